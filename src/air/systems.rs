@@ -1,0 +1,114 @@
+//! `ExternalForces`: what the air and gravity do to velocities, and what wind asks of the bonds.
+
+use super::{AirDrag, Blower, HairGravity, WindReceived, model::wind};
+use crate::{
+    bond::{BondChanges, BondKind, model::drying},
+    fault::{Fault, HairFault},
+    parallel::for_each,
+    setting::{self, Notes, Settings},
+    strand::{Hair, Strand, StrandOf, TickPose},
+    tick::{HairStep, HairSystems, HairTick},
+};
+use bevy::{platform::collections::HashMap, prelude::*};
+
+/// Gravity, wind and drag.
+pub struct AirPlugin;
+
+impl Plugin for AirPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<AirDrag>(app);
+        app.init_resource::<HairGravity>()
+            .register_type::<HairGravity>()
+            .register_type::<Blower>()
+            .register_type::<WindReceived>()
+            .add_systems(PreUpdate, report_blowers)
+            .add_systems(HairTick, apply_air.in_set(HairSystems::ExternalForces));
+    }
+}
+
+fn report_blowers(
+    blowers: Query<(Entity, &Blower), Changed<Blower>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, blower) in &blowers {
+        let notes = Notes::default();
+        blower.mended(&notes);
+        for wrong in notes.into_inner() {
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+        }
+    }
+}
+
+/// A hair's air in its own frame.
+struct LocalAir {
+    gravity: Vec3,
+    keep: f32,
+    blowers: Vec<(Vec3, Vec3, Blower)>,
+}
+
+pub(crate) fn apply_air(
+    step: Res<HairStep>,
+    gravity: Res<HairGravity>,
+    drag: Settings<AirDrag>,
+    hairs: Query<&TickPose, With<Hair>>,
+    blowers: Query<(&Blower, &TickPose)>,
+    mut strands: Query<(&StrandOf, &mut Strand, &mut BondChanges, Option<&mut WindReceived>)>,
+) {
+    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
+    let blowers: Vec<(Vec3, Vec3, Blower)> = blowers
+        .iter()
+        .map(|(b, pose)| (b.mended(&Notes::default()), pose.now()))
+        .filter(|(blower, _)| blower.strength > 0.0)
+        .map(|(blower, pose)| (pose.translation, pose.rotation * Vec3::NEG_Z, blower))
+        .collect();
+    let mut airs: Vec<LocalAir> = Vec::new();
+    let mut index_of = HashMap::<Entity, Option<usize>>::default();
+    let mut items = Vec::with_capacity(strands.iter().len());
+    for (of, strand, changes, received) in &mut strands {
+        let index = *index_of.entry(of.0).or_insert_with(|| {
+            let pose = hairs.get(of.0).ok()?.now();
+            airs.push(LocalAir {
+                gravity: pose.direction_in(gravity) * step.dt,
+                keep: bevy::math::ops::exp(-drag.of(of.0).rate * step.dt),
+                blowers: (blowers.iter())
+                    .map(|&(p, aim, b)| (pose.point_in(p), pose.direction_in(aim), b))
+                    .collect(),
+            });
+            Some(airs.len() - 1)
+        });
+        if let Some(air) = index {
+            items.push((air, strand, changes, received));
+        }
+    }
+    for_each(&mut items, |(air, strand, changes, received)| {
+        let air = &airs[*air];
+        let (positions, velocities, ..) = strand.bypass_change_detection().parts_mut();
+        for v in velocities.iter_mut() {
+            *v = *v * air.keep + air.gravity;
+        }
+        if air.blowers.is_empty() {
+            return;
+        }
+        let edges = positions.len().saturating_sub(1);
+        for i in 0..edges {
+            // The tip has no edge of its own: it takes the last one's wind.
+            let edge = positions[i + 1] - positions[i];
+            let (mut change, mut dried) = (Vec3::ZERO, 0.0);
+            for (nozzle, aim, blower) in &air.blowers {
+                let w = wind(blower.strength, *nozzle, *aim, positions[i], edge) * step.dt;
+                change += w;
+                dried += drying(w.length(), blower.drying);
+                if i + 1 == edges {
+                    velocities[i + 1] +=
+                        wind(blower.strength, *nozzle, *aim, positions[i + 1], edge) * step.dt;
+                }
+            }
+            velocities[i] += change;
+            changes.bypass_change_detection().ask(i, BondKind::Hydrogen, dried);
+            if let Some(received) = received.as_deref_mut() {
+                received.total.resize(edges, 0.0);
+                received.total[i] += change.length();
+            }
+        }
+    });
+}

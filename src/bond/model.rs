@@ -1,0 +1,191 @@
+//! Side-chain bonds as mathematics: equations 13–16 and 19 of \[B\], on one joint at a time.
+
+use super::BondKind;
+use crate::rod::frame::full;
+use bevy::{math::Quat, math::Vec3, reflect::Reflect};
+
+/// The bonds of one joint: for each kind its remembered shape Ω_j and its rate b_j ∈ \[0, 1\]. One
+/// cache line.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+pub struct JointBonds {
+    /// Remembered Darboux vector Ω_j of each kind, by [`BondKind`] as index.
+    pub shapes: [Vec3; BondKind::COUNT],
+    /// Rate b_j of each kind: 1 all bonds closed, 0 all broken.
+    pub rates: [f32; BondKind::COUNT],
+}
+
+impl Default for JointBonds {
+    fn default() -> Self {
+        Self::closed(Vec3::ZERO)
+    }
+}
+
+impl JointBonds {
+    /// All bonds closed around the shape `omega`.
+    pub fn closed(omega: Vec3) -> Self {
+        Self { shapes: [omega; BondKind::COUNT], rates: [1.0; BondKind::COUNT] }
+    }
+
+    /// Equation 15: Ω0 = Σ f_j {Ω_j + (1−b_j)(Ω − Ω_j)} / Σ f_j, as a full quaternion.
+    ///
+    /// `omega` is the present shape with real part ≥ 0, `influence` the shares f_j. Broken bonds
+    /// follow the present shape: the joint gets softer by B = Σ f b / Σ f and feels only what bonds
+    /// remain. Ω is taken in the hemisphere of each Ω_j.
+    #[inline]
+    pub fn rest_shape(&self, omega: Quat, influence: &[f32; BondKind::COUNT]) -> Quat {
+        let mut sum = Vec3::ZERO;
+        let mut total = 0.0;
+        for j in 0..BondKind::COUNT {
+            let (f, b) = (influence[j], self.rates[j]);
+            let present = aligned(omega, self.shapes[j]);
+            sum += f * (self.shapes[j] * b + present * (1.0 - b));
+            total += f;
+        }
+        full(sum / total)
+    }
+
+    /// Equation 16: bonds of kind `j` that form (Δb > 0) remember the present shape,
+    /// Ω_j ← (b Ω_j + Δb Ω)/(b + Δb); bonds that break forget nothing. b stays in \[0, 1\].
+    #[inline]
+    pub fn change(&mut self, j: usize, change: f32, omega: Quat) {
+        let b = self.rates[j];
+        let to = (b + change).clamp(0.0, 1.0);
+        let formed = to - b;
+        if formed > 0.0 {
+            let present = aligned(omega, self.shapes[j]);
+            self.shapes[j] = (self.shapes[j] * b + present * formed) / to;
+        }
+        self.rates[j] = to;
+    }
+
+    /// The shape the bonds alone would rest in: Ω* = Σ f b Ω_j / Σ f b (zero when all are broken).
+    pub fn relaxed(&self, influence: &[f32; BondKind::COUNT]) -> Vec3 {
+        let (sum, closed) = (0..BondKind::COUNT).fold((Vec3::ZERO, 0.0), |(s, t), j| {
+            let fb = influence[j] * self.rates[j];
+            (s + self.shapes[j] * fb, t + fb)
+        });
+        if closed > 0.0 { sum / closed } else { Vec3::ZERO }
+    }
+
+    /// B = Σ f b / Σ f: the share of the joint's stiffness that is left.
+    pub fn closed_share(&self, influence: &[f32; BondKind::COUNT]) -> f32 {
+        let (sum, total) = (0..BondKind::COUNT)
+            .fold((0.0, 0.0), |(s, t), j| (s + influence[j] * self.rates[j], t + influence[j]));
+        sum / total
+    }
+
+    /// Whether every number is finite and every rate in \[0, 1\].
+    pub fn is_valid(&self) -> bool {
+        self.shapes.iter().all(|s| s.is_finite())
+            && self.rates.iter().all(|b| (0.0..=1.0).contains(b))
+    }
+}
+
+/// The present shape as a Darboux vector in the hemisphere of the remembered one.
+#[inline]
+fn aligned(omega: Quat, remembered: Vec3) -> Vec3 {
+    let w = (1.0 - remembered.length_squared()).max(0.0).sqrt();
+    let opposite = omega.xyz().dot(remembered) + omega.w * w < 0.0;
+    if opposite { -omega.xyz() } else { omega.xyz() }
+}
+
+/// Equation 19: the change of the hydrogen bonds' rate by a wind that changed the velocity by
+/// `wind` (m/s) in this substep. `per_speed` is 0.3 per m/s (print: 0.003 per cm/s).
+#[inline]
+pub fn drying(wind: f32, per_speed: f32) -> f32 {
+    per_speed * wind
+}
+
+/// Equations 13 and 14 as a factor on the true stiffness: 1 at the root, 1 − `softening` where the
+/// cuticle is gone. `distance` from the root (m), `damage` per length (1/m).
+#[inline]
+pub fn cuticle_factor(distance: f32, damage: f32, softening: f32) -> f32 {
+    let cuticle = (1.0 - damage * distance).max(0.0);
+    1.0 - softening * (1.0 - cuticle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const F: [f32; 4] = [0.3, 0.33, 0.2, 0.17];
+
+    fn omega(v: Vec3) -> Quat {
+        full(v)
+    }
+
+    #[test]
+    fn fresh_bonds_rest_in_their_shape_and_broken_ones_in_the_present() {
+        let shape = Vec3::new(0.1, -0.2, 0.3);
+        let present = omega(Vec3::new(0.4, 0.1, 0.0));
+        let mut joint = JointBonds::closed(shape);
+        assert!(joint.rest_shape(present, &F).xyz().distance(shape) < 1e-6);
+        joint.rates = [0.0; 4];
+        assert!(joint.rest_shape(present, &F).xyz().distance(present.xyz()) < 1e-6);
+        assert_eq!(joint.relaxed(&F), Vec3::ZERO);
+    }
+
+    #[test]
+    fn forming_remembers_breaking_does_not() {
+        let (old, new) = (Vec3::X * 0.2, Vec3::Y * 0.4);
+        let mut joint = JointBonds::closed(old);
+        joint.change(0, -0.75, omega(new));
+        assert_eq!(joint.shapes[0], old);
+        joint.change(0, 0.25, omega(new));
+        assert!(joint.shapes[0].distance((old + new) * 0.5) < 1e-6);
+        // clamped first: only 0.5 of the asked 9 forms
+        joint.change(0, 9.0, omega(new));
+        assert_eq!(joint.rates[0], 1.0);
+        assert!(joint.shapes[0].distance(old * 0.25 + new * 0.75) < 1e-6);
+    }
+
+    #[test]
+    fn a_remembered_half_turn_is_not_averaged_away() {
+        // Darboux vectors near ±1 mean nearly the same rotation.
+        let shape = Vec3::X * 0.999;
+        let mut joint = JointBonds::closed(shape);
+        joint.rates = [0.5; 4];
+        let present = omega(Vec3::X * -0.9985);
+        assert!(joint.rest_shape(present, &F).x > 0.99);
+    }
+
+    #[test]
+    fn cuticle_follows_table_1() {
+        assert_eq!(cuticle_factor(0.0, 0.33, 0.5764), 1.0);
+        assert!((cuticle_factor(0.24, 0.33, 0.5764) - (1.0 - 0.5764 * 0.0792)).abs() < 1e-6);
+        assert!((cuticle_factor(9.0, 0.33, 0.5764) - 0.4236).abs() < 1e-6);
+    }
+
+    proptest! {
+        #[test]
+        fn many_small_steps_remember_like_one(steps in 1usize..200, to in 0.05f32..1.0) {
+            let mut once = JointBonds::closed(Vec3::X * 0.3);
+            once.rates[2] = 0.0;
+            let mut often = once;
+            let present = omega(Vec3::new(0.0, 0.2, -0.4));
+            once.change(2, to, present);
+            for _ in 0..steps {
+                often.change(2, to / steps as f32, present);
+            }
+            prop_assert!(once.shapes[2].distance(often.shapes[2]) < 1e-4);
+            prop_assert!((once.rates[2] - often.rates[2]).abs() < 1e-4);
+        }
+
+        #[test]
+        fn rest_shape_is_the_two_term_form(
+            b in proptest::array::uniform4(0.0f32..1.0),
+            s in -0.4f32..0.4, t in -0.4f32..0.4,
+        ) {
+            // Ω0 = M + (1−B) Ω
+            let mut joint = JointBonds::closed(Vec3::new(s, 0.1, 0.0));
+            joint.shapes[1] = Vec3::new(0.0, t, 0.2);
+            joint.rates = b;
+            let present = omega(Vec3::new(0.2, t, s));
+            let m = (0..4).map(|j| F[j] * b[j] * joint.shapes[j]).sum::<Vec3>();
+            let share: f32 = (0..4).map(|j| F[j] * b[j]).sum();
+            let expected = m + (1.0 - share) * present.xyz();
+            prop_assert!(joint.rest_shape(present, &F).xyz().distance(expected) < 1e-5);
+        }
+    }
+}

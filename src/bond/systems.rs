@@ -1,0 +1,133 @@
+//! The bonds' two places in the tick: `RestShape` (equation 15) and `BondUpdate` (equation 16).
+
+use super::{
+    BondChanges, BondInfluence, BondKind, Bonds, Cuticle, JointBonds, RestShape,
+    model::cuticle_factor,
+};
+use crate::{
+    fault::{Fault, HairFault},
+    parallel::for_each,
+    rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
+    setting::{self, Bound, Notes, Settings},
+    strand::{self, Strand, StrandOf},
+    tick::{HairStep, HairSystems, HairTick},
+};
+use bevy::{platform::collections::HashMap, prelude::*};
+
+/// Rest shapes from bonds and bonds' memory.
+pub struct BondPlugin;
+
+impl Plugin for BondPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<BondInfluence>(app);
+        setting::plugin::<Cuticle>(app);
+        app.register_type::<Bonds>()
+            .register_type::<BondChanges>()
+            .register_type::<RestShape>()
+            .add_systems(HairTick, fit_bonds.in_set(HairSystems::Roots).after(strand::carry_strands))
+            .add_systems(HairTick, generate_rest_shapes.in_set(HairSystems::RestShape))
+            .add_systems(HairTick, update_bonds.in_set(HairSystems::BondUpdate));
+    }
+}
+
+/// Gives new strands their bonds, and mends what game code wrote into them. Our own writes bypass
+/// change detection, so `Changed` means somebody else's.
+fn fit_bonds(
+    mut strands: Query<(Entity, &Strand, &mut Bonds), Changed<Bonds>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    const RATE: Bound = Bound::new("a bond's rate", 0.0, 1.0, "0 all broken, 1 all closed");
+    for (entity, strand, mut bonds) in &mut strands {
+        let bonds = bonds.bypass_change_detection();
+        if bonds.joints.len() != strand.edges() {
+            *bonds = Bonds::of(strand);
+        }
+        let notes = Notes::default();
+        for joint in bonds.joints.iter_mut().filter(|j| !j.is_valid()) {
+            for (shape, rate) in joint.shapes.iter_mut().zip(&mut joint.rates) {
+                *rate = RATE.mend(*rate, 1.0, &notes);
+                if !shape.is_finite() {
+                    RATE.mend(shape.length(), 0.0, &notes);
+                    *shape = Vec3::ZERO;
+                }
+            }
+        }
+        if let Some(wrong) = notes.into_inner().into_iter().next() {
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+        }
+    }
+}
+
+/// What the stiffness of a hair's joints is made of, resolved once a substep.
+type Resolved = ([f32; BondKind::COUNT], StiffnessKey);
+
+/// Stiffness per iteration is recomputed only when one of these changes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
+pub(super) struct StiffnessKey {
+    stiffness: Stiffness,
+    cuticle: Cuticle,
+    iterations: u32,
+    dt: f32,
+}
+
+fn generate_rest_shapes(
+    step: Res<HairStep>,
+    influence: Settings<BondInfluence>,
+    stiffness: Settings<Stiffness>,
+    cuticle: Settings<Cuticle>,
+    solver: Settings<Solver>,
+    mut strands: Query<(&StrandOf, &Strand, &Bonds, &mut RestShape)>,
+) {
+    let mut resolved = HashMap::<Entity, Resolved>::default();
+    let mut items: Vec<_> = strands
+        .iter_mut()
+        .map(|(of, strand, bonds, rest)| {
+            let hair = *resolved.entry(of.0).or_insert_with(|| {
+                let key = StiffnessKey {
+                    stiffness: stiffness.of(of.0),
+                    cuticle: cuticle.of(of.0),
+                    iterations: solver.of(of.0).iterations,
+                    dt: step.dt,
+                };
+                (influence.of(of.0).as_array(), key)
+            });
+            (hair, strand, bonds, rest)
+        })
+        .collect();
+    for_each(&mut items, |((influence, key), strand, bonds, rest)| {
+        let rest = rest.bypass_change_detection();
+        rest.darboux.clear();
+        rest.darboux.extend(
+            (bonds.joints.iter())
+                .enumerate()
+                .map(|(i, joint)| joint.rest_shape(strand.darboux(i), influence)),
+        );
+        if rest.key != Some(*key) || rest.stiffness.len() != strand.edges() {
+            rest.key = Some(*key);
+            rest.stiffness.clear();
+            let mut distance = 0.0;
+            rest.stiffness.extend(strand.rest_lengths().iter().map(|length| {
+                let factor = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
+                distance += length;
+                let k = key.stiffness.per_substep(key.dt, factor);
+                stiffness_per_iteration(k, key.iterations)
+            }));
+        }
+    });
+}
+
+fn update_bonds(mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges)>) {
+    let mut items: Vec<_> =
+        strands.iter_mut().filter(|(_, _, changes)| !changes.is_empty()).collect();
+    for_each(&mut items, |(strand, bonds, changes)| {
+        let joints: &mut [JointBonds] = &mut bonds.bypass_change_detection().joints;
+        for (i, change) in changes.bypass_change_detection().take() {
+            if let Some(joint) = joints.get_mut(i) {
+                let omega = strand.darboux(i);
+                for (kind, change) in change.into_iter().enumerate().filter(|(_, c)| *c != 0.0) {
+                    joint.change(kind, change, omega);
+                }
+            }
+        }
+    });
+}

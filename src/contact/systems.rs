@@ -1,0 +1,125 @@
+//! `Interaction`: strands push each other apart, colliders are seen from each hair's frame.
+
+use super::{
+    ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles,
+    model::Run,
+};
+use crate::{
+    fault::{Fault, HairFault},
+    parallel::for_each,
+    rod::obstacle::{Obstacle, Solid},
+    setting::{self, Notes, Settings},
+    strand::{Hair, Strand, StrandOf, Strands, TickPose},
+    tick::{HairStep, HairSystems, HairTick},
+};
+use bevy::prelude::*;
+
+/// Colliders and contact between strands.
+pub struct ContactPlugin;
+
+impl Plugin for ContactPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<LockContact>(app);
+        app.register_type::<HairCollider>()
+            .register_type::<ColliderShape>()
+            .register_required_components::<Hair, Obstacles>()
+            .register_required_components::<Hair, LockNeighbours>()
+            .add_systems(PreUpdate, report_colliders)
+            .add_systems(
+                HairTick,
+                (gather_obstacles, part_strands).in_set(HairSystems::Interaction),
+            );
+    }
+}
+
+fn report_colliders(
+    colliders: Query<(Entity, &HairCollider), Changed<HairCollider>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, collider) in &colliders {
+        let notes = Notes::default();
+        collider.mended(&notes);
+        for wrong in notes.into_inner() {
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+        }
+    }
+}
+
+/// A collider in a hair's frame, with the way its surface goes there during the substep.
+fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obstacle {
+    let (now, own) = (hair.now(), pose.now());
+    let scale = own.scale / now.scale;
+    let at = now.point_in(own.translation);
+    let turned = |d: Vec3| now.direction_in(own.rotation * d);
+    let solid = match collider.shape {
+        ColliderShape::Sphere(s) => Solid::Capsule { a: at, b: at, radius: s.radius * scale },
+        ColliderShape::Capsule(c) => {
+            let half = turned(Vec3::Y) * (c.half_length * scale);
+            Solid::Capsule { a: at - half, b: at + half, radius: c.radius * scale }
+        }
+        ColliderShape::Plane(p) => Solid::HalfSpace { normal: turned(*p.normal), point: at },
+        ColliderShape::Cylinder(c) => Solid::Cylinder {
+            center: at,
+            axis: turned(Vec3::Y),
+            radius: c.radius * scale,
+            half_height: c.half_height * scale,
+        },
+    };
+    let motion = pose.motion_in(now);
+    Obstacle { solid, motion, friction: collider.friction }
+}
+
+fn gather_obstacles(
+    colliders: Query<(&HairCollider, &TickPose)>,
+    mut hairs: Query<(&TickPose, &mut Obstacles), With<Hair>>,
+) {
+    for (hair, mut obstacles) in &mut hairs {
+        obstacles.solids.clear();
+        obstacles.solids.extend(
+            colliders.iter().map(|(c, pose)| seen_from(hair, &c.mended(&Notes::default()), pose)),
+        );
+    }
+}
+
+pub(crate) fn part_strands(
+    step: Res<HairStep>,
+    contact: Settings<LockContact>,
+    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours), With<Hair>>,
+    mut strands: Query<&mut Strand, With<StrandOf>>,
+) {
+    for (hair, members, mut neighbours) in &mut hairs {
+        let LockContact { radius, strength } = contact.of(hair);
+        if radius <= 0.0 || strength <= 0.0 {
+            continue;
+        }
+        let LockNeighbours { list, points, runs, pushes } = neighbours.bypass_change_detection();
+        points.clear();
+        runs.clear();
+        for strand in strands.iter_many(members.collection()) {
+            let run = Run { start: points.len() as u32, len: strand.nodes() as u32 };
+            points.extend_from_slice(strand.positions());
+            runs.push(run);
+        }
+        list.update(points, runs, radius);
+        pushes.resize(points.len(), Vec3::ZERO);
+        let (list, points) = (&*list, &*points);
+        let mut work: Vec<(usize, &mut [Vec3])> = Vec::with_capacity(runs.len());
+        let mut rest = &mut pushes[..];
+        for run in runs.iter() {
+            let (own, others) = rest.split_at_mut(run.len as usize);
+            work.push((run.start as usize, own));
+            rest = others;
+        }
+        for_each(&mut work, |(start, pushes)| {
+            for (i, push) in (*start..).zip(pushes.iter_mut()) {
+                *push = list.acceleration(i, points, radius, strength) * step.dt;
+            }
+        });
+        let mut pushes = pushes.iter();
+        let mut members = strands.iter_many_mut(members.collection());
+        while let Some(mut strand) = members.fetch_next() {
+            let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
+            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += *push);
+        }
+    }
+}

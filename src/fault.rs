@@ -1,0 +1,50 @@
+//! Faults: what went wrong and was contained, told once, as messages and in the log.
+
+use crate::{setting::InvalidValue, strand::StrandError};
+use bevy::prelude::*;
+
+/// Something that was wrong and has been contained. Written once per occurrence, so that game code
+/// can react; also logged as a warning.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct HairFault {
+    /// The hair, strand, collider, blower or rod concerned; [`Entity::PLACEHOLDER`] for resources.
+    pub entity: Entity,
+    /// What was wrong.
+    pub fault: Fault,
+}
+
+/// The kinds of [`HairFault`].
+#[derive(thiserror::Error, Clone, Debug, PartialEq)]
+pub enum Fault {
+    /// A setting outside its range is used as the nearest valid value.
+    #[error("{0}; the nearest valid value is used")]
+    Setting(#[from] InvalidValue),
+    /// A strand left the finite numbers and was put back to the state of the substep before.
+    #[error("the strand became non-finite and was put back to its last finite state, at rest")]
+    PutBack,
+    /// A strand's stored state was not finite and its pose was rebuilt from root, lengths and bonds.
+    #[error("the strand's state was not finite; its rest pose was rebuilt from root and bonds")]
+    Rebuilt,
+    /// A strand points to a hair that does not exist or carries no `Hair`: it is left out.
+    #[error("the strand belongs to no hair: spawn it with StrandOf(hair), hair carrying Hair")]
+    NoHair,
+    /// A strand that cannot be simulated at all.
+    #[error(transparent)]
+    Strand(#[from] StrandError),
+    /// A transform that cannot be inverted, or is not finite: the last valid one is used.
+    #[error("the transform is not finite or has no inverse: the last valid pose is used")]
+    Transform,
+    /// A request that names something that is not there.
+    #[error("the treatment's target is neither a Hair nor a strand")]
+    NoTarget,
+}
+
+pub(crate) fn plugin(app: &mut App) {
+    app.add_message::<HairFault>().add_systems(Last, log_faults);
+}
+
+fn log_faults(mut faults: MessageReader<HairFault>) {
+    for HairFault { entity, fault } in faults.read() {
+        tracing::warn!("hair, entity {entity}: {fault}");
+    }
+}

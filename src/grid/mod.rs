@@ -1,0 +1,152 @@
+//! The uniform grid, pure: who is near whom, without looking at all pairs.
+//!
+//! Wet-hair paper (\[W\]) equations 4 and 5, as meant: a point's cell is ⌊p / h⌋ with the cell size h
+//! at least the search radius, so that its neighbours lie in the 27 cells around. The paper's cells
+//! cover a box of N³; here the cells' keys are hashed into a table, so the world has no edges and an
+//! outlier costs nothing. Built by counting sort: two passes over the points, no allocation once
+//! warm, the same order every time.
+
+use bevy::math::{IVec3, Vec3};
+
+const FAR: Vec3 = Vec3::splat(1e9);
+
+/// Points sorted by cell.
+#[derive(Clone, Debug, Default)]
+pub struct UniformGrid {
+    inverse_cell: f32,
+    /// Where each bucket's entries begin; one more than buckets, a power of two of them.
+    starts: Vec<u32>,
+    entries: Vec<Entry>,
+    unsorted: Vec<Entry>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    cell: IVec3,
+    item: u32,
+}
+
+impl UniformGrid {
+    /// Equation 4 as meant: the cell that `point` lies in.
+    #[inline]
+    pub fn cell_of(&self, point: Vec3) -> IVec3 {
+        // Beyond a billion cells all points share the outermost one; distance tests sort them out.
+        (point * self.inverse_cell).floor().clamp(-FAR, FAR).as_ivec3()
+    }
+
+    /// Sorts `items`, each a point and a number of the caller's, into cells of size `cell` (> 0).
+    /// Non-finite points are left out. An item may come in several cells, once in each.
+    pub fn build(&mut self, cell: f32, items: impl Iterator<Item = (Vec3, u32)>) {
+        self.inverse_cell = 1.0 / cell.max(1e-9);
+        self.unsorted.clear();
+        for (point, item) in items {
+            if point.is_finite() {
+                let cell = self.cell_of(point);
+                self.unsorted.push(Entry { cell, item });
+            }
+        }
+        let buckets = self.unsorted.len().next_power_of_two().max(16);
+        self.starts.clear();
+        self.starts.resize(buckets + 1, 0);
+        let mask = buckets - 1;
+        for e in &self.unsorted {
+            self.starts[bucket(e.cell, mask) + 1] += 1;
+        }
+        for b in 0..buckets {
+            self.starts[b + 1] += self.starts[b];
+        }
+        self.entries.clear();
+        self.entries.resize(self.unsorted.len(), Entry::default());
+        // Filling from the back turns each bucket's end into its start and keeps the items' order.
+        for e in self.unsorted.iter().rev() {
+            let end = &mut self.starts[bucket(e.cell, mask) + 1];
+            *end -= 1;
+            self.entries[*end as usize] = *e;
+        }
+        self.starts.rotate_left(1);
+        self.starts[buckets] = self.entries.len() as u32;
+    }
+
+    /// Calls `near` with every item in the 27 cells around `point`: all that lie within one cell
+    /// size of it, and some that do not. An item comes once for each cell it was put in.
+    #[inline]
+    pub fn for_each_near(&self, point: Vec3, mut near: impl FnMut(u32)) {
+        if self.entries.is_empty() || !point.is_finite() {
+            return;
+        }
+        let center = self.cell_of(point);
+        let mask = self.starts.len() - 2;
+        for z in -1..=1 {
+            for y in -1..=1 {
+                for x in -1..=1 {
+                    let cell = center + IVec3::new(x, y, z);
+                    let b = bucket(cell, mask);
+                    let range = self.starts[b] as usize..self.starts[b + 1] as usize;
+                    for e in &self.entries[range] {
+                        // Cells that share a bucket are told apart here.
+                        if e.cell == cell {
+                            near(e.item);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Equation 5's role: a table index for a cell.
+#[inline]
+fn bucket(cell: IVec3, mask: usize) -> usize {
+    let h = (cell.x as u32).wrapping_mul(0x9E37_79B1)
+        ^ (cell.y as u32).wrapping_mul(0x85EB_CA77)
+        ^ (cell.z as u32).wrapping_mul(0xC2B2_AE3D);
+    (h ^ (h >> 15)) as usize & mask
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn near(grid: &UniformGrid, points: &[Vec3], p: Vec3, radius: f32) -> Vec<u32> {
+        let mut found = Vec::new();
+        grid.for_each_near(p, |i| {
+            if points[i as usize].distance(p) <= radius {
+                found.push(i);
+            }
+        });
+        found.sort_unstable();
+        found
+    }
+
+    proptest! {
+        #[test]
+        fn neighbour_sets_equal_brute_force(
+            raw in proptest::collection::vec((-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0), 1..200),
+            radius in 0.01f32..0.5,
+            stretch in 0.1f32..50.0,
+        ) {
+            let points: Vec<Vec3> =
+                raw.iter().map(|&(x, y, z)| Vec3::new(x, y, z) * stretch).collect();
+            let mut grid = UniformGrid::default();
+            grid.build(radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
+            for &p in &points {
+                let brute: Vec<u32> = (0..points.len() as u32)
+                    .filter(|&i| points[i as usize].distance(p) <= radius)
+                    .collect();
+                prop_assert_eq!(near(&grid, &points, p, radius), brute);
+            }
+        }
+    }
+
+    #[test]
+    fn outliers_and_nonsense_do_not_disturb() {
+        let points = [Vec3::ZERO, Vec3::splat(1e30), Vec3::NAN, Vec3::X * 0.05, Vec3::NEG_X * 1e9];
+        let mut grid = UniformGrid::default();
+        grid.build(0.1, points.iter().zip(0..).map(|(p, i)| (*p, i)));
+        assert_eq!(near(&grid, &points, Vec3::ZERO, 0.1), vec![0, 3]);
+        grid.for_each_near(Vec3::NAN, |_| panic!("nothing is near nowhere"));
+        grid.build(0.1, core::iter::empty());
+        grid.for_each_near(Vec3::ZERO, |_| panic!("an empty grid is empty"));
+    }
+}

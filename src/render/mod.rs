@@ -1,0 +1,10 @@
+//! Draws the hair.
+
+use bevy::prelude::*;
+
+/// Draws the hair.
+pub struct HairRenderPlugin;
+
+impl Plugin for HairRenderPlugin {
+    fn build(&self, _app: &mut App) {}
+}

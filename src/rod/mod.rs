@@ -1,0 +1,31 @@
+//! Cosserat rods on position-based dynamics, as pure functions.
+//!
+//! A strand is nodes p_0 (root) … p_{n−1} (tip) and edges with orientations q_i, whose tangent is
+//! R(q) e3. Edge 0 forms a joint with the scalp's frame q_{−1}, which gives the root half cell its
+//! double stiffness; the tip carries half a mass. Source: Demura, Fujisawa, Mikawa, *Hair Simulation
+//! Based on Internal Chemical Bonds* (\[B\] here), on the rods of Kugelstadt & Schömer 2016.
+//!
+//! | file | equations of \[B\] |
+//! |---|---|
+//! | [`constraint`] | 1–5 stretch–shear, 6–11 bend–twist, 12 stiffness per iteration |
+//! | [`stiffness`] | weights from the gravity-bending length (the paper gives none) |
+//! | [`block`] | one substep: predict, project, limit lengths, velocities |
+//! | `limiter` | direct tridiagonal solve of a strand's lengths |
+//! | [`obstacle`] | colliders as half-space, capsule and cylinder, with friction |
+//!
+//! Strands of equal node count are solved [`LANES`] side by side; see [`block`] for the layout.
+
+pub mod algebra;
+pub mod block;
+pub mod constraint;
+pub mod frame;
+pub mod lanes;
+mod limiter;
+pub mod obstacle;
+pub mod stiffness;
+mod systems;
+
+pub use constraint::StretchProjection;
+pub use lanes::LANES;
+pub use stiffness::{Solver, Stiffness};
+pub use systems::RodPlugin;

@@ -1,0 +1,174 @@
+//! Colliders as rod mathematics sees them: half-spaces, capsules and cylinders, in lanes.
+
+use super::{
+    algebra::V3,
+    lanes::{LANES, Real},
+};
+use bevy::math::{Affine3A, Vec3};
+use fearless_simd::{Simd, f32x16, prelude::*};
+
+/// The solid part of space that an [`Obstacle`] fills, in the frame of the nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solid {
+    /// Everything on the far side of a plane.
+    HalfSpace {
+        /// Unit normal, pointing out of the solid.
+        normal: Vec3,
+        /// A point of the plane (m).
+        point: Vec3,
+    },
+    /// All points within `radius` of a segment; of a point for spheres.
+    Capsule {
+        /// One end of the segment (m).
+        a: Vec3,
+        /// The other end (m).
+        b: Vec3,
+        /// Radius (m).
+        radius: f32,
+    },
+    /// A solid cylinder with flat ends.
+    Cylinder {
+        /// The centre (m).
+        center: Vec3,
+        /// Unit direction of the axis.
+        axis: Vec3,
+        /// Radius (m).
+        radius: f32,
+        /// Half the length along the axis (m).
+        half_height: f32,
+    },
+}
+
+/// A solid that nodes cannot enter.
+#[derive(Clone, Copy, Debug)]
+pub struct Obstacle {
+    /// What space it fills at the end of the substep.
+    pub solid: Solid,
+    /// How its surface moves during the substep: a point of it goes from x to `motion · x`.
+    pub motion: Option<Affine3A>,
+    /// Coulomb coefficient.
+    pub friction: f32,
+}
+
+impl Obstacle {
+    /// Whether any point of the box `low…high`, grown by `margin`, may lie inside. Never wrongly
+    /// denies.
+    pub fn may_touch(&self, low: Vec3, high: Vec3, margin: f32) -> bool {
+        let center = 0.5 * (low + high);
+        let half = 0.5 * (high - low) + margin;
+        match self.solid {
+            Solid::HalfSpace { normal, point } => {
+                (center - point).dot(normal) <= normal.abs().dot(half)
+            }
+            Solid::Capsule { a, b, radius } => {
+                let (l, h) = (a.min(b) - radius, a.max(b) + radius);
+                (l.cmple(center + half) & h.cmpge(center - half)).all()
+            }
+            Solid::Cylinder { center: c, axis, radius, half_height } => {
+                let across = (Vec3::ONE - axis * axis).max(Vec3::ZERO);
+                let reach = axis.abs() * half_height
+                    + radius * Vec3::new(across.x.sqrt(), across.y.sqrt(), across.z.sqrt());
+                ((c - reach).cmple(center + half) & (c + reach).cmpge(center - half)).all()
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
+    let s = |x: f32| f32x16::splat(simd, x);
+    V3::new(s(v.x), s(v.y), s(v.z))
+}
+
+/// Moves `p` out of the solid where it is inside, and holds it back along the surface by Coulomb
+/// friction, measured from where the node was (`from`) and against the surface's own motion.
+///
+/// With `silent`, nothing but the shortest way out: for states, not for steps. Where no lane is
+/// inside, `p` comes back bit for bit.
+#[inline(always)]
+pub(super) fn push_out<S: Simd>(
+    obstacle: &Obstacle,
+    p: V3<f32x16<S>>,
+    from: V3<f32x16<S>>,
+    friction: f32x16<S>,
+    skin: f32,
+    silent: bool,
+) -> V3<f32x16<S>> {
+    let simd = p.x.simd;
+    let s = |x: f32| f32x16::splat(simd, x);
+    let (zero, one, tiny) = (s(0.0), s(1.0), s(1e-12));
+    // A point on a collider's own axis has no way out that is shorter than another: it goes
+    // along `up`.
+    let unit_or = |v: V3<f32x16<S>>, up: Vec3| {
+        let length = Real::sqrt(v.dot(v));
+        let degenerate = Real::lt(length, tiny);
+        let inverse = one / Real::max(length, tiny);
+        (V3::select(degenerate, splat(simd, up), v.scale(inverse)), length)
+    };
+    let (normal, depth) = match obstacle.solid {
+        Solid::HalfSpace { normal, point } => {
+            let n = splat(simd, normal);
+            (n, s(skin) - (p - splat(simd, point)).dot(n))
+        }
+        Solid::Capsule { a, b, radius } => {
+            let axis = b - a;
+            let inverse = 1.0 / axis.length_squared().max(1e-20);
+            let rel = p - splat(simd, a);
+            let t = rel.dot(splat(simd, axis * inverse));
+            let t = Real::min(Real::max(t, zero), one);
+            let off = rel - splat(simd, axis).scale(t);
+            let (n, distance) = unit_or(off, self::across(axis));
+            (n, s(radius + skin) - distance)
+        }
+        Solid::Cylinder { center, axis, radius, half_height } => {
+            let u = splat(simd, axis);
+            let rel = p - splat(simd, center);
+            let along = rel.dot(u);
+            let across = rel - u.scale(along);
+            let (radial, distance) = unit_or(across, self::across(axis));
+            let side = s(radius + skin) - distance;
+            let below = Real::lt(along, zero);
+            let cap = s(half_height + skin) - Real::select(below, -along, along);
+            let cap_normal = V3::select(below, -u, u);
+            let nearer_cap = Real::lt(cap, side);
+            // Outside where either is negative: the smaller of the two decides.
+            (
+                V3::select(nearer_cap, cap_normal, radial),
+                Real::min(cap, side),
+            )
+        }
+    };
+    let inside = Real::lt(zero, depth);
+    if inside.to_bitmask() == 0 {
+        return p;
+    }
+    let depth = Real::max(depth, zero);
+    let out = normal.scale_add(depth, p);
+    if silent {
+        return V3::select(inside, out, p);
+    }
+    let mut slip = out - from;
+    if let Some(m) = &obstacle.motion {
+        let column = |c: usize| splat(simd, m.matrix3.col(c).into());
+        let moved = column(0).scale_add(
+            from.x,
+            column(1).scale_add(
+                from.y,
+                column(2).scale_add(from.z, splat(simd, m.translation.into())),
+            ),
+        );
+        slip = out - moved;
+    }
+    let tangential = slip - normal.scale(slip.dot(normal));
+    let length = Real::sqrt(tangential.dot(tangential));
+    // Static where the grip suffices, sliding where not.
+    let held = Real::min(one, friction * depth / Real::max(length, tiny));
+    V3::select(inside, tangential.scale_add(-held, out), p)
+}
+
+/// Some direction across an axis; up for an axis without length.
+fn across(axis: Vec3) -> Vec3 {
+    axis.try_normalize().map_or(Vec3::Y, |u| u.any_orthonormal_vector())
+}
+
+const _: () = assert!(LANES == 16, "f32x16 is the lane type");

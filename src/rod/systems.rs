@@ -1,0 +1,184 @@
+//! `Projection`: strands of a hair with equal node count are gathered into blocks, stepped side by
+//! side, and scattered back.
+
+use super::{
+    LANES, Solver, Stiffness,
+    block::{BlockLanes, StepParams, put3, put4, step, take3, take4},
+    obstacle::Obstacle,
+};
+use crate::{
+    bond::{BondInfluence, Bonds, RestShape},
+    contact::{LockContact, Obstacles},
+    fault::{Fault, HairFault},
+    parallel::for_each_init,
+    setting::{self, Settings},
+    strand::{HeldNodes, PutBack, Strand, StrandOf},
+    tick::{HairStep, HairSystems, HairTick},
+};
+use bevy::{platform::collections::HashMap, prelude::*};
+use fearless_simd::Level;
+
+/// Cosserat rods: the elastic projection.
+pub struct RodPlugin;
+
+impl Plugin for RodPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<Stiffness>(app);
+        setting::plugin::<Solver>(app);
+        app.add_systems(HairTick, project.in_set(HairSystems::Projection));
+    }
+}
+
+/// What the projection needs of a hair, resolved once a substep.
+struct HairParams {
+    step: StepParams,
+    stiffness: Stiffness,
+    influence: [f32; 4],
+    obstacles: Vec<Obstacle>,
+}
+
+struct Item<'a> {
+    entity: Entity,
+    hair: usize,
+    strand: Mut<'a, Strand>,
+    rest: &'a RestShape,
+    bonds: &'a Bonds,
+    held: Option<&'a HeldNodes>,
+    put_back: Option<PutBack>,
+}
+
+fn project(
+    time: Res<HairStep>,
+    solver: Settings<Solver>,
+    stiffness: Settings<Stiffness>,
+    influence: Settings<BondInfluence>,
+    contact: Settings<LockContact>,
+    hairs: Query<&Obstacles>,
+    mut strands: Query<(Entity, &StrandOf, &mut Strand, &RestShape, &Bonds, Option<&HeldNodes>)>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let mut params: Vec<HairParams> = Vec::new();
+    let mut index_of = HashMap::<Entity, Option<usize>>::default();
+    let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
+    for (entity, of, strand, rest, bonds, held) in &mut strands {
+        let index = *index_of.entry(of.0).or_insert_with(|| {
+            let obstacles = hairs.get(of.0).ok()?;
+            let s = solver.of(of.0);
+            params.push(HairParams {
+                step: StepParams {
+                    dt: time.dt,
+                    iterations: s.iterations,
+                    projection: s.projection,
+                    limiter_steps: s.limiter_steps,
+                    internal_damping: s.internal_damping,
+                    skin: contact.of(of.0).radius,
+                },
+                stiffness: stiffness.of(of.0),
+                influence: influence.of(of.0).as_array(),
+                obstacles: obstacles.solids.clone(),
+            });
+            Some(params.len() - 1)
+        });
+        if let Some(hair) = index
+            && strand.nodes() >= 2
+            && rest.darboux.len() == strand.edges()
+        {
+            items.push(Item { entity, hair, strand, rest, bonds, held, put_back: None });
+        }
+    }
+    // Lanes do not see each other, so how strands are grouped changes no bit of the result.
+    items.sort_by_key(|item| (item.hair, item.strand.nodes()));
+    let mut blocks: Vec<&mut [Item<'_>]> = items
+        .chunk_by_mut(|a, b| (a.hair, a.strand.nodes()) == (b.hair, b.strand.nodes()))
+        .flat_map(|alike| alike.chunks_mut(LANES))
+        .collect();
+    let level = Level::new();
+    for_each_init(&mut blocks, BlockLanes::default, |block, items| {
+        solve(level, block, items, &params[items[0].hair]);
+    });
+    for item in &items {
+        if let Some(how) = item.put_back {
+            let fault = match how {
+                PutBack::LastFinite => Fault::PutBack,
+                PutBack::RestPose => Fault::Rebuilt,
+            };
+            faults.write(HairFault { entity: item.entity, fault });
+        }
+    }
+}
+
+/// One block through one substep.
+fn solve(level: Level, block: &mut BlockLanes, items: &mut [Item<'_>], params: &HairParams) {
+    block.resize(items[0].strand.nodes());
+    for (lane, item) in items.iter().enumerate() {
+        gather(block, lane, item, &params.stiffness, params.step.dt);
+    }
+    for lane in items.len()..LANES {
+        block.repeat_lane(0, lane);
+    }
+    let (low, high) = block.bounds(params.step.dt);
+    // Nodes may be pulled beyond their prediction, never by more than an edge in a substep.
+    let margin = params.step.skin + block.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
+    let near: Vec<Obstacle> =
+        params.obstacles.iter().filter(|o| o.may_touch(low, high, margin)).copied().collect();
+    step(level, block, &params.step, &near);
+    for (lane, item) in items.iter_mut().enumerate() {
+        if block.finite[lane] == 0.0 {
+            scatter(block, lane, item.strand.bypass_change_detection());
+        } else {
+            let remembered = item.bonds.joints.iter().map(|j| j.relaxed(&params.influence));
+            item.put_back = item.strand.put_back(remembered);
+        }
+    }
+}
+
+fn gather(block: &mut BlockLanes, lane: usize, item: &Item<'_>, stiffness: &Stiffness, dt: f32) {
+    let (positions, velocities, orientations, angular) = item.strand.parts();
+    let lengths = item.strand.rest_lengths();
+    let mean = lengths.iter().sum::<f32>() / lengths.len() as f32;
+    let held = item.held.map_or(&[][..], |h| &h.targets[..]);
+    for (i, node) in block.nodes.iter_mut().enumerate() {
+        let target = match held.get(i) {
+            Some(Some(target)) => Some(*target),
+            _ => (i == 0).then_some(positions[0]),
+        };
+        // Half a cell on either side, so the tip carries half a mass.
+        let before = if i == 0 { 0.0 } else { lengths[i - 1] };
+        let after = lengths.get(i).copied().unwrap_or(0.0);
+        put3(&mut node.from, lane, positions[i]);
+        match target {
+            Some(target) => {
+                put3(&mut node.p, lane, target);
+                put3(&mut node.v, lane, (target - positions[i]) / dt);
+                node.w[lane] = 0.0;
+            }
+            None => {
+                put3(&mut node.p, lane, positions[i]);
+                put3(&mut node.v, lane, velocities[i]);
+                node.w[lane] = 2.0 * mean / (before + after);
+            }
+        }
+    }
+    for (i, edge) in block.edges.iter_mut().enumerate() {
+        put4(&mut edge.q, lane, orientations[i]);
+        put3(&mut edge.omega, lane, angular[i]);
+        edge.l[lane] = lengths[i];
+        edge.wq[lane] = stiffness.rotational_weight(lengths[i], mean);
+        put4(&mut edge.rest, lane, item.rest.darboux[i]);
+        edge.k[lane] = item.rest.stiffness[i];
+    }
+    put4(&mut block.root, lane, item.strand.root_frame());
+}
+
+fn scatter(block: &BlockLanes, lane: usize, strand: &mut Strand) {
+    let (positions, velocities, orientations, angular) = strand.parts_mut();
+    for (i, node) in block.nodes.iter().enumerate() {
+        positions[i] = take3(&node.p, lane);
+        velocities[i] = take3(&node.v, lane);
+    }
+    for (i, edge) in block.edges.iter().enumerate() {
+        orientations[i] = take4(&edge.q, lane);
+        angular[i] = take3(&edge.omega, lane);
+    }
+    strand.stepped_well();
+}

@@ -1,0 +1,337 @@
+//! Strands and the hair they make up: the entities that everything else works on.
+//!
+//! A [`Hair`] is the wearer's hair as one thing. Its strands are entities of their own, tied to it
+//! by [`StrandOf`] (despawning the hair takes them along). A strand holds arrays of nodes, because
+//! a rod is solved in sequence.
+//!
+//! All of a strand's state is in its hair's own frame: the space of the `Hair` entity's children.
+//! When that frame moves, [`frame`] carries the motion over to the nodes as inertia, spread over the
+//! substeps; drawing places the nodes with the pose that is drawn, so roots never lag. Lengths are
+//! in the hair's units: a scaled character's hair behaves as if unscaled.
+
+pub mod frame;
+mod systems;
+
+pub use frame::TickPose;
+pub use systems::StrandPlugin;
+pub(crate) use systems::carry_strands;
+
+use crate::{
+    bond::{BondChanges, Bonds, RestShape},
+    rod::frame::{darboux, full, parallel_transport},
+};
+use bevy::prelude::*;
+
+/// The wearer's hair as one thing. Put it on any entity with a transform, such as a head bone; spawn
+/// strands with [`StrandOf`] pointing here. Settings ([`Stiffness`](crate::Stiffness),
+/// [`Solver`](crate::Solver), [`AirDrag`](crate::AirDrag), [`BondInfluence`](crate::BondInfluence),
+/// [`Cuticle`](crate::Cuticle), [`LockContact`](crate::LockContact)) may be added as components.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+#[require(Transform, TickPose)]
+pub struct Hair;
+
+/// Makes an entity a strand of a [`Hair`].
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component, Clone, PartialEq)]
+#[relationship(relationship_target = Strands)]
+pub struct StrandOf(pub Entity);
+
+/// The strands of a [`Hair`], in the order they were spawned. Kept by Bevy.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default, Clone)]
+#[relationship_target(relationship = StrandOf, linked_spawn)]
+pub struct Strands(Vec<Entity>);
+
+/// Why a polyline cannot be a strand.
+#[derive(thiserror::Error, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StrandError {
+    /// Fewer than two nodes.
+    #[error("a strand has {found} nodes, expected 2 or more: give root and tip at least")]
+    TooFewNodes {
+        /// How many there were.
+        found: usize,
+    },
+    /// A node that is not finite.
+    #[error("node {node} of the strand is not finite: remove it or repair the source")]
+    NonFinite {
+        /// Its index from the root.
+        node: usize,
+    },
+    /// Two neighbouring nodes (nearly) at the same place.
+    #[error(
+        "segment {segment} of the strand has no length, expected more than {MIN_SEGMENT} m: \
+         merge nodes {segment} and {}", segment + 1
+    )]
+    ZeroLength {
+        /// Index of the segment from the root.
+        segment: usize,
+    },
+}
+
+/// The shortest segment that a strand may have (m).
+pub const MIN_SEGMENT: f32 = 1e-6;
+
+/// A strand's nodes and edges, in its hair's frame, root first.
+///
+/// Made by [`Strand::from_polyline`]. Game code may read all and write positions and velocities; the
+/// number of nodes stays what it was.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+#[require(Bonds, BondChanges, RestShape, StrandHistory)]
+pub struct Strand {
+    positions: Vec<Vec3>,
+    velocities: Vec<Vec3>,
+    orientations: Vec<Quat>,
+    angular_velocities: Vec<Vec3>,
+    rest_lengths: Vec<f32>,
+    root_frame: Quat,
+    was_put_back: bool,
+}
+
+/// Where a strand's nodes were at the end of the tick before, in the hair's frame: drawing goes from
+/// there to the present by the overstep of the fixed clock.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct StrandHistory {
+    /// Positions (m), root first; empty until the first tick.
+    pub positions: Vec<Vec3>,
+}
+
+/// Nodes that something else holds: a rod they are wound on, a hand, a clip. Held nodes have no
+/// inverse mass and go where they are told. Add it to a strand entity.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct HeldNodes {
+    /// For each node from the root where it is to be at the end of the next substep (m, in the
+    /// hair's frame), or `None`. May be shorter than the strand.
+    pub targets: Vec<Option<Vec3>>,
+}
+
+impl Strand {
+    /// A strand at rest along `points`, root first, in its hair's frame. Lengths and the angle at
+    /// which it leaves the scalp are taken from them.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// let straight = Strand::from_polyline(&[Vec3::ZERO, Vec3::Y * 0.03, Vec3::Y * 0.06]).unwrap();
+    /// assert_eq!(straight.edges(), 2);
+    /// assert!(Strand::from_polyline(&[Vec3::ZERO]).is_err());
+    /// ```
+    ///
+    /// # Errors
+    /// With fewer than two points, a point that is not finite, or a segment shorter than 1 µm.
+    pub fn from_polyline(points: &[Vec3]) -> Result<Self, StrandError> {
+        if points.len() < 2 {
+            return Err(StrandError::TooFewNodes { found: points.len() });
+        }
+        if let Some(node) = points.iter().position(|p| !p.is_finite()) {
+            return Err(StrandError::NonFinite { node });
+        }
+        let rest_lengths: Vec<f32> = points.windows(2).map(|p| p[0].distance(p[1])).collect();
+        let usable = |l: &f32| *l >= MIN_SEGMENT && l.is_finite();
+        if let Some(segment) = rest_lengths.iter().position(|l| !usable(l)) {
+            return Err(StrandError::ZeroLength { segment });
+        }
+        let orientations = parallel_transport(points, None);
+        Ok(Self {
+            velocities: vec![Vec3::ZERO; points.len()],
+            angular_velocities: vec![Vec3::ZERO; orientations.len()],
+            positions: points.to_vec(),
+            root_frame: orientations[0],
+            orientations,
+            rest_lengths,
+            was_put_back: false,
+        })
+    }
+
+    /// The same strand, leaving the scalp along `direction` whatever its first edge does: curly hair
+    /// that is drawn bent at the root springs to it.
+    pub fn leaving_along(mut self, direction: Dir3) -> Self {
+        if let Some(&first) = self.orientations.first() {
+            let turn = Quat::from_rotation_arc(first * Vec3::Z, *direction);
+            self.root_frame = (turn * first).normalize();
+        }
+        self
+    }
+
+    /// How many nodes there are, root and tip included.
+    pub fn nodes(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// How many edges, and joints, there are: one fewer than nodes.
+    pub fn edges(&self) -> usize {
+        self.rest_lengths.len()
+    }
+
+    /// Node positions (m), root first.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// Node positions (m) to edit. Moving the first moves the root.
+    pub fn positions_mut(&mut self) -> &mut [Vec3] {
+        &mut self.positions
+    }
+
+    /// Node velocities (m/s) in the world, along the axes of the hair's frame.
+    pub fn velocities(&self) -> &[Vec3] {
+        &self.velocities
+    }
+
+    /// Node velocities (m/s) to edit.
+    pub fn velocities_mut(&mut self) -> &mut [Vec3] {
+        &mut self.velocities
+    }
+
+    /// Edge orientations; R(q) e3 is the tangent.
+    pub fn orientations(&self) -> &[Quat] {
+        &self.orientations
+    }
+
+    /// Edge angular velocities (rad/s).
+    pub fn angular_velocities(&self) -> &[Vec3] {
+        &self.angular_velocities
+    }
+
+    /// Rest lengths of the edges (m).
+    pub fn rest_lengths(&self) -> &[f32] {
+        &self.rest_lengths
+    }
+
+    /// The scalp's frame q_{−1} at the root.
+    pub fn root_frame(&self) -> Quat {
+        self.root_frame
+    }
+
+    /// Length along the strand at rest (m).
+    pub fn length(&self) -> f32 {
+        self.rest_lengths.iter().sum()
+    }
+
+    /// Ω of joint `i`, between edges i−1 and i (joint 0: the scalp and edge 0), as a full quaternion
+    /// with real part ≥ 0. For an untwisted joint |Im Ω| = sin(θ/2), θ the turning angle.
+    #[inline]
+    pub fn darboux(&self, i: usize) -> Quat {
+        let before = if i == 0 { self.root_frame } else { self.orientations[i - 1] };
+        darboux(before, self.orientations[i])
+    }
+
+    /// The largest |length/rest − 1| over the segments.
+    pub fn peak_strain(&self) -> f32 {
+        (self.positions.windows(2).zip(&self.rest_lengths))
+            .map(|(p, l)| (p[0].distance(p[1]) / l - 1.0).abs())
+            .fold(0.0, f32::max)
+    }
+
+    /// Whether every number of the state is finite.
+    pub fn is_finite(&self) -> bool {
+        self.is_pose_finite()
+            && self.velocities.iter().all(|v| v.is_finite())
+            && self.angular_velocities.iter().all(|v| v.is_finite())
+    }
+
+    fn is_pose_finite(&self) -> bool {
+        self.positions.iter().all(|p| p.is_finite())
+            && self.orientations.iter().all(|q| q.is_finite() && q.length_squared() > 0.25)
+    }
+
+    /// Sets every velocity to zero.
+    pub fn rest(&mut self) {
+        self.velocities.fill(Vec3::ZERO);
+        self.angular_velocities.fill(Vec3::ZERO);
+    }
+
+    /// Puts the strand into the shape given by a Darboux vector per joint, at rest, from its root
+    /// on. Joints not given are straight.
+    pub fn pose(&mut self, shape: impl IntoIterator<Item = Vec3>) {
+        if !self.root_frame.is_finite() {
+            self.root_frame = Quat::IDENTITY;
+        }
+        let mut shape = shape.into_iter();
+        let mut p = self.positions.first().copied().filter(|p| p.is_finite()).unwrap_or_default();
+        let mut q = self.root_frame;
+        for i in 0..self.edges() {
+            q = (q * full(shape.next().unwrap_or_default())).normalize();
+            self.positions[i] = p;
+            self.orientations[i] = q;
+            p += q * Vec3::Z * self.rest_lengths[i];
+        }
+        if let Some(tip) = self.positions.last_mut() {
+            *tip = p;
+        }
+        self.rest();
+    }
+
+    pub(crate) fn parts(&self) -> (&[Vec3], &[Vec3], &[Quat], &[Vec3]) {
+        (&self.positions, &self.velocities, &self.orientations, &self.angular_velocities)
+    }
+
+    pub(crate) fn parts_mut(&mut self) -> (&mut [Vec3], &mut [Vec3], &mut [Quat], &mut [Vec3]) {
+        (
+            &mut self.positions,
+            &mut self.velocities,
+            &mut self.orientations,
+            &mut self.angular_velocities,
+        )
+    }
+
+    /// After a step that left the finite numbers: back to what it was, at rest, or if that is not
+    /// finite either to the pose its bonds remember. Says what happened unless it did last time too.
+    pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<PutBack> {
+        let how = if self.is_pose_finite() {
+            self.rest();
+            PutBack::LastFinite
+        } else {
+            self.pose(bonds.into_iter().map(|o| if o.is_finite() { o } else { Vec3::ZERO }));
+            PutBack::RestPose
+        };
+        let again = core::mem::replace(&mut self.was_put_back, true);
+        (!again).then_some(how)
+    }
+
+    pub(crate) fn stepped_well(&mut self) {
+        self.was_put_back = false;
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PutBack {
+    LastFinite,
+    RestPose,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_polylines_are_refused_with_a_reason() {
+        let refuse = |points: &[Vec3]| Strand::from_polyline(points).unwrap_err();
+        assert_eq!(refuse(&[]), StrandError::TooFewNodes { found: 0 });
+        assert_eq!(refuse(&[Vec3::ZERO, Vec3::NAN]), StrandError::NonFinite { node: 1 });
+        let zero = refuse(&[Vec3::ZERO, Vec3::X, Vec3::X]);
+        assert_eq!(zero, StrandError::ZeroLength { segment: 1 });
+        assert!(zero.to_string().ends_with("merge nodes 1 and 2"), "{zero}");
+        assert!(matches!(
+            refuse(&[Vec3::splat(-3e38), Vec3::splat(3e38)]),
+            StrandError::ZeroLength { segment: 0 }
+        ));
+    }
+
+    #[test]
+    fn posing_in_its_own_shape_changes_nothing() {
+        let points: Vec<Vec3> = (0..10)
+            .map(|i| i as f32)
+            .map(|t| Vec3::new((t * 0.5).cos(), t * 0.3, (t * 0.5).sin()) * 0.05)
+            .collect();
+        let mut strand = Strand::from_polyline(&points).unwrap();
+        let shape: Vec<Vec3> = (0..strand.edges()).map(|i| strand.darboux(i).xyz()).collect();
+        strand.pose(shape);
+        for (a, b) in strand.positions().iter().zip(&points) {
+            assert!(a.distance(*b) < 1e-6);
+        }
+        assert!(strand.peak_strain() < 1e-5);
+    }
+}

@@ -1,0 +1,99 @@
+//! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
+
+use super::{
+    Hair, TickPose, HeldNodes, Strand, StrandError, StrandHistory, StrandOf, Strands,
+    frame::Pose,
+};
+use crate::{
+    fault::{Fault, HairFault},
+    parallel::for_each,
+    tick::{HairStep, HairSystems, HairTick},
+};
+use bevy::prelude::*;
+
+/// Hair and strands as entities, and the frame they live in.
+pub struct StrandPlugin;
+
+impl Plugin for StrandPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Hair>()
+            .register_type::<TickPose>()
+            .register_type::<Strand>()
+            .register_type::<StrandOf>()
+            .register_type::<Strands>()
+            .register_type::<StrandHistory>()
+            .register_type::<HeldNodes>()
+            .add_systems(PreUpdate, report_unusable)
+            .add_systems(
+                HairTick,
+                (remember_drawn, move_poses, carry_strands).chain().in_set(HairSystems::Roots),
+            );
+    }
+}
+
+/// Strands that cannot take part are told once, when they appear.
+fn report_unusable(
+    strands: Query<(Entity, Ref<Strand>, Option<Ref<StrandOf>>)>,
+    hairs: Query<(), With<Hair>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, strand, of) in &strands {
+        if strand.is_added() && strand.nodes() < 2 {
+            let fault = Fault::Strand(StrandError::TooFewNodes { found: strand.nodes() });
+            faults.write(HairFault { entity, fault });
+        }
+        let homeless = match of {
+            Some(of) => of.is_added() && !hairs.contains(of.0),
+            None => strand.is_added(),
+        };
+        if homeless {
+            faults.write(HairFault { entity, fault: Fault::NoHair });
+        }
+    }
+}
+
+/// Before the first substep of a tick: what was present becomes history.
+fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &mut StrandHistory)>) {
+    if step.index == 0 {
+        for (strand, mut history) in &mut strands {
+            history.bypass_change_detection().positions.clone_from(&strand.positions);
+        }
+    }
+}
+
+fn move_poses(
+    step: Res<HairStep>,
+    transforms: TransformHelper,
+    mut poses: Query<(Entity, &mut TickPose)>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, mut frame) in &mut poses {
+        if step.index == 0 {
+            // With MinimalPlugins nothing propagates transforms, so the helper computes them.
+            let pose = transforms.compute_global_transform(entity).ok();
+            if frame.aim(pose.as_ref().and_then(Pose::of)) {
+                faults.write(HairFault { entity, fault: Fault::Transform });
+            }
+        }
+        frame.advance((step.index + 1) as f32 / step.count as f32);
+    }
+}
+
+/// Inertia: free nodes are carried by the inverse of the frame's motion; the root stays.
+pub(crate) fn carry_strands(hairs: Query<&TickPose, With<Hair>>, mut strands: Query<(&StrandOf, &mut Strand)>) {
+    if hairs.iter().all(|hair| hair.carry().is_none()) {
+        return;
+    }
+    let mut items: Vec<_> = strands
+        .iter_mut()
+        .filter_map(|(of, strand)| Some((hairs.get(of.0).ok()?.carry()?, strand)))
+        .collect();
+    for_each(&mut items, |(carry, strand)| {
+        let strand = strand.bypass_change_detection();
+        let turn = carry.rotation;
+        strand.positions.iter_mut().skip(1).for_each(|p| *p = *carry * *p);
+        strand.velocities.iter_mut().for_each(|v| *v = turn * *v);
+        strand.orientations.iter_mut().for_each(|q| *q = (turn * *q).normalize());
+        strand.angular_velocities.iter_mut().for_each(|v| *v = turn * *v);
+    });
+}

@@ -1,0 +1,158 @@
+//! Treatments ask for bond changes in `ExternalForces`; rods guide their strands in `Interaction`.
+
+use super::{
+    PermRod, Treat, Treatments, Winding, WoundOn, WoundStrands,
+    model::{Rod, winding},
+};
+use crate::{
+    air,
+    bond::{BondChanges, BondKind, Bonds},
+    contact,
+    fault::{Fault, HairFault},
+    parallel::for_each,
+    setting::Notes,
+    strand::{HeldNodes, Strand, StrandOf, Strands, TickPose},
+    tick::{HairStep, HairSystems, HairTick},
+};
+use bevy::prelude::*;
+
+/// Treatments and perm rods.
+pub struct StylePlugin;
+
+impl Plugin for StylePlugin {
+    fn build(&self, app: &mut App) {
+        app.add_message::<Treat>()
+            .register_type::<Treat>()
+            .register_type::<Treatments>()
+            .register_type::<PermRod>()
+            .register_type::<WoundOn>()
+            .register_type::<WoundStrands>()
+            .register_type::<Winding>()
+            .register_required_components::<Strand, Treatments>()
+            .add_observer(release)
+            .add_systems(PreUpdate, report_rods)
+            .add_systems(
+                HairTick,
+                (begin_treatments, apply_treatments)
+                    .chain()
+                    .in_set(HairSystems::ExternalForces)
+                    .after(air::apply_air),
+            )
+            .add_systems(HairTick, wind_strands.in_set(HairSystems::Interaction).after(contact::part_strands));
+    }
+}
+
+fn begin_treatments(
+    mut requests: MessageReader<Treat>,
+    hairs: Query<&Strands>,
+    mut strands: Query<&mut Treatments, With<StrandOf>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for request in requests.read() {
+        let notes = Notes::default();
+        let treat = request.clone().mended(&notes);
+        let entity = treat.target;
+        for wrong in notes.into_inner() {
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+        }
+        if let Ok(members) = hairs.get(entity) {
+            let mut members = strands.iter_many_mut(members.collection());
+            while let Some(mut treatments) = members.fetch_next() {
+                treatments.acting.push(treat.clone());
+            }
+        } else if let Ok(mut treatments) = strands.get_mut(entity) {
+            treatments.acting.push(treat);
+        } else {
+            faults.write(HairFault { entity, fault: Fault::NoTarget });
+        }
+    }
+}
+
+/// Asks for this substep's part of what each treatment still has to do.
+fn apply_treatments(
+    step: Res<HairStep>,
+    mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
+) {
+    let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();
+    for_each(&mut items, |(bonds, changes, treatments)| {
+        let changes = changes.bypass_change_detection();
+        for treat in &mut treatments.acting {
+            let share = if treat.seconds > step.dt { step.dt / treat.seconds } else { 1.0 };
+            let range = treat.joints.clone().unwrap_or(0..bonds.joints.len());
+            for (i, joint) in bonds.joints.iter().enumerate().filter(|(i, _)| range.contains(i)) {
+                for kind in BondKind::ALL {
+                    if let Some(to) = treat.rates[kind as usize] {
+                        changes.ask(i, kind, (to - joint.rates[kind as usize]) * share);
+                    }
+                }
+            }
+            treat.seconds -= step.dt;
+        }
+        treatments.acting.retain(|t| t.seconds > 0.0);
+    });
+}
+
+fn report_rods(
+    rods: Query<(Entity, &PermRod), Changed<PermRod>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, rod) in &rods {
+        let notes = Notes::default();
+        rod.mended(&notes);
+        for wrong in notes.into_inner() {
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+        }
+    }
+}
+
+fn wind_strands(
+    step: Res<HairStep>,
+    hairs: Query<&TickPose>,
+    rods: Query<(&PermRod, &TickPose)>,
+    mut strands: Query<(&StrandOf, &WoundOn, &Strand, &mut Winding, &mut HeldNodes)>,
+) {
+    let mut items: Vec<_> = strands
+        .iter_mut()
+        .filter_map(|(of, on, strand, winding, held)| {
+            let hair = hairs.get(of.0).ok()?.now();
+            let (rod, pose) = rods.get(on.0).ok()?;
+            let (rod, pose) = (rod.mended(&Notes::default()), pose.now());
+            let scale = pose.scale / hair.scale;
+            let rod = Rod {
+                center: hair.point_in(pose.translation),
+                axis: hair.direction_in(pose.rotation * Vec3::Y),
+                radius: rod.radius * scale,
+                half_length: 0.5 * rod.length * scale,
+            };
+            Some((rod, strand, winding, held))
+        })
+        .collect();
+    for_each(&mut items, |(rod, strand, wound, held)| {
+        // The root is the scalp's, so the first node that can be wound is the next.
+        let from = wound.from_node.max(1);
+        if from >= strand.edges() {
+            return;
+        }
+        if wound.start.len() != strand.nodes() {
+            wound.start = strand.positions().to_vec();
+        }
+        let seconds = wound.seconds.max(step.dt);
+        let advanced = wound.progress + step.dt / seconds;
+        wound.progress = if advanced.is_finite() { advanced.min(1.0) } else { 1.0 };
+        let pitch = if wound.pitch.is_finite() { wound.pitch } else { 0.0 };
+        let targets =
+            winding(rod, &wound.start, strand.rest_lengths(), from, pitch, wound.progress);
+        held.targets.clear();
+        held.targets.resize(from, None);
+        held.targets.extend(targets.into_iter().map(Some));
+    });
+}
+
+/// A strand that leaves its rod, for whatever reason, is free.
+fn release(left: On<Remove, WoundOn>, mut strands: Query<(&mut Winding, &mut HeldNodes)>) {
+    if let Ok((mut winding, mut held)) = strands.get_mut(left.entity) {
+        held.targets.clear();
+        winding.progress = 0.0;
+        winding.start.clear();
+    }
+}

@@ -1,0 +1,63 @@
+//! A headless app as the tests want it: no window, exactly one fixed tick per update.
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy_keratin::prelude::*;
+use std::time::Duration;
+
+/// An app with the plugin at `hertz`, warmed up.
+pub fn test_app(hertz: f64) -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, HairPlugins::default()))
+        .insert_resource(Time::<Fixed>::from_hz(hertz))
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    app.finish();
+    app.cleanup();
+    app.update();
+    app
+}
+
+/// Runs for `seconds` of simulated time.
+pub fn run(app: &mut App, seconds: f64) {
+    let dt = app.world().resource::<Time<Fixed>>().timestep().as_secs_f64();
+    for _ in 0..(seconds / dt).round() as usize {
+        app.update();
+    }
+}
+
+/// A hair with one straight strand of `length` along `direction`, in `segments`.
+pub fn one_strand(app: &mut App, length: f32, segments: usize, direction: Vec3) -> (Entity, Entity) {
+    let hair = app.world_mut().spawn(Hair).id();
+    let points: Vec<Vec3> =
+        (0..=segments).map(|i| direction * (length * i as f32 / segments as f32)).collect();
+    let strand = Strand::from_polyline(&points).unwrap();
+    let strand = app.world_mut().spawn((StrandOf(hair), strand)).id();
+    (hair, strand)
+}
+
+pub fn strand(app: &App, entity: Entity) -> &Strand {
+    app.world().get::<Strand>(entity).unwrap()
+}
+
+/// Root mean square speed (m/s) of a strand's free nodes.
+pub fn rms_speed(strand: &Strand) -> f32 {
+    let v = &strand.velocities()[1..];
+    (v.iter().map(|v| v.length_squared()).sum::<f32>() / v.len() as f32).sqrt()
+}
+
+pub fn settle(app: &mut App, entity: Entity, limit: f64) {
+    let mut t = 0.0;
+    loop {
+        run(app, 0.5);
+        t += 0.5;
+        if rms_speed(strand(app, entity)) < 1e-3 {
+            return;
+        }
+        assert!(t < limit, "still moving at {} m/s", rms_speed(strand(app, entity)));
+    }
+}
+
+pub fn no_gravity(app: &mut App) {
+    app.insert_resource(HairGravity(Vec3::ZERO));
+}
