@@ -30,8 +30,8 @@ pub mod prelude {
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Cuticle, Hair, HairCollider, HairDefault,
-        HairFault, HairGravity, HairPlugins, HairSubsteps, HairSystems, HairTick, LockContact,
-        PermRod, Solver, Stiffness, Strand, StrandOf, Strands, StretchProjection, Treat, Winding,
-        WoundOn,
+        HairFault, HairGravity, HairPlugins, HairSubsteps, HairSystems, HairTick, HeldNodes,
+        LockContact, PermRod, Solver, Stiffness, Strand, StrandOf, Strands, StretchProjection,
+        Treat, Winding, WoundOn,
     };
 }

@@ -279,8 +279,7 @@ fn sweep<S: Simd>(simd: S, b: &mut BlockLanes, projection: StretchProjection) {
         let e = &b.edges[i];
         let (wq, l) = (lane(&e.wq), lane(&e.l));
         let mut q = load4(simd, &e.q);
-        let (d_before, d_q) =
-            bend_twist(before, q, load4(simd, &e.rest), w_before, wq, lane(&e.k));
+        let (d_before, d_q) = bend_twist(before, q, load4(simd, &e.rest), w_before, wq, lane(&e.k));
         q = q.add_scaled(d_q, one).normalize();
         if i > 0 {
             let turned = before.add_scaled(d_before, one).normalize();
@@ -337,7 +336,10 @@ fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
         let exchange = 0.5 * (1.0 - bevy::math::ops::exp(-params.internal_damping * params.dt));
         let exchange = f32x16::splat(simd, exchange);
         for i in 1..b.edges.len() {
-            let (a, c) = (load3(simd, &b.edges[i - 1].omega), load3(simd, &b.edges[i].omega));
+            let (a, c) = (
+                load3(simd, &b.edges[i - 1].omega),
+                load3(simd, &b.edges[i].omega),
+            );
             let d = (c - a).scale(exchange);
             store3(&mut b.edges[i - 1].omega, a + d);
             store3(&mut b.edges[i].omega, c - d);

@@ -5,9 +5,9 @@
 //! C_i = |p_{i+1} − p_i| − l_i, solved by the Thomas algorithm in one pass down and one up.
 //! Node masses alone enter: the rods' orientations are left as the iterations put them.
 
-use super::{algebra::V3, block::BlockLanes};
 use super::lanes::{LANES, Real};
-use fearless_simd::{Simd, prelude::*, f32x16};
+use super::{algebra::V3, block::BlockLanes};
+use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// One Newton step on the lengths of every strand in the block.
 #[inline(always)]
@@ -51,7 +51,11 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes) {
     for i in (0..edges).rev() {
         let s = &b.scratch[i];
         lambda = load(&s.rhs) - load(&s.upper) * lambda;
-        let d = V3::new(load(&s.direction[0]), load(&s.direction[1]), load(&s.direction[2]));
+        let d = V3::new(
+            load(&s.direction[0]),
+            load(&s.direction[1]),
+            load(&s.direction[2]),
+        );
         let tension = d.scale(lambda);
         let node = &mut b.nodes[i + 1];
         let w = load(&node.w);

@@ -34,7 +34,9 @@ pub fn winding(
     let rel = origin - rod.center;
     let along = rel.dot(rod.axis).clamp(-rod.half_length, rod.half_length);
     let off = rel - rod.axis * rel.dot(rod.axis);
-    let outward = off.try_normalize().unwrap_or_else(|| rod.axis.any_orthonormal_vector());
+    let outward = off
+        .try_normalize()
+        .unwrap_or_else(|| rod.axis.any_orthonormal_vector());
     let mut touch = rod.center + rod.axis * along + outward * rod.radius;
     let slack: f32 = lengths[..from].iter().sum();
     if touch.distance(start[0]) > slack {
@@ -43,7 +45,11 @@ pub fn winding(
     // Round the rod the way the strand already goes.
     let mut tangent = rod.axis.cross(outward);
     let heading = start.get(from + 1).map_or(tangent, |next| *next - origin);
-    let sense = if heading.dot(tangent) < 0.0 { -1.0 } else { 1.0 };
+    let sense = if heading.dot(tangent) < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
     tangent *= sense;
 
     let u = progress.clamp(0.0, 1.0);
@@ -63,7 +69,8 @@ pub fn winding(
         let (sin, cos) = ops::sin_cos(angle + 0.5 * turn);
         let helix = (tangent * cos - outward * sin) * (flat / l) + rod.axis * (rise / l);
         let pointed = (start[j + 1] - start[j]).normalize_or(helix);
-        let direction = Quat::IDENTITY.slerp(Quat::from_rotation_arc(pointed, helix), joined) * pointed;
+        let direction =
+            Quat::IDENTITY.slerp(Quat::from_rotation_arc(pointed, helix), joined) * pointed;
         p += direction * l;
         nodes.push(p);
         angle += turn;
@@ -93,7 +100,10 @@ mod tests {
         let (start, lengths) = straight(16);
         for p in winding(&ROD, &start, &lengths, 2, 0.004, 1.0) {
             let rel = p - ROD.center;
-            assert!(((rel - ROD.axis * rel.z).length() - 0.03).abs() < 3e-5, "{p}");
+            assert!(
+                ((rel - ROD.axis * rel.z).length() - 0.03).abs() < 3e-5,
+                "{p}"
+            );
         }
     }
 
@@ -113,6 +123,11 @@ mod tests {
     fn winding_begins_where_the_strand_is() {
         let (start, lengths) = straight(16);
         let nodes = winding(&ROD, &start, &lengths, 2, 0.004, 0.0);
-        assert!(nodes.iter().zip(&start[2..]).all(|(a, b)| a.distance(*b) < 1e-4));
+        assert!(
+            nodes
+                .iter()
+                .zip(&start[2..])
+                .all(|(a, b)| a.distance(*b) < 1e-4)
+        );
     }
 }

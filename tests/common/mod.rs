@@ -11,7 +11,9 @@ pub fn test_app(hertz: f64) -> App {
     app.add_plugins((MinimalPlugins, HairPlugins::default()))
         .insert_resource(Time::<Fixed>::from_hz(hertz))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
-    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    app.world_mut()
+        .resource_mut::<Time<Virtual>>()
+        .set_max_delta(Duration::MAX);
     app.finish();
     app.cleanup();
     app.update();
@@ -20,17 +22,27 @@ pub fn test_app(hertz: f64) -> App {
 
 /// Runs for `seconds` of simulated time.
 pub fn run(app: &mut App, seconds: f64) {
-    let dt = app.world().resource::<Time<Fixed>>().timestep().as_secs_f64();
+    let dt = app
+        .world()
+        .resource::<Time<Fixed>>()
+        .timestep()
+        .as_secs_f64();
     for _ in 0..(seconds / dt).round() as usize {
         app.update();
     }
 }
 
 /// A hair with one straight strand of `length` along `direction`, in `segments`.
-pub fn one_strand(app: &mut App, length: f32, segments: usize, direction: Vec3) -> (Entity, Entity) {
+pub fn one_strand(
+    app: &mut App,
+    length: f32,
+    segments: usize,
+    direction: Vec3,
+) -> (Entity, Entity) {
     let hair = app.world_mut().spawn(Hair).id();
-    let points: Vec<Vec3> =
-        (0..=segments).map(|i| direction * (length * i as f32 / segments as f32)).collect();
+    let points: Vec<Vec3> = (0..=segments)
+        .map(|i| direction * (length * i as f32 / segments as f32))
+        .collect();
     let strand = Strand::from_polyline(&points).unwrap();
     let strand = app.world_mut().spawn((StrandOf(hair), strand)).id();
     (hair, strand)
@@ -54,7 +66,11 @@ pub fn settle(app: &mut App, entity: Entity, limit: f64) {
         if rms_speed(strand(app, entity)) < 1e-3 {
             return;
         }
-        assert!(t < limit, "still moving at {} m/s", rms_speed(strand(app, entity)));
+        assert!(
+            t < limit,
+            "still moving at {} m/s",
+            rms_speed(strand(app, entity))
+        );
     }
 }
 
