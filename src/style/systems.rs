@@ -1,7 +1,7 @@
 //! Treatments ask for bond changes in `ExternalForces`; rods guide their strands in `Interaction`.
 
 use super::{
-    PermRod, Treat, Treatments, Winding, WoundOn, WoundStrands,
+    PermRod, Treat, Treatments, Winding, WindingProgress, WoundOn, WoundStrands,
     model::{Rod, winding},
 };
 use crate::{
@@ -28,6 +28,7 @@ impl Plugin for StylePlugin {
             .register_type::<WoundOn>()
             .register_type::<WoundStrands>()
             .register_type::<Winding>()
+            .register_type::<WindingProgress>()
             .register_required_components::<Strand, Treatments>()
             .add_observer(release)
             .add_systems(PreUpdate, report_rods)
@@ -40,9 +41,7 @@ impl Plugin for StylePlugin {
             )
             .add_systems(
                 HairTick,
-                wind_strands
-                    .in_set(HairSystems::Interaction)
-                    .after(contact::part_strands),
+                wind_strands.in_set(HairSystems::Interaction).after(contact::part_strands),
             );
     }
 }
@@ -58,10 +57,7 @@ fn begin_treatments(
         let treat = request.clone().mended(&notes);
         let entity = treat.target;
         for wrong in notes.into_inner() {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::Setting(wrong),
-            });
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
         if let Ok(members) = hairs.get(entity) {
             let mut members = strands.iter_many_mut(members.collection());
@@ -71,10 +67,7 @@ fn begin_treatments(
         } else if let Ok(mut treatments) = strands.get_mut(entity) {
             treatments.acting.push(treat);
         } else {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::NoTarget,
-            });
+            faults.write(HairFault { entity, fault: Fault::NoTarget });
         }
     }
 }
@@ -84,25 +77,13 @@ fn apply_treatments(
     step: Res<HairStep>,
     mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
 ) {
-    let mut items: Vec<_> = strands
-        .iter_mut()
-        .filter(|(.., t)| !t.acting.is_empty())
-        .collect();
+    let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();
     for_each(&mut items, |(bonds, changes, treatments)| {
         let changes = changes.bypass_change_detection();
         for treat in &mut treatments.acting {
-            let share = if treat.seconds > step.dt {
-                step.dt / treat.seconds
-            } else {
-                1.0
-            };
+            let share = if treat.seconds > step.dt { step.dt / treat.seconds } else { 1.0 };
             let range = treat.joints.clone().unwrap_or(0..bonds.joints.len());
-            for (i, joint) in bonds
-                .joints
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| range.contains(i))
-            {
+            for (i, joint) in bonds.joints.iter().enumerate().filter(|(i, _)| range.contains(i)) {
                 for kind in BondKind::ALL {
                     if let Some(to) = treat.rates[kind as usize] {
                         changes.ask(i, kind, (to - joint.rates[kind as usize]) * share);
@@ -123,10 +104,7 @@ fn report_rods(
         let notes = Notes::default();
         rod.mended(&notes);
         for wrong in notes.into_inner() {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::Setting(wrong),
-            });
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
     }
 }
@@ -135,11 +113,18 @@ fn wind_strands(
     step: Res<HairStep>,
     hairs: Query<&TickPose>,
     rods: Query<(&PermRod, &TickPose)>,
-    mut strands: Query<(&StrandOf, &WoundOn, &Strand, &mut Winding, &mut HeldNodes)>,
+    mut strands: Query<(
+        &StrandOf,
+        &WoundOn,
+        &Strand,
+        &Winding,
+        &mut WindingProgress,
+        &mut HeldNodes,
+    )>,
 ) {
     let mut items: Vec<_> = strands
         .iter_mut()
-        .filter_map(|(of, on, strand, winding, held)| {
+        .filter_map(|(of, on, strand, settings, wound, held)| {
             let hair = hairs.get(of.0).ok()?.now();
             let (rod, pose) = rods.get(on.0).ok()?;
             let (rod, pose) = (rod.mended(&Notes::default()), pose.now());
@@ -150,38 +135,24 @@ fn wind_strands(
                 radius: rod.radius * scale,
                 half_length: 0.5 * rod.length * scale,
             };
-            Some((rod, strand, winding, held))
+            Some((rod, strand, settings, wound, held))
         })
         .collect();
-    for_each(&mut items, |(rod, strand, wound, held)| {
+    for_each(&mut items, |(rod, strand, settings, wound, held)| {
         // The root is the scalp's, so the first node that can be wound is the next.
-        let from = wound.from_node.max(1);
+        let from = settings.from_node.max(1);
         if from >= strand.edges() {
             return;
         }
         if wound.start.len() != strand.nodes() {
             wound.start = strand.positions().to_vec();
         }
-        let seconds = wound.seconds.max(step.dt);
+        let seconds = settings.seconds.max(step.dt);
         let advanced = wound.progress + step.dt / seconds;
-        wound.progress = if advanced.is_finite() {
-            advanced.min(1.0)
-        } else {
-            1.0
-        };
-        let pitch = if wound.pitch.is_finite() {
-            wound.pitch
-        } else {
-            0.0
-        };
-        let targets = winding(
-            rod,
-            &wound.start,
-            strand.rest_lengths(),
-            from,
-            pitch,
-            wound.progress,
-        );
+        wound.progress = if advanced.is_finite() { advanced.min(1.0) } else { 1.0 };
+        let pitch = if settings.pitch.is_finite() { settings.pitch } else { 0.0 };
+        let targets =
+            winding(rod, &wound.start, strand.rest_lengths(), from, pitch, wound.progress);
         held.targets.clear();
         held.targets.resize(from, None);
         held.targets.extend(targets.into_iter().map(Some));
@@ -189,10 +160,9 @@ fn wind_strands(
 }
 
 /// A strand that leaves its rod, for whatever reason, is free.
-fn release(left: On<Remove, WoundOn>, mut strands: Query<(&mut Winding, &mut HeldNodes)>) {
-    if let Ok((mut winding, mut held)) = strands.get_mut(left.entity) {
+fn release(left: On<Remove, WoundOn>, mut strands: Query<(&mut WindingProgress, &mut HeldNodes)>) {
+    if let Ok((mut wound, mut held)) = strands.get_mut(left.entity) {
         held.targets.clear();
-        winding.progress = 0.0;
-        winding.start.clear();
+        *wound = default();
     }
 }

@@ -1,0 +1,157 @@
+//! Runs a scene without a window and prints what it came to.
+//!
+//! `cargo run --release --example headless -- --scene perm --variant treated --json`
+
+#[path = "../scenes/mod.rs"]
+mod scenes;
+
+mod report;
+
+use bevy::{
+    app::{TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy},
+    prelude::*,
+    time::TimeUpdateStrategy,
+};
+use bevy_keratin::prelude::*;
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use report::Report;
+use scenes::{Director, Scene, SceneKind, ScenePlugin, measure};
+use std::{
+    io::Write,
+    path::PathBuf,
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+/// Runs a scene of the paper without a window.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    /// Which scene: bedhead, blow-dry, perm.
+    #[arg(long)]
+    scene: SceneKind,
+    /// Which variant of it; the full treatment if left out.
+    #[arg(long)]
+    variant: Option<String>,
+    /// How long the story runs (s) before it is measured; the paper's length if left out.
+    #[arg(long)]
+    seconds: Option<f32>,
+    /// One JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Writes a line a frame to this file.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Threads that solve strands; Bevy's own choice if left out.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let scene = Scene::new(arguments.scene, arguments.variant.as_deref())?;
+    let seconds = arguments.seconds.unwrap_or(scene.kind.frames() as f32 / 60.0);
+    if !(seconds > 0.0 && seconds < 1e5) {
+        return Err(format!("--seconds is {seconds}, expected more than 0, at most 100000").into());
+    }
+    let mut csv = arguments.csv.as_ref().map(std::fs::File::create).transpose()?;
+    if let Some(file) = &mut csv {
+        writeln!(file, "seconds,kept,b_hydrogen_mean,strain_peak,tip_x,tip_y,tip_z")?;
+    }
+    let mut app = headless_app(scene, arguments.threads);
+    let frames = (seconds * 60.0).round() as u64;
+    let bar = ProgressBar::new(frames)
+        .with_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} frames, {eta} left")?);
+    bar.set_message(format!("{} {}", scene.kind.name(), scene.variant));
+    let start = Instant::now();
+    for _ in 0..frames {
+        app.update();
+        if let Some(file) = &mut csv {
+            writeln!(file, "{}", frame_line(app.world_mut()))?;
+        }
+        bar.inc(1);
+    }
+    let wall = start.elapsed();
+    let mut report = Report::new(app.world_mut(), scene, frames, wall);
+    bar.set_message("settling");
+    settle(&mut app);
+    report.hanging(app.world_mut());
+    app.insert_resource(HairGravity(Vec3::ZERO));
+    settle(&mut app);
+    report.weightless(app.world_mut());
+    bar.finish_and_clear();
+    if arguments.json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        println!("{}", report.table()?);
+    }
+    Ok(())
+}
+
+/// Exactly one tick an update, on as many threads as asked for.
+fn headless_app(scene: Scene, threads: Option<u16>) -> App {
+    // The thread that runs the app solves strands too, next to those of the pool.
+    let mut pools = TaskPoolOptions::default();
+    if let Some(threads) = threads {
+        let count = usize::from(threads - 1);
+        pools.compute = TaskPoolThreadAssignmentPolicy {
+            min_threads: count,
+            max_threads: count,
+            percent: 1.0,
+            on_thread_spawn: None,
+            on_thread_destroy: None,
+        };
+    }
+    let mut app = App::new();
+    app.add_plugins((
+        MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools }),
+        HairPlugins::default(),
+        ScenePlugin(scene),
+    ))
+    .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    app.finish();
+    app.cleanup();
+    app.update();
+    app
+}
+
+/// Lets the hair come to rest, with more drag than air has, for at most half a minute.
+fn settle(app: &mut App) {
+    let drag = **app.world().resource::<HairDefault<AirDrag>>();
+    app.insert_resource(HairDefault(AirDrag { rate: 6.0 }));
+    for _ in 0..60 {
+        for _ in 0..30 {
+            app.update();
+        }
+        let mut strands = app.world_mut().query::<&Strand>();
+        let (sum, n) = strands
+            .iter(app.world())
+            .flat_map(Strand::velocities)
+            .fold((0.0, 0), |(s, n), v| (s + v.length_squared() as f64, n + 1));
+        if (sum / n as f64).sqrt() < 1e-4 {
+            break;
+        }
+    }
+    app.insert_resource(HairDefault(drag));
+}
+
+fn frame_line(world: &mut World) -> String {
+    let director = world.resource::<Director>().clone();
+    let kept = measure::kept_now(&director, world.query::<&Strand>().iter(world));
+    let (_, hydrogen, _) = measure::hydrogen(world.query::<&Bonds>().iter(world));
+    let tip = report::tip_mean(world);
+    let strain = world.resource::<measure::StrainPeak>().0;
+    let seconds = world.resource::<Director>().seconds;
+    format!("{seconds},{kept},{hydrogen},{strain},{},{},{}", tip[0], tip[1], tip[2])
+}

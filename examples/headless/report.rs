@@ -1,0 +1,182 @@
+//! The numbers that a run came to.
+
+use crate::scenes::{Director, Scene, SceneKind, measure};
+use bevy::{math::DVec3, prelude::*};
+use bevy_keratin::{HairStep, WindReceived, prelude::*};
+use serde::Serialize;
+use std::time::Duration;
+
+#[derive(Serialize)]
+struct Spread {
+    min: f32,
+    mean: f64,
+    max: f32,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+pub struct Report {
+    scene: &'static str,
+    variant: &'static str,
+    strands: usize,
+    nodes: usize,
+    substeps: u32,
+    dt: f32,
+    frames: u64,
+    finite: bool,
+    strain_peak: f32,
+    /// The share of the held shape that the bonds alone would rest in.
+    kept_rest: f64,
+    /// The share that is there after settling without gravity.
+    kept_zero_gravity: f64,
+    /// The share that is there after settling under gravity.
+    kept_hanging: f64,
+    /// Mean radius of the held shape (m).
+    curl_radius_held: Option<f64>,
+    /// Mean radius without gravity (m); none for straight hair.
+    curl_radius_zero_gravity: Option<f64>,
+    /// Turns of the hanging hair.
+    turns: f64,
+    b_hydrogen: Spread,
+    /// Mean of the hanging tips (m).
+    tip_mean: [f64; 3],
+    /// Largest |rate − min(1, b₀ + 0.3 Σ|Δv_w|)| over the joints, blow-dry treated only.
+    drying_error: Option<f64>,
+    /// Rank correlation of wind received and rate over unsaturated joints, blow-dry treated only.
+    wind_rate_correlation: Option<f64>,
+    /// Largest distance of a joint's shape without gravity from Σ f b Ω_j / Σ f b.
+    relaxed_error: f64,
+    /// A number made of every bit of the state when the story ended.
+    state_hash: String,
+    wall_seconds: f64,
+    sim_seconds: f64,
+    /// Simulated seconds per second.
+    real_time_factor: f64,
+    ns_per_segment_iteration: f64,
+    #[serde(skip)]
+    segment: f32,
+    #[serde(skip)]
+    held: Vec<Vec<Vec3>>,
+}
+
+impl Report {
+    /// Measures at the end of the story.
+    pub fn new(world: &mut World, scene: Scene, frames: u64, wall: Duration) -> Self {
+        let held = world.resource::<Director>().held.clone();
+        let step = *world.resource::<HairStep>();
+        let sim_seconds = frames as f64 / 60.0;
+        let strands: Vec<Strand> = world.query::<&Strand>().iter(world).cloned().collect();
+        let bonds: Vec<Bonds> = world.query::<&Bonds>().iter(world).cloned().collect();
+        let remembered = measure::remembered(bonds.iter(), &BondInfluence::default());
+        let (min, mean, max) = measure::hydrogen(bonds.iter());
+        let segments: usize = strands.iter().map(Strand::edges).sum();
+        let iterations = Solver::default().iterations as f64 * step.count as f64 * frames as f64;
+        let segment = strands.first().map_or(0.0, |s| s.rest_lengths()[0]);
+        let mut report = Self {
+            scene: scene.kind.name(),
+            variant: scene.variant,
+            strands: strands.len(),
+            nodes: strands.first().map_or(0, Strand::nodes),
+            substeps: step.count,
+            dt: step.dt,
+            frames,
+            finite: strands.iter().all(Strand::is_finite),
+            strain_peak: world.resource::<measure::StrainPeak>().0,
+            kept_rest: measure::kept(&remembered, &held),
+            kept_zero_gravity: f64::NAN,
+            kept_hanging: f64::NAN,
+            curl_radius_held: finite(measure::curl_radius(&held, segment)),
+            curl_radius_zero_gravity: None,
+            turns: 0.0,
+            b_hydrogen: Spread { min, mean, max },
+            tip_mean: [0.0; 3],
+            drying_error: None,
+            wind_rate_correlation: None,
+            relaxed_error: f64::NAN,
+            state_hash: format!("{:016x}", state_hash(&strands, &bonds)),
+            wall_seconds: wall.as_secs_f64(),
+            sim_seconds,
+            real_time_factor: sim_seconds / wall.as_secs_f64(),
+            ns_per_segment_iteration: wall.as_nanos() as f64 / (segments as f64 * iterations),
+            segment,
+            held,
+        };
+        if scene.kind == SceneKind::BlowDry && scene.variant == "treated" {
+            let wind: Vec<f32> = world
+                .query::<&WindReceived>()
+                .iter(world)
+                .flat_map(|w| w.total.iter().copied())
+                .collect();
+            let rates = bonds.iter().flat_map(|b| b.rates(BondKind::Hydrogen));
+            let pairs: Vec<(f32, f32)> = wind.into_iter().zip(rates).collect();
+            let error = |&(w, b): &(f32, f32)| f64::from((b - (0.3 * w).min(1.0)).abs());
+            report.drying_error = Some(pairs.iter().map(error).fold(0.0, f64::max));
+            let open: Vec<_> = pairs.iter().filter(|(_, b)| *b < 1.0).copied().collect();
+            report.wind_rate_correlation = Some(measure::rank_correlation(&open));
+        }
+        report
+    }
+
+    /// Measures the settled hair under gravity.
+    pub fn hanging(&mut self, world: &mut World) {
+        let shapes = measure::shapes(world.query::<&Strand>().iter(world));
+        self.kept_hanging = measure::kept(&shapes, &self.held);
+        self.turns = measure::turns(&shapes);
+        self.tip_mean = tip_mean(world);
+        self.check(world);
+    }
+
+    /// Measures the settled hair without gravity.
+    pub fn weightless(&mut self, world: &mut World) {
+        let shapes = measure::shapes(world.query::<&Strand>().iter(world));
+        self.kept_zero_gravity = measure::kept(&shapes, &self.held);
+        self.curl_radius_zero_gravity = finite(measure::curl_radius(&shapes, self.segment));
+        let bonds: Vec<Bonds> = world.query::<&Bonds>().iter(world).cloned().collect();
+        let remembered = measure::remembered(bonds.iter(), &BondInfluence::default());
+        self.relaxed_error = (shapes.iter().flatten().zip(remembered.iter().flatten()))
+            .map(|(a, b)| f64::from(a.distance(*b)))
+            .fold(0.0, f64::max);
+        self.check(world);
+    }
+
+    fn check(&mut self, world: &mut World) {
+        self.finite &= world.query::<&Strand>().iter(world).all(Strand::is_finite);
+        self.strain_peak = world.resource::<measure::StrainPeak>().0;
+    }
+
+    /// The same as lines of name and value.
+    pub fn table(&self) -> serde_json::Result<String> {
+        let value = serde_json::to_value(self)?;
+        let lines = value.as_object().into_iter().flatten();
+        Ok(lines.map(|(k, v)| format!("{k:26} {v}")).collect::<Vec<_>>().join("\n"))
+    }
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+/// The mean place of the tips in the hair's frame (m).
+pub fn tip_mean(world: &mut World) -> [f64; 3] {
+    let tips: Vec<Vec3> = world
+        .query::<&Strand>()
+        .iter(world)
+        .filter_map(|s| s.positions().last().copied())
+        .collect();
+    let mean = tips.iter().map(|t| t.as_dvec3()).sum::<DVec3>() / tips.len().max(1) as f64;
+    mean.to_array()
+}
+
+/// FNV-1a over the bits of positions, velocities, orientations and bonds, in strand order.
+fn state_hash(strands: &[Strand], bonds: &[Bonds]) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut eat = |x: f32| hash = (hash ^ u64::from(x.to_bits())).wrapping_mul(0x0100_0000_01b3);
+    for s in strands {
+        s.positions().iter().chain(s.velocities()).flat_map(|v| v.to_array()).for_each(&mut eat);
+        s.orientations().iter().flat_map(|q| q.to_array()).for_each(&mut eat);
+    }
+    for joint in bonds.iter().flat_map(|b| &b.joints) {
+        joint.shapes.iter().flat_map(|s| s.to_array()).chain(joint.rates).for_each(&mut eat);
+    }
+    hash
+}

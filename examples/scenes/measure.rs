@@ -1,0 +1,85 @@
+//! What a scene came to, in numbers.
+
+use super::Director;
+use bevy::prelude::*;
+use bevy_keratin::prelude::*;
+
+/// The largest segment strain since the scene began.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+pub struct StrainPeak(pub f32);
+
+pub fn watch_strain(strands: Query<&Strand>, mut peak: ResMut<StrainPeak>) {
+    // A NaN must not pass for no strain.
+    peak.0 =
+        strands.iter().map(Strand::peak_strain).fold(peak.0, |a, b| if b <= a { a } else { b });
+}
+
+/// Ω of every joint, by strand.
+pub fn shapes<'a>(strands: impl Iterator<Item = &'a Strand>) -> Vec<Vec<Vec3>> {
+    strands.map(|s| (0..s.edges()).map(|i| s.darboux(i).xyz()).collect()).collect()
+}
+
+/// The share of `held` that is in `now`: Σ Ω·Ω_held / Σ Ω_held². NaN before anything was held.
+pub fn kept(now: &[Vec<Vec3>], held: &[Vec<Vec3>]) -> f64 {
+    let (mut dot, mut norm) = (0.0, 0.0);
+    for (now, held) in now.iter().flatten().zip(held.iter().flatten()) {
+        dot += now.dot(*held) as f64;
+        norm += held.length_squared() as f64;
+    }
+    dot / norm
+}
+
+/// The mean radius of curvature from sin(θ/2) = l/(2R) (m), over the joints that bend at all.
+pub fn curl_radius(shapes: &[Vec<Vec3>], segment: f32) -> f64 {
+    let bent = shapes.iter().flatten().map(|o| o.length()).filter(|o| *o > 1e-3);
+    let (sum, n) = bent.fold((0.0, 0), |(s, n), o| (s + (segment / (2.0 * o)) as f64, n + 1));
+    if n == 0 { f64::INFINITY } else { sum / n as f64 }
+}
+
+/// How many turns a strand makes from root to tip, on average: the angle of all its joints' rotation
+/// taken together.
+pub fn turns(shapes: &[Vec<Vec3>]) -> f64 {
+    let angle = |o: &Vec3| (2.0 * o.length().min(1.0).asin()) as f64;
+    let total: f64 = shapes.iter().flatten().map(angle).sum();
+    total / core::f64::consts::TAU / shapes.len().max(1) as f64
+}
+
+/// Least, mean and most of the hydrogen bonds' rates.
+pub fn hydrogen<'a>(bonds: impl Iterator<Item = &'a Bonds>) -> (f32, f64, f32) {
+    let (mut low, mut high, mut sum, mut n) = (f32::INFINITY, f32::NEG_INFINITY, 0.0, 0);
+    for b in bonds.flat_map(|b| b.rates(BondKind::Hydrogen)) {
+        (low, high, sum, n) = (low.min(b), high.max(b), sum + b as f64, n + 1);
+    }
+    (low, sum / n.max(1) as f64, high)
+}
+
+/// What the bonds alone would rest in, by strand.
+pub fn remembered<'a>(
+    bonds: impl Iterator<Item = &'a Bonds>,
+    influence: &BondInfluence,
+) -> Vec<Vec<Vec3>> {
+    let f = influence.as_array();
+    bonds.map(|b| b.joints.iter().map(|j| j.relaxed(&f)).collect()).collect()
+}
+
+/// Spearman's rank correlation.
+pub fn rank_correlation(pairs: &[(f32, f32)]) -> f64 {
+    let ranks = |pick: fn(&(f32, f32)) -> f32| {
+        let mut order: Vec<usize> = (0..pairs.len()).collect();
+        order.sort_by(|a, b| pick(&pairs[*a]).total_cmp(&pick(&pairs[*b])));
+        let mut rank = vec![0.0; pairs.len()];
+        order.iter().enumerate().for_each(|(r, i)| rank[*i] = r as f64);
+        rank
+    };
+    let (a, b) = (ranks(|p| p.0), ranks(|p| p.1));
+    let mean = (pairs.len() as f64 - 1.0) / 2.0;
+    let sum = |f: &dyn Fn(usize) -> f64| (0..pairs.len()).map(f).sum::<f64>();
+    let covariance = sum(&|i| (a[i] - mean) * (b[i] - mean));
+    let (va, vb) = (sum(&|i| (a[i] - mean).powi(2)), sum(&|i| (b[i] - mean).powi(2)));
+    covariance / (va * vb).sqrt()
+}
+
+/// The share of what was held that is in the strands now; NaN before.
+pub fn kept_now<'a>(director: &Director, strands: impl Iterator<Item = &'a Strand>) -> f64 {
+    kept(&shapes(strands), &director.held)
+}
