@@ -85,7 +85,7 @@ impl Report {
             kept_rest: measure::kept(&remembered, &held),
             kept_zero_gravity: f64::NAN,
             kept_hanging: f64::NAN,
-            curl_radius_held: finite(measure::curl_radius(&held, segment)),
+            curl_radius_held: measure::curl_radius(&held, &held, segment),
             curl_radius_zero_gravity: None,
             turns: 0.0,
             b_hydrogen: Spread { min, mean, max },
@@ -130,7 +130,7 @@ impl Report {
     pub fn weightless(&mut self, world: &mut World) {
         let shapes = measure::shapes(world.query::<&Strand>().iter(world));
         self.kept_zero_gravity = measure::kept(&shapes, &self.held);
-        self.curl_radius_zero_gravity = finite(measure::curl_radius(&shapes, self.segment));
+        self.curl_radius_zero_gravity = measure::curl_radius(&shapes, &self.held, self.segment);
         let bonds: Vec<Bonds> = world.query::<&Bonds>().iter(world).cloned().collect();
         let remembered = measure::remembered(bonds.iter(), &BondInfluence::default());
         self.relaxed_error = (shapes.iter().flatten().zip(remembered.iter().flatten()))
@@ -150,10 +150,6 @@ impl Report {
         let lines = value.as_object().into_iter().flatten();
         Ok(lines.map(|(k, v)| format!("{k:26} {v}")).collect::<Vec<_>>().join("\n"))
     }
-}
-
-fn finite(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
 }
 
 /// The mean place of the tips in the hair's frame (m).

@@ -29,11 +29,19 @@ pub fn kept(now: &[Vec<Vec3>], held: &[Vec<Vec3>]) -> f64 {
     dot / norm
 }
 
-/// The mean radius of curvature from sin(θ/2) = l/(2R) (m), over the joints that bend at all.
-pub fn curl_radius(shapes: &[Vec<Vec3>], segment: f32) -> f64 {
-    let bent = shapes.iter().flatten().map(|o| o.length()).filter(|o| *o > 1e-3);
-    let (sum, n) = bent.fold((0.0, 0), |(s, n), o| (s + (segment / (2.0 * o)) as f64, n + 1));
-    if n == 0 { f64::INFINITY } else { sum / n as f64 }
+/// The mean radius of curvature from sin(θ/2) = l/(2R) (m), over the joints that are on the curl:
+/// those that `held` bends at least half as much as its most bent one. None for straight hair.
+pub fn curl_radius(shapes: &[Vec<Vec3>], held: &[Vec<Vec3>], segment: f32) -> Option<f64> {
+    let most = held.iter().flatten().map(|o| o.length()).fold(0.0, f32::max);
+    let (mut sum, mut n) = (0.0, 0);
+    for (now, held) in shapes.iter().flatten().zip(held.iter().flatten()) {
+        if held.length() >= 0.5 * most {
+            sum += f64::from(segment / (2.0 * now.length()));
+            n += 1;
+        }
+    }
+    let mean = sum / f64::from(n.max(1));
+    (n > 0 && mean < 1e3).then_some(mean)
 }
 
 /// How many turns a strand makes from root to tip, on average: the angle of all its joints' rotation

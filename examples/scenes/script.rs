@@ -21,7 +21,7 @@ pub struct Moment;
 
 impl Moment {
     /// bedhead, blow-dry: the head has come down.
-    pub const PRESSED: f32 = 3.0;
+    pub const PRESSED: f32 = 4.0;
     /// bedhead, blow-dry: drying begins; perm: the hair is wound and treated.
     pub const TREATED: f32 = 6.5;
     /// bedhead, blow-dry: lifted from here on.

@@ -84,9 +84,15 @@ impl JointBonds {
 /// The present shape as a Darboux vector in the hemisphere of the remembered one.
 #[inline]
 fn aligned(omega: Quat, remembered: Vec3) -> Vec3 {
-    let w = (1.0 - remembered.length_squared()).max(0.0).sqrt();
-    let opposite = omega.xyz().dot(remembered) + omega.w * w < 0.0;
-    if opposite { -omega.xyz() } else { omega.xyz() }
+    let dot = omega.xyz().dot(remembered);
+    // Both real parts are ≥ 0, so only vectors that point apart can be opposite at all.
+    if dot < 0.0 {
+        let w = (1.0 - remembered.length_squared()).max(0.0).sqrt();
+        if dot + omega.w * w < 0.0 {
+            return -omega.xyz();
+        }
+    }
+    omega.xyz()
 }
 
 /// Equation 19: the change of the hydrogen bonds' rate by a wind that changed the velocity by

@@ -1,7 +1,10 @@
 //! Contact between strands as mathematics: equation 18 of \[B\] over the uniform grid.
 
 use crate::grid::UniformGrid;
-use bevy::{math::Vec3, reflect::Reflect};
+use bevy::{
+    math::{IVec3, Vec3},
+    reflect::Reflect,
+};
 
 /// Equation 18: the acceleration of a node at `p` away from the foot `f` of its perpendicular on
 /// another strand's edge, α (2r − |p−f|)/(2r) along p − f, within 2r.
@@ -9,25 +12,52 @@ use bevy::{math::Vec3, reflect::Reflect};
 pub fn penalty(p: Vec3, foot: Vec3, radius: f32, strength: f32) -> Vec3 {
     let off = p - foot;
     let reach = 2.0 * radius;
-    let distance = off.length();
+    let squared = off.length_squared();
     // Two nodes in one place have no direction to part in.
-    if distance >= reach || distance < 1e-9 {
+    if squared >= reach * reach || squared < 1e-18 {
         return Vec3::ZERO;
     }
+    let distance = squared.sqrt();
     off * (strength * (reach - distance) / (reach * distance))
 }
 
-/// The foot of the perpendicular from `p` on the edge `a b`, clamped to it, or `None` where another
-/// edge of the strand counts it: a foot on a node that two edges share belongs to the second one.
-#[inline]
-pub fn foot(p: Vec3, a: Vec3, b: Vec3, is_last: bool) -> Option<Vec3> {
-    let edge = b - a;
-    let t = (p - a).dot(edge) / edge.length_squared().max(1e-20);
-    if t >= 1.0 {
-        return is_last.then_some(b);
-    }
-    Some(a + edge * t.max(0.0))
+/// An edge of a strand with what is needed to drop perpendiculars on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Edge {
+    start: Vec3,
+    along: Vec3,
+    inverse_squared: f32,
+    is_last: bool,
 }
+
+impl Edge {
+    /// The edge from `a` to `b`; `is_last` for the one at the tip.
+    #[inline]
+    pub fn new(a: Vec3, b: Vec3, is_last: bool) -> Self {
+        let along = b - a;
+        let inverse_squared = 1.0 / along.length_squared().max(1e-20);
+        Self { start: a, along, inverse_squared, is_last }
+    }
+
+    /// The foot of the perpendicular from `p`, clamped to the edge, or `None` where another edge of
+    /// the strand counts it: a foot on a node that two edges share belongs to the second one.
+    #[inline]
+    pub fn foot(&self, p: Vec3) -> Option<Vec3> {
+        let t = (p - self.start).dot(self.along) * self.inverse_squared;
+        if t >= 1.0 {
+            return self.is_last.then_some(self.start + self.along);
+        }
+        Some(self.start + self.along * t.max(0.0))
+    }
+
+    fn distance_squared(&self, p: Vec3) -> f32 {
+        let t = ((p - self.start).dot(self.along) * self.inverse_squared).clamp(0.0, 1.0);
+        p.distance_squared(self.start + self.along * t)
+    }
+}
+
+/// Margin of the list, in units of the reach 2r. More means longer lists, built less often.
+const MARGIN: f32 = 1.4;
 
 /// One strand as contacts see it: a range of nodes in a flat array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
@@ -48,9 +78,11 @@ pub struct Neighbours {
     built_at: Vec<Vec3>,
     runs: Vec<Run>,
     reach: f32,
+    /// The edge that starts at each node, as it is now; tips have one without length.
+    edges: Vec<Edge>,
     starts: Vec<u32>,
-    /// Index of the edge's start node, and whether it is the strand's last edge.
-    edges: Vec<(u32, bool)>,
+    /// The near edges of each node, by their start nodes.
+    near: Vec<u32>,
 }
 
 impl Neighbours {
@@ -58,7 +90,18 @@ impl Neighbours {
     /// had to be built.
     pub fn update(&mut self, points: &[Vec3], runs: &[Run], radius: f32) -> bool {
         let reach = 2.0 * radius;
-        let margin = 2.0 * reach;
+        let margin = MARGIN * reach;
+        self.edges.clear();
+        self.edges.reserve(points.len());
+        for run in runs {
+            let nodes = &points[run.start as usize..(run.start + run.len) as usize];
+            let last = nodes.len().saturating_sub(2);
+            self.edges.extend(
+                (0..nodes.len()).map(|i| {
+                    Edge::new(nodes[i], *nodes.get(i + 1).unwrap_or(&nodes[i]), i == last)
+                }),
+            );
+        }
         let limit = (0.5 * margin) * (0.5 * margin);
         let current = self.reach == reach
             && self.built_at.len() == points.len()
@@ -78,85 +121,76 @@ impl Neighbours {
     }
 
     fn build(&mut self, points: &[Vec3], within: f32) {
-        // Edges are put in by samples at most one spacing apart, so that whatever is within reach of
-        // an edge is within reach + spacing/2 of a sample: one cell.
-        let cell = 2.0 * within;
-        let samples = self.runs.iter().flat_map(|run| {
-            (run.start..(run.start + run.len).saturating_sub(1)).flat_map(move |i| {
+        // Each edge is put, in pieces, into every cell that has a point within reach of it, so that a
+        // node finds all its edges in the one cell it is in.
+        let half_piece = 0.5 * within;
+        let reach = Vec3::splat(within + half_piece);
+        self.grid.begin(2.0 * (within + half_piece));
+        for run in &self.runs {
+            for i in run.start..(run.start + run.len).saturating_sub(1) {
                 let (a, b) = (points[i as usize], points[i as usize + 1]);
+                if !(a.is_finite() && b.is_finite()) {
+                    continue;
+                }
                 // An edge torn to absurd length is sampled coarsely rather than for ever.
-                let n = (a.distance(b) / cell).ceil().clamp(1.0, 64.0) as u32;
-                (0..n).map(move |s| (a.lerp(b, (s as f32 + 0.5) / n as f32), i))
-            })
-        });
-        self.grid.build(cell, samples);
+                let n = (a.distance(b) / (2.0 * half_piece)).ceil().clamp(1.0, 64.0) as u32;
+                // Boxes of cells along a line move one way on each axis: a cell that was put in
+                // before is in the box before.
+                let (mut low_before, mut high_before) = (IVec3::MAX, IVec3::MIN);
+                for piece in 0..n {
+                    let middle = a.lerp(b, (piece as f32 + 0.5) / n as f32);
+                    let low = self.grid.cell_of(middle - reach);
+                    let high = self.grid.cell_of(middle + reach);
+                    for z in low.z..=high.z {
+                        for y in low.y..=high.y {
+                            for x in low.x..=high.x {
+                                let cell = IVec3::new(x, y, z);
+                                let inside = cell.cmpge(low_before) & cell.cmple(high_before);
+                                if !inside.all() {
+                                    self.grid.put(cell, i);
+                                }
+                            }
+                        }
+                    }
+                    (low_before, high_before) = (low, high);
+                }
+            }
+        }
+        self.grid.sort();
         self.starts.clear();
-        self.edges.clear();
+        self.near.clear();
         self.starts.push(0);
+        let within = within * within;
         for run in &self.runs {
             let (start, end) = (run.start, run.start + run.len);
             for i in start..end {
-                let p = points[i as usize];
-                let first = self.edges.len();
-                let found = &mut self.edges;
                 // The root is held; pushing it would do nothing.
                 if i > start {
-                    self.grid.for_each_near(p, |j| {
-                        if !(start..end).contains(&j) {
-                            found.push((j, false));
+                    let p = points[i as usize];
+                    self.grid.for_each_at(p, |j| {
+                        let own = (start..end).contains(&j);
+                        if !own && self.edges[j as usize].distance_squared(p) < within {
+                            self.near.push(j);
                         }
                     });
-                    found[first..].sort_unstable();
-                    let mut kept = first;
-                    for k in first..found.len() {
-                        let j = found[k].0;
-                        let repeated = kept > first && found[kept - 1].0 == j;
-                        let (a, b) = (points[j as usize], points[j as usize + 1]);
-                        if !repeated && near_edge(p, a, b, within) {
-                            found[kept].0 = j;
-                            kept += 1;
-                        }
-                    }
-                    found.truncate(kept);
                 }
-                self.starts.push(self.edges.len() as u32);
+                self.starts.push(self.near.len() as u32);
             }
-        }
-        self.mark_last_edges();
-    }
-
-    fn mark_last_edges(&mut self) {
-        let mut last = vec![false; self.built_at.len()];
-        for run in self.runs.iter().filter(|r| r.len >= 2) {
-            last[(run.start + run.len - 2) as usize] = true;
-        }
-        for (edge, is_last) in &mut self.edges {
-            *is_last = last[*edge as usize];
         }
     }
 
     /// Equation 18 summed over all edges near node `i`, in a fixed order (m/s²).
-    pub fn acceleration(&self, i: usize, points: &[Vec3], radius: f32, strength: f32) -> Vec3 {
-        let p = points[i];
-        self.edges[self.starts[i] as usize..self.starts[i + 1] as usize]
+    pub fn acceleration(&self, i: usize, p: Vec3, radius: f32, strength: f32) -> Vec3 {
+        self.near[self.starts[i] as usize..self.starts[i + 1] as usize]
             .iter()
-            .filter_map(|&(j, is_last)| {
-                let f = foot(p, points[j as usize], points[j as usize + 1], is_last)?;
-                Some(penalty(p, f, radius, strength))
-            })
+            .filter_map(|&j| Some(penalty(p, self.edges[j as usize].foot(p)?, radius, strength)))
             .sum()
     }
 
     /// How many pairs of node and edge are kept.
     pub fn pairs(&self) -> usize {
-        self.edges.len()
+        self.near.len()
     }
-}
-
-fn near_edge(p: Vec3, a: Vec3, b: Vec3, within: f32) -> bool {
-    let edge = b - a;
-    let t = ((p - a).dot(edge) / edge.length_squared().max(1e-20)).clamp(0.0, 1.0);
-    p.distance_squared(a + edge * t) < within * within
 }
 
 #[cfg(test)]
@@ -177,9 +211,9 @@ mod tests {
     fn a_foot_on_a_shared_node_counts_once_and_tips_count() {
         let (a, b, c) = (Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y);
         let p = Vec3::new(1.2, -0.2, 0.0);
-        assert_eq!(foot(p, a, b, false), None);
-        assert_eq!(foot(p, b, c, true), Some(b));
-        assert_eq!(foot(Vec3::new(1.0, 2.0, 0.0), b, c, true), Some(c));
+        assert_eq!(Edge::new(a, b, false).foot(p), None);
+        assert_eq!(Edge::new(b, c, true).foot(p), Some(b));
+        assert_eq!(Edge::new(b, c, true).foot(Vec3::new(1.0, 2.0, 0.0)), Some(c));
     }
 
     fn brute(points: &[Vec3], runs: &[Run], i: usize, radius: f32) -> Vec3 {
@@ -193,7 +227,8 @@ mod tests {
                 continue;
             }
             for j in s..e - 1 {
-                if let Some(f) = foot(points[i], points[j], points[j + 1], j + 2 == e) {
+                let edge = Edge::new(points[j], points[j + 1], j + 2 == e);
+                if let Some(f) = edge.foot(points[i]) {
                     sum += penalty(points[i], f, radius, 20.0);
                 }
             }
@@ -220,12 +255,12 @@ mod tests {
             // less than half the margin: the old list must still be complete
             for (k, p) in points.iter_mut().enumerate() {
                 let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-                *p += Vec3::new(0.0, sign * drift * 2.0 * radius, 0.0);
+                *p += Vec3::new(0.0, sign * drift * MARGIN * radius, 0.0);
             }
             prop_assert!(!list.update(&points, &runs, radius));
             for i in 0..points.len() {
                 let (a, b) =
-                    (list.acceleration(i, &points, radius, 20.0), brute(&points, &runs, i, radius));
+                    (list.acceleration(i, points[i], radius, 20.0), brute(&points, &runs, i, radius));
                 prop_assert!(a.distance(b) < 1e-3, "node {}: {} against {}", i, a, b);
             }
         }

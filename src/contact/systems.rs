@@ -109,7 +109,7 @@ pub(crate) fn part_strands(
         }
         for_each(&mut work, |(start, pushes)| {
             for (i, push) in (*start..).zip(pushes.iter_mut()) {
-                *push = list.acceleration(i, points, radius, strength) * step.dt;
+                *push = list.acceleration(i, points[i], radius, strength) * step.dt;
             }
         });
         let mut pushes = pushes.iter();

@@ -31,20 +31,40 @@ impl UniformGrid {
     #[inline]
     pub fn cell_of(&self, point: Vec3) -> IVec3 {
         // Beyond a billion cells all points share the outermost one; distance tests sort them out.
-        (point * self.inverse_cell).floor().clamp(-FAR, FAR).as_ivec3()
+        let scaled = (point * self.inverse_cell).clamp(-FAR, FAR);
+        // The floor, without a call per number where the target has no instruction for it.
+        let toward_zero = scaled.as_ivec3();
+        toward_zero
+            + IVec3::select(toward_zero.as_vec3().cmpgt(scaled), IVec3::NEG_ONE, IVec3::ZERO)
     }
 
     /// Sorts `items`, each a point and a number of the caller's, into cells of size `cell` (> 0).
-    /// Non-finite points are left out. An item may come in several cells, once in each.
+    /// Non-finite points are left out.
     pub fn build(&mut self, cell: f32, items: impl Iterator<Item = (Vec3, u32)>) {
-        self.inverse_cell = 1.0 / cell.max(1e-9);
-        self.unsorted.clear();
+        self.begin(cell);
         for (point, item) in items {
             if point.is_finite() {
-                let cell = self.cell_of(point);
-                self.unsorted.push(Entry { cell, item });
+                self.put(self.cell_of(point), item);
             }
         }
+        self.sort();
+    }
+
+    /// Begins a grid of cells of size `cell` (> 0), empty.
+    pub fn begin(&mut self, cell: f32) {
+        self.inverse_cell = 1.0 / cell.max(1e-9);
+        self.unsorted.clear();
+    }
+
+    /// Puts an item into a cell; it may be put into several.
+    #[inline]
+    pub fn put(&mut self, cell: IVec3, item: u32) {
+        self.unsorted.push(Entry { cell, item });
+    }
+
+    /// Ends what [`begin`](Self::begin) began: from here on items are found, in each cell in the
+    /// order they were put.
+    pub fn sort(&mut self) {
         let buckets = self.unsorted.len().next_power_of_two().max(16);
         self.starts.clear();
         self.starts.resize(buckets + 1, 0);
@@ -67,6 +87,25 @@ impl UniformGrid {
         self.starts[buckets] = self.entries.len() as u32;
     }
 
+    /// Calls `found` with every item that was put into the cell of `point`.
+    #[inline]
+    pub fn for_each_at(&self, point: Vec3, mut found: impl FnMut(u32)) {
+        if !self.entries.is_empty() && point.is_finite() {
+            self.for_each_in(self.cell_of(point), self.starts.len() - 2, &mut found);
+        }
+    }
+
+    #[inline]
+    fn for_each_in(&self, cell: IVec3, mask: usize, found: &mut impl FnMut(u32)) {
+        let b = bucket(cell, mask);
+        for e in &self.entries[self.starts[b] as usize..self.starts[b + 1] as usize] {
+            // Cells that share a bucket are told apart here.
+            if e.cell == cell {
+                found(e.item);
+            }
+        }
+    }
+
     /// Calls `near` with every item in the 27 cells around `point`: all that lie within one cell
     /// size of it, and some that do not. An item comes once for each cell it was put in.
     #[inline]
@@ -80,14 +119,7 @@ impl UniformGrid {
             for y in -1..=1 {
                 for x in -1..=1 {
                     let cell = center + IVec3::new(x, y, z);
-                    let b = bucket(cell, mask);
-                    let range = self.starts[b] as usize..self.starts[b + 1] as usize;
-                    for e in &self.entries[range] {
-                        // Cells that share a bucket are told apart here.
-                        if e.cell == cell {
-                            near(e.item);
-                        }
-                    }
+                    self.for_each_in(cell, mask, &mut near);
                 }
             }
         }

@@ -34,6 +34,8 @@ pub struct NodeLanes {
     pub v: [Lane; 3],
     /// Inverse mass, relative to a whole node's: 1, at the tip 2, held 0.
     pub w: Lane,
+    /// Normal of the obstacle that the node rests on, or zero; written by the contact passes.
+    pub rests_on: [Lane; 3],
 }
 
 /// One edge of every strand in the block, with the joint at its start.
@@ -74,6 +76,8 @@ pub struct BlockLanes {
     pub root: [Lane; 4],
     /// Zero for lanes whose state is finite, else not a number; written by [`step`].
     pub finite: Lane,
+    /// Whether any node of any lane rests on an obstacle.
+    pub(super) touching: bool,
     pub(super) scratch: Vec<LimiterRow>,
 }
 
@@ -124,19 +128,23 @@ impl BlockLanes {
 
     /// The box that holds every node of every lane, before and after prediction with `dt`.
     pub fn bounds(&self, dt: f32) -> (Vec3, Vec3) {
-        let mut low = Vec3::INFINITY;
-        let mut high = Vec3::NEG_INFINITY;
+        let mut low = [[f32::INFINITY; LANES]; 3];
+        let mut high = [[f32::NEG_INFINITY; LANES]; 3];
         for n in &self.nodes {
             for axis in 0..3 {
+                let (p, v) = (&n.p[axis], &n.v[axis]);
+                let (l, h) = (&mut low[axis], &mut high[axis]);
                 for lane in 0..LANES {
-                    let a = n.p[axis][lane];
-                    let b = a + n.v[axis][lane] * dt;
-                    low[axis] = low[axis].min(a).min(b);
-                    high[axis] = high[axis].max(a).max(b);
+                    let to = p[lane] + v[lane] * dt;
+                    l[lane] = l[lane].min(p[lane]).min(to);
+                    h[lane] = h[lane].max(p[lane]).max(to);
                 }
             }
         }
-        (low, high)
+        let over_lanes = |a: [Lane; 3], f: fn(f32, f32) -> f32| {
+            Vec3::from(a.map(|lanes| lanes.into_iter().reduce(f).unwrap_or(f32::NAN)))
+        };
+        (over_lanes(low, f32::min), over_lanes(high, f32::max))
     }
 }
 
@@ -203,6 +211,16 @@ impl NodeLanes {
     }
 
     #[inline(always)]
+    pub(super) fn support<S: Simd>(&self, simd: S) -> V3<f32x16<S>> {
+        load3(simd, &self.rests_on)
+    }
+
+    #[inline(always)]
+    pub(super) fn set_support<S: Simd>(&mut self, normal: V3<f32x16<S>>) {
+        store3(&mut self.rests_on, normal);
+    }
+
+    #[inline(always)]
     pub(super) fn set_position<S: Simd>(&mut self, p: V3<f32x16<S>>) {
         store3(&mut self.p, p);
     }
@@ -226,7 +244,11 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacle
         contacts(simd, b, params, obstacles);
     }
     for _ in 0..params.limiter_steps {
-        limit_lengths(simd, b);
+        if b.touching {
+            limit_lengths::<S, true>(simd, b);
+        } else {
+            limit_lengths::<S, false>(simd, b);
+        }
     }
     if params.limiter_steps > 0 {
         contacts(simd, b, params, obstacles);
@@ -248,7 +270,9 @@ fn predict<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles:
         // getting them out gives them no velocity.
         let mut from = p;
         for o in obstacles {
-            from = V3::select(held, from, push_out(o, from, from, zero, params.skin, true));
+            if let Some((out, _)) = push_out(o, from, from, zero, params.skin, true) {
+                from = V3::select(held, from, out);
+            }
         }
         let v = load3(simd, &n.v);
         // Held nodes carry where they come from in `from` and where they are to be in `p`.
@@ -301,15 +325,28 @@ fn sweep<S: Simd>(simd: S, b: &mut BlockLanes, projection: StretchProjection) {
 
 #[inline(always)]
 fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
-    for o in obstacles {
-        let friction = f32x16::splat(simd, o.friction);
-        for n in &mut b.nodes {
-            let w = f32x16::load_array_ref(simd, &n.w);
-            let held = Real::lt(w, f32x16::splat(simd, 1e-12));
-            let p = load3(simd, &n.p);
-            let out = push_out(o, p, load3(simd, &n.from), friction, params.skin, false);
-            store3(&mut n.p, V3::select(held, p, out));
+    b.touching = false;
+    if obstacles.is_empty() {
+        return;
+    }
+    let zero = f32x16::splat(simd, 0.0);
+    let none = V3::new(zero, zero, zero);
+    for n in &mut b.nodes {
+        let w = f32x16::load_array_ref(simd, &n.w);
+        let held = Real::lt(w, f32x16::splat(simd, 1e-12));
+        let from = load3(simd, &n.from);
+        let (mut p, mut rests_on) = (load3(simd, &n.p), none);
+        for o in obstacles {
+            let friction = f32x16::splat(simd, o.friction);
+            if let Some((out, normal)) = push_out(o, p, from, friction, params.skin, false) {
+                p = V3::select(held, p, out);
+                let pushed = Real::lt(zero, normal.dot(normal));
+                rests_on = V3::select(pushed, normal, rests_on);
+                b.touching = true;
+            }
         }
+        store3(&mut n.p, p);
+        store3(&mut n.rests_on, rests_on);
     }
 }
 

@@ -4,14 +4,25 @@
 //! One Newton step on all lengths at once is a tridiagonal system J W Jᵀ λ = C with
 //! C_i = |p_{i+1} − p_i| − l_i, solved by the Thomas algorithm in one pass down and one up.
 //! Node masses alone enter: the rods' orientations are left as the iterations put them.
+//!
+//! A node that rests on an obstacle cannot go into it, so there W = w (I − a n nᵀ): lengths are
+//! mended along the surface instead of against it, which would end in compression. A node that the
+//! strand pulls off the surface is let go.
 
-use super::lanes::{LANES, Real};
-use super::{algebra::V3, block::BlockLanes};
+use super::{
+    algebra::V3,
+    block::BlockLanes,
+    lanes::{LANES, Real},
+};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// One Newton step on the lengths of every strand in the block.
+/// a: how firmly an obstacle holds against being pushed into. Below 1, so that a strand pressed
+/// straight down is not asked to fold within one substep.
+const FIRMNESS: f32 = 0.95;
+
+/// One Newton step on the lengths of every strand in the block. `TOUCHING` heeds obstacles.
 #[inline(always)]
-pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes) {
+pub(super) fn limit_lengths<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes) {
     let load = |a: &[f32; LANES]| f32x16::load_array_ref(simd, a);
     let edges = b.edges.len();
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
@@ -22,15 +33,25 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes) {
         let length = Real::sqrt(Real::max(along.dot(along), f32x16::splat(simd, 1e-20)));
         (along.scale(one / length), length)
     };
+    let firmness = f32x16::splat(simd, FIRMNESS);
+    // a · W b of node i
+    let mobility = |b: &BlockLanes, i: usize, x: V3<f32x16<S>>, y: V3<f32x16<S>>| {
+        let node = &b.nodes[i];
+        let free = x.dot(y);
+        if TOUCHING {
+            let n = node.support(simd);
+            load(&node.w) * (free - firmness * x.dot(n) * y.dot(n))
+        } else {
+            load(&node.w) * free
+        }
+    };
     let mut end = b.nodes[1].position(simd);
     let (mut d, mut length) = span(b.nodes[0].position(simd), end);
-    let mut w = load(&b.nodes[0].w);
     let (mut lower, mut upper, mut rhs) = (zero, zero, zero);
     for i in 0..edges {
-        // Row i: lower λ_{i−1} + (w_i + w_{i+1}) λ_i + coupling λ_{i+1} = C_i, where the coupling of
-        // two rows is −w (d·d′) of the node they share, and so also the next row's `lower`.
-        let w_end = load(&b.nodes[i + 1].w);
-        let pivot = w + w_end - lower * upper;
+        // Row i: lower λ_{i−1} + d_i·(W_i + W_{i+1})d_i λ_i + coupling λ_{i+1} = C_i, where the
+        // coupling of two rows is −d·W d′ of the node they share, and so the next row's `lower`.
+        let pivot = mobility(b, i, d, d) + mobility(b, i + 1, d, d) - lower * upper;
         let inverse = Real::select(Real::lt(pivot, tiny), zero, one / pivot);
         rhs = (length - load(&b.edges[i].l) - lower * rhs) * inverse;
         let s = &mut b.scratch[i];
@@ -39,13 +60,13 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes) {
         if i + 1 < edges {
             let next = b.nodes[i + 2].position(simd);
             let (ahead, ahead_length) = span(end, next);
-            let coupling = -(w_end * d.dot(ahead));
+            let coupling = -mobility(b, i + 1, d, ahead);
             upper = coupling * inverse;
-            (lower, d, length, end, w) = (coupling, ahead, ahead_length, next, w_end);
+            (lower, d, length, end) = (coupling, ahead, ahead_length, next);
         }
         b.scratch[i].upper = upper.to_array();
     }
-    // Back substitution, and Δp_{i+1} = w_{i+1} (λ_{i+1} d_{i+1} − λ_i d_i) from the tip upward.
+    // Back substitution, and Δp_{i+1} = W_{i+1} (λ_{i+1} d_{i+1} − λ_i d_i) from the tip upward.
     let mut lambda = zero;
     let mut pull = V3::new(zero, zero, zero);
     for i in (0..edges).rev() {
@@ -55,8 +76,15 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes) {
         let tension = d.scale(lambda);
         let node = &mut b.nodes[i + 1];
         let w = load(&node.w);
-        let moved = (pull - tension).scale_add(w, node.position(simd));
-        node.set_position(moved);
+        let mut force = pull - tension;
+        if TOUCHING {
+            let n = node.support(simd);
+            let off = force.dot(n);
+            let lifts = Real::lt(zero, off);
+            node.set_support(V3::select(lifts, V3::new(zero, zero, zero), n));
+            force = V3::select(lifts, force, n.scale_add(-(firmness * off), force));
+        }
+        node.set_position(force.scale_add(w, node.position(simd)));
         pull = tension;
     }
 }

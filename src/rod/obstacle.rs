@@ -83,8 +83,8 @@ fn splat<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
 /// Moves `p` out of the solid where it is inside, and holds it back along the surface by Coulomb
 /// friction, measured from where the node was (`from`) and against the surface's own motion.
 ///
-/// With `silent`, nothing but the shortest way out: for states, not for steps. Where no lane is
-/// inside, `p` comes back bit for bit.
+/// With `silent`, nothing but the shortest way out: for states, not for steps. Returns the new place
+/// and the solid's normal there, or zero for lanes that are not inside; nothing where no lane is.
 #[inline(always)]
 pub(super) fn push_out<S: Simd>(
     obstacle: &Obstacle,
@@ -93,7 +93,7 @@ pub(super) fn push_out<S: Simd>(
     friction: f32x16<S>,
     skin: f32,
     silent: bool,
-) -> V3<f32x16<S>> {
+) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
     let simd = p.x.simd;
     let s = |x: f32| f32x16::splat(simd, x);
     let (zero, one, tiny) = (s(0.0), s(1.0), s(1e-12));
@@ -137,12 +137,13 @@ pub(super) fn push_out<S: Simd>(
     };
     let inside = Real::lt(zero, depth);
     if inside.to_bitmask() == 0 {
-        return p;
+        return None;
     }
+    let touching = V3::select(inside, normal, V3::new(zero, zero, zero));
     let depth = Real::max(depth, zero);
     let out = normal.scale_add(depth, p);
     if silent {
-        return V3::select(inside, out, p);
+        return Some((V3::select(inside, out, p), touching));
     }
     let mut slip = out - from;
     if let Some(m) = &obstacle.motion {
@@ -158,7 +159,7 @@ pub(super) fn push_out<S: Simd>(
     let length = Real::sqrt(tangential.dot(tangential));
     // Static where the grip suffices, sliding where not.
     let held = Real::min(one, friction * depth / Real::max(length, tiny));
-    V3::select(inside, tangential.scale_add(-held, out), p)
+    Some((V3::select(inside, tangential.scale_add(-held, out), p), touching))
 }
 
 /// Some direction across an axis; up for an axis without length.
