@@ -5,7 +5,7 @@
 //! nodes is about 22 kB: every iteration of a substep stays in the first cache. The arrays are
 //! plain old data and may be handed to a compute shader as they are.
 //!
-//! Order within a substep ([B] §2 with model notes): predict positions and orientations, project
+//! Order within a substep (\[B\] §2 with model notes): predict positions and orientations, project
 //! stretch–shear, bend–twist and contacts `iterations` times from root to tip, limit lengths, a
 //! last contact pass, then velocities from the change.
 
