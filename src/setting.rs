@@ -50,12 +50,7 @@ impl Notes {
 
 impl Bound {
     pub(crate) const fn new(what: &'static str, low: f32, high: f32, hint: &'static str) -> Self {
-        Self {
-            what,
-            low,
-            high,
-            hint,
-        }
+        Self { what, low, high, hint }
     }
 
     /// For constructors: the value, or why not.
@@ -76,11 +71,7 @@ impl Bound {
     pub(crate) fn mend(&self, value: f32, default: f32, notes: &Notes) -> f32 {
         self.check(value).unwrap_or_else(|wrong| {
             notes.0.borrow_mut().push(wrong);
-            if value.is_nan() {
-                default
-            } else {
-                value.clamp(self.low, self.high)
-            }
+            if value.is_nan() { default } else { value.clamp(self.low, self.high) }
         })
     }
 }
@@ -114,10 +105,7 @@ pub struct Settings<'w, 's, T: HairSetting> {
 impl<T: HairSetting> Settings<'_, '_, T> {
     /// The settings of `hair`.
     pub fn of(&self, hair: Entity) -> T {
-        self.overrides
-            .get(hair)
-            .unwrap_or(&self.default.0)
-            .mended(&Notes::default())
+        self.overrides.get(hair).unwrap_or(&self.default.0).mended(&Notes::default())
     }
 }
 
@@ -138,10 +126,7 @@ fn report_invalid<T: HairSetting>(
         let notes = Notes::default();
         setting.mended(&notes);
         for wrong in notes.into_inner() {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::Setting(wrong),
-            });
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
     };
     if default.is_changed() {

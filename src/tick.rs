@@ -122,9 +122,7 @@ pub struct HairPlugins {
 impl HairPlugins {
     /// Hair that ticks in `schedule`, with the time that passes there.
     pub fn new(schedule: impl ScheduleLabel) -> Self {
-        Self {
-            schedule: schedule.intern(),
-        }
+        Self { schedule: schedule.intern() }
     }
 }
 
@@ -138,9 +136,7 @@ impl Default for HairPlugins {
 impl PluginGroup for HairPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>()
-            .add(TickPlugin {
-                schedule: self.schedule,
-            })
+            .add(TickPlugin { schedule: self.schedule })
             .add(StrandPlugin)
             .add(BondPlugin)
             .add(AirPlugin)
@@ -148,7 +144,7 @@ impl PluginGroup for HairPlugins {
             .add(StylePlugin)
             .add(RodPlugin);
         #[cfg(feature = "render")]
-        let group = group.add(crate::render::HairRenderPlugin);
+        let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
         group
     }
 }
@@ -212,14 +208,8 @@ mod tests {
 
     #[test]
     fn auto_substeps_come_near_the_papers_step() {
-        for (rate, count) in [
-            (60.0, 6),
-            (120.0, 3),
-            (240.0, 2),
-            (30.0, 12),
-            (64.0, 6),
-            (360.0, 1),
-        ] {
+        for (rate, count) in [(60.0, 6), (120.0, 3), (240.0, 2), (30.0, 12), (64.0, 6), (360.0, 1)]
+        {
             assert_eq!(HairSubsteps::Auto.count(1.0 / rate), count, "{rate} Hz");
         }
         assert_eq!(HairSubsteps::Fixed(0).count(0.1), 1);

@@ -12,11 +12,8 @@ use common::*;
 fn bent(hertz: f64, iterations: u32, turn: f32) -> (App, Entity, Vec<Vec3>) {
     let mut app = test_app(hertz);
     no_gravity(&mut app);
-    app.insert_resource(HairDefault(Solver {
-        iterations,
-        ..default()
-    }))
-    .insert_resource(HairDefault(AirDrag { rate: 6.0 }));
+    app.insert_resource(HairDefault(Solver { iterations, ..default() }))
+        .insert_resource(HairDefault(AirDrag { rate: 6.0 }));
     let (_, entity) = one_strand(&mut app, 0.24, 8, Vec3::Y);
     run(&mut app, 0.1);
     hold_arc(&mut app, entity, turn);
@@ -33,9 +30,7 @@ fn hold_arc(app: &mut App, entity: Entity, turn: f32) {
         let omega = Vec3::X * (0.5 * turn).sin();
         arc.pose(core::iter::repeat_n(omega, arc.edges()));
         let targets = arc.positions().iter().map(|p| Some(*p)).collect();
-        app.world_mut()
-            .entity_mut(entity)
-            .insert(HeldNodes { targets });
+        app.world_mut().entity_mut(entity).insert(HeldNodes { targets });
         run(app, 1.0 / 60.0);
     }
 }
@@ -67,10 +62,7 @@ fn set(app: &mut App, e: Entity, kind: BondKind, rate: f32) {
 
 #[track_caller]
 fn near(found: f32, expected: f32) {
-    assert!(
-        (found - expected).abs() < 0.003,
-        "kept {found}, expected {expected}"
-    );
+    assert!((found - expected).abs() < 0.003, "kept {found}, expected {expected}");
 }
 
 #[test]

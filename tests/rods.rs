@@ -10,20 +10,13 @@ fn probe() {
     for segments in [8, 16, 32] {
         let mut app = test_app(60.0);
         app.insert_resource(HairDefault(AirDrag { rate: 8.0 }));
-        app.insert_resource(HairDefault(Cuticle {
-            damage: 0.0,
-            ..default()
-        }));
+        app.insert_resource(HairDefault(Cuticle { damage: 0.0, ..default() }));
         app.insert_resource(HairDefault(Stiffness::from_bending_length(0.5).unwrap()));
         let (_, s) = one_strand(&mut app, 0.24, segments, Vec3::X);
         settle(&mut app, s, 60.0);
         let tip = *strand(&app, s).positions().last().unwrap();
         let theory = 0.24f32.powi(4) / (8.0 * 0.5f32.powi(3));
-        println!(
-            "{segments}: sag {} theory {theory} ratio {}",
-            -tip.y,
-            -tip.y / theory
-        );
+        println!("{segments}: sag {} theory {theory} ratio {}", -tip.y, -tip.y / theory);
     }
     for segments in [8, 16, 32] {
         for hz in [60.0, 120.0, 240.0] {
@@ -32,10 +25,7 @@ fn probe() {
             let (_, s) = one_strand(&mut app, 0.24, segments, Vec3::X);
             settle(&mut app, s, 60.0);
             let tip = *strand(&app, s).positions().last().unwrap();
-            println!(
-                "{segments} {hz}: tip {tip} strain {}",
-                strand(&app, s).peak_strain()
-            );
+            println!("{segments} {hz}: tip {tip} strain {}", strand(&app, s).peak_strain());
         }
     }
 }

@@ -43,9 +43,7 @@ const DRAG: Bound = Bound::new("AirDrag::rate (1/s)", 0.0, 1e4, "2 is air, 20 is
 
 impl HairSetting for AirDrag {
     fn mended(&self, notes: &Notes) -> Self {
-        Self {
-            rate: DRAG.mend(self.rate, 2.0, notes),
-        }
+        Self { rate: DRAG.mend(self.rate, 2.0, notes) }
     }
 }
 
@@ -66,10 +64,7 @@ pub struct Blower {
 
 impl Default for Blower {
     fn default() -> Self {
-        Self {
-            strength: 3.33,
-            drying: 0.3,
-        }
+        Self { strength: 3.33, drying: 0.3 }
     }
 }
 
@@ -83,10 +78,7 @@ impl Blower {
     /// When the strength is negative or not finite.
     pub fn new(strength: f32) -> Result<Self, InvalidValue> {
         STRENGTH.check(strength)?;
-        Ok(Self {
-            strength,
-            ..default()
-        })
+        Ok(Self { strength, ..default() })
     }
 
     fn mended(&self, notes: &Notes) -> Self {

@@ -34,10 +34,7 @@ fn report_blowers(
         let notes = Notes::default();
         blower.mended(&notes);
         for wrong in notes.into_inner() {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::Setting(wrong),
-            });
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
     }
 }
@@ -55,18 +52,9 @@ pub(crate) fn apply_air(
     drag: Settings<AirDrag>,
     hairs: Query<&TickPose, With<Hair>>,
     blowers: Query<(&Blower, &TickPose)>,
-    mut strands: Query<(
-        &StrandOf,
-        &mut Strand,
-        &mut BondChanges,
-        Option<&mut WindReceived>,
-    )>,
+    mut strands: Query<(&StrandOf, &mut Strand, &mut BondChanges, Option<&mut WindReceived>)>,
 ) {
-    let gravity = if gravity.is_finite() {
-        gravity.0
-    } else {
-        Vec3::ZERO
-    };
+    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
     let blowers: Vec<(Vec3, Vec3, Blower)> = blowers
         .iter()
         .map(|(b, pose)| (b.mended(&Notes::default()), pose.now()))
@@ -116,9 +104,7 @@ pub(crate) fn apply_air(
                 }
             }
             velocities[i] += change;
-            changes
-                .bypass_change_detection()
-                .ask(i, BondKind::Hydrogen, dried);
+            changes.bypass_change_detection().ask(i, BondKind::Hydrogen, dried);
             if let Some(received) = received.as_deref_mut() {
                 received.total.resize(edges, 0.0);
                 received.total[i] += change.length();

@@ -56,9 +56,8 @@ pub struct Bonds {
 impl Bonds {
     /// Closed bonds around the strand's present shape.
     pub fn of(strand: &Strand) -> Self {
-        let joints = (0..strand.edges())
-            .map(|i| JointBonds::closed(strand.darboux(i).xyz()))
-            .collect();
+        let joints =
+            (0..strand.edges()).map(|i| JointBonds::closed(strand.darboux(i).xyz())).collect();
         Self { joints }
     }
 
@@ -125,27 +124,14 @@ pub struct BondInfluence {
 
 impl Default for BondInfluence {
     fn default() -> Self {
-        Self {
-            hydrogen: 0.33,
-            ionic: 0.30,
-            disulfide: 0.20,
-            peptide: 0.17,
-        }
+        Self { hydrogen: 0.33, ionic: 0.30, disulfide: 0.20, peptide: 0.17 }
     }
 }
 
-const INFLUENCE: Bound = Bound::new(
-    "BondInfluence",
-    0.0,
-    1e6,
-    "shares such as 0.33, 0.3, 0.2, 0.17",
-);
-const INFLUENCE_SUM: Bound = Bound::new(
-    "the sum of BondInfluence",
-    1e-6,
-    1e7,
-    "at least one kind must count",
-);
+const INFLUENCE: Bound =
+    Bound::new("BondInfluence", 0.0, 1e6, "shares such as 0.33, 0.3, 0.2, 0.17");
+const INFLUENCE_SUM: Bound =
+    Bound::new("the sum of BondInfluence", 1e-6, 1e7, "at least one kind must count");
 
 impl BondInfluence {
     /// Influences of hydrogen, ionic, disulfide and peptide bonds; only their proportions count.
@@ -162,12 +148,7 @@ impl BondInfluence {
             INFLUENCE.check(f)?;
         }
         INFLUENCE_SUM.check(hydrogen + ionic + disulfide + peptide)?;
-        Ok(Self {
-            hydrogen,
-            ionic,
-            disulfide,
-            peptide,
-        })
+        Ok(Self { hydrogen, ionic, disulfide, peptide })
     }
 
     /// The influences by [`BondKind`] as index.
@@ -186,11 +167,7 @@ impl HairSetting for BondInfluence {
             peptide: INFLUENCE.mend(self.peptide, d.peptide, notes),
         };
         let sum = mended.as_array().iter().sum();
-        if INFLUENCE_SUM.mend(sum, 1.0, notes) == sum {
-            mended
-        } else {
-            d
-        }
+        if INFLUENCE_SUM.mend(sum, 1.0, notes) == sum { mended } else { d }
     }
 }
 
@@ -208,10 +185,7 @@ pub struct Cuticle {
 
 impl Default for Cuticle {
     fn default() -> Self {
-        Self {
-            damage: 0.33,
-            softening: 0.5764,
-        }
+        Self { damage: 0.33, softening: 0.5764 }
     }
 }
 

@@ -23,10 +23,7 @@ impl Default for JointBonds {
 impl JointBonds {
     /// All bonds closed around the shape `omega`.
     pub fn closed(omega: Vec3) -> Self {
-        Self {
-            shapes: [omega; BondKind::COUNT],
-            rates: [1.0; BondKind::COUNT],
-        }
+        Self { shapes: [omega; BondKind::COUNT], rates: [1.0; BondKind::COUNT] }
     }
 
     /// Equation 15: Ω0 = Σ f_j {Ω_j + (1−b_j)(Ω − Ω_j)} / Σ f_j, as a full quaternion.
@@ -67,18 +64,13 @@ impl JointBonds {
             let fb = influence[j] * self.rates[j];
             (s + self.shapes[j] * fb, t + fb)
         });
-        if closed > 0.0 {
-            sum / closed
-        } else {
-            Vec3::ZERO
-        }
+        if closed > 0.0 { sum / closed } else { Vec3::ZERO }
     }
 
     /// B = Σ f b / Σ f: the share of the joint's stiffness that is left.
     pub fn closed_share(&self, influence: &[f32; BondKind::COUNT]) -> f32 {
-        let (sum, total) = (0..BondKind::COUNT).fold((0.0, 0.0), |(s, t), j| {
-            (s + influence[j] * self.rates[j], t + influence[j])
-        });
+        let (sum, total) = (0..BondKind::COUNT)
+            .fold((0.0, 0.0), |(s, t), j| (s + influence[j] * self.rates[j], t + influence[j]));
         sum / total
     }
 

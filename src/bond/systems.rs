@@ -26,14 +26,9 @@ impl Plugin for BondPlugin {
             .register_type::<RestShape>()
             .add_systems(
                 HairTick,
-                fit_bonds
-                    .in_set(HairSystems::Roots)
-                    .after(strand::carry_strands),
+                fit_bonds.in_set(HairSystems::Roots).after(strand::carry_strands),
             )
-            .add_systems(
-                HairTick,
-                generate_rest_shapes.in_set(HairSystems::RestShape),
-            )
+            .add_systems(HairTick, generate_rest_shapes.in_set(HairSystems::RestShape))
             .add_systems(HairTick, update_bonds.in_set(HairSystems::BondUpdate));
     }
 }
@@ -61,10 +56,7 @@ fn fit_bonds(
             }
         }
         if let Some(wrong) = notes.into_inner().into_iter().next() {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::Setting(wrong),
-            });
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
     }
 }
@@ -117,23 +109,19 @@ fn generate_rest_shapes(
             rest.key = Some(*key);
             rest.stiffness.clear();
             let mut distance = 0.0;
-            rest.stiffness
-                .extend(strand.rest_lengths().iter().map(|length| {
-                    let factor =
-                        cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
-                    distance += length;
-                    let k = key.stiffness.per_substep(key.dt, factor);
-                    stiffness_per_iteration(k, key.iterations)
-                }));
+            rest.stiffness.extend(strand.rest_lengths().iter().map(|length| {
+                let factor = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
+                distance += length;
+                let k = key.stiffness.per_substep(key.dt, factor);
+                stiffness_per_iteration(k, key.iterations)
+            }));
         }
     });
 }
 
 fn update_bonds(mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges)>) {
-    let mut items: Vec<_> = strands
-        .iter_mut()
-        .filter(|(_, _, changes)| !changes.is_empty())
-        .collect();
+    let mut items: Vec<_> =
+        strands.iter_mut().filter(|(_, _, changes)| !changes.is_empty()).collect();
     for_each(&mut items, |(strand, bonds, changes)| {
         let joints: &mut [JointBonds] = &mut bonds.bypass_change_detection().joints;
         for (i, change) in changes.bypass_change_detection().take() {

@@ -48,20 +48,12 @@ pub enum ColliderShape {
 
 impl Default for HairCollider {
     fn default() -> Self {
-        Self {
-            shape: ColliderShape::Sphere(Sphere::new(0.09)),
-            friction: 0.3,
-        }
+        Self { shape: ColliderShape::Sphere(Sphere::new(0.09)), friction: 0.3 }
     }
 }
 
 const RADIUS: Bound = Bound::new("a collider's radius (m)", 1e-5, 1e5, "a head has 0.09");
-const LENGTH: Bound = Bound::new(
-    "a collider's half length (m)",
-    0.0,
-    1e5,
-    "0 makes it a point",
-);
+const LENGTH: Bound = Bound::new("a collider's half length (m)", 0.0, 1e5, "0 makes it a point");
 const FRICTION: Bound = Bound::new("HairCollider::friction", 0.0, 100.0, "hair has 0.2 to 0.4");
 
 impl HairCollider {
@@ -120,19 +112,13 @@ impl HairCollider {
                 half_height: half(c.half_height),
             }),
         };
-        Self {
-            shape,
-            friction: FRICTION.mend(self.friction, 0.3, notes),
-        }
+        Self { shape, friction: FRICTION.mend(self.friction, 0.3, notes) }
     }
 }
 
 impl From<ColliderShape> for HairCollider {
     fn from(shape: ColliderShape) -> Self {
-        Self {
-            shape,
-            friction: 0.3,
-        }
+        Self { shape, friction: 0.3 }
     }
 }
 
@@ -153,20 +139,13 @@ pub struct LockContact {
 
 impl Default for LockContact {
     fn default() -> Self {
-        Self {
-            radius: 1e-3,
-            strength: 20.0,
-        }
+        Self { radius: 1e-3, strength: 20.0 }
     }
 }
 
 const LOCK_RADIUS: Bound = Bound::new("LockContact::radius (m)", 0.0, 1.0, "1e-3 is a thin lock");
-const LOCK_STRENGTH: Bound = Bound::new(
-    "LockContact::strength (m/s²)",
-    0.0,
-    1e6,
-    "20 parts locks gently",
-);
+const LOCK_STRENGTH: Bound =
+    Bound::new("LockContact::strength (m/s²)", 0.0, 1e6, "20 parts locks gently");
 
 impl HairSetting for LockContact {
     fn mended(&self, notes: &Notes) -> Self {

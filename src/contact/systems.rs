@@ -37,10 +37,7 @@ fn report_colliders(
         let notes = Notes::default();
         collider.mended(&notes);
         for wrong in notes.into_inner() {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::Setting(wrong),
-            });
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
     }
 }
@@ -52,23 +49,12 @@ fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obsta
     let at = now.point_in(own.translation);
     let turned = |d: Vec3| now.direction_in(own.rotation * d);
     let solid = match collider.shape {
-        ColliderShape::Sphere(s) => Solid::Capsule {
-            a: at,
-            b: at,
-            radius: s.radius * scale,
-        },
+        ColliderShape::Sphere(s) => Solid::Capsule { a: at, b: at, radius: s.radius * scale },
         ColliderShape::Capsule(c) => {
             let half = turned(Vec3::Y) * (c.half_length * scale);
-            Solid::Capsule {
-                a: at - half,
-                b: at + half,
-                radius: c.radius * scale,
-            }
+            Solid::Capsule { a: at - half, b: at + half, radius: c.radius * scale }
         }
-        ColliderShape::Plane(p) => Solid::HalfSpace {
-            normal: turned(*p.normal),
-            point: at,
-        },
+        ColliderShape::Plane(p) => Solid::HalfSpace { normal: turned(*p.normal), point: at },
         ColliderShape::Cylinder(c) => Solid::Cylinder {
             center: at,
             axis: turned(Vec3::Y),
@@ -77,11 +63,7 @@ fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obsta
         },
     };
     let motion = pose.motion_in(now);
-    Obstacle {
-        solid,
-        motion,
-        friction: collider.friction,
-    }
+    Obstacle { solid, motion, friction: collider.friction }
 }
 
 fn gather_obstacles(
@@ -91,9 +73,7 @@ fn gather_obstacles(
     for (hair, mut obstacles) in &mut hairs {
         obstacles.solids.clear();
         obstacles.solids.extend(
-            colliders
-                .iter()
-                .map(|(c, pose)| seen_from(hair, &c.mended(&Notes::default()), pose)),
+            colliders.iter().map(|(c, pose)| seen_from(hair, &c.mended(&Notes::default()), pose)),
         );
     }
 }
@@ -109,19 +89,11 @@ pub(crate) fn part_strands(
         if radius <= 0.0 || strength <= 0.0 {
             continue;
         }
-        let LockNeighbours {
-            list,
-            points,
-            runs,
-            pushes,
-        } = neighbours.bypass_change_detection();
+        let LockNeighbours { list, points, runs, pushes } = neighbours.bypass_change_detection();
         points.clear();
         runs.clear();
         for strand in strands.iter_many(members.collection()) {
-            let run = Run {
-                start: points.len() as u32,
-                len: strand.nodes() as u32,
-            };
+            let run = Run { start: points.len() as u32, len: strand.nodes() as u32 };
             points.extend_from_slice(strand.positions());
             runs.push(run);
         }
@@ -144,10 +116,7 @@ pub(crate) fn part_strands(
         let mut members = strands.iter_many_mut(members.collection());
         while let Some(mut strand) = members.fetch_next() {
             let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
-            velocities
-                .iter_mut()
-                .zip(&mut pushes)
-                .for_each(|(v, push)| *v += *push);
+            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += *push);
         }
     }
 }

@@ -31,10 +31,7 @@ impl UniformGrid {
     #[inline]
     pub fn cell_of(&self, point: Vec3) -> IVec3 {
         // Beyond a billion cells all points share the outermost one; distance tests sort them out.
-        (point * self.inverse_cell)
-            .floor()
-            .clamp(-FAR, FAR)
-            .as_ivec3()
+        (point * self.inverse_cell).floor().clamp(-FAR, FAR).as_ivec3()
     }
 
     /// Sorts `items`, each a point and a number of the caller's, into cells of size `cell` (> 0).
@@ -144,13 +141,7 @@ mod tests {
 
     #[test]
     fn outliers_and_nonsense_do_not_disturb() {
-        let points = [
-            Vec3::ZERO,
-            Vec3::splat(1e30),
-            Vec3::NAN,
-            Vec3::X * 0.05,
-            Vec3::NEG_X * 1e9,
-        ];
+        let points = [Vec3::ZERO, Vec3::splat(1e30), Vec3::NAN, Vec3::X * 0.05, Vec3::NEG_X * 1e9];
         let mut grid = UniformGrid::default();
         grid.build(0.1, points.iter().zip(0..).map(|(p, i)| (*p, i)));
         assert_eq!(near(&grid, &points, Vec3::ZERO, 0.1), vec![0, 3]);

@@ -115,8 +115,7 @@ impl<R: Real> Quaternion<R> {
     /// The Hamilton product `self ⊗ o`.
     #[inline(always)]
     pub fn product(self, o: Self) -> Self {
-        let v =
-            o.v.scale_add(self.w, self.v.scale_add(o.w, self.v.cross(o.v)));
+        let v = o.v.scale_add(self.w, self.v.scale_add(o.w, self.v.cross(o.v)));
         let w = self.w.mul_add(o.w, -self.v.dot(o.v));
         Self::new(v, w)
     }
@@ -161,10 +160,7 @@ impl<R: Real> Quaternion<R> {
     /// R(q) e3, the tangent of an edge of orientation q.
     #[inline(always)]
     pub fn tangent(self) -> V3<R> {
-        let Self {
-            v: V3 { x, y, z },
-            w,
-        } = self;
+        let Self { v: V3 { x, y, z }, w } = self;
         let two = w.lit(2.0);
         V3::new(
             two * x.mul_add(z, w * y),

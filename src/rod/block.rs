@@ -336,10 +336,7 @@ fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
         let exchange = 0.5 * (1.0 - bevy::math::ops::exp(-params.internal_damping * params.dt));
         let exchange = f32x16::splat(simd, exchange);
         for i in 1..b.edges.len() {
-            let (a, c) = (
-                load3(simd, &b.edges[i - 1].omega),
-                load3(simd, &b.edges[i].omega),
-            );
+            let (a, c) = (load3(simd, &b.edges[i - 1].omega), load3(simd, &b.edges[i].omega));
             let d = (c - a).scale(exchange);
             store3(&mut b.edges[i - 1].omega, a + d);
             store3(&mut b.edges[i].omega, c - d);

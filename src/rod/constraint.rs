@@ -131,12 +131,7 @@ mod tests {
         // χ = 9: the coupled denominator leaves 90 % of a pure stretch, the split one none.
         let q = Quaternion::new(V3::new(0.0, 0.0, 0.0), 1.0_f64);
         let (p1, p2) = (V3::new(0.0, 0.0, 0.0), V3::new(0.0, 0.0, 0.036));
-        let e = EdgeWeights {
-            w1: 1.0,
-            w2: 1.0,
-            wq: 9.0 / (0.03 * 0.03),
-            l: 0.03,
-        };
+        let e = EdgeWeights { w1: 1.0, w2: 1.0, wq: 9.0 / (0.03 * 0.03), l: 0.03 };
         let left = |kind| {
             let d = stretch_shear(kind, p1, p2, q, e);
             ((p2 + d.p2) - (p1 + d.p1)).z / e.l - 1.0
@@ -151,12 +146,7 @@ mod tests {
         let p1 = V3::new(0.0, 0.0, 0.0);
         let p2 = V3::new(1e-4, 0.0, 0.03);
         let chi = 1.0;
-        let e = EdgeWeights {
-            w1: 1.0,
-            w2: 1.0,
-            wq: chi / (0.03 * 0.03),
-            l: 0.03,
-        };
+        let e = EdgeWeights { w1: 1.0, w2: 1.0, wq: chi / (0.03 * 0.03), l: 0.03 };
         let left = |kind| {
             let d = stretch_shear(kind, p1, p2, q, e);
             let turned = q.add_scaled(d.q, 1.0).normalize();

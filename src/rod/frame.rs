@@ -59,9 +59,7 @@ mod tests {
     fn an_antiparallel_tangent_still_gives_a_frame() {
         let frames = parallel_transport(&[Vec3::ZERO, Vec3::NEG_Z, Vec3::NEG_Z * 2.0], None);
         assert!(
-            frames
-                .iter()
-                .all(|q| q.is_finite() && (*q * Vec3::Z).distance(Vec3::NEG_Z) < 1e-5)
+            frames.iter().all(|q| q.is_finite() && (*q * Vec3::Z).distance(Vec3::NEG_Z) < 1e-5)
         );
     }
 }

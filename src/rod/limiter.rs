@@ -51,11 +51,7 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes) {
     for i in (0..edges).rev() {
         let s = &b.scratch[i];
         lambda = load(&s.rhs) - load(&s.upper) * lambda;
-        let d = V3::new(
-            load(&s.direction[0]),
-            load(&s.direction[1]),
-            load(&s.direction[2]),
-        );
+        let d = V3::new(load(&s.direction[0]), load(&s.direction[1]), load(&s.direction[2]));
         let tension = d.scale(lambda);
         let node = &mut b.nodes[i + 1];
         let w = load(&node.w);

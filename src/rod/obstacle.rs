@@ -64,12 +64,7 @@ impl Obstacle {
                 let (l, h) = (a.min(b) - radius, a.max(b) + radius);
                 (l.cmple(center + half) & h.cmpge(center - half)).all()
             }
-            Solid::Cylinder {
-                center: c,
-                axis,
-                radius,
-                half_height,
-            } => {
+            Solid::Cylinder { center: c, axis, radius, half_height } => {
                 let across = (Vec3::ONE - axis * axis).max(Vec3::ZERO);
                 let reach = axis.abs() * half_height
                     + radius * Vec3::new(across.x.sqrt(), across.y.sqrt(), across.z.sqrt());
@@ -108,10 +103,7 @@ pub(super) fn push_out<S: Simd>(
         let length = Real::sqrt(v.dot(v));
         let degenerate = Real::lt(length, tiny);
         let inverse = one / Real::max(length, tiny);
-        (
-            V3::select(degenerate, splat(simd, up), v.scale(inverse)),
-            length,
-        )
+        (V3::select(degenerate, splat(simd, up), v.scale(inverse)), length)
     };
     let (normal, depth) = match obstacle.solid {
         Solid::HalfSpace { normal, point } => {
@@ -128,12 +120,7 @@ pub(super) fn push_out<S: Simd>(
             let (n, distance) = unit_or(off, self::across(axis));
             (n, s(radius + skin) - distance)
         }
-        Solid::Cylinder {
-            center,
-            axis,
-            radius,
-            half_height,
-        } => {
+        Solid::Cylinder { center, axis, radius, half_height } => {
             let u = splat(simd, axis);
             let rel = p - splat(simd, center);
             let along = rel.dot(u);
@@ -145,10 +132,7 @@ pub(super) fn push_out<S: Simd>(
             let cap_normal = V3::select(below, -u, u);
             let nearer_cap = Real::lt(cap, side);
             // Outside where either is negative: the smaller of the two decides.
-            (
-                V3::select(nearer_cap, cap_normal, radial),
-                Real::min(cap, side),
-            )
+            (V3::select(nearer_cap, cap_normal, radial), Real::min(cap, side))
         }
     };
     let inside = Real::lt(zero, depth);
@@ -165,10 +149,8 @@ pub(super) fn push_out<S: Simd>(
         let column = |c: usize| splat(simd, m.matrix3.col(c).into());
         let moved = column(0).scale_add(
             from.x,
-            column(1).scale_add(
-                from.y,
-                column(2).scale_add(from.z, splat(simd, m.translation.into())),
-            ),
+            column(1)
+                .scale_add(from.y, column(2).scale_add(from.z, splat(simd, m.translation.into()))),
         );
         slip = out - moved;
     }
@@ -181,8 +163,7 @@ pub(super) fn push_out<S: Simd>(
 
 /// Some direction across an axis; up for an axis without length.
 fn across(axis: Vec3) -> Vec3 {
-    axis.try_normalize()
-        .map_or(Vec3::Y, |u| u.any_orthonormal_vector())
+    axis.try_normalize().map_or(Vec3::Y, |u| u.any_orthonormal_vector())
 }
 
 const _: () = assert!(LANES == 16, "f32x16 is the lane type");

@@ -37,11 +37,7 @@ pub struct Stiffness {
 
 impl Default for Stiffness {
     fn default() -> Self {
-        Self {
-            bending_length: 0.13,
-            bend: 0.05,
-            orientation_weight: None,
-        }
+        Self { bending_length: 0.13, bend: 0.05, orientation_weight: None }
     }
 }
 
@@ -52,12 +48,8 @@ const BENDING_LENGTH: Bound = Bound::new(
     "0.13 is soft hair, 0.045 a bare fibre",
 );
 const BEND: Bound = Bound::new("Stiffness::bend", 0.0, 1.0, "the paper uses 0.05");
-const CHI: Bound = Bound::new(
-    "Stiffness::orientation_weight",
-    1e-9,
-    1e3,
-    "0.03 is 13 cm at 3 cm edges",
-);
+const CHI: Bound =
+    Bound::new("Stiffness::orientation_weight", 1e-9, 1e3, "0.03 is 13 cm at 3 cm edges");
 
 impl Stiffness {
     /// Stiffness from the gravity-bending length (m).
@@ -66,10 +58,7 @@ impl Stiffness {
     /// When it is not a number between 1 mm and 100 m.
     pub fn from_bending_length(metres: f32) -> Result<Self, InvalidValue> {
         BENDING_LENGTH.check(metres)?;
-        Ok(Self {
-            bending_length: metres,
-            ..default()
-        })
+        Ok(Self { bending_length: metres, ..default() })
     }
 
     /// Stiffness of a bare round fibre: Young's modulus (Pa), diameter (m), density (kg/m³).
@@ -150,12 +139,8 @@ impl Default for Solver {
 
 const ITERATIONS: Bound = Bound::new("Solver::iterations", 1.0, 1000.0, "5 is the paper's");
 const LIMITER: Bound = Bound::new("Solver::limiter_steps", 0.0, 16.0, "2 hold long hair");
-const INTERNAL: Bound = Bound::new(
-    "Solver::internal_damping (1/s)",
-    0.0,
-    1e4,
-    "0 is off, 20 is syrup",
-);
+const INTERNAL: Bound =
+    Bound::new("Solver::internal_damping (1/s)", 0.0, 1e4, "0 is off, 20 is syrup");
 
 impl HairSetting for Solver {
     fn mended(&self, notes: &Notes) -> Self {
@@ -188,10 +173,7 @@ mod tests {
     fn stiffness_scales_with_the_square_of_the_substep() {
         let s = Stiffness::default();
         let big = |k: f32| k / (1.0 - k);
-        let (a, b) = (
-            s.per_substep(REFERENCE_DT, 1.0),
-            s.per_substep(REFERENCE_DT * 2.0, 1.0),
-        );
+        let (a, b) = (s.per_substep(REFERENCE_DT, 1.0), s.per_substep(REFERENCE_DT * 2.0, 1.0));
         assert!((a - 0.05).abs() < 1e-6);
         assert!((big(b) / big(a) - 4.0).abs() < 1e-4);
     }

@@ -54,14 +54,7 @@ fn project(
     influence: Settings<BondInfluence>,
     contact: Settings<LockContact>,
     hairs: Query<&Obstacles>,
-    mut strands: Query<(
-        Entity,
-        &StrandOf,
-        &mut Strand,
-        &RestShape,
-        &Bonds,
-        Option<&HeldNodes>,
-    )>,
+    mut strands: Query<(Entity, &StrandOf, &mut Strand, &RestShape, &Bonds, Option<&HeldNodes>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
     let mut params: Vec<HairParams> = Vec::new();
@@ -90,15 +83,7 @@ fn project(
             && strand.nodes() >= 2
             && rest.darboux.len() == strand.edges()
         {
-            items.push(Item {
-                entity,
-                hair,
-                strand,
-                rest,
-                bonds,
-                held,
-                put_back: None,
-            });
+            items.push(Item { entity, hair, strand, rest, bonds, held, put_back: None });
         }
     }
     // Lanes do not see each other, so how strands are grouped changes no bit of the result.
@@ -117,10 +102,7 @@ fn project(
                 PutBack::LastFinite => Fault::PutBack,
                 PutBack::RestPose => Fault::Rebuilt,
             };
-            faults.write(HairFault {
-                entity: item.entity,
-                fault,
-            });
+            faults.write(HairFault { entity: item.entity, fault });
         }
     }
 }
@@ -137,22 +119,14 @@ fn solve(level: Level, block: &mut BlockLanes, items: &mut [Item<'_>], params: &
     let (low, high) = block.bounds(params.step.dt);
     // Nodes may be pulled beyond their prediction, never by more than an edge in a substep.
     let margin = params.step.skin + block.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
-    let near: Vec<Obstacle> = params
-        .obstacles
-        .iter()
-        .filter(|o| o.may_touch(low, high, margin))
-        .copied()
-        .collect();
+    let near: Vec<Obstacle> =
+        params.obstacles.iter().filter(|o| o.may_touch(low, high, margin)).copied().collect();
     step(level, block, &params.step, &near);
     for (lane, item) in items.iter_mut().enumerate() {
         if block.finite[lane] == 0.0 {
             scatter(block, lane, item.strand.bypass_change_detection());
         } else {
-            let remembered = item
-                .bonds
-                .joints
-                .iter()
-                .map(|j| j.relaxed(&params.influence));
+            let remembered = item.bonds.joints.iter().map(|j| j.relaxed(&params.influence));
             item.put_back = item.strand.put_back(remembered);
         }
     }

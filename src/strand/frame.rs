@@ -37,11 +37,7 @@ pub struct Pose {
 
 impl Default for Pose {
     fn default() -> Self {
-        Self {
-            translation: Vec3::ZERO,
-            rotation: Quat::IDENTITY,
-            scale: 1.0,
-        }
+        Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 }
     }
 }
 
@@ -56,11 +52,7 @@ impl Pose {
             && rotation.length_squared() > 0.5
             && scale.is_finite()
             && scale > 1e-9;
-        valid.then(|| Self {
-            translation,
-            rotation: rotation.normalize(),
-            scale,
-        })
+        valid.then(|| Self { translation, rotation: rotation.normalize(), scale })
     }
 
     /// From `self` (0) to `to` (1).
@@ -126,11 +118,7 @@ impl TickPose {
     pub(super) fn aim(&mut self, to: Option<Pose>) -> bool {
         let report = to.is_none() && !self.was_invalid;
         self.was_invalid = to.is_none();
-        let from = if self.from.is_some() {
-            Some(self.to)
-        } else {
-            to
-        };
+        let from = if self.from.is_some() { Some(self.to) } else { to };
         self.to = to.unwrap_or(self.to);
         if self.from.is_none() {
             self.now = self.to;
@@ -177,10 +165,7 @@ mod tests {
         let mut frame = TickPose::default();
         assert!(!frame.aim(Some(a)));
         frame.advance(1.0);
-        assert!(
-            frame.carry().is_none(),
-            "the first tick begins where the frame is"
-        );
+        assert!(frame.carry().is_none(), "the first tick begins where the frame is");
         frame.aim(Some(b));
         let world = Vec3::new(0.2, 0.4, -0.3);
         let mut local = a.point_in(world);

@@ -123,9 +123,7 @@ impl Strand {
     /// With fewer than two points, a point that is not finite, or a segment shorter than 1 µm.
     pub fn from_polyline(points: &[Vec3]) -> Result<Self, StrandError> {
         if points.len() < 2 {
-            return Err(StrandError::TooFewNodes {
-                found: points.len(),
-            });
+            return Err(StrandError::TooFewNodes { found: points.len() });
         }
         if let Some(node) = points.iter().position(|p| !p.is_finite()) {
             return Err(StrandError::NonFinite { node });
@@ -216,11 +214,7 @@ impl Strand {
     /// with real part ≥ 0. For an untwisted joint |Im Ω| = sin(θ/2), θ the turning angle.
     #[inline]
     pub fn darboux(&self, i: usize) -> Quat {
-        let before = if i == 0 {
-            self.root_frame
-        } else {
-            self.orientations[i - 1]
-        };
+        let before = if i == 0 { self.root_frame } else { self.orientations[i - 1] };
         darboux(before, self.orientations[i])
     }
 
@@ -240,10 +234,7 @@ impl Strand {
 
     fn is_pose_finite(&self) -> bool {
         self.positions.iter().all(|p| p.is_finite())
-            && self
-                .orientations
-                .iter()
-                .all(|q| q.is_finite() && q.length_squared() > 0.25)
+            && self.orientations.iter().all(|q| q.is_finite() && q.length_squared() > 0.25)
     }
 
     /// Sets every velocity to zero.
@@ -259,12 +250,7 @@ impl Strand {
             self.root_frame = Quat::IDENTITY;
         }
         let mut shape = shape.into_iter();
-        let mut p = self
-            .positions
-            .first()
-            .copied()
-            .filter(|p| p.is_finite())
-            .unwrap_or_default();
+        let mut p = self.positions.first().copied().filter(|p| p.is_finite()).unwrap_or_default();
         let mut q = self.root_frame;
         for i in 0..self.edges() {
             q = (q * full(shape.next().unwrap_or_default())).normalize();
@@ -279,12 +265,7 @@ impl Strand {
     }
 
     pub(crate) fn parts(&self) -> (&[Vec3], &[Vec3], &[Quat], &[Vec3]) {
-        (
-            &self.positions,
-            &self.velocities,
-            &self.orientations,
-            &self.angular_velocities,
-        )
+        (&self.positions, &self.velocities, &self.orientations, &self.angular_velocities)
     }
 
     pub(crate) fn parts_mut(&mut self) -> (&mut [Vec3], &mut [Vec3], &mut [Quat], &mut [Vec3]) {
@@ -303,11 +284,7 @@ impl Strand {
             self.rest();
             PutBack::LastFinite
         } else {
-            self.pose(
-                bonds
-                    .into_iter()
-                    .map(|o| if o.is_finite() { o } else { Vec3::ZERO }),
-            );
+            self.pose(bonds.into_iter().map(|o| if o.is_finite() { o } else { Vec3::ZERO }));
             PutBack::RestPose
         };
         let again = core::mem::replace(&mut self.was_put_back, true);
@@ -333,10 +310,7 @@ mod tests {
     fn bad_polylines_are_refused_with_a_reason() {
         let refuse = |points: &[Vec3]| Strand::from_polyline(points).unwrap_err();
         assert_eq!(refuse(&[]), StrandError::TooFewNodes { found: 0 });
-        assert_eq!(
-            refuse(&[Vec3::ZERO, Vec3::NAN]),
-            StrandError::NonFinite { node: 1 }
-        );
+        assert_eq!(refuse(&[Vec3::ZERO, Vec3::NAN]), StrandError::NonFinite { node: 1 });
         let zero = refuse(&[Vec3::ZERO, Vec3::X, Vec3::X]);
         assert_eq!(zero, StrandError::ZeroLength { segment: 1 });
         assert!(zero.to_string().ends_with("merge nodes 1 and 2"), "{zero}");
@@ -353,9 +327,7 @@ mod tests {
             .map(|t| Vec3::new((t * 0.5).cos(), t * 0.3, (t * 0.5).sin()) * 0.05)
             .collect();
         let mut strand = Strand::from_polyline(&points).unwrap();
-        let shape: Vec<Vec3> = (0..strand.edges())
-            .map(|i| strand.darboux(i).xyz())
-            .collect();
+        let shape: Vec<Vec3> = (0..strand.edges()).map(|i| strand.darboux(i).xyz()).collect();
         strand.pose(shape);
         for (a, b) in strand.positions().iter().zip(&points) {
             assert!(a.distance(*b) < 1e-6);

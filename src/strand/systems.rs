@@ -25,9 +25,7 @@ impl Plugin for StrandPlugin {
             .add_systems(PreUpdate, report_unusable)
             .add_systems(
                 HairTick,
-                (remember_drawn, move_poses, carry_strands)
-                    .chain()
-                    .in_set(HairSystems::Roots),
+                (remember_drawn, move_poses, carry_strands).chain().in_set(HairSystems::Roots),
             );
     }
 }
@@ -40,9 +38,7 @@ fn report_unusable(
 ) {
     for (entity, strand, of) in &strands {
         if strand.is_added() && strand.nodes() < 2 {
-            let fault = Fault::Strand(StrandError::TooFewNodes {
-                found: strand.nodes(),
-            });
+            let fault = Fault::Strand(StrandError::TooFewNodes { found: strand.nodes() });
             faults.write(HairFault { entity, fault });
         }
         let homeless = match of {
@@ -50,10 +46,7 @@ fn report_unusable(
             None => strand.is_added(),
         };
         if homeless {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::NoHair,
-            });
+            faults.write(HairFault { entity, fault: Fault::NoHair });
         }
     }
 }
@@ -62,10 +55,7 @@ fn report_unusable(
 fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &mut StrandHistory)>) {
     if step.index == 0 {
         for (strand, mut history) in &mut strands {
-            history
-                .bypass_change_detection()
-                .positions
-                .clone_from(&strand.positions);
+            history.bypass_change_detection().positions.clone_from(&strand.positions);
         }
     }
 }
@@ -81,10 +71,7 @@ fn move_poses(
             // With MinimalPlugins nothing propagates transforms, so the helper computes them.
             let pose = transforms.compute_global_transform(entity).ok();
             if frame.aim(pose.as_ref().and_then(Pose::of)) {
-                faults.write(HairFault {
-                    entity,
-                    fault: Fault::Transform,
-                });
+                faults.write(HairFault { entity, fault: Fault::Transform });
             }
         }
         frame.advance((step.index + 1) as f32 / step.count as f32);
@@ -106,19 +93,9 @@ pub(crate) fn carry_strands(
     for_each(&mut items, |(carry, strand)| {
         let strand = strand.bypass_change_detection();
         let turn = carry.rotation;
-        strand
-            .positions
-            .iter_mut()
-            .skip(1)
-            .for_each(|p| *p = *carry * *p);
+        strand.positions.iter_mut().skip(1).for_each(|p| *p = *carry * *p);
         strand.velocities.iter_mut().for_each(|v| *v = turn * *v);
-        strand
-            .orientations
-            .iter_mut()
-            .for_each(|q| *q = (turn * *q).normalize());
-        strand
-            .angular_velocities
-            .iter_mut()
-            .for_each(|v| *v = turn * *v);
+        strand.orientations.iter_mut().for_each(|q| *q = (turn * *q).normalize());
+        strand.angular_velocities.iter_mut().for_each(|v| *v = turn * *v);
     });
 }

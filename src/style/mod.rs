@@ -46,12 +46,7 @@ const RATE: Bound = Bound::new("a bond's rate", 0.0, 1.0, "0 all broken, 1 all c
 
 impl Treat {
     fn rates(target: Entity, rates: [Option<f32>; BondKind::COUNT]) -> Self {
-        Self {
-            target,
-            joints: None,
-            rates,
-            seconds: 0.0,
-        }
+        Self { target, joints: None, rates, seconds: 0.0 }
     }
 
     /// Soaks: cuts the hydrogen bonds.
@@ -145,25 +140,12 @@ pub struct PermRod {
 
 impl Default for PermRod {
     fn default() -> Self {
-        Self {
-            radius: 0.03,
-            length: 0.2,
-        }
+        Self { radius: 0.03, length: 0.2 }
     }
 }
 
-const ROD_RADIUS: Bound = Bound::new(
-    "PermRod::radius (m)",
-    1e-3,
-    10.0,
-    "3 cm is the paper's size",
-);
-const ROD_LENGTH: Bound = Bound::new(
-    "PermRod::length (m)",
-    1e-3,
-    100.0,
-    "0.2 takes a row of hair",
-);
+const ROD_RADIUS: Bound = Bound::new("PermRod::radius (m)", 1e-3, 10.0, "3 cm is the paper's size");
+const ROD_LENGTH: Bound = Bound::new("PermRod::length (m)", 1e-3, 100.0, "0.2 takes a row of hair");
 
 impl PermRod {
     /// A rod of `radius` and `length` (m).
@@ -171,10 +153,7 @@ impl PermRod {
     /// # Errors
     /// When one is not between 1 mm and 10 m (radius) or 100 m (length).
     pub fn new(radius: f32, length: f32) -> Result<Self, InvalidValue> {
-        Ok(Self {
-            radius: ROD_RADIUS.check(radius)?,
-            length: ROD_LENGTH.check(length)?,
-        })
+        Ok(Self { radius: ROD_RADIUS.check(radius)?, length: ROD_LENGTH.check(length)? })
     }
 
     fn mended(&self, notes: &Notes) -> Self {
@@ -219,23 +198,13 @@ pub struct Winding {
 
 impl Default for Winding {
     fn default() -> Self {
-        Self {
-            from_node: 2,
-            pitch: 0.004,
-            seconds: 2.0,
-            progress: 0.0,
-            start: Vec::new(),
-        }
+        Self { from_node: 2, pitch: 0.004, seconds: 2.0, progress: 0.0, start: Vec::new() }
     }
 }
 
 impl Winding {
     /// Winding from this node on, taking `seconds`.
     pub fn from_node(node: usize, seconds: f32) -> Self {
-        Self {
-            from_node: node,
-            seconds,
-            ..default()
-        }
+        Self { from_node: node, seconds, ..default() }
     }
 }

@@ -34,9 +34,7 @@ pub fn winding(
     let rel = origin - rod.center;
     let along = rel.dot(rod.axis).clamp(-rod.half_length, rod.half_length);
     let off = rel - rod.axis * rel.dot(rod.axis);
-    let outward = off
-        .try_normalize()
-        .unwrap_or_else(|| rod.axis.any_orthonormal_vector());
+    let outward = off.try_normalize().unwrap_or_else(|| rod.axis.any_orthonormal_vector());
     let mut touch = rod.center + rod.axis * along + outward * rod.radius;
     let slack: f32 = lengths[..from].iter().sum();
     if touch.distance(start[0]) > slack {
@@ -45,11 +43,7 @@ pub fn winding(
     // Round the rod the way the strand already goes.
     let mut tangent = rod.axis.cross(outward);
     let heading = start.get(from + 1).map_or(tangent, |next| *next - origin);
-    let sense = if heading.dot(tangent) < 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
+    let sense = if heading.dot(tangent) < 0.0 { -1.0 } else { 1.0 };
     tangent *= sense;
 
     let u = progress.clamp(0.0, 1.0);
@@ -88,22 +82,15 @@ mod tests {
         (points, vec![0.03; n])
     }
 
-    const ROD: Rod = Rod {
-        center: Vec3::new(0.03, -0.06, 0.0),
-        axis: Vec3::Z,
-        radius: 0.03,
-        half_length: 0.1,
-    };
+    const ROD: Rod =
+        Rod { center: Vec3::new(0.03, -0.06, 0.0), axis: Vec3::Z, radius: 0.03, half_length: 0.1 };
 
     #[test]
     fn a_wound_strand_lies_on_the_rod() {
         let (start, lengths) = straight(16);
         for p in winding(&ROD, &start, &lengths, 2, 0.004, 1.0) {
             let rel = p - ROD.center;
-            assert!(
-                ((rel - ROD.axis * rel.z).length() - 0.03).abs() < 3e-5,
-                "{p}"
-            );
+            assert!(((rel - ROD.axis * rel.z).length() - 0.03).abs() < 3e-5, "{p}");
         }
     }
 
@@ -123,11 +110,6 @@ mod tests {
     fn winding_begins_where_the_strand_is() {
         let (start, lengths) = straight(16);
         let nodes = winding(&ROD, &start, &lengths, 2, 0.004, 0.0);
-        assert!(
-            nodes
-                .iter()
-                .zip(&start[2..])
-                .all(|(a, b)| a.distance(*b) < 1e-4)
-        );
+        assert!(nodes.iter().zip(&start[2..]).all(|(a, b)| a.distance(*b) < 1e-4));
     }
 }

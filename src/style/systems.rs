@@ -40,9 +40,7 @@ impl Plugin for StylePlugin {
             )
             .add_systems(
                 HairTick,
-                wind_strands
-                    .in_set(HairSystems::Interaction)
-                    .after(contact::part_strands),
+                wind_strands.in_set(HairSystems::Interaction).after(contact::part_strands),
             );
     }
 }
@@ -58,10 +56,7 @@ fn begin_treatments(
         let treat = request.clone().mended(&notes);
         let entity = treat.target;
         for wrong in notes.into_inner() {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::Setting(wrong),
-            });
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
         if let Ok(members) = hairs.get(entity) {
             let mut members = strands.iter_many_mut(members.collection());
@@ -71,10 +66,7 @@ fn begin_treatments(
         } else if let Ok(mut treatments) = strands.get_mut(entity) {
             treatments.acting.push(treat);
         } else {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::NoTarget,
-            });
+            faults.write(HairFault { entity, fault: Fault::NoTarget });
         }
     }
 }
@@ -84,25 +76,13 @@ fn apply_treatments(
     step: Res<HairStep>,
     mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
 ) {
-    let mut items: Vec<_> = strands
-        .iter_mut()
-        .filter(|(.., t)| !t.acting.is_empty())
-        .collect();
+    let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();
     for_each(&mut items, |(bonds, changes, treatments)| {
         let changes = changes.bypass_change_detection();
         for treat in &mut treatments.acting {
-            let share = if treat.seconds > step.dt {
-                step.dt / treat.seconds
-            } else {
-                1.0
-            };
+            let share = if treat.seconds > step.dt { step.dt / treat.seconds } else { 1.0 };
             let range = treat.joints.clone().unwrap_or(0..bonds.joints.len());
-            for (i, joint) in bonds
-                .joints
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| range.contains(i))
-            {
+            for (i, joint) in bonds.joints.iter().enumerate().filter(|(i, _)| range.contains(i)) {
                 for kind in BondKind::ALL {
                     if let Some(to) = treat.rates[kind as usize] {
                         changes.ask(i, kind, (to - joint.rates[kind as usize]) * share);
@@ -123,10 +103,7 @@ fn report_rods(
         let notes = Notes::default();
         rod.mended(&notes);
         for wrong in notes.into_inner() {
-            faults.write(HairFault {
-                entity,
-                fault: Fault::Setting(wrong),
-            });
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
     }
 }
@@ -164,24 +141,10 @@ fn wind_strands(
         }
         let seconds = wound.seconds.max(step.dt);
         let advanced = wound.progress + step.dt / seconds;
-        wound.progress = if advanced.is_finite() {
-            advanced.min(1.0)
-        } else {
-            1.0
-        };
-        let pitch = if wound.pitch.is_finite() {
-            wound.pitch
-        } else {
-            0.0
-        };
-        let targets = winding(
-            rod,
-            &wound.start,
-            strand.rest_lengths(),
-            from,
-            pitch,
-            wound.progress,
-        );
+        wound.progress = if advanced.is_finite() { advanced.min(1.0) } else { 1.0 };
+        let pitch = if wound.pitch.is_finite() { wound.pitch } else { 0.0 };
+        let targets =
+            winding(rod, &wound.start, strand.rest_lengths(), from, pitch, wound.progress);
         held.targets.clear();
         held.targets.resize(from, None);
         held.targets.extend(targets.into_iter().map(Some));

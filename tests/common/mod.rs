@@ -11,9 +11,7 @@ pub fn test_app(hertz: f64) -> App {
     app.add_plugins((MinimalPlugins, HairPlugins::default()))
         .insert_resource(Time::<Fixed>::from_hz(hertz))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
-    app.world_mut()
-        .resource_mut::<Time<Virtual>>()
-        .set_max_delta(Duration::MAX);
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.finish();
     app.cleanup();
     app.update();
@@ -22,11 +20,7 @@ pub fn test_app(hertz: f64) -> App {
 
 /// Runs for `seconds` of simulated time.
 pub fn run(app: &mut App, seconds: f64) {
-    let dt = app
-        .world()
-        .resource::<Time<Fixed>>()
-        .timestep()
-        .as_secs_f64();
+    let dt = app.world().resource::<Time<Fixed>>().timestep().as_secs_f64();
     for _ in 0..(seconds / dt).round() as usize {
         app.update();
     }
@@ -40,9 +34,8 @@ pub fn one_strand(
     direction: Vec3,
 ) -> (Entity, Entity) {
     let hair = app.world_mut().spawn(Hair).id();
-    let points: Vec<Vec3> = (0..=segments)
-        .map(|i| direction * (length * i as f32 / segments as f32))
-        .collect();
+    let points: Vec<Vec3> =
+        (0..=segments).map(|i| direction * (length * i as f32 / segments as f32)).collect();
     let strand = Strand::from_polyline(&points).unwrap();
     let strand = app.world_mut().spawn((StrandOf(hair), strand)).id();
     (hair, strand)
@@ -66,11 +59,7 @@ pub fn settle(app: &mut App, entity: Entity, limit: f64) {
         if rms_speed(strand(app, entity)) < 1e-3 {
             return;
         }
-        assert!(
-            t < limit,
-            "still moving at {} m/s",
-            rms_speed(strand(app, entity))
-        );
+        assert!(t < limit, "still moving at {} m/s", rms_speed(strand(app, entity)));
     }
 }
 
