@@ -10,8 +10,10 @@ pub struct StrainPeak(pub f32);
 
 pub fn watch_strain(strands: Query<&Strand>, mut peak: ResMut<StrainPeak>) {
     // A NaN must not pass for no strain.
-    peak.0 =
-        strands.iter().map(Strand::peak_strain).fold(peak.0, |a, b| if b <= a { a } else { b });
+    peak.0 = strands
+        .iter()
+        .map(Strand::peak_strain)
+        .fold(peak.0, |a, b| if b <= a || a.is_nan() { a } else { b });
 }
 
 /// Ω of every joint, by strand.

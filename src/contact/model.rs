@@ -83,6 +83,10 @@ pub struct Neighbours {
     starts: Vec<u32>,
     /// The near edges of each node, by their start nodes.
     near: Vec<u32>,
+    /// How far beyond the reach each node's nearest edge was when the list was built (m).
+    slack: Vec<f32>,
+    /// The farthest that a node has moved since (m).
+    moved: f32,
 }
 
 impl Neighbours {
@@ -102,15 +106,17 @@ impl Neighbours {
                 }),
             );
         }
-        let limit = (0.5 * margin) * (0.5 * margin);
-        let current = self.reach == reach
-            && self.built_at.len() == points.len()
-            && self.runs == runs
-            // A non-finite node compares as not near and forces a new list, which leaves it out.
-            && points.iter().zip(&self.built_at).all(|(p, q)| p.distance_squared(*q) < limit);
-        if current {
-            return false;
+        let same = self.reach == reach && self.built_at.len() == points.len() && self.runs == runs;
+        if same {
+            // A non-finite node moves the maximum to no number, which is not less than the limit.
+            let squared = points.iter().zip(&self.built_at).map(|(p, q)| p.distance_squared(*q));
+            self.moved =
+                squared.fold(0.0, |a: f32, b| if b <= a || a.is_nan() { a } else { b }).sqrt();
+            if self.moved < 0.5 * margin {
+                return false;
+            }
         }
+        self.moved = 0.0;
         self.reach = reach;
         self.built_at.clear();
         self.built_at.extend_from_slice(points);
@@ -159,21 +165,28 @@ impl Neighbours {
         self.grid.sort();
         self.starts.clear();
         self.near.clear();
+        self.slack.clear();
         self.starts.push(0);
         let within = within * within;
         for run in &self.runs {
             let (start, end) = (run.start, run.start + run.len);
             for i in start..end {
+                let mut nearest = f32::INFINITY;
                 // The root is held; pushing it would do nothing.
                 if i > start {
                     let p = points[i as usize];
                     self.grid.for_each_at(p, |j| {
-                        let own = (start..end).contains(&j);
-                        if !own && self.edges[j as usize].distance_squared(p) < within {
+                        if (start..end).contains(&j) {
+                            return;
+                        }
+                        let squared = self.edges[j as usize].distance_squared(p);
+                        if squared < within {
+                            nearest = nearest.min(squared);
                             self.near.push(j);
                         }
                     });
                 }
+                self.slack.push(nearest.sqrt() - self.reach);
                 self.starts.push(self.near.len() as u32);
             }
         }
@@ -181,6 +194,10 @@ impl Neighbours {
 
     /// Equation 18 summed over all edges near node `i`, in a fixed order (m/s²).
     pub fn acceleration(&self, i: usize, p: Vec3, radius: f32, strength: f32) -> Vec3 {
+        // Neither the node nor an edge has moved by more, so what was farther cannot touch yet.
+        if 2.0 * self.moved < self.slack[i] {
+            return Vec3::ZERO;
+        }
         self.near[self.starts[i] as usize..self.starts[i + 1] as usize]
             .iter()
             .filter_map(|&j| Some(penalty(p, self.edges[j as usize].foot(p)?, radius, strength)))

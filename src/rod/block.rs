@@ -181,9 +181,13 @@ pub fn take4(a: &[Lane; 4], lane: usize) -> Quat {
 }
 
 #[inline(always)]
+pub(super) fn load<S: Simd>(simd: S, a: &Lane) -> f32x16<S> {
+    f32x16::load_array_ref(simd, a)
+}
+
+#[inline(always)]
 fn load3<S: Simd>(simd: S, a: &[Lane; 3]) -> V3<f32x16<S>> {
-    let l = |i: usize| f32x16::load_array_ref(simd, &a[i]);
-    V3::new(l(0), l(1), l(2))
+    V3::new(load(simd, &a[0]), load(simd, &a[1]), load(simd, &a[2]))
 }
 
 #[inline(always)]
@@ -195,8 +199,8 @@ fn store3<S: Simd>(a: &mut [Lane; 3], v: V3<f32x16<S>>) {
 
 #[inline(always)]
 fn load4<S: Simd>(simd: S, a: &[Lane; 4]) -> Quaternion<f32x16<S>> {
-    let l = |i: usize| f32x16::load_array_ref(simd, &a[i]);
-    Quaternion::new(V3::new(l(0), l(1), l(2)), l(3))
+    let v = V3::new(load(simd, &a[0]), load(simd, &a[1]), load(simd, &a[2]));
+    Quaternion::new(v, load(simd, &a[3]))
 }
 
 #[inline(always)]
@@ -267,7 +271,7 @@ fn predict<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles:
     let dt = f32x16::splat(simd, params.dt);
     let zero = f32x16::splat(simd, 0.0);
     for n in &mut b.nodes {
-        let w = f32x16::load_array_ref(simd, &n.w);
+        let w = load(simd, &n.w);
         let held = Real::lt(w, f32x16::splat(simd, 1e-12));
         let p = load3(simd, &n.p);
         // Nodes that begin inside an obstacle are set on its surface before the step, so that
@@ -297,24 +301,24 @@ fn predict<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles:
 /// stretch–shear. What two neighbours share travels in registers.
 #[inline(always)]
 fn sweep<S: Simd>(simd: S, b: &mut BlockLanes, projection: StretchProjection) {
-    let lane = |a: &Lane| f32x16::load_array_ref(simd, a);
     let one = f32x16::splat(simd, 1.0);
     let mut before = load4(simd, &b.root);
     let mut w_before = f32x16::splat(simd, 0.0);
     let mut p1 = b.nodes[0].position(simd);
-    let mut w1 = lane(&b.nodes[0].w);
+    let mut w1 = load(simd, &b.nodes[0].w);
     for i in 0..b.edges.len() {
         let e = &b.edges[i];
-        let (wq, l) = (lane(&e.wq), lane(&e.l));
+        let (wq, l) = (load(simd, &e.wq), load(simd, &e.l));
         let mut q = load4(simd, &e.q);
-        let (d_before, d_q) = bend_twist(before, q, load4(simd, &e.rest), w_before, wq, lane(&e.k));
+        let (d_before, d_q) =
+            bend_twist(before, q, load4(simd, &e.rest), w_before, wq, load(simd, &e.k));
         q = q.add_scaled(d_q, one).normalize();
         if i > 0 {
             let turned = before.add_scaled(d_before, one).normalize();
             store4(&mut b.edges[i - 1].q, turned);
         }
         let mut p2 = b.nodes[i + 1].position(simd);
-        let w2 = lane(&b.nodes[i + 1].w);
+        let w2 = load(simd, &b.nodes[i + 1].w);
         let c = stretch_shear(projection, p1, p2, q, EdgeWeights { w1, w2, wq, l });
         p1 = p1 + c.p1;
         p2 = p2 + c.p2;
@@ -337,7 +341,7 @@ fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles
     let mut touched = zero;
     let none = V3::new(zero, zero, zero);
     for n in &mut b.nodes {
-        let w = f32x16::load_array_ref(simd, &n.w);
+        let w = load(simd, &n.w);
         let held = Real::lt(w, f32x16::splat(simd, 1e-12));
         let from = load3(simd, &n.from);
         let (mut p, mut rests_on) = (load3(simd, &n.p), none);

@@ -11,7 +11,7 @@
 
 use super::{
     algebra::V3,
-    block::BlockLanes,
+    block::{BlockLanes, load},
     lanes::{LANES, Real},
 };
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -31,48 +31,63 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes, touched_only: 
     }
 }
 
+// Closures would be compiled without the instruction set of their caller where the compiler does not
+// inline them, so the small parts are functions that it has to.
+
+/// The direction from one node to the next and the distance between them.
+#[inline(always)]
+fn span<S: Simd>(simd: S, from: V3<f32x16<S>>, to: V3<f32x16<S>>) -> (V3<f32x16<S>>, f32x16<S>) {
+    let along = to - from;
+    let length = Real::sqrt(Real::max(along.dot(along), f32x16::splat(simd, 1e-20)));
+    (along.scale(f32x16::splat(simd, 1.0) / length), length)
+}
+
+/// x · W y of node `i`.
+#[inline(always)]
+fn mobility<S: Simd, const TOUCHING: bool>(
+    simd: S,
+    b: &BlockLanes,
+    i: usize,
+    x: V3<f32x16<S>>,
+    y: V3<f32x16<S>>,
+) -> f32x16<S> {
+    let node = &b.nodes[i];
+    let free = x.dot(y);
+    if TOUCHING {
+        let n = node.support(simd);
+        load(simd, &node.w) * (free - f32x16::splat(simd, FIRMNESS) * x.dot(n) * y.dot(n))
+    } else {
+        load(simd, &node.w) * free
+    }
+}
+
 /// `TOUCHING` heeds obstacles; where there are none it changes no bit.
 #[inline(always)]
 fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_only: bool) {
-    let load = |a: &[f32; LANES]| f32x16::load_array_ref(simd, a);
     let edges = b.edges.len();
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     // Pivots below this belong to edges with both ends held: nothing there can move.
     let tiny = f32x16::splat(simd, 1e-6);
-    let span = |from: V3<f32x16<S>>, to: V3<f32x16<S>>| {
-        let along = to - from;
-        let length = Real::sqrt(Real::max(along.dot(along), f32x16::splat(simd, 1e-20)));
-        (along.scale(one / length), length)
-    };
     let firmness = f32x16::splat(simd, FIRMNESS);
-    let touched = load(&b.touched);
-    // a · W b of node i
-    let mobility = |b: &BlockLanes, i: usize, x: V3<f32x16<S>>, y: V3<f32x16<S>>| {
-        let node = &b.nodes[i];
-        let free = x.dot(y);
-        if TOUCHING {
-            let n = node.support(simd);
-            load(&node.w) * (free - firmness * x.dot(n) * y.dot(n))
-        } else {
-            load(&node.w) * free
-        }
-    };
+    let touched = load(simd, &b.touched);
     let mut end = b.nodes[1].position(simd);
-    let (mut d, mut length) = span(b.nodes[0].position(simd), end);
+    let (mut d, mut length) = span(simd, b.nodes[0].position(simd), end);
     let (mut lower, mut upper, mut rhs) = (zero, zero, zero);
     for i in 0..edges {
         // Row i: lower λ_{i−1} + d_i·(W_i + W_{i+1})d_i λ_i + coupling λ_{i+1} = C_i, where the
         // coupling of two rows is −d·W d′ of the node they share, and so the next row's `lower`.
-        let pivot = mobility(b, i, d, d) + mobility(b, i + 1, d, d) - lower * upper;
+        let pivot = mobility::<S, TOUCHING>(simd, b, i, d, d)
+            + mobility::<S, TOUCHING>(simd, b, i + 1, d, d)
+            - lower * upper;
         let inverse = Real::select(Real::lt(pivot, tiny), zero, one / pivot);
-        rhs = (length - load(&b.edges[i].l) - lower * rhs) * inverse;
+        rhs = (length - load(simd, &b.edges[i].l) - lower * rhs) * inverse;
         let s = &mut b.scratch[i];
         s.direction = [d.x.to_array(), d.y.to_array(), d.z.to_array()];
         s.rhs = rhs.to_array();
         if i + 1 < edges {
             let next = b.nodes[i + 2].position(simd);
-            let (ahead, ahead_length) = span(end, next);
-            let coupling = -mobility(b, i + 1, d, ahead);
+            let (ahead, ahead_length) = span(simd, end, next);
+            let coupling = -mobility::<S, TOUCHING>(simd, b, i + 1, d, ahead);
             upper = coupling * inverse;
             (lower, d, length, end) = (coupling, ahead, ahead_length, next);
         }
@@ -83,11 +98,15 @@ fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_on
     let mut pull = V3::new(zero, zero, zero);
     for i in (0..edges).rev() {
         let s = &b.scratch[i];
-        lambda = load(&s.rhs) - load(&s.upper) * lambda;
-        let d = V3::new(load(&s.direction[0]), load(&s.direction[1]), load(&s.direction[2]));
+        lambda = load(simd, &s.rhs) - load(simd, &s.upper) * lambda;
+        let d = V3::new(
+            load(simd, &s.direction[0]),
+            load(simd, &s.direction[1]),
+            load(simd, &s.direction[2]),
+        );
         let tension = d.scale(lambda);
         let node = &mut b.nodes[i + 1];
-        let w = load(&node.w);
+        let w = load(simd, &node.w);
         let p = node.position(simd);
         let mut force = pull - tension;
         if TOUCHING {

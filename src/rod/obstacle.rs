@@ -76,8 +76,19 @@ impl Obstacle {
 
 #[inline(always)]
 fn splat<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
-    let s = |x: f32| f32x16::splat(simd, x);
-    V3::new(s(v.x), s(v.y), s(v.z))
+    V3::new(f32x16::splat(simd, v.x), f32x16::splat(simd, v.y), f32x16::splat(simd, v.z))
+}
+
+/// The direction and length of `v`. A point on a collider's own axis has no way out that is shorter
+/// than another: it goes along `or`.
+#[inline(always)]
+fn unit_or<S: Simd>(v: V3<f32x16<S>>, or: Vec3) -> (V3<f32x16<S>>, f32x16<S>) {
+    let simd = v.x.simd;
+    let tiny = f32x16::splat(simd, 1e-12);
+    let length = Real::sqrt(v.dot(v));
+    let degenerate = Real::lt(length, tiny);
+    let inverse = f32x16::splat(simd, 1.0) / Real::max(length, tiny);
+    (V3::select(degenerate, splat(simd, or), v.scale(inverse)), length)
 }
 
 /// Moves `p` out of the solid where it is inside, and holds it back along the surface by Coulomb
@@ -95,20 +106,12 @@ pub(super) fn push_out<S: Simd>(
     silent: bool,
 ) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
     let simd = p.x.simd;
-    let s = |x: f32| f32x16::splat(simd, x);
-    let (zero, one, tiny) = (s(0.0), s(1.0), s(1e-12));
-    // A point on a collider's own axis has no way out that is shorter than another: it goes
-    // along `up`.
-    let unit_or = |v: V3<f32x16<S>>, up: Vec3| {
-        let length = Real::sqrt(v.dot(v));
-        let degenerate = Real::lt(length, tiny);
-        let inverse = one / Real::max(length, tiny);
-        (V3::select(degenerate, splat(simd, up), v.scale(inverse)), length)
-    };
+    let zero = f32x16::splat(simd, 0.0);
+    let one = f32x16::splat(simd, 1.0);
     let (normal, depth) = match obstacle.solid {
         Solid::HalfSpace { normal, point } => {
             let n = splat(simd, normal);
-            (n, s(skin) - (p - splat(simd, point)).dot(n))
+            (n, f32x16::splat(simd, skin) - (p - splat(simd, point)).dot(n))
         }
         Solid::Capsule { a, b, radius } => {
             let axis = b - a;
@@ -117,18 +120,18 @@ pub(super) fn push_out<S: Simd>(
             let t = rel.dot(splat(simd, axis * inverse));
             let t = Real::min(Real::max(t, zero), one);
             let off = rel - splat(simd, axis).scale(t);
-            let (n, distance) = unit_or(off, self::across(axis));
-            (n, s(radius + skin) - distance)
+            let (n, distance) = unit_or(off, across(axis));
+            (n, f32x16::splat(simd, radius + skin) - distance)
         }
         Solid::Cylinder { center, axis, radius, half_height } => {
             let u = splat(simd, axis);
             let rel = p - splat(simd, center);
             let along = rel.dot(u);
-            let across = rel - u.scale(along);
-            let (radial, distance) = unit_or(across, self::across(axis));
-            let side = s(radius + skin) - distance;
+            let off = rel - u.scale(along);
+            let (radial, distance) = unit_or(off, across(axis));
+            let side = f32x16::splat(simd, radius + skin) - distance;
             let below = Real::lt(along, zero);
-            let cap = s(half_height + skin) - Real::select(below, -along, along);
+            let cap = f32x16::splat(simd, half_height + skin) - Real::select(below, -along, along);
             let cap_normal = V3::select(below, -u, u);
             let nearer_cap = Real::lt(cap, side);
             // Outside where either is negative: the smaller of the two decides.
@@ -147,18 +150,16 @@ pub(super) fn push_out<S: Simd>(
     }
     let mut slip = out - from;
     if let Some(m) = &obstacle.motion {
-        let column = |c: usize| splat(simd, m.matrix3.col(c).into());
-        let moved = column(0).scale_add(
-            from.x,
-            column(1)
-                .scale_add(from.y, column(2).scale_add(from.z, splat(simd, m.translation.into()))),
-        );
+        let moved = splat(simd, m.translation.into());
+        let moved = splat(simd, m.matrix3.z_axis.into()).scale_add(from.z, moved);
+        let moved = splat(simd, m.matrix3.y_axis.into()).scale_add(from.y, moved);
+        let moved = splat(simd, m.matrix3.x_axis.into()).scale_add(from.x, moved);
         slip = out - moved;
     }
     let tangential = slip - normal.scale(slip.dot(normal));
     let length = Real::sqrt(tangential.dot(tangential));
     // Static where the grip suffices, sliding where not.
-    let held = Real::min(one, friction * depth / Real::max(length, tiny));
+    let held = Real::min(one, friction * depth / Real::max(length, f32x16::splat(simd, 1e-12)));
     Some((V3::select(inside, tangential.scale_add(-held, out), p), touching))
 }
 
