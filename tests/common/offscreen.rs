@@ -92,44 +92,45 @@ pub fn windowless() -> PluginGroupBuilder {
         .disable::<bevy::render::pipelined_rendering::PipelinedRenderingPlugin>()
 }
 
-/// Whether there is anything that can draw; says so on the test's output if not.
+/// Whether there is anything that can draw; says so on the test's output if not. Asked of the
+/// drivers' descriptions, because Bevy panics without an adapter.
 pub fn has_adapter() -> bool {
-    use bevy::render::settings::WgpuSettings;
-    let settings = WgpuSettings::default();
-    let backends = settings.backends.unwrap_or_default();
-    let instance = wgpu_probe::has_adapter(backends.bits());
-    if !instance {
-        eprintln!("skipped: no graphics adapter, install mesa-vulkan-drivers to draw in software");
+    let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
+    let named = ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"];
+    let found = !cfg!(target_os = "linux")
+        || named.iter().any(|name| std::env::var_os(name).is_some())
+        || (folders.iter()).any(|folder| {
+            std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some())
+        });
+    if !found {
+        println!("skipped: no graphics driver; mesa-vulkan-drivers draws in software");
     }
-    instance
-}
-
-mod wgpu_probe {
-    /// Bevy panics without an adapter, so that must be known before.
-    pub fn has_adapter(_: u32) -> bool {
-        // A Vulkan loader with at least one driver description, or a platform that always has one.
-        if !cfg!(target_os = "linux") {
-            return true;
-        }
-        let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
-        std::env::var_os("VK_ICD_FILENAMES").is_some()
-            || std::env::var_os("VK_DRIVER_FILES").is_some()
-            || folders
-                .iter()
-                .any(|f| std::fs::read_dir(f).is_ok_and(|mut entries| entries.next().is_some()))
-    }
+    found
 }
 
 impl Offscreen {
     /// `None`, with the reason printed, where nothing can draw. The tick stands still until
     /// `ticking` is told.
     pub fn new(width: u32, height: u32) -> Option<Self> {
+        Self::of(width, height, false)
+    }
+
+    /// The same with the hair's plugins added before Bevy's.
+    pub fn with_hair_first(width: u32, height: u32) -> Option<Self> {
+        Self::of(width, height, true)
+    }
+
+    fn of(width: u32, height: u32, hair_first: bool) -> Option<Self> {
         if !has_adapter() {
             return None;
         }
         let mut app = App::new();
-        app.add_plugins((windowless(), HairPlugins::default()))
-            .insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
+        if hair_first {
+            app.add_plugins((HairPlugins::default(), windowless()));
+        } else {
+            app.add_plugins((windowless(), HairPlugins::default()));
+        }
+        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
             .insert_resource(ClearColor(Color::BLACK))
             .insert_resource(GlobalAmbientLight::NONE)
             .init_resource::<Caught>();
