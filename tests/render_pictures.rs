@@ -29,10 +29,10 @@ fn studio(scene: &mut Offscreen) {
     };
     world.spawn(light(Vec3::new(1.0, 1.6, 1.4), 9000.0, Color::srgb(1.0, 0.95, 0.88), true));
     world.spawn(light(Vec3::new(-1.6, 0.4, 0.9), 2500.0, Color::srgb(0.8, 0.88, 1.0), false));
-    world.spawn(light(Vec3::new(-0.5, 1.2, -1.6), 9000.0, Color::WHITE, true));
+    world.spawn(light(Vec3::new(-0.5, 1.2, -1.6), 4500.0, Color::WHITE, true));
     world.insert_resource(GlobalAmbientLight { brightness: 350.0, ..default() });
     world.insert_resource(ClearColor(Color::srgb(0.18, 0.19, 0.21)));
-    scene.look(Vec3::new(0.12, 0.06, 0.62), Vec3::new(0.0, -0.05, 0.0));
+    scene.look(Vec3::new(0.22, 0.08, 0.5), Vec3::new(0.0, -0.05, 0.0));
 }
 
 fn groom(scene: &mut Offscreen, guides: usize) -> Entity {
