@@ -280,3 +280,92 @@ fn bad_hair_neither_panics_nor_leaves_a_stale_picture() {
     scene.app.world_mut().despawn(third);
     assert_eq!(scene.draw().covered(BLACK), 0, "despawned hair is gone at once");
 }
+
+#[test]
+fn every_kind_of_light_lights_hair_through_every_kind_of_camera() {
+    use bevy::{camera::Hdr, core_pipeline::prepass::DepthPrepass, light::EnvironmentMapLight};
+    let Some(mut scene) = Offscreen::new(60, 60) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
+    let look = HairLook { melanin: Melanin::BLOND, ..wide(3e-3) };
+    hair(&mut scene, &curtain(12, 0.3), (look, HairFollowers::new(60)));
+    assert!(scene.draw().mean_luma() < 0.5, "no light, no hair to be seen");
+
+    let camera = scene.camera;
+    let at = Transform::from_xyz(0.2, 0.3, 0.6).looking_at(Vec3::ZERO, Vec3::Y);
+    let lit = |scene: &mut Offscreen, what: &str, light: Entity| {
+        let luma = scene.draw().mean_luma();
+        println!("{what}: mean luma {luma}");
+        assert!(luma > 2.0, "{what} does not light hair");
+        scene.app.world_mut().despawn(light);
+    };
+    let spawn = |scene: &mut Offscreen, light: &str| {
+        let world = scene.app.world_mut();
+        let mut entity = world.spawn(at);
+        match light {
+            "point" => entity.insert(PointLight {
+                intensity: 60_000.0,
+                shadow_maps_enabled: true,
+                ..default()
+            }),
+            "spot" => entity.insert(SpotLight {
+                intensity: 60_000.0,
+                shadow_maps_enabled: true,
+                ..default()
+            }),
+            "rect" => entity.insert(RectLight {
+                intensity: 60_000.0,
+                width: 0.3,
+                height: 0.3,
+                ..default()
+            }),
+            _ => entity.insert(DirectionalLight { shadow_maps_enabled: true, ..default() }),
+        };
+        entity.id()
+    };
+    for light in ["point", "spot", "rect", "directional"] {
+        let entity = spawn(&mut scene, light);
+        lit(&mut scene, light, entity);
+    }
+    let none = scene.app.world_mut().spawn_empty().id();
+    scene.app.insert_resource(GlobalAmbientLight { brightness: 2000.0, ..default() });
+    lit(&mut scene, "ambient", none);
+    scene.app.insert_resource(GlobalAmbientLight::NONE);
+    let world = scene.app.world_mut();
+    let sky = EnvironmentMapLight {
+        intensity: 2000.0,
+        ..EnvironmentMapLight::solid_color(&mut world.resource_mut::<Assets<Image>>(), Color::WHITE)
+    };
+    let none = world.spawn_empty().id();
+    world.entity_mut(camera).insert(sky);
+    lit(&mut scene, "environment", none);
+    scene.app.world_mut().entity_mut(camera).remove::<EnvironmentMapLight>();
+
+    let cameras: [(&str, fn(EntityWorldMut)); 5] = [
+        ("without samples", |mut c| {
+            c.insert(Msaa::Off);
+        }),
+        ("of high range", |mut c| {
+            c.insert(Hdr);
+        }),
+        ("with a depth prepass", |mut c| {
+            c.insert(DepthPrepass);
+        }),
+        ("in fog", |mut c| {
+            c.insert(DistanceFog::default());
+        }),
+        ("orthographic", |mut c| {
+            c.insert(Projection::Orthographic(OrthographicProjection {
+                scale: 0.005,
+                ..OrthographicProjection::default_3d()
+            }));
+        }),
+    ];
+    for (what, make) in cameras {
+        make(scene.app.world_mut().entity_mut(camera));
+        let light = spawn(&mut scene, "directional");
+        lit(&mut scene, what, light);
+    }
+    assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
+}

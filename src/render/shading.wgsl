@@ -217,7 +217,7 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         let front = saturate(dot(cross((*panel).up, (*panel).right), -l));
         let area = (*panel).width * (*panel).height;
         let falloff = lighting::getRangeFalloff(square, 1.0 / max((*panel).range * (*panel).range, 1e-4));
-        light += PI * reflected(fibre, surface, l, 1.0) * (*panel).color.rgb
+        light += reflected(fibre, surface, l, 1.0) * (*panel).color.rgb
             * (front * area / (square + area) * falloff);
     }
 

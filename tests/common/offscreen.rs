@@ -133,6 +133,8 @@ impl Offscreen {
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
             .insert_resource(ClearColor(Color::BLACK))
             .insert_resource(GlobalAmbientLight::NONE)
+            .insert_resource(bevy::light::DirectionalLightShadowMap { size: 1024 })
+            .insert_resource(bevy::light::PointLightShadowMap { size: 512 })
             .init_resource::<Caught>();
         let mut image =
             Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
