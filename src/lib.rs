@@ -27,6 +27,9 @@ pub use tick::{HairPlugins, HairStep, HairSubsteps, HairSystems, HairTick};
 
 /// What most games need.
 pub mod prelude {
+    #[cfg(feature = "render")]
+    #[doc(hidden)]
+    pub use crate::render::{HairFollowers, HairLook, HairShading, HairView, Melanin};
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Cuticle, Hair, HairCollider, HairDefault,
