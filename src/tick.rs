@@ -144,7 +144,7 @@ impl PluginGroup for HairPlugins {
             .add(StylePlugin)
             .add(RodPlugin);
         #[cfg(feature = "render")]
-        let group = group.add(crate::render::HairRenderPlugin);
+        let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
         group
     }
 }

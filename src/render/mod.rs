@@ -1,10 +1,120 @@
-//! Draws the hair.
+//! Draws the hair: what is simulated, and many strands between, from one buffer of nodes.
+//!
+//! Each [`Hair`](crate::Hair) is one mesh and one draw call (one more for each shadow map). Once a
+//! frame its nodes are packed where the fixed clock's overstep puts them and written to the GPU; all
+//! else happens in the vertex shader: curves through the nodes, followers between guides, ribbons
+//! that face the camera. Places stay in the hair's frame up to there, so roots never lag behind the
+//! head.
+//!
+//! How it looks is edited at run time through components of the hair: [`HairLook`],
+//! [`HairFollowers`], [`HairView`]. For a look of your own write a material around [`HairBuffers`].
+//!
+//! Vertex shaders read storage buffers, so WebGL2 cannot draw this; WebGPU and native can. Strands
+//! thinner than a pixel are drawn one pixel wide and cover part of its samples; without MSAA fewer
+//! strands are drawn instead.
 
-use bevy::prelude::*;
+pub mod curve;
 
-/// Draws the hair.
-pub struct HairRenderPlugin;
+mod buffers;
+mod draw;
+mod followers;
+mod look;
+mod material;
+mod upload;
+mod view;
+
+pub use buffers::HairBuffers;
+pub use followers::{DrawnStrand, HairFollowers};
+pub use look::{HairLook, HairShading, Melanin, WetLook};
+pub use view::{HairView, STRAIN_FULL, heat};
+
+use crate::{setting, strand::Hair};
+use bevy::{
+    app::FixedMain,
+    asset::{AssetEventSystems, embedded_asset, io::embedded::EmbeddedAssetRegistry},
+    camera::visibility::VisibilitySystems,
+    ecs::schedule::{InternedScheduleLabel, ScheduleLabel},
+    prelude::*,
+    render::{erased_render_asset::ErasedRenderAssetPlugin, storage::ShaderBuffer},
+    shader::load_shader_library,
+};
+use draw::Interpolate;
+use material::RibbonMaterial;
+
+/// Draws the hair. Part of [`HairPlugins`](crate::HairPlugins), which may be added before or after
+/// `DefaultPlugins`. Without a renderer it does nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct HairRenderPlugin {
+    /// Whether to draw between the last two ticks by the overstep of the fixed clock. Right for hair
+    /// that ticks in a fixed schedule, wrong for any other. Default true.
+    pub interpolate: bool,
+}
+
+impl Default for HairRenderPlugin {
+    fn default() -> Self {
+        Self { interpolate: true }
+    }
+}
+
+impl HairRenderPlugin {
+    /// For hair that ticks in `schedule`.
+    pub fn for_schedule(schedule: InternedScheduleLabel) -> Self {
+        let fixed = [
+            FixedMain.intern(),
+            FixedFirst.intern(),
+            FixedPreUpdate.intern(),
+            FixedUpdate.intern(),
+            FixedPostUpdate.intern(),
+            FixedLast.intern(),
+        ];
+        Self { interpolate: fixed.contains(&schedule) }
+    }
+}
+
+/// The systems that draw, in `PostUpdate` after transforms have been propagated and before
+/// visibility is.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct HairRenderSystems;
 
 impl Plugin for HairRenderPlugin {
-    fn build(&self, _app: &mut App) {}
+    fn build(&self, app: &mut App) {
+        setting::plugin::<HairLook>(app);
+        setting::plugin::<HairFollowers>(app);
+        setting::plugin::<HairView>(app);
+        app.insert_resource(Interpolate(self.interpolate))
+            .register_type::<HairBuffers>()
+            .register_type::<WetLook>();
+        // The drawn child inherits it. An error says that the user has required it already.
+        let _ = app.try_register_required_components::<Hair, Visibility>();
+    }
+
+    /// Here, because now all that there is of a renderer has been added, whatever the order.
+    fn finish(&self, app: &mut App) {
+        let world = app.world();
+        let can_draw = world.contains_resource::<EmbeddedAssetRegistry>()
+            && world.contains_resource::<Assets<Shader>>()
+            && world.contains_resource::<Assets<Mesh>>()
+            && world.contains_resource::<Assets<ShaderBuffer>>()
+            && world.contains_resource::<Assets<StandardMaterial>>();
+        if !can_draw {
+            return;
+        }
+        load_shader_library!(app, "strands.wgsl");
+        load_shader_library!(app, "ribbon.wgsl");
+        load_shader_library!(app, "shading.wgsl");
+        embedded_asset!(app, "ribbon_forward.wgsl");
+        embedded_asset!(app, "ribbon_prepass.wgsl");
+        app.add_plugins(MaterialPlugin::<RibbonMaterial>::default());
+        // Bevy finishes only the plugins that were there when it began to finish.
+        ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial>>::default().finish(app);
+        app.add_systems(PostUpdate, (draw::appear, draw::pack).chain().in_set(HairRenderSystems))
+            .configure_sets(
+                PostUpdate,
+                HairRenderSystems
+                    .after(TransformSystems::Propagate)
+                    .before(VisibilitySystems::VisibilityPropagate)
+                    .before(AssetEventSystems),
+            );
+        upload::plugin(app);
+    }
 }

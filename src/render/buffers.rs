@@ -1,0 +1,168 @@
+//! What a hair hands to the GPU: its nodes in every frame, guides and drawn strands once.
+
+use super::{WetLook, followers::DrawnStrand};
+use crate::{
+    bond::Bonds,
+    strand::{Strand, StrandHistory},
+};
+use bevy::{prelude::*, render::storage::ShaderBuffer};
+
+/// The buffers of a drawn [`Hair`](crate::Hair), on the same entity. Bind them in a material of your
+/// own to draw the hair another way; `#import bevy_keratin::strands` has the structures and the curve.
+///
+/// All numbers are little-endian `f32` or `u32`, all places are in the hair's frame (m).
+///
+/// | buffer | stride | holds |
+/// |---|---|---|
+/// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain, moisture, length from the root at rest (m), 1 if the guide may be shown |
+/// | `guides` | 8 | first node and number of nodes of each guide |
+/// | `strands` | 64 | [`DrawnStrand`]: the guides first, then the followers |
+///
+/// `nodes` is written once a frame into the same GPU buffer. When the groom changes the handles
+/// change too.
+#[derive(Component, Reflect, Clone, Debug)]
+#[reflect(Component, Clone)]
+pub struct HairBuffers {
+    /// The nodes of all guides, one guide after the other.
+    pub nodes: Handle<ShaderBuffer>,
+    /// Which nodes belong to which guide.
+    pub guides: Handle<ShaderBuffer>,
+    /// Which strands are drawn.
+    pub strands: Handle<ShaderBuffer>,
+    /// How many guides there are.
+    pub guide_count: u32,
+    /// How many strands are drawn, guides included.
+    pub strand_count: u32,
+    /// The child that carries mesh and material.
+    pub drawn: Entity,
+}
+
+/// A node as the shader reads it: 32 bytes.
+pub(super) type PackedNode = [u32; 8];
+
+/// Hair farther from its own origin than this (m) is as broken as hair at NaN.
+const FAR: f32 = 1e6;
+
+fn usable(p: Vec3) -> bool {
+    p.is_finite() && p.abs().max_element() < FAR
+}
+
+/// Where a guide is drawn: between the tick before and the present by `overstep`.
+pub(super) fn drawn_place(strand: &Strand, before: &[Vec3], node: usize, overstep: f32) -> Vec3 {
+    let now = strand.positions()[node];
+    match before.get(node) {
+        Some(before) if before.is_finite() => before.lerp(now, overstep),
+        _ => now,
+    }
+}
+
+/// Appends a guide's nodes. Unusable nodes take the place of the node before them; a guide with none
+/// left is not shown. Gives the box around what was appended.
+pub(super) fn pack_guide(
+    out: &mut Vec<PackedNode>,
+    strand: &Strand,
+    history: &StrandHistory,
+    bonds: &Bonds,
+    wet: Option<&WetLook>,
+    overstep: f32,
+) -> Option<(Vec3, Vec3)> {
+    let before = match history.positions.len() == strand.nodes() {
+        true => &history.positions[..],
+        false => &[],
+    };
+    let place = |i| drawn_place(strand, before, i, overstep);
+    let first = (0..strand.nodes()).map(place).find(|p| usable(*p));
+    let shown = f32::from(u8::from(first.is_some()));
+    let mut last = first.unwrap_or_default();
+    let (mut low, mut high) = (last, last);
+    let mut rest = 0.0;
+    let mut strain_below = None;
+    for i in 0..strand.nodes() {
+        let p = place(i);
+        if usable(p) {
+            last = p;
+        }
+        (low, high) = (low.min(last), high.max(last));
+        let strain_above = strand.rest_lengths().get(i).map(|l| {
+            let length = strand.positions()[i].distance(strand.positions()[i + 1]);
+            (length / l - 1.0).abs()
+        });
+        let strain = match (strain_below, strain_above) {
+            (Some(a), Some(b)) => 0.5 * (a + b),
+            (a, b) => a.or(b).unwrap_or(0.0),
+        };
+        strain_below = strain_above;
+        // The tip has no joint: it shows the last one's. Hair not yet ticked has all bonds closed.
+        let joint = bonds.joints.get(i).or(bonds.joints.last());
+        let rates = joint.map_or([1.0; 4], |j| j.rates);
+        let moisture = wet.and_then(|w| w.0.get(i)).copied().unwrap_or(0.0);
+        let number = |x: f32| if x.is_finite() { x.to_bits() } else { 0 };
+        let [x, y, z] = last.to_array().map(f32::to_bits);
+        out.push([
+            x,
+            y,
+            z,
+            unorm8(rates),
+            number(strain),
+            number(moisture.clamp(0.0, 1.0)),
+            number(rest),
+            shown.to_bits(),
+        ]);
+        rest += strand.rest_lengths().get(i).copied().unwrap_or(0.0);
+    }
+    first.map(|_| (low, high))
+}
+
+fn unorm8(rates: [f32; 4]) -> u32 {
+    // `as` saturates and takes NaN as 0.
+    u32::from_le_bytes(rates.map(|r| (r * 255.0 + 0.5) as u8))
+}
+
+/// The static buffers' contents.
+pub(super) fn pack_strands(drawn: &[DrawnStrand]) -> Vec<u8> {
+    let words: Vec<[u32; 16]> = drawn.iter().map(DrawnStrand::packed).collect();
+    bytemuck::cast_slice(&words).to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packed(strand: &Strand, history: &[Vec3], overstep: f32) -> Vec<PackedNode> {
+        let mut out = Vec::new();
+        let history = StrandHistory { positions: history.to_vec() };
+        let bonds = Bonds::default();
+        pack_guide(&mut out, strand, &history, &bonds, None, overstep);
+        out
+    }
+
+    fn place(node: &PackedNode) -> Vec3 {
+        Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
+    }
+
+    #[test]
+    fn nodes_are_drawn_between_the_last_two_ticks() {
+        let strand = Strand::from_polyline(&[Vec3::ZERO, Vec3::X, Vec3::X * 2.0]).unwrap();
+        let before = [Vec3::ZERO, Vec3::Y, Vec3::Y * 2.0];
+        let nodes = packed(&strand, &before, 0.25);
+        assert_eq!(place(&nodes[1]), Vec3::new(0.25, 0.75, 0.0));
+        assert_eq!(place(&packed(&strand, &[], 0.25)[2]), Vec3::X * 2.0);
+        assert_eq!(place(&packed(&strand, &before[..2], 0.25)[2]), Vec3::X * 2.0);
+    }
+
+    #[test]
+    fn broken_nodes_take_the_place_of_the_one_before() {
+        let mut strand = Strand::from_polyline(&[Vec3::ZERO, Vec3::X, Vec3::X * 2.0]).unwrap();
+        strand.positions_mut()[1] = Vec3::NAN;
+        let nodes = packed(&strand, &[], 1.0);
+        assert_eq!(place(&nodes[1]), Vec3::ZERO);
+        assert!(nodes.iter().all(|n| n[4] != f32::NAN.to_bits()));
+        strand.positions_mut().fill(Vec3::INFINITY);
+        assert!(packed(&strand, &[], 1.0).iter().all(|n| n[7] == 0));
+    }
+
+    #[test]
+    fn rates_are_bytes() {
+        assert_eq!(unorm8([0.0, 1.0, 0.5, f32::NAN]), 0x0080_ff00);
+    }
+}

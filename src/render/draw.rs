@@ -1,0 +1,250 @@
+//! From strands to what is drawn, once a frame.
+
+use super::{
+    HairFollowers, HairLook, HairView, WetLook,
+    buffers::{HairBuffers, PackedNode, pack_guide, pack_strands},
+    followers::{DrawnStrand, GuideRoot, scatter},
+    material::{Ribbon, RibbonMaterial, ribbon_mesh},
+};
+use crate::{
+    bond::Bonds,
+    setting::Settings,
+    strand::{Hair, Strand, StrandHistory, Strands},
+};
+use bevy::{
+    asset::RenderAssetUsages,
+    camera::{primitives::Aabb, visibility::NoAutoAabb},
+    prelude::*,
+    render::storage::ShaderBuffer,
+};
+
+/// Whether drawing goes between ticks by the overstep of the fixed clock.
+#[derive(Resource, Clone, Copy, Debug)]
+pub(super) struct Interpolate(pub(super) bool);
+
+/// What was packed for a hair, kept so that nothing is allocated again.
+#[derive(Component, Clone, Debug, Default)]
+pub(super) struct Packed {
+    pub(super) nodes: Vec<PackedNode>,
+    /// The strands that are guides, with their numbers of nodes.
+    layout: Vec<(Entity, u32)>,
+    followers: Option<HairFollowers>,
+    centre: Vec3,
+    /// How far followers reach beyond the guides (m).
+    margin: f32,
+    ribbon: Ribbon,
+}
+
+type GuideParts =
+    (&'static Strand, &'static StrandHistory, &'static Bonds, Option<&'static WetLook>);
+
+/// Hair that appeared, and hair that is no more.
+pub(super) fn appear(
+    mut commands: Commands,
+    hairs: Query<Entity, (With<Hair>, Without<Packed>)>,
+    bald: Query<(Entity, Option<&HairBuffers>), (With<Packed>, Without<Hair>)>,
+) {
+    for hair in &hairs {
+        commands.entity(hair).insert(Packed::default());
+    }
+    for (entity, buffers) in &bald {
+        if let Some(buffers) = buffers {
+            commands.entity(buffers.drawn).try_despawn();
+        }
+        commands.entity(entity).remove::<(Packed, HairBuffers)>();
+    }
+}
+
+/// Packs all nodes where they are drawn in this frame; when the groom has changed, what depends on
+/// it is made anew.
+pub(super) fn pack(
+    mut commands: Commands,
+    mut hairs: Query<(
+        Entity,
+        &mut Packed,
+        Option<&mut HairBuffers>,
+        Option<&Strands>,
+        &GlobalTransform,
+    )>,
+    strands: Query<GuideParts>,
+    mut drawn: Query<(&mut Aabb, &mut Mesh3d, &MeshMaterial3d<RibbonMaterial>)>,
+    (looks, views, followers): (Settings<HairLook>, Settings<HairView>, Settings<HairFollowers>),
+    (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<RibbonMaterial>>,
+    mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
+) {
+    let overstep = match time {
+        Some(time) if interpolate.0 => time.overstep_fraction().clamp(0.0, 1.0),
+        _ => 1.0,
+    };
+    for (hair, mut packed, buffers, members, place) in &mut hairs {
+        let packed = packed.bypass_change_detection();
+        let guides = || members.into_iter().flat_map(|m| m.iter());
+        let settings = followers.of(hair);
+        let regroomed = packed.note_layout(guides(), &strands, &settings);
+
+        packed.nodes.clear();
+        let mut bounds: Option<(Vec3, Vec3)> = None;
+        for (guide, _) in &packed.layout {
+            let Ok((strand, history, bonds, wet)) = strands.get(*guide) else {
+                continue;
+            };
+            let own = pack_guide(&mut packed.nodes, strand, history, bonds, wet, overstep);
+            bounds = match (bounds, own) {
+                (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
+                (a, b) => a.or(b),
+            };
+        }
+        let (low, high) = bounds.unwrap_or_default();
+        let aabb = Aabb::from_min_max(low - packed.margin, high + packed.margin);
+        let look = looks.of(hair);
+        let view = views.of(hair);
+
+        let known = buffers.as_ref().and_then(|b| drawn.get_mut(b.drawn).ok().zip(Some(b)));
+        if packed.layout.is_empty() {
+            if let Some(buffers) = &buffers {
+                commands.entity(buffers.drawn).try_despawn();
+                commands.entity(hair).remove::<HairBuffers>();
+            }
+            continue;
+        }
+        if !regroomed && let Some(((mut bounds, _, material), buffers)) = known {
+            bounds.set_if_neq(aabb);
+            let counts = (buffers.guide_count, buffers.strand_count);
+            let ribbon = packed.ribbon(&look, &settings, view, counts);
+            if packed.ribbon != ribbon {
+                packed.ribbon = ribbon;
+                if let Some(mut material) = materials.get_mut(&material.0) {
+                    material.ribbon = ribbon;
+                }
+            }
+            continue;
+        }
+
+        let strands = packed.scatter(&strands, &settings);
+        let counts = (packed.layout.len() as u32, strands.len() as u32);
+        packed.ribbon = packed.ribbon(&look, &settings, view, counts);
+        let mut first = 0;
+        let ranges = packed.layout.iter().map(|(_, nodes)| {
+            first += nodes;
+            [first - nodes, *nodes]
+        });
+        let ranges: Vec<[u32; 2]> = ranges.collect();
+        let mut add = |bytes: &[u8]| {
+            shader_buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::RENDER_WORLD))
+        };
+        let material = RibbonMaterial {
+            ribbon: packed.ribbon,
+            nodes: add(bytemuck::cast_slice(&packed.nodes)),
+            guides: add(bytemuck::cast_slice(&ranges)),
+            strands: add(&pack_strands(&strands)),
+        };
+        let new = HairBuffers {
+            nodes: material.nodes.clone(),
+            guides: material.guides.clone(),
+            strands: material.strands.clone(),
+            guide_count: counts.0,
+            strand_count: counts.1,
+            drawn: Entity::PLACEHOLDER,
+        };
+        let mesh = meshes.add(ribbon_mesh(counts.1, settings.segments));
+        if let Some(old) = buffers {
+            commands.entity(old.drawn).try_despawn();
+        }
+        let child = commands.spawn((
+            Name::new("drawn hair"),
+            Mesh3d(mesh),
+            MeshMaterial3d(materials.add(material)),
+            aabb,
+            NoAutoAabb,
+            // Transforms have been propagated already in this frame.
+            *place,
+            ChildOf(hair),
+        ));
+        let drawn = child.id();
+        commands.entity(hair).insert(HairBuffers { drawn, ..new });
+    }
+}
+
+impl Packed {
+    /// Notes which strands are guides; says whether that, or how they are followed, has changed.
+    fn note_layout(
+        &mut self,
+        members: impl Iterator<Item = Entity>,
+        strands: &Query<GuideParts>,
+        followers: &HairFollowers,
+    ) -> bool {
+        let mut count = 0;
+        let mut changed = false;
+        for guide in members {
+            let Ok((strand, ..)) = strands.get(guide) else {
+                continue;
+            };
+            if strand.nodes() < 2 {
+                continue;
+            }
+            let entry = (guide, strand.nodes() as u32);
+            match self.layout.get_mut(count) {
+                Some(known) if *known == entry => {}
+                Some(known) => {
+                    *known = entry;
+                    changed = true;
+                }
+                None => {
+                    self.layout.push(entry);
+                    changed = true;
+                }
+            }
+            count += 1;
+        }
+        changed |= count != self.layout.len();
+        self.layout.truncate(count);
+        // What the shader reads from the uniform needs no new strands.
+        let grown = |f: &HairFollowers| HairFollowers { clump: 0.0, parting: 0.0, ..*f };
+        changed |= self.followers.as_ref().map(grown) != Some(grown(followers));
+        self.followers = Some(*followers);
+        changed
+    }
+
+    /// Decides which strands are drawn.
+    fn scatter(
+        &mut self,
+        strands: &Query<GuideParts>,
+        followers: &HairFollowers,
+    ) -> Vec<DrawnStrand> {
+        let roots: Vec<GuideRoot> = (self.layout.iter())
+            .map(|(guide, _)| {
+                let Ok((strand, ..)) = strands.get(*guide) else {
+                    return GuideRoot::default();
+                };
+                GuideRoot {
+                    place: strand.positions()[0],
+                    normal: strand.root_frame() * Vec3::Z,
+                    length: strand.length(),
+                }
+            })
+            .collect();
+        let usable = || roots.iter().map(|r| r.place).filter(|p| p.is_finite());
+        self.centre = usable().sum::<Vec3>() / usable().count().max(1) as f32;
+        let drawn = scatter(&roots, followers);
+        let reach = |strand: &DrawnStrand| {
+            let own = roots[strand.guides[0] as usize].place;
+            let apart = |k: usize| roots[strand.guides[k] as usize].place.distance(own);
+            let reach = apart(1).max(apart(2)) + strand.root.length() + strand.stray.length();
+            if reach.is_finite() { reach } else { 0.0 }
+        };
+        self.margin = drawn.iter().map(reach).fold(0.005, f32::max);
+        drawn
+    }
+
+    fn ribbon(
+        &self,
+        look: &HairLook,
+        followers: &HairFollowers,
+        view: HairView,
+        (guides, strands): (u32, u32),
+    ) -> Ribbon {
+        Ribbon::new(look, followers, view, self.centre, guides, strands)
+    }
+}

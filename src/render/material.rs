@@ -1,0 +1,158 @@
+//! The material that draws ribbons, and the mesh that counts them.
+
+use super::{HairFollowers, HairLook, HairShading, HairView};
+use bevy::{
+    asset::RenderAssetUsages,
+    material::OpaqueRendererMethod,
+    mesh::{
+        Indices, MeshVertexAttribute, MeshVertexBufferLayoutRef, PrimitiveTopology,
+        VertexAttributeValues, VertexFormat,
+    },
+    pbr::{MaterialPipeline, MaterialPipelineKey},
+    prelude::*,
+    render::{
+        render_resource::{
+            AsBindGroup, RenderPipelineDescriptor, ShaderType, SpecializedMeshPipelineError,
+        },
+        storage::ShaderBuffer,
+    },
+    shader::{ShaderDefVal, ShaderRef},
+};
+
+/// The material of drawn hair; made and kept up to date from [`HairLook`], [`HairFollowers`] and
+/// [`HairView`], which a game edits instead.
+#[derive(Asset, AsBindGroup, TypePath, Clone, Debug)]
+pub(super) struct RibbonMaterial {
+    #[uniform(0)]
+    pub(super) ribbon: Ribbon,
+    #[storage(1, read_only)]
+    pub(super) nodes: Handle<ShaderBuffer>,
+    #[storage(2, read_only)]
+    pub(super) guides: Handle<ShaderBuffer>,
+    #[storage(3, read_only)]
+    pub(super) strands: Handle<ShaderBuffer>,
+}
+
+/// `Ribbon` of `strands.wgsl`.
+#[derive(ShaderType, Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Ribbon {
+    root_color: Vec3,
+    variation: f32,
+    tip_color: Vec3,
+    root_shade: f32,
+    centre: Vec3,
+    width: f32,
+    taper: f32,
+    roughness: f32,
+    gloss: f32,
+    backlight: f32,
+    self_shadow: f32,
+    clump: f32,
+    parting: f32,
+    shading: u32,
+    segments: u32,
+    guides: u32,
+    strands: u32,
+    view: u32,
+}
+
+impl Ribbon {
+    pub(super) fn new(
+        look: &HairLook,
+        followers: &HairFollowers,
+        view: HairView,
+        centre: Vec3,
+        guides: u32,
+        strands: u32,
+    ) -> Self {
+        let (root_color, tip_color) = look.colors();
+        Self {
+            root_color,
+            variation: look.variation,
+            tip_color,
+            root_shade: look.root_shade,
+            centre,
+            width: look.width,
+            taper: look.taper,
+            roughness: look.roughness,
+            gloss: look.gloss,
+            backlight: look.backlight,
+            self_shadow: look.self_shadow,
+            clump: followers.clump,
+            parting: followers.parting,
+            shading: match look.shading {
+                HairShading::Fibre => 0,
+                HairShading::KajiyaKay => 1,
+            },
+            segments: followers.segments,
+            guides,
+            strands,
+            view: view.number(),
+        }
+    }
+}
+
+const FORWARD: &str = "embedded://bevy_keratin/render/ribbon_forward.wgsl";
+const PREPASS: &str = "embedded://bevy_keratin/render/ribbon_prepass.wgsl";
+
+/// Which corner of which ring of which strand a vertex is. An attribute rather than the vertex
+/// index, because that counts from wherever Bevy put the mesh.
+const CORNER: MeshVertexAttribute =
+    MeshVertexAttribute::new("Hair_Corner", 0x6b65_7261_7469_6e01, VertexFormat::Uint32);
+
+impl Material for RibbonMaterial {
+    fn vertex_shader() -> ShaderRef {
+        FORWARD.into()
+    }
+
+    fn fragment_shader() -> ShaderRef {
+        FORWARD.into()
+    }
+
+    fn prepass_vertex_shader() -> ShaderRef {
+        PREPASS.into()
+    }
+
+    fn opaque_render_method(&self) -> OpaqueRendererMethod {
+        OpaqueRendererMethod::Forward
+    }
+
+    // A prepass would have to leave out the very samples that the forward pass leaves out.
+    fn enable_prepass() -> bool {
+        false
+    }
+
+    fn specialize(
+        _: &MaterialPipeline,
+        descriptor: &mut RenderPipelineDescriptor,
+        layout: &MeshVertexBufferLayoutRef,
+        _: MaterialPipelineKey<Self>,
+    ) -> Result<(), SpecializedMeshPipelineError> {
+        descriptor.vertex.buffers = vec![layout.0.get_layout(&[CORNER.at_shader_location(0)])?];
+        descriptor.primitive.cull_mode = None;
+        let samples = descriptor.multisample.count;
+        if let Some(fragment) = &mut descriptor.fragment
+            && samples > 1
+        {
+            let samples = ShaderDefVal::UInt("HAIR_SAMPLES".into(), samples);
+            fragment.shader_defs.push(samples);
+        }
+        Ok(())
+    }
+}
+
+/// A mesh of nothing but counted corners: two for each ring of each strand.
+pub(super) fn ribbon_mesh(strands: u32, segments: u32) -> Mesh {
+    let per_strand = 2 * (segments + 1);
+    let corners: Vec<u32> = (0..strands * per_strand).collect();
+    let mut indices = Vec::with_capacity((strands * segments * 6) as usize);
+    for strand in 0..strands {
+        for ring in 0..segments {
+            let a = strand * per_strand + 2 * ring;
+            indices.extend([a, a + 1, a + 2, a + 2, a + 1, a + 3]);
+        }
+    }
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        .with_inserted_attribute(CORNER, VertexAttributeValues::Uint32(corners))
+        .with_inserted_indices(Indices::U32(indices))
+}

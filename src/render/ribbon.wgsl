@@ -1,0 +1,76 @@
+// Camera-facing ribbons by vertex pulling: what the forward and the shadow pass share.
+#define_import_path bevy_keratin::ribbon
+
+#import bevy_pbr::mesh_functions
+#import bevy_pbr::mesh_view_bindings::view
+#import bevy_keratin::strands::{ribbon, strands, strand_point, strand_state, hash, StrandState, DrawnStrand}
+
+const VIEW_GUIDES: u32 = 6u;
+
+struct RibbonVertex {
+    world_position: vec3<f32>,
+    tangent: vec3<f32>,
+    // Away from the head, across the strand: stands for the surface that many strands make up.
+    outward: vec3<f32>,
+    // 0 root ... 1 tip.
+    along: f32,
+    // How much of its drawn width the strand really has, where it is thinner than a pixel.
+    coverage: f32,
+    seed: u32,
+    state: StrandState,
+    shown: bool,
+}
+
+// The pixel size (m) where clip.w is `w`: right for perspective and orthographic cameras.
+fn pixel_size(w: f32) -> f32 {
+    return 2.0 * abs(w) / (abs(view.clip_from_view[1][1]) * max(view.viewport.w, 1.0));
+}
+
+fn toward_eye(position: vec3<f32>) -> vec3<f32> {
+    if view.clip_from_view[3][3] == 1.0 {
+        return normalize(view.world_from_view[2].xyz);
+    }
+    return normalize(view.world_position - position);
+}
+
+fn safe_normalize(v: vec3<f32>, otherwise: vec3<f32>) -> vec3<f32> {
+    let square = dot(v, v);
+    return select(otherwise, v * inverseSqrt(max(square, 1e-30)), square > 1e-20);
+}
+
+// `corner` counts through all strands: two for each ring of each strand.
+fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
+    var out: RibbonVertex;
+    let per_strand = 2u * (ribbon.segments + 1u);
+    let index = corner / per_strand;
+    if index >= ribbon.strands || (ribbon.view == VIEW_GUIDES && index >= ribbon.guides) {
+        return out;
+    }
+    let strand = strands[index];
+    let in_strand = corner - index * per_strand;
+    out.along = f32(in_strand / 2u) / f32(ribbon.segments);
+    let side = f32(in_strand & 1u) - 0.5;
+    let point = strand_point(strand, out.along);
+    if all(point.weights == vec3(0.0)) {
+        return out;
+    }
+    out.shown = true;
+    out.seed = strand.seed;
+    out.state = strand_state(strand, point);
+
+    let world = mesh_functions::get_world_from_local(instance);
+    let linear = mat3x3(world[0].xyz, world[1].xyz, world[2].xyz);
+    let scale = pow(abs(determinant(linear)), 1.0 / 3.0);
+    let center = (world * vec4(point.position, 1.0)).xyz;
+    out.tangent = safe_normalize(linear * point.slope, vec3(0.0, 1.0, 0.0));
+    let from_centre = center - (world * vec4(ribbon.centre, 1.0)).xyz;
+    let eye = toward_eye(center);
+    out.outward = safe_normalize(from_centre - out.tangent * dot(from_centre, out.tangent), eye);
+
+    let pixel = pixel_size((view.clip_from_world * vec4(center, 1.0)).w);
+    let width = scale * ribbon.width * mix(1.0, ribbon.taper, out.along * out.along);
+    out.coverage = saturate(width / max(pixel, 1e-9));
+    let across = safe_normalize(cross(out.tangent, eye), normalize(view.world_from_view[0].xyz));
+    out.world_position = center + across * (side * max(width, pixel));
+    return out;
+}

@@ -1,0 +1,106 @@
+// Hair as the camera sees it.
+
+#import bevy_pbr::view_transformations::position_world_to_clip
+#import bevy_pbr::mesh_view_bindings::view
+#import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
+#import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
+#import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, VIEW_GUIDES}
+#import bevy_keratin::strands::{ribbon, hash}
+#import bevy_keratin::shading::{Fibre, lit_hair}
+
+const VIEW_NATURAL: u32 = 0u;
+const VIEW_STRAIN: u32 = 5u;
+const VIEW_MOISTURE: u32 = 7u;
+// The strain that is drawn red.
+const STRAIN_FULL: f32 = 0.05;
+
+struct ForwardVertex {
+    @builtin(position) position: vec4<f32>,
+    @location(0) world_position: vec3<f32>,
+    @location(1) tangent: vec3<f32>,
+    @location(2) outward: vec3<f32>,
+    // Along the strand, coverage, value of the heat map, moisture.
+    @location(3) along: vec4<f32>,
+    @location(4) @interpolate(flat) seed: u32,
+}
+
+@vertex
+fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> ForwardVertex {
+    var out: ForwardVertex;
+    let vertex = ribbon_vertex(corner, instance);
+    if !vertex.shown {
+        out.position = vec4(0.0, 0.0, 0.0, 1.0);
+        return out;
+    }
+    out.world_position = vertex.world_position;
+    out.position = position_world_to_clip(vertex.world_position);
+    out.tangent = vertex.tangent;
+    out.outward = vertex.outward;
+    out.seed = vertex.seed;
+    var value = 0.0;
+    switch ribbon.view {
+        case 1u, 2u, 3u, 4u: { value = vertex.state.rates[ribbon.view - 1u]; }
+        case 5u: { value = vertex.state.strain / STRAIN_FULL; }
+        case 7u: { value = vertex.state.moisture; }
+        default: {}
+    }
+    out.along = vec4(vertex.along, vertex.coverage, value, vertex.state.moisture);
+    return out;
+}
+
+// Blue 0, red 1, over a pale violet. Rust twin: `heat`.
+fn heat(value: f32) -> vec3<f32> {
+    let v = saturate(value);
+    let srgb = vec3(v, 1.6 * v * (1.0 - v), 1.0 - v);
+    return pow(srgb, vec3(2.2));
+}
+
+struct ForwardColor {
+    @location(0) color: vec4<f32>,
+#ifdef HAIR_SAMPLES
+    @builtin(sample_mask) samples: u32,
+#endif
+}
+
+@fragment
+fn fragment(in: ForwardVertex) -> ForwardColor {
+    var out: ForwardColor;
+    let coverage = in.along.y;
+#ifdef HAIR_SAMPLES
+    // As many samples as the strand covers, others for each strand, the same in every frame.
+    let samples = #{HAIR_SAMPLES}u;
+    let part = coverage * f32(samples) + hash(in.seed);
+    let count = clamp(u32(part), 0u, samples);
+    let turn = u32(hash(in.seed + 1u) * f32(samples));
+    let run = (1u << count) - 1u;
+    out.samples = ((run << turn) | (run >> (samples - turn))) & ((1u << samples) - 1u);
+#else
+    // Without samples to share, fewer strands stand for all.
+    if hash(in.seed) >= max(coverage, 0.05) {
+        discard;
+    }
+#endif
+
+    if ribbon.view != VIEW_NATURAL && ribbon.view != VIEW_GUIDES {
+        out.color = vec4(heat(in.along.z), 1.0);
+        return out;
+    }
+
+    var fibre: Fibre;
+    fibre.position = in.world_position;
+    fibre.frag_coord = in.position;
+    fibre.tangent = normalize(in.tangent);
+    fibre.eye = toward_eye(in.world_position);
+    fibre.outward = normalize(in.outward);
+    fibre.along = in.along.x;
+    fibre.seed = in.seed;
+    fibre.moisture = saturate(in.along.w);
+    let lit = lit_hair(fibre);
+
+    var pbr = pbr_input_new();
+    pbr.frag_coord = in.position;
+    pbr.world_position = vec4(in.world_position, 1.0);
+    pbr.material.flags |= STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT;
+    out.color = main_pass_post_lighting_processing(pbr, vec4(lit, 1.0));
+    return out;
+}

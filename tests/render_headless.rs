@@ -1,0 +1,65 @@
+//! Without a renderer the plugin does nothing, and breaks nothing.
+
+mod common;
+
+use bevy::{
+    asset::AssetPlugin,
+    prelude::*,
+    render::{RenderPlugin, settings::WgpuSettings},
+};
+use bevy_keratin::{prelude::*, render::HairBuffers};
+use common::{one_strand, test_app};
+
+#[test]
+fn minimal_plugins_draw_nothing_and_panic_nowhere() {
+    let mut app = test_app(60.0);
+    let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+    common::run(&mut app, 0.2);
+    assert!(app.world().get::<HairBuffers>(hair).is_none());
+    app.world_mut().despawn(hair);
+    common::run(&mut app, 0.1);
+}
+
+#[test]
+fn assets_without_a_renderer_are_fine() {
+    for hair_first in [true, false] {
+        let mut app = App::new();
+        if hair_first {
+            app.add_plugins((HairPlugins::default(), MinimalPlugins, AssetPlugin::default()));
+        } else {
+            app.add_plugins((MinimalPlugins, AssetPlugin::default(), HairPlugins::default()));
+        }
+        let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+        app.finish();
+        app.cleanup();
+        app.update();
+        assert!(app.world().get::<HairBuffers>(hair).is_none());
+    }
+}
+
+#[test]
+fn a_renderer_without_a_device_is_fine() {
+    for hair_first in [true, false] {
+        let render = RenderPlugin {
+            render_creation: WgpuSettings { backends: None, ..default() }.into(),
+            ..default()
+        };
+        let bevy = DefaultPlugins
+            .set(render)
+            .disable::<bevy::winit::WinitPlugin>()
+            .disable::<bevy::log::LogPlugin>();
+        let mut app = App::new();
+        if hair_first {
+            app.add_plugins((HairPlugins::default(), bevy));
+        } else {
+            app.add_plugins((bevy, HairPlugins::default()));
+        }
+        let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+        app.finish();
+        app.cleanup();
+        for _ in 0..3 {
+            app.update();
+        }
+        assert!(app.world().get::<Strands>(hair).is_some());
+    }
+}

@@ -1,0 +1,76 @@
+//! Pictures to look at, not run by default:
+//! `cargo test --test render_pictures -- --ignored --nocapture`, then open the files in /tmp.
+
+mod common;
+#[path = "common/offscreen.rs"]
+mod offscreen;
+
+use bevy::{light::CascadeShadowConfigBuilder, prelude::*};
+use bevy_keratin::{prelude::*, render::*};
+use offscreen::{Offscreen, head_of_guides};
+
+fn studio(scene: &mut Offscreen) {
+    let world = scene.app.world_mut();
+    let ball = world.resource_mut::<Assets<Mesh>>().add(Sphere::new(0.09));
+    let skin = StandardMaterial {
+        base_color: Color::srgb(0.8, 0.6, 0.5),
+        perceptual_roughness: 0.6,
+        ..default()
+    };
+    let skin = world.resource_mut::<Assets<StandardMaterial>>().add(skin);
+    world.spawn((Mesh3d(ball), MeshMaterial3d(skin)));
+    let light = |at: Vec3, lux: f32, color: Color, shadows: bool| {
+        (
+            DirectionalLight { illuminance: lux, color, shadow_maps_enabled: shadows, ..default() },
+            CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 2.0, ..default() }
+                .build(),
+            Transform::from_translation(at).looking_at(Vec3::ZERO, Vec3::Y),
+        )
+    };
+    world.spawn(light(Vec3::new(1.0, 1.6, 1.4), 9000.0, Color::srgb(1.0, 0.95, 0.88), true));
+    world.spawn(light(Vec3::new(-1.6, 0.4, 0.9), 2500.0, Color::srgb(0.8, 0.88, 1.0), false));
+    world.spawn(light(Vec3::new(-0.5, 1.2, -1.6), 9000.0, Color::WHITE, true));
+    world.insert_resource(GlobalAmbientLight { brightness: 350.0, ..default() });
+    world.insert_resource(ClearColor(Color::srgb(0.18, 0.19, 0.21)));
+    scene.look(Vec3::new(0.12, 0.06, 0.62), Vec3::new(0.0, -0.05, 0.0));
+}
+
+fn groom(scene: &mut Offscreen, guides: usize) -> Entity {
+    let world = scene.app.world_mut();
+    let hair = world.spawn(Hair).id();
+    for points in head_of_guides(guides, 0.09, 0.26, 14) {
+        world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    hair
+}
+
+#[test]
+#[ignore = "writes pictures"]
+fn studio_pictures() {
+    let Some(mut scene) = Offscreen::new(400, 400) else {
+        return;
+    };
+    studio(&mut scene);
+    let hair = groom(&mut scene, 220);
+    let views = [
+        ("brown", HairLook::default(), 5_000, HairView::Natural),
+        ("guides", HairLook::default(), 0, HairView::Natural),
+        ("blond", HairLook { melanin: Melanin::BLOND, ..default() }, 5_000, HairView::Natural),
+        (
+            "red_kajiya",
+            HairLook { melanin: Melanin::RED, shading: HairShading::KajiyaKay, ..default() },
+            5_000,
+            HairView::Natural,
+        ),
+        ("heat", HairLook::default(), 5_000, HairView::Bond(BondKind::Hydrogen)),
+    ];
+    for (name, look, count, view) in views {
+        let followers = HairFollowers::new(count);
+        scene.app.world_mut().entity_mut(hair).insert((look, followers, view));
+        let start = std::time::Instant::now();
+        let picture = scene.draw();
+        println!("{name}: {:?} for 4 or more frames", start.elapsed());
+        println!("{:#?}", scene.unready_pipelines());
+        picture.save(&format!("/tmp/hair_{name}.png"));
+    }
+}
