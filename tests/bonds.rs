@@ -75,3 +75,113 @@ fn water_set_keeps_the_hydrogen_share_at_any_rate_and_iterations() {
         near(kept(&app, e, &held), 0.33);
     }
 }
+
+#[test]
+fn half_dried_keeps_its_weighted_share() {
+    let (mut app, e, held) = bent(60.0, 5, 0.4);
+    set(&mut app, e, BondKind::Hydrogen, 0.0);
+    set(&mut app, e, BondKind::Hydrogen, 0.5);
+    release(&mut app, e);
+    near(kept(&app, e, &held), 0.33 * 0.5 / (0.33 * 0.5 + 0.67));
+    near(kept(&app, e, &held), 0.1976);
+}
+
+#[test]
+fn never_cut_or_never_reformed_keeps_nothing() {
+    let (mut app, e, held) = bent(60.0, 5, 0.4);
+    release(&mut app, e);
+    near(kept(&app, e, &held), 0.0);
+    let (mut app, e, held) = bent(60.0, 5, 0.4);
+    treat(&mut app, Treat::wet(e));
+    release(&mut app, e);
+    near(kept(&app, e, &held), 0.0);
+}
+
+fn permed() -> (App, Entity, Vec<Vec3>) {
+    let (mut app, e, held) = bent(60.0, 5, 0.6);
+    treat(&mut app, Treat::lotion(e));
+    treat(&mut app, Treat::neutraliser(e).over(0.05));
+    treat(&mut app, Treat::dry(e).over(0.05));
+    release(&mut app, e);
+    (app, e, held)
+}
+
+#[test]
+fn a_perm_keeps_two_thirds_and_survives_washing_in_part() {
+    let (mut app, e, held) = permed();
+    near(kept(&app, e, &held), 0.67);
+    // washed: only disulfide and peptide bonds are left to decide
+    treat(&mut app, Treat::shampoo(e));
+    run(&mut app, 4.0);
+    near(kept(&app, e, &held), 0.04 / 0.37);
+    // dried free, it stays where it is
+    treat(&mut app, Treat::neutraliser(e));
+    treat(&mut app, Treat::dry(e));
+    run(&mut app, 4.0);
+    near(kept(&app, e, &held), 0.10811);
+}
+
+#[test]
+fn a_perm_washed_and_dried_straight_keeps_the_disulfide_part() {
+    let (mut app, e, held) = permed();
+    treat(&mut app, Treat::shampoo(e));
+    hold_arc(&mut app, e, 0.0);
+    run(&mut app, 0.5);
+    treat(&mut app, Treat::neutraliser(e));
+    treat(&mut app, Treat::dry(e));
+    release(&mut app, e);
+    near(kept(&app, e, &held), 0.04);
+}
+
+#[test]
+fn a_water_set_of_hydrogen_and_ionic_bonds_keeps_63_percent() {
+    let (mut app, e, held) = bent(60.0, 5, 0.6);
+    treat(&mut app, Treat::shampoo(e));
+    treat(&mut app, Treat::neutraliser(e));
+    treat(&mut app, Treat::dry(e));
+    release(&mut app, e);
+    near(kept(&app, e, &held), 0.63);
+}
+
+#[test]
+fn a_set_is_not_mirrored_from_the_other_side() {
+    // +45° per joint, water-set, then started from −22°: a three-component sign test would find the
+    // mirror image nearer.
+    let (mut app, e, held) = bent(60.0, 5, 45_f32.to_radians());
+    treat(&mut app, Treat::wet(e));
+    treat(&mut app, Treat::dry(e));
+    let mirrored = Vec3::X * (-0.5 * 22_f32.to_radians()).sin();
+    app.world_mut().entity_mut(e).remove::<HeldNodes>();
+    let mut strand = app.world_mut().get_mut::<Strand>(e).unwrap();
+    let edges = strand.edges();
+    strand.pose(core::iter::repeat_n(mirrored, edges));
+    run(&mut app, 4.0);
+    near(kept(&app, e, &held), 0.33);
+}
+
+#[test]
+fn treatments_reach_only_their_joints_and_never_the_backbone() {
+    let mut app = test_app(60.0);
+    let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+    app.update();
+    app.world_mut().write_message(Treat::wet(hair).joints(2..4));
+    app.world_mut().write_message(Treat::set(hair, BondKind::Peptide, 0.0).unwrap());
+    app.update();
+    let bonds = app.world().get::<Bonds>(e).unwrap();
+    let hydrogen: Vec<f32> = bonds.rates(BondKind::Hydrogen).collect();
+    assert_eq!(hydrogen, [1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
+    assert!(bonds.rates(BondKind::Peptide).all(|b| b == 1.0));
+}
+
+#[test]
+fn a_slow_treatment_takes_its_time() {
+    let mut app = test_app(60.0);
+    let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+    app.update();
+    app.world_mut().write_message(Treat::wet(hair).over(2.0));
+    run(&mut app, 1.0);
+    let rate = app.world().get::<Bonds>(e).unwrap().joints[3].rates[0];
+    assert!((rate - 0.5).abs() < 0.01, "half way at half time, not {rate}");
+    run(&mut app, 1.1);
+    assert_eq!(app.world().get::<Bonds>(e).unwrap().joints[3].rates[0], 0.0);
+}

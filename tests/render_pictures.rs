@@ -44,33 +44,64 @@ fn groom(scene: &mut Offscreen, guides: usize) -> Entity {
     hair
 }
 
+/// A setting of the pictures, from the environment.
+fn setting<T: std::str::FromStr>(name: &str, otherwise: T) -> T {
+    let given = std::env::var(name).ok().and_then(|v| v.parse().ok());
+    given.unwrap_or(otherwise)
+}
+
 #[test]
 #[ignore = "writes pictures"]
 fn studio_pictures() {
-    let Some(mut scene) = Offscreen::new(400, 400) else {
+    let size = setting("SIZE", 400);
+    let Some(mut scene) = Offscreen::new(size, size) else {
         return;
     };
     studio(&mut scene);
-    let hair = groom(&mut scene, 220);
+    let hair = groom(&mut scene, setting("GUIDES", 220));
+    let count = setting("FOLLOWERS", 5000);
+    let only: String = setting("ONLY", String::new());
+    let msaa = match setting("MSAA", 4) {
+        4 => Msaa::Sample4,
+        _ => Msaa::Off,
+    };
+    let camera = scene.camera;
+    scene
+        .app
+        .world_mut()
+        .entity_mut(camera)
+        .insert((msaa, bevy::light::ShadowFilteringMethod::Hardware2x2));
+    if setting("SHADOWS", 1) == 0 {
+        let world = scene.app.world_mut();
+        for mut light in world.query::<&mut DirectionalLight>().iter_mut(world) {
+            light.shadow_maps_enabled = false;
+        }
+    }
+    let of = |melanin| HairLook { melanin, ..default() };
+    let kajiya = HairLook { melanin: Melanin::RED, shading: HairShading::KajiyaKay, ..default() };
     let views = [
-        ("brown", HairLook::default(), 5_000, HairView::Natural),
+        ("brown", HairLook::default(), count, HairView::Natural),
         ("guides", HairLook::default(), 0, HairView::Natural),
-        ("blond", HairLook { melanin: Melanin::BLOND, ..default() }, 5_000, HairView::Natural),
-        (
-            "red_kajiya",
-            HairLook { melanin: Melanin::RED, shading: HairShading::KajiyaKay, ..default() },
-            5_000,
-            HairView::Natural,
-        ),
-        ("heat", HairLook::default(), 5_000, HairView::Bond(BondKind::Hydrogen)),
+        ("black", of(Melanin::BLACK), count, HairView::Natural),
+        ("blond", of(Melanin::BLOND), count, HairView::Natural),
+        ("red", of(Melanin::RED), count, HairView::Natural),
+        ("kajiya", kajiya, count, HairView::Natural),
+        ("heat", HairLook::default(), count, HairView::Bond(BondKind::Hydrogen)),
     ];
     for (name, look, count, view) in views {
+        if !only.is_empty() && !only.split(',').any(|o| o == name) {
+            continue;
+        }
         let followers = HairFollowers::new(count);
         scene.app.world_mut().entity_mut(hair).insert((look, followers, view));
+        scene.app.update();
+        scene.app.update();
         let start = std::time::Instant::now();
-        let picture = scene.draw();
-        println!("{name}: {:?} for 4 or more frames", start.elapsed());
-        println!("{:#?}", scene.unready_pipelines());
+        let picture = scene.draw_now();
+        println!("{name}: {:?} for two frames", start.elapsed());
+        for pipeline in scene.unready_pipelines() {
+            println!("{pipeline}");
+        }
         picture.save(&format!("/tmp/hair_{name}.png"));
     }
 }

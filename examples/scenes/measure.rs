@@ -41,7 +41,7 @@ pub fn curl_radius(shapes: &[Vec<Vec3>], held: &[Vec<Vec3>], segment: f32) -> Op
         }
     }
     let mean = sum / f64::from(n.max(1));
-    (n > 0 && mean < 1e3).then_some(mean)
+    (n > 0 && mean < 10.0).then_some(mean)
 }
 
 /// How many turns a strand makes from root to tip, on average: the angle of all its joints' rotation

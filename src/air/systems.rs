@@ -82,9 +82,14 @@ pub(crate) fn apply_air(
     }
     for_each(&mut items, |(air, strand, changes, received)| {
         let air = &airs[*air];
-        let (positions, velocities, ..) = strand.bypass_change_detection().parts_mut();
+        let (positions, velocities, _, spins) = strand.bypass_change_detection().parts_mut();
         for v in velocities.iter_mut() {
             *v = *v * air.keep + air.gravity;
+        }
+        // Edges carry rotary inertia of their own, much of it on fine stiff strands: air that slowed
+        // the nodes alone would leave them ringing.
+        for spin in spins {
+            *spin *= air.keep;
         }
         if air.blowers.is_empty() {
             return;

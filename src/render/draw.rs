@@ -4,7 +4,7 @@ use super::{
     HairFollowers, HairLook, HairView, WetLook,
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands},
     followers::{DrawnStrand, GuideRoot, scatter},
-    material::{Ribbon, RibbonMaterial, ribbon_mesh},
+    material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
 };
 use crate::{
     bond::Bonds,
@@ -33,6 +33,7 @@ pub(super) struct Packed {
     /// How far followers reach beyond the guides (m).
     margin: f32,
     ribbon: Ribbon,
+    key: RibbonKey,
 }
 
 type GuideParts =
@@ -100,6 +101,7 @@ pub(super) fn pack(
         let aabb = Aabb::from_min_max(low - packed.margin, high + packed.margin);
         let look = looks.of(hair);
         let view = views.of(hair);
+        let key = RibbonKey::new(&look, view);
 
         let known = buffers.as_ref().and_then(|b| drawn.get_mut(b.drawn).ok().zip(Some(b)));
         if packed.layout.is_empty() {
@@ -113,9 +115,10 @@ pub(super) fn pack(
             bounds.set_if_neq(aabb);
             let counts = (buffers.guide_count, buffers.strand_count);
             let ribbon = packed.ribbon(&look, &settings, view, counts);
-            if packed.ribbon != ribbon {
-                packed.ribbon = ribbon;
+            if (packed.ribbon, packed.key) != (ribbon, key) {
+                (packed.ribbon, packed.key) = (ribbon, key);
                 if let Some(mut material) = materials.get_mut(&material.0) {
+                    material.key = key;
                     material.ribbon = ribbon;
                 }
             }
@@ -125,6 +128,7 @@ pub(super) fn pack(
         let strands = packed.scatter(&strands, &settings);
         let counts = (packed.layout.len() as u32, strands.len() as u32);
         packed.ribbon = packed.ribbon(&look, &settings, view, counts);
+        packed.key = key;
         let mut first = 0;
         let ranges = packed.layout.iter().map(|(_, nodes)| {
             first += nodes;
@@ -135,6 +139,7 @@ pub(super) fn pack(
             shader_buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::RENDER_WORLD))
         };
         let material = RibbonMaterial {
+            key,
             ribbon: packed.ribbon,
             nodes: add(bytemuck::cast_slice(&packed.nodes)),
             guides: add(bytemuck::cast_slice(&ranges)),

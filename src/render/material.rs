@@ -16,13 +16,15 @@ use bevy::{
         },
         storage::ShaderBuffer,
     },
-    shader::{ShaderDefVal, ShaderRef},
+    shader::ShaderRef,
 };
 
 /// The material of drawn hair; made and kept up to date from [`HairLook`], [`HairFollowers`] and
 /// [`HairView`], which a game edits instead.
 #[derive(Asset, AsBindGroup, TypePath, Clone, Debug)]
+#[bind_group_data(RibbonKey)]
 pub(super) struct RibbonMaterial {
+    pub(super) key: RibbonKey,
     #[uniform(0)]
     pub(super) ribbon: Ribbon,
     #[storage(1, read_only)]
@@ -31,6 +33,26 @@ pub(super) struct RibbonMaterial {
     pub(super) guides: Handle<ShaderBuffer>,
     #[storage(3, read_only)]
     pub(super) strands: Handle<ShaderBuffer>,
+}
+
+/// What needs a shader of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct RibbonKey {
+    heat: bool,
+    kajiya_kay: bool,
+}
+
+impl RibbonKey {
+    pub(super) fn new(look: &HairLook, view: HairView) -> Self {
+        let heat = !matches!(view, HairView::Natural | HairView::Guides);
+        Self { heat, kajiya_kay: !heat && look.shading == HairShading::KajiyaKay }
+    }
+}
+
+impl From<&RibbonMaterial> for RibbonKey {
+    fn from(material: &RibbonMaterial) -> Self {
+        material.key
+    }
 }
 
 /// `Ribbon` of `strands.wgsl`.
@@ -49,7 +71,6 @@ pub(super) struct Ribbon {
     self_shadow: f32,
     clump: f32,
     parting: f32,
-    shading: u32,
     segments: u32,
     guides: u32,
     strands: u32,
@@ -80,10 +101,6 @@ impl Ribbon {
             self_shadow: look.self_shadow,
             clump: followers.clump,
             parting: followers.parting,
-            shading: match look.shading {
-                HairShading::Fibre => 0,
-                HairShading::KajiyaKay => 1,
-            },
             segments: followers.segments,
             guides,
             strands,
@@ -117,7 +134,7 @@ impl Material for RibbonMaterial {
         OpaqueRendererMethod::Forward
     }
 
-    // A prepass would have to leave out the very samples that the forward pass leaves out.
+    // Ribbons of the prepass would have to be those of the forward pass to the last bit.
     fn enable_prepass() -> bool {
         false
     }
@@ -126,16 +143,18 @@ impl Material for RibbonMaterial {
         _: &MaterialPipeline,
         descriptor: &mut RenderPipelineDescriptor,
         layout: &MeshVertexBufferLayoutRef,
-        _: MaterialPipelineKey<Self>,
+        key: MaterialPipelineKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
         descriptor.vertex.buffers = vec![layout.0.get_layout(&[CORNER.at_shader_location(0)])?];
         descriptor.primitive.cull_mode = None;
-        let samples = descriptor.multisample.count;
-        if let Some(fragment) = &mut descriptor.fragment
-            && samples > 1
-        {
-            let samples = ShaderDefVal::UInt("HAIR_SAMPLES".into(), samples);
-            fragment.shader_defs.push(samples);
+        if descriptor.multisample.count > 1 {
+            descriptor.vertex.shader_defs.push("HAIR_SAMPLES".into());
+        }
+        if let Some(fragment) = &mut descriptor.fragment {
+            let RibbonKey { heat, kajiya_kay } = key.bind_group_data;
+            let defs = &mut fragment.shader_defs;
+            defs.extend(heat.then(|| "HAIR_HEAT".into()));
+            defs.extend(kajiya_kay.then(|| "HAIR_KAJIYA_KAY".into()));
         }
         Ok(())
     }

@@ -6,6 +6,12 @@
 #import bevy_keratin::strands::{ribbon, strands, strand_point, strand_state, hash, StrandState, DrawnStrand}
 
 const VIEW_GUIDES: u32 = 6u;
+// The least drawn width. Samples within a pixel find what is thinner than a pixel.
+#ifdef HAIR_SAMPLES
+const LEAST_PIXELS: f32 = 0.6;
+#else
+const LEAST_PIXELS: f32 = 1.0;
+#endif
 
 struct RibbonVertex {
     world_position: vec3<f32>,
@@ -14,8 +20,6 @@ struct RibbonVertex {
     outward: vec3<f32>,
     // 0 root ... 1 tip.
     along: f32,
-    // How much of its drawn width the strand really has, where it is thinner than a pixel.
-    coverage: f32,
     seed: u32,
     state: StrandState,
     shown: bool,
@@ -67,10 +71,13 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     let eye = toward_eye(center);
     out.outward = safe_normalize(from_centre - out.tangent * dot(from_centre, out.tangent), eye);
 
-    let pixel = pixel_size((view.clip_from_world * vec4(center, 1.0)).w);
+    let least = LEAST_PIXELS * pixel_size((view.clip_from_world * vec4(center, 1.0)).w);
     let width = scale * ribbon.width * mix(1.0, ribbon.taper, out.along * out.along);
-    out.coverage = saturate(width / max(pixel, 1e-9));
+    // Strands thinner than can be drawn are drawn so wide, and fewer of them, so that hair covers
+    // as much from afar. Which ones is the same in every frame; guides go last.
+    let kept = width / max(least, 1e-9) - hash(strand.seed) * (1.0 - strand.guide);
+    let drawn = max(width, least) * saturate(kept * 8.0 + 0.5);
     let across = safe_normalize(cross(out.tangent, eye), normalize(view.world_from_view[0].xyz));
-    out.world_position = center + across * (side * max(width, pixel));
+    out.world_position = center + across * (side * drawn);
     return out;
 }

@@ -4,13 +4,10 @@
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
 #import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
-#import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, VIEW_GUIDES}
-#import bevy_keratin::strands::{ribbon, hash}
+#import bevy_keratin::ribbon::{ribbon_vertex, toward_eye}
+#import bevy_keratin::strands::ribbon
 #import bevy_keratin::shading::{Fibre, lit_hair}
 
-const VIEW_NATURAL: u32 = 0u;
-const VIEW_STRAIN: u32 = 5u;
-const VIEW_MOISTURE: u32 = 7u;
 // The strain that is drawn red.
 const STRAIN_FULL: f32 = 0.05;
 
@@ -19,8 +16,8 @@ struct ForwardVertex {
     @location(0) world_position: vec3<f32>,
     @location(1) tangent: vec3<f32>,
     @location(2) outward: vec3<f32>,
-    // Along the strand, coverage, value of the heat map, moisture.
-    @location(3) along: vec4<f32>,
+    // Along the strand, value of the heat map, moisture.
+    @location(3) along: vec3<f32>,
     @location(4) @interpolate(flat) seed: u32,
 }
 
@@ -44,7 +41,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
         case 7u: { value = vertex.state.moisture; }
         default: {}
     }
-    out.along = vec4(vertex.along, vertex.coverage, value, vertex.state.moisture);
+    out.along = vec3(vertex.along, value, vertex.state.moisture);
     return out;
 }
 
@@ -55,37 +52,11 @@ fn heat(value: f32) -> vec3<f32> {
     return pow(srgb, vec3(2.2));
 }
 
-struct ForwardColor {
-    @location(0) color: vec4<f32>,
-#ifdef HAIR_SAMPLES
-    @builtin(sample_mask) samples: u32,
-#endif
-}
-
 @fragment
-fn fragment(in: ForwardVertex) -> ForwardColor {
-    var out: ForwardColor;
-    let coverage = in.along.y;
-#ifdef HAIR_SAMPLES
-    // As many samples as the strand covers, others for each strand, the same in every frame.
-    let samples = #{HAIR_SAMPLES}u;
-    let part = coverage * f32(samples) + hash(in.seed);
-    let count = clamp(u32(part), 0u, samples);
-    let turn = u32(hash(in.seed + 1u) * f32(samples));
-    let run = (1u << count) - 1u;
-    out.samples = ((run << turn) | (run >> (samples - turn))) & ((1u << samples) - 1u);
+fn fragment(in: ForwardVertex) -> @location(0) vec4<f32> {
+#ifdef HAIR_HEAT
+    return vec4(heat(in.along.y), 1.0);
 #else
-    // Without samples to share, fewer strands stand for all.
-    if hash(in.seed) >= max(coverage, 0.05) {
-        discard;
-    }
-#endif
-
-    if ribbon.view != VIEW_NATURAL && ribbon.view != VIEW_GUIDES {
-        out.color = vec4(heat(in.along.z), 1.0);
-        return out;
-    }
-
     var fibre: Fibre;
     fibre.position = in.world_position;
     fibre.frag_coord = in.position;
@@ -94,13 +65,13 @@ fn fragment(in: ForwardVertex) -> ForwardColor {
     fibre.outward = normalize(in.outward);
     fibre.along = in.along.x;
     fibre.seed = in.seed;
-    fibre.moisture = saturate(in.along.w);
+    fibre.moisture = saturate(in.along.z);
     let lit = lit_hair(fibre);
 
     var pbr = pbr_input_new();
     pbr.frag_coord = in.position;
     pbr.world_position = vec4(in.world_position, 1.0);
     pbr.material.flags |= STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT;
-    out.color = main_pass_post_lighting_processing(pbr, vec4(lit, 1.0));
-    return out;
+    return main_pass_post_lighting_processing(pbr, vec4(lit, 1.0));
+#endif
 }

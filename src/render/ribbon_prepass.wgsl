@@ -3,7 +3,6 @@
 #import bevy_pbr::prepass_io::VertexOutput
 #import bevy_pbr::view_transformations::position_world_to_clip
 #import bevy_keratin::ribbon::ribbon_vertex
-#import bevy_keratin::strands::hash
 
 @vertex
 fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> VertexOutput {
@@ -11,8 +10,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> V
     let ribbon = ribbon_vertex(corner, instance);
     out.world_position = vec4(ribbon.world_position, 1.0);
     out.position = position_world_to_clip(ribbon.world_position);
-    // Texels are wider than strands: fewer strands keep what light gets through.
-    if !ribbon.shown || hash(ribbon.seed ^ 0x5bd1e995u) > max(ribbon.coverage, 0.1) {
+    if !ribbon.shown {
         out.position = vec4(0.0, 0.0, 0.0, 1.0);
     }
 #ifdef UNCLIPPED_DEPTH_ORTHO_EMULATION

@@ -15,8 +15,6 @@
 #import bevy_render::maths::PI
 #import bevy_keratin::strands::{ribbon, hash}
 
-const SHADING_KAJIYA_KAY: u32 = 1u;
-
 struct Fibre {
     position: vec3<f32>,
     frag_coord: vec4<f32>,
@@ -90,17 +88,16 @@ fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, shadow: f32) -> vec3<
     let v = fibre.eye;
     let r = surface.roughness;
 
-    if ribbon.shading == SHADING_KAJIYA_KAY {
-        // Two lobes, shifted to root and tip; the second went through the fibre and is tinted.
-        let exponent = 2.0 / (r * r);
-        let first = kajiya_kay(normalize(t + 0.05 * fibre.outward), l, v, exponent);
-        let second = kajiya_kay(normalize(t - 0.1 * fibre.outward), l, v, 0.25 * exponent);
-        let bright = surface.gloss * facing * (exponent + 2.0) / (64.0 * PI);
-        return shadow * (surface.color * first.x * mix(0.4, 1.0, facing) / PI
-            + bright * first.y * 0.35
-            + bright * second.y * 0.5 * sqrt(surface.color));
-    }
-
+#ifdef HAIR_KAJIYA_KAY
+    // Two lobes, shifted to root and tip; the second went through the fibre and is tinted.
+    let exponent = 2.0 / (r * r);
+    let first = kajiya_kay(normalize(t + 0.05 * fibre.outward), l, v, exponent);
+    let second = kajiya_kay(normalize(t - 0.1 * fibre.outward), l, v, 0.25 * exponent);
+    let bright = surface.gloss * facing * (exponent + 2.0) / (64.0 * PI);
+    return shadow * (surface.color * first.x * mix(0.4, 1.0, facing) / PI
+        + bright * first.y * 0.35
+        + bright * second.y * 0.5 * sqrt(surface.color));
+#else
     let sin_l = clamp(dot(t, l), -1.0, 1.0);
     let sin_v = clamp(dot(t, v), -1.0, 1.0);
     let cos_d = cos(0.5 * abs(asin(sin_v) - asin(sin_l)));
@@ -137,13 +134,11 @@ fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, shadow: f32) -> vec3<
     let through = ribbon.backlight * tt_lobe * smoothstep(-1.0, -0.2, -abs(dot(fibre.outward, l)));
     let mirror = surface.gloss * facing * (r_lobe + trt_lobe * 2.0);
     return shadow * (mirror + through) + shadow * scattered(fibre, surface, l, shadow);
+#endif
 }
 
-// Shadow at three depths below the place: hair is not a wall, light fades as it goes in.
-fn depths() -> vec3<f32> {
-    return ribbon.self_shadow * vec3(0.35, 1.0, 2.2);
-}
-const DEPTH_WEIGHTS: vec3<f32> = vec3(0.35, 0.4, 0.25);
+// Shadow is looked up at two places above: hair is not a wall, light fades as it goes in.
+const DEPTHS: vec2<f32> = vec2(0.4, 1.6);
 
 fn at_depth(fibre: Fibre, l: vec3<f32>, depth: f32) -> vec4<f32> {
     return vec4(fibre.position + l * depth, 1.0);
@@ -170,13 +165,13 @@ fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32>
     var shadow = 1.0;
     if ((*light).flags & mesh_view_types::POINT_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) != 0u {
         shadow = 0.0;
-        for (var i = 0; i < 3; i++) {
-            let place = at_depth(fibre, l, depths()[i]);
+        for (var i = 0; i < 2; i++) {
+            let place = at_depth(fibre, l, ribbon.self_shadow * DEPTHS[i]);
             if spot {
-                shadow += DEPTH_WEIGHTS[i] * shadows::fetch_spot_shadow(
+                shadow += 0.5 * shadows::fetch_spot_shadow(
                     id, place, fibre.outward, (*light).shadow_map_near_z, fibre.frag_coord.xy);
             } else {
-                shadow += DEPTH_WEIGHTS[i] * shadows::fetch_point_shadow(
+                shadow += 0.5 * shadows::fetch_point_shadow(
                     id, place, fibre.outward, fibre.frag_coord.xy);
             }
         }
@@ -204,9 +199,9 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         var shadow = 1.0;
         if ((*sun).flags & mesh_view_types::DIRECTIONAL_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) != 0u {
             shadow = 0.0;
-            for (var k = 0; k < 3; k++) {
-                shadow += DEPTH_WEIGHTS[k] * shadows::fetch_directional_shadow(
-                    i, at_depth(fibre, l, depths()[k]), fibre.outward, view_z, fibre.frag_coord.xy);
+            for (var k = 0; k < 2; k++) {
+                shadow += 0.5 * shadows::fetch_directional_shadow(
+                    i, at_depth(fibre, l, ribbon.self_shadow * DEPTHS[k]), fibre.outward, view_z, fibre.frag_coord.xy);
             }
         }
         light += reflected(fibre, surface, l, shadow) * (*sun).color.rgb;

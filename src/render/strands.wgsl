@@ -37,7 +37,6 @@ struct Ribbon {
     self_shadow: f32,
     clump: f32,
     parting: f32,
-    shading: u32,
     segments: u32,
     guides: u32,
     strands: u32,

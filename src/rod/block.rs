@@ -5,7 +5,7 @@
 //! nodes is about 22 kB: every iteration of a substep stays in the first cache. The arrays are
 //! plain old data and may be handed to a compute shader as they are.
 //!
-//! Order within a substep ([B] §2 with model notes): predict positions and orientations, project
+//! Order within a substep (\[B\] §2 with model notes): predict positions and orientations, project
 //! stretch–shear, bend–twist and contacts `iterations` times from root to tip, limit lengths, a
 //! last contact pass, then velocities from the change.
 
@@ -18,6 +18,9 @@ use super::{
 };
 use bevy::math::{Quat, Vec3};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+
+/// Passes that a limiter step takes for strands that touch something.
+const PASSES_IN_TOUCH: u32 = 3;
 
 /// One number of each lane.
 pub type Lane = [f32; LANES];
@@ -76,8 +79,8 @@ pub struct BlockLanes {
     pub root: [Lane; 4],
     /// Zero for lanes whose state is finite, else not a number; written by [`step`].
     pub finite: Lane,
-    /// Whether any node of any lane rests on an obstacle.
-    pub(super) touching: bool,
+    /// 1 for lanes with a node that rests on an obstacle, else 0; written by the contact passes.
+    pub(super) touched: Lane,
     pub(super) scratch: Vec<LimiterRow>,
 }
 
@@ -244,14 +247,15 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacle
         contacts(simd, b, params, obstacles);
     }
     for _ in 0..params.limiter_steps {
-        if b.touching {
-            limit_lengths::<S, true>(simd, b);
-        } else {
-            limit_lengths::<S, false>(simd, b);
-        }
-    }
-    if params.limiter_steps > 0 {
+        limit_lengths(simd, b, false);
         contacts(simd, b, params, obstacles);
+        // Pressed on something, hair has to fold: the more it has, the better the next pass can.
+        for _ in 1..PASSES_IN_TOUCH {
+            if b.touched != [0.0; LANES] {
+                limit_lengths(simd, b, true);
+                contacts(simd, b, params, obstacles);
+            }
+        }
     }
     velocities(simd, b, params);
 }
@@ -325,11 +329,12 @@ fn sweep<S: Simd>(simd: S, b: &mut BlockLanes, projection: StretchProjection) {
 
 #[inline(always)]
 fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
-    b.touching = false;
+    b.touched = [0.0; LANES];
     if obstacles.is_empty() {
         return;
     }
-    let zero = f32x16::splat(simd, 0.0);
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let mut touched = zero;
     let none = V3::new(zero, zero, zero);
     for n in &mut b.nodes {
         let w = f32x16::load_array_ref(simd, &n.w);
@@ -342,12 +347,13 @@ fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles
                 p = V3::select(held, p, out);
                 let pushed = Real::lt(zero, normal.dot(normal));
                 rests_on = V3::select(pushed, normal, rests_on);
-                b.touching = true;
+                touched = Real::select(pushed, one, touched);
             }
         }
         store3(&mut n.p, p);
         store3(&mut n.rests_on, rests_on);
     }
+    touched.store_array(&mut b.touched);
 }
 
 /// Velocities from the change of the step, the joints' damping, and the check that all is finite.

@@ -20,9 +20,20 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 /// straight down is not asked to fold within one substep.
 const FIRMNESS: f32 = 0.95;
 
-/// One Newton step on the lengths of every strand in the block. `TOUCHING` heeds obstacles.
+/// One Newton step on the lengths of every strand in the block; with `touched_only` of those that
+/// touch an obstacle. What a strand does never depends on the others in its block.
 #[inline(always)]
-pub(super) fn limit_lengths<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes) {
+pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes, touched_only: bool) {
+    if b.touched == [0.0; LANES] {
+        newton::<S, false>(simd, b, false);
+    } else {
+        newton::<S, true>(simd, b, touched_only);
+    }
+}
+
+/// `TOUCHING` heeds obstacles; where there are none it changes no bit.
+#[inline(always)]
+fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_only: bool) {
     let load = |a: &[f32; LANES]| f32x16::load_array_ref(simd, a);
     let edges = b.edges.len();
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
@@ -34,6 +45,7 @@ pub(super) fn limit_lengths<S: Simd, const TOUCHING: bool>(simd: S, b: &mut Bloc
         (along.scale(one / length), length)
     };
     let firmness = f32x16::splat(simd, FIRMNESS);
+    let touched = load(&b.touched);
     // a · W b of node i
     let mobility = |b: &BlockLanes, i: usize, x: V3<f32x16<S>>, y: V3<f32x16<S>>| {
         let node = &b.nodes[i];
@@ -76,6 +88,7 @@ pub(super) fn limit_lengths<S: Simd, const TOUCHING: bool>(simd: S, b: &mut Bloc
         let tension = d.scale(lambda);
         let node = &mut b.nodes[i + 1];
         let w = load(&node.w);
+        let p = node.position(simd);
         let mut force = pull - tension;
         if TOUCHING {
             let n = node.support(simd);
@@ -84,7 +97,9 @@ pub(super) fn limit_lengths<S: Simd, const TOUCHING: bool>(simd: S, b: &mut Bloc
             node.set_support(V3::select(lifts, V3::new(zero, zero, zero), n));
             force = V3::select(lifts, force, n.scale_add(-(firmness * off), force));
         }
-        node.set_position(force.scale_add(w, node.position(simd)));
+        let moved = force.scale_add(w, p);
+        let moves = Real::lt(zero, touched);
+        node.set_position(if touched_only { V3::select(moves, moved, p) } else { moved });
         pull = tension;
     }
 }

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::prelude::*;
+use bevy_keratin::{Fault, prelude::*};
 use std::time::Duration;
 
 /// An app with the plugin at `hertz`, warmed up.
@@ -12,6 +12,7 @@ pub fn test_app(hertz: f64) -> App {
         .insert_resource(Time::<Fixed>::from_hz(hertz))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    app.init_resource::<Told>().add_systems(Last, listen);
     app.finish();
     app.cleanup();
     app.update();
@@ -65,4 +66,16 @@ pub fn settle(app: &mut App, entity: Entity, limit: f64) {
 
 pub fn no_gravity(app: &mut App) {
     app.insert_resource(HairGravity(Vec3::ZERO));
+}
+
+#[derive(Resource, Default)]
+struct Told(Vec<Fault>);
+
+fn listen(mut messages: MessageReader<HairFault>, mut told: ResMut<Told>) {
+    told.0.extend(messages.read().map(|m| m.fault.clone()));
+}
+
+/// The faults that were told since the last call.
+pub fn faults(app: &mut App) -> Vec<Fault> {
+    core::mem::take(&mut app.world_mut().resource_mut::<Told>().0)
 }

@@ -1,0 +1,164 @@
+//! Golden vectors of a published reference implementation against the coupled projection.
+//!
+//! `data/cosserat.json` tells its conventions in `meta`; here are its cases with full stiffness.
+
+use bevy_keratin::rod::{
+    algebra::{Quaternion, V3},
+    constraint::{EPSILON, EdgeWeights, StretchProjection, bend_twist, stretch_shear},
+    lanes::Real,
+};
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+struct Golden {
+    stretch_shear: Vec<Stretch>,
+    bend_twist: Vec<Bend>,
+}
+
+#[derive(Deserialize)]
+struct Stretch {
+    p0: [f64; 3],
+    w0: f64,
+    p1: [f64; 3],
+    w1: f64,
+    q: [f64; 4],
+    wq: f64,
+    l: f64,
+    corr0: [f64; 3],
+    corr1: [f64; 3],
+    corrq: [f64; 4],
+    q_after: [f64; 4],
+}
+
+#[derive(Deserialize)]
+struct Bend {
+    q0: [f64; 4],
+    w0: f64,
+    q1: [f64; 4],
+    w1: f64,
+    rest_darboux: [f64; 4],
+    corrq0: [f64; 4],
+    corrq1: [f64; 4],
+    q0_after: [f64; 4],
+    q1_after: [f64; 4],
+}
+
+fn golden() -> Golden {
+    let golden: Golden = serde_json::from_str(include_str!("data/cosserat.json")).unwrap();
+    assert_eq!((golden.stretch_shear.len(), golden.bend_twist.len()), (48, 48));
+    golden
+}
+
+/// Unit roundoff of f32.
+const EPS32: f64 = 1.0 / 16_777_216.0;
+
+trait Number: Real {
+    fn of(x: f64) -> Self;
+    fn get(self) -> f64;
+}
+impl Number for f64 {
+    fn of(x: f64) -> Self {
+        x
+    }
+    fn get(self) -> f64 {
+        self
+    }
+}
+impl Number for f32 {
+    fn of(x: f64) -> Self {
+        x as f32
+    }
+    fn get(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+fn v<R: Number>(a: [f64; 3]) -> V3<R> {
+    V3::new(R::of(a[0]), R::of(a[1]), R::of(a[2]))
+}
+fn q<R: Number>(a: [f64; 4]) -> Quaternion<R> {
+    Quaternion::new(v([a[0], a[1], a[2]]), R::of(a[3]))
+}
+fn v_get<R: Number>(a: V3<R>) -> [f64; 3] {
+    [a.x.get(), a.y.get(), a.z.get()]
+}
+fn q_get<R: Number>(a: Quaternion<R>) -> [f64; 4] {
+    let [x, y, z] = v_get(a.v);
+    [x, y, z, a.w.get()]
+}
+fn length(a: &[f64]) -> f64 {
+    a.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Compares within `absolute` plus 1e-5 of the largest component expected (f32), or `absolute`.
+fn same(what: &str, case: usize, found: &[f64], expected: &[f64], relative: f64, absolute: f64) {
+    let most = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    for (f, e) in found.iter().zip(expected) {
+        let (off, allowed) = ((f - e).abs(), relative * most + absolute);
+        assert!(
+            off <= allowed,
+            "{what} of case {case}: {found:?} for {expected:?}, off {off:e} > {allowed:e}"
+        );
+    }
+}
+
+fn check<R: Number>(relative: f64, rounding: f64) {
+    let golden = golden();
+    for (i, c) in golden.stretch_shear.iter().enumerate() {
+        let quat = q::<R>(c.q);
+        let e = EdgeWeights { w1: R::of(c.w0), w2: R::of(c.w1), wq: R::of(c.wq), l: R::of(c.l) };
+        let d = stretch_shear(StretchProjection::Coupled, v(c.p0), v(c.p1), quat, e);
+        // Rounded inputs move C = (p1 − p0)/l − R(q)e3 by up to ε (|p0| + |p1|)/l through the
+        // cancelling difference, and by a few ε in the rest; both pass on through γ.
+        let span = [c.p1[0] - c.p0[0], c.p1[1] - c.p0[1], c.p1[2] - c.p0[2]];
+        let moved = rounding
+            * (2.0 * (length(&c.p0) + length(&c.p1)) / c.l + 8.0 * (1.0 + length(&span) / c.l));
+        let gamma = moved / ((c.w0 + c.w1) / c.l + 4.0 * c.wq * c.l + EPSILON);
+        let floor = if rounding == 0.0 { 1e-10 } else { 0.0 };
+        same("corr0", i, &v_get(d.p1), &c.corr0, relative, c.w0 * gamma + floor);
+        same("corr1", i, &v_get(d.p2), &c.corr1, relative, c.w1 * gamma + floor);
+        let turn = 2.0 * c.wq * c.l * gamma + floor;
+        same("corrq", i, &q_get(d.q), &c.corrq, relative, turn);
+        let after = quat.add_scaled(d.q, R::of(1.0)).normalize();
+        same("q_after", i, &q_get(after), &c.q_after, relative, turn + 4.0 * rounding);
+    }
+    for (i, c) in golden.bend_twist.iter().enumerate() {
+        let (q0, q1) = (q::<R>(c.q0), q::<R>(c.q1));
+        let (w0, w1) = (R::of(c.w0), R::of(c.w1));
+        let (d0, d1) = bend_twist(q0, q1, q(c.rest_darboux), w0, w1, R::of(1.0));
+        // Ω of rounded unit quaternions is off by a few ε whatever its size.
+        let moved = 8.0 * rounding / (c.w0 + c.w1 + EPSILON);
+        let floor = if rounding == 0.0 { 1e-10 } else { 0.0 };
+        same("corrq0", i, &q_get(d0), &c.corrq0, relative, c.w0 * moved + floor);
+        same("corrq1", i, &q_get(d1), &c.corrq1, relative, c.w1 * moved + floor);
+        let one = R::of(1.0);
+        let after = q0.add_scaled(d0, one).normalize();
+        same(
+            "q0_after",
+            i,
+            &q_get(after),
+            &c.q0_after,
+            relative,
+            c.w0 * moved + 4.0 * rounding + floor,
+        );
+        let after = q1.add_scaled(d1, one).normalize();
+        same(
+            "q1_after",
+            i,
+            &q_get(after),
+            &c.q1_after,
+            relative,
+            c.w1 * moved + 4.0 * rounding + floor,
+        );
+    }
+}
+
+#[test]
+fn coupled_projection_in_f64() {
+    check::<f64>(0.0, 0.0);
+}
+
+#[test]
+fn coupled_projection_in_f32() {
+    check::<f32>(1e-5, EPS32);
+}

@@ -1,0 +1,134 @@
+//! The paper's scenes as a user runs them: through the `headless` example and its JSON.
+
+use serde_json::Value;
+use std::{
+    path::PathBuf,
+    process::{Command, Output},
+};
+
+/// The example as `cargo test` has just built it.
+fn example() -> PathBuf {
+    let mut path = std::env::current_exe().unwrap();
+    path.pop();
+    path.pop();
+    path.push(format!("examples/headless{}", std::env::consts::EXE_SUFFIX));
+    assert!(path.exists(), "{} is missing: run `cargo test`, which builds it", path.display());
+    path
+}
+
+fn headless(arguments: &[&str]) -> Output {
+    Command::new(example()).args(arguments).output().unwrap()
+}
+
+fn scene(scene: &str, variant: &str) -> Value {
+    let out = headless(&["--scene", scene, "--variant", variant, "--json", "--threads", "1"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(
+        (report["scene"].as_str(), report["variant"].as_str()),
+        (Some(scene), Some(variant))
+    );
+    assert_eq!(report["finite"], true);
+    let strain = number(&report, "strain_peak");
+    assert!(strain < 0.02, "{scene} {variant}: peak strain {strain}");
+    assert_eq!(report["substeps"], 6);
+    report
+}
+
+fn number(report: &Value, key: &str) -> f64 {
+    report[key].as_f64().unwrap_or_else(|| panic!("{key} is missing in {report}"))
+}
+
+#[track_caller]
+fn near(report: &Value, key: &str, expected: f64, tolerance: f64) {
+    let found = number(report, key);
+    assert!((found - expected).abs() <= tolerance, "{key} is {found}, expected {expected}");
+}
+
+#[test]
+fn bedhead_keeps_a_third_and_its_controls_nothing() {
+    let treated = scene("bedhead", "treated");
+    near(&treated, "kept_zero_gravity", 0.33, 0.01);
+    near(&treated, "kept_rest", 0.33, 0.003);
+    assert!(number(&treated, "kept_hanging") > 0.1, "the bend is seen under gravity too");
+    for control in ["never-wet", "never-dried"] {
+        near(&scene("bedhead", control), "kept_zero_gravity", 0.0, 0.01);
+    }
+}
+
+#[test]
+fn blow_dry_follows_the_wind() {
+    let treated = scene("blow-dry", "treated");
+    // every rate is min(1, b₀ + 0.3 Σ|Δv_w|)
+    near(&treated, "drying_error", 0.0, 1e-4);
+    let hydrogen = &treated["b_hydrogen"];
+    let (least, mean) = (number(hydrogen, "min"), number(hydrogen, "mean"));
+    assert!((0.6..0.95).contains(&mean) && least < 0.6, "{hydrogen}");
+    assert!(number(&treated, "wind_rate_correlation") >= 0.9);
+    // without gravity every joint rests at Σ f b Ω_j / Σ f b
+    near(&treated, "relaxed_error", 0.0, 1e-3);
+    assert!(number(&treated, "kept_zero_gravity") > 0.2);
+    near(&scene("blow-dry", "no-drying"), "kept_zero_gravity", 0.0, 0.01);
+    near(&scene("blow-dry", "uniform"), "kept_zero_gravity", 0.33, 0.01);
+}
+
+#[test]
+fn perm_curls_and_its_controls_hang_straight() {
+    let treated = scene("perm", "treated");
+    near(&treated, "kept_zero_gravity", 0.67, 0.01);
+    near(&treated, "curl_radius_held", 0.03, 1e-3);
+    near(&treated, "curl_radius_zero_gravity", 0.03 / 0.67, 1e-3);
+    let hanging = number(&treated, "kept_hanging");
+    assert!((0.55..0.67).contains(&hanging), "hanging {hanging}");
+    assert!(number(&treated, "turns") > 1.2);
+    near(&scene("perm", "water-set"), "kept_zero_gravity", 0.63, 0.01);
+    for control in ["cut-only", "untreated"] {
+        let report = scene("perm", control);
+        near(&report, "kept_zero_gravity", 0.0, 0.01);
+        assert!(number(&report, "turns") < 0.1);
+    }
+}
+
+#[test]
+fn every_bit_is_the_same_again_and_on_two_threads() {
+    // Long enough for wind, contact with the floor and bond changes; winding in the perm.
+    for (scene, variant, seconds) in
+        [("bedhead", "treated", "8"), ("blow-dry", "treated", "8"), ("perm", "treated", "10")]
+    {
+        let hash = |threads: &str| {
+            let out = headless(&[
+                "--scene",
+                scene,
+                "--variant",
+                variant,
+                "--seconds",
+                seconds,
+                "--threads",
+                threads,
+                "--json",
+            ]);
+            let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+            report["state_hash"].as_str().unwrap().to_owned()
+        };
+        let first = hash("1");
+        assert_eq!(first, hash("1"), "{scene}: a second run differs");
+        assert_eq!(first, hash("2"), "{scene}: two threads differ");
+    }
+}
+
+#[test]
+fn misspelt_names_are_answered_with_the_valid_ones() {
+    let error = |arguments: &[&str]| {
+        let out = headless(arguments);
+        assert!(!out.status.success());
+        String::from_utf8(out.stderr).unwrap()
+    };
+    let text = error(&["--scene", "bedhaed"]);
+    assert!(text.contains("no scene `bedhaed`; valid: bedhead, blow-dry, perm"), "{text}");
+    let text = error(&["--scene", "perm", "--variant", "curly"]);
+    assert!(text.contains("valid: treated, water-set, cut-only, untreated"), "{text}");
+    let text = error(&["--scene", "perm", "--second", "3"]);
+    assert!(text.contains("--seconds"), "{text}");
+    let text = error(&["--scene", "perm", "--seconds", "-3"]);
+    assert!(!text.contains("panicked"), "{text}");
+}

@@ -1,0 +1,302 @@
+//! The tick: its order, its clock, its determinism, and what it does with what is wrong.
+
+mod common;
+use bevy::prelude::*;
+use bevy_keratin::{Fault, HairStep, bond::RestShape, prelude::*};
+use common::*;
+
+#[derive(Resource, Default)]
+struct Trace(Vec<(HairSystems, u32)>);
+
+fn tracer(set: HairSystems) -> impl Fn(ResMut<Trace>, Res<HairStep>) {
+    move |mut trace, step| trace.0.push((set, step.index))
+}
+
+#[test]
+fn sets_run_in_the_order_of_figure_1_once_a_substep() {
+    let mut app = test_app(60.0);
+    app.init_resource::<Trace>();
+    // Added backwards, so that only the schedule can have put them in order.
+    for set in HairSystems::ALL.into_iter().rev() {
+        app.add_systems(HairTick, tracer(set).in_set(set).ambiguous_with_all());
+    }
+    app.update();
+    let trace = &app.world().resource::<Trace>().0;
+    let expected: Vec<_> = (0..6).flat_map(|i| HairSystems::ALL.map(|set| (set, i))).collect();
+    assert_eq!(*trace, expected);
+}
+
+#[derive(Resource, Default)]
+struct Seen(Vec<(f32, f32, f32)>);
+
+/// The quantities that each set is to change, read between the sets.
+#[test]
+fn each_set_does_its_part_and_no_other() {
+    let mut app = test_app(60.0);
+    app.init_resource::<Seen>();
+    let watch = |set: HairSystems| {
+        move |strand: Single<(&Strand, &Bonds, &RestShape)>,
+              mut seen: ResMut<Seen>,
+              step: Res<HairStep>| {
+            let _ = set;
+            if step.index == 0 {
+                let (s, bonds, rest) = *strand;
+                seen.0.push((
+                    s.velocities()[4].y + 1e3 * s.positions()[4].y,
+                    bonds.joints.get(2).map_or(9.0, |j| j.rates[0]),
+                    rest.darboux.get(2).map_or(9.0, |q| q.xyz().element_sum()),
+                ));
+            }
+        }
+    };
+    // Wet hair's rest shape follows the present one, so it changes in every substep.
+    let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.world_mut().write_message(Treat::wet(hair));
+    app.update();
+    for (before, after) in [
+        (HairSystems::First, HairSystems::Roots),
+        (HairSystems::ExternalForces, HairSystems::Interaction),
+        (HairSystems::RestShape, HairSystems::Projection),
+        (HairSystems::BondUpdate, HairSystems::Last),
+    ] {
+        app.add_systems(HairTick, watch(before).after(before).before(after).ambiguous_with_all());
+    }
+    app.world_mut().write_message(Treat::dry(hair));
+    app.update();
+    let seen = &app.world().resource::<Seen>().0;
+    assert_eq!(seen.len(), 4);
+    assert_ne!(seen[0].0, seen[1].0, "ExternalForces change velocities");
+    assert_eq!(seen[0].1, seen[2].1, "rates wait for BondUpdate");
+    assert_ne!(seen[1].2, seen[2].2, "RestShape writes rest shapes");
+    assert_eq!((seen[2].1, seen[3].1), (0.0, 1.0), "BondUpdate moves rates");
+}
+
+#[test]
+fn substeps_follow_the_apps_rate() {
+    for (hertz, count) in [(60.0, 6), (120.0, 3), (240.0, 2), (64.0, 6)] {
+        let mut app = test_app(hertz);
+        app.update();
+        let step = app.world().resource::<HairStep>();
+        assert_eq!(step.count, count, "{hertz} Hz");
+        assert!((step.dt * count as f32 - 1.0 / hertz as f32).abs() < 1e-7);
+    }
+}
+
+#[test]
+fn paused_hair_stands_still_and_slow_motion_is_slow() {
+    let mut app = test_app(60.0);
+    let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.insert_resource(bevy::time::TimeUpdateStrategy::ManualDuration(
+        std::time::Duration::from_secs_f64(1.0 / 60.0),
+    ));
+    app.update();
+    app.world_mut().resource_mut::<Time<Virtual>>().pause();
+    app.update();
+    let before = strand(&app, e).positions().to_vec();
+    for _ in 0..10 {
+        app.update();
+    }
+    assert_eq!(before, strand(&app, e).positions());
+    let mut time = app.world_mut().resource_mut::<Time<Virtual>>();
+    time.unpause();
+    time.set_relative_speed(0.25);
+    let fixed = |app: &App| app.world().resource::<Time<Fixed>>().elapsed_secs();
+    let start = fixed(&app);
+    for _ in 0..40 {
+        app.update();
+    }
+    let passed = fixed(&app) - start;
+    assert!((passed - 10.0 / 60.0).abs() < 1.5 / 60.0, "{passed} s");
+    assert_ne!(before, strand(&app, e).positions());
+}
+
+#[test]
+fn another_schedule_can_be_chosen() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, HairPlugins::new(Update)));
+    app.insert_resource(bevy::time::TimeUpdateStrategy::ManualDuration(
+        std::time::Duration::from_millis(10),
+    ));
+    let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    for _ in 0..20 {
+        app.update();
+    }
+    assert!(strand(&app, e).positions()[8].y < -0.01);
+}
+
+#[test]
+fn despawning_hair_takes_its_strands_and_nothing_else() {
+    let mut app = test_app(60.0);
+    let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    let (other, kept) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.update();
+    app.world_mut().entity_mut(hair).despawn();
+    app.update();
+    assert!(app.world().get_entity(e).is_err());
+    assert!(app.world().get_entity(kept).is_ok() && app.world().get_entity(other).is_ok());
+}
+
+#[test]
+fn a_strand_that_goes_wrong_is_put_back_and_its_neighbours_do_not_notice() {
+    let build = || {
+        let mut app = test_app(60.0);
+        let hair = app.world_mut().spawn(Hair).id();
+        let ids: Vec<Entity> = (0..5)
+            .map(|i| {
+                let root = Vec3::Z * (0.1 * i as f32);
+                let points: Vec<Vec3> =
+                    (0..9).map(|k| root + Vec3::X * (0.03 * k as f32)).collect();
+                let strand = Strand::from_polyline(&points).unwrap();
+                app.world_mut().spawn((StrandOf(hair), strand)).id()
+            })
+            .collect();
+        run(&mut app, 0.2);
+        (app, ids)
+    };
+    let (mut healthy, ids) = build();
+    run(&mut healthy, 0.2);
+
+    // a velocity from somewhere
+    let (mut app, ids_b) = build();
+    app.world_mut().get_mut::<Strand>(ids_b[2]).unwrap().velocities_mut()[3] = Vec3::NAN;
+    run(&mut app, 0.2);
+    assert_eq!(faults(&mut app), [Fault::PutBack], "told once");
+    assert!(strand(&app, ids_b[2]).is_finite());
+    for i in [0, 1, 3, 4] {
+        assert_eq!(strand(&app, ids_b[i]).positions(), strand(&healthy, ids[i]).positions());
+    }
+
+    // the pose itself
+    let (mut app, ids_c) = build();
+    app.world_mut().get_mut::<Strand>(ids_c[2]).unwrap().positions_mut()[5] =
+        Vec3::splat(f32::INFINITY);
+    run(&mut app, 0.2);
+    assert_eq!(faults(&mut app), [Fault::Rebuilt]);
+    let s = strand(&app, ids_c[2]);
+    assert!(s.is_finite() && s.peak_strain() < 0.01, "{}", s.peak_strain());
+    for i in [0, 1, 3, 4] {
+        assert_eq!(strand(&app, ids_c[i]).positions(), strand(&healthy, ids[i]).positions());
+    }
+}
+
+#[test]
+fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
+    let mut app = test_app(60.0);
+    let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.update();
+    app.world_mut().entity_mut(hair).insert((
+        Stiffness { bending_length: -1.0, bend: 7.0, orientation_weight: None },
+        AirDrag { rate: f32::NAN },
+        BondInfluence { hydrogen: 0.0, ionic: 0.0, disulfide: 0.0, peptide: 0.0 },
+        Solver { iterations: 0, ..default() },
+        LockContact { radius: f32::INFINITY, strength: -3.0 },
+    ));
+    app.world_mut().spawn((HairCollider::default(), Transform::from_xyz(0.0, -2.0, 0.0)));
+    app.world_mut().spawn(HairCollider {
+        shape: bevy_keratin::ColliderShape::Sphere(Sphere::new(-0.05)),
+        friction: f32::NAN,
+    });
+    app.world_mut().spawn(Blower { strength: -5.0, drying: 0.3 });
+    app.world_mut().spawn(PermRod { radius: 0.0, length: 0.1 });
+    app.update();
+    let told = faults(&mut app);
+    // 2 stiffness, 1 drag, 1 influence, 1 solver, 2 contact, 2 collider, 1 blower, 1 rod
+    assert_eq!(told.len(), 11, "{told:#?}");
+    assert!(told.iter().all(|f| matches!(f, Fault::Setting(_))));
+    run(&mut app, 0.5);
+    assert_eq!(faults(&mut app), []);
+    assert!(strand(&app, e).is_finite());
+    let text = told.iter().map(|f| f.to_string()).find(|t| t.contains("bending_length")).unwrap();
+    assert!(text.contains("is -1, expected 0.001 to 100"), "{text}");
+}
+
+#[test]
+fn edited_bond_rates_are_brought_into_range() {
+    let mut app = test_app(60.0);
+    let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.update();
+    let mut bonds = app.world_mut().get_mut::<Bonds>(e).unwrap();
+    bonds.joints[1].rates = [4.0, -1.0, f32::NAN, 0.5];
+    bonds.joints[2].shapes[0] = Vec3::NAN;
+    app.update();
+    assert_eq!(faults(&mut app).len(), 1);
+    let bonds = app.world().get::<Bonds>(e).unwrap();
+    assert_eq!(bonds.joints[1].rates, [1.0, 0.0, 1.0, 0.5]);
+    assert_eq!(bonds.joints[2].shapes[0], Vec3::ZERO);
+    run(&mut app, 0.5);
+    assert_eq!(faults(&mut app), []);
+}
+
+#[test]
+fn strands_without_hair_or_nodes_are_told_and_left_out() {
+    let mut app = test_app(60.0);
+    let not_hair = app.world_mut().spawn_empty().id();
+    let points = [Vec3::ZERO, Vec3::X * 0.1];
+    let homeless =
+        app.world_mut().spawn((StrandOf(not_hair), Strand::from_polyline(&points).unwrap())).id();
+    let hair = app.world_mut().spawn(Hair).id();
+    app.world_mut().spawn((StrandOf(hair), Strand::default()));
+    app.world_mut().write_message(Treat::wet(not_hair));
+    run(&mut app, 0.1);
+    let told = faults(&mut app);
+    assert_eq!(told.iter().filter(|f| **f == Fault::NoHair).count(), 1);
+    assert_eq!(told.iter().filter(|f| matches!(f, Fault::Strand(_))).count(), 1);
+    assert_eq!(strand(&app, homeless).positions(), points);
+}
+
+#[test]
+fn a_broken_transform_keeps_the_last_good_pose() {
+    let mut app = test_app(60.0);
+    let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+    run(&mut app, 0.1);
+    app.world_mut().get_mut::<Transform>(hair).unwrap().translation = Vec3::NAN;
+    run(&mut app, 0.1);
+    app.world_mut().get_mut::<Transform>(hair).unwrap().translation = Vec3::ZERO;
+    app.world_mut().get_mut::<Transform>(hair).unwrap().scale = Vec3::ZERO;
+    run(&mut app, 0.1);
+    assert_eq!(faults(&mut app), [Fault::Transform]);
+    assert!(strand(&app, e).is_finite());
+}
+
+#[test]
+fn settings_and_colliders_changed_at_run_time_act_in_the_next_tick() {
+    let mut app = test_app(60.0);
+    let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    no_gravity(&mut app);
+    run(&mut app, 0.2);
+    assert!(rms_speed(strand(&app, e)) < 1e-5);
+    app.insert_resource(HairGravity(Vec3::Y * 9.8));
+    app.update();
+    assert!(strand(&app, e).velocities()[8].y > 0.1);
+    app.world_mut().entity_mut(hair).insert(AirDrag { rate: 1e4 });
+    app.update();
+    app.update();
+    assert!(rms_speed(strand(&app, e)) < 0.03, "its own drag overrides the default");
+    app.world_mut().entity_mut(hair).remove::<AirDrag>();
+    run(&mut app, 0.1);
+    assert!(rms_speed(strand(&app, e)) > 0.03);
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits() {
+    let run_once = || {
+        let mut app = test_app(60.0);
+        let hair = app.world_mut().spawn(Hair).id();
+        app.world_mut()
+            .spawn((HairCollider::sphere(0.1).unwrap(), Transform::from_xyz(0.1, -0.15, 0.0)));
+        let ids: Vec<Entity> = (0..70)
+            .map(|i| {
+                let root = Vec3::Z * (0.001 * i as f32);
+                let nodes = 5 + i % 4;
+                let points: Vec<Vec3> =
+                    (0..nodes).map(|k| root + Vec3::X * (0.03 * k as f32)).collect();
+                app.world_mut()
+                    .spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()))
+                    .id()
+            })
+            .collect();
+        run(&mut app, 1.0);
+        ids.iter().flat_map(|e| strand(&app, *e).positions().to_vec()).collect::<Vec<_>>()
+    };
+    assert_eq!(run_once(), run_once());
+}
