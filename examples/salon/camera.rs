@@ -65,7 +65,11 @@ pub fn bundle(kind: SceneKind) -> impl Bundle {
 }
 
 /// Frames a scene when another kind is chosen; the user's view stays otherwise.
-pub fn frame_scene(scene: Res<Scene>, mut last: Local<Option<SceneKind>>, mut orbits: Query<&mut Orbit>) {
+pub fn frame_scene(
+    scene: Res<Scene>,
+    mut last: Local<Option<SceneKind>>,
+    mut orbits: Query<&mut Orbit>,
+) {
     if last.replace(scene.kind).is_some_and(|kind| kind != scene.kind) {
         for mut orbit in &mut orbits {
             *orbit = Orbit { shift: orbit.shift, ..Orbit::of(scene.kind) };

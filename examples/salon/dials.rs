@@ -44,7 +44,10 @@ pub struct Hand {
 }
 
 /// Edits a copy: what has not changed must not look changed.
-fn edit<T: HairSetting + PartialEq>(setting: &mut HairDefault<T>, ui: impl FnOnce(&mut T)) -> Option<T> {
+fn edit<T: HairSetting + PartialEq>(
+    setting: &mut HairDefault<T>,
+    ui: impl FnOnce(&mut T),
+) -> Option<T> {
     let mut value = setting.0.clone();
     ui(&mut value);
     (value != setting.0).then_some(value)
@@ -55,7 +58,12 @@ fn slide(ui: &mut Ui, value: &mut f32, range: core::ops::RangeInclusive<f32>, te
 }
 
 /// The same with a value in m and a slider in mm.
-fn slide_mm(ui: &mut Ui, value: &mut f32, range: core::ops::RangeInclusive<f32>, text: &str) -> bool {
+fn slide_mm(
+    ui: &mut Ui,
+    value: &mut f32,
+    range: core::ops::RangeInclusive<f32>,
+    text: &str,
+) -> bool {
     let mut mm = *value * 1e3;
     let changed = slide(ui, &mut mm, range, text);
     if changed {
@@ -114,7 +122,10 @@ impl Settings<'_, '_> {
             hand.first = hand.first.min(hand.last);
             ui.add_enabled(hand.only, egui::DragValue::new(&mut hand.first).range(0..=hand.last));
             ui.label("to");
-            ui.add_enabled(hand.only, egui::DragValue::new(&mut hand.last).range(hand.first..=last));
+            ui.add_enabled(
+                hand.only,
+                egui::DragValue::new(&mut hand.last).range(hand.first..=last),
+            );
         });
         ui.label("Mean rates; drag to set them:");
         for kind in BondKind::ALL {
@@ -128,7 +139,11 @@ impl Settings<'_, '_> {
         }
         if let Some(treat) = asked {
             let treat = treat.over(hand.seconds);
-            self.treat.write(if hand.only { treat.joints(hand.first..hand.last + 1) } else { treat });
+            self.treat.write(if hand.only {
+                treat.joints(hand.first..hand.last + 1)
+            } else {
+                treat
+            });
         }
     }
 

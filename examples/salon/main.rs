@@ -35,7 +35,7 @@ use bevy_keratin::{
     prelude::*,
     render::{HairFollowers, HairRenderPlugin, HairView},
 };
-use clap::Parser;
+use clap::{CommandFactory, Parser, error::ErrorKind};
 use scenes::{Scene, SceneKind, ScenePlugin};
 use std::{path::PathBuf, process::ExitCode};
 
@@ -99,7 +99,10 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return refuse(&error),
+    };
     let scene = match Scene::new(arguments.scene, arguments.variant.as_deref()) {
         Ok(scene) => scene,
         Err(error) => {
@@ -126,6 +129,18 @@ fn main() -> ExitCode {
     }
 }
 
+/// Tells what is wrong with the command line; with a misspelt flag, which there are.
+fn refuse(error: &clap::Error) -> ExitCode {
+    // Nothing can be done about a closed terminal.
+    let _ = error.print();
+    if error.kind() == ErrorKind::UnknownArgument {
+        let command = Arguments::command();
+        let flags: Vec<&str> = command.get_arguments().filter_map(clap::Arg::get_long).collect();
+        eprintln!("valid: --{}", flags.join(", --"));
+    }
+    ExitCode::from(if error.use_stderr() { 2 } else { 0 })
+}
+
 /// What both share: the scene, the hair, the studio.
 fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
     app.insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
@@ -148,9 +163,12 @@ fn renderer() -> RenderPlugin {
     }
 }
 
-/// Bevy warns of software rendering, which is all right here.
+/// Software rendering, bare displays and missing drivers are all right or told in other words.
+const QUIET: &str = "warn,bevy_render::renderer=error,bevy_light=error,bevy_egui=error,\
+     wgpu=error,wgpu_hal=off,winit=error";
+
 fn log() -> LogPlugin {
-    LogPlugin { filter: "warn,bevy_render::renderer=error,wgpu=error,naga=warn".into(), ..default() }
+    LogPlugin { filter: QUIET.into(), ..default() }
 }
 
 fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
@@ -194,11 +212,8 @@ fn spare_software(
 }
 
 fn windowless(scene: Scene, arguments: &Arguments) -> App {
-    let window = WindowPlugin {
-        primary_window: None,
-        exit_condition: ExitCondition::DontExit,
-        ..default()
-    };
+    let window =
+        WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
     let mut app = App::new();
     let plugins = DefaultPlugins.set(window).set(renderer()).set(log());
     app.add_plugins((

@@ -84,7 +84,7 @@ fn head(p: Vec3) -> f32 {
     d = join(d, limb(p, v(-0.05, -0.012, 0.0), v(-0.2, -0.03, 0.0), 0.05, 0.056), 0.03);
     d = join(d, limb(p, v(-0.235, -0.035, 0.0), v(-0.27, -0.04, 0.15), 0.05, 0.058), 0.06);
     d = join(d, ellipsoid(p, v(-0.31, -0.02, 0.0), v(0.09, 0.07, 0.15)), 0.05);
-    d.max(BUST_END - p.x)
+    carve(d, p.x - BUST_END, 0.012)
 }
 
 fn normal(p: Vec3) -> Vec3 {
@@ -94,8 +94,8 @@ fn normal(p: Vec3) -> Vec3 {
 
 /// Skin, and the darker scalp that shows between strands.
 fn colour(p: Vec3) -> [f32; 4] {
-    let scalp = block(p, Vec3::new(0.0, -0.1, 0.0), Vec3::new(0.03, 0.016, 0.053), 0.01);
-    let share = (1.0 - scalp / 0.012).clamp(0.0, 1.0);
+    let scalp = block(p, Vec3::new(0.0, -0.1, 0.0), Vec3::new(0.044, 0.034, 0.064), 0.02);
+    let share = (1.0 - scalp / 0.006).clamp(0.0, 1.0);
     let lips = ellipsoid(p, Vec3::new(-0.064, 0.09, 0.0), Vec3::new(0.0095, 0.012, 0.02));
     let red = (1.0 - lips / 0.004).clamp(0.0, 1.0) * 0.45;
     let skin = Vec3::new(0.62, 0.40, 0.29).lerp(Vec3::new(0.50, 0.18, 0.15), red);
@@ -137,9 +137,11 @@ pub fn mesh() -> Mesh {
         for y in 1..count.y - 1 {
             for x in 1..count.x - 1 {
                 let c = UVec3::new(x, y, z);
-                for (axis, u, v) in
-                    [(UVec3::X, UVec3::Y, UVec3::Z), (UVec3::Y, UVec3::Z, UVec3::X), (UVec3::Z, UVec3::X, UVec3::Y)]
-                {
+                for (axis, u, v) in [
+                    (UVec3::X, UVec3::Y, UVec3::Z),
+                    (UVec3::Y, UVec3::Z, UVec3::X),
+                    (UVec3::Z, UVec3::X, UVec3::Y),
+                ] {
                     if inside(c) == inside(c + axis) {
                         continue;
                     }

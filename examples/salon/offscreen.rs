@@ -21,11 +21,16 @@ struct Captured(Option<Image>);
 
 /// How often the app may update until a picture comes back.
 const PATIENCE: u32 = 100;
-/// Updates until meshes, textures and pipelines are on the device.
-const WARM_UP: u32 = 4;
+/// Drawn updates until meshes, textures and pipelines are on the device.
+const WARM_UP: u32 = 2;
 
 /// Runs the scene and writes a PNG for every frame asked for. Gives the files' paths.
-pub fn run(app: &mut App, scene: Scene, arguments: &Arguments, folder: &Path) -> io::Result<Vec<PathBuf>> {
+pub fn run(
+    app: &mut App,
+    scene: Scene,
+    arguments: &Arguments,
+    folder: &Path,
+) -> io::Result<Vec<PathBuf>> {
     std::fs::create_dir_all(folder)?;
     let mut frames = arguments.frames.clone().unwrap_or_else(|| scene.kind.shown().to_vec());
     frames.sort_unstable();
@@ -45,20 +50,19 @@ pub fn run(app: &mut App, scene: Scene, arguments: &Arguments, folder: &Path) ->
     for _ in 0..WARM_UP {
         app.update();
     }
+    // Nothing is drawn on the way: only the ticks count.
+    draw(app, camera, false);
 
     let mut written = Vec::new();
     let mut ticks = 0;
     for frame in frames {
-        // Nothing is drawn on the way: only the ticks count.
-        draw(app, camera, false);
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
         while ticks < frame {
             app.update();
             ticks += 1;
         }
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-        draw(app, camera, true);
-        let picture = capture(app, &target)?;
+        let picture = capture(app, camera, &target)?;
         let name = format!("{}-{}-{frame}.png", scene.kind.name(), scene.variant);
         let path = folder.join(name);
         let picture = picture.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
@@ -75,10 +79,8 @@ fn draw(app: &mut App, camera: Entity, active: bool) {
 }
 
 /// Draws the world as it is now.
-fn capture(app: &mut App, target: &Handle<Image>) -> io::Result<Image> {
-    for _ in 0..WARM_UP {
-        app.update();
-    }
+fn capture(app: &mut App, camera: Entity, target: &Handle<Image>) -> io::Result<Image> {
+    draw(app, camera, true);
     app.world_mut().spawn(Screenshot::image(target.clone())).observe(
         |shot: On<ScreenshotCaptured>, mut captured: ResMut<Captured>| {
             captured.0 = Some(shot.image.clone());
@@ -86,6 +88,8 @@ fn capture(app: &mut App, target: &Handle<Image>) -> io::Result<Image> {
     );
     for _ in 0..PATIENCE {
         app.update();
+        // Once is enough; the rest is waiting.
+        draw(app, camera, false);
         if let Some(image) = app.world_mut().resource_mut::<Captured>().0.take() {
             return Ok(image);
         }

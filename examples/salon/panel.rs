@@ -60,7 +60,7 @@ fn show(
                 settings.restore();
             }
             ui.small("Mouse: drag turns, right drag moves, wheel zooms.");
-            ui.small("Keys: space plays, R restarts, → steps.");
+            ui.small("Keys: space plays, R restarts, right arrow steps.");
         });
     });
     // The action in the middle of what is left free.

@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Color32};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
 use bevy_keratin::prelude::*;
-use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot};
+use egui_plot::{HLine, Line, LineStyle, Plot};
 
 /// Frames between samples: ten a second.
 const EVERY: u32 = 6;
@@ -65,7 +65,9 @@ fn measure_now(
     measured.kept = (!director.held.is_empty())
         .then(|| measure::kept_now(&director, strands().map(|(strand, _)| strand)))
         .filter(|kept| kept.is_finite());
-    if director.frame > 0 && (measured.samples.is_empty() || director.frame >= measured.frame + EVERY) {
+    if director.frame > 0
+        && (measured.samples.is_empty() || director.frame >= measured.frame + EVERY)
+    {
         measured.frame = director.frame;
         let Measured { rates, kept, .. } = *measured;
         let seconds = f64::from(director.seconds);
@@ -107,9 +109,15 @@ fn show(mut contexts: EguiContexts, measured: Res<Measured>) -> Result {
         .default_width(290.0)
         .show(contexts.ctx_mut()?, |ui| {
             ui.label("Mean bond rate (0 cut, 1 closed)");
-            let lines: Vec<Line> = BondKind::ALL.into_iter().map(|k| rate_line(&measured, k)).collect();
-            plot("rates").legend(Legend::default().position(Corner::RightBottom)).show(ui, |ui| {
+            let lines: Vec<Line> =
+                BondKind::ALL.into_iter().map(|k| rate_line(&measured, k)).collect();
+            plot("rates").show(ui, |ui| {
                 lines.into_iter().for_each(|line| ui.line(line));
+            });
+            ui.horizontal(|ui| {
+                for kind in BondKind::ALL {
+                    ui.small(egui::RichText::new(name(kind)).color(colour(kind)));
+                }
             });
             ui.add_space(6.0);
             ui.horizontal(|ui| {

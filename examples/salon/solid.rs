@@ -16,7 +16,11 @@ pub struct Paint<'w> {
 }
 
 impl Paint<'_> {
-    pub fn matte(&mut self, base_color: Color, perceptual_roughness: f32) -> Handle<StandardMaterial> {
+    pub fn matte(
+        &mut self,
+        base_color: Color,
+        perceptual_roughness: f32,
+    ) -> Handle<StandardMaterial> {
         self.materials.add(StandardMaterial { base_color, perceptual_roughness, ..default() })
     }
 

@@ -47,9 +47,14 @@ pub fn build(mut commands: Commands, mut paint: Paint) {
         )
     };
     // Key, fill and rim.
-    commands.spawn(light(Color::srgb(1.0, 0.95, 0.88), 190_000.0, Vec3::new(1.0, 1.5, 1.5), true));
-    commands.spawn(light(Color::srgb(0.82, 0.9, 1.0), 60_000.0, Vec3::new(-1.6, 0.8, 1.3), false));
-    commands.spawn(light(Color::srgb(1.0, 0.98, 0.95), 150_000.0, Vec3::new(0.7, 1.3, -1.5), false));
+    commands.spawn(light(Color::srgb(1.0, 0.95, 0.88), 230_000.0, Vec3::new(1.0, 1.5, 1.5), true));
+    commands.spawn(light(Color::srgb(0.82, 0.9, 1.0), 75_000.0, Vec3::new(-1.6, 0.8, 1.3), false));
+    commands.spawn(light(
+        Color::srgb(1.0, 0.98, 0.95),
+        150_000.0,
+        Vec3::new(0.7, 1.3, -1.5),
+        false,
+    ));
     commands.insert_resource(GlobalAmbientLight {
         color: Color::srgb(0.9, 0.94, 1.0),
         brightness: 260.0,
@@ -63,7 +68,7 @@ pub fn build(mut commands: Commands, mut paint: Paint) {
     };
     let room: Vec<Vec2> =
         [Vec2::new(2.5, 3.0)].into_iter().chain((0..=16).map(cove)).chain([Vec2::ZERO]).collect();
-    let wall = paint.matte(Color::srgb(0.52, 0.56, 0.60), 0.95);
+    let wall = paint.matte(Color::srgb(0.60, 0.62, 0.62), 0.95);
     commands.spawn((
         Mesh3d(paint.meshes.add(lathe(&room, 96))),
         MeshMaterial3d(wall),
@@ -152,7 +157,10 @@ fn head(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity,
 }
 
 /// Keeps sleeves on the pole while the head moves.
-pub fn slide(mut sleeves: Query<(&mut Transform, &ChildOf), With<Sleeve>>, places: Query<&GlobalTransform>) {
+pub fn slide(
+    mut sleeves: Query<(&mut Transform, &ChildOf), With<Sleeve>>,
+    places: Query<&GlobalTransform>,
+) {
     for (mut sleeve, parent) in &mut sleeves {
         if let Ok(head) = places.get(parent.parent()) {
             sleeve.translation.x = POLE.x - head.translation().x;
@@ -229,7 +237,8 @@ fn blower(commands: &mut Commands, paint: &mut Paint, on: Entity) {
         blower.spawn(part(nozzle, dark.clone(), back));
         blower.spawn(part(body, red.clone(), back));
         blower.spawn(part(grill, dark.clone(), back));
-        let inside = Transform::from_xyz(0.0, 0.0, 0.03).with_rotation(Quat::from_rotation_x(FRAC_PI_2));
+        let inside =
+            Transform::from_xyz(0.0, 0.0, 0.03).with_rotation(Quat::from_rotation_x(FRAC_PI_2));
         blower.spawn(part(coil, hot, inside));
         let grip = Transform::from_xyz(0.0, -0.09, 0.145).with_rotation(lean);
         blower.spawn(part(handle, red, grip));

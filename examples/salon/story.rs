@@ -69,7 +69,11 @@ fn restart(
     });
 }
 
-fn step(mut steps: MessageReader<Step>, mut time: ResMut<Time<Virtual>>, mut fixed: ResMut<Time<Fixed>>) {
+fn step(
+    mut steps: MessageReader<Step>,
+    mut time: ResMut<Time<Virtual>>,
+    mut fixed: ResMut<Time<Fixed>>,
+) {
     if steps.read().count() > 0 {
         time.pause();
         let tick = fixed.timestep();
