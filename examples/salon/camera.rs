@@ -3,8 +3,9 @@
 use crate::scenes::{Scene, SceneKind};
 use bevy::{
     core_pipeline::tonemapping::Tonemapping,
-    input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit},
+    input::mouse::{AccumulatedMouseScroll, MouseScrollUnit},
     prelude::*,
+    window::CursorMoved,
 };
 use bevy_egui::input::EguiWantsInput;
 use core::f32::consts::{FRAC_PI_2, TAU};
@@ -35,9 +36,9 @@ impl Orbit {
     /// The view in which a scene's story is seen best.
     pub fn of(kind: SceneKind) -> Self {
         let (focus, yaw, pitch, distance) = match kind {
-            SceneKind::Bedhead => (Vec3::new(-0.06, 0.215, 0.0), 0.28, 0.12, 1.15),
-            SceneKind::BlowDry => (Vec3::new(-0.06, 0.215, 0.0), 0.28, 0.12, 1.15),
-            SceneKind::Perm => (Vec3::new(-0.04, 0.46, 0.0), 0.6, 0.1, 1.5),
+            SceneKind::Bedhead => (Vec3::new(-0.03, 0.225, 0.0), 0.32, 0.13, 1.0),
+            SceneKind::BlowDry => (Vec3::new(-0.03, 0.225, 0.0), 0.45, 0.2, 1.0),
+            SceneKind::Perm => (Vec3::new(0.0, 0.43, 0.0), 0.6, 0.08, 1.3),
         };
         Self { focus, yaw, pitch, distance, shift: 0.0 }
     }
@@ -80,12 +81,13 @@ pub fn frame_scene(
 /// Dragging orbits (right or middle button: moves), the wheel zooms, unless the panel has the mouse.
 pub fn orbit(
     buttons: Res<ButtonInput<MouseButton>>,
-    motion: Res<AccumulatedMouseMotion>,
+    mut moves: MessageReader<CursorMoved>,
     scroll: Res<AccumulatedMouseScroll>,
     panel: Res<EguiWantsInput>,
     mut dragging: Local<bool>,
     mut orbits: Query<&mut Orbit>,
 ) {
+    let motion: Vec2 = moves.read().filter_map(|moved| moved.delta).sum();
     let turning = buttons.pressed(MouseButton::Left);
     let moving = buttons.any_pressed([MouseButton::Right, MouseButton::Middle]);
     // A drag belongs to whom it began with.
@@ -96,14 +98,14 @@ pub fn orbit(
         MouseScrollUnit::Pixel => scroll.delta.y / 40.0,
     };
     for mut orbit in &mut orbits {
-        if *dragging && motion.delta != Vec2::ZERO {
+        if *dragging && motion != Vec2::ZERO {
             if turning {
-                orbit.yaw = (orbit.yaw - motion.delta.x * TURN).rem_euclid(TAU);
-                let pitch = orbit.pitch + motion.delta.y * TURN;
+                orbit.yaw = (orbit.yaw - motion.x * TURN).rem_euclid(TAU);
+                let pitch = orbit.pitch + motion.y * TURN;
                 orbit.pitch = pitch.clamp(-0.25, FRAC_PI_2 - 0.02);
             } else {
                 let turn = Quat::from_euler(EulerRot::YXZ, orbit.yaw, -orbit.pitch, 0.0);
-                let way = turn * Vec3::new(-motion.delta.x, motion.delta.y, 0.0);
+                let way = turn * Vec3::new(-motion.x, motion.y, 0.0);
                 let focus = orbit.focus + way * (orbit.distance * 8e-4);
                 orbit.focus = focus.clamp(Vec3::new(-0.5, 0.0, -0.5), Vec3::new(0.5, 0.9, 0.5));
             }
