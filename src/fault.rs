@@ -5,7 +5,8 @@ use bevy::prelude::*;
 
 /// Something that was wrong and has been contained. Written once per occurrence, so that game code
 /// can react; also logged as a warning.
-#[derive(Message, Clone, Debug, PartialEq)]
+#[derive(Message, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
 pub struct HairFault {
     /// The hair, strand, collider, blower or rod concerned; [`Entity::PLACEHOLDER`] for resources.
     pub entity: Entity,
@@ -14,7 +15,8 @@ pub struct HairFault {
 }
 
 /// The kinds of [`HairFault`].
-#[derive(thiserror::Error, Clone, Debug, PartialEq)]
+#[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
 pub enum Fault {
     /// A setting outside its range is used as the nearest valid value.
     #[error("{0}; the nearest valid value is used")]
@@ -34,13 +36,16 @@ pub enum Fault {
     /// A transform that cannot be inverted, or is not finite: the last valid one is used.
     #[error("the transform is not finite or has no inverse: the last valid pose is used")]
     Transform,
+    /// Gravity that is not finite counts as none.
+    #[error("HairGravity is not finite: no gravity is used until it is")]
+    Gravity,
     /// A request that names something that is not there.
     #[error("the treatment's target is neither a Hair nor a strand")]
     NoTarget,
 }
 
 pub(crate) fn plugin(app: &mut App) {
-    app.add_message::<HairFault>().add_systems(Last, log_faults);
+    app.add_message::<HairFault>().register_type::<HairFault>().add_systems(Last, log_faults);
 }
 
 fn log_faults(mut faults: MessageReader<HairFault>) {

@@ -13,7 +13,8 @@ use bevy::{
 
 /// A value that a constructor or a setting refuses: which, what was found, what was expected and
 /// how to mend it.
-#[derive(thiserror::Error, Clone, Debug, PartialEq)]
+#[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
 #[error("{what} is {found}, expected {low} to {high}: {hint}")]
 pub struct InvalidValue {
     /// The value's name and unit.

@@ -14,7 +14,13 @@ use bevy::{
 };
 
 use crate::{
-    air::AirPlugin, bond::BondPlugin, contact::ContactPlugin, rod::RodPlugin, strand::StrandPlugin,
+    air::AirPlugin,
+    bond::BondPlugin,
+    contact::ContactPlugin,
+    fault::{Fault, HairFault},
+    rod::RodPlugin,
+    setting::{Bound, InvalidValue},
+    strand::StrandPlugin,
     style::StylePlugin,
 };
 
@@ -76,9 +82,8 @@ impl HairSubsteps {
     ///
     /// # Errors
     /// When it is 0 or more than 1000.
-    pub fn fixed(count: u32) -> Result<Self, crate::setting::InvalidValue> {
-        crate::setting::Bound::new("HairSubsteps", 1.0, 1000.0, "6 suit a tick of 1/60 s")
-            .check(count as f32)?;
+    pub fn fixed(count: u32) -> Result<Self, InvalidValue> {
+        SUBSTEPS.check(count as f32)?;
         Ok(Self::Fixed(count))
     }
 
@@ -89,6 +94,17 @@ impl HairSubsteps {
             Self::Auto => ((seconds * 360.0 - 1e-3).ceil() as u32).clamp(1, 1000),
             Self::Fixed(n) => n.clamp(1, 1000),
         }
+    }
+}
+
+const SUBSTEPS: Bound = Bound::new("HairSubsteps", 1.0, 1000.0, "6 suit a tick of 1/60 s");
+
+fn report_substeps(substeps: Res<HairSubsteps>, mut faults: MessageWriter<HairFault>) {
+    if let HairSubsteps::Fixed(count) = *substeps
+        && let Err(wrong) = SUBSTEPS.check(count as f32)
+    {
+        let entity = Entity::PLACEHOLDER;
+        faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
     }
 }
 
@@ -184,6 +200,7 @@ impl Plugin for TickPlugin {
                             .chain(),
                     );
             })
+            .add_systems(PreUpdate, report_substeps.run_if(resource_changed::<HairSubsteps>))
             .add_systems(self.schedule, run_hair_tick);
     }
 }

@@ -198,11 +198,13 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
     });
     app.world_mut().spawn(Blower { strength: -5.0, drying: 0.3 });
     app.world_mut().spawn(PermRod { radius: 0.0, length: 0.1 });
+    app.insert_resource(HairSubsteps::Fixed(0)).insert_resource(HairGravity(Vec3::NAN));
     app.update();
     let told = faults(&mut app);
-    // 2 stiffness, 1 drag, 1 influence, 1 solver, 2 contact, 2 collider, 1 blower, 1 rod
-    assert_eq!(told.len(), 11, "{told:#?}");
-    assert!(told.iter().all(|f| matches!(f, Fault::Setting(_))));
+    // 2 stiffness, 1 drag, 1 influence, 1 solver, 2 contact, 2 collider, 1 blower, 1 rod,
+    // 1 substeps, 1 gravity
+    assert_eq!(told.len(), 13, "{told:#?}");
+    assert!(told.iter().all(|f| matches!(f, Fault::Setting(_) | Fault::Gravity)));
     run(&mut app, 0.5);
     assert_eq!(faults(&mut app), []);
     assert!(strand(&app, e).is_finite());

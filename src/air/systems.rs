@@ -22,6 +22,7 @@ impl Plugin for AirPlugin {
             .register_type::<Blower>()
             .register_type::<WindReceived>()
             .add_systems(PreUpdate, report_blowers)
+            .add_systems(PreUpdate, report_gravity.run_if(resource_changed::<HairGravity>))
             .add_systems(HairTick, apply_air.in_set(HairSystems::ExternalForces));
     }
 }
@@ -36,6 +37,12 @@ fn report_blowers(
         for wrong in notes.into_inner() {
             faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
         }
+    }
+}
+
+fn report_gravity(gravity: Res<HairGravity>, mut faults: MessageWriter<HairFault>) {
+    if !gravity.is_finite() {
+        faults.write(HairFault { entity: Entity::PLACEHOLDER, fault: Fault::Gravity });
     }
 }
 

@@ -35,10 +35,8 @@ impl JointBonds {
     pub fn rest_shape(&self, omega: Quat, influence: &[f32; BondKind::COUNT]) -> Quat {
         let mut sum = Vec3::ZERO;
         let mut total = 0.0;
-        for j in 0..BondKind::COUNT {
-            let (f, b) = (influence[j], self.rates[j]);
-            let present = aligned(omega, self.shapes[j]);
-            sum += f * (self.shapes[j] * b + present * (1.0 - b));
+        for ((shape, b), f) in self.shapes.iter().zip(self.rates).zip(influence) {
+            sum += *f * (*shape * b + aligned(omega, *shape) * (1.0 - b));
             total += f;
         }
         full(sum / total)

@@ -159,18 +159,25 @@ impl HairSetting for LockContact {
 
 /// The colliders as one hair sees them in this substep, in its frame. Written by `Interaction`, read
 /// by `Projection`.
-#[derive(Component, Clone, Debug, Default)]
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
 pub struct Obstacles {
     /// The solids.
+    #[reflect(ignore)]
     pub solids: Vec<Obstacle>,
 }
 
 /// The pairs of strands of one hair that may touch.
-#[derive(Component, Clone, Debug, Default)]
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
 pub struct LockNeighbours {
+    #[reflect(ignore)]
     list: model::Neighbours,
+    #[reflect(ignore)]
     points: Vec<Vec3>,
+    #[reflect(ignore)]
     runs: Vec<model::Run>,
+    #[reflect(ignore)]
     pushes: Vec<Vec3>,
 }
 

@@ -19,6 +19,8 @@ impl Plugin for ContactPlugin {
         setting::plugin::<LockContact>(app);
         app.register_type::<HairCollider>()
             .register_type::<ColliderShape>()
+            .register_type::<Obstacles>()
+            .register_type::<LockNeighbours>()
             .register_required_components::<Hair, Obstacles>()
             .register_required_components::<Hair, LockNeighbours>()
             .add_systems(PreUpdate, report_colliders)

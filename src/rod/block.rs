@@ -365,7 +365,7 @@ fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
     for n in &mut b.nodes {
         let v = (load3(simd, &n.p) - load3(simd, &n.from)).scale(rate);
         store3(&mut n.v, v);
-        sum = sum + v.dot(v);
+        sum += v.dot(v);
     }
     let double = rate + rate;
     for e in &mut b.edges {
@@ -373,7 +373,7 @@ fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
         let sign = Real::select(Real::lt(change.w, zero), -double, double);
         let omega = change.v.scale(sign);
         store3(&mut e.omega, omega);
-        sum = sum + omega.dot(omega);
+        sum += omega.dot(omega);
     }
     if params.internal_damping > 0.0 {
         let exchange = 0.5 * (1.0 - bevy::math::ops::exp(-params.internal_damping * params.dt));

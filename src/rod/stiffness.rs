@@ -74,6 +74,15 @@ impl Stiffness {
         Self::from_bending_length(bevy::math::ops::cbrt(ei_over_mu / REFERENCE_GRAVITY))
     }
 
+    /// The same stiffness, solved with another k_o.
+    ///
+    /// # Errors
+    /// When `bend` is outside 0 to 1.
+    pub fn with_bend(mut self, bend: f32) -> Result<Self, InvalidValue> {
+        self.bend = BEND.check(bend)?;
+        Ok(self)
+    }
+
     /// Inverse rotational mass w_q (1/m²) of an edge of length `l` on a strand whose edges average
     /// `mean`. On even strands it is χ/l²; on uneven ones it keeps EI the same in every joint.
     pub fn rotational_weight(&self, l: f32, mean: f32) -> f32 {
@@ -183,5 +192,6 @@ mod tests {
         let s = Stiffness::from_fibre(3.9e9, 70e-6, 1310.0).unwrap();
         assert!((s.bending_length - 0.0453).abs() < 1e-4);
         assert!(Stiffness::from_fibre(-1.0, 70e-6, 1310.0).is_err());
+        assert!(s.with_bend(1.5).is_err());
     }
 }

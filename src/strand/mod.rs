@@ -44,7 +44,8 @@ pub struct StrandOf(pub Entity);
 pub struct Strands(Vec<Entity>);
 
 /// Why a polyline cannot be a strand.
-#[derive(thiserror::Error, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(thiserror::Error, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Clone, PartialEq)]
 pub enum StrandError {
     /// Fewer than two nodes.
     #[error("a strand has {found} nodes, expected 2 or more: give root and tip at least")]

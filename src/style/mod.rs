@@ -204,7 +204,10 @@ impl Default for Winding {
 #[reflect(Component, Default, Clone)]
 pub struct WindingProgress {
     progress: f32,
+    /// Where the strand was when winding began, in the hair's frame.
     start: Vec<Vec3>,
+    /// Where its nodes are on the rod once they are wound, in the rod's frame.
+    on_rod: Vec<Vec3>,
 }
 
 impl WindingProgress {

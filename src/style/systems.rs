@@ -135,28 +135,41 @@ fn wind_strands(
                 radius: rod.radius * scale,
                 half_length: 0.5 * rod.length * scale,
             };
-            Some((rod, strand, settings, wound, held))
+            Some((rod, (*hair, *pose), strand, settings, wound, held))
         })
         .collect();
-    for_each(&mut items, |(rod, strand, settings, wound, held)| {
+    for_each(&mut items, |(rod, (hair, pose), strand, settings, wound, held)| {
         // The root is the scalp's, so the first node that can be wound is the next.
         let from = settings.from_node.max(1);
         if from >= strand.edges() {
             return;
         }
         if wound.start.len() != strand.nodes() {
-            wound.start = strand.positions().to_vec();
+            **wound = WindingProgress { start: strand.positions().to_vec(), ..default() };
         }
-        let seconds = settings.seconds.max(step.dt);
-        let advanced = wound.progress + step.dt / seconds;
-        wound.progress = if advanced.is_finite() { advanced.min(1.0) } else { 1.0 };
-        let pitch = if settings.pitch.is_finite() { settings.pitch } else { 0.0 };
-        let targets =
-            winding(rod, &wound.start, strand.rest_lengths(), from, pitch, wound.progress);
-        held.targets.clear();
-        held.targets.resize(from, None);
-        held.targets.extend(targets.into_iter().map(Some));
+        // Once wound, hair is fast on its rod and goes where that goes and turns.
+        if wound.on_rod.is_empty() {
+            let advanced = wound.progress + step.dt / settings.seconds.max(step.dt);
+            wound.progress = if advanced.is_finite() { advanced.min(1.0) } else { 1.0 };
+            let pitch = if settings.pitch.is_finite() { settings.pitch } else { 0.0 };
+            let path =
+                winding(rod, &wound.start, strand.rest_lengths(), from, pitch, wound.progress);
+            if wound.progress >= 1.0 {
+                wound.on_rod = path.iter().map(|p| pose.point_in(hair.point_out(*p))).collect();
+            }
+            hold(held, from, path.into_iter());
+        } else {
+            let on_rod = wound.on_rod.iter();
+            hold(held, from, on_rod.map(|p| hair.point_in(pose.point_out(*p))));
+        }
     });
+}
+
+/// Holds the nodes from `from` on.
+fn hold(held: &mut HeldNodes, from: usize, nodes: impl Iterator<Item = Vec3>) {
+    held.targets.clear();
+    held.targets.resize(from, None);
+    held.targets.extend(nodes.map(Some));
 }
 
 /// A strand that leaves its rod, for whatever reason, is free.
