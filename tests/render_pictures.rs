@@ -29,17 +29,30 @@ fn studio(scene: &mut Offscreen) {
     };
     world.spawn(light(Vec3::new(1.0, 1.6, 1.4), 9000.0, Color::srgb(1.0, 0.95, 0.88), true));
     world.spawn(light(Vec3::new(-1.6, 0.4, 0.9), 2500.0, Color::srgb(0.8, 0.88, 1.0), false));
-    world.spawn(light(Vec3::new(-0.5, 1.2, -1.6), 9000.0, Color::WHITE, true));
+    world.spawn(light(Vec3::new(-0.5, 1.2, -1.6), 4500.0, Color::WHITE, true));
     world.insert_resource(GlobalAmbientLight { brightness: 350.0, ..default() });
     world.insert_resource(ClearColor(Color::srgb(0.18, 0.19, 0.21)));
-    scene.look(Vec3::new(0.12, 0.06, 0.62), Vec3::new(0.0, -0.05, 0.0));
+    scene.look(Vec3::new(0.22, 0.08, 0.5), Vec3::new(0.0, -0.05, 0.0));
 }
 
+/// With `CURL` as radius (m) of the curls.
 fn groom(scene: &mut Offscreen, guides: usize) -> Entity {
     let world = scene.app.world_mut();
     let hair = world.spawn(Hair).id();
-    for points in head_of_guides(guides, 0.09, 0.26, 14) {
-        world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    let curl: f32 = setting("CURL", 0.0);
+    for (k, mut points) in head_of_guides(guides, 0.09, 0.26, 28).into_iter().enumerate() {
+        for (i, point) in points.iter_mut().enumerate() {
+            let (sin, cos) = (0.9 * i as f32 + 2.4 * k as f32).sin_cos();
+            let grown = (i as f32 / 9.0).min(1.0);
+            *point += Vec3::new(cos, 0.2 * sin, sin) * (curl * grown);
+        }
+        let strand = Strand::from_polyline(&points).unwrap();
+        let mut bonds = Bonds::of(&strand);
+        // For the heat map: cut toward the tips, as if they had hung in water.
+        for (i, joint) in bonds.joints.iter_mut().enumerate() {
+            joint.rates[0] = (1.4 - i as f32 / 9.0).clamp(0.0, 1.0);
+        }
+        world.spawn((StrandOf(hair), strand, bonds));
     }
     hair
 }
@@ -57,6 +70,8 @@ fn studio_pictures() {
     let Some(mut scene) = Offscreen::new(size, size) else {
         return;
     };
+    let fine = bevy::light::DirectionalLightShadowMap { size: 2048 };
+    scene.app.insert_resource(fine);
     studio(&mut scene);
     let hair = groom(&mut scene, setting("GUIDES", 220));
     let count = setting("FOLLOWERS", 5000);

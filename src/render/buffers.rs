@@ -33,7 +33,8 @@ pub struct HairBuffers {
     pub guide_count: u32,
     /// How many strands are drawn, guides included.
     pub strand_count: u32,
-    /// The child that carries mesh and material.
+    /// The child that carries mesh and material. Put `NotShadowCaster`, `RenderLayers` and the like
+    /// on it.
     pub drawn: Entity,
 }
 

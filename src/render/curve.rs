@@ -55,7 +55,8 @@ pub fn strand_point<'a>(
 
     let mut sum = strand.weights[0];
     let mut root = strand.root + sum * near_root;
-    let mut way = sum * (near_point.position - guide_point(near, strand.phase).position);
+    let near_way = near_point.position - guide_point(near, strand.phase).position;
+    let mut way = sum * near_way;
     let mut slope = sum * near_point.slope;
     for k in 1..3 {
         if strand.weights[k] <= 0.0 {
@@ -65,11 +66,19 @@ pub fn strand_point<'a>(
         let guide_root = nodes.first().copied().unwrap_or_default();
         let point = guide_point(nodes, share);
         root += strand.weights[k] * guide_root;
+        let guide_way = point.position - guide_point(nodes, strand.phase).position;
         let apart =
             point.position.distance(near_point.position) / guide_root.distance(near_root).max(1e-4);
-        let weight = strand.weights[k] * (1.0 - smoothstep(parting, 1.5 * parting, apart));
+        let together =
+            guide_way.dot(near_way) / (guide_way.length() * near_way.length()).max(1e-12);
+        let together = match share <= strand.phase {
+            true => 1.0,
+            false => smoothstep(0.0, 0.6, together),
+        };
+        let weight =
+            strand.weights[k] * (1.0 - smoothstep(parting, 1.5 * parting, apart)) * together;
         sum += weight;
-        way += weight * (point.position - guide_point(nodes, strand.phase).position);
+        way += weight * guide_way;
         slope += weight * point.slope;
     }
     let gather = if strand.is_guide { Vec3::ZERO } else { (near_root - root) * clump };

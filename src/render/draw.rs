@@ -63,12 +63,12 @@ pub(super) fn pack(
     mut hairs: Query<(
         Entity,
         &mut Packed,
-        Option<&mut HairBuffers>,
+        Option<&HairBuffers>,
         Option<&Strands>,
         &GlobalTransform,
     )>,
     strands: Query<GuideParts>,
-    mut drawn: Query<(&mut Aabb, &mut Mesh3d, &MeshMaterial3d<RibbonMaterial>)>,
+    mut drawn: Query<(&mut Aabb, &MeshMaterial3d<RibbonMaterial>)>,
     (looks, views, followers): (Settings<HairLook>, Settings<HairView>, Settings<HairFollowers>),
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
     mut meshes: ResMut<Assets<Mesh>>,
@@ -111,7 +111,7 @@ pub(super) fn pack(
             }
             continue;
         }
-        if !regroomed && let Some(((mut bounds, _, material), buffers)) = known {
+        if !regroomed && let Some(((mut bounds, material), buffers)) = known {
             bounds.set_if_neq(aabb);
             let counts = (buffers.guide_count, buffers.strand_count);
             let ribbon = packed.ribbon(&look, &settings, view, counts);
@@ -145,30 +145,30 @@ pub(super) fn pack(
             guides: add(bytemuck::cast_slice(&ranges)),
             strands: add(&pack_strands(&strands)),
         };
-        let new = HairBuffers {
-            nodes: material.nodes.clone(),
-            guides: material.guides.clone(),
-            strands: material.strands.clone(),
+        let (nodes, guides) = (material.nodes.clone(), material.guides.clone());
+        let strands = material.strands.clone();
+        let mesh = meshes.add(ribbon_mesh(counts.1, settings.segments));
+        let parts = (Mesh3d(mesh), MeshMaterial3d(materials.add(material)), aabb, NoAutoAabb);
+        // The child stays what it is for whatever a game has put on it.
+        let drawn = match known {
+            Some((_, old)) => {
+                commands.entity(old.drawn).try_insert(parts);
+                old.drawn
+            }
+            // Transforms have been propagated already in this frame.
+            None => {
+                let name = Name::new("drawn hair");
+                commands.spawn((name, parts, *place, ChildOf(hair))).id()
+            }
+        };
+        commands.entity(hair).insert(HairBuffers {
+            nodes,
+            guides,
+            strands,
             guide_count: counts.0,
             strand_count: counts.1,
-            drawn: Entity::PLACEHOLDER,
-        };
-        let mesh = meshes.add(ribbon_mesh(counts.1, settings.segments));
-        if let Some(old) = buffers {
-            commands.entity(old.drawn).try_despawn();
-        }
-        let child = commands.spawn((
-            Name::new("drawn hair"),
-            Mesh3d(mesh),
-            MeshMaterial3d(materials.add(material)),
-            aabb,
-            NoAutoAabb,
-            // Transforms have been propagated already in this frame.
-            *place,
-            ChildOf(hair),
-        ));
-        let drawn = child.id();
-        commands.entity(hair).insert(HairBuffers { drawn, ..new });
+            drawn,
+        });
     }
 }
 

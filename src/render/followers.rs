@@ -35,7 +35,8 @@ pub struct HairFollowers {
     /// How much tips draw together around their guide, a share. Default 0.25, safe 0…1.
     pub clump: f32,
     /// How many times farther apart than at the scalp guides may be before they stop blending.
-    /// Default 5, safe 1.5…100.
+    /// Guides that go ways more than 60° to 90° apart, as at a parting, stop in any case. Default 4,
+    /// safe 1.5…100.
     pub parting: f32,
     /// How far around it followers grow where a guide stands alone (m). Default 6 mm.
     pub lock_radius: f32,
@@ -51,7 +52,7 @@ impl Default for HairFollowers {
             phase_variation: 0.03,
             stray: 0.03,
             clump: 0.25,
-            parting: 5.0,
+            parting: 4.0,
             lock_radius: 6e-3,
         }
     }
@@ -72,7 +73,7 @@ impl HairFollowers {
 const COUNT: Bound = Bound::new("HairFollowers::count", 0.0, 1e6, "20000 suit a head");
 const SEGMENTS: Bound = Bound::new("HairFollowers::segments", 1.0, 256.0, "16 suit most hair");
 const SHARE: Bound = Bound::new("a share of HairFollowers", 0.0, 1.0, "shares go from 0 to 1");
-const PARTING: Bound = Bound::new("HairFollowers::parting", 1.0, 1e6, "5 suits most hair");
+const PARTING: Bound = Bound::new("HairFollowers::parting", 1.0, 1e6, "4 suits most hair");
 const RADIUS: Bound = Bound::new("HairFollowers::lock_radius (m)", 0.0, 10.0, "locks have 0.006");
 
 impl HairSetting for HairFollowers {

@@ -11,23 +11,23 @@ use bevy::prelude::*;
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct Melanin {
-    /// Brown-black pigment. 0 in white hair, about 2 in black hair; safe 0…8.
+    /// Brown-black pigment. 0 in white hair, about 2.5 in black hair; safe 0…8.
     pub eumelanin: f32,
-    /// Yellow-red pigment. 0 in most hair, about 0.5 in red hair; safe 0…8.
+    /// Yellow-red pigment. 0 in most hair, about 0.85 in red hair; safe 0…8.
     pub pheomelanin: f32,
 }
 
 impl Melanin {
     /// Black hair.
-    pub const BLACK: Self = Self::new(1.9, 0.0);
+    pub const BLACK: Self = Self::new(2.5, 0.0);
     /// Dark brown hair, the most frequent colour after black.
-    pub const DARK_BROWN: Self = Self::new(0.75, 0.05);
+    pub const DARK_BROWN: Self = Self::new(1.0, 0.08);
     /// Mid-brown hair.
-    pub const BROWN: Self = Self::new(0.38, 0.06);
+    pub const BROWN: Self = Self::new(0.5, 0.08);
     /// Reddish brown hair.
-    pub const AUBURN: Self = Self::new(0.3, 0.45);
+    pub const AUBURN: Self = Self::new(0.35, 0.7);
     /// Red hair.
-    pub const RED: Self = Self::new(0.06, 0.5);
+    pub const RED: Self = Self::new(0.07, 0.85);
     /// Blond hair.
     pub const BLOND: Self = Self::new(0.1, 0.04);
     /// Very light blond hair.
@@ -98,7 +98,7 @@ pub struct HairLook {
     pub roughness: f32,
     /// Strength of the highlights; 1 is a clean fibre. Default 1, safe 0…4.
     pub gloss: f32,
-    /// Strength of the light that shines through against the light. Default 0.6, safe 0…2.
+    /// Strength of the light that shines through against the light. Default 0.4, safe 0…2.
     pub backlight: f32,
     /// How deep light goes into the hair where a light casts shadows (m). Default 12 mm,
     /// safe 1…100 mm. Lower gives harder shade between locks.
@@ -120,7 +120,7 @@ impl Default for HairLook {
             taper: 0.3,
             roughness: 0.38,
             gloss: 1.0,
-            backlight: 0.6,
+            backlight: 0.4,
             self_shadow: 12e-3,
             root_shade: 0.5,
             shading: HairShading::default(),
@@ -128,7 +128,7 @@ impl Default for HairLook {
     }
 }
 
-const MELANIN: Bound = Bound::new("Melanin", 0.0, 1e3, "2 of eumelanin is black");
+const MELANIN: Bound = Bound::new("Melanin", 0.0, 1e3, "2.5 of eumelanin is black");
 const SHARE: Bound = Bound::new("a share of HairLook", 0.0, 1.0, "shares go from 0 to 1");
 const WIDTH: Bound = Bound::new("HairLook::width (m)", 1e-6, 1.0, "0.00035 suits a head");
 const ROUGHNESS: Bound = Bound::new("HairLook::roughness", 0.05, 1.0, "0.38 suits clean hair");

@@ -49,7 +49,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
 fn heat(value: f32) -> vec3<f32> {
     let v = saturate(value);
     let srgb = vec3(v, 1.6 * v * (1.0 - v), 1.0 - v);
-    return pow(srgb, vec3(2.2));
+    return select(pow((srgb + 0.055) / 1.055, vec3(2.4)), srgb / 12.92, srgb <= vec3(0.04045));
 }
 
 @fragment

@@ -76,8 +76,10 @@ fn scattered(fibre: Fibre, surface: Surface, l: vec3<f32>, shadow: f32) -> vec3<
     let cylinder = sqrt(max(1.0 - lt * lt, 0.0));
     let wrapped = saturate((dot(fibre.outward, l) + 0.5) / 2.25);
     let tint = pow(surface.color / max(luminance(surface.color), 1e-4), vec3(1.0 - shadow));
-    return sqrt(surface.color) * surface.color * tint * mix(wrapped, cylinder, 0.4) * (1.5 / PI)
-        + surface.color * wrapped / PI;
+    // The cuticles' rough edges scatter some light that never met a pigment.
+    let pale = surface.color + 0.012;
+    return sqrt(surface.color) * surface.color * tint * mix(wrapped, cylinder, 0.4) * (1.0 / PI)
+        + pale * wrapped / PI;
 }
 
 // Reflected share of light from `l`, shadow (1 lit) included. Not yet weighted by the light.
@@ -215,7 +217,7 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         let front = saturate(dot(cross((*panel).up, (*panel).right), -l));
         let area = (*panel).width * (*panel).height;
         let falloff = lighting::getRangeFalloff(square, 1.0 / max((*panel).range * (*panel).range, 1e-4));
-        light += PI * reflected(fibre, surface, l, 1.0) * (*panel).color.rgb
+        light += reflected(fibre, surface, l, 1.0) * (*panel).color.rgb
             * (front * area / (square + area) * falloff);
     }
 

@@ -104,7 +104,8 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
 
     var weights = vec3(strand.weights.x * nodes[near.x].shown, 0.0, 0.0);
     var root = strand.root + strand.weights.x * near_root;
-    var way = weights.x * (near_point.position - guide_point(near, strand.phase).position);
+    let near_way = near_point.position - guide_point(near, strand.phase).position;
+    var way = weights.x * near_way;
     var slope = weights.x * near_point.slope;
     for (var i = 1; i < 3; i++) {
         if strand.weights[i] <= 0.0 {
@@ -114,13 +115,17 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
         let guide_root = nodes[guide.x].position;
         let point = guide_point(guide, out.share);
         root += strand.weights[i] * guide_root;
-        // Guides that went apart stop blending: the strand goes with its nearest.
+        let guide_way = point.position - guide_point(guide, strand.phase).position;
+        // Guides that went apart, or other ways, stop blending: the strand goes with its nearest.
         let apart = distance(point.position, near_point.position)
             / max(distance(guide_root, near_root), 1e-4);
+        let together = dot(guide_way, near_way)
+            / max(length(guide_way) * length(near_way), 1e-12);
         let weight = strand.weights[i] * nodes[guide.x].shown
-            * (1.0 - smoothstep(ribbon.parting, 1.5 * ribbon.parting, apart));
+            * (1.0 - smoothstep(ribbon.parting, 1.5 * ribbon.parting, apart))
+            * select(smoothstep(0.0, 0.6, together), 1.0, out.share <= strand.phase);
         weights[i] = weight;
-        way += weight * (point.position - guide_point(guide, strand.phase).position);
+        way += weight * guide_way;
         slope += weight * point.slope;
     }
     let sum = weights.x + weights.y + weights.z;

@@ -92,46 +92,49 @@ pub fn windowless() -> PluginGroupBuilder {
         .disable::<bevy::render::pipelined_rendering::PipelinedRenderingPlugin>()
 }
 
-/// Whether there is anything that can draw; says so on the test's output if not.
+/// Whether there is anything that can draw; says so on the test's output if not. Asked of the
+/// drivers' descriptions, because Bevy panics without an adapter.
 pub fn has_adapter() -> bool {
-    use bevy::render::settings::WgpuSettings;
-    let settings = WgpuSettings::default();
-    let backends = settings.backends.unwrap_or_default();
-    let instance = wgpu_probe::has_adapter(backends.bits());
-    if !instance {
-        eprintln!("skipped: no graphics adapter, install mesa-vulkan-drivers to draw in software");
+    let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
+    let named = ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"];
+    let found = !cfg!(target_os = "linux")
+        || named.iter().any(|name| std::env::var_os(name).is_some())
+        || (folders.iter()).any(|folder| {
+            std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some())
+        });
+    if !found {
+        println!("skipped: no graphics driver; mesa-vulkan-drivers draws in software");
     }
-    instance
-}
-
-mod wgpu_probe {
-    /// Bevy panics without an adapter, so that must be known before.
-    pub fn has_adapter(_: u32) -> bool {
-        // A Vulkan loader with at least one driver description, or a platform that always has one.
-        if !cfg!(target_os = "linux") {
-            return true;
-        }
-        let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
-        std::env::var_os("VK_ICD_FILENAMES").is_some()
-            || std::env::var_os("VK_DRIVER_FILES").is_some()
-            || folders
-                .iter()
-                .any(|f| std::fs::read_dir(f).is_ok_and(|mut entries| entries.next().is_some()))
-    }
+    found
 }
 
 impl Offscreen {
     /// `None`, with the reason printed, where nothing can draw. The tick stands still until
     /// `ticking` is told.
     pub fn new(width: u32, height: u32) -> Option<Self> {
+        Self::of(width, height, false)
+    }
+
+    /// The same with the hair's plugins added before Bevy's.
+    pub fn with_hair_first(width: u32, height: u32) -> Option<Self> {
+        Self::of(width, height, true)
+    }
+
+    fn of(width: u32, height: u32, hair_first: bool) -> Option<Self> {
         if !has_adapter() {
             return None;
         }
         let mut app = App::new();
-        app.add_plugins((windowless(), HairPlugins::default()))
-            .insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
+        if hair_first {
+            app.add_plugins((HairPlugins::default(), windowless()));
+        } else {
+            app.add_plugins((windowless(), HairPlugins::default()));
+        }
+        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
             .insert_resource(ClearColor(Color::BLACK))
             .insert_resource(GlobalAmbientLight::NONE)
+            .insert_resource(bevy::light::DirectionalLightShadowMap { size: 1024 })
+            .insert_resource(bevy::light::PointLightShadowMap { size: 512 })
             .init_resource::<Caught>();
         let mut image =
             Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
@@ -211,41 +214,42 @@ impl Offscreen {
     }
 }
 
-/// Guides on a ball of `radius` around the origin, growing outward and falling under their weight:
-/// `count` of them in a spiral from the crown down to the height `lowest` (a share of the radius).
+/// Guides on a ball of `radius` around the origin, parted in the middle and combed to the sides:
+/// about `count` of them in a spiral over the scalp; the face looks along +z.
 pub fn head_of_guides(count: usize, radius: f32, length: f32, nodes: usize) -> Vec<Vec<Vec3>> {
     let golden = core::f32::consts::PI * (3.0 - 5.0f32.sqrt());
+    let root = |i: usize| {
+        let y = 1.0 - 1.15 * (i as f32 + 0.5) / count as f32;
+        let (sin, cos) = (golden * i as f32).sin_cos();
+        let flat = (1.0 - y * y).max(0.0).sqrt();
+        Vec3::new(cos * flat, y, sin * flat)
+    };
     (0..count)
-        .map(|i| {
-            let y = 1.0 - 1.05 * (i as f32 + 0.5) / count as f32;
-            let (sin, cos) = (golden * i as f32).sin_cos();
-            let flat = (1.0 - y * y).max(0.0).sqrt();
-            let out = Vec3::new(cos * flat, y, sin * flat);
-            fall(out * radius, out, length, nodes, radius)
-        })
-        .filter(|points| {
-            // The face is free.
-            let root = points[0] / radius;
-            !(root.z > 0.35 && root.y < 0.55)
-        })
+        .map(root)
+        // The face and the ears are free.
+        .filter(|root| !(root.z > 0.25 && root.y < 0.62) && !(root.z > 0.05 && root.y < 0.2))
+        .map(|root| combed(root, radius, length, nodes))
         .collect()
 }
 
-/// A strand that leaves along `out`, lies down over the ball and hangs.
-fn fall(root: Vec3, out: Vec3, length: f32, nodes: usize, radius: f32) -> Vec<Vec3> {
+/// A strand that lies down over the ball to its side and hangs.
+fn combed(root: Vec3, radius: f32, length: f32, nodes: usize) -> Vec<Vec3> {
     let step = length / (nodes - 1) as f32;
-    let mut points = vec![root];
-    let mut way = out;
-    let back = Vec3::new(0.0, -1.0, -0.25);
+    let side = if root.x < 0.0 { -1.0 } else { 1.0 };
+    let mut points = vec![root * radius];
+    let mut way = (root + Vec3::new(side, 0.3, -0.4)).normalize();
     for _ in 1..nodes {
         let p = points[points.len() - 1];
-        way = (way + back * (step * 28.0)).normalize();
-        let mut next = p + way * step;
-        let clear = radius * 1.05;
+        let out = p.normalize();
+        let comb = if out.y > 0.1 { 0.9 } else { 0.05 };
+        let pull = Vec3::new(side * comb, -1.0, -0.35 * comb - 0.1);
+        way = (way + pull * (step * 30.0)).normalize();
+        let next = p + way * step;
+        // A layer of hair lies between the ball and the outer strands.
+        let clear = radius * (1.08 + 0.06 * root.y.max(0.0));
         if next.length() < clear {
-            next = next.normalize() * clear;
+            way = (next.normalize() * clear - p).normalize_or(way);
         }
-        way = (next - p).normalize_or(way);
         points.push(p + way * step);
     }
     points

@@ -1,0 +1,217 @@
+//! The shader's curve and follower maths against its Rust twin, on random data.
+
+mod common;
+#[path = "common/offscreen.rs"]
+mod offscreen;
+
+use bevy::{
+    prelude::*,
+    render::{
+        RenderApp,
+        render_resource::{
+            BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BufferDescriptor,
+            BufferInitDescriptor, BufferUsages, ComputePipelineDescriptor, MapMode, PipelineCache,
+            PollType, ShaderStages,
+            binding_types::{
+                storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer_sized,
+            },
+        },
+        renderer::{RenderDevice, RenderQueue},
+    },
+    shader::ShaderDefVal,
+};
+use bevy_keratin::render::{DrawnStrand, curve::strand_point};
+use offscreen::Offscreen;
+
+const SAMPLES: usize = 24;
+const SHADER: &str = "
+#import bevy_keratin::strands::{strands, strand_point}
+@group(0) @binding(4) var<storage, read_write> out: array<vec4<f32>>;
+@compute @workgroup_size(1)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let t = f32(id.y) / f32(SAMPLES - 1u);
+    let point = strand_point(strands[id.x], t);
+    let at = 2u * (id.x * SAMPLES + id.y);
+    out[at] = vec4(point.position, 1.0);
+    out[at + 1u] = vec4(point.slope, 1.0);
+}
+const SAMPLES: u32 = 24u;
+";
+
+/// A fixed sequence of numbers in 0…1.
+struct Random(u32);
+
+impl Random {
+    fn share(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (self.0 >> 8) as f32 / 16_777_216.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.share(), self.share(), self.share()) - 0.5
+    }
+}
+
+fn random_guides(random: &mut Random) -> Vec<Vec<Vec3>> {
+    (0..20)
+        .map(|k| {
+            let nodes = 2 + k % 9;
+            let mut p = random.vector() * 0.1;
+            (0..nodes)
+                .map(|_| {
+                    p += random.vector() * 0.06 - Vec3::Y * 0.02;
+                    p
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn random_strand(random: &mut Random, k: u32) -> DrawnStrand {
+    if k < 20 {
+        return DrawnStrand::guide(k);
+    }
+    let mut guide = || (random.share() * 20.0) as u32;
+    let guides = [guide(), guide(), guide()];
+    let (u, v) = (0.5 * random.share(), 0.5 * random.share());
+    DrawnStrand {
+        guides,
+        weights: [1.0 - 0.5 * (u + v), 0.5 * u, 0.5 * v],
+        length: 1.0 - 0.4 * random.share(),
+        root: random.vector() * 0.01,
+        phase: 0.1 * random.share(),
+        stray: random.vector() * 0.02,
+        ..default()
+    }
+}
+
+#[test]
+fn the_shader_puts_strands_where_its_rust_twin_does() {
+    let Some(mut scene) = Offscreen::new(16, 16) else {
+        return;
+    };
+    let (clump, parting) = (0.3, 2.0);
+    let mut random = Random(7);
+    let guides = random_guides(&mut random);
+    let strands: Vec<_> = (0..120).map(|k| random_strand(&mut random, k)).collect();
+
+    let mut nodes: Vec<[f32; 8]> = Vec::new();
+    let mut ranges: Vec<[u32; 2]> = Vec::new();
+    for guide in &guides {
+        ranges.push([nodes.len() as u32, guide.len() as u32]);
+        nodes.extend(guide.iter().map(|p| [p.x, p.y, p.z, 0.0, 0.0, 0.0, 0.0, 1.0]));
+    }
+    let mut ribbon = [0.0f32; 24];
+    (ribbon[17], ribbon[18]) = (clump, parting);
+    let packed: Vec<[u32; 16]> = strands.iter().map(DrawnStrand::packed).collect();
+
+    let shader = Shader::from_wgsl(SHADER, "twin.wgsl");
+    let shader = scene.app.world_mut().resource_mut::<Assets<Shader>>().add(shader);
+    let read = || storage_buffer_read_only_sized(false, None);
+    let layout = BindGroupLayoutDescriptor::new(
+        "twin",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::COMPUTE,
+            (
+                uniform_buffer_sized(false, None),
+                read(),
+                read(),
+                read(),
+                storage_buffer_sized(false, None),
+            ),
+        ),
+    );
+    scene.app.update();
+    let cache = |scene: &mut Offscreen| {
+        scene.app.sub_app_mut(RenderApp).world_mut().remove_resource::<PipelineCache>().unwrap()
+    };
+    let give_back = |scene: &mut Offscreen, cache: PipelineCache| {
+        scene.app.sub_app_mut(RenderApp).world_mut().insert_resource(cache);
+    };
+    let pipelines = cache(&mut scene);
+    let id = pipelines.queue_compute_pipeline(ComputePipelineDescriptor {
+        layout: vec![layout.clone()],
+        shader,
+        shader_defs: vec![ShaderDefVal::UInt("MATERIAL_BIND_GROUP".into(), 0)],
+        ..default()
+    });
+    give_back(&mut scene, pipelines);
+    for _ in 0..50 {
+        scene.app.update();
+        let render = scene.app.sub_app(RenderApp).world();
+        if render.resource::<PipelineCache>().get_compute_pipeline(id).is_some() {
+            break;
+        }
+    }
+
+    let render = scene.app.sub_app(RenderApp).world();
+    let pipelines = render.resource::<PipelineCache>();
+    let device = render.resource::<RenderDevice>();
+    let Some(pipeline) = pipelines.get_compute_pipeline(id) else {
+        panic!("the pipeline is not ready: {:?}", scene.unready_pipelines());
+    };
+    let buffer = |contents: &[u8], usage| {
+        device.create_buffer_with_data(&BufferInitDescriptor { label: None, contents, usage })
+    };
+    let storage = BufferUsages::STORAGE;
+    let size = (strands.len() * SAMPLES * 32) as u64;
+    let made = |usage| {
+        device.create_buffer(&BufferDescriptor {
+            label: None,
+            size,
+            usage,
+            mapped_at_creation: false,
+        })
+    };
+    let out = made(storage | BufferUsages::COPY_SRC);
+    let back = made(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
+    let bytes_of =
+        |words: &[u32]| -> Vec<u8> { words.iter().flat_map(|w| w.to_le_bytes()).collect() };
+    let ribbon = buffer(&bytes_of(&ribbon.map(f32::to_bits)), BufferUsages::UNIFORM);
+    let nodes: Vec<u32> = nodes.iter().flatten().map(|x| x.to_bits()).collect();
+    let nodes = buffer(&bytes_of(&nodes), storage);
+    let ranges = buffer(&bytes_of(ranges.as_flattened()), storage);
+    let packed = buffer(&bytes_of(packed.as_flattened()), storage);
+    let group = device.create_bind_group(
+        None,
+        &pipelines.get_bind_group_layout(&layout),
+        &BindGroupEntries::sequential((
+            ribbon.as_entire_binding(),
+            nodes.as_entire_binding(),
+            ranges.as_entire_binding(),
+            packed.as_entire_binding(),
+            out.as_entire_binding(),
+        )),
+    );
+    let mut encoder = device.create_command_encoder(&default());
+    {
+        let mut pass = encoder.begin_compute_pass(&default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(strands.len() as u32, SAMPLES as u32, 1);
+    }
+    encoder.copy_buffer_to_buffer(&out, 0, &back, 0, size);
+    render.resource::<RenderQueue>().submit([encoder.finish()]);
+    device.map_buffer(&back.slice(..), MapMode::Read, |mapped| mapped.unwrap());
+    device.poll(PollType::wait_indefinitely()).unwrap();
+    let bytes = back.slice(..).get_mapped_range().to_vec();
+    let read = |i: usize| f32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().unwrap());
+    let vector = |i: usize| Vec3::new(read(4 * i), read(4 * i + 1), read(4 * i + 2));
+
+    let guide = |k: u32| &guides[k as usize][..];
+    let (mut worst, mut parted) = (0.0f32, 0);
+    for (k, strand) in strands.iter().enumerate() {
+        for i in 0..SAMPLES {
+            let t = i as f32 / (SAMPLES - 1) as f32;
+            let twin = strand_point(strand, guide, t, clump, parting);
+            let at = 2 * (k * SAMPLES + i);
+            worst = worst.max(vector(at).distance(twin.position));
+            worst = worst.max(vector(at + 1).distance(twin.slope) * 0.01);
+            let blended = strand_point(strand, guide, t, clump, 1e6);
+            parted += usize::from(blended.position.distance(twin.position) > 1e-4);
+        }
+    }
+    println!("largest difference {worst} m; {parted} points where guides had parted");
+    assert!(worst < 1e-5, "shader and twin differ by {worst} m");
+    assert!(parted > 100, "the data must contain parted guides");
+}
