@@ -1,1 +1,226 @@
-fn main() {}
+//! The salon: a head with hair that remembers, in a window with everything to play with, or drawn
+//! into pictures.
+//!
+//! `cargo run --release --example salon`
+//! `cargo run --release --example salon -- --scene perm --offscreen pictures`
+
+#[path = "../scenes/mod.rs"]
+mod scenes;
+
+mod camera;
+mod dials;
+mod failure;
+mod mannequin;
+mod offscreen;
+mod panel;
+mod plots;
+mod solid;
+mod stage;
+mod story;
+mod tools;
+
+use bevy::{
+    log::LogPlugin,
+    prelude::*,
+    render::{
+        RenderPlugin,
+        pipelined_rendering::PipelinedRenderingPlugin,
+        renderer::RenderAdapterInfo,
+        settings::{Backends, WgpuSettings},
+    },
+    window::{ExitCondition, WindowResolution},
+    winit::WinitPlugin,
+};
+use bevy_keratin::{
+    prelude::*,
+    render::{HairFollowers, HairRenderPlugin, HairView},
+};
+use clap::{CommandFactory, Parser, error::ErrorKind};
+use scenes::{Scene, SceneKind, ScenePlugin};
+use std::{path::PathBuf, process::ExitCode};
+
+/// A head with hair that remembers, in a window or in pictures.
+#[derive(Parser)]
+#[command(version)]
+pub struct Arguments {
+    /// Which scene: bedhead, blow-dry, perm.
+    #[arg(long, default_value = "bedhead")]
+    scene: SceneKind,
+    /// Which variant of it; the full treatment if left out.
+    #[arg(long)]
+    variant: Option<String>,
+    /// What is shown of the hair.
+    #[arg(long, default_value = "natural")]
+    view: View,
+    /// Draws no window, but PNGs into this folder.
+    #[arg(long, value_name = "DIR")]
+    offscreen: Option<PathBuf>,
+    /// The frames to draw, 60 a second; those that the paper shows if left out.
+    #[arg(long, requires = "offscreen", value_delimiter = ',', value_name = "N,N",
+          value_parser = clap::value_parser!(u32).range(..=100_000))]
+    frames: Option<Vec<u32>>,
+    /// Width and height of pictures or window (pixels).
+    #[arg(long, default_value = "1280x720", value_name = "WxH", value_parser = size)]
+    size: (u32, u32),
+}
+
+/// The views by name.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum View {
+    Natural,
+    Guides,
+    Hydrogen,
+    Ionic,
+    Disulfide,
+    Peptide,
+    Strain,
+}
+
+impl From<View> for HairView {
+    fn from(view: View) -> Self {
+        match view {
+            View::Natural => Self::Natural,
+            View::Guides => Self::Guides,
+            View::Hydrogen => Self::Bond(BondKind::Hydrogen),
+            View::Ionic => Self::Bond(BondKind::Ionic),
+            View::Disulfide => Self::Bond(BondKind::Disulfide),
+            View::Peptide => Self::Bond(BondKind::Peptide),
+            View::Strain => Self::Strain,
+        }
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let valid = |side: u32| (16..=8192).contains(&side);
+    sides
+        .filter(|&(w, h)| valid(w) && valid(h))
+        .ok_or_else(|| "expected WIDTHxHEIGHT of 16 to 8192 each, such as 1280x720".into())
+}
+
+fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return refuse(&error),
+    };
+    let scene = match Scene::new(arguments.scene, arguments.variant.as_deref()) {
+        Ok(scene) => scene,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return ExitCode::from(2);
+        }
+    };
+    failure::explain_known();
+    match arguments.offscreen.clone() {
+        None => windowed(scene, &arguments),
+        Some(folder) => {
+            let mut app = windowless(scene, &arguments);
+            match offscreen::run(&mut app, scene, &arguments, &folder) {
+                Ok(paths) => {
+                    paths.iter().for_each(|path| println!("{}", path.display()));
+                    ExitCode::SUCCESS
+                }
+                Err(error) => {
+                    eprintln!("error: no pictures in {}: {error}", folder.display());
+                    ExitCode::FAILURE
+                }
+            }
+        }
+    }
+}
+
+/// Tells what is wrong with the command line; with a misspelt flag, which there are.
+fn refuse(error: &clap::Error) -> ExitCode {
+    // Nothing can be done about a closed terminal.
+    let _ = error.print();
+    if error.kind() == ErrorKind::UnknownArgument {
+        let command = Arguments::command();
+        let flags: Vec<&str> = command.get_arguments().filter_map(clap::Arg::get_long).collect();
+        eprintln!("valid: --{}", flags.join(", --"));
+    }
+    ExitCode::from(if error.use_stderr() { 2 } else { 0 })
+}
+
+/// What both share: the scene, the hair, the studio.
+fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
+    app.insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
+        .add_plugins(ScenePlugin(scene))
+        .insert_resource(HairDefault(HairView::from(arguments.view)))
+        .add_systems(Startup, stage::build.before(scenes::spawn_scene))
+        .add_systems(PostUpdate, (stage::embody, stage::slide).before(TransformSystems::Propagate));
+}
+
+/// Hair is drawn by storage buffers in the vertex stage, which GL lacks.
+fn renderer() -> RenderPlugin {
+    let mut settings = WgpuSettings::default();
+    if std::env::var_os("WGPU_BACKEND").is_none() {
+        settings.backends = Some(Backends::PRIMARY);
+    }
+    RenderPlugin {
+        render_creation: settings.into(),
+        synchronous_pipeline_compilation: true,
+        ..default()
+    }
+}
+
+/// Software rendering, bare displays and missing drivers are all right or told in other words.
+const QUIET: &str = "warn,bevy_render::renderer=error,bevy_light=error,bevy_egui=error,\
+     wgpu=error,wgpu_hal=off,winit=error";
+
+fn log() -> LogPlugin {
+    LogPlugin { filter: QUIET.into(), ..default() }
+}
+
+fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
+    let (width, height) = arguments.size;
+    let window = Window {
+        title: "bevy_keratin salon".into(),
+        resolution: WindowResolution::new(width, height),
+        ..default()
+    };
+    let window = WindowPlugin { primary_window: Some(window), ..default() };
+    let mut app = App::new();
+    app.add_plugins((
+        DefaultPlugins.set(window).set(renderer()).set(log()),
+        HairPlugins::default(),
+        panel::PanelPlugin,
+        story::StoryPlugin,
+    ));
+    salon(&mut app, scene, arguments);
+    app.add_systems(Startup, (open_eye, spare_software).after(stage::build))
+        .add_systems(Update, (camera::frame_scene, camera::orbit, camera::place).chain());
+    match app.run() {
+        AppExit::Success => ExitCode::SUCCESS,
+        AppExit::Error(code) => ExitCode::from(code.get()),
+    }
+}
+
+fn open_eye(mut commands: Commands, scene: Res<Scene>) {
+    commands.spawn(camera::bundle(scene.kind));
+}
+
+/// Without a graphics card a window is drawn with fewer strands and plain edges, or it would crawl.
+fn spare_software(
+    adapter: Option<Res<RenderAdapterInfo>>,
+    mut followers: ResMut<HairDefault<HairFollowers>>,
+    mut lights: Query<&mut SpotLight>,
+) {
+    if adapter.is_some_and(|a| format!("{:?}", a.device_type) == "Cpu") {
+        followers.count = followers.count.min(1500);
+        lights.iter_mut().for_each(|mut light| light.shadow_maps_enabled = false);
+    }
+}
+
+fn windowless(scene: Scene, arguments: &Arguments) -> App {
+    let window =
+        WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+    let mut app = App::new();
+    let plugins = DefaultPlugins.set(window).set(renderer()).set(log());
+    app.add_plugins((
+        plugins.disable::<WinitPlugin>().disable::<PipelinedRenderingPlugin>(),
+        // A picture shows its own frame, not one between two.
+        HairPlugins::default().set(HairRenderPlugin { interpolate: false }),
+    ));
+    salon(&mut app, scene, arguments);
+    app
+}

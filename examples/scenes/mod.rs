@@ -17,7 +17,7 @@ use bevy::prelude::*;
 use bevy_keratin::{WindReceived, prelude::*};
 use core::{fmt, str::FromStr};
 
-pub use script::Director;
+pub use script::{Director, Moment};
 
 /// Which story is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,312 @@
+//! The panel's sliders: treatments, the hair's own values, air, solver, tools and looks.
+
+use crate::{
+    plots::{Measured, colour, name},
+    tools::{self, Tools},
+};
+use bevy::{ecs::system::SystemParam, prelude::*};
+use bevy_egui::egui::{self, Color32, Slider, Ui};
+use bevy_keratin::{
+    prelude::*,
+    render::{HairFollowers, HairLook, HairView, Melanin, heat},
+    setting::HairSetting,
+};
+
+/// Everything that sliders change.
+#[derive(SystemParam)]
+pub struct Settings<'w, 's> {
+    stiffness: ResMut<'w, HairDefault<Stiffness>>,
+    influence: ResMut<'w, HairDefault<BondInfluence>>,
+    cuticle: ResMut<'w, HairDefault<Cuticle>>,
+    contact: ResMut<'w, HairDefault<LockContact>>,
+    drag: ResMut<'w, HairDefault<AirDrag>>,
+    solver: ResMut<'w, HairDefault<Solver>>,
+    gravity: ResMut<'w, HairGravity>,
+    substeps: ResMut<'w, HairSubsteps>,
+    view: ResMut<'w, HairDefault<HairView>>,
+    look: ResMut<'w, HairDefault<HairLook>>,
+    followers: ResMut<'w, HairDefault<HairFollowers>>,
+    tools: ResMut<'w, Tools>,
+    blowers: Query<'w, 's, (Entity, &'static Blower, &'static Transform)>,
+    hairs: Query<'w, 's, (Entity, &'static Strands), With<Hair>>,
+    strands: Query<'w, 's, &'static Strand>,
+    treat: MessageWriter<'w, Treat>,
+    commands: Commands<'w, 's>,
+}
+
+/// How the next treatment is given.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Hand {
+    seconds: f32,
+    only: bool,
+    first: usize,
+    last: usize,
+}
+
+/// Edits a copy: what has not changed must not look changed.
+fn edit<T: HairSetting + PartialEq>(
+    setting: &mut HairDefault<T>,
+    ui: impl FnOnce(&mut T),
+) -> Option<T> {
+    let mut value = setting.0.clone();
+    ui(&mut value);
+    (value != setting.0).then_some(value)
+}
+
+fn slide(ui: &mut Ui, value: &mut f32, range: core::ops::RangeInclusive<f32>, text: &str) -> bool {
+    ui.add(Slider::new(value, range).text(text).max_decimals(3)).changed()
+}
+
+/// The same with a value in m and a slider in mm.
+fn slide_mm(
+    ui: &mut Ui,
+    value: &mut f32,
+    range: core::ops::RangeInclusive<f32>,
+    text: &str,
+) -> bool {
+    let mut mm = *value * 1e3;
+    let changed = slide(ui, &mut mm, range, text);
+    if changed {
+        *value = mm * 1e-3;
+    }
+    changed
+}
+
+macro_rules! edited {
+    ($setting:expr, $ui:expr) => {
+        if let Some(value) = edit($setting.bypass_change_detection(), $ui) {
+            $setting.0 = value;
+        }
+    };
+}
+
+impl Settings<'_, '_> {
+    /// Everything as the paper has it.
+    pub fn restore(&mut self) {
+        *self.stiffness = default();
+        *self.influence = default();
+        *self.cuticle = default();
+        *self.contact = default();
+        *self.drag = default();
+        *self.solver = default();
+        *self.gravity = default();
+        *self.substeps = default();
+        *self.tools = default();
+    }
+
+    /// Buttons and sliders that ask the tick for changes of bond rates.
+    pub fn treatments(&mut self, ui: &mut Ui, hand: &mut Hand, measured: &Measured) {
+        let Ok((hair, members)) = self.hairs.single() else { return };
+        let joints = members.iter().find_map(|s| self.strands.get(s).ok()).map_or(0, Strand::edges);
+        let mut asked = None;
+        let kinds: [(&str, &str, fn(Entity) -> Treat); 6] = [
+            ("Wet", "cuts hydrogen bonds", Treat::wet),
+            ("Dry", "hydrogen bonds close in the present shape", Treat::dry),
+            ("Shampoo", "cuts hydrogen and ionic bonds", Treat::shampoo),
+            ("Lotion", "cuts hydrogen, ionic and a fifth of the disulfide bonds", Treat::lotion),
+            ("Neutraliser", "ionic and disulfide bonds close", Treat::neutraliser),
+            ("Set everything", "the present shape becomes the hair's own", Treat::set_everything),
+        ];
+        ui.horizontal_wrapped(|ui| {
+            for (label, what, treat) in kinds {
+                if ui.button(label).on_hover_text(what).clicked() {
+                    asked = Some(treat(hair));
+                }
+            }
+        });
+        slide(ui, &mut hand.seconds, 0.0..=5.0, "takes (s)");
+        ui.horizontal(|ui| {
+            ui.checkbox(&mut hand.only, "only joints");
+            let last = joints.saturating_sub(1);
+            hand.last = if hand.only { hand.last.min(last) } else { last };
+            hand.first = hand.first.min(hand.last);
+            ui.add_enabled(hand.only, egui::DragValue::new(&mut hand.first).range(0..=hand.last));
+            ui.label("to");
+            ui.add_enabled(
+                hand.only,
+                egui::DragValue::new(&mut hand.last).range(hand.first..=last),
+            );
+        });
+        ui.label("Mean rates; drag to set them:");
+        for kind in BondKind::ALL {
+            let mut rate = measured.rates[kind as usize] as f32;
+            let text = egui::RichText::new(name(kind)).color(colour(kind));
+            let slider = Slider::new(&mut rate, 0.0..=1.0).text(text).max_decimals(2);
+            // The backbone is never cut.
+            if ui.add_enabled(kind != BondKind::Peptide, slider).changed() {
+                asked = Treat::set(hair, kind, rate).ok();
+            }
+        }
+        if let Some(treat) = asked {
+            let treat = treat.over(hand.seconds);
+            self.treat.write(if hand.only {
+                treat.joints(hand.first..hand.last + 1)
+            } else {
+                treat
+            });
+        }
+    }
+
+    pub fn hair(&mut self, ui: &mut Ui) {
+        edited!(self.stiffness, |s: &mut Stiffness| {
+            slide_mm(ui, &mut s.bending_length, 20.0..=400.0, "bending length (mm)");
+            slide(ui, &mut s.bend, 0.005..=0.1, "k₀ of a substep");
+        });
+        ui.label("Influence of each kind of bond:");
+        edited!(self.influence, |f: &mut BondInfluence| {
+            slide(ui, &mut f.hydrogen, 0.0..=1.0, name(BondKind::Hydrogen));
+            slide(ui, &mut f.ionic, 0.0..=1.0, name(BondKind::Ionic));
+            slide(ui, &mut f.disulfide, 0.0..=1.0, name(BondKind::Disulfide));
+            slide(ui, &mut f.peptide, 0.01..=1.0, name(BondKind::Peptide));
+        });
+        edited!(self.cuticle, |c: &mut Cuticle| {
+            slide(ui, &mut c.damage, 0.0..=5.0, "cuticle lost (1/m)");
+        });
+        edited!(self.contact, |c: &mut LockContact| {
+            slide_mm(ui, &mut c.radius, 0.0..=5.0, "lock radius (mm)");
+        });
+    }
+
+    pub fn air(&mut self, ui: &mut Ui) {
+        let mut down = -self.gravity.y;
+        if slide(ui, &mut down, 0.0..=20.0, "gravity (m/s²)") {
+            self.gravity.y = -down;
+        }
+        edited!(self.drag, |d: &mut AirDrag| {
+            slide(ui, &mut d.rate, 0.0..=20.0, "drag (1/s)");
+        });
+    }
+
+    pub fn solver(&mut self, ui: &mut Ui) {
+        edited!(self.solver, |s: &mut Solver| {
+            ui.add(Slider::new(&mut s.iterations, 1..=50).text("iterations"));
+            ui.add(Slider::new(&mut s.limiter_steps, 0..=4).text("length limiter steps"));
+            slide(ui, &mut s.internal_damping, 0.0..=50.0, "bend damping (1/s)");
+        });
+        let mut auto = *self.substeps == HairSubsteps::Auto;
+        let now = self.substeps.count(1.0 / 60.0);
+        if ui.checkbox(&mut auto, "substeps near 1/360 s").changed() {
+            *self.substeps = if auto { HairSubsteps::Auto } else { HairSubsteps::Fixed(now) };
+        }
+        let mut count = now;
+        let slider = Slider::new(&mut count, 1..=24).text("substeps a tick");
+        if ui.add_enabled(!auto, slider).changed() {
+            *self.substeps = HairSubsteps::Fixed(count);
+        }
+    }
+
+    pub fn tools(&mut self, ui: &mut Ui) {
+        let there = self.blowers.iter().next().map(|(_, b, t)| (*b, t.translation));
+        let mut on = there.is_some();
+        if ui.checkbox(&mut on, "blower").changed() {
+            if on {
+                self.commands.spawn(tools::blower());
+                // Its values are the user's from the start.
+                self.tools.set_changed();
+            } else {
+                self.blowers.iter().for_each(|(e, ..)| self.commands.entity(e).despawn());
+            }
+        }
+        let (blower, place) = there.unwrap_or((Blower::default(), tools::BLOWER_PLACE));
+        let mut wanted = *self.tools;
+        let mut strength = wanted.strength.unwrap_or(blower.strength);
+        if slide(ui, &mut strength, 0.0..=30.0, "strength (m/s²)") {
+            wanted.strength = Some(strength);
+        }
+        let mut drying = wanted.drying.unwrap_or(blower.drying);
+        if slide(ui, &mut drying, 0.0..=1.0, "drying (s/m)") {
+            wanted.drying = Some(drying);
+        }
+        let mut place = wanted.place.unwrap_or(place);
+        let mut moved = slide(ui, &mut place.x, -0.4..=0.4, "x (m)");
+        moved |= slide(ui, &mut place.y, 0.02..=0.6, "y (m)");
+        moved |= slide(ui, &mut place.z, -0.4..=0.4, "z (m)");
+        if moved {
+            wanted.place = Some(place);
+        }
+        let mut radius = wanted.radius.unwrap_or(PermRod::default().radius);
+        if slide_mm(ui, &mut radius, 18.0..=60.0, "rod radius (mm)") {
+            wanted.radius = Some(radius);
+        }
+        self.tools.set_if_neq(wanted);
+    }
+
+    /// The heat map's switch and its scale, as in the paper's figure 5.
+    pub fn view(&mut self, ui: &mut Ui, kind: &mut BondKind) {
+        let mut view = self.view.0;
+        let mut coloured = matches!(view, HairView::Bond(_));
+        ui.checkbox(&mut coloured, "colour by bond rate");
+        ui.horizontal(|ui| {
+            for k in BondKind::ALL {
+                coloured |= ui.selectable_value(kind, k, name(k)).clicked();
+            }
+        });
+        view = match (coloured, view) {
+            (true, _) => HairView::Bond(*kind),
+            (false, HairView::Bond(_)) => HairView::Natural,
+            (false, other) => other,
+        };
+        if coloured {
+            scale(ui, "0 cut", "1 closed");
+        }
+        ui.horizontal(|ui| {
+            ui.label("or");
+            ui.selectable_value(&mut view, HairView::Natural, "natural");
+            ui.selectable_value(&mut view, HairView::Guides, "guides");
+            ui.selectable_value(&mut view, HairView::Strain, "strain");
+        });
+        if view == HairView::Strain {
+            scale(ui, "0 %", "5 %");
+        }
+        if view != self.view.0 {
+            self.view.0 = view;
+        }
+    }
+
+    pub fn look(&mut self, ui: &mut Ui) {
+        edited!(self.followers, |f: &mut HairFollowers| {
+            ui.add(Slider::new(&mut f.count, 0..=40_000).logarithmic(true).text("followers"));
+            slide(ui, &mut f.stray, 0.0..=0.2, "stray");
+            slide(ui, &mut f.clump, 0.0..=1.0, "clump");
+        });
+        edited!(self.look, |l: &mut HairLook| {
+            slide_mm(ui, &mut l.width, 0.05..=1.5, "width (mm)");
+            ui.horizontal_wrapped(|ui| {
+                let colours = [
+                    ("black", Melanin::BLACK),
+                    ("brown", Melanin::BROWN),
+                    ("auburn", Melanin::AUBURN),
+                    ("red", Melanin::RED),
+                    ("blond", Melanin::BLOND),
+                    ("platinum", Melanin::PLATINUM),
+                ];
+                for (label, melanin) in colours {
+                    ui.selectable_value(&mut l.melanin, melanin, label);
+                }
+            });
+            slide(ui, &mut l.melanin.eumelanin, 0.0..=2.0, "eumelanin");
+            slide(ui, &mut l.melanin.pheomelanin, 0.0..=1.0, "pheomelanin");
+            slide(ui, &mut l.roughness, 0.1..=1.0, "roughness");
+        });
+    }
+}
+
+/// The colours from 0 to 1.
+fn scale(ui: &mut Ui, low: &str, high: &str) {
+    ui.horizontal(|ui| {
+        ui.small(low);
+        let (rect, _) = ui.allocate_exact_size(egui::vec2(120.0, 10.0), egui::Sense::hover());
+        let steps = 24;
+        for i in 0..steps {
+            let share = |i: i32| i as f32 / steps as f32;
+            let [r, g, b, _] = heat(share(i)).to_srgba().to_u8_array();
+            let x = rect.x_range();
+            let piece = egui::Rect::from_x_y_ranges(
+                egui::lerp(x.min..=x.max, share(i))..=egui::lerp(x.min..=x.max, share(i + 1)),
+                rect.y_range(),
+            );
+            ui.painter().rect_filled(piece, 0.0, Color32::from_rgb(r, g, b));
+        }
+        ui.small(high);
+    });
+}

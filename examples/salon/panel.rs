@@ -1,0 +1,141 @@
+//! The panel: choosing and playing scenes, and all that can be changed while they run.
+
+use crate::{
+    camera::Orbit,
+    dials::{Hand, Settings},
+    plots::{Measured, PlotsPlugin},
+    scenes::{Director, Scene, SceneKind},
+    story::{Restart, Step, moments, toggle},
+    tools,
+};
+use bevy::prelude::*;
+use bevy_egui::{
+    EguiContexts, EguiPlugin, EguiPrimaryContextPass,
+    egui::{self, CollapsingHeader, Slider, Ui, UiBuilder},
+};
+use bevy_keratin::BondKind;
+
+/// How wide the panel and the plots are (points).
+const WIDTH: f32 = 300.0;
+const PLOTS: f32 = 310.0;
+
+pub struct PanelPlugin;
+
+impl Plugin for PanelPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins((EguiPlugin::default(), PlotsPlugin))
+            .init_resource::<tools::Tools>()
+            .add_systems(Update, (tools::give_back, tools::apply).chain())
+            .add_systems(EguiPrimaryContextPass, show);
+    }
+}
+
+fn show(
+    mut contexts: EguiContexts,
+    mut player: Player,
+    mut settings: Settings,
+    measured: Res<Measured>,
+    mut hand: Local<Hand>,
+    mut kind: Local<Option<BondKind>>,
+    mut orbits: Query<&mut Orbit>,
+) -> Result {
+    let ctx = contexts.ctx_mut()?;
+    let area = ctx.viewport_rect();
+    let layer = UiBuilder::new().layer_id(egui::LayerId::background()).max_rect(area);
+    let mut root = Ui::new(ctx.clone(), "salon".into(), layer);
+    let kind = kind.get_or_insert(BondKind::Hydrogen);
+    egui::Panel::left("panel").exact_size(WIDTH).resizable(false).show(&mut root, |ui| {
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.spacing_mut().slider_width = 110.0;
+            player.show(ui);
+            section(ui, "Bond rates", true, |ui| settings.treatments(ui, &mut hand, &measured));
+            section(ui, "Colours", true, |ui| settings.view(ui, kind));
+            section(ui, "Hair", false, |ui| settings.hair(ui));
+            section(ui, "Air", false, |ui| settings.air(ui));
+            section(ui, "Blower and rod", false, |ui| settings.tools(ui));
+            section(ui, "Solver", false, |ui| settings.solver(ui));
+            section(ui, "Looks", false, |ui| settings.look(ui));
+            ui.add_space(6.0);
+            if ui.button("Everything as in the paper").clicked() {
+                settings.restore();
+            }
+            ui.small("Mouse: drag turns, right drag moves, wheel zooms.");
+            ui.small("Keys: space plays, R restarts, right arrow steps.");
+        });
+    });
+    // The action in the middle of what is left free.
+    let shift = 0.5 * (WIDTH - PLOTS) / area.height().max(1.0);
+    for mut orbit in &mut orbits {
+        if orbit.shift != shift {
+            orbit.shift = shift;
+        }
+    }
+    Ok(())
+}
+
+fn section(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui)) {
+    CollapsingHeader::new(title).default_open(open).show(ui, add);
+}
+
+/// What chooses and plays.
+#[derive(bevy::ecs::system::SystemParam)]
+pub struct Player<'w> {
+    scene: Res<'w, Scene>,
+    director: Res<'w, Director>,
+    time: ResMut<'w, Time<Virtual>>,
+    restarts: MessageWriter<'w, Restart>,
+    steps: MessageWriter<'w, Step>,
+}
+
+impl Player<'_> {
+    fn show(&mut self, ui: &mut Ui) {
+        ui.add_space(4.0);
+        let mut wanted = *self.scene;
+        ui.horizontal(|ui| {
+            for kind in SceneKind::ALL {
+                if ui.selectable_label(wanted.kind == kind, kind.name()).clicked() {
+                    wanted = Scene { kind, variant: kind.variants()[0] };
+                }
+            }
+        });
+        ui.horizontal_wrapped(|ui| {
+            for variant in wanted.kind.variants() {
+                ui.selectable_value(&mut wanted.variant, *variant, *variant);
+            }
+        });
+        ui.horizontal(|ui| {
+            let label = if self.time.is_paused() { "▶ Play" } else { "⏸ Pause" };
+            if ui.button(label).clicked() {
+                toggle(&mut self.time);
+            }
+            if ui.button("Step").on_hover_text("one tick of 1/60 s").clicked() {
+                self.steps.write(Step);
+            }
+            if ui.button("Reset").clicked() || wanted != *self.scene {
+                self.restarts.write(Restart(wanted));
+            }
+        });
+        let mut speed = self.time.relative_speed();
+        if ui.add(Slider::new(&mut speed, 0.1..=4.0).logarithmic(true).text("speed")).changed() {
+            self.time.set_relative_speed(speed);
+        }
+        self.story(ui);
+        ui.separator();
+    }
+
+    /// The moments of the story, the present one marked.
+    fn story(&self, ui: &mut Ui) {
+        let now = self.director.seconds;
+        let frame = self.director.frame;
+        let end = self.scene.kind.frames();
+        let share = frame as f32 / end as f32;
+        let text = format!("{now:.1} s, frame {frame} of {end}");
+        ui.add(egui::ProgressBar::new(share.min(1.0)).text(egui::RichText::new(text).small()));
+        let moments = moments(*self.scene);
+        let present = moments.iter().rposition(|(from, _)| *from <= now).unwrap_or(0);
+        for (i, (from, words)) in moments.iter().enumerate() {
+            let line = egui::RichText::new(format!("{from:>4.1} s  {words}")).small();
+            ui.label(if i == present { line.strong() } else { line.weak() });
+        }
+    }
+}

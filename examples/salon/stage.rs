@@ -1,0 +1,248 @@
+//! The studio: three lights, a backdrop, the stand, and the models of head, rod and blower.
+
+use crate::{
+    mannequin,
+    scenes::{HEAD_RADIUS, Model, Scene, SceneKind},
+    solid::{Paint, lathe},
+};
+use bevy::prelude::*;
+use core::f32::consts::{FRAC_PI_2, PI};
+
+/// Where the stand's pole is (m).
+const POLE: Vec3 = Vec3::new(-0.60, 0.0, -0.03);
+
+/// What is made once.
+#[derive(Resource)]
+pub struct Studio {
+    head: Handle<Mesh>,
+    skin: Handle<StandardMaterial>,
+    chrome: Handle<StandardMaterial>,
+}
+
+/// The sleeve by which the head's arm hangs on the pole.
+#[derive(Component)]
+pub struct Sleeve;
+
+/// Lights, backdrop and stand, which every scene shares.
+pub fn build(mut commands: Commands, mut paint: Paint) {
+    let head = paint.meshes.add(mannequin::mesh());
+    let skin = paint.matte(Color::WHITE, 0.55);
+    let chrome = paint.metal(Color::srgb(0.72, 0.73, 0.75));
+
+    let light = |colour, lumens, from: Vec3, shadow| {
+        (
+            SpotLight {
+                color: colour,
+                intensity: lumens,
+                range: 8.0,
+                radius: 0.05,
+                shadow_maps_enabled: shadow,
+                shadow_normal_bias: 0.6,
+                shadow_depth_bias: 0.004,
+                inner_angle: 0.35,
+                outer_angle: 0.75,
+                ..default()
+            },
+            Transform::from_translation(from).looking_at(Vec3::new(-0.03, 0.25, 0.0), Vec3::Y),
+        )
+    };
+    // Key, fill and rim.
+    commands.spawn(light(Color::srgb(1.0, 0.95, 0.88), 230_000.0, Vec3::new(1.0, 1.5, 1.5), true));
+    commands.spawn(light(Color::srgb(0.82, 0.9, 1.0), 75_000.0, Vec3::new(-1.6, 0.8, 1.3), false));
+    commands.spawn(light(
+        Color::srgb(1.0, 0.98, 0.95),
+        150_000.0,
+        Vec3::new(0.7, 1.3, -1.5),
+        false,
+    ));
+    commands.insert_resource(GlobalAmbientLight {
+        color: Color::srgb(0.9, 0.94, 1.0),
+        brightness: 260.0,
+        ..default()
+    });
+
+    // One surface from the top of the wall down to the floor, all around.
+    let cove = |i: i32| {
+        let turn = FRAC_PI_2 * i as f32 / 16.0;
+        Vec2::new(1.7 + 0.8 * turn.cos(), 0.8 - 0.8 * turn.sin())
+    };
+    let room: Vec<Vec2> =
+        [Vec2::new(2.5, 3.0)].into_iter().chain((0..=16).map(cove)).chain([Vec2::ZERO]).collect();
+    let wall = paint.matte(Color::srgb(0.60, 0.62, 0.62), 0.95);
+    commands.spawn((
+        Mesh3d(paint.meshes.add(lathe(&room, 96))),
+        MeshMaterial3d(wall),
+        Transform::from_xyz(0.0, -0.012, 0.0),
+    ));
+    // Its top is the floor that the hair feels.
+    let cloth = paint.matte(Color::srgb(0.80, 0.77, 0.71), 0.9);
+    commands.spawn((
+        Mesh3d(paint.meshes.add(lathe(
+            &[
+                Vec2::new(0.36, -0.012),
+                Vec2::new(0.362, -0.004),
+                Vec2::new(0.358, -0.0012),
+                Vec2::new(0.352, -0.0006),
+                Vec2::new(0.0, -0.0006),
+            ],
+            96,
+        ))),
+        MeshMaterial3d(cloth),
+        Transform::from_xyz(0.03, 0.0, 0.0),
+    ));
+    let base = [
+        Vec2::new(0.13, -0.012),
+        Vec2::new(0.13, 0.004),
+        Vec2::new(0.12, 0.012),
+        Vec2::new(0.016, 0.018),
+        Vec2::new(0.014, 0.03),
+        Vec2::new(0.014, 0.96),
+        Vec2::new(0.010, 0.968),
+        Vec2::new(0.0, 0.97),
+    ];
+    commands.spawn((
+        Mesh3d(paint.meshes.add(lathe(&base, 48))),
+        MeshMaterial3d(chrome.clone()),
+        Transform::from_translation(POLE),
+    ));
+    commands.insert_resource(Studio { head, skin, chrome });
+}
+
+/// Gives a body to every model that has appeared or changed.
+pub fn embody(
+    mut commands: Commands,
+    mut paint: Paint,
+    studio: Res<Studio>,
+    scene: Res<Scene>,
+    models: Query<(Entity, &Model), Changed<Model>>,
+) {
+    for (entity, model) in &models {
+        commands.entity(entity).despawn_related::<Children>().insert(Visibility::default());
+        match *model {
+            Model::Head(_) => head(&mut commands, &mut paint, &studio, entity, scene.kind),
+            Model::Rod(radius, length) => rod(&mut commands, &mut paint, entity, radius, length),
+            Model::Blower => blower(&mut commands, &mut paint, entity),
+        }
+    }
+}
+
+type Part = (Mesh3d, MeshMaterial3d<StandardMaterial>, Transform);
+
+fn part(mesh: Handle<Mesh>, material: Handle<StandardMaterial>, place: Transform) -> Part {
+    (Mesh3d(mesh), MeshMaterial3d(material), place)
+}
+
+fn head(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity, kind: SceneKind) {
+    let along_x = Quat::from_rotation_z(FRAC_PI_2);
+    let end = Vec3::new(mannequin::BUST_END, -0.03, 0.0);
+    let arm = paint.meshes.add(Cylinder::new(0.009, 0.5));
+    let sleeve = paint.meshes.add(Cuboid::new(0.05, 0.045, 0.085));
+    let dark = paint.matte(Color::srgb(0.05, 0.05, 0.06), 0.5);
+    commands.entity(on).with_children(|head| {
+        head.spawn(part(studio.head.clone(), studio.skin.clone(), default()));
+        head.spawn(part(
+            arm,
+            studio.chrome.clone(),
+            Transform::from_translation(end - Vec3::X * 0.24).with_rotation(along_x),
+        ));
+        let place = Transform::from_translation(end.with_z(0.5 * POLE.z));
+        head.spawn((Sleeve, part(sleeve, dark.clone(), place)));
+        if kind == SceneKind::Perm {
+            // The row is wider than the head: a bar clamps it, as for a weft.
+            let bar = paint.meshes.add(Cuboid::new(0.014, 0.012, 0.215));
+            let place = Transform::from_xyz(0.0, 0.005 - HEAD_RADIUS, 0.0);
+            head.spawn(part(bar, dark, place));
+        }
+    });
+}
+
+/// Keeps sleeves on the pole while the head moves.
+pub fn slide(
+    mut sleeves: Query<(&mut Transform, &ChildOf), With<Sleeve>>,
+    places: Query<&GlobalTransform>,
+) {
+    for (mut sleeve, parent) in &mut sleeves {
+        if let Ok(head) = places.get(parent.parent()) {
+            sleeve.translation.x = POLE.x - head.translation().x;
+        }
+    }
+}
+
+fn rod(commands: &mut Commands, paint: &mut Paint, on: Entity, radius: f32, length: f32) {
+    let half = 0.5 * length;
+    // A slim barrel with grooves, so that hair lies on its nominal radius.
+    let mut barrel = vec![Vec2::new(0.0, -half)];
+    let rings = 12;
+    for i in 0..=rings {
+        let y = (2.0 * i as f32 / rings as f32 - 1.0) * half;
+        let groove = if i % 2 == 0 { 0.0012 } else { 0.0022 };
+        barrel.push(Vec2::new((radius - groove).max(0.001), y));
+    }
+    barrel.push(Vec2::new(0.0, half));
+    let collar = [
+        Vec2::new(0.0, -0.004),
+        Vec2::new(radius + 0.003, -0.004),
+        Vec2::new(radius + 0.004, -0.002),
+        Vec2::new(radius + 0.004, 0.002),
+        Vec2::new(radius + 0.003, 0.004),
+        Vec2::new(0.008, 0.004),
+        Vec2::new(0.007, 0.012),
+        Vec2::new(0.0, 0.013),
+    ];
+    let plastic = paint.matte(Color::srgb(0.55, 0.33, 0.62), 0.35);
+    let white = paint.matte(Color::srgb(0.86, 0.85, 0.83), 0.4);
+    let barrel = paint.meshes.add(lathe(&barrel, 40));
+    let collar = paint.meshes.add(lathe(&collar, 40));
+    commands.entity(on).with_children(|rod| {
+        rod.spawn(part(barrel, plastic, default()));
+        rod.spawn(part(collar.clone(), white.clone(), Transform::from_xyz(0.0, half, 0.0)));
+        let other = Transform::from_xyz(0.0, -half, 0.0).with_rotation(Quat::from_rotation_x(PI));
+        rod.spawn(part(collar, white, other));
+    });
+}
+
+fn blower(commands: &mut Commands, paint: &mut Paint, on: Entity) {
+    // Its mouth is at the origin and looks along −Z; the lathe turns round Y.
+    let back = Transform::from_rotation(Quat::from_rotation_x(FRAC_PI_2));
+    let nozzle = [
+        Vec2::new(0.026, 0.052),
+        Vec2::new(0.021, 0.004),
+        Vec2::new(0.023, 0.0),
+        Vec2::new(0.025, 0.001),
+        Vec2::new(0.031, 0.055),
+    ];
+    let mut nozzle = nozzle;
+    nozzle.reverse();
+    let body = [
+        Vec2::new(0.030, 0.05),
+        Vec2::new(0.036, 0.06),
+        Vec2::new(0.041, 0.09),
+        Vec2::new(0.043, 0.14),
+        Vec2::new(0.041, 0.175),
+        Vec2::new(0.034, 0.195),
+        Vec2::new(0.026, 0.2),
+    ];
+    let grill = [Vec2::new(0.027, 0.199), Vec2::new(0.02, 0.202), Vec2::new(0.0, 0.203)];
+    let hot = paint.glow(Color::srgb(1.0, 0.35, 0.12), 1.2);
+    let red = paint.matte(Color::srgb(0.66, 0.10, 0.12), 0.3);
+    let dark = paint.matte(Color::srgb(0.04, 0.04, 0.045), 0.5);
+    let nozzle = paint.meshes.add(lathe(&nozzle, 40));
+    let body = paint.meshes.add(lathe(&body, 40));
+    let grill = paint.meshes.add(lathe(&grill, 40));
+    let coil = paint.meshes.add(Torus::new(0.010, 0.014));
+    let handle = paint.meshes.add(Capsule3d::new(0.0165, 0.1));
+    let switch = paint.meshes.add(Cuboid::new(0.008, 0.026, 0.006));
+    let lean = Quat::from_rotation_x(-0.18);
+    commands.entity(on).with_children(|blower| {
+        blower.spawn(part(nozzle, dark.clone(), back));
+        blower.spawn(part(body, red.clone(), back));
+        blower.spawn(part(grill, dark.clone(), back));
+        let inside =
+            Transform::from_xyz(0.0, 0.0, 0.03).with_rotation(Quat::from_rotation_x(FRAC_PI_2));
+        blower.spawn(part(coil, hot, inside));
+        let grip = Transform::from_xyz(0.0, -0.09, 0.145).with_rotation(lean);
+        blower.spawn(part(handle, red, grip));
+        let thumb = Transform::from_xyz(0.0, -0.075, 0.127).with_rotation(lean);
+        blower.spawn(part(switch, dark, thumb));
+    });
+}
