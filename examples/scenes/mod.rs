@@ -17,6 +17,7 @@ use bevy::prelude::*;
 use bevy_keratin::{WindReceived, prelude::*};
 use core::{fmt, str::FromStr};
 
+#[allow(unused_imports, reason = "each example uses its own part")]
 pub use script::{Director, Moment};
 
 /// Which story is told.
