@@ -20,7 +20,8 @@ pub struct HairFollowers {
     /// How many strands are drawn besides the guides. Default 12,000; 0 draws guides only; safe to
     /// 100,000. A real head carries 100,000.
     pub count: u32,
-    /// Straight pieces drawn for each strand, along a smooth curve. Default 16, safe 2…64.
+    /// Straight pieces drawn for each strand, along a smooth curve. Default 16, safe 2…64; for curls
+    /// at least as many as the guides have edges.
     pub segments: u32,
     /// The same seed gives the same followers.
     pub seed: u32,
