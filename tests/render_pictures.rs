@@ -6,7 +6,7 @@ mod common;
 mod offscreen;
 
 use bevy::{light::CascadeShadowConfigBuilder, prelude::*};
-use bevy_keratin::{prelude::*, render::*};
+use bevy_keratin::prelude::*;
 use offscreen::{Offscreen, head_of_guides};
 
 fn studio(scene: &mut Offscreen) {

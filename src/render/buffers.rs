@@ -166,4 +166,22 @@ mod tests {
     fn rates_are_bytes() {
         assert_eq!(unorm8([0.0, 1.0, 0.5, f32::NAN]), 0x0080_ff00);
     }
+
+    #[test]
+    #[ignore = "a timing, to be read"]
+    fn what_packing_costs() {
+        let points: Vec<Vec3> = (0..16).map(|i| Vec3::Y * (0.02 * i as f32)).collect();
+        let strand = Strand::from_polyline(&points).unwrap();
+        let strands = vec![(strand.clone(), Bonds::of(&strand)); 10_000];
+        let history = StrandHistory { positions: points };
+        let mut out = Vec::new();
+        for _ in 0..3 {
+            out.clear();
+            let start = std::time::Instant::now();
+            for (strand, bonds) in &strands {
+                pack_guide(&mut out, strand, &history, bonds, None, 0.5);
+            }
+            println!("10,000 guides of 16 nodes: {:?}", start.elapsed());
+        }
+    }
 }

@@ -98,21 +98,21 @@ pub(super) fn pack(
             };
         }
         let (low, high) = bounds.unwrap_or_default();
-        let aabb = Aabb::from_min_max(low - packed.margin, high + packed.margin);
+        let around = |margin: f32| Aabb::from_min_max(low - margin, high + margin);
         let look = looks.of(hair);
         let view = views.of(hair);
         let key = RibbonKey::new(&look, view);
 
-        let known = buffers.as_ref().and_then(|b| drawn.get_mut(b.drawn).ok().zip(Some(b)));
+        let known = buffers.and_then(|b| drawn.get_mut(b.drawn).ok().zip(Some(b)));
         if packed.layout.is_empty() {
-            if let Some(buffers) = &buffers {
+            if let Some(buffers) = buffers {
                 commands.entity(buffers.drawn).try_despawn();
                 commands.entity(hair).remove::<HairBuffers>();
             }
             continue;
         }
         if !regroomed && let Some(((mut bounds, material), buffers)) = known {
-            bounds.set_if_neq(aabb);
+            bounds.set_if_neq(around(packed.margin));
             let counts = (buffers.guide_count, buffers.strand_count);
             let ribbon = packed.ribbon(&look, &settings, view, counts);
             if (packed.ribbon, packed.key) != (ribbon, key) {
@@ -148,7 +148,8 @@ pub(super) fn pack(
         let (nodes, guides) = (material.nodes.clone(), material.guides.clone());
         let strands = material.strands.clone();
         let mesh = meshes.add(ribbon_mesh(counts.1, settings.segments));
-        let parts = (Mesh3d(mesh), MeshMaterial3d(materials.add(material)), aabb, NoAutoAabb);
+        let material = MeshMaterial3d(materials.add(material));
+        let parts = (Mesh3d(mesh), material, around(packed.margin), NoAutoAabb);
         // The child stays what it is for whatever a game has put on it.
         let drawn = match known {
             Some((_, old)) => {

@@ -20,7 +20,8 @@ pub struct HairFollowers {
     /// How many strands are drawn besides the guides. Default 12,000; 0 draws guides only; safe to
     /// 100,000. A real head carries 100,000.
     pub count: u32,
-    /// Straight pieces drawn for each strand, along a smooth curve. Default 16, safe 2…64.
+    /// Straight pieces drawn for each strand, along a smooth curve. Default 16, safe 2…64; for curls
+    /// at least as many as the guides have edges.
     pub segments: u32,
     /// The same seed gives the same followers.
     pub seed: u32,
@@ -70,8 +71,9 @@ impl HairFollowers {
     }
 }
 
-const COUNT: Bound = Bound::new("HairFollowers::count", 0.0, 1e6, "20000 suit a head");
-const SEGMENTS: Bound = Bound::new("HairFollowers::segments", 1.0, 256.0, "16 suit most hair");
+// Beyond these the mesh outgrows what a GPU buffer holds everywhere (256 MiB).
+const COUNT: Bound = Bound::new("HairFollowers::count", 0.0, 1e5, "20000 suit a head");
+const SEGMENTS: Bound = Bound::new("HairFollowers::segments", 1.0, 64.0, "16 suit most hair");
 const SHARE: Bound = Bound::new("a share of HairFollowers", 0.0, 1.0, "shares go from 0 to 1");
 const PARTING: Bound = Bound::new("HairFollowers::parting", 1.0, 1e6, "4 suits most hair");
 const RADIUS: Bound = Bound::new("HairFollowers::lock_radius (m)", 0.0, 10.0, "locks have 0.006");

@@ -1,5 +1,5 @@
 //! A camera without a window: draws into an image and reads it back. Works on a software device.
-#![allow(dead_code, reason = "each test binary uses its own part")]
+#![allow(dead_code, unreachable_pub, reason = "each test binary uses its own part")]
 
 use bevy::{
     app::PluginGroupBuilder,
@@ -227,7 +227,7 @@ pub fn head_of_guides(count: usize, radius: f32, length: f32, nodes: usize) -> V
     (0..count)
         .map(root)
         // The face and the ears are free.
-        .filter(|root| !(root.z > 0.25 && root.y < 0.62) && !(root.z > 0.05 && root.y < 0.2))
+        .filter(|r| !(r.z > 0.25 && r.y < 0.62 || r.z > 0.05 && r.y < 0.2))
         .map(|root| combed(root, radius, length, nodes))
         .collect()
 }
