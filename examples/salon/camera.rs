@@ -36,8 +36,8 @@ impl Orbit {
     /// The view in which a scene's story is seen best.
     pub fn of(kind: SceneKind) -> Self {
         let (focus, yaw, pitch, distance) = match kind {
-            SceneKind::Bedhead => (Vec3::new(-0.03, 0.225, 0.0), 0.32, 0.13, 1.0),
-            SceneKind::BlowDry => (Vec3::new(-0.03, 0.225, 0.0), 0.45, 0.2, 1.0),
+            SceneKind::Bedhead => (Vec3::new(-0.03, 0.235, 0.0), 0.32, 0.13, 1.04),
+            SceneKind::BlowDry => (Vec3::new(-0.03, 0.24, 0.0), 0.45, 0.2, 1.08),
             SceneKind::Perm => (Vec3::new(0.0, 0.43, 0.0), 0.6, 0.08, 1.3),
         };
         Self { focus, yaw, pitch, distance, shift: 0.0 }
