@@ -1,6 +1,9 @@
 //! The camera: frames each scene's action, and orbits it by mouse.
 
-use crate::scenes::{Scene, SceneKind};
+use crate::{
+    panel,
+    scenes::{Scene, SceneKind},
+};
 use bevy::{
     core_pipeline::tonemapping::Tonemapping,
     input::mouse::{AccumulatedMouseScroll, MouseScrollUnit},
@@ -36,9 +39,9 @@ impl Orbit {
     /// The view in which a scene's story is seen best.
     pub fn of(kind: SceneKind) -> Self {
         let (focus, yaw, pitch, distance) = match kind {
-            SceneKind::Bedhead => (Vec3::new(-0.03, 0.225, 0.0), 0.32, 0.13, 1.0),
-            SceneKind::BlowDry => (Vec3::new(-0.03, 0.225, 0.0), 0.45, 0.2, 1.0),
-            SceneKind::Perm => (Vec3::new(0.0, 0.43, 0.0), 0.6, 0.08, 1.3),
+            SceneKind::Bedhead => (Vec3::new(-0.03, 0.235, 0.0), 0.32, 0.13, 1.04),
+            SceneKind::BlowDry => (Vec3::new(-0.03, 0.24, 0.0), 0.45, 0.2, 1.08),
+            SceneKind::Perm => (Vec3::new(0.0, 0.465, 0.0), 0.6, 0.08, 1.42),
         };
         Self { focus, yaw, pitch, distance, shift: 0.0 }
     }
@@ -83,16 +86,19 @@ pub fn orbit(
     buttons: Res<ButtonInput<MouseButton>>,
     mut moves: MessageReader<CursorMoved>,
     scroll: Res<AccumulatedMouseScroll>,
-    panel: Res<EguiWantsInput>,
+    egui: Res<EguiWantsInput>,
+    windows: Query<&Window>,
     mut dragging: Local<bool>,
     mut orbits: Query<&mut Orbit>,
 ) {
     let motion: Vec2 = moves.read().filter_map(|moved| moved.delta).sum();
+    let over_panel = |w: &Window| w.cursor_position().is_some_and(|p| p.x < panel::WIDTH);
+    let taken = egui.wants_any_pointer_input() || windows.iter().any(over_panel);
     let turning = buttons.pressed(MouseButton::Left);
     let moving = buttons.any_pressed([MouseButton::Right, MouseButton::Middle]);
     // A drag belongs to whom it began with.
     let fresh = buttons.get_just_pressed().next().is_some();
-    *dragging = (turning || moving) && (*dragging || (fresh && !panel.wants_any_pointer_input()));
+    *dragging = (turning || moving) && (*dragging || (fresh && !taken));
     let wheel = match scroll.unit {
         MouseScrollUnit::Line => scroll.delta.y,
         MouseScrollUnit::Pixel => scroll.delta.y / 40.0,
@@ -110,7 +116,7 @@ pub fn orbit(
                 orbit.focus = focus.clamp(Vec3::new(-0.5, 0.0, -0.5), Vec3::new(0.5, 0.9, 0.5));
             }
         }
-        if wheel != 0.0 && !panel.wants_any_pointer_input() {
+        if wheel != 0.0 && !taken {
             orbit.distance = (orbit.distance * (-0.12 * wheel).exp()).clamp(NEAR, FAR);
         }
     }

@@ -187,7 +187,7 @@ fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
         story::StoryPlugin,
     ));
     salon(&mut app, scene, arguments);
-    app.add_systems(Startup, (open_eye, spare_software).after(stage::build))
+    app.add_systems(Startup, (open_eye, spare_software).chain().after(stage::build))
         .add_systems(Update, (camera::frame_scene, camera::orbit, camera::place).chain());
     match app.run() {
         AppExit::Success => ExitCode::SUCCESS,
@@ -204,10 +204,12 @@ fn spare_software(
     adapter: Option<Res<RenderAdapterInfo>>,
     mut followers: ResMut<HairDefault<HairFollowers>>,
     mut lights: Query<&mut SpotLight>,
+    mut edges: Query<&mut Msaa>,
 ) {
     if adapter.is_some_and(|a| format!("{:?}", a.device_type) == "Cpu") {
         followers.count = followers.count.min(1500);
         lights.iter_mut().for_each(|mut light| light.shadow_maps_enabled = false);
+        edges.iter_mut().for_each(|mut edges| *edges = Msaa::Off);
     }
 }
 

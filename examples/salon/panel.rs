@@ -16,7 +16,7 @@ use bevy_egui::{
 use bevy_keratin::BondKind;
 
 /// How wide the panel and the plots are (points).
-const WIDTH: f32 = 300.0;
+pub const WIDTH: f32 = 300.0;
 const PLOTS: f32 = 310.0;
 
 pub struct PanelPlugin;
@@ -37,6 +37,7 @@ fn show(
     measured: Res<Measured>,
     mut hand: Local<Hand>,
     mut kind: Local<Option<BondKind>>,
+    mut calm: Local<u32>,
     mut orbits: Query<&mut Orbit>,
 ) -> Result {
     let ctx = contexts.ctx_mut()?;
@@ -63,6 +64,7 @@ fn show(
             ui.small("Keys: space plays, R restarts, right arrow steps.");
         });
     });
+    release_focus(ctx, &mut calm);
     // The action in the middle of what is left free.
     let shift = 0.5 * (WIDTH - PLOTS) / area.height().max(1.0);
     for mut orbit in &mut orbits {
@@ -71,6 +73,19 @@ fn show(
         }
     }
     Ok(())
+}
+
+/// A button or slider that was clicked keeps the keyboard, and the keys of the story with it. Shortly
+/// after the click it lets go; a number that is being typed does not.
+fn release_focus(ctx: &egui::Context, calm: &mut u32) {
+    *calm = if ctx.input(|i| i.pointer.any_down()) { 0 } else { calm.saturating_add(1) };
+    if *calm == 3 && !ctx.text_edit_focused() {
+        ctx.memory_mut(|memory| {
+            if let Some(id) = memory.focused() {
+                memory.surrender_focus(id);
+            }
+        });
+    }
 }
 
 fn section(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui)) {
