@@ -1,6 +1,6 @@
 //! Draws the hair: what is simulated, and many strands between, from one buffer of nodes.
 //!
-//! Each [`Hair`](crate::Hair) is one mesh and one draw call (one more for each shadow map). Once a
+//! Each [`Hair`] is one mesh and one draw call (one more for each shadow map). Once a
 //! frame its nodes are packed where the fixed clock's overstep puts them and written to the GPU; all
 //! else happens in the vertex shader: curves through the nodes, followers between guides, ribbons
 //! that face the camera. Places stay in the hair's frame up to there, so roots never lag behind the
