@@ -60,7 +60,8 @@ fn measure_now(
         joints += 1;
         sums.iter_mut().zip(joint.rates).for_each(|(sum, rate)| *sum += f64::from(rate));
     }
-    measured.rates = sums.map(|sum| sum / f64::from(joints.max(1)));
+    // Before the first tick there are no bonds yet: they will all be closed.
+    measured.rates = sums.map(|sum| if joints == 0 { 1.0 } else { sum / f64::from(joints) });
     measured.strain = peak.0;
     measured.kept = (!director.held.is_empty())
         .then(|| measure::kept_now(&director, strands().map(|(strand, _)| strand)))
