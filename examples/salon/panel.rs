@@ -41,6 +41,8 @@ fn show(
     mut orbits: Query<&mut Orbit>,
 ) -> Result {
     let ctx = contexts.ctx_mut()?;
+    // Drawn in software a frame may last longer than a click may by default.
+    ctx.options_mut(|options| options.input_options.max_click_duration = 5.0);
     let area = ctx.viewport_rect();
     let layer = UiBuilder::new().layer_id(egui::LayerId::background()).max_rect(area);
     let mut root = Ui::new(ctx.clone(), "salon".into(), layer);
