@@ -16,6 +16,7 @@ mod script;
 use bevy::prelude::*;
 use bevy_keratin::{WindReceived, prelude::*};
 use core::{fmt, str::FromStr};
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 #[allow(unused_imports, reason = "each example uses its own part")]
 pub use script::{Director, Moment};
@@ -135,6 +136,9 @@ pub const HEAD_RADIUS: f32 = 0.1;
 const PATCH_SPACING: f32 = 0.005;
 const ROD_SPACING: f32 = 0.002;
 
+/// How far roots are off their grid, as a share of its spacing.
+const JITTER: f32 = 0.2;
+
 /// Length between nodes (m): table 1's 0.33 nodes per cm.
 const SEGMENT: f32 = 0.03;
 
@@ -188,10 +192,16 @@ pub fn spawn_scene(
     // Combed a little to one side, so that it folds that way on the floor.
     let lean = if scene.kind == SceneKind::Perm { 0.0 } else { 7.0_f32.to_radians() };
     let direction = Quat::from_rotation_z(lean) * Vec3::NEG_Y;
+    // No scalp is a grid: roots are a little off theirs, the same way every time.
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut jitter = || spacing * random.random_range(-JITTER..JITTER);
     for row in 0..rows {
         for column in 0..columns {
             let place = |i: usize, n: usize| (i as f32 - 0.5 * (n - 1) as f32) * spacing;
-            let root = Vec3::new(place(row, rows), 0.0, place(column, columns));
+            let grid = Vec3::new(place(row, rows), 0.0, place(column, columns));
+            // A row on a rod lies straight along it.
+            let across = if rows > 1 { jitter() } else { 0.0 };
+            let root = grid + Vec3::new(across, 0.0, jitter());
             let points: Vec<Vec3> =
                 (0..=segments).map(|i| root + direction * (SEGMENT * i as f32)).collect();
             let strand = Strand::from_polyline(&points).expect("points are apart");

@@ -1,6 +1,6 @@
 //! Air as mathematics: equation 17 of \[B\].
 
-use bevy::math::Vec3;
+use glam::Vec3;
 
 /// The distance in equation 17's d + 1, which print gives in cm (m).
 pub const REFERENCE_DISTANCE: f32 = 0.01;

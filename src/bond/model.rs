@@ -2,7 +2,8 @@
 
 use super::BondKind;
 use crate::rod::frame::full;
-use bevy::{math::Quat, math::Vec3, reflect::Reflect};
+use bevy::reflect::Reflect;
+use glam::{Quat, Vec3};
 
 /// The bonds of one joint: for each kind its remembered shape Ω_j and its rate b_j ∈ \[0, 1\]. One
 /// cache line.
@@ -36,7 +37,10 @@ impl JointBonds {
         let mut sum = Vec3::ZERO;
         let mut total = 0.0;
         for ((shape, b), f) in self.shapes.iter().zip(self.rates).zip(influence) {
-            sum += *f * (*shape * b + aligned(omega, *shape) * (1.0 - b));
+            // Closed bonds do not look at the present shape.
+            let wanted =
+                if b == 1.0 { *shape } else { *shape * b + aligned(omega, *shape) * (1.0 - b) };
+            sum += *f * wanted;
             total += f;
         }
         full(sum / total)

@@ -1,10 +1,8 @@
 //! Contact between strands as mathematics: equation 18 of \[B\] over the uniform grid.
 
 use crate::grid::UniformGrid;
-use bevy::{
-    math::{IVec3, Vec3},
-    reflect::Reflect,
-};
+use bevy::reflect::Reflect;
+use glam::{IVec3, Vec3};
 
 /// Equation 18: the acceleration of a node at `p` away from the foot `f` of its perpendicular on
 /// another strand's edge, α (2r − |p−f|)/(2r) along p − f, within 2r.
@@ -57,7 +55,7 @@ impl Edge {
 }
 
 /// Margin of the list, in units of the reach 2r. More means longer lists, built less often.
-const MARGIN: f32 = 1.4;
+const MARGIN: f32 = 1.6;
 
 /// One strand as contacts see it: a range of nodes in a flat array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
@@ -81,10 +79,9 @@ pub struct Neighbours {
     /// The edge that starts at each node, as it is now; tips have one without length.
     edges: Vec<Edge>,
     starts: Vec<u32>,
-    /// The near edges of each node, by their start nodes.
-    near: Vec<u32>,
-    /// How far beyond the reach each node's nearest edge was when the list was built (m).
-    slack: Vec<f32>,
+    /// The near edges of each node, nearest first: how far beyond the reach each was when the list
+    /// was built (m), and its start node.
+    near: Vec<(f32, u32)>,
     /// The farthest that a node has moved since (m).
     moved: f32,
 }
@@ -165,13 +162,12 @@ impl Neighbours {
         self.grid.sort();
         self.starts.clear();
         self.near.clear();
-        self.slack.clear();
         self.starts.push(0);
         let within = within * within;
         for run in &self.runs {
             let (start, end) = (run.start, run.start + run.len);
             for i in start..end {
-                let mut nearest = f32::INFINITY;
+                let first = self.near.len();
                 // The root is held; pushing it would do nothing.
                 if i > start {
                     let p = points[i as usize];
@@ -181,12 +177,12 @@ impl Neighbours {
                         }
                         let squared = self.edges[j as usize].distance_squared(p);
                         if squared < within {
-                            nearest = nearest.min(squared);
-                            self.near.push(j);
+                            self.near.push((squared.sqrt() - self.reach, j));
                         }
                     });
+                    let found = &mut self.near[first..];
+                    found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                 }
-                self.slack.push(nearest.sqrt() - self.reach);
                 self.starts.push(self.near.len() as u32);
             }
         }
@@ -195,12 +191,13 @@ impl Neighbours {
     /// Equation 18 summed over all edges near node `i`, in a fixed order (m/s²).
     pub fn acceleration(&self, i: usize, p: Vec3, radius: f32, strength: f32) -> Vec3 {
         // Neither the node nor an edge has moved by more, so what was farther cannot touch yet.
-        if 2.0 * self.moved < self.slack[i] {
-            return Vec3::ZERO;
-        }
+        let may_touch = 2.0 * self.moved;
         self.near[self.starts[i] as usize..self.starts[i + 1] as usize]
             .iter()
-            .filter_map(|&j| Some(penalty(p, self.edges[j as usize].foot(p)?, radius, strength)))
+            .take_while(|(slack, _)| *slack <= may_touch)
+            .filter_map(|&(_, j)| {
+                Some(penalty(p, self.edges[j as usize].foot(p)?, radius, strength))
+            })
             .sum()
     }
 
@@ -272,7 +269,7 @@ mod tests {
             // less than half the margin: the old list must still be complete
             for (k, p) in points.iter_mut().enumerate() {
                 let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-                *p += Vec3::new(0.0, sign * drift * MARGIN * radius, 0.0);
+                *p += Vec3::new(0.0, sign * drift * radius, 0.0);
             }
             prop_assert!(!list.update(&points, &runs, radius));
             for i in 0..points.len() {

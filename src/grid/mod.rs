@@ -6,7 +6,7 @@
 //! outlier costs nothing. Built by counting sort: two passes over the points, no allocation once
 //! warm, the same order every time.
 
-use bevy::math::{IVec3, Vec3};
+use glam::{IVec3, Vec3};
 
 const FAR: Vec3 = Vec3::splat(1e9);
 

@@ -16,8 +16,8 @@ use super::{
     limiter::limit_lengths,
     obstacle::{Obstacle, push_out},
 };
-use bevy::math::{Quat, Vec3};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use glam::{Quat, Vec3};
 
 /// Passes that a limiter step takes for strands that touch something.
 const PASSES_IN_TOUCH: u32 = 3;

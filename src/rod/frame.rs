@@ -1,6 +1,6 @@
 //! Frames along a polyline: shortest rotation at the root, then parallel transport.
 
-use bevy::math::{Quat, Vec3};
+use glam::{Quat, Vec3};
 
 /// Orientations of the edges of a polyline, with as little twist as can be.
 ///

@@ -4,8 +4,8 @@ use super::{
     algebra::V3,
     lanes::{LANES, Real},
 };
-use bevy::math::{Affine3A, Vec3};
 use fearless_simd::{Simd, f32x16, prelude::*};
+use glam::{Affine3A, Vec3};
 
 /// The solid part of space that an [`Obstacle`] fills, in the frame of the nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
