@@ -14,6 +14,7 @@ pub mod setting;
 pub mod strand;
 pub mod style;
 pub mod tick;
+pub mod water;
 
 pub use air::{AirDrag, Blower, HairGravity, WindReceived};
 pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
@@ -21,9 +22,12 @@ pub use contact::{ColliderShape, HairCollider, LockContact};
 pub use fault::{Fault, HairFault};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
-pub use strand::{Hair, HeldNodes, Strand, StrandError, StrandOf, Strands};
+pub use strand::{Burden, Hair, HeldNodes, Strand, StrandError, StrandOf, Strands};
 pub use style::{PermRod, Treat, Winding, WoundOn, WoundStrands};
 pub use tick::{HairPlugins, HairStep, HairSubsteps, HairSystems, HairTick};
+pub use water::{
+    Climate, Droplet, DropletRules, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
+};
 
 /// What most games need.
 pub mod prelude {
@@ -32,9 +36,10 @@ pub mod prelude {
     pub use crate::render::{HairFollowers, HairLook, HairShading, HairView, Melanin};
     #[doc(hidden)]
     pub use crate::{
-        AirDrag, Blower, BondInfluence, BondKind, Bonds, Cuticle, Hair, HairCollider, HairDefault,
-        HairFault, HairGravity, HairPlugins, HairSubsteps, HairSystems, HairTick, HeldNodes,
-        LockContact, PermRod, Solver, Stiffness, Strand, StrandOf, Strands, StretchProjection,
-        Treat, Winding, WoundOn,
+        AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
+        HairCollider, HairDefault, HairFault, HairGravity, HairPlugins, HairSubsteps, HairSystems,
+        HairTick, HeldNodes, LockContact, Moisture, PermRod, ProcessTime, Shower, Soak, Solver,
+        Stiffness, Strand, StrandOf, Strands, StretchProjection, Treat, WaterLedger, Wetting,
+        Winding, WoundOn,
     };
 }

@@ -22,6 +22,7 @@ use crate::{
     setting::{Bound, InvalidValue},
     strand::StrandPlugin,
     style::StylePlugin,
+    water::WaterPlugin,
 };
 
 /// The schedule of one substep. Add systems to it in one of [`HairSystems`], `First` and `Last` best.
@@ -36,10 +37,11 @@ pub enum HairSystems {
     /// Where the scalp is now: frames move, free nodes stay behind by inertia, new strands get
     /// their bonds.
     Roots,
-    /// Gravity, wind (equation 17) and drag change velocities; drying (19), treatments and whoever
-    /// else ask for changes of bond rates.
+    /// Gravity, wind (equation 17) and drag change velocities; water soaks, flows and dries; drying
+    /// (19), water, treatments and whoever else ask for changes of bond rates.
     ExternalForces,
-    /// Strands push each other apart (equation 18); colliders and held nodes are gathered.
+    /// Strands push each other apart (equation 18); droplets move, land and pull (\[W\] 2); colliders
+    /// and held nodes are gathered.
     Interaction,
     /// Stiffness from the cuticle (13, 14), rest shapes from the bonds (15).
     RestShape,
@@ -158,6 +160,7 @@ impl PluginGroup for HairPlugins {
             .add(AirPlugin)
             .add(ContactPlugin)
             .add(StylePlugin)
+            .add(WaterPlugin)
             .add(RodPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));

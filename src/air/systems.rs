@@ -6,7 +6,7 @@ use crate::{
     fault::{Fault, HairFault},
     parallel::for_each,
     setting::{self, Notes, Settings},
-    strand::{Hair, Strand, StrandOf, TickPose},
+    strand::{Burden, Hair, Pose, Strand, StrandOf, TickPose},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
@@ -50,7 +50,32 @@ fn report_gravity(gravity: Res<HairGravity>, mut faults: MessageWriter<HairFault
 struct LocalAir {
     gravity: Vec3,
     keep: f32,
-    blowers: Vec<(Vec3, Vec3, Blower)>,
+    blowers: Vec<LocalBlower>,
+}
+
+/// A blower as seen in a frame, its values valid.
+pub(crate) struct LocalBlower {
+    pub nozzle: Vec3,
+    /// Unit direction of its wind.
+    pub aim: Vec3,
+    pub blower: Blower,
+}
+
+/// The blowers that blow, seen in the frame of `pose`.
+pub(crate) fn local_blowers(
+    frame: &Pose,
+    blowers: &Query<(&Blower, &TickPose)>,
+) -> Vec<LocalBlower> {
+    blowers
+        .iter()
+        .map(|(b, pose)| (b.mended(&Notes::default()), pose.now()))
+        .filter(|(blower, _)| blower.strength > 0.0)
+        .map(|(blower, pose)| LocalBlower {
+            nozzle: frame.point_in(pose.translation),
+            aim: frame.direction_in(pose.rotation * Vec3::NEG_Z),
+            blower,
+        })
+        .collect()
 }
 
 pub(crate) fn apply_air(
@@ -59,35 +84,33 @@ pub(crate) fn apply_air(
     drag: Settings<AirDrag>,
     hairs: Query<&TickPose, With<Hair>>,
     blowers: Query<(&Blower, &TickPose)>,
-    mut strands: Query<(&StrandOf, &mut Strand, &mut BondChanges, Option<&mut WindReceived>)>,
+    mut strands: Query<(
+        &StrandOf,
+        &mut Strand,
+        &Burden,
+        &mut BondChanges,
+        Option<&mut WindReceived>,
+    )>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let blowers: Vec<(Vec3, Vec3, Blower)> = blowers
-        .iter()
-        .map(|(b, pose)| (b.mended(&Notes::default()), pose.now()))
-        .filter(|(blower, _)| blower.strength > 0.0)
-        .map(|(blower, pose)| (pose.translation, pose.rotation * Vec3::NEG_Z, blower))
-        .collect();
     let mut airs: Vec<LocalAir> = Vec::new();
     let mut index_of = HashMap::<Entity, Option<usize>>::default();
     let mut items = Vec::with_capacity(strands.iter().len());
-    for (of, strand, changes, received) in &mut strands {
+    for (of, strand, burden, changes, received) in &mut strands {
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let pose = hairs.get(of.0).ok()?.now();
             airs.push(LocalAir {
                 gravity: pose.direction_in(gravity) * step.dt,
                 keep: bevy::math::ops::exp(-drag.of(of.0).rate * step.dt),
-                blowers: (blowers.iter())
-                    .map(|&(p, aim, b)| (pose.point_in(p), pose.direction_in(aim), b))
-                    .collect(),
+                blowers: local_blowers(pose, &blowers),
             });
             Some(airs.len() - 1)
         });
         if let Some(air) = index {
-            items.push((air, strand, changes, received));
+            items.push((air, strand, burden, changes, received));
         }
     }
-    for_each(&mut items, |(air, strand, changes, received)| {
+    for_each(&mut items, |(air, strand, burden, changes, received)| {
         let air = &airs[*air];
         let (positions, velocities, _, spins) = strand.bypass_change_detection().parts_mut();
         for v in velocities.iter_mut() {
@@ -102,21 +125,27 @@ pub(crate) fn apply_air(
             return;
         }
         let edges = positions.len().saturating_sub(1);
+        // Wet hair is heavier: the same wind moves it less.
+        let heed = |i: usize| 1.0 / (1.0 + burden.mass.get(i).copied().unwrap_or(0.0));
         for i in 0..edges {
             // The tip has no edge of its own: it takes the last one's wind.
             let edge = positions[i + 1] - positions[i];
             let (mut change, mut dried) = (Vec3::ZERO, 0.0);
-            for (nozzle, aim, blower) in &air.blowers {
+            for LocalBlower { nozzle, aim, blower } in &air.blowers {
                 let w = wind(blower.strength, *nozzle, *aim, positions[i], edge) * step.dt;
                 change += w;
                 dried += drying(w.length(), blower.drying);
                 if i + 1 == edges {
                     velocities[i + 1] +=
-                        wind(blower.strength, *nozzle, *aim, positions[i + 1], edge) * step.dt;
+                        wind(blower.strength, *nozzle, *aim, positions[i + 1], edge)
+                            * (step.dt * heed(i + 1));
                 }
             }
-            velocities[i] += change;
-            changes.bypass_change_detection().ask(i, BondKind::Hydrogen, dried);
+            velocities[i] += change * heed(i);
+            // Where there is water, the wind dries that, and the bonds follow it.
+            if burden.softening.is_empty() {
+                changes.bypass_change_detection().ask(i, BondKind::Hydrogen, dried);
+            }
             if let Some(received) = received.as_deref_mut() {
                 received.total.resize(edges, 0.0);
                 received.total[i] += change.length();

@@ -212,4 +212,5 @@ pub struct RestShape {
     /// (equation 12).
     pub stiffness: Vec<f32>,
     key: Option<systems::StiffnessKey>,
+    softened: Vec<f32>,
 }

@@ -9,7 +9,7 @@ use crate::{
     parallel::for_each,
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
     setting::{self, Bound, Notes, Settings},
-    strand::{self, Strand, StrandOf},
+    strand::{self, Burden, Strand, StrandOf},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
@@ -79,12 +79,12 @@ fn generate_rest_shapes(
     stiffness: Settings<Stiffness>,
     cuticle: Settings<Cuticle>,
     solver: Settings<Solver>,
-    mut strands: Query<(&StrandOf, &Strand, &Bonds, &mut RestShape)>,
+    mut strands: Query<(&StrandOf, &Strand, &Bonds, &Burden, &mut RestShape)>,
 ) {
     let mut resolved = HashMap::<Entity, Resolved>::default();
     let mut items: Vec<_> = strands
         .iter_mut()
-        .map(|(of, strand, bonds, rest)| {
+        .map(|(of, strand, bonds, burden, rest)| {
             let hair = *resolved.entry(of.0).or_insert_with(|| {
                 let key = StiffnessKey {
                     stiffness: stiffness.of(of.0),
@@ -94,10 +94,10 @@ fn generate_rest_shapes(
                 };
                 (influence.of(of.0).as_array(), key)
             });
-            (hair, strand, bonds, rest)
+            (hair, strand, bonds, burden, rest)
         })
         .collect();
-    for_each(&mut items, |((influence, key), strand, bonds, rest)| {
+    for_each(&mut items, |((influence, key), strand, bonds, burden, rest)| {
         let rest = rest.bypass_change_detection();
         rest.darboux.clear();
         rest.darboux.extend(
@@ -105,18 +105,29 @@ fn generate_rest_shapes(
                 .enumerate()
                 .map(|(i, joint)| joint.rest_shape(strand.darboux(i), influence)),
         );
-        if rest.key != Some(*key) || rest.stiffness.len() != strand.edges() {
+        if rest.key != Some(*key)
+            || rest.stiffness.len() != strand.edges()
+            || has_softened(&rest.softened, &burden.softening)
+        {
             rest.key = Some(*key);
+            rest.softened.clone_from(&burden.softening);
             rest.stiffness.clear();
             let mut distance = 0.0;
-            rest.stiffness.extend(strand.rest_lengths().iter().map(|length| {
-                let factor = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
+            rest.stiffness.extend(strand.rest_lengths().iter().enumerate().map(|(i, length)| {
+                let softened = rest.softened.get(i).copied().unwrap_or(0.0);
+                let cuticle = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
                 distance += length;
-                let k = key.stiffness.per_substep(key.dt, factor);
+                let k = key.stiffness.per_substep(key.dt, cuticle * (1.0 - softened));
                 stiffness_per_iteration(k, key.iterations)
             }));
         }
     });
+}
+
+/// Whether joints are softer or harder than `before` by what could be seen. Water moves a little in
+/// every substep; powers are not taken anew for that.
+fn has_softened(before: &[f32], now: &[f32]) -> bool {
+    before.len() != now.len() || before.iter().zip(now).any(|(a, b)| (a - b).abs() > 2e-3)
 }
 
 fn update_bonds(mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges)>) {

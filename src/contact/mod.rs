@@ -4,7 +4,7 @@ pub mod model;
 mod systems;
 
 pub use systems::ContactPlugin;
-pub(crate) use systems::part_strands;
+pub(crate) use systems::{part_strands, seen_from};
 
 use crate::{
     rod::obstacle::Obstacle,
@@ -95,6 +95,11 @@ impl HairCollider {
     pub fn with_friction(mut self, friction: f32) -> Self {
         self.friction = FRICTION.mend(friction, 0.3, &Notes::default());
         self
+    }
+
+    /// The collider with every value in its valid range.
+    pub(crate) fn valid(&self) -> Self {
+        self.mended(&Notes::default())
     }
 
     fn mended(&self, notes: &Notes) -> Self {

@@ -45,7 +45,7 @@ fn report_colliders(
 }
 
 /// A collider in a hair's frame, with the way its surface goes there during the substep.
-fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obstacle {
+pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obstacle {
     let (now, own) = (hair.now(), pose.now());
     let scale = own.scale / now.scale;
     let at = now.point_in(own.translation);
@@ -74,9 +74,9 @@ fn gather_obstacles(
 ) {
     for (hair, mut obstacles) in &mut hairs {
         obstacles.solids.clear();
-        obstacles.solids.extend(
-            colliders.iter().map(|(c, pose)| seen_from(hair, &c.mended(&Notes::default()), pose)),
-        );
+        obstacles
+            .solids
+            .extend(colliders.iter().map(|(c, pose)| seen_from(hair, &c.valid(), pose)));
     }
 }
 

@@ -75,20 +75,59 @@ impl Obstacle {
 }
 
 #[inline(always)]
-fn splat<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
-    V3::new(f32x16::splat(simd, v.x), f32x16::splat(simd, v.y), f32x16::splat(simd, v.z))
+fn splat<R: Real>(like: R, v: Vec3) -> V3<R> {
+    V3::new(like.lit(v.x.into()), like.lit(v.y.into()), like.lit(v.z.into()))
 }
 
 /// The direction and length of `v`. A point on a collider's own axis has no way out that is shorter
 /// than another: it goes along `or`.
 #[inline(always)]
-fn unit_or<S: Simd>(v: V3<f32x16<S>>, or: Vec3) -> (V3<f32x16<S>>, f32x16<S>) {
-    let simd = v.x.simd;
-    let tiny = f32x16::splat(simd, 1e-12);
-    let length = Real::sqrt(v.dot(v));
-    let degenerate = Real::lt(length, tiny);
-    let inverse = f32x16::splat(simd, 1.0) / Real::max(length, tiny);
-    (V3::select(degenerate, splat(simd, or), v.scale(inverse)), length)
+fn unit_or<R: Real>(v: V3<R>, or: Vec3) -> (V3<R>, R) {
+    let tiny = v.x.lit(1e-12);
+    let length = v.dot(v).sqrt();
+    let degenerate = length.lt(tiny);
+    let inverse = v.x.lit(1.0) / length.max(tiny);
+    (V3::select(degenerate, splat(v.x, or), v.scale(inverse)), length)
+}
+
+impl Solid {
+    /// The unit normal of the surface nearest to `p`, and how deep `p` is below a layer of `skin`
+    /// (m) on it: negative outside.
+    #[inline(always)]
+    pub(crate) fn depth<R: Real>(&self, p: V3<R>, skin: f32) -> (V3<R>, R) {
+        let one = p.x;
+        let lit = |value: f32| one.lit(value.into());
+        match *self {
+            Solid::HalfSpace { normal, point } => {
+                let n = splat(one, normal);
+                (n, lit(skin) - (p - splat(one, point)).dot(n))
+            }
+            Solid::Capsule { a, b, radius } => {
+                let axis = b - a;
+                let inverse = 1.0 / axis.length_squared().max(1e-20);
+                let rel = p - splat(one, a);
+                let t = rel.dot(splat(one, axis * inverse));
+                let t = t.max(lit(0.0)).min(lit(1.0));
+                let off = rel - splat(one, axis).scale(t);
+                let (n, distance) = unit_or(off, across(axis));
+                (n, lit(radius + skin) - distance)
+            }
+            Solid::Cylinder { center, axis, radius, half_height } => {
+                let u = splat(one, axis);
+                let rel = p - splat(one, center);
+                let along = rel.dot(u);
+                let off = rel - u.scale(along);
+                let (radial, distance) = unit_or(off, across(axis));
+                let side = lit(radius + skin) - distance;
+                let below = along.lt(lit(0.0));
+                let cap = lit(half_height + skin) - R::select(below, -along, along);
+                let cap_normal = V3::select(below, -u, u);
+                let nearer_cap = cap.lt(side);
+                // Outside where either is negative: the smaller of the two decides.
+                (V3::select(nearer_cap, cap_normal, radial), cap.min(side))
+            }
+        }
+    }
 }
 
 /// Moves `p` out of the solid where it is inside, and holds it back along the surface by Coulomb
@@ -108,36 +147,7 @@ pub(super) fn push_out<S: Simd>(
     let simd = p.x.simd;
     let zero = f32x16::splat(simd, 0.0);
     let one = f32x16::splat(simd, 1.0);
-    let (normal, depth) = match obstacle.solid {
-        Solid::HalfSpace { normal, point } => {
-            let n = splat(simd, normal);
-            (n, f32x16::splat(simd, skin) - (p - splat(simd, point)).dot(n))
-        }
-        Solid::Capsule { a, b, radius } => {
-            let axis = b - a;
-            let inverse = 1.0 / axis.length_squared().max(1e-20);
-            let rel = p - splat(simd, a);
-            let t = rel.dot(splat(simd, axis * inverse));
-            let t = Real::min(Real::max(t, zero), one);
-            let off = rel - splat(simd, axis).scale(t);
-            let (n, distance) = unit_or(off, across(axis));
-            (n, f32x16::splat(simd, radius + skin) - distance)
-        }
-        Solid::Cylinder { center, axis, radius, half_height } => {
-            let u = splat(simd, axis);
-            let rel = p - splat(simd, center);
-            let along = rel.dot(u);
-            let off = rel - u.scale(along);
-            let (radial, distance) = unit_or(off, across(axis));
-            let side = f32x16::splat(simd, radius + skin) - distance;
-            let below = Real::lt(along, zero);
-            let cap = f32x16::splat(simd, half_height + skin) - Real::select(below, -along, along);
-            let cap_normal = V3::select(below, -u, u);
-            let nearer_cap = Real::lt(cap, side);
-            // Outside where either is negative: the smaller of the two decides.
-            (V3::select(nearer_cap, cap_normal, radial), Real::min(cap, side))
-        }
-    };
+    let (normal, depth) = obstacle.solid.depth(p, skin);
     let inside = Real::lt(zero, depth);
     if inside.to_bitmask() == 0 {
         return None;
@@ -150,10 +160,10 @@ pub(super) fn push_out<S: Simd>(
     }
     let mut slip = out - from;
     if let Some(m) = &obstacle.motion {
-        let moved = splat(simd, m.translation.into());
-        let moved = splat(simd, m.matrix3.z_axis.into()).scale_add(from.z, moved);
-        let moved = splat(simd, m.matrix3.y_axis.into()).scale_add(from.y, moved);
-        let moved = splat(simd, m.matrix3.x_axis.into()).scale_add(from.x, moved);
+        let moved = splat(p.x, m.translation.into());
+        let moved = splat(p.x, m.matrix3.z_axis.into()).scale_add(from.z, moved);
+        let moved = splat(p.x, m.matrix3.y_axis.into()).scale_add(from.y, moved);
+        let moved = splat(p.x, m.matrix3.x_axis.into()).scale_add(from.x, moved);
         slip = out - moved;
     }
     let tangential = slip - normal.scale(slip.dot(normal));

@@ -12,7 +12,7 @@ use crate::{
     fault::{Fault, HairFault},
     parallel::for_each_init,
     setting::{self, Settings},
-    strand::{HeldNodes, PutBack, Strand, StrandOf},
+    strand::{Burden, HeldNodes, PutBack, Strand, StrandOf},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
@@ -43,6 +43,7 @@ struct Item<'a> {
     strand: Mut<'a, Strand>,
     rest: &'a RestShape,
     bonds: &'a Bonds,
+    burden: &'a Burden,
     held: Option<&'a HeldNodes>,
     put_back: Option<PutBack>,
 }
@@ -54,13 +55,21 @@ fn project(
     influence: Settings<BondInfluence>,
     contact: Settings<LockContact>,
     hairs: Query<&Obstacles>,
-    mut strands: Query<(Entity, &StrandOf, &mut Strand, &RestShape, &Bonds, Option<&HeldNodes>)>,
+    mut strands: Query<(
+        Entity,
+        &StrandOf,
+        &mut Strand,
+        &RestShape,
+        &Bonds,
+        &Burden,
+        Option<&HeldNodes>,
+    )>,
     mut faults: MessageWriter<HairFault>,
 ) {
     let mut params: Vec<HairParams> = Vec::new();
     let mut index_of = HashMap::<Entity, Option<usize>>::default();
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
-    for (entity, of, strand, rest, bonds, held) in &mut strands {
+    for (entity, of, strand, rest, bonds, burden, held) in &mut strands {
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let obstacles = hairs.get(of.0).ok()?;
             let s = solver.of(of.0);
@@ -83,7 +92,7 @@ fn project(
             && strand.nodes() >= 2
             && rest.darboux.len() == strand.edges()
         {
-            items.push(Item { entity, hair, strand, rest, bonds, held, put_back: None });
+            items.push(Item { entity, hair, strand, rest, bonds, burden, held, put_back: None });
         }
     }
     // Lanes do not see each other, so how strands are grouped changes no bit of the result.
@@ -155,7 +164,8 @@ fn gather(block: &mut BlockLanes, lane: usize, item: &Item<'_>, stiffness: &Stif
             None => {
                 put3(&mut node.p, lane, positions[i]);
                 put3(&mut node.v, lane, velocities[i]);
-                node.w[lane] = 2.0 * mean / (before + after);
+                let load = item.burden.mass.get(i).copied().unwrap_or(0.0);
+                node.w[lane] = 2.0 * mean / ((before + after) * (1.0 + load));
             }
         }
     }

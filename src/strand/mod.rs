@@ -12,7 +12,7 @@
 pub mod frame;
 mod systems;
 
-pub use frame::TickPose;
+pub use frame::{Pose, TickPose};
 pub use systems::StrandPlugin;
 pub(crate) use systems::carry_strands;
 
@@ -79,7 +79,7 @@ pub const MIN_SEGMENT: f32 = 1e-6;
 /// number of nodes stays what it was.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-#[require(Bonds, BondChanges, RestShape, StrandHistory)]
+#[require(Bonds, BondChanges, RestShape, StrandHistory, Burden)]
 pub struct Strand {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
@@ -97,6 +97,17 @@ pub struct Strand {
 pub struct StrandHistory {
     /// Positions (m), root first; empty until the first tick.
     pub positions: Vec<Vec3>,
+}
+
+/// What weighs on a strand and softens it, beside its own dry state: water does. Written by the
+/// tick; empty on dry hair.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct Burden {
+    /// Added mass of each node, over its dry mass. Inverse masses, wind and contacts heed it.
+    pub mass: Vec<f32>,
+    /// Share of its stiffness that each joint has lost, beyond open bonds.
+    pub softening: Vec<f32>,
 }
 
 /// Nodes that something else holds: a rod they are wound on, a hand, a clip. Held nodes have no
@@ -267,6 +278,10 @@ impl Strand {
 
     pub(crate) fn parts(&self) -> (&[Vec3], &[Vec3], &[Quat], &[Vec3]) {
         (&self.positions, &self.velocities, &self.orientations, &self.angular_velocities)
+    }
+
+    pub(crate) fn motion_parts(&mut self) -> (&[Vec3], &mut [Vec3], &[f32]) {
+        (&self.positions, &mut self.velocities, &self.rest_lengths)
     }
 
     pub(crate) fn parts_mut(&mut self) -> (&mut [Vec3], &mut [Vec3], &mut [Quat], &mut [Vec3]) {

@@ -1,7 +1,8 @@
 //! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
 
 use super::{
-    Hair, HeldNodes, Strand, StrandError, StrandHistory, StrandOf, Strands, TickPose, frame::Pose,
+    Burden, Hair, HeldNodes, Strand, StrandError, StrandHistory, StrandOf, Strands, TickPose,
+    frame::Pose,
 };
 use crate::{
     fault::{Fault, HairFault},
@@ -22,6 +23,7 @@ impl Plugin for StrandPlugin {
             .register_type::<Strands>()
             .register_type::<StrandHistory>()
             .register_type::<HeldNodes>()
+            .register_type::<Burden>()
             .add_systems(PreUpdate, report_unusable)
             .add_systems(
                 HairTick,

@@ -4,6 +4,7 @@ pub mod model;
 mod systems;
 
 pub use systems::StylePlugin;
+pub(crate) use systems::apply_treatments;
 
 use crate::{
     bond::BondKind,

@@ -73,7 +73,7 @@ fn begin_treatments(
 }
 
 /// Asks for this substep's part of what each treatment still has to do.
-fn apply_treatments(
+pub(crate) fn apply_treatments(
     step: Res<HairStep>,
     mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
 ) {

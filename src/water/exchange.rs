@@ -1,0 +1,260 @@
+//! `ExternalForces`: showers run, hair soaks and dries, and hydrogen bonds follow the water.
+
+use super::{
+    Climate, Droplet, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
+    model::ball_radius,
+    moisture::{Exposure, Left, Surroundings, node_lengths},
+    vapour::{DryingAir, WATER, jet},
+};
+use crate::{
+    Blower,
+    air::{HairGravity, LocalBlower, local_blowers, model::wind},
+    bond::{BondChanges, BondKind, Bonds, model::drying},
+    fault::{Fault, HairFault},
+    parallel::for_each,
+    setting::{Notes, Settings},
+    strand::{Burden, Hair, Pose, Strand, StrandOf, Strands, TickPose},
+    tick::HairStep,
+};
+use bevy::{platform::collections::HashMap, prelude::*};
+
+pub(super) fn run_showers(
+    mut commands: Commands,
+    step: Res<HairStep>,
+    mut showers: Query<(&mut Shower, &TickPose)>,
+) {
+    for (mut shower, pose) in &mut showers {
+        let shower = shower.bypass_change_detection();
+        let mut valid = shower.mended(&Notes::default());
+        let pose = pose.now();
+        let drops: Vec<Droplet> = (valid.make(step.dt))
+            .map(|drop| {
+                let position = pose.point_out(drop.position);
+                let velocity = pose.rotation * drop.velocity;
+                Droplet { position, velocity, before: position, ..drop }
+            })
+            .collect();
+        (shower.made, shower.owed) = (valid.made, valid.owed);
+        if !drops.is_empty() {
+            commands.spawn_batch(drops);
+        }
+    }
+}
+
+/// The air that blowers send past a place: its velocity (m/s), and its temperature above the room's
+/// (K). Along the axis it is a jet ([`jet`]); aside it falls off like equation 17's wind.
+pub(super) fn blown_air(blowers: &[LocalBlower], scale: f32, room: f32, p: Vec3) -> (Vec3, f32) {
+    let (mut velocity, mut warmth) = (Vec3::ZERO, 0.0);
+    for LocalBlower { nozzle, aim, blower } in blowers {
+        let along = (p - *nozzle).dot(*aim);
+        // Equation 17 on an edge across the wind is all but its share of the angle.
+        let share = wind(1.0, *nozzle, *aim, p, aim.any_orthonormal_vector()).length();
+        let left = share * jet(along * scale);
+        velocity += *aim * (blower.speed * left);
+        warmth += (blower.celsius - room) * left;
+    }
+    (velocity, warmth)
+}
+
+/// Water's surroundings as one hair has them, in its frame.
+struct LocalWater {
+    wetting: Wetting,
+    pose: Pose,
+    gravity: Vec3,
+    blowers: Vec<LocalBlower>,
+}
+
+impl LocalWater {
+    /// What the air does at a place of an edge.
+    fn exposure(&self, p: Vec3, edge: Vec3, room: f32, dt: f32) -> Exposure {
+        if self.blowers.is_empty() {
+            return Exposure::default();
+        }
+        let (velocity, warmth) = blown_air(&self.blowers, self.pose.scale, room, p);
+        let blown = |b: &LocalBlower| {
+            drying(wind(b.blower.strength, b.nozzle, b.aim, p, edge).length() * dt, b.blower.drying)
+        };
+        Exposure {
+            speed: velocity.cross(edge.normalize_or_zero()).length(),
+            warmth,
+            blown: self.blowers.iter().map(blown).sum(),
+        }
+    }
+}
+
+struct Wet<'a> {
+    hair: usize,
+    strand: &'a Strand,
+    bonds: &'a Bonds,
+    moisture: &'a mut Moisture,
+    burden: &'a mut Burden,
+    changes: &'a mut BondChanges,
+    left: Left,
+    /// Water that has nowhere to be any more (m³).
+    gone: f64,
+}
+
+pub(super) fn exchange_water(
+    mut commands: Commands,
+    step: Res<HairStep>,
+    (climate, process, gravity): (Res<Climate>, Res<ProcessTime>, Res<HairGravity>),
+    wetting: Settings<Wetting>,
+    hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
+    blowers: Query<(&Blower, &TickPose)>,
+    mut strands: Query<(&StrandOf, &Strand, &Bonds, &mut Moisture, &mut Burden, &mut BondChanges)>,
+    mut soaks: MessageReader<Soak>,
+    mut ledger: ResMut<WaterLedger>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for soak in soaks.read() {
+        let members = match hairs.get(soak.target) {
+            Ok((_, members)) => members.map(|m| m.collection().to_vec()).unwrap_or_default(),
+            Err(_) if strands.contains(soak.target) => vec![soak.target],
+            Err(_) => {
+                faults.write(HairFault { entity: soak.target, fault: Fault::NoTarget });
+                continue;
+            }
+        };
+        let share = if soak.wetness.is_nan() { 0.0 } else { soak.wetness.clamp(0.0, 1.0) };
+        for member in members {
+            if let Ok((of, strand, _, mut moisture, ..)) = strands.get_mut(member) {
+                let capacity = wetting.of(of.0).capacity();
+                let lengths = node_lengths(strand.rest_lengths());
+                let moisture = moisture.bypass_change_detection();
+                ledger.water_out += moisture.fit(strand.nodes());
+                ledger.book(moisture.soak(share, lengths.map(|l| capacity * f64::from(l))));
+            }
+        }
+    }
+    let climate = climate.mended(&Notes::default());
+    let air = DryingAir::new(climate.celsius, climate.humidity, climate.draught);
+    let damp = air.equilibrium > 0.0;
+    if !damp && strands.iter().all(|(_, _, _, moisture, ..)| moisture.is_untouched()) {
+        return;
+    }
+    let process = process.mended(&Notes::default());
+    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
+    let mut waters: Vec<LocalWater> = Vec::new();
+    let mut index_of = HashMap::<Entity, Option<usize>>::default();
+    let mut items: Vec<Wet<'_>> = Vec::new();
+    for (of, strand, bonds, moisture, burden, changes) in &mut strands {
+        if !damp && moisture.is_untouched() {
+            continue;
+        }
+        let index = *index_of.entry(of.0).or_insert_with(|| {
+            let pose = *hairs.get(of.0).ok()?.0.now();
+            waters.push(LocalWater {
+                wetting: wetting.of(of.0),
+                gravity: pose.direction_in(gravity),
+                blowers: local_blowers(&pose, &blowers),
+                pose,
+            });
+            Some(waters.len() - 1)
+        });
+        if let Some(hair) = index
+            && strand.nodes() >= 2
+            && bonds.joints.len() == strand.edges()
+        {
+            items.push(Wet {
+                hair,
+                strand,
+                bonds,
+                moisture: moisture.into_inner(),
+                burden: burden.into_inner(),
+                changes: changes.into_inner(),
+                left: Left::default(),
+                gone: 0.0,
+            });
+        }
+    }
+    for_each(&mut items, |wet| exchange(wet, &waters[wet.hair], &air, damp, step.dt, process));
+    for wet in &items {
+        ledger.book(-wet.left.evaporated);
+        ledger.water_out += wet.gone;
+        let LocalWater { pose, wetting, .. } = &waters[wet.hair];
+        for &(node, volume) in &wet.left.drips {
+            commands.spawn(let_go(pose, wet.strand, node as f32, volume, wetting, gravity));
+        }
+    }
+}
+
+/// One strand's water in one substep, what follows from it for bonds and weight.
+fn exchange(
+    wet: &mut Wet<'_>,
+    water: &LocalWater,
+    air: &DryingAir,
+    damp: bool,
+    dt: f32,
+    process: f32,
+) {
+    let LocalWater { wetting, gravity, .. } = water;
+    let Wet { strand, bonds, moisture, burden, changes, .. } = wet;
+    wet.gone += moisture.fit(strand.nodes());
+    let (positions, lengths, edges) = (strand.positions(), strand.rest_lengths(), strand.edges());
+    let around = Surroundings { positions, lengths, wetting, gravity: *gravity, air, dt, process };
+    let exposure = |i: usize| {
+        let e = i.min(edges - 1);
+        water.exposure(positions[i], positions[e + 1] - positions[e], air.celsius, dt)
+    };
+    moisture.exchange(&around, exposure, &mut wet.left);
+    open_bonds(bonds, moisture.wetness(), wetting.bond_time, process * dt, changes);
+    let capacity = wetting.capacity() * f64::from(strand.length());
+    if !damp
+        && moisture.volume() < 1e-4 * capacity
+        && bonds.rates(BondKind::Hydrogen).all(|rate| rate > 0.999)
+    {
+        wet.gone += moisture.clear();
+        **burden = default();
+        return;
+    }
+    let dry = f64::from(wetting.dry_mass());
+    let water = moisture.film().iter().zip(moisture.bound()).map(|(film, bound)| film + bound);
+    burden.mass.clear();
+    burden.mass.extend(
+        (node_lengths(lengths).zip(water)).map(|(l, v)| (WATER * v / (dry * f64::from(l))) as f32),
+    );
+    burden.softening.clear();
+    burden.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
+}
+
+/// Hydrogen bonds go toward 1 − wetness with the time constant `bond_time`; equation 16 remembers
+/// the shape in which they close.
+fn open_bonds(
+    bonds: &Bonds,
+    wetness: &[f32],
+    bond_time: f32,
+    seconds: f32,
+    changes: &mut BondChanges,
+) {
+    let share = 1.0 - bevy::math::ops::exp(-seconds / bond_time.max(1e-9));
+    for (i, (b, wet)) in bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate() {
+        changes.ask(i, BondKind::Hydrogen, (1.0 - wet - b) * share);
+    }
+}
+
+/// A drop that leaves a strand, `at` segments from the root: just below it, with its velocity.
+pub(super) fn let_go(
+    pose: &Pose,
+    strand: &Strand,
+    at: f32,
+    volume: f64,
+    wetting: &Wetting,
+    gravity: Vec3,
+) -> Droplet {
+    let (place, velocity) = on_strand(strand, at);
+    let radius = ball_radius(volume);
+    let below = gravity.normalize_or_zero() * (1.01 * (radius + wetting.lock_radius()) + 1e-5);
+    let mut drop = Droplet::ball(pose.point_out(place) + below, radius);
+    drop.velocity = pose.rotation * velocity;
+    // The ledger has counted this water already.
+    (drop.volume, drop.counted) = (volume, volume);
+    drop
+}
+
+/// Place and velocity of the point `at` segments from the root, in the hair's frame.
+pub(super) fn on_strand(strand: &Strand, at: f32) -> (Vec3, Vec3) {
+    let edge = (at as usize).min(strand.edges() - 1);
+    let t = (at - edge as f32).clamp(0.0, 1.0);
+    let mix = |v: &[Vec3]| v[edge].lerp(v[edge + 1], t);
+    (mix(strand.positions()), mix(strand.velocities()))
+}

@@ -1,0 +1,154 @@
+//! Water: droplets that fall, land and clump hair, hair that gets wet and dries, and bonds that
+//! follow.
+//!
+//! The wet-hair paper's droplets as entities, then what both papers leave open: an unbroken loop. A
+//! [`Droplet`] lands on a strand, rides on it, pulls other strands together, spreads into a film and
+//! soaks in ([`Moisture`]). Where fibres are wet, hydrogen bonds open; the air, damp or dry, still
+//! or out of a [`Blower`](crate::Blower), takes the water again; the bonds close around the shape of
+//! that moment. Nobody sets a rate.
+//!
+//! Droplets find strands through the [uniform grid](crate::grid), neither by all pairs nor in a unit
+//! box. They are rows of one table and never change archetype: ten thousands move in one pass.
+//!
+//! Every drop of water is accounted for in [`WaterLedger`]: in = held + out.
+
+mod adhesion;
+mod droplet;
+mod exchange;
+pub mod model;
+pub mod moisture;
+mod motion;
+mod systems;
+pub mod vapour;
+
+pub use droplet::{Droplet, Ride, Shower};
+pub use moisture::{Moisture, Wetting};
+pub use systems::WaterPlugin;
+
+use crate::setting::{Bound, Notes};
+use bevy::prelude::*;
+
+/// The air of the room. A resource.
+#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct Climate {
+    /// Temperature (°C). Default 22, safe −20…50.
+    pub celsius: f32,
+    /// Relative humidity, 0…1. Default 0.5, at which hair is dry; damper air wets it.
+    pub humidity: f32,
+    /// Speed of the draught (m/s). Default 0.1, safe 0…10.
+    pub draught: f32,
+}
+
+impl Default for Climate {
+    fn default() -> Self {
+        Self { celsius: 22.0, humidity: 0.5, draught: 0.1 }
+    }
+}
+
+const CELSIUS: Bound = Bound::new("Climate::celsius (°C)", -60.0, 100.0, "a room has 22");
+const HUMIDITY: Bound = Bound::new("Climate::humidity", 0.0, 1.0, "a room has 0.5");
+const DRAUGHT: Bound = Bound::new("Climate::draught (m/s)", 0.0, 100.0, "a room has 0.1");
+
+impl Climate {
+    /// The air of a room: temperature (°C) and relative humidity (0…1).
+    ///
+    /// # Errors
+    /// When the temperature is outside −60…100 °C or the humidity outside 0…1.
+    pub fn new(celsius: f32, humidity: f32) -> Result<Self, crate::InvalidValue> {
+        let celsius = CELSIUS.check(celsius)?;
+        Ok(Self { celsius, humidity: HUMIDITY.check(humidity)?, ..default() })
+    }
+
+    fn mended(&self, notes: &Notes) -> Self {
+        let d = Self::default();
+        Self {
+            celsius: CELSIUS.mend(self.celsius, d.celsius, notes),
+            humidity: HUMIDITY.mend(self.humidity, d.humidity, notes),
+            draught: DRAUGHT.mend(self.draught, d.draught, notes),
+        }
+    }
+}
+
+/// How much faster wetting, drying and the bonds' chemistry go than in life. A resource, default 1,
+/// safe 1…1000.
+///
+/// Hair dries in minutes, players wait seconds. Mechanics are untouched.
+#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct ProcessTime(pub f32);
+
+impl Default for ProcessTime {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
+impl ProcessTime {
+    fn mended(&self, notes: &Notes) -> f32 {
+        PROCESS.mend(self.0, 1.0, notes)
+    }
+}
+
+const PROCESS: Bound = Bound::new("ProcessTime", 0.0, 1e6, "60 makes minutes of seconds");
+
+/// What droplets may do. A resource.
+#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct DropletRules {
+    /// Lower corner of the box that droplets may be in (m). Default −100 on each axis. A floor
+    /// drains at its height.
+    pub min: Vec3,
+    /// Upper corner (m). Default 100 on each axis.
+    pub max: Vec3,
+    /// How long a drop lies on a collider before it has run off (s). Default 2.
+    pub lying: f32,
+    /// Whether drops that touch become one. Default true; \[W\]'s own drops do not.
+    pub merging: bool,
+}
+
+impl Default for DropletRules {
+    fn default() -> Self {
+        Self { min: Vec3::splat(-100.0), max: Vec3::splat(100.0), lying: 2.0, merging: true }
+    }
+}
+
+/// Sets the bound water of a hair or strand at once and takes the film off it: a dive into a lake, a
+/// towel. A message; the [`WaterLedger`] counts the difference.
+#[derive(Message, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct Soak {
+    /// The [`Hair`](crate::Hair) or strand.
+    pub target: Entity,
+    /// Share of what hair can bind: 1 soaks through, 0 dries. Taken to the nearest of 0…1.
+    pub wetness: f32,
+}
+
+/// The water that came, is there and has gone (m³). A resource, kept by the tick; `held` is of the
+/// tick's end.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct WaterLedger {
+    /// Spawned as droplets, soaked in, taken from damp air.
+    pub water_in: f64,
+    /// In droplets, on and in hair.
+    pub held: f64,
+    /// Evaporated, run off, out of bounds, despawned.
+    pub water_out: f64,
+}
+
+impl WaterLedger {
+    /// Books water that came (m³), or with a negative sign went.
+    fn book(&mut self, came: f64) {
+        *(if came > 0.0 { &mut self.water_in } else { &mut self.water_out }) += came.abs();
+    }
+
+    /// |in − held − out| / in, what has been lost count of; 0 where no water came.
+    pub fn error(&self) -> f64 {
+        if self.water_in > 0.0 {
+            (self.water_in - self.held - self.water_out).abs() / self.water_in
+        } else {
+            0.0
+        }
+    }
+}

@@ -1,0 +1,485 @@
+//! Water on and in a strand: a film on its surface, water bound inside, and their ways.
+//!
+//! Two states a node (m³ in `f64`, so that nothing is lost by rounding): the **film** lies on the
+//! lock, flows down, creeps along and drips; the **bound** water has soaked into the fibres, where it
+//! opens hydrogen bonds. Air takes the film first, then what is bound.
+
+use super::{
+    model::{WATER_VISCOSITY, clinging, hanging},
+    vapour::{DryingAir, WATER, transfer},
+};
+use crate::setting::{Bound, HairSetting, Notes};
+use bevy::prelude::*;
+use core::f32::consts::PI;
+
+/// Density of dry keratin (kg/m³).
+const KERATIN: f32 = 1310.0;
+/// Share of a lock's cross-section that its fibres fill.
+const PACKING: f32 = 0.6;
+/// Bound water of soaked hair beyond a room's, as a share of the dry mass.
+const SATURATION: f32 = 0.31 - 0.0957;
+/// Thickest change that the flow makes in one substep, as a share of a segment.
+const COURANT: f32 = 0.4;
+
+/// How hair takes water up, gives it away and is pulled by it. Component of a
+/// [`Hair`](crate::Hair); where absent, [`HairDefault<Wetting>`](crate::HairDefault) holds.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct Wetting {
+    /// How many fibres a simulated strand stands for: with the diameter its mass, its thickness and
+    /// what it holds. Default 500: two hundred strands are a head of hair. Safe 1…10,000.
+    pub fibres: f32,
+    /// Diameter of a fibre (m). Default 70e-6, safe 40e-6…120e-6.
+    pub fibre_diameter: f32,
+    /// Largest acceleration that a droplet gives a node, \[W\] equation 2 (m/s²). Default 30, safe
+    /// 0…100; print has 1 without a unit. Less for droplets smaller than their r_min, and for nodes
+    /// that water has made heavy.
+    pub adhesion: f32,
+    /// Rate at which a droplet spreads into the film of what it touches (1/s). Default 20, safe
+    /// 0…100; 0 leaves droplets whole.
+    pub uptake: f32,
+    /// Rate at which film soaks into the fibres (1/s). Default 1/120 (virgin hair; bleached hair is
+    /// two to four times as fast), safe 0…1.
+    pub soaking: f32,
+    /// Diffusivity of the film along the strand by capillary action (m²/s). Default 1e-5, safe
+    /// 0…1e-3.
+    pub wicking: f32,
+    /// Rate at which water leaves, times what physics gives for a lock in free air. Default 1; less
+    /// deep inside dense hair, 0 never dries.
+    pub evaporation: f32,
+    /// Time in which hydrogen bonds follow the water (s). Default 1, safe 0…60; 0 follows at once.
+    pub bond_time: f32,
+    /// Share of its stiffness that soaked hair loses beyond its open hydrogen bonds. Default 0.33:
+    /// with the 0.67 that they leave, wet hair has 0.45 of its dry stiffness, as measured. Safe
+    /// 0…0.9.
+    pub softening: f32,
+    /// Time constant of a 1 mm droplet that slides down a strand: the speed that gravity's pull
+    /// along it gives in this time (s). Default 0.01, safe 0…0.1; 0 pins droplets where they land.
+    pub sliding: f32,
+}
+
+impl Default for Wetting {
+    fn default() -> Self {
+        Self {
+            fibres: 500.0,
+            fibre_diameter: 70e-6,
+            adhesion: 30.0,
+            uptake: 20.0,
+            soaking: 1.0 / 120.0,
+            wicking: 1e-5,
+            evaporation: 1.0,
+            bond_time: 1.0,
+            softening: 0.33,
+            sliding: 0.01,
+        }
+    }
+}
+
+const FIBRES: Bound = Bound::new("Wetting::fibres", 1.0, 1e6, "500 on each of 200 strands");
+const DIAMETER: Bound =
+    Bound::new("Wetting::fibre_diameter (m)", 1e-6, 1e-3, "hair has 50e-6 to 100e-6");
+const ADHESION: Bound = Bound::new("Wetting::adhesion (m/s²)", 0.0, 1e3, "30 clumps soft hair");
+const UPTAKE: Bound = Bound::new("Wetting::uptake (1/s)", 0.0, 1e4, "20 takes a drop in at once");
+const SOAKING: Bound = Bound::new("Wetting::soaking (1/s)", 0.0, 1e3, "1/120 is virgin hair");
+const WICKING: Bound = Bound::new("Wetting::wicking (m²/s)", 0.0, 1.0, "1e-5 creeps along");
+const EVAPORATION: Bound = Bound::new("Wetting::evaporation", 0.0, 1e3, "1 is a lock in free air");
+const BOND_TIME: Bound = Bound::new("Wetting::bond_time (s)", 0.0, 1e4, "1 follows water closely");
+const SOFTENING: Bound = Bound::new("Wetting::softening", 0.0, 0.95, "0.33 is measured");
+const SLIDING: Bound = Bound::new("Wetting::sliding (s)", 0.0, 10.0, "0.01 slides, 0 pins");
+
+impl HairSetting for Wetting {
+    fn mended(&self, notes: &Notes) -> Self {
+        let d = Self::default();
+        Self {
+            fibres: FIBRES.mend(self.fibres, d.fibres, notes),
+            fibre_diameter: DIAMETER.mend(self.fibre_diameter, d.fibre_diameter, notes),
+            adhesion: ADHESION.mend(self.adhesion, d.adhesion, notes),
+            uptake: UPTAKE.mend(self.uptake, d.uptake, notes),
+            soaking: SOAKING.mend(self.soaking, d.soaking, notes),
+            wicking: WICKING.mend(self.wicking, d.wicking, notes),
+            evaporation: EVAPORATION.mend(self.evaporation, d.evaporation, notes),
+            bond_time: BOND_TIME.mend(self.bond_time, d.bond_time, notes),
+            softening: SOFTENING.mend(self.softening, d.softening, notes),
+            sliding: SLIDING.mend(self.sliding, d.sliding, notes),
+        }
+    }
+}
+
+impl Wetting {
+    /// Radius of a bundle of `strands` strands' fibres that holds a drop together, √N r (m).
+    pub fn bundle(&self, strands: f32) -> f32 {
+        (self.fibres * strands).sqrt() * 0.5 * self.fibre_diameter
+    }
+
+    /// Radius of the lock that a strand stands for (m).
+    pub fn lock_radius(&self) -> f32 {
+        self.bundle(1.0) / PACKING.sqrt()
+    }
+
+    /// Dry mass of a metre of strand (kg/m).
+    pub fn dry_mass(&self) -> f32 {
+        let radius = 0.5 * self.fibre_diameter;
+        self.fibres * KERATIN * PI * radius * radius
+    }
+
+    /// What a metre of strand binds when soaked, beyond what it holds in a room (m³/m).
+    pub fn capacity(&self) -> f64 {
+        f64::from(self.dry_mass() * SATURATION) / WATER
+    }
+}
+
+/// The water of a strand, node by node, root first. Empty on hair that no water has touched: such
+/// hair costs nothing, and its hydrogen bonds are left to [`Treat`](crate::Treat) and equation 19.
+///
+/// Where there is water, hydrogen bonds follow it. The tick writes it; to wet hair from game code
+/// spawn a [`Droplet`](crate::Droplet) or send a [`Soak`](crate::Soak).
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct Moisture {
+    film: Vec<f64>,
+    bound: Vec<f64>,
+    wetness: Vec<f32>,
+}
+
+impl Moisture {
+    /// Whether no water has touched the strand since it was last dry.
+    pub fn is_untouched(&self) -> bool {
+        self.film.is_empty()
+    }
+
+    /// The film on each node (m³).
+    pub fn film(&self) -> &[f64] {
+        &self.film
+    }
+
+    /// The water bound at each node beyond what hair holds in a room (m³).
+    pub fn bound(&self) -> &[f64] {
+        &self.bound
+    }
+
+    /// The share of what it can bind that each node has bound: 0 dry, 1 soaked.
+    pub fn wetness(&self) -> &[f32] {
+        &self.wetness
+    }
+
+    /// All its water (m³).
+    pub fn volume(&self) -> f64 {
+        self.film.iter().chain(&self.bound).sum()
+    }
+
+    /// Makes room for `nodes`. What lay on nodes that are gone is returned.
+    pub(super) fn fit(&mut self, nodes: usize) -> f64 {
+        if self.film.len() == nodes {
+            return 0.0;
+        }
+        let cut = |water: &mut Vec<f64>| water.drain(nodes.min(water.len())..).sum::<f64>();
+        let lost = cut(&mut self.film) + cut(&mut self.bound);
+        self.film.resize(nodes, 0.0);
+        self.bound.resize(nodes, 0.0);
+        self.wetness.resize(nodes, 0.0);
+        lost
+    }
+
+    pub(super) fn add_film(&mut self, node: usize, volume: f64) {
+        self.film[node] += volume;
+    }
+
+    /// Brings bound water to a share of what each node can bind and takes the film off. Returns how
+    /// much more there is than before.
+    pub(super) fn soak(&mut self, share: f32, capacities: impl Iterator<Item = f64>) -> f64 {
+        let before = self.volume();
+        self.film.fill(0.0);
+        for ((bound, wetness), capacity) in
+            self.bound.iter_mut().zip(&mut self.wetness).zip(capacities)
+        {
+            *bound = capacity * f64::from(share);
+            *wetness = share;
+        }
+        self.volume() - before
+    }
+
+    /// Forgets the last traces; returns them.
+    pub(super) fn clear(&mut self) -> f64 {
+        let rest = self.volume();
+        *self = Self::default();
+        rest
+    }
+}
+
+/// Half the segments on either side of each node (m): the length of strand that it stands for.
+pub(super) fn node_lengths(lengths: &[f32]) -> impl Iterator<Item = f32> + '_ {
+    (0..=lengths.len()).map(|i| {
+        let before = if i == 0 { 0.0 } else { lengths[i - 1] };
+        0.5 * (before + lengths.get(i).copied().unwrap_or(0.0))
+    })
+}
+
+/// What the air does at a node in a substep.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Exposure {
+    /// Speed of the air beyond the room's draught (m/s).
+    pub speed: f32,
+    /// Its temperature above the room's (K).
+    pub warmth: f32,
+    /// Share of the node's capacity that equation 19 dries away in this substep: Σ drying |Δv_w|.
+    pub blown: f32,
+}
+
+/// A strand, its hair's wetting and its surroundings in one substep.
+pub struct Surroundings<'a> {
+    /// Where the nodes are (m).
+    pub positions: &'a [Vec3],
+    /// Rest lengths of the segments (m).
+    pub lengths: &'a [f32],
+    /// How this hair wets.
+    pub wetting: &'a Wetting,
+    /// Gravity in the hair's frame (m/s²).
+    pub gravity: Vec3,
+    /// The room's air.
+    pub air: &'a DryingAir,
+    /// The substep (s).
+    pub dt: f32,
+    /// Process time over time.
+    pub process: f32,
+}
+
+/// What left a strand in a substep.
+#[derive(Clone, Debug, Default)]
+pub struct Left {
+    /// Into the air (m³); negative where air was damp.
+    pub evaporated: f64,
+    /// Node and volume (m³) of drops that let go.
+    pub drips: Vec<(usize, f64)>,
+}
+
+impl Moisture {
+    /// One substep of a strand's water: the film flows and creeps, soaks in, dries and drips. Needs
+    /// room for all nodes.
+    pub fn exchange(
+        &mut self,
+        around: &Surroundings<'_>,
+        exposure: impl Fn(usize) -> Exposure,
+        left: &mut Left,
+    ) {
+        self.flow(around);
+        let Surroundings { wetting, air, dt, process, gravity, .. } = *around;
+        let diameter = 2.0 * wetting.lock_radius();
+        let soaked = 1.0 - bevy::math::ops::exp(-wetting.soaking * process * dt);
+        let g = gravity.length();
+        let held = clinging(wetting.bundle(1.0), g);
+        let hung = hanging(wetting.bundle(1.0), g);
+        let last = around.lengths.len();
+        for (i, length) in node_lengths(around.lengths).enumerate() {
+            let (film, bound) = (&mut self.film[i], &mut self.bound[i]);
+            let capacity = wetting.capacity() * f64::from(length);
+            // Beyond capacity only after the settings changed: what no longer fits comes out.
+            let soaks = ((capacity - *bound) * f64::from(soaked))
+                .min(*film)
+                .max((capacity - *bound).min(0.0));
+            *film -= soaks;
+            *bound += soaks;
+
+            let exposed = exposure(i);
+            let blown = capacity * f64::from(exposed.blown);
+            let speed = air.draught + exposed.speed;
+            let flux = transfer(speed, diameter) * air.drive(exposed.warmth) * wetting.evaporation;
+            let area = PI * diameter * length;
+            let drying = f64::from(flux * area * process * dt) / WATER;
+            let from_film = (drying + blown).min(*film);
+            *film -= from_film;
+            // Bound water is drier the less of it there is; in damp air it comes back.
+            let share = (*bound / capacity) as f32;
+            let thirst = f64::from((share - air.equilibrium) / (1.0 - air.equilibrium).max(1e-3));
+            let rest = (drying + blown - from_film).max(0.0);
+            let warm = if rest > 0.0 { drying.min(rest) } else { 0.0 };
+            let wanted = warm * thirst + (rest - warm);
+            let from_bound = wanted.min(*bound).max(*bound - capacity);
+            *bound -= from_bound;
+            left.evaporated += from_film + from_bound;
+            self.wetness[i] = ((*bound / capacity) as f32).clamp(0.0, 1.0);
+
+            let limit = if i == last { hung } else { held };
+            if *film > limit {
+                // A drop takes all but a neck with it; along the strand only what is too much.
+                let drop = if i == last { 0.8 * *film } else { *film - 0.7 * limit };
+                *film -= drop;
+                left.drips.push((i, drop));
+            }
+        }
+    }
+
+    /// The film flows along each segment as gravity pulls, and creeps from full to empty.
+    fn flow(&mut self, around: &Surroundings<'_>) {
+        let Surroundings { positions, lengths, wetting, gravity, dt, process, .. } = *around;
+        let girth = 2.0 * PI * wetting.lock_radius();
+        let thinning = WATER as f32 / (3.0 * WATER_VISCOSITY);
+        let mut came = 0.0;
+        for (i, &length) in lengths.iter().enumerate() {
+            let (above, below) = (self.film[i], self.film[i + 1]);
+            if above == 0.0 && below == 0.0 && came == 0.0 {
+                continue;
+            }
+            let along = (positions[i + 1] - positions[i]).normalize_or_zero().dot(gravity);
+            let source = if along >= 0.0 { above } else { below };
+            let thickness = source as f32 / (girth * length);
+            let speed = along.abs() * thickness * thickness * thinning;
+            let flowing = f64::from((speed * dt / length).min(COURANT)) * source;
+            let creep = (wetting.wicking * process * dt / (length * length)).min(0.5 * COURANT);
+            let creeping = (above - below) * f64::from(creep);
+            let crossing = flowing.copysign(f64::from(along)) + creeping;
+            // Every node is left with what the step before brought: no film below nothing.
+            let crossing = crossing.clamp(-0.5 * below, 0.5 * above);
+            self.film[i] += came - crossing;
+            came = crossing;
+        }
+        if let Some(tip) = self.film.last_mut() {
+            *tip += came;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn still() -> DryingAir {
+        DryingAir::new(22.0, 0.5, 0.1)
+    }
+
+    fn hanging_strand(n: usize) -> (Vec<Vec3>, Vec<f32>) {
+        ((0..=n).map(|i| Vec3::NEG_Y * 0.03 * i as f32).collect(), vec![0.03; n])
+    }
+
+    fn around<'a>(
+        strand: &'a (Vec<Vec3>, Vec<f32>),
+        wetting: &'a Wetting,
+        air: &'a DryingAir,
+    ) -> Surroundings<'a> {
+        Surroundings {
+            positions: &strand.0,
+            lengths: &strand.1,
+            wetting,
+            gravity: Vec3::NEG_Y * 9.8,
+            air,
+            dt: 1.0 / 360.0,
+            process: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_head_of_hair_weighs_and_holds_what_is_measured() {
+        // 100,000 fibres of 25 cm: 127 g, 30 % of it water when soaked.
+        let w = Wetting { fibres: 100_000.0, ..default() };
+        assert!((w.dry_mass() * 0.25 - 0.126).abs() < 0.002);
+        let room_to_soaked = w.capacity() * 0.25 * WATER / f64::from(w.dry_mass() * 0.25);
+        assert!((room_to_soaked - 0.214).abs() < 0.002);
+        let lock = Wetting::default();
+        assert!((lock.lock_radius() - 1.0e-3).abs() < 2e-5);
+    }
+
+    #[test]
+    fn the_film_runs_down_and_drips() {
+        let strand = hanging_strand(8);
+        let (wetting, air) = (Wetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
+        let around = around(&strand, &wetting, &air);
+        let mut m = Moisture::default();
+        m.fit(9);
+        m.add_film(1, 15e-9);
+        let mut left = Left::default();
+        // A film is the slower the thinner it is.
+        let mut middle = 1.0;
+        for seconds in [1, 4, 15] {
+            for _ in 0..360 * seconds {
+                m.exchange(&around, |_| Exposure::default(), &mut left);
+            }
+            let moment: f64 = m.film().iter().enumerate().map(|(i, f)| i as f64 * f).sum();
+            let lower = moment / m.film().iter().sum::<f64>();
+            assert!(lower > middle + 0.1 && left.drips.is_empty(), "{lower}");
+            middle = lower;
+        }
+        for _ in 0..20 {
+            m.add_film(1, 10e-9);
+            for _ in 0..360 {
+                m.exchange(&around, |_| Exposure::default(), &mut left);
+            }
+        }
+        assert!(left.drips.iter().any(|(node, _)| *node == 8), "{:?}", left.drips);
+        let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
+        let total = m.volume() + dripped;
+        assert!((total - 215e-9).abs() < 1e-18, "{total}");
+    }
+
+    #[test]
+    fn in_the_papers_limit_drying_is_equation_19() {
+        // Soaked through, no drying but the wind's, no film: dw = −0.3 |Δv_w|.
+        let strand = hanging_strand(4);
+        let (wetting, air) = (Wetting { evaporation: 0.0, ..default() }, still());
+        let around = around(&strand, &wetting, &air);
+        let mut m = Moisture::default();
+        m.fit(5);
+        m.soak(1.0, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
+        for _ in 0..100 {
+            let blown = |i: usize| Exposure { blown: 0.3 * 0.004 * i as f32, ..default() };
+            m.exchange(&around, blown, &mut Left::default());
+        }
+        for (i, wet) in m.wetness().iter().enumerate() {
+            assert!((wet - (1.0 - 0.12 * i as f32)).abs() < 1e-5, "{i}: {wet}");
+        }
+    }
+
+    #[test]
+    fn damp_air_wets_and_a_room_dries() {
+        let strand = hanging_strand(4);
+        let wetting = Wetting::default();
+        let damp = DryingAir::new(22.0, 0.9, 0.1);
+        let mut m = Moisture::default();
+        m.fit(5);
+        let mut left = Left::default();
+        let run = |m: &mut Moisture, air: &DryingAir, left: &mut Left| {
+            let around = Surroundings { process: 3600.0, ..around(&strand, &wetting, air) };
+            for _ in 0..3600 {
+                m.exchange(&around, |_| Exposure::default(), left);
+            }
+        };
+        run(&mut m, &damp, &mut left);
+        assert!(left.evaporated < 0.0);
+        assert!((m.wetness()[2] - damp.equilibrium).abs() < 0.02, "{}", m.wetness()[2]);
+        run(&mut m, &still(), &mut left);
+        assert!(m.wetness()[2] < 0.02);
+        assert!((m.volume() + left.evaporated).abs() < 1e-18);
+    }
+
+    proptest! {
+        #[test]
+        fn water_is_neither_made_nor_lost_nor_negative(
+            film in proptest::collection::vec(0.0f64..60e-9, 9),
+            share in 0.0f32..1.0,
+            points in proptest::collection::vec((-1.0f32..1.0, -1.0f32..1.0), 9),
+            process in 0.0f32..1e4,
+            dt in 1e-4f32..0.1,
+        ) {
+            let strand = hanging_strand(8);
+            let (wetting, air) = (Wetting::default(), still());
+            let positions: Vec<Vec3> =
+                points.iter().map(|(x, y)| Vec3::new(*x, *y, 0.0) * 0.1).collect();
+            let around =
+                Surroundings { positions: &positions, process, dt, ..around(&strand, &wetting, &air) };
+            let mut m = Moisture::default();
+            m.fit(9);
+            m.soak(share, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
+            film.iter().enumerate().for_each(|(i, f)| m.add_film(i, *f));
+            let before = m.volume();
+            let mut left = Left::default();
+            for _ in 0..50 {
+                let exposed = |_| Exposure { speed: 3.0, warmth: 40.0, blown: 0.001 };
+                m.exchange(&around, exposed, &mut left);
+                prop_assert!(m.film().iter().chain(m.bound()).all(|v| *v >= 0.0 && v.is_finite()));
+                prop_assert!(m.wetness().iter().all(|w| (0.0..=1.0).contains(w)));
+            }
+            let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
+            let after = m.volume() + left.evaporated + dripped;
+            prop_assert!((after - before).abs() < 1e-12 * before.max(1e-12));
+        }
+    }
+}

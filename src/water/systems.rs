@@ -1,0 +1,127 @@
+//! Water's places in the tick, and what it tells and counts.
+
+use super::{
+    Climate, Droplet, DropletRules, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
+    exchange::{exchange_water, run_showers},
+    motion::{WaterField, follow_strands, merge_droplets, move_droplets, wet_strands},
+};
+use crate::{
+    contact,
+    fault::{Fault, HairFault},
+    setting::{self, Notes},
+    strand::Strand,
+    style,
+    tick::{HairStep, HairSystems, HairTick},
+};
+use bevy::prelude::*;
+
+/// Droplets, showers, moisture and the air that dries.
+pub struct WaterPlugin;
+
+impl Plugin for WaterPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<Wetting>(app);
+        app.init_resource::<Climate>()
+            .init_resource::<ProcessTime>()
+            .init_resource::<DropletRules>()
+            .init_resource::<WaterLedger>()
+            .init_resource::<WaterField>()
+            .add_message::<Soak>()
+            .register_type::<Climate>()
+            .register_type::<ProcessTime>()
+            .register_type::<DropletRules>()
+            .register_type::<WaterLedger>()
+            .register_type::<Droplet>()
+            .register_type::<Shower>()
+            .register_type::<Moisture>()
+            .register_required_components::<Strand, Moisture>()
+            .add_observer(count_lost_droplet)
+            .add_observer(count_lost_moisture)
+            .add_systems(PreUpdate, (report_showers, report_air))
+            .add_systems(
+                HairTick,
+                (run_showers, exchange_water)
+                    .chain()
+                    .in_set(HairSystems::ExternalForces)
+                    .after(style::apply_treatments),
+            )
+            .add_systems(
+                HairTick,
+                (move_droplets, merge_droplets, wet_strands)
+                    .chain()
+                    .in_set(HairSystems::Interaction)
+                    .after(contact::part_strands),
+            )
+            .add_systems(
+                HairTick,
+                (follow_strands, close_books).chain().in_set(HairSystems::BondUpdate),
+            );
+    }
+}
+
+fn report_showers(
+    showers: Query<(Entity, &Shower), Changed<Shower>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, shower) in &showers {
+        let notes = Notes::default();
+        shower.mended(&notes);
+        tell(entity, notes, &mut faults);
+    }
+}
+
+fn report_air(
+    climate: Res<Climate>,
+    process: Res<ProcessTime>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let notes = Notes::default();
+    if climate.is_changed() {
+        climate.mended(&notes);
+    }
+    if process.is_changed() {
+        process.mended(&notes);
+    }
+    tell(Entity::PLACEHOLDER, notes, &mut faults);
+}
+
+pub(super) fn tell(entity: Entity, notes: Notes, faults: &mut MessageWriter<HairFault>) {
+    for wrong in notes.into_inner() {
+        faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+    }
+}
+
+/// Droplets that somebody despawns take their water with them.
+fn count_lost_droplet(
+    lost: On<Discard, Droplet>,
+    droplets: Query<&Droplet>,
+    mut ledger: ResMut<WaterLedger>,
+) {
+    if let Ok(droplet) = droplets.get(lost.entity) {
+        ledger.water_out += droplet.counted;
+    }
+}
+
+/// Strands that somebody despawns while wet, likewise.
+fn count_lost_moisture(
+    lost: On<Discard, Moisture>,
+    strands: Query<&Moisture>,
+    mut ledger: ResMut<WaterLedger>,
+) {
+    if let Ok(moisture) = strands.get(lost.entity) {
+        ledger.water_out += moisture.volume();
+    }
+}
+
+/// At the end of a tick: what there is, summed in the order of the entities.
+fn close_books(
+    step: Res<HairStep>,
+    droplets: Query<&Droplet>,
+    strands: Query<&Moisture>,
+    mut ledger: ResMut<WaterLedger>,
+) {
+    if step.index + 1 == step.count && ledger.water_in > 0.0 {
+        ledger.held = droplets.iter().map(|d| d.counted).sum::<f64>()
+            + strands.iter().map(Moisture::volume).sum::<f64>();
+    }
+}
