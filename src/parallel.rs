@@ -3,18 +3,27 @@
 #[cfg(feature = "parallel")]
 use bevy::tasks::ComputeTaskPool;
 
-/// Fewer items than this are not worth a task.
-#[cfg(feature = "parallel")]
+/// Fewer strands than this are not worth a task.
 const GRAIN: usize = 32;
 
 /// Calls `work` with every item. Items are independent, so the order cannot matter.
-pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + Sync) {
-    for_each_init(items, || (), |(), item| work(item));
+pub(crate) fn for_each<T: Send>(strands: &mut [T], work: impl Fn(&mut T) + Send + Sync) {
+    for_each_init(strands, GRAIN, || (), |(), strand| work(strand));
 }
 
-/// Calls `work` with every item and scratch space that `init` makes once a task.
-pub(crate) fn for_each_init<T: Send, S>(
+/// Calls `work` with every block of about sixteen strands and scratch space that `init` makes once
+/// a task.
+pub(crate) fn for_each_block<T: Send, S>(
+    blocks: &mut [T],
+    init: impl Fn() -> S + Send + Sync,
+    work: impl Fn(&mut S, &mut T) + Send + Sync,
+) {
+    for_each_init(blocks, GRAIN / 16, init, work);
+}
+
+fn for_each_init<T: Send, S>(
     items: &mut [T],
+    grain: usize,
     init: impl Fn() -> S + Send + Sync,
     work: impl Fn(&mut S, &mut T) + Send + Sync,
 ) {
@@ -26,8 +35,8 @@ pub(crate) fn for_each_init<T: Send, S>(
     #[cfg(feature = "parallel")]
     if let Some(pool) = ComputeTaskPool::try_get() {
         let workers = pool.thread_num() + 1;
-        if workers > 1 && items.len() >= 2 * GRAIN {
-            let chunk = items.len().div_ceil(workers * 2).max(GRAIN);
+        if workers > 1 && items.len() >= 2 * grain {
+            let chunk = items.len().div_ceil(workers * 2).max(grain);
             pool.scope(|scope| {
                 for chunk in items.chunks_mut(chunk) {
                     scope.spawn(async { serial(chunk) });
@@ -36,5 +45,7 @@ pub(crate) fn for_each_init<T: Send, S>(
             return;
         }
     }
+    #[cfg(not(feature = "parallel"))]
+    let _ = grain;
     serial(items);
 }

@@ -1,6 +1,8 @@
 //! What hair touches: colliders, and other strands.
 
+mod lanes;
 pub mod model;
+mod neighbours;
 mod systems;
 
 pub use systems::ContactPlugin;
@@ -175,20 +177,11 @@ pub struct Obstacles {
 /// The pairs of strands of one hair that may touch.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub struct LockNeighbours {
-    #[reflect(ignore)]
-    list: model::Neighbours,
-    #[reflect(ignore)]
-    points: Vec<Vec3>,
-    #[reflect(ignore)]
-    runs: Vec<model::Run>,
-    #[reflect(ignore)]
-    pushes: Vec<Vec3>,
-}
+pub struct LockNeighbours(#[reflect(ignore)] neighbours::Neighbours);
 
 impl LockNeighbours {
-    /// How many pairs of node and edge are watched.
+    /// How many pairs of node and edge are watched, rounded up to groups of eight for each node.
     pub fn pairs(&self) -> usize {
-        self.list.pairs()
+        self.0.pairs()
     }
 }

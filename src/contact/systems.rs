@@ -1,9 +1,8 @@
 //! `Interaction`: strands push each other apart, colliders are seen from each hair's frame.
 
-use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles, model::Run};
+use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles};
 use crate::{
     fault::{Fault, HairFault},
-    parallel::for_each,
     rod::obstacle::{Obstacle, Solid},
     setting::{self, Notes, Settings},
     strand::{Hair, Strand, StrandOf, Strands, TickPose},
@@ -91,34 +90,16 @@ pub(crate) fn part_strands(
         if radius <= 0.0 || strength <= 0.0 {
             continue;
         }
-        let LockNeighbours { list, points, runs, pushes } = neighbours.bypass_change_detection();
-        points.clear();
-        runs.clear();
+        let list = &mut neighbours.bypass_change_detection().0;
+        list.clear();
         for strand in strands.iter_many(members.collection()) {
-            let run = Run { start: points.len() as u32, len: strand.nodes() as u32 };
-            points.extend_from_slice(strand.positions());
-            runs.push(run);
+            list.add(strand.positions());
         }
-        list.update(points, runs, radius);
-        pushes.resize(points.len(), Vec3::ZERO);
-        let (list, points) = (&*list, &*points);
-        let mut work: Vec<(usize, &mut [Vec3])> = Vec::with_capacity(runs.len());
-        let mut rest = &mut pushes[..];
-        for run in runs.iter() {
-            let (own, others) = rest.split_at_mut(run.len as usize);
-            work.push((run.start as usize, own));
-            rest = others;
-        }
-        for_each(&mut work, |(start, pushes)| {
-            for (i, push) in (*start..).zip(pushes.iter_mut()) {
-                *push = list.acceleration(i, points[i], radius, strength) * step.dt;
-            }
-        });
-        let mut pushes = pushes.iter();
+        let mut pushes = list.pushes(radius, strength);
         let mut members = strands.iter_many_mut(members.collection());
         while let Some(mut strand) = members.fetch_next() {
             let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
-            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += *push);
+            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * step.dt);
         }
     }
 }

@@ -6,6 +6,7 @@
 //! outlier costs nothing. Built by counting sort: two passes over the points, no allocation once
 //! warm, the same order every time.
 
+use core::ops::Range;
 use glam::{IVec3, Vec3};
 
 const FAR: Vec3 = Vec3::splat(1e9);
@@ -124,15 +125,39 @@ impl UniformGrid {
             }
         }
     }
+
+    /// The items in the grid's own order, in which neighbouring cells lie together: for callers that
+    /// keep what they look at in this order, to read it in a row. The first few come again at the
+    /// end, so that no row of cells is torn.
+    pub fn order(&self) -> impl Iterator<Item = u32> {
+        let first = self.starts.get(1).map_or(0, |end| *end as usize);
+        self.entries.iter().chain(&self.entries[..first]).map(|e| e.item)
+    }
+
+    /// Where in [`order`](Self::order) the items of the 8 cells nearest to `point` are: all that lie
+    /// within half a cell size of it, some that do not, and with bad luck some twice.
+    #[inline]
+    pub fn rows_around(&self, point: Vec3) -> [Range<usize>; 4] {
+        if self.entries.is_empty() || !point.is_finite() {
+            return [const { 0..0 }; 4];
+        }
+        let low = self.cell_of(point - 0.5 / self.inverse_cell);
+        let mask = self.starts.len() - 2;
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(y, z)| {
+            let b = bucket(low + IVec3::new(0, y, z), mask);
+            // The last bucket's neighbour is the first one, which comes again behind it.
+            let end =
+                if b < mask { self.starts[b + 2] } else { self.starts[mask + 1] + self.starts[1] };
+            self.starts[b] as usize..end as usize
+        })
+    }
 }
 
-/// Equation 5's role: a table index for a cell.
+/// Equation 5's role: a table index for a cell. Cells in a row along x have neighbouring ones.
 #[inline]
 fn bucket(cell: IVec3, mask: usize) -> usize {
-    let h = (cell.x as u32).wrapping_mul(0x9E37_79B1)
-        ^ (cell.y as u32).wrapping_mul(0x85EB_CA77)
-        ^ (cell.z as u32).wrapping_mul(0xC2B2_AE3D);
-    (h ^ (h >> 15)) as usize & mask
+    let h = (cell.y as u32).wrapping_mul(0x85EB_CA77) ^ (cell.z as u32).wrapping_mul(0xC2B2_AE3D);
+    (h ^ (h >> 15)).wrapping_add(cell.x as u32) as usize & mask
 }
 
 #[cfg(test)]

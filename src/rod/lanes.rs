@@ -1,16 +1,17 @@
-//! One scalar type for every width: `f32`, `f64` and sixteen `f32` lanes.
+//! One scalar type for every width: `f32`, `f64`, and eight or sixteen `f32` lanes.
 //!
 //! The constraint mathematics is written once, generic over [`Real`]. `f64` serves the golden
 //! vectors, `f32` is the scalar twin that benches compare against, and [`f32x16`] is what the
-//! tick runs: sixteen strands side by side, on whichever instruction set the machine has.
+//! tick runs: sixteen strands side by side, on whichever instruction set the machine has. Contact
+//! between strands takes [`f32x8`], because its lists are short.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
-use fearless_simd::{f32x16, mask32x16, prelude::*};
+use fearless_simd::{f32x8, f32x16, mask32x8, mask32x16, prelude::*};
 
 /// How many strands one block solves side by side.
 pub const LANES: usize = 16;
 
-/// A number, or [`LANES`] numbers side by side, that rod mathematics can be written in.
+/// A number, or several side by side, that mathematics can be written in.
 pub trait Real:
     Copy
     + Add<Output = Self>
@@ -75,34 +76,40 @@ macro_rules! scalar {
 scalar!(f32);
 scalar!(f64);
 
-impl<S: Simd> Real for f32x16<S> {
-    type Mask = mask32x16<S>;
-    #[inline(always)]
-    fn lit(self, value: f64) -> Self {
-        (value as f32).simd_into(self.simd)
-    }
-    #[inline(always)]
-    fn mul_add(self, b: Self, c: Self) -> Self {
-        SimdFloat::mul_add(self, b, c)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        SimdFloat::sqrt(self)
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Self::select(self.simd_gt(other), self, other)
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Self::select(self.simd_lt(other), self, other)
-    }
-    #[inline(always)]
-    fn lt(self, other: Self) -> Self::Mask {
-        self.simd_lt(other)
-    }
-    #[inline(always)]
-    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
-        mask.select(yes, no)
-    }
+macro_rules! lanes {
+    ($lanes:ident, $mask:ident) => {
+        impl<S: Simd> Real for $lanes<S> {
+            type Mask = $mask<S>;
+            #[inline(always)]
+            fn lit(self, value: f64) -> Self {
+                (value as f32).simd_into(self.simd)
+            }
+            #[inline(always)]
+            fn mul_add(self, b: Self, c: Self) -> Self {
+                SimdFloat::mul_add(self, b, c)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                SimdFloat::sqrt(self)
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                Self::select(self.simd_gt(other), self, other)
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                Self::select(self.simd_lt(other), self, other)
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> Self::Mask {
+                self.simd_lt(other)
+            }
+            #[inline(always)]
+            fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+                mask.select(yes, no)
+            }
+        }
+    };
 }
+lanes!(f32x8, mask32x8);
+lanes!(f32x16, mask32x16);

@@ -10,7 +10,7 @@ use crate::{
     bond::{BondInfluence, Bonds, RestShape},
     contact::{LockContact, Obstacles},
     fault::{Fault, HairFault},
-    parallel::for_each_init,
+    parallel::for_each_block,
     setting::{self, Settings},
     strand::{Burden, HeldNodes, PutBack, Strand, StrandOf},
     tick::{HairStep, HairSystems, HairTick},
@@ -102,7 +102,7 @@ fn project(
         .flat_map(|alike| alike.chunks_mut(LANES))
         .collect();
     let level = Level::new();
-    for_each_init(&mut blocks, BlockLanes::default, |block, items| {
+    for_each_block(&mut blocks, BlockLanes::default, |block, items| {
         solve(level, block, items, &params[items[0].hair]);
     });
     for item in &items {

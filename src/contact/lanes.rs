@@ -1,0 +1,227 @@
+//! Equation 18 for eight edges side by side, against one node.
+//!
+//! The mathematics of [`model`](super::model), which the tests hold it against. Nearly every branch
+//! of it (is the foot mine, does it touch) is a coin toss in a pile of hair, and the guesses that
+//! fail cost more than the arithmetic: masks guess nothing. Collecting eight edges costs little,
+//! because an edge is two neighbouring rows of [`Row`]s, each one load.
+
+use super::model::SAME_PLACE;
+use crate::rod::{algebra::V3, lanes::Real};
+use core::ops::Range;
+use fearless_simd::{Simd, f32x4, f32x8, f32x16, mask32x8, prelude::*, u32x8, u32x16};
+use glam::Vec3;
+
+/// How many edges are met side by side.
+pub(super) const WIDTH: usize = 8;
+
+/// A node as the edge that starts at it sees it: x, y, z (m), and the share of the edge from which
+/// on feet are not its own: 1, but without end for the last edge, and nothing for the tip.
+pub(super) type Row = [f32; 4];
+
+/// The nodes of one strand as rows.
+pub(super) fn rows(nodes: &[Vec3]) -> impl Iterator<Item = Row> {
+    nodes.iter().enumerate().map(|(i, p)| {
+        let end = match nodes.len() - i {
+            1 => f32::NEG_INFINITY,
+            2 => f32::INFINITY,
+            _ => 1.0,
+        };
+        [p.x, p.y, p.z, end]
+    })
+}
+
+/// The node of a row.
+#[inline(always)]
+pub(super) fn place(row: &Row) -> Vec3 {
+    Vec3::new(row[0], row[1], row[2])
+}
+
+/// Numbers that lanes append some of theirs to, without a branch on how many.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stack {
+    items: Vec<u32>,
+    len: usize,
+}
+
+impl Stack {
+    /// Empties it and makes room for `most` numbers. Growing while lanes append would have them go
+    /// through memory each time, for the call that may be.
+    pub fn clear(&mut self, most: usize) {
+        self.len = 0;
+        if self.items.len() < most + 16 {
+            self.items.resize(2 * most + 16, 0);
+        }
+    }
+
+    pub fn items(&self) -> &[u32] {
+        &self.items[..self.len]
+    }
+
+    /// The items in eights, filled up with `filler`.
+    pub fn eights(&mut self, filler: u32) -> &[[u32; 8]] {
+        let end = self.len.next_multiple_of(8);
+        self.items[self.len..end].fill(filler);
+        self.items[..end].as_chunks().0
+    }
+
+    /// Appends the lanes for which the mask holds.
+    #[inline(always)]
+    fn push<S: Simd, L: SimdInt<S, Element = u32>>(&mut self, lanes: L, mask: L::Mask) {
+        lanes.compress(mask).store_slice(&mut self.items[self.len..self.len + L::LEN]);
+        self.len += mask.to_bitmask().count_ones() as usize;
+    }
+}
+
+/// Sixteen pieces of edges, by their middles.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Pieces {
+    middles: [[f32; 16]; 3],
+    edges: [u32; 16],
+}
+
+impl Pieces {
+    const NOWHERE: Self = Self { middles: [[f32::NAN; 16]; 3], edges: [0; 16] };
+
+    /// Writes `pieces`, each a middle and an edge, to `all`, in their order.
+    pub fn collect(pieces: impl Iterator<Item = (Vec3, u32)>, all: &mut Vec<Self>) {
+        all.clear();
+        for (k, (middle, edge)) in pieces.enumerate() {
+            if k % 16 == 0 {
+                all.push(Self::NOWHERE);
+            }
+            let Some(last) = all.last_mut() else { return };
+            last.edges[k % 16] = edge;
+            for axis in 0..3 {
+                last.middles[axis][k % 16] = middle[axis];
+            }
+        }
+    }
+
+    /// Appends to `edges` those whose piece's middle is within √`limit` of `p`.
+    #[inline(always)]
+    pub fn close<S: Simd>(&self, simd: S, p: Vec3, limit: f32, edges: &mut Stack) {
+        let mut squared = f32x16::splat(simd, 0.0);
+        for axis in 0..3 {
+            let off = f32x16::load_array_ref(simd, &self.middles[axis]) - p[axis];
+            squared = Real::mul_add(off, off, squared);
+        }
+        let close = Real::lt(squared, f32x16::splat(simd, limit));
+        edges.push(u32x16::load_array_ref(simd, &self.edges), close);
+    }
+}
+
+/// A strength of equation 18 with its reach 2r.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Penalty {
+    pub reach: f32,
+    pub strength: f32,
+}
+
+/// From the nearest point of each edge to one node, and which edges count it as their own.
+struct Off<S: Simd> {
+    off: V3<f32x8<S>>,
+    squared: f32x8<S>,
+    own: mask32x8<S>,
+}
+
+/// Four rows, by column.
+#[inline(always)]
+fn four<S: Simd>(simd: S, rows: [Row; 4]) -> [f32x4<S>; 4] {
+    let mut flat = [0.0; 16];
+    flat.copy_from_slice(rows.as_flattened());
+    simd.load_four_interleaved_f32x4(&flat)
+}
+
+/// The starts of eight edges, or with `after` 1 their ends, and their rows' last column.
+#[inline(always)]
+fn eight<S: Simd>(
+    simd: S,
+    rows: &[Row],
+    edges: &[u32; WIDTH],
+    after: usize,
+) -> (V3<f32x8<S>>, f32x8<S>) {
+    let row = |k: usize| rows[edges[k] as usize + after];
+    let a = four(simd, [row(0), row(1), row(2), row(3)]);
+    let b = four(simd, [row(4), row(5), row(6), row(7)]);
+    let p = V3::new(
+        simd.combine_f32x4(a[0], b[0]),
+        simd.combine_f32x4(a[1], b[1]),
+        simd.combine_f32x4(a[2], b[2]),
+    );
+    (p, simd.combine_f32x4(a[3], b[3]))
+}
+
+#[inline(always)]
+fn off<S: Simd>(simd: S, rows: &[Row], edges: &[u32; WIDTH], p: V3<f32x8<S>>) -> Off<S> {
+    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+    let (start, end_share) = eight(simd, rows, edges, 0);
+    let (end, _) = eight(simd, rows, edges, 1);
+    let along = end - start;
+    let from_start = p - start;
+    let length_squared = Real::max(along.dot(along), f32x8::splat(simd, 1e-20));
+    let share = from_start.dot(along) / length_squared;
+    let clamped = Real::min(Real::max(share, zero), one);
+    let off = from_start - along.scale(clamped);
+    Off { off, squared: off.dot(off), own: Real::lt(share, end_share) }
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, p: Vec3) -> V3<f32x8<S>> {
+    V3::new(f32x8::splat(simd, p.x), f32x8::splat(simd, p.y), f32x8::splat(simd, p.z))
+}
+
+/// Appends those of eight edges that are within √`limit` of `p` and not of its `own` strand, and
+/// their squared distances as bits, which are in the order of the distances.
+#[inline(always)]
+pub(super) fn near<S: Simd>(
+    simd: S,
+    rows: &[Row],
+    eight: &[u32; WIDTH],
+    (p, own): (Vec3, &Range<u32>),
+    limit: f32,
+    edges: &mut Stack,
+    distances: &mut Stack,
+) {
+    let squared = off(simd, rows, eight, splat(simd, p)).squared;
+    let numbers = u32x8::load_array_ref(simd, eight);
+    let others = numbers.simd_lt(own.start) | numbers.simd_ge(own.end);
+    let near = Real::lt(squared, f32x8::splat(simd, limit)) & others;
+    edges.push(numbers, near);
+    distances.push(squared.bitcast::<u32x8<S>>(), near);
+}
+
+/// Equation 18 of groups of eight edges on a node, lane by lane: see [`total`](Self::total).
+pub(super) struct Sum<S: Simd> {
+    p: V3<f32x8<S>>,
+    sum: V3<f32x8<S>>,
+    penalty: Penalty,
+}
+
+impl<S: Simd> Sum<S> {
+    /// Nothing yet, for a node at `p`.
+    #[inline(always)]
+    pub fn new(simd: S, p: Vec3, penalty: Penalty) -> Self {
+        Self { p: splat(simd, p), sum: splat(simd, Vec3::ZERO), penalty }
+    }
+
+    /// Adds what eight edges do. What is not finite fails every comparison and adds nothing.
+    #[inline(always)]
+    pub fn add(&mut self, simd: S, rows: &[Row], edges: &[u32; WIDTH]) {
+        let Off { off, squared, own } = off(simd, rows, edges, self.p);
+        let reach = f32x8::splat(simd, self.penalty.reach);
+        let touching = own
+            & Real::lt(squared, reach * reach)
+            & Real::lt(f32x8::splat(simd, SAME_PLACE), squared);
+        let distance = Real::sqrt(squared);
+        let strength = f32x8::splat(simd, self.penalty.strength);
+        let pushed = off.scale_add(strength * (reach - distance) / (reach * distance), self.sum);
+        self.sum = V3::select(touching, pushed, self.sum);
+    }
+
+    /// The sum over all lanes (m/s²).
+    #[inline(always)]
+    pub fn total(self) -> Vec3 {
+        Vec3::new(self.sum.x.reduce_sum(), self.sum.y.reduce_sum(), self.sum.z.reduce_sum())
+    }
+}
