@@ -11,6 +11,7 @@ mod parallel;
 pub mod render;
 pub mod rod;
 pub mod setting;
+pub mod spring;
 pub mod strand;
 pub mod style;
 pub mod tick;
@@ -22,7 +23,8 @@ pub use contact::{ColliderShape, HairCollider, LockContact};
 pub use fault::{Fault, HairFault};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
-pub use strand::{Burden, Hair, HeldNodes, Strand, StrandError, StrandOf, Strands};
+pub use spring::Springs;
+pub use strand::{Burden, Hair, HeldNodes, Strand, StrandError, StrandModel, StrandOf, Strands};
 pub use style::{PermRod, Treat, Winding, WoundOn, WoundStrands};
 pub use tick::{HairPlugins, HairStep, HairSubsteps, HairSystems, HairTick};
 pub use water::{
@@ -39,7 +41,7 @@ pub mod prelude {
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
         HairCollider, HairDefault, HairFault, HairGravity, HairPlugins, HairSubsteps, HairSystems,
         HairTick, HeldNodes, LockContact, Moisture, PermRod, ProcessTime, Shower, Soak, Solver,
-        Stiffness, Strand, StrandOf, Strands, StretchProjection, Treat, WaterLedger, Wetting,
-        Winding, WoundOn,
+        Stiffness, Strand, StrandModel, StrandOf, Strands, StretchProjection, Treat, WaterLedger,
+        Wetting, Winding, WoundOn,
     };
 }

@@ -20,6 +20,7 @@ use crate::{
     fault::{Fault, HairFault},
     rod::RodPlugin,
     setting::{Bound, InvalidValue},
+    spring::SpringPlugin,
     strand::StrandPlugin,
     style::StylePlugin,
     water::WaterPlugin,
@@ -161,7 +162,8 @@ impl PluginGroup for HairPlugins {
             .add(ContactPlugin)
             .add(StylePlugin)
             .add(WaterPlugin)
-            .add(RodPlugin);
+            .add(RodPlugin)
+            .add(SpringPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
         group

@@ -196,7 +196,7 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
         shape: bevy_keratin::ColliderShape::Sphere(Sphere::new(-0.05)),
         friction: f32::NAN,
     });
-    app.world_mut().spawn(Blower { strength: -5.0, drying: 0.3 });
+    app.world_mut().spawn(Blower { strength: -5.0, ..default() });
     app.world_mut().spawn(PermRod { radius: 0.0, length: 0.1 });
     app.insert_resource(HairSubsteps::Fixed(0)).insert_resource(HairGravity(Vec3::NAN));
     app.update();

@@ -16,7 +16,7 @@ use bevy_keratin::prelude::*;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use report::Report;
-use scenes::{Director, Scene, SceneKind, ScenePlugin, measure};
+use scenes::{Director, DropletCount, Scene, SceneKind, ScenePlugin, measure};
 use std::{
     io::Write,
     path::PathBuf,
@@ -28,7 +28,7 @@ use std::{
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// Which scene: bedhead, blow-dry, perm.
+    /// Which scene: bedhead, blow-dry, perm, wet, shower.
     #[arg(long)]
     scene: SceneKind,
     /// Which variant of it; the full treatment if left out.
@@ -37,6 +37,9 @@ struct Arguments {
     /// How long the story runs (s) before it is measured; the paper's length if left out.
     #[arg(long)]
     seconds: Option<f32>,
+    /// How many droplets the scene `wet` strews.
+    #[arg(long, default_value_t = DropletCount::default().0)]
+    droplets: usize,
     /// One JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -68,7 +71,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if let Some(file) = &mut csv {
         writeln!(file, "seconds,kept,b_hydrogen_mean,strain_peak,tip_x,tip_y,tip_z")?;
     }
-    let mut app = headless_app(scene, arguments.threads);
+    let mut app = headless_app(scene, arguments.threads, DropletCount(arguments.droplets));
     let frames = (seconds * 60.0).round() as u64;
     let bar = ProgressBar::new(frames)
         .with_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} frames, {eta} left")?);
@@ -84,6 +87,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let wall = start.elapsed();
     let mut report = Report::new(app.world_mut(), scene, frames, wall);
     bar.set_message("settling");
+    app.world_mut().resource_mut::<Director>().ended = true;
     settle(&mut app);
     report.hanging(app.world_mut());
     app.insert_resource(HairGravity(Vec3::ZERO));
@@ -99,7 +103,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Exactly one tick an update, on as many threads as asked for.
-fn headless_app(scene: Scene, threads: Option<u16>) -> App {
+fn headless_app(scene: Scene, threads: Option<u16>, droplets: DropletCount) -> App {
     // The thread that runs the app solves strands too, next to those of the pool.
     let mut pools = TaskPoolOptions::default();
     if let Some(threads) = threads {
@@ -118,6 +122,7 @@ fn headless_app(scene: Scene, threads: Option<u16>) -> App {
         HairPlugins::default(),
         ScenePlugin(scene),
     ))
+    .insert_resource(droplets)
     .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.finish();

@@ -1,6 +1,6 @@
 //! The numbers that a run came to.
 
-use crate::scenes::{Director, Scene, SceneKind, measure};
+use crate::scenes::{Director, Scene, SceneKind, locks, measure};
 use bevy::{math::DVec3, prelude::*};
 use bevy_keratin::{HairStep, WindReceived, prelude::*};
 use serde::Serialize;
@@ -46,6 +46,22 @@ pub struct Report {
     wind_rate_correlation: Option<f64>,
     /// Largest distance of a joint's shape without gravity from Σ f b Ω_j / Σ f b.
     relaxed_error: f64,
+    /// Water that came, is there and has gone (m³), and what was lost count of, |in − held − out|/in.
+    water_in: f64,
+    water_held: f64,
+    water_out: f64,
+    water_error: f64,
+    droplets: usize,
+    /// Mean nearest distance between tips over the dry one, wet only.
+    tip_spacing_ratio: Option<f64>,
+    /// Share of strands in clusters linked at half the dry distance, wet only.
+    clustered_share: Option<f64>,
+    /// Hydrogen bonds' rate when pressing began, weighted by the held shape, shower only.
+    b_pressed: Option<f64>,
+    /// What the bonds kept of the held shape before the second shower, and their weighted rate after
+    /// it, shower only.
+    kept_dried: Option<f64>,
+    b_rewet: Option<f64>,
     /// A number made of every bit of the state when the story ended.
     state_hash: String,
     wall_seconds: f64,
@@ -62,12 +78,14 @@ pub struct Report {
 impl Report {
     /// Measures at the end of the story.
     pub fn new(world: &mut World, scene: Scene, frames: u64, wall: Duration) -> Self {
-        let held = world.resource::<Director>().held.clone();
+        let director = world.resource::<Director>().clone();
+        let held = director.held.clone();
+        let ledger = *world.resource::<WaterLedger>();
         let step = *world.resource::<HairStep>();
         let sim_seconds = frames as f64 / 60.0;
         let strands: Vec<Strand> = world.query::<&Strand>().iter(world).cloned().collect();
         let bonds: Vec<Bonds> = world.query::<&Bonds>().iter(world).cloned().collect();
-        let remembered = measure::remembered(bonds.iter(), &BondInfluence::default());
+        let tips = measure::tips(strands.iter());
         let (min, mean, max) = measure::hydrogen(bonds.iter());
         let segments: usize = strands.iter().map(Strand::edges).sum();
         let iterations = Solver::default().iterations as f64 * step.count as f64 * frames as f64;
@@ -82,7 +100,7 @@ impl Report {
             frames,
             finite: strands.iter().all(Strand::is_finite),
             strain_peak: world.resource::<measure::StrainPeak>().0,
-            kept_rest: measure::kept(&remembered, &held),
+            kept_rest: measure::kept_at_rest(bonds.iter(), &held),
             kept_zero_gravity: f64::NAN,
             kept_hanging: f64::NAN,
             curl_radius_held: measure::curl_radius(&held, &held, segment),
@@ -93,6 +111,17 @@ impl Report {
             drying_error: None,
             wind_rate_correlation: None,
             relaxed_error: f64::NAN,
+            water_in: ledger.water_in,
+            water_held: ledger.held,
+            water_out: ledger.water_out,
+            water_error: ledger.error(),
+            droplets: world.query::<&Droplet>().iter(world).count(),
+            tip_spacing_ratio: director.dry_spacing.map(|dry| locks::tip_spacing(&tips) / dry),
+            clustered_share: (director.dry_spacing)
+                .map(|dry| locks::clustered_share(&tips, 0.5 * dry as f32)),
+            b_pressed: director.rate(0),
+            kept_dried: director.kept_dried,
+            b_rewet: director.rate(1),
             state_hash: format!("{:016x}", state_hash(&strands, &bonds)),
             wall_seconds: wall.as_secs_f64(),
             sim_seconds,

@@ -72,6 +72,27 @@ pub fn remembered<'a>(
     bonds.map(|b| b.joints.iter().map(|j| j.relaxed(&f)).collect()).collect()
 }
 
+/// The share of `held` that the bonds alone would rest in.
+pub fn kept_at_rest<'a>(bonds: impl Iterator<Item = &'a Bonds>, held: &[Vec<Vec3>]) -> f64 {
+    kept(&remembered(bonds, &BondInfluence::default()), held)
+}
+
+/// The mean of the joints' rates, weighted by how much each is bent: Σ b Ω² / Σ Ω².
+pub fn weighted_rate(rates: &[Vec<f32>], held: &[Vec<Vec3>]) -> f64 {
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (rate, shape) in rates.iter().flatten().zip(held.iter().flatten()) {
+        let bent = f64::from(shape.length_squared());
+        sum += f64::from(*rate) * bent;
+        weight += bent;
+    }
+    sum / weight
+}
+
+/// The strands' tips (m).
+pub fn tips<'a>(strands: impl Iterator<Item = &'a Strand>) -> Vec<Vec3> {
+    strands.filter_map(|s| s.positions().last().copied()).collect()
+}
+
 /// Spearman's rank correlation.
 pub fn rank_correlation(pairs: &[(f32, f32)]) -> f64 {
     let ranks = |pick: fn(&(f32, f32)) -> f32| {

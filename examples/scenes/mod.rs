@@ -1,22 +1,28 @@
-//! The three scenes of the paper, with table 1's values, as a library for both examples.
+//! The three scenes of the bond paper with table 1's values, the wet-hair paper's experiment, and a
+//! shower that closes the loop, as a library for both examples.
 //!
 //! A customer lies back in the salon: the hair hangs from the head. `bedhead` and `blow-dry` press it
 //! on the floor, `perm` winds it on a rod. Each has controls that leave something out. The scenes run
 //! on a clock of paper frames, 1/60 s each: whether a frame of the paper is a step or a rendered
 //! frame cannot be decided from it, and with one step a frame the hair is still swinging at its end.
 //!
+//! `wet` strews droplets over a head of ten thousand strands, which gather in locks. `shower` wets
+//! straight hair, presses it on the floor, lets a night dry it, lifts it, and showers it again; no code
+//! sets a bond's rate there.
+//!
 //! Winding is done by the simulation's own [`Winding`]: nodes are guided through ever tighter
 //! helices onto the rod.
 
 #![allow(dead_code, reason = "each example uses its own part")]
 
+pub mod locks;
 pub mod measure;
 mod script;
+mod strands;
 
-use bevy::prelude::*;
-use bevy_keratin::{WindReceived, prelude::*};
+use bevy::{ecs::system::SystemParam, prelude::*};
+use bevy_keratin::{DropletRules, prelude::*};
 use core::{fmt, str::FromStr};
-use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 #[allow(unused_imports, reason = "each example uses its own part")]
 pub use script::{Director, Moment};
@@ -27,6 +33,8 @@ pub enum SceneKind {
     Bedhead,
     BlowDry,
     Perm,
+    Wet,
+    Shower,
 }
 
 /// A story and which control of it.
@@ -53,13 +61,15 @@ impl fmt::Display for UnknownName {
 impl std::error::Error for UnknownName {}
 
 impl SceneKind {
-    pub const ALL: [Self; 3] = [Self::Bedhead, Self::BlowDry, Self::Perm];
+    pub const ALL: [Self; 5] = [Self::Bedhead, Self::BlowDry, Self::Perm, Self::Wet, Self::Shower];
 
     pub fn name(self) -> &'static str {
         match self {
             Self::Bedhead => "bedhead",
             Self::BlowDry => "blow-dry",
             Self::Perm => "perm",
+            Self::Wet => "wet",
+            Self::Shower => "shower",
         }
     }
 
@@ -69,22 +79,28 @@ impl SceneKind {
             Self::Bedhead => &["treated", "never-wet", "never-dried"],
             Self::BlowDry => &["treated", "no-drying", "uniform"],
             Self::Perm => &["treated", "water-set", "cut-only", "untreated"],
+            Self::Wet => &["rods", "springs"],
+            Self::Shower => &["treated", "never-wet", "dried-free"],
         }
     }
 
-    /// How many frames the paper shows.
+    /// How many frames the story has; where the paper shows it, the paper's.
     pub fn frames(self) -> u32 {
         match self {
             Self::Bedhead | Self::BlowDry => 1170,
             Self::Perm => 900,
+            Self::Wet => 720,
+            Self::Shower => 2400,
         }
     }
 
-    /// The frames that the paper prints.
+    /// The frames that tell the story; where the paper prints some, those.
     pub fn shown(self) -> [u32; 4] {
         match self {
             Self::Bedhead | Self::BlowDry => [0, 390, 780, 1170],
             Self::Perm => [0, 450, 630, 900],
+            Self::Wet => [0, 300, 420, 720],
+            Self::Shower => [30, 360, 900, 1440],
         }
     }
 }
@@ -127,20 +143,24 @@ pub enum Model {
     Rod(f32, f32),
     /// A blower that points along −Z.
     Blower,
+    /// A shower head that points along −Z.
+    Shower,
+    /// An upright head around its origin (radius in m).
+    Bust(f32),
+}
+
+/// How many droplets the scene `wet` strews.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DropletCount(pub usize);
+
+impl Default for DropletCount {
+    fn default() -> Self {
+        Self(1000)
+    }
 }
 
 /// How far the hair's roots are below the centre of the head that is drawn (m).
 pub const HEAD_RADIUS: f32 = 0.1;
-
-/// The scenes' spacing of strands (m): rows touch at lock radius 1 mm in the perm.
-const PATCH_SPACING: f32 = 0.005;
-const ROD_SPACING: f32 = 0.002;
-
-/// How far roots are off their grid, as a share of its spacing.
-const JITTER: f32 = 0.2;
-
-/// Length between nodes (m): table 1's 0.33 nodes per cm.
-const SEGMENT: f32 = 0.03;
 
 /// Runs a scene in the app: spawns it at startup and directs it every fixed tick.
 pub struct ScenePlugin(pub Scene);
@@ -150,10 +170,52 @@ impl Plugin for ScenePlugin {
         app.insert_resource(self.0)
             .insert_resource(Time::<Fixed>::from_hz(60.0))
             .init_resource::<Director>()
+            .init_resource::<DropletCount>()
             .init_resource::<measure::StrainPeak>()
             .add_systems(Startup, spawn_scene)
             .add_systems(FixedUpdate, script::direct)
             .add_systems(HairTick, measure::watch_strain.in_set(HairSystems::Last));
+    }
+}
+
+/// What a scene sets of the world around the hair; the rest are defaults.
+#[derive(SystemParam)]
+pub struct Surroundings<'w> {
+    gravity: ResMut<'w, HairGravity>,
+    drag: ResMut<'w, HairDefault<AirDrag>>,
+    wetting: ResMut<'w, HairDefault<Wetting>>,
+    contact: ResMut<'w, HairDefault<LockContact>>,
+    substeps: ResMut<'w, HairSubsteps>,
+    climate: ResMut<'w, Climate>,
+    process: ResMut<'w, ProcessTime>,
+    rules: ResMut<'w, DropletRules>,
+}
+
+impl Surroundings<'_> {
+    fn set(&mut self, kind: SceneKind) {
+        *self.gravity = default();
+        **self.drag = default();
+        **self.wetting = default();
+        **self.contact = default();
+        *self.substeps = default();
+        *self.climate = default();
+        *self.process = default();
+        *self.rules = default();
+        match kind {
+            SceneKind::Wet => {
+                // [W]: four updates a frame, no contact between strands, droplets that stay whole and
+                // where they land.
+                *self.substeps = HairSubsteps::Fixed(4);
+                self.drag.rate = 3.0;
+                self.contact.strength = 0.0;
+                self.wetting.fibres = 10.0;
+                self.wetting.sliding = 0.0;
+                self.rules.merging = false;
+            }
+            // Minutes in seconds.
+            SceneKind::Shower => self.process.0 = 60.0,
+            _ => {}
+        }
     }
 }
 
@@ -163,49 +225,43 @@ pub fn spawn_scene(
     scene: Res<Scene>,
     mut director: ResMut<Director>,
     mut peak: ResMut<measure::StrainPeak>,
-    mut gravity: ResMut<HairGravity>,
-    mut drag: ResMut<HairDefault<AirDrag>>,
-    props: Query<Entity, With<Prop>>,
+    mut surroundings: Surroundings,
+    props: Query<Entity, Or<(With<Prop>, With<Droplet>)>>,
 ) {
     for prop in &props {
         commands.entity(prop).despawn();
     }
     *director = Director::default();
     *peak = default();
-    *gravity = default();
-    **drag = default();
+    surroundings.set(scene.kind);
     // The paper's floor.
     commands.spawn((Prop, HairCollider::plane(Dir3::Y)));
     let hair = commands
         .spawn((Prop, Hair, Transform::from_translation(script::root_path(scene.kind, 0.0))))
         .id();
-    commands.spawn((
-        Prop,
-        Model::Head(HEAD_RADIUS),
-        ChildOf(hair),
-        Transform::from_xyz(0.0, HEAD_RADIUS, 0.0),
-    ));
-    let (rows, columns, spacing, segments) = match scene.kind {
-        SceneKind::Bedhead | SceneKind::BlowDry => (10, 20, PATCH_SPACING, 8),
-        SceneKind::Perm => (1, 100, ROD_SPACING, 16),
-    };
-    // Combed a little to one side, so that it folds that way on the floor.
-    let lean = if scene.kind == SceneKind::Perm { 0.0 } else { 7.0_f32.to_radians() };
-    let direction = Quat::from_rotation_z(lean) * Vec3::NEG_Y;
-    // No scalp is a grid: roots are a little off theirs, the same way every time.
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
-    let mut jitter = || spacing * random.random_range(-JITTER..JITTER);
-    for row in 0..rows {
-        for column in 0..columns {
-            let place = |i: usize, n: usize| (i as f32 - 0.5 * (n - 1) as f32) * spacing;
-            let grid = Vec3::new(place(row, rows), 0.0, place(column, columns));
-            // A row on a rod lies straight along it.
-            let across = if rows > 1 { jitter() } else { 0.0 };
-            let root = grid + Vec3::new(across, 0.0, jitter());
-            let points: Vec<Vec3> =
-                (0..=segments).map(|i| root + direction * (SEGMENT * i as f32)).collect();
-            let strand = Strand::from_polyline(&points).expect("points are apart");
-            commands.spawn((StrandOf(hair), strand, WindReceived::default()));
+    match scene.kind {
+        SceneKind::Wet => {
+            let model = match scene.variant {
+                "springs" => StrandModel::MassSpring,
+                _ => StrandModel::Rod,
+            };
+            commands.entity(hair).insert(model);
+            commands.spawn((
+                Prop,
+                Model::Bust(strands::BUST),
+                ChildOf(hair),
+                HairCollider::sphere(strands::BUST).expect("a head has a radius"),
+                Transform::default(),
+            ));
+        }
+        _ => {
+            commands.spawn((
+                Prop,
+                Model::Head(HEAD_RADIUS),
+                ChildOf(hair),
+                Transform::from_xyz(0.0, HEAD_RADIUS, 0.0),
+            ));
         }
     }
+    strands::spawn(&mut commands, scene.kind, hair);
 }

@@ -1,8 +1,12 @@
 //! What happens when, in seconds of the scene's own clock.
 
-use super::{Model, Prop, Scene, SceneKind, measure::shapes};
-use bevy::prelude::*;
+use super::{
+    DropletCount, Model, Prop, Scene, SceneKind, locks,
+    measure::{shapes, tips, weighted_rate},
+};
+use bevy::{ecs::system::SystemParam, prelude::*};
 use bevy_keratin::{WindReceived, prelude::*};
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// The clock of a scene, and what it has seen.
 #[derive(Resource, Clone, Debug, Default)]
@@ -13,6 +17,22 @@ pub struct Director {
     pub seconds: f32,
     /// Ω of every joint just before lifting or releasing, by strand in spawn order.
     pub held: Vec<Vec<Vec3>>,
+    /// shower: the hydrogen bonds' rates when pressing begins, and after the second shower.
+    pub rates: [Vec<Vec<f32>>; 2],
+    /// shower: what the bonds alone keep of the held shape, before the second shower.
+    pub kept_dried: Option<f64>,
+    /// Whether the story has ended: the head stays where it is, nothing happens any more.
+    pub ended: bool,
+    /// wet: mean nearest distance between tips, dry (m).
+    pub dry_spacing: Option<f64>,
+}
+
+impl Director {
+    /// The hydrogen bonds' rate at one of the moments of [`Self::rates`], weighted by the held shape.
+    pub fn rate(&self, moment: usize) -> Option<f64> {
+        (!self.held.is_empty() && !self.rates[moment].is_empty())
+            .then(|| weighted_rate(&self.rates[moment], &self.held))
+    }
 }
 
 /// The moments of the stories (s).
@@ -32,7 +52,22 @@ impl Moment {
     pub const RINSED: f32 = 7.5;
     /// perm: the rod is taken out.
     pub const RELEASED: f32 = 9.0;
+    /// wet: the hair has settled, droplets fall.
+    pub const STREWN: f32 = 4.0;
+    /// shower: on, and off again.
+    pub const SHOWER: [f32; 2] = [1.0, 6.0];
+    /// shower: the head comes down.
+    pub const LYING: f32 = 10.0;
+    /// shower: the night, until the head is lifted.
+    pub const NIGHT: [f32; 2] = [13.0, 19.0];
+    /// shower: a second time.
+    pub const REWET: [f32; 2] = [24.0, 29.0];
+    /// shower: dries hanging.
+    pub const DRYING: f32 = 33.0;
 }
+
+/// How much faster than life water goes in a night.
+const NIGHT_PROCESS: f32 = 900.0;
 
 /// Time that winding takes (s).
 const WINDING: f32 = 4.0;
@@ -40,16 +75,19 @@ const WINDING: f32 = 4.0;
 const HIGH: f32 = 0.28;
 const LOW: f32 = 0.04;
 const PERM_HIGH: f32 = 0.60;
+const BUST_HIGH: f32 = 0.40;
 /// How far the head slides while it comes down, so that the hair lies to one side (m).
 const SLIDE: f32 = -0.08;
 
 /// Where the scalp is at a time of the scene (m).
 pub fn root_path(kind: SceneKind, t: f32) -> Vec3 {
-    if kind == SceneKind::Perm {
-        return Vec3::Y * PERM_HIGH;
-    }
-    let down = smooth(t / Moment::PRESSED);
-    let up = smooth((t - Moment::LIFTED) / 2.5);
+    let (down, up) = match kind {
+        SceneKind::Perm => return Vec3::Y * PERM_HIGH,
+        SceneKind::Wet => return Vec3::Y * BUST_HIGH,
+        SceneKind::Shower => ((t - Moment::LYING) / 2.0, (t - Moment::NIGHT[1]) / 2.5),
+        _ => (t / Moment::PRESSED, (t - Moment::LIFTED) / 2.5),
+    };
+    let (down, up) = (smooth(down), smooth(up));
     Vec3::new(SLIDE * down, HIGH + (LOW - HIGH) * (down - up), 0.0)
 }
 
@@ -66,9 +104,14 @@ pub fn direct(
     mut director: ResMut<Director>,
     mut hair: Single<(Entity, &mut Transform, &Strands), With<Hair>>,
     strands: Query<&Strand>,
+    bonds: Query<&Bonds>,
     tools: Query<Entity, Or<(With<PermRod>, With<Blower>)>>,
     mut treat: MessageWriter<Treat>,
+    mut water: Water,
 ) {
+    if director.ended {
+        return;
+    }
     let before = director.seconds;
     director.frame += 1;
     director.seconds += time.delta_secs();
@@ -99,7 +142,7 @@ pub fn direct(
                 commands.spawn((
                     Prop,
                     Model::Blower,
-                    Blower { strength: 3.33, drying },
+                    Blower { strength: 3.33, drying, ..default() },
                     Transform::from_xyz(0.0, 0.12, -0.25)
                         .looking_at(Vec3::new(0.01, 0.0, 0.0), Vec3::Y),
                 ));
@@ -142,14 +185,101 @@ pub fn direct(
                 treat.write(Treat::dry(hair).over(1.0));
             }
         }
+        SceneKind::Wet | SceneKind::Shower => {}
     }
-    let end = if scene.kind == SceneKind::Perm { Moment::RELEASED } else { Moment::LIFTED };
+    if scene.kind == SceneKind::Wet && passes(Moment::STREWN) {
+        director.dry_spacing = Some(locks::tip_spacing(&tips(strands.iter())));
+        let center = transform.translation;
+        strew(&mut commands, *water.count, strands.iter(), center);
+    }
+    if scene.kind == SceneKind::Shower {
+        let all = || members.iter().filter_map(|s| bonds.get(s).ok());
+        if passes(Moment::LYING) {
+            director.rates[0] = hydrogen_rates(all());
+        }
+        if passes(Moment::REWET[0]) {
+            director.kept_dried = Some(super::measure::kept_at_rest(all(), &director.held));
+        }
+        if passes(Moment::DRYING) {
+            director.rates[1] = hydrogen_rates(all());
+        }
+        let [first, second] = [Moment::SHOWER, Moment::REWET];
+        let wets = variant == "treated";
+        if wets && passes(first[0]) || passes(second[0]) {
+            commands.spawn(shower(transform.translation));
+        }
+        if passes(first[1]) || passes(second[1]) {
+            water.showers.iter().for_each(|shower| commands.entity(shower).despawn());
+        }
+        if variant == "dried-free" && passes(first[0]) {
+            water.soak.write(Soak { target: hair, wetness: 1.0 });
+        }
+        let free = variant == "dried-free" && (2.0..Moment::LYING).contains(&now);
+        let night = (Moment::NIGHT[0]..Moment::NIGHT[1]).contains(&now) || now > Moment::DRYING;
+        water.process.0 = if free || night { NIGHT_PROCESS } else { 60.0 };
+    }
+    let end = match scene.kind {
+        SceneKind::Perm => Moment::RELEASED,
+        SceneKind::Wet => f32::INFINITY,
+        SceneKind::Shower => Moment::NIGHT[1],
+        _ => Moment::LIFTED,
+    };
     if passes(end) {
         director.held = shapes(members.iter().filter_map(|s| strands.get(s).ok()));
         for tool in &tools {
             commands.entity(tool).despawn();
         }
     }
+}
+
+/// What the scenes with water move.
+#[derive(SystemParam)]
+pub struct Water<'w, 's> {
+    count: Res<'w, DropletCount>,
+    showers: Query<'w, 's, Entity, With<Shower>>,
+    process: ResMut<'w, ProcessTime>,
+    soak: MessageWriter<'w, Soak>,
+}
+
+/// A hand shower beside the roots of the hair that hangs from `scalp`: water runs down from there.
+fn shower(scalp: Vec3) -> impl Bundle {
+    let head = scalp + Vec3::new(-0.30, -0.05, 0.0);
+    (
+        Prop,
+        Model::Shower,
+        Shower {
+            rate: 800.0,
+            drop_radius: 2e-3,
+            speed: 4.0,
+            spread: 0.25,
+            opening: 0.04,
+            ..default()
+        },
+        Transform::from_translation(head).looking_at(scalp - Vec3::Y * 0.01, Vec3::Y),
+    )
+}
+
+/// Droplets on nodes of the outer hair, chosen by a seed: [W]'s experiment.
+fn strew<'a>(
+    commands: &mut Commands,
+    count: DropletCount,
+    strands: impl Iterator<Item = &'a Strand>,
+    center: Vec3,
+) {
+    let nodes: Vec<Vec3> =
+        strands.flat_map(|s| s.positions().iter().skip(s.nodes() / 2)).copied().collect();
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
+    let radius = 0.003;
+    let volume = 4.0 / 3.0 * core::f64::consts::PI * f64::from(radius).powi(3);
+    for _ in 0..if nodes.is_empty() { 0 } else { count.0 } {
+        let place = center + nodes[random.random_range(0..nodes.len())];
+        let drop = Droplet::new(place, volume).and_then(|d| d.with_influence(radius, 0.015));
+        commands.spawn(drop.expect("a drop of 3 mm on a finite node"));
+    }
+}
+
+fn hydrogen_rates<'a>(bonds: impl Iterator<Item = &'a Bonds>) -> Vec<Vec<f32>> {
+    bonds.map(|b| b.rates(BondKind::Hydrogen).collect()).collect()
 }
 
 /// Σ |Δv_w| of every joint, by strand in spawn order (m/s).

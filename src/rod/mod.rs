@@ -29,3 +29,4 @@ pub use constraint::StretchProjection;
 pub use lanes::LANES;
 pub use stiffness::{Solver, Stiffness};
 pub use systems::RodPlugin;
+pub(crate) use systems::project;

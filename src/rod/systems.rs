@@ -12,7 +12,7 @@ use crate::{
     fault::{Fault, HairFault},
     parallel::for_each_block,
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, PutBack, Strand, StrandOf},
+    strand::{Burden, HeldNodes, PutBack, Strand, StrandModel, StrandOf},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
@@ -48,8 +48,9 @@ struct Item<'a> {
     put_back: Option<PutBack>,
 }
 
-fn project(
+pub(crate) fn project(
     time: Res<HairStep>,
+    model: Settings<StrandModel>,
     solver: Settings<Solver>,
     stiffness: Settings<Stiffness>,
     influence: Settings<BondInfluence>,
@@ -71,7 +72,7 @@ fn project(
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
     for (entity, of, strand, rest, bonds, burden, held) in &mut strands {
         let index = *index_of.entry(of.0).or_insert_with(|| {
-            let obstacles = hairs.get(of.0).ok()?;
+            let obstacles = hairs.get(of.0).ok().filter(|_| model.of(of.0) == StrandModel::Rod)?;
             let s = solver.of(of.0);
             params.push(HairParams {
                 step: StepParams {

@@ -19,6 +19,7 @@ pub(crate) use systems::carry_strands;
 use crate::{
     bond::{BondChanges, Bonds, RestShape},
     rod::frame::{darboux, full, parallel_transport},
+    setting::{HairSetting, Notes},
 };
 use bevy::prelude::*;
 
@@ -97,6 +98,25 @@ pub struct Strand {
 pub struct StrandHistory {
     /// Positions (m), root first; empty until the first tick.
     pub positions: Vec<Vec3>,
+}
+
+/// What the strands of a hair are made of. Component of a [`Hair`]; where absent,
+/// [`HairDefault<StrandModel>`](crate::HairDefault) holds.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub enum StrandModel {
+    /// Cosserat rods with side-chain bonds, \[B\].
+    #[default]
+    Rod,
+    /// Masses and [`Springs`](crate::spring::Springs), \[W\] equation 1: cheaper, straight at rest,
+    /// without bonds.
+    MassSpring,
+}
+
+impl HairSetting for StrandModel {
+    fn mended(&self, _: &Notes) -> Self {
+        *self
+    }
 }
 
 /// What weighs on a strand and softens it, beside its own dry state: water does. Written by the
@@ -282,6 +302,19 @@ impl Strand {
 
     pub(crate) fn motion_parts(&mut self) -> (&[Vec3], &mut [Vec3], &[f32]) {
         (&self.positions, &mut self.velocities, &self.rest_lengths)
+    }
+
+    /// Takes over positions and velocities from a model without orientations of its own: edges turn
+    /// with their nodes by the shortest way.
+    pub(crate) fn take_over(&mut self, positions: &[Vec3], velocities: &[Vec3]) {
+        self.positions.copy_from_slice(positions);
+        self.velocities.copy_from_slice(velocities);
+        self.angular_velocities.fill(Vec3::ZERO);
+        for (q, p) in self.orientations.iter_mut().zip(self.positions.windows(2)) {
+            if let Some(to) = (p[1] - p[0]).try_normalize() {
+                *q = (Quat::from_rotation_arc(*q * Vec3::Z, to) * *q).normalize();
+            }
+        }
     }
 
     pub(crate) fn parts_mut(&mut self) -> (&mut [Vec3], &mut [Vec3], &mut [Quat], &mut [Vec3]) {

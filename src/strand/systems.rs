@@ -1,12 +1,13 @@
 //! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
 
 use super::{
-    Burden, Hair, HeldNodes, Strand, StrandError, StrandHistory, StrandOf, Strands, TickPose,
-    frame::Pose,
+    Burden, Hair, HeldNodes, Strand, StrandError, StrandHistory, StrandModel, StrandOf, Strands,
+    TickPose, frame::Pose,
 };
 use crate::{
     fault::{Fault, HairFault},
     parallel::for_each,
+    setting,
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::prelude::*;
@@ -16,6 +17,7 @@ pub struct StrandPlugin;
 
 impl Plugin for StrandPlugin {
     fn build(&self, app: &mut App) {
+        setting::plugin::<StrandModel>(app);
         app.register_type::<Hair>()
             .register_type::<TickPose>()
             .register_type::<Strand>()

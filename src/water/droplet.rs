@@ -201,7 +201,8 @@ pub struct Shower {
     pub seed: u64,
     /// How many drops it has made.
     pub made: u64,
-    pub(super) owed: f32,
+    /// The part of the next drop that is due.
+    pub owed: f32,
 }
 
 impl Default for Shower {

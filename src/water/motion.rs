@@ -15,7 +15,7 @@ use crate::{
     contact::seen_from,
     fault::HairFault,
     grid::UniformGrid,
-    parallel::for_each,
+    parallel::{for_each, for_each_block},
     rod::{algebra::V3, obstacle::Obstacle},
     setting::{Notes, Settings},
     strand::{Burden, Hair, Pose, Strand, StrandOf, TickPose},
@@ -25,7 +25,7 @@ use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
 /// How many strands meet droplets as one piece of work: the same on any number of threads, so that
 /// what droplets get is always summed in the same order.
-const PIECE: usize = 32;
+const PIECE: usize = 16;
 
 /// Room for the work of a substep, kept from one to the next.
 #[derive(Resource, Default)]
@@ -401,21 +401,25 @@ fn meet_all(
     pieces.resize_with(strands.len().div_ceil(PIECE), default);
     pieces.iter_mut().for_each(Encounters::clear);
     let mut work: Vec<_> = strands.chunks_mut(PIECE).zip(&mut *pieces).collect();
-    for_each(&mut work, |(strands, out)| {
-        for Strandful { entity, strand, burden, moisture } in strands.iter_mut() {
-            let (positions, velocities, lengths) = strand.motion_parts();
-            let mut met = Met {
-                strand: *entity,
-                positions,
-                velocities,
-                lengths,
-                load: &burden.mass,
-                film: moisture.film(),
-                by: met,
-            };
-            met.meet(field, out);
-        }
-    });
+    for_each_block(
+        &mut work,
+        || (),
+        |(), (strands, out)| {
+            for Strandful { entity, strand, burden, moisture } in strands.iter_mut() {
+                let (positions, velocities, lengths) = strand.motion_parts();
+                let mut met = Met {
+                    strand: *entity,
+                    positions,
+                    velocities,
+                    lengths,
+                    load: &burden.mass,
+                    film: moisture.film(),
+                    by: met,
+                };
+                met.meet(field, out);
+            }
+        },
+    );
 }
 
 /// Adds up what a piece of the strands did, in their order.
