@@ -211,5 +211,7 @@ pub struct RestShape {
     /// k′ of each joint: equation 13's factor on the true stiffness, spread over the iterations
     /// (equation 12).
     pub stiffness: Vec<f32>,
-    key: Option<systems::StiffnessKey>,
+    key: Option<systems::Key>,
+    /// Whether all bonds are closed: then the shape is theirs alone, and stays until they change.
+    closed: bool,
 }
