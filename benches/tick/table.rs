@@ -86,7 +86,7 @@ fn row(threads: usize, strands: usize, nodes: usize) {
     } else {
         let app = &mut apps[2];
         app.insert_resource(HairDefault(LockContact::default()));
-        (0..90).for_each(|_| app.update());
+        (0..240).for_each(|_| app.update());
         let [without, with] = contacts_off_and_on(app, turns);
         percent(with, without)
     };
@@ -172,13 +172,15 @@ enum Kind {
 
 fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
     // The thread that runs the app works too.
-    let mut pools = TaskPoolOptions::default();
-    pools.compute = TaskPoolThreadAssignmentPolicy {
-        min_threads: threads - 1,
-        max_threads: threads - 1,
-        percent: 1.0,
-        on_thread_spawn: None,
-        on_thread_destroy: None,
+    let pools = TaskPoolOptions {
+        compute: TaskPoolThreadAssignmentPolicy {
+            min_threads: threads - 1,
+            max_threads: threads - 1,
+            percent: 1.0,
+            on_thread_spawn: None,
+            on_thread_destroy: None,
+        },
+        ..default()
     };
     let mut app = App::new();
     app.add_plugins(MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools }))
@@ -199,7 +201,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
     };
     // What the plugins left out would have brought, and no contact between strands to begin with.
     app.init_resource::<HairDefault<BondInfluence>>()
-        .insert_resource(HairDefault(AirDrag { rate: 3.0, ..default() }))
+        .insert_resource(HairDefault(AirDrag { rate: 3.0 }))
         .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
     if kind == Kind::Projection {
         app.insert_resource(HairDefault(Solver { limiter_steps: 0, ..default() }));
@@ -224,7 +226,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
 
 /// Bonds break in one substep and form in the next.
 fn stir(step: Res<HairStep>, mut strands: Query<(&Strand, &mut BondChanges)>) {
-    let change = if step.index % 2 == 0 { -1e-3 } else { 9e-4 };
+    let change = if step.index.is_multiple_of(2) { -1e-3 } else { 9e-4 };
     for (strand, mut changes) in &mut strands {
         (0..strand.edges()).for_each(|i| changes.ask(i, BondKind::Hydrogen, change));
     }
