@@ -1,7 +1,13 @@
-//! `cargo bench`: what a substep of a block costs, with and without the length limiter, and how long
-//! a simulated second of the paper's first scene takes.
+//! `cargo bench`: a table of what a tick costs in a whole app, then what a substep of a block costs,
+//! with and without the length limiter, and how long a simulated second of the paper's first scene
+//! takes.
 //!
 //! Read the ratios: all rows come from one run on one machine.
+
+#[path = "tick/scalar.rs"]
+mod scalar;
+#[path = "tick/table.rs"]
+mod table;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
@@ -17,7 +23,9 @@ use fearless_simd::Level;
 use std::time::Duration;
 
 fn main() {
-    divan::main();
+    if table::print() {
+        divan::main();
+    }
 }
 
 /// Sixteen strands of `nodes` nodes, each hanging a little differently.

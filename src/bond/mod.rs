@@ -211,6 +211,9 @@ pub struct RestShape {
     /// k′ of each joint: equation 13's factor on the true stiffness, spread over the iterations
     /// (equation 12).
     pub stiffness: Vec<f32>,
-    key: Option<systems::StiffnessKey>,
+    key: Option<systems::Key>,
+    /// Whether all bonds are closed: then the shape is theirs alone, and stays until they change.
+    closed: bool,
+    /// What the stiffness was last softened by.
     softened: Vec<f32>,
 }

@@ -36,11 +36,12 @@ impl Plugin for BondPlugin {
 /// Gives new strands their bonds, and mends what game code wrote into them. Our own writes bypass
 /// change detection, so `Changed` means somebody else's.
 fn fit_bonds(
-    mut strands: Query<(Entity, &Strand, &mut Bonds), Changed<Bonds>>,
+    mut strands: Query<(Entity, &Strand, &mut Bonds, &mut RestShape), Changed<Bonds>>,
     mut faults: MessageWriter<HairFault>,
 ) {
     const RATE: Bound = Bound::new("a bond's rate", 0.0, 1.0, "0 all broken, 1 all closed");
-    for (entity, strand, mut bonds) in &mut strands {
+    for (entity, strand, mut bonds, mut rest) in &mut strands {
+        rest.bypass_change_detection().closed = false;
         let bonds = bonds.bypass_change_detection();
         if bonds.joints.len() != strand.edges() {
             *bonds = Bonds::of(strand);
@@ -61,12 +62,10 @@ fn fit_bonds(
     }
 }
 
-/// What the stiffness of a hair's joints is made of, resolved once a substep.
-type Resolved = ([f32; BondKind::COUNT], StiffnessKey);
-
-/// Stiffness per iteration is recomputed only when one of these changes.
+/// What rest shapes depend on besides bonds and the present shape, resolved once a substep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
-pub(super) struct StiffnessKey {
+pub(super) struct Key {
+    influence: [f32; BondKind::COUNT],
     stiffness: Stiffness,
     cuticle: Cuticle,
     iterations: u32,
@@ -79,31 +78,35 @@ fn generate_rest_shapes(
     stiffness: Settings<Stiffness>,
     cuticle: Settings<Cuticle>,
     solver: Settings<Solver>,
-    mut strands: Query<(&StrandOf, &Strand, &Bonds, &Burden, &mut RestShape)>,
+    mut strands: Query<(&StrandOf, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
 ) {
-    let mut resolved = HashMap::<Entity, Resolved>::default();
-    let mut items: Vec<_> = strands
-        .iter_mut()
-        .map(|(of, strand, bonds, burden, rest)| {
-            let hair = *resolved.entry(of.0).or_insert_with(|| {
-                let key = StiffnessKey {
-                    stiffness: stiffness.of(of.0),
-                    cuticle: cuticle.of(of.0),
-                    iterations: solver.of(of.0).iterations,
-                    dt: step.dt,
-                };
-                (influence.of(of.0).as_array(), key)
-            });
-            (hair, strand, bonds, burden, rest)
-        })
-        .collect();
-    for_each(&mut items, |((influence, key), strand, bonds, burden, rest)| {
+    let mut resolved = HashMap::<Entity, Key>::default();
+    let mut items = Vec::new();
+    for (of, strand, bonds, burden, rest) in &mut strands {
+        let key = *resolved.entry(of.0).or_insert_with(|| Key {
+            influence: influence.of(of.0).as_array(),
+            stiffness: stiffness.of(of.0),
+            cuticle: cuticle.of(of.0),
+            iterations: solver.of(of.0).iterations,
+            dt: step.dt,
+        });
+        // Hair whose bonds are all closed, most hair most of the time, costs no more than this.
+        if !rest.closed
+            || rest.key != Some(key)
+            || bonds.is_changed()
+            || has_softened(&rest.softened, &burden.softening)
+        {
+            items.push((key, strand, bonds, burden, rest));
+        }
+    }
+    for_each(&mut items, |(key, strand, bonds, burden, rest)| {
         let rest = rest.bypass_change_detection();
+        rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
         rest.darboux.clear();
         rest.darboux.extend(
             (bonds.joints.iter())
                 .enumerate()
-                .map(|(i, joint)| joint.rest_shape(strand.darboux(i), influence)),
+                .map(|(i, joint)| joint.rest_shape(strand.darboux(i), &key.influence)),
         );
         if rest.key != Some(*key)
             || rest.stiffness.len() != strand.edges()
@@ -130,14 +133,17 @@ fn has_softened(before: &[f32], now: &[f32]) -> bool {
     before.len() != now.len() || before.iter().zip(now).any(|(a, b)| (a - b).abs() > 2e-3)
 }
 
-fn update_bonds(mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges)>) {
+fn update_bonds(mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape)>) {
     let mut items: Vec<_> =
-        strands.iter_mut().filter(|(_, _, changes)| !changes.is_empty()).collect();
-    for_each(&mut items, |(strand, bonds, changes)| {
+        strands.iter_mut().filter(|(_, _, changes, _)| !changes.is_empty()).collect();
+    for_each(&mut items, |(strand, bonds, changes, rest)| {
+        rest.bypass_change_detection().closed = false;
         let joints: &mut [JointBonds] = &mut bonds.bypass_change_detection().joints;
         for (i, change) in changes.bypass_change_detection().take() {
             if let Some(joint) = joints.get_mut(i) {
-                let omega = strand.darboux(i);
+                // Only bonds that form look at the present shape.
+                let forms = change.iter().any(|c| *c > 0.0);
+                let omega = if forms { strand.darboux(i) } else { Quat::IDENTITY };
                 for (kind, change) in change.into_iter().enumerate().filter(|(_, c)| *c != 0.0) {
                     joint.change(kind, change, omega);
                 }

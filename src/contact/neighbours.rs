@@ -162,7 +162,7 @@ impl Lists {
             }
         }
         let numbered = self.unsorted.iter().zip(0..).map(|((middle, _), k)| (*middle, k));
-        self.grid.build(2.001 * self.close(), numbered);
+        self.grid.build(1.001 * self.close(), numbered);
         let sorted = self.grid.order().map(|k| self.unsorted[k as usize]);
         Pieces::collect(sorted, &mut self.pieces);
     }

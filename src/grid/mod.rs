@@ -130,25 +130,28 @@ impl UniformGrid {
     /// keep what they look at in this order, to read it in a row. The first few come again at the
     /// end, so that no row of cells is torn.
     pub fn order(&self) -> impl Iterator<Item = u32> {
-        let first = self.starts.get(1).map_or(0, |end| *end as usize);
+        let first = self.starts.get(2).map_or(0, |end| *end as usize);
         self.entries.iter().chain(&self.entries[..first]).map(|e| e.item)
     }
 
-    /// Where in [`order`](Self::order) the items of the 8 cells nearest to `point` are: all that lie
-    /// within half a cell size of it, some that do not, and with bad luck some twice.
+    /// Where in [`order`](Self::order) the items of the 27 cells around `point` are, three cells a
+    /// row: all that lie within one cell size of it, some that do not, and with bad luck some twice.
     #[inline]
-    pub fn rows_around(&self, point: Vec3) -> [Range<usize>; 4] {
+    pub fn rows_around(&self, point: Vec3) -> [Range<usize>; 9] {
         if self.entries.is_empty() || !point.is_finite() {
-            return [const { 0..0 }; 4];
+            return [const { 0..0 }; 9];
         }
-        let low = self.cell_of(point - 0.5 / self.inverse_cell);
-        let mask = self.starts.len() - 2;
-        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(y, z)| {
-            let b = bucket(low + IVec3::new(0, y, z), mask);
-            // The last bucket's neighbour is the first one, which comes again behind it.
-            let end =
-                if b < mask { self.starts[b + 2] } else { self.starts[mask + 1] + self.starts[1] };
-            self.starts[b] as usize..end as usize
+        let low = self.cell_of(point) - 1;
+        let buckets = self.starts.len() - 1;
+        core::array::from_fn(|k| {
+            let row = bucket(low + IVec3::new(0, k as i32 % 3, k as i32 / 3), buckets - 1);
+            let end = row + 3;
+            let end = match end.checked_sub(buckets) {
+                None | Some(0) => self.starts[end],
+                // Behind the last bucket the first ones come again.
+                Some(again) => self.starts[buckets] + self.starts[again],
+            };
+            self.starts[row] as usize..end as usize
         })
     }
 }

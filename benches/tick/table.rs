@@ -1,0 +1,233 @@
+//! The table: what a tick of 1/60 s, 6 substeps of 5 iterations, costs in a whole app.
+//!
+//! What is compared is run in turns, and of each the best is kept: others on the machine slow single
+//! turns down, not ratios. Bevy's thread pools are made once a process, so each number of threads
+//! gets a process of its own.
+
+use super::scalar::Twin;
+use bevy::{
+    app::{TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy},
+    prelude::*,
+    time::TimeUpdateStrategy,
+};
+use bevy_keratin::{
+    BondChanges, HairStep, air::AirPlugin, bond::BondPlugin, bond::RestShape,
+    contact::ContactPlugin, contact::Obstacles, prelude::*, style::StylePlugin,
+};
+use std::{
+    process::Command,
+    time::{Duration, Instant},
+};
+
+const THREADS: &str = "KERATIN_BENCH_THREADS";
+
+/// Prints the whole table, or in a process of its own the rows of one number of threads.
+pub fn print() -> bool {
+    if let Ok(threads) = std::env::var(THREADS) {
+        rows(threads.parse().expect("a number of threads"));
+        return false;
+    }
+    println!(
+        "strands × nodes | threads | scalar, ns | projection, ns | scalar / projection | tick, ms | \
+         tick / projection | bonds at rest | bonds moving | contacts"
+    );
+    for threads in ["1", "2"] {
+        let this = std::env::current_exe().expect("a running program");
+        let status = Command::new(this).env(THREADS, threads).status();
+        assert!(status.is_ok_and(|s| s.success()), "rows for {threads} threads");
+    }
+    true
+}
+
+fn rows(threads: usize) {
+    for (strands, nodes) in [(200, 9), (10_000, 6), (10_000, 16), (1_000, 64), (100_000, 16)] {
+        row(threads, strands, nodes);
+    }
+    for strands in [1_000, 10_000, 100_000] {
+        let mut app = app(threads, Kind::Tick, &patch(strands, 16), None);
+        (0..4).for_each(|_| app.update());
+        let [without, with] = contacts_off_and_on(&mut app, 3);
+        println!(
+            "{strands} × 16 hanging | {threads} | contacts {:.2} µs a strand, tick {:.2}",
+            (with - without) * 1e6 / strands as f64,
+            with * 1e6 / strands as f64,
+        );
+    }
+}
+
+fn row(threads: usize, strands: usize, nodes: usize) {
+    let hair = head(strands, nodes);
+    let work = (strands * (nodes - 1) * 5 * 6) as f64;
+    let turns = (1_600_000 / (strands * nodes)).clamp(3, 20);
+    let mut twins: Vec<Twin> = hair.iter().take(1000).map(Twin::of).collect();
+    let mut scalar = || {
+        for _ in 0..6 {
+            twins.iter_mut().for_each(|t| t.step(1.0 / 360.0, 5));
+        }
+    };
+    let kinds = [Kind::Projection, Kind::NoBonds, Kind::Tick, Kind::BondsMoving];
+    let mut apps = kinds.map(|kind| app(threads, kind, &hair, Some(head_radius(strands))));
+    for _ in 0..if strands > 10_000 { 2 } else { 30 } {
+        apps.iter_mut().for_each(App::update);
+    }
+    let (mut best_scalar, mut best) = (f64::INFINITY, [f64::INFINITY; 4]);
+    for _ in 0..turns {
+        best_scalar = best_scalar.min(seconds(&mut scalar));
+        for (best, app) in best.iter_mut().zip(&mut apps) {
+            *best = best.min(seconds(|| app.update()));
+        }
+    }
+    best_scalar *= strands as f64 / strands.min(1000) as f64;
+    let [projection, no_bonds, tick, moving] = best;
+    // Settled under contact, then with and without.
+    let percent = |a: f64, b: f64| format!("{:+.0} %", (a / b - 1.0) * 100.0);
+    let contacts = if strands > 10_000 {
+        "-".into()
+    } else {
+        let app = &mut apps[2];
+        app.insert_resource(HairDefault(LockContact::default()));
+        (0..240).for_each(|_| app.update());
+        let [without, with] = contacts_off_and_on(app, turns);
+        percent(with, without)
+    };
+    println!(
+        "{strands} × {nodes} | {threads} | {:.1} | {:.2} | {:.1} | {:.2} | {:.2} | {} | {} | {contacts}",
+        best_scalar / work * 1e9,
+        projection / work * 1e9,
+        best_scalar / projection,
+        tick * 1e3,
+        tick / projection,
+        percent(tick, no_bonds),
+        percent(moving, no_bonds),
+    );
+}
+
+fn seconds(work: impl FnOnce()) -> f64 {
+    let start = Instant::now();
+    work();
+    start.elapsed().as_secs_f64()
+}
+
+/// The best ticks without and with contact between strands, in turns.
+fn contacts_off_and_on(app: &mut App, turns: usize) -> [f64; 2] {
+    let mut best = [f64::INFINITY; 2];
+    for _ in 0..turns {
+        for (best, strength) in best.iter_mut().zip([0.0, LockContact::default().strength]) {
+            app.insert_resource(HairDefault(LockContact { strength, ..default() }));
+            *best = best.min(seconds(|| app.update()));
+        }
+    }
+    best
+}
+
+/// 24 cm strands all over the upper half of a head, as dense as 10,000 on one of 9 cm.
+fn head(strands: usize, nodes: usize) -> Vec<Strand> {
+    let radius = head_radius(strands);
+    let strand = |i: usize| {
+        let y = 1.0 - (i as f32 + 0.5) / strands as f32;
+        let across = (1.0 - y * y).sqrt();
+        let (sin, cos) = (i as f32 * 2.399_963).sin_cos();
+        let out = Vec3::new(across * cos, y, across * sin);
+        along(out * (radius + 2e-3), out, nodes)
+    };
+    (0..strands).map(strand).collect()
+}
+
+fn head_radius(strands: usize) -> f32 {
+    0.09 * (strands as f32 / 10_000.0).sqrt()
+}
+
+/// Strands that hang from a ceiling, equally many on each area.
+fn patch(strands: usize, nodes: usize) -> Vec<Strand> {
+    let side = (strands as f32).sqrt().ceil() as usize;
+    let uneven = |i: usize| (i as f32 * 0.618_034).fract() - 0.5;
+    let strand = |i: usize| {
+        let root = Vec3::new(
+            (i % side) as f32 + 0.5 * uneven(i),
+            0.0,
+            (i / side) as f32 + 0.5 * uneven(7 * i + 3),
+        );
+        along(root * 2.26e-3, Vec3::NEG_Y, nodes)
+    };
+    (0..strands).map(strand).collect()
+}
+
+fn along(root: Vec3, direction: Vec3, nodes: usize) -> Strand {
+    let step = 0.24 / (nodes - 1) as f32;
+    let points: Vec<Vec3> = (0..nodes).map(|k| root + direction * (step * k as f32)).collect();
+    Strand::from_polyline(&points).expect("points are apart")
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// Stretch–shear and bend–twist, with gather, scatter and integration, and nothing else.
+    Projection,
+    /// Everything but bonds and contact between strands.
+    NoBonds,
+    /// Everything but contact between strands.
+    Tick,
+    /// The same while every bond's rate moves.
+    BondsMoving,
+}
+
+fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
+    // The thread that runs the app works too.
+    let pools = TaskPoolOptions {
+        compute: TaskPoolThreadAssignmentPolicy {
+            min_threads: threads - 1,
+            max_threads: threads - 1,
+            percent: 1.0,
+            on_thread_spawn: None,
+            on_thread_destroy: None,
+        },
+        ..default()
+    };
+    let mut app = App::new();
+    app.add_plugins(MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools }))
+        .insert_resource(Time::<Fixed>::from_hz(60.0))
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    let plugins = HairPlugins::default().build();
+    match kind {
+        Kind::Projection => app.add_plugins(
+            plugins
+                .disable::<AirPlugin>()
+                .disable::<BondPlugin>()
+                .disable::<ContactPlugin>()
+                .disable::<StylePlugin>(),
+        ),
+        Kind::NoBonds => app.add_plugins(plugins.disable::<BondPlugin>()),
+        Kind::Tick | Kind::BondsMoving => app.add_plugins(plugins),
+    };
+    // What the plugins left out would have brought, and no contact between strands to begin with.
+    app.init_resource::<HairDefault<BondInfluence>>()
+        .insert_resource(HairDefault(AirDrag { rate: 3.0 }))
+        .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
+    if kind == Kind::Projection {
+        app.insert_resource(HairDefault(Solver { limiter_steps: 0, ..default() }));
+    } else if let Some(radius) = head {
+        let floor = HairCollider::plane(Dir3::Y);
+        app.world_mut().spawn((HairCollider::sphere(radius).expect("a head"), Transform::IDENTITY));
+        app.world_mut().spawn((floor, Transform::from_xyz(0.0, -2.0 * radius, 0.0)));
+    }
+    if kind == Kind::BondsMoving {
+        app.add_systems(HairTick, stir.in_set(HairSystems::First));
+    }
+    let of = app.world_mut().spawn((Hair, Obstacles::default())).id();
+    for strand in hair {
+        let mut rest = RestShape::default();
+        rest.darboux = (0..strand.edges()).map(|i| strand.darboux(i)).collect();
+        rest.stiffness = vec![0.01; strand.edges()];
+        app.world_mut().spawn((StrandOf(of), strand.clone(), rest));
+    }
+    app.update();
+    app
+}
+
+/// Bonds break in one substep and form in the next.
+fn stir(step: Res<HairStep>, mut strands: Query<(&Strand, &mut BondChanges)>) {
+    let change = if step.index.is_multiple_of(2) { -1e-3 } else { 9e-4 };
+    for (strand, mut changes) in &mut strands {
+        (0..strand.edges()).for_each(|i| changes.ask(i, BondKind::Hydrogen, change));
+    }
+}
