@@ -71,8 +71,8 @@ impl HairRenderPlugin {
     }
 }
 
-/// The systems that draw, in `PostUpdate` after transforms have been propagated and before
-/// visibility is.
+/// The systems that draw: in `PostUpdate` after transforms have been propagated and before visibility
+/// is, and in the render world's `ExtractSchedule` the one write to the GPU.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairRenderSystems;
 
