@@ -477,3 +477,47 @@ fn coincident_guides_and_nodes_are_drawn() {
     }
     assert!(scene.draw().covered(BLACK) < 2000, "followers stay with their roots");
 }
+
+#[test]
+fn water_is_drawn_as_beads_as_long_as_there_is_any() {
+    let Some(mut scene) = Offscreen::new(160, 160) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.3), Vec3::ZERO);
+    sun(&mut scene, Vec3::new(0.5, 0.8, 1.0), false);
+    let bead = |x: f32, y: f32, velocity: Vec3| Bead {
+        position: Vec3::new(x, y, 0.0),
+        radius: 15e-3,
+        velocity,
+    };
+    let mut draw = |beads: Vec<Bead>| {
+        **scene.app.world_mut().resource_mut::<HairBeads>() = beads;
+        let picture = scene.draw();
+        assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
+        picture
+    };
+    assert_eq!(draw(vec![]).covered(BLACK), 0);
+    let still = draw(vec![bead(0.0, 0.0, Vec3::ZERO)]);
+    let fast = draw(vec![bead(0.0, 0.0, Vec3::Y * 8.0)]);
+    let tall = |picture: &Picture| {
+        let bright = |y: &u32| (0..picture.width).any(|x| luma(picture.at(x, *y)) > 3.0);
+        (0..picture.height).filter(bright).count()
+    };
+    if let Ok(folder) = std::env::var("BEADS") {
+        still.save(&format!("{folder}/bead.png"));
+        fast.save(&format!("{folder}/bead_fast.png"));
+    }
+    println!("a bead is {} pixels tall, a fast one {}", tall(&still), tall(&fast));
+    assert!(tall(&still) > 10 && tall(&fast) as f32 > 1.5 * tall(&still) as f32);
+    let most = still.pixels().map(luma).fold(0.0, f32::max);
+    assert!(most > 150.0, "a bead glitters, this one has {most}");
+
+    // More than there was room for, then broken ones, then none.
+    let many: Vec<Bead> = (0..300)
+        .map(|i| bead((i % 20) as f32 * 0.008 - 0.08, (i / 20) as f32 * 0.008 - 0.06, Vec3::ZERO))
+        .collect();
+    assert!(draw(many).covered(BLACK) > 5 * still.covered(BLACK));
+    let broken = Bead { position: Vec3::NAN, ..bead(0.0, 0.0, Vec3::ZERO) };
+    assert_eq!(draw(vec![broken; 3]).covered(BLACK), 0);
+    assert_eq!(draw(vec![]).covered(BLACK), 0, "no water, no beads");
+}
