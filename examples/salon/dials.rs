@@ -183,8 +183,8 @@ impl Settings<'_, '_> {
     pub fn solver(&mut self, ui: &mut Ui) {
         edited!(self.solver, |s: &mut Solver| {
             ui.add(Slider::new(&mut s.iterations, 1..=50).text("iterations"));
-            ui.add(Slider::new(&mut s.limiter_steps, 0..=4).text("length limiter steps"));
-            slide(ui, &mut s.internal_damping, 0.0..=50.0, "bend damping (1/s)");
+            ui.add(Slider::new(&mut s.limiter_steps, 0..=4).text("limiter steps"));
+            slide(ui, &mut s.internal_damping, 0.0..=50.0, "damping (1/s)");
         });
         let mut auto = *self.substeps == HairSubsteps::Auto;
         let now = self.substeps.count(1.0 / 60.0);
