@@ -9,6 +9,7 @@ use bevy::{
 };
 use bevy_keratin::{prelude::*, render::HairBuffers};
 use common::{one_strand, test_app};
+use std::sync::{Arc, Mutex};
 
 #[test]
 fn minimal_plugins_draw_nothing_and_panic_nowhere() {
@@ -55,11 +56,43 @@ fn a_renderer_without_a_device_is_fine() {
             app.add_plugins((bevy, HairPlugins::default()));
         }
         let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
-        app.finish();
-        app.cleanup();
-        for _ in 0..3 {
-            app.update();
-        }
+        let told = Told::default();
+        tracing::subscriber::with_default(told.clone(), || {
+            app.finish();
+            app.cleanup();
+            for _ in 0..3 {
+                app.update();
+            }
+        });
         assert!(app.world().get::<Strands>(hair).is_some());
+        let told = told.0.lock().unwrap();
+        assert_eq!(told.len(), 1, "one message: {told:?}");
+        assert!(told[0].contains("no graphics device"), "{told:?}");
     }
+}
+
+/// What the crate has logged.
+#[derive(Clone, Default)]
+struct Told(Arc<Mutex<Vec<String>>>);
+
+impl tracing::field::Visit for Told {
+    fn record_debug(&mut self, _: &tracing::field::Field, value: &dyn core::fmt::Debug) {
+        self.0.lock().unwrap().push(format!("{value:?}"));
+    }
+}
+
+impl tracing::Subscriber for Told {
+    fn enabled(&self, metadata: &tracing::Metadata<'_>) -> bool {
+        metadata.is_event() && metadata.target().starts_with("bevy_keratin")
+    }
+    fn event(&self, event: &tracing::Event<'_>) {
+        event.record(&mut self.clone());
+    }
+    fn new_span(&self, _: &tracing::span::Attributes<'_>) -> tracing::span::Id {
+        tracing::span::Id::from_u64(1)
+    }
+    fn record(&self, _: &tracing::span::Id, _: &tracing::span::Record<'_>) {}
+    fn record_follows_from(&self, _: &tracing::span::Id, _: &tracing::span::Id) {}
+    fn enter(&self, _: &tracing::span::Id) {}
+    fn exit(&self, _: &tracing::span::Id) {}
 }

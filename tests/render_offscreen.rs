@@ -369,3 +369,155 @@ fn every_kind_of_light_lights_hair_through_every_kind_of_camera() {
     }
     assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
 }
+
+/// The forward pass draws what is as near as the prepass found: ribbons that differed in a bit would
+/// be holes. Without samples, so that every pixel is one depth.
+#[test]
+fn prepasses_leave_no_holes_and_motion_moves_nothing() {
+    use bevy::core_pipeline::prepass::{DepthPrepass, MotionVectorPrepass, NormalPrepass};
+    let Some(mut scene) = Offscreen::new(160, 160) else {
+        return;
+    };
+    scene.look(Vec3::new(0.1, 0.05, 0.5), Vec3::ZERO);
+    sun(&mut scene, Vec3::new(0.3, 0.5, 1.0), true);
+    let hair = hair(&mut scene, &curtain(12, 0.3), (wide(1e-3), HairFollowers::new(200)));
+    let camera = scene.camera;
+    for msaa in [Msaa::Off, Msaa::Sample4] {
+        scene.app.world_mut().entity_mut(camera).insert(msaa);
+        let without = scene.draw();
+        let prepasses = (DepthPrepass, NormalPrepass, MotionVectorPrepass);
+        scene.app.world_mut().entity_mut(camera).insert(prepasses);
+        let with = scene.draw();
+        // A head that moves: the frame before differs from this one.
+        for x in [0.03, 0.06, 0.0] {
+            set(&mut scene, hair, Transform::from_xyz(x, 0.0, 0.0));
+            scene.app.update();
+        }
+        let back = scene.draw();
+        assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
+        type Prepasses = (DepthPrepass, NormalPrepass, MotionVectorPrepass);
+        scene.app.world_mut().entity_mut(camera).remove::<Prepasses>();
+        let differ = |a: &Picture, b: &Picture| {
+            a.pixels().zip(b.pixels()).filter(|(a, b)| (luma(*a) - luma(*b)).abs() > 8.0).count()
+        };
+        let (holes, moved) = (differ(&without, &with), differ(&with, &back));
+        println!("{msaa:?}: {holes} and {moved} of {} pixels differ", without.covered(BLACK));
+        assert!(without.covered(BLACK) > 2000 && holes < 20 && moved < 20);
+    }
+}
+
+#[test]
+fn followers_are_laid_anew_when_roots_are_edited_and_rest() {
+    let Some(mut scene) = Offscreen::new(120, 120) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
+    let hair = hair(&mut scene, &curtain(6, 0.2), (wide(2e-3), HairFollowers::new(60)));
+    scene.draw();
+    let buffers = |scene: &Offscreen| scene.app.world().get::<HairBuffers>(hair).cloned().unwrap();
+    let first = buffers(&scene);
+    let shift = |scene: &mut Offscreen, strand: Entity, by: Vec3| {
+        let mut strand = scene.app.world_mut().get_mut::<Strand>(strand).unwrap();
+        strand.positions_mut().iter_mut().for_each(|p| *p += by);
+    };
+    // The leftmost guide goes to the far right in steps, as by a hand.
+    let mover = strands_of(&scene, hair)[0];
+    for _ in 0..6 {
+        shift(&mut scene, mover, Vec3::X * 0.04);
+        scene.app.update();
+        assert_eq!(buffers(&scene).strands, first.strands, "not while it moves");
+    }
+    for _ in 0..3 {
+        scene.app.update();
+    }
+    let second = buffers(&scene);
+    assert_ne!(second.strands, first.strands, "its neighbours are others now");
+    assert_eq!((second.drawn, second.strand_count), (first.drawn, first.strand_count));
+    shift(&mut scene, mover, Vec3::X * 1e-4);
+    for _ in 0..4 {
+        scene.app.update();
+    }
+    assert_eq!(buffers(&scene).strands, second.strands, "a nudge changes no neighbours");
+}
+
+#[test]
+fn wet_locks_are_tighter() {
+    let Some(mut scene) = Offscreen::new(160, 160) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
+    let followers = HairFollowers { stray: 0.1, ..HairFollowers::new(400) };
+    let parts = (wide(0.5e-3), followers, HairView::Strain);
+    let hair = hair(&mut scene, &curtain(5, 0.3), parts);
+    let dry = scene.draw().covered(BLACK);
+    for strand in strands_of(&scene, hair) {
+        scene.app.world_mut().entity_mut(strand).insert(WetLook(vec![1.0; 9]));
+    }
+    let wet = scene.draw().covered(BLACK);
+    println!("{dry} pixels of dry hair, {wet} of wet");
+    assert!((wet as f32) < 0.75 * dry as f32 && wet > 500);
+}
+
+#[test]
+fn coincident_guides_and_nodes_are_drawn() {
+    let Some(mut scene) = Offscreen::new(100, 100) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
+    let same = vec![curtain(1, 0.2)[0].clone(); 4];
+    let view = HairView::Bond(BondKind::Hydrogen);
+    let hair = hair(&mut scene, &same, (wide(4e-3), HairFollowers::new(40), view));
+    assert!(scene.draw().covered(BLACK) > 100, "guides in one place");
+    // All nodes of one, then of all of them, come to lie in one point.
+    for strand in strands_of(&scene, hair) {
+        let mut strand = scene.app.world_mut().get_mut::<Strand>(strand).unwrap();
+        let root = strand.positions()[0];
+        strand.positions_mut().fill(root);
+        scene.draw();
+    }
+    assert!(scene.draw().covered(BLACK) < 2000, "followers stay with their roots");
+}
+
+#[test]
+fn water_is_drawn_as_beads_as_long_as_there_is_any() {
+    let Some(mut scene) = Offscreen::new(160, 160) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.3), Vec3::ZERO);
+    sun(&mut scene, Vec3::new(0.5, 0.8, 1.0), false);
+    let bead = |x: f32, y: f32, velocity: Vec3| Bead {
+        position: Vec3::new(x, y, 0.0),
+        radius: 15e-3,
+        velocity,
+    };
+    let mut draw = |beads: Vec<Bead>| {
+        **scene.app.world_mut().resource_mut::<HairBeads>() = beads;
+        let picture = scene.draw();
+        assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
+        picture
+    };
+    assert_eq!(draw(vec![]).covered(BLACK), 0);
+    let still = draw(vec![bead(0.0, 0.0, Vec3::ZERO)]);
+    let fast = draw(vec![bead(0.0, 0.0, Vec3::Y * 8.0)]);
+    let tall = |picture: &Picture| {
+        let bright = |y: &u32| (0..picture.width).any(|x| luma(picture.at(x, *y)) > 3.0);
+        (0..picture.height).filter(bright).count()
+    };
+    if let Ok(folder) = std::env::var("BEADS") {
+        still.save(&format!("{folder}/bead.png"));
+        fast.save(&format!("{folder}/bead_fast.png"));
+    }
+    println!("a bead is {} pixels tall, a fast one {}", tall(&still), tall(&fast));
+    assert!(tall(&still) > 10 && tall(&fast) as f32 > 1.5 * tall(&still) as f32);
+    let most = still.pixels().map(luma).fold(0.0, f32::max);
+    assert!(most > 150.0, "a bead glitters, this one has {most}");
+
+    // More than there was room for, then broken ones, then none.
+    let many: Vec<Bead> = (0..300)
+        .map(|i| bead((i % 20) as f32 * 0.008 - 0.08, (i / 20) as f32 * 0.008 - 0.06, Vec3::ZERO))
+        .collect();
+    assert!(draw(many).covered(BLACK) > 5 * still.covered(BLACK));
+    let broken = Bead { position: Vec3::NAN, ..bead(0.0, 0.0, Vec3::ZERO) };
+    assert_eq!(draw(vec![broken; 3]).covered(BLACK), 0);
+    assert_eq!(draw(vec![]).covered(BLACK), 0, "no water, no beads");
+}

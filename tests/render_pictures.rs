@@ -2,11 +2,20 @@
 //! `cargo test --test render_pictures -- --ignored --nocapture`, then open the files in /tmp.
 
 mod common;
+#[path = "../examples/salon/mannequin.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod mannequin;
 #[path = "common/offscreen.rs"]
 mod offscreen;
 
+/// What the mannequin takes from the scenes.
+mod scenes {
+    pub const HEAD_RADIUS: f32 = 0.1;
+}
+
 use bevy::{light::CascadeShadowConfigBuilder, prelude::*};
 use bevy_keratin::prelude::*;
+use bevy_keratin::render::WetLook;
 use offscreen::{Offscreen, head_of_guides};
 
 fn studio(scene: &mut Offscreen) {
@@ -118,5 +127,187 @@ fn studio_pictures() {
             println!("{pipeline}");
         }
         picture.save(&format!("/tmp/hair_{name}.png"));
+    }
+}
+
+/// The mannequin lies; upright its crown is up and its face looks along +z.
+fn upright(p: Vec3) -> Vec3 {
+    Vec3::new(p.z, p.x, p.y)
+}
+
+fn lying(p: Vec3) -> Vec3 {
+    Vec3::new(p.y, p.z, p.x)
+}
+
+/// How high the hairline is (m) at `front` (m) before the middle of the head.
+fn hairline(front: f32) -> f32 {
+    let line = [(-0.045, -0.05), (-0.022, -0.02), (0.0, 0.03), (0.03, 0.052), (0.06, 0.082)];
+    if front <= line[0].0 {
+        return line[0].1;
+    }
+    let piece = line.windows(2).find(|w| front < w[1].0);
+    piece.map_or(0.084, |w| w[0].1 + (w[1].1 - w[0].1) * (front - w[0].0) / (w[1].0 - w[0].0))
+}
+
+/// Guides all over the scalp, parted in the middle, lying over head, neck and shoulders.
+fn long_hair(spacing: f32, length: f32, nodes: usize) -> Vec<Vec<Vec3>> {
+    let mut roots: Vec<Vec3> = Vec::new();
+    let golden = core::f32::consts::PI * (3.0 - 5.0f32.sqrt());
+    for i in 0..6000 {
+        let y = 1.0 - 2.0 * (i as f32 + 0.5) / 6000.0;
+        let (sin, cos) = (golden * i as f32).sin_cos();
+        let flat = (1.0 - y * y).sqrt();
+        // From outside onto the skin.
+        let mut p = Vec3::new(0.018, 0.0, 0.0) + lying(Vec3::new(cos * flat, y, sin * flat)) * 0.1;
+        for _ in 0..12 {
+            p -= mannequin::normal(p) * mannequin::head(p);
+        }
+        let at = upright(p);
+        let ear = (p - Vec3::new(-0.016, -0.002, p.z.signum() * 0.08)).length() < 0.034;
+        let free = roots.iter().all(|r| r.distance(at) > spacing);
+        if at.y > hairline(at.z) && !ear && free && p.x > -0.06 {
+            roots.push(at);
+        }
+    }
+    roots.iter().map(|root| draped(*root, length, nodes)).collect()
+}
+
+fn draped(root: Vec3, length: f32, nodes: usize) -> Vec<Vec3> {
+    let step = length / (nodes - 1) as f32;
+    let side = if root.x < 0.0 { -1.0 } else { 1.0 };
+    let normal = |p: Vec3| upright(mannequin::normal(lying(p)));
+    let mut points = vec![root];
+    let mut way = (normal(root) + Vec3::new(0.8 * side, 0.2, -0.5)).normalize();
+    // Hair from higher up lies on that from below.
+    let layer = 0.004 + 0.12 * (root.y - 0.0).max(0.0);
+    for i in 1..nodes {
+        let p = points[i - 1];
+        let pull = Vec3::new(0.25 * side, -1.0, if p.z > 0.02 { -0.9 } else { -0.1 });
+        way = (way + pull * (step * 45.0)).normalize();
+        let mut next = p + way * step;
+        let clear = layer * (i as f32 / 3.0).min(1.0);
+        for _ in 0..3 {
+            let depth = clear - mannequin::head(lying(next));
+            if depth > 0.0 {
+                next += normal(next) * depth;
+            }
+        }
+        way = (next - p).normalize_or(way);
+        points.push(p + way * step);
+    }
+    points
+}
+
+/// The skin under the hair, darker, fading out at the hairline.
+fn with_scalp(mut mesh: Mesh) -> Mesh {
+    use bevy::mesh::VertexAttributeValues::{Float32x3, Float32x4};
+    let Some(Float32x3(places)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION).cloned() else {
+        return mesh;
+    };
+    if let Some(Float32x4(colors)) = mesh.attribute_mut(Mesh::ATTRIBUTE_COLOR) {
+        for (color, place) in colors.iter_mut().zip(places) {
+            let at = upright(Vec3::from(place));
+            let share = ((at.y - hairline(at.z)) / 0.012 + 0.3).clamp(0.0, 1.0) * 0.85;
+            let skin = Vec4::from(*color);
+            *color = skin.lerp(Vec4::new(0.05, 0.03, 0.022, 1.0), share).to_array();
+        }
+    }
+    mesh
+}
+
+/// `cargo test --test render_pictures portraits -- --ignored --nocapture`: a whole head of long hair in
+/// four looks. `WIDTH`, `HEIGHT`, `FOLLOWERS`, `ONLY` choose.
+#[test]
+#[ignore = "writes pictures"]
+fn portraits() {
+    let (width, height) = (setting("WIDTH", 1920), setting("HEIGHT", 1080));
+    let Some(mut scene) = Offscreen::new(width, height) else {
+        return;
+    };
+    let fine = bevy::light::DirectionalLightShadowMap { size: 2048 };
+    scene.app.insert_resource(fine);
+    let only: String = setting("ONLY", String::new());
+    let world = scene.app.world_mut();
+    let head = world.resource_mut::<Assets<Mesh>>().add(with_scalp(mannequin::mesh()));
+    let skin = StandardMaterial { perceptual_roughness: 0.55, ..default() };
+    let skin = world.resource_mut::<Assets<StandardMaterial>>().add(skin);
+    let turn = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::X);
+    let upright = Transform::from_rotation(Quat::from_mat3(&turn));
+    world.spawn((Mesh3d(head), MeshMaterial3d(skin), upright));
+    let light = |at: Vec3, lux: f32, color: Color, shadows: bool| {
+        let light = DirectionalLight {
+            illuminance: lux,
+            color,
+            shadow_maps_enabled: shadows,
+            shadow_normal_bias: 0.6,
+            ..default()
+        };
+        let cascades =
+            CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 1.6, ..default() };
+        let at = Transform::from_translation(at).looking_at(Vec3::ZERO, Vec3::Y);
+        (light, cascades.build(), at)
+    };
+    world.spawn(light(Vec3::new(1.0, 1.3, 1.2), 9000.0, Color::srgb(1.0, 0.95, 0.88), true));
+    world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2200.0, Color::srgb(0.8, 0.88, 1.0), false));
+    world.spawn(light(Vec3::new(-0.7, 1.0, -1.5), 5000.0, Color::WHITE, false));
+    world.insert_resource(GlobalAmbientLight { brightness: 300.0, ..default() });
+    world.insert_resource(ClearColor(Color::srgb(0.17, 0.18, 0.2)));
+    scene.look(Vec3::new(0.29, 0.03, 0.52), Vec3::new(0.0, -0.085, 0.0));
+
+    // Hair that hair hides is not shaded: many times faster.
+    if setting("PREPASS", 1) == 1 {
+        let camera = scene.camera;
+        let prepass = bevy::core_pipeline::prepass::DepthPrepass;
+        scene.app.world_mut().entity_mut(camera).insert(prepass);
+    }
+    let world = scene.app.world_mut();
+    let hair = world.spawn(Hair).id();
+    let guides = long_hair(0.0125, setting("LENGTH", 0.36), 20);
+    println!("{} guides", guides.len());
+    for points in &guides {
+        let strand = Strand::from_polyline(points).unwrap();
+        let mut bonds = Bonds::of(&strand);
+        // For the heat map: cut toward the tips, as if they had hung in water.
+        for (i, joint) in bonds.joints.iter_mut().enumerate() {
+            joint.rates[0] = (1.3 - i as f32 / 12.0).clamp(0.0, 1.0);
+        }
+        world.spawn((StrandOf(hair), strand, bonds));
+    }
+    let of = |melanin| HairLook { melanin, width: 0.2e-3, ..default() };
+    let dark = Melanin::new(1.3, 0.1);
+    let views = [
+        ("dark", of(dark), HairView::Natural, false),
+        ("blond", of(Melanin::BLOND), HairView::Natural, false),
+        ("wet", of(dark), HairView::Natural, true),
+        ("heat", of(dark), HairView::Bond(BondKind::Hydrogen), false),
+    ];
+    let followers = HairFollowers {
+        segments: 24,
+        stray: 0.02,
+        clump: 0.35,
+        ..HairFollowers::new(setting("FOLLOWERS", 20_000))
+    };
+    for (name, look, view, wet) in views {
+        if !only.is_empty() && !only.split(',').any(|o| o == name) {
+            continue;
+        }
+        scene.app.world_mut().entity_mut(hair).insert((look, followers, view));
+        let strands: Vec<Entity> = scene.app.world().get::<Strands>(hair).unwrap().iter().collect();
+        for strand in strands {
+            let moisture = if wet { 1.0 } else { 0.0 };
+            scene.app.world_mut().entity_mut(strand).insert(WetLook(vec![moisture; 20]));
+        }
+        // Assets arrive while nothing is drawn.
+        let active = |scene: &mut Offscreen, on: bool| {
+            let camera = scene.camera;
+            scene.app.world_mut().get_mut::<Camera>(camera).unwrap().is_active = on;
+        };
+        active(&mut scene, false);
+        (0..3).for_each(|_| scene.app.update());
+        active(&mut scene, true);
+        let start = std::time::Instant::now();
+        let picture = scene.draw_now();
+        println!("{name}: {:?} for two frames", start.elapsed());
+        picture.save(&format!("/tmp/portrait_{name}.png"));
     }
 }

@@ -1,4 +1,5 @@
-//! The shader's curve and follower maths against its Rust twin, on random data.
+//! The shader's curve and follower maths against its Rust twin, on random data: dry and wet strands,
+//! in this frame and in the one before.
 
 mod common;
 #[path = "common/offscreen.rs"]
@@ -20,20 +21,24 @@ use bevy::{
     },
     shader::ShaderDefVal,
 };
-use bevy_keratin::render::{DrawnStrand, curve::strand_point};
+use bevy_keratin::render::{
+    DrawnStrand, HairFollowers,
+    curve::{CurvePoint, Guide, strand_point},
+};
 use offscreen::Offscreen;
 
 const SAMPLES: usize = 24;
 const SHADER: &str = "
-#import bevy_keratin::strands::{strands, strand_point}
+#import bevy_keratin::strands::{strands, strand_point, past_strand_position}
 @group(0) @binding(4) var<storage, read_write> out: array<vec4<f32>>;
 @compute @workgroup_size(1)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let t = f32(id.y) / f32(SAMPLES - 1u);
     let point = strand_point(strands[id.x], t);
-    let at = 2u * (id.x * SAMPLES + id.y);
+    let at = 3u * (id.x * SAMPLES + id.y);
     out[at] = vec4(point.position, 1.0);
     out[at + 1u] = vec4(point.slope, 1.0);
+    out[at + 2u] = vec4(past_strand_position(strands[id.x], t), 1.0);
 }
 const SAMPLES: u32 = 24u;
 ";
@@ -52,17 +57,51 @@ impl Random {
     }
 }
 
-fn random_guides(random: &mut Random) -> Vec<Vec<Vec3>> {
+/// A guide of random nodes, their moisture, and how they moved since the frame before (m/1024): both
+/// in steps that an f16 holds.
+#[derive(Default)]
+struct RandomGuide {
+    nodes: Vec<Vec3>,
+    moisture: Vec<f32>,
+    motion: Vec<Vec3>,
+}
+
+impl RandomGuide {
+    fn past(&self) -> Vec<Vec3> {
+        self.nodes.iter().zip(&self.motion).map(|(p, m)| p - m / 1024.0).collect()
+    }
+
+    /// As the node buffer holds them.
+    fn packed(&self) -> impl Iterator<Item = [u32; 8]> + '_ {
+        let shown = half(1.0) << 16;
+        self.nodes.iter().zip(&self.moisture).zip(&self.motion).map(move |((p, wet), m)| {
+            let [x, y, z] = p.to_array().map(f32::to_bits);
+            let motion = [half(m.x) | half(m.y) << 16, half(m.z) | shown];
+            [x, y, z, 0, half(*wet) << 16, 0, motion[0], motion[1]]
+        })
+    }
+}
+
+/// The f16 that is `x`.
+fn half(x: f32) -> u32 {
+    let bits = x.to_bits();
+    if x == 0.0 { 0 } else { (bits >> 16) & 0x8000 | ((bits & 0x7fff_ffff) - (112 << 23)) >> 13 }
+}
+
+fn random_guides(random: &mut Random) -> Vec<RandomGuide> {
     (0..20)
         .map(|k| {
-            let nodes = 2 + k % 9;
             let mut p = random.vector() * 0.1;
-            (0..nodes)
-                .map(|_| {
-                    p += random.vector() * 0.06 - Vec3::Y * 0.02;
-                    p
-                })
-                .collect()
+            let mut guide = RandomGuide::default();
+            for _ in 0..2 + k % 9 {
+                p += random.vector() * 0.06 - Vec3::Y * 0.02;
+                guide.nodes.push(p);
+                // Every other guide is dry.
+                let wet = (random.share() * 5.0).floor() / 4.0;
+                guide.moisture.push(if k % 2 == 0 { 0.0 } else { wet });
+                guide.motion.push((random.vector() * 16.0).round());
+            }
+            guide
         })
         .collect()
 }
@@ -90,19 +129,21 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     let Some(mut scene) = Offscreen::new(16, 16) else {
         return;
     };
-    let (clump, parting) = (0.3, 2.0);
+    let followers =
+        HairFollowers { clump: 0.3, parting: 2.0, wet_clump: 0.6, ..HairFollowers::none() };
     let mut random = Random(7);
     let guides = random_guides(&mut random);
     let strands: Vec<_> = (0..120).map(|k| random_strand(&mut random, k)).collect();
 
-    let mut nodes: Vec<[f32; 8]> = Vec::new();
+    let mut nodes: Vec<[u32; 8]> = Vec::new();
     let mut ranges: Vec<[u32; 2]> = Vec::new();
     for guide in &guides {
-        ranges.push([nodes.len() as u32, guide.len() as u32]);
-        nodes.extend(guide.iter().map(|p| [p.x, p.y, p.z, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        ranges.push([nodes.len() as u32, guide.nodes.len() as u32]);
+        nodes.extend(guide.packed());
     }
     let mut ribbon = [0.0f32; 24];
-    (ribbon[17], ribbon[18]) = (clump, parting);
+    (ribbon[17], ribbon[18], ribbon[19]) =
+        (followers.clump, followers.parting, followers.wet_clump);
     let packed: Vec<[u32; 16]> = strands.iter().map(DrawnStrand::packed).collect();
 
     let shader = Shader::from_wgsl(SHADER, "twin.wgsl");
@@ -132,7 +173,10 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     let id = pipelines.queue_compute_pipeline(ComputePipelineDescriptor {
         layout: vec![layout.clone()],
         shader,
-        shader_defs: vec![ShaderDefVal::UInt("MATERIAL_BIND_GROUP".into(), 0)],
+        shader_defs: vec![
+            ShaderDefVal::UInt("MATERIAL_BIND_GROUP".into(), 0),
+            "MOTION_VECTOR_PREPASS".into(),
+        ],
         ..default()
     });
     give_back(&mut scene, pipelines);
@@ -154,7 +198,7 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         device.create_buffer_with_data(&BufferInitDescriptor { label: None, contents, usage })
     };
     let storage = BufferUsages::STORAGE;
-    let size = (strands.len() * SAMPLES * 32) as u64;
+    let size = (strands.len() * SAMPLES * 48) as u64;
     let made = |usage| {
         device.create_buffer(&BufferDescriptor {
             label: None,
@@ -168,8 +212,7 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     let bytes_of =
         |words: &[u32]| -> Vec<u8> { words.iter().flat_map(|w| w.to_le_bytes()).collect() };
     let ribbon = buffer(&bytes_of(&ribbon.map(f32::to_bits)), BufferUsages::UNIFORM);
-    let nodes: Vec<u32> = nodes.iter().flatten().map(|x| x.to_bits()).collect();
-    let nodes = buffer(&bytes_of(&nodes), storage);
+    let nodes = buffer(&bytes_of(nodes.as_flattened()), storage);
     let ranges = buffer(&bytes_of(ranges.as_flattened()), storage);
     let packed = buffer(&bytes_of(packed.as_flattened()), storage);
     let group = device.create_bind_group(
@@ -198,20 +241,32 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     let read = |i: usize| f32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().unwrap());
     let vector = |i: usize| Vec3::new(read(4 * i), read(4 * i + 1), read(4 * i + 2));
 
-    let guide = |k: u32| &guides[k as usize][..];
-    let (mut worst, mut parted) = (0.0f32, 0);
+    let past: Vec<Vec<Vec3>> = guides.iter().map(RandomGuide::past).collect();
+    let now = |k: u32| {
+        let RandomGuide { nodes, moisture, .. } = &guides[k as usize];
+        Guide { nodes, moisture }
+    };
+    let before = |k: u32| Guide { nodes: &past[k as usize], ..now(k) };
+    let dry = |k: u32| Guide { moisture: &[], ..now(k) };
+    let parted = HairFollowers { parting: 1e6, ..followers };
+    let [mut worst, mut worst_past] = [0.0f32; 2];
+    let [mut parts, mut drawn_in] = [0; 2];
     for (k, strand) in strands.iter().enumerate() {
         for i in 0..SAMPLES {
             let t = i as f32 / (SAMPLES - 1) as f32;
-            let twin = strand_point(strand, guide, t, clump, parting);
-            let at = 2 * (k * SAMPLES + i);
+            let twin = strand_point(strand, now, t, &followers);
+            let at = 3 * (k * SAMPLES + i);
             worst = worst.max(vector(at).distance(twin.position));
             worst = worst.max(vector(at + 1).distance(twin.slope) * 0.01);
-            let blended = strand_point(strand, guide, t, clump, 1e6);
-            parted += usize::from(blended.position.distance(twin.position) > 1e-4);
+            let past = strand_point(strand, before, t, &followers).position;
+            worst_past = worst_past.max(vector(at + 2).distance(past));
+            let differs = |other: CurvePoint| other.position.distance(twin.position) > 1e-4;
+            parts += u32::from(differs(strand_point(strand, now, t, &parted)));
+            drawn_in += u32::from(differs(strand_point(strand, dry, t, &followers)));
         }
     }
-    println!("largest difference {worst} m; {parted} points where guides had parted");
-    assert!(worst < 1e-5, "shader and twin differ by {worst} m");
-    assert!(parted > 100, "the data must contain parted guides");
+    println!("largest difference {worst} m, in the frame before {worst_past} m");
+    println!("{parts} points where guides had parted, {drawn_in} that water had drawn in");
+    assert!(worst < 1e-5 && worst_past < 1e-5, "shader and twin differ by {worst}, {worst_past} m");
+    assert!(parts > 100 && drawn_in > 100, "the data must contain parted and wet guides");
 }

@@ -1,6 +1,7 @@
 //! The panel's sliders: treatments, the hair's own values, air, solver, tools and looks.
 
 use crate::{
+    overlay::HairGizmos,
     plots::{Measured, colour, name},
     tools::{self, Tools},
 };
@@ -8,7 +9,7 @@ use bevy::{ecs::system::SystemParam, prelude::*};
 use bevy_egui::egui::{self, Color32, Slider, Ui};
 use bevy_keratin::{
     prelude::*,
-    render::{HairFollowers, HairLook, HairView, Melanin, heat},
+    render::{HairFollowers, HairLook, HairShading, HairView, Melanin, heat},
     setting::HairSetting,
 };
 
@@ -27,6 +28,8 @@ pub struct Settings<'w, 's> {
     look: ResMut<'w, HairDefault<HairLook>>,
     followers: ResMut<'w, HairDefault<HairFollowers>>,
     tools: ResMut<'w, Tools>,
+    gizmos: ResMut<'w, GizmoConfigStore>,
+    lights: Query<'w, 's, &'static mut SpotLight>,
     blowers: Query<'w, 's, (Entity, &'static Blower, &'static Transform)>,
     hairs: Query<'w, 's, (Entity, &'static Strands), With<Hair>>,
     strands: Query<'w, 's, &'static Strand>,
@@ -180,8 +183,8 @@ impl Settings<'_, '_> {
     pub fn solver(&mut self, ui: &mut Ui) {
         edited!(self.solver, |s: &mut Solver| {
             ui.add(Slider::new(&mut s.iterations, 1..=50).text("iterations"));
-            ui.add(Slider::new(&mut s.limiter_steps, 0..=4).text("length limiter steps"));
-            slide(ui, &mut s.internal_damping, 0.0..=50.0, "bend damping (1/s)");
+            ui.add(Slider::new(&mut s.limiter_steps, 0..=4).text("limiter steps"));
+            slide(ui, &mut s.internal_damping, 0.0..=50.0, "damping (1/s)");
         });
         let mut auto = *self.substeps == HairSubsteps::Auto;
         let now = self.substeps.count(1.0 / 60.0);
@@ -254,9 +257,17 @@ impl Settings<'_, '_> {
             ui.selectable_value(&mut view, HairView::Natural, "natural");
             ui.selectable_value(&mut view, HairView::Guides, "guides");
             ui.selectable_value(&mut view, HairView::Strain, "strain");
+            ui.selectable_value(&mut view, HairView::Moisture, "water");
         });
         if view == HairView::Strain {
             scale(ui, "0 %", "5 %");
+        }
+        if view == HairView::Moisture {
+            scale(ui, "dry", "soaked");
+        }
+        let mut lines = self.gizmos.config::<HairGizmos>().0.enabled;
+        if ui.checkbox(&mut lines, "colliders, wind and rods as lines").changed() {
+            self.gizmos.config_mut::<HairGizmos>().0.enabled = lines;
         }
         if view != self.view.0 {
             self.view.0 = view;
@@ -287,7 +298,21 @@ impl Settings<'_, '_> {
             slide(ui, &mut l.melanin.eumelanin, 0.0..=2.0, "eumelanin");
             slide(ui, &mut l.melanin.pheomelanin, 0.0..=1.0, "pheomelanin");
             slide(ui, &mut l.roughness, 0.1..=1.0, "roughness");
+            slide(ui, &mut l.gloss, 0.0..=3.0, "gloss");
+            slide_mm(ui, &mut l.self_shadow, 1.0..=60.0, "light goes in (mm)");
+            ui.horizontal(|ui| {
+                ui.label("model");
+                ui.selectable_value(&mut l.shading, HairShading::Fibre, "fibre");
+                ui.selectable_value(&mut l.shading, HairShading::KajiyaKay, "Kajiya–Kay");
+            });
         });
+        // The key light is the first.
+        if let Some(mut key) = self.lights.iter_mut().next() {
+            let mut shadows = key.shadow_maps_enabled;
+            if ui.checkbox(&mut shadows, "shadows").changed() {
+                key.shadow_maps_enabled = shadows;
+            }
+        }
     }
 }
 

@@ -12,6 +12,7 @@ mod dials;
 mod failure;
 mod mannequin;
 mod offscreen;
+mod overlay;
 mod panel;
 mod plots;
 mod solid;
@@ -52,6 +53,9 @@ pub struct Arguments {
     /// What is shown of the hair.
     #[arg(long, default_value = "natural")]
     view: View,
+    /// Shows colliders, wind and rods as lines.
+    #[arg(long)]
+    gizmos: bool,
     /// Draws no window, but PNGs into this folder.
     #[arg(long, value_name = "DIR")]
     offscreen: Option<PathBuf>,
@@ -74,6 +78,7 @@ enum View {
     Disulfide,
     Peptide,
     Strain,
+    Moisture,
 }
 
 impl From<View> for HairView {
@@ -86,6 +91,7 @@ impl From<View> for HairView {
             View::Disulfide => Self::Bond(BondKind::Disulfide),
             View::Peptide => Self::Bond(BondKind::Peptide),
             View::Strain => Self::Strain,
+            View::Moisture => Self::Moisture,
         }
     }
 }
@@ -144,10 +150,12 @@ fn refuse(error: &clap::Error) -> ExitCode {
 /// What both share: the scene, the hair, the studio.
 fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
     app.insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
-        .add_plugins(ScenePlugin(scene))
+        .add_plugins((ScenePlugin(scene), overlay::OverlayPlugin))
         .insert_resource(HairDefault(HairView::from(arguments.view)))
         .add_systems(Startup, stage::build.before(scenes::spawn_scene))
         .add_systems(PostUpdate, (stage::embody, stage::slide).before(TransformSystems::Propagate));
+    let mut gizmos = app.world_mut().resource_mut::<GizmoConfigStore>();
+    gizmos.config_mut::<overlay::HairGizmos>().0.enabled = arguments.gizmos;
 }
 
 /// Hair is drawn by storage buffers in the vertex stage, which GL lacks.

@@ -53,7 +53,7 @@ fn block(p: Vec3, centre: Vec3, half: Vec3, round: f32) -> f32 {
 }
 
 /// Distance to the head's surface (m), negative inside. Both halves are alike.
-fn head(p: Vec3) -> f32 {
+pub fn head(p: Vec3) -> f32 {
     let p = Vec3::new(p.x, p.y, p.z.abs());
     let v = Vec3::new;
     let skull = ellipsoid(p, v(0.018, 0.0, 0.0), v(0.1, 0.095, 0.077));
@@ -87,7 +87,7 @@ fn head(p: Vec3) -> f32 {
     carve(d, p.x - BUST_END, 0.012)
 }
 
-fn normal(p: Vec3) -> Vec3 {
+pub fn normal(p: Vec3) -> Vec3 {
     let step = |axis: Vec3| head(p + axis * 1e-3) - head(p - axis * 1e-3);
     Vec3::new(step(Vec3::X), step(Vec3::Y), step(Vec3::Z)).normalize_or(Vec3::Y)
 }

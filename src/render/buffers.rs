@@ -14,7 +14,7 @@ use bevy::{prelude::*, render::storage::ShaderBuffer};
 ///
 /// | buffer | stride | holds |
 /// |---|---|---|
-/// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain, moisture, length from the root at rest (m), 1 if the guide may be shown |
+/// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain and moisture (2 × f16), length from the root at rest (m), motion since the frame before (3 × f16, in m/1024), 1 if the guide may be shown (f16) |
 /// | `guides` | 8 | first node and number of nodes of each guide |
 /// | `strands` | 64 | [`DrawnStrand`]: the guides first, then the followers |
 ///
@@ -57,10 +57,12 @@ pub(super) fn drawn_place(strand: &Strand, before: &[Vec3], node: usize, overste
     }
 }
 
-/// Appends a guide's nodes. Unusable nodes take the place of the node before them; a guide with none
-/// left is not shown. Gives the box around what was appended.
+/// Packs a guide's nodes into `out`, one each; `known` says that `out` holds those of the frame
+/// before. Unusable nodes take the place of the node before them; a guide with none left is not
+/// shown. Gives the box around what was packed.
 pub(super) fn pack_guide(
-    out: &mut Vec<PackedNode>,
+    out: &mut [PackedNode],
+    known: bool,
     strand: &Strand,
     history: &StrandHistory,
     bonds: &Bonds,
@@ -73,12 +75,12 @@ pub(super) fn pack_guide(
     };
     let place = |i| drawn_place(strand, before, i, overstep);
     let first = (0..strand.nodes()).map(place).find(|p| usable(*p));
-    let shown = f32::from(u8::from(first.is_some()));
+    let shown = half(f32::from(u8::from(first.is_some())));
     let mut last = first.unwrap_or_default();
     let (mut low, mut high) = (last, last);
-    let mut rest = 0.0;
+    let mut rest = 0.0_f32;
     let mut strain_below = None;
-    for i in 0..strand.nodes() {
+    for (i, node) in out.iter_mut().enumerate().take(strand.nodes()) {
         let p = place(i);
         if usable(p) {
             last = p;
@@ -97,21 +99,46 @@ pub(super) fn pack_guide(
         let joint = bonds.joints.get(i).or(bonds.joints.last());
         let rates = joint.map_or([1.0; 4], |j| j.rates);
         let moisture = wet.and_then(|w| w.0.get(i)).copied().unwrap_or(0.0);
-        let number = |x: f32| if x.is_finite() { x.to_bits() } else { 0 };
+        let motion = match known && first.is_some() {
+            true => (last - packed_place(node)) * MOTION_UNITS,
+            false => Vec3::ZERO,
+        };
         let [x, y, z] = last.to_array().map(f32::to_bits);
-        out.push([
+        *node = [
             x,
             y,
             z,
             unorm8(rates),
-            number(strain),
-            number(moisture.clamp(0.0, 1.0)),
-            number(rest),
-            shown.to_bits(),
-        ]);
+            half(strain) | half(moisture.clamp(0.0, 1.0)) << 16,
+            if rest.is_finite() { rest.to_bits() } else { 0 },
+            half(motion.x) | half(motion.y) << 16,
+            half(motion.z) | shown << 16,
+        ];
         rest += strand.rest_lengths().get(i).copied().unwrap_or(0.0);
     }
     first.map(|_| (low, high))
+}
+
+/// Motion is packed in these units per m, so that what a frame moves lies well within an f16.
+const MOTION_UNITS: f32 = 1024.0;
+
+/// Where a packed node is.
+pub(super) fn packed_place(node: &PackedNode) -> Vec3 {
+    Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
+}
+
+/// The nearest f16, in the low bits. What is too small for one, and NaN, become 0; what is too large
+/// the largest.
+fn half(x: f32) -> u32 {
+    const LEAST: f32 = 6.103_515_6e-5;
+    // False for NaN.
+    if x.abs() >= LEAST {
+        let bits = x.to_bits();
+        let rebased = (bits & 0x7fff_ffff) + 0x1000 - (112 << 23);
+        (bits >> 16) & 0x8000 | (rebased >> 13).min(0x7bff)
+    } else {
+        0
+    }
 }
 
 fn unorm8(rates: [f32; 4]) -> u32 {
@@ -130,15 +157,11 @@ mod tests {
     use super::*;
 
     fn packed(strand: &Strand, history: &[Vec3], overstep: f32) -> Vec<PackedNode> {
-        let mut out = Vec::new();
+        let mut out = vec![[0; 8]; strand.nodes()];
         let history = StrandHistory { positions: history.to_vec() };
         let bonds = Bonds::default();
-        pack_guide(&mut out, strand, &history, &bonds, None, overstep);
+        pack_guide(&mut out, false, strand, &history, &bonds, None, overstep);
         out
-    }
-
-    fn place(node: &PackedNode) -> Vec3 {
-        Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
     }
 
     #[test]
@@ -146,9 +169,9 @@ mod tests {
         let strand = Strand::from_polyline(&[Vec3::ZERO, Vec3::X, Vec3::X * 2.0]).unwrap();
         let before = [Vec3::ZERO, Vec3::Y, Vec3::Y * 2.0];
         let nodes = packed(&strand, &before, 0.25);
-        assert_eq!(place(&nodes[1]), Vec3::new(0.25, 0.75, 0.0));
-        assert_eq!(place(&packed(&strand, &[], 0.25)[2]), Vec3::X * 2.0);
-        assert_eq!(place(&packed(&strand, &before[..2], 0.25)[2]), Vec3::X * 2.0);
+        assert_eq!(packed_place(&nodes[1]), Vec3::new(0.25, 0.75, 0.0));
+        assert_eq!(packed_place(&packed(&strand, &[], 0.25)[2]), Vec3::X * 2.0);
+        assert_eq!(packed_place(&packed(&strand, &before[..2], 0.25)[2]), Vec3::X * 2.0);
     }
 
     #[test]
@@ -156,10 +179,32 @@ mod tests {
         let mut strand = Strand::from_polyline(&[Vec3::ZERO, Vec3::X, Vec3::X * 2.0]).unwrap();
         strand.positions_mut()[1] = Vec3::NAN;
         let nodes = packed(&strand, &[], 1.0);
-        assert_eq!(place(&nodes[1]), Vec3::ZERO);
-        assert!(nodes.iter().all(|n| n[4] != f32::NAN.to_bits()));
+        assert_eq!(packed_place(&nodes[1]), Vec3::ZERO);
+        assert!(nodes.iter().all(|n| n[7] >> 16 == half(1.0)));
         strand.positions_mut().fill(Vec3::INFINITY);
         assert!(packed(&strand, &[], 1.0).iter().all(|n| n[7] == 0));
+    }
+
+    #[test]
+    fn motion_is_that_since_the_frame_before() {
+        let mut strand = Strand::from_polyline(&[Vec3::ZERO, Vec3::X]).unwrap();
+        let mut nodes = packed(&strand, &[], 1.0);
+        assert_eq!(nodes[1][6], 0, "hair that appears has not moved");
+        strand.positions_mut()[1] = Vec3::new(1.5, -0.25, 0.0);
+        let (history, bonds) = (StrandHistory::default(), Bonds::default());
+        pack_guide(&mut nodes, true, &strand, &history, &bonds, None, 1.0);
+        assert_eq!(nodes[1][6], half(512.0) | half(-256.0) << 16);
+        assert_eq!((nodes[0][6], nodes[1][7]), (0, half(1.0) << 16));
+    }
+
+    #[test]
+    fn halves_are_the_nearest() {
+        let halves = [(0.0, 0), (1.0, 0x3c00), (-2.0, 0xc000), (65504.0, 0x7bff)];
+        let odd = [(1e9, 0x7bff), (f32::NAN, 0), (1e-7, 0), (0.1, 0x2e66), (f32::MAX, 0x7bff)];
+        for (x, bits) in halves.into_iter().chain(odd) {
+            assert_eq!(half(x), bits, "{x}");
+        }
+        assert_eq!(half(f32::INFINITY), 0x7bff);
     }
 
     #[test]
@@ -174,12 +219,11 @@ mod tests {
         let strand = Strand::from_polyline(&points).unwrap();
         let strands = vec![(strand.clone(), Bonds::of(&strand)); 10_000];
         let history = StrandHistory { positions: points };
-        let mut out = Vec::new();
+        let mut out = vec![[0; 8]; 160_000];
         for _ in 0..3 {
-            out.clear();
             let start = std::time::Instant::now();
-            for (strand, bonds) in &strands {
-                pack_guide(&mut out, strand, &history, bonds, None, 0.5);
+            for ((strand, bonds), out) in strands.iter().zip(out.chunks_mut(16)) {
+                pack_guide(out, true, strand, &history, bonds, None, 0.5);
             }
             println!("10,000 guides of 16 nodes: {:?}", start.elapsed());
         }

@@ -1,7 +1,7 @@
 //! Points on drawn strands: the Rust twin of `strands.wgsl`, for tools, tests and effects that
 //! need to know where a follower is.
 
-use super::followers::DrawnStrand;
+use super::followers::{DrawnStrand, HairFollowers};
 use bevy::prelude::*;
 
 /// A point on a curve and the derivative by the share of the length.
@@ -38,18 +38,27 @@ pub fn guide_point(nodes: &[Vec3], share: f32) -> CurvePoint {
     }
 }
 
-/// The point at `t` (0 root, 1 tip) of a drawn strand, in the hair's frame; `guide` gives the nodes
-/// of a guide, `clump` and `parting` are those of [`HairFollowers`](super::HairFollowers).
+/// What a guide is made of, root first.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Guide<'a> {
+    /// Its nodes, in the hair's frame (m).
+    pub nodes: &'a [Vec3],
+    /// How wet each node is, as [`WetLook`](super::WetLook) says; dry where absent.
+    pub moisture: &'a [f32],
+}
+
+/// The point at `t` (0 root, 1 tip) of a drawn strand, in the hair's frame; `guide` gives the guides
+/// by their index.
 pub fn strand_point<'a>(
     strand: &DrawnStrand,
-    guide: impl Fn(u32) -> &'a [Vec3],
+    guide: impl Fn(u32) -> Guide<'a>,
     t: f32,
-    clump: f32,
-    parting: f32,
+    followers: &HairFollowers,
 ) -> CurvePoint {
     let reach = strand.length - strand.phase;
     let share = strand.phase + t * reach;
-    let near = guide(strand.guides[0]);
+    let near_guide = guide(strand.guides[0]);
+    let near = near_guide.nodes;
     let near_root = near.first().copied().unwrap_or_default();
     let near_point = guide_point(near, share);
 
@@ -62,7 +71,7 @@ pub fn strand_point<'a>(
         if strand.weights[k] <= 0.0 {
             continue;
         }
-        let nodes = guide(strand.guides[k]);
+        let nodes = guide(strand.guides[k]).nodes;
         let guide_root = nodes.first().copied().unwrap_or_default();
         let point = guide_point(nodes, share);
         root += strand.weights[k] * guide_root;
@@ -75,17 +84,40 @@ pub fn strand_point<'a>(
             true => 1.0,
             false => smoothstep(0.0, 0.6, together),
         };
+        let parting = followers.parting;
         let weight =
             strand.weights[k] * (1.0 - smoothstep(parting, 1.5 * parting, apart)) * together;
         sum += weight;
         way += weight * guide_way;
         slope += weight * point.slope;
     }
-    let gather = if strand.is_guide { Vec3::ZERO } else { (near_root - root) * clump };
+    let (gather, most) = match strand.is_guide {
+        true => (Vec3::ZERO, 0.0),
+        false => ((near_root - root) * followers.clump, followers.wet_clump),
+    };
+    let loose = root + way / sum + gather * t + strand.stray * t * t;
+    let loose_slope = slope * reach / sum + gather + 2.0 * t * strand.stray;
+    let (moisture, rise) = moisture_at(&near_guide, share);
+    let tight = most * moisture * t * (2.0 - t);
+    let tighter = most * (rise * reach * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
+    let inward = near_point.position - loose;
     CurvePoint {
-        position: root + way / sum + gather * t + strand.stray * t * t,
-        slope: slope * reach / sum + gather + 2.0 * t * strand.stray,
+        position: loose + inward * tight,
+        slope: loose_slope.lerp(near_point.slope * reach, tight) + inward * tighter,
     }
+}
+
+/// How wet a guide is at `share` of its length, and the derivative.
+fn moisture_at(guide: &Guide<'_>, share: f32) -> (f32, f32) {
+    if guide.nodes.len() < 2 {
+        return (guide.moisture.first().copied().unwrap_or(0.0), 0.0);
+    }
+    let last = guide.nodes.len() - 1;
+    let along = share.clamp(0.0, 1.0) * last as f32;
+    let i = (along as usize).min(last - 1);
+    let of = |i: usize| guide.moisture.get(i).copied().unwrap_or(0.0);
+    let rise = of(i + 1) - of(i);
+    (of(i) + rise * (along - i as f32), rise * last as f32)
 }
 
 fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
@@ -123,13 +155,41 @@ mod tests {
         let mut right: Vec<Vec3> = BENT.iter().map(|p| *p + Vec3::X * 0.01).collect();
         let strand =
             DrawnStrand { guides: [0, 1, 0], weights: [0.6, 0.4, 0.0], length: 1.0, ..default() };
+        let followers = HairFollowers { clump: 0.0, parting: 5.0, ..default() };
         let tip = |right: &[Vec3]| {
-            let guide = |i| if i == 0 { &left[..] } else { right };
-            strand_point(&strand, guide, 1.0, 0.0, 5.0).position
+            let guide = |i| Guide { nodes: if i == 0 { &left } else { right }, moisture: &[] };
+            strand_point(&strand, guide, 1.0, &followers).position
         };
         let root = Vec3::X * -0.002;
         assert!(tip(&right).distance(BENT[3] + root) < 1e-6);
         right[3] += Vec3::X * 0.2;
         assert!(tip(&right).distance(BENT[3] + root) < 1e-6, "goes with the nearest");
+    }
+
+    #[test]
+    fn wet_followers_draw_near_their_guide_and_their_slope_stays_the_derivative() {
+        let strand = DrawnStrand {
+            weights: [1.0, 0.0, 0.0],
+            length: 1.0,
+            root: Vec3::X * 0.01,
+            stray: Vec3::Z * 0.02,
+            ..default()
+        };
+        let followers = HairFollowers { wet_clump: 0.8, clump: 0.0, ..default() };
+        let point = |t: f32, moisture: &[f32]| {
+            strand_point(&strand, |_| Guide { nodes: &BENT, moisture }, t, &followers)
+        };
+        let apart = |t, moisture: &[f32]| {
+            point(t, moisture).position.distance(guide_point(&BENT, t).position)
+        };
+        let (dry, wet) = ([0.0; 4], [1.0; 4]);
+        assert_eq!(apart(0.0, &wet), apart(0.0, &dry), "roots stay in the scalp");
+        assert!((apart(1.0, &wet) / apart(1.0, &dry) - 0.2).abs() < 1e-4);
+        let uneven = [0.0, 0.3, 1.0, 0.2];
+        for k in 1..30 {
+            let (t, h) = (k as f32 / 31.0, 1e-3);
+            let rise = point(t + h, &uneven).position - point(t - h, &uneven).position;
+            assert!((rise / (2.0 * h)).distance(point(t, &uneven).slope) < 2e-2, "{t}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     HairFollowers, HairLook, HairView, WetLook,
-    buffers::{HairBuffers, PackedNode, pack_guide, pack_strands},
+    buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     followers::{DrawnStrand, GuideRoot, scatter},
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
 };
@@ -26,14 +26,27 @@ pub(super) struct Interpolate(pub(super) bool);
 #[derive(Component, Clone, Debug, Default)]
 pub(super) struct Packed {
     pub(super) nodes: Vec<PackedNode>,
-    /// The strands that are guides, with their numbers of nodes.
-    layout: Vec<(Entity, u32)>,
+    layout: Vec<Guide>,
     followers: Option<HairFollowers>,
+    /// Whether roots are elsewhere than when followers were laid.
+    roots_moved: bool,
     centre: Vec3,
+    /// How far apart guides grow (m).
+    spacing: f32,
     /// How far followers reach beyond the guides (m).
     margin: f32,
     ribbon: Ribbon,
     key: RibbonKey,
+}
+
+/// A strand that is a guide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Guide {
+    strand: Entity,
+    /// How many nodes it has.
+    nodes: u32,
+    /// Where its root was when followers were laid (m).
+    root: Vec3,
 }
 
 type GuideParts =
@@ -85,18 +98,7 @@ pub(super) fn pack(
         let settings = followers.of(hair);
         let regroomed = packed.note_layout(guides(), &strands, &settings);
 
-        packed.nodes.clear();
-        let mut bounds: Option<(Vec3, Vec3)> = None;
-        for (guide, _) in &packed.layout {
-            let Ok((strand, history, bonds, wet)) = strands.get(*guide) else {
-                continue;
-            };
-            let own = pack_guide(&mut packed.nodes, strand, history, bonds, wet, overstep);
-            bounds = match (bounds, own) {
-                (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
-                (a, b) => a.or(b),
-            };
-        }
+        let bounds = packed.pack_nodes(&strands, overstep, !regroomed);
         let (low, high) = bounds.unwrap_or_default();
         let around = |margin: f32| Aabb::from_min_max(low - margin, high + margin);
         let look = looks.of(hair);
@@ -130,9 +132,9 @@ pub(super) fn pack(
         packed.ribbon = packed.ribbon(&look, &settings, view, counts);
         packed.key = key;
         let mut first = 0;
-        let ranges = packed.layout.iter().map(|(_, nodes)| {
-            first += nodes;
-            [first - nodes, *nodes]
+        let ranges = packed.layout.iter().map(|guide| {
+            first += guide.nodes;
+            [first - guide.nodes, guide.nodes]
         });
         let ranges: Vec<[u32; 2]> = ranges.collect();
         let mut add = |bytes: &[u8]| {
@@ -190,14 +192,12 @@ impl Packed {
             if strand.nodes() < 2 {
                 continue;
             }
-            let entry = (guide, strand.nodes() as u32);
-            match self.layout.get_mut(count) {
-                Some(known) if *known == entry => {}
-                Some(known) => {
-                    *known = entry;
-                    changed = true;
-                }
-                None => {
+            let nodes = strand.nodes() as u32;
+            match self.layout.get(count) {
+                Some(known) if known.strand == guide && known.nodes == nodes => {}
+                _ => {
+                    let entry = Guide { strand: guide, nodes, root: Vec3::ZERO };
+                    self.layout.truncate(count);
                     self.layout.push(entry);
                     changed = true;
                 }
@@ -210,7 +210,41 @@ impl Packed {
         let grown = |f: &HairFollowers| HairFollowers { clump: 0.0, parting: 0.0, ..*f };
         changed |= self.followers.as_ref().map(grown) != Some(grown(followers));
         self.followers = Some(*followers);
-        changed
+        changed | core::mem::take(&mut self.roots_moved)
+    }
+
+    /// Packs the nodes of all guides; `known` says that those of the frame before are there. Gives
+    /// the box around them.
+    fn pack_nodes(
+        &mut self,
+        strands: &Query<GuideParts>,
+        overstep: f32,
+        known: bool,
+    ) -> Option<(Vec3, Vec3)> {
+        let count = self.layout.iter().map(|guide| guide.nodes as usize).sum();
+        self.nodes.resize(count, default());
+        let mut rest = &mut self.nodes[..];
+        let mut bounds: Option<(Vec3, Vec3)> = None;
+        let (mut still, mut elsewhere) = (true, false);
+        for guide in &self.layout {
+            let (own, others) = rest.split_at_mut(guide.nodes as usize);
+            rest = others;
+            let Ok((strand, history, bonds, wet)) = strands.get(guide.strand) else {
+                continue;
+            };
+            let root_before = packed_place(&own[0]);
+            let around = pack_guide(own, known, strand, history, bonds, wet, overstep);
+            let root = packed_place(&own[0]);
+            still &= root.distance_squared(root_before) < 1e-12;
+            elsewhere |= root.distance(guide.root) > 0.25 * self.spacing;
+            bounds = match (bounds, around) {
+                (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
+                (a, b) => a.or(b),
+            };
+        }
+        // Followers go with their roots; who their neighbours are is decided anew once those rest.
+        self.roots_moved = known && still && elsewhere;
+        bounds
     }
 
     /// Decides which strands are drawn.
@@ -220,8 +254,8 @@ impl Packed {
         followers: &HairFollowers,
     ) -> Vec<DrawnStrand> {
         let roots: Vec<GuideRoot> = (self.layout.iter())
-            .map(|(guide, _)| {
-                let Ok((strand, ..)) = strands.get(*guide) else {
+            .map(|guide| {
+                let Ok((strand, ..)) = strands.get(guide.strand) else {
                     return GuideRoot::default();
                 };
                 GuideRoot {
@@ -233,6 +267,7 @@ impl Packed {
             .collect();
         let usable = || roots.iter().map(|r| r.place).filter(|p| p.is_finite());
         self.centre = usable().sum::<Vec3>() / usable().count().max(1) as f32;
+        self.note_roots();
         let drawn = scatter(&roots, followers);
         let reach = |strand: &DrawnStrand| {
             let own = roots[strand.guides[0] as usize].place;
@@ -242,6 +277,21 @@ impl Packed {
         };
         self.margin = drawn.iter().map(reach).fold(0.005, f32::max);
         drawn
+    }
+
+    /// Notes where roots are, now that followers are laid.
+    fn note_roots(&mut self) {
+        let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
+        let mut first = 0;
+        for guide in &mut self.layout {
+            guide.root = packed_place(&self.nodes[first]);
+            first += guide.nodes as usize;
+            (low, high) = (low.min(guide.root), high.max(guide.root));
+        }
+        // About so far are guides apart if they cover the box's largest side. A guide alone, or all
+        // in one place, has no neighbours to choose.
+        let spacing = (high - low).length() / (self.layout.len() as f32).sqrt();
+        self.spacing = if spacing > 1e-6 { spacing } else { f32::MAX };
     }
 
     fn ribbon(

@@ -35,6 +35,9 @@ pub struct HairFollowers {
     pub stray: f32,
     /// How much tips draw together around their guide, a share. Default 0.25, safe 0…1.
     pub clump: f32,
+    /// How far water draws the strands of a lock to their guide where it soaks them, a share of the
+    /// way. Default 0.75, safe 0…0.95.
+    pub wet_clump: f32,
     /// How many times farther apart than at the scalp guides may be before they stop blending.
     /// Guides that go ways more than 60° to 90° apart, as at a parting, stop in any case. Default 4,
     /// safe 1.5…100.
@@ -53,6 +56,7 @@ impl Default for HairFollowers {
             phase_variation: 0.03,
             stray: 0.03,
             clump: 0.25,
+            wet_clump: 0.75,
             parting: 4.0,
             lock_radius: 6e-3,
         }
@@ -91,6 +95,7 @@ impl HairSetting for HairFollowers {
             phase_variation: SHARE.mend(self.phase_variation, d.phase_variation, notes).min(0.5),
             stray: SHARE.mend(self.stray, d.stray, notes),
             clump: SHARE.mend(self.clump, d.clump, notes),
+            wet_clump: SHARE.mend(self.wet_clump, d.wet_clump, notes),
             parting: PARTING.mend(self.parting, d.parting, notes),
             lock_radius: RADIUS.mend(self.lock_radius, d.lock_radius, notes),
         }

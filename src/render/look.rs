@@ -174,7 +174,8 @@ impl HairLook {
 }
 
 /// How wet each node of a strand looks, root first: 0 dry, 1 soaked. Component of a strand, written
-/// by whoever computes water; absent or too short means dry. Wet hair is drawn darker and glossier.
+/// by whoever computes water; absent or too short means dry. Wet hair is drawn darker, glossier and
+/// in tighter locks ([`HairFollowers::wet_clump`](super::HairFollowers::wet_clump)).
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct WetLook(pub Vec<f32>);

@@ -71,6 +71,7 @@ pub(super) struct Ribbon {
     self_shadow: f32,
     clump: f32,
     parting: f32,
+    wet_clump: f32,
     segments: u32,
     guides: u32,
     strands: u32,
@@ -101,6 +102,7 @@ impl Ribbon {
             self_shadow: look.self_shadow,
             clump: followers.clump,
             parting: followers.parting,
+            wet_clump: followers.wet_clump,
             segments: followers.segments,
             guides,
             strands,
@@ -132,11 +134,6 @@ impl Material for RibbonMaterial {
 
     fn opaque_render_method(&self) -> OpaqueRendererMethod {
         OpaqueRendererMethod::Forward
-    }
-
-    // Ribbons of the prepass would have to be those of the forward pass to the last bit.
-    fn enable_prepass() -> bool {
-        false
     }
 
     fn specialize(

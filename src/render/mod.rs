@@ -6,6 +6,8 @@
 //! that face the camera. Places stay in the hair's frame up to there, so roots never lag behind the
 //! head.
 //!
+//! Water is drawn as beads: see [`HairBeads`].
+//!
 //! How it looks is edited at run time through components of the hair: [`HairLook`],
 //! [`HairFollowers`], [`HairView`]. For a look of your own write a material around [`HairBuffers`].
 //!
@@ -15,6 +17,7 @@
 
 pub mod curve;
 
+mod beads;
 mod buffers;
 mod draw;
 mod followers;
@@ -23,6 +26,7 @@ mod material;
 mod upload;
 mod view;
 
+pub use beads::{Bead, HairBeads};
 pub use buffers::HairBuffers;
 pub use followers::{DrawnStrand, HairFollowers};
 pub use look::{HairLook, HairShading, Melanin, WetLook};
@@ -35,7 +39,10 @@ use bevy::{
     camera::visibility::VisibilitySystems,
     ecs::schedule::{InternedScheduleLabel, ScheduleLabel},
     prelude::*,
-    render::{erased_render_asset::ErasedRenderAssetPlugin, storage::ShaderBuffer},
+    render::{
+        RenderApp, erased_render_asset::ErasedRenderAssetPlugin, render_resource::DownlevelFlags,
+        renderer::RenderAdapter, storage::ShaderBuffer,
+    },
     shader::load_shader_library,
 };
 use draw::Interpolate;
@@ -71,8 +78,8 @@ impl HairRenderPlugin {
     }
 }
 
-/// The systems that draw, in `PostUpdate` after transforms have been propagated and before
-/// visibility is.
+/// The systems that draw: in `PostUpdate` after transforms have been propagated and before visibility
+/// is, and in the render world's `ExtractSchedule` the one write to the GPU.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairRenderSystems;
 
@@ -82,6 +89,8 @@ impl Plugin for HairRenderPlugin {
         setting::plugin::<HairFollowers>(app);
         setting::plugin::<HairView>(app);
         app.insert_resource(Interpolate(self.interpolate))
+            .init_resource::<HairBeads>()
+            .register_type::<HairBeads>()
             .register_type::<HairBuffers>()
             .register_type::<WetLook>();
         // The drawn child inherits it. An error says that the user has required it already.
@@ -99,6 +108,9 @@ impl Plugin for HairRenderPlugin {
         if !can_draw {
             return;
         }
+        if app.get_sub_app(RenderApp).is_none() {
+            tracing::warn!("hair is simulated but not drawn: the app has no graphics device");
+        }
         load_shader_library!(app, "strands.wgsl");
         load_shader_library!(app, "ribbon.wgsl");
         load_shader_library!(app, "shading.wgsl");
@@ -107,14 +119,34 @@ impl Plugin for HairRenderPlugin {
         app.add_plugins(MaterialPlugin::<RibbonMaterial>::default());
         // Bevy finishes only the plugins that were there when it began to finish.
         ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial>>::default().finish(app);
-        app.add_systems(PostUpdate, (draw::appear, draw::pack).chain().in_set(HairRenderSystems))
-            .configure_sets(
-                PostUpdate,
-                HairRenderSystems
-                    .after(TransformSystems::Propagate)
-                    .before(VisibilitySystems::VisibilityPropagate)
-                    .before(AssetEventSystems),
-            );
+        let draw = (draw::appear, draw::pack).chain().run_if(supported);
+        app.add_systems(PostUpdate, draw.in_set(HairRenderSystems)).configure_sets(
+            PostUpdate,
+            HairRenderSystems
+                .after(TransformSystems::Propagate)
+                .before(VisibilitySystems::VisibilityPropagate)
+                .before(AssetEventSystems),
+        );
         upload::plugin(app);
+        beads::finish(app);
     }
+}
+
+/// Whether the graphics device can draw hair; tells once if not. Asked only while running, because
+/// the device may come with a plugin that is finished later.
+fn supported(adapter: Option<Res<RenderAdapter>>, mut known: Local<Option<bool>>) -> bool {
+    let Some(adapter) = adapter else {
+        return true;
+    };
+    *known.get_or_insert_with(|| {
+        let flags = adapter.get_downlevel_capabilities().flags;
+        let supported = flags.contains(DownlevelFlags::VERTEX_STORAGE);
+        if !supported {
+            tracing::warn!(
+                "hair is not drawn: the graphics device gives vertex shaders no storage buffers; \
+                 use Vulkan, Metal, Direct3D 12 or WebGPU"
+            );
+        }
+        supported
+    })
 }

@@ -1,9 +1,13 @@
-// Camera-facing ribbons by vertex pulling: what the forward and the shadow pass share.
+// Camera-facing ribbons by vertex pulling: what all passes share. Depth of the prepass and of the
+// forward pass must be equal to the last bit, so both do exactly this and mark positions invariant.
 #define_import_path bevy_keratin::ribbon
 
 #import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_keratin::strands::{ribbon, strands, strand_point, strand_state, hash, StrandState, DrawnStrand}
+#ifdef MOTION_VECTOR_PREPASS
+#import bevy_keratin::strands::past_strand_position
+#endif
 
 const VIEW_GUIDES: u32 = 6u;
 // The least drawn width. Samples within a pixel find what is thinner than a pixel.
@@ -15,6 +19,8 @@ const LEAST_PIXELS: f32 = 1.0;
 
 struct RibbonVertex {
     world_position: vec3<f32>,
+    // The point of the strand beside which this is.
+    center: vec3<f32>,
     tangent: vec3<f32>,
     // Away from the head, across the strand: stands for the surface that many strands make up.
     outward: vec3<f32>,
@@ -66,6 +72,7 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     let linear = mat3x3(world[0].xyz, world[1].xyz, world[2].xyz);
     let scale = pow(abs(determinant(linear)), 1.0 / 3.0);
     let center = (world * vec4(point.position, 1.0)).xyz;
+    out.center = center;
     out.tangent = safe_normalize(linear * point.slope, vec3(0.0, 1.0, 0.0));
     let from_centre = center - (world * vec4(ribbon.centre, 1.0)).xyz;
     let eye = toward_eye(center);
@@ -81,3 +88,13 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     out.world_position = center + across * (side * drawn);
     return out;
 }
+
+#ifdef MOTION_VECTOR_PREPASS
+// Where a vertex was in the frame before. The side it faced then is taken for that it faces now.
+fn place_before(vertex: RibbonVertex, corner: u32, instance: u32) -> vec3<f32> {
+    let strand = strands[corner / (2u * (ribbon.segments + 1u))];
+    let point = past_strand_position(strand, vertex.along);
+    let world = mesh_functions::get_previous_world_from_local(instance);
+    return (world * vec4(point, 1.0)).xyz + vertex.world_position - vertex.center;
+}
+#endif

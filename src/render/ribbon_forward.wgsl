@@ -12,7 +12,7 @@
 const STRAIN_FULL: f32 = 0.05;
 
 struct ForwardVertex {
-    @builtin(position) position: vec4<f32>,
+    @invariant @builtin(position) position: vec4<f32>,
     @location(0) world_position: vec3<f32>,
     @location(1) tangent: vec3<f32>,
     @location(2) outward: vec3<f32>,

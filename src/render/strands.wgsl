@@ -6,10 +6,14 @@
 struct HairNode {
     position: vec3<f32>,   // in the hair's frame (m)
     rates: u32,            // hydrogen, ionic, disulfide, peptide as unorm8, lowest byte first
-    strain: f32,           // mean |length / rest - 1| of the edges that meet here
-    moisture: f32,         // 0 dry ... 1 soaked
+    // As f16, low bits first: mean |length / rest - 1| of the edges that meet here, and 0 dry ... 1
+    // soaked.
+    strain_moisture: u32,
     rest: f32,             // length along the strand from the root at rest (m)
-    shown: f32,            // 1, or 0 where the guide has no usable node in this frame
+    // As f16: motion since the frame before (m / 1024), and 1, or 0 where the guide has no usable
+    // node in this frame.
+    motion_xy: u32,
+    motion_z_shown: u32,
 }
 
 struct DrawnStrand {
@@ -37,6 +41,7 @@ struct Ribbon {
     self_shadow: f32,
     clump: f32,
     parting: f32,
+    wet_clump: f32,
     segments: u32,
     guides: u32,
     strands: u32,
@@ -48,6 +53,29 @@ struct Ribbon {
 // First node and number of nodes of each guide.
 @group(#{MATERIAL_BIND_GROUP}) @binding(2) var<storage, read> guides: array<vec2<u32>>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(3) var<storage, read> strands: array<DrawnStrand>;
+
+#ifdef MOTION_VECTOR_PREPASS
+// 1 computes points as they were in the frame before, 0 as they are.
+var<private> past: f32 = 0.0;
+#endif
+
+fn node_place(index: u32) -> vec3<f32> {
+#ifdef MOTION_VECTOR_PREPASS
+    let n = nodes[index];
+    let motion = vec3(unpack2x16float(n.motion_xy), unpack2x16float(n.motion_z_shown).x);
+    return n.position - motion * (past / 1024.0);
+#else
+    return nodes[index].position;
+#endif
+}
+
+fn node_shown(index: u32) -> f32 {
+    return unpack2x16float(nodes[index].motion_z_shown).y;
+}
+
+fn node_moisture(index: u32) -> f32 {
+    return unpack2x16float(nodes[index].strain_moisture).y;
+}
 
 struct CurvePoint {
     position: vec3<f32>,
@@ -66,15 +94,15 @@ fn guide_point(guide: vec2<u32>, share: f32) -> CurvePoint {
     let at = node_below(guide, share);
     let i = u32(at.x);
     let f = at.y;
-    let p1 = nodes[guide.x + i].position;
-    let p2 = nodes[guide.x + i + 1u].position;
+    let p1 = node_place(guide.x + i);
+    let p2 = node_place(guide.x + i + 1u);
     var p0 = 2.0 * p1 - p2;
     if i > 0u {
-        p0 = nodes[guide.x + i - 1u].position;
+        p0 = node_place(guide.x + i - 1u);
     }
     var p3 = 2.0 * p2 - p1;
     if i + 2u < guide.y {
-        p3 = nodes[guide.x + i + 2u].position;
+        p3 = node_place(guide.x + i + 2u);
     }
     let a = 0.5 * (p2 - p0);
     let b = p0 - 2.5 * p1 + 2.0 * p2 - 0.5 * p3;
@@ -99,10 +127,10 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     let reach = strand.length - strand.phase;
     out.share = strand.phase + t * reach;
     let near = guides[strand.guides.x];
-    let near_root = nodes[near.x].position;
+    let near_root = node_place(near.x);
     let near_point = guide_point(near, out.share);
 
-    var weights = vec3(strand.weights.x * nodes[near.x].shown, 0.0, 0.0);
+    var weights = vec3(strand.weights.x * node_shown(near.x), 0.0, 0.0);
     var root = strand.root + strand.weights.x * near_root;
     let near_way = near_point.position - guide_point(near, strand.phase).position;
     var way = weights.x * near_way;
@@ -112,7 +140,7 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
             continue;
         }
         let guide = guides[strand.guides[i]];
-        let guide_root = nodes[guide.x].position;
+        let guide_root = node_place(guide.x);
         let point = guide_point(guide, out.share);
         root += strand.weights[i] * guide_root;
         let guide_way = point.position - guide_point(guide, strand.phase).position;
@@ -121,7 +149,7 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
             / max(distance(guide_root, near_root), 1e-4);
         let together = dot(guide_way, near_way)
             / max(length(guide_way) * length(near_way), 1e-12);
-        let weight = strand.weights[i] * nodes[guide.x].shown
+        let weight = strand.weights[i] * node_shown(guide.x)
             * (1.0 - smoothstep(ribbon.parting, 1.5 * ribbon.parting, apart))
             * select(smoothstep(0.0, 0.6, together), 1.0, out.share <= strand.phase);
         weights[i] = weight;
@@ -135,10 +163,31 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     out.weights = weights / sum;
     // Toward the tip locks draw together around their guide, and strays leave them.
     let gather = (near_root - root) * ribbon.clump * (1.0 - strand.guide);
-    out.position = root + way / sum + gather * t + strand.stray * t * t;
-    out.slope = slope * reach / sum + gather + 2.0 * t * strand.stray;
+    let loose = root + way / sum + gather * t + strand.stray * t * t;
+    let loose_slope = slope * reach / sum + gather + 2.0 * t * strand.stray;
+    // Water draws a lock together around its guide, from the root on.
+    let at = node_below(near, out.share);
+    let low = node_moisture(near.x + u32(at.x));
+    let rise = node_moisture(near.x + u32(at.x) + 1u) - low;
+    let most = ribbon.wet_clump * (1.0 - strand.guide) * node_shown(near.x);
+    let moisture = low + rise * at.y;
+    let tight = most * moisture * t * (2.0 - t);
+    let tighter = most * (rise * f32(near.y - 1u) * reach * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
+    let inward = near_point.position - loose;
+    out.position = loose + inward * tight;
+    out.slope = mix(loose_slope, near_point.slope * reach, tight) + inward * tighter;
     return out;
 }
+
+#ifdef MOTION_VECTOR_PREPASS
+// Where the point was in the frame before, in the hair's frame.
+fn past_strand_position(strand: DrawnStrand, t: f32) -> vec3<f32> {
+    past = 1.0;
+    let point = strand_point(strand, t);
+    past = 0.0;
+    return point.position;
+}
+#endif
 
 struct StrandState {
     rates: vec4<f32>,
@@ -159,8 +208,9 @@ fn strand_state(strand: DrawnStrand, point: StrandPoint) -> StrandState {
         let n = nodes[guide.x + u32(at.x)];
         let m = nodes[guide.x + u32(at.x) + 1u];
         state.rates += weight * mix(unpack4x8unorm(n.rates), unpack4x8unorm(m.rates), at.y);
-        state.strain += weight * mix(n.strain, m.strain, at.y);
-        state.moisture += weight * mix(n.moisture, m.moisture, at.y);
+        let own = mix(unpack2x16float(n.strain_moisture), unpack2x16float(m.strain_moisture), at.y);
+        state.strain += weight * own.x;
+        state.moisture += weight * own.y;
     }
     return state;
 }

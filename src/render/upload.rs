@@ -1,6 +1,6 @@
 //! The one write a frame: packed nodes into the GPU buffer that is there already.
 
-use super::{buffers::HairBuffers, draw::Packed};
+use super::{HairRenderSystems, buffers::HairBuffers, draw::Packed};
 use bevy::{
     prelude::*,
     render::{
@@ -11,7 +11,7 @@ use bevy::{
 
 pub(super) fn plugin(app: &mut App) {
     if let Some(render) = app.get_sub_app_mut(RenderApp) {
-        render.add_systems(ExtractSchedule, upload);
+        render.add_systems(ExtractSchedule, upload.in_set(HairRenderSystems));
     }
 }
 

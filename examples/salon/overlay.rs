@@ -1,0 +1,88 @@
+//! What is invisible, as lines: colliders, the wind of blowers, rods.
+//!
+//! Here and not in the crate, because Bevy's gizmos are a feature that a game need not have. Switched
+//! and styled by the config of [`HairGizmos`], as all gizmos are.
+
+use bevy::prelude::*;
+use bevy_keratin::{ColliderShape, prelude::*};
+use core::f32::consts::{FRAC_PI_2, TAU};
+
+/// The lines of the overlay. Off until switched on in the `GizmoConfigStore`.
+#[derive(Default, Reflect, GizmoConfigGroup)]
+pub struct HairGizmos;
+
+pub struct OverlayPlugin;
+
+impl Plugin for OverlayPlugin {
+    fn build(&self, app: &mut App) {
+        let config = GizmoConfig { enabled: false, depth_bias: -0.2, ..default() };
+        let shown = |store: Res<GizmoConfigStore>| store.config::<HairGizmos>().0.enabled;
+        // Water's droplets and shower belong here too.
+        app.insert_gizmo_config(HairGizmos, config)
+            .add_systems(PostUpdate, (colliders, blowers, rods).run_if(shown));
+    }
+}
+
+const SOLID: Color = Color::srgb(0.35, 0.85, 0.45);
+const WIND: Color = Color::srgb(0.4, 0.75, 1.0);
+const ROD: Color = Color::srgb(0.85, 0.5, 0.95);
+
+/// How far wind is drawn (m), and into which angle (rad).
+const REACH: f32 = 0.35;
+const SPREAD: f32 = 0.16;
+
+fn colliders(mut gizmos: Gizmos<HairGizmos>, colliders: Query<(&HairCollider, &GlobalTransform)>) {
+    for (collider, place) in &colliders {
+        let (scale, rotation, translation) = place.to_scale_rotation_translation();
+        let at = Isometry3d::new(translation, rotation);
+        let scale = scale.x;
+        match collider.shape {
+            ColliderShape::Sphere(ball) => _ = gizmos.sphere(at, ball.radius * scale, SOLID),
+            ColliderShape::Capsule(mut capsule) => {
+                capsule.radius *= scale;
+                capsule.half_length *= scale;
+                gizmos.primitive_3d(&capsule, at, SOLID);
+            }
+            ColliderShape::Cylinder(mut cylinder) => {
+                cylinder.radius *= scale;
+                cylinder.half_height *= scale;
+                gizmos.primitive_3d(&cylinder, at, SOLID);
+            }
+            ColliderShape::Plane(plane) => {
+                // The grid lies in its own x and y.
+                let turn = rotation * Quat::from_rotation_arc(Vec3::Z, *plane.normal);
+                let at = Isometry3d::new(translation, turn);
+                gizmos.grid(at, UVec2::splat(12), Vec2::splat(0.06), SOLID.with_alpha(0.4));
+            }
+        }
+    }
+}
+
+fn blowers(mut gizmos: Gizmos<HairGizmos>, blowers: Query<(&Blower, &GlobalTransform)>) {
+    for (blower, place) in &blowers {
+        let mouth = place.translation();
+        let ahead = *place.forward();
+        // A cone as wide as half of the wind is, and an arrow as long as it is strong.
+        let ring = REACH * SPREAD.tan();
+        let end = mouth + ahead * REACH;
+        let turn = Quat::from_rotation_arc(Vec3::Z, ahead);
+        gizmos.circle(Isometry3d::new(end, turn), ring, WIND);
+        for k in 0..8 {
+            let (sin, cos) = (TAU * k as f32 / 8.0).sin_cos();
+            gizmos.line(mouth, end + turn * Vec3::new(cos, sin, 0.0) * ring, WIND.with_alpha(0.5));
+        }
+        let length = REACH * (blower.strength / 10.0).clamp(0.05, 1.0);
+        gizmos.arrow(mouth, mouth + ahead * length, WIND);
+    }
+}
+
+fn rods(mut gizmos: Gizmos<HairGizmos>, rods: Query<(&PermRod, &GlobalTransform)>) {
+    for (rod, place) in &rods {
+        let (_, rotation, translation) = place.to_scale_rotation_translation();
+        let at = Isometry3d::new(translation, rotation);
+        gizmos.primitive_3d(&Cylinder::new(rod.radius, rod.length), at, ROD);
+        // Which way hair is wound.
+        let turn = rotation * Quat::from_rotation_x(-FRAC_PI_2);
+        gizmos.arc_3d(4.0, rod.radius * 1.15, Isometry3d::new(translation, turn), ROD);
+    }
+}

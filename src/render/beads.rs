@@ -1,0 +1,229 @@
+//! Water as beads: small clear drops, all of them one draw call.
+//!
+//! Whoever simulates water fills [`HairBeads`] once a frame, or leaves it alone; what is in it is
+//! drawn, stretched along the way it flies. Each bead is a square that faces the eye, on which a
+//! sphere is shaded; the squares are counted by a mesh and pulled from one buffer, as ribbons are.
+
+use super::{HairRenderSystems, supported};
+use bevy::{
+    asset::{RenderAssetUsages, embedded_asset},
+    camera::{primitives::Aabb, visibility::NoAutoAabb},
+    light::NotShadowCaster,
+    mesh::{
+        Indices, MeshVertexAttribute, MeshVertexBufferLayoutRef, PrimitiveTopology,
+        VertexAttributeValues, VertexFormat,
+    },
+    pbr::{MaterialPipeline, MaterialPipelineKey},
+    prelude::*,
+    render::{
+        Extract, ExtractSchedule, RenderApp,
+        erased_render_asset::ErasedRenderAssetPlugin,
+        render_asset::RenderAssets,
+        render_resource::{AsBindGroup, RenderPipelineDescriptor, SpecializedMeshPipelineError},
+        renderer::RenderQueue,
+        storage::{GpuShaderBuffer, ShaderBuffer},
+    },
+    shader::ShaderRef,
+};
+use core::f32::consts::PI;
+
+/// A drop of water as it is drawn.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct Bead {
+    /// Its middle, in the world (m).
+    pub position: Vec3,
+    /// Radius at rest (m). A drop of 1 mm³ has 0.62 mm; nothing is drawn at 0.
+    pub radius: f32,
+    /// Velocity (m/s): fast beads are drawn long and slim.
+    pub velocity: Vec3,
+}
+
+impl Bead {
+    /// A bead of `volume` (m³).
+    ///
+    /// ```
+    /// # use bevy_keratin::render::Bead; use bevy::prelude::*;
+    /// let drop = Bead::of_volume(Vec3::ZERO, 1e-9, Vec3::ZERO);
+    /// assert!((drop.radius - 0.62e-3).abs() < 1e-5);
+    /// ```
+    pub fn of_volume(position: Vec3, volume: f32, velocity: Vec3) -> Self {
+        Self { position, radius: (volume.max(0.0) * (0.75 / PI)).cbrt(), velocity }
+    }
+
+    /// As the shader reads it: 32 bytes. Beads that are not finite are none.
+    fn packed(&self) -> PackedBead {
+        let [x, y, z] = self.position.to_array();
+        let [u, v, w] = self.velocity.to_array();
+        let packed = [x, y, z, self.radius, u, v, w, 0.0];
+        match packed.iter().all(|x| x.is_finite()) {
+            true => packed,
+            false => [0.0; 8],
+        }
+    }
+}
+
+/// The beads to draw in this frame, in any order. Fill it between the fixed ticks and
+/// [`HairRenderSystems`]; empty it when the water is gone.
+#[derive(Resource, Reflect, Clone, Debug, Default, Deref, DerefMut)]
+#[reflect(Resource, Default)]
+pub struct HairBeads(pub Vec<Bead>);
+
+type PackedBead = [f32; 8];
+
+/// The beads as they are drawn: a buffer with room for more, so that few frames allocate.
+#[derive(Resource, Default)]
+struct DrawnBeads {
+    packed: Vec<PackedBead>,
+    buffer: Handle<ShaderBuffer>,
+    entity: Option<Entity>,
+}
+
+const CORNER: MeshVertexAttribute =
+    MeshVertexAttribute::new("Bead_Corner", 0x6b65_7261_7469_6e02, VertexFormat::Uint32);
+const SHADER: &str = "embedded://bevy_keratin/render/beads.wgsl";
+const LEAST_ROOM: usize = 64;
+const MOST: usize = 1 << 20;
+
+#[derive(Asset, AsBindGroup, TypePath, Clone, Debug)]
+struct BeadMaterial {
+    #[storage(0, read_only)]
+    beads: Handle<ShaderBuffer>,
+}
+
+impl Material for BeadMaterial {
+    fn vertex_shader() -> ShaderRef {
+        SHADER.into()
+    }
+
+    fn fragment_shader() -> ShaderRef {
+        SHADER.into()
+    }
+
+    fn alpha_mode(&self) -> AlphaMode {
+        AlphaMode::Premultiplied
+    }
+
+    fn enable_prepass() -> bool {
+        false
+    }
+
+    fn enable_shadows() -> bool {
+        false
+    }
+
+    fn specialize(
+        _: &MaterialPipeline,
+        descriptor: &mut RenderPipelineDescriptor,
+        layout: &MeshVertexBufferLayoutRef,
+        _: MaterialPipelineKey<Self>,
+    ) -> Result<(), SpecializedMeshPipelineError> {
+        descriptor.vertex.buffers = vec![layout.0.get_layout(&[CORNER.at_shader_location(0)])?];
+        descriptor.primitive.cull_mode = None;
+        if let Some(fragment) = &mut descriptor.fragment {
+            // Light that falls through the drop glows on its far side.
+            fragment.shader_defs.push("STANDARD_MATERIAL_DIFFUSE_TRANSMISSION".into());
+        }
+        Ok(())
+    }
+}
+
+/// Called once all that there is of a renderer has been added.
+pub(super) fn finish(app: &mut App) {
+    embedded_asset!(app, "beads.wgsl");
+    app.add_plugins(MaterialPlugin::<BeadMaterial>::default());
+    ErasedRenderAssetPlugin::<MeshMaterial3d<BeadMaterial>>::default().finish(app);
+    app.init_resource::<DrawnBeads>()
+        .add_systems(PostUpdate, pack.in_set(HairRenderSystems).run_if(supported));
+    if let Some(render) = app.get_sub_app_mut(RenderApp) {
+        render.add_systems(ExtractSchedule, upload.in_set(HairRenderSystems));
+    }
+}
+
+fn pack(
+    mut commands: Commands,
+    beads: Res<HairBeads>,
+    mut drawn: ResMut<DrawnBeads>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<BeadMaterial>>,
+    mut buffers: ResMut<Assets<ShaderBuffer>>,
+    mut bounds: Query<&mut Aabb>,
+) {
+    let count = beads.len().min(MOST);
+    // The first bead brings the rest along.
+    if !beads.is_changed() || (count == 0 && drawn.entity.is_none()) {
+        return;
+    }
+    let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
+    let room = count.max(LEAST_ROOM).next_power_of_two().max(drawn.packed.len());
+    let grown = room != drawn.packed.len();
+    let packed = beads.iter().take(count).map(|bead| {
+        let packed = bead.packed();
+        let reach = 4.0 * packed[3];
+        if reach > 0.0 {
+            (low, high) = (low.min(bead.position - reach), high.max(bead.position + reach));
+        }
+        packed
+    });
+    drawn.packed.clear();
+    drawn.packed.extend(packed);
+    drawn.packed.resize(room, [0.0; 8]);
+    let around = if low.x <= high.x { Aabb::from_min_max(low, high) } else { Aabb::default() };
+    if !grown && let Some(Ok(mut bounds)) = drawn.entity.map(|entity| bounds.get_mut(entity)) {
+        bounds.set_if_neq(around);
+        return;
+    }
+    let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
+    drawn.buffer = buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::RENDER_WORLD));
+    let parts = (
+        Name::new("drawn beads"),
+        Mesh3d(meshes.add(quads(room as u32))),
+        MeshMaterial3d(materials.add(BeadMaterial { beads: drawn.buffer.clone() })),
+        around,
+        NoAutoAabb,
+        NotShadowCaster,
+    );
+    if let Some(old) = drawn.entity.take() {
+        commands.entity(old).try_despawn();
+    }
+    drawn.entity = Some(commands.spawn(parts).id());
+}
+
+/// A buffer made in this frame is not there yet and brings its beads along.
+fn upload(
+    drawn: Extract<Option<Res<DrawnBeads>>>,
+    buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
+    queue: Option<Res<RenderQueue>>,
+) {
+    let (Some(drawn), Some(buffers), Some(queue)) = (drawn.as_ref(), buffers, queue) else {
+        return;
+    };
+    let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
+    if let Some(gpu) = buffers.get(&drawn.buffer)
+        && gpu.buffer.size() == bytes.len() as u64
+    {
+        queue.write_buffer(&gpu.buffer, 0, bytes);
+    }
+}
+
+/// A mesh of nothing but counted corners: four for each bead.
+fn quads(count: u32) -> Mesh {
+    let indices = (0..count).flat_map(|i| [0, 1, 2, 2, 1, 3].map(|corner| 4 * i + corner));
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        .with_inserted_attribute(CORNER, VertexAttributeValues::Uint32((0..4 * count).collect()))
+        .with_inserted_indices(Indices::U32(indices.collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bead_holds_its_volume_and_a_broken_one_is_none() {
+        let bead = Bead::of_volume(Vec3::X, 4.0 / 3.0 * PI * 8e-9, Vec3::Y);
+        assert!((bead.radius - 2e-3).abs() < 1e-8);
+        assert_eq!(Bead::of_volume(Vec3::X, -1.0, Vec3::Y).radius, 0.0);
+        assert_eq!(Bead { velocity: Vec3::NAN, ..bead }.packed(), [0.0; 8]);
+        assert_eq!(bead.packed()[..3], [1.0, 0.0, 0.0]);
+    }
+}
