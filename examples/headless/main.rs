@@ -16,7 +16,7 @@ use bevy_keratin::prelude::*;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use report::Report;
-use scenes::{Director, DropletCount, Scene, SceneKind, ScenePlugin, measure};
+use scenes::{Director, Scene, SceneKind, ScenePlugin, Strewn, measure};
 use std::{
     io::Write,
     path::PathBuf,
@@ -38,7 +38,7 @@ struct Arguments {
     #[arg(long)]
     seconds: Option<f32>,
     /// How many droplets the scene `wet` strews.
-    #[arg(long, default_value_t = DropletCount::default().0)]
+    #[arg(long, default_value_t = Strewn::default().count)]
     droplets: usize,
     /// One JSON object instead of a table.
     #[arg(long)]
@@ -71,7 +71,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if let Some(file) = &mut csv {
         writeln!(file, "seconds,kept,b_hydrogen_mean,strain_peak,tip_x,tip_y,tip_z")?;
     }
-    let mut app = headless_app(scene, arguments.threads, DropletCount(arguments.droplets));
+    let mut app =
+        headless_app(scene, arguments.threads, Strewn { count: arguments.droplets, ..default() });
     let frames = (seconds * 60.0).round() as u64;
     let bar = ProgressBar::new(frames)
         .with_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} frames, {eta} left")?);
@@ -103,7 +104,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Exactly one tick an update, on as many threads as asked for.
-fn headless_app(scene: Scene, threads: Option<u16>, droplets: DropletCount) -> App {
+fn headless_app(scene: Scene, threads: Option<u16>, droplets: Strewn) -> App {
     // The thread that runs the app solves strands too, next to those of the pool.
     let mut pools = TaskPoolOptions::default();
     if let Some(threads) = threads {

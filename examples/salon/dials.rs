@@ -3,6 +3,7 @@
 use crate::{
     overlay::HairGizmos,
     plots::{Measured, colour, name},
+    scenes::Strewn,
     tools::{self, Tools},
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
@@ -28,6 +29,8 @@ pub struct Settings<'w, 's> {
     look: ResMut<'w, HairDefault<HairLook>>,
     followers: ResMut<'w, HairDefault<HairFollowers>>,
     tools: ResMut<'w, Tools>,
+    wetting: ResMut<'w, HairDefault<Wetting>>,
+    water: Water<'w, 's>,
     gizmos: ResMut<'w, GizmoConfigStore>,
     lights: Query<'w, 's, &'static mut SpotLight>,
     blowers: Query<'w, 's, (Entity, &'static Blower, &'static Transform)>,
@@ -35,6 +38,17 @@ pub struct Settings<'w, 's> {
     strands: Query<'w, 's, &'static Strand>,
     treat: MessageWriter<'w, Treat>,
     commands: Commands<'w, 's>,
+}
+
+/// What of the world's water sliders change and show.
+#[derive(SystemParam)]
+pub struct Water<'w, 's> {
+    climate: ResMut<'w, Climate>,
+    process: ResMut<'w, ProcessTime>,
+    strewn: ResMut<'w, Strewn>,
+    ledger: Res<'w, WaterLedger>,
+    droplets: Query<'w, 's, (), With<Droplet>>,
+    soak: MessageWriter<'w, Soak>,
 }
 
 /// How the next treatment is given.
@@ -94,6 +108,9 @@ impl Settings<'_, '_> {
         *self.solver = default();
         *self.gravity = default();
         *self.substeps = default();
+        *self.wetting = default();
+        *self.water.climate = default();
+        *self.water.process = default();
         *self.tools = default();
     }
 
@@ -178,6 +195,45 @@ impl Settings<'_, '_> {
         edited!(self.drag, |d: &mut AirDrag| {
             slide(ui, &mut d.rate, 0.0..=20.0, "drag (1/s)");
         });
+    }
+
+    /// Droplets, how hair takes water up, and the air that takes it away.
+    pub fn water(&mut self, ui: &mut Ui) {
+        let Water { climate, process, strewn, ledger, droplets, soak } = &mut self.water;
+        if let Ok((hair, _)) = self.hairs.single() {
+            ui.horizontal(|ui| {
+                for (label, wetness) in [("Soak through", 1.0), ("Towel", 0.3), ("Dry", 0.0)] {
+                    if ui.button(label).clicked() {
+                        soak.write(Soak { target: hair, wetness });
+                    }
+                }
+            });
+        }
+        ui.small(format!(
+            "{} droplets; {:.1} ml of {:.1} ml are left",
+            droplets.iter().len(),
+            ledger.held * 1e6,
+            ledger.water_in * 1e6
+        ));
+        let mut wanted = **strewn;
+        ui.add(Slider::new(&mut wanted.count, 0..=1000).text("droplets"));
+        slide_mm(ui, &mut wanted.radius, 1.0..=4.0, "their radius (mm)");
+        strewn.set_if_neq(wanted);
+        edited!(self.wetting, |w: &mut Wetting| {
+            slide(ui, &mut w.adhesion, 0.0..=100.0, "adhesion (m/s²)");
+            slide(ui, &mut w.uptake, 0.0..=50.0, "uptake (1/s)");
+            slide(ui, &mut w.evaporation, 0.0..=4.0, "evaporation");
+            slide(ui, &mut w.sliding, 0.0..=0.05, "sliding (s)");
+        });
+        let mut air = **climate;
+        slide(ui, &mut air.celsius, 0.0..=45.0, "air (°C)");
+        slide(ui, &mut air.humidity, 0.0..=1.0, "humidity");
+        climate.set_if_neq(air);
+        let mut faster = process.0;
+        let slider = Slider::new(&mut faster, 1.0..=1000.0).logarithmic(true);
+        if ui.add(slider.text("times as fast as life").max_decimals(0)).changed() {
+            process.0 = faster;
+        }
     }
 
     pub fn solver(&mut self, ui: &mut Ui) {

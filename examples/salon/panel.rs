@@ -55,6 +55,7 @@ fn show(
             section(ui, "Colours", true, |ui| settings.view(ui, kind));
             section(ui, "Hair", false, |ui| settings.hair(ui));
             section(ui, "Air", false, |ui| settings.air(ui));
+            section(ui, "Water", false, |ui| settings.water(ui));
             section(ui, "Blower and rod", false, |ui| settings.tools(ui));
             section(ui, "Solver", false, |ui| settings.solver(ui));
             section(ui, "Looks", false, |ui| settings.look(ui));

@@ -122,6 +122,8 @@ pub fn embody(
             Model::Head(_) => head(&mut commands, &mut paint, &studio, entity, scene.kind),
             Model::Rod(radius, length) => rod(&mut commands, &mut paint, entity, radius, length),
             Model::Blower => blower(&mut commands, &mut paint, entity),
+            Model::Shower => shower(&mut commands, &mut paint, &studio, entity),
+            Model::Bust(radius) => bust(&mut commands, &studio, entity, radius),
         }
     }
 }
@@ -153,6 +155,43 @@ fn head(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity,
             let place = Transform::from_xyz(0.0, 0.005 - HEAD_RADIUS, 0.0);
             head.spawn(part(bar, dark, place));
         }
+    });
+}
+
+/// The training head upright, its skull fitted to the ball that the hair feels.
+fn bust(commands: &mut Commands, studio: &Studio, on: Entity, radius: f32) {
+    // It is made lying: the crown at +X, the face at +Y.
+    let upright = Quat::from_rotation_y(FRAC_PI_2) * Quat::from_rotation_z(FRAC_PI_2);
+    let fitted = Vec3::new(0.118, 0.095, 0.077).recip() * radius;
+    commands.entity(on).with_children(|head| {
+        let place = Transform::from_rotation(upright).with_scale(fitted);
+        head.spawn(part(studio.head.clone(), studio.skin.clone(), place));
+    });
+}
+
+/// A hand shower: its plate at the origin looks along −Z.
+fn shower(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity) {
+    let back = Transform::from_rotation(Quat::from_rotation_x(FRAC_PI_2));
+    let bell = [
+        Vec2::new(0.0, 0.0),
+        Vec2::new(0.041, 0.0),
+        Vec2::new(0.044, 0.003),
+        Vec2::new(0.043, 0.008),
+        Vec2::new(0.030, 0.018),
+        Vec2::new(0.014, 0.026),
+        Vec2::new(0.0, 0.027),
+    ];
+    let bell = paint.meshes.add(lathe(&bell, 40));
+    let handle = paint.meshes.add(Capsule3d::new(0.011, 0.13));
+    let hose = paint.meshes.add(Capsule3d::new(0.006, 0.2));
+    let dark = paint.matte(Color::srgb(0.08, 0.08, 0.09), 0.4);
+    commands.entity(on).with_children(|shower| {
+        shower.spawn(part(bell, studio.chrome.clone(), back));
+        let grip =
+            Transform::from_xyz(0.0, -0.07, 0.04).with_rotation(Quat::from_rotation_x(-0.35));
+        shower.spawn(part(handle, studio.chrome.clone(), grip));
+        let hangs = Transform::from_xyz(0.0, -0.23, 0.09);
+        shower.spawn(part(hose, dark, hangs));
     });
 }
 

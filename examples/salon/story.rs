@@ -126,5 +126,26 @@ pub fn moments(scene: Scene) -> Vec<(f32, &'static str)> {
                 (Moment::RELEASED, "released"),
             ]
         }
+        SceneKind::Wet => vec![
+            (0.0, "dry, settles"),
+            (Moment::STREWN, "droplets stick and pull strands together"),
+        ],
+        SceneKind::Shower => {
+            let (wet, lies) = match variant {
+                "never-wet" => ("no water", "dry, comes down"),
+                "dried-free" => ("soaked through, dries hanging", "dry again, comes down"),
+                _ => ("shower: water soaks in, hydrogen bonds open", "wet, comes down"),
+            };
+            vec![
+                (0.0, "dry"),
+                (Moment::SHOWER[0], wet),
+                (Moment::SHOWER[1], "water runs down and drips"),
+                (Moment::LYING, lies),
+                (Moment::NIGHT[0], "a night: what is wet dries in the pressed shape"),
+                (Moment::NIGHT[1], "lifted"),
+                (Moment::REWET[0], "shower again: the shape is let go"),
+                (Moment::DRYING, "dries hanging"),
+            ]
+        }
     }
 }

@@ -149,13 +149,17 @@ pub enum Model {
     Bust(f32),
 }
 
-/// How many droplets the scene `wet` strews.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DropletCount(pub usize);
+/// The droplets that the scene `wet` strews.
+#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+pub struct Strewn {
+    pub count: usize,
+    /// Their radius, and r_min; r_max is five times as much (m).
+    pub radius: f32,
+}
 
-impl Default for DropletCount {
+impl Default for Strewn {
     fn default() -> Self {
-        Self(1000)
+        Self { count: 1000, radius: 0.003 }
     }
 }
 
@@ -170,7 +174,7 @@ impl Plugin for ScenePlugin {
         app.insert_resource(self.0)
             .insert_resource(Time::<Fixed>::from_hz(60.0))
             .init_resource::<Director>()
-            .init_resource::<DropletCount>()
+            .init_resource::<Strewn>()
             .init_resource::<measure::StrainPeak>()
             .add_systems(Startup, spawn_scene)
             .add_systems(FixedUpdate, script::direct)

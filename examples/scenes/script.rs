@@ -1,7 +1,7 @@
 //! What happens when, in seconds of the scene's own clock.
 
 use super::{
-    DropletCount, Model, Prop, Scene, SceneKind, locks,
+    Model, Prop, Scene, SceneKind, Strewn, locks,
     measure::{shapes, tips, weighted_rate},
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
@@ -190,7 +190,7 @@ pub fn direct(
     if scene.kind == SceneKind::Wet && passes(Moment::STREWN) {
         director.dry_spacing = Some(locks::tip_spacing(&tips(strands.iter())));
         let center = transform.translation;
-        strew(&mut commands, *water.count, strands.iter(), center);
+        strew(&mut commands, *water.strewn, strands.iter(), center);
     }
     if scene.kind == SceneKind::Shower {
         let all = || members.iter().filter_map(|s| bonds.get(s).ok());
@@ -235,7 +235,7 @@ pub fn direct(
 /// What the scenes with water move.
 #[derive(SystemParam)]
 pub struct Water<'w, 's> {
-    count: Res<'w, DropletCount>,
+    strewn: Res<'w, Strewn>,
     showers: Query<'w, 's, Entity, With<Shower>>,
     process: ResMut<'w, ProcessTime>,
     soak: MessageWriter<'w, Soak>,
@@ -262,19 +262,19 @@ fn shower(scalp: Vec3) -> impl Bundle {
 /// Droplets on nodes of the outer hair, chosen by a seed: [W]'s experiment.
 fn strew<'a>(
     commands: &mut Commands,
-    count: DropletCount,
+    drops: Strewn,
     strands: impl Iterator<Item = &'a Strand>,
     center: Vec3,
 ) {
     let nodes: Vec<Vec3> =
         strands.flat_map(|s| s.positions().iter().skip(s.nodes() / 2)).copied().collect();
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
-    let radius = 0.003;
+    let Strewn { count, radius } = drops;
     let volume = 4.0 / 3.0 * core::f64::consts::PI * f64::from(radius).powi(3);
-    for _ in 0..if nodes.is_empty() { 0 } else { count.0 } {
+    for _ in 0..if nodes.is_empty() { 0 } else { count } {
         let place = center + nodes[random.random_range(0..nodes.len())];
-        let drop = Droplet::new(place, volume).and_then(|d| d.with_influence(radius, 0.015));
-        commands.spawn(drop.expect("a drop of 3 mm on a finite node"));
+        let drop = Droplet::new(place, volume).and_then(|d| d.with_influence(radius, 5.0 * radius));
+        commands.spawn(drop.expect("a drop of some millimetres on a finite node"));
     }
 }
 

@@ -1,10 +1,11 @@
 //! Water as beads: small clear drops, all of them one draw call.
 //!
-//! Whoever simulates water fills [`HairBeads`] once a frame, or leaves it alone; what is in it is
-//! drawn, stretched along the way it flies. Each bead is a square that faces the eye, on which a
+//! Every frame [`HairBeads`] is filled with the [`Droplet`]s; others may be added to it. What is in it
+//! is drawn, stretched along the way it flies. Each bead is a square that faces the eye, on which a
 //! sphere is shaded; the squares are counted by a mesh and pulled from one buffer, as ribbons are.
 
-use super::{HairRenderSystems, supported};
+use super::{HairRenderSystems, Interpolate, supported};
+use crate::Droplet;
 use bevy::{
     asset::{RenderAssetUsages, embedded_asset},
     camera::{primitives::Aabb, visibility::NoAutoAabb},
@@ -63,11 +64,38 @@ impl Bead {
     }
 }
 
-/// The beads to draw in this frame, in any order. Fill it between the fixed ticks and
-/// [`HairRenderSystems`]; empty it when the water is gone.
+/// The beads to draw in this frame, in any order. [`HairBeadSystems`] fill it in `PostUpdate`, before
+/// [`HairRenderSystems`]; add your own between the two.
 #[derive(Resource, Reflect, Clone, Debug, Default, Deref, DerefMut)]
 #[reflect(Resource, Default)]
 pub struct HairBeads(pub Vec<Bead>);
+
+/// The system that fills [`HairBeads`] with the droplets.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct HairBeadSystems;
+
+/// Droplets where they are between two ticks.
+pub(super) fn show_droplets(
+    mut beads: ResMut<HairBeads>,
+    droplets: Query<&Droplet>,
+    (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
+) {
+    if droplets.is_empty() && beads.is_empty() {
+        return;
+    }
+    let late = match time {
+        Some(time) if interpolate.0 => {
+            (1.0 - time.overstep_fraction().clamp(0.0, 1.0)) * time.timestep().as_secs_f32()
+        }
+        _ => 0.0,
+    };
+    beads.clear();
+    beads.extend(droplets.iter().map(|drop| Bead {
+        position: drop.position - drop.velocity * late,
+        radius: drop.radius(),
+        velocity: drop.velocity,
+    }));
+}
 
 type PackedBead = [f32; 8];
 

@@ -1,6 +1,6 @@
 //! What a hair hands to the GPU: its nodes in every frame, guides and drawn strands once.
 
-use super::{WetLook, followers::DrawnStrand};
+use super::followers::DrawnStrand;
 use crate::{
     bond::Bonds,
     strand::{Strand, StrandHistory},
@@ -66,7 +66,7 @@ pub(super) fn pack_guide(
     strand: &Strand,
     history: &StrandHistory,
     bonds: &Bonds,
-    wet: Option<&WetLook>,
+    wet: &[f32],
     overstep: f32,
 ) -> Option<(Vec3, Vec3)> {
     let before = match history.positions.len() == strand.nodes() {
@@ -98,7 +98,7 @@ pub(super) fn pack_guide(
         // The tip has no joint: it shows the last one's. Hair not yet ticked has all bonds closed.
         let joint = bonds.joints.get(i).or(bonds.joints.last());
         let rates = joint.map_or([1.0; 4], |j| j.rates);
-        let moisture = wet.and_then(|w| w.0.get(i)).copied().unwrap_or(0.0);
+        let moisture = wet.get(i).copied().unwrap_or(0.0);
         let motion = match known && first.is_some() {
             true => (last - packed_place(node)) * MOTION_UNITS,
             false => Vec3::ZERO,
@@ -160,7 +160,7 @@ mod tests {
         let mut out = vec![[0; 8]; strand.nodes()];
         let history = StrandHistory { positions: history.to_vec() };
         let bonds = Bonds::default();
-        pack_guide(&mut out, false, strand, &history, &bonds, None, overstep);
+        pack_guide(&mut out, false, strand, &history, &bonds, &[], overstep);
         out
     }
 
@@ -192,7 +192,7 @@ mod tests {
         assert_eq!(nodes[1][6], 0, "hair that appears has not moved");
         strand.positions_mut()[1] = Vec3::new(1.5, -0.25, 0.0);
         let (history, bonds) = (StrandHistory::default(), Bonds::default());
-        pack_guide(&mut nodes, true, &strand, &history, &bonds, None, 1.0);
+        pack_guide(&mut nodes, true, &strand, &history, &bonds, &[], 1.0);
         assert_eq!(nodes[1][6], half(512.0) | half(-256.0) << 16);
         assert_eq!((nodes[0][6], nodes[1][7]), (0, half(1.0) << 16));
     }
@@ -223,7 +223,7 @@ mod tests {
         for _ in 0..3 {
             let start = std::time::Instant::now();
             for ((strand, bonds), out) in strands.iter().zip(out.chunks_mut(16)) {
-                pack_guide(out, true, strand, &history, bonds, None, 0.5);
+                pack_guide(out, true, strand, &history, bonds, &[], 0.5);
             }
             println!("10,000 guides of 16 nodes: {:?}", start.elapsed());
         }

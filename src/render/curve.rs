@@ -43,7 +43,7 @@ pub fn guide_point(nodes: &[Vec3], share: f32) -> CurvePoint {
 pub struct Guide<'a> {
     /// Its nodes, in the hair's frame (m).
     pub nodes: &'a [Vec3],
-    /// How wet each node is, as [`WetLook`](super::WetLook) says; dry where absent.
+    /// How wet each node looks; dry where absent.
     pub moisture: &'a [f32],
 }
 

@@ -7,6 +7,7 @@ use super::{
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
 };
 use crate::{
+    Moisture,
     bond::Bonds,
     setting::Settings,
     strand::{Hair, Strand, StrandHistory, Strands},
@@ -49,8 +50,13 @@ struct Guide {
     root: Vec3,
 }
 
-type GuideParts =
-    (&'static Strand, &'static StrandHistory, &'static Bonds, Option<&'static WetLook>);
+type GuideParts = (
+    &'static Strand,
+    &'static StrandHistory,
+    &'static Bonds,
+    &'static Moisture,
+    Option<&'static WetLook>,
+);
 
 /// Hair that appeared, and hair that is no more.
 pub(super) fn appear(
@@ -229,11 +235,19 @@ impl Packed {
         for guide in &self.layout {
             let (own, others) = rest.split_at_mut(guide.nodes as usize);
             rest = others;
-            let Ok((strand, history, bonds, wet)) = strands.get(guide.strand) else {
+            let Ok((strand, history, bonds, water, wet)) = strands.get(guide.strand) else {
                 continue;
             };
             let root_before = packed_place(&own[0]);
-            let around = pack_guide(own, known, strand, history, bonds, wet, overstep);
+            let around = pack_guide(
+                own,
+                known,
+                strand,
+                history,
+                bonds,
+                wet.map_or(water.sheen(), |w| &w.0),
+                overstep,
+            );
             let root = packed_place(&own[0]);
             still &= root.distance_squared(root_before) < 1e-12;
             elsewhere |= root.distance(guide.root) > 0.25 * self.spacing;

@@ -173,9 +173,9 @@ impl HairLook {
     }
 }
 
-/// How wet each node of a strand looks, root first: 0 dry, 1 soaked. Component of a strand, written
-/// by whoever computes water; absent or too short means dry. Wet hair is drawn darker, glossier and
-/// in tighter locks ([`HairFollowers::wet_clump`](super::HairFollowers::wet_clump)).
+/// How wet each node of a strand looks, root first: 0 dry, 1 soaked. Component of a strand for those
+/// who know better than its water ([`Moisture::sheen`](crate::Moisture::sheen)), which is what shows
+/// where this is absent. Wet hair is drawn darker, glossier and in tighter locks ([`HairFollowers::wet_clump`](super::HairFollowers::wet_clump)).
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct WetLook(pub Vec<f32>);

@@ -26,7 +26,7 @@ mod material;
 mod upload;
 mod view;
 
-pub use beads::{Bead, HairBeads};
+pub use beads::{Bead, HairBeadSystems, HairBeads};
 pub use buffers::HairBuffers;
 pub use followers::{DrawnStrand, HairFollowers};
 pub use look::{HairLook, HairShading, Melanin, WetLook};
@@ -92,7 +92,11 @@ impl Plugin for HairRenderPlugin {
             .init_resource::<HairBeads>()
             .register_type::<HairBeads>()
             .register_type::<HairBuffers>()
-            .register_type::<WetLook>();
+            .register_type::<WetLook>()
+            .add_systems(
+                PostUpdate,
+                beads::show_droplets.in_set(HairBeadSystems).before(HairRenderSystems),
+            );
         // The drawn child inherits it. An error says that the user has required it already.
         let _ = app.try_register_required_components::<Hair, Visibility>();
     }

@@ -21,7 +21,7 @@ pub enum HairView {
     Bond(BondKind),
     /// Stretch of the edges: blue none, red [`STRAIN_FULL`] or more.
     Strain,
-    /// Water in the hair, as [`WetLook`](super::WetLook) says: blue dry, red soaked.
+    /// Water on and in the hair, [`Moisture::sheen`](crate::Moisture::sheen): blue dry, red soaked.
     Moisture,
     /// Lit, but only the strands that are simulated.
     Guides,

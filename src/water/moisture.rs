@@ -139,7 +139,11 @@ pub struct Moisture {
     film: Vec<f64>,
     bound: Vec<f64>,
     wetness: Vec<f32>,
+    sheen: Vec<f32>,
 }
+
+/// Share of the film that a node can hold at which it looks wet all over.
+const SHINES_AT: f64 = 0.15;
 
 impl Moisture {
     /// Whether no water has touched the strand since it was last dry.
@@ -162,6 +166,11 @@ impl Moisture {
         &self.wetness
     }
 
+    /// How wet each node looks: soaked, or covered by film. 0 dry, 1 dripping.
+    pub fn sheen(&self) -> &[f32] {
+        &self.sheen
+    }
+
     /// All its water (m³).
     pub fn volume(&self) -> f64 {
         self.film.iter().chain(&self.bound).sum()
@@ -177,6 +186,7 @@ impl Moisture {
         self.film.resize(nodes, 0.0);
         self.bound.resize(nodes, 0.0);
         self.wetness.resize(nodes, 0.0);
+        self.sheen.resize(nodes, 0.0);
         lost
     }
 
@@ -305,6 +315,7 @@ impl Moisture {
                 *film -= drop;
                 left.drips.push((i, drop));
             }
+            self.sheen[i] = self.wetness[i].max((*film / (SHINES_AT * held)).min(1.0) as f32);
         }
     }
 
