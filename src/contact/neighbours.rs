@@ -17,7 +17,8 @@ use glam::Vec3;
 const MARGIN: f32 = 1.6;
 
 /// Half the length of the pieces in which edges are put into the grid, in units of reach and margin.
-const HALF_PIECE: f32 = 0.5;
+/// Shorter ones are more to sort (0.5: scene 1 takes 5 % longer), longer ones sift less.
+const HALF_PIECE: f32 = 0.8;
 
 /// Strands that are one piece of work.
 const PART: usize = 16;
