@@ -179,7 +179,7 @@ fn draped(root: Vec3, length: f32, nodes: usize) -> Vec<Vec3> {
     let mut points = vec![root];
     let mut way = (normal(root) + Vec3::new(0.8 * side, 0.2, -0.5)).normalize();
     // Hair from higher up lies on that from below.
-    let layer = 0.004 + 0.12 * (root.y - 0.0).max(0.0);
+    let layer = 0.008 + 0.1 * (root.y - 0.0).max(0.0);
     for i in 1..nodes {
         let p = points[i - 1];
         let pull = Vec3::new(0.25 * side, -1.0, if p.z > 0.02 { -0.9 } else { -0.1 });
@@ -260,6 +260,9 @@ fn portraits() {
         let prepass = bevy::core_pipeline::prepass::DepthPrepass;
         scene.app.world_mut().entity_mut(camera).insert(prepass);
     }
+    let camera = scene.camera;
+    let soft = bevy::light::ShadowFilteringMethod::Hardware2x2;
+    scene.app.world_mut().entity_mut(camera).insert(soft);
     let world = scene.app.world_mut();
     let hair = world.spawn(Hair).id();
     let guides = long_hair(0.0125, setting("LENGTH", 0.36), 20);
@@ -274,7 +277,7 @@ fn portraits() {
         world.spawn((StrandOf(hair), strand, bonds));
     }
     let of = |melanin| HairLook { melanin, width: 0.2e-3, ..default() };
-    let dark = Melanin::new(1.3, 0.1);
+    let dark = Melanin::new(2.2, 0.1);
     let views = [
         ("dark", of(dark), HairView::Natural, false),
         ("blond", of(Melanin::BLOND), HairView::Natural, false),
@@ -297,17 +300,9 @@ fn portraits() {
             let moisture = if wet { 1.0 } else { 0.0 };
             scene.app.world_mut().entity_mut(strand).insert(WetLook(vec![moisture; 20]));
         }
-        // Assets arrive while nothing is drawn.
-        let active = |scene: &mut Offscreen, on: bool| {
-            let camera = scene.camera;
-            scene.app.world_mut().get_mut::<Camera>(camera).unwrap().is_active = on;
-        };
-        active(&mut scene, false);
-        (0..3).for_each(|_| scene.app.update());
-        active(&mut scene, true);
         let start = std::time::Instant::now();
-        let picture = scene.draw_now();
-        println!("{name}: {:?} for two frames", start.elapsed());
+        let picture = scene.draw_once();
+        println!("{name}: {:?}", start.elapsed());
         picture.save(&format!("/tmp/portrait_{name}.png"));
     }
 }

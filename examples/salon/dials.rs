@@ -355,7 +355,7 @@ impl Settings<'_, '_> {
             slide(ui, &mut l.melanin.pheomelanin, 0.0..=1.0, "pheomelanin");
             slide(ui, &mut l.roughness, 0.1..=1.0, "roughness");
             slide(ui, &mut l.gloss, 0.0..=3.0, "gloss");
-            slide_mm(ui, &mut l.self_shadow, 1.0..=60.0, "light goes in (mm)");
+            slide_mm(ui, &mut l.self_shadow, 1.0..=60.0, "light depth (mm)");
             ui.horizontal(|ui| {
                 ui.label("model");
                 ui.selectable_value(&mut l.shading, HairShading::Fibre, "fibre");

@@ -82,7 +82,7 @@ fn show(
 /// after the click it lets go; a number that is being typed does not.
 fn release_focus(ctx: &egui::Context, calm: &mut u32) {
     *calm = if ctx.input(|i| i.pointer.any_down()) { 0 } else { calm.saturating_add(1) };
-    if *calm == 3 && !ctx.text_edit_focused() {
+    if *calm == 2 && !ctx.text_edit_focused() {
         ctx.memory_mut(|memory| {
             if let Some(id) = memory.focused() {
                 memory.surrender_focus(id);

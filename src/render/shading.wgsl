@@ -31,6 +31,8 @@ struct Surface {
     color: vec3<f32>,
     roughness: f32,
     gloss: f32,
+    // Light that the cuticles' rough edges scatter before it meets a pigment.
+    pale: f32,
 }
 
 fn surface_of(fibre: Fibre) -> Surface {
@@ -44,6 +46,8 @@ fn surface_of(fibre: Fibre) -> Surface {
     let uneven = 1.0 + 0.3 * (hash(fibre.seed + 11u) - 0.5);
     surface.roughness = clamp(ribbon.roughness * uneven * (1.0 - 0.35 * wet), 0.04, 1.0);
     surface.gloss = ribbon.gloss * (1.0 + 1.2 * wet);
+    // No two strands are alike, which even black hair shows; a film of water smooths the edges.
+    surface.pale = 0.012 * (0.4 + 1.2 * hash(fibre.seed + 13u)) * (1.0 - 0.8 * wet);
     return surface;
 }
 
@@ -76,8 +80,7 @@ fn scattered(fibre: Fibre, surface: Surface, l: vec3<f32>, shadow: f32) -> vec3<
     let cylinder = sqrt(max(1.0 - lt * lt, 0.0));
     let wrapped = saturate((dot(fibre.outward, l) + 0.5) / 2.25);
     let tint = pow(surface.color / max(luminance(surface.color), 1e-4), vec3(1.0 - shadow));
-    // The cuticles' rough edges scatter some light that never met a pigment.
-    let pale = surface.color + 0.012;
+    let pale = surface.color + surface.pale;
     return sqrt(surface.color) * surface.color * tint * mix(wrapped, cylinder, 0.4) * (1.0 / PI)
         + pale * wrapped / PI;
 }
@@ -223,7 +226,7 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
 
     // What comes from everywhere reaches roots least.
     let open = 1.0 - ribbon.root_shade * (1.0 - smoothstep(0.0, 0.35, fibre.along));
-    let indirect_color = surface.color * (0.8 + 0.2 * sqrt(surface.color)) + 0.012 * surface.gloss;
+    let indirect_color = surface.color * (0.8 + 0.2 * sqrt(surface.color)) + surface.pale * surface.gloss;
     var indirect = lights.ambient_color.rgb * indirect_color;
 #ifdef ENVIRONMENT_MAP
     var input: lighting::LightingInput;

@@ -168,8 +168,27 @@ impl Offscreen {
         self.draw_now()
     }
 
+    /// Lets assets arrive while nothing is drawn, then draws one frame only: for large pictures.
+    pub fn draw_once(&mut self) -> Picture {
+        self.activate(false);
+        (0..3).for_each(|_| self.app.update());
+        self.activate(true);
+        self.catch(|scene| scene.activate(false))
+    }
+
+    fn activate(&mut self, on: bool) {
+        if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
+            camera.is_active = on;
+        }
+    }
+
     /// Draws without frames in advance.
     pub fn draw_now(&mut self) -> Picture {
+        self.catch(|_| ())
+    }
+
+    /// Catches the next frame, and calls `after` when it has been drawn.
+    fn catch(&mut self, after: impl Fn(&mut Self)) -> Picture {
         self.app.world_mut().resource_mut::<Caught>().0 = None;
         self.app.world_mut().spawn(Screenshot::image(self.target.clone())).observe(
             |shot: On<ScreenshotCaptured>, mut caught: ResMut<Caught>| {
@@ -183,6 +202,7 @@ impl Offscreen {
         );
         for _ in 0..20 {
             self.app.update();
+            after(self);
             if let Some(picture) = self.app.world_mut().resource_mut::<Caught>().0.take() {
                 return picture;
             }
