@@ -158,13 +158,13 @@ fn head(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity,
     });
 }
 
-/// The training head upright, its skull fitted to the ball that the hair feels.
+/// The training head upright, its crown where the ball's is that the hair feels.
 fn bust(commands: &mut Commands, studio: &Studio, on: Entity, radius: f32) {
     // It is made lying: the crown at +X, the face at +Y.
     let upright = Quat::from_rotation_y(FRAC_PI_2) * Quat::from_rotation_z(FRAC_PI_2);
-    let fitted = Vec3::new(0.118, 0.095, 0.077).recip() * radius;
+    const CROWN: f32 = 0.118;
     commands.entity(on).with_children(|head| {
-        let place = Transform::from_rotation(upright).with_scale(fitted);
+        let place = Transform::from_xyz(0.0, radius - CROWN, 0.0).with_rotation(upright);
         head.spawn(part(studio.head.clone(), studio.skin.clone(), place));
     });
 }

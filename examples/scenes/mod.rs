@@ -249,7 +249,9 @@ pub fn spawn_scene(
                 "springs" => StrandModel::MassSpring,
                 _ => StrandModel::Rod,
             };
-            commands.entity(hair).insert(model);
+            // Soft hair, that hangs.
+            let stiffness = Stiffness::from_bending_length(0.06).expect("6 cm is valid");
+            commands.entity(hair).insert((model, stiffness));
             commands.spawn((
                 Prop,
                 Model::Bust(strands::BUST),
