@@ -89,12 +89,68 @@ fn perm_curls_and_its_controls_hang_straight() {
     }
 }
 
+fn shower(variant: &str, seconds: &str) -> Value {
+    let arguments = ["--scene", "shower", "--variant", variant, "--seconds", seconds, "--json"];
+    let out = headless(&arguments);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(report["finite"], true);
+    assert!(number(&report, "water_error") < 1e-5, "{report}");
+    assert!(number(&report, "strain_peak") < 0.05, "{report}");
+    report
+}
+
+/// Until the head has been lifted and the hair hangs.
+const LIFTED: &str = "22";
+
+#[test]
+fn hair_pressed_wet_keeps_what_water_opened() {
+    let treated = shower("treated", LIFTED);
+    let open = 1.0 - number(&treated, "b_pressed");
+    let kept = number(&treated, "kept_zero_gravity");
+    assert!((kept / (0.33 * open) - 1.0).abs() < 0.1, "kept {kept}, open {open}");
+    assert!(kept >= 0.15, "{kept}");
+    near(&shower("never-wet", LIFTED), "kept_zero_gravity", 0.0, 0.01);
+    near(&shower("dried-free", LIFTED), "kept_zero_gravity", 0.0, 0.02);
+}
+
+#[test]
+fn another_shower_lets_go_of_it() {
+    let report = shower("treated", "40");
+    let (kept, left) = (number(&report, "kept_dried"), number(&report, "b_rewet"));
+    let now = number(&report, "kept_zero_gravity");
+    assert!(kept > 0.15 && now <= kept * left + 0.02, "{now} of {kept} after rates {left}");
+}
+
+#[test]
+fn ten_thousand_strands_gather_around_droplets() {
+    let wet = |droplets: &str| {
+        let out = headless(&["--scene", "wet", "--droplets", droplets, "--seconds", "7", "--json"]);
+        let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert_eq!(report["finite"], true);
+        assert!(number(&report, "water_error") < 1e-5, "{report}");
+        assert!(number(&report, "strain_peak") < 0.05, "{report}");
+        report
+    };
+    let dry = wet("0");
+    near(&dry, "tip_spacing_ratio", 1.0, 0.05);
+    assert!(number(&dry, "clustered_share") < 0.02);
+    let (few, many) = (wet("100"), wet("1000"));
+    let (a, b) = (number(&few, "tip_spacing_ratio"), number(&many, "tip_spacing_ratio"));
+    assert!(b < a && a < 0.98 && b < 0.8, "{a} {b}");
+}
+
 #[test]
 fn every_bit_is_the_same_again_and_on_two_threads() {
     // Long enough for wind, contact with the floor and bond changes; winding in the perm.
-    for (scene, variant, seconds) in
-        [("bedhead", "treated", "8"), ("blow-dry", "treated", "8"), ("perm", "treated", "10")]
-    {
+    for (scene, variant, seconds) in [
+        ("bedhead", "treated", "8"),
+        ("blow-dry", "treated", "8"),
+        ("perm", "treated", "10"),
+        ("shower", "treated", "4"),
+        ("wet", "rods", "5"),
+        ("wet", "springs", "4.5"),
+    ] {
         let hash = |threads: &str| {
             let out = headless(&[
                 "--scene",
@@ -124,7 +180,10 @@ fn misspelt_names_are_answered_with_the_valid_ones() {
         String::from_utf8(out.stderr).unwrap()
     };
     let text = error(&["--scene", "bedhaed"]);
-    assert!(text.contains("no scene `bedhaed`; valid: bedhead, blow-dry, perm"), "{text}");
+    assert!(
+        text.contains("no scene `bedhaed`; valid: bedhead, blow-dry, perm, wet, shower"),
+        "{text}"
+    );
     let text = error(&["--scene", "perm", "--variant", "curly"]);
     assert!(text.contains("valid: treated, water-set, cut-only, untreated"), "{text}");
     let text = error(&["--scene", "perm", "--second", "3"]);

@@ -87,13 +87,16 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     }
     let wall = start.elapsed();
     let mut report = Report::new(app.world_mut(), scene, frames, wall);
-    bar.set_message("settling");
-    app.world_mut().resource_mut::<Director>().ended = true;
-    settle(&mut app);
-    report.hanging(app.world_mut());
-    app.insert_resource(HairGravity(Vec3::ZERO));
-    settle(&mut app);
-    report.weightless(app.world_mut());
+    // Where nothing was held there is nothing to keep.
+    if !app.world().resource::<Director>().held.is_empty() {
+        bar.set_message("settling");
+        app.world_mut().resource_mut::<Director>().ended = true;
+        settle(&mut app);
+        report.hanging(app.world_mut());
+        app.insert_resource(HairGravity(Vec3::ZERO));
+        settle(&mut app);
+        report.weightless(app.world_mut());
+    }
     bar.finish_and_clear();
     if arguments.json {
         println!("{}", serde_json::to_string(&report)?);

@@ -105,9 +105,9 @@ impl Report {
             kept_hanging: f64::NAN,
             curl_radius_held: measure::curl_radius(&held, &held, segment),
             curl_radius_zero_gravity: None,
-            turns: 0.0,
+            turns: measure::turns(&measure::shapes(strands.iter())),
             b_hydrogen: Spread { min, mean, max },
-            tip_mean: [0.0; 3],
+            tip_mean: tip_mean(world),
             drying_error: None,
             wind_rate_correlation: None,
             relaxed_error: f64::NAN,
@@ -122,7 +122,7 @@ impl Report {
             b_pressed: director.rate(0),
             kept_dried: director.kept_dried,
             b_rewet: director.rate(1),
-            state_hash: format!("{:016x}", state_hash(&strands, &bonds)),
+            state_hash: format!("{:016x}", state_hash(&strands, &bonds, &ledger)),
             wall_seconds: wall.as_secs_f64(),
             sim_seconds,
             real_time_factor: sim_seconds / wall.as_secs_f64(),
@@ -192,8 +192,8 @@ pub fn tip_mean(world: &mut World) -> [f64; 3] {
     mean.to_array()
 }
 
-/// FNV-1a over the bits of positions, velocities, orientations and bonds, in strand order.
-fn state_hash(strands: &[Strand], bonds: &[Bonds]) -> u64 {
+/// FNV-1a over the bits of positions, velocities, orientations, bonds and water, in strand order.
+fn state_hash(strands: &[Strand], bonds: &[Bonds], water: &WaterLedger) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut eat = |x: f32| hash = (hash ^ u64::from(x.to_bits())).wrapping_mul(0x0100_0000_01b3);
     for s in strands {
@@ -202,6 +202,10 @@ fn state_hash(strands: &[Strand], bonds: &[Bonds]) -> u64 {
     }
     for joint in bonds.iter().flat_map(|b| &b.joints) {
         joint.shapes.iter().flat_map(|s| s.to_array()).chain(joint.rates).for_each(&mut eat);
+    }
+    for volume in [water.water_in, water.held, water.water_out] {
+        eat(f32::from_bits((volume.to_bits() >> 32) as u32));
+        eat(f32::from_bits(volume.to_bits() as u32));
     }
     hash
 }

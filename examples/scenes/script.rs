@@ -259,15 +259,14 @@ fn shower(scalp: Vec3) -> impl Bundle {
     )
 }
 
-/// Droplets on nodes of the outer hair, chosen by a seed: [W]'s experiment.
+/// Droplets on nodes chosen by a seed: [W]'s experiment.
 fn strew<'a>(
     commands: &mut Commands,
     drops: Strewn,
     strands: impl Iterator<Item = &'a Strand>,
     center: Vec3,
 ) {
-    let nodes: Vec<Vec3> =
-        strands.flat_map(|s| s.positions().iter().skip(s.nodes() / 2)).copied().collect();
+    let nodes: Vec<Vec3> = strands.flat_map(|s| s.positions().iter().skip(1)).copied().collect();
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let Strewn { count, radius } = drops;
     let volume = 4.0 / 3.0 * core::f64::consts::PI * f64::from(radius).powi(3);
