@@ -328,3 +328,32 @@ fn droplets_in_another_order_give_the_same_sums() {
     assert!((a.0.held - b.0.held).abs() < 1e-4 * a.0.held, "{a:?} {b:?}");
     assert!(a.1.distance(b.1) < 1e-4, "{} {}", a.1, b.1);
 }
+
+#[test]
+fn a_droplet_lands_rides_slides_down_and_drips() {
+    let mut app = test_app(60.0);
+    let (_, entity) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+    let whole = Wetting { uptake: 0.0, evaporation: 0.0, ..default() };
+    app.insert_resource(HairDefault(whole));
+    // 60 µl: more than the tip of a lock of 500 fibres can hold, 21 µl.
+    let fat =
+        app.world_mut().spawn(Droplet::new(Vec3::new(0.002, -0.05, 0.0), 60e-9).unwrap()).id();
+    let small =
+        app.world_mut().spawn(Droplet::new(Vec3::new(0.0, -0.15, 0.001), 4e-9).unwrap()).id();
+    run(&mut app, 0.1);
+    let at = |app: &App, drop: Entity| app.world().get::<Droplet>(drop)?.ride().map(|r| r.at);
+    let (first, low) = (at(&app, fat).unwrap(), at(&app, small).unwrap());
+    let on = app.world().get::<Droplet>(fat).unwrap().ride().unwrap().strand;
+    assert_eq!(on, entity);
+    assert!((1.0..3.0).contains(&first) && low > 4.0, "{first} {low}");
+    run(&mut app, 0.2);
+    assert!(at(&app, fat).unwrap() > first + 0.5, "it slides");
+    assert!(at(&app, small).unwrap() < low + 0.5, "small ones slide slowly");
+    run(&mut app, 1.5);
+    // It took the small one in on its way, and was too heavy for the tip.
+    assert_eq!(droplets(&mut app), 1);
+    let drop = app.world().get::<Droplet>(fat).expect("the larger one is left");
+    assert!((drop.volume - 64e-9).abs() < 1e-14, "{}", drop.volume);
+    assert!(drop.ride().is_none() && drop.position.y < -0.3, "{:?}", drop.position);
+    assert!(ledger(&app).error() < 1e-5);
+}

@@ -1,6 +1,6 @@
 //! Contact between strands as mathematics: equation 18 of \[B\], one node and one edge at a time.
 //!
-//! The tick meets eight edges at a time ([`lanes`](super::lanes)); these lines say what that means.
+//! The tick meets eight edges at a time (`lanes.rs`); these lines say what that means.
 
 use glam::Vec3;
 

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 /// A droplet as the strands of one hair see it, in the hair's frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Drop {
+pub(super) struct SeenDrop {
     pub at: Vec3,
     /// Where it was a substep ago, for drops that fall.
     pub before: Vec3,
@@ -20,7 +20,7 @@ pub(super) struct Drop {
 /// The droplets around a hair, found by place.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Field {
-    pub drops: Vec<Drop>,
+    pub drops: Vec<SeenDrop>,
     /// Each droplet in all cells that it pulls in: a node finds all of them in its own cell.
     pulling: UniformGrid,
     /// Each falling droplet in all cells where the middle of an edge may be that it hits.
@@ -225,8 +225,8 @@ impl Met<'_> {
 mod tests {
     use super::*;
 
-    fn drop(at: Vec3) -> Drop {
-        Drop {
+    fn drop(at: Vec3) -> SeenDrop {
+        SeenDrop {
             at,
             before: at,
             radius: 0.003,
@@ -289,9 +289,12 @@ mod tests {
         let positions = [Vec3::ZERO, Vec3::X * 0.03, Vec3::X * 0.06];
         let mut field = Field::default();
         let before = Vec3::new(0.04, 0.05, 0.0);
-        let falling = Drop { before, ride: None, ..drop(Vec3::new(0.04, -0.05, 0.0)) };
-        let beside =
-            Drop { before: before + Vec3::Z * 0.02, at: falling.at + Vec3::Z * 0.02, ..falling };
+        let falling = SeenDrop { before, ride: None, ..drop(Vec3::new(0.04, -0.05, 0.0)) };
+        let beside = SeenDrop {
+            before: before + Vec3::Z * 0.02,
+            at: falling.at + Vec3::Z * 0.02,
+            ..falling
+        };
         field.drops = vec![falling, beside];
         field.sort(0.03, 1e-3);
         let mut out = Encounters::default();

@@ -2,7 +2,7 @@
 
 use super::{
     Climate, Droplet, DropletRules, Moisture, ProcessTime, Ride, WaterLedger, Wetting,
-    adhesion::{Drop, Encounters, Field, Landing, Met, MetBy, Touch},
+    adhesion::{Encounters, Field, Landing, Met, MetBy, SeenDrop, Touch},
     exchange::{blown_air, let_go, on_strand},
     model::{ball_radius, clinging, fall, hanging, slide},
     moisture::node_lengths,
@@ -380,7 +380,7 @@ impl Field {
     fn see(&mut self, drops: &[&mut Droplet], pose: &Pose) {
         let scale = pose.scale.recip();
         self.drops.clear();
-        self.drops.extend(drops.iter().map(|d| Drop {
+        self.drops.extend(drops.iter().map(|d| SeenDrop {
             at: pose.point_in(d.position),
             before: pose.point_in(d.before),
             radius: d.radius() * scale,
