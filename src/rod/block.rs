@@ -16,6 +16,7 @@ use super::{
     limiter::limit_lengths,
     obstacle::{Obstacle, push_out},
 };
+use crate::strand::{Burden, HeldNodes, Strand};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use glam::{Quat, Vec3};
 
@@ -61,11 +62,12 @@ pub struct EdgeLanes {
     pub k: Lane,
 }
 
+/// A row of a tridiagonal system over a strand's edges, eliminated from the root on.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct LimiterRow {
-    pub(super) direction: [Lane; 3],
-    pub(super) upper: Lane,
-    pub(super) rhs: Lane,
+pub(crate) struct Row {
+    pub(crate) direction: [Lane; 3],
+    pub(crate) upper: Lane,
+    pub(crate) rhs: Lane,
 }
 
 /// [`LANES`] strands of equal node count. See the [module](self).
@@ -80,8 +82,8 @@ pub struct BlockLanes {
     /// Zero for lanes whose state is finite, else not a number; written by [`step`].
     pub finite: Lane,
     /// 1 for lanes with a node that rests on an obstacle, else 0; written by the contact passes.
-    pub(super) touched: Lane,
-    pub(super) scratch: Vec<LimiterRow>,
+    pub(crate) touched: Lane,
+    pub(crate) scratch: Vec<Row>,
 }
 
 /// What a substep does to a block.
@@ -106,7 +108,7 @@ impl BlockLanes {
     pub fn resize(&mut self, nodes: usize) {
         self.nodes.resize(nodes, NodeLanes::default());
         self.edges.resize(nodes - 1, EdgeLanes::default());
-        self.scratch.resize(nodes - 1, LimiterRow::default());
+        self.scratch.resize(nodes - 1, Row::default());
     }
 
     /// Copies everything of lane `from` to lane `to`: fills lanes that no strand uses.
@@ -127,6 +129,67 @@ impl BlockLanes {
             e.k[to] = e.k[from];
         }
         copy(&mut self.root);
+    }
+
+    /// Puts a strand's nodes into a lane; held ones with where they are to be and the velocity that
+    /// takes them there.
+    pub(crate) fn gather_nodes(
+        &mut self,
+        lane: usize,
+        strand: &Strand,
+        burden: &Burden,
+        held: Option<&HeldNodes>,
+        dt: f32,
+    ) {
+        let (positions, velocities, ..) = strand.parts();
+        let lengths = strand.rest_lengths();
+        let mean = lengths.iter().sum::<f32>() / lengths.len() as f32;
+        let held = held.map_or(&[][..], |h| &h.targets[..]);
+        for (i, node) in self.nodes.iter_mut().enumerate() {
+            let target = match held.get(i) {
+                Some(Some(target)) => Some(*target),
+                _ => (i == 0).then_some(positions[0]),
+            };
+            // Half a cell on either side, so the tip carries half a mass.
+            let before = if i == 0 { 0.0 } else { lengths[i - 1] };
+            let after = lengths.get(i).copied().unwrap_or(0.0);
+            put3(&mut node.from, lane, positions[i]);
+            match target {
+                Some(target) => {
+                    put3(&mut node.p, lane, target);
+                    put3(&mut node.v, lane, (target - positions[i]) / dt);
+                    node.w[lane] = 0.0;
+                }
+                None => {
+                    put3(&mut node.p, lane, positions[i]);
+                    put3(&mut node.v, lane, velocities[i]);
+                    let load = burden.mass.get(i).copied().unwrap_or(0.0);
+                    node.w[lane] = 2.0 * mean / ((before + after) * (1.0 + load));
+                }
+            }
+        }
+    }
+
+    /// Puts what became of a lane back into its strand.
+    pub(crate) fn scatter(&self, lane: usize, strand: &mut Strand) {
+        let (positions, velocities, orientations, angular) = strand.parts_mut();
+        for (i, node) in self.nodes.iter().enumerate() {
+            positions[i] = take3(&node.p, lane);
+            velocities[i] = take3(&node.v, lane);
+        }
+        for (i, edge) in self.edges.iter().enumerate() {
+            orientations[i] = take4(&edge.q, lane);
+            angular[i] = take3(&edge.omega, lane);
+        }
+        strand.stepped_well();
+    }
+
+    /// The obstacles that any lane may touch in a step of `dt`.
+    pub(crate) fn near(&self, obstacles: &[Obstacle], dt: f32, skin: f32) -> Vec<Obstacle> {
+        let (low, high) = self.bounds(dt);
+        // Nodes may be pulled beyond their prediction, never by more than an edge in a substep.
+        let margin = skin + self.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
+        obstacles.iter().filter(|o| o.may_touch(low, high, margin)).copied().collect()
     }
 
     /// The box that holds every node of every lane, before and after prediction with `dt`.
@@ -181,30 +244,30 @@ pub fn take4(a: &[Lane; 4], lane: usize) -> Quat {
 }
 
 #[inline(always)]
-pub(super) fn load<S: Simd>(simd: S, a: &Lane) -> f32x16<S> {
+pub(crate) fn load<S: Simd>(simd: S, a: &Lane) -> f32x16<S> {
     f32x16::load_array_ref(simd, a)
 }
 
 #[inline(always)]
-fn load3<S: Simd>(simd: S, a: &[Lane; 3]) -> V3<f32x16<S>> {
+pub(crate) fn load3<S: Simd>(simd: S, a: &[Lane; 3]) -> V3<f32x16<S>> {
     V3::new(load(simd, &a[0]), load(simd, &a[1]), load(simd, &a[2]))
 }
 
 #[inline(always)]
-fn store3<S: Simd>(a: &mut [Lane; 3], v: V3<f32x16<S>>) {
+pub(crate) fn store3<S: Simd>(a: &mut [Lane; 3], v: V3<f32x16<S>>) {
     v.x.store_array(&mut a[0]);
     v.y.store_array(&mut a[1]);
     v.z.store_array(&mut a[2]);
 }
 
 #[inline(always)]
-fn load4<S: Simd>(simd: S, a: &[Lane; 4]) -> Quaternion<f32x16<S>> {
+pub(crate) fn load4<S: Simd>(simd: S, a: &[Lane; 4]) -> Quaternion<f32x16<S>> {
     let v = V3::new(load(simd, &a[0]), load(simd, &a[1]), load(simd, &a[2]));
     Quaternion::new(v, load(simd, &a[3]))
 }
 
 #[inline(always)]
-fn store4<S: Simd>(a: &mut [Lane; 4], q: Quaternion<f32x16<S>>) {
+pub(crate) fn store4<S: Simd>(a: &mut [Lane; 4], q: Quaternion<f32x16<S>>) {
     q.v.x.store_array(&mut a[0]);
     q.v.y.store_array(&mut a[1]);
     q.v.z.store_array(&mut a[2]);
@@ -213,7 +276,7 @@ fn store4<S: Simd>(a: &mut [Lane; 4], q: Quaternion<f32x16<S>>) {
 
 impl NodeLanes {
     #[inline(always)]
-    pub(super) fn position<S: Simd>(&self, simd: S) -> V3<f32x16<S>> {
+    pub(crate) fn position<S: Simd>(&self, simd: S) -> V3<f32x16<S>> {
         load3(simd, &self.p)
     }
 
@@ -228,7 +291,7 @@ impl NodeLanes {
     }
 
     #[inline(always)]
-    pub(super) fn set_position<S: Simd>(&mut self, p: V3<f32x16<S>>) {
+    pub(crate) fn set_position<S: Simd>(&mut self, p: V3<f32x16<S>>) {
         store3(&mut self.p, p);
     }
 }
@@ -240,7 +303,8 @@ pub fn step(level: Level, block: &mut BlockLanes, params: &StepParams, obstacles
 
 #[inline(always)]
 fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
-    predict(simd, b, params, obstacles);
+    predict_nodes(simd, b, params.dt, params.skin, obstacles);
+    predict_edges(simd, b, params.dt);
     for _ in 0..params.iterations {
         // The projection is chosen outside the loops, so that each has straight code inside.
         match params.projection {
@@ -248,27 +312,32 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacle
             StretchProjection::Coupled => sweep(simd, b, StretchProjection::Coupled),
             StretchProjection::Printed => sweep(simd, b, StretchProjection::Printed),
         }
-        contacts(simd, b, params, obstacles);
+        contacts(simd, b, params.skin, obstacles);
     }
     for _ in 0..params.limiter_steps {
         limit_lengths(simd, b, false);
-        contacts(simd, b, params, obstacles);
+        contacts(simd, b, params.skin, obstacles);
         // Pressed on something, hair has to fold: the more it has, the better the next pass can.
         for _ in 1..PASSES_IN_TOUCH {
             if b.touched != [0.0; LANES] {
                 limit_lengths(simd, b, true);
-                contacts(simd, b, params, obstacles);
+                contacts(simd, b, params.skin, obstacles);
             }
         }
     }
     velocities(simd, b, params);
 }
 
-/// v is already that of the forces; p* = p + v dt, and orientations from angular velocity likewise:
-/// without the latter a strand is overdamped and never settles.
+/// v is already that of the forces; p* = p + v dt.
 #[inline(always)]
-fn predict<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
-    let dt = f32x16::splat(simd, params.dt);
+pub(crate) fn predict_nodes<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    dt: f32,
+    skin: f32,
+    obstacles: &[Obstacle],
+) {
+    let dt = f32x16::splat(simd, dt);
     let zero = f32x16::splat(simd, 0.0);
     for n in &mut b.nodes {
         let w = load(simd, &n.w);
@@ -278,7 +347,7 @@ fn predict<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles:
         // getting them out gives them no velocity.
         let mut from = p;
         for o in obstacles {
-            if let Some((out, _)) = push_out(o, from, from, zero, params.skin, true) {
+            if let Some((out, _)) = push_out(o, from, from, zero, skin, true) {
                 from = V3::select(held, from, out);
             }
         }
@@ -288,7 +357,12 @@ fn predict<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles:
         store3(&mut n.from, came_from);
         store3(&mut n.p, V3::select(held, p, v.scale_add(dt, from)));
     }
-    let half = f32x16::splat(simd, 0.5 * params.dt);
+}
+
+/// Orientations from angular velocity likewise: without, a strand is overdamped and never settles.
+#[inline(always)]
+fn predict_edges<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
+    let half = f32x16::splat(simd, 0.5 * dt);
     for e in &mut b.edges {
         let q = load4(simd, &e.q);
         let turn = q.after_vector(load3(simd, &e.omega));
@@ -331,8 +405,9 @@ fn sweep<S: Simd>(simd: S, b: &mut BlockLanes, projection: StretchProjection) {
     store3(&mut b.nodes[last].p, p1);
 }
 
+/// Takes nodes out of obstacles, with friction, and notes what touches.
 #[inline(always)]
-fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
+pub(crate) fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, skin: f32, obstacles: &[Obstacle]) {
     b.touched = [0.0; LANES];
     if obstacles.is_empty() {
         return;
@@ -347,7 +422,7 @@ fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles
         let (mut p, mut rests_on) = (load3(simd, &n.p), none);
         for o in obstacles {
             let friction = f32x16::splat(simd, o.friction);
-            if let Some((out, normal)) = push_out(o, p, from, friction, params.skin, false) {
+            if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
                 p = V3::select(held, p, out);
                 let pushed = Real::lt(zero, normal.dot(normal));
                 rests_on = V3::select(pushed, normal, rests_on);

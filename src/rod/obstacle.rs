@@ -75,7 +75,7 @@ impl Obstacle {
 }
 
 #[inline(always)]
-fn splat<R: Real>(like: R, v: Vec3) -> V3<R> {
+pub(crate) fn splat<R: Real>(like: R, v: Vec3) -> V3<R> {
     V3::new(like.lit(v.x.into()), like.lit(v.y.into()), like.lit(v.z.into()))
 }
 

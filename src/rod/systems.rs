@@ -3,7 +3,7 @@
 
 use super::{
     LANES, Solver, Stiffness,
-    block::{BlockLanes, StepParams, put3, put4, step, take3, take4},
+    block::{BlockLanes, StepParams, put3, put4, step},
     obstacle::Obstacle,
 };
 use crate::{
@@ -126,15 +126,11 @@ fn solve(level: Level, block: &mut BlockLanes, items: &mut [Item<'_>], params: &
     for lane in items.len()..LANES {
         block.repeat_lane(0, lane);
     }
-    let (low, high) = block.bounds(params.step.dt);
-    // Nodes may be pulled beyond their prediction, never by more than an edge in a substep.
-    let margin = params.step.skin + block.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
-    let near: Vec<Obstacle> =
-        params.obstacles.iter().filter(|o| o.may_touch(low, high, margin)).copied().collect();
+    let near = block.near(&params.obstacles, params.step.dt, params.step.skin);
     step(level, block, &params.step, &near);
     for (lane, item) in items.iter_mut().enumerate() {
         if block.finite[lane] == 0.0 {
-            scatter(block, lane, item.strand.bypass_change_detection());
+            block.scatter(lane, item.strand.bypass_change_detection());
         } else {
             let remembered = item.bonds.joints.iter().map(|j| j.relaxed(&params.influence));
             item.put_back = item.strand.put_back(remembered);
@@ -143,33 +139,11 @@ fn solve(level: Level, block: &mut BlockLanes, items: &mut [Item<'_>], params: &
 }
 
 fn gather(block: &mut BlockLanes, lane: usize, item: &Item<'_>, stiffness: &Stiffness, dt: f32) {
-    let (positions, velocities, orientations, angular) = item.strand.parts();
-    let lengths = item.strand.rest_lengths();
+    let strand = &*item.strand;
+    block.gather_nodes(lane, strand, item.burden, item.held, dt);
+    let (_, _, orientations, angular) = strand.parts();
+    let lengths = strand.rest_lengths();
     let mean = lengths.iter().sum::<f32>() / lengths.len() as f32;
-    let held = item.held.map_or(&[][..], |h| &h.targets[..]);
-    for (i, node) in block.nodes.iter_mut().enumerate() {
-        let target = match held.get(i) {
-            Some(Some(target)) => Some(*target),
-            _ => (i == 0).then_some(positions[0]),
-        };
-        // Half a cell on either side, so the tip carries half a mass.
-        let before = if i == 0 { 0.0 } else { lengths[i - 1] };
-        let after = lengths.get(i).copied().unwrap_or(0.0);
-        put3(&mut node.from, lane, positions[i]);
-        match target {
-            Some(target) => {
-                put3(&mut node.p, lane, target);
-                put3(&mut node.v, lane, (target - positions[i]) / dt);
-                node.w[lane] = 0.0;
-            }
-            None => {
-                put3(&mut node.p, lane, positions[i]);
-                put3(&mut node.v, lane, velocities[i]);
-                let load = item.burden.mass.get(i).copied().unwrap_or(0.0);
-                node.w[lane] = 2.0 * mean / ((before + after) * (1.0 + load));
-            }
-        }
-    }
     for (i, edge) in block.edges.iter_mut().enumerate() {
         put4(&mut edge.q, lane, orientations[i]);
         put3(&mut edge.omega, lane, angular[i]);
@@ -178,18 +152,5 @@ fn gather(block: &mut BlockLanes, lane: usize, item: &Item<'_>, stiffness: &Stif
         put4(&mut edge.rest, lane, item.rest.darboux[i]);
         edge.k[lane] = item.rest.stiffness[i];
     }
-    put4(&mut block.root, lane, item.strand.root_frame());
-}
-
-fn scatter(block: &BlockLanes, lane: usize, strand: &mut Strand) {
-    let (positions, velocities, orientations, angular) = strand.parts_mut();
-    for (i, node) in block.nodes.iter().enumerate() {
-        positions[i] = take3(&node.p, lane);
-        velocities[i] = take3(&node.v, lane);
-    }
-    for (i, edge) in block.edges.iter().enumerate() {
-        orientations[i] = take4(&edge.q, lane);
-        angular[i] = take3(&edge.omega, lane);
-    }
-    strand.stepped_well();
+    put4(&mut block.root, lane, strand.root_frame());
 }

@@ -2,19 +2,20 @@
 
 use super::{
     Springs,
-    model::{Scratch, step},
+    block::{SpringLanes, StepParams, step},
 };
 use crate::{
     air::HairGravity,
     contact::{LockContact, Obstacles},
     fault::{Fault, HairFault},
     parallel::for_each_block,
-    rod::{algebra::V3, obstacle::Obstacle, project},
+    rod::{LANES, block::put4, obstacle::Obstacle, project},
     setting::{self, Settings},
     strand::{Burden, HeldNodes, PutBack, Strand, StrandModel, StrandOf, TickPose},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use fearless_simd::Level;
 
 /// Mass-spring strands.
 pub struct SpringPlugin;
@@ -28,27 +29,14 @@ impl Plugin for SpringPlugin {
 
 /// What one hair's strands share in a substep.
 struct HairParams {
-    springs: Springs,
+    step: StepParams,
     obstacles: Vec<Obstacle>,
-    skin: f32,
-    gravity: Vec3,
-}
-
-/// How many strands are one piece of work.
-const BLOCK: usize = 16;
-
-/// Room for the work on one strand.
-#[derive(Default)]
-struct Room {
-    positions: Vec<Vec3>,
-    velocities: Vec<Vec3>,
-    step: Scratch,
 }
 
 struct Item<'a> {
     entity: Entity,
     hair: usize,
-    strand: &'a mut Strand,
+    strand: Mut<'a, Strand>,
     burden: &'a Burden,
     held: Option<&'a HeldNodes>,
     put_back: Option<PutBack>,
@@ -72,25 +60,31 @@ fn step_springs(
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let (obstacles, pose) = hairs.get(of.0).ok()?;
             (model.of(of.0) == StrandModel::MassSpring).then(|| {
-                params.push(HairParams {
+                let step = StepParams {
+                    dt: time.dt,
                     springs: springs.of(of.0),
-                    obstacles: obstacles.solids.clone(),
-                    skin: contact.of(of.0).radius,
                     gravity: pose.now().direction_in(gravity),
-                });
+                    skin: contact.of(of.0).radius,
+                };
+                params.push(HairParams { step, obstacles: obstacles.solids.clone() });
                 params.len() - 1
             })
         });
         if let Some(hair) = index
             && strand.nodes() >= 2
         {
-            let strand = strand.into_inner();
             items.push(Item { entity, hair, strand, burden, held, put_back: None });
         }
     }
-    let mut blocks: Vec<&mut [Item<'_>]> = items.chunks_mut(BLOCK).collect();
-    for_each_block(&mut blocks, default, |scratch, block| {
-        block.iter_mut().for_each(|item| advance(item, &params[item.hair], time.dt, scratch));
+    // As with rods: how strands are grouped changes no bit of the result.
+    items.sort_by_key(|item| (item.hair, item.strand.nodes()));
+    let mut blocks: Vec<&mut [Item<'_>]> = items
+        .chunk_by_mut(|a, b| (a.hair, a.strand.nodes()) == (b.hair, b.strand.nodes()))
+        .flat_map(|alike| alike.chunks_mut(LANES))
+        .collect();
+    let level = Level::new();
+    for_each_block(&mut blocks, SpringLanes::default, |block, items| {
+        solve(level, block, items, &params[items[0].hair]);
     });
     for item in &items {
         if let Some(how) = item.put_back {
@@ -103,49 +97,28 @@ fn step_springs(
     }
 }
 
-/// One strand through one substep.
-fn advance(item: &mut Item<'_>, params: &HairParams, dt: f32, scratch: &mut Room) {
-    let HairParams { springs, obstacles, skin, gravity } = params;
-    let held = |i: usize| item.held.and_then(|h| h.targets.get(i).copied().flatten());
-    let inverse_mass = |i: usize| {
-        let load = item.burden.mass.get(i).copied().unwrap_or(0.0);
-        if i == 0 || held(i).is_some() { 0.0 } else { 1.0 / (1.0 + load) }
-    };
-    let Room { positions, velocities, step: inner } = scratch;
-    positions.clear();
-    positions.extend_from_slice(item.strand.positions());
-    velocities.clear();
-    velocities.extend_from_slice(item.strand.velocities());
-    for (i, v) in velocities.iter_mut().enumerate() {
-        if let Some(target) = held(i) {
-            *v = (target - positions[i]) / dt;
-        } else if i == 0 {
-            *v = Vec3::ZERO;
+/// One block through one substep.
+fn solve(level: Level, block: &mut SpringLanes, items: &mut [Item<'_>], params: &HairParams) {
+    let HairParams { step: params, obstacles } = params;
+    let strands = &mut block.strands;
+    strands.resize(items[0].strand.nodes());
+    for (lane, item) in items.iter().enumerate() {
+        strands.gather_nodes(lane, &item.strand, item.burden, item.held, params.dt);
+        for (i, edge) in strands.edges.iter_mut().enumerate() {
+            edge.l[lane] = item.strand.rest_lengths()[i];
+            put4(&mut edge.q, lane, item.strand.orientations()[i]);
         }
     }
-    let out = |p: Vec3, from: Vec3| {
-        obstacles.iter().fold(p, |p, obstacle| push_out(obstacle, p, from, *skin))
-    };
-    let lengths = item.strand.rest_lengths();
-    step(positions, velocities, lengths, inverse_mass, springs, *gravity, dt, inner, out);
-    if positions.iter().chain(&*velocities).all(|v| v.is_finite()) {
-        item.strand.take_over(positions, velocities);
-        item.strand.stepped_well();
-    } else {
-        item.put_back = item.strand.put_back(core::iter::empty());
+    for lane in items.len()..LANES {
+        strands.repeat_lane(0, lane);
     }
-}
-
-/// Out of a solid, held back along its surface by friction as far as it has got in.
-fn push_out(obstacle: &Obstacle, p: Vec3, from: Vec3, skin: f32) -> Vec3 {
-    let (normal, depth) = obstacle.solid.depth(V3::new(p.x, p.y, p.z), skin);
-    if depth.is_nan() || depth <= 0.0 {
-        return p;
+    let near = strands.near(obstacles, params.dt, params.skin);
+    step(level, block, params, &near);
+    for (lane, item) in items.iter_mut().enumerate() {
+        if block.strands.finite[lane] == 0.0 {
+            block.strands.scatter(lane, item.strand.bypass_change_detection());
+        } else {
+            item.put_back = item.strand.put_back(core::iter::empty());
+        }
     }
-    let normal = Vec3::new(normal.x, normal.y, normal.z);
-    let out = p + normal * depth;
-    let from = obstacle.motion.map_or(from, |motion| motion.transform_point3(from));
-    let slip = (out - from).reject_from_normalized(normal);
-    let length = slip.length();
-    out - slip * (obstacle.friction * depth / length.max(1e-12)).min(1.0)
 }

@@ -304,19 +304,6 @@ impl Strand {
         (&self.positions, &mut self.velocities, &self.rest_lengths)
     }
 
-    /// Takes over positions and velocities from a model without orientations of its own: edges turn
-    /// with their nodes by the shortest way.
-    pub(crate) fn take_over(&mut self, positions: &[Vec3], velocities: &[Vec3]) {
-        self.positions.copy_from_slice(positions);
-        self.velocities.copy_from_slice(velocities);
-        self.angular_velocities.fill(Vec3::ZERO);
-        for (q, p) in self.orientations.iter_mut().zip(self.positions.windows(2)) {
-            if let Some(to) = (p[1] - p[0]).try_normalize() {
-                *q = (Quat::from_rotation_arc(*q * Vec3::Z, to) * *q).normalize();
-            }
-        }
-    }
-
     pub(crate) fn parts_mut(&mut self) -> (&mut [Vec3], &mut [Vec3], &mut [Quat], &mut [Vec3]) {
         (
             &mut self.positions,

@@ -1,0 +1,113 @@
+//! `cargo bench --bench water`: the wet-hair paper's table, a frame of 10,000 strands of 6 nodes among
+//! droplets, in both strand models beside the paper's own times; and what it costs a node to ask who
+//! pulls at it.
+//!
+//! The scene is `wet` of the examples, which looks for the largest strain after every substep; that is
+//! counted. Both models are run in turns and of each the best is kept.
+
+#[path = "../examples/scenes/mod.rs"]
+mod scenes;
+
+use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy_keratin::{grid::UniformGrid, prelude::*};
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+use scenes::{Moment, Scene, SceneKind, ScenePlugin, Strewn, measure::StrainPeak};
+use std::{
+    hint::black_box,
+    time::{Duration, Instant},
+};
+
+/// Droplets, and a frame with them in the paper's table (ms).
+const PAPER: [(usize, Option<f64>); 7] = [
+    (0, Some(22.4)),
+    (20, Some(46.9)),
+    (40, Some(57.9)),
+    (60, Some(71.7)),
+    (80, Some(78.0)),
+    (100, Some(78.9)),
+    (1000, None),
+];
+
+/// How far a droplet of the scene pulls (m).
+const REACH: f32 = 0.015;
+
+fn main() {
+    println!("droplets | paper, GT 630, ms | rods, ms | springs, ms | peak strain of each");
+    for (count, paper) in PAPER {
+        let mut apps = ["rods", "springs"].map(|variant| wet(variant, count));
+        let mut best = [f64::INFINITY; 2];
+        for _ in 0..20 {
+            for (best, app) in best.iter_mut().zip(&mut apps) {
+                let start = Instant::now();
+                app.update();
+                *best = best.min(start.elapsed().as_secs_f64() * 1e3);
+            }
+        }
+        let paper = paper.map_or("–".into(), |ms| ms.to_string());
+        let [a, b] = apps.map(|app| app.world().resource::<StrainPeak>().0);
+        println!("{count} | {paper} | {:.2} | {:.2} | {a:.4} {b:.4}", best[0], best[1]);
+    }
+    println!("\ndroplets, equally dense | a query, ns");
+    for count in [1_000, 10_000, 100_000] {
+        println!("{count} | {:.1}", query(count) * 1e9);
+    }
+}
+
+/// The scene half a second after its droplets have fallen.
+fn wet(variant: &str, count: usize) -> App {
+    let scene = Scene::new(SceneKind::Wet, Some(variant)).expect("a variant of the scene");
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, HairPlugins::default(), ScenePlugin(scene)))
+        .insert_resource(Strewn { count, ..default() })
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    app.finish();
+    app.cleanup();
+    let frames = ((Moment::STREWN + 0.5) * 60.0) as usize;
+    (0..frames).for_each(|_| app.update());
+    app
+}
+
+/// Seconds that a node takes to visit the droplets that pull at it, as strands do: each droplet is in
+/// every cell that it reaches, a node looks into its own.
+fn query(count: usize) -> f64 {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
+    let side = 0.4 * (count as f32 / 1000.0).cbrt();
+    let mut place = || Vec3::from_array([0.0; 3].map(|_: f32| random.random_range(0.0..side)));
+    let drops: Vec<Vec3> = (0..count).map(|_| place()).collect();
+    let nodes: Vec<Vec3> = (0..10_000)
+        .flat_map(|_| {
+            let root = place();
+            (0..6).map(move |i| root + Vec3::NEG_Y * (0.048 * i as f32))
+        })
+        .collect();
+    let mut grid = UniformGrid::default();
+    grid.begin(2.0 * REACH);
+    for (drop, i) in drops.iter().zip(0..) {
+        let (low, high) = (grid.cell_of(*drop - REACH), grid.cell_of(*drop + REACH));
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                for x in low.x..=high.x {
+                    grid.put(IVec3::new(x, y, z), i);
+                }
+            }
+        }
+    }
+    grid.sort();
+    let mut best = f64::INFINITY;
+    for _ in 0..20 {
+        let start = Instant::now();
+        let mut pull = Vec3::ZERO;
+        for node in &nodes {
+            grid.for_each_at(*node, |i| {
+                let offset = drops[i as usize] - *node;
+                if offset.length_squared() < REACH * REACH {
+                    pull += offset;
+                }
+            });
+        }
+        black_box(pull);
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    best / nodes.len() as f64
+}
