@@ -490,8 +490,17 @@ fn water_is_drawn_as_beads_as_long_as_there_is_any() {
         radius: 15e-3,
         velocity,
     };
+    #[derive(Resource, Default)]
+    struct Wanted(Vec<Bead>);
+    let add = |wanted: Res<Wanted>, mut beads: ResMut<HairBeads>| {
+        if !(wanted.0.is_empty() && beads.is_empty()) {
+            **beads = wanted.0.clone();
+        }
+    };
+    let add = add.after(HairBeadSystems).before(HairRenderSystems);
+    scene.app.init_resource::<Wanted>().add_systems(PostUpdate, add);
     let mut draw = |beads: Vec<Bead>| {
-        **scene.app.world_mut().resource_mut::<HairBeads>() = beads;
+        scene.app.world_mut().resource_mut::<Wanted>().0 = beads;
         let picture = scene.draw();
         assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
         picture
@@ -520,4 +529,121 @@ fn water_is_drawn_as_beads_as_long_as_there_is_any() {
     let broken = Bead { position: Vec3::NAN, ..bead(0.0, 0.0, Vec3::ZERO) };
     assert_eq!(draw(vec![broken; 3]).covered(BLACK), 0);
     assert_eq!(draw(vec![]).covered(BLACK), 0, "no water, no beads");
+}
+
+#[test]
+fn soaked_hair_is_darker_and_droplets_are_seen() {
+    let Some(mut scene) = Offscreen::new(160, 160) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.7), Vec3::ZERO);
+    sun(&mut scene, Vec3::new(0.3, 0.5, 1.0), false);
+    // Locks do not draw together, so that the same pixels are compared.
+    let followers = HairFollowers { wet_clump: 0.0, ..HairFollowers::new(300) };
+    let hair = hair(&mut scene, &curtain(12, 0.3), (wide(1e-3), followers));
+    let tick = |scene: &mut Offscreen| {
+        scene.ticking(1);
+        (0..2).for_each(|_| scene.app.update());
+        scene.ticking(0);
+        scene.draw()
+    };
+    let brightness = |picture: &Picture| {
+        picture.mean_luma() * (picture.width * picture.height) as f32
+            / picture.covered(BLACK) as f32
+    };
+    let dry = tick(&mut scene);
+    scene.app.world_mut().write_message(Soak { target: hair, wetness: 1.0 });
+    let wet = tick(&mut scene);
+    let (light, dark) = (brightness(&dry), brightness(&wet));
+    println!("hair has a mean luma of {light} dry, {dark} soaked");
+    assert!(dry.covered(BLACK) > 1000 && dark < 0.85 * light);
+    scene.app.world_mut().write_message(Soak { target: hair, wetness: 0.0 });
+    let again = brightness(&tick(&mut scene));
+    println!("and {again} dried");
+    assert!((again - light).abs() < 0.03 * light);
+
+    scene.app.world_mut().despawn(hair);
+    assert_eq!(scene.draw().covered(BLACK), 0);
+    // A drop of 25 mm, which is where it is as soon as it is, and gone as soon as it is gone.
+    let place = Vec3::new(0.05, -0.03, 0.0);
+    let drop = Droplet::new(place, 6.5e-5).unwrap();
+    let drop = scene.app.world_mut().spawn(drop).id();
+    for place in [place, Vec3::new(-0.06, 0.05, 0.1)] {
+        scene.app.world_mut().get_mut::<Droplet>(drop).unwrap().position = place;
+        let picture = scene.draw();
+        let at = scene.project(place).unwrap();
+        let bright: Vec<Vec2> = (0..160 * 160)
+            .map(|i| UVec2::new(i % 160, i / 160))
+            .filter(|p| luma(picture.at(p.x, p.y)) > 3.0)
+            .map(|p| p.as_vec2())
+            .collect();
+        let centre = bright.iter().sum::<Vec2>() / bright.len().max(1) as f32;
+        println!("a drop at {at} is seen around {centre} on {} pixels", bright.len());
+        assert!(bright.len() > 15 && centre.distance(at) < 5.0);
+    }
+    scene.app.world_mut().despawn(drop);
+    assert_eq!(scene.draw().covered(BLACK), 0, "no water, no beads");
+}
+
+/// Bevy quits when the device is lost, unless the app says how to go on.
+#[test]
+fn hair_and_water_outlive_a_lost_device() {
+    use bevy::light::cluster::GlobalClusterSettings;
+    use bevy::render::{
+        error_handler::{RenderErrorHandler, RenderErrorPolicy},
+        render_resource::PollType,
+        renderer::RenderDevice,
+        settings::WgpuSettings,
+    };
+    let Some(mut scene) = Offscreen::new(120, 120) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
+    let view = HairView::Bond(BondKind::Hydrogen);
+    let parts = (wide(2e-3), HairFollowers::new(100), view);
+    let hair = hair(&mut scene, &curtain(12, 0.2), parts);
+    let drop = Droplet::new(Vec3::new(0.0, 0.13, 0.0), 4.2e-6).unwrap();
+    scene.app.world_mut().spawn(drop);
+    scene.draw();
+    // Since its buffers were made the hair has moved.
+    for strand in strands_of(&scene, hair) {
+        let mut strand = scene.app.world_mut().get_mut::<Strand>(strand).unwrap();
+        strand.positions_mut().iter_mut().for_each(|p| p.y -= 0.03);
+    }
+    let before = scene.draw();
+    scene.app.insert_resource(RenderErrorHandler(|error, _, _| {
+        println!("{:?}: {}", error.ty, error.description);
+        RenderErrorPolicy::Recover(WgpuSettings::default().into())
+    }));
+    let device = scene.app.world().resource::<RenderDevice>().clone();
+    // Bevy 0.19.1 itself panics as it goes if it sorts lights on the device or draws meanwhile.
+    let mut lights = scene.app.world_mut().resource_mut::<GlobalClusterSettings>();
+    lights.gpu_clustering = None;
+    let look = |scene: &mut Offscreen, on: bool| {
+        scene.app.world_mut().get_mut::<Camera>(scene.camera).unwrap().is_active = on;
+        (0..3).for_each(|_| scene.app.update());
+    };
+    look(&mut scene, false);
+    device.wgpu_device().destroy();
+    let _ = device.poll(PollType::Poll);
+    #[derive(Resource, Default)]
+    struct Renewed(u32);
+    let count = |device: Res<RenderDevice>, mut renewed: ResMut<Renewed>| {
+        renewed.0 += u32::from(device.is_changed());
+    };
+    scene.app.init_resource::<Renewed>().add_systems(Update, count);
+    let mut frames = 0;
+    // The system sees the first device as new as well.
+    while scene.app.world().resource::<Renewed>().0 < 2 && frames < 300 {
+        scene.app.update();
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        frames += 1;
+    }
+    println!("{frames} frames until there is another device");
+    assert!(frames < 300);
+    look(&mut scene, false);
+    look(&mut scene, true);
+    let after = scene.draw();
+    assert!(before.covered(BLACK) > 1000);
+    assert!(after == before, "{} and {} pixels", before.covered(BLACK), after.covered(BLACK));
 }

@@ -42,7 +42,7 @@ impl Orbit {
             SceneKind::Bedhead => (Vec3::new(-0.03, 0.235, 0.0), 0.32, 0.13, 1.04),
             SceneKind::BlowDry => (Vec3::new(-0.03, 0.24, 0.0), 0.45, 0.2, 1.08),
             SceneKind::Perm => (Vec3::new(0.0, 0.465, 0.0), 0.6, 0.08, 1.42),
-            SceneKind::Wet => (Vec3::new(0.0, 0.37, 0.0), 0.3, 0.1, 1.15),
+            SceneKind::Wet => (Vec3::new(0.0, 0.26, 0.0), 0.3, 0.1, 1.15),
             SceneKind::Shower => (Vec3::new(-0.06, 0.235, 0.0), 0.32, 0.13, 1.08),
         };
         Self { focus, yaw, pitch, distance, shift: 0.0 }

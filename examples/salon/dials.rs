@@ -322,7 +322,7 @@ impl Settings<'_, '_> {
             scale(ui, "dry", "soaked");
         }
         let mut lines = self.gizmos.config::<HairGizmos>().0.enabled;
-        if ui.checkbox(&mut lines, "colliders, wind and rods as lines").changed() {
+        if ui.checkbox(&mut lines, "colliders, wind, showers, rods as lines").changed() {
             self.gizmos.config_mut::<HairGizmos>().0.enabled = lines;
         }
         if view != self.view.0 {

@@ -44,7 +44,7 @@ use std::{path::PathBuf, process::ExitCode};
 #[derive(Parser)]
 #[command(version)]
 pub struct Arguments {
-    /// Which scene: bedhead, blow-dry, perm.
+    /// Which scene: bedhead, blow-dry, perm, wet, shower.
     #[arg(long, default_value = "bedhead")]
     scene: SceneKind,
     /// Which variant of it; the full treatment if left out.
@@ -53,7 +53,7 @@ pub struct Arguments {
     /// What is shown of the hair.
     #[arg(long, default_value = "natural")]
     view: View,
-    /// Shows colliders, wind and rods as lines.
+    /// Shows colliders, wind, showers and rods as lines.
     #[arg(long)]
     gizmos: bool,
     /// Draws no window, but PNGs into this folder.

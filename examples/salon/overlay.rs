@@ -1,4 +1,4 @@
-//! What is invisible, as lines: colliders, the wind of blowers, rods.
+//! What is invisible, as lines: colliders, the wind of blowers, the cone of showers, rods.
 //!
 //! Here and not in the crate, because Bevy's gizmos are a feature that a game need not have. Switched
 //! and styled by the config of [`HairGizmos`], as all gizmos are.
@@ -17,14 +17,14 @@ impl Plugin for OverlayPlugin {
     fn build(&self, app: &mut App) {
         let config = GizmoConfig { enabled: false, depth_bias: -0.2, ..default() };
         let shown = |store: Res<GizmoConfigStore>| store.config::<HairGizmos>().0.enabled;
-        // Water's droplets and shower belong here too.
         app.insert_gizmo_config(HairGizmos, config)
-            .add_systems(PostUpdate, (colliders, blowers, rods).run_if(shown));
+            .add_systems(PostUpdate, (colliders, blowers, showers, rods).run_if(shown));
     }
 }
 
 const SOLID: Color = Color::srgb(0.35, 0.85, 0.45);
 const WIND: Color = Color::srgb(0.4, 0.75, 1.0);
+const WATER: Color = Color::srgb(0.3, 0.55, 1.0);
 const ROD: Color = Color::srgb(0.85, 0.5, 0.95);
 
 /// How far wind is drawn (m), and into which angle (rad).
@@ -73,6 +73,24 @@ fn blowers(mut gizmos: Gizmos<HairGizmos>, blowers: Query<(&Blower, &GlobalTrans
         }
         let length = REACH * (blower.strength / 10.0).clamp(0.05, 1.0);
         gizmos.arrow(mouth, mouth + ahead * length, WIND);
+    }
+}
+
+/// Where the drops of a shower may fly, as long as they fly straight: one cone for the plate's rim.
+fn showers(mut gizmos: Gizmos<HairGizmos>, showers: Query<(&Shower, &GlobalTransform)>) {
+    for (shower, place) in &showers {
+        let (_, rotation, plate) = place.to_scale_rotation_translation();
+        let end = plate + place.forward() * REACH;
+        let rim = shower.opening + REACH * shower.spread.min(1.4).tan();
+        gizmos.circle(Isometry3d::new(plate, rotation), shower.opening, WATER);
+        gizmos.circle(Isometry3d::new(end, rotation), rim, WATER);
+        for k in 0..8 {
+            let (sin, cos) = (TAU * k as f32 / 8.0).sin_cos();
+            let way = rotation * Vec3::new(cos, sin, 0.0);
+            gizmos.line(plate + way * shower.opening, end + way * rim, WATER.with_alpha(0.5));
+        }
+        let length = REACH * (shower.speed / 5.0).clamp(0.05, 1.0);
+        gizmos.arrow(plate, plate + place.forward() * length, WATER);
     }
 }
 

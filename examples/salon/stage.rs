@@ -2,7 +2,7 @@
 
 use crate::{
     mannequin,
-    scenes::{HEAD_RADIUS, Model, Scene, SceneKind},
+    scenes::{BUST_HIGH, HEAD_RADIUS, Model, Scene, SceneKind},
     solid::{Paint, lathe},
 };
 use bevy::prelude::*;
@@ -123,7 +123,7 @@ pub fn embody(
             Model::Rod(radius, length) => rod(&mut commands, &mut paint, entity, radius, length),
             Model::Blower => blower(&mut commands, &mut paint, entity),
             Model::Shower => shower(&mut commands, &mut paint, &studio, entity),
-            Model::Bust(radius) => bust(&mut commands, &studio, entity, radius),
+            Model::Bust(radius) => bust(&mut commands, &mut paint, &studio, entity, radius),
         }
     }
 }
@@ -158,14 +158,32 @@ fn head(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity,
     });
 }
 
-/// The training head upright, its crown where the ball's is that the hair feels.
-fn bust(commands: &mut Commands, studio: &Studio, on: Entity, radius: f32) {
+/// The training head upright on a column, its crown where the ball's is that the hair feels.
+fn bust(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity, radius: f32) {
     // It is made lying: the crown at +X, the face at +Y.
     let upright = Quat::from_rotation_y(FRAC_PI_2) * Quat::from_rotation_z(FRAC_PI_2);
     const CROWN: f32 = 0.118;
+    // The skull is slimmer than the ball by that much.
+    let broad = Vec3::new(1.0, 1.0, 1.12);
+    let end = radius - CROWN + mannequin::BUST_END;
+    // From the floor up to within the bust, which is a little behind its own axis.
+    let column = [
+        Vec2::new(0.125, -BUST_HIGH - 0.012),
+        Vec2::new(0.125, -BUST_HIGH + 0.012),
+        Vec2::new(0.118, -BUST_HIGH + 0.019),
+        Vec2::new(0.050, -BUST_HIGH + 0.022),
+        Vec2::new(0.042, -BUST_HIGH + 0.032),
+        Vec2::new(0.042, end - 0.012),
+        Vec2::new(0.060, end - 0.004),
+        Vec2::new(0.060, end + 0.01),
+        Vec2::new(0.0, end + 0.01),
+    ];
+    let column = paint.meshes.add(lathe(&column, 64));
+    let dark = paint.matte(Color::srgb(0.09, 0.085, 0.085), 0.45);
     commands.entity(on).with_children(|head| {
         let place = Transform::from_xyz(0.0, radius - CROWN, 0.0).with_rotation(upright);
-        head.spawn(part(studio.head.clone(), studio.skin.clone(), place));
+        head.spawn(part(studio.head.clone(), studio.skin.clone(), place.with_scale(broad)));
+        head.spawn(part(column, dark, Transform::from_xyz(0.0, 0.0, -0.02)));
     });
 }
 

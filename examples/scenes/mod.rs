@@ -25,7 +25,7 @@ use bevy_keratin::{DropletRules, prelude::*};
 use core::{fmt, str::FromStr};
 
 #[allow(unused_imports, reason = "each example uses its own part")]
-pub use script::{Director, Moment};
+pub use script::{BUST_HIGH, Director, Moment};
 
 /// Which story is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

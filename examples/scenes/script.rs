@@ -75,7 +75,7 @@ const WINDING: f32 = 4.0;
 const HIGH: f32 = 0.28;
 const LOW: f32 = 0.04;
 const PERM_HIGH: f32 = 0.60;
-const BUST_HIGH: f32 = 0.40;
+pub const BUST_HIGH: f32 = 0.40;
 /// How far the head slides while it comes down, so that the hair lies to one side (m).
 const SLIDE: f32 = -0.08;
 

@@ -5,7 +5,7 @@
 //! sphere is shaded; the squares are counted by a mesh and pulled from one buffer, as ribbons are.
 
 use super::{HairRenderSystems, Interpolate, supported};
-use crate::Droplet;
+use crate::{Droplet, DropletRules, HairGravity};
 use bevy::{
     asset::{RenderAssetUsages, embedded_asset},
     camera::{primitives::Aabb, visibility::NoAutoAabb},
@@ -74,10 +74,16 @@ pub struct HairBeads(pub Vec<Bead>);
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairBeadSystems;
 
-/// Droplets where they are between two ticks.
+/// How long a drop takes to sink into itself where it lies (s), and how far, as a share of its radius.
+const SINKING: f32 = 0.06;
+const SUNK: f32 = 0.6;
+
+/// Droplets where they are between two ticks. Lying ones are caps, not balls: the lower part is in what
+/// they lie on; and smaller the more of them has run off.
 pub(super) fn show_droplets(
     mut beads: ResMut<HairBeads>,
     droplets: Query<&Droplet>,
+    (rules, gravity): (Option<Res<DropletRules>>, Option<Res<HairGravity>>),
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
 ) {
     if droplets.is_empty() && beads.is_empty() {
@@ -89,11 +95,20 @@ pub(super) fn show_droplets(
         }
         _ => 0.0,
     };
+    let longest = rules.map_or(2.0, |rules| rules.lying).max(SINKING);
+    let down = gravity.map_or(Vec3::NEG_Y, |gravity| gravity.normalize_or_zero());
     beads.clear();
-    beads.extend(droplets.iter().map(|drop| Bead {
-        position: drop.position - drop.velocity * late,
-        radius: drop.radius(),
-        velocity: drop.velocity,
+    beads.extend(droplets.iter().map(|drop| {
+        let position = drop.position - drop.velocity * late;
+        let radius = drop.radius();
+        if drop.lying <= 0.0 {
+            return Bead { position, radius, velocity: drop.velocity };
+        }
+        let sunk = SUNK * (drop.lying / SINKING).min(1.0);
+        let left = (1.0 - drop.lying / longest).clamp(0.0, 1.0).sqrt();
+        // It stands on what is under it as it shrinks; water that sinks goes to the sides.
+        let position = position + down * (radius * (1.0 - left * (1.0 - sunk)));
+        Bead { position, radius: radius * left * (1.0 + 0.3 * sunk), velocity: Vec3::ZERO }
     }));
 }
 
@@ -202,7 +217,7 @@ fn pack(
         return;
     }
     let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
-    drawn.buffer = buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::RENDER_WORLD));
+    drawn.buffer = buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::default()));
     let parts = (
         Name::new("drawn beads"),
         Mesh3d(meshes.add(quads(room as u32))),
@@ -227,7 +242,9 @@ fn upload(
         return;
     };
     let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
+    // Not in the frame in which a new device's queue stands beside buffers of a lost one.
     if let Some(gpu) = buffers.get(&drawn.buffer)
+        && !queue.is_changed()
         && gpu.buffer.size() == bytes.len() as u64
     {
         queue.write_buffer(&gpu.buffer, 0, bytes);
@@ -237,7 +254,7 @@ fn upload(
 /// A mesh of nothing but counted corners: four for each bead.
 fn quads(count: u32) -> Mesh {
     let indices = (0..count).flat_map(|i| [0, 1, 2, 2, 1, 3].map(|corner| 4 * i + corner));
-    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
         .with_inserted_attribute(CORNER, VertexAttributeValues::Uint32((0..4 * count).collect()))
         .with_inserted_indices(Indices::U32(indices.collect()))
 }

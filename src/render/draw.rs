@@ -16,7 +16,7 @@ use bevy::{
     asset::RenderAssetUsages,
     camera::{primitives::Aabb, visibility::NoAutoAabb},
     prelude::*,
-    render::storage::ShaderBuffer,
+    render::{renderer::RenderDevice, storage::ShaderBuffer},
 };
 
 /// Whether drawing goes between ticks by the overstep of the fixed clock.
@@ -90,6 +90,7 @@ pub(super) fn pack(
     mut drawn: Query<(&mut Aabb, &MeshMaterial3d<RibbonMaterial>)>,
     (looks, views, followers): (Settings<HairLook>, Settings<HairView>, Settings<HairFollowers>),
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
+    device: Option<Res<RenderDevice>>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<RibbonMaterial>>,
     mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
@@ -98,6 +99,7 @@ pub(super) fn pack(
         Some(time) if interpolate.0 => time.overstep_fraction().clamp(0.0, 1.0),
         _ => 1.0,
     };
+    let new_device = device.is_some_and(|device| device.is_changed());
     for (hair, mut packed, buffers, members, place) in &mut hairs {
         let packed = packed.bypass_change_detection();
         let guides = || members.into_iter().flat_map(|m| m.iter());
@@ -121,6 +123,10 @@ pub(super) fn pack(
         }
         if !regroomed && let Some(((mut bounds, material), buffers)) = known {
             bounds.set_if_neq(around(packed.margin));
+            // A device that takes a lost one's place is given all buffers; these nodes are of now.
+            if new_device && let Some(mut nodes) = shader_buffers.get_mut(&buffers.nodes) {
+                nodes.data = Some(bytemuck::cast_slice(&packed.nodes).to_vec());
+            }
             let counts = (buffers.guide_count, buffers.strand_count);
             let ribbon = packed.ribbon(&look, &settings, view, counts);
             if (packed.ribbon, packed.key) != (ribbon, key) {
@@ -143,8 +149,9 @@ pub(super) fn pack(
             [first - guide.nodes, guide.nodes]
         });
         let ranges: Vec<[u32; 2]> = ranges.collect();
+        // Kept here as well, for the case that the device is lost and another takes its place.
         let mut add = |bytes: &[u8]| {
-            shader_buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::RENDER_WORLD))
+            shader_buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::default()))
         };
         let material = RibbonMaterial {
             key,

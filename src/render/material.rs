@@ -168,7 +168,7 @@ pub(super) fn ribbon_mesh(strands: u32, segments: u32) -> Mesh {
             indices.extend([a, a + 1, a + 2, a + 2, a + 1, a + 3]);
         }
     }
-    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
         .with_inserted_attribute(CORNER, VertexAttributeValues::Uint32(corners))
         .with_inserted_indices(Indices::U32(indices))
 }

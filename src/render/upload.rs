@@ -26,6 +26,10 @@ fn upload(
     let (Some(buffers), Some(queue)) = (buffers, queue) else {
         return;
     };
+    // Until the frame after, a new device's queue stands beside buffers of a lost one.
+    if queue.is_changed() {
+        return;
+    }
     for (hair, packed) in &hairs {
         let bytes: &[u8] = bytemuck::cast_slice(&packed.nodes);
         if let Some(gpu) = buffers.get(&hair.nodes)

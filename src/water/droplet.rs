@@ -40,7 +40,7 @@ pub struct Droplet {
     /// How many strands are at it.
     pub(super) company: u32,
     /// For how long it has lain on a collider (s).
-    pub(super) lying: f32,
+    pub(crate) lying: f32,
 }
 
 /// What carries a drop.
