@@ -11,7 +11,7 @@
 
 use super::{
     algebra::V3,
-    block::{BlockLanes, load},
+    block::{BlockLanes, NodeLanes, load},
     lanes::{LANES, Real},
 };
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -44,7 +44,7 @@ fn span<S: Simd>(simd: S, from: V3<f32x16<S>>, to: V3<f32x16<S>>) -> (V3<f32x16<
 
 /// x · W y of node `i`.
 #[inline(always)]
-fn mobility<S: Simd, const TOUCHING: bool>(
+pub(crate) fn mobility<S: Simd, const TOUCHING: bool>(
     simd: S,
     b: &BlockLanes,
     i: usize,
@@ -61,6 +61,21 @@ fn mobility<S: Simd, const TOUCHING: bool>(
     }
 }
 
+/// What a force on a node comes to where an obstacle bears it; a node that is pulled off is let go.
+#[inline(always)]
+pub(crate) fn along_support<S: Simd>(
+    simd: S,
+    node: &mut NodeLanes,
+    force: V3<f32x16<S>>,
+) -> V3<f32x16<S>> {
+    let (zero, firmness) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, FIRMNESS));
+    let n = node.support(simd);
+    let off = force.dot(n);
+    let lifts = Real::lt(zero, off);
+    node.set_support(V3::select(lifts, V3::new(zero, zero, zero), n));
+    V3::select(lifts, force, n.scale_add(-(firmness * off), force))
+}
+
 /// `TOUCHING` heeds obstacles; where there are none it changes no bit.
 #[inline(always)]
 fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_only: bool) {
@@ -68,7 +83,6 @@ fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_on
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     // Pivots below this belong to edges with both ends held: nothing there can move.
     let tiny = f32x16::splat(simd, 1e-6);
-    let firmness = f32x16::splat(simd, FIRMNESS);
     let touched = load(simd, &b.touched);
     let mut end = b.nodes[1].position(simd);
     let (mut d, mut length) = span(simd, b.nodes[0].position(simd), end);
@@ -110,11 +124,7 @@ fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_on
         let p = node.position(simd);
         let mut force = pull - tension;
         if TOUCHING {
-            let n = node.support(simd);
-            let off = force.dot(n);
-            let lifts = Real::lt(zero, off);
-            node.set_support(V3::select(lifts, V3::new(zero, zero, zero), n));
-            force = V3::select(lifts, force, n.scale_add(-(firmness * off), force));
+            force = along_support(simd, node, force);
         }
         let moved = force.scale_add(w, p);
         let moves = Real::lt(zero, touched);

@@ -20,7 +20,7 @@ pub mod block;
 pub mod constraint;
 pub mod frame;
 pub mod lanes;
-mod limiter;
+pub(crate) mod limiter;
 pub mod obstacle;
 pub mod stiffness;
 mod systems;
