@@ -212,7 +212,7 @@ impl Settings<'_, '_> {
         ui.small(format!(
             "{} droplets; {:.1} ml of {:.1} ml are left",
             droplets.iter().len(),
-            ledger.held * 1e6,
+            (ledger.held * 1e6).max(0.0),
             ledger.water_in * 1e6
         ));
         let mut wanted = **strewn;
@@ -231,7 +231,7 @@ impl Settings<'_, '_> {
         climate.set_if_neq(air);
         let mut faster = process.0;
         let slider = Slider::new(&mut faster, 1.0..=1000.0).logarithmic(true);
-        if ui.add(slider.text("times as fast as life").max_decimals(0)).changed() {
+        if ui.add(slider.text("× life's speed").max_decimals(0)).changed() {
             process.0 = faster;
         }
     }

@@ -208,7 +208,8 @@ fn shower(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entit
         let grip =
             Transform::from_xyz(0.0, -0.07, 0.04).with_rotation(Quat::from_rotation_x(-0.35));
         shower.spawn(part(handle, studio.chrome.clone(), grip));
-        let hangs = Transform::from_xyz(0.0, -0.23, 0.09);
+        // From the end of the handle on.
+        let hangs = Transform::from_xyz(0.0, -0.238, 0.067);
         shower.spawn(part(hose, dark, hangs));
     });
 }
