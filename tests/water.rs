@@ -353,7 +353,8 @@ fn a_droplet_lands_rides_slides_down_and_drips() {
     // It took the small one in on its way, and was too heavy for the tip.
     assert_eq!(droplets(&mut app), 1);
     let drop = app.world().get::<Droplet>(fat).expect("the larger one is left");
-    assert!((drop.volume - 64e-9).abs() < 1e-14, "{}", drop.volume);
+    // but for the little that dried in flight
+    assert!((drop.volume - 64e-9).abs() < 1e-10, "{}", drop.volume);
     assert!(drop.ride().is_none() && drop.position.y < -0.3, "{:?}", drop.position);
     assert!(ledger(&app).error() < 1e-5);
 }

@@ -290,6 +290,17 @@ pub(super) fn wet_strands(
     if drops.is_empty() {
         return;
     }
+    // Who carries a drop is heavy for all that pulls.
+    for drop in &drops {
+        if let Some(ride) = drop.ride
+            && let Ok((_, of, strand, mut burden, _)) = strands.get_mut(ride.strand)
+            && strand.nodes() >= 2
+        {
+            let burden = burden.bypass_change_detection();
+            weigh(&strand, burden, &wetting.of(of.0), ride.at, mass_of(drop));
+            loaded.push(ride.strand);
+        }
+    }
     let process = process.mended(&Notes::default());
     let mut outcomes = vec![Outcome::default(); drops.len()];
     let mut drunk: Vec<Touch> = Vec::new();
@@ -311,7 +322,8 @@ pub(super) fn wet_strands(
     }
     for (drop, outcome) in drops.iter_mut().zip(&outcomes) {
         drop.company = outcome.company.max(1);
-        if let (None, Some(landing)) = (drop.ride, outcome.landing) {
+        let lands = drop.ride.is_none() && outcome.landing.is_some();
+        if let Some(landing) = outcome.landing.filter(|_| lands) {
             drop.ride = Some(Ride { strand: landing.strand, at: landing.at });
             drop.lying = 0.0;
         } else if drop.ride.is_none() {
@@ -325,14 +337,14 @@ pub(super) fn wet_strands(
             let (pose, wetting) = (pose.now(), wetting.of(of.0));
             let (strand, burden) =
                 (strand.bypass_change_detection(), burden.bypass_change_detection());
-            weigh(strand, burden, &wetting, ride.at, mass_of(drop));
             let mut impulse = pose.direction_in(outcome.impulse);
-            if outcome.landing.is_some() {
+            if lands {
+                weigh(strand, burden, &wetting, ride.at, mass_of(drop));
+                loaded.push(ride.strand);
                 let lands_at = pose.rotation * on_strand(strand, ride.at).1;
                 impulse += pose.direction_in(drop.velocity - lands_at) * mass_of(drop);
             }
             push(strand, burden, &wetting, ride.at, impulse);
-            loaded.push(ride.strand);
         }
     }
     for touch in drunk {
