@@ -4,7 +4,7 @@ use super::{
     Climate, Droplet, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
     model::ball_radius,
     moisture::{Exposure, Left, Surroundings, node_lengths},
-    vapour::{DryingAir, WATER, jet},
+    vapour::{DryingAir, WATER, equilibrium, jet},
 };
 use crate::{
     Blower,
@@ -127,11 +127,11 @@ pub(super) fn exchange_water(
         }
     }
     let climate = climate.mended(&Notes::default());
-    let air = DryingAir::new(climate.celsius, climate.humidity, climate.draught);
-    let damp = air.equilibrium > 0.0;
+    let damp = equilibrium(climate.humidity) > 0.0;
     if !damp && strands.iter().all(|(_, _, _, moisture, ..)| moisture.is_untouched()) {
         return;
     }
+    let air = DryingAir::new(climate.celsius, climate.humidity, climate.draught);
     let process = process.mended(&Notes::default());
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
     let mut waters: Vec<LocalWater> = Vec::new();
