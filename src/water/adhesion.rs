@@ -182,7 +182,8 @@ impl Met<'_> {
                     out.company.push(k);
                 }
                 // Between a strand and the drop on it the pull is an inner force. Roots do not move.
-                if rides_here || i == 0 {
+                // A drop in the air touches nothing that it could pull at.
+                if rides_here || i == 0 || drop.ride.is_none() {
                     return;
                 }
                 let f = model::pull(offset, drop.r_min, drop.r_max);

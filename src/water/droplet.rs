@@ -8,7 +8,7 @@ use crate::{
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// A drop of water: falls, lands on strands, rides on them, pulls them together (\[W\] equation 2),
+/// A drop of water: falls, lands on strands, rides on one and pulls others to it (\[W\] equation 2),
 /// soaks in, merges, drips off. Spawn it to wet hair; its water is counted until it has evaporated
 /// or left [`DropletRules`](crate::water::DropletRules).
 ///

@@ -326,9 +326,6 @@ pub(super) fn wet_strands(
         if let Some(landing) = outcome.landing.filter(|_| lands) {
             drop.ride = Some(Ride { strand: landing.strand, at: landing.at });
             drop.lying = 0.0;
-        } else if drop.ride.is_none() {
-            drop.velocity += outcome.impulse / mass_of(drop);
-            continue;
         }
         if let Some(ride) = drop.ride
             && let Ok((_, of, mut strand, mut burden, _)) = strands.get_mut(ride.strand)
