@@ -7,6 +7,8 @@ pub mod bond;
 pub mod contact;
 pub mod fault;
 pub mod grid;
+#[cfg(feature = "groom")]
+pub mod groom;
 mod parallel;
 #[cfg(feature = "render")]
 pub mod render;
@@ -22,6 +24,8 @@ pub use air::{AirDrag, Blower, HairGravity, WindReceived};
 pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
 pub use contact::{ColliderShape, HairCollider, LockContact};
 pub use fault::{Fault, HairFault};
+#[cfg(feature = "groom")]
+pub use groom::{Groom, GroomError};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
 pub use spring::Springs;

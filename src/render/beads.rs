@@ -5,7 +5,7 @@
 //! sphere is shaded; the squares are counted by a mesh and pulled from one buffer, as ribbons are.
 
 use super::{HairRenderSystems, Interpolate, supported};
-use crate::{Droplet, DropletRules, HairGravity};
+use crate::{Droplet, DropletRules, HairGravity, water::model::ball_radius};
 use bevy::{
     asset::{RenderAssetUsages, embedded_asset},
     camera::{primitives::Aabb, visibility::NoAutoAabb},
@@ -26,7 +26,6 @@ use bevy::{
     },
     shader::ShaderRef,
 };
-use core::f32::consts::PI;
 
 /// A drop of water as it is drawn.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
@@ -48,8 +47,8 @@ impl Bead {
     /// let drop = Bead::of_volume(Vec3::ZERO, 1e-9, Vec3::ZERO);
     /// assert!((drop.radius - 0.62e-3).abs() < 1e-5);
     /// ```
-    pub fn of_volume(position: Vec3, volume: f32, velocity: Vec3) -> Self {
-        Self { position, radius: (volume.max(0.0) * (0.75 / PI)).cbrt(), velocity }
+    pub fn of_volume(position: Vec3, volume: f64, velocity: Vec3) -> Self {
+        Self { position, radius: ball_radius(volume), velocity }
     }
 
     /// As the shader reads it: 32 bytes. Beads that are not finite are none.
@@ -265,7 +264,7 @@ mod tests {
 
     #[test]
     fn a_bead_holds_its_volume_and_a_broken_one_is_none() {
-        let bead = Bead::of_volume(Vec3::X, 4.0 / 3.0 * PI * 8e-9, Vec3::Y);
+        let bead = Bead::of_volume(Vec3::X, 4.0 / 3.0 * core::f64::consts::PI * 8e-9, Vec3::Y);
         assert!((bead.radius - 2e-3).abs() < 1e-8);
         assert_eq!(Bead::of_volume(Vec3::X, -1.0, Vec3::Y).radius, 0.0);
         assert_eq!(Bead { velocity: Vec3::NAN, ..bead }.packed(), [0.0; 8]);

@@ -3,7 +3,7 @@
 
 use super::{
     LANES, Solver, Stiffness,
-    block::{BlockLanes, StepParams, put3, put4, step},
+    block::{BlockLanes, StepParams, blocks_of, put3, put4, step},
     obstacle::Obstacle,
 };
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
     fault::{Fault, HairFault},
     parallel::for_each_block,
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, PutBack, Strand, StrandModel, StrandOf},
+    strand::{Burden, HeldNodes, Strand, StrandModel, StrandOf},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
@@ -45,7 +45,7 @@ struct Item<'a> {
     bonds: &'a Bonds,
     burden: &'a Burden,
     held: Option<&'a HeldNodes>,
-    put_back: Option<PutBack>,
+    put_back: Option<Fault>,
 }
 
 pub(crate) fn project(
@@ -96,22 +96,13 @@ pub(crate) fn project(
             items.push(Item { entity, hair, strand, rest, bonds, burden, held, put_back: None });
         }
     }
-    // Lanes do not see each other, so how strands are grouped changes no bit of the result.
-    items.sort_by_key(|item| (item.hair, item.strand.nodes()));
-    let mut blocks: Vec<&mut [Item<'_>]> = items
-        .chunk_by_mut(|a, b| (a.hair, a.strand.nodes()) == (b.hair, b.strand.nodes()))
-        .flat_map(|alike| alike.chunks_mut(LANES))
-        .collect();
+    let mut blocks = blocks_of(&mut items, |item| (item.hair, item.strand.nodes()));
     let level = Level::new();
     for_each_block(&mut blocks, BlockLanes::default, |block, items| {
         solve(level, block, items, &params[items[0].hair]);
     });
-    for item in &items {
-        if let Some(how) = item.put_back {
-            let fault = match how {
-                PutBack::LastFinite => Fault::PutBack,
-                PutBack::RestPose => Fault::Rebuilt,
-            };
+    for item in items {
+        if let Some(fault) = item.put_back {
             faults.write(HairFault { entity: item.entity, fault });
         }
     }

@@ -9,9 +9,14 @@ use crate::{
     contact::{LockContact, Obstacles},
     fault::{Fault, HairFault},
     parallel::for_each_block,
-    rod::{LANES, block::put4, obstacle::Obstacle, project},
+    rod::{
+        LANES,
+        block::{blocks_of, put4},
+        obstacle::Obstacle,
+        project,
+    },
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, PutBack, Strand, StrandModel, StrandOf, TickPose},
+    strand::{Burden, HeldNodes, Strand, StrandModel, StrandOf, TickPose},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
@@ -39,7 +44,7 @@ struct Item<'a> {
     strand: Mut<'a, Strand>,
     burden: &'a Burden,
     held: Option<&'a HeldNodes>,
-    put_back: Option<PutBack>,
+    put_back: Option<Fault>,
 }
 
 fn step_springs(
@@ -76,22 +81,13 @@ fn step_springs(
             items.push(Item { entity, hair, strand, burden, held, put_back: None });
         }
     }
-    // As with rods: how strands are grouped changes no bit of the result.
-    items.sort_by_key(|item| (item.hair, item.strand.nodes()));
-    let mut blocks: Vec<&mut [Item<'_>]> = items
-        .chunk_by_mut(|a, b| (a.hair, a.strand.nodes()) == (b.hair, b.strand.nodes()))
-        .flat_map(|alike| alike.chunks_mut(LANES))
-        .collect();
+    let mut blocks = blocks_of(&mut items, |item| (item.hair, item.strand.nodes()));
     let level = Level::new();
     for_each_block(&mut blocks, SpringLanes::default, |block, items| {
         solve(level, block, items, &params[items[0].hair]);
     });
-    for item in &items {
-        if let Some(how) = item.put_back {
-            let fault = match how {
-                PutBack::LastFinite => Fault::PutBack,
-                PutBack::RestPose => Fault::Rebuilt,
-            };
+    for item in items {
+        if let Some(fault) = item.put_back {
             faults.write(HairFault { entity: item.entity, fault });
         }
     }

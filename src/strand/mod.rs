@@ -18,6 +18,7 @@ pub(crate) use systems::carry_strands;
 
 use crate::{
     bond::{BondChanges, Bonds, RestShape},
+    fault::Fault,
     rod::frame::{darboux, full, parallel_transport},
     setting::{HairSetting, Notes},
 };
@@ -315,13 +316,13 @@ impl Strand {
 
     /// After a step that left the finite numbers: back to what it was, at rest, or if that is not
     /// finite either to the pose its bonds remember. Says what happened unless it did last time too.
-    pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<PutBack> {
+    pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<Fault> {
         let how = if self.is_pose_finite() {
             self.rest();
-            PutBack::LastFinite
+            Fault::PutBack
         } else {
             self.pose(bonds.into_iter().map(|o| if o.is_finite() { o } else { Vec3::ZERO }));
-            PutBack::RestPose
+            Fault::Rebuilt
         };
         let again = core::mem::replace(&mut self.was_put_back, true);
         (!again).then_some(how)
@@ -330,12 +331,6 @@ impl Strand {
     pub(crate) fn stepped_well(&mut self) {
         self.was_put_back = false;
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PutBack {
-    LastFinite,
-    RestPose,
 }
 
 #[cfg(test)]

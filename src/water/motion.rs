@@ -123,7 +123,8 @@ pub(super) fn move_droplets(
                 drop.company = 1;
                 drop.velocity = fall(drop.velocity, gravity, wind, radius, dt);
                 drop.position += drop.velocity * dt;
-                let lies = obstacles.iter().any(|o| rest_on(o, drop, radius));
+                // All of them: a drop may lie where two meet.
+                let lies = obstacles.iter().fold(false, |lies, o| rest_on(o, drop, radius) | lies);
                 drop.lying = if lies { drop.lying + dt } else { 0.0 };
             }
         }
@@ -276,6 +277,7 @@ pub(super) fn wet_strands(
     hairs: Query<&TickPose, With<Hair>>,
     mut strands: Query<(Entity, &StrandOf, &mut Strand, &mut Burden, &mut Moisture)>,
     mut droplets: Query<&mut Droplet>,
+    mut ledger: ResMut<WaterLedger>,
 ) {
     let WaterField { field, pieces, loaded, .. } = scratch.bypass_change_detection();
     // Water's own weight is written anew by its exchange; to dry hair only droplets are a burden.
@@ -351,7 +353,7 @@ pub(super) fn wet_strands(
         let takes = (touch.wants * share).min(drop.volume);
         if let Ok((_, _, strand, _, mut moisture)) = strands.get_mut(touch.strand) {
             let moisture = moisture.bypass_change_detection();
-            moisture.fit(strand.nodes());
+            ledger.water_out += moisture.fit(strand.nodes());
             moisture.add_film(touch.node as usize, takes);
             drop.volume -= takes;
         }

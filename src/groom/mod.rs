@@ -1,0 +1,168 @@
+//! Grooms: hair as a modeller hands it over, before it is simulated.
+//!
+//! A [`Groom`] holds strands as polylines, root first, in metres. It comes from a file, from game
+//! code ([`Groom::from_polylines`]) or is planted on a mesh.
+
+use bevy::prelude::*;
+
+/// Many strands as polylines, root first (m), with what a modeller gave along: widths, colours and
+/// places on the scalp's texture. An asset; immutable, so that its arrays always fit together.
+#[derive(Asset, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct Groom {
+    points: Vec<Vec3>,
+    ends: Vec<u32>,
+    widths: Vec<f32>,
+    colors: Vec<LinearRgba>,
+    uvs: Vec<Vec2>,
+}
+
+/// One strand of a [`Groom`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroomStrand<'a> {
+    /// Its nodes (m), root first.
+    pub points: &'a [Vec3],
+    /// Diameter at each node (m), if given.
+    pub widths: Option<&'a [f32]>,
+    /// Colour at each node, if given.
+    pub colors: Option<&'a [LinearRgba]>,
+    /// Where the root is on the scalp's texture, if given.
+    pub uv: Option<Vec2>,
+}
+
+/// Why data cannot be a [`Groom`].
+#[derive(thiserror::Error, Clone, Debug, PartialEq)]
+pub enum GroomError {
+    /// A strand that is no line.
+    #[error("strand {strand} has {found} nodes, expected 2 or more: leave it out")]
+    TooFewNodes {
+        /// Its index.
+        strand: usize,
+        /// How many nodes it has.
+        found: usize,
+    },
+    /// A node that is not finite.
+    #[error("node {node} of strand {strand} is not finite: remove it or repair the source")]
+    NonFinite {
+        /// The strand's index.
+        strand: usize,
+        /// The node's index from the root.
+        node: usize,
+    },
+    /// An array whose length does not go with the nodes or strands.
+    #[error("{what} has {found} elements, expected {expected} or none")]
+    Length {
+        /// Which array.
+        what: &'static str,
+        /// How many it has.
+        found: usize,
+        /// How many it should have.
+        expected: usize,
+    },
+    /// More nodes than an index of 32 bits can count.
+    #[error("the groom has {found} nodes, expected at most {}: thin it first", u32::MAX)]
+    TooMany {
+        /// How many there are.
+        found: usize,
+    },
+}
+
+impl Groom {
+    /// A groom of these polylines (m), root first.
+    ///
+    /// ```
+    /// # use bevy_keratin::groom::Groom; use bevy::prelude::*;
+    /// let lines = (0..10).map(|i| Vec3::X * i as f32 * 0.01).map(|root| [root, root + Vec3::Y * 0.1]);
+    /// assert_eq!(Groom::from_polylines(lines).unwrap().len(), 10);
+    /// ```
+    ///
+    /// # Errors
+    /// When a strand has fewer than two nodes or a node that is not finite.
+    pub fn from_polylines<L: IntoIterator<Item = Vec3>>(
+        strands: impl IntoIterator<Item = L>,
+    ) -> Result<Self, GroomError> {
+        let mut groom = Self::default();
+        for line in strands {
+            groom.points.extend(line);
+            let found = groom.points.len();
+            groom.ends.push(u32::try_from(found).map_err(|_| GroomError::TooMany { found })?);
+        }
+        groom.checked()
+    }
+
+    /// The groom with a diameter (m) for each node, strand after strand.
+    ///
+    /// # Errors
+    /// When there are not as many as nodes.
+    pub fn with_widths(mut self, widths: Vec<f32>) -> Result<Self, GroomError> {
+        self.widths = widths;
+        self.checked()
+    }
+
+    /// The groom with a colour for each node, strand after strand.
+    ///
+    /// # Errors
+    /// When there are not as many as nodes.
+    pub fn with_colors(mut self, colors: Vec<LinearRgba>) -> Result<Self, GroomError> {
+        self.colors = colors;
+        self.checked()
+    }
+
+    /// The groom with a place on the scalp's texture for each strand.
+    ///
+    /// # Errors
+    /// When there are not as many as strands.
+    pub fn with_uvs(mut self, uvs: Vec<Vec2>) -> Result<Self, GroomError> {
+        self.uvs = uvs;
+        self.checked()
+    }
+
+    fn checked(self) -> Result<Self, GroomError> {
+        for (strand, line) in self.strands().enumerate() {
+            let found = line.points.len();
+            if found < 2 {
+                return Err(GroomError::TooFewNodes { strand, found });
+            }
+            if let Some(node) = line.points.iter().position(|p| !p.is_finite()) {
+                return Err(GroomError::NonFinite { strand, node });
+            }
+        }
+        let fits = |what, found: usize, expected: usize| {
+            let fits = found == 0 || found == expected;
+            fits.then_some(()).ok_or(GroomError::Length { what, found, expected })
+        };
+        fits("widths", self.widths.len(), self.points.len())?;
+        fits("colors", self.colors.len(), self.points.len())?;
+        fits("uvs", self.uvs.len(), self.len())?;
+        Ok(self)
+    }
+
+    /// How many strands there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The nodes of all strands (m), one strand after the other.
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// The strands in their order.
+    pub fn strands(&self) -> impl ExactSizeIterator<Item = GroomStrand<'_>> {
+        (0..self.len()).map(|i| {
+            let start = i.checked_sub(1).map_or(0, |before| self.ends[before] as usize);
+            let nodes = start..self.ends[i] as usize;
+            GroomStrand {
+                points: &self.points[nodes.clone()],
+                widths: self.widths.get(nodes.clone()).filter(|_| !self.widths.is_empty()),
+                colors: self.colors.get(nodes).filter(|_| !self.colors.is_empty()),
+                uv: self.uvs.get(i).copied(),
+            }
+        })
+    }
+}
