@@ -88,11 +88,52 @@ impl UniformGrid {
         self.starts[buckets] = self.entries.len() as u32;
     }
 
+    /// Where in [`order`](Self::order) the items of the cell of `point` are, among some of other cells
+    /// (see [`holds`](Self::holds)).
+    #[inline]
+    pub fn slots_at(&self, point: Vec3) -> (IVec3, Range<usize>) {
+        if self.entries.is_empty() || !point.is_finite() {
+            return (IVec3::ZERO, 0..0);
+        }
+        let cell = self.cell_of(point);
+        let b = bucket(cell, self.starts.len() - 2);
+        (cell, self.starts[b] as usize..self.starts[b + 1] as usize)
+    }
+
+    /// The item at a place of [`order`](Self::order), if it was put into `cell`.
+    #[inline]
+    pub fn holds(&self, slot: usize, cell: IVec3) -> Option<u32> {
+        let entry = self.entries[slot];
+        (entry.cell == cell).then_some(entry.item)
+    }
+
     /// Calls `found` with every item that was put into the cell of `point`.
     #[inline]
     pub fn for_each_at(&self, point: Vec3, mut found: impl FnMut(u32)) {
-        if !self.entries.is_empty() && point.is_finite() {
-            self.for_each_in(self.cell_of(point), self.starts.len() - 2, &mut found);
+        let (cell, slots) = self.slots_at(point);
+        slots.filter_map(|slot| self.holds(slot, cell)).for_each(&mut found);
+    }
+
+    /// Puts an item into every cell that the ball around `at` reaches.
+    pub fn put_ball(&mut self, at: Vec3, radius: f32, item: u32) {
+        if !at.is_finite() {
+            return;
+        }
+        let (low, high) = (self.cell_of(at - radius), self.cell_of(at + radius));
+        let size = self.inverse_cell.recip();
+        // Rounding must not leave a cell out.
+        let reach = radius * (1.0 + 1e-4) + 1e-6 * at.abs().max_element();
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                for x in low.x..=high.x {
+                    let cell = IVec3::new(x, y, z);
+                    let corner = cell.as_vec3() * size;
+                    let nearest = at.clamp(corner, corner + size);
+                    if nearest.distance_squared(at) <= reach * reach {
+                        self.put(cell, item);
+                    }
+                }
+            }
         }
     }
 

@@ -17,58 +17,105 @@ pub(super) struct SeenDrop {
     pub ride: Option<Entity>,
 }
 
+/// Balls, found by a point inside them.
+#[derive(Clone, Debug, Default)]
+struct Balls {
+    /// Each ball in all cells that it reaches: a point finds all of them in its own cell.
+    grid: UniformGrid,
+    given: Vec<(Vec4, u32)>,
+    /// In the grid's order, centres and squared radii.
+    sorted: Vec<Vec4>,
+}
+
+impl Balls {
+    fn clear(&mut self) {
+        self.given.clear();
+    }
+
+    fn push(&mut self, item: u32, center: Vec3, radius: f32) {
+        self.given.push((center.extend(radius), item));
+    }
+
+    fn sort(&mut self) {
+        let widest = self.given.iter().map(|(ball, _)| ball.w).fold(1e-4, f32::max);
+        self.grid.begin(widest);
+        for (i, (ball, _)) in (0..).zip(&self.given) {
+            self.grid.put_ball(ball.xyz(), ball.w, i);
+        }
+        self.grid.sort();
+        // Most balls in a cell do not hold a point of it: what tells lies in a row.
+        self.sorted.clear();
+        self.sorted.extend(self.grid.order().map(|i| {
+            let (ball, _) = self.given[i as usize];
+            ball.xyz().extend(ball.w * ball.w)
+        }));
+    }
+
+    /// Calls `found` with every ball that holds `p`, the way from there to its centre and the
+    /// square of that.
+    #[inline]
+    fn for_each_at(&self, p: Vec3, mut found: impl FnMut(u32, Vec3, f32)) {
+        let (cell, slots) = self.grid.slots_at(p);
+        for slot in slots {
+            let ball = self.sorted[slot];
+            let offset = ball.xyz() - p;
+            let squared = offset.length_squared();
+            if squared < ball.w
+                && let Some(i) = self.grid.holds(slot, cell)
+            {
+                found(self.given[i as usize].1, offset, squared);
+            }
+        }
+    }
+}
+
 /// The droplets around a hair, found by place.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Field {
     pub drops: Vec<SeenDrop>,
-    /// Each droplet in all cells that it pulls in: a node finds all of them in its own cell.
-    pulling: UniformGrid,
-    /// Each falling droplet in all cells where the middle of an edge may be that it hits.
-    falling: UniformGrid,
-    any_fall: bool,
+    /// Riding droplets as far as they reach.
+    riding: Balls,
+    /// Who is ridden by which droplet, sorted.
+    riders: Vec<(Entity, u32)>,
+    /// Falling droplets, as far as the middle of an edge may be that they hit.
+    falling: Balls,
 }
 
 impl Field {
+    /// The droplets that ride a strand.
+    fn on(&self, strand: Entity) -> impl Iterator<Item = (u32, &SeenDrop)> {
+        let first = self.riders.partition_point(|(ridden, _)| *ridden < strand);
+        let theirs = self.riders[first..].iter().take_while(move |(ridden, _)| *ridden == strand);
+        theirs.map(|&(_, k)| (k, &self.drops[k as usize]))
+    }
+
     /// Sorts the droplets for strands whose longest edge is `longest` (m), of locks of radius `skin`.
     pub fn sort(&mut self, longest: f32, skin: f32) {
-        let widest = self.drops.iter().map(|d| d.r_max).fold(1e-4, f32::max);
-        self.pulling.begin(2.0 * widest);
-        let mut fastest = 0.0_f32;
-        self.any_fall = false;
+        self.riding.clear();
+        self.riders.clear();
+        self.falling.clear();
         for (i, drop) in (0..).zip(&self.drops) {
-            put_box(&mut self.pulling, drop.at, drop.r_max, i);
-            if drop.ride.is_none() {
-                self.any_fall = true;
-                fastest = fastest.max(drop.at.distance(drop.before) + drop.radius);
+            match drop.ride {
+                Some(strand) => {
+                    self.riders.push((strand, i));
+                    self.riding.push(i, drop.at, drop.r_max.max(drop.touch(skin)));
+                }
+                None => {
+                    let way = drop.at.distance(drop.before).min(0.2);
+                    self.falling.push(i, drop.at, 0.5 * longest + skin + drop.radius + way);
+                }
             }
         }
-        self.pulling.sort();
-        if !self.any_fall {
-            return;
-        }
-        let reach = 0.5 * longest + skin + fastest.min(0.2);
-        self.falling.begin(2.0 * reach);
-        for (i, drop) in (0..).zip(&self.drops) {
-            if drop.ride.is_none() {
-                put_box(&mut self.falling, drop.at, reach, i);
-            }
-        }
+        self.riders.sort_unstable();
+        self.riding.sort();
         self.falling.sort();
     }
 }
 
-/// Puts an item into every cell that the ball around `at` may reach.
-fn put_box(grid: &mut UniformGrid, at: Vec3, reach: f32, item: u32) {
-    if !at.is_finite() {
-        return;
-    }
-    let (low, high) = (grid.cell_of(at - reach), grid.cell_of(at + reach));
-    for z in low.z..=high.z {
-        for y in low.y..=high.y {
-            for x in low.x..=high.x {
-                grid.put(IVec3::new(x, y, z), item);
-            }
-        }
+impl SeenDrop {
+    /// How near a strand of locks of radius `skin` touches it: its core keeps strands away at r_min.
+    fn touch(&self, skin: f32) -> f32 {
+        self.radius.max(self.r_min) + skin
     }
 }
 
@@ -104,7 +151,7 @@ pub(super) struct Pull {
 pub(super) struct Touch {
     pub drop: u32,
     pub strand: Entity,
-    pub node: u32,
+    pub node: usize,
     /// What it would take (m³).
     pub wants: f64,
 }
@@ -121,6 +168,7 @@ pub(super) struct Landing {
 }
 
 /// What holds for all strands of a hair in a substep.
+#[derive(Clone, Copy)]
 pub(super) struct MetBy<'a> {
     pub wetting: &'a Wetting,
     pub dt: f32,
@@ -128,6 +176,14 @@ pub(super) struct MetBy<'a> {
     pub uptake: f32,
     /// The most film that a node holds (m³).
     pub most_film: f64,
+}
+
+impl MetBy<'_> {
+    /// What node `i` under a `film` (m³) would drink from a droplet that touches it (m³).
+    fn wants(&self, film: &[f64], i: usize) -> f64 {
+        let room = self.most_film - film.get(i).copied().unwrap_or(0.0);
+        room.max(0.0) * f64::from(self.uptake)
+    }
 }
 
 /// A strand among droplets.
@@ -154,36 +210,29 @@ impl Met<'_> {
         if field.drops.is_empty() {
             return;
         }
-        let MetBy { wetting, dt, uptake, most_film } = *self.by;
+        let MetBy { wetting, dt, .. } = *self.by;
         let (mass, skin) = (wetting.dry_mass(), wetting.lock_radius());
         let first_company = out.company.len();
         for (i, length) in node_lengths(self.lengths).enumerate() {
             let p = self.positions[i];
             let load = self.load.get(i).copied().unwrap_or(0.0);
-            let room = (most_film - self.film.get(i).copied().unwrap_or(0.0)).max(0.0);
+            let wants = self.by.wants(self.film, i);
             let (mut change, mut steepness) = (Vec3::ZERO, 0.0);
             let first_pull = out.pulls.len();
-            field.pulling.for_each_at(p, |k| {
+            field.riding.for_each_at(p, |k, offset, squared| {
                 let drop = &field.drops[k as usize];
-                let offset = drop.at - p;
-                let squared = offset.length_squared();
-                // Its core keeps strands away at r_min, so that is where they touch it.
-                let touch = drop.radius.max(drop.r_min) + skin;
+                let touch = drop.touch(skin);
                 let rides_here = drop.ride == Some(self.strand);
-                if uptake > 0.0 && drop.ride.is_some() {
-                    let near = if rides_here { touch.max(0.5 * length) } else { touch };
-                    if squared < near * near && room > 0.0 {
-                        let wants = room * f64::from(uptake);
-                        let node = i as u32;
-                        out.touches.push(Touch { drop: k, strand: self.strand, node, wants });
+                if squared < touch * touch {
+                    if !rides_here && wants > 0.0 {
+                        out.touches.push(Touch { drop: k, strand: self.strand, node: i, wants });
+                    }
+                    if !out.company[first_company..].contains(&k) {
+                        out.company.push(k);
                     }
                 }
-                if squared < touch * touch && !out.company[first_company..].contains(&k) {
-                    out.company.push(k);
-                }
                 // Between a strand and the drop on it the pull is an inner force. Roots do not move.
-                // A drop in the air touches nothing that it could pull at.
-                if rides_here || i == 0 || drop.ride.is_none() {
+                if rides_here || i == 0 {
                     return;
                 }
                 let f = model::pull(offset, drop.r_min, drop.r_max);
@@ -198,8 +247,24 @@ impl Met<'_> {
             out.pulls[first_pull..].iter_mut().for_each(|pull| pull.impulse *= share);
             self.velocities[i] += change * (share / (1.0 + load));
         }
-        if field.any_fall {
-            self.catch(field, skin, out);
+        // Who carries a droplet is heavy.
+        if !self.load.is_empty() {
+            self.drink_from_riders(field, out);
+        }
+        self.catch(field, skin, out);
+    }
+
+    /// Between two nodes a droplet touches the nearer one of its strand, however far off that is.
+    fn drink_from_riders(&self, field: &Field, out: &mut Encounters) {
+        for (drop, seen) in field.on(self.strand) {
+            let touch = seen.touch(self.by.wetting.lock_radius());
+            for (node, length) in node_lengths(self.lengths).enumerate() {
+                let near = touch.max(0.5 * length);
+                let wants = self.by.wants(self.film, node);
+                if self.positions[node].distance_squared(seen.at) < near * near && wants > 0.0 {
+                    out.touches.push(Touch { drop, strand: self.strand, node, wants });
+                }
+            }
         }
     }
 
@@ -207,7 +272,7 @@ impl Met<'_> {
     fn catch(&self, field: &Field, skin: f32, out: &mut Encounters) {
         for (i, pair) in self.positions.windows(2).enumerate() {
             let edge = pair[1] - pair[0];
-            field.falling.for_each_at(pair[0] + 0.5 * edge, |k| {
+            field.falling.for_each_at(pair[0] + 0.5 * edge, |k, _, _| {
                 let drop = &field.drops[k as usize];
                 let (when, along) =
                     model::closest(drop.before, drop.at - drop.before, pair[0], edge);

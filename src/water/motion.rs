@@ -354,7 +354,7 @@ pub(super) fn wet_strands(
         if let Ok((_, _, strand, _, mut moisture)) = strands.get_mut(touch.strand) {
             let moisture = moisture.bypass_change_detection();
             ledger.water_out += moisture.fit(strand.nodes());
-            moisture.add_film(touch.node as usize, takes);
+            moisture.add_film(touch.node, takes);
             drop.volume -= takes;
         }
     }
