@@ -110,7 +110,41 @@ fn droplets_clump_soft_hair() {
         if drops == 0 {
             assert!(c.ratio > 0.95 && c.clustered < 0.02);
         }
+        let together = moving_together(&mut app);
+        println!("{drops}: neighbours share {together:.3} of their motion");
+        match drops {
+            0 => assert!(together.abs() < 0.1, "dry strands go their own ways: {together}"),
+            1000 => assert!(together > 0.3, "strands in locks move together: {together}"),
+            _ => {}
+        }
     }
+}
+
+/// Knocks every strand in a direction of its own, and says what share of its tip's motion each has
+/// in common with its nearest neighbour: 0 for strands that know nothing of each other, 1 for one
+/// body.
+fn moving_together(app: &mut App) -> f64 {
+    let before = tips(app);
+    let neighbour: Vec<usize> = (0..before.len())
+        .map(|i| {
+            let others = (0..before.len()).filter(|&j| j != i);
+            let distance = |j: &usize| before[i].distance_squared(before[*j]);
+            others.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+        })
+        .collect();
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+    let mut strands = app.world_mut().query::<&mut Strand>();
+    for mut strand in strands.iter_mut(app.world_mut()) {
+        let angle: f32 = random.random_range(0.0..2.0 * PI);
+        let knock = Vec3::new(angle.cos(), 0.0, angle.sin()) * 0.1;
+        strand.velocities_mut()[5..].iter_mut().for_each(|v| *v += knock);
+    }
+    run(app, 0.15);
+    let way: Vec<Vec3> = tips(app).iter().zip(&before).map(|(a, b)| *a - *b).collect();
+    let square = |v: Vec3| f64::from(v.length_squared());
+    let apart: f64 = neighbour.iter().enumerate().map(|(i, &j)| square(way[i] - way[j])).sum();
+    let all: f64 = neighbour.iter().enumerate().map(|(i, &j)| square(way[i]) + square(way[j])).sum();
+    1.0 - apart / all
 }
 
 #[test]

@@ -23,6 +23,10 @@ pub struct Studio {
 #[derive(Component)]
 pub struct Sleeve;
 
+/// The stand's pole: away while nothing hangs on it.
+#[derive(Component)]
+pub struct Pole;
+
 /// Lights, backdrop and stand, which every scene shares.
 pub fn build(mut commands: Commands, mut paint: Paint) {
     let head = paint.meshes.add(mannequin::mesh());
@@ -101,6 +105,7 @@ pub fn build(mut commands: Commands, mut paint: Paint) {
         Vec2::new(0.0, 0.97),
     ];
     commands.spawn((
+        Pole,
         Mesh3d(paint.meshes.add(lathe(&base, 48))),
         MeshMaterial3d(chrome.clone()),
         Transform::from_translation(POLE),
@@ -217,8 +222,13 @@ fn shower(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entit
 /// Keeps sleeves on the pole while the head moves.
 pub fn slide(
     mut sleeves: Query<(&mut Transform, &ChildOf), With<Sleeve>>,
+    mut poles: Query<&mut Visibility, With<Pole>>,
     places: Query<&GlobalTransform>,
 ) {
+    let wanted = if sleeves.is_empty() { Visibility::Hidden } else { Visibility::Inherited };
+    for mut pole in &mut poles {
+        pole.set_if_neq(wanted);
+    }
     for (mut sleeve, parent) in &mut sleeves {
         if let Ok(head) = places.get(parent.parent()) {
             sleeve.translation.x = POLE.x - head.translation().x;
