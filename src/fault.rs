@@ -39,6 +39,9 @@ pub enum Fault {
     /// Gravity that is not finite counts as none.
     #[error("HairGravity is not finite: no gravity is used until it is")]
     Gravity,
+    /// Roots that cannot be tied to their mesh: the strands stay as they are.
+    #[error("{0}; those strands do not follow the mesh")]
+    Roots(&'static str),
     /// A request that names something that is not there.
     #[error("the treatment's target is neither a Hair nor a strand")]
     NoTarget,

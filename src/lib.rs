@@ -29,7 +29,7 @@ pub use groom::{Groom, GroomError};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
 pub use spring::Springs;
-pub use strand::{Burden, Hair, HeldNodes, Strand, StrandError, StrandModel, StrandOf, Strands};
+pub use strand::{Burden, Hair, HairInertia, HeldNodes, Strand, StrandError, StrandModel, StrandOf, Strands};
 pub use style::{PermRod, Treat, Winding, WoundOn, WoundStrands};
 pub use tick::{HairPlugins, HairStep, HairSubsteps, HairSystems, HairTick};
 pub use water::{
@@ -44,7 +44,7 @@ pub mod prelude {
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
-        HairCollider, HairDefault, HairFault, HairGravity, HairPlugins, HairSubsteps, HairSystems,
+        HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairPlugins, HairSubsteps, HairSystems,
         HairTick, HeldNodes, LockContact, Moisture, PermRod, ProcessTime, Shower, Soak, Solver,
         Stiffness, Strand, StrandModel, StrandOf, Strands, StretchProjection, Treat, WaterLedger,
         Wetting, Winding, WoundOn,

@@ -169,7 +169,7 @@ impl Settings<'_, '_> {
 
     pub fn hair(&mut self, ui: &mut Ui) {
         edited!(self.stiffness, |s: &mut Stiffness| {
-            slide_mm(ui, &mut s.bending_length, 20.0..=400.0, "bending length (mm)");
+            slide_mm(ui, &mut s.bending_length, 20.0..=400.0, "bend length (mm)");
             slide(ui, &mut s.bend, 0.005..=0.1, "k₀ of a substep");
         });
         ui.label("Influence of each kind of bond:");

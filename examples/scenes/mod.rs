@@ -235,6 +235,8 @@ pub fn spawn_scene(
     for prop in &props {
         commands.entity(prop).despawn();
     }
+    // After them: what they held is booked when they go.
+    commands.insert_resource(WaterLedger::default());
     *director = Director::default();
     *peak = default();
     surroundings.set(scene.kind);

@@ -63,7 +63,7 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
             half_height: c.half_height * scale,
         },
     };
-    let motion = pose.motion_in(now);
+    let motion = pose.motion_in(hair);
     Obstacle { solid, motion, friction: collider.friction }
 }
 

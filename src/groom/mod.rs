@@ -3,6 +3,10 @@
 //! A [`Groom`] holds strands as polylines, root first, in metres. It comes from a file, from game
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
+mod skin;
+
+pub use skin::{RootOnMesh, RootsOnMesh, TiedRoots};
+
 use bevy::prelude::*;
 
 /// Many strands as polylines, root first (m), with what a modeller gave along: widths, colours and

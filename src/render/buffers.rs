@@ -48,15 +48,6 @@ fn usable(p: Vec3) -> bool {
     p.is_finite() && p.abs().max_element() < FAR
 }
 
-/// Where a guide is drawn: between the tick before and the present by `overstep`.
-pub(super) fn drawn_place(strand: &Strand, before: &[Vec3], node: usize, overstep: f32) -> Vec3 {
-    let now = strand.positions()[node];
-    match before.get(node) {
-        Some(before) if before.is_finite() => before.lerp(now, overstep),
-        _ => now,
-    }
-}
-
 /// Packs a guide's nodes into `out`, one each; `known` says that `out` holds those of the frame
 /// before. Unusable nodes take the place of the node before them; a guide with none left is not
 /// shown. Gives the box around what was packed.
@@ -69,11 +60,7 @@ pub(super) fn pack_guide(
     wet: &[f32],
     overstep: f32,
 ) -> Option<(Vec3, Vec3)> {
-    let before = match history.positions.len() == strand.nodes() {
-        true => &history.positions[..],
-        false => &[],
-    };
-    let place = |i| drawn_place(strand, before, i, overstep);
+    let place = |i| history.drawn(strand, i, overstep);
     let first = (0..strand.nodes()).map(place).find(|p| usable(*p));
     let shown = half(f32::from(u8::from(first.is_some())));
     let mut last = first.unwrap_or_default();
@@ -158,7 +145,7 @@ mod tests {
 
     fn packed(strand: &Strand, history: &[Vec3], overstep: f32) -> Vec<PackedNode> {
         let mut out = vec![[0; 8]; strand.nodes()];
-        let history = StrandHistory { positions: history.to_vec() };
+        let history = StrandHistory { positions: history.to_vec(), ..default() };
         let bonds = Bonds::default();
         pack_guide(&mut out, false, strand, &history, &bonds, &[], overstep);
         out
@@ -218,7 +205,7 @@ mod tests {
         let points: Vec<Vec3> = (0..16).map(|i| Vec3::Y * (0.02 * i as f32)).collect();
         let strand = Strand::from_polyline(&points).unwrap();
         let strands = vec![(strand.clone(), Bonds::of(&strand)); 10_000];
-        let history = StrandHistory { positions: points };
+        let history = StrandHistory { positions: points, ..default() };
         let mut out = vec![[0; 8]; 160_000];
         for _ in 0..3 {
             let start = std::time::Instant::now();

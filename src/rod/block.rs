@@ -14,7 +14,7 @@ use super::{
     constraint::{EdgeWeights, StretchProjection, bend_twist, stretch_shear},
     lanes::{LANES, Real},
     limiter::limit_lengths,
-    obstacle::{Obstacle, push_out},
+    obstacle::{Obstacle, hold_back, push_out},
 };
 use crate::strand::{Burden, HeldNodes, Strand};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
@@ -355,18 +355,25 @@ pub(crate) fn predict_nodes<S: Simd>(
         let held = Real::lt(w, f32x16::splat(simd, 1e-12));
         let p = load3(simd, &n.p);
         // Nodes that begin inside an obstacle are set on its surface before the step, so that
-        // getting them out gives them no velocity.
+        // getting them out gives them no velocity. What comes at them gives them some.
         let mut from = p;
         for o in obstacles {
-            if let Some((out, _)) = push_out(o, from, from, zero, skin, true) {
-                from = V3::select(held, from, out);
+            let start = o.taken_along(from);
+            if let Some((out, _)) = push_out(o, start, start, zero, skin, true) {
+                from = V3::select(held, from, from + (out - start));
             }
         }
         let v = load3(simd, &n.v);
         // Held nodes carry where they come from in `from` and where they are to be in `p`.
         let came_from = V3::select(held, load3(simd, &n.from), from);
         store3(&mut n.from, came_from);
-        store3(&mut n.p, V3::select(held, p, v.scale_add(dt, from)));
+        let mut to = v.scale_add(dt, from);
+        for o in obstacles {
+            if let Some(before) = hold_back(o, o.taken_along(from), to, skin) {
+                to = before;
+            }
+        }
+        store3(&mut n.p, V3::select(held, p, to));
     }
 }
 

@@ -5,7 +5,7 @@ use super::{
     lanes::{LANES, Real},
 };
 use fearless_simd::{Simd, f32x16, prelude::*};
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, BVec3, Vec3};
 
 /// The solid part of space that an [`Obstacle`] fills, in the frame of the nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,10 +51,29 @@ pub struct Obstacle {
 }
 
 impl Obstacle {
-    /// Whether any point of the box `low…high`, grown by `margin`, may lie inside. Never wrongly
-    /// denies.
+    /// Where a point of the surface goes during the substep.
+    #[inline(always)]
+    pub(crate) fn taken_along<R: Real>(&self, p: V3<R>) -> V3<R> {
+        let Some(m) = &self.motion else { return p };
+        let moved = splat(p.x, m.translation.into());
+        let moved = splat(p.x, m.matrix3.z_axis.into()).scale_add(p.z, moved);
+        let moved = splat(p.x, m.matrix3.y_axis.into()).scale_add(p.y, moved);
+        splat(p.x, m.matrix3.x_axis.into()).scale_add(p.x, moved)
+    }
+
+    /// Whether any point of the box `low…high`, grown by `margin`, may lie inside during the
+    /// substep. Never wrongly denies.
     pub fn may_touch(&self, low: Vec3, high: Vec3, margin: f32) -> bool {
         let center = 0.5 * (low + high);
+        let motion = self.motion.map_or(0.0, |motion| {
+            // Of an affine motion the largest is at a corner.
+            let corners = (0..8).map(|i| {
+                let upper = BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
+                Vec3::select(upper, high, low)
+            });
+            corners.map(|x| motion.transform_point3(x).distance(x)).fold(0.0, f32::max)
+        });
+        let margin = margin + motion;
         let half = 0.5 * (high - low) + margin;
         match self.solid {
             Solid::HalfSpace { normal, point } => {
@@ -158,19 +177,67 @@ pub(super) fn push_out<S: Simd>(
     if silent {
         return Some((V3::select(inside, out, p), touching));
     }
-    let mut slip = out - from;
-    if let Some(m) = &obstacle.motion {
-        let moved = splat(p.x, m.translation.into());
-        let moved = splat(p.x, m.matrix3.z_axis.into()).scale_add(from.z, moved);
-        let moved = splat(p.x, m.matrix3.y_axis.into()).scale_add(from.y, moved);
-        let moved = splat(p.x, m.matrix3.x_axis.into()).scale_add(from.x, moved);
-        slip = out - moved;
-    }
+    let slip = out - obstacle.taken_along(from);
     let tangential = slip - normal.scale(slip.dot(normal));
     let length = Real::sqrt(tangential.dot(tangential));
     // Static where the grip suffices, sliding where not.
     let held = Real::min(one, friction * depth / Real::max(length, f32x16::splat(simd, 1e-12)));
     Some((V3::select(inside, tangential.scale_add(-held, out), p), touching))
+}
+
+/// Holds a node back that would pass through a thin or fast solid within the substep: a node that
+/// was on one side of it (`start`, taken along by the solid) and would be on the other stays before
+/// the plane that touches the solid where it was nearest. `None` where no lane would.
+///
+/// The way is looked at where it comes nearest to the solid's axis, in its middle and at its end:
+/// what moves by less than half the solid's thickness does not pass.
+#[inline(always)]
+pub(super) fn hold_back<S: Simd>(
+    obstacle: &Obstacle,
+    start: V3<f32x16<S>>,
+    p: V3<f32x16<S>>,
+    skin: f32,
+) -> Option<V3<f32x16<S>>> {
+    let simd = p.x.simd;
+    let lit = |value: f32| f32x16::splat(simd, value);
+    let (thickness, center, axis) = match obstacle.solid {
+        Solid::HalfSpace { .. } => return None,
+        Solid::Capsule { a, b, radius } => (radius, a, (b - a).normalize_or_zero()),
+        Solid::Cylinder { center, axis, radius, half_height } => {
+            (radius.min(half_height), center, axis)
+        }
+    };
+    let way = p - start;
+    // Slower ones are still on their side, where the nearest way out is the right one.
+    let fast = Real::lt(lit(0.2 * thickness * thickness), way.dot(way));
+    if fast.to_bitmask() == 0 {
+        return None;
+    }
+    let (facing, depth) = obstacle.solid.depth(start, skin);
+    let mut deepest = lit(f32::NEG_INFINITY);
+    let mut leaving = facing;
+    let across = |v: V3<f32x16<S>>| {
+        let u = splat(v.x, axis);
+        u.scale_add(-v.dot(u), v)
+    };
+    let (from, along) = (across(start - splat(p.x, center)), across(way));
+    let nearest = -from.dot(along) / Real::max(along.dot(along), lit(1e-20));
+    let nearest = Real::min(Real::max(nearest, lit(0.0)), lit(1.0));
+    for share in [nearest, lit(0.5), lit(1.0)] {
+        let (normal, depth) = obstacle.solid.depth(way.scale_add(share, start), skin);
+        deepest = Real::max(deepest, depth);
+        leaving = normal;
+    }
+    let passes = fast
+        & Real::lt(lit(0.0), deepest)
+        & Real::lt(leaving.dot(facing), lit(0.0))
+        & Real::lt(depth, lit(1e-3 * thickness));
+    if passes.to_bitmask() == 0 {
+        return None;
+    }
+    // How far behind the plane: `start` is −depth before it.
+    let behind = Real::max(-(way.dot(facing)) + depth, lit(0.0));
+    Some(V3::select(passes, facing.scale_add(behind, p), p))
 }
 
 /// Some direction across an axis; up for an axis without length.

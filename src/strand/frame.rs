@@ -7,6 +7,7 @@
 //! at rest in the world seem to move the other way: each substep the nodes are carried by the inverse
 //! of the frame's motion, which is exactly inertia.
 
+use crate::setting::{Bound, HairSetting, Notes};
 use bevy::{
     math::{Affine3A, Isometry3d},
     prelude::*,
@@ -14,14 +15,86 @@ use bevy::{
 
 /// Where an entity is within the tick, spread over its substeps. Written by `Roots` from the
 /// entity's global transform.
-#[derive(Component, Reflect, Clone, Debug, Default)]
+#[derive(Component, Reflect, Clone, Debug)]
 #[reflect(Component, Default, Clone)]
 pub struct TickPose {
     from: Option<Pose>,
     to: Pose,
     now: Pose,
     before: Pose,
+    /// The shares of the frame's moving and turning that its hair is left behind by.
+    inertia: Vec2,
+    jumps: bool,
     was_invalid: bool,
+}
+
+impl Default for TickPose {
+    fn default() -> Self {
+        let pose = Pose::default();
+        Self {
+            from: None,
+            to: pose,
+            now: pose,
+            before: pose,
+            inertia: Vec2::ONE,
+            jumps: false,
+            was_invalid: false,
+        }
+    }
+}
+
+/// What the motion of the head does to its hair. Component of a [`Hair`](crate::Hair), may change at
+/// any time; where absent, [`HairDefault<HairInertia>`](crate::HairDefault) holds.
+///
+/// The fastest characters run and turn harder than any person could; with less inertia their hair
+/// still flies behind them, but by less.
+///
+/// ```
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+/// # let mut world = World::new();
+/// // a cartoon hero who dashes about
+/// world.spawn((Hair, HairInertia { moving: 0.3, turning: 0.5, ..default() }));
+/// ```
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct HairInertia {
+    /// Share of the head's movement that hair is left behind by: 1 as in nature, 0 for hair that
+    /// goes along as if the head rested. Headwind and drag are scaled along. Default 1, safe 0…1.
+    pub moving: f32,
+    /// The same of the head's turning. Default 1, safe 0…1.
+    pub turning: f32,
+    /// A head that moves farther than this within one tick is taken to have been put elsewhere: its
+    /// hair goes along in its present shape, at rest (m in the hair's own scale). Default 1, at
+    /// 60 Hz 60 m/s; safe 0.1…∞.
+    pub teleport_distance: f32,
+    /// The same for a head that turns by more than this (rad). Default 1.6, at 60 Hz more than
+    /// 5000° a second; π and above never happen.
+    pub teleport_angle: f32,
+}
+
+impl Default for HairInertia {
+    fn default() -> Self {
+        Self { moving: 1.0, turning: 1.0, teleport_distance: 1.0, teleport_angle: 1.6 }
+    }
+}
+
+const MOVING: Bound = Bound::new("HairInertia::moving", 0.0, 1.0, "1 is as in nature");
+const TURNING: Bound = Bound::new("HairInertia::turning", 0.0, 1.0, "1 is as in nature");
+const DISTANCE: Bound =
+    Bound::new("HairInertia::teleport_distance (m)", 0.0, f32::INFINITY, "1 suits games");
+const ANGLE: Bound =
+    Bound::new("HairInertia::teleport_angle (rad)", 0.0, f32::INFINITY, "1.6 suits games");
+
+impl HairSetting for HairInertia {
+    fn mended(&self, notes: &Notes) -> Self {
+        let d = Self::default();
+        Self {
+            moving: MOVING.mend(self.moving, d.moving, notes),
+            turning: TURNING.mend(self.turning, d.turning, notes),
+            teleport_distance: DISTANCE.mend(self.teleport_distance, d.teleport_distance, notes),
+            teleport_angle: ANGLE.mend(self.teleport_angle, d.teleport_angle, notes),
+        }
+    }
 }
 
 /// A rigid pose with a scale.
@@ -104,27 +177,50 @@ impl TickPose {
     }
 
     /// How this pose goes from before to now as seen in `hair`: what carries a point of its surface
-    /// along; `None` if it rests. Nodes have been carried into the hair's frame as it is now, so what
-    /// rests in the world rests in it, whatever the frame did.
-    pub fn motion_in(&self, hair: &Pose) -> Option<Affine3A> {
-        (self.now != self.before).then(|| {
-            let hair = hair.affine();
-            hair.inverse() * self.now.affine() * self.before.affine().inverse() * hair
-        })
+    /// along; `None` if it rests. Nodes have been carried into the hair's frame as it is now, so with
+    /// full inertia what rests in the world rests in it, whatever the frame did.
+    pub fn motion_in(&self, hair: &TickPose) -> Option<Affine3A> {
+        if hair.inertia == Vec2::ONE {
+            return (self.now != self.before).then(|| {
+                let hair = hair.now.affine();
+                hair.inverse() * self.now.affine() * self.before.affine().inverse() * hair
+            });
+        }
+        let seen = |own: &Pose, hair: &Pose| hair.affine().inverse() * own.affine();
+        let (before, now) = (seen(&self.before, &hair.before), seen(&self.now, &hair.now));
+        let carried = hair.carry().map_or(before, |carry| Affine3A::from(carry) * before);
+        (now != carried).then(|| now * carried.inverse())
     }
 
-    /// Begins a tick: the frame is to go to `to`, from where it was; from `to` itself the first time.
-    /// Says whether an invalid pose should be reported.
-    pub(super) fn aim(&mut self, to: Option<Pose>) -> bool {
+    /// Takes the next tick's change of pose as being put elsewhere, not as motion.
+    pub fn jump(&mut self) {
+        self.jumps = true;
+    }
+
+    /// Begins a tick: the frame is to go to `to`, from where it was; from `to` itself the first time
+    /// and when it is put there. Says whether it was put, and whether an invalid pose should be
+    /// reported.
+    pub(super) fn aim(&mut self, to: Option<Pose>, inertia: &HairInertia) -> (bool, bool) {
         let report = to.is_none() && !self.was_invalid;
         self.was_invalid = to.is_none();
-        let from = if self.from.is_some() { Some(self.to) } else { to };
+        self.inertia = Vec2::new(inertia.moving, inertia.turning);
+        let first = self.from.is_none();
+        let asked = core::mem::take(&mut self.jumps);
+        let put = !first
+            && to.is_some_and(|to| {
+                let scale = to.scale.max(self.to.scale);
+                asked
+                    || to.translation.distance(self.to.translation)
+                        > inertia.teleport_distance * scale
+                    || to.rotation.angle_between(self.to.rotation) > inertia.teleport_angle
+            });
+        let from = if first || put { to } else { Some(self.to) };
         self.to = to.unwrap_or(self.to);
-        if self.from.is_none() {
+        if first || put {
             self.now = self.to;
         }
         self.from = from;
-        report
+        (put, report)
     }
 
     /// Goes to the share `t` of the tick's motion.
@@ -134,14 +230,20 @@ impl TickPose {
     }
 
     /// How a point at rest in the world moves in this frame during the substep; `None` if the frame
-    /// did not move.
+    /// did not move. With less than full [`HairInertia`] the world seems to move by a share of it.
     pub fn carry(&self) -> Option<Isometry3d> {
         (self.before != self.now).then(|| {
             let rotation = (self.now.rotation.inverse() * self.before.rotation).normalize();
             let translation = self.now.rotation.inverse()
                 * (self.before.translation - self.now.translation)
                 / self.now.scale;
-            Isometry3d::new(translation, rotation)
+            match self.inertia {
+                Vec2::ONE => Isometry3d::new(translation, rotation),
+                Vec2 { x: moving, y: turning } => Isometry3d::new(
+                    translation * moving,
+                    Quat::IDENTITY.slerp(rotation, turning),
+                ),
+            }
         })
     }
 }
@@ -163,10 +265,11 @@ mod tests {
             scale: 2.0,
         };
         let mut frame = TickPose::default();
-        assert!(!frame.aim(Some(a)));
+        let inertia = HairInertia { teleport_distance: 10.0, ..default() };
+        assert_eq!(frame.aim(Some(a), &inertia), (false, false));
         frame.advance(1.0);
         assert!(frame.carry().is_none(), "the first tick begins where the frame is");
-        frame.aim(Some(b));
+        frame.aim(Some(b), &inertia);
         let world = Vec3::new(0.2, 0.4, -0.3);
         let mut local = a.point_in(world);
         for i in 1..=6 {
@@ -174,7 +277,8 @@ mod tests {
             local = frame.carry().unwrap() * local;
         }
         assert!(b.point_out(local).distance(world) < 1e-5);
-        assert!(frame.aim(None) && !frame.aim(None), "reported once");
+        let mut reports = || frame.aim(None, &inertia).1;
+        assert!(reports() && !reports(), "reported once");
         frame.advance(1.0);
         assert_eq!(*frame.now(), b);
     }

@@ -9,10 +9,11 @@
 //! substeps; drawing places the nodes with the pose that is drawn, so roots never lag. Lengths are
 //! in the hair's units: a scaled character's hair behaves as if unscaled.
 
+mod command;
 pub mod frame;
 mod systems;
 
-pub use frame::{Pose, TickPose};
+pub use frame::{HairInertia, Pose, TickPose};
 pub use systems::StrandPlugin;
 pub(crate) use systems::carry_strands;
 
@@ -99,6 +100,31 @@ pub struct Strand {
 pub struct StrandHistory {
     /// Positions (m), root first; empty until the first tick.
     pub positions: Vec<Vec3>,
+    /// Where the root is drawn, if known better than from the ticks: on a skinned mesh, where that is
+    /// drawn (m). The strand is drawn as much beside its ticks as its root.
+    pub root: Option<Vec3>,
+}
+
+impl StrandHistory {
+    fn between(&self, strand: &Strand, node: usize, overstep: f32) -> Vec3 {
+        let now = strand.positions[node];
+        match self.positions.get(node) {
+            Some(before) if before.is_finite() && self.positions.len() == strand.nodes() => {
+                before.lerp(now, overstep)
+            }
+            _ => now,
+        }
+    }
+
+    /// Where a node is drawn, in the hair's frame: between the tick before and the present by the
+    /// overstep of the fixed clock (0…1).
+    pub fn drawn(&self, strand: &Strand, node: usize, overstep: f32) -> Vec3 {
+        let place = self.between(strand, node, overstep);
+        match self.root {
+            None => place,
+            Some(root) => place + (root - self.between(strand, 0, overstep)),
+        }
+    }
 }
 
 /// What the strands of a hair are made of. Component of a [`Hair`]; where absent,
@@ -295,6 +321,15 @@ impl Strand {
             *tip = p;
         }
         self.rest();
+    }
+
+    /// Puts the root elsewhere, with the scalp's frame.
+    #[cfg(feature = "groom")]
+    pub(crate) fn put_root(&mut self, place: Vec3, frame: Quat) {
+        if place.is_finite() && frame.is_finite() {
+            self.positions[0] = place;
+            self.root_frame = frame.normalize();
+        }
     }
 
     pub(crate) fn parts(&self) -> (&[Vec3], &[Vec3], &[Quat], &[Vec3]) {

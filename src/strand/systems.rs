@@ -2,12 +2,13 @@
 
 use super::{
     Burden, Hair, HeldNodes, Strand, StrandError, StrandHistory, StrandModel, StrandOf, Strands,
-    TickPose, frame::Pose,
+    TickPose,
+    frame::{HairInertia, Pose},
 };
 use crate::{
     fault::{Fault, HairFault},
     parallel::for_each,
-    setting,
+    setting::{self, Settings},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::prelude::*;
@@ -18,6 +19,7 @@ pub struct StrandPlugin;
 impl Plugin for StrandPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<StrandModel>(app);
+        setting::plugin::<HairInertia>(app);
         app.register_type::<Hair>()
             .register_type::<TickPose>()
             .register_type::<Strand>()
@@ -67,15 +69,24 @@ fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &mut StrandH
 fn move_poses(
     step: Res<HairStep>,
     transforms: TransformHelper,
-    mut poses: Query<(Entity, &mut TickPose)>,
+    inertia: Settings<HairInertia>,
+    mut poses: Query<(Entity, &mut TickPose, Option<&Strands>)>,
+    mut strands: Query<&mut Strand>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    for (entity, mut frame) in &mut poses {
+    for (entity, mut frame, members) in &mut poses {
         if step.index == 0 {
             // With MinimalPlugins nothing propagates transforms, so the helper computes them.
             let pose = transforms.compute_global_transform(entity).ok();
-            if frame.aim(pose.as_ref().and_then(Pose::of)) {
+            let (put, report) = frame.aim(pose.as_ref().and_then(Pose::of), &inertia.of(entity));
+            if report {
                 faults.write(HairFault { entity, fault: Fault::Transform });
+            }
+            if let Some(members) = members.filter(|_| put) {
+                let mut theirs = strands.iter_many_mut(members.collection());
+                while let Some(mut strand) = theirs.fetch_next() {
+                    strand.bypass_change_detection().rest();
+                }
             }
         }
         frame.advance((step.index + 1) as f32 / step.count as f32);
