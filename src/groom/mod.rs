@@ -3,6 +3,13 @@
 //! A [`Groom`] holds strands as polylines, root first, in metres. It comes from a file, from game
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
+pub mod plant;
+
+pub use plant::{
+    Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, ImageMap, MAX_ROOTS, MapChannel,
+    PlantError, Planted, Planting, PlantingMaps, RootOnMesh, RootPlace, vertex_color,
+};
+
 use bevy::prelude::*;
 
 /// Many strands as polylines, root first (m), with what a modeller gave along: widths, colours and
