@@ -4,11 +4,15 @@
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
 pub mod plant;
+mod preset;
+mod scalp;
 
 pub use plant::{
     Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, ImageMap, MAX_ROOTS, MapChannel,
     PlantError, Planted, Planting, PlantingMaps, RootOnMesh, RootPlace, vertex_color,
 };
+pub use preset::{HairPreset, PresetSettings};
+pub use scalp::Scalp;
 
 use bevy::prelude::*;
 
