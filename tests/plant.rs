@@ -2,12 +2,14 @@
 #![cfg(feature = "groom")]
 
 use bevy::render::{mesh::RenderMesh, render_asset::RenderAsset};
+mod common;
+
 use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
-use bevy_keratin::{Strand, groom::*};
+use bevy_keratin::{groom::*, prelude::*};
 use core::f32::consts::{PI, TAU};
 use proptest::prelude::*;
 
@@ -628,6 +630,64 @@ fn a_mesh_on_the_graphics_device_is_refused() {
     mesh.asset_usage = RenderAssetUsages::RENDER_WORLD;
     let _ = <RenderMesh as RenderAsset>::take_gpu_data(&mut mesh, None);
     assert_eq!(straight(1e4).plant(&mesh).unwrap_err(), PlantError::Extracted);
+}
+
+/// Where hair is on a head: on the crown, not in the face nor on the ears, and alike on both sides.
+#[test]
+fn the_hairline_leaves_face_and_ears_free() {
+    let scalp = Scalp::default();
+    let at = |right: f32, up: f32, front: f32| {
+        let place = Vec3::new(right, up, front);
+        let (share, mirrored) =
+            (scalp.share(place), scalp.share(place * Vec3::new(-1.0, 1.0, 1.0)));
+        assert!((share - mirrored).abs() < 1e-6);
+        share
+    };
+    assert_eq!(at(0.0, 0.1, 0.0), 1.0);
+    assert_eq!(at(0.0, 0.0, -0.1), 1.0);
+    assert_eq!(at(0.07, 0.06, 0.0), 1.0);
+    assert_eq!(at(0.0, 0.05, 0.08), 0.0);
+    assert_eq!(at(0.08, 0.01, 0.0), 0.0);
+    assert_eq!(at(0.0, -0.08, -0.07), 0.0);
+    assert_eq!(at(f32::NAN, 0.0, 0.0), 0.0);
+    // Turned with its head.
+    let lying = Scalp { up: Dir3::X, front: Dir3::Y, ..scalp };
+    assert_eq!(lying.share(Vec3::X), 1.0);
+    assert_eq!(lying.share(Vec3::new(0.05, 0.08, 0.0)), 0.0);
+    let receded = Scalp { recede: 0.3, ..scalp };
+    assert!(receded.share(Vec3::new(0.0, 0.08, 0.06)) < scalp.share(Vec3::new(0.0, 0.08, 0.06)));
+}
+
+/// Each preset on a ball of a head: no strand is torn, restless or in the head a second after it
+/// is let go.
+#[test]
+fn presets_settle_on_a_head() {
+    let head = Sphere::new(0.1).mesh().ico(20).unwrap();
+    let scalp = Scalp { height: 0.1, ..default() };
+    for preset in HairPreset::ALL {
+        let recipe = preset.planting(&scalp);
+        let few = Planting { density: 0.12 * recipe.density, ..recipe };
+        let planted = preset.plant_as(&few, &head, &scalp).unwrap();
+        let mut app = common::test_app(60.0);
+        let hair = app.world_mut().spawn((Hair, preset.settings())).id();
+        app.world_mut().spawn((HairCollider::sphere(0.0985).unwrap(), Transform::default()));
+        for strand in planted.groom.strands() {
+            let strand = Strand::from_polyline(strand.points).unwrap();
+            app.world_mut().spawn((StrandOf(hair), strand));
+        }
+        common::run(&mut app, 1.5);
+        let world = app.world_mut();
+        let mut worst = (0.0f32, 0.0f32, 1.0f32);
+        for strand in world.query::<&Strand>().iter(world) {
+            worst.0 = worst.0.max(strand.peak_strain());
+            worst.1 = worst.1.max(common::rms_speed(strand));
+            let heights = strand.positions().iter().map(|p| p.length());
+            worst.2 = heights.fold(worst.2, f32::min);
+        }
+        assert!(worst.0 < 0.02, "{preset:?}: strain {}", worst.0);
+        assert!(worst.1 < 0.3, "{preset:?}: {} m/s", worst.1);
+        assert!(worst.2 > 0.0975, "{preset:?}: {} m from the centre", worst.2);
+    }
 }
 
 fn coordinate() -> impl Strategy<Value = f32> {

@@ -213,13 +213,14 @@ fn body() -> Result<Vec<(HairCollider, Transform)>> {
         parts.push((HairCollider::capsule(radius, way.length())?, place));
         Ok(())
     };
-    // The skull, from back to front and from below to above.
-    limb(Vec3::new(0.0, 0.018, -0.018), Vec3::new(0.0, 0.018, 0.016), 0.076)?;
-    limb(Vec3::new(0.0, 0.0, -0.012), Vec3::new(0.0, 0.035, 0.006), 0.076)?;
-    limb(Vec3::new(0.0, 0.03, -0.014), Vec3::new(0.0, 0.034, 0.014), 0.078)?;
-    // Jaw, neck, shoulders, chest.
-    limb(Vec3::new(0.0, -0.04, 0.035), Vec3::new(0.0, -0.06, 0.035), 0.05)?;
-    limb(Vec3::new(0.0, -0.05, -0.012), Vec3::new(0.0, -0.2, -0.03), 0.052)?;
+    // The skull, from back to front and from below to above. A little within the skin: roots must
+    // not be inside.
+    limb(Vec3::new(0.0, 0.018, -0.020), Vec3::new(0.0, 0.018, 0.018), 0.073)?;
+    limb(Vec3::new(0.0, 0.0, -0.014), Vec3::new(0.0, 0.040, 0.0), 0.073)?;
+    // Face, jaw, neck, shoulders, chest.
+    limb(Vec3::new(0.0, 0.02, 0.040), Vec3::new(0.0, -0.055, 0.043), 0.053)?;
+    limb(Vec3::new(0.0, -0.066, 0.035), Vec3::new(0.0, -0.066, 0.030), 0.047)?;
+    limb(Vec3::new(0.0, -0.05, -0.012), Vec3::new(0.0, -0.2, -0.03), 0.050)?;
     limb(Vec3::new(-0.15, -0.27, -0.04), Vec3::new(-0.03, -0.235, -0.035), 0.056)?;
     limb(Vec3::new(0.15, -0.27, -0.04), Vec3::new(0.03, -0.235, -0.035), 0.056)?;
     limb(Vec3::new(-0.08, -0.30, -0.02), Vec3::new(0.08, -0.30, -0.02), 0.07)?;

@@ -81,6 +81,28 @@ impl HairPreset {
     /// # Errors
     /// When the mesh cannot be planted; see [`Planting::plant`].
     pub fn plant(self, mesh: &Mesh, scalp: &Scalp) -> Result<Planted, PlantError> {
+        self.plant_as(&self.planting(scalp), mesh, scalp)
+    }
+
+    /// Plants a changed recipe, with the preset's hairline, parting and lengths by place.
+    ///
+    /// ```
+    /// # use bevy_keratin::groom::*; use bevy::prelude::*;
+    /// # let (head, scalp) = (Sphere::new(0.1).mesh().build(), Scalp::default());
+    /// let bob = HairPreset::Bob;
+    /// let fewer = Planting { density: 0.4e4, ..bob.planting(&scalp) };
+    /// let planted = bob.plant_as(&fewer, &head, &scalp).unwrap();
+    /// assert!(planted.groom.len() < 300);
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`Planting::plant`].
+    pub fn plant_as(
+        self,
+        planting: &Planting,
+        mesh: &Mesh,
+        scalp: &Scalp,
+    ) -> Result<Planted, PlantError> {
         let density = scalp.mask();
         let length = |place: &RootPlace| self.length_share(scalp, place.position);
         let direction = |place: &RootPlace| self.direction(scalp, place.position);
@@ -88,7 +110,7 @@ impl HairPreset {
         if self.is_parted() {
             maps = maps.direction(&direction);
         }
-        self.planting(scalp).plant_with(mesh, &maps)
+        planting.plant_with(mesh, &maps)
     }
 }
 
@@ -104,9 +126,10 @@ impl HairPreset {
         let parting = if self == Self::Bob { -0.22 } else { 0.0 };
         let side = if off.dot(right) < parting { -1.0 } else { 1.0 };
         let forward = off.dot(front);
-        // Behind the crown there is no parting.
+        // Behind the crown there is no parting; before it, down would be into the face.
         let across = (0.55 + 0.9 * (forward + 0.35)).clamp(0.0, 1.0);
-        right * (side * across) - front * (0.35 + 0.5 * forward.max(0.0)) - *scalp.up * 0.6
+        let down = (0.5 - forward).clamp(0.0, 0.6);
+        right * (side * across) - front * (0.35 + 0.8 * forward.max(0.0)) - *scalp.up * down
     }
 
     /// Hair is cut shorter at the sides and the nape.
@@ -132,7 +155,7 @@ impl HairPreset {
             length: 0.3,
             length_variation: 0.1,
             comb: parted,
-            lean: 1.1,
+            lean: 1.2,
             jitter: 0.06,
             clump: Some(Clump { spacing: 25e-3, strength: 0.25 }),
             fall: Some(fall),
@@ -162,9 +185,9 @@ impl HairPreset {
             },
             Self::Coily => Planting {
                 density: 2.0e4,
-                length: 0.2,
+                length: 0.17,
                 length_variation: 0.15,
-                nodes: 60,
+                nodes: 52,
                 comb: Comb::Out,
                 lean: 0.0,
                 jitter: 0.25,
@@ -206,7 +229,7 @@ impl HairPreset {
             Self::Long => 0.075,
             Self::Wavy => 0.09,
             Self::Curly => 0.085,
-            Self::Coily => 0.09,
+            Self::Coily => 0.2,
             Self::Short => 0.12,
         };
         PresetSettings {
@@ -231,7 +254,7 @@ impl HairPreset {
             Self::Coily => HairLook {
                 melanin: Melanin::BLACK,
                 roughness: 0.55,
-                gloss: 0.7,
+                gloss: 0.4,
                 width: 0.25e-3,
                 ..base
             },
@@ -246,9 +269,7 @@ impl HairPreset {
         let base = HairFollowers { segments: 24, stray: 0.02, ..HairFollowers::new(20_000) };
         match self {
             Self::Straight | Self::Long => HairFollowers { clump: 0.3, ..base },
-            Self::Wavy => {
-                HairFollowers { segments: 40, clump: 0.4, parting: 2.5, stray: 0.03, ..base }
-            }
+            Self::Wavy => HairFollowers { segments: 40, clump: 0.4, parting: 2.5, ..base },
             // Curls of neighbours blended would be none: each follows its nearest.
             Self::Curly => HairFollowers {
                 segments: 64,
@@ -260,11 +281,11 @@ impl HairPreset {
             },
             Self::Coily => HairFollowers {
                 count: 24_000,
-                segments: 64,
-                clump: 0.5,
+                segments: 52,
+                clump: 0.1,
                 parting: 1.0,
-                phase_variation: 0.02,
-                stray: 0.06,
+                phase_variation: 0.04,
+                stray: 0.1,
                 length_variation: 0.25,
                 ..base
             },

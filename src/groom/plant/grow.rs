@@ -231,8 +231,8 @@ fn axis(
         }
         let mut next = from + go * step;
         if let Some(shell) = shell {
-            // It rises to its layer with the first of its length, not at once.
-            let clearance = lot.clearance.min(0.7 * step * (i + 1) as f32);
+            // It rises to its layer little by little: hair is flat where it parts.
+            let clearance = lot.clearance.min(0.3 * step * (i + 1) as f32);
             if let Some((depth, off)) = shell.depth(next, clearance) {
                 go = (next + off * depth - from).normalize_or(off);
                 next = from + go * step;
