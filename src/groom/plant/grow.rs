@@ -39,7 +39,7 @@ pub(super) fn grow(
     let lots = lots(planting, maps, surface, roots, &leaders);
     let steps = steps(planting);
     let reach = lots.iter().map(|lot| lot.clearance).fold(0.0, f32::max);
-    let shell = planting.fall.map(|_| Shell::of(surface, reach));
+    let shell = planting.fall.map(|fall| Shell::of(surface, reach, 0.6 * fall.over));
     let axis_of = |i: usize, leader: Option<&[Vec3]>| {
         axis(planting, &roots[i].place, &lots[i], shell.as_ref(), steps, leader)
     };
