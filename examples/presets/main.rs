@@ -236,7 +236,7 @@ fn with_scalp(mut mesh: Mesh) -> Mesh {
     };
     if let Some(Float32x4(colors)) = mesh.attribute_mut(Mesh::ATTRIBUTE_COLOR) {
         for (color, place) in colors.iter_mut().zip(places) {
-            let share = 0.8 * scalp.share(Vec3::from(place));
+            let share = 0.95 * scalp.share(Vec3::from(place));
             let skin = Vec4::new(0.62, 0.40, 0.29, 1.0);
             let bare = scalp.share(Vec3::from(place)) > 0.0;
             let skin = if bare { skin } else { Vec4::from(*color) };

@@ -52,7 +52,8 @@ pub enum HairPreset {
 }
 
 /// What a [`HairPreset`] puts on the [`Hair`](crate::Hair) entity.
-#[derive(Bundle, Clone, Debug, Default, PartialEq)]
+#[derive(Bundle, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
 pub struct PresetSettings {
     /// How stiff it is.
     pub stiffness: Stiffness,
@@ -127,9 +128,9 @@ impl HairPreset {
         let side = if off.dot(right) < parting { -1.0 } else { 1.0 };
         let forward = off.dot(front);
         // Behind the crown there is no parting; before it, down would be into the face.
-        let across = (0.55 + 0.9 * (forward + 0.35)).clamp(0.0, 1.0);
+        let across = (0.6 + 2.0 * (forward + 0.2)).clamp(0.0, 1.0);
         let down = (0.5 - forward).clamp(0.0, 0.6);
-        right * (side * across) - front * (0.35 + 0.8 * forward.max(0.0)) - *scalp.up * down
+        right * (side * across) - front * (0.35 + 1.4 * forward.max(0.0)) - *scalp.up * down
     }
 
     /// Hair is cut shorter at the sides and the nape.
@@ -202,10 +203,10 @@ impl HairPreset {
                 length_variation: 0.2,
                 nodes: 10,
                 comb: Comb::Whorl { center: crown, turn: 0.5 },
-                lean: 0.95,
-                jitter: 0.15,
-                clump: Some(Clump { spacing: 14e-3, strength: 0.4 }),
-                fall: Some(Fall { over: 0.12, clearance: 4e-3, layering: 0.03, ..fall }),
+                lean: 1.2,
+                jitter: 0.12,
+                clump: Some(Clump { spacing: 14e-3, strength: 0.25 }),
+                fall: Some(Fall { over: 0.09, clearance: 4e-3, layering: 0.03, ..fall }),
                 ..base
             },
             Self::Bob => Planting {
@@ -213,7 +214,12 @@ impl HairPreset {
                 length_variation: 0.04,
                 nodes: 18,
                 fall: Some(Fall { layering: 0.09, ..fall }),
-                cut: Some(Cut { at: scalp.place(0.0, -0.9, 0.0), normal: up, least: 0.03 }),
+                // Higher in front, where the way down is longer: it hangs in one line.
+                cut: Some(Cut {
+                    at: scalp.place(0.0, -0.9, 0.0),
+                    normal: up - front * 0.25,
+                    least: 0.03,
+                }),
                 clump: Some(Clump { spacing: 25e-3, strength: 0.15 }),
                 ..base
             },
@@ -258,7 +264,7 @@ impl HairPreset {
                 width: 0.25e-3,
                 ..base
             },
-            Self::Short => HairLook { melanin: Melanin::DARK_BROWN, ..base },
+            Self::Short => HairLook { melanin: Melanin::DARK_BROWN, gloss: 0.6, ..base },
             Self::Bob => HairLook { melanin: Melanin::BLACK, roughness: 0.32, ..base },
             Self::Long => HairLook { melanin: Melanin::BLOND, ..base },
         }
@@ -289,7 +295,7 @@ impl HairPreset {
                 length_variation: 0.25,
                 ..base
             },
-            Self::Short => HairFollowers { segments: 12, clump: 0.2, stray: 0.05, ..base },
+            Self::Short => HairFollowers { segments: 12, clump: 0.2, ..base },
             Self::Bob => HairFollowers { clump: 0.15, stray: 0.01, length_variation: 0.03, ..base },
         }
     }

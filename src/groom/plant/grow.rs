@@ -95,7 +95,7 @@ fn lots(
     roots: &[Root],
     leaders: &[usize],
 ) -> Vec<Lot> {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(planting.seed ^ 0x6_0b0d_4a12);
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(planting.seed ^ 0x60b0_d4a1);
     let up = planting.fall.map_or(Vec3::ZERO, |fall| -fall.toward.normalize_or_zero());
     let lowest = roots.iter().map(|r| r.place.position.dot(up)).fold(f32::MAX, f32::min);
     let mut lots: Vec<Lot> = Vec::with_capacity(roots.len());
@@ -232,7 +232,7 @@ fn axis(
         let mut next = from + go * step;
         if let Some(shell) = shell {
             // It rises to its layer little by little: hair is flat where it parts.
-            let clearance = lot.clearance.min(0.3 * step * (i + 1) as f32);
+            let clearance = lot.clearance.min(0.4 * step * (i + 1) as f32);
             if let Some((depth, off)) = shell.depth(next, clearance) {
                 go = (next + off * depth - from).normalize_or(off);
                 next = from + go * step;

@@ -29,13 +29,13 @@ pub(super) fn scatter(
 ) -> Result<Vec<Root>, PlantError> {
     let unmasked = surface.area() * f64::from(density);
     let drawn = (unmasked * CANDIDATES).ceil().max(1.0);
-    if !(drawn <= MAX_DRAWN) {
+    if drawn > MAX_DRAWN {
         return Err(PlantError::TooMany { found: unmasked });
     }
     // Whole strata, or density would be off on meshes with few strands.
     let share = unmasked / drawn;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut choice = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x5eed_0f_3a5c);
+    let mut choice = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x5eed_0f3a);
     let mut wanted = 0.0;
     let mut candidates = Vec::new();
     for root in surface.draw(drawn as usize, &mut random) {
@@ -73,7 +73,7 @@ fn eliminate(candidates: &[(Root, f32)], density: f32, wanted: usize) -> Vec<usi
         let ((a, wide), (b, narrow)) = (&candidates[i], &candidates[j as usize]);
         let square = a.place.position.distance_squared(b.place.position) * 0.5 * (wide + narrow);
         let share = 1.0 - square.sqrt() / reach;
-        if i == j as usize || !(share > 0.0) {
+        if i == j as usize || share <= 0.0 {
             return 0.0;
         }
         let square = share * share;
