@@ -213,10 +213,17 @@ fn body() -> Result<Vec<(HairCollider, Transform)>> {
         parts.push((HairCollider::capsule(radius, way.length())?, place));
         Ok(())
     };
-    // The skull, from back to front and from below to above. A little within the skin: roots must
-    // not be inside.
-    limb(Vec3::new(0.0, 0.018, -0.020), Vec3::new(0.0, 0.018, 0.018), 0.073)?;
-    limb(Vec3::new(0.0, 0.0, -0.014), Vec3::new(0.0, 0.040, 0.0), 0.073)?;
+    // The skull: its core, and balls rolled inside it from the forehead over the crown to the nape.
+    // All a little within the skin, because roots must not be inside, yet not by more than what hair
+    // that lies on them needs to be seen.
+    limb(Vec3::new(0.0, 0.018, -0.020), Vec3::new(0.0, 0.018, 0.018), 0.074)?;
+    let rolled = |i: u8| {
+        let (sine, cosine) = (f32::from(i) * std::f32::consts::PI / 6.0).sin_cos();
+        Vec3::new(0.0, 0.018 + 0.042 * sine, 0.037 * cosine)
+    };
+    for i in 0..8 {
+        limb(rolled(i), rolled(i + 1), 0.057)?;
+    }
     // Face, jaw, neck, shoulders, chest.
     limb(Vec3::new(0.0, 0.02, 0.040), Vec3::new(0.0, -0.055, 0.043), 0.053)?;
     limb(Vec3::new(0.0, -0.066, 0.035), Vec3::new(0.0, -0.066, 0.030), 0.047)?;

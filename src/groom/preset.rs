@@ -93,7 +93,8 @@ impl HairPreset {
     /// let bob = HairPreset::Bob;
     /// let fewer = Planting { density: 0.4e4, ..bob.planting(&scalp) };
     /// let planted = bob.plant_as(&fewer, &head, &scalp).unwrap();
-    /// assert!(planted.groom.len() < 300);
+    /// let all = bob.plant(&head, &scalp).unwrap();
+    /// assert!(2 * planted.groom.len() < all.groom.len());
     /// ```
     ///
     /// # Errors
