@@ -3,9 +3,18 @@
 //! A [`Groom`] holds strands as polylines, root first, in metres. It comes from a file, from game
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
+pub mod plant;
+mod preset;
+mod scalp;
 mod skin;
 
-pub use skin::{RootOnMesh, RootsOnMesh, TiedRoots};
+pub use plant::{
+    Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, ImageMap, MAX_ROOTS, MapChannel,
+    PlantError, Planted, Planting, PlantingMaps, RootOnMesh, RootPlace, vertex_color,
+};
+pub use preset::{HairPreset, PresetSettings};
+pub use scalp::Scalp;
+pub use skin::{RootsOnMesh, TiedRoots};
 
 use bevy::prelude::*;
 

@@ -6,6 +6,7 @@
 //! roots there in equal parts over its substeps, and once a frame from the pose that is drawn, so
 //! that no root is ever seen beside its scalp.
 
+use super::RootOnMesh;
 use crate::{
     bond::Bonds,
     fault::{Fault, HairFault},
@@ -20,17 +21,6 @@ use bevy::{
     },
     prelude::*,
 };
-
-/// Where on a mesh a strand grows, to find the place again when the mesh is skinned: the triangle's
-/// vertices with the root's share of each. Shares are ≥ 0 and sum to 1.
-#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct RootOnMesh {
-    /// Indices of the triangle's vertices.
-    pub vertices: [u32; 3],
-    /// Barycentric weights of these vertices.
-    pub weights: Vec3,
-}
 
 /// Ties the strands of a [`Hair`] to triangles of a mesh, skinned or not. Component of the hair, which
 /// best sits on the bone that moves most of it.

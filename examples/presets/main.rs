@@ -1,0 +1,281 @@
+//! Every hair preset on the training head after two seconds, as pictures:
+//! `cargo run --release --example presets -- [FOLDER] [PRESET …]`.
+
+#[path = "../salon/mannequin.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod mannequin;
+
+/// What the mannequin takes from the scenes.
+mod scenes {
+    pub const HEAD_RADIUS: f32 = 0.1;
+}
+
+use bevy::{
+    asset::RenderAssetUsages,
+    camera::RenderTarget,
+    core_pipeline::prepass::DepthPrepass,
+    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, ShadowFilteringMethod},
+    mesh::VertexAttributeValues,
+    prelude::*,
+    render::{
+        RenderPlugin,
+        pipelined_rendering::PipelinedRenderingPlugin,
+        render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages},
+        view::screenshot::{Screenshot, ScreenshotCaptured},
+    },
+    time::TimeUpdateStrategy,
+    window::ExitCondition,
+    winit::WinitPlugin,
+};
+use bevy_keratin::{
+    groom::{HairPreset, Planted, Scalp},
+    prelude::*,
+};
+use std::{path::PathBuf, time::Instant};
+
+/// Seconds until hair has settled.
+const SETTLING: f32 = 2.0;
+const SIZE: (u32, u32) = (560, 640);
+/// Where the camera is (m): in front to the side, at the side, behind.
+const VIEWS: [Vec3; 3] =
+    [Vec3::new(0.30, 0.06, 0.62), Vec3::new(0.68, 0.05, 0.02), Vec3::new(-0.35, 0.12, -0.58)];
+
+#[derive(Resource, Default)]
+struct Captured(Option<Image>);
+
+/// The mannequin lies; its crown is at +X and its face at +Y. This puts it upright.
+fn upright() -> Transform {
+    Transform::from_matrix(Mat4::from_mat3(Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::X)))
+}
+
+fn scalp() -> Scalp {
+    Scalp { up: Dir3::X, front: Dir3::Y, height: 0.118, ..default() }
+}
+
+fn main() -> Result {
+    let mut arguments = std::env::args().skip(1);
+    let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "target/presets".into()));
+    let only: Vec<String> = arguments.map(|name| name.to_lowercase()).collect();
+    std::fs::create_dir_all(&folder)?;
+    for preset in HairPreset::ALL {
+        let name = format!("{preset:?}").to_lowercase();
+        if !only.is_empty() && !only.contains(&name) {
+            continue;
+        }
+        let views = draw(preset)?;
+        let path = folder.join(format!("{name}.png"));
+        beside(&views).try_into_dynamic()?.into_rgb8().save(&path)?;
+        println!("{}", path.display());
+    }
+    Ok(())
+}
+
+/// The views as one picture, from left to right.
+fn beside(views: &[Image]) -> Image {
+    let (width, height) = SIZE;
+    let row = |image: &Image, y: u32| {
+        let bytes = image.data.as_deref().unwrap_or_default();
+        let start = (4 * y * width) as usize;
+        bytes.get(start..start + 4 * width as usize).unwrap_or_default().to_vec()
+    };
+    let rows = (0..height).flat_map(|y| views.iter().flat_map(move |view| row(view, y)));
+    let size = Extent3d { width: width * views.len() as u32, height, depth_or_array_layers: 1 };
+    Image::new(
+        size,
+        TextureDimension::D2,
+        rows.collect(),
+        TextureFormat::Rgba8UnormSrgb,
+        RenderAssetUsages::default(),
+    )
+}
+
+fn draw(preset: HairPreset) -> Result<Vec<Image>> {
+    let start = Instant::now();
+    let mut app = app();
+    let camera = studio(&mut app);
+    let mesh = mannequin::mesh();
+    let planted = preset.plant(&mesh, &scalp())?;
+    let took = start.elapsed();
+    let hair = wear(&mut app, preset, &planted, with_scalp(mesh))?;
+    app.finish();
+    app.cleanup();
+    show(&mut app, &camera, false);
+    app.update();
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    let start = Instant::now();
+    for _ in 0..(60.0 * SETTLING) as u32 {
+        app.update();
+    }
+    println!(
+        "{preset:?}: {} guides planted with the studio in {took:.1?}, settled in {:.1?}",
+        planted.groom.len(),
+        start.elapsed()
+    );
+    report(&mut app, hair);
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+    VIEWS.iter().map(|from| view(&mut app, &camera, *from)).collect()
+}
+
+/// How well strands have kept their length and stayed off the head.
+fn report(app: &mut App, hair: Entity) {
+    let world = app.world_mut();
+    let mut strands = world.query::<(&Strand, &StrandOf)>();
+    let (mut strain, mut speed, mut inside) = (0.0f32, 0.0f32, 0.0f32);
+    for (strand, _) in strands.iter(world).filter(|(_, of)| of.0 == hair) {
+        strain = strain.max(strand.peak_strain());
+        speed = strand.velocities().iter().map(|v| v.length()).fold(speed, f32::max);
+        let depth = |p: &Vec3| -mannequin::head(*p);
+        inside = strand.positions()[1..].iter().map(depth).fold(inside, f32::max);
+    }
+    println!("  strain {strain:.3}, speed {speed:.3} m/s, deepest {:.1} mm", inside * 1e3);
+}
+
+fn app() -> App {
+    let mut app = App::new();
+    let plugins = DefaultPlugins
+        .set(WindowPlugin {
+            primary_window: None,
+            exit_condition: ExitCondition::DontExit,
+            ..default()
+        })
+        .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+        .set(bevy::log::LogPlugin { filter: "warn".into(), ..default() })
+        .disable::<WinitPlugin>()
+        .disable::<PipelinedRenderingPlugin>();
+    app.add_plugins((plugins, HairPlugins::default()))
+        .insert_resource(Time::<Fixed>::from_hz(60.0))
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
+        .insert_resource(DirectionalLightShadowMap { size: 2048 })
+        .insert_resource(GlobalAmbientLight { brightness: 300.0, ..default() })
+        .insert_resource(ClearColor(Color::srgb(0.17, 0.18, 0.2)))
+        .init_resource::<Captured>();
+    app
+}
+
+/// Three lights and a camera.
+fn studio(app: &mut App) -> (Entity, Handle<Image>) {
+    let light = |at: Vec3, lux: f32, color: Color, shadows: bool| {
+        let light = DirectionalLight {
+            illuminance: lux,
+            color,
+            shadow_maps_enabled: shadows,
+            shadow_normal_bias: 0.6,
+            ..default()
+        };
+        let cascades =
+            CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 1.6, ..default() };
+        let at = Transform::from_translation(at).looking_at(Vec3::ZERO, Vec3::Y);
+        (light, cascades.build(), at)
+    };
+    let world = app.world_mut();
+    world.spawn(light(Vec3::new(1.0, 1.3, 1.2), 9000.0, Color::srgb(1.0, 0.95, 0.88), true));
+    world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 3000.0, Color::srgb(0.8, 0.88, 1.0), false));
+    world.spawn(light(Vec3::new(-0.7, 1.0, -1.5), 6000.0, Color::WHITE, false));
+    let mut image = Image::new_target_texture(SIZE.0, SIZE.1, TextureFormat::Rgba8UnormSrgb, None);
+    image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
+    let target = world.resource_mut::<Assets<Image>>().add(image);
+    let camera = world
+        .spawn((
+            Camera3d::default(),
+            RenderTarget::Image(target.clone().into()),
+            Msaa::Sample4,
+            DepthPrepass,
+            ShadowFilteringMethod::Hardware2x2,
+        ))
+        .id();
+    (camera, target)
+}
+
+/// The head with the preset's hair.
+fn wear(app: &mut App, preset: HairPreset, planted: &Planted, head: Mesh) -> Result<Entity> {
+    let world = app.world_mut();
+    let head = world.resource_mut::<Assets<Mesh>>().add(head);
+    let skin = StandardMaterial { perceptual_roughness: 0.55, ..default() };
+    let skin = world.resource_mut::<Assets<StandardMaterial>>().add(skin);
+    world.spawn((Mesh3d(head), MeshMaterial3d(skin), upright()));
+    let hair = world.spawn((Hair, upright(), preset.settings())).id();
+    for strand in planted.groom.strands() {
+        world.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
+    }
+    for (collider, place) in body()? {
+        world.spawn((collider, place));
+    }
+    Ok(hair)
+}
+
+/// What hair lies on, as balls and capsules (upright, m).
+fn body() -> Result<Vec<(HairCollider, Transform)>> {
+    let mut parts = Vec::new();
+    let mut limb = |a: Vec3, b: Vec3, radius: f32| -> Result {
+        let way = b - a;
+        let turn = Quat::from_rotation_arc(Vec3::Y, way.normalize_or(Vec3::Y));
+        let place = Transform::from_translation((a + b) * 0.5).with_rotation(turn);
+        parts.push((HairCollider::capsule(radius, way.length())?, place));
+        Ok(())
+    };
+    // The skull: its core, and balls rolled inside it from the forehead over the crown to the nape.
+    // All a little within the skin, because roots must not be inside, yet not by more than what hair
+    // that lies on them needs to be seen.
+    limb(Vec3::new(0.0, 0.018, -0.020), Vec3::new(0.0, 0.018, 0.018), 0.074)?;
+    let rolled = |i: u8| {
+        let (sine, cosine) = (f32::from(i) * std::f32::consts::PI / 6.0).sin_cos();
+        Vec3::new(0.0, 0.018 + 0.042 * sine, 0.037 * cosine)
+    };
+    for i in 0..8 {
+        limb(rolled(i), rolled(i + 1), 0.057)?;
+    }
+    // Face, jaw, neck, shoulders, chest.
+    limb(Vec3::new(0.0, 0.02, 0.040), Vec3::new(0.0, -0.055, 0.043), 0.053)?;
+    limb(Vec3::new(0.0, -0.066, 0.035), Vec3::new(0.0, -0.066, 0.030), 0.047)?;
+    limb(Vec3::new(0.0, -0.05, -0.012), Vec3::new(0.0, -0.2, -0.03), 0.050)?;
+    limb(Vec3::new(-0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058)?;
+    limb(Vec3::new(0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058)?;
+    limb(Vec3::new(-0.08, -0.30, -0.02), Vec3::new(0.08, -0.30, -0.02), 0.07)?;
+    Ok(parts)
+}
+
+/// The skin under the hair, darker.
+fn with_scalp(mut mesh: Mesh) -> Mesh {
+    use VertexAttributeValues::{Float32x3, Float32x4};
+    let scalp = scalp();
+    let Some(Float32x3(places)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION).cloned() else {
+        return mesh;
+    };
+    if let Some(Float32x4(colors)) = mesh.attribute_mut(Mesh::ATTRIBUTE_COLOR) {
+        for (color, place) in colors.iter_mut().zip(places) {
+            let share = 0.95 * scalp.share(Vec3::from(place));
+            let skin = Vec4::new(0.62, 0.40, 0.29, 1.0);
+            let bare = scalp.share(Vec3::from(place)) > 0.0;
+            let skin = if bare { skin } else { Vec4::from(*color) };
+            *color = skin.lerp(Vec4::new(0.05, 0.03, 0.022, 1.0), share).to_array();
+        }
+    }
+    mesh
+}
+
+fn show(app: &mut App, camera: &(Entity, Handle<Image>), is_on: bool) {
+    if let Some(mut camera) = app.world_mut().get_mut::<Camera>(camera.0) {
+        camera.is_active = is_on;
+    }
+}
+
+fn view(app: &mut App, camera: &(Entity, Handle<Image>), from: Vec3) -> Result<Image> {
+    let at = Vec3::new(0.0, -0.05, 0.0);
+    let place = Transform::from_translation(from).looking_at(at, Vec3::Y);
+    app.world_mut().entity_mut(camera.0).insert(place);
+    show(app, camera, true);
+    app.world_mut().spawn(Screenshot::image(camera.1.clone())).observe(
+        |shot: On<ScreenshotCaptured>, mut captured: ResMut<Captured>| {
+            captured.0 = Some(shot.image.clone());
+        },
+    );
+    for _ in 0..100 {
+        app.update();
+        // Once is enough; the rest is waiting.
+        show(app, camera, false);
+        if let Some(image) = app.world_mut().resource_mut::<Captured>().0.take() {
+            return Ok(image);
+        }
+    }
+    Err("the graphics device gave no picture back".into())
+}
