@@ -39,6 +39,17 @@ pub enum Fault {
     /// Gravity that is not finite counts as none.
     #[error("HairGravity is not finite: no gravity is used until it is")]
     Gravity,
+    /// A groom that no strands can be grown from.
+    #[cfg(feature = "groom")]
+    #[error("the hair's groom cannot be used: {0}")]
+    Groom(crate::groom::GroomError),
+    /// A groom whose file could not be loaded.
+    #[cfg(feature = "groom")]
+    #[error("the hair's groom was not loaded: {error}")]
+    GroomNotLoaded {
+        /// What the asset server says.
+        error: String,
+    },
     /// A request that names something that is not there.
     #[error("the treatment's target is neither a Hair nor a strand")]
     NoTarget,

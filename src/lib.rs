@@ -25,7 +25,7 @@ pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
 pub use contact::{ColliderShape, HairCollider, LockContact};
 pub use fault::{Fault, HairFault};
 #[cfg(feature = "groom")]
-pub use groom::{Groom, GroomError};
+pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
 pub use spring::Springs;

@@ -1,15 +1,12 @@
 //! A head for a groom that comes without one.
 
 use super::Groom;
-use bevy::{
-    math::{DVec3, bounding::BoundingSphere},
-    prelude::*,
-};
+use bevy::math::{DVec3, bounding::BoundingSphere};
 
 impl Groom {
     /// The ball (m) whose surface the roots lie on best, by least squares: a collider for a groom
-    /// whose head is not at hand, and its place. It is shrunk until only one root in twenty lies
-    /// within. `None` where roots do not curve, as on a flat patch, or are fewer than four.
+    /// whose head is not at hand, and its place. It is shrunk until no root lies within, because what
+    /// grows inside a collider is stretched out of it. `None` where roots do not curve, as on a flat patch, or are fewer than four.
     ///
     /// ```
     /// # use bevy_keratin::groom::Groom; use bevy::prelude::*;
@@ -42,9 +39,7 @@ impl Groom {
         let centre = DVec3::new(x, y, z) * 0.5;
         let radius = (d + centre.length_squared()).max(0.0).sqrt() * spread;
         let centre = (middle + centre * spread).as_vec3();
-        let mut reach: Vec<f32> = self.roots().map(|r| r.distance(centre)).collect();
-        let rank = count / 20;
-        let (_, nearest, _) = reach.select_nth_unstable_by(rank, f32::total_cmp);
+        let nearest = self.roots().map(|r| r.distance(centre)).fold(f32::MAX, f32::min);
         let radius = nearest.min(radius as f32);
         (centre.is_finite() && radius > 0.0 && radius < 1e3 * spread as f32)
             .then(|| BoundingSphere::new(centre, radius))

@@ -1,6 +1,8 @@
 //! Grooms as assets.
 
-use super::{Groom, GroomFileError, GroomLosses, GroomSettings, UpAxis, gltf, tressfx, yuksel};
+use super::{
+    Groom, GroomFileError, GroomLosses, GroomSettings, UpAxis, gltf, tressfx, wear, yuksel,
+};
 use bevy::{
     asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
     platform::collections::HashMap,
@@ -194,6 +196,7 @@ pub struct GroomPlugin;
 impl Plugin for GroomPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<Groom>().register_type::<GroomSettings>();
+        wear::build(app);
         add_loader(app);
     }
 
@@ -207,6 +210,7 @@ fn add_loader(app: &mut App) {
     let world = app.world();
     if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<Groom>>() {
         app.init_asset::<Groom>().register_asset_loader(GroomLoader);
+        wear::with_assets(app);
     }
 }
 

@@ -12,6 +12,7 @@ mod losses;
 mod reshape;
 mod settings;
 pub mod tressfx;
+mod wear;
 pub mod yuksel;
 
 pub use bytes::GroomFileError;
@@ -19,6 +20,7 @@ pub use loader::{GroomFormat, GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
 pub use reshape::UpAxis;
 pub use settings::GroomSettings;
+pub use wear::{GroomGuides, GroomedHair};
 
 use crate::setting::InvalidValue;
 use bevy::prelude::*;

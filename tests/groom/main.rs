@@ -5,4 +5,5 @@ mod gltf;
 mod malformed;
 mod reshape;
 mod tressfx;
+mod worn;
 mod yuksel;
