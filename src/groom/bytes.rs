@@ -90,7 +90,7 @@ impl<'a> Bytes<'a> {
         what: &'static str,
     ) -> Result<&'a [u8], GroomFileError> {
         let found = self.len().saturating_sub(offset);
-        let expected = count.checked_mul(size).unwrap_or(u64::MAX);
+        let expected = count.saturating_mul(size);
         let short = GroomFileError::Truncated { offset, what, expected, found };
         let end = offset.checked_add(expected).ok_or_else(|| short.clone())?;
         let range = usize::try_from(offset).ok().zip(usize::try_from(end).ok());

@@ -51,7 +51,7 @@ fn solve(mut rows: [[f64; 5]; 4], least: f64) -> Option<[f64; 4]> {
     for k in 0..4 {
         let pivot = (k..4).max_by(|a, b| rows[*a][k].abs().total_cmp(&rows[*b][k].abs()))?;
         rows.swap(k, pivot);
-        if !(rows[k][k].abs() > least) {
+        if rows[k][k].is_nan() || rows[k][k].abs() <= least {
             return None;
         }
         let row = rows[k];

@@ -195,7 +195,10 @@ pub struct GroomPlugin;
 
 impl Plugin for GroomPlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<Groom>().register_type::<GroomSettings>();
+        app.register_type::<Groom>()
+            .register_type::<GroomSettings>()
+            .register_type::<GroomFormat>()
+            .register_type::<GroomLosses>();
         wear::build(app);
         add_loader(app);
     }

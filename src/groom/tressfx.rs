@@ -95,7 +95,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     let mut losses = GroomLosses::default();
     let points = match layout.header {
         160 => {
-            let fixed = |i: u64, w: f32| w == 0.0 && each > 0 && i % each != 0;
+            let fixed = |i: u64, w: f32| w == 0.0 && !i.is_multiple_of(each);
             let points = bytes.groups(offset, nodes, "a position", Vec4::from_array)?;
             losses.freed_nodes = (0..).zip(&points).filter(|(i, p)| fixed(*i, p.w)).count();
             points.iter().map(|p| p.truncate()).collect()
