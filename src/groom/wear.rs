@@ -199,7 +199,9 @@ fn grow(
         let Some(groom) = grooms.get(&wanted.groom) else {
             if let LoadState::Failed(error) = assets.load_state(&wanted.groom) {
                 // The asset server has logged the whole of it.
-                let fault = Fault::GroomNotLoaded { error: error.to_string() };
+                let error = error.to_string();
+                let error = error.lines().next().unwrap_or_default().to_owned();
+                let fault = Fault::GroomNotLoaded { error };
                 faults.write(HairFault { entity: hair, fault });
                 grown.take_off(&mut commands, hair);
                 grown.from = Some(wanted.clone());
