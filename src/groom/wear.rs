@@ -88,17 +88,17 @@ impl Groom {
     ///
     /// ```
     /// # use bevy_keratin::{prelude::*, groom::*}; use bevy::prelude::*;
-    /// fn tuft(mut commands: Commands) -> Result {
+    /// fn tuft(commands: &mut Commands) -> Result {
     ///     let roots = (0..100).map(|i| Vec3::new(i as f32 * 1e-3, 0.0, 0.0));
     ///     let groom = Groom::from_polylines(roots.map(|r| [r, r + Vec3::Y * 0.1]))?;
     ///     let hair = commands.spawn(Hair).id();
-    ///     groom.spawn(&mut commands, hair, &GroomGuides { count: 20, ..default() })?;
+    ///     groom.spawn(commands, hair, &GroomGuides { count: 20, ..default() })?;
     ///     Ok(())
     /// }
     /// # let mut world = World::new();
-    /// # world.run_system_once(tuft).unwrap().unwrap();
+    /// # tuft(&mut world.commands()).unwrap();
+    /// # world.flush();
     /// # assert_eq!(world.query::<&Strand>().iter(&world).count(), 20);
-    /// # use bevy::ecs::system::RunSystemOnce;
     /// ```
     ///
     /// # Errors
