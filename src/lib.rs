@@ -38,6 +38,9 @@ pub use water::{
 
 /// What most games need.
 pub mod prelude {
+    #[cfg(feature = "groom")]
+    #[doc(hidden)]
+    pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};
     #[cfg(feature = "render")]
     #[doc(hidden)]
     pub use crate::render::{HairFollowers, HairLook, HairShading, HairView, Melanin};

@@ -130,7 +130,8 @@ fn put_on(
     );
     let guides = GroomGuides { count: arguments.guides, nodes: arguments.nodes, ..default() };
     let hair = GroomedHair { groom: grooms.add(groom), guides };
-    commands.spawn((head, children![(hair, HairFollowers::new(100_000))]));
+    let stiffness = Stiffness::from_bending_length(arguments.stiffness)?;
+    commands.spawn((head, children![(hair, stiffness, HairFollowers::new(100_000))]));
     commands.insert_resource(Shown { middle, reach, pivot, rest });
     Ok(())
 }

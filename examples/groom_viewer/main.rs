@@ -45,6 +45,10 @@ struct Arguments {
     /// How many nodes they have at most.
     #[arg(long, default_value_t = GroomGuides::default().nodes)]
     nodes: usize,
+    /// How long hair can be that stands by itself: the gravity-bending length (m).
+    #[arg(long, value_name = "M", default_value_t = Stiffness::default().bending_length,
+          value_parser = stiffness)]
+    stiffness: f32,
     /// Draws no window, but PNGs into this folder.
     #[arg(long, value_name = "DIR")]
     offscreen: Option<PathBuf>,
@@ -72,6 +76,11 @@ impl From<Up> for UpAxis {
             Up::Z => Self::Z,
         }
     }
+}
+
+fn stiffness(text: &str) -> Result<f32, String> {
+    let metres = text.parse().map_err(|_| "expected metres, such as 0.13")?;
+    Stiffness::from_bending_length(metres).map(|_| metres).map_err(|error| error.to_string())
 }
 
 fn seconds(text: &str) -> Result<f32, String> {
