@@ -47,7 +47,9 @@ fn main() {
         let [a, b] = apps.map(|app| app.world().resource::<StrainPeak>().0);
         println!("{count} | {paper} | {:.2} | {:.2} | {a:.4} {b:.4}", best[0], best[1]);
     }
-    println!("\ndroplets, equally dense | a query of strands that grow side by side, ns | anywhere, ns");
+    println!(
+        "\ndroplets, equally dense | a query of strands that grow side by side, ns | anywhere, ns"
+    );
     for count in [1_000, 10_000, 100_000] {
         let [beside, anywhere] = [true, false].map(|beside| query(count, beside) * 1e9);
         println!("{count} | {beside:.1} | {anywhere:.1}");

@@ -42,6 +42,17 @@ pub enum Fault {
     /// Roots that cannot be tied to their mesh: the strands stay as they are.
     #[error("{0}; those strands do not follow the mesh")]
     Roots(&'static str),
+    /// A groom that no strands can be grown from.
+    #[cfg(feature = "groom")]
+    #[error("the hair's groom cannot be used: {0}")]
+    Groom(crate::groom::GroomError),
+    /// A groom whose file could not be loaded.
+    #[cfg(feature = "groom")]
+    #[error("the hair's groom was not loaded: {error}")]
+    GroomNotLoaded {
+        /// What the asset server says.
+        error: String,
+    },
     /// A request that names something that is not there.
     #[error("the treatment's target is neither a Hair nor a strand")]
     NoTarget,

@@ -25,11 +25,13 @@ pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
 pub use contact::{ColliderShape, HairCollider, LockContact};
 pub use fault::{Fault, HairFault};
 #[cfg(feature = "groom")]
-pub use groom::{Groom, GroomError};
+pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
 pub use spring::Springs;
-pub use strand::{Burden, Hair, HairInertia, HeldNodes, Strand, StrandError, StrandModel, StrandOf, Strands};
+pub use strand::{
+    Burden, Hair, HairInertia, HeldNodes, Strand, StrandError, StrandModel, StrandOf, Strands,
+};
 pub use style::{PermRod, Treat, Winding, WoundOn, WoundStrands};
 pub use tick::{HairPlugins, HairStep, HairSubsteps, HairSystems, HairTick};
 pub use water::{
@@ -38,15 +40,18 @@ pub use water::{
 
 /// What most games need.
 pub mod prelude {
+    #[cfg(feature = "groom")]
+    #[doc(hidden)]
+    pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};
     #[cfg(feature = "render")]
     #[doc(hidden)]
     pub use crate::render::{HairFollowers, HairLook, HairShading, HairView, Melanin};
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
-        HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairPlugins, HairSubsteps, HairSystems,
-        HairTick, HeldNodes, LockContact, Moisture, PermRod, ProcessTime, Shower, Soak, Solver,
-        Stiffness, Strand, StrandModel, StrandOf, Strands, StretchProjection, Treat, WaterLedger,
-        Wetting, Winding, WoundOn,
+        HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairPlugins, HairSubsteps,
+        HairSystems, HairTick, HeldNodes, LockContact, Moisture, PermRod, ProcessTime, Shower,
+        Soak, Solver, Stiffness, Strand, StrandModel, StrandOf, Strands, StretchProjection, Treat,
+        WaterLedger, Wetting, Winding, WoundOn,
     };
 }

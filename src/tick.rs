@@ -166,6 +166,8 @@ impl PluginGroup for HairPlugins {
             .add(SpringPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
+        #[cfg(feature = "groom")]
+        let group = group.add(crate::groom::GroomPlugin);
         group
     }
 }

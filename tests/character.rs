@@ -4,7 +4,7 @@
 mod common;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{HairInertia, prelude::*};
+use bevy_keratin::{Fault, prelude::*};
 use common::{one_strand, run, settle, strand, test_app};
 use core::{f32::consts::PI, time::Duration};
 
@@ -223,9 +223,8 @@ fn restyled_hair_keeps_its_shape_and_reset_brings_it_back() {
         app.world_mut().get_mut::<Strand>(id).unwrap().pose([turn; 8]);
         strand(app, id).positions().to_vec()
     };
-    let far = |a: &[Vec3], b: &[Vec3]| {
-        a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
-    };
+    let far =
+        |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
     // Bent by hand it springs back.
     let bent = bend(&mut app);
     assert!(far(&bent, &straight) > 0.05);
@@ -237,4 +236,172 @@ fn restyled_hair_keeps_its_shape_and_reset_brings_it_back() {
     app.world_mut().commands().entity(hair).queue(Hair::restyle);
     run(&mut app, 3.0);
     assert!(far(strand(&app, id).positions(), &bent) < 1e-3, "{:?}", strand(&app, id).positions());
+}
+
+/// A strip of scalp from one joint to another, and hair on it.
+mod skinned {
+    use super::*;
+    use bevy::{
+        asset::RenderAssetUsages,
+        mesh::{
+            Indices, Mesh, Mesh3d, PrimitiveTopology, VertexAttributeValues,
+            skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
+        },
+        transform::TransformPlugin,
+    };
+    use bevy_keratin::{
+        groom::{RootOnMesh, RootsOnMesh},
+        strand::StrandHistory,
+    };
+
+    const ROWS: u32 = 9;
+
+    /// Along Z from 0 to 0.2 m, moved by the first joint at 0 and by the second at the end.
+    fn strip() -> Mesh {
+        let z = |row: u32| 0.2 * row as f32 / (ROWS - 1) as f32;
+        let rows = || (0..ROWS).flat_map(|row| [(row, -0.03_f32), (row, 0.03)]);
+        let share = |row: u32| row as f32 / (ROWS - 1) as f32;
+        let indices = (0..ROWS - 1).flat_map(|r| {
+            let i = 2 * r;
+            [i, i + 2, i + 1, i + 1, i + 2, i + 3]
+        });
+        Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+            .with_inserted_attribute(
+                Mesh::ATTRIBUTE_POSITION,
+                rows().map(|(row, x)| [x, 0.0, z(row)]).collect::<Vec<_>>(),
+            )
+            .with_inserted_attribute(
+                Mesh::ATTRIBUTE_JOINT_INDEX,
+                VertexAttributeValues::Uint16x4(rows().map(|_| [0, 1, 0, 0]).collect()),
+            )
+            .with_inserted_attribute(
+                Mesh::ATTRIBUTE_JOINT_WEIGHT,
+                rows().map(|(r, _)| [1.0 - share(r), share(r), 0.0, 0.0]).collect::<Vec<_>>(),
+            )
+            .with_inserted_indices(Indices::U32(indices.collect()))
+    }
+
+    fn roots() -> Vec<RootOnMesh> {
+        let Some(Indices::U32(indices)) = strip().indices().cloned() else { unreachable!() };
+        let corners = indices.as_chunks::<3>().0.iter();
+        corners.map(|c| RootOnMesh { vertices: *c, weights: Vec3::new(0.5, 0.2, 0.3) }).collect()
+    }
+
+    /// Where a root is with these joints, by the definition of skinning.
+    fn on_mesh(root: &RootOnMesh, joints: [Affine3; 2]) -> Vec3 {
+        let mesh = strip();
+        let positions = mesh.attribute(Mesh::ATTRIBUTE_POSITION).unwrap().as_float3().unwrap();
+        let corner = |v: u32| {
+            let share = (v / 2) as f32 / (ROWS - 1) as f32;
+            let at = Vec3::from_array(positions[v as usize]);
+            joints[0].transform_point3(at) * (1.0 - share) + joints[1].transform_point3(at) * share
+        };
+        let [a, b, c] = root.vertices.map(corner);
+        a * root.weights.x + b * root.weights.y + c * root.weights.z
+    }
+
+    use bevy::math::Affine3A as Affine3;
+
+    fn app_with_meshes(fps: f64) -> App {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default()))
+            .init_asset::<Mesh>()
+            .init_asset::<SkinnedMeshInverseBindposes>()
+            .add_plugins(HairPlugins::default())
+            .insert_resource(Time::<Fixed>::from_hz(60.0));
+        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+        let frame = Duration::from_secs_f64(1.0 / fps);
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(frame));
+        app.init_resource::<Roots>().add_systems(Last, count_roots);
+        app.finish();
+        app.cleanup();
+        app
+    }
+
+    /// How often roots were told not to fit.
+    #[derive(Resource, Default)]
+    struct Roots(usize);
+
+    fn count_roots(mut faults: MessageReader<HairFault>, mut roots: ResMut<Roots>) {
+        roots.0 += faults.read().filter(|f| matches!(f.fault, Fault::Roots(_))).count();
+    }
+
+    #[test]
+    fn roots_are_drawn_on_the_skinned_scalp_in_every_frame() {
+        // Frames that fit no tick.
+        let mut app = app_with_meshes(144.0);
+        let world = app.world_mut();
+        let size = 2.0;
+        let body =
+            world.spawn(Transform::from_xyz(3.0, 1.0, -2.0).with_scale(Vec3::splat(size))).id();
+        let neck = world.spawn((Transform::default(), ChildOf(body))).id();
+        let end = Transform::from_xyz(0.0, 0.0, 0.2);
+        let head = world.spawn((end, ChildOf(neck))).id();
+        let inverse = vec![Mat4::IDENTITY, end.to_matrix().inverse()];
+        let inverse_bindposes =
+            world.resource_mut::<Assets<_>>().add(SkinnedMeshInverseBindposes::from(inverse));
+        let mesh = world.resource_mut::<Assets<Mesh>>().add(strip());
+        let skin = SkinnedMesh { inverse_bindposes, joints: vec![neck, head] };
+        let mesh = world.spawn((Mesh3d(mesh), skin, ChildOf(body))).id();
+        let hair = world.spawn((Hair, ChildOf(neck))).id();
+        let ids: Vec<Entity> = roots()
+            .iter()
+            .map(|root| {
+                let at = on_mesh(root, [Affine3::IDENTITY; 2]);
+                let points: Vec<Vec3> = (0..8).map(|k| at + Vec3::Y * (0.02 * k as f32)).collect();
+                world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap())).id()
+            })
+            .collect();
+        world.entity_mut(hair).insert(RootsOnMesh { mesh: Some(mesh), roots: roots() });
+        // The neck turns by up to 720 degrees a second, the head bends on it.
+        app.add_systems(Update, move |time: Res<Time>, mut bones: Query<&mut Transform>| {
+            let t = time.elapsed_secs();
+            bones.get_mut(neck).unwrap().rotation = Quat::from_rotation_y(2.0 * (6.0 * t).sin());
+            bones.get_mut(head).unwrap().rotation = Quat::from_rotation_x(0.8 * (5.0 * t).sin());
+        });
+        let (mut worst, mut moved) = (0.0_f32, 0.0_f32);
+        for i in 0..400 {
+            app.update();
+            if i < 8 {
+                continue;
+            }
+            let world = app.world();
+            let place = |e: Entity| world.get::<GlobalTransform>(e).unwrap().affine();
+            let joints = [place(neck), place(head) * Affine3::from(end.compute_affine()).inverse()];
+            let overstep = world.resource::<Time<Fixed>>().overstep_fraction();
+            for (id, root) in ids.iter().zip(&roots()) {
+                let strand = world.get::<Strand>(*id).unwrap();
+                let history = world.get::<StrandHistory>(*id).unwrap();
+                let drawn = place(hair).transform_point3(history.drawn(strand, 0, overstep));
+                let scalp = on_mesh(root, joints);
+                worst = worst.max(drawn.distance(scalp));
+                moved = moved.max(scalp.distance(on_mesh(root, [place(neck); 2])));
+            }
+        }
+        println!("roots at most {} mm beside, bent by {} mm", worst * 1e3, moved * 1e3);
+        assert!(moved > 0.02, "the scalp bends by {moved} m");
+        assert!(worst < 1e-4, "a root was drawn {} mm beside its scalp", worst * 1e3);
+        // Hair has the size of the body: lengths in its frame are the mesh's.
+        let strand = app.world().get::<Strand>(ids[0]).unwrap();
+        assert!((strand.length() - 0.14).abs() < 1e-3, "{}", strand.length());
+        assert!(strand.is_finite() && strand.peak_strain() < 0.1, "{}", strand.peak_strain());
+    }
+
+    #[test]
+    fn roots_that_fit_no_mesh_are_told_once_and_left_alone() {
+        let mut app = app_with_meshes(60.0);
+        let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(strip());
+        let mesh = app.world_mut().spawn((Mesh3d(mesh), Transform::default())).id();
+        let (hair, id) = one_strand(&mut app, 0.1, 4, Vec3::Y);
+        let before = strand(&app, id).positions()[0];
+        for (vertices, count) in [([0, 1, 99], 1), ([0, 0, 0], 1), ([0, 2, 1], 2)] {
+            let root = RootOnMesh { vertices, weights: Vec3::new(0.5, 0.25, 0.25) };
+            let roots = RootsOnMesh { mesh: Some(mesh), roots: vec![root; count] };
+            app.world_mut().entity_mut(hair).insert(roots);
+            run(&mut app, 0.2);
+            let told = core::mem::take(&mut app.world_mut().resource_mut::<Roots>().0);
+            assert_eq!(told, 1, "{vertices:?}");
+            assert_eq!(strand(&app, id).positions()[0], before);
+        }
+    }
 }

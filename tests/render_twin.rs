@@ -116,7 +116,7 @@ fn random_strand(random: &mut Random, k: u32) -> DrawnStrand {
     DrawnStrand {
         guides,
         weights: [1.0 - 0.5 * (u + v), 0.5 * u, 0.5 * v],
-        length: 1.0 - 0.4 * random.share(),
+        length: 1.4 - 0.8 * random.share(),
         root: random.vector() * 0.01,
         phase: 0.1 * random.share(),
         stray: random.vector() * 0.02,

@@ -143,7 +143,8 @@ fn moving_together(app: &mut App) -> f64 {
     let way: Vec<Vec3> = tips(app).iter().zip(&before).map(|(a, b)| *a - *b).collect();
     let square = |v: Vec3| f64::from(v.length_squared());
     let apart: f64 = neighbour.iter().enumerate().map(|(i, &j)| square(way[i] - way[j])).sum();
-    let all: f64 = neighbour.iter().enumerate().map(|(i, &j)| square(way[i]) + square(way[j])).sum();
+    let all: f64 =
+        neighbour.iter().enumerate().map(|(i, &j)| square(way[i]) + square(way[j])).sum();
     1.0 - apart / all
 }
 

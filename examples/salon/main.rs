@@ -14,24 +14,16 @@ mod mannequin;
 mod offscreen;
 mod overlay;
 mod panel;
+mod picture;
 mod plots;
+mod renderer;
 mod solid;
 mod stage;
 mod story;
+mod studio;
 mod tools;
 
-use bevy::{
-    log::LogPlugin,
-    prelude::*,
-    render::{
-        RenderPlugin,
-        pipelined_rendering::PipelinedRenderingPlugin,
-        renderer::RenderAdapterInfo,
-        settings::{Backends, WgpuSettings},
-    },
-    window::{ExitCondition, WindowResolution},
-    winit::WinitPlugin,
-};
+use bevy::{prelude::*, render::renderer::RenderAdapterInfo, window::WindowResolution};
 use bevy_keratin::{
     prelude::*,
     render::{HairFollowers, HairRenderPlugin, HairView},
@@ -64,7 +56,7 @@ pub struct Arguments {
           value_parser = clap::value_parser!(u32).range(..=100_000))]
     frames: Option<Vec<u32>>,
     /// Width and height of pictures or window (pixels).
-    #[arg(long, default_value = "1280x720", value_name = "WxH", value_parser = size)]
+    #[arg(long, default_value = "1280x720", value_name = "WxH", value_parser = renderer::size)]
     size: (u32, u32),
 }
 
@@ -94,14 +86,6 @@ impl From<View> for HairView {
             View::Moisture => Self::Moisture,
         }
     }
-}
-
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    let valid = |side: u32| (16..=8192).contains(&side);
-    sides
-        .filter(|&(w, h)| valid(w) && valid(h))
-        .ok_or_else(|| "expected WIDTHxHEIGHT of 16 to 8192 each, such as 1280x720".into())
 }
 
 fn main() -> ExitCode {
@@ -158,27 +142,6 @@ fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
     gizmos.config_mut::<overlay::HairGizmos>().0.enabled = arguments.gizmos;
 }
 
-/// Hair is drawn by storage buffers in the vertex stage, which GL lacks.
-fn renderer() -> RenderPlugin {
-    let mut settings = WgpuSettings::default();
-    if std::env::var_os("WGPU_BACKEND").is_none() {
-        settings.backends = Some(Backends::PRIMARY);
-    }
-    RenderPlugin {
-        render_creation: settings.into(),
-        synchronous_pipeline_compilation: true,
-        ..default()
-    }
-}
-
-/// Software rendering, bare displays and missing drivers are all right or told in other words.
-const QUIET: &str = "warn,bevy_render::renderer=error,bevy_light=error,bevy_egui=error,\
-     wgpu=error,wgpu_hal=off,winit=error";
-
-fn log() -> LogPlugin {
-    LogPlugin { filter: QUIET.into(), ..default() }
-}
-
 fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
     let (width, height) = arguments.size;
     let window = Window {
@@ -189,7 +152,7 @@ fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
     let window = WindowPlugin { primary_window: Some(window), ..default() };
     let mut app = App::new();
     app.add_plugins((
-        DefaultPlugins.set(window).set(renderer()).set(log()),
+        DefaultPlugins.set(window).set(renderer::renderer()).set(renderer::log()),
         HairPlugins::default(),
         panel::PanelPlugin,
         story::StoryPlugin,
@@ -222,12 +185,9 @@ fn spare_software(
 }
 
 fn windowless(scene: Scene, arguments: &Arguments) -> App {
-    let window =
-        WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
     let mut app = App::new();
-    let plugins = DefaultPlugins.set(window).set(renderer()).set(log());
     app.add_plugins((
-        plugins.disable::<WinitPlugin>().disable::<PipelinedRenderingPlugin>(),
+        renderer::windowless(),
         // A picture shows its own frame, not one between two.
         HairPlugins::default().set(HairRenderPlugin { interpolate: false }),
     ));

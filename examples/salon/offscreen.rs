@@ -1,28 +1,11 @@
 //! Pictures without a window: exactly one tick an update, drawn at the frames asked for.
 
-use crate::{Arguments, camera, scenes::Scene};
-use bevy::{
-    camera::RenderTarget,
-    prelude::*,
-    render::{
-        render_resource::{TextureFormat, TextureUsages},
-        view::screenshot::{Screenshot, ScreenshotCaptured},
-    },
-    time::TimeUpdateStrategy,
-};
+use crate::{Arguments, camera, picture::Pictures, scenes::Scene};
+use bevy::{prelude::*, time::TimeUpdateStrategy};
 use std::{
     io,
     path::{Path, PathBuf},
 };
-
-/// The picture that came back.
-#[derive(Resource, Default)]
-struct Captured(Option<Image>);
-
-/// How often the app may update until a picture comes back.
-const PATIENCE: u32 = 100;
-/// Drawn updates until meshes, textures and pipelines are on the device.
-const WARM_UP: u32 = 2;
 
 /// Runs the scene and writes a PNG for every frame asked for. Gives the files' paths.
 pub fn run(
@@ -36,22 +19,7 @@ pub fn run(
     frames.sort_unstable();
     frames.dedup();
 
-    let (width, height) = arguments.size;
-    let mut image = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
-    image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
-    let target = app.world_mut().resource_mut::<Assets<Image>>().add(image);
-    let camera = app
-        .world_mut()
-        .spawn((camera::bundle(scene.kind), RenderTarget::Image(target.clone().into())))
-        .id();
-    app.init_resource::<Captured>().insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-    app.finish();
-    app.cleanup();
-    for _ in 0..WARM_UP {
-        app.update();
-    }
-    // Nothing is drawn on the way: only the ticks count.
-    draw(app, camera, false);
+    let pictures = Pictures::new(app, arguments.size, camera::bundle(scene.kind));
 
     let mut written = Vec::new();
     let mut ticks = 0;
@@ -62,37 +30,10 @@ pub fn run(
             ticks += 1;
         }
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-        let picture = capture(app, camera, &target)?;
         let name = format!("{}-{}-{frame}.png", scene.kind.name(), scene.variant);
         let path = folder.join(name);
-        let picture = picture.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
-        picture.save(&path).map_err(io::Error::other)?;
+        pictures.take(app, &path)?;
         written.push(path);
     }
     Ok(written)
-}
-
-fn draw(app: &mut App, camera: Entity, active: bool) {
-    if let Some(mut camera) = app.world_mut().get_mut::<Camera>(camera) {
-        camera.is_active = active;
-    }
-}
-
-/// Draws the world as it is now.
-fn capture(app: &mut App, camera: Entity, target: &Handle<Image>) -> io::Result<Image> {
-    draw(app, camera, true);
-    app.world_mut().spawn(Screenshot::image(target.clone())).observe(
-        |shot: On<ScreenshotCaptured>, mut captured: ResMut<Captured>| {
-            captured.0 = Some(shot.image.clone());
-        },
-    );
-    for _ in 0..PATIENCE {
-        app.update();
-        // Once is enough; the rest is waiting.
-        draw(app, camera, false);
-        if let Some(image) = app.world_mut().resource_mut::<Captured>().0.take() {
-            return Ok(image);
-        }
-    }
-    Err(io::Error::other("the graphics device gave no picture back"))
 }

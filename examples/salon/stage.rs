@@ -4,6 +4,7 @@ use crate::{
     mannequin,
     scenes::{BUST_HIGH, HEAD_RADIUS, Model, Scene, SceneKind},
     solid::{Paint, lathe},
+    studio,
 };
 use bevy::prelude::*;
 use core::f32::consts::{FRAC_PI_2, PI};
@@ -33,51 +34,8 @@ pub fn build(mut commands: Commands, mut paint: Paint) {
     let skin = paint.matte(Color::WHITE, 0.55);
     let chrome = paint.metal(Color::srgb(0.72, 0.73, 0.75));
 
-    let light = |colour, lumens, from: Vec3, shadow| {
-        (
-            SpotLight {
-                color: colour,
-                intensity: lumens,
-                range: 8.0,
-                radius: 0.05,
-                shadow_maps_enabled: shadow,
-                shadow_normal_bias: 0.6,
-                shadow_depth_bias: 0.004,
-                inner_angle: 0.35,
-                outer_angle: 0.75,
-                ..default()
-            },
-            Transform::from_translation(from).looking_at(Vec3::new(-0.03, 0.25, 0.0), Vec3::Y),
-        )
-    };
-    // Key, fill and rim.
-    commands.spawn(light(Color::srgb(1.0, 0.95, 0.88), 230_000.0, Vec3::new(1.0, 1.5, 1.5), true));
-    commands.spawn(light(Color::srgb(0.82, 0.9, 1.0), 75_000.0, Vec3::new(-1.6, 0.8, 1.3), false));
-    commands.spawn(light(
-        Color::srgb(1.0, 0.98, 0.95),
-        150_000.0,
-        Vec3::new(0.7, 1.3, -1.5),
-        false,
-    ));
-    commands.insert_resource(GlobalAmbientLight {
-        color: Color::srgb(0.9, 0.94, 1.0),
-        brightness: 260.0,
-        ..default()
-    });
-
-    // One surface from the top of the wall down to the floor, all around.
-    let cove = |i: i32| {
-        let turn = FRAC_PI_2 * i as f32 / 16.0;
-        Vec2::new(1.7 + 0.8 * turn.cos(), 0.8 - 0.8 * turn.sin())
-    };
-    let room: Vec<Vec2> =
-        [Vec2::new(2.5, 3.0)].into_iter().chain((0..=16).map(cove)).chain([Vec2::ZERO]).collect();
-    let wall = paint.matte(Color::srgb(0.60, 0.62, 0.62), 0.95);
-    commands.spawn((
-        Mesh3d(paint.meshes.add(lathe(&room, 96))),
-        MeshMaterial3d(wall),
-        Transform::from_xyz(0.0, -0.012, 0.0),
-    ));
+    studio::light(&mut commands, studio::FOCUS, 1.0);
+    studio::room(&mut commands, &mut paint, -0.012, 1.0);
     // Its top is the floor that the hair feels.
     let cloth = paint.matte(Color::srgb(0.80, 0.77, 0.71), 0.9);
     commands.spawn((

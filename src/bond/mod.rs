@@ -14,6 +14,8 @@ mod systems;
 
 pub use model::JointBonds;
 pub use systems::BondPlugin;
+#[cfg(feature = "groom")]
+pub(crate) use systems::fit_bonds;
 
 use crate::{
     setting::{Bound, HairSetting, InvalidValue, Notes},

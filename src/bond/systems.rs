@@ -35,7 +35,7 @@ impl Plugin for BondPlugin {
 
 /// Gives new strands their bonds, and mends what game code wrote into them. Our own writes bypass
 /// change detection, so `Changed` means somebody else's.
-fn fit_bonds(
+pub(crate) fn fit_bonds(
     mut strands: Query<(Entity, &Strand, &mut Bonds, &mut RestShape), Changed<Bonds>>,
     mut faults: MessageWriter<HairFault>,
 ) {

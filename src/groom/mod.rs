@@ -3,19 +3,37 @@
 //! A [`Groom`] holds strands as polylines, root first, in metres. It comes from a file, from game
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
+mod bytes;
+pub mod gltf;
+mod guides;
+mod head;
+mod loader;
+mod losses;
 pub mod plant;
 mod preset;
+mod reshape;
 mod scalp;
+mod settings;
 mod skin;
+pub mod tressfx;
+mod wear;
+pub mod yuksel;
 
+pub use bytes::GroomFileError;
+pub use loader::{GroomFormat, GroomLoadError, GroomLoader, GroomPlugin};
+pub use losses::GroomLosses;
 pub use plant::{
     Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, ImageMap, MAX_ROOTS, MapChannel,
     PlantError, Planted, Planting, PlantingMaps, RootOnMesh, RootPlace, vertex_color,
 };
 pub use preset::{HairPreset, PresetSettings};
+pub use reshape::UpAxis;
 pub use scalp::Scalp;
+pub use settings::GroomSettings;
 pub use skin::{RootsOnMesh, TiedRoots};
+pub use wear::{GroomGuides, GroomedHair};
 
+use crate::setting::InvalidValue;
 use bevy::prelude::*;
 
 /// Many strands as polylines, root first (m), with what a modeller gave along: widths, colours and
@@ -44,7 +62,8 @@ pub struct GroomStrand<'a> {
 }
 
 /// Why data cannot be a [`Groom`].
-#[derive(thiserror::Error, Clone, Debug, PartialEq)]
+#[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
 pub enum GroomError {
     /// A strand that is no line.
     #[error("strand {strand} has {found} nodes, expected 2 or more: leave it out")]
@@ -78,6 +97,20 @@ pub enum GroomError {
         /// How many there are.
         found: usize,
     },
+    /// A strand longer than a file format can hold.
+    #[error("strand {strand} has {found} nodes, expected at most 65536: resample it first")]
+    TooManyNodes {
+        /// Its index.
+        strand: usize,
+        /// How many nodes it has.
+        found: usize,
+    },
+    /// No strand at all.
+    #[error("the groom has no strands, expected 1 or more: see whether all were left out as short")]
+    Empty,
+    /// A number that a method of [`Groom`] refuses.
+    #[error(transparent)]
+    Value(#[from] InvalidValue),
 }
 
 impl Groom {
@@ -167,15 +200,16 @@ impl Groom {
 
     /// The strands in their order.
     pub fn strands(&self) -> impl ExactSizeIterator<Item = GroomStrand<'_>> {
-        (0..self.len()).map(|i| {
-            let start = i.checked_sub(1).map_or(0, |before| self.ends[before] as usize);
-            let nodes = start..self.ends[i] as usize;
-            GroomStrand {
-                points: &self.points[nodes.clone()],
-                widths: self.widths.get(nodes.clone()).filter(|_| !self.widths.is_empty()),
-                colors: self.colors.get(nodes).filter(|_| !self.colors.is_empty()),
-                uv: self.uvs.get(i).copied(),
-            }
-        })
+        (0..self.len()).map(|i| self.strand_at(i))
+    }
+
+    fn strand_at(&self, i: usize) -> GroomStrand<'_> {
+        let nodes = self.nodes_of(i);
+        GroomStrand {
+            points: &self.points[nodes.clone()],
+            widths: self.widths.get(nodes.clone()).filter(|_| !self.widths.is_empty()),
+            colors: self.colors.get(nodes).filter(|_| !self.colors.is_empty()),
+            uv: self.uvs.get(i).copied(),
+        }
     }
 }

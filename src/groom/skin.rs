@@ -121,7 +121,8 @@ pub(super) fn plugin(app: &mut App) {
             (tie, aim_roots, move_roots)
                 .chain()
                 .in_set(HairSystems::Roots)
-                .after(crate::strand::carry_strands),
+                .after(crate::strand::carry_strands)
+                .before(crate::bond::fit_bonds),
         )
         .add_systems(PostUpdate, draw_roots.after(TransformSystems::Propagate));
 }
@@ -155,10 +156,9 @@ fn tie(
             continue;
         }
         let joints = match skin {
-            None => vec![Joint {
-                entity: roots.mesh.unwrap_or(hair),
-                inverse_bind: Affine3A::IDENTITY,
-            }],
+            None => {
+                vec![Joint { entity: roots.mesh.unwrap_or(hair), inverse_bind: Affine3A::IDENTITY }]
+            }
             Some(skin) => {
                 let Some(inverse) =
                     bindposes.as_ref().and_then(|poses| poses.get(&skin.inverse_bindposes))
@@ -173,9 +173,9 @@ fn tie(
                     .collect()
             }
         };
-        let Some(matrices) = joint_matrices(&joints, |joint| {
-            transforms.compute_global_transform(joint).ok()
-        }) else {
+        let Some(matrices) =
+            joint_matrices(&joints, |joint| transforms.compute_global_transform(joint).ok())
+        else {
             continue;
         };
         let corners = corners(mesh, skin.is_some(), joints.len());
@@ -183,7 +183,8 @@ fn tie(
         let made = members.iter().zip(&roots.roots).filter_map(|(member, root)| {
             let corners = root.vertices.map(|v| corners(v as usize));
             let (strand, bonds, history) = strands.get_mut(member).ok()?;
-            let Some(tied) = tie_strand(member, root, corners, &matrices, pose.now(), (strand, bonds, history))
+            let Some(tied) =
+                tie_strand(member, root, corners, &matrices, pose.now(), (strand, bonds, history))
             else {
                 flat += 1;
                 return None;
@@ -193,7 +194,8 @@ fn tie(
         tied.roots = made.collect();
         tied.joints = joints;
         if flat > 0 {
-            let why = "some roots of RootsOnMesh are on triangles without area: they stay on the hair";
+            let why =
+                "some roots of RootsOnMesh are on triangles without area: they stay on the hair";
             faults.write(HairFault { entity: hair, fault: Fault::Roots(why) });
         }
         tied.failed = tied.roots.is_empty();
@@ -269,7 +271,11 @@ fn joint_matrices(
 }
 
 /// Where the tied roots are with these joints, seen from a hair.
-fn places(tied: &TiedRoots, matrices: &[Affine3A], hair: &Pose) -> impl Iterator<Item = Option<Isometry3d>> {
+fn places(
+    tied: &TiedRoots,
+    matrices: &[Affine3A],
+    hair: &Pose,
+) -> impl Iterator<Item = Option<Isometry3d>> {
     tied.roots.iter().map(|root| {
         let corners = root.corners.map(|c| hair.point_in(c.skinned(matrices)));
         triangle(corners, root.weights).map(|now| now * root.offset)

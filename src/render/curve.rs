@@ -55,7 +55,9 @@ pub fn strand_point<'a>(
     t: f32,
     followers: &HairFollowers,
 ) -> CurvePoint {
-    let reach = strand.length - strand.phase;
+    let reach = strand.length.min(1.0) - strand.phase;
+    // What is longer than its guides is like them, but larger.
+    let larger = strand.length.max(1.0);
     let share = strand.phase + t * reach;
     let near_guide = guide(strand.guides[0]);
     let near = near_guide.nodes;
@@ -95,8 +97,8 @@ pub fn strand_point<'a>(
         true => (Vec3::ZERO, 0.0),
         false => ((near_root - root) * followers.clump, followers.wet_clump),
     };
-    let loose = root + way / sum + gather * t + strand.stray * t * t;
-    let loose_slope = slope * reach / sum + gather + 2.0 * t * strand.stray;
+    let loose = root + way * (larger / sum) + gather * t + strand.stray * t * t;
+    let loose_slope = slope * (reach * larger / sum) + gather + 2.0 * t * strand.stray;
     let (moisture, rise) = moisture_at(&near_guide, share);
     let tight = most * moisture * t * (2.0 - t);
     let tighter = most * (rise * reach * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));

@@ -4,6 +4,7 @@ use super::{
     HairFollowers, HairLook, HairView, WetLook,
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     followers::{DrawnStrand, GuideRoot, scatter},
+    given::FollowerRoots,
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
 };
 use crate::{
@@ -28,6 +29,8 @@ pub(super) struct Interpolate(pub(super) bool);
 pub(super) struct Packed {
     pub(super) nodes: Vec<PackedNode>,
     layout: Vec<Guide>,
+    /// Where guides grew when the layout was new: given roots of followers are of that time.
+    roots: Vec<GuideRoot>,
     followers: Option<HairFollowers>,
     /// Whether roots are elsewhere than when followers were laid.
     roots_moved: bool,
@@ -84,8 +87,10 @@ pub(super) fn pack(
         &mut Packed,
         Option<&HairBuffers>,
         Option<&Strands>,
+        Option<Ref<FollowerRoots>>,
         &GlobalTransform,
     )>,
+    mut shorn: RemovedComponents<FollowerRoots>,
     strands: Query<GuideParts>,
     mut drawn: Query<(&mut Aabb, &MeshMaterial3d<RibbonMaterial>)>,
     (looks, views, followers): (Settings<HairLook>, Settings<HairView>, Settings<HairFollowers>),
@@ -100,11 +105,13 @@ pub(super) fn pack(
         _ => 1.0,
     };
     let new_device = device.is_some_and(|device| device.is_changed());
-    for (hair, mut packed, buffers, members, place) in &mut hairs {
+    let shorn: Vec<Entity> = shorn.read().collect();
+    for (hair, mut packed, buffers, members, given, place) in &mut hairs {
         let packed = packed.bypass_change_detection();
         let guides = || members.into_iter().flat_map(|m| m.iter());
         let settings = followers.of(hair);
-        let regroomed = packed.note_layout(guides(), &strands, &settings);
+        let mut regroomed = packed.note_layout(guides(), &strands, &settings);
+        regroomed |= given.as_ref().map_or(shorn.contains(&hair), Ref::is_changed);
 
         let bounds = packed.pack_nodes(&strands, overstep, !regroomed);
         let (low, high) = bounds.unwrap_or_default();
@@ -139,7 +146,7 @@ pub(super) fn pack(
             continue;
         }
 
-        let strands = packed.scatter(&strands, &settings);
+        let strands = packed.scatter(&strands, given.as_deref(), &settings);
         let counts = (packed.layout.len() as u32, strands.len() as u32);
         packed.ribbon = packed.ribbon(&look, &settings, view, counts);
         packed.key = key;
@@ -212,13 +219,17 @@ impl Packed {
                     let entry = Guide { strand: guide, nodes, root: Vec3::ZERO };
                     self.layout.truncate(count);
                     self.layout.push(entry);
+                    self.roots.clear();
                     changed = true;
                 }
             }
             count += 1;
         }
-        changed |= count != self.layout.len();
-        self.layout.truncate(count);
+        if count != self.layout.len() {
+            self.layout.truncate(count);
+            self.roots.clear();
+            changed = true;
+        }
         // What the shader reads from the uniform needs no new strands.
         let grown = |f: &HairFollowers| HairFollowers { clump: 0.0, parting: 0.0, ..*f };
         changed |= self.followers.as_ref().map(grown) != Some(grown(followers));
@@ -272,31 +283,40 @@ impl Packed {
     fn scatter(
         &mut self,
         strands: &Query<GuideParts>,
+        given: Option<&FollowerRoots>,
         followers: &HairFollowers,
     ) -> Vec<DrawnStrand> {
-        let roots: Vec<GuideRoot> = (self.layout.iter())
-            .map(|guide| {
+        if given.is_none() || self.roots.is_empty() {
+            self.roots.clear();
+            self.roots.extend(self.layout.iter().map(|guide| {
                 let Ok((strand, ..)) = strands.get(guide.strand) else {
                     return GuideRoot::default();
                 };
+                let places = strand.positions();
                 GuideRoot {
-                    place: strand.positions()[0],
+                    place: places[0],
                     normal: strand.root_frame() * Vec3::Z,
                     length: strand.length(),
+                    reach: places[places.len() - 1] - places[0],
                 }
-            })
-            .collect();
+            }));
+        }
+        let roots = core::mem::take(&mut self.roots);
         let usable = || roots.iter().map(|r| r.place).filter(|p| p.is_finite());
         self.centre = usable().sum::<Vec3>() / usable().count().max(1) as f32;
         self.note_roots();
-        let drawn = scatter(&roots, followers);
+        let drawn = scatter(&roots, given, followers);
         let reach = |strand: &DrawnStrand| {
             let own = roots[strand.guides[0] as usize].place;
             let apart = |k: usize| roots[strand.guides[k] as usize].place.distance(own);
-            let reach = apart(1).max(apart(2)) + strand.root.length() + strand.stray.length();
+            let larger = (strand.length - 1.0).max(0.0)
+                * strand.guides.iter().map(|g| roots[*g as usize].length).fold(0.0, f32::max);
+            let reach =
+                apart(1).max(apart(2)) + strand.root.length() + strand.stray.length() + larger;
             if reach.is_finite() { reach } else { 0.0 }
         };
         self.margin = drawn.iter().map(reach).fold(0.005, f32::max);
+        self.roots = roots;
         drawn
     }
 

@@ -2,6 +2,7 @@
 //! is decided once for a groom; where they are is computed in the vertex shader (and in
 //! [`curve`](super::curve)).
 
+use super::given::{FollowerRoots, grow};
 use crate::{
     grid::UniformGrid,
     setting::{Bound, HairSetting, Notes},
@@ -13,11 +14,13 @@ use bevy::prelude::*;
 /// [`HairDefault<HairFollowers>`](crate::HairDefault) holds.
 ///
 /// A follower grows between up to three near guides and takes their shape in shares. Guides that
-/// move apart let go of it: it stays with its nearest.
+/// move apart let go of it: it stays with its nearest. [`FollowerRoots`] says where followers grow if
+/// that is known.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct HairFollowers {
-    /// How many strands are drawn besides the guides. Default 12,000; 0 draws guides only; safe to
+    /// How many strands are drawn besides the guides, at most as many as [`FollowerRoots`] if the
+    /// hair has them. Default 12,000; 0 draws guides only; safe to
     /// 100,000. A real head carries 100,000.
     pub count: u32,
     /// Straight pieces drawn for each strand, along a smooth curve. Default 16, safe 2…64; for curls
@@ -112,7 +115,8 @@ pub struct DrawnStrand {
     pub seed: u32,
     /// Shares of the guides, sum 1.
     pub weights: [f32; 3],
-    /// Where on the guides it ends, a share of their length.
+    /// Where on the guides it ends, a share of their length. Above 1 it ends at their tips and is as
+    /// many times as large.
     pub length: f32,
     /// The root's place besides the weighted roots of the guides (m).
     pub root: Vec3,
@@ -156,11 +160,21 @@ pub(super) struct GuideRoot {
     /// Which way it leaves the scalp.
     pub(super) normal: Vec3,
     pub(super) length: f32,
+    /// From root to tip (m).
+    pub(super) reach: Vec3,
 }
 
 /// The drawn strands of a groom: the guides in their order, then the followers.
-pub(super) fn scatter(roots: &[GuideRoot], followers: &HairFollowers) -> Vec<DrawnStrand> {
+pub(super) fn scatter(
+    roots: &[GuideRoot],
+    given: Option<&FollowerRoots>,
+    followers: &HairFollowers,
+) -> Vec<DrawnStrand> {
     let mut drawn: Vec<_> = (0..roots.len() as u32).map(DrawnStrand::guide).collect();
+    if let Some(given) = given {
+        drawn.extend(grow(&given.0, roots, followers));
+        return drawn;
+    }
     if roots.is_empty() || followers.count == 0 {
         return drawn;
     }
@@ -336,19 +350,19 @@ pub(super) fn hash(seed: u32) -> u32 {
 }
 
 /// A small generator of our own: followers must not change with a dependency's version.
-struct Random(u32);
+pub(super) struct Random(pub(super) u32);
 
 impl Random {
-    fn next(&mut self) -> u32 {
+    pub(super) fn next(&mut self) -> u32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9);
         hash(self.0)
     }
 
-    fn share(&mut self) -> f32 {
+    pub(super) fn share(&mut self) -> f32 {
         (self.next() >> 8) as f32 / 16_777_216.0
     }
 
-    fn direction(&mut self) -> Vec3 {
+    pub(super) fn direction(&mut self) -> Vec3 {
         let v = Vec3::new(self.share(), self.share(), self.share()) * 2.0 - 1.0;
         v.normalize_or(Vec3::X)
     }
@@ -364,6 +378,7 @@ mod tests {
                 place: Vec3::new((i % n) as f32, 0.0, (i / n) as f32) * 0.01,
                 normal: Vec3::Y,
                 length: 0.2,
+                reach: Vec3::Y * 0.2,
             })
             .collect()
     }
@@ -371,7 +386,7 @@ mod tests {
     #[test]
     fn followers_cover_the_scalp_evenly_and_near_their_first_guide() {
         let roots = field(10);
-        let drawn = scatter(&roots, &HairFollowers::new(9000));
+        let drawn = scatter(&roots, None, &HairFollowers::new(9000));
         assert_eq!(drawn.len(), 9100);
         let mut cells = [0u32; 81];
         for strand in &drawn[100..] {
@@ -392,12 +407,19 @@ mod tests {
         let one = [GuideRoot::default()];
         let same = [GuideRoot::default(); 5];
         let row: Vec<_> = (0..7)
-            .map(|i| GuideRoot { place: Vec3::X * i as f32, normal: Vec3::Y, length: 1.0 })
+            .map(|i| GuideRoot {
+                place: Vec3::X * i as f32,
+                normal: Vec3::Y,
+                length: 1.0,
+                reach: Vec3::Y,
+            })
             .collect();
-        let broken = [GuideRoot { place: Vec3::NAN, normal: Vec3::NAN, length: f32::NAN }; 3];
+        let broken =
+            [GuideRoot { place: Vec3::NAN, normal: Vec3::NAN, length: f32::NAN, reach: Vec3::NAN };
+                3];
         for roots in [&one[..], &same, &row, &broken] {
-            assert_eq!(scatter(roots, &HairFollowers::new(50)).len(), roots.len() + 50);
+            assert_eq!(scatter(roots, None, &HairFollowers::new(50)).len(), roots.len() + 50);
         }
-        assert!(scatter(&[], &HairFollowers::new(50)).is_empty());
+        assert!(scatter(&[], None, &HairFollowers::new(50)).is_empty());
     }
 }

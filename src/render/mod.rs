@@ -21,6 +21,7 @@ mod beads;
 mod buffers;
 mod draw;
 mod followers;
+mod given;
 mod look;
 mod material;
 mod upload;
@@ -29,6 +30,7 @@ mod view;
 pub use beads::{Bead, HairBeadSystems, HairBeads};
 pub use buffers::HairBuffers;
 pub use followers::{DrawnStrand, HairFollowers};
+pub use given::{FollowerRoot, FollowerRoots};
 pub use look::{HairLook, HairShading, Melanin, WetLook};
 pub use view::{HairView, STRAIN_FULL, heat};
 
@@ -92,6 +94,7 @@ impl Plugin for HairRenderPlugin {
             .init_resource::<HairBeads>()
             .register_type::<HairBeads>()
             .register_type::<HairBuffers>()
+            .register_type::<FollowerRoots>()
             .register_type::<WetLook>()
             .add_systems(
                 PostUpdate,

@@ -20,7 +20,7 @@ struct DrawnStrand {
     guides: vec3<u32>,     // nearest first
     seed: u32,
     weights: vec3<f32>,    // shares of the guides, sum 1
-    length: f32,           // share of the guides' length that is drawn, above phase
+    length: f32,           // share of the guides' length that is drawn, above phase; above 1 larger
     root: vec3<f32>,       // root's place besides the weighted guides' roots (m)
     phase: f32,            // where on the guides the strand begins, a share of their length
     stray: vec3<f32>,      // by how much the tip leaves the lock (m)
@@ -124,7 +124,9 @@ struct StrandPoint {
 
 fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     var out: StrandPoint;
-    let reach = strand.length - strand.phase;
+    let reach = min(strand.length, 1.0) - strand.phase;
+    // What is longer than its guides is like them, but larger.
+    let larger = max(strand.length, 1.0);
     out.share = strand.phase + t * reach;
     let near = guides[strand.guides.x];
     let near_root = node_place(near.x);
@@ -163,8 +165,8 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     out.weights = weights / sum;
     // Toward the tip locks draw together around their guide, and strays leave them.
     let gather = (near_root - root) * ribbon.clump * (1.0 - strand.guide);
-    let loose = root + way / sum + gather * t + strand.stray * t * t;
-    let loose_slope = slope * reach / sum + gather + 2.0 * t * strand.stray;
+    let loose = root + way * (larger / sum) + gather * t + strand.stray * t * t;
+    let loose_slope = slope * (reach * larger / sum) + gather + 2.0 * t * strand.stray;
     // Water draws a lock together around its guide, from the root on.
     let at = node_below(near, out.share);
     let low = node_moisture(near.x + u32(at.x));

@@ -239,10 +239,9 @@ impl TickPose {
                 / self.now.scale;
             match self.inertia {
                 Vec2::ONE => Isometry3d::new(translation, rotation),
-                Vec2 { x: moving, y: turning } => Isometry3d::new(
-                    translation * moving,
-                    Quat::IDENTITY.slerp(rotation, turning),
-                ),
+                Vec2 { x: moving, y: turning } => {
+                    Isometry3d::new(translation * moving, Quat::IDENTITY.slerp(rotation, turning))
+                }
             }
         })
     }

@@ -1,0 +1,179 @@
+//! Shows a groom from a file on a head that shakes.
+//!
+//! `cargo run --release --example groom_viewer -- hair.tfx`
+//! `cargo run --release --example groom_viewer -- hair.tfx --offscreen pictures`
+
+#[path = "../salon/failure.rs"]
+mod failure;
+#[path = "../salon/picture.rs"]
+mod picture;
+#[path = "../salon/renderer.rs"]
+mod renderer;
+#[path = "../salon/solid.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod solid;
+#[path = "../salon/studio.rs"]
+mod studio;
+
+mod camera;
+mod head;
+
+use bevy::{asset::LoadState, prelude::*, time::TimeUpdateStrategy};
+use bevy_keratin::{groom::*, prelude::*, render::HairRenderPlugin};
+use clap::Parser;
+use head::{Measure, Shown};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+/// Shows a groom from a .hair, .tfx, .gltf or .glb file on a head that turns to and fro.
+#[derive(Parser, Resource, Clone)]
+#[command(version)]
+struct Arguments {
+    /// The file.
+    file: PathBuf,
+    /// Metres per unit of the file; what is usual for its kind if left out.
+    #[arg(long)]
+    scale: Option<f32>,
+    /// The file's axis that points up; what is usual for its kind if left out.
+    #[arg(long)]
+    up: Option<Up>,
+    /// How many strands are simulated.
+    #[arg(long, default_value_t = GroomGuides::default().count)]
+    guides: usize,
+    /// How many nodes they have at most.
+    #[arg(long, default_value_t = GroomGuides::default().nodes)]
+    nodes: usize,
+    /// How long hair can be that stands by itself: the gravity-bending length (m).
+    #[arg(long, value_name = "M", default_value_t = Stiffness::default().bending_length,
+          value_parser = stiffness)]
+    stiffness: f32,
+    /// Draws no window, but PNGs into this folder.
+    #[arg(long, value_name = "DIR")]
+    offscreen: Option<PathBuf>,
+    /// How long the head shakes (s); a picture is drawn at the beginning, in the turns of the last
+    /// second, and one second after the end.
+    #[arg(long, default_value_t = 10.0, value_parser = seconds)]
+    seconds: f32,
+    /// Width and height of pictures or window (pixels).
+    #[arg(long, default_value = "960x960", value_name = "WxH", value_parser = renderer::size)]
+    size: (u32, u32),
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Up {
+    X,
+    Y,
+    Z,
+}
+
+impl From<Up> for UpAxis {
+    fn from(up: Up) -> Self {
+        match up {
+            Up::X => Self::X,
+            Up::Y => Self::Y,
+            Up::Z => Self::Z,
+        }
+    }
+}
+
+fn stiffness(text: &str) -> Result<f32, String> {
+    let metres = text.parse().map_err(|_| "expected metres, such as 0.13")?;
+    Stiffness::from_bending_length(metres).map(|_| metres).map_err(|error| error.to_string())
+}
+
+fn seconds(text: &str) -> Result<f32, String> {
+    let seconds = text.parse().ok().filter(|s| (1.0..=3600.0).contains(s));
+    seconds.ok_or_else(|| "expected seconds from 1 to 3600".into())
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    failure::explain_known();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}: {error}", arguments.file.display());
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let file = arguments.file.canonicalize()?;
+    let folder = file.parent().unwrap_or(Path::new("/")).to_string_lossy().into_owned();
+    let assets = AssetPlugin { file_path: folder, ..default() };
+    let mut app = App::new();
+    if arguments.offscreen.is_some() {
+        app.add_plugins((
+            renderer::windowless().set(assets),
+            // A picture shows its own frame, not one between two.
+            HairPlugins::default().set(HairRenderPlugin { interpolate: false }),
+        ));
+    } else {
+        let (width, height) = arguments.size;
+        let window = Window {
+            title: "groom viewer".into(),
+            resolution: bevy::window::WindowResolution::new(width, height),
+            ..default()
+        };
+        let window = WindowPlugin { primary_window: Some(window), ..default() };
+        let plugins = DefaultPlugins.set(window).set(renderer::renderer()).set(renderer::log());
+        app.add_plugins((plugins.set(assets), HairPlugins::default()));
+    }
+    app.insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
+        .insert_resource(arguments.clone())
+        .add_plugins(head::HeadPlugin);
+    match &arguments.offscreen {
+        Some(folder) => offscreen(&mut app, arguments, folder),
+        None => {
+            app.add_systems(Update, (camera::frame, camera::orbit).chain());
+            app.add_systems(Startup, |mut commands: Commands| {
+                commands.spawn(camera::bundle());
+            });
+            match app.run() {
+                AppExit::Success => Ok(()),
+                AppExit::Error(code) => Err(format!("it ended with code {code}").into()),
+            }
+        }
+    }
+}
+
+/// Runs with exactly one tick an update, and writes the pictures and what was measured.
+fn offscreen(
+    app: &mut App,
+    arguments: &Arguments,
+    folder: &Path,
+) -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all(folder)?;
+    app.add_systems(Update, camera::frame);
+    let pictures = picture::Pictures::new(app, arguments.size, camera::bundle());
+    while !app.world().contains_resource::<Shown>() {
+        app.update();
+        let (assets, shown) =
+            (app.world().resource::<AssetServer>(), app.world().resource::<head::Loading>());
+        if let LoadState::Failed(error) = assets.load_state(&shown.0) {
+            return Err(error.to_string().into());
+        }
+    }
+    // The strands grow in the update after.
+    app.update();
+    app.update();
+    let end = (arguments.seconds * 60.0).round() as u32;
+    let name = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
+    let mut ticks = 0;
+    for frame in [0, end - 45, end - 30, end - 15, end, end + 60] {
+        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+        while ticks < frame {
+            app.update();
+            ticks += 1;
+        }
+        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+        let path = folder.join(format!("{name}-{frame}.png"));
+        pictures.take(app, &path)?;
+        let measure = app.world().resource::<Measure>();
+        println!("{}: after {} s {measure}", path.display(), frame as f32 / 60.0);
+    }
+    Ok(())
+}

@@ -1,0 +1,80 @@
+//! Pictures of an app that has no window.
+
+use bevy::{
+    camera::RenderTarget,
+    prelude::*,
+    render::{
+        render_resource::{TextureFormat, TextureUsages},
+        view::screenshot::{Screenshot, ScreenshotCaptured},
+    },
+    time::TimeUpdateStrategy,
+};
+use std::{io, path::Path};
+
+/// The picture that came back.
+#[derive(Resource, Default)]
+struct Captured(Option<Image>);
+
+/// How often the app may update until a picture comes back.
+const PATIENCE: u32 = 100;
+/// Drawn updates until meshes, textures and pipelines are on the device.
+const WARM_UP: u32 = 2;
+
+/// A camera that draws into an image when asked to.
+pub struct Pictures {
+    camera: Entity,
+    target: Handle<Image>,
+}
+
+impl Pictures {
+    /// Finishes the app's plugins and gets everything onto the device, without a tick.
+    pub fn new(app: &mut App, (width, height): (u32, u32), camera: impl Bundle) -> Self {
+        let mut image =
+            Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
+        image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
+        let target = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        let camera =
+            app.world_mut().spawn((camera, RenderTarget::Image(target.clone().into()))).id();
+        app.init_resource::<Captured>().insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+        app.finish();
+        app.cleanup();
+        for _ in 0..WARM_UP {
+            app.update();
+        }
+        // Nothing is drawn on the way: only the ticks count.
+        draw(app, camera, false);
+        Self { camera, target }
+    }
+
+    /// Draws the world as it is now into a PNG.
+    pub fn take(&self, app: &mut App, path: &Path) -> io::Result<()> {
+        let picture = capture(app, self.camera, &self.target)?;
+        let picture = picture.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
+        picture.save(path).map_err(io::Error::other)
+    }
+}
+
+fn draw(app: &mut App, camera: Entity, active: bool) {
+    if let Some(mut camera) = app.world_mut().get_mut::<Camera>(camera) {
+        camera.is_active = active;
+    }
+}
+
+/// Draws the world as it is now.
+fn capture(app: &mut App, camera: Entity, target: &Handle<Image>) -> io::Result<Image> {
+    draw(app, camera, true);
+    app.world_mut().spawn(Screenshot::image(target.clone())).observe(
+        |shot: On<ScreenshotCaptured>, mut captured: ResMut<Captured>| {
+            captured.0 = Some(shot.image.clone());
+        },
+    );
+    for _ in 0..PATIENCE {
+        app.update();
+        // Once is enough; the rest is waiting.
+        draw(app, camera, false);
+        if let Some(image) = app.world_mut().resource_mut::<Captured>().0.take() {
+            return Ok(image);
+        }
+    }
+    Err(io::Error::other("the graphics device gave no picture back"))
+}

@@ -1,0 +1,18 @@
+//! `cargo +nightly fuzz run groom`: any bytes are a groom or an error, and what is read can be
+//! written and read again.
+#![no_main]
+
+use bevy_keratin::groom::{Groom, GroomSettings, yuksel};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|file: &[u8]| {
+    let Ok((groom, _)) = Groom::from_file(file, &GroomSettings::default()) else {
+        return;
+    };
+    assert!(groom.points().len() <= file.len());
+    let Ok(written) = yuksel::write(&groom) else {
+        return;
+    };
+    let (again, _) = yuksel::read(&written).expect("what was written can be read");
+    assert_eq!(again.points(), groom.points());
+});

@@ -1,0 +1,147 @@
+//! Numbers from untrusted bytes: every read is checked, and nothing is allocated before it is known
+//! that the bytes for it are there.
+
+use super::GroomError;
+
+/// Why a file cannot be read as a groom: where, what was expected, what was found and how to mend it.
+#[derive(thiserror::Error, Clone, Debug, PartialEq)]
+pub enum GroomFileError {
+    /// The file ends before something that it should hold.
+    #[error(
+        "byte {offset}: expected {expected} bytes of {what}, found {found} up to the end: the file \
+         is cut short or its counts are wrong, fetch or export it again"
+    )]
+    Truncated {
+        /// Where it should begin.
+        offset: u64,
+        /// What it is.
+        what: &'static str,
+        /// How many bytes it takes; [`u64::MAX`] where no file could hold it.
+        expected: u64,
+        /// How many are left.
+        found: u64,
+    },
+    /// A value that the format does not allow, or that contradicts the others.
+    #[error("byte {offset}: {what} is {found}, expected {expected}: {hint}")]
+    Value {
+        /// Where it is.
+        offset: u64,
+        /// Its name.
+        what: &'static str,
+        /// What is there.
+        found: String,
+        /// What may be there.
+        expected: String,
+        /// How to mend it.
+        hint: &'static str,
+    },
+    /// A number that is infinite or none.
+    #[error(
+        "byte {offset}: {what} is {found}, expected a finite number: repair or leave out that strand"
+    )]
+    NonFinite {
+        /// Where it is.
+        offset: u64,
+        /// To what it belongs.
+        what: &'static str,
+        /// The number.
+        found: f32,
+    },
+    /// glTF whose JSON cannot be understood.
+    #[error("byte {offset}: the JSON is wrong, expected glTF 2.0: {message}; export it again")]
+    Json {
+        /// Where reading stopped.
+        offset: u64,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Something in a glTF file that its JSON describes wrongly.
+    #[error("{place}: found {found}, expected {expected}: {hint}")]
+    Gltf {
+        /// Path in the JSON, with the byte in the buffer where there is one.
+        place: String,
+        /// What is there.
+        found: String,
+        /// What may be there.
+        expected: String,
+        /// How to mend it.
+        hint: &'static str,
+    },
+    /// What was read is no groom.
+    #[error(transparent)]
+    Groom(#[from] GroomError),
+}
+
+/// A file's bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bytes<'a>(pub(super) &'a [u8]);
+
+impl<'a> Bytes<'a> {
+    pub(super) fn len(&self) -> u64 {
+        self.0.len() as u64
+    }
+
+    /// `count` elements of `size` bytes.
+    pub(super) fn array(
+        &self,
+        offset: u64,
+        count: u64,
+        size: u64,
+        what: &'static str,
+    ) -> Result<&'a [u8], GroomFileError> {
+        let found = self.len().saturating_sub(offset);
+        let expected = count.saturating_mul(size);
+        let short = GroomFileError::Truncated { offset, what, expected, found };
+        let end = offset.checked_add(expected).ok_or_else(|| short.clone())?;
+        let range = usize::try_from(offset).ok().zip(usize::try_from(end).ok());
+        range.and_then(|(from, to)| self.0.get(from..to)).ok_or(short)
+    }
+
+    pub(super) fn u32(&self, offset: u64, what: &'static str) -> Result<u32, GroomFileError> {
+        let bytes = self.array(offset, 1, 4, what)?;
+        Ok(words(bytes).next().unwrap_or_default())
+    }
+
+    pub(super) fn f32(&self, offset: u64, what: &'static str) -> Result<f32, GroomFileError> {
+        self.u32(offset, what).map(f32::from_bits)
+    }
+
+    /// `count` groups of N finite numbers, each made into a `T`.
+    pub(super) fn groups<T, const N: usize>(
+        &self,
+        offset: u64,
+        count: u64,
+        what: &'static str,
+        make: impl Fn([f32; N]) -> T,
+    ) -> Result<Vec<T>, GroomFileError> {
+        let bytes = self.array(offset, count, 4 * N as u64, what)?;
+        let mut groups = Vec::with_capacity(bytes.len() / (4 * N));
+        for (i, group) in (0..).zip(bytes.chunks_exact(4 * N)) {
+            let mut numbers = [0.0; N];
+            for (number, word) in numbers.iter_mut().zip(words(group)) {
+                *number = f32::from_bits(word);
+            }
+            if let Some(k) = numbers.iter().position(|n| !n.is_finite()) {
+                let offset = offset + i * 4 * N as u64 + 4 * k as u64;
+                return Err(GroomFileError::NonFinite { offset, what, found: numbers[k] });
+            }
+            groups.push(make(numbers));
+        }
+        Ok(groups)
+    }
+}
+
+fn words(bytes: &[u8]) -> impl Iterator<Item = u32> {
+    bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word))
+}
+
+pub(super) fn value<T>(
+    offset: u64,
+    what: &'static str,
+    found: impl ToString,
+    expected: impl ToString,
+    hint: &'static str,
+) -> Result<T, GroomFileError> {
+    let (found, expected) = (found.to_string(), expected.to_string());
+    Err(GroomFileError::Value { offset, what, found, expected, hint })
+}

@@ -1,0 +1,230 @@
+//! Grooms as assets.
+
+use super::{
+    Groom, GroomFileError, GroomLosses, GroomSettings, UpAxis, gltf, skin, tressfx, wear, yuksel,
+};
+use bevy::{
+    asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
+    platform::collections::HashMap,
+    prelude::*,
+};
+
+/// The kinds of files that a groom is read from.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[reflect(Clone, PartialEq)]
+pub enum GroomFormat {
+    /// Cem Yuksel's HAIR.
+    Yuksel,
+    /// TressFX, version 3 or 4.
+    TressFx,
+    /// glTF or GLB.
+    Gltf,
+}
+
+impl GroomFormat {
+    /// The format that bytes are in, by how they begin: files' names may lie. `None` for others.
+    pub fn of(file: &[u8]) -> Option<Self> {
+        let version = file.first_chunk().map_or(0.0, |bytes| f32::from_le_bytes(*bytes));
+        match file {
+            [b'H', b'A', b'I', b'R', ..] => Some(Self::Yuksel),
+            [b'g', b'l', b'T', b'F', ..] => Some(Self::Gltf),
+            _ if (3.0..5.0).contains(&version) => Some(Self::TressFx),
+            text if gltf::looks_like_json(text) => Some(Self::Gltf),
+            _ => None,
+        }
+    }
+
+    /// Metres per unit in most files of this format.
+    pub fn scale(self) -> f32 {
+        match self {
+            Self::Yuksel => 0.00254,
+            Self::TressFx | Self::Gltf => 1.0,
+        }
+    }
+
+    /// The axis that is up in most files of this format.
+    pub fn up(self) -> UpAxis {
+        match self {
+            Self::Yuksel => UpAxis::Z,
+            Self::TressFx | Self::Gltf => UpAxis::Y,
+        }
+    }
+}
+
+/// Why loading a groom failed.
+#[derive(thiserror::Error, Debug)]
+pub enum GroomLoadError {
+    /// The file could not be read from its source.
+    #[error("the file cannot be read: {0}")]
+    Io(#[from] std::io::Error),
+    /// A buffer of a glTF file that is a file of its own.
+    #[error("the buffer {uri} cannot be read: {source}; put it next to the .gltf")]
+    Buffer {
+        /// As the glTF names it.
+        uri: String,
+        /// Why not.
+        source: Box<ReadAssetBytesError>,
+    },
+    /// What it holds is none of the formats, or broken.
+    #[error(transparent)]
+    File(#[from] GroomFileError),
+}
+
+/// Loads a [`Groom`] from `.hair`, `.tfx`, `.gltf` and `.glb`, which it tells by their contents.
+///
+/// It announces the first two extensions only, so that it takes no glTF away from Bevy's own loader:
+/// ask for the type, as in `assets.load::<Groom>("hair.glb")`. What is left out of a file is told in
+/// the log, once.
+#[derive(TypePath, Clone, Copy, Debug, Default)]
+pub struct GroomLoader;
+
+impl AssetLoader for GroomLoader {
+    type Asset = Groom;
+    type Settings = GroomSettings;
+    type Error = GroomLoadError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        settings: &GroomSettings,
+        context: &mut LoadContext<'_>,
+    ) -> Result<Groom, GroomLoadError> {
+        let mut file = Vec::new();
+        reader.read_to_end(&mut file).await?;
+        let mut external = HashMap::default();
+        if GroomFormat::of(&file) == Some(GroomFormat::Gltf) {
+            let uris: Vec<String> =
+                gltf::GltfFile::parse(&file)?.external().map(str::to_owned).collect();
+            for uri in uris {
+                let failed =
+                    |source| GroomLoadError::Buffer { uri: uri.clone(), source: Box::new(source) };
+                let path = context.path().resolve_embed_str(&percent_decoded(&uri));
+                let path = path.map_err(|_| {
+                    let offset = 0;
+                    let message = format!("{uri:?} is no path");
+                    GroomFileError::Json { offset, message }
+                })?;
+                let bytes = context.read_asset_bytes(path).await.map_err(failed)?;
+                external.insert(uri, bytes);
+            }
+        }
+        let (groom, losses) = Groom::from_file_with(&file, settings, &external)?;
+        if !losses.is_empty() {
+            tracing::info!("groom {}: {} strands; {losses}", context.path(), groom.len());
+        }
+        Ok(groom)
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["hair", "tfx"]
+    }
+}
+
+impl Groom {
+    /// A groom from the bytes of a `.hair`, `.tfx`, GLB or self-contained glTF file, in metres and Y
+    /// up as the settings say, and what was left out.
+    ///
+    /// ```
+    /// # use bevy_keratin::groom::*; use bevy::prelude::*;
+    /// let lock = Groom::from_polylines([[Vec3::ZERO, Vec3::Z * 0.1]]).unwrap();
+    /// let file = yuksel::write(&lock).unwrap();
+    ///
+    /// let settings = GroomSettings { scale: Some(2.0), nodes: Some(9), ..default() };
+    /// let (groom, losses) = Groom::from_file(&file, &settings).unwrap();
+    /// assert_eq!(groom.points()[8], Vec3::Y * 0.2); // .hair files have Z up
+    /// assert!(losses.is_empty());
+    /// ```
+    ///
+    /// # Errors
+    /// When the bytes are none of these or broken, or the settings out of range.
+    pub fn from_file(
+        file: &[u8],
+        settings: &GroomSettings,
+    ) -> Result<(Self, GroomLosses), GroomFileError> {
+        Self::from_file_with(file, settings, &HashMap::default())
+    }
+
+    fn from_file_with(
+        file: &[u8],
+        settings: &GroomSettings,
+        external: &HashMap<String, Vec<u8>>,
+    ) -> Result<(Self, GroomLosses), GroomFileError> {
+        let format = GroomFormat::of(file).ok_or_else(|| GroomFileError::Value {
+            offset: 0,
+            what: "the beginning",
+            found: file[..file.len().min(4)].escape_ascii().to_string(),
+            expected: "HAIR, glTF, JSON or a TressFX version of 3 or 4".to_owned(),
+            hint: "convert the file to .hair, .tfx, .gltf or .glb",
+        })?;
+        let (groom, mut losses) = match format {
+            GroomFormat::Yuksel => yuksel::read(file)?,
+            GroomFormat::TressFx => tressfx::read(file)?,
+            GroomFormat::Gltf => gltf::GltfFile::parse(file)?.read(external)?,
+        };
+        let (groom, left_out) = settings.apply(groom, format)?;
+        losses += left_out;
+        Ok((groom, losses))
+    }
+}
+
+/// `%20` and the like as the bytes they stand for; what is no such code stays.
+fn percent_decoded(uri: &str) -> String {
+    let bytes = uri.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut i = 0;
+    while i < bytes.len() {
+        let digit = |k: usize| bytes.get(i + k).and_then(|b| char::from(*b).to_digit(16));
+        match (bytes[i], digit(1), digit(2)) {
+            (b'%', Some(high), Some(low)) => {
+                decoded.push((16 * high + low) as u8);
+                i += 3;
+            }
+            (byte, ..) => {
+                decoded.push(byte);
+                i += 1;
+            }
+        }
+    }
+    String::from_utf8(decoded).unwrap_or_else(|_| uri.to_owned())
+}
+
+/// Grooms: as assets where there is an [`AssetServer`], and worn by hair. Part of
+/// [`HairPlugins`](crate::HairPlugins), which may be added before or after `DefaultPlugins`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GroomPlugin;
+
+impl Plugin for GroomPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Groom>()
+            .register_type::<GroomSettings>()
+            .register_type::<GroomFormat>()
+            .register_type::<GroomLosses>();
+        wear::build(app);
+        skin::plugin(app);
+        add_loader(app);
+    }
+
+    /// Here again for an asset server that was added later.
+    fn finish(&self, app: &mut App) {
+        add_loader(app);
+    }
+}
+
+fn add_loader(app: &mut App) {
+    let world = app.world();
+    if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<Groom>>() {
+        app.init_asset::<Groom>().register_asset_loader(GroomLoader);
+        wear::with_assets(app);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percent_codes_are_bytes() {
+        assert_eq!(percent_decoded("a%20b%C3%A4%2"), "a bä%2");
+        assert_eq!(percent_decoded("%FF"), "%FF");
+    }
+}

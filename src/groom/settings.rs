@@ -1,0 +1,99 @@
+//! How a file's groom becomes one in metres with Y up.
+
+use super::{Groom, GroomError, GroomFormat, GroomLosses, UpAxis};
+use bevy::prelude::*;
+
+/// How a groom is taken from a file: unit, axes, and how much of it. Settings of the
+/// [`GroomLoader`](super::GroomLoader), also in `.meta` files; or apply them in game code.
+///
+/// ```no_run
+/// # use bevy_keratin::groom::*; use bevy::prelude::*;
+/// fn load(assets: Res<AssetServer>) -> Handle<Groom> {
+///     assets
+///         .load_builder()
+///         .with_settings(|s: &mut GroomSettings| {
+///             s.scale = Some(0.01); // the file is in centimetres
+///             s.up = Some(UpAxis::Z);
+///         })
+///         .load("hair/bob.hair")
+/// }
+/// ```
+///
+/// Files do not know their unit; the defaults are what most of them are in:
+///
+/// | file | scale | up |
+/// |---|---|---|
+/// | `.hair` | 0.00254 (tenths of an inch) | Z |
+/// | `.tfx` | 1 | Y |
+/// | glTF | 1 | Y |
+#[derive(Reflect, Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct GroomSettings {
+    /// Metres per unit of the file. Default `None`: what the table says; valid 1e-9…1e9.
+    pub scale: Option<f32>,
+    /// The file's axis that points up. Default `None`: what the table says.
+    pub up: Option<UpAxis>,
+    /// The place that becomes the groom's origin, such as the head's centre: in metres, Y up.
+    /// Default zero: the file's own.
+    pub origin: Vec3,
+    /// Segments shorter than this are merged and strands shorter than this left out (m). Default
+    /// 1e-5, safe 2e-6…1e-3. Strands of the simulation need more than 1e-6.
+    pub merge: f32,
+    /// Resamples every strand to so many nodes, evenly along it. Default `None`: as in the file;
+    /// valid 2…4096.
+    pub nodes: Option<usize>,
+    /// Keeps every so-manieth strand. Default 1: all.
+    pub keep_every: usize,
+    /// Keeps at most so many strands, taken evenly from their order. Default `None`: all.
+    pub limit: Option<usize>,
+}
+
+impl Default for GroomSettings {
+    fn default() -> Self {
+        Self {
+            scale: None,
+            up: None,
+            origin: Vec3::ZERO,
+            merge: 1e-5,
+            nodes: None,
+            keep_every: 1,
+            limit: None,
+        }
+    }
+}
+
+impl GroomSettings {
+    /// Applies these settings to a groom as read from a file of this format, and counts what is left
+    /// out: fewer strands first, then scale and axes, then merging, then resampling.
+    ///
+    /// # Errors
+    /// When a setting is out of range, or scaled nodes leave the finite numbers.
+    pub fn apply(
+        &self,
+        groom: Groom,
+        format: GroomFormat,
+    ) -> Result<(Groom, GroomLosses), GroomError> {
+        let mut groom = groom;
+        let before = groom.len();
+        if self.keep_every != 1 {
+            groom = groom.thinned(self.keep_every)?;
+        }
+        if let Some(limit) = self.limit
+            && limit < groom.len()
+        {
+            groom = groom.limited(limit);
+        }
+        let thinned_strands = before - groom.len();
+        let groom = groom
+            .with_up(self.up.unwrap_or(format.up()))
+            .scaled(self.scale.unwrap_or(format.scale()))?
+            .moved(-self.origin)?;
+        let (mut groom, mut losses) = groom.merged(self.merge)?;
+        losses.thinned_strands = thinned_strands;
+        if let Some(nodes) = self.nodes {
+            groom = groom.resampled(nodes)?;
+        }
+        Ok((groom, losses))
+    }
+}

@@ -1,0 +1,254 @@
+//! Hair grown from a groom: a few strands are simulated, the others drawn between them.
+
+use super::{Groom, GroomError, GroomStrand, reshape::NODES};
+use crate::{
+    fault::{Fault, HairFault},
+    setting::Bound,
+    strand::{Hair, MIN_SEGMENT, Strand, StrandOf},
+};
+use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
+
+/// Hair that grows as a [`Groom`] says. Put it on the entity that is to be the [`Hair`], such as a
+/// head bone; once the groom is loaded its strands appear.
+///
+/// The groom's origin becomes the entity's: see [`GroomSettings::origin`](super::GroomSettings::origin).
+/// Changing this component, or reloading the asset, grows the hair anew; removing it shaves it off.
+/// A groom that cannot be used is told as a [`HairFault`].
+///
+/// With the feature `render` all strands that are not guides become
+/// [`FollowerRoots`](crate::render::FollowerRoots), and a hair without
+/// [`HairLook`](crate::render::HairLook) takes the groom's mean colour and width, if it has them.
+/// Widths and colours of single nodes stay in the asset.
+///
+/// ```
+/// # use bevy_keratin::{prelude::*, groom::*}; use bevy::prelude::*;
+/// fn head(mut commands: Commands, assets: Res<AssetServer>) {
+///     commands.spawn(GroomedHair::new(assets.load("bob.hair")));
+/// }
+/// ```
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+#[require(Hair)]
+pub struct GroomedHair {
+    /// The groom.
+    pub groom: Handle<Groom>,
+    /// Which of its strands are simulated, and how finely.
+    pub guides: GroomGuides,
+}
+
+impl GroomedHair {
+    /// Hair of this groom, with the default number of guides.
+    pub fn new(groom: Handle<Groom>) -> Self {
+        Self { groom, guides: GroomGuides::default() }
+    }
+}
+
+/// How many strands of a groom are simulated, and how finely.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct GroomGuides {
+    /// How many, chosen by [`Groom::guides`]. Default 500, safe 1…10,000.
+    pub count: usize,
+    /// Nodes of a strand, evenly along it. Default 16, safe 2…64.
+    pub nodes: usize,
+    /// Short strands have fewer nodes, but three at least, so that their segments are no shorter than
+    /// this (m). Strands that are shorter themselves are not simulated as long as there are others:
+    /// they are stubble beside the distance that hair keeps from the head. Default 5 mm; safe
+    /// 1 mm…5 cm.
+    pub segment: f32,
+}
+
+impl Default for GroomGuides {
+    fn default() -> Self {
+        Self { count: 500, nodes: 16, segment: 5e-3 }
+    }
+}
+
+const COUNT: Bound = Bound::new("GroomGuides::count", 1.0, 1e6, "500 suit a head");
+const SEGMENT: Bound = Bound::new("GroomGuides::segment (m)", 0.0, 10.0, "0.005 suits a head");
+
+impl GroomGuides {
+    fn check(&self) -> Result<(), GroomError> {
+        COUNT.check(self.count as f32)?;
+        NODES.check(self.nodes as f32)?;
+        SEGMENT.check(self.segment)?;
+        Ok(())
+    }
+
+    fn nodes_of(&self, length: f32) -> usize {
+        // `as` saturates.
+        let most = (length / self.segment.max(10.0 * MIN_SEGMENT)) as usize + 1;
+        most.max(3).min(self.nodes)
+    }
+}
+
+impl Groom {
+    /// Grows this groom on `hair` at once: what [`GroomedHair`] does, for game code that makes its
+    /// grooms itself. Gives the simulated strands; despawn them to take them off again.
+    ///
+    /// ```
+    /// # use bevy_keratin::{prelude::*, groom::*}; use bevy::prelude::*;
+    /// fn tuft(commands: &mut Commands) -> Result {
+    ///     let roots = (0..100).map(|i| Vec3::new(i as f32 * 1e-3, 0.0, 0.0));
+    ///     let groom = Groom::from_polylines(roots.map(|r| [r, r + Vec3::Y * 0.1]))?;
+    ///     let hair = commands.spawn(Hair).id();
+    ///     groom.spawn(commands, hair, &GroomGuides { count: 20, ..default() })?;
+    ///     Ok(())
+    /// }
+    /// # let mut world = World::new();
+    /// # tuft(&mut world.commands()).unwrap();
+    /// # world.flush();
+    /// # assert_eq!(world.query::<&Strand>().iter(&world).count(), 20);
+    /// ```
+    ///
+    /// # Errors
+    /// When the groom has no strands that can be simulated, or a number of `guides` is out of range.
+    pub fn spawn(
+        &self,
+        commands: &mut Commands,
+        hair: Entity,
+        guides: &GroomGuides,
+    ) -> Result<Vec<Entity>, GroomError> {
+        guides.check()?;
+        let long = |s: &GroomStrand<'_>| length(s.points) >= guides.segment;
+        let mut long: Vec<usize> =
+            (0..).zip(self.strands()).filter(|(_, s)| long(s)).map(|(i, _)| i).collect();
+        if long.is_empty() {
+            long = (0..self.len()).collect();
+        }
+        let chosen = self.guides_among(long, guides.count);
+        let coarse = self.picked(chosen.iter().copied());
+        let coarse = coarse.resampled_by(|length| guides.nodes_of(length))?;
+        let strands = coarse.strands().map(|s| Strand::from_polyline(s.points));
+        let strands: Vec<Strand> = strands.filter_map(Result::ok).collect();
+        if strands.is_empty() {
+            return Err(GroomError::Empty);
+        }
+        if strands.len() < chosen.len() {
+            let short = chosen.len() - strands.len();
+            tracing::warn!("hair, entity {hair}: {short} guides without length are left out");
+        }
+        #[cfg(feature = "render")]
+        commands.entity(hair).try_insert(self.followers_of(&chosen));
+        Ok(strands.into_iter().map(|s| commands.spawn((StrandOf(hair), s)).id()).collect())
+    }
+
+    #[cfg(feature = "render")]
+    fn followers_of(&self, guides: &[usize]) -> crate::render::FollowerRoots {
+        use crate::render::{FollowerRoot, FollowerRoots};
+        let mut is_guide = vec![false; self.len()];
+        guides.iter().for_each(|i| is_guide[*i] = true);
+        let others = self.strands().zip(&is_guide).filter(|(_, guide)| !**guide);
+        let root = |GroomStrand { points, .. }: GroomStrand<'_>| {
+            let (root, tip) = (points[0], points[points.len() - 1]);
+            FollowerRoot { place: root, length: length(points), reach: tip - root }
+        };
+        FollowerRoots(others.map(|(strand, _)| root(strand)).collect())
+    }
+}
+
+fn length(points: &[Vec3]) -> f32 {
+    points.windows(2).map(|p| p[0].distance(p[1])).sum()
+}
+
+/// What a hair has grown from its groom.
+#[derive(Component, Debug, Default)]
+pub(super) struct Grown {
+    /// What it has grown from, or has failed to.
+    from: Option<GroomedHair>,
+    strands: Vec<Entity>,
+    gave_look: bool,
+}
+
+pub(super) fn build(app: &mut App) {
+    app.register_type::<GroomedHair>().register_type::<GroomGuides>();
+}
+
+/// Needs grooms to be assets.
+pub(super) fn with_assets(app: &mut App) {
+    app.add_systems(PreUpdate, (shave, grow).chain());
+}
+
+#[cfg(feature = "render")]
+type Look = crate::render::HairLook;
+#[cfg(not(feature = "render"))]
+type Look = Hair;
+
+fn grow(
+    mut commands: Commands,
+    mut hairs: Query<(Entity, &GroomedHair, Option<&mut Grown>, Has<Look>)>,
+    mut events: MessageReader<AssetEvent<Groom>>,
+    (grooms, assets): (Res<Assets<Groom>>, Res<AssetServer>),
+    mut faults: MessageWriter<HairFault>,
+) {
+    let changed: HashSet<_> = events
+        .read()
+        .filter_map(|event| match event {
+            AssetEvent::Modified { id } => Some(*id),
+            _ => None,
+        })
+        .collect();
+    for (hair, wanted, grown, has_look) in &mut hairs {
+        let Some(mut grown) = grown else {
+            commands.entity(hair).insert(Grown::default());
+            continue;
+        };
+        if grown.from.as_ref() == Some(wanted) && !changed.contains(&wanted.groom.id()) {
+            continue;
+        }
+        let Some(groom) = grooms.get(&wanted.groom) else {
+            if let LoadState::Failed(error) = assets.load_state(&wanted.groom) {
+                // The asset server has logged the whole of it.
+                let error = error.to_string();
+                let error = error.lines().next().unwrap_or_default().to_owned();
+                let fault = Fault::GroomNotLoaded { error };
+                faults.write(HairFault { entity: hair, fault });
+                grown.take_off(&mut commands, hair);
+                grown.from = Some(wanted.clone());
+            }
+            continue;
+        };
+        let has_look = has_look && !grown.gave_look;
+        grown.take_off(&mut commands, hair);
+        grown.from = Some(wanted.clone());
+        match groom.spawn(&mut commands, hair, &wanted.guides) {
+            Ok(strands) => grown.strands = strands,
+            Err(error) => {
+                faults.write(HairFault { entity: hair, fault: Fault::Groom(error) });
+                continue;
+            }
+        }
+        #[cfg(feature = "render")]
+        if !has_look && let Some(look) = groom.look() {
+            commands.entity(hair).insert(look);
+            grown.gave_look = true;
+        }
+        let _ = has_look;
+    }
+}
+
+impl Grown {
+    /// Takes off what has grown.
+    fn take_off(&mut self, commands: &mut Commands, hair: Entity) {
+        // From the back: that is where a hair looks for a strand that leaves it.
+        while let Some(strand) = self.strands.pop() {
+            commands.entity(strand).try_despawn();
+        }
+        #[cfg(feature = "render")]
+        {
+            commands.entity(hair).try_remove::<crate::render::FollowerRoots>();
+            if core::mem::take(&mut self.gave_look) {
+                commands.entity(hair).try_remove::<Look>();
+            }
+        }
+        let _ = hair;
+    }
+}
+
+/// Hair that is no longer to be of a groom.
+fn shave(mut commands: Commands, mut hairs: Query<(Entity, &mut Grown), Without<GroomedHair>>) {
+    for (hair, mut grown) in &mut hairs {
+        grown.take_off(&mut commands, hair);
+        commands.entity(hair).remove::<Grown>();
+    }
+}

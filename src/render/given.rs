@@ -1,0 +1,211 @@
+//! Followers that grow where they are told to, instead of evenly between the guides.
+
+use super::followers::{DrawnStrand, GuideRoot, HairFollowers, Random, hash};
+use crate::grid::UniformGrid;
+use bevy::prelude::*;
+
+/// Where the followers of a hair grow. Component of a [`Hair`](crate::Hair); where absent they are
+/// scattered evenly between the guides. [`HairFollowers::count`] limits how many are drawn, taken
+/// evenly; its length variation is not used, as lengths are given.
+///
+/// A follower goes with up to three guides near its root, most with those that are shaped as it is
+/// at rest.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct FollowerRoots(pub Vec<FollowerRoot>);
+
+/// Where one follower grows.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct FollowerRoot {
+    /// The root's place at rest, in the hair's frame (m).
+    pub place: Vec3,
+    /// The strand's length (m). Up to four times that of its guides.
+    pub length: f32,
+    /// From root to tip at rest (m); zero if that is not known.
+    pub reach: Vec3,
+}
+
+/// The most that a follower's length may be of its guides'.
+const LONGEST: f32 = 4.0;
+/// How many guides near a root are looked at.
+const NEAR: usize = 8;
+/// How much a difference in shape counts against one in place.
+const SHAPE: f32 = 0.3;
+
+/// The followers that grow from given roots.
+pub(super) fn grow(
+    given: &[FollowerRoot],
+    guides: &[GuideRoot],
+    settings: &HairFollowers,
+) -> Vec<DrawnStrand> {
+    let usable = |r: &FollowerRoot| r.place.is_finite() && r.length.is_finite() && r.length > 0.0;
+    let given: Vec<&FollowerRoot> = given.iter().filter(|r| usable(r)).collect();
+    let count = given.len().min(settings.count as usize);
+    let near = Near::new(guides);
+    let mut found = Vec::new();
+    (0..count)
+        .map(|k| k * given.len() / count)
+        .filter_map(|i| {
+            near.find(given[i].place, guides, &mut found);
+            follower(i as u32, given[i], guides, &found, settings)
+        })
+        .collect()
+}
+
+fn follower(
+    index: u32,
+    own: &FollowerRoot,
+    guides: &[GuideRoot],
+    near: &[(f32, u32)],
+    settings: &HairFollowers,
+) -> Option<DrawnStrand> {
+    let shape = own.reach / own.length;
+    let cost = |(square, i): &(f32, u32)| {
+        let guide = &guides[*i as usize];
+        let differ = (guide.reach / guide.length - shape) * own.length.min(guide.length);
+        let differ = match own.reach == Vec3::ZERO || !differ.is_finite() {
+            true => 0.0,
+            false => SHAPE * SHAPE * differ.length_squared(),
+        };
+        (square + differ, *i)
+    };
+    let mut best: Vec<(f32, u32)> = near.iter().map(cost).collect();
+    best.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    best.truncate(3);
+    let nearest = best.first()?.1;
+
+    let weight = |cost: f32| 1.0 / (cost + 1e-8);
+    let sum: f32 = best.iter().map(|(cost, _)| weight(*cost)).sum();
+    let (mut chosen, mut weights) = ([nearest; 3], [0.0; 3]);
+    let (mut root, mut length) = (own.place, 0.0);
+    for (k, (cost, i)) in best.iter().enumerate() {
+        let guide = &guides[*i as usize];
+        (chosen[k], weights[k]) = (*i, weight(*cost) / sum);
+        root -= weights[k] * guide.place;
+        length += weights[k] * guide.length;
+    }
+    let mut random = Random(hash(settings.seed ^ hash(index)));
+    let far = random.share().powi(3) * 2.0 + 0.3;
+    let share = own.length / length;
+    (share.is_finite() && root.is_finite()).then(|| DrawnStrand {
+        guides: chosen,
+        seed: random.next(),
+        weights,
+        length: share.clamp(0.01, LONGEST),
+        root,
+        phase: (settings.phase_variation * random.share()).min(0.5 * share),
+        stray: random.direction() * (settings.stray * own.length * far),
+        is_guide: false,
+    })
+}
+
+/// Finds guides by place.
+struct Near {
+    grid: UniformGrid,
+    all: usize,
+}
+
+impl Near {
+    fn new(guides: &[GuideRoot]) -> Self {
+        let places = || guides.iter().map(|g| g.place).filter(|p| p.is_finite());
+        let low = places().fold(Vec3::MAX, Vec3::min);
+        let high = places().fold(Vec3::MIN, Vec3::max);
+        let spacing = (high - low).length() / (guides.len() as f32).sqrt();
+        let mut grid = UniformGrid::default();
+        grid.build((2.0 * spacing).max(1e-6), guides.iter().map(|g| g.place).zip(0..));
+        Self { grid, all: guides.len() }
+    }
+
+    /// The nearest guides with the squares of their distances, nearest first.
+    fn find(&self, place: Vec3, guides: &[GuideRoot], found: &mut Vec<(f32, u32)>) {
+        let entry = |i: u32| {
+            let guide = &guides[i as usize];
+            let square = guide.place.distance_squared(place);
+            (square.is_finite() && guide.length > 0.0).then_some((square, i))
+        };
+        found.clear();
+        self.grid.for_each_near(place, |i| found.extend(entry(i)));
+        // Far from all guides, or where those are few.
+        if found.is_empty() || (found.len() < 3 && self.all <= 4096) {
+            found.clear();
+            found.extend((0..self.all as u32).filter_map(entry));
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found.dedup_by_key(|f| f.1);
+        found.truncate(NEAR);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::curve::{Guide, strand_point};
+
+    fn guide(x: f32, way: Vec3) -> GuideRoot {
+        let (place, length) = (Vec3::X * x, way.length());
+        GuideRoot { place, normal: Vec3::Y, length, reach: way }
+    }
+
+    fn plain(count: u32) -> HairFollowers {
+        HairFollowers { phase_variation: 0.0, stray: 0.0, clump: 0.0, ..HairFollowers::new(count) }
+    }
+
+    /// Root and tip as drawn.
+    fn drawn(strand: &DrawnStrand, guides: &[GuideRoot]) -> (Vec3, Vec3) {
+        let nodes: Vec<[Vec3; 2]> = guides.iter().map(|g| [g.place, g.place + g.reach]).collect();
+        let at = |t| {
+            let of = |i: u32| Guide { nodes: &nodes[i as usize], ..default() };
+            strand_point(strand, of, t, &plain(0)).position
+        };
+        (at(0.0), at(1.0))
+    }
+
+    #[test]
+    fn followers_grow_where_they_are_told_and_as_long() {
+        let guides: Vec<_> = (0..5).map(|i| guide(0.01 * i as f32, Vec3::Y * 0.2)).collect();
+        let given: Vec<_> = [0.05, 0.2, 0.3]
+            .iter()
+            .zip(0..)
+            .map(|(length, i)| FollowerRoot {
+                place: Vec3::new(0.013 * i as f32 + 0.002, 0.001, 0.004),
+                length: *length,
+                reach: Vec3::Y * *length,
+            })
+            .collect();
+        let grown = grow(&given, &guides, &plain(100));
+        assert_eq!(grown.len(), 3);
+        for (strand, given) in grown.iter().zip(&given) {
+            let (root, tip) = drawn(strand, &guides);
+            assert!(root.distance(given.place) < 1e-6, "{root} for {}", given.place);
+            assert!(tip.distance(given.place + given.reach) < 1e-5, "{tip} of {given:?}");
+            assert!((strand.weights.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+            assert!(strand.weights[0] >= strand.weights[1].max(strand.weights[2]));
+        }
+        assert_eq!(grow(&given, &guides, &plain(2)).len(), 2);
+        assert!(grow(&given, &guides, &plain(0)).is_empty());
+    }
+
+    #[test]
+    fn among_near_guides_those_of_its_shape_count() {
+        let guides = [guide(0.0, Vec3::Y * 0.2), guide(0.004, Vec3::X * 0.2)];
+        let own = |reach| FollowerRoot { place: Vec3::X * 0.001, length: 0.2, reach };
+        for (reach, like) in [(Vec3::Y * 0.2, 0), (Vec3::X * 0.2, 1)] {
+            let strand = grow(&[own(reach)], &guides, &plain(1))[0];
+            assert_eq!(strand.guides[0], like);
+            assert!(strand.weights[0] > 0.9, "{strand:?}");
+        }
+    }
+
+    #[test]
+    fn broken_roots_and_guides_are_left_out() {
+        let nan = FollowerRoot { place: Vec3::NAN, length: 0.1, reach: Vec3::Y };
+        let flat = FollowerRoot { length: 0.0, ..default() };
+        let good = FollowerRoot { length: 0.1, ..default() };
+        let guides = [guide(0.0, Vec3::Y), guide(f32::NAN, Vec3::Y), guide(0.1, Vec3::ZERO)];
+        let grown = grow(&[nan, flat, good], &guides, &plain(9));
+        assert_eq!(grown.len(), 1);
+        assert_eq!(grown[0].guides, [0; 3]);
+        assert!(grow(&[good], &[], &plain(9)).is_empty());
+    }
+}

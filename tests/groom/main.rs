@@ -1,0 +1,10 @@
+//! Grooms: files read and written, malformed ones refused, strands reshaped and worn.
+
+mod drawn;
+mod files;
+mod gltf;
+mod malformed;
+mod reshape;
+mod tressfx;
+mod worn;
+mod yuksel;
