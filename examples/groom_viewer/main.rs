@@ -154,7 +154,9 @@ fn offscreen(
         let (assets, shown) =
             (app.world().resource::<AssetServer>(), app.world().resource::<head::Loading>());
         if let LoadState::Failed(error) = assets.load_state(&shown.0) {
-            return Err(error.to_string().into());
+            // Without the trace that Bevy puts behind it.
+            let error = error.to_string();
+            return Err(error.lines().next().unwrap_or_default().into());
         }
     }
     // The strands grow in the update after.

@@ -1,7 +1,6 @@
 //! Followers drawn where a groom has them. Skipped, with the reason printed, where nothing can draw.
 
 #[path = "../common/offscreen.rs"]
-#[allow(dead_code, reason = "each test binary uses its own part")]
 mod offscreen;
 
 use bevy::prelude::*;
