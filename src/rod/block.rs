@@ -83,6 +83,8 @@ pub struct BlockLanes {
     pub finite: Lane,
     /// 1 for lanes with a node that rests on an obstacle, else 0; written by the contact passes.
     pub(crate) touched: Lane,
+    /// Whether any node moves so fast against an obstacle that it might pass through.
+    sweeps: bool,
     pub(crate) scratch: Vec<Row>,
 }
 
@@ -350,6 +352,7 @@ pub(crate) fn predict_nodes<S: Simd>(
 ) {
     let dt = f32x16::splat(simd, dt);
     let zero = f32x16::splat(simd, 0.0);
+    b.sweeps = false;
     for n in &mut b.nodes {
         let w = load(simd, &n.w);
         let held = Real::lt(w, f32x16::splat(simd, 1e-12));
@@ -369,8 +372,8 @@ pub(crate) fn predict_nodes<S: Simd>(
         store3(&mut n.from, came_from);
         let mut to = v.scale_add(dt, from);
         for o in obstacles {
-            if let Some(before) = hold_back(o, o.taken_along(from), to, skin) {
-                to = before;
+            if let Some((before, _)) = hold_back(o, o.taken_along(from), to, skin) {
+                (to, b.sweeps) = (before, true);
             }
         }
         store3(&mut n.p, V3::select(held, p, to));
@@ -439,6 +442,16 @@ pub(crate) fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, skin: f32, obstacle
         let from = load3(simd, &n.from);
         let (mut p, mut rests_on) = (load3(simd, &n.p), none);
         for o in obstacles {
+            // What would take a node through has to be stopped in every pass: the shortest way out
+            // may be the wrong one.
+            if b.sweeps
+                && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin)
+            {
+                p = V3::select(held, p, before);
+                let stopped = Real::lt(zero, normal.dot(normal));
+                rests_on = V3::select(stopped, normal, rests_on);
+                touched = Real::select(stopped, one, touched);
+            }
             let friction = f32x16::splat(simd, o.friction);
             if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
                 p = V3::select(held, p, out);

@@ -187,7 +187,8 @@ pub(super) fn push_out<S: Simd>(
 
 /// Holds a node back that would pass through a thin or fast solid within the substep: a node that
 /// was on one side of it (`start`, taken along by the solid) and would be on the other stays before
-/// the plane that touches the solid where it was nearest. `None` where no lane would.
+/// the plane that touches the solid where it was nearest. Returns as [`push_out`] does; `None` where
+/// no lane moves so fast against the solid that it might.
 ///
 /// The way is looked at where it comes nearest to the solid's axis, in its middle and at its end:
 /// what moves by less than half the solid's thickness does not pass.
@@ -197,7 +198,7 @@ pub(super) fn hold_back<S: Simd>(
     start: V3<f32x16<S>>,
     p: V3<f32x16<S>>,
     skin: f32,
-) -> Option<V3<f32x16<S>>> {
+) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
     let simd = p.x.simd;
     let lit = |value: f32| f32x16::splat(simd, value);
     let (thickness, center, axis) = match obstacle.solid {
@@ -232,12 +233,11 @@ pub(super) fn hold_back<S: Simd>(
         & Real::lt(lit(0.0), deepest)
         & Real::lt(leaving.dot(facing), lit(0.0))
         & Real::lt(depth, lit(1e-3 * thickness));
-    if passes.to_bitmask() == 0 {
-        return None;
-    }
     // How far behind the plane: `start` is −depth before it.
     let behind = Real::max(-(way.dot(facing)) + depth, lit(0.0));
-    Some(V3::select(passes, facing.scale_add(behind, p), p))
+    let none = V3::new(lit(0.0), lit(0.0), lit(0.0));
+    let held = V3::select(passes, facing.scale_add(behind, p), p);
+    Some((held, V3::select(passes, facing, none)))
 }
 
 /// Some direction across an axis; up for an axis without length.

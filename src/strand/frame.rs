@@ -26,6 +26,43 @@ pub struct TickPose {
     inertia: Vec2,
     jumps: bool,
     was_invalid: bool,
+    frames: Frames,
+}
+
+/// Where an entity was in the last frames. Frames and ticks do not keep step: a head that turns evenly
+/// from frame to frame would be seen to turn by two frames' worth in one tick and by three in the next,
+/// and its hair would stutter. So ticks look at where it was one frame ago by their own clock, between
+/// the last two frames. What is moved by ticks itself is seen as it is.
+#[derive(Reflect, Clone, Debug, Default)]
+#[reflect(Default, Clone)]
+struct Frames {
+    /// The last two frames' poses with their times (s), the newer one second.
+    last: [Option<(f64, Pose)>; 2],
+    /// What the last tick saw.
+    seen: Option<Pose>,
+    /// Whether the last change came from within the ticks.
+    moved_by_ticks: bool,
+}
+
+impl Frames {
+    fn record(&mut self, seconds: f64, pose: Pose) {
+        if self.seen.is_some_and(|seen| seen != pose) {
+            self.moved_by_ticks = false;
+        }
+        self.seen = Some(pose);
+        self.last = [self.last[1], Some((seconds, pose))];
+    }
+
+    fn at(&mut self, seconds: f64, present: Pose) -> Pose {
+        self.moved_by_ticks |= self.seen.is_some_and(|seen| seen != present);
+        self.seen = Some(present);
+        match self.last {
+            [Some((t0, before)), Some((t1, after))] if t0 < t1 && !self.moved_by_ticks => {
+                before.toward(&after, ((seconds - t0) / (t1 - t0)).clamp(0.0, 1.0) as f32)
+            }
+            _ => present,
+        }
+    }
 }
 
 impl Default for TickPose {
@@ -39,6 +76,7 @@ impl Default for TickPose {
             inertia: Vec2::ONE,
             jumps: false,
             was_invalid: false,
+            frames: Frames::default(),
         }
     }
 }
@@ -70,6 +108,15 @@ pub struct HairInertia {
     /// The same for a head that turns by more than this (rad). Default 1.6, at 60 Hz more than
     /// 5000° a second; π and above never happen.
     pub teleport_angle: f32,
+}
+
+impl HairInertia {
+    /// Whether going from one pose to another within a tick is being put there.
+    fn is_jump(&self, from: &Pose, to: &Pose) -> bool {
+        let scale = to.scale.max(from.scale);
+        to.translation.distance(from.translation) > self.teleport_distance * scale
+            || to.rotation.angle_between(from.rotation) > self.teleport_angle
+    }
 }
 
 impl Default for HairInertia {
@@ -200,20 +247,24 @@ impl TickPose {
     /// Begins a tick: the frame is to go to `to`, from where it was; from `to` itself the first time
     /// and when it is put there. Says whether it was put, and whether an invalid pose should be
     /// reported.
-    pub(super) fn aim(&mut self, to: Option<Pose>, inertia: &HairInertia) -> (bool, bool) {
+    pub(super) fn aim(
+        &mut self,
+        to: Option<Pose>,
+        seconds: f64,
+        inertia: &HairInertia,
+    ) -> (bool, bool) {
         let report = to.is_none() && !self.was_invalid;
         self.was_invalid = to.is_none();
         self.inertia = Vec2::new(inertia.moving, inertia.turning);
         let first = self.from.is_none();
         let asked = core::mem::take(&mut self.jumps);
-        let put = !first
-            && to.is_some_and(|to| {
-                let scale = to.scale.max(self.to.scale);
-                asked
-                    || to.translation.distance(self.to.translation)
-                        > inertia.teleport_distance * scale
-                    || to.rotation.angle_between(self.to.rotation) > inertia.teleport_angle
-            });
+        let put = !first && to.is_some_and(|to| asked || inertia.is_jump(&self.to, &to));
+        let to = to.map(|present| {
+            if put {
+                self.frames = Frames::default();
+            }
+            self.frames.at(seconds, present)
+        });
         let from = if first || put { to } else { Some(self.to) };
         self.to = to.unwrap_or(self.to);
         if first || put {
@@ -221,6 +272,13 @@ impl TickPose {
         }
         self.from = from;
         (put, report)
+    }
+
+    /// Notes where the entity is as a frame begins, `seconds` being the frame before's time.
+    pub(super) fn record(&mut self, seconds: f64, pose: Option<Pose>) {
+        if let Some(pose) = pose {
+            self.frames.record(seconds, pose);
+        }
     }
 
     /// Goes to the share `t` of the tick's motion.
@@ -265,10 +323,10 @@ mod tests {
         };
         let mut frame = TickPose::default();
         let inertia = HairInertia { teleport_distance: 10.0, ..default() };
-        assert_eq!(frame.aim(Some(a), &inertia), (false, false));
+        assert_eq!(frame.aim(Some(a), 0.0, &inertia), (false, false));
         frame.advance(1.0);
         assert!(frame.carry().is_none(), "the first tick begins where the frame is");
-        frame.aim(Some(b), &inertia);
+        frame.aim(Some(b), 0.0, &inertia);
         let world = Vec3::new(0.2, 0.4, -0.3);
         let mut local = a.point_in(world);
         for i in 1..=6 {
@@ -276,7 +334,7 @@ mod tests {
             local = frame.carry().unwrap() * local;
         }
         assert!(b.point_out(local).distance(world) < 1e-5);
-        let mut reports = || frame.aim(None, &inertia).1;
+        let mut reports = || frame.aim(None, 0.0, &inertia).1;
         assert!(reports() && !reports(), "reported once");
         frame.advance(1.0);
         assert_eq!(*frame.now(), b);

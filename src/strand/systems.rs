@@ -28,7 +28,7 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandHistory>()
             .register_type::<HeldNodes>()
             .register_type::<Burden>()
-            .add_systems(PreUpdate, report_unusable)
+            .add_systems(PreUpdate, (report_unusable, record_frame))
             .add_systems(
                 HairTick,
                 (remember_drawn, move_poses, carry_strands).chain().in_set(HairSystems::Roots),
@@ -66,8 +66,22 @@ fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &mut StrandH
     }
 }
 
+/// As a frame begins: where the frame before left everything.
+fn record_frame(
+    time: Res<Time<Virtual>>,
+    transforms: TransformHelper,
+    mut poses: Query<(Entity, &mut TickPose)>,
+) {
+    let seconds = time.elapsed_secs_f64() - time.delta_secs_f64();
+    for (entity, mut frame) in &mut poses {
+        let pose = transforms.compute_global_transform(entity).ok();
+        frame.bypass_change_detection().record(seconds, pose.as_ref().and_then(Pose::of));
+    }
+}
+
 fn move_poses(
     step: Res<HairStep>,
+    (time, frames): (Res<Time>, Res<Time<Virtual>>),
     transforms: TransformHelper,
     inertia: Settings<HairInertia>,
     mut poses: Query<(Entity, &mut TickPose, Option<&Strands>)>,
@@ -78,7 +92,9 @@ fn move_poses(
         if step.index == 0 {
             // With MinimalPlugins nothing propagates transforms, so the helper computes them.
             let pose = transforms.compute_global_transform(entity).ok();
-            let (put, report) = frame.aim(pose.as_ref().and_then(Pose::of), &inertia.of(entity));
+            let pose = pose.as_ref().and_then(Pose::of);
+            let a_frame_ago = time.elapsed_secs_f64() - frames.delta_secs_f64();
+            let (put, report) = frame.aim(pose, a_frame_ago, &inertia.of(entity));
             if report {
                 faults.write(HairFault { entity, fault: Fault::Transform });
             }
