@@ -184,4 +184,13 @@ fn a_slow_treatment_takes_its_time() {
     assert!((rate - 0.5).abs() < 0.01, "half way at half time, not {rate}");
     run(&mut app, 1.1);
     assert_eq!(app.world().get::<Bonds>(e).unwrap().joints[3].rates[0], 0.0);
+    // A quarter of an hour under lotion passes in a quarter of a minute.
+    app.insert_resource(ProcessTime(60.0));
+    let lotion = Treat::set(hair, BondKind::Disulfide, 0.2).unwrap();
+    app.world_mut().write_message(lotion.over(900.0));
+    run(&mut app, 7.5);
+    let rate = app.world().get::<Bonds>(e).unwrap().joints[3].rates[2];
+    assert!((rate - 0.6).abs() < 0.01, "half way at half time, not {rate}");
+    run(&mut app, 7.6);
+    assert_eq!(app.world().get::<Bonds>(e).unwrap().joints[3].rates[2], 0.2);
 }

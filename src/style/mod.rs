@@ -96,7 +96,7 @@ impl Treat {
         self
     }
 
-    /// The same treatment, taking `seconds`.
+    /// The same treatment, taking `seconds`, of which [`ProcessTime`](crate::ProcessTime) makes fewer.
     pub fn over(mut self, seconds: f32) -> Self {
         self.seconds = seconds;
         self

@@ -13,6 +13,7 @@ use crate::{
     setting::Notes,
     strand::{HeldNodes, Strand, StrandOf, Strands, TickPose},
     tick::{HairStep, HairSystems, HairTick},
+    water::ProcessTime,
 };
 use bevy::prelude::*;
 
@@ -75,13 +76,15 @@ fn begin_treatments(
 /// Asks for this substep's part of what each treatment still has to do.
 pub(crate) fn apply_treatments(
     step: Res<HairStep>,
+    process: Res<ProcessTime>,
     mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
 ) {
+    let dt = step.dt * process.mended(&Notes::default());
     let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();
     for_each(&mut items, |(bonds, changes, treatments)| {
         let changes = changes.bypass_change_detection();
         for treat in &mut treatments.acting {
-            let share = if treat.seconds > step.dt { step.dt / treat.seconds } else { 1.0 };
+            let share = if treat.seconds > dt { dt / treat.seconds } else { 1.0 };
             let range = treat.joints.clone().unwrap_or(0..bonds.joints.len());
             for (i, joint) in bonds.joints.iter().enumerate().filter(|(i, _)| range.contains(i)) {
                 for kind in BondKind::ALL {
@@ -90,7 +93,7 @@ pub(crate) fn apply_treatments(
                     }
                 }
             }
-            treat.seconds -= step.dt;
+            treat.seconds -= dt;
         }
         treatments.acting.retain(|t| t.seconds > 0.0);
     });

@@ -70,7 +70,8 @@ impl Climate {
     }
 }
 
-/// How much faster wetting, drying and the bonds' chemistry go than in life. A resource, default 1,
+/// How much faster wetting, drying and the bonds' chemistry ([`Treat`](crate::Treat)) go than in life. A
+/// resource, default 1,
 /// safe 1…1000.
 ///
 /// Hair dries in minutes, players wait seconds. Mechanics are untouched.
@@ -85,7 +86,7 @@ impl Default for ProcessTime {
 }
 
 impl ProcessTime {
-    fn mended(&self, notes: &Notes) -> f32 {
+    pub(crate) fn mended(&self, notes: &Notes) -> f32 {
         PROCESS.mend(self.0, 1.0, notes)
     }
 }
