@@ -57,7 +57,10 @@ impl Frames {
         self.moved_by_ticks |= self.seen.is_some_and(|seen| seen != present);
         self.seen = Some(present);
         match self.last {
-            [Some((t0, before)), Some((t1, after))] if t0 < t1 && !self.moved_by_ticks => {
+            // What rests is to rest to the last bit.
+            [Some((t0, before)), Some((t1, after))]
+                if t0 < t1 && before != after && !self.moved_by_ticks =>
+            {
                 before.toward(&after, ((seconds - t0) / (t1 - t0)).clamp(0.0, 1.0) as f32)
             }
             _ => present,
@@ -308,6 +311,28 @@ impl TickPose {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ticks_see_frames_evenly_and_what_they_move_as_it_is() {
+        let at = |x: f32| Pose { translation: Vec3::X * x, ..default() };
+        let mut frames = Frames::default();
+        assert_eq!(frames.at(0.0, at(1.0)), at(1.0), "nothing is known yet");
+        frames.record(1.0, at(1.0));
+        frames.record(2.0, at(2.0));
+        assert_eq!(frames.at(1.25, at(2.0)), at(1.25));
+        assert_eq!(frames.at(9.0, at(2.0)), at(2.0), "nothing is foretold");
+        // A tick moves it: it is where the tick put it, also after it stopped there.
+        assert_eq!(frames.at(2.5, at(2.6)), at(2.6));
+        frames.record(3.0, at(2.6));
+        assert_eq!(frames.at(2.5, at(2.6)), at(2.6));
+        // A frame moves it again.
+        frames.record(4.0, at(4.0));
+        assert_eq!(frames.at(3.5, at(4.0)), at(3.3));
+        let turned = Pose { rotation: Quat::from_rotation_y(0.3), ..at(4.0) };
+        frames.record(5.0, turned);
+        frames.record(6.0, turned);
+        assert_eq!(frames.at(5.3, turned), turned, "bit for bit");
+    }
 
     #[test]
     fn what_rests_in_the_world_is_carried_so_that_it_still_does() {
