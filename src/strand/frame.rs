@@ -322,12 +322,12 @@ mod tests {
         assert_eq!(frames.at(1.25, at(2.0)), at(1.25));
         assert_eq!(frames.at(9.0, at(2.0)), at(2.0), "nothing is foretold");
         // A tick moves it: it is where the tick put it, also after it stopped there.
-        assert_eq!(frames.at(2.5, at(2.6)), at(2.6));
-        frames.record(3.0, at(2.6));
-        assert_eq!(frames.at(2.5, at(2.6)), at(2.6));
+        assert_eq!(frames.at(2.5, at(2.5)), at(2.5));
+        frames.record(3.0, at(2.5));
+        assert_eq!(frames.at(2.5, at(2.5)), at(2.5));
         // A frame moves it again.
         frames.record(4.0, at(4.0));
-        assert_eq!(frames.at(3.5, at(4.0)), at(3.3));
+        assert_eq!(frames.at(3.5, at(4.0)), at(3.25));
         let turned = Pose { rotation: Quat::from_rotation_y(0.3), ..at(4.0) };
         frames.record(5.0, turned);
         frames.record(6.0, turned);
