@@ -42,6 +42,10 @@ pub enum Fault {
     /// Roots that cannot be tied to their mesh: the strands stay as they are.
     #[error("{0}; those strands do not follow the mesh")]
     Roots(&'static str),
+    /// A hairdo that the hair cannot wear.
+    #[cfg(feature = "save")]
+    #[error("{0}; the hair keeps the hairdo that it has")]
+    Hairdo(#[from] crate::hairdo::HairdoError),
     /// A request that names something that is not there.
     #[error("the treatment's target is neither a Hair nor a strand")]
     NoTarget,
