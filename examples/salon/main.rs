@@ -19,6 +19,7 @@ mod solid;
 mod stage;
 mod story;
 mod tools;
+mod wardrobe;
 
 use bevy::{
     log::LogPlugin,
@@ -193,6 +194,7 @@ fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
         HairPlugins::default(),
         panel::PanelPlugin,
         story::StoryPlugin,
+        wardrobe::WardrobePlugin,
     ));
     salon(&mut app, scene, arguments);
     app.add_systems(Startup, (open_eye, spare_software).chain().after(stage::build))
