@@ -118,6 +118,15 @@ fn new_and_bald_hair_can_be_saved_too() {
     let per_node = fresh.to_bytes().len() / fresh.nodes();
     println!("untreated: {per_node} bytes a node");
     assert!(per_node < 60);
+    // put on before the first tick
+    let (other, permed, ..) = permed();
+    let perm = of(&other, permed);
+    let (unborn, strand) = one_strand(&mut app, 0.24, 8, Vec3::Y);
+    apply(&mut app, unborn, &perm);
+    app.update();
+    let bonds = &app.world().get::<Bonds>(strand).unwrap().joints;
+    assert_eq!(bonds, perm.strands()[0].joints());
+
     let bald = app.world_mut().spawn(Hair).id();
     let none = of(&app, bald);
     assert_eq!(none, Hairdo::default());
@@ -310,7 +319,7 @@ fn another_groom_is_told_and_the_hair_is_left_alone() {
         assert_eq!(own.apply_resampled(app.world_mut(), entity).unwrap_err(), expected);
     }
     let error = Hairdo::default().apply_resampled(app.world_mut(), hair).unwrap_err();
-    assert_eq!(error, HairdoError::Strands { found: 0, expected: 3 });
+    assert_eq!(error, HairdoError::Bald);
     assert!(bits(&app, hair) == before);
     queue(&mut app, hair, own.clone().put_on());
     assert_eq!(of(&app, hair), own);
@@ -541,11 +550,15 @@ fn a_curl_keeps_its_radius_on_other_nodes_and_lengths() {
 fn blending_is_exact_at_its_ends_and_keeps_lengths() {
     let (mut app, hair) = treated(3, 9);
     let a = of(&app, hair);
-    app.world_mut().write_message(Treat::set_everything(hair));
-    app.insert_resource(HairGravity(Vec3::X * 9.8));
-    run(&mut app, 1.0);
+    // turned round the other way, and dry
+    for member in members(&app, hair) {
+        let mut strand = app.world_mut().get_mut::<Strand>(member).unwrap();
+        let mirrored: Vec<Vec3> = shape(&strand).into_iter().map(|omega| -omega).collect();
+        strand.pose(mirrored);
+    }
+    Hair::restyle(app.world_mut().entity_mut(hair));
     app.world_mut().write_message(Soak { target: hair, wetness: 0.0 });
-    run(&mut app, 0.1);
+    run(&mut app, 0.5);
     let b = of(&app, hair);
     assert_eq!(Hairdo::blend(&a, &b, 0.0).unwrap().to_bytes(), a.to_bytes());
     assert_eq!(Hairdo::blend(&a, &b, 1.0).unwrap().to_bytes(), b.to_bytes());
@@ -648,4 +661,32 @@ fn undoing_does_not_keep_hairdos_for_ever() {
     }
     let steps = core::iter::from_fn(|| hairdos.undo(Hairdo::default())).count();
     assert_eq!(steps, 50);
+}
+
+#[test]
+fn other_strands_take_the_style_of_the_nearest() {
+    let mut app = test_app(60.0);
+    no_gravity(&mut app);
+    let source = app.world_mut().spawn(Hair).id();
+    let turns = [0.5 * PI, 1.0 * PI, 2.0 * PI];
+    for (x, angle) in [0.0, 0.2, 0.4].into_iter().zip(turns) {
+        app.world_mut().spawn((StrandOf(source), curl(Vec3::X * x, 17, 0.02, angle)));
+    }
+    let target = app.world_mut().spawn(Hair).id();
+    let places = [(0.05, 0), (0.39, 2), (0.13, 1), (0.31, 2), (-1.0, 0)];
+    for (x, _) in places {
+        app.world_mut().spawn((StrandOf(target), curl(Vec3::X * x, 12, 0.1, 1.0)));
+    }
+    run(&mut app, 0.1);
+    let hairdo = of(&app, source);
+    hairdo.apply_resampled(app.world_mut(), target).unwrap();
+    for (member, (x, nearest)) in members(&app, target).into_iter().zip(places) {
+        let worn = strand(&app, member);
+        assert_eq!(worn.positions()[0], Vec3::X * x, "roots stay");
+        let expected = radius(hairdo.strands()[nearest].positions());
+        let found = radius(worn.positions());
+        assert!((found / expected - 1.0).abs() < 0.03, "at {x}: {found}, expected {expected}");
+    }
+    run(&mut app, 0.5);
+    assert!(faults(&mut app).is_empty());
 }

@@ -80,8 +80,9 @@ fn serve(
     mut orders: MessageReader<Order>,
     hairs: Query<Entity, With<Hair>>,
 ) {
-    for order in orders.read().cloned() {
+    for order in orders.read() {
         let Ok(hair) = hairs.single() else { continue };
+        let order = order.clone();
         commands.queue(move |world: &mut World| {
             let told = carry_out(&order, world, hair).unwrap_or_else(|error| error.to_string());
             world.resource_mut::<Hairdos>().told = told;

@@ -76,6 +76,11 @@ pub enum HairdoError {
         /// What may be.
         expected: &'static str,
     },
+    /// A cuticle's wear that is not finite.
+    #[error(
+        "damage or softening of the hair's Cuticle is not finite, expected 0.33 or so: mend it"
+    )]
+    Cuticle,
     /// A strand that is no line.
     #[error("strand {strand} has {found} nodes, expected 2 or more: despawn it")]
     TooFewNodes {
@@ -108,6 +113,9 @@ pub enum HairdoError {
         /// How many it has in the hair.
         expected: usize,
     },
+    /// Nothing to go by.
+    #[error("the hairdo has no strands, expected one at least: take it from hair that has grown")]
+    Bald,
     /// A number given to a function.
     #[error(transparent)]
     Value(#[from] InvalidValue),

@@ -59,7 +59,9 @@ pub struct Hairdo {
 }
 
 /// One strand of a [`Hairdo`].
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(opaque)]
+#[reflect(Default, Clone, Debug, PartialEq)]
 pub struct StyledStrand {
     positions: Vec<Vec3>,
     orientations: Vec<Quat>,
@@ -103,7 +105,7 @@ impl Hairdo {
         if let Some(Cuticle { damage, softening }) = self.cuticle
             && !(damage.is_finite() && softening.is_finite())
         {
-            return Err(HairdoError::NonFinite { what: "the cuticle's wear", strand: 0, at: 0 });
+            return Err(HairdoError::Cuticle);
         }
         Ok(self)
     }
