@@ -644,6 +644,13 @@ fn the_salon_undoes_redoes_saves_and_loads() {
     assert_eq!(rate(&app), 1.0);
     assert_eq!(order(&mut app, Order::Undo), "");
     assert_eq!(rate(&app), 0.0);
+    // a step of other hair waits until it fits
+    let more = app.world_mut().spawn((StrandOf(hair), curl(Vec3::X, 9, 0.02, 1.0))).id();
+    let told = order(&mut app, Order::Undo);
+    assert!(told.contains("another groom"), "{told}");
+    app.world_mut().despawn(more);
+    let able = undoable(&app);
+    assert_eq!(able, (true, true));
     std::fs::write(&path, b"no hair").unwrap();
     let told = order(&mut app, Order::Load(path.clone()));
     assert!(told.contains("not a hairdo"), "{told}");
@@ -689,4 +696,25 @@ fn other_strands_take_the_style_of_the_nearest() {
     }
     run(&mut app, 0.5);
     assert!(faults(&mut app).is_empty());
+}
+
+#[test]
+fn two_nodes_are_a_strand_too() {
+    let mut app = test_app(60.0);
+    let fine = curls(&mut app, 1, 9);
+    let coarse = app.world_mut().spawn(Hair).id();
+    let line = Strand::from_polyline(&[Vec3::ZERO, Vec3::X * 0.1]).unwrap();
+    app.world_mut().spawn((StrandOf(coarse), line));
+    run(&mut app, 0.1);
+    let (few, many) = (of(&app, coarse), of(&app, fine));
+    assert_eq!(many.resampled_for(&few).unwrap().nodes(), 2);
+    let straight = few.resampled_for(&many).unwrap();
+    assert_eq!(straight.nodes(), 9);
+    let positions = straight.strands()[0].positions();
+    let along = (positions[1] - positions[0]).normalize();
+    assert!(positions.windows(2).all(|p| (p[1] - p[0]).normalize().distance(along) < 1e-4));
+    apply(&mut app, fine, &straight);
+    apply(&mut app, coarse, &few);
+    assert_eq!(Hairdo::from_bytes(&few.to_bytes()).unwrap(), few);
+    assert_eq!(Hairdo::blend(&few, &few, 0.5).unwrap().nodes(), 2);
 }

@@ -92,7 +92,8 @@ fn serve(
 
 fn carry_out(order: &Order, world: &mut World, hair: Entity) -> Result<String, Box<dyn Error>> {
     let now = Hairdo::of(world, hair)?;
-    let exchange: fn(&mut Hairdos, Hairdo) -> Option<Hairdo> = match order {
+    type Exchange = fn(&mut Hairdos, Hairdo) -> Option<Hairdo>;
+    let (go, back): (Exchange, Exchange) = match order {
         Order::Remember => {
             world.resource_mut::<Hairdos>().push(now);
             return Ok(String::new());
@@ -108,11 +109,15 @@ fn carry_out(order: &Order, world: &mut World, hair: Entity) -> Result<String, B
             world.resource_mut::<Hairdos>().push(now);
             return Ok("loaded".into());
         }
-        Order::Undo => Hairdos::undo,
-        Order::Redo => Hairdos::redo,
+        Order::Undo => (Hairdos::undo, Hairdos::redo),
+        Order::Redo => (Hairdos::redo, Hairdos::undo),
     };
-    let found = exchange(&mut world.resource_mut::<Hairdos>(), now);
+    let found = go(&mut world.resource_mut::<Hairdos>(), now);
     let hairdo = found.ok_or("there is no such step")?;
-    hairdo.apply(world, hair)?;
+    if let Err(error) = hairdo.apply(world, hair) {
+        // Of another scene's hair: the step waits for that scene.
+        back(&mut world.resource_mut::<Hairdos>(), hairdo);
+        return Err(error.into());
+    }
     Ok(String::new())
 }

@@ -8,7 +8,8 @@
 //!
 //! [`Hairdo::of`] takes it from a hair, [`Hairdo::apply`] puts it on the same groom,
 //! [`Hairdo::apply_resampled`] on another. [`Hairdo::to_bytes`] and [`Hairdo::from_bytes`] are its
-//! file. [`Hairdo::blend`] goes from one to another.
+//! file: compact, with a checksum, and of a numbered format ([`NEWEST_FORMAT`]); files of older formats
+//! stay readable, newer ones are told. [`Hairdo::blend`] goes from one to another.
 
 mod blend;
 mod bytes;
