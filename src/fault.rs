@@ -53,6 +53,10 @@ pub enum Fault {
         /// What the asset server says.
         error: String,
     },
+    /// A hairdo that the hair cannot wear.
+    #[cfg(feature = "save")]
+    #[error("{0}; the hair keeps the hairdo that it has")]
+    Hairdo(#[from] crate::hairdo::HairdoError),
     /// A request that names something that is not there.
     #[error("the treatment's target is neither a Hair nor a strand")]
     NoTarget,

@@ -9,6 +9,8 @@ pub mod fault;
 pub mod grid;
 #[cfg(feature = "groom")]
 pub mod groom;
+#[cfg(feature = "save")]
+pub mod hairdo;
 mod parallel;
 #[cfg(feature = "render")]
 pub mod render;
@@ -26,6 +28,8 @@ pub use contact::{ColliderShape, HairCollider, LockContact};
 pub use fault::{Fault, HairFault};
 #[cfg(feature = "groom")]
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
+#[cfg(feature = "save")]
+pub use hairdo::{Hairdo, HairdoError};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
 pub use spring::Springs;
@@ -43,6 +47,9 @@ pub mod prelude {
     #[cfg(feature = "groom")]
     #[doc(hidden)]
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};
+    #[cfg(feature = "save")]
+    #[doc(hidden)]
+    pub use crate::hairdo::{Hairdo, HairdoError};
     #[cfg(feature = "render")]
     #[doc(hidden)]
     pub use crate::render::{HairFollowers, HairLook, HairShading, HairView, Melanin};

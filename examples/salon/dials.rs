@@ -5,6 +5,7 @@ use crate::{
     plots::{Measured, colour, name},
     scenes::Strewn,
     tools::{self, Tools},
+    wardrobe::Order,
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
 use bevy_egui::egui::{self, Color32, Slider, Ui};
@@ -37,6 +38,7 @@ pub struct Settings<'w, 's> {
     hairs: Query<'w, 's, (Entity, &'static Strands), With<Hair>>,
     strands: Query<'w, 's, &'static Strand>,
     treat: MessageWriter<'w, Treat>,
+    orders: MessageWriter<'w, Order>,
     commands: Commands<'w, 's>,
 }
 
@@ -130,6 +132,7 @@ impl Settings<'_, '_> {
         ui.horizontal_wrapped(|ui| {
             for (label, what, treat) in kinds {
                 if ui.button(label).on_hover_text(what).clicked() {
+                    self.orders.write(Order::Remember);
                     asked = Some(treat(hair));
                 }
             }
@@ -153,7 +156,12 @@ impl Settings<'_, '_> {
             let text = egui::RichText::new(name(kind)).color(colour(kind));
             let slider = Slider::new(&mut rate, 0.0..=1.0).text(text).max_decimals(2);
             // The backbone is never cut.
-            if ui.add_enabled(kind != BondKind::Peptide, slider).changed() {
+            let response = ui.add_enabled(kind != BondKind::Peptide, slider);
+            // A drag is one step to undo.
+            if response.drag_started() || response.changed() && !response.dragged() {
+                self.orders.write(Order::Remember);
+            }
+            if response.changed() {
                 asked = Treat::set(hair, kind, rate).ok();
             }
         }
@@ -204,6 +212,7 @@ impl Settings<'_, '_> {
             ui.horizontal(|ui| {
                 for (label, wetness) in [("Soak through", 1.0), ("Towel", 0.3), ("Dry", 0.0)] {
                     if ui.button(label).clicked() {
+                        self.orders.write(Order::Remember);
                         soak.write(Soak { target: hair, wetness });
                     }
                 }
@@ -258,6 +267,7 @@ impl Settings<'_, '_> {
         let there = self.blowers.iter().next().map(|(_, b, t)| (*b, t.translation));
         let mut on = there.is_some();
         if ui.checkbox(&mut on, "blower").changed() {
+            self.orders.write(Order::Remember);
             if on {
                 self.commands.spawn(tools::blower());
                 // Its values are the user's from the start.

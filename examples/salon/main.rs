@@ -22,6 +22,7 @@ mod stage;
 mod story;
 mod studio;
 mod tools;
+mod wardrobe;
 
 use bevy::{prelude::*, render::renderer::RenderAdapterInfo, window::WindowResolution};
 use bevy_keratin::{
@@ -156,6 +157,7 @@ fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
         HairPlugins::default(),
         panel::PanelPlugin,
         story::StoryPlugin,
+        wardrobe::WardrobePlugin,
     ));
     salon(&mut app, scene, arguments);
     app.add_systems(Startup, (open_eye, spare_software).chain().after(stage::build))

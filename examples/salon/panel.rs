@@ -7,6 +7,7 @@ use crate::{
     scenes::{Director, Scene, SceneKind},
     story::{Restart, Step, moments, toggle},
     tools,
+    wardrobe::{Hairdos, Order},
 };
 use bevy::prelude::*;
 use bevy_egui::{
@@ -39,6 +40,7 @@ fn show(
     mut kind: Local<Option<BondKind>>,
     mut calm: Local<u32>,
     mut orbits: Query<&mut Orbit>,
+    mut wardrobe: Wardrobe,
 ) -> Result {
     let ctx = contexts.ctx_mut()?;
     // Drawn in software a frame may last longer than a click may by default.
@@ -52,6 +54,7 @@ fn show(
             ui.spacing_mut().slider_width = 110.0;
             player.show(ui);
             section(ui, "Bond rates", true, |ui| settings.treatments(ui, &mut hand, &measured));
+            section(ui, "Hairdo", false, |ui| wardrobe.show(ui));
             section(ui, "Colours", true, |ui| settings.view(ui, kind));
             section(ui, "Hair", false, |ui| settings.hair(ui));
             section(ui, "Air", false, |ui| settings.air(ui));
@@ -95,6 +98,38 @@ fn section(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui)) {
     CollapsingHeader::new(title).default_open(open).show(ui, add);
 }
 
+/// What saves, loads and undoes.
+#[derive(bevy::ecs::system::SystemParam)]
+pub struct Wardrobe<'w, 's> {
+    hairdos: Res<'w, Hairdos>,
+    orders: MessageWriter<'w, Order>,
+    path: Local<'s, Option<String>>,
+}
+
+impl Wardrobe<'_, '_> {
+    fn show(&mut self, ui: &mut Ui) {
+        let path = self.path.get_or_insert_with(|| "hairdo.keratin".into());
+        ui.add(egui::TextEdit::singleline(path).hint_text("file").desired_width(f32::INFINITY));
+        ui.horizontal(|ui| {
+            if ui.button("Save").clicked() {
+                self.orders.write(Order::Save(path.clone().into()));
+            }
+            if ui.button("Load").clicked() {
+                self.orders.write(Order::Load(path.clone().into()));
+            }
+            if ui.add_enabled(self.hairdos.can_undo(), egui::Button::new("Undo")).clicked() {
+                self.orders.write(Order::Undo);
+            }
+            if ui.add_enabled(self.hairdos.can_redo(), egui::Button::new("Redo")).clicked() {
+                self.orders.write(Order::Redo);
+            }
+        });
+        if !self.hairdos.told.is_empty() {
+            ui.small(&self.hairdos.told);
+        }
+    }
+}
+
 /// What chooses and plays.
 #[derive(bevy::ecs::system::SystemParam)]
 pub struct Player<'w> {
@@ -103,6 +138,7 @@ pub struct Player<'w> {
     time: ResMut<'w, Time<Virtual>>,
     restarts: MessageWriter<'w, Restart>,
     steps: MessageWriter<'w, Step>,
+    orders: MessageWriter<'w, Order>,
 }
 
 impl Player<'_> {
@@ -130,6 +166,7 @@ impl Player<'_> {
                 self.steps.write(Step);
             }
             if ui.button("Reset").clicked() || wanted != *self.scene {
+                self.orders.write(Order::Remember);
                 self.restarts.write(Restart(wanted));
             }
         });

@@ -332,6 +332,26 @@ impl Strand {
         }
     }
 
+    /// Puts it into another state of as many nodes, at rest.
+    #[cfg(feature = "save")]
+    pub(crate) fn replace(
+        &mut self,
+        positions: Vec<Vec3>,
+        orientations: Vec<Quat>,
+        rest_lengths: Vec<f32>,
+        root_frame: Quat,
+    ) {
+        *self = Self {
+            velocities: vec![Vec3::ZERO; positions.len()],
+            angular_velocities: vec![Vec3::ZERO; orientations.len()],
+            positions,
+            orientations,
+            rest_lengths,
+            root_frame,
+            was_put_back: false,
+        };
+    }
+
     pub(crate) fn parts(&self) -> (&[Vec3], &[Vec3], &[Quat], &[Vec3]) {
         (&self.positions, &self.velocities, &self.orientations, &self.angular_velocities)
     }

@@ -144,6 +144,13 @@ impl WaterLedger {
         *(if came > 0.0 { &mut self.water_in } else { &mut self.water_out }) += came.abs();
     }
 
+    /// Books water that was put on or taken off hair at once (m³), also as held.
+    #[cfg(feature = "save")]
+    pub(crate) fn replace(&mut self, came: f64) {
+        self.book(came);
+        self.held += came;
+    }
+
     /// |in − held − out| / in, what has been lost count of; 0 where no water came.
     pub fn error(&self) -> f64 {
         if self.water_in > 0.0 {

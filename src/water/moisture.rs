@@ -208,6 +208,29 @@ impl Moisture {
         self.volume() - before
     }
 
+    /// Puts other water in the place of what there is: film and bound water (m³) of each node, or
+    /// none. Returns how much more there is than before.
+    #[cfg(feature = "save")]
+    pub(crate) fn replace(
+        &mut self,
+        film: &[f64],
+        bound: &[f64],
+        lengths: &[f32],
+        wetting: &Wetting,
+        gravity: f32,
+    ) -> f64 {
+        let before = self.volume();
+        let held = clinging(wetting.bundle(1.0), gravity);
+        *self = Self { film: film.to_vec(), bound: bound.to_vec(), ..default() };
+        for ((film, bound), length) in film.iter().zip(bound).zip(node_lengths(lengths)) {
+            let capacity = wetting.capacity() * f64::from(length);
+            let wetness = ((bound / capacity) as f32).clamp(0.0, 1.0);
+            self.wetness.push(wetness);
+            self.sheen.push(sheen(*film, wetness, held));
+        }
+        self.volume() - before
+    }
+
     /// Forgets the last traces; returns them.
     pub(super) fn clear(&mut self) -> f64 {
         let rest = self.volume();
@@ -216,8 +239,13 @@ impl Moisture {
     }
 }
 
+/// How wet a node looks that can hold a film of `held` (m³).
+fn sheen(film: f64, wetness: f32, held: f64) -> f32 {
+    wetness.max((film / (SHINES_AT * held)).min(1.0) as f32)
+}
+
 /// Half the segments on either side of each node (m): the length of strand that it stands for.
-pub(super) fn node_lengths(lengths: &[f32]) -> impl Iterator<Item = f32> + '_ {
+pub(crate) fn node_lengths(lengths: &[f32]) -> impl Iterator<Item = f32> + '_ {
     (0..=lengths.len()).map(|i| {
         let before = if i == 0 { 0.0 } else { lengths[i - 1] };
         0.5 * (before + lengths.get(i).copied().unwrap_or(0.0))
@@ -315,7 +343,7 @@ impl Moisture {
                 *film -= drop;
                 left.drips.push((i, drop));
             }
-            self.sheen[i] = self.wetness[i].max((*film / (SHINES_AT * held)).min(1.0) as f32);
+            self.sheen[i] = sheen(*film, self.wetness[i], held);
         }
     }
 

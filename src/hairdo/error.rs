@@ -1,0 +1,122 @@
+//! Why a hairdo cannot be saved, loaded or worn.
+
+use crate::setting::InvalidValue;
+use bevy::prelude::*;
+
+/// Why a [`Hairdo`](super::Hairdo) cannot be taken, read or put on. Whatever the error, the present
+/// hair stays as it is.
+#[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+#[non_exhaustive]
+pub enum HairdoError {
+    /// The entity is not there or carries no [`Hair`](crate::Hair).
+    #[error("{entity} is not a Hair: name the entity that the strands point to with StrandOf")]
+    NoHair {
+        /// What was named.
+        entity: Entity,
+    },
+    /// The bytes begin like no hairdo.
+    #[error("these bytes are not a hairdo: give what Hairdo::to_bytes has made")]
+    NotAHairdo,
+    /// Written by a newer version of this crate.
+    #[error("the hairdo has format {found}, expected {newest} at most: update bevy_keratin")]
+    FutureVersion {
+        /// The file's format.
+        found: u16,
+        /// The newest that can be read.
+        newest: u16,
+    },
+    /// The end is missing.
+    #[error("the hairdo has {found} bytes, expected {expected}: its end is missing, copy it anew")]
+    Truncated {
+        /// How many bytes there are.
+        found: u64,
+        /// How many there should be, as far as can be told.
+        expected: u64,
+    },
+    /// The bytes are not those that were written.
+    #[error(
+        "the hairdo's checksum is {found:08x}, expected {expected:08x}: it was damaged, copy it anew"
+    )]
+    Checksum {
+        /// Of the bytes that are there.
+        found: u32,
+        /// What the file says of itself.
+        expected: u32,
+    },
+    /// The checksum fits, but the bytes make no sense: written by something else.
+    #[error("byte {offset} of the hairdo: expected {expected}; write it with Hairdo::to_bytes")]
+    Malformed {
+        /// Where, from the file's beginning.
+        offset: u64,
+        /// What should be there.
+        expected: &'static str,
+    },
+    /// A number that is not finite.
+    #[error("{what} {at} of strand {strand} is not finite, expected a number: mend the source")]
+    NonFinite {
+        /// Which number.
+        what: &'static str,
+        /// The strand's index.
+        strand: usize,
+        /// The index from the root of node, edge or joint.
+        at: usize,
+    },
+    /// A number beyond what it may be.
+    #[error("{what} {at} of strand {strand} is {found}, expected {expected}: mend the source")]
+    OutOfRange {
+        /// Which number, with its unit.
+        what: &'static str,
+        /// The strand's index.
+        strand: usize,
+        /// The index from the root of node, edge or joint.
+        at: usize,
+        /// What was found.
+        found: f64,
+        /// What may be.
+        expected: &'static str,
+    },
+    /// A cuticle's wear that is not finite.
+    #[error(
+        "damage or softening of the hair's Cuticle is not finite, expected 0.33 or so: mend it"
+    )]
+    Cuticle,
+    /// A strand that is no line.
+    #[error("strand {strand} has {found} nodes, expected 2 or more: despawn it")]
+    TooFewNodes {
+        /// The strand's index.
+        strand: usize,
+        /// How many nodes it has.
+        found: usize,
+    },
+    /// The hairdo is of another groom: another number of strands.
+    #[error(
+        "the hairdo has {found} strands, expected {expected}: it is of another groom, \
+         use Hairdo::apply_resampled"
+    )]
+    Strands {
+        /// How many the hairdo has.
+        found: usize,
+        /// How many the hair has.
+        expected: usize,
+    },
+    /// The hairdo is of another groom: another number of nodes.
+    #[error(
+        "strand {strand} of the hairdo has {found} nodes, expected {expected}: it is of another \
+         groom, use Hairdo::apply_resampled"
+    )]
+    Nodes {
+        /// The strand's index.
+        strand: usize,
+        /// How many nodes it has in the hairdo.
+        found: usize,
+        /// How many it has in the hair.
+        expected: usize,
+    },
+    /// Nothing to go by.
+    #[error("the hairdo has no strands, expected one at least: take it from hair that has grown")]
+    Bald,
+    /// A number given to a function.
+    #[error(transparent)]
+    Value(#[from] InvalidValue),
+}

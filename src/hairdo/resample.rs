@@ -1,0 +1,186 @@
+//! A hairdo carried over to another groom.
+
+use super::{Hairdo, HairdoError, StyledStrand};
+use crate::{
+    bond::{BondKind, JointBonds},
+    rod::frame::{darboux, full},
+    water::moisture::node_lengths,
+};
+use bevy::prelude::*;
+
+/// The sharpest turn of a resampled joint, sin(θ/2): 150°. Beyond half a turn a joint would be
+/// taken for one that turns the other way.
+const SHARPEST: f32 = 0.966;
+
+impl Hairdo {
+    /// Puts the hairdo on the hair of another groom, at rest; all strands, or in case of an error
+    /// none. As [`Hairdo::apply`], but strands may be others and have more or fewer nodes.
+    ///
+    /// With as many strands, each takes the style of the one in its place; else of the one with the
+    /// nearest root. Along a strand everything is taken by the share of its length. Curvature is
+    /// kept, not the angles of joints: a curl has the same radius on fewer or more nodes, and on
+    /// longer hair more turns. Water is kept per length. Lengths, roots and the scalp's frames are
+    /// the new groom's.
+    ///
+    /// # Limits
+    /// Directions are kept as they are in the hair's frame: both heads have to face the same way and
+    /// be of about the same size and shape, for nothing is bent round a skull that is in the way. A
+    /// joint turns by at most 150°; curls tighter than the new segments allow get wider. Details
+    /// finer than a segment are evened out. A strand is styled by one other alone: from few strands
+    /// to many, neighbours wear the same. The nearest root is looked for among all: ten thousand strands
+    /// onto as many others take a few tenths of a second.
+    ///
+    /// # Errors
+    /// When `hair` is no hair or has numbers that cannot be, or this hairdo has no strands at all.
+    pub fn apply_resampled(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
+        self.resampled_for(&Self::of(world, hair)?)?.apply(world, hair)
+    }
+
+    /// The hairdo as the groom of `other` would wear it: what [`Hairdo::apply_resampled`] puts on.
+    ///
+    /// # Errors
+    /// When this hairdo has no strands and the other has.
+    pub fn resampled_for(&self, other: &Self) -> Result<Self, HairdoError> {
+        if self.strands.is_empty() && !other.strands.is_empty() {
+            return Err(HairdoError::Bald);
+        }
+        let by_index = self.strands.len() == other.strands.len();
+        let strands = other.strands.iter().enumerate().map(|(i, layout)| {
+            let source = if by_index { i } else { self.nearest(layout.positions[0]) };
+            self.strands[source].resampled(layout)
+        });
+        Self { strands: strands.collect(), cuticle: self.cuticle }.checked()
+    }
+
+    /// The strand with the root nearest to a place; of equals the first.
+    fn nearest(&self, place: Vec3) -> usize {
+        let distance = |strand: &StyledStrand| strand.positions[0].distance_squared(place);
+        let strands = self.strands.iter().enumerate();
+        strands
+            .min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))
+            .map_or(0, |(index, _)| index)
+    }
+}
+
+impl StyledStrand {
+    /// The style of `self` with root, lengths and number of nodes of `layout`.
+    fn resampled(&self, layout: &Self) -> Self {
+        let lengths = &layout.rest_lengths;
+        if (&self.rest_lengths, self.root_frame) == (lengths, layout.root_frame) {
+            let mut same = self.clone();
+            let moved = layout.positions[0] - self.positions[0];
+            if moved != Vec3::ZERO {
+                same.positions.iter_mut().for_each(|p| *p += moved);
+            }
+            return same;
+        }
+        let along = Along::new(&self.rest_lengths, lengths);
+        let course = |shapes: Vec<Vec3>| along.course(self.root_frame, &shapes, layout.root_frame);
+
+        let mut turn = layout.root_frame;
+        let mut place = layout.positions[0];
+        let (mut positions, mut orientations) = (vec![place], Vec::new());
+        for (shape, length) in course(self.shape().collect()).into_iter().zip(lengths) {
+            turn = (turn * full(shape)).normalize();
+            place += turn * Vec3::Z * *length;
+            orientations.push(turn);
+            positions.push(place);
+        }
+
+        let mut joints = vec![JointBonds::default(); lengths.len()];
+        for kind in BondKind::ALL {
+            let shapes = course(self.remembered(kind).collect());
+            let rates: Vec<f64> =
+                self.joints.iter().map(|j| f64::from(j.rates[kind as usize])).collect();
+            for (j, (joint, shape)) in joints.iter_mut().zip(shapes).enumerate() {
+                joint.shapes[kind as usize] = shape;
+                joint.rates[kind as usize] = along.at_node(&rates, j).clamp(0.0, 1.0) as f32;
+            }
+        }
+        let own: Vec<f64> = node_lengths(&self.rest_lengths).map(f64::from).collect();
+        let water = |water: &[f64]| -> Vec<f64> {
+            let density: Vec<f64> = water.iter().zip(&own).map(|(v, l)| v / l).collect();
+            let nodes = node_lengths(lengths).enumerate().filter(|_| !density.is_empty());
+            nodes.map(|(j, l)| along.at_node(&density, j) * f64::from(l)).collect()
+        };
+        Self {
+            positions,
+            orientations,
+            rest_lengths: lengths.clone(),
+            root_frame: layout.root_frame,
+            joints,
+            film: water(&self.film),
+            bound: water(&self.bound),
+        }
+    }
+}
+
+/// Places along an old and a new strand, all measured along the old one.
+struct Along {
+    old_nodes: Vec<f32>,
+    old_middles: Vec<f32>,
+    new_nodes: Vec<f32>,
+    new_middles: Vec<f32>,
+    /// New length over old.
+    scale: f32,
+}
+
+impl Along {
+    fn new(old: &[f32], new: &[f32]) -> Self {
+        let scale = new.iter().sum::<f32>() / old.iter().sum::<f32>();
+        let measure = |lengths: &[f32], scale: f32| {
+            let mut at = 0.0;
+            let (mut nodes, mut middles) = (vec![0.0], Vec::new());
+            for length in lengths {
+                middles.push((at + 0.5 * length) / scale);
+                at += length;
+                nodes.push(at / scale);
+            }
+            (nodes, middles)
+        };
+        let (old_nodes, old_middles) = measure(old, 1.0);
+        let (new_nodes, new_middles) = measure(new, scale);
+        Self { old_nodes, old_middles, new_nodes, new_middles, scale }
+    }
+
+    /// Shapes of the new joints. Edge orientations are those at the edges' middles, so a joint turns
+    /// by the curvature between two of them. |Im Ω| = sin(θ/2) is half the edge over the radius of
+    /// the circle through the nodes: Ω per length, unlike the angle, keeps that radius exactly.
+    fn course(&self, old_root: Quat, shapes: &[Vec3], new_root: Quat) -> Vec<Vec3> {
+        let first = shapes.first().copied().unwrap_or_default();
+        let onward = self.turn(shapes, self.old_middles[0], self.new_middles[0]);
+        let first = darboux(new_root, old_root * full(first) * full(onward)).xyz();
+        let others = self.new_middles.windows(2).map(|m| self.turn(shapes, m[0], m[1]));
+        core::iter::once(first).chain(others).collect()
+    }
+
+    /// Ω gathered between two places; before the first joint as at it, behind the last likewise.
+    fn turn(&self, shapes: &[Vec3], from: f32, to: f32) -> Vec3 {
+        if to < from {
+            return -self.turn(shapes, to, from);
+        }
+        let last = self.old_middles.len() - 1;
+        let pairs = self.old_middles.windows(2).enumerate();
+        let sum: Vec3 = pairs
+            .map(|(i, m)| {
+                let begin = if i == 0 { from } else { from.max(m[0]) };
+                let end = if i + 1 == last { to } else { to.min(m[1]) };
+                shapes[i + 1] * ((end - begin).max(0.0) / (m[1] - m[0]))
+            })
+            .sum();
+        (sum * self.scale).clamp_length_max(SHARPEST)
+    }
+
+    /// What has `values` at the old nodes, at a new one; behind the last value as at it.
+    fn at_node(&self, values: &[f64], new: usize) -> f64 {
+        let place = self.new_nodes[new];
+        let after = self.old_nodes.partition_point(|node| *node <= place);
+        let (before, after) = (after.saturating_sub(1), after.min(values.len() - 1));
+        if before >= after {
+            return values[after];
+        }
+        let (a, b) = (self.old_nodes[before], self.old_nodes[after]);
+        let share = f64::from((place - a) / (b - a));
+        values[before] + (values[after] - values[before]) * share
+    }
+}
