@@ -5,6 +5,8 @@
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
 
+mod head;
+
 /// What the mannequin takes from the scenes.
 mod scenes {
     pub const HEAD_RADIUS: f32 = 0.1;
@@ -15,7 +17,6 @@ use bevy::{
     camera::RenderTarget,
     core_pipeline::prepass::DepthPrepass,
     light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, ShadowFilteringMethod},
-    mesh::VertexAttributeValues,
     prelude::*,
     render::{
         RenderPlugin,
@@ -96,7 +97,7 @@ fn draw(preset: HairPreset) -> Result<Vec<Image>> {
     let mesh = mannequin::mesh();
     let planted = preset.plant(&mesh, &scalp())?;
     let took = start.elapsed();
-    let hair = wear(&mut app, preset, &planted, with_scalp(mesh))?;
+    let hair = wear(&mut app, preset, &planted, head::with_scalp(mesh, &scalp()))?;
     app.finish();
     app.cleanup();
     show(&mut app, &camera, false);
@@ -205,52 +206,15 @@ fn wear(app: &mut App, preset: HairPreset, planted: &Planted, head: Mesh) -> Res
 
 /// What hair lies on, as balls and capsules (upright, m).
 fn body() -> Result<Vec<(HairCollider, Transform)>> {
-    let mut parts = Vec::new();
-    let mut limb = |a: Vec3, b: Vec3, radius: f32| -> Result {
-        let way = b - a;
-        let turn = Quat::from_rotation_arc(Vec3::Y, way.normalize_or(Vec3::Y));
-        let place = Transform::from_translation((a + b) * 0.5).with_rotation(turn);
-        parts.push((HairCollider::capsule(radius, way.length())?, place));
-        Ok(())
-    };
-    // The skull: its core, and balls rolled inside it from the forehead over the crown to the nape.
-    // All a little within the skin, because roots must not be inside, yet not by more than what hair
-    // that lies on them needs to be seen.
-    limb(Vec3::new(0.0, 0.018, -0.020), Vec3::new(0.0, 0.018, 0.018), 0.074)?;
-    let rolled = |i: u8| {
-        let (sine, cosine) = (f32::from(i) * std::f32::consts::PI / 6.0).sin_cos();
-        Vec3::new(0.0, 0.018 + 0.042 * sine, 0.037 * cosine)
-    };
-    for i in 0..8 {
-        limb(rolled(i), rolled(i + 1), 0.057)?;
-    }
-    // Face, jaw, neck, shoulders, chest.
-    limb(Vec3::new(0.0, 0.02, 0.040), Vec3::new(0.0, -0.055, 0.043), 0.053)?;
-    limb(Vec3::new(0.0, -0.066, 0.035), Vec3::new(0.0, -0.066, 0.030), 0.047)?;
-    limb(Vec3::new(0.0, -0.05, -0.012), Vec3::new(0.0, -0.2, -0.03), 0.050)?;
-    limb(Vec3::new(-0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058)?;
-    limb(Vec3::new(0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058)?;
-    limb(Vec3::new(-0.08, -0.30, -0.02), Vec3::new(0.08, -0.30, -0.02), 0.07)?;
-    Ok(parts)
-}
-
-/// The skin under the hair, darker.
-fn with_scalp(mut mesh: Mesh) -> Mesh {
-    use VertexAttributeValues::{Float32x3, Float32x4};
-    let scalp = scalp();
-    let Some(Float32x3(places)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION).cloned() else {
-        return mesh;
-    };
-    if let Some(Float32x4(colors)) = mesh.attribute_mut(Mesh::ATTRIBUTE_COLOR) {
-        for (color, place) in colors.iter_mut().zip(places) {
-            let share = 0.95 * scalp.share(Vec3::from(place));
-            let skin = Vec4::new(0.62, 0.40, 0.29, 1.0);
-            let bare = scalp.share(Vec3::from(place)) > 0.0;
-            let skin = if bare { skin } else { Vec4::from(*color) };
-            *color = skin.lerp(Vec4::new(0.05, 0.03, 0.022, 1.0), share).to_array();
-        }
-    }
-    mesh
+    // Neck, shoulders, chest.
+    let bust = [
+        (Vec3::new(0.0, -0.05, -0.012), Vec3::new(0.0, -0.2, -0.03), 0.050),
+        (Vec3::new(-0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058),
+        (Vec3::new(0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058),
+        (Vec3::new(-0.08, -0.30, -0.02), Vec3::new(0.08, -0.30, -0.02), 0.07),
+    ];
+    let parts = head::skull().into_iter().chain(bust);
+    parts.map(|(a, b, radius)| head::limb(a, b, radius)).collect()
 }
 
 fn show(app: &mut App, camera: &(Entity, Handle<Image>), is_on: bool) {

@@ -20,13 +20,13 @@ const HIGH: Vec3 = Vec3::new(0.14, 0.15, 0.235);
 pub const BUST_END: f32 = -0.30;
 
 /// Blends two distances over a width of `k`.
-fn join(a: f32, b: f32, k: f32) -> f32 {
+pub fn join(a: f32, b: f32, k: f32) -> f32 {
     let h = (k - (a - b).abs()).max(0.0) / k;
     a.min(b) - 0.25 * h * h * k
 }
 
 /// Takes `b` away from `a`, with an edge of width `k`.
-fn carve(a: f32, b: f32, k: f32) -> f32 {
+pub fn carve(a: f32, b: f32, k: f32) -> f32 {
     -join(-a, b, k)
 }
 
@@ -41,7 +41,7 @@ fn ellipsoid(p: Vec3, centre: Vec3, radii: Vec3) -> f32 {
 }
 
 /// A capsule whose radius goes from `ra` at `a` to `rb` at `b`.
-fn limb(p: Vec3, a: Vec3, b: Vec3, ra: f32, rb: f32) -> f32 {
+pub fn limb(p: Vec3, a: Vec3, b: Vec3, ra: f32, rb: f32) -> f32 {
     let way = b - a;
     let t = ((p - a).dot(way) / way.length_squared()).clamp(0.0, 1.0);
     p.distance(a + way * t) - (ra + (rb - ra) * t)
@@ -52,8 +52,20 @@ fn block(p: Vec3, centre: Vec3, half: Vec3, round: f32) -> f32 {
     q.max(Vec3::ZERO).length() + q.max_element().min(0.0) - round
 }
 
-/// Distance to the head's surface (m), negative inside. Both halves are alike.
+/// Distance to the surface of head, neck and shoulders (m), negative inside.
 pub fn head(p: Vec3) -> f32 {
+    let p = Vec3::new(p.x, p.y, p.z.abs());
+    let v = Vec3::new;
+    let mut d = face(p);
+    // Neck, shoulders, chest, cut off below.
+    d = join(d, limb(p, v(-0.05, -0.012, 0.0), v(-0.2, -0.03, 0.0), 0.05, 0.056), 0.03);
+    d = join(d, limb(p, v(-0.235, -0.035, 0.0), v(-0.27, -0.04, 0.15), 0.05, 0.058), 0.06);
+    d = join(d, ellipsoid(p, v(-0.31, -0.02, 0.0), v(0.09, 0.07, 0.15)), 0.05);
+    carve(d, p.x - BUST_END, 0.012)
+}
+
+/// Distance to the surface of the head without its neck (m), negative inside. Both halves are alike.
+pub fn face(p: Vec3) -> f32 {
     let p = Vec3::new(p.x, p.y, p.z.abs());
     let v = Vec3::new;
     let skull = ellipsoid(p, v(0.018, 0.0, 0.0), v(0.1, 0.095, 0.077));
@@ -79,16 +91,15 @@ pub fn head(p: Vec3) -> f32 {
     // Ear: a shell with a hollow.
     let shell = ellipsoid(p, v(-0.016, -0.002, 0.077), v(0.031, 0.018, 0.0085));
     let ear = carve(shell, ellipsoid(p, v(-0.012, 0.0, 0.084), v(0.02, 0.01, 0.007)), 0.005);
-    d = join(d, ear, 0.008);
-    // Neck, shoulders, chest, cut off below.
-    d = join(d, limb(p, v(-0.05, -0.012, 0.0), v(-0.2, -0.03, 0.0), 0.05, 0.056), 0.03);
-    d = join(d, limb(p, v(-0.235, -0.035, 0.0), v(-0.27, -0.04, 0.15), 0.05, 0.058), 0.06);
-    d = join(d, ellipsoid(p, v(-0.31, -0.02, 0.0), v(0.09, 0.07, 0.15)), 0.05);
-    carve(d, p.x - BUST_END, 0.012)
+    join(d, ear, 0.008)
 }
 
 pub fn normal(p: Vec3) -> Vec3 {
-    let step = |axis: Vec3| head(p + axis * 1e-3) - head(p - axis * 1e-3);
+    normal_of(&head, p)
+}
+
+fn normal_of(distance: &impl Fn(Vec3) -> f32, p: Vec3) -> Vec3 {
+    let step = |axis: Vec3| distance(p + axis * 1e-3) - distance(p - axis * 1e-3);
     Vec3::new(step(Vec3::X), step(Vec3::Y), step(Vec3::Z)).normalize_or(Vec3::Y)
 }
 
@@ -96,22 +107,36 @@ pub fn normal(p: Vec3) -> Vec3 {
 fn colour(p: Vec3) -> [f32; 4] {
     let scalp = block(p, Vec3::new(0.0, -0.1, 0.0), Vec3::new(0.044, 0.034, 0.064), 0.02);
     let share = (1.0 - scalp / 0.006).clamp(0.0, 1.0);
-    let lips = ellipsoid(p, Vec3::new(-0.064, 0.09, 0.0), Vec3::new(0.0095, 0.012, 0.02));
-    let red = (1.0 - lips / 0.004).clamp(0.0, 1.0) * 0.45;
-    let skin = Vec3::new(0.62, 0.40, 0.29).lerp(Vec3::new(0.50, 0.18, 0.15), red);
-    skin.lerp(Vec3::new(0.09, 0.05, 0.035), share * 0.9).extend(1.0).to_array()
+    skin(p).lerp(Vec3::new(0.09, 0.05, 0.035), share * 0.9).extend(1.0).to_array()
 }
 
-/// The head as a mesh with vertex colours: one vertex in each cell that the surface crosses, put
-/// onto the surface; one quad around each grid edge that it crosses.
+/// Skin and lips.
+pub fn skin(p: Vec3) -> Vec3 {
+    let lips = ellipsoid(p, Vec3::new(-0.064, 0.09, 0.0), Vec3::new(0.0095, 0.012, 0.02));
+    let red = (1.0 - lips / 0.004).clamp(0.0, 1.0) * 0.45;
+    Vec3::new(0.62, 0.40, 0.29).lerp(Vec3::new(0.50, 0.18, 0.15), red)
+}
+
+/// The head as a mesh with vertex colours.
 pub fn mesh() -> Mesh {
-    let count = ((HIGH - LOW) / CELL).ceil().as_uvec3();
-    let place = |c: UVec3| LOW + c.as_vec3() * CELL;
+    surface((LOW, HIGH), CELL, &head, &colour)
+}
+
+/// What a distance is 0 on within a box, as a mesh with vertex colours: one vertex in each cell that
+/// the surface crosses, put onto the surface; one quad around each grid edge that it crosses.
+pub fn surface(
+    (low, high): (Vec3, Vec3),
+    cell: f32,
+    distance: &impl Fn(Vec3) -> f32,
+    colour: &impl Fn(Vec3) -> [f32; 4],
+) -> Mesh {
+    let count = ((high - low) / cell).ceil().as_uvec3();
+    let place = |c: UVec3| low + c.as_vec3() * cell;
     let index = |c: UVec3| (c.x + count.x * (c.y + count.y * c.z)) as usize;
     let mut field = Vec::with_capacity(count.element_product() as usize);
     for z in 0..count.z {
         for y in 0..count.y {
-            field.extend((0..count.x).map(|x| head(place(UVec3::new(x, y, z)))));
+            field.extend((0..count.x).map(|x| distance(place(UVec3::new(x, y, z)))));
         }
     }
     let inside = |c: UVec3| field[index(c)] < 0.0;
@@ -120,14 +145,14 @@ pub fn mesh() -> Mesh {
     let mut normals: Vec<[f32; 3]> = Vec::new();
     let mut colours: Vec<[f32; 4]> = Vec::new();
     let mut vertex_of: HashMap<UVec3, u32> = HashMap::default();
-    let mut vertex = |cell: UVec3| {
-        *vertex_of.entry(cell).or_insert_with(|| {
-            let mut p = place(cell) + 0.5 * CELL;
+    let mut vertex = |corner: UVec3| {
+        *vertex_of.entry(corner).or_insert_with(|| {
+            let mut p = place(corner) + 0.5 * cell;
             for _ in 0..4 {
-                p -= normal(p) * head(p);
+                p -= normal_of(distance, p) * distance(p);
             }
             positions.push(p.to_array());
-            normals.push(normal(p).to_array());
+            normals.push(normal_of(distance, p).to_array());
             colours.push(colour(p));
             positions.len() as u32 - 1
         })

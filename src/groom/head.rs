@@ -1,6 +1,6 @@
 //! A head for a groom that comes without one.
 
-use super::Groom;
+use super::{Groom, linear::solve};
 use bevy::math::{DVec3, bounding::BoundingSphere};
 
 impl Groom {
@@ -26,16 +26,17 @@ impl Groom {
         let spread = (spread / count as f64).sqrt();
         // |p|² = 2 c·p + d is linear in the centre c and d = r² − |c|²; about the middle, in units of
         // the spread, the sums are well scaled.
-        let mut sums = [[0.0_f64; 5]; 4];
+        let (mut sums, mut rights) = ([[0.0_f64; 4]; 4], [0.0_f64; 4]);
         for root in self.roots() {
             let p = (root.as_dvec3() - middle) / spread;
             let row = [p.x, p.y, p.z, 1.0];
             let right = p.length_squared();
-            for (a, sums) in row.iter().zip(&mut sums) {
-                row.iter().chain([&right]).zip(sums).for_each(|(b, sum)| *sum += a * b);
+            for (k, a) in row.iter().enumerate() {
+                row.iter().zip(&mut sums[k]).for_each(|(b, sum)| *sum += a * b);
+                rights[k] += a * right;
             }
         }
-        let [x, y, z, d] = solve(sums, 1e-5 * count as f64)?;
+        let [x, y, z, d] = solve(sums, rights, 1e-5 * count as f64)?;
         let centre = DVec3::new(x, y, z) * 0.5;
         let radius = (d + centre.length_squared()).max(0.0).sqrt() * spread;
         let centre = (middle + centre * spread).as_vec3();
@@ -44,23 +45,4 @@ impl Groom {
         (centre.is_finite() && radius > 0.0 && radius < 1e3 * spread as f32)
             .then(|| BoundingSphere::new(centre, radius))
     }
-}
-
-/// Gauss's elimination with pivots; `None` where one is not above `least`.
-fn solve(mut rows: [[f64; 5]; 4], least: f64) -> Option<[f64; 4]> {
-    for k in 0..4 {
-        let pivot = (k..4).max_by(|a, b| rows[*a][k].abs().total_cmp(&rows[*b][k].abs()))?;
-        rows.swap(k, pivot);
-        if rows[k][k].is_nan() || rows[k][k].abs() <= least {
-            return None;
-        }
-        let row = rows[k];
-        for (i, other) in rows.iter_mut().enumerate() {
-            if i != k {
-                let share = other[k] / row[k];
-                other.iter_mut().zip(row).for_each(|(o, r)| *o -= share * r);
-            }
-        }
-    }
-    Some(core::array::from_fn(|k| rows[k][4] / rows[k][k]))
 }

@@ -4,9 +4,11 @@
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
 mod bytes;
+mod fit;
 pub mod gltf;
 mod guides;
 mod head;
+mod linear;
 mod loader;
 mod losses;
 pub mod plant;
@@ -20,6 +22,7 @@ mod wear;
 pub mod yuksel;
 
 pub use bytes::GroomFileError;
+pub use fit::{FitError, JointCapsule, fit_joint_capsules};
 pub use loader::{GroomFormat, GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
 pub use plant::{

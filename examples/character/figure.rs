@@ -1,0 +1,113 @@
+//! The figure: bones, skin, hair and what hair lies on.
+
+use crate::{
+    Arguments, body, head,
+    skeleton::{self, *},
+    solid::Paint,
+};
+use bevy::{
+    camera::visibility::NoFrustumCulling,
+    mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
+    prelude::*,
+};
+use bevy_keratin::{groom::*, prelude::*};
+
+/// The whole of it: moves as it walks.
+#[derive(Component, Default)]
+pub struct Figure {
+    /// How long it has walked (s).
+    pub walked: f32,
+    /// Where the middle of its circle is (m).
+    pub place: Vec3,
+}
+
+/// A bone, by its number.
+#[derive(Component)]
+pub struct Bone(pub usize);
+
+/// The skin, a skinned mesh.
+#[derive(Component)]
+pub struct Body;
+
+/// A capsule of the head that hair must stay out of: its ends in the head bone's space, its radius.
+#[derive(Component)]
+pub struct Skull(pub Vec3, pub Vec3, pub f32);
+
+pub struct FigurePlugin;
+
+impl Plugin for FigurePlugin {
+    fn build(&self, app: &mut App) {
+        app.add_systems(Startup, build).add_systems(Update, walk);
+    }
+}
+
+fn build(
+    mut commands: Commands,
+    mut paint: Paint,
+    mut poses: ResMut<Assets<SkinnedMeshInverseBindposes>>,
+    arguments: Res<Arguments>,
+) -> Result {
+    let figure = commands.spawn((Figure::default(), path(0.0), Visibility::default())).id();
+    let mut bones: Vec<Entity> = Vec::new();
+    for bone in 0..skeleton::COUNT {
+        let above = skeleton::parent(bone).map_or(figure, |parent| bones[parent]);
+        let bone = (Bone(bone), at_rest(bone), Visibility::default(), ChildOf(above));
+        bones.push(commands.spawn(bone).id());
+    }
+    let inverse: Vec<Mat4> =
+        (0..skeleton::COUNT).map(|bone| Mat4::from_translation(-joint(bone))).collect();
+    // The middle between the ears; the hairline follows from it.
+    let scalp = Scalp { center: SKULL, height: 0.118, ..default() };
+    let skin = body::mesh();
+    let preset = arguments.preset.0;
+    let planted = preset.plant(&skin, &scalp)?;
+    let capsules = fit_joint_capsules(&skin, &inverse)?;
+
+    let body = commands
+        .spawn((
+            Body,
+            Mesh3d(paint.meshes.add(head::with_scalp(skin, &scalp))),
+            MeshMaterial3d(paint.matte(Color::WHITE, 0.55)),
+            SkinnedMesh { inverse_bindposes: poses.add(inverse), joints: bones.clone() },
+            // Its bounds are those at rest.
+            NoFrustumCulling,
+            ChildOf(figure),
+        ))
+        .id();
+
+    let hair = commands.spawn((Hair, preset.settings(), ChildOf(bones[HEAD]))).id();
+    for strand in planted.groom.strands() {
+        commands.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
+    }
+    println!("{preset:?}: {} guides", planted.groom.len());
+    commands.entity(hair).insert(RootsOnMesh { mesh: Some(body), roots: planted.roots });
+
+    // A head is no capsule: hair lies on its skull by several.
+    for (a, b, radius) in head::skull() {
+        let [a, b] = [a, b].map(|end| end + SKULL - joint(HEAD));
+        commands.spawn((head::limb(a, b, radius)?, Skull(a, b, radius), ChildOf(bones[HEAD])));
+    }
+    for bone in [1, CHEST, NECK, UPPER_ARM, UPPER_ARM + OTHER_SIDE] {
+        if let Some(capsule) = capsules[bone] {
+            commands.spawn((capsule.collider()?, ChildOf(bones[bone])));
+        }
+    }
+    commands.spawn(HairCollider::plane(Dir3::Y));
+    Ok(())
+}
+
+fn walk(
+    time: Res<Time>,
+    mut figures: Query<(&mut Figure, &mut Transform), Without<Bone>>,
+    mut bones: Query<(&Bone, &mut Transform)>,
+) {
+    for (mut figure, mut place) in &mut figures {
+        figure.walked += time.delta_secs();
+        *place = path(figure.walked);
+        place.translation += figure.place;
+        let pose = skeleton::walk(figure.walked);
+        for (bone, mut place) in &mut bones {
+            *place = pose[bone.0];
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! What hair wants of the mannequin's head: solids to lie on, and a dark scalp.
+
+use bevy::{mesh::VertexAttributeValues, prelude::*};
+use bevy_keratin::{groom::Scalp, prelude::*};
+use core::f32::consts::PI;
+
+/// A capsule as a collider, between the centres of its ends (m).
+pub fn limb(a: Vec3, b: Vec3, radius: f32) -> Result<(HairCollider, Transform)> {
+    let way = b - a;
+    let turn = Quat::from_rotation_arc(Vec3::Y, way.normalize_or(Vec3::Y));
+    let place = Transform::from_translation((a + b) * 0.5).with_rotation(turn);
+    Ok((HairCollider::capsule(radius, way.length())?, place))
+}
+
+/// The skull: its core, and balls rolled inside it from the forehead over the crown to the nape.
+/// Then face and jaw. Upright about the head's centre (m), the ends and the radius of each capsule.
+///
+/// All a little within the skin, because roots must not be inside, yet not by more than what hair
+/// that lies on them needs to be seen.
+pub fn skull() -> Vec<(Vec3, Vec3, f32)> {
+    let core = (Vec3::new(0.0, 0.018, -0.020), Vec3::new(0.0, 0.018, 0.018), 0.074);
+    let rolled = |i: u8| {
+        let (sine, cosine) = (f32::from(i) * PI / 6.0).sin_cos();
+        Vec3::new(0.0, 0.018 + 0.042 * sine, 0.037 * cosine)
+    };
+    let face = (Vec3::new(0.0, 0.02, 0.040), Vec3::new(0.0, -0.055, 0.043), 0.053);
+    let jaw = (Vec3::new(0.0, -0.066, 0.035), Vec3::new(0.0, -0.066, 0.030), 0.047);
+    let balls = (0..8).map(|i| (rolled(i), rolled(i + 1), 0.057));
+    [core].into_iter().chain(balls).chain([face, jaw]).collect()
+}
+
+/// The skin under the hair, darker.
+pub fn with_scalp(mut mesh: Mesh, scalp: &Scalp) -> Mesh {
+    use VertexAttributeValues::{Float32x3, Float32x4};
+    let Some(Float32x3(places)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION).cloned() else {
+        return mesh;
+    };
+    if let Some(Float32x4(colors)) = mesh.attribute_mut(Mesh::ATTRIBUTE_COLOR) {
+        for (color, place) in colors.iter_mut().zip(places) {
+            let share = 0.95 * scalp.share(Vec3::from(place));
+            let skin = Vec4::new(0.62, 0.40, 0.29, 1.0);
+            let bare = scalp.share(Vec3::from(place)) > 0.0;
+            let skin = if bare { skin } else { Vec4::from(*color) };
+            *color = skin.lerp(Vec4::new(0.05, 0.03, 0.022, 1.0), share).to_array();
+        }
+    }
+    mesh
+}
