@@ -227,8 +227,8 @@ fn hair_of_an_evenly_turning_head_does_not_stutter() {
         // Until it turns along with the head.
         let frames = |seconds: f64| (seconds * fps) as usize;
         (0..frames(8.0)).for_each(|_| app.update());
-        let mut low = vec![Vec3::INFINITY; 10];
-        let mut high = vec![Vec3::NEG_INFINITY; 10];
+        let mut low = [Vec3::INFINITY; 10];
+        let mut high = [Vec3::NEG_INFINITY; 10];
         for _ in 0..frames(1.0) {
             app.update();
             let overstep = app.world().resource::<Time<Fixed>>().overstep_fraction();
@@ -276,6 +276,7 @@ mod skinned {
     use super::*;
     use bevy::{
         asset::RenderAssetUsages,
+        math::Affine3A,
         mesh::{
             Indices, Mesh, Mesh3d, PrimitiveTopology, VertexAttributeValues,
             skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
@@ -318,7 +319,7 @@ mod skinned {
     }
 
     /// Where a root is with these joints, by the definition of skinning.
-    fn on_mesh(root: &RootOnMesh, joints: [Affine3; 2]) -> Vec3 {
+    fn on_mesh(root: &RootOnMesh, joints: [Affine3A; 2]) -> Vec3 {
         let mesh = strip();
         let positions = mesh.attribute(Mesh::ATTRIBUTE_POSITION).unwrap().as_float3().unwrap();
         let corner = |v: u32| {
@@ -329,8 +330,6 @@ mod skinned {
         let [a, b, c] = root.vertices.map(corner);
         a * root.weights.x + b * root.weights.y + c * root.weights.z
     }
-
-    use bevy::math::Affine3A as Affine3;
 
     fn app_with_meshes(fps: f64) -> App {
         let mut app = App::new();
@@ -377,7 +376,7 @@ mod skinned {
         let ids: Vec<Entity> = roots()
             .iter()
             .map(|root| {
-                let at = on_mesh(root, [Affine3::IDENTITY; 2]);
+                let at = on_mesh(root, [Affine3A::IDENTITY; 2]);
                 let points: Vec<Vec3> = (0..8).map(|k| at + Vec3::Y * (0.02 * k as f32)).collect();
                 world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap())).id()
             })
@@ -397,7 +396,7 @@ mod skinned {
             }
             let world = app.world();
             let place = |e: Entity| world.get::<GlobalTransform>(e).unwrap().affine();
-            let joints = [place(neck), place(head) * Affine3::from(end.compute_affine()).inverse()];
+            let joints = [place(neck), place(head) * end.compute_affine().inverse()];
             let overstep = world.resource::<Time<Fixed>>().overstep_fraction();
             for (id, root) in ids.iter().zip(&roots()) {
                 let strand = world.get::<Strand>(*id).unwrap();
