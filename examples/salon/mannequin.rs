@@ -94,6 +94,8 @@ pub fn face(p: Vec3) -> f32 {
     join(d, ear, 0.008)
 }
 
+/// The direction out of the head at a point of its surface.
+#[allow(dead_code, reason = "each example uses its own part")]
 pub fn normal(p: Vec3) -> Vec3 {
     normal_of(&head, p)
 }
