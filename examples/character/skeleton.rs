@@ -112,10 +112,10 @@ pub fn walk(seconds: f32) -> [Transform; COUNT] {
         let ankle = x(thigh) * (place[0] + x(knee) * place[1]);
         reach = reach.max(-ankle.y);
         let is_left = if side == 0 { 1.0 } else { -1.0 };
-        let swing = -0.05 + 0.42 * own.sin();
+        let swing = 0.02 + 0.42 * own.sin();
         let down = Quat::from_rotation_z(-0.3 * is_left);
         bones[UPPER_ARM + side].rotation = x(swing) * down;
-        bones[FOREARM + side].rotation = x(-0.3 - 0.22 * (1.0 - own.sin()));
+        bones[FOREARM + side].rotation = x(-0.16 - 0.2 * (1.0 - own.sin()));
     }
     // The leg that stands carries it.
     bones[0].translation.y = reach + joint(FOOT).y + joint(0).y - joint(THIGH).y;
