@@ -21,7 +21,8 @@ pub struct Measure {
     deepest: f32,
     /// Of any drawn root from the drawn skin (m).
     off_skin: f32,
-    moisture: f32,
+    /// The mean over all strands, 0…1.
+    wetness: f32,
     frames: u32,
 }
 
@@ -39,7 +40,7 @@ impl fmt::Display for Measure {
             1e3 * self.inside,
             1e3 * self.deepest,
             1e3 * self.off_skin,
-            100.0 * self.moisture
+            100.0 * self.wetness
         )
     }
 }
@@ -67,6 +68,9 @@ fn strands(
     let nodes = strands.iter().flat_map(|(strand, _)| &strand.positions()[1..]);
     measure.inside = nodes.map(depth).fold(0.0, f32::max);
     measure.strain = strands.iter().map(|(s, _)| s.peak_strain()).fold(0.0, f32::max);
+    let mean = |wetness: &[f32]| wetness.iter().sum::<f32>() / wetness.len().max(1) as f32;
+    let sum: f32 = strands.iter().map(|(_, water)| mean(water.wetness())).sum();
+    measure.wetness = sum / strands.iter().len().max(1) as f32;
     measure.frames += 1;
     if measure.frames > SETTLING {
         measure.peak_strain = measure.peak_strain.max(measure.strain);

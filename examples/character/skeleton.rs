@@ -88,7 +88,7 @@ fn look(seconds: f32) -> f32 {
 fn leg(phase: f32) -> [f32; 3] {
     let thigh = -0.36 * phase.sin() - 0.06;
     // The knee bends while the leg swings to the front.
-    let knee = 0.16 + 0.85 * (phase + 0.45).cos().max(0.0).powi(2);
+    let knee = 0.16 + 0.75 * (phase + 0.45).cos().max(0.0).powi(2);
     // Flat while it stands, the heel first where it lands, the toes last where it leaves.
     let foot = -0.75 * (thigh + knee) - 0.1 * phase.sin();
     [thigh, knee, foot]

@@ -19,7 +19,7 @@ struct Cloud;
 const WIND: f32 = 4.0;
 const WIND_TOWARD: Vec3 = Vec3::new(-0.9, 0.0, -0.43);
 /// Drops a second on a disc of this radius (m).
-const RAIN: f32 = 500.0;
+const RAIN: f32 = 800.0;
 const RAIN_RADIUS: f32 = 0.3;
 /// How far a jump goes (m).
 const JUMP: f32 = 3.0;
