@@ -367,7 +367,7 @@ mod skinned {
             }
             let world = app.world();
             let place = |e: Entity| world.get::<GlobalTransform>(e).unwrap().affine();
-            let joints = [place(neck), place(head) * Affine3::from(end.compute_affine()).inverse()];
+            let joints = [place(neck), place(head) * end.compute_affine().inverse()];
             let overstep = world.resource::<Time<Fixed>>().overstep_fraction();
             for (id, root) in ids.iter().zip(&roots()) {
                 let strand = world.get::<Strand>(*id).unwrap();
