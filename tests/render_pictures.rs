@@ -160,7 +160,7 @@ fn long_hair(spacing: f32, length: f32, nodes: usize) -> Vec<Vec<Vec3>> {
         // From outside onto the skin.
         let mut p = Vec3::new(0.018, 0.0, 0.0) + lying(Vec3::new(cos * flat, y, sin * flat)) * 0.1;
         for _ in 0..12 {
-            p -= mannequin::normal(p) * mannequin::head(p);
+            p -= mannequin::normal(&mannequin::head, p) * mannequin::head(p);
         }
         let at = upright(p);
         let ear = (p - Vec3::new(-0.016, -0.002, p.z.signum() * 0.08)).length() < 0.034;
@@ -175,7 +175,7 @@ fn long_hair(spacing: f32, length: f32, nodes: usize) -> Vec<Vec<Vec3>> {
 fn draped(root: Vec3, length: f32, nodes: usize) -> Vec<Vec3> {
     let step = length / (nodes - 1) as f32;
     let side = if root.x < 0.0 { -1.0 } else { 1.0 };
-    let normal = |p: Vec3| upright(mannequin::normal(lying(p)));
+    let normal = |p: Vec3| upright(mannequin::normal(&mannequin::head, lying(p)));
     let mut points = vec![root];
     let mut way = (normal(root) + Vec3::new(0.8 * side, 0.2, -0.5)).normalize();
     // Hair from higher up lies on that from below.

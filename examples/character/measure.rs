@@ -12,17 +12,32 @@ use bevy_keratin::{groom::RootsOnMesh, prelude::*, strand::StrandHistory};
 use core::fmt;
 
 /// What has been measured up to now.
-#[derive(Resource, Default)]
+#[derive(Resource)]
 pub struct Measure {
     strain: f32,
     peak_strain: f32,
-    /// Of any node but the root in the head (m), now and at most.
-    inside: f32,
-    deepest: f32,
+    /// Of any node but the root from the head (m), negative within: now and at least.
+    off_head: f32,
+    nearest: f32,
     /// Of any drawn root from the drawn skin (m).
     off_skin: f32,
-    moisture: f32,
+    /// The mean over all strands, 0…1.
+    wetness: f32,
     frames: u32,
+}
+
+impl Default for Measure {
+    fn default() -> Self {
+        Self {
+            strain: 0.0,
+            peak_strain: 0.0,
+            off_head: f32::MAX,
+            nearest: f32::MAX,
+            off_skin: 0.0,
+            wetness: 0.0,
+            frames: 0,
+        }
+    }
 }
 
 /// Until hair has settled, nothing is measured (frames).
@@ -32,14 +47,14 @@ impl fmt::Display for Measure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "strain {:.1} % now and {:.1} % at most, {:.2} mm deep in the head now and {:.2} mm at \
-             most, roots at most {:.4} mm off the skin, {:.0} % wet",
+            "strain {:.1} % now and {:.1} % at most, nodes {:.2} mm off the head now and {:.2} mm at \
+             least, roots at most {:.4} mm off the skin, {:.0} % wet",
             100.0 * self.strain,
             100.0 * self.peak_strain,
-            1e3 * self.inside,
-            1e3 * self.deepest,
+            1e3 * self.off_head,
+            1e3 * self.nearest,
             1e3 * self.off_skin,
-            100.0 * self.moisture
+            100.0 * self.wetness
         )
     }
 }
@@ -57,20 +72,23 @@ fn strands(
     strands: Query<(&Strand, &Moisture)>,
     skull: Query<&Skull>,
 ) {
-    let depth = |p: &Vec3| {
+    let off_head = |p: &Vec3| {
         let off = |&Skull(a, b, radius): &Skull| {
             let share = (p - a).dot(b - a) / (b - a).length_squared().max(1e-12);
-            radius - p.distance(a.lerp(b, share.clamp(0.0, 1.0)))
+            p.distance(a.lerp(b, share.clamp(0.0, 1.0))) - radius
         };
-        skull.iter().map(off).fold(0.0, f32::max)
+        skull.iter().map(off).fold(f32::MAX, f32::min)
     };
     let nodes = strands.iter().flat_map(|(strand, _)| &strand.positions()[1..]);
-    measure.inside = nodes.map(depth).fold(0.0, f32::max);
+    measure.off_head = nodes.map(off_head).fold(f32::MAX, f32::min);
     measure.strain = strands.iter().map(|(s, _)| s.peak_strain()).fold(0.0, f32::max);
+    let mean = |wetness: &[f32]| wetness.iter().sum::<f32>() / wetness.len().max(1) as f32;
+    let sum: f32 = strands.iter().map(|(_, water)| mean(water.wetness())).sum();
+    measure.wetness = sum / strands.iter().len().max(1) as f32;
     measure.frames += 1;
     if measure.frames > SETTLING {
         measure.peak_strain = measure.peak_strain.max(measure.strain);
-        measure.deepest = measure.deepest.max(measure.inside);
+        measure.nearest = measure.nearest.min(measure.off_head);
     }
 }
 

@@ -88,7 +88,7 @@ fn look(seconds: f32) -> f32 {
 fn leg(phase: f32) -> [f32; 3] {
     let thigh = -0.36 * phase.sin() - 0.06;
     // The knee bends while the leg swings to the front.
-    let knee = 0.16 + 0.85 * (phase + 0.45).cos().max(0.0).powi(2);
+    let knee = 0.16 + 0.75 * (phase + 0.45).cos().max(0.0).powi(2);
     // Flat while it stands, the heel first where it lands, the toes last where it leaves.
     let foot = -0.75 * (thigh + knee) - 0.1 * phase.sin();
     [thigh, knee, foot]
@@ -112,10 +112,10 @@ pub fn walk(seconds: f32) -> [Transform; COUNT] {
         let ankle = x(thigh) * (place[0] + x(knee) * place[1]);
         reach = reach.max(-ankle.y);
         let is_left = if side == 0 { 1.0 } else { -1.0 };
-        let swing = -0.05 + 0.42 * own.sin();
+        let swing = 0.02 + 0.42 * own.sin();
         let down = Quat::from_rotation_z(-0.3 * is_left);
         bones[UPPER_ARM + side].rotation = x(swing) * down;
-        bones[FOREARM + side].rotation = x(-0.3 - 0.22 * (1.0 - own.sin()));
+        bones[FOREARM + side].rotation = x(-0.16 - 0.2 * (1.0 - own.sin()));
     }
     // The leg that stands carries it.
     bones[0].translation.y = reach + joint(FOOT).y + joint(0).y - joint(THIGH).y;

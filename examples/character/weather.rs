@@ -19,8 +19,8 @@ struct Cloud;
 const WIND: f32 = 4.0;
 const WIND_TOWARD: Vec3 = Vec3::new(-0.9, 0.0, -0.43);
 /// Drops a second on a disc of this radius (m).
-const RAIN: f32 = 500.0;
-const RAIN_RADIUS: f32 = 0.3;
+const RAIN: f32 = 1500.0;
+const RAIN_RADIUS: f32 = 0.22;
 /// How far a jump goes (m).
 const JUMP: f32 = 3.0;
 
@@ -95,7 +95,7 @@ fn rain(
         (Some((cloud, _)), false) => commands.entity(cloud).despawn(),
         (None, true) => {
             // A soaking of minutes, in seconds.
-            commands.insert_resource(ProcessTime(20.0));
+            commands.insert_resource(ProcessTime(30.0));
             commands.spawn((Cloud, Shower::rain(RAIN, RAIN_RADIUS)?, place));
         }
         (None, false) => {}

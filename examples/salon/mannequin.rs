@@ -94,13 +94,8 @@ pub fn face(p: Vec3) -> f32 {
     join(d, ear, 0.008)
 }
 
-/// The direction out of the head at a point of its surface.
-#[allow(dead_code, reason = "each example uses its own part")]
-pub fn normal(p: Vec3) -> Vec3 {
-    normal_of(&head, p)
-}
-
-fn normal_of(distance: &impl Fn(Vec3) -> f32, p: Vec3) -> Vec3 {
+/// The unit direction in which a distance grows.
+pub fn normal(distance: &impl Fn(Vec3) -> f32, p: Vec3) -> Vec3 {
     let step = |axis: Vec3| distance(p + axis * 1e-3) - distance(p - axis * 1e-3);
     Vec3::new(step(Vec3::X), step(Vec3::Y), step(Vec3::Z)).normalize_or(Vec3::Y)
 }
@@ -151,10 +146,10 @@ pub fn surface(
         *vertex_of.entry(corner).or_insert_with(|| {
             let mut p = place(corner) + 0.5 * cell;
             for _ in 0..4 {
-                p -= normal_of(distance, p) * distance(p);
+                p -= normal(distance, p) * distance(p);
             }
             positions.push(p.to_array());
-            normals.push(normal_of(distance, p).to_array());
+            normals.push(normal(distance, p).to_array());
             colours.push(colour(p));
             positions.len() as u32 - 1
         })
