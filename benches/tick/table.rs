@@ -12,7 +12,8 @@ use bevy::{
 };
 use bevy_keratin::{
     BondChanges, HairStep, air::AirPlugin, bond::BondPlugin, bond::RestShape,
-    contact::ContactPlugin, contact::Obstacles, prelude::*, style::StylePlugin,
+    contact::ContactPlugin, contact::Obstacles, prelude::*, spring::SpringPlugin,
+    style::StylePlugin, water::WaterPlugin,
 };
 use std::{
     process::Command,
@@ -194,7 +195,9 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
                 .disable::<AirPlugin>()
                 .disable::<BondPlugin>()
                 .disable::<ContactPlugin>()
-                .disable::<StylePlugin>(),
+                .disable::<StylePlugin>()
+                .disable::<WaterPlugin>()
+                .disable::<SpringPlugin>(),
         ),
         Kind::NoBonds => app.add_plugins(plugins.disable::<BondPlugin>()),
         Kind::Tick | Kind::BondsMoving => app.add_plugins(plugins),
