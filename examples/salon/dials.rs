@@ -38,7 +38,8 @@ pub struct Settings<'w, 's> {
     hairs: Query<'w, 's, (Entity, &'static Strands), With<Hair>>,
     strands: Query<'w, 's, &'static Strand>,
     treat: MessageWriter<'w, Treat>,
-    orders: MessageWriter<'w, Order>,
+    /// Shared by all of the panel: a system may have but one of these.
+    pub orders: MessageWriter<'w, Order>,
     commands: Commands<'w, 's>,
 }
 

@@ -52,9 +52,11 @@ fn show(
     egui::Panel::left("panel").exact_size(WIDTH).resizable(false).show(&mut root, |ui| {
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().slider_width = 110.0;
-            player.show(ui);
+            player.show(ui, &mut settings.orders);
             section(ui, "Bond rates", true, |ui| settings.treatments(ui, &mut hand, &measured));
-            section(ui, "Hairdo", false, |ui| wardrobe.show(ui));
+            section(ui, "Hairdo", false, |ui| {
+                wardrobe.show(ui, &mut settings.orders);
+            });
             section(ui, "Colours", true, |ui| settings.view(ui, kind));
             section(ui, "Hair", false, |ui| settings.hair(ui));
             section(ui, "Air", false, |ui| settings.air(ui));
@@ -102,26 +104,25 @@ fn section(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui)) {
 #[derive(bevy::ecs::system::SystemParam)]
 pub struct Wardrobe<'w, 's> {
     hairdos: Res<'w, Hairdos>,
-    orders: MessageWriter<'w, Order>,
     path: Local<'s, Option<String>>,
 }
 
 impl Wardrobe<'_, '_> {
-    fn show(&mut self, ui: &mut Ui) {
+    fn show(&mut self, ui: &mut Ui, orders: &mut MessageWriter<Order>) {
         let path = self.path.get_or_insert_with(|| "hairdo.keratin".into());
         ui.add(egui::TextEdit::singleline(path).hint_text("file").desired_width(f32::INFINITY));
         ui.horizontal(|ui| {
             if ui.button("Save").clicked() {
-                self.orders.write(Order::Save(path.clone().into()));
+                orders.write(Order::Save(path.clone().into()));
             }
             if ui.button("Load").clicked() {
-                self.orders.write(Order::Load(path.clone().into()));
+                orders.write(Order::Load(path.clone().into()));
             }
             if ui.add_enabled(self.hairdos.can_undo(), egui::Button::new("Undo")).clicked() {
-                self.orders.write(Order::Undo);
+                orders.write(Order::Undo);
             }
             if ui.add_enabled(self.hairdos.can_redo(), egui::Button::new("Redo")).clicked() {
-                self.orders.write(Order::Redo);
+                orders.write(Order::Redo);
             }
         });
         if !self.hairdos.told.is_empty() {
@@ -138,11 +139,10 @@ pub struct Player<'w> {
     time: ResMut<'w, Time<Virtual>>,
     restarts: MessageWriter<'w, Restart>,
     steps: MessageWriter<'w, Step>,
-    orders: MessageWriter<'w, Order>,
 }
 
 impl Player<'_> {
-    fn show(&mut self, ui: &mut Ui) {
+    fn show(&mut self, ui: &mut Ui, orders: &mut MessageWriter<Order>) {
         ui.add_space(4.0);
         let mut wanted = *self.scene;
         ui.horizontal(|ui| {
@@ -166,7 +166,7 @@ impl Player<'_> {
                 self.steps.write(Step);
             }
             if ui.button("Reset").clicked() || wanted != *self.scene {
-                self.orders.write(Order::Remember);
+                orders.write(Order::Remember);
                 self.restarts.write(Restart(wanted));
             }
         });
