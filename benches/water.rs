@@ -69,8 +69,7 @@ fn wet(variant: &str, count: usize) -> App {
     app
 }
 
-/// Seconds that a node takes to visit the droplets that pull at it, as strands do: each droplet is in
-/// every cell that it reaches, a node looks into its own. The strands' order tells what the processor's
+/// Seconds that a node takes to visit the droplets that pull at it, as strands do. The strands' order tells what the processor's
 /// caches do to it: a groom's neighbours are mostly spawned one after the other. Both droplets and
 /// strands are equally dense, however many there are.
 fn query(count: usize, beside: bool) -> f64 {
@@ -87,22 +86,19 @@ fn query(count: usize, beside: bool) -> f64 {
         .flat_map(|root| (0..6).map(move |i| root + Vec3::NEG_Y * (0.048 * i as f32)))
         .collect();
     let mut grid = UniformGrid::default();
-    grid.begin(REACH);
-    for (drop, i) in drops.iter().zip(0..) {
-        grid.put_ball(*drop, REACH, i);
-    }
-    grid.sort();
+    grid.build(2.0 * REACH, drops.iter().zip(0..).map(|(drop, i)| (*drop, i)));
+    let sorted: Vec<Vec3> = grid.order().map(|i| drops[i as usize]).collect();
     let mut best = f64::INFINITY;
     for _ in 0..5 {
         let start = Instant::now();
         let mut pull = Vec3::ZERO;
         for node in &nodes {
-            grid.for_each_at(*node, |i| {
-                let offset = drops[i as usize] - *node;
+            for drop in grid.runs_near(*node, REACH).into_iter().flat_map(|run| &sorted[run]) {
+                let offset = drop - *node;
                 if offset.length_squared() < REACH * REACH {
                     pull += offset;
                 }
-            });
+            }
         }
         black_box(pull);
         best = best.min(start.elapsed().as_secs_f64());

@@ -231,6 +231,8 @@ impl Settings<'_, '_> {
         strewn.set_if_neq(wanted);
         edited!(self.wetting, |w: &mut Wetting| {
             slide(ui, &mut w.adhesion, 0.0..=100.0, "adhesion (m/s²)");
+            slide(ui, &mut w.cohesion, 0.0..=50.0, "film's pull (m/s²)");
+            slide(ui, &mut w.film_drag, 0.0..=100.0, "film's drag (1/s)");
             slide(ui, &mut w.uptake, 0.0..=50.0, "uptake (1/s)");
             slide(ui, &mut w.evaporation, 0.0..=4.0, "evaporation");
             slide(ui, &mut w.sliding, 0.0..=0.05, "sliding (s)");

@@ -5,7 +5,7 @@
 //! fail cost more than the arithmetic: masks guess nothing. Collecting eight edges costs little,
 //! because an edge is two neighbouring rows of [`Row`]s, each one load.
 
-use super::model::SAME_PLACE;
+use super::model::{BREAKS_AT, Bridged, Film, SAME_PLACE, THIN};
 use crate::rod::{algebra::V3, lanes::Real};
 use core::ops::Range;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16, mask32x8, prelude::*, u32x8, u32x16};
@@ -17,6 +17,10 @@ pub(super) const WIDTH: usize = 8;
 /// A node as the edge that starts at it sees it: x, y, z (m), and the share of the edge from which
 /// on feet are not its own: 1, but without end for the last edge, and nothing for the tip.
 pub(super) type Row = [f32; 4];
+
+/// What a node brings to a bridge of water: its velocity (m/s), and the cross-section of the film on
+/// it (m²).
+pub type WetRow = [f32; 4];
 
 /// The nodes of one strand as rows.
 pub(super) fn rows(nodes: &[Vec3]) -> impl Iterator<Item = Row> {
@@ -118,10 +122,12 @@ pub(super) struct Penalty {
     pub strength: f32,
 }
 
-/// From the nearest point of each edge to one node, and which edges count it as their own.
+/// From the nearest point of each edge to one node, where on the edge that is (0…1), and which edges
+/// count it as their own.
 struct Off<S: Simd> {
     off: V3<f32x8<S>>,
     squared: f32x8<S>,
+    at: f32x8<S>,
     own: mask32x8<S>,
 }
 
@@ -163,7 +169,7 @@ fn off<S: Simd>(simd: S, rows: &[Row], edges: &[u32; WIDTH], p: V3<f32x8<S>>) ->
     let share = from_start.dot(along) / length_squared;
     let clamped = Real::min(Real::max(share, zero), one);
     let off = from_start - along.scale(clamped);
-    Off { off, squared: off.dot(off), own: Real::lt(share, end_share) }
+    Off { off, squared: off.dot(off), at: clamped, own: Real::lt(share, end_share) }
 }
 
 #[inline(always)]
@@ -208,7 +214,7 @@ impl<S: Simd> Sum<S> {
     /// Adds what eight edges do. What is not finite fails every comparison and adds nothing.
     #[inline(always)]
     pub fn add(&mut self, simd: S, rows: &[Row], edges: &[u32; WIDTH]) {
-        let Off { off, squared, own } = off(simd, rows, edges, self.p);
+        let Off { off, squared, own, .. } = off(simd, rows, edges, self.p);
         let reach = f32x8::splat(simd, self.penalty.reach);
         let touching = own
             & Real::lt(squared, reach * reach)
@@ -223,5 +229,82 @@ impl<S: Simd> Sum<S> {
     #[inline(always)]
     pub fn total(self) -> Vec3 {
         Vec3::new(self.sum.x.reduce_sum(), self.sum.y.reduce_sum(), self.sum.z.reduce_sum())
+    }
+}
+
+/// Water's bridges from groups of eight edges to one node, lane by lane: see [`bridged`].
+///
+/// [`bridged`]: super::model::bridged
+pub(super) struct Bridges<S: Simd> {
+    p: V3<f32x8<S>>,
+    area: f32x8<S>,
+    film: Film,
+    pull: V3<f32x8<S>>,
+    steepness: f32x8<S>,
+    drift: V3<f32x8<S>>,
+    grip: f32x8<S>,
+}
+
+impl<S: Simd> Bridges<S> {
+    /// Nothing yet, for a node at `p` with a film of `area` (m²).
+    #[inline(always)]
+    pub fn new(simd: S, p: Vec3, area: f32, film: Film) -> Self {
+        let zero = f32x8::splat(simd, 0.0);
+        Self {
+            p: splat(simd, p),
+            area: f32x8::splat(simd, area),
+            film,
+            pull: splat(simd, Vec3::ZERO),
+            steepness: zero,
+            drift: splat(simd, Vec3::ZERO),
+            grip: zero,
+        }
+    }
+
+    /// Adds the bridges to eight edges. What is not finite fails every comparison and adds nothing.
+    #[inline(always)]
+    pub fn add(&mut self, simd: S, rows: &[Row], wet: &[WetRow], edges: &[u32; WIDTH]) {
+        let lit = |value: f32| f32x8::splat(simd, value);
+        let (zero, one) = (lit(0.0), lit(1.0));
+        let Film { reach, longest } = self.film;
+        let Off { off, squared, at, own } = off(simd, rows, edges, self.p);
+        let near = own
+            & Real::lt(squared, lit((reach + longest) * (reach + longest)))
+            & Real::lt(lit(SAME_PLACE), squared);
+        if near.to_bitmask() == 0 {
+            return;
+        }
+        let (start, start_area) = eight(simd, wet, edges, 0);
+        let (end, end_area) = eight(simd, wet, edges, 1);
+        let area = self.area + start_area + (end_area - start_area) * at;
+        let velocity = start + (end - start).scale(at);
+
+        let distance = Real::sqrt(squared);
+        let longest = Real::min(Real::sqrt(area) * lit(BREAKS_AT), lit(longest));
+        let amount = Real::min(area * lit(1.0 / (THIN * reach * reach)), one);
+        let apart = Real::max(lit(reach), distance) - lit(reach);
+        let left = Real::max(one - apart / Real::max(longest, lit(1e-9)), zero) * amount;
+        let pressed = Real::min(distance * lit(1.0 / reach), one);
+        let joined = near & Real::lt(zero, left);
+
+        let pull = left * pressed * pressed;
+        let pulled = off.scale_add(-(pull / distance), self.pull);
+        self.pull = V3::select(joined, pulled, self.pull);
+        let steep = amount / Real::min(Real::max(longest, lit(1e-9)), lit(0.5 * reach));
+        self.steepness = self.steepness + Real::select(joined, steep, zero);
+        self.drift = V3::select(joined, velocity.scale_add(left, self.drift), self.drift);
+        self.grip = self.grip + Real::select(joined, left, zero);
+    }
+
+    /// The sums over all lanes.
+    #[inline(always)]
+    pub fn total(self) -> Bridged {
+        let sum = |v: V3<f32x8<S>>| Vec3::new(v.x.reduce_sum(), v.y.reduce_sum(), v.z.reduce_sum());
+        Bridged {
+            pull: sum(self.pull),
+            steepness: self.steepness.reduce_sum(),
+            drift: sum(self.drift),
+            grip: self.grip.reduce_sum(),
+        }
     }
 }

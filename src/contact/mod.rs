@@ -6,7 +6,11 @@ mod neighbours;
 mod systems;
 
 pub use systems::ContactPlugin;
-pub(crate) use systems::{part_strands, seen_from};
+pub(crate) use {
+    lanes::WetRow,
+    model::{Bridged, Film},
+    systems::{part_strands, seen_from},
+};
 
 use crate::{
     rod::obstacle::Obstacle,
@@ -179,7 +183,35 @@ pub struct Obstacles {
 #[reflect(Component, Default, Clone)]
 pub struct LockNeighbours(#[reflect(ignore)] neighbours::Neighbours);
 
+impl Film {
+    /// The bridges between strands that touch at a distance of axes of `reach` (m), as long as lists
+    /// of neighbours know them.
+    pub(crate) fn between(reach: f32) -> Self {
+        Self { reach, longest: neighbours::LONGEST_BRIDGE * reach }
+    }
+}
+
 impl LockNeighbours {
+    /// How many nodes the lists are for.
+    pub(crate) fn nodes(&self) -> usize {
+        self.0.nodes()
+    }
+
+    /// Asks for lists that know bridges of water this long (m), from the next ones on.
+    pub(crate) fn look_beyond(&mut self, longest: f32) {
+        self.0.look_beyond(longest);
+    }
+
+    /// The bridges of water at every node, where contact has seen them last. `wet` has a row for each,
+    /// in the order of the hair's strands.
+    pub(crate) fn bridges(
+        &mut self,
+        wet: &mut Vec<WetRow>,
+        film: Film,
+    ) -> impl Iterator<Item = Bridged> {
+        self.0.bridges(wet, film)
+    }
+
     /// How many pairs of node and edge are watched, rounded up to groups of eight for each node.
     pub fn pairs(&self) -> usize {
         self.0.pairs()

@@ -21,6 +21,62 @@ pub fn penalty(p: Vec3, foot: Vec3, radius: f32, strength: f32) -> Vec3 {
     Vec3::ZERO
 }
 
+/// How long a bridge between two wet strands may get: (1 + θ/2) √A for a film of cross-section A, with
+/// the contact angle θ of 60° that hair has.
+pub(super) const BREAKS_AT: f32 = 1.5;
+
+/// A film of less than this, as a share of the reach squared, pulls in proportion; of more, as
+/// capillary bridges do, no stronger but farther.
+pub(super) const THIN: f32 = 0.02;
+
+/// Where water bridges two strands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Film {
+    /// 2r: the distance of axes at which strands touch (m).
+    pub reach: f32,
+    /// No bridge is longer than this, from surface to surface (m).
+    pub longest: f32,
+}
+
+/// What the bridges at a node do to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bridged {
+    /// Toward the strands it is bridged to: one for a bridge in full, less for one that is about to
+    /// break, and for strands that are pressed together.
+    pub pull: Vec3,
+    /// How fast that changes with the node's place, at most (1/m).
+    pub steepness: f32,
+    /// The velocities of what it is bridged to, each times its share in `grip` (m/s).
+    pub drift: Vec3,
+    /// How firmly it is held, 1 for each bridge in full.
+    pub grip: f32,
+}
+
+/// A bridge of water from a node at `p` to the foot `f` of its perpendicular on a strand that moves
+/// with `velocity`, both films together of cross-section `area` (m²).
+///
+/// Between two fibres the pull of a capillary bridge hardly depends on its volume, but its reach
+/// does: it breaks at (1 + θ/2) √A (Fei et al. 2017). Taken to fall evenly to there, and to fade
+/// where strands are pressed into one another, since a film has no more to gain there.
+pub fn bridged(p: Vec3, foot: Vec3, velocity: Vec3, area: f32, film: Film) -> Bridged {
+    let off = p - foot;
+    let distance = off.length();
+    let touch = SAME_PLACE < distance * distance && distance < film.reach + film.longest;
+    let longest = (BREAKS_AT * area.sqrt()).min(film.longest).max(1e-9);
+    let amount = (area / (THIN * film.reach * film.reach)).min(1.0);
+    let left = amount * (1.0 - (distance - film.reach).max(0.0) / longest).max(0.0);
+    if !touch || left <= 0.0 {
+        return Bridged::default();
+    }
+    let pressed = (distance / film.reach).min(1.0);
+    Bridged {
+        pull: -off / distance * (left * pressed * pressed),
+        steepness: amount / longest.min(0.5 * film.reach),
+        drift: velocity * left,
+        grip: left,
+    }
+}
+
 /// An edge of a strand with what is needed to drop perpendiculars on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Edge {

@@ -7,7 +7,10 @@
 //! cells around a node, the short pieces of edges whose middles are near, the edges that are near.
 //! With exact tests on all edges of the cells, scene 1 took 1.3 times as long.
 
-use super::lanes::{self, Penalty, Pieces, Row, Stack, Sum, WIDTH};
+use super::{
+    lanes::{self, Bridges, Penalty, Pieces, Row, Stack, Sum, WIDTH, WetRow},
+    model::{Bridged, Film},
+};
 use crate::{grid::UniformGrid, parallel::for_each_block};
 use core::ops::Range;
 use fearless_simd::{Level, Simd, dispatch};
@@ -20,6 +23,10 @@ const MARGIN: f32 = 1.6;
 /// Shorter ones are more to sort (0.5: scene 1 takes 5 % longer), longer ones sift less.
 const HALF_PIECE: f32 = 0.8;
 
+/// How long bridges of water may get, in units of the reach: what is left of the margin is what nodes
+/// may move before lists are built anew.
+pub(super) const LONGEST_BRIDGE: f32 = 0.6;
+
 /// Strands that are one piece of work.
 const PART: usize = 16;
 
@@ -31,6 +38,8 @@ pub struct Neighbours {
     strands: Vec<Range<u32>>,
     lists: Lists,
     parts: Vec<Part>,
+    /// How much farther than the reach bridges of water are asked for (m).
+    beyond: f32,
 }
 
 /// What the lists were built from.
@@ -53,6 +62,7 @@ struct Part {
     starts: Vec<u32>,
     groups: Vec<Group>,
     pushes: Vec<Vec3>,
+    bridged: Vec<Bridged>,
 }
 
 /// Eight edges near a node, by their start node.
@@ -94,12 +104,12 @@ impl Neighbours {
         self.rows.extend([[f32::NAN; 4]; 2]);
         let reach = 2.0 * radius;
         let level = Level::new();
-        let stale = self.lists.are_stale(&self.rows, &self.strands, reach);
+        let stale = self.lists.are_stale(&self.rows, &self.strands, reach, self.beyond);
         if stale {
             self.lists.begin(&self.rows, &self.strands, reach);
             self.parts.resize_with(self.strands.len().div_ceil(PART), Part::default);
         }
-        let Self { rows, strands, lists, parts } = self;
+        let Self { rows, strands, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let penalty = Penalty { reach, strength };
         for_each_block(&mut work, Default::default, |scratch: &mut Scratch, (part, strands)| {
@@ -109,6 +119,34 @@ impl Neighbours {
             dispatch!(level, simd => part.push(simd, rows, strands, lists.moved, penalty));
         });
         parts.iter().flat_map(|part| part.pushes.iter().copied())
+    }
+
+    /// How many nodes there are.
+    pub fn nodes(&self) -> usize {
+        self.rows.len().saturating_sub(2)
+    }
+
+    /// From the next lists on, they are complete to `beyond` (m) more than strands' reach.
+    pub fn look_beyond(&mut self, beyond: f32) {
+        self.beyond = beyond;
+    }
+
+    /// The bridges of water at every node, after [`pushes`](Self::pushes) of the same places. `wet` has
+    /// a row for each node, in the order they were added.
+    pub fn bridges(&mut self, wet: &mut Vec<WetRow>, film: Film) -> impl Iterator<Item = Bridged> {
+        wet.resize(self.rows.len(), [f32::NAN; 4]);
+        let level = Level::new();
+        let Self { rows, strands, lists, parts, .. } = self;
+        let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
+        let reaches = film.longest + 2.0 * lists.moved;
+        for_each_block(
+            &mut work,
+            || (),
+            |(), (part, strands)| {
+                dispatch!(level, simd => part.bridge(simd, rows, wet, strands, reaches, film));
+            },
+        );
+        parts.iter().flat_map(|part| part.bridged.iter().copied())
     }
 
     /// How many pairs of node and edge are kept, rounded up to groups of eight for each node.
@@ -128,7 +166,7 @@ impl Lists {
         self.within() * (1.0 + HALF_PIECE)
     }
 
-    fn are_stale(&mut self, rows: &[Row], strands: &[Range<u32>], reach: f32) -> bool {
+    fn are_stale(&mut self, rows: &[Row], strands: &[Range<u32>], reach: f32, beyond: f32) -> bool {
         if self.reach != reach || self.strands != strands {
             return true;
         }
@@ -139,7 +177,7 @@ impl Lists {
             .map(|(p, q)| lanes::place(p).distance_squared(lanes::place(q)));
         // A non-finite node moves the maximum to no number, which is not less than the limit.
         self.moved = squared.fold(0.0, |a: f32, b| if b <= a || a.is_nan() { a } else { b }).sqrt();
-        let complete = self.moved < 0.5 * MARGIN * reach;
+        let complete = self.moved < 0.5 * (MARGIN * reach - beyond);
         !complete
     }
 
@@ -243,6 +281,32 @@ impl Part {
             self.pushes.push(sum.total());
         }
     }
+
+    /// Sums the bridges of water over these strands' lists.
+    #[inline(always)]
+    fn bridge<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &[Row],
+        wet: &[WetRow],
+        strands: &[Range<u32>],
+        reaches: f32,
+        film: Film,
+    ) {
+        let nodes = strands.first().map_or(0, |s| s.start) as usize;
+        self.bridged.clear();
+        for (k, ends) in self.starts.windows(2).enumerate() {
+            let node = nodes + k;
+            let mut sum = Bridges::new(simd, lanes::place(&rows[node]), wet[node][3], film);
+            for group in &self.groups[ends[0] as usize..ends[1] as usize] {
+                if group.slack > reaches {
+                    break;
+                }
+                sum.add(simd, rows, wet, &group.edges);
+            }
+            self.bridged.push(sum.total());
+        }
+    }
 }
 
 #[cfg(test)]
@@ -308,6 +372,79 @@ mod tests {
                     a.distance(b) < 1e-3 + rounding,
                     "strand {} node {}: {} against {}", s, i, a, b
                 );
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn lanes_bridge_as_the_model_does_even_after_small_moves(
+            raw in proptest::collection::vec((0f32..1.0, 0f32..1.0, 0f32..1.0), 8..90),
+            films in proptest::collection::vec(0f32..1.0, 90),
+            radius in 0.02f32..0.1,
+            nodes in 2usize..8,
+            drift in -0.45f32..0.45,
+        ) {
+            let points: Vec<Vec3> = raw.iter().map(|&(x, y, z)| Vec3::new(x, y, z)).collect();
+            let mut strands: Vec<Vec<Vec3>> =
+                points.chunks_exact(nodes).map(<[Vec3]>::to_vec).collect();
+            let film = Film { reach: 2.0 * radius, longest: LONGEST_BRIDGE * 2.0 * radius };
+            let mut list = Neighbours::default();
+            list.look_beyond(film.longest);
+            pushes(&mut list, &strands, radius);
+            for strand in &mut strands {
+                for (k, p) in strand.iter_mut().enumerate() {
+                    *p += Vec3::Y * (drift * radius * if k % 2 == 0 { 1.0 } else { -1.0 });
+                }
+            }
+            pushes(&mut list, &strands, radius);
+            // Every third strand is dry, velocities are anything.
+            let area = |s: usize, i: usize| {
+                let film = films[(s * nodes + i) % films.len()];
+                if s % 3 == 0 { 0.0 } else { film * radius * radius }
+            };
+            let speed = |s: usize, i: usize| Vec3::new(s as f32, i as f32, 0.5);
+            let mut wet: Vec<WetRow> = (0..strands.len() * nodes)
+                .map(|k| (k / nodes, k % nodes))
+                .map(|(s, i)| speed(s, i).extend(area(s, i)).to_array())
+                .collect();
+            let found: Vec<Bridged> = list.bridges(&mut wet, film).collect();
+            for (k, found) in found.iter().enumerate() {
+                let (own, n) = (k / nodes, k % nodes);
+                if n == 0 {
+                    prop_assert_eq!(*found, Bridged::default());
+                    continue;
+                }
+                let brute = |p: Vec3| {
+                    let mut all = Bridged::default();
+                    for s in (0..strands.len()).filter(|&s| s != own) {
+                        for j in 0..nodes - 1 {
+                            let (a, b) = (strands[s][j], strands[s][j + 1]);
+                            let Some(foot) = Edge::new(a, b, j + 2 == nodes).foot(p) else {
+                                continue;
+                            };
+                            let t = (foot - a).dot(b - a) / (b - a).length_squared().max(1e-20);
+                            let both = area(own, n) + area(s, j) * (1.0 - t) + area(s, j + 1) * t;
+                            let velocity = speed(s, j).lerp(speed(s, j + 1), t);
+                            let one = bridged(p, foot, velocity, both, film);
+                            all.pull += one.pull;
+                            all.drift += one.drift;
+                            all.grip += one.grip;
+                        }
+                    }
+                    all
+                };
+                let expected = brute(strands[own][n]);
+                let rounding: f32 = Vec3::AXES
+                    .into_iter()
+                    .flat_map(|d| [d * 2e-6, d * -2e-6])
+                    .map(|d| brute(strands[own][n] + d))
+                    .map(|b| b.pull.distance(expected.pull) + (b.grip - expected.grip).abs())
+                    .sum();
+                prop_assert!(found.pull.distance(expected.pull) < 1e-3 + rounding, "pull {}", k);
+                prop_assert!((found.grip - expected.grip).abs() < 1e-3 + rounding, "grip {}", k);
+                let most = 1e-2 + 50.0 * rounding;
+                prop_assert!(found.drift.distance(expected.drift) < most, "drift {}", k);
             }
         }
     }

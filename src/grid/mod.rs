@@ -39,33 +39,20 @@ impl UniformGrid {
             + IVec3::select(toward_zero.as_vec3().cmpgt(scaled), IVec3::NEG_ONE, IVec3::ZERO)
     }
 
-    /// Sorts `items`, each a point and a number of the caller's, into cells of size `cell` (> 0).
-    /// Non-finite points are left out.
+    /// Sorts `items`, each a point and a number of the caller's, into cells of size `cell` (> 0): from
+    /// here on they are found, in each cell in the order they came. Non-finite points are left out.
     pub fn build(&mut self, cell: f32, items: impl Iterator<Item = (Vec3, u32)>) {
-        self.begin(cell);
+        self.inverse_cell = 1.0 / cell.max(1e-9);
+        self.unsorted.clear();
         for (point, item) in items {
             if point.is_finite() {
-                self.put(self.cell_of(point), item);
+                self.unsorted.push(Entry { cell: self.cell_of(point), item });
             }
         }
         self.sort();
     }
 
-    /// Begins a grid of cells of size `cell` (> 0), empty.
-    pub fn begin(&mut self, cell: f32) {
-        self.inverse_cell = 1.0 / cell.max(1e-9);
-        self.unsorted.clear();
-    }
-
-    /// Puts an item into a cell; it may be put into several.
-    #[inline]
-    pub fn put(&mut self, cell: IVec3, item: u32) {
-        self.unsorted.push(Entry { cell, item });
-    }
-
-    /// Ends what [`begin`](Self::begin) began: from here on items are found, in each cell in the
-    /// order they were put.
-    pub fn sort(&mut self) {
+    fn sort(&mut self) {
         let buckets = self.unsorted.len().next_power_of_two().max(16);
         self.starts.clear();
         self.starts.resize(buckets + 1, 0);
@@ -88,55 +75,6 @@ impl UniformGrid {
         self.starts[buckets] = self.entries.len() as u32;
     }
 
-    /// Where in [`order`](Self::order) the items of the cell of `point` are, among some of other cells
-    /// (see [`holds`](Self::holds)).
-    #[inline]
-    pub fn slots_at(&self, point: Vec3) -> (IVec3, Range<usize>) {
-        if self.entries.is_empty() || !point.is_finite() {
-            return (IVec3::ZERO, 0..0);
-        }
-        let cell = self.cell_of(point);
-        let b = bucket(cell, self.starts.len() - 2);
-        (cell, self.starts[b] as usize..self.starts[b + 1] as usize)
-    }
-
-    /// The item at a place of [`order`](Self::order), if it was put into `cell`.
-    #[inline]
-    pub fn holds(&self, slot: usize, cell: IVec3) -> Option<u32> {
-        let entry = self.entries[slot];
-        (entry.cell == cell).then_some(entry.item)
-    }
-
-    /// Calls `found` with every item that was put into the cell of `point`.
-    #[inline]
-    pub fn for_each_at(&self, point: Vec3, mut found: impl FnMut(u32)) {
-        let (cell, slots) = self.slots_at(point);
-        slots.filter_map(|slot| self.holds(slot, cell)).for_each(&mut found);
-    }
-
-    /// Puts an item into every cell that the ball around `at` reaches.
-    pub fn put_ball(&mut self, at: Vec3, radius: f32, item: u32) {
-        if !at.is_finite() {
-            return;
-        }
-        let (low, high) = (self.cell_of(at - radius), self.cell_of(at + radius));
-        let size = self.inverse_cell.recip();
-        // Rounding must not leave a cell out.
-        let reach = radius * (1.0 + 1e-4) + 1e-6 * at.abs().max_element();
-        for z in low.z..=high.z {
-            for y in low.y..=high.y {
-                for x in low.x..=high.x {
-                    let cell = IVec3::new(x, y, z);
-                    let corner = cell.as_vec3() * size;
-                    let nearest = at.clamp(corner, corner + size);
-                    if nearest.distance_squared(at) <= reach * reach {
-                        self.put(cell, item);
-                    }
-                }
-            }
-        }
-    }
-
     #[inline]
     fn for_each_in(&self, cell: IVec3, mask: usize, found: &mut impl FnMut(u32)) {
         let b = bucket(cell, mask);
@@ -149,7 +87,7 @@ impl UniformGrid {
     }
 
     /// Calls `near` with every item in the 27 cells around `point`: all that lie within one cell
-    /// size of it, and some that do not. An item comes once for each cell it was put in.
+    /// size of it, and some that do not.
     #[inline]
     pub fn for_each_near(&self, point: Vec3, mut near: impl FnMut(u32)) {
         if self.entries.is_empty() || !point.is_finite() {
@@ -175,6 +113,32 @@ impl UniformGrid {
         self.entries.iter().chain(&self.entries[..first]).map(|e| e.item)
     }
 
+    /// Where in [`order`](Self::order) all items within `radius` of `point` are, and others. The radius
+    /// is at most half a cell: then they are in two cells each way, which takes least looking up.
+    #[inline]
+    pub fn runs_near(&self, point: Vec3, radius: f32) -> Runs {
+        debug_assert!(radius * self.inverse_cell <= 0.5001, "cells are too small");
+        let mut runs = Runs::NONE;
+        if self.entries.is_empty() || !point.is_finite() {
+            return runs;
+        }
+        // Rounding must not leave a cell out.
+        let reach = radius + 1e-6 * point.abs().max_element();
+        let low = self.cell_of(point - reach);
+        let high = self.cell_of(point + reach).min(low + 1);
+        let buckets = self.starts.len() - 1;
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                let row = bucket(IVec3::new(low.x, y, z), buckets - 1);
+                let end = row + (high.x - low.x) as usize + 1;
+                runs.add(self.starts[row] as usize..self.starts[end.min(buckets)] as usize);
+                // Behind the last bucket comes the first.
+                runs.add(0..self.starts[end.saturating_sub(buckets)] as usize);
+            }
+        }
+        runs
+    }
+
     /// Where in [`order`](Self::order) the items of the 27 cells around `point` are, three cells a
     /// row: all that lie within one cell size of it, some that do not, and with bad luck some twice.
     #[inline]
@@ -194,6 +158,48 @@ impl UniformGrid {
             };
             self.starts[row] as usize..end as usize
         })
+    }
+}
+
+/// Where in a grid's order the items around a point are: a few runs, none twice.
+#[derive(Clone, Debug)]
+pub struct Runs {
+    runs: [Range<usize>; 8],
+    count: usize,
+}
+
+impl Runs {
+    const NONE: Self = Self { runs: [const { 0..0 }; 8], count: 0 };
+
+    /// Adds a run; what overlaps becomes one.
+    #[inline]
+    fn add(&mut self, mut run: Range<usize>) {
+        if run.is_empty() {
+            return;
+        }
+        let mut k = 0;
+        while k < self.count {
+            let other = &self.runs[k];
+            if run.start < other.end && other.start < run.end {
+                run = run.start.min(other.start)..run.end.max(other.end);
+                self.count -= 1;
+                self.runs.swap(k, self.count);
+                k = 0;
+            } else {
+                k += 1;
+            }
+        }
+        self.runs[self.count] = run;
+        self.count += 1;
+    }
+}
+
+impl IntoIterator for Runs {
+    type Item = Range<usize>;
+    type IntoIter = core::iter::Take<core::array::IntoIter<Range<usize>, 8>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.runs.into_iter().take(self.count)
     }
 }
 
@@ -230,12 +236,21 @@ mod tests {
             let points: Vec<Vec3> =
                 raw.iter().map(|&(x, y, z)| Vec3::new(x, y, z) * stretch).collect();
             let mut grid = UniformGrid::default();
+            let mut wide = UniformGrid::default();
             grid.build(radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
+            wide.build(2.0 * radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
+            let order: Vec<u32> = wide.order().collect();
             for &p in &points {
                 let brute: Vec<u32> = (0..points.len() as u32)
                     .filter(|&i| points[i as usize].distance(p) <= radius)
                     .collect();
-                prop_assert_eq!(near(&grid, &points, p, radius), brute);
+                prop_assert_eq!(&near(&grid, &points, p, radius), &brute);
+                let mut found: Vec<u32> = (wide.runs_near(p, radius).into_iter().flatten())
+                    .map(|slot| order[slot])
+                    .filter(|&i| points[i as usize].distance(p) <= radius)
+                    .collect();
+                found.sort_unstable();
+                prop_assert_eq!(found, brute);
             }
         }
     }

@@ -13,8 +13,10 @@
 //! Every drop of water is accounted for in [`WaterLedger`]: in = held + out.
 
 mod adhesion;
+mod bridge;
 mod droplet;
 mod exchange;
+mod field;
 pub mod model;
 pub mod moisture;
 mod motion;

@@ -35,6 +35,13 @@ pub struct Wetting {
     /// 0…100; print has 1 without a unit. Less for droplets smaller than their r_min, and for nodes
     /// that water has made heavy.
     pub adhesion: f32,
+    /// Largest acceleration with which the film between two strands draws them together (m/s²).
+    /// Default 10, safe 0…50. Capillary forces give up to 2σ/λ, 57 m/s² for the default's mass λ of a
+    /// metre of strand, where all of an edge is bridged. 0 for none.
+    pub cohesion: f32,
+    /// Rate at which strands lose their motion against each other where a film or a droplet joins
+    /// them (1/s). Default 30, safe 0…1000; 0 lets them slip.
+    pub film_drag: f32,
     /// Rate at which a droplet spreads into the film of what it touches (1/s). Default 20, safe
     /// 0…100; 0 leaves droplets whole.
     pub uptake: f32,
@@ -64,6 +71,8 @@ impl Default for Wetting {
             fibres: 500.0,
             fibre_diameter: 70e-6,
             adhesion: 30.0,
+            cohesion: 10.0,
+            film_drag: 30.0,
             uptake: 20.0,
             soaking: 1.0 / 120.0,
             wicking: 1e-5,
@@ -79,6 +88,8 @@ const FIBRES: Bound = Bound::new("Wetting::fibres", 1.0, 1e6, "500 on each of 20
 const DIAMETER: Bound =
     Bound::new("Wetting::fibre_diameter (m)", 1e-6, 1e-3, "hair has 50e-6 to 100e-6");
 const ADHESION: Bound = Bound::new("Wetting::adhesion (m/s²)", 0.0, 1e3, "30 clumps soft hair");
+const COHESION: Bound = Bound::new("Wetting::cohesion (m/s²)", 0.0, 1e3, "10 holds locks");
+const FILM_DRAG: Bound = Bound::new("Wetting::film_drag (1/s)", 0.0, 1e6, "30 holds locks");
 const UPTAKE: Bound = Bound::new("Wetting::uptake (1/s)", 0.0, 1e4, "20 takes a drop in at once");
 const SOAKING: Bound = Bound::new("Wetting::soaking (1/s)", 0.0, 1e3, "1/120 is virgin hair");
 const WICKING: Bound = Bound::new("Wetting::wicking (m²/s)", 0.0, 1.0, "1e-5 creeps along");
@@ -94,6 +105,8 @@ impl HairSetting for Wetting {
             fibres: FIBRES.mend(self.fibres, d.fibres, notes),
             fibre_diameter: DIAMETER.mend(self.fibre_diameter, d.fibre_diameter, notes),
             adhesion: ADHESION.mend(self.adhesion, d.adhesion, notes),
+            cohesion: COHESION.mend(self.cohesion, d.cohesion, notes),
+            film_drag: FILM_DRAG.mend(self.film_drag, d.film_drag, notes),
             uptake: UPTAKE.mend(self.uptake, d.uptake, notes),
             soaking: SOAKING.mend(self.soaking, d.soaking, notes),
             wicking: WICKING.mend(self.wicking, d.wicking, notes),

@@ -2,8 +2,9 @@
 
 use super::{
     Climate, Droplet, DropletRules, Moisture, ProcessTime, Ride, WaterLedger, Wetting,
-    adhesion::{Encounters, Field, Landing, Met, MetBy, SeenDrop, Touch},
+    adhesion::{Encounters, Landing, Met, MetBy, Touch},
     exchange::{blown_air, let_go, on_strand},
+    field::{Field, SeenDrop},
     model::{ball_radius, clinging, fall, hanging, slide},
     moisture::node_lengths,
     systems::tell,
@@ -22,10 +23,21 @@ use crate::{
     tick::HairStep,
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use fearless_simd::Level;
+
+/// The fewest strands that meet droplets as one piece of work.
+const PIECE: usize = 16;
+
+/// The most sums over pieces that are kept, for all droplets together.
+const SUMS: usize = 1 << 18;
 
 /// How many strands meet droplets as one piece of work: the same on any number of threads, so that
-/// what droplets get is always summed in the same order.
-const PIECE: usize = 16;
+/// what droplets get is always summed in the same order. Every piece sums for all droplets, so of
+/// many droplets there are few pieces.
+fn piece(strands: usize, drops: usize) -> usize {
+    let pieces = (SUMS / drops.max(1)).clamp(4, 64);
+    strands.div_ceil(pieces).max(PIECE)
+}
 
 /// Room for the work of a substep, kept from one to the next.
 #[derive(Resource, Default)]
@@ -317,8 +329,12 @@ pub(super) fn wet_strands(
             most_film: clinging(wetting.bundle(1.0), gravity.length()),
         };
         meet_all(&mut strands, field, &met, pieces);
+        for (k, outcome) in outcomes.iter_mut().enumerate() {
+            let sum: Vec4 = pieces.iter().map(|out| out.impulses[k]).sum();
+            outcome.impulse += pose.rotation * sum.xyz();
+        }
         for out in pieces.iter() {
-            sum_up(out, &pose, &mut outcomes);
+            sum_up(out, &mut outcomes);
             drunk.extend_from_slice(&out.touches);
         }
     }
@@ -394,10 +410,13 @@ impl Field {
         self.drops.extend(drops.iter().map(|d| SeenDrop {
             at: pose.point_in(d.position),
             before: pose.point_in(d.before),
+            velocity: pose.rotation.inverse() * d.velocity,
             radius: d.radius() * scale,
             r_min: d.r_min * scale,
             r_max: d.r_max * scale,
             strength: d.strength(),
+            mass: mass_of(d),
+            company: d.company as f32,
             ride: d.ride.map(|r| r.strand),
         }));
     }
@@ -409,13 +428,15 @@ fn meet_all(
     met: &MetBy<'_>,
     pieces: &mut Vec<Encounters>,
 ) {
-    pieces.resize_with(strands.len().div_ceil(PIECE), default);
-    pieces.iter_mut().for_each(Encounters::clear);
-    let mut work: Vec<_> = strands.chunks_mut(PIECE).zip(&mut *pieces).collect();
+    let piece = piece(strands.len(), field.drops.len());
+    pieces.resize_with(strands.len().div_ceil(piece), default);
+    let level = Level::new();
+    let mut work: Vec<_> = strands.chunks_mut(piece).zip(&mut *pieces).collect();
     for_each_block(
         &mut work,
         || (),
         |(), (strands, out)| {
+            out.clear(field.drops.len());
             for Strandful { entity, strand, burden, moisture } in strands.iter_mut() {
                 let (positions, velocities, lengths) = strand.motion_parts();
                 let mut met = Met {
@@ -427,17 +448,14 @@ fn meet_all(
                     film: moisture.film(),
                     by: met,
                 };
-                met.meet(field, out);
+                met.meet(level, field, out);
             }
         },
     );
 }
 
-/// Adds up what a piece of the strands did, in their order.
-fn sum_up(out: &Encounters, pose: &Pose, outcomes: &mut [Outcome]) {
-    for pull in &out.pulls {
-        outcomes[pull.drop as usize].impulse += pose.rotation * pull.impulse;
-    }
+/// Adds up whom a piece of the strands met, in their order.
+fn sum_up(out: &Encounters, outcomes: &mut [Outcome]) {
     for &drop in &out.company {
         outcomes[drop as usize].company += 1;
     }

@@ -2,6 +2,7 @@
 
 use super::{
     Climate, Droplet, DropletRules, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
+    bridge::join_wet_strands,
     exchange::{exchange_water, run_showers},
     motion::{WaterField, follow_strands, merge_droplets, move_droplets, wet_strands},
 };
@@ -47,7 +48,7 @@ impl Plugin for WaterPlugin {
             )
             .add_systems(
                 HairTick,
-                (move_droplets, merge_droplets, wet_strands)
+                (move_droplets, merge_droplets, wet_strands, join_wet_strands)
                     .chain()
                     .in_set(HairSystems::Interaction)
                     .after(contact::part_strands),

@@ -1,0 +1,100 @@
+//! `Interaction`: strands that a film of water joins draw together and move as one.
+
+use super::{Moisture, Wetting, moisture::node_lengths};
+use crate::{
+    contact::{Bridged, Film, LockContact, LockNeighbours, WetRow},
+    setting::Settings,
+    strand::{Burden, Hair, Strand, StrandOf, Strands},
+    tick::HairStep,
+};
+use bevy::prelude::*;
+
+/// Bridges of water between the wet strands of each hair, found through the lists of its contacts.
+pub(super) fn join_wet_strands(
+    step: Res<HairStep>,
+    contact: Settings<LockContact>,
+    wetting: Settings<Wetting>,
+    mut rows: Local<Vec<WetRow>>,
+    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours), With<Hair>>,
+    mut strands: Query<(&mut Strand, &Moisture, &Burden), With<StrandOf>>,
+) {
+    for (hair, members, mut neighbours) in &mut hairs {
+        let LockContact { radius, strength } = contact.of(hair);
+        let wetting = wetting.of(hair);
+        let dry = strands.iter_many(members.collection()).all(|(_, m, _)| m.is_untouched());
+        let joins = !dry
+            && radius > 0.0
+            && strength > 0.0
+            && (wetting.cohesion > 0.0 || wetting.film_drag > 0.0);
+        let list = neighbours.bypass_change_detection();
+        let film = Film::between(2.0 * radius);
+        list.look_beyond(if joins { film.longest } else { 0.0 });
+        if !joins {
+            continue;
+        }
+        rows.clear();
+        for (strand, moisture, _) in strands.iter_many(members.collection()) {
+            let film = |i: usize| moisture.film().get(i).copied().unwrap_or(0.0);
+            let lengths = node_lengths(strand.rest_lengths());
+            rows.extend(strand.velocities().iter().zip(lengths).enumerate().map(
+                |(i, (v, length))| [v.x, v.y, v.z, (film(i) / f64::from(length.max(1e-9))) as f32],
+            ));
+        }
+        // Contact may have had no turn since strands came or went.
+        if list.nodes() != rows.len() {
+            continue;
+        }
+        let mut bridges = list.bridges(&mut rows, film);
+        let mut members = strands.iter_many_mut(members.collection());
+        while let Some((mut strand, _, burden)) = members.fetch_next() {
+            let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
+            for (i, (v, bridged)) in velocities.iter_mut().zip(&mut bridges).enumerate() {
+                let load = burden.mass.get(i).copied().unwrap_or(0.0);
+                *v = joined(*v, &bridged, &wetting, load, step.dt);
+            }
+        }
+    }
+}
+
+/// The velocity of a node under a `load` (in dry masses) after bridges had it for a substep of `dt`
+/// (s).
+///
+/// The pull is taken explicitly and held to what the substep can follow; the film's drag goes to the
+/// common velocity exactly, however strong it is.
+fn joined(v: Vec3, bridged: &Bridged, wetting: &Wetting, load: f32, dt: f32) -> Vec3 {
+    if bridged.grip <= 0.0 {
+        return v;
+    }
+    let pull = wetting.cohesion * dt;
+    let follows = (1.0 + load) / (pull * dt * bridged.steepness).max(1e-9);
+    let pulled = v + bridged.pull * (pull * follows.min(1.0) / (1.0 + load));
+    let shared = 1.0 - bevy::math::ops::exp(-wetting.film_drag * dt * bridged.grip / (1.0 + load));
+    pulled.lerp(bridged.drift / bridged.grip, shared)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bridge_pulls_within_what_a_substep_follows_and_shares_motion() {
+        let bridged = Bridged { pull: Vec3::X, steepness: 1e3, drift: Vec3::Y * 2.0, grip: 2.0 };
+        let wetting = Wetting { cohesion: 10.0, film_drag: 0.0, ..default() };
+        let dt = 1.0 / 360.0;
+        let v = joined(Vec3::ZERO, &bridged, &wetting, 0.0, dt);
+        assert!(v.distance(Vec3::X * 10.0 * dt) < 1e-7, "{v}");
+        let heavy = joined(Vec3::ZERO, &bridged, &wetting, 1.0, dt);
+        assert!(heavy.distance(0.5 * v) < 1e-7, "{heavy}");
+        // Twice over the limit: the pull is halved.
+        let steep = Bridged { steepness: 2.0 / (10.0 * dt * dt), ..bridged };
+        let v = joined(Vec3::ZERO, &steep, &wetting, 0.0, dt);
+        assert!(v.distance(Vec3::X * 5.0 * dt) < 1e-6, "{v}");
+        // The common velocity is drift over grip, and drag for ever ends there.
+        let wetting = Wetting { cohesion: 0.0, film_drag: 1e9, ..default() };
+        assert!(joined(Vec3::X, &bridged, &wetting, 0.0, dt).distance(Vec3::Y) < 1e-6);
+        let wetting = Wetting { cohesion: 0.0, film_drag: 30.0, ..default() };
+        let v = joined(Vec3::X, &bridged, &wetting, 0.0, dt);
+        let left = (-60.0 * dt).exp();
+        assert!(v.distance(Vec3::X * left + Vec3::Y * (1.0 - left)) < 1e-6);
+    }
+}
