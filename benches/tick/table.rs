@@ -11,7 +11,7 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use bevy_keratin::{
-    BondChanges, HairStep, air::AirPlugin, bond::BondPlugin, bond::RestShape,
+    BondChanges, DropletRules, HairStep, air::AirPlugin, bond::BondPlugin, bond::RestShape,
     contact::ContactPlugin, contact::Obstacles, prelude::*, spring::SpringPlugin,
     style::StylePlugin, water::WaterPlugin,
 };
@@ -30,7 +30,7 @@ pub fn print() -> bool {
     }
     println!(
         "strands × nodes | threads | scalar, ns | projection, ns | scalar / projection | tick, ms | \
-         tick / projection | bonds at rest | bonds moving | contacts"
+         tick / projection | bonds at rest | bonds moving | contacts | 1,000 droplets"
     );
     for threads in ["1", "2"] {
         let this = std::env::current_exe().expect("a running program");
@@ -41,6 +41,10 @@ pub fn print() -> bool {
 }
 
 fn rows(threads: usize) {
+    // First, while the process has nothing that it could use again.
+    if threads == 1 {
+        println!("100000 × 16 | memory {:.2} kB a strand, of all that is held for it", memory());
+    }
     for (strands, nodes) in [(200, 9), (10_000, 6), (10_000, 16), (1_000, 64), (100_000, 16)] {
         row(threads, strands, nodes);
     }
@@ -80,19 +84,23 @@ fn row(threads: usize, strands: usize, nodes: usize) {
     }
     best_scalar *= strands as f64 / strands.min(1000) as f64;
     let [projection, no_bonds, tick, moving] = best;
-    // Settled under contact, then with and without.
+    // Settled under contact, then with and without; then wetted, and beside the dry one.
     let percent = |a: f64, b: f64| format!("{:+.0} %", (a / b - 1.0) * 100.0);
-    let contacts = if strands > 10_000 {
-        "-".into()
+    let [contacts, droplets] = if strands > 10_000 {
+        ["-".into(), "-".into()]
     } else {
         let app = &mut apps[2];
         app.insert_resource(HairDefault(LockContact::default()));
         (0..240).for_each(|_| app.update());
         let [without, with] = contacts_off_and_on(app, turns);
-        percent(with, without)
+        app.insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
+        strew(app, 1000);
+        (0..30).for_each(|_| app.update());
+        let wet = (0..turns).map(|_| seconds(|| app.update())).fold(f64::INFINITY, f64::min);
+        [percent(with, without), percent(wet, without)]
     };
     println!(
-        "{strands} × {nodes} | {threads} | {:.1} | {:.2} | {:.1} | {:.2} | {:.2} | {} | {} | {contacts}",
+        "{strands} × {nodes} | {threads} | {:.1} | {:.2} | {:.1} | {:.2} | {:.2} | {} | {} | {contacts} | {droplets}",
         best_scalar / work * 1e9,
         projection / work * 1e9,
         best_scalar / projection,
@@ -101,6 +109,39 @@ fn row(threads: usize, strands: usize, nodes: usize) {
         percent(tick, no_bonds),
         percent(moving, no_bonds),
     );
+}
+
+/// What a strand of a whole head takes, in kB: its components, its place in blocks and contact's
+/// lists.
+fn memory() -> f64 {
+    let strands = 100_000;
+    let hair = head(strands, 16);
+    let before = resident();
+    let mut app = app(1, Kind::Tick, &hair, Some(head_radius(strands)));
+    app.insert_resource(HairDefault(LockContact::default()));
+    (0..3).for_each(|_| app.update());
+    (resident() - before) / strands as f64 / 1e3
+}
+
+/// The memory that the process holds (bytes), where the system tells.
+fn resident() -> f64 {
+    let pages = std::fs::read_to_string("/proc/self/statm").ok();
+    let pages = pages.and_then(|text| text.split(' ').nth(1)?.parse::<f64>().ok());
+    pages.unwrap_or(f64::NAN) * 4096.0
+}
+
+/// Droplets of 1 mm on the strands' nodes, that neither spread nor slide.
+fn strew(app: &mut App, count: usize) {
+    let pinned = Wetting { uptake: 0.0, sliding: 0.0, evaporation: 0.0, ..default() };
+    app.insert_resource(HairDefault(pinned));
+    app.insert_resource(DropletRules { merging: false, min: Vec3::splat(-10.0), ..default() });
+    let mut strands = app.world_mut().query::<&Strand>();
+    let nodes: Vec<Vec3> =
+        strands.iter(app.world()).flat_map(|s| s.positions()[1..].to_vec()).collect();
+    let drops: Vec<Droplet> = (0..count)
+        .filter_map(|i| Droplet::new(nodes[i * 7919 % nodes.len()], 4.2e-9).ok())
+        .collect();
+    app.world_mut().spawn_batch(drops);
 }
 
 fn seconds(work: impl FnOnce()) -> f64 {

@@ -3,7 +3,7 @@
 use super::BondKind;
 use crate::rod::frame::full;
 use bevy::reflect::Reflect;
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec3, Vec4};
 
 /// The bonds of one joint: for each kind its remembered shape Ω_j and its rate b_j ∈ \[0, 1\]. One
 /// cache line.
@@ -34,16 +34,21 @@ impl JointBonds {
     /// remain. Ω is taken in the hemisphere of each Ω_j.
     #[inline]
     pub fn rest_shape(&self, omega: Quat, influence: &[f32; BondKind::COUNT]) -> Quat {
-        let mut sum = Vec3::ZERO;
-        let mut total = 0.0;
-        for ((shape, b), f) in self.shapes.iter().zip(self.rates).zip(influence) {
-            // Closed bonds do not look at the present shape.
-            let wanted =
-                if b == 1.0 { *shape } else { *shape * b + aligned(omega, *shape) * (1.0 - b) };
-            sum += *f * wanted;
-            total += f;
-        }
-        full(sum / total)
+        // The four kinds side by side. With M = Σ f b Ω_j and B = Σ f b this is {M + (Σf − B) Ω}/Σf.
+        let [x, y, z] = core::array::from_fn(|axis| {
+            Vec4::from_array(core::array::from_fn(|j| self.shapes[j][axis]))
+        });
+        let f = Vec4::from_array(*influence);
+        let fb = f * Vec4::from_array(self.rates);
+        let total = f.element_sum();
+        let remembered = Vec3::new(x.dot(fb), y.dot(fb), z.dot(fb));
+        let along = x * omega.x + y * omega.y + z * omega.z;
+        let present = if along.cmplt(Vec4::ZERO).any() {
+            (0..BondKind::COUNT).map(|j| aligned(omega, self.shapes[j]) * (f[j] - fb[j])).sum()
+        } else {
+            omega.xyz() * (total - fb.element_sum())
+        };
+        full((remembered + present) / total)
     }
 
     /// Equation 16: bonds of kind `j` that form (Δb > 0) remember the present shape,

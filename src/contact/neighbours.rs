@@ -61,6 +61,11 @@ struct Part {
     /// Where each node's groups begin, and where the last one's end.
     starts: Vec<u32>,
     groups: Vec<Group>,
+    /// For each node how far its nearest edge was beyond the reach (m): most nodes of loose hair need
+    /// no more than that.
+    slacks: Vec<f32>,
+    /// The square of how far a node has moved since (m²).
+    moved: f32,
     pushes: Vec<Vec3>,
     bridged: Vec<Bridged>,
 }
@@ -104,7 +109,7 @@ impl Neighbours {
         self.rows.extend([[f32::NAN; 4]; 2]);
         let reach = 2.0 * radius;
         let level = Level::new();
-        let stale = self.lists.are_stale(&self.rows, &self.strands, reach, self.beyond);
+        let stale = self.are_stale(reach);
         if stale {
             self.lists.begin(&self.rows, &self.strands, reach);
             self.parts.resize_with(self.strands.len().div_ceil(PART), Part::default);
@@ -119,6 +124,21 @@ impl Neighbours {
             dispatch!(level, simd => part.push(simd, rows, strands, lists.moved, penalty));
         });
         parts.iter().flat_map(|part| part.pushes.iter().copied())
+    }
+
+    /// Whether the lists may miss a pair of the nodes as they are now.
+    fn are_stale(&mut self, reach: f32) -> bool {
+        let Self { rows, strands, lists, parts, beyond } = self;
+        if lists.reach != reach || lists.strands != *strands {
+            return true;
+        }
+        let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
+        for_each_block(&mut work, || (), |(), (part, strands)| part.watch(rows, strands, lists));
+        // A non-finite node moves the maximum to no number, which is not less than the limit.
+        let squared = parts.iter().map(|part| part.moved).fold(0.0, larger);
+        lists.moved = squared.sqrt();
+        let complete = lists.moved < 0.5 * (MARGIN * reach - *beyond);
+        !complete
     }
 
     /// How many nodes there are.
@@ -166,21 +186,6 @@ impl Lists {
         self.within() * (1.0 + HALF_PIECE)
     }
 
-    fn are_stale(&mut self, rows: &[Row], strands: &[Range<u32>], reach: f32, beyond: f32) -> bool {
-        if self.reach != reach || self.strands != strands {
-            return true;
-        }
-        let count = rows.len() - 2;
-        let squared = rows[..count]
-            .iter()
-            .zip(&self.rows[..count])
-            .map(|(p, q)| lanes::place(p).distance_squared(lanes::place(q)));
-        // A non-finite node moves the maximum to no number, which is not less than the limit.
-        self.moved = squared.fold(0.0, |a: f32, b| if b <= a || a.is_nan() { a } else { b }).sqrt();
-        let complete = self.moved < 0.5 * (MARGIN * reach - beyond);
-        !complete
-    }
-
     /// Puts all edges into the grid.
     fn begin(&mut self, rows: &[Row], strands: &[Range<u32>], reach: f32) {
         self.moved = 0.0;
@@ -207,7 +212,21 @@ impl Lists {
     }
 }
 
+/// The larger of two numbers, and no number if one is none.
+fn larger(a: f32, b: f32) -> f32 {
+    if b <= a || a.is_nan() { a } else { b }
+}
+
 impl Part {
+    /// Looks how far these strands' nodes have moved since the lists were built.
+    fn watch(&mut self, rows: &[Row], strands: &[Range<u32>], lists: &Lists) {
+        let start = strands.first().map_or(0, |s| s.start) as usize;
+        let nodes = start..strands.last().map_or(start, |s| s.end as usize);
+        let squared = (rows[nodes.clone()].iter().zip(&lists.rows[nodes]))
+            .map(|(p, q)| lanes::place(p).distance_squared(lanes::place(q)));
+        self.moved = squared.fold(0.0, larger);
+    }
+
     /// Builds the lists of these strands' nodes.
     #[inline(always)]
     fn search<S: Simd>(
@@ -222,6 +241,7 @@ impl Part {
         let nowhere = rows.len() as u32 - 2;
         self.starts.clear();
         self.starts.push(0);
+        self.slacks.clear();
         self.groups.clear();
         for own in strands {
             for i in own.clone() {
@@ -251,6 +271,9 @@ impl Part {
                     let nearest = f32::from_bits((found[0] >> 32) as u32).sqrt();
                     self.groups.push(Group { edges, slack: nearest - lists.reach });
                 }
+                let first = self.starts.last().map_or(0, |start| *start as usize);
+                let nearest = self.groups[first..].first().map_or(f32::INFINITY, |g| g.slack);
+                self.slacks.push(nearest);
                 self.starts.push(self.groups.len() as u32);
             }
         }
@@ -270,7 +293,12 @@ impl Part {
         let may_touch = 2.0 * moved;
         let nodes = strands.first().map_or(0, |s| s.start) as usize;
         self.pushes.clear();
-        for (ends, row) in self.starts.windows(2).zip(&rows[nodes..]) {
+        let ends = self.starts.windows(2).zip(&self.slacks);
+        for ((ends, slack), row) in ends.zip(&rows[nodes..]) {
+            if *slack > may_touch {
+                self.pushes.push(Vec3::ZERO);
+                continue;
+            }
             let mut sum = Sum::new(simd, lanes::place(row), penalty);
             for group in &self.groups[ends[0] as usize..ends[1] as usize] {
                 if group.slack > may_touch {
@@ -295,8 +323,12 @@ impl Part {
     ) {
         let nodes = strands.first().map_or(0, |s| s.start) as usize;
         self.bridged.clear();
-        for (k, ends) in self.starts.windows(2).enumerate() {
+        for (k, (ends, slack)) in self.starts.windows(2).zip(&self.slacks).enumerate() {
             let node = nodes + k;
+            if *slack > reaches {
+                self.bridged.push(Bridged::default());
+                continue;
+            }
             let mut sum = Bridges::new(simd, lanes::place(&rows[node]), wet[node][3], film);
             for group in &self.groups[ends[0] as usize..ends[1] as usize] {
                 if group.slack > reaches {

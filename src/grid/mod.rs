@@ -11,6 +11,9 @@ use glam::{IVec3, Vec3};
 
 const FAR: Vec3 = Vec3::splat(1e9);
 
+/// The fewest buckets. A few items in as few buckets would be met in most of empty space, too.
+const FEWEST: usize = 4096;
+
 /// Points sorted by cell.
 #[derive(Clone, Debug, Default)]
 pub struct UniformGrid {
@@ -53,7 +56,7 @@ impl UniformGrid {
     }
 
     fn sort(&mut self) {
-        let buckets = self.unsorted.len().next_power_of_two().max(16);
+        let buckets = self.unsorted.len().next_power_of_two().max(FEWEST);
         self.starts.clear();
         self.starts.resize(buckets + 1, 0);
         let mask = buckets - 1;
