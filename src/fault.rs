@@ -40,8 +40,9 @@ pub enum Fault {
     #[error("HairGravity is not finite: no gravity is used until it is")]
     Gravity,
     /// Roots that cannot be tied to their mesh: the strands stay as they are.
+    #[cfg(feature = "groom")]
     #[error("{0}; those strands do not follow the mesh")]
-    Roots(&'static str),
+    Roots(#[from] crate::groom::RootsError),
     /// A groom that no strands can be grown from.
     #[cfg(feature = "groom")]
     #[error("the hair's groom cannot be used: {0}")]
