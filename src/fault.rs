@@ -39,9 +39,14 @@ pub enum Fault {
     /// Gravity that is not finite counts as none.
     #[error("HairGravity is not finite: no gravity is used until it is")]
     Gravity,
+    /// An avian collider, or a part of one, that hair does not know: hair goes through it.
+    #[cfg(feature = "avian")]
+    #[error("{0}; hair goes through it")]
+    Avian(#[from] crate::contact::AvianShapeError),
     /// Roots that cannot be tied to their mesh: the strands stay as they are.
+    #[cfg(feature = "groom")]
     #[error("{0}; those strands do not follow the mesh")]
-    Roots(&'static str),
+    Roots(#[from] crate::groom::RootsError),
     /// A groom that no strands can be grown from.
     #[cfg(feature = "groom")]
     #[error("the hair's groom cannot be used: {0}")]

@@ -24,6 +24,8 @@ pub mod water;
 
 pub use air::{AirDrag, Blower, HairGravity, WindReceived};
 pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
+#[cfg(feature = "avian")]
+pub use contact::{AvianHairCollider, AvianShapeError};
 pub use contact::{ColliderShape, HairCollider, LockContact};
 pub use fault::{Fault, HairFault};
 #[cfg(feature = "groom")]
@@ -44,6 +46,9 @@ pub use water::{
 
 /// What most games need.
 pub mod prelude {
+    #[cfg(feature = "avian")]
+    #[doc(hidden)]
+    pub use crate::contact::AvianHairCollider;
     #[cfg(feature = "groom")]
     #[doc(hidden)]
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};

@@ -208,7 +208,13 @@ impl Plugin for TickPlugin {
                     );
             })
             .add_systems(PreUpdate, report_substeps.run_if(resource_changed::<HairSubsteps>))
-            .add_systems(self.schedule, run_hair_tick);
+            .add_systems(self.schedule, {
+                let tick = run_hair_tick.into_configs();
+                // Where both are in one schedule, hair sees where bodies have come to.
+                #[cfg(feature = "avian")]
+                let tick = tick.after(avian3d::prelude::PhysicsSystems::Writeback);
+                tick
+            });
     }
 }
 

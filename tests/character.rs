@@ -4,8 +4,8 @@
 mod common;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{Fault, prelude::*, strand::StrandHistory};
-use common::{one_strand, run, settle, strand, test_app};
+use bevy_keratin::{prelude::*, strand::StrandHistory};
+use common::{app_with_meshes, one_strand, run, settle, strand, test_app};
 use core::{f32::consts::PI, time::Duration};
 
 const HEAD: f32 = 0.09;
@@ -281,7 +281,6 @@ mod skinned {
             Indices, Mesh, Mesh3d, PrimitiveTopology, VertexAttributeValues,
             skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
         },
-        transform::TransformPlugin,
     };
     use bevy_keratin::groom::{RootOnMesh, RootsOnMesh};
 
@@ -329,30 +328,6 @@ mod skinned {
         };
         let [a, b, c] = root.vertices.map(corner);
         a * root.weights.x + b * root.weights.y + c * root.weights.z
-    }
-
-    fn app_with_meshes(fps: f64) -> App {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default()))
-            .init_asset::<Mesh>()
-            .init_asset::<SkinnedMeshInverseBindposes>()
-            .add_plugins(HairPlugins::default())
-            .insert_resource(Time::<Fixed>::from_hz(60.0));
-        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
-        let frame = Duration::from_secs_f64(1.0 / fps);
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(frame));
-        app.init_resource::<Roots>().add_systems(Last, count_roots);
-        app.finish();
-        app.cleanup();
-        app
-    }
-
-    /// How often roots were told not to fit.
-    #[derive(Resource, Default)]
-    struct Roots(usize);
-
-    fn count_roots(mut faults: MessageReader<HairFault>, mut roots: ResMut<Roots>) {
-        roots.0 += faults.read().filter(|f| matches!(f.fault, Fault::Roots(_))).count();
     }
 
     #[test]
@@ -414,23 +389,5 @@ mod skinned {
         let strand = app.world().get::<Strand>(ids[0]).unwrap();
         assert!((strand.length() - 0.14).abs() < 1e-3, "{}", strand.length());
         assert!(strand.is_finite() && strand.peak_strain() < 0.1, "{}", strand.peak_strain());
-    }
-
-    #[test]
-    fn roots_that_fit_no_mesh_are_told_once_and_left_alone() {
-        let mut app = app_with_meshes(60.0);
-        let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(strip());
-        let mesh = app.world_mut().spawn((Mesh3d(mesh), Transform::default())).id();
-        let (hair, id) = one_strand(&mut app, 0.1, 4, Vec3::Y);
-        let before = strand(&app, id).positions()[0];
-        for (vertices, count) in [([0, 1, 99], 1), ([0, 0, 0], 1), ([0, 2, 1], 2)] {
-            let root = RootOnMesh { vertices, weights: Vec3::new(0.5, 0.25, 0.25) };
-            let roots = RootsOnMesh { mesh: Some(mesh), roots: vec![root; count] };
-            app.world_mut().entity_mut(hair).insert(roots);
-            run(&mut app, 0.2);
-            let told = core::mem::take(&mut app.world_mut().resource_mut::<Roots>().0);
-            assert_eq!(told, 1, "{vertices:?}");
-            assert_eq!(strand(&app, id).positions()[0], before);
-        }
     }
 }

@@ -36,7 +36,7 @@ mod scenes {
 }
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{groom::HairPreset, prelude::*, render::HairRenderPlugin};
+use bevy_keratin::groom::HairPreset;
 use clap::Parser;
 use stage::Follow;
 use std::{
@@ -96,30 +96,14 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let mut app = App::new();
-    if arguments.offscreen.is_some() {
-        app.add_plugins((
-            renderer::windowless(),
-            // A picture shows its own frame, not one between two.
-            HairPlugins::default().set(HairRenderPlugin { interpolate: false }),
-        ));
-    } else {
-        let (width, height) = arguments.size;
-        let window = Window {
-            title: "character".into(),
-            resolution: bevy::window::WindowResolution::new(width, height),
-            ..default()
-        };
-        let window = WindowPlugin { primary_window: Some(window), ..default() };
-        let plugins = DefaultPlugins.set(window).set(renderer::renderer()).set(renderer::log());
-        app.add_plugins((plugins, HairPlugins::default()));
-    }
+    let offscreen = arguments.offscreen.is_some();
+    let mut app = renderer::app("character", arguments.size, offscreen, default());
     app.insert_resource(Time::<Fixed>::from_hz(60.0))
         .insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
         .insert_resource(arguments.clone())
         .add_plugins((figure::FigurePlugin, weather::WeatherPlugin, stage::StagePlugin));
     match &arguments.offscreen {
-        Some(folder) => offscreen(&mut app, arguments, folder),
+        Some(folder) => pictures(&mut app, arguments, folder),
         None => {
             app.add_systems(Startup, |mut commands: Commands| {
                 commands.spawn(stage::camera());
@@ -140,7 +124,7 @@ fn views() -> [(&'static str, Follow); 4] {
 
 /// Runs with exactly one tick an update; draws a picture each second, in turn of all, of the head from
 /// each side, and all of them at the end.
-fn offscreen(
+fn pictures(
     app: &mut App,
     arguments: &Arguments,
     folder: &Path,

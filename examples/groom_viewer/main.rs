@@ -19,7 +19,7 @@ mod camera;
 mod head;
 
 use bevy::{asset::LoadState, prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{groom::*, prelude::*, render::HairRenderPlugin};
+use bevy_keratin::{groom::*, prelude::*};
 use clap::Parser;
 use head::{Measure, Shown};
 use std::{
@@ -104,29 +104,13 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let file = arguments.file.canonicalize()?;
     let folder = file.parent().unwrap_or(Path::new("/")).to_string_lossy().into_owned();
     let assets = AssetPlugin { file_path: folder, ..default() };
-    let mut app = App::new();
-    if arguments.offscreen.is_some() {
-        app.add_plugins((
-            renderer::windowless().set(assets),
-            // A picture shows its own frame, not one between two.
-            HairPlugins::default().set(HairRenderPlugin { interpolate: false }),
-        ));
-    } else {
-        let (width, height) = arguments.size;
-        let window = Window {
-            title: "groom viewer".into(),
-            resolution: bevy::window::WindowResolution::new(width, height),
-            ..default()
-        };
-        let window = WindowPlugin { primary_window: Some(window), ..default() };
-        let plugins = DefaultPlugins.set(window).set(renderer::renderer()).set(renderer::log());
-        app.add_plugins((plugins.set(assets), HairPlugins::default()));
-    }
+    let offscreen = arguments.offscreen.is_some();
+    let mut app = renderer::app("groom viewer", arguments.size, offscreen, assets);
     app.insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
         .insert_resource(arguments.clone())
         .add_plugins(head::HeadPlugin);
     match &arguments.offscreen {
-        Some(folder) => offscreen(&mut app, arguments, folder),
+        Some(folder) => pictures(&mut app, arguments, folder),
         None => {
             app.add_systems(Update, (camera::frame, camera::orbit).chain());
             app.add_systems(Startup, |mut commands: Commands| {
@@ -141,7 +125,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Runs with exactly one tick an update, and writes the pictures and what was measured.
-fn offscreen(
+fn pictures(
     app: &mut App,
     arguments: &Arguments,
     folder: &Path,

@@ -4,6 +4,12 @@
 #[path = "../salon/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
+#[path = "../salon/picture.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod picture;
+#[path = "../salon/renderer.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod renderer;
 
 mod head;
 
@@ -14,24 +20,17 @@ mod scenes {
 
 use bevy::{
     asset::RenderAssetUsages,
-    camera::RenderTarget,
     core_pipeline::prepass::DepthPrepass,
     light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, ShadowFilteringMethod},
     prelude::*,
-    render::{
-        RenderPlugin,
-        pipelined_rendering::PipelinedRenderingPlugin,
-        render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages},
-        view::screenshot::{Screenshot, ScreenshotCaptured},
-    },
+    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
     time::TimeUpdateStrategy,
-    window::ExitCondition,
-    winit::WinitPlugin,
 };
 use bevy_keratin::{
     groom::{HairPreset, Planted, Scalp},
     prelude::*,
 };
+use picture::Pictures;
 use std::{path::PathBuf, time::Instant};
 
 /// Seconds until hair has settled.
@@ -40,9 +39,6 @@ const SIZE: (u32, u32) = (560, 640);
 /// Where the camera is (m): in front to the side, at the side, behind.
 const VIEWS: [Vec3; 3] =
     [Vec3::new(0.30, 0.06, 0.62), Vec3::new(0.68, 0.05, 0.02), Vec3::new(-0.35, 0.12, -0.58)];
-
-#[derive(Resource, Default)]
-struct Captured(Option<Image>);
 
 /// The mannequin lies; its crown is at +X and its face at +Y. This puts it upright.
 fn upright() -> Transform {
@@ -65,7 +61,7 @@ fn main() -> Result {
         }
         let views = draw(preset)?;
         let path = folder.join(format!("{name}.png"));
-        beside(&views).try_into_dynamic()?.into_rgb8().save(&path)?;
+        picture::save(beside(&views), &path)?;
         println!("{}", path.display());
     }
     Ok(())
@@ -93,15 +89,14 @@ fn beside(views: &[Image]) -> Image {
 fn draw(preset: HairPreset) -> Result<Vec<Image>> {
     let start = Instant::now();
     let mut app = app();
-    let camera = studio(&mut app);
+    studio(&mut app);
     let mesh = mannequin::mesh();
     let planted = preset.plant(&mesh, &scalp())?;
     let took = start.elapsed();
     let hair = wear(&mut app, preset, &planted, head::with_scalp(mesh, &scalp()))?;
-    app.finish();
-    app.cleanup();
-    show(&mut app, &camera, false);
-    app.update();
+    let camera =
+        (Camera3d::default(), Msaa::Sample4, DepthPrepass, ShadowFilteringMethod::Hardware2x2);
+    let pictures = Pictures::new(&mut app, SIZE, camera);
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     let start = Instant::now();
     for _ in 0..(60.0 * SETTLING) as u32 {
@@ -114,7 +109,14 @@ fn draw(preset: HairPreset) -> Result<Vec<Image>> {
     );
     report(&mut app, hair);
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-    VIEWS.iter().map(|from| view(&mut app, &camera, *from)).collect()
+    let middle = Vec3::new(0.0, -0.05, 0.0);
+    let view = |from| {
+        let place = Transform::from_translation(from).looking_at(middle, Vec3::Y);
+        let mut cameras = app.world_mut().query_filtered::<&mut Transform, With<Camera>>();
+        cameras.iter_mut(app.world_mut()).for_each(|mut camera| *camera = place);
+        Ok(pictures.draw(&mut app)?)
+    };
+    VIEWS.into_iter().map(view).collect()
 }
 
 /// How well strands have kept their length and stayed off the head.
@@ -132,29 +134,16 @@ fn report(app: &mut App, hair: Entity) {
 }
 
 fn app() -> App {
-    let mut app = App::new();
-    let plugins = DefaultPlugins
-        .set(WindowPlugin {
-            primary_window: None,
-            exit_condition: ExitCondition::DontExit,
-            ..default()
-        })
-        .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
-        .set(bevy::log::LogPlugin { filter: "warn".into(), ..default() })
-        .disable::<WinitPlugin>()
-        .disable::<PipelinedRenderingPlugin>();
-    app.add_plugins((plugins, HairPlugins::default()))
-        .insert_resource(Time::<Fixed>::from_hz(60.0))
-        .insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
+    let mut app = renderer::app("presets", SIZE, true, default());
+    app.insert_resource(Time::<Fixed>::from_hz(60.0))
         .insert_resource(DirectionalLightShadowMap { size: 2048 })
         .insert_resource(GlobalAmbientLight { brightness: 300.0, ..default() })
-        .insert_resource(ClearColor(Color::srgb(0.17, 0.18, 0.2)))
-        .init_resource::<Captured>();
+        .insert_resource(ClearColor(Color::srgb(0.17, 0.18, 0.2)));
     app
 }
 
-/// Three lights and a camera.
-fn studio(app: &mut App) -> (Entity, Handle<Image>) {
+/// Three lights.
+fn studio(app: &mut App) {
     let light = |at: Vec3, lux: f32, color: Color, shadows: bool| {
         let light = DirectionalLight {
             illuminance: lux,
@@ -172,19 +161,6 @@ fn studio(app: &mut App) -> (Entity, Handle<Image>) {
     world.spawn(light(Vec3::new(1.0, 1.3, 1.2), 9000.0, Color::srgb(1.0, 0.95, 0.88), true));
     world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 3000.0, Color::srgb(0.8, 0.88, 1.0), false));
     world.spawn(light(Vec3::new(-0.7, 1.0, -1.5), 6000.0, Color::WHITE, false));
-    let mut image = Image::new_target_texture(SIZE.0, SIZE.1, TextureFormat::Rgba8UnormSrgb, None);
-    image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
-    let target = world.resource_mut::<Assets<Image>>().add(image);
-    let camera = world
-        .spawn((
-            Camera3d::default(),
-            RenderTarget::Image(target.clone().into()),
-            Msaa::Sample4,
-            DepthPrepass,
-            ShadowFilteringMethod::Hardware2x2,
-        ))
-        .id();
-    (camera, target)
 }
 
 /// The head with the preset's hair.
@@ -215,31 +191,4 @@ fn body() -> Result<Vec<(HairCollider, Transform)>> {
     ];
     let parts = head::skull().into_iter().chain(bust);
     parts.map(|(a, b, radius)| head::limb(a, b, radius)).collect()
-}
-
-fn show(app: &mut App, camera: &(Entity, Handle<Image>), is_on: bool) {
-    if let Some(mut camera) = app.world_mut().get_mut::<Camera>(camera.0) {
-        camera.is_active = is_on;
-    }
-}
-
-fn view(app: &mut App, camera: &(Entity, Handle<Image>), from: Vec3) -> Result<Image> {
-    let at = Vec3::new(0.0, -0.05, 0.0);
-    let place = Transform::from_translation(from).looking_at(at, Vec3::Y);
-    app.world_mut().entity_mut(camera.0).insert(place);
-    show(app, camera, true);
-    app.world_mut().spawn(Screenshot::image(camera.1.clone())).observe(
-        |shot: On<ScreenshotCaptured>, mut captured: ResMut<Captured>| {
-            captured.0 = Some(shot.image.clone());
-        },
-    );
-    for _ in 0..100 {
-        app.update();
-        // Once is enough; the rest is waiting.
-        show(app, camera, false);
-        if let Some(image) = app.world_mut().resource_mut::<Captured>().0.take() {
-            return Ok(image);
-        }
-    }
-    Err("the graphics device gave no picture back".into())
 }

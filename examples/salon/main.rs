@@ -24,10 +24,10 @@ mod studio;
 mod tools;
 mod wardrobe;
 
-use bevy::{prelude::*, render::renderer::RenderAdapterInfo, window::WindowResolution};
+use bevy::{prelude::*, render::renderer::RenderAdapterInfo};
 use bevy_keratin::{
     prelude::*,
-    render::{HairFollowers, HairRenderPlugin, HairView},
+    render::{HairFollowers, HairView},
 };
 use clap::{CommandFactory, Parser, error::ErrorKind};
 use scenes::{Scene, SceneKind, ScenePlugin};
@@ -144,21 +144,8 @@ fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
 }
 
 fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
-    let (width, height) = arguments.size;
-    let window = Window {
-        title: "bevy_keratin salon".into(),
-        resolution: WindowResolution::new(width, height),
-        ..default()
-    };
-    let window = WindowPlugin { primary_window: Some(window), ..default() };
-    let mut app = App::new();
-    app.add_plugins((
-        DefaultPlugins.set(window).set(renderer::renderer()).set(renderer::log()),
-        HairPlugins::default(),
-        panel::PanelPlugin,
-        story::StoryPlugin,
-        wardrobe::WardrobePlugin,
-    ));
+    let mut app = renderer::app("bevy_keratin salon", arguments.size, false, default());
+    app.add_plugins((panel::PanelPlugin, story::StoryPlugin, wardrobe::WardrobePlugin));
     salon(&mut app, scene, arguments);
     app.add_systems(Startup, (open_eye, spare_software).chain().after(stage::build))
         .add_systems(Update, (camera::frame_scene, camera::orbit, camera::place).chain());
@@ -187,12 +174,7 @@ fn spare_software(
 }
 
 fn windowless(scene: Scene, arguments: &Arguments) -> App {
-    let mut app = App::new();
-    app.add_plugins((
-        renderer::windowless(),
-        // A picture shows its own frame, not one between two.
-        HairPlugins::default().set(HairRenderPlugin { interpolate: false }),
-    ));
+    let mut app = renderer::app("", arguments.size, true, default());
     salon(&mut app, scene, arguments);
     app
 }

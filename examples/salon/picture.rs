@@ -42,39 +42,43 @@ impl Pictures {
             app.update();
         }
         // Nothing is drawn on the way: only the ticks count.
-        draw(app, camera, false);
+        activate(app, camera, false);
         Self { camera, target }
     }
 
     /// Draws the world as it is now into a PNG.
     pub fn take(&self, app: &mut App, path: &Path) -> io::Result<()> {
-        let picture = capture(app, self.camera, &self.target)?;
-        let picture = picture.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
-        picture.save(path).map_err(io::Error::other)
+        save(self.draw(app)?, path)
+    }
+
+    /// Draws the world as it is now.
+    pub fn draw(&self, app: &mut App) -> io::Result<Image> {
+        activate(app, self.camera, true);
+        app.world_mut().spawn(Screenshot::image(self.target.clone())).observe(
+            |shot: On<ScreenshotCaptured>, mut captured: ResMut<Captured>| {
+                captured.0 = Some(shot.image.clone());
+            },
+        );
+        for _ in 0..PATIENCE {
+            app.update();
+            // Once is enough; the rest is waiting.
+            activate(app, self.camera, false);
+            if let Some(image) = app.world_mut().resource_mut::<Captured>().0.take() {
+                return Ok(image);
+            }
+        }
+        Err(io::Error::other("the graphics device gave no picture back"))
     }
 }
 
-fn draw(app: &mut App, camera: Entity, active: bool) {
+/// Writes a PNG.
+pub fn save(picture: Image, path: &Path) -> io::Result<()> {
+    let picture = picture.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
+    picture.save(path).map_err(io::Error::other)
+}
+
+fn activate(app: &mut App, camera: Entity, active: bool) {
     if let Some(mut camera) = app.world_mut().get_mut::<Camera>(camera) {
         camera.is_active = active;
     }
-}
-
-/// Draws the world as it is now.
-fn capture(app: &mut App, camera: Entity, target: &Handle<Image>) -> io::Result<Image> {
-    draw(app, camera, true);
-    app.world_mut().spawn(Screenshot::image(target.clone())).observe(
-        |shot: On<ScreenshotCaptured>, mut captured: ResMut<Captured>| {
-            captured.0 = Some(shot.image.clone());
-        },
-    );
-    for _ in 0..PATIENCE {
-        app.update();
-        // Once is enough; the rest is waiting.
-        draw(app, camera, false);
-        if let Some(image) = app.world_mut().resource_mut::<Captured>().0.take() {
-            return Ok(image);
-        }
-    }
-    Err(io::Error::other("the graphics device gave no picture back"))
 }

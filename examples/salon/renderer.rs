@@ -9,12 +9,30 @@ use bevy::{
         pipelined_rendering::PipelinedRenderingPlugin,
         settings::{Backends, WgpuSettings},
     },
-    window::ExitCondition,
+    window::{ExitCondition, WindowResolution},
     winit::WinitPlugin,
 };
+use bevy_keratin::{prelude::*, render::HairRenderPlugin};
+
+/// An app with hair that is drawn into a window; without a window where `offscreen`.
+pub fn app(title: &str, size: (u32, u32), offscreen: bool, assets: AssetPlugin) -> App {
+    let mut app = App::new();
+    if offscreen {
+        // A picture shows its own frame, not one between two.
+        let hair = HairPlugins::default().set(HairRenderPlugin { interpolate: false });
+        app.add_plugins((windowless().set(assets), hair));
+    } else {
+        let resolution = WindowResolution::new(size.0, size.1);
+        let window = Window { title: title.into(), resolution, ..default() };
+        let window = WindowPlugin { primary_window: Some(window), ..default() };
+        let plugins = DefaultPlugins.set(window).set(renderer()).set(log()).set(assets);
+        app.add_plugins((plugins, HairPlugins::default()));
+    }
+    app
+}
 
 /// Hair is drawn by storage buffers in the vertex stage, which GL lacks.
-pub fn renderer() -> RenderPlugin {
+fn renderer() -> RenderPlugin {
     let mut settings = WgpuSettings::default();
     if std::env::var_os("WGPU_BACKEND").is_none() {
         settings.backends = Some(Backends::PRIMARY);
@@ -30,12 +48,12 @@ pub fn renderer() -> RenderPlugin {
 const QUIET: &str = "warn,bevy_render::renderer=error,bevy_light=error,bevy_egui=error,\
      wgpu=error,wgpu_hal=off,winit=error";
 
-pub fn log() -> LogPlugin {
+fn log() -> LogPlugin {
     LogPlugin { filter: QUIET.into(), ..default() }
 }
 
 /// Bevy's plugins for drawing without a window.
-pub fn windowless() -> PluginGroupBuilder {
+fn windowless() -> PluginGroupBuilder {
     let window =
         WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
     let plugins = DefaultPlugins.set(window).set(renderer()).set(log());

@@ -1,10 +1,14 @@
 //! What hair touches: colliders, and other strands.
 
+#[cfg(feature = "avian")]
+mod avian;
 mod lanes;
 pub mod model;
 mod neighbours;
 mod systems;
 
+#[cfg(feature = "avian")]
+pub use avian::{AvianHairCollider, AvianShapeError};
 pub use systems::ContactPlugin;
 pub(crate) use {
     lanes::WetRow,

@@ -16,6 +16,8 @@ pub struct ContactPlugin;
 impl Plugin for ContactPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<LockContact>(app);
+        #[cfg(feature = "avian")]
+        super::avian::plugin(app);
         app.register_type::<HairCollider>()
             .register_type::<ColliderShape>()
             .register_type::<Obstacles>()

@@ -33,7 +33,7 @@ pub use preset::{HairPreset, PresetSettings};
 pub use reshape::UpAxis;
 pub use scalp::Scalp;
 pub use settings::GroomSettings;
-pub use skin::{RootsOnMesh, TiedRoots};
+pub use skin::{RootsError, RootsOnMesh, TiedRoots};
 pub use wear::{GroomGuides, GroomedHair};
 
 use crate::setting::InvalidValue;

@@ -1,7 +1,12 @@
 //! A headless app as the tests want it: no window, exactly one fixed tick per update.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
-use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy::{
+    mesh::{Mesh, skinning::SkinnedMeshInverseBindposes},
+    prelude::*,
+    time::TimeUpdateStrategy,
+    transform::TransformPlugin,
+};
 use bevy_keratin::{Fault, prelude::*};
 use std::time::Duration;
 
@@ -11,12 +16,29 @@ pub fn test_app(hertz: f64) -> App {
     app.add_plugins((MinimalPlugins, HairPlugins::default()))
         .insert_resource(Time::<Fixed>::from_hz(hertz))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    ready(&mut app);
+    app.update();
+    app
+}
+
+/// An app with meshes, 60 ticks a second and frames of their own.
+pub fn app_with_meshes(fps: f64) -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default()))
+        .init_asset::<Mesh>()
+        .init_asset::<SkinnedMeshInverseBindposes>()
+        .add_plugins(HairPlugins::default())
+        .insert_resource(Time::<Fixed>::from_hz(60.0))
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / fps)));
+    ready(&mut app);
+    app
+}
+
+fn ready(app: &mut App) {
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.init_resource::<Told>().add_systems(Last, listen);
     app.finish();
     app.cleanup();
-    app.update();
-    app
 }
 
 /// Runs for `seconds` of simulated time.

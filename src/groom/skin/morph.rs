@@ -1,0 +1,48 @@
+//! What the morph targets of a mesh do to the few vertices that carry roots.
+
+use bevy::{
+    ecs::system::SystemParam,
+    mesh::morph::{MeshMorphWeights, MorphWeights},
+    prelude::*,
+};
+
+/// Where one morph target takes one corner.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shift {
+    target: u32,
+    /// At weight 1, in the mesh's own space.
+    by: Vec3,
+}
+
+impl Shift {
+    /// `None` where the target leaves the corner alone.
+    pub fn new(target: usize, by: Vec3) -> Option<Self> {
+        (by != Vec3::ZERO && by.is_finite()).then_some(Self { target: target as u32, by })
+    }
+
+    /// With these weights of all targets. A weight that is missing or not finite counts as none.
+    pub fn at(&self, weights: &[f32]) -> Vec3 {
+        let weight = weights.get(self.target as usize).copied().unwrap_or(0.0);
+        if weight.is_finite() { self.by * weight } else { Vec3::ZERO }
+    }
+}
+
+/// The weights of morph targets as Bevy draws them: a mesh's own, or those it refers to.
+#[derive(SystemParam)]
+pub(super) struct Morphs<'w, 's> {
+    meshes: Query<'w, 's, &'static MeshMorphWeights>,
+    shared: Query<'w, 's, &'static MorphWeights>,
+}
+
+impl Morphs<'_, '_> {
+    /// Those of a mesh, one for each target; empty where nothing morphs it.
+    pub fn of(&self, mesh: Option<Entity>) -> &[f32] {
+        match mesh.and_then(|mesh| self.meshes.get(mesh).ok()) {
+            Some(MeshMorphWeights::Value { weights }) => weights,
+            Some(MeshMorphWeights::Reference(other)) => {
+                self.shared.get(*other).map_or(&[], MorphWeights::weights)
+            }
+            None => &[],
+        }
+    }
+}
