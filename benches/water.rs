@@ -60,6 +60,7 @@ fn wet(variant: &str, count: usize) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, HairPlugins::default(), ScenePlugin(scene)))
         .insert_resource(Strewn { count, ..default() })
+        .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.finish();

@@ -6,7 +6,7 @@ use crate::{
     fault::{Fault, HairFault},
     parallel::for_each,
     setting::{self, Notes, Settings},
-    strand::{Burden, Hair, Pose, Strand, StrandOf, TickPose},
+    strand::{Burden, Hair, Pose, Sleep, Strand, StrandOf, TickPose},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
@@ -86,6 +86,7 @@ pub(crate) fn apply_air(
     blowers: Query<(&Blower, &TickPose)>,
     mut strands: Query<(
         &StrandOf,
+        &Sleep,
         &mut Strand,
         &Burden,
         &mut BondChanges,
@@ -96,7 +97,10 @@ pub(crate) fn apply_air(
     let mut airs: Vec<LocalAir> = Vec::new();
     let mut index_of = HashMap::<Entity, Option<usize>>::default();
     let mut items = Vec::with_capacity(strands.iter().len());
-    for (of, strand, burden, changes, received) in &mut strands {
+    for (of, sleep, strand, burden, changes, received) in &mut strands {
+        if sleep.is_asleep() {
+            continue;
+        }
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let pose = hairs.get(of.0).ok()?.now();
             airs.push(LocalAir {

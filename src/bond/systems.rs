@@ -9,7 +9,7 @@ use crate::{
     parallel::for_each,
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
     setting::{self, Bound, Notes, Settings},
-    strand::{self, Burden, Strand, StrandOf},
+    strand::{self, Burden, Sleep, Strand, StrandOf},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
@@ -78,11 +78,14 @@ fn generate_rest_shapes(
     stiffness: Settings<Stiffness>,
     cuticle: Settings<Cuticle>,
     solver: Settings<Solver>,
-    mut strands: Query<(&StrandOf, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
+    mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
 ) {
     let mut resolved = HashMap::<Entity, Key>::default();
     let mut items = Vec::new();
-    for (of, strand, bonds, burden, rest) in &mut strands {
+    for (of, sleep, strand, bonds, burden, rest) in &mut strands {
+        if sleep.is_asleep() {
+            continue;
+        }
         let key = *resolved.entry(of.0).or_insert_with(|| Key {
             influence: influence.of(of.0).as_array(),
             stiffness: stiffness.of(of.0),
@@ -133,10 +136,13 @@ fn has_softened(before: &[f32], now: &[f32]) -> bool {
     before.len() != now.len() || before.iter().zip(now).any(|(a, b)| (a - b).abs() > 2e-3)
 }
 
-fn update_bonds(mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape)>) {
+fn update_bonds(
+    mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut Sleep)>,
+) {
     let mut items: Vec<_> =
-        strands.iter_mut().filter(|(_, _, changes, _)| !changes.is_empty()).collect();
-    for_each(&mut items, |(strand, bonds, changes, rest)| {
+        strands.iter_mut().filter(|(_, _, changes, ..)| !changes.is_empty()).collect();
+    for_each(&mut items, |(strand, bonds, changes, rest, sleep)| {
+        sleep.bypass_change_detection().wake();
         rest.bypass_change_detection().closed = false;
         let joints: &mut [JointBonds] = &mut bonds.bypass_change_detection().joints;
         for (i, change) in changes.bypass_change_detection().take() {

@@ -12,7 +12,7 @@ use crate::{
     fault::{Fault, HairFault},
     parallel::for_each_block,
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, Strand, StrandModel, StrandOf},
+    strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
@@ -59,6 +59,7 @@ pub(crate) fn project(
     mut strands: Query<(
         Entity,
         &StrandOf,
+        &Sleep,
         &mut Strand,
         &RestShape,
         &Bonds,
@@ -70,7 +71,10 @@ pub(crate) fn project(
     let mut params: Vec<HairParams> = Vec::new();
     let mut index_of = HashMap::<Entity, Option<usize>>::default();
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
-    for (entity, of, strand, rest, bonds, burden, held) in &mut strands {
+    for (entity, of, sleep, strand, rest, bonds, burden, held) in &mut strands {
+        if sleep.is_asleep() {
+            continue;
+        }
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let obstacles = hairs.get(of.0).ok().filter(|_| model.of(of.0) == StrandModel::Rod)?;
             let s = solver.of(of.0);

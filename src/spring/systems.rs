@@ -16,7 +16,7 @@ use crate::{
         project,
     },
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, Strand, StrandModel, StrandOf, TickPose},
+    strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf, TickPose},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
@@ -54,14 +54,17 @@ fn step_springs(
     contact: Settings<LockContact>,
     gravity: Res<HairGravity>,
     hairs: Query<(&Obstacles, &TickPose)>,
-    mut strands: Query<(Entity, &StrandOf, &mut Strand, &Burden, Option<&HeldNodes>)>,
+    mut strands: Query<(Entity, &StrandOf, &Sleep, &mut Strand, &Burden, Option<&HeldNodes>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
     let mut params: Vec<HairParams> = Vec::new();
     let mut index_of = EntityHashMap::<Option<usize>>::default();
     let mut items: Vec<Item<'_>> = Vec::new();
-    for (entity, of, strand, burden, held) in &mut strands {
+    for (entity, of, sleep, strand, burden, held) in &mut strands {
+        if sleep.is_asleep() {
+            continue;
+        }
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let (obstacles, pose) = hairs.get(of.0).ok()?;
             (model.of(of.0) == StrandModel::MassSpring).then(|| {
