@@ -11,6 +11,7 @@ pub mod grid;
 pub mod groom;
 #[cfg(feature = "save")]
 pub mod hairdo;
+pub mod lod;
 mod parallel;
 #[cfg(feature = "render")]
 pub mod render;
@@ -31,6 +32,7 @@ pub use fault::{Fault, HairFault};
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 #[cfg(feature = "save")]
 pub use hairdo::{Hairdo, HairdoError};
+pub use lod::{HairLod, LodLevel, PresentLod, ScreenShare};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
 pub use sleep::HairSleep;
@@ -59,9 +61,9 @@ pub mod prelude {
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
-        HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairPlugins, HairSleep,
-        HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact, Moisture, PermRod,
-        ProcessTime, Shower, Sleep, Soak, Solver, Stiffness, Strand, StrandModel, StrandOf,
-        Strands, StretchProjection, Treat, WaterLedger, Wetting, Winding, WoundOn,
+        HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairLod, HairPlugins,
+        HairSleep, HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact, Moisture, PermRod,
+        ProcessTime, ScreenShare, Shower, Sleep, Soak, Solver, Stiffness, Strand, StrandModel,
+        StrandOf, Strands, StretchProjection, Treat, WaterLedger, Wetting, Winding, WoundOn,
     };
 }

@@ -18,6 +18,7 @@ use crate::{
     bond::BondPlugin,
     contact::ContactPlugin,
     fault::{Fault, HairFault},
+    lod::LodPlugin,
     rod::RodPlugin,
     setting::{Bound, InvalidValue},
     sleep::SleepPlugin,
@@ -165,7 +166,8 @@ impl PluginGroup for HairPlugins {
             .add(WaterPlugin)
             .add(RodPlugin)
             .add(SpringPlugin)
-            .add(SleepPlugin);
+            .add(SleepPlugin)
+            .add(LodPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
         #[cfg(feature = "groom")]

@@ -4,6 +4,7 @@ mod common;
 use bevy::prelude::*;
 use bevy_keratin::{Sleepers, StrandError, prelude::*};
 use common::*;
+use std::time::Instant;
 
 /// A hair that hangs and sleeps, and its strand.
 fn sleeper() -> (App, Entity, Entity) {
@@ -53,7 +54,7 @@ fn until_asleep(app: &mut App, hair: Entity, limit: f64) -> f64 {
 /// A sleeper wakes by `act`.
 #[track_caller]
 fn wakes(act: impl FnOnce(&mut App, Entity, Entity)) {
-    woken(act);
+    let _ = woken(act);
 }
 
 #[track_caller]
@@ -186,7 +187,7 @@ fn colliders_wake_it_when_they_come_go_or_move_near_it() {
         let mut app = test_app(60.0);
         let ball = app.world_mut().spawn((ball(), at)).id();
         let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
-        run(&mut app, 1.5);
+        run(&mut app, 8.0);
         assert!(is_asleep(&app, e));
         (app, ball, e)
     };
@@ -197,6 +198,10 @@ fn colliders_wake_it_when_they_come_go_or_move_near_it() {
     go(&mut app, id, |t| t.translation.y += 0.01);
     run(&mut app, 0.05);
     assert!(!is_asleep(&app, e), "one that moves beside it");
+    let (mut app, id, e) = with_ball(near);
+    go(&mut app, id, |t| t.rotate_y(0.05));
+    run(&mut app, 0.05);
+    assert!(!is_asleep(&app, e), "one that turns where it is");
     let (mut app, id, e) = with_ball(near);
     app.world_mut().entity_mut(id).despawn();
     run(&mut app, 0.05);
@@ -460,4 +465,33 @@ fn who_sleeps_does_not_depend_on_threads() {
         line.unwrap_or_else(|| panic!("{text}"))
     });
     assert_eq!(digests[0], digests[1]);
+}
+
+#[test]
+fn hair_that_sleeps_costs_next_to_nothing() {
+    let mut app = test_app(60.0);
+    app.insert_resource(HairDefault(HairSleep::never()));
+    let hair = app.world_mut().spawn(Hair).id();
+    for i in 0..4000 {
+        let root = Vec3::new((i % 50) as f32, 0.0, (i / 50) as f32) * 2.5e-3;
+        let points: Vec<Vec3> = (0..16).map(|k| root + Vec3::NEG_Y * (0.016 * k as f32)).collect();
+        app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    run(&mut app, 0.3);
+    // The best of some: others on the machine slow single ticks down.
+    let tick = |app: &mut App| {
+        let one = |_| {
+            let start = Instant::now();
+            app.update();
+            start.elapsed().as_secs_f64()
+        };
+        (0..10).map(one).fold(f64::INFINITY, f64::min)
+    };
+    let awake = tick(&mut app);
+    app.insert_resource(HairDefault(HairSleep { speed: 1.0, turning: 10.0, seconds: 0.2 }));
+    run(&mut app, 0.4);
+    assert!(app.world().get::<Sleepers>(hair).unwrap().all());
+    let asleep = tick(&mut app);
+    println!("awake {} ms, asleep {} ms: 1 in {}", awake * 1e3, asleep * 1e3, awake / asleep);
+    assert!(awake > 10.0 * asleep, "awake {awake} s, asleep {asleep} s");
 }

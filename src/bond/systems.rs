@@ -6,11 +6,12 @@ use super::{
 };
 use crate::{
     fault::{Fault, HairFault},
+    lod::HairSteps,
     parallel::for_each,
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
     setting::{self, Bound, Notes, Settings},
     strand::{self, Burden, Sleep, Strand, StrandOf},
-    tick::{HairStep, HairSystems, HairTick},
+    tick::{HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
 
@@ -73,26 +74,30 @@ pub(super) struct Key {
 }
 
 fn generate_rest_shapes(
-    step: Res<HairStep>,
+    steps: HairSteps,
     influence: Settings<BondInfluence>,
     stiffness: Settings<Stiffness>,
     cuticle: Settings<Cuticle>,
     solver: Settings<Solver>,
     mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
 ) {
-    let mut resolved = HashMap::<Entity, Key>::default();
+    let mut resolved = HashMap::<Entity, Option<Key>>::default();
     let mut items = Vec::new();
     for (of, sleep, strand, bonds, burden, rest) in &mut strands {
         if sleep.is_asleep() {
             continue;
         }
-        let key = *resolved.entry(of.0).or_insert_with(|| Key {
-            influence: influence.of(of.0).as_array(),
-            stiffness: stiffness.of(of.0),
-            cuticle: cuticle.of(of.0),
-            iterations: solver.of(of.0).iterations,
-            dt: step.dt,
+        let key = *resolved.entry(of.0).or_insert_with(|| {
+            let stride = steps.of(of.0)?;
+            Some(Key {
+                influence: influence.of(of.0).as_array(),
+                stiffness: stiffness.of(of.0),
+                cuticle: cuticle.of(of.0),
+                iterations: stride.iterations(solver.of(of.0).iterations),
+                dt: stride.dt,
+            })
         });
+        let Some(key) = key else { continue };
         // Hair whose bonds are all closed, most hair most of the time, costs no more than this.
         if !rest.closed
             || rest.key != Some(key)

@@ -3,10 +3,11 @@
 use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles};
 use crate::{
     fault::{Fault, HairFault},
+    lod::HairSteps,
     rod::obstacle::{Obstacle, Solid},
     setting::{self, Notes, Settings},
     strand::{Hair, Sleep, Sleepers, StillPose, Strand, StrandOf, Strands, TickPose},
-    tick::{HairStep, HairSystems, HairTick},
+    tick::{HairSystems, HairTick},
 };
 use bevy::prelude::*;
 
@@ -80,7 +81,7 @@ fn gather_obstacles(
 }
 
 pub(crate) fn part_strands(
-    step: Res<HairStep>,
+    steps: HairSteps,
     contact: Settings<LockContact>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
     mut strands: Query<(&mut Strand, &mut Sleep, &mut StillPose), With<StrandOf>>,
@@ -90,6 +91,7 @@ pub(crate) fn part_strands(
         if radius <= 0.0 || strength <= 0.0 || sleepers.is_some_and(Sleepers::all) {
             continue;
         }
+        let Some(stride) = steps.of(hair) else { continue };
         let list = &mut neighbours.bypass_change_detection().0;
         list.clear();
         for (strand, ..) in strands.iter_many(members.collection()) {
@@ -106,7 +108,7 @@ pub(crate) fn part_strands(
                 continue;
             }
             let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
-            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * step.dt);
+            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * stride.dt);
         }
     }
 }

@@ -3,6 +3,11 @@
 use crate::rod::obstacle::Solid;
 use glam::{Quat, Vec3};
 
+/// Whether something has changed by no more than `most`; what is not a number has.
+pub fn within(change: f32, most: f32) -> bool {
+    change <= most
+}
+
 /// Whether all points are within `distance` (m) of where they were. Points that are not finite, and
 /// lists of other lengths, are elsewhere.
 pub fn stays(before: &[Vec3], now: &[Vec3], distance: f32) -> bool {
@@ -25,13 +30,21 @@ pub fn turn(a: Quat, b: Quat) -> f32 {
     2.0 * apart.sqrt()
 }
 
-/// How far a solid has gone from one place to another (m): no point of its surface within a metre of
-/// the origin has gone farther. Infinite between solids of different kinds.
+/// How far from its centre the surface of a solid reaches (m); of a half-space, where hair is.
+pub fn lever(solid: &Solid) -> f32 {
+    match *solid {
+        Solid::HalfSpace { .. } => 1.0,
+        Solid::Capsule { a, b, radius } => 0.5 * a.distance(b) + radius,
+        Solid::Cylinder { radius, half_height, .. } => radius + half_height,
+    }
+}
+
+/// How far a solid has gone from one place to another, apart from turning about its own centre (m).
+/// Infinite between solids of different kinds.
 pub fn displacement(before: &Solid, now: &Solid) -> f32 {
-    let lever = 1.0;
     match (*before, *now) {
         (Solid::HalfSpace { normal: n, point: p }, Solid::HalfSpace { normal: m, point: q }) => {
-            (n.dot(p) - m.dot(q)).abs() + n.distance(m) * lever
+            p.distance(q) + n.distance(m) * lever(now)
         }
         (Solid::Capsule { a, b, radius }, Solid::Capsule { a: c, b: d, radius: other }) => {
             a.distance(c).max(b.distance(d)) + (radius - other).abs()
@@ -41,7 +54,7 @@ pub fn displacement(before: &Solid, now: &Solid) -> f32 {
             Solid::Cylinder { center: c, axis: d, radius: r, half_height: h },
         ) => {
             center.distance(c)
-                + axis.distance(d) * (h + r)
+                + axis.distance(d) * lever(now)
                 + (radius - r).abs()
                 + (half_height - h).abs()
         }
@@ -85,8 +98,8 @@ mod tests {
         let ball = |x: f32, radius: f32| Solid::Capsule { a: Vec3::X * x, b: Vec3::X * x, radius };
         assert!((displacement(&ball(0.0, 0.1), &ball(0.02, 0.1)) - 0.02).abs() < 1e-7);
         assert!((displacement(&ball(0.0, 0.1), &ball(0.0, 0.13)) - 0.03).abs() < 1e-7);
-        let floor = |y: f32| Solid::HalfSpace { normal: Vec3::Y, point: Vec3::new(y, y, 3.0 * y) };
-        assert!((displacement(&floor(0.0), &floor(-0.5)) - 0.5).abs() < 1e-7, "along is nothing");
+        let floor = |x: f32| Solid::HalfSpace { normal: Vec3::Y, point: Vec3::X * x };
+        assert_eq!(displacement(&floor(0.0), &floor(-0.5)), 0.5, "a belt takes hair along");
         assert_eq!(displacement(&floor(0.0), &ball(0.0, 0.1)), f32::INFINITY);
     }
 

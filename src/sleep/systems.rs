@@ -2,7 +2,7 @@
 
 use super::{
     HairSleep,
-    model::{displacement, held_nodes, keeps_turn, stays, turn},
+    model::{displacement, held_nodes, keeps_turn, lever, stays, turn, within},
 };
 use crate::{
     air::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, model::wind},
@@ -108,9 +108,9 @@ pub(super) struct Watch {
     conditions: Option<Conditions>,
     pose: Pose,
     members: usize,
-    /// The colliders in its frame, with their friction.
+    /// The colliders in its frame.
     #[reflect(ignore)]
-    solids: Vec<(Solid, f32)>,
+    solids: Vec<Seen>,
 }
 
 /// What happened to a hair as a whole since the tick before.
@@ -130,7 +130,7 @@ impl Watch {
         conditions: Conditions,
         pose: &Pose,
         members: usize,
-        obstacles: &[Obstacle],
+        seen: Vec<Seen>,
         substeps: u32,
     ) -> News {
         let distance = conditions.sleep.distance();
@@ -146,7 +146,7 @@ impl Watch {
         self.conditions = Some(conditions);
         self.members = members;
         let skin = conditions.contact.radius + CLEARANCE;
-        let solids = self.compare_solids(obstacles, distance, skin, substeps);
+        let solids = self.compare_solids(seen, distance, skin, substeps);
         News { sleep: conditions.sleep, stirred: !(rests && same), solids, blowers: Vec::new() }
     }
 
@@ -154,38 +154,49 @@ impl Watch {
     /// within this tick.
     fn compare_solids(
         &mut self,
-        now: &[Obstacle],
+        now: Vec<Seen>,
         distance: f32,
         skin: f32,
         substeps: u32,
     ) -> Vec<(Solid, f32)> {
         let mut changed = Vec::new();
-        let moved = |before: &(Solid, f32), now: &(Solid, f32)| {
-            let friction = if before.1 == now.1 { 0.0 } else { f32::INFINITY };
-            displacement(&before.0, &now.0) + friction
-        };
-        let now = now.iter().map(|o| (o.solid, o.friction));
         if now.len() == self.solids.len() {
             for (known, now) in self.solids.iter_mut().zip(now) {
-                let moved = moved(known, &now);
+                let moved = known.moved(&now);
                 // What is not finite moves too.
-                if !(moved <= distance) {
+                if !within(moved, distance) {
                     // It goes on for the rest of the tick.
                     let reach = skin + moved * substeps as f32;
-                    changed.extend([(known.0, reach), (now.0, reach)]);
+                    changed.extend([(known.solid, reach), (now.solid, reach)]);
                     *known = now;
                 }
             }
             return changed;
         }
-        let now: Vec<_> = now.collect();
-        let is_new = |s: &(Solid, f32), others: &[(Solid, f32)]| {
-            others.iter().all(|other| !(moved(other, s) <= distance))
+        let unknown = |one: &&Seen, others: &[Seen]| {
+            others.iter().all(|other| !within(other.moved(one), distance))
         };
-        changed.extend(now.iter().filter(|s| is_new(s, &self.solids)).map(|s| (s.0, skin)));
-        changed.extend(self.solids.iter().filter(|s| is_new(s, &now)).map(|s| (s.0, skin)));
+        changed.extend(now.iter().filter(|s| unknown(s, &self.solids)).map(|s| (s.solid, skin)));
+        changed.extend(self.solids.iter().filter(|s| unknown(s, &now)).map(|s| (s.solid, skin)));
         self.solids = now;
         changed
+    }
+}
+
+/// A collider as a hair saw it.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    solid: Solid,
+    friction: f32,
+    rotation: Quat,
+}
+
+impl Seen {
+    /// How far its surface has moved (m): a ball that only turns takes hair along too.
+    fn moved(&self, now: &Self) -> f32 {
+        let friction = if self.friction == now.friction { 0.0 } else { f32::INFINITY };
+        let turned = turn(self.rotation, now.rotation) * lever(&now.solid);
+        displacement(&self.solid, &now.solid) + turned + friction
     }
 }
 
@@ -220,11 +231,15 @@ fn watch(
     let mut news: Vec<News> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
     for (hair, frame, mut watch, _, members) in &mut hairs {
-        let obstacles: Vec<Obstacle> =
-            colliders.iter().map(|(c, pose)| seen_from(frame, &c.valid(), pose)).collect();
+        let seen = colliders.iter().map(|(collider, pose)| {
+            let Obstacle { solid, friction, .. } = seen_from(frame, &collider.valid(), pose);
+            let rotation = frame.now().rotation.inverse() * pose.now().rotation;
+            Seen { solid, friction, rotation }
+        });
+        let seen = seen.collect();
         let members = members.map_or(0, |members| members.len());
         let watch = watch.bypass_change_detection();
-        let mut new = watch.news(settings.of(hair), frame.now(), members, &obstacles, step.count);
+        let mut new = watch.news(settings.of(hair), frame.now(), members, seen, step.count);
         new.blowers = local_blowers(frame.now(), &blowers);
         index_of.insert(hair, news.len());
         news.push(new);
@@ -276,6 +291,10 @@ fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
         return;
     }
     let (sleep, still) = (sleep.bypass_change_detection(), still.bypass_change_detection());
+    if news.sleep.seconds == f32::INFINITY {
+        sleep.wake_up();
+        return;
+    }
     if restless
         || !stays(&still.positions, strand.positions(), distance)
         || !keeps_turn(&still.orientations, strand.orientations(), angle)
@@ -289,12 +308,15 @@ fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
     }
     sleep.lie_still(seconds);
     if sleep.still_for() >= news.sleep.seconds {
-        sleep.fall_asleep();
-        strand.rest();
         still.distance = distance;
         (still.low, still.high) = (strand.positions()[0], strand.positions()[0]);
         for p in strand.positions() {
             (still.low, still.high) = (still.low.min(*p), still.high.max(*p));
+        }
+        // What comes in this very tick would find it asleep.
+        if !comes_near(still, &news.solids) {
+            sleep.fall_asleep();
+            strand.rest();
         }
     }
 }
@@ -307,7 +329,7 @@ fn was_pushed(strand: &Strand) -> bool {
 fn has_moved_root(strand: &Strand, still: &StillPose, distance: f32, angle: f32) -> bool {
     let stays = still.positions.first().zip(strand.positions().first());
     !stays.is_some_and(|(a, b)| a.distance(*b) <= distance)
-        || !(turn(still.root_frame, strand.root_frame()) <= angle)
+        || !within(turn(still.root_frame, strand.root_frame()), angle)
 }
 
 /// Whether other nodes are held than before, or the same ones elsewhere.
@@ -317,7 +339,7 @@ fn pulls(strand: &Strand, still: &StillPose, targets: &[Option<Vec3>], distance:
     }
     let held = targets.iter().zip(strand.positions());
     held_nodes(targets) != still.held
-        || held.filter_map(|(t, p)| Some(t.as_ref()?.distance(*p))).any(|d| !(d <= distance))
+        || held.filter_map(|(t, p)| Some(t.as_ref()?.distance(*p))).any(|d| !within(d, distance))
 }
 
 fn comes_near(still: &StillPose, solids: &[(Solid, f32)]) -> bool {
@@ -333,7 +355,7 @@ fn is_blown(strand: &Strand, blowers: &[LocalBlower]) -> bool {
     blowers.iter().any(|LocalBlower { nozzle, aim, blower }| {
         [0, last / 2, last].into_iter().any(|i| {
             let felt = wind(blower.strength, *nozzle, *aim, p[i], p[i + 1] - p[i]);
-            !(felt.length_squared() < BREEZE * BREEZE)
+            !within(felt.length(), BREEZE)
         })
     })
 }

@@ -8,6 +8,7 @@ use crate::{
     air::HairGravity,
     contact::{LockContact, Obstacles},
     fault::{Fault, HairFault},
+    lod::HairSteps,
     parallel::for_each_block,
     rod::{
         LANES,
@@ -17,7 +18,7 @@ use crate::{
     },
     setting::{self, Settings},
     strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf, TickPose},
-    tick::{HairStep, HairSystems, HairTick},
+    tick::{HairSystems, HairTick},
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 use fearless_simd::Level;
@@ -48,7 +49,7 @@ struct Item<'a> {
 }
 
 fn step_springs(
-    time: Res<HairStep>,
+    steps: HairSteps,
     model: Settings<StrandModel>,
     springs: Settings<Springs>,
     contact: Settings<LockContact>,
@@ -67,14 +68,17 @@ fn step_springs(
         }
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let (obstacles, pose) = hairs.get(of.0).ok()?;
+            let stride = steps.of(of.0)?;
             (model.of(of.0) == StrandModel::MassSpring).then(|| {
+                let full = springs.of(of.0);
+                let iterations = stride.iterations(full.iterations);
                 let step = StepParams {
-                    dt: time.dt,
-                    springs: springs.of(of.0),
+                    dt: stride.dt,
+                    springs: Springs { iterations, ..full },
                     gravity: pose.now().direction_in(gravity),
                     skin: contact.of(of.0).radius,
                 };
-                params.push(HairParams { step, obstacles: obstacles.solids.clone() });
+                params.push(HairParams { step, obstacles: obstacles.over(stride.substeps) });
                 params.len() - 1
             })
         });
