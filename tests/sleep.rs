@@ -468,6 +468,7 @@ fn who_sleeps_does_not_depend_on_threads() {
 }
 
 #[test]
+#[ignore = "measures time: run it alone on an idle machine"]
 fn hair_that_sleeps_costs_next_to_nothing() {
     let mut app = test_app(60.0);
     app.insert_resource(HairDefault(HairSleep::never()));
