@@ -63,6 +63,7 @@ fn app() -> App {
         HairPlugins::default(),
     ))
     .insert_resource(Time::<Fixed>::from_hz(60.0))
+    .insert_resource(HairDefault(HairSleep::never()))
     .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
     .init_resource::<Clock>()
     .init_resource::<TickClock>()

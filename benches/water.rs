@@ -33,7 +33,12 @@ const REACH: f32 = 0.015;
 
 fn main() {
     println!("droplets | paper, GT 630, ms | rods, ms | springs, ms | peak strain of each");
+    // `cargo bench --bench water -- 1000` runs one row.
+    let named: Vec<usize> = std::env::args().filter_map(|arg| arg.parse().ok()).collect();
     for (count, paper) in PAPER {
+        if !named.is_empty() && !named.contains(&count) {
+            continue;
+        }
         let mut apps = ["rods", "springs"].map(|variant| wet(variant, count));
         let mut best = [f64::INFINITY; 2];
         for _ in 0..20 {
@@ -46,6 +51,9 @@ fn main() {
         let paper = paper.map_or("–".into(), |ms| ms.to_string());
         let [a, b] = apps.map(|app| app.world().resource::<StrainPeak>().0);
         println!("{count} | {paper} | {:.2} | {:.2} | {a:.4} {b:.4}", best[0], best[1]);
+    }
+    if !named.is_empty() {
+        return;
     }
     println!("\ndroplets, ten strands each | a query, strands side by side, ns | in any order, ns");
     for count in [1_000, 10_000, 100_000] {
@@ -60,6 +68,7 @@ fn wet(variant: &str, count: usize) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, HairPlugins::default(), ScenePlugin(scene)))
         .insert_resource(Strewn { count, ..default() })
+        .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.finish();

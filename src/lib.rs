@@ -11,11 +11,13 @@ pub mod grid;
 pub mod groom;
 #[cfg(feature = "save")]
 pub mod hairdo;
+pub mod lod;
 mod parallel;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod rod;
 pub mod setting;
+pub mod sleep;
 pub mod spring;
 pub mod strand;
 pub mod style;
@@ -32,11 +34,14 @@ pub use fault::{Fault, HairFault};
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 #[cfg(feature = "save")]
 pub use hairdo::{Hairdo, HairdoError};
+pub use lod::{HairLod, LodLevel, PresentLod, ScreenShare};
 pub use rod::{Solver, Stiffness, StretchProjection};
 pub use setting::{HairDefault, InvalidValue};
+pub use sleep::HairSleep;
 pub use spring::Springs;
 pub use strand::{
-    Burden, Hair, HairInertia, HeldNodes, Strand, StrandError, StrandModel, StrandOf, Strands,
+    Burden, Hair, HairInertia, HeldNodes, Sleep, Sleepers, Strand, StrandError, StrandModel,
+    StrandOf, Strands,
 };
 pub use style::{PermRod, Treat, Winding, WoundOn, WoundStrands};
 pub use tick::{HairPlugins, HairStep, HairSubsteps, HairSystems, HairTick};
@@ -61,9 +66,9 @@ pub mod prelude {
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
-        HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairPlugins, HairSubsteps,
-        HairSystems, HairTick, HeldNodes, LockContact, Moisture, PermRod, ProcessTime, Shower,
-        Soak, Solver, Stiffness, Strand, StrandModel, StrandOf, Strands, StretchProjection, Treat,
-        WaterLedger, Wetting, Winding, WoundOn,
+        HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairLod, HairPlugins,
+        HairSleep, HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact, Moisture, PermRod,
+        ProcessTime, ScreenShare, Shower, Sleep, Soak, Solver, Stiffness, Strand, StrandModel,
+        StrandOf, Strands, StretchProjection, Treat, WaterLedger, Wetting, Winding, WoundOn,
     };
 }

@@ -110,6 +110,20 @@ impl<T: HairSetting> Settings<'_, '_, T> {
     }
 }
 
+/// Reports invalid values of a setting that only components carry.
+pub(crate) fn report_changed<T: HairSetting>(
+    changed: Query<(Entity, &T), Changed<T>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, setting) in &changed {
+        let notes = Notes::default();
+        setting.mended(&notes);
+        for wrong in notes.into_inner() {
+            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+        }
+    }
+}
+
 /// Registers one setting: its default, its type, and the report of invalid values.
 pub(crate) fn plugin<T: HairSetting>(app: &mut App) {
     app.init_resource::<HairDefault<T>>()

@@ -18,8 +18,10 @@ use crate::{
     bond::BondPlugin,
     contact::ContactPlugin,
     fault::{Fault, HairFault},
+    lod::LodPlugin,
     rod::RodPlugin,
     setting::{Bound, InvalidValue},
+    sleep::SleepPlugin,
     spring::SpringPlugin,
     strand::StrandPlugin,
     style::StylePlugin,
@@ -35,7 +37,7 @@ pub struct HairTick;
 pub enum HairSystems {
     /// Empty, for users.
     First,
-    /// Where the scalp is now: frames move, free nodes stay behind by inertia, new strands get
+    /// Where the scalp is now: frames move, strands fall asleep and wake, free nodes stay behind by inertia, new strands get
     /// their bonds.
     Roots,
     /// Gravity, wind (equation 17) and drag change velocities; water soaks, flows and dries; drying
@@ -163,7 +165,9 @@ impl PluginGroup for HairPlugins {
             .add(StylePlugin)
             .add(WaterPlugin)
             .add(RodPlugin)
-            .add(SpringPlugin);
+            .add(SpringPlugin)
+            .add(SleepPlugin)
+            .add(LodPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
         #[cfg(feature = "groom")]

@@ -11,9 +11,9 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use bevy_keratin::{
-    BondChanges, DropletRules, HairStep, air::AirPlugin, bond::BondPlugin, bond::RestShape,
-    contact::ContactPlugin, contact::Obstacles, prelude::*, spring::SpringPlugin,
-    style::StylePlugin, water::WaterPlugin,
+    BondChanges, DropletRules, HairStep, Sleepers, air::AirPlugin, bond::BondPlugin,
+    bond::RestShape, contact::ContactPlugin, contact::Obstacles, prelude::*, sleep::SleepPlugin,
+    spring::SpringPlugin, style::StylePlugin, water::WaterPlugin,
 };
 use std::{
     process::Command,
@@ -21,6 +21,9 @@ use std::{
 };
 
 const THREADS: &str = "KERATIN_BENCH_THREADS";
+
+/// Set, only the rows of sleep and of levels of detail are printed.
+const SLEEP_ONLY: &str = "KERATIN_BENCH_SLEEP";
 
 /// Prints the whole table, or in a process of its own the rows of one number of threads.
 pub fn print() -> bool {
@@ -41,9 +44,14 @@ pub fn print() -> bool {
 }
 
 fn rows(threads: usize) {
+    let sleep_only = std::env::var_os(SLEEP_ONLY).is_some();
     // First, while the process has nothing that it could use again.
-    if threads == 1 {
+    if threads == 1 && !sleep_only {
         println!("100000 × 16 | memory {:.2} kB a strand, of all that is held for it", memory());
+    }
+    sleep_row(threads);
+    if sleep_only {
+        return;
     }
     for (strands, nodes) in [(200, 9), (10_000, 6), (10_000, 16), (1_000, 64), (100_000, 16)] {
         row(threads, strands, nodes);
@@ -58,6 +66,41 @@ fn rows(threads: usize) {
             with * 1e6 / strands as f64,
         );
     }
+}
+
+/// The same head awake, asleep, and on the two levels of detail.
+fn sleep_row(threads: usize) {
+    let mut app = app(threads, Kind::Tick, &head(10_000, 16), Some(head_radius(10_000)));
+    app.insert_resource(HairDefault(LockContact::default()));
+    let hair = app.world_mut().query_filtered::<Entity, With<Hair>>().single(app.world());
+    let hair = hair.expect("one hair");
+    app.world_mut().entity_mut(hair).insert(HairLod::default());
+    (0..240).for_each(|_| app.update());
+    // Whatever it does counts as lying still.
+    let sleepy = HairSleep { speed: 1.0, turning: 10.0, seconds: 0.2 };
+    let (mut awake, mut asleep) = ([f64::INFINITY; 3], f64::INFINITY);
+    for _ in 0..6 {
+        app.insert_resource(HairDefault(HairSleep::never()));
+        for (best, share) in awake.iter_mut().zip([0.05, 0.2, 1.0]) {
+            app.world_mut().entity_mut(hair).insert(ScreenShare(share));
+            app.update();
+            *best = best.min(seconds(|| app.update()));
+        }
+        app.insert_resource(HairDefault(sleepy));
+        (0..16).for_each(|_| app.update());
+        asleep = asleep.min(seconds(|| app.update()));
+        let sleepers = app.world().get::<Sleepers>(hair);
+        assert!(sleepers.is_some_and(Sleepers::all), "{sleepers:?}");
+    }
+    println!(
+        "10000 × 16 with contacts | {threads} | awake {:.2} ms, asleep {:.2} ms, 1 in {:.0} | levels \
+         of detail {:.0} % and {:.0} %",
+        awake[2] * 1e3,
+        asleep * 1e3,
+        awake[2] / asleep,
+        awake[1] / awake[2] * 100.0,
+        awake[0] / awake[2] * 100.0,
+    );
 }
 
 fn row(threads: usize, strands: usize, nodes: usize) {
@@ -238,14 +281,16 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
                 .disable::<ContactPlugin>()
                 .disable::<StylePlugin>()
                 .disable::<WaterPlugin>()
-                .disable::<SpringPlugin>(),
+                .disable::<SpringPlugin>()
+                .disable::<SleepPlugin>(),
         ),
-        Kind::NoBonds => app.add_plugins(plugins.disable::<BondPlugin>()),
+        Kind::NoBonds => app.add_plugins(plugins.disable::<BondPlugin>().disable::<SleepPlugin>()),
         Kind::Tick | Kind::BondsMoving => app.add_plugins(plugins),
     };
     // What the plugins left out would have brought, and no contact between strands to begin with.
     app.init_resource::<HairDefault<BondInfluence>>()
         .insert_resource(HairDefault(AirDrag { rate: 3.0 }))
+        .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
     if kind == Kind::Projection {
         app.insert_resource(HairDefault(Solver { limiter_steps: 0, ..default() }));

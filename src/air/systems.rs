@@ -4,10 +4,11 @@ use super::{AirDrag, Blower, HairGravity, WindReceived, model::wind};
 use crate::{
     bond::{BondChanges, BondKind, model::drying},
     fault::{Fault, HairFault},
+    lod::HairSteps,
     parallel::for_each,
     setting::{self, Notes, Settings},
-    strand::{Burden, Hair, Pose, Strand, StrandOf, TickPose},
-    tick::{HairStep, HairSystems, HairTick},
+    strand::{Burden, Hair, Pose, Sleep, Strand, StrandOf, TickPose},
+    tick::{HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
 
@@ -50,6 +51,7 @@ fn report_gravity(gravity: Res<HairGravity>, mut faults: MessageWriter<HairFault
 struct LocalAir {
     gravity: Vec3,
     keep: f32,
+    dt: f32,
     blowers: Vec<LocalBlower>,
 }
 
@@ -79,13 +81,14 @@ pub(crate) fn local_blowers(
 }
 
 pub(crate) fn apply_air(
-    step: Res<HairStep>,
+    steps: HairSteps,
     gravity: Res<HairGravity>,
     drag: Settings<AirDrag>,
     hairs: Query<&TickPose, With<Hair>>,
     blowers: Query<(&Blower, &TickPose)>,
     mut strands: Query<(
         &StrandOf,
+        &Sleep,
         &mut Strand,
         &Burden,
         &mut BondChanges,
@@ -96,12 +99,17 @@ pub(crate) fn apply_air(
     let mut airs: Vec<LocalAir> = Vec::new();
     let mut index_of = HashMap::<Entity, Option<usize>>::default();
     let mut items = Vec::with_capacity(strands.iter().len());
-    for (of, strand, burden, changes, received) in &mut strands {
+    for (of, sleep, strand, burden, changes, received) in &mut strands {
+        if sleep.is_asleep() {
+            continue;
+        }
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let pose = hairs.get(of.0).ok()?.now();
+            let dt = steps.of(of.0)?.dt;
             airs.push(LocalAir {
-                gravity: pose.direction_in(gravity) * step.dt,
-                keep: bevy::math::ops::exp(-drag.of(of.0).rate * step.dt),
+                gravity: pose.direction_in(gravity) * dt,
+                keep: bevy::math::ops::exp(-drag.of(of.0).rate * dt),
+                dt,
                 blowers: local_blowers(pose, &blowers),
             });
             Some(airs.len() - 1)
@@ -132,13 +140,13 @@ pub(crate) fn apply_air(
             let edge = positions[i + 1] - positions[i];
             let (mut change, mut dried) = (Vec3::ZERO, 0.0);
             for LocalBlower { nozzle, aim, blower } in &air.blowers {
-                let w = wind(blower.strength, *nozzle, *aim, positions[i], edge) * step.dt;
+                let w = wind(blower.strength, *nozzle, *aim, positions[i], edge) * air.dt;
                 change += w;
                 dried += drying(w.length(), blower.drying);
                 if i + 1 == edges {
                     velocities[i + 1] +=
                         wind(blower.strength, *nozzle, *aim, positions[i + 1], edge)
-                            * (step.dt * heed(i + 1));
+                            * (air.dt * heed(i + 1));
                 }
             }
             velocities[i] += change * heed(i);

@@ -6,11 +6,12 @@ use super::{
 };
 use crate::{
     fault::{Fault, HairFault},
+    lod::HairSteps,
     parallel::for_each,
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
     setting::{self, Bound, Notes, Settings},
-    strand::{self, Burden, Strand, StrandOf},
-    tick::{HairStep, HairSystems, HairTick},
+    strand::{self, Burden, Sleep, Strand, StrandOf},
+    tick::{HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
 
@@ -73,23 +74,30 @@ pub(super) struct Key {
 }
 
 fn generate_rest_shapes(
-    step: Res<HairStep>,
+    steps: HairSteps,
     influence: Settings<BondInfluence>,
     stiffness: Settings<Stiffness>,
     cuticle: Settings<Cuticle>,
     solver: Settings<Solver>,
-    mut strands: Query<(&StrandOf, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
+    mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
 ) {
-    let mut resolved = HashMap::<Entity, Key>::default();
+    let mut resolved = HashMap::<Entity, Option<Key>>::default();
     let mut items = Vec::new();
-    for (of, strand, bonds, burden, rest) in &mut strands {
-        let key = *resolved.entry(of.0).or_insert_with(|| Key {
-            influence: influence.of(of.0).as_array(),
-            stiffness: stiffness.of(of.0),
-            cuticle: cuticle.of(of.0),
-            iterations: solver.of(of.0).iterations,
-            dt: step.dt,
+    for (of, sleep, strand, bonds, burden, rest) in &mut strands {
+        if sleep.is_asleep() {
+            continue;
+        }
+        let key = *resolved.entry(of.0).or_insert_with(|| {
+            let stride = steps.of(of.0)?;
+            Some(Key {
+                influence: influence.of(of.0).as_array(),
+                stiffness: stiffness.of(of.0),
+                cuticle: cuticle.of(of.0),
+                iterations: stride.iterations(solver.of(of.0).iterations),
+                dt: stride.dt,
+            })
         });
+        let Some(key) = key else { continue };
         // Hair whose bonds are all closed, most hair most of the time, costs no more than this.
         if !rest.closed
             || rest.key != Some(key)
@@ -133,10 +141,13 @@ fn has_softened(before: &[f32], now: &[f32]) -> bool {
     before.len() != now.len() || before.iter().zip(now).any(|(a, b)| (a - b).abs() > 2e-3)
 }
 
-fn update_bonds(mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape)>) {
+fn update_bonds(
+    mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut Sleep)>,
+) {
     let mut items: Vec<_> =
-        strands.iter_mut().filter(|(_, _, changes, _)| !changes.is_empty()).collect();
-    for_each(&mut items, |(strand, bonds, changes, rest)| {
+        strands.iter_mut().filter(|(_, _, changes, ..)| !changes.is_empty()).collect();
+    for_each(&mut items, |(strand, bonds, changes, rest, sleep)| {
+        sleep.bypass_change_detection().wake();
         rest.bypass_change_detection().closed = false;
         let joints: &mut [JointBonds] = &mut bonds.bypass_change_detection().joints;
         for (i, change) in changes.bypass_change_detection().take() {

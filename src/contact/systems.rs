@@ -3,10 +3,11 @@
 use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles};
 use crate::{
     fault::{Fault, HairFault},
+    lod::HairSteps,
     rod::obstacle::{Obstacle, Solid},
     setting::{self, Notes, Settings},
-    strand::{Hair, Strand, StrandOf, Strands, TickPose},
-    tick::{HairStep, HairSystems, HairTick},
+    strand::{Hair, Sleep, Sleepers, StillPose, Strand, StrandOf, Strands, TickPose},
+    tick::{HairSystems, HairTick},
 };
 use bevy::prelude::*;
 
@@ -82,26 +83,34 @@ fn gather_obstacles(
 }
 
 pub(crate) fn part_strands(
-    step: Res<HairStep>,
+    steps: HairSteps,
     contact: Settings<LockContact>,
-    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours), With<Hair>>,
-    mut strands: Query<&mut Strand, With<StrandOf>>,
+    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
+    mut strands: Query<(&mut Strand, &mut Sleep, &mut StillPose), With<StrandOf>>,
 ) {
-    for (hair, members, mut neighbours) in &mut hairs {
+    for (hair, members, mut neighbours, sleepers) in &mut hairs {
         let LockContact { radius, strength } = contact.of(hair);
-        if radius <= 0.0 || strength <= 0.0 {
+        if radius <= 0.0 || strength <= 0.0 || sleepers.is_some_and(Sleepers::all) {
             continue;
         }
+        let Some(stride) = steps.of(hair) else { continue };
         let list = &mut neighbours.bypass_change_detection().0;
         list.clear();
-        for strand in strands.iter_many(members.collection()) {
+        for (strand, ..) in strands.iter_many(members.collection()) {
             list.add(strand.positions());
         }
         let mut pushes = list.pushes(radius, strength);
         let mut members = strands.iter_many_mut(members.collection());
-        while let Some(mut strand) = members.fetch_next() {
+        while let Some((mut strand, mut sleep, mut still)) = members.fetch_next() {
+            if sleep.is_asleep() {
+                let pushes = pushes.by_ref().take(strand.nodes());
+                if still.bypass_change_detection().feels(pushes, strength / (2.0 * radius)) {
+                    sleep.bypass_change_detection().wake();
+                }
+                continue;
+            }
             let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
-            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * step.dt);
+            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * stride.dt);
         }
     }
 }

@@ -24,6 +24,7 @@ mod followers;
 mod given;
 mod look;
 mod material;
+mod share;
 mod upload;
 mod view;
 
@@ -100,6 +101,10 @@ impl Plugin for HairRenderPlugin {
                 PostUpdate,
                 beads::show_droplets.in_set(HairBeadSystems).before(HairRenderSystems),
             );
+        app.add_systems(
+            PostUpdate,
+            share::measure.after(TransformSystems::Propagate).after(HairRenderSystems),
+        );
         // The drawn child inherits it. An error says that the user has required it already.
         let _ = app.try_register_required_components::<Hair, Visibility>();
     }

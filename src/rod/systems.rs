@@ -10,10 +10,11 @@ use crate::{
     bond::{BondInfluence, Bonds, RestShape},
     contact::{LockContact, Obstacles},
     fault::{Fault, HairFault},
+    lod::HairSteps,
     parallel::for_each_block,
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, Strand, StrandModel, StrandOf},
-    tick::{HairStep, HairSystems, HairTick},
+    strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf},
+    tick::{HairSystems, HairTick},
 };
 use bevy::{platform::collections::HashMap, prelude::*};
 use fearless_simd::Level;
@@ -49,7 +50,7 @@ struct Item<'a> {
 }
 
 pub(crate) fn project(
-    time: Res<HairStep>,
+    steps: HairSteps,
     model: Settings<StrandModel>,
     solver: Settings<Solver>,
     stiffness: Settings<Stiffness>,
@@ -59,6 +60,7 @@ pub(crate) fn project(
     mut strands: Query<(
         Entity,
         &StrandOf,
+        &Sleep,
         &mut Strand,
         &RestShape,
         &Bonds,
@@ -70,14 +72,18 @@ pub(crate) fn project(
     let mut params: Vec<HairParams> = Vec::new();
     let mut index_of = HashMap::<Entity, Option<usize>>::default();
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
-    for (entity, of, strand, rest, bonds, burden, held) in &mut strands {
+    for (entity, of, sleep, strand, rest, bonds, burden, held) in &mut strands {
+        if sleep.is_asleep() {
+            continue;
+        }
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let obstacles = hairs.get(of.0).ok().filter(|_| model.of(of.0) == StrandModel::Rod)?;
+            let stride = steps.of(of.0)?;
             let s = solver.of(of.0);
             params.push(HairParams {
                 step: StepParams {
-                    dt: time.dt,
-                    iterations: s.iterations,
+                    dt: stride.dt,
+                    iterations: stride.iterations(s.iterations),
                     projection: s.projection,
                     limiter_steps: s.limiter_steps,
                     internal_damping: s.internal_damping,
@@ -85,7 +91,7 @@ pub(crate) fn project(
                 },
                 stiffness: stiffness.of(of.0),
                 influence: influence.of(of.0).as_array(),
-                obstacles: obstacles.solids.clone(),
+                obstacles: obstacles.over(stride.substeps),
             });
             Some(params.len() - 1)
         });

@@ -8,6 +8,7 @@ use crate::{
     air::HairGravity,
     contact::{LockContact, Obstacles},
     fault::{Fault, HairFault},
+    lod::HairSteps,
     parallel::for_each_block,
     rod::{
         LANES,
@@ -16,8 +17,8 @@ use crate::{
         project,
     },
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, Strand, StrandModel, StrandOf, TickPose},
-    tick::{HairStep, HairSystems, HairTick},
+    strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf, TickPose},
+    tick::{HairSystems, HairTick},
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 use fearless_simd::Level;
@@ -48,30 +49,36 @@ struct Item<'a> {
 }
 
 fn step_springs(
-    time: Res<HairStep>,
+    steps: HairSteps,
     model: Settings<StrandModel>,
     springs: Settings<Springs>,
     contact: Settings<LockContact>,
     gravity: Res<HairGravity>,
     hairs: Query<(&Obstacles, &TickPose)>,
-    mut strands: Query<(Entity, &StrandOf, &mut Strand, &Burden, Option<&HeldNodes>)>,
+    mut strands: Query<(Entity, &StrandOf, &Sleep, &mut Strand, &Burden, Option<&HeldNodes>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
     let mut params: Vec<HairParams> = Vec::new();
     let mut index_of = EntityHashMap::<Option<usize>>::default();
     let mut items: Vec<Item<'_>> = Vec::new();
-    for (entity, of, strand, burden, held) in &mut strands {
+    for (entity, of, sleep, strand, burden, held) in &mut strands {
+        if sleep.is_asleep() {
+            continue;
+        }
         let index = *index_of.entry(of.0).or_insert_with(|| {
             let (obstacles, pose) = hairs.get(of.0).ok()?;
+            let stride = steps.of(of.0)?;
             (model.of(of.0) == StrandModel::MassSpring).then(|| {
+                let full = springs.of(of.0);
+                let iterations = stride.iterations(full.iterations);
                 let step = StepParams {
-                    dt: time.dt,
-                    springs: springs.of(of.0),
+                    dt: stride.dt,
+                    springs: Springs { iterations, ..full },
                     gravity: pose.now().direction_in(gravity),
                     skin: contact.of(of.0).radius,
                 };
-                params.push(HairParams { step, obstacles: obstacles.solids.clone() });
+                params.push(HairParams { step, obstacles: obstacles.over(stride.substeps) });
                 params.len() - 1
             })
         });

@@ -11,11 +11,13 @@
 
 mod command;
 pub mod frame;
+mod sleep;
 mod systems;
 
 pub use frame::{HairInertia, Pose, TickPose};
+pub use sleep::{Sleep, Sleepers, StillPose};
 pub use systems::StrandPlugin;
-pub(crate) use systems::carry_strands;
+pub(crate) use systems::{carry_strands, move_poses};
 
 use crate::{
     bond::{BondChanges, Bonds, RestShape},
@@ -82,7 +84,7 @@ pub const MIN_SEGMENT: f32 = 1e-6;
 /// number of nodes stays what it was.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-#[require(Bonds, BondChanges, RestShape, StrandHistory, Burden)]
+#[require(Bonds, BondChanges, RestShape, StrandHistory, Burden, Sleep, StillPose)]
 pub struct Strand {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,

@@ -1,8 +1,8 @@
 //! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
 
 use super::{
-    Burden, Hair, HeldNodes, Strand, StrandError, StrandHistory, StrandModel, StrandOf, Strands,
-    TickPose,
+    Burden, Hair, HeldNodes, Sleep, Sleepers, StillPose, Strand, StrandError, StrandHistory,
+    StrandModel, StrandOf, Strands, TickPose,
     frame::{HairInertia, Pose},
 };
 use crate::{
@@ -28,6 +28,9 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandHistory>()
             .register_type::<HeldNodes>()
             .register_type::<Burden>()
+            .register_type::<Sleep>()
+            .register_type::<Sleepers>()
+            .register_type::<StillPose>()
             .add_systems(PreUpdate, (report_unusable, record_frame))
             .add_systems(
                 HairTick,
@@ -58,9 +61,13 @@ fn report_unusable(
 }
 
 /// Before the first substep of a tick: what was present becomes history.
-fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &mut StrandHistory)>) {
+fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &Sleep, &mut StrandHistory)>) {
     if step.index == 0 {
-        for (strand, mut history) in &mut strands {
+        for (strand, sleep, mut history) in &mut strands {
+            // A sleeper was remembered as it fell asleep. Only its root may go a hair's breadth.
+            if sleep.is_asleep() && history.positions.first() == strand.positions.first() {
+                continue;
+            }
             history.bypass_change_detection().positions.clone_from(&strand.positions);
         }
     }
@@ -79,7 +86,7 @@ fn record_frame(
     }
 }
 
-fn move_poses(
+pub(crate) fn move_poses(
     step: Res<HairStep>,
     (time, frames): (Res<Time>, Res<Time<Virtual>>),
     transforms: TransformHelper,
@@ -112,14 +119,15 @@ fn move_poses(
 /// Inertia: free nodes are carried by the inverse of the frame's motion; the root stays.
 pub(crate) fn carry_strands(
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<(&StrandOf, &mut Strand)>,
+    mut strands: Query<(&StrandOf, &Sleep, &mut Strand)>,
 ) {
     if hairs.iter().all(|hair| hair.carry().is_none()) {
         return;
     }
     let mut items: Vec<_> = strands
         .iter_mut()
-        .filter_map(|(of, strand)| Some((hairs.get(of.0).ok()?.carry()?, strand)))
+        .filter(|(_, sleep, _)| !sleep.is_asleep())
+        .filter_map(|(of, _, strand)| Some((hairs.get(of.0).ok()?.carry()?, strand)))
         .collect();
     for_each(&mut items, |(carry, strand)| {
         let strand = strand.bypass_change_detection();

@@ -263,7 +263,7 @@ struct Head<'a> {
 
 struct Strandful<'a> {
     entity: Entity,
-    strand: &'a mut Strand,
+    strand: Mut<'a, Strand>,
     burden: &'a Burden,
     moisture: &'a Moisture,
 }
@@ -394,8 +394,7 @@ fn heads<'a>(
         if let Some(index) = index
             && strand.nodes() >= 2
         {
-            let (strand, burden, moisture) =
-                (strand.into_inner(), &*burden.into_inner(), &*moisture.into_inner());
+            let (burden, moisture) = (&*burden.into_inner(), &*moisture.into_inner());
             heads[index].strands.push(Strandful { entity, strand, burden, moisture });
         }
     }
@@ -438,6 +437,7 @@ fn meet_all(
         |(), (strands, out)| {
             out.clear(field.drops.len());
             for Strandful { entity, strand, burden, moisture } in strands.iter_mut() {
+                let strand = strand.bypass_change_detection();
                 let (positions, velocities, lengths) = strand.motion_parts();
                 let mut met = Met {
                     strand: *entity,

@@ -1,0 +1,56 @@
+//! How large hair is on the screen, for its level of detail.
+
+use super::HairBuffers;
+use crate::lod::{ScreenShare, model::screen_share};
+use bevy::{
+    camera::{Camera, primitives::Aabb},
+    prelude::*,
+};
+
+/// Once a frame, after hair has been drawn where it is: the largest share in any view that is active.
+/// Without one, what a game wrote stays.
+pub(super) fn measure(
+    cameras: Query<(&Camera, &GlobalTransform)>,
+    mut hairs: Query<(&HairBuffers, &GlobalTransform, &mut ScreenShare)>,
+    drawn: Query<&Aabb>,
+) {
+    for (buffers, place, mut share) in &mut hairs {
+        let Ok(bounds) = drawn.get(buffers.drawn) else { continue };
+        let center = place.transform_point(bounds.center.into());
+        let scale = place.affine().matrix3.determinant().abs().cbrt();
+        let radius = bounds.half_extents.length() * scale;
+        let views = cameras.iter().filter(|(camera, _)| camera.is_active);
+        let seen = views.map(|(camera, from)| seen_in(camera, from, center, radius));
+        if let Some(largest) = seen.reduce(f32::max)
+            && largest.is_finite()
+        {
+            share.set_if_neq(ScreenShare(largest));
+        }
+    }
+}
+
+fn seen_in(camera: &Camera, from: &GlobalTransform, center: Vec3, radius: f32) -> f32 {
+    let clip = camera.clip_from_view();
+    let ahead = (center - from.translation()).dot(*from.forward());
+    if ahead < -radius {
+        return 0.0;
+    }
+    if clip.w_axis.w == 1.0 {
+        // Parallel: as large from anywhere.
+        return clip.y_axis.y * radius;
+    }
+    screen_share(radius, from.translation().distance(center), clip.y_axis.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hair_behind_the_camera_takes_up_nothing() {
+        let camera = Camera::default();
+        let from = GlobalTransform::IDENTITY;
+        assert_eq!(seen_in(&camera, &from, Vec3::Z, 0.1), 0.0);
+        assert!(seen_in(&camera, &from, Vec3::NEG_Z, 0.1) > 0.0);
+    }
+}

@@ -1,0 +1,361 @@
+//! At the start of a tick, in `Roots`: who sleeps in it.
+
+use super::{
+    HairSleep,
+    model::{displacement, held_nodes, keeps_turn, lever, stays, turn, within},
+};
+use crate::{
+    air::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, model::wind},
+    bond::{BondChanges, BondInfluence, Bonds, Cuticle},
+    contact::{HairCollider, LockContact, seen_from},
+    parallel::for_each,
+    rod::{
+        Solver, Stiffness,
+        obstacle::{Obstacle, Solid},
+    },
+    setting::{self, Settings},
+    spring::Springs,
+    strand::{
+        self, Burden, Hair, HeldNodes, Pose, Sleep, Sleepers, StillPose, Strand, StrandModel,
+        StrandOf, Strands, TickPose,
+    },
+    style::Treatments,
+    tick::{HairStep, HairSystems, HairTick},
+    water::Moisture,
+};
+use bevy::{
+    ecs::{entity::EntityHashMap, system::SystemParam},
+    prelude::*,
+};
+
+/// The wind in which no strand sleeps (m/s²): it would bend hair by a thousandth of what gravity
+/// does, and dry it.
+const BREEZE: f32 = 0.01;
+
+/// How much room a strand has to a moving collider beyond its own distance from it (m).
+const CLEARANCE: f32 = 1e-3;
+
+/// Strands that lie still fall asleep, and wake when something happens to them.
+pub struct SleepPlugin;
+
+impl Plugin for SleepPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<HairSleep>(app);
+        app.register_type::<Watch>()
+            .register_required_components::<Hair, Watch>()
+            .register_required_components::<Hair, Sleepers>()
+            .add_systems(
+                HairTick,
+                watch
+                    .in_set(HairSystems::Roots)
+                    .after(strand::move_poses)
+                    .before(strand::carry_strands)
+                    .run_if(|step: Res<HairStep>| step.index == 0),
+            );
+    }
+}
+
+/// All settings by which hair at rest might come to rest elsewhere.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+struct Conditions {
+    gravity: Vec3,
+    sleep: HairSleep,
+    stiffness: Stiffness,
+    solver: Solver,
+    influence: BondInfluence,
+    cuticle: Cuticle,
+    contact: LockContact,
+    drag: AirDrag,
+    model: StrandModel,
+    springs: Springs,
+}
+
+#[derive(SystemParam)]
+struct EverySetting<'w, 's> {
+    gravity: Res<'w, HairGravity>,
+    sleep: Settings<'w, 's, HairSleep>,
+    stiffness: Settings<'w, 's, Stiffness>,
+    solver: Settings<'w, 's, Solver>,
+    influence: Settings<'w, 's, BondInfluence>,
+    cuticle: Settings<'w, 's, Cuticle>,
+    contact: Settings<'w, 's, LockContact>,
+    drag: Settings<'w, 's, AirDrag>,
+    model: Settings<'w, 's, StrandModel>,
+    springs: Settings<'w, 's, Springs>,
+}
+
+impl EverySetting<'_, '_> {
+    fn of(&self, hair: Entity) -> Conditions {
+        Conditions {
+            gravity: if self.gravity.is_finite() { self.gravity.0 } else { Vec3::ZERO },
+            sleep: self.sleep.of(hair),
+            stiffness: self.stiffness.of(hair),
+            solver: self.solver.of(hair),
+            influence: self.influence.of(hair),
+            cuticle: self.cuticle.of(hair),
+            contact: self.contact.of(hair),
+            drag: self.drag.of(hair),
+            model: self.model.of(hair),
+            springs: self.springs.of(hair),
+        }
+    }
+}
+
+/// What a hair was like when something last happened to it.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub(super) struct Watch {
+    conditions: Option<Conditions>,
+    pose: Pose,
+    members: usize,
+    /// The colliders in its frame.
+    #[reflect(ignore)]
+    solids: Vec<Seen>,
+}
+
+/// What happened to a hair as a whole since the tick before.
+struct News {
+    sleep: HairSleep,
+    /// All its strands are awake.
+    stirred: bool,
+    /// Where colliders have come, gone or moved: what is within reach of these (m).
+    solids: Vec<(Solid, f32)>,
+    blowers: Vec<LocalBlower>,
+}
+
+impl Watch {
+    /// Notes what is otherwise, and says what that means for the strands.
+    fn news(
+        &mut self,
+        conditions: Conditions,
+        pose: &Pose,
+        members: usize,
+        seen: Vec<Seen>,
+        substeps: u32,
+    ) -> News {
+        let distance = conditions.sleep.distance();
+        let apart = pose.translation.distance(self.pose.translation) / pose.scale;
+        // A turn counts as what it does to the tip of a long strand.
+        let turned = turn(self.pose.rotation, pose.rotation) * LONG;
+        let scaled = (pose.scale / self.pose.scale - 1.0).abs() * LONG;
+        let rests = apart <= distance && turned <= distance && scaled <= distance;
+        let same = self.conditions == Some(conditions) && self.members == members;
+        if !rests {
+            self.pose = *pose;
+        }
+        self.conditions = Some(conditions);
+        self.members = members;
+        let skin = conditions.contact.radius + CLEARANCE;
+        let solids = self.compare_solids(seen, distance, skin, substeps);
+        News { sleep: conditions.sleep, stirred: !(rests && same), solids, blowers: Vec::new() }
+    }
+
+    /// The solids that have changed, before and after, with the reach in which they may be felt
+    /// within this tick.
+    fn compare_solids(
+        &mut self,
+        now: Vec<Seen>,
+        distance: f32,
+        skin: f32,
+        substeps: u32,
+    ) -> Vec<(Solid, f32)> {
+        let mut changed = Vec::new();
+        if now.len() == self.solids.len() {
+            for (known, now) in self.solids.iter_mut().zip(now) {
+                let moved = known.moved(&now);
+                // What is not finite moves too.
+                if !within(moved, distance) {
+                    // It goes on for the rest of the tick.
+                    let reach = skin + moved * substeps as f32;
+                    changed.extend([(known.solid, reach), (now.solid, reach)]);
+                    *known = now;
+                }
+            }
+            return changed;
+        }
+        let unknown = |one: &&Seen, others: &[Seen]| {
+            others.iter().all(|other| !within(other.moved(one), distance))
+        };
+        changed.extend(now.iter().filter(|s| unknown(s, &self.solids)).map(|s| (s.solid, skin)));
+        changed.extend(self.solids.iter().filter(|s| unknown(s, &now)).map(|s| (s.solid, skin)));
+        self.solids = now;
+        changed
+    }
+}
+
+/// A collider as a hair saw it.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    solid: Solid,
+    friction: f32,
+    rotation: Quat,
+}
+
+impl Seen {
+    /// How far its surface has moved (m): a ball that only turns takes hair along too.
+    fn moved(&self, now: &Self) -> f32 {
+        let friction = if self.friction == now.friction { 0.0 } else { f32::INFINITY };
+        let turned = turn(self.rotation, now.rotation) * lever(&now.solid);
+        displacement(&self.solid, &now.solid) + turned + friction
+    }
+}
+
+/// How long a long strand is (m).
+const LONG: f32 = 0.3;
+
+struct Item<'a> {
+    hair: usize,
+    strand: Mut<'a, Strand>,
+    sleep: Mut<'a, Sleep>,
+    still: Mut<'a, StillPose>,
+    held: Option<&'a HeldNodes>,
+    /// Whether its bonds or its water are on the move, or somebody wrote to it.
+    restless: bool,
+}
+
+fn watch(
+    step: Res<HairStep>,
+    settings: EverySetting,
+    colliders: Query<(&HairCollider, &TickPose)>,
+    blowers: Query<(&Blower, &TickPose)>,
+    mut hairs: Query<(Entity, &TickPose, &mut Watch, &mut Sleepers, Option<&Strands>), With<Hair>>,
+    mut strands: Query<(
+        &StrandOf,
+        &mut Strand,
+        &mut Sleep,
+        &mut StillPose,
+        (Ref<Bonds>, &BondChanges, &Burden),
+        (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
+    )>,
+) {
+    let mut news: Vec<News> = Vec::new();
+    let mut index_of = EntityHashMap::<usize>::default();
+    for (hair, frame, mut watch, _, members) in &mut hairs {
+        let seen = colliders.iter().map(|(collider, pose)| {
+            let Obstacle { solid, friction, .. } = seen_from(frame, &collider.valid(), pose);
+            let rotation = frame.now().rotation.inverse() * pose.now().rotation;
+            Seen { solid, friction, rotation }
+        });
+        let seen = seen.collect();
+        let members = members.map_or(0, |members| members.len());
+        let watch = watch.bypass_change_detection();
+        let mut new = watch.news(settings.of(hair), frame.now(), members, seen, step.count);
+        new.blowers = local_blowers(frame.now(), &blowers);
+        index_of.insert(hair, news.len());
+        news.push(new);
+    }
+    let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
+    for (of, strand, mut sleep, still, (bonds, changes, burden), others) in &mut strands {
+        let Some(&hair) = index_of.get(&of.0) else { continue };
+        let (treatments, water, held) = others;
+        let restless = strand.is_changed()
+            || bonds.is_changed()
+            || sleep.bypass_change_detection().take_disturbed()
+            || !changes.is_empty()
+            || !burden.mass.is_empty()
+            || treatments.is_some_and(|t| !t.acting().is_empty())
+            || water.is_some_and(|water| !water.is_untouched());
+        items.push(Item { hair, strand, sleep, still, held, restless });
+    }
+    let seconds = step.dt * step.count as f32;
+    for_each(&mut items, |item| decide(item, &news[item.hair], seconds));
+    let mut counts = vec![Sleepers::default(); news.len()];
+    for item in &items {
+        let count = &mut counts[item.hair];
+        *(if item.sleep.is_asleep() { &mut count.asleep } else { &mut count.awake }) += 1;
+    }
+    drop(items);
+    for (hair, .., mut sleepers, _) in &mut hairs {
+        sleepers.set_if_neq(counts[index_of[&hair]]);
+    }
+}
+
+/// Whether one strand sleeps from now on.
+fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
+    let Item { strand, sleep, still, held, restless, .. } = item;
+    let strand = strand.bypass_change_detection();
+    let (distance, angle) = (news.sleep.distance(), news.sleep.angle());
+    let targets = held.map_or(&[][..], |held| &held.targets);
+    let restless = *restless || news.stirred || strand.nodes() < 2;
+    if sleep.is_asleep() {
+        if restless
+            || was_pushed(strand)
+            || has_moved_root(strand, still, distance, angle)
+            || pulls(strand, still, targets, distance)
+            || comes_near(still, &news.solids)
+            || is_blown(strand, &news.blowers)
+        {
+            sleep.bypass_change_detection().wake_up();
+            still.bypass_change_detection().begin(strand, held_nodes(targets));
+        }
+        return;
+    }
+    let (sleep, still) = (sleep.bypass_change_detection(), still.bypass_change_detection());
+    if news.sleep.seconds == f32::INFINITY {
+        sleep.wake_up();
+        return;
+    }
+    if restless
+        || !stays(&still.positions, strand.positions(), distance)
+        || !keeps_turn(&still.orientations, strand.orientations(), angle)
+        || has_moved_root(strand, still, distance, angle)
+        || pulls(strand, still, targets, distance)
+        || is_blown(strand, &news.blowers)
+    {
+        sleep.wake_up();
+        still.begin(strand, held_nodes(targets));
+        return;
+    }
+    sleep.lie_still(seconds);
+    if sleep.still_for() >= news.sleep.seconds {
+        still.distance = distance;
+        (still.low, still.high) = (strand.positions()[0], strand.positions()[0]);
+        for p in strand.positions() {
+            (still.low, still.high) = (still.low.min(*p), still.high.max(*p));
+        }
+        // What comes in this very tick would find it asleep.
+        if !comes_near(still, &news.solids) {
+            sleep.fall_asleep();
+            strand.rest();
+        }
+    }
+}
+
+/// A sleeper's velocities are zero: who gave it another has pushed it.
+fn was_pushed(strand: &Strand) -> bool {
+    strand.velocities().iter().any(|v| *v != Vec3::ZERO)
+}
+
+fn has_moved_root(strand: &Strand, still: &StillPose, distance: f32, angle: f32) -> bool {
+    let stays = still.positions.first().zip(strand.positions().first());
+    !stays.is_some_and(|(a, b)| a.distance(*b) <= distance)
+        || !within(turn(still.root_frame, strand.root_frame()), angle)
+}
+
+/// Whether other nodes are held than before, or the same ones elsewhere.
+fn pulls(strand: &Strand, still: &StillPose, targets: &[Option<Vec3>], distance: f32) -> bool {
+    if targets.is_empty() && still.held == 0 {
+        return false;
+    }
+    let held = targets.iter().zip(strand.positions());
+    held_nodes(targets) != still.held
+        || held.filter_map(|(t, p)| Some(t.as_ref()?.distance(*p))).any(|d| !within(d, distance))
+}
+
+fn comes_near(still: &StillPose, solids: &[(Solid, f32)]) -> bool {
+    solids.iter().any(|&(solid, reach)| {
+        let near = Obstacle { solid, motion: None, friction: 0.0 };
+        !reach.is_finite() || near.may_touch(still.low, still.high, reach)
+    })
+}
+
+/// Whether a blower reaches the strand's root, middle or tip.
+fn is_blown(strand: &Strand, blowers: &[LocalBlower]) -> bool {
+    let (p, last) = (strand.positions(), strand.edges().saturating_sub(1));
+    blowers.iter().any(|LocalBlower { nozzle, aim, blower }| {
+        [0, last / 2, last].into_iter().any(|i| {
+            let felt = wind(blower.strength, *nozzle, *aim, p[i], p[i + 1] - p[i]);
+            !within(felt.length(), BREEZE)
+        })
+    })
+}
