@@ -7,10 +7,10 @@ use crate::{
     lod::HairSteps,
     parallel::for_each,
     setting::{self, Notes, Settings},
-    strand::{Burden, Hair, Pose, Sleep, Strand, StrandOf, TickPose},
+    strand::{Burden, Hair, PerHair, Pose, Sleep, Strand, StrandOf, TickPose},
     tick::{HairSystems, HairTick},
 };
-use bevy::{platform::collections::HashMap, prelude::*};
+use bevy::prelude::*;
 
 /// Gravity, wind and drag.
 pub struct AirPlugin;
@@ -96,30 +96,28 @@ pub(crate) fn apply_air(
     )>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let mut airs: Vec<LocalAir> = Vec::new();
-    let mut index_of = HashMap::<Entity, Option<usize>>::default();
+    let mut airs = PerHair::default();
     let mut items = Vec::with_capacity(strands.iter().len());
     for (of, sleep, strand, burden, changes, received) in &mut strands {
         if sleep.is_asleep() {
             continue;
         }
-        let index = *index_of.entry(of.0).or_insert_with(|| {
+        let index = airs.index(of.0, || {
             let pose = hairs.get(of.0).ok()?.now();
             let dt = steps.of(of.0)?.dt;
-            airs.push(LocalAir {
+            Some(LocalAir {
                 gravity: pose.direction_in(gravity) * dt,
                 keep: bevy::math::ops::exp(-drag.of(of.0).rate * dt),
                 dt,
                 blowers: local_blowers(pose, &blowers),
-            });
-            Some(airs.len() - 1)
+            })
         });
         if let Some(air) = index {
             items.push((air, strand, burden, changes, received));
         }
     }
     for_each(&mut items, |(air, strand, burden, changes, received)| {
-        let air = &airs[*air];
+        let air = &airs.values[*air];
         let (positions, velocities, _, spins) = strand.bypass_change_detection().parts_mut();
         for v in velocities.iter_mut() {
             *v = *v * air.keep + air.gravity;

@@ -10,10 +10,10 @@ use crate::{
     parallel::for_each,
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
     setting::{self, Bound, Notes, Settings},
-    strand::{self, Burden, Sleep, Strand, StrandOf},
+    strand::{self, Burden, PerHair, Sleep, Strand, StrandOf},
     tick::{HairSystems, HairTick},
 };
-use bevy::{platform::collections::HashMap, prelude::*};
+use bevy::prelude::*;
 
 /// Rest shapes from bonds and bonds' memory.
 pub struct BondPlugin;
@@ -81,13 +81,13 @@ fn generate_rest_shapes(
     solver: Settings<Solver>,
     mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
 ) {
-    let mut resolved = HashMap::<Entity, Option<Key>>::default();
+    let mut keys = PerHair::default();
     let mut items = Vec::new();
     for (of, sleep, strand, bonds, burden, rest) in &mut strands {
         if sleep.is_asleep() {
             continue;
         }
-        let key = *resolved.entry(of.0).or_insert_with(|| {
+        let index = keys.index(of.0, || {
             let stride = steps.of(of.0)?;
             Some(Key {
                 influence: influence.of(of.0).as_array(),
@@ -97,7 +97,7 @@ fn generate_rest_shapes(
                 dt: stride.dt,
             })
         });
-        let Some(key) = key else { continue };
+        let Some(key) = index.map(|index| keys.values[index]) else { continue };
         // Hair whose bonds are all closed, most hair most of the time, costs no more than this.
         if !rest.closed
             || rest.key != Some(key)

@@ -13,10 +13,10 @@ use crate::{
     lod::HairSteps,
     parallel::for_each_block,
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf},
+    strand::{Burden, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf},
     tick::{HairSystems, HairTick},
 };
-use bevy::{platform::collections::HashMap, prelude::*};
+use bevy::prelude::*;
 use fearless_simd::Level;
 
 /// Cosserat rods: the elastic projection.
@@ -69,18 +69,17 @@ pub(crate) fn project(
     )>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    let mut params: Vec<HairParams> = Vec::new();
-    let mut index_of = HashMap::<Entity, Option<usize>>::default();
+    let mut params = PerHair::default();
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
     for (entity, of, sleep, strand, rest, bonds, burden, held) in &mut strands {
         if sleep.is_asleep() {
             continue;
         }
-        let index = *index_of.entry(of.0).or_insert_with(|| {
+        let index = params.index(of.0, || {
             let obstacles = hairs.get(of.0).ok().filter(|_| model.of(of.0) == StrandModel::Rod)?;
             let stride = steps.of(of.0)?;
             let s = solver.of(of.0);
-            params.push(HairParams {
+            Some(HairParams {
                 step: StepParams {
                     dt: stride.dt,
                     iterations: stride.iterations(s.iterations),
@@ -92,8 +91,7 @@ pub(crate) fn project(
                 stiffness: stiffness.of(of.0),
                 influence: influence.of(of.0).as_array(),
                 obstacles: obstacles.over(stride.substeps),
-            });
-            Some(params.len() - 1)
+            })
         });
         if let Some(hair) = index
             && strand.nodes() >= 2
@@ -105,7 +103,7 @@ pub(crate) fn project(
     let mut blocks = blocks_of(&mut items, |item| (item.hair, item.strand.nodes()));
     let level = Level::new();
     for_each_block(&mut blocks, BlockLanes::default, |block, items| {
-        solve(level, block, items, &params[items[0].hair]);
+        solve(level, block, items, &params.values[items[0].hair]);
     });
     for item in items {
         if let Some(fault) = item.put_back {

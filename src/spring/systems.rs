@@ -17,10 +17,10 @@ use crate::{
         project,
     },
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf, TickPose},
+    strand::{Burden, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf, TickPose},
     tick::{HairSystems, HairTick},
 };
-use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use bevy::prelude::*;
 use fearless_simd::Level;
 
 /// Mass-spring strands.
@@ -59,14 +59,13 @@ fn step_springs(
     mut faults: MessageWriter<HairFault>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let mut params: Vec<HairParams> = Vec::new();
-    let mut index_of = EntityHashMap::<Option<usize>>::default();
+    let mut params = PerHair::default();
     let mut items: Vec<Item<'_>> = Vec::new();
     for (entity, of, sleep, strand, burden, held) in &mut strands {
         if sleep.is_asleep() {
             continue;
         }
-        let index = *index_of.entry(of.0).or_insert_with(|| {
+        let index = params.index(of.0, || {
             let (obstacles, pose) = hairs.get(of.0).ok()?;
             let stride = steps.of(of.0)?;
             (model.of(of.0) == StrandModel::MassSpring).then(|| {
@@ -78,8 +77,7 @@ fn step_springs(
                     gravity: pose.now().direction_in(gravity),
                     skin: contact.of(of.0).radius,
                 };
-                params.push(HairParams { step, obstacles: obstacles.over(stride.substeps) });
-                params.len() - 1
+                HairParams { step, obstacles: obstacles.over(stride.substeps) }
             })
         });
         if let Some(hair) = index
@@ -91,7 +89,7 @@ fn step_springs(
     let mut blocks = blocks_of(&mut items, |item| (item.hair, item.strand.nodes()));
     let level = Level::new();
     for_each_block(&mut blocks, SpringLanes::default, |block, items| {
-        solve(level, block, items, &params[items[0].hair]);
+        solve(level, block, items, &params.values[items[0].hair]);
     });
     for item in items {
         if let Some(fault) = item.put_back {

@@ -11,10 +11,12 @@
 
 mod command;
 pub mod frame;
+mod per_hair;
 mod sleep;
 mod systems;
 
 pub use frame::{HairInertia, Pose, TickPose};
+pub(crate) use per_hair::PerHair;
 pub use sleep::{Sleep, Sleepers, StillPose};
 pub use systems::StrandPlugin;
 pub(crate) use systems::{carry_strands, move_poses};

@@ -4,7 +4,7 @@ use super::{Moisture, Wetting, moisture::node_lengths};
 use crate::{
     contact::{Bridged, Film, LockContact, LockNeighbours, WetRow},
     setting::Settings,
-    strand::{Burden, Hair, Strand, StrandOf, Strands},
+    strand::{Burden, Hair, Sleep, Strand, StrandOf, Strands},
     tick::HairStep,
 };
 use bevy::prelude::*;
@@ -16,12 +16,12 @@ pub(super) fn join_wet_strands(
     wetting: Settings<Wetting>,
     mut rows: Local<Vec<WetRow>>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours), With<Hair>>,
-    mut strands: Query<(&mut Strand, &Moisture, &Burden), With<StrandOf>>,
+    mut strands: Query<(&mut Strand, &Moisture, &Burden, &Sleep), With<StrandOf>>,
 ) {
     for (hair, members, mut neighbours) in &mut hairs {
         let LockContact { radius, strength } = contact.of(hair);
         let wetting = wetting.of(hair);
-        let dry = strands.iter_many(members.collection()).all(|(_, m, _)| m.is_untouched());
+        let dry = strands.iter_many(members.collection()).all(|(_, m, ..)| m.is_untouched());
         let joins = !dry
             && radius > 0.0
             && strength > 0.0
@@ -33,7 +33,7 @@ pub(super) fn join_wet_strands(
             continue;
         }
         rows.clear();
-        for (strand, moisture, _) in strands.iter_many(members.collection()) {
+        for (strand, moisture, ..) in strands.iter_many(members.collection()) {
             let film = |i: usize| moisture.film().get(i).copied().unwrap_or(0.0);
             let lengths = node_lengths(strand.rest_lengths());
             rows.extend(strand.velocities().iter().zip(lengths).enumerate().map(
@@ -46,7 +46,12 @@ pub(super) fn join_wet_strands(
         }
         let mut bridges = list.bridges(&mut rows, film);
         let mut members = strands.iter_many_mut(members.collection());
-        while let Some((mut strand, _, burden)) = members.fetch_next() {
+        while let Some((mut strand, _, burden, sleep)) = members.fetch_next() {
+            let nodes = strand.nodes();
+            if sleep.is_asleep() {
+                bridges.by_ref().take(nodes).for_each(drop);
+                continue;
+            }
             let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
             for (i, (v, bridged)) in velocities.iter_mut().zip(&mut bridges).enumerate() {
                 let load = burden.mass.get(i).copied().unwrap_or(0.0);

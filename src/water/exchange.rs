@@ -13,10 +13,10 @@ use crate::{
     fault::{Fault, HairFault},
     parallel::for_each,
     setting::{Notes, Settings},
-    strand::{Burden, Hair, Pose, Strand, StrandOf, Strands, TickPose},
+    strand::{Burden, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
     tick::HairStep,
 };
-use bevy::{platform::collections::HashMap, prelude::*};
+use bevy::prelude::*;
 
 pub(super) fn run_showers(
     mut commands: Commands,
@@ -134,22 +134,20 @@ pub(super) fn exchange_water(
     let air = DryingAir::new(climate.celsius, climate.humidity, climate.draught);
     let process = process.mended(&Notes::default());
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let mut waters: Vec<LocalWater> = Vec::new();
-    let mut index_of = HashMap::<Entity, Option<usize>>::default();
+    let mut waters = PerHair::default();
     let mut items: Vec<Wet<'_>> = Vec::new();
     for (of, strand, bonds, moisture, burden, changes) in &mut strands {
         if !damp && moisture.is_untouched() {
             continue;
         }
-        let index = *index_of.entry(of.0).or_insert_with(|| {
+        let index = waters.index(of.0, || {
             let pose = *hairs.get(of.0).ok()?.0.now();
-            waters.push(LocalWater {
+            Some(LocalWater {
                 wetting: wetting.of(of.0),
                 gravity: pose.direction_in(gravity),
                 blowers: local_blowers(&pose, &blowers),
                 pose,
-            });
-            Some(waters.len() - 1)
+            })
         });
         if let Some(hair) = index
             && strand.nodes() >= 2
@@ -167,11 +165,13 @@ pub(super) fn exchange_water(
             });
         }
     }
-    for_each(&mut items, |wet| exchange(wet, &waters[wet.hair], &air, damp, step.dt, process));
+    for_each(&mut items, |wet| {
+        exchange(wet, &waters.values[wet.hair], &air, damp, step.dt, process)
+    });
     for wet in &items {
         ledger.book(-wet.left.evaporated);
         ledger.water_out += wet.gone;
-        let LocalWater { pose, wetting, .. } = &waters[wet.hair];
+        let LocalWater { pose, wetting, .. } = &waters.values[wet.hair];
         for &(node, volume) in &wet.left.drips {
             commands.spawn(let_go(pose, wet.strand, node as f32, volume, wetting, gravity));
         }

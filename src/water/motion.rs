@@ -19,10 +19,10 @@ use crate::{
     parallel::{for_each, for_each_block},
     rod::{algebra::V3, obstacle::Obstacle},
     setting::{Notes, Settings},
-    strand::{Burden, Hair, Pose, Strand, StrandOf, TickPose},
+    strand::{Burden, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
     tick::HairStep,
 };
-use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use bevy::prelude::*;
 use fearless_simd::Level;
 
 /// The fewest strands that meet droplets as one piece of work.
@@ -383,22 +383,20 @@ fn heads<'a>(
     wetting: &Settings<Wetting>,
     strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut Burden, &mut Moisture)>,
 ) -> Vec<Head<'a>> {
-    let mut heads: Vec<Head<'a>> = Vec::new();
-    let mut index_of = EntityHashMap::<Option<usize>>::default();
+    let mut heads: PerHair<Head<'a>> = default();
     for (entity, of, strand, burden, moisture) in strands {
-        let index = *index_of.entry(of.0).or_insert_with(|| {
+        let index = heads.index(of.0, || {
             let pose = *hairs.get(of.0).ok()?.now();
-            heads.push(Head { pose, wetting: wetting.of(of.0), strands: Vec::new() });
-            Some(heads.len() - 1)
+            Some(Head { pose, wetting: wetting.of(of.0), strands: Vec::new() })
         });
         if let Some(index) = index
             && strand.nodes() >= 2
         {
             let (burden, moisture) = (&*burden.into_inner(), &*moisture.into_inner());
-            heads[index].strands.push(Strandful { entity, strand, burden, moisture });
+            heads.values[index].strands.push(Strandful { entity, strand, burden, moisture });
         }
     }
-    heads
+    heads.values
 }
 
 impl Field {
