@@ -95,17 +95,19 @@ fn query(count: usize, beside: bool) -> f64 {
         .flat_map(|root| (0..6).map(move |i| root + Vec3::NEG_Y * (0.048 * i as f32)))
         .collect();
     let mut grid = UniformGrid::default();
-    grid.build(2.0 * REACH, drops.iter().zip(0..).map(|(drop, i)| (*drop, i)));
+    grid.build(2.002 * REACH, drops.iter().zip(0..).map(|(drop, i)| (*drop, i)));
     let sorted: Vec<Vec3> = grid.order().map(|i| drops[i as usize]).collect();
     let mut best = f64::INFINITY;
     for _ in 0..5 {
         let start = Instant::now();
         let mut pull = Vec3::ZERO;
         for node in &nodes {
-            for drop in grid.runs_near(*node, REACH).into_iter().flat_map(|run| &sorted[run]) {
-                let offset = drop - *node;
-                if offset.length_squared() < REACH * REACH {
-                    pull += offset;
+            for run in grid.runs_near(*node, REACH).each() {
+                for drop in &sorted[run] {
+                    let offset = drop - *node;
+                    if offset.length_squared() < REACH * REACH {
+                        pull += offset;
+                    }
                 }
             }
         }

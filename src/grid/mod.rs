@@ -12,7 +12,7 @@ use glam::{IVec3, Vec3};
 const FAR: Vec3 = Vec3::splat(1e9);
 
 /// The fewest buckets. A few items in as few buckets would be met in most of empty space, too.
-const FEWEST: usize = 4096;
+const FEWEST: usize = 8192;
 
 /// Points sorted by cell.
 #[derive(Clone, Debug, Default)]
@@ -117,27 +117,34 @@ impl UniformGrid {
     }
 
     /// Where in [`order`](Self::order) all items within `radius` of `point` are, and others. The radius
-    /// is at most half a cell: then they are in two cells each way, which takes least looking up.
+    /// is a little less than half a cell: then they are in two cells each way, in four rows.
     #[inline]
     pub fn runs_near(&self, point: Vec3, radius: f32) -> Runs {
-        debug_assert!(radius * self.inverse_cell <= 0.5001, "cells are too small");
-        let mut runs = Runs::NONE;
+        debug_assert!(radius * self.inverse_cell < 0.5, "cells are too small");
+        let mut runs = Runs::default();
         if self.entries.is_empty() || !point.is_finite() {
             return runs;
         }
         // Rounding must not leave a cell out.
-        let reach = radius + 1e-6 * point.abs().max_element();
-        let low = self.cell_of(point - reach);
-        let high = self.cell_of(point + reach).min(low + 1);
+        let low = self.cell_of(point - (radius + 2e-7 * point.abs().max_element()));
         let buckets = self.starts.len() - 1;
-        for z in low.z..=high.z {
-            for y in low.y..=high.y {
-                let row = bucket(IVec3::new(low.x, y, z), buckets - 1);
-                let end = row + (high.x - low.x) as usize + 1;
-                runs.add(self.starts[row] as usize..self.starts[end.min(buckets)] as usize);
-                // Behind the last bucket comes the first.
-                runs.add(0..self.starts[end.saturating_sub(buckets)] as usize);
-            }
+        let rows: [usize; 4] = core::array::from_fn(|k| {
+            bucket(low + IVec3::new(0, k as i32 & 1, k as i32 >> 1), buckets - 1)
+        });
+        // What would be a branch on how full cells are is guessed wrong half of the time.
+        let end = |row: usize| match row + 2 {
+            end if end <= buckets => self.starts[end],
+            // Behind the last bucket the first ones come again.
+            end => self.starts[buckets] + self.starts[end - buckets],
+        };
+        for row in rows {
+            runs.add(self.starts[row], end(row));
+        }
+        // Rows whose buckets are the same, or next to each other, would bring items twice.
+        let near = |a: usize, b: usize| (a.wrapping_sub(b).wrapping_add(1) & (buckets - 1)) <= 2;
+        let [a, b, c, d] = rows;
+        if near(a, b) | near(a, c) | near(a, d) | near(b, c) | near(b, d) | near(c, d) {
+            runs.join(self.starts[buckets]);
         }
         runs
     }
@@ -165,44 +172,43 @@ impl UniformGrid {
 }
 
 /// Where in a grid's order the items around a point are: a few runs, none twice.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Runs {
-    runs: [Range<usize>; 8],
+    /// With room to write one more.
+    runs: [(u32, u32); 9],
     count: usize,
 }
 
 impl Runs {
-    const NONE: Self = Self { runs: [const { 0..0 }; 8], count: 0 };
-
-    /// Adds a run; what overlaps becomes one.
-    #[inline]
-    fn add(&mut self, mut run: Range<usize>) {
-        if run.is_empty() {
-            return;
-        }
-        let mut k = 0;
-        while k < self.count {
-            let other = &self.runs[k];
-            if run.start < other.end && other.start < run.end {
-                run = run.start.min(other.start)..run.end.max(other.end);
-                self.count -= 1;
-                self.runs.swap(k, self.count);
-                k = 0;
-            } else {
-                k += 1;
-            }
-        }
-        self.runs[self.count] = run;
-        self.count += 1;
+    #[inline(always)]
+    fn add(&mut self, start: u32, end: u32) {
+        self.runs[self.count] = (start, end);
+        self.count += usize::from(start < end);
     }
-}
 
-impl IntoIterator for Runs {
-    type Item = Range<usize>;
-    type IntoIter = core::iter::Take<core::array::IntoIter<Range<usize>, 8>>;
+    /// Makes one of runs that overlap, in an order of `len` items behind which the first come again.
+    #[cold]
+    fn join(&mut self, len: u32) {
+        let torn: Vec<(u32, u32)> = (self.runs[..self.count].iter())
+            .flat_map(|&(start, end)| [(start, end.min(len)), (0, end.saturating_sub(len))])
+            .collect();
+        self.count = 0;
+        for (mut start, mut end) in torn {
+            while let Some(k) =
+                (self.runs[..self.count].iter()).position(|r| start < r.1 && r.0 < end)
+            {
+                (start, end) = (start.min(self.runs[k].0), end.max(self.runs[k].1));
+                self.count -= 1;
+                self.runs[k] = self.runs[self.count];
+            }
+            self.add(start, end);
+        }
+    }
 
-    fn into_iter(self) -> Self::IntoIter {
-        self.runs.into_iter().take(self.count)
+    /// The runs, as places in the order.
+    #[inline(always)]
+    pub fn each(self) -> impl Iterator<Item = Range<usize>> {
+        (0..self.count).map(move |k| self.runs[k].0 as usize..self.runs[k].1 as usize)
     }
 }
 
@@ -241,14 +247,14 @@ mod tests {
             let mut grid = UniformGrid::default();
             let mut wide = UniformGrid::default();
             grid.build(radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
-            wide.build(2.0 * radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
+            wide.build(2.002 * radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
             let order: Vec<u32> = wide.order().collect();
             for &p in &points {
                 let brute: Vec<u32> = (0..points.len() as u32)
                     .filter(|&i| points[i as usize].distance(p) <= radius)
                     .collect();
                 prop_assert_eq!(&near(&grid, &points, p, radius), &brute);
-                let mut found: Vec<u32> = (wide.runs_near(p, radius).into_iter().flatten())
+                let mut found: Vec<u32> = (wide.runs_near(p, radius).each().flatten())
                     .map(|slot| order[slot])
                     .filter(|&i| points[i as usize].distance(p) <= radius)
                     .collect();

@@ -161,7 +161,7 @@ impl Met<'_> {
             let load = self.load.get(i).copied().unwrap_or(0.0);
             let (mut change, mut steepness) = (Vec3::ZERO, 0.0);
             out.pulls.clear();
-            for run in field.pulling(p) {
+            for run in field.pulling(p).each() {
                 for first in run.clone().step_by(WIDTH) {
                     let own = self.strand.index_u32();
                     let lanes = Lanes { first, count: run.end - first, p, own, is_root: i == 0 };

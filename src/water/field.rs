@@ -40,7 +40,7 @@ impl Places {
     /// Sorts balls, each a centre, a radius and the droplet's number.
     fn sort(&mut self, balls: impl Iterator<Item = (Vec3, f32, u32)> + Clone) {
         self.widest = balls.clone().map(|(_, radius, _)| radius).fold(1e-4, f32::max);
-        self.grid.build(2.0 * self.widest, balls.map(|(center, _, drop)| (center, drop)));
+        self.grid.build(2.002 * self.widest, balls.map(|(center, _, drop)| (center, drop)));
     }
 }
 
@@ -117,13 +117,14 @@ pub(super) struct Field {
     riders: Vec<(Entity, u32)>,
     /// Falling droplets, as far as the middle of an edge may be that they hit.
     falling: Places,
-    order: Vec<u32>,
+    /// These in the grid's order: centre and squared radius, and which droplet it is.
+    balls: Vec<(Vec4, u32)>,
 }
 
 impl Field {
     /// Sorts the droplets for strands whose longest edge is `longest` (m), of locks of radius `skin`.
     pub fn sort(&mut self, longest: f32, skin: f32) {
-        let Self { drops, riding, columns, riders, falling, order } = self;
+        let Self { drops, riding, columns, riders, falling, balls } = self;
         let numbered = || (0..).zip(&*drops);
         riders.clear();
         riders.extend(numbered().filter_map(|(k, drop)| Some((drop.ride?, k))));
@@ -131,13 +132,17 @@ impl Field {
         let reaches = numbered().filter(|(_, drop)| drop.ride.is_some());
         riding.sort(reaches.map(|(k, drop)| (drop.at, drop.r_max.max(drop.touch(skin)), k)));
         columns.fill(riding.grid.order(), drops, skin);
-        let falls = numbered().filter(|(_, drop)| drop.ride.is_none());
-        falling.sort(falls.map(|(k, drop)| {
+        let hits_within = |drop: &SeenDrop| {
             let way = drop.at.distance(drop.before).min(0.2);
-            (drop.at, 0.5 * longest + skin + drop.radius + way, k)
+            0.5 * longest + skin + drop.radius + way
+        };
+        let falls = numbered().filter(|(_, drop)| drop.ride.is_none());
+        falling.sort(falls.map(|(k, drop)| (drop.at, hits_within(drop), k)));
+        balls.clear();
+        balls.extend(falling.grid.order().map(|k| {
+            let drop = &drops[k as usize];
+            (drop.at.extend(hits_within(drop).powi(2)), k)
         }));
-        order.clear();
-        order.extend(falling.grid.order());
     }
 
     /// The droplets that ride a strand.
@@ -153,9 +158,12 @@ impl Field {
         self.riding.grid.runs_near(p, self.riding.widest)
     }
 
-    /// All droplets that may hit an edge around a point, and others.
+    /// All droplets that may hit an edge around a point.
     pub fn falling(&self, p: Vec3) -> impl Iterator<Item = (u32, &SeenDrop)> {
         let runs = self.falling.grid.runs_near(p, self.falling.widest);
-        runs.into_iter().flat_map(|run| &self.order[run]).map(|&k| (k, &self.drops[k as usize]))
+        runs.each()
+            .flat_map(|run| &self.balls[run])
+            .filter(move |(ball, _)| ball.xyz().distance_squared(p) < ball.w)
+            .map(|&(_, k)| (k, &self.drops[k as usize]))
     }
 }
