@@ -95,7 +95,7 @@ fn query(count: usize, beside: bool) -> f64 {
         .flat_map(|root| (0..6).map(move |i| root + Vec3::NEG_Y * (0.048 * i as f32)))
         .collect();
     let mut grid = UniformGrid::default();
-    grid.build(2.002 * REACH, drops.iter().zip(0..).map(|(drop, i)| (*drop, i)));
+    grid.build_sparse(2.002 * REACH, drops.iter().zip(0..).map(|(drop, i)| (*drop, i)));
     let sorted: Vec<Vec3> = grid.order().map(|i| drops[i as usize]).collect();
     let mut best = f64::INFINITY;
     for _ in 0..5 {

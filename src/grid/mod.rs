@@ -22,6 +22,9 @@ pub struct UniformGrid {
     starts: Vec<u32>,
     entries: Vec<Entry>,
     unsorted: Vec<Entry>,
+    /// A bit for each of some buckets of cells that lie within half a cell of an item; a power of two
+    /// of words, or none where nobody asks.
+    near: Vec<u64>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,12 +50,28 @@ impl UniformGrid {
     pub fn build(&mut self, cell: f32, items: impl Iterator<Item = (Vec3, u32)>) {
         self.inverse_cell = 1.0 / cell.max(1e-9);
         self.unsorted.clear();
+        self.near.clear();
         for (point, item) in items {
             if point.is_finite() {
                 self.unsorted.push(Entry { cell: self.cell_of(point), item });
             }
         }
         self.sort();
+    }
+
+    /// The same for [`runs_near`](Self::runs_near) alone, which then sees at one glance where there is
+    /// nothing: most of space, if items are few.
+    pub fn build_sparse(&mut self, cell: f32, items: impl Iterator<Item = (Vec3, u32)> + Clone) {
+        self.build(cell, items.clone());
+        self.near.resize((self.starts.len() - 1) / 8, 0);
+        let bits = 64 * self.near.len();
+        for (point, _) in items.filter(|(point, _)| point.is_finite()) {
+            let low = self.cell_of(point - 0.5 * cell);
+            for k in 0..8 {
+                let bit = bucket(low + IVec3::new(k & 1, k >> 1 & 1, k >> 2), bits - 1);
+                self.near[bit / 64] |= 1 << (bit % 64);
+            }
+        }
     }
 
     fn sort(&mut self) {
@@ -124,6 +143,12 @@ impl UniformGrid {
         let mut runs = Runs::default();
         if self.entries.is_empty() || !point.is_finite() {
             return runs;
+        }
+        if !self.near.is_empty() {
+            let bit = bucket(self.cell_of(point), 64 * self.near.len() - 1);
+            if self.near[bit / 64] & (1 << (bit % 64)) == 0 {
+                return runs;
+            }
         }
         // Rounding must not leave a cell out.
         let low = self.cell_of(point - (radius + 2e-7 * point.abs().max_element()));
@@ -247,7 +272,12 @@ mod tests {
             let mut grid = UniformGrid::default();
             let mut wide = UniformGrid::default();
             grid.build(radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
-            wide.build(2.002 * radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
+            let items = points.iter().zip(0..).map(|(p, i)| (*p, i));
+            if stretch < 20.0 {
+                wide.build(2.002 * radius, items);
+            } else {
+                wide.build_sparse(2.002 * radius, items);
+            }
             let order: Vec<u32> = wide.order().collect();
             for &p in &points {
                 let brute: Vec<u32> = (0..points.len() as u32)

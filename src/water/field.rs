@@ -40,7 +40,7 @@ impl Places {
     /// Sorts balls, each a centre, a radius and the droplet's number.
     fn sort(&mut self, balls: impl Iterator<Item = (Vec3, f32, u32)> + Clone) {
         self.widest = balls.clone().map(|(_, radius, _)| radius).fold(1e-4, f32::max);
-        self.grid.build(2.002 * self.widest, balls.map(|(center, _, drop)| (center, drop)));
+        self.grid.build_sparse(2.002 * self.widest, balls.map(|(center, _, drop)| (center, drop)));
     }
 }
 
