@@ -1,8 +1,8 @@
 //! `Interaction`: strands that a film of water joins draw together and move as one.
 
-use super::{Moisture, Wetting, moisture::node_lengths};
+use super::{Moisture, Wetting, moisture::node_lengths, motion::WaterField};
 use crate::{
-    contact::{Bridged, Film, LockContact, LockNeighbours, WetRow},
+    contact::{Bridged, Film, LockContact, LockNeighbours},
     setting::Settings,
     strand::{Burden, Hair, Sleep, Strand, StrandOf, Strands},
     tick::HairStep,
@@ -14,10 +14,11 @@ pub(super) fn join_wet_strands(
     step: Res<HairStep>,
     contact: Settings<LockContact>,
     wetting: Settings<Wetting>,
-    mut rows: Local<Vec<WetRow>>,
+    mut scratch: ResMut<WaterField>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours), With<Hair>>,
     mut strands: Query<(&mut Strand, &Moisture, &Burden, &Sleep), With<StrandOf>>,
 ) {
+    let rows = &mut scratch.bypass_change_detection().rows;
     for (hair, members, mut neighbours) in &mut hairs {
         let LockContact { radius, strength } = contact.of(hair);
         let wetting = wetting.of(hair);
@@ -44,7 +45,7 @@ pub(super) fn join_wet_strands(
         if list.nodes() != rows.len() {
             continue;
         }
-        let mut bridges = list.bridges(&mut rows, film);
+        let mut bridges = list.bridges(rows, film);
         let mut members = strands.iter_many_mut(members.collection());
         while let Some((mut strand, _, burden, sleep)) = members.fetch_next() {
             let nodes = strand.nodes();

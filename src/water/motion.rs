@@ -13,7 +13,7 @@ use super::{
 use crate::{
     Blower, HairCollider,
     air::{HairGravity, local_blowers},
-    contact::seen_from,
+    contact::{WetRow, seen_from},
     fault::HairFault,
     grid::UniformGrid,
     parallel::{for_each, for_each_block},
@@ -47,6 +47,8 @@ pub(super) struct WaterField {
     pieces: Vec<Encounters>,
     /// Strands that carry a droplet's weight.
     loaded: Vec<Entity>,
+    /// What nodes bring to bridges of water.
+    pub(super) rows: Vec<WetRow>,
 }
 
 /// What becomes of a droplet in this substep.
