@@ -291,9 +291,9 @@ impl<S: Simd> Bridges<S> {
         let pulled = off.scale_add(-(pull / distance), self.pull);
         self.pull = V3::select(joined, pulled, self.pull);
         let steep = amount / Real::min(Real::max(longest, lit(1e-9)), lit(0.5 * reach));
-        self.steepness = self.steepness + Real::select(joined, steep, zero);
+        self.steepness += Real::select(joined, steep, zero);
         self.drift = V3::select(joined, velocity.scale_add(left, self.drift), self.drift);
-        self.grip = self.grip + Real::select(joined, left, zero);
+        self.grip += Real::select(joined, left, zero);
     }
 
     /// The sums over all lanes.

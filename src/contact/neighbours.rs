@@ -433,7 +433,7 @@ mod tests {
             // Every third strand is dry, velocities are anything.
             let area = |s: usize, i: usize| {
                 let film = films[(s * nodes + i) % films.len()];
-                if s % 3 == 0 { 0.0 } else { film * radius * radius }
+                if s.is_multiple_of(3) { 0.0 } else { film * radius * radius }
             };
             let speed = |s: usize, i: usize| Vec3::new(s as f32, i as f32, 0.5);
             let mut wet: Vec<WetRow> = (0..strands.len() * nodes)

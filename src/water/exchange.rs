@@ -166,7 +166,7 @@ pub(super) fn exchange_water(
         }
     }
     for_each(&mut items, |wet| {
-        exchange(wet, &waters.values[wet.hair], &air, damp, step.dt, process)
+        exchange(wet, &waters.values[wet.hair], &air, damp, step.dt, process);
     });
     for wet in &items {
         ledger.book(-wet.left.evaporated);
