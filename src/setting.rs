@@ -110,7 +110,14 @@ impl<T: HairSetting> Settings<'_, '_, T> {
     }
 }
 
-/// Reports invalid values of a setting that only components carry.
+/// Reports what was wrong with an entity's values.
+pub(crate) fn tell(entity: Entity, notes: Notes, faults: &mut MessageWriter<HairFault>) {
+    for wrong in notes.into_inner() {
+        faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+    }
+}
+
+/// Reports invalid values in components.
 pub(crate) fn report_changed<T: HairSetting>(
     changed: Query<(Entity, &T), Changed<T>>,
     mut faults: MessageWriter<HairFault>,
@@ -118,10 +125,18 @@ pub(crate) fn report_changed<T: HairSetting>(
     for (entity, setting) in &changed {
         let notes = Notes::default();
         setting.mended(&notes);
-        for wrong in notes.into_inner() {
-            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
-        }
+        tell(entity, notes, &mut faults);
     }
+}
+
+/// Reports invalid values in the default.
+fn report_default<T: HairSetting>(
+    default: Res<HairDefault<T>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let notes = Notes::default();
+    default.0.mended(&notes);
+    tell(Entity::PLACEHOLDER, notes, &mut faults);
 }
 
 /// Registers one setting: its default, its type, and the report of invalid values.
@@ -129,27 +144,10 @@ pub(crate) fn plugin<T: HairSetting>(app: &mut App) {
     app.init_resource::<HairDefault<T>>()
         .register_type::<T>()
         .register_type::<HairDefault<T>>()
-        .add_systems(PreUpdate, report_invalid::<T>);
-}
-
-fn report_invalid<T: HairSetting>(
-    default: Res<HairDefault<T>>,
-    changed: Query<(Entity, &T), Changed<T>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    let mut report = |entity, setting: &T| {
-        let notes = Notes::default();
-        setting.mended(&notes);
-        for wrong in notes.into_inner() {
-            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
-        }
-    };
-    if default.is_changed() {
-        report(Entity::PLACEHOLDER, &default.0);
-    }
-    for (entity, setting) in &changed {
-        report(entity, setting);
-    }
+        .add_systems(
+            PreUpdate,
+            (report_default::<T>.run_if(resource_changed::<HairDefault<T>>), report_changed::<T>),
+        );
 }
 
 #[cfg(test)]

@@ -37,8 +37,8 @@ pub struct HairTick;
 pub enum HairSystems {
     /// Empty, for users.
     First,
-    /// Where the scalp is now: frames move, strands fall asleep and wake, free nodes stay behind by inertia, new strands get
-    /// their bonds.
+    /// Where the scalp is now: frames move, strands fall asleep and wake, free nodes stay behind by
+    /// inertia, new strands get their bonds.
     Roots,
     /// Gravity, wind (equation 17) and drag change velocities; water soaks, flows and dries; drying
     /// (19), water, treatments and whoever else ask for changes of bond rates.

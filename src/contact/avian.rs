@@ -9,7 +9,7 @@ use avian3d::{
     parry::shape::{SharedShape, TypedShape},
     prelude::{Collider, ColliderDisabled},
 };
-use bevy::{ecs::entity::EntityHashMap, math::Isometry3d, prelude::*};
+use bevy::{math::Isometry3d, prelude::*};
 
 /// Keeps hair out of the avian [`Collider`] of the same entity, with or without a rigid body.
 ///
@@ -28,6 +28,7 @@ use bevy::{ecs::entity::EntityHashMap, math::Isometry3d, prelude::*};
 /// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
+#[require(Unknown)]
 pub struct AvianHairCollider {
     /// Coulomb friction of hair on it, whatever bodies feel. Default 0.3, safe 0…2.
     pub friction: f32,
@@ -53,30 +54,37 @@ pub struct AvianShapeError {
     pub hint: &'static str,
 }
 
+/// What of a collider hair does not know, and has been told.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+struct Unknown(Option<AvianShapeError>);
+
 /// A child that stands for the collider of its parent, or for a part of it.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 struct AvianPart;
 
 pub(super) fn plugin(app: &mut App) {
-    app.register_type::<AvianHairCollider>().register_type::<AvianPart>().add_systems(
-        HairTick,
-        follow_colliders.after(HairSystems::First).before(HairSystems::Roots),
-    );
+    app.register_type::<AvianHairCollider>()
+        .register_type::<Unknown>()
+        .register_type::<AvianPart>()
+        .add_systems(
+            HairTick,
+            follow_colliders.after(HairSystems::First).before(HairSystems::Roots),
+        );
 }
 
 /// Makes the parts of every body what its collider is now.
 fn follow_colliders(
     step: Res<HairStep>,
-    bodies: Query<
-        (Entity, &Collider, &AvianHairCollider, Option<&Children>),
+    mut bodies: Query<
+        (Entity, &Collider, &AvianHairCollider, &mut Unknown, Option<&Children>),
         Without<ColliderDisabled>,
     >,
     mut parts: Query<
         (Entity, Option<&ChildOf>, &mut HairCollider, &mut Transform),
         With<AvianPart>,
     >,
-    mut told: Local<EntityHashMap<AvianShapeError>>,
     mut faults: MessageWriter<HairFault>,
     mut commands: Commands,
 ) {
@@ -88,16 +96,13 @@ fn follow_colliders(
             commands.entity(part).despawn();
         }
     }
-    told.retain(|&body, _| bodies.contains(body));
-    for (body, collider, &AvianHairCollider { friction }, children) in &bodies {
+    for (body, collider, &AvianHairCollider { friction }, mut unknown, children) in &mut bodies {
         let mut shapes = Vec::new();
-        match gather(collider.shape(), Isometry3d::IDENTITY, &mut shapes) {
-            Ok(()) => _ = told.remove(&body),
-            Err(why) => {
-                if told.insert(body, why.clone()) != Some(why.clone()) {
-                    faults.write(HairFault { entity: body, fault: Fault::Avian(why) });
-                }
-            }
+        let why = gather(collider.shape(), Isometry3d::IDENTITY, &mut shapes).err();
+        if unknown.set_if_neq(Unknown(why.clone()))
+            && let Some(why) = why
+        {
+            faults.write(HairFault { entity: body, fault: Fault::Avian(why) });
         }
         let mut wanted = shapes
             .into_iter()

@@ -6,6 +6,10 @@
 //! outlier costs nothing. Built by counting sort: two passes over the points, no allocation once
 //! warm, the same order every time.
 
+mod balls;
+
+pub use balls::{BallGrid, Found};
+
 use core::ops::Range;
 use glam::{IVec3, Vec3};
 
@@ -22,9 +26,6 @@ pub struct UniformGrid {
     starts: Vec<u32>,
     entries: Vec<Entry>,
     unsorted: Vec<Entry>,
-    /// A bit for each of some buckets of cells that lie within half a cell of an item; a power of two
-    /// of words, or none where nobody asks.
-    near: Vec<u64>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -50,28 +51,12 @@ impl UniformGrid {
     pub fn build(&mut self, cell: f32, items: impl Iterator<Item = (Vec3, u32)>) {
         self.inverse_cell = 1.0 / cell.max(1e-9);
         self.unsorted.clear();
-        self.near.clear();
         for (point, item) in items {
             if point.is_finite() {
                 self.unsorted.push(Entry { cell: self.cell_of(point), item });
             }
         }
         self.sort();
-    }
-
-    /// The same for [`runs_near`](Self::runs_near) alone, which then sees at one glance where there is
-    /// nothing: most of space, if items are few.
-    pub fn build_sparse(&mut self, cell: f32, items: impl Iterator<Item = (Vec3, u32)> + Clone) {
-        self.build(cell, items.clone());
-        self.near.resize((self.starts.len() - 1) / 8, 0);
-        let bits = 64 * self.near.len();
-        for (point, _) in items.filter(|(point, _)| point.is_finite()) {
-            let low = self.cell_of(point - 0.5 * cell);
-            for k in 0..8 {
-                let bit = bucket(low + IVec3::new(k & 1, k >> 1 & 1, k >> 2), bits - 1);
-                self.near[bit / 64] |= 1 << (bit % 64);
-            }
-        }
     }
 
     fn sort(&mut self) {
@@ -135,43 +120,40 @@ impl UniformGrid {
         self.entries.iter().chain(&self.entries[..first]).map(|e| e.item)
     }
 
-    /// Where in [`order`](Self::order) all items within `radius` of `point` are, and others. The radius
-    /// is a little less than half a cell: then they are in two cells each way, in four rows.
-    #[inline]
-    pub fn runs_near(&self, point: Vec3, radius: f32) -> Runs {
-        debug_assert!(radius * self.inverse_cell < 0.5, "cells are too small");
-        let mut runs = Runs::default();
-        if self.entries.is_empty() || !point.is_finite() {
-            return runs;
+    /// Where in [`order`](Self::order) the items of all cells are that a box from `low` to `high`
+    /// touches, row by row. A run may hold items of other rows too: [`Run::row`] tells them apart, and
+    /// then each comes once.
+    pub fn runs_in_box(&self, low: Vec3, high: Vec3, runs: &mut Vec<Run>) {
+        runs.clear();
+        if self.entries.is_empty() || !(low.is_finite() && high.is_finite()) {
+            return;
         }
-        if !self.near.is_empty() {
-            let bit = bucket(self.cell_of(point), 64 * self.near.len() - 1);
-            if self.near[bit / 64] & (1 << (bit % 64)) == 0 {
-                return runs;
+        let (low, high) = (self.cell_of(low), self.cell_of(high));
+        let buckets = self.starts.len() - 1;
+        let [width, deep, tall] = (high.as_i64vec3() - low.as_i64vec3() + 1).to_array();
+        // More rows than items: all items are looked at sooner.
+        if width >= buckets as i64 || deep * tall > self.entries.len() as i64 {
+            runs.push(Run { row: None, places: [0, self.entries.len() as u32] });
+            return;
+        }
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                let first = bucket(IVec3::new(low.x, y, z), buckets - 1);
+                let end = first + width as usize;
+                // Behind the last bucket comes the first one.
+                for (first, end) in [(first, end.min(buckets)), (0, end.saturating_sub(buckets))] {
+                    let places = [self.starts[first], self.starts[end]];
+                    if places[0] < places[1] {
+                        runs.push(Run { row: Some([y, z]), places });
+                    }
+                }
             }
         }
-        // Rounding must not leave a cell out.
-        let low = self.cell_of(point - (radius + 2e-7 * point.abs().max_element()));
-        let buckets = self.starts.len() - 1;
-        let rows: [usize; 4] = core::array::from_fn(|k| {
-            bucket(low + IVec3::new(0, k as i32 & 1, k as i32 >> 1), buckets - 1)
-        });
-        // What would be a branch on how full cells are is guessed wrong half of the time.
-        let end = |row: usize| match row + 2 {
-            end if end <= buckets => self.starts[end],
-            // Behind the last bucket the first ones come again.
-            end => self.starts[buckets] + self.starts[end - buckets],
-        };
-        for row in rows {
-            runs.add(self.starts[row], end(row));
-        }
-        // Rows whose buckets are the same, or next to each other, would bring items twice.
-        let near = |a: usize, b: usize| (a.wrapping_sub(b).wrapping_add(1) & (buckets - 1)) <= 2;
-        let [a, b, c, d] = rows;
-        if near(a, b) | near(a, c) | near(a, d) | near(b, c) | near(b, d) | near(c, d) {
-            runs.join(self.starts[buckets]);
-        }
-        runs
+    }
+
+    /// The row of cells of each item in [`order`](Self::order), as runs name it.
+    fn rows(&self) -> impl Iterator<Item = [i32; 2]> {
+        self.entries.iter().map(|e| [e.cell.y, e.cell.z])
     }
 
     /// Where in [`order`](Self::order) the items of the 27 cells around `point` are, three cells a
@@ -196,45 +178,13 @@ impl UniformGrid {
     }
 }
 
-/// Where in a grid's order the items around a point are: a few runs, none twice.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Runs {
-    /// With room to write one more.
-    runs: [(u32, u32); 9],
-    count: usize,
-}
-
-impl Runs {
-    #[inline(always)]
-    fn add(&mut self, start: u32, end: u32) {
-        self.runs[self.count] = (start, end);
-        self.count += usize::from(start < end);
-    }
-
-    /// Makes one of runs that overlap, in an order of `len` items behind which the first come again.
-    #[cold]
-    fn join(&mut self, len: u32) {
-        let torn: Vec<(u32, u32)> = (self.runs[..self.count].iter())
-            .flat_map(|&(start, end)| [(start, end.min(len)), (0, end.saturating_sub(len))])
-            .collect();
-        self.count = 0;
-        for (mut start, mut end) in torn {
-            while let Some(k) =
-                (self.runs[..self.count].iter()).position(|r| start < r.1 && r.0 < end)
-            {
-                (start, end) = (start.min(self.runs[k].0), end.max(self.runs[k].1));
-                self.count -= 1;
-                self.runs[k] = self.runs[self.count];
-            }
-            self.add(start, end);
-        }
-    }
-
-    /// The runs, as places in the order.
-    #[inline(always)]
-    pub fn each(self) -> impl Iterator<Item = Range<usize>> {
-        (0..self.count).map(move |k| self.runs[k].0 as usize..self.runs[k].1 as usize)
-    }
+/// Items that stand together in a grid's order.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    /// Whose items are meant, those of one row of cells; `None` for all.
+    pub row: Option<[i32; 2]>,
+    /// The first place, and the one behind the last.
+    pub places: [u32; 2],
 }
 
 /// Equation 5's role: a table index for a cell. Cells in a row along x have neighbouring ones.
@@ -270,26 +220,12 @@ mod tests {
             let points: Vec<Vec3> =
                 raw.iter().map(|&(x, y, z)| Vec3::new(x, y, z) * stretch).collect();
             let mut grid = UniformGrid::default();
-            let mut wide = UniformGrid::default();
             grid.build(radius, points.iter().zip(0..).map(|(p, i)| (*p, i)));
-            let items = points.iter().zip(0..).map(|(p, i)| (*p, i));
-            if stretch < 20.0 {
-                wide.build(2.002 * radius, items);
-            } else {
-                wide.build_sparse(2.002 * radius, items);
-            }
-            let order: Vec<u32> = wide.order().collect();
             for &p in &points {
                 let brute: Vec<u32> = (0..points.len() as u32)
                     .filter(|&i| points[i as usize].distance(p) <= radius)
                     .collect();
                 prop_assert_eq!(&near(&grid, &points, p, radius), &brute);
-                let mut found: Vec<u32> = (wide.runs_near(p, radius).each().flatten())
-                    .map(|slot| order[slot])
-                    .filter(|&i| points[i as usize].distance(p) <= radius)
-                    .collect();
-                found.sort_unstable();
-                prop_assert_eq!(found, brute);
             }
         }
     }

@@ -1,61 +1,87 @@
-//! One strand among droplets: pulled by them (\[W\] equation 2), touched by them, landed on.
+//! A tuft among droplets: pulled by them (\[W\] equation 2), touched by them, landed on.
 
 use super::{
     Wetting,
-    field::{Columns, Field},
+    field::{Falling, Field, Puller},
     model,
     moisture::node_lengths,
+    tuft::{Member, Row, Tuft},
 };
-use crate::rod::{algebra::V3, lanes::Real};
+use crate::grid::Found;
+use crate::rod::{
+    algebra::V3,
+    block::{Lane, load, load3, store3},
+    lanes::{LANES, Real},
+};
 use bevy::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
-
-/// How many droplets meet a node side by side.
-pub(super) const WIDTH: usize = 16;
-
-const NUMBERS: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
 /// A node whose squared distance from a droplet's centre (m²) is not more is pulled nowhere.
 const SAME_PLACE: f32 = 1e-18;
 
-/// What strands did to droplets, in the order of strands and nodes.
+/// The steepest field of force, in units of 1/dt², that a substep follows without overshooting. A
+/// node among more droplets than make it (about thirteen of 3/15 mm at 30 m/s² and 1/360 s) is
+/// pulled as by so many.
+const STEEPEST: f32 = 1.0;
+
+/// What strands did to droplets, in the order of tufts.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Encounters {
     /// What each droplet got (kg m/s, in the hair's frame).
-    pub impulses: Vec<Vec4>,
+    pub impulses: Vec<Vec3>,
+    /// How many strands are at each droplet.
+    pub company: Vec<u32>,
+    /// The most that strands would drink of each droplet (m³).
+    pub wanted: Vec<f64>,
     pub touches: Vec<Touch>,
     pub landings: Vec<Landing>,
-    /// A droplet for each strand that is at it.
-    pub company: Vec<u32>,
-    pulls: Vec<Pulls>,
+    /// Water that was on nodes that are gone (m³).
+    pub gone: f64,
+    scratch: Scratch,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Scratch {
+    tuft: Tuft,
+    near: Found,
+    hits: Vec<Hit>,
+    /// Which lanes are at each puller, and at which ones there are any.
+    at: Vec<u64>,
+    met: Vec<u32>,
 }
 
 impl Encounters {
     pub fn clear(&mut self, drops: usize) {
-        self.impulses.clear();
-        self.impulses.resize(drops, Vec4::ZERO);
-        self.touches.clear();
-        self.landings.clear();
-        self.company.clear();
+        let Self { impulses, company, wanted, touches, landings, gone, .. } = self;
+        impulses.clear();
+        impulses.resize(drops, Vec3::ZERO);
+        company.clear();
+        company.resize(drops, 0);
+        wanted.clear();
+        wanted.resize(drops, 0.0);
+        touches.clear();
+        landings.clear();
+        *gone = 0.0;
     }
 }
 
-/// Droplets that pull at a node, side by side, from a place of the field's columns on.
+/// A droplet among the nodes of a row.
 #[derive(Clone, Copy, Debug)]
-struct Pulls {
-    first: usize,
-    /// Which of the lanes do.
-    lanes: u64,
-    /// The node's change of velocity by each (m/s), if it bears nothing.
-    change: [[f32; WIDTH]; 3],
+struct Hit {
+    puller: u32,
+    /// Lanes that touch it.
+    touches: u64,
+    /// The nodes' change of velocity (m/s), if they bear nothing.
+    change: [Lane; 3],
 }
 
 /// A node that drinks from a droplet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch {
     pub drop: u32,
-    pub strand: Entity,
-    pub node: usize,
+    /// The strand's number among those of the piece of work.
+    pub strand: u32,
+    pub node: u32,
     /// What it would take (m³).
     pub wants: f64,
 }
@@ -75,52 +101,12 @@ pub(super) struct Landing {
 #[derive(Clone, Copy)]
 pub(super) struct MetBy<'a> {
     pub wetting: &'a Wetting,
+    pub field: &'a Field,
     pub dt: f32,
     /// Share of the free room on a node that a droplet fills in this substep.
     pub uptake: f32,
     /// The most film that a node holds (m³).
     pub most_film: f64,
-}
-
-impl MetBy<'_> {
-    /// What node `i` under a `film` (m³) would drink from a droplet that touches it (m³).
-    fn wants(&self, film: &[f64], i: usize) -> f64 {
-        let room = self.most_film - film.get(i).copied().unwrap_or(0.0);
-        room.max(0.0) * f64::from(self.uptake)
-    }
-}
-
-/// A strand among droplets.
-pub(super) struct Met<'a> {
-    pub strand: Entity,
-    pub positions: &'a [Vec3],
-    pub velocities: &'a mut [Vec3],
-    pub lengths: &'a [f32],
-    /// Added mass of each node over its dry mass; empty for none.
-    pub load: &'a [f32],
-    /// The film that lies on each node (m³); empty for none.
-    pub film: &'a [f64],
-    pub by: &'a MetBy<'a>,
-}
-
-/// A node, and the droplets that lanes hold against it: `count` from `first` on.
-#[derive(Clone, Copy)]
-struct Lanes {
-    first: usize,
-    count: usize,
-    p: Vec3,
-    /// The index of its strand.
-    own: u32,
-    is_root: bool,
-}
-
-/// What droplets do to a node.
-#[derive(Clone, Copy, Default)]
-struct Felt {
-    change: Vec3,
-    steepness: f32,
-    /// Lanes that it touches.
-    touches: u64,
 }
 
 /// The numbers of the bits that are set.
@@ -132,178 +118,253 @@ fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The steepest field of force, in units of 1/dt², that a substep follows without overshooting. A
-/// node among more droplets than make it (about thirteen of 3/15 mm at 30 m/s² and 1/360 s) is
-/// pulled as by so many.
-const STEEPEST: f32 = 1.0;
+#[inline(always)]
+fn splat<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
+    V3::new(f32x16::splat(simd, v.x), f32x16::splat(simd, v.y), f32x16::splat(simd, v.z))
+}
 
-impl Met<'_> {
-    /// Pulls the strand's nodes, and adds up what the droplets get from it.
-    pub fn meet(&mut self, level: Level, field: &Field, out: &mut Encounters) {
-        if field.drops.is_empty() {
-            return;
-        }
-        dispatch!(level, simd => self.feel(simd, field, out));
-        // Who carries a droplet is heavy.
-        if !self.load.is_empty() {
-            self.drink_from_riders(field, out);
-        }
-        self.catch(field, self.by.wetting.lock_radius(), out);
-    }
+#[inline(always)]
+fn sum<S: Simd>(v: V3<f32x16<S>>) -> Vec3 {
+    Vec3::new(v.x.reduce_sum(), v.y.reduce_sum(), v.z.reduce_sum())
+}
 
-    /// \[W\] equation 2 on every node, and what it touches.
-    #[inline(always)]
-    fn feel<S: Simd>(&mut self, simd: S, field: &Field, out: &mut Encounters) {
-        let mass = self.by.wetting.dry_mass();
-        let first_company = out.company.len();
-        for (i, length) in node_lengths(self.lengths).enumerate() {
-            let p = self.positions[i];
-            let load = self.load.get(i).copied().unwrap_or(0.0);
-            let (mut change, mut steepness) = (Vec3::ZERO, 0.0);
-            out.pulls.clear();
-            for run in field.pulling(p).each() {
-                for first in run.clone().step_by(WIDTH) {
-                    let own = self.strand.index_u32();
-                    let lanes = Lanes { first, count: run.end - first, p, own, is_root: i == 0 };
-                    let felt = self.pulled_by(simd, lanes, &field.columns, &mut out.pulls);
-                    change += felt.change;
-                    steepness += felt.steepness;
-                    for slot in bits(felt.touches).map(|lane| first + lane) {
-                        let drop = field.columns.drop[slot];
-                        self.touch((i, load, length), drop, field, first_company, out);
-                    }
-                }
-            }
-            let share = (STEEPEST * (1.0 + load) / steepness).min(1.0);
-            let impulse = -share * mass * length;
-            for Pulls { first, lanes, change: [x, y, z] } in &out.pulls {
-                for lane in bits(*lanes) {
-                    let drop = field.columns.drop[first + lane] as usize;
-                    out.impulses[drop] += Vec4::new(x[lane], y[lane], z[lane], 0.0) * impulse;
-                }
-            }
-            self.velocities[i] += change * (share / (1.0 + load));
-        }
-    }
-
-    /// Up to [`WIDTH`] droplets side by side.
-    #[inline(always)]
-    fn pulled_by<S: Simd>(
+impl MetBy<'_> {
+    /// Pulls the nodes of up to sixteen strands, the first of them number `first` of its piece of work,
+    /// and adds up what droplets get from them.
+    pub fn meet(
         &self,
-        simd: S,
-        Lanes { first, count, p, own, is_root }: Lanes,
-        columns: &Columns,
-        pulls: &mut Vec<Pulls>,
-    ) -> Felt {
-        let lit = |value: f32| f32x16::splat(simd, value);
-        let column = |column: &Vec<f32>| f32x16::from_slice(simd, &column[first..first + WIDTH]);
-        let offset = V3::new(
-            column(&columns.center[0]) - lit(p.x),
-            column(&columns.center[1]) - lit(p.y),
-            column(&columns.center[2]) - lit(p.z),
-        );
-        let squared = offset.dot(offset);
-        // What comes behind the run belongs to other cells.
-        let here = u32x16::load_array_ref(simd, &NUMBERS).simd_lt(count.min(WIDTH) as u32);
-        let inside = here & Real::lt(squared, column(&columns.reach));
-        if inside.to_bitmask() == 0 {
-            return Felt::default();
-        }
-        let touches = (inside & Real::lt(squared, column(&columns.touch))).to_bitmask();
-        // Between a strand and the drop on it the pull is an inner force. Roots do not move.
-        let rides = u32x16::from_slice(simd, &columns.rides[first..first + WIDTH]);
-        let (r_min, r_max) = (column(&columns.r_min), column(&columns.r_max));
-        let pulls_here = inside
-            & !rides.simd_eq(own)
-            & Real::lt(squared, r_max * r_max)
-            & Real::lt(lit(SAME_PLACE), squared);
-        let lanes = pulls_here.to_bitmask();
-        if is_root || lanes == 0 {
-            return Felt { touches, ..default() };
-        }
-        let distance = Real::sqrt(squared);
-        let most = column(&columns.strength) * lit(self.by.wetting.adhesion * self.by.dt);
-        let width = r_max - r_min;
-        let x = (distance + distance - r_min - r_max) / width;
-        let pull = (lit(1.0) - x * x) * most / distance;
-        let zero = lit(0.0);
-        let change = V3::select(pulls_here, offset.scale(pull), V3::new(zero, zero, zero));
-        let steepness = most * lit(4.0 * self.by.dt) / width;
-        let mut stored = Pulls { first, lanes, change: [[0.0; WIDTH]; 3] };
-        change.x.store_array(&mut stored.change[0]);
-        change.y.store_array(&mut stored.change[1]);
-        change.z.store_array(&mut stored.change[2]);
-        pulls.push(stored);
-        Felt {
-            change: Vec3::new(change.x.reduce_sum(), change.y.reduce_sum(), change.z.reduce_sum()),
-            steepness: Real::select(pulls_here, steepness, zero).reduce_sum(),
-            touches,
-        }
-    }
-
-    /// A droplet that node `i` touches: it drinks from it, and the water between them takes their
-    /// motion against each other.
-    fn touch(
-        &mut self,
-        (i, load, length): (usize, f32, f32),
-        drop: u32,
-        field: &Field,
-        first_company: usize,
+        level: Level,
+        members: &mut [Member<'_>],
+        first: usize,
         out: &mut Encounters,
     ) {
-        let MetBy { wetting, dt, .. } = *self.by;
-        let seen = &field.drops[drop as usize];
-        if !out.company[first_company..].contains(&drop) {
-            out.company.push(drop);
-        }
-        if seen.ride == Some(self.strand) {
+        if self.field.drops.is_empty() {
             return;
         }
-        let wants = self.by.wants(self.film, i);
-        if wants > 0.0 {
-            out.touches.push(Touch { drop, strand: self.strand, node: i, wants });
+        let mut tuft = core::mem::take(&mut out.scratch.tuft);
+        tuft.gather(members, self.wetting);
+        out.scratch.at.resize(self.field.pullers.len(), 0);
+        for i in 0..tuft.rows.len() {
+            let row = &mut tuft.rows[i];
+            self.field.pulling(level, row.low, row.high, &mut out.scratch.near);
+            if !out.scratch.near.balls.is_empty() {
+                let at = Place { node: i, first, own: &tuft.own };
+                dispatch!(level, simd => self.pull(simd, row, at, members, out));
+            }
         }
-        if i > 0 {
-            let node = wetting.dry_mass() * length * (1.0 + load);
-            // All that are at it together must not throw it beyond their common motion.
-            let rate = wetting.film_drag * dt * seen.strength;
-            let share = seen.mass / (seen.mass + node) * rate / (1.0 + rate * seen.company);
-            let change = (seen.velocity - self.velocities[i]) * share;
-            self.velocities[i] += change;
-            out.impulses[drop as usize] -= (change * node).extend(0.0);
+        let Scratch { at, met, .. } = &mut out.scratch;
+        for puller in met.drain(..) {
+            let lanes = core::mem::take(&mut at[puller as usize]);
+            out.company[self.field.pullers[puller as usize].drop as usize] += lanes.count_ones();
+        }
+        // Who carries a droplet is heavy.
+        for (k, member) in members.iter().enumerate().filter(|(_, m)| !m.load.is_empty()) {
+            self.drink_from_riders(member, first + k, out);
+        }
+        for (i, ends) in tuft.rows.windows(2).enumerate() {
+            let (low, high) = (ends[0].low.min(ends[1].low), ends[0].high.max(ends[1].high));
+            self.field.falling(level, low, high, &mut out.scratch.near);
+            for k in 0..out.scratch.near.balls.len() {
+                let falling = &self.field.fallers[out.scratch.near.balls[k] as usize];
+                let (lanes, when, along) = dispatch!(level, simd => caught(simd, ends, falling));
+                for lane in bits(lanes) {
+                    let (strand, at) = (members[lane].strand, i as f32 + along[lane]);
+                    let landing = Landing { drop: falling.drop, strand, at, when: when[lane] };
+                    out.landings.push(landing);
+                }
+            }
+        }
+        tuft.scatter(members);
+        out.scratch.tuft = tuft;
+    }
+
+    /// \[W\] equation 2 on a row of nodes, and what they touch.
+    #[inline(always)]
+    fn pull<S: Simd>(
+        &self,
+        simd: S,
+        row: &mut Row,
+        place: Place<'_>,
+        members: &[Member<'_>],
+        out: &mut Encounters,
+    ) {
+        let own = u32x16::load_array_ref(simd, place.own);
+        let p = load3(simd, &row.p);
+        let mut change = splat(simd, Vec3::ZERO);
+        let mut steepness = f32x16::splat(simd, 0.0);
+        out.scratch.hits.clear();
+        for k in 0..out.scratch.near.balls.len() {
+            let number = out.scratch.near.balls[k];
+            let puller = &self.field.pullers[number as usize];
+            let Felt { touches, pulls, by, steep } = self.felt(simd, p, own, puller);
+            if place.node > 0 {
+                change = change + by;
+                steepness += steep;
+            }
+            if touches != 0 {
+                let at = &mut out.scratch.at[number as usize];
+                if *at == 0 {
+                    out.scratch.met.push(number);
+                }
+                *at |= touches;
+            }
+            if touches | pulls != 0 {
+                let mut hit = Hit { puller: number, touches, change: [[0.0; LANES]; 3] };
+                store3(&mut hit.change, by);
+                out.scratch.hits.push(hit);
+            }
+        }
+        let bears = load(simd, &row.load) + 1.0;
+        let share = Real::min(bears * STEEPEST / steepness, f32x16::splat(simd, 1.0));
+        let mut v = change.scale_add(share / bears, load3(simd, &row.v));
+        let mass = load(simd, &row.mass);
+        // Roots do not move, nor do they hold what touches them back.
+        let given = if place.node > 0 { share * mass } else { f32x16::splat(simd, 0.0) };
+        for k in 0..out.scratch.hits.len() {
+            let hit = out.scratch.hits[k];
+            let puller = &self.field.pullers[hit.puller as usize];
+            let mut impulse = -load3(simd, &hit.change).scale(given);
+            if hit.touches != 0 {
+                let others = mask32x16::from_bitmask(simd, hit.touches)
+                    & !own.simd_eq(u32x16::splat(simd, puller.rides));
+                if place.node > 0 {
+                    let (changed, got) = self.drag(simd, v, mass * bears, others, puller);
+                    (v, impulse) = (changed, impulse + got);
+                }
+                self.drink(others.to_bitmask(), puller.drop, &place, members, out);
+            }
+            out.impulses[puller.drop as usize] += sum(impulse);
+        }
+        store3(&mut row.v, v);
+    }
+
+    /// What a droplet does to sixteen nodes at `p`.
+    #[inline(always)]
+    fn felt<S: Simd>(&self, simd: S, p: V3<f32x16<S>>, own: u32x16<S>, puller: &Puller) -> Felt<S> {
+        let zero = f32x16::splat(simd, 0.0);
+        let one = f32x16::splat(simd, 1.0);
+        let offset = splat(simd, puller.center) - p;
+        let squared = offset.dot(offset);
+        let inside = squared.simd_lt(f32x16::splat(simd, puller.reach));
+        let touches = squared.simd_lt(f32x16::splat(simd, puller.touch)).to_bitmask();
+        // Between a strand and the drop on it the pull is an inner force.
+        let pulls = inside
+            & !own.simd_eq(u32x16::splat(simd, puller.rides))
+            & squared.simd_lt(f32x16::splat(simd, puller.pulls_within))
+            & squared.simd_gt(f32x16::splat(simd, SAME_PLACE));
+        let lanes = pulls.to_bitmask();
+        if lanes == 0 {
+            return Felt { touches, pulls: lanes, by: V3::new(zero, zero, zero), steep: zero };
+        }
+        let distance = Real::sqrt(squared);
+        let most = puller.strength * self.wetting.adhesion * self.dt;
+        let x = distance * puller.steep - puller.middle;
+        let pull = (one - x * x) * most / distance;
+        Felt {
+            touches,
+            pulls: lanes,
+            by: V3::select(pulls, offset.scale(pull), V3::new(zero, zero, zero)),
+            steep: Real::select(
+                pulls,
+                f32x16::splat(simd, most * 2.0 * self.dt * puller.steep),
+                zero,
+            ),
+        }
+    }
+
+    /// The water between nodes and a droplet that touches them takes their motion against each other:
+    /// the nodes' velocity then, and what the droplet gets.
+    #[inline(always)]
+    fn drag<S: Simd>(
+        &self,
+        simd: S,
+        v: V3<f32x16<S>>,
+        node: f32x16<S>,
+        touching: mask32x16<S>,
+        puller: &Puller,
+    ) -> (V3<f32x16<S>>, V3<f32x16<S>>) {
+        let zero = f32x16::splat(simd, 0.0);
+        let drop = &self.field.drops[puller.drop as usize];
+        // All that are at it together must not throw it beyond their common motion.
+        let rate = self.wetting.film_drag * self.dt * drop.strength;
+        let rate = rate / (1.0 + rate * drop.company);
+        let share = f32x16::splat(simd, drop.mass * rate) / (node + drop.mass);
+        let share = Real::select(touching, share, zero);
+        let change = (splat(simd, drop.velocity) - v).scale(share);
+        (v + change, -change.scale(node))
+    }
+
+    /// What each of some lanes would take from a droplet.
+    fn drink(
+        &self,
+        lanes: u64,
+        drop: u32,
+        place: &Place<'_>,
+        members: &[Member<'_>],
+        out: &mut Encounters,
+    ) {
+        for (lane, member) in bits(lanes).filter_map(|lane| Some((lane, members.get(lane)?))) {
+            self.want(drop, place.first + lane, place.node, member.film, out);
+        }
+    }
+
+    /// A node under its strand's `film` (m³) touches a droplet, and would fill what room it has.
+    fn want(&self, drop: u32, strand: usize, node: usize, film: &[f64], out: &mut Encounters) {
+        let room = self.most_film - film.get(node).copied().unwrap_or(0.0);
+        let wants = room * f64::from(self.uptake);
+        if wants > 0.0 {
+            out.wanted[drop as usize] += wants;
+            out.touches.push(Touch { drop, strand: strand as u32, node: node as u32, wants });
         }
     }
 
     /// Between two nodes a droplet touches the nearer one of its strand, however far off that is.
-    fn drink_from_riders(&self, field: &Field, out: &mut Encounters) {
-        for (drop, seen) in field.on(self.strand) {
-            let touch = seen.touch(self.by.wetting.lock_radius());
-            for (node, length) in node_lengths(self.lengths).enumerate() {
+    fn drink_from_riders(&self, member: &Member<'_>, strand: usize, out: &mut Encounters) {
+        for (drop, seen) in self.field.on(member.strand) {
+            let touch = seen.touch(self.wetting.lock_radius());
+            for (node, length) in node_lengths(member.lengths).enumerate() {
                 let near = touch.max(0.5 * length);
-                let wants = self.by.wants(self.film, node);
-                if self.positions[node].distance_squared(seen.at) < near * near && wants > 0.0 {
-                    out.touches.push(Touch { drop, strand: self.strand, node, wants });
+                if member.positions[node].distance_squared(seen.at) < near * near {
+                    self.want(drop, strand, node, member.film, out);
                 }
             }
         }
     }
+}
 
-    /// Whether falling droplets hit an edge on their way of this substep.
-    fn catch(&self, field: &Field, skin: f32, out: &mut Encounters) {
-        for (i, pair) in self.positions.windows(2).enumerate() {
-            let edge = pair[1] - pair[0];
-            for (drop, seen) in field.falling(pair[0] + 0.5 * edge) {
-                let (when, along) =
-                    model::closest(seen.before, seen.at - seen.before, pair[0], edge);
-                let met = seen.before.lerp(seen.at, when).distance_squared(pair[0] + edge * along);
-                let near = seen.radius + skin;
-                if met < near * near {
-                    let at = i as f32 + along;
-                    out.landings.push(Landing { drop, strand: self.strand, at, when });
-                }
-            }
-        }
-    }
+/// Which nodes a row is.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    node: usize,
+    /// The number of the first lane's strand in its piece of work.
+    first: usize,
+    /// The index of each lane's strand.
+    own: &'a [u32; LANES],
+}
+
+/// What a droplet does to nodes side by side.
+#[derive(Clone, Copy)]
+struct Felt<S: Simd> {
+    touches: u64,
+    pulls: u64,
+    by: V3<f32x16<S>>,
+    steep: f32x16<S>,
+}
+
+/// The edges between two rows that a falling droplet has hit on its way of this substep: which lanes,
+/// when (0…1), and where along them (0…1).
+#[inline(always)]
+fn caught<S: Simd>(simd: S, ends: &[Row], falling: &Falling) -> (u64, Lane, Lane) {
+    let start = load3(simd, &ends[0].p);
+    let edge = load3(simd, &ends[1].p) - start;
+    let (from, way) = (splat(simd, falling.from), splat(simd, falling.way));
+    let (when, along) = model::closest(from, way, start, edge);
+    let apart = way.scale_add(when, from) - edge.scale_add(along, start);
+    let near = f32x16::splat(simd, falling.near * falling.near);
+    let mut places = (apart.dot(apart).simd_lt(near).to_bitmask(), [0.0; LANES], [0.0; LANES]);
+    when.store_array(&mut places.1);
+    along.store_array(&mut places.2);
+    places
 }
 
 #[cfg(test)]
@@ -325,11 +386,25 @@ mod tests {
         }
     }
 
+    fn member<'a>(i: u32, positions: &'a [Vec3], velocities: &'a mut [Vec3]) -> Member<'a> {
+        const LENGTHS: [f32; 8] = [0.03; 8];
+        let strand = Entity::from_raw_u32(7 + i).unwrap();
+        let lengths = &LENGTHS[..positions.len() - 1];
+        Member { strand, positions, velocities, lengths, load: &[], film: &[] }
+    }
+
+    fn met_by<'a>(wetting: &'a Wetting, field: &'a Field, dt: f32) -> MetBy<'a> {
+        MetBy { wetting, field, dt, uptake: 0.0, most_film: 0.0 }
+    }
+
     #[test]
     fn every_node_feels_every_droplet_in_reach_and_no_other() {
-        let strand = Entity::from_raw_u32(7).unwrap();
-        let positions: Vec<Vec3> = (0..9).map(|i| Vec3::X * (0.03 * i as f32)).collect();
-        let lengths = vec![0.03; 8];
+        // Five strands beside each other, each shorter than the one before.
+        let strands: Vec<Vec<Vec3>> = (0..5)
+            .map(|s| {
+                (0..9 - s).map(|i| Vec3::new(0.03 * i as f32, 0.004 * s as f32, 0.0)).collect()
+            })
+            .collect();
         let wetting = Wetting { film_drag: 0.0, ..default() };
         let mut random = 1u32;
         let mut next = || {
@@ -337,44 +412,68 @@ mod tests {
             random as f32 / u32::MAX as f32 - 0.5
         };
         let mut field = Field::default();
-        for _ in 0..300 {
+        for k in 0..300 {
             let at = Vec3::new(0.12 + next() * 0.3, next() * 0.05, next() * 0.05);
-            field.drops.push(drop(at));
+            // Some ride on one of the strands, and do not pull at it.
+            let ride = Entity::from_raw_u32(if k % 7 == 0 { 8 } else { 1000 });
+            field.drops.push(SeenDrop { ride, ..drop(at) });
         }
         // and one exactly on a node
-        field.drops.push(drop(positions[3]));
-        field.sort(0.03, 1e-3);
-        let mut velocities = vec![Vec3::ZERO; 9];
+        field.drops.push(drop(strands[0][3]));
+        field.sort(1e-3);
+        let mut velocities: Vec<_> = strands.iter().map(|s| vec![Vec3::ZERO; s.len()]).collect();
         let mut out = Encounters::default();
         out.clear(field.drops.len());
-        let mut met = Met {
-            strand,
-            positions: &positions,
-            velocities: &mut velocities,
-            lengths: &lengths,
-            load: &[],
-            film: &[],
-            by: &MetBy { wetting: &wetting, dt: 1.0 / 3600.0, uptake: 0.0, most_film: 0.0 },
-        };
-        met.meet(Level::new(), &field, &mut out);
-        for (i, p) in positions.iter().enumerate() {
-            let expected: Vec3 = (field.drops.iter())
-                .map(|d| model::pull(d.at - *p, d.r_min, d.r_max) * (30.0 / 3600.0))
-                .sum();
-            let expected = if i == 0 { Vec3::ZERO } else { expected };
-            assert!(velocities[i].distance(expected) < 1e-5, "{i}");
+        let mut members: Vec<_> = (0..)
+            .zip(strands.iter().zip(&mut velocities))
+            .map(|(i, (positions, velocities))| member(i, positions, velocities))
+            .collect();
+        met_by(&wetting, &field, 1.0 / 3600.0).meet(Level::new(), &mut members, 0, &mut out);
+        let mut given = Vec3::ZERO;
+        for (s, member) in members.iter().enumerate() {
+            for (i, p) in member.positions.iter().enumerate() {
+                let others = field.drops.iter().filter(|d| d.ride != Some(member.strand));
+                let expected: Vec3 = others
+                    .map(|d| model::pull(d.at - *p, d.r_min, d.r_max) * (30.0 / 3600.0))
+                    .sum();
+                let expected = if i == 0 { Vec3::ZERO } else { expected };
+                assert!(member.velocities[i].distance(expected) < 1e-5, "{s} {i}");
+            }
+            given += (member.velocities.iter().zip(node_lengths(member.lengths)))
+                .map(|(v, l)| *v * (l * wetting.dry_mass()))
+                .sum::<Vec3>();
         }
-        // What droplets get is what the strand gave: momentum in, momentum out.
-        let given: Vec3 = (velocities.iter().zip(node_lengths(&lengths)))
-            .map(|(v, l)| *v * (l * wetting.dry_mass()))
-            .sum();
-        let got: Vec3 = out.impulses.iter().map(|p| p.xyz()).sum();
+        // What droplets get is what strands gave: momentum in, momentum out.
+        let got: Vec3 = out.impulses.iter().sum();
         assert!((given + got).length() < 1e-6 * given.length());
+        for (k, d) in field.drops.iter().enumerate() {
+            let at = |s: &&Vec<Vec3>| s.iter().any(|p| p.distance(d.at) < 0.004);
+            assert_eq!(out.company[k] as usize, strands.iter().filter(at).count(), "{k}");
+        }
+    }
+
+    #[test]
+    fn drag_takes_motion_and_keeps_momentum() {
+        let positions = [Vec3::ZERO, Vec3::X * 0.03, Vec3::X * 0.06];
+        let mut velocities = [Vec3::ZERO, Vec3::Y, Vec3::Z];
+        let wetting = Wetting { adhesion: 0.0, film_drag: 30.0, ..default() };
+        let mut field = Field::default();
+        field.drops.push(SeenDrop { company: 3.0, ..drop(positions[1]) });
+        field.sort(1e-3);
+        let mut out = Encounters::default();
+        out.clear(1);
+        let dt = 1.0 / 360.0;
+        let mut members = [member(0, &positions, &mut velocities)];
+        met_by(&wetting, &field, dt).meet(Level::new(), &mut members, 0, &mut out);
+        let node = wetting.dry_mass() * 0.03;
+        let share = 1.1e-4 / (1.1e-4 + node) * (30.0 * dt) / (1.0 + 3.0 * 30.0 * dt);
+        assert!(velocities[1].distance(Vec3::Y * (1.0 - share)) < 1e-6, "{velocities:?}");
+        assert_eq!(velocities[2], Vec3::Z);
+        assert!(out.impulses[0].distance(Vec3::Y * (share * node)) < 1e-6 * node);
     }
 
     #[test]
     fn a_fast_drop_does_not_fall_through_a_strand() {
-        let strand = Entity::from_raw_u32(7).unwrap();
         let positions = [Vec3::ZERO, Vec3::X * 0.03, Vec3::X * 0.06];
         let mut field = Field::default();
         let before = Vec3::new(0.04, 0.05, 0.0);
@@ -385,24 +484,13 @@ mod tests {
             ..falling
         };
         field.drops = vec![falling, beside];
-        field.sort(0.03, 1e-3);
+        field.sort(1e-3);
         let mut out = Encounters::default();
         out.clear(field.drops.len());
-        let mut met = Met {
-            strand,
-            positions: &positions,
-            velocities: &mut [Vec3::ZERO; 3],
-            lengths: &[0.03; 2],
-            load: &[],
-            film: &[],
-            by: &MetBy {
-                wetting: &Wetting::default(),
-                dt: 1.0 / 360.0,
-                uptake: 0.0,
-                most_film: 0.0,
-            },
-        };
-        met.meet(Level::new(), &field, &mut out);
+        let mut velocities = [Vec3::ZERO; 3];
+        let mut members = [member(0, &positions, &mut velocities)];
+        let wetting = Wetting::default();
+        met_by(&wetting, &field, 1.0 / 360.0).meet(Level::new(), &mut members, 0, &mut out);
         let hits: Vec<_> = out.landings.iter().map(|l| (l.drop, l.at)).collect();
         assert_eq!(hits.len(), 1);
         assert_eq!(hits[0].0, 0);

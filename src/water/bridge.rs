@@ -1,32 +1,36 @@
 //! `Interaction`: strands that a film of water joins draw together and move as one.
 
-use super::{Moisture, Wetting, moisture::node_lengths, motion::WaterField};
+use super::{Moisture, Wetting, meet::WaterField, moisture::node_lengths};
 use crate::{
     contact::{Bridged, Film, LockContact, LockNeighbours},
+    lod::HairSteps,
     setting::Settings,
-    strand::{Burden, Hair, Sleep, Strand, StrandOf, Strands},
-    tick::HairStep,
+    strand::{Burden, Hair, Sleep, Sleepers, Strand, StrandOf, Strands},
 };
 use bevy::prelude::*;
 
 /// Bridges of water between the wet strands of each hair, found through the lists of its contacts.
 pub(super) fn join_wet_strands(
-    step: Res<HairStep>,
+    steps: HairSteps,
     contact: Settings<LockContact>,
     wetting: Settings<Wetting>,
     mut scratch: ResMut<WaterField>,
-    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours), With<Hair>>,
+    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
     mut strands: Query<(&mut Strand, &Moisture, &Burden, &Sleep), With<StrandOf>>,
 ) {
     let rows = &mut scratch.bypass_change_detection().rows;
-    for (hair, members, mut neighbours) in &mut hairs {
+    for (hair, members, mut neighbours, sleepers) in &mut hairs {
+        if sleepers.is_some_and(Sleepers::all) {
+            continue;
+        }
+        let Some(stride) = steps.of(hair) else { continue };
         let LockContact { radius, strength } = contact.of(hair);
         let wetting = wetting.of(hair);
-        let dry = strands.iter_many(members.collection()).all(|(_, m, ..)| m.is_untouched());
-        let joins = !dry
-            && radius > 0.0
+        let mut moistures = strands.iter_many(members.collection()).map(|(_, m, ..)| m);
+        let joins = radius > 0.0
             && strength > 0.0
-            && (wetting.cohesion > 0.0 || wetting.film_drag > 0.0);
+            && (wetting.cohesion > 0.0 || wetting.film_drag > 0.0)
+            && moistures.any(|moisture| !moisture.is_untouched());
         let list = neighbours.bypass_change_detection();
         let film = Film::between(2.0 * radius);
         list.look_beyond(if joins { film.longest } else { 0.0 });
@@ -56,7 +60,7 @@ pub(super) fn join_wet_strands(
             let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
             for (i, (v, bridged)) in velocities.iter_mut().zip(&mut bridges).enumerate() {
                 let load = burden.mass.get(i).copied().unwrap_or(0.0);
-                *v = joined(*v, &bridged, &wetting, load, step.dt);
+                *v = joined(*v, &bridged, &wetting, load, stride.dt);
             }
         }
     }

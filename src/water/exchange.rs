@@ -57,28 +57,30 @@ pub(super) fn blown_air(blowers: &[LocalBlower], scale: f32, room: f32, p: Vec3)
 }
 
 /// Water's surroundings as one hair has them, in its frame.
-struct LocalWater {
+struct LocalWater<'a> {
     wetting: Wetting,
     pose: Pose,
-    gravity: Vec3,
+    around: Surroundings<'a>,
     blowers: Vec<LocalBlower>,
+    /// The share of the way that hydrogen bonds go after the water.
+    bonds_follow: f32,
 }
 
-impl LocalWater {
-    /// What the air does at a place of an edge.
-    fn exposure(&self, p: Vec3, edge: Vec3, room: f32, dt: f32) -> Exposure {
+impl LocalWater<'_> {
+    /// What blown air does at a place of an edge.
+    fn exposure(&self, p: Vec3, edge: Vec3, room: f32, dt: f32) -> Option<Exposure> {
         if self.blowers.is_empty() {
-            return Exposure::default();
+            return None;
         }
         let (velocity, warmth) = blown_air(&self.blowers, self.pose.scale, room, p);
         let blown = |b: &LocalBlower| {
             drying(wind(b.blower.strength, b.nozzle, b.aim, p, edge).length() * dt, b.blower.drying)
         };
-        Exposure {
+        Some(Exposure {
             speed: velocity.cross(edge.normalize_or_zero()).length(),
             warmth,
             blown: self.blowers.iter().map(blown).sum(),
-        }
+        })
     }
 }
 
@@ -142,10 +144,14 @@ pub(super) fn exchange_water(
         }
         let index = waters.index(of.0, || {
             let pose = *hairs.get(of.0).ok()?.0.now();
+            let wetting = wetting.of(of.0);
+            let gravity = pose.direction_in(gravity);
+            let seconds = process * step.dt;
             Some(LocalWater {
-                wetting: wetting.of(of.0),
-                gravity: pose.direction_in(gravity),
+                wetting,
+                around: Surroundings::new(wetting, gravity, &air, step.dt, process),
                 blowers: local_blowers(&pose, &blowers),
+                bonds_follow: 1.0 - bevy::math::ops::exp(-seconds / wetting.bond_time.max(1e-9)),
                 pose,
             })
         });
@@ -166,7 +172,7 @@ pub(super) fn exchange_water(
         }
     }
     for_each(&mut items, |wet| {
-        exchange(wet, &waters.values[wet.hair], &air, damp, step.dt, process);
+        exchange(wet, &waters.values[wet.hair], &air, damp, step.dt);
     });
     for wet in &items {
         ledger.book(-wet.left.evaporated);
@@ -179,25 +185,17 @@ pub(super) fn exchange_water(
 }
 
 /// One strand's water in one substep, what follows from it for bonds and weight.
-fn exchange(
-    wet: &mut Wet<'_>,
-    water: &LocalWater,
-    air: &DryingAir,
-    damp: bool,
-    dt: f32,
-    process: f32,
-) {
-    let LocalWater { wetting, gravity, .. } = water;
+fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bool, dt: f32) {
+    let LocalWater { wetting, around, bonds_follow, .. } = water;
     let Wet { strand, bonds, moisture, burden, changes, .. } = wet;
     wet.gone += moisture.fit(strand.nodes());
     let (positions, lengths, edges) = (strand.positions(), strand.rest_lengths(), strand.edges());
-    let around = Surroundings { positions, lengths, wetting, gravity: *gravity, air, dt, process };
     let exposure = |i: usize| {
         let e = i.min(edges - 1);
         water.exposure(positions[i], positions[e + 1] - positions[e], air.celsius, dt)
     };
-    moisture.exchange(&around, exposure, &mut wet.left);
-    open_bonds(bonds, moisture.wetness(), wetting.bond_time, process * dt, changes);
+    moisture.exchange(positions, lengths, around, exposure, &mut wet.left);
+    open_bonds(bonds, moisture.wetness(), *bonds_follow, changes);
     let capacity = wetting.capacity() * f64::from(strand.length());
     if !damp
         && moisture.volume() < 1e-4 * capacity
@@ -217,16 +215,9 @@ fn exchange(
     burden.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
 }
 
-/// Hydrogen bonds go toward 1 − wetness with the time constant `bond_time`; equation 16 remembers
-/// the shape in which they close.
-fn open_bonds(
-    bonds: &Bonds,
-    wetness: &[f32],
-    bond_time: f32,
-    seconds: f32,
-    changes: &mut BondChanges,
-) {
-    let share = 1.0 - bevy::math::ops::exp(-seconds / bond_time.max(1e-9));
+/// Hydrogen bonds go a `share` of their way toward 1 − wetness; equation 16 remembers the shape in
+/// which they close.
+fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChanges) {
     for (i, (b, wet)) in bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate() {
         changes.ask(i, BondKind::Hydrogen, (1.0 - wet - b) * share);
     }

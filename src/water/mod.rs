@@ -17,10 +17,12 @@ mod bridge;
 mod droplet;
 mod exchange;
 mod field;
+mod meet;
 pub mod model;
 pub mod moisture;
 mod motion;
 mod systems;
+mod tuft;
 pub mod vapour;
 
 pub use droplet::{Droplet, Ride, Shower};

@@ -1,5 +1,6 @@
 //! Droplets as mathematics: the wet-hair paper's equation 2, falling, sliding, hanging.
 
+use crate::rod::{algebra::V3, lanes::Real};
 use glam::Vec3;
 
 /// Surface tension of water (N/m).
@@ -86,17 +87,17 @@ const WATER_DENSITY: f32 = 1000.0;
 
 /// Where two points that move evenly, or two segments, come closest: the shares of both ways,
 /// 0…1.
-#[inline]
-pub fn closest(a: Vec3, along_a: Vec3, b: Vec3, along_b: Vec3) -> (f32, f32) {
+#[inline(always)]
+pub fn closest<R: Real>(a: V3<R>, along_a: V3<R>, b: V3<R>, along_b: V3<R>) -> (R, R) {
+    let (zero, one) = (a.x.lit(0.0), a.x.lit(1.0));
     let between = b - a;
-    let (aa, bb, ab) = (along_a.length_squared(), along_b.length_squared(), along_a.dot(along_b));
+    let (aa, bb, ab) = (along_a.dot(along_a), along_b.dot(along_b), along_a.dot(along_b));
     let (da, db) = (along_a.dot(between), along_b.dot(between));
     let flat = aa * bb - ab * ab;
-    let s = if flat > 1e-7 * aa * bb { (da * bb - db * ab) / flat } else { 0.0 };
-    let s = s.clamp(0.0, 1.0);
-    let t = if bb > 0.0 { (s * ab - db) / bb } else { 0.0 };
-    let t = t.clamp(0.0, 1.0);
-    let s = if aa > 0.0 { ((t * ab + da) / aa).clamp(0.0, 1.0) } else { 0.0 };
+    let crosses = (aa * bb * a.x.lit(1e-7)).lt(flat);
+    let s = R::select(crosses, (da * bb - db * ab) / flat, zero).max(zero).min(one);
+    let t = R::select(zero.lt(bb), (s * ab - db) / bb, zero).max(zero).min(one);
+    let s = R::select(zero.lt(aa), (t * ab + da) / aa, zero).max(zero).min(one);
     (s, t)
 }
 
@@ -143,7 +144,8 @@ mod tests {
             s in 0.0f32..1.0, t in 0.0f32..1.0,
         ) {
             let [a, u, b, w] = [0, 3, 6, 9].map(|i| Vec3::new(v[i], v[i + 1], v[i + 2]));
-            let (x, y) = closest(a, u, b, w);
+            let lane = |v: Vec3| V3::new(v.x, v.y, v.z);
+            let (x, y) = closest(lane(a), lane(u), lane(b), lane(w));
             let best = (a + u * x).distance(b + w * y);
             prop_assert!(best <= (a + u * s).distance(b + w * t) + 1e-3);
         }

@@ -4,12 +4,14 @@ use super::{
     Climate, Droplet, DropletRules, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
     bridge::join_wet_strands,
     exchange::{exchange_water, run_showers},
-    motion::{WaterField, follow_strands, merge_droplets, move_droplets, wet_strands},
+    meet::{WaterField, wet_strands},
+    motion::{follow_strands, merge_droplets, move_droplets},
+    tuft,
 };
 use crate::{
     contact,
-    fault::{Fault, HairFault},
-    setting::{self, Notes},
+    fault::HairFault,
+    setting::{self, Notes, tell},
     strand::Strand,
     style,
     tick::{HairStep, HairSystems, HairTick},
@@ -22,6 +24,7 @@ pub struct WaterPlugin;
 impl Plugin for WaterPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<Wetting>(app);
+        tuft::plugin(app);
         app.init_resource::<Climate>()
             .init_resource::<ProcessTime>()
             .init_resource::<DropletRules>()
@@ -84,12 +87,6 @@ fn report_air(
         process.mended(&notes);
     }
     tell(Entity::PLACEHOLDER, notes, &mut faults);
-}
-
-pub(super) fn tell(entity: Entity, notes: Notes, faults: &mut MessageWriter<HairFault>) {
-    for wrong in notes.into_inner() {
-        faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
-    }
 }
 
 /// Droplets that somebody despawns take their water with them.

@@ -4,10 +4,11 @@
 //! lock, flows down, creeps along and drips; the **bound** water has soaked into the fibres, where it
 //! opens hydrogen bonds. Air takes the film first, then what is bound.
 
-use super::{
-    model::{WATER_VISCOSITY, clinging, hanging},
-    vapour::{DryingAir, WATER, transfer},
-};
+mod flow;
+
+pub use flow::{Exposure, Left, Surroundings};
+
+use super::vapour::WATER;
 use crate::setting::{Bound, HairSetting, Notes};
 use bevy::prelude::*;
 use core::f32::consts::PI;
@@ -18,8 +19,6 @@ const KERATIN: f32 = 1310.0;
 const PACKING: f32 = 0.6;
 /// Bound water of soaked hair beyond a room's, as a share of the dry mass.
 const SATURATION: f32 = 0.31 - 0.0957;
-/// Thickest change that the flow makes in one substep, as a share of a segment.
-const COURANT: f32 = 0.4;
 
 /// How hair takes water up, gives it away and is pulled by it. Component of a
 /// [`Hair`](crate::Hair); where absent, [`HairDefault<Wetting>`](crate::HairDefault) holds.
@@ -233,7 +232,7 @@ impl Moisture {
         gravity: f32,
     ) -> f64 {
         let before = self.volume();
-        let held = clinging(wetting.bundle(1.0), gravity);
+        let held = super::model::clinging(wetting.bundle(1.0), gravity);
         *self = Self { film: film.to_vec(), bound: bound.to_vec(), ..default() };
         for ((film, bound), length) in film.iter().zip(bound).zip(node_lengths(lengths)) {
             let capacity = wetting.capacity() * f64::from(length);
@@ -265,159 +264,9 @@ pub(crate) fn node_lengths(lengths: &[f32]) -> impl Iterator<Item = f32> + '_ {
     })
 }
 
-/// What the air does at a node in a substep.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Exposure {
-    /// Speed of the air beyond the room's draught (m/s).
-    pub speed: f32,
-    /// Its temperature above the room's (K).
-    pub warmth: f32,
-    /// Share of the node's capacity that equation 19 dries away in this substep: Σ drying |Δv_w|.
-    pub blown: f32,
-}
-
-/// A strand, its hair's wetting and its surroundings in one substep.
-pub struct Surroundings<'a> {
-    /// Where the nodes are (m).
-    pub positions: &'a [Vec3],
-    /// Rest lengths of the segments (m).
-    pub lengths: &'a [f32],
-    /// How this hair wets.
-    pub wetting: &'a Wetting,
-    /// Gravity in the hair's frame (m/s²).
-    pub gravity: Vec3,
-    /// The room's air.
-    pub air: &'a DryingAir,
-    /// The substep (s).
-    pub dt: f32,
-    /// Process time over time.
-    pub process: f32,
-}
-
-/// What left a strand in a substep.
-#[derive(Clone, Debug, Default)]
-pub struct Left {
-    /// Into the air (m³); negative where air was damp.
-    pub evaporated: f64,
-    /// Node and volume (m³) of drops that let go.
-    pub drips: Vec<(usize, f64)>,
-}
-
-impl Moisture {
-    /// One substep of a strand's water: the film flows and creeps, soaks in, dries and drips. Needs
-    /// room for all nodes.
-    pub fn exchange(
-        &mut self,
-        around: &Surroundings<'_>,
-        exposure: impl Fn(usize) -> Exposure,
-        left: &mut Left,
-    ) {
-        self.flow(around);
-        let Surroundings { wetting, air, dt, process, gravity, .. } = *around;
-        let diameter = 2.0 * wetting.lock_radius();
-        let soaked = 1.0 - bevy::math::ops::exp(-wetting.soaking * process * dt);
-        let g = gravity.length();
-        let held = clinging(wetting.bundle(1.0), g);
-        let hung = hanging(wetting.bundle(1.0), g);
-        let last = around.lengths.len();
-        for (i, length) in node_lengths(around.lengths).enumerate() {
-            let (film, bound) = (&mut self.film[i], &mut self.bound[i]);
-            let capacity = wetting.capacity() * f64::from(length);
-            // Beyond capacity only after the settings changed: what no longer fits comes out.
-            let soaks = ((capacity - *bound) * f64::from(soaked))
-                .min(*film)
-                .max((capacity - *bound).min(0.0));
-            *film -= soaks;
-            *bound += soaks;
-
-            let exposed = exposure(i);
-            let blown = capacity * f64::from(exposed.blown);
-            let speed = air.draught + exposed.speed;
-            let flux = transfer(speed, diameter) * air.drive(exposed.warmth) * wetting.evaporation;
-            let area = PI * diameter * length;
-            let drying = f64::from(flux * area * process * dt) / WATER;
-            let from_film = (drying + blown).min(*film);
-            *film -= from_film;
-            // Bound water is drier the less of it there is; in damp air it comes back.
-            let share = (*bound / capacity) as f32;
-            let thirst = f64::from((share - air.equilibrium) / (1.0 - air.equilibrium).max(1e-3));
-            let rest = (drying + blown - from_film).max(0.0);
-            let warm = if rest > 0.0 { drying.min(rest) } else { 0.0 };
-            let wanted = warm * thirst + (rest - warm);
-            let from_bound = wanted.min(*bound).max(*bound - capacity);
-            *bound -= from_bound;
-            left.evaporated += from_film + from_bound;
-            self.wetness[i] = ((*bound / capacity) as f32).clamp(0.0, 1.0);
-
-            let limit = if i == last { hung } else { held };
-            if *film > limit {
-                // A drop takes all but a neck with it; along the strand only what is too much.
-                let drop = if i == last { 0.8 * *film } else { *film - 0.7 * limit };
-                *film -= drop;
-                left.drips.push((i, drop));
-            }
-            self.sheen[i] = sheen(*film, self.wetness[i], held);
-        }
-    }
-
-    /// The film flows along each segment as gravity pulls, and creeps from full to empty.
-    fn flow(&mut self, around: &Surroundings<'_>) {
-        let Surroundings { positions, lengths, wetting, gravity, dt, process, .. } = *around;
-        let girth = 2.0 * PI * wetting.lock_radius();
-        let thinning = WATER as f32 / (3.0 * WATER_VISCOSITY);
-        let mut came = 0.0;
-        for (i, &length) in lengths.iter().enumerate() {
-            let (above, below) = (self.film[i], self.film[i + 1]);
-            if above == 0.0 && below == 0.0 && came == 0.0 {
-                continue;
-            }
-            let along = (positions[i + 1] - positions[i]).normalize_or_zero().dot(gravity);
-            let source = if along >= 0.0 { above } else { below };
-            let thickness = source as f32 / (girth * length);
-            let speed = along.abs() * thickness * thickness * thinning;
-            let flowing = f64::from((speed * dt / length).min(COURANT)) * source;
-            let creep = (wetting.wicking * process * dt / (length * length)).min(0.5 * COURANT);
-            let creeping = (above - below) * f64::from(creep);
-            let crossing = flowing.copysign(f64::from(along)) + creeping;
-            // Every node is left with what the step before brought: no film below nothing.
-            let crossing = crossing.clamp(-0.5 * below, 0.5 * above);
-            self.film[i] += came - crossing;
-            came = crossing;
-        }
-        if let Some(tip) = self.film.last_mut() {
-            *tip += came;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    fn still() -> DryingAir {
-        DryingAir::new(22.0, 0.5, 0.1)
-    }
-
-    fn hanging_strand(n: usize) -> (Vec<Vec3>, Vec<f32>) {
-        ((0..=n).map(|i| Vec3::NEG_Y * 0.03 * i as f32).collect(), vec![0.03; n])
-    }
-
-    fn around<'a>(
-        strand: &'a (Vec<Vec3>, Vec<f32>),
-        wetting: &'a Wetting,
-        air: &'a DryingAir,
-    ) -> Surroundings<'a> {
-        Surroundings {
-            positions: &strand.0,
-            lengths: &strand.1,
-            wetting,
-            gravity: Vec3::NEG_Y * 9.8,
-            air,
-            dt: 1.0 / 360.0,
-            process: 1.0,
-        }
-    }
 
     #[test]
     fn a_head_of_hair_weighs_and_holds_what_is_measured() {
@@ -428,110 +277,5 @@ mod tests {
         assert!((room_to_soaked - 0.214).abs() < 0.002);
         let lock = Wetting::default();
         assert!((lock.lock_radius() - 1.0e-3).abs() < 2e-5);
-    }
-
-    #[test]
-    fn the_film_runs_down_and_drips() {
-        let strand = hanging_strand(8);
-        let (wetting, air) = (Wetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
-        let around = around(&strand, &wetting, &air);
-        let mut m = Moisture::default();
-        m.fit(9);
-        m.add_film(1, 15e-9);
-        let mut left = Left::default();
-        // A film is the slower the thinner it is.
-        let mut middle = 1.0;
-        for seconds in [1, 4, 15] {
-            for _ in 0..360 * seconds {
-                m.exchange(&around, |_| Exposure::default(), &mut left);
-            }
-            let moment: f64 = m.film().iter().enumerate().map(|(i, f)| i as f64 * f).sum();
-            let lower = moment / m.film().iter().sum::<f64>();
-            assert!(lower > middle + 0.1 && left.drips.is_empty(), "{lower}");
-            middle = lower;
-        }
-        for _ in 0..20 {
-            (1..9).for_each(|node| m.add_film(node, 2e-9));
-            for _ in 0..360 {
-                m.exchange(&around, |_| Exposure::default(), &mut left);
-            }
-        }
-        assert!(left.drips.iter().any(|(node, _)| *node == 8), "{:?}", left.drips);
-        let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
-        let total = m.volume() + dripped;
-        assert!((total - 335e-9).abs() < 1e-18, "{total}");
-    }
-
-    #[test]
-    fn in_the_papers_limit_drying_is_equation_19() {
-        // Soaked through, no drying but the wind's, no film: dw = −0.3 |Δv_w|.
-        let strand = hanging_strand(4);
-        let (wetting, air) = (Wetting { evaporation: 0.0, ..default() }, still());
-        let around = around(&strand, &wetting, &air);
-        let mut m = Moisture::default();
-        m.fit(5);
-        m.soak(1.0, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
-        for _ in 0..100 {
-            let blown = |i: usize| Exposure { blown: 0.3 * 0.004 * i as f32, ..default() };
-            m.exchange(&around, blown, &mut Left::default());
-        }
-        for (i, wet) in m.wetness().iter().enumerate() {
-            assert!((wet - (1.0 - 0.12 * i as f32)).abs() < 1e-5, "{i}: {wet}");
-        }
-    }
-
-    #[test]
-    fn damp_air_wets_and_a_room_dries() {
-        let strand = hanging_strand(4);
-        let wetting = Wetting::default();
-        let damp = DryingAir::new(22.0, 0.9, 0.1);
-        let mut m = Moisture::default();
-        m.fit(5);
-        let mut left = Left::default();
-        let run = |m: &mut Moisture, air: &DryingAir, left: &mut Left| {
-            let around = Surroundings { process: 3600.0, ..around(&strand, &wetting, air) };
-            for _ in 0..3600 {
-                m.exchange(&around, |_| Exposure::default(), left);
-            }
-        };
-        run(&mut m, &damp, &mut left);
-        assert!(left.evaporated < 0.0);
-        assert!((m.wetness()[2] - damp.equilibrium).abs() < 0.02, "{}", m.wetness()[2]);
-        run(&mut m, &still(), &mut left);
-        assert!(m.wetness()[2] < 0.02);
-        assert!((m.volume() + left.evaporated).abs() < 1e-18);
-    }
-
-    proptest! {
-        #[test]
-        fn water_is_neither_made_nor_lost_nor_negative(
-            film in proptest::collection::vec(0.0f64..60e-9, 9),
-            share in 0.0f32..1.0,
-            points in proptest::collection::vec((-1.0f32..1.0, -1.0f32..1.0), 9),
-            process in 0.0f32..1e4,
-            dt in 1e-4f32..0.1,
-        ) {
-            let strand = hanging_strand(8);
-            let (wetting, air) = (Wetting::default(), still());
-            let positions: Vec<Vec3> =
-                points.iter().map(|(x, y)| Vec3::new(*x, *y, 0.0) * 0.1).collect();
-            let around =
-                Surroundings { positions: &positions, process, dt, ..around(&strand, &wetting, &air) };
-            let mut m = Moisture::default();
-            m.fit(9);
-            m.soak(share, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
-            film.iter().enumerate().for_each(|(i, f)| m.add_film(i, *f));
-            let before = m.volume();
-            let mut left = Left::default();
-            for _ in 0..50 {
-                let exposed = |_| Exposure { speed: 3.0, warmth: 40.0, blown: 0.001 };
-                m.exchange(&around, exposed, &mut left);
-                prop_assert!(m.film().iter().chain(m.bound()).all(|v| *v >= 0.0 && v.is_finite()));
-                prop_assert!(m.wetness().iter().all(|w| (0.0..=1.0).contains(w)));
-            }
-            let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
-            let after = m.volume() + left.evaporated + dripped;
-            prop_assert!((after - before).abs() < 1e-12 * before.max(1e-12));
-        }
     }
 }

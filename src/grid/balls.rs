@@ -1,0 +1,165 @@
+//! Balls, found by boxes that they reach into.
+
+use super::{Run, UniformGrid};
+use crate::rod::{algebra::V3, lanes::Real};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use glam::Vec3;
+
+const WIDTH: usize = 16;
+
+const NUMBERS: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
+/// Balls of different sizes in a [`UniformGrid`]. A box finds those that reach into it, sixteen at a
+/// time: rows of cells lie together, so there are few rows to look up and many balls in each.
+#[derive(Clone, Debug, Default)]
+pub struct BallGrid {
+    grid: UniformGrid,
+    widest: f32,
+    /// In the grid's order, filled up with balls that are nowhere.
+    center: [Vec<f32>; 3],
+    squared_radius: Vec<f32>,
+    row: [Vec<u32>; 2],
+    ball: Vec<u32>,
+}
+
+/// What a search found, and its room to work in.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// The numbers of the balls, in the grid's order.
+    pub balls: Vec<u32>,
+    runs: Vec<Run>,
+}
+
+impl BallGrid {
+    /// Sorts balls, each a centre and a radius; the n-th is number n from here on. Those whose centre
+    /// is not finite are not found.
+    pub fn build(&mut self, balls: impl Iterator<Item = (Vec3, f32)> + Clone) {
+        let Self { grid, widest, center, squared_radius, row, ball } = self;
+        *widest = balls.clone().map(|(_, radius)| radius).fold(0.0, f32::max);
+        // In smaller cells there is more to look up, in larger ones more to look at.
+        let numbered = balls.clone().zip(0..).map(|((center, _), k)| (center, k));
+        grid.build(2.0 * widest.max(1e-4), numbered);
+        let nowhere = core::iter::repeat_n(f32::NAN, WIDTH);
+        let radii: Vec<f32> = balls.clone().map(|(_, radius)| radius).collect();
+        let centers: Vec<Vec3> = balls.map(|(center, _)| center).collect();
+        let items = || grid.entries.iter().map(|e| e.item as usize);
+        for (axis, column) in center.iter_mut().enumerate() {
+            column.clear();
+            column.extend(items().map(|k| centers[k][axis]).chain(nowhere.clone()));
+        }
+        squared_radius.clear();
+        squared_radius.extend(items().map(|k| radii[k] * radii[k]).chain(nowhere));
+        for (axis, column) in row.iter_mut().enumerate() {
+            column.clear();
+            column.extend(grid.rows().map(|row| row[axis] as u32));
+            column.resize(grid.entries.len() + WIDTH, 0);
+        }
+        ball.clear();
+        ball.extend(items().map(|k| k as u32));
+    }
+
+    /// Finds the balls that reach into the box from `low` to `high`, each once. A box that is not finite
+    /// finds none.
+    pub fn reaching(&self, level: Level, low: Vec3, high: Vec3, found: &mut Found) {
+        found.balls.clear();
+        let Found { balls, runs } = found;
+        self.grid.runs_in_box(low - self.widest, high + self.widest, runs);
+        if !runs.is_empty() {
+            dispatch!(level, simd => self.sift(simd, low, high, runs, balls));
+        }
+    }
+
+    #[inline(always)]
+    fn sift<S: Simd>(&self, simd: S, low: Vec3, high: Vec3, runs: &[Run], found: &mut Vec<u32>) {
+        let (low, high) = (splat(simd, low), splat(simd, high));
+        for run in runs {
+            let [start, end] = run.places.map(|place| place as usize);
+            for first in (start..end).step_by(WIDTH) {
+                let c = V3::new(
+                    f32x16::from_slice(simd, &self.center[0][first..first + WIDTH]),
+                    f32x16::from_slice(simd, &self.center[1][first..first + WIDTH]),
+                    f32x16::from_slice(simd, &self.center[2][first..first + WIDTH]),
+                );
+                let off = c - V3::new(
+                    Real::min(Real::max(c.x, low.x), high.x),
+                    Real::min(Real::max(c.y, low.y), high.y),
+                    Real::min(Real::max(c.z, low.z), high.z),
+                );
+                let squared = f32x16::from_slice(simd, &self.squared_radius[first..first + WIDTH]);
+                let numbers = u32x16::load_array_ref(simd, &NUMBERS);
+                let mut near = off.dot(off).simd_lt(squared)
+                    & numbers.simd_lt(u32x16::splat(simd, (end - first).min(WIDTH) as u32));
+                if let Some([y, z]) = run.row {
+                    let rows_y = u32x16::from_slice(simd, &self.row[0][first..first + WIDTH]);
+                    let rows_z = u32x16::from_slice(simd, &self.row[1][first..first + WIDTH]);
+                    near = near
+                        & rows_y.simd_eq(u32x16::splat(simd, y as u32))
+                        & rows_z.simd_eq(u32x16::splat(simd, z as u32));
+                }
+                let mut lanes = near.to_bitmask();
+                while lanes != 0 {
+                    found.push(self.ball[first + lanes.trailing_zeros() as usize]);
+                    lanes &= lanes - 1;
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
+    V3::new(f32x16::splat(simd, v.x), f32x16::splat(simd, v.y), f32x16::splat(simd, v.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_box_finds_what_brute_force_finds(
+            raw in proptest::collection::vec((-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0, 0.0f32..1.0), 1..300),
+            radius in 0.01f32..0.5,
+            stretch in 0.1f32..50.0,
+            size in (0.0f32..3.0, 0.0f32..60.0, 0.0f32..0.1),
+        ) {
+            let balls: Vec<(Vec3, f32)> =
+                raw.iter().map(|&(x, y, z, r)| (Vec3::new(x, y, z) * stretch, r * radius)).collect();
+            let mut grid = BallGrid::default();
+            grid.build(balls.iter().copied());
+            let mut found = Found::default();
+            for &(low, _) in &balls {
+                let high = low + Vec3::from(size);
+                let brute: Vec<u32> = (0..)
+                    .zip(&balls)
+                    .filter(|(_, (c, r))| c.clamp(low, high).distance_squared(*c) < r * r)
+                    .map(|(k, _)| k)
+                    .collect();
+                for level in [Level::new(), Level::baseline()] {
+                    grid.reaching(level, low, high, &mut found);
+                    found.balls.sort_unstable();
+                    prop_assert_eq!(&found.balls, &brute);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nonsense_is_nowhere() {
+        let mut grid = BallGrid::default();
+        let mut found = Found::default();
+        grid.build([(Vec3::NAN, 1.0), (Vec3::splat(1e30), 1.0), (Vec3::ZERO, 1.0)].into_iter());
+        let mut balls = |low, high| {
+            grid.reaching(Level::new(), low, high, &mut found);
+            found.balls.clone()
+        };
+        assert_eq!(balls(Vec3::ZERO, Vec3::ONE), [2]);
+        assert!(balls(Vec3::NAN, Vec3::ONE).is_empty());
+        assert!(balls(Vec3::NEG_INFINITY, Vec3::INFINITY).is_empty());
+        assert_eq!(balls(Vec3::splat(-1e9), Vec3::splat(1e9)), [2]);
+        grid.build(core::iter::empty());
+        grid.reaching(Level::new(), Vec3::ZERO, Vec3::ONE, &mut found);
+        assert!(found.balls.is_empty());
+    }
+}

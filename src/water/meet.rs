@@ -1,0 +1,312 @@
+//! `Interaction`: strands meet droplets.
+
+use super::{
+    Droplet, Moisture, ProcessTime, Ride, WaterLedger, Wetting,
+    adhesion::{Encounters, Landing, MetBy},
+    exchange::on_strand,
+    field::{Field, SeenDrop},
+    model::clinging,
+    moisture::node_lengths,
+    tuft::{Member, Tufts},
+    vapour::WATER,
+};
+use crate::{
+    air::HairGravity,
+    contact::WetRow,
+    parallel::for_each_block,
+    rod::lanes::LANES,
+    setting::{Notes, Settings},
+    strand::{Burden, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
+    tick::HairStep,
+};
+use bevy::prelude::*;
+use fearless_simd::Level;
+
+/// The most sums over pieces that are kept, for all droplets together.
+const SUMS: usize = 1 << 18;
+
+/// How many strands meet droplets as one piece of work, whole tufts: the same on any number of
+/// threads, so that what droplets get is always summed in the same order. Every piece sums for all
+/// droplets, so of many droplets there are few pieces.
+fn piece(strands: usize, drops: usize) -> usize {
+    let pieces = (SUMS / drops.max(1)).clamp(4, 64);
+    strands.div_ceil(pieces).next_multiple_of(LANES)
+}
+
+/// Room for the work of a substep, kept from one to the next.
+#[derive(Resource, Default)]
+pub(super) struct WaterField {
+    /// The droplets around each hair, and what its pieces of work came to.
+    fields: Vec<(Field, Vec<Encounters>)>,
+    /// Strands that carry a droplet's weight.
+    loaded: Vec<Entity>,
+    /// What nodes bring to bridges of water.
+    pub(super) rows: Vec<WetRow>,
+}
+
+/// A hair and its strands among droplets.
+struct Head<'a> {
+    pose: Pose,
+    wetting: Wetting,
+    strands: Vec<Strandful<'a>>,
+}
+
+struct Strandful<'a> {
+    entity: Entity,
+    strand: Mut<'a, Strand>,
+    burden: &'a Burden,
+    moisture: Mut<'a, Moisture>,
+}
+
+/// What a substep did to one droplet.
+#[derive(Clone, Copy, Debug, Default)]
+struct Outcome {
+    /// What strands gave it (kg m/s, in the world).
+    impulse: Vec3,
+    /// How many strands are at it.
+    company: u32,
+    landing: Option<Landing>,
+    /// The most that strands would drink (m³).
+    wanted: f64,
+}
+
+pub(super) fn wet_strands(
+    step: Res<HairStep>,
+    gravity: Res<HairGravity>,
+    process: Res<ProcessTime>,
+    wetting: Settings<Wetting>,
+    mut scratch: ResMut<WaterField>,
+    mut hairs: Query<(&TickPose, &mut Tufts), With<Hair>>,
+    mut strands: Query<(Entity, &StrandOf, &mut Strand, &mut Burden, &mut Moisture)>,
+    mut droplets: Query<&mut Droplet>,
+    mut ledger: ResMut<WaterLedger>,
+) {
+    let WaterField { fields, loaded, .. } = scratch.bypass_change_detection();
+    // Water's own weight is written anew by its exchange; to dry hair only droplets are a burden.
+    for strand in loaded.drain(..) {
+        if let Ok((.., mut burden, moisture)) = strands.get_mut(strand)
+            && moisture.is_untouched()
+        {
+            *burden.bypass_change_detection() = default();
+        }
+    }
+    let mut drops: Vec<&mut Droplet> = droplets.iter_mut().map(Mut::into_inner).collect();
+    if drops.is_empty() {
+        return;
+    }
+    // Who carries a drop is heavy for all that pulls.
+    for drop in &drops {
+        if let Some(ride) = drop.ride
+            && let Ok((_, of, strand, mut burden, _)) = strands.get_mut(ride.strand)
+            && strand.nodes() >= 2
+        {
+            let burden = burden.bypass_change_detection();
+            weigh(&strand, burden, &wetting.of(of.0), ride.at, mass_of(drop));
+            loaded.push(ride.strand);
+        }
+    }
+    let process = process.mended(&Notes::default());
+    let mut outcomes = vec![Outcome::default(); drops.len()];
+    let mut heads = heads(&mut hairs, &wetting, &mut strands, step.index == 0);
+    fields.resize_with(heads.len(), default);
+    for (Head { pose, wetting, strands }, (field, pieces)) in heads.iter_mut().zip(&mut *fields) {
+        field.see(&drops, pose);
+        field.sort(wetting.lock_radius());
+        let met = MetBy {
+            wetting,
+            field,
+            dt: step.dt,
+            uptake: 1.0 - bevy::math::ops::exp(-wetting.uptake * process * step.dt),
+            most_film: clinging(wetting.bundle(1.0), gravity.length()),
+        };
+        let piece = piece(strands.len(), drops.len());
+        pieces.resize_with(strands.len().div_ceil(piece), default);
+        meet_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &met);
+        for out in &*pieces {
+            sum_up(out, pose.rotation, &mut outcomes);
+        }
+    }
+    // What all want together may be more than there is.
+    let shares: Vec<f64> =
+        drops.iter().zip(&outcomes).map(|(drop, o)| (drop.counted / o.wanted).min(1.0)).collect();
+    for (Head { strands, .. }, (_, pieces)) in heads.iter_mut().zip(&mut *fields) {
+        let piece = piece(strands.len(), drops.len());
+        drink_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &shares);
+        ledger.water_out += pieces.iter().map(|out| out.gone).sum::<f64>();
+    }
+    for ((drop, outcome), share) in drops.iter_mut().zip(&outcomes).zip(shares) {
+        // Less than nothing only by what sums are rounded.
+        drop.volume = (drop.volume - share * outcome.wanted).max(0.0);
+        drop.counted = drop.volume;
+        drop.company = outcome.company.max(1);
+        let lands = drop.ride.is_none() && outcome.landing.is_some();
+        if let Some(landing) = outcome.landing.filter(|_| lands) {
+            drop.ride = Some(Ride { strand: landing.strand, at: landing.at });
+            drop.lying = 0.0;
+        }
+        if let Some(ride) = drop.ride
+            && let Ok((_, of, mut strand, mut burden, _)) = strands.get_mut(ride.strand)
+            && let Ok((pose, _)) = hairs.get(of.0)
+        {
+            let (pose, wetting) = (pose.now(), wetting.of(of.0));
+            let (strand, burden) =
+                (strand.bypass_change_detection(), burden.bypass_change_detection());
+            let mut impulse = pose.direction_in(outcome.impulse);
+            if lands {
+                weigh(strand, burden, &wetting, ride.at, mass_of(drop));
+                loaded.push(ride.strand);
+                let lands_at = pose.rotation * on_strand(strand, ride.at).1;
+                impulse += pose.direction_in(drop.velocity - lands_at) * mass_of(drop);
+            }
+            push(strand, burden, &wetting, ride.at, impulse);
+        }
+    }
+}
+
+/// All strands by their hair, those that grow together together.
+fn heads<'a>(
+    hairs: &mut Query<(&TickPose, &mut Tufts), With<Hair>>,
+    wetting: &Settings<Wetting>,
+    strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut Burden, &mut Moisture)>,
+    anew: bool,
+) -> Vec<Head<'a>> {
+    let mut heads: PerHair<(Entity, Pose, Vec<Option<Strandful<'a>>>)> = default();
+    for (entity, of, strand, burden, moisture) in strands {
+        let index = heads.index(of.0, || Some((of.0, *hairs.get(of.0).ok()?.0.now(), Vec::new())));
+        if let Some(index) = index
+            && strand.nodes() >= 2
+        {
+            let burden = &*burden.into_inner();
+            heads.values[index].2.push(Some(Strandful { entity, strand, burden, moisture }));
+        }
+    }
+    let sorted = heads.values.into_iter().filter_map(|(hair, pose, mut unsorted)| {
+        let mut tufts = hairs.get_mut(hair).ok()?.1;
+        let roots =
+            unsorted.iter().map(|s| s.as_ref().map_or(Vec3::ZERO, |s| s.strand.positions()[0]));
+        let order = tufts.bypass_change_detection().order(anew, roots);
+        let strands = order.iter().filter_map(|i| unsorted.get_mut(*i as usize)?.take()).collect();
+        Some(Head { pose, wetting: wetting.of(hair), strands })
+    });
+    sorted.collect()
+}
+
+impl Field {
+    /// The droplets in a hair's frame.
+    fn see(&mut self, drops: &[&mut Droplet], pose: &Pose) {
+        let scale = pose.scale.recip();
+        self.drops.clear();
+        self.drops.extend(drops.iter().map(|d| SeenDrop {
+            at: pose.point_in(d.position),
+            before: pose.point_in(d.before),
+            velocity: pose.rotation.inverse() * d.velocity,
+            radius: d.radius() * scale,
+            r_min: d.r_min * scale,
+            r_max: d.r_max * scale,
+            strength: d.strength(),
+            mass: mass_of(d),
+            company: d.company as f32,
+            ride: d.ride.map(|r| r.strand),
+        }));
+    }
+}
+
+/// Strands and what became of them, piece by piece.
+type Work<'w, 'a> = Vec<(&'w mut [Strandful<'a>], &'w mut Encounters)>;
+
+fn meet_all(mut work: Work<'_, '_>, met: &MetBy<'_>) {
+    let level = Level::new();
+    for_each_block(
+        &mut work,
+        || (),
+        |(), (strands, out)| {
+            out.clear(met.field.drops.len());
+            for (tuft, first) in strands.chunks_mut(LANES).zip((0..).step_by(LANES)) {
+                let mut members: Vec<Member<'_>> = tuft.iter_mut().map(Strandful::member).collect();
+                met.meet(level, &mut members, first, out);
+            }
+        },
+    );
+}
+
+/// Gives every node its share of what it wanted.
+fn drink_all(mut work: Work<'_, '_>, shares: &[f64]) {
+    for_each_block(
+        &mut work,
+        || (),
+        |(), (strands, out)| {
+            for touch in &out.touches {
+                let Strandful { strand, moisture, .. } = &mut strands[touch.strand as usize];
+                let moisture = moisture.bypass_change_detection();
+                out.gone += moisture.fit(strand.nodes());
+                let takes = touch.wants * shares[touch.drop as usize];
+                moisture.add_film(touch.node as usize, takes);
+            }
+        },
+    );
+}
+
+impl Strandful<'_> {
+    fn member(&mut self) -> Member<'_> {
+        let (positions, velocities, lengths) = self.strand.bypass_change_detection().motion_parts();
+        Member {
+            strand: self.entity,
+            positions,
+            velocities,
+            lengths,
+            load: &self.burden.mass,
+            film: self.moisture.film(),
+        }
+    }
+}
+
+/// Adds up what a piece of the strands did to droplets, and whom it met, in the strands' order.
+fn sum_up(out: &Encounters, rotation: Quat, outcomes: &mut [Outcome]) {
+    for (k, outcome) in outcomes.iter_mut().enumerate() {
+        outcome.impulse += rotation * out.impulses[k];
+        outcome.company += out.company[k];
+        outcome.wanted += out.wanted[k];
+    }
+    for landing in &out.landings {
+        let first = &mut outcomes[landing.drop as usize].landing;
+        if first.is_none_or(|other| landing.when < other.when) {
+            *first = Some(*landing);
+        }
+    }
+}
+
+fn mass_of(drop: &Droplet) -> f32 {
+    (drop.volume * WATER) as f32
+}
+
+/// The edge that a point `at` segments from the root is on, and its ends' shares in it.
+fn shares(strand: &Strand, at: f32) -> (usize, [f32; 2]) {
+    let edge = (at as usize).min(strand.edges() - 1);
+    let t = (at - edge as f32).clamp(0.0, 1.0);
+    (edge, [1.0 - t, t])
+}
+
+/// Lets a strand bear `mass` (kg) at a point: its nodes get heavier.
+fn weigh(strand: &Strand, burden: &mut Burden, wetting: &Wetting, at: f32, mass: f32) {
+    burden.mass.resize(strand.nodes(), 0.0);
+    let (edge, share) = shares(strand, at);
+    for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
+        burden.mass[i] += share[i - edge] * mass / (wetting.dry_mass() * length);
+    }
+}
+
+/// Gives a strand an impulse (kg m/s) at a point, which moves as one with what it bears.
+fn push(strand: &mut Strand, burden: &Burden, wetting: &Wetting, at: f32, impulse: Vec3) {
+    let (edge, share) = shares(strand, at);
+    let mut mobility = [0.0; 2];
+    for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
+        let load = burden.mass.get(i).copied().unwrap_or(0.0);
+        // The root is the scalp's.
+        mobility[i - edge] =
+            if i == 0 { 0.0 } else { 1.0 / (wetting.dry_mass() * length * (1.0 + load)) };
+    }
+    let (_, velocities, _) = strand.motion_parts();
+    for end in 0..2 {
+        velocities[edge + end] += impulse * (share[end] * mobility[end]);
+    }
+}

@@ -1,0 +1,294 @@
+//! The ways of a strand's water in a substep: along it, into it, off it.
+
+use super::{Moisture, Wetting, node_lengths, sheen};
+use crate::water::{
+    model::{WATER_VISCOSITY, clinging, hanging},
+    vapour::{DryingAir, WATER, transfer},
+};
+use bevy::prelude::*;
+use core::f32::consts::PI;
+
+/// Thickest change that the flow makes in one substep, as a share of a segment.
+const COURANT: f32 = 0.4;
+
+/// What moving air does at a node in a substep.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Exposure {
+    /// Speed of the air beyond the room's draught (m/s).
+    pub speed: f32,
+    /// Its temperature above the room's (K).
+    pub warmth: f32,
+    /// Share of the node's capacity that equation 19 dries away in this substep: Σ drying |Δv_w|.
+    pub blown: f32,
+}
+
+/// What a substep has for the water of all strands of a hair, worked out once.
+#[derive(Clone, Debug)]
+pub struct Surroundings<'a> {
+    wetting: Wetting,
+    gravity: Vec3,
+    air: &'a DryingAir,
+    /// Time for chemistry and evaporation (s).
+    process: f32,
+    dt: f32,
+    diameter: f32,
+    /// What a metre of strand binds (m³/m).
+    capacity: f64,
+    /// Share of what it lacks that hair binds in this substep.
+    soaked: f64,
+    /// The most film on a node, and on a tip (m³).
+    held: f64,
+    hung: f64,
+    /// What the room's air takes off a metre of strand (m³/m).
+    still: f64,
+}
+
+impl<'a> Surroundings<'a> {
+    /// For a hair that wets as `wetting` says, under `gravity` in its frame (m/s²), in a room's `air`,
+    /// in a substep of `dt` (s) in which chemistry goes `process` times as fast as in life.
+    pub fn new(wetting: Wetting, gravity: Vec3, air: &'a DryingAir, dt: f32, process: f32) -> Self {
+        let (bundle, g) = (wetting.bundle(1.0), gravity.length());
+        let mut around = Self {
+            gravity,
+            air,
+            process: process * dt,
+            dt,
+            diameter: 2.0 * wetting.lock_radius(),
+            capacity: wetting.capacity(),
+            soaked: f64::from(1.0 - bevy::math::ops::exp(-wetting.soaking * process * dt)),
+            held: clinging(bundle, g),
+            hung: hanging(bundle, g),
+            still: 0.0,
+            wetting,
+        };
+        around.still = around.drying(&Exposure::default());
+        around
+    }
+
+    /// What air takes off a metre of strand in this substep (m³/m).
+    fn drying(&self, exposed: &Exposure) -> f64 {
+        let speed = self.air.draught + exposed.speed;
+        let drive = self.air.drive(exposed.warmth) * self.wetting.evaporation;
+        let flux = transfer(speed, self.diameter) * drive;
+        f64::from(flux * PI * self.diameter * self.process) / WATER
+    }
+}
+
+/// What left a strand in a substep.
+#[derive(Clone, Debug, Default)]
+pub struct Left {
+    /// Into the air (m³); negative where air was damp.
+    pub evaporated: f64,
+    /// Node and volume (m³) of drops that let go.
+    pub drips: Vec<(usize, f64)>,
+}
+
+impl Moisture {
+    /// One substep of the water of a strand with nodes at `positions` and segments of rest `lengths`
+    /// (m): the film flows and creeps, soaks in, dries and drips. `exposure` is `None` in still air. Needs
+    /// room for all nodes.
+    pub fn exchange(
+        &mut self,
+        positions: &[Vec3],
+        lengths: &[f32],
+        around: &Surroundings<'_>,
+        exposure: impl Fn(usize) -> Option<Exposure>,
+        left: &mut Left,
+    ) {
+        self.flow(positions, lengths, around);
+        let last = lengths.len();
+        let damp = around.air.equilibrium > 0.0;
+        for (i, length) in node_lengths(lengths).enumerate() {
+            let (film, bound) = (&mut self.film[i], &mut self.bound[i]);
+            if *film == 0.0 && *bound == 0.0 && !damp {
+                (self.wetness[i], self.sheen[i]) = (0.0, 0.0);
+                continue;
+            }
+            let length = f64::from(length);
+            let capacity = around.capacity * length;
+            let of_capacity = capacity.recip();
+            // Beyond capacity only after the settings changed: what no longer fits comes out.
+            let soaks =
+                ((capacity - *bound) * around.soaked).min(*film).max((capacity - *bound).min(0.0));
+            *film -= soaks;
+            *bound += soaks;
+
+            let exposed = exposure(i);
+            let blown = exposed.map_or(0.0, |e| capacity * f64::from(e.blown));
+            let drying = length * exposed.map_or(around.still, |e| around.drying(&e));
+            let from_film = (drying + blown).min(*film);
+            *film -= from_film;
+            // Bound water is drier the less of it there is; in damp air it comes back.
+            let share = (*bound * of_capacity) as f32;
+            let equilibrium = around.air.equilibrium;
+            let thirst = f64::from((share - equilibrium) / (1.0 - equilibrium).max(1e-3));
+            let rest = (drying + blown - from_film).max(0.0);
+            let warm = if rest > 0.0 { drying.min(rest) } else { 0.0 };
+            let wanted = warm * thirst + (rest - warm);
+            let from_bound = wanted.min(*bound).max(*bound - capacity);
+            *bound -= from_bound;
+            left.evaporated += from_film + from_bound;
+            self.wetness[i] = ((*bound * of_capacity) as f32).clamp(0.0, 1.0);
+
+            let limit = if i == last { around.hung } else { around.held };
+            if *film > limit {
+                // A drop takes all but a neck with it; along the strand only what is too much.
+                let drop = if i == last { 0.8 * *film } else { *film - 0.7 * limit };
+                *film -= drop;
+                left.drips.push((i, drop));
+            }
+            self.sheen[i] = sheen(*film, self.wetness[i], around.held);
+        }
+    }
+
+    /// The film flows along each segment as gravity pulls, and creeps from full to empty.
+    fn flow(&mut self, positions: &[Vec3], lengths: &[f32], around: &Surroundings<'_>) {
+        let Surroundings { wetting, gravity, dt, process, diameter, .. } = around;
+        let girth = PI * diameter;
+        let thinning = WATER as f32 / (3.0 * WATER_VISCOSITY);
+        let mut came = 0.0;
+        for (i, &length) in lengths.iter().enumerate() {
+            let (above, below) = (self.film[i], self.film[i + 1]);
+            if above == 0.0 && below == 0.0 && came == 0.0 {
+                continue;
+            }
+            let along = (positions[i + 1] - positions[i]).normalize_or_zero().dot(*gravity);
+            let source = if along >= 0.0 { above } else { below };
+            let thickness = source as f32 / (girth * length);
+            let speed = along.abs() * thickness * thickness * thinning;
+            let flowing = f64::from((speed * dt / length).min(COURANT)) * source;
+            let creep = (wetting.wicking * process / (length * length)).min(0.5 * COURANT);
+            let creeping = (above - below) * f64::from(creep);
+            let crossing = flowing.copysign(f64::from(along)) + creeping;
+            // Every node is left with what the step before brought: no film below nothing.
+            let crossing = crossing.clamp(-0.5 * below, 0.5 * above);
+            self.film[i] += came - crossing;
+            came = crossing;
+        }
+        if let Some(tip) = self.film.last_mut() {
+            *tip += came;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn still() -> DryingAir {
+        DryingAir::new(22.0, 0.5, 0.1)
+    }
+
+    fn hanging_strand(n: usize) -> (Vec<Vec3>, Vec<f32>) {
+        ((0..=n).map(|i| Vec3::NEG_Y * 0.03 * i as f32).collect(), vec![0.03; n])
+    }
+
+    fn around(wetting: Wetting, air: &DryingAir, process: f32) -> Surroundings<'_> {
+        Surroundings::new(wetting, Vec3::NEG_Y * 9.8, air, 1.0 / 360.0, process)
+    }
+
+    #[test]
+    fn the_film_runs_down_and_drips() {
+        let strand = hanging_strand(8);
+        let (wetting, air) = (Wetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
+        let around = around(wetting, &air, 1.0);
+        let mut m = Moisture::default();
+        m.fit(9);
+        m.add_film(1, 15e-9);
+        let mut left = Left::default();
+        // A film is the slower the thinner it is.
+        let mut middle = 1.0;
+        for seconds in [1, 4, 15] {
+            for _ in 0..360 * seconds {
+                m.exchange(&strand.0, &strand.1, &around, |_| None, &mut left);
+            }
+            let moment: f64 = m.film().iter().enumerate().map(|(i, f)| i as f64 * f).sum();
+            let lower = moment / m.film().iter().sum::<f64>();
+            assert!(lower > middle + 0.1 && left.drips.is_empty(), "{lower}");
+            middle = lower;
+        }
+        for _ in 0..20 {
+            (1..9).for_each(|node| m.add_film(node, 2e-9));
+            for _ in 0..360 {
+                m.exchange(&strand.0, &strand.1, &around, |_| None, &mut left);
+            }
+        }
+        assert!(left.drips.iter().any(|(node, _)| *node == 8), "{:?}", left.drips);
+        let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
+        let total = m.volume() + dripped;
+        assert!((total - 335e-9).abs() < 1e-18, "{total}");
+    }
+
+    #[test]
+    fn in_the_papers_limit_drying_is_equation_19() {
+        // Soaked through, no drying but the wind's, no film: dw = −0.3 |Δv_w|.
+        let strand = hanging_strand(4);
+        let (wetting, air) = (Wetting { evaporation: 0.0, ..default() }, still());
+        let around = around(wetting, &air, 1.0);
+        let mut m = Moisture::default();
+        m.fit(5);
+        m.soak(1.0, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
+        for _ in 0..100 {
+            let blown = |i: usize| Some(Exposure { blown: 0.3 * 0.004 * i as f32, ..default() });
+            m.exchange(&strand.0, &strand.1, &around, blown, &mut Left::default());
+        }
+        for (i, wet) in m.wetness().iter().enumerate() {
+            assert!((wet - (1.0 - 0.12 * i as f32)).abs() < 1e-5, "{i}: {wet}");
+        }
+    }
+
+    #[test]
+    fn damp_air_wets_and_a_room_dries() {
+        let strand = hanging_strand(4);
+        let wetting = Wetting::default();
+        let damp = DryingAir::new(22.0, 0.9, 0.1);
+        let mut m = Moisture::default();
+        m.fit(5);
+        let mut left = Left::default();
+        let run = |m: &mut Moisture, air: &DryingAir, left: &mut Left| {
+            let around = around(wetting, air, 3600.0);
+            for _ in 0..3600 {
+                m.exchange(&strand.0, &strand.1, &around, |_| None, left);
+            }
+        };
+        run(&mut m, &damp, &mut left);
+        assert!(left.evaporated < 0.0);
+        assert!((m.wetness()[2] - damp.equilibrium).abs() < 0.02, "{}", m.wetness()[2]);
+        run(&mut m, &still(), &mut left);
+        assert!(m.wetness()[2] < 0.02);
+        assert!((m.volume() + left.evaporated).abs() < 1e-18);
+    }
+
+    proptest! {
+        #[test]
+        fn water_is_neither_made_nor_lost_nor_negative(
+            film in proptest::collection::vec(0.0f64..60e-9, 9),
+            share in 0.0f32..1.0,
+            points in proptest::collection::vec((-1.0f32..1.0, -1.0f32..1.0), 9),
+            process in 0.0f32..1e4,
+            dt in 1e-4f32..0.1,
+        ) {
+            let strand = hanging_strand(8);
+            let (wetting, air) = (Wetting::default(), still());
+            let positions: Vec<Vec3> =
+                points.iter().map(|(x, y)| Vec3::new(*x, *y, 0.0) * 0.1).collect();
+            let around = Surroundings::new(wetting, Vec3::NEG_Y * 9.8, &air, dt, process);
+            let mut m = Moisture::default();
+            m.fit(9);
+            m.soak(share, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
+            film.iter().enumerate().for_each(|(i, f)| m.add_film(i, *f));
+            let before = m.volume();
+            let mut left = Left::default();
+            for _ in 0..50 {
+                let exposed = |_| Some(Exposure { speed: 3.0, warmth: 40.0, blown: 0.001 });
+                m.exchange(&positions, &strand.1, &around, exposed, &mut left);
+                prop_assert!(m.film().iter().chain(m.bound()).all(|v| *v >= 0.0 && v.is_finite()));
+                prop_assert!(m.wetness().iter().all(|w| (0.0..=1.0).contains(w)));
+            }
+            let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
+            let after = m.volume() + left.evaporated + dripped;
+            prop_assert!((after - before).abs() < 1e-12 * before.max(1e-12));
+        }
+    }
+}

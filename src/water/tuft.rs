@@ -1,0 +1,177 @@
+//! Sixteen strands side by side, as droplets meet them.
+//!
+//! Strands that grow together hang together, so what is near one node is near its fifteen
+//! neighbours: they ask the grid once, and every droplet that it names is held against all of them.
+
+use super::{Wetting, moisture::node_lengths};
+use crate::{
+    rod::{
+        block::{Lane, put3, take3},
+        lanes::LANES,
+    },
+    strand::Hair,
+};
+use bevy::prelude::*;
+
+/// A strand among droplets.
+pub(super) struct Member<'a> {
+    pub strand: Entity,
+    pub positions: &'a [Vec3],
+    pub velocities: &'a mut [Vec3],
+    pub lengths: &'a [f32],
+    /// Added mass of each node over its dry mass; empty for none.
+    pub load: &'a [f32],
+    /// The film that lies on each node (m³); empty for none.
+    pub film: &'a [f64],
+}
+
+/// The nodes that are equally far down their strands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// Positions (m); no numbers where a strand is shorter.
+    pub p: [Lane; 3],
+    /// Velocities (m/s).
+    pub v: [Lane; 3],
+    /// Added mass over dry mass.
+    pub load: Lane,
+    /// Dry mass (kg).
+    pub mass: Lane,
+    /// The box around them (m).
+    pub low: Vec3,
+    pub high: Vec3,
+}
+
+impl Default for Row {
+    fn default() -> Self {
+        let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let (p, v) = ([[f32::NAN; LANES]; 3], [[0.0; LANES]; 3]);
+        Self { p, v, load: [0.0; LANES], mass: [0.0; LANES], low, high }
+    }
+}
+
+/// Up to sixteen strands in lanes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tuft {
+    /// Root first, as many as the longest strand has nodes.
+    pub rows: Vec<Row>,
+    /// The index of each lane's strand.
+    pub own: [u32; LANES],
+}
+
+impl Tuft {
+    pub fn gather(&mut self, members: &[Member<'_>], wetting: &Wetting) {
+        let dry = wetting.dry_mass();
+        self.rows.clear();
+        let longest = members.iter().map(|m| m.positions.len()).max().unwrap_or(0);
+        self.rows.resize(longest, Row::default());
+        self.own = [u32::MAX; LANES];
+        for (lane, member) in members.iter().enumerate() {
+            self.own[lane] = member.strand.index_u32();
+            let nodes = member.positions.iter().zip(&*member.velocities);
+            let lengths = node_lengths(member.lengths);
+            for (i, (((p, v), length), row)) in nodes.zip(lengths).zip(&mut self.rows).enumerate() {
+                // What is not finite reaches no droplet; it must not widen the box either.
+                if !p.is_finite() {
+                    continue;
+                }
+                put3(&mut row.p, lane, *p);
+                put3(&mut row.v, lane, *v);
+                row.load[lane] = member.load.get(i).copied().unwrap_or(0.0);
+                row.mass[lane] = dry * length;
+                (row.low, row.high) = (row.low.min(*p), row.high.max(*p));
+            }
+        }
+    }
+
+    /// Puts velocities back.
+    pub fn scatter(&self, members: &mut [Member<'_>]) {
+        for (lane, member) in members.iter_mut().enumerate() {
+            let nodes = member.velocities.iter_mut().zip(member.positions).zip(&self.rows);
+            for ((v, p), row) in nodes {
+                if p.is_finite() {
+                    *v = take3(&row.v, lane);
+                }
+            }
+        }
+    }
+}
+
+/// The order in which a hair's strands are taken side by side: along a curve that fills space
+/// (Morton's), by their roots.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub(super) struct Tufts {
+    order: Vec<u32>,
+}
+
+impl Tufts {
+    /// The numbers of the strands with these `roots`, in order. Sorted anew if `anew` or if there are
+    /// others than last time; which strands stand together changes only how fast it goes.
+    pub fn order(&mut self, anew: bool, roots: impl ExactSizeIterator<Item = Vec3>) -> &[u32] {
+        if anew || self.order.len() != roots.len() {
+            let mut keys: Vec<(u64, u32)> = roots.map(place_on_curve).zip(0..).collect();
+            keys.sort_unstable();
+            self.order.clear();
+            self.order.extend(keys.into_iter().map(|(_, strand)| strand));
+        }
+        &self.order
+    }
+}
+
+/// How far along Morton's curve through cells of 2 mm a root is.
+fn place_on_curve(root: Vec3) -> u64 {
+    let cell =
+        (root * 500.0).as_ivec3().clamp(IVec3::splat(-(1 << 20)), IVec3::splat((1 << 20) - 1));
+    let [x, y, z] = (cell + (1 << 20)).as_u64vec3().to_array().map(spread);
+    x | y << 1 | z << 2
+}
+
+/// The lowest 21 bits, with two bits of room after each.
+fn spread(x: u64) -> u64 {
+    let x = (x | x << 32) & 0x001f_0000_0000_ffff;
+    let x = (x | x << 16) & 0x001f_0000_ff00_00ff;
+    let x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    let x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+pub(super) fn plugin(app: &mut App) {
+    app.register_type::<Tufts>().register_required_components::<Hair, Tufts>();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strands_that_stand_together_are_taken_together() {
+        // A square of 32 by 32 roots, 3 mm apart, in an order that jumps about.
+        let roots = (0..1024u32).map(|i| i * 389 % 1024);
+        let roots = roots.map(|i| Vec3::new((i % 32) as f32, 5.0, (i / 32) as f32) * 0.003);
+        let roots: Vec<Vec3> = roots.collect();
+        let mut tufts = Tufts::default();
+        let order = tufts.order(true, roots.iter().copied()).to_vec();
+        let mut all = order.clone();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..1024), "each strand once");
+        let widths = order.chunks(LANES).map(|tuft| {
+            let places = || tuft.iter().map(|i| roots[*i as usize]);
+            let low = places().reduce(Vec3::min).unwrap_or_default();
+            (places().reduce(Vec3::max).unwrap_or_default() - low).max_element()
+        });
+        let mean = widths.sum::<f32>() / 64.0;
+        assert!(mean < 0.02, "sixteen strands fill 12 mm by 12 mm, here {mean} m");
+        // Kept while nothing is asked anew, but not for another number of strands.
+        assert_eq!(tufts.order(false, [Vec3::NAN; 1024].into_iter()), order);
+        assert_eq!(tufts.order(false, roots[..3].iter().copied()).len(), 3);
+    }
+
+    #[test]
+    fn places_that_are_no_places_have_an_order_too() {
+        let mut tufts = Tufts::default();
+        let roots = [Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::ZERO];
+        let mut order = tufts.order(true, roots.into_iter()).to_vec();
+        order.sort_unstable();
+        assert_eq!(order, [0, 1, 2, 3]);
+    }
+}
