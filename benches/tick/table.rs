@@ -22,8 +22,8 @@ use std::{
 
 const THREADS: &str = "KERATIN_BENCH_THREADS";
 
-/// Set, only the rows of sleep and of levels of detail are printed.
-const SLEEP_ONLY: &str = "KERATIN_BENCH_SLEEP";
+/// The rows to print, if not all: `memory`, `sleep`, `hanging`, or strands and nodes such as `10000x16`.
+const ONLY: &str = "KERATIN_BENCH_ONLY";
 
 /// Prints the whole table, or in a process of its own the rows of one number of threads.
 pub fn print() -> bool {
@@ -44,18 +44,27 @@ pub fn print() -> bool {
 }
 
 fn rows(threads: usize) {
-    let sleep_only = std::env::var_os(SLEEP_ONLY).is_some();
+    let only = std::env::var(ONLY).ok();
+    let wanted = |name: &str| only.as_ref().is_none_or(|only| only.split(',').any(|o| o == name));
     // First, while the process has nothing that it could use again.
-    if threads == 1 && !sleep_only {
+    if threads == 1 && wanted("memory") {
         println!("100000 × 16 | memory {:.2} kB a strand, of all that is held for it", memory());
     }
-    sleep_row(threads);
-    if sleep_only {
-        return;
+    if wanted("sleep") {
+        sleep_row(threads);
     }
     for (strands, nodes) in [(200, 9), (10_000, 6), (10_000, 16), (1_000, 64), (100_000, 16)] {
-        row(threads, strands, nodes);
+        if wanted(&format!("{strands}x{nodes}")) {
+            row(threads, strands, nodes);
+        }
     }
+    if wanted("hanging") {
+        hanging_rows(threads);
+    }
+}
+
+/// Contact between strands that hang equally dense, however many there are.
+fn hanging_rows(threads: usize) {
     for strands in [1_000, 10_000, 100_000] {
         let mut app = app(threads, Kind::Tick, &patch(strands, 16), None);
         (0..4).for_each(|_| app.update());
