@@ -3,11 +3,16 @@
 //! Each of its edges turns as its guides' edges turn at the same distance from the root, and the
 //! strand is built up from its own root with its own segments. So it keeps its lengths exactly, its
 //! root stays on the scalp, and in the moment it is tied it is where it was: turns begin with none.
+//! What its edges turned faster than their guides then, they go on doing, ever less, and come back.
 
+use bevy::math::ops;
 use glam::{Quat, Vec3};
 
 /// How many guides a strand has at most.
 pub const GUIDES: usize = 3;
+
+/// How soon a strand gives up the motion of its own that it was tied with (s).
+const OWN_WAY: f32 = 0.15;
 
 /// How a strand hangs on its guides.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,6 +23,11 @@ pub struct Ties {
     edges: Vec<Tie>,
     /// Each segment in the frame of its edge (m).
     segments: Vec<Vec3>,
+    /// How much faster each edge turned than its guides when it was tied (rad/s); empty once that is
+    /// over.
+    own: Vec<Vec3>,
+    /// How long ago that was (s).
+    since: f32,
 }
 
 /// What ties an edge to a guide.
@@ -29,13 +39,28 @@ struct Tie {
     at: f32,
 }
 
-/// A strand as a guide is seen: frames and lengths of its edges.
+/// A strand as it is when it is tied, or is to be tied to.
 #[derive(Clone, Copy, Debug)]
-pub struct Guide<'a> {
+pub struct Course<'a> {
+    /// Node positions (m).
+    pub positions: &'a [Vec3],
+    /// Node velocities (m/s).
+    pub velocities: &'a [Vec3],
     /// Orientations of its edges.
     pub turns: &'a [Quat],
     /// Their rest lengths (m).
     pub lengths: &'a [f32],
+}
+
+impl Course<'_> {
+    /// How fast edge `i` turns across itself (rad/s).
+    fn spin(&self, i: usize) -> Vec3 {
+        let (p, v) = (self.positions, self.velocities);
+        let (Some(p), Some(v)) = (p.get(i..i + 2), v.get(i..i + 2)) else { return Vec3::ZERO };
+        let edge = p[1] - p[0];
+        let spin = edge.cross(v[1] - v[0]) / edge.length_squared();
+        if spin.is_finite() { spin } else { Vec3::ZERO }
+    }
 }
 
 /// How far what rests in the world has gone in the frame of the nodes, which moves itself.
@@ -74,27 +99,31 @@ pub struct Pose<'a> {
 impl Ties {
     /// Ties a strand in its present pose to guides in theirs, with their weights.
     pub fn new<'a>(
-        positions: &[Vec3],
-        orientations: &[Quat],
-        lengths: &[f32],
-        guides: impl IntoIterator<Item = (u32, f32, Guide<'a>)>,
+        strand: Course<'_>,
+        guides: impl IntoIterator<Item = (u32, f32, Course<'a>)>,
     ) -> Self {
         let guides: Vec<_> = guides.into_iter().take(GUIDES).collect();
-        let mut edges = Vec::with_capacity(guides.len() * lengths.len());
+        let mut edges = Vec::with_capacity(guides.len() * strand.lengths.len());
+        let mut own = Vec::with_capacity(strand.lengths.len());
         let mut distance = 0.0;
-        for (length, turn) in lengths.iter().zip(orientations) {
-            for (_, _, guide) in &guides {
+        for (i, (length, turn)) in strand.lengths.iter().zip(strand.turns).enumerate() {
+            let mut spin = strand.spin(i);
+            for (_, weight, guide) in &guides {
                 let at = edge_at(guide.lengths, distance + 0.5 * length);
                 let relative = between(guide.turns, at).conjugate() * *turn;
                 edges.push(Tie { relative, at });
+                spin -= guide.spin((at + 0.5) as usize) * *weight;
             }
+            own.push(spin);
             distance += length;
         }
-        let segments = positions.windows(2).zip(orientations);
+        let segments = strand.positions.windows(2).zip(strand.turns);
         Self {
             segments: segments.map(|(p, q)| q.conjugate() * (p[1] - p[0])).collect(),
             guides: guides.into_iter().map(|(index, weight, _)| (index, weight)).collect(),
             edges,
+            own,
+            since: 0.0,
         }
     }
 
@@ -109,7 +138,7 @@ impl Ties {
     /// Velocities are those of the motion in `dt` (s), in which what rests in the world went by
     /// `frame`. Says whether there was any guide; without one the strand stays where it is, at rest.
     pub fn carry<'a>(
-        &self,
+        &mut self,
         pose: &mut Pose<'_>,
         turns: impl Fn(u32) -> Option<&'a [Quat]>,
         frame: &Frame,
@@ -123,6 +152,12 @@ impl Ties {
             pose.spins.fill(Vec3::ZERO);
             return false;
         }
+        self.since += dt;
+        if self.since > 10.0 * OWN_WAY {
+            self.own.clear();
+        }
+        // It sets out as fast as it was and ends where it began.
+        let own_way = self.since * ops::exp(-self.since / OWN_WAY);
         let per_second = 1.0 / dt;
         let finite = |v: Vec3| if v.is_finite() { v } else { Vec3::ZERO };
         let mut p = root;
@@ -132,7 +167,10 @@ impl Ties {
         let ties = self.edges.chunks_exact(self.guides.len());
         for (i, (segment, ties)) in self.segments.iter().zip(ties).enumerate() {
             let (place, before) = frame.taken(pose.positions[i + 1], pose.orientations[i]);
-            let turn = self.turn(ties, &frames);
+            let mut turn = self.turn(ties, &frames);
+            if let Some(own) = self.own.get(i) {
+                turn = Quat::from_scaled_axis(*own * own_way) * turn;
+            }
             p += turn * *segment;
             pose.orientations[i] = turn;
             pose.spins[i] = finite(spin(before, turn) * per_second);
@@ -152,7 +190,7 @@ impl Ties {
             let one = between(turns, tie.at) * tie.relative;
             // A turn and its negative are the same.
             let like = *first.get_or_insert(one);
-            sum = sum + one * if like.dot(one) < 0.0 { -*weight } else { *weight };
+            sum += one * if like.dot(one) < 0.0 { -*weight } else { *weight };
         }
         let square = sum.length_squared();
         // Guides that have turned apart in opposite ways have no mean.
@@ -233,16 +271,50 @@ mod tests {
         strand((0..nodes).map(|i| root + Vec3::NEG_Y * (segment * i as f32)))
     }
 
+    fn course(parts: &Parts) -> Course<'_> {
+        Course { positions: &parts.0, velocities: &[], turns: &parts.1, lengths: &parts.2 }
+    }
+
     fn tied(own: &Parts, guides: &[(&Parts, f32)]) -> Ties {
-        let guides = guides
-            .iter()
-            .zip(0..)
-            .map(|((parts, weight), i)| (i, *weight, Guide { turns: &parts.1, lengths: &parts.2 }));
-        Ties::new(&own.0, &own.1, &own.2, guides)
+        let guides = guides.iter().zip(0..);
+        Ties::new(course(own), guides.map(|((parts, weight), i)| (i, *weight, course(parts))))
+    }
+
+    #[test]
+    fn a_strand_goes_on_as_fast_as_it_was_and_comes_back() {
+        let guide = straight(Vec3::ZERO, 9, 0.02);
+        let mut own = straight(Vec3::X * 0.01, 9, 0.02);
+        let before = own.clone();
+        // The strand swings about its root, the guide rests.
+        let speed: Vec<Vec3> = (0..9).map(|i| Vec3::Z * (0.04 * i as f32)).collect();
+        let velocities = vec![Vec3::ZERO; 9];
+        let strand = Course { velocities: &speed, ..course(&own) };
+        let guides = [(0, 1.0, Course { velocities: &velocities, ..course(&guide) })];
+        let mut ties = Ties::new(strand, guides);
+        let mut step = |own: &mut Parts| {
+            let (mut v, mut w) = (vec![Vec3::ZERO; 9], vec![Vec3::ZERO; 8]);
+            let mut pose = Pose {
+                positions: &mut own.0,
+                velocities: &mut v,
+                orientations: &mut own.1,
+                spins: &mut w,
+            };
+            ties.carry(&mut pose, |_| Some(&guide.1[..]), &Frame::default(), 1.0 / 60.0);
+            v
+        };
+        let first = step(&mut own);
+        assert!(first[8].distance(speed[8]) < 0.2 * speed[8].length(), "{}", first[8]);
+        let mut farthest = 0.0_f32;
+        for _ in 0..120 {
+            step(&mut own);
+            farthest = farthest.max(own.0[8].distance(before.0[8]));
+        }
+        assert!((0.01..0.03).contains(&farthest), "{farthest} m");
+        assert!(own.0[8].distance(before.0[8]) < 1e-5, "{}", own.0[8]);
     }
 
     /// Carries a strand; what it was before comes back as velocities.
-    fn carried(ties: &Ties, own: &mut Parts, guides: &[Option<&[Quat]>]) -> (bool, Vec<Vec3>) {
+    fn carried(ties: &mut Ties, own: &mut Parts, guides: &[Option<&[Quat]>]) -> (bool, Vec<Vec3>) {
         let mut velocities = vec![Vec3::NAN; own.0.len()];
         let mut spins = vec![Vec3::NAN; own.1.len()];
         let mut pose = Pose {
@@ -261,9 +333,9 @@ mod tests {
         let guides = [curl(9, 0.0), curl(12, 2.0), straight(Vec3::X, 5, 0.03)];
         let before = curl(9, 1.0);
         let mut own = before.clone();
-        let ties = tied(&own, &[(&guides[0], 0.5), (&guides[1], 0.3), (&guides[2], 0.2)]);
+        let mut ties = tied(&own, &[(&guides[0], 0.5), (&guides[1], 0.3), (&guides[2], 0.2)]);
         let turns = guides.each_ref().map(|g| Some(&g.1[..]));
-        let (went, velocities) = carried(&ties, &mut own, &turns);
+        let (went, velocities) = carried(&mut ties, &mut own, &turns);
         assert!(went && ties.fit(8) && !ties.fit(9));
         for (a, b) in own.0.iter().zip(&before.0) {
             assert!(a.distance(*b) < 1e-6, "{a} {b}");
@@ -276,10 +348,10 @@ mod tests {
         let guide = straight(Vec3::ZERO, 9, 0.02);
         let before = curl(9, 0.7);
         let mut own = before.clone();
-        let ties = tied(&own, &[(&guide, 1.0)]);
+        let mut ties = tied(&own, &[(&guide, 1.0)]);
         let turn = Quat::from_rotation_z(0.8);
         let turned: Vec<Quat> = guide.1.iter().map(|q| turn * *q).collect();
-        let (_, velocities) = carried(&ties, &mut own, &[Some(&turned)]);
+        let (_, velocities) = carried(&mut ties, &mut own, &[Some(&turned)]);
         for (i, p) in own.0.iter().enumerate() {
             let expected = before.0[0] + turn * (before.0[i] - before.0[0]);
             assert!(p.distance(expected) < 1e-6);
@@ -292,19 +364,19 @@ mod tests {
     fn lengths_stay_whatever_guides_do_and_however_many_nodes_they_have() {
         let (a, b) = (straight(Vec3::ZERO, 9, 0.02), straight(Vec3::X, 4, 0.07));
         let mut own = curl(14, 0.3);
-        let ties = tied(&own, &[(&a, 0.7), (&b, 0.3)]);
+        let mut ties = tied(&own, &[(&a, 0.7), (&b, 0.3)]);
         let bent = |parts: &Parts, by: f32| -> Vec<Quat> {
             let turn = |i: usize| Quat::from_rotation_x(by * i as f32) * Quat::from_rotation_y(by);
             parts.1.iter().enumerate().map(|(i, q)| turn(i) * *q).collect()
         };
         let (to, other) = (bent(&a, 0.2), bent(&b, -0.3));
-        carried(&ties, &mut own, &[Some(&to), Some(&other)]);
+        carried(&mut ties, &mut own, &[Some(&to), Some(&other)]);
         let now = own.0.windows(2).map(|p| p[0].distance(p[1]));
         assert!(now.zip(&own.2).all(|(now, rest)| (now / rest - 1.0).abs() < 1e-4));
         // Opposite turns have no mean: the first guide's is taken.
         let half = |q: &Quat| Quat::from_rotation_x(core::f32::consts::PI) * *q;
         let turned: Vec<Quat> = a.1.iter().map(half).collect();
-        let (went, _) = carried(&ties, &mut own, &[Some(&turned), Some(&b.1)]);
+        let (went, _) = carried(&mut ties, &mut own, &[Some(&turned), Some(&b.1)]);
         assert!(went && own.0.iter().all(|p| p.is_finite()));
     }
 
@@ -326,12 +398,12 @@ mod tests {
         let guide = straight(Vec3::ZERO, 9, 0.02);
         let before = curl(9, 0.7);
         let mut own = before.clone();
-        let ties = tied(&own, &[(&guide, 1.0)]);
-        let (went, velocities) = carried(&ties, &mut own, &[None]);
+        let mut ties = tied(&own, &[(&guide, 1.0)]);
+        let (went, velocities) = carried(&mut ties, &mut own, &[None]);
         assert!(!went && own.0 == before.0 && velocities == [Vec3::ZERO; 9]);
-        assert!(!carried(&Ties::default(), &mut own, &[]).0);
+        assert!(!carried(&mut Ties::default(), &mut own, &[]).0);
         own.0[0] = Vec3::NAN;
-        assert!(!carried(&ties, &mut own, &[Some(&guide.1)]).0);
+        assert!(!carried(&mut ties, &mut own, &[Some(&guide.1)]).0);
         assert_eq!(own.0[1..], before.0[1..]);
     }
 
@@ -339,7 +411,7 @@ mod tests {
     fn what_rests_in_the_world_while_the_frame_moves_has_no_velocity() {
         let guide = straight(Vec3::ZERO, 9, 0.02);
         let mut own = straight(Vec3::X * 0.01, 9, 0.02);
-        let ties = tied(&own, &[(&guide, 1.0)]);
+        let mut ties = tied(&own, &[(&guide, 1.0)]);
         let turn = Quat::from_rotation_y(0.3);
         let mut frame = Frame::default();
         // The root stays in the frame; were it where the world is, all would be at rest.

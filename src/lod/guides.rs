@@ -2,15 +2,18 @@
 
 use super::{
     PresentLod,
-    carry::{Frame, GUIDES, Guide, Pose, Ties},
+    carry::{Course, Frame, GUIDES, Pose, Ties},
     even::{Nearest, even_order},
 };
 use crate::{
     parallel::for_each,
-    strand::{Hair, HeldNodes, PerHair, Sleep, Strand, StrandOf, TickPose},
+    rod::frame::parallel_transport,
+    setting::Settings,
+    strand::{Hair, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf, TickPose},
     tick::HairStep,
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use std::borrow::Cow;
 
 /// How many of the nearest guides are looked at for those that run most alike.
 const CANDIDATES: usize = 8;
@@ -49,6 +52,7 @@ pub struct Guides {
     usable: Vec<bool>,
     awake: Vec<bool>,
     level: usize,
+    model: StrandModel,
     /// How the hair's own frame has moved in this tick.
     #[reflect(ignore)]
     frame: Frame,
@@ -71,20 +75,32 @@ impl Guides {
     }
 
     fn add(&mut self, entity: Entity, strand: &Strand) {
+        let seen = turns(strand, self.model);
         self.strands.push(entity);
-        self.turns.extend_from_slice(strand.orientations());
+        self.turns.extend_from_slice(&seen);
         self.starts.push(self.turns.len() as u32);
-        self.usable.push(is_usable(strand.orientations()));
+        self.usable.push(is_usable(&seen));
         self.awake.push(true);
     }
 
     /// Sees where a guide is now.
     fn see(&mut self, i: usize, strand: Option<&Strand>) {
         let (from, to) = (self.starts[i] as usize, self.starts[i + 1] as usize);
-        let seen = strand.map_or(&[][..], Strand::orientations);
-        self.usable[i] = seen.len() == to - from && is_usable(seen);
+        let seen = strand.map_or(Cow::Borrowed(&[][..]), |strand| turns(strand, self.model));
+        self.usable[i] = seen.len() == to - from && is_usable(&seen);
         if self.usable[i] {
-            self.turns[from..to].copy_from_slice(seen);
+            self.turns[from..to].copy_from_slice(&seen);
+        }
+    }
+}
+
+/// The frames that are followed. Springs know no twist: each edge of theirs gathers its own, which
+/// would kink whoever followed it.
+fn turns(strand: &Strand, model: StrandModel) -> Cow<'_, [Quat]> {
+    match model {
+        StrandModel::Rod => strand.orientations().into(),
+        StrandModel::MassSpring => {
+            parallel_transport(strand.positions(), Some(strand.root_frame())).into()
         }
     }
 }
@@ -98,6 +114,7 @@ struct Group<'a> {
     hair: Entity,
     share: f32,
     level: usize,
+    model: StrandModel,
     members: Vec<Member<'a>>,
     strands: Vec<Ref<'a, Strand>>,
 }
@@ -112,6 +129,7 @@ struct Member<'a> {
 
 /// At the start of a tick: who is simulated, and who goes along with whom.
 pub(crate) fn choose_guides(
+    models: Settings<StrandModel>,
     mut hairs: Query<(Entity, &mut PresentLod, &mut Guides), With<Hair>>,
     mut strands: Query<(
         Entity,
@@ -133,8 +151,15 @@ pub(crate) fn choose_guides(
         let index = groups.index(of.0, || {
             let (hair, present, guides) = hairs.get(of.0).ok()?;
             let (members, strands) = default();
-            let (share, level) = (present.share(), present.level);
-            concerns(present, guides).then_some(Group { hair, share, level, members, strands })
+            let (share, level, model) = (present.share(), present.level, models.of(hair));
+            concerns(present, guides).then_some(Group {
+                hair,
+                share,
+                level,
+                model,
+                members,
+                strands,
+            })
         });
         let Some(index) = index else { continue };
         let is_held = held.is_some_and(|held| held.targets.iter().any(Option::is_some));
@@ -164,7 +189,7 @@ pub(crate) fn choose_guides(
 
 /// Parts a hair's strands into guides and carried ones; says how many are carried.
 fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
-    let Group { share, level, members, strands, .. } = group;
+    let Group { share, level, model, members, strands, .. } = group;
     let mut ranks = Vec::new();
     if *share < 1.0 {
         rank(members, strands);
@@ -174,7 +199,8 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
     let wanted = ((*share * ranks.len() as f32 - 1e-3).ceil() as usize).max(1);
     let last =
         if wanted < ranks.len() { *ranks.select_nth_unstable(wanted - 1).1 } else { u32::MAX };
-    let mut same = guides.strands.len() == wanted && guides.level == *level;
+    let mut same =
+        guides.strands.len() == wanted && (guides.level, guides.model) == (*level, *model);
     let mut count = 0;
     for (member, strand) in members.iter_mut().zip(strands.iter()) {
         let Member { entity, sleep, carried, free } = member;
@@ -203,8 +229,9 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
         return 0;
     }
     if !same {
-        renew(members, strands, guides, last, guides.level == *level);
-        guides.level = *level;
+        let keep = (guides.level, guides.model) == (*level, *model);
+        (guides.level, guides.model) = (*level, *model);
+        renew(members, strands, guides, last, keep);
     }
     tie(members, strands, guides);
     count
@@ -273,7 +300,8 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &Guides)
             *place = Some(strand);
         }
     }
-    let courses: Vec<[Vec3; 3]> = ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], course)).collect();
+    let courses: Vec<[Vec3; 3]> =
+        ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
     let roots: Vec<Vec3> = courses.iter().map(|c| c[0]).collect();
     let nearest = Nearest::among(&roots);
     let mut loose: Vec<_> = (members.iter_mut())
@@ -285,14 +313,14 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &Guides)
         })
         .collect();
     for_each(&mut loose, |(carried, strand)| {
-        let own = course(strand);
-        let mut found: Vec<(f32, u32, Guide<'_>)> = nearest
+        let own = waypoints(strand);
+        let mut found: Vec<(f32, u32, Course<'_>)> = nearest
             .to::<CANDIDATES>(own[0])
             .filter_map(|(i, _)| {
                 let guide = ahead[i]?;
                 let apart = courses[i].iter().zip(own).map(|(a, b)| a.distance_squared(b));
-                let guide = Guide { turns: guide.orientations(), lengths: guide.rest_lengths() };
-                Some((apart.sum::<f32>() / 3.0, i as u32, guide))
+                let turns = guides.turns(i as u32)?;
+                Some((apart.sum::<f32>() / 3.0, i as u32, Course { turns, ..course(guide) }))
             })
             .collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -300,14 +328,22 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &Guides)
         let weight = |apart: f32| 1.0 / (apart + ALIKE * ALIKE);
         let sum: f32 = found.iter().map(|f| weight(f.0)).sum();
         let guides = found.into_iter().map(|(apart, i, guide)| (i, weight(apart) / sum, guide));
-        let (p, q, l) = (strand.positions(), strand.orientations(), strand.rest_lengths());
-        carried.ties = Ties::new(p, q, l, guides);
+        carried.ties = Ties::new(course(strand), guides);
         carried.root = own[0];
     });
 }
 
+fn course(strand: &Strand) -> Course<'_> {
+    Course {
+        positions: strand.positions(),
+        velocities: strand.velocities(),
+        turns: strand.orientations(),
+        lengths: strand.rest_lengths(),
+    }
+}
+
 /// Root, middle and tip: where a strand runs.
-fn course(strand: &Strand) -> [Vec3; 3] {
+fn waypoints(strand: &Strand) -> [Vec3; 3] {
     let p = strand.positions();
     let last = p.len().saturating_sub(1);
     [0, last / 2, last].map(|i| p.get(i).copied().unwrap_or_default())
@@ -358,7 +394,7 @@ pub(crate) fn lull(
 pub(crate) fn carry(
     step: Res<HairStep>,
     mut hairs: Query<(&TickPose, &mut Guides), With<Hair>>,
-    mut strands: Query<(&StrandOf, &mut Strand, &Sleep, &Carried)>,
+    mut strands: Query<(&StrandOf, &mut Strand, &Sleep, &mut Carried)>,
 ) {
     let is_last = step.index + 1 == step.count;
     let mut any = false;
@@ -400,7 +436,8 @@ pub(crate) fn carry(
         let (positions, velocities, orientations, spins) =
             strand.bypass_change_detection().parts_mut();
         let mut pose = Pose { positions, velocities, orientations, spins };
-        carried.ties.carry(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds);
+        let ties = &mut carried.bypass_change_detection().ties;
+        ties.carry(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds);
     });
 }
 

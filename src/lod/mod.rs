@@ -11,7 +11,8 @@
 //! level its first ones are simulated, so that who is at a coarse level is at all finer ones. Each of
 //! the others is **carried** by up to three guides that are near and run alike ([`carry`]): once a tick
 //! its edges turn as theirs have turned at the same distance from the root since the level began. So
-//! it begins and ends where it is, keeps its lengths and its root, and goes on with the velocity it has.
+//! it begins and ends where it is, keeps its lengths and its root, and goes on with the velocity it
+//! has. The motion of its own with which it begins ebbs away within a second.
 //!
 //! | what | for a strand that is carried |
 //! |---|---|
@@ -58,7 +59,8 @@ use bevy::prelude::*;
 #[require(ScreenShare, PresentLod)]
 pub struct HairLod {
     /// The levels, from near to far, each for smaller hair than the one before. Default two: under a
-    /// quarter of the view's height three iterations, under a tenth two with substeps twice as long.
+    /// quarter of the view's height three iterations and half of the strands, under a tenth two with
+    /// substeps twice as long and a quarter of the strands.
     pub levels: Vec<LodLevel>,
     /// By which share more than a level's limit hair has to grow before it leaves the level again.
     /// Default 0.2; safe 0.05…1.
@@ -80,7 +82,9 @@ pub struct LodLevel {
     /// a tick may be shorter. Hair sags more in longer ones: the same tip by 8 mm at 2, 2 cm at 3,
     /// which is two pixels where hair is as far away as the default level's.
     pub substeps: u32,
-    /// Share of the strands that are simulated, at least one; the others go along with those.
+    /// Share of the hair's strands that are simulated, rounded up, at least one; the others go along
+    /// with those, as the [module](self) says. Default 1, which is all of them; safe 0.1…1. A share of
+    /// zero leaves one strand.
     pub strands: f32,
 }
 
