@@ -288,7 +288,7 @@ fn renew(
 }
 
 /// Ties those that are to be carried and hang on nobody to guides that are near and run alike.
-fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &Guides) {
+fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Guides) {
     let is_loose =
         |m: &Member<'_>| m.free && m.carried.guide.is_none() && m.carried.ties.guides.is_empty();
     if !members.iter().any(is_loose) {
@@ -300,6 +300,9 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &Guides)
             *place = Some(strand);
         }
     }
+    // Whoever was written to since the last tick is elsewhere now.
+    ahead.iter().enumerate().for_each(|(i, strand)| guides.see(i, *strand));
+    let guides = &*guides;
     let courses: Vec<[Vec3; 3]> =
         ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
     let roots: Vec<Vec3> = courses.iter().map(|c| c[0]).collect();
