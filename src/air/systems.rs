@@ -99,7 +99,8 @@ pub(crate) fn apply_air(
     let mut airs = PerHair::default();
     let mut items = Vec::with_capacity(strands.iter().len());
     for (of, sleep, strand, burden, changes, received) in &mut strands {
-        if sleep.is_asleep() {
+        // Wind also dries hair that is carried.
+        if sleep.is_asleep() || (sleep.is_carried() && blowers.is_empty()) {
             continue;
         }
         let index = airs.index(of.0, || {

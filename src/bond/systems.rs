@@ -84,7 +84,7 @@ fn generate_rest_shapes(
     let mut keys = PerHair::default();
     let mut items = Vec::new();
     for (of, sleep, strand, bonds, burden, rest) in &mut strands {
-        if sleep.is_asleep() {
+        if !sleep.is_simulated() {
             continue;
         }
         let index = keys.index(of.0, || {

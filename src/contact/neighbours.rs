@@ -151,6 +151,11 @@ impl Neighbours {
         self.beyond = beyond;
     }
 
+    /// Whether bridges of water are asked for.
+    pub fn looks_beyond(&self) -> bool {
+        self.beyond > 0.0
+    }
+
     /// The bridges of water at every node, after [`pushes`](Self::pushes) of the same places. `wet` has
     /// a row for each node, in the order they were added.
     pub fn bridges(&mut self, wet: &mut Vec<WetRow>, film: Film) -> impl Iterator<Item = Bridged> {

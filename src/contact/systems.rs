@@ -96,12 +96,19 @@ pub(crate) fn part_strands(
         let Some(stride) = steps.of(hair) else { continue };
         let list = &mut neighbours.bypass_change_detection().0;
         list.clear();
-        for (strand, ..) in strands.iter_many(members.collection()) {
-            list.add(strand.positions());
+        // Carried strands neither push nor are pushed. Where water joins strands, it joins them too.
+        let with_carried = list.looks_beyond();
+        for (strand, sleep, _) in strands.iter_many(members.collection()) {
+            if with_carried || !sleep.is_carried() {
+                list.add(strand.positions());
+            }
         }
         let mut pushes = list.pushes(radius, strength);
         let mut members = strands.iter_many_mut(members.collection());
         while let Some((mut strand, mut sleep, mut still)) = members.fetch_next() {
+            if sleep.is_carried() && !with_carried {
+                continue;
+            }
             if sleep.is_asleep() {
                 let pushes = pushes.by_ref().take(strand.nodes());
                 if still.bypass_change_detection().feels(pushes, strength / (2.0 * radius)) {

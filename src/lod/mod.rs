@@ -1,15 +1,43 @@
 //! Level of detail: hair that is small on the screen is simulated more cheaply.
 //!
 //! A [`HairLod`] on a [`Hair`](crate::Hair) lists levels by the share of the view's height that the
-//! hair takes up ([`ScreenShare`]). Each has fewer iterations and longer substeps. A change of level
-//! moves no node: hair goes over, as hair does, into what it settles to at that level, which is near to
-//! what it was ([`LodLevel`] says how near). Bonds stay as they are.
+//! hair takes up ([`ScreenShare`]). Each has fewer iterations, longer substeps and fewer simulated
+//! strands. A change of level moves no node: hair goes over, as hair does, into what it settles to at
+//! that level, which is near to what it was ([`LodLevel`] says how near). Bonds stay as they are.
+//!
+//! # Fewer strands
+//!
+//! Strands stand in an order of which every beginning is spread evenly over the roots ([`even`]). At a
+//! level its first ones are simulated, so that who is at a coarse level is at all finer ones. Each of
+//! the others is **carried** by up to three guides that are near and run alike ([`carry`]): once a tick
+//! its edges turn as theirs have turned at the same distance from the root since the level began. So
+//! it begins and ends where it is, keeps its lengths and its root, and goes on with the velocity it
+//! has. The motion of its own with which it begins ebbs away within a second.
+//!
+//! | what | for a strand that is carried |
+//! |---|---|
+//! | gravity, drag, wind, droplets' pull | felt by its guides only |
+//! | bonds: treatments, drying, water | act on it; bonds that form remember the shape it has |
+//! | colliders | do not push it: it stays out of the head as its guides do |
+//! | contact with other strands | none, in either way; where water joins strands, they feel it |
+//! | sleep | while all its guides sleep |
+//! | [`HeldNodes`](crate::HeldNodes), wound on a rod | it is simulated, and nobody follows it |
+//! | game code that writes to its [`Strand`](crate::Strand) | it goes on from there; velocities are lost |
+//!
+//! What a strand lags behind its guides when a level begins stays until it ends. A strand that comes at
+//! a level keeps the shape it came with, as far as its guides keep theirs; all strands take new places
+//! in the order then.
 //!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
+pub mod carry;
+pub mod even;
+mod guides;
 pub mod model;
 mod systems;
 
+pub use guides::{Carried, Guides};
+pub(crate) use guides::{choose_guides, lull};
 pub(crate) use systems::HairSteps;
 pub use systems::LodPlugin;
 
@@ -31,7 +59,8 @@ use bevy::prelude::*;
 #[require(ScreenShare, PresentLod)]
 pub struct HairLod {
     /// The levels, from near to far, each for smaller hair than the one before. Default two: under a
-    /// quarter of the view's height three iterations, under a tenth two with substeps twice as long.
+    /// quarter of the view's height three iterations and half of the strands, under a tenth two with
+    /// substeps twice as long and a quarter of the strands.
     pub levels: Vec<LodLevel>,
     /// By which share more than a level's limit hair has to grow before it leaves the level again.
     /// Default 0.2; safe 0.05…1.
@@ -53,18 +82,23 @@ pub struct LodLevel {
     /// a tick may be shorter. Hair sags more in longer ones: the same tip by 8 mm at 2, 2 cm at 3,
     /// which is two pixels where hair is as far away as the default level's.
     pub substeps: u32,
+    /// Share of the hair's strands that are simulated, rounded up, at least one; the others go along
+    /// with those, as the [module](self) says. Default 1, which is all of them; safe 0.1…1. A share of
+    /// zero leaves one strand.
+    pub strands: f32,
 }
 
 impl Default for LodLevel {
     fn default() -> Self {
-        Self { below: 0.1, iterations: 2, substeps: 2 }
+        Self { below: 0.1, iterations: 2, substeps: 2, strands: 1.0 }
     }
 }
 
 impl Default for HairLod {
     fn default() -> Self {
-        let near = LodLevel { below: 0.25, iterations: 3, substeps: 1 };
-        Self { levels: vec![near, LodLevel::default()], hysteresis: 0.2 }
+        let near = LodLevel { below: 0.25, iterations: 3, substeps: 1, strands: 0.5 };
+        let far = LodLevel { strands: 0.25, ..default() };
+        Self { levels: vec![near, far], hysteresis: 0.2 }
     }
 }
 
@@ -82,18 +116,29 @@ impl Default for ScreenShare {
 }
 
 /// The level at which a hair is simulated in this tick. Kept by the tick.
-#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct PresentLod {
     /// 0 in full, n the n-th of [`HairLod::levels`].
     pub level: usize,
+    /// How many strands are not simulated but carried by others.
+    pub carried: usize,
     iterations: Option<u32>,
     substeps: Option<u32>,
+    strands: Option<f32>,
+}
+
+impl PresentLod {
+    /// The share of the strands that is to be simulated.
+    pub(crate) fn share(&self) -> f32 {
+        self.strands.unwrap_or(1.0)
+    }
 }
 
 const BELOW: Bound = Bound::new("LodLevel::below", 0.0, 100.0, "a tenth of the view is 0.1");
 const ITERATIONS: Bound = Bound::new("LodLevel::iterations", 1.0, 1000.0, "2 are enough from afar");
 const SUBSTEPS: Bound = Bound::new("LodLevel::substeps", 1.0, 1000.0, "2 makes three of six");
+const STRANDS: Bound = Bound::new("LodLevel::strands", 0.0, 1.0, "0.25 is one of four");
 const HYSTERESIS: Bound = Bound::new("HairLod::hysteresis", 0.0, 100.0, "0.2 is a fifth");
 
 impl LodLevel {
@@ -106,7 +151,13 @@ impl LodLevel {
         BELOW.check(below)?;
         ITERATIONS.check(iterations as f32)?;
         SUBSTEPS.check(substeps as f32)?;
-        Ok(Self { below, iterations, substeps })
+        Ok(Self { below, iterations, substeps, strands: 1.0 })
+    }
+
+    /// The same level with another share of the strands simulated, taken to the nearest valid value.
+    pub fn with_strands(mut self, share: f32) -> Self {
+        self.strands = STRANDS.mend(share, 1.0, &Notes::default());
+        self
     }
 }
 
@@ -116,6 +167,7 @@ impl HairSetting for HairLod {
             below: BELOW.mend(l.below, 0.0, notes),
             iterations: ITERATIONS.mend(l.iterations as f32, 2.0, notes) as u32,
             substeps: SUBSTEPS.mend(l.substeps as f32, 1.0, notes) as u32,
+            strands: STRANDS.mend(l.strands, 1.0, notes),
         };
         Self {
             levels: self.levels.iter().map(level).collect(),

@@ -1,9 +1,15 @@
 //! Levels are chosen at the start of a tick; the systems that move hair ask what they are.
 
-use super::{HairLod, LodLevel, PresentLod, ScreenShare, model};
+use super::{
+    Carried, Guides, HairLod, LodLevel, PresentLod, ScreenShare,
+    guides::{carry, choose_guides, let_go, lull},
+    model,
+};
 use crate::{
+    rod,
     setting::{HairSetting, Notes},
-    strand::Hair,
+    spring,
+    strand::{self, Hair, Strand},
     tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
@@ -17,11 +23,35 @@ impl Plugin for LodPlugin {
             .register_type::<LodLevel>()
             .register_type::<ScreenShare>()
             .register_type::<PresentLod>()
+            .register_type::<Carried>()
+            .register_type::<Guides>()
+            .register_required_components::<Strand, Carried>()
+            .register_required_components::<HairLod, Guides>()
             .add_observer(forget)
+            .add_observer(let_go)
             .add_systems(PreUpdate, crate::setting::report_changed::<HairLod>)
             .add_systems(
                 HairTick,
-                choose.in_set(HairSystems::Roots).run_if(|step: Res<HairStep>| step.index == 0),
+                (choose, choose_guides)
+                    .chain()
+                    .in_set(HairSystems::Roots)
+                    .after(strand::move_poses)
+                    .before(strand::carry_strands)
+                    .run_if(|step: Res<HairStep>| step.index == 0),
+            )
+            .add_systems(
+                HairTick,
+                lull.in_set(HairSystems::Roots)
+                    .after(choose_guides)
+                    .before(strand::carry_strands)
+                    .run_if(|step: Res<HairStep>| step.index == 0),
+            )
+            .add_systems(
+                HairTick,
+                carry
+                    .in_set(HairSystems::Projection)
+                    .after(rod::project)
+                    .after(spring::step_springs),
             );
     }
 }
@@ -42,6 +72,8 @@ fn choose(mut hairs: Query<(&HairLod, &ScreenShare, &mut PresentLod), With<Hair>
             level,
             iterations: settings.map(|l| l.iterations),
             substeps: settings.map(|l| l.substeps),
+            strands: settings.map(|l| l.strands),
+            carried: present.carried,
         });
     }
 }

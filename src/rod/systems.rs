@@ -72,7 +72,7 @@ pub(crate) fn project(
     let mut params = PerHair::default();
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
     for (entity, of, sleep, strand, rest, bonds, burden, held) in &mut strands {
-        if sleep.is_asleep() {
+        if !sleep.is_simulated() {
             continue;
         }
         let index = params.index(of.0, || {

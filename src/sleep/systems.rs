@@ -8,6 +8,7 @@ use crate::{
     air::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, model::wind},
     bond::{BondChanges, BondInfluence, Bonds, Cuticle},
     contact::{HairCollider, LockContact, seen_from},
+    lod,
     parallel::for_each,
     rod::{
         Solver, Stiffness,
@@ -49,6 +50,8 @@ impl Plugin for SleepPlugin {
                 watch
                     .in_set(HairSystems::Roots)
                     .after(strand::move_poses)
+                    .after(lod::choose_guides)
+                    .before(lod::lull)
                     .before(strand::carry_strands)
                     .run_if(|step: Res<HairStep>| step.index == 0),
             );
@@ -261,6 +264,10 @@ fn watch(
     for_each(&mut items, |item| decide(item, &news[item.hair], seconds));
     let mut counts = vec![Sleepers::default(); news.len()];
     for item in &items {
+        // The carried sleep when those do whom they follow.
+        if item.sleep.is_carried() {
+            continue;
+        }
         let count = &mut counts[item.hair];
         *(if item.sleep.is_asleep() { &mut count.asleep } else { &mut count.awake }) += 1;
     }
@@ -273,6 +280,9 @@ fn watch(
 /// Whether one strand sleeps from now on.
 fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
     let Item { strand, sleep, still, held, restless, .. } = item;
+    if sleep.is_carried() {
+        return;
+    }
     let strand = strand.bypass_change_detection();
     let (distance, angle) = (news.sleep.distance(), news.sleep.angle());
     let targets = held.map_or(&[][..], |held| &held.targets);

@@ -10,6 +10,7 @@ pub mod model;
 mod systems;
 
 pub use systems::SpringPlugin;
+pub(crate) use systems::step_springs;
 
 use crate::setting::{Bound, HairSetting, Notes};
 use bevy::prelude::*;

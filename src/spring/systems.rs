@@ -48,7 +48,7 @@ struct Item<'a> {
     put_back: Option<Fault>,
 }
 
-fn step_springs(
+pub(crate) fn step_springs(
     steps: HairSteps,
     model: Settings<StrandModel>,
     springs: Settings<Springs>,
@@ -62,7 +62,7 @@ fn step_springs(
     let mut params = PerHair::default();
     let mut items: Vec<Item<'_>> = Vec::new();
     for (entity, of, sleep, strand, burden, held) in &mut strands {
-        if sleep.is_asleep() {
+        if !sleep.is_simulated() {
             continue;
         }
         let index = params.index(of.0, || {

@@ -4,18 +4,34 @@
 use super::Strand;
 use bevy::prelude::*;
 
-/// Whether a strand sleeps: it keeps its pose and is left out of all that moves hair. Changes only
-/// at the start of a tick; see [`HairSleep`](crate::HairSleep).
+/// Whether a strand is simulated in this tick. One that sleeps keeps its pose and is left out of all
+/// that moves hair, see [`HairSleep`](crate::HairSleep); one that is carried goes along with others,
+/// see [`LodLevel::strands`](crate::LodLevel::strands). Changes only at the start of a tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Sleep {
     /// How long the strand has stayed where it is (s).
     still: f32,
     asleep: bool,
+    carried: bool,
     disturbed: bool,
 }
 
 impl Sleep {
+    /// Whether forces, rest shapes and the projection act on it: it neither sleeps nor is carried.
+    pub fn is_simulated(&self) -> bool {
+        !self.asleep && !self.carried
+    }
+
+    /// Whether it goes along with others instead of being simulated.
+    pub fn is_carried(&self) -> bool {
+        self.carried
+    }
+
+    pub(crate) fn be_carried(&mut self, carried: bool) {
+        self.carried = carried;
+    }
+
     /// Whether it sleeps in this tick.
     pub fn is_asleep(&self) -> bool {
         self.asleep
@@ -51,7 +67,7 @@ impl Sleep {
     }
 }
 
-/// How many strands of a [`Hair`](crate::Hair) sleep. Kept by the tick.
+/// How many of the strands that are not carried by others sleep. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Sleepers {

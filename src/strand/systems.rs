@@ -126,7 +126,7 @@ pub(crate) fn carry_strands(
     }
     let mut items: Vec<_> = strands
         .iter_mut()
-        .filter(|(_, sleep, _)| !sleep.is_asleep())
+        .filter(|(_, sleep, _)| sleep.is_simulated())
         .filter_map(|(of, _, strand)| Some((hairs.get(of.0).ok()?.carry()?, strand)))
         .collect();
     for_each(&mut items, |(carry, strand)| {

@@ -1,6 +1,11 @@
 //! Hair that is small on the screen is simulated more cheaply, and nobody sees when that begins.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod guides;
+mod head;
+mod treated;
+
 use bevy::prelude::*;
 use bevy_keratin::{Fault, LodLevel, PresentLod, prelude::*, strand::StrandHistory};
 use common::*;
@@ -46,12 +51,12 @@ fn levels_follow_the_screen_with_hysteresis_and_end_with_the_component() {
 fn nonsense_is_told_and_mended() {
     let mut app = test_app(60.0);
     let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
-    let wrong = LodLevel { below: f32::NAN, iterations: 0, substeps: 0 };
+    let wrong = LodLevel { below: f32::NAN, iterations: 0, substeps: 0, strands: -1.0 };
     app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![wrong], hysteresis: -1.0 });
     zoom(&mut app, hair, -5.0);
     run(&mut app, 0.2);
     let told = faults(&mut app);
-    assert_eq!(told.len(), 4, "{told:?}");
+    assert_eq!(told.len(), 5, "{told:?}");
     assert!(told.iter().all(|f| matches!(f, Fault::Setting(_))));
     assert!(strand(&app, e).is_finite());
     assert!(LodLevel::new(0.1, 0, 1).is_err() && LodLevel::new(-0.1, 1, 1).is_err());

@@ -1,0 +1,456 @@
+//! Which strands are simulated at a level, and the others' way after them.
+
+use super::{
+    PresentLod,
+    carry::{Course, Frame, GUIDES, Pose, Ties},
+    even::{Nearest, even_order},
+};
+use crate::{
+    parallel::for_each,
+    rod::frame::parallel_transport,
+    setting::Settings,
+    strand::{Hair, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf, TickPose},
+    tick::HairStep,
+};
+use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use std::borrow::Cow;
+
+/// How many of the nearest guides are looked at for those that run most alike.
+const CANDIDATES: usize = 8;
+
+/// Guides that run as near as this count alike (m).
+const ALIKE: f32 = 1e-3;
+
+/// How a strand that is not simulated at its hair's level goes along with its guides, see
+/// [`LodLevel::strands`](crate::LodLevel::strands). Kept by the tick.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct Carried {
+    /// Its place in the hair's even order, once that was asked for.
+    rank: Option<u32>,
+    /// Its index among the hair's guides.
+    guide: Option<u32>,
+    #[reflect(ignore)]
+    ties: Ties,
+    /// Where its root was when it came to lie still (m).
+    root: Vec3,
+    /// Whether it sleeps because its guides do.
+    lulled: bool,
+}
+
+/// The strands of a [`Hair`] that others are carried by. Kept by the tick.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct Guides {
+    /// In their even order.
+    strands: Vec<Entity>,
+    /// Where each one's frames begin in the list, and where the last one's end.
+    starts: Vec<u32>,
+    /// Orientations of their edges as they were last seen.
+    turns: Vec<Quat>,
+    /// Which may be followed, and which of them move.
+    usable: Vec<bool>,
+    awake: Vec<bool>,
+    level: usize,
+    model: StrandModel,
+    /// How the hair's own frame has moved in this tick.
+    #[reflect(ignore)]
+    frame: Frame,
+}
+
+impl Guides {
+    fn turns(&self, guide: u32) -> Option<&[Quat]> {
+        let i = guide as usize;
+        let (from, to) = (*self.starts.get(i)?, *self.starts.get(i + 1)?);
+        self.turns.get(from as usize..to as usize).filter(|_| self.usable[i])
+    }
+
+    fn begin(&mut self) {
+        self.strands.clear();
+        self.turns.clear();
+        self.usable.clear();
+        self.awake.clear();
+        self.starts.clear();
+        self.starts.push(0);
+    }
+
+    fn add(&mut self, entity: Entity, strand: &Strand) {
+        let seen = turns(strand, self.model);
+        self.strands.push(entity);
+        self.turns.extend_from_slice(&seen);
+        self.starts.push(self.turns.len() as u32);
+        self.usable.push(is_usable(&seen));
+        self.awake.push(true);
+    }
+
+    /// Sees where a guide is now.
+    fn see(&mut self, i: usize, strand: Option<&Strand>) {
+        let (from, to) = (self.starts[i] as usize, self.starts[i + 1] as usize);
+        let seen = strand.map_or(Cow::Borrowed(&[][..]), |strand| turns(strand, self.model));
+        self.usable[i] = seen.len() == to - from && is_usable(&seen);
+        if self.usable[i] {
+            self.turns[from..to].copy_from_slice(&seen);
+        }
+    }
+}
+
+/// The frames that are followed. Springs know no twist: each edge of theirs gathers its own, which
+/// would kink whoever followed it.
+fn turns(strand: &Strand, model: StrandModel) -> Cow<'_, [Quat]> {
+    match model {
+        StrandModel::Rod => strand.orientations().into(),
+        StrandModel::MassSpring => {
+            parallel_transport(strand.positions(), Some(strand.root_frame())).into()
+        }
+    }
+}
+
+fn is_usable(turns: &[Quat]) -> bool {
+    turns.iter().all(|q| (0.5..2.0).contains(&q.length_squared()))
+}
+
+/// A hair whose strands are to be told apart.
+struct Group<'a> {
+    hair: Entity,
+    share: f32,
+    level: usize,
+    model: StrandModel,
+    members: Vec<Member<'a>>,
+    strands: Vec<Ref<'a, Strand>>,
+}
+
+struct Member<'a> {
+    entity: Entity,
+    sleep: Mut<'a, Sleep>,
+    carried: Mut<'a, Carried>,
+    /// Whether it may be a guide or be carried: nothing holds it, and it is a strand at all.
+    free: bool,
+}
+
+/// At the start of a tick: who is simulated, and who goes along with whom.
+pub(crate) fn choose_guides(
+    models: Settings<StrandModel>,
+    mut hairs: Query<(Entity, &mut PresentLod, &mut Guides), With<Hair>>,
+    mut strands: Query<(
+        Entity,
+        &StrandOf,
+        Ref<Strand>,
+        &mut Sleep,
+        &mut Carried,
+        Option<&HeldNodes>,
+    )>,
+) {
+    let concerns = |present: &PresentLod, guides: &Guides| {
+        present.share() < 1.0 || present.carried > 0 || !guides.strands.is_empty()
+    };
+    if !hairs.iter().any(|(_, present, guides)| concerns(present, guides)) {
+        return;
+    }
+    let mut groups = PerHair::default();
+    for (entity, of, strand, sleep, carried, held) in &mut strands {
+        let index = groups.index(of.0, || {
+            let (hair, present, guides) = hairs.get(of.0).ok()?;
+            let (members, strands) = default();
+            let (share, level, model) = (present.share(), present.level, models.of(hair));
+            concerns(present, guides).then_some(Group {
+                hair,
+                share,
+                level,
+                model,
+                members,
+                strands,
+            })
+        });
+        let Some(index) = index else { continue };
+        let is_held = held.is_some_and(|held| held.targets.iter().any(Option::is_some));
+        // What is not finite is mended by being simulated. Only others than the tick make it so.
+        let is_whole = strand.nodes() >= 2 && (!strand.is_changed() || strand.is_finite());
+        let free = is_whole && !is_held;
+        let group: &mut Group<'_> = &mut groups.values[index];
+        group.members.push(Member { entity, sleep, carried, free });
+        group.strands.push(strand);
+    }
+    let mut counts = EntityHashMap::<usize>::default();
+    for group in &mut groups.values {
+        if let Ok((.., mut guides)) = hairs.get_mut(group.hair) {
+            counts.insert(group.hair, part(group, guides.bypass_change_detection()));
+        }
+    }
+    for (hair, mut present, mut guides) in &mut hairs {
+        let carried = counts.get(&hair).copied().unwrap_or(0);
+        if present.carried != carried {
+            present.carried = carried;
+        }
+        if !counts.contains_key(&hair) && !guides.strands.is_empty() {
+            guides.bypass_change_detection().begin();
+        }
+    }
+}
+
+/// Parts a hair's strands into guides and carried ones; says how many are carried.
+fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
+    let Group { share, level, model, members, strands, .. } = group;
+    let mut ranks = Vec::new();
+    if *share < 1.0 {
+        rank(members, strands);
+        ranks.extend(members.iter().filter(|m| m.free).filter_map(|m| m.carried.rank));
+    }
+    // The first so many of the free ones are guides; the last of them has this rank.
+    let wanted = ((*share * ranks.len() as f32 - 1e-3).ceil() as usize).max(1);
+    let last =
+        if wanted < ranks.len() { *ranks.select_nth_unstable(wanted - 1).1 } else { u32::MAX };
+    let mut same =
+        guides.strands.len() == wanted && (guides.level, guides.model) == (*level, *model);
+    let mut count = 0;
+    for (member, strand) in members.iter_mut().zip(strands.iter()) {
+        let Member { entity, sleep, carried, free } = member;
+        let (sleep, carried) = (sleep.bypass_change_detection(), carried.bypass_change_detection());
+        let is_carried = *free && carried.rank.is_some_and(|rank| rank > last);
+        let is_guide = *free && !is_carried && last < u32::MAX;
+        let guide = carried.guide.filter(|_| is_guide);
+        same &= !is_guide || guide.is_some_and(|i| guides.strands.get(i as usize) == Some(entity));
+        count += usize::from(is_carried);
+        if !is_carried && sleep.is_carried() {
+            // It goes on from where it is, as fast as it is.
+            sleep.be_carried(false);
+            if core::mem::take(&mut carried.lulled) {
+                sleep.wake_up();
+            }
+            carried.ties = Ties::default();
+        }
+        // Who was written to has been put somewhere: it stays there and goes on from there.
+        if is_carried && (strand.is_changed() || !carried.ties.fit(strand.edges())) {
+            carried.ties = Ties::default();
+        }
+        carried.guide = guide;
+    }
+    if count == 0 {
+        guides.begin();
+        return 0;
+    }
+    if !same {
+        let keep = (guides.level, guides.model) == (*level, *model);
+        (guides.level, guides.model) = (*level, *model);
+        renew(members, strands, guides, last, keep);
+    }
+    tie(members, strands, guides);
+    count
+}
+
+/// Gives every strand its place in the even order, if one has none yet.
+fn rank(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>]) {
+    if members.iter().all(|m| !m.free || m.carried.rank.is_some()) {
+        return;
+    }
+    let root = |strand: &Strand| strand.positions().first().copied();
+    let (places, whole): (Vec<Vec3>, Vec<usize>) = (strands.iter().enumerate())
+        .filter_map(|(i, strand)| Some((root(strand).filter(|p| p.is_finite())?, i)))
+        .unzip();
+    for (rank, i) in even_order(&places).into_iter().enumerate() {
+        let member = &mut members[whole[i as usize]];
+        member.carried.bypass_change_detection().rank = Some(rank as u32);
+    }
+}
+
+/// Takes new guides. Strands whose guides stay go on with them, unless the level is another: then
+/// there are nearer ones.
+fn renew(
+    members: &mut [Member<'_>],
+    strands: &[Ref<'_, Strand>],
+    guides: &mut Guides,
+    last: u32,
+    keep: bool,
+) {
+    let mut chosen: Vec<(u32, usize)> = (members.iter().enumerate())
+        .filter_map(|(i, m)| Some((m.carried.rank.filter(|r| m.free && *r <= last)?, i)))
+        .collect();
+    chosen.sort_unstable();
+    let before = core::mem::take(&mut guides.strands);
+    guides.begin();
+    let mut now = EntityHashMap::<u32>::default();
+    for ((_, i), index) in chosen.into_iter().zip(0..) {
+        let member = &mut members[i];
+        member.carried.bypass_change_detection().guide = Some(index);
+        guides.add(member.entity, &strands[i]);
+        now.insert(member.entity, index);
+    }
+    let index_now: Vec<Option<u32>> = before.iter().map(|e| now.get(e).copied()).collect();
+    for member in members {
+        let ties = &mut member.carried.bypass_change_detection().ties;
+        let stays = |(guide, _): &mut (u32, f32)| {
+            let index = index_now.get(*guide as usize).copied().flatten();
+            index.map(|index| *guide = index).is_some()
+        };
+        if !keep || !ties.guides.iter_mut().all(stays) {
+            *ties = Ties::default();
+        }
+    }
+}
+
+/// Ties those that are to be carried and hang on nobody to guides that are near and run alike.
+fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Guides) {
+    let is_loose =
+        |m: &Member<'_>| m.free && m.carried.guide.is_none() && m.carried.ties.guides.is_empty();
+    if !members.iter().any(is_loose) {
+        return;
+    }
+    let mut ahead: Vec<Option<&Strand>> = vec![None; guides.strands.len()];
+    for (member, strand) in members.iter().zip(strands) {
+        if let Some(place) = member.carried.guide.and_then(|i| ahead.get_mut(i as usize)) {
+            *place = Some(strand);
+        }
+    }
+    // Whoever was written to since the last tick is elsewhere now.
+    ahead.iter().enumerate().for_each(|(i, strand)| guides.see(i, *strand));
+    let guides = &*guides;
+    let courses: Vec<[Vec3; 3]> =
+        ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
+    let roots: Vec<Vec3> = courses.iter().map(|c| c[0]).collect();
+    let nearest = Nearest::among(&roots);
+    let mut loose: Vec<_> = (members.iter_mut())
+        .zip(strands)
+        .filter(|(m, _)| is_loose(m))
+        .map(|(m, strand)| {
+            m.sleep.bypass_change_detection().be_carried(true);
+            (m.carried.bypass_change_detection(), &**strand)
+        })
+        .collect();
+    for_each(&mut loose, |(carried, strand)| {
+        let own = waypoints(strand);
+        let mut found: Vec<(f32, u32, Course<'_>)> = nearest
+            .to::<CANDIDATES>(own[0])
+            .filter_map(|(i, _)| {
+                let guide = ahead[i]?;
+                let apart = courses[i].iter().zip(own).map(|(a, b)| a.distance_squared(b));
+                let turns = guides.turns(i as u32)?;
+                Some((apart.sum::<f32>() / 3.0, i as u32, Course { turns, ..course(guide) }))
+            })
+            .collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found.truncate(GUIDES);
+        let weight = |apart: f32| 1.0 / (apart + ALIKE * ALIKE);
+        let sum: f32 = found.iter().map(|f| weight(f.0)).sum();
+        let guides = found.into_iter().map(|(apart, i, guide)| (i, weight(apart) / sum, guide));
+        carried.ties = Ties::new(course(strand), guides);
+        carried.root = own[0];
+    });
+}
+
+fn course(strand: &Strand) -> Course<'_> {
+    Course {
+        positions: strand.positions(),
+        velocities: strand.velocities(),
+        turns: strand.orientations(),
+        lengths: strand.rest_lengths(),
+    }
+}
+
+/// Root, middle and tip: where a strand runs.
+fn waypoints(strand: &Strand) -> [Vec3; 3] {
+    let p = strand.positions();
+    let last = p.len().saturating_sub(1);
+    [0, last / 2, last].map(|i| p.get(i).copied().unwrap_or_default())
+}
+
+/// After sleep has been decided on: the carried sleep while all their guides do.
+pub(crate) fn lull(
+    mut hairs: Query<&mut Guides, With<Hair>>,
+    mut strands: Query<(&StrandOf, &mut Strand, &mut Sleep, &mut Carried)>,
+) {
+    let mut any = false;
+    for mut guides in &mut hairs {
+        let Guides { strands: ahead, awake, .. } = guides.bypass_change_detection();
+        for (guide, awake) in ahead.iter().zip(awake) {
+            *awake = strands.get(*guide).is_ok_and(|(.., sleep, _)| !sleep.is_asleep());
+            any = true;
+        }
+    }
+    if !any {
+        return;
+    }
+    let mut per_hair = PerHair::default();
+    for (of, mut strand, mut sleep, mut carried) in &mut strands {
+        if !sleep.is_carried() {
+            continue;
+        }
+        let index = per_hair.index(of.0, || hairs.get(of.0).ok());
+        let Some(guides) = index.map(|i| per_hair.values[i]) else { continue };
+        let is_awake = |guide: &(u32, f32)| guides.awake.get(guide.0 as usize) == Some(&true);
+        let sleep = sleep.bypass_change_detection();
+        let root = strand.positions().first().copied().unwrap_or_default();
+        let carried = carried.bypass_change_detection();
+        let moves = carried.ties.guides.iter().any(is_awake) || carried.root != root;
+        if moves && sleep.is_asleep() {
+            sleep.wake_up();
+            carried.lulled = false;
+        } else if !moves && !sleep.is_asleep() {
+            sleep.fall_asleep();
+            strand.bypass_change_detection().rest();
+            carried.lulled = true;
+        }
+        carried.root = root;
+    }
+}
+
+/// At the end of a tick, after the projection: who is carried goes along. Once a tick is enough for
+/// what is seen once a tick, and costs a sixth of once a substep.
+pub(crate) fn carry(
+    step: Res<HairStep>,
+    mut hairs: Query<(&TickPose, &mut Guides), With<Hair>>,
+    mut strands: Query<(&StrandOf, &mut Strand, &Sleep, &mut Carried)>,
+) {
+    let is_last = step.index + 1 == step.count;
+    let mut any = false;
+    for (pose, mut guides) in &mut hairs {
+        let guides = guides.bypass_change_detection();
+        if step.index == 0 {
+            guides.frame = Frame::default();
+        }
+        if guides.strands.is_empty() {
+            continue;
+        }
+        if let Some(carry) = pose.carry() {
+            guides.frame.then(carry.rotation, carry.translation.into());
+        }
+        for i in 0..if is_last { guides.strands.len() } else { 0 } {
+            if guides.awake[i] {
+                let strand = strands.get(guides.strands[i]).ok().map(|(_, strand, ..)| strand);
+                guides.see(i, strand);
+            }
+            any = true;
+        }
+    }
+    if !any {
+        return;
+    }
+    let mut per_hair = PerHair::default();
+    let mut items = Vec::new();
+    for (of, strand, sleep, carried) in &mut strands {
+        if sleep.is_carried()
+            && !sleep.is_asleep()
+            && let Some(index) = per_hair.index(of.0, || Some(hairs.get(of.0).ok()?.1))
+        {
+            items.push((index, strand, carried));
+        }
+    }
+    let seconds = step.dt * step.count as f32;
+    for_each(&mut items, |(index, strand, carried)| {
+        let guides = per_hair.values[*index];
+        let (positions, velocities, orientations, spins) =
+            strand.bypass_change_detection().parts_mut();
+        let mut pose = Pose { positions, velocities, orientations, spins };
+        let ties = &mut carried.bypass_change_detection().ties;
+        ties.carry(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds);
+    });
+}
+
+/// A strand that leaves its hair, or goes over to another, is simulated until it is chosen there.
+pub(super) fn let_go(left: On<Discard, StrandOf>, mut strands: Query<(&mut Sleep, &mut Carried)>) {
+    if let Ok((mut sleep, mut carried)) = strands.get_mut(left.entity) {
+        if sleep.is_carried() {
+            sleep.be_carried(false);
+            sleep.wake_up();
+        }
+        *carried = Carried::default();
+    }
+}

@@ -1,0 +1,305 @@
+//! Which strands are simulated, and how the others begin, go along and end.
+
+use super::{
+    common::*,
+    head::{HEAD, carried, fewer, head, is_carried, turn},
+    zoom,
+};
+use bevy::prelude::*;
+use bevy_keratin::{Fault, LodLevel, PresentLod, Sleepers, prelude::*, strand::TickPose};
+
+fn simulated(app: &App, ids: &[Entity]) -> Vec<Entity> {
+    ids.iter().copied().filter(|e| !is_carried(app, *e)).collect()
+}
+
+fn put(app: &mut App, hair: Entity, lod: HairLod, share: f32) {
+    app.world_mut().entity_mut(hair).insert(lod);
+    zoom(app, hair, share);
+    app.update();
+}
+
+/// A head of 60 strands at a level with a quarter of them.
+fn quarter() -> (App, Entity, Vec<Entity>) {
+    let mut app = test_app(60.0);
+    let (hair, ids) = head(&mut app, 60, 9, 0.24);
+    put(&mut app, hair, fewer(0.25), 0.1);
+    assert_eq!(simulated(&app, &ids).len(), 15);
+    (app, hair, ids)
+}
+
+#[test]
+fn the_share_that_is_simulated_is_spread_evenly_and_finer_levels_hold_coarser_ones() {
+    let mut app = test_app(60.0);
+    let (hair, ids) = head(&mut app, 400, 4, 0.1);
+    let level = |below, share| LodLevel::new(below, 5, 1).unwrap().with_strands(share);
+    let levels = vec![level(0.5, 0.5), level(0.2, 0.1), level(0.1, 0.0)];
+    put(&mut app, hair, HairLod { levels, ..default() }, 1.0);
+    assert_eq!(simulated(&app, &ids).len(), 400);
+    let mut before: Vec<Entity> = ids.clone();
+    let mut known = Vec::new();
+    for (share, count) in [(0.4, 200), (0.15, 40), (0.05, 1)] {
+        zoom(&mut app, hair, share);
+        app.update();
+        let now = simulated(&app, &ids);
+        assert_eq!(now.len(), count);
+        assert_eq!(app.world().get::<PresentLod>(hair).unwrap().carried, 400 - count);
+        assert!(now.iter().all(|e| before.contains(e)), "nested");
+        // Each stands for an area of the half sphere; none is farther from one than a few radii.
+        let area = core::f32::consts::TAU * HEAD * HEAD / count as f32;
+        let radius = (area / core::f32::consts::PI).sqrt();
+        let root = |e: &Entity| strand(&app, *e).positions()[0];
+        let farthest = ids
+            .iter()
+            .map(|e| now.iter().map(|g| root(g).distance(root(e))).fold(f32::INFINITY, f32::min));
+        let farthest = farthest.fold(0.0, f32::max);
+        println!("{count}: {farthest} m to the nearest, radius {radius} m");
+        assert!(farthest < 2.2 * radius, "{count}: {farthest} m");
+        before = now.clone();
+        known.push(now);
+    }
+    for (share, known) in [(0.15, &known[1]), (0.4, &known[0]), (1.0, &ids)] {
+        zoom(&mut app, hair, share);
+        app.update();
+        assert_eq!(simulated(&app, &ids), *known, "the same ones again");
+    }
+    assert_eq!(faults(&mut app), []);
+}
+
+/// Where everyone's nodes are in the world.
+fn places(app: &App, hair: Entity, ids: &[Entity]) -> Vec<Vec3> {
+    let pose = *app.world().get::<TickPose>(hair).unwrap().now();
+    ids.iter().flat_map(|e| strand(app, *e).positions()).map(|p| pose.point_out(*p)).collect()
+}
+
+/// The largest of all nodes' changes of displacement from frame to frame (m).
+fn jolt([a, b, c]: [&[Vec3]; 3]) -> f32 {
+    let all = a.iter().zip(b).zip(c).map(|((a, b), c)| (*a + *c - *b * 2.0).length());
+    all.fold(0.0, f32::max)
+}
+
+#[test]
+fn nothing_pops_while_hair_swings_and_velocities_are_those_of_the_motion() {
+    for model in [StrandModel::Rod, StrandModel::MassSpring] {
+        let mut apps = [(); 2].map(|()| {
+            let mut app = test_app(60.0);
+            let (hair, ids) = head(&mut app, 120, 9, 0.24);
+            put(&mut app, hair, fewer(0.25), 1.0);
+            app.world_mut().entity_mut(hair).insert(model);
+            (app, hair, ids)
+        });
+        let mut seen = [const { Vec::<Vec<Vec3>>::new() }; 2];
+        let (mut strain, mut off) = (0.0_f32, 0.0_f32);
+        for frame in 0..300 {
+            for (i, (app, hair, ids)) in apps.iter_mut().enumerate() {
+                turn(app, *hair, frame as f32 / 60.0);
+                if i == 1 && frame % 60 == 59 {
+                    zoom(app, *hair, if frame % 120 == 59 { 0.1 } else { 1.0 });
+                }
+                app.update();
+                let now = places(app, *hair, ids);
+                for (k, e) in ids.iter().enumerate().filter(|(_, e)| is_carried(app, **e)) {
+                    let strand = strand(app, *e);
+                    strain = strain.max(strand.peak_strain());
+                    let pose = app.world().get::<TickPose>(*hair).unwrap().now();
+                    let before = seen[i].last().map_or(&[][..], |b| &b[9 * k..]);
+                    for (n, v) in strand.velocities().iter().enumerate().skip(1) {
+                        let moved = pose.direction_in(now[9 * k + n] - before[n]);
+                        off = off.max((*v / 60.0).distance(moved));
+                    }
+                }
+                seen[i].push(now);
+            }
+        }
+        let jolts = |seen: &[Vec<Vec3>], frames: &dyn Fn(usize) -> bool| {
+            let all = seen.windows(3).enumerate().filter(|(i, _)| frames(i + 2));
+            all.map(|(_, w)| jolt([&w[0], &w[1], &w[2]])).fold(0.0, f32::max)
+        };
+        let plain = jolts(&seen[0], &|frame| frame > 58);
+        let at = |change: usize| move |frame: usize| frame > 58 && (frame + 121 - change) % 120 < 2;
+        let (begun, ended) = (jolts(&seen[1], &at(60)), jolts(&seen[1], &at(0)));
+        let between = jolts(&seen[1], &|frame| frame > 58);
+        let apart = seen[0][59].iter().zip(&seen[1][59]).map(|(a, b)| a.distance(*b));
+        let apart = apart.fold(0.0, f32::max);
+        println!(
+            "{model:?}: jolts {begun} m as it begins, {ended} m as it ends, {between} m in all, \
+             {plain} m without; {apart} m apart after the first tick; strain {strain}; velocities off by {off} m a tick"
+        );
+        assert!(seen[0][58] == seen[1][58] && apart > 0.0, "the same until then");
+        assert!(apart < 4e-3, "{model:?}: {apart} m");
+        assert!(begun < 1.2 * plain + 1e-3, "{model:?}: {begun} m, {plain} m without");
+        // Springs snap back from bends that their guides gave them.
+        let snap = if model == StrandModel::Rod { 1e-3 } else { 0.2 };
+        assert!(ended < 1.2 * plain + snap, "{model:?}: {ended} m, {plain} m without");
+        assert!(strain < 0.03, "{model:?}: {strain}");
+        assert!(off < 1e-5, "{model:?}: {off} m");
+        assert_eq!(faults(&mut apps[1].0), []);
+    }
+}
+
+#[test]
+fn roots_stay_and_hair_goes_along_when_it_is_put_elsewhere() {
+    let (mut app, hair, ids) = quarter();
+    let roots: Vec<Vec3> = ids.iter().map(|e| strand(&app, *e).positions()[0]).collect();
+    run(&mut app, 2.0);
+    let before: Vec<_> = ids.iter().map(|e| strand(&app, *e).positions().to_vec()).collect();
+    app.world_mut().entity_mut(hair).get_mut::<Transform>().unwrap().translation.x += 5.0;
+    app.update();
+    for ((e, root), before) in ids.iter().zip(&roots).zip(&before) {
+        let now = strand(&app, *e).positions();
+        assert_eq!(now[0], *root);
+        let apart = now.iter().zip(before).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        assert!(apart < 5e-3, "{apart} m");
+    }
+    // Back into shape: everybody, also who is carried.
+    app.world_mut().commands().entity(hair).queue(Hair::reset);
+    app.insert_resource(HairGravity(Vec3::ZERO));
+    run(&mut app, 0.5);
+    assert_eq!(carried(&app, &ids).len(), 45);
+    for e in &ids {
+        let p = strand(&app, *e).positions();
+        let out = p[0].normalize() * (HEAD + 1e-3 + 0.24);
+        assert!(p[8].distance(out) < 5e-3, "{} m", p[8].distance(out));
+    }
+}
+
+#[test]
+fn guides_that_sleep_let_who_hangs_on_them_sleep_and_wake_it() {
+    let mut app = test_app(60.0);
+    let (hair, ids) = head(&mut app, 60, 9, 0.24);
+    put(&mut app, hair, fewer(0.25), 0.1);
+    let sleepers = |app: &App| *app.world().get::<Sleepers>(hair).unwrap();
+    let mut seconds = 0.0;
+    while !sleepers(&app).all() {
+        run(&mut app, 0.5);
+        seconds += 0.5;
+        assert!(seconds < 60.0, "{:?}", sleepers(&app));
+    }
+    run(&mut app, 0.1);
+    let asleep = |app: &App| {
+        ids.iter().filter(|e| app.world().get::<Sleep>(**e).unwrap().is_asleep()).count()
+    };
+    assert_eq!((sleepers(&app).asleep, asleep(&app)), (15, 60));
+    let rest = places(&app, hair, &ids);
+    run(&mut app, 0.5);
+    assert_eq!(places(&app, hair, &ids), rest, "to the last bit");
+    assert!(ids.iter().all(|e| rms_speed(strand(&app, *e)) == 0.0));
+    turn(&mut app, hair, 0.05);
+    app.update();
+    assert_eq!(asleep(&app), 0);
+    app.update();
+    assert!(carried(&app, &ids).iter().all(|e| rms_speed(strand(&app, *e)) > 0.0));
+}
+
+#[test]
+fn who_is_held_is_simulated_and_nobody_hangs_on_it() {
+    let (mut app, hair, ids) = quarter();
+    run(&mut app, 1.0);
+    let (guide, other) = (simulated(&app, &ids)[3], carried(&app, &ids)[7]);
+    for e in [guide, other] {
+        let targets = strand(&app, e).positions().iter().map(|p| Some(*p)).collect();
+        app.world_mut().entity_mut(e).insert(HeldNodes { targets });
+    }
+    app.update();
+    // A quarter of the 58 that are free, and the two.
+    assert!(!is_carried(&app, guide) && !is_carried(&app, other));
+    assert_eq!(simulated(&app, &ids).len(), 15 + 2);
+    let held = strand(&app, guide).positions().to_vec();
+    for i in 0..60 {
+        turn(&mut app, hair, i as f32 / 60.0);
+        app.update();
+    }
+    assert!(strand(&app, guide).positions()[8].distance(held[8]) < 1e-3);
+    let swung = carried(&app, &ids).iter().filter(|e| rms_speed(strand(&app, **e)) > 0.01).count();
+    assert_eq!(swung, 43, "all others move");
+    app.world_mut().entity_mut(guide).remove::<HeldNodes>();
+    app.world_mut().entity_mut(other).remove::<HeldNodes>();
+    app.update();
+    assert!(is_carried(&app, other) && !is_carried(&app, guide));
+}
+
+#[test]
+fn strands_may_come_go_and_change_their_hair_at_a_level() {
+    let (mut app, hair, ids) = quarter();
+    run(&mut app, 0.5);
+    // Half the guides go.
+    let guides = simulated(&app, &ids);
+    guides.iter().step_by(2).for_each(|e| assert!(app.world_mut().despawn(*e)));
+    let ids: Vec<Entity> = ids.into_iter().filter(|e| app.world().get_entity(*e).is_ok()).collect();
+    let before = places(&app, hair, &ids);
+    app.update();
+    assert_eq!(ids.len(), 52);
+    assert_eq!(simulated(&app, &ids).len(), 13);
+    let after = places(&app, hair, &ids);
+    let moved = before.iter().zip(&after).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+    assert!(moved < 0.02, "{moved} m in a tick");
+    // Others come, one of them no strand at all, one not finite.
+    let point = |i: usize| Vec3::new(0.0, HEAD + 0.02 * i as f32, 0.01);
+    let strand_of = || Strand::from_polyline(&[0, 1, 2].map(point)).unwrap();
+    let come = app.world_mut().spawn((StrandOf(hair), strand_of())).id();
+    let none = app.world_mut().spawn((StrandOf(hair), Strand::default())).id();
+    let mut broken = strand_of();
+    broken.positions_mut()[2] = Vec3::NAN;
+    let broken = app.world_mut().spawn((StrandOf(hair), broken)).id();
+    run(&mut app, 0.2);
+    assert!(!is_carried(&app, none));
+    assert!([come, broken].iter().all(|e| strand(&app, *e).is_finite()));
+    assert_eq!(simulated(&app, &ids).len() + simulated(&app, &[come, broken]).len(), 14);
+    // A guide that is not finite is put back; nobody follows it into nowhere.
+    let guide = simulated(&app, &ids)[0];
+    app.world_mut().get_mut::<Strand>(guide).unwrap().positions_mut()[3] = Vec3::NAN;
+    run(&mut app, 0.2);
+    assert!(ids.iter().all(|e| strand(&app, *e).is_finite()));
+    let told = faults(&mut app);
+    assert!(told.iter().all(|f| matches!(f, Fault::Strand(_) | Fault::PutBack | Fault::Rebuilt)));
+    // One goes over to other hair, which has no levels; one to none.
+    let [gone, alone] = [0, 1].map(|i| carried(&app, &ids)[i]);
+    let other = app.world_mut().spawn(Hair).id();
+    app.world_mut().entity_mut(gone).insert(StrandOf(other));
+    app.world_mut().entity_mut(alone).remove::<StrandOf>();
+    run(&mut app, 0.1);
+    assert!(!is_carried(&app, gone) && !is_carried(&app, alone));
+    assert!(rms_speed(strand(&app, gone)) > 0.0);
+    // Without levels everyone is simulated.
+    app.world_mut().entity_mut(hair).remove::<HairLod>();
+    app.update();
+    assert_eq!(carried(&app, &ids), []);
+    assert_eq!(*app.world().get::<PresentLod>(hair).unwrap(), PresentLod::default());
+    app.world_mut().entity_mut(hair).despawn();
+    run(&mut app, 0.1);
+}
+
+#[test]
+fn the_same_head_gives_the_same_bits() {
+    let go = || {
+        let (mut app, hair, ids) = quarter();
+        for i in 0..90 {
+            turn(&mut app, hair, i as f32 / 60.0);
+            zoom(&mut app, hair, if i % 40 < 20 { 0.1 } else { 1.0 });
+            app.update();
+        }
+        places(&app, hair, &ids)
+    };
+    assert_eq!(go(), go());
+}
+
+#[test]
+fn hair_that_sleeps_sleeps_on_when_fewer_strands_are_simulated_and_when_all_are_again() {
+    let mut app = test_app(60.0);
+    let (hair, ids) = head(&mut app, 60, 9, 0.24);
+    put(&mut app, hair, fewer(0.25), 1.0);
+    run(&mut app, 0.1);
+    // Whatever it does counts as lying still.
+    app.insert_resource(HairDefault(HairSleep { speed: 1.0, turning: 10.0, seconds: 0.2 }));
+    run(&mut app, 1.0);
+    let asleep = |app: &App| {
+        ids.iter().filter(|e| app.world().get::<Sleep>(**e).unwrap().is_asleep()).count()
+    };
+    assert_eq!(asleep(&app), 60);
+    for (share, count) in [(0.1, 45), (1.0, 0)] {
+        zoom(&mut app, hair, share);
+        for _ in 0..3 {
+            app.update();
+            assert_eq!((carried(&app, &ids).len(), asleep(&app)), (count, 60));
+        }
+    }
+}
