@@ -7,13 +7,11 @@ use super::{
 };
 use crate::{
     parallel::for_each,
-    rod::frame::parallel_transport,
     setting::Settings,
     strand::{Hair, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf, TickPose},
     tick::HairStep,
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
-use std::borrow::Cow;
 
 /// How many of the nearest guides are looked at for those that run most alike.
 const CANDIDATES: usize = 8;
@@ -52,7 +50,6 @@ pub struct Guides {
     usable: Vec<bool>,
     awake: Vec<bool>,
     level: usize,
-    model: StrandModel,
     /// How the hair's own frame has moved in this tick.
     #[reflect(ignore)]
     frame: Frame,
@@ -75,32 +72,21 @@ impl Guides {
     }
 
     fn add(&mut self, entity: Entity, strand: &Strand) {
-        let seen = turns(strand, self.model);
+        let seen = strand.orientations();
         self.strands.push(entity);
-        self.turns.extend_from_slice(&seen);
+        self.turns.extend_from_slice(seen);
         self.starts.push(self.turns.len() as u32);
-        self.usable.push(is_usable(&seen));
+        self.usable.push(is_usable(seen));
         self.awake.push(true);
     }
 
     /// Sees where a guide is now.
     fn see(&mut self, i: usize, strand: Option<&Strand>) {
         let (from, to) = (self.starts[i] as usize, self.starts[i + 1] as usize);
-        let seen = strand.map_or(Cow::Borrowed(&[][..]), |strand| turns(strand, self.model));
-        self.usable[i] = seen.len() == to - from && is_usable(&seen);
+        let seen = strand.map_or(&[][..], Strand::orientations);
+        self.usable[i] = seen.len() == to - from && is_usable(seen);
         if self.usable[i] {
-            self.turns[from..to].copy_from_slice(&seen);
-        }
-    }
-}
-
-/// The frames that are followed. Springs know no twist: each edge of theirs gathers its own, which
-/// would kink whoever followed it.
-fn turns(strand: &Strand, model: StrandModel) -> Cow<'_, [Quat]> {
-    match model {
-        StrandModel::Rod => strand.orientations().into(),
-        StrandModel::MassSpring => {
-            parallel_transport(strand.positions(), Some(strand.root_frame())).into()
+            self.turns[from..to].copy_from_slice(seen);
         }
     }
 }
@@ -114,7 +100,6 @@ struct Group<'a> {
     hair: Entity,
     share: f32,
     level: usize,
-    model: StrandModel,
     members: Vec<Member<'a>>,
     strands: Vec<Ref<'a, Strand>>,
 }
@@ -151,15 +136,13 @@ pub(crate) fn choose_guides(
         let index = groups.index(of.0, || {
             let (hair, present, guides) = hairs.get(of.0).ok()?;
             let (members, strands) = default();
-            let (share, level, model) = (present.share(), present.level, models.of(hair));
-            concerns(present, guides).then_some(Group {
-                hair,
-                share,
-                level,
-                model,
-                members,
-                strands,
-            })
+            // Springs have no twist that a neighbour could follow.
+            let share = match models.of(hair) {
+                StrandModel::Rod => present.share(),
+                StrandModel::MassSpring => 1.0,
+            };
+            let level = present.level;
+            concerns(present, guides).then_some(Group { hair, share, level, members, strands })
         });
         let Some(index) = index else { continue };
         let is_held = held.is_some_and(|held| held.targets.iter().any(Option::is_some));
@@ -189,7 +172,7 @@ pub(crate) fn choose_guides(
 
 /// Parts a hair's strands into guides and carried ones; says how many are carried.
 fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
-    let Group { share, level, model, members, strands, .. } = group;
+    let Group { share, level, members, strands, .. } = group;
     let mut ranks = Vec::new();
     if *share < 1.0 {
         rank(members, strands);
@@ -199,8 +182,7 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
     let wanted = ((*share * ranks.len() as f32 - 1e-3).ceil() as usize).max(1);
     let last =
         if wanted < ranks.len() { *ranks.select_nth_unstable(wanted - 1).1 } else { u32::MAX };
-    let mut same =
-        guides.strands.len() == wanted && (guides.level, guides.model) == (*level, *model);
+    let mut same = guides.strands.len() == wanted && guides.level == *level;
     let mut count = 0;
     for (member, strand) in members.iter_mut().zip(strands.iter()) {
         let Member { entity, sleep, carried, free } = member;
@@ -229,8 +211,8 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
         return 0;
     }
     if !same {
-        let keep = (guides.level, guides.model) == (*level, *model);
-        (guides.level, guides.model) = (*level, *model);
+        let keep = guides.level == *level;
+        guides.level = *level;
         renew(members, strands, guides, last, keep);
     }
     tie(members, strands, guides);

@@ -83,8 +83,8 @@ pub struct LodLevel {
     /// which is two pixels where hair is as far away as the default level's.
     pub substeps: u32,
     /// Share of the hair's strands that are simulated, rounded up, at least one; the others go along
-    /// with those, as the [module](self) says. Default 1, which is all of them; safe 0.1…1. A share of
-    /// zero leaves one strand.
+    /// with those, as the [module](self) says. Default 1, which is all of them; safe 0.1…1. Hair of
+    /// springs is simulated whole at every level.
     pub strands: f32,
 }
 
@@ -154,10 +154,12 @@ impl LodLevel {
         Ok(Self { below, iterations, substeps, strands: 1.0 })
     }
 
-    /// The same level with another share of the strands simulated, taken to the nearest valid value.
-    pub fn with_strands(mut self, share: f32) -> Self {
-        self.strands = STRANDS.mend(share, 1.0, &Notes::default());
-        self
+    /// The same level with another share of the strands simulated.
+    ///
+    /// # Errors
+    /// When the share is not a number or outside 0…1.
+    pub fn with_strands(self, share: f32) -> Result<Self, InvalidValue> {
+        Ok(Self { strands: STRANDS.check(share)?, ..self })
     }
 }
 

@@ -10,7 +10,7 @@ pub const HEAD: f32 = 0.09;
 /// One level with every iteration and substep, and this share of the strands.
 pub fn fewer(strands: f32) -> HairLod {
     HairLod {
-        levels: vec![LodLevel::new(0.5, 1000, 1).unwrap().with_strands(strands)],
+        levels: vec![LodLevel::new(0.5, 1000, 1).unwrap().with_strands(strands).unwrap()],
         ..default()
     }
 }
