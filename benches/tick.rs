@@ -2,6 +2,8 @@
 //! with and without the length limiter, and how long a simulated second of the paper's first scene
 //! takes.
 //!
+//! `KERATIN_BENCH_ONLY=10000x16,sleep` prints these rows alone; `memory` and `hanging` are others.
+//!
 //! Read the ratios: all rows come from one run on one machine. What does not depend on who else is on
 //! it are instructions. The projection alone, gather and scatter left out, takes 42 to 43 of them per
 //! segment and iteration on AVX2 (27,238, 50,905 and 213,193 a substep of sixteen strands of 9, 16 and

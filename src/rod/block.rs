@@ -5,6 +5,12 @@
 //! nodes is about 22 kB: every iteration of a substep stays in the first cache. The arrays are
 //! plain old data and may be handed to a compute shader as they are.
 //!
+//! Strands keep their own vectors, so that game code reads and writes them, and are gathered into lanes
+//! and scattered back in each substep. With ten thousand strands that takes as long as solving: it is
+//! the memory that takes the time. Turning four strands at a time in registers, with and without
+//! copying them first, was no faster (10.5 to 11.6 against 9.7 to 10.4 ns per segment and iteration at
+//! 10,000 strands), and reading four strands in step much slower (16 ns).
+//!
 //! Order within a substep (\[B\] §2 with model notes): predict positions and orientations, project
 //! stretch–shear, bend–twist and contacts `iterations` times from root to tip, limit lengths, a
 //! last contact pass, then velocities from the change.

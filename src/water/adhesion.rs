@@ -142,12 +142,17 @@ impl MetBy<'_> {
             return;
         }
         let mut tuft = core::mem::take(&mut out.scratch.tuft);
-        tuft.gather(members, self.wetting);
+        tuft.place(members);
+        let mut is_weighed = false;
         out.scratch.at.resize(self.field.pullers.len(), 0);
         for i in 0..tuft.rows.len() {
-            let row = &mut tuft.rows[i];
+            let row = &tuft.rows[i];
             self.field.pulling(level, row.low, row.high, &mut out.scratch.near);
             if !out.scratch.near.balls.is_empty() {
+                if !core::mem::replace(&mut is_weighed, true) {
+                    tuft.weigh(members, self.wetting);
+                }
+                let row = &mut tuft.rows[i];
                 let at = Place { node: i, first, own: &tuft.own };
                 dispatch!(level, simd => self.pull(simd, row, at, members, out));
             }
@@ -174,7 +179,9 @@ impl MetBy<'_> {
                 }
             }
         }
-        tuft.scatter(members);
+        if is_weighed {
+            tuft.scatter(members);
+        }
         out.scratch.tuft = tuft;
     }
 

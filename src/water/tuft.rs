@@ -59,26 +59,33 @@ pub(super) struct Tuft {
 }
 
 impl Tuft {
-    pub fn gather(&mut self, members: &[Member<'_>], wetting: &Wetting) {
-        let dry = wetting.dry_mass();
+    /// Takes strands in, where they are and no more: most are near no droplet.
+    pub fn place(&mut self, members: &[Member<'_>]) {
         self.rows.clear();
         let longest = members.iter().map(|m| m.positions.len()).max().unwrap_or(0);
         self.rows.resize(longest, Row::default());
         self.own = [u32::MAX; LANES];
         for (lane, member) in members.iter().enumerate() {
             self.own[lane] = member.strand.index_u32();
-            let nodes = member.positions.iter().zip(&*member.velocities);
-            let lengths = node_lengths(member.lengths);
-            for (i, (((p, v), length), row)) in nodes.zip(lengths).zip(&mut self.rows).enumerate() {
+            for (p, row) in member.positions.iter().zip(&mut self.rows) {
                 // What is not finite reaches no droplet; it must not widen the box either.
-                if !p.is_finite() {
-                    continue;
+                if p.is_finite() {
+                    put3(&mut row.p, lane, *p);
+                    (row.low, row.high) = (row.low.min(*p), row.high.max(*p));
                 }
-                put3(&mut row.p, lane, *p);
+            }
+        }
+    }
+
+    /// How they move and what they weigh, before droplets act on them.
+    pub fn weigh(&mut self, members: &[Member<'_>], wetting: &Wetting) {
+        let dry = wetting.dry_mass();
+        for (lane, member) in members.iter().enumerate() {
+            let nodes = member.velocities.iter().zip(node_lengths(member.lengths));
+            for (i, ((v, length), row)) in nodes.zip(&mut self.rows).enumerate() {
                 put3(&mut row.v, lane, *v);
                 row.load[lane] = member.load.get(i).copied().unwrap_or(0.0);
                 row.mass[lane] = dry * length;
-                (row.low, row.high) = (row.low.min(*p), row.high.max(*p));
             }
         }
     }
@@ -86,11 +93,8 @@ impl Tuft {
     /// Puts velocities back.
     pub fn scatter(&self, members: &mut [Member<'_>]) {
         for (lane, member) in members.iter_mut().enumerate() {
-            let nodes = member.velocities.iter_mut().zip(member.positions).zip(&self.rows);
-            for ((v, p), row) in nodes {
-                if p.is_finite() {
-                    *v = take3(&row.v, lane);
-                }
+            for (v, row) in member.velocities.iter_mut().zip(&self.rows) {
+                *v = take3(&row.v, lane);
             }
         }
     }
