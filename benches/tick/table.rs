@@ -48,7 +48,11 @@ fn rows(threads: usize) {
     let wanted = |name: &str| only.as_ref().is_none_or(|only| only.split(',').any(|o| o == name));
     // First, while the process has nothing that it could use again.
     if threads == 1 && wanted("memory") {
-        println!("100000 × 16 | memory {:.2} kB a strand, of all that is held for it", memory());
+        let [without, with] = memory();
+        println!(
+            "100000 × 16 | memory {without:.2} kB a strand, of all that is held for it; {with:.2} kB \
+             with contact"
+        );
     }
     if wanted("sleep") {
         sleep_row(threads);
@@ -163,16 +167,18 @@ fn row(threads: usize, strands: usize, nodes: usize) {
     );
 }
 
-/// What a strand of a whole head takes, in kB: its components, its place in blocks and contact's
-/// lists.
-fn memory() -> f64 {
+/// What a strand of a whole head takes, in kB: its components and its place in blocks; then with
+/// contact's lists, too.
+fn memory() -> [f64; 2] {
     let strands = 100_000;
     let hair = head(strands, 16);
     let before = resident();
     let mut app = app(1, Kind::Tick, &hair, Some(head_radius(strands)));
-    app.insert_resource(HairDefault(LockContact::default()));
-    (0..3).for_each(|_| app.update());
-    (resident() - before) / strands as f64 / 1e3
+    [0.0, LockContact::default().strength].map(|strength| {
+        app.insert_resource(HairDefault(LockContact { strength, ..default() }));
+        (0..3).for_each(|_| app.update());
+        (resident() - before) / strands as f64 / 1e3
+    })
 }
 
 /// The memory that the process holds (bytes), where the system tells.
