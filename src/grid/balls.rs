@@ -1,7 +1,10 @@
 //! Balls, found by boxes that they reach into.
 
 use super::{Run, UniformGrid};
-use crate::rod::{algebra::V3, lanes::Real};
+use crate::rod::{
+    algebra::V3,
+    lanes::{Real, lanes_in, splat3},
+};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use glam::Vec3;
 
@@ -14,6 +17,8 @@ const NUMBERS: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14,
 #[derive(Clone, Debug, Default)]
 pub struct BallGrid {
     grid: UniformGrid,
+    /// As they came, each a centre and a radius.
+    balls: Vec<(Vec3, f32)>,
     widest: f32,
     /// In the grid's order, filled up with balls that are nowhere.
     center: [Vec<f32>; 3],
@@ -33,29 +38,29 @@ pub struct Found {
 impl BallGrid {
     /// Sorts balls, each a centre and a radius; the n-th is number n from here on. Those whose centre
     /// is not finite are not found.
-    pub fn build(&mut self, balls: impl Iterator<Item = (Vec3, f32)> + Clone) {
-        let Self { grid, widest, center, squared_radius, row, ball } = self;
-        *widest = balls.clone().map(|(_, radius)| radius).fold(0.0, f32::max);
+    pub fn build(&mut self, balls: impl Iterator<Item = (Vec3, f32)>) {
+        let Self { grid, balls: unsorted, widest, center, squared_radius, row, ball } = self;
+        unsorted.clear();
+        unsorted.extend(balls);
+        *widest = unsorted.iter().map(|(_, radius)| *radius).fold(0.0, f32::max);
         // In smaller cells there is more to look up, in larger ones more to look at.
-        let numbered = balls.clone().zip(0..).map(|((center, _), k)| (center, k));
+        let numbered = unsorted.iter().zip(0..).map(|((center, _), k)| (*center, k));
         grid.build(2.0 * widest.max(1e-4), numbered);
+        let sorted = || grid.entries.iter().map(|e| unsorted[e.item as usize]);
         let nowhere = core::iter::repeat_n(f32::NAN, WIDTH);
-        let radii: Vec<f32> = balls.clone().map(|(_, radius)| radius).collect();
-        let centers: Vec<Vec3> = balls.map(|(center, _)| center).collect();
-        let items = || grid.entries.iter().map(|e| e.item as usize);
         for (axis, column) in center.iter_mut().enumerate() {
             column.clear();
-            column.extend(items().map(|k| centers[k][axis]).chain(nowhere.clone()));
+            column.extend(sorted().map(|(center, _)| center[axis]).chain(nowhere.clone()));
         }
         squared_radius.clear();
-        squared_radius.extend(items().map(|k| radii[k] * radii[k]).chain(nowhere));
+        squared_radius.extend(sorted().map(|(_, radius)| radius * radius).chain(nowhere));
         for (axis, column) in row.iter_mut().enumerate() {
             column.clear();
-            column.extend(grid.rows().map(|row| row[axis] as u32));
+            column.extend(grid.entries.iter().map(|e| [e.cell.y, e.cell.z][axis] as u32));
             column.resize(grid.entries.len() + WIDTH, 0);
         }
         ball.clear();
-        ball.extend(items().map(|k| k as u32));
+        ball.extend(grid.entries.iter().map(|e| e.item));
     }
 
     /// Finds the balls that reach into the box from `low` to `high`, each once. A box that is not finite
@@ -71,7 +76,7 @@ impl BallGrid {
 
     #[inline(always)]
     fn sift<S: Simd>(&self, simd: S, low: Vec3, high: Vec3, runs: &[Run], found: &mut Vec<u32>) {
-        let (low, high) = (splat(simd, low), splat(simd, high));
+        let (low, high) = (splat3(simd, low), splat3(simd, high));
         for run in runs {
             let [start, end] = run.places.map(|place| place as usize);
             for first in (start..end).step_by(WIDTH) {
@@ -96,19 +101,11 @@ impl BallGrid {
                         & rows_y.simd_eq(u32x16::splat(simd, y as u32))
                         & rows_z.simd_eq(u32x16::splat(simd, z as u32));
                 }
-                let mut lanes = near.to_bitmask();
-                while lanes != 0 {
-                    found.push(self.ball[first + lanes.trailing_zeros() as usize]);
-                    lanes &= lanes - 1;
-                }
+                let lanes = lanes_in(near.to_bitmask());
+                found.extend(lanes.map(|lane| self.ball[first + lane]));
             }
         }
     }
-}
-
-#[inline(always)]
-fn splat<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
-    V3::new(f32x16::splat(simd, v.x), f32x16::splat(simd, v.y), f32x16::splat(simd, v.z))
 }
 
 #[cfg(test)]

@@ -151,11 +151,6 @@ impl UniformGrid {
         }
     }
 
-    /// The row of cells of each item in [`order`](Self::order), as runs name it.
-    fn rows(&self) -> impl Iterator<Item = [i32; 2]> {
-        self.entries.iter().map(|e| [e.cell.y, e.cell.z])
-    }
-
     /// Where in [`order`](Self::order) the items of the 27 cells around `point` are, three cells a
     /// row: all that lie within one cell size of it, some that do not, and with bad luck some twice.
     #[inline]

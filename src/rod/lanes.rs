@@ -5,8 +5,10 @@
 //! tick runs: sixteen strands side by side, on whichever instruction set the machine has. Contact
 //! between strands takes [`f32x8`], because its lists are short.
 
+use super::algebra::V3;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use fearless_simd::{f32x8, f32x16, mask32x8, mask32x16, prelude::*};
+use glam::Vec3;
 
 /// How many strands one block solves side by side.
 pub const LANES: usize = 16;
@@ -113,3 +115,19 @@ macro_rules! lanes {
 }
 lanes!(f32x8, mask32x8);
 lanes!(f32x16, mask32x16);
+
+/// One vector in all lanes.
+#[inline(always)]
+pub(crate) fn splat3<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
+    V3::new(f32x16::splat(simd, v.x), f32x16::splat(simd, v.y), f32x16::splat(simd, v.z))
+}
+
+/// The lanes whose bits are set.
+#[inline(always)]
+pub(crate) fn lanes_in(mut bits: u64) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let lowest = (bits != 0).then(|| bits.trailing_zeros() as usize);
+        bits &= bits.wrapping_sub(1);
+        lowest
+    })
+}

@@ -11,7 +11,7 @@ use crate::grid::Found;
 use crate::rod::{
     algebra::V3,
     block::{Lane, load, load3, store3},
-    lanes::{LANES, Real},
+    lanes::{LANES, Real, lanes_in, splat3},
 };
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
@@ -109,20 +109,6 @@ pub(super) struct MetBy<'a> {
     pub most_film: f64,
 }
 
-/// The numbers of the bits that are set.
-fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
-    core::iter::from_fn(move || {
-        let lowest = (mask != 0).then(|| mask.trailing_zeros() as usize);
-        mask &= mask.wrapping_sub(1);
-        lowest
-    })
-}
-
-#[inline(always)]
-fn splat<S: Simd>(simd: S, v: Vec3) -> V3<f32x16<S>> {
-    V3::new(f32x16::splat(simd, v.x), f32x16::splat(simd, v.y), f32x16::splat(simd, v.z))
-}
-
 #[inline(always)]
 fn sum<S: Simd>(v: V3<f32x16<S>>) -> Vec3 {
     Vec3::new(v.x.reduce_sum(), v.y.reduce_sum(), v.z.reduce_sum())
@@ -172,7 +158,7 @@ impl MetBy<'_> {
             for k in 0..out.scratch.near.balls.len() {
                 let falling = &self.field.fallers[out.scratch.near.balls[k] as usize];
                 let (lanes, when, along) = dispatch!(level, simd => caught(simd, ends, falling));
-                for lane in bits(lanes) {
+                for lane in lanes_in(lanes) {
                     let (strand, at) = (members[lane].strand, i as f32 + along[lane]);
                     let landing = Landing { drop: falling.drop, strand, at, when: when[lane] };
                     out.landings.push(landing);
@@ -197,7 +183,7 @@ impl MetBy<'_> {
     ) {
         let own = u32x16::load_array_ref(simd, place.own);
         let p = load3(simd, &row.p);
-        let mut change = splat(simd, Vec3::ZERO);
+        let mut change = splat3(simd, Vec3::ZERO);
         let mut steepness = f32x16::splat(simd, 0.0);
         out.scratch.hits.clear();
         for k in 0..out.scratch.near.balls.len() {
@@ -250,7 +236,7 @@ impl MetBy<'_> {
     fn felt<S: Simd>(&self, simd: S, p: V3<f32x16<S>>, own: u32x16<S>, puller: &Puller) -> Felt<S> {
         let zero = f32x16::splat(simd, 0.0);
         let one = f32x16::splat(simd, 1.0);
-        let offset = splat(simd, puller.center) - p;
+        let offset = splat3(simd, puller.center) - p;
         let squared = offset.dot(offset);
         let inside = squared.simd_lt(f32x16::splat(simd, puller.reach));
         let touches = squared.simd_lt(f32x16::splat(simd, puller.touch)).to_bitmask();
@@ -297,7 +283,7 @@ impl MetBy<'_> {
         let rate = rate / (1.0 + rate * drop.company);
         let share = f32x16::splat(simd, drop.mass * rate) / (node + drop.mass);
         let share = Real::select(touching, share, zero);
-        let change = (splat(simd, drop.velocity) - v).scale(share);
+        let change = (splat3(simd, drop.velocity) - v).scale(share);
         (v + change, -change.scale(node))
     }
 
@@ -310,7 +296,7 @@ impl MetBy<'_> {
         members: &[Member<'_>],
         out: &mut Encounters,
     ) {
-        for (lane, member) in bits(lanes).filter_map(|lane| Some((lane, members.get(lane)?))) {
+        for (lane, member) in lanes_in(lanes).filter_map(|lane| Some((lane, members.get(lane)?))) {
             self.want(drop, place.first + lane, place.node, member.film, out);
         }
     }
@@ -364,7 +350,7 @@ struct Felt<S: Simd> {
 fn caught<S: Simd>(simd: S, ends: &[Row], falling: &Falling) -> (u64, Lane, Lane) {
     let start = load3(simd, &ends[0].p);
     let edge = load3(simd, &ends[1].p) - start;
-    let (from, way) = (splat(simd, falling.from), splat(simd, falling.way));
+    let (from, way) = (splat3(simd, falling.from), splat3(simd, falling.way));
     let (when, along) = model::closest(from, way, start, edge);
     let apart = way.scale_add(when, from) - edge.scale_add(along, start);
     let near = f32x16::splat(simd, falling.near * falling.near);
