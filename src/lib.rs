@@ -1,6 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![cfg_attr(docsrs, feature(doc_cfg))]
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod air;
 pub mod bond;
@@ -13,6 +13,7 @@ pub mod groom;
 pub mod hairdo;
 pub mod lod;
 mod parallel;
+mod prefetch;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod rod;

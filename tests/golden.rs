@@ -4,7 +4,10 @@
 
 use bevy_keratin::rod::{
     algebra::{Quaternion, V3},
-    constraint::{EPSILON, EdgeWeights, StretchProjection, bend_twist, stretch_shear},
+    constraint::{
+        BendShares, EPSILON, EdgeWeights, StretchProjection, StretchShares, bend_twist,
+        stretch_shear,
+    },
     lanes::Real,
 };
 use serde::Deserialize;
@@ -107,7 +110,8 @@ fn check<R: Number>(relative: f64, rounding: f64) {
     for (i, c) in golden.stretch_shear.iter().enumerate() {
         let quat = q::<R>(c.q);
         let e = EdgeWeights { w1: R::of(c.w0), w2: R::of(c.w1), wq: R::of(c.wq), l: R::of(c.l) };
-        let d = stretch_shear(StretchProjection::Coupled, v(c.p0), v(c.p1), quat, e);
+        let shares = StretchShares::new(StretchProjection::Coupled, e);
+        let d = stretch_shear(StretchProjection::Coupled, v(c.p0), v(c.p1), quat, shares);
         // Rounded inputs move C = (p1 − p0)/l − R(q)e3 by up to ε (|p0| + |p1|)/l through the
         // cancelling difference, and by a few ε in the rest; both pass on through γ.
         let span = [c.p1[0] - c.p0[0], c.p1[1] - c.p0[1], c.p1[2] - c.p0[2]];
@@ -125,7 +129,7 @@ fn check<R: Number>(relative: f64, rounding: f64) {
     for (i, c) in golden.bend_twist.iter().enumerate() {
         let (q0, q1) = (q::<R>(c.q0), q::<R>(c.q1));
         let (w0, w1) = (R::of(c.w0), R::of(c.w1));
-        let (d0, d1) = bend_twist(q0, q1, q(c.rest_darboux), w0, w1, R::of(1.0));
+        let (d0, d1) = bend_twist(q0, q1, q(c.rest_darboux), BendShares::new(w0, w1, R::of(1.0)));
         // Ω of rounded unit quaternions is off by a few ε whatever its size.
         let moved = 8.0 * rounding / (c.w0 + c.w1 + EPSILON);
         let floor = if rounding == 0.0 { 1e-10 } else { 0.0 };

@@ -6,7 +6,7 @@ use bevy_keratin::{
     prelude::*,
     rod::{
         algebra::{Quaternion, V3},
-        constraint::{EdgeWeights, bend_twist, stretch_shear},
+        constraint::{BendShares, EdgeWeights, StretchShares, bend_twist, stretch_shear},
     },
 };
 
@@ -35,6 +35,8 @@ pub struct Twin {
     root: Quaternion<f32>,
     from: Vec<V3<f32>>,
     turned_from: Vec<Quaternion<f32>>,
+    /// What the iterations of a substep have in common.
+    shares: Vec<(StretchShares<f32>, BendShares<f32>)>,
 }
 
 fn v3(v: Vec3) -> V3<f32> {
@@ -67,6 +69,7 @@ impl Twin {
             root: quaternion(strand.root_frame()),
             from: vec![still; last + 1],
             turned_from: vec![quaternion(Quat::IDENTITY); last],
+            shares: Vec::with_capacity(last),
         }
     }
 
@@ -81,6 +84,7 @@ impl Twin {
             let turn = edge.q.after_vector(edge.omega);
             edge.q = edge.q.add_scaled(turn, 0.5 * dt).normalize();
         }
+        self.weigh();
         for _ in 0..iterations {
             self.sweep();
         }
@@ -89,30 +93,41 @@ impl Twin {
             node.v = (node.p - *from).scale(rate);
         }
         for (edge, from) in self.edges.iter_mut().zip(&self.turned_from) {
+            edge.q = edge.q.normalize();
             let change = edge.q.product(from.conjugate());
             let sign = if change.w < 0.0 { -2.0 } else { 2.0 };
             edge.omega = change.v.scale(sign * rate);
         }
     }
 
+    fn weigh(&mut self) {
+        self.shares.clear();
+        let mut w_before = 0.0;
+        for (e, nodes) in self.edges.iter().zip(self.nodes.windows(2)) {
+            let weights = EdgeWeights { w1: nodes[0].w, w2: nodes[1].w, wq: e.wq, l: e.l };
+            let stretch = StretchShares::new(StretchProjection::Split, weights);
+            self.shares.push((stretch, BendShares::new(w_before, e.wq, e.k)));
+            w_before = e.wq;
+        }
+    }
+
     fn sweep(&mut self) {
-        let (mut before, mut w_before) = (self.root, 0.0);
+        let mut before = self.root;
         for i in 0..self.edges.len() {
-            let Edge { mut q, l, wq, rest, k, .. } = self.edges[i];
-            let (d_before, d_q) = bend_twist(before, q, rest, w_before, wq, k);
-            q = q.add_scaled(d_q, 1.0).normalize();
+            let (mut q, rest) = (self.edges[i].q, self.edges[i].rest);
+            let (stretch, bend) = self.shares[i];
+            let (d_before, d_q) = bend_twist(before, q, rest, bend);
+            q = q.add_scaled(d_q, 1.0).renormalize();
             if i > 0 {
-                self.edges[i - 1].q = before.add_scaled(d_before, 1.0).normalize();
+                self.edges[i - 1].q = before.add_scaled(d_before, 1.0).renormalize();
             }
-            let (w1, w2) = (self.nodes[i].w, self.nodes[i + 1].w);
             let (p1, p2) = (self.nodes[i].p, self.nodes[i + 1].p);
-            let e = EdgeWeights { w1, w2, wq, l };
-            let c = stretch_shear(StretchProjection::Split, p1, p2, q, e);
+            let c = stretch_shear(StretchProjection::Split, p1, p2, q, stretch);
             self.nodes[i].p = p1 + c.p1;
             self.nodes[i + 1].p = p2 + c.p2;
-            q = q.add_scaled(c.q, 1.0).normalize();
+            q = q.add_scaled(c.q, 1.0).renormalize();
             self.edges[i].q = q;
-            (before, w_before) = (q, wq);
+            before = q;
         }
     }
 }

@@ -5,7 +5,8 @@ use crate::{
     bond::{BondChanges, BondKind, model::drying},
     fault::{Fault, HairFault},
     lod::HairSteps,
-    parallel::for_each,
+    parallel::{emptied, for_each_ahead},
+    prefetch::prefetch,
     setting::{self, Notes, Settings},
     strand::{Burden, Hair, PerHair, Pose, Sleep, Strand, StrandOf, TickPose},
     tick::{HairSystems, HairTick},
@@ -80,6 +81,10 @@ pub(crate) fn local_blowers(
         .collect()
 }
 
+/// A strand that air acts on, with the number of its hair's air.
+type Blown<'a> =
+    (usize, Mut<'a, Strand>, &'a Burden, Mut<'a, BondChanges>, Option<Mut<'a, WindReceived>>);
+
 pub(crate) fn apply_air(
     steps: HairSteps,
     gravity: Res<HairGravity>,
@@ -94,10 +99,11 @@ pub(crate) fn apply_air(
         &mut BondChanges,
         Option<&mut WindReceived>,
     )>,
+    mut room: Local<Vec<Blown<'static>>>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
     let mut airs = PerHair::default();
-    let mut items = Vec::with_capacity(strands.iter().len());
+    let mut items: Vec<Blown<'_>> = emptied(core::mem::take(&mut *room));
     for (of, sleep, strand, burden, changes, received) in &mut strands {
         // Wind also dries hair that is carried.
         if sleep.is_asleep() || (sleep.is_carried() && blowers.is_empty()) {
@@ -117,7 +123,12 @@ pub(crate) fn apply_air(
             items.push((air, strand, burden, changes, received));
         }
     }
-    for_each(&mut items, |(air, strand, burden, changes, received)| {
+    let ahead = |(_, strand, ..): &Blown<'_>| {
+        let (_, velocities, _, spins) = strand.parts();
+        prefetch(velocities);
+        prefetch(spins);
+    };
+    for_each_ahead(&mut items, ahead, |(air, strand, burden, changes, received)| {
         let air = &airs.values[*air];
         let (positions, velocities, _, spins) = strand.bypass_change_detection().parts_mut();
         for v in velocities.iter_mut() {
@@ -159,4 +170,5 @@ pub(crate) fn apply_air(
             }
         }
     });
+    *room = emptied(items);
 }

@@ -18,6 +18,7 @@ pub use systems::BondPlugin;
 pub(crate) use systems::fit_bonds;
 
 use crate::{
+    prefetch::prefetch,
     setting::{Bound, HairSetting, InvalidValue, Notes},
     strand::Strand,
 };
@@ -97,6 +98,10 @@ impl BondChanges {
     /// Whether anything was asked.
     pub fn is_empty(&self) -> bool {
         !self.any
+    }
+
+    fn prefetch(&self) {
+        prefetch(&self.joints);
     }
 
     fn take(&mut self) -> impl Iterator<Item = (usize, [f32; BondKind::COUNT])> + '_ {

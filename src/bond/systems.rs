@@ -7,7 +7,8 @@ use super::{
 use crate::{
     fault::{Fault, HairFault},
     lod::HairSteps,
-    parallel::for_each,
+    parallel::{emptied, for_each_ahead},
+    prefetch::prefetch,
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
     setting::{self, Bound, Notes, Settings},
     strand::{self, Burden, PerHair, Sleep, Strand, StrandOf},
@@ -73,6 +74,9 @@ pub(super) struct Key {
     dt: f32,
 }
 
+/// A strand whose rest shape is not what it was.
+type Shaped<'a> = (Key, &'a Strand, Ref<'a, Bonds>, &'a Burden, Mut<'a, RestShape>);
+
 fn generate_rest_shapes(
     steps: HairSteps,
     influence: Settings<BondInfluence>,
@@ -80,9 +84,10 @@ fn generate_rest_shapes(
     cuticle: Settings<Cuticle>,
     solver: Settings<Solver>,
     mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
+    mut room: Local<Vec<Shaped<'static>>>,
 ) {
     let mut keys = PerHair::default();
-    let mut items = Vec::new();
+    let mut items: Vec<Shaped<'_>> = emptied(core::mem::take(&mut *room));
     for (of, sleep, strand, bonds, burden, rest) in &mut strands {
         if !sleep.is_simulated() {
             continue;
@@ -107,7 +112,12 @@ fn generate_rest_shapes(
             items.push((key, strand, bonds, burden, rest));
         }
     }
-    for_each(&mut items, |(key, strand, bonds, burden, rest)| {
+    let ahead = |(_, strand, bonds, _, rest): &Shaped<'_>| {
+        prefetch(&bonds.joints);
+        prefetch(strand.orientations());
+        prefetch(&rest.darboux);
+    };
+    for_each_ahead(&mut items, ahead, |(key, strand, bonds, burden, rest)| {
         let rest = rest.bypass_change_detection();
         rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
         rest.darboux.clear();
@@ -133,6 +143,7 @@ fn generate_rest_shapes(
             }));
         }
     });
+    *room = emptied(items);
 }
 
 /// Whether joints are softer or harder than `before` by what could be seen. Water moves a little in
@@ -141,12 +152,22 @@ fn has_softened(before: &[f32], now: &[f32]) -> bool {
     before.len() != now.len() || before.iter().zip(now).any(|(a, b)| (a - b).abs() > 2e-3)
 }
 
+/// A strand whose bonds are to change.
+type Changing<'a> =
+    (&'a Strand, Mut<'a, Bonds>, Mut<'a, BondChanges>, Mut<'a, RestShape>, Mut<'a, Sleep>);
+
 fn update_bonds(
     mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut Sleep)>,
+    mut room: Local<Vec<Changing<'static>>>,
 ) {
-    let mut items: Vec<_> =
-        strands.iter_mut().filter(|(_, _, changes, ..)| !changes.is_empty()).collect();
-    for_each(&mut items, |(strand, bonds, changes, rest, sleep)| {
+    let mut items: Vec<Changing<'_>> = emptied(core::mem::take(&mut *room));
+    items.extend(strands.iter_mut().filter(|(_, _, changes, ..)| !changes.is_empty()));
+    let ahead = |(strand, bonds, changes, ..): &Changing<'_>| {
+        prefetch(&bonds.joints);
+        prefetch(strand.orientations());
+        changes.prefetch();
+    };
+    for_each_ahead(&mut items, ahead, |(strand, bonds, changes, rest, sleep)| {
         sleep.bypass_change_detection().wake();
         rest.bypass_change_detection().closed = false;
         let joints: &mut [JointBonds] = &mut bonds.bypass_change_detection().joints;
@@ -161,4 +182,5 @@ fn update_bonds(
             }
         }
     });
+    *room = emptied(items);
 }

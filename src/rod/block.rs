@@ -17,10 +17,14 @@
 
 use super::{
     algebra::{Quaternion, V3},
-    constraint::{EdgeWeights, StretchProjection, bend_twist, stretch_shear},
+    constraint::{
+        BendShares, EdgeWeights, StretchProjection, StretchShares, bend_twist, stretch_shear,
+    },
     lanes::{LANES, Real},
     limiter::limit_lengths,
     obstacle::{Obstacle, hold_back, push_out},
+    stiffness::Stiffness,
+    turn::{put_numbers, put_vectors, take_quaternions, take_vectors},
 };
 use crate::strand::{Burden, HeldNodes, Strand};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
@@ -28,6 +32,9 @@ use glam::{Quat, Vec3};
 
 /// Passes that a limiter step takes for strands that touch something.
 const PASSES_IN_TOUCH: u32 = 3;
+
+/// How many iterations run down a strand one behind the other, at most.
+const ABREAST: usize = 8;
 
 /// One number of each lane.
 pub type Lane = [f32; LANES];
@@ -68,6 +75,38 @@ pub struct EdgeLanes {
     pub k: Lane,
 }
 
+/// What the iterations of a substep need of an edge's weights and of its joint's stiffness.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shares {
+    inverse_length: Lane,
+    along: Lane,
+    across: Lane,
+    start: Lane,
+    end: Lane,
+    turn: Lane,
+    first: Lane,
+    second: Lane,
+}
+
+impl Shares {
+    #[inline(always)]
+    fn stretch<S: Simd>(&self, simd: S) -> StretchShares<f32x16<S>> {
+        StretchShares {
+            inverse_length: load(simd, &self.inverse_length),
+            along: load(simd, &self.along),
+            across: load(simd, &self.across),
+            start: load(simd, &self.start),
+            end: load(simd, &self.end),
+            turn: load(simd, &self.turn),
+        }
+    }
+
+    #[inline(always)]
+    fn bend<S: Simd>(&self, simd: S) -> BendShares<f32x16<S>> {
+        BendShares { first: load(simd, &self.first), second: load(simd, &self.second) }
+    }
+}
+
 /// A row of a tridiagonal system over a strand's edges, eliminated from the root on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Row {
@@ -92,6 +131,7 @@ pub struct BlockLanes {
     /// Whether any node moves so fast against an obstacle that it might pass through.
     sweeps: bool,
     pub(crate) scratch: Vec<Row>,
+    shares: Vec<Shares>,
 }
 
 /// What a substep does to a block.
@@ -117,83 +157,98 @@ impl BlockLanes {
         self.nodes.resize(nodes, NodeLanes::default());
         self.edges.resize(nodes - 1, EdgeLanes::default());
         self.scratch.resize(nodes - 1, Row::default());
+        self.shares.resize(nodes - 1, Shares::default());
     }
 
-    /// Copies everything of lane `from` to lane `to`: fills lanes that no strand uses.
-    pub fn repeat_lane(&mut self, from: usize, to: usize) {
-        let copy = |a: &mut [Lane]| a.iter_mut().for_each(|l| l[to] = l[from]);
-        for n in &mut self.nodes {
-            copy(&mut n.p);
-            copy(&mut n.from);
-            copy(&mut n.v);
-            n.w[to] = n.w[from];
+    /// Puts strands' nodes and lengths into the lanes; held nodes with where they are to be and the
+    /// velocity that takes them there. [`weigh`] has to follow: until then `w` is how many dry nodes
+    /// a node weighs.
+    pub(crate) fn gather_nodes(&mut self, from: &[Source<'_>; LANES], dt: f32) {
+        for (quarter, four) in from.as_chunks::<4>().0.iter().enumerate() {
+            let strands = four.map(|source| source.strand);
+            let positions = strands.map(Strand::positions);
+            put_vectors(&mut self.nodes, quarter, positions, |n| &mut n.p);
+            put_vectors(&mut self.nodes, quarter, strands.map(Strand::velocities), |n| &mut n.v);
+            put_numbers(&mut self.edges, quarter, strands.map(Strand::rest_lengths), |e| &mut e.l);
         }
-        for e in &mut self.edges {
-            copy(&mut e.q);
-            copy(&mut e.omega);
-            copy(&mut e.rest);
-            e.l[to] = e.l[from];
-            e.wq[to] = e.wq[from];
-            e.k[to] = e.k[from];
+        for node in &mut self.nodes {
+            node.w = [1.0; LANES];
         }
-        copy(&mut self.root);
-    }
-
-    /// Puts a strand's nodes into a lane; held ones with where they are to be and the velocity that
-    /// takes them there.
-    pub(crate) fn gather_nodes(
-        &mut self,
-        lane: usize,
-        strand: &Strand,
-        burden: &Burden,
-        held: Option<&HeldNodes>,
-        dt: f32,
-    ) {
-        let (positions, velocities, ..) = strand.parts();
-        let lengths = strand.rest_lengths();
-        let mean = lengths.iter().sum::<f32>() / lengths.len() as f32;
-        let held = held.map_or(&[][..], |h| &h.targets[..]);
-        for (i, node) in self.nodes.iter_mut().enumerate() {
-            let target = match held.get(i) {
-                Some(Some(target)) => Some(*target),
-                _ => (i == 0).then_some(positions[0]),
+        for (lane, Source { strand, burden, held }) in from.iter().enumerate() {
+            for (node, load) in self.nodes.iter_mut().zip(&burden.mass) {
+                node.w[lane] += load;
+            }
+            let hold = |node: &mut NodeLanes, from: Vec3, to: Vec3| {
+                put3(&mut node.from, lane, from);
+                put3(&mut node.p, lane, to);
+                put3(&mut node.v, lane, (to - from) / dt);
+                node.w[lane] = 0.0;
             };
-            // Half a cell on either side, so the tip carries half a mass.
-            let before = if i == 0 { 0.0 } else { lengths[i - 1] };
-            let after = lengths.get(i).copied().unwrap_or(0.0);
-            put3(&mut node.from, lane, positions[i]);
-            match target {
-                Some(target) => {
-                    put3(&mut node.p, lane, target);
-                    put3(&mut node.v, lane, (target - positions[i]) / dt);
-                    node.w[lane] = 0.0;
-                }
-                None => {
-                    put3(&mut node.p, lane, positions[i]);
-                    put3(&mut node.v, lane, velocities[i]);
-                    let load = burden.mass.get(i).copied().unwrap_or(0.0);
-                    node.w[lane] = 2.0 * mean / ((before + after) * (1.0 + load));
+            let positions = strand.positions();
+            hold(&mut self.nodes[0], positions[0], positions[0]);
+            let targets = held.iter().flat_map(|held| &held.targets);
+            for ((node, from), target) in self.nodes.iter_mut().zip(positions).zip(targets) {
+                if let Some(target) = target {
+                    hold(node, *from, *target);
                 }
             }
         }
     }
 
-    /// Puts what became of a lane back into its strand.
-    pub(crate) fn scatter(&self, lane: usize, strand: &mut Strand) {
-        let (positions, velocities, orientations, angular) = strand.parts_mut();
-        for (i, node) in self.nodes.iter().enumerate() {
-            positions[i] = take3(&node.p, lane);
-            velocities[i] = take3(&node.v, lane);
+    /// Puts what became of the lanes back into the strands of `items`, and calls `lost` with those
+    /// whose state is not finite any more.
+    pub(crate) fn scatter<T>(
+        &self,
+        items: &mut [T],
+        strand: impl Fn(&mut T) -> &mut Strand,
+        mut lost: impl FnMut(&mut T),
+    ) {
+        for (quarter, four) in items.chunks_mut(4).enumerate() {
+            let lanes = 4 * quarter..4 * quarter + four.len();
+            match four {
+                [a, b, c, d] if self.finite[lanes.clone()] == [0.0; 4] => {
+                    self.scatter_four(quarter, [strand(a), strand(b), strand(c), strand(d)]);
+                }
+                four => {
+                    for (lane, item) in lanes.zip(four) {
+                        if self.finite[lane] == 0.0 {
+                            self.scatter_one(lane, strand(item));
+                        } else {
+                            lost(item);
+                        }
+                    }
+                }
+            }
         }
-        for (i, edge) in self.edges.iter().enumerate() {
-            orientations[i] = take4(&edge.q, lane);
-            angular[i] = take3(&edge.omega, lane);
-        }
+    }
+
+    fn scatter_four(&self, quarter: usize, strands: [&mut Strand; 4]) {
+        let [a, b, c, d] = strands.map(|strand| {
+            strand.stepped_well();
+            strand.parts_mut()
+        });
+        take_vectors(&self.nodes, quarter, [a.0, b.0, c.0, d.0], |n| &n.p);
+        take_vectors(&self.nodes, quarter, [a.1, b.1, c.1, d.1], |n| &n.v);
+        take_quaternions(&self.edges, quarter, [a.2, b.2, c.2, d.2], |e| &e.q);
+        take_vectors(&self.edges, quarter, [a.3, b.3, c.3, d.3], |e| &e.omega);
+    }
+
+    fn scatter_one(&self, lane: usize, strand: &mut Strand) {
         strand.stepped_well();
+        let (positions, velocities, orientations, angular) = strand.parts_mut();
+        for ((node, p), v) in self.nodes.iter().zip(positions).zip(velocities) {
+            (*p, *v) = (take3(&node.p, lane), take3(&node.v, lane));
+        }
+        for ((edge, q), omega) in self.edges.iter().zip(orientations).zip(angular) {
+            (*q, *omega) = (take4(&edge.q, lane), take3(&edge.omega, lane));
+        }
     }
 
     /// The obstacles that any lane may touch in a step of `dt`.
     pub(crate) fn near(&self, obstacles: &[Obstacle], dt: f32, skin: f32) -> Vec<Obstacle> {
+        if obstacles.is_empty() {
+            return Vec::new();
+        }
         let (low, high) = self.bounds(dt);
         // Nodes may be pulled beyond their prediction, never by more than an edge in a substep.
         let margin = skin + self.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
@@ -222,11 +277,26 @@ impl BlockLanes {
     }
 }
 
+/// What a lane is filled from.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'a> {
+    pub(crate) strand: &'a Strand,
+    pub(crate) burden: &'a Burden,
+    pub(crate) held: Option<&'a HeldNodes>,
+}
+
+/// One of each lane; lanes that no item uses repeat the first.
+pub(crate) fn in_lanes<'a, T, U>(items: &'a [T], of: impl Fn(&'a T) -> U) -> [U; LANES] {
+    core::array::from_fn(|lane| of(items.get(lane).unwrap_or(&items[0])))
+}
+
 /// Sorts strands so that those of one hair with equal node count, the `key`, stand together, and
 /// divides them into blocks. Lanes do not see each other, so how strands are grouped changes no bit
 /// of the result.
 pub(crate) fn blocks_of<T>(strands: &mut [T], key: impl Fn(&T) -> (usize, usize)) -> Vec<&mut [T]> {
-    strands.sort_by_key(&key);
+    if !strands.is_sorted_by_key(&key) {
+        strands.sort_by_key(&key);
+    }
     strands
         .chunk_by_mut(|a, b| key(a) == key(b))
         .flat_map(|alike| alike.chunks_mut(LANES))
@@ -324,14 +394,11 @@ pub fn step(level: Level, block: &mut BlockLanes, params: &StepParams, obstacles
 fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
     predict_nodes(simd, b, params.dt, params.skin, obstacles);
     predict_edges(simd, b, params.dt);
-    for _ in 0..params.iterations {
-        // The projection is chosen outside the loops, so that each has straight code inside.
-        match params.projection {
-            StretchProjection::Split => sweep(simd, b, StretchProjection::Split),
-            StretchProjection::Coupled => sweep(simd, b, StretchProjection::Coupled),
-            StretchProjection::Printed => sweep(simd, b, StretchProjection::Printed),
-        }
-        contacts(simd, b, params.skin, obstacles);
+    // The projection is chosen outside the loops, so that each has straight code inside.
+    match params.projection {
+        StretchProjection::Split => project::<S, 0>(simd, b, params, obstacles),
+        StretchProjection::Coupled => project::<S, 1>(simd, b, params, obstacles),
+        StretchProjection::Printed => project::<S, 2>(simd, b, params, obstacles),
     }
     for _ in 0..params.limiter_steps {
         limit_lengths(simd, b, false);
@@ -345,6 +412,38 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacle
         }
     }
     velocities(simd, b, params);
+}
+
+/// Makes inverse masses of the masses that were gathered, which are in those of dry nodes, and, given
+/// the strands' stiffness, inverse rotational masses of the edges.
+pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<&Stiffness>) {
+    dispatch!(level, simd => weigh_simd(simd, block, stiffness));
+}
+
+#[inline(always)]
+fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<&Stiffness>) {
+    let (zero, two) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 2.0));
+    let mut sum = zero;
+    for e in &b.edges {
+        sum += load(simd, &e.l);
+    }
+    let mean = sum / f32x16::splat(simd, b.edges.len() as f32);
+    let mut before = zero;
+    for (i, n) in b.nodes.iter_mut().enumerate() {
+        let mut after = zero;
+        if let Some(e) = b.edges.get_mut(i) {
+            after = load(simd, &e.l);
+            if let Some(stiffness) = stiffness {
+                stiffness.rotational_weight(after, mean).store_array(&mut e.wq);
+            }
+        }
+        // Half a cell on either side, so the tip carries half a mass.
+        let mass = load(simd, &n.w);
+        let held = Real::lt(mass, f32x16::splat(simd, 1e-12));
+        let w = two * mean / ((before + after) * mass);
+        Real::select(held, zero, w).store_array(&mut n.w);
+        before = after;
+    }
 }
 
 /// v is already that of the forces; p* = p + v dt.
@@ -398,38 +497,126 @@ fn predict_edges<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
     }
 }
 
-/// One Gauss–Seidel sweep from root to tip: at each edge its bend–twist joint, then its
-/// stretch–shear. What two neighbours share travels in registers.
+/// How stretch–shear is projected, by the number that the sweeps are compiled for.
+const PROJECTIONS: [StretchProjection; 3] =
+    [StretchProjection::Split, StretchProjection::Coupled, StretchProjection::Printed];
+
+/// All iterations. [`ABREAST`] of them run down the strand one behind the other: what each does, and
+/// so every bit, is the same as if it began when the one before had ended, but a processor finds work
+/// while it waits for the results of one.
 #[inline(always)]
-fn sweep<S: Simd>(simd: S, b: &mut BlockLanes, projection: StretchProjection) {
-    let one = f32x16::splat(simd, 1.0);
-    let mut before = load4(simd, &b.root);
-    let mut w_before = f32x16::splat(simd, 0.0);
-    let mut p1 = b.nodes[0].position(simd);
-    let mut w1 = load(simd, &b.nodes[0].w);
-    for i in 0..b.edges.len() {
-        let e = &b.edges[i];
-        let (wq, l) = (load(simd, &e.wq), load(simd, &e.l));
-        let mut q = load4(simd, &e.q);
-        let (d_before, d_q) =
-            bend_twist(before, q, load4(simd, &e.rest), w_before, wq, load(simd, &e.k));
-        q = q.add_scaled(d_q, one).normalize();
-        if i > 0 {
-            let turned = before.add_scaled(d_before, one).normalize();
-            store4(&mut b.edges[i - 1].q, turned);
-        }
-        let mut p2 = b.nodes[i + 1].position(simd);
-        let w2 = load(simd, &b.nodes[i + 1].w);
-        let c = stretch_shear(projection, p1, p2, q, EdgeWeights { w1, w2, wq, l });
-        p1 = p1 + c.p1;
-        p2 = p2 + c.p2;
-        q = q.add_scaled(c.q, one).normalize();
-        store3(&mut b.nodes[i].p, p1);
-        (before, w_before, p1, w1) = (q, wq, p2, w2);
+fn project<S: Simd, const P: usize>(
+    simd: S,
+    b: &mut BlockLanes,
+    params: &StepParams,
+    obstacles: &[Obstacle],
+) {
+    share::<S, P>(simd, b);
+    let mut left = params.iterations as usize;
+    while left > 0 {
+        let abreast = left.div_ceil(left.div_ceil(ABREAST));
+        sweeps::<S, P>(simd, b, abreast, params.skin, obstacles);
+        left -= abreast;
     }
-    let last = b.edges.len();
-    store4(&mut b.edges[last - 1].q, before);
-    store3(&mut b.nodes[last].p, p1);
+    b.touched = [0.0; LANES];
+    if !obstacles.is_empty() {
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        let mut touched = zero;
+        for n in &b.nodes {
+            let normal = n.support(simd);
+            touched = Real::select(Real::lt(zero, normal.dot(normal)), one, touched);
+        }
+        touched.store_array(&mut b.touched);
+    }
+}
+
+/// What stays the same in all iterations.
+#[inline(always)]
+fn share<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
+    let mut w_before = f32x16::splat(simd, 0.0);
+    let mut w1 = load(simd, &b.nodes[0].w);
+    for ((e, node), shares) in b.edges.iter().zip(&b.nodes[1..]).zip(&mut b.shares) {
+        let (wq, l, w2) = (load(simd, &e.wq), load(simd, &e.l), load(simd, &node.w));
+        let s = StretchShares::new(PROJECTIONS[P], EdgeWeights { w1, w2, wq, l });
+        let bend = BendShares::new(w_before, wq, load(simd, &e.k));
+        s.inverse_length.store_array(&mut shares.inverse_length);
+        s.along.store_array(&mut shares.along);
+        s.across.store_array(&mut shares.across);
+        s.start.store_array(&mut shares.start);
+        s.end.store_array(&mut shares.end);
+        s.turn.store_array(&mut shares.turn);
+        bend.first.store_array(&mut shares.first);
+        bend.second.store_array(&mut shares.second);
+        (w_before, w1) = (wq, w2);
+    }
+}
+
+/// What a sweep carries in registers from one edge to the next.
+#[derive(Clone, Copy)]
+struct Carried<S: Simd> {
+    /// The edge before, which has yet to turn for the joint that follows.
+    before: Quaternion<f32x16<S>>,
+    /// The node between them.
+    p1: V3<f32x16<S>>,
+}
+
+/// `abreast` Gauss–Seidel sweeps from root to tip: at each edge its bend–twist joint, then its
+/// stretch–shear, then the edge's start node against obstacles, which nothing else in this sweep
+/// moves. A sweep may follow two edges behind another: all that it reads there is as that leaves it.
+#[inline(always)]
+fn sweeps<S: Simd, const P: usize>(
+    simd: S,
+    b: &mut BlockLanes,
+    abreast: usize,
+    skin: f32,
+    obstacles: &[Obstacle],
+) {
+    let edges = b.edges.len();
+    let root = load4(simd, &b.root);
+    let p1 = b.nodes[0].position(simd);
+    let mut carried = [Carried { before: root, p1 }; ABREAST];
+    for step in 0..edges + 2 * (abreast - 1) {
+        for (k, carried) in carried.iter_mut().take(abreast).enumerate() {
+            let i = step.wrapping_sub(2 * k);
+            if i >= edges {
+                continue;
+            }
+            if i == 0 {
+                carried.p1 = b.nodes[0].position(simd);
+            }
+            pass_edge::<S, P>(simd, b, i, carried);
+            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles);
+            if i + 1 == edges {
+                store4(&mut b.edges[i].q, carried.before);
+                store3(&mut b.nodes[i + 1].p, carried.p1);
+                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles);
+            }
+        }
+    }
+}
+
+/// One edge of a sweep.
+#[inline(always)]
+fn pass_edge<S: Simd, const P: usize>(
+    simd: S,
+    b: &mut BlockLanes,
+    i: usize,
+    carried: &mut Carried<S>,
+) {
+    let one = f32x16::splat(simd, 1.0);
+    let Carried { before, p1 } = *carried;
+    let (e, shares) = (&b.edges[i], &b.shares[i]);
+    let q = load4(simd, &e.q);
+    let (d_before, d_q) = bend_twist(before, q, load4(simd, &e.rest), shares.bend(simd));
+    let q = q.add_scaled(d_q, one).renormalize();
+    let p2 = b.nodes[i + 1].position(simd);
+    let c = stretch_shear(PROJECTIONS[P], p1, p2, q, shares.stretch(simd));
+    if i > 0 {
+        let turned = before.add_scaled(d_before, one).renormalize();
+        store4(&mut b.edges[i - 1].q, turned);
+    }
+    store3(&mut b.nodes[i].p, p1 + c.p1);
+    *carried = Carried { before: q.add_scaled(c.q, one).renormalize(), p1: p2 + c.p2 };
 }
 
 /// Takes nodes out of obstacles, with friction, and notes what touches.
@@ -439,37 +626,51 @@ pub(crate) fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, skin: f32, obstacle
     if obstacles.is_empty() {
         return;
     }
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    let mut touched = zero;
-    let none = V3::new(zero, zero, zero);
+    let mut touched = f32x16::splat(simd, 0.0);
     for n in &mut b.nodes {
-        let w = load(simd, &n.w);
-        let held = Real::lt(w, f32x16::splat(simd, 1e-12));
-        let from = load3(simd, &n.from);
-        let (mut p, mut rests_on) = (load3(simd, &n.p), none);
-        for o in obstacles {
-            // What would take a node through has to be stopped in every pass: the shortest way out
-            // may be the wrong one.
-            if b.sweeps
-                && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin)
-            {
-                p = V3::select(held, p, before);
-                let stopped = Real::lt(zero, normal.dot(normal));
-                rests_on = V3::select(stopped, normal, rests_on);
-                touched = Real::select(stopped, one, touched);
-            }
-            let friction = f32x16::splat(simd, o.friction);
-            if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
-                p = V3::select(held, p, out);
-                let pushed = Real::lt(zero, normal.dot(normal));
-                rests_on = V3::select(pushed, normal, rests_on);
-                touched = Real::select(pushed, one, touched);
-            }
-        }
-        store3(&mut n.p, p);
-        store3(&mut n.rests_on, rests_on);
+        touched = Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles));
     }
     touched.store_array(&mut b.touched);
+}
+
+/// Takes one node out of obstacles, with friction, and notes what it rests on. Returns 1 where it
+/// rests on any.
+#[inline(always)]
+fn touch<S: Simd>(
+    simd: S,
+    n: &mut NodeLanes,
+    sweeps: bool,
+    skin: f32,
+    obstacles: &[Obstacle],
+) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let mut touched = zero;
+    if obstacles.is_empty() {
+        return touched;
+    }
+    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+    let from = load3(simd, &n.from);
+    let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
+    for o in obstacles {
+        // What would take a node through has to be stopped in every pass: the shortest way out
+        // may be the wrong one.
+        if sweeps && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin) {
+            p = V3::select(held, p, before);
+            let stopped = Real::lt(zero, normal.dot(normal));
+            rests_on = V3::select(stopped, normal, rests_on);
+            touched = Real::select(stopped, one, touched);
+        }
+        let friction = f32x16::splat(simd, o.friction);
+        if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
+            p = V3::select(held, p, out);
+            let pushed = Real::lt(zero, normal.dot(normal));
+            rests_on = V3::select(pushed, normal, rests_on);
+            touched = Real::select(pushed, one, touched);
+        }
+    }
+    store3(&mut n.p, p);
+    store3(&mut n.rests_on, rests_on);
+    touched
 }
 
 /// Velocities from the change of the step, the joints' damping, and the check that all is finite.
@@ -485,7 +686,9 @@ fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
     }
     let double = rate + rate;
     for e in &mut b.edges {
-        let change = load4(simd, &e.q).product(load4(simd, &e.from).conjugate());
+        let q = load4(simd, &e.q).normalize();
+        store4(&mut e.q, q);
+        let change = q.product(load4(simd, &e.from).conjugate());
         let sign = Real::select(Real::lt(change.w, zero), -double, double);
         let omega = change.v.scale(sign);
         store3(&mut e.omega, omega);

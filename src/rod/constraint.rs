@@ -39,6 +39,67 @@ pub struct EdgeWeights<R> {
     pub l: R,
 }
 
+/// What a stretch–shear projection makes of its [`EdgeWeights`]. They do not change within a substep,
+/// so that its iterations need not divide.
+#[derive(Clone, Copy, Debug)]
+pub struct StretchShares<R> {
+    /// 1/l.
+    pub inverse_length: R,
+    /// 1 over the denominator of the part along the tangent.
+    pub along: R,
+    /// 1 over the denominator of the part that can be taken up by turning.
+    pub across: R,
+    /// w1 l: moves the start node.
+    pub start: R,
+    /// w2 l: moves the end node.
+    pub end: R,
+    /// w_q l², with the projection's factor: turns the edge.
+    pub turn: R,
+}
+
+impl<R: Real> StretchShares<R> {
+    /// The denominators and factors of equations 3 to 5.
+    #[inline(always)]
+    pub fn new(projection: StretchProjection, e: EdgeWeights<R>) -> Self {
+        let one = e.l.lit(1.0);
+        let axial = e.l.lit(EPSILON).mul_add(e.l, e.w1 + e.w2);
+        let wql2 = e.wq * e.l * e.l;
+        let across = one / wql2.mul_add(e.l.lit(4.0), axial);
+        let (along, factor) = match projection {
+            StretchProjection::Split => (one / axial, 2.0),
+            StretchProjection::Coupled => (across, 2.0),
+            StretchProjection::Printed => (across, 1.0),
+        };
+        Self {
+            inverse_length: one / e.l,
+            along,
+            across,
+            start: e.w1 * e.l,
+            end: e.w2 * e.l,
+            turn: wql2 * e.l.lit(factor),
+        }
+    }
+}
+
+/// How much of a joint's error each of its two edges takes up in one projection.
+#[derive(Clone, Copy, Debug)]
+pub struct BendShares<R> {
+    /// The first edge's: w1 k′ / (w1 + w2).
+    pub first: R,
+    /// The second edge's: w2 k′ / (w1 + w2).
+    pub second: R,
+}
+
+impl<R: Real> BendShares<R> {
+    /// From the edges' inverse rotational masses and the joint's stiffness per iteration k′
+    /// (equation 12).
+    #[inline(always)]
+    pub fn new(w1: R, w2: R, stiffness: R) -> Self {
+        let share = stiffness / (w1 + w2 + w1.lit(EPSILON));
+        Self { first: w1 * share, second: w2 * share }
+    }
+}
+
 /// Corrections of one stretch–shear projection: of both nodes and, unnormalised, of the orientation.
 #[derive(Clone, Copy, Debug)]
 pub struct StretchCorrection<R> {
@@ -57,62 +118,47 @@ pub fn stretch_shear<R: Real>(
     p1: V3<R>,
     p2: V3<R>,
     q: Quaternion<R>,
-    e: EdgeWeights<R>,
+    e: StretchShares<R>,
 ) -> StretchCorrection<R> {
-    let one = e.l.lit(1.0);
     let tangent = q.tangent();
-    let c = (p2 - p1).scale(one / e.l) - tangent;
-    let axial_d = e.l.lit(EPSILON).mul_add(e.l, e.w1 + e.w2);
-    let wql2 = e.wq * e.l * e.l;
-    let d = wql2.mul_add(e.l.lit(4.0), axial_d);
+    let c = (p2 - p1).scale(e.inverse_length) - tangent;
     // Along the tangent a unit quaternion can take nothing up, so that part need not share the
     // denominator with the rotation.
     let (gamma_over_d, rotating) = match projection {
         StretchProjection::Split => {
             let axial = c.dot(tangent);
-            let transverse = tangent.scale_add(-axial, c).scale(one / d);
-            (tangent.scale_add(axial / axial_d, transverse), transverse)
+            let transverse = tangent.scale_add(-axial, c).scale(e.across);
+            (tangent.scale_add(axial * e.along, transverse), transverse)
         }
         StretchProjection::Coupled | StretchProjection::Printed => {
-            let gamma = c.scale(one / d);
+            let gamma = c.scale(e.across);
             (gamma, gamma)
         }
     };
-    let factor = match projection {
-        StretchProjection::Printed => 1.0,
-        _ => 2.0,
-    };
-    let q_ebar = q.times_e3_conjugate();
-    let dq = q_ebar.after_vector(rotating);
-    let s = wql2 * e.l.lit(factor);
+    let dq = q.times_e3_conjugate().after_vector(rotating);
     StretchCorrection {
-        p1: gamma_over_d.scale(e.w1 * e.l),
-        p2: gamma_over_d.scale(-(e.w2 * e.l)),
-        q: Quaternion::new(dq.v.scale(s), dq.w * s),
+        p1: gamma_over_d.scale(e.start),
+        p2: gamma_over_d.scale(-e.end),
+        q: Quaternion::new(dq.v.scale(e.turn), dq.w * e.turn),
     }
 }
 
 /// Bend–twist, equations 6–11: Im(q̄1 q2) is brought toward ±Ω0, whichever is nearer as a full
-/// quaternion. The printed three-component test (7) mirrors a remembered curve.
-///
-/// `stiffness` is k′ of equation 12. Returns Δq1 and Δq2, unnormalised.
+/// quaternion. The printed three-component test (7) mirrors a remembered curve. Returns Δq1 and Δq2,
+/// unnormalised.
 #[inline(always)]
 pub fn bend_twist<R: Real>(
     q1: Quaternion<R>,
     q2: Quaternion<R>,
     rest: Quaternion<R>,
-    w1: R,
-    w2: R,
-    stiffness: R,
+    shares: BendShares<R>,
 ) -> (Quaternion<R>, Quaternion<R>) {
     let omega = q1.conjugate().product(q2);
-    let zero = w1.lit(0.0);
-    let opposite = omega.dot(rest).lt(zero);
+    let opposite = omega.dot(rest).lt(omega.w.lit(0.0));
     let nearest = V3::select(opposite, -rest.v, rest.v);
     let difference = omega.v - nearest;
-    let share = stiffness / (w1 + w2 + w1.lit(EPSILON));
-    let d1 = q2.times_vector(difference.scale(w1 * share));
-    let d2 = q1.times_vector(difference.scale(-(w2 * share)));
+    let d1 = q2.times_vector(difference.scale(shares.first));
+    let d2 = q1.times_vector(difference.scale(-shares.second));
     (d1, d2)
 }
 
@@ -133,7 +179,7 @@ mod tests {
         let (p1, p2) = (V3::new(0.0, 0.0, 0.0), V3::new(0.0, 0.0, 0.036));
         let e = EdgeWeights { w1: 1.0, w2: 1.0, wq: 9.0 / (0.03 * 0.03), l: 0.03 };
         let left = |kind| {
-            let d = stretch_shear(kind, p1, p2, q, e);
+            let d = stretch_shear(kind, p1, p2, q, StretchShares::new(kind, e));
             ((p2 + d.p2) - (p1 + d.p1)).z / e.l - 1.0
         };
         assert!(left(StretchProjection::Split).abs() < 1e-6);
@@ -148,7 +194,7 @@ mod tests {
         let chi = 1.0;
         let e = EdgeWeights { w1: 1.0, w2: 1.0, wq: chi / (0.03 * 0.03), l: 0.03 };
         let left = |kind| {
-            let d = stretch_shear(kind, p1, p2, q, e);
+            let d = stretch_shear(kind, p1, p2, q, StretchShares::new(kind, e));
             let turned = q.add_scaled(d.q, 1.0).normalize();
             let c = ((p2 + d.p2) - (p1 + d.p1)).scale(1.0 / e.l) - turned.tangent();
             c.x / (1e-4 / 0.03)

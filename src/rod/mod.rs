@@ -24,6 +24,7 @@ pub(crate) mod limiter;
 pub mod obstacle;
 pub mod stiffness;
 mod systems;
+pub(crate) mod turn;
 
 pub use constraint::StretchProjection;
 pub use lanes::LANES;

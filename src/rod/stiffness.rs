@@ -7,6 +7,7 @@
 
 use crate::{
     rod::constraint::StretchProjection,
+    rod::lanes::Real,
     setting::{Bound, HairSetting, InvalidValue, Notes},
 };
 use bevy::prelude::*;
@@ -85,14 +86,16 @@ impl Stiffness {
 
     /// Inverse rotational mass w_q (1/m²) of an edge of length `l` on a strand whose edges average
     /// `mean`. On even strands it is χ/l²; on uneven ones it keeps EI the same in every joint.
-    pub fn rotational_weight(&self, l: f32, mean: f32) -> f32 {
+    #[inline(always)]
+    pub fn rotational_weight<R: Real>(&self, l: R, mean: R) -> R {
         match self.orientation_weight {
-            Some(chi) => chi / (l * mean),
+            Some(chi) => l.lit(chi.into()) / (l * mean),
             None => {
                 let lg3 = self.bending_length * self.bending_length * self.bending_length;
                 let stiff = self.bend.clamp(1e-6, 0.999_999);
-                stiff * mean * l
-                    / (8.0 * (1.0 - stiff) * lg3 * REFERENCE_DT * REFERENCE_DT * REFERENCE_GRAVITY)
+                let inertia = stiff
+                    / (8.0 * (1.0 - stiff) * lg3 * REFERENCE_DT * REFERENCE_DT * REFERENCE_GRAVITY);
+                l.lit(inertia.into()) * mean * l
             }
         }
     }

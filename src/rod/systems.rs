@@ -2,16 +2,18 @@
 //! side, and scattered back.
 
 use super::{
-    LANES, Solver, Stiffness,
-    block::{BlockLanes, StepParams, blocks_of, put3, put4, step},
+    Solver, Stiffness,
+    block::{BlockLanes, Source, StepParams, blocks_of, in_lanes, put4, step, weigh},
     obstacle::Obstacle,
+    turn::{put_numbers, put_quaternions, put_vectors},
 };
 use crate::{
     bond::{BondInfluence, Bonds, RestShape},
     contact::{LockContact, Obstacles},
     fault::{Fault, HairFault},
     lod::HairSteps,
-    parallel::for_each_block,
+    parallel::{emptied, for_each_block_ahead},
+    prefetch::prefetch,
     setting::{self, Settings},
     strand::{Burden, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf},
     tick::{HairSystems, HairTick},
@@ -38,7 +40,7 @@ struct HairParams {
     obstacles: Vec<Obstacle>,
 }
 
-struct Item<'a> {
+pub(crate) struct Item<'a> {
     entity: Entity,
     hair: usize,
     strand: Mut<'a, Strand>,
@@ -47,6 +49,15 @@ struct Item<'a> {
     burden: &'a Burden,
     held: Option<&'a HeldNodes>,
     put_back: Option<Fault>,
+}
+
+impl Item<'_> {
+    fn prefetch(&self) {
+        self.strand.prefetch();
+        prefetch(self.strand.rest_lengths());
+        prefetch(&self.rest.darboux);
+        prefetch(&self.rest.stiffness);
+    }
 }
 
 pub(crate) fn project(
@@ -68,9 +79,10 @@ pub(crate) fn project(
         Option<&HeldNodes>,
     )>,
     mut faults: MessageWriter<HairFault>,
+    mut room: Local<Vec<Item<'static>>>,
 ) {
     let mut params = PerHair::default();
-    let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
+    let mut items: Vec<Item<'_>> = emptied(core::mem::take(&mut *room));
     for (entity, of, sleep, strand, rest, bonds, burden, held) in &mut strands {
         if !sleep.is_simulated() {
             continue;
@@ -96,56 +108,63 @@ pub(crate) fn project(
         if let Some(hair) = index
             && strand.nodes() >= 2
             && rest.darboux.len() == strand.edges()
+            && rest.stiffness.len() == strand.edges()
         {
             items.push(Item { entity, hair, strand, rest, bonds, burden, held, put_back: None });
         }
     }
     let mut blocks = blocks_of(&mut items, |item| (item.hair, item.strand.nodes()));
     let level = Level::new();
-    for_each_block(&mut blocks, BlockLanes::default, |block, items| {
-        solve(level, block, items, &params.values[items[0].hair]);
-    });
-    for item in items {
-        if let Some(fault) = item.put_back {
+    for_each_block_ahead(
+        &mut blocks,
+        BlockLanes::default,
+        |items| items.iter().for_each(Item::prefetch),
+        |block, items| solve(level, block, items, &params.values[items[0].hair]),
+    );
+    for item in &mut items {
+        if let Some(fault) = item.put_back.take() {
             faults.write(HairFault { entity: item.entity, fault });
         }
     }
+    *room = emptied(items);
 }
 
 /// One block through one substep.
 fn solve(level: Level, block: &mut BlockLanes, items: &mut [Item<'_>], params: &HairParams) {
     block.resize(items[0].strand.nodes());
-    for (lane, item) in items.iter().enumerate() {
-        gather(block, lane, item, &params.stiffness, params.step.dt);
-    }
-    for lane in items.len()..LANES {
-        block.repeat_lane(0, lane);
-    }
+    gather(block, items, params.step.dt);
+    weigh(level, block, Some(&params.stiffness));
     let near = block.near(&params.obstacles, params.step.dt, params.step.skin);
     step(level, block, &params.step, &near);
-    for (lane, item) in items.iter_mut().enumerate() {
-        if block.finite[lane] == 0.0 {
-            block.scatter(lane, item.strand.bypass_change_detection());
-        } else {
+    block.scatter(
+        items,
+        |item| item.strand.bypass_change_detection(),
+        |item| {
             let remembered = item.bonds.joints.iter().map(|j| j.relaxed(&params.influence));
             item.put_back = item.strand.put_back(remembered);
-        }
-    }
+        },
+    );
 }
 
-fn gather(block: &mut BlockLanes, lane: usize, item: &Item<'_>, stiffness: &Stiffness, dt: f32) {
-    let strand = &*item.strand;
-    block.gather_nodes(lane, strand, item.burden, item.held, dt);
-    let (_, _, orientations, angular) = strand.parts();
-    let lengths = strand.rest_lengths();
-    let mean = lengths.iter().sum::<f32>() / lengths.len() as f32;
-    for (i, edge) in block.edges.iter_mut().enumerate() {
-        put4(&mut edge.q, lane, orientations[i]);
-        put3(&mut edge.omega, lane, angular[i]);
-        edge.l[lane] = lengths[i];
-        edge.wq[lane] = stiffness.rotational_weight(lengths[i], mean);
-        put4(&mut edge.rest, lane, item.rest.darboux[i]);
-        edge.k[lane] = item.rest.stiffness[i];
+fn gather(block: &mut BlockLanes, items: &[Item<'_>], dt: f32) {
+    let from = in_lanes(items, |item| Source {
+        strand: &item.strand,
+        burden: item.burden,
+        held: item.held,
+    });
+    block.gather_nodes(&from, dt);
+    let rest = in_lanes(items, |item| item.rest);
+    let edges = &mut block.edges;
+    for (quarter, four) in from.as_chunks::<4>().0.iter().enumerate() {
+        let poses = four.map(|source| source.strand.parts());
+        put_quaternions(edges, quarter, poses.map(|pose| pose.2), |e| &mut e.q);
+        put_vectors(edges, quarter, poses.map(|pose| pose.3), |e| &mut e.omega);
     }
-    put4(&mut block.root, lane, strand.root_frame());
+    for (quarter, four) in rest.as_chunks::<4>().0.iter().enumerate() {
+        put_quaternions(edges, quarter, four.map(|rest| &rest.darboux[..]), |e| &mut e.rest);
+        put_numbers(edges, quarter, four.map(|rest| &rest.stiffness[..]), |e| &mut e.k);
+    }
+    for (lane, source) in from.iter().enumerate() {
+        put4(&mut block.root, lane, source.strand.root_frame());
+    }
 }

@@ -9,12 +9,12 @@ use crate::{
     contact::{LockContact, Obstacles},
     fault::{Fault, HairFault},
     lod::HairSteps,
-    parallel::for_each_block,
+    parallel::{emptied, for_each_block_ahead},
     rod::{
-        LANES,
-        block::{blocks_of, put4},
+        block::{Source, blocks_of, in_lanes, weigh},
         obstacle::Obstacle,
         project,
+        turn::put_quaternions,
     },
     setting::{self, Settings},
     strand::{Burden, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf, TickPose},
@@ -39,7 +39,7 @@ struct HairParams {
     obstacles: Vec<Obstacle>,
 }
 
-struct Item<'a> {
+pub(crate) struct Item<'a> {
     entity: Entity,
     hair: usize,
     strand: Mut<'a, Strand>,
@@ -57,10 +57,11 @@ pub(crate) fn step_springs(
     hairs: Query<(&Obstacles, &TickPose)>,
     mut strands: Query<(Entity, &StrandOf, &Sleep, &mut Strand, &Burden, Option<&HeldNodes>)>,
     mut faults: MessageWriter<HairFault>,
+    mut room: Local<Vec<Item<'static>>>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
     let mut params = PerHair::default();
-    let mut items: Vec<Item<'_>> = Vec::new();
+    let mut items: Vec<Item<'_>> = emptied(core::mem::take(&mut *room));
     for (entity, of, sleep, strand, burden, held) in &mut strands {
         if !sleep.is_simulated() {
             continue;
@@ -88,14 +89,18 @@ pub(crate) fn step_springs(
     }
     let mut blocks = blocks_of(&mut items, |item| (item.hair, item.strand.nodes()));
     let level = Level::new();
-    for_each_block(&mut blocks, SpringLanes::default, |block, items| {
-        solve(level, block, items, &params.values[items[0].hair]);
-    });
-    for item in items {
-        if let Some(fault) = item.put_back {
+    for_each_block_ahead(
+        &mut blocks,
+        SpringLanes::default,
+        |items| items.iter().for_each(|item| item.strand.prefetch()),
+        |block, items| solve(level, block, items, &params.values[items[0].hair]),
+    );
+    for item in &mut items {
+        if let Some(fault) = item.put_back.take() {
             faults.write(HairFault { entity: item.entity, fault });
         }
     }
+    *room = emptied(items);
 }
 
 /// One block through one substep.
@@ -103,23 +108,22 @@ fn solve(level: Level, block: &mut SpringLanes, items: &mut [Item<'_>], params: 
     let HairParams { step: params, obstacles } = params;
     let strands = &mut block.strands;
     strands.resize(items[0].strand.nodes());
-    for (lane, item) in items.iter().enumerate() {
-        strands.gather_nodes(lane, &item.strand, item.burden, item.held, params.dt);
-        for (i, edge) in strands.edges.iter_mut().enumerate() {
-            edge.l[lane] = item.strand.rest_lengths()[i];
-            put4(&mut edge.q, lane, item.strand.orientations()[i]);
-        }
+    let from = in_lanes(items, |item| Source {
+        strand: &item.strand,
+        burden: item.burden,
+        held: item.held,
+    });
+    strands.gather_nodes(&from, params.dt);
+    for (quarter, four) in from.as_chunks::<4>().0.iter().enumerate() {
+        let orientations = four.map(|source| source.strand.orientations());
+        put_quaternions(&mut strands.edges, quarter, orientations, |e| &mut e.q);
     }
-    for lane in items.len()..LANES {
-        strands.repeat_lane(0, lane);
-    }
+    weigh(level, strands, None);
     let near = strands.near(obstacles, params.dt, params.skin);
     step(level, block, params, &near);
-    for (lane, item) in items.iter_mut().enumerate() {
-        if block.strands.finite[lane] == 0.0 {
-            block.strands.scatter(lane, item.strand.bypass_change_detection());
-        } else {
-            item.put_back = item.strand.put_back(core::iter::empty());
-        }
-    }
+    block.strands.scatter(
+        items,
+        |item| item.strand.bypass_change_detection(),
+        |item| item.put_back = item.strand.put_back(core::iter::empty()),
+    );
 }

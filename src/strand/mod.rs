@@ -24,6 +24,7 @@ pub(crate) use systems::{carry_strands, move_poses};
 use crate::{
     bond::{BondChanges, Bonds, RestShape},
     fault::Fault,
+    prefetch::prefetch,
     rod::frame::{darboux, full, parallel_transport},
     setting::{HairSetting, Notes},
 };
@@ -354,6 +355,14 @@ impl Strand {
             root_frame,
             was_put_back: false,
         };
+    }
+
+    /// Asks for the memory of what moves: positions, velocities, orientations, angular velocities.
+    pub(crate) fn prefetch(&self) {
+        prefetch(&self.positions);
+        prefetch(&self.velocities);
+        prefetch(&self.orientations);
+        prefetch(&self.angular_velocities);
     }
 
     pub(crate) fn parts(&self) -> (&[Vec3], &[Vec3], &[Quat], &[Vec3]) {
