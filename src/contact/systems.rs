@@ -4,12 +4,16 @@ use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles}
 use crate::{
     fault::{Fault, HairFault},
     lod::HairSteps,
+    prefetch::prefetch,
     rod::obstacle::{Obstacle, Solid},
     setting::{self, Notes, Settings},
     strand::{Hair, Sleep, Sleepers, StillPose, Strand, StrandOf, Strands, TickPose},
     tick::{HairSystems, HairTick},
 };
 use bevy::prelude::*;
+
+/// How many strands' memory is asked for at once.
+const TOGETHER: usize = 16;
 
 /// Colliders and contact between strands.
 pub struct ContactPlugin;
@@ -98,26 +102,32 @@ pub(crate) fn part_strands(
         list.clear();
         // Carried strands neither push nor are pushed. Where water joins strands, it joins them too.
         let with_carried = list.looks_beyond();
-        for (strand, sleep, _) in strands.iter_many(members.collection()) {
-            if with_carried || !sleep.is_carried() {
-                list.add(strand.positions());
+        for some in members.collection().chunks(TOGETHER) {
+            strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
+            for (strand, sleep, _) in strands.iter_many(some) {
+                if with_carried || !sleep.is_carried() {
+                    list.add(strand.positions());
+                }
             }
         }
         let mut pushes = list.pushes(radius, strength);
-        let mut members = strands.iter_many_mut(members.collection());
-        while let Some((mut strand, mut sleep, mut still)) = members.fetch_next() {
-            if sleep.is_carried() && !with_carried {
-                continue;
-            }
-            if sleep.is_asleep() {
-                let pushes = pushes.by_ref().take(strand.nodes());
-                if still.bypass_change_detection().feels(pushes, strength / (2.0 * radius)) {
-                    sleep.bypass_change_detection().wake();
+        for some in members.collection().chunks(TOGETHER) {
+            strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.velocities()));
+            let mut some = strands.iter_many_mut(some);
+            while let Some((mut strand, mut sleep, mut still)) = some.fetch_next() {
+                if sleep.is_carried() && !with_carried {
+                    continue;
                 }
-                continue;
+                if sleep.is_asleep() {
+                    let pushes = pushes.by_ref().take(strand.nodes());
+                    if still.bypass_change_detection().feels(pushes, strength / (2.0 * radius)) {
+                        sleep.bypass_change_detection().wake();
+                    }
+                    continue;
+                }
+                let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
+                velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * stride.dt);
             }
-            let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
-            velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * stride.dt);
         }
     }
 }

@@ -1,5 +1,8 @@
 //! Strands' arrays into lanes and back: four strands by four numbers at a time are turned in registers,
 //! so that a store takes four numbers and not one.
+//!
+//! Arrays of four are written out: what `map` calls is not always inlined, which costs more than all the
+//! rest.
 
 use super::block::{Lane, put3, take3};
 use glam::{Mat4, Quat, Vec3};
@@ -38,9 +41,16 @@ pub(crate) fn put_vectors<T>(
     let (chunks, rest) = to.as_chunks_mut::<4>();
     for (i, chunk) in chunks.iter_mut().enumerate() {
         // Four vectors of a strand are three times four numbers on end.
-        let flat: [[[f32; 4]; 3]; 4] = fours.map(|strand| bytemuck::cast(strand[i]));
+        let [a, b, c, d] = &fours;
+        let [a, b, c, d]: [[[f32; 4]; 3]; 4] = [
+            bytemuck::cast(a[i]),
+            bytemuck::cast(b[i]),
+            bytemuck::cast(c[i]),
+            bytemuck::cast(d[i]),
+        ];
         for third in 0..3 {
-            for (k, lanes) in turned(flat.map(|strand| strand[third])).into_iter().enumerate() {
+            let rows = [a[third], b[third], c[third], d[third]];
+            for (k, lanes) in turned(rows).into_iter().enumerate() {
                 let number = 4 * third + k;
                 *part_mut(&mut field(&mut chunk[number / 3])[number % 3], quarter) = lanes;
             }
@@ -66,10 +76,10 @@ pub(crate) fn take_vectors<T>(
     for (i, chunk) in chunks.iter().enumerate() {
         let mut flat = [[[0.0; 4]; 3]; 4];
         for third in 0..3 {
-            let rows = [0, 1, 2, 3].map(|k| {
-                let number = 4 * third + k;
-                part(&field(&chunk[number / 3])[number % 3], quarter)
-            });
+            let mut rows = [[0.0; 4]; 4];
+            for (row, number) in rows.iter_mut().zip(4 * third..) {
+                *row = part(&field(&chunk[number / 3])[number % 3], quarter);
+            }
             for (strand, row) in flat.iter_mut().zip(turned(rows)) {
                 strand[third] = row;
             }
@@ -95,7 +105,9 @@ pub(crate) fn put_quaternions<T>(
 ) {
     let from = from.map(|strand| &strand[..to.len()]);
     for (i, item) in to.iter_mut().enumerate() {
-        let lanes = turned(from.map(|strand| strand[i].to_array()));
+        let [a, b, c, d] = &from;
+        let rows = [a[i].to_array(), b[i].to_array(), c[i].to_array(), d[i].to_array()];
+        let lanes = turned(rows);
         for (component, lanes) in field(item).iter_mut().zip(lanes) {
             *part_mut(component, quarter) = lanes;
         }
@@ -112,8 +124,9 @@ pub(crate) fn take_quaternions<T>(
 ) {
     let mut to = to.map(|strand| &mut strand[..from.len()]);
     for (i, item) in from.iter().enumerate() {
-        let rows = turned(field(item).each_ref().map(|component| part(component, quarter)));
-        for (strand, row) in to.iter_mut().zip(rows) {
+        let [x, y, z, w] = field(item);
+        let lanes = [part(x, quarter), part(y, quarter), part(z, quarter), part(w, quarter)];
+        for (strand, row) in to.iter_mut().zip(turned(lanes)) {
             strand[i] = Quat::from_array(row);
         }
     }
@@ -131,11 +144,81 @@ pub(crate) fn put_numbers<T>(
     let fours = from.map(|strand| strand.as_chunks::<4>().0);
     let (chunks, rest) = to.as_chunks_mut::<4>();
     for (i, chunk) in chunks.iter_mut().enumerate() {
-        for (item, lanes) in chunk.iter_mut().zip(turned(fours.map(|strand| strand[i]))) {
+        let [a, b, c, d] = &fours;
+        for (item, lanes) in chunk.iter_mut().zip(turned([a[i], b[i], c[i], d[i]])) {
             *part_mut(field(item), quarter) = lanes;
         }
     }
     for (item, i) in rest.iter_mut().zip(4 * chunks.len()..) {
-        *part_mut(field(item), quarter) = from.map(|strand| strand[i]);
+        let [a, b, c, d] = &from;
+        *part_mut(field(item), quarter) = [a[i], b[i], c[i], d[i]];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::LANES;
+
+    #[derive(Clone, Copy, Default)]
+    struct Item {
+        vector: [Lane; 3],
+        quaternion: [Lane; 4],
+        number: Lane,
+    }
+
+    #[test]
+    fn what_is_put_into_a_quarter_is_there_and_comes_back_whatever_the_length() {
+        for length in 1..=13 {
+            let value =
+                |strand: usize, i: usize, part: usize| (100 * strand + 10 * i + part) as f32;
+            let make = |strand: usize| {
+                let vector = |i| Vec3::from_array([0, 1, 2].map(|part| value(strand, i, part)));
+                let quaternion =
+                    |i| Quat::from_array([3, 4, 5, 6].map(|part| value(strand, i, part)));
+                let all = 0..length;
+                (
+                    all.clone().map(vector).collect::<Vec<_>>(),
+                    all.clone().map(quaternion).collect::<Vec<_>>(),
+                    all.map(|i| value(strand, i, 7)).collect::<Vec<_>>(),
+                )
+            };
+            for quarter in 0..4 {
+                let strands = [0, 1, 2, 3].map(make);
+                let mut items = vec![Item::default(); length];
+                put_vectors(&mut items, quarter, strands.each_ref().map(|s| &s.0[..]), |item| {
+                    &mut item.vector
+                });
+                put_quaternions(
+                    &mut items,
+                    quarter,
+                    strands.each_ref().map(|s| &s.1[..]),
+                    |item| &mut item.quaternion,
+                );
+                put_numbers(&mut items, quarter, strands.each_ref().map(|s| &s.2[..]), |item| {
+                    &mut item.number
+                });
+                for (i, item) in items.iter().enumerate() {
+                    for lane in 0..LANES {
+                        let rows = item.vector.iter().chain(&item.quaternion).chain([&item.number]);
+                        for (part, row) in rows.enumerate() {
+                            let inside = (4 * quarter..4 * quarter + 4).contains(&lane);
+                            let expected =
+                                if inside { value(lane - 4 * quarter, i, part) } else { 0.0 };
+                            assert_eq!(row[lane], expected, "{length}, {quarter}, {lane}, {part}");
+                        }
+                    }
+                }
+                let mut back = [0; 4].map(|_| (vec![Vec3::NAN; length], vec![Quat::NAN; length]));
+                let [a, b, c, d] = &mut back;
+                let vectors = [&mut a.0[..], &mut b.0, &mut c.0, &mut d.0];
+                take_vectors(&items, quarter, vectors, |item| &item.vector);
+                let quaternions = [&mut a.1[..], &mut b.1, &mut c.1, &mut d.1];
+                take_quaternions(&items, quarter, quaternions, |item| &item.quaternion);
+                for (back, strand) in back.iter().zip(&strands) {
+                    assert_eq!((&back.0, &back.1), (&strand.0, &strand.1));
+                }
+            }
+        }
     }
 }
