@@ -24,12 +24,14 @@ pub fn parallel_transport(points: &[Vec3], first: Option<Quat>) -> Vec<Quat> {
 }
 
 /// Ω = Im(q̄1 q2) as a full quaternion with real part ≥ 0.
+#[inline]
 pub fn darboux(q1: Quat, q2: Quat) -> Quat {
     let omega = q1.conjugate() * q2;
     if omega.w < 0.0 { -omega } else { omega }
 }
 
 /// A full unit quaternion from a Darboux vector, real part ≥ 0.
+#[inline]
 pub fn full(omega: Vec3) -> Quat {
     let w = (1.0 - omega.length_squared()).max(0.0).sqrt();
     Quat::from_xyzw(omega.x, omega.y, omega.z, w)

@@ -48,7 +48,8 @@ pub(crate) struct Item<'a> {
     bonds: &'a Bonds,
     burden: &'a Burden,
     held: Option<&'a HeldNodes>,
-    put_back: Option<Fault>,
+    /// Boxed, because it is rare and the items are many.
+    put_back: Option<Box<Fault>>,
 }
 
 impl Item<'_> {
@@ -123,7 +124,7 @@ pub(crate) fn project(
     );
     for item in &mut items {
         if let Some(fault) = item.put_back.take() {
-            faults.write(HairFault { entity: item.entity, fault });
+            faults.write(HairFault { entity: item.entity, fault: *fault });
         }
     }
     *room = emptied(items);
@@ -141,7 +142,7 @@ fn solve(level: Level, block: &mut BlockLanes, items: &mut [Item<'_>], params: &
         |item| item.strand.bypass_change_detection(),
         |item| {
             let remembered = item.bonds.joints.iter().map(|j| j.relaxed(&params.influence));
-            item.put_back = item.strand.put_back(remembered);
+            item.put_back = item.strand.put_back(remembered).map(Box::new);
         },
     );
 }

@@ -45,7 +45,8 @@ pub(crate) struct Item<'a> {
     strand: Mut<'a, Strand>,
     burden: &'a Burden,
     held: Option<&'a HeldNodes>,
-    put_back: Option<Fault>,
+    /// Boxed, because it is rare and the items are many.
+    put_back: Option<Box<Fault>>,
 }
 
 pub(crate) fn step_springs(
@@ -97,7 +98,7 @@ pub(crate) fn step_springs(
     );
     for item in &mut items {
         if let Some(fault) = item.put_back.take() {
-            faults.write(HairFault { entity: item.entity, fault });
+            faults.write(HairFault { entity: item.entity, fault: *fault });
         }
     }
     *room = emptied(items);
@@ -124,6 +125,6 @@ fn solve(level: Level, block: &mut SpringLanes, items: &mut [Item<'_>], params: 
     block.strands.scatter(
         items,
         |item| item.strand.bypass_change_detection(),
-        |item| item.put_back = item.strand.put_back(core::iter::empty()),
+        |item| item.put_back = item.strand.put_back(core::iter::empty()).map(Box::new),
     );
 }
