@@ -25,7 +25,8 @@ use bevy_keratin::{
     prelude::*,
     rod::{
         LANES,
-        block::{BlockLanes, StepParams, put4, step},
+        block::{BlockLanes, put4},
+        step::{StepParams, step},
     },
 };
 use divan::{Bencher, counter::ItemsCount};

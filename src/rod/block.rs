@@ -2,39 +2,25 @@
 //!
 //! Layout: an array of nodes and an array of edges, each an array of lanes (AoSoA), so that a
 //! constraint reads whole vectors and a strand's sequence runs down the array. A block of sixteen
-//! nodes is about 22 kB: every iteration of a substep stays in the first cache. The arrays are
-//! plain old data and may be handed to a compute shader as they are.
+//! nodes is about 43 kB, of which the iterations of a substep take turns on 18: they stay in the first
+//! cache. The arrays are plain old data and may be handed to a compute shader as they are.
 //!
 //! Strands keep their own vectors, so that game code reads and writes them, and are gathered into lanes
-//! and scattered back in each substep. With ten thousand strands that takes as long as solving: it is
-//! the memory that takes the time. Turning four strands at a time in registers, with and without
-//! copying them first, was no faster (10.5 to 11.6 against 9.7 to 10.4 ns per segment and iteration at
-//! 10,000 strands), and reading four strands in step much slower (16 ns).
-//!
-//! Order within a substep (\[B\] §2 with model notes): predict positions and orientations, project
-//! stretch–shear, bend–twist and contacts `iterations` times from root to tip, limit lengths, a
-//! last contact pass, then velocities from the change.
+//! and scattered back in each substep. At ten thousand strands of sixteen nodes that takes about as long
+//! as three of five iterations: four strands by four numbers are turned at a time (`turn`), and their
+//! memory is asked for (`prefetch`) while the block before is solved. Number by number and without
+//! asking ahead it took longer than all five.
 
 use super::{
     algebra::{Quaternion, V3},
-    constraint::{
-        BendShares, EdgeWeights, StretchProjection, StretchShares, bend_twist, stretch_shear,
-    },
-    lanes::{LANES, Real},
-    limiter::limit_lengths,
-    obstacle::{Obstacle, hold_back, push_out},
-    stiffness::Stiffness,
+    lanes::LANES,
+    obstacle::Obstacle,
+    sweep::Shares,
     turn::{put_numbers, put_vectors, take_quaternions, take_vectors},
 };
 use crate::strand::{Burden, HeldNodes, Strand};
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, prelude::*};
 use glam::{Quat, Vec3};
-
-/// Passes that a limiter step takes for strands that touch something.
-const PASSES_IN_TOUCH: u32 = 3;
-
-/// How many iterations run down a strand one behind the other, at most.
-const ABREAST: usize = 8;
 
 /// One number of each lane.
 pub type Lane = [f32; LANES];
@@ -75,38 +61,6 @@ pub struct EdgeLanes {
     pub k: Lane,
 }
 
-/// What the iterations of a substep need of an edge's weights and of its joint's stiffness.
-#[derive(Clone, Copy, Debug, Default)]
-struct Shares {
-    inverse_length: Lane,
-    along: Lane,
-    across: Lane,
-    start: Lane,
-    end: Lane,
-    turn: Lane,
-    first: Lane,
-    second: Lane,
-}
-
-impl Shares {
-    #[inline(always)]
-    fn stretch<S: Simd>(&self, simd: S) -> StretchShares<f32x16<S>> {
-        StretchShares {
-            inverse_length: load(simd, &self.inverse_length),
-            along: load(simd, &self.along),
-            across: load(simd, &self.across),
-            start: load(simd, &self.start),
-            end: load(simd, &self.end),
-            turn: load(simd, &self.turn),
-        }
-    }
-
-    #[inline(always)]
-    fn bend<S: Simd>(&self, simd: S) -> BendShares<f32x16<S>> {
-        BendShares { first: load(simd, &self.first), second: load(simd, &self.second) }
-    }
-}
-
 /// A row of a tridiagonal system over a strand's edges, eliminated from the root on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Row {
@@ -124,31 +78,14 @@ pub struct BlockLanes {
     pub edges: Vec<EdgeLanes>,
     /// The scalp's frame q_{−1} of each strand.
     pub root: [Lane; 4],
-    /// Zero for lanes whose state is finite, else not a number; written by [`step`].
+    /// Zero for lanes whose state is finite, else not a number; written by [`step`](super::step::step).
     pub finite: Lane,
     /// 1 for lanes with a node that rests on an obstacle, else 0; written by the contact passes.
     pub(crate) touched: Lane,
     /// Whether any node moves so fast against an obstacle that it might pass through.
-    sweeps: bool,
+    pub(super) sweeps: bool,
     pub(crate) scratch: Vec<Row>,
-    shares: Vec<Shares>,
-}
-
-/// What a substep does to a block.
-#[derive(Clone, Copy, Debug)]
-pub struct StepParams {
-    /// Substep (s).
-    pub dt: f32,
-    /// Iterations of the projection.
-    pub iterations: u32,
-    /// How stretch–shear is projected.
-    pub projection: StretchProjection,
-    /// Newton steps of the length limiter; 0 turns it off.
-    pub limiter_steps: u32,
-    /// Damping of neighbouring edges' relative angular velocity (1/s).
-    pub internal_damping: f32,
-    /// Distance that nodes keep from obstacles (m).
-    pub skin: f32,
+    pub(super) shares: Vec<Shares>,
 }
 
 impl BlockLanes {
@@ -161,7 +98,7 @@ impl BlockLanes {
     }
 
     /// Puts strands' nodes and lengths into the lanes; held nodes with where they are to be and the
-    /// velocity that takes them there. [`weigh`] has to follow: until then `w` is how many dry nodes
+    /// velocity that takes them there. [`weigh`](super::step::weigh) has to follow: until then `w` is how many dry nodes
     /// a node weighs.
     pub(crate) fn gather_nodes(&mut self, from: &[Source<'_>; LANES], dt: f32) {
         for (quarter, four) in from.as_chunks::<4>().0.iter().enumerate() {
@@ -383,326 +320,4 @@ impl NodeLanes {
     pub(crate) fn set_position<S: Simd>(&mut self, p: V3<f32x16<S>>) {
         store3(&mut self.p, p);
     }
-}
-
-/// Takes the block through one substep, on the instruction set that the machine has.
-pub fn step(level: Level, block: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
-    dispatch!(level, simd => step_simd(simd, block, params, obstacles));
-}
-
-#[inline(always)]
-fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
-    predict_nodes(simd, b, params.dt, params.skin, obstacles);
-    predict_edges(simd, b, params.dt);
-    // The projection is chosen outside the loops, so that each has straight code inside.
-    match params.projection {
-        StretchProjection::Split => project::<S, 0>(simd, b, params, obstacles),
-        StretchProjection::Coupled => project::<S, 1>(simd, b, params, obstacles),
-        StretchProjection::Printed => project::<S, 2>(simd, b, params, obstacles),
-    }
-    for _ in 0..params.limiter_steps {
-        limit_lengths(simd, b, false);
-        contacts(simd, b, params.skin, obstacles);
-        // Pressed on something, hair has to fold: the more it has, the better the next pass can.
-        for _ in 1..PASSES_IN_TOUCH {
-            if b.touched != [0.0; LANES] {
-                limit_lengths(simd, b, true);
-                contacts(simd, b, params.skin, obstacles);
-            }
-        }
-    }
-    velocities(simd, b, params);
-}
-
-/// Makes inverse masses of the masses that were gathered, which are in those of dry nodes, and, given
-/// the strands' stiffness, inverse rotational masses of the edges.
-pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<&Stiffness>) {
-    dispatch!(level, simd => weigh_simd(simd, block, stiffness));
-}
-
-#[inline(always)]
-fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<&Stiffness>) {
-    let (zero, two) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 2.0));
-    let mut sum = zero;
-    for e in &b.edges {
-        sum += load(simd, &e.l);
-    }
-    let mean = sum / f32x16::splat(simd, b.edges.len() as f32);
-    let mut before = zero;
-    for (i, n) in b.nodes.iter_mut().enumerate() {
-        let mut after = zero;
-        if let Some(e) = b.edges.get_mut(i) {
-            after = load(simd, &e.l);
-            if let Some(stiffness) = stiffness {
-                stiffness.rotational_weight(after, mean).store_array(&mut e.wq);
-            }
-        }
-        // Half a cell on either side, so the tip carries half a mass.
-        let mass = load(simd, &n.w);
-        let held = Real::lt(mass, f32x16::splat(simd, 1e-12));
-        let w = two * mean / ((before + after) * mass);
-        Real::select(held, zero, w).store_array(&mut n.w);
-        before = after;
-    }
-}
-
-/// v is already that of the forces; p* = p + v dt.
-#[inline(always)]
-pub(crate) fn predict_nodes<S: Simd>(
-    simd: S,
-    b: &mut BlockLanes,
-    dt: f32,
-    skin: f32,
-    obstacles: &[Obstacle],
-) {
-    let dt = f32x16::splat(simd, dt);
-    let zero = f32x16::splat(simd, 0.0);
-    b.sweeps = false;
-    for n in &mut b.nodes {
-        let w = load(simd, &n.w);
-        let held = Real::lt(w, f32x16::splat(simd, 1e-12));
-        let p = load3(simd, &n.p);
-        // Nodes that begin inside an obstacle are set on its surface before the step, so that
-        // getting them out gives them no velocity. What comes at them gives them some.
-        let mut from = p;
-        for o in obstacles {
-            let start = o.taken_along(from);
-            if let Some((out, _)) = push_out(o, start, start, zero, skin, true) {
-                from = V3::select(held, from, from + (out - start));
-            }
-        }
-        let v = load3(simd, &n.v);
-        // Held nodes carry where they come from in `from` and where they are to be in `p`.
-        let came_from = V3::select(held, load3(simd, &n.from), from);
-        store3(&mut n.from, came_from);
-        let mut to = v.scale_add(dt, from);
-        for o in obstacles {
-            if let Some((before, _)) = hold_back(o, o.taken_along(from), to, skin) {
-                (to, b.sweeps) = (before, true);
-            }
-        }
-        store3(&mut n.p, V3::select(held, p, to));
-    }
-}
-
-/// Orientations from angular velocity likewise: without, a strand is overdamped and never settles.
-#[inline(always)]
-fn predict_edges<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
-    let half = f32x16::splat(simd, 0.5 * dt);
-    for e in &mut b.edges {
-        let q = load4(simd, &e.q);
-        let turn = q.after_vector(load3(simd, &e.omega));
-        store4(&mut e.from, q);
-        store4(&mut e.q, q.add_scaled(turn, half).normalize());
-    }
-}
-
-/// How stretch–shear is projected, by the number that the sweeps are compiled for.
-const PROJECTIONS: [StretchProjection; 3] =
-    [StretchProjection::Split, StretchProjection::Coupled, StretchProjection::Printed];
-
-/// All iterations. [`ABREAST`] of them run down the strand one behind the other: what each does, and
-/// so every bit, is the same as if it began when the one before had ended, but a processor finds work
-/// while it waits for the results of one.
-#[inline(always)]
-fn project<S: Simd, const P: usize>(
-    simd: S,
-    b: &mut BlockLanes,
-    params: &StepParams,
-    obstacles: &[Obstacle],
-) {
-    share::<S, P>(simd, b);
-    let mut left = params.iterations as usize;
-    while left > 0 {
-        let abreast = left.div_ceil(left.div_ceil(ABREAST));
-        sweeps::<S, P>(simd, b, abreast, params.skin, obstacles);
-        left -= abreast;
-    }
-    b.touched = [0.0; LANES];
-    if !obstacles.is_empty() {
-        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        let mut touched = zero;
-        for n in &b.nodes {
-            let normal = n.support(simd);
-            touched = Real::select(Real::lt(zero, normal.dot(normal)), one, touched);
-        }
-        touched.store_array(&mut b.touched);
-    }
-}
-
-/// What stays the same in all iterations.
-#[inline(always)]
-fn share<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
-    let mut w_before = f32x16::splat(simd, 0.0);
-    let mut w1 = load(simd, &b.nodes[0].w);
-    for ((e, node), shares) in b.edges.iter().zip(&b.nodes[1..]).zip(&mut b.shares) {
-        let (wq, l, w2) = (load(simd, &e.wq), load(simd, &e.l), load(simd, &node.w));
-        let s = StretchShares::new(PROJECTIONS[P], EdgeWeights { w1, w2, wq, l });
-        let bend = BendShares::new(w_before, wq, load(simd, &e.k));
-        s.inverse_length.store_array(&mut shares.inverse_length);
-        s.along.store_array(&mut shares.along);
-        s.across.store_array(&mut shares.across);
-        s.start.store_array(&mut shares.start);
-        s.end.store_array(&mut shares.end);
-        s.turn.store_array(&mut shares.turn);
-        bend.first.store_array(&mut shares.first);
-        bend.second.store_array(&mut shares.second);
-        (w_before, w1) = (wq, w2);
-    }
-}
-
-/// What a sweep carries in registers from one edge to the next.
-#[derive(Clone, Copy)]
-struct Carried<S: Simd> {
-    /// The edge before, which has yet to turn for the joint that follows.
-    before: Quaternion<f32x16<S>>,
-    /// The node between them.
-    p1: V3<f32x16<S>>,
-}
-
-/// `abreast` Gauss–Seidel sweeps from root to tip: at each edge its bend–twist joint, then its
-/// stretch–shear, then the edge's start node against obstacles, which nothing else in this sweep
-/// moves. A sweep may follow two edges behind another: all that it reads there is as that leaves it.
-#[inline(always)]
-fn sweeps<S: Simd, const P: usize>(
-    simd: S,
-    b: &mut BlockLanes,
-    abreast: usize,
-    skin: f32,
-    obstacles: &[Obstacle],
-) {
-    let edges = b.edges.len();
-    let root = load4(simd, &b.root);
-    let p1 = b.nodes[0].position(simd);
-    let mut carried = [Carried { before: root, p1 }; ABREAST];
-    for step in 0..edges + 2 * (abreast - 1) {
-        for (k, carried) in carried.iter_mut().take(abreast).enumerate() {
-            let i = step.wrapping_sub(2 * k);
-            if i >= edges {
-                continue;
-            }
-            if i == 0 {
-                carried.p1 = b.nodes[0].position(simd);
-            }
-            pass_edge::<S, P>(simd, b, i, carried);
-            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles);
-            if i + 1 == edges {
-                store4(&mut b.edges[i].q, carried.before);
-                store3(&mut b.nodes[i + 1].p, carried.p1);
-                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles);
-            }
-        }
-    }
-}
-
-/// One edge of a sweep.
-#[inline(always)]
-fn pass_edge<S: Simd, const P: usize>(
-    simd: S,
-    b: &mut BlockLanes,
-    i: usize,
-    carried: &mut Carried<S>,
-) {
-    let one = f32x16::splat(simd, 1.0);
-    let Carried { before, p1 } = *carried;
-    let (e, shares) = (&b.edges[i], &b.shares[i]);
-    let q = load4(simd, &e.q);
-    let (d_before, d_q) = bend_twist(before, q, load4(simd, &e.rest), shares.bend(simd));
-    let q = q.add_scaled(d_q, one).renormalize();
-    let p2 = b.nodes[i + 1].position(simd);
-    let c = stretch_shear(PROJECTIONS[P], p1, p2, q, shares.stretch(simd));
-    if i > 0 {
-        let turned = before.add_scaled(d_before, one).renormalize();
-        store4(&mut b.edges[i - 1].q, turned);
-    }
-    store3(&mut b.nodes[i].p, p1 + c.p1);
-    *carried = Carried { before: q.add_scaled(c.q, one).renormalize(), p1: p2 + c.p2 };
-}
-
-/// Takes nodes out of obstacles, with friction, and notes what touches.
-#[inline(always)]
-pub(crate) fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, skin: f32, obstacles: &[Obstacle]) {
-    b.touched = [0.0; LANES];
-    if obstacles.is_empty() {
-        return;
-    }
-    let mut touched = f32x16::splat(simd, 0.0);
-    for n in &mut b.nodes {
-        touched = Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles));
-    }
-    touched.store_array(&mut b.touched);
-}
-
-/// Takes one node out of obstacles, with friction, and notes what it rests on. Returns 1 where it
-/// rests on any.
-#[inline(always)]
-fn touch<S: Simd>(
-    simd: S,
-    n: &mut NodeLanes,
-    sweeps: bool,
-    skin: f32,
-    obstacles: &[Obstacle],
-) -> f32x16<S> {
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    let mut touched = zero;
-    if obstacles.is_empty() {
-        return touched;
-    }
-    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
-    let from = load3(simd, &n.from);
-    let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
-    for o in obstacles {
-        // What would take a node through has to be stopped in every pass: the shortest way out
-        // may be the wrong one.
-        if sweeps && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin) {
-            p = V3::select(held, p, before);
-            let stopped = Real::lt(zero, normal.dot(normal));
-            rests_on = V3::select(stopped, normal, rests_on);
-            touched = Real::select(stopped, one, touched);
-        }
-        let friction = f32x16::splat(simd, o.friction);
-        if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
-            p = V3::select(held, p, out);
-            let pushed = Real::lt(zero, normal.dot(normal));
-            rests_on = V3::select(pushed, normal, rests_on);
-            touched = Real::select(pushed, one, touched);
-        }
-    }
-    store3(&mut n.p, p);
-    store3(&mut n.rests_on, rests_on);
-    touched
-}
-
-/// Velocities from the change of the step, the joints' damping, and the check that all is finite.
-#[inline(always)]
-fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
-    let rate = f32x16::splat(simd, 1.0 / params.dt);
-    let zero = f32x16::splat(simd, 0.0);
-    let mut sum = zero;
-    for n in &mut b.nodes {
-        let v = (load3(simd, &n.p) - load3(simd, &n.from)).scale(rate);
-        store3(&mut n.v, v);
-        sum += v.dot(v);
-    }
-    let double = rate + rate;
-    for e in &mut b.edges {
-        let q = load4(simd, &e.q).normalize();
-        store4(&mut e.q, q);
-        let change = q.product(load4(simd, &e.from).conjugate());
-        let sign = Real::select(Real::lt(change.w, zero), -double, double);
-        let omega = change.v.scale(sign);
-        store3(&mut e.omega, omega);
-        sum += omega.dot(omega);
-    }
-    if params.internal_damping > 0.0 {
-        let exchange = 0.5 * (1.0 - bevy::math::ops::exp(-params.internal_damping * params.dt));
-        let exchange = f32x16::splat(simd, exchange);
-        for i in 1..b.edges.len() {
-            let (a, c) = (load3(simd, &b.edges[i - 1].omega), load3(simd, &b.edges[i].omega));
-            let d = (c - a).scale(exchange);
-            store3(&mut b.edges[i - 1].omega, a + d);
-            store3(&mut b.edges[i].omega, c - d);
-        }
-    }
-    (sum * zero).store_array(&mut b.finite);
 }

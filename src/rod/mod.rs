@@ -9,7 +9,9 @@
 //! |---|---|
 //! | [`constraint`] | 1–5 stretch–shear, 6–11 bend–twist, 12 stiffness per iteration |
 //! | [`stiffness`] | weights from the gravity-bending length (the paper gives none) |
-//! | [`block`] | one substep: predict, project, limit lengths, velocities |
+//! | [`block`] | strands side by side: their layout, into it and back |
+//! | [`step`] | one substep: predict, project, limit lengths, velocities |
+//! | `sweep` | the iterations, root to tip, several at once |
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
 //! | [`obstacle`] | colliders as half-space, capsule and cylinder, with friction |
 //!
@@ -22,7 +24,9 @@ pub mod frame;
 pub mod lanes;
 pub(crate) mod limiter;
 pub mod obstacle;
+pub mod step;
 pub mod stiffness;
+mod sweep;
 mod systems;
 pub(crate) mod turn;
 

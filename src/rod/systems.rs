@@ -3,8 +3,9 @@
 
 use super::{
     Solver, Stiffness,
-    block::{BlockLanes, Source, StepParams, blocks_of, in_lanes, put4, step, weigh},
+    block::{BlockLanes, Source, blocks_of, in_lanes, put4},
     obstacle::Obstacle,
+    step::{StepParams, step, weigh},
     turn::{put_numbers, put_quaternions, put_vectors},
 };
 use crate::{

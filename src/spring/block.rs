@@ -13,12 +13,11 @@ use super::{Springs, model::Law};
 use crate::rod::{
     LANES,
     algebra::{Quaternion, V3},
-    block::{
-        BlockLanes, Lane, NodeLanes, contacts, load, load3, load4, predict_nodes, store3, store4,
-    },
+    block::{BlockLanes, Lane, NodeLanes, load, load3, load4, store3, store4},
     lanes::Real,
     limiter::{along_support, mobility},
     obstacle::{Obstacle, splat},
+    step::{contacts, predict_nodes},
 };
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use glam::Vec3;

@@ -11,9 +11,10 @@ use crate::{
     lod::HairSteps,
     parallel::{emptied, for_each_block_ahead},
     rod::{
-        block::{Source, blocks_of, in_lanes, weigh},
+        block::{Source, blocks_of, in_lanes},
         obstacle::Obstacle,
         project,
+        step::weigh,
         turn::put_quaternions,
     },
     setting::{self, Settings},

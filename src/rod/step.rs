@@ -1,0 +1,237 @@
+//! One substep of a block.
+//!
+//! Order (\[B\] §2 with model notes): predict positions and orientations, project stretch–shear,
+//! bend–twist and contacts `iterations` times from root to tip, limit lengths, a last contact pass,
+//! then velocities from the change.
+
+use super::{
+    algebra::V3,
+    block::{BlockLanes, NodeLanes, load, load3, load4, store3, store4},
+    constraint::StretchProjection,
+    lanes::{LANES, Real},
+    limiter::limit_lengths,
+    obstacle::{Obstacle, hold_back, push_out},
+    stiffness::Stiffness,
+    sweep::project,
+};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+
+/// Passes that a limiter step takes for strands that touch something.
+const PASSES_IN_TOUCH: u32 = 3;
+
+/// What a substep does to a block.
+#[derive(Clone, Copy, Debug)]
+pub struct StepParams {
+    /// Substep (s).
+    pub dt: f32,
+    /// Iterations of the projection.
+    pub iterations: u32,
+    /// How stretch–shear is projected.
+    pub projection: StretchProjection,
+    /// Newton steps of the length limiter; 0 turns it off.
+    pub limiter_steps: u32,
+    /// Damping of neighbouring edges' relative angular velocity (1/s).
+    pub internal_damping: f32,
+    /// Distance that nodes keep from obstacles (m).
+    pub skin: f32,
+}
+
+/// Takes the block through one substep, on the instruction set that the machine has.
+pub fn step(level: Level, block: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
+    dispatch!(level, simd => step_simd(simd, block, params, obstacles));
+}
+
+#[inline(always)]
+fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
+    predict_nodes(simd, b, params.dt, params.skin, obstacles);
+    predict_edges(simd, b, params.dt);
+    // The projection is chosen outside the loops, so that each has straight code inside.
+    match params.projection {
+        StretchProjection::Split => project::<S, 0>(simd, b, params, obstacles),
+        StretchProjection::Coupled => project::<S, 1>(simd, b, params, obstacles),
+        StretchProjection::Printed => project::<S, 2>(simd, b, params, obstacles),
+    }
+    for _ in 0..params.limiter_steps {
+        limit_lengths(simd, b, false);
+        contacts(simd, b, params.skin, obstacles);
+        // Pressed on something, hair has to fold: the more it has, the better the next pass can.
+        for _ in 1..PASSES_IN_TOUCH {
+            if b.touched != [0.0; LANES] {
+                limit_lengths(simd, b, true);
+                contacts(simd, b, params.skin, obstacles);
+            }
+        }
+    }
+    velocities(simd, b, params);
+}
+
+/// Makes inverse masses of the masses that were gathered, which are in those of dry nodes, and, given
+/// the strands' stiffness, inverse rotational masses of the edges.
+pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<&Stiffness>) {
+    dispatch!(level, simd => weigh_simd(simd, block, stiffness));
+}
+
+#[inline(always)]
+fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<&Stiffness>) {
+    let (zero, two) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 2.0));
+    let mut sum = zero;
+    for e in &b.edges {
+        sum += load(simd, &e.l);
+    }
+    let mean = sum / f32x16::splat(simd, b.edges.len() as f32);
+    let mut before = zero;
+    for (i, n) in b.nodes.iter_mut().enumerate() {
+        let mut after = zero;
+        if let Some(e) = b.edges.get_mut(i) {
+            after = load(simd, &e.l);
+            if let Some(stiffness) = stiffness {
+                stiffness.rotational_weight(after, mean).store_array(&mut e.wq);
+            }
+        }
+        // Half a cell on either side, so the tip carries half a mass.
+        let mass = load(simd, &n.w);
+        let held = Real::lt(mass, f32x16::splat(simd, 1e-12));
+        let w = two * mean / ((before + after) * mass);
+        Real::select(held, zero, w).store_array(&mut n.w);
+        before = after;
+    }
+}
+
+/// v is already that of the forces; p* = p + v dt.
+#[inline(always)]
+pub(crate) fn predict_nodes<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    dt: f32,
+    skin: f32,
+    obstacles: &[Obstacle],
+) {
+    let dt = f32x16::splat(simd, dt);
+    let zero = f32x16::splat(simd, 0.0);
+    b.sweeps = false;
+    for n in &mut b.nodes {
+        let w = load(simd, &n.w);
+        let held = Real::lt(w, f32x16::splat(simd, 1e-12));
+        let p = load3(simd, &n.p);
+        // Nodes that begin inside an obstacle are set on its surface before the step, so that
+        // getting them out gives them no velocity. What comes at them gives them some.
+        let mut from = p;
+        for o in obstacles {
+            let start = o.taken_along(from);
+            if let Some((out, _)) = push_out(o, start, start, zero, skin, true) {
+                from = V3::select(held, from, from + (out - start));
+            }
+        }
+        let v = load3(simd, &n.v);
+        // Held nodes carry where they come from in `from` and where they are to be in `p`.
+        let came_from = V3::select(held, load3(simd, &n.from), from);
+        store3(&mut n.from, came_from);
+        let mut to = v.scale_add(dt, from);
+        for o in obstacles {
+            if let Some((before, _)) = hold_back(o, o.taken_along(from), to, skin) {
+                (to, b.sweeps) = (before, true);
+            }
+        }
+        store3(&mut n.p, V3::select(held, p, to));
+    }
+}
+
+/// Orientations from angular velocity likewise: without, a strand is overdamped and never settles.
+#[inline(always)]
+fn predict_edges<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
+    let half = f32x16::splat(simd, 0.5 * dt);
+    for e in &mut b.edges {
+        let q = load4(simd, &e.q);
+        let turn = q.after_vector(load3(simd, &e.omega));
+        store4(&mut e.from, q);
+        store4(&mut e.q, q.add_scaled(turn, half).normalize());
+    }
+}
+
+/// Takes nodes out of obstacles, with friction, and notes what touches.
+#[inline(always)]
+pub(crate) fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, skin: f32, obstacles: &[Obstacle]) {
+    b.touched = [0.0; LANES];
+    if obstacles.is_empty() {
+        return;
+    }
+    let mut touched = f32x16::splat(simd, 0.0);
+    for n in &mut b.nodes {
+        touched = Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles));
+    }
+    touched.store_array(&mut b.touched);
+}
+
+/// Takes one node out of obstacles, with friction, and notes what it rests on. Returns 1 where it
+/// rests on any.
+#[inline(always)]
+pub(super) fn touch<S: Simd>(
+    simd: S,
+    n: &mut NodeLanes,
+    sweeps: bool,
+    skin: f32,
+    obstacles: &[Obstacle],
+) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let mut touched = zero;
+    if obstacles.is_empty() {
+        return touched;
+    }
+    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+    let from = load3(simd, &n.from);
+    let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
+    for o in obstacles {
+        // What would take a node through has to be stopped in every pass: the shortest way out
+        // may be the wrong one.
+        if sweeps && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin) {
+            p = V3::select(held, p, before);
+            let stopped = Real::lt(zero, normal.dot(normal));
+            rests_on = V3::select(stopped, normal, rests_on);
+            touched = Real::select(stopped, one, touched);
+        }
+        let friction = f32x16::splat(simd, o.friction);
+        if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
+            p = V3::select(held, p, out);
+            let pushed = Real::lt(zero, normal.dot(normal));
+            rests_on = V3::select(pushed, normal, rests_on);
+            touched = Real::select(pushed, one, touched);
+        }
+    }
+    store3(&mut n.p, p);
+    store3(&mut n.rests_on, rests_on);
+    touched
+}
+
+/// Velocities from the change of the step, the joints' damping, and the check that all is finite.
+#[inline(always)]
+fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
+    let rate = f32x16::splat(simd, 1.0 / params.dt);
+    let zero = f32x16::splat(simd, 0.0);
+    let mut sum = zero;
+    for n in &mut b.nodes {
+        let v = (load3(simd, &n.p) - load3(simd, &n.from)).scale(rate);
+        store3(&mut n.v, v);
+        sum += v.dot(v);
+    }
+    let double = rate + rate;
+    for e in &mut b.edges {
+        let q = load4(simd, &e.q).normalize();
+        store4(&mut e.q, q);
+        let change = q.product(load4(simd, &e.from).conjugate());
+        let sign = Real::select(Real::lt(change.w, zero), -double, double);
+        let omega = change.v.scale(sign);
+        store3(&mut e.omega, omega);
+        sum += omega.dot(omega);
+    }
+    if params.internal_damping > 0.0 {
+        let exchange = 0.5 * (1.0 - bevy::math::ops::exp(-params.internal_damping * params.dt));
+        let exchange = f32x16::splat(simd, exchange);
+        for i in 1..b.edges.len() {
+            let (a, c) = (load3(simd, &b.edges[i - 1].omega), load3(simd, &b.edges[i].omega));
+            let d = (c - a).scale(exchange);
+            store3(&mut b.edges[i - 1].omega, a + d);
+            store3(&mut b.edges[i].omega, c - d);
+        }
+    }
+    (sum * zero).store_array(&mut b.finite);
+}
