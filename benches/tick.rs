@@ -5,8 +5,8 @@
 //! `KERATIN_BENCH_ONLY=10000x16,sleep` prints these rows alone; `memory` and `hanging` are others.
 //!
 //! Read the ratios: all rows come from one run on one machine. What does not depend on who else is on
-//! it are instructions. The projection alone, gather and scatter left out, takes 42 to 43 of them per
-//! segment and iteration on AVX2 (27,238, 50,905 and 213,193 a substep of sixteen strands of 9, 16 and
+//! it are instructions. The projection alone, gather and scatter left out, takes 43 to 46 of them per
+//! segment and iteration on AVX2 (29,318, 53,447 and 218,903 a substep of sixteen strands of 9, 16 and
 //! 64 nodes), counted by
 //!
 //! ```text
