@@ -9,6 +9,7 @@
 //! whoever wants a change asks for it in [`BondChanges`], which game code does through
 //! [`Treat`](crate::style::Treat).
 
+mod lanes;
 pub mod model;
 mod systems;
 
@@ -104,9 +105,15 @@ impl BondChanges {
         prefetch(&self.joints);
     }
 
-    fn take(&mut self) -> impl Iterator<Item = (usize, [f32; BondKind::COUNT])> + '_ {
+    /// What was asked of each joint, root first.
+    fn asked(&self) -> &[[f32; BondKind::COUNT]] {
+        &self.joints
+    }
+
+    /// All of it is done.
+    fn clear(&mut self) {
         self.any = false;
-        self.joints.iter_mut().map(core::mem::take).enumerate()
+        self.joints.fill([0.0; BondKind::COUNT]);
     }
 }
 

@@ -1,9 +1,12 @@
 //! Side-chain bonds as mathematics: equations 13–16 and 19 of \[B\], on one joint at a time.
 
 use super::BondKind;
-use crate::rod::frame::full;
+use crate::rod::{
+    algebra::{Quaternion, V3},
+    lanes::Real,
+};
 use bevy::reflect::Reflect;
-use glam::{Quat, Vec3, Vec4};
+use glam::{Quat, Vec3};
 
 /// The bonds of one joint: for each kind its remembered shape Ω_j and its rate b_j ∈ \[0, 1\]. One
 /// cache line.
@@ -34,35 +37,23 @@ impl JointBonds {
     /// remain. Ω is taken in the hemisphere of each Ω_j.
     #[inline]
     pub fn rest_shape(&self, omega: Quat, influence: &[f32; BondKind::COUNT]) -> Quat {
-        // The four kinds side by side. With M = Σ f b Ω_j and B = Σ f b this is {M + (Σf − B) Ω}/Σf.
-        let [x, y, z] = core::array::from_fn(|axis| {
-            Vec4::from_array(core::array::from_fn(|j| self.shapes[j][axis]))
-        });
-        let f = Vec4::from_array(*influence);
-        let fb = f * Vec4::from_array(self.rates);
-        let total = f.element_sum();
-        let remembered = Vec3::new(x.dot(fb), y.dot(fb), z.dot(fb));
-        let along = x * omega.x + y * omega.y + z * omega.z;
-        let present = if along.cmplt(Vec4::ZERO).any() {
-            (0..BondKind::COUNT).map(|j| aligned(omega, self.shapes[j]) * (f[j] - fb[j])).sum()
-        } else {
-            omega.xyz() * (total - fb.element_sum())
-        };
-        full((remembered + present) / total)
+        let bonds = core::array::from_fn(|j| self.kind(j));
+        let Quaternion { v, w } = rest_shape(quaternion(omega), &bonds, influence);
+        Quat::from_xyzw(v.x, v.y, v.z, w)
     }
 
     /// Equation 16: bonds of kind `j` that form (Δb > 0) remember the present shape,
     /// Ω_j ← (b Ω_j + Δb Ω)/(b + Δb); bonds that break forget nothing. b stays in \[0, 1\].
     #[inline]
     pub fn change(&mut self, j: usize, change: f32, omega: Quat) {
-        let b = self.rates[j];
-        let to = (b + change).clamp(0.0, 1.0);
-        let formed = to - b;
-        if formed > 0.0 {
-            let present = aligned(omega, self.shapes[j]);
-            self.shapes[j] = (self.shapes[j] * b + present * formed) / to;
-        }
-        self.rates[j] = to;
+        let Remembered { shape: V3 { x, y, z }, rate } =
+            changed(self.kind(j), change, quaternion(omega));
+        (self.shapes[j], self.rates[j]) = (Vec3::new(x, y, z), rate);
+    }
+
+    fn kind(&self, j: usize) -> Remembered<f32> {
+        let [x, y, z] = self.shapes[j].to_array();
+        Remembered { shape: V3::new(x, y, z), rate: self.rates[j] }
     }
 
     /// The shape the bonds alone would rest in: Ω* = Σ f b Ω_j / Σ f b (zero when all are broken).
@@ -88,18 +79,65 @@ impl JointBonds {
     }
 }
 
-/// The present shape as a Darboux vector in the hemisphere of the remembered one.
-#[inline]
-fn aligned(omega: Quat, remembered: Vec3) -> Vec3 {
-    let dot = omega.xyz().dot(remembered);
-    // Both real parts are ≥ 0, so only vectors that point apart can be opposite at all.
-    if dot < 0.0 {
-        let w = (1.0 - remembered.length_squared()).max(0.0).sqrt();
-        if dot + omega.w * w < 0.0 {
-            return -omega.xyz();
-        }
+fn quaternion(q: Quat) -> Quaternion<f32> {
+    Quaternion::new(V3::new(q.x, q.y, q.z), q.w)
+}
+
+/// One kind of bonds of a joint, or of many joints side by side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Remembered<R> {
+    /// Ω_j.
+    pub shape: V3<R>,
+    /// b_j.
+    pub rate: R,
+}
+
+impl<R: Real> Remembered<R> {
+    /// Whether the present shape is in the other hemisphere than the remembered one, so that −Ω is
+    /// what is nearer to it. Real parts are ≥ 0.
+    #[inline(always)]
+    fn is_opposite(&self, omega: Quaternion<R>) -> R::Mask {
+        // Ω·Ω_j + w √(1 − |Ω_j|²) < 0, without the root.
+        let zero = omega.w.lit(0.0);
+        let away = (-omega.v.dot(self.shape)).max(zero);
+        let square = (zero.lit(1.0) - self.shape.dot(self.shape)).max(zero);
+        (omega.w * omega.w * square).lt(away * away)
     }
-    omega.xyz()
+}
+
+/// Equation 15, see [`JointBonds::rest_shape`]: with M = Σ f b Ω_j this is {M + Σ f (1−b) Ω}/Σ f.
+#[inline(always)]
+pub(super) fn rest_shape<R: Real>(
+    omega: Quaternion<R>,
+    bonds: &[Remembered<R>; BondKind::COUNT],
+    influence: &[R; BondKind::COUNT],
+) -> Quaternion<R> {
+    let zero = omega.w.lit(0.0);
+    let (mut remembered, mut present, mut total) = (V3::new(zero, zero, zero), zero, zero);
+    for (bond, f) in bonds.iter().zip(*influence) {
+        let closed = f * bond.rate;
+        let open = f - closed;
+        remembered = bond.shape.scale_add(closed, remembered);
+        present = present + R::select(bond.is_opposite(omega), -open, open);
+        total = total + f;
+    }
+    let v = omega.v.scale_add(present, remembered).scale(zero.lit(1.0) / total);
+    Quaternion::new(v, (zero.lit(1.0) - v.dot(v)).max(zero).sqrt())
+}
+
+/// Equation 16, see [`JointBonds::change`].
+#[inline(always)]
+pub(super) fn changed<R: Real>(
+    bond: Remembered<R>,
+    change: R,
+    omega: Quaternion<R>,
+) -> Remembered<R> {
+    let (zero, one) = (change.lit(0.0), change.lit(1.0));
+    let to = (bond.rate + change).max(zero).min(one);
+    let formed = to - bond.rate;
+    let present = R::select(bond.is_opposite(omega), -formed, formed);
+    let mean = omega.v.scale_add(present, bond.shape.scale(bond.rate)).scale(one / to);
+    Remembered { shape: V3::select(zero.lt(formed), mean, bond.shape), rate: to }
 }
 
 /// Equation 19: the change of the hydrogen bonds' rate by a wind that changed the velocity by
@@ -120,6 +158,7 @@ pub fn cuticle_factor(distance: f32, damage: f32, softening: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rod::frame::full;
     use proptest::prelude::*;
 
     const F: [f32; 4] = [0.3, 0.33, 0.2, 0.17];

@@ -1,7 +1,8 @@
 //! The bonds' two places in the tick: `RestShape` (equation 15) and `BondUpdate` (equation 16).
 
 use super::{
-    BondChanges, BondInfluence, BondKind, Bonds, Cuticle, JointBonds, RestShape,
+    BondChanges, BondInfluence, BondKind, Bonds, Cuticle, RestShape,
+    lanes::{Frames, change, rest_shapes},
     model::cuticle_factor,
 };
 use crate::{
@@ -15,6 +16,7 @@ use crate::{
     tick::{HairSystems, HairTick},
 };
 use bevy::prelude::*;
+use fearless_simd::Level;
 
 /// Rest shapes from bonds and bonds' memory.
 pub struct BondPlugin;
@@ -117,15 +119,12 @@ fn generate_rest_shapes(
         prefetch(strand.orientations());
         prefetch(&rest.darboux);
     };
+    let level = Level::new();
     for_each_ahead(&mut items, ahead, |(key, strand, bonds, burden, rest)| {
         let rest = rest.bypass_change_detection();
         rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
-        rest.darboux.clear();
-        rest.darboux.extend(
-            (bonds.joints.iter())
-                .enumerate()
-                .map(|(i, joint)| joint.rest_shape(strand.darboux(i), &key.influence)),
-        );
+        rest.darboux.resize(strand.edges(), Quat::IDENTITY);
+        rest_shapes(level, frames(strand), &bonds.joints, &key.influence, &mut rest.darboux);
         if rest.key != Some(*key)
             || rest.stiffness.len() != strand.edges()
             || has_softened(&rest.softened, &burden.softening)
@@ -144,6 +143,10 @@ fn generate_rest_shapes(
         }
     });
     *room = emptied(items);
+}
+
+fn frames(strand: &Strand) -> Frames<'_> {
+    Frames { root: strand.root_frame(), orientations: strand.orientations() }
 }
 
 /// Whether joints are softer or harder than `before` by what could be seen. Water moves a little in
@@ -167,20 +170,14 @@ fn update_bonds(
         prefetch(strand.orientations());
         changes.prefetch();
     };
+    let level = Level::new();
     for_each_ahead(&mut items, ahead, |(strand, bonds, changes, rest, sleep)| {
         sleep.bypass_change_detection().wake();
         rest.bypass_change_detection().closed = false;
-        let joints: &mut [JointBonds] = &mut bonds.bypass_change_detection().joints;
-        for (i, change) in changes.bypass_change_detection().take() {
-            if let Some(joint) = joints.get_mut(i) {
-                // Only bonds that form look at the present shape.
-                let forms = change.iter().any(|c| *c > 0.0);
-                let omega = if forms { strand.darboux(i) } else { Quat::IDENTITY };
-                for (kind, change) in change.into_iter().enumerate().filter(|(_, c)| *c != 0.0) {
-                    joint.change(kind, change, omega);
-                }
-            }
-        }
+        let changes = changes.bypass_change_detection();
+        let bonds = bonds.bypass_change_detection();
+        change(level, frames(strand), &mut bonds.joints, changes.asked());
+        changes.clear();
     });
     *room = emptied(items);
 }

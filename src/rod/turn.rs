@@ -13,8 +13,9 @@ pub(crate) type Four<'a, T> = [&'a [T]; 4];
 /// The same, to be written.
 pub(crate) type FourMut<'a, T> = [&'a mut [T]; 4];
 
+/// Rows as columns.
 #[inline(always)]
-fn turned(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
+pub(crate) fn turned(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
     Mat4::from_cols_array_2d(&rows).transpose().to_cols_array_2d()
 }
 
