@@ -178,7 +178,12 @@ impl Plugin for ScenePlugin {
             .init_resource::<measure::StrainPeak>()
             .add_systems(Startup, spawn_scene)
             .add_systems(FixedUpdate, script::direct)
-            .add_systems(HairTick, measure::watch_strain.in_set(HairSystems::Last));
+            .add_systems(
+                HairTick,
+                measure::watch_strain
+                    .in_set(HairSystems::Last)
+                    .run_if(resource_exists::<measure::StrainPeak>),
+            );
     }
 }
 

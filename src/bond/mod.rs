@@ -101,7 +101,8 @@ impl BondChanges {
         !self.any
     }
 
-    fn prefetch(&self) {
+    /// Asks for the memory of what was asked for.
+    pub(crate) fn prefetch(&self) {
         prefetch(&self.joints);
     }
 

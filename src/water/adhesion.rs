@@ -128,7 +128,7 @@ impl MetBy<'_> {
             return;
         }
         let mut tuft = core::mem::take(&mut out.scratch.tuft);
-        tuft.place(members);
+        tuft.place(level, members);
         let mut is_weighed = false;
         out.scratch.at.resize(self.field.pullers.len(), 0);
         for i in 0..tuft.rows.len() {
@@ -152,7 +152,8 @@ impl MetBy<'_> {
         for (k, member) in members.iter().enumerate().filter(|(_, m)| !m.load.is_empty()) {
             self.drink_from_riders(member, first + k, out);
         }
-        for (i, ends) in tuft.rows.windows(2).enumerate() {
+        let edges = if self.field.fallers.is_empty() { &[] } else { &tuft.rows[..] };
+        for (i, ends) in edges.windows(2).enumerate() {
             let (low, high) = (ends[0].low.min(ends[1].low), ends[0].high.max(ends[1].high));
             self.field.falling(level, low, high, &mut out.scratch.near);
             for k in 0..out.scratch.near.balls.len() {

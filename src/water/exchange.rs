@@ -11,7 +11,8 @@ use crate::{
     air::{HairGravity, LocalBlower, local_blowers, model::wind},
     bond::{BondChanges, BondKind, Bonds, model::drying},
     fault::{Fault, HairFault},
-    parallel::for_each,
+    parallel::{emptied, for_each_ahead},
+    prefetch::prefetch,
     setting::{Notes, Settings},
     strand::{Burden, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
     tick::HairStep,
@@ -84,7 +85,7 @@ impl LocalWater<'_> {
     }
 }
 
-struct Wet<'a> {
+pub(super) struct Wet<'a> {
     hair: usize,
     strand: &'a Strand,
     bonds: &'a Bonds,
@@ -94,6 +95,18 @@ struct Wet<'a> {
     left: Left,
     /// Water that has nowhere to be any more (m³).
     gone: f64,
+}
+
+impl Wet<'_> {
+    fn prefetch(&self) {
+        prefetch(self.strand.positions());
+        prefetch(self.strand.rest_lengths());
+        prefetch(&self.bonds.joints);
+        self.moisture.prefetch();
+        prefetch(&self.burden.mass);
+        prefetch(&self.burden.softening);
+        self.changes.prefetch();
+    }
 }
 
 pub(super) fn exchange_water(
@@ -107,6 +120,7 @@ pub(super) fn exchange_water(
     mut soaks: MessageReader<Soak>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
+    mut room: Local<Vec<Wet<'static>>>,
 ) {
     for soak in soaks.read() {
         let members = match hairs.get(soak.target) {
@@ -137,7 +151,7 @@ pub(super) fn exchange_water(
     let process = process.mended(&Notes::default());
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
     let mut waters = PerHair::default();
-    let mut items: Vec<Wet<'_>> = Vec::new();
+    let mut items: Vec<Wet<'_>> = emptied(core::mem::take(&mut *room));
     for (of, strand, bonds, moisture, burden, changes) in &mut strands {
         if !damp && moisture.is_untouched() {
             continue;
@@ -171,7 +185,7 @@ pub(super) fn exchange_water(
             });
         }
     }
-    for_each(&mut items, |wet| {
+    for_each_ahead(&mut items, Wet::prefetch, |wet| {
         exchange(wet, &waters.values[wet.hair], &air, damp, step.dt);
     });
     for wet in &items {
@@ -182,6 +196,7 @@ pub(super) fn exchange_water(
             commands.spawn(let_go(pose, wet.strand, node as f32, volume, wetting, gravity));
         }
     }
+    *room = emptied(items);
 }
 
 /// One strand's water in one substep, what follows from it for bonds and weight.

@@ -13,7 +13,8 @@ use super::{
 use crate::{
     air::HairGravity,
     contact::WetRow,
-    parallel::for_each_block,
+    parallel::{emptied, for_each_block},
+    prefetch::prefetch,
     rod::lanes::LANES,
     setting::{Notes, Settings},
     strand::{Burden, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
@@ -42,7 +43,12 @@ pub(super) struct WaterField {
     loaded: Vec<Entity>,
     /// What nodes bring to bridges of water.
     pub(super) rows: Vec<WetRow>,
+    outcomes: Vec<Outcome>,
+    rooms: Vec<Room>,
 }
+
+/// Room for a hair's strands, as they come and in order.
+type Room = (Vec<Option<Strandful<'static>>>, Vec<Strandful<'static>>);
 
 /// A hair and its strands among droplets.
 struct Head<'a> {
@@ -81,7 +87,7 @@ pub(super) fn wet_strands(
     mut droplets: Query<&mut Droplet>,
     mut ledger: ResMut<WaterLedger>,
 ) {
-    let WaterField { fields, loaded, .. } = scratch.bypass_change_detection();
+    let WaterField { fields, loaded, outcomes, rooms, .. } = scratch.bypass_change_detection();
     // Water's own weight is written anew by its exchange; to dry hair only droplets are a burden.
     for strand in loaded.drain(..) {
         if let Ok((.., mut burden, moisture)) = strands.get_mut(strand)
@@ -106,8 +112,9 @@ pub(super) fn wet_strands(
         }
     }
     let process = process.mended(&Notes::default());
-    let mut outcomes = vec![Outcome::default(); drops.len()];
-    let mut heads = heads(&mut hairs, &wetting, &mut strands, step.index == 0);
+    outcomes.clear();
+    outcomes.resize(drops.len(), Outcome::default());
+    let mut heads = heads(&mut hairs, &wetting, &mut strands, step.index == 0, rooms);
     fields.resize_with(heads.len(), default);
     for (Head { pose, wetting, strands }, (field, pieces)) in heads.iter_mut().zip(&mut *fields) {
         field.see(&drops, pose);
@@ -123,18 +130,21 @@ pub(super) fn wet_strands(
         pieces.resize_with(strands.len().div_ceil(piece), default);
         meet_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &met);
         for out in &*pieces {
-            sum_up(out, pose.rotation, &mut outcomes);
+            sum_up(out, pose.rotation, outcomes);
         }
     }
     // What all want together may be more than there is.
     let shares: Vec<f64> =
-        drops.iter().zip(&outcomes).map(|(drop, o)| (drop.counted / o.wanted).min(1.0)).collect();
+        drops.iter().zip(&*outcomes).map(|(drop, o)| (drop.counted / o.wanted).min(1.0)).collect();
     for (Head { strands, .. }, (_, pieces)) in heads.iter_mut().zip(&mut *fields) {
         let piece = piece(strands.len(), drops.len());
         drink_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &shares);
         ledger.water_out += pieces.iter().map(|out| out.gone).sum::<f64>();
     }
-    for ((drop, outcome), share) in drops.iter_mut().zip(&outcomes).zip(shares) {
+    for (head, room) in heads.into_iter().zip(rooms) {
+        room.1 = emptied(head.strands);
+    }
+    for ((drop, outcome), share) in drops.iter_mut().zip(&*outcomes).zip(shares) {
         // Less than nothing only by what sums are rounded.
         drop.volume = (drop.volume - share * outcome.wanted).max(0.0);
         drop.counted = drop.volume;
@@ -169,10 +179,16 @@ fn heads<'a>(
     wetting: &Settings<Wetting>,
     strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut Burden, &mut Moisture)>,
     anew: bool,
+    rooms: &mut Vec<Room>,
 ) -> Vec<Head<'a>> {
-    let mut heads: PerHair<(Entity, Pose, Vec<Option<Strandful<'a>>>)> = default();
+    let mut heads: PerHair<(Entity, Head<'a>, Vec<Option<Strandful<'a>>>)> = default();
+    let mut unused = core::mem::take(rooms).into_iter();
     for (entity, of, strand, burden, moisture) in strands {
-        let index = heads.index(of.0, || Some((of.0, *hairs.get(of.0).ok()?.0.now(), Vec::new())));
+        let index = heads.index(of.0, || {
+            let (pose, wetting) = (*hairs.get(of.0).ok()?.0.now(), wetting.of(of.0));
+            let (unsorted, sorted) = unused.next().unwrap_or_default();
+            Some((of.0, Head { pose, wetting, strands: emptied(sorted) }, emptied(unsorted)))
+        });
         if let Some(index) = index
             && strand.nodes() >= 2
         {
@@ -180,13 +196,14 @@ fn heads<'a>(
             heads.values[index].2.push(Some(Strandful { entity, strand, burden, moisture }));
         }
     }
-    let sorted = heads.values.into_iter().filter_map(|(hair, pose, mut unsorted)| {
-        let mut tufts = hairs.get_mut(hair).ok()?.1;
-        let roots =
-            unsorted.iter().map(|s| s.as_ref().map_or(Vec3::ZERO, |s| s.strand.positions()[0]));
-        let order = tufts.bypass_change_detection().order(anew, roots);
-        let strands = order.iter().filter_map(|i| unsorted.get_mut(*i as usize)?.take()).collect();
-        Some(Head { pose, wetting: wetting.of(hair), strands })
+    let sorted = heads.values.into_iter().map(|(hair, mut head, mut unsorted)| {
+        if let Ok((_, mut tufts)) = hairs.get_mut(hair) {
+            let roots = unsorted.iter().flatten().map(|s| s.strand.positions()[0]);
+            let order = tufts.bypass_change_detection().order(anew, unsorted.len(), roots);
+            head.strands.extend(order.iter().filter_map(|i| unsorted.get_mut(*i as usize)?.take()));
+        }
+        rooms.push((emptied(unsorted), Vec::new()));
+        head
     });
     sorted.collect()
 }
@@ -221,9 +238,14 @@ fn meet_all(mut work: Work<'_, '_>, met: &MetBy<'_>) {
         || (),
         |(), (strands, out)| {
             out.clear(met.field.drops.len());
-            for (tuft, first) in strands.chunks_mut(LANES).zip((0..).step_by(LANES)) {
+            let (mut rest, mut first) = (&mut **strands, 0);
+            rest.iter().take(LANES).for_each(Strandful::prefetch);
+            while !rest.is_empty() {
+                let (tuft, after) = rest.split_at_mut(LANES.min(rest.len()));
+                after.iter().take(LANES).for_each(Strandful::prefetch);
                 let mut members: Vec<Member<'_>> = tuft.iter_mut().map(Strandful::member).collect();
                 met.meet(level, &mut members, first, out);
+                (rest, first) = (after, first + LANES);
             }
         },
     );
@@ -247,6 +269,13 @@ fn drink_all(mut work: Work<'_, '_>, shares: &[f64]) {
 }
 
 impl Strandful<'_> {
+    fn prefetch(&self) {
+        let (positions, velocities, ..) = self.strand.parts();
+        prefetch(positions);
+        prefetch(velocities);
+        prefetch(self.strand.rest_lengths());
+    }
+
     fn member(&mut self) -> Member<'_> {
         let (positions, velocities, lengths) = self.strand.bypass_change_detection().motion_parts();
         Member {

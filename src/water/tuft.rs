@@ -3,15 +3,18 @@
 //! Strands that grow together hang together, so what is near one node is near its fifteen
 //! neighbours: they ask the grid once, and every droplet that it names is held against all of them.
 
-use super::{Wetting, moisture::node_lengths};
+use super::Wetting;
 use crate::{
     rod::{
-        block::{Lane, put3, take3},
-        lanes::LANES,
+        algebra::V3,
+        block::{Lane, load3, put3, take3},
+        lanes::{LANES, splat3},
+        turn::{put_numbers, put_vectors, take_vectors},
     },
     strand::Hair,
 };
 use bevy::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 /// A strand among droplets.
 pub(super) struct Member<'a> {
@@ -36,6 +39,8 @@ pub(super) struct Row {
     pub load: Lane,
     /// Dry mass (kg).
     pub mass: Lane,
+    /// Lengths of the edges that follow (m); zero where there are none.
+    length: Lane,
     /// The box around them (m).
     pub low: Vec3,
     pub high: Vec3,
@@ -44,8 +49,32 @@ pub(super) struct Row {
 impl Default for Row {
     fn default() -> Self {
         let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let (p, v) = ([[f32::NAN; LANES]; 3], [[0.0; LANES]; 3]);
-        Self { p, v, load: [0.0; LANES], mass: [0.0; LANES], low, high }
+        let none = [0.0; LANES];
+        Self {
+            p: [[f32::NAN; LANES]; 3],
+            v: [none; 3],
+            load: none,
+            mass: none,
+            length: none,
+            low,
+            high,
+        }
+    }
+}
+
+impl Row {
+    /// The box around those nodes that are somewhere.
+    #[inline(always)]
+    fn bounds<S: Simd>(&self, simd: S) -> (Vec3, Vec3) {
+        let p = load3(simd, &self.p);
+        // Without what is no number or endless, which less itself is not zero.
+        let is_somewhere = (p - p).dot(p - p).simd_eq(f32x16::splat(simd, 0.0));
+        let low = V3::select(is_somewhere, p, splat3(simd, Vec3::INFINITY));
+        let high = V3::select(is_somewhere, p, splat3(simd, Vec3::NEG_INFINITY));
+        (
+            Vec3::new(low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()),
+            Vec3::new(high.x.reduce_max(), high.y.reduce_max(), high.z.reduce_max()),
+        )
     }
 }
 
@@ -60,44 +89,96 @@ pub(super) struct Tuft {
 
 impl Tuft {
     /// Takes strands in, where they are and no more: most are near no droplet.
-    pub fn place(&mut self, members: &[Member<'_>]) {
+    pub fn place(&mut self, level: Level, members: &[Member<'_>]) {
         self.rows.clear();
         let longest = members.iter().map(|m| m.positions.len()).max().unwrap_or(0);
         self.rows.resize(longest, Row::default());
         self.own = [u32::MAX; LANES];
-        for (lane, member) in members.iter().enumerate() {
-            self.own[lane] = member.strand.index_u32();
-            for (p, row) in member.positions.iter().zip(&mut self.rows) {
-                // What is not finite reaches no droplet; it must not widen the box either.
-                if p.is_finite() {
+        for (own, member) in self.own.iter_mut().zip(members) {
+            *own = member.strand.index_u32();
+        }
+        for (quarter, four) in members.chunks(4).enumerate() {
+            if let [a, b, c, d] = four
+                && is_of(longest, four)
+            {
+                let four = [a.positions, b.positions, c.positions, d.positions];
+                put_vectors(&mut self.rows, quarter, four, |row| &mut row.p);
+                continue;
+            }
+            for (lane, member) in (4 * quarter..).zip(four) {
+                for (p, row) in member.positions.iter().zip(&mut self.rows) {
                     put3(&mut row.p, lane, *p);
-                    (row.low, row.high) = (row.low.min(*p), row.high.max(*p));
                 }
             }
         }
+        dispatch!(level, simd => {
+            for row in &mut self.rows {
+                (row.low, row.high) = row.bounds(simd);
+            }
+        });
     }
 
     /// How they move and what they weigh, before droplets act on them.
     pub fn weigh(&mut self, members: &[Member<'_>], wetting: &Wetting) {
-        let dry = wetting.dry_mass();
+        for (quarter, four) in members.chunks(4).enumerate() {
+            if let [a, b, c, d] = four
+                && is_of(self.rows.len(), four)
+            {
+                let velocities = [&*a.velocities, b.velocities, c.velocities, d.velocities];
+                put_vectors(&mut self.rows, quarter, velocities, |row| &mut row.v);
+                let lengths = [a.lengths, b.lengths, c.lengths, d.lengths];
+                let edges = self.rows.len() - 1;
+                put_numbers(&mut self.rows[..edges], quarter, lengths, |row| &mut row.length);
+                continue;
+            }
+            for (lane, member) in (4 * quarter..).zip(four) {
+                for (v, row) in member.velocities.iter().zip(&mut self.rows) {
+                    put3(&mut row.v, lane, *v);
+                }
+                for (length, row) in member.lengths.iter().zip(&mut self.rows) {
+                    row.length[lane] = *length;
+                }
+            }
+        }
         for (lane, member) in members.iter().enumerate() {
-            let nodes = member.velocities.iter().zip(node_lengths(member.lengths));
-            for (i, ((v, length), row)) in nodes.zip(&mut self.rows).enumerate() {
-                put3(&mut row.v, lane, *v);
-                row.load[lane] = member.load.get(i).copied().unwrap_or(0.0);
-                row.mass[lane] = dry * length;
+            for (load, row) in member.load.iter().zip(&mut self.rows) {
+                row.load[lane] = *load;
+            }
+        }
+        // A node weighs what half of the edges beside it do.
+        let half = 0.5 * wetting.dry_mass();
+        let mut before = [0.0; LANES];
+        for row in &mut self.rows {
+            for ((mass, before), length) in row.mass.iter_mut().zip(&mut before).zip(row.length) {
+                *mass = half * (*before + length);
+                *before = length;
             }
         }
     }
 
     /// Puts velocities back.
     pub fn scatter(&self, members: &mut [Member<'_>]) {
-        for (lane, member) in members.iter_mut().enumerate() {
-            for (v, row) in member.velocities.iter_mut().zip(&self.rows) {
-                *v = take3(&row.v, lane);
+        for (quarter, four) in members.chunks_mut(4).enumerate() {
+            let is_whole = is_of(self.rows.len(), four);
+            if let [a, b, c, d] = &mut *four
+                && is_whole
+            {
+                let four = [&mut *a.velocities, b.velocities, c.velocities, d.velocities];
+                take_vectors(&self.rows, quarter, four, |row| &row.v);
+                continue;
+            }
+            for (lane, member) in (4 * quarter..).zip(four) {
+                for (v, row) in member.velocities.iter_mut().zip(&self.rows) {
+                    *v = take3(&row.v, lane);
+                }
             }
         }
     }
+}
+
+/// Whether all strands have so many nodes.
+fn is_of(nodes: usize, members: &[Member<'_>]) -> bool {
+    members.iter().all(|member| member.positions.len() == nodes)
 }
 
 /// The order in which a hair's strands are taken side by side: along a curve that fills space
@@ -109,10 +190,10 @@ pub(super) struct Tufts {
 }
 
 impl Tufts {
-    /// The numbers of the strands with these `roots`, in order. Sorted anew if `anew` or if there are
+    /// The numbers of `count` strands with these `roots`, in order. Sorted anew if `anew` or if there are
     /// others than last time; which strands stand together changes only how fast it goes.
-    pub fn order(&mut self, anew: bool, roots: impl ExactSizeIterator<Item = Vec3>) -> &[u32] {
-        if anew || self.order.len() != roots.len() {
+    pub fn order(&mut self, anew: bool, count: usize, roots: impl Iterator<Item = Vec3>) -> &[u32] {
+        if anew || self.order.len() != count {
             let mut keys: Vec<(u64, u32)> = roots.map(place_on_curve).zip(0..).collect();
             keys.sort_unstable();
             self.order.clear();
@@ -154,7 +235,7 @@ mod tests {
         let roots = roots.map(|i| Vec3::new((i % 32) as f32, 5.0, (i / 32) as f32) * 0.003);
         let roots: Vec<Vec3> = roots.collect();
         let mut tufts = Tufts::default();
-        let order = tufts.order(true, roots.iter().copied()).to_vec();
+        let order = tufts.order(true, 1024, roots.iter().copied()).to_vec();
         let mut all = order.clone();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..1024), "each strand once");
@@ -166,15 +247,15 @@ mod tests {
         let mean = widths.sum::<f32>() / 64.0;
         assert!(mean < 0.02, "sixteen strands fill 12 mm by 12 mm, here {mean} m");
         // Kept while nothing is asked anew, but not for another number of strands.
-        assert_eq!(tufts.order(false, [Vec3::NAN; 1024].into_iter()), order);
-        assert_eq!(tufts.order(false, roots[..3].iter().copied()).len(), 3);
+        assert_eq!(tufts.order(false, 1024, [Vec3::NAN; 1024].into_iter()), order);
+        assert_eq!(tufts.order(false, 3, roots[..3].iter().copied()).len(), 3);
     }
 
     #[test]
     fn places_that_are_no_places_have_an_order_too() {
         let mut tufts = Tufts::default();
         let roots = [Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::ZERO];
-        let mut order = tufts.order(true, roots.into_iter()).to_vec();
+        let mut order = tufts.order(true, 4, roots.into_iter()).to_vec();
         order.sort_unstable();
         assert_eq!(order, [0, 1, 2, 3]);
     }

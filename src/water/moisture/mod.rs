@@ -9,7 +9,10 @@ mod flow;
 pub use flow::{Exposure, Left, Surroundings};
 
 use super::vapour::WATER;
-use crate::setting::{Bound, HairSetting, Notes};
+use crate::{
+    prefetch::prefetch,
+    setting::{Bound, HairSetting, Notes},
+};
 use bevy::prelude::*;
 use core::f32::consts::PI;
 
@@ -241,6 +244,14 @@ impl Moisture {
             self.sheen.push(sheen(*film, wetness, held));
         }
         self.volume() - before
+    }
+
+    /// Asks for its memory.
+    pub(super) fn prefetch(&self) {
+        prefetch(&self.film);
+        prefetch(&self.bound);
+        prefetch(&self.wetness);
+        prefetch(&self.sheen);
     }
 
     /// Forgets the last traces; returns them.
