@@ -27,17 +27,24 @@ const STEEPEST: f32 = 1.0;
 /// What strands did to droplets, in the order of tufts.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Encounters {
-    /// What each droplet got (kg m/s, in the hair's frame).
-    pub impulses: Vec<Vec3>,
-    /// How many strands are at each droplet.
-    pub company: Vec<u32>,
-    /// The most that strands would drink of each droplet (m³).
-    pub wanted: Vec<f64>,
+    /// What was done to each droplet.
+    pub sums: Vec<Sum>,
     pub touches: Vec<Touch>,
     pub landings: Vec<Landing>,
     /// Water that was on nodes that are gone (m³).
     pub gone: f64,
     scratch: Scratch,
+}
+
+/// What a piece of the strands did to a droplet.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sum {
+    /// What they gave it (kg m/s, in the hair's frame).
+    pub impulse: Vec3,
+    /// How many of them are at it.
+    pub company: u32,
+    /// The most that they would drink of it (m³).
+    pub wanted: f64,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -51,17 +58,13 @@ struct Scratch {
 }
 
 impl Encounters {
+    /// Nothing yet, of so many droplets.
     pub fn clear(&mut self, drops: usize) {
-        let Self { impulses, company, wanted, touches, landings, gone, .. } = self;
-        impulses.clear();
-        impulses.resize(drops, Vec3::ZERO);
-        company.clear();
-        company.resize(drops, 0);
-        wanted.clear();
-        wanted.resize(drops, 0.0);
-        touches.clear();
-        landings.clear();
-        *gone = 0.0;
+        self.sums.clear();
+        self.sums.resize(drops, Sum::default());
+        self.touches.clear();
+        self.landings.clear();
+        self.gone = 0.0;
     }
 }
 
@@ -143,10 +146,10 @@ impl MetBy<'_> {
                 dispatch!(level, simd => self.pull(simd, row, at, members, out));
             }
         }
-        let Scratch { at, met, .. } = &mut out.scratch;
+        let Encounters { sums, scratch: Scratch { at, met, .. }, .. } = out;
         for puller in met.drain(..) {
             let lanes = core::mem::take(&mut at[puller as usize]);
-            out.company[self.field.pullers[puller as usize].drop as usize] += lanes.count_ones();
+            sums[self.field.pullers[puller as usize].drop as usize].company += lanes.count_ones();
         }
         // Who carries a droplet is heavy.
         for (k, member) in members.iter().enumerate().filter(|(_, m)| !m.load.is_empty()) {
@@ -227,7 +230,7 @@ impl MetBy<'_> {
                 }
                 self.drink(others.to_bitmask(), puller.drop, &place, members, out);
             }
-            out.impulses[puller.drop as usize] += sum(impulse);
+            out.sums[puller.drop as usize].impulse += sum(impulse);
         }
         store3(&mut row.v, v);
     }
@@ -307,7 +310,7 @@ impl MetBy<'_> {
         let room = self.most_film - film.get(node).copied().unwrap_or(0.0);
         let wants = room * f64::from(self.uptake);
         if wants > 0.0 {
-            out.wanted[drop as usize] += wants;
+            out.sums[drop as usize].wanted += wants;
             out.touches.push(Touch { drop, strand: strand as u32, node: node as u32, wants });
         }
     }
@@ -438,11 +441,11 @@ mod tests {
                 .sum::<Vec3>();
         }
         // What droplets get is what strands gave: momentum in, momentum out.
-        let got: Vec3 = out.impulses.iter().sum();
+        let got: Vec3 = out.sums.iter().map(|sum| sum.impulse).sum();
         assert!((given + got).length() < 1e-6 * given.length());
         for (k, d) in field.drops.iter().enumerate() {
             let at = |s: &&Vec<Vec3>| s.iter().any(|p| p.distance(d.at) < 0.004);
-            assert_eq!(out.company[k] as usize, strands.iter().filter(at).count(), "{k}");
+            assert_eq!(out.sums[k].company as usize, strands.iter().filter(at).count(), "{k}");
         }
     }
 
@@ -463,7 +466,7 @@ mod tests {
         let share = 1.1e-4 / (1.1e-4 + node) * (30.0 * dt) / (1.0 + 3.0 * 30.0 * dt);
         assert!(velocities[1].distance(Vec3::Y * (1.0 - share)) < 1e-6, "{velocities:?}");
         assert_eq!(velocities[2], Vec3::Z);
-        assert!(out.impulses[0].distance(Vec3::Y * (share * node)) < 1e-6 * node);
+        assert!(out.sums[0].impulse.distance(Vec3::Y * (share * node)) < 1e-6 * node);
     }
 
     #[test]

@@ -21,14 +21,18 @@ use crate::{
     tick::HairStep,
 };
 use bevy::prelude::*;
+use core::slice::from_ref;
 use fearless_simd::Level;
 
 /// The most sums over pieces that are kept, for all droplets together.
 const SUMS: usize = 1 << 18;
 
+/// How many droplets are summed for at a time.
+const PART: usize = 64;
+
 /// How many strands meet droplets as one piece of work, whole tufts: the same on any number of
-/// threads, so that what droplets get is always summed in the same order. Every piece sums for all
-/// droplets, so of many droplets there are few pieces.
+/// threads, so that what droplets get is always summed in the same order. Every piece keeps room for
+/// all droplets' sums, so of many droplets there are few pieces.
 fn piece(strands: usize, drops: usize) -> usize {
     let pieces = (SUMS / drops.max(1)).clamp(4, 64);
     strands.div_ceil(pieces).next_multiple_of(LANES)
@@ -129,9 +133,7 @@ pub(super) fn wet_strands(
         let piece = piece(strands.len(), drops.len());
         pieces.resize_with(strands.len().div_ceil(piece), default);
         meet_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &met);
-        for out in &*pieces {
-            sum_up(out, pose.rotation, outcomes);
-        }
+        sum_up(pieces, pose.rotation, outcomes);
     }
     // What all want together may be more than there is.
     let shares: Vec<f64> =
@@ -200,7 +202,12 @@ fn heads<'a>(
         if let Ok((_, mut tufts)) = hairs.get_mut(hair) {
             let roots = unsorted.iter().flatten().map(|s| s.strand.positions()[0]);
             let order = tufts.bypass_change_detection().order(anew, unsorted.len(), roots);
-            head.strands.extend(order.iter().filter_map(|i| unsorted.get_mut(*i as usize)?.take()));
+            for (i, k) in order.iter().enumerate() {
+                // They are taken from all over.
+                let later = order.get(i + 16).and_then(|k| unsorted.get(*k as usize));
+                prefetch(later.map_or(&[], from_ref));
+                head.strands.extend(unsorted.get_mut(*k as usize).and_then(Option::take));
+            }
         }
         rooms.push((emptied(unsorted), Vec::new()));
         head
@@ -239,9 +246,12 @@ fn meet_all(mut work: Work<'_, '_>, met: &MetBy<'_>) {
         |(), (strands, out)| {
             out.clear(met.field.drops.len());
             let (mut rest, mut first) = (&mut **strands, 0);
+            rest.iter().take(2 * LANES).for_each(|one| prefetch(from_ref(&*one.strand)));
             rest.iter().take(LANES).for_each(Strandful::prefetch);
             while !rest.is_empty() {
                 let (tuft, after) = rest.split_at_mut(LANES.min(rest.len()));
+                let later = after.get(LANES..).unwrap_or_default();
+                later.iter().take(LANES).for_each(|one| prefetch(from_ref(&*one.strand)));
                 after.iter().take(LANES).for_each(Strandful::prefetch);
                 let mut members: Vec<Member<'_>> = tuft.iter_mut().map(Strandful::member).collect();
                 met.meet(level, &mut members, first, out);
@@ -289,14 +299,24 @@ impl Strandful<'_> {
     }
 }
 
-/// Adds up what a piece of the strands did to droplets, and whom it met, in the strands' order.
-fn sum_up(out: &Encounters, rotation: Quat, outcomes: &mut [Outcome]) {
-    for (k, outcome) in outcomes.iter_mut().enumerate() {
-        outcome.impulse += rotation * out.impulses[k];
-        outcome.company += out.company[k];
-        outcome.wanted += out.wanted[k];
-    }
-    for landing in &out.landings {
+/// Adds up what the pieces of the strands did to droplets, and whom they met, in the strands' order.
+fn sum_up(pieces: &[Encounters], rotation: Quat, outcomes: &mut [Outcome]) {
+    // Droplets side by side, for what other threads wrote is slow to read.
+    let mut parts: Vec<_> = (0..).step_by(PART).zip(outcomes.chunks_mut(PART)).collect();
+    for_each_block(
+        &mut parts,
+        || (),
+        |(), (first, outcomes)| {
+            for piece in pieces {
+                for (outcome, sum) in outcomes.iter_mut().zip(&piece.sums[*first..]) {
+                    outcome.impulse += rotation * sum.impulse;
+                    outcome.company += sum.company;
+                    outcome.wanted += sum.wanted;
+                }
+            }
+        },
+    );
+    for landing in pieces.iter().flat_map(|piece| &piece.landings) {
         let first = &mut outcomes[landing.drop as usize].landing;
         if first.is_none_or(|other| landing.when < other.when) {
             *first = Some(*landing);
