@@ -41,7 +41,7 @@ pub struct EdgeWeights<R> {
 
 /// What a stretch–shear projection makes of its [`EdgeWeights`]. They do not change within a substep,
 /// so that its iterations need not divide.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct StretchShares<R> {
     /// 1/l.
     pub inverse_length: R,
@@ -55,6 +55,21 @@ pub struct StretchShares<R> {
     pub end: R,
     /// w_q l², with the projection's factor: turns the edge.
     pub turn: R,
+}
+
+impl<R> StretchShares<R> {
+    /// The same with each number as `of` makes it.
+    #[inline(always)]
+    pub(super) fn map<T>(&self, of: impl Fn(&R) -> T) -> StretchShares<T> {
+        StretchShares {
+            inverse_length: of(&self.inverse_length),
+            along: of(&self.along),
+            across: of(&self.across),
+            start: of(&self.start),
+            end: of(&self.end),
+            turn: of(&self.turn),
+        }
+    }
 }
 
 impl<R: Real> StretchShares<R> {
@@ -82,12 +97,20 @@ impl<R: Real> StretchShares<R> {
 }
 
 /// How much of a joint's error each of its two edges takes up in one projection.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct BendShares<R> {
     /// The first edge's: w1 k′ / (w1 + w2).
     pub first: R,
     /// The second edge's: w2 k′ / (w1 + w2).
     pub second: R,
+}
+
+impl<R> BendShares<R> {
+    /// The same with each number as `of` makes it.
+    #[inline(always)]
+    pub(super) fn map<T>(&self, of: impl Fn(&R) -> T) -> BendShares<T> {
+        BendShares { first: of(&self.first), second: of(&self.second) }
+    }
 }
 
 impl<R: Real> BendShares<R> {

@@ -22,33 +22,8 @@ const ABREAST: usize = 8;
 /// What the iterations of a substep need of an edge's weights and of its joint's stiffness.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shares {
-    inverse_length: Lane,
-    along: Lane,
-    across: Lane,
-    start: Lane,
-    end: Lane,
-    turn: Lane,
-    first: Lane,
-    second: Lane,
-}
-
-impl Shares {
-    #[inline(always)]
-    fn stretch<S: Simd>(&self, simd: S) -> StretchShares<f32x16<S>> {
-        StretchShares {
-            inverse_length: load(simd, &self.inverse_length),
-            along: load(simd, &self.along),
-            across: load(simd, &self.across),
-            start: load(simd, &self.start),
-            end: load(simd, &self.end),
-            turn: load(simd, &self.turn),
-        }
-    }
-
-    #[inline(always)]
-    fn bend<S: Simd>(&self, simd: S) -> BendShares<f32x16<S>> {
-        BendShares { first: load(simd, &self.first), second: load(simd, &self.second) }
-    }
+    stretch: StretchShares<Lane>,
+    bend: BendShares<Lane>,
 }
 
 /// How stretch–shear is projected, by the number that the sweeps are compiled for.
@@ -89,16 +64,10 @@ fn share<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
     let mut w1 = load(simd, &b.nodes[0].w);
     for ((e, node), shares) in b.edges.iter().zip(&b.nodes[1..]).zip(&mut b.shares) {
         let (wq, l, w2) = (load(simd, &e.wq), load(simd, &e.l), load(simd, &node.w));
-        let s = StretchShares::new(PROJECTIONS[P], EdgeWeights { w1, w2, wq, l });
+        let stretch = StretchShares::new(PROJECTIONS[P], EdgeWeights { w1, w2, wq, l });
         let bend = BendShares::new(w_before, wq, load(simd, &e.k));
-        s.inverse_length.store_array(&mut shares.inverse_length);
-        s.along.store_array(&mut shares.along);
-        s.across.store_array(&mut shares.across);
-        s.start.store_array(&mut shares.start);
-        s.end.store_array(&mut shares.end);
-        s.turn.store_array(&mut shares.turn);
-        bend.first.store_array(&mut shares.first);
-        bend.second.store_array(&mut shares.second);
+        shares.stretch = stretch.map(|lanes| (*lanes).into());
+        shares.bend = bend.map(|lanes| (*lanes).into());
         (w_before, w1) = (wq, w2);
     }
 }
@@ -124,9 +93,8 @@ fn sweeps<S: Simd, const P: usize>(
     obstacles: &[Obstacle],
 ) {
     let edges = b.edges.len();
-    let root = load4(simd, &b.root);
-    let p1 = b.nodes[0].position(simd);
-    let mut carried = [Carried { before: root, p1 }; ABREAST];
+    let (before, p1) = (load4(simd, &b.root), b.nodes[0].position(simd));
+    let mut carried = [Carried { before, p1 }; ABREAST];
     for step in 0..edges + 2 * (abreast - 1) {
         for (k, carried) in carried.iter_mut().take(abreast).enumerate() {
             let i = step.wrapping_sub(2 * k);
@@ -134,6 +102,7 @@ fn sweeps<S: Simd, const P: usize>(
                 continue;
             }
             if i == 0 {
+                // The sweep before has left it here.
                 carried.p1 = b.nodes[0].position(simd);
             }
             pass_edge::<S, P>(simd, b, i, carried);
@@ -159,10 +128,11 @@ fn pass_edge<S: Simd, const P: usize>(
     let Carried { before, p1 } = *carried;
     let (e, shares) = (&b.edges[i], &b.shares[i]);
     let q = load4(simd, &e.q);
-    let (d_before, d_q) = bend_twist(before, q, load4(simd, &e.rest), shares.bend(simd));
+    let (d_before, d_q) =
+        bend_twist(before, q, load4(simd, &e.rest), shares.bend.map(|s| load(simd, s)));
     let q = q.add_scaled(d_q, one).renormalize();
     let p2 = b.nodes[i + 1].position(simd);
-    let c = stretch_shear(PROJECTIONS[P], p1, p2, q, shares.stretch(simd));
+    let c = stretch_shear(PROJECTIONS[P], p1, p2, q, shares.stretch.map(|s| load(simd, s)));
     if i > 0 {
         let turned = before.add_scaled(d_before, one).renormalize();
         store4(&mut b.edges[i - 1].q, turned);
