@@ -3,7 +3,8 @@
 //! The constraint mathematics is written once, generic over [`Real`]. `f64` serves the golden
 //! vectors, `f32` is the scalar twin that benches compare against, and [`f32x16`] is what the
 //! tick runs: sixteen strands side by side, on whichever instruction set the machine has. Contact
-//! between strands takes [`f32x8`], because its lists are short, and bonds do, a strand's joints side by side.
+//! between strands takes [`f32x8`], because its lists are short, and so do bonds, of which a strand's
+//! own joints lie side by side.
 
 use super::algebra::V3;
 use core::ops::{Add, Div, Mul, Neg, Sub};
