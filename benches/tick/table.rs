@@ -8,6 +8,7 @@ use super::scalar::Twin;
 use bevy::{
     app::{TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy},
     prelude::*,
+    tasks::ComputeTaskPool,
     time::TimeUpdateStrategy,
 };
 use bevy_keratin::{
@@ -334,7 +335,15 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
 /// Bonds break in one substep and form in the next.
 fn stir(step: Res<HairStep>, mut strands: Query<(&Strand, &mut BondChanges)>) {
     let change = if step.index.is_multiple_of(2) { -1e-3 } else { 9e-4 };
-    for (strand, mut changes) in &mut strands {
-        (0..strand.edges()).for_each(|i| changes.ask(i, BondKind::Hydrogen, change));
-    }
+    // On all threads, as those who ask in a game are.
+    let mut strands: Vec<_> = strands.iter_mut().collect();
+    ComputeTaskPool::get().scope(|scope| {
+        for strands in strands.chunks_mut(1024) {
+            scope.spawn(async move {
+                for (strand, changes) in strands {
+                    (0..strand.edges()).for_each(|i| changes.ask(i, BondKind::Hydrogen, change));
+                }
+            });
+        }
+    });
 }

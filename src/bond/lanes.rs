@@ -94,7 +94,7 @@ fn change_in<S: Simd>(
             *bond = changed(*bond, lanes(simd, low[j], high[j]), omega);
         }
         let [a, b, c, d] = bonds;
-        let numbers = |half: usize| {
+        let rows = |half: usize| {
             let row = |lanes| halves(lanes)[half];
             [
                 turned([row(a.shape.x), row(a.shape.y), row(a.shape.z), row(b.shape.x)]),
@@ -104,7 +104,7 @@ fn change_in<S: Simd>(
             ]
         };
         for (half, four) in joints.chunks_mut(4).enumerate() {
-            let [first, second, third, rates] = numbers(half);
+            let [first, second, third, rates] = rows(half);
             for (i, joint) in four.iter_mut().enumerate() {
                 joint.shapes = bytemuck::cast([first[i], second[i], third[i]]);
                 joint.rates = rates[i];

@@ -123,7 +123,7 @@ fn generate_rest_shapes(
     for_each_ahead(&mut items, ahead, |(key, strand, bonds, burden, rest)| {
         let rest = rest.bypass_change_detection();
         rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
-        rest.darboux.resize(strand.edges(), Quat::IDENTITY);
+        rest.darboux.resize(bonds.joints.len(), Quat::IDENTITY);
         rest_shapes(level, frames(strand), &bonds.joints, &key.influence, &mut rest.darboux);
         if rest.key != Some(*key)
             || rest.stiffness.len() != strand.edges()
