@@ -67,8 +67,10 @@ impl Row {
     #[inline(always)]
     fn bounds<S: Simd>(&self, simd: S) -> (Vec3, Vec3) {
         let p = load3(simd, &self.p);
-        // Without what is no number or endless, which less itself is not zero.
-        let is_somewhere = (p - p).dot(p - p).simd_eq(f32x16::splat(simd, 0.0));
+        // Without what is no number or endless, of which nothing times is not zero.
+        let zero = f32x16::splat(simd, 0.0);
+        let none = p.scale(zero);
+        let is_somewhere = none.dot(none).simd_eq(zero);
         let low = V3::select(is_somewhere, p, splat3(simd, Vec3::INFINITY));
         let high = V3::select(is_somewhere, p, splat3(simd, Vec3::NEG_INFINITY));
         (
