@@ -254,6 +254,82 @@ mod tests {
     }
 
     #[test]
+    fn strands_of_any_lengths_are_in_lanes_what_they_were_and_come_back() {
+        // All alike; a quarter with a shorter one among them; a quarter that is not full.
+        for lengths in [vec![6; 16], vec![6, 6, 6, 6, 6, 5, 6, 6, 2, 3, 4, 5, 6, 6], vec![7; 3]] {
+            let number = |s: usize, i: usize| (100 * s + 10 * i) as f32;
+            let vectors = |s: usize, add: f32| -> Vec<Vec3> {
+                let vector = |i| Vec3::new(0.1, 1.0, 2.0) * (number(s, i) + add);
+                (0..lengths[s]).map(vector).collect()
+            };
+            let positions: Vec<_> = (0..lengths.len()).map(|s| vectors(s, 1.0)).collect();
+            let edges: Vec<Vec<f32>> = (0..lengths.len())
+                .map(|s| (1..lengths[s]).map(|i| number(s, i)).collect())
+                .collect();
+            let before: Vec<_> = (0..lengths.len()).map(|s| vectors(s, 3.0)).collect();
+            let mut velocities = before.clone();
+            let mut members: Vec<_> = (0..)
+                .zip(positions.iter().zip(&edges).zip(&mut velocities))
+                .map(|(s, ((positions, lengths), velocities))| {
+                    let load: &[f32] = if s == 2 { &[0.5, 0.25] } else { &[] };
+                    let strand = Entity::from_raw_u32(s).unwrap();
+                    Member { strand, positions, velocities, lengths, load, film: &[] }
+                })
+                .collect();
+            let (mut tuft, wetting) = (Tuft::default(), Wetting::default());
+            // What was in it before must not stay.
+            tuft.rows = vec![Row { v: [[7.0; LANES]; 3], load: [7.0; LANES], ..default() }; 9];
+            tuft.place(Level::new(), &members);
+            tuft.weigh(&members, &wetting);
+            for (s, member) in members.iter().enumerate() {
+                let masses = super::super::moisture::node_lengths(member.lengths);
+                for (i, length) in masses.enumerate() {
+                    let row = &tuft.rows[i];
+                    assert_eq!(take3(&row.p, s), member.positions[i]);
+                    assert_eq!(take3(&row.v, s), member.velocities[i]);
+                    assert_eq!(row.load[s], member.load.get(i).copied().unwrap_or(0.0));
+                    let mass = wetting.dry_mass() * length;
+                    assert!((row.mass[s] - mass).abs() <= 1e-6 * mass, "{s} {i}");
+                }
+                assert!(tuft.rows[lengths[s]..].iter().all(|row| take3(&row.p, s).is_nan()));
+            }
+            for (i, row) in tuft.rows.iter().enumerate() {
+                let there = || positions.iter().filter_map(|p| p.get(i)).copied();
+                assert_eq!(Some(row.low), there().reduce(Vec3::min));
+                assert_eq!(Some(row.high), there().reduce(Vec3::max));
+            }
+            for row in &mut tuft.rows {
+                row.v = row.v.map(|v| v.map(|v| 2.0 * v));
+            }
+            tuft.scatter(&mut members);
+            let doubled = |v: &Vec<Vec3>| v.iter().map(|v| *v * 2.0).collect::<Vec<_>>();
+            assert_eq!(velocities, before.iter().map(doubled).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn what_is_nowhere_is_in_no_box() {
+        let places = [Vec3::ONE, Vec3::NAN, Vec3::INFINITY, Vec3::new(2.0, f32::NEG_INFINITY, 0.0)];
+        let mut velocities = [[Vec3::ZERO]; 4];
+        let members: Vec<_> = places
+            .each_ref()
+            .into_iter()
+            .zip(&mut velocities)
+            .map(|(place, velocities)| Member {
+                strand: Entity::PLACEHOLDER,
+                positions: core::slice::from_ref(place),
+                velocities,
+                lengths: &[],
+                load: &[],
+                film: &[],
+            })
+            .collect();
+        let mut tuft = Tuft::default();
+        tuft.place(Level::new(), &members);
+        assert_eq!((tuft.rows[0].low, tuft.rows[0].high), (Vec3::ONE, Vec3::ONE));
+    }
+
+    #[test]
     fn places_that_are_no_places_have_an_order_too() {
         let mut tufts = Tufts::default();
         let roots = [Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::ZERO];
