@@ -5,7 +5,7 @@ use crate::{
     bond::{BondChanges, BondKind, model::drying},
     fault::{Fault, HairFault},
     lod::HairSteps,
-    parallel::{emptied, for_each_ahead},
+    parallel::{AHEAD, for_each_part, in_turn, tables},
     prefetch::prefetch,
     setting::{self, Notes, Settings},
     strand::{Burden, Hair, PerHair, Pose, Sleep, Strand, StrandOf, TickPose},
@@ -83,7 +83,7 @@ pub(crate) fn local_blowers(
 
 /// A strand that air acts on, with the number of its hair's air.
 type Blown<'a> =
-    (usize, Mut<'a, Strand>, &'a Burden, Mut<'a, BondChanges>, Option<Mut<'a, WindReceived>>);
+    (usize, &'a mut Strand, &'a Burden, &'a mut BondChanges, Option<&'a mut WindReceived>);
 
 pub(crate) fn apply_air(
     steps: HairSteps,
@@ -99,76 +99,86 @@ pub(crate) fn apply_air(
         &mut BondChanges,
         Option<&mut WindReceived>,
     )>,
-    mut room: Local<Vec<Blown<'static>>>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let mut airs = PerHair::default();
-    let mut items: Vec<Blown<'_>> = emptied(core::mem::take(&mut *room));
-    for (of, sleep, strand, burden, changes, received) in &mut strands {
-        // Wind also dries hair that is carried.
-        if sleep.is_asleep() || (sleep.is_carried() && blowers.is_empty()) {
-            continue;
-        }
-        let index = airs.index(of.0, || {
-            let pose = hairs.get(of.0).ok()?.now();
-            let dt = steps.of(of.0)?.dt;
-            Some(LocalAir {
-                gravity: pose.direction_in(gravity) * dt,
-                keep: bevy::math::ops::exp(-drag.of(of.0).rate * dt),
-                dt,
-                blowers: local_blowers(pose, &blowers),
-            })
-        });
-        if let Some(air) = index {
-            items.push((air, strand, burden, changes, received));
-        }
-    }
+    let air_of = |hair: Entity| {
+        let pose = hairs.get(hair).ok()?.now();
+        let dt = steps.of(hair)?.dt;
+        Some(LocalAir {
+            gravity: pose.direction_in(gravity) * dt,
+            keep: bevy::math::ops::exp(-drag.of(hair).rate * dt),
+            dt,
+            blowers: local_blowers(pose, &blowers),
+        })
+    };
+    // Wind also dries hair that is carried.
+    let is_blown =
+        |sleep: &Sleep| !sleep.is_asleep() && !(sleep.is_carried() && blowers.is_empty());
     let ahead = |(_, strand, ..): &Blown<'_>| {
         let (_, velocities, _, spins) = strand.parts();
         prefetch(velocities);
         prefetch(spins);
     };
-    for_each_ahead(&mut items, ahead, |(air, strand, burden, changes, received)| {
-        let air = &airs.values[*air];
-        let (positions, velocities, _, spins) = strand.bypass_change_detection().parts_mut();
-        for v in velocities.iter_mut() {
-            *v = *v * air.keep + air.gravity;
-        }
-        // Edges carry rotary inertia of their own, much of it on fine stiff strands: air that slowed
-        // the nodes alone would leave them ringing.
-        for spin in spins {
-            *spin *= air.keep;
-        }
-        if air.blowers.is_empty() {
-            return;
-        }
-        let edges = positions.len().saturating_sub(1);
-        // Wet hair is heavier: the same wind moves it less.
-        let heed = |i: usize| 1.0 / (1.0 + burden.mass.get(i).copied().unwrap_or(0.0));
-        for i in 0..edges {
-            // The tip has no edge of its own: it takes the last one's wind.
-            let edge = positions[i + 1] - positions[i];
-            let (mut change, mut dried) = (Vec3::ZERO, 0.0);
-            for LocalBlower { nozzle, aim, blower } in &air.blowers {
-                let w = wind(blower.strength, *nozzle, *aim, positions[i], edge) * air.dt;
-                change += w;
-                dried += drying(w.length(), blower.drying);
-                if i + 1 == edges {
-                    velocities[i + 1] +=
-                        wind(blower.strength, *nozzle, *aim, positions[i + 1], edge)
-                            * (air.dt * heed(i + 1));
-                }
-            }
-            velocities[i] += change * heed(i);
-            // Where there is water, the wind dries that, and the bonds follow it.
-            if burden.softening.is_empty() {
-                changes.bypass_change_detection().ask(i, BondKind::Hydrogen, dried);
-            }
-            if let Some(received) = received.as_deref_mut() {
-                received.total.resize(edges, 0.0);
-                received.total[i] += change.length();
+    for_each_part(tables(&mut strands), Vec::new, |items, rows| {
+        let mut airs = PerHair::default();
+        for (of, sleep, strand, burden, changes, received) in rows {
+            if is_blown(sleep)
+                && let Some(air) = airs.index(of.0, || air_of(of.0))
+            {
+                items.push((air, strand, burden, changes, received));
             }
         }
+        in_turn(items, AHEAD, ahead, |(air, strand, burden, changes, received)| {
+            blow(&airs.values[*air], strand, burden, changes, received.as_deref_mut());
+        });
+        items.clear();
     });
-    *room = emptied(items);
+}
+
+/// What a hair's air does to one strand in a substep.
+fn blow(
+    air: &LocalAir,
+    strand: &mut Strand,
+    burden: &Burden,
+    changes: &mut BondChanges,
+    mut received: Option<&mut WindReceived>,
+) {
+    let (positions, velocities, _, spins) = strand.parts_mut();
+    for v in velocities.iter_mut() {
+        *v = *v * air.keep + air.gravity;
+    }
+    // Edges carry rotary inertia of their own, much of it on fine stiff strands: air that slowed
+    // the nodes alone would leave them ringing.
+    for spin in spins {
+        *spin *= air.keep;
+    }
+    if air.blowers.is_empty() {
+        return;
+    }
+    let edges = positions.len().saturating_sub(1);
+    // Wet hair is heavier: the same wind moves it less.
+    let heed = |i: usize| 1.0 / (1.0 + burden.mass.get(i).copied().unwrap_or(0.0));
+    for i in 0..edges {
+        // The tip has no edge of its own: it takes the last one's wind.
+        let edge = positions[i + 1] - positions[i];
+        let (mut change, mut dried) = (Vec3::ZERO, 0.0);
+        for LocalBlower { nozzle, aim, blower } in &air.blowers {
+            let w = wind(blower.strength, *nozzle, *aim, positions[i], edge) * air.dt;
+            change += w;
+            dried += drying(w.length(), blower.drying);
+            if i + 1 == edges {
+                velocities[i + 1] += wind(blower.strength, *nozzle, *aim, positions[i + 1], edge)
+                    * (air.dt * heed(i + 1));
+            }
+        }
+        velocities[i] += change * heed(i);
+        // Where there is water, the wind dries that, and the bonds follow it.
+        if burden.softening.is_empty() {
+            changes.ask(i, BondKind::Hydrogen, dried);
+        }
+        if let Some(received) = received.as_deref_mut() {
+            received.total.resize(edges, 0.0);
+            received.total[i] += change.length();
+        }
+    }
 }

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     fault::{Fault, HairFault},
     lod::HairSteps,
-    parallel::{emptied, for_each_ahead},
+    parallel::{AHEAD, for_each_part, in_turn, tables},
     prefetch::prefetch,
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
     setting::{self, Bound, Notes, Settings},
@@ -77,7 +77,7 @@ pub(super) struct Key {
 }
 
 /// A strand whose rest shape is not what it was.
-type Shaped<'a> = (Key, &'a Strand, Ref<'a, Bonds>, &'a Burden, Mut<'a, RestShape>);
+type Shaped<'a> = (Key, &'a Strand, &'a Bonds, &'a Burden, &'a mut RestShape);
 
 fn generate_rest_shapes(
     steps: HairSteps,
@@ -86,63 +86,75 @@ fn generate_rest_shapes(
     cuticle: Settings<Cuticle>,
     solver: Settings<Solver>,
     mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
-    mut room: Local<Vec<Shaped<'static>>>,
 ) {
-    let mut keys = PerHair::default();
-    let mut items: Vec<Shaped<'_>> = emptied(core::mem::take(&mut *room));
-    for (of, sleep, strand, bonds, burden, rest) in &mut strands {
-        if !sleep.is_simulated() {
-            continue;
-        }
-        let index = keys.index(of.0, || {
-            let stride = steps.of(of.0)?;
-            Some(Key {
-                influence: influence.of(of.0).as_array(),
-                stiffness: stiffness.of(of.0),
-                cuticle: cuticle.of(of.0),
-                iterations: stride.iterations(solver.of(of.0).iterations),
-                dt: stride.dt,
-            })
-        });
-        let Some(key) = index.map(|index| keys.values[index]) else { continue };
-        // Hair whose bonds are all closed, most hair most of the time, costs no more than this.
-        if !rest.closed
-            || rest.key != Some(key)
-            || bonds.is_changed()
-            || has_softened(&rest.softened, &burden.softening)
-        {
-            items.push((key, strand, bonds, burden, rest));
-        }
-    }
+    let key_of = |hair: Entity| {
+        let stride = steps.of(hair)?;
+        Some(Key {
+            influence: influence.of(hair).as_array(),
+            stiffness: stiffness.of(hair),
+            cuticle: cuticle.of(hair),
+            iterations: stride.iterations(solver.of(hair).iterations),
+            dt: stride.dt,
+        })
+    };
     let ahead = |(_, strand, bonds, _, rest): &Shaped<'_>| {
         prefetch(&bonds.joints);
         prefetch(strand.orientations());
         prefetch(&rest.darboux);
     };
     let level = Level::new();
-    for_each_ahead(&mut items, ahead, |(key, strand, bonds, burden, rest)| {
-        let rest = rest.bypass_change_detection();
-        rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
-        rest.darboux.resize(bonds.joints.len(), Quat::IDENTITY);
-        rest_shapes(level, frames(strand), &bonds.joints, &key.influence, &mut rest.darboux);
-        if rest.key != Some(*key)
-            || rest.stiffness.len() != strand.edges()
-            || has_softened(&rest.softened, &burden.softening)
-        {
-            rest.key = Some(*key);
-            rest.softened.clone_from(&burden.softening);
-            rest.stiffness.clear();
-            let mut distance = 0.0;
-            rest.stiffness.extend(strand.rest_lengths().iter().enumerate().map(|(i, length)| {
-                let softened = rest.softened.get(i).copied().unwrap_or(0.0);
-                let cuticle = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
-                distance += length;
-                let k = key.stiffness.per_substep(key.dt, cuticle * (1.0 - softened));
-                stiffness_per_iteration(k, key.iterations)
-            }));
+    for_each_part(tables(&mut strands), Vec::new, |items, rows| {
+        let mut keys = PerHair::default();
+        for (of, sleep, strand, (bonds, is_changed), burden, rest) in rows {
+            if !sleep.is_simulated() {
+                continue;
+            }
+            let index = keys.index(of.0, || key_of(of.0));
+            let Some(key) = index.map(|index| keys.values[index]) else { continue };
+            // Hair whose bonds are all closed, most hair most of the time, costs no more than this.
+            if !rest.closed
+                || rest.key != Some(key)
+                || is_changed
+                || has_softened(&rest.softened, &burden.softening)
+            {
+                items.push((key, strand, bonds, burden, rest));
+            }
         }
+        in_turn(items, AHEAD, ahead, |(key, strand, bonds, burden, rest)| {
+            shape(level, key, strand, bonds, burden, rest);
+        });
+        items.clear();
     });
-    *room = emptied(items);
+}
+
+/// A strand's rest shape and stiffness.
+fn shape(
+    level: Level,
+    key: &Key,
+    strand: &Strand,
+    bonds: &Bonds,
+    burden: &Burden,
+    rest: &mut RestShape,
+) {
+    rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
+    rest.darboux.resize(bonds.joints.len(), Quat::IDENTITY);
+    rest_shapes(level, frames(strand), &bonds.joints, &key.influence, &mut rest.darboux);
+    if rest.key != Some(*key)
+        || rest.stiffness.len() != strand.edges()
+        || has_softened(&rest.softened, &burden.softening)
+    {
+        rest.key = Some(*key);
+        rest.softened.clone_from(&burden.softening);
+        rest.stiffness.clear();
+        let mut distance = 0.0;
+        rest.stiffness.extend(strand.rest_lengths().iter().enumerate().map(|(i, length)| {
+            let softened = rest.softened.get(i).copied().unwrap_or(0.0);
+            let cuticle = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
+            distance += length;
+            let k = key.stiffness.per_substep(key.dt, cuticle * (1.0 - softened));
+            stiffness_per_iteration(k, key.iterations)
+        }));
+    }
 }
 
 fn frames(strand: &Strand) -> Frames<'_> {
@@ -157,27 +169,25 @@ fn has_softened(before: &[f32], now: &[f32]) -> bool {
 
 /// A strand whose bonds are to change.
 type Changing<'a> =
-    (&'a Strand, Mut<'a, Bonds>, Mut<'a, BondChanges>, Mut<'a, RestShape>, Mut<'a, Sleep>);
+    (&'a Strand, &'a mut Bonds, &'a mut BondChanges, &'a mut RestShape, &'a mut Sleep);
 
 fn update_bonds(
     mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut Sleep)>,
-    mut room: Local<Vec<Changing<'static>>>,
 ) {
-    let mut items: Vec<Changing<'_>> = emptied(core::mem::take(&mut *room));
-    items.extend(strands.iter_mut().filter(|(_, _, changes, ..)| !changes.is_empty()));
     let ahead = |(strand, bonds, changes, ..): &Changing<'_>| {
         prefetch(&bonds.joints);
         prefetch(strand.orientations());
         changes.prefetch();
     };
     let level = Level::new();
-    for_each_ahead(&mut items, ahead, |(strand, bonds, changes, rest, sleep)| {
-        sleep.bypass_change_detection().wake();
-        rest.bypass_change_detection().closed = false;
-        let changes = changes.bypass_change_detection();
-        let bonds = bonds.bypass_change_detection();
-        change(level, frames(strand), &mut bonds.joints, changes.asked());
-        changes.clear();
+    for_each_part(tables(&mut strands), Vec::new, |items: &mut Vec<Changing<'_>>, rows| {
+        items.extend(rows.filter(|(_, _, changes, ..)| !changes.is_empty()));
+        in_turn(items, AHEAD, ahead, |(strand, bonds, changes, rest, sleep)| {
+            sleep.wake();
+            rest.closed = false;
+            change(level, frames(strand), &mut bonds.joints, changes.asked());
+            changes.clear();
+        });
+        items.clear();
     });
-    *room = emptied(items);
 }

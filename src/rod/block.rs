@@ -227,19 +227,6 @@ pub(crate) fn in_lanes<'a, T, U>(items: &'a [T], of: impl Fn(&'a T) -> U) -> [U;
     core::array::from_fn(|lane| of(items.get(lane).unwrap_or(&items[0])))
 }
 
-/// Sorts strands so that those of one hair with equal node count, the `key`, stand together, and
-/// divides them into blocks. Lanes do not see each other, so how strands are grouped changes no bit
-/// of the result.
-pub(crate) fn blocks_of<T>(strands: &mut [T], key: impl Fn(&T) -> (usize, usize)) -> Vec<&mut [T]> {
-    if !strands.is_sorted_by_key(&key) {
-        strands.sort_by_key(&key);
-    }
-    strands
-        .chunk_by_mut(|a, b| key(a) == key(b))
-        .flat_map(|alike| alike.chunks_mut(LANES))
-        .collect()
-}
-
 /// Writes a vector into one lane.
 #[inline(always)]
 pub fn put3(a: &mut [Lane; 3], lane: usize, v: Vec3) {

@@ -18,6 +18,7 @@
 //! Strands of equal node count are solved [`LANES`] side by side; see [`block`] for the layout.
 
 pub mod algebra;
+pub(crate) mod batch;
 pub mod block;
 pub mod constraint;
 pub mod frame;

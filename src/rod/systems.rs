@@ -3,7 +3,8 @@
 
 use super::{
     Solver, Stiffness,
-    block::{BlockLanes, Source, blocks_of, in_lanes, put4},
+    batch::for_each_batch,
+    block::{BlockLanes, Source, in_lanes, put4},
     obstacle::Obstacle,
     step::{StepParams, step, weigh},
     turn::{put_numbers, put_quaternions, put_vectors},
@@ -11,9 +12,9 @@ use super::{
 use crate::{
     bond::{BondInfluence, Bonds, RestShape},
     contact::{LockContact, Obstacles},
-    fault::{Fault, HairFault},
+    fault::HairFault,
     lod::HairSteps,
-    parallel::{emptied, for_each_block_ahead},
+    parallel::tables,
     prefetch::prefetch,
     setting::{self, Settings},
     strand::{Burden, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf},
@@ -41,16 +42,14 @@ struct HairParams {
     obstacles: Vec<Obstacle>,
 }
 
-pub(crate) struct Item<'a> {
+struct Item<'a> {
     entity: Entity,
-    hair: usize,
-    strand: Mut<'a, Strand>,
+    hair: Entity,
+    strand: &'a mut Strand,
     rest: &'a RestShape,
     bonds: &'a Bonds,
     burden: &'a Burden,
     held: Option<&'a HeldNodes>,
-    /// Boxed, because it is rare and the items are many.
-    put_back: Option<Box<Fault>>,
 }
 
 impl Item<'_> {
@@ -71,9 +70,7 @@ pub(crate) fn project(
     contact: Settings<LockContact>,
     hairs: Query<&Obstacles>,
     mut strands: Query<(
-        Entity,
-        &StrandOf,
-        &Sleep,
+        (Entity, &StrandOf, &Sleep),
         &mut Strand,
         &RestShape,
         &Bonds,
@@ -81,76 +78,83 @@ pub(crate) fn project(
         Option<&HeldNodes>,
     )>,
     mut faults: MessageWriter<HairFault>,
-    mut room: Local<Vec<Item<'static>>>,
 ) {
-    let mut params = PerHair::default();
-    let mut items: Vec<Item<'_>> = emptied(core::mem::take(&mut *room));
-    for (entity, of, sleep, strand, rest, bonds, burden, held) in &mut strands {
-        if !sleep.is_simulated() {
-            continue;
-        }
-        let index = params.index(of.0, || {
-            let obstacles = hairs.get(of.0).ok().filter(|_| model.of(of.0) == StrandModel::Rod)?;
-            let stride = steps.of(of.0)?;
-            let s = solver.of(of.0);
-            Some(HairParams {
-                step: StepParams {
-                    dt: stride.dt,
-                    iterations: stride.iterations(s.iterations),
-                    projection: s.projection,
-                    limiter_steps: s.limiter_steps,
-                    internal_damping: s.internal_damping,
-                    skin: contact.of(of.0).radius,
-                },
-                stiffness: stiffness.of(of.0),
-                influence: influence.of(of.0).as_array(),
-                obstacles: obstacles.over(stride.substeps),
-            })
-        });
-        if let Some(hair) = index
-            && strand.nodes() >= 2
-            && rest.darboux.len() == strand.edges()
-            && rest.stiffness.len() == strand.edges()
-        {
-            items.push(Item { entity, hair, strand, rest, bonds, burden, held, put_back: None });
-        }
-    }
-    let mut blocks = blocks_of(&mut items, |item| (item.hair, item.strand.nodes()));
+    let params_of = |hair: Entity| {
+        let obstacles = hairs.get(hair).ok().filter(|_| model.of(hair) == StrandModel::Rod)?;
+        let stride = steps.of(hair)?;
+        let s = solver.of(hair);
+        Some(HairParams {
+            step: StepParams {
+                dt: stride.dt,
+                iterations: stride.iterations(s.iterations),
+                projection: s.projection,
+                limiter_steps: s.limiter_steps,
+                internal_damping: s.internal_damping,
+                skin: contact.of(hair).radius,
+            },
+            stiffness: stiffness.of(hair),
+            influence: influence.of(hair).as_array(),
+            obstacles: obstacles.over(stride.substeps),
+        })
+    };
     let level = Level::new();
-    for_each_block_ahead(
-        &mut blocks,
-        BlockLanes::default,
-        |items| items.iter().for_each(Item::prefetch),
-        |block, items| solve(level, block, items, &params.values[items[0].hair]),
+    let nodes = strands.iter().next().map_or(0, |(_, strand, ..)| strand.nodes());
+    let lost = for_each_batch(
+        tables(&mut strands),
+        nodes,
+        || (BlockLanes::default(), PerHair::default()),
+        |(_, params), rows, items| {
+            for ((entity, of, sleep), strand, rest, bonds, burden, held) in rows {
+                let hair = of.0;
+                if sleep.is_simulated()
+                    && strand.nodes() >= 2
+                    && rest.darboux.len() == strand.edges()
+                    && rest.stiffness.len() == strand.edges()
+                    && params.index(hair, || params_of(hair)).is_some()
+                {
+                    items.push(Item { entity: *entity, hair, strand, rest, bonds, burden, held });
+                }
+            }
+        },
+        |item| (item.hair, item.strand.nodes()),
+        Item::prefetch,
+        |(block, params), items| {
+            let hair = items[0].hair;
+            let index = params.index(hair, || params_of(hair));
+            index.map_or_else(Vec::new, |index| solve(level, block, items, &params.values[index]))
+        },
     );
-    for item in &mut items {
-        if let Some(fault) = item.put_back.take() {
-            faults.write(HairFault { entity: item.entity, fault: *fault });
-        }
-    }
-    *room = emptied(items);
+    faults.write_batch(lost);
 }
 
-/// One block through one substep.
-fn solve(level: Level, block: &mut BlockLanes, items: &mut [Item<'_>], params: &HairParams) {
+/// One block through one substep. Says which strands had to be put back.
+fn solve(
+    level: Level,
+    block: &mut BlockLanes,
+    items: &mut [Item<'_>],
+    params: &HairParams,
+) -> Vec<HairFault> {
     block.resize(items[0].strand.nodes());
     gather(block, items, params.step.dt);
     weigh(level, block, Some(&params.stiffness));
     let near = block.near(&params.obstacles, params.step.dt, params.step.skin);
     step(level, block, &params.step, &near);
+    let mut lost = Vec::new();
     block.scatter(
         items,
-        |item| item.strand.bypass_change_detection(),
+        |item| &mut *item.strand,
         |item| {
             let remembered = item.bonds.joints.iter().map(|j| j.relaxed(&params.influence));
-            item.put_back = item.strand.put_back(remembered).map(Box::new);
+            let fault = item.strand.put_back(remembered);
+            lost.extend(fault.map(|fault| HairFault { entity: item.entity, fault }));
         },
     );
+    lost
 }
 
 fn gather(block: &mut BlockLanes, items: &[Item<'_>], dt: f32) {
     let from = in_lanes(items, |item| Source {
-        strand: &item.strand,
+        strand: item.strand,
         burden: item.burden,
         held: item.held,
     });

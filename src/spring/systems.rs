@@ -7,11 +7,12 @@ use super::{
 use crate::{
     air::HairGravity,
     contact::{LockContact, Obstacles},
-    fault::{Fault, HairFault},
+    fault::HairFault,
     lod::HairSteps,
-    parallel::{emptied, for_each_block_ahead},
+    parallel::tables,
     rod::{
-        block::{Source, blocks_of, in_lanes},
+        batch::for_each_batch,
+        block::{Source, in_lanes},
         obstacle::Obstacle,
         project,
         step::weigh,
@@ -40,14 +41,12 @@ struct HairParams {
     obstacles: Vec<Obstacle>,
 }
 
-pub(crate) struct Item<'a> {
+struct Item<'a> {
     entity: Entity,
-    hair: usize,
-    strand: Mut<'a, Strand>,
+    hair: Entity,
+    strand: &'a mut Strand,
     burden: &'a Burden,
     held: Option<&'a HeldNodes>,
-    /// Boxed, because it is rare and the items are many.
-    put_back: Option<Box<Fault>>,
 }
 
 pub(crate) fn step_springs(
@@ -59,59 +58,63 @@ pub(crate) fn step_springs(
     hairs: Query<(&Obstacles, &TickPose)>,
     mut strands: Query<(Entity, &StrandOf, &Sleep, &mut Strand, &Burden, Option<&HeldNodes>)>,
     mut faults: MessageWriter<HairFault>,
-    mut room: Local<Vec<Item<'static>>>,
 ) {
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let mut params = PerHair::default();
-    let mut items: Vec<Item<'_>> = emptied(core::mem::take(&mut *room));
-    for (entity, of, sleep, strand, burden, held) in &mut strands {
-        if !sleep.is_simulated() {
-            continue;
-        }
-        let index = params.index(of.0, || {
-            let (obstacles, pose) = hairs.get(of.0).ok()?;
-            let stride = steps.of(of.0)?;
-            (model.of(of.0) == StrandModel::MassSpring).then(|| {
-                let full = springs.of(of.0);
-                let iterations = stride.iterations(full.iterations);
-                let step = StepParams {
-                    dt: stride.dt,
-                    springs: Springs { iterations, ..full },
-                    gravity: pose.now().direction_in(gravity),
-                    skin: contact.of(of.0).radius,
-                };
-                HairParams { step, obstacles: obstacles.over(stride.substeps) }
-            })
-        });
-        if let Some(hair) = index
-            && strand.nodes() >= 2
-        {
-            items.push(Item { entity, hair, strand, burden, held, put_back: None });
-        }
-    }
-    let mut blocks = blocks_of(&mut items, |item| (item.hair, item.strand.nodes()));
+    let params_of = |hair: Entity| {
+        let (obstacles, pose) = hairs.get(hair).ok()?;
+        let stride = steps.of(hair)?;
+        (model.of(hair) == StrandModel::MassSpring).then(|| {
+            let full = springs.of(hair);
+            let iterations = stride.iterations(full.iterations);
+            let step = StepParams {
+                dt: stride.dt,
+                springs: Springs { iterations, ..full },
+                gravity: pose.now().direction_in(gravity),
+                skin: contact.of(hair).radius,
+            };
+            HairParams { step, obstacles: obstacles.over(stride.substeps) }
+        })
+    };
     let level = Level::new();
-    for_each_block_ahead(
-        &mut blocks,
-        SpringLanes::default,
-        |items| items.iter().for_each(|item| item.strand.prefetch()),
-        |block, items| solve(level, block, items, &params.values[items[0].hair]),
+    let nodes = strands.iter().next().map_or(0, |(_, _, _, strand, ..)| strand.nodes());
+    let lost = for_each_batch(
+        tables(&mut strands),
+        nodes,
+        || (SpringLanes::default(), PerHair::default()),
+        |(_, params), rows, items| {
+            for (entity, of, sleep, strand, burden, held) in rows {
+                let hair = of.0;
+                if sleep.is_simulated()
+                    && strand.nodes() >= 2
+                    && params.index(hair, || params_of(hair)).is_some()
+                {
+                    items.push(Item { entity: *entity, hair, strand, burden, held });
+                }
+            }
+        },
+        |item| (item.hair, item.strand.nodes()),
+        |item| item.strand.prefetch(),
+        |(block, params), items| {
+            let hair = items[0].hair;
+            let index = params.index(hair, || params_of(hair));
+            index.map_or_else(Vec::new, |index| solve(level, block, items, &params.values[index]))
+        },
     );
-    for item in &mut items {
-        if let Some(fault) = item.put_back.take() {
-            faults.write(HairFault { entity: item.entity, fault: *fault });
-        }
-    }
-    *room = emptied(items);
+    faults.write_batch(lost);
 }
 
-/// One block through one substep.
-fn solve(level: Level, block: &mut SpringLanes, items: &mut [Item<'_>], params: &HairParams) {
+/// One block through one substep. Says which strands had to be put back.
+fn solve(
+    level: Level,
+    block: &mut SpringLanes,
+    items: &mut [Item<'_>],
+    params: &HairParams,
+) -> Vec<HairFault> {
     let HairParams { step: params, obstacles } = params;
     let strands = &mut block.strands;
     strands.resize(items[0].strand.nodes());
     let from = in_lanes(items, |item| Source {
-        strand: &item.strand,
+        strand: item.strand,
         burden: item.burden,
         held: item.held,
     });
@@ -123,9 +126,14 @@ fn solve(level: Level, block: &mut SpringLanes, items: &mut [Item<'_>], params: 
     weigh(level, strands, None);
     let near = strands.near(obstacles, params.dt, params.skin);
     step(level, block, params, &near);
+    let mut lost = Vec::new();
     block.strands.scatter(
         items,
-        |item| item.strand.bypass_change_detection(),
-        |item| item.put_back = item.strand.put_back(core::iter::empty()).map(Box::new),
+        |item| &mut *item.strand,
+        |item| {
+            let fault = item.strand.put_back(core::iter::empty());
+            lost.extend(fault.map(|fault| HairFault { entity: item.entity, fault }));
+        },
     );
+    lost
 }

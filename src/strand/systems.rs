@@ -1,17 +1,17 @@
 //! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
 
 use super::{
-    Burden, Hair, HeldNodes, Sleep, Sleepers, StillPose, Strand, StrandError, StrandHistory,
-    StrandModel, StrandOf, Strands, TickPose,
+    Burden, Hair, HeldNodes, PerHair, Sleep, Sleepers, StillPose, Strand, StrandError,
+    StrandHistory, StrandModel, StrandOf, Strands, TickPose,
     frame::{HairInertia, Pose},
 };
 use crate::{
     fault::{Fault, HairFault},
-    parallel::for_each,
+    parallel::{for_each_part, tables},
     setting::{self, Settings},
     tick::{HairStep, HairSystems, HairTick},
 };
-use bevy::prelude::*;
+use bevy::{math::Isometry3d, prelude::*};
 
 /// Hair and strands as entities, and the frame they live in.
 pub struct StrandPlugin;
@@ -62,15 +62,22 @@ fn report_unusable(
 
 /// Before the first substep of a tick: what was present becomes history.
 fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &Sleep, &mut StrandHistory)>) {
-    if step.index == 0 {
-        for (strand, sleep, mut history) in &mut strands {
-            // A sleeper was remembered as it fell asleep. Only its root may go a hair's breadth.
-            if sleep.is_asleep() && history.positions.first() == strand.positions.first() {
-                continue;
-            }
-            history.bypass_change_detection().positions.clone_from(&strand.positions);
-        }
+    if step.index > 0 {
+        return;
     }
+    for_each_part(
+        tables(&mut strands),
+        || (),
+        |(), rows| {
+            for (strand, sleep, history) in rows {
+                // A sleeper was remembered as it fell asleep. Only its root may go a hair's breadth.
+                if sleep.is_asleep() && history.positions.first() == strand.positions.first() {
+                    continue;
+                }
+                history.positions.clone_from(&strand.positions);
+            }
+        },
+    );
 }
 
 /// As a frame begins: where the frame before left everything.
@@ -124,17 +131,27 @@ pub(crate) fn carry_strands(
     if hairs.iter().all(|hair| hair.carry().is_none()) {
         return;
     }
-    let mut items: Vec<_> = strands
-        .iter_mut()
-        .filter(|(_, sleep, _)| sleep.is_simulated())
-        .filter_map(|(of, _, strand)| Some((hairs.get(of.0).ok()?.carry()?, strand)))
-        .collect();
-    for_each(&mut items, |(carry, strand)| {
-        let strand = strand.bypass_change_detection();
-        let turn = carry.rotation;
-        strand.positions.iter_mut().skip(1).for_each(|p| *p = *carry * *p);
-        strand.velocities.iter_mut().for_each(|v| *v = turn * *v);
-        strand.orientations.iter_mut().for_each(|q| *q = (turn * *q).normalize());
-        strand.angular_velocities.iter_mut().for_each(|v| *v = turn * *v);
-    });
+    for_each_part(
+        tables(&mut strands),
+        || (),
+        |(), rows| {
+            let mut carries = PerHair::default();
+            for (of, sleep, strand) in rows {
+                let carry = || hairs.get(of.0).ok()?.carry();
+                if sleep.is_simulated()
+                    && let Some(index) = carries.index(of.0, carry)
+                {
+                    carry_one(strand, &carries.values[index]);
+                }
+            }
+        },
+    );
+}
+
+fn carry_one(strand: &mut Strand, carry: &Isometry3d) {
+    let turn = carry.rotation;
+    strand.positions.iter_mut().skip(1).for_each(|p| *p = *carry * *p);
+    strand.velocities.iter_mut().for_each(|v| *v = turn * *v);
+    strand.orientations.iter_mut().for_each(|q| *q = (turn * *q).normalize());
+    strand.angular_velocities.iter_mut().for_each(|v| *v = turn * *v);
 }

@@ -1,17 +1,17 @@
 //! `ExternalForces`: showers run, hair soaks and dries, and hydrogen bonds follow the water.
 
 use super::{
-    Climate, Droplet, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
+    Droplet, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
     model::ball_radius,
     moisture::{Exposure, Left, Surroundings, node_lengths},
-    vapour::{DryingAir, WATER, equilibrium, jet},
+    vapour::{DryingAir, WATER, jet},
 };
 use crate::{
     Blower,
     air::{HairGravity, LocalBlower, local_blowers, model::wind},
     bond::{BondChanges, BondKind, Bonds, model::drying},
     fault::{Fault, HairFault},
-    parallel::{emptied, for_each_ahead},
+    parallel::{AHEAD, for_each_part, in_turn, tables},
     prefetch::prefetch,
     setting::{Notes, Settings},
     strand::{Burden, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
@@ -85,8 +85,7 @@ impl LocalWater<'_> {
     }
 }
 
-pub(super) struct Wet<'a> {
-    hair: usize,
+struct Wet<'a> {
     strand: &'a Strand,
     bonds: &'a Bonds,
     moisture: &'a mut Moisture,
@@ -112,7 +111,7 @@ impl Wet<'_> {
 pub(super) fn exchange_water(
     mut commands: Commands,
     step: Res<HairStep>,
-    (climate, process, gravity): (Res<Climate>, Res<ProcessTime>, Res<HairGravity>),
+    (air, process, gravity): (Res<DryingAir>, Res<ProcessTime>, Res<HairGravity>),
     wetting: Settings<Wetting>,
     hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
     blowers: Query<(&Blower, &TickPose)>,
@@ -120,7 +119,6 @@ pub(super) fn exchange_water(
     mut soaks: MessageReader<Soak>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
-    mut room: Local<Vec<Wet<'static>>>,
 ) {
     for soak in soaks.read() {
         let members = match hairs.get(soak.target) {
@@ -142,61 +140,66 @@ pub(super) fn exchange_water(
             }
         }
     }
-    let climate = climate.mended(&Notes::default());
-    let damp = equilibrium(climate.humidity) > 0.0;
-    if !damp && strands.iter().all(|(_, _, _, moisture, ..)| moisture.is_untouched()) {
-        return;
-    }
-    let air = DryingAir::new(climate.celsius, climate.humidity, climate.draught);
+    let damp = air.equilibrium > 0.0;
     let process = process.mended(&Notes::default());
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let mut waters = PerHair::default();
-    let mut items: Vec<Wet<'_>> = emptied(core::mem::take(&mut *room));
-    for (of, strand, bonds, moisture, burden, changes) in &mut strands {
-        if !damp && moisture.is_untouched() {
-            continue;
+    let water_of = |hair: Entity| {
+        let pose = *hairs.get(hair).ok()?.0.now();
+        let wetting = wetting.of(hair);
+        let around = Surroundings::new(wetting, pose.direction_in(gravity), &air, step.dt, process);
+        let seconds = process * step.dt;
+        Some(LocalWater {
+            wetting,
+            around,
+            blowers: local_blowers(&pose, &blowers),
+            bonds_follow: 1.0 - bevy::math::ops::exp(-seconds / wetting.bond_time.max(1e-9)),
+            pose,
+        })
+    };
+    let done = for_each_part(tables(&mut strands), Vec::new, |items, rows| {
+        let (mut waters, mut done) = (PerHair::default(), Done::default());
+        for (of, strand, bonds, moisture, burden, changes) in rows {
+            if (damp || !moisture.is_untouched())
+                && let Some(hair) = waters.index(of.0, || water_of(of.0))
+                && strand.nodes() >= 2
+                && bonds.joints.len() == strand.edges()
+            {
+                let left = Left::default();
+                let wet = Wet { strand, bonds, moisture, burden, changes, left, gone: 0.0 };
+                items.push((hair, wet));
+            }
         }
-        let index = waters.index(of.0, || {
-            let pose = *hairs.get(of.0).ok()?.0.now();
-            let wetting = wetting.of(of.0);
-            let gravity = pose.direction_in(gravity);
-            let seconds = process * step.dt;
-            Some(LocalWater {
-                wetting,
-                around: Surroundings::new(wetting, gravity, &air, step.dt, process),
-                blowers: local_blowers(&pose, &blowers),
-                bonds_follow: 1.0 - bevy::math::ops::exp(-seconds / wetting.bond_time.max(1e-9)),
-                pose,
-            })
+        let ahead = |(_, wet): &(usize, Wet<'_>)| wet.prefetch();
+        in_turn(items, AHEAD, ahead, |(hair, wet)| {
+            exchange(wet, &waters.values[*hair], &air, damp, step.dt);
         });
-        if let Some(hair) = index
-            && strand.nodes() >= 2
-            && bonds.joints.len() == strand.edges()
-        {
-            items.push(Wet {
-                hair,
-                strand,
-                bonds,
-                moisture: moisture.into_inner(),
-                burden: burden.into_inner(),
-                changes: changes.into_inner(),
-                left: Left::default(),
-                gone: 0.0,
-            });
+        for (hair, wet) in items.drain(..) {
+            done.evaporated += wet.left.evaporated;
+            done.gone += wet.gone;
+            let LocalWater { pose, wetting, .. } = &waters.values[hair];
+            done.drips.extend(wet.left.drips.iter().map(|&(node, volume)| {
+                let_go(pose, wet.strand, node as f32, volume, wetting, gravity)
+            }));
         }
-    }
-    for_each_ahead(&mut items, Wet::prefetch, |wet| {
-        exchange(wet, &waters.values[wet.hair], &air, damp, step.dt);
+        done
     });
-    for wet in &items {
-        ledger.book(-wet.left.evaporated);
-        ledger.water_out += wet.gone;
-        let LocalWater { pose, wetting, .. } = &waters.values[wet.hair];
-        for &(node, volume) in &wet.left.drips {
-            commands.spawn(let_go(pose, wet.strand, node as f32, volume, wetting, gravity));
+    for Done { evaporated, gone, drips } in done {
+        ledger.book(-evaporated);
+        ledger.water_out += gone;
+        if !drips.is_empty() {
+            commands.spawn_batch(drips);
         }
     }
-    *room = emptied(items);
+}
+
+/// What came of some strands' water.
+#[derive(Default)]
+struct Done {
+    /// What went into the air (m³); less than nothing where hair took more from it.
+    evaporated: f64,
+    /// Water that has nowhere to be any more (m³).
+    gone: f64,
+    drips: Vec<Droplet>,
 }
 
 /// One strand's water in one substep, what follows from it for bonds and weight.

@@ -1,7 +1,7 @@
 //! `Interaction` and `BondUpdate`: droplets fall, slide, merge and follow their strands.
 
 use super::{
-    Climate, Droplet, DropletRules, ProcessTime, Ride, WaterLedger, Wetting,
+    Droplet, DropletRules, ProcessTime, Ride, WaterLedger, Wetting,
     exchange::{blown_air, let_go, on_strand},
     model::{ball_radius, clinging, fall, hanging, slide},
     vapour::{DryingAir, WATER, transfer},
@@ -34,8 +34,8 @@ struct Moving<'a> {
 pub(super) fn move_droplets(
     mut commands: Commands,
     step: Res<HairStep>,
-    (climate, process, gravity, rules): (
-        Res<Climate>,
+    (air, process, gravity, rules): (
+        Res<DryingAir>,
         Res<ProcessTime>,
         Res<HairGravity>,
         Res<DropletRules>,
@@ -54,8 +54,6 @@ pub(super) fn move_droplets(
     }
     let dt = step.dt;
     let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let climate = climate.mended(&Notes::default());
-    let air = DryingAir::new(climate.celsius, climate.humidity, climate.draught);
     let process = process.mended(&Notes::default());
     let world = TickPose::default();
     let obstacles: Vec<Obstacle> =

@@ -7,6 +7,7 @@ use super::{
     meet::{WaterField, wet_strands},
     motion::{follow_strands, merge_droplets, move_droplets},
     tuft,
+    vapour::DryingAir,
 };
 use crate::{
     contact,
@@ -26,6 +27,7 @@ impl Plugin for WaterPlugin {
         setting::plugin::<Wetting>(app);
         tuft::plugin(app);
         app.init_resource::<Climate>()
+            .init_resource::<DryingAir>()
             .init_resource::<ProcessTime>()
             .init_resource::<DropletRules>()
             .init_resource::<WaterLedger>()
@@ -44,7 +46,7 @@ impl Plugin for WaterPlugin {
             .add_systems(PreUpdate, (report_showers, report_air))
             .add_systems(
                 HairTick,
-                (run_showers, exchange_water)
+                (settle_air.run_if(resource_changed::<Climate>), run_showers, exchange_water)
                     .chain()
                     .in_set(HairSystems::ExternalForces)
                     .after(style::apply_treatments),
@@ -87,6 +89,10 @@ fn report_air(
         process.mended(&notes);
     }
     tell(Entity::PLACEHOLDER, notes, &mut faults);
+}
+
+fn settle_air(climate: Res<Climate>, mut air: ResMut<DryingAir>) {
+    *air = DryingAir::of(&climate.mended(&Notes::default()));
 }
 
 /// Droplets that somebody despawns take their water with them.

@@ -4,7 +4,11 @@
 //! law for a cylinder in a cross flow; a hand dryer's air at 15, 10 and 5 cm has 47, 61 and 95 °C and
 //! dries a tress in 60, 30 and 15 s (Lee 2011).
 
-use bevy::math::ops::{exp, powf};
+use super::Climate;
+use bevy::{
+    math::ops::{exp, powf},
+    prelude::Resource,
+};
 
 /// Density of water (kg/m³).
 pub const WATER: f64 = 1000.0;
@@ -76,8 +80,9 @@ pub fn jet(along: f32) -> f32 {
     JET_CORE / along.max(JET_CORE)
 }
 
-/// Evaporation's drive over temperature, tabulated: the wet bulb is not found anew for every node.
-#[derive(Clone, Debug)]
+/// Evaporation's drive over temperature, tabulated: the wet bulb is not found anew for every node, nor
+/// the table for every substep. As a resource, the air of the [`Climate`].
+#[derive(Resource, Clone, Debug)]
 pub struct DryingAir {
     /// Temperature of the room (°C).
     pub celsius: f32,
@@ -86,6 +91,12 @@ pub struct DryingAir {
     /// The wetness that hair takes on in it.
     pub equilibrium: f32,
     drives: [f32; Self::ENTRIES],
+}
+
+impl Default for DryingAir {
+    fn default() -> Self {
+        Self::of(&Climate::default())
+    }
 }
 
 impl DryingAir {
@@ -97,6 +108,11 @@ impl DryingAir {
         let vapour = humidity * saturated(celsius);
         let drives = core::array::from_fn(|i| drive(celsius + i as f32 * Self::STEP, vapour));
         Self { celsius, draught, equilibrium: equilibrium(humidity), drives }
+    }
+
+    /// The air of a climate, whose values are valid.
+    pub fn of(&Climate { celsius, humidity, draught }: &Climate) -> Self {
+        Self::new(celsius, humidity, draught)
     }
 
     /// Evaporation's drive (kg/m³) in this air, warmed by `warmth` (K).

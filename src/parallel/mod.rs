@@ -1,28 +1,33 @@
 //! Work over many strands, on Bevy's compute task pool, with the same result on any thread count.
 
+mod columns;
+
+use bevy::{
+    ecs::query::{ArchetypeFilter, ContiguousQueryData, QueryContiguousIter},
+    prelude::*,
+};
+pub(crate) use columns::Columns;
+
 #[cfg(feature = "parallel")]
 use bevy::tasks::ComputeTaskPool;
 
 /// Fewer strands than this are not worth a task.
 const GRAIN: usize = 32;
 
+/// The most parts that a table is cut into, unless they would be larger than [`MOST_ROWS`].
+const MOST_PARTS: usize = 32;
+
+/// The most rows of a part.
+const MOST_ROWS: usize = 512;
+
 /// How many strands ahead of the present one memory is asked for: far enough for it to come, near
 /// enough for it not to be pushed out again.
-const AHEAD: usize = 6;
+pub(crate) const AHEAD: usize = 6;
 
 /// Calls `work` with every item. Items are independent, so the order cannot matter.
-pub(crate) fn for_each<T: Send>(strands: &mut [T], work: impl Fn(&mut T) + Send + Sync) {
-    for_each_ahead(strands, |_| {}, work);
-}
-
-/// The same, with `ahead` called for every item some time before `work`, to ask for its memory.
-pub(crate) fn for_each_ahead<T: Send>(
-    strands: &mut [T],
-    ahead: impl Fn(&T) + Send + Sync,
-    work: impl Fn(&mut T) + Send + Sync,
-) {
-    let sizes = Sizes { grain: GRAIN, ahead: AHEAD };
-    for_each_init(strands, sizes, || (), ahead, |(), strand| work(strand));
+pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + Sync) {
+    let sizes = Sizes { grain: GRAIN, ahead: 1 };
+    for_each_init(items, sizes, || (), |_| {}, |(), item| work(item));
 }
 
 /// Calls `work` with every block of about sixteen strands and scratch space that `init` makes once
@@ -46,6 +51,51 @@ pub(crate) fn for_each_block_ahead<T: Send, S>(
     for_each_init(blocks, sizes, init, ahead, work);
 }
 
+/// The tables that a query finds its entities in.
+pub(crate) fn tables<'a, 's, D: ContiguousQueryData, F: ArchetypeFilter>(
+    query: &'a mut Query<'_, 's, D, F>,
+) -> QueryContiguousIter<'a, 's, D, F> {
+    query.contiguous_iter_mut().expect("components of strands lie in tables")
+}
+
+/// Goes through the rows of tables in parts: `work` gets some rows at a time, and scratch space that
+/// `init` makes once a task. Says what it made of each part, in the order of the rows. What the parts
+/// are does not depend on the number of threads.
+pub(crate) fn for_each_part<C: Columns, S, O: Send>(
+    tables: impl Iterator<Item = C>,
+    init: impl Fn() -> S + Send + Sync,
+    work: impl Fn(&mut S, C::Part) -> O + Send + Sync,
+) -> Vec<O> {
+    for_each_part_of(256, tables, init, work)
+}
+
+/// The same with at least so many rows in a part: fewer where there is much to do for each, so that
+/// all threads get some.
+pub(crate) fn for_each_part_of<C: Columns, S, O: Send>(
+    least: usize,
+    tables: impl Iterator<Item = C>,
+    init: impl Fn() -> S + Send + Sync,
+    work: impl Fn(&mut S, C::Part) -> O + Send + Sync,
+) -> Vec<O> {
+    let parts = tables.flat_map(|table| {
+        // Enough parts for many threads, each so small that what is gathered of it stays in the cache.
+        let rows = table.rows().div_ceil(MOST_PARTS).next_multiple_of(GRAIN);
+        table.parts(rows.clamp(least, MOST_ROWS))
+    });
+    let mut parts: Vec<_> = parts.map(|part| (Some(part), None)).collect();
+    let sizes = Sizes { grain: 1, ahead: 1 };
+    for_each_init(
+        &mut parts,
+        sizes,
+        init,
+        |_| {},
+        |scratch, (part, made)| {
+            *made = part.take().map(|part| work(scratch, part));
+        },
+    );
+    parts.into_iter().filter_map(|(_, made)| made).collect()
+}
+
 struct Sizes {
     grain: usize,
     ahead: usize,
@@ -60,22 +110,15 @@ fn for_each_init<T: Send, S>(
 ) {
     let serial = |items: &mut [T]| {
         let mut scratch = init();
-        items.iter().take(distance).for_each(&ahead);
-        let mut rest = items;
-        while let Some((item, after)) = rest.split_first_mut() {
-            if let Some(later) = after.get(distance - 1) {
-                ahead(later);
-            }
-            work(&mut scratch, item);
-            rest = after;
-        }
+        in_turn(items, distance, &ahead, |item| work(&mut scratch, item));
     };
     // The thread that waits for the scope works too, so one pool thread makes two workers.
     #[cfg(feature = "parallel")]
     if let Some(pool) = ComputeTaskPool::try_get() {
         let workers = pool.thread_num() + 1;
         if workers > 1 && items.len() >= 2 * grain {
-            let chunk = items.len().div_ceil(workers * 2).max(grain);
+            // More than threads, because some are longer than others.
+            let chunk = items.len().div_ceil(workers * 8).max(grain);
             pool.scope(|scope| {
                 for chunk in items.chunks_mut(chunk) {
                     scope.spawn(async { serial(chunk) });
@@ -87,6 +130,25 @@ fn for_each_init<T: Send, S>(
     #[cfg(not(feature = "parallel"))]
     let _ = grain;
     serial(items);
+}
+
+/// Calls `work` with one item after the other, and `ahead` with the one that is `distance` later, to
+/// ask for its memory.
+pub(crate) fn in_turn<T>(
+    items: &mut [T],
+    distance: usize,
+    ahead: impl Fn(&T),
+    mut work: impl FnMut(&mut T),
+) {
+    items.iter().take(distance).for_each(&ahead);
+    let mut rest = items;
+    while let Some((item, after)) = rest.split_first_mut() {
+        if let Some(later) = after.get(distance - 1) {
+            ahead(later);
+        }
+        work(item);
+        rest = after;
+    }
 }
 
 /// The room of a vector whose items are not needed any more, for items that borrow something else. What
@@ -116,8 +178,9 @@ mod tests {
         use core::sync::atomic::{AtomicBool, Ordering};
         for count in [0, 1, 5, 6, 7, 500] {
             let mut items: Vec<_> = (0..count).map(|_| AtomicBool::new(false)).collect();
-            for_each_ahead(
+            in_turn(
                 &mut items,
+                AHEAD,
                 |item| assert!(!item.swap(true, Ordering::Relaxed), "asked for twice"),
                 |item| assert!(*item.get_mut(), "not asked for"),
             );
