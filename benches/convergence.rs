@@ -7,28 +7,28 @@
 //! direct tridiagonal solve of the lengths (`limiter`). A direct solve of bending, a block tridiagonal
 //! system of 6 × 6 blocks, was not tried.
 //!
-//! One run on a 2-core x86-64 server machine with AVX-512:
+//! The best of four runs on a 2-core x86-64 server machine with AVX-512 that others use, too:
 //!
 //! ```text
 //! substeps × iterations | limiter | ms a second | sag of 8; 32 segments | strain of 64
-//!                 6 × 5 | 2       | 189         | 1.061; 1.485          | 0.0008
-//!                 6 × 5 | 1       | 188         | 1.061; 1.485          | 0.0121
-//!                 6 × 5 | 0       | 184         | 1.061; 1.491          | 0.4521
-//!                3 × 10 | 2       | 140         | 1.155; 2.014          | 1.4588
-//!                2 × 15 | 2       | 119         | 1.289; 2.569          | 0.7958
-//!                10 × 3 | 2       | 338         | 1.036; 1.285          | 0.0000
-//!                15 × 2 | 1       | 496         | 1.026; 1.184          | 0.0002
-//!                30 × 1 | 1       | 689         | 1.018; 1.089          | 0.0000
-//!                6 × 10 | 2       | 261         | 1.049; 1.251          | 0.0000
-//!                6 × 20 | 2       | 384         | 1.043; 1.131          | 0.0000
-//!                12 × 5 | 2       | 386         | 1.024; 1.116          | 0.0000
+//!                 6 × 5 | 2       | 143         | 1.061; 1.485          | 0.0008
+//!                 6 × 5 | 1       | 170         | 1.061; 1.483          | 0.0121
+//!                 6 × 5 | 0       | 172         | 1.061; 1.491          | 0.4523
+//!                3 × 10 | 2       | 111         | 1.155; 2.014          | 1.4588
+//!                2 × 15 | 2       | 95          | 1.289; 2.569          | 0.7958
+//!                10 × 3 | 2       | 215         | 1.036; 1.283          | 0.0000
+//!                15 × 2 | 1       | 299         | 1.026; 1.185          | 0.0002
+//!                30 × 1 | 1       | 518         | 1.018; 1.088          | 0.0000
+//!                6 × 10 | 2       | 231         | 1.048; 1.251          | 0.0000
+//!                6 × 20 | 2       | 329         | 1.043; 1.132          | 0.0000
+//!                12 × 5 | 2       | 264         | 1.024; 1.116          | 0.0000
 //! ```
 //!
-//! So the direct solve of lengths is nearly free and takes the strain away. Fewer substeps than six are
-//! cheaper and bad. For twice the time twelve substeps of five are the best buy; six of ten are the best
-//! for less. Many substeps of one iteration cost most: gathering strands and all other systems run in
-//! each of them. The coupled projection costs and errs as the split one. The printed
-//! one sags by half in coarse segments.
+//! So the direct solve of lengths takes the strain away for less than what runs differ by. Fewer
+//! substeps than six are cheaper and bad. For less than twice the time twelve substeps of five are the
+//! best buy; ten of three are the best for less. Many substeps of one iteration cost most: gathering
+//! strands and all other systems run in each of them. The coupled projection costs and errs as the
+//! split one. The printed one sags by half in coarse segments.
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{Cuticle, prelude::*};
