@@ -112,8 +112,7 @@ pub(crate) fn apply_air(
         })
     };
     // Wind also dries hair that is carried.
-    let is_blown =
-        |sleep: &Sleep| !sleep.is_asleep() && !(sleep.is_carried() && blowers.is_empty());
+    let is_spared = |sleep: &Sleep| sleep.is_asleep() || (sleep.is_carried() && blowers.is_empty());
     let ahead = |(_, strand, ..): &Blown<'_>| {
         let (_, velocities, _, spins) = strand.parts();
         prefetch(velocities);
@@ -122,7 +121,7 @@ pub(crate) fn apply_air(
     for_each_part(tables(&mut strands), Vec::new, |items, rows| {
         let mut airs = PerHair::default();
         for (of, sleep, strand, burden, changes, received) in rows {
-            if is_blown(sleep)
+            if !is_spared(sleep)
                 && let Some(air) = airs.index(of.0, || air_of(of.0))
             {
                 items.push((air, strand, burden, changes, received));
