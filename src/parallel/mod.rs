@@ -17,7 +17,8 @@ const GRAIN: usize = 32;
 /// The most parts that a table is cut into, unless they would be larger than [`MOST_ROWS`].
 const MOST_PARTS: usize = 32;
 
-/// The most rows of a part.
+/// The least and the most rows of a part.
+const LEAST_ROWS: usize = 256;
 const MOST_ROWS: usize = 512;
 
 /// How many strands ahead of the present one memory is asked for: far enough for it to come, near
@@ -66,7 +67,7 @@ pub(crate) fn for_each_part<C: Columns, S, O: Send>(
     init: impl Fn() -> S + Send + Sync,
     work: impl Fn(&mut S, C::Part) -> O + Send + Sync,
 ) -> Vec<O> {
-    for_each_part_of(256, tables, init, work)
+    for_each_part_of(LEAST_ROWS, tables, init, work)
 }
 
 /// The same with at least so many rows in a part: fewer where there is much to do for each, so that

@@ -6,32 +6,46 @@
 //! lanes are full however uneven the strands are.
 
 use super::lanes::LANES;
-use crate::parallel::{Columns, for_each_block_ahead, for_each_part_of};
+use crate::{
+    parallel::{Columns, for_each_block_ahead, for_each_part_of},
+    strand::PerHair,
+};
+use bevy::prelude::*;
 
 /// About how many nodes are worth a thread of their own: it takes tens of microseconds to wake up.
 const NODES: usize = 4096;
 
-/// Calls `work` with every block of strands of about so many `nodes`. `gather` makes items of a part's
-/// rows, and `key` says what those of a block have in common; `ahead` asks for the memory of one that
-/// comes next, and `init` makes scratch space for a task. What `work` has to tell comes in the same
-/// order on any number of threads.
-pub(crate) fn for_each_batch<C: Columns, S, T: Send, K: Ord, O: Send>(
+/// Calls `solve` with every block of strands of about so many `nodes`, and what holds for their hair.
+/// `item` makes an item of a row that is to be solved, and `key` tells its hair and how many nodes it
+/// has; strands of hairs without `params_of` are left out; `ahead` asks for the memory of an item that
+/// comes next. What `solve` has to tell comes in the same order on any number of threads.
+pub(crate) fn for_each_batch<C: Columns, P, B: Default, T: Send, O: Send>(
     tables: impl Iterator<Item = C>,
     nodes: usize,
-    init: impl Fn() -> S + Send + Sync,
-    gather: impl Fn(&mut S, C::Part, &mut Vec<T>) + Send + Sync,
-    key: impl Fn(&T) -> K + Send + Sync,
+    params_of: impl Fn(Entity) -> Option<P> + Send + Sync,
+    item: impl Fn(<C::Part as Iterator>::Item) -> Option<T> + Send + Sync,
+    key: impl Fn(&T) -> (Entity, usize) + Send + Sync,
     ahead: impl Fn(&T) + Send + Sync,
-    work: impl Fn(&mut S, &mut [T]) -> Vec<O> + Send + Sync,
+    solve: impl Fn(&mut B, &mut [T], &P) -> Vec<O> + Send + Sync,
 ) -> Vec<O> {
     let ahead = |strands: &[T]| strands.iter().for_each(&ahead);
-    let room = || (init(), Vec::new());
+    let hair = |strand: &T| key(strand).0;
+    let solve = |lanes: &mut B, params: &mut PerHair<P>, block: &mut [T]| {
+        let hair = hair(&block[0]);
+        let index = params.index(hair, || params_of(hair));
+        index.map_or_else(Vec::new, |index| solve(lanes, block, &params.values[index]))
+    };
     let least = (NODES / nodes.max(1)).next_multiple_of(LANES).clamp(2 * LANES, 16 * LANES);
-    let parts = for_each_part_of(least, tables, room, |(scratch, strands), rows| {
-        gather(scratch, rows, strands);
+    let room = || (B::default(), PerHair::default(), Vec::new());
+    let parts = for_each_part_of(least, tables, room, |(lanes, params, strands), rows| {
+        strands.extend(rows.filter_map(&item).filter(|strand| {
+            let hair = hair(strand);
+            params.index(hair, || params_of(hair)).is_some()
+        }));
         let mut told = Vec::new();
-        let solve = |block: &mut [T]| told.append(&mut work(scratch, block));
-        let left = full_blocks(strands, &key, ahead, solve);
+        let left = full_blocks(strands, &key, ahead, |block| {
+            told.append(&mut solve(lanes, params, block));
+        });
         strands.clear();
         (left, told)
     });
@@ -43,9 +57,9 @@ pub(crate) fn for_each_batch<C: Columns, S, T: Send, K: Ord, O: Send>(
     let mut blocks: Vec<_> = blocks.map(|block| (block, Vec::new())).collect();
     for_each_block_ahead(
         &mut blocks,
-        init,
+        || (B::default(), PerHair::default()),
         |(strands, _)| ahead(strands),
-        |scratch, (strands, told)| *told = work(scratch, strands),
+        |(lanes, params), (strands, told)| *told = solve(lanes, params, strands),
     );
     told.extend(blocks.into_iter().map(|(_, told)| told));
     told.into_iter().flatten().collect()
@@ -83,7 +97,6 @@ fn full_blocks<T, K: Ord>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bevy::prelude::*;
 
     #[derive(Component)]
     struct Length(usize);
@@ -110,27 +123,33 @@ mod tests {
             }
             let mut strands = world.query::<(Entity, &Length, &mut Met)>();
             let mut strands = strands.query_mut(&mut world);
+            let [hair, bald] = [1, 2].map(|i| Entity::from_raw_u32(i).unwrap());
             let told = for_each_batch(
                 strands.contiguous_iter_mut().unwrap(),
                 100,
-                || (),
-                |(), rows, items| items.extend(rows.map(|(_, length, met)| (length.0, met))),
-                |item| item.0,
+                |of| (of == hair).then_some(7),
+                |(_, length, met)| {
+                    let of = if length.0 == 2 { bald } else { hair };
+                    Some((of, length.0, met))
+                },
+                |item| (item.0, item.1),
                 |_| {},
-                |(), items| {
-                    assert!(items.len() <= LANES && items.iter().all(|item| item.0 == items[0].0));
+                |(), items, params| {
+                    assert!(items.len() <= LANES && *params == 7);
+                    assert!(items.iter().all(|item| (item.0, item.1) == (hair, items[0].1)));
                     let beside = items.len();
-                    for (_, met) in items {
+                    for (.., met) in items {
                         (met.times, met.beside) = (met.times + 1, beside);
                     }
                     vec![beside]
                 },
             );
-            assert_eq!(told.iter().sum::<usize>(), 1500);
+            let solved = strands.iter().filter(|(_, length, _)| length.0 != 2).count();
+            assert_eq!(told.iter().sum::<usize>(), solved);
             assert!(told.len() <= 1500 / LANES + lengths, "{} for {lengths}", told.len());
             for (_, length, met) in &strands {
-                assert_eq!(met.times, 1);
-                assert!(told.contains(&met.beside), "{}", length.0);
+                assert_eq!(met.times, u32::from(length.0 != 2));
+                assert!(met.times == 0 || told.contains(&met.beside), "{}", length.0);
             }
         }
     }

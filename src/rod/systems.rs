@@ -17,7 +17,7 @@ use crate::{
     parallel::tables,
     prefetch::prefetch,
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf},
+    strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf},
     tick::{HairSystems, HairTick},
 };
 use bevy::prelude::*;
@@ -102,27 +102,25 @@ pub(crate) fn project(
     let lost = for_each_batch(
         tables(&mut strands),
         nodes,
-        || (BlockLanes::default(), PerHair::default()),
-        |(_, params), rows, items| {
-            for ((entity, of, sleep), strand, rest, bonds, burden, held) in rows {
-                let hair = of.0;
-                if sleep.is_simulated()
-                    && strand.nodes() >= 2
-                    && rest.darboux.len() == strand.edges()
-                    && rest.stiffness.len() == strand.edges()
-                    && params.index(hair, || params_of(hair)).is_some()
-                {
-                    items.push(Item { entity: *entity, hair, strand, rest, bonds, burden, held });
-                }
-            }
+        params_of,
+        |((entity, of, sleep), strand, rest, bonds, burden, held)| {
+            let is_stepped = sleep.is_simulated()
+                && strand.nodes() >= 2
+                && rest.darboux.len() == strand.edges()
+                && rest.stiffness.len() == strand.edges();
+            is_stepped.then_some(Item {
+                entity: *entity,
+                hair: of.0,
+                strand,
+                rest,
+                bonds,
+                burden,
+                held,
+            })
         },
         |item| (item.hair, item.strand.nodes()),
         Item::prefetch,
-        |(block, params), items| {
-            let hair = items[0].hair;
-            let index = params.index(hair, || params_of(hair));
-            index.map_or_else(Vec::new, |index| solve(level, block, items, &params.values[index]))
-        },
+        |block, items, params| solve(level, block, items, params),
     );
     faults.write_batch(lost);
 }

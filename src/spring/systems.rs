@@ -19,7 +19,7 @@ use crate::{
         turn::put_quaternions,
     },
     setting::{self, Settings},
-    strand::{Burden, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf, TickPose},
+    strand::{Burden, HeldNodes, Sleep, Strand, StrandModel, StrandOf, TickPose},
     tick::{HairSystems, HairTick},
 };
 use bevy::prelude::*;
@@ -80,25 +80,14 @@ pub(crate) fn step_springs(
     let lost = for_each_batch(
         tables(&mut strands),
         nodes,
-        || (SpringLanes::default(), PerHair::default()),
-        |(_, params), rows, items| {
-            for (entity, of, sleep, strand, burden, held) in rows {
-                let hair = of.0;
-                if sleep.is_simulated()
-                    && strand.nodes() >= 2
-                    && params.index(hair, || params_of(hair)).is_some()
-                {
-                    items.push(Item { entity: *entity, hair, strand, burden, held });
-                }
-            }
+        params_of,
+        |(entity, of, sleep, strand, burden, held)| {
+            let is_stepped = sleep.is_simulated() && strand.nodes() >= 2;
+            is_stepped.then_some(Item { entity: *entity, hair: of.0, strand, burden, held })
         },
         |item| (item.hair, item.strand.nodes()),
         |item| item.strand.prefetch(),
-        |(block, params), items| {
-            let hair = items[0].hair;
-            let index = params.index(hair, || params_of(hair));
-            index.map_or_else(Vec::new, |index| solve(level, block, items, &params.values[index]))
-        },
+        |block, items, params| solve(level, block, items, params),
     );
     faults.write_batch(lost);
 }
