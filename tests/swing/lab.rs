@@ -125,9 +125,13 @@ impl Lab {
         self.drag(0.0);
     }
 
-    /// What the probes read after each substep.
+    /// What the probes read now and after each substep.
     pub fn record(&mut self, seconds: f64, probes: Vec<(Entity, Probe)>) -> Vec<Vec<f64>> {
-        let probes = probes.into_iter().map(|(e, probe)| (e, probe, Vec::new())).collect();
+        let begin = |(entity, mut probe): (Entity, Probe)| {
+            let now = probe(self.get(entity));
+            (entity, probe, vec![now])
+        };
+        let probes = probes.into_iter().map(begin).collect();
         self.app.insert_resource(Recording { probes });
         self.run(seconds);
         let recorded =
@@ -196,30 +200,4 @@ pub fn energy(strand: &Strand, bending_length: f64) -> f64 {
         })
         .sum();
     motion + bends
-}
-
-/// Period of a swing about 0 that is let go at its greatest (s), from its zeros; `None` where it
-/// does not swing to and fro.
-pub fn period(swing: &[f64], substep: f64) -> Option<f64> {
-    let zeros: Vec<f64> = (swing.windows(2).enumerate())
-        .filter(|(_, w)| w[0] * w[1] < 0.0)
-        .map(|(i, w)| i as f64 + w[0] / (w[0] - w[1]))
-        .take(5)
-        .collect();
-    // Whole periods: then it does not matter if zero is a little beside the middle.
-    let whole = zeros.len().checked_sub(1)? / 2;
-    (whole > 0).then(|| (zeros[2 * whole] - zeros[0]) / whole as f64 * substep)
-}
-
-/// Rate at which the energy of a swing dies (1/s), twice that of its extremes.
-pub fn decay(swing: &[f64], substep: f64) -> f64 {
-    let extremes: Vec<(f64, f64)> = (swing.windows(3).enumerate())
-        .filter(|(_, w)| (w[1] - w[0]) * (w[2] - w[1]) <= 0.0)
-        .map(|(i, w)| ((i + 2) as f64 * substep, w[1].abs().ln()))
-        .collect();
-    let n = extremes.len() as f64;
-    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| extremes.iter().map(f).sum::<f64>() / n;
-    let (t, y) = (mean(&|e| e.0), mean(&|e| e.1));
-    let slope = mean(&|e| (e.0 - t) * (e.1 - y)) / mean(&|e| (e.0 - t).powi(2));
-    -2.0 * slope
 }

@@ -6,6 +6,8 @@ mod lab;
 mod settled;
 mod swings;
 mod theory;
+#[path = "../../examples/headless/trace.rs"]
+mod trace;
 mod twisted;
 
 /// G J / E I of the crate's hair.
