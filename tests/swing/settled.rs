@@ -28,7 +28,7 @@ fn hair_that_stands_off_level_sags_as_the_elastica() {
         println!("L_g {bending:.2}, L {length:.2}: {theory:.4}, found {found:.4?}");
         for (sag, n) in found.into_iter().zip(SEGMENTS) {
             let most = if n < 16 { 0.025 } else { 0.01 };
-            if !((sag - theory).abs() <= most) {
+            if sag.is_nan() || (sag - theory).abs() > most {
                 wrong.push((bending, length, n, sag, theory));
             }
         }

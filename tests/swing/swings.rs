@@ -85,7 +85,7 @@ fn energy_never_grows() {
             least = least.min(energy);
         }
         // Rounding of single precision is what stubs of half a millimetre's swing are made of.
-        if !(rise <= 5e-3 * swing + 1e-7) {
+        if swing.is_nan() || rise > 5e-3 * swing + 1e-7 {
             wrong.push((bending, length, n, rise / swing));
         }
     }
@@ -125,6 +125,7 @@ fn damping_is_a_property_of_the_hair() {
 
 #[test]
 fn periods_are_the_same_at_any_step() {
+    let mut wrong = Vec::new();
     for (hertz, substeps) in STEPS {
         let mut lab = Lab::new(hertz, substeps);
         lab.undamped();
@@ -141,11 +142,10 @@ fn periods_are_the_same_at_any_step() {
             let found = period(swing, lab.substep).unwrap_or(f64::NAN);
             let off = found / theory - 1.0;
             println!("{hertz} Hz, {substeps}: L_g {bending}, L {length}: {off:+.4}");
-            assert!(
-                off.abs() <= 0.03,
-                "L_g {bending}, L {length}: {found} s at {hertz} Hz and {substeps} substeps, \
-                 theory {theory}"
-            );
+            if off.is_nan() || off.abs() > 0.03 {
+                wrong.push((hertz, substeps, *bending, *length, found, *theory));
+            }
         }
     }
+    assert!(wrong.is_empty(), "Hz, substeps, L_g, L, period, theory: {wrong:#?}");
 }

@@ -51,10 +51,8 @@ mod tests {
                 }
             }
         }
-        for a in 0..n {
-            for b in (a % 2..n).step_by(2) {
-                form[a][b] += 1e4;
-            }
+        for (a, row) in form.iter_mut().enumerate() {
+            row.iter_mut().skip(a % 2).step_by(2).for_each(|x| *x += 1e4);
         }
         // Cholesky
         for j in 0..n {
