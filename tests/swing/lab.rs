@@ -148,10 +148,10 @@ impl Lab {
             strands.iter().map(|s| lab.get(*s).positions().to_vec()).collect()
         };
         self.gravity(down);
-        self.settle(4.0);
+        self.settle(3.0);
         let settled = positions(self);
         self.gravity(down - Vec3::new(0.35, 0.35, 0.0));
-        self.settle(4.0);
+        self.settle(3.0);
         let aside = positions(self);
         self.gravity(down);
         let probes = (strands.iter().zip(settled).zip(aside))
