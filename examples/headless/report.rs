@@ -172,13 +172,6 @@ impl Report {
         self.finite &= world.query::<&Strand>().iter(world).all(Strand::is_finite);
         self.strain_peak = world.resource::<measure::StrainPeak>().0;
     }
-
-    /// The same as lines of name and value.
-    pub fn table(&self) -> serde_json::Result<String> {
-        let value = serde_json::to_value(self)?;
-        let lines = value.as_object().into_iter().flatten();
-        Ok(lines.map(|(k, v)| format!("{k:26} {v}")).collect::<Vec<_>>().join("\n"))
-    }
 }
 
 /// The mean place of the tips in the hair's frame (m).
