@@ -1,6 +1,6 @@
 //! The few vertices of a mesh that carry roots, and what moves them.
 
-use super::{RootsError, morph::Shift};
+use super::{error::RootsError, morph::Shift};
 use crate::plant::RootOnMesh;
 use bevy::{
     mesh::{Mesh, MeshAccessError, VertexAttributeValues, morph::MorphAttributes},

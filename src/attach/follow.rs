@@ -1,7 +1,11 @@
 //! Tied roots go with their triangles: in equal parts through a tick, and once a frame to where the
 //! mesh is drawn.
 
-use super::{TiedRoots, morph::Morphs, pose::MeshPose, triangle};
+use super::{
+    morph::Morphs,
+    pose::MeshPose,
+    roots::{TiedRoots, triangle},
+};
 use crate::{
     schedule::HairStep,
     strand::{Hair, Pose, Strand, StrandHistory, StrandOf},

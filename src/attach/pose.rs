@@ -1,8 +1,8 @@
 //! The mesh as joints and morph targets pose it now.
 
 use super::{
-    RootsError,
     corner::Corner,
+    error::RootsError,
     morph::{Morphs, Shift},
 };
 use bevy::{

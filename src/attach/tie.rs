@@ -1,11 +1,11 @@
 //! Tying strands to their mesh, once it is there.
 
 use super::{
-    RootsError, RootsOnMesh, Tied, TiedRoots,
     corner::{Corner, Corners},
+    error::RootsError,
     morph::Morphs,
     pose::Movers,
-    triangle,
+    roots::{RootsOnMesh, Tied, TiedRoots, triangle},
 };
 use crate::{
     bond::Bonds,

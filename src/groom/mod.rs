@@ -4,6 +4,7 @@
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
 mod bytes;
+mod format;
 pub mod gltf;
 mod guides;
 mod loader;
@@ -15,7 +16,8 @@ mod wear;
 pub mod yuksel;
 
 pub use bytes::GroomFileError;
-pub use loader::{GroomFormat, GroomLoadError, GroomLoader, GroomPlugin};
+pub use format::GroomFormat;
+pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
 pub use reshape::UpAxis;
 pub use settings::GroomSettings;

@@ -4,7 +4,7 @@
 //! is drawn, stretched along the way it flies. Each bead is a square that faces the eye, on which a
 //! sphere is shaded; the squares are counted by a mesh and pulled from one buffer, as ribbons are.
 
-use super::{HairRenderSystems, Interpolate, supported};
+use super::sets::{HairRenderSystems, Interpolate, supported};
 use crate::{Droplet, DropletRules, HairGravity, water::model::ball_radius};
 use bevy::{
     asset::{RenderAssetUsages, embedded_asset},

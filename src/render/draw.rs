@@ -6,6 +6,7 @@ use super::{
     followers::{DrawnStrand, GuideRoot, scatter},
     given::FollowerRoots,
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
+    sets::Interpolate,
 };
 use crate::{
     Moisture,
@@ -19,10 +20,6 @@ use bevy::{
     prelude::*,
     render::{renderer::RenderDevice, storage::ShaderBuffer},
 };
-
-/// Whether drawing goes between ticks by the overstep of the fixed clock.
-#[derive(Resource, Clone, Copy, Debug)]
-pub(super) struct Interpolate(pub(super) bool);
 
 /// What was packed for a hair, kept so that nothing is allocated again.
 #[derive(Component, Clone, Debug, Default)]

@@ -24,6 +24,7 @@ mod followers;
 mod given;
 mod look;
 mod material;
+mod sets;
 mod share;
 mod upload;
 mod view;
@@ -33,6 +34,7 @@ pub use buffers::HairBuffers;
 pub use followers::{DrawnStrand, HairFollowers};
 pub use given::{FollowerRoot, FollowerRoots};
 pub use look::{HairLook, HairShading, Melanin, WetLook};
+pub use sets::HairRenderSystems;
 pub use view::{HairView, STRAIN_FULL, heat};
 
 use crate::{setting, strand::Hair};
@@ -42,14 +44,11 @@ use bevy::{
     camera::visibility::VisibilitySystems,
     ecs::schedule::{InternedScheduleLabel, ScheduleLabel},
     prelude::*,
-    render::{
-        RenderApp, erased_render_asset::ErasedRenderAssetPlugin, render_resource::DownlevelFlags,
-        renderer::RenderAdapter, storage::ShaderBuffer,
-    },
+    render::{RenderApp, erased_render_asset::ErasedRenderAssetPlugin, storage::ShaderBuffer},
     shader::load_shader_library,
 };
-use draw::Interpolate;
 use material::RibbonMaterial;
+use sets::{Interpolate, supported};
 
 /// Draws the hair. Part of [`HairPlugins`](crate::HairPlugins), which may be added before or after
 /// `DefaultPlugins`. Without a renderer it does nothing.
@@ -80,11 +79,6 @@ impl HairRenderPlugin {
         Self { interpolate: fixed.contains(&schedule) }
     }
 }
-
-/// The systems that draw: in `PostUpdate` after transforms have been propagated and before visibility
-/// is, and in the render world's `ExtractSchedule` the one write to the GPU.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct HairRenderSystems;
 
 impl Plugin for HairRenderPlugin {
     fn build(&self, app: &mut App) {
@@ -142,23 +136,4 @@ impl Plugin for HairRenderPlugin {
         upload::plugin(app);
         beads::finish(app);
     }
-}
-
-/// Whether the graphics device can draw hair; tells once if not. Asked only while running, because
-/// the device may come with a plugin that is finished later.
-fn supported(adapter: Option<Res<RenderAdapter>>, mut known: Local<Option<bool>>) -> bool {
-    let Some(adapter) = adapter else {
-        return true;
-    };
-    *known.get_or_insert_with(|| {
-        let flags = adapter.get_downlevel_capabilities().flags;
-        let supported = flags.contains(DownlevelFlags::VERTEX_STORAGE);
-        if !supported {
-            tracing::warn!(
-                "hair is not drawn: the graphics device gives vertex shaders no storage buffers; \
-                 use Vulkan, Metal, Direct3D 12 or WebGPU"
-            );
-        }
-        supported
-    })
 }

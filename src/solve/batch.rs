@@ -5,54 +5,20 @@
 //! block. What is left over, few where strands are alike, is put together in a second round, so that
 //! lanes are full however uneven the strands are.
 
-use super::gather::{Source, gather_nodes, in_lanes, scatter};
+use super::{
+    batched::Batched,
+    gather::{gather_nodes, in_lanes, scatter},
+};
 use crate::{
     fault::HairFault,
     lanes::LANES,
     parallel::{Columns, for_each_block_ahead, for_each_part_of},
-    rod::block::BlockLanes,
-    strand::{PerHair, Strand},
+    strand::PerHair,
 };
 use bevy::prelude::*;
 
 /// About how many nodes are worth a thread of their own: it takes tens of microseconds to wake up.
 const NODES: usize = 4096;
-
-/// A strand as it is taken from its table, of one kind of kernel: rods or springs.
-pub(super) trait Batched: Sized + Send {
-    /// What holds for a hair's strands in a substep.
-    type Params;
-    /// A block with what else the kernel needs.
-    type Lanes: Default;
-
-    /// The strand.
-    fn entity(&self) -> Entity;
-    /// Its hair.
-    fn hair(&self) -> Entity;
-    /// What its lane is filled from.
-    fn source(&self) -> Source<'_>;
-    /// Its state, to be written.
-    fn strand_mut(&mut self) -> &mut Strand;
-    /// Asks for its memory.
-    fn prefetch(&self) {
-        self.source().strand.prefetch();
-    }
-    /// The shape it is rebuilt in when its state is lost: a Darboux vector for each joint.
-    fn remembered(&self, _params: &Self::Params) -> Vec<Vec3> {
-        Vec::new()
-    }
-    /// How long the substep is (s).
-    fn dt(params: &Self::Params) -> f32;
-    /// The block's nodes and edges.
-    fn block(lanes: &mut Self::Lanes) -> &mut BlockLanes;
-    /// Takes a block, whose nodes are gathered, through a substep.
-    fn step(
-        lanes: &mut Self::Lanes,
-        sources: &[Source<'_>; LANES],
-        items: &[Self],
-        params: &Self::Params,
-    );
-}
 
 /// One block of strands of equal node count through one substep.
 fn solve<T: Batched>(lanes: &mut T::Lanes, items: &mut [T], params: &T::Params) -> Vec<HairFault> {
@@ -135,8 +101,12 @@ fn full_blocks<T: Batched>(strands: &mut Vec<T>, mut work: impl FnMut(&mut [T]))
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::{parallel::tables, strand::AddedMass};
+    use super::{super::batched::Source, *};
+    use crate::{
+        parallel::tables,
+        rod::block::BlockLanes,
+        strand::{AddedMass, Strand},
+    };
 
     #[derive(Component)]
     struct Of(Entity);

@@ -4,22 +4,14 @@
 //! strands by four numbers are transposed at a time, and their memory is prefetched while the block
 //! before is solved. Number by number and without prefetching it took longer than all five.
 
-use super::batch::Batched;
+use super::batched::{Batched, Source};
 use crate::{
     fault::HairFault,
     lanes::{LANES, put_numbers, put_vectors, put3, take_quaternions, take_vectors, take3, take4},
     rod::block::{BlockLanes, NodeLanes},
-    strand::{AddedMass, HeldNodes, Strand},
+    strand::Strand,
 };
 use bevy::prelude::*;
-
-/// What a lane is filled from.
-#[derive(Clone, Copy)]
-pub(super) struct Source<'a> {
-    pub(super) strand: &'a Strand,
-    pub(super) added: &'a AddedMass,
-    pub(super) held: Option<&'a HeldNodes>,
-}
 
 /// One of each lane; lanes that no item uses repeat the first.
 pub(super) fn in_lanes<'a, T, U>(items: &'a [T], of: impl Fn(&'a T) -> U) -> [U; LANES] {

@@ -6,12 +6,14 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `batch` | which strands are solved side by side, on all threads; what a kernel has to offer |
+//! | `batched` | what a kernel offers |
+//! | `batch` | which strands are solved side by side, on all threads |
 //! | `gather` | strands' arrays into lanes and back; strands that left the finite numbers |
 //! | `rods` | Cosserat rods ([`rod`](crate::rod)) |
 //! | `springs` | masses and springs ([`mass_spring`](crate::mass_spring)) |
 
 mod batch;
+mod batched;
 mod gather;
 mod rods;
 mod springs;

@@ -1,8 +1,9 @@
 //! Cosserat rods in the tick.
 
 use super::{
-    batch::{Batched, for_each_batch},
-    gather::{Source, in_lanes},
+    batch::for_each_batch,
+    batched::{Batched, Source},
+    gather::in_lanes,
 };
 use crate::{
     bond::{BondInfluence, Bonds, RestShape},

@@ -1,8 +1,8 @@
 //! Mass-spring strands in the tick.
 
 use super::{
-    batch::{Batched, for_each_batch},
-    gather::Source,
+    batch::for_each_batch,
+    batched::{Batched, Source},
 };
 use crate::{
     contact::{LockContact, Obstacles},
