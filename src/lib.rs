@@ -1,4 +1,6 @@
 #![doc = include_str!("../README.md")]
+#![doc = include_str!("guide/substep.md")]
+#![doc = include_str!("guide/glossary.md")]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![deny(unsafe_code)]
 

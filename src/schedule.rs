@@ -339,6 +339,27 @@ fn run_hair_tick(world: &mut World) {
 mod tests {
     use super::*;
 
+    /// `KERATIN_WRITE_DOCS=1 cargo test --lib docs_show` writes the table anew.
+    #[test]
+    fn docs_show_the_substep_as_it_runs() {
+        let mut table = String::from(
+            "\n# A substep\n\nEach fixed tick runs these sets of [`HairSystems`] once per substep, one after \
+             the other.\n\n| set | part | what it does |\n|---|---|---|\n",
+        );
+        let link = |set: HairSystems| format!("[`{set:?}`](HairSystems::{set:?})");
+        for set in HairSystems::ALL {
+            table += &format!("| {} | | {} |\n", link(set), set.description());
+            for part in set.parts() {
+                table += &format!("| | {} | {} |\n", link(*part), part.description());
+            }
+        }
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/guide/substep.md");
+        if std::env::var_os("KERATIN_WRITE_DOCS").is_some() {
+            std::fs::write(file, &table).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(file).unwrap(), table);
+    }
+
     #[test]
     fn auto_substeps_come_near_the_papers_step() {
         for (rate, count) in [(60.0, 6), (120.0, 3), (240.0, 2), (30.0, 12), (64.0, 6), (360.0, 1)]

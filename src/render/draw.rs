@@ -54,7 +54,7 @@ type GuideParts = (
     &'static Strand,
     &'static StrandHistory,
     &'static Bonds,
-    &'static Moisture,
+    Option<&'static Moisture>,
     Option<&'static WetLook>,
 );
 
@@ -260,7 +260,7 @@ impl Packed {
                 strand,
                 history,
                 bonds,
-                wet.map_or(water.sheen(), |w| &w.0),
+                wet.map_or_else(|| water.map_or(&[][..], Moisture::sheen), |wet| &wet.0),
                 overstep,
             );
             let root = packed_place(&own[0]);
