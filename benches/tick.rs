@@ -22,10 +22,10 @@ mod table;
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
     WindReceived,
+    lanes::{LANES, put4},
     prelude::*,
     rod::{
-        LANES,
-        block::{BlockLanes, put4},
+        block::BlockLanes,
         step::{StepParams, step},
     },
 };

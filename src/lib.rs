@@ -2,53 +2,60 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![deny(unsafe_code)]
 
-pub mod air;
+#[cfg(feature = "groom")]
+pub mod attach;
 pub mod bond;
+#[cfg(feature = "groom")]
+pub mod collider_fit;
 pub mod contact;
+pub mod environment;
 pub mod fault;
 pub mod grid;
 #[cfg(feature = "groom")]
 pub mod groom;
-#[cfg(feature = "save")]
-pub mod hairdo;
+pub mod lanes;
 pub mod lod;
+pub mod mass_spring;
 mod parallel;
-mod prefetch;
+#[cfg(feature = "groom")]
+pub mod plant;
+pub mod plugins;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod rod;
+#[cfg(feature = "save")]
+pub mod save;
+pub mod schedule;
 pub mod setting;
 pub mod sleep;
-pub mod spring;
+pub mod solve;
 pub mod strand;
-pub mod style;
-pub mod tick;
+pub mod treatment;
 pub mod water;
 
-pub use air::{AirDrag, Blower, HairGravity, WindReceived};
 pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
 #[cfg(feature = "avian")]
 pub use contact::{AvianHairCollider, AvianShapeError};
 pub use contact::{ColliderShape, HairCollider, LockContact};
-pub use fault::{Fault, HairFault};
+pub use environment::{AirDrag, Blower, Climate, HairGravity, WindReceived};
+pub use fault::{FaultKind, HairFault};
 #[cfg(feature = "groom")]
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
-#[cfg(feature = "save")]
-pub use hairdo::{Hairdo, HairdoError};
 pub use lod::{HairLod, LodLevel, PresentLod, ScreenShare};
+pub use mass_spring::Springs;
+pub use plugins::HairPlugins;
 pub use rod::{Solver, Stiffness, StretchProjection};
+#[cfg(feature = "save")]
+pub use save::{Hairdo, HairdoError};
+pub use schedule::{HairStep, HairSubsteps, HairSystems, HairTick, ProcessTime};
 pub use setting::{HairDefault, InvalidValue};
 pub use sleep::HairSleep;
-pub use spring::Springs;
 pub use strand::{
-    Burden, Hair, HairInertia, HeldNodes, Sleep, Sleepers, Strand, StrandError, StrandModel,
+    AddedMass, Hair, HairInertia, HeldNodes, Sleep, Sleepers, Strand, StrandError, StrandModel,
     StrandOf, Strands,
 };
-pub use style::{PermRod, Treat, Winding, WoundOn, WoundStrands};
-pub use tick::{HairPlugins, HairStep, HairSubsteps, HairSystems, HairTick};
-pub use water::{
-    Climate, Droplet, DropletRules, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
-};
+pub use treatment::{PermRod, Treat, Winding, WoundOn, WoundStrands};
+pub use water::{Droplet, DropletRules, Moisture, Shower, Soak, WaterLedger, Wetting};
 
 /// What most games need.
 pub mod prelude {
@@ -58,12 +65,12 @@ pub mod prelude {
     #[cfg(feature = "groom")]
     #[doc(hidden)]
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};
-    #[cfg(feature = "save")]
-    #[doc(hidden)]
-    pub use crate::hairdo::{Hairdo, HairdoError};
     #[cfg(feature = "render")]
     #[doc(hidden)]
     pub use crate::render::{HairFollowers, HairLook, HairShading, HairView, Melanin};
+    #[cfg(feature = "save")]
+    #[doc(hidden)]
+    pub use crate::save::{Hairdo, HairdoError};
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,

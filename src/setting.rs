@@ -4,7 +4,7 @@
 //! Values set by editing a component are taken over at the next tick. A value outside its range is
 //! reported once and used as the nearest valid one; the component keeps what the user wrote.
 
-use crate::fault::{Fault, HairFault};
+use crate::fault::{FaultKind, HairFault};
 use bevy::{
     ecs::system::SystemParam,
     prelude::*,
@@ -112,9 +112,17 @@ impl<T: HairSetting> Settings<'_, '_, T> {
 }
 
 /// Reports what was wrong with an entity's values.
-pub(crate) fn tell(entity: Entity, notes: Notes, faults: &mut MessageWriter<HairFault>) {
+pub(crate) fn tell(entity: Option<Entity>, notes: Notes, faults: &mut MessageWriter<HairFault>) {
     for wrong in notes.into_inner() {
-        faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+        let mut fault = HairFault::from(wrong);
+        fault.entity = entity;
+        faults.write(fault);
+    }
+}
+
+impl From<InvalidValue> for HairFault {
+    fn from(value: InvalidValue) -> Self {
+        Self::caused(FaultKind::Setting, value, "the nearest valid value is used")
     }
 }
 
@@ -126,7 +134,7 @@ pub(crate) fn report_changed<T: HairSetting>(
     for (entity, setting) in &changed {
         let notes = Notes::default();
         setting.mended(&notes);
-        tell(entity, notes, &mut faults);
+        tell(Some(entity), notes, &mut faults);
     }
 }
 
@@ -137,7 +145,7 @@ fn report_default<T: HairSetting>(
 ) {
     let notes = Notes::default();
     default.0.mended(&notes);
-    tell(Entity::PLACEHOLDER, notes, &mut faults);
+    tell(None, notes, &mut faults);
 }
 
 /// Registers one setting: its default, its type, and the report of invalid values.

@@ -2,7 +2,7 @@
 
 mod common;
 use bevy::prelude::*;
-use bevy_keratin::{WindReceived, prelude::*, style::WindingProgress};
+use bevy_keratin::{WindReceived, prelude::*, treatment::WindingProgress};
 use common::*;
 
 fn wind_on(at: Vec3, aim: Vec3, direction: Vec3) -> f32 {

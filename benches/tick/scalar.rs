@@ -3,11 +3,9 @@
 
 use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
+    lanes::{Quaternion, V3},
     prelude::*,
-    rod::{
-        algebra::{Quaternion, V3},
-        constraint::{BendShares, EdgeWeights, StretchShares, bend_twist, stretch_shear},
-    },
+    rod::constraint::{BendShares, EdgeWeights, StretchShares, bend_twist, stretch_shear},
 };
 
 #[derive(Clone)]

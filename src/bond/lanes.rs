@@ -7,11 +7,7 @@ use super::{
     BondKind, JointBonds,
     model::{Remembered, changed, rest_shape},
 };
-use crate::rod::{
-    algebra::{Quaternion, V3},
-    lanes::Real,
-    turn::turned,
-};
+use crate::lanes::{Quaternion, Real, V3, turned};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use glam::Quat;
 

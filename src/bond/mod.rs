@@ -7,19 +7,18 @@
 //!
 //! Mathematics in [`model`], components here, systems beside. Nothing but `BondUpdate` moves rates:
 //! whoever wants a change asks for it in [`BondChanges`], which game code does through
-//! [`Treat`](crate::style::Treat).
+//! [`Treat`](crate::treatment::Treat).
 
+mod command;
 mod lanes;
 pub mod model;
 mod systems;
 
 pub use model::JointBonds;
 pub use systems::BondPlugin;
-#[cfg(feature = "groom")]
-pub(crate) use systems::fit_bonds;
 
 use crate::{
-    prefetch::prefetch,
+    parallel::prefetch,
     setting::{Bound, HairSetting, InvalidValue, Notes},
     strand::Strand,
 };

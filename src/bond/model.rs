@@ -1,10 +1,7 @@
 //! Side-chain bonds as mathematics: equations 13–16 and 19 of \[B\], on one joint at a time.
 
 use super::BondKind;
-use crate::rod::{
-    algebra::{Quaternion, V3},
-    lanes::Real,
-};
+use crate::lanes::{Quaternion, Real, V3};
 use bevy::reflect::Reflect;
 use glam::{Quat, Vec3};
 

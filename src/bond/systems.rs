@@ -6,14 +6,12 @@ use super::{
     model::cuticle_factor,
 };
 use crate::{
-    fault::{Fault, HairFault},
-    lod::HairSteps,
-    parallel::{AHEAD, for_each_part, in_turn, tables},
-    prefetch::prefetch,
+    fault::HairFault,
+    parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
+    schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Bound, Notes, Settings},
-    strand::{self, Burden, PerHair, Sleep, Strand, StrandOf},
-    tick::{HairSystems, HairTick},
+    strand::{AddedMass, PerHair, Sleep, Strand, StrandOf},
 };
 use bevy::prelude::*;
 use fearless_simd::Level;
@@ -28,12 +26,12 @@ impl Plugin for BondPlugin {
         app.register_type::<Bonds>()
             .register_type::<BondChanges>()
             .register_type::<RestShape>()
-            .add_systems(
-                HairTick,
-                fit_bonds.in_set(HairSystems::Roots).after(strand::carry_strands),
-            )
+            .register_required_components::<Strand, Bonds>()
+            .register_required_components::<Strand, BondChanges>()
+            .register_required_components::<Strand, RestShape>()
+            .add_systems(HairTick, fit_bonds.in_set(HairSystems::BondFit))
             .add_systems(HairTick, generate_rest_shapes.in_set(HairSystems::RestShape))
-            .add_systems(HairTick, update_bonds.in_set(HairSystems::BondUpdate));
+            .add_systems(HairTick, update_bonds.in_set(HairSystems::BondRates));
     }
 }
 
@@ -61,7 +59,7 @@ pub(crate) fn fit_bonds(
             }
         }
         if let Some(wrong) = notes.into_inner().into_iter().next() {
-            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+            faults.write(HairFault::from(wrong).of(entity));
         }
     }
 }
@@ -77,15 +75,15 @@ pub(super) struct Key {
 }
 
 /// A strand whose rest shape is not what it was.
-type Shaped<'a> = (Key, &'a Strand, &'a Bonds, &'a Burden, &'a mut RestShape);
+type Shaped<'a> = (Key, &'a Strand, &'a Bonds, &'a AddedMass, &'a mut RestShape);
 
 fn generate_rest_shapes(
-    steps: HairSteps,
+    steps: EffectiveSubsteps,
     influence: Settings<BondInfluence>,
     stiffness: Settings<Stiffness>,
     cuticle: Settings<Cuticle>,
     solver: Settings<Solver>,
-    mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
+    mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape)>,
 ) {
     let key_of = |hair: Entity| {
         let stride = steps.of(hair)?;
@@ -105,7 +103,7 @@ fn generate_rest_shapes(
     let level = Level::new();
     for_each_part(tables(&mut strands), Vec::new, |items, rows| {
         let mut keys = PerHair::default();
-        for (of, sleep, strand, (bonds, is_changed), burden, rest) in rows {
+        for (of, sleep, strand, (bonds, is_changed), added_mass, rest) in rows {
             if !sleep.is_simulated() {
                 continue;
             }
@@ -115,13 +113,13 @@ fn generate_rest_shapes(
             if !rest.closed
                 || rest.key != Some(key)
                 || is_changed
-                || has_softened(&rest.softened, &burden.softening)
+                || has_softened(&rest.softened, &added_mass.softening)
             {
-                items.push((key, strand, bonds, burden, rest));
+                items.push((key, strand, bonds, added_mass, rest));
             }
         }
-        in_turn(items, AHEAD, ahead, |(key, strand, bonds, burden, rest)| {
-            shape(level, key, strand, bonds, burden, rest);
+        in_turn(items, AHEAD, ahead, |(key, strand, bonds, added_mass, rest)| {
+            shape(level, key, strand, bonds, added_mass, rest);
         });
         items.clear();
     });
@@ -133,7 +131,7 @@ fn shape(
     key: &Key,
     strand: &Strand,
     bonds: &Bonds,
-    burden: &Burden,
+    added_mass: &AddedMass,
     rest: &mut RestShape,
 ) {
     rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
@@ -141,10 +139,10 @@ fn shape(
     rest_shapes(level, frames(strand), &bonds.joints, &key.influence, &mut rest.darboux);
     if rest.key != Some(*key)
         || rest.stiffness.len() != strand.edges()
-        || has_softened(&rest.softened, &burden.softening)
+        || has_softened(&rest.softened, &added_mass.softening)
     {
         rest.key = Some(*key);
-        rest.softened.clone_from(&burden.softening);
+        rest.softened.clone_from(&added_mass.softening);
         rest.stiffness.clear();
         let mut distance = 0.0;
         rest.stiffness.extend(strand.rest_lengths().iter().enumerate().map(|(i, length)| {

@@ -2,8 +2,8 @@
 
 use super::{ColliderShape, HairCollider};
 use crate::{
-    fault::{Fault, HairFault},
-    tick::{HairStep, HairSystems, HairTick},
+    fault::{FaultKind, HairFault},
+    schedule::{HairStep, HairSystems, HairTick},
 };
 use avian3d::{
     parry::shape::{SharedShape, TypedShape},
@@ -17,7 +17,7 @@ use bevy::{math::Isometry3d, prelude::*};
 /// that follow the collider: its shape in the next tick when that changes, the body in every tick.
 /// They go when the collider, its body or this component does, or while the collider carries
 /// [`ColliderDisabled`]. What hair does not know is told once as
-/// [`Fault::Avian`](crate::Fault::Avian). As for any hair collider an uneven scale counts as its mean.
+/// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider an uneven scale counts as its mean.
 /// Hair pushes no bodies.
 ///
 /// ```
@@ -102,7 +102,9 @@ fn follow_colliders(
         if unknown.set_if_neq(Unknown(why.clone()))
             && let Some(why) = why
         {
-            faults.write(HairFault { entity: body, fault: Fault::Avian(why) });
+            faults.write(
+                HairFault::caused(FaultKind::Collider, why, "hair goes through it").of(body),
+            );
         }
         let mut wanted = shapes
             .into_iter()

@@ -13,7 +13,7 @@ pub use systems::ContactPlugin;
 pub(crate) use {
     lanes::WetRow,
     model::{Bridged, Film},
-    systems::{part_strands, seen_from},
+    systems::seen_from,
 };
 
 use crate::{

@@ -2,13 +2,12 @@
 
 use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles};
 use crate::{
-    fault::{Fault, HairFault},
-    lod::HairSteps,
-    prefetch::prefetch,
+    fault::HairFault,
+    parallel::prefetch,
     rod::obstacle::{Obstacle, Solid},
+    schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Notes, Settings},
     strand::{Hair, Sleep, Sleepers, StillPose, Strand, StrandOf, Strands, TickPose},
-    tick::{HairSystems, HairTick},
 };
 use bevy::prelude::*;
 
@@ -32,7 +31,10 @@ impl Plugin for ContactPlugin {
             .add_systems(PreUpdate, report_colliders)
             .add_systems(
                 HairTick,
-                (gather_obstacles, part_strands).in_set(HairSystems::Interaction),
+                (
+                    gather_obstacles.in_set(HairSystems::Obstacles),
+                    part_strands.in_set(HairSystems::StrandContact),
+                ),
             );
     }
 }
@@ -45,7 +47,7 @@ fn report_colliders(
         let notes = Notes::default();
         collider.mended(&notes);
         for wrong in notes.into_inner() {
-            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+            faults.write(HairFault::from(wrong).of(entity));
         }
     }
 }
@@ -87,7 +89,7 @@ fn gather_obstacles(
 }
 
 pub(crate) fn part_strands(
-    steps: HairSteps,
+    steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
     mut strands: Query<(&mut Strand, &mut Sleep, &mut StillPose), With<StrandOf>>,

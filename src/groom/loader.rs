@@ -1,7 +1,7 @@
 //! Grooms as assets.
 
 use super::{
-    Groom, GroomFileError, GroomLosses, GroomSettings, UpAxis, gltf, skin, tressfx, wear, yuksel,
+    Groom, GroomFileError, GroomLosses, GroomSettings, UpAxis, gltf, tressfx, wear, yuksel,
 };
 use bevy::{
     asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
@@ -200,7 +200,6 @@ impl Plugin for GroomPlugin {
             .register_type::<GroomFormat>()
             .register_type::<GroomLosses>();
         wear::build(app);
-        skin::plugin(app);
         add_loader(app);
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Groom, GroomError, GroomStrand, reshape::NODES};
 use crate::{
-    fault::{Fault, HairFault},
+    fault::{FaultKind, HairFault},
     setting::Bound,
     strand::{Hair, MIN_SEGMENT, Strand, StrandOf},
 };
@@ -201,8 +201,8 @@ fn grow(
                 // The asset server has logged the whole of it.
                 let error = error.to_string();
                 let error = error.lines().next().unwrap_or_default().to_owned();
-                let fault = Fault::GroomNotLoaded { error };
-                faults.write(HairFault { entity: hair, fault });
+                let message = format!("the hair's groom was not loaded: {error}");
+                faults.write(HairFault::new(FaultKind::Groom, message).of(hair));
                 grown.take_off(&mut commands, hair);
                 grown.from = Some(wanted.clone());
             }
@@ -214,7 +214,8 @@ fn grow(
         match groom.spawn(&mut commands, hair, &wanted.guides) {
             Ok(strands) => grown.strands = strands,
             Err(error) => {
-                faults.write(HairFault { entity: hair, fault: Fault::Groom(error) });
+                let outcome = "nothing is grown from this groom";
+                faults.write(HairFault::caused(FaultKind::Groom, error, outcome).of(hair));
                 continue;
             }
         }

@@ -7,9 +7,9 @@ use super::{
 };
 use crate::{
     parallel::for_each,
+    schedule::HairStep,
     setting::Settings,
     strand::{Hair, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf, TickPose},
-    tick::HairStep,
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 

@@ -37,11 +37,12 @@ pub mod model;
 mod systems;
 
 pub use guides::{Carried, Guides};
-pub(crate) use guides::{choose_guides, lull};
-pub(crate) use systems::HairSteps;
 pub use systems::LodPlugin;
 
-use crate::setting::{Bound, HairSetting, InvalidValue, Notes};
+use crate::{
+    schedule::SubstepLimits,
+    setting::{Bound, HairSetting, InvalidValue, Notes},
+};
 use bevy::prelude::*;
 
 /// How cheaply a hair is simulated when it is small on the screen. Component of a
@@ -56,7 +57,7 @@ use bevy::prelude::*;
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
-#[require(ScreenShare, PresentLod)]
+#[require(ScreenShare, PresentLod, SubstepLimits)]
 pub struct HairLod {
     /// The levels, from near to far, each for smaller hair than the one before. Default two: under a
     /// quarter of the view's height three iterations and half of the strands, under a tenth two with
@@ -123,8 +124,6 @@ pub struct PresentLod {
     pub level: usize,
     /// How many strands are not simulated but carried by others.
     pub carried: usize,
-    iterations: Option<u32>,
-    substeps: Option<u32>,
     strands: Option<f32>,
 }
 

@@ -15,24 +15,16 @@
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
 //! | [`obstacle`] | colliders as half-space, capsule and cylinder, with friction |
 //!
-//! Strands of equal node count are solved [`LANES`] side by side; see [`block`] for the layout.
+//! Strands of equal node count are solved [`LANES`](crate::lanes::LANES) side by side; see [`block`] for the layout.
 
-pub mod algebra;
-pub(crate) mod batch;
 pub mod block;
 pub mod constraint;
 pub mod frame;
-pub mod lanes;
 pub(crate) mod limiter;
 pub mod obstacle;
 pub mod step;
 pub mod stiffness;
 mod sweep;
-mod systems;
-pub(crate) mod turn;
 
 pub use constraint::StretchProjection;
-pub use lanes::LANES;
 pub use stiffness::{Solver, Stiffness};
-pub use systems::RodPlugin;
-pub(crate) use systems::project;

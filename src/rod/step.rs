@@ -5,15 +5,14 @@
 //! then velocities from the change.
 
 use super::{
-    algebra::V3,
-    block::{BlockLanes, NodeLanes, load, load3, load4, store3, store4},
+    block::{BlockLanes, NodeLanes},
     constraint::StretchProjection,
-    lanes::{LANES, Real},
     limiter::limit_lengths,
     obstacle::{Obstacle, hold_back, push_out},
     stiffness::Stiffness,
     sweep::project,
 };
+use crate::lanes::{LANES, Real, V3, load, load3, load4, store3, store4};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 /// Passes that a limiter step takes for strands that touch something.

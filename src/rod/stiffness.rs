@@ -5,9 +5,9 @@
 //! L_g³ = k l⁴ / (8 χ (1−k) Δt² g), χ = w_q l². Solved for χ at the paper's step and k_o it makes
 //! the look independent of segment count, and k/(1−k) ∝ Δt² makes it independent of substeps.
 
+use super::constraint::StretchProjection;
 use crate::{
-    rod::constraint::StretchProjection,
-    rod::lanes::Real,
+    lanes::Real,
     setting::{Bound, HairSetting, InvalidValue, Notes},
 };
 use bevy::prelude::*;

@@ -5,15 +5,14 @@
 //! so each finds all as if the one before had ended, and the result is the same to the bit.
 
 use super::{
-    algebra::{Quaternion, V3},
-    block::{BlockLanes, Lane, load, load4, store3, store4},
+    block::BlockLanes,
     constraint::{
         BendShares, EdgeWeights, StretchProjection, StretchShares, bend_twist, stretch_shear,
     },
-    lanes::{LANES, Real},
     obstacle::Obstacle,
     step::{StepParams, touch},
 };
+use crate::lanes::{LANES, Lane, Quaternion, Real, V3, load, load4, store3, store4};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// How many iterations run down a strand one behind the other, at most.
@@ -143,12 +142,9 @@ fn pass_edge<S: Simd, const P: usize>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::obstacle::Solid;
     use super::*;
-    use crate::rod::{
-        algebra::V3,
-        block::{put3, put4},
-        obstacle::Solid,
-    };
+    use crate::lanes::{V3, put3, put4};
     use fearless_simd::{Level, dispatch};
     use glam::{Quat, Vec3};
 

@@ -5,23 +5,22 @@ use super::{
     model::{displacement, held_nodes, keeps_turn, lever, stays, turn, within},
 };
 use crate::{
-    air::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, model::wind},
     bond::{BondChanges, BondInfluence, Bonds, Cuticle},
     contact::{HairCollider, LockContact, seen_from},
-    lod,
+    environment::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, wind::wind},
+    mass_spring::Springs,
     parallel::for_each,
     rod::{
         Solver, Stiffness,
         obstacle::{Obstacle, Solid},
     },
+    schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Settings},
-    spring::Springs,
     strand::{
-        self, Burden, Hair, HeldNodes, Pose, Sleep, Sleepers, StillPose, Strand, StrandModel,
+        AddedMass, Hair, HeldNodes, Pose, Sleep, Sleepers, StillPose, Strand, StrandModel,
         StrandOf, Strands, TickPose,
     },
-    style::Treatments,
-    tick::{HairStep, HairSystems, HairTick},
+    treatment::Treatments,
     water::Moisture,
 };
 use bevy::{
@@ -45,16 +44,7 @@ impl Plugin for SleepPlugin {
         app.register_type::<Watch>()
             .register_required_components::<Hair, Watch>()
             .register_required_components::<Hair, Sleepers>()
-            .add_systems(
-                HairTick,
-                watch
-                    .in_set(HairSystems::Roots)
-                    .after(strand::move_poses)
-                    .after(lod::choose_guides)
-                    .before(lod::lull)
-                    .before(strand::carry_strands)
-                    .run_if(|step: Res<HairStep>| step.index == 0),
-            );
+            .add_systems(HairTick, watch.in_set(HairSystems::Sleep).run_if(first_substep));
     }
 }
 
@@ -227,7 +217,7 @@ fn watch(
         &mut Strand,
         &mut Sleep,
         &mut StillPose,
-        (Ref<Bonds>, &BondChanges, &Burden),
+        (Ref<Bonds>, &BondChanges, &AddedMass),
         (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
     )>,
 ) {
@@ -248,14 +238,14 @@ fn watch(
         news.push(new);
     }
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
-    for (of, strand, mut sleep, still, (bonds, changes, burden), others) in &mut strands {
+    for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
         let Some(&hair) = index_of.get(&of.0) else { continue };
         let (treatments, water, held) = others;
         let restless = strand.is_changed()
             || bonds.is_changed()
             || sleep.bypass_change_detection().take_disturbed()
             || !changes.is_empty()
-            || !burden.mass.is_empty()
+            || !added_mass.mass.is_empty()
             || treatments.is_some_and(|t| !t.acting().is_empty())
             || water.is_some_and(|water| !water.is_untouched());
         items.push(Item { hair, strand, sleep, still, held, restless });

@@ -9,22 +9,20 @@
 //! substeps; drawing places the nodes with the pose that is drawn, so roots never lag. Lengths are
 //! in the hair's units: a scaled character's hair behaves as if unscaled.
 
-mod command;
 pub mod frame;
 mod per_hair;
 mod sleep;
 mod systems;
+mod teleport;
 
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use per_hair::PerHair;
 pub use sleep::{Sleep, Sleepers, StillPose};
 pub use systems::StrandPlugin;
-pub(crate) use systems::{carry_strands, move_poses};
 
 use crate::{
-    bond::{BondChanges, Bonds, RestShape},
-    fault::Fault,
-    prefetch::prefetch,
+    fault::{FaultKind, HairFault},
+    parallel::prefetch,
     rod::frame::{darboux, full, parallel_transport},
     setting::{HairSetting, Notes},
 };
@@ -87,7 +85,7 @@ pub const MIN_SEGMENT: f32 = 1e-6;
 /// number of nodes stays what it was.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-#[require(Bonds, BondChanges, RestShape, StrandHistory, Burden, Sleep, StillPose)]
+#[require(StrandHistory, AddedMass, Sleep, StillPose)]
 pub struct Strand {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
@@ -111,6 +109,11 @@ pub struct StrandHistory {
 }
 
 impl StrandHistory {
+    /// Takes the present for the past: the strand is drawn where it is, as if it had not moved.
+    pub(crate) fn remember(&mut self, strand: &Strand) {
+        self.positions.clone_from(&strand.positions);
+    }
+
     fn between(&self, strand: &Strand, node: usize, overstep: f32) -> Vec3 {
         let now = strand.positions[node];
         match self.positions.get(node) {
@@ -140,7 +143,7 @@ pub enum StrandModel {
     /// Cosserat rods with side-chain bonds, \[B\].
     #[default]
     Rod,
-    /// Masses and [`Springs`](crate::spring::Springs), \[W\] equation 1: cheaper, straight at rest,
+    /// Masses and [`Springs`](crate::mass_spring::Springs), \[W\] equation 1: cheaper, straight at rest,
     /// without bonds.
     MassSpring,
 }
@@ -155,7 +158,7 @@ impl HairSetting for StrandModel {
 /// tick; empty on dry hair.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub struct Burden {
+pub struct AddedMass {
     /// Added mass of each node, over its dry mass. Inverse masses, wind and contacts heed it.
     pub mass: Vec<f32>,
     /// Share of its stiffness that each joint has lost, beyond open bonds.
@@ -384,13 +387,19 @@ impl Strand {
 
     /// After a step that left the finite numbers: back to what it was, at rest, or if that is not
     /// finite either to the pose its bonds remember. Says what happened unless it did last time too.
-    pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<Fault> {
+    pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<HairFault> {
         let how = if self.is_pose_finite() {
             self.rest();
-            Fault::PutBack
+            HairFault::new(
+                FaultKind::PutBack,
+                "the strand became non-finite and was put back to its last finite state, at rest",
+            )
         } else {
             self.pose(bonds.into_iter().map(|o| if o.is_finite() { o } else { Vec3::ZERO }));
-            Fault::Rebuilt
+            HairFault::new(
+                FaultKind::Rebuilt,
+                "the strand's state was not finite; its rest pose was rebuilt from root and bonds",
+            )
         };
         let again = core::mem::replace(&mut self.was_put_back, true);
         (!again).then_some(how)

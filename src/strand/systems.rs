@@ -1,15 +1,15 @@
 //! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
 
 use super::{
-    Burden, Hair, HeldNodes, PerHair, Sleep, Sleepers, StillPose, Strand, StrandError,
+    AddedMass, Hair, HeldNodes, PerHair, Sleep, Sleepers, StillPose, Strand, StrandError,
     StrandHistory, StrandModel, StrandOf, Strands, TickPose,
     frame::{HairInertia, Pose},
 };
 use crate::{
-    fault::{Fault, HairFault},
+    fault::{FaultKind, HairFault},
     parallel::{for_each_part, tables},
+    schedule::{HairStep, HairSystems, HairTick},
     setting::{self, Settings},
-    tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{math::Isometry3d, prelude::*};
 
@@ -27,14 +27,18 @@ impl Plugin for StrandPlugin {
             .register_type::<Strands>()
             .register_type::<StrandHistory>()
             .register_type::<HeldNodes>()
-            .register_type::<Burden>()
+            .register_type::<AddedMass>()
             .register_type::<Sleep>()
             .register_type::<Sleepers>()
             .register_type::<StillPose>()
             .add_systems(PreUpdate, (report_unusable, record_frame))
             .add_systems(
                 HairTick,
-                (remember_drawn, move_poses, carry_strands).chain().in_set(HairSystems::Roots),
+                (
+                    remember_drawn.in_set(HairSystems::History),
+                    move_poses.in_set(HairSystems::Poses),
+                    carry_strands.in_set(HairSystems::FrameInertia),
+                ),
             );
     }
 }
@@ -47,15 +51,17 @@ fn report_unusable(
 ) {
     for (entity, strand, of) in &strands {
         if strand.is_added() && strand.nodes() < 2 {
-            let fault = Fault::Strand(StrandError::TooFewNodes { found: strand.nodes() });
-            faults.write(HairFault { entity, fault });
+            let error = StrandError::TooFewNodes { found: strand.nodes() };
+            faults.write(HairFault::caused(FaultKind::Strand, error, "it is left out").of(entity));
         }
         let homeless = match of {
             Some(of) => of.is_added() && !hairs.contains(of.0),
             None => strand.is_added(),
         };
         if homeless {
-            faults.write(HairFault { entity, fault: Fault::NoHair });
+            let message =
+                "the strand belongs to no hair: spawn it with StrandOf(hair), hair carrying Hair";
+            faults.write(HairFault::new(FaultKind::NoHair, message).of(entity));
         }
     }
 }
@@ -93,7 +99,7 @@ fn record_frame(
     }
 }
 
-pub(crate) fn move_poses(
+fn move_poses(
     step: Res<HairStep>,
     (time, frames): (Res<Time>, Res<Time<Virtual>>),
     transforms: TransformHelper,
@@ -110,7 +116,9 @@ pub(crate) fn move_poses(
             let a_frame_ago = time.elapsed_secs_f64() - frames.delta_secs_f64();
             let (put, report) = frame.aim(pose, a_frame_ago, &inertia.of(entity));
             if report {
-                faults.write(HairFault { entity, fault: Fault::Transform });
+                let message =
+                    "the transform is not finite or has no inverse: the last valid pose is used";
+                faults.write(HairFault::new(FaultKind::Transform, message).of(entity));
             }
             if let Some(members) = members.filter(|_| put) {
                 let mut theirs = strands.iter_many_mut(members.collection());
@@ -124,7 +132,7 @@ pub(crate) fn move_poses(
 }
 
 /// Inertia: free nodes are carried by the inverse of the frame's motion; the root stays.
-pub(crate) fn carry_strands(
+fn carry_strands(
     hairs: Query<&TickPose, With<Hair>>,
     mut strands: Query<(&StrandOf, &Sleep, &mut Strand)>,
 ) {

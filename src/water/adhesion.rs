@@ -8,11 +8,7 @@ use super::{
     tuft::{Member, Row, Tuft},
 };
 use crate::grid::Found;
-use crate::rod::{
-    algebra::V3,
-    block::{Lane, load, load3, store3},
-    lanes::{LANES, Real, lanes_in, splat3},
-};
+use crate::lanes::{LANES, Lane, Real, V3, lanes_in, load, load3, splat3, store3};
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 

@@ -1,25 +1,24 @@
 //! `Interaction`: strands meet droplets.
 
 use super::{
-    Droplet, Moisture, ProcessTime, Ride, WaterLedger, Wetting,
+    Droplet, Moisture, Ride, WaterLedger, Wetting,
     adhesion::{Encounters, Landing, MetBy},
     exchange::on_strand,
     field::{Field, SeenDrop},
     model::clinging,
     moisture::node_lengths,
     tuft::{Member, Tufts},
-    vapour::WATER,
 };
 use crate::{
-    air::HairGravity,
     contact::WetRow,
-    parallel::{emptied, for_each_block},
-    prefetch::prefetch,
-    rod::lanes::LANES,
+    environment::HairGravity,
+    lanes::LANES,
+    parallel::{emptied, for_each_block, prefetch},
+    schedule::HairStep,
     setting::{Notes, Settings},
-    strand::{Burden, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
-    tick::HairStep,
+    strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
 };
+use crate::{environment::vapour::WATER, schedule::ProcessTime};
 use bevy::prelude::*;
 use core::slice::from_ref;
 use fearless_simd::Level;
@@ -64,7 +63,7 @@ struct Head<'a> {
 struct Strandful<'a> {
     entity: Entity,
     strand: Mut<'a, Strand>,
-    burden: &'a Burden,
+    added_mass: &'a AddedMass,
     moisture: Mut<'a, Moisture>,
 }
 
@@ -87,17 +86,17 @@ pub(super) fn wet_strands(
     wetting: Settings<Wetting>,
     mut scratch: ResMut<WaterField>,
     mut hairs: Query<(&TickPose, &mut Tufts), With<Hair>>,
-    mut strands: Query<(Entity, &StrandOf, &mut Strand, &mut Burden, &mut Moisture)>,
+    mut strands: Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
     mut droplets: Query<&mut Droplet>,
     mut ledger: ResMut<WaterLedger>,
 ) {
     let WaterField { fields, loaded, outcomes, rooms, .. } = scratch.bypass_change_detection();
-    // Water's own weight is written anew by its exchange; to dry hair only droplets are a burden.
+    // Water's own weight is written anew by its exchange; to dry hair only droplets are a added_mass.
     for strand in loaded.drain(..) {
-        if let Ok((.., mut burden, moisture)) = strands.get_mut(strand)
+        if let Ok((.., mut added_mass, moisture)) = strands.get_mut(strand)
             && moisture.is_untouched()
         {
-            *burden.bypass_change_detection() = default();
+            *added_mass.bypass_change_detection() = default();
         }
     }
     let mut drops: Vec<&mut Droplet> = droplets.iter_mut().map(Mut::into_inner).collect();
@@ -107,11 +106,11 @@ pub(super) fn wet_strands(
     // Who carries a drop is heavy for all that pulls.
     for drop in &drops {
         if let Some(ride) = drop.ride
-            && let Ok((_, of, strand, mut burden, _)) = strands.get_mut(ride.strand)
+            && let Ok((_, of, strand, mut added_mass, _)) = strands.get_mut(ride.strand)
             && strand.nodes() >= 2
         {
-            let burden = burden.bypass_change_detection();
-            weigh(&strand, burden, &wetting.of(of.0), ride.at, mass_of(drop));
+            let added_mass = added_mass.bypass_change_detection();
+            weigh(&strand, added_mass, &wetting.of(of.0), ride.at, mass_of(drop));
             loaded.push(ride.strand);
         }
     }
@@ -157,20 +156,20 @@ pub(super) fn wet_strands(
             drop.lying = 0.0;
         }
         if let Some(ride) = drop.ride
-            && let Ok((_, of, mut strand, mut burden, _)) = strands.get_mut(ride.strand)
+            && let Ok((_, of, mut strand, mut added_mass, _)) = strands.get_mut(ride.strand)
             && let Ok((pose, _)) = hairs.get(of.0)
         {
             let (pose, wetting) = (pose.now(), wetting.of(of.0));
-            let (strand, burden) =
-                (strand.bypass_change_detection(), burden.bypass_change_detection());
+            let (strand, added_mass) =
+                (strand.bypass_change_detection(), added_mass.bypass_change_detection());
             let mut impulse = pose.direction_in(outcome.impulse);
             if lands {
-                weigh(strand, burden, &wetting, ride.at, mass_of(drop));
+                weigh(strand, added_mass, &wetting, ride.at, mass_of(drop));
                 loaded.push(ride.strand);
                 let lands_at = pose.rotation * on_strand(strand, ride.at).1;
                 impulse += pose.direction_in(drop.velocity - lands_at) * mass_of(drop);
             }
-            push(strand, burden, &wetting, ride.at, impulse);
+            push(strand, added_mass, &wetting, ride.at, impulse);
         }
     }
 }
@@ -179,13 +178,13 @@ pub(super) fn wet_strands(
 fn heads<'a>(
     hairs: &mut Query<(&TickPose, &mut Tufts), With<Hair>>,
     wetting: &Settings<Wetting>,
-    strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut Burden, &mut Moisture)>,
+    strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
     anew: bool,
     rooms: &mut Vec<Room>,
 ) -> Vec<Head<'a>> {
     let mut heads: PerHair<(Entity, Head<'a>, Vec<Option<Strandful<'a>>>)> = default();
     let mut unused = core::mem::take(rooms).into_iter();
-    for (entity, of, strand, burden, moisture) in strands {
+    for (entity, of, strand, added_mass, moisture) in strands {
         let index = heads.index(of.0, || {
             let (pose, wetting) = (*hairs.get(of.0).ok()?.0.now(), wetting.of(of.0));
             let (unsorted, sorted) = unused.next().unwrap_or_default();
@@ -194,8 +193,8 @@ fn heads<'a>(
         if let Some(index) = index
             && strand.nodes() >= 2
         {
-            let burden = &*burden.into_inner();
-            heads.values[index].2.push(Some(Strandful { entity, strand, burden, moisture }));
+            let added_mass = &*added_mass.into_inner();
+            heads.values[index].2.push(Some(Strandful { entity, strand, added_mass, moisture }));
         }
     }
     let sorted = heads.values.into_iter().map(|(hair, mut head, mut unsorted)| {
@@ -293,7 +292,7 @@ impl Strandful<'_> {
             positions,
             velocities,
             lengths,
-            load: &self.burden.mass,
+            load: &self.added_mass.mass,
             film: self.moisture.film(),
         }
     }
@@ -336,20 +335,20 @@ fn shares(strand: &Strand, at: f32) -> (usize, [f32; 2]) {
 }
 
 /// Lets a strand bear `mass` (kg) at a point: its nodes get heavier.
-fn weigh(strand: &Strand, burden: &mut Burden, wetting: &Wetting, at: f32, mass: f32) {
-    burden.mass.resize(strand.nodes(), 0.0);
+fn weigh(strand: &Strand, added_mass: &mut AddedMass, wetting: &Wetting, at: f32, mass: f32) {
+    added_mass.mass.resize(strand.nodes(), 0.0);
     let (edge, share) = shares(strand, at);
     for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
-        burden.mass[i] += share[i - edge] * mass / (wetting.dry_mass() * length);
+        added_mass.mass[i] += share[i - edge] * mass / (wetting.dry_mass() * length);
     }
 }
 
 /// Gives a strand an impulse (kg m/s) at a point, which moves as one with what it bears.
-fn push(strand: &mut Strand, burden: &Burden, wetting: &Wetting, at: f32, impulse: Vec3) {
+fn push(strand: &mut Strand, added_mass: &AddedMass, wetting: &Wetting, at: f32, impulse: Vec3) {
     let (edge, share) = shares(strand, at);
     let mut mobility = [0.0; 2];
     for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
-        let load = burden.mass.get(i).copied().unwrap_or(0.0);
+        let load = added_mass.mass.get(i).copied().unwrap_or(0.0);
         // The root is the scalp's.
         mobility[i - edge] =
             if i == 0 { 0.0 } else { 1.0 / (wetting.dry_mass() * length * (1.0 + load)) };

@@ -1,22 +1,26 @@
 //! `Interaction` and `BondUpdate`: droplets fall, slide, merge and follow their strands.
 
 use super::{
-    Droplet, DropletRules, ProcessTime, Ride, WaterLedger, Wetting,
+    Droplet, DropletRules, Ride, WaterLedger, Wetting,
     exchange::{blown_air, let_go, on_strand},
     model::{ball_radius, clinging, fall, hanging, slide},
-    vapour::{DryingAir, WATER, transfer},
 };
 use crate::{
     Blower, HairCollider,
-    air::{HairGravity, local_blowers},
     contact::seen_from,
+    environment::{HairGravity, local_blowers},
     fault::HairFault,
     grid::UniformGrid,
+    lanes::V3,
     parallel::for_each,
-    rod::{algebra::V3, obstacle::Obstacle},
+    rod::obstacle::Obstacle,
+    schedule::HairStep,
     setting::{Notes, Settings, tell},
     strand::{Hair, Pose, Strand, StrandOf, TickPose},
-    tick::HairStep,
+};
+use crate::{
+    environment::vapour::{DryingAir, WATER, transfer},
+    schedule::ProcessTime,
 };
 use bevy::prelude::*;
 
@@ -115,7 +119,7 @@ pub(super) fn move_droplets(
     for Moving { entity, notes, new, evaporated, ends, .. } in items {
         ledger.book(new);
         ledger.book(-evaporated);
-        tell(entity, notes, &mut faults);
+        tell(Some(entity), notes, &mut faults);
         if ends {
             // What is left is counted when it goes.
             commands.entity(entity).despawn();

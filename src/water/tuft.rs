@@ -5,12 +5,7 @@
 
 use super::Wetting;
 use crate::{
-    rod::{
-        algebra::V3,
-        block::{Lane, load3, put3, take3},
-        lanes::{LANES, splat3},
-        turn::{put_numbers, put_vectors, take_vectors},
-    },
+    lanes::{LANES, Lane, V3, load3, put_numbers, put_vectors, put3, splat3, take_vectors, take3},
     strand::Hair,
 };
 use bevy::prelude::*;

@@ -6,7 +6,7 @@ use super::{
     zoom,
 };
 use bevy::prelude::*;
-use bevy_keratin::{Fault, LodLevel, PresentLod, Sleepers, prelude::*, strand::TickPose};
+use bevy_keratin::{FaultKind, LodLevel, PresentLod, Sleepers, prelude::*, strand::TickPose};
 
 fn simulated(app: &App, ids: &[Entity]) -> Vec<Entity> {
     ids.iter().copied().filter(|e| !is_carried(app, *e)).collect()
@@ -259,7 +259,10 @@ fn strands_may_come_go_and_change_their_hair_at_a_level() {
     run(&mut app, 0.2);
     assert!(ids.iter().all(|e| strand(&app, *e).is_finite()));
     let told = faults(&mut app);
-    assert!(told.iter().all(|f| matches!(f, Fault::Strand(_) | Fault::PutBack | Fault::Rebuilt)));
+    assert!(
+        told.iter()
+            .all(|f| matches!(f.kind, FaultKind::Strand | FaultKind::PutBack | FaultKind::Rebuilt))
+    );
     // One goes over to other hair, which has no levels; one to none.
     let [gone, alone] = [0, 1].map(|i| carried(&app, &ids)[i]);
     let other = app.world_mut().spawn(Hair).id();

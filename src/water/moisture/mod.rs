@@ -8,9 +8,9 @@ mod flow;
 
 pub use flow::{Exposure, Left, Surroundings};
 
-use super::vapour::WATER;
+use crate::environment::vapour::WATER;
 use crate::{
-    prefetch::prefetch,
+    parallel::prefetch,
     setting::{Bound, HairSetting, Notes},
 };
 use bevy::prelude::*;
