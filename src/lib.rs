@@ -50,7 +50,7 @@ pub use rod::{Solver, Stiffness, StretchProjection};
 #[cfg(feature = "save")]
 pub use save::{Hairdo, HairdoError};
 pub use schedule::{HairStep, HairSubsteps, HairSystems, HairTick, ProcessTime};
-pub use setting::{HairDefault, InvalidValue};
+pub use setting::{HairDefault, InvalidValue, ValueRange};
 pub use sleep::HairSleep;
 pub use strand::{
     AddedMass, Hair, HairInertia, HeldNodes, Sleep, Sleepers, Strand, StrandError, StrandModel,

@@ -5,8 +5,8 @@
 //! systems go wide inside, over strands.
 
 use crate::{
-    fault::{self, HairFault},
-    setting::{Bound, InvalidValue, Notes},
+    fault,
+    setting::{self, InvalidValue, Ranged, ValueRange, Violations},
 };
 use bevy::{
     ecs::{
@@ -125,32 +125,36 @@ pub enum HairSubsteps {
 }
 
 impl HairSubsteps {
+    /// The range of their number.
+    pub const RANGE: ValueRange =
+        ValueRange::new("HairSubsteps", 1.0..=1000.0, "6 suit a tick of 1/60 s")
+            .with_safe(1.0..=24.0);
+
     /// A fixed number of substeps.
     ///
     /// # Errors
     /// When it is 0 or more than 1000.
     pub fn fixed(count: u32) -> Result<Self, InvalidValue> {
-        SUBSTEPS.check(count as f32)?;
-        Ok(Self::Fixed(count))
+        Self::Fixed(count).checked()
     }
 
     /// The number of substeps for a tick of `seconds`.
     pub fn count(&self, seconds: f32) -> u32 {
-        match *self {
+        let mut count = match *self {
             // Clocks count nanoseconds: 1/60 s is not quite six times 1/360 s.
-            Self::Auto => ((seconds * 360.0 - 1e-3).ceil() as u32).clamp(1, 1000),
-            Self::Fixed(n) => n.clamp(1, 1000),
-        }
+            Self::Auto => (seconds * 360.0 - 1e-3).ceil() as u32,
+            Self::Fixed(count) => count,
+        };
+        Self::RANGE.clamp(&mut count, || 1, &mut Violations::new());
+        count
     }
 }
 
-const SUBSTEPS: Bound = Bound::new("HairSubsteps", 1.0, 1000.0, "6 suit a tick of 1/60 s");
-
-fn report_substeps(substeps: Res<HairSubsteps>, mut faults: MessageWriter<HairFault>) {
-    if let HairSubsteps::Fixed(count) = *substeps
-        && let Err(wrong) = SUBSTEPS.check(count as f32)
-    {
-        faults.write(HairFault::from(wrong));
+impl Ranged for HairSubsteps {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        if let Self::Fixed(count) = self {
+            Self::RANGE.clamp(count, || 1, violations);
+        }
     }
 }
 
@@ -251,17 +255,16 @@ impl Default for ProcessTime {
 }
 
 impl ProcessTime {
-    pub(crate) fn mended(&self, notes: &Notes) -> f32 {
-        PROCESS.mend(self.0, 1.0, notes)
-    }
+    /// Its range.
+    pub const RANGE: ValueRange =
+        ValueRange::new("ProcessTime", 0.0..=1e6, "60 makes minutes of seconds")
+            .with_safe(1.0..=1000.0);
 }
 
-const PROCESS: Bound = Bound::new("ProcessTime", 0.0, 1e6, "60 makes minutes of seconds");
-
-fn report_process_time(process: Res<ProcessTime>, mut faults: MessageWriter<HairFault>) {
-    let notes = Notes::default();
-    process.mended(&notes);
-    crate::setting::tell(None, notes, &mut faults);
+impl Ranged for ProcessTime {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        Self::RANGE.clamp(&mut self.0, || 1.0, violations);
+    }
 }
 
 /// Runs [`HairTick`] in a schedule, [`FixedPostUpdate`] by default.
@@ -286,13 +289,11 @@ impl Default for TickPlugin {
 impl Plugin for TickPlugin {
     fn build(&self, app: &mut App) {
         fault::plugin(app);
-        app.init_resource::<HairSubsteps>()
-            .init_resource::<HairStep>()
-            .init_resource::<ProcessTime>()
-            .register_type::<HairSubsteps>()
+        setting::resource::<HairSubsteps>(app);
+        setting::resource::<ProcessTime>(app);
+        app.init_resource::<HairStep>()
             .register_type::<HairStep>()
             .register_type::<SubstepLimits>()
-            .register_type::<ProcessTime>()
             .edit_schedule(HairTick, |schedule| {
                 schedule.set_executor(SingleThreadedExecutor::new()).set_build_settings(
                     ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() },
@@ -309,8 +310,6 @@ impl Plugin for TickPlugin {
                     }
                 }
             })
-            .add_systems(PreUpdate, report_substeps.run_if(resource_changed::<HairSubsteps>))
-            .add_systems(PreUpdate, report_process_time.run_if(resource_changed::<ProcessTime>))
             .add_systems(self.schedule, {
                 let tick = run_hair_tick.into_configs();
                 // Where both are in one schedule, hair sees where bodies have come to.

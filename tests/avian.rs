@@ -101,7 +101,8 @@ fn hair_follows_a_collider_that_changes_and_one_that_is_scaled() {
     on_ball_of(&mut app, 0.1);
     app.world_mut().entity_mut(body).insert(AvianHairCollider { friction: 0.8 });
     app.update();
-    assert_eq!(hair_colliders(&mut app), [HairCollider::sphere(0.08).unwrap().with_friction(0.8)]);
+    let expected = HairCollider::sphere(0.08).unwrap().with_friction(0.8).unwrap();
+    assert_eq!(hair_colliders(&mut app), [expected]);
     // Of more parts, and of fewer again.
     let parts =
         [Vec3::ZERO, Vec3::X, Vec3::Z].map(|at| (at, Quat::IDENTITY, Collider::sphere(0.1)));

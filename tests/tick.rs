@@ -2,7 +2,7 @@
 
 mod common;
 use bevy::prelude::*;
-use bevy_keratin::{FaultKind, HairStep, bond::RestShape, prelude::*};
+use bevy_keratin::{DropletRules, FaultKind, HairStep, InvalidValue, bond::RestShape, prelude::*};
 use common::*;
 
 #[derive(Resource, Default)]
@@ -198,13 +198,44 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
     });
     app.world_mut().spawn(Blower { strength: -5.0, ..default() });
     app.world_mut().spawn(PermRod { radius: 0.0, length: 0.1 });
+    app.world_mut().spawn(Winding { from_node: 0, pitch: f32::NAN, seconds: -1.0 });
     app.insert_resource(HairSubsteps::Fixed(0)).insert_resource(HairGravity(Vec3::NAN));
+    app.insert_resource(DropletRules { min: Vec3::NAN, lying: -2.0, ..default() });
     app.update();
     let told = faults(&mut app);
-    // 2 stiffness, 1 drag, 1 influence, 1 solver, 2 contact, 2 collider, 1 blower, 1 rod,
-    // 1 substeps, 1 gravity
-    assert_eq!(told.len(), 13, "{told:#?}");
+    let mut names: Vec<_> = told.iter().map(|f| f.cause::<InvalidValue>().unwrap().what).collect();
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        [
+            "AirDrag::rate (1/s)",
+            "Blower::strength (m/s²)",
+            "ColliderShape::radius (m)",
+            "DropletRules::lying (s)",
+            "DropletRules::min (m)",
+            "HairCollider::friction",
+            "HairGravity (m/s²)",
+            "HairSubsteps",
+            "LockContact::radius (m)",
+            "LockContact::strength (m/s²)",
+            "PermRod::radius (m)",
+            "Solver::iterations",
+            "Stiffness::bend",
+            "Stiffness::bending_length (m)",
+            "Winding::from_node",
+            "Winding::pitch (m)",
+            "Winding::seconds (s)",
+            "the sum of BondInfluence",
+        ]
+    );
     assert!(told.iter().all(|f| f.kind == FaultKind::Setting));
+    // What is edited and what a constructor takes are checked by the same rule.
+    let told_of =
+        |what| told.iter().filter_map(|f| f.cause::<InvalidValue>()).find(|v| v.what == what);
+    assert_eq!(told_of("Blower::strength (m/s²)"), Blower::new(-5.0).err().as_ref());
+    assert_eq!(told_of("PermRod::radius (m)"), PermRod::new(0.0, 0.1).err().as_ref());
+    assert_eq!(told_of("ColliderShape::radius (m)"), HairCollider::sphere(-0.05).err().as_ref());
+    assert!(HairCollider::default().with_friction(f32::NAN).is_err());
     run(&mut app, 0.5);
     assert_eq!(faults(&mut app), []);
     assert!(strand(&app, e).is_finite());

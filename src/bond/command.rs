@@ -2,7 +2,7 @@
 
 use super::{BondInfluence, BondKind, Bonds};
 use crate::{
-    setting::{HairDefault, HairSetting, Notes},
+    setting::{HairDefault, Ranged},
     strand::{Hair, Strand, StrandHistory, Strands},
 };
 use bevy::prelude::*;
@@ -17,7 +17,7 @@ impl Hair {
             world.get_resource::<HairDefault<BondInfluence>>().map(|default| default.0)
         });
         let influence = hair.get().copied().or(default).unwrap_or_default();
-        let influence = influence.mended(&Notes::default()).as_array();
+        let influence = influence.clamped().as_array();
         for_each_strand(&mut hair, |strand, bonds, history| {
             strand.pose(bonds.joints.iter().map(|joint| joint.relaxed(&influence)));
             history.remember(strand);

@@ -19,7 +19,7 @@ pub use systems::BondPlugin;
 
 use crate::{
     parallel::prefetch,
-    setting::{Bound, HairSetting, InvalidValue, Notes},
+    setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
     strand::Strand,
 };
 use bevy::prelude::*;
@@ -117,35 +117,27 @@ impl BondChanges {
     }
 }
 
-/// How much each kind of bond contributes to the shape: the influences f_j of equation 15, as
-/// shares of their sum. Component of a [`Hair`](crate::Hair); where absent,
-/// [`HairDefault<BondInfluence>`](crate::HairDefault) holds.
-///
-/// The default is \[B\] table 1's scenes 1 and 2, hydrogen 33 %, the other 67 % spread as the perm
-/// scene's ionic, disulfide and peptide bonds stand to each other.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct BondInfluence {
-    /// f of the hydrogen bonds, ≥ 0. Default 0.33.
-    pub hydrogen: f32,
-    /// f of the ionic bonds, ≥ 0. Default 0.30.
-    pub ionic: f32,
-    /// f of the disulfide bonds, ≥ 0. Default 0.20.
-    pub disulfide: f32,
-    /// f of the peptide bonds, ≥ 0. Default 0.17.
-    pub peptide: f32,
-}
-
-impl Default for BondInfluence {
-    fn default() -> Self {
-        Self { hydrogen: 0.33, ionic: 0.30, disulfide: 0.20, peptide: 0.17 }
+setting! {
+    /// How much each kind of bond contributes to the shape: the influences f_j of equation 15, as
+    /// shares of their sum. Component of a [`Hair`](crate::Hair); where absent,
+    /// [`HairDefault<BondInfluence>`](crate::HairDefault) holds.
+    ///
+    /// The default is \[B\] table 1's scenes 1 and 2, hydrogen 33 %, the other 67 % spread as the perm
+    /// scene's ionic, disulfide and peptide bonds stand to each other.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct BondInfluence {
+        /// f of the hydrogen bonds.
+        pub hydrogen: f32 = 0.33, in HYDROGEN: 0.0..=1e6, safe 0.0..=1.0, "a share such as 0.33";
+        /// f of the ionic bonds.
+        pub ionic: f32 = 0.30, in IONIC: 0.0..=1e6, safe 0.0..=1.0, "a share such as 0.3";
+        /// f of the disulfide bonds.
+        pub disulfide: f32 = 0.20, in DISULFIDE: 0.0..=1e6, safe 0.0..=1.0, "a share such as 0.2";
+        /// f of the peptide bonds.
+        pub peptide: f32 = 0.17, in PEPTIDE: 0.0..=1e6, safe 0.0..=1.0, "a share such as 0.17";
     }
+    then Self::one_must_count
 }
-
-const INFLUENCE: Bound =
-    Bound::new("BondInfluence", 0.0, 1e6, "shares such as 0.33, 0.3, 0.2, 0.17");
-const INFLUENCE_SUM: Bound =
-    Bound::new("the sum of BondInfluence", 1e-6, 1e7, "at least one kind must count");
 
 impl BondInfluence {
     /// Influences of hydrogen, ionic, disulfide and peptide bonds; only their proportions count.
@@ -158,61 +150,35 @@ impl BondInfluence {
         disulfide: f32,
         peptide: f32,
     ) -> Result<Self, InvalidValue> {
-        for f in [hydrogen, ionic, disulfide, peptide] {
-            INFLUENCE.check(f)?;
-        }
-        INFLUENCE_SUM.check(hydrogen + ionic + disulfide + peptide)?;
-        Ok(Self { hydrogen, ionic, disulfide, peptide })
+        Self { hydrogen, ionic, disulfide, peptide }.checked()
     }
 
     /// The influences by [`BondKind`] as index.
     pub fn as_array(&self) -> [f32; BondKind::COUNT] {
         [self.hydrogen, self.ionic, self.disulfide, self.peptide]
     }
-}
 
-impl HairSetting for BondInfluence {
-    fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        let mended = Self {
-            hydrogen: INFLUENCE.mend(self.hydrogen, d.hydrogen, notes),
-            ionic: INFLUENCE.mend(self.ionic, d.ionic, notes),
-            disulfide: INFLUENCE.mend(self.disulfide, d.disulfide, notes),
-            peptide: INFLUENCE.mend(self.peptide, d.peptide, notes),
-        };
-        let sum = mended.as_array().iter().sum();
-        if INFLUENCE_SUM.mend(sum, 1.0, notes) == sum { mended } else { d }
-    }
-}
-
-/// Wear of the cuticle, which softens hair toward the tip: equations 13 and 14. Component of a
-/// [`Hair`](crate::Hair); where absent, [`HairDefault<Cuticle>`](crate::HairDefault) holds.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct Cuticle {
-    /// s, share of the cuticle lost per length from the root (1/m). Default 0.33, safe 0…10.
-    pub damage: f32,
-    /// k_cut / k_o, the share of stiffness that is gone where the cuticle is. Default 0.5764,
-    /// safe 0…0.9.
-    pub softening: f32,
-}
-
-impl Default for Cuticle {
-    fn default() -> Self {
-        Self { damage: 0.33, softening: 0.5764 }
-    }
-}
-
-const DAMAGE: Bound = Bound::new("Cuticle::damage (1/m)", 0.0, 1e4, "the paper uses 0.33");
-const SOFTENING: Bound = Bound::new("Cuticle::softening", 0.0, 0.99, "the paper uses 0.5764");
-
-impl HairSetting for Cuticle {
-    fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        Self {
-            damage: DAMAGE.mend(self.damage, d.damage, notes),
-            softening: SOFTENING.mend(self.softening, d.softening, notes),
+    fn one_must_count(&mut self, violations: &mut Violations) {
+        const SUM: ValueRange =
+            ValueRange::new("the sum of BondInfluence", 1e-6..=1e7, "at least one kind must count");
+        if let Err(wrong) = SUM.check(self.as_array().iter().sum::<f32>()) {
+            violations.push(wrong);
+            *self = default();
         }
+    }
+}
+
+setting! {
+    /// Wear of the cuticle, which softens hair toward the tip: equations 13 and 14. Component of a
+    /// [`Hair`](crate::Hair); where absent, [`HairDefault<Cuticle>`](crate::HairDefault) holds.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct Cuticle {
+        /// s, share of the cuticle lost per length from the root.
+        pub damage: f32 = 0.33, "1/m" in DAMAGE: 0.0..=1e4, safe 0.0..=10.0, "the paper uses 0.33";
+        /// k_cut / k_o, the share of stiffness that is gone where the cuticle is.
+        pub softening: f32 = 0.5764, in SOFTENING: 0.0..=0.99, safe 0.0..=0.9,
+            "the paper uses 0.5764";
     }
 }
 

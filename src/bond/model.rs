@@ -1,7 +1,10 @@
 //! Side-chain bonds as mathematics: equations 13–16 and 19 of \[B\], on one joint at a time.
 
 use super::BondKind;
-use crate::lanes::{Quaternion, Real, V3};
+use crate::{
+    lanes::{Quaternion, Real, V3},
+    setting::{Ranged, ValueRange, Violations},
+};
 use bevy::reflect::Reflect;
 use glam::{Quat, Vec3};
 
@@ -73,6 +76,26 @@ impl JointBonds {
     pub fn is_valid(&self) -> bool {
         self.shapes.iter().all(|s| s.is_finite())
             && self.rates.iter().all(|b| (0.0..=1.0).contains(b))
+    }
+}
+
+impl JointBonds {
+    /// The range of [`rates`](Self::rates).
+    pub const RATES: ValueRange =
+        ValueRange::new("JointBonds::rates", 0.0..=1.0, "0 all broken, 1 all closed");
+    const SHAPES: ValueRange = ValueRange::new(
+        "JointBonds::shapes",
+        -1.01..=1.01,
+        "give the imaginary part of a unit quaternion",
+    );
+}
+
+impl Ranged for JointBonds {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        for (shape, rate) in self.shapes.iter_mut().zip(&mut self.rates) {
+            Self::RATES.clamp(rate, || 1.0, violations);
+            Self::SHAPES.clamp(shape, || Vec3::ZERO, violations);
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{
     parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
     rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
-    setting::{self, Bound, Notes, Settings},
+    setting::{self, Ranged, Settings, Violations, report},
     strand::{AddedMass, PerHair, Sleep, Strand, StrandOf},
 };
 use bevy::prelude::*;
@@ -41,26 +41,16 @@ pub(crate) fn fit_bonds(
     mut strands: Query<(Entity, &Strand, &mut Bonds, &mut RestShape), Changed<Bonds>>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    const RATE: Bound = Bound::new("a bond's rate", 0.0, 1.0, "0 all broken, 1 all closed");
     for (entity, strand, mut bonds, mut rest) in &mut strands {
         rest.bypass_change_detection().closed = false;
         let bonds = bonds.bypass_change_detection();
         if bonds.joints.len() != strand.edges() {
             *bonds = Bonds::of(strand);
         }
-        let notes = Notes::default();
-        for joint in bonds.joints.iter_mut().filter(|j| !j.is_valid()) {
-            for (shape, rate) in joint.shapes.iter_mut().zip(&mut joint.rates) {
-                *rate = RATE.mend(*rate, 1.0, &notes);
-                if !shape.is_finite() {
-                    RATE.mend(shape.length(), 0.0, &notes);
-                    *shape = Vec3::ZERO;
-                }
-            }
-        }
-        if let Some(wrong) = notes.into_inner().into_iter().next() {
-            faults.write(HairFault::from(wrong).of(entity));
-        }
+        let mut violations = Violations::new();
+        bonds.joints.clamp_values(&mut violations);
+        violations.truncate(1);
+        report(Some(entity), violations, &mut faults);
     }
 }
 

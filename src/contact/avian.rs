@@ -30,7 +30,7 @@ use bevy::{math::Isometry3d, prelude::*};
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(Unknown)]
 pub struct AvianHairCollider {
-    /// Coulomb friction of hair on it, whatever bodies feel. Default 0.3, safe 0…2.
+    /// Coulomb friction of hair on it, whatever bodies feel: [`HairCollider::friction`].
     pub friction: f32,
 }
 

@@ -2,11 +2,10 @@
 
 use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles};
 use crate::{
-    fault::HairFault,
     parallel::prefetch,
     rod::obstacle::{Obstacle, Solid},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
-    setting::{self, Notes, Settings},
+    setting::{self, Ranged, Settings},
     strand::{Hair, Sleep, Sleepers, StillPose, Strand, StrandOf, Strands, TickPose},
 };
 use bevy::prelude::*;
@@ -22,13 +21,12 @@ impl Plugin for ContactPlugin {
         setting::plugin::<LockContact>(app);
         #[cfg(feature = "avian")]
         super::avian::plugin(app);
-        app.register_type::<HairCollider>()
-            .register_type::<ColliderShape>()
+        setting::component::<HairCollider>(app);
+        app.register_type::<ColliderShape>()
             .register_type::<Obstacles>()
             .register_type::<LockNeighbours>()
             .register_required_components::<Hair, Obstacles>()
             .register_required_components::<Hair, LockNeighbours>()
-            .add_systems(PreUpdate, report_colliders)
             .add_systems(
                 HairTick,
                 (
@@ -36,19 +34,6 @@ impl Plugin for ContactPlugin {
                     part_strands.in_set(HairSystems::StrandContact),
                 ),
             );
-    }
-}
-
-fn report_colliders(
-    colliders: Query<(Entity, &HairCollider), Changed<HairCollider>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    for (entity, collider) in &colliders {
-        let notes = Notes::default();
-        collider.mended(&notes);
-        for wrong in notes.into_inner() {
-            faults.write(HairFault::from(wrong).of(entity));
-        }
     }
 }
 
@@ -84,7 +69,7 @@ fn gather_obstacles(
         obstacles.solids.clear();
         obstacles
             .solids
-            .extend(colliders.iter().map(|(c, pose)| seen_from(hair, &c.valid(), pose)));
+            .extend(colliders.iter().map(|(c, pose)| seen_from(hair, &c.clamped(), pose)));
     }
 }
 

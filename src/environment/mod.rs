@@ -10,7 +10,7 @@ pub use systems::EnvironmentPlugin;
 pub(crate) use systems::{LocalBlower, local_blowers};
 
 use crate::{
-    setting::{Bound, HairSetting, InvalidValue, Notes},
+    setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
     strand::TickPose,
 };
 use bevy::prelude::*;
@@ -27,63 +27,54 @@ impl Default for HairGravity {
     }
 }
 
-/// Drag of still air. Component of a [`Hair`](crate::Hair); where absent,
-/// [`HairDefault<AirDrag>`](crate::HairDefault) holds.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct AirDrag {
-    /// Rate at which velocities die away, v′ = −rate · v (1/s). Default 2, safe 0…50.
-    pub rate: f32,
+impl HairGravity {
+    /// The range of each of its components.
+    pub const RANGE: ValueRange =
+        ValueRange::new("HairGravity (m/s²)", -1e4..=1e4, "9.8 down is the Earth's");
 }
 
-impl Default for AirDrag {
-    fn default() -> Self {
-        Self { rate: 2.0 }
+impl Ranged for HairGravity {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        Self::RANGE.clamp(&mut self.0, || Self::default().0, violations);
     }
 }
 
-const DRAG: Bound = Bound::new("AirDrag::rate (1/s)", 0.0, 1e4, "2 is air, 20 is water");
-
-impl HairSetting for AirDrag {
-    fn mended(&self, notes: &Notes) -> Self {
-        Self { rate: DRAG.mend(self.rate, 2.0, notes) }
+setting! {
+    /// Drag of still air. Component of a [`Hair`](crate::Hair); where absent,
+    /// [`HairDefault<AirDrag>`](crate::HairDefault) holds.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct AirDrag {
+        /// Rate at which velocities die away, v′ = −rate · v.
+        pub rate: f32 = 2.0, "1/s" in RATE: 0.0..=1e4, safe 0.0..=50.0, "2 is air, 20 is water";
     }
 }
 
-/// A hair dryer: blows along its transform's forward direction (−Z) and dries what it blows on.
-///
-/// Equation 17 of \[B\]. Despawn it, or set `strength` to 0, to switch it off.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-#[require(Transform, TickPose)]
-pub struct Blower {
-    /// α, the acceleration of an edge across the wind, on the axis (m/s²). Default 3.33, safe 0…30.
-    /// The paper gives no value.
-    pub strength: f32,
-    /// Rate of hydrogen bonds that form per velocity that the wind gives (s/m), equation 19.
-    /// Default 0.3 (print: 0.003 s/cm); 0 blows without drying. On hair that carries water
-    /// ([`Moisture`](crate::Moisture)) it takes that share of it instead, and the bonds follow.
-    pub drying: f32,
-    /// Temperature of the air at the nozzle (°C): it evaporates water. Falls along the axis as a
-    /// jet does, [`jet`](crate::environment::vapour::jet). Default 105 (95 at 5 cm, 47 at 15 cm), safe
-    /// −20…150.
-    pub celsius: f32,
-    /// Speed of the air at the nozzle (m/s), for evaporation and droplets; what pushes hair is
-    /// `strength`. Default 15, safe 0…30.
-    pub speed: f32,
-}
-
-impl Default for Blower {
-    fn default() -> Self {
-        Self { strength: 3.33, drying: 0.3, celsius: 105.0, speed: 15.0 }
+setting! {
+    /// A hair dryer: blows along its transform's forward direction (−Z) and dries what it blows on.
+    ///
+    /// Equation 17 of \[B\]. Despawn it, or set `strength` to 0, to switch it off.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Transform, TickPose)]
+    pub struct Blower {
+        /// α, the acceleration of an edge across the wind, on the axis. The paper gives no value.
+        pub strength: f32 = 3.33, "m/s²" in STRENGTH: 0.0..=1e4, safe 0.0..=30.0,
+            "3.33 is a hair dryer";
+        /// Rate of hydrogen bonds that form per velocity that the wind gives, equation 19 (print:
+        /// 0.003 s/cm); 0 blows without drying. On hair that carries water
+        /// ([`Moisture`](crate::Moisture)) it takes that share of it instead, and the bonds follow.
+        pub drying: f32 = 0.3, "s/m" in DRYING: 0.0..=1e4, safe 0.0..=1.0, "the paper uses 0.3";
+        /// Temperature of the air at the nozzle: it evaporates water. Falls along the axis as a jet
+        /// does, [`jet`](crate::environment::vapour::jet): 105 gives 95 at 5 cm, 47 at 15 cm.
+        pub celsius: f32 = 105.0, "°C" in CELSIUS: -273.15..=1000.0, safe -20.0..=150.0,
+            "a hair dryer's nozzle has 60 to 110";
+        /// Speed of the air at the nozzle, for evaporation and droplets; what pushes hair is
+        /// `strength`.
+        pub speed: f32 = 15.0, "m/s" in SPEED: 0.0..=300.0, safe 0.0..=30.0,
+            "a hair dryer has 10 to 20";
     }
 }
-
-const STRENGTH: Bound = Bound::new("Blower::strength (m/s²)", 0.0, 1e4, "3.33 is a hair dryer");
-const CELSIUS: Bound =
-    Bound::new("Blower::celsius (°C)", -273.15, 1000.0, "a hair dryer's nozzle has 60 to 110");
-const SPEED: Bound = Bound::new("Blower::speed (m/s)", 0.0, 300.0, "a hair dryer has 10 to 20");
-const DRYING: Bound = Bound::new("Blower::drying (s/m)", 0.0, 1e4, "the paper uses 0.3");
 
 impl Blower {
     /// A blower of `strength` (m/s²) with the paper's drying.
@@ -91,27 +82,15 @@ impl Blower {
     /// # Errors
     /// When the strength is negative or not finite.
     pub fn new(strength: f32) -> Result<Self, InvalidValue> {
-        STRENGTH.check(strength)?;
-        Ok(Self { strength, ..default() })
+        Self { strength, ..default() }.checked()
     }
 
     /// The same blower with warmer or colder air (°C at the nozzle).
     ///
     /// # Errors
     /// Below absolute zero, above 1000 °C, or when not a number.
-    pub fn with_celsius(mut self, celsius: f32) -> Result<Self, InvalidValue> {
-        self.celsius = CELSIUS.check(celsius)?;
-        Ok(self)
-    }
-
-    fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        Self {
-            strength: STRENGTH.mend(self.strength, d.strength, notes),
-            drying: DRYING.mend(self.drying, d.drying, notes),
-            celsius: CELSIUS.mend(self.celsius, d.celsius, notes),
-            speed: SPEED.mend(self.speed, d.speed, notes),
-        }
+    pub fn with_celsius(self, celsius: f32) -> Result<Self, InvalidValue> {
+        Self { celsius, ..self }.checked()
     }
 }
 

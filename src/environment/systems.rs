@@ -3,10 +3,9 @@
 use super::{AirDrag, Blower, Climate, HairGravity, WindReceived, vapour::DryingAir, wind::wind};
 use crate::{
     bond::{BondChanges, BondKind, model::drying},
-    fault::{FaultKind, HairFault},
     parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
-    setting::{self, Notes, Settings},
+    setting::{self, Ranged, Settings},
     strand::{AddedMass, Hair, PerHair, Pose, Sleep, Strand, StrandOf, TickPose},
 };
 use bevy::prelude::*;
@@ -17,52 +16,21 @@ pub struct EnvironmentPlugin;
 impl Plugin for EnvironmentPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<AirDrag>(app);
-        app.init_resource::<HairGravity>()
-            .register_type::<HairGravity>()
-            .register_type::<Blower>()
-            .register_type::<WindReceived>()
-            .register_type::<Climate>()
-            .init_resource::<Climate>()
+        setting::component::<Blower>(app);
+        setting::resource::<HairGravity>(app);
+        setting::resource::<Climate>(app);
+        app.register_type::<WindReceived>()
             .init_resource::<DryingAir>()
-            .add_systems(PreUpdate, report_blowers)
-            .add_systems(PreUpdate, report_climate.run_if(resource_changed::<Climate>))
             .add_systems(
                 HairTick,
                 settle_climate.in_set(HairSystems::Air).run_if(resource_changed::<Climate>),
             )
-            .add_systems(PreUpdate, report_gravity.run_if(resource_changed::<HairGravity>))
             .add_systems(HairTick, apply_air.in_set(HairSystems::Air));
     }
 }
 
-fn report_blowers(
-    blowers: Query<(Entity, &Blower), Changed<Blower>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    for (entity, blower) in &blowers {
-        let notes = Notes::default();
-        blower.mended(&notes);
-        for wrong in notes.into_inner() {
-            faults.write(HairFault::from(wrong).of(entity));
-        }
-    }
-}
-
-fn report_gravity(gravity: Res<HairGravity>, mut faults: MessageWriter<HairFault>) {
-    if !gravity.is_finite() {
-        let message = "HairGravity is not finite: no gravity is used until it is";
-        faults.write(HairFault::new(FaultKind::Setting, message));
-    }
-}
-
-fn report_climate(climate: Res<Climate>, mut faults: MessageWriter<HairFault>) {
-    let notes = Notes::default();
-    climate.mended(&notes);
-    setting::tell(None, notes, &mut faults);
-}
-
 fn settle_climate(climate: Res<Climate>, mut air: ResMut<DryingAir>) {
-    *air = DryingAir::of(&climate.mended(&Notes::default()));
+    *air = DryingAir::of(&climate.clamped());
 }
 
 /// A hair's air in its own frame.
@@ -88,7 +56,7 @@ pub(crate) fn local_blowers(
 ) -> Vec<LocalBlower> {
     blowers
         .iter()
-        .map(|(b, pose)| (b.mended(&Notes::default()), pose.now()))
+        .map(|(b, pose)| (b.clamped(), pose.now()))
         .filter(|(blower, _)| blower.strength > 0.0)
         .map(|(blower, pose)| LocalBlower {
             nozzle: frame.point_in(pose.translation),
@@ -117,7 +85,7 @@ fn apply_air(
         Option<&mut WindReceived>,
     )>,
 ) {
-    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
+    let gravity = gravity.clamped().0;
     let air_of = |hair: Entity| {
         let pose = hairs.get(hair).ok()?.now();
         let dt = steps.of(hair)?.dt;

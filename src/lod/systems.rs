@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     schedule::{HairSystems, HairTick, SubstepLimits, first_substep},
-    setting::{HairSetting, Notes},
+    setting::{self, Ranged},
     strand::{Hair, Strand},
 };
 use bevy::prelude::*;
@@ -17,8 +17,8 @@ pub struct LodPlugin;
 
 impl Plugin for LodPlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<HairLod>()
-            .register_type::<LodLevel>()
+        setting::component::<HairLod>(app);
+        app.register_type::<LodLevel>()
             .register_type::<ScreenShare>()
             .register_type::<PresentLod>()
             .register_type::<Carried>()
@@ -27,7 +27,6 @@ impl Plugin for LodPlugin {
             .register_required_components::<HairLod, Guides>()
             .add_observer(forget)
             .add_observer(let_go)
-            .add_systems(PreUpdate, crate::setting::report_changed::<HairLod>)
             .add_systems(
                 HairTick,
                 (
@@ -53,7 +52,7 @@ fn choose(
     mut hairs: Query<(&HairLod, &ScreenShare, &mut PresentLod, &mut SubstepLimits), With<Hair>>,
 ) {
     for (lod, share, mut present, mut limits) in &mut hairs {
-        let lod = lod.mended(&Notes::default());
+        let lod = lod.clamped();
         let level = model::choose(&lod.levels, lod.hysteresis, present.level, share.0);
         let settings = level.checked_sub(1).and_then(|i| lod.levels.get(i));
         present.set_if_neq(PresentLod {

@@ -28,7 +28,7 @@ pub use preset::{HairPreset, PresetSettings};
 pub use scalp::Scalp;
 
 use crate::groom::Groom;
-use crate::setting::{Bound, InvalidValue};
+use crate::setting::{InvalidValue, Ranged, ValueRange, Violations, setting};
 use bevy::prelude::*;
 use core::f32::consts::TAU;
 use surface::Surface;
@@ -40,71 +40,58 @@ pub const HUMAN_DENSITY: f32 = 223e4;
 /// The most strands that one planting gives.
 pub const MAX_ROOTS: usize = 1_000_000;
 
-/// How hair is planted on a mesh. Lengths are in the mesh's own unit, metres as a rule.
-///
-/// ```
-/// # use bevy_keratin::plant::*; use bevy::prelude::*;
-/// let scalp = Sphere::new(0.1).mesh().build();
-/// // 0.2 guides per cm², 12 cm long, in curls as wide as a pencil
-/// let planting = Planting {
-///     density: 0.2e4,
-///     length: 0.12,
-///     nodes: 40,
-///     curl: Some(Curl { radius: 4e-3, pitch: 15e-3, ..default() }),
-///     ..default()
-/// };
-/// let planted = planting.plant(&scalp).unwrap();
-/// assert_eq!(planted.roots.len(), planted.groom.len());
-/// assert!((240..260).contains(&planted.roots.len()));
-/// ```
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct Planting {
-    /// Strands per area (1/m²; 10,000 are one per cm²). Default 10,000, which suits guides; a human
-    /// has [`HUMAN_DENSITY`]. Safe 1…3e6.
-    pub density: f32,
-    /// The same seed gives the same strands.
-    pub seed: u64,
-    /// Nodes of each strand, root and tip included, equally spaced along it. Default 12, safe 2…256;
-    /// at least four for each turn of a curl.
-    pub nodes: u32,
-    /// Length along the strand (m). Default 0.2, safe 0.005…2.
-    pub length: f32,
-    /// How much shorter than that a strand may be, a share. Default 0.1, safe 0…0.9.
-    pub length_variation: f32,
-    /// Which way strands are combed. Default [`Comb::Out`].
-    pub comb: Comb,
-    /// How far strands lean from the surface's normal the way they are combed (rad). Default 0,
-    /// safe 0…1.4; never flat, so that they leave the scalp. Hair on a head leans by about 1.
-    pub lean: f32,
-    /// How far a strand's own direction may be off (rad). Default 0.08, safe 0…1.
-    pub jitter: f32,
-    /// Curls. Default `None`: straight.
-    pub curl: Option<Curl>,
-    /// Locks, whose tips draw together. Default `None`.
-    pub clump: Option<Clump>,
-    /// How strands turn and lie down over the mesh. Default `None`: each grows straight on.
-    pub fall: Option<Fall>,
-    /// Where strands are cut. Default `None`.
-    pub cut: Option<Cut>,
-}
-
-impl Default for Planting {
-    fn default() -> Self {
-        Self {
-            density: 1e4,
-            seed: 0,
-            nodes: 12,
-            length: 0.2,
-            length_variation: 0.1,
-            comb: Comb::Out,
-            lean: 0.0,
-            jitter: 0.08,
-            curl: None,
-            clump: None,
-            fall: None,
-            cut: None,
-        }
+setting! {
+    /// How hair is planted on a mesh. Lengths are in the mesh's own unit, metres as a rule.
+    ///
+    /// ```
+    /// # use bevy_keratin::plant::*; use bevy::prelude::*;
+    /// let scalp = Sphere::new(0.1).mesh().build();
+    /// // 0.2 guides per cm², 12 cm long, in curls as wide as a pencil
+    /// let planting = Planting {
+    ///     density: 0.2e4,
+    ///     length: 0.12,
+    ///     nodes: 40,
+    ///     curl: Some(Curl { radius: 4e-3, pitch: 15e-3, ..default() }),
+    ///     ..default()
+    /// };
+    /// let planted = planting.plant(&scalp).unwrap();
+    /// assert_eq!(planted.roots.len(), planted.groom.len());
+    /// assert!((240..260).contains(&planted.roots.len()));
+    /// ```
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct Planting {
+        /// Strands per area; 10,000 are one per cm² and suit guides, a human has [`HUMAN_DENSITY`].
+        pub density: f32 = 1e4, "1/m²" in DENSITY: 1e-6..=1e12, safe 1.0..=3e6,
+            "guides have 10000, a human 2230000; give what is per cm² times 10000";
+        /// The same seed gives the same strands.
+        pub seed: u64 = 0;
+        /// Nodes of each strand, root and tip included, equally spaced along it; at least four for
+        /// each turn of a curl.
+        pub nodes: u32 = 12, in NODES: 2.0..=4096.0, safe 2.0..=256.0, "12 suit straight hair";
+        /// Length along the strand.
+        pub length: f32 = 0.2, "m" in LENGTH: 1e-5..=1e4, safe 0.005..=2.0,
+            "0.2 reaches the shoulders";
+        /// How much shorter than that a strand may be, a share.
+        pub length_variation: f32 = 0.1, in LENGTH_VARIATION: 0.0..=0.95, safe 0.0..=0.9,
+            "0.1 is natural";
+        /// Which way strands are combed.
+        pub comb: Comb = Comb::Out => Ranged::clamp_values;
+        /// How far strands lean from the surface's normal the way they are combed; never flat, so
+        /// that they leave the scalp. Hair on a head leans by about 1.
+        pub lean: f32 = 0.0, "rad" in LEAN: 0.0..=1.45, safe 0.0..=1.4,
+            "0 stands on the surface; flatter than 1.45 strands would run into it";
+        /// How far a strand's own direction may be off.
+        pub jitter: f32 = 0.08, "rad" in JITTER: 0.0..=1.5, safe 0.0..=1.0,
+            "0.08 is combed, 0.5 wild";
+        /// Curls; `None` is straight.
+        pub curl: Option<Curl> = None => Ranged::clamp_values;
+        /// Locks, whose tips draw together.
+        pub clump: Option<Clump> = None => Ranged::clamp_values;
+        /// How strands turn and lie down over the mesh; with `None` each grows straight on.
+        pub fall: Option<Fall> = None => Ranged::clamp_values;
+        /// Where strands are cut.
+        pub cut: Option<Cut> = None => Ranged::clamp_values;
     }
 }
 
@@ -137,25 +124,55 @@ pub enum Comb {
     },
 }
 
-/// A helix around the way a strand grows.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct Curl {
-    /// Radius of the helix (m). Default 5 mm, safe 0.5…50 mm. Near the root it grows from nothing.
-    pub radius: f32,
-    /// Length along the helix's axis of one turn (m). Default 25 mm, safe 1…500 mm. Together they
-    /// bend the strand with a radius of curvature of radius + (pitch/2π)²/radius.
-    pub pitch: f32,
-    /// By how much radius and pitch may differ from strand to strand, a share. Default 0.1,
-    /// safe 0…0.9.
-    pub variation: f32,
-    /// Which strands turn together. Default [`CurlPhase::PerClump`].
-    pub phase: CurlPhase,
+impl Ranged for Comb {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        const TURN: ValueRange =
+            ValueRange::new("Comb::Whorl::turn (rad)", -1e3..=1e3, "0 is away, π/2 around");
+        match self {
+            Self::Out => {}
+            Self::Along(along) => direction("Comb::Along", along, violations),
+            Self::Whorl { center, turn } => {
+                place("Comb::Whorl::center (m)", center, violations);
+                TURN.clamp(turn, || 0.0, violations);
+            }
+            Self::Parted { at, across, along } => {
+                place("Comb::Parted::at (m)", at, violations);
+                direction("Comb::Parted::across", across, violations);
+                place("Comb::Parted::along", along, violations);
+            }
+        }
+    }
 }
 
-impl Default for Curl {
-    fn default() -> Self {
-        Self { radius: 5e-3, pitch: 25e-3, variation: 0.1, phase: CurlPhase::default() }
+fn place(what: &'static str, at: &mut Vec3, violations: &mut Violations) {
+    Cut::AT.named(what).clamp(at, || Vec3::ZERO, violations);
+}
+
+/// A direction needs a length.
+fn direction(what: &'static str, way: &mut Vec3, violations: &mut Violations) {
+    let range = ValueRange::new(what, 1e-6..=1e6, "give a finite vector that is longer than 0");
+    if let Err(wrong) = range.check(way.length()) {
+        violations.push(wrong);
+        *way = Vec3::NEG_Y;
+    }
+}
+
+setting! {
+    /// A helix around the way a strand grows.
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct Curl {
+        /// Radius of the helix. Near the root it grows from nothing.
+        pub radius: f32 = 5e-3, "m" in RADIUS: 1e-6..=1e3, safe 0.5e-3..=0.05,
+            "0.005 is a finger's curl";
+        /// Length along the helix's axis of one turn. Together they bend the strand with a radius of
+        /// curvature of radius + (pitch/2π)²/radius.
+        pub pitch: f32 = 25e-3, "m" in PITCH: 1e-6..=1e3, safe 1e-3..=0.5,
+            "0.025 is a finger's curl";
+        /// By how much radius and pitch may differ from strand to strand, a share.
+        pub variation: f32 = 0.1, in VARIATION: 0.0..=0.9, "0.1 is natural";
+        /// Which strands turn together.
+        pub phase: CurlPhase = CurlPhase::PerClump;
     }
 }
 
@@ -185,59 +202,50 @@ pub enum CurlPhase {
     PerStrand,
 }
 
-/// Locks: strands draw together toward their tips around one of them.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct Clump {
-    /// How far apart the locks' middles are at the scalp (m). Default 12 mm, safe 1…100 mm.
-    pub spacing: f32,
-    /// Share of the way to the lock's middle that tips go. Default 0.5, safe 0…0.95.
-    pub strength: f32,
-}
-
-impl Default for Clump {
-    fn default() -> Self {
-        Self { spacing: 12e-3, strength: 0.5 }
+setting! {
+    /// Locks: strands draw together toward their tips around one of them.
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct Clump {
+        /// How far apart the locks' middles are at the scalp.
+        pub spacing: f32 = 12e-3, "m" in SPACING: 1e-5..=1e3, safe 1e-3..=0.1,
+            "locks are 0.012 apart";
+        /// Share of the way to the lock's middle that tips go.
+        pub strength: f32 = 0.5, in STRENGTH: 0.0..=0.95, "0.5 shows locks";
     }
 }
 
-/// How strands turn toward a direction as they grow, as hair does that is heavy or combed down. They
-/// keep off the mesh on their way, at rest already.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct Fall {
-    /// Where they turn. Default down.
-    pub toward: Vec3,
-    /// Over what length they turn there (m). Default 0.03, safe 0.002…10.
-    pub over: f32,
-    /// How far off the mesh they stay (m). Default 4 mm, safe 0…0.1.
-    pub clearance: f32,
-    /// How much farther off those stay that grow higher up, and so lie on top (m per m of height
-    /// above the lowest root). Default 0.06, safe 0…1.
-    pub layering: f32,
-}
-
-impl Default for Fall {
-    fn default() -> Self {
-        Self { toward: Vec3::NEG_Y, over: 0.03, clearance: 4e-3, layering: 0.06 }
+setting! {
+    /// How strands turn toward a direction as they grow, as hair does that is heavy or combed down. They
+    /// keep off the mesh on their way, at rest already.
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct Fall {
+        /// Where they turn.
+        pub toward: Vec3 = Vec3::NEG_Y => |way, violations| direction("Fall::toward", way, violations);
+        /// Over what length they turn there.
+        pub over: f32 = 0.03, "m" in OVER: 1e-4..=1e6, safe 0.002..=10.0, "0.03 is soft hair";
+        /// How far off the mesh they stay.
+        pub clearance: f32 = 4e-3, "m" in CLEARANCE: 0.0..=1e3, safe 0.0..=0.1,
+            "0.004 lies on the scalp";
+        /// How much farther off those stay that grow higher up, and so lie on top: m per m of height
+        /// above the lowest root.
+        pub layering: f32 = 0.06, in LAYERING: 0.0..=10.0, safe 0.0..=1.0, "0.06 is full hair";
     }
 }
 
-/// A plane at which strands are cut.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct Cut {
-    /// A point of the plane (m).
-    pub at: Vec3,
-    /// Toward the side where hair stays. Default up.
-    pub normal: Vec3,
-    /// The least length that is left, also of strands that grow beyond the plane (m). Default 0.02.
-    pub least: f32,
-}
-
-impl Default for Cut {
-    fn default() -> Self {
-        Self { at: Vec3::ZERO, normal: Vec3::Y, least: 0.02 }
+setting! {
+    /// A plane at which strands are cut.
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct Cut {
+        /// A point of the plane.
+        pub at: Vec3 = Vec3::ZERO, "m" in AT: -1e6..=1e6, "give a finite place";
+        /// Toward the side where hair stays.
+        pub normal: Vec3 = Vec3::Y => |way, violations| direction("Cut::normal", way, violations);
+        /// The least length that is left, also of strands that grow beyond the plane.
+        pub least: f32 = 0.02, "m" in LEAST: 1e-5..=1e4, safe 1e-3..=1.0,
+            "0.02 is a centimetre of stubble or two";
     }
 }
 
@@ -261,40 +269,6 @@ pub struct Planted {
     /// Where each strand grows, in the groom's order.
     pub roots: Vec<RootOnMesh>,
 }
-
-const DENSITY: Bound = Bound::new(
-    "Planting::density (1/m²)",
-    1e-6,
-    1e12,
-    "guides have 10000, a human 2230000; give what is per cm² times 10000",
-);
-const NODES: Bound = Bound::new("Planting::nodes", 2.0, 4096.0, "12 suit straight hair");
-const LENGTH: Bound = Bound::new("Planting::length (m)", 1e-5, 1e4, "0.2 reaches the shoulders");
-const SHORTER: Bound = Bound::new("Planting::length_variation", 0.0, 0.95, "0.1 is natural");
-const LEAN: Bound = Bound::new(
-    "Planting::lean (rad)",
-    0.0,
-    1.45,
-    "0 stands on the surface; flatter than 1.45 strands would run into it",
-);
-const JITTER: Bound = Bound::new("Planting::jitter (rad)", 0.0, 1.5, "0.08 is combed, 0.5 wild");
-const RADIUS: Bound = Bound::new("Curl::radius (m)", 1e-6, 1e3, "0.005 is a finger's curl");
-const PITCH: Bound = Bound::new("Curl::pitch (m)", 1e-6, 1e3, "0.025 is a finger's curl");
-const VARIATION: Bound = Bound::new("Curl::variation", 0.0, 0.9, "0.1 is natural");
-const SPACING: Bound = Bound::new("Clump::spacing (m)", 1e-5, 1e3, "locks are 0.012 apart");
-const STRENGTH: Bound = Bound::new("Clump::strength", 0.0, 0.95, "0.5 shows locks");
-const OVER: Bound = Bound::new("Fall::over (m)", 1e-4, 1e6, "0.03 is soft hair");
-const CLEARANCE: Bound = Bound::new("Fall::clearance (m)", 0.0, 1e3, "0.004 lies on the scalp");
-const LAYERING: Bound = Bound::new("Fall::layering", 0.0, 10.0, "0.06 is full hair");
-const LEAST: Bound =
-    Bound::new("Cut::least (m)", 1e-5, 1e4, "0.02 is a centimetre of stubble or two");
-const TURN: Bound = Bound::new("Comb::Whorl::turn (rad)", -1e3, 1e3, "0 is away, π/2 around");
-const WAY: Bound = Bound::new(
-    "the length of a direction or place in Planting",
-    1e-6,
-    1e6,
-    "give finite vectors, directions longer than 0",
-);
 
 impl Planting {
     /// Plants hair all over `mesh`, whose triangles may be a list or a strip, indexed or not.
@@ -343,49 +317,8 @@ impl Planting {
     }
 
     fn check(&self) -> Result<(), PlantError> {
-        DENSITY.check(self.density)?;
-        NODES.check(self.nodes as f32)?;
-        LENGTH.check(self.length)?;
-        SHORTER.check(self.length_variation)?;
-        LEAN.check(self.lean)?;
-        JITTER.check(self.jitter)?;
-        let place = |v: Vec3| WAY.check(v.length().max(1.0)).map(drop);
-        let way = |v: Vec3| WAY.check(v.length()).map(drop);
-        match self.comb {
-            Comb::Out => {}
-            Comb::Along(along) => way(along)?,
-            Comb::Whorl { center, turn } => {
-                place(center)?;
-                TURN.check(turn)?;
-            }
-            Comb::Parted { at, across, along } => {
-                place(at)?;
-                way(across)?;
-                place(along)?;
-            }
-        }
-        if let Some(clump) = self.clump {
-            SPACING.check(clump.spacing)?;
-            STRENGTH.check(clump.strength)?;
-        }
-        if let Some(fall) = self.fall {
-            way(fall.toward)?;
-            OVER.check(fall.over)?;
-            CLEARANCE.check(fall.clearance)?;
-            LAYERING.check(fall.layering)?;
-        }
-        if let Some(cut) = self.cut {
-            place(cut.at)?;
-            way(cut.normal)?;
-            LEAST.check(cut.least)?;
-        }
-        self.curl.map_or(Ok(()), |curl| self.check_curl(&curl))
-    }
-
-    fn check_curl(&self, curl: &Curl) -> Result<(), PlantError> {
-        RADIUS.check(curl.radius)?;
-        PITCH.check(curl.pitch)?;
-        VARIATION.check(curl.variation)?;
+        self.checked()?;
+        let Some(curl) = self.curl else { return Ok(()) };
         let turns = self.length / curl.turn_length();
         let expected = (4.0 * turns).ceil() + 1.0;
         if (self.nodes as f32) < expected {

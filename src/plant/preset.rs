@@ -6,7 +6,7 @@ use super::{
 };
 #[cfg(feature = "render")]
 use crate::render::{HairFollowers, HairLook, Melanin};
-use crate::{AirDrag, LockContact, Solver, Stiffness};
+use crate::{AirDrag, LockContact, Solver, Stiffness, setting::Ranged};
 use bevy::prelude::*;
 
 /// A head of hair: how it is planted, how stiff it is and how it looks.
@@ -102,6 +102,7 @@ impl HairPreset {
         mesh: &Mesh,
         scalp: &Scalp,
     ) -> Result<Planted, PlantError> {
+        let scalp = &scalp.checked()?;
         let density = scalp.mask();
         let length = |place: &RootPlace| self.length_share(scalp, place.position);
         let direction = |place: &RootPlace| self.direction(scalp, place.position);

@@ -1,48 +1,37 @@
 //! The scalp: where hair grows on a head.
 
 use super::RootPlace;
+use crate::setting::setting;
 use bevy::{math::ops::atan2, prelude::*};
 use core::f32::consts::PI;
 
-/// A head's frame, from which a natural hairline follows: over the forehead, in front of and around
-/// the ears, down to the nape. In the space of the head's mesh.
-///
-/// ```
-/// # use bevy_keratin::plant::*; use bevy::prelude::*;
-/// let head = Sphere::new(0.1).mesh().build();
-/// let scalp = Scalp::default().mask();
-/// let planted = Planting::default().plant_with(&head, &PlantingMaps::new().density(&scalp)).unwrap();
-/// assert!(planted.groom.strands().all(|s| s.points[0].y > -0.08));
-/// ```
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct Scalp {
-    /// The middle between the ears (m). Default the origin.
-    pub center: Vec3,
-    /// Toward the crown. Default +Y.
-    pub up: Dir3,
-    /// Toward the face, as far as it is not up. Default +Z.
-    pub front: Dir3,
-    /// From the centre to the crown (m). Default 0.11.
-    pub height: f32,
-    /// How much higher the hairline is, as an angle at the centre (rad): a high forehead above 0, a
-    /// low one below. Default 0, safe −0.2…0.3.
-    pub recede: f32,
-    /// Over what angle at the centre density fades out at the hairline (rad). Default 0.1,
-    /// safe 0…0.5.
-    pub fade: f32,
-}
-
-impl Default for Scalp {
-    fn default() -> Self {
-        Self {
-            center: Vec3::ZERO,
-            up: Dir3::Y,
-            front: Dir3::Z,
-            height: 0.11,
-            recede: 0.0,
-            fade: 0.1,
-        }
+setting! {
+    /// A head's frame, from which a natural hairline follows: over the forehead, in front of and around
+    /// the ears, down to the nape. In the space of the head's mesh.
+    ///
+    /// ```
+    /// # use bevy_keratin::plant::*; use bevy::prelude::*;
+    /// let head = Sphere::new(0.1).mesh().build();
+    /// let scalp = Scalp::default().mask();
+    /// let planted = Planting::default().plant_with(&head, &PlantingMaps::new().density(&scalp)).unwrap();
+    /// assert!(planted.groom.strands().all(|s| s.points[0].y > -0.08));
+    /// ```
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct Scalp {
+        /// The middle between the ears.
+        pub center: Vec3 = Vec3::ZERO, "m" in CENTER: -1e6..=1e6, "the middle between the ears";
+        /// Toward the crown.
+        pub up: Dir3 = Dir3::Y;
+        /// Toward the face, as far as it is not up.
+        pub front: Dir3 = Dir3::Z;
+        /// From the centre to the crown.
+        pub height: f32 = 0.11, "m" in HEIGHT: 1e-6..=1e6, safe 0.05..=0.5, "a head has 0.11";
+        /// How much higher the hairline is, as an angle at the centre: a high forehead above 0, a low
+        /// one below.
+        pub recede: f32 = 0.0, "rad" in RECEDE: -3.2..=3.2, safe -0.2..=0.3, "0 is an adult's";
+        /// Over what angle at the centre density fades out at the hairline.
+        pub fade: f32 = 0.1, "rad" in FADE: 0.0..=3.2, safe 0.0..=0.5, "0.1 is soft";
     }
 }
 

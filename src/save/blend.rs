@@ -4,12 +4,12 @@ use super::{Hairdo, HairdoError, StyledStrand};
 use crate::{
     bond::{BondKind, Cuticle, JointBonds},
     rod::frame::full,
-    setting::Bound,
+    setting::ValueRange,
 };
 use bevy::prelude::*;
 
-const SHARE: Bound =
-    Bound::new("Hairdo::blend's t", 0.0, 1.0, "0 is the first hairdo, 1 the second");
+const SHARE: ValueRange =
+    ValueRange::new("Hairdo::blend's t", 0.0..=1.0, "0 is the first hairdo, 1 the second");
 
 impl Hairdo {
     /// The hairdo between two of the same groom: `a` at `t` = 0, `b` at 1, each to the bit.

@@ -5,7 +5,7 @@ use crate::{
     bond::{BondChanges, Bonds, Cuticle, RestShape},
     environment::HairGravity,
     fault::{FaultKind, HairFault},
-    setting::{HairDefault, HairSetting, Notes},
+    setting::{HairDefault, HairSetting, Ranged},
     strand::{AddedMass, Hair, HeldNodes, Strand, StrandHistory, Strands},
     treatment::{Treatments, WindingProgress, WoundOn},
     water::{Moisture, WaterLedger, Wetting},
@@ -49,8 +49,7 @@ impl Hairdo {
         self.must_fit(nodes)?;
         let surroundings = Surroundings {
             wetting: setting(world, hair),
-            gravity: (world.get_resource::<HairGravity>())
-                .map_or(0.0, |g| if g.is_finite() { g.length() } else { 0.0 }),
+            gravity: (world.get_resource::<HairGravity>()).map_or(0.0, |g| g.clamped().length()),
         };
         let mut came = 0.0;
         for (member, style) in members.into_iter().zip(&self.strands) {
@@ -117,7 +116,7 @@ fn members(world: &World, hair: Entity) -> Result<Vec<Entity>, HairdoError> {
 fn setting<T: HairSetting>(world: &World, hair: Entity) -> T {
     let default = world.get_resource::<HairDefault<T>>().map(|default| &default.0);
     let own = world.get::<T>(hair).or(default);
-    own.cloned().unwrap_or_default().mended(&Notes::default())
+    own.cloned().unwrap_or_default().clamped()
 }
 
 /// What decides how wet hair with some water is.

@@ -15,7 +15,7 @@ use crate::{
         obstacle::{Obstacle, Solid},
     },
     schedule::{HairStep, HairSystems, HairTick, first_substep},
-    setting::{self, Settings},
+    setting::{self, Ranged, Settings},
     strand::{
         AddedMass, Hair, HeldNodes, Pose, Sleep, Sleepers, StillPose, Strand, StrandModel,
         StrandOf, Strands, TickPose,
@@ -80,7 +80,7 @@ struct EverySetting<'w, 's> {
 impl EverySetting<'_, '_> {
     fn of(&self, hair: Entity) -> Conditions {
         Conditions {
-            gravity: if self.gravity.is_finite() { self.gravity.0 } else { Vec3::ZERO },
+            gravity: self.gravity.clamped().0,
             sleep: self.sleep.of(hair),
             stiffness: self.stiffness.of(hair),
             solver: self.solver.of(hair),
@@ -225,7 +225,7 @@ fn watch(
     let mut index_of = EntityHashMap::<usize>::default();
     for (hair, frame, mut watch, _, members) in &mut hairs {
         let seen = colliders.iter().map(|(collider, pose)| {
-            let Obstacle { solid, friction, .. } = seen_from(frame, &collider.valid(), pose);
+            let Obstacle { solid, friction, .. } = seen_from(frame, &collider.clamped(), pose);
             let rotation = frame.now().rotation.inverse() * pose.now().rotation;
             Seen { solid, friction, rotation }
         });

@@ -16,7 +16,7 @@ use crate::{
     parallel::tables,
     rod::{block::BlockLanes, obstacle::Obstacle, step::weigh},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
-    setting::{self, Settings},
+    setting::{self, Ranged, Settings},
     strand::{AddedMass, HeldNodes, Sleep, Strand, StrandModel, StrandOf, TickPose},
 };
 use bevy::prelude::*;
@@ -103,7 +103,7 @@ fn step_springs(
     mut strands: Query<(Entity, &StrandOf, &Sleep, &mut Strand, &AddedMass, Option<&HeldNodes>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
+    let gravity = gravity.clamped().0;
     let level = Level::new();
     let params_of = |hair: Entity| {
         let (obstacles, pose) = hairs.get(hair).ok()?;

@@ -24,7 +24,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     parallel::prefetch,
     rod::frame::{darboux, full, parallel_transport},
-    setting::{HairSetting, Notes},
+    setting::Ranged,
 };
 use bevy::prelude::*;
 
@@ -148,11 +148,7 @@ pub enum StrandModel {
     MassSpring,
 }
 
-impl HairSetting for StrandModel {
-    fn mended(&self, _: &Notes) -> Self {
-        *self
-    }
-}
+impl Ranged for StrandModel {}
 
 /// What weighs on a strand and softens it, beside its own dry state: water does. Written by the
 /// tick; empty on dry hair.

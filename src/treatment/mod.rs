@@ -6,8 +6,8 @@ pub mod winding;
 pub use systems::TreatmentPlugin;
 
 use crate::{
-    bond::BondKind,
-    setting::{Bound, InvalidValue, Notes},
+    bond::{BondKind, JointBonds},
+    setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
     strand::{HeldNodes, TickPose},
 };
 use bevy::prelude::*;
@@ -42,9 +42,13 @@ pub struct Treat {
 /// The share of disulfide bonds that perm lotion leaves (\[B\] §4).
 pub const LOTION_DISULFIDE: f32 = 0.8;
 
-const RATE: Bound = Bound::new("a bond's rate", 0.0, 1.0, "0 all broken, 1 all closed");
-
 impl Treat {
+    /// The range of [`rates`](Self::rates).
+    pub const RATES: ValueRange = JointBonds::RATES.named("Treat::rates");
+    /// The range of [`seconds`](Self::seconds).
+    pub const SECONDS: ValueRange =
+        ValueRange::new("Treat::seconds (s)", 0.0..=1e6, "0 acts at once").with_safe(0.0..=60.0);
+
     fn rates(target: Entity, rates: [Option<f32>; BondKind::COUNT]) -> Self {
         Self { target, joints: None, rates, seconds: 0.0 }
     }
@@ -85,7 +89,7 @@ impl Treat {
     /// When the rate is outside 0 to 1.
     pub fn set(target: Entity, kind: BondKind, rate: f32) -> Result<Self, InvalidValue> {
         let mut rates = [None; BondKind::COUNT];
-        rates[kind as usize] = Some(RATE.check(rate)?);
+        rates[kind as usize] = Some(Self::RATES.check(rate)?);
         Ok(Self::rates(target, rates))
     }
 
@@ -100,15 +104,14 @@ impl Treat {
         self.seconds = seconds;
         self
     }
+}
 
-    /// Values from anywhere: brought into their ranges.
-    fn mended(mut self, notes: &Notes) -> Self {
-        const SECONDS: Bound = Bound::new("Treat::seconds (s)", 0.0, 1e6, "0 acts at once");
-        self.seconds = SECONDS.mend(self.seconds, 0.0, notes);
+impl Ranged for Treat {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        Self::SECONDS.clamp(&mut self.seconds, || 0.0, violations);
         for rate in self.rates.iter_mut().flatten() {
-            *rate = RATE.mend(*rate, 1.0, notes);
+            Self::RATES.clamp(rate, || 1.0, violations);
         }
-        self
     }
 }
 
@@ -126,26 +129,20 @@ impl Treatments {
     }
 }
 
-/// A cylinder along Y that strands are wound round: see [`Winding`]. Despawn it to release them.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-#[require(Transform, TickPose)]
-pub struct PermRod {
-    /// Radius (m). Default 0.03, safe 0.003…0.1. A joint turns by 2 asin(l/2R): keep segments below
-    /// 1.7 times the radius.
-    pub radius: f32,
-    /// Length (m). Default 0.2.
-    pub length: f32,
-}
-
-impl Default for PermRod {
-    fn default() -> Self {
-        Self { radius: 0.03, length: 0.2 }
+setting! {
+    /// A cylinder along Y that strands are wound round: see [`Winding`]. Despawn it to release them.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Transform, TickPose)]
+    pub struct PermRod {
+        /// Radius. A joint turns by 2 asin(l/2R): keep segments below 1.7 times the radius.
+        pub radius: f32 = 0.03, "m" in RADIUS: 1e-3..=10.0, safe 0.003..=0.1,
+            "3 cm is the paper's size";
+        /// Length.
+        pub length: f32 = 0.2, "m" in LENGTH: 1e-3..=100.0, safe 0.01..=1.0,
+            "0.2 takes a row of hair";
     }
 }
-
-const ROD_RADIUS: Bound = Bound::new("PermRod::radius (m)", 1e-3, 10.0, "3 cm is the paper's size");
-const ROD_LENGTH: Bound = Bound::new("PermRod::length (m)", 1e-3, 100.0, "0.2 takes a row of hair");
 
 impl PermRod {
     /// A rod of `radius` and `length` (m).
@@ -153,14 +150,7 @@ impl PermRod {
     /// # Errors
     /// When one is not between 1 mm and 10 m (radius) or 100 m (length).
     pub fn new(radius: f32, length: f32) -> Result<Self, InvalidValue> {
-        Ok(Self { radius: ROD_RADIUS.check(radius)?, length: ROD_LENGTH.check(length)? })
-    }
-
-    fn mended(&self, notes: &Notes) -> Self {
-        Self {
-            radius: ROD_RADIUS.mend(self.radius, 0.03, notes),
-            length: ROD_LENGTH.mend(self.length, 0.2, notes),
-        }
+        Self { radius, length }.checked()
     }
 }
 
@@ -177,25 +167,22 @@ pub struct WoundOn(pub Entity);
 #[relationship_target(relationship = WoundOn)]
 pub struct WoundStrands(Vec<Entity>);
 
-/// How a strand is wound on its rod.
-///
-/// The nodes are guided, as by a hairdresser's hand: from where the strand is when winding begins,
-/// through ever tighter helices whose radius shrinks to the rod's, each of the strand's own length,
-/// so nothing is stretched on the way. Their shape is the bonds' to remember.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct Winding {
-    /// The first node on the rod, from the root. Default 2.
-    pub from_node: usize,
-    /// Advance along the rod's axis per turn (m). Default 0.004: turns lie side by side.
-    pub pitch: f32,
-    /// Time that winding takes (s). Default 2.
-    pub seconds: f32,
-}
-
-impl Default for Winding {
-    fn default() -> Self {
-        Self { from_node: 2, pitch: 0.004, seconds: 2.0 }
+setting! {
+    /// How a strand is wound on its rod.
+    ///
+    /// The nodes are guided, as by a hairdresser's hand: from where the strand is when winding begins,
+    /// through ever tighter helices whose radius shrinks to the rod's, each of the strand's own length,
+    /// so nothing is stretched on the way. Their shape is the bonds' to remember.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct Winding {
+        /// The first node on the rod, from the root, which is the scalp's.
+        pub from_node: usize = 2, in FROM_NODE: 1.0..=1e6, safe 1.0..=64.0, "2 keeps off the scalp";
+        /// Advance along the rod's axis per turn. At 4 mm turns lie side by side.
+        pub pitch: f32 = 0.004, "m" in PITCH: -10.0..=10.0, safe 0.0..=0.1,
+            "0.004 lays turns side by side";
+        /// Time that winding takes; 0 winds at once.
+        pub seconds: f32 = 2.0, "s" in SECONDS: 0.0..=1e6, safe 0.0..=60.0, "2 is quick";
     }
 }
 

@@ -9,7 +9,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     parallel::for_each,
     schedule::{HairStep, HairSystems, HairTick, ProcessTime},
-    setting::Notes,
+    setting::{self, Ranged, report},
     strand::{HeldNodes, Strand, StrandOf, Strands, TickPose},
 };
 use bevy::prelude::*;
@@ -19,17 +19,16 @@ pub struct TreatmentPlugin;
 
 impl Plugin for TreatmentPlugin {
     fn build(&self, app: &mut App) {
+        setting::component::<PermRod>(app);
+        setting::component::<Winding>(app);
         app.add_message::<Treat>()
             .register_type::<Treat>()
             .register_type::<Treatments>()
-            .register_type::<PermRod>()
             .register_type::<WoundOn>()
             .register_type::<WoundStrands>()
-            .register_type::<Winding>()
             .register_type::<WindingProgress>()
             .register_required_components::<Strand, Treatments>()
             .add_observer(release)
-            .add_systems(PreUpdate, report_rods)
             .add_systems(
                 HairTick,
                 (begin_treatments, apply_treatments).chain().in_set(HairSystems::Treatments),
@@ -45,12 +44,8 @@ fn begin_treatments(
     mut faults: MessageWriter<HairFault>,
 ) {
     for request in requests.read() {
-        let notes = Notes::default();
-        let treat = request.clone().mended(&notes);
-        let entity = treat.target;
-        for wrong in notes.into_inner() {
-            faults.write(HairFault::from(wrong).of(entity));
-        }
+        let (treat, entity) = (request.clamped(), request.target);
+        report(Some(entity), request.violations(), &mut faults);
         if let Ok(members) = hairs.get(entity) {
             let mut members = strands.iter_many_mut(members.collection());
             while let Some(mut treatments) = members.fetch_next() {
@@ -71,7 +66,7 @@ fn apply_treatments(
     process: Res<ProcessTime>,
     mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
 ) {
-    let dt = step.dt * process.mended(&Notes::default());
+    let dt = step.dt * process.clamped().0;
     let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();
     for_each(&mut items, |(bonds, changes, treatments)| {
         let changes = changes.bypass_change_detection();
@@ -89,19 +84,6 @@ fn apply_treatments(
         }
         treatments.acting.retain(|t| t.seconds > 0.0);
     });
-}
-
-fn report_rods(
-    rods: Query<(Entity, &PermRod), Changed<PermRod>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    for (entity, rod) in &rods {
-        let notes = Notes::default();
-        rod.mended(&notes);
-        for wrong in notes.into_inner() {
-            faults.write(HairFault::from(wrong).of(entity));
-        }
-    }
 }
 
 fn wind_strands(
@@ -122,7 +104,7 @@ fn wind_strands(
         .filter_map(|(of, on, strand, settings, wound, held)| {
             let hair = hairs.get(of.0).ok()?.now();
             let (rod, pose) = rods.get(on.0).ok()?;
-            let (rod, pose) = (rod.mended(&Notes::default()), pose.now());
+            let (rod, pose) = (rod.clamped(), pose.now());
             let scale = pose.scale / hair.scale;
             let rod = Rod {
                 center: hair.point_in(pose.translation),
@@ -130,12 +112,11 @@ fn wind_strands(
                 radius: rod.radius * scale,
                 half_length: 0.5 * rod.length * scale,
             };
-            Some((rod, (*hair, *pose), strand, settings, wound, held))
+            Some((rod, (*hair, *pose), strand, settings.clamped(), wound, held))
         })
         .collect();
     for_each(&mut items, |(rod, (hair, pose), strand, settings, wound, held)| {
-        // The root is the scalp's, so the first node that can be wound is the next.
-        let from = settings.from_node.max(1);
+        let from = settings.from_node;
         if from >= strand.edges() {
             return;
         }
@@ -144,11 +125,9 @@ fn wind_strands(
         }
         // Once wound, hair is fast on its rod and goes where that goes and turns.
         if wound.on_rod.is_empty() {
-            let advanced = wound.progress + step.dt / settings.seconds.max(step.dt);
-            wound.progress = if advanced.is_finite() { advanced.min(1.0) } else { 1.0 };
-            let pitch = if settings.pitch.is_finite() { settings.pitch } else { 0.0 };
-            let path =
-                winding(rod, &wound.start, strand.rest_lengths(), from, pitch, wound.progress);
+            wound.progress = (wound.progress + step.dt / settings.seconds.max(step.dt)).min(1.0);
+            let (lengths, progress) = (strand.rest_lengths(), wound.progress);
+            let path = winding(rod, &wound.start, lengths, from, settings.pitch, progress);
             if wound.progress >= 1.0 {
                 wound.on_rod = path.iter().map(|p| pose.point_in(hair.point_out(*p))).collect();
             }

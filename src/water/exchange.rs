@@ -12,7 +12,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
     schedule::HairStep,
-    setting::{Notes, Settings},
+    setting::{Ranged, Settings, report},
     strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
 };
 use crate::{
@@ -28,7 +28,7 @@ pub(super) fn run_showers(
 ) {
     for (mut shower, pose) in &mut showers {
         let shower = shower.bypass_change_detection();
-        let mut valid = shower.mended(&Notes::default());
+        let mut valid = shower.clamped();
         let pose = pose.now();
         let drops: Vec<Droplet> = (valid.make(step.dt))
             .map(|drop| {
@@ -139,7 +139,8 @@ pub(super) fn exchange_water(
                 continue;
             }
         };
-        let share = if soak.wetness.is_nan() { 0.0 } else { soak.wetness.clamp(0.0, 1.0) };
+        report(Some(soak.target), soak.violations(), &mut faults);
+        let share = soak.clamped().wetness;
         for member in members {
             if let Ok((of, strand, _, mut moisture, ..)) = strands.get_mut(member) {
                 let capacity = wetting.of(of.0).capacity();
@@ -151,8 +152,8 @@ pub(super) fn exchange_water(
         }
     }
     let damp = air.equilibrium > 0.0;
-    let process = process.mended(&Notes::default());
-    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
+    let process = process.clamped().0;
+    let gravity = gravity.clamped().0;
     let water_of = |hair: Entity| {
         let pose = *hairs.get(hair).ok()?.0.now();
         let wetting = wetting.of(hair);

@@ -15,7 +15,7 @@ use crate::{
     lanes::LANES,
     parallel::{emptied, for_each_block, prefetch},
     schedule::HairStep,
-    setting::{Notes, Settings},
+    setting::{Ranged, Settings},
     strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
 };
 use crate::{environment::vapour::WATER, schedule::ProcessTime};
@@ -114,7 +114,7 @@ pub(super) fn wet_strands(
             loaded.push(ride.strand);
         }
     }
-    let process = process.mended(&Notes::default());
+    let process = process.clamped().0;
     outcomes.clear();
     outcomes.resize(drops.len(), Outcome::default());
     let mut heads = heads(&mut hairs, &wetting, &mut strands, step.index == 0, rooms);

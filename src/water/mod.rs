@@ -28,26 +28,25 @@ pub use droplet::{Droplet, Ride, Shower};
 pub use moisture::{Moisture, Wetting};
 pub use systems::WaterPlugin;
 
+use crate::setting::{Ranged, ValueRange, Violations, setting};
 use bevy::prelude::*;
 
-/// What droplets may do. A resource.
-#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Resource, Default, Clone, PartialEq)]
-pub struct DropletRules {
-    /// Lower corner of the box that droplets may be in (m). Default −100 on each axis. A floor
-    /// drains at its height.
-    pub min: Vec3,
-    /// Upper corner (m). Default 100 on each axis.
-    pub max: Vec3,
-    /// How long a drop lies on a collider before it has run off (s). Default 2.
-    pub lying: f32,
-    /// Whether drops that touch become one. Default true; \[W\]'s own drops do not.
-    pub merging: bool,
-}
-
-impl Default for DropletRules {
-    fn default() -> Self {
-        Self { min: Vec3::splat(-100.0), max: Vec3::splat(100.0), lying: 2.0, merging: true }
+setting! {
+    /// What droplets may do. A resource.
+    #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Resource, Default, Clone, PartialEq)]
+    pub struct DropletRules {
+        /// Lower corner of the box that droplets may be in. A floor drains at its height.
+        pub min: Vec3 = Vec3::splat(-100.0), "m" in MIN: f32::NEG_INFINITY..=f32::INFINITY,
+            "-100 is far below";
+        /// Upper corner.
+        pub max: Vec3 = Vec3::splat(100.0), "m" in MAX: f32::NEG_INFINITY..=f32::INFINITY,
+            "100 is far above, and more than the lower corner";
+        /// How long a drop lies on a collider before it has run off.
+        pub lying: f32 = 2.0, "s" in LYING: 0.0..=f32::INFINITY, safe 0.0..=60.0,
+            "2 lets it run off";
+        /// Whether drops that touch become one; \[W\]'s own drops do not.
+        pub merging: bool = true;
     }
 }
 
@@ -58,8 +57,20 @@ impl Default for DropletRules {
 pub struct Soak {
     /// The [`Hair`](crate::Hair) or strand.
     pub target: Entity,
-    /// Share of what hair can bind: 1 soaks through, 0 dries. Taken to the nearest of 0…1.
+    /// Share of what hair can bind: 1 soaks through, 0 dries.
     pub wetness: f32,
+}
+
+impl Soak {
+    /// The range of [`wetness`](Self::wetness).
+    pub const WETNESS: ValueRange =
+        ValueRange::new("Soak::wetness", 0.0..=1.0, "1 soaks through, 0 dries");
+}
+
+impl Ranged for Soak {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        Self::WETNESS.clamp(&mut self.wetness, || 0.0, violations);
+    }
 }
 
 /// The water that came, is there and has gone (m³). A resource, kept by the tick; `held` is of the

@@ -15,7 +15,7 @@ use crate::{
     parallel::for_each,
     rod::obstacle::Obstacle,
     schedule::HairStep,
-    setting::{Notes, Settings, tell},
+    setting::{Ranged, Settings, Violations, report},
     strand::{Hair, Pose, Strand, StrandOf, TickPose},
 };
 use crate::{
@@ -28,7 +28,7 @@ use bevy::prelude::*;
 struct Moving<'a> {
     entity: Entity,
     drop: &'a mut Droplet,
-    notes: Notes,
+    violations: Violations,
     /// Water that the ledger did not know (m³); negative for water that somebody took.
     new: f64,
     evaporated: f64,
@@ -56,26 +56,26 @@ pub(super) fn move_droplets(
     if droplets.is_empty() {
         return;
     }
-    let dt = step.dt;
-    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let process = process.mended(&Notes::default());
+    let (dt, rules) = (step.dt, rules.clamped());
+    let gravity = gravity.clamped().0;
+    let process = process.clamped().0;
     let world = TickPose::default();
     let obstacles: Vec<Obstacle> =
-        colliders.iter().map(|(c, pose)| seen_from(&world, &c.valid(), pose)).collect();
+        colliders.iter().map(|(c, pose)| seen_from(&world, &c.clamped(), pose)).collect();
     let blowers = local_blowers(world.now(), &blowers);
     let mut items: Vec<Moving<'_>> = droplets
         .iter_mut()
         .map(|(entity, drop)| Moving {
             entity,
             drop: drop.into_inner(),
-            notes: Notes::default(),
+            violations: Violations::new(),
             new: 0.0,
             evaporated: 0.0,
             ends: false,
         })
         .collect();
-    for_each(&mut items, |Moving { drop, notes, new, evaporated, ends, .. }| {
-        drop.mend(notes);
+    for_each(&mut items, |Moving { drop, violations, new, evaporated, ends, .. }| {
+        drop.repair(violations);
         *new = drop.volume - drop.counted;
         drop.before = drop.position;
 
@@ -116,10 +116,10 @@ pub(super) fn move_droplets(
         let inside = (drop.position.cmpge(rules.min) & drop.position.cmple(rules.max)).all();
         *ends = !inside || drop.lying > rules.lying || drop.volume < 1e-15;
     });
-    for Moving { entity, notes, new, evaporated, ends, .. } in items {
+    for Moving { entity, violations, new, evaporated, ends, .. } in items {
         ledger.book(new);
         ledger.book(-evaporated);
-        tell(Some(entity), notes, &mut faults);
+        report(Some(entity), violations, &mut faults);
         if ends {
             // What is left is counted when it goes.
             commands.entity(entity).despawn();

@@ -9,9 +9,8 @@ use super::{
     tuft,
 };
 use crate::{
-    fault::HairFault,
     schedule::{HairStep, HairSystems, HairTick},
-    setting::{self, Notes, tell},
+    setting,
     strand::Strand,
 };
 use bevy::prelude::*;
@@ -23,19 +22,17 @@ impl Plugin for WaterPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<Wetting>(app);
         tuft::plugin(app);
-        app.init_resource::<DropletRules>()
-            .init_resource::<WaterLedger>()
+        setting::resource::<DropletRules>(app);
+        setting::component::<Shower>(app);
+        app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
             .add_message::<Soak>()
-            .register_type::<DropletRules>()
             .register_type::<WaterLedger>()
             .register_type::<Droplet>()
-            .register_type::<Shower>()
             .register_type::<Moisture>()
             .register_required_components::<Strand, Moisture>()
             .add_observer(count_lost_droplet)
             .add_observer(count_lost_moisture)
-            .add_systems(PreUpdate, report_showers)
             .add_systems(
                 HairTick,
                 (run_showers, exchange_water).chain().in_set(HairSystems::WaterExchange),
@@ -52,17 +49,6 @@ impl Plugin for WaterPlugin {
                 HairTick,
                 (follow_strands, close_books).chain().in_set(HairSystems::Ledger),
             );
-    }
-}
-
-fn report_showers(
-    showers: Query<(Entity, &Shower), Changed<Shower>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    for (entity, shower) in &showers {
-        let notes = Notes::default();
-        shower.mended(&notes);
-        tell(Some(entity), notes, &mut faults);
     }
 }
 

@@ -164,7 +164,7 @@ fn grooms_that_cannot_be_used_are_told_once() {
     let told = &app.world().resource::<Told>().0;
     assert!(told[0].kind == FaultKind::Groom && told[0].message.contains("not loaded"), "{told:?}");
     assert_eq!(told[1].cause(), Some(&GroomError::Empty));
-    assert!(told[2].to_string().contains("nodes to resample to is 1"), "{}", told[2]);
+    assert!(told[2].to_string().contains("GroomGuides::nodes is 1"), "{}", told[2]);
     assert_eq!(told.len(), 3, "{told:?}");
 }
 

@@ -131,7 +131,7 @@ fn a_moving_floor_takes_hair_along_at_every_level() {
         let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
         app.world_mut().entity_mut(hair).insert(coarse(5, substeps));
         zoom(&mut app, hair, 0.1);
-        let floor = HairCollider::plane(Dir3::Y).with_friction(1.0);
+        let floor = HairCollider::plane(Dir3::Y).with_friction(1.0).unwrap();
         let floor = app.world_mut().spawn((floor, Transform::from_xyz(0.0, -0.15, 0.0))).id();
         app.world_mut().get_mut::<Strand>(e).unwrap().positions_mut()[8].x = 0.01;
         run(&mut app, 3.0);
