@@ -1,6 +1,6 @@
 //! What a game may do to a hair's shape at once: put it back, or make the present one its own.
 
-use super::{BondInfluence, BondKind, Bonds};
+use super::{bonds::Bonds, kind::BondKind, settings::BondInfluence};
 use crate::{
     setting::{HairDefault, Ranged},
     strand::{Hair, Strand, StrandHistory, Strands},

@@ -4,8 +4,8 @@
 //! by side and never go by way of memory. Two such fours are computed with at once.
 
 use super::{
-    BondKind, JointBonds,
-    model::{Remembered, changed, rest_shape},
+    kind::BondKind,
+    model::{JointBonds, Remembered, changed, rest_shape},
 };
 use crate::lanes::{Quaternion, Real, V3, turned};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};

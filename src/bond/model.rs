@@ -1,6 +1,6 @@
 //! Side-chain bonds as mathematics: equations 13–16 and 19 of \[B\], on one joint at a time.
 
-use super::BondKind;
+use super::kind::BondKind;
 use crate::{
     lanes::{Quaternion, Real, V3},
     setting::{Ranged, ValueRange, Violations},

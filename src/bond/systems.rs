@@ -1,9 +1,12 @@
 //! The bonds' two places in the tick: `RestShape` (equation 15) and `BondUpdate` (equation 16).
 
 use super::{
-    BondChanges, BondInfluence, BondKind, Bonds, Cuticle, RestShape,
+    bonds::{BondChanges, Bonds},
+    kind::BondKind,
     lanes::{Frames, change, rest_shapes},
     model::cuticle_factor,
+    rest::{Key, RestShape},
+    settings::{BondInfluence, Cuticle},
 };
 use crate::{
     fault::HairFault,
@@ -37,7 +40,7 @@ impl Plugin for BondPlugin {
 
 /// Gives new strands their bonds, and mends what game code wrote into them. Our own writes bypass
 /// change detection, so `Changed` means somebody else's.
-pub(crate) fn fit_bonds(
+fn fit_bonds(
     mut strands: Query<(Entity, &Strand, &mut Bonds, &mut RestShape), Changed<Bonds>>,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -52,16 +55,6 @@ pub(crate) fn fit_bonds(
         violations.truncate(1);
         report(Some(entity), violations, &mut faults);
     }
-}
-
-/// What rest shapes depend on besides bonds and the present shape, resolved once a substep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
-pub(super) struct Key {
-    influence: [f32; BondKind::COUNT],
-    stiffness: Stiffness,
-    cuticle: Cuticle,
-    iterations: u32,
-    dt: f32,
 }
 
 /// A strand whose rest shape is not what it was.

@@ -1,6 +1,6 @@
 //! Why hair cannot be planted.
 
-use super::MAX_ROOTS;
+use super::recipe::MAX_ROOTS;
 use crate::{groom::GroomError, setting::InvalidValue};
 use bevy::mesh::PrimitiveTopology;
 
@@ -115,4 +115,10 @@ pub enum PlantError {
     /// What a groom refuses.
     #[error(transparent)]
     Groom(#[from] GroomError),
+}
+
+impl From<InvalidValue> for PlantError {
+    fn from(value: InvalidValue) -> Self {
+        Self::Setting(value)
+    }
 }

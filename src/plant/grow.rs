@@ -1,7 +1,8 @@
 //! How strands grow from their roots: an axis that is stepped along, and a helix around it.
 
 use super::{
-    Comb, Curl, CurlPhase, Planting, PlantingMaps, RootPlace,
+    map::{PlantingMaps, RootPlace},
+    recipe::{Comb, Curl, CurlPhase, Planting},
     shell::Shell,
     surface::{Root, Surface},
 };

@@ -1,6 +1,6 @@
 //! Maps: what differs from place to place.
 
-use super::PlantError;
+use super::error::PlantError;
 use bevy::prelude::*;
 
 /// A place on a mesh, as maps see it.

@@ -1,8 +1,11 @@
 //! Presets: hair that looks right untouched, from straight to coily and from short to long.
 
 use super::{
-    Clump, Comb, Curl, CurlPhase, Cut, Fall, PlantError, Planted, Planting, PlantingMaps,
-    RootPlace, scalp::Scalp,
+    error::PlantError,
+    map::{PlantingMaps, RootPlace},
+    planting::Planted,
+    recipe::{Clump, Comb, Curl, CurlPhase, Cut, Fall, Planting},
+    scalp::Scalp,
 };
 #[cfg(feature = "render")]
 use crate::render::{HairFollowers, HairLook, Melanin};

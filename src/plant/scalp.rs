@@ -1,6 +1,6 @@
 //! The scalp: where hair grows on a head.
 
-use super::RootPlace;
+use super::map::RootPlace;
 use crate::setting::setting;
 use bevy::{math::ops::atan2, prelude::*};
 use core::f32::consts::PI;

@@ -4,7 +4,9 @@
 //! Sample Sets"), with distances that shrink where the density map asks for less.
 
 use super::{
-    MAX_ROOTS, PlantError, PlantingMaps,
+    error::PlantError,
+    map::PlantingMaps,
+    recipe::MAX_ROOTS,
     surface::{Root, Surface},
 };
 use crate::grid::UniformGrid;

@@ -1,6 +1,6 @@
 //! A mesh as a surface on which points are drawn.
 
-use super::{PlantError, RootPlace};
+use super::{error::PlantError, map::RootPlace};
 use bevy::{
     mesh::{Indices, MeshVertexAttribute, PrimitiveTopology, VertexAttributeValues},
     prelude::*,
