@@ -46,18 +46,18 @@ pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 pub use lod::{HairLod, LodLevel, PresentLod, ScreenShare};
 pub use mass_spring::Springs;
 pub use plugins::HairPlugins;
-pub use rod::{Solver, Stiffness, StretchProjection};
+pub use rod::{HairSolver, Stiffness, StretchProjection};
 #[cfg(feature = "save")]
 pub use save::{Hairdo, HairdoError};
 pub use schedule::{HairStep, HairSubsteps, HairSystems, HairTick, ProcessTime};
 pub use setting::{HairDefault, InvalidValue, ValueRange};
 pub use sleep::HairSleep;
 pub use strand::{
-    AddedMass, Hair, HairInertia, HeldNodes, Sleep, Sleepers, Strand, StrandError, StrandModel,
-    StrandOf, Strands,
+    AddedMass, Hair, HairInertia, HeldNodes, Sleepers, Strand, StrandError, StrandModel, StrandOf,
+    StrandSleep, Strands,
 };
 pub use treatment::{PermRod, Treat, Winding, WoundOn, WoundStrands};
-pub use water::{Droplet, DropletRules, Moisture, Shower, Soak, WaterLedger, Wetting};
+pub use water::{Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting};
 
 /// What most games need.
 pub mod prelude {
@@ -77,8 +77,9 @@ pub mod prelude {
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
         HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairLod, HairPlugins,
-        HairSleep, HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact, Moisture, PermRod,
-        ProcessTime, ScreenShare, Shower, Sleep, Soak, Solver, Stiffness, Strand, StrandModel,
-        StrandOf, Strands, StretchProjection, Treat, WaterLedger, Wetting, Winding, WoundOn,
+        HairSleep, HairSolver, HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact,
+        Moisture, PermRod, ProcessTime, ScreenShare, Shower, SoakHair, Stiffness, Strand,
+        StrandModel, StrandOf, StrandSleep, Strands, StretchProjection, Treat, WaterLedger,
+        Wetting, Winding, WoundOn,
     };
 }

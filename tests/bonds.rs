@@ -12,7 +12,7 @@ use common::*;
 fn bent(hertz: f64, iterations: u32, turn: f32) -> (App, Entity, Vec<Vec3>) {
     let mut app = test_app(hertz);
     no_gravity(&mut app);
-    app.insert_resource(HairDefault(Solver { iterations, ..default() }))
+    app.insert_resource(HairDefault(HairSolver { iterations, ..default() }))
         .insert_resource(HairDefault(AirDrag { rate: 6.0 }));
     let (_, entity) = one_strand(&mut app, 0.24, 8, Vec3::Y);
     run(&mut app, 0.1);
@@ -184,7 +184,7 @@ fn a_slow_treatment_takes_its_time() {
     assert!((rate - 0.5).abs() < 0.01, "half way at half time, not {rate}");
     run(&mut app, 1.1);
     assert_eq!(app.world().get::<Bonds>(e).unwrap().joints[3].rates[0], 0.0);
-    // A quarter of an hour under lotion passes in a quarter of a minute.
+    // A group of an hour under lotion passes in a group of a minute.
     app.insert_resource(ProcessTime(60.0));
     let lotion = Treat::set(hair, BondKind::Disulfide, 0.2).unwrap();
     app.world_mut().write_message(lotion.over(900.0));

@@ -216,7 +216,7 @@ fn vertex_colours_and_images_are_masks() {
     let bald = straight(5e4).plant_with(&mesh, &maps).unwrap_err();
     assert!(matches!(bald, PlantError::NoRoots { .. }));
 
-    // Hair in the quarter around the pixel in the upper left, v = 0.
+    // Hair in the group around the pixel in the upper left, v = 0.
     let mut values = vec![0.0; 64];
     for y in 0..4 {
         values[8 * y..8 * y + 4].fill(1.0);

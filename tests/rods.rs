@@ -18,7 +18,7 @@ fn cantilever(hertz: f64, iterations: u32, segments: usize, bending_length: f32)
     let mut app = test_app(hertz);
     no_wear(&mut app);
     app.insert_resource(HairDefault(AirDrag { rate: 8.0 }))
-        .insert_resource(HairDefault(Solver { iterations, ..default() }))
+        .insert_resource(HairDefault(HairSolver { iterations, ..default() }))
         .insert_resource(HairDefault(Stiffness::from_bending_length(bending_length).unwrap()));
     let (_, entity) = one_strand(&mut app, 0.24, segments, Vec3::X);
     run(&mut app, 10.0);
@@ -81,7 +81,7 @@ fn settled_hair_looks_the_same_at_any_rate_iterations_and_segments() {
 fn literal_projections_can_be_chosen_and_stretch_more() {
     let strain = |projection| {
         let mut app = test_app(60.0);
-        app.insert_resource(HairDefault(Solver { projection, limiter_steps: 0, ..default() }))
+        app.insert_resource(HairDefault(HairSolver { projection, limiter_steps: 0, ..default() }))
             .insert_resource(HairDefault(Stiffness { orientation_weight: Some(1.0), ..default() }));
         let (_, entity) = one_strand(&mut app, 0.48, 16, Vec3::X);
         let mut peak = 0.0_f32;

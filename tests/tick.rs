@@ -188,7 +188,7 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
         Stiffness { bending_length: -1.0, bend: 7.0, orientation_weight: None },
         AirDrag { rate: f32::NAN },
         BondInfluence { hydrogen: 0.0, ionic: 0.0, disulfide: 0.0, peptide: 0.0 },
-        Solver { iterations: 0, ..default() },
+        HairSolver { iterations: 0, ..default() },
         LockContact { radius: f32::INFINITY, strength: -3.0 },
     ));
     app.world_mut().spawn((HairCollider::default(), Transform::from_xyz(0.0, -2.0, 0.0)));
@@ -219,7 +219,7 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
             "LockContact::radius (m)",
             "LockContact::strength (m/s²)",
             "PermRod::radius (m)",
-            "Solver::iterations",
+            "HairSolver::iterations",
             "Stiffness::bend",
             "Stiffness::bending_length (m)",
             "Winding::from_node",

@@ -318,7 +318,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
         .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
     if kind == Kind::Projection {
-        app.insert_resource(HairDefault(Solver { limiter_steps: 0, ..default() }));
+        app.insert_resource(HairDefault(HairSolver { limiter_steps: 0, ..default() }));
     } else if let Some(radius) = head {
         let floor = HairCollider::plane(Dir3::Y);
         app.world_mut().spawn((HairCollider::sphere(radius).expect("a head"), Transform::IDENTITY));

@@ -24,7 +24,7 @@ pub struct Settings<'w, 's> {
     cuticle: ResMut<'w, HairDefault<Cuticle>>,
     contact: ResMut<'w, HairDefault<LockContact>>,
     drag: ResMut<'w, HairDefault<AirDrag>>,
-    solver: ResMut<'w, HairDefault<Solver>>,
+    solver: ResMut<'w, HairDefault<HairSolver>>,
     gravity: ResMut<'w, HairGravity>,
     substeps: ResMut<'w, HairSubsteps>,
     view: ResMut<'w, HairDefault<HairView>>,
@@ -52,7 +52,7 @@ pub struct Water<'w, 's> {
     strewn: ResMut<'w, Strewn>,
     ledger: Res<'w, WaterLedger>,
     droplets: Query<'w, 's, (), With<Droplet>>,
-    soak: MessageWriter<'w, Soak>,
+    soak: MessageWriter<'w, SoakHair>,
 }
 
 /// How the next treatment is given.
@@ -219,10 +219,10 @@ impl Settings<'_, '_> {
         let Water { climate, process, strewn, ledger, droplets, soak } = &mut self.water;
         if let Ok((hair, _)) = self.hairs.single() {
             ui.horizontal(|ui| {
-                for (label, wetness) in [("Soak through", 1.0), ("Towel", 0.3), ("Dry", 0.0)] {
+                for (label, wetness) in [("SoakHair through", 1.0), ("Towel", 0.3), ("Dry", 0.0)] {
                     if ui.button(label).clicked() {
                         self.orders.write(Order::Remember);
-                        soak.write(Soak { target: hair, wetness });
+                        soak.write(SoakHair { target: hair, wetness });
                     }
                 }
             });
@@ -257,10 +257,10 @@ impl Settings<'_, '_> {
     }
 
     pub fn solver(&mut self, ui: &mut Ui) {
-        edited!(self.solver, |s: &mut Solver| {
-            slide_count(ui, &mut s.iterations, Solver::ITERATIONS, "iterations");
-            slide_count(ui, &mut s.limiter_steps, Solver::LIMITER_STEPS, "limiter steps");
-            slide(ui, &mut s.internal_damping, Solver::INTERNAL_DAMPING, "damping (1/s)");
+        edited!(self.solver, |s: &mut HairSolver| {
+            slide_count(ui, &mut s.iterations, HairSolver::ITERATIONS, "iterations");
+            slide_count(ui, &mut s.limiter_steps, HairSolver::LIMITER_STEPS, "limiter steps");
+            slide(ui, &mut s.internal_damping, HairSolver::INTERNAL_DAMPING, "damping (1/s)");
         });
         let mut auto = *self.substeps == HairSubsteps::Auto;
         let now = self.substeps.count(1.0 / 60.0);

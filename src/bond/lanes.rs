@@ -7,7 +7,7 @@ use super::{
     kind::BondKind,
     model::{JointBonds, Remembered, changed, rest_shape},
 };
-use crate::lanes::{Quaternion, Real, V3, turned};
+use crate::lanes::{Quaternion, Real, V3, transposed};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use glam::Quat;
 
@@ -64,7 +64,8 @@ fn rest_shapes_in<S: Simd>(
             rest_shape(omega, &bonds(simd, filled(joints)), &influence);
         let [x, y, z, w] = [halves(x), halves(y), halves(z), halves(w)];
         for (half, four) in darboux.chunks_mut(4).enumerate() {
-            for (to, rest) in four.iter_mut().zip(turned([x[half], y[half], z[half], w[half]])) {
+            for (to, rest) in four.iter_mut().zip(transposed([x[half], y[half], z[half], w[half]]))
+            {
                 *to = Quat::from_array(rest);
             }
         }
@@ -84,8 +85,8 @@ fn change_in<S: Simd>(
         let omega = present(simd, &mut before, filled(orientations));
         let mut bonds = bonds(simd, filled(joints));
         let asked = |k: usize| changes.get(k).copied().unwrap_or_default();
-        let low = turned([asked(0), asked(1), asked(2), asked(3)]);
-        let high = turned([asked(4), asked(5), asked(6), asked(7)]);
+        let low = transposed([asked(0), asked(1), asked(2), asked(3)]);
+        let high = transposed([asked(4), asked(5), asked(6), asked(7)]);
         for (j, bond) in bonds.iter_mut().enumerate() {
             *bond = changed(*bond, lanes(simd, low[j], high[j]), omega);
         }
@@ -93,10 +94,10 @@ fn change_in<S: Simd>(
         let rows = |half: usize| {
             let row = |lanes| halves(lanes)[half];
             [
-                turned([row(a.shape.x), row(a.shape.y), row(a.shape.z), row(b.shape.x)]),
-                turned([row(b.shape.y), row(b.shape.z), row(c.shape.x), row(c.shape.y)]),
-                turned([row(c.shape.z), row(d.shape.x), row(d.shape.y), row(d.shape.z)]),
-                turned([row(a.rate), row(b.rate), row(c.rate), row(d.rate)]),
+                transposed([row(a.shape.x), row(a.shape.y), row(a.shape.z), row(b.shape.x)]),
+                transposed([row(b.shape.y), row(b.shape.z), row(c.shape.x), row(c.shape.y)]),
+                transposed([row(c.shape.z), row(d.shape.x), row(d.shape.y), row(d.shape.z)]),
+                transposed([row(a.rate), row(b.rate), row(c.rate), row(d.rate)]),
             ]
         };
         for (half, four) in joints.chunks_mut(4).enumerate() {
@@ -150,8 +151,9 @@ fn present<S: Simd>(
 
 #[inline(always)]
 fn quaternions<S: Simd>(simd: S, low: [&Quat; 4], high: [&Quat; 4]) -> Quaternion<f32x8<S>> {
-    let rows =
-        |[a, b, c, d]: [&Quat; 4]| turned([a.to_array(), b.to_array(), c.to_array(), d.to_array()]);
+    let rows = |[a, b, c, d]: [&Quat; 4]| {
+        transposed([a.to_array(), b.to_array(), c.to_array(), d.to_array()])
+    };
     let (low, high) = (rows(low), rows(high));
     let at = |i: usize| lanes(simd, low[i], high[i]);
     Quaternion::new(V3::new(at(0), at(1), at(2)), at(3))
@@ -182,8 +184,8 @@ fn numbers([a, b, c, d]: [&JointBonds; 4]) -> [[[f32; 4]; 4]; 4] {
         bytemuck::cast(c.shapes),
         bytemuck::cast(d.shapes),
     ];
-    let third = |t: usize| turned([shapes[0][t], shapes[1][t], shapes[2][t], shapes[3][t]]);
-    [third(0), third(1), third(2), turned([a.rates, b.rates, c.rates, d.rates])]
+    let third = |t: usize| transposed([shapes[0][t], shapes[1][t], shapes[2][t], shapes[3][t]]);
+    [third(0), third(1), third(2), transposed([a.rates, b.rates, c.rates, d.rates])]
 }
 
 #[cfg(test)]

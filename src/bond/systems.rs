@@ -11,10 +11,10 @@ use super::{
 use crate::{
     fault::HairFault,
     parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
-    rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
+    rod::{HairSolver, Stiffness, constraint::stiffness_per_iteration},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Ranged, Settings, Violations, report},
-    strand::{AddedMass, PerHair, Sleep, Strand, StrandOf},
+    strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep},
 };
 use bevy::prelude::*;
 use fearless_simd::Level;
@@ -65,8 +65,8 @@ fn generate_rest_shapes(
     influence: Settings<BondInfluence>,
     stiffness: Settings<Stiffness>,
     cuticle: Settings<Cuticle>,
-    solver: Settings<Solver>,
-    mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape)>,
+    solver: Settings<HairSolver>,
+    mut strands: Query<(&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape)>,
 ) {
     let key_of = |hair: Entity| {
         let stride = steps.of(hair)?;
@@ -150,10 +150,10 @@ fn has_softened(before: &[f32], now: &[f32]) -> bool {
 
 /// A strand whose bonds are to change.
 type Changing<'a> =
-    (&'a Strand, &'a mut Bonds, &'a mut BondChanges, &'a mut RestShape, &'a mut Sleep);
+    (&'a Strand, &'a mut Bonds, &'a mut BondChanges, &'a mut RestShape, &'a mut StrandSleep);
 
 fn update_bonds(
-    mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut Sleep)>,
+    mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut StrandSleep)>,
 ) {
     let ahead = |(strand, bonds, changes, ..): &Changing<'_>| {
         prefetch(&bonds.joints);

@@ -188,8 +188,8 @@ impl LockNeighbours {
     }
 
     /// Asks for lists that know bridges of water this long (m), from the next ones on.
-    pub(crate) fn look_beyond(&mut self, longest: f32) {
-        self.0.look_beyond(longest);
+    pub(crate) fn set_extra_margin(&mut self, longest: f32) {
+        self.0.set_extra_margin(longest);
     }
 
     /// The bridges of water at every node, where contact has seen them last. `wet` has a row for each,

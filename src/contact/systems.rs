@@ -6,7 +6,7 @@ use crate::{
     rod::obstacle::{Obstacle, Solid},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{Hair, Sleep, Sleepers, StillPose, Strand, StrandOf, Strands, TickPose},
+    strand::{Hair, Sleepers, StillPose, Strand, StrandOf, StrandSleep, Strands, TickPose},
 };
 use bevy::prelude::*;
 
@@ -31,7 +31,7 @@ impl Plugin for ContactPlugin {
                 HairTick,
                 (
                     gather_obstacles.in_set(HairSystems::Obstacles),
-                    part_strands.in_set(HairSystems::StrandContact),
+                    push_strands_apart.in_set(HairSystems::StrandContact),
                 ),
             );
     }
@@ -73,11 +73,11 @@ fn gather_obstacles(
     }
 }
 
-pub(crate) fn part_strands(
+pub(crate) fn push_strands_apart(
     steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
-    mut strands: Query<(&mut Strand, &mut Sleep, &mut StillPose), With<StrandOf>>,
+    mut strands: Query<(&mut Strand, &mut StrandSleep, &mut StillPose), With<StrandOf>>,
 ) {
     for (hair, members, mut neighbours, sleepers) in &mut hairs {
         let LockContact { radius, strength } = contact.of(hair);
@@ -87,12 +87,12 @@ pub(crate) fn part_strands(
         let Some(stride) = steps.of(hair) else { continue };
         let list = &mut neighbours.bypass_change_detection().0;
         list.clear();
-        // Carried strands neither push nor are pushed. Where water joins strands, it joins them too.
-        let with_carried = list.looks_beyond();
+        // Follower strands neither push nor are pushed. Where water joins strands, it joins them too.
+        let with_followers = list.has_extra_margin();
         for some in members.collection().chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
             for (strand, sleep, _) in strands.iter_many(some) {
-                if with_carried || !sleep.is_carried() {
+                if with_followers || !sleep.is_follower() {
                     list.add(strand.positions());
                 }
             }
@@ -102,7 +102,7 @@ pub(crate) fn part_strands(
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.velocities()));
             let mut some = strands.iter_many_mut(some);
             while let Some((mut strand, mut sleep, mut still)) = some.fetch_next() {
-                if sleep.is_carried() && !with_carried {
+                if sleep.is_follower() && !with_followers {
                     continue;
                 }
                 if sleep.is_asleep() {

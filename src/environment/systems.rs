@@ -6,7 +6,7 @@ use crate::{
     parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, Hair, PerHair, Pose, Sleep, Strand, StrandOf, TickPose},
+    strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose},
 };
 use bevy::prelude::*;
 
@@ -78,7 +78,7 @@ fn apply_air(
     blowers: Query<(&Blower, &TickPose)>,
     mut strands: Query<(
         &StrandOf,
-        &Sleep,
+        &StrandSleep,
         &mut Strand,
         &AddedMass,
         &mut BondChanges,
@@ -97,7 +97,8 @@ fn apply_air(
         })
     };
     // Wind also dries hair that is carried.
-    let is_spared = |sleep: &Sleep| sleep.is_asleep() || (sleep.is_carried() && blowers.is_empty());
+    let is_spared =
+        |sleep: &StrandSleep| sleep.is_asleep() || (sleep.is_follower() && blowers.is_empty());
     let ahead = |(_, strand, ..): &Blown<'_>| {
         let (_, velocities, _, spins) = strand.parts();
         prefetch(velocities);

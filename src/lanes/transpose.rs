@@ -15,25 +15,25 @@ pub(crate) type FourMut<'a, T> = [&'a mut [T]; 4];
 
 /// Rows as columns.
 #[inline(always)]
-pub(crate) fn turned(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
+pub(crate) fn transposed(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
     Mat4::from_cols_array_2d(&rows).transpose().to_cols_array_2d()
 }
 
 #[inline(always)]
-fn part(lane: &Lane, quarter: usize) -> [f32; 4] {
-    lane.as_chunks().0[quarter % 4]
+fn part(lane: &Lane, group: usize) -> [f32; 4] {
+    lane.as_chunks().0[group % 4]
 }
 
 #[inline(always)]
-fn part_mut(lane: &mut Lane, quarter: usize) -> &mut [f32; 4] {
-    &mut lane.as_chunks_mut().0[quarter % 4]
+fn part_mut(lane: &mut Lane, group: usize) -> &mut [f32; 4] {
+    &mut lane.as_chunks_mut().0[group % 4]
 }
 
-/// Puts vectors into the lanes of a quarter of a block.
+/// Puts vectors into the lanes of a group of a block.
 #[inline(always)]
 pub(crate) fn put_vectors<T>(
     to: &mut [T],
-    quarter: usize,
+    group: usize,
     from: Four<'_, Vec3>,
     field: impl Fn(&mut T) -> &mut [Lane; 3],
 ) {
@@ -51,24 +51,24 @@ pub(crate) fn put_vectors<T>(
         ];
         for third in 0..3 {
             let rows = [a[third], b[third], c[third], d[third]];
-            for (k, lanes) in turned(rows).into_iter().enumerate() {
+            for (k, lanes) in transposed(rows).into_iter().enumerate() {
                 let number = 4 * third + k;
-                *part_mut(&mut field(&mut chunk[number / 3])[number % 3], quarter) = lanes;
+                *part_mut(&mut field(&mut chunk[number / 3])[number % 3], group) = lanes;
             }
         }
     }
     for (item, i) in rest.iter_mut().zip(4 * chunks.len()..) {
         for (k, strand) in from.iter().enumerate() {
-            put3(field(item), 4 * (quarter % 4) + k, strand[i]);
+            put3(field(item), 4 * (group % 4) + k, strand[i]);
         }
     }
 }
 
-/// Takes vectors out of the lanes of a quarter of a block.
+/// Takes vectors out of the lanes of a group of a block.
 #[inline(always)]
 pub(crate) fn take_vectors<T>(
     from: &[T],
-    quarter: usize,
+    group: usize,
     to: FourMut<'_, Vec3>,
     field: impl Fn(&T) -> &[Lane; 3],
 ) {
@@ -79,9 +79,9 @@ pub(crate) fn take_vectors<T>(
         for third in 0..3 {
             let mut rows = [[0.0; 4]; 4];
             for (row, number) in rows.iter_mut().zip(4 * third..) {
-                *row = part(&field(&chunk[number / 3])[number % 3], quarter);
+                *row = part(&field(&chunk[number / 3])[number % 3], group);
             }
-            for (strand, row) in flat.iter_mut().zip(turned(rows)) {
+            for (strand, row) in flat.iter_mut().zip(transposed(rows)) {
                 strand[third] = row;
             }
         }
@@ -91,16 +91,16 @@ pub(crate) fn take_vectors<T>(
     }
     for (item, i) in rest.iter().zip(4 * chunks.len()..) {
         for (k, strand) in to.iter_mut().enumerate() {
-            strand[i] = take3(field(item), 4 * (quarter % 4) + k);
+            strand[i] = take3(field(item), 4 * (group % 4) + k);
         }
     }
 }
 
-/// Puts quaternions into the lanes of a quarter of a block.
+/// Puts quaternions into the lanes of a group of a block.
 #[inline(always)]
 pub(crate) fn put_quaternions<T>(
     to: &mut [T],
-    quarter: usize,
+    group: usize,
     from: Four<'_, Quat>,
     field: impl Fn(&mut T) -> &mut [Lane; 4],
 ) {
@@ -108,36 +108,36 @@ pub(crate) fn put_quaternions<T>(
     for (i, item) in to.iter_mut().enumerate() {
         let [a, b, c, d] = &from;
         let rows = [a[i].to_array(), b[i].to_array(), c[i].to_array(), d[i].to_array()];
-        let lanes = turned(rows);
+        let lanes = transposed(rows);
         for (component, lanes) in field(item).iter_mut().zip(lanes) {
-            *part_mut(component, quarter) = lanes;
+            *part_mut(component, group) = lanes;
         }
     }
 }
 
-/// Takes quaternions out of the lanes of a quarter of a block.
+/// Takes quaternions out of the lanes of a group of a block.
 #[inline(always)]
 pub(crate) fn take_quaternions<T>(
     from: &[T],
-    quarter: usize,
+    group: usize,
     to: FourMut<'_, Quat>,
     field: impl Fn(&T) -> &[Lane; 4],
 ) {
     let mut to = to.map(|strand| &mut strand[..from.len()]);
     for (i, item) in from.iter().enumerate() {
         let [x, y, z, w] = field(item);
-        let lanes = [part(x, quarter), part(y, quarter), part(z, quarter), part(w, quarter)];
-        for (strand, row) in to.iter_mut().zip(turned(lanes)) {
+        let lanes = [part(x, group), part(y, group), part(z, group), part(w, group)];
+        for (strand, row) in to.iter_mut().zip(transposed(lanes)) {
             strand[i] = Quat::from_array(row);
         }
     }
 }
 
-/// Puts numbers into the lanes of a quarter of a block.
+/// Puts numbers into the lanes of a group of a block.
 #[inline(always)]
 pub(crate) fn put_numbers<T>(
     to: &mut [T],
-    quarter: usize,
+    group: usize,
     from: Four<'_, f32>,
     field: impl Fn(&mut T) -> &mut Lane,
 ) {
@@ -146,13 +146,13 @@ pub(crate) fn put_numbers<T>(
     let (chunks, rest) = to.as_chunks_mut::<4>();
     for (i, chunk) in chunks.iter_mut().enumerate() {
         let [a, b, c, d] = &fours;
-        for (item, lanes) in chunk.iter_mut().zip(turned([a[i], b[i], c[i], d[i]])) {
-            *part_mut(field(item), quarter) = lanes;
+        for (item, lanes) in chunk.iter_mut().zip(transposed([a[i], b[i], c[i], d[i]])) {
+            *part_mut(field(item), group) = lanes;
         }
     }
     for (item, i) in rest.iter_mut().zip(4 * chunks.len()..) {
         let [a, b, c, d] = &from;
-        *part_mut(field(item), quarter) = [a[i], b[i], c[i], d[i]];
+        *part_mut(field(item), group) = [a[i], b[i], c[i], d[i]];
     }
 }
 
@@ -184,38 +184,35 @@ mod tests {
                     all.map(|i| value(strand, i, 7)).collect::<Vec<_>>(),
                 )
             };
-            for quarter in 0..4 {
+            for group in 0..4 {
                 let strands = [0, 1, 2, 3].map(make);
                 let mut items = vec![Item::default(); length];
-                put_vectors(&mut items, quarter, strands.each_ref().map(|s| &s.0[..]), |item| {
+                put_vectors(&mut items, group, strands.each_ref().map(|s| &s.0[..]), |item| {
                     &mut item.vector
                 });
-                put_quaternions(
-                    &mut items,
-                    quarter,
-                    strands.each_ref().map(|s| &s.1[..]),
-                    |item| &mut item.quaternion,
-                );
-                put_numbers(&mut items, quarter, strands.each_ref().map(|s| &s.2[..]), |item| {
+                put_quaternions(&mut items, group, strands.each_ref().map(|s| &s.1[..]), |item| {
+                    &mut item.quaternion
+                });
+                put_numbers(&mut items, group, strands.each_ref().map(|s| &s.2[..]), |item| {
                     &mut item.number
                 });
                 for (i, item) in items.iter().enumerate() {
                     for lane in 0..LANES {
                         let rows = item.vector.iter().chain(&item.quaternion).chain([&item.number]);
                         for (part, row) in rows.enumerate() {
-                            let inside = (4 * quarter..4 * quarter + 4).contains(&lane);
+                            let inside = (4 * group..4 * group + 4).contains(&lane);
                             let expected =
-                                if inside { value(lane - 4 * quarter, i, part) } else { 0.0 };
-                            assert_eq!(row[lane], expected, "{length}, {quarter}, {lane}, {part}");
+                                if inside { value(lane - 4 * group, i, part) } else { 0.0 };
+                            assert_eq!(row[lane], expected, "{length}, {group}, {lane}, {part}");
                         }
                     }
                 }
                 let mut back = [0; 4].map(|_| (vec![Vec3::NAN; length], vec![Quat::NAN; length]));
                 let [a, b, c, d] = &mut back;
                 let vectors = [&mut a.0[..], &mut b.0, &mut c.0, &mut d.0];
-                take_vectors(&items, quarter, vectors, |item| &item.vector);
+                take_vectors(&items, group, vectors, |item| &item.vector);
                 let quaternions = [&mut a.1[..], &mut b.1, &mut c.1, &mut d.1];
-                take_quaternions(&items, quarter, quaternions, |item| &item.quaternion);
+                take_quaternions(&items, group, quaternions, |item| &item.quaternion);
                 for (back, strand) in back.iter().zip(&strands) {
                     assert_eq!((&back.0, &back.1), (&strand.0, &strand.1));
                 }

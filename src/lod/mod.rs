@@ -9,7 +9,7 @@
 //!
 //! Strands stand in an order of which every beginning is spread evenly over the roots ([`even`]). At a
 //! level its first ones are simulated, so that who is at a coarse level is at all finer ones. Each of
-//! the others is **carried** by up to three guides that are near and run alike ([`carry`]): once a tick
+//! the others is **carried** by up to three guides that are near and run alike ([`follow`]): once a tick
 //! its edges turn as theirs have turned at the same distance from the root since the level began. So
 //! it begins and ends where it is, keeps its lengths and its root, and goes on with the velocity it
 //! has. The motion of its own with which it begins ebbs away within a second.
@@ -30,13 +30,13 @@
 //!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
-pub mod carry;
 pub mod even;
+pub mod follow;
 mod guides;
 pub mod model;
 mod systems;
 
-pub use guides::{Carried, Guides};
+pub use guides::{Follower, Guides};
 pub use systems::LodPlugin;
 
 use crate::{
@@ -74,7 +74,7 @@ setting! {
     pub struct LodLevel {
         /// Hair that takes up less than this share of the view's height is simulated so.
         pub below: f32 = 0.1, in BELOW: 0.0..=100.0, safe 0.0..=1.0, "a tenth of the view is 0.1";
-        /// Iterations a substep, at most as many as [`Solver`](crate::Solver) and
+        /// Iterations a substep, at most as many as [`HairSolver`](crate::HairSolver) and
         /// [`Springs`](crate::Springs) have. On 24 cm of hair that stands out 2 in place of 5 move the
         /// tip by 0.5 mm.
         pub iterations: u32 = 2, in ITERATIONS: 1.0..=1000.0, safe 2.0..=5.0,
@@ -122,9 +122,9 @@ impl PresentLod {
 }
 
 impl LodLevel {
-    /// For hair under a quarter of the view's height: three iterations, half of the strands.
+    /// For hair under a group of the view's height: three iterations, half of the strands.
     pub const NEAR: Self = Self { below: 0.25, iterations: 3, substeps: 1, strands: 0.5 };
-    /// For hair under a tenth: two, substeps twice as long, a quarter of the strands.
+    /// For hair under a tenth: two, substeps twice as long, a group of the strands.
     pub const FAR: Self = Self { below: 0.1, iterations: 2, substeps: 2, strands: 0.25 };
 
     /// A level for hair below a share of the view's height, with its iterations, and how many substeps

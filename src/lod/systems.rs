@@ -1,8 +1,8 @@
 //! Levels are chosen at the start of a tick; the systems that move hair ask what they are.
 
 use super::{
-    Carried, Guides, HairLod, LodLevel, PresentLod, ScreenShare,
-    guides::{carry, choose_guides, let_go, lull},
+    Follower, Guides, HairLod, LodLevel, PresentLod, ScreenShare,
+    guides::{choose_guides, let_go, move_followers, sync_follower_sleep},
     model,
 };
 use crate::{
@@ -21,9 +21,9 @@ impl Plugin for LodPlugin {
         app.register_type::<LodLevel>()
             .register_type::<ScreenShare>()
             .register_type::<PresentLod>()
-            .register_type::<Carried>()
+            .register_type::<Follower>()
             .register_type::<Guides>()
-            .register_required_components::<Strand, Carried>()
+            .register_required_components::<Strand, Follower>()
             .register_required_components::<HairLod, Guides>()
             .add_observer(forget)
             .add_observer(let_go)
@@ -34,8 +34,8 @@ impl Plugin for LodPlugin {
                         .chain()
                         .in_set(HairSystems::LevelOfDetail)
                         .run_if(first_substep),
-                    lull.in_set(HairSystems::FollowerSleep).run_if(first_substep),
-                    carry.in_set(HairSystems::Followers),
+                    sync_follower_sleep.in_set(HairSystems::FollowerSleep).run_if(first_substep),
+                    move_followers.in_set(HairSystems::Followers),
                 ),
             );
     }

@@ -9,7 +9,7 @@
 //! What few iterations leave undone cannot feed energy in: a step that would end with more than it
 //! began with is shortened, and its speeds with it.
 
-use super::{Springs, model::Law};
+use super::{Springs, model::Xpbd};
 use crate::{
     lanes::{LANES, Lane, Quaternion, Real, V3, load, load3, load4, store3, store4},
     rod::{
@@ -32,7 +32,7 @@ pub(crate) struct SpringLanes {
     tensions: Vec<Tensions>,
 }
 
-/// Tension of the springs that begin at a node; see [`Law`].
+/// Tension of the springs that begin at a node; see [`Xpbd`].
 #[derive(Clone, Copy, Debug, Default)]
 struct Tensions {
     next: Lane,
@@ -74,8 +74,8 @@ fn step_simd<S: Simd>(
 ) {
     let Springs { stretch, bend, damping, iterations } = params.springs;
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    let next = Law::new(zero, stretch, damping, params.dt);
-    let over = Law::new(zero, bend, damping, params.dt);
+    let next = Xpbd::new(zero, stretch, damping, params.dt);
+    let over = Xpbd::new(zero, bend, damping, params.dt);
     predict_nodes(simd, b, params.dt, params.skin, obstacles);
     b.touched = [0.0; LANES];
     // Who is moved by something else may get energy from there.
@@ -124,7 +124,7 @@ fn solve_over<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     tensions: &mut [Tensions],
-    law: Law<f32x16<S>>,
+    spring: Xpbd<f32x16<S>>,
 ) {
     for i in 1..b.edges.len() {
         let length = load(simd, &b.edges[i - 1].l) + load(simd, &b.edges[i].l);
@@ -134,8 +134,8 @@ fn solve_over<S: Simd>(
         let (u, distance) = span(a, c);
         let held = &mut tensions[i - 1].over;
         let tension = load(simd, held);
-        let excess = law.excess(distance - length, (moved_c - moved_a).dot(u), tension);
-        let more = excess / (wa + wc + law.give);
+        let excess = spring.excess(distance - length, (moved_c - moved_a).dot(u), tension);
+        let more = excess / (wa + wc + spring.compliance);
         (tension + more).store_array(held);
         store3(&mut b.nodes[i - 1].p, u.scale_add(wa * more, a));
         store3(&mut b.nodes[i + 1].p, u.scale_add(-(wc * more), c));
@@ -150,7 +150,7 @@ fn solve_next<S: Simd, const TOUCHING: bool>(
     simd: S,
     b: &mut BlockLanes,
     tensions: &mut [Tensions],
-    law: Law<f32x16<S>>,
+    spring: Xpbd<f32x16<S>>,
 ) {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let none = V3::new(zero, zero, zero);
@@ -160,13 +160,13 @@ fn solve_next<S: Simd, const TOUCHING: bool>(
         let (c, moved_c) = place(simd, &b.nodes[i + 1]);
         let (u, distance) = span(a, c);
         let stretch = distance - load(simd, &b.edges[i].l);
-        let excess = law.excess(stretch, (moved_c - moved_a).dot(u), load(simd, &tension.next));
+        let excess = spring.excess(stretch, (moved_c - moved_a).dot(u), load(simd, &tension.next));
         // Neighbouring springs share a node: −u·W u′.
         let coupling = -mobility::<S, TOUCHING>(simd, b, i, before, u);
         let upper = coupling * inverse;
         let pivot = mobility::<S, TOUCHING>(simd, b, i, u, u)
             + mobility::<S, TOUCHING>(simd, b, i + 1, u, u)
-            + law.give
+            + spring.compliance
             - coupling * upper;
         inverse = one / pivot;
         rhs = (excess - coupling * rhs) * inverse;

@@ -2,7 +2,7 @@
 //!
 //! Print's damper, c |v_b − v_a|, has no sign and feeds energy in; a true one acts on how fast the
 //! spring gets longer. An explicit step of stiff springs blows up beyond √(2m/k), here 1 ms. So each
-//! spring is solved for the end of the step ([`Law`]), on positions (compliant position based
+//! spring is solved for the end of the step ([`Xpbd`]), on positions (compliant position based
 //! dynamics): the stiffer the spring, the nearer to its length.
 
 use crate::lanes::Real;
@@ -22,27 +22,27 @@ pub fn force(d: Vec3, rate: Vec3, length: f32, stiffness: f32, damping: f32) -> 
 ///
 /// Tensions here are forces times dt², per mass of a node (m): by so much they move a free one.
 #[derive(Clone, Copy, Debug)]
-pub struct Law<R> {
-    compliance: R,
+pub struct Xpbd<R> {
+    inverse_stiffness: R,
     friction: R,
     share: R,
     /// What a spring itself gives way for each unit of tension, added to its ends' inverse masses.
-    pub give: R,
+    pub compliance: R,
 }
 
-impl<R: Real> Law<R> {
+impl<R: Real> Xpbd<R> {
     /// Springs of `stiffness` k/m > 0 (1/s²) and `damping` c/m (1/s) in a step of `dt` (s), in as
     /// many lanes as `like` has.
     #[inline(always)]
     pub fn new(like: R, stiffness: f32, damping: f32, dt: f32) -> Self {
         let (k, c, dt) = (f64::from(stiffness), f64::from(damping), f64::from(dt));
-        let (compliance, friction) = (1.0 / (k * dt * dt), c / (k * dt));
+        let (inverse_stiffness, friction) = (1.0 / (k * dt * dt), c / (k * dt));
         let share = 1.0 / (1.0 + friction);
         Self {
-            compliance: like.lit(compliance),
+            inverse_stiffness: like.lit(inverse_stiffness),
             friction: like.lit(friction),
             share: like.lit(share),
-            give: like.lit(compliance * share),
+            compliance: like.lit(inverse_stiffness * share),
         }
     }
 
@@ -51,7 +51,7 @@ impl<R: Real> Law<R> {
     /// all, it is the tension that is missing.
     #[inline(always)]
     pub fn excess(&self, stretch: R, moved: R, tension: R) -> R {
-        self.friction.mul_add(moved, stretch - self.compliance * tension) * self.share
+        self.friction.mul_add(moved, stretch - self.inverse_stiffness * tension) * self.share
     }
 }
 
@@ -72,12 +72,15 @@ mod tests {
     fn a_pair_ends_its_step_with_the_force_of_equation_1() {
         let (k, c, dt, length) = (3e3_f32, 20.0, 1.0 / 60.0, 1.0);
         let (from, predicted, wa, wb) = (1.1_f32, 1.25, 1.0, 0.25);
-        let law = Law::new(0.0, k, c, dt);
-        let excess = law.excess(predicted - length, predicted - from, 0.0);
-        let tension = excess / (wa + wb + law.give);
+        let spring = Xpbd::new(0.0, k, c, dt);
+        let excess = spring.excess(predicted - length, predicted - from, 0.0);
+        let tension = excess / (wa + wb + spring.compliance);
         let end = predicted - (wa + wb) * tension;
         let f = force(Vec3::X * end, Vec3::X * ((end - from) / dt), length, k, c);
         assert!((f.x * dt * dt + tension).abs() < 1e-5 * tension, "{} {tension}", f.x * dt * dt);
-        assert!(law.excess(end - length, end - from, tension).abs() < 1e-6, "nothing is missing");
+        assert!(
+            spring.excess(end - length, end - from, tension).abs() < 1e-6,
+            "nothing is missing"
+        );
     }
 }

@@ -9,7 +9,7 @@ use super::{
 };
 #[cfg(feature = "render")]
 use crate::render::{HairFollowers, HairLook, Melanin};
-use crate::{AirDrag, LockContact, Solver, Stiffness, setting::Ranged};
+use crate::{AirDrag, HairSolver, LockContact, Stiffness, setting::Ranged};
 use bevy::prelude::*;
 
 /// A head of hair: how it is planted, how stiff it is and how it looks.
@@ -60,7 +60,7 @@ pub struct PresetSettings {
     /// How it swings.
     pub drag: AirDrag,
     /// How it is solved.
-    pub solver: Solver,
+    pub solver: HairSolver,
     /// How its strands keep apart.
     pub contact: LockContact,
     /// How it looks.
@@ -243,7 +243,7 @@ impl HairPreset {
         PresetSettings {
             stiffness: Stiffness { bending_length, ..default() },
             drag: AirDrag { rate: 3.0 },
-            solver: Solver { internal_damping: 4.0, ..default() },
+            solver: HairSolver { internal_damping: 4.0, ..default() },
             contact: LockContact::default(),
             #[cfg(feature = "render")]
             look: self.look(),

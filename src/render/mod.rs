@@ -24,8 +24,8 @@ mod followers;
 mod given;
 mod look;
 mod material;
+mod screen_share;
 mod sets;
-mod share;
 mod upload;
 mod view;
 
@@ -97,7 +97,7 @@ impl Plugin for HairRenderPlugin {
             );
         app.add_systems(
             PostUpdate,
-            share::measure.after(TransformSystems::Propagate).after(HairRenderSystems),
+            screen_share::measure.after(TransformSystems::Propagate).after(HairRenderSystems),
         );
         // The drawn child inherits it. An error says that the user has required it already.
         let _ = app.try_register_required_components::<Hair, Visibility>();

@@ -27,4 +27,4 @@ pub mod stiffness;
 mod sweep;
 
 pub use constraint::StretchProjection;
-pub use stiffness::{Solver, Stiffness};
+pub use stiffness::{HairSolver, Stiffness};

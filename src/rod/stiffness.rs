@@ -104,10 +104,10 @@ impl Stiffness {
 
 setting! {
     /// How the rods are solved. Component of a [`Hair`](crate::Hair); where absent,
-    /// [`HairDefault<Solver>`](crate::HairDefault) holds.
+    /// [`HairDefault<HairSolver>`](crate::HairDefault) holds.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    pub struct Solver {
+    pub struct HairSolver {
         /// Gauss–Seidel iterations a substep, as in \[B\] table 1.
         pub iterations: u32 = 5, in ITERATIONS: 1.0..=1000.0, safe 1.0..=50.0, "5 is the paper's";
         /// How stretch–shear is projected.

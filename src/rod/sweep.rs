@@ -73,7 +73,7 @@ fn share<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
 
 /// What a sweep carries in registers from one edge to the next.
 #[derive(Clone, Copy)]
-struct Carried<S: Simd> {
+struct Follower<S: Simd> {
     /// The edge before, which has yet to turn for the joint that follows.
     before: Quaternion<f32x16<S>>,
     /// The node between them.
@@ -93,7 +93,7 @@ fn sweeps<S: Simd, const P: usize>(
 ) {
     let edges = b.edges.len();
     let (before, p1) = (load4(simd, &b.root), b.nodes[0].position(simd));
-    let mut carried = [Carried { before, p1 }; ABREAST];
+    let mut carried = [Follower { before, p1 }; ABREAST];
     for step in 0..edges + 2 * (abreast - 1) {
         for (k, carried) in carried.iter_mut().take(abreast).enumerate() {
             let i = step.wrapping_sub(2 * k);
@@ -121,10 +121,10 @@ fn pass_edge<S: Simd, const P: usize>(
     simd: S,
     b: &mut BlockLanes,
     i: usize,
-    carried: &mut Carried<S>,
+    carried: &mut Follower<S>,
 ) {
     let one = f32x16::splat(simd, 1.0);
-    let Carried { before, p1 } = *carried;
+    let Follower { before, p1 } = *carried;
     let (e, shares) = (&b.edges[i], &b.shares[i]);
     let q = load4(simd, &e.q);
     let (d_before, d_q) =
@@ -137,7 +137,7 @@ fn pass_edge<S: Simd, const P: usize>(
         store4(&mut b.edges[i - 1].q, turned);
     }
     store3(&mut b.nodes[i].p, p1 + c.p1);
-    *carried = Carried { before: q.add_scaled(c.q, one).renormalize(), p1: p2 + c.p2 };
+    *carried = Follower { before: q.add_scaled(c.q, one).renormalize(), p1: p2 + c.p2 };
 }
 
 #[cfg(test)]

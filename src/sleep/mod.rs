@@ -1,7 +1,7 @@
-//! Sleep: strands that lie still are left alone until something happens to them.
+//! StrandSleep: strands that lie still are left alone until something happens to them.
 //!
 //! Once a tick each strand is asked: has it stayed in its place for a while, and is nothing going on
-//! that could move it or its bonds? Then it sleeps ([`Sleep`](crate::Sleep)): velocities are zero,
+//! that could move it or its bonds? Then it sleeps ([`StrandSleep`](crate::StrandSleep)): velocities are zero,
 //! and forces, contacts, rest shapes and projection pass it by. It wakes when the head moves,
 //! gravity or a setting changes, a blower reaches it, a collider comes, goes or moves near it, a
 //! neighbour pushes it otherwise than before, its held nodes or its root move, bonds are treated,

@@ -11,14 +11,14 @@ use crate::{
     mass_spring::Springs,
     parallel::for_each,
     rod::{
-        Solver, Stiffness,
+        HairSolver, Stiffness,
         obstacle::{Obstacle, Solid},
     },
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
     strand::{
-        AddedMass, Hair, HeldNodes, Pose, Sleep, Sleepers, StillPose, Strand, StrandModel,
-        StrandOf, Strands, TickPose,
+        AddedMass, Hair, HeldNodes, Pose, Sleepers, StillPose, Strand, StrandModel, StrandOf,
+        StrandSleep, Strands, TickPose,
     },
     treatment::Treatments,
     water::Moisture,
@@ -41,10 +41,10 @@ pub struct SleepPlugin;
 impl Plugin for SleepPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<HairSleep>(app);
-        app.register_type::<Watch>()
-            .register_required_components::<Hair, Watch>()
+        app.register_type::<SleepSnapshot>()
+            .register_required_components::<Hair, SleepSnapshot>()
             .register_required_components::<Hair, Sleepers>()
-            .add_systems(HairTick, watch.in_set(HairSystems::Sleep).run_if(first_substep));
+            .add_systems(HairTick, update_sleep.in_set(HairSystems::Sleep).run_if(first_substep));
     }
 }
 
@@ -54,7 +54,7 @@ struct Conditions {
     gravity: Vec3,
     sleep: HairSleep,
     stiffness: Stiffness,
-    solver: Solver,
+    solver: HairSolver,
     influence: BondInfluence,
     cuticle: Cuticle,
     contact: LockContact,
@@ -64,11 +64,11 @@ struct Conditions {
 }
 
 #[derive(SystemParam)]
-struct EverySetting<'w, 's> {
+struct RestSettings<'w, 's> {
     gravity: Res<'w, HairGravity>,
     sleep: Settings<'w, 's, HairSleep>,
     stiffness: Settings<'w, 's, Stiffness>,
-    solver: Settings<'w, 's, Solver>,
+    solver: Settings<'w, 's, HairSolver>,
     influence: Settings<'w, 's, BondInfluence>,
     cuticle: Settings<'w, 's, Cuticle>,
     contact: Settings<'w, 's, LockContact>,
@@ -77,7 +77,7 @@ struct EverySetting<'w, 's> {
     springs: Settings<'w, 's, Springs>,
 }
 
-impl EverySetting<'_, '_> {
+impl RestSettings<'_, '_> {
     fn of(&self, hair: Entity) -> Conditions {
         Conditions {
             gravity: self.gravity.clamped().0,
@@ -97,17 +97,17 @@ impl EverySetting<'_, '_> {
 /// What a hair was like when something last happened to it.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub(super) struct Watch {
+pub(super) struct SleepSnapshot {
     conditions: Option<Conditions>,
     pose: Pose,
     members: usize,
     /// The colliders in its frame.
     #[reflect(ignore)]
-    solids: Vec<Seen>,
+    solids: Vec<SeenCollider>,
 }
 
 /// What happened to a hair as a whole since the tick before.
-struct News {
+struct WakeEvents {
     sleep: HairSleep,
     /// All its strands are awake.
     stirred: bool,
@@ -116,21 +116,21 @@ struct News {
     blowers: Vec<LocalBlower>,
 }
 
-impl Watch {
+impl SleepSnapshot {
     /// Notes what is otherwise, and says what that means for the strands.
-    fn news(
+    fn wake_events(
         &mut self,
         conditions: Conditions,
         pose: &Pose,
         members: usize,
-        seen: Vec<Seen>,
+        seen: Vec<SeenCollider>,
         substeps: u32,
-    ) -> News {
+    ) -> WakeEvents {
         let distance = conditions.sleep.distance();
         let apart = pose.translation.distance(self.pose.translation) / pose.scale;
         // A turn counts as what it does to the tip of a long strand.
-        let turned = turn(self.pose.rotation, pose.rotation) * LONG;
-        let scaled = (pose.scale / self.pose.scale - 1.0).abs() * LONG;
+        let turned = turn(self.pose.rotation, pose.rotation) * LONG_STRAND;
+        let scaled = (pose.scale / self.pose.scale - 1.0).abs() * LONG_STRAND;
         let rests = apart <= distance && turned <= distance && scaled <= distance;
         let same = self.conditions == Some(conditions) && self.members == members;
         if !rests {
@@ -140,14 +140,19 @@ impl Watch {
         self.members = members;
         let skin = conditions.contact.radius + CLEARANCE;
         let solids = self.compare_solids(seen, distance, skin, substeps);
-        News { sleep: conditions.sleep, stirred: !(rests && same), solids, blowers: Vec::new() }
+        WakeEvents {
+            sleep: conditions.sleep,
+            stirred: !(rests && same),
+            solids,
+            blowers: Vec::new(),
+        }
     }
 
     /// The solids that have changed, before and after, with the reach in which they may be felt
     /// within this tick.
     fn compare_solids(
         &mut self,
-        now: Vec<Seen>,
+        now: Vec<SeenCollider>,
         distance: f32,
         skin: f32,
         substeps: u32,
@@ -166,7 +171,7 @@ impl Watch {
             }
             return changed;
         }
-        let unknown = |one: &&Seen, others: &[Seen]| {
+        let unknown = |one: &&SeenCollider, others: &[SeenCollider]| {
             others.iter().all(|other| !within(other.moved(one), distance))
         };
         changed.extend(now.iter().filter(|s| unknown(s, &self.solids)).map(|s| (s.solid, skin)));
@@ -178,13 +183,13 @@ impl Watch {
 
 /// A collider as a hair saw it.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct SeenCollider {
     solid: Solid,
     friction: f32,
     rotation: Quat,
 }
 
-impl Seen {
+impl SeenCollider {
     /// How far its surface has moved (m): a ball that only turns takes hair along too.
     fn moved(&self, now: &Self) -> f32 {
         let friction = if self.friction == now.friction { 0.0 } else { f32::INFINITY };
@@ -194,48 +199,52 @@ impl Seen {
 }
 
 /// How long a long strand is (m).
-const LONG: f32 = 0.3;
+const LONG_STRAND: f32 = 0.3;
 
 struct Item<'a> {
     hair: usize,
     strand: Mut<'a, Strand>,
-    sleep: Mut<'a, Sleep>,
+    sleep: Mut<'a, StrandSleep>,
     still: Mut<'a, StillPose>,
     held: Option<&'a HeldNodes>,
     /// Whether its bonds or its water are on the move, or somebody wrote to it.
     restless: bool,
 }
 
-fn watch(
+fn update_sleep(
     step: Res<HairStep>,
-    settings: EverySetting,
+    settings: RestSettings,
     colliders: Query<(&HairCollider, &TickPose)>,
     blowers: Query<(&Blower, &TickPose)>,
-    mut hairs: Query<(Entity, &TickPose, &mut Watch, &mut Sleepers, Option<&Strands>), With<Hair>>,
+    mut hairs: Query<
+        (Entity, &TickPose, &mut SleepSnapshot, &mut Sleepers, Option<&Strands>),
+        With<Hair>,
+    >,
     mut strands: Query<(
         &StrandOf,
         &mut Strand,
-        &mut Sleep,
+        &mut StrandSleep,
         &mut StillPose,
         (Ref<Bonds>, &BondChanges, &AddedMass),
         (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
     )>,
 ) {
-    let mut news: Vec<News> = Vec::new();
+    let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
-    for (hair, frame, mut watch, _, members) in &mut hairs {
+    for (hair, frame, mut snapshot, _, members) in &mut hairs {
         let seen = colliders.iter().map(|(collider, pose)| {
             let Obstacle { solid, friction, .. } = seen_from(frame, &collider.clamped(), pose);
             let rotation = frame.now().rotation.inverse() * pose.now().rotation;
-            Seen { solid, friction, rotation }
+            SeenCollider { solid, friction, rotation }
         });
         let seen = seen.collect();
         let members = members.map_or(0, |members| members.len());
-        let watch = watch.bypass_change_detection();
-        let mut new = watch.news(settings.of(hair), frame.now(), members, seen, step.count);
+        let snapshot = snapshot.bypass_change_detection();
+        let mut new =
+            snapshot.wake_events(settings.of(hair), frame.now(), members, seen, step.count);
         new.blowers = local_blowers(frame.now(), &blowers);
-        index_of.insert(hair, news.len());
-        news.push(new);
+        index_of.insert(hair, wake_events.len());
+        wake_events.push(new);
     }
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
     for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
@@ -251,11 +260,11 @@ fn watch(
         items.push(Item { hair, strand, sleep, still, held, restless });
     }
     let seconds = step.dt * step.count as f32;
-    for_each(&mut items, |item| decide(item, &news[item.hair], seconds));
-    let mut counts = vec![Sleepers::default(); news.len()];
+    for_each(&mut items, |item| decide(item, &wake_events[item.hair], seconds));
+    let mut counts = vec![Sleepers::default(); wake_events.len()];
     for item in &items {
         // The carried sleep when those do whom they follow.
-        if item.sleep.is_carried() {
+        if item.sleep.is_follower() {
             continue;
         }
         let count = &mut counts[item.hair];
@@ -268,22 +277,22 @@ fn watch(
 }
 
 /// Whether one strand sleeps from now on.
-fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
+fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
     let Item { strand, sleep, still, held, restless, .. } = item;
-    if sleep.is_carried() {
+    if sleep.is_follower() {
         return;
     }
     let strand = strand.bypass_change_detection();
-    let (distance, angle) = (news.sleep.distance(), news.sleep.angle());
+    let (distance, angle) = (wake_events.sleep.distance(), wake_events.sleep.angle());
     let targets = held.map_or(&[][..], |held| &held.targets);
-    let restless = *restless || news.stirred || strand.nodes() < 2;
+    let restless = *restless || wake_events.stirred || strand.nodes() < 2;
     if sleep.is_asleep() {
         if restless
             || was_pushed(strand)
             || has_moved_root(strand, still, distance, angle)
             || pulls(strand, still, targets, distance)
-            || comes_near(still, &news.solids)
-            || is_blown(strand, &news.blowers)
+            || comes_near(still, &wake_events.solids)
+            || is_blown(strand, &wake_events.blowers)
         {
             sleep.bypass_change_detection().wake_up();
             still.bypass_change_detection().begin(strand, held_nodes(targets));
@@ -291,7 +300,7 @@ fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
         return;
     }
     let (sleep, still) = (sleep.bypass_change_detection(), still.bypass_change_detection());
-    if news.sleep.seconds == f32::INFINITY {
+    if wake_events.sleep.seconds == f32::INFINITY {
         sleep.wake_up();
         return;
     }
@@ -300,21 +309,21 @@ fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
         || !keeps_turn(&still.orientations, strand.orientations(), angle)
         || has_moved_root(strand, still, distance, angle)
         || pulls(strand, still, targets, distance)
-        || is_blown(strand, &news.blowers)
+        || is_blown(strand, &wake_events.blowers)
     {
         sleep.wake_up();
         still.begin(strand, held_nodes(targets));
         return;
     }
     sleep.lie_still(seconds);
-    if sleep.still_for() >= news.sleep.seconds {
+    if sleep.still_for() >= wake_events.sleep.seconds {
         still.distance = distance;
         (still.low, still.high) = (strand.positions()[0], strand.positions()[0]);
         for p in strand.positions() {
             (still.low, still.high) = (still.low.min(*p), still.high.max(*p));
         }
         // What comes in this very tick would find it asleep.
-        if !comes_near(still, &news.solids) {
+        if !comes_near(still, &wake_events.solids) {
             sleep.fall_asleep();
             strand.rest();
         }

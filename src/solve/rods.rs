@@ -12,14 +12,14 @@ use crate::{
     lanes::{LANES, put_numbers, put_quaternions, put_vectors, put4},
     parallel::{prefetch, tables},
     rod::{
-        Solver, Stiffness,
+        HairSolver, Stiffness,
         block::BlockLanes,
         obstacle::Obstacle,
         step::{StepParams, step, weigh},
     },
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Settings},
-    strand::{AddedMass, Hair, HeldNodes, Sleep, Strand, StrandModel, StrandOf},
+    strand::{AddedMass, Hair, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep},
 };
 use bevy::prelude::*;
 use fearless_simd::Level;
@@ -31,7 +31,7 @@ pub struct RodPlugin;
 impl Plugin for RodPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<Stiffness>(app);
-        setting::plugin::<Solver>(app);
+        setting::plugin::<HairSolver>(app);
         app.add_systems(HairTick, step_rods.in_set(HairSystems::Rods));
     }
 }
@@ -110,13 +110,13 @@ impl Batched for Rod<'_> {
 fn step_rods(
     substeps: EffectiveSubsteps,
     model: Settings<StrandModel>,
-    solver: Settings<Solver>,
+    solver: Settings<HairSolver>,
     stiffness: Settings<Stiffness>,
     influence: Settings<BondInfluence>,
     contact: Settings<LockContact>,
     hairs: Query<Option<&Obstacles>, With<Hair>>,
     mut strands: Query<(
-        (Entity, &StrandOf, &Sleep),
+        (Entity, &StrandOf, &StrandSleep),
         &mut Strand,
         &RestShape,
         &Bonds,

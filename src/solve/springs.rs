@@ -17,7 +17,7 @@ use crate::{
     rod::{block::BlockLanes, obstacle::Obstacle, step::weigh},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, HeldNodes, Sleep, Strand, StrandModel, StrandOf, TickPose},
+    strand::{AddedMass, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
 };
 use bevy::prelude::*;
 use fearless_simd::Level;
@@ -100,7 +100,14 @@ fn step_springs(
     contact: Settings<LockContact>,
     gravity: Res<HairGravity>,
     hairs: Query<(Option<&Obstacles>, &TickPose)>,
-    mut strands: Query<(Entity, &StrandOf, &Sleep, &mut Strand, &AddedMass, Option<&HeldNodes>)>,
+    mut strands: Query<(
+        Entity,
+        &StrandOf,
+        &StrandSleep,
+        &mut Strand,
+        &AddedMass,
+        Option<&HeldNodes>,
+    )>,
     mut faults: MessageWriter<HairFault>,
 ) {
     let gravity = gravity.clamped().0;

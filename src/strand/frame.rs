@@ -217,7 +217,7 @@ impl TickPose {
         }
         let seen = |own: &Pose, hair: &Pose| hair.affine().inverse() * own.affine();
         let (before, now) = (seen(&self.before, &hair.before), seen(&self.now, &hair.now));
-        let carried = hair.carry().map_or(before, |carry| Affine3A::from(carry) * before);
+        let carried = hair.frame_delta().map_or(before, |carry| Affine3A::from(carry) * before);
         (now != carried).then(|| now * carried.inverse())
     }
 
@@ -271,7 +271,7 @@ impl TickPose {
 
     /// How a point at rest in the world moves in this frame during the substep; `None` if the frame
     /// did not move. With less than full [`HairInertia`] the world seems to move by a share of it.
-    pub fn carry(&self) -> Option<Isometry3d> {
+    pub fn frame_delta(&self) -> Option<Isometry3d> {
         (self.before != self.now).then(|| {
             let rotation = (self.now.rotation.inverse() * self.before.rotation).normalize();
             let translation = self.now.rotation.inverse()
@@ -329,13 +329,13 @@ mod tests {
         let inertia = HairInertia { teleport_distance: 10.0, ..default() };
         assert_eq!(frame.aim(Some(a), 0.0, &inertia), (false, false));
         frame.advance(1.0);
-        assert!(frame.carry().is_none(), "the first tick begins where the frame is");
+        assert!(frame.frame_delta().is_none(), "the first tick begins where the frame is");
         frame.aim(Some(b), 0.0, &inertia);
         let world = Vec3::new(0.2, 0.4, -0.3);
         let mut local = a.point_in(world);
         for i in 1..=6 {
             frame.advance(i as f32 / 6.0);
-            local = frame.carry().unwrap() * local;
+            local = frame.frame_delta().unwrap() * local;
         }
         assert!(b.point_out(local).distance(world) < 1e-5);
         let mut reports = || frame.aim(None, 0.0, &inertia).1;

@@ -17,7 +17,7 @@ mod teleport;
 
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use per_hair::PerHair;
-pub use sleep::{Sleep, Sleepers, StillPose};
+pub use sleep::{Sleepers, StillPose, StrandSleep};
 pub use systems::StrandPlugin;
 
 use crate::{
@@ -30,7 +30,7 @@ use bevy::prelude::*;
 
 /// The wearer's hair as one thing. Put it on any entity with a transform, such as a head bone; spawn
 /// strands with [`StrandOf`] pointing here. Settings ([`Stiffness`](crate::Stiffness),
-/// [`Solver`](crate::Solver), [`AirDrag`](crate::AirDrag), [`BondInfluence`](crate::BondInfluence),
+/// [`HairSolver`](crate::HairSolver), [`AirDrag`](crate::AirDrag), [`BondInfluence`](crate::BondInfluence),
 /// [`Cuticle`](crate::Cuticle), [`LockContact`](crate::LockContact)) may be added as components.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
@@ -85,7 +85,7 @@ pub const MIN_SEGMENT: f32 = 1e-6;
 /// number of nodes stays what it was.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-#[require(StrandHistory, AddedMass, Sleep, StillPose)]
+#[require(StrandHistory, AddedMass, StrandSleep, StillPose)]
 pub struct Strand {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,

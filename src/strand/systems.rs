@@ -1,8 +1,8 @@
 //! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
 
 use super::{
-    AddedMass, Hair, HeldNodes, PerHair, Sleep, Sleepers, StillPose, Strand, StrandError,
-    StrandHistory, StrandModel, StrandOf, Strands, TickPose,
+    AddedMass, Hair, HeldNodes, PerHair, Sleepers, StillPose, Strand, StrandError, StrandHistory,
+    StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     frame::{HairInertia, Pose},
 };
 use crate::{
@@ -28,7 +28,7 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandHistory>()
             .register_type::<HeldNodes>()
             .register_type::<AddedMass>()
-            .register_type::<Sleep>()
+            .register_type::<StrandSleep>()
             .register_type::<Sleepers>()
             .register_type::<StillPose>()
             .add_systems(PreUpdate, (report_unusable, record_frame))
@@ -37,7 +37,7 @@ impl Plugin for StrandPlugin {
                 (
                     remember_drawn.in_set(HairSystems::History),
                     move_poses.in_set(HairSystems::Poses),
-                    carry_strands.in_set(HairSystems::FrameInertia),
+                    apply_frame_inertia.in_set(HairSystems::FrameInertia),
                 ),
             );
     }
@@ -67,7 +67,10 @@ fn report_unusable(
 }
 
 /// Before the first substep of a tick: what was present becomes history.
-fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &Sleep, &mut StrandHistory)>) {
+fn remember_drawn(
+    step: Res<HairStep>,
+    mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory)>,
+) {
     if step.index > 0 {
         return;
     }
@@ -132,11 +135,11 @@ fn move_poses(
 }
 
 /// Inertia: free nodes are carried by the inverse of the frame's motion; the root stays.
-fn carry_strands(
+fn apply_frame_inertia(
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<(&StrandOf, &Sleep, &mut Strand)>,
+    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand)>,
 ) {
-    if hairs.iter().all(|hair| hair.carry().is_none()) {
+    if hairs.iter().all(|hair| hair.frame_delta().is_none()) {
         return;
     }
     for_each_part(
@@ -145,18 +148,18 @@ fn carry_strands(
         |(), rows| {
             let mut carries = PerHair::default();
             for (of, sleep, strand) in rows {
-                let carry = || hairs.get(of.0).ok()?.carry();
+                let carry = || hairs.get(of.0).ok()?.frame_delta();
                 if sleep.is_simulated()
                     && let Some(index) = carries.index(of.0, carry)
                 {
-                    carry_one(strand, &carries.values[index]);
+                    shift_by(strand, &carries.values[index]);
                 }
             }
         },
     );
 }
 
-fn carry_one(strand: &mut Strand, carry: &Isometry3d) {
+fn shift_by(strand: &mut Strand, carry: &Isometry3d) {
     let turn = carry.rotation;
     strand.positions.iter_mut().skip(1).for_each(|p| *p = *carry * *p);
     strand.velocities.iter_mut().for_each(|v| *v = turn * *v);

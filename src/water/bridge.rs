@@ -1,11 +1,11 @@
 //! `Interaction`: strands that a film of water joins draw together and move as one.
 
-use super::{Moisture, Wetting, meet::WaterField, moisture::node_lengths};
+use super::{Moisture, Wetting, droplet_contact::WaterField, moisture::node_lengths};
 use crate::{
     contact::{Bridged, Film, LockContact, LockNeighbours},
     schedule::EffectiveSubsteps,
     setting::Settings,
-    strand::{AddedMass, Hair, Sleep, Sleepers, Strand, StrandOf, Strands},
+    strand::{AddedMass, Hair, Sleepers, Strand, StrandOf, StrandSleep, Strands},
 };
 use bevy::prelude::*;
 
@@ -16,7 +16,7 @@ pub(super) fn join_wet_strands(
     wetting: Settings<Wetting>,
     mut scratch: ResMut<WaterField>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
-    mut strands: Query<(&mut Strand, &Moisture, &AddedMass, &Sleep), With<StrandOf>>,
+    mut strands: Query<(&mut Strand, &Moisture, &AddedMass, &StrandSleep), With<StrandOf>>,
 ) {
     let rows = &mut scratch.bypass_change_detection().rows;
     for (hair, members, mut neighbours, sleepers) in &mut hairs {
@@ -33,7 +33,7 @@ pub(super) fn join_wet_strands(
             && moistures.any(|moisture| !moisture.is_untouched());
         let list = neighbours.bypass_change_detection();
         let film = Film::between(2.0 * radius);
-        list.look_beyond(if joins { film.longest } else { 0.0 });
+        list.set_extra_margin(if joins { film.longest } else { 0.0 });
         if !joins {
             continue;
         }

@@ -1,7 +1,7 @@
 //! `ExternalForces`: showers run, hair soaks and dries, and hydrogen bonds follow the water.
 
 use super::{
-    Droplet, Moisture, Shower, Soak, WaterLedger, Wetting,
+    Droplet, Moisture, Shower, SoakHair, WaterLedger, Wetting,
     model::ball_radius,
     moisture::{Exposure, Left, Surroundings, node_lengths},
 };
@@ -125,7 +125,7 @@ pub(super) fn exchange_water(
         &mut AddedMass,
         &mut BondChanges,
     )>,
-    mut soaks: MessageReader<Soak>,
+    mut soaks: MessageReader<SoakHair>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -134,7 +134,7 @@ pub(super) fn exchange_water(
             Ok((_, members)) => members.map(|m| m.collection().to_vec()).unwrap_or_default(),
             Err(_) if strands.contains(soak.target) => vec![soak.target],
             Err(_) => {
-                let message = "the target of Soak is neither a Hair nor a strand";
+                let message = "the target of SoakHair is neither a Hair nor a strand";
                 faults.write(HairFault::new(FaultKind::NoTarget, message).of(soak.target));
                 continue;
             }

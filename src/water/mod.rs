@@ -15,14 +15,14 @@
 mod adhesion;
 mod bridge;
 mod droplet;
+mod droplet_contact;
 mod exchange;
 mod field;
-mod meet;
 pub mod model;
 pub mod moisture;
 mod motion;
+mod strand_block;
 mod systems;
-mod tuft;
 
 pub use droplet::{Droplet, Ride, Shower};
 pub use moisture::{Moisture, Wetting};
@@ -54,20 +54,20 @@ setting! {
 /// towel. A message; the [`WaterLedger`] counts the difference.
 #[derive(Message, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
-pub struct Soak {
+pub struct SoakHair {
     /// The [`Hair`](crate::Hair) or strand.
     pub target: Entity,
     /// Share of what hair can bind: 1 soaks through, 0 dries.
     pub wetness: f32,
 }
 
-impl Soak {
+impl SoakHair {
     /// The range of [`wetness`](Self::wetness).
     pub const WETNESS: ValueRange =
-        ValueRange::new("Soak::wetness", 0.0..=1.0, "1 soaks through, 0 dries");
+        ValueRange::new("SoakHair::wetness", 0.0..=1.0, "1 soaks through, 0 dries");
 }
 
-impl Ranged for Soak {
+impl Ranged for SoakHair {
     fn clamp_values(&mut self, violations: &mut Violations) {
         Self::WETNESS.clamp(&mut self.wetness, || 0.0, violations);
     }

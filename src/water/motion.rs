@@ -200,7 +200,7 @@ pub(super) fn merge_droplets(
             let [(_, a), (_, b)] = drops.get_disjoint_mut([i, j]).expect("i is before j");
             if a.volume > 0.0 && b.volume > 0.0 {
                 let (a, b) = (a.bypass_change_detection(), b.bypass_change_detection());
-                if a.volume >= b.volume { a.take_in(b) } else { b.take_in(a) }
+                if a.volume >= b.volume { a.merge(b) } else { b.merge(a) }
             }
         }
     }
@@ -212,7 +212,7 @@ pub(super) fn merge_droplets(
 
 impl Droplet {
     /// Takes another drop in, with its momentum.
-    fn take_in(&mut self, other: &mut Droplet) {
+    fn merge(&mut self, other: &mut Droplet) {
         let volume = self.volume + other.volume;
         let share = (other.volume / volume) as f32;
         if self.ride.is_none() {

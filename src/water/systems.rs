@@ -1,12 +1,12 @@
 //! Water's places in the tick, and what it tells and counts.
 
 use super::{
-    Droplet, DropletRules, Moisture, Shower, Soak, WaterLedger, Wetting,
+    Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting,
     bridge::join_wet_strands,
+    droplet_contact::{WaterField, wet_strands},
     exchange::{exchange_water, run_showers},
-    meet::{WaterField, wet_strands},
     motion::{follow_strands, merge_droplets, move_droplets},
-    tuft,
+    strand_block,
 };
 use crate::{
     schedule::{HairStep, HairSystems, HairTick},
@@ -21,12 +21,12 @@ pub struct WaterPlugin;
 impl Plugin for WaterPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<Wetting>(app);
-        tuft::plugin(app);
+        strand_block::plugin(app);
         setting::resource::<DropletRules>(app);
         setting::component::<Shower>(app);
         app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
-            .add_message::<Soak>()
+            .add_message::<SoakHair>()
             .register_type::<WaterLedger>()
             .register_type::<Droplet>()
             .register_type::<Moisture>()

@@ -121,7 +121,7 @@ fn hair_far_away_sleeps_on_when_its_level_changes() {
     run(&mut app, 1.0);
     zoom(&mut app, hair, 0.01);
     run(&mut app, 0.1);
-    assert!(level(&app, hair) == 2 && app.world().get::<Sleep>(e).unwrap().is_asleep());
+    assert!(level(&app, hair) == 2 && app.world().get::<StrandSleep>(e).unwrap().is_asleep());
 }
 
 #[test]

@@ -67,7 +67,7 @@ impl Lab {
 
     /// The least damping that hair may be given, for all hair.
     pub fn undamped(&mut self) {
-        self.app.insert_resource(HairDefault(Solver { internal_damping: 0.0, ..default() }));
+        self.app.insert_resource(HairDefault(HairSolver { internal_damping: 0.0, ..default() }));
     }
 
     /// The hair of this stiffness (m).

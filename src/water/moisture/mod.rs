@@ -98,7 +98,7 @@ impl Wetting {
 /// hair costs nothing, and its hydrogen bonds are left to [`Treat`](crate::Treat) and equation 19.
 ///
 /// Where there is water, hydrogen bonds follow it. The tick writes it; to wet hair from game code
-/// spawn a [`Droplet`](crate::Droplet) or send a [`Soak`](crate::Soak).
+/// spawn a [`Droplet`](crate::Droplet) or send a [`SoakHair`](crate::SoakHair).
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Moisture {

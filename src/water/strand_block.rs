@@ -12,7 +12,7 @@ use bevy::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 /// A strand among droplets.
-pub(super) struct Member<'a> {
+pub(super) struct StrandLane<'a> {
     pub strand: Entity,
     pub positions: &'a [Vec3],
     pub velocities: &'a mut [Vec3],
@@ -77,16 +77,16 @@ impl Row {
 
 /// Up to sixteen strands in lanes.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tuft {
+pub(super) struct StrandBlock {
     /// Root first, as many as the longest strand has nodes.
     pub rows: Vec<Row>,
     /// The index of each lane's strand.
     pub own: [u32; LANES],
 }
 
-impl Tuft {
+impl StrandBlock {
     /// Takes strands in, where they are and no more: most are near no droplet.
-    pub fn place(&mut self, level: Level, members: &[Member<'_>]) {
+    pub fn place(&mut self, level: Level, members: &[StrandLane<'_>]) {
         self.rows.clear();
         let longest = members.iter().map(|m| m.positions.len()).max().unwrap_or(0);
         self.rows.resize(longest, Row::default());
@@ -94,15 +94,15 @@ impl Tuft {
         for (own, member) in self.own.iter_mut().zip(members) {
             *own = member.strand.index_u32();
         }
-        for (quarter, four) in members.chunks(4).enumerate() {
+        for (group, four) in members.chunks(4).enumerate() {
             if let [a, b, c, d] = four
                 && is_of(longest, four)
             {
                 let four = [a.positions, b.positions, c.positions, d.positions];
-                put_vectors(&mut self.rows, quarter, four, |row| &mut row.p);
+                put_vectors(&mut self.rows, group, four, |row| &mut row.p);
                 continue;
             }
-            for (lane, member) in (4 * quarter..).zip(four) {
+            for (lane, member) in (4 * group..).zip(four) {
                 for (p, row) in member.positions.iter().zip(&mut self.rows) {
                     put3(&mut row.p, lane, *p);
                 }
@@ -116,19 +116,19 @@ impl Tuft {
     }
 
     /// How they move and what they weigh, before droplets act on them.
-    pub fn weigh(&mut self, members: &[Member<'_>], wetting: &Wetting) {
-        for (quarter, four) in members.chunks(4).enumerate() {
+    pub fn weigh(&mut self, members: &[StrandLane<'_>], wetting: &Wetting) {
+        for (group, four) in members.chunks(4).enumerate() {
             if let [a, b, c, d] = four
                 && is_of(self.rows.len(), four)
             {
                 let velocities = [&*a.velocities, b.velocities, c.velocities, d.velocities];
-                put_vectors(&mut self.rows, quarter, velocities, |row| &mut row.v);
+                put_vectors(&mut self.rows, group, velocities, |row| &mut row.v);
                 let lengths = [a.lengths, b.lengths, c.lengths, d.lengths];
                 let edges = self.rows.len() - 1;
-                put_numbers(&mut self.rows[..edges], quarter, lengths, |row| &mut row.length);
+                put_numbers(&mut self.rows[..edges], group, lengths, |row| &mut row.length);
                 continue;
             }
-            for (lane, member) in (4 * quarter..).zip(four) {
+            for (lane, member) in (4 * group..).zip(four) {
                 for (v, row) in member.velocities.iter().zip(&mut self.rows) {
                     put3(&mut row.v, lane, *v);
                 }
@@ -154,17 +154,17 @@ impl Tuft {
     }
 
     /// Puts velocities back.
-    pub fn scatter(&self, members: &mut [Member<'_>]) {
-        for (quarter, four) in members.chunks_mut(4).enumerate() {
+    pub fn scatter(&self, members: &mut [StrandLane<'_>]) {
+        for (group, four) in members.chunks_mut(4).enumerate() {
             let is_whole = is_of(self.rows.len(), four);
             if let [a, b, c, d] = &mut *four
                 && is_whole
             {
                 let four = [&mut *a.velocities, b.velocities, c.velocities, d.velocities];
-                take_vectors(&self.rows, quarter, four, |row| &row.v);
+                take_vectors(&self.rows, group, four, |row| &row.v);
                 continue;
             }
-            for (lane, member) in (4 * quarter..).zip(four) {
+            for (lane, member) in (4 * group..).zip(four) {
                 for (v, row) in member.velocities.iter_mut().zip(&self.rows) {
                     *v = take3(&row.v, lane);
                 }
@@ -174,7 +174,7 @@ impl Tuft {
 }
 
 /// Whether all strands have so many nodes.
-fn is_of(nodes: usize, members: &[Member<'_>]) -> bool {
+fn is_of(nodes: usize, members: &[StrandLane<'_>]) -> bool {
     members.iter().all(|member| member.positions.len() == nodes)
 }
 
@@ -182,11 +182,11 @@ fn is_of(nodes: usize, members: &[Member<'_>]) -> bool {
 /// (Morton's), by their roots.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub(super) struct Tufts {
+pub(super) struct StrandBlocks {
     order: Vec<u32>,
 }
 
-impl Tufts {
+impl StrandBlocks {
     /// The numbers of `count` strands with these `roots`, in order. Sorted anew if `anew` or if there are
     /// others than last time; which strands stand together changes only how fast it goes.
     pub fn order(&mut self, anew: bool, count: usize, roots: impl Iterator<Item = Vec3>) -> &[u32] {
@@ -218,7 +218,7 @@ fn spread(x: u64) -> u64 {
 }
 
 pub(super) fn plugin(app: &mut App) {
-    app.register_type::<Tufts>().register_required_components::<Hair, Tufts>();
+    app.register_type::<StrandBlocks>().register_required_components::<Hair, StrandBlocks>();
 }
 
 #[cfg(test)]
@@ -231,26 +231,26 @@ mod tests {
         let roots = (0..1024u32).map(|i| i * 389 % 1024);
         let roots = roots.map(|i| Vec3::new((i % 32) as f32, 5.0, (i / 32) as f32) * 0.003);
         let roots: Vec<Vec3> = roots.collect();
-        let mut tufts = Tufts::default();
-        let order = tufts.order(true, 1024, roots.iter().copied()).to_vec();
+        let mut blocks = StrandBlocks::default();
+        let order = blocks.order(true, 1024, roots.iter().copied()).to_vec();
         let mut all = order.clone();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..1024), "each strand once");
-        let widths = order.chunks(LANES).map(|tuft| {
-            let places = || tuft.iter().map(|i| roots[*i as usize]);
+        let widths = order.chunks(LANES).map(|strand_block| {
+            let places = || strand_block.iter().map(|i| roots[*i as usize]);
             let low = places().reduce(Vec3::min).unwrap_or_default();
             (places().reduce(Vec3::max).unwrap_or_default() - low).max_element()
         });
         let mean = widths.sum::<f32>() / 64.0;
         assert!(mean < 0.02, "sixteen strands fill 12 mm by 12 mm, here {mean} m");
         // Kept while nothing is asked anew, but not for another number of strands.
-        assert_eq!(tufts.order(false, 1024, [Vec3::NAN; 1024].into_iter()), order);
-        assert_eq!(tufts.order(false, 3, roots[..3].iter().copied()).len(), 3);
+        assert_eq!(blocks.order(false, 1024, [Vec3::NAN; 1024].into_iter()), order);
+        assert_eq!(blocks.order(false, 3, roots[..3].iter().copied()).len(), 3);
     }
 
     #[test]
     fn strands_of_any_lengths_are_in_lanes_what_they_were_and_come_back() {
-        // All alike; a quarter with a shorter one among them; a quarter that is not full.
+        // All alike; a group with a shorter one among them; a group that is not full.
         for lengths in [vec![6; 16], vec![6, 6, 6, 6, 6, 5, 6, 6, 2, 3, 4, 5, 6, 6], vec![7; 3]] {
             let number = |s: usize, i: usize| (100 * s + 10 * i) as f32;
             let vectors = |s: usize, add: f32| -> Vec<Vec3> {
@@ -268,35 +268,38 @@ mod tests {
                 .map(|(s, ((positions, lengths), velocities))| {
                     let load: &[f32] = if s == 2 { &[0.5, 0.25] } else { &[] };
                     let strand = Entity::from_raw_u32(s).unwrap();
-                    Member { strand, positions, velocities, lengths, load, film: &[] }
+                    StrandLane { strand, positions, velocities, lengths, load, film: &[] }
                 })
                 .collect();
-            let (mut tuft, wetting) = (Tuft::default(), Wetting::default());
+            let (mut strand_block, wetting) = (StrandBlock::default(), Wetting::default());
             // What was in it before must not stay.
-            tuft.rows = vec![Row { v: [[7.0; LANES]; 3], load: [7.0; LANES], ..default() }; 9];
-            tuft.place(Level::new(), &members);
-            tuft.weigh(&members, &wetting);
+            strand_block.rows =
+                vec![Row { v: [[7.0; LANES]; 3], load: [7.0; LANES], ..default() }; 9];
+            strand_block.place(Level::new(), &members);
+            strand_block.weigh(&members, &wetting);
             for (s, member) in members.iter().enumerate() {
                 let masses = super::super::moisture::node_lengths(member.lengths);
                 for (i, length) in masses.enumerate() {
-                    let row = &tuft.rows[i];
+                    let row = &strand_block.rows[i];
                     assert_eq!(take3(&row.p, s), member.positions[i]);
                     assert_eq!(take3(&row.v, s), member.velocities[i]);
                     assert_eq!(row.load[s], member.load.get(i).copied().unwrap_or(0.0));
                     let mass = wetting.dry_mass() * length;
                     assert!((row.mass[s] - mass).abs() <= 1e-6 * mass, "{s} {i}");
                 }
-                assert!(tuft.rows[lengths[s]..].iter().all(|row| take3(&row.p, s).is_nan()));
+                assert!(
+                    strand_block.rows[lengths[s]..].iter().all(|row| take3(&row.p, s).is_nan())
+                );
             }
-            for (i, row) in tuft.rows.iter().enumerate() {
+            for (i, row) in strand_block.rows.iter().enumerate() {
                 let there = || positions.iter().filter_map(|p| p.get(i)).copied();
                 assert_eq!(Some(row.low), there().reduce(Vec3::min));
                 assert_eq!(Some(row.high), there().reduce(Vec3::max));
             }
-            for row in &mut tuft.rows {
+            for row in &mut strand_block.rows {
                 row.v = row.v.map(|v| v.map(|v| 2.0 * v));
             }
-            tuft.scatter(&mut members);
+            strand_block.scatter(&mut members);
             let doubled = |v: &Vec<Vec3>| v.iter().map(|v| *v * 2.0).collect::<Vec<_>>();
             assert_eq!(velocities, before.iter().map(doubled).collect::<Vec<_>>());
         }
@@ -310,7 +313,7 @@ mod tests {
             .each_ref()
             .into_iter()
             .zip(&mut velocities)
-            .map(|(place, velocities)| Member {
+            .map(|(place, velocities)| StrandLane {
                 strand: Entity::PLACEHOLDER,
                 positions: core::slice::from_ref(place),
                 velocities,
@@ -319,16 +322,16 @@ mod tests {
                 film: &[],
             })
             .collect();
-        let mut tuft = Tuft::default();
-        tuft.place(Level::new(), &members);
-        assert_eq!((tuft.rows[0].low, tuft.rows[0].high), (Vec3::ONE, Vec3::ONE));
+        let mut strand_block = StrandBlock::default();
+        strand_block.place(Level::new(), &members);
+        assert_eq!((strand_block.rows[0].low, strand_block.rows[0].high), (Vec3::ONE, Vec3::ONE));
     }
 
     #[test]
     fn places_that_are_no_places_have_an_order_too() {
-        let mut tufts = Tufts::default();
+        let mut blocks = StrandBlocks::default();
         let roots = [Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::ZERO];
-        let mut order = tufts.order(true, 4, roots.into_iter()).to_vec();
+        let mut order = blocks.order(true, 4, roots.into_iter()).to_vec();
         order.sort_unstable();
         assert_eq!(order, [0, 1, 2, 3]);
     }

@@ -2,12 +2,12 @@
 
 use super::{
     Droplet, Moisture, Ride, WaterLedger, Wetting,
-    adhesion::{Encounters, Landing, MetBy},
+    adhesion::{ContactParams, DropletContacts, Landing},
     exchange::on_strand,
     field::{Field, SeenDrop},
     model::clinging,
     moisture::node_lengths,
-    tuft::{Member, Tufts},
+    strand_block::{StrandBlocks, StrandLane},
 };
 use crate::{
     contact::WetRow,
@@ -29,7 +29,7 @@ const SUMS: usize = 1 << 18;
 /// How many droplets are summed for at a time.
 const PART: usize = 64;
 
-/// How many strands meet droplets as one piece of work, whole tufts: the same on any number of
+/// How many strands meet droplets as one piece of work, whole blocks: the same on any number of
 /// threads, so that what droplets get is always summed in the same order. Every piece keeps room for
 /// all droplets' sums, so of many droplets there are few pieces.
 fn piece(strands: usize, drops: usize) -> usize {
@@ -41,7 +41,7 @@ fn piece(strands: usize, drops: usize) -> usize {
 #[derive(Resource, Default)]
 pub(super) struct WaterField {
     /// The droplets around each hair, and what its pieces of work came to.
-    fields: Vec<(Field, Vec<Encounters>)>,
+    fields: Vec<(Field, Vec<DropletContacts>)>,
     /// Strands that carry a droplet's weight.
     loaded: Vec<Entity>,
     /// What nodes bring to bridges of water.
@@ -51,16 +51,16 @@ pub(super) struct WaterField {
 }
 
 /// Room for a hair's strands, as they come and in order.
-type Room = (Vec<Option<Strandful<'static>>>, Vec<Strandful<'static>>);
+type Room = (Vec<Option<WetStrand<'static>>>, Vec<WetStrand<'static>>);
 
 /// A hair and its strands among droplets.
 struct Head<'a> {
     pose: Pose,
     wetting: Wetting,
-    strands: Vec<Strandful<'a>>,
+    strands: Vec<WetStrand<'a>>,
 }
 
-struct Strandful<'a> {
+struct WetStrand<'a> {
     entity: Entity,
     strand: Mut<'a, Strand>,
     added_mass: &'a AddedMass,
@@ -75,7 +75,7 @@ struct Outcome {
     /// How many strands are at it.
     company: u32,
     landing: Option<Landing>,
-    /// The most that strands would drink (m³).
+    /// The most that strands would absorb (m³).
     wanted: f64,
 }
 
@@ -85,7 +85,7 @@ pub(super) fn wet_strands(
     process: Res<ProcessTime>,
     wetting: Settings<Wetting>,
     mut scratch: ResMut<WaterField>,
-    mut hairs: Query<(&TickPose, &mut Tufts), With<Hair>>,
+    mut hairs: Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
     mut strands: Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
     mut droplets: Query<&mut Droplet>,
     mut ledger: ResMut<WaterLedger>,
@@ -122,7 +122,7 @@ pub(super) fn wet_strands(
     for (Head { pose, wetting, strands }, (field, pieces)) in heads.iter_mut().zip(&mut *fields) {
         field.see(&drops, pose);
         field.sort(wetting.lock_radius());
-        let met = MetBy {
+        let met = ContactParams {
             wetting,
             field,
             dt: step.dt,
@@ -131,7 +131,7 @@ pub(super) fn wet_strands(
         };
         let piece = piece(strands.len(), drops.len());
         pieces.resize_with(strands.len().div_ceil(piece), default);
-        meet_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &met);
+        contact_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &met);
         sum_up(pieces, pose.rotation, outcomes);
     }
     // What all want together may be more than there is.
@@ -139,7 +139,7 @@ pub(super) fn wet_strands(
         drops.iter().zip(&*outcomes).map(|(drop, o)| (drop.counted / o.wanted).min(1.0)).collect();
     for (Head { strands, .. }, (_, pieces)) in heads.iter_mut().zip(&mut *fields) {
         let piece = piece(strands.len(), drops.len());
-        drink_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &shares);
+        absorb_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &shares);
         ledger.water_out += pieces.iter().map(|out| out.gone).sum::<f64>();
     }
     for (head, room) in heads.into_iter().zip(rooms) {
@@ -176,13 +176,13 @@ pub(super) fn wet_strands(
 
 /// All strands by their hair, those that grow together together.
 fn heads<'a>(
-    hairs: &mut Query<(&TickPose, &mut Tufts), With<Hair>>,
+    hairs: &mut Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
     wetting: &Settings<Wetting>,
     strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
     anew: bool,
     rooms: &mut Vec<Room>,
 ) -> Vec<Head<'a>> {
-    let mut heads: PerHair<(Entity, Head<'a>, Vec<Option<Strandful<'a>>>)> = default();
+    let mut heads: PerHair<(Entity, Head<'a>, Vec<Option<WetStrand<'a>>>)> = default();
     let mut unused = core::mem::take(rooms).into_iter();
     for (entity, of, strand, added_mass, moisture) in strands {
         let index = heads.index(of.0, || {
@@ -194,13 +194,13 @@ fn heads<'a>(
             && strand.nodes() >= 2
         {
             let added_mass = &*added_mass.into_inner();
-            heads.values[index].2.push(Some(Strandful { entity, strand, added_mass, moisture }));
+            heads.values[index].2.push(Some(WetStrand { entity, strand, added_mass, moisture }));
         }
     }
     let sorted = heads.values.into_iter().map(|(hair, mut head, mut unsorted)| {
-        if let Ok((_, mut tufts)) = hairs.get_mut(hair) {
+        if let Ok((_, mut blocks)) = hairs.get_mut(hair) {
             let roots = unsorted.iter().flatten().map(|s| s.strand.positions()[0]);
-            let order = tufts.bypass_change_detection().order(anew, unsorted.len(), roots);
+            let order = blocks.bypass_change_detection().order(anew, unsorted.len(), roots);
             for (i, k) in order.iter().enumerate() {
                 // They are taken from all over.
                 let later = order.get(i + 16).and_then(|k| unsorted.get(*k as usize));
@@ -235,9 +235,9 @@ impl Field {
 }
 
 /// Strands and what became of them, piece by piece.
-type Work<'w, 'a> = Vec<(&'w mut [Strandful<'a>], &'w mut Encounters)>;
+type Work<'w, 'a> = Vec<(&'w mut [WetStrand<'a>], &'w mut DropletContacts)>;
 
-fn meet_all(mut work: Work<'_, '_>, met: &MetBy<'_>) {
+fn contact_all(mut work: Work<'_, '_>, met: &ContactParams<'_>) {
     let level = Level::new();
     for_each_block(
         &mut work,
@@ -246,14 +246,15 @@ fn meet_all(mut work: Work<'_, '_>, met: &MetBy<'_>) {
             out.clear(met.field.drops.len());
             let (mut rest, mut first) = (&mut **strands, 0);
             rest.iter().take(2 * LANES).for_each(|one| prefetch(from_ref(&*one.strand)));
-            rest.iter().take(LANES).for_each(Strandful::prefetch);
+            rest.iter().take(LANES).for_each(WetStrand::prefetch);
             while !rest.is_empty() {
-                let (tuft, after) = rest.split_at_mut(LANES.min(rest.len()));
+                let (strand_block, after) = rest.split_at_mut(LANES.min(rest.len()));
                 let later = after.get(LANES..).unwrap_or_default();
                 later.iter().take(LANES).for_each(|one| prefetch(from_ref(&*one.strand)));
-                after.iter().take(LANES).for_each(Strandful::prefetch);
-                let mut members: Vec<Member<'_>> = tuft.iter_mut().map(Strandful::member).collect();
-                met.meet(level, &mut members, first, out);
+                after.iter().take(LANES).for_each(WetStrand::prefetch);
+                let mut members: Vec<StrandLane<'_>> =
+                    strand_block.iter_mut().map(WetStrand::member).collect();
+                met.contact(level, &mut members, first, out);
                 (rest, first) = (after, first + LANES);
             }
         },
@@ -261,13 +262,13 @@ fn meet_all(mut work: Work<'_, '_>, met: &MetBy<'_>) {
 }
 
 /// Gives every node its share of what it wanted.
-fn drink_all(mut work: Work<'_, '_>, shares: &[f64]) {
+fn absorb_all(mut work: Work<'_, '_>, shares: &[f64]) {
     for_each_block(
         &mut work,
         || (),
         |(), (strands, out)| {
             for touch in &out.touches {
-                let Strandful { strand, moisture, .. } = &mut strands[touch.strand as usize];
+                let WetStrand { strand, moisture, .. } = &mut strands[touch.strand as usize];
                 let moisture = moisture.bypass_change_detection();
                 out.gone += moisture.fit(strand.nodes());
                 let takes = touch.wants * shares[touch.drop as usize];
@@ -277,7 +278,7 @@ fn drink_all(mut work: Work<'_, '_>, shares: &[f64]) {
     );
 }
 
-impl Strandful<'_> {
+impl WetStrand<'_> {
     fn prefetch(&self) {
         let (positions, velocities, ..) = self.strand.parts();
         prefetch(positions);
@@ -285,9 +286,9 @@ impl Strandful<'_> {
         prefetch(self.strand.rest_lengths());
     }
 
-    fn member(&mut self) -> Member<'_> {
+    fn member(&mut self) -> StrandLane<'_> {
         let (positions, velocities, lengths) = self.strand.bypass_change_detection().motion_parts();
-        Member {
+        StrandLane {
             strand: self.entity,
             positions,
             velocities,
@@ -299,7 +300,7 @@ impl Strandful<'_> {
 }
 
 /// Adds up what the pieces of the strands did to droplets, and whom they met, in the strands' order.
-fn sum_up(pieces: &[Encounters], rotation: Quat, outcomes: &mut [Outcome]) {
+fn sum_up(pieces: &[DropletContacts], rotation: Quat, outcomes: &mut [Outcome]) {
     // Droplets side by side, for what other threads wrote is slow to read.
     let mut parts: Vec<_> = (0..).step_by(PART).zip(outcomes.chunks_mut(PART)).collect();
     for_each_block(

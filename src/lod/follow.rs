@@ -12,7 +12,7 @@ use glam::{Quat, Vec3};
 pub const GUIDES: usize = 3;
 
 /// How soon a strand gives up the motion of its own that it was tied with (s).
-const OWN_WAY: f32 = 0.15;
+const OWN_MOTION: f32 = 0.15;
 
 /// How a strand hangs on its guides.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,7 +41,7 @@ struct Tie {
 
 /// A strand as it is when it is tied, or is to be tied to.
 #[derive(Clone, Copy, Debug)]
-pub struct Course<'a> {
+pub struct StrandState<'a> {
     /// Node positions (m).
     pub positions: &'a [Vec3],
     /// Node velocities (m/s).
@@ -52,7 +52,7 @@ pub struct Course<'a> {
     pub lengths: &'a [f32],
 }
 
-impl Course<'_> {
+impl StrandState<'_> {
     /// How fast edge `i` turns across itself (rad/s).
     fn spin(&self, i: usize) -> Vec3 {
         let (p, v) = (self.positions, self.velocities);
@@ -99,8 +99,8 @@ pub struct Pose<'a> {
 impl Ties {
     /// Ties a strand in its present pose to guides in theirs, with their weights.
     pub fn new<'a>(
-        strand: Course<'_>,
-        guides: impl IntoIterator<Item = (u32, f32, Course<'a>)>,
+        strand: StrandState<'_>,
+        guides: impl IntoIterator<Item = (u32, f32, StrandState<'a>)>,
     ) -> Self {
         let guides: Vec<_> = guides.into_iter().take(GUIDES).collect();
         let mut edges = Vec::with_capacity(guides.len() * strand.lengths.len());
@@ -137,7 +137,7 @@ impl Ties {
     /// Goes along with the guides, whose frames `turns` gives: none for one that is not usable.
     /// Velocities are those of the motion in `dt` (s), in which what rests in the world went by
     /// `frame`. Says whether there was any guide; without one the strand stays where it is, at rest.
-    pub fn carry<'a>(
+    pub fn follow<'a>(
         &mut self,
         pose: &mut Pose<'_>,
         turns: impl Fn(u32) -> Option<&'a [Quat]>,
@@ -153,11 +153,11 @@ impl Ties {
             return false;
         }
         self.since += dt;
-        if self.since > 10.0 * OWN_WAY {
+        if self.since > 10.0 * OWN_MOTION {
             self.own.clear();
         }
         // It sets out as fast as it was and ends where it began.
-        let own_way = self.since * ops::exp(-self.since / OWN_WAY);
+        let own_motion = self.since * ops::exp(-self.since / OWN_MOTION);
         let per_second = 1.0 / dt;
         let finite = |v: Vec3| if v.is_finite() { v } else { Vec3::ZERO };
         let mut p = root;
@@ -169,7 +169,7 @@ impl Ties {
             let (place, before) = frame.taken(pose.positions[i + 1], pose.orientations[i]);
             let mut turn = self.turn(ties, &frames);
             if let Some(own) = self.own.get(i) {
-                turn = Quat::from_scaled_axis(*own * own_way) * turn;
+                turn = Quat::from_scaled_axis(*own * own_motion) * turn;
             }
             p += turn * *segment;
             pose.orientations[i] = turn;
@@ -271,13 +271,13 @@ mod tests {
         strand((0..nodes).map(|i| root + Vec3::NEG_Y * (segment * i as f32)))
     }
 
-    fn course(parts: &Parts) -> Course<'_> {
-        Course { positions: &parts.0, velocities: &[], turns: &parts.1, lengths: &parts.2 }
+    fn state_of(parts: &Parts) -> StrandState<'_> {
+        StrandState { positions: &parts.0, velocities: &[], turns: &parts.1, lengths: &parts.2 }
     }
 
     fn tied(own: &Parts, guides: &[(&Parts, f32)]) -> Ties {
         let guides = guides.iter().zip(0..);
-        Ties::new(course(own), guides.map(|((parts, weight), i)| (i, *weight, course(parts))))
+        Ties::new(state_of(own), guides.map(|((parts, weight), i)| (i, *weight, state_of(parts))))
     }
 
     #[test]
@@ -288,8 +288,8 @@ mod tests {
         // The strand swings about its root, the guide rests.
         let speed: Vec<Vec3> = (0..9).map(|i| Vec3::Z * (0.04 * i as f32)).collect();
         let velocities = vec![Vec3::ZERO; 9];
-        let strand = Course { velocities: &speed, ..course(&own) };
-        let guides = [(0, 1.0, Course { velocities: &velocities, ..course(&guide) })];
+        let strand = StrandState { velocities: &speed, ..state_of(&own) };
+        let guides = [(0, 1.0, StrandState { velocities: &velocities, ..state_of(&guide) })];
         let mut ties = Ties::new(strand, guides);
         let mut step = |own: &mut Parts| {
             let (mut v, mut w) = (vec![Vec3::ZERO; 9], vec![Vec3::ZERO; 8]);
@@ -299,7 +299,7 @@ mod tests {
                 orientations: &mut own.1,
                 spins: &mut w,
             };
-            ties.carry(&mut pose, |_| Some(&guide.1[..]), &Frame::default(), 1.0 / 60.0);
+            ties.follow(&mut pose, |_| Some(&guide.1[..]), &Frame::default(), 1.0 / 60.0);
             v
         };
         let first = step(&mut own);
@@ -323,7 +323,7 @@ mod tests {
             orientations: &mut own.1,
             spins: &mut spins,
         };
-        let went = ties.carry(&mut pose, |i| guides[i as usize], &Frame::default(), 0.1);
+        let went = ties.follow(&mut pose, |i| guides[i as usize], &Frame::default(), 0.1);
         assert!(velocities.iter().chain(&spins).all(|v| v.is_finite()));
         (went, velocities)
     }
@@ -425,7 +425,7 @@ mod tests {
             orientations: &mut own.1,
             spins: &mut w,
         };
-        ties.carry(&mut pose, |_| Some(&turned[..]), &frame, 0.1);
+        ties.follow(&mut pose, |_| Some(&turned[..]), &frame, 0.1);
         assert!(v.iter().chain(&w).all(|v| v.length() < 1e-4), "{v:?} {w:?}");
     }
 }
