@@ -15,6 +15,7 @@ pub mod fault;
 pub mod grid;
 #[cfg(feature = "groom")]
 pub mod groom;
+#[doc(hidden)]
 pub mod lanes;
 pub mod lod;
 pub mod mass_spring;

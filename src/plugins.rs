@@ -63,8 +63,14 @@ impl PluginGroup for HairPlugins {
             .add(LodPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
+        #[cfg(feature = "save")]
+        let group = group.add(crate::save::SavePlugin);
         #[cfg(feature = "groom")]
-        let group = group.add(crate::groom::GroomPlugin).add(crate::attach::AttachPlugin);
+        let group = group
+            .add(crate::groom::GroomPlugin)
+            .add(crate::plant::PlantPlugin)
+            .add(crate::collider_fit::ColliderFitPlugin)
+            .add(crate::attach::AttachPlugin);
         group
     }
 }

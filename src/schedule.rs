@@ -294,6 +294,7 @@ impl Plugin for TickPlugin {
         app.init_resource::<HairStep>()
             .register_type::<HairStep>()
             .register_type::<SubstepLimits>()
+            .register_type::<InvalidValue>()
             .edit_schedule(HairTick, |schedule| {
                 schedule.set_executor(SingleThreadedExecutor::new()).set_build_settings(
                     ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() },

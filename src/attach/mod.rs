@@ -28,6 +28,7 @@ impl Plugin for AttachPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<RootsOnMesh>()
             .register_type::<TiedRoots>()
+            .register_type::<RootsError>()
             .register_required_components::<RootsOnMesh, TiedRoots>()
             .add_systems(
                 HairTick,

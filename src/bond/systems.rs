@@ -26,7 +26,8 @@ impl Plugin for BondPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<BondInfluence>(app);
         setting::plugin::<Cuticle>(app);
-        app.register_type::<Bonds>()
+        app.register_type::<BondKind>()
+            .register_type::<Bonds>()
             .register_type::<BondChanges>()
             .register_type::<RestShape>()
             .register_required_components::<Strand, Bonds>()

@@ -6,3 +6,15 @@ mod head;
 mod linear;
 
 pub use capsules::{FitError, JointCapsule, fit_joint_capsules};
+
+use bevy::prelude::*;
+
+/// Registers what fitting gives for reflection.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ColliderFitPlugin;
+
+impl Plugin for ColliderFitPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<JointCapsule>().register_type::<FitError>();
+    }
+}

@@ -67,6 +67,7 @@ struct AvianPart;
 pub(super) fn plugin(app: &mut App) {
     app.register_type::<AvianHairCollider>()
         .register_type::<Unknown>()
+        .register_type::<AvianShapeError>()
         .register_type::<AvianPart>()
         .add_systems(
             HairTick,

@@ -1,7 +1,8 @@
 //! Grooms as assets.
 
 use super::{
-    Groom, GroomFileError, GroomFormat, GroomLosses, GroomSettings, gltf, tressfx, wear, yuksel,
+    Groom, GroomError, GroomFileError, GroomFormat, GroomLosses, GroomSettings, gltf, tressfx,
+    wear, yuksel,
 };
 use bevy::{
     asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
@@ -156,7 +157,8 @@ impl Plugin for GroomPlugin {
         app.register_type::<Groom>()
             .register_type::<GroomSettings>()
             .register_type::<GroomFormat>()
-            .register_type::<GroomLosses>();
+            .register_type::<GroomLosses>()
+            .register_type::<GroomError>();
         wear::build(app);
         add_loader(app);
     }

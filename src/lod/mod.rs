@@ -30,9 +30,12 @@
 //!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
+#[doc(hidden)]
 pub mod even;
+#[doc(hidden)]
 pub mod follow;
 mod guides;
+#[doc(hidden)]
 pub mod model;
 mod systems;
 

@@ -30,3 +30,21 @@ pub use planting::{Planted, RootOnMesh};
 pub use preset::{HairPreset, PresetSettings};
 pub use recipe::{Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, MAX_ROOTS, Planting};
 pub use scalp::Scalp;
+
+use bevy::prelude::*;
+
+/// Registers what planting is told for reflection: inspectors, scene files.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PlantPlugin;
+
+impl Plugin for PlantPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Planting>()
+            .register_type::<Planted>()
+            .register_type::<HairPreset>()
+            .register_type::<PresetSettings>()
+            .register_type::<Scalp>()
+            .register_type::<ImageMap>()
+            .register_type::<RootPlace>();
+    }
+}

@@ -15,6 +15,7 @@
 //! thinner than a pixel are drawn one pixel wide and cover part of its samples; without MSAA fewer
 //! strands are drawn instead.
 
+#[doc(hidden)]
 pub mod curve;
 
 mod beads;

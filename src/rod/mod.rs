@@ -17,11 +17,15 @@
 //!
 //! Strands of equal node count are solved [`LANES`](crate::lanes::LANES) side by side; see [`block`] for the layout.
 
+#[doc(hidden)]
 pub mod block;
 pub mod constraint;
+#[doc(hidden)]
 pub mod frame;
 pub(crate) mod limiter;
+#[doc(hidden)]
 pub mod obstacle;
+#[doc(hidden)]
 pub mod step;
 pub mod stiffness;
 mod sweep;

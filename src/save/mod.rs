@@ -213,3 +213,13 @@ impl StyledStrand {
         within("water (m³; film, then bound) of node", "0 to 1", water, 0.0, MOST_WATER)
     }
 }
+
+/// Registers hairdos for reflection.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SavePlugin;
+
+impl Plugin for SavePlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Hairdo>().register_type::<HairdoError>();
+    }
+}

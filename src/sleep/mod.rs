@@ -11,6 +11,7 @@
 //! Wet hair, hair in the wind and hair whose bonds are moving never sleeps: a style that is still
 //! forming would freeze. The mathematics is in [`model`].
 
+#[doc(hidden)]
 pub mod model;
 mod systems;
 

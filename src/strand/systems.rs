@@ -26,6 +26,7 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandOf>()
             .register_type::<Strands>()
             .register_type::<StrandHistory>()
+            .register_type::<StrandError>()
             .register_type::<HeldNodes>()
             .register_type::<AddedMass>()
             .register_type::<StrandSleep>()

@@ -30,6 +30,7 @@ impl Plugin for WaterPlugin {
             .register_type::<WaterLedger>()
             .register_type::<Droplet>()
             .register_type::<Moisture>()
+            .register_type::<SoakHair>()
             .register_required_components::<Strand, Moisture>()
             .add_observer(count_lost_droplet)
             .add_observer(count_lost_moisture)
