@@ -1,6 +1,6 @@
 //! The file formats that grooms come in.
 
-use super::{gltf, reshape::UpAxis};
+use super::gltf;
 use bevy::prelude::*;
 
 /// The kinds of files that a groom is read from.
@@ -41,6 +41,41 @@ impl GroomFormat {
         match self {
             Self::Yuksel => UpAxis::Z,
             Self::TressFx | Self::Gltf => UpAxis::Y,
+        }
+    }
+}
+
+/// The axis of a file that points up.
+#[derive(
+    Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize,
+)]
+#[reflect(Default, Clone, PartialEq)]
+pub enum UpAxis {
+    /// +X, which becomes +Y; Z stays.
+    X,
+    /// +Y, as Bevy has it.
+    #[default]
+    Y,
+    /// +Z, which becomes +Y; X stays. What faces −Y faces +Z then. Blender's axes.
+    Z,
+    /// −X.
+    NegX,
+    /// −Y: turned around Z.
+    NegY,
+    /// −Z, which becomes +Y; X stays.
+    NegZ,
+}
+
+impl UpAxis {
+    /// A vector of a space with this axis up, in Bevy's.
+    pub fn to_y_up(self, v: Vec3) -> Vec3 {
+        match self {
+            Self::X => Vec3::new(-v.y, v.x, v.z),
+            Self::Y => v,
+            Self::Z => Vec3::new(v.x, v.z, -v.y),
+            Self::NegX => Vec3::new(v.y, -v.x, v.z),
+            Self::NegY => Vec3::new(-v.x, -v.y, v.z),
+            Self::NegZ => Vec3::new(v.x, -v.z, v.y),
         }
     }
 }

@@ -16,10 +16,10 @@ mod wear;
 pub mod yuksel;
 
 pub use bytes::GroomFileError;
-pub use format::GroomFormat;
+pub use format::{GroomFormat, UpAxis};
 pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
-pub use reshape::UpAxis;
+
 pub use settings::GroomSettings;
 pub use wear::{GroomGuides, GroomedHair};
 

@@ -1,44 +1,9 @@
 //! Grooms made of other grooms: scaled, turned upright, cleaned, resampled, thinned.
 
-use super::{Groom, GroomError, GroomLosses, GroomSettings, GroomStrand};
+use super::{Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis};
 use crate::setting::ValueRange;
 use bevy::prelude::*;
 use core::ops::Range;
-
-/// The axis of a file that points up.
-#[derive(
-    Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize,
-)]
-#[reflect(Default, Clone, PartialEq)]
-pub enum UpAxis {
-    /// +X, which becomes +Y; Z stays.
-    X,
-    /// +Y, as Bevy has it.
-    #[default]
-    Y,
-    /// +Z, which becomes +Y; X stays. What faces −Y faces +Z then. Blender's axes.
-    Z,
-    /// −X.
-    NegX,
-    /// −Y: turned around Z.
-    NegY,
-    /// −Z, which becomes +Y; X stays.
-    NegZ,
-}
-
-impl UpAxis {
-    /// A vector of a space with this axis up, in Bevy's.
-    pub fn to_y_up(self, v: Vec3) -> Vec3 {
-        match self {
-            Self::X => Vec3::new(-v.y, v.x, v.z),
-            Self::Y => v,
-            Self::Z => Vec3::new(v.x, v.z, -v.y),
-            Self::NegX => Vec3::new(v.y, -v.x, v.z),
-            Self::NegY => Vec3::new(-v.x, -v.y, v.z),
-            Self::NegZ => Vec3::new(v.x, -v.z, v.y),
-        }
-    }
-}
 
 const SCALE: ValueRange = GroomSettings::SCALE.named("a groom's scale");
 const NODES: ValueRange = GroomSettings::NODES.named("nodes to resample to");
