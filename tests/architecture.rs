@@ -102,6 +102,10 @@ impl Crate {
             let (_, source) = &self.files[&at];
             let named = |import: &&Import| import.name.as_deref() == Some(next.as_str());
             let Some(import) = source.imports.iter().find(named) else { return at };
+            // A macro that is re-exported where it is defined.
+            if import.path.split_last() == Some((&next, &at[..])) {
+                return at;
+            }
             let rest = path.split_off(1);
             path = import.path.iter().cloned().chain(rest).collect();
             at.clear();
