@@ -1,13 +1,17 @@
 //! What surrounds hair: gravity, the wind of blowers, the drag of the air, and how fast it dries.
 
+mod blower;
+mod blown;
 mod climate;
 mod systems;
 pub mod vapour;
 pub mod wind;
 
+pub(crate) use blower::{LocalBlower, local_blowers};
+pub(crate) use blown::Blown;
+pub use blown::BlownAir;
 pub use climate::Climate;
 pub use systems::EnvironmentPlugin;
-pub(crate) use systems::{LocalBlower, local_blowers};
 
 use crate::{
     setting::{InvalidValue, Ranged, ValueRange, Violations, setting},

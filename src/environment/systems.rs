@@ -1,12 +1,17 @@
 //! `ExternalForces`: what the air and gravity do to velocities, and what wind asks of the bonds.
 
-use super::{AirDrag, Blower, Climate, HairGravity, WindReceived, vapour::DryingAir, wind::wind};
+use super::{
+    AirDrag, Blower, Climate, HairGravity, WindReceived,
+    blower::{LocalBlower, local_blowers},
+    blown::{Blown, BlownAir},
+    vapour::DryingAir,
+};
 use crate::{
-    bond::{BondChanges, BondKind, model::drying},
+    bond::{BondChanges, BondKind},
     parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose},
+    strand::{AddedMass, Hair, PerHair, Strand, StrandOf, StrandSleep, TickPose},
 };
 use bevy::prelude::*;
 
@@ -20,6 +25,8 @@ impl Plugin for EnvironmentPlugin {
         setting::resource::<HairGravity>(app);
         setting::resource::<Climate>(app);
         app.register_type::<WindReceived>()
+            .register_type::<BlownAir>()
+            .register_required_components::<Strand, BlownAir>()
             .init_resource::<DryingAir>()
             .add_systems(
                 HairTick,
@@ -38,37 +45,19 @@ struct LocalAir {
     gravity: Vec3,
     keep: f32,
     dt: f32,
+    scale: f32,
     blowers: Vec<LocalBlower>,
 }
 
-/// A blower as seen in a frame, its values valid.
-pub(crate) struct LocalBlower {
-    pub nozzle: Vec3,
-    /// Unit direction of its wind.
-    pub aim: Vec3,
-    pub blower: Blower,
-}
-
-/// The blowers that blow, seen in the frame of `pose`.
-pub(crate) fn local_blowers(
-    frame: &Pose,
-    blowers: &Query<(&Blower, &TickPose)>,
-) -> Vec<LocalBlower> {
-    blowers
-        .iter()
-        .map(|(b, pose)| (b.clamped(), pose.now()))
-        .filter(|(blower, _)| blower.strength > 0.0)
-        .map(|(blower, pose)| LocalBlower {
-            nozzle: frame.point_in(pose.translation),
-            aim: frame.direction_in(pose.rotation * Vec3::NEG_Z),
-            blower,
-        })
-        .collect()
-}
-
 /// A strand that air acts on, with the number of its hair's air.
-type Blown<'a> =
-    (usize, &'a mut Strand, &'a AddedMass, &'a mut BondChanges, Option<&'a mut WindReceived>);
+type InAir<'a> = (
+    usize,
+    &'a mut Strand,
+    &'a AddedMass,
+    &'a mut BondChanges,
+    &'a mut BlownAir,
+    Option<&'a mut WindReceived>,
+);
 
 fn apply_air(
     steps: EffectiveSubsteps,
@@ -82,6 +71,7 @@ fn apply_air(
         &mut Strand,
         &AddedMass,
         &mut BondChanges,
+        &mut BlownAir,
         Option<&mut WindReceived>,
     )>,
 ) {
@@ -93,28 +83,30 @@ fn apply_air(
             gravity: pose.direction_in(gravity) * dt,
             keep: bevy::math::ops::exp(-drag.of(hair).rate * dt),
             dt,
+            scale: pose.scale,
             blowers: local_blowers(pose, &blowers),
         })
     };
     // Wind also dries hair that is carried.
     let is_spared =
         |sleep: &StrandSleep| sleep.is_asleep() || (sleep.is_follower() && blowers.is_empty());
-    let ahead = |(_, strand, ..): &Blown<'_>| {
+    let ahead = |(_, strand, ..): &InAir<'_>| {
         let (_, velocities, _, spins) = strand.parts();
         prefetch(velocities);
         prefetch(spins);
     };
     for_each_part(tables(&mut strands), Vec::new, |items, rows| {
         let mut airs = PerHair::default();
-        for (of, sleep, strand, added_mass, changes, received) in rows {
+        for (of, sleep, strand, added_mass, changes, blown, received) in rows {
             if !is_spared(sleep)
                 && let Some(air) = airs.index(of.0, || air_of(of.0))
             {
-                items.push((air, strand, added_mass, changes, received));
+                items.push((air, strand, added_mass, changes, blown, received));
             }
         }
-        in_turn(items, AHEAD, ahead, |(air, strand, added_mass, changes, received)| {
-            blow(&airs.values[*air], strand, added_mass, changes, received.as_deref_mut());
+        in_turn(items, AHEAD, ahead, |(air, strand, added_mass, changes, blown, received)| {
+            let air = &airs.values[*air];
+            blow(air, strand, added_mass, changes, blown, received.as_deref_mut());
         });
         items.clear();
     });
@@ -126,8 +118,10 @@ fn blow(
     strand: &mut Strand,
     added_mass: &AddedMass,
     changes: &mut BondChanges,
+    BlownAir { nodes: at_nodes }: &mut BlownAir,
     mut received: Option<&mut WindReceived>,
 ) {
+    at_nodes.clear();
     let (positions, velocities, _, spins) = strand.parts_mut();
     for v in velocities.iter_mut() {
         *v = *v * air.keep + air.gravity;
@@ -143,27 +137,22 @@ fn blow(
     let edges = positions.len().saturating_sub(1);
     // Wet hair is heavier: the same wind moves it less.
     let heed = |i: usize| 1.0 / (1.0 + added_mass.mass.get(i).copied().unwrap_or(0.0));
-    for i in 0..edges {
+    let is_wet = added_mass.moves_bonds;
+    for (i, velocity) in velocities.iter_mut().enumerate().take(edges + 1).filter(|_| edges > 0) {
         // The tip has no edge of its own: it takes the last one's wind.
-        let edge = positions[i + 1] - positions[i];
-        let (mut change, mut dried) = (Vec3::ZERO, 0.0);
-        for LocalBlower { nozzle, aim, blower } in &air.blowers {
-            let w = wind(blower.strength, *nozzle, *aim, positions[i], edge) * air.dt;
-            change += w;
-            dried += drying(w.length(), blower.drying);
-            if i + 1 == edges {
-                velocities[i + 1] += wind(blower.strength, *nozzle, *aim, positions[i + 1], edge)
-                    * (air.dt * heed(i + 1));
-            }
-        }
-        velocities[i] += change * heed(i);
+        let e = i.min(edges - 1);
+        let edge = positions[e + 1] - positions[e];
+        let blown = Blown::at(&air.blowers, air.scale, positions[i], edge);
+        *velocity += blown.acceleration * (air.dt * heed(i));
         // Where there is water, the wind dries that, and the bonds follow it.
-        if added_mass.softening.is_empty() {
-            changes.ask(i, BondKind::Hydrogen, dried);
+        if is_wet {
+            at_nodes.push(blown);
+        } else if i < edges {
+            changes.ask(i, BondKind::Hydrogen, blown.drying * air.dt);
         }
-        if let Some(received) = received.as_deref_mut() {
+        if let Some(received) = received.as_deref_mut().filter(|_| i < edges) {
             received.total.resize(edges, 0.0);
-            received.total[i] += change.length();
+            received.total[i] += blown.acceleration.length() * air.dt;
         }
     }
 }

@@ -159,6 +159,8 @@ pub struct AddedMass {
     pub mass: Vec<f32>,
     /// Share of its stiffness that each joint has lost, beyond open bonds.
     pub softening: Vec<f32>,
+    /// Whether the strand's water moves its hydrogen bonds: then wind dries that water, not the bonds.
+    pub moves_bonds: bool,
 }
 
 /// Nodes that something else holds: a rod they are wound on, a hand, a clip. Held nodes have no

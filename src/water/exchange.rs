@@ -7,17 +7,16 @@ use super::{
 };
 use crate::{
     Blower,
-    bond::{BondChanges, BondKind, Bonds, model::drying},
-    environment::{HairGravity, LocalBlower, local_blowers, wind::wind},
+    bond::{BondChanges, BondKind, Bonds},
+    environment::{
+        Blown, BlownAir, HairGravity,
+        vapour::{DryingAir, WATER},
+    },
     fault::{FaultKind, HairFault},
     parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
-    schedule::HairStep,
+    schedule::{HairStep, ProcessTime},
     setting::{Ranged, Settings, report},
     strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
-};
-use crate::{
-    environment::vapour::{DryingAir, WATER, jet},
-    schedule::ProcessTime,
 };
 use bevy::prelude::*;
 
@@ -44,52 +43,20 @@ pub(super) fn run_showers(
     }
 }
 
-/// The air that blowers send past a place: its velocity (m/s), and its temperature above the room's
-/// (K). Along the axis it is a jet ([`jet`]); aside it falls off like equation 17's wind.
-pub(super) fn blown_air(blowers: &[LocalBlower], scale: f32, room: f32, p: Vec3) -> (Vec3, f32) {
-    let (mut velocity, mut warmth) = (Vec3::ZERO, 0.0);
-    for LocalBlower { nozzle, aim, blower } in blowers {
-        let along = (p - *nozzle).dot(*aim);
-        // Equation 17 on an edge across the wind is all but its share of the angle.
-        let share = wind(1.0, *nozzle, *aim, p, aim.any_orthonormal_vector()).length();
-        let left = share * jet(along * scale);
-        velocity += *aim * (blower.speed * left);
-        warmth += (blower.celsius - room) * left;
-    }
-    (velocity, warmth)
-}
-
 /// Water's surroundings as one hair has them, in its frame.
 struct LocalWater<'a> {
     wetting: Wetting,
     pose: Pose,
     around: Surroundings<'a>,
-    blowers: Vec<LocalBlower>,
     /// The share of the way that hydrogen bonds go after the water.
     bonds_follow: f32,
-}
-
-impl LocalWater<'_> {
-    /// What blown air does at a place of an edge.
-    fn exposure(&self, p: Vec3, edge: Vec3, room: f32, dt: f32) -> Option<Exposure> {
-        if self.blowers.is_empty() {
-            return None;
-        }
-        let (velocity, warmth) = blown_air(&self.blowers, self.pose.scale, room, p);
-        let blown = |b: &LocalBlower| {
-            drying(wind(b.blower.strength, b.nozzle, b.aim, p, edge).length() * dt, b.blower.drying)
-        };
-        Some(Exposure {
-            speed: velocity.cross(edge.normalize_or_zero()).length(),
-            warmth,
-            blown: self.blowers.iter().map(blown).sum(),
-        })
-    }
 }
 
 struct Wet<'a> {
     strand: &'a Strand,
     bonds: &'a Bonds,
+    /// What blowers do to each node; nothing while none blows.
+    blown: &'a [Blown],
     moisture: &'a mut Moisture,
     added_mass: &'a mut AddedMass,
     changes: &'a mut BondChanges,
@@ -116,11 +83,12 @@ pub(super) fn exchange_water(
     (air, process, gravity): (Res<DryingAir>, Res<ProcessTime>, Res<HairGravity>),
     wetting: Settings<Wetting>,
     hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
-    blowers: Query<(&Blower, &TickPose)>,
+    blowers: Query<(), With<Blower>>,
     mut strands: Query<(
         &StrandOf,
         &Strand,
         &Bonds,
+        &BlownAir,
         &mut Moisture,
         &mut AddedMass,
         &mut BondChanges,
@@ -152,6 +120,7 @@ pub(super) fn exchange_water(
         }
     }
     let damp = air.equilibrium > 0.0;
+    let is_still = blowers.is_empty();
     let process = process.clamped().0;
     let gravity = gravity.clamped().0;
     let water_of = |hair: Entity| {
@@ -162,21 +131,22 @@ pub(super) fn exchange_water(
         Some(LocalWater {
             wetting,
             around,
-            blowers: local_blowers(&pose, &blowers),
             bonds_follow: 1.0 - bevy::math::ops::exp(-seconds / wetting.bond_time.max(1e-9)),
             pose,
         })
     };
     let done = for_each_part(tables(&mut strands), Vec::new, |items, rows| {
         let (mut waters, mut done) = (PerHair::default(), Done::default());
-        for (of, strand, bonds, moisture, added_mass, changes) in rows {
+        for (of, strand, bonds, air, moisture, added_mass, changes) in rows {
             if (damp || !moisture.is_untouched())
                 && let Some(hair) = waters.index(of.0, || water_of(of.0))
                 && strand.nodes() >= 2
                 && bonds.joints.len() == strand.edges()
             {
                 let left = Left::default();
-                let wet = Wet { strand, bonds, moisture, added_mass, changes, left, gone: 0.0 };
+                let blown = if is_still { &[][..] } else { &air.nodes };
+                let wet =
+                    Wet { strand, bonds, blown, moisture, added_mass, changes, left, gone: 0.0 };
                 items.push((hair, wet));
             }
         }
@@ -216,12 +186,17 @@ struct Done {
 /// One strand's water in one substep, what follows from it for bonds and weight.
 fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bool, dt: f32) {
     let LocalWater { wetting, around, bonds_follow, .. } = water;
-    let Wet { strand, bonds, moisture, added_mass, changes, .. } = wet;
+    let Wet { strand, bonds, blown, moisture, added_mass, changes, .. } = wet;
     wet.gone += moisture.fit(strand.nodes());
     let (positions, lengths, edges) = (strand.positions(), strand.rest_lengths(), strand.edges());
     let exposure = |i: usize| {
-        let e = i.min(edges - 1);
-        water.exposure(positions[i], positions[e + 1] - positions[e], air.celsius, dt)
+        let (e, blown) = (i.min(edges - 1), blown.get(i)?);
+        let along = (positions[e + 1] - positions[e]).normalize_or_zero();
+        Some(Exposure {
+            speed: blown.velocity.cross(along).length(),
+            warmth: blown.warmth(air.celsius),
+            blown: blown.drying * dt,
+        })
     };
     moisture.exchange(positions, lengths, around, exposure, &mut wet.left);
     open_bonds(bonds, moisture.wetness(), *bonds_follow, changes);
@@ -240,6 +215,7 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
     added_mass.mass.extend(
         (node_lengths(lengths).zip(water)).map(|(l, v)| (WATER * v / (dry * f64::from(l))) as f32),
     );
+    added_mass.moves_bonds = true;
     added_mass.softening.clear();
     added_mass.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
 }

@@ -2,25 +2,24 @@
 
 use super::{
     Droplet, DropletRules, Ride, WaterLedger, Wetting,
-    exchange::{blown_air, let_go, on_strand},
+    exchange::{let_go, on_strand},
     model::{ball_radius, clinging, fall, hanging, slide},
 };
 use crate::{
     Blower, HairCollider,
     contact::seen_from,
-    environment::{HairGravity, local_blowers},
+    environment::{
+        Blown, HairGravity, local_blowers,
+        vapour::{DryingAir, WATER, transfer},
+    },
     fault::HairFault,
     grid::UniformGrid,
     lanes::V3,
     parallel::for_each,
     rod::obstacle::Obstacle,
-    schedule::HairStep,
+    schedule::{HairStep, ProcessTime},
     setting::{Ranged, Settings, Violations, report},
     strand::{Hair, Pose, Strand, StrandOf, TickPose},
-};
-use crate::{
-    environment::vapour::{DryingAir, WATER, transfer},
-    schedule::ProcessTime,
 };
 use bevy::prelude::*;
 
@@ -79,7 +78,8 @@ pub(super) fn move_droplets(
         *new = drop.volume - drop.counted;
         drop.before = drop.position;
 
-        let (wind, warmth) = blown_air(&blowers, 1.0, air.celsius, drop.position);
+        let blown = Blown::at(&blowers, 1.0, drop.position, Vec3::ZERO);
+        let (wind, warmth) = (blown.velocity, blown.warmth(air.celsius));
         let radius = drop.radius();
         let speed = air.draught + (wind - drop.velocity).length();
         let area = 4.0 * core::f32::consts::PI * radius * radius;

@@ -1,0 +1,52 @@
+//! What the air of blowers does at a node: worked out once, for velocities, bonds and water.
+
+use super::{blower::LocalBlower, vapour::jet, wind::wind};
+use crate::bond::model::drying;
+use bevy::prelude::*;
+
+/// The air that blowers send past a node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Blown {
+    /// Acceleration of the edge that begins here, equation 17 (m/s²).
+    pub(crate) acceleration: Vec3,
+    /// Rate at which it dries, equation 19 (1/s).
+    pub(crate) drying: f32,
+    /// Velocity of the air beyond the room's draught (m/s).
+    pub(crate) velocity: Vec3,
+    /// The air's share of the jets, and their temperature weighted by it (°C).
+    share: f32,
+    celsius: f32,
+}
+
+impl Blown {
+    /// At a place of an `edge`, in a frame of `scale` world units to one. Aside of its axis a jet falls
+    /// off like equation 17's wind.
+    pub(crate) fn at(blowers: &[LocalBlower], scale: f32, p: Vec3, edge: Vec3) -> Self {
+        let mut all = Self::default();
+        for LocalBlower { nozzle, aim, blower } in blowers {
+            let acceleration = wind(blower.strength, *nozzle, *aim, p, edge);
+            all.acceleration += acceleration;
+            all.drying += drying(acceleration.length(), blower.drying);
+            let across = aim.any_orthonormal_vector();
+            let share =
+                wind(1.0, *nozzle, *aim, p, across).length() * jet((p - *nozzle).dot(*aim) * scale);
+            all.velocity += *aim * (blower.speed * share);
+            all.share += share;
+            all.celsius += blower.celsius * share;
+        }
+        all
+    }
+
+    /// How much warmer it is than a `room` (K).
+    pub(crate) fn warmth(&self, room: f32) -> f32 {
+        self.celsius - room * self.share
+    }
+}
+
+/// What blowers do to each node of a wet strand, root first. Kept by the tick while any blower blows.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct BlownAir {
+    #[reflect(ignore)]
+    pub(crate) nodes: Vec<Blown>,
+}
