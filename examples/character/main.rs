@@ -129,7 +129,7 @@ fn pictures(
     arguments: &Arguments,
     folder: &Path,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    std::fs::create_dir_all(folder)?;
+    picture::folder(folder)?;
     app.add_plugins(measure::MeasurePlugin);
     let pictures = picture::Pictures::new(app, arguments.size, stage::camera());
     let name = format!("{:?}", arguments.preset.0).to_lowercase();

@@ -112,7 +112,7 @@ fn main() -> ExitCode {
                     ExitCode::SUCCESS
                 }
                 Err(error) => {
-                    eprintln!("error: no pictures in {}: {error}", folder.display());
+                    eprintln!("error: {error}");
                     ExitCode::FAILURE
                 }
             }

@@ -1,6 +1,10 @@
 //! Pictures without a window: exactly one tick an update, drawn at the frames asked for.
 
-use crate::{Arguments, camera, picture::Pictures, scenes::Scene};
+use crate::{
+    Arguments, camera,
+    picture::{self, Pictures},
+    scenes::Scene,
+};
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use std::{
     io,
@@ -14,7 +18,7 @@ pub fn run(
     arguments: &Arguments,
     folder: &Path,
 ) -> io::Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder)?;
+    picture::folder(folder)?;
     let mut frames = arguments.frames.clone().unwrap_or_else(|| scene.kind.shown().to_vec());
     frames.sort_unstable();
     frames.dedup();
