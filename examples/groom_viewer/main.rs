@@ -114,6 +114,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let file = arguments.file.canonicalize().map_err(blamed)?;
     let kind = GroomFormat::of(&std::fs::read(&file).map_err(blamed)?)
         .ok_or_else(|| format!("{path}: expected a .hair, .tfx, .gltf or .glb file"))?;
+    // Before anything that takes long.
+    arguments.offscreen.as_deref().map(picture::folder).transpose()?;
     let folder = file.parent().unwrap_or(Path::new("/")).to_string_lossy().into_owned();
     let assets = AssetPlugin { file_path: folder, ..default() };
     let offscreen = arguments.offscreen.is_some();
@@ -149,7 +151,6 @@ fn pictures(
     arguments: &Arguments,
     folder: &Path,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    picture::folder(folder)?;
     app.add_systems(Update, camera::frame);
     let pictures = picture::Pictures::new(app, arguments.size, camera::bundle());
     while !app.world().contains_resource::<Shown>() {

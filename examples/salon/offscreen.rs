@@ -1,24 +1,19 @@
 //! Pictures without a window: exactly one tick an update, drawn at the frames asked for.
 
-use crate::{
-    Arguments, camera,
-    picture::{self, Pictures},
-    scenes::Scene,
-};
+use crate::{Arguments, camera, picture::Pictures, scenes::Scene};
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use std::{
     io,
     path::{Path, PathBuf},
 };
 
-/// Runs the scene and writes a PNG for every frame asked for. Gives the files' paths.
+/// Runs the scene and writes into the folder, which is there, a PNG for every frame asked for. Gives the files' paths.
 pub fn run(
     app: &mut App,
     scene: Scene,
     arguments: &Arguments,
     folder: &Path,
 ) -> io::Result<Vec<PathBuf>> {
-    picture::folder(folder)?;
     let mut frames = arguments.frames.clone().unwrap_or_else(|| scene.kind.shown().to_vec());
     frames.sort_unstable();
     frames.dedup();
