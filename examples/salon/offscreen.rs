@@ -7,7 +7,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Runs the scene and writes into the folder, which is there, a PNG for every frame asked for. Gives the files' paths.
+/// Runs the scene and writes a PNG for every frame asked for into the folder, which is there. Gives
+/// the files' paths.
 pub fn run(
     app: &mut App,
     scene: Scene,

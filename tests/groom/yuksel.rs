@@ -113,7 +113,7 @@ fn files_without_strands_or_with_impossible_widths_are_refused() {
 #[test]
 fn what_is_written_after_any_scale_can_be_read() {
     let (groom, _) = yuksel::read(&hair(&[2, 1, 3], 31)).unwrap();
-    let lines = groom.strands().map(|s| s.points.to_vec());
+    let lines: Vec<_> = groom.strands().map(|s| s.points.to_vec()).collect();
     for width in [1e-30, 1.0, 1e20, 1e30, f32::MAX] {
         let groom = Groom::from_polylines(lines.clone()).unwrap();
         let groom = groom.with_widths((0..9).map(|i| width * 0.1 * i as f32).collect()).unwrap();
