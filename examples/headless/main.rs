@@ -100,7 +100,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::new(kind, arguments.variant.as_deref())?;
     let seconds = arguments.seconds.unwrap_or(scene.kind.frames() as f32 / 60.0);
     let frames = (seconds * 60.0).round() as u64;
-    if frames < 1 || !(seconds < 1e5) {
+    // What is not a number has no frames.
+    if frames < 1 || seconds > 1e5 {
         let expected = "expected 0.017, which is one frame, to 100000";
         return Err(format!("--seconds is {seconds}, {expected}").into());
     }

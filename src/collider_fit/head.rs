@@ -2,7 +2,7 @@
 
 use super::linear::solve;
 use crate::groom::Groom;
-use bevy::math::{DVec3, Vec3, bounding::BoundingSphere};
+use bevy::math::{DVec3, bounding::BoundingSphere};
 
 impl Groom {
     /// The ball (m) whose surface the roots lie on best, by least squares: a collider for a groom
@@ -44,15 +44,13 @@ impl Groom {
         let [x, y, z, d] = solve(sums, rights, 1e-5 * count as f64)?;
         let centre = DVec3::new(x, y, z) * 0.5;
         let radius = (d + centre.length_squared()).max(0.0).sqrt() * spread;
-        let centre = middle + centre * spread;
-        let off = |r: Vec3| (r.as_dvec3().distance(centre) - radius).powi(2);
-        let off = (self.roots().map(off).sum::<f64>() / count as f64).sqrt();
-        let is_ball = off <= 0.2 * radius;
+        let centre = (middle + centre * spread).as_vec3();
         // To a small part of a ball one of almost any size fits.
         let reach = self.roots().map(|r| r.as_dvec3().distance(middle)).fold(0.0, f64::max);
         let is_patch = radius.is_nan() || reach < 0.5 * radius;
-        let centre = centre.as_vec3();
         let nearest = self.roots().map(|r| r.distance(centre)).fold(f32::MAX, f32::min);
+        // Most of it shrunk away: they lie on no ball.
+        let is_ball = f64::from(nearest) >= 0.5 * radius;
         let radius = nearest.min(radius as f32);
         let (low, high) = self.extents()?;
         let within = 2.0 * radius <= (high - low).max_element();
