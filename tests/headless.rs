@@ -141,6 +141,22 @@ fn a_swing_that_cannot_be_says_why() {
     assert!(String::from_utf8_lossy(&out.stderr).contains("swing's"));
 }
 
+#[test]
+fn a_table_that_cannot_be_written_is_named_and_no_frame_is_an_error() {
+    let error = |arguments: &[&str]| {
+        let out = headless(&[&["--scene", "bedhead"], arguments].concat());
+        assert_eq!(out.status.code(), Some(1));
+        String::from_utf8(out.stderr).unwrap()
+    };
+    let table = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml/table.csv");
+    let text = error(&["--csv", table]);
+    assert!(text.contains(&format!("--csv {table} cannot be written")), "{text}");
+    for seconds in ["0.001", "0", "-1", "NaN", "1e9"] {
+        let text = error(&[&format!("--seconds={seconds}")]);
+        assert!(text.contains("--seconds is") && text.contains("expected 0.017"), "{text}");
+    }
+}
+
 fn shower(variant: &str, seconds: &str) -> Value {
     let arguments = ["--scene", "shower", "--variant", variant, "--seconds", seconds, "--json"];
     let out = headless(&arguments);

@@ -96,6 +96,8 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    // Before anything that takes long.
+    arguments.offscreen.as_deref().map(picture::folder).transpose()?;
     let offscreen = arguments.offscreen.is_some();
     let mut app = renderer::app("character", arguments.size, offscreen, default());
     app.insert_resource(Time::<Fixed>::from_hz(60.0))
@@ -129,7 +131,6 @@ fn pictures(
     arguments: &Arguments,
     folder: &Path,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    std::fs::create_dir_all(folder)?;
     app.add_plugins(measure::MeasurePlugin);
     let pictures = picture::Pictures::new(app, arguments.size, stage::camera());
     let name = format!("{:?}", arguments.preset.0).to_lowercase();

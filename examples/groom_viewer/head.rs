@@ -1,8 +1,8 @@
 //! The groom on a ball for a head, its motion, and what is measured of it.
 
 use crate::{Arguments, camera, solid::Paint, studio};
-use bevy::{math::bounding::BoundingSphere, prelude::*};
-use bevy_keratin::{groom::*, prelude::*};
+use bevy::prelude::*;
+use bevy_keratin::{FaultKind, groom::*, prelude::*};
 use core::{f32::consts::TAU, fmt};
 
 /// How far the head turns to either side (rad), once a second.
@@ -11,6 +11,14 @@ const TURN: f32 = TAU / 6.0;
 /// The groom as it comes from the file.
 #[derive(Resource)]
 pub struct Loading(pub Handle<Groom>);
+
+/// What kind of file it is.
+#[derive(Resource)]
+pub struct Kind(pub GroomFormat);
+
+/// Why no hair has grown.
+#[derive(Resource, Default)]
+pub struct Refused(pub Vec<String>);
 
 /// That the groom is there, and the ball around all of it (m).
 #[derive(Resource)]
@@ -63,48 +71,98 @@ pub struct HeadPlugin;
 impl Plugin for HeadPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Measure>()
+            .init_resource::<Refused>()
             .insert_resource(Time::<Fixed>::from_hz(60.0))
             .add_systems(Startup, load)
-            .add_systems(Update, put_on.run_if(not(resource_exists::<Shown>)))
+            .add_systems(Update, put_on.pipe(give_up).run_if(not(resource_exists::<Shown>)))
+            .add_systems(Last, refuse)
             .add_systems(FixedUpdate, shake)
             .add_systems(FixedLast, measure);
     }
 }
 
-fn load(mut commands: Commands, assets: Res<AssetServer>, arguments: Res<Arguments>) {
-    let (scale, up) = (arguments.scale, arguments.up.map(UpAxis::from));
+fn refuse(mut faults: MessageReader<HairFault>, mut refused: ResMut<Refused>) {
+    let faults = faults.read().filter(|fault| fault.kind == FaultKind::Groom);
+    refused.0.extend(faults.map(ToString::to_string));
+}
+
+fn give_up(
+    In(shown): In<Result>,
+    mut refused: ResMut<Refused>,
+    mut exit: MessageWriter<AppExit>,
+    arguments: Res<Arguments>,
+) {
+    if let Err(error) = shown {
+        // Without the trace that Bevy puts behind it.
+        let error = error.to_string().lines().next().unwrap_or_default().to_owned();
+        if arguments.offscreen.is_none() {
+            eprintln!("error: {}: {error}", arguments.file.display());
+        }
+        refused.0.push(error);
+        exit.write(AppExit::error());
+    }
+}
+
+fn load(
+    mut commands: Commands,
+    assets: Res<AssetServer>,
+    arguments: Res<Arguments>,
+    kind: Res<Kind>,
+) {
+    let scale = Some(arguments.scale.unwrap_or(kind.0.scale()));
+    let up = arguments.up.map(UpAxis::from);
     let name = arguments.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let load = assets.load_builder().with_settings(move |s: &mut GroomSettings| {
-        (s.scale, s.up) = (scale, up);
+        // What is short is known once the scale is.
+        (s.scale, s.up, s.merge) = (scale, up, 0.0);
     });
     commands.insert_resource(Loading(load.load(name)));
 }
 
-/// Grows the groom on a ball that fits its roots, the ball's centre being the origin.
+/// The groom in a size that hair can have. A scale that was asked for stays.
+fn sized(groom: &Groom, kind: GroomFormat, asked: Option<f32>) -> Result<Groom> {
+    let scale = asked.unwrap_or(kind.scale());
+    let mut factor = 1.0;
+    if let Some(odd) = groom.odd_size(scale) {
+        println!("with {scale} m a unit {odd}");
+        if asked.is_none() {
+            println!("shown as by --scale {}", odd.scale);
+            factor = odd.scale / scale;
+        }
+    }
+    let (groom, losses) = groom.clone().scaled(factor)?.merged(GroomSettings::default().merge)?;
+    if groom.is_empty() {
+        return Err(GroomError::Empty.into());
+    }
+    if !losses.is_empty() {
+        println!("{losses}");
+    }
+    Ok(groom)
+}
+
+/// Grows the groom on a ball that fits its roots, the ball's centre being the origin. Without such a
+/// ball, as for a tail or a fringe, the origin is the middle of the roots, and nothing is below.
 fn put_on(
     mut commands: Commands,
     mut paint: Paint,
     mut grooms: ResMut<Assets<Groom>>,
     loading: Res<Loading>,
-    arguments: Res<Arguments>,
+    (arguments, kind): (Res<Arguments>, Res<Kind>),
 ) -> Result {
     let Some(groom) = grooms.get(&loading.0) else {
         return Ok(());
     };
-    let fallback = || {
-        let middle = groom.roots().sum::<Vec3>() / groom.len().max(1) as f32;
-        BoundingSphere::new(middle, 1e-3)
-    };
-    let ball = groom.fit_head().unwrap_or_else(fallback);
-    let groom = groom.clone().moved(-Vec3::from(ball.center))?;
-    let (low, high) = groom
-        .points()
-        .iter()
-        .fold((Vec3::MAX, Vec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
+    let groom = sized(groom, kind.0, arguments.scale)?;
+    let ball = groom.fit_head();
+    let roots = || groom.roots().map(|r| r / groom.len() as f32).sum::<Vec3>();
+    let centre = ball.map_or_else(roots, |ball| ball.center.into());
+    let radius = ball.map_or(0.0, |ball| ball.radius());
+    let groom = groom.moved(-centre)?;
+    let (low, high) = groom.extents().unwrap_or_default();
     let middle = 0.5 * (low + high);
     // Hair on the back of something large: turned around where it grows, and shown from aside.
     let aside = middle * Vec3::new(1.0, 0.0, 1.0);
-    let (pivot, rest) = match aside.length() > 0.5 * ball.radius() {
+    let (pivot, rest) = match aside.length() > 0.5 * radius {
         true => (aside, camera::YAW - 1.2 - aside.x.atan2(aside.z)),
         false => (Vec3::ZERO, 0.0),
     };
@@ -113,25 +171,24 @@ fn put_on(
     let size = reach / 0.25;
     studio::light(&mut commands, middle, size);
     studio::room(&mut commands, &mut paint, middle.y - 1.3 * reach, 1.6 * size);
-    println!(
-        "{} strands, {} nodes, head of radius {:.3} m at {}",
-        groom.len(),
-        groom.points().len(),
-        ball.radius(),
-        ball.center
-    );
-
-    let head = (
-        Head,
-        Mesh3d(paint.meshes.add(Sphere::new(0.985 * ball.radius()).mesh().uv(96, 64))),
-        MeshMaterial3d(paint.matte(Color::srgb(0.62, 0.42, 0.32), 0.6)),
-        HairCollider::sphere(ball.radius())?,
-        place(pivot, rest),
-    );
-    let guides = GroomGuides { count: arguments.guides, nodes: arguments.nodes, ..default() };
+    print!("{} strands, {} nodes, ", groom.len(), groom.points().len());
+    let mut head = commands.spawn((Head, Visibility::default(), place(pivot, rest)));
+    match ball {
+        Some(_) => {
+            println!("head of radius {radius:.3} m at {centre}");
+            head.insert((
+                Mesh3d(paint.meshes.add(Sphere::new(0.985 * radius).mesh().uv(96, 64))),
+                MeshMaterial3d(paint.matte(Color::srgb(0.62, 0.42, 0.32), 0.6)),
+                HairCollider::sphere(radius)?,
+            ));
+        }
+        None => println!("no head: the roots are too few of one to tell where it is"),
+    }
+    let (count, nodes) = (arguments.guides as usize, arguments.nodes as usize);
+    let guides = GroomGuides { count, nodes, ..default() };
     let hair = GroomedHair { groom: grooms.add(groom), guides };
     let stiffness = Stiffness::from_bending_length(arguments.stiffness)?;
-    commands.spawn((head, children![(hair, stiffness, HairFollowers::new(100_000))]));
+    head.with_child((hair, stiffness, HairFollowers::new(100_000)));
     commands.insert_resource(Shown { middle, reach, pivot, rest });
     Ok(())
 }

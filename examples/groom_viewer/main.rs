@@ -33,18 +33,21 @@ use std::{
 struct Arguments {
     /// The file.
     file: PathBuf,
-    /// Metres per unit of the file; what is usual for its kind if left out.
-    #[arg(long)]
+    /// Metres per unit of the file. If left out, what is usual for its kind, unless hair cannot be as
+    /// large or as small as that makes it.
+    #[arg(long, value_parser = scale)]
     scale: Option<f32>,
     /// The file's axis that points up; what is usual for its kind if left out.
     #[arg(long)]
     up: Option<Up>,
     /// How many strands are simulated.
-    #[arg(long, default_value_t = GroomGuides::default().count)]
-    guides: usize,
+    #[arg(long, default_value_t = GroomGuides::default().count as u32,
+          value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    guides: u32,
     /// How many nodes they have at most.
-    #[arg(long, default_value_t = GroomGuides::default().nodes)]
-    nodes: usize,
+    #[arg(long, default_value_t = GroomGuides::default().nodes as u32,
+          value_parser = clap::value_parser!(u32).range(2..=4096))]
+    nodes: u32,
     /// How long hair can be that stands by itself: the gravity-bending length (m).
     #[arg(long, value_name = "M", default_value_t = Stiffness::default().bending_length,
           value_parser = stiffness)]
@@ -78,6 +81,11 @@ impl From<Up> for UpAxis {
     }
 }
 
+fn scale(text: &str) -> Result<f32, String> {
+    let scale = text.parse().ok().filter(|s| (1e-9..=1e9).contains(s));
+    scale.ok_or_else(|| "expected metres per unit from 1e-9 to 1e9, such as 0.01".into())
+}
+
 fn stiffness(text: &str) -> Result<f32, String> {
     let metres = text.parse().map_err(|_| "expected metres, such as 0.13")?;
     Stiffness::from_bending_length(metres).map(|_| metres).map_err(|error| error.to_string())
@@ -94,20 +102,27 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}: {error}", arguments.file.display());
+            eprintln!("error: {error}");
             ExitCode::FAILURE
         }
     }
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let file = arguments.file.canonicalize()?;
+    let path = arguments.file.display();
+    let blamed = |error: std::io::Error| format!("{path}: {error}");
+    let file = arguments.file.canonicalize().map_err(blamed)?;
+    let kind = GroomFormat::of(&std::fs::read(&file).map_err(blamed)?)
+        .ok_or_else(|| format!("{path}: expected a .hair, .tfx, .gltf or .glb file"))?;
+    // Before anything that takes long.
+    arguments.offscreen.as_deref().map(picture::folder).transpose()?;
     let folder = file.parent().unwrap_or(Path::new("/")).to_string_lossy().into_owned();
     let assets = AssetPlugin { file_path: folder, ..default() };
     let offscreen = arguments.offscreen.is_some();
     let mut app = renderer::app("groom viewer", arguments.size, offscreen, assets);
     app.insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
         .insert_resource(arguments.clone())
+        .insert_resource(head::Kind(kind))
         .add_plugins(head::HeadPlugin);
     match &arguments.offscreen {
         Some(folder) => pictures(&mut app, arguments, folder),
@@ -124,13 +139,18 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     }
 }
 
+/// Whether the groom could be shown.
+fn refused(app: &App, file: &Path) -> Result<(), String> {
+    let why = app.world().resource::<head::Refused>().0.first();
+    why.map_or(Ok(()), |why| Err(format!("{}: {why}", file.display())))
+}
+
 /// Runs with exactly one tick an update, and writes the pictures and what was measured.
 fn pictures(
     app: &mut App,
     arguments: &Arguments,
     folder: &Path,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    std::fs::create_dir_all(folder)?;
     app.add_systems(Update, camera::frame);
     let pictures = picture::Pictures::new(app, arguments.size, camera::bundle());
     while !app.world().contains_resource::<Shown>() {
@@ -140,12 +160,15 @@ fn pictures(
         if let LoadState::Failed(error) = assets.load_state(&shown.0) {
             // Without the trace that Bevy puts behind it.
             let error = error.to_string();
-            return Err(error.lines().next().unwrap_or_default().into());
+            let error = error.lines().next().unwrap_or_default();
+            return Err(format!("{}: {error}", arguments.file.display()).into());
         }
+        refused(app, &arguments.file)?;
     }
     // The strands grow in the update after.
     app.update();
     app.update();
+    refused(app, &arguments.file)?;
     let end = (arguments.seconds * 60.0).round() as u32;
     let name = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
     let mut ticks = 0;

@@ -24,8 +24,9 @@ use report::Report;
 use scenes::{Director, Scene, SceneKind, ScenePlugin, Strewn, UnknownName, measure};
 use serde::Serialize;
 use std::{
-    io::Write,
-    path::PathBuf,
+    fs::File,
+    io::{self, Write},
+    path::{Path, PathBuf},
     process::ExitCode,
     str::FromStr,
     time::{Duration, Instant},
@@ -98,24 +99,23 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     }
     let scene = Scene::new(kind, arguments.variant.as_deref())?;
     let seconds = arguments.seconds.unwrap_or(scene.kind.frames() as f32 / 60.0);
-    if !(seconds > 0.0 && seconds < 1e5) {
-        return Err(format!("--seconds is {seconds}, expected more than 0, at most 100000").into());
+    let frames = (seconds * 60.0).round() as u64;
+    // What is not a number has no frames.
+    if frames < 1 || seconds > 1e5 {
+        let expected = "expected 0.017, which is one frame, to 100000";
+        return Err(format!("--seconds is {seconds}, {expected}").into());
     }
-    let mut csv = arguments.csv.as_ref().map(std::fs::File::create).transpose()?;
-    if let Some(file) = &mut csv {
-        writeln!(file, "seconds,kept,b_hydrogen_mean,strain_peak,tip_x,tip_y,tip_z")?;
-    }
+    let mut csv = arguments.csv.as_deref().map(Table::create).transpose()?;
     let mut app =
         headless_app(scene, arguments.threads, Strewn { count: arguments.droplets, ..default() });
-    let frames = (seconds * 60.0).round() as u64;
     let bar = ProgressBar::new(frames)
         .with_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} frames, {eta} left")?);
     bar.set_message(format!("{} {}", scene.kind.name(), scene.variant));
     let start = Instant::now();
     for _ in 0..frames {
         app.update();
-        if let Some(file) = &mut csv {
-            writeln!(file, "{}", frame_line(app.world_mut()))?;
+        if let Some(table) = &mut csv {
+            table.line(&frame_line(app.world_mut()))?;
         }
         bar.inc(1);
     }
@@ -133,6 +133,30 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     }
     bar.finish_and_clear();
     print(&report, arguments.json)
+}
+
+/// A file with a line a frame.
+struct Table<'a> {
+    path: &'a Path,
+    file: File,
+}
+
+impl<'a> Table<'a> {
+    fn create(path: &'a Path) -> Result<Self, String> {
+        let file = File::create(path).map_err(|error| Self::unwritable(path, &error))?;
+        let mut table = Self { path, file };
+        table.line("seconds,kept,b_hydrogen_mean,strain_peak,tip_x,tip_y,tip_z")?;
+        Ok(table)
+    }
+
+    fn line(&mut self, line: &str) -> Result<(), String> {
+        writeln!(self.file, "{line}").map_err(|error| Self::unwritable(self.path, &error))
+    }
+
+    fn unwritable(path: &Path, error: &io::Error) -> String {
+        let path = path.display();
+        format!("--csv {path} cannot be written: {error}; name a file that can be")
+    }
 }
 
 fn swing(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {

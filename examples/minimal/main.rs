@@ -2,10 +2,15 @@
 //!
 //! `cargo run --release --example minimal`
 
+#[path = "../salon/failure.rs"]
+mod failure;
+
 use bevy::prelude::*;
 use bevy_keratin::{plant::*, prelude::*};
 
 fn main() {
+    // One sentence instead of a panic where there is no display.
+    failure::explain_known();
     App::new()
         .add_plugins((DefaultPlugins, HairPlugins::default()))
         .add_systems(Startup, setup)

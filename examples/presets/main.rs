@@ -1,6 +1,8 @@
 //! Every hair preset on the training head after two seconds, as pictures:
 //! `cargo run --release --example presets -- [FOLDER] [PRESET …]`.
 
+#[path = "../salon/failure.rs"]
+mod failure;
 #[path = "../salon/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
@@ -30,8 +32,9 @@ use bevy_keratin::{
     plant::{HairPreset, Planted, Scalp},
     prelude::*,
 };
+use clap::Parser;
 use picture::Pictures;
-use std::{path::PathBuf, time::Instant};
+use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 /// Seconds until hair has settled.
 const SETTLING: f32 = 2.0;
@@ -49,18 +52,47 @@ fn scalp() -> Scalp {
     Scalp { up: Dir3::X, front: Dir3::Y, height: 0.118, ..default() }
 }
 
-fn main() -> Result {
-    let mut arguments = std::env::args().skip(1);
-    let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "target/presets".into()));
-    let only: Vec<String> = arguments.map(|name| name.to_lowercase()).collect();
-    std::fs::create_dir_all(&folder)?;
+/// Draws hair presets into PNGs.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    /// The folder that the pictures go into.
+    #[arg(default_value = "target/presets")]
+    folder: PathBuf,
+    /// straight, wavy, curly, coily, short, bob, long; all if left out.
+    #[arg(value_parser = preset)]
+    presets: Vec<HairPreset>,
+}
+
+fn name(preset: HairPreset) -> String {
+    format!("{preset:?}").to_lowercase()
+}
+
+fn preset(text: &str) -> Result<HairPreset, String> {
+    let found = HairPreset::ALL.into_iter().find(|p| name(*p) == text.to_lowercase());
+    found.ok_or_else(|| format!("expected one of {}", HairPreset::ALL.map(name).join(", ")))
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    failure::explain_known();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(Arguments { folder, presets }: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    picture::folder(folder)?;
     for preset in HairPreset::ALL {
-        let name = format!("{preset:?}").to_lowercase();
-        if !only.is_empty() && !only.contains(&name) {
+        if !presets.is_empty() && !presets.contains(&preset) {
             continue;
         }
-        let views = draw(preset)?;
-        let path = folder.join(format!("{name}.png"));
+        let views = draw(preset).map_err(|error| error.to_string())?;
+        let path = folder.join(format!("{}.png", name(preset)));
         picture::save(beside(&views), &path)?;
         println!("{}", path.display());
     }

@@ -19,7 +19,8 @@ const NO_ADAPTER: &str = if cfg!(target_os = "linux") {
 };
 
 const NO_DISPLAY: &str = "there is no display to open a window on: run it in a desktop session, \
-     set DISPLAY, or draw pictures without a window by `--offscreen DIR`";
+     set DISPLAY or WAYLAND_DISPLAY, or draw pictures without a window by `--offscreen DIR` where an \
+     example has it";
 
 /// From now on the known failures end the process with a sentence and exit code 1; all others panic
 /// as before.

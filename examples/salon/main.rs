@@ -105,14 +105,18 @@ fn main() -> ExitCode {
     match arguments.offscreen.clone() {
         None => windowed(scene, &arguments),
         Some(folder) => {
-            let mut app = windowless(scene, &arguments);
-            match offscreen::run(&mut app, scene, &arguments, &folder) {
+            // The folder before anything that takes long.
+            let written = picture::folder(&folder).and_then(|()| {
+                let mut app = windowless(scene, &arguments);
+                offscreen::run(&mut app, scene, &arguments, &folder)
+            });
+            match written {
                 Ok(paths) => {
                     paths.iter().for_each(|path| println!("{}", path.display()));
                     ExitCode::SUCCESS
                 }
                 Err(error) => {
-                    eprintln!("error: no pictures in {}: {error}", folder.display());
+                    eprintln!("error: {error}");
                     ExitCode::FAILURE
                 }
             }

@@ -7,14 +7,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Runs the scene and writes a PNG for every frame asked for. Gives the files' paths.
+/// Runs the scene and writes a PNG for every frame asked for into the folder, which is there. Gives
+/// the files' paths.
 pub fn run(
     app: &mut App,
     scene: Scene,
     arguments: &Arguments,
     folder: &Path,
 ) -> io::Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder)?;
     let mut frames = arguments.frames.clone().unwrap_or_else(|| scene.kind.shown().to_vec());
     frames.sort_unstable();
     frames.dedup();

@@ -9,6 +9,7 @@ use bevy::{
     },
     time::TimeUpdateStrategy,
 };
+use core::fmt::Display;
 use std::{io, path::Path};
 
 /// The picture that came back.
@@ -71,10 +72,21 @@ impl Pictures {
     }
 }
 
+/// Makes the folder that pictures go into.
+pub fn folder(path: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(path).map_err(|error| unwritable(path, error))
+}
+
 /// Writes a PNG.
 pub fn save(picture: Image, path: &Path) -> io::Result<()> {
     let picture = picture.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
-    picture.save(path).map_err(io::Error::other)
+    picture.save(path).map_err(|error| unwritable(path, error))
+}
+
+/// Says which path it was: the system's errors do not.
+fn unwritable(path: &Path, error: impl Display) -> io::Error {
+    let path = path.display();
+    io::Error::other(format!("{path} cannot be written: {error}; name a folder that can be"))
 }
 
 fn activate(app: &mut App, camera: Entity, active: bool) {

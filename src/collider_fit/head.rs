@@ -7,7 +7,11 @@ use bevy::math::{DVec3, bounding::BoundingSphere};
 impl Groom {
     /// The ball (m) whose surface the roots lie on best, by least squares: a collider for a groom
     /// whose head is not at hand, and its place. It is shrunk until no root lies within, because what
-    /// grows inside a collider is stretched out of it. `None` where roots do not curve, as on a flat patch, or are fewer than four.
+    /// grows inside a collider is stretched out of it.
+    ///
+    /// `None` where that would be a guess: fewer than four roots, roots that hardly curve or lie on
+    /// no ball, or a patch such as a tail's, whose roots are all within half a radius of their
+    /// middle. Nor is a ball ever wider than the groom itself.
     ///
     /// ```
     /// # use bevy_keratin::groom::Groom; use bevy::prelude::*;
@@ -41,9 +45,16 @@ impl Groom {
         let centre = DVec3::new(x, y, z) * 0.5;
         let radius = (d + centre.length_squared()).max(0.0).sqrt() * spread;
         let centre = (middle + centre * spread).as_vec3();
+        // To a small part of a ball one of almost any size fits.
+        let reach = self.roots().map(|r| r.as_dvec3().distance(middle)).fold(0.0, f64::max);
+        let is_patch = radius.is_nan() || reach < 0.5 * radius;
         let nearest = self.roots().map(|r| r.distance(centre)).fold(f32::MAX, f32::min);
+        // Most of it shrunk away: they lie on no ball.
+        let is_ball = f64::from(nearest) >= 0.5 * radius;
         let radius = nearest.min(radius as f32);
-        (centre.is_finite() && radius > 0.0 && radius < 1e3 * spread as f32)
+        let (low, high) = self.extents()?;
+        let within = 2.0 * radius <= (high - low).max_element();
+        (is_ball && !is_patch && within && centre.is_finite() && radius > 0.0)
             .then(|| BoundingSphere::new(centre, radius))
     }
 }

@@ -1,7 +1,7 @@
 //! Numbers from untrusted bytes: every read is checked, and nothing is allocated before it is known
 //! that the bytes for it are there.
 
-use super::GroomError;
+use super::{Groom, GroomError};
 
 /// Why a file cannot be read as a groom: where, what was expected, what was found and how to mend it.
 #[derive(thiserror::Error, Clone, Debug, PartialEq)]
@@ -129,6 +129,26 @@ impl<'a> Bytes<'a> {
         }
         Ok(groups)
     }
+}
+
+/// The same widths, if they can be diameters; they begin at `offset`.
+pub(super) fn widths(offset: u64, widths: Vec<f32>) -> Result<Vec<f32>, GroomFileError> {
+    match (0..).zip(&widths).find(|(_, width)| **width < 0.0) {
+        Some((i, width)) => {
+            let hint = "repair or leave out that strand";
+            value(offset + 4 * i, "a thickness", width, "0 or more", hint)
+        }
+        None => Ok(widths),
+    }
+}
+
+/// A groom that has something to show.
+pub(super) fn some_strands(offset: u64, groom: Groom) -> Result<Groom, GroomFileError> {
+    if groom.is_empty() {
+        let hint = "export hair of strands with two nodes or more";
+        return value(offset, "the count of strands with a segment", 0, "1 or more", hint);
+    }
+    Ok(groom)
 }
 
 fn words(bytes: &[u8]) -> impl Iterator<Item = u32> {

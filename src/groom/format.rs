@@ -9,8 +9,10 @@ use bevy::prelude::*;
 pub enum GroomFormat {
     /// Cem Yuksel's HAIR.
     Yuksel,
-    /// TressFX, version 3 or 4.
-    TressFx,
+    /// TressFX, version 3.
+    TressFx3,
+    /// TressFX, version 4.
+    TressFx4,
     /// glTF or GLB.
     Gltf,
 }
@@ -22,25 +24,28 @@ impl GroomFormat {
         match file {
             [b'H', b'A', b'I', b'R', ..] => Some(Self::Yuksel),
             [b'g', b'l', b'T', b'F', ..] => Some(Self::Gltf),
-            _ if (3.0..5.0).contains(&version) => Some(Self::TressFx),
+            _ if (3.0..4.0).contains(&version) => Some(Self::TressFx3),
+            _ if (4.0..5.0).contains(&version) => Some(Self::TressFx4),
             text if gltf::looks_like_json(text) => Some(Self::Gltf),
             _ => None,
         }
     }
 
-    /// Metres per unit in most files of this format.
+    /// Metres per unit as the format's own samples have it: tenths of an inch, centimetres, metres.
+    /// Only glTF says so itself; [`Groom::odd_size`](super::Groom::odd_size) tells where it cannot be.
     pub fn scale(self) -> f32 {
         match self {
             Self::Yuksel => 0.00254,
-            Self::TressFx | Self::Gltf => 1.0,
+            Self::TressFx3 => 0.01,
+            Self::TressFx4 | Self::Gltf => 1.0,
         }
     }
 
-    /// The axis that is up in most files of this format.
+    /// The axis that is up in most files of this format; glTF says so itself.
     pub fn up(self) -> UpAxis {
         match self {
             Self::Yuksel => UpAxis::Z,
-            Self::TressFx | Self::Gltf => UpAxis::Y,
+            Self::TressFx3 | Self::TressFx4 | Self::Gltf => UpAxis::Y,
         }
     }
 }

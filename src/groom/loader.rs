@@ -1,8 +1,8 @@
 //! Grooms as assets.
 
 use super::{
-    Groom, GroomError, GroomFileError, GroomFormat, GroomLosses, GroomSettings, gltf, tressfx,
-    wear, yuksel,
+    Groom, GroomError, GroomFileError, GroomFormat, GroomLosses, GroomSettings, OddSize, gltf,
+    tressfx, wear, yuksel,
 };
 use bevy::{
     asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
@@ -32,8 +32,8 @@ pub enum GroomLoadError {
 /// Loads a [`Groom`] from `.hair`, `.tfx`, `.gltf` and `.glb`, which it tells by their contents.
 ///
 /// It announces the first two extensions only, so that it takes no glTF away from Bevy's own loader:
-/// ask for the type, as in `assets.load::<Groom>("hair.glb")`. What is left out of a file is told in
-/// the log, once.
+/// ask for the type, as in `assets.load::<Groom>("hair.glb")`. The unit and the axis that were taken,
+/// and what is left out of a file, are told in the log, once.
 #[derive(TypePath, Clone, Copy, Debug, Default)]
 pub struct GroomLoader;
 
@@ -51,7 +51,8 @@ impl AssetLoader for GroomLoader {
         let mut file = Vec::new();
         reader.read_to_end(&mut file).await?;
         let mut external = HashMap::default();
-        if GroomFormat::of(&file) == Some(GroomFormat::Gltf) {
+        let format = GroomFormat::of(&file);
+        if format == Some(GroomFormat::Gltf) {
             let uris: Vec<String> =
                 gltf::GltfFile::parse(&file)?.external().map(str::to_owned).collect();
             for uri in uris {
@@ -68,8 +69,14 @@ impl AssetLoader for GroomLoader {
             }
         }
         let (groom, losses) = Groom::from_file_with(&file, settings, &external)?;
-        if !losses.is_empty() {
-            tracing::info!("groom {}: {} strands; {losses}", context.path(), groom.len());
+        if let Some(format) = format {
+            let (scale, up) = (settings.scale_of(format), settings.up_of(format));
+            let (path, count) = (context.path(), groom.len());
+            tracing::info!("groom {path}: {count} strands, {scale} m a unit, {up:?} up; {losses}");
+            // Who states a scale knows it.
+            if let (None, Some(odd)) = (settings.scale, groom.odd_size(scale)) {
+                tracing::warn!("groom {path}: {odd}: set GroomSettings::scale to {}", odd.scale);
+            }
         }
         Ok(groom)
     }
@@ -117,7 +124,7 @@ impl Groom {
         })?;
         let (groom, mut losses) = match format {
             GroomFormat::Yuksel => yuksel::read(file)?,
-            GroomFormat::TressFx => tressfx::read(file)?,
+            GroomFormat::TressFx3 | GroomFormat::TressFx4 => tressfx::read(file)?,
             GroomFormat::Gltf => gltf::GltfFile::parse(file)?.read(external)?,
         };
         let (groom, left_out) = settings.apply(groom, format)?;
@@ -158,7 +165,8 @@ impl Plugin for GroomPlugin {
             .register_type::<GroomSettings>()
             .register_type::<GroomFormat>()
             .register_type::<GroomLosses>()
-            .register_type::<GroomError>();
+            .register_type::<GroomError>()
+            .register_type::<OddSize>();
         wear::build(app);
         add_loader(app);
     }

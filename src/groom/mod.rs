@@ -11,6 +11,7 @@ mod loader;
 mod losses;
 mod reshape;
 mod settings;
+mod size;
 pub mod tressfx;
 mod wear;
 pub mod yuksel;
@@ -21,6 +22,7 @@ pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
 
 pub use settings::GroomSettings;
+pub use size::OddSize;
 pub use wear::{GroomGuides, GroomedHair};
 
 use crate::setting::InvalidValue;
@@ -71,6 +73,20 @@ pub enum GroomError {
         /// The node's index from the root.
         node: usize,
     },
+    /// A width, colour or place on the texture that cannot be one.
+    #[error("{what} {at} of strand {strand} is {found}, expected {expected}: mend or leave it out")]
+    OutOfRange {
+        /// Which number, with its unit.
+        what: &'static str,
+        /// The strand's index.
+        strand: usize,
+        /// The node's index from the root; 0 for what a strand has once.
+        at: usize,
+        /// What was found.
+        found: f32,
+        /// What may be.
+        expected: &'static str,
+    },
     /// An array whose length does not go with the nodes or strands.
     #[error("{what} has {found} elements, expected {expected} or none")]
     Length {
@@ -96,8 +112,21 @@ pub enum GroomError {
         found: usize,
     },
     /// No strand at all.
-    #[error("the groom has no strands, expected 1 or more: see whether all were left out as short")]
+    #[error(
+        "the groom has no strands, expected 1 or more: see whether all were left out as \
+         short, or its scale is too small"
+    )]
     Empty,
+    /// Strands that do not follow each other in the list of nodes.
+    #[error("strand {strand} ends at node {found}, expected {expected}: make it by from_polylines")]
+    Ends {
+        /// Its index.
+        strand: usize,
+        /// Where it ends.
+        found: usize,
+        /// Where it may end.
+        expected: &'static str,
+    },
     /// A number that a method of [`Groom`] refuses.
     #[error(transparent)]
     Value(#[from] InvalidValue),
@@ -129,7 +158,7 @@ impl Groom {
     /// The groom with a diameter (m) for each node, strand after strand.
     ///
     /// # Errors
-    /// When there are not as many as nodes.
+    /// When there are not as many as nodes, or one is negative or not finite.
     pub fn with_widths(mut self, widths: Vec<f32>) -> Result<Self, GroomError> {
         self.widths = widths;
         self.checked()
@@ -138,7 +167,7 @@ impl Groom {
     /// The groom with a colour for each node, strand after strand.
     ///
     /// # Errors
-    /// When there are not as many as nodes.
+    /// When there are not as many as nodes, or one is not finite.
     pub fn with_colors(mut self, colors: Vec<LinearRgba>) -> Result<Self, GroomError> {
         self.colors = colors;
         self.checked()
@@ -147,22 +176,19 @@ impl Groom {
     /// The groom with a place on the scalp's texture for each strand.
     ///
     /// # Errors
-    /// When there are not as many as strands.
+    /// When there are not as many as strands, or one is not finite.
     pub fn with_uvs(mut self, uvs: Vec<Vec2>) -> Result<Self, GroomError> {
         self.uvs = uvs;
         self.checked()
     }
 
     fn checked(self) -> Result<Self, GroomError> {
-        for (strand, line) in self.strands().enumerate() {
-            let found = line.points.len();
-            if found < 2 {
-                return Err(GroomError::TooFewNodes { strand, found });
-            }
-            if let Some(node) = line.points.iter().position(|p| !p.is_finite()) {
-                return Err(GroomError::NonFinite { strand, node });
-            }
-        }
+        self.check().map(|()| self)
+    }
+
+    /// Whether it is what it says to be: grooms also come from files and through reflection.
+    fn check(&self) -> Result<(), GroomError> {
+        self.check_ends()?;
         let fits = |what, found: usize, expected: usize| {
             let fits = found == 0 || found == expected;
             fits.then_some(()).ok_or(GroomError::Length { what, found, expected })
@@ -170,7 +196,23 @@ impl Groom {
         fits("widths", self.widths.len(), self.points.len())?;
         fits("colors", self.colors.len(), self.points.len())?;
         fits("uvs", self.uvs.len(), self.len())?;
-        Ok(self)
+        self.strands().enumerate().try_for_each(|(i, strand)| strand.check(i))
+    }
+
+    /// Every strand begins where the one before ends, and the last ends with the nodes.
+    fn check_ends(&self) -> Result<(), GroomError> {
+        let (mut start, all) = (0, self.points.len());
+        for (strand, &end) in self.ends.iter().enumerate() {
+            let found = end as usize;
+            if found < start || found > all {
+                let expected = "behind the one before, and within the nodes";
+                return Err(GroomError::Ends { strand, found, expected });
+            }
+            start = found;
+        }
+        let fits = start == all;
+        let expected = self.ends.last().map_or(0, |end| *end as usize);
+        fits.then_some(()).ok_or(GroomError::Length { what: "nodes", found: all, expected })
     }
 
     /// How many strands there are.
@@ -200,6 +242,42 @@ impl Groom {
             widths: self.widths.get(nodes.clone()).filter(|_| !self.widths.is_empty()),
             colors: self.colors.get(nodes).filter(|_| !self.colors.is_empty()),
             uv: self.uvs.get(i).copied(),
+        }
+    }
+}
+
+impl GroomStrand<'_> {
+    /// Length along its nodes (m).
+    pub fn length(&self) -> f32 {
+        self.points.windows(2).map(|p| p[0].distance(p[1])).sum()
+    }
+
+    fn check(&self, strand: usize) -> Result<(), GroomError> {
+        let found = self.points.len();
+        if found < 2 {
+            return Err(GroomError::TooFewNodes { strand, found });
+        }
+        if let Some(node) = self.points.iter().position(|p| !p.is_finite()) {
+            return Err(GroomError::NonFinite { strand, node });
+        }
+        let wrong = |what, at, found, expected| {
+            Err(GroomError::OutOfRange { what, strand, at, found, expected })
+        };
+        let width = |w: &f32| w.is_finite() && *w >= 0.0;
+        let widths = self.widths.unwrap_or_default();
+        if let Some(at) = widths.iter().position(|w| !width(w)) {
+            return wrong("width (m)", at, widths[at], "a finite diameter, 0 or more");
+        }
+        let parts = self.colors.unwrap_or_default().iter().map(|c| c.to_f32_array());
+        for (at, parts) in parts.enumerate() {
+            if let Some(part) = parts.into_iter().find(|part| !part.is_finite()) {
+                return wrong("colour", at, part, "finite numbers");
+            }
+        }
+        let uv = self.uv.unwrap_or_default().to_array();
+        match uv.into_iter().find(|part| !part.is_finite()) {
+            Some(part) => wrong("UV", 0, part, "finite numbers"),
+            None => Ok(()),
         }
     }
 }

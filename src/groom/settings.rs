@@ -21,12 +21,15 @@ setting! {
     /// }
     /// ```
     ///
-    /// Files do not know their unit; the defaults are what most of them are in:
+    /// Files other than glTF do not know their unit; the defaults are what the formats' own samples
+    /// are in. Which ones were taken is logged, and warned of where hair cannot be as large or as small
+    /// as they make it, with a scale that would fit: see [`Groom::odd_size`].
     ///
-    /// | file | scale | up |
+    /// | file | metres per unit | up |
     /// |---|---|---|
     /// | `.hair` | 0.00254 (tenths of an inch) | Z |
-    /// | `.tfx` | 1 | Y |
+    /// | `.tfx`, version 3 | 0.01 (centimetres) | Y |
+    /// | `.tfx`, version 4 | 1 | Y |
     /// | glTF | 1 | Y |
     #[derive(Reflect, Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
     #[serde(default)]
@@ -48,7 +51,7 @@ setting! {
         /// Keeps every so-manieth strand; 1 keeps all.
         pub keep_every: usize = 1, in KEEP_EVERY: 1.0..=1e9, "1 keeps all";
         /// Keeps at most so many strands, taken evenly from their order; `None` keeps all.
-        pub limit: Option<usize> = None;
+        pub limit: Option<usize> = None, in LIMIT: 1.0..=1e9, "None keeps all";
     }
 }
 
@@ -57,7 +60,7 @@ impl GroomSettings {
     /// out: fewer strands first, then scale and axes, then merging, then resampling.
     ///
     /// # Errors
-    /// When a setting is out of range, or scaled nodes leave the finite numbers.
+    /// When a setting is out of range, scaled nodes leave the finite numbers, or no strand is left.
     pub fn apply(
         &self,
         groom: Groom,
@@ -69,21 +72,31 @@ impl GroomSettings {
         if self.keep_every != 1 {
             groom = groom.thinned(self.keep_every)?;
         }
-        if let Some(limit) = self.limit
-            && limit < groom.len()
-        {
+        if let Some(limit) = self.limit {
+            LIMIT.check(limit as f32)?;
             groom = groom.limited(limit);
         }
         let thinned_strands = before - groom.len();
-        let groom = groom
-            .with_up(self.up.unwrap_or(format.up()))
-            .scaled(self.scale.unwrap_or(format.scale()))?
-            .moved(-self.origin)?;
+        let groom =
+            groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?.moved(-self.origin)?;
         let (mut groom, mut losses) = groom.merged(self.merge)?;
         losses.thinned_strands = thinned_strands;
+        if groom.is_empty() {
+            return Err(GroomError::Empty);
+        }
         if let Some(nodes) = self.nodes {
             groom = groom.resampled(nodes)?;
         }
         Ok((groom, losses))
+    }
+
+    /// Metres per unit of a file of this format.
+    pub fn scale_of(&self, format: GroomFormat) -> f32 {
+        self.scale.unwrap_or(format.scale())
+    }
+
+    /// The axis that is up in a file of this format.
+    pub fn up_of(&self, format: GroomFormat) -> UpAxis {
+        self.up.unwrap_or(format.up())
     }
 }

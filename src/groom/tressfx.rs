@@ -12,7 +12,7 @@
 
 use super::{
     Groom, GroomFileError, GroomLosses,
-    bytes::{Bytes, value},
+    bytes::{Bytes, some_strands, value, widths},
 };
 use bevy::prelude::*;
 
@@ -52,8 +52,8 @@ const V4: Layout = Layout {
 /// version 3's indices of guides are not read. Which nodes are fixed is not kept: roots are.
 ///
 /// # Errors
-/// When the version is neither 3 nor 4, the header contradicts the file's length, or a number is not
-/// finite.
+/// When the version is neither 3 nor 4, the header contradicts the file's length, there are no
+/// strands, or a number is not finite or a thickness negative.
 pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     let bytes = Bytes(file);
     let version = bytes.f32(0, "version")?;
@@ -107,7 +107,9 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
         None => Vec::new(),
     };
     let thickness = match array(layout.thickness)? {
-        Some(offset) => bytes.groups(offset, strands, "a strand's thickness", |[t]| t)?,
+        Some(offset) => {
+            widths(offset, bytes.groups(offset, strands, "a strand's thickness", |[t]| t)?)?
+        }
         None => Vec::new(),
     };
     let widths = thickness.iter().flat_map(|t| (0..each).map(|_| *t)).collect();
@@ -127,5 +129,5 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     }
     let ends = (1..=strands).map(|i| (i * each) as u32).collect();
     let groom = Groom { points, ends, widths, colors, uvs };
-    Ok((groom.checked()?, losses))
+    Ok((some_strands(4, groom)?.checked()?, losses))
 }

@@ -3,8 +3,8 @@
 use super::{Groom, GroomError, GroomStrand};
 use crate::{
     fault::{FaultKind, HairFault},
-    setting::{Ranged, setting},
-    strand::{Hair, MIN_SEGMENT, Strand, StrandOf},
+    setting::{Ranged, ValueRange, setting},
+    strand::{Hair, Strand, StrandOf},
 };
 use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 
@@ -54,17 +54,27 @@ setting! {
         pub nodes: usize = 16, in NODES: 2.0..=4096.0, safe 2.0..=64.0, "16 suit hair of a head";
         /// Short strands have fewer nodes, but three at least, so that their segments are no shorter
         /// than this. Strands that are shorter themselves are not simulated as long as there are
-        /// others: they are stubble beside the distance that hair keeps from the head.
-        pub segment: f32 = 5e-3, "m" in SEGMENT: 0.0..=10.0, safe 1e-3..=0.05,
+        /// others: they are stubble beside the distance that hair keeps from the head. Whatever is
+        /// asked for, no segment is shorter than 1 mm.
+        pub segment: f32 = 5e-3, "m" in SEGMENT: FINEST..=10.0, safe 1e-3..=0.05,
             "0.005 suits a head";
     }
 }
 
+/// The shortest segment of a guide (m): contact stretches those of a tenth of it many times over,
+/// and their strands take seconds a tick.
+const FINEST: f32 = 1e-3;
+const LONGEST: ValueRange = ValueRange::new(
+    "the longest strand's length (m)",
+    FINEST..=1e6,
+    "the groom's scale may be wrong: Groom::odd_size gives one that fits",
+);
+
 impl GroomGuides {
     fn nodes_of(&self, length: f32) -> usize {
         // `as` saturates.
-        let most = (length / self.segment.max(10.0 * MIN_SEGMENT)) as usize + 1;
-        most.max(3).min(self.nodes)
+        let nodes_at = |segment: f32| (length / segment) as usize + 1;
+        nodes_at(self.segment).max(3).min(nodes_at(FINEST)).clamp(2, self.nodes)
     }
 }
 
@@ -88,7 +98,7 @@ impl Groom {
     /// ```
     ///
     /// # Errors
-    /// When the groom has no strands that can be simulated, or a number of `guides` is out of range.
+    /// When the groom has no strand as long as 1 mm, or a number of `guides` is out of range.
     pub fn spawn(
         &self,
         commands: &mut Commands,
@@ -96,11 +106,16 @@ impl Groom {
         guides: &GroomGuides,
     ) -> Result<Vec<Entity>, GroomError> {
         guides.checked()?;
-        let long = |s: &GroomStrand<'_>| length(s.points) >= guides.segment;
-        let mut long: Vec<usize> =
-            (0..).zip(self.strands()).filter(|(_, s)| long(s)).map(|(i, _)| i).collect();
+        self.check()?;
+        if self.is_empty() {
+            return Err(GroomError::Empty);
+        }
+        let lengths: Vec<f32> = self.strands().map(|s| s.length()).collect();
+        LONGEST.check(lengths.iter().copied().fold(0.0, f32::max))?;
+        let at_least = |least: f32| (0..self.len()).filter(|i| lengths[*i] >= least).collect();
+        let mut long: Vec<usize> = at_least(guides.segment);
         if long.is_empty() {
-            long = (0..self.len()).collect();
+            long = at_least(FINEST);
         }
         let chosen = self.guides_among(long, guides.count);
         let coarse = self.picked(chosen.iter().copied());
@@ -125,16 +140,12 @@ impl Groom {
         let mut is_guide = vec![false; self.len()];
         guides.iter().for_each(|i| is_guide[*i] = true);
         let others = self.strands().zip(&is_guide).filter(|(_, guide)| !**guide);
-        let root = |GroomStrand { points, .. }: GroomStrand<'_>| {
-            let (root, tip) = (points[0], points[points.len() - 1]);
-            FollowerRoot { place: root, length: length(points), reach: tip - root }
+        let root = |strand: GroomStrand<'_>| {
+            let (root, tip) = (strand.points[0], strand.points[strand.points.len() - 1]);
+            FollowerRoot { place: root, length: strand.length(), reach: tip - root }
         };
         FollowerRoots(others.map(|(strand, _)| root(strand)).collect())
     }
-}
-
-fn length(points: &[Vec3]) -> f32 {
-    points.windows(2).map(|p| p[0].distance(p[1])).sum()
 }
 
 /// What a hair has grown from its groom.

@@ -7,7 +7,7 @@
 
 use super::{
     Groom, GroomError, GroomFileError, GroomLosses,
-    bytes::{Bytes, value},
+    bytes::{Bytes, some_strands, value, widths},
 };
 use bevy::prelude::*;
 
@@ -39,7 +39,8 @@ const UNSET_COLOUR: [f32; 3] = [1.0; 3];
 /// ```
 ///
 /// # Errors
-/// When the header contradicts itself or the file's length, or a number is not finite.
+/// When the header contradicts itself or the file's length, a number is not finite or a thickness
+/// negative, or no strand has a segment.
 pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     let bytes = Bytes(file);
     let magic = bytes.array(0, 4, 1, "the mark HAIR")?;
@@ -82,6 +83,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     let points = bytes.groups(at, nodes, "a point", Vec3::from_array)?;
     at += 12 * nodes;
     let thickness = bytes.groups(at, nodes * has(THICKNESS), "a thickness", |[t]| t)?;
+    let thickness = widths(at, thickness)?;
     at += 4 * nodes * has(THICKNESS);
     let clear = bytes.groups(at, nodes * has(TRANSPARENCY), "a transparency", |[t]| t)?;
     at += 4 * nodes * has(TRANSPARENCY);
@@ -89,10 +91,10 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
 
     let header = |at, what| bytes.groups(at, 1, what, |[x]: [f32; 1]| x).map(|x| x[0]);
     let every = |x| vec![x; points.len()];
-    let widths = match has(THICKNESS) {
+    let diameters = match has(THICKNESS) {
         0 => match header(20, "the default thickness")? {
             UNSET_THICKNESS | 0.0 => Vec::new(),
-            thickness => every(thickness),
+            thickness => every(widths(20, vec![thickness])?[0]),
         },
         _ => thickness,
     };
@@ -122,9 +124,9 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
         end += segments + 1;
         ends.push(end);
     }
-    let raw = Groom { points, ends, widths, colors, uvs: Vec::new() };
+    let raw = Groom { points, ends, widths: diameters, colors, uvs: Vec::new() };
     let (groom, short_strands) = raw.without_lone_nodes();
-    Ok((groom.checked()?, GroomLosses { short_strands, ..default() }))
+    Ok((some_strands(4, groom)?.checked()?, GroomLosses { short_strands, ..default() }))
 }
 
 const EXPORT_AGAIN: &str = "export the file again";
@@ -135,8 +137,13 @@ const EXPORT_AGAIN: &str = "export the file again";
 /// Reading what was written gives the same groom, and writing that the same bytes.
 ///
 /// # Errors
-/// When a strand has more than 65,535 segments, or there are more strands than 32 bits count.
+/// When the groom is empty, a strand has more than 65,535 segments, there are more strands than 32
+/// bits count, or reflection has put numbers into it that [`read`] would refuse.
 pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
+    groom.check()?;
+    if groom.is_empty() {
+        return Err(GroomError::Empty);
+    }
     let strands = u32::try_from(groom.len());
     let strands = strands.map_err(|_| GroomError::TooMany { found: groom.len() })?;
     let segments: Vec<usize> = groom.strands().map(|s| s.points.len() - 1).collect();
@@ -154,7 +161,7 @@ pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
     let mut set = |bit, present: bool, is_same: bool| {
         bits |= if present && !is_same { bit } else { 0 };
     };
-    set(SEGMENTS, !groom.is_empty(), same_segments.is_some());
+    set(SEGMENTS, true, same_segments.is_some());
     set(THICKNESS, !groom.widths.is_empty(), width.is_some());
     set(TRANSPARENCY, !groom.colors.is_empty(), clear.is_some());
     set(COLOURS, !groom.colors.is_empty(), colour.is_some());

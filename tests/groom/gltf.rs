@@ -133,3 +133,20 @@ fn copies_beyond_the_files_size_are_refused() {
     let error = gltf::read(&glb(&json, &gltf_bytes())).unwrap_err().to_string();
     assert!(error.contains("apply instances"), "{error}");
 }
+
+#[test]
+fn extras_of_any_kind_are_ignored() {
+    let good = gltf_json(&primitive(1, true), "");
+    let expected = gltf::read(&glb(&good, &gltf_bytes())).unwrap();
+    for extras in ["1", "\"text\"", "[1, {}]", "true", "null", "{\"a\": [2]}"] {
+        let with = |before: &str| {
+            let json = good.replacen(before, &format!("\"extras\":{extras},{before}"), 1);
+            assert_ne!(json, good);
+            json
+        };
+        for before in [r#""asset""#, r#""version""#, r#""mesh":0"#, r#""attributes""#] {
+            let read = gltf::read(&glb(&with(before), &gltf_bytes()));
+            assert_eq!(read.as_ref(), Ok(&expected), "{extras} before {before}");
+        }
+    }
+}

@@ -97,6 +97,7 @@ fn settings_apply_in_order_and_refuse_nonsense() {
         GroomSettings { scale: Some(0.0), ..default() },
         GroomSettings { scale: Some(f32::NAN), ..default() },
         GroomSettings { keep_every: 0, ..default() },
+        GroomSettings { limit: Some(0), ..default() },
         GroomSettings { nodes: Some(1), ..default() },
         GroomSettings { nodes: Some(usize::MAX), ..default() },
         GroomSettings { merge: -1.0, ..default() },
@@ -107,6 +108,8 @@ fn settings_apply_in_order_and_refuse_nonsense() {
     // Units by the kind of file.
     let (groom, _) = Groom::from_file(&hair(&[2, 2], 2), &default()).unwrap();
     assert_eq!(groom.points()[2], Vec3::Y * 0.00254);
+    let (groom, _) = Groom::from_file(&tfx(3.0, 2, 4, Arrays::default()), &default()).unwrap();
+    assert_eq!(groom.points()[3], Vec3::Z * 0.015, "centimetres");
 }
 
 /// Roots scattered over a hemisphere of 9 cm around `centre`.
@@ -176,6 +179,108 @@ fn a_head_is_found_under_the_roots() {
     assert!(scalp(3, centre).fit_head().is_none());
     let same = Groom::from_polylines(vec![[Vec3::ONE, Vec3::X]; 7]).unwrap();
     assert!(same.fit_head().is_none());
+}
+
+#[test]
+fn a_patch_gives_no_head_and_no_head_is_wider_than_its_groom() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
+    // Part of a head of 9 cm, as uneven as modelled scalps are, with hair that hangs.
+    let mut patch = |sine: f32, hair: f32| {
+        let strands: Vec<_> = (0..400)
+            .map(|_| {
+                let across: f32 = sine * random.random_range(0.0f32..1.0).sqrt();
+                let turn: f32 = random.random_range(0.0..core::f32::consts::TAU);
+                let way = Vec3::new(across * turn.cos(), (1.0 - across * across).sqrt(), 0.0)
+                    .with_z(across * turn.sin());
+                let root = way * 0.09 * random.random_range(0.97..1.03);
+                [root, root + way * 0.3 * hair, root + way * 0.3 * hair + Vec3::NEG_Y * hair]
+            })
+            .collect();
+        Groom::from_polylines(strands).unwrap()
+    };
+    // Its unevenness hides how a patch curves: at worst it gives a ball as small as itself.
+    let ball = patch(0.25, 0.4).fit_head();
+    assert!(ball.is_none_or(|b| b.radius() < 0.03), "{ball:?}");
+    for sine in [0.02, 0.05, 0.1, 0.15] {
+        assert_eq!(patch(sine, 0.4).fit_head().map(|b| b.radius()), None, "{sine}");
+    }
+    for (sine, hair) in [(0.5, 0.01), (0.9, 0.01), (0.99, 0.3), (0.7, 0.3)] {
+        let groom = patch(sine, hair);
+        let (low, high) = groom.extents().unwrap();
+        if let Some(ball) = groom.fit_head() {
+            assert!(2.0 * ball.radius() <= (high - low).max_element(), "{ball:?} of {sine}");
+            assert!((ball.radius() - 0.09).abs() < 0.02, "{ball:?} of {sine}");
+        }
+    }
+    assert!(patch(0.99, 0.1).fit_head().is_some());
+}
+
+#[test]
+fn an_odd_size_is_told_with_the_unit_that_fits() {
+    let head = scalp(300, Vec3::ZERO);
+    assert_eq!(head.odd_size(1.0), None);
+    for unit in [0.01f32, 0.0254, 0.001] {
+        // Taken as metres though it is in smaller units.
+        let raw = head.clone().scaled(1.0 / unit).unwrap();
+        let odd = raw.odd_size(1.0).expect("38 cm and more times a hundred");
+        assert_eq!(odd.scale, unit, "{odd}");
+        assert_eq!(raw.scaled(odd.scale).unwrap().odd_size(odd.scale), None);
+    }
+    // Metres taken as tenths of an inch.
+    let odd = head.clone().scaled(0.00254).unwrap().odd_size(0.00254).unwrap();
+    assert_eq!(odd.scale, 1.0);
+    assert!(odd.to_string().contains("1 m a unit would fit"), "{odd}");
+    // In no unit at all.
+    let raw = head.scaled(1e6).unwrap();
+    let odd = raw.odd_size(1.0).unwrap();
+    let fitted = raw.scaled(odd.scale).unwrap();
+    let (low, high) = fitted.extents().unwrap();
+    assert!(((high - low).max_element() - 0.4).abs() < 1e-3, "{odd}");
+    assert_eq!(Groom::default().odd_size(1.0), None);
+    let point = Groom::from_polylines([[Vec3::ONE; 2]]).unwrap();
+    assert_eq!(point.odd_size(1.0), None, "no scale helps");
+}
+
+#[test]
+fn numbers_that_hair_cannot_have_are_refused() {
+    let groom = || Groom::from_polylines([[Vec3::ZERO, Vec3::Y], [Vec3::X, Vec3::ONE]]).unwrap();
+    for wrong in [-0.1, f32::NAN, f32::INFINITY] {
+        let error = groom().with_widths(vec![1e-4, 1e-4, 1e-4, wrong]).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("width (m) 1 of strand 1 is") && text.contains("0 or more"),
+            "{text}"
+        );
+    }
+    assert!(groom().with_widths(vec![0.0; 4]).is_ok());
+    let red = LinearRgba::rgb(f32::NAN, 0.0, 0.0);
+    let error = groom().with_colors(vec![LinearRgba::WHITE, red, red, red]).unwrap_err();
+    assert!(error.to_string().contains("colour 1 of strand 0 is NaN"), "{error}");
+    let error = groom().with_uvs(vec![Vec2::ONE, Vec2::NAN]).unwrap_err();
+    assert!(error.to_string().contains("UV 0 of strand 1 is NaN"), "{error}");
+    // A scale that points survive but widths do not.
+    let wide = groom().with_widths(vec![1e38; 4]).unwrap().scaled(1e9);
+    assert!(matches!(wide, Err(GroomError::OutOfRange { strand: 0, at: 0, .. })), "{wide:?}");
+}
+
+#[test]
+fn what_reflection_breaks_is_an_error_and_no_panic() {
+    let groom = Groom::from_polylines([[Vec3::ZERO, Vec3::Y], [Vec3::X, Vec3::ONE]]).unwrap();
+    let ends = |ends: Vec<u32>| {
+        let mut broken = groom.clone();
+        let field = broken.reflect_mut().as_struct().unwrap().field_mut("ends").unwrap();
+        field.apply(&ends);
+        *field.try_downcast_mut::<Vec<u32>>().unwrap() = ends;
+        broken
+    };
+    for broken in [vec![2, 9], vec![3, 1], vec![4, u32::MAX], vec![2, 2], vec![2, 3]] {
+        let broken = ends(broken);
+        let error = yuksel::write(&broken).unwrap_err();
+        let mut world = World::new();
+        let hair = world.spawn_empty().id();
+        let grown = broken.spawn(&mut world.commands(), hair, &default());
+        assert_eq!(grown.unwrap_err(), error);
+    }
 }
 
 #[test]

@@ -69,3 +69,18 @@ fn errors_say_where_and_what() {
     let found = f32::NEG_INFINITY;
     assert_eq!(error, GroomFileError::NonFinite { offset, what: "a position", found });
 }
+
+#[test]
+fn files_without_strands_or_with_negative_widths_are_refused() {
+    for version in [3.0, 4.0] {
+        let mut none = tfx(version, 3, 4, Arrays::ALL);
+        put(&mut none, 4, 0);
+        let error = tressfx::read(&none).unwrap_err().to_string();
+        assert!(error.starts_with("byte 4: the count of strands"), "{error}");
+        let mut wide = tfx(version, 3, 4, Arrays { thickness: true, ..Arrays::default() });
+        let at = wide.len() - 4;
+        put(&mut wide, at, (-2.0f32).to_bits());
+        let error = tressfx::read(&wide).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("byte {at}: a thickness is -2, expected 0")), "{error}");
+    }
+}

@@ -194,3 +194,34 @@ fn short_strands_have_fewer_nodes_and_those_without_length_are_no_guides() {
     nodes.sort_unstable();
     assert_eq!(nodes, [5, 16]);
 }
+
+#[test]
+fn guides_are_never_finer_than_a_millimetre() {
+    let mut world = World::new();
+    let hair = world.spawn(Hair).id();
+    let mut grow = |lengths: &[f32], guides: GroomGuides| {
+        let lines = lengths.iter().map(|l| [Vec3::X * *l, Vec3::new(*l, *l, 0.0)]);
+        let groom = Groom::from_polylines(lines).unwrap();
+        let grown = groom.spawn(&mut world.commands(), hair, &guides)?;
+        world.flush();
+        let segments = grown.iter().map(|s| {
+            let strand = world.get::<Strand>(*s).unwrap();
+            (strand.nodes(), strand.rest_lengths().iter().copied().fold(f32::MAX, f32::min))
+        });
+        Ok::<_, GroomError>(segments.collect::<Vec<_>>())
+    };
+    let fine = GroomGuides { nodes: 4096, segment: 1e-3, ..default() };
+    for (length, nodes) in [(0.3, 301), (0.1, 101), (0.0103, 11), (2.2e-3, 3), (1.5e-3, 2)] {
+        let [(found, least)] = grow(&[length], fine).unwrap()[..] else {
+            panic!("one strand");
+        };
+        assert!(found.abs_diff(nodes) <= 1 && least > 0.99e-3, "{length}: {found} of {least} m");
+    }
+    let default = GroomGuides::default();
+    // Strands all shorter than asked for are taken, but not those finer than can be simulated.
+    assert_eq!(grow(&[4e-3, 5e-4, 1e-4], default).unwrap().len(), 1);
+    let error = grow(&[5e-4, 2e-4], default).unwrap_err().to_string();
+    assert!(error.starts_with("the longest strand's length (m) is 0.0005"), "{error}");
+    let error = grow(&[0.1], GroomGuides { segment: 1e-4, ..fine }).unwrap_err().to_string();
+    assert!(error.contains("GroomGuides::segment (m) is 0.0001, expected 0.001"), "{error}");
+}

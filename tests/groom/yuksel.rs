@@ -74,8 +74,6 @@ fn what_is_written_reads_as_the_same_groom_and_writes_as_the_same_bytes() {
     }
     let plain = Groom::from_polylines([[Vec3::ZERO, Vec3::Y], [Vec3::X, Vec3::ONE]]).unwrap();
     assert_eq!(yuksel::read(&yuksel::write(&plain).unwrap()).unwrap().0, plain);
-    let none = Groom::default();
-    assert_eq!(yuksel::read(&yuksel::write(&none).unwrap()).unwrap().0, none);
 }
 
 #[test]
@@ -84,6 +82,48 @@ fn what_the_format_cannot_hold_is_refused() {
     let groom = Groom::from_polylines([long]).unwrap();
     let refused = yuksel::write(&groom).unwrap_err();
     assert_eq!(refused, GroomError::TooManyNodes { strand: 0, found: 65_537 });
+    assert_eq!(yuksel::write(&Groom::default()).unwrap_err(), GroomError::Empty);
+}
+
+#[test]
+fn files_without_strands_or_with_impossible_widths_are_refused() {
+    let mut none = hair(&[1], 2);
+    none.truncate(128);
+    (4..=16).step_by(4).for_each(|at| put(&mut none, at, 0));
+    put(&mut none, 12, 2);
+    let says = "byte 4: the count of strands with a segment is 0, expected 1 or more";
+    for file in [none, hair(&[0, 0], 2), hair(&[0, 0, 0], 3)] {
+        let error = yuksel::read(&file).unwrap_err().to_string();
+        assert!(error.starts_with(says), "{error}");
+    }
+    // Three counts of two bytes, nine points, and the fourth thickness.
+    let at = 128 + 6 + 9 * 12 + 3 * 4;
+    let mut wide = hair(&[2, 1, 3], 31);
+    put(&mut wide, at, (-0.5f32).to_bits());
+    let error = yuksel::read(&wide).unwrap_err().to_string();
+    assert!(error.starts_with(&format!("byte {at}: a thickness is -0.5, expected 0")), "{error}");
+    put(&mut wide, at, f32::NAN.to_bits());
+    assert!(matches!(yuksel::read(&wide), Err(GroomFileError::NonFinite { .. })));
+    let mut wide = hair(&[2, 2], 2);
+    put(&mut wide, 20, (-1.0f32).to_bits());
+    let error = yuksel::read(&wide).unwrap_err().to_string();
+    assert!(error.starts_with("byte 20: a thickness is -1"), "{error}");
+}
+
+#[test]
+fn what_is_written_after_any_scale_can_be_read() {
+    let (groom, _) = yuksel::read(&hair(&[2, 1, 3], 31)).unwrap();
+    let lines: Vec<_> = groom.strands().map(|s| s.points.to_vec()).collect();
+    for width in [1e-30, 1.0, 1e20, 1e30, f32::MAX] {
+        let groom = Groom::from_polylines(lines.clone()).unwrap();
+        let groom = groom.with_widths((0..9).map(|i| width * 0.1 * i as f32).collect()).unwrap();
+        for scale in [1e-9, 1.0, 1e9] {
+            let Ok(scaled) = groom.clone().scaled(scale) else {
+                continue;
+            };
+            assert_eq!(yuksel::read(&yuksel::write(&scaled).unwrap()).unwrap().0, scaled);
+        }
+    }
 }
 
 #[test]
