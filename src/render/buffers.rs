@@ -1,6 +1,6 @@
 //! What a hair hands to the GPU: its nodes in every frame, guides and drawn strands once.
 
-use super::followers::DrawnStrand;
+use super::drawn_strand::DrawnStrand;
 use crate::{
     bond::Bonds,
     strand::{Strand, StrandHistory},
