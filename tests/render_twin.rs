@@ -84,8 +84,7 @@ impl RandomGuide {
 
 /// The f16 that is `x`.
 fn half(x: f32) -> u32 {
-    let bits = x.to_bits();
-    if x == 0.0 { 0 } else { (bits >> 16) & 0x8000 | ((bits & 0x7fff_ffff) - (112 << 23)) >> 13 }
+    u32::from(half::f16::from_f32(x).to_bits())
 }
 
 fn random_guides(random: &mut Random) -> Vec<RandomGuide> {

@@ -1,4 +1,7 @@
-//! Small systems of linear equations.
+//! Small systems of linear equations: four unknowns for a head, seven for a capsule.
+//!
+//! glam's matrices end at four by four, and their inverse of a matrix that is all but singular is
+//! large without saying so; pivots tell.
 
 /// Gauss's elimination with pivots: the solution of `rows` · x = `right`; `None` where a pivot is not
 /// above `least`.

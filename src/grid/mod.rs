@@ -7,8 +7,11 @@
 //! warm, the same order every time.
 
 mod balls;
+mod kd_tree;
 
 pub use balls::{BallGrid, Found};
+pub use kd_tree::KdTree;
+pub(crate) use kd_tree::split_at_median;
 
 use core::ops::Range;
 use glam::{IVec3, Vec3};

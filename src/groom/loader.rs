@@ -9,6 +9,7 @@ use bevy::{
     platform::collections::HashMap,
     prelude::*,
 };
+use percent_encoding::percent_decode_str;
 
 /// Why loading a groom failed.
 #[derive(thiserror::Error, Debug)]
@@ -58,7 +59,9 @@ impl AssetLoader for GroomLoader {
             for uri in uris {
                 let failed =
                     |source| GroomLoadError::Buffer { uri: uri.clone(), source: Box::new(source) };
-                let path = context.path().resolve_embed_str(&percent_decoded(&uri));
+                // Codes that make no UTF-8 are meant as they stand.
+                let name = percent_decode_str(&uri).decode_utf8().unwrap_or(uri.as_str().into());
+                let path = context.path().resolve_embed_str(&name);
                 let path = path.map_err(|_| {
                     let offset = 0;
                     let message = format!("{uri:?} is no path");
@@ -133,27 +136,6 @@ impl Groom {
     }
 }
 
-/// `%20` and the like as the bytes they stand for; what is no such code stays.
-fn percent_decoded(uri: &str) -> String {
-    let bytes = uri.as_bytes();
-    let mut decoded = Vec::with_capacity(bytes.len());
-    let mut i = 0;
-    while i < bytes.len() {
-        let digit = |k: usize| bytes.get(i + k).and_then(|b| char::from(*b).to_digit(16));
-        match (bytes[i], digit(1), digit(2)) {
-            (b'%', Some(high), Some(low)) => {
-                decoded.push((16 * high + low) as u8);
-                i += 3;
-            }
-            (byte, ..) => {
-                decoded.push(byte);
-                i += 1;
-            }
-        }
-    }
-    String::from_utf8(decoded).unwrap_or_else(|_| uri.to_owned())
-}
-
 /// Grooms: as assets where there is an [`AssetServer`], and worn by hair. Part of
 /// [`HairPlugins`](crate::HairPlugins), which may be added before or after `DefaultPlugins`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -182,16 +164,5 @@ fn add_loader(app: &mut App) {
     if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<Groom>>() {
         app.init_asset::<Groom>().register_asset_loader(GroomLoader);
         wear::with_assets(app);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn percent_codes_are_bytes() {
-        assert_eq!(percent_decoded("a%20b%C3%A4%2"), "a bä%2");
-        assert_eq!(percent_decoded("%FF"), "%FF");
     }
 }

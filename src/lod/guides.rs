@@ -2,10 +2,11 @@
 
 use super::{
     PresentLod,
-    even::{Nearest, even_order},
     follow::{Frame, GUIDES, Pose, StrandState, Ties},
+    spread::spread_order,
 };
 use crate::{
+    grid::KdTree,
     parallel::for_each,
     schedule::HairStep,
     setting::Settings,
@@ -228,7 +229,7 @@ fn rank(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>]) {
     let (places, whole): (Vec<Vec3>, Vec<usize>) = (strands.iter().enumerate())
         .filter_map(|(i, strand)| Some((root(strand).filter(|p| p.is_finite())?, i)))
         .unzip();
-    for (rank, i) in even_order(&places).into_iter().enumerate() {
+    for (rank, i) in spread_order(&places).into_iter().enumerate() {
         let member = &mut members[whole[i as usize]];
         member.carried.bypass_change_detection().rank = Some(rank as u32);
     }
@@ -287,8 +288,7 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
     let guides = &*guides;
     let waypoints_of: Vec<[Vec3; 3]> =
         ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
-    let roots: Vec<Vec3> = waypoints_of.iter().map(|c| c[0]).collect();
-    let nearest = Nearest::among(&roots);
+    let nearest = KdTree::new(waypoints_of.iter().map(|c| c[0]).zip(0..));
     let mut loose: Vec<_> = (members.iter_mut())
         .zip(strands)
         .filter(|(m, _)| is_loose(m))
@@ -300,12 +300,13 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
     for_each(&mut loose, |(carried, strand)| {
         let own = waypoints(strand);
         let mut found: Vec<(f32, u32, StrandState<'_>)> = nearest
-            .to::<CANDIDATES>(own[0])
-            .filter_map(|(i, _)| {
+            .nearest::<CANDIDATES>(own[0])
+            .filter_map(|(index, _)| {
+                let i = index as usize;
                 let guide = ahead[i]?;
                 let apart = waypoints_of[i].iter().zip(own).map(|(a, b)| a.distance_squared(b));
-                let turns = guides.turns(i as u32)?;
-                Some((apart.sum::<f32>() / 3.0, i as u32, StrandState { turns, ..state_of(guide) }))
+                let turns = guides.turns(index)?;
+                Some((apart.sum::<f32>() / 3.0, index, StrandState { turns, ..state_of(guide) }))
             })
             .collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

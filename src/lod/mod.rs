@@ -7,7 +7,7 @@
 //!
 //! # Fewer strands
 //!
-//! Strands stand in an order of which every beginning is spread evenly over the roots ([`even`]). At a
+//! Strands stand in an order of which every beginning is spread evenly over the roots ([`spread`]). At a
 //! level its first ones are simulated, so that who is at a coarse level is at all finer ones. Each of
 //! the others is **carried** by up to three guides that are near and run alike ([`follow`]): once a tick
 //! its edges turn as theirs have turned at the same distance from the root since the level began. So
@@ -31,12 +31,12 @@
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
 #[doc(hidden)]
-pub mod even;
-#[doc(hidden)]
 pub mod follow;
 mod guides;
 #[doc(hidden)]
 pub mod model;
+#[doc(hidden)]
+pub mod spread;
 mod systems;
 
 pub use guides::{Follower, Guides};

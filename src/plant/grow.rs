@@ -6,7 +6,10 @@ use super::{
     shell::Shell,
     surface::{Root, Surface},
 };
-use crate::{grid::UniformGrid, strand::MIN_SEGMENT};
+use crate::{
+    grid::{KdTree, UniformGrid},
+    strand::MIN_SEGMENT,
+};
 use bevy::{
     math::ops::{cos, sin, sin_cos, tan},
     prelude::*,
@@ -74,19 +77,10 @@ fn leaders(planting: &Planting, roots: &[Root]) -> Vec<usize> {
         });
         is_middle[i] = is_free;
     }
-    (0..roots.len())
-        .map(|i| {
-            let mut nearest = (f32::MAX, i);
-            grid.for_each_near(place(i), |j| {
-                let j = j as usize;
-                let distance = place(i).distance_squared(place(j));
-                if is_middle[j] && (distance, j) < nearest {
-                    nearest = (distance, j);
-                }
-            });
-            if is_middle[i] { i } else { nearest.1 }
-        })
-        .collect()
+    let middles = (0..).zip(&is_middle).filter(|(_, is_middle)| **is_middle);
+    let middles = KdTree::new(middles.map(|(i, _)| (place(i as usize), i)));
+    let leader = |i: usize| middles.nearest::<1>(place(i)).next().map_or(i, |(j, _)| j as usize);
+    (0..roots.len()).map(|i| if is_middle[i] { i } else { leader(i) }).collect()
 }
 
 fn lots(

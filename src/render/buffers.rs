@@ -1,11 +1,12 @@
 //! What a hair hands to the GPU: its nodes in every frame, guides and drawn strands once.
 
-use super::followers::DrawnStrand;
+use super::drawn_strand::DrawnStrand;
 use crate::{
     bond::Bonds,
     strand::{Strand, StrandHistory},
 };
 use bevy::{prelude::*, render::storage::ShaderBuffer};
+use half::{f16, slice::HalfFloatSliceExt};
 
 /// The buffers of a drawn [`Hair`](crate::Hair), on the same entity. Bind them in a material of your
 /// own to draw the hair another way; `#import bevy_keratin::strands` has the structures and the curve.
@@ -62,7 +63,7 @@ pub(super) fn pack_guide(
 ) -> Option<(Vec3, Vec3)> {
     let place = |i| history.drawn(strand, i, overstep);
     let first = (0..strand.nodes()).map(place).find(|p| usable(*p));
-    let shown = half(f32::from(u8::from(first.is_some())));
+    let shown = f32::from(u8::from(first.is_some()));
     let mut last = first.unwrap_or_default();
     let (mut low, mut high) = (last, last);
     let mut rest = 0.0_f32;
@@ -91,15 +92,17 @@ pub(super) fn pack_guide(
             false => Vec3::ZERO,
         };
         let [x, y, z] = last.to_array().map(f32::to_bits);
+        let halves =
+            halves([strain, moisture.clamp(0.0, 1.0), motion.x, motion.y, motion.z, shown]);
         *node = [
             x,
             y,
             z,
             unorm8(rates),
-            half(strain) | half(moisture.clamp(0.0, 1.0)) << 16,
+            halves[0],
             if rest.is_finite() { rest.to_bits() } else { 0 },
-            half(motion.x) | half(motion.y) << 16,
-            half(motion.z) | shown << 16,
+            halves[1],
+            halves[2],
         ];
         rest += strand.rest_lengths().get(i).copied().unwrap_or(0.0);
     }
@@ -114,18 +117,18 @@ pub(super) fn packed_place(node: &PackedNode) -> Vec3 {
     Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
 }
 
-/// The nearest f16, in the low bits. What is too small for one, and NaN, become 0; what is too large
-/// the largest.
-fn half(x: f32) -> u32 {
-    const LEAST: f32 = 6.103_515_6e-5;
-    // False for NaN.
-    if x.abs() >= LEAST {
-        let bits = x.to_bits();
-        let rebased = (bits & 0x7fff_ffff) + 0x1000 - (112 << 23);
-        (bits >> 16) & 0x8000 | (rebased >> 13).min(0x7bff)
-    } else {
-        0
+/// The nearest f16s, two in a word. NaN becomes 0; what is too large the largest.
+fn halves(x: [f32; 6]) -> [u32; 3] {
+    let most = f16::MAX.to_f32_const();
+    // Eight are converted by one instruction where there is one.
+    let mut all = [0.0; 8];
+    for (to, x) in all.iter_mut().zip(x) {
+        *to = if x.is_nan() { 0.0 } else { x.clamp(-most, most) };
     }
+    let mut halves = [f16::ZERO; 8];
+    halves.convert_from_f32_slice(&all);
+    let bits = |i: usize| u32::from(halves[i].to_bits());
+    [0, 2, 4].map(|i| bits(i) | bits(i + 1) << 16)
 }
 
 fn unorm8(rates: [f32; 4]) -> u32 {
@@ -184,14 +187,16 @@ mod tests {
         assert_eq!((nodes[0][6], nodes[1][7]), (0, half(1.0) << 16));
     }
 
+    fn half(x: f32) -> u32 {
+        u32::from(f16::from_f32(x).to_bits())
+    }
+
     #[test]
-    fn halves_are_the_nearest() {
-        let halves = [(0.0, 0), (1.0, 0x3c00), (-2.0, 0xc000), (65504.0, 0x7bff)];
-        let odd = [(1e9, 0x7bff), (f32::NAN, 0), (1e-7, 0), (0.1, 0x2e66), (f32::MAX, 0x7bff)];
-        for (x, bits) in halves.into_iter().chain(odd) {
-            assert_eq!(half(x), bits, "{x}");
-        }
-        assert_eq!(half(f32::INFINITY), 0x7bff);
+    fn halves_are_the_nearest_and_always_finite() {
+        let halves = halves([1.0, -2.0, 65504.0, 1e9, f32::NAN, 0.1]);
+        assert_eq!(halves, [0xc000_3c00, 0x7bff_7bff, 0x2e66_0000]);
+        let odd = super::halves([f32::INFINITY, f32::MIN, 1e-9, 1e-7, 0.0, f32::MAX]);
+        assert_eq!(odd, [0xfbff_7bff, 0x0002_0000, 0x7bff_0000]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Points on drawn strands: the Rust twin of `strands.wgsl`, for tools, tests and effects that
 //! need to know where a follower is.
 
-use super::followers::{DrawnStrand, HairFollowers};
+use super::{drawn_strand::DrawnStrand, followers::HairFollowers};
 use bevy::prelude::*;
 
 /// A point on a curve and the derivative by the share of the length.

@@ -3,9 +3,10 @@
 use super::{
     HairFollowers, HairLook, HairView, WetLook,
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
-    followers::{DrawnStrand, GuideRoot, scatter},
-    given::FollowerRoots,
+    drawn_strand::{DrawnStrand, GuideRoot},
+    follower_roots::FollowerRoots,
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
+    scatter::scatter,
     sets::Interpolate,
 };
 use crate::{

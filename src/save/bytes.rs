@@ -6,7 +6,7 @@
 //! | 2 | format, little endian as all numbers here |
 //! | 8 | length of the numbers |
 //! | … | the numbers |
-//! | 4 | CRC-32 of all bytes before |
+//! | 4 | CRC-32 of all bytes before, as in zip files and PNGs |
 //!
 //! This frame stays, whatever the format. In format 1 the numbers are: strands; the cuticle's damage and
 //! softening as an option; then strand by strand its nodes, whether it is wet, the root's frame,
@@ -46,7 +46,7 @@ impl Hairdo {
         self.strands.iter().for_each(|strand| out.strand(strand));
         let length = (out.0.len() - HEAD) as u64;
         out.0[HEAD - 8..HEAD].copy_from_slice(&length.to_le_bytes());
-        let checksum = crc32(&out.0);
+        let checksum = crc32fast::hash(&out.0);
         out.0.extend(checksum.to_le_bytes());
         out.0
     }
@@ -74,7 +74,7 @@ impl Hairdo {
         }
         let (told, tail) = bytes.split_at(bytes.len() - CHECKSUM);
         let expected = tail.iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte));
-        let found = crc32(told);
+        let found = crc32fast::hash(told);
         if found != expected {
             return Err(HairdoError::Checksum { found, expected });
         }
@@ -236,35 +236,5 @@ impl<'a> Reader<'a> {
             }
         }
         Ok(joint)
-    }
-}
-
-/// CRC-32 as in zip files and PNGs: notices every damage of up to 32 bits in a row.
-fn crc32(bytes: &[u8]) -> u32 {
-    const TABLE: [u32; 256] = {
-        let mut table = [0; 256];
-        let mut i = 0;
-        while i < 256 {
-            let mut sum = i as u32;
-            let mut bit = 0;
-            while bit < 8 {
-                sum = if sum & 1 == 1 { 0xEDB8_8320 ^ (sum >> 1) } else { sum >> 1 };
-                bit += 1;
-            }
-            table[i] = sum;
-            i += 1;
-        }
-        table
-    };
-    !bytes.iter().fold(!0, |sum, byte| TABLE[(sum as u8 ^ byte) as usize] ^ (sum >> 8))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_checksum_is_the_usual_one() {
-        assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
     }
 }

@@ -3,6 +3,7 @@
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::{
     bond::{BondKind, JointBonds},
+    grid::KdTree,
     rod::frame::{darboux, full},
     water::moisture::node_lengths,
 };
@@ -27,8 +28,7 @@ impl Hairdo {
     /// be of about the same size and shape, for nothing is bent round a skull that is in the way. A
     /// joint turns by at most 150°; curls tighter than the new segments allow get wider. Details
     /// finer than a segment are evened out. A strand is styled by one other alone: from few strands
-    /// to many, neighbours wear the same. The nearest root is looked for among all: ten thousand strands
-    /// onto as many others take a few tenths of a second.
+    /// to many, neighbours wear the same.
     ///
     /// # Errors
     /// When `hair` is no hair or has numbers that cannot be, or this hairdo has no strands at all.
@@ -45,20 +45,14 @@ impl Hairdo {
             return Err(HairdoError::Bald);
         }
         let by_index = self.strands.len() == other.strands.len();
+        let roots = self.strands.iter().map(|strand| strand.positions[0]).zip(0..);
+        let nearest = KdTree::new(roots.filter(|_| !by_index));
+        let of = |place| nearest.nearest::<1>(place).next().map_or(0, |(i, _)| i as usize);
         let strands = other.strands.iter().enumerate().map(|(i, layout)| {
-            let source = if by_index { i } else { self.nearest(layout.positions[0]) };
+            let source = if by_index { i } else { of(layout.positions[0]) };
             self.strands[source].resampled(layout)
         });
         Self { strands: strands.collect(), cuticle: self.cuticle }.checked()
-    }
-
-    /// The strand with the root nearest to a place; of equals the first.
-    fn nearest(&self, place: Vec3) -> usize {
-        let distance = |strand: &StyledStrand| strand.positions[0].distance_squared(place);
-        let strands = self.strands.iter().enumerate();
-        strands
-            .min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))
-            .map_or(0, |(index, _)| index)
     }
 }
 

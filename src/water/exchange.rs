@@ -110,7 +110,7 @@ pub(super) fn exchange_water(
         report(Some(soak.target), soak.violations(), &mut faults);
         let share = soak.clamped().wetness;
         for member in members {
-            if let Ok((of, strand, _, mut moisture, ..)) = strands.get_mut(member) {
+            if let Ok((of, strand, _, _, mut moisture, ..)) = strands.get_mut(member) {
                 let capacity = wetting.of(of.0).capacity();
                 let lengths = node_lengths(strand.rest_lengths());
                 let moisture = moisture.bypass_change_detection();

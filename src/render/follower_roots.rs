@@ -1,8 +1,12 @@
 //! Followers that grow where they are told to, instead of evenly between the guides.
 
-use super::followers::{DrawnStrand, GuideRoot, HairFollowers, Random, hash};
-use crate::grid::UniformGrid;
+use super::{
+    drawn_strand::{DrawnStrand, GuideRoot, direction},
+    followers::HairFollowers,
+};
+use crate::grid::KdTree;
 use bevy::prelude::*;
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// Where the followers of a hair grow. Component of a [`Hair`](crate::Hair); where absent they are
 /// scattered evenly between the guides. [`HairFollowers::count`] limits how many are drawn, taken
@@ -42,13 +46,13 @@ pub(super) fn grow(
     let usable = |r: &FollowerRoot| r.place.is_finite() && r.length.is_finite() && r.length > 0.0;
     let given: Vec<&FollowerRoot> = given.iter().filter(|r| usable(r)).collect();
     let count = given.len().min(settings.count as usize);
-    let near = Near::new(guides);
-    let mut found = Vec::new();
+    let usable = (0..).zip(guides).filter(|(_, guide)| guide.length > 0.0);
+    let tree = KdTree::new(usable.map(|(i, guide)| (guide.place, i)));
     (0..count)
         .map(|k| k * given.len() / count)
         .filter_map(|i| {
-            near.find(given[i].place, guides, &mut found);
-            follower(i as u32, given[i], guides, &found, settings)
+            let near = tree.nearest::<NEAR>(given[i].place);
+            follower(i as u32, given[i], guides, near, settings)
         })
         .collect()
 }
@@ -57,20 +61,20 @@ fn follower(
     index: u32,
     own: &FollowerRoot,
     guides: &[GuideRoot],
-    near: &[(f32, u32)],
+    near: impl Iterator<Item = (u32, f32)>,
     settings: &HairFollowers,
 ) -> Option<DrawnStrand> {
     let shape = own.reach / own.length;
-    let cost = |(square, i): &(f32, u32)| {
-        let guide = &guides[*i as usize];
+    let cost = |(i, square): (u32, f32)| {
+        let guide = &guides[i as usize];
         let differ = (guide.reach / guide.length - shape) * own.length.min(guide.length);
         let differ = match own.reach == Vec3::ZERO || !differ.is_finite() {
             true => 0.0,
             false => SHAPE * SHAPE * differ.length_squared(),
         };
-        (square + differ, *i)
+        (square + differ, i)
     };
-    let mut best: Vec<(f32, u32)> = near.iter().map(cost).collect();
+    let mut best: Vec<(f32, u32)> = near.map(cost).collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     best.truncate(3);
     let nearest = best.first()?.1;
@@ -85,56 +89,21 @@ fn follower(
         root -= weights[k] * guide.place;
         length += weights[k] * guide.length;
     }
-    let mut random = Random(hash(settings.seed ^ hash(index)));
-    let far = random.share().powi(3) * 2.0 + 0.3;
+    // Its own, so that a follower stays the same when others come or go.
+    let seed = u64::from(settings.seed) << 32 | u64::from(index);
+    let random = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
+    let far = random.random::<f32>().powi(3) * 2.0 + 0.3;
     let share = own.length / length;
     (share.is_finite() && root.is_finite()).then(|| DrawnStrand {
         guides: chosen,
-        seed: random.next(),
+        seed: random.random(),
         weights,
         length: share.clamp(0.01, LONGEST),
         root,
-        phase: (settings.phase_variation * random.share()).min(0.5 * share),
-        stray: random.direction() * (settings.stray * own.length * far),
+        phase: (settings.phase_variation * random.random::<f32>()).min(0.5 * share),
+        stray: direction(random) * (settings.stray * own.length * far),
         is_guide: false,
     })
-}
-
-/// Finds guides by place.
-struct Near {
-    grid: UniformGrid,
-    all: usize,
-}
-
-impl Near {
-    fn new(guides: &[GuideRoot]) -> Self {
-        let places = || guides.iter().map(|g| g.place).filter(|p| p.is_finite());
-        let low = places().fold(Vec3::MAX, Vec3::min);
-        let high = places().fold(Vec3::MIN, Vec3::max);
-        let spacing = (high - low).length() / (guides.len() as f32).sqrt();
-        let mut grid = UniformGrid::default();
-        grid.build((2.0 * spacing).max(1e-6), guides.iter().map(|g| g.place).zip(0..));
-        Self { grid, all: guides.len() }
-    }
-
-    /// The nearest guides with the squares of their distances, nearest first.
-    fn find(&self, place: Vec3, guides: &[GuideRoot], found: &mut Vec<(f32, u32)>) {
-        let entry = |i: u32| {
-            let guide = &guides[i as usize];
-            let square = guide.place.distance_squared(place);
-            (square.is_finite() && guide.length > 0.0).then_some((square, i))
-        };
-        found.clear();
-        self.grid.for_each_near(place, |i| found.extend(entry(i)));
-        // Far from all guides, or where those are few.
-        if found.is_empty() || (found.len() < 3 && self.all <= 4096) {
-            found.clear();
-            found.extend((0..self.all as u32).filter_map(entry));
-        }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        found.dedup_by_key(|f| f.1);
-        found.truncate(NEAR);
-    }
 }
 
 #[cfg(test)]
