@@ -12,7 +12,7 @@ use super::{
     },
     lanes::{LANES, Real},
     obstacle::Obstacle,
-    step::{StepParams, touch},
+    step::{Grip, StepParams, touch},
 };
 use fearless_simd::{Simd, f32x16, prelude::*};
 
@@ -106,11 +106,11 @@ fn sweeps<S: Simd, const P: usize>(
                 carried.p1 = b.nodes[0].position(simd);
             }
             pass_edge::<S, P>(simd, b, i, carried);
-            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles);
+            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles, Grip::WHOLE);
             if i + 1 == edges {
                 store4(&mut b.edges[i].q, carried.before);
                 store3(&mut b.nodes[i + 1].p, carried.p1);
-                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles);
+                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles, Grip::WHOLE);
             }
         }
     }
