@@ -1,5 +1,5 @@
 //! `cargo bench --bench convergence`: what a substep, an iteration and a Newton step of the limiter
-//! buy. Each row runs the same hair with another [`Solver`]; time and error stand side by side, so
+//! buy. Each row runs the same hair with another [`HairSolver`]; time and error stand side by side, so
 //! that settings of equal cost can be compared.
 //!
 //! Of the ways to solve a strand this compares: Gauss–Seidel sweeps from root to tip in all three
@@ -63,7 +63,7 @@ fn main() {
         (Split, 6, 20, 2),
         (Split, 12, 5, 2),
     ] {
-        let solver = Solver { projection, iterations, limiter_steps, ..default() };
+        let solver = Sweeps { projection, iterations, limiter_steps, ..default() };
         let app = || app(solver, substeps);
         println!(
             "{projection:?} | {substeps} × {iterations} | {limiter_steps} | {:.1} | {:.3}; {:.3} | {:.4}",
@@ -75,7 +75,7 @@ fn main() {
     }
 }
 
-fn app(solver: Solver, substeps: u32) -> App {
+fn app(solver: HairSolver, substeps: u32) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, HairPlugins::default()))
         .insert_resource(Time::<Fixed>::from_hz(60.0))

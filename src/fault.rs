@@ -1,78 +1,125 @@
 //! Faults: what went wrong and was contained, told once, as messages and in the log.
 
-use crate::{setting::InvalidValue, strand::StrandError};
 use bevy::prelude::*;
+use core::{error::Error, fmt};
+use std::sync::Arc;
 
 /// Something that was wrong and has been contained. Written once per occurrence, so that game code
 /// can react; also logged as a warning.
-#[derive(Message, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Clone, PartialEq)]
+///
+/// ```
+/// # use bevy_keratin::{prelude::*, FaultKind, InvalidValue}; use bevy::prelude::*;
+/// fn react(mut faults: MessageReader<HairFault>) {
+///     for fault in faults.read().filter(|fault| fault.kind == FaultKind::Setting) {
+///         let value = fault.cause::<InvalidValue>().map(|value| value.what);
+///         println!("{fault}: {value:?}");
+///     }
+/// }
+/// ```
+#[derive(Message, Reflect, Clone, Debug)]
+#[reflect(Clone)]
 pub struct HairFault {
-    /// The hair, strand, collider, blower or rod concerned; [`Entity::PLACEHOLDER`] for resources.
-    pub entity: Entity,
-    /// What was wrong.
-    pub fault: Fault,
+    /// The hair, strand, collider, blower or rod concerned; `None` for resources.
+    pub entity: Option<Entity>,
+    /// What kind of fault it is, for code to tell them apart.
+    pub kind: FaultKind,
+    /// What was wrong, what was expected, how to mend it and what happens meanwhile.
+    pub message: String,
+    #[reflect(ignore)]
+    source: Source,
 }
 
+/// The error behind a fault.
+#[derive(Clone, Debug, Default)]
+struct Source(Option<Arc<dyn Error + Send + Sync>>);
+
 /// The kinds of [`HairFault`].
-#[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Clone, PartialEq)]
-pub enum Fault {
-    /// A setting outside its range is used as the nearest valid value.
-    #[error("{0}; the nearest valid value is used")]
-    Setting(#[from] InvalidValue),
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[reflect(Clone, PartialEq, Hash)]
+#[non_exhaustive]
+pub enum FaultKind {
+    /// A setting or a tool's value outside its range: the nearest valid value is used.
+    Setting,
     /// A strand left the finite numbers and was put back to the state of the substep before.
-    #[error("the strand became non-finite and was put back to its last finite state, at rest")]
     PutBack,
-    /// A strand's stored state was not finite and its pose was rebuilt from root, lengths and bonds.
-    #[error("the strand's state was not finite; its rest pose was rebuilt from root and bonds")]
+    /// A strand's stored state was not finite: its pose was rebuilt from root, lengths and bonds.
     Rebuilt,
     /// A strand points to a hair that does not exist or carries no `Hair`: it is left out.
-    #[error("the strand belongs to no hair: spawn it with StrandOf(hair), hair carrying Hair")]
     NoHair,
     /// A strand that cannot be simulated at all.
-    #[error(transparent)]
-    Strand(#[from] StrandError),
+    Strand,
     /// A transform that cannot be inverted, or is not finite: the last valid one is used.
-    #[error("the transform is not finite or has no inverse: the last valid pose is used")]
     Transform,
-    /// Gravity that is not finite counts as none.
-    #[error("HairGravity is not finite: no gravity is used until it is")]
-    Gravity,
-    /// An avian collider, or a part of one, that hair does not know: hair goes through it.
-    #[cfg(feature = "avian")]
-    #[error("{0}; hair goes through it")]
-    Avian(#[from] crate::contact::AvianShapeError),
+    /// A physics collider that hair does not know: hair goes through it.
+    Collider,
     /// Roots that cannot be tied to their mesh: the strands stay as they are.
-    #[cfg(feature = "groom")]
-    #[error("{0}; those strands do not follow the mesh")]
-    Roots(#[from] crate::groom::RootsError),
-    /// A groom that no strands can be grown from.
-    #[cfg(feature = "groom")]
-    #[error("the hair's groom cannot be used: {0}")]
-    Groom(crate::groom::GroomError),
-    /// A groom whose file could not be loaded.
-    #[cfg(feature = "groom")]
-    #[error("the hair's groom was not loaded: {error}")]
-    GroomNotLoaded {
-        /// What the asset server says.
-        error: String,
-    },
-    /// A hairdo that the hair cannot wear.
-    #[cfg(feature = "save")]
-    #[error("{0}; the hair keeps the hairdo that it has")]
-    Hairdo(#[from] crate::hairdo::HairdoError),
+    Roots,
+    /// A groom that could not be loaded, or that no strands can be grown from.
+    Groom,
+    /// A hairdo that the hair cannot wear: it keeps the one that it has.
+    Hairdo,
     /// A request that names something that is not there.
-    #[error("the treatment's target is neither a Hair nor a strand")]
     NoTarget,
 }
 
+impl HairFault {
+    /// A fault that concerns no entity.
+    pub fn new(kind: FaultKind, message: impl Into<String>) -> Self {
+        Self { entity: None, kind, message: message.into(), source: Source(None) }
+    }
+
+    /// A fault with the error behind it and what is done about it, in a few words.
+    pub fn caused(
+        kind: FaultKind,
+        source: impl Error + Send + Sync + 'static,
+        outcome: &str,
+    ) -> Self {
+        let message = format!("{source}; {outcome}");
+        Self { source: Source(Some(Arc::new(source))), ..Self::new(kind, message) }
+    }
+
+    /// The same fault of this entity.
+    pub fn of(mut self, entity: Entity) -> Self {
+        self.entity = Some(entity);
+        self
+    }
+
+    /// The error behind it, where there is one and it is an `E`.
+    pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
+        self.source.0.as_deref()?.downcast_ref()
+    }
+}
+
+impl PartialEq for HairFault {
+    fn eq(&self, other: &Self) -> bool {
+        (self.entity, self.kind, &self.message) == (other.entity, other.kind, &other.message)
+    }
+}
+
+impl fmt::Display for HairFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.entity {
+            Some(entity) => write!(f, "hair, entity {entity}: {}", self.message),
+            None => write!(f, "hair: {}", self.message),
+        }
+    }
+}
+
+impl Error for HairFault {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.source.0.as_deref().map(|source| source as _)
+    }
+}
+
 pub(crate) fn plugin(app: &mut App) {
-    app.add_message::<HairFault>().register_type::<HairFault>().add_systems(Last, log_faults);
+    app.add_message::<HairFault>()
+        .register_type::<HairFault>()
+        .register_type::<FaultKind>()
+        .add_systems(Last, log_faults);
 }
 
 fn log_faults(mut faults: MessageReader<HairFault>) {
-    for HairFault { entity, fault } in faults.read() {
-        tracing::warn!("hair, entity {entity}: {fault}");
+    for fault in faults.read() {
+        tracing::warn!("{fault}");
     }
 }

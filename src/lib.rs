@@ -1,54 +1,64 @@
 #![doc = include_str!("../README.md")]
+#![doc = include_str!("guide/substep.md")]
+#![doc = include_str!("guide/glossary.md")]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![deny(unsafe_code)]
 
-pub mod air;
+#[cfg(feature = "groom")]
+pub mod attach;
 pub mod bond;
+#[cfg(feature = "groom")]
+pub mod collider_fit;
 pub mod contact;
+pub mod environment;
 pub mod fault;
 pub mod grid;
 #[cfg(feature = "groom")]
 pub mod groom;
-#[cfg(feature = "save")]
-pub mod hairdo;
+#[doc(hidden)]
+pub mod lanes;
 pub mod lod;
+pub mod mass_spring;
 mod parallel;
-mod prefetch;
+#[cfg(feature = "groom")]
+pub mod plant;
+pub mod plugins;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod rod;
+#[cfg(feature = "save")]
+pub mod save;
+pub mod schedule;
 pub mod setting;
 pub mod sleep;
-pub mod spring;
+pub mod solve;
 pub mod strand;
-pub mod style;
-pub mod tick;
+pub mod treatment;
 pub mod water;
 
-pub use air::{AirDrag, Blower, HairGravity, WindReceived};
 pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
 #[cfg(feature = "avian")]
 pub use contact::{AvianHairCollider, AvianShapeError};
 pub use contact::{ColliderShape, HairCollider, LockContact};
-pub use fault::{Fault, HairFault};
+pub use environment::{AirDrag, Blower, Climate, HairGravity, WindReceived};
+pub use fault::{FaultKind, HairFault};
 #[cfg(feature = "groom")]
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
-#[cfg(feature = "save")]
-pub use hairdo::{Hairdo, HairdoError};
 pub use lod::{HairLod, LodLevel, PresentLod, ScreenShare};
-pub use rod::{Solver, Stiffness, StretchProjection};
-pub use setting::{HairDefault, InvalidValue};
+pub use mass_spring::Springs;
+pub use plugins::HairPlugins;
+pub use rod::{HairSolver, SolverMethod, Stiffness, StretchProjection, Sweeps};
+#[cfg(feature = "save")]
+pub use save::{Hairdo, HairdoError};
+pub use schedule::{HairStep, HairSubsteps, HairSystems, HairTick, ProcessTime};
+pub use setting::{HairDefault, InvalidValue, ValueRange};
 pub use sleep::HairSleep;
-pub use spring::Springs;
 pub use strand::{
-    Burden, Hair, HairInertia, HeldNodes, Sleep, Sleepers, Strand, StrandError, StrandModel,
-    StrandOf, Strands,
+    AddedMass, Hair, HairInertia, HeldNodes, Sleepers, Strand, StrandError, StrandModel, StrandOf,
+    StrandSleep, Strands,
 };
-pub use style::{PermRod, Treat, Winding, WoundOn, WoundStrands};
-pub use tick::{HairPlugins, HairStep, HairSubsteps, HairSystems, HairTick};
-pub use water::{
-    Climate, Droplet, DropletRules, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
-};
+pub use treatment::{PermRod, Treat, Winding, WoundOn, WoundStrands};
+pub use water::{Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting};
 
 /// What most games need.
 pub mod prelude {
@@ -58,18 +68,19 @@ pub mod prelude {
     #[cfg(feature = "groom")]
     #[doc(hidden)]
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};
-    #[cfg(feature = "save")]
-    #[doc(hidden)]
-    pub use crate::hairdo::{Hairdo, HairdoError};
     #[cfg(feature = "render")]
     #[doc(hidden)]
     pub use crate::render::{HairFollowers, HairLook, HairShading, HairView, Melanin};
+    #[cfg(feature = "save")]
+    #[doc(hidden)]
+    pub use crate::save::{Hairdo, HairdoError};
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
         HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairLod, HairPlugins,
-        HairSleep, HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact, Moisture, PermRod,
-        ProcessTime, ScreenShare, Shower, Sleep, Soak, Solver, Stiffness, Strand, StrandModel,
-        StrandOf, Strands, StretchProjection, Treat, WaterLedger, Wetting, Winding, WoundOn,
+        HairSleep, HairSolver, HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact,
+        Moisture, PermRod, ProcessTime, ScreenShare, Shower, SoakHair, SolverMethod, Stiffness,
+        Strand, StrandModel, StrandOf, StrandSleep, Strands, StretchProjection, Sweeps, Treat,
+        WaterLedger, Wetting, Winding, WoundOn,
     };
 }

@@ -1,15 +1,20 @@
-//! Settings: a default for all hair as a resource, an override as a component on a `Hair`.
+//! Values that users set: settings of hair, tools, rules of the world.
 //!
-//! In Bevy 0.19 one type cannot be both, so [`HairDefault<T>`] carries the default of `T`.
-//! Values set by editing a component are taken over at the next tick. A value outside its range is
-//! reported once and used as the nearest valid one; the component keeps what the user wrote.
+//! Each is stated once, with its unit, default, range and a hint; docs, `Default`, constructors' checks
+//! and the [`ValueRange`] constants are made of that. A value outside its range is an error where a
+//! constructor takes it. Where it is edited it is reported once and used as the nearest valid one, the
+//! default in place of what is not a number; the component keeps what the user wrote.
+//!
+//! Settings have a default for all hair as a resource and an override as a component on a `Hair`. In
+//! Bevy 0.19 one type cannot be both, so [`HairDefault<T>`] carries the default of `T`.
 
-use crate::fault::{Fault, HairFault};
+use crate::fault::{FaultKind, HairFault};
 use bevy::{
     ecs::system::SystemParam,
     prelude::*,
     reflect::{GetTypeRegistration, Typed},
 };
+use core::ops::RangeInclusive;
 
 /// A value that a constructor or a setting refuses: which, what was found, what was expected and
 /// how to mend it.
@@ -29,60 +34,256 @@ pub struct InvalidValue {
     pub hint: &'static str,
 }
 
-/// The valid range of one value.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Bound {
-    what: &'static str,
-    low: f32,
-    high: f32,
-    hint: &'static str,
-}
-
-/// What was mended while reading a setting.
-#[derive(Debug, Default)]
-pub struct Notes(core::cell::RefCell<Vec<InvalidValue>>);
-
-impl Notes {
-    /// The refused values, in the order met.
-    pub fn into_inner(self) -> Vec<InvalidValue> {
-        self.0.into_inner()
+impl From<InvalidValue> for HairFault {
+    fn from(value: InvalidValue) -> Self {
+        Self::caused(FaultKind::Setting, value, "the nearest valid value is used")
     }
 }
 
-impl Bound {
-    pub(crate) const fn new(what: &'static str, low: f32, high: f32, hint: &'static str) -> Self {
-        Self { what, low, high, hint }
+/// The range of one value: what is valid, what does well, and how to mend what is outside.
+///
+/// Settings and tools have one as a constant for each value, for sliders and the like:
+///
+/// ```
+/// # use bevy_keratin::prelude::*;
+/// assert_eq!(AirDrag::RATE.safe, 0.0..=50.0);
+/// assert_eq!(AirDrag::RATE.what, "AirDrag::rate (1/s)");
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ValueRange {
+    /// The value's name and unit.
+    pub what: &'static str,
+    /// What is outside is reported, and the nearest value inside is used.
+    pub valid: RangeInclusive<f32>,
+    /// What does well; all that is valid where nothing narrower is known.
+    pub safe: RangeInclusive<f32>,
+    /// How to mend a value that is outside.
+    pub hint: &'static str,
+}
+
+/// What was outside its range, in the order met.
+pub type Violations = Vec<InvalidValue>;
+
+impl ValueRange {
+    pub(crate) const fn new(
+        what: &'static str,
+        valid: RangeInclusive<f32>,
+        hint: &'static str,
+    ) -> Self {
+        let safe = RangeInclusive::new(*valid.start(), *valid.end());
+        Self { what, valid, safe, hint }
+    }
+
+    pub(crate) const fn with_safe(self, safe: RangeInclusive<f32>) -> Self {
+        Self { what: self.what, valid: self.valid, safe, hint: self.hint }
     }
 
     /// For constructors: the value, or why not.
-    pub(crate) fn check(&self, value: f32) -> Result<f32, InvalidValue> {
-        if value >= self.low && value <= self.high {
-            return Ok(value);
-        }
-        Err(InvalidValue {
-            what: self.what,
-            found: value,
-            low: self.low,
-            high: self.high,
-            hint: self.hint,
-        })
+    pub(crate) fn check<T: Value>(&self, value: T) -> Result<T, InvalidValue> {
+        let Some(found) = value.outside(&self.valid) else { return Ok(value) };
+        let (low, high) = (*self.valid.start(), *self.valid.end());
+        Err(InvalidValue { what: self.what, found, low, high, hint: self.hint })
     }
 
-    /// For edited components: the nearest valid value, `default` for what is not a number.
-    pub(crate) fn mend(&self, value: f32, default: f32, notes: &Notes) -> f32 {
-        self.check(value).unwrap_or_else(|wrong| {
-            notes.0.borrow_mut().push(wrong);
-            if value.is_nan() { default } else { value.clamp(self.low, self.high) }
-        })
+    /// The same rule under another name, for what is no field.
+    pub(crate) const fn named(self, what: &'static str) -> Self {
+        Self { what, valid: self.valid, safe: self.safe, hint: self.hint }
+    }
+
+    /// For what was edited: the nearest valid value, `default` for what is not a number.
+    pub(crate) fn clamp<T: Value>(
+        &self,
+        value: &mut T,
+        default: impl FnOnce() -> T,
+        violations: &mut Violations,
+    ) {
+        if let Err(wrong) = self.check(*value) {
+            violations.push(wrong);
+            *value = value.nearest(&self.valid).unwrap_or_else(default);
+        }
     }
 }
 
-/// A group of settings that a [`Hair`](crate::Hair) may override.
+/// What can have a [`ValueRange`].
+pub(crate) trait Value: Copy {
+    /// The first of its numbers that is outside.
+    fn outside(self, range: &RangeInclusive<f32>) -> Option<f32>;
+    /// The nearest value inside; `None` when it is not a number.
+    fn nearest(self, range: &RangeInclusive<f32>) -> Option<Self>;
+}
+
+impl Value for f32 {
+    fn outside(self, range: &RangeInclusive<f32>) -> Option<f32> {
+        (!range.contains(&self)).then_some(self)
+    }
+
+    fn nearest(self, range: &RangeInclusive<f32>) -> Option<Self> {
+        (!self.is_nan()).then(|| self.clamp(*range.start(), *range.end()))
+    }
+}
+
+macro_rules! value_as_f32 {
+    ($($number:ty)*) => {$(
+        impl Value for $number {
+            fn outside(self, range: &RangeInclusive<f32>) -> Option<f32> {
+                (self as f32).outside(range)
+            }
+
+            fn nearest(self, range: &RangeInclusive<f32>) -> Option<Self> {
+                (self as f32).nearest(range).map(|nearest| nearest as $number)
+            }
+        }
+    )*};
+}
+
+value_as_f32!(u32 usize f64);
+
+impl<T: Value> Value for Option<T> {
+    fn outside(self, range: &RangeInclusive<f32>) -> Option<f32> {
+        self.and_then(|value| value.outside(range))
+    }
+
+    fn nearest(self, range: &RangeInclusive<f32>) -> Option<Self> {
+        self?.nearest(range).map(Some)
+    }
+}
+
+impl Value for Vec3 {
+    fn outside(self, range: &RangeInclusive<f32>) -> Option<f32> {
+        self.to_array().into_iter().find_map(|x| x.outside(range))
+    }
+
+    fn nearest(self, range: &RangeInclusive<f32>) -> Option<Self> {
+        (!self.is_nan()).then(|| self.clamp(Vec3::splat(*range.start()), Vec3::splat(*range.end())))
+    }
+}
+
+/// Settings or a tool of which every value has its range. One rule for what constructors take and
+/// what is edited later.
+pub trait Ranged: Clone {
+    /// Brings every value into its range: to the nearest that is valid, to the default what is not a
+    /// number. Adds what was outside to `violations`.
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        let _ = violations;
+    }
+
+    /// The same with every value in its range.
+    fn clamped(&self) -> Self {
+        let mut clamped = self.clone();
+        clamped.clamp_values(&mut Violations::new());
+        clamped
+    }
+
+    /// What is outside its range.
+    fn violations(&self) -> Violations {
+        let mut violations = Violations::new();
+        self.clone().clamp_values(&mut violations);
+        violations
+    }
+
+    /// For constructors: itself, if every value is in its range.
+    ///
+    /// # Errors
+    /// The first value that is not.
+    fn checked(self) -> Result<Self, InvalidValue> {
+        self.violations().into_iter().next().map_or(Ok(self), Err)
+    }
+}
+
+impl<T: Ranged> Ranged for Vec<T> {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        self.iter_mut().for_each(|one| one.clamp_values(violations));
+    }
+}
+
+impl<T: Ranged> Ranged for Option<T> {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        self.iter_mut().for_each(|one| one.clamp_values(violations));
+    }
+}
+
+/// States the values of a setting or tool once: field, default, unit, range and hint. Of it are made
+/// the struct with these in its docs, `Default`, the [`ValueRange`] constants, and [`Ranged`].
+///
+/// ```ignore
+/// setting! {
+///     /// Drag of still air.
+///     #[derive(Component, Reflect, Clone, Debug)]
+///     pub struct AirDrag {
+///         /// Rate at which velocities die away.
+///         pub rate: f32 = 2.0, "1/s" in RATE: 0.0..=1e4, safe 0.0..=50.0, "2 is air, 20 is water";
+///     }
+/// }
+/// ```
+///
+/// A field without `in` may be anything; `=> function` gives one whose values are checked by another
+/// rule. After the struct `then function` checks what no single value shows.
+macro_rules! setting {
+    (
+        $(#[$attribute:meta])*
+        $vis:vis struct $Type:ident {
+            $(
+                $(#[$field_attribute:meta])*
+                $field_vis:vis $field:ident: $type:ty = $default:expr
+                $(, $($unit:literal)? in $RANGE:ident: $valid:expr,
+                    $(safe $safe:expr,)? $hint:literal)?
+                $(=> $clamp:expr)?;
+            )*
+        }
+        $(then $whole:expr)?
+    ) => {
+        $(#[$attribute])*
+        $vis struct $Type {
+            $(
+                $(#[$field_attribute])*
+                #[doc = concat!(
+                    "Default `", stringify!($default), "`"
+                    $($(, ", safe `", stringify!($safe), "`")?, ", valid `", stringify!($valid), "`"
+                        $(, " (", $unit, ")")?)?, "."
+                )]
+                $field_vis $field: $type,
+            )*
+        }
+
+        impl Default for $Type {
+            fn default() -> Self {
+                Self { $($field: $default),* }
+            }
+        }
+
+        impl $Type {$($(
+            #[doc = concat!("Range of [`", stringify!($field), "`](Self::", stringify!($field), ").")]
+            $field_vis const $RANGE: $crate::setting::ValueRange = $crate::setting::ValueRange::new(
+                concat!(stringify!($Type), "::", stringify!($field) $(, " (", $unit, ")")?),
+                $valid,
+                $hint,
+            )$(.with_safe($safe))?;
+        )?)*}
+
+        impl $crate::setting::Ranged for $Type {
+            fn clamp_values(&mut self, violations: &mut $crate::setting::Violations) {
+                $(
+                    $(Self::$RANGE.clamp(&mut self.$field, || $default, violations);)?
+                    $($clamp(&mut self.$field, violations);)?
+                )*
+                $($whole(self, violations);)?
+                let _ = violations;
+            }
+        }
+    };
+}
+
+pub(crate) use setting;
+
+/// Settings of one kind, which a [`Hair`](crate::Hair) may override.
 pub trait HairSetting:
-    Component + Clone + Default + Typed + FromReflect + GetTypeRegistration
+    Component + Ranged + Default + Typed + FromReflect + GetTypeRegistration
 {
-    /// These settings with every value in its valid range; what had to change goes into `notes`.
-    fn mended(&self, notes: &Notes) -> Self;
+}
+
+impl<T: Component + Ranged + Default + Typed + FromReflect + GetTypeRegistration> HairSetting
+    for T
+{
 }
 
 /// What holds for every hair that carries no `T` of its own.
@@ -96,74 +297,174 @@ pub trait HairSetting:
 #[reflect(Resource, Default)]
 pub struct HairDefault<T: HairSetting>(pub T);
 
+impl<T: HairSetting> Ranged for HairDefault<T> {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        self.0.clamp_values(violations);
+    }
+}
+
 /// Reads the settings `T` that hold for a hair, always valid.
 #[derive(SystemParam)]
 pub struct Settings<'w, 's, T: HairSetting> {
-    default: Res<'w, HairDefault<T>>,
+    /// None while the plugin that has these settings is switched off.
+    default: Option<Res<'w, HairDefault<T>>>,
     overrides: Query<'w, 's, &'static T>,
 }
 
 impl<T: HairSetting> Settings<'_, '_, T> {
     /// The settings of `hair`.
     pub fn of(&self, hair: Entity) -> T {
-        self.overrides.get(hair).unwrap_or(&self.default.0).mended(&Notes::default())
+        let default = || self.default.as_ref().map(|default| &default.0);
+        let set = self.overrides.get(hair).ok().or_else(default);
+        set.map_or_else(T::default, Ranged::clamped)
     }
 }
 
-/// Reports what was wrong with an entity's values.
-pub(crate) fn tell(entity: Entity, notes: Notes, faults: &mut MessageWriter<HairFault>) {
-    for wrong in notes.into_inner() {
-        faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
+/// Reports what was outside its range.
+pub(crate) fn report(
+    entity: Option<Entity>,
+    violations: Violations,
+    faults: &mut MessageWriter<HairFault>,
+) {
+    for wrong in violations {
+        let mut fault = HairFault::from(wrong);
+        fault.entity = entity;
+        faults.write(fault);
     }
 }
 
-/// Reports invalid values in components.
-pub(crate) fn report_changed<T: HairSetting>(
+fn report_changed<T: Component + Ranged>(
     changed: Query<(Entity, &T), Changed<T>>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    for (entity, setting) in &changed {
-        let notes = Notes::default();
-        setting.mended(&notes);
-        tell(entity, notes, &mut faults);
+    for (entity, values) in &changed {
+        report(Some(entity), values.violations(), &mut faults);
     }
 }
 
-/// Reports invalid values in the default.
-fn report_default<T: HairSetting>(
-    default: Res<HairDefault<T>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    let notes = Notes::default();
-    default.0.mended(&notes);
-    tell(Entity::PLACEHOLDER, notes, &mut faults);
+fn report_resource<T: Resource + Ranged>(values: Res<T>, mut faults: MessageWriter<HairFault>) {
+    report(None, values.violations(), &mut faults);
 }
 
-/// Registers one setting: its default, its type, and the report of invalid values.
+/// Registers settings: their default, and what [`component`] does.
 pub(crate) fn plugin<T: HairSetting>(app: &mut App) {
-    app.init_resource::<HairDefault<T>>()
+    resource::<HairDefault<T>>(app);
+    component::<T>(app);
+}
+
+/// Registers a tool: its type, and the report of invalid values.
+pub(crate) fn component<T: Component + Ranged + GetTypeRegistration>(app: &mut App) {
+    app.register_type::<T>().add_systems(PreUpdate, report_changed::<T>);
+}
+
+/// Registers values that hold for all hair: the resource, its type, and the report of invalid values.
+pub(crate) fn resource<T: Resource + Ranged + Default + GetTypeRegistration>(app: &mut App) {
+    app.init_resource::<T>()
         .register_type::<T>()
-        .register_type::<HairDefault<T>>()
-        .add_systems(
-            PreUpdate,
-            (report_default::<T>.run_if(resource_changed::<HairDefault<T>>), report_changed::<T>),
-        );
+        .add_systems(PreUpdate, report_resource::<T>.run_if(resource_changed::<T>));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    setting! {
+        /// A tool with a value of each kind.
+        #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+        #[reflect(Component, Default, Clone, PartialEq)]
+        pub struct Tool {
+            /// With a unit and a narrower safe range.
+            pub rate: f32 = 2.0, "1/s" in RATE: 0.0..=1e4, safe 0.0..=50.0, "2 is air";
+            /// Without.
+            pub seconds: f32 = 0.5, in SECONDS: 0.0..=f32::INFINITY, "0.5 lasts";
+            /// A count.
+            pub count: u32 = 5, in COUNT: 1.0..=1000.0, "5 are usual";
+            /// What need not be there.
+            pub weight: Option<f32> = None, in WEIGHT: 1e-9..=1e3, "0.03 is light";
+            /// A place.
+            pub corner: Vec3 = Vec3::NEG_ONE, "m" in CORNER: -100.0..=100.0, "a place nearby";
+            /// What may be anything.
+            pub is_on: bool = true;
+            /// Values of their own.
+            pub parts: Vec<Part> = vec![Part { share: 0.5 }] => Ranged::clamp_values;
+        }
+        then Self::rest_a_second
+    }
+
+    impl Tool {
+        fn rest_a_second(&mut self, violations: &mut Violations) {
+            let least = ValueRange::new("Tool::seconds at rate 0 (s)", 1.0..=1e3, "give it time");
+            if self.rate == 0.0 {
+                least.clamp(&mut self.seconds, || 1.0, violations);
+            }
+        }
+    }
+
+    setting! {
+        /// A part of it.
+        #[derive(Reflect, Clone, Debug, PartialEq)]
+        pub struct Part {
+            /// A share.
+            pub share: f32 = 1.0, in SHARE: 0.0..=1.0, "shares go from 0 to 1";
+        }
+    }
+
     #[test]
-    fn mending_takes_the_nearest_valid_value_and_says_so() {
-        let bound = Bound::new("x", 0.0, 1.0, "h");
-        let notes = Notes::default();
-        assert_eq!(bound.mend(0.5, 0.1, &notes), 0.5);
-        assert_eq!(bound.mend(2.0, 0.1, &notes), 1.0);
-        assert_eq!(bound.mend(f32::NEG_INFINITY, 0.1, &notes), 0.0);
-        assert_eq!(bound.mend(f32::NAN, 0.1, &notes), 0.1);
-        assert_eq!(notes.into_inner().len(), 3);
-        let text = bound.check(2.0).unwrap_err().to_string();
-        assert_eq!(text, "x is 2, expected 0 to 1: h");
+    fn defaults_are_valid_and_stay() {
+        let tool = Tool::default();
+        assert_eq!(tool.clone().checked().unwrap(), tool);
+        assert_eq!((tool.rate, tool.count, tool.weight, tool.is_on), (2.0, 5, None, true));
+        assert_eq!((Tool::RATE.safe, Tool::RATE.valid), (0.0..=50.0, 0.0..=1e4));
+        assert_eq!(Tool::COUNT.safe, 1.0..=1000.0);
+    }
+
+    #[test]
+    fn one_rule_for_constructors_and_for_what_is_edited() {
+        let edited = Tool {
+            rate: f32::NAN,
+            seconds: f32::NEG_INFINITY,
+            count: 0,
+            weight: Some(f32::NAN),
+            corner: Vec3::new(1.0, f32::INFINITY, -200.0),
+            is_on: false,
+            parts: vec![Part { share: 0.25 }, Part { share: 2.0 }],
+        };
+        let clamped = edited.clamped();
+        let expected = Tool {
+            rate: 2.0,
+            seconds: 0.0,
+            count: 1,
+            weight: None,
+            corner: Vec3::new(1.0, 100.0, -100.0),
+            is_on: false,
+            parts: vec![Part { share: 0.25 }, Part { share: 1.0 }],
+        };
+        assert_eq!(clamped, expected);
+        assert!(clamped.violations().is_empty());
+        let violations = edited.violations();
+        let names: Vec<_> = violations.iter().map(|v| v.what).collect();
+        assert_eq!(
+            names,
+            [
+                "Tool::rate (1/s)",
+                "Tool::seconds",
+                "Tool::count",
+                "Tool::weight",
+                "Tool::corner (m)",
+                "Part::share"
+            ]
+        );
+        assert_eq!(
+            violations[5].to_string(),
+            "Part::share is 2, expected 0 to 1: shares go from 0 to 1"
+        );
+        assert_eq!(edited.checked().unwrap_err().what, "Tool::rate (1/s)");
+    }
+
+    #[test]
+    fn a_rule_on_the_whole_is_asked_last() {
+        let tool = Tool { rate: -1.0, ..default() };
+        assert_eq!((tool.clamped().rate, tool.clamped().seconds), (0.0, 1.0));
+        assert_eq!(tool.violations().len(), 2);
     }
 }

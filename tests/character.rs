@@ -282,7 +282,7 @@ mod skinned {
             skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
         },
     };
-    use bevy_keratin::groom::{RootOnMesh, RootsOnMesh};
+    use bevy_keratin::{attach::RootsOnMesh, plant::RootOnMesh};
 
     const ROWS: u32 = 9;
 

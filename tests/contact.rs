@@ -47,7 +47,7 @@ fn friction_decides_whether_hair_slides_off() {
     let dragged = |friction: f32| {
         let mut app = test_app(60.0);
         let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
-        let floor = HairCollider::plane(Dir3::Y).with_friction(friction);
+        let floor = HairCollider::plane(Dir3::Y).with_friction(friction).unwrap();
         let floor = app.world_mut().spawn((floor, Transform::from_xyz(0.0, -0.15, 0.0))).id();
         app.world_mut().get_mut::<Strand>(e).unwrap().positions_mut()[8].x = 0.01;
         run(&mut app, 3.0);

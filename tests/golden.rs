@@ -2,13 +2,12 @@
 //!
 //! `data/cosserat.json` tells its conventions in `meta`; here are its cases with full stiffness.
 
-use bevy_keratin::rod::{
-    algebra::{Quaternion, V3},
-    constraint::{
+use bevy_keratin::{
+    lanes::{Quaternion, Real, V3},
+    rod::constraint::{
         BendShares, EPSILON, EdgeWeights, StretchProjection, StretchShares, bend_twist,
         stretch_shear,
     },
-    lanes::Real,
 };
 use serde::Deserialize;
 

@@ -8,7 +8,7 @@ mod wardrobe;
 
 use bevy::prelude::*;
 use bevy_keratin::{
-    Fault, hairdo::NEWEST_FORMAT, prelude::*, strand::StrandHistory, style::Treatments,
+    FaultKind, prelude::*, save::NEWEST_FORMAT, strand::StrandHistory, treatment::Treatments,
 };
 use common::*;
 use core::f32::consts::PI;
@@ -47,7 +47,7 @@ fn treated(strands: usize, nodes: usize) -> (App, Entity) {
     app.world_mut().write_message(Treat::wet(hair).joints(0..2));
     run(&mut app, 0.1);
     app.world_mut().write_message(Treat::neutraliser(first).over(0.05));
-    app.world_mut().write_message(Soak { target: first, wetness: 0.6 });
+    app.world_mut().write_message(SoakHair { target: first, wetness: 0.6 });
     run(&mut app, 0.2);
     app.world_mut().entity_mut(hair).insert(Cuticle { damage: 0.7, softening: 0.5 });
     (app, hair)
@@ -305,7 +305,10 @@ fn another_groom_is_told_and_the_hair_is_left_alone() {
         queue(&mut app, hair, hairdo.put_on());
         assert!(bits(&app, hair) == before);
         app.update();
-        assert_eq!(faults(&mut app), [Fault::Hairdo(expected)]);
+        let told = faults(&mut app);
+        assert!(
+            matches!(&told[..], [f] if f.kind == FaultKind::Hairdo && f.cause() == Some(&expected))
+        );
     }
     let before = bits(&app, hair);
     let own = of(&app, hair);
@@ -507,7 +510,7 @@ fn a_curl_keeps_its_radius_on_other_nodes_and_lengths() {
         let curly = app.world_mut().spawn(Hair).id();
         app.world_mut().spawn((StrandOf(curly), curl(Vec3::Y, 33, 0.02, 3.0 * PI)));
         run(&mut app, 0.1);
-        app.world_mut().write_message(Soak { target: curly, wetness: 0.4 });
+        app.world_mut().write_message(SoakHair { target: curly, wetness: 0.4 });
         app.update();
         let hairdo = of(&app, curly);
         let old = radius(hairdo.strands()[0].positions());
@@ -557,7 +560,7 @@ fn blending_is_exact_at_its_ends_and_keeps_lengths() {
         strand.pose(mirrored);
     }
     Hair::restyle(app.world_mut().entity_mut(hair));
-    app.world_mut().write_message(Soak { target: hair, wetness: 0.0 });
+    app.world_mut().write_message(SoakHair { target: hair, wetness: 0.0 });
     run(&mut app, 0.5);
     let b = of(&app, hair);
     assert_eq!(Hairdo::blend(&a, &b, 0.0).unwrap().to_bytes(), a.to_bytes());

@@ -89,6 +89,58 @@ fn perm_curls_and_its_controls_hang_straight() {
     }
 }
 
+fn swing(from: &str, segments: &str, more: &[&str]) -> Value {
+    let strand = ["--scene", "swing", "--length", "0.2", "--bending-length", "0.13", "--json"];
+    let out = headless(&[&strand, &["--from", from, "--segments", segments][..], more].concat());
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(report["finite"], true);
+    assert!(number(&report, "strain_peak") < 0.01, "{report}");
+    report
+}
+
+#[test]
+fn a_strand_let_go_swings_as_a_rod() {
+    // The elastica, and a beam under its own weight hanging and about the elastica.
+    let (sag, hanging, level) = (0.3963, 0.4029, 0.4419);
+    for segments in ["8", "32"] {
+        let report = swing("hanging", segments, &[]);
+        near(&report, "sag", sag, if segments == "8" { 0.025 } else { 0.01 });
+        near(&report, "period", hanging, 0.05 * hanging);
+        assert!(report["low_point"].is_null(), "{report}");
+        assert_eq!(report["substeps"], 6);
+    }
+    let report = swing("level", "16", &["--substeps", "12"]);
+    near(&report, "sag", sag, 0.01);
+    near(&report, "period", level, 0.05 * level);
+    // It falls for a little more than half of a period: large swings are slower.
+    let low = number(&report, "low_point") / level;
+    assert!((0.45..0.6).contains(&low), "lowest after {low} periods");
+    let left = number(&report, "energy_left_1s");
+    assert!(left > 0.0 && left < 1.0, "{left} of the energy is left");
+    assert_eq!(report["substeps"], 12);
+}
+
+#[test]
+fn a_swing_that_cannot_be_says_why() {
+    let error = |more: &[&str]| {
+        let strand = ["--scene", "swing", "--bending-length", "0.13", "--from", "level"];
+        let out = headless(&[&strand, more].concat());
+        assert!(!out.status.success());
+        String::from_utf8(out.stderr).unwrap()
+    };
+    let length = "--length is -2 m, expected 0.001 to 10";
+    assert!(error(&["--segments", "8", "--length", "-2"]).contains(length));
+    let segments = "--segments is 0, expected 1 to 1024";
+    assert!(error(&["--length", "1", "--segments", "0"]).contains(segments));
+    assert!(error(&["--length", "1"]).contains("--segments"));
+    let strand = ["--length", "1", "--segments", "8"];
+    assert!(error(&[&strand[..], &["--substeps", "0"]].concat()).contains("expected 1 to 1000"));
+    assert!(error(&[&strand[..], &["--seconds", "1"]].concat()).contains("not for swing"));
+    let out = headless(&["--scene", "perm", "--length", "1"]);
+    assert!(String::from_utf8_lossy(&out.stderr).contains("swing's"));
+}
+
 fn shower(variant: &str, seconds: &str) -> Value {
     let arguments = ["--scene", "shower", "--variant", variant, "--seconds", seconds, "--json"];
     let out = headless(&arguments);

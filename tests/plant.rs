@@ -9,7 +9,7 @@ use bevy::{
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
-use bevy_keratin::{groom::*, prelude::*};
+use bevy_keratin::{plant::*, prelude::*};
 use core::f32::consts::{PI, TAU};
 use proptest::prelude::*;
 
@@ -216,7 +216,7 @@ fn vertex_colours_and_images_are_masks() {
     let bald = straight(5e4).plant_with(&mesh, &maps).unwrap_err();
     assert!(matches!(bald, PlantError::NoRoots { .. }));
 
-    // Hair in the quarter around the pixel in the upper left, v = 0.
+    // Hair in the group around the pixel in the upper left, v = 0.
     let mut values = vec![0.0; 64];
     for y in 0..4 {
         values[8 * y..8 * y + 4].fill(1.0);
@@ -600,20 +600,23 @@ fn what_cannot_be_planted_says_why() {
         ("length_variation", Planting { length_variation: 1.0, ..base }),
         ("lean", Planting { lean: 1.6, ..base }),
         ("jitter", Planting { jitter: -0.1, ..base }),
-        ("direction", Planting { comb: Comb::Along(Vec3::ZERO), ..base }),
-        ("direction", Planting { comb: Comb::Along(Vec3::NAN), ..base }),
+        ("Comb::Along", Planting { comb: Comb::Along(Vec3::ZERO), ..base }),
+        ("Comb::Along", Planting { comb: Comb::Along(Vec3::NAN), ..base }),
         ("turn", Planting { comb: Comb::Whorl { center: Vec3::Y, turn: f32::NAN }, ..base }),
-        ("place", Planting { comb: Comb::Whorl { center: Vec3::INFINITY, turn: 0.0 }, ..base }),
+        (
+            "Whorl::center",
+            Planting { comb: Comb::Whorl { center: Vec3::INFINITY, turn: 0.0 }, ..base },
+        ),
         ("radius", Planting { curl: curl(0.0, 0.02, 0.0), ..base }),
         ("pitch", Planting { curl: curl(5e-3, f32::NAN, 0.0), ..base }),
         ("variation", Planting { curl: curl(5e-3, 0.05, 2.0), ..base }),
         ("spacing", Planting { clump: Some(Clump { spacing: 0.0, strength: 0.5 }), ..base }),
         ("strength", Planting { clump: Some(Clump { spacing: 0.1, strength: 1.0 }), ..base }),
-        ("direction", Planting { fall: fall(Vec3::ZERO, 0.1, 0.0, 0.0), ..base }),
+        ("Fall::toward", Planting { fall: fall(Vec3::ZERO, 0.1, 0.0, 0.0), ..base }),
         ("over", Planting { fall: fall(down, 0.0, 0.0, 0.0), ..base }),
         ("clearance", Planting { fall: fall(down, 0.1, -1.0, 0.0), ..base }),
         ("layering", Planting { fall: fall(down, 0.1, 0.0, f32::NAN), ..base }),
-        ("direction", Planting { cut: Some(Cut { normal: Vec3::ZERO, ..default() }), ..base }),
+        ("Cut::normal", Planting { cut: Some(Cut { normal: Vec3::ZERO, ..default() }), ..base }),
         ("least", Planting { cut: Some(Cut { least: 0.0, ..default() }), ..base }),
     ];
     for (what, planting) in odd {

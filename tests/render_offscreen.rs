@@ -552,12 +552,12 @@ fn soaked_hair_is_darker_and_droplets_are_seen() {
             / picture.covered(BLACK) as f32
     };
     let dry = tick(&mut scene);
-    scene.app.world_mut().write_message(Soak { target: hair, wetness: 1.0 });
+    scene.app.world_mut().write_message(SoakHair { target: hair, wetness: 1.0 });
     let wet = tick(&mut scene);
     let (light, dark) = (brightness(&dry), brightness(&wet));
     println!("hair has a mean luma of {light} dry, {dark} soaked");
     assert!(dry.covered(BLACK) > 1000 && dark < 0.85 * light);
-    scene.app.world_mut().write_message(Soak { target: hair, wetness: 0.0 });
+    scene.app.world_mut().write_message(SoakHair { target: hair, wetness: 0.0 });
     let again = brightness(&tick(&mut scene));
     println!("and {again} dried");
     assert!((again - light).abs() < 0.03 * light);

@@ -16,7 +16,7 @@ fn sleeper() -> (App, Entity, Entity) {
 }
 
 fn is_asleep(app: &App, strand: Entity) -> bool {
-    app.world().get::<Sleep>(strand).unwrap().is_asleep()
+    app.world().get::<StrandSleep>(strand).unwrap().is_asleep()
 }
 
 fn bits(strand: &Strand) -> Vec<[u32; 3]> {
@@ -296,7 +296,7 @@ fn bonds_that_change_wake_it_and_keep_it_awake() {
 fn water_wakes_it_and_wet_hair_does_not_sleep() {
     let mut app = woken(|app, hair, _| {
         app.insert_resource(ProcessTime(100.0));
-        app.world_mut().write_message(Soak { target: hair, wetness: 1.0 });
+        app.world_mut().write_message(SoakHair { target: hair, wetness: 1.0 });
     });
     let e = app.world_mut().query_filtered::<Entity, With<Strand>>().single(app.world()).unwrap();
     let wet = |app: &App| !app.world().get::<Moisture>(e).unwrap().is_untouched();
@@ -325,7 +325,8 @@ fn water_wakes_it_and_wet_hair_does_not_sleep() {
 #[test]
 fn settings_wake_it() {
     wakes(set(Stiffness::from_bending_length(0.2).unwrap()));
-    wakes(set(Solver { iterations: 7, ..default() }));
+    wakes(set(HairSolver { method: SolverMethod::Sweeps, ..default() }));
+    wakes(set(Sweeps { iterations: 7, ..default() }));
     wakes(set(BondInfluence { hydrogen: 0.4, ..default() }));
     wakes(set(Cuticle { damage: 0.5, ..default() }));
     wakes(set(LockContact { radius: 2e-3, ..default() }));
@@ -345,7 +346,7 @@ fn settings_wake_it() {
 fn game_code_wakes_it() {
     wakes(|app, _, e| app.world_mut().get_mut::<Strand>(e).unwrap().velocities_mut()[5].x = 0.1);
     wakes(|app, _, e| app.world_mut().get_mut::<Strand>(e).unwrap().positions_mut()[8].x = 0.01);
-    wakes(|app, _, e| app.world_mut().get_mut::<Sleep>(e).unwrap().wake());
+    wakes(|app, _, e| app.world_mut().get_mut::<StrandSleep>(e).unwrap().wake());
     for act in [Hair::teleport, Hair::reset, Hair::restyle] {
         wakes(|app, hair, _| act(app.world_mut().entity_mut(hair)));
     }

@@ -2,7 +2,7 @@
 
 mod common;
 use bevy::prelude::*;
-use bevy_keratin::{WindReceived, prelude::*, style::WindingProgress};
+use bevy_keratin::{WindReceived, prelude::*, treatment::WindingProgress};
 use common::*;
 
 fn wind_on(at: Vec3, aim: Vec3, direction: Vec3) -> f32 {
@@ -22,7 +22,7 @@ fn wind_on(at: Vec3, aim: Vec3, direction: Vec3) -> f32 {
 fn wind_is_that_of_equation_17() {
     // one tick of 1/60 s at 3.6 m/s² on the axis, across the edge
     assert!((wind_on(Vec3::NEG_X, Vec3::X, Vec3::Y) - 0.06).abs() < 1e-3);
-    // 3 cm beside the axis: a quarter
+    // 3 cm beside the axis: a group
     assert!((wind_on(Vec3::new(-1.0, 0.0, 0.03), Vec3::X, Vec3::Y) - 0.015).abs() < 5e-4);
     // along the edge, and behind the nozzle: nothing
     assert!(wind_on(Vec3::NEG_X, Vec3::X, Vec3::X) < 1e-6);

@@ -12,9 +12,15 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use bevy_keratin::{
-    BondChanges, DropletRules, HairStep, Sleepers, air::AirPlugin, bond::BondPlugin,
-    bond::RestShape, contact::ContactPlugin, contact::Obstacles, prelude::*, sleep::SleepPlugin,
-    spring::SpringPlugin, style::StylePlugin, water::WaterPlugin,
+    BondChanges, DropletRules, HairStep, Sleepers,
+    bond::{BondPlugin, RestShape},
+    contact::{ContactPlugin, Obstacles},
+    environment::EnvironmentPlugin,
+    prelude::*,
+    sleep::SleepPlugin,
+    solve::SpringPlugin,
+    treatment::TreatmentPlugin,
+    water::WaterPlugin,
 };
 use std::{
     process::Command,
@@ -295,10 +301,10 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
     match kind {
         Kind::Projection => app.add_plugins(
             plugins
-                .disable::<AirPlugin>()
+                .disable::<EnvironmentPlugin>()
                 .disable::<BondPlugin>()
                 .disable::<ContactPlugin>()
-                .disable::<StylePlugin>()
+                .disable::<TreatmentPlugin>()
                 .disable::<WaterPlugin>()
                 .disable::<SpringPlugin>()
                 .disable::<SleepPlugin>(),
@@ -312,7 +318,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
         .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
     if kind == Kind::Projection {
-        app.insert_resource(HairDefault(Solver { limiter_steps: 0, ..default() }));
+        app.insert_resource(HairDefault(HairSolver { limiter_steps: 0, ..default() }));
     } else if let Some(radius) = head {
         let floor = HairCollider::plane(Dir3::Y);
         app.world_mut().spawn((HairCollider::sphere(radius).expect("a head"), Transform::IDENTITY));

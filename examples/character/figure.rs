@@ -10,7 +10,7 @@ use bevy::{
     mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     prelude::*,
 };
-use bevy_keratin::{groom::*, prelude::*};
+use bevy_keratin::{attach::*, collider_fit::*, plant::*, prelude::*};
 
 /// The whole of it: moves as it walks.
 #[derive(Component, Default)]

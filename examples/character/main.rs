@@ -36,7 +36,7 @@ mod scenes {
 }
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::groom::HairPreset;
+use bevy_keratin::plant::HairPreset;
 use clap::Parser;
 use stage::Follow;
 use std::{

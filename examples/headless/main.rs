@@ -1,11 +1,16 @@
 //! Runs a scene without a window and prints what it came to.
 //!
 //! `cargo run --release --example headless -- --scene perm --variant treated --json`
+//!
+//! `swing` is no scene of a paper: a single strand is let go, to be held against the theory of rods.
+//! `-- --scene swing --length 0.2 --bending-length 0.13 --segments 16 --from level --json`
 
 #[path = "../scenes/mod.rs"]
 mod scenes;
 
 mod report;
+mod swing;
+mod trace;
 
 use bevy::{
     app::{TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy},
@@ -16,21 +21,40 @@ use bevy_keratin::prelude::*;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use report::Report;
-use scenes::{Director, Scene, SceneKind, ScenePlugin, Strewn, measure};
+use scenes::{Director, Scene, SceneKind, ScenePlugin, Strewn, UnknownName, measure};
+use serde::Serialize;
 use std::{
     io::Write,
     path::PathBuf,
     process::ExitCode,
+    str::FromStr,
     time::{Duration, Instant},
 };
+
+/// What can be shown: the scenes, and a single strand.
+#[derive(Clone, Copy, PartialEq)]
+enum Show {
+    Scene(SceneKind),
+    Swing,
+}
+
+impl FromStr for Show {
+    type Err = String;
+    fn from_str(name: &str) -> Result<Self, String> {
+        match name {
+            "swing" => Ok(Self::Swing),
+            _ => name.parse().map(Self::Scene).map_err(|e: UnknownName| format!("{e}, swing")),
+        }
+    }
+}
 
 /// Runs a scene of the paper without a window.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// Which scene: bedhead, blow-dry, perm, wet, shower.
+    /// Which scene: bedhead, blow-dry, perm, wet, shower; or swing, a single strand.
     #[arg(long)]
-    scene: SceneKind,
+    scene: Show,
     /// Which variant of it; the full treatment if left out.
     #[arg(long)]
     variant: Option<String>,
@@ -49,6 +73,8 @@ struct Arguments {
     /// Threads that solve strands; Bevy's own choice if left out.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
+    #[command(flatten)]
+    swing: swing::Options,
 }
 
 fn main() -> ExitCode {
@@ -62,7 +88,15 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let scene = Scene::new(arguments.scene, arguments.variant.as_deref())?;
+    let Show::Scene(kind) = arguments.scene else {
+        return swing(arguments);
+    };
+    if arguments.swing.any() {
+        return Err(
+            "--length, --bending-length, --segments, --from and --substeps are swing's".into()
+        );
+    }
+    let scene = Scene::new(kind, arguments.variant.as_deref())?;
     let seconds = arguments.seconds.unwrap_or(scene.kind.frames() as f32 / 60.0);
     if !(seconds > 0.0 && seconds < 1e5) {
         return Err(format!("--seconds is {seconds}, expected more than 0, at most 100000").into());
@@ -98,10 +132,25 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         report.weightless(app.world_mut());
     }
     bar.finish_and_clear();
-    if arguments.json {
-        println!("{}", serde_json::to_string(&report)?);
+    print(&report, arguments.json)
+}
+
+fn swing(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    if arguments.variant.is_some() || arguments.seconds.is_some() || arguments.csv.is_some() {
+        return Err("--variant, --seconds and --csv are not for swing".into());
+    }
+    print(&arguments.swing.run()?, arguments.json)
+}
+
+/// One JSON object, or lines of name and value.
+fn print(report: &impl Serialize, json: bool) -> Result<(), Box<dyn std::error::Error>> {
+    let value = serde_json::to_value(report)?;
+    if json {
+        println!("{}", serde_json::to_string(report)?);
     } else {
-        println!("{}", report.table()?);
+        for (name, value) in value.as_object().into_iter().flatten() {
+            println!("{name:26} {value}");
+        }
     }
     Ok(())
 }

@@ -88,7 +88,7 @@ impl Report {
         let tips = measure::tips(strands.iter());
         let (min, mean, max) = measure::hydrogen(bonds.iter());
         let segments: usize = strands.iter().map(Strand::edges).sum();
-        let iterations = Solver::default().iterations as f64 * step.count as f64 * frames as f64;
+        let iterations = f64::from(step.count) * frames as f64;
         let segment = strands.first().map_or(0.0, |s| s.rest_lengths()[0]);
         let mut report = Self {
             scene: scene.kind.name(),
@@ -171,13 +171,6 @@ impl Report {
     fn check(&mut self, world: &mut World) {
         self.finite &= world.query::<&Strand>().iter(world).all(Strand::is_finite);
         self.strain_peak = world.resource::<measure::StrainPeak>().0;
-    }
-
-    /// The same as lines of name and value.
-    pub fn table(&self) -> serde_json::Result<String> {
-        let value = serde_json::to_value(self)?;
-        let lines = value.as_object().into_iter().flatten();
-        Ok(lines.map(|(k, v)| format!("{k:26} {v}")).collect::<Vec<_>>().join("\n"))
     }
 }
 

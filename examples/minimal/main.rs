@@ -3,7 +3,7 @@
 //! `cargo run --release --example minimal`
 
 use bevy::prelude::*;
-use bevy_keratin::{groom::*, prelude::*};
+use bevy_keratin::{plant::*, prelude::*};
 
 fn main() {
     App::new()

@@ -1,7 +1,7 @@
 //! What hair wants of the mannequin's head: solids to lie on, and a dark scalp.
 
 use bevy::{mesh::VertexAttributeValues, prelude::*};
-use bevy_keratin::{groom::Scalp, prelude::*};
+use bevy_keratin::{plant::Scalp, prelude::*};
 use core::f32::consts::PI;
 
 /// A capsule as a collider, between the centres of its ends (m).

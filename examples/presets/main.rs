@@ -27,7 +27,7 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use bevy_keratin::{
-    groom::{HairPreset, Planted, Scalp},
+    plant::{HairPreset, Planted, Scalp},
     prelude::*,
 };
 use picture::Pictures;

@@ -12,8 +12,9 @@ use bevy_egui::egui::{self, Color32, Slider, Ui};
 use bevy_keratin::{
     prelude::*,
     render::{HairFollowers, HairLook, HairShading, HairView, Melanin, heat},
-    setting::HairSetting,
+    setting::{HairSetting, ValueRange},
 };
+use core::ops::RangeInclusive;
 
 /// Everything that sliders change.
 #[derive(SystemParam)]
@@ -23,7 +24,7 @@ pub struct Settings<'w, 's> {
     cuticle: ResMut<'w, HairDefault<Cuticle>>,
     contact: ResMut<'w, HairDefault<LockContact>>,
     drag: ResMut<'w, HairDefault<AirDrag>>,
-    solver: ResMut<'w, HairDefault<Solver>>,
+    solver: ResMut<'w, HairDefault<HairSolver>>,
     gravity: ResMut<'w, HairGravity>,
     substeps: ResMut<'w, HairSubsteps>,
     view: ResMut<'w, HairDefault<HairView>>,
@@ -51,7 +52,7 @@ pub struct Water<'w, 's> {
     strewn: ResMut<'w, Strewn>,
     ledger: Res<'w, WaterLedger>,
     droplets: Query<'w, 's, (), With<Droplet>>,
-    soak: MessageWriter<'w, Soak>,
+    soak: MessageWriter<'w, SoakHair>,
 }
 
 /// How the next treatment is given.
@@ -73,19 +74,26 @@ fn edit<T: HairSetting + PartialEq>(
     (value != setting.0).then_some(value)
 }
 
-fn slide(ui: &mut Ui, value: &mut f32, range: core::ops::RangeInclusive<f32>, text: &str) -> bool {
-    ui.add(Slider::new(value, range).text(text).max_decimals(3)).changed()
+/// A slider over what is safe.
+fn slide(ui: &mut Ui, value: &mut f32, range: ValueRange, text: &str) -> bool {
+    slide_over(ui, value, range.safe, text)
+}
+
+fn slide_over(ui: &mut Ui, value: &mut f32, range: RangeInclusive<f32>, text: &str) -> bool {
+    let wide = *range.end() > 500.0;
+    ui.add(Slider::new(value, range).text(text).logarithmic(wide).max_decimals(3)).changed()
+}
+
+/// The same for a count.
+fn slide_count(ui: &mut Ui, value: &mut u32, range: ValueRange, text: &str) {
+    let (low, high) = (*range.safe.start() as u32, *range.safe.end() as u32);
+    ui.add(Slider::new(value, low..=high).text(text).logarithmic(high > 500));
 }
 
 /// The same with a value in m and a slider in mm.
-fn slide_mm(
-    ui: &mut Ui,
-    value: &mut f32,
-    range: core::ops::RangeInclusive<f32>,
-    text: &str,
-) -> bool {
+fn slide_mm(ui: &mut Ui, value: &mut f32, range: ValueRange, text: &str) -> bool {
     let mut mm = *value * 1e3;
-    let changed = slide(ui, &mut mm, range, text);
+    let changed = slide_over(ui, &mut mm, range.safe.start() * 1e3..=range.safe.end() * 1e3, text);
     if changed {
         *value = mm * 1e-3;
     }
@@ -138,7 +146,7 @@ impl Settings<'_, '_> {
                 }
             }
         });
-        slide(ui, &mut hand.seconds, 0.0..=5.0, "takes (s)");
+        slide(ui, &mut hand.seconds, Treat::SECONDS, "takes (s)");
         ui.horizontal(|ui| {
             ui.checkbox(&mut hand.only, "only joints");
             let last = joints.saturating_sub(1);
@@ -155,7 +163,7 @@ impl Settings<'_, '_> {
         for kind in BondKind::ALL {
             let mut rate = measured.rates[kind as usize] as f32;
             let text = egui::RichText::new(name(kind)).color(colour(kind));
-            let slider = Slider::new(&mut rate, 0.0..=1.0).text(text).max_decimals(2);
+            let slider = Slider::new(&mut rate, Treat::RATES.safe).text(text).max_decimals(2);
             // The backbone is never cut.
             let response = ui.add_enabled(kind != BondKind::Peptide, slider);
             // A drag is one step to undo.
@@ -178,31 +186,31 @@ impl Settings<'_, '_> {
 
     pub fn hair(&mut self, ui: &mut Ui) {
         edited!(self.stiffness, |s: &mut Stiffness| {
-            slide_mm(ui, &mut s.bending_length, 20.0..=400.0, "bend length (mm)");
-            slide(ui, &mut s.bend, 0.005..=0.1, "k₀ of a substep");
+            slide_mm(ui, &mut s.bending_length, Stiffness::BENDING_LENGTH, "bend length (mm)");
+            slide(ui, &mut s.damping, Stiffness::DAMPING, "damping (s)");
         });
         ui.label("Influence of each kind of bond:");
         edited!(self.influence, |f: &mut BondInfluence| {
-            slide(ui, &mut f.hydrogen, 0.0..=1.0, name(BondKind::Hydrogen));
-            slide(ui, &mut f.ionic, 0.0..=1.0, name(BondKind::Ionic));
-            slide(ui, &mut f.disulfide, 0.0..=1.0, name(BondKind::Disulfide));
-            slide(ui, &mut f.peptide, 0.01..=1.0, name(BondKind::Peptide));
+            slide(ui, &mut f.hydrogen, BondInfluence::HYDROGEN, name(BondKind::Hydrogen));
+            slide(ui, &mut f.ionic, BondInfluence::IONIC, name(BondKind::Ionic));
+            slide(ui, &mut f.disulfide, BondInfluence::DISULFIDE, name(BondKind::Disulfide));
+            slide(ui, &mut f.peptide, BondInfluence::PEPTIDE, name(BondKind::Peptide));
         });
         edited!(self.cuticle, |c: &mut Cuticle| {
-            slide(ui, &mut c.damage, 0.0..=5.0, "cuticle lost (1/m)");
+            slide(ui, &mut c.damage, Cuticle::DAMAGE, "cuticle lost (1/m)");
         });
         edited!(self.contact, |c: &mut LockContact| {
-            slide_mm(ui, &mut c.radius, 0.0..=5.0, "lock radius (mm)");
+            slide_mm(ui, &mut c.radius, LockContact::RADIUS, "lock radius (mm)");
         });
     }
 
     pub fn air(&mut self, ui: &mut Ui) {
         let mut down = -self.gravity.y;
-        if slide(ui, &mut down, 0.0..=20.0, "gravity (m/s²)") {
+        if slide_over(ui, &mut down, 0.0..=20.0, "gravity (m/s²)") {
             self.gravity.y = -down;
         }
         edited!(self.drag, |d: &mut AirDrag| {
-            slide(ui, &mut d.rate, 0.0..=20.0, "drag (1/s)");
+            slide(ui, &mut d.rate, AirDrag::RATE, "drag (1/s)");
         });
     }
 
@@ -211,10 +219,10 @@ impl Settings<'_, '_> {
         let Water { climate, process, strewn, ledger, droplets, soak } = &mut self.water;
         if let Ok((hair, _)) = self.hairs.single() {
             ui.horizontal(|ui| {
-                for (label, wetness) in [("Soak through", 1.0), ("Towel", 0.3), ("Dry", 0.0)] {
+                for (label, wetness) in [("SoakHair through", 1.0), ("Towel", 0.3), ("Dry", 0.0)] {
                     if ui.button(label).clicked() {
                         self.orders.write(Order::Remember);
-                        soak.write(Soak { target: hair, wetness });
+                        soak.write(SoakHair { target: hair, wetness });
                     }
                 }
             });
@@ -227,32 +235,33 @@ impl Settings<'_, '_> {
         ));
         let mut wanted = **strewn;
         ui.add(Slider::new(&mut wanted.count, 0..=1000).text("droplets"));
-        slide_mm(ui, &mut wanted.radius, 1.0..=4.0, "their radius (mm)");
+        slide_mm(ui, &mut wanted.radius, Shower::DROP_RADIUS, "their radius (mm)");
         strewn.set_if_neq(wanted);
         edited!(self.wetting, |w: &mut Wetting| {
-            slide(ui, &mut w.adhesion, 0.0..=100.0, "adhesion (m/s²)");
-            slide(ui, &mut w.cohesion, 0.0..=50.0, "film's pull (m/s²)");
-            slide(ui, &mut w.film_drag, 0.0..=100.0, "film's drag (1/s)");
-            slide(ui, &mut w.uptake, 0.0..=50.0, "uptake (1/s)");
-            slide(ui, &mut w.evaporation, 0.0..=4.0, "evaporation");
-            slide(ui, &mut w.sliding, 0.0..=0.05, "sliding (s)");
+            slide(ui, &mut w.adhesion, Wetting::ADHESION, "adhesion (m/s²)");
+            slide(ui, &mut w.cohesion, Wetting::COHESION, "film's pull (m/s²)");
+            slide(ui, &mut w.film_drag, Wetting::FILM_DRAG, "film's drag (1/s)");
+            slide(ui, &mut w.uptake, Wetting::UPTAKE, "uptake (1/s)");
+            slide(ui, &mut w.evaporation, Wetting::EVAPORATION, "evaporation");
+            slide(ui, &mut w.sliding, Wetting::SLIDING, "sliding (s)");
         });
         let mut air = **climate;
-        slide(ui, &mut air.celsius, 0.0..=45.0, "air (°C)");
-        slide(ui, &mut air.humidity, 0.0..=1.0, "humidity");
+        slide(ui, &mut air.celsius, Climate::CELSIUS, "air (°C)");
+        slide(ui, &mut air.humidity, Climate::HUMIDITY, "humidity");
         climate.set_if_neq(air);
         let mut faster = process.0;
-        let slider = Slider::new(&mut faster, 1.0..=1000.0).logarithmic(true);
+        let slider = Slider::new(&mut faster, ProcessTime::RANGE.safe).logarithmic(true);
         if ui.add(slider.text("× life's speed").max_decimals(0)).changed() {
             process.0 = faster;
         }
     }
 
     pub fn solver(&mut self, ui: &mut Ui) {
-        edited!(self.solver, |s: &mut Solver| {
-            ui.add(Slider::new(&mut s.iterations, 1..=50).text("iterations"));
-            ui.add(Slider::new(&mut s.limiter_steps, 0..=4).text("limiter steps"));
-            slide(ui, &mut s.internal_damping, 0.0..=50.0, "damping (1/s)");
+        edited!(self.solver, |s: &mut HairSolver| {
+            let mut sweeps = s.method == SolverMethod::Sweeps;
+            ui.checkbox(&mut sweeps, "the paper's projections");
+            s.method = if sweeps { SolverMethod::Sweeps } else { SolverMethod::Direct };
+            slide_count(ui, &mut s.limiter_steps, HairSolver::LIMITER_STEPS, "limiter steps");
         });
         let mut auto = *self.substeps == HairSubsteps::Auto;
         let now = self.substeps.count(1.0 / 60.0);
@@ -260,8 +269,10 @@ impl Settings<'_, '_> {
             *self.substeps = if auto { HairSubsteps::Auto } else { HairSubsteps::Fixed(now) };
         }
         let mut count = now;
-        let slider = Slider::new(&mut count, 1..=24).text("substeps a tick");
-        if ui.add_enabled(!auto, slider).changed() {
+        ui.add_enabled_ui(!auto, |ui| {
+            slide_count(ui, &mut count, HairSubsteps::RANGE, "substeps a tick");
+        });
+        if count != now {
             *self.substeps = HairSubsteps::Fixed(count);
         }
     }
@@ -282,22 +293,22 @@ impl Settings<'_, '_> {
         let (blower, place) = there.unwrap_or((Blower::default(), tools::BLOWER_PLACE));
         let mut wanted = *self.tools;
         let mut strength = wanted.strength.unwrap_or(blower.strength);
-        if slide(ui, &mut strength, 0.0..=30.0, "strength (m/s²)") {
+        if slide(ui, &mut strength, Blower::STRENGTH, "strength (m/s²)") {
             wanted.strength = Some(strength);
         }
         let mut drying = wanted.drying.unwrap_or(blower.drying);
-        if slide(ui, &mut drying, 0.0..=1.0, "drying (s/m)") {
+        if slide(ui, &mut drying, Blower::DRYING, "drying (s/m)") {
             wanted.drying = Some(drying);
         }
         let mut place = wanted.place.unwrap_or(place);
-        let mut moved = slide(ui, &mut place.x, -0.4..=0.4, "x (m)");
-        moved |= slide(ui, &mut place.y, 0.02..=0.6, "y (m)");
-        moved |= slide(ui, &mut place.z, -0.4..=0.4, "z (m)");
+        let mut moved = slide_over(ui, &mut place.x, -0.4..=0.4, "x (m)");
+        moved |= slide_over(ui, &mut place.y, 0.02..=0.6, "y (m)");
+        moved |= slide_over(ui, &mut place.z, -0.4..=0.4, "z (m)");
         if moved {
             wanted.place = Some(place);
         }
         let mut radius = wanted.radius.unwrap_or(PermRod::default().radius);
-        if slide_mm(ui, &mut radius, 18.0..=60.0, "rod radius (mm)") {
+        if slide_mm(ui, &mut radius, PermRod::RADIUS, "rod radius (mm)") {
             wanted.radius = Some(radius);
         }
         self.tools.set_if_neq(wanted);
@@ -345,12 +356,12 @@ impl Settings<'_, '_> {
 
     pub fn look(&mut self, ui: &mut Ui) {
         edited!(self.followers, |f: &mut HairFollowers| {
-            ui.add(Slider::new(&mut f.count, 0..=40_000).logarithmic(true).text("followers"));
-            slide(ui, &mut f.stray, 0.0..=0.2, "stray");
-            slide(ui, &mut f.clump, 0.0..=1.0, "clump");
+            slide_count(ui, &mut f.count, HairFollowers::COUNT, "followers");
+            slide(ui, &mut f.stray, HairFollowers::STRAY, "stray");
+            slide(ui, &mut f.clump, HairFollowers::CLUMP, "clump");
         });
         edited!(self.look, |l: &mut HairLook| {
-            slide_mm(ui, &mut l.width, 0.05..=1.5, "width (mm)");
+            slide_mm(ui, &mut l.width, HairLook::WIDTH, "width (mm)");
             ui.horizontal_wrapped(|ui| {
                 let colours = [
                     ("black", Melanin::BLACK),
@@ -364,11 +375,11 @@ impl Settings<'_, '_> {
                     ui.selectable_value(&mut l.melanin, melanin, label);
                 }
             });
-            slide(ui, &mut l.melanin.eumelanin, 0.0..=2.0, "eumelanin");
-            slide(ui, &mut l.melanin.pheomelanin, 0.0..=1.0, "pheomelanin");
-            slide(ui, &mut l.roughness, 0.1..=1.0, "roughness");
-            slide(ui, &mut l.gloss, 0.0..=3.0, "gloss");
-            slide_mm(ui, &mut l.self_shadow, 1.0..=60.0, "light depth (mm)");
+            slide(ui, &mut l.melanin.eumelanin, Melanin::EUMELANIN, "eumelanin");
+            slide(ui, &mut l.melanin.pheomelanin, Melanin::PHEOMELANIN, "pheomelanin");
+            slide(ui, &mut l.roughness, HairLook::ROUGHNESS, "roughness");
+            slide(ui, &mut l.gloss, HairLook::GLOSS, "gloss");
+            slide_mm(ui, &mut l.self_shadow, HairLook::SELF_SHADOW, "light depth (mm)");
             ui.horizontal(|ui| {
                 ui.label("model");
                 ui.selectable_value(&mut l.shading, HairShading::Fibre, "fibre");

@@ -62,7 +62,7 @@ fn show(
             section(ui, "Air", false, |ui| settings.air(ui));
             section(ui, "Water", false, |ui| settings.water(ui));
             section(ui, "Blower and rod", false, |ui| settings.tools(ui));
-            section(ui, "Solver", false, |ui| settings.solver(ui));
+            section(ui, "HairSolver", false, |ui| settings.solver(ui));
             section(ui, "Looks", false, |ui| settings.look(ui));
             ui.add_space(6.0);
             if ui.button("Everything as in the paper").clicked() {

@@ -212,7 +212,7 @@ pub fn direct(
             water.showers.iter().for_each(|shower| commands.entity(shower).despawn());
         }
         if variant == "dried-free" && passes(first[0]) {
-            water.soak.write(Soak { target: hair, wetness: 1.0 });
+            water.soak.write(SoakHair { target: hair, wetness: 1.0 });
         }
         let free = variant == "dried-free" && (2.0..Moment::LYING).contains(&now);
         let night = (Moment::NIGHT[0]..Moment::NIGHT[1]).contains(&now) || now > Moment::DRYING;
@@ -238,7 +238,7 @@ pub struct Water<'w, 's> {
     strewn: Res<'w, Strewn>,
     showers: Query<'w, 's, Entity, With<Shower>>,
     process: ResMut<'w, ProcessTime>,
-    soak: MessageWriter<'w, Soak>,
+    soak: MessageWriter<'w, SoakHair>,
 }
 
 /// A hand shower beside the roots of the hair that hangs from `scalp`: water runs down from there.

@@ -4,14 +4,10 @@
 //! by side and never go by way of memory. Two such fours are computed with at once.
 
 use super::{
-    BondKind, JointBonds,
-    model::{Remembered, changed, rest_shape},
+    kind::BondKind,
+    model::{FEW, JointBonds, Remembered, changed, remembered, rest_shape},
 };
-use crate::rod::{
-    algebra::{Quaternion, V3},
-    lanes::Real,
-    turn::turned,
-};
+use crate::lanes::{Quaternion, Real, V3, transposed};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
 use glam::Quat;
 
@@ -33,6 +29,19 @@ pub(super) fn rest_shapes(
     darboux: &mut [Quat],
 ) {
     dispatch!(level, simd => rest_shapes_in(simd, frames, joints, influence, darboux));
+}
+
+/// Writes of every joint what its closed bonds remember, Ω*, and their share B. A joint of which hardly
+/// any is closed takes its present shape for it: returns whether there is such a joint.
+pub(super) fn remembered_shapes(
+    level: Level,
+    frames: Frames<'_>,
+    joints: &[JointBonds],
+    influence: &[f32; BondKind::COUNT],
+    darboux: &mut [Quat],
+    closed: &mut [f32],
+) -> bool {
+    dispatch!(level, simd => remembered_in(simd, frames, joints, influence, darboux, closed))
 }
 
 /// Changes every joint's bonds by Δb, its row of `changes`: equation 16.
@@ -68,11 +77,50 @@ fn rest_shapes_in<S: Simd>(
             rest_shape(omega, &bonds(simd, filled(joints)), &influence);
         let [x, y, z, w] = [halves(x), halves(y), halves(z), halves(w)];
         for (half, four) in darboux.chunks_mut(4).enumerate() {
-            for (to, rest) in four.iter_mut().zip(turned([x[half], y[half], z[half], w[half]])) {
+            for (to, rest) in four.iter_mut().zip(transposed([x[half], y[half], z[half], w[half]]))
+            {
                 *to = Quat::from_array(rest);
             }
         }
     }
+}
+
+#[inline(always)]
+fn remembered_in<S: Simd>(
+    simd: S,
+    frames: Frames<'_>,
+    joints: &[JointBonds],
+    influence: &[f32; BondKind::COUNT],
+    darboux: &mut [Quat],
+    closed: &mut [f32],
+) -> bool {
+    let [a, b, c, d] = *influence;
+    let influence = [
+        f32x8::splat(simd, a),
+        f32x8::splat(simd, b),
+        f32x8::splat(simd, c),
+        f32x8::splat(simd, d),
+    ];
+    let mut before = frames.root;
+    let mut follows = false;
+    let eights = joints.chunks(8).zip(frames.orientations.chunks(8));
+    let to = darboux.chunks_mut(8).zip(closed.chunks_mut(8));
+    for ((joints, orientations), (darboux, closed)) in eights.zip(to) {
+        let omega = present(simd, &mut before, filled(orientations));
+        let (Quaternion { v: V3 { x, y, z }, w }, share) =
+            remembered(omega, &bonds(simd, filled(joints)), &influence);
+        let [x, y, z, w] = [halves(x), halves(y), halves(z), halves(w)];
+        let share = halves(share);
+        for (half, (four, closed)) in darboux.chunks_mut(4).zip(closed.chunks_mut(4)).enumerate() {
+            let shapes = transposed([x[half], y[half], z[half], w[half]]);
+            for (to, shape) in four.iter_mut().zip(shapes) {
+                *to = Quat::from_array(shape);
+            }
+            closed.copy_from_slice(&share[half][..closed.len()]);
+            follows |= closed.iter().any(|share| *share <= FEW);
+        }
+    }
+    follows
 }
 
 #[inline(always)]
@@ -88,8 +136,8 @@ fn change_in<S: Simd>(
         let omega = present(simd, &mut before, filled(orientations));
         let mut bonds = bonds(simd, filled(joints));
         let asked = |k: usize| changes.get(k).copied().unwrap_or_default();
-        let low = turned([asked(0), asked(1), asked(2), asked(3)]);
-        let high = turned([asked(4), asked(5), asked(6), asked(7)]);
+        let low = transposed([asked(0), asked(1), asked(2), asked(3)]);
+        let high = transposed([asked(4), asked(5), asked(6), asked(7)]);
         for (j, bond) in bonds.iter_mut().enumerate() {
             *bond = changed(*bond, lanes(simd, low[j], high[j]), omega);
         }
@@ -97,10 +145,10 @@ fn change_in<S: Simd>(
         let rows = |half: usize| {
             let row = |lanes| halves(lanes)[half];
             [
-                turned([row(a.shape.x), row(a.shape.y), row(a.shape.z), row(b.shape.x)]),
-                turned([row(b.shape.y), row(b.shape.z), row(c.shape.x), row(c.shape.y)]),
-                turned([row(c.shape.z), row(d.shape.x), row(d.shape.y), row(d.shape.z)]),
-                turned([row(a.rate), row(b.rate), row(c.rate), row(d.rate)]),
+                transposed([row(a.shape.x), row(a.shape.y), row(a.shape.z), row(b.shape.x)]),
+                transposed([row(b.shape.y), row(b.shape.z), row(c.shape.x), row(c.shape.y)]),
+                transposed([row(c.shape.z), row(d.shape.x), row(d.shape.y), row(d.shape.z)]),
+                transposed([row(a.rate), row(b.rate), row(c.rate), row(d.rate)]),
             ]
         };
         for (half, four) in joints.chunks_mut(4).enumerate() {
@@ -154,8 +202,9 @@ fn present<S: Simd>(
 
 #[inline(always)]
 fn quaternions<S: Simd>(simd: S, low: [&Quat; 4], high: [&Quat; 4]) -> Quaternion<f32x8<S>> {
-    let rows =
-        |[a, b, c, d]: [&Quat; 4]| turned([a.to_array(), b.to_array(), c.to_array(), d.to_array()]);
+    let rows = |[a, b, c, d]: [&Quat; 4]| {
+        transposed([a.to_array(), b.to_array(), c.to_array(), d.to_array()])
+    };
     let (low, high) = (rows(low), rows(high));
     let at = |i: usize| lanes(simd, low[i], high[i]);
     Quaternion::new(V3::new(at(0), at(1), at(2)), at(3))
@@ -186,8 +235,8 @@ fn numbers([a, b, c, d]: [&JointBonds; 4]) -> [[[f32; 4]; 4]; 4] {
         bytemuck::cast(c.shapes),
         bytemuck::cast(d.shapes),
     ];
-    let third = |t: usize| turned([shapes[0][t], shapes[1][t], shapes[2][t], shapes[3][t]]);
-    [third(0), third(1), third(2), turned([a.rates, b.rates, c.rates, d.rates])]
+    let third = |t: usize| transposed([shapes[0][t], shapes[1][t], shapes[2][t], shapes[3][t]]);
+    [third(0), third(1), third(2), transposed([a.rates, b.rates, c.rates, d.rates])]
 }
 
 #[cfg(test)]

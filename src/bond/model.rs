@@ -1,9 +1,9 @@
 //! Side-chain bonds as mathematics: equations 13–16 and 19 of \[B\], on one joint at a time.
 
-use super::BondKind;
-use crate::rod::{
-    algebra::{Quaternion, V3},
-    lanes::Real,
+use super::kind::BondKind;
+use crate::{
+    lanes::{Quaternion, Real, V3},
+    setting::{Ranged, ValueRange, Violations},
 };
 use bevy::reflect::Reflect;
 use glam::{Quat, Vec3};
@@ -79,6 +79,26 @@ impl JointBonds {
     }
 }
 
+impl JointBonds {
+    /// The range of [`rates`](Self::rates).
+    pub const RATES: ValueRange =
+        ValueRange::new("JointBonds::rates", 0.0..=1.0, "0 all broken, 1 all closed");
+    const SHAPES: ValueRange = ValueRange::new(
+        "JointBonds::shapes",
+        -1.01..=1.01,
+        "give the imaginary part of a unit quaternion",
+    );
+}
+
+impl Ranged for JointBonds {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        for (shape, rate) in self.shapes.iter_mut().zip(&mut self.rates) {
+            Self::RATES.clamp(rate, || 1.0, violations);
+            Self::SHAPES.clamp(shape, || Vec3::ZERO, violations);
+        }
+    }
+}
+
 fn quaternion(q: Quat) -> Quaternion<f32> {
     Quaternion::new(V3::new(q.x, q.y, q.z), q.w)
 }
@@ -123,6 +143,36 @@ pub(super) fn rest_shape<R: Real>(
     }
     let v = omega.v.scale_add(present, remembered).scale(zero.lit(1.0) / total);
     Quaternion::new(v, (zero.lit(1.0) - v.dot(v)).max(zero).sqrt())
+}
+
+/// Below this share of closed bonds a joint has no shape of its own.
+pub(super) const FEW: f32 = 1e-3;
+
+/// The equivalent of equation 15 that does not follow the present shape, for a solver to which that
+/// would be inertia: Ω* = M/B = Σ f b Ω_j / Σ f b with the share of the stiffness that is left,
+/// B = Σ f b / Σ f. The equilibria are the same. Where hardly any bond is closed the rest shape is the
+/// present one, with as little stiffness as twist needs to be determined.
+#[inline(always)]
+pub(super) fn remembered<R: Real>(
+    omega: Quaternion<R>,
+    bonds: &[Remembered<R>; BondKind::COUNT],
+    influence: &[R; BondKind::COUNT],
+) -> (Quaternion<R>, R) {
+    let (zero, one) = (omega.w.lit(0.0), omega.w.lit(1.0));
+    let (mut sum, mut closed, mut total) = (V3::new(zero, zero, zero), zero, zero);
+    for (bond, f) in bonds.iter().zip(*influence) {
+        let fb = f * bond.rate;
+        sum = bond.shape.scale_add(fb, sum);
+        closed = closed + fb;
+        total = total + f;
+    }
+    let few = zero.lit(FEW.into());
+    let share = closed / total;
+    let v = sum.scale(one / closed.max(few * total));
+    let open = share.lt(few);
+    let v = V3::select(open, omega.v, v);
+    let w = R::select(open, omega.w, (one - v.dot(v)).max(zero).sqrt());
+    (Quaternion::new(v, w), share.max(few))
 }
 
 /// Equation 16, see [`JointBonds::change`].

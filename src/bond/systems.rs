@@ -1,19 +1,20 @@
 //! The bonds' two places in the tick: `RestShape` (equation 15) and `BondUpdate` (equation 16).
 
 use super::{
-    BondChanges, BondInfluence, BondKind, Bonds, Cuticle, RestShape,
-    lanes::{Frames, change, rest_shapes},
+    bonds::{BondChanges, Bonds},
+    kind::BondKind,
+    lanes::{Frames, change, remembered_shapes, rest_shapes},
     model::cuticle_factor,
+    rest::{Key, RestShape},
+    settings::{BondInfluence, Cuticle},
 };
 use crate::{
-    fault::{Fault, HairFault},
-    lod::HairSteps,
-    parallel::{AHEAD, for_each_part, in_turn, tables},
-    prefetch::prefetch,
-    rod::{Solver, Stiffness, constraint::stiffness_per_iteration},
-    setting::{self, Bound, Notes, Settings},
-    strand::{self, Burden, PerHair, Sleep, Strand, StrandOf},
-    tick::{HairSystems, HairTick},
+    fault::HairFault,
+    parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
+    rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
+    schedule::{EffectiveSubsteps, HairSystems, HairTick},
+    setting::{self, Ranged, Settings, Violations, report},
+    strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep},
 };
 use bevy::prelude::*;
 use fearless_simd::Level;
@@ -25,76 +26,58 @@ impl Plugin for BondPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<BondInfluence>(app);
         setting::plugin::<Cuticle>(app);
-        app.register_type::<Bonds>()
+        app.register_type::<BondKind>()
+            .register_type::<Bonds>()
             .register_type::<BondChanges>()
             .register_type::<RestShape>()
-            .add_systems(
-                HairTick,
-                fit_bonds.in_set(HairSystems::Roots).after(strand::carry_strands),
-            )
+            .register_required_components::<Strand, Bonds>()
+            .register_required_components::<Strand, BondChanges>()
+            .register_required_components::<Strand, RestShape>()
+            .add_systems(HairTick, fit_bonds.in_set(HairSystems::BondFit))
             .add_systems(HairTick, generate_rest_shapes.in_set(HairSystems::RestShape))
-            .add_systems(HairTick, update_bonds.in_set(HairSystems::BondUpdate));
+            .add_systems(HairTick, update_bonds.in_set(HairSystems::BondRates));
     }
 }
 
 /// Gives new strands their bonds, and mends what game code wrote into them. Our own writes bypass
 /// change detection, so `Changed` means somebody else's.
-pub(crate) fn fit_bonds(
+fn fit_bonds(
     mut strands: Query<(Entity, &Strand, &mut Bonds, &mut RestShape), Changed<Bonds>>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    const RATE: Bound = Bound::new("a bond's rate", 0.0, 1.0, "0 all broken, 1 all closed");
     for (entity, strand, mut bonds, mut rest) in &mut strands {
         rest.bypass_change_detection().closed = false;
         let bonds = bonds.bypass_change_detection();
         if bonds.joints.len() != strand.edges() {
             *bonds = Bonds::of(strand);
         }
-        let notes = Notes::default();
-        for joint in bonds.joints.iter_mut().filter(|j| !j.is_valid()) {
-            for (shape, rate) in joint.shapes.iter_mut().zip(&mut joint.rates) {
-                *rate = RATE.mend(*rate, 1.0, &notes);
-                if !shape.is_finite() {
-                    RATE.mend(shape.length(), 0.0, &notes);
-                    *shape = Vec3::ZERO;
-                }
-            }
-        }
-        if let Some(wrong) = notes.into_inner().into_iter().next() {
-            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
-        }
+        let mut violations = Violations::new();
+        bonds.joints.clamp_values(&mut violations);
+        violations.truncate(1);
+        report(Some(entity), violations, &mut faults);
     }
 }
 
-/// What rest shapes depend on besides bonds and the present shape, resolved once a substep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
-pub(super) struct Key {
-    influence: [f32; BondKind::COUNT],
-    stiffness: Stiffness,
-    cuticle: Cuticle,
-    iterations: u32,
-    dt: f32,
-}
-
 /// A strand whose rest shape is not what it was.
-type Shaped<'a> = (Key, &'a Strand, &'a Bonds, &'a Burden, &'a mut RestShape);
+type Shaped<'a> = (Key, &'a Strand, &'a Bonds, &'a AddedMass, &'a mut RestShape);
 
 fn generate_rest_shapes(
-    steps: HairSteps,
+    steps: EffectiveSubsteps,
     influence: Settings<BondInfluence>,
-    stiffness: Settings<Stiffness>,
+    sweeps: Settings<Sweeps>,
     cuticle: Settings<Cuticle>,
-    solver: Settings<Solver>,
-    mut strands: Query<(&StrandOf, &Sleep, &Strand, Ref<Bonds>, &Burden, &mut RestShape)>,
+    solver: Settings<HairSolver>,
+    mut strands: Query<(&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape)>,
 ) {
     let key_of = |hair: Entity| {
         let stride = steps.of(hair)?;
         Some(Key {
             influence: influence.of(hair).as_array(),
-            stiffness: stiffness.of(hair),
             cuticle: cuticle.of(hair),
-            iterations: stride.iterations(solver.of(hair).iterations),
-            dt: stride.dt,
+            sweeps: (solver.of(hair).method == SolverMethod::Sweeps).then(|| {
+                let full = sweeps.of(hair);
+                (Sweeps { iterations: stride.iterations(full.iterations), ..full }, stride.dt)
+            }),
         })
     };
     let ahead = |(_, strand, bonds, _, rest): &Shaped<'_>| {
@@ -105,7 +88,7 @@ fn generate_rest_shapes(
     let level = Level::new();
     for_each_part(tables(&mut strands), Vec::new, |items, rows| {
         let mut keys = PerHair::default();
-        for (of, sleep, strand, (bonds, is_changed), burden, rest) in rows {
+        for (of, sleep, strand, (bonds, is_changed), added_mass, rest) in rows {
             if !sleep.is_simulated() {
                 continue;
             }
@@ -115,13 +98,13 @@ fn generate_rest_shapes(
             if !rest.closed
                 || rest.key != Some(key)
                 || is_changed
-                || has_softened(&rest.softened, &burden.softening)
+                || has_softened(&rest.softened, &added_mass.softening)
             {
-                items.push((key, strand, bonds, burden, rest));
+                items.push((key, strand, bonds, added_mass, rest));
             }
         }
-        in_turn(items, AHEAD, ahead, |(key, strand, bonds, burden, rest)| {
-            shape(level, key, strand, bonds, burden, rest);
+        in_turn(items, AHEAD, ahead, |(key, strand, bonds, added_mass, rest)| {
+            shape(level, key, strand, bonds, added_mass, rest);
         });
         items.clear();
     });
@@ -133,27 +116,45 @@ fn shape(
     key: &Key,
     strand: &Strand,
     bonds: &Bonds,
-    burden: &Burden,
+    added_mass: &AddedMass,
     rest: &mut RestShape,
 ) {
-    rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
-    rest.darboux.resize(bonds.joints.len(), Quat::IDENTITY);
-    rest_shapes(level, frames(strand), &bonds.joints, &key.influence, &mut rest.darboux);
-    if rest.key != Some(*key)
+    let joints = &bonds.joints;
+    rest.closed = joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
+    rest.darboux.resize(joints.len(), Quat::IDENTITY);
+    let changed = rest.key != Some(*key)
         || rest.stiffness.len() != strand.edges()
-        || has_softened(&rest.softened, &burden.softening)
-    {
+        || has_softened(&rest.softened, &added_mass.softening);
+    match key.sweeps {
+        None => {
+            rest.stiffness.resize(joints.len(), 0.0);
+            let (darboux, closed) = (&mut rest.darboux, &mut rest.stiffness);
+            let follows =
+                remembered_shapes(level, frames(strand), joints, &key.influence, darboux, closed);
+            rest.closed = !follows;
+        }
+        Some(_) => rest_shapes(level, frames(strand), joints, &key.influence, &mut rest.darboux),
+    }
+    if changed {
         rest.key = Some(*key);
-        rest.softened.clone_from(&burden.softening);
-        rest.stiffness.clear();
+        rest.softened.clone_from(&added_mass.softening);
+    }
+    if changed || key.sweeps.is_none() {
         let mut distance = 0.0;
-        rest.stiffness.extend(strand.rest_lengths().iter().enumerate().map(|(i, length)| {
+        rest.stiffness.resize(strand.edges(), 0.0);
+        let joints = rest.stiffness.iter_mut().zip(strand.rest_lengths());
+        for (i, (stiffness, length)) in joints.enumerate() {
             let softened = rest.softened.get(i).copied().unwrap_or(0.0);
             let cuticle = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
             distance += length;
-            let k = key.stiffness.per_substep(key.dt, cuticle * (1.0 - softened));
-            stiffness_per_iteration(k, key.iterations)
-        }));
+            let factor = cuticle * (1.0 - softened);
+            *stiffness = match key.sweeps {
+                None => *stiffness * factor,
+                Some((sweeps, dt)) => {
+                    stiffness_per_iteration(sweeps.per_substep(dt, factor), sweeps.iterations)
+                }
+            };
+        }
     }
 }
 
@@ -169,10 +170,10 @@ fn has_softened(before: &[f32], now: &[f32]) -> bool {
 
 /// A strand whose bonds are to change.
 type Changing<'a> =
-    (&'a Strand, &'a mut Bonds, &'a mut BondChanges, &'a mut RestShape, &'a mut Sleep);
+    (&'a Strand, &'a mut Bonds, &'a mut BondChanges, &'a mut RestShape, &'a mut StrandSleep);
 
 fn update_bonds(
-    mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut Sleep)>,
+    mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut StrandSleep)>,
 ) {
     let ahead = |(strand, bonds, changes, ..): &Changing<'_>| {
         prefetch(&bonds.joints);

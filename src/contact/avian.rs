@@ -2,8 +2,8 @@
 
 use super::{ColliderShape, HairCollider};
 use crate::{
-    fault::{Fault, HairFault},
-    tick::{HairStep, HairSystems, HairTick},
+    fault::{FaultKind, HairFault},
+    schedule::{HairStep, HairSystems, HairTick},
 };
 use avian3d::{
     parry::shape::{SharedShape, TypedShape},
@@ -17,7 +17,7 @@ use bevy::{math::Isometry3d, prelude::*};
 /// that follow the collider: its shape in the next tick when that changes, the body in every tick.
 /// They go when the collider, its body or this component does, or while the collider carries
 /// [`ColliderDisabled`]. What hair does not know is told once as
-/// [`Fault::Avian`](crate::Fault::Avian). As for any hair collider an uneven scale counts as its mean.
+/// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider an uneven scale counts as its mean.
 /// Hair pushes no bodies.
 ///
 /// ```
@@ -30,7 +30,7 @@ use bevy::{math::Isometry3d, prelude::*};
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(Unknown)]
 pub struct AvianHairCollider {
-    /// Coulomb friction of hair on it, whatever bodies feel. Default 0.3, safe 0…2.
+    /// Coulomb friction of hair on it, whatever bodies feel: [`HairCollider::friction`].
     pub friction: f32,
 }
 
@@ -67,6 +67,7 @@ struct AvianPart;
 pub(super) fn plugin(app: &mut App) {
     app.register_type::<AvianHairCollider>()
         .register_type::<Unknown>()
+        .register_type::<AvianShapeError>()
         .register_type::<AvianPart>()
         .add_systems(
             HairTick,
@@ -102,7 +103,9 @@ fn follow_colliders(
         if unknown.set_if_neq(Unknown(why.clone()))
             && let Some(why) = why
         {
-            faults.write(HairFault { entity: body, fault: Fault::Avian(why) });
+            faults.write(
+                HairFault::caused(FaultKind::Collider, why, "hair goes through it").of(body),
+            );
         }
         let mut wanted = shapes
             .into_iter()

@@ -6,7 +6,7 @@
 //! because an edge is two neighbouring rows of [`Row`]s, each one load.
 
 use super::model::{BREAKS_AT, Bridged, Film, SAME_PLACE, THIN};
-use crate::rod::{algebra::V3, lanes::Real};
+use crate::lanes::{Real, V3};
 use core::ops::Range;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16, mask32x8, prelude::*, u32x8, u32x16};
 use glam::Vec3;

@@ -13,33 +13,36 @@ pub use systems::ContactPlugin;
 pub(crate) use {
     lanes::WetRow,
     model::{Bridged, Film},
-    systems::{part_strands, seen_from},
+    systems::seen_from,
 };
 
 use crate::{
     rod::obstacle::Obstacle,
-    setting::{Bound, HairSetting, InvalidValue, Notes},
+    setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
     strand::TickPose,
 };
 use bevy::prelude::*;
 
-/// A solid that hair cannot enter: head, shoulders, floor, pillow. Placed by its transform; axes of
-/// capsule and cylinder are along Y, a plane's solid side is against its normal.
-///
-/// ```
-/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// # fn setup(mut commands: Commands) {
-/// commands.spawn((HairCollider::sphere(0.09).unwrap(), Transform::from_xyz(0.0, 1.6, 0.0)));
-/// # }
-/// ```
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-#[require(Transform, TickPose)]
-pub struct HairCollider {
-    /// Its shape, in the units of its transform.
-    pub shape: ColliderShape,
-    /// Coulomb friction of hair on it. Default 0.3 (dry hair; wet 0.4), safe 0…2.
-    pub friction: f32,
+setting! {
+    /// A solid that hair cannot enter: head, shoulders, floor, pillow. Placed by its transform; axes of
+    /// capsule and cylinder are along Y, a plane's solid side is against its normal.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # fn setup(mut commands: Commands) {
+    /// commands.spawn((HairCollider::sphere(0.09).unwrap(), Transform::from_xyz(0.0, 1.6, 0.0)));
+    /// # }
+    /// ```
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Transform, TickPose)]
+    pub struct HairCollider {
+        /// Its shape, in the units of its transform.
+        pub shape: ColliderShape = ColliderShape::Sphere(Sphere { radius: 0.09 })
+            => Ranged::clamp_values;
+        /// Coulomb friction of hair on it; 0.4 when wet.
+        pub friction: f32 = 0.3, in FRICTION: 0.0..=100.0, safe 0.0..=2.0, "hair has 0.2 to 0.4";
+    }
 }
 
 /// The shapes of a [`HairCollider`], Bevy's primitives.
@@ -56,15 +59,29 @@ pub enum ColliderShape {
     Cylinder(Cylinder),
 }
 
-impl Default for HairCollider {
-    fn default() -> Self {
-        Self { shape: ColliderShape::Sphere(Sphere::new(0.09)), friction: 0.3 }
-    }
+impl ColliderShape {
+    /// The range of a radius.
+    pub const RADIUS: ValueRange =
+        ValueRange::new("ColliderShape::radius (m)", 1e-5..=1e5, "a head has 0.09");
+    /// The range of half the length between a capsule's centres, or half a cylinder's height.
+    pub const HALF_LENGTH: ValueRange =
+        ValueRange::new("ColliderShape::half_length (m)", 0.0..=1e5, "0 makes it a point");
 }
 
-const RADIUS: Bound = Bound::new("a collider's radius (m)", 1e-5, 1e5, "a head has 0.09");
-const LENGTH: Bound = Bound::new("a collider's half length (m)", 0.0, 1e5, "0 makes it a point");
-const FRICTION: Bound = Bound::new("HairCollider::friction", 0.0, 100.0, "hair has 0.2 to 0.4");
+impl Ranged for ColliderShape {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        let (radius, half_length) = match self {
+            Self::Sphere(s) => (&mut s.radius, None),
+            Self::Capsule(c) => (&mut c.radius, Some(&mut c.half_length)),
+            Self::Cylinder(c) => (&mut c.radius, Some(&mut c.half_height)),
+            Self::Plane(_) => return,
+        };
+        Self::RADIUS.clamp(radius, || 0.09, violations);
+        if let Some(half_length) = half_length {
+            Self::HALF_LENGTH.clamp(half_length, || 0.0, violations);
+        }
+    }
+}
 
 impl HairCollider {
     /// A ball of `radius` (m).
@@ -72,8 +89,7 @@ impl HairCollider {
     /// # Errors
     /// When the radius is not positive and finite.
     pub fn sphere(radius: f32) -> Result<Self, InvalidValue> {
-        RADIUS.check(radius)?;
-        Ok(ColliderShape::Sphere(Sphere::new(radius)).into())
+        Self::from(ColliderShape::Sphere(Sphere::new(radius))).checked()
     }
 
     /// A capsule along Y: `radius` and `length` between the centres of its ends (m).
@@ -81,9 +97,7 @@ impl HairCollider {
     /// # Errors
     /// When the radius is not positive or the length negative.
     pub fn capsule(radius: f32, length: f32) -> Result<Self, InvalidValue> {
-        RADIUS.check(radius)?;
-        LENGTH.check(length * 0.5)?;
-        Ok(ColliderShape::Capsule(Capsule3d::new(radius, length)).into())
+        Self::from(ColliderShape::Capsule(Capsule3d::new(radius, length))).checked()
     }
 
     /// A cylinder along Y: `radius` and `height` (m).
@@ -91,9 +105,7 @@ impl HairCollider {
     /// # Errors
     /// When the radius is not positive or the height negative.
     pub fn cylinder(radius: f32, height: f32) -> Result<Self, InvalidValue> {
-        RADIUS.check(radius)?;
-        LENGTH.check(height * 0.5)?;
-        Ok(ColliderShape::Cylinder(Cylinder::new(radius, height)).into())
+        Self::from(ColliderShape::Cylinder(Cylinder::new(radius, height))).checked()
     }
 
     /// The half-space below a plane with this normal.
@@ -101,74 +113,36 @@ impl HairCollider {
         ColliderShape::Plane(InfinitePlane3d::new(normal)).into()
     }
 
-    /// The same collider with another friction, taken to the nearest valid value.
-    pub fn with_friction(mut self, friction: f32) -> Self {
-        self.friction = FRICTION.mend(friction, 0.3, &Notes::default());
-        self
-    }
-
-    /// The collider with every value in its valid range.
-    pub(crate) fn valid(&self) -> Self {
-        self.mended(&Notes::default())
-    }
-
-    fn mended(&self, notes: &Notes) -> Self {
-        let radius = |r| RADIUS.mend(r, 0.09, notes);
-        let half = |h| LENGTH.mend(h, 0.0, notes);
-        let shape = match self.shape {
-            ColliderShape::Sphere(s) => ColliderShape::Sphere(Sphere::new(radius(s.radius))),
-            ColliderShape::Capsule(c) => ColliderShape::Capsule(Capsule3d {
-                radius: radius(c.radius),
-                half_length: half(c.half_length),
-            }),
-            ColliderShape::Plane(p) => ColliderShape::Plane(p),
-            ColliderShape::Cylinder(c) => ColliderShape::Cylinder(Cylinder {
-                radius: radius(c.radius),
-                half_height: half(c.half_height),
-            }),
-        };
-        Self { shape, friction: FRICTION.mend(self.friction, 0.3, notes) }
+    /// The same collider with another friction.
+    ///
+    /// # Errors
+    /// When it is negative or not finite.
+    pub fn with_friction(self, friction: f32) -> Result<Self, InvalidValue> {
+        Self { friction, ..self }.checked()
     }
 }
 
 impl From<ColliderShape> for HairCollider {
     fn from(shape: ColliderShape) -> Self {
-        Self { shape, friction: 0.3 }
+        Self { shape, ..default() }
     }
 }
 
-/// How strands keep apart: equation 18 of \[B\]. Component of a [`Hair`](crate::Hair); where absent,
-/// [`HairDefault<LockContact>`](crate::HairDefault) holds.
-///
-/// A simulated strand stands for a lock of hair, so the radius is the lock's.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct LockContact {
-    /// r, the radius of a strand (m); also the distance kept from colliders. Default 1e-3,
-    /// safe 0…0.01; 0 turns contact between strands off.
-    pub radius: f32,
-    /// α, the acceleration of strands whose axes meet (m/s²). Default 20, safe 0 to about 8 r/Δt²;
-    /// 0 turns contact between strands off.
-    pub strength: f32,
-}
-
-impl Default for LockContact {
-    fn default() -> Self {
-        Self { radius: 1e-3, strength: 20.0 }
-    }
-}
-
-const LOCK_RADIUS: Bound = Bound::new("LockContact::radius (m)", 0.0, 1.0, "1e-3 is a thin lock");
-const LOCK_STRENGTH: Bound =
-    Bound::new("LockContact::strength (m/s²)", 0.0, 1e6, "20 parts locks gently");
-
-impl HairSetting for LockContact {
-    fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        Self {
-            radius: LOCK_RADIUS.mend(self.radius, d.radius, notes),
-            strength: LOCK_STRENGTH.mend(self.strength, d.strength, notes),
-        }
+setting! {
+    /// How strands keep apart: equation 18 of \[B\]. Component of a [`Hair`](crate::Hair); where absent,
+    /// [`HairDefault<LockContact>`](crate::HairDefault) holds.
+    ///
+    /// A simulated strand stands for a lock of hair, so the radius is the lock's.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct LockContact {
+        /// r, the radius of a strand; also the distance kept from colliders. 0 turns contact between
+        /// strands off.
+        pub radius: f32 = 1e-3, "m" in RADIUS: 0.0..=1.0, safe 0.0..=0.01, "1e-3 is a thin lock";
+        /// α, the acceleration of strands whose axes meet. Safe to about 8 r/Δt²; 0 turns contact
+        /// between strands off.
+        pub strength: f32 = 20.0, "m/s²" in STRENGTH: 0.0..=1e6, safe 0.0..=1e3,
+            "20 parts locks gently";
     }
 }
 
@@ -214,8 +188,8 @@ impl LockNeighbours {
     }
 
     /// Asks for lists that know bridges of water this long (m), from the next ones on.
-    pub(crate) fn look_beyond(&mut self, longest: f32) {
-        self.0.look_beyond(longest);
+    pub(crate) fn set_extra_margin(&mut self, longest: f32) {
+        self.0.set_extra_margin(longest);
     }
 
     /// The bridges of water at every node, where contact has seen them last. `wet` has a row for each,

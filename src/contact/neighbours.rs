@@ -147,12 +147,12 @@ impl Neighbours {
     }
 
     /// From the next lists on, they are complete to `beyond` (m) more than strands' reach.
-    pub fn look_beyond(&mut self, beyond: f32) {
+    pub fn set_extra_margin(&mut self, beyond: f32) {
         self.beyond = beyond;
     }
 
     /// Whether bridges of water are asked for.
-    pub fn looks_beyond(&self) -> bool {
+    pub fn has_extra_margin(&self) -> bool {
         self.beyond > 0.0
     }
 
@@ -427,7 +427,7 @@ mod tests {
                 points.chunks_exact(nodes).map(<[Vec3]>::to_vec).collect();
             let film = Film { reach: 2.0 * radius, longest: LONGEST_BRIDGE * 2.0 * radius };
             let mut list = Neighbours::default();
-            list.look_beyond(film.longest);
+            list.set_extra_margin(film.longest);
             pushes(&mut list, &strands, radius);
             for strand in &mut strands {
                 for (k, p) in strand.iter_mut().enumerate() {

@@ -2,13 +2,11 @@
 
 use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles};
 use crate::{
-    fault::{Fault, HairFault},
-    lod::HairSteps,
-    prefetch::prefetch,
+    parallel::prefetch,
     rod::obstacle::{Obstacle, Solid},
-    setting::{self, Notes, Settings},
-    strand::{Hair, Sleep, Sleepers, StillPose, Strand, StrandOf, Strands, TickPose},
-    tick::{HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairSystems, HairTick},
+    setting::{self, Ranged, Settings},
+    strand::{Hair, Sleepers, StillPose, Strand, StrandOf, StrandSleep, Strands, TickPose},
 };
 use bevy::prelude::*;
 
@@ -23,30 +21,19 @@ impl Plugin for ContactPlugin {
         setting::plugin::<LockContact>(app);
         #[cfg(feature = "avian")]
         super::avian::plugin(app);
-        app.register_type::<HairCollider>()
-            .register_type::<ColliderShape>()
+        setting::component::<HairCollider>(app);
+        app.register_type::<ColliderShape>()
             .register_type::<Obstacles>()
             .register_type::<LockNeighbours>()
             .register_required_components::<Hair, Obstacles>()
             .register_required_components::<Hair, LockNeighbours>()
-            .add_systems(PreUpdate, report_colliders)
             .add_systems(
                 HairTick,
-                (gather_obstacles, part_strands).in_set(HairSystems::Interaction),
+                (
+                    gather_obstacles.in_set(HairSystems::Obstacles),
+                    push_strands_apart.in_set(HairSystems::StrandContact),
+                ),
             );
-    }
-}
-
-fn report_colliders(
-    colliders: Query<(Entity, &HairCollider), Changed<HairCollider>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    for (entity, collider) in &colliders {
-        let notes = Notes::default();
-        collider.mended(&notes);
-        for wrong in notes.into_inner() {
-            faults.write(HairFault { entity, fault: Fault::Setting(wrong) });
-        }
     }
 }
 
@@ -82,15 +69,15 @@ fn gather_obstacles(
         obstacles.solids.clear();
         obstacles
             .solids
-            .extend(colliders.iter().map(|(c, pose)| seen_from(hair, &c.valid(), pose)));
+            .extend(colliders.iter().map(|(c, pose)| seen_from(hair, &c.clamped(), pose)));
     }
 }
 
-pub(crate) fn part_strands(
-    steps: HairSteps,
+pub(crate) fn push_strands_apart(
+    steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
-    mut strands: Query<(&mut Strand, &mut Sleep, &mut StillPose), With<StrandOf>>,
+    mut strands: Query<(&mut Strand, &mut StrandSleep, &mut StillPose), With<StrandOf>>,
 ) {
     for (hair, members, mut neighbours, sleepers) in &mut hairs {
         let LockContact { radius, strength } = contact.of(hair);
@@ -100,12 +87,12 @@ pub(crate) fn part_strands(
         let Some(stride) = steps.of(hair) else { continue };
         let list = &mut neighbours.bypass_change_detection().0;
         list.clear();
-        // Carried strands neither push nor are pushed. Where water joins strands, it joins them too.
-        let with_carried = list.looks_beyond();
+        // Follower strands neither push nor are pushed. Where water joins strands, it joins them too.
+        let with_followers = list.has_extra_margin();
         for some in members.collection().chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
             for (strand, sleep, _) in strands.iter_many(some) {
-                if with_carried || !sleep.is_carried() {
+                if with_followers || !sleep.is_follower() {
                     list.add(strand.positions());
                 }
             }
@@ -115,7 +102,7 @@ pub(crate) fn part_strands(
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.velocities()));
             let mut some = strands.iter_many_mut(some);
             while let Some((mut strand, mut sleep, mut still)) = some.fetch_next() {
-                if sleep.is_carried() && !with_carried {
+                if sleep.is_follower() && !with_followers {
                     continue;
                 }
                 if sleep.is_asleep() {

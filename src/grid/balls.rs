@@ -1,10 +1,7 @@
 //! Balls, found by boxes that they reach into.
 
 use super::{Run, UniformGrid};
-use crate::rod::{
-    algebra::V3,
-    lanes::{Real, lanes_in, splat3},
-};
+use crate::lanes::{Real, V3, lanes_in, splat3};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use glam::Vec3;
 

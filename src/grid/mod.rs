@@ -18,7 +18,7 @@ const FAR: Vec3 = Vec3::splat(1e9);
 /// The fewest buckets. A few items in as few buckets would be met in most of empty space, too.
 const FEWEST: usize = 8192;
 
-/// Points sorted by cell.
+/// Points sorted by cell: equations 4 and 5 of \[W\].
 #[derive(Clone, Debug, Default)]
 pub struct UniformGrid {
     inverse_cell: f32,

@@ -64,7 +64,8 @@ impl Groom {
             look.dye = color.with_alpha(1.0).into();
         }
         if let Some(width) = width {
-            look.width = width.clamp(5e-5, 5e-3);
+            let safe = HairLook::WIDTH.safe;
+            look.width = width.clamp(*safe.start(), *safe.end());
         }
         Some(look)
     }

@@ -1,55 +1,14 @@
 //! Grooms as assets.
 
 use super::{
-    Groom, GroomFileError, GroomLosses, GroomSettings, UpAxis, gltf, skin, tressfx, wear, yuksel,
+    Groom, GroomError, GroomFileError, GroomFormat, GroomLosses, GroomSettings, gltf, tressfx,
+    wear, yuksel,
 };
 use bevy::{
     asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
     platform::collections::HashMap,
     prelude::*,
 };
-
-/// The kinds of files that a groom is read from.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[reflect(Clone, PartialEq)]
-pub enum GroomFormat {
-    /// Cem Yuksel's HAIR.
-    Yuksel,
-    /// TressFX, version 3 or 4.
-    TressFx,
-    /// glTF or GLB.
-    Gltf,
-}
-
-impl GroomFormat {
-    /// The format that bytes are in, by how they begin: files' names may lie. `None` for others.
-    pub fn of(file: &[u8]) -> Option<Self> {
-        let version = file.first_chunk().map_or(0.0, |bytes| f32::from_le_bytes(*bytes));
-        match file {
-            [b'H', b'A', b'I', b'R', ..] => Some(Self::Yuksel),
-            [b'g', b'l', b'T', b'F', ..] => Some(Self::Gltf),
-            _ if (3.0..5.0).contains(&version) => Some(Self::TressFx),
-            text if gltf::looks_like_json(text) => Some(Self::Gltf),
-            _ => None,
-        }
-    }
-
-    /// Metres per unit in most files of this format.
-    pub fn scale(self) -> f32 {
-        match self {
-            Self::Yuksel => 0.00254,
-            Self::TressFx | Self::Gltf => 1.0,
-        }
-    }
-
-    /// The axis that is up in most files of this format.
-    pub fn up(self) -> UpAxis {
-        match self {
-            Self::Yuksel => UpAxis::Z,
-            Self::TressFx | Self::Gltf => UpAxis::Y,
-        }
-    }
-}
 
 /// Why loading a groom failed.
 #[derive(thiserror::Error, Debug)]
@@ -198,9 +157,9 @@ impl Plugin for GroomPlugin {
         app.register_type::<Groom>()
             .register_type::<GroomSettings>()
             .register_type::<GroomFormat>()
-            .register_type::<GroomLosses>();
+            .register_type::<GroomLosses>()
+            .register_type::<GroomError>();
         wear::build(app);
-        skin::plugin(app);
         add_loader(app);
     }
 

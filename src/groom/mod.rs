@@ -4,36 +4,23 @@
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
 mod bytes;
-mod fit;
+mod format;
 pub mod gltf;
 mod guides;
-mod head;
-mod linear;
 mod loader;
 mod losses;
-pub mod plant;
-mod preset;
 mod reshape;
-mod scalp;
 mod settings;
-mod skin;
 pub mod tressfx;
 mod wear;
 pub mod yuksel;
 
 pub use bytes::GroomFileError;
-pub use fit::{FitError, JointCapsule, fit_joint_capsules};
-pub use loader::{GroomFormat, GroomLoadError, GroomLoader, GroomPlugin};
+pub use format::{GroomFormat, UpAxis};
+pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
-pub use plant::{
-    Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, ImageMap, MAX_ROOTS, MapChannel,
-    PlantError, Planted, Planting, PlantingMaps, RootOnMesh, RootPlace, vertex_color,
-};
-pub use preset::{HairPreset, PresetSettings};
-pub use reshape::UpAxis;
-pub use scalp::Scalp;
+
 pub use settings::GroomSettings;
-pub use skin::{RootsError, RootsOnMesh, TiedRoots};
 pub use wear::{GroomGuides, GroomedHair};
 
 use crate::setting::InvalidValue;

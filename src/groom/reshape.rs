@@ -1,51 +1,14 @@
 //! Grooms made of other grooms: scaled, turned upright, cleaned, resampled, thinned.
 
-use super::{Groom, GroomError, GroomLosses, GroomStrand};
-use crate::setting::Bound;
+use super::{Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis};
+use crate::setting::ValueRange;
 use bevy::prelude::*;
 use core::ops::Range;
 
-/// The axis of a file that points up.
-#[derive(
-    Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize,
-)]
-#[reflect(Default, Clone, PartialEq)]
-pub enum UpAxis {
-    /// +X, which becomes +Y; Z stays.
-    X,
-    /// +Y, as Bevy has it.
-    #[default]
-    Y,
-    /// +Z, which becomes +Y; X stays. What faces −Y faces +Z then. Blender's axes.
-    Z,
-    /// −X.
-    NegX,
-    /// −Y: turned around Z.
-    NegY,
-    /// −Z, which becomes +Y; X stays.
-    NegZ,
-}
-
-impl UpAxis {
-    /// A vector of a space with this axis up, in Bevy's.
-    pub fn to_y_up(self, v: Vec3) -> Vec3 {
-        match self {
-            Self::X => Vec3::new(-v.y, v.x, v.z),
-            Self::Y => v,
-            Self::Z => Vec3::new(v.x, v.z, -v.y),
-            Self::NegX => Vec3::new(v.y, -v.x, v.z),
-            Self::NegY => Vec3::new(-v.x, -v.y, v.z),
-            Self::NegZ => Vec3::new(v.x, -v.z, v.y),
-        }
-    }
-}
-
-const SCALE: Bound = Bound::new("a groom's scale", 1e-9, 1e9, "0.01 takes centimetres to metres");
-pub(super) const NODES: Bound =
-    Bound::new("nodes to resample to", 2.0, 4096.0, "16 suit hair of a head");
-const SHORTEST: Bound =
-    Bound::new("the shortest segment (m)", 0.0, 1e6, "1e-5 takes away what has no length");
-const EVERY: Bound = Bound::new("keep every k-th strand, k", 1.0, 1e9, "1 keeps all");
+const SCALE: ValueRange = GroomSettings::SCALE.named("a groom's scale");
+const NODES: ValueRange = GroomSettings::NODES.named("nodes to resample to");
+const SHORTEST: ValueRange = GroomSettings::MERGE.named("the shortest segment (m)");
+const EVERY: ValueRange = GroomSettings::KEEP_EVERY.named("keep every k-th strand, k");
 
 impl Groom {
     /// The groom `factor` times as large, widths included.
@@ -81,7 +44,7 @@ impl Groom {
     /// # Errors
     /// When `nodes` is out of range, or there would be more than 32 bits count.
     pub fn resampled(&self, nodes: usize) -> Result<Self, GroomError> {
-        NODES.check(nodes as f32)?;
+        NODES.check(nodes)?;
         self.resampled_by(|_| nodes)
     }
 
@@ -145,7 +108,7 @@ impl Groom {
     /// # Errors
     /// When `k` is 0.
     pub fn thinned(&self, k: usize) -> Result<Self, GroomError> {
-        EVERY.check(k as f32)?;
+        EVERY.check(k)?;
         Ok(self.picked((0..self.len()).step_by(k)))
     }
 

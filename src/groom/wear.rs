@@ -1,9 +1,9 @@
 //! Hair grown from a groom: a few strands are simulated, the others drawn between them.
 
-use super::{Groom, GroomError, GroomStrand, reshape::NODES};
+use super::{Groom, GroomError, GroomStrand};
 use crate::{
-    fault::{Fault, HairFault},
-    setting::Bound,
+    fault::{FaultKind, HairFault},
+    setting::{Ranged, setting},
     strand::{Hair, MIN_SEGMENT, Strand, StrandOf},
 };
 use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
@@ -43,38 +43,24 @@ impl GroomedHair {
     }
 }
 
-/// How many strands of a groom are simulated, and how finely.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct GroomGuides {
-    /// How many, chosen by [`Groom::guides`]. Default 500, safe 1…10,000.
-    pub count: usize,
-    /// Nodes of a strand, evenly along it. Default 16, safe 2…64.
-    pub nodes: usize,
-    /// Short strands have fewer nodes, but three at least, so that their segments are no shorter than
-    /// this (m). Strands that are shorter themselves are not simulated as long as there are others:
-    /// they are stubble beside the distance that hair keeps from the head. Default 5 mm; safe
-    /// 1 mm…5 cm.
-    pub segment: f32,
-}
-
-impl Default for GroomGuides {
-    fn default() -> Self {
-        Self { count: 500, nodes: 16, segment: 5e-3 }
+setting! {
+    /// How many strands of a groom are simulated, and how finely.
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct GroomGuides {
+        /// How many, chosen by [`Groom::guides`].
+        pub count: usize = 500, in COUNT: 1.0..=1e6, safe 1.0..=1e4, "500 suit a head";
+        /// Nodes of a strand, evenly along it.
+        pub nodes: usize = 16, in NODES: 2.0..=4096.0, safe 2.0..=64.0, "16 suit hair of a head";
+        /// Short strands have fewer nodes, but three at least, so that their segments are no shorter
+        /// than this. Strands that are shorter themselves are not simulated as long as there are
+        /// others: they are stubble beside the distance that hair keeps from the head.
+        pub segment: f32 = 5e-3, "m" in SEGMENT: 0.0..=10.0, safe 1e-3..=0.05,
+            "0.005 suits a head";
     }
 }
-
-const COUNT: Bound = Bound::new("GroomGuides::count", 1.0, 1e6, "500 suit a head");
-const SEGMENT: Bound = Bound::new("GroomGuides::segment (m)", 0.0, 10.0, "0.005 suits a head");
 
 impl GroomGuides {
-    fn check(&self) -> Result<(), GroomError> {
-        COUNT.check(self.count as f32)?;
-        NODES.check(self.nodes as f32)?;
-        SEGMENT.check(self.segment)?;
-        Ok(())
-    }
-
     fn nodes_of(&self, length: f32) -> usize {
         // `as` saturates.
         let most = (length / self.segment.max(10.0 * MIN_SEGMENT)) as usize + 1;
@@ -109,7 +95,7 @@ impl Groom {
         hair: Entity,
         guides: &GroomGuides,
     ) -> Result<Vec<Entity>, GroomError> {
-        guides.check()?;
+        guides.checked()?;
         let long = |s: &GroomStrand<'_>| length(s.points) >= guides.segment;
         let mut long: Vec<usize> =
             (0..).zip(self.strands()).filter(|(_, s)| long(s)).map(|(i, _)| i).collect();
@@ -201,8 +187,8 @@ fn grow(
                 // The asset server has logged the whole of it.
                 let error = error.to_string();
                 let error = error.lines().next().unwrap_or_default().to_owned();
-                let fault = Fault::GroomNotLoaded { error };
-                faults.write(HairFault { entity: hair, fault });
+                let message = format!("the hair's groom was not loaded: {error}");
+                faults.write(HairFault::new(FaultKind::Groom, message).of(hair));
                 grown.take_off(&mut commands, hair);
                 grown.from = Some(wanted.clone());
             }
@@ -214,7 +200,8 @@ fn grow(
         match groom.spawn(&mut commands, hair, &wanted.guides) {
             Ok(strands) => grown.strands = strands,
             Err(error) => {
-                faults.write(HairFault { entity: hair, fault: Fault::Groom(error) });
+                let outcome = "nothing is grown from this groom";
+                faults.write(HairFault::caused(FaultKind::Groom, error, outcome).of(hair));
                 continue;
             }
         }

@@ -2,14 +2,14 @@
 
 use super::{
     PresentLod,
-    carry::{Course, Frame, GUIDES, Pose, Ties},
     even::{Nearest, even_order},
+    follow::{Frame, GUIDES, Pose, StrandState, Ties},
 };
 use crate::{
     parallel::for_each,
+    schedule::HairStep,
     setting::Settings,
-    strand::{Hair, HeldNodes, PerHair, Sleep, Strand, StrandModel, StrandOf, TickPose},
-    tick::HairStep,
+    strand::{Hair, HeldNodes, PerHair, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
@@ -23,7 +23,7 @@ const ALIKE: f32 = 1e-3;
 /// [`LodLevel::strands`](crate::LodLevel::strands). Kept by the tick.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub struct Carried {
+pub struct Follower {
     /// Its place in the hair's even order, once that was asked for.
     rank: Option<u32>,
     /// Its index among the hair's guides.
@@ -33,7 +33,7 @@ pub struct Carried {
     /// Where its root was when it came to lie still (m).
     root: Vec3,
     /// Whether it sleeps because its guides do.
-    lulled: bool,
+    synced_asleep: bool,
 }
 
 /// The strands of a [`Hair`] that others are carried by. Kept by the tick.
@@ -106,8 +106,8 @@ struct Group<'a> {
 
 struct Member<'a> {
     entity: Entity,
-    sleep: Mut<'a, Sleep>,
-    carried: Mut<'a, Carried>,
+    sleep: Mut<'a, StrandSleep>,
+    carried: Mut<'a, Follower>,
     /// Whether it may be a guide or be carried: nothing holds it, and it is a strand at all.
     free: bool,
 }
@@ -120,8 +120,8 @@ pub(crate) fn choose_guides(
         Entity,
         &StrandOf,
         Ref<Strand>,
-        &mut Sleep,
-        &mut Carried,
+        &mut StrandSleep,
+        &mut Follower,
         Option<&HeldNodes>,
     )>,
 ) {
@@ -187,21 +187,21 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
     for (member, strand) in members.iter_mut().zip(strands.iter()) {
         let Member { entity, sleep, carried, free } = member;
         let (sleep, carried) = (sleep.bypass_change_detection(), carried.bypass_change_detection());
-        let is_carried = *free && carried.rank.is_some_and(|rank| rank > last);
-        let is_guide = *free && !is_carried && last < u32::MAX;
+        let is_follower = *free && carried.rank.is_some_and(|rank| rank > last);
+        let is_guide = *free && !is_follower && last < u32::MAX;
         let guide = carried.guide.filter(|_| is_guide);
         same &= !is_guide || guide.is_some_and(|i| guides.strands.get(i as usize) == Some(entity));
-        count += usize::from(is_carried);
-        if !is_carried && sleep.is_carried() {
+        count += usize::from(is_follower);
+        if !is_follower && sleep.is_follower() {
             // It goes on from where it is, as fast as it is.
-            sleep.be_carried(false);
-            if core::mem::take(&mut carried.lulled) {
+            sleep.set_follower(false);
+            if core::mem::take(&mut carried.synced_asleep) {
                 sleep.wake_up();
             }
             carried.ties = Ties::default();
         }
         // Who was written to has been put somewhere: it stays there and goes on from there.
-        if is_carried && (strand.is_changed() || !carried.ties.fit(strand.edges())) {
+        if is_follower && (strand.is_changed() || !carried.ties.fit(strand.edges())) {
             carried.ties = Ties::default();
         }
         carried.guide = guide;
@@ -285,27 +285,27 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
     // Whoever was written to since the last tick is elsewhere now.
     ahead.iter().enumerate().for_each(|(i, strand)| guides.see(i, *strand));
     let guides = &*guides;
-    let courses: Vec<[Vec3; 3]> =
+    let waypoints_of: Vec<[Vec3; 3]> =
         ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
-    let roots: Vec<Vec3> = courses.iter().map(|c| c[0]).collect();
+    let roots: Vec<Vec3> = waypoints_of.iter().map(|c| c[0]).collect();
     let nearest = Nearest::among(&roots);
     let mut loose: Vec<_> = (members.iter_mut())
         .zip(strands)
         .filter(|(m, _)| is_loose(m))
         .map(|(m, strand)| {
-            m.sleep.bypass_change_detection().be_carried(true);
+            m.sleep.bypass_change_detection().set_follower(true);
             (m.carried.bypass_change_detection(), &**strand)
         })
         .collect();
     for_each(&mut loose, |(carried, strand)| {
         let own = waypoints(strand);
-        let mut found: Vec<(f32, u32, Course<'_>)> = nearest
+        let mut found: Vec<(f32, u32, StrandState<'_>)> = nearest
             .to::<CANDIDATES>(own[0])
             .filter_map(|(i, _)| {
                 let guide = ahead[i]?;
-                let apart = courses[i].iter().zip(own).map(|(a, b)| a.distance_squared(b));
+                let apart = waypoints_of[i].iter().zip(own).map(|(a, b)| a.distance_squared(b));
                 let turns = guides.turns(i as u32)?;
-                Some((apart.sum::<f32>() / 3.0, i as u32, Course { turns, ..course(guide) }))
+                Some((apart.sum::<f32>() / 3.0, i as u32, StrandState { turns, ..state_of(guide) }))
             })
             .collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -313,13 +313,13 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
         let weight = |apart: f32| 1.0 / (apart + ALIKE * ALIKE);
         let sum: f32 = found.iter().map(|f| weight(f.0)).sum();
         let guides = found.into_iter().map(|(apart, i, guide)| (i, weight(apart) / sum, guide));
-        carried.ties = Ties::new(course(strand), guides);
+        carried.ties = Ties::new(state_of(strand), guides);
         carried.root = own[0];
     });
 }
 
-fn course(strand: &Strand) -> Course<'_> {
-    Course {
+fn state_of(strand: &Strand) -> StrandState<'_> {
+    StrandState {
         positions: strand.positions(),
         velocities: strand.velocities(),
         turns: strand.orientations(),
@@ -335,9 +335,9 @@ fn waypoints(strand: &Strand) -> [Vec3; 3] {
 }
 
 /// After sleep has been decided on: the carried sleep while all their guides do.
-pub(crate) fn lull(
+pub(crate) fn sync_follower_sleep(
     mut hairs: Query<&mut Guides, With<Hair>>,
-    mut strands: Query<(&StrandOf, &mut Strand, &mut Sleep, &mut Carried)>,
+    mut strands: Query<(&StrandOf, &mut Strand, &mut StrandSleep, &mut Follower)>,
 ) {
     let mut any = false;
     for mut guides in &mut hairs {
@@ -352,7 +352,7 @@ pub(crate) fn lull(
     }
     let mut per_hair = PerHair::default();
     for (of, mut strand, mut sleep, mut carried) in &mut strands {
-        if !sleep.is_carried() {
+        if !sleep.is_follower() {
             continue;
         }
         let index = per_hair.index(of.0, || hairs.get(of.0).ok());
@@ -364,11 +364,11 @@ pub(crate) fn lull(
         let moves = carried.ties.guides.iter().any(is_awake) || carried.root != root;
         if moves && sleep.is_asleep() {
             sleep.wake_up();
-            carried.lulled = false;
+            carried.synced_asleep = false;
         } else if !moves && !sleep.is_asleep() {
             sleep.fall_asleep();
             strand.bypass_change_detection().rest();
-            carried.lulled = true;
+            carried.synced_asleep = true;
         }
         carried.root = root;
     }
@@ -376,10 +376,10 @@ pub(crate) fn lull(
 
 /// At the end of a tick, after the projection: who is carried goes along. Once a tick is enough for
 /// what is seen once a tick, and costs a sixth of once a substep.
-pub(crate) fn carry(
+pub(crate) fn move_followers(
     step: Res<HairStep>,
     mut hairs: Query<(&TickPose, &mut Guides), With<Hair>>,
-    mut strands: Query<(&StrandOf, &mut Strand, &Sleep, &mut Carried)>,
+    mut strands: Query<(&StrandOf, &mut Strand, &StrandSleep, &mut Follower)>,
 ) {
     let is_last = step.index + 1 == step.count;
     let mut any = false;
@@ -391,7 +391,7 @@ pub(crate) fn carry(
         if guides.strands.is_empty() {
             continue;
         }
-        if let Some(carry) = pose.carry() {
+        if let Some(carry) = pose.frame_delta() {
             guides.frame.then(carry.rotation, carry.translation.into());
         }
         for i in 0..if is_last { guides.strands.len() } else { 0 } {
@@ -408,7 +408,7 @@ pub(crate) fn carry(
     let mut per_hair = PerHair::default();
     let mut items = Vec::new();
     for (of, strand, sleep, carried) in &mut strands {
-        if sleep.is_carried()
+        if sleep.is_follower()
             && !sleep.is_asleep()
             && let Some(index) = per_hair.index(of.0, || Some(hairs.get(of.0).ok()?.1))
         {
@@ -422,17 +422,20 @@ pub(crate) fn carry(
             strand.bypass_change_detection().parts_mut();
         let mut pose = Pose { positions, velocities, orientations, spins };
         let ties = &mut carried.bypass_change_detection().ties;
-        ties.carry(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds);
+        ties.follow(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds);
     });
 }
 
 /// A strand that leaves its hair, or goes over to another, is simulated until it is chosen there.
-pub(super) fn let_go(left: On<Discard, StrandOf>, mut strands: Query<(&mut Sleep, &mut Carried)>) {
+pub(super) fn let_go(
+    left: On<Discard, StrandOf>,
+    mut strands: Query<(&mut StrandSleep, &mut Follower)>,
+) {
     if let Ok((mut sleep, mut carried)) = strands.get_mut(left.entity) {
-        if sleep.is_carried() {
-            sleep.be_carried(false);
+        if sleep.is_follower() {
+            sleep.set_follower(false);
             sleep.wake_up();
         }
-        *carried = Carried::default();
+        *carried = Follower::default();
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! Strands stand in an order of which every beginning is spread evenly over the roots ([`even`]). At a
 //! level its first ones are simulated, so that who is at a coarse level is at all finer ones. Each of
-//! the others is **carried** by up to three guides that are near and run alike ([`carry`]): once a tick
+//! the others is **carried** by up to three guides that are near and run alike ([`follow`]): once a tick
 //! its edges turn as theirs have turned at the same distance from the root since the level began. So
 //! it begins and ends where it is, keeps its lengths and its root, and goes on with the velocity it
 //! has. The motion of its own with which it begins ebbs away within a second.
@@ -30,75 +30,66 @@
 //!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
-pub mod carry;
+#[doc(hidden)]
 pub mod even;
+#[doc(hidden)]
+pub mod follow;
 mod guides;
+#[doc(hidden)]
 pub mod model;
 mod systems;
 
-pub use guides::{Carried, Guides};
-pub(crate) use guides::{choose_guides, lull};
-pub(crate) use systems::HairSteps;
+pub use guides::{Follower, Guides};
 pub use systems::LodPlugin;
 
-use crate::setting::{Bound, HairSetting, InvalidValue, Notes};
+use crate::{
+    schedule::SubstepLimits,
+    setting::{InvalidValue, Ranged, setting},
+};
 use bevy::prelude::*;
 
-/// How cheaply a hair is simulated when it is small on the screen. Component of a
-/// [`Hair`](crate::Hair), may change at any time; hair without it is always simulated in full.
-///
-/// The feature `render` writes [`ScreenShare`] from the cameras; without it a game writes that itself.
-///
-/// ```
-/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// # let mut world = World::new();
-/// world.spawn((Hair, HairLod::default()));
-/// ```
-#[derive(Component, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-#[require(ScreenShare, PresentLod)]
-pub struct HairLod {
-    /// The levels, from near to far, each for smaller hair than the one before. Default two: under a
-    /// quarter of the view's height three iterations and half of the strands, under a tenth two with
-    /// substeps twice as long and a quarter of the strands.
-    pub levels: Vec<LodLevel>,
-    /// By which share more than a level's limit hair has to grow before it leaves the level again.
-    /// Default 0.2; safe 0.05…1.
-    pub hysteresis: f32,
-}
-
-/// One level of a [`HairLod`].
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct LodLevel {
-    /// Hair that takes up less than this share of the view's height is simulated so. Default 0.1,
-    /// safe 0…1.
-    pub below: f32,
-    /// Iterations a substep, at most as many as [`Solver`](crate::Solver) and
-    /// [`Springs`](crate::Springs) have. Default 2, safe 2…5. On 24 cm of hair that stands out 2 in
-    /// place of 5 move the tip by 0.5 mm.
-    pub iterations: u32,
-    /// How many substeps are taken as one. Default 2, safe 1…3; 1 leaves them as they are. The last of
-    /// a tick may be shorter. Hair sags more in longer ones: the same tip by 8 mm at 2, 2 cm at 3,
-    /// which is two pixels where hair is as far away as the default level's.
-    pub substeps: u32,
-    /// Share of the hair's strands that are simulated, rounded up, at least one; the others go along
-    /// with those, as the [module](self) says. Default 1, which is all of them; safe 0.1…1. Hair of
-    /// springs is simulated whole at every level.
-    pub strands: f32,
-}
-
-impl Default for LodLevel {
-    fn default() -> Self {
-        Self { below: 0.1, iterations: 2, substeps: 2, strands: 1.0 }
+setting! {
+    /// How cheaply a hair is simulated when it is small on the screen. Component of a
+    /// [`Hair`](crate::Hair), may change at any time; hair without it is always simulated in full.
+    ///
+    /// The feature `render` writes [`ScreenShare`] from the cameras; without it a game writes that itself.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # let mut world = World::new();
+    /// world.spawn((Hair, HairLod::default()));
+    /// ```
+    #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(ScreenShare, PresentLod, SubstepLimits)]
+    pub struct HairLod {
+        /// The levels, from near to far, each for smaller hair than the one before.
+        pub levels: Vec<LodLevel> = vec![LodLevel::NEAR, LodLevel::FAR] => Ranged::clamp_values;
+        /// By which share more than a level's limit hair has to grow before it leaves the level again.
+        pub hysteresis: f32 = 0.2, in HYSTERESIS: 0.0..=100.0, safe 0.05..=1.0, "0.2 is a fifth";
     }
 }
 
-impl Default for HairLod {
-    fn default() -> Self {
-        let near = LodLevel { below: 0.25, iterations: 3, substeps: 1, strands: 0.5 };
-        let far = LodLevel { strands: 0.25, ..default() };
-        Self { levels: vec![near, far], hysteresis: 0.2 }
+setting! {
+    /// One level of a [`HairLod`].
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct LodLevel {
+        /// Hair that takes up less than this share of the view's height is simulated so.
+        pub below: f32 = 0.1, in BELOW: 0.0..=100.0, safe 0.0..=1.0, "a tenth of the view is 0.1";
+        /// Iterations a substep, at most as many as [`HairSolver`](crate::HairSolver) and
+        /// [`Springs`](crate::Springs) have. On 24 cm of hair that stands out 2 in place of 5 move the
+        /// tip by 0.5 mm.
+        pub iterations: u32 = 2, in ITERATIONS: 1.0..=1000.0, safe 2.0..=5.0,
+            "2 are enough from afar";
+        /// How many substeps are taken as one; 1 leaves them as they are. The last of a tick may be
+        /// shorter. Hair sags more in longer ones: the same tip by 8 mm at 2, 2 cm at 3, which is two
+        /// pixels where hair is as far away as the default level's.
+        pub substeps: u32 = 2, in SUBSTEPS: 1.0..=1000.0, safe 1.0..=3.0, "2 makes three of six";
+        /// Share of the hair's strands that are simulated, rounded up, at least one; the others go
+        /// along with those, as the [module](self) says. Hair of springs is simulated whole at every
+        /// level.
+        pub strands: f32 = 1.0, in STRANDS: 0.0..=1.0, safe 0.1..=1.0, "0.25 is one of four";
     }
 }
 
@@ -123,8 +114,6 @@ pub struct PresentLod {
     pub level: usize,
     /// How many strands are not simulated but carried by others.
     pub carried: usize,
-    iterations: Option<u32>,
-    substeps: Option<u32>,
     strands: Option<f32>,
 }
 
@@ -135,23 +124,19 @@ impl PresentLod {
     }
 }
 
-const BELOW: Bound = Bound::new("LodLevel::below", 0.0, 100.0, "a tenth of the view is 0.1");
-const ITERATIONS: Bound = Bound::new("LodLevel::iterations", 1.0, 1000.0, "2 are enough from afar");
-const SUBSTEPS: Bound = Bound::new("LodLevel::substeps", 1.0, 1000.0, "2 makes three of six");
-const STRANDS: Bound = Bound::new("LodLevel::strands", 0.0, 1.0, "0.25 is one of four");
-const HYSTERESIS: Bound = Bound::new("HairLod::hysteresis", 0.0, 100.0, "0.2 is a fifth");
-
 impl LodLevel {
+    /// For hair under a group of the view's height: three iterations, half of the strands.
+    pub const NEAR: Self = Self { below: 0.25, iterations: 3, substeps: 1, strands: 0.5 };
+    /// For hair under a tenth: two, substeps twice as long, a group of the strands.
+    pub const FAR: Self = Self { below: 0.1, iterations: 2, substeps: 2, strands: 0.25 };
+
     /// A level for hair below a share of the view's height, with its iterations, and how many substeps
     /// are taken as one.
     ///
     /// # Errors
     /// When the share is negative or not a number, or a count is 0 or more than 1000.
     pub fn new(below: f32, iterations: u32, substeps: u32) -> Result<Self, InvalidValue> {
-        BELOW.check(below)?;
-        ITERATIONS.check(iterations as f32)?;
-        SUBSTEPS.check(substeps as f32)?;
-        Ok(Self { below, iterations, substeps, strands: 1.0 })
+        Self { below, iterations, substeps, ..default() }.checked()
     }
 
     /// The same level with another share of the strands simulated.
@@ -159,21 +144,6 @@ impl LodLevel {
     /// # Errors
     /// When the share is not a number or outside 0…1.
     pub fn with_strands(self, share: f32) -> Result<Self, InvalidValue> {
-        Ok(Self { strands: STRANDS.check(share)?, ..self })
-    }
-}
-
-impl HairSetting for HairLod {
-    fn mended(&self, notes: &Notes) -> Self {
-        let level = |l: &LodLevel| LodLevel {
-            below: BELOW.mend(l.below, 0.0, notes),
-            iterations: ITERATIONS.mend(l.iterations as f32, 2.0, notes) as u32,
-            substeps: SUBSTEPS.mend(l.substeps as f32, 1.0, notes) as u32,
-            strands: STRANDS.mend(l.strands, 1.0, notes),
-        };
-        Self {
-            levels: self.levels.iter().map(level).collect(),
-            hysteresis: HYSTERESIS.mend(self.hysteresis, 0.2, notes),
-        }
+        Self { strands: share, ..self }.checked()
     }
 }

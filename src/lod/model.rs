@@ -19,18 +19,6 @@ pub fn choose(levels: &[LodLevel], hysteresis: f32, before: usize, share: f32) -
     level
 }
 
-/// How many substeps the hair takes as one at the end of substep `index` of `count`, if `together`
-/// are taken at a time; `None` while it waits. What is left at the tick's end is taken then.
-pub fn taken(index: u32, count: u32, together: u32) -> Option<u32> {
-    let together = together.max(1);
-    let done = (index + 1) % together;
-    match done {
-        0 => Some(together),
-        rest if index + 1 == count => Some(rest),
-        _ => None,
-    }
-}
-
 /// The share of the view's height that a ball of `radius` (m) takes up at `distance` (m) in a
 /// perspective whose scale (1 / tan of half the vertical angle) is `scale`.
 pub fn screen_share(radius: f32, distance: f32, scale: f32) -> f32 {
@@ -63,20 +51,6 @@ mod tests {
         }
         assert_eq!(go(1, f32::NAN), 1);
         assert_eq!(choose(&[], 0.2, 3, 0.0), 0);
-    }
-
-    #[test]
-    fn substeps_taken_together_make_up_the_tick() {
-        for count in 1..20 {
-            for together in 0..8 {
-                let all: Vec<_> = (0..count).map(|i| taken(i, count, together)).collect();
-                assert_eq!(all.iter().flatten().sum::<u32>(), count);
-                assert!(all[count as usize - 1].is_some(), "nothing waits beyond the tick");
-                assert!(all.iter().flatten().all(|n| *n <= together.max(1)));
-            }
-        }
-        let six: Vec<_> = (0..6).map(|i| taken(i, 6, 2)).collect();
-        assert_eq!(six, [None, Some(2), None, Some(2), None, Some(2)]);
     }
 
     #[test]

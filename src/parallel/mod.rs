@@ -1,12 +1,14 @@
 //! Work over many strands, on Bevy's compute task pool, with the same result on any thread count.
 
 mod columns;
+mod prefetch;
 
 use bevy::{
     ecs::query::{ArchetypeFilter, ContiguousQueryData, QueryContiguousIter},
     prelude::*,
 };
 pub(crate) use columns::Columns;
+pub(crate) use prefetch::prefetch;
 
 #[cfg(feature = "parallel")]
 use bevy::tasks::ComputeTaskPool;

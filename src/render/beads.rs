@@ -4,8 +4,8 @@
 //! is drawn, stretched along the way it flies. Each bead is a square that faces the eye, on which a
 //! sphere is shaded; the squares are counted by a mesh and pulled from one buffer, as ribbons are.
 
-use super::{HairRenderSystems, Interpolate, supported};
-use crate::{Droplet, DropletRules, HairGravity, water::model::ball_radius};
+use super::sets::{HairRenderSystems, Interpolate, supported};
+use crate::{Droplet, DropletRules, HairGravity, setting::Ranged, water::model::ball_radius};
 use bevy::{
     asset::{RenderAssetUsages, embedded_asset},
     camera::{primitives::Aabb, visibility::NoAutoAabb},
@@ -94,7 +94,7 @@ pub(super) fn show_droplets(
         }
         _ => 0.0,
     };
-    let longest = rules.map_or(2.0, |rules| rules.lying).max(SINKING);
+    let longest = rules.map(|rules| rules.clamped()).unwrap_or_default().lying.max(SINKING);
     let down = gravity.map_or(Vec3::NEG_Y, |gravity| gravity.normalize_or_zero());
     beads.clear();
     beads.extend(droplets.iter().map(|drop| {

@@ -6,6 +6,7 @@ use super::{
     followers::{DrawnStrand, GuideRoot, scatter},
     given::FollowerRoots,
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
+    sets::Interpolate,
 };
 use crate::{
     Moisture,
@@ -19,10 +20,6 @@ use bevy::{
     prelude::*,
     render::{renderer::RenderDevice, storage::ShaderBuffer},
 };
-
-/// Whether drawing goes between ticks by the overstep of the fixed clock.
-#[derive(Resource, Clone, Copy, Debug)]
-pub(super) struct Interpolate(pub(super) bool);
 
 /// What was packed for a hair, kept so that nothing is allocated again.
 #[derive(Component, Clone, Debug, Default)]
@@ -57,7 +54,7 @@ type GuideParts = (
     &'static Strand,
     &'static StrandHistory,
     &'static Bonds,
-    &'static Moisture,
+    Option<&'static Moisture>,
     Option<&'static WetLook>,
 );
 
@@ -263,7 +260,7 @@ impl Packed {
                 strand,
                 history,
                 bonds,
-                wet.map_or(water.sheen(), |w| &w.0),
+                wet.map_or_else(|| water.map_or(&[][..], Moisture::sheen), |wet| &wet.0),
                 overstep,
             );
             let root = packed_place(&own[0]);

@@ -139,8 +139,8 @@ impl Near {
 
 #[cfg(test)]
 mod tests {
+    use super::super::curve::{Guide, strand_point};
     use super::*;
-    use crate::render::curve::{Guide, strand_point};
 
     fn guide(x: f32, way: Vec3) -> GuideRoot {
         let (place, length) = (Vec3::X * x, way.length());

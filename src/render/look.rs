@@ -1,20 +1,22 @@
 //! How hair looks: colour from melanin, sheen, thickness.
 
-use crate::setting::{Bound, HairSetting, Notes};
+use crate::setting::{Ranged, setting};
 use bevy::prelude::*;
 
-/// How much of the two pigments hair holds, which gives its colour.
-///
-/// The scale is that of Chiang et al. 2016 ("A practical and controllable hair and fur model"):
-/// absorption is the pigments' spectra times these numbers, and the colour that a full head shows is
-/// the albedo their equation gives for it.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct Melanin {
-    /// Brown-black pigment. 0 in white hair, about 2.5 in black hair; safe 0…8.
-    pub eumelanin: f32,
-    /// Yellow-red pigment. 0 in most hair, about 0.85 in red hair; safe 0…8.
-    pub pheomelanin: f32,
+setting! {
+    /// How much of the two pigments hair holds, which gives its colour.
+    ///
+    /// The scale is that of Chiang et al. 2016 ("A practical and controllable hair and fur model"):
+    /// absorption is the pigments' spectra times these numbers, and the colour that a full head shows is
+    /// the albedo their equation gives for it.
+    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct Melanin {
+        /// Brown-black pigment. 0 in white hair, about 2.5 in black hair.
+        pub eumelanin: f32 = 1.0, in EUMELANIN: 0.0..=1e3, safe 0.0..=8.0, "2.5 is black";
+        /// Yellow-red pigment. 0 in most hair, about 0.85 in red hair.
+        pub pheomelanin: f32 = 0.08, in PHEOMELANIN: 0.0..=1e3, safe 0.0..=8.0, "0.85 is red";
+    }
 }
 
 impl Melanin {
@@ -50,12 +52,6 @@ impl Melanin {
     }
 }
 
-impl Default for Melanin {
-    fn default() -> Self {
-        Self::DARK_BROWN
-    }
-}
-
 /// The reflection model.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Default, Clone, PartialEq)]
@@ -68,93 +64,48 @@ pub enum HairShading {
     KajiyaKay,
 }
 
-/// How hair looks. Component of a [`Hair`](crate::Hair), may change at any time; where absent,
-/// [`HairDefault<HairLook>`](crate::HairDefault) holds.
-///
-/// ```
-/// # use bevy_keratin::prelude::*; use bevy_keratin::render::*; use bevy::prelude::*;
-/// # let mut world = World::new();
-/// world.spawn((Hair, HairLook { melanin: Melanin::AUBURN, ..default() }));
-/// ```
-#[derive(Component, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct HairLook {
-    /// Pigments. Default [`Melanin::DARK_BROWN`].
-    pub melanin: Melanin,
-    /// Dye: multiplies the pigments' colour. White, no dye, by default. Pigment cannot be dyed
-    /// lighter: bleach first (little melanin), as on a real head.
-    pub dye: Color,
-    /// How much the amount of pigment differs from strand to strand, a share. Default 0.2,
-    /// safe 0…0.5.
-    pub variation: f32,
-    /// Share of the pigment that sun has taken at the tips. Default 0.25, safe 0…1.
-    pub tip_bleach: f32,
-    /// Drawn width of a strand at the root (m). Default 0.35 mm, safe 0.05…5 mm. Real hair has
-    /// 0.07 mm; a drawn strand stands for several.
-    pub width: f32,
-    /// Width at the tip as a share of that at the root. Default 0.3, safe 0…1.
-    pub taper: f32,
-    /// Roughness of the fibre: width of the highlights. Default 0.38, safe 0.1…1. Lower is sleeker.
-    pub roughness: f32,
-    /// Strength of the highlights; 1 is a clean fibre. Default 1, safe 0…4.
-    pub gloss: f32,
-    /// Strength of the light that shines through against the light. Default 0.4, safe 0…2.
-    pub backlight: f32,
-    /// How deep light goes into the hair where a light casts shadows (m). Default 12 mm,
-    /// safe 1…100 mm. Lower gives harder shade between locks.
-    pub self_shadow: f32,
-    /// How much darker it is at the roots, a share. Default 0.5, safe 0…1.
-    pub root_shade: f32,
-    /// The reflection model. Default [`HairShading::Fibre`].
-    pub shading: HairShading,
-}
-
-impl Default for HairLook {
-    fn default() -> Self {
-        Self {
-            melanin: Melanin::default(),
-            dye: Color::WHITE,
-            variation: 0.2,
-            tip_bleach: 0.25,
-            width: 0.35e-3,
-            taper: 0.3,
-            roughness: 0.38,
-            gloss: 1.0,
-            backlight: 0.4,
-            self_shadow: 12e-3,
-            root_shade: 0.5,
-            shading: HairShading::default(),
-        }
-    }
-}
-
-const MELANIN: Bound = Bound::new("Melanin", 0.0, 1e3, "2.5 of eumelanin is black");
-const SHARE: Bound = Bound::new("a share of HairLook", 0.0, 1.0, "shares go from 0 to 1");
-const WIDTH: Bound = Bound::new("HairLook::width (m)", 1e-6, 1.0, "0.00035 suits a head");
-const ROUGHNESS: Bound = Bound::new("HairLook::roughness", 0.05, 1.0, "0.38 suits clean hair");
-const STRENGTH: Bound = Bound::new("a strength of HairLook", 0.0, 100.0, "1 is natural");
-const DEPTH: Bound = Bound::new("HairLook::self_shadow (m)", 0.0, 10.0, "0.012 suits a head");
-
-impl HairSetting for HairLook {
-    fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        Self {
-            melanin: Melanin {
-                eumelanin: MELANIN.mend(self.melanin.eumelanin, d.melanin.eumelanin, notes),
-                pheomelanin: MELANIN.mend(self.melanin.pheomelanin, d.melanin.pheomelanin, notes),
-            },
-            dye: self.dye,
-            variation: SHARE.mend(self.variation, d.variation, notes),
-            tip_bleach: SHARE.mend(self.tip_bleach, d.tip_bleach, notes),
-            width: WIDTH.mend(self.width, d.width, notes),
-            taper: SHARE.mend(self.taper, d.taper, notes),
-            roughness: ROUGHNESS.mend(self.roughness, d.roughness, notes),
-            gloss: STRENGTH.mend(self.gloss, d.gloss, notes),
-            backlight: STRENGTH.mend(self.backlight, d.backlight, notes),
-            self_shadow: DEPTH.mend(self.self_shadow, d.self_shadow, notes),
-            root_shade: SHARE.mend(self.root_shade, d.root_shade, notes),
-            shading: self.shading,
-        }
+setting! {
+    /// How hair looks. Component of a [`Hair`](crate::Hair), may change at any time; where absent,
+    /// [`HairDefault<HairLook>`](crate::HairDefault) holds.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy_keratin::render::*; use bevy::prelude::*;
+    /// # let mut world = World::new();
+    /// world.spawn((Hair, HairLook { melanin: Melanin::AUBURN, ..default() }));
+    /// ```
+    #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct HairLook {
+        /// Pigments.
+        pub melanin: Melanin = Melanin::DARK_BROWN => Ranged::clamp_values;
+        /// Dye: multiplies the pigments' colour; white is no dye. Pigment cannot be dyed lighter:
+        /// bleach first (little melanin), as on a real head.
+        pub dye: Color = Color::WHITE;
+        /// How much the amount of pigment differs from strand to strand, a share.
+        pub variation: f32 = 0.2, in VARIATION: 0.0..=1.0, safe 0.0..=0.5, "0.2 is natural";
+        /// Share of the pigment that sun has taken at the tips.
+        pub tip_bleach: f32 = 0.25, in TIP_BLEACH: 0.0..=1.0, "0.25 is a summer";
+        /// Drawn width of a strand at the root. Real hair has 0.07 mm; a drawn strand stands for
+        /// several.
+        pub width: f32 = 0.35e-3, "m" in WIDTH: 1e-6..=1.0, safe 0.05e-3..=5e-3,
+            "0.00035 suits a head";
+        /// Width at the tip as a share of that at the root.
+        pub taper: f32 = 0.3, in TAPER: 0.0..=1.0, "0.3 is natural";
+        /// Roughness of the fibre: width of the highlights. Lower is sleeker.
+        pub roughness: f32 = 0.38, in ROUGHNESS: 0.05..=1.0, safe 0.1..=1.0,
+            "0.38 suits clean hair";
+        /// Strength of the highlights; 1 is a clean fibre.
+        pub gloss: f32 = 1.0, in GLOSS: 0.0..=100.0, safe 0.0..=4.0, "1 is natural";
+        /// Strength of the light that shines through against the light.
+        pub backlight: f32 = 0.4, in BACKLIGHT: 0.0..=100.0, safe 0.0..=2.0, "0.4 is natural";
+        /// How deep light goes into the hair where a light casts shadows. Lower gives harder shade
+        /// between locks.
+        pub self_shadow: f32 = 12e-3, "m" in SELF_SHADOW: 0.0..=10.0, safe 1e-3..=0.1,
+            "0.012 suits a head";
+        /// How much darker it is at the roots, a share.
+        pub root_shade: f32 = 0.5, in ROOT_SHADE: 0.0..=1.0, "0.5 is full hair";
+        /// The reflection model.
+        pub shading: HairShading = HairShading::Fibre;
     }
 }
 
@@ -197,16 +148,16 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_look_is_mended() {
+    fn a_broken_look_is_clamped() {
         let broken = HairLook {
             width: f32::NAN,
             roughness: -1.0,
             dye: Color::linear_rgb(f32::NAN, 1.0, 1.0),
             ..default()
         };
-        let mended = broken.mended(&Notes::default());
-        assert_eq!(mended.width, HairLook::default().width);
-        assert_eq!(mended.roughness, 0.05);
-        assert!(mended.colors().0.is_finite());
+        let clamped = broken.clamped();
+        assert_eq!(clamped.width, HairLook::default().width);
+        assert_eq!(clamped.roughness, 0.05);
+        assert!(clamped.colors().0.is_finite());
     }
 }

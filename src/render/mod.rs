@@ -15,6 +15,7 @@
 //! thinner than a pixel are drawn one pixel wide and cover part of its samples; without MSAA fewer
 //! strands are drawn instead.
 
+#[doc(hidden)]
 pub mod curve;
 
 mod beads;
@@ -24,7 +25,8 @@ mod followers;
 mod given;
 mod look;
 mod material;
-mod share;
+mod screen_share;
+mod sets;
 mod upload;
 mod view;
 
@@ -33,6 +35,7 @@ pub use buffers::HairBuffers;
 pub use followers::{DrawnStrand, HairFollowers};
 pub use given::{FollowerRoot, FollowerRoots};
 pub use look::{HairLook, HairShading, Melanin, WetLook};
+pub use sets::HairRenderSystems;
 pub use view::{HairView, STRAIN_FULL, heat};
 
 use crate::{setting, strand::Hair};
@@ -42,14 +45,11 @@ use bevy::{
     camera::visibility::VisibilitySystems,
     ecs::schedule::{InternedScheduleLabel, ScheduleLabel},
     prelude::*,
-    render::{
-        RenderApp, erased_render_asset::ErasedRenderAssetPlugin, render_resource::DownlevelFlags,
-        renderer::RenderAdapter, storage::ShaderBuffer,
-    },
+    render::{RenderApp, erased_render_asset::ErasedRenderAssetPlugin, storage::ShaderBuffer},
     shader::load_shader_library,
 };
-use draw::Interpolate;
 use material::RibbonMaterial;
+use sets::{Interpolate, supported};
 
 /// Draws the hair. Part of [`HairPlugins`](crate::HairPlugins), which may be added before or after
 /// `DefaultPlugins`. Without a renderer it does nothing.
@@ -81,11 +81,6 @@ impl HairRenderPlugin {
     }
 }
 
-/// The systems that draw: in `PostUpdate` after transforms have been propagated and before visibility
-/// is, and in the render world's `ExtractSchedule` the one write to the GPU.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct HairRenderSystems;
-
 impl Plugin for HairRenderPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<HairLook>(app);
@@ -103,7 +98,7 @@ impl Plugin for HairRenderPlugin {
             );
         app.add_systems(
             PostUpdate,
-            share::measure.after(TransformSystems::Propagate).after(HairRenderSystems),
+            screen_share::measure.after(TransformSystems::Propagate).after(HairRenderSystems),
         );
         // The drawn child inherits it. An error says that the user has required it already.
         let _ = app.try_register_required_components::<Hair, Visibility>();
@@ -142,23 +137,4 @@ impl Plugin for HairRenderPlugin {
         upload::plugin(app);
         beads::finish(app);
     }
-}
-
-/// Whether the graphics device can draw hair; tells once if not. Asked only while running, because
-/// the device may come with a plugin that is finished later.
-fn supported(adapter: Option<Res<RenderAdapter>>, mut known: Local<Option<bool>>) -> bool {
-    let Some(adapter) = adapter else {
-        return true;
-    };
-    *known.get_or_insert_with(|| {
-        let flags = adapter.get_downlevel_capabilities().flags;
-        let supported = flags.contains(DownlevelFlags::VERTEX_STORAGE);
-        if !supported {
-            tracing::warn!(
-                "hair is not drawn: the graphics device gives vertex shaders no storage buffers; \
-                 use Vulkan, Metal, Direct3D 12 or WebGPU"
-            );
-        }
-        supported
-    })
 }

@@ -1,6 +1,6 @@
 //! The one write a frame: packed nodes into the GPU buffer that is there already.
 
-use super::{HairRenderSystems, buffers::HairBuffers, draw::Packed};
+use super::{buffers::HairBuffers, draw::Packed, sets::HairRenderSystems};
 use bevy::{
     prelude::*,
     render::{

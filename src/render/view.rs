@@ -1,9 +1,6 @@
 //! What of the hair is shown: its looks, or a quantity as a heat map.
 
-use crate::{
-    bond::BondKind,
-    setting::{HairSetting, Notes},
-};
+use crate::{bond::BondKind, setting::Ranged};
 use bevy::prelude::*;
 
 /// What is shown of a hair. Component of a [`Hair`](crate::Hair), may change at any time; where
@@ -55,8 +52,4 @@ impl HairView {
     }
 }
 
-impl HairSetting for HairView {
-    fn mended(&self, _: &Notes) -> Self {
-        *self
-    }
-}
+impl Ranged for HairView {}

@@ -9,11 +9,8 @@
 //! mended along the surface instead of against it, which would end in compression. A node that the
 //! strand pulls off the surface is let go.
 
-use super::{
-    algebra::V3,
-    block::{BlockLanes, NodeLanes, load},
-    lanes::{LANES, Real},
-};
+use super::block::{BlockLanes, NodeLanes};
+use crate::lanes::{LANES, Real, V3, load};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// a: how firmly an obstacle holds against being pushed into. Below 1, so that a strand pressed

@@ -11,28 +11,26 @@
 //! | [`stiffness`] | weights from the gravity-bending length (the paper gives none) |
 //! | [`block`] | strands side by side: their layout, into it and back |
 //! | [`step`] | one substep: predict, project, limit lengths, velocities |
+//! | [`direct`] | the default solver: one implicit step of a whole strand per substep |
 //! | `sweep` | the iterations, root to tip, several at once |
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
 //! | [`obstacle`] | colliders as half-space, capsule and cylinder, with friction |
 //!
-//! Strands of equal node count are solved [`LANES`] side by side; see [`block`] for the layout.
+//! Strands of equal node count are solved [`LANES`](crate::lanes::LANES) side by side; see [`block`] for the layout.
 
-pub mod algebra;
-pub(crate) mod batch;
+#[doc(hidden)]
 pub mod block;
 pub mod constraint;
+pub mod direct;
+#[doc(hidden)]
 pub mod frame;
-pub mod lanes;
 pub(crate) mod limiter;
+#[doc(hidden)]
 pub mod obstacle;
+#[doc(hidden)]
 pub mod step;
 pub mod stiffness;
 mod sweep;
-mod systems;
-pub(crate) mod turn;
 
 pub use constraint::StretchProjection;
-pub use lanes::LANES;
-pub use stiffness::{Solver, Stiffness};
-pub use systems::RodPlugin;
-pub(crate) use systems::project;
+pub use stiffness::{HairSolver, SolverMethod, Stiffness, Sweeps};

@@ -1,9 +1,6 @@
 //! Colliders as rod mathematics sees them: half-spaces, capsules and cylinders, in lanes.
 
-use super::{
-    algebra::V3,
-    lanes::{LANES, Real},
-};
+use crate::lanes::{LANES, Real, V3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 use glam::{Affine3A, BVec3, Vec3};
 

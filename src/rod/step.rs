@@ -5,15 +5,14 @@
 //! then velocities from the change.
 
 use super::{
-    algebra::V3,
-    block::{BlockLanes, NodeLanes, load, load3, load4, store3, store4},
+    block::{BlockLanes, NodeLanes},
     constraint::StretchProjection,
-    lanes::{LANES, Real},
     limiter::limit_lengths,
     obstacle::{Obstacle, hold_back, push_out},
-    stiffness::Stiffness,
+    stiffness::Sweeps,
     sweep::project,
 };
+use crate::lanes::{LANES, Real, V3, load, load3, load4, store3, store4};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 /// Passes that a limiter step takes for strands that touch something.
@@ -68,13 +67,13 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacle
 }
 
 /// Makes inverse masses of the masses that were gathered, which are in those of dry nodes, and, given
-/// the strands' stiffness, inverse rotational masses of the edges.
-pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<&Stiffness>) {
+/// the sweeps' settings with the gravity-bending length, inverse rotational masses of the edges.
+pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<(&Sweeps, f32)>) {
     dispatch!(level, simd => weigh_simd(simd, block, stiffness));
 }
 
 #[inline(always)]
-fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<&Stiffness>) {
+fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<(&Sweeps, f32)>) {
     let (zero, two) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 2.0));
     let mut sum = zero;
     for e in &b.edges {
@@ -86,8 +85,8 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<&Stiffness
         let mut after = zero;
         if let Some(e) = b.edges.get_mut(i) {
             after = load(simd, &e.l);
-            if let Some(stiffness) = stiffness {
-                stiffness.rotational_weight(after, mean).store_array(&mut e.wq);
+            if let Some((sweeps, bending_length)) = stiffness {
+                sweeps.rotational_weight(bending_length, after, mean).store_array(&mut e.wq);
             }
         }
         // Half a cell on either side, so the tip carries half a mass.
@@ -153,7 +152,7 @@ fn predict_edges<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
 /// Takes nodes out of obstacles, with friction, and notes what touches.
 #[inline(always)]
 pub(crate) fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, skin: f32, obstacles: &[Obstacle]) {
-    contacts_with(simd, b, skin, obstacles, Grip::WHOLE);
+    contacts_with(simd, b, skin, obstacles, Grip::WHOLE, f32x16::splat(simd, 1.0));
 }
 
 /// How much of the depth that a node is found at says how hard it is pressed on an obstacle: of nodes
@@ -166,9 +165,11 @@ pub(super) struct Grip {
 
 impl Grip {
     pub(super) const WHOLE: Self = Self { resting: 1.0, others: 1.0 };
+    /// No friction.
+    pub(super) const NONE: Self = Self { resting: 0.0, others: 0.0 };
 }
 
-/// [`contacts`], where depths are not what a whole step's forces came to.
+/// [`contacts`], where depths are not what a whole step's forces came to, and of lanes that are not 0.
 #[inline(always)]
 pub(super) fn contacts_with<S: Simd>(
     simd: S,
@@ -176,6 +177,7 @@ pub(super) fn contacts_with<S: Simd>(
     skin: f32,
     obstacles: &[Obstacle],
     grip: Grip,
+    lanes: f32x16<S>,
 ) {
     b.touched = [0.0; LANES];
     if obstacles.is_empty() {
@@ -183,7 +185,7 @@ pub(super) fn contacts_with<S: Simd>(
     }
     let mut touched = f32x16::splat(simd, 0.0);
     for n in &mut b.nodes {
-        touched = Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles, grip));
+        touched = Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles, grip, lanes));
     }
     touched.store_array(&mut b.touched);
 }
@@ -198,13 +200,14 @@ pub(super) fn touch<S: Simd>(
     skin: f32,
     obstacles: &[Obstacle],
     grip: Grip,
+    lanes: f32x16<S>,
 ) -> f32x16<S> {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let mut touched = zero;
     if obstacles.is_empty() {
         return touched;
     }
-    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+    let held = Real::lt(load(simd, &n.w) * lanes, f32x16::splat(simd, 1e-12));
     let from = load3(simd, &n.from);
     let rested = n.support(simd);
     let grip = Real::select(
@@ -218,14 +221,14 @@ pub(super) fn touch<S: Simd>(
         // may be the wrong one.
         if sweeps && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin) {
             p = V3::select(held, p, before);
-            let stopped = Real::lt(zero, normal.dot(normal));
+            let stopped = Real::lt(zero, normal.dot(normal) * lanes);
             rests_on = V3::select(stopped, normal, rests_on);
             touched = Real::select(stopped, one, touched);
         }
         let friction = grip * f32x16::splat(simd, o.friction);
         if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
             p = V3::select(held, p, out);
-            let pushed = Real::lt(zero, normal.dot(normal));
+            let pushed = Real::lt(zero, normal.dot(normal) * lanes);
             rests_on = V3::select(pushed, normal, rests_on);
             touched = Real::select(pushed, one, touched);
         }

@@ -5,15 +5,14 @@
 //! so each finds all as if the one before had ended, and the result is the same to the bit.
 
 use super::{
-    algebra::{Quaternion, V3},
-    block::{BlockLanes, Lane, load, load4, store3, store4},
+    block::BlockLanes,
     constraint::{
         BendShares, EdgeWeights, StretchProjection, StretchShares, bend_twist, stretch_shear,
     },
-    lanes::{LANES, Real},
     obstacle::Obstacle,
     step::{Grip, StepParams, touch},
 };
+use crate::lanes::{LANES, Lane, Quaternion, Real, V3, load, load4, store3, store4};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// How many iterations run down a strand one behind the other, at most.
@@ -74,7 +73,7 @@ fn share<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
 
 /// What a sweep carries in registers from one edge to the next.
 #[derive(Clone, Copy)]
-struct Carried<S: Simd> {
+struct Follower<S: Simd> {
     /// The edge before, which has yet to turn for the joint that follows.
     before: Quaternion<f32x16<S>>,
     /// The node between them.
@@ -93,8 +92,9 @@ fn sweeps<S: Simd, const P: usize>(
     obstacles: &[Obstacle],
 ) {
     let edges = b.edges.len();
+    let all = f32x16::splat(simd, 1.0);
     let (before, p1) = (load4(simd, &b.root), b.nodes[0].position(simd));
-    let mut carried = [Carried { before, p1 }; ABREAST];
+    let mut carried = [Follower { before, p1 }; ABREAST];
     for step in 0..edges + 2 * (abreast - 1) {
         for (k, carried) in carried.iter_mut().take(abreast).enumerate() {
             let i = step.wrapping_sub(2 * k);
@@ -106,11 +106,11 @@ fn sweeps<S: Simd, const P: usize>(
                 carried.p1 = b.nodes[0].position(simd);
             }
             pass_edge::<S, P>(simd, b, i, carried);
-            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles, Grip::WHOLE);
+            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles, Grip::WHOLE, all);
             if i + 1 == edges {
                 store4(&mut b.edges[i].q, carried.before);
                 store3(&mut b.nodes[i + 1].p, carried.p1);
-                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles, Grip::WHOLE);
+                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles, Grip::WHOLE, all);
             }
         }
     }
@@ -122,10 +122,10 @@ fn pass_edge<S: Simd, const P: usize>(
     simd: S,
     b: &mut BlockLanes,
     i: usize,
-    carried: &mut Carried<S>,
+    carried: &mut Follower<S>,
 ) {
     let one = f32x16::splat(simd, 1.0);
-    let Carried { before, p1 } = *carried;
+    let Follower { before, p1 } = *carried;
     let (e, shares) = (&b.edges[i], &b.shares[i]);
     let q = load4(simd, &e.q);
     let (d_before, d_q) =
@@ -138,17 +138,14 @@ fn pass_edge<S: Simd, const P: usize>(
         store4(&mut b.edges[i - 1].q, turned);
     }
     store3(&mut b.nodes[i].p, p1 + c.p1);
-    *carried = Carried { before: q.add_scaled(c.q, one).renormalize(), p1: p2 + c.p2 };
+    *carried = Follower { before: q.add_scaled(c.q, one).renormalize(), p1: p2 + c.p2 };
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::obstacle::Solid;
     use super::*;
-    use crate::rod::{
-        algebra::V3,
-        block::{put3, put4},
-        obstacle::Solid,
-    };
+    use crate::lanes::{V3, put3, put4};
     use fearless_simd::{Level, dispatch};
     use glam::{Quat, Vec3};
 

@@ -1,4 +1,4 @@
-//! Sleep as mathematics: what counts as the same place.
+//! StrandSleep as mathematics: what counts as the same place.
 
 use crate::rod::obstacle::Solid;
 use glam::{Quat, Vec3};

@@ -5,23 +5,22 @@ use super::{
     model::{displacement, held_nodes, keeps_turn, lever, stays, turn, within},
 };
 use crate::{
-    air::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, model::wind},
     bond::{BondChanges, BondInfluence, Bonds, Cuticle},
     contact::{HairCollider, LockContact, seen_from},
-    lod,
+    environment::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, wind::wind},
+    mass_spring::Springs,
     parallel::for_each,
     rod::{
-        Solver, Stiffness,
+        HairSolver, Stiffness, Sweeps,
         obstacle::{Obstacle, Solid},
     },
-    setting::{self, Settings},
-    spring::Springs,
+    schedule::{HairStep, HairSystems, HairTick, first_substep},
+    setting::{self, Ranged, Settings},
     strand::{
-        self, Burden, Hair, HeldNodes, Pose, Sleep, Sleepers, StillPose, Strand, StrandModel,
-        StrandOf, Strands, TickPose,
+        AddedMass, Hair, HeldNodes, Pose, Sleepers, StillPose, Strand, StrandModel, StrandOf,
+        StrandSleep, Strands, TickPose,
     },
-    style::Treatments,
-    tick::{HairStep, HairSystems, HairTick},
+    treatment::Treatments,
     water::Moisture,
 };
 use bevy::{
@@ -42,19 +41,10 @@ pub struct SleepPlugin;
 impl Plugin for SleepPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<HairSleep>(app);
-        app.register_type::<Watch>()
-            .register_required_components::<Hair, Watch>()
+        app.register_type::<SleepSnapshot>()
+            .register_required_components::<Hair, SleepSnapshot>()
             .register_required_components::<Hair, Sleepers>()
-            .add_systems(
-                HairTick,
-                watch
-                    .in_set(HairSystems::Roots)
-                    .after(strand::move_poses)
-                    .after(lod::choose_guides)
-                    .before(lod::lull)
-                    .before(strand::carry_strands)
-                    .run_if(|step: Res<HairStep>| step.index == 0),
-            );
+            .add_systems(HairTick, update_sleep.in_set(HairSystems::Sleep).run_if(first_substep));
     }
 }
 
@@ -64,7 +54,8 @@ struct Conditions {
     gravity: Vec3,
     sleep: HairSleep,
     stiffness: Stiffness,
-    solver: Solver,
+    solver: HairSolver,
+    sweeps: Sweeps,
     influence: BondInfluence,
     cuticle: Cuticle,
     contact: LockContact,
@@ -74,11 +65,12 @@ struct Conditions {
 }
 
 #[derive(SystemParam)]
-struct EverySetting<'w, 's> {
+struct RestSettings<'w, 's> {
     gravity: Res<'w, HairGravity>,
     sleep: Settings<'w, 's, HairSleep>,
     stiffness: Settings<'w, 's, Stiffness>,
-    solver: Settings<'w, 's, Solver>,
+    solver: Settings<'w, 's, HairSolver>,
+    sweeps: Settings<'w, 's, Sweeps>,
     influence: Settings<'w, 's, BondInfluence>,
     cuticle: Settings<'w, 's, Cuticle>,
     contact: Settings<'w, 's, LockContact>,
@@ -87,13 +79,14 @@ struct EverySetting<'w, 's> {
     springs: Settings<'w, 's, Springs>,
 }
 
-impl EverySetting<'_, '_> {
+impl RestSettings<'_, '_> {
     fn of(&self, hair: Entity) -> Conditions {
         Conditions {
-            gravity: if self.gravity.is_finite() { self.gravity.0 } else { Vec3::ZERO },
+            gravity: self.gravity.clamped().0,
             sleep: self.sleep.of(hair),
             stiffness: self.stiffness.of(hair),
             solver: self.solver.of(hair),
+            sweeps: self.sweeps.of(hair),
             influence: self.influence.of(hair),
             cuticle: self.cuticle.of(hair),
             contact: self.contact.of(hair),
@@ -107,17 +100,17 @@ impl EverySetting<'_, '_> {
 /// What a hair was like when something last happened to it.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub(super) struct Watch {
+pub(super) struct SleepSnapshot {
     conditions: Option<Conditions>,
     pose: Pose,
     members: usize,
     /// The colliders in its frame.
     #[reflect(ignore)]
-    solids: Vec<Seen>,
+    solids: Vec<SeenCollider>,
 }
 
 /// What happened to a hair as a whole since the tick before.
-struct News {
+struct WakeEvents {
     sleep: HairSleep,
     /// All its strands are awake.
     stirred: bool,
@@ -126,21 +119,21 @@ struct News {
     blowers: Vec<LocalBlower>,
 }
 
-impl Watch {
+impl SleepSnapshot {
     /// Notes what is otherwise, and says what that means for the strands.
-    fn news(
+    fn wake_events(
         &mut self,
         conditions: Conditions,
         pose: &Pose,
         members: usize,
-        seen: Vec<Seen>,
+        seen: Vec<SeenCollider>,
         substeps: u32,
-    ) -> News {
+    ) -> WakeEvents {
         let distance = conditions.sleep.distance();
         let apart = pose.translation.distance(self.pose.translation) / pose.scale;
         // A turn counts as what it does to the tip of a long strand.
-        let turned = turn(self.pose.rotation, pose.rotation) * LONG;
-        let scaled = (pose.scale / self.pose.scale - 1.0).abs() * LONG;
+        let turned = turn(self.pose.rotation, pose.rotation) * LONG_STRAND;
+        let scaled = (pose.scale / self.pose.scale - 1.0).abs() * LONG_STRAND;
         let rests = apart <= distance && turned <= distance && scaled <= distance;
         let same = self.conditions == Some(conditions) && self.members == members;
         if !rests {
@@ -150,14 +143,19 @@ impl Watch {
         self.members = members;
         let skin = conditions.contact.radius + CLEARANCE;
         let solids = self.compare_solids(seen, distance, skin, substeps);
-        News { sleep: conditions.sleep, stirred: !(rests && same), solids, blowers: Vec::new() }
+        WakeEvents {
+            sleep: conditions.sleep,
+            stirred: !(rests && same),
+            solids,
+            blowers: Vec::new(),
+        }
     }
 
     /// The solids that have changed, before and after, with the reach in which they may be felt
     /// within this tick.
     fn compare_solids(
         &mut self,
-        now: Vec<Seen>,
+        now: Vec<SeenCollider>,
         distance: f32,
         skin: f32,
         substeps: u32,
@@ -176,7 +174,7 @@ impl Watch {
             }
             return changed;
         }
-        let unknown = |one: &&Seen, others: &[Seen]| {
+        let unknown = |one: &&SeenCollider, others: &[SeenCollider]| {
             others.iter().all(|other| !within(other.moved(one), distance))
         };
         changed.extend(now.iter().filter(|s| unknown(s, &self.solids)).map(|s| (s.solid, skin)));
@@ -188,13 +186,13 @@ impl Watch {
 
 /// A collider as a hair saw it.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct SeenCollider {
     solid: Solid,
     friction: f32,
     rotation: Quat,
 }
 
-impl Seen {
+impl SeenCollider {
     /// How far its surface has moved (m): a ball that only turns takes hair along too.
     fn moved(&self, now: &Self) -> f32 {
         let friction = if self.friction == now.friction { 0.0 } else { f32::INFINITY };
@@ -204,68 +202,72 @@ impl Seen {
 }
 
 /// How long a long strand is (m).
-const LONG: f32 = 0.3;
+const LONG_STRAND: f32 = 0.3;
 
 struct Item<'a> {
     hair: usize,
     strand: Mut<'a, Strand>,
-    sleep: Mut<'a, Sleep>,
+    sleep: Mut<'a, StrandSleep>,
     still: Mut<'a, StillPose>,
     held: Option<&'a HeldNodes>,
     /// Whether its bonds or its water are on the move, or somebody wrote to it.
     restless: bool,
 }
 
-fn watch(
+fn update_sleep(
     step: Res<HairStep>,
-    settings: EverySetting,
+    settings: RestSettings,
     colliders: Query<(&HairCollider, &TickPose)>,
     blowers: Query<(&Blower, &TickPose)>,
-    mut hairs: Query<(Entity, &TickPose, &mut Watch, &mut Sleepers, Option<&Strands>), With<Hair>>,
+    mut hairs: Query<
+        (Entity, &TickPose, &mut SleepSnapshot, &mut Sleepers, Option<&Strands>),
+        With<Hair>,
+    >,
     mut strands: Query<(
         &StrandOf,
         &mut Strand,
-        &mut Sleep,
+        &mut StrandSleep,
         &mut StillPose,
-        (Ref<Bonds>, &BondChanges, &Burden),
+        (Ref<Bonds>, &BondChanges, &AddedMass),
         (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
     )>,
 ) {
-    let mut news: Vec<News> = Vec::new();
+    let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
-    for (hair, frame, mut watch, _, members) in &mut hairs {
+    for (hair, frame, mut snapshot, _, members) in &mut hairs {
         let seen = colliders.iter().map(|(collider, pose)| {
-            let Obstacle { solid, friction, .. } = seen_from(frame, &collider.valid(), pose);
+            let Obstacle { solid, friction, .. } = seen_from(frame, &collider.clamped(), pose);
             let rotation = frame.now().rotation.inverse() * pose.now().rotation;
-            Seen { solid, friction, rotation }
+            SeenCollider { solid, friction, rotation }
         });
         let seen = seen.collect();
         let members = members.map_or(0, |members| members.len());
-        let watch = watch.bypass_change_detection();
-        let mut new = watch.news(settings.of(hair), frame.now(), members, seen, step.count);
+        let snapshot = snapshot.bypass_change_detection();
+        let mut new =
+            snapshot.wake_events(settings.of(hair), frame.now(), members, seen, step.count);
         new.blowers = local_blowers(frame.now(), &blowers);
-        index_of.insert(hair, news.len());
-        news.push(new);
+        index_of.insert(hair, wake_events.len());
+        wake_events.push(new);
     }
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
-    for (of, strand, mut sleep, still, (bonds, changes, burden), others) in &mut strands {
+    for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
         let Some(&hair) = index_of.get(&of.0) else { continue };
         let (treatments, water, held) = others;
         let restless = strand.is_changed()
             || bonds.is_changed()
             || sleep.bypass_change_detection().take_disturbed()
             || !changes.is_empty()
-            || !burden.mass.is_empty()
+            || !added_mass.mass.is_empty()
             || treatments.is_some_and(|t| !t.acting().is_empty())
             || water.is_some_and(|water| !water.is_untouched());
         items.push(Item { hair, strand, sleep, still, held, restless });
     }
     let seconds = step.dt * step.count as f32;
-    for_each(&mut items, |item| decide(item, &news[item.hair], seconds));
-    let mut counts = vec![Sleepers::default(); news.len()];
+    for_each(&mut items, |item| decide(item, &wake_events[item.hair], seconds));
+    let mut counts = vec![Sleepers::default(); wake_events.len()];
     for item in &items {
         // The carried sleep when those do whom they follow.
-        if item.sleep.is_carried() {
+        if item.sleep.is_follower() {
             continue;
         }
         let count = &mut counts[item.hair];
@@ -278,22 +280,22 @@ fn watch(
 }
 
 /// Whether one strand sleeps from now on.
-fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
+fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
     let Item { strand, sleep, still, held, restless, .. } = item;
-    if sleep.is_carried() {
+    if sleep.is_follower() {
         return;
     }
     let strand = strand.bypass_change_detection();
-    let (distance, angle) = (news.sleep.distance(), news.sleep.angle());
+    let (distance, angle) = (wake_events.sleep.distance(), wake_events.sleep.angle());
     let targets = held.map_or(&[][..], |held| &held.targets);
-    let restless = *restless || news.stirred || strand.nodes() < 2;
+    let restless = *restless || wake_events.stirred || strand.nodes() < 2;
     if sleep.is_asleep() {
         if restless
             || was_pushed(strand)
             || has_moved_root(strand, still, distance, angle)
             || pulls(strand, still, targets, distance)
-            || comes_near(still, &news.solids)
-            || is_blown(strand, &news.blowers)
+            || comes_near(still, &wake_events.solids)
+            || is_blown(strand, &wake_events.blowers)
         {
             sleep.bypass_change_detection().wake_up();
             still.bypass_change_detection().begin(strand, held_nodes(targets));
@@ -301,7 +303,7 @@ fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
         return;
     }
     let (sleep, still) = (sleep.bypass_change_detection(), still.bypass_change_detection());
-    if news.sleep.seconds == f32::INFINITY {
+    if wake_events.sleep.seconds == f32::INFINITY {
         sleep.wake_up();
         return;
     }
@@ -310,21 +312,21 @@ fn decide(item: &mut Item<'_>, news: &News, seconds: f32) {
         || !keeps_turn(&still.orientations, strand.orientations(), angle)
         || has_moved_root(strand, still, distance, angle)
         || pulls(strand, still, targets, distance)
-        || is_blown(strand, &news.blowers)
+        || is_blown(strand, &wake_events.blowers)
     {
         sleep.wake_up();
         still.begin(strand, held_nodes(targets));
         return;
     }
     sleep.lie_still(seconds);
-    if sleep.still_for() >= news.sleep.seconds {
+    if sleep.still_for() >= wake_events.sleep.seconds {
         still.distance = distance;
         (still.low, still.high) = (strand.positions()[0], strand.positions()[0]);
         for p in strand.positions() {
             (still.low, still.high) = (still.low.min(*p), still.high.max(*p));
         }
         // What comes in this very tick would find it asleep.
-        if !comes_near(still, &news.solids) {
+        if !comes_near(still, &wake_events.solids) {
             sleep.fall_asleep();
             strand.rest();
         }

@@ -7,7 +7,7 @@
 //! at rest in the world seem to move the other way: each substep the nodes are carried by the inverse
 //! of the frame's motion, which is exactly inertia.
 
-use crate::setting::{Bound, HairSetting, Notes};
+use crate::setting::setting;
 use bevy::{
     math::{Affine3A, Isometry3d},
     prelude::*,
@@ -84,33 +84,37 @@ impl Default for TickPose {
     }
 }
 
-/// What the motion of the head does to its hair. Component of a [`Hair`](crate::Hair), may change at
-/// any time; where absent, [`HairDefault<HairInertia>`](crate::HairDefault) holds.
-///
-/// The fastest characters run and turn harder than any person could; with less inertia their hair
-/// still flies behind them, but by less.
-///
-/// ```
-/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// # let mut world = World::new();
-/// // a cartoon hero who dashes about
-/// world.spawn((Hair, HairInertia { moving: 0.3, turning: 0.5, ..default() }));
-/// ```
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct HairInertia {
-    /// Share of the head's movement that hair is left behind by: 1 as in nature, 0 for hair that
-    /// goes along as if the head rested. Headwind and drag are scaled along. Default 1, safe 0…1.
-    pub moving: f32,
-    /// The same of the head's turning. Default 1, safe 0…1.
-    pub turning: f32,
-    /// A head that moves farther than this within one tick is taken to have been put elsewhere: its
-    /// hair goes along in its present shape, at rest (m in the hair's own scale). Default 1, at
-    /// 60 Hz 60 m/s; safe 0.1…∞.
-    pub teleport_distance: f32,
-    /// The same for a head that turns by more than this (rad). Default 1.6, at 60 Hz more than
-    /// 5000° a second; π and above never happen.
-    pub teleport_angle: f32,
+setting! {
+    /// What the motion of the head does to its hair. Component of a [`Hair`](crate::Hair), may change at
+    /// any time; where absent, [`HairDefault<HairInertia>`](crate::HairDefault) holds.
+    ///
+    /// The fastest characters run and turn harder than any person could; with less inertia their hair
+    /// still flies behind them, but by less.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # let mut world = World::new();
+    /// // a cartoon hero who dashes about
+    /// world.spawn((Hair, HairInertia { moving: 0.3, turning: 0.5, ..default() }));
+    /// ```
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct HairInertia {
+        /// Share of the head's movement that hair is left behind by: 1 as in nature, 0 for hair that
+        /// goes along as if the head rested. Headwind and drag are scaled along.
+        pub moving: f32 = 1.0, in MOVING: 0.0..=1.0, "1 is as in nature";
+        /// The same of the head's turning.
+        pub turning: f32 = 1.0, in TURNING: 0.0..=1.0, "1 is as in nature";
+        /// A head that moves farther than this within one tick is taken to have been put elsewhere:
+        /// its hair goes along in its present shape, at rest. In the hair's own scale; 1 is 60 m/s at
+        /// 60 Hz.
+        pub teleport_distance: f32 = 1.0, "m" in TELEPORT_DISTANCE: 0.0..=f32::INFINITY,
+            safe 0.1..=f32::INFINITY, "1 suits games";
+        /// The same for a head that turns by more than this. 1.6 is more than 5000° a second at
+        /// 60 Hz; π and above never happen.
+        pub teleport_angle: f32 = 1.6, "rad" in TELEPORT_ANGLE: 0.0..=f32::INFINITY,
+            "1.6 suits games";
+    }
 }
 
 impl HairInertia {
@@ -119,31 +123,6 @@ impl HairInertia {
         let scale = to.scale.max(from.scale);
         to.translation.distance(from.translation) > self.teleport_distance * scale
             || to.rotation.angle_between(from.rotation) > self.teleport_angle
-    }
-}
-
-impl Default for HairInertia {
-    fn default() -> Self {
-        Self { moving: 1.0, turning: 1.0, teleport_distance: 1.0, teleport_angle: 1.6 }
-    }
-}
-
-const MOVING: Bound = Bound::new("HairInertia::moving", 0.0, 1.0, "1 is as in nature");
-const TURNING: Bound = Bound::new("HairInertia::turning", 0.0, 1.0, "1 is as in nature");
-const DISTANCE: Bound =
-    Bound::new("HairInertia::teleport_distance (m)", 0.0, f32::INFINITY, "1 suits games");
-const ANGLE: Bound =
-    Bound::new("HairInertia::teleport_angle (rad)", 0.0, f32::INFINITY, "1.6 suits games");
-
-impl HairSetting for HairInertia {
-    fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        Self {
-            moving: MOVING.mend(self.moving, d.moving, notes),
-            turning: TURNING.mend(self.turning, d.turning, notes),
-            teleport_distance: DISTANCE.mend(self.teleport_distance, d.teleport_distance, notes),
-            teleport_angle: ANGLE.mend(self.teleport_angle, d.teleport_angle, notes),
-        }
     }
 }
 
@@ -238,7 +217,7 @@ impl TickPose {
         }
         let seen = |own: &Pose, hair: &Pose| hair.affine().inverse() * own.affine();
         let (before, now) = (seen(&self.before, &hair.before), seen(&self.now, &hair.now));
-        let carried = hair.carry().map_or(before, |carry| Affine3A::from(carry) * before);
+        let carried = hair.frame_delta().map_or(before, |carry| Affine3A::from(carry) * before);
         (now != carried).then(|| now * carried.inverse())
     }
 
@@ -292,7 +271,7 @@ impl TickPose {
 
     /// How a point at rest in the world moves in this frame during the substep; `None` if the frame
     /// did not move. With less than full [`HairInertia`] the world seems to move by a share of it.
-    pub fn carry(&self) -> Option<Isometry3d> {
+    pub fn frame_delta(&self) -> Option<Isometry3d> {
         (self.before != self.now).then(|| {
             let rotation = (self.now.rotation.inverse() * self.before.rotation).normalize();
             let translation = self.now.rotation.inverse()
@@ -350,13 +329,13 @@ mod tests {
         let inertia = HairInertia { teleport_distance: 10.0, ..default() };
         assert_eq!(frame.aim(Some(a), 0.0, &inertia), (false, false));
         frame.advance(1.0);
-        assert!(frame.carry().is_none(), "the first tick begins where the frame is");
+        assert!(frame.frame_delta().is_none(), "the first tick begins where the frame is");
         frame.aim(Some(b), 0.0, &inertia);
         let world = Vec3::new(0.2, 0.4, -0.3);
         let mut local = a.point_in(world);
         for i in 1..=6 {
             frame.advance(i as f32 / 6.0);
-            local = frame.carry().unwrap() * local;
+            local = frame.frame_delta().unwrap() * local;
         }
         assert!(b.point_out(local).distance(world) < 1e-5);
         let mut reports = || frame.aim(None, 0.0, &inertia).1;

@@ -9,30 +9,28 @@
 //! substeps; drawing places the nodes with the pose that is drawn, so roots never lag. Lengths are
 //! in the hair's units: a scaled character's hair behaves as if unscaled.
 
-mod command;
 pub mod frame;
 mod per_hair;
 mod sleep;
 mod systems;
+mod teleport;
 
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use per_hair::PerHair;
-pub use sleep::{Sleep, Sleepers, StillPose};
+pub use sleep::{Sleepers, StillPose, StrandSleep};
 pub use systems::StrandPlugin;
-pub(crate) use systems::{carry_strands, move_poses};
 
 use crate::{
-    bond::{BondChanges, Bonds, RestShape},
-    fault::Fault,
-    prefetch::prefetch,
+    fault::{FaultKind, HairFault},
+    parallel::prefetch,
     rod::frame::{darboux, full, parallel_transport},
-    setting::{HairSetting, Notes},
+    setting::Ranged,
 };
 use bevy::prelude::*;
 
 /// The wearer's hair as one thing. Put it on any entity with a transform, such as a head bone; spawn
 /// strands with [`StrandOf`] pointing here. Settings ([`Stiffness`](crate::Stiffness),
-/// [`Solver`](crate::Solver), [`AirDrag`](crate::AirDrag), [`BondInfluence`](crate::BondInfluence),
+/// [`HairSolver`](crate::HairSolver), [`AirDrag`](crate::AirDrag), [`BondInfluence`](crate::BondInfluence),
 /// [`Cuticle`](crate::Cuticle), [`LockContact`](crate::LockContact)) may be added as components.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
@@ -87,14 +85,16 @@ pub const MIN_SEGMENT: f32 = 1e-6;
 /// number of nodes stays what it was.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-#[require(Bonds, BondChanges, RestShape, StrandHistory, Burden, Sleep, StillPose)]
+#[require(StrandHistory, AddedMass, StrandSleep, StillPose)]
 pub struct Strand {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
     orientations: Vec<Quat>,
     angular_velocities: Vec<Vec3>,
     rest_lengths: Vec<f32>,
+    tensions: Vec<f32>,
     root_frame: Quat,
+    root_before: Option<(Vec3, Quat)>,
     was_put_back: bool,
 }
 
@@ -111,6 +111,11 @@ pub struct StrandHistory {
 }
 
 impl StrandHistory {
+    /// Takes the present for the past: the strand is drawn where it is, as if it had not moved.
+    pub(crate) fn remember(&mut self, strand: &Strand) {
+        self.positions.clone_from(&strand.positions);
+    }
+
     fn between(&self, strand: &Strand, node: usize, overstep: f32) -> Vec3 {
         let now = strand.positions[node];
         match self.positions.get(node) {
@@ -140,22 +145,18 @@ pub enum StrandModel {
     /// Cosserat rods with side-chain bonds, \[B\].
     #[default]
     Rod,
-    /// Masses and [`Springs`](crate::spring::Springs), \[W\] equation 1: cheaper, straight at rest,
+    /// Masses and [`Springs`](crate::mass_spring::Springs), \[W\] equation 1: cheaper, straight at rest,
     /// without bonds.
     MassSpring,
 }
 
-impl HairSetting for StrandModel {
-    fn mended(&self, _: &Notes) -> Self {
-        *self
-    }
-}
+impl Ranged for StrandModel {}
 
 /// What weighs on a strand and softens it, beside its own dry state: water does. Written by the
 /// tick; empty on dry hair.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub struct Burden {
+pub struct AddedMass {
     /// Added mass of each node, over its dry mass. Inverse masses, wind and contacts heed it.
     pub mass: Vec<f32>,
     /// Share of its stiffness that each joint has lost, beyond open bonds.
@@ -203,8 +204,10 @@ impl Strand {
             angular_velocities: vec![Vec3::ZERO; orientations.len()],
             positions: points.to_vec(),
             root_frame: orientations[0],
+            tensions: vec![0.0; orientations.len()],
             orientations,
             rest_lengths,
+            root_before: None,
             was_put_back: false,
         })
     }
@@ -305,6 +308,7 @@ impl Strand {
     pub fn rest(&mut self) {
         self.velocities.fill(Vec3::ZERO);
         self.angular_velocities.fill(Vec3::ZERO);
+        self.tensions.fill(0.0);
     }
 
     /// Puts the strand into the shape given by a Darboux vector per joint, at rest, from its root
@@ -332,8 +336,10 @@ impl Strand {
     #[cfg(feature = "groom")]
     pub(crate) fn put_root(&mut self, place: Vec3, frame: Quat) {
         if place.is_finite() && frame.is_finite() {
+            let frame = frame.normalize();
+            self.root_before.get_or_insert((self.positions[0], self.root_frame));
             self.positions[0] = place;
-            self.root_frame = frame.normalize();
+            self.root_frame = frame;
         }
     }
 
@@ -349,20 +355,36 @@ impl Strand {
         *self = Self {
             velocities: vec![Vec3::ZERO; positions.len()],
             angular_velocities: vec![Vec3::ZERO; orientations.len()],
+            tensions: vec![0.0; orientations.len()],
             positions,
             orientations,
             rest_lengths,
             root_frame,
+            root_before: None,
             was_put_back: false,
         };
     }
 
-    /// Asks for the memory of what moves: positions, velocities, orientations, angular velocities.
+    /// Asks for the memory of what moves: positions, velocities, orientations.
     pub(crate) fn prefetch(&self) {
         prefetch(&self.positions);
         prefetch(&self.velocities);
         prefetch(&self.orientations);
-        prefetch(&self.angular_velocities);
+    }
+
+    /// Tension that the last substep of the direct solver left in each edge, for hair of which a whole
+    /// node weighs 1 kg (N).
+    pub(crate) fn tensions(&self) -> &[f32] {
+        &self.tensions
+    }
+
+    pub(crate) fn tensions_mut(&mut self) -> &mut [f32] {
+        &mut self.tensions
+    }
+
+    /// Where in the hair's frame the root was at the end of the last substep, with the scalp's frame.
+    pub(crate) fn root_before(&self) -> (Vec3, Quat) {
+        self.root_before.unwrap_or((self.positions[0], self.root_frame))
     }
 
     pub(crate) fn parts(&self) -> (&[Vec3], &[Vec3], &[Quat], &[Vec3]) {
@@ -384,13 +406,19 @@ impl Strand {
 
     /// After a step that left the finite numbers: back to what it was, at rest, or if that is not
     /// finite either to the pose its bonds remember. Says what happened unless it did last time too.
-    pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<Fault> {
+    pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<HairFault> {
         let how = if self.is_pose_finite() {
             self.rest();
-            Fault::PutBack
+            HairFault::new(
+                FaultKind::PutBack,
+                "the strand became non-finite and was put back to its last finite state, at rest",
+            )
         } else {
             self.pose(bonds.into_iter().map(|o| if o.is_finite() { o } else { Vec3::ZERO }));
-            Fault::Rebuilt
+            HairFault::new(
+                FaultKind::Rebuilt,
+                "the strand's state was not finite; its rest pose was rebuilt from root and bonds",
+            )
         };
         let again = core::mem::replace(&mut self.was_put_back, true);
         (!again).then_some(how)
@@ -398,6 +426,7 @@ impl Strand {
 
     pub(crate) fn stepped_well(&mut self) {
         self.was_put_back = false;
+        self.root_before = None;
     }
 }
 

@@ -9,7 +9,7 @@ use bevy::prelude::*;
 /// see [`LodLevel::strands`](crate::LodLevel::strands). Changes only at the start of a tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
-pub struct Sleep {
+pub struct StrandSleep {
     /// How long the strand has stayed where it is (s).
     still: f32,
     asleep: bool,
@@ -17,18 +17,18 @@ pub struct Sleep {
     disturbed: bool,
 }
 
-impl Sleep {
+impl StrandSleep {
     /// Whether forces, rest shapes and the projection act on it: it neither sleeps nor is carried.
     pub fn is_simulated(&self) -> bool {
         !self.asleep && !self.carried
     }
 
     /// Whether it goes along with others instead of being simulated.
-    pub fn is_carried(&self) -> bool {
+    pub fn is_follower(&self) -> bool {
         self.carried
     }
 
-    pub(crate) fn be_carried(&mut self, carried: bool) {
+    pub(crate) fn set_follower(&mut self, carried: bool) {
         self.carried = carried;
     }
 

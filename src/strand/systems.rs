@@ -1,15 +1,15 @@
 //! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
 
 use super::{
-    Burden, Hair, HeldNodes, PerHair, Sleep, Sleepers, StillPose, Strand, StrandError,
-    StrandHistory, StrandModel, StrandOf, Strands, TickPose,
+    AddedMass, Hair, HeldNodes, PerHair, Sleepers, StillPose, Strand, StrandError, StrandHistory,
+    StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     frame::{HairInertia, Pose},
 };
 use crate::{
-    fault::{Fault, HairFault},
+    fault::{FaultKind, HairFault},
     parallel::{for_each_part, tables},
+    schedule::{HairStep, HairSystems, HairTick},
     setting::{self, Settings},
-    tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::{math::Isometry3d, prelude::*};
 
@@ -26,15 +26,20 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandOf>()
             .register_type::<Strands>()
             .register_type::<StrandHistory>()
+            .register_type::<StrandError>()
             .register_type::<HeldNodes>()
-            .register_type::<Burden>()
-            .register_type::<Sleep>()
+            .register_type::<AddedMass>()
+            .register_type::<StrandSleep>()
             .register_type::<Sleepers>()
             .register_type::<StillPose>()
             .add_systems(PreUpdate, (report_unusable, record_frame))
             .add_systems(
                 HairTick,
-                (remember_drawn, move_poses, carry_strands).chain().in_set(HairSystems::Roots),
+                (
+                    remember_drawn.in_set(HairSystems::History),
+                    move_poses.in_set(HairSystems::Poses),
+                    apply_frame_inertia.in_set(HairSystems::FrameInertia),
+                ),
             );
     }
 }
@@ -47,21 +52,26 @@ fn report_unusable(
 ) {
     for (entity, strand, of) in &strands {
         if strand.is_added() && strand.nodes() < 2 {
-            let fault = Fault::Strand(StrandError::TooFewNodes { found: strand.nodes() });
-            faults.write(HairFault { entity, fault });
+            let error = StrandError::TooFewNodes { found: strand.nodes() };
+            faults.write(HairFault::caused(FaultKind::Strand, error, "it is left out").of(entity));
         }
         let homeless = match of {
             Some(of) => of.is_added() && !hairs.contains(of.0),
             None => strand.is_added(),
         };
         if homeless {
-            faults.write(HairFault { entity, fault: Fault::NoHair });
+            let message =
+                "the strand belongs to no hair: spawn it with StrandOf(hair), hair carrying Hair";
+            faults.write(HairFault::new(FaultKind::NoHair, message).of(entity));
         }
     }
 }
 
 /// Before the first substep of a tick: what was present becomes history.
-fn remember_drawn(step: Res<HairStep>, mut strands: Query<(&Strand, &Sleep, &mut StrandHistory)>) {
+fn remember_drawn(
+    step: Res<HairStep>,
+    mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory)>,
+) {
     if step.index > 0 {
         return;
     }
@@ -93,7 +103,7 @@ fn record_frame(
     }
 }
 
-pub(crate) fn move_poses(
+fn move_poses(
     step: Res<HairStep>,
     (time, frames): (Res<Time>, Res<Time<Virtual>>),
     transforms: TransformHelper,
@@ -110,7 +120,9 @@ pub(crate) fn move_poses(
             let a_frame_ago = time.elapsed_secs_f64() - frames.delta_secs_f64();
             let (put, report) = frame.aim(pose, a_frame_ago, &inertia.of(entity));
             if report {
-                faults.write(HairFault { entity, fault: Fault::Transform });
+                let message =
+                    "the transform is not finite or has no inverse: the last valid pose is used";
+                faults.write(HairFault::new(FaultKind::Transform, message).of(entity));
             }
             if let Some(members) = members.filter(|_| put) {
                 let mut theirs = strands.iter_many_mut(members.collection());
@@ -124,11 +136,11 @@ pub(crate) fn move_poses(
 }
 
 /// Inertia: free nodes are carried by the inverse of the frame's motion; the root stays.
-pub(crate) fn carry_strands(
+fn apply_frame_inertia(
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<(&StrandOf, &Sleep, &mut Strand)>,
+    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand)>,
 ) {
-    if hairs.iter().all(|hair| hair.carry().is_none()) {
+    if hairs.iter().all(|hair| hair.frame_delta().is_none()) {
         return;
     }
     for_each_part(
@@ -137,18 +149,18 @@ pub(crate) fn carry_strands(
         |(), rows| {
             let mut carries = PerHair::default();
             for (of, sleep, strand) in rows {
-                let carry = || hairs.get(of.0).ok()?.carry();
+                let carry = || hairs.get(of.0).ok()?.frame_delta();
                 if sleep.is_simulated()
                     && let Some(index) = carries.index(of.0, carry)
                 {
-                    carry_one(strand, &carries.values[index]);
+                    shift_by(strand, &carries.values[index]);
                 }
             }
         },
     );
 }
 
-fn carry_one(strand: &mut Strand, carry: &Isometry3d) {
+fn shift_by(strand: &mut Strand, carry: &Isometry3d) {
     let turn = carry.rotation;
     strand.positions.iter_mut().skip(1).for_each(|p| *p = *carry * *p);
     strand.velocities.iter_mut().for_each(|v| *v = turn * *v);

@@ -1,18 +1,14 @@
-//! A tuft among droplets: pulled by them (\[W\] equation 2), touched by them, landed on.
+//! A block of strands among droplets: pulled by them (\[W\] equation 2), touched by them, landed on.
 
 use super::{
     Wetting,
     field::{Falling, Field, Puller},
     model,
     moisture::node_lengths,
-    tuft::{Member, Row, Tuft},
+    strand_block::{Row, StrandBlock, StrandLane},
 };
 use crate::grid::Found;
-use crate::rod::{
-    algebra::V3,
-    block::{Lane, load, load3, store3},
-    lanes::{LANES, Real, lanes_in, splat3},
-};
+use crate::lanes::{LANES, Lane, Real, V3, lanes_in, load, load3, splat3, store3};
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -24,9 +20,9 @@ const SAME_PLACE: f32 = 1e-18;
 /// pulled as by so many.
 const STEEPEST: f32 = 1.0;
 
-/// What strands did to droplets, in the order of tufts.
+/// What strands did to droplets, in the order of blocks.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Encounters {
+pub(super) struct DropletContacts {
     /// What was done to each droplet.
     pub sums: Vec<Sum>,
     pub touches: Vec<Touch>,
@@ -43,13 +39,13 @@ pub(super) struct Sum {
     pub impulse: Vec3,
     /// How many of them are at it.
     pub company: u32,
-    /// The most that they would drink of it (m³).
+    /// The most that they would absorb of it (m³).
     pub wanted: f64,
 }
 
 #[derive(Clone, Debug, Default)]
 struct Scratch {
-    tuft: Tuft,
+    strand_block: StrandBlock,
     near: Found,
     hits: Vec<Hit>,
     /// Which lanes are at each puller, and at which ones there are any.
@@ -57,7 +53,7 @@ struct Scratch {
     met: Vec<u32>,
 }
 
-impl Encounters {
+impl DropletContacts {
     /// Nothing yet, of so many droplets.
     pub fn clear(&mut self, drops: usize) {
         self.sums.clear();
@@ -102,7 +98,7 @@ pub(super) struct Landing {
 
 /// What holds for all strands of a hair in a substep.
 #[derive(Clone, Copy)]
-pub(super) struct MetBy<'a> {
+pub(super) struct ContactParams<'a> {
     pub wetting: &'a Wetting,
     pub field: &'a Field,
     pub dt: f32,
@@ -117,45 +113,45 @@ fn sum<S: Simd>(v: V3<f32x16<S>>) -> Vec3 {
     Vec3::new(v.x.reduce_sum(), v.y.reduce_sum(), v.z.reduce_sum())
 }
 
-impl MetBy<'_> {
+impl ContactParams<'_> {
     /// Pulls the nodes of up to sixteen strands, the first of them number `first` of its piece of work,
     /// and adds up what droplets get from them.
-    pub fn meet(
+    pub fn contact(
         &self,
         level: Level,
-        members: &mut [Member<'_>],
+        members: &mut [StrandLane<'_>],
         first: usize,
-        out: &mut Encounters,
+        out: &mut DropletContacts,
     ) {
         if self.field.drops.is_empty() {
             return;
         }
-        let mut tuft = core::mem::take(&mut out.scratch.tuft);
-        tuft.place(level, members);
+        let mut strand_block = core::mem::take(&mut out.scratch.strand_block);
+        strand_block.place(level, members);
         let mut is_weighed = false;
         out.scratch.at.resize(self.field.pullers.len(), 0);
-        for i in 0..tuft.rows.len() {
-            let row = &tuft.rows[i];
+        for i in 0..strand_block.rows.len() {
+            let row = &strand_block.rows[i];
             self.field.pulling(level, row.low, row.high, &mut out.scratch.near);
             if !out.scratch.near.balls.is_empty() {
                 if !core::mem::replace(&mut is_weighed, true) {
-                    tuft.weigh(members, self.wetting);
+                    strand_block.weigh(members, self.wetting);
                 }
-                let row = &mut tuft.rows[i];
-                let at = Place { node: i, first, own: &tuft.own };
+                let row = &mut strand_block.rows[i];
+                let at = Place { node: i, first, own: &strand_block.own };
                 dispatch!(level, simd => self.pull(simd, row, at, members, out));
             }
         }
-        let Encounters { sums, scratch: Scratch { at, met, .. }, .. } = out;
+        let DropletContacts { sums, scratch: Scratch { at, met, .. }, .. } = out;
         for puller in met.drain(..) {
             let lanes = core::mem::take(&mut at[puller as usize]);
             sums[self.field.pullers[puller as usize].drop as usize].company += lanes.count_ones();
         }
         // Who carries a droplet is heavy.
         for (k, member) in members.iter().enumerate().filter(|(_, m)| !m.load.is_empty()) {
-            self.drink_from_riders(member, first + k, out);
+            self.absorb_from_riders(member, first + k, out);
         }
-        let edges = if self.field.fallers.is_empty() { &[] } else { &tuft.rows[..] };
+        let edges = if self.field.fallers.is_empty() { &[] } else { &strand_block.rows[..] };
         for (i, ends) in edges.windows(2).enumerate() {
             let (low, high) = (ends[0].low.min(ends[1].low), ends[0].high.max(ends[1].high));
             self.field.falling(level, low, high, &mut out.scratch.near);
@@ -170,9 +166,9 @@ impl MetBy<'_> {
             }
         }
         if is_weighed {
-            tuft.scatter(members);
+            strand_block.scatter(members);
         }
-        out.scratch.tuft = tuft;
+        out.scratch.strand_block = strand_block;
     }
 
     /// \[W\] equation 2 on a row of nodes, and what they touch.
@@ -182,8 +178,8 @@ impl MetBy<'_> {
         simd: S,
         row: &mut Row,
         place: Place<'_>,
-        members: &[Member<'_>],
-        out: &mut Encounters,
+        members: &[StrandLane<'_>],
+        out: &mut DropletContacts,
     ) {
         let own = u32x16::load_array_ref(simd, place.own);
         let p = load3(simd, &row.p);
@@ -193,7 +189,7 @@ impl MetBy<'_> {
         for k in 0..out.scratch.near.balls.len() {
             let number = out.scratch.near.balls[k];
             let puller = &self.field.pullers[number as usize];
-            let Felt { touches, pulls, by, steep } = self.felt(simd, p, own, puller);
+            let Adhesion { touches, pulls, by, steep } = self.adhesion_at(simd, p, own, puller);
             if place.node > 0 {
                 change = change + by;
                 steepness += steep;
@@ -228,7 +224,7 @@ impl MetBy<'_> {
                     let (changed, got) = self.drag(simd, v, mass * bears, others, puller);
                     (v, impulse) = (changed, impulse + got);
                 }
-                self.drink(others.to_bitmask(), puller.drop, &place, members, out);
+                self.absorb(others.to_bitmask(), puller.drop, &place, members, out);
             }
             out.sums[puller.drop as usize].impulse += sum(impulse);
         }
@@ -237,7 +233,13 @@ impl MetBy<'_> {
 
     /// What a droplet does to sixteen nodes at `p`.
     #[inline(always)]
-    fn felt<S: Simd>(&self, simd: S, p: V3<f32x16<S>>, own: u32x16<S>, puller: &Puller) -> Felt<S> {
+    fn adhesion_at<S: Simd>(
+        &self,
+        simd: S,
+        p: V3<f32x16<S>>,
+        own: u32x16<S>,
+        puller: &Puller,
+    ) -> Adhesion<S> {
         let zero = f32x16::splat(simd, 0.0);
         let one = f32x16::splat(simd, 1.0);
         let offset = splat3(simd, puller.center) - p;
@@ -251,13 +253,13 @@ impl MetBy<'_> {
             & squared.simd_gt(f32x16::splat(simd, SAME_PLACE));
         let lanes = pulls.to_bitmask();
         if lanes == 0 {
-            return Felt { touches, pulls: lanes, by: V3::new(zero, zero, zero), steep: zero };
+            return Adhesion { touches, pulls: lanes, by: V3::new(zero, zero, zero), steep: zero };
         }
         let distance = Real::sqrt(squared);
         let most = puller.strength * self.wetting.adhesion * self.dt;
         let x = distance * puller.steep - puller.middle;
         let pull = (one - x * x) * most / distance;
-        Felt {
+        Adhesion {
             touches,
             pulls: lanes,
             by: V3::select(pulls, offset.scale(pull), V3::new(zero, zero, zero)),
@@ -292,13 +294,13 @@ impl MetBy<'_> {
     }
 
     /// What each of some lanes would take from a droplet.
-    fn drink(
+    fn absorb(
         &self,
         lanes: u64,
         drop: u32,
         place: &Place<'_>,
-        members: &[Member<'_>],
-        out: &mut Encounters,
+        members: &[StrandLane<'_>],
+        out: &mut DropletContacts,
     ) {
         for (lane, member) in lanes_in(lanes).filter_map(|lane| Some((lane, members.get(lane)?))) {
             self.want(drop, place.first + lane, place.node, member.film, out);
@@ -306,7 +308,7 @@ impl MetBy<'_> {
     }
 
     /// A node under its strand's `film` (m³) touches a droplet, and would fill what room it has.
-    fn want(&self, drop: u32, strand: usize, node: usize, film: &[f64], out: &mut Encounters) {
+    fn want(&self, drop: u32, strand: usize, node: usize, film: &[f64], out: &mut DropletContacts) {
         let room = self.most_film - film.get(node).copied().unwrap_or(0.0);
         let wants = room * f64::from(self.uptake);
         if wants > 0.0 {
@@ -316,7 +318,12 @@ impl MetBy<'_> {
     }
 
     /// Between two nodes a droplet touches the nearer one of its strand, however far off that is.
-    fn drink_from_riders(&self, member: &Member<'_>, strand: usize, out: &mut Encounters) {
+    fn absorb_from_riders(
+        &self,
+        member: &StrandLane<'_>,
+        strand: usize,
+        out: &mut DropletContacts,
+    ) {
         for (drop, seen) in self.field.on(member.strand) {
             let touch = seen.touch(self.wetting.lock_radius());
             for (node, length) in node_lengths(member.lengths).enumerate() {
@@ -341,7 +348,7 @@ struct Place<'a> {
 
 /// What a droplet does to nodes side by side.
 #[derive(Clone, Copy)]
-struct Felt<S: Simd> {
+struct Adhesion<S: Simd> {
     touches: u64,
     pulls: u64,
     by: V3<f32x16<S>>,
@@ -383,15 +390,15 @@ mod tests {
         }
     }
 
-    fn member<'a>(i: u32, positions: &'a [Vec3], velocities: &'a mut [Vec3]) -> Member<'a> {
+    fn member<'a>(i: u32, positions: &'a [Vec3], velocities: &'a mut [Vec3]) -> StrandLane<'a> {
         const LENGTHS: [f32; 8] = [0.03; 8];
         let strand = Entity::from_raw_u32(7 + i).unwrap();
         let lengths = &LENGTHS[..positions.len() - 1];
-        Member { strand, positions, velocities, lengths, load: &[], film: &[] }
+        StrandLane { strand, positions, velocities, lengths, load: &[], film: &[] }
     }
 
-    fn met_by<'a>(wetting: &'a Wetting, field: &'a Field, dt: f32) -> MetBy<'a> {
-        MetBy { wetting, field, dt, uptake: 0.0, most_film: 0.0 }
+    fn contact_params<'a>(wetting: &'a Wetting, field: &'a Field, dt: f32) -> ContactParams<'a> {
+        ContactParams { wetting, field, dt, uptake: 0.0, most_film: 0.0 }
     }
 
     #[test]
@@ -419,13 +426,18 @@ mod tests {
         field.drops.push(drop(strands[0][3]));
         field.sort(1e-3);
         let mut velocities: Vec<_> = strands.iter().map(|s| vec![Vec3::ZERO; s.len()]).collect();
-        let mut out = Encounters::default();
+        let mut out = DropletContacts::default();
         out.clear(field.drops.len());
         let mut members: Vec<_> = (0..)
             .zip(strands.iter().zip(&mut velocities))
             .map(|(i, (positions, velocities))| member(i, positions, velocities))
             .collect();
-        met_by(&wetting, &field, 1.0 / 3600.0).meet(Level::new(), &mut members, 0, &mut out);
+        contact_params(&wetting, &field, 1.0 / 3600.0).contact(
+            Level::new(),
+            &mut members,
+            0,
+            &mut out,
+        );
         let mut given = Vec3::ZERO;
         for (s, member) in members.iter().enumerate() {
             for (i, p) in member.positions.iter().enumerate() {
@@ -457,11 +469,11 @@ mod tests {
         let mut field = Field::default();
         field.drops.push(SeenDrop { company: 3.0, ..drop(positions[1]) });
         field.sort(1e-3);
-        let mut out = Encounters::default();
+        let mut out = DropletContacts::default();
         out.clear(1);
         let dt = 1.0 / 360.0;
         let mut members = [member(0, &positions, &mut velocities)];
-        met_by(&wetting, &field, dt).meet(Level::new(), &mut members, 0, &mut out);
+        contact_params(&wetting, &field, dt).contact(Level::new(), &mut members, 0, &mut out);
         let node = wetting.dry_mass() * 0.03;
         let share = 1.1e-4 / (1.1e-4 + node) * (30.0 * dt) / (1.0 + 3.0 * 30.0 * dt);
         assert!(velocities[1].distance(Vec3::Y * (1.0 - share)) < 1e-6, "{velocities:?}");
@@ -482,12 +494,17 @@ mod tests {
         };
         field.drops = vec![falling, beside];
         field.sort(1e-3);
-        let mut out = Encounters::default();
+        let mut out = DropletContacts::default();
         out.clear(field.drops.len());
         let mut velocities = [Vec3::ZERO; 3];
         let mut members = [member(0, &positions, &mut velocities)];
         let wetting = Wetting::default();
-        met_by(&wetting, &field, 1.0 / 360.0).meet(Level::new(), &mut members, 0, &mut out);
+        contact_params(&wetting, &field, 1.0 / 360.0).contact(
+            Level::new(),
+            &mut members,
+            0,
+            &mut out,
+        );
         let hits: Vec<_> = out.landings.iter().map(|l| (l.drop, l.at)).collect();
         assert_eq!(hits.len(), 1);
         assert_eq!(hits[0].0, 0);

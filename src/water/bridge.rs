@@ -1,22 +1,22 @@
 //! `Interaction`: strands that a film of water joins draw together and move as one.
 
-use super::{Moisture, Wetting, meet::WaterField, moisture::node_lengths};
+use super::{Moisture, Wetting, droplet_contact::WaterField, moisture::node_lengths};
 use crate::{
     contact::{Bridged, Film, LockContact, LockNeighbours},
-    lod::HairSteps,
+    schedule::EffectiveSubsteps,
     setting::Settings,
-    strand::{Burden, Hair, Sleep, Sleepers, Strand, StrandOf, Strands},
+    strand::{AddedMass, Hair, Sleepers, Strand, StrandOf, StrandSleep, Strands},
 };
 use bevy::prelude::*;
 
 /// Bridges of water between the wet strands of each hair, found through the lists of its contacts.
 pub(super) fn join_wet_strands(
-    steps: HairSteps,
+    steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
     wetting: Settings<Wetting>,
     mut scratch: ResMut<WaterField>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
-    mut strands: Query<(&mut Strand, &Moisture, &Burden, &Sleep), With<StrandOf>>,
+    mut strands: Query<(&mut Strand, &Moisture, &AddedMass, &StrandSleep), With<StrandOf>>,
 ) {
     let rows = &mut scratch.bypass_change_detection().rows;
     for (hair, members, mut neighbours, sleepers) in &mut hairs {
@@ -33,7 +33,7 @@ pub(super) fn join_wet_strands(
             && moistures.any(|moisture| !moisture.is_untouched());
         let list = neighbours.bypass_change_detection();
         let film = Film::between(2.0 * radius);
-        list.look_beyond(if joins { film.longest } else { 0.0 });
+        list.set_extra_margin(if joins { film.longest } else { 0.0 });
         if !joins {
             continue;
         }
@@ -51,7 +51,7 @@ pub(super) fn join_wet_strands(
         }
         let mut bridges = list.bridges(rows, film);
         let mut members = strands.iter_many_mut(members.collection());
-        while let Some((mut strand, _, burden, sleep)) = members.fetch_next() {
+        while let Some((mut strand, _, added_mass, sleep)) = members.fetch_next() {
             let nodes = strand.nodes();
             if sleep.is_asleep() {
                 bridges.by_ref().take(nodes).for_each(drop);
@@ -59,7 +59,7 @@ pub(super) fn join_wet_strands(
             }
             let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
             for (i, (v, bridged)) in velocities.iter_mut().zip(&mut bridges).enumerate() {
-                let load = burden.mass.get(i).copied().unwrap_or(0.0);
+                let load = added_mass.mass.get(i).copied().unwrap_or(0.0);
                 *v = joined(*v, &bridged, &wetting, load, stride.dt);
             }
         }

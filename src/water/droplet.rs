@@ -2,45 +2,50 @@
 
 use super::model::{ball_radius, ball_volume};
 use crate::{
-    setting::{Bound, InvalidValue, Notes},
+    setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
     strand::TickPose,
 };
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// A drop of water: falls, lands on strands, rides on one and pulls others to it (\[W\] equation 2),
-/// soaks in, merges, drips off. Spawn it to wet hair; its water is counted until it has evaporated
-/// or left [`DropletRules`](crate::water::DropletRules).
-///
-/// ```
-/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// # fn drip(mut commands: Commands) -> Result {
-/// // 14 µl: a drop of 1.5 mm
-/// commands.spawn(Droplet::new(Vec3::Y * 1.9, 14e-9)?);
-/// # Ok(()) }
-/// ```
-#[derive(Component, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct Droplet {
-    /// Its centre in the world (m).
-    pub position: Vec3,
-    /// Its velocity (m/s).
-    pub velocity: Vec3,
-    /// Its volume (m³), 1e-15…1e-3. `f64`, for what goes from drop to hair is counted.
-    pub volume: f64,
-    /// Distance within which it keeps strands off its core (m).
-    pub r_min: f32,
-    /// Distance up to which it pulls strands (m), more than `r_min`.
-    pub r_max: f32,
-    pub(super) ride: Option<Ride>,
-    /// Where it was a substep ago.
-    pub(super) before: Vec3,
-    /// How much of it the ledger knows (m³).
-    pub(super) counted: f64,
-    /// How many strands are at it.
-    pub(super) company: u32,
-    /// For how long it has lain on a collider (s).
-    pub(crate) lying: f32,
+setting! {
+    /// A drop of water: falls, lands on strands, rides on one and pulls others to it (\[W\] equation 2),
+    /// soaks in, merges, drips off. Spawn it to wet hair; its water is counted until it has evaporated
+    /// or left [`DropletRules`](crate::water::DropletRules).
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # fn drip(mut commands: Commands) -> Result {
+    /// // 14 µl: a drop of 1.5 mm
+    /// commands.spawn(Droplet::new(Vec3::Y * 1.9, 14e-9)?);
+    /// # Ok(()) }
+    /// ```
+    #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct Droplet {
+        /// Its centre in the world.
+        pub position: Vec3 = Vec3::ZERO, "m" in POSITION: -1e6..=1e6,
+            "a finite place in the world";
+        /// Its velocity.
+        pub velocity: Vec3 = Vec3::ZERO, "m/s" in VELOCITY: -1e3..=1e3, "rain falls at 6";
+        /// Its volume. `f64`, for what goes from drop to hair is counted.
+        pub volume: f64 = ball_volume(1e-3), "m³" in VOLUME: 1e-15..=1e-3, safe 1e-10..=2e-7,
+            "4.2e-9 is a drop of 1 mm";
+        /// Distance within which it keeps strands off its core.
+        pub r_min: f32 = 1e-3, "m" in R_MIN: 1e-6..=1.0, "about the drop's own radius";
+        /// Distance up to which it pulls strands, more than `r_min`.
+        pub r_max: f32 = 1e-3 * INFLUENCE;
+        pub(super) ride: Option<Ride> = None;
+        /// Where it was a substep ago.
+        pub(super) before: Vec3 = Vec3::ZERO;
+        /// How much of it the ledger knows (m³).
+        pub(super) counted: f64 = 0.0;
+        /// How many strands are at it.
+        pub(super) company: u32 = 1;
+        /// For how long it has lain on a collider (s).
+        pub(crate) lying: f32 = 0.0;
+    }
+    then Self::pulls_from_beyond_its_core
 }
 
 /// What carries a drop.
@@ -55,48 +60,30 @@ pub struct Ride {
 /// r_max over r_min where nobody says otherwise, as in the clumping experiment.
 const INFLUENCE: f32 = 5.0;
 
-const VOLUME: Bound = Bound::new("Droplet::volume (m³)", 1e-15, 1e-3, "4.2e-9 is a drop of 1 mm");
-const R_MIN: Bound = Bound::new("Droplet::r_min (m)", 1e-6, 1.0, "about the drop's own radius");
-const COORDINATE: Bound =
-    Bound::new("Droplet::position (m)", -1e6, 1e6, "a finite place in the world");
-const SPEED: Bound = Bound::new("Droplet::velocity (m/s)", -1e3, 1e3, "rain falls at 6");
-
-impl Default for Droplet {
-    /// A drop of 1 mm at the origin.
-    fn default() -> Self {
-        Self::ball(Vec3::ZERO, 1e-3)
-    }
-}
-
 impl Droplet {
     /// A drop at rest, of `volume` (m³), that pulls up to five times its radius.
     ///
     /// # Errors
     /// When the place is not finite or the volume outside 1e-15…1e-3 m³.
     pub fn new(position: Vec3, volume: f64) -> Result<Self, InvalidValue> {
-        position.to_array().into_iter().try_for_each(|x| COORDINATE.check(x).map(drop))?;
-        VOLUME.check(volume as f32)?;
-        Ok(Self { volume, ..Self::ball(position, ball_radius(volume)) })
+        Self::VOLUME.check(volume)?;
+        Self { volume, ..Self::ball(position, ball_radius(volume)) }.checked()
     }
 
     /// The same drop with other influence radii (m), \[W\] equation 2.
     ///
     /// # Errors
     /// When `r_min` is not positive or `r_max` not larger.
-    pub fn with_influence(mut self, r_min: f32, r_max: f32) -> Result<Self, InvalidValue> {
-        self.r_min = R_MIN.check(r_min)?;
-        self.r_max = r_max_bound(r_min).check(r_max)?;
-        Ok(self)
+    pub fn with_influence(self, r_min: f32, r_max: f32) -> Result<Self, InvalidValue> {
+        Self { r_min, r_max, ..self }.checked()
     }
 
     /// The same drop, moving (m/s).
     ///
     /// # Errors
     /// When the velocity is not finite or beyond 1000 m/s.
-    pub fn with_velocity(mut self, velocity: Vec3) -> Result<Self, InvalidValue> {
-        velocity.to_array().into_iter().try_for_each(|x| SPEED.check(x).map(drop))?;
-        self.velocity = velocity;
-        Ok(self)
+    pub fn with_velocity(self, velocity: Vec3) -> Result<Self, InvalidValue> {
+        Self { velocity, ..self }.checked()
     }
 
     /// `count` drops of `radius` (m) strewn evenly over a box, the same for the same seed.
@@ -140,94 +127,78 @@ impl Droplet {
     pub(super) fn ball(position: Vec3, radius: f32) -> Self {
         Self {
             position,
-            velocity: Vec3::ZERO,
             volume: ball_volume(radius),
             r_min: radius,
             r_max: radius * INFLUENCE,
-            ride: None,
             before: position,
-            counted: 0.0,
-            company: 1,
-            lying: 0.0,
+            ..default()
         }
+    }
+
+    fn pulls_from_beyond_its_core(&mut self, violations: &mut Violations) {
+        let hint = "more than r_min, five times as a rule";
+        ValueRange::new("Droplet::r_max (m)", self.r_min * 1.001..=10.0, hint).clamp(
+            &mut self.r_max,
+            || self.r_min * INFLUENCE,
+            violations,
+        );
     }
 
     /// Brings what was written into it back into its ranges. Water that was known is never lost: an
     /// impossible volume counts as unchanged.
-    pub(super) fn mend(&mut self, notes: &Notes) {
-        if !(self.volume >= 0.0 && VOLUME.check(self.volume.max(1e-15) as f32).is_ok()) {
-            VOLUME.mend(self.volume as f32, 0.0, notes);
+    pub(super) fn repair(&mut self, violations: &mut Violations) {
+        let Self { volume, position, velocity, .. } = *self;
+        // What has run out is gone by the end of the substep.
+        let has_run_out = (0.0..1e-15).contains(&volume);
+        if has_run_out {
+            self.volume = 1e-15;
+        }
+        self.clamp_values(violations);
+        if has_run_out {
+            self.volume = volume;
+        } else if self.volume != volume {
             self.volume = self.counted;
         }
-        let finite =
-            |v: Vec3, bound: &Bound| v.to_array().into_iter().all(|x| bound.check(x).is_ok());
-        if !finite(self.position, &COORDINATE) {
-            COORDINATE.mend(f32::NAN, 0.0, notes);
-            self.position = if finite(self.before, &COORDINATE) { self.before } else { Vec3::ZERO };
+        if self.position != position {
+            self.position = Self::POSITION.check(self.before).unwrap_or(Vec3::ZERO);
         }
-        if !finite(self.velocity, &SPEED) {
-            SPEED.mend(f32::NAN, 0.0, notes);
+        if self.velocity != velocity {
             self.velocity = Vec3::ZERO;
         }
-        self.r_min = R_MIN.mend(self.r_min, 1e-3, notes);
-        let least = r_max_bound(self.r_min);
-        self.r_max = least.mend(self.r_max, self.r_min * INFLUENCE, notes);
     }
 }
 
-fn r_max_bound(r_min: f32) -> Bound {
-    Bound::new("Droplet::r_max (m)", r_min * 1.001, 10.0, "more than r_min, five times as a rule")
-}
-
-/// A shower head, or with [`Shower::rain`] a cloud: makes drops and sends them along its transform's
-/// forward direction (−Z). The same drops for the same seed.
-#[derive(Component, Reflect, Clone, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-#[require(Transform, TickPose)]
-pub struct Shower {
-    /// Drops per second. Default 200, safe 0…2000; 0 is off.
-    pub rate: f32,
-    /// Radius of a drop (m). Default 1.5e-3, safe 0.3e-3…3e-3.
-    pub drop_radius: f32,
-    /// Speed of drops at the head (m/s). Default 2, safe 0…10.
-    pub speed: f32,
-    /// Half angle of the cone (rad). Default 0.15, safe 0…1.5.
-    pub spread: f32,
-    /// Radius of the head (m). Default 0.06, safe 0…10.
-    pub opening: f32,
-    /// r_max over r_min of its drops. Default 5, safe 1.5…10.
-    pub influence: f32,
-    /// Seed of the drops' places and directions.
-    pub seed: u64,
-    /// How many drops it has made.
-    pub made: u64,
-    /// The part of the next drop that is due.
-    pub owed: f32,
-}
-
-impl Default for Shower {
-    fn default() -> Self {
-        Self {
-            rate: 200.0,
-            drop_radius: 1.5e-3,
-            speed: 2.0,
-            spread: 0.15,
-            opening: 0.06,
-            influence: INFLUENCE,
-            seed: 1,
-            made: 0,
-            owed: 0.0,
-        }
+setting! {
+    /// A shower head, or with [`Shower::rain`] a cloud: makes drops and sends them along its transform's
+    /// forward direction (−Z). The same drops for the same seed.
+    #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Transform, TickPose)]
+    pub struct Shower {
+        /// Drops per second; 0 is off.
+        pub rate: f32 = 200.0, "1/s" in RATE: 0.0..=1e5, safe 0.0..=2000.0,
+            "200 is a gentle shower";
+        /// Radius of a drop.
+        pub drop_radius: f32 = 1.5e-3, "m" in DROP_RADIUS: 1e-5..=0.05, safe 0.3e-3..=3e-3,
+            "rain has 0.5e-3 to 3e-3";
+        /// Speed of drops at the head.
+        pub speed: f32 = 2.0, "m/s" in SPEED: 0.0..=100.0, safe 0.0..=10.0, "2 is a shower head";
+        /// Half angle of the cone.
+        pub spread: f32 = 0.15, "rad" in SPREAD: 0.0..=1.57, safe 0.0..=1.5,
+            "0.15 is a narrow cone";
+        /// Radius of the head.
+        pub opening: f32 = 0.06, "m" in OPENING: 0.0..=1e3, safe 0.0..=10.0,
+            "0.06 is a shower head";
+        /// r_max over r_min of its drops.
+        pub influence: f32 = INFLUENCE, in INFLUENCE: 1.01..=100.0, safe 1.5..=10.0, "5 is usual";
+        /// Seed of the drops' places and directions.
+        pub seed: u64 = 1;
+        /// How many drops it has made.
+        pub made: u64 = 0;
+        /// The part of the next drop that is due.
+        pub owed: f32 = 0.0;
     }
 }
-
-const RATE: Bound = Bound::new("Shower::rate (1/s)", 0.0, 1e5, "200 is a gentle shower");
-const DROP_RADIUS: Bound =
-    Bound::new("Shower::drop_radius (m)", 1e-5, 0.05, "rain has 0.5e-3 to 3e-3");
-const OUTLET: Bound = Bound::new("Shower::speed (m/s)", 0.0, 100.0, "2 is a shower head");
-const SPREAD: Bound = Bound::new("Shower::spread (rad)", 0.0, 1.57, "0.15 is a narrow cone");
-const OPENING: Bound = Bound::new("Shower::opening (m)", 0.0, 1e3, "0.06 is a shower head");
-const INFLUENCES: Bound = Bound::new("Shower::influence", 1.01, 100.0, "5 is usual");
 
 impl Shower {
     /// A shower head of `rate` drops per second, each of `drop_radius` (m).
@@ -235,9 +206,7 @@ impl Shower {
     /// # Errors
     /// When one of them is negative, zero for the radius, or not finite.
     pub fn new(rate: f32, drop_radius: f32) -> Result<Self, InvalidValue> {
-        RATE.check(rate)?;
-        DROP_RADIUS.check(drop_radius)?;
-        Ok(Self { rate, drop_radius, ..default() })
+        Self { rate, drop_radius, ..default() }.checked()
     }
 
     /// Rain of `rate` drops per second over a disc of `radius` (m), falling at its terminal speed.
@@ -245,22 +214,8 @@ impl Shower {
     /// # Errors
     /// When one of them is negative or not finite.
     pub fn rain(rate: f32, radius: f32) -> Result<Self, InvalidValue> {
-        RATE.check(rate)?;
-        OPENING.check(radius)?;
-        Ok(Self { rate, opening: radius, drop_radius: 1e-3, speed: 6.5, spread: 0.0, ..default() })
-    }
-
-    pub(super) fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        Self {
-            rate: RATE.mend(self.rate, d.rate, notes),
-            drop_radius: DROP_RADIUS.mend(self.drop_radius, d.drop_radius, notes),
-            speed: OUTLET.mend(self.speed, d.speed, notes),
-            spread: SPREAD.mend(self.spread, d.spread, notes),
-            opening: OPENING.mend(self.opening, d.opening, notes),
-            influence: INFLUENCES.mend(self.influence, d.influence, notes),
-            ..self.clone()
-        }
+        Self { rate, opening: radius, drop_radius: 1e-3, speed: 6.5, spread: 0.0, ..default() }
+            .checked()
     }
 
     /// The drops of the next `seconds`, seen from the head (drops leave along −Z). Settings must be
@@ -315,16 +270,17 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_written_later_is_mended_and_its_water_kept() {
+    fn nonsense_written_later_is_repaired_and_its_water_kept() {
         let mut drop = Droplet::new(Vec3::ONE, 4e-9).unwrap();
         drop.counted = 4e-9;
         drop.volume = f64::NAN;
         drop.position = Vec3::NAN;
         drop.velocity = Vec3::NAN;
         drop.r_max = 0.0;
-        let notes = Notes::default();
-        drop.mend(&notes);
-        assert_eq!(notes.into_inner().len(), 4);
+        let mut violations = Violations::new();
+        drop.repair(&mut violations);
+        assert_eq!(violations.len(), 4);
+        assert!(violations[0].found.is_nan(), "what was written: {}", violations[0]);
         assert_eq!((drop.volume, drop.position, drop.velocity), (4e-9, Vec3::ONE, Vec3::ZERO));
         assert!(drop.r_max > drop.r_min);
     }

@@ -1,21 +1,23 @@
 //! `ExternalForces`: showers run, hair soaks and dries, and hydrogen bonds follow the water.
 
 use super::{
-    Droplet, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
+    Droplet, Moisture, Shower, SoakHair, WaterLedger, Wetting,
     model::ball_radius,
     moisture::{Exposure, Left, Surroundings, node_lengths},
-    vapour::{DryingAir, WATER, jet},
 };
 use crate::{
     Blower,
-    air::{HairGravity, LocalBlower, local_blowers, model::wind},
     bond::{BondChanges, BondKind, Bonds, model::drying},
-    fault::{Fault, HairFault},
-    parallel::{AHEAD, for_each_part, in_turn, tables},
-    prefetch::prefetch,
-    setting::{Notes, Settings},
-    strand::{Burden, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
-    tick::HairStep,
+    environment::{HairGravity, LocalBlower, local_blowers, wind::wind},
+    fault::{FaultKind, HairFault},
+    parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
+    schedule::HairStep,
+    setting::{Ranged, Settings, report},
+    strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
+};
+use crate::{
+    environment::vapour::{DryingAir, WATER, jet},
+    schedule::ProcessTime,
 };
 use bevy::prelude::*;
 
@@ -26,7 +28,7 @@ pub(super) fn run_showers(
 ) {
     for (mut shower, pose) in &mut showers {
         let shower = shower.bypass_change_detection();
-        let mut valid = shower.mended(&Notes::default());
+        let mut valid = shower.clamped();
         let pose = pose.now();
         let drops: Vec<Droplet> = (valid.make(step.dt))
             .map(|drop| {
@@ -89,7 +91,7 @@ struct Wet<'a> {
     strand: &'a Strand,
     bonds: &'a Bonds,
     moisture: &'a mut Moisture,
-    burden: &'a mut Burden,
+    added_mass: &'a mut AddedMass,
     changes: &'a mut BondChanges,
     left: Left,
     /// Water that has nowhere to be any more (m³).
@@ -102,8 +104,8 @@ impl Wet<'_> {
         prefetch(self.strand.rest_lengths());
         prefetch(&self.bonds.joints);
         self.moisture.prefetch();
-        prefetch(&self.burden.mass);
-        prefetch(&self.burden.softening);
+        prefetch(&self.added_mass.mass);
+        prefetch(&self.added_mass.softening);
         self.changes.prefetch();
     }
 }
@@ -115,8 +117,15 @@ pub(super) fn exchange_water(
     wetting: Settings<Wetting>,
     hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
     blowers: Query<(&Blower, &TickPose)>,
-    mut strands: Query<(&StrandOf, &Strand, &Bonds, &mut Moisture, &mut Burden, &mut BondChanges)>,
-    mut soaks: MessageReader<Soak>,
+    mut strands: Query<(
+        &StrandOf,
+        &Strand,
+        &Bonds,
+        &mut Moisture,
+        &mut AddedMass,
+        &mut BondChanges,
+    )>,
+    mut soaks: MessageReader<SoakHair>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -125,11 +134,13 @@ pub(super) fn exchange_water(
             Ok((_, members)) => members.map(|m| m.collection().to_vec()).unwrap_or_default(),
             Err(_) if strands.contains(soak.target) => vec![soak.target],
             Err(_) => {
-                faults.write(HairFault { entity: soak.target, fault: Fault::NoTarget });
+                let message = "the target of SoakHair is neither a Hair nor a strand";
+                faults.write(HairFault::new(FaultKind::NoTarget, message).of(soak.target));
                 continue;
             }
         };
-        let share = if soak.wetness.is_nan() { 0.0 } else { soak.wetness.clamp(0.0, 1.0) };
+        report(Some(soak.target), soak.violations(), &mut faults);
+        let share = soak.clamped().wetness;
         for member in members {
             if let Ok((of, strand, _, mut moisture, ..)) = strands.get_mut(member) {
                 let capacity = wetting.of(of.0).capacity();
@@ -141,8 +152,8 @@ pub(super) fn exchange_water(
         }
     }
     let damp = air.equilibrium > 0.0;
-    let process = process.mended(&Notes::default());
-    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
+    let process = process.clamped().0;
+    let gravity = gravity.clamped().0;
     let water_of = |hair: Entity| {
         let pose = *hairs.get(hair).ok()?.0.now();
         let wetting = wetting.of(hair);
@@ -158,14 +169,14 @@ pub(super) fn exchange_water(
     };
     let done = for_each_part(tables(&mut strands), Vec::new, |items, rows| {
         let (mut waters, mut done) = (PerHair::default(), Done::default());
-        for (of, strand, bonds, moisture, burden, changes) in rows {
+        for (of, strand, bonds, moisture, added_mass, changes) in rows {
             if (damp || !moisture.is_untouched())
                 && let Some(hair) = waters.index(of.0, || water_of(of.0))
                 && strand.nodes() >= 2
                 && bonds.joints.len() == strand.edges()
             {
                 let left = Left::default();
-                let wet = Wet { strand, bonds, moisture, burden, changes, left, gone: 0.0 };
+                let wet = Wet { strand, bonds, moisture, added_mass, changes, left, gone: 0.0 };
                 items.push((hair, wet));
             }
         }
@@ -205,7 +216,7 @@ struct Done {
 /// One strand's water in one substep, what follows from it for bonds and weight.
 fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bool, dt: f32) {
     let LocalWater { wetting, around, bonds_follow, .. } = water;
-    let Wet { strand, bonds, moisture, burden, changes, .. } = wet;
+    let Wet { strand, bonds, moisture, added_mass, changes, .. } = wet;
     wet.gone += moisture.fit(strand.nodes());
     let (positions, lengths, edges) = (strand.positions(), strand.rest_lengths(), strand.edges());
     let exposure = |i: usize| {
@@ -220,17 +231,17 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
         && bonds.rates(BondKind::Hydrogen).all(|rate| rate > 0.999)
     {
         wet.gone += moisture.clear();
-        **burden = default();
+        **added_mass = default();
         return;
     }
     let dry = f64::from(wetting.dry_mass());
     let water = moisture.film().iter().zip(moisture.bound()).map(|(film, bound)| film + bound);
-    burden.mass.clear();
-    burden.mass.extend(
+    added_mass.mass.clear();
+    added_mass.mass.extend(
         (node_lengths(lengths).zip(water)).map(|(l, v)| (WATER * v / (dry * f64::from(l))) as f32),
     );
-    burden.softening.clear();
-    burden.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
+    added_mass.softening.clear();
+    added_mass.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
 }
 
 /// Hydrogen bonds go a `share` of their way toward 1 − wetness; equation 16 remembers the shape in

@@ -15,106 +15,38 @@
 mod adhesion;
 mod bridge;
 mod droplet;
+mod droplet_contact;
 mod exchange;
 mod field;
-mod meet;
 pub mod model;
 pub mod moisture;
 mod motion;
+mod strand_block;
 mod systems;
-mod tuft;
-pub mod vapour;
 
 pub use droplet::{Droplet, Ride, Shower};
 pub use moisture::{Moisture, Wetting};
 pub use systems::WaterPlugin;
 
-use crate::setting::{Bound, Notes};
+use crate::setting::{Ranged, ValueRange, Violations, setting};
 use bevy::prelude::*;
 
-/// The air of the room. A resource.
-#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Resource, Default, Clone, PartialEq)]
-pub struct Climate {
-    /// Temperature (°C). Default 22, safe −20…50.
-    pub celsius: f32,
-    /// Relative humidity, 0…1. Default 0.5, at which hair is dry; damper air wets it.
-    pub humidity: f32,
-    /// Speed of the draught (m/s). Default 0.1, safe 0…10.
-    pub draught: f32,
-}
-
-impl Default for Climate {
-    fn default() -> Self {
-        Self { celsius: 22.0, humidity: 0.5, draught: 0.1 }
-    }
-}
-
-const CELSIUS: Bound = Bound::new("Climate::celsius (°C)", -60.0, 100.0, "a room has 22");
-const HUMIDITY: Bound = Bound::new("Climate::humidity", 0.0, 1.0, "a room has 0.5");
-const DRAUGHT: Bound = Bound::new("Climate::draught (m/s)", 0.0, 100.0, "a room has 0.1");
-
-impl Climate {
-    /// The air of a room: temperature (°C) and relative humidity (0…1).
-    ///
-    /// # Errors
-    /// When the temperature is outside −60…100 °C or the humidity outside 0…1.
-    pub fn new(celsius: f32, humidity: f32) -> Result<Self, crate::InvalidValue> {
-        let celsius = CELSIUS.check(celsius)?;
-        Ok(Self { celsius, humidity: HUMIDITY.check(humidity)?, ..default() })
-    }
-
-    fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        Self {
-            celsius: CELSIUS.mend(self.celsius, d.celsius, notes),
-            humidity: HUMIDITY.mend(self.humidity, d.humidity, notes),
-            draught: DRAUGHT.mend(self.draught, d.draught, notes),
-        }
-    }
-}
-
-/// How much faster wetting, drying and the bonds' chemistry ([`Treat`](crate::Treat)) go than in life. A
-/// resource, default 1,
-/// safe 1…1000.
-///
-/// Hair dries in minutes, players wait seconds. Mechanics are untouched.
-#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Resource, Default, Clone, PartialEq)]
-pub struct ProcessTime(pub f32);
-
-impl Default for ProcessTime {
-    fn default() -> Self {
-        Self(1.0)
-    }
-}
-
-impl ProcessTime {
-    pub(crate) fn mended(&self, notes: &Notes) -> f32 {
-        PROCESS.mend(self.0, 1.0, notes)
-    }
-}
-
-const PROCESS: Bound = Bound::new("ProcessTime", 0.0, 1e6, "60 makes minutes of seconds");
-
-/// What droplets may do. A resource.
-#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Resource, Default, Clone, PartialEq)]
-pub struct DropletRules {
-    /// Lower corner of the box that droplets may be in (m). Default −100 on each axis. A floor
-    /// drains at its height.
-    pub min: Vec3,
-    /// Upper corner (m). Default 100 on each axis.
-    pub max: Vec3,
-    /// How long a drop lies on a collider before it has run off (s). Default 2.
-    pub lying: f32,
-    /// Whether drops that touch become one. Default true; \[W\]'s own drops do not.
-    pub merging: bool,
-}
-
-impl Default for DropletRules {
-    fn default() -> Self {
-        Self { min: Vec3::splat(-100.0), max: Vec3::splat(100.0), lying: 2.0, merging: true }
+setting! {
+    /// What droplets may do. A resource.
+    #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Resource, Default, Clone, PartialEq)]
+    pub struct DropletRules {
+        /// Lower corner of the box that droplets may be in. A floor drains at its height.
+        pub min: Vec3 = Vec3::splat(-100.0), "m" in MIN: f32::NEG_INFINITY..=f32::INFINITY,
+            "-100 is far below";
+        /// Upper corner.
+        pub max: Vec3 = Vec3::splat(100.0), "m" in MAX: f32::NEG_INFINITY..=f32::INFINITY,
+            "100 is far above, and more than the lower corner";
+        /// How long a drop lies on a collider before it has run off.
+        pub lying: f32 = 2.0, "s" in LYING: 0.0..=f32::INFINITY, safe 0.0..=60.0,
+            "2 lets it run off";
+        /// Whether drops that touch become one; \[W\]'s own drops do not.
+        pub merging: bool = true;
     }
 }
 
@@ -122,11 +54,23 @@ impl Default for DropletRules {
 /// towel. A message; the [`WaterLedger`] counts the difference.
 #[derive(Message, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
-pub struct Soak {
+pub struct SoakHair {
     /// The [`Hair`](crate::Hair) or strand.
     pub target: Entity,
-    /// Share of what hair can bind: 1 soaks through, 0 dries. Taken to the nearest of 0…1.
+    /// Share of what hair can bind: 1 soaks through, 0 dries.
     pub wetness: f32,
+}
+
+impl SoakHair {
+    /// The range of [`wetness`](Self::wetness).
+    pub const WETNESS: ValueRange =
+        ValueRange::new("SoakHair::wetness", 0.0..=1.0, "1 soaks through, 0 dries");
+}
+
+impl Ranged for SoakHair {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        Self::WETNESS.clamp(&mut self.wetness, || 0.0, violations);
+    }
 }
 
 /// The water that came, is there and has gone (m³). A resource, kept by the tick; `held` is of the

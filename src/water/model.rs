@@ -1,6 +1,6 @@
 //! Droplets as mathematics: the wet-hair paper's equation 2, falling, sliding, hanging.
 
-use crate::rod::{algebra::V3, lanes::Real};
+use crate::lanes::{Real, V3};
 use glam::Vec3;
 
 /// Surface tension of water (N/m).

@@ -1,22 +1,26 @@
 //! `Interaction` and `BondUpdate`: droplets fall, slide, merge and follow their strands.
 
 use super::{
-    Droplet, DropletRules, ProcessTime, Ride, WaterLedger, Wetting,
+    Droplet, DropletRules, Ride, WaterLedger, Wetting,
     exchange::{blown_air, let_go, on_strand},
     model::{ball_radius, clinging, fall, hanging, slide},
-    vapour::{DryingAir, WATER, transfer},
 };
 use crate::{
     Blower, HairCollider,
-    air::{HairGravity, local_blowers},
     contact::seen_from,
+    environment::{HairGravity, local_blowers},
     fault::HairFault,
     grid::UniformGrid,
+    lanes::V3,
     parallel::for_each,
-    rod::{algebra::V3, obstacle::Obstacle},
-    setting::{Notes, Settings, tell},
+    rod::obstacle::Obstacle,
+    schedule::HairStep,
+    setting::{Ranged, Settings, Violations, report},
     strand::{Hair, Pose, Strand, StrandOf, TickPose},
-    tick::HairStep,
+};
+use crate::{
+    environment::vapour::{DryingAir, WATER, transfer},
+    schedule::ProcessTime,
 };
 use bevy::prelude::*;
 
@@ -24,7 +28,7 @@ use bevy::prelude::*;
 struct Moving<'a> {
     entity: Entity,
     drop: &'a mut Droplet,
-    notes: Notes,
+    violations: Violations,
     /// Water that the ledger did not know (m³); negative for water that somebody took.
     new: f64,
     evaporated: f64,
@@ -52,26 +56,26 @@ pub(super) fn move_droplets(
     if droplets.is_empty() {
         return;
     }
-    let dt = step.dt;
-    let gravity = if gravity.is_finite() { gravity.0 } else { Vec3::ZERO };
-    let process = process.mended(&Notes::default());
+    let (dt, rules) = (step.dt, rules.clamped());
+    let gravity = gravity.clamped().0;
+    let process = process.clamped().0;
     let world = TickPose::default();
     let obstacles: Vec<Obstacle> =
-        colliders.iter().map(|(c, pose)| seen_from(&world, &c.valid(), pose)).collect();
+        colliders.iter().map(|(c, pose)| seen_from(&world, &c.clamped(), pose)).collect();
     let blowers = local_blowers(world.now(), &blowers);
     let mut items: Vec<Moving<'_>> = droplets
         .iter_mut()
         .map(|(entity, drop)| Moving {
             entity,
             drop: drop.into_inner(),
-            notes: Notes::default(),
+            violations: Violations::new(),
             new: 0.0,
             evaporated: 0.0,
             ends: false,
         })
         .collect();
-    for_each(&mut items, |Moving { drop, notes, new, evaporated, ends, .. }| {
-        drop.mend(notes);
+    for_each(&mut items, |Moving { drop, violations, new, evaporated, ends, .. }| {
+        drop.repair(violations);
         *new = drop.volume - drop.counted;
         drop.before = drop.position;
 
@@ -112,10 +116,10 @@ pub(super) fn move_droplets(
         let inside = (drop.position.cmpge(rules.min) & drop.position.cmple(rules.max)).all();
         *ends = !inside || drop.lying > rules.lying || drop.volume < 1e-15;
     });
-    for Moving { entity, notes, new, evaporated, ends, .. } in items {
+    for Moving { entity, violations, new, evaporated, ends, .. } in items {
         ledger.book(new);
         ledger.book(-evaporated);
-        tell(entity, notes, &mut faults);
+        report(Some(entity), violations, &mut faults);
         if ends {
             // What is left is counted when it goes.
             commands.entity(entity).despawn();
@@ -196,7 +200,7 @@ pub(super) fn merge_droplets(
             let [(_, a), (_, b)] = drops.get_disjoint_mut([i, j]).expect("i is before j");
             if a.volume > 0.0 && b.volume > 0.0 {
                 let (a, b) = (a.bypass_change_detection(), b.bypass_change_detection());
-                if a.volume >= b.volume { a.take_in(b) } else { b.take_in(a) }
+                if a.volume >= b.volume { a.merge(b) } else { b.merge(a) }
             }
         }
     }
@@ -208,7 +212,7 @@ pub(super) fn merge_droplets(
 
 impl Droplet {
     /// Takes another drop in, with its momentum.
-    fn take_in(&mut self, other: &mut Droplet) {
+    fn merge(&mut self, other: &mut Droplet) {
         let volume = self.volume + other.volume;
         let share = (other.volume / volume) as f32;
         if self.ride.is_none() {

@@ -1,21 +1,17 @@
 //! Water's places in the tick, and what it tells and counts.
 
 use super::{
-    Climate, Droplet, DropletRules, Moisture, ProcessTime, Shower, Soak, WaterLedger, Wetting,
+    Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting,
     bridge::join_wet_strands,
+    droplet_contact::{WaterField, wet_strands},
     exchange::{exchange_water, run_showers},
-    meet::{WaterField, wet_strands},
     motion::{follow_strands, merge_droplets, move_droplets},
-    tuft,
-    vapour::DryingAir,
+    strand_block,
 };
 use crate::{
-    contact,
-    fault::HairFault,
-    setting::{self, Notes, tell},
+    schedule::{HairStep, HairSystems, HairTick},
+    setting,
     strand::Strand,
-    style,
-    tick::{HairStep, HairSystems, HairTick},
 };
 use bevy::prelude::*;
 
@@ -25,74 +21,36 @@ pub struct WaterPlugin;
 impl Plugin for WaterPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<Wetting>(app);
-        tuft::plugin(app);
-        app.init_resource::<Climate>()
-            .init_resource::<DryingAir>()
-            .init_resource::<ProcessTime>()
-            .init_resource::<DropletRules>()
-            .init_resource::<WaterLedger>()
+        strand_block::plugin(app);
+        setting::resource::<DropletRules>(app);
+        setting::component::<Shower>(app);
+        app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
-            .add_message::<Soak>()
-            .register_type::<Climate>()
-            .register_type::<ProcessTime>()
-            .register_type::<DropletRules>()
+            .add_message::<SoakHair>()
             .register_type::<WaterLedger>()
             .register_type::<Droplet>()
-            .register_type::<Shower>()
             .register_type::<Moisture>()
+            .register_type::<SoakHair>()
             .register_required_components::<Strand, Moisture>()
             .add_observer(count_lost_droplet)
             .add_observer(count_lost_moisture)
-            .add_systems(PreUpdate, (report_showers, report_air))
             .add_systems(
                 HairTick,
-                (settle_air.run_if(resource_changed::<Climate>), run_showers, exchange_water)
-                    .chain()
-                    .in_set(HairSystems::ExternalForces)
-                    .after(style::apply_treatments),
+                (run_showers, exchange_water).chain().in_set(HairSystems::WaterExchange),
             )
             .add_systems(
                 HairTick,
-                (move_droplets, merge_droplets, wet_strands, join_wet_strands)
-                    .chain()
-                    .in_set(HairSystems::Interaction)
-                    .after(contact::part_strands),
+                (
+                    (move_droplets, merge_droplets).chain().in_set(HairSystems::Droplets),
+                    wet_strands.in_set(HairSystems::DropletContact),
+                    join_wet_strands.in_set(HairSystems::Bridges),
+                ),
             )
             .add_systems(
                 HairTick,
-                (follow_strands, close_books).chain().in_set(HairSystems::BondUpdate),
+                (follow_strands, close_books).chain().in_set(HairSystems::Ledger),
             );
     }
-}
-
-fn report_showers(
-    showers: Query<(Entity, &Shower), Changed<Shower>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    for (entity, shower) in &showers {
-        let notes = Notes::default();
-        shower.mended(&notes);
-        tell(entity, notes, &mut faults);
-    }
-}
-
-fn report_air(
-    climate: Res<Climate>,
-    process: Res<ProcessTime>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    let notes = Notes::default();
-    if climate.is_changed() {
-        climate.mended(&notes);
-    }
-    if process.is_changed() {
-        process.mended(&notes);
-    }
-    tell(Entity::PLACEHOLDER, notes, &mut faults);
-}
-
-fn settle_air(climate: Res<Climate>, mut air: ResMut<DryingAir>) {
-    *air = DryingAir::of(&climate.mended(&Notes::default()));
 }
 
 /// Droplets that somebody despawns take their water with them.

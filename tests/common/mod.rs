@@ -7,7 +7,7 @@ use bevy::{
     time::TimeUpdateStrategy,
     transform::TransformPlugin,
 };
-use bevy_keratin::{Fault, prelude::*};
+use bevy_keratin::{FaultKind, prelude::*};
 use std::time::Duration;
 
 /// An app with the plugin at `hertz`, warmed up.
@@ -91,13 +91,18 @@ pub fn no_gravity(app: &mut App) {
 }
 
 #[derive(Resource, Default)]
-struct Told(Vec<Fault>);
+struct Told(Vec<HairFault>);
 
 fn listen(mut messages: MessageReader<HairFault>, mut told: ResMut<Told>) {
-    told.0.extend(messages.read().map(|m| m.fault.clone()));
+    told.0.extend(messages.read().cloned());
 }
 
 /// The faults that were told since the last call.
-pub fn faults(app: &mut App) -> Vec<Fault> {
+pub fn faults(app: &mut App) -> Vec<HairFault> {
     core::mem::take(&mut app.world_mut().resource_mut::<Told>().0)
+}
+
+/// Their kinds.
+pub fn fault_kinds(app: &mut App) -> Vec<FaultKind> {
+    faults(app).into_iter().map(|fault| fault.kind).collect()
 }

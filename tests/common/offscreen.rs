@@ -112,23 +112,28 @@ impl Offscreen {
     /// `None`, with the reason printed, where nothing can draw. The tick stands still until
     /// `ticking` is told.
     pub fn new(width: u32, height: u32) -> Option<Self> {
-        Self::of(width, height, false)
+        Self::with_plugins(width, height, HairPlugins::default().build())
     }
 
     /// The same with the hair's plugins added before Bevy's.
     pub fn with_hair_first(width: u32, height: u32) -> Option<Self> {
-        Self::of(width, height, true)
+        Self::of(width, height, HairPlugins::default().build(), true)
     }
 
-    fn of(width: u32, height: u32, hair_first: bool) -> Option<Self> {
+    /// The same with these of the hair's plugins.
+    pub fn with_plugins(width: u32, height: u32, hair: PluginGroupBuilder) -> Option<Self> {
+        Self::of(width, height, hair, false)
+    }
+
+    fn of(width: u32, height: u32, hair: PluginGroupBuilder, hair_first: bool) -> Option<Self> {
         if !has_adapter() {
             return None;
         }
         let mut app = App::new();
         if hair_first {
-            app.add_plugins((HairPlugins::default(), windowless()));
+            app.add_plugins((hair, windowless()));
         } else {
-            app.add_plugins((windowless(), HairPlugins::default()));
+            app.add_plugins((windowless(), hair));
         }
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
             .insert_resource(ClearColor(Color::BLACK))

@@ -13,7 +13,7 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use bevy_keratin::{
-    Fault,
+    FaultKind,
     groom::*,
     prelude::*,
     render::{FollowerRoots, HairLook},
@@ -21,7 +21,7 @@ use bevy_keratin::{
 use std::{path::Path, time::Duration};
 
 #[derive(Resource, Default)]
-struct Told(Vec<Fault>);
+struct Told(Vec<HairFault>);
 
 /// An app whose assets are these files.
 fn app(files: &[(&str, Vec<u8>)]) -> App {
@@ -36,7 +36,7 @@ fn app(files: &[(&str, Vec<u8>)]) -> App {
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
         .init_resource::<Told>()
         .add_systems(Last, |mut faults: MessageReader<HairFault>, mut told: ResMut<Told>| {
-            told.0.extend(faults.read().map(|f| f.fault.clone()));
+            told.0.extend(faults.read().cloned());
         });
     app.finish();
     app.cleanup();
@@ -162,9 +162,9 @@ fn grooms_that_cannot_be_used_are_told_once() {
         app.update();
     }
     let told = &app.world().resource::<Told>().0;
-    assert!(matches!(told[0], Fault::GroomNotLoaded { .. }), "{told:?}");
-    assert_eq!(told[1], Fault::Groom(GroomError::Empty));
-    assert!(told[2].to_string().contains("nodes to resample to is 1"), "{}", told[2]);
+    assert!(told[0].kind == FaultKind::Groom && told[0].message.contains("not loaded"), "{told:?}");
+    assert_eq!(told[1].cause(), Some(&GroomError::Empty));
+    assert!(told[2].to_string().contains("GroomGuides::nodes is 1"), "{}", told[2]);
     assert_eq!(told.len(), 3, "{told:?}");
 }
 

@@ -2,14 +2,14 @@
 
 use super::{
     common::*,
-    head::{HEAD, carried, fewer, head, is_carried, turn},
+    head::{HEAD, carried, fewer, head, is_follower, turn},
     zoom,
 };
 use bevy::prelude::*;
-use bevy_keratin::{Fault, LodLevel, PresentLod, Sleepers, prelude::*, strand::TickPose};
+use bevy_keratin::{FaultKind, LodLevel, PresentLod, Sleepers, prelude::*, strand::TickPose};
 
 fn simulated(app: &App, ids: &[Entity]) -> Vec<Entity> {
-    ids.iter().copied().filter(|e| !is_carried(app, *e)).collect()
+    ids.iter().copied().filter(|e| !is_follower(app, *e)).collect()
 }
 
 fn put(app: &mut App, hair: Entity, lod: HairLod, share: f32) {
@@ -18,8 +18,8 @@ fn put(app: &mut App, hair: Entity, lod: HairLod, share: f32) {
     app.update();
 }
 
-/// A head of 60 strands at a level with a quarter of them.
-fn quarter() -> (App, Entity, Vec<Entity>) {
+/// A head of 60 strands at a level with a group of them.
+fn group() -> (App, Entity, Vec<Entity>) {
     let mut app = test_app(60.0);
     let (hair, ids) = head(&mut app, 60, 9, 0.24);
     put(&mut app, hair, fewer(0.25), 0.1);
@@ -95,7 +95,7 @@ fn nothing_pops_while_hair_swings_and_velocities_are_those_of_the_motion() {
             }
             app.update();
             let now = places(app, *hair, ids);
-            for (k, e) in ids.iter().enumerate().filter(|(_, e)| is_carried(app, **e)) {
+            for (k, e) in ids.iter().enumerate().filter(|(_, e)| is_follower(app, **e)) {
                 let strand = strand(app, *e);
                 strain = strain.max(strand.peak_strain());
                 let pose = app.world().get::<TickPose>(*hair).unwrap().now();
@@ -134,8 +134,8 @@ fn nothing_pops_while_hair_swings_and_velocities_are_those_of_the_motion() {
 /// Springs have no twist that others could follow.
 #[test]
 fn springs_are_all_simulated() {
-    let (mut app, hair, ids) = quarter();
-    let carried = |app: &App| ids.iter().filter(|e| is_carried(app, **e)).count();
+    let (mut app, hair, ids) = group();
+    let carried = |app: &App| ids.iter().filter(|e| is_follower(app, **e)).count();
     assert!(carried(&app) > ids.len() / 2);
     for (model, some) in [(StrandModel::MassSpring, false), (StrandModel::Rod, true)] {
         app.world_mut().entity_mut(hair).insert(model);
@@ -147,7 +147,7 @@ fn springs_are_all_simulated() {
 
 #[test]
 fn roots_stay_and_hair_goes_along_when_it_is_put_elsewhere() {
-    let (mut app, hair, ids) = quarter();
+    let (mut app, hair, ids) = group();
     let roots: Vec<Vec3> = ids.iter().map(|e| strand(&app, *e).positions()[0]).collect();
     run(&mut app, 2.0);
     let before: Vec<_> = ids.iter().map(|e| strand(&app, *e).positions().to_vec()).collect();
@@ -185,7 +185,7 @@ fn guides_that_sleep_let_who_hangs_on_them_sleep_and_wake_it() {
     }
     run(&mut app, 0.1);
     let asleep = |app: &App| {
-        ids.iter().filter(|e| app.world().get::<Sleep>(**e).unwrap().is_asleep()).count()
+        ids.iter().filter(|e| app.world().get::<StrandSleep>(**e).unwrap().is_asleep()).count()
     };
     assert_eq!((sleepers(&app).asleep, asleep(&app)), (15, 60));
     let rest = places(&app, hair, &ids);
@@ -201,7 +201,7 @@ fn guides_that_sleep_let_who_hangs_on_them_sleep_and_wake_it() {
 
 #[test]
 fn who_is_held_is_simulated_and_nobody_hangs_on_it() {
-    let (mut app, hair, ids) = quarter();
+    let (mut app, hair, ids) = group();
     run(&mut app, 1.0);
     let (guide, other) = (simulated(&app, &ids)[3], carried(&app, &ids)[7]);
     for e in [guide, other] {
@@ -209,8 +209,8 @@ fn who_is_held_is_simulated_and_nobody_hangs_on_it() {
         app.world_mut().entity_mut(e).insert(HeldNodes { targets });
     }
     app.update();
-    // A quarter of the 58 that are free, and the two.
-    assert!(!is_carried(&app, guide) && !is_carried(&app, other));
+    // A group of the 58 that are free, and the two.
+    assert!(!is_follower(&app, guide) && !is_follower(&app, other));
     assert_eq!(simulated(&app, &ids).len(), 15 + 2);
     let held = strand(&app, guide).positions().to_vec();
     for i in 0..60 {
@@ -223,12 +223,12 @@ fn who_is_held_is_simulated_and_nobody_hangs_on_it() {
     app.world_mut().entity_mut(guide).remove::<HeldNodes>();
     app.world_mut().entity_mut(other).remove::<HeldNodes>();
     app.update();
-    assert!(is_carried(&app, other) && !is_carried(&app, guide));
+    assert!(is_follower(&app, other) && !is_follower(&app, guide));
 }
 
 #[test]
 fn strands_may_come_go_and_change_their_hair_at_a_level() {
-    let (mut app, hair, ids) = quarter();
+    let (mut app, hair, ids) = group();
     run(&mut app, 0.5);
     // Half the guides go.
     let guides = simulated(&app, &ids);
@@ -250,7 +250,7 @@ fn strands_may_come_go_and_change_their_hair_at_a_level() {
     broken.positions_mut()[2] = Vec3::NAN;
     let broken = app.world_mut().spawn((StrandOf(hair), broken)).id();
     run(&mut app, 0.2);
-    assert!(!is_carried(&app, none));
+    assert!(!is_follower(&app, none));
     assert!([come, broken].iter().all(|e| strand(&app, *e).is_finite()));
     assert_eq!(simulated(&app, &ids).len() + simulated(&app, &[come, broken]).len(), 14);
     // A guide that is not finite is put back; nobody follows it into nowhere.
@@ -259,14 +259,17 @@ fn strands_may_come_go_and_change_their_hair_at_a_level() {
     run(&mut app, 0.2);
     assert!(ids.iter().all(|e| strand(&app, *e).is_finite()));
     let told = faults(&mut app);
-    assert!(told.iter().all(|f| matches!(f, Fault::Strand(_) | Fault::PutBack | Fault::Rebuilt)));
+    assert!(
+        told.iter()
+            .all(|f| matches!(f.kind, FaultKind::Strand | FaultKind::PutBack | FaultKind::Rebuilt))
+    );
     // One goes over to other hair, which has no levels; one to none.
     let [gone, alone] = [0, 1].map(|i| carried(&app, &ids)[i]);
     let other = app.world_mut().spawn(Hair).id();
     app.world_mut().entity_mut(gone).insert(StrandOf(other));
     app.world_mut().entity_mut(alone).remove::<StrandOf>();
     run(&mut app, 0.1);
-    assert!(!is_carried(&app, gone) && !is_carried(&app, alone));
+    assert!(!is_follower(&app, gone) && !is_follower(&app, alone));
     assert!(rms_speed(strand(&app, gone)) > 0.0);
     // Without levels everyone is simulated.
     app.world_mut().entity_mut(hair).remove::<HairLod>();
@@ -280,7 +283,7 @@ fn strands_may_come_go_and_change_their_hair_at_a_level() {
 #[test]
 fn the_same_head_gives_the_same_bits() {
     let go = || {
-        let (mut app, hair, ids) = quarter();
+        let (mut app, hair, ids) = group();
         for i in 0..90 {
             turn(&mut app, hair, i as f32 / 60.0);
             zoom(&mut app, hair, if i % 40 < 20 { 0.1 } else { 1.0 });
@@ -301,7 +304,7 @@ fn hair_that_sleeps_sleeps_on_when_fewer_strands_are_simulated_and_when_all_are_
     app.insert_resource(HairDefault(HairSleep { speed: 1.0, turning: 10.0, seconds: 0.2 }));
     run(&mut app, 1.0);
     let asleep = |app: &App| {
-        ids.iter().filter(|e| app.world().get::<Sleep>(**e).unwrap().is_asleep()).count()
+        ids.iter().filter(|e| app.world().get::<StrandSleep>(**e).unwrap().is_asleep()).count()
     };
     assert_eq!(asleep(&app), 60);
     for (share, count) in [(0.1, 45), (1.0, 0)] {

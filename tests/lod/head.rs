@@ -40,12 +40,12 @@ pub fn turn(app: &mut App, hair: Entity, seconds: f32) {
         * Quat::from_rotation_x(0.3 * (seconds * 3.0).sin());
 }
 
-pub fn is_carried(app: &App, strand: Entity) -> bool {
-    app.world().get::<Sleep>(strand).unwrap().is_carried()
+pub fn is_follower(app: &App, strand: Entity) -> bool {
+    app.world().get::<StrandSleep>(strand).unwrap().is_follower()
 }
 
 pub fn carried(app: &App, ids: &[Entity]) -> Vec<Entity> {
-    ids.iter().copied().filter(|e| is_carried(app, *e)).collect()
+    ids.iter().copied().filter(|e| is_follower(app, *e)).collect()
 }
 
 fn mean_and_most(all: &[f32]) -> (f32, f32) {
@@ -164,7 +164,7 @@ fn strands_that_are_carried_cost_little() {
         }
         let ms = |seconds: [f64; 2]| seconds.map(|s| s * 1e3);
         println!(
-            "contact {strength}: ms a tick with all strands and with a quarter {:?}, {:.2}; in which the \
+            "contact {strength}: ms a tick with all strands and with a group {:?}, {:.2}; in which the \
              level begins {:?}",
             ms(best),
             best[1] / best[0],

@@ -71,7 +71,7 @@ fn wind_dries_and_water_wets_who_is_carried() {
     app.world_mut().despawn(blower);
     app.world_mut().write_message(Treat::dry(hair));
     run(&mut app, 0.5);
-    app.world_mut().write_message(Soak { target: hair, wetness: 1.0 });
+    app.world_mut().write_message(SoakHair { target: hair, wetness: 1.0 });
     run(&mut app, 8.0);
     let wet: Vec<f32> = carried(&app, &ids).iter().map(|e| rate(&app, *e)).collect();
     assert!(wet.len() == 9 && wet.iter().all(|r| *r < 0.05), "{wet:?}");

@@ -1,7 +1,7 @@
 //! Numbers out of glTF's buffers, with everything that refers to something checked.
 
-use super::{missing, wrong};
-use crate::groom::GroomFileError;
+use super::super::GroomFileError;
+use super::error::{missing, wrong};
 use ::gltf::json::{Root, accessor::ComponentType, validation::Checked};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use bevy::platform::collections::HashMap;

@@ -64,7 +64,7 @@ fn parse(text: &[u8], start: u64) -> Result<Root, GroomFileError> {
     })?;
     if !root.asset.version.starts_with("2.") {
         let found = format!("asset.version {:?}", root.asset.version);
-        return super::wrong("asset.version", found, "2.0", EXPORT_AGAIN);
+        return super::error::wrong("asset.version", found, "2.0", EXPORT_AGAIN);
     }
     Ok(root)
 }

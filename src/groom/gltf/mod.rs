@@ -9,6 +9,7 @@
 mod accessor;
 mod chain;
 mod container;
+mod error;
 
 use super::{Groom, GroomError, GroomFileError, GroomLosses};
 use ::gltf::json::{
@@ -21,6 +22,7 @@ use ::gltf::json::{
 use accessor::{Buffers, Vectors};
 use bevy::{platform::collections::HashMap, prelude::*};
 use chain::Chains;
+use error::{missing, wrong};
 
 pub(super) use container::looks_like_json;
 
@@ -253,18 +255,4 @@ impl Reading<'_> {
         }
         Ok(())
     }
-}
-
-fn wrong<T>(
-    place: &str,
-    found: impl Into<String>,
-    expected: impl Into<String>,
-    hint: &'static str,
-) -> Result<T, GroomFileError> {
-    let (found, expected) = (found.into(), expected.into());
-    Err(GroomFileError::Gltf { place: place.to_owned(), found, expected, hint })
-}
-
-fn missing<T>(place: &str) -> Result<T, GroomFileError> {
-    wrong(place, "nothing", "what the file refers to", "export the file again")
 }

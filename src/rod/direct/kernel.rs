@@ -9,10 +9,9 @@ use super::{
     matrix::{Matrix, Pivot, Symmetric},
     width::Width,
 };
-use crate::rod::{
-    algebra::{Quaternion, V3},
-    block::{EdgeLanes, NodeLanes},
-    lanes::Real,
+use crate::{
+    lanes::{Quaternion, Real, V3},
+    rod::block::{EdgeLanes, NodeLanes},
 };
 
 /// What the way up needs of the way down: at index i of edge i and the node at its end.
@@ -32,21 +31,22 @@ pub(crate) struct Row<C> {
 pub(crate) struct Stage<R> {
     /// How far into the substep the forces are taken (s): θ dt.
     pub ahead: R,
-    /// 1/θ.
+    /// How much farther nodes go than is solved for: 1/θ.
     pub beyond: R,
     /// Gravity (m/s²).
     pub gravity: V3<R>,
     /// Kelvin–Voigt time (s), less what the step itself damps.
     pub damping: R,
-    /// 1 in lanes that take a second Newton step, else 0.
+    /// 1 in lanes that take this Newton step, 0 in lanes that are done. Where nothing touches, all do.
     pub again: R,
+    /// 1 in lanes that touch an obstacle, else 0: others start where their inertia takes them.
+    pub touching: R,
 }
 
 /// How firmly a node that rests on an obstacle is held out of it, in shares of its inertia. Without
 /// end it would make fine strands jump off; loosely held they are pushed out after the solve, which
 /// bends them.
 pub(crate) const HOLD: f64 = 100.0;
-
 
 /// An edge as the way down carries it.
 #[derive(Clone, Copy)]
@@ -91,10 +91,8 @@ pub(crate) fn carry<R: Real>(q: Quaternion<R>, e: V3<R>, len: R) -> (Quaternion<
     let scale = one / (len.lit(2.0) * len * cosine).max(len.lit(1e-30)).sqrt();
     let turn = Quaternion::new(d.cross(e).scale(scale), cosine * scale);
     let half = Quaternion::new(first_axis(q), len.lit(0.0));
-    let turn = Quaternion::new(
-        V3::select(folded, half.v, turn.v),
-        R::select(folded, half.w, turn.w),
-    );
+    let turn =
+        Quaternion::new(V3::select(folded, half.v, turn.v), R::select(folded, half.w, turn.w));
     let turned = turn.product(q);
     // Off by round-off only, so that one step of Newton's does for a root.
     let length = len.lit(-0.5).mul_add(turned.dot(turned), len.lit(1.5));
@@ -135,9 +133,9 @@ fn first_axis<R: Real>(q: Quaternion<R>) -> V3<R> {
 }
 
 /// Assembles and eliminates from the root to the tip, with frames carried to where the nodes are.
-/// `AGAIN`: a second Newton step, for [`Stage::again`] alone.
+/// `TOUCHING`: something touches, so obstacles are heeded, and lanes may have to wait.
 #[inline(always)]
-pub(crate) fn down<W: Width, const TOUCHING: bool, const AGAIN: bool>(
+pub(crate) fn down<W: Width, const TOUCHING: bool>(
     w: W,
     nodes: &[NodeLanes<W::Cell>],
     edges: &mut [EdgeLanes<W::Cell>],
@@ -193,7 +191,7 @@ pub(crate) fn down<W: Width, const TOUCHING: bool, const AGAIN: bool>(
             let turn = V3::select(crushed, none, turn);
             let r = w.lit(1.0) / length.max(l * w.lit(0.2));
             let t = V3::select(crushed, q.tangent(), e.scale(r));
-            w.put4(if AGAIN { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
+            w.put4(if TOUCHING { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
             let tension = (axial * (length - l)).max(w.get(&edge.tension)).max(zero);
             let across = W::Real::select(crushed, axial, tension * r);
             let k = w.get(&edge.k);
@@ -277,7 +275,8 @@ fn eliminate<W: Width, const TOUCHING: bool>(
         let n = w.get3(&node.rests_on);
         a = a.plus_outer(n, inert * w.lit(HOLD));
         let inertial = w.get3(&node.v).scale_add(stage.ahead, w.get3(&node.from));
-        b = (inertial - w.get3(&node.p)).scale_add(inert, b);
+        let pulled = (inertial - w.get3(&node.p)).scale_add(inert, b);
+        b = V3::select(w.lit(0.0).lt(stage.touching), pulled, b);
     }
     let next = next.plus(left.between);
     let pivot = Pivot::new(&a, inert * w.lit(1e-3), held);
@@ -305,10 +304,9 @@ fn eliminate<W: Width, const TOUCHING: bool>(
     }
 }
 
-/// Solves from the tip to the root and moves nodes. Where this is the `LAST` step, nodes go on to the
-/// end of the substep.
+/// Solves from the tip to the root and moves nodes, beyond the solution as the stage says.
 #[inline(always)]
-pub(crate) fn up<W: Width, const LAST: bool, const AGAIN: bool>(
+pub(crate) fn up<W: Width, const TOUCHING: bool>(
     w: W,
     nodes: &mut [NodeLanes<W::Cell>],
     edges: &mut [EdgeLanes<W::Cell>],
@@ -324,21 +322,24 @@ pub(crate) fn up<W: Width, const LAST: bool, const AGAIN: bool>(
         let mut solved = none;
         if i > 0 {
             let row = &rows[i - 1];
-            let near = Matrix { rows: [w.get3(&row.near[0]), w.get3(&row.near[1]), w.get3(&row.near[2])] };
-            let far = Matrix { rows: [w.get3(&row.far[0]), w.get3(&row.far[1]), w.get3(&row.far[2])] };
+            let near =
+                Matrix { rows: [w.get3(&row.near[0]), w.get3(&row.near[1]), w.get3(&row.near[2])] };
+            let far =
+                Matrix { rows: [w.get3(&row.far[0]), w.get3(&row.far[1]), w.get3(&row.far[2])] };
             let from = far.transposed_to(after, near.transposed_from(next, w.get3(&row.solution)));
             let l = w.get3(&row.lower);
             let y1 = (-l.z).mul_add(from.z, from.y);
             let x1 = (-l.y).mul_add(from.z, (-l.x).mul_add(y1, from.x));
             solved = V3::new(x1, y1, from.z);
-            if AGAIN {
-                // Lanes that are done have nothing to solve: they stay, and so does their tension.
+            if TOUCHING {
+                // Lanes that are done stay, to the bit, and so does their tension.
                 solved = V3::select(w.lit(0.0).lt(stage.again), solved, none);
             }
             y = y + solved;
         }
         let start = w.get3(&node.from);
-        let to = if LAST { (y - start).scale_add(stage.beyond, start) } else { y };
+        let to = (y - start).scale_add(stage.beyond, start);
+        let to = if TOUCHING { V3::select(w.lit(0.0).lt(stage.again), to, y) } else { to };
         w.put3(to, &mut node.p);
         if i < edges.len() {
             let edge = &mut edges[i];
@@ -346,7 +347,11 @@ pub(crate) fn up<W: Width, const LAST: bool, const AGAIN: bool>(
             let t = q.tangent();
             let tension = w.get(&edge.axial) * (t.dot(end - y) - w.get(&edge.l));
             let again = w.lit(0.0).lt(stage.again);
-            let tension = if AGAIN { W::Real::select(again, tension, w.get(&edge.tension)) } else { tension };
+            let tension = if TOUCHING {
+                W::Real::select(again, tension, w.get(&edge.tension))
+            } else {
+                tension
+            };
             w.put(tension, &mut edge.tension);
         }
         end = y;
@@ -447,11 +452,7 @@ impl<R: Real> Twist<R> {
 
 /// Turns edges about their tangents until twist is in balance.
 #[inline(always)]
-pub(crate) fn untwist<W: Width>(
-    w: W,
-    edges: &mut [EdgeLanes<W::Cell>],
-    rows: &[Row<W::Cell>],
-) {
+pub(crate) fn untwist<W: Width>(w: W, edges: &mut [EdgeLanes<W::Cell>], rows: &[Row<W::Cell>]) {
     let mut twist = w.lit(0.0);
     for (edge, row) in edges.iter_mut().zip(rows).rev() {
         twist = (-w.get(&row.twist_next)).mul_add(twist, w.get(&row.twist));

@@ -1,6 +1,6 @@
 //! Blocks of three by three.
 
-use crate::rod::{algebra::V3, lanes::Real};
+use crate::lanes::{Real, V3};
 
 /// A symmetric matrix by its lower triangle.
 #[derive(Clone, Copy)]
@@ -151,14 +151,26 @@ impl<R: Real> Matrix<R> {
     #[inline(always)]
     pub fn minus_product(self, a: &Self, b: &Self) -> Self {
         let ([x, y, z], [ax, ay, az], [bx, by, bz]) = (self.rows, a.rows, b.rows);
-        Self { rows: [row_from(x, ax, bx, by, bz), row_from(y, ay, bx, by, bz), row_from(z, az, bx, by, bz)] }
+        Self {
+            rows: [
+                row_from(x, ax, bx, by, bz),
+                row_from(y, ay, bx, by, bz),
+                row_from(z, az, bx, by, bz),
+            ],
+        }
     }
 
     /// `self + a bᵀ`.
     #[inline(always)]
     pub fn plus_product(self, a: &Self, b: &Self) -> Self {
         let ([x, y, z], [ax, ay, az], [bx, by, bz]) = (self.rows, a.rows, b.rows);
-        Self { rows: [row_from(x, -ax, bx, by, bz), row_from(y, -ay, bx, by, bz), row_from(z, -az, bx, by, bz)] }
+        Self {
+            rows: [
+                row_from(x, -ax, bx, by, bz),
+                row_from(y, -ay, bx, by, bz),
+                row_from(z, -az, bx, by, bz),
+            ],
+        }
     }
 
     /// `from + self v`.

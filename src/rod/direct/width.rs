@@ -1,10 +1,6 @@
 //! How numbers lie in memory and in registers, so that one kernel serves lanes and a scalar twin.
 
-use crate::rod::{
-    algebra::{Quaternion, V3},
-    block::Lane,
-    lanes::Real,
-};
+use crate::lanes::{Lane, Quaternion, Real, V3};
 use core::marker::PhantomData;
 use fearless_simd::{Simd, f32x8, f32x16, prelude::*};
 
@@ -81,24 +77,26 @@ impl<S: Simd> Width for Whole<S> {
 /// Half of a block's lanes, the first or the second: where registers hold eight, sixteen would not
 /// stay in them.
 #[derive(Clone, Copy)]
-pub(crate) struct Half<S, const SECOND: bool>(pub(crate) S);
+pub(crate) struct Half<S> {
+    pub(crate) simd: S,
+    /// 0 or 1.
+    pub(crate) index: usize,
+}
 
-impl<S: Simd, const SECOND: bool> Width for Half<S, SECOND> {
+impl<S: Simd> Width for Half<S> {
     type Real = f32x8<S>;
     type Cell = Lane;
     #[inline(always)]
     fn lit(self, value: f64) -> f32x8<S> {
-        f32x8::splat(self.0, value as f32)
+        f32x8::splat(self.simd, value as f32)
     }
     #[inline(always)]
     fn get(self, cell: &Lane) -> f32x8<S> {
-        let [first, second] = cell.as_chunks::<8>().0 else { unreachable!() };
-        f32x8::load_array_ref(self.0, if SECOND { second } else { first })
+        f32x8::load_array_ref(self.simd, &cell.as_chunks().0[self.index % 2])
     }
     #[inline(always)]
     fn put(self, value: f32x8<S>, cell: &mut Lane) {
-        let [first, second] = cell.as_chunks_mut::<8>().0 else { unreachable!() };
-        value.store_array(if SECOND { second } else { first });
+        value.store_array(&mut cell.as_chunks_mut().0[self.index % 2]);
     }
 }
 

@@ -1,10 +1,8 @@
 //! The ways of a strand's water in a substep: along it, into it, off it.
 
+use super::super::model::{WATER_VISCOSITY, clinging, hanging};
 use super::{Moisture, Wetting, node_lengths, sheen};
-use crate::water::{
-    model::{WATER_VISCOSITY, clinging, hanging},
-    vapour::{DryingAir, WATER, transfer},
-};
+use crate::environment::vapour::{DryingAir, WATER, transfer};
 use bevy::prelude::*;
 use core::f32::consts::PI;
 

@@ -8,11 +8,8 @@ mod flow;
 
 pub use flow::{Exposure, Left, Surroundings};
 
-use super::vapour::WATER;
-use crate::{
-    prefetch::prefetch,
-    setting::{Bound, HairSetting, Notes},
-};
+use crate::environment::vapour::WATER;
+use crate::{parallel::prefetch, setting::setting};
 use bevy::prelude::*;
 use core::f32::consts::PI;
 
@@ -23,100 +20,54 @@ const PACKING: f32 = 0.6;
 /// Bound water of soaked hair beyond a room's, as a share of the dry mass.
 const SATURATION: f32 = 0.31 - 0.0957;
 
-/// How hair takes water up, gives it away and is pulled by it. Component of a
-/// [`Hair`](crate::Hair); where absent, [`HairDefault<Wetting>`](crate::HairDefault) holds.
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct Wetting {
-    /// How many fibres a simulated strand stands for: with the diameter its mass, its thickness and
-    /// what it holds. Default 500: two hundred strands are a head of hair. Safe 1…10,000.
-    pub fibres: f32,
-    /// Diameter of a fibre (m). Default 70e-6, safe 40e-6…120e-6.
-    pub fibre_diameter: f32,
-    /// Largest acceleration that a droplet gives a node, \[W\] equation 2 (m/s²). Default 30, safe
-    /// 0…100; print has 1 without a unit. Less for droplets smaller than their r_min, and for nodes
-    /// that water has made heavy.
-    pub adhesion: f32,
-    /// Largest acceleration with which the film between two strands draws them together (m/s²).
-    /// Default 10, safe 0…50. Capillary forces give up to 2σ/λ, 57 m/s² for the default's mass λ of a
-    /// metre of strand, where all of an edge is bridged. 0 for none.
-    pub cohesion: f32,
-    /// Rate at which strands lose their motion against each other where a film or a droplet joins
-    /// them (1/s). Default 30, safe 0…1000; 0 lets them slip.
-    pub film_drag: f32,
-    /// Rate at which a droplet spreads into the film of what it touches (1/s). Default 20, safe
-    /// 0…100; 0 leaves droplets whole.
-    pub uptake: f32,
-    /// Rate at which film soaks into the fibres (1/s). Default 1/120 (virgin hair; bleached hair is
-    /// two to four times as fast), safe 0…1.
-    pub soaking: f32,
-    /// Diffusivity of the film along the strand by capillary action (m²/s). Default 1e-5, safe
-    /// 0…1e-3.
-    pub wicking: f32,
-    /// Rate at which water leaves, times what physics gives for a lock in free air. Default 1; less
-    /// deep inside dense hair, 0 never dries.
-    pub evaporation: f32,
-    /// Time in which hydrogen bonds follow the water (s). Default 1, safe 0…60; 0 follows at once.
-    pub bond_time: f32,
-    /// Share of its stiffness that soaked hair loses beyond its open hydrogen bonds. Default 0.33:
-    /// with the 0.67 that they leave, wet hair has 0.45 of its dry stiffness, as measured. Safe
-    /// 0…0.9.
-    pub softening: f32,
-    /// Time constant of a 1 mm droplet that slides down a strand: the speed that gravity's pull
-    /// along it gives in this time (s). Default 0.01, safe 0…0.1; 0 pins droplets where they land.
-    pub sliding: f32,
-}
-
-impl Default for Wetting {
-    fn default() -> Self {
-        Self {
-            fibres: 500.0,
-            fibre_diameter: 70e-6,
-            adhesion: 30.0,
-            cohesion: 10.0,
-            film_drag: 30.0,
-            uptake: 20.0,
-            soaking: 1.0 / 120.0,
-            wicking: 1e-5,
-            evaporation: 1.0,
-            bond_time: 1.0,
-            softening: 0.33,
-            sliding: 0.01,
-        }
-    }
-}
-
-const FIBRES: Bound = Bound::new("Wetting::fibres", 1.0, 1e6, "500 on each of 200 strands");
-const DIAMETER: Bound =
-    Bound::new("Wetting::fibre_diameter (m)", 1e-6, 1e-3, "hair has 50e-6 to 100e-6");
-const ADHESION: Bound = Bound::new("Wetting::adhesion (m/s²)", 0.0, 1e3, "30 clumps soft hair");
-const COHESION: Bound = Bound::new("Wetting::cohesion (m/s²)", 0.0, 1e3, "10 holds locks");
-const FILM_DRAG: Bound = Bound::new("Wetting::film_drag (1/s)", 0.0, 1e6, "30 holds locks");
-const UPTAKE: Bound = Bound::new("Wetting::uptake (1/s)", 0.0, 1e4, "20 takes a drop in at once");
-const SOAKING: Bound = Bound::new("Wetting::soaking (1/s)", 0.0, 1e3, "1/120 is virgin hair");
-const WICKING: Bound = Bound::new("Wetting::wicking (m²/s)", 0.0, 1.0, "1e-5 creeps along");
-const EVAPORATION: Bound = Bound::new("Wetting::evaporation", 0.0, 1e3, "1 is a lock in free air");
-const BOND_TIME: Bound = Bound::new("Wetting::bond_time (s)", 0.0, 1e4, "1 follows water closely");
-const SOFTENING: Bound = Bound::new("Wetting::softening", 0.0, 0.95, "0.33 is measured");
-const SLIDING: Bound = Bound::new("Wetting::sliding (s)", 0.0, 10.0, "0.01 slides, 0 pins");
-
-impl HairSetting for Wetting {
-    fn mended(&self, notes: &Notes) -> Self {
-        let d = Self::default();
-        Self {
-            fibres: FIBRES.mend(self.fibres, d.fibres, notes),
-            fibre_diameter: DIAMETER.mend(self.fibre_diameter, d.fibre_diameter, notes),
-            adhesion: ADHESION.mend(self.adhesion, d.adhesion, notes),
-            cohesion: COHESION.mend(self.cohesion, d.cohesion, notes),
-            film_drag: FILM_DRAG.mend(self.film_drag, d.film_drag, notes),
-            uptake: UPTAKE.mend(self.uptake, d.uptake, notes),
-            soaking: SOAKING.mend(self.soaking, d.soaking, notes),
-            wicking: WICKING.mend(self.wicking, d.wicking, notes),
-            evaporation: EVAPORATION.mend(self.evaporation, d.evaporation, notes),
-            bond_time: BOND_TIME.mend(self.bond_time, d.bond_time, notes),
-            softening: SOFTENING.mend(self.softening, d.softening, notes),
-            sliding: SLIDING.mend(self.sliding, d.sliding, notes),
-        }
+setting! {
+    /// How hair takes water up, gives it away and is pulled by it. Component of a
+    /// [`Hair`](crate::Hair); where absent, [`HairDefault<Wetting>`](crate::HairDefault) holds.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct Wetting {
+        /// How many fibres a simulated strand stands for: with the diameter its mass, its thickness
+        /// and what it holds. At 500 two hundred strands are a head of hair.
+        pub fibres: f32 = 500.0, in FIBRES: 1.0..=1e6, safe 1.0..=1e4,
+            "500 on each of 200 strands";
+        /// Diameter of a fibre.
+        pub fibre_diameter: f32 = 70e-6, "m" in FIBRE_DIAMETER: 1e-6..=1e-3, safe 40e-6..=120e-6,
+            "hair has 50e-6 to 100e-6";
+        /// Largest acceleration that a droplet gives a node, \[W\] equation 2; print has 1 without a
+        /// unit. Less for droplets smaller than their r_min, and for nodes that water has made heavy.
+        pub adhesion: f32 = 30.0, "m/s²" in ADHESION: 0.0..=1e3, safe 0.0..=100.0,
+            "30 clumps soft hair";
+        /// Largest acceleration with which the film between two strands draws them together; 0 for
+        /// none. Capillary forces give up to 2σ/λ, 57 m/s² for the default's mass λ of a metre of
+        /// strand, where all of an edge is bridged.
+        pub cohesion: f32 = 10.0, "m/s²" in COHESION: 0.0..=1e3, safe 0.0..=50.0, "10 holds locks";
+        /// Rate at which strands lose their motion against each other where a film or a droplet joins
+        /// them; 0 lets them slip.
+        pub film_drag: f32 = 30.0, "1/s" in FILM_DRAG: 0.0..=1e6, safe 0.0..=1000.0,
+            "30 holds locks";
+        /// Rate at which a droplet spreads into the film of what it touches; 0 leaves droplets whole.
+        pub uptake: f32 = 20.0, "1/s" in UPTAKE: 0.0..=1e4, safe 0.0..=100.0,
+            "20 takes a drop in at once";
+        /// Rate at which film soaks into the fibres. 1/120 is virgin hair; bleached hair is two to
+        /// four times as fast.
+        pub soaking: f32 = 1.0 / 120.0, "1/s" in SOAKING: 0.0..=1e3, safe 0.0..=1.0,
+            "1/120 is virgin hair";
+        /// Diffusivity of the film along the strand by capillary action.
+        pub wicking: f32 = 1e-5, "m²/s" in WICKING: 0.0..=1.0, safe 0.0..=1e-3,
+            "1e-5 creeps along";
+        /// Rate at which water leaves, times what physics gives for a lock in free air; less deep
+        /// inside dense hair, 0 never dries.
+        pub evaporation: f32 = 1.0, in EVAPORATION: 0.0..=1e3, safe 0.0..=10.0,
+            "1 is a lock in free air";
+        /// Time in which hydrogen bonds follow the water; 0 follows at once.
+        pub bond_time: f32 = 1.0, "s" in BOND_TIME: 0.0..=1e4, safe 0.0..=60.0,
+            "1 follows water closely";
+        /// Share of its stiffness that soaked hair loses beyond its open hydrogen bonds. With the 0.67
+        /// that they leave, 0.33 gives wet hair 0.45 of its dry stiffness, as measured.
+        pub softening: f32 = 0.33, in SOFTENING: 0.0..=0.95, safe 0.0..=0.9, "0.33 is measured";
+        /// Time constant of a 1 mm droplet that slides down a strand: the speed that gravity's pull
+        /// along it gives in this time; 0 pins droplets where they land.
+        pub sliding: f32 = 0.01, "s" in SLIDING: 0.0..=10.0, safe 0.0..=0.1, "0.01 slides, 0 pins";
     }
 }
 
@@ -147,7 +98,7 @@ impl Wetting {
 /// hair costs nothing, and its hydrogen bonds are left to [`Treat`](crate::Treat) and equation 19.
 ///
 /// Where there is water, hydrogen bonds follow it. The tick writes it; to wet hair from game code
-/// spawn a [`Droplet`](crate::Droplet) or send a [`Soak`](crate::Soak).
+/// spawn a [`Droplet`](crate::Droplet) or send a [`SoakHair`](crate::SoakHair).
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Moisture {

@@ -1,0 +1,59 @@
+//! The roots that are tied to a mesh.
+
+use super::{corner::Corner, pose::Movers};
+use crate::plant::RootOnMesh;
+use bevy::{
+    math::{Isometry3d, Mat3A},
+    prelude::*,
+};
+
+/// Ties the strands of a [`Hair`](crate::Hair) to triangles of a mesh, at rest, skinned or morphed.
+/// Component of the hair, which best sits on the bone that moves most of it.
+///
+/// Give strands as they grow on the mesh in its own space, before any skinning, as planting gives
+/// them. In the first tick in which mesh and joints are there every strand is taken to its place on
+/// the mesh as it is posed; lengths are scaled as the mesh is. From then on roots go with their
+/// triangles, turning with them: with the joints of a `SkinnedMesh`, and with the mesh's morph targets
+/// as `MeshMorphWeights` weighs them. What does not fit is told once as
+/// [`FaultKind::Roots`](crate::FaultKind::Roots).
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct RootsOnMesh {
+    /// The entity that carries the `Mesh3d`, and if there are any `SkinnedMesh` and
+    /// `MeshMorphWeights`.
+    pub mesh: Option<Entity>,
+    /// One for each strand, in the order of the hair's [`Strands`](crate::Strands).
+    pub roots: Vec<RootOnMesh>,
+}
+
+/// What was read from the mesh when the strands were tied to it, so that its asset may go.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct TiedRoots {
+    #[reflect(ignore)]
+    pub(super) roots: Vec<Tied>,
+    #[reflect(ignore)]
+    pub(super) movers: Movers,
+    pub(super) failed: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tied {
+    pub(super) strand: Entity,
+    pub(super) weights: Vec3,
+    pub(super) corners: [Corner; 3],
+    /// Where the root's frame is in its triangle's.
+    pub(super) offset: Isometry3d,
+    pub(super) from: Isometry3d,
+    pub(super) to: Isometry3d,
+}
+
+/// The frame of a triangle at a point of it; `None` where it has no area.
+pub(super) fn triangle(corners: [Vec3; 3], weights: Vec3) -> Option<Isometry3d> {
+    let [a, b, c] = corners;
+    let along = (b - a).try_normalize()?;
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    let turn = Mat3A::from_cols(along.into(), normal.cross(along).into(), normal.into());
+    let at = a * weights.x + b * weights.y + c * weights.z;
+    at.is_finite().then(|| Isometry3d::new(at, Quat::from_mat3a(&turn)))
+}

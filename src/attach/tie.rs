@@ -1,0 +1,142 @@
+//! Tying strands to their mesh, once it is there.
+
+use super::{
+    corner::{Corner, Corners},
+    error::RootsError,
+    morph::Morphs,
+    pose::Movers,
+    roots::{RootsOnMesh, Tied, TiedRoots, triangle},
+};
+use crate::{
+    bond::Bonds,
+    fault::{FaultKind, HairFault},
+    plant::RootOnMesh,
+    schedule::HairStep,
+    strand::{Hair, Strand, StrandHistory, Strands, TickPose},
+};
+use bevy::{
+    math::Isometry3d,
+    mesh::{
+        Mesh, Mesh3d,
+        skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
+    },
+    prelude::*,
+};
+
+/// Ties the strands of new [`RootsOnMesh`].
+pub(super) fn tie(
+    step: Res<HairStep>,
+    meshes: Option<Res<Assets<Mesh>>>,
+    bindposes: Option<Res<Assets<SkinnedMeshInverseBindposes>>>,
+    transforms: TransformHelper,
+    skins: Query<(&Mesh3d, Option<&SkinnedMesh>)>,
+    morphs: Morphs,
+    mut hairs: Query<(Entity, Ref<RootsOnMesh>, &mut TiedRoots, &Strands, &TickPose), With<Hair>>,
+    mut strands: Query<(&mut Strand, &mut Bonds, &mut StrandHistory)>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let Some(meshes) = meshes.filter(|_| step.index == 0) else { return };
+    for (hair, roots, mut tied, members, pose) in &mut hairs {
+        if roots.is_changed() {
+            *tied = default();
+        }
+        if tied.failed || !tied.roots.is_empty() {
+            continue;
+        }
+        let Some(entity) = roots.mesh else { continue };
+        let Ok((mesh, skin)) = skins.get(entity) else { continue };
+        let Some(mesh) = meshes.get(&mesh.0) else { continue };
+        let poses = skin.and_then(|s| bindposes.as_ref()?.get(&s.inverse_bindposes));
+        if skin.is_some() && poses.is_none() {
+            continue;
+        }
+        let mut told = |why| {
+            faults.write(
+                HairFault::caused(FaultKind::Roots, why, "those strands do not follow the mesh")
+                    .of(hair),
+            )
+        };
+        let read = Movers::of(entity, skin.zip(poses))
+            .and_then(|movers| read(&roots, mesh, skin.is_some(), movers, members.iter().len()));
+        let (movers, corners) = match read {
+            Ok(read) => read,
+            Err(why) => {
+                tied.failed = true;
+                told(why);
+                continue;
+            }
+        };
+        let place = |entity| transforms.compute_global_transform(entity).ok();
+        let Some(posed) = movers.pose(place, &morphs) else { continue };
+        let mut flat = 0;
+        let made = members.iter().zip(&roots.roots).zip(corners).filter_map(
+            |((member, root), corners)| {
+                let seen = |at| pose.now().point_in(at);
+                let now = corners.map(|c| seen(posed.corner(&c)));
+                let unmorphed = corners.map(|c| seen(posed.unmorphed(&c)));
+                let strand = strands.get_mut(member).ok()?;
+                let tied = tie_strand(member, root, corners, now, unmorphed, strand);
+                flat += usize::from(tied.is_none());
+                tied
+            },
+        );
+        tied.roots = made.collect();
+        tied.failed = tied.roots.is_empty();
+        tied.movers = movers;
+        if flat > 0 {
+            told(RootsError::Flat { found: flat });
+        }
+    }
+}
+
+/// Reads the corners of every root, before any strand is touched.
+fn read(
+    roots: &RootsOnMesh,
+    mesh: &Mesh,
+    skinned: bool,
+    mut movers: Movers,
+    strands: usize,
+) -> Result<(Movers, Vec<[Corner; 3]>), RootsError> {
+    let found = roots.roots.len();
+    if found != strands {
+        return Err(RootsError::Count { found, expected: strands });
+    }
+    let corners = Corners::of(mesh, skinned, movers.joints())?;
+    let read = roots.roots.iter().map(|root| corners.around(root, &mut movers.shifts));
+    let read = read.collect::<Result<_, _>>()?;
+    Ok((movers, read))
+}
+
+/// Puts a strand that was given in the mesh's own space to its place in the hair's frame, where the
+/// corners of its triangle are `posed`. Morph targets move and turn it, but hair is no longer on a
+/// face that happens to be puffed when it is tied: lengths are those of the `unmorphed` mesh.
+fn tie_strand(
+    member: Entity,
+    root: &RootOnMesh,
+    corners: [Corner; 3],
+    posed: [Vec3; 3],
+    unmorphed: [Vec3; 3],
+    (mut strand, mut bonds, mut history): (Mut<'_, Strand>, Mut<'_, Bonds>, Mut<'_, StrandHistory>),
+) -> Option<Tied> {
+    let bind = triangle(corners.map(|c| c.at), root.weights)?;
+    let now = triangle(posed, root.weights)?;
+    let size = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).length().sqrt();
+    let scale = size(unmorphed) / size(corners.map(|c| c.at));
+    let points: Vec<Vec3> =
+        strand.positions().iter().map(|p| now * ((bind.inverse() * *p) * scale)).collect();
+    let turn = now.rotation * bind.rotation.inverse();
+    let frame = turn * strand.root_frame();
+    let leaves = Dir3::new(frame * Vec3::Z).ok()?;
+    *strand = Strand::from_polyline(&points).ok()?.leaving_along(leaves);
+    *bonds = Bonds::of(&strand);
+    history.positions.clear();
+    let at = Isometry3d::new(points[0], strand.root_frame());
+    Some(Tied {
+        strand: member,
+        weights: root.weights,
+        corners,
+        offset: now.inverse() * at,
+        from: at,
+        to: at,
+    })
+}

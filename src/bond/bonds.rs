@@ -1,0 +1,76 @@
+//! A strand's bonds, and what is asked of them.
+
+use super::{kind::BondKind, model::JointBonds};
+use crate::{parallel::prefetch, strand::Strand};
+use bevy::prelude::*;
+
+/// The bonds of a strand: one [`JointBonds`] a joint, joint i at node i, joint 0 at the scalp.
+///
+/// Spawned empty it is filled in the next tick with closed bonds around the strand's present shape.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct Bonds {
+    /// The joints, root first; as many as the strand has edges.
+    pub joints: Vec<JointBonds>,
+}
+
+impl Bonds {
+    /// Closed bonds around the strand's present shape.
+    pub fn of(strand: &Strand) -> Self {
+        let joints =
+            (0..strand.edges()).map(|i| JointBonds::closed(strand.darboux(i).xyz())).collect();
+        Self { joints }
+    }
+
+    /// The rates of one kind, root first.
+    pub fn rates(&self, kind: BondKind) -> impl Iterator<Item = f32> + '_ {
+        self.joints.iter().map(move |j| j.rates[kind as usize])
+    }
+}
+
+/// What the tick will do to a strand's rates: requested Δb per joint and kind, summed over all who
+/// ask in `ExternalForces`, taken by `BondUpdate` through equation 16.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct BondChanges {
+    /// Δb per joint; may be empty when nobody asks.
+    joints: Vec<[f32; BondKind::COUNT]>,
+    any: bool,
+}
+
+impl BondChanges {
+    /// Asks for a change of `kind` at `joint`. Requests beyond the strand's joints and non-finite
+    /// ones do nothing; peptide bonds are never cut.
+    #[inline]
+    pub fn ask(&mut self, joint: usize, kind: BondKind, change: f32) {
+        if change == 0.0 || !change.is_finite() || (kind == BondKind::Peptide && change < 0.0) {
+            return;
+        }
+        if joint >= self.joints.len() {
+            self.joints.resize(joint + 1, [0.0; BondKind::COUNT]);
+        }
+        self.joints[joint][kind as usize] += change;
+        self.any = true;
+    }
+
+    /// Whether anything was asked.
+    pub fn is_empty(&self) -> bool {
+        !self.any
+    }
+
+    /// Asks for the memory of what was asked for.
+    pub(crate) fn prefetch(&self) {
+        prefetch(&self.joints);
+    }
+
+    /// What was asked of each joint, root first.
+    pub(super) fn asked(&self) -> &[[f32; BondKind::COUNT]] {
+        &self.joints
+    }
+
+    /// All of it is done.
+    pub(super) fn clear(&mut self) {
+        self.any = false;
+        self.joints.fill([0.0; BondKind::COUNT]);
+    }
+}

@@ -1,0 +1,81 @@
+//! The file formats that grooms come in.
+
+use super::gltf;
+use bevy::prelude::*;
+
+/// The kinds of files that a groom is read from.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[reflect(Clone, PartialEq)]
+pub enum GroomFormat {
+    /// Cem Yuksel's HAIR.
+    Yuksel,
+    /// TressFX, version 3 or 4.
+    TressFx,
+    /// glTF or GLB.
+    Gltf,
+}
+
+impl GroomFormat {
+    /// The format that bytes are in, by how they begin: files' names may lie. `None` for others.
+    pub fn of(file: &[u8]) -> Option<Self> {
+        let version = file.first_chunk().map_or(0.0, |bytes| f32::from_le_bytes(*bytes));
+        match file {
+            [b'H', b'A', b'I', b'R', ..] => Some(Self::Yuksel),
+            [b'g', b'l', b'T', b'F', ..] => Some(Self::Gltf),
+            _ if (3.0..5.0).contains(&version) => Some(Self::TressFx),
+            text if gltf::looks_like_json(text) => Some(Self::Gltf),
+            _ => None,
+        }
+    }
+
+    /// Metres per unit in most files of this format.
+    pub fn scale(self) -> f32 {
+        match self {
+            Self::Yuksel => 0.00254,
+            Self::TressFx | Self::Gltf => 1.0,
+        }
+    }
+
+    /// The axis that is up in most files of this format.
+    pub fn up(self) -> UpAxis {
+        match self {
+            Self::Yuksel => UpAxis::Z,
+            Self::TressFx | Self::Gltf => UpAxis::Y,
+        }
+    }
+}
+
+/// The axis of a file that points up.
+#[derive(
+    Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize,
+)]
+#[reflect(Default, Clone, PartialEq)]
+pub enum UpAxis {
+    /// +X, which becomes +Y; Z stays.
+    X,
+    /// +Y, as Bevy has it.
+    #[default]
+    Y,
+    /// +Z, which becomes +Y; X stays. What faces −Y faces +Z then. Blender's axes.
+    Z,
+    /// −X.
+    NegX,
+    /// −Y: turned around Z.
+    NegY,
+    /// −Z, which becomes +Y; X stays.
+    NegZ,
+}
+
+impl UpAxis {
+    /// A vector of a space with this axis up, in Bevy's.
+    pub fn to_y_up(self, v: Vec3) -> Vec3 {
+        match self {
+            Self::X => Vec3::new(-v.y, v.x, v.z),
+            Self::Y => v,
+            Self::Z => Vec3::new(v.x, v.z, -v.y),
+            Self::NegX => Vec3::new(v.y, -v.x, v.z),
+            Self::NegY => Vec3::new(-v.x, -v.y, v.z),
+            Self::NegZ => Vec3::new(v.x, -v.z, v.y),
+        }
+    }
+}

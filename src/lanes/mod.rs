@@ -1,0 +1,17 @@
+//! Numbers side by side: the scalar type of all kernels, vectors and quaternions over it, and strands'
+//! arrays into lanes and back.
+//!
+//! Mathematics is written once, generic over [`Real`], and runs on one `f64` as on sixteen lanes.
+
+mod algebra;
+mod memory;
+mod real;
+mod transpose;
+
+pub(crate) use algebra::splat3;
+pub use algebra::{Quaternion, V3};
+pub use memory::{Lane, put3, put4, take3, take4};
+pub(crate) use memory::{load, load3, load4, store3, store4};
+pub(crate) use real::lanes_in;
+pub use real::{LANES, Real};
+pub(crate) use transpose::*;

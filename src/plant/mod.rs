@@ -1,0 +1,50 @@
+//! Planting: hair for a mesh that has none, by rule.
+//!
+//! [`Planting`] says how dense, how long, which way and how curly; [`PlantingMaps`] says where more
+//! or less of it; [`Planting::plant`] makes a [`Groom`] of it and says on which triangle each strand
+//! grows. The same settings, mesh and seed give the same bits.
+//!
+//! ```
+//! # use bevy_keratin::plant::*; use bevy::prelude::*;
+//! let head = Sphere::new(0.09).mesh().build();
+//! let upper = |place: &RootPlace| if place.position.y > 0.03 { 1.0 } else { 0.0 };
+//! let fringe = Planting { density: 5e3, length: 0.06, ..default() };
+//! let planted = fringe.plant_with(&head, &PlantingMaps::new().density(&upper)).unwrap();
+//! assert!(planted.groom.len() > 80);
+//! ```
+
+mod error;
+mod grow;
+mod map;
+mod planting;
+mod preset;
+mod recipe;
+mod scalp;
+mod scatter;
+mod shell;
+mod surface;
+
+pub use error::PlantError;
+pub use map::{ImageMap, MapChannel, PlantingMaps, RootPlace, vertex_color};
+pub use planting::{Planted, RootOnMesh};
+pub use preset::{HairPreset, PresetSettings};
+pub use recipe::{Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, MAX_ROOTS, Planting};
+pub use scalp::Scalp;
+
+use bevy::prelude::*;
+
+/// Registers what planting is told for reflection: inspectors, scene files.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PlantPlugin;
+
+impl Plugin for PlantPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Planting>()
+            .register_type::<Planted>()
+            .register_type::<HairPreset>()
+            .register_type::<PresetSettings>()
+            .register_type::<Scalp>()
+            .register_type::<ImageMap>()
+            .register_type::<RootPlace>();
+    }
+}

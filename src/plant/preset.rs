@@ -1,0 +1,304 @@
+//! Presets: hair that looks right untouched, from straight to coily and from short to long.
+
+use super::{
+    error::PlantError,
+    map::{PlantingMaps, RootPlace},
+    planting::Planted,
+    recipe::{Clump, Comb, Curl, CurlPhase, Cut, Fall, Planting},
+    scalp::Scalp,
+};
+#[cfg(feature = "render")]
+use crate::render::{HairFollowers, HairLook, Melanin};
+use crate::{AirDrag, HairSolver, LockContact, Stiffness, setting::Ranged};
+use bevy::prelude::*;
+
+/// A head of hair: how it is planted, how stiff it is and how it looks.
+///
+/// Shapes follow measurements where there are some. The radius of a hair's bends is 57 ± 22 mm on
+/// tresses of straight hair and 22 ± 18 mm on curly ones (J. Cosmet. Sci. 64:26);
+/// [`Curl::curvature_radius`] gives that number for each preset. Densities are those of guides:
+/// drawn followers stand for the 223 strands per cm² of a human (BioNumbers 116431).
+///
+/// ```
+/// # use bevy_keratin::{prelude::*, plant::*}; use bevy::prelude::*;
+/// # fn grow(mut commands: Commands) -> Result {
+/// let head = Sphere::new(0.1).mesh().build();
+/// let planted = HairPreset::Wavy.plant(&head, &Scalp::default())?;
+/// let hair = commands.spawn((Hair, HairPreset::Wavy.settings())).id();
+/// for strand in planted.groom.strands() {
+///     commands.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[reflect(Default, Clone, PartialEq, Hash)]
+pub enum HairPreset {
+    /// Shoulder-long, parted in the middle, nearly straight: bends of 54 mm radius.
+    #[default]
+    Straight,
+    /// Shoulder-long in loose waves: bends of 21 mm radius, as measured on curly tresses.
+    Wavy,
+    /// Ringlets of 14 mm across: bends of 9 mm radius.
+    Curly,
+    /// Tight coils of 7 mm across that stand out in a round shape.
+    Coily,
+    /// Cut close at the sides and the nape, 6 cm on top.
+    Short,
+    /// Straight to the jaw and cut off there.
+    Bob,
+    /// Straight down the back.
+    Long,
+}
+
+/// What a [`HairPreset`] puts on the [`Hair`](crate::Hair) entity.
+#[derive(Bundle, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct PresetSettings {
+    /// How stiff it is.
+    pub stiffness: Stiffness,
+    /// How it swings.
+    pub drag: AirDrag,
+    /// How it is solved.
+    pub solver: HairSolver,
+    /// How its strands keep apart.
+    pub contact: LockContact,
+    /// How it looks.
+    #[cfg(feature = "render")]
+    pub look: HairLook,
+    /// What is drawn between the guides.
+    #[cfg(feature = "render")]
+    pub followers: HairFollowers,
+}
+
+impl HairPreset {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Straight, Self::Wavy, Self::Curly, Self::Coily, Self::Short, Self::Bob, Self::Long];
+
+    /// Plants it on a head's mesh, which may have neck and shoulders for hair to lie on. Settings are
+    /// in metres: the mesh is of life size.
+    ///
+    /// # Errors
+    /// When the mesh cannot be planted; see [`Planting::plant`].
+    pub fn plant(self, mesh: &Mesh, scalp: &Scalp) -> Result<Planted, PlantError> {
+        self.plant_as(&self.planting(scalp), mesh, scalp)
+    }
+
+    /// Plants a changed recipe, with the preset's hairline, parting and lengths by place.
+    ///
+    /// ```
+    /// # use bevy_keratin::plant::*; use bevy::prelude::*;
+    /// # let (head, scalp) = (Sphere::new(0.1).mesh().build(), Scalp::default());
+    /// let bob = HairPreset::Bob;
+    /// let fewer = Planting { density: 0.4e4, ..bob.planting(&scalp) };
+    /// let planted = bob.plant_as(&fewer, &head, &scalp).unwrap();
+    /// let all = bob.plant(&head, &scalp).unwrap();
+    /// assert!(2 * planted.groom.len() < all.groom.len());
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`Planting::plant`].
+    pub fn plant_as(
+        self,
+        planting: &Planting,
+        mesh: &Mesh,
+        scalp: &Scalp,
+    ) -> Result<Planted, PlantError> {
+        let scalp = &scalp.checked()?;
+        let density = scalp.mask();
+        let length = |place: &RootPlace| self.length_share(scalp, place.position);
+        let direction = |place: &RootPlace| self.direction(scalp, place.position);
+        let mut maps = PlantingMaps::new().density(&density).length(&length);
+        if self.is_parted() {
+            maps = maps.direction(&direction);
+        }
+        planting.plant_with(mesh, &maps)
+    }
+}
+
+impl HairPreset {
+    fn is_parted(self) -> bool {
+        !matches!(self, Self::Short | Self::Coily)
+    }
+
+    /// Away from the parting; in front to the back as well, so that the face is free.
+    fn direction(self, scalp: &Scalp, place: Vec3) -> Vec3 {
+        let [right, _, front] = scalp.axes();
+        let off = (place - scalp.center) / scalp.height;
+        let parting = if self == Self::Bob { -0.22 } else { 0.0 };
+        let side = if off.dot(right) < parting { -1.0 } else { 1.0 };
+        let forward = off.dot(front);
+        // Behind the crown there is no parting; before it, down would be into the face.
+        let across = (0.6 + 2.0 * (forward + 0.2)).clamp(0.0, 1.0);
+        let down = (0.5 - forward).clamp(0.0, 0.6);
+        right * (side * across) - front * (0.35 + 1.4 * forward.max(0.0)) - *scalp.up * down
+    }
+
+    /// Hair is cut shorter at the sides and the nape.
+    fn length_share(self, scalp: &Scalp, place: Vec3) -> f32 {
+        if self != Self::Short {
+            return 1.0;
+        }
+        let off = (place - scalp.center) / scalp.height;
+        let height = (off.dot(*scalp.up) / 0.85).clamp(0.0, 1.0);
+        0.28 + 0.72 * height * height * (3.0 - 2.0 * height)
+    }
+
+    /// How it is planted; to be changed before [`Planting::plant_with`].
+    pub fn planting(self, scalp: &Scalp) -> Planting {
+        let [right, up, front] = scalp.axes();
+        let crown = scalp.place(0.05, 0.9, -0.35);
+        let fall =
+            Fall { toward: -up - front * 0.15, over: 0.035, clearance: 5e-3, layering: 0.07 };
+        let parted = Comb::Parted { at: scalp.center, across: right, along: -front * 0.4 };
+        let base = Planting {
+            density: 1.0e4,
+            nodes: 20,
+            length: 0.3,
+            length_variation: 0.1,
+            comb: parted,
+            lean: 1.2,
+            jitter: 0.06,
+            clump: Some(Clump { spacing: 25e-3, strength: 0.25 }),
+            fall: Some(fall),
+            ..default()
+        };
+        let curl = |radius, pitch, phase| Some(Curl { radius, pitch, variation: 0.12, phase });
+        match self {
+            Self::Straight => {
+                Planting { nodes: 24, curl: curl(1.4e-3, 54e-3, CurlPhase::PerClump), ..base }
+            }
+            Self::Wavy => Planting {
+                length: 0.33,
+                nodes: 40,
+                curl: curl(6e-3, 60e-3, CurlPhase::PerClump),
+                clump: Some(Clump { spacing: 22e-3, strength: 0.35 }),
+                fall: Some(Fall { layering: 0.12, ..fall }),
+                ..base
+            },
+            Self::Curly => Planting {
+                length: 0.34,
+                nodes: 64,
+                lean: 0.9,
+                curl: curl(7e-3, 26e-3, CurlPhase::PerStrand),
+                clump: None,
+                fall: Some(Fall { over: 0.05, layering: 0.2, ..fall }),
+                ..base
+            },
+            Self::Coily => Planting {
+                density: 2.0e4,
+                length: 0.17,
+                length_variation: 0.15,
+                nodes: 52,
+                comb: Comb::Out,
+                lean: 0.0,
+                jitter: 0.25,
+                curl: curl(3.5e-3, 9e-3, CurlPhase::PerStrand),
+                clump: None,
+                fall: None,
+                ..base
+            },
+            Self::Short => Planting {
+                density: 1.5e4,
+                length: 0.065,
+                length_variation: 0.2,
+                nodes: 10,
+                comb: Comb::Whorl { center: crown, turn: 0.5 },
+                lean: 1.2,
+                jitter: 0.12,
+                clump: Some(Clump { spacing: 14e-3, strength: 0.25 }),
+                fall: Some(Fall { over: 0.09, clearance: 4e-3, layering: 0.03, ..fall }),
+                ..base
+            },
+            Self::Bob => Planting {
+                length: 0.32,
+                length_variation: 0.04,
+                nodes: 18,
+                fall: Some(Fall { layering: 0.09, ..fall }),
+                // Higher in front, where the way down is longer: it hangs in one line.
+                cut: Some(Cut {
+                    at: scalp.place(0.0, -0.9, 0.0),
+                    normal: up - front * 0.25,
+                    least: 0.03,
+                }),
+                clump: Some(Clump { spacing: 25e-3, strength: 0.15 }),
+                ..base
+            },
+            Self::Long => Planting { length: 0.5, nodes: 30, ..base },
+        }
+    }
+
+    /// What goes on the [`Hair`](crate::Hair) entity with it.
+    pub fn settings(self) -> PresetSettings {
+        // A bare fibre has 0.045 m; hair holds together and stands better.
+        let bending_length = match self {
+            Self::Straight | Self::Bob => 0.08,
+            Self::Long => 0.075,
+            Self::Wavy => 0.09,
+            Self::Curly => 0.085,
+            Self::Coily => 0.2,
+            Self::Short => 0.12,
+        };
+        PresetSettings {
+            stiffness: Stiffness { bending_length, ..default() },
+            drag: AirDrag { rate: 3.0 },
+            solver: HairSolver::default(),
+            contact: LockContact::default(),
+            #[cfg(feature = "render")]
+            look: self.look(),
+            #[cfg(feature = "render")]
+            followers: self.followers(),
+        }
+    }
+
+    #[cfg(feature = "render")]
+    fn look(self) -> HairLook {
+        let base = HairLook { width: 0.2e-3, ..default() };
+        match self {
+            Self::Straight => HairLook { melanin: Melanin::DARK_BROWN, ..base },
+            Self::Wavy => HairLook { melanin: Melanin::AUBURN, ..base },
+            Self::Curly => HairLook { melanin: Melanin::BROWN, roughness: 0.45, ..base },
+            Self::Coily => HairLook {
+                melanin: Melanin::BLACK,
+                roughness: 0.55,
+                gloss: 0.4,
+                width: 0.25e-3,
+                ..base
+            },
+            Self::Short => HairLook { melanin: Melanin::DARK_BROWN, gloss: 0.6, ..base },
+            Self::Bob => HairLook { melanin: Melanin::BLACK, roughness: 0.32, ..base },
+            Self::Long => HairLook { melanin: Melanin::BLOND, ..base },
+        }
+    }
+
+    #[cfg(feature = "render")]
+    fn followers(self) -> HairFollowers {
+        let base = HairFollowers { segments: 24, stray: 0.02, ..HairFollowers::new(20_000) };
+        match self {
+            Self::Straight | Self::Long => HairFollowers { clump: 0.3, ..base },
+            Self::Wavy => HairFollowers { segments: 40, clump: 0.4, parting: 2.5, ..base },
+            // Curls of neighbours blended would be none: each follows its nearest.
+            Self::Curly => HairFollowers {
+                segments: 64,
+                clump: 0.75,
+                parting: 1.0,
+                phase_variation: 0.01,
+                stray: 0.03,
+                ..base
+            },
+            Self::Coily => HairFollowers {
+                count: 24_000,
+                segments: 52,
+                clump: 0.1,
+                parting: 1.0,
+                phase_variation: 0.04,
+                stray: 0.1,
+                length_variation: 0.25,
+                ..base
+            },
+            Self::Short => HairFollowers { segments: 12, clump: 0.2, ..base },
+            Self::Bob => HairFollowers { clump: 0.15, stray: 0.01, length_variation: 0.03, ..base },
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! When hair is drawn, and whether it can be.
+
+use bevy::{
+    prelude::*,
+    render::{render_resource::DownlevelFlags, renderer::RenderAdapter},
+};
+
+/// The systems that draw: in `PostUpdate` after transforms have been propagated and before visibility
+/// is, and in the render world's `ExtractSchedule` the one write to the GPU.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct HairRenderSystems;
+
+/// Whether drawing goes between ticks by the overstep of the fixed clock.
+#[derive(Resource, Clone, Copy, Debug)]
+pub(super) struct Interpolate(pub(super) bool);
+
+/// Whether the graphics device can draw hair; tells once if not. Asked only while running, because
+/// the device may come with a plugin that is finished later.
+pub(super) fn supported(
+    adapter: Option<Res<RenderAdapter>>,
+    mut known: Local<Option<bool>>,
+) -> bool {
+    let Some(adapter) = adapter else {
+        return true;
+    };
+    *known.get_or_insert_with(|| {
+        let flags = adapter.get_downlevel_capabilities().flags;
+        let supported = flags.contains(DownlevelFlags::VERTEX_STORAGE);
+        if !supported {
+            tracing::warn!(
+                "hair is not drawn: the graphics device gives vertex shaders no storage buffers; \
+                 use Vulkan, Metal, Direct3D 12 or WebGPU"
+            );
+        }
+        supported
+    })
+}

@@ -1,0 +1,386 @@
+//! The tick: figure 1 of \[B\], read from top to bottom. The one place that knows the order.
+//!
+//! Each fixed tick runs the schedule [`HairTick`] once per substep, with the sets of
+//! [`HairSystems`] one after the other. It runs on a single thread and treats ambiguities as errors;
+//! systems go wide inside, over strands.
+
+use crate::{
+    fault,
+    setting::{self, InvalidValue, Ranged, ValueRange, Violations},
+};
+use bevy::{
+    ecs::{
+        schedule::{
+            InternedScheduleLabel, LogLevel, ScheduleBuildSettings, ScheduleLabel,
+            SingleThreadedExecutor,
+        },
+        system::SystemParam,
+    },
+    prelude::*,
+};
+
+/// The schedule of one substep. Add systems to it in one of [`HairSystems`], `First` and `Last` best.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct HairTick;
+
+/// States the order of a substep once: sets, their parts, and what each does. The enum, the order of
+/// the schedule and the table in the docs are made from it.
+macro_rules! substep {
+    ($($set:ident: $does:literal { $($part:ident: $part_does:literal,)* })*) => {
+        /// The parts of a substep, in the order they run.
+        ///
+        /// Each of the eight sets of \[B\]'s figure 1 is made of parts, which are sets too. All run one
+        /// after the other, so that a system may be ordered against any of them.
+        ///
+        /// | set | part | what it does |
+        /// |---|---|---|
+        $(
+            #[doc = concat!("| [`", stringify!($set), "`](Self::", stringify!($set), ") | | ", $does, " |")]
+            $(#[doc = concat!(
+                "| | [`", stringify!($part), "`](Self::", stringify!($part), ") | ", $part_does, " |"
+            )])*
+        )*
+        #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum HairSystems {
+            $(
+                #[doc = concat!($does, ".")]
+                $set,
+                $(
+                    #[doc = concat!($part_does, ". Part of [`", stringify!($set), "`](Self::", stringify!($set), ").")]
+                    $part,
+                )*
+            )*
+        }
+
+        impl HairSystems {
+            /// The sets of the paper's figure in their order.
+            pub const ALL: [Self; 8] = [$(Self::$set),*];
+
+            /// The parts of a set in their order; none for a part.
+            pub fn parts(self) -> &'static [Self] {
+                match self {
+                    $(Self::$set => &[$(Self::$part),*],)*
+                    _ => &[],
+                }
+            }
+
+            /// What it does, in one line.
+            pub fn description(self) -> &'static str {
+                match self {
+                    $(Self::$set => $does, $(Self::$part => $part_does,)*)*
+                }
+            }
+        }
+    };
+}
+
+substep! {
+    First: "Empty, for users" {}
+    Roots: "Where the scalp is now" {
+        History: "What was drawn becomes the past",
+        Poses: "Frames of hair, colliders, rods and blowers move by a substep",
+        LevelOfDetail: "Levels and guides are chosen, once a tick",
+        Sleep: "Strands at rest fall asleep, disturbed ones wake, once a tick",
+        FollowerSleep: "Followers sleep while all their guides do, once a tick",
+        FrameInertia: "Free nodes stay behind when the hair's frame moves",
+        MeshRoots: "Roots go with the triangles that they grow on",
+        BondFit: "New and changed strands get as many bonds as joints",
+    }
+    ExternalForces: "What acts from outside, and what asks bonds to change" {
+        Air: "Gravity, wind (equation 17) and drag; drying (19) of hair without water",
+        Treatments: "Lotions, heat and whatever else a game does to bonds",
+        WaterExchange: "Showers run; hair soaks, films flow, water dries and hydrogen bonds follow",
+    }
+    Interaction: "What touches what" {
+        Obstacles: "Colliders are seen from each hair",
+        StrandContact: "Strands push each other apart (equation 18)",
+        Droplets: "Droplets move, land and merge",
+        DropletContact: "Droplets pull the strands they touch (\\[W\\] 2 to 5)",
+        Bridges: "Films between wet strands pull them together",
+        RodWinding: "Perm rods guide the strands wound on them",
+    }
+    RestShape: "Stiffness from the cuticle (13, 14), rest shapes from the bonds (15)" {}
+    Projection: "Positions and velocities" {
+        Rods: "Cosserat rods: predict, project, limit lengths, velocities (1 to 12)",
+        Springs: "Mass-spring strands (\\[W\\] 1)",
+        Followers: "Strands that are not simulated follow their guides, once a tick",
+    }
+    BondUpdate: "Bonds that re-formed remember the present shape (16)" {
+        BondRates: "Rates move, memories follow (16)",
+        Ledger: "Droplets ride along; the water's books are closed",
+    }
+    Last: "Empty, for users" {}
+}
+
+/// Into how many substeps a tick is divided.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub enum HairSubsteps {
+    /// As many as bring the substep to the paper's 1/360 s or just below, whatever the app's rate:
+    /// 6 at 60 Hz, 3 at 120 Hz.
+    #[default]
+    Auto,
+    /// This many; 0 counts as 1.
+    Fixed(u32),
+}
+
+impl HairSubsteps {
+    /// The range of their number.
+    pub const RANGE: ValueRange =
+        ValueRange::new("HairSubsteps", 1.0..=1000.0, "6 suit a tick of 1/60 s")
+            .with_safe(1.0..=24.0);
+
+    /// A fixed number of substeps.
+    ///
+    /// # Errors
+    /// When it is 0 or more than 1000.
+    pub fn fixed(count: u32) -> Result<Self, InvalidValue> {
+        Self::Fixed(count).checked()
+    }
+
+    /// The number of substeps for a tick of `seconds`.
+    pub fn count(&self, seconds: f32) -> u32 {
+        let mut count = match *self {
+            // Clocks count nanoseconds: 1/60 s is not quite six times 1/360 s.
+            Self::Auto => (seconds * 360.0 - 1e-3).ceil() as u32,
+            Self::Fixed(count) => count,
+        };
+        Self::RANGE.clamp(&mut count, || 1, &mut Violations::new());
+        count
+    }
+}
+
+impl Ranged for HairSubsteps {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        if let Self::Fixed(count) = self {
+            Self::RANGE.clamp(count, || 1, violations);
+        }
+    }
+}
+
+/// The substep that is running.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct HairStep {
+    /// Its length (s).
+    pub dt: f32,
+    /// Its number within the tick, from 0.
+    pub index: u32,
+    /// How many the tick has.
+    pub count: u32,
+}
+
+/// Run condition: in the first substep of a tick.
+pub(crate) fn first_substep(step: Res<HairStep>) -> bool {
+    step.index == 0
+}
+
+/// How many of the tick's substeps a hair takes as one, and with how many iterations at most. A
+/// component of a [`Hair`](crate::Hair), written by its level of detail; without it every substep is
+/// taken.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct SubstepLimits {
+    /// So many substeps are taken as one; 0 counts as 1.
+    pub substeps: u32,
+    /// The most iterations in each.
+    pub iterations: u32,
+}
+
+impl Default for SubstepLimits {
+    fn default() -> Self {
+        Self { substeps: 1, iterations: u32::MAX }
+    }
+}
+
+/// The substep as each hair takes it.
+#[derive(SystemParam)]
+pub(crate) struct EffectiveSubsteps<'w, 's> {
+    step: Res<'w, HairStep>,
+    limits: Query<'w, 's, &'static SubstepLimits>,
+}
+
+/// One hair's substep.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EffectiveSubstep {
+    /// How long it is (s).
+    pub(crate) dt: f32,
+    /// How many substeps it stands for.
+    pub(crate) substeps: u32,
+    most_iterations: u32,
+}
+
+impl EffectiveSubsteps<'_, '_> {
+    /// The substep that `hair` takes now, or `None` while it waits for a longer one.
+    pub(crate) fn of(&self, hair: Entity) -> Option<EffectiveSubstep> {
+        let HairStep { dt, index, count } = *self.step;
+        let limits = self.limits.get(hair).copied().unwrap_or_default();
+        let substeps = merged(index, count, limits.substeps)?;
+        let most_iterations = limits.iterations;
+        Some(EffectiveSubstep { dt: dt * substeps as f32, substeps, most_iterations })
+    }
+}
+
+impl EffectiveSubstep {
+    /// So many iterations of `full`.
+    pub(crate) fn iterations(&self, full: u32) -> u32 {
+        self.most_iterations.min(full)
+    }
+}
+
+/// How many substeps the hair takes as one at the end of substep `index` of `count`, if `together`
+/// are taken at a time; `None` while it waits. What is left at the tick's end is taken then.
+fn merged(index: u32, count: u32, together: u32) -> Option<u32> {
+    let together = together.max(1);
+    let done = (index + 1) % together;
+    match done {
+        0 => Some(together),
+        rest if index + 1 == count => Some(rest),
+        _ => None,
+    }
+}
+
+/// How much faster wetting, drying and the bonds' chemistry ([`Treat`](crate::Treat)) go than in life.
+/// A resource, default 1, safe 1…1000.
+///
+/// Hair dries in minutes, players wait seconds. Mechanics are untouched.
+#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct ProcessTime(pub f32);
+
+impl Default for ProcessTime {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
+impl ProcessTime {
+    /// Its range.
+    pub const RANGE: ValueRange =
+        ValueRange::new("ProcessTime", 0.0..=1e6, "60 makes minutes of seconds")
+            .with_safe(1.0..=1000.0);
+}
+
+impl Ranged for ProcessTime {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        Self::RANGE.clamp(&mut self.0, || 1.0, violations);
+    }
+}
+
+/// Runs [`HairTick`] in a schedule, [`FixedPostUpdate`] by default.
+#[derive(Clone, Debug)]
+pub struct TickPlugin {
+    schedule: InternedScheduleLabel,
+}
+
+impl TickPlugin {
+    /// Ticks in `schedule`, with the time that passes there.
+    pub fn new(schedule: impl ScheduleLabel) -> Self {
+        Self { schedule: schedule.intern() }
+    }
+}
+
+impl Default for TickPlugin {
+    fn default() -> Self {
+        Self::new(FixedPostUpdate)
+    }
+}
+
+impl Plugin for TickPlugin {
+    fn build(&self, app: &mut App) {
+        fault::plugin(app);
+        setting::resource::<HairSubsteps>(app);
+        setting::resource::<ProcessTime>(app);
+        app.init_resource::<HairStep>()
+            .register_type::<HairStep>()
+            .register_type::<SubstepLimits>()
+            .register_type::<InvalidValue>()
+            .edit_schedule(HairTick, |schedule| {
+                schedule.set_executor(SingleThreadedExecutor::new()).set_build_settings(
+                    ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() },
+                );
+                for pair in HairSystems::ALL.windows(2) {
+                    schedule.configure_sets(pair[0].before(pair[1]));
+                }
+                for set in HairSystems::ALL {
+                    for part in set.parts() {
+                        schedule.configure_sets(part.in_set(set));
+                    }
+                    for pair in set.parts().windows(2) {
+                        schedule.configure_sets(pair[0].before(pair[1]));
+                    }
+                }
+            })
+            .add_systems(self.schedule, {
+                let tick = run_hair_tick.into_configs();
+                // Where both are in one schedule, hair sees where bodies have come to.
+                #[cfg(feature = "avian")]
+                let tick = tick.after(avian3d::prelude::PhysicsSystems::Writeback);
+                tick
+            });
+    }
+}
+
+/// One tick: as many substeps as [`HairSubsteps`] asks for. No time, no tick.
+fn run_hair_tick(world: &mut World) {
+    let seconds = world.resource::<Time>().delta_secs();
+    if seconds <= 0.0 {
+        return;
+    }
+    let count = world.resource::<HairSubsteps>().count(seconds);
+    let dt = seconds / count as f32;
+    for index in 0..count {
+        *world.resource_mut::<HairStep>() = HairStep { dt, index, count };
+        world.run_schedule(HairTick);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `KERATIN_WRITE_DOCS=1 cargo test --lib docs_show` writes the table anew.
+    #[test]
+    fn docs_show_the_substep_as_it_runs() {
+        let mut table = String::from(
+            "\n# A substep\n\nEach fixed tick runs these sets of [`HairSystems`] once per substep, one after \
+             the other.\n\n| set | part | what it does |\n|---|---|---|\n",
+        );
+        let link = |set: HairSystems| format!("[`{set:?}`](HairSystems::{set:?})");
+        for set in HairSystems::ALL {
+            table += &format!("| {} | | {} |\n", link(set), set.description());
+            for part in set.parts() {
+                table += &format!("| | {} | {} |\n", link(*part), part.description());
+            }
+        }
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/guide/substep.md");
+        if std::env::var_os("KERATIN_WRITE_DOCS").is_some() {
+            std::fs::write(file, &table).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(file).unwrap(), table);
+    }
+
+    #[test]
+    fn auto_substeps_come_near_the_papers_step() {
+        for (rate, count) in [(60.0, 6), (120.0, 3), (240.0, 2), (30.0, 12), (64.0, 6), (360.0, 1)]
+        {
+            assert_eq!(HairSubsteps::Auto.count(1.0 / rate), count, "{rate} Hz");
+        }
+        assert_eq!(HairSubsteps::Fixed(0).count(0.1), 1);
+        assert!(HairSubsteps::fixed(0).is_err());
+    }
+
+    #[test]
+    fn substeps_taken_together_make_up_the_tick() {
+        for count in 1..20 {
+            for together in 0..8 {
+                let all: Vec<_> = (0..count).map(|i| merged(i, count, together)).collect();
+                assert_eq!(all.iter().flatten().sum::<u32>(), count);
+                assert!(all[count as usize - 1].is_some(), "nothing waits beyond the tick");
+                assert!(all.iter().flatten().all(|n| *n <= together.max(1)));
+            }
+        }
+        let six: Vec<_> = (0..6).map(|i| merged(i, 6, 2)).collect();
+        assert_eq!(six, [None, Some(2), None, Some(2), None, Some(2)]);
+    }
+}

@@ -1,0 +1,22 @@
+//! `Projection`: strands from their tables into lanes, through their kernel, and back.
+//!
+//! The only room that knows both entities and lanes. Strands keep their own vectors, so that game code
+//! reads and writes them; those of a hair with equal node count are gathered into a block of
+//! [`LANES`](crate::lanes::LANES), stepped side by side and scattered back in each substep.
+//!
+//! | file | what |
+//! |---|---|
+//! | `batched` | what a kernel offers |
+//! | `batch` | which strands are solved side by side, on all threads |
+//! | `gather` | strands' arrays into lanes and back; strands that left the finite numbers |
+//! | `rods` | Cosserat rods ([`rod`](crate::rod)) |
+//! | `springs` | masses and springs ([`mass_spring`](crate::mass_spring)) |
+
+mod batch;
+mod batched;
+mod gather;
+mod rods;
+mod springs;
+
+pub use rods::RodPlugin;
+pub use springs::SpringPlugin;

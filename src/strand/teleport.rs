@@ -1,0 +1,49 @@
+//! A character that is put elsewhere takes its hair along.
+
+use super::{Hair, Strand, StrandHistory, Strands, TickPose};
+use bevy::prelude::*;
+
+impl Hair {
+    /// Before the character is put elsewhere: its hair goes along in its present shape, at rest,
+    /// and so do colliders, rods and blowers of the same character. Long jumps are noticed without
+    /// this, see [`HairInertia`](crate::HairInertia).
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// fn step_through_the_portal(
+    ///     mut commands: Commands,
+    ///     hair: Single<Entity, With<Hair>>,
+    ///     mut hero: Single<&mut Transform, With<Name>>,
+    /// ) {
+    ///     commands.entity(*hair).queue(Hair::teleport);
+    ///     hero.translation.x += 0.5;
+    /// }
+    /// ```
+    pub fn teleport(mut hair: EntityWorldMut<'_>) {
+        let id = hair.id();
+        let members: Vec<Entity> =
+            hair.get::<Strands>().into_iter().flat_map(Strands::iter).collect();
+        hair.world_scope(|world| {
+            for strand in members {
+                if let Ok((mut strand, mut history)) = world
+                    .entity_mut(strand)
+                    .get_components_mut::<(&mut Strand, &mut StrandHistory)>()
+                {
+                    strand.rest();
+                    history.remember(&strand);
+                }
+            }
+            let mut root = id;
+            while let Some(parent) = world.get::<ChildOf>(root) {
+                root = parent.parent();
+            }
+            let mut todo = vec![root];
+            while let Some(entity) = todo.pop() {
+                if let Some(mut pose) = world.get_mut::<TickPose>(entity) {
+                    pose.jump();
+                }
+                todo.extend(world.get::<Children>(entity).into_iter().flatten());
+            }
+        });
+    }
+}

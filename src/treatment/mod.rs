@@ -1,0 +1,205 @@
+//! Tools on bonds: treatments that cut or re-form them, and perm rods that hair is wound on.
+
+mod systems;
+pub mod winding;
+
+pub use systems::TreatmentPlugin;
+
+use crate::{
+    bond::{BondKind, JointBonds},
+    setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+    strand::{HeldNodes, TickPose},
+};
+use bevy::prelude::*;
+use core::ops::Range;
+
+/// A request to move bond rates, for a hair or one strand, all joints or some, at once or over
+/// time. A message: write it from anywhere, the next tick takes it up and lets it act through
+/// equation 16, so that bonds which re-form remember the shape of that moment.
+///
+/// ```
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+/// fn shower(hair: Single<Entity, With<Hair>>, mut treat: MessageWriter<Treat>) {
+///     treat.write(Treat::wet(*hair));
+///     // dry the outer half in two seconds
+///     treat.write(Treat::dry(*hair).over(2.0).joints(4..8));
+/// }
+/// ```
+#[derive(Message, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct Treat {
+    /// The [`Hair`](crate::Hair) or strand to treat.
+    pub target: Entity,
+    /// The joints to treat, from the root; `None` all.
+    pub joints: Option<Range<usize>>,
+    /// The rate that each [`BondKind`] is to reach, `None` where it stays. Peptide bonds are never
+    /// cut.
+    pub rates: [Option<f32>; BondKind::COUNT],
+    /// Time to get there (s). Default 0: in one substep.
+    pub seconds: f32,
+}
+
+/// The share of disulfide bonds that perm lotion leaves (\[B\] §4).
+pub const LOTION_DISULFIDE: f32 = 0.8;
+
+impl Treat {
+    /// The range of [`rates`](Self::rates).
+    pub const RATES: ValueRange = JointBonds::RATES.named("Treat::rates");
+    /// The range of [`seconds`](Self::seconds).
+    pub const SECONDS: ValueRange =
+        ValueRange::new("Treat::seconds (s)", 0.0..=1e6, "0 acts at once").with_safe(0.0..=60.0);
+
+    fn rates(target: Entity, rates: [Option<f32>; BondKind::COUNT]) -> Self {
+        Self { target, joints: None, rates, seconds: 0.0 }
+    }
+
+    /// Soaks: cuts the hydrogen bonds.
+    pub fn wet(target: Entity) -> Self {
+        Self::rates(target, [Some(0.0), None, None, None])
+    }
+
+    /// Dries: the hydrogen bonds re-form around the present shape.
+    pub fn dry(target: Entity) -> Self {
+        Self::rates(target, [Some(1.0), None, None, None])
+    }
+
+    /// Perm lotion: cuts hydrogen and ionic bonds, and a fifth of the disulfide bonds.
+    pub fn lotion(target: Entity) -> Self {
+        Self::rates(target, [Some(0.0), Some(0.0), Some(LOTION_DISULFIDE), None])
+    }
+
+    /// Neutraliser and rinse: ionic and disulfide bonds re-form. Hydrogen bonds wait for drying.
+    pub fn neutraliser(target: Entity) -> Self {
+        Self::rates(target, [None, Some(1.0), Some(1.0), None])
+    }
+
+    /// Shampoo: cuts hydrogen and ionic bonds.
+    pub fn shampoo(target: Entity) -> Self {
+        Self::rates(target, [Some(0.0), Some(0.0), None, None])
+    }
+
+    /// Everything re-forms around the present shape, which becomes the hair's own.
+    pub fn set_everything(target: Entity) -> Self {
+        Self::rates(target, [Some(1.0); BondKind::COUNT])
+    }
+
+    /// Brings one kind to a rate.
+    ///
+    /// # Errors
+    /// When the rate is outside 0 to 1.
+    pub fn set(target: Entity, kind: BondKind, rate: f32) -> Result<Self, InvalidValue> {
+        let mut rates = [None; BondKind::COUNT];
+        rates[kind as usize] = Some(Self::RATES.check(rate)?);
+        Ok(Self::rates(target, rates))
+    }
+
+    /// The same treatment of these joints only, counted from the root.
+    pub fn joints(mut self, joints: Range<usize>) -> Self {
+        self.joints = Some(joints);
+        self
+    }
+
+    /// The same treatment, taking `seconds`, of which [`ProcessTime`](crate::ProcessTime) makes fewer.
+    pub fn over(mut self, seconds: f32) -> Self {
+        self.seconds = seconds;
+        self
+    }
+}
+
+impl Ranged for Treat {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        Self::SECONDS.clamp(&mut self.seconds, || 0.0, violations);
+        for rate in self.rates.iter_mut().flatten() {
+            Self::RATES.clamp(rate, || 1.0, violations);
+        }
+    }
+}
+
+/// The treatments that are acting on a strand. Kept by the tick.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone)]
+pub struct Treatments {
+    acting: Vec<Treat>,
+}
+
+impl Treatments {
+    /// The treatments, oldest first, with the time they still take.
+    pub fn acting(&self) -> &[Treat] {
+        &self.acting
+    }
+}
+
+setting! {
+    /// A cylinder along Y that strands are wound round: see [`Winding`]. Despawn it to release them.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Transform, TickPose)]
+    pub struct PermRod {
+        /// Radius. A joint turns by 2 asin(l/2R): keep segments below 1.7 times the radius.
+        pub radius: f32 = 0.03, "m" in RADIUS: 1e-3..=10.0, safe 0.003..=0.1,
+            "3 cm is the paper's size";
+        /// Length.
+        pub length: f32 = 0.2, "m" in LENGTH: 1e-3..=100.0, safe 0.01..=1.0,
+            "0.2 takes a row of hair";
+    }
+}
+
+impl PermRod {
+    /// A rod of `radius` and `length` (m).
+    ///
+    /// # Errors
+    /// When one is not between 1 mm and 10 m (radius) or 100 m (length).
+    pub fn new(radius: f32, length: f32) -> Result<Self, InvalidValue> {
+        Self { radius, length }.checked()
+    }
+}
+
+/// The rod that a strand is wound on. Removing it, or despawning the rod, releases the strand.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component, Clone, PartialEq)]
+#[relationship(relationship_target = WoundStrands)]
+#[require(Winding, WindingProgress, HeldNodes)]
+pub struct WoundOn(pub Entity);
+
+/// The strands on a [`PermRod`]. Kept by Bevy.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default, Clone)]
+#[relationship_target(relationship = WoundOn)]
+pub struct WoundStrands(Vec<Entity>);
+
+setting! {
+    /// How a strand is wound on its rod.
+    ///
+    /// The nodes are guided, as by a hairdresser's hand: from where the strand is when winding begins,
+    /// through ever tighter helices whose radius shrinks to the rod's, each of the strand's own length,
+    /// so nothing is stretched on the way. Their shape is the bonds' to remember.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct Winding {
+        /// The first node on the rod, from the root, which is the scalp's.
+        pub from_node: usize = 2, in FROM_NODE: 1.0..=1e6, safe 1.0..=64.0, "2 keeps off the scalp";
+        /// Advance along the rod's axis per turn. At 4 mm turns lie side by side.
+        pub pitch: f32 = 0.004, "m" in PITCH: -10.0..=10.0, safe 0.0..=0.1,
+            "0.004 lays turns side by side";
+        /// Time that winding takes; 0 winds at once.
+        pub seconds: f32 = 2.0, "s" in SECONDS: 0.0..=1e6, safe 0.0..=60.0, "2 is quick";
+    }
+}
+
+/// How far winding has come. Kept by the tick.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone)]
+pub struct WindingProgress {
+    progress: f32,
+    /// Where the strand was when winding began, in the hair's frame.
+    start: Vec<Vec3>,
+    /// Where its nodes are on the rod once they are wound, in the rod's frame.
+    on_rod: Vec<Vec3>,
+}
+
+impl WindingProgress {
+    /// 0 has just begun, 1 is wound.
+    pub fn progress(&self) -> f32 {
+        self.progress
+    }
+}

@@ -1,0 +1,155 @@
+//! Treatments ask for bond changes in `ExternalForces`; rods guide their strands in `Interaction`.
+
+use super::{
+    PermRod, Treat, Treatments, Winding, WindingProgress, WoundOn, WoundStrands,
+    winding::{Rod, winding},
+};
+use crate::{
+    bond::{BondChanges, BondKind, Bonds},
+    fault::{FaultKind, HairFault},
+    parallel::for_each,
+    schedule::{HairStep, HairSystems, HairTick, ProcessTime},
+    setting::{self, Ranged, report},
+    strand::{HeldNodes, Strand, StrandOf, Strands, TickPose},
+};
+use bevy::prelude::*;
+
+/// Treatments and perm rods.
+pub struct TreatmentPlugin;
+
+impl Plugin for TreatmentPlugin {
+    fn build(&self, app: &mut App) {
+        setting::component::<PermRod>(app);
+        setting::component::<Winding>(app);
+        app.add_message::<Treat>()
+            .register_type::<Treat>()
+            .register_type::<Treatments>()
+            .register_type::<WoundOn>()
+            .register_type::<WoundStrands>()
+            .register_type::<WindingProgress>()
+            .register_required_components::<Strand, Treatments>()
+            .add_observer(release)
+            .add_systems(
+                HairTick,
+                (begin_treatments, apply_treatments).chain().in_set(HairSystems::Treatments),
+            )
+            .add_systems(HairTick, wind_strands.in_set(HairSystems::RodWinding));
+    }
+}
+
+fn begin_treatments(
+    mut requests: MessageReader<Treat>,
+    hairs: Query<&Strands>,
+    mut strands: Query<&mut Treatments, With<StrandOf>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for request in requests.read() {
+        let (treat, entity) = (request.clamped(), request.target);
+        report(Some(entity), request.violations(), &mut faults);
+        if let Ok(members) = hairs.get(entity) {
+            let mut members = strands.iter_many_mut(members.collection());
+            while let Some(mut treatments) = members.fetch_next() {
+                treatments.acting.push(treat.clone());
+            }
+        } else if let Ok(mut treatments) = strands.get_mut(entity) {
+            treatments.acting.push(treat);
+        } else {
+            let message = "the treatment's target is neither a Hair nor a strand";
+            faults.write(HairFault::new(FaultKind::NoTarget, message).of(entity));
+        }
+    }
+}
+
+/// Asks for this substep's part of what each treatment still has to do.
+fn apply_treatments(
+    step: Res<HairStep>,
+    process: Res<ProcessTime>,
+    mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
+) {
+    let dt = step.dt * process.clamped().0;
+    let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();
+    for_each(&mut items, |(bonds, changes, treatments)| {
+        let changes = changes.bypass_change_detection();
+        for treat in &mut treatments.acting {
+            let share = if treat.seconds > dt { dt / treat.seconds } else { 1.0 };
+            let range = treat.joints.clone().unwrap_or(0..bonds.joints.len());
+            for (i, joint) in bonds.joints.iter().enumerate().filter(|(i, _)| range.contains(i)) {
+                for kind in BondKind::ALL {
+                    if let Some(to) = treat.rates[kind as usize] {
+                        changes.ask(i, kind, (to - joint.rates[kind as usize]) * share);
+                    }
+                }
+            }
+            treat.seconds -= dt;
+        }
+        treatments.acting.retain(|t| t.seconds > 0.0);
+    });
+}
+
+fn wind_strands(
+    step: Res<HairStep>,
+    hairs: Query<&TickPose>,
+    rods: Query<(&PermRod, &TickPose)>,
+    mut strands: Query<(
+        &StrandOf,
+        &WoundOn,
+        &Strand,
+        &Winding,
+        &mut WindingProgress,
+        &mut HeldNodes,
+    )>,
+) {
+    let mut items: Vec<_> = strands
+        .iter_mut()
+        .filter_map(|(of, on, strand, settings, wound, held)| {
+            let hair = hairs.get(of.0).ok()?.now();
+            let (rod, pose) = rods.get(on.0).ok()?;
+            let (rod, pose) = (rod.clamped(), pose.now());
+            let scale = pose.scale / hair.scale;
+            let rod = Rod {
+                center: hair.point_in(pose.translation),
+                axis: hair.direction_in(pose.rotation * Vec3::Y),
+                radius: rod.radius * scale,
+                half_length: 0.5 * rod.length * scale,
+            };
+            Some((rod, (*hair, *pose), strand, settings.clamped(), wound, held))
+        })
+        .collect();
+    for_each(&mut items, |(rod, (hair, pose), strand, settings, wound, held)| {
+        let from = settings.from_node;
+        if from >= strand.edges() {
+            return;
+        }
+        if wound.start.len() != strand.nodes() {
+            **wound = WindingProgress { start: strand.positions().to_vec(), ..default() };
+        }
+        // Once wound, hair is fast on its rod and goes where that goes and turns.
+        if wound.on_rod.is_empty() {
+            wound.progress = (wound.progress + step.dt / settings.seconds.max(step.dt)).min(1.0);
+            let (lengths, progress) = (strand.rest_lengths(), wound.progress);
+            let path = winding(rod, &wound.start, lengths, from, settings.pitch, progress);
+            if wound.progress >= 1.0 {
+                wound.on_rod = path.iter().map(|p| pose.point_in(hair.point_out(*p))).collect();
+            }
+            hold(held, from, path.into_iter());
+        } else {
+            let on_rod = wound.on_rod.iter();
+            hold(held, from, on_rod.map(|p| hair.point_in(pose.point_out(*p))));
+        }
+    });
+}
+
+/// Holds the nodes from `from` on.
+fn hold(held: &mut HeldNodes, from: usize, nodes: impl Iterator<Item = Vec3>) {
+    held.targets.clear();
+    held.targets.resize(from, None);
+    held.targets.extend(nodes.map(Some));
+}
+
+/// A strand that leaves its rod, for whatever reason, is free.
+fn release(left: On<Remove, WoundOn>, mut strands: Query<(&mut WindingProgress, &mut HeldNodes)>) {
+    if let Ok((mut wound, mut held)) = strands.get_mut(left.entity) {
+        held.targets.clear();
+        *wound = default();
+    }
+}

@@ -1,0 +1,361 @@
+//! `Interaction`: strands meet droplets.
+
+use super::{
+    Droplet, Moisture, Ride, WaterLedger, Wetting,
+    adhesion::{ContactParams, DropletContacts, Landing},
+    exchange::on_strand,
+    field::{Field, SeenDrop},
+    model::clinging,
+    moisture::node_lengths,
+    strand_block::{StrandBlocks, StrandLane},
+};
+use crate::{
+    contact::WetRow,
+    environment::HairGravity,
+    lanes::LANES,
+    parallel::{emptied, for_each_block, prefetch},
+    schedule::HairStep,
+    setting::{Ranged, Settings},
+    strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
+};
+use crate::{environment::vapour::WATER, schedule::ProcessTime};
+use bevy::prelude::*;
+use core::slice::from_ref;
+use fearless_simd::Level;
+
+/// The most sums over pieces that are kept, for all droplets together.
+const SUMS: usize = 1 << 18;
+
+/// How many droplets are summed for at a time.
+const PART: usize = 64;
+
+/// How many strands meet droplets as one piece of work, whole blocks: the same on any number of
+/// threads, so that what droplets get is always summed in the same order. Every piece keeps room for
+/// all droplets' sums, so of many droplets there are few pieces.
+fn piece(strands: usize, drops: usize) -> usize {
+    let pieces = (SUMS / drops.max(1)).clamp(4, 64);
+    strands.div_ceil(pieces).next_multiple_of(LANES)
+}
+
+/// Room for the work of a substep, kept from one to the next.
+#[derive(Resource, Default)]
+pub(super) struct WaterField {
+    /// The droplets around each hair, and what its pieces of work came to.
+    fields: Vec<(Field, Vec<DropletContacts>)>,
+    /// Strands that carry a droplet's weight.
+    loaded: Vec<Entity>,
+    /// What nodes bring to bridges of water.
+    pub(super) rows: Vec<WetRow>,
+    outcomes: Vec<Outcome>,
+    rooms: Vec<Room>,
+}
+
+/// Room for a hair's strands, as they come and in order.
+type Room = (Vec<Option<WetStrand<'static>>>, Vec<WetStrand<'static>>);
+
+/// A hair and its strands among droplets.
+struct Head<'a> {
+    pose: Pose,
+    wetting: Wetting,
+    strands: Vec<WetStrand<'a>>,
+}
+
+struct WetStrand<'a> {
+    entity: Entity,
+    strand: Mut<'a, Strand>,
+    added_mass: &'a AddedMass,
+    moisture: Mut<'a, Moisture>,
+}
+
+/// What a substep did to one droplet.
+#[derive(Clone, Copy, Debug, Default)]
+struct Outcome {
+    /// What strands gave it (kg m/s, in the world).
+    impulse: Vec3,
+    /// How many strands are at it.
+    company: u32,
+    landing: Option<Landing>,
+    /// The most that strands would absorb (m³).
+    wanted: f64,
+}
+
+pub(super) fn wet_strands(
+    step: Res<HairStep>,
+    gravity: Res<HairGravity>,
+    process: Res<ProcessTime>,
+    wetting: Settings<Wetting>,
+    mut scratch: ResMut<WaterField>,
+    mut hairs: Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
+    mut strands: Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
+    mut droplets: Query<&mut Droplet>,
+    mut ledger: ResMut<WaterLedger>,
+) {
+    let WaterField { fields, loaded, outcomes, rooms, .. } = scratch.bypass_change_detection();
+    // Water's own weight is written anew by its exchange; to dry hair only droplets are a added_mass.
+    for strand in loaded.drain(..) {
+        if let Ok((.., mut added_mass, moisture)) = strands.get_mut(strand)
+            && moisture.is_untouched()
+        {
+            *added_mass.bypass_change_detection() = default();
+        }
+    }
+    let mut drops: Vec<&mut Droplet> = droplets.iter_mut().map(Mut::into_inner).collect();
+    if drops.is_empty() {
+        return;
+    }
+    // Who carries a drop is heavy for all that pulls.
+    for drop in &drops {
+        if let Some(ride) = drop.ride
+            && let Ok((_, of, strand, mut added_mass, _)) = strands.get_mut(ride.strand)
+            && strand.nodes() >= 2
+        {
+            let added_mass = added_mass.bypass_change_detection();
+            weigh(&strand, added_mass, &wetting.of(of.0), ride.at, mass_of(drop));
+            loaded.push(ride.strand);
+        }
+    }
+    let process = process.clamped().0;
+    outcomes.clear();
+    outcomes.resize(drops.len(), Outcome::default());
+    let mut heads = heads(&mut hairs, &wetting, &mut strands, step.index == 0, rooms);
+    fields.resize_with(heads.len(), default);
+    for (Head { pose, wetting, strands }, (field, pieces)) in heads.iter_mut().zip(&mut *fields) {
+        field.see(&drops, pose);
+        field.sort(wetting.lock_radius());
+        let met = ContactParams {
+            wetting,
+            field,
+            dt: step.dt,
+            uptake: 1.0 - bevy::math::ops::exp(-wetting.uptake * process * step.dt),
+            most_film: clinging(wetting.bundle(1.0), gravity.length()),
+        };
+        let piece = piece(strands.len(), drops.len());
+        pieces.resize_with(strands.len().div_ceil(piece), default);
+        contact_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &met);
+        sum_up(pieces, pose.rotation, outcomes);
+    }
+    // What all want together may be more than there is.
+    let shares: Vec<f64> =
+        drops.iter().zip(&*outcomes).map(|(drop, o)| (drop.counted / o.wanted).min(1.0)).collect();
+    for (Head { strands, .. }, (_, pieces)) in heads.iter_mut().zip(&mut *fields) {
+        let piece = piece(strands.len(), drops.len());
+        absorb_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &shares);
+        ledger.water_out += pieces.iter().map(|out| out.gone).sum::<f64>();
+    }
+    for (head, room) in heads.into_iter().zip(rooms) {
+        room.1 = emptied(head.strands);
+    }
+    for ((drop, outcome), share) in drops.iter_mut().zip(&*outcomes).zip(shares) {
+        // Less than nothing only by what sums are rounded.
+        drop.volume = (drop.volume - share * outcome.wanted).max(0.0);
+        drop.counted = drop.volume;
+        drop.company = outcome.company.max(1);
+        let lands = drop.ride.is_none() && outcome.landing.is_some();
+        if let Some(landing) = outcome.landing.filter(|_| lands) {
+            drop.ride = Some(Ride { strand: landing.strand, at: landing.at });
+            drop.lying = 0.0;
+        }
+        if let Some(ride) = drop.ride
+            && let Ok((_, of, mut strand, mut added_mass, _)) = strands.get_mut(ride.strand)
+            && let Ok((pose, _)) = hairs.get(of.0)
+        {
+            let (pose, wetting) = (pose.now(), wetting.of(of.0));
+            let (strand, added_mass) =
+                (strand.bypass_change_detection(), added_mass.bypass_change_detection());
+            let mut impulse = pose.direction_in(outcome.impulse);
+            if lands {
+                weigh(strand, added_mass, &wetting, ride.at, mass_of(drop));
+                loaded.push(ride.strand);
+                let lands_at = pose.rotation * on_strand(strand, ride.at).1;
+                impulse += pose.direction_in(drop.velocity - lands_at) * mass_of(drop);
+            }
+            push(strand, added_mass, &wetting, ride.at, impulse);
+        }
+    }
+}
+
+/// All strands by their hair, those that grow together together.
+fn heads<'a>(
+    hairs: &mut Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
+    wetting: &Settings<Wetting>,
+    strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
+    anew: bool,
+    rooms: &mut Vec<Room>,
+) -> Vec<Head<'a>> {
+    let mut heads: PerHair<(Entity, Head<'a>, Vec<Option<WetStrand<'a>>>)> = default();
+    let mut unused = core::mem::take(rooms).into_iter();
+    for (entity, of, strand, added_mass, moisture) in strands {
+        let index = heads.index(of.0, || {
+            let (pose, wetting) = (*hairs.get(of.0).ok()?.0.now(), wetting.of(of.0));
+            let (unsorted, sorted) = unused.next().unwrap_or_default();
+            Some((of.0, Head { pose, wetting, strands: emptied(sorted) }, emptied(unsorted)))
+        });
+        if let Some(index) = index
+            && strand.nodes() >= 2
+        {
+            let added_mass = &*added_mass.into_inner();
+            heads.values[index].2.push(Some(WetStrand { entity, strand, added_mass, moisture }));
+        }
+    }
+    let sorted = heads.values.into_iter().map(|(hair, mut head, mut unsorted)| {
+        if let Ok((_, mut blocks)) = hairs.get_mut(hair) {
+            let roots = unsorted.iter().flatten().map(|s| s.strand.positions()[0]);
+            let order = blocks.bypass_change_detection().order(anew, unsorted.len(), roots);
+            for (i, k) in order.iter().enumerate() {
+                // They are taken from all over.
+                let later = order.get(i + 16).and_then(|k| unsorted.get(*k as usize));
+                prefetch(later.map_or(&[], from_ref));
+                head.strands.extend(unsorted.get_mut(*k as usize).and_then(Option::take));
+            }
+        }
+        rooms.push((emptied(unsorted), Vec::new()));
+        head
+    });
+    sorted.collect()
+}
+
+impl Field {
+    /// The droplets in a hair's frame.
+    fn see(&mut self, drops: &[&mut Droplet], pose: &Pose) {
+        let scale = pose.scale.recip();
+        self.drops.clear();
+        self.drops.extend(drops.iter().map(|d| SeenDrop {
+            at: pose.point_in(d.position),
+            before: pose.point_in(d.before),
+            velocity: pose.rotation.inverse() * d.velocity,
+            radius: d.radius() * scale,
+            r_min: d.r_min * scale,
+            r_max: d.r_max * scale,
+            strength: d.strength(),
+            mass: mass_of(d),
+            company: d.company as f32,
+            ride: d.ride.map(|r| r.strand),
+        }));
+    }
+}
+
+/// Strands and what became of them, piece by piece.
+type Work<'w, 'a> = Vec<(&'w mut [WetStrand<'a>], &'w mut DropletContacts)>;
+
+fn contact_all(mut work: Work<'_, '_>, met: &ContactParams<'_>) {
+    let level = Level::new();
+    for_each_block(
+        &mut work,
+        || (),
+        |(), (strands, out)| {
+            out.clear(met.field.drops.len());
+            let (mut rest, mut first) = (&mut **strands, 0);
+            rest.iter().take(2 * LANES).for_each(|one| prefetch(from_ref(&*one.strand)));
+            rest.iter().take(LANES).for_each(WetStrand::prefetch);
+            while !rest.is_empty() {
+                let (strand_block, after) = rest.split_at_mut(LANES.min(rest.len()));
+                let later = after.get(LANES..).unwrap_or_default();
+                later.iter().take(LANES).for_each(|one| prefetch(from_ref(&*one.strand)));
+                after.iter().take(LANES).for_each(WetStrand::prefetch);
+                let mut members: Vec<StrandLane<'_>> =
+                    strand_block.iter_mut().map(WetStrand::member).collect();
+                met.contact(level, &mut members, first, out);
+                (rest, first) = (after, first + LANES);
+            }
+        },
+    );
+}
+
+/// Gives every node its share of what it wanted.
+fn absorb_all(mut work: Work<'_, '_>, shares: &[f64]) {
+    for_each_block(
+        &mut work,
+        || (),
+        |(), (strands, out)| {
+            for touch in &out.touches {
+                let WetStrand { strand, moisture, .. } = &mut strands[touch.strand as usize];
+                let moisture = moisture.bypass_change_detection();
+                out.gone += moisture.fit(strand.nodes());
+                let takes = touch.wants * shares[touch.drop as usize];
+                moisture.add_film(touch.node as usize, takes);
+            }
+        },
+    );
+}
+
+impl WetStrand<'_> {
+    fn prefetch(&self) {
+        let (positions, velocities, ..) = self.strand.parts();
+        prefetch(positions);
+        prefetch(velocities);
+        prefetch(self.strand.rest_lengths());
+    }
+
+    fn member(&mut self) -> StrandLane<'_> {
+        let (positions, velocities, lengths) = self.strand.bypass_change_detection().motion_parts();
+        StrandLane {
+            strand: self.entity,
+            positions,
+            velocities,
+            lengths,
+            load: &self.added_mass.mass,
+            film: self.moisture.film(),
+        }
+    }
+}
+
+/// Adds up what the pieces of the strands did to droplets, and whom they met, in the strands' order.
+fn sum_up(pieces: &[DropletContacts], rotation: Quat, outcomes: &mut [Outcome]) {
+    // Droplets side by side, for what other threads wrote is slow to read.
+    let mut parts: Vec<_> = (0..).step_by(PART).zip(outcomes.chunks_mut(PART)).collect();
+    for_each_block(
+        &mut parts,
+        || (),
+        |(), (first, outcomes)| {
+            for piece in pieces {
+                for (outcome, sum) in outcomes.iter_mut().zip(&piece.sums[*first..]) {
+                    outcome.impulse += rotation * sum.impulse;
+                    outcome.company += sum.company;
+                    outcome.wanted += sum.wanted;
+                }
+            }
+        },
+    );
+    for landing in pieces.iter().flat_map(|piece| &piece.landings) {
+        let first = &mut outcomes[landing.drop as usize].landing;
+        if first.is_none_or(|other| landing.when < other.when) {
+            *first = Some(*landing);
+        }
+    }
+}
+
+fn mass_of(drop: &Droplet) -> f32 {
+    (drop.volume * WATER) as f32
+}
+
+/// The edge that a point `at` segments from the root is on, and its ends' shares in it.
+fn shares(strand: &Strand, at: f32) -> (usize, [f32; 2]) {
+    let edge = (at as usize).min(strand.edges() - 1);
+    let t = (at - edge as f32).clamp(0.0, 1.0);
+    (edge, [1.0 - t, t])
+}
+
+/// Lets a strand bear `mass` (kg) at a point: its nodes get heavier.
+fn weigh(strand: &Strand, added_mass: &mut AddedMass, wetting: &Wetting, at: f32, mass: f32) {
+    added_mass.mass.resize(strand.nodes(), 0.0);
+    let (edge, share) = shares(strand, at);
+    for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
+        added_mass.mass[i] += share[i - edge] * mass / (wetting.dry_mass() * length);
+    }
+}
+
+/// Gives a strand an impulse (kg m/s) at a point, which moves as one with what it bears.
+fn push(strand: &mut Strand, added_mass: &AddedMass, wetting: &Wetting, at: f32, impulse: Vec3) {
+    let (edge, share) = shares(strand, at);
+    let mut mobility = [0.0; 2];
+    for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
+        let load = added_mass.mass.get(i).copied().unwrap_or(0.0);
+        // The root is the scalp's.
+        mobility[i - edge] =
+            if i == 0 { 0.0 } else { 1.0 / (wetting.dry_mass() * length * (1.0 + load)) };
+    }
+    let (_, velocities, _) = strand.motion_parts();
+    for end in 0..2 {
+        velocities[edge + end] += impulse * (share[end] * mobility[end]);
+    }
+}

@@ -1,0 +1,338 @@
+//! Sixteen strands side by side, as droplets meet them.
+//!
+//! Strands that grow together hang together, so what is near one node is near its fifteen
+//! neighbours: they ask the grid once, and every droplet that it names is held against all of them.
+
+use super::Wetting;
+use crate::{
+    lanes::{LANES, Lane, V3, load3, put_numbers, put_vectors, put3, splat3, take_vectors, take3},
+    strand::Hair,
+};
+use bevy::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+
+/// A strand among droplets.
+pub(super) struct StrandLane<'a> {
+    pub strand: Entity,
+    pub positions: &'a [Vec3],
+    pub velocities: &'a mut [Vec3],
+    pub lengths: &'a [f32],
+    /// Added mass of each node over its dry mass; empty for none.
+    pub load: &'a [f32],
+    /// The film that lies on each node (m³); empty for none.
+    pub film: &'a [f64],
+}
+
+/// The nodes that are equally far down their strands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// Positions (m); no numbers where a strand is shorter.
+    pub p: [Lane; 3],
+    /// Velocities (m/s).
+    pub v: [Lane; 3],
+    /// Added mass over dry mass.
+    pub load: Lane,
+    /// Dry mass (kg).
+    pub mass: Lane,
+    /// Lengths of the edges that follow (m); zero where there are none.
+    length: Lane,
+    /// The box around them (m).
+    pub low: Vec3,
+    pub high: Vec3,
+}
+
+impl Default for Row {
+    fn default() -> Self {
+        let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let none = [0.0; LANES];
+        Self {
+            p: [[f32::NAN; LANES]; 3],
+            v: [none; 3],
+            load: none,
+            mass: none,
+            length: none,
+            low,
+            high,
+        }
+    }
+}
+
+impl Row {
+    /// The box around those nodes that are somewhere.
+    #[inline(always)]
+    fn bounds<S: Simd>(&self, simd: S) -> (Vec3, Vec3) {
+        let p = load3(simd, &self.p);
+        // Without what is no number or endless, of which nothing times is not zero.
+        let zero = f32x16::splat(simd, 0.0);
+        let none = p.scale(zero);
+        let is_somewhere = none.dot(none).simd_eq(zero);
+        let low = V3::select(is_somewhere, p, splat3(simd, Vec3::INFINITY));
+        let high = V3::select(is_somewhere, p, splat3(simd, Vec3::NEG_INFINITY));
+        (
+            Vec3::new(low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()),
+            Vec3::new(high.x.reduce_max(), high.y.reduce_max(), high.z.reduce_max()),
+        )
+    }
+}
+
+/// Up to sixteen strands in lanes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StrandBlock {
+    /// Root first, as many as the longest strand has nodes.
+    pub rows: Vec<Row>,
+    /// The index of each lane's strand.
+    pub own: [u32; LANES],
+}
+
+impl StrandBlock {
+    /// Takes strands in, where they are and no more: most are near no droplet.
+    pub fn place(&mut self, level: Level, members: &[StrandLane<'_>]) {
+        self.rows.clear();
+        let longest = members.iter().map(|m| m.positions.len()).max().unwrap_or(0);
+        self.rows.resize(longest, Row::default());
+        self.own = [u32::MAX; LANES];
+        for (own, member) in self.own.iter_mut().zip(members) {
+            *own = member.strand.index_u32();
+        }
+        for (group, four) in members.chunks(4).enumerate() {
+            if let [a, b, c, d] = four
+                && is_of(longest, four)
+            {
+                let four = [a.positions, b.positions, c.positions, d.positions];
+                put_vectors(&mut self.rows, group, four, |row| &mut row.p);
+                continue;
+            }
+            for (lane, member) in (4 * group..).zip(four) {
+                for (p, row) in member.positions.iter().zip(&mut self.rows) {
+                    put3(&mut row.p, lane, *p);
+                }
+            }
+        }
+        dispatch!(level, simd => {
+            for row in &mut self.rows {
+                (row.low, row.high) = row.bounds(simd);
+            }
+        });
+    }
+
+    /// How they move and what they weigh, before droplets act on them.
+    pub fn weigh(&mut self, members: &[StrandLane<'_>], wetting: &Wetting) {
+        for (group, four) in members.chunks(4).enumerate() {
+            if let [a, b, c, d] = four
+                && is_of(self.rows.len(), four)
+            {
+                let velocities = [&*a.velocities, b.velocities, c.velocities, d.velocities];
+                put_vectors(&mut self.rows, group, velocities, |row| &mut row.v);
+                let lengths = [a.lengths, b.lengths, c.lengths, d.lengths];
+                let edges = self.rows.len() - 1;
+                put_numbers(&mut self.rows[..edges], group, lengths, |row| &mut row.length);
+                continue;
+            }
+            for (lane, member) in (4 * group..).zip(four) {
+                for (v, row) in member.velocities.iter().zip(&mut self.rows) {
+                    put3(&mut row.v, lane, *v);
+                }
+                for (length, row) in member.lengths.iter().zip(&mut self.rows) {
+                    row.length[lane] = *length;
+                }
+            }
+        }
+        for (lane, member) in members.iter().enumerate() {
+            for (load, row) in member.load.iter().zip(&mut self.rows) {
+                row.load[lane] = *load;
+            }
+        }
+        // A node weighs what half of the edges beside it do.
+        let half = 0.5 * wetting.dry_mass();
+        let mut before = [0.0; LANES];
+        for row in &mut self.rows {
+            for ((mass, before), length) in row.mass.iter_mut().zip(&mut before).zip(row.length) {
+                *mass = half * (*before + length);
+                *before = length;
+            }
+        }
+    }
+
+    /// Puts velocities back.
+    pub fn scatter(&self, members: &mut [StrandLane<'_>]) {
+        for (group, four) in members.chunks_mut(4).enumerate() {
+            let is_whole = is_of(self.rows.len(), four);
+            if let [a, b, c, d] = &mut *four
+                && is_whole
+            {
+                let four = [&mut *a.velocities, b.velocities, c.velocities, d.velocities];
+                take_vectors(&self.rows, group, four, |row| &row.v);
+                continue;
+            }
+            for (lane, member) in (4 * group..).zip(four) {
+                for (v, row) in member.velocities.iter_mut().zip(&self.rows) {
+                    *v = take3(&row.v, lane);
+                }
+            }
+        }
+    }
+}
+
+/// Whether all strands have so many nodes.
+fn is_of(nodes: usize, members: &[StrandLane<'_>]) -> bool {
+    members.iter().all(|member| member.positions.len() == nodes)
+}
+
+/// The order in which a hair's strands are taken side by side: along a curve that fills space
+/// (Morton's), by their roots.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub(super) struct StrandBlocks {
+    order: Vec<u32>,
+}
+
+impl StrandBlocks {
+    /// The numbers of `count` strands with these `roots`, in order. Sorted anew if `anew` or if there are
+    /// others than last time; which strands stand together changes only how fast it goes.
+    pub fn order(&mut self, anew: bool, count: usize, roots: impl Iterator<Item = Vec3>) -> &[u32] {
+        if anew || self.order.len() != count {
+            let mut keys: Vec<(u64, u32)> = roots.map(place_on_curve).zip(0..).collect();
+            keys.sort_unstable();
+            self.order.clear();
+            self.order.extend(keys.into_iter().map(|(_, strand)| strand));
+        }
+        &self.order
+    }
+}
+
+/// How far along Morton's curve through cells of 2 mm a root is.
+fn place_on_curve(root: Vec3) -> u64 {
+    let cell =
+        (root * 500.0).as_ivec3().clamp(IVec3::splat(-(1 << 20)), IVec3::splat((1 << 20) - 1));
+    let [x, y, z] = (cell + (1 << 20)).as_u64vec3().to_array().map(spread);
+    x | y << 1 | z << 2
+}
+
+/// The lowest 21 bits, with two bits of room after each.
+fn spread(x: u64) -> u64 {
+    let x = (x | x << 32) & 0x001f_0000_0000_ffff;
+    let x = (x | x << 16) & 0x001f_0000_ff00_00ff;
+    let x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    let x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+pub(super) fn plugin(app: &mut App) {
+    app.register_type::<StrandBlocks>().register_required_components::<Hair, StrandBlocks>();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strands_that_stand_together_are_taken_together() {
+        // A square of 32 by 32 roots, 3 mm apart, in an order that jumps about.
+        let roots = (0..1024u32).map(|i| i * 389 % 1024);
+        let roots = roots.map(|i| Vec3::new((i % 32) as f32, 5.0, (i / 32) as f32) * 0.003);
+        let roots: Vec<Vec3> = roots.collect();
+        let mut blocks = StrandBlocks::default();
+        let order = blocks.order(true, 1024, roots.iter().copied()).to_vec();
+        let mut all = order.clone();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..1024), "each strand once");
+        let widths = order.chunks(LANES).map(|strand_block| {
+            let places = || strand_block.iter().map(|i| roots[*i as usize]);
+            let low = places().reduce(Vec3::min).unwrap_or_default();
+            (places().reduce(Vec3::max).unwrap_or_default() - low).max_element()
+        });
+        let mean = widths.sum::<f32>() / 64.0;
+        assert!(mean < 0.02, "sixteen strands fill 12 mm by 12 mm, here {mean} m");
+        // Kept while nothing is asked anew, but not for another number of strands.
+        assert_eq!(blocks.order(false, 1024, [Vec3::NAN; 1024].into_iter()), order);
+        assert_eq!(blocks.order(false, 3, roots[..3].iter().copied()).len(), 3);
+    }
+
+    #[test]
+    fn strands_of_any_lengths_are_in_lanes_what_they_were_and_come_back() {
+        // All alike; a group with a shorter one among them; a group that is not full.
+        for lengths in [vec![6; 16], vec![6, 6, 6, 6, 6, 5, 6, 6, 2, 3, 4, 5, 6, 6], vec![7; 3]] {
+            let number = |s: usize, i: usize| (100 * s + 10 * i) as f32;
+            let vectors = |s: usize, add: f32| -> Vec<Vec3> {
+                let vector = |i| Vec3::new(0.1, 1.0, 2.0) * (number(s, i) + add);
+                (0..lengths[s]).map(vector).collect()
+            };
+            let positions: Vec<_> = (0..lengths.len()).map(|s| vectors(s, 1.0)).collect();
+            let edges: Vec<Vec<f32>> = (0..lengths.len())
+                .map(|s| (1..lengths[s]).map(|i| number(s, i)).collect())
+                .collect();
+            let before: Vec<_> = (0..lengths.len()).map(|s| vectors(s, 3.0)).collect();
+            let mut velocities = before.clone();
+            let mut members: Vec<_> = (0..)
+                .zip(positions.iter().zip(&edges).zip(&mut velocities))
+                .map(|(s, ((positions, lengths), velocities))| {
+                    let load: &[f32] = if s == 2 { &[0.5, 0.25] } else { &[] };
+                    let strand = Entity::from_raw_u32(s).unwrap();
+                    StrandLane { strand, positions, velocities, lengths, load, film: &[] }
+                })
+                .collect();
+            let (mut strand_block, wetting) = (StrandBlock::default(), Wetting::default());
+            // What was in it before must not stay.
+            strand_block.rows =
+                vec![Row { v: [[7.0; LANES]; 3], load: [7.0; LANES], ..default() }; 9];
+            strand_block.place(Level::new(), &members);
+            strand_block.weigh(&members, &wetting);
+            for (s, member) in members.iter().enumerate() {
+                let masses = super::super::moisture::node_lengths(member.lengths);
+                for (i, length) in masses.enumerate() {
+                    let row = &strand_block.rows[i];
+                    assert_eq!(take3(&row.p, s), member.positions[i]);
+                    assert_eq!(take3(&row.v, s), member.velocities[i]);
+                    assert_eq!(row.load[s], member.load.get(i).copied().unwrap_or(0.0));
+                    let mass = wetting.dry_mass() * length;
+                    assert!((row.mass[s] - mass).abs() <= 1e-6 * mass, "{s} {i}");
+                }
+                assert!(
+                    strand_block.rows[lengths[s]..].iter().all(|row| take3(&row.p, s).is_nan())
+                );
+            }
+            for (i, row) in strand_block.rows.iter().enumerate() {
+                let there = || positions.iter().filter_map(|p| p.get(i)).copied();
+                assert_eq!(Some(row.low), there().reduce(Vec3::min));
+                assert_eq!(Some(row.high), there().reduce(Vec3::max));
+            }
+            for row in &mut strand_block.rows {
+                row.v = row.v.map(|v| v.map(|v| 2.0 * v));
+            }
+            strand_block.scatter(&mut members);
+            let doubled = |v: &Vec<Vec3>| v.iter().map(|v| *v * 2.0).collect::<Vec<_>>();
+            assert_eq!(velocities, before.iter().map(doubled).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn what_is_nowhere_is_in_no_box() {
+        let places = [Vec3::ONE, Vec3::NAN, Vec3::INFINITY, Vec3::new(2.0, f32::NEG_INFINITY, 0.0)];
+        let mut velocities = [[Vec3::ZERO]; 4];
+        let members: Vec<_> = places
+            .each_ref()
+            .into_iter()
+            .zip(&mut velocities)
+            .map(|(place, velocities)| StrandLane {
+                strand: Entity::PLACEHOLDER,
+                positions: core::slice::from_ref(place),
+                velocities,
+                lengths: &[],
+                load: &[],
+                film: &[],
+            })
+            .collect();
+        let mut strand_block = StrandBlock::default();
+        strand_block.place(Level::new(), &members);
+        assert_eq!((strand_block.rows[0].low, strand_block.rows[0].high), (Vec3::ONE, Vec3::ONE));
+    }
+
+    #[test]
+    fn places_that_are_no_places_have_an_order_too() {
+        let mut blocks = StrandBlocks::default();
+        let roots = [Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::ZERO];
+        let mut order = blocks.order(true, 4, roots.into_iter()).to_vec();
+        order.sort_unstable();
+        assert_eq!(order, [0, 1, 2, 3]);
+    }
+}

@@ -1,0 +1,392 @@
+//! The floor plan of the crate: which room may know which.
+//!
+//! Rooms are the modules below `src`. Every path that leads from one file into another is read from the
+//! sources' tokens, tests left out, re-exports followed to where a name is defined.
+
+use proc_macro2::{Delimiter, TokenStream, TokenTree};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Rooms from the ground up: each may import those before it, none after it.
+const FLOORS: [&str; 27] = [
+    "fault",
+    "setting",
+    "parallel",
+    "lanes",
+    "schedule",
+    "grid",
+    "rod",
+    "mass_spring",
+    "strand",
+    "bond",
+    "environment",
+    "contact",
+    "treatment",
+    "water",
+    "lod",
+    "sleep",
+    "solve",
+    "save",
+    "render",
+    "groom",
+    "plant",
+    "attach",
+    "collider_fit",
+    "plugins",
+    "prelude",
+    "lib",
+    "",
+];
+
+/// A path in a file, from the crate's root, with its line.
+#[derive(Clone, Debug)]
+struct Import {
+    path: Vec<String>,
+    line: usize,
+    /// The name it is re-exported or imported as; `None` for a path that is used in place.
+    name: Option<String>,
+}
+
+#[derive(Debug, Default)]
+struct Source {
+    imports: Vec<Import>,
+}
+
+struct Crate {
+    /// Files by module path; the crate's root is the empty path.
+    files: BTreeMap<Vec<String>, (PathBuf, Source)>,
+}
+
+impl Crate {
+    fn read() -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        let mut files = BTreeMap::new();
+        let mut folders = vec![root.clone()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|e| e == "rs") {
+                    let inside = path.strip_prefix(&root).unwrap().with_extension("");
+                    let mut module: Vec<String> =
+                        inside.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
+                    if ["mod", "lib"].contains(&module.last().unwrap().as_str()) {
+                        module.pop();
+                    }
+                    let text = fs::read_to_string(&path).unwrap();
+                    let source = Source::parse(&text, &module);
+                    files.insert(module, (path, source));
+                }
+            }
+        }
+        Self { files }
+    }
+
+    /// The module whose file defines what a path names.
+    fn home(&self, path: &[String]) -> Vec<String> {
+        let mut at: Vec<String> = Vec::new();
+        let mut path = path.to_vec();
+        // A circle of re-exports would not compile; a glob may lead astray, so it ends.
+        for _ in 0..32 {
+            let Some(next) = path.first().cloned() else { return at };
+            at.push(next.clone());
+            if self.files.contains_key(&at) {
+                path.remove(0);
+                continue;
+            }
+            at.pop();
+            let (_, source) = &self.files[&at];
+            let named = |import: &&Import| import.name.as_deref() == Some(next.as_str());
+            let Some(import) = source.imports.iter().find(named) else { return at };
+            // A macro that is re-exported where it is defined.
+            if import.path.split_last() == Some((&next, &at[..])) {
+                return at;
+            }
+            let rest = path.split_off(1);
+            path = import.path.iter().cloned().chain(rest).collect();
+            at.clear();
+        }
+        at
+    }
+
+    /// For each file the files it takes something from, with the first line that does.
+    fn arrows(&self) -> BTreeMap<&Vec<String>, BTreeMap<Vec<String>, usize>> {
+        let mut arrows = BTreeMap::new();
+        for (module, (_, source)) in &self.files {
+            let mut to = BTreeMap::new();
+            for import in &source.imports {
+                // Re-exporting what is below is the index of a room, not an import.
+                let own = import.path.len() > module.len() && import.path.starts_with(module);
+                if own && import.name.is_some() {
+                    continue;
+                }
+                let home = self.home(&import.path);
+                if home != *module {
+                    to.entry(home).or_insert(import.line);
+                }
+            }
+            arrows.insert(module, to);
+        }
+        arrows
+    }
+
+    fn place(&self, module: &[String], line: usize) -> String {
+        format!("{}:{line}", self.files[module].0.display())
+    }
+}
+
+impl Source {
+    fn parse(text: &str, module: &[String]) -> Self {
+        let tokens: TokenStream = text.parse().unwrap();
+        let mut source = Self::default();
+        source.walk(tokens, module);
+        source
+    }
+
+    fn walk(&mut self, tokens: TokenStream, module: &[String]) {
+        let tokens: Vec<TokenTree> = tokens.into_iter().collect();
+        let mut i = 0;
+        while i < tokens.len() {
+            match &tokens[i] {
+                TokenTree::Punct(p) if p.as_char() == '#' && is_test(tokens.get(i + 1)) => {
+                    // Leaves out the item behind `#[cfg(test)]`.
+                    i += 2;
+                    while i < tokens.len() && !ends_item(&tokens[i]) {
+                        i += 1;
+                    }
+                }
+                // Not the `use<'a>` of a captured lifetime.
+                TokenTree::Ident(word)
+                    if *word == "use" && !tokens.get(i + 1).is_some_and(|t| is_punct(t, '<')) =>
+                {
+                    let end = (i..tokens.len()).find(|k| is_punct(&tokens[*k], ';')).unwrap();
+                    self.tree(&tokens[i + 1..end], &[], module, true);
+                    i = end;
+                }
+                TokenTree::Ident(word) if *word == "crate" || *word == "super" => {
+                    let end = path_end(&tokens, i);
+                    if end > i + 1 {
+                        self.tree(&tokens[i..end], &[], module, false);
+                    }
+                    i = end.max(i + 1) - 1;
+                }
+                // A path from here: perhaps into a child.
+                TokenTree::Ident(word) if path_end(&tokens, i) > i + 1 => {
+                    let line = word.span().start().line;
+                    let path = [module, &[word.to_string()]].concat();
+                    self.imports.push(Import { path, line, name: None });
+                    i = path_end(&tokens, i) - 1;
+                }
+                TokenTree::Group(group) => self.walk(group.stream(), module),
+                _ => {}
+            }
+            i += 1;
+        }
+    }
+
+    /// One tree of a `use`, or a path in place.
+    fn tree(&mut self, tokens: &[TokenTree], before: &[String], module: &[String], names: bool) {
+        let branches = tokens.split(|token| is_punct(token, ','));
+        for branch in branches.filter(|branch| !branch.is_empty()) {
+            let mut path = before.to_vec();
+            let mut name = None;
+            let mut group = None;
+            let mut relative = before.is_empty();
+            let mut tokens = branch.iter();
+            let mut line = 0;
+            while let Some(token) = tokens.next() {
+                line = token.span().start().line;
+                match token {
+                    TokenTree::Ident(word) => match word.to_string().as_str() {
+                        "crate" if relative => (path, relative) = (vec![], false),
+                        "super" if path.is_empty() && relative => {
+                            path = module[..module.len() - 1].to_vec();
+                            relative = false;
+                            path.push(String::new());
+                        }
+                        "super" => {
+                            path.pop();
+                            path.pop();
+                            path.push(String::new());
+                        }
+                        "self" if path.is_empty() && relative => {
+                            (path, relative) = (module.to_vec(), false);
+                        }
+                        "self" => {}
+                        "as" => {
+                            name = tokens.next().map(ToString::to_string);
+                        }
+                        word => {
+                            path.retain(|part| !part.is_empty());
+                            if relative && names {
+                                // A child of this module, or another crate.
+                                path = [module, &[word.to_owned()]].concat();
+                                relative = false;
+                            } else {
+                                path.push(word.to_owned());
+                            }
+                        }
+                    },
+                    TokenTree::Group(inner) if inner.delimiter() == Delimiter::Brace => {
+                        group = Some(inner.stream());
+                    }
+                    _ => {}
+                }
+            }
+            path.retain(|part| !part.is_empty());
+            if let Some(inner) = group {
+                if relative {
+                    self.tree(&inner.into_iter().collect::<Vec<_>>(), &[], module, names);
+                } else {
+                    path.push(String::new());
+                    self.tree(&inner.into_iter().collect::<Vec<_>>(), &path, module, names);
+                }
+            } else if !path.is_empty() {
+                let name = names.then(|| name.unwrap_or_else(|| path.last().unwrap().clone()));
+                self.imports.push(Import { path, line, name });
+            }
+        }
+    }
+}
+
+fn is_punct(token: &TokenTree, what: char) -> bool {
+    matches!(token, TokenTree::Punct(p) if p.as_char() == what)
+}
+
+fn is_test(attribute: Option<&TokenTree>) -> bool {
+    attribute.is_some_and(|a| a.to_string().replace(' ', "") == "[cfg(test)]")
+}
+
+fn ends_item(token: &TokenTree) -> bool {
+    is_punct(token, ';')
+        || matches!(token, TokenTree::Group(g) if g.delimiter() == Delimiter::Brace)
+}
+
+/// Where the path that begins at `from` ends: words with `::` between.
+fn path_end(tokens: &[TokenTree], from: usize) -> usize {
+    let mut i = from + 1;
+    while i + 2 < tokens.len()
+        && is_punct(&tokens[i], ':')
+        && is_punct(&tokens[i + 1], ':')
+        && matches!(tokens[i + 2], TokenTree::Ident(_))
+    {
+        i += 3;
+    }
+    i
+}
+
+fn room(module: &[String]) -> &str {
+    module.first().map_or("lib", String::as_str)
+}
+
+fn floor(room: &str) -> usize {
+    FLOORS.iter().position(|r| *r == room).unwrap_or_else(|| panic!("{room} has no floor"))
+}
+
+#[test]
+fn no_room_imports_upward() {
+    let source = Crate::read();
+    let mut upward = Vec::new();
+    for (from, arrows) in source.arrows() {
+        for (to, line) in arrows {
+            let (here, there) = (room(from), room(&to));
+            // The crate's root only lists the rooms.
+            if here != there && here != "lib" && floor(there) >= floor(here) {
+                upward.push(format!("{here} imports {there}: {}", source.place(from, line)));
+            }
+        }
+    }
+    assert!(upward.is_empty(), "rooms that import upward:\n{}", upward.join("\n"));
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let source = Crate::read();
+    let arrows = source.arrows();
+    // What can be reached from a file; a file that reaches itself is in a circle.
+    let mut circles = Vec::new();
+    for start in arrows.keys() {
+        let mut seen = BTreeSet::new();
+        let mut todo: Vec<Vec<String>> = arrows[*start].keys().cloned().collect();
+        while let Some(module) = todo.pop() {
+            if seen.insert(module.clone()) {
+                todo.extend(arrows[&module].keys().cloned());
+            }
+        }
+        if seen.contains(*start) {
+            let back: Vec<String> = arrows[*start]
+                .iter()
+                .filter(|(to, _)| reaches(&arrows, to, start))
+                .map(|(to, line)| format!("{} at {}", to.join("::"), source.place(start, *line)))
+                .collect();
+            circles.push(format!("{} imports {}", start.join("::"), back.join(", ")));
+        }
+    }
+    assert!(circles.is_empty(), "files in circles:\n{}", circles.join("\n"));
+}
+
+fn reaches(
+    arrows: &BTreeMap<&Vec<String>, BTreeMap<Vec<String>, usize>>,
+    from: &[String],
+    to: &[String],
+) -> bool {
+    let mut seen = BTreeSet::new();
+    let mut todo = vec![from.to_vec()];
+    while let Some(module) = todo.pop() {
+        if module == to {
+            return true;
+        }
+        if seen.insert(module.clone()) {
+            todo.extend(arrows[&module].keys().cloned());
+        }
+    }
+    false
+}
+
+#[test]
+fn no_file_is_too_long_to_be_understood() {
+    let source = Crate::read();
+    for (path, _) in source.files.values() {
+        let text = fs::read_to_string(path).unwrap();
+        let code = text.split("\n#[cfg(test)]\nmod tests {").next().unwrap();
+        let is_code = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with("//");
+        let lines = code.lines().filter(is_code).count();
+        assert!(lines <= 400, "{} has {lines} lines of code", path.display());
+    }
+}
+
+#[test]
+fn the_reader_of_paths_finds_all_kinds() {
+    let text = "use crate::{a::{self, B}, c::D as E};\npub use x::Y;\n\
+                fn f() -> crate::g::H { super::i::j(); child::k() }\n\
+                #[cfg(test)]\nmod tests { use crate::never::Seen; }";
+    let module = ["room", "file"].map(str::to_owned);
+    let source = Source::parse(text, &module);
+    let found: Vec<String> = source
+        .imports
+        .iter()
+        .map(|i| {
+            format!(
+                "{}{}",
+                i.path.join("::"),
+                i.name.as_ref().map_or(String::new(), |n| format!(" as {n}"))
+            )
+        })
+        .collect();
+    assert_eq!(
+        found,
+        [
+            "a as a",
+            "a::B as B",
+            "c::D as E",
+            "room::file::x::Y as Y",
+            "g::H",
+            "room::i::j",
+            "room::file::child"
+        ]
+    );
+}

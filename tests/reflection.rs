@@ -1,0 +1,62 @@
+//! Every public type that can be reflected is registered: inspectors and scene files know it.
+
+use bevy::{
+    asset::AssetPlugin, ecs::reflect::AppTypeRegistry, prelude::*, render::storage::ShaderBuffer,
+};
+use bevy_keratin::prelude::*;
+use std::{fs, path::Path};
+
+#[test]
+fn every_public_reflected_type_is_registered() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), HairPlugins::default()))
+        .init_asset::<Mesh>()
+        .init_asset::<ShaderBuffer>();
+    app.finish();
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let mut missing = Vec::new();
+    let mut known = 0;
+    for (name, file) in public_reflected(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src")) {
+        // A generic type is registered for each of its parameters.
+        let is_registered = registry.get_with_short_type_path(&name).is_some()
+            || registry.iter().any(|t| t.type_info().type_path().contains(&format!("::{name}<")));
+        if is_registered {
+            known += 1;
+        } else {
+            missing.push(format!("{name} of {file}"));
+        }
+    }
+    assert!(missing.is_empty(), "not registered: {missing:#?}");
+    assert!(known > 60, "only {known} types were found");
+}
+
+/// The names of public structs and enums that derive `Reflect`, with their files.
+fn public_reflected(folder: &Path) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(public_reflected(&path));
+            continue;
+        }
+        let avian = path.ends_with("avian.rs") && !cfg!(feature = "avian");
+        if avian || path.extension().is_none_or(|e| e != "rs") {
+            continue;
+        }
+        let text = fs::read_to_string(&path).unwrap();
+        let mut reflected = false;
+        for line in text.split("\n#[cfg(test)]\nmod tests").next().unwrap().lines() {
+            let line = line.trim_start();
+            if line.starts_with("#[derive(") {
+                reflected = line.contains("Reflect");
+            }
+            let item = ["pub struct ", "pub enum "].iter().find_map(|kind| line.strip_prefix(kind));
+            if let Some(item) = item.filter(|_| reflected) {
+                let end = item.find(|c: char| !c.is_alphanumeric()).unwrap_or(item.len());
+                found.push((item[..end].to_owned(), path.display().to_string()));
+                reflected = false;
+            }
+        }
+    }
+    found
+}
