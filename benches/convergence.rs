@@ -63,7 +63,7 @@ fn main() {
         (Split, 6, 20, 2),
         (Split, 12, 5, 2),
     ] {
-        let solver = HairSolver { projection, iterations, limiter_steps, ..default() };
+        let solver = Sweeps { projection, iterations, limiter_steps, ..default() };
         let app = || app(solver, substeps);
         println!(
             "{projection:?} | {substeps} × {iterations} | {limiter_steps} | {:.1} | {:.3}; {:.3} | {:.4}",

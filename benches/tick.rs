@@ -43,7 +43,7 @@ fn main() {
 
 /// Sixteen strands of `nodes` nodes, each hanging a little differently.
 fn block(nodes: usize) -> BlockLanes {
-    let stiffness = Stiffness::default();
+    let sweeps = Sweeps::default();
     let length = 0.48;
     let l = length / (nodes - 1) as f32;
     let mut block = BlockLanes::default();
@@ -69,7 +69,7 @@ fn block(nodes: usize) -> BlockLanes {
             put4(&mut edge.q, lane, along);
             put4(&mut edge.rest, lane, Quat::IDENTITY);
             edge.l[lane] = l;
-            edge.wq[lane] = stiffness.rotational_weight(l, l);
+            edge.wq[lane] = sweeps.rotational_weight(0.13, l, l);
             edge.k[lane] = 0.01;
         }
         put4(&mut block.root, lane, along);

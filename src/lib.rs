@@ -47,7 +47,7 @@ pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 pub use lod::{HairLod, LodLevel, PresentLod, ScreenShare};
 pub use mass_spring::Springs;
 pub use plugins::HairPlugins;
-pub use rod::{HairSolver, Stiffness, StretchProjection};
+pub use rod::{HairSolver, SolverMethod, Stiffness, StretchProjection, Sweeps};
 #[cfg(feature = "save")]
 pub use save::{Hairdo, HairdoError};
 pub use schedule::{HairStep, HairSubsteps, HairSystems, HairTick, ProcessTime};
@@ -79,8 +79,8 @@ pub mod prelude {
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
         HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairLod, HairPlugins,
         HairSleep, HairSolver, HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact,
-        Moisture, PermRod, ProcessTime, ScreenShare, Shower, SoakHair, Stiffness, Strand,
-        StrandModel, StrandOf, StrandSleep, Strands, StretchProjection, Treat, WaterLedger,
-        Wetting, Winding, WoundOn,
+        Moisture, PermRod, ProcessTime, ScreenShare, Shower, SoakHair, SolverMethod, Stiffness,
+        Strand, StrandModel, StrandOf, StrandSleep, Strands, StretchProjection, Sweeps, Treat,
+        WaterLedger, Wetting, Winding, WoundOn,
     };
 }

@@ -185,10 +185,11 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
     let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
     app.update();
     app.world_mut().entity_mut(hair).insert((
-        Stiffness { bending_length: -1.0, bend: 7.0, orientation_weight: None },
+        Stiffness { bending_length: -1.0, damping: -7.0 },
         AirDrag { rate: f32::NAN },
         BondInfluence { hydrogen: 0.0, ionic: 0.0, disulfide: 0.0, peptide: 0.0 },
-        HairSolver { iterations: 0, ..default() },
+        HairSolver { limiter_steps: 99, ..default() },
+        Sweeps { iterations: 0, bend: 7.0, ..default() },
         LockContact { radius: f32::INFINITY, strength: -3.0 },
     ));
     app.world_mut().spawn((HairCollider::default(), Transform::from_xyz(0.0, -2.0, 0.0)));
@@ -219,9 +220,11 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
             "LockContact::radius (m)",
             "LockContact::strength (m/s²)",
             "PermRod::radius (m)",
-            "HairSolver::iterations",
-            "Stiffness::bend",
+            "HairSolver::limiter_steps",
             "Stiffness::bending_length (m)",
+            "Stiffness::damping (s)",
+            "Sweeps::bend",
+            "Sweeps::iterations",
             "Winding::from_node",
             "Winding::pitch (m)",
             "Winding::seconds (s)",

@@ -47,7 +47,7 @@ fn quaternion(q: Quat) -> Quaternion<f32> {
 
 impl Twin {
     pub fn of(strand: &Strand) -> Self {
-        let stiffness = Stiffness::default();
+        let sweeps = Sweeps::default();
         let last = strand.nodes() - 1;
         let weight = |i: usize| if i == 0 { 0.0 } else { 1.0 + f32::from(u8::from(i == last)) };
         let still = V3::new(0.0, 0.0, 0.0);
@@ -57,7 +57,7 @@ impl Twin {
             q: quaternion(strand.orientations()[i]),
             omega: still,
             l: *l,
-            wq: stiffness.rotational_weight(*l, *l),
+            wq: sweeps.rotational_weight(0.13, *l, *l),
             rest: quaternion(strand.darboux(i)),
             k: 0.01,
         });

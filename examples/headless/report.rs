@@ -88,8 +88,7 @@ impl Report {
         let tips = measure::tips(strands.iter());
         let (min, mean, max) = measure::hydrogen(bonds.iter());
         let segments: usize = strands.iter().map(Strand::edges).sum();
-        let iterations =
-            HairSolver::default().iterations as f64 * step.count as f64 * frames as f64;
+        let iterations = f64::from(step.count) * frames as f64;
         let segment = strands.first().map_or(0.0, |s| s.rest_lengths()[0]);
         let mut report = Self {
             scene: scene.kind.name(),

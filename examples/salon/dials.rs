@@ -187,7 +187,7 @@ impl Settings<'_, '_> {
     pub fn hair(&mut self, ui: &mut Ui) {
         edited!(self.stiffness, |s: &mut Stiffness| {
             slide_mm(ui, &mut s.bending_length, Stiffness::BENDING_LENGTH, "bend length (mm)");
-            slide(ui, &mut s.bend, Stiffness::BEND, "k₀ of a substep");
+            slide(ui, &mut s.damping, Stiffness::DAMPING, "damping (s)");
         });
         ui.label("Influence of each kind of bond:");
         edited!(self.influence, |f: &mut BondInfluence| {
@@ -258,9 +258,10 @@ impl Settings<'_, '_> {
 
     pub fn solver(&mut self, ui: &mut Ui) {
         edited!(self.solver, |s: &mut HairSolver| {
-            slide_count(ui, &mut s.iterations, HairSolver::ITERATIONS, "iterations");
+            let mut sweeps = s.method == SolverMethod::Sweeps;
+            ui.checkbox(&mut sweeps, "the paper's projections");
+            s.method = if sweeps { SolverMethod::Sweeps } else { SolverMethod::Direct };
             slide_count(ui, &mut s.limiter_steps, HairSolver::LIMITER_STEPS, "limiter steps");
-            slide(ui, &mut s.internal_damping, HairSolver::INTERNAL_DAMPING, "damping (1/s)");
         });
         let mut auto = *self.substeps == HairSubsteps::Auto;
         let now = self.substeps.count(1.0 / 60.0);

@@ -5,7 +5,7 @@
 
 use super::{
     kind::BondKind,
-    model::{JointBonds, Remembered, changed, rest_shape},
+    model::{FEW, JointBonds, Remembered, changed, remembered, rest_shape},
 };
 use crate::lanes::{Quaternion, Real, V3, transposed};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
@@ -29,6 +29,19 @@ pub(super) fn rest_shapes(
     darboux: &mut [Quat],
 ) {
     dispatch!(level, simd => rest_shapes_in(simd, frames, joints, influence, darboux));
+}
+
+/// Writes of every joint what its closed bonds remember, Ω*, and their share B. A joint of which hardly
+/// any is closed takes its present shape for it: returns whether there is such a joint.
+pub(super) fn remembered_shapes(
+    level: Level,
+    frames: Frames<'_>,
+    joints: &[JointBonds],
+    influence: &[f32; BondKind::COUNT],
+    darboux: &mut [Quat],
+    closed: &mut [f32],
+) -> bool {
+    dispatch!(level, simd => remembered_in(simd, frames, joints, influence, darboux, closed))
 }
 
 /// Changes every joint's bonds by Δb, its row of `changes`: equation 16.
@@ -70,6 +83,44 @@ fn rest_shapes_in<S: Simd>(
             }
         }
     }
+}
+
+#[inline(always)]
+fn remembered_in<S: Simd>(
+    simd: S,
+    frames: Frames<'_>,
+    joints: &[JointBonds],
+    influence: &[f32; BondKind::COUNT],
+    darboux: &mut [Quat],
+    closed: &mut [f32],
+) -> bool {
+    let [a, b, c, d] = *influence;
+    let influence = [
+        f32x8::splat(simd, a),
+        f32x8::splat(simd, b),
+        f32x8::splat(simd, c),
+        f32x8::splat(simd, d),
+    ];
+    let mut before = frames.root;
+    let mut follows = false;
+    let eights = joints.chunks(8).zip(frames.orientations.chunks(8));
+    let to = darboux.chunks_mut(8).zip(closed.chunks_mut(8));
+    for ((joints, orientations), (darboux, closed)) in eights.zip(to) {
+        let omega = present(simd, &mut before, filled(orientations));
+        let (Quaternion { v: V3 { x, y, z }, w }, share) =
+            remembered(omega, &bonds(simd, filled(joints)), &influence);
+        let [x, y, z, w] = [halves(x), halves(y), halves(z), halves(w)];
+        let share = halves(share);
+        for (half, (four, closed)) in darboux.chunks_mut(4).zip(closed.chunks_mut(4)).enumerate() {
+            let shapes = transposed([x[half], y[half], z[half], w[half]]);
+            for (to, shape) in four.iter_mut().zip(shapes) {
+                *to = Quat::from_array(shape);
+            }
+            closed.copy_from_slice(&share[half][..closed.len()]);
+            follows |= closed.iter().any(|share| *share <= FEW);
+        }
+    }
+    follows
 }
 
 #[inline(always)]

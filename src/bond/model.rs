@@ -145,6 +145,36 @@ pub(super) fn rest_shape<R: Real>(
     Quaternion::new(v, (zero.lit(1.0) - v.dot(v)).max(zero).sqrt())
 }
 
+/// Below this share of closed bonds a joint has no shape of its own.
+pub(super) const FEW: f32 = 1e-3;
+
+/// The equivalent of equation 15 that does not follow the present shape, for a solver to which that
+/// would be inertia: Ω* = M/B = Σ f b Ω_j / Σ f b with the share of the stiffness that is left,
+/// B = Σ f b / Σ f. The equilibria are the same. Where hardly any bond is closed the rest shape is the
+/// present one, with as little stiffness as twist needs to be determined.
+#[inline(always)]
+pub(super) fn remembered<R: Real>(
+    omega: Quaternion<R>,
+    bonds: &[Remembered<R>; BondKind::COUNT],
+    influence: &[R; BondKind::COUNT],
+) -> (Quaternion<R>, R) {
+    let (zero, one) = (omega.w.lit(0.0), omega.w.lit(1.0));
+    let (mut sum, mut closed, mut total) = (V3::new(zero, zero, zero), zero, zero);
+    for (bond, f) in bonds.iter().zip(*influence) {
+        let fb = f * bond.rate;
+        sum = bond.shape.scale_add(fb, sum);
+        closed = closed + fb;
+        total = total + f;
+    }
+    let few = zero.lit(FEW.into());
+    let share = closed / total;
+    let v = sum.scale(one / closed.max(few * total));
+    let open = share.lt(few);
+    let v = V3::select(open, omega.v, v);
+    let w = R::select(open, omega.w, (one - v.dot(v)).max(zero).sqrt());
+    (Quaternion::new(v, w), share.max(few))
+}
+
 /// Equation 16, see [`JointBonds::change`].
 #[inline(always)]
 pub(super) fn changed<R: Real>(

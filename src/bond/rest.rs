@@ -1,20 +1,24 @@
 //! What the rods spring back to.
 
 use super::{kind::BondKind, settings::Cuticle};
-use crate::rod::Stiffness;
+use crate::rod::Sweeps;
 use bevy::prelude::*;
 
 /// What the rods spring back to in this substep, written by `RestShape`, read by `Projection`.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct RestShape {
-    /// Ω0 of each joint (equation 15), a full quaternion with real part ≥ 0.
+    /// Rest shape of each joint, a full quaternion with real part ≥ 0: for the direct solver what its
+    /// closed bonds remember, Ω* = Σ f b Ω_j / Σ f b; for sweeps Ω0 of equation 15, which follows the
+    /// present shape as far as bonds are open. Both have the same equilibria.
     pub darboux: Vec<Quat>,
-    /// k′ of each joint: equation 13's factor on the true stiffness, spread over the iterations
+    /// Stiffness of each joint: for the direct solver a factor on the hair's own, equation 13's times
+    /// the share B of bonds that are closed; for sweeps k′, equation 13's spread over the iterations
     /// (equation 12).
     pub stiffness: Vec<f32>,
     pub(super) key: Option<Key>,
-    /// Whether all bonds are closed: then the shape is theirs alone, and stays until they change.
+    /// Whether the shape stays until bonds change: with all closed it is theirs alone, and in the direct
+    /// solver with any.
     pub(super) closed: bool,
     /// What the stiffness was last softened by.
     pub(super) softened: Vec<f32>,
@@ -24,8 +28,7 @@ pub struct RestShape {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
 pub(super) struct Key {
     pub(super) influence: [f32; BondKind::COUNT],
-    pub(super) stiffness: Stiffness,
     pub(super) cuticle: Cuticle,
-    pub(super) iterations: u32,
-    pub(super) dt: f32,
+    /// The sweeps' settings and their substep (s), where they solve the rods.
+    pub(super) sweeps: Option<(Sweeps, f32)>,
 }

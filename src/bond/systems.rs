@@ -3,7 +3,7 @@
 use super::{
     bonds::{BondChanges, Bonds},
     kind::BondKind,
-    lanes::{Frames, change, rest_shapes},
+    lanes::{Frames, change, remembered_shapes, rest_shapes},
     model::cuticle_factor,
     rest::{Key, RestShape},
     settings::{BondInfluence, Cuticle},
@@ -11,7 +11,7 @@ use super::{
 use crate::{
     fault::HairFault,
     parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
-    rod::{HairSolver, Stiffness, constraint::stiffness_per_iteration},
+    rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Ranged, Settings, Violations, report},
     strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep},
@@ -64,7 +64,7 @@ type Shaped<'a> = (Key, &'a Strand, &'a Bonds, &'a AddedMass, &'a mut RestShape)
 fn generate_rest_shapes(
     steps: EffectiveSubsteps,
     influence: Settings<BondInfluence>,
-    stiffness: Settings<Stiffness>,
+    sweeps: Settings<Sweeps>,
     cuticle: Settings<Cuticle>,
     solver: Settings<HairSolver>,
     mut strands: Query<(&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape)>,
@@ -73,10 +73,11 @@ fn generate_rest_shapes(
         let stride = steps.of(hair)?;
         Some(Key {
             influence: influence.of(hair).as_array(),
-            stiffness: stiffness.of(hair),
             cuticle: cuticle.of(hair),
-            iterations: stride.iterations(solver.of(hair).iterations),
-            dt: stride.dt,
+            sweeps: (solver.of(hair).method == SolverMethod::Sweeps).then(|| {
+                let full = sweeps.of(hair);
+                (Sweeps { iterations: stride.iterations(full.iterations), ..full }, stride.dt)
+            }),
         })
     };
     let ahead = |(_, strand, bonds, _, rest): &Shaped<'_>| {
@@ -118,24 +119,42 @@ fn shape(
     added_mass: &AddedMass,
     rest: &mut RestShape,
 ) {
-    rest.closed = bonds.joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
-    rest.darboux.resize(bonds.joints.len(), Quat::IDENTITY);
-    rest_shapes(level, frames(strand), &bonds.joints, &key.influence, &mut rest.darboux);
-    if rest.key != Some(*key)
+    let joints = &bonds.joints;
+    rest.closed = joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
+    rest.darboux.resize(joints.len(), Quat::IDENTITY);
+    let changed = rest.key != Some(*key)
         || rest.stiffness.len() != strand.edges()
-        || has_softened(&rest.softened, &added_mass.softening)
-    {
+        || has_softened(&rest.softened, &added_mass.softening);
+    match key.sweeps {
+        None => {
+            rest.stiffness.resize(joints.len(), 0.0);
+            let (darboux, closed) = (&mut rest.darboux, &mut rest.stiffness);
+            let follows =
+                remembered_shapes(level, frames(strand), joints, &key.influence, darboux, closed);
+            rest.closed = !follows;
+        }
+        Some(_) => rest_shapes(level, frames(strand), joints, &key.influence, &mut rest.darboux),
+    }
+    if changed {
         rest.key = Some(*key);
         rest.softened.clone_from(&added_mass.softening);
-        rest.stiffness.clear();
+    }
+    if changed || key.sweeps.is_none() {
         let mut distance = 0.0;
-        rest.stiffness.extend(strand.rest_lengths().iter().enumerate().map(|(i, length)| {
+        rest.stiffness.resize(strand.edges(), 0.0);
+        let joints = rest.stiffness.iter_mut().zip(strand.rest_lengths());
+        for (i, (stiffness, length)) in joints.enumerate() {
             let softened = rest.softened.get(i).copied().unwrap_or(0.0);
             let cuticle = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
             distance += length;
-            let k = key.stiffness.per_substep(key.dt, cuticle * (1.0 - softened));
-            stiffness_per_iteration(k, key.iterations)
-        }));
+            let factor = cuticle * (1.0 - softened);
+            *stiffness = match key.sweeps {
+                None => *stiffness * factor,
+                Some((sweeps, dt)) => {
+                    stiffness_per_iteration(sweeps.per_substep(dt, factor), sweeps.iterations)
+                }
+            };
+        }
     }
 }
 

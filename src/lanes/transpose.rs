@@ -156,6 +156,35 @@ pub(crate) fn put_numbers<T>(
     }
 }
 
+/// Takes numbers out of the lanes of a group of a block.
+#[inline(always)]
+pub(crate) fn take_numbers<T>(
+    from: &[T],
+    group: usize,
+    to: FourMut<'_, f32>,
+    field: impl Fn(&T) -> &Lane,
+) {
+    let [a, b, c, d] = to.map(|strand| &mut strand[..from.len()]);
+    let (chunks, rest) = from.as_chunks::<4>();
+    for (i, chunk) in chunks.iter().enumerate() {
+        let [w, x, y, z] = chunk;
+        let lanes = [
+            part(field(w), group),
+            part(field(x), group),
+            part(field(y), group),
+            part(field(z), group),
+        ];
+        let [p, q, r, s] = transposed(lanes);
+        a.as_chunks_mut::<4>().0[i] = p;
+        b.as_chunks_mut::<4>().0[i] = q;
+        c.as_chunks_mut::<4>().0[i] = r;
+        d.as_chunks_mut::<4>().0[i] = s;
+    }
+    for (item, i) in rest.iter().zip(4 * chunks.len()..) {
+        [a[i], b[i], c[i], d[i]] = part(field(item), group);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::LANES;
@@ -207,14 +236,18 @@ mod tests {
                         }
                     }
                 }
-                let mut back = [0; 4].map(|_| (vec![Vec3::NAN; length], vec![Quat::NAN; length]));
+                let mut back = [0; 4].map(|_| {
+                    (vec![Vec3::NAN; length], vec![Quat::NAN; length], vec![f32::NAN; length])
+                });
                 let [a, b, c, d] = &mut back;
+                let numbers = [&mut a.2[..], &mut b.2, &mut c.2, &mut d.2];
+                take_numbers(&items, group, numbers, |item| &item.number);
                 let vectors = [&mut a.0[..], &mut b.0, &mut c.0, &mut d.0];
                 take_vectors(&items, group, vectors, |item| &item.vector);
                 let quaternions = [&mut a.1[..], &mut b.1, &mut c.1, &mut d.1];
                 take_quaternions(&items, group, quaternions, |item| &item.quaternion);
                 for (back, strand) in back.iter().zip(&strands) {
-                    assert_eq!((&back.0, &back.1), (&strand.0, &strand.1));
+                    assert_eq!((&back.0, &back.1, &back.2), (&strand.0, &strand.1, &strand.2));
                 }
             }
         }

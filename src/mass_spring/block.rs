@@ -76,7 +76,9 @@ fn step_simd<S: Simd>(
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let next = Xpbd::new(zero, stretch, damping, params.dt);
     let over = Xpbd::new(zero, bend, damping, params.dt);
-    predict_nodes(simd, b, params.dt, params.skin, obstacles);
+    let zero = f32x16::splat(simd, 0.0);
+    let none = V3::new(zero, zero, zero);
+    predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.skin, obstacles);
     b.touched = [0.0; LANES];
     // Who is moved by something else may get energy from there.
     let mut moved = zero;

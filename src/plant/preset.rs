@@ -243,7 +243,7 @@ impl HairPreset {
         PresetSettings {
             stiffness: Stiffness { bending_length, ..default() },
             drag: AirDrag { rate: 3.0 },
-            solver: HairSolver { internal_damping: 4.0, ..default() },
+            solver: HairSolver::default(),
             contact: LockContact::default(),
             #[cfg(feature = "render")]
             look: self.look(),

@@ -11,7 +11,7 @@
 //! memory is asked for (`prefetch`) while the block before is solved. Number by number and without
 //! asking ahead it took longer than all five.
 
-use super::{obstacle::Obstacle, sweep::Shares};
+use super::{direct, obstacle::Obstacle, sweep::Shares};
 use crate::lanes::{LANES, Lane, V3, load3, store3};
 use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
@@ -19,37 +19,44 @@ use glam::Vec3;
 /// One node of every strand in the block.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
-pub struct NodeLanes {
+pub struct NodeLanes<C = Lane> {
     /// Position (m).
-    pub p: [Lane; 3],
+    pub p: [C; 3],
     /// Position at the start of the substep (m); for held nodes, where they come from.
-    pub from: [Lane; 3],
+    pub from: [C; 3],
     /// Velocity (m/s).
-    pub v: [Lane; 3],
+    pub v: [C; 3],
     /// Inverse mass, relative to a whole node's: 1, at the tip 2, held 0.
-    pub w: Lane,
+    pub w: C,
+    /// Mass, relative to a whole node's. Direct method only.
+    pub mass: C,
     /// Normal of the obstacle that the node rests on, or zero; written by the contact passes.
-    pub rests_on: [Lane; 3],
+    pub rests_on: [C; 3],
 }
 
 /// One edge of every strand in the block, with the joint at its start.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
-pub struct EdgeLanes {
+pub struct EdgeLanes<C = Lane> {
     /// Orientation, x y z w.
-    pub q: [Lane; 4],
-    /// Orientation at the start of the substep.
-    pub from: [Lane; 4],
-    /// Angular velocity (rad/s), in the frame of the positions.
-    pub omega: [Lane; 3],
+    pub q: [C; 4],
     /// Rest length (m).
-    pub l: Lane,
-    /// Inverse rotational mass w_q (1/m²).
-    pub wq: Lane,
+    pub l: C,
     /// Rest shape Ω0 of the joint, a full quaternion.
-    pub rest: [Lane; 4],
-    /// Stiffness per iteration k′ of the joint (equation 12).
-    pub k: Lane,
+    pub rest: [C; 4],
+    /// Stiffness of the joint: per iteration, k′ of equation 12, for sweeps; B EI over its cell
+    /// (N m, of hair of which a whole node weighs 1 kg) for the direct method.
+    pub k: C,
+    /// Orientation at the start of the substep. Sweeps only.
+    pub from: [C; 4],
+    /// Angular velocity (rad/s), in the frame of the positions. Sweeps only.
+    pub omega: [C; 3],
+    /// Inverse rotational mass w_q (1/m²). Sweeps only.
+    pub wq: C,
+    /// Stiffness against stretching EA/l (N/m, as `k`). Direct method only.
+    pub axial: C,
+    /// Tension that the last substep left (N, as `k`). Direct method only.
+    pub tension: C,
 }
 
 /// A row of a tridiagonal system over a strand's edges, eliminated from the root on.
@@ -75,8 +82,14 @@ pub struct BlockLanes {
     pub(crate) touched: Lane,
     /// Whether any node moves so fast against an obstacle that it might pass through.
     pub(super) sweeps: bool,
+    /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
+    pub(crate) root_from: [Lane; 4],
+    pub(super) theta: Lane,
+    pub(super) touching: Lane,
+    pub(super) root_between: [Lane; 4],
     pub(crate) scratch: Vec<Row>,
     pub(super) shares: Vec<Shares>,
+    pub(super) rows: Vec<direct::Row<Lane>>,
 }
 
 impl BlockLanes {
@@ -86,6 +99,7 @@ impl BlockLanes {
         self.edges.resize(nodes - 1, EdgeLanes::default());
         self.scratch.resize(nodes - 1, Row::default());
         self.shares.resize(nodes - 1, Shares::default());
+        self.rows.resize(nodes - 1, direct::Row::default());
     }
 
     /// The obstacles that any lane may touch in a step of `dt`.

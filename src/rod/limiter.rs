@@ -21,11 +21,39 @@ const FIRMNESS: f32 = 0.95;
 /// touch an obstacle. What a strand does never depends on the others in its block.
 #[inline(always)]
 pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes, touched_only: bool) {
+    let touched = load(simd, &b.touched);
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     if b.touched == [0.0; LANES] {
-        newton::<S, false>(simd, b, false);
+        eliminate::<S, false>(simd, b);
+        solve::<S, false, false>(simd, b, one);
     } else {
-        newton::<S, true>(simd, b, touched_only);
+        eliminate::<S, true>(simd, b);
+        if touched_only {
+            solve::<S, true, true>(simd, b, Real::select(Real::lt(zero, touched), one, zero));
+        } else {
+            solve::<S, true, false>(simd, b, one);
+        }
     }
+}
+
+/// One Newton step for strands of which an edge is off its length by more than the share `tolerance`.
+/// Returns whether there were any.
+#[inline(always)]
+pub(super) fn limit_strained<S: Simd>(simd: S, b: &mut BlockLanes, tolerance: f32) -> bool {
+    let touching = b.touched != [0.0; LANES];
+    let worst =
+        if touching { eliminate::<S, true>(simd, b) } else { eliminate::<S, false>(simd, b) };
+    let strained = Real::lt(f32x16::splat(simd, tolerance), worst);
+    if strained.to_bitmask() == 0 {
+        return false;
+    }
+    let moves = Real::select(strained, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+    if touching {
+        solve::<S, true, true>(simd, b, moves);
+    } else {
+        solve::<S, false, true>(simd, b, moves);
+    }
+    true
 }
 
 // Closures would be compiled without the instruction set of their caller where the compiler does not
@@ -73,14 +101,15 @@ pub(crate) fn along_support<S: Simd>(
     V3::select(lifts, force, n.scale_add(-(firmness * off), force))
 }
 
-/// `TOUCHING` heeds obstacles; where there are none it changes no bit.
+/// Eliminates from the root to the tip. `TOUCHING` heeds obstacles; where there are none it changes no
+/// bit. Returns the largest strain of each lane.
 #[inline(always)]
-fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_only: bool) {
+fn eliminate<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes) -> f32x16<S> {
     let edges = b.edges.len();
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     // Pivots below this belong to edges with both ends held: nothing there can move.
     let tiny = f32x16::splat(simd, 1e-6);
-    let touched = load(simd, &b.touched);
+    let mut worst = zero;
     let mut end = b.nodes[1].position(simd);
     let (mut d, mut length) = span(simd, b.nodes[0].position(simd), end);
     let (mut lower, mut upper, mut rhs) = (zero, zero, zero);
@@ -91,7 +120,9 @@ fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_on
             + mobility::<S, TOUCHING>(simd, b, i + 1, d, d)
             - lower * upper;
         let inverse = Real::select(Real::lt(pivot, tiny), zero, one / pivot);
-        rhs = (length - load(simd, &b.edges[i].l) - lower * rhs) * inverse;
+        let off = length - load(simd, &b.edges[i].l);
+        worst = Real::max(worst, Real::max(off, -off) / load(simd, &b.edges[i].l));
+        rhs = (off - lower * rhs) * inverse;
         let s = &mut b.scratch[i];
         s.direction = [d.x.to_array(), d.y.to_array(), d.z.to_array()];
         s.rhs = rhs.to_array();
@@ -104,6 +135,19 @@ fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_on
         }
         b.scratch[i].upper = upper.to_array();
     }
+    worst
+}
+
+/// Solves from the tip to the root and moves the nodes of all lanes, or with `SOME` of those that are
+/// not 0 in `moves`.
+#[inline(always)]
+fn solve<S: Simd, const TOUCHING: bool, const SOME: bool>(
+    simd: S,
+    b: &mut BlockLanes,
+    moves: f32x16<S>,
+) {
+    let (edges, zero) = (b.edges.len(), f32x16::splat(simd, 0.0));
+    let moves = Real::lt(zero, moves);
     // Back substitution, and Δp_{i+1} = W_{i+1} (λ_{i+1} d_{i+1} − λ_i d_i) from the tip upward.
     let mut lambda = zero;
     let mut pull = V3::new(zero, zero, zero);
@@ -124,8 +168,7 @@ fn newton<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes, touched_on
             force = along_support(simd, node, force);
         }
         let moved = force.scale_add(w, p);
-        let moves = Real::lt(zero, touched);
-        node.set_position(if touched_only { V3::select(moves, moved, p) } else { moved });
+        node.set_position(if SOME { V3::select(moves, moved, p) } else { moved });
         pull = tension;
     }
 }

@@ -11,6 +11,7 @@
 //! | [`stiffness`] | weights from the gravity-bending length (the paper gives none) |
 //! | [`block`] | strands side by side: their layout, into it and back |
 //! | [`step`] | one substep: predict, project, limit lengths, velocities |
+//! | [`direct`] | the default solver: one implicit step of a whole strand per substep |
 //! | `sweep` | the iterations, root to tip, several at once |
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
 //! | [`obstacle`] | colliders as half-space, capsule and cylinder, with friction |
@@ -20,6 +21,7 @@
 #[doc(hidden)]
 pub mod block;
 pub mod constraint;
+pub mod direct;
 #[doc(hidden)]
 pub mod frame;
 pub(crate) mod limiter;
@@ -31,4 +33,4 @@ pub mod stiffness;
 mod sweep;
 
 pub use constraint::StretchProjection;
-pub use stiffness::{HairSolver, Stiffness};
+pub use stiffness::{HairSolver, SolverMethod, Stiffness, Sweeps};

@@ -9,7 +9,7 @@ use super::{
     constraint::StretchProjection,
     limiter::limit_lengths,
     obstacle::{Obstacle, hold_back, push_out},
-    stiffness::Stiffness,
+    stiffness::Sweeps,
     sweep::project,
 };
 use crate::lanes::{LANES, Real, V3, load, load3, load4, store3, store4};
@@ -42,7 +42,9 @@ pub fn step(level: Level, block: &mut BlockLanes, params: &StepParams, obstacles
 
 #[inline(always)]
 fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
-    predict_nodes(simd, b, params.dt, params.skin, obstacles);
+    let zero = f32x16::splat(simd, 0.0);
+    let none = V3::new(zero, zero, zero);
+    predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.skin, obstacles);
     predict_edges(simd, b, params.dt);
     // The projection is chosen outside the loops, so that each has straight code inside.
     match params.projection {
@@ -65,13 +67,13 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacle
 }
 
 /// Makes inverse masses of the masses that were gathered, which are in those of dry nodes, and, given
-/// the strands' stiffness, inverse rotational masses of the edges.
-pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<&Stiffness>) {
+/// the sweeps' settings with the gravity-bending length, inverse rotational masses of the edges.
+pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<(&Sweeps, f32)>) {
     dispatch!(level, simd => weigh_simd(simd, block, stiffness));
 }
 
 #[inline(always)]
-fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<&Stiffness>) {
+fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<(&Sweeps, f32)>) {
     let (zero, two) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 2.0));
     let mut sum = zero;
     for e in &b.edges {
@@ -83,8 +85,8 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<&Stiffness
         let mut after = zero;
         if let Some(e) = b.edges.get_mut(i) {
             after = load(simd, &e.l);
-            if let Some(stiffness) = stiffness {
-                stiffness.rotational_weight(after, mean).store_array(&mut e.wq);
+            if let Some((sweeps, bending_length)) = stiffness {
+                sweeps.rotational_weight(bending_length, after, mean).store_array(&mut e.wq);
             }
         }
         // Half a cell on either side, so the tip carries half a mass.
@@ -96,16 +98,16 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<&Stiffness
     }
 }
 
-/// v is already that of the forces; p* = p + v dt.
+/// v is already that of the forces, but for what `gain` adds to it; p* = p + v dt.
 #[inline(always)]
 pub(crate) fn predict_nodes<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
-    dt: f32,
+    dt: f32x16<S>,
+    gain: V3<f32x16<S>>,
     skin: f32,
     obstacles: &[Obstacle],
 ) {
-    let dt = f32x16::splat(simd, dt);
     let zero = f32x16::splat(simd, 0.0);
     b.sweeps = false;
     for n in &mut b.nodes {
@@ -125,7 +127,7 @@ pub(crate) fn predict_nodes<S: Simd>(
         // Held nodes carry where they come from in `from` and where they are to be in `p`.
         let came_from = V3::select(held, load3(simd, &n.from), from);
         store3(&mut n.from, came_from);
-        let mut to = v.scale_add(dt, from);
+        let mut to = (v + gain).scale_add(dt, from);
         for o in obstacles {
             if let Some((before, _)) = hold_back(o, o.taken_along(from), to, skin) {
                 (to, b.sweeps) = (before, true);
@@ -150,13 +152,40 @@ fn predict_edges<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
 /// Takes nodes out of obstacles, with friction, and notes what touches.
 #[inline(always)]
 pub(crate) fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, skin: f32, obstacles: &[Obstacle]) {
+    contacts_with(simd, b, skin, obstacles, Grip::WHOLE, f32x16::splat(simd, 1.0));
+}
+
+/// How much of the depth that a node is found at says how hard it is pressed on an obstacle: of nodes
+/// that rested on one in the pass before, and of others.
+#[derive(Clone, Copy)]
+pub(super) struct Grip {
+    pub(super) resting: f32,
+    pub(super) others: f32,
+}
+
+impl Grip {
+    pub(super) const WHOLE: Self = Self { resting: 1.0, others: 1.0 };
+    /// No friction.
+    pub(super) const NONE: Self = Self { resting: 0.0, others: 0.0 };
+}
+
+/// [`contacts`], where depths are not what a whole step's forces came to, and of lanes that are not 0.
+#[inline(always)]
+pub(super) fn contacts_with<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    skin: f32,
+    obstacles: &[Obstacle],
+    grip: Grip,
+    lanes: f32x16<S>,
+) {
     b.touched = [0.0; LANES];
     if obstacles.is_empty() {
         return;
     }
     let mut touched = f32x16::splat(simd, 0.0);
     for n in &mut b.nodes {
-        touched = Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles));
+        touched = Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles, grip, lanes));
     }
     touched.store_array(&mut b.touched);
 }
@@ -170,28 +199,36 @@ pub(super) fn touch<S: Simd>(
     sweeps: bool,
     skin: f32,
     obstacles: &[Obstacle],
+    grip: Grip,
+    lanes: f32x16<S>,
 ) -> f32x16<S> {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let mut touched = zero;
     if obstacles.is_empty() {
         return touched;
     }
-    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+    let held = Real::lt(load(simd, &n.w) * lanes, f32x16::splat(simd, 1e-12));
     let from = load3(simd, &n.from);
+    let rested = n.support(simd);
+    let grip = Real::select(
+        Real::lt(zero, rested.dot(rested)),
+        f32x16::splat(simd, grip.resting),
+        f32x16::splat(simd, grip.others),
+    );
     let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
     for o in obstacles {
         // What would take a node through has to be stopped in every pass: the shortest way out
         // may be the wrong one.
         if sweeps && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin) {
             p = V3::select(held, p, before);
-            let stopped = Real::lt(zero, normal.dot(normal));
+            let stopped = Real::lt(zero, normal.dot(normal) * lanes);
             rests_on = V3::select(stopped, normal, rests_on);
             touched = Real::select(stopped, one, touched);
         }
-        let friction = f32x16::splat(simd, o.friction);
+        let friction = grip * f32x16::splat(simd, o.friction);
         if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
             p = V3::select(held, p, out);
-            let pushed = Real::lt(zero, normal.dot(normal));
+            let pushed = Real::lt(zero, normal.dot(normal) * lanes);
             rests_on = V3::select(pushed, normal, rests_on);
             touched = Real::select(pushed, one, touched);
         }

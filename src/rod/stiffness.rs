@@ -12,7 +12,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// The paper's step Δt₀ (s), at which [`Stiffness::bend`] is what the paper calls k_o.
+/// The paper's step Δt₀ (s), at which [`Sweeps::bend`] is what the paper calls k_o.
 pub const REFERENCE_DT: f32 = 1.0 / 360.0;
 
 /// The gravity (m/s²) in the definition of the gravity-bending length, as in the paper's table 1.
@@ -30,13 +30,11 @@ setting! {
         /// 0.045; the paper's look wants 0.12…0.2.
         pub bending_length: f32 = 0.13, "m" in BENDING_LENGTH: 1e-3..=100.0, safe 0.02..=1.0,
             "0.13 is soft hair, 0.045 a bare fibre";
-        /// k_o of equation 13: the share of a bend that one substep of 1/360 s would take back, as in
-        /// \[B\] table 1. Changes how the solver works, not the look.
-        pub bend: f32 = 0.05, in BEND: 0.0..=1.0, safe 0.005..=0.1, "the paper uses 0.05";
-        /// χ = w_q l² at the paper's step, set directly as a reader of the paper might; replaces what
-        /// `bending_length` gives.
-        pub orientation_weight: Option<f32> = None, in ORIENTATION_WEIGHT: 1e-9..=1e3,
-            "0.03 is 13 cm at 3 cm edges";
+        /// Internal friction as a Kelvin–Voigt time c: the moment of a joint is K (κ + c dκ/dt), so a
+        /// swing of angular frequency ω decays by c ω/2 of critical, at any segment count and step.
+        /// The step itself damps like 0.3 of its length, which is taken off: less than that is as that.
+        pub damping: f32 = 0.003, "s" in DAMPING: 0.0..=10.0, safe 0.0..=0.02,
+            "0.003 swings for two seconds, 0.02 is syrup";
     }
 }
 
@@ -67,23 +65,73 @@ impl Stiffness {
         let ei_over_mu = young * diameter * diameter / (16.0 * density);
         Self::from_bending_length(bevy::math::ops::cbrt(ei_over_mu / REFERENCE_GRAVITY))
     }
+}
 
-    /// The same stiffness, solved with another k_o.
-    ///
-    /// # Errors
-    /// When `bend` is outside 0 to 1.
-    pub fn with_bend(self, bend: f32) -> Result<Self, InvalidValue> {
-        Self { bend, ..self }.checked()
+/// Which method solves the rods.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Default, Clone, PartialEq)]
+pub enum SolverMethod {
+    /// One direct implicit step of a whole strand per substep ([`direct`](super::direct)): stiffness,
+    /// periods and sag are the hair's own at any segment count and step.
+    #[default]
+    Direct,
+    /// The paper's Gauss–Seidel projections, as [`Sweeps`] say: to compare with \[B\]. Stiff or finely
+    /// divided hair swings too slowly and sags too far.
+    Sweeps,
+}
+
+setting! {
+    /// How the rods are solved. Component of a [`Hair`](crate::Hair); where absent,
+    /// [`HairDefault<HairSolver>`](crate::HairDefault) holds.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct HairSolver {
+        /// Which method is used.
+        pub method: SolverMethod = SolverMethod::Direct;
+        /// Newton steps of the length limiter of the direct method, at most: it stops where lengths
+        /// are right within 0.05 %. 0 turns it off.
+        pub limiter_steps: u32 = 6, in LIMITER_STEPS: 0.0..=16.0, safe 1.0..=8.0,
+            "6 hold any hair";
     }
+}
 
+setting! {
+    /// The paper's projections, where [`SolverMethod::Sweeps`] is chosen. Component of a
+    /// [`Hair`](crate::Hair); where absent, [`HairDefault<Sweeps>`](crate::HairDefault) holds.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct Sweeps {
+        /// Gauss–Seidel iterations a substep, as in \[B\] table 1.
+        pub iterations: u32 = 5, in ITERATIONS: 1.0..=1000.0, safe 1.0..=50.0, "5 is the paper's";
+        /// How stretch–shear is projected.
+        pub projection: StretchProjection = StretchProjection::Split;
+        /// k_o of equation 13: the share of a bend that one substep of 1/360 s would take back, as in
+        /// \[B\] table 1. Changes how the solver works, and through it how fast hair swings.
+        pub bend: f32 = 0.05, in BEND: 0.0..=1.0, safe 0.005..=0.1, "the paper uses 0.05";
+        /// χ = w_q l² at the paper's step, set directly as a reader of the paper might; replaces what
+        /// [`Stiffness::bending_length`] gives.
+        pub orientation_weight: Option<f32> = None, in ORIENTATION_WEIGHT: 1e-9..=1e3,
+            "0.03 is 13 cm at 3 cm edges";
+        /// Newton steps of the direct length limiter after the iterations. 0 turns it off; 1 leaves
+        /// about ten times the strain.
+        pub limiter_steps: u32 = 2, in LIMITER_STEPS: 0.0..=16.0, safe 0.0..=4.0,
+            "2 hold long hair";
+        /// Damping of neighbouring edges' relative rotation: bending vibration dies away, falling and
+        /// swinging do not.
+        pub internal_damping: f32 = 0.0, "1/s" in INTERNAL_DAMPING: 0.0..=1e4, safe 0.0..=100.0,
+            "0 is off, 20 is syrup";
+    }
+}
+
+impl Sweeps {
     /// Inverse rotational mass w_q (1/m²) of an edge of length `l` on a strand whose edges average
     /// `mean`. On even strands it is χ/l²; on uneven ones it keeps EI the same in every joint.
     #[inline(always)]
-    pub fn rotational_weight<R: Real>(&self, l: R, mean: R) -> R {
+    pub fn rotational_weight<R: Real>(&self, bending_length: f32, l: R, mean: R) -> R {
         match self.orientation_weight {
             Some(chi) => l.lit(chi.into()) / (l * mean),
             None => {
-                let lg3 = self.bending_length * self.bending_length * self.bending_length;
+                let lg3 = bending_length * bending_length * bending_length;
                 let stiff = self.bend.clamp(1e-6, 0.999_999);
                 let inertia = stiff
                     / (8.0 * (1.0 - stiff) * lg3 * REFERENCE_DT * REFERENCE_DT * REFERENCE_GRAVITY);
@@ -102,27 +150,6 @@ impl Stiffness {
     }
 }
 
-setting! {
-    /// How the rods are solved. Component of a [`Hair`](crate::Hair); where absent,
-    /// [`HairDefault<HairSolver>`](crate::HairDefault) holds.
-    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-    #[reflect(Component, Default, Clone, PartialEq)]
-    pub struct HairSolver {
-        /// Gauss–Seidel iterations a substep, as in \[B\] table 1.
-        pub iterations: u32 = 5, in ITERATIONS: 1.0..=1000.0, safe 1.0..=50.0, "5 is the paper's";
-        /// How stretch–shear is projected.
-        pub projection: StretchProjection = StretchProjection::Split;
-        /// Newton steps of the direct length limiter after the iterations. 0 turns it off; 1 leaves
-        /// about ten times the strain.
-        pub limiter_steps: u32 = 2, in LIMITER_STEPS: 0.0..=16.0, safe 0.0..=4.0,
-            "2 hold long hair";
-        /// Damping of neighbouring edges' relative rotation: bending vibration dies away, falling and
-        /// swinging do not.
-        pub internal_damping: f32 = 0.0, "1/s" in INTERNAL_DAMPING: 0.0..=1e4, safe 0.0..=100.0,
-            "0 is off, 20 is syrup";
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,8 +157,8 @@ mod tests {
     #[test]
     fn weights_satisfy_the_bending_length_formula() {
         for (lg, l) in [(0.13_f32, 0.03_f32), (0.045, 0.01), (0.2, 0.0075)] {
-            let s = Stiffness::from_bending_length(lg).unwrap();
-            let chi = s.rotational_weight(l, l) * l * l;
+            let s = Sweeps::default();
+            let chi = s.rotational_weight(lg, l, l) * l * l;
             let k = s.bend;
             let dt2 = REFERENCE_DT * REFERENCE_DT;
             let back = k * l.powi(4) / (8.0 * chi * (1.0 - k) * dt2 * REFERENCE_GRAVITY);
@@ -141,7 +168,7 @@ mod tests {
 
     #[test]
     fn stiffness_scales_with_the_square_of_the_substep() {
-        let s = Stiffness::default();
+        let s = Sweeps::default();
         let big = |k: f32| k / (1.0 - k);
         let (a, b) = (s.per_substep(REFERENCE_DT, 1.0), s.per_substep(REFERENCE_DT * 2.0, 1.0));
         assert!((a - 0.05).abs() < 1e-6);
@@ -153,6 +180,5 @@ mod tests {
         let s = Stiffness::from_fibre(3.9e9, 70e-6, 1310.0).unwrap();
         assert!((s.bending_length - 0.0453).abs() < 1e-4);
         assert!(Stiffness::from_fibre(-1.0, 70e-6, 1310.0).is_err());
-        assert!(s.with_bend(1.5).is_err());
     }
 }

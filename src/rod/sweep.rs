@@ -10,7 +10,7 @@ use super::{
         BendShares, EdgeWeights, StretchProjection, StretchShares, bend_twist, stretch_shear,
     },
     obstacle::Obstacle,
-    step::{StepParams, touch},
+    step::{Grip, StepParams, touch},
 };
 use crate::lanes::{LANES, Lane, Quaternion, Real, V3, load, load4, store3, store4};
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -92,6 +92,7 @@ fn sweeps<S: Simd, const P: usize>(
     obstacles: &[Obstacle],
 ) {
     let edges = b.edges.len();
+    let all = f32x16::splat(simd, 1.0);
     let (before, p1) = (load4(simd, &b.root), b.nodes[0].position(simd));
     let mut carried = [Follower { before, p1 }; ABREAST];
     for step in 0..edges + 2 * (abreast - 1) {
@@ -105,11 +106,11 @@ fn sweeps<S: Simd, const P: usize>(
                 carried.p1 = b.nodes[0].position(simd);
             }
             pass_edge::<S, P>(simd, b, i, carried);
-            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles);
+            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles, Grip::WHOLE, all);
             if i + 1 == edges {
                 store4(&mut b.edges[i].q, carried.before);
                 store3(&mut b.nodes[i + 1].p, carried.p1);
-                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles);
+                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles, Grip::WHOLE, all);
             }
         }
     }

@@ -15,6 +15,14 @@ pub(super) struct Source<'a> {
     pub(super) held: Option<&'a HeldNodes>,
 }
 
+/// What a method keeps of edges from substep to substep, beside orientations.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kept {
+    Nothing,
+    AngularVelocities,
+    Tensions,
+}
+
 /// A strand as it is taken from its table, of one kind of kernel: rods or springs.
 pub(super) trait Batched: Sized + Send {
     /// What holds for a hair's strands in a substep.
@@ -37,6 +45,10 @@ pub(super) trait Batched: Sized + Send {
     /// The shape it is rebuilt in when its state is lost: a Darboux vector for each joint.
     fn remembered(&self, _params: &Self::Params) -> Vec<Vec3> {
         Vec::new()
+    }
+    /// What of edges goes back into strands, beside orientations.
+    fn kept(_params: &Self::Params) -> Kept {
+        Kept::Nothing
     }
     /// How long the substep is (s).
     fn dt(params: &Self::Params) -> f32;

@@ -4,10 +4,13 @@
 //! strands by four numbers are transposed at a time, and their memory is prefetched while the block
 //! before is solved. Number by number and without prefetching it took longer than all five.
 
-use super::batched::{Batched, Source};
+use super::batched::{Batched, Kept, Source};
 use crate::{
     fault::HairFault,
-    lanes::{LANES, put_numbers, put_vectors, put3, take_quaternions, take_vectors, take3, take4},
+    lanes::{
+        LANES, put_numbers, put_vectors, put3, take_numbers, take_quaternions, take_vectors, take3,
+        take4,
+    },
     rod::block::{BlockLanes, NodeLanes},
     strand::Strand,
 };
@@ -60,16 +63,17 @@ pub(super) fn scatter<T: Batched>(
     params: &T::Params,
 ) -> Vec<HairFault> {
     let mut faults = Vec::new();
+    let kept = T::kept(params);
     for (group, four) in items.chunks_mut(4).enumerate() {
         let lanes = 4 * group..4 * group + four.len();
         match four {
             [a, b, c, d] if block.finite[lanes.clone()] == [0.0; 4] => {
-                scatter_four(block, group, [a, b, c, d].map(|item| item.strand_mut()));
+                scatter_four(block, group, [a, b, c, d].map(|item| item.strand_mut()), kept);
             }
             four => {
                 for (lane, item) in lanes.zip(four) {
                     if block.finite[lane] == 0.0 {
-                        scatter_one(block, lane, item.strand_mut());
+                        scatter_one(block, lane, item.strand_mut(), kept);
                     } else {
                         let shape = item.remembered(params);
                         let fault = item.strand_mut().put_back(shape);
@@ -82,24 +86,41 @@ pub(super) fn scatter<T: Batched>(
     faults
 }
 
-fn scatter_four(block: &BlockLanes, group: usize, strands: [&mut Strand; 4]) {
-    let [a, b, c, d] = strands.map(|strand| {
+fn scatter_four(block: &BlockLanes, group: usize, strands: [&mut Strand; 4], kept: Kept) {
+    let [a, b, c, d] = strands;
+    for strand in [&mut *a, &mut *b, &mut *c, &mut *d] {
         strand.stepped_well();
-        strand.parts_mut()
-    });
+    }
+    if kept == Kept::Tensions {
+        let tensions = [a.tensions_mut(), b.tensions_mut(), c.tensions_mut(), d.tensions_mut()];
+        take_numbers(&block.edges, group, tensions, |e| &e.tension);
+    }
+    let [a, b, c, d] = [a.parts_mut(), b.parts_mut(), c.parts_mut(), d.parts_mut()];
     take_vectors(&block.nodes, group, [a.0, b.0, c.0, d.0], |n| &n.p);
     take_vectors(&block.nodes, group, [a.1, b.1, c.1, d.1], |n| &n.v);
     take_quaternions(&block.edges, group, [a.2, b.2, c.2, d.2], |e| &e.q);
-    take_vectors(&block.edges, group, [a.3, b.3, c.3, d.3], |e| &e.omega);
+    if kept == Kept::AngularVelocities {
+        take_vectors(&block.edges, group, [a.3, b.3, c.3, d.3], |e| &e.omega);
+    }
 }
 
-fn scatter_one(block: &BlockLanes, lane: usize, strand: &mut Strand) {
+fn scatter_one(block: &BlockLanes, lane: usize, strand: &mut Strand, kept: Kept) {
     strand.stepped_well();
+    if kept == Kept::Tensions {
+        for (edge, tension) in block.edges.iter().zip(strand.tensions_mut()) {
+            *tension = edge.tension[lane];
+        }
+    }
     let (positions, velocities, orientations, angular) = strand.parts_mut();
     for ((node, p), v) in block.nodes.iter().zip(positions).zip(velocities) {
         (*p, *v) = (take3(&node.p, lane), take3(&node.v, lane));
     }
-    for ((edge, q), omega) in block.edges.iter().zip(orientations).zip(angular) {
-        (*q, *omega) = (take4(&edge.q, lane), take3(&edge.omega, lane));
+    for (edge, q) in block.edges.iter().zip(orientations) {
+        *q = take4(&edge.q, lane);
+    }
+    if kept == Kept::AngularVelocities {
+        for (edge, omega) in block.edges.iter().zip(angular) {
+            *omega = take3(&edge.omega, lane);
+        }
     }
 }

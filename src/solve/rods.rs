@@ -2,26 +2,28 @@
 
 use super::{
     batch::for_each_batch,
-    batched::{Batched, Source},
+    batched::{Batched, Kept, Source},
     gather::in_lanes,
 };
 use crate::{
     bond::{BondInfluence, Bonds, RestShape},
     contact::{LockContact, Obstacles},
+    environment::HairGravity,
     fault::HairFault,
-    lanes::{LANES, put_numbers, put_quaternions, put_vectors, put4},
+    lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4},
     parallel::{prefetch, tables},
     rod::{
-        HairSolver, Stiffness,
+        HairSolver, SolverMethod, Stiffness, Sweeps,
         block::BlockLanes,
+        direct::{self, DirectParams},
         obstacle::Obstacle,
-        step::{StepParams, step, weigh},
+        step::{self, StepParams},
     },
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
-    setting::{self, Settings},
-    strand::{AddedMass, Hair, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep},
+    setting::{self, Ranged, Settings},
+    strand::{AddedMass, Hair, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
 };
-use bevy::prelude::*;
+use bevy::{math::Isometry3d, prelude::*};
 use fearless_simd::Level;
 
 /// Cosserat rods: the elastic projection.
@@ -32,6 +34,7 @@ impl Plugin for RodPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<Stiffness>(app);
         setting::plugin::<HairSolver>(app);
+        setting::plugin::<Sweeps>(app);
         app.add_systems(HairTick, step_rods.in_set(HairSystems::Rods));
     }
 }
@@ -39,10 +42,21 @@ impl Plugin for RodPlugin {
 /// What the projection needs of a hair, resolved once a substep.
 struct HairParams {
     level: Level,
-    step: StepParams,
-    stiffness: Stiffness,
+    method: Method,
+    dt: f32,
+    skin: f32,
+    bending_length: f32,
     influence: [f32; 4],
     obstacles: Vec<Obstacle>,
+}
+
+enum Method {
+    Direct {
+        params: DirectParams,
+        /// What the motion of the hair's frame did to what rests in the world.
+        carry: Option<Isometry3d>,
+    },
+    Sweeps(StepParams, Sweeps),
 }
 
 struct Rod<'a> {
@@ -78,6 +92,7 @@ impl Batched for Rod<'_> {
     fn prefetch(&self) {
         self.strand.prefetch();
         prefetch(self.strand.rest_lengths());
+        prefetch(self.strand.tensions());
         prefetch(&self.rest.darboux);
         prefetch(&self.rest.stiffness);
     }
@@ -86,8 +101,15 @@ impl Batched for Rod<'_> {
         self.bonds.joints.iter().map(|joint| joint.relaxed(&params.influence)).collect()
     }
 
+    fn kept(params: &HairParams) -> Kept {
+        match params.method {
+            Method::Direct { .. } => Kept::Tensions,
+            Method::Sweeps(..) => Kept::AngularVelocities,
+        }
+    }
+
     fn dt(params: &HairParams) -> f32 {
-        params.step.dt
+        params.dt
     }
 
     fn block(lanes: &mut BlockLanes) -> &mut BlockLanes {
@@ -101,20 +123,32 @@ impl Batched for Rod<'_> {
         params: &HairParams,
     ) {
         gather_frames(block, sources, items);
-        weigh(params.level, block, Some(&params.stiffness));
-        let near = block.near(&params.obstacles, params.step.dt, params.step.skin);
-        step(params.level, block, &params.step, &near);
+        let near = block.near(&params.obstacles, params.dt, params.skin);
+        match &params.method {
+            Method::Direct { params: direct, carry } => {
+                gather_tensions(block, sources);
+                gather_roots(block, sources, carry.unwrap_or_default());
+                direct::weigh(params.level, block, params.bending_length);
+                direct::step(params.level, block, direct, &near);
+            }
+            Method::Sweeps(sweeps, settings) => {
+                gather_spins(block, sources);
+                step::weigh(params.level, block, Some((settings, params.bending_length)));
+                step::step(params.level, block, sweeps, &near);
+            }
+        }
     }
 }
 
 fn step_rods(
     substeps: EffectiveSubsteps,
     model: Settings<StrandModel>,
-    solver: Settings<HairSolver>,
+    (solver, sweeps): (Settings<HairSolver>, Settings<Sweeps>),
+    gravity: Res<HairGravity>,
     stiffness: Settings<Stiffness>,
     influence: Settings<BondInfluence>,
     contact: Settings<LockContact>,
-    hairs: Query<Option<&Obstacles>, With<Hair>>,
+    hairs: Query<(Option<&Obstacles>, &TickPose), With<Hair>>,
     mut strands: Query<(
         (Entity, &StrandOf, &StrandSleep),
         &mut Strand,
@@ -126,21 +160,43 @@ fn step_rods(
     mut faults: MessageWriter<HairFault>,
 ) {
     let level = Level::new();
+    let gravity = gravity.clamped().0;
     let params_of = |hair: Entity| {
-        let obstacles = hairs.get(hair).ok().filter(|_| model.of(hair) == StrandModel::Rod)?;
+        let (obstacles, pose) =
+            hairs.get(hair).ok().filter(|_| model.of(hair) == StrandModel::Rod)?;
         let substep = substeps.of(hair)?;
-        let s = solver.of(hair);
+        let (dt, skin, stiffness) = (substep.dt, contact.of(hair).radius, stiffness.of(hair));
+        let solver = solver.of(hair);
+        let method = match solver.method {
+            SolverMethod::Direct => Method::Direct {
+                params: DirectParams {
+                    dt,
+                    gravity: pose.now().direction_in(gravity),
+                    damping: stiffness.damping,
+                    limiter_steps: solver.limiter_steps,
+                    skin,
+                },
+                carry: pose.frame_delta(),
+            },
+            SolverMethod::Sweeps => {
+                let sweeps = sweeps.of(hair);
+                let params = StepParams {
+                    dt,
+                    iterations: substep.iterations(sweeps.iterations),
+                    projection: sweeps.projection,
+                    limiter_steps: sweeps.limiter_steps,
+                    internal_damping: sweeps.internal_damping,
+                    skin,
+                };
+                Method::Sweeps(params, sweeps)
+            }
+        };
         Some(HairParams {
             level,
-            step: StepParams {
-                dt: substep.dt,
-                iterations: substep.iterations(s.iterations),
-                projection: s.projection,
-                limiter_steps: s.limiter_steps,
-                internal_damping: s.internal_damping,
-                skin: contact.of(hair).radius,
-            },
-            stiffness: stiffness.of(hair),
+            method,
+            dt,
+            skin,
+            bending_length: stiffness.bending_length,
             influence: influence.of(hair).as_array(),
             obstacles: obstacles.map_or_else(Vec::new, |all| all.over(substep.substeps)),
         })
@@ -162,14 +218,13 @@ fn step_rods(
     faults.write_batch(lost);
 }
 
-/// Orientations, angular velocities, rest shapes and stiffness.
+/// Orientations, rest shapes and stiffness.
 fn gather_frames(block: &mut BlockLanes, from: &[Source<'_>; LANES], items: &[Rod<'_>]) {
     let rest = in_lanes(items, |item| item.rest);
     let edges = &mut block.edges;
     for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
-        let poses = four.map(|source| source.strand.parts());
-        put_quaternions(edges, group, poses.map(|pose| pose.2), |e| &mut e.q);
-        put_vectors(edges, group, poses.map(|pose| pose.3), |e| &mut e.omega);
+        let orientations = four.map(|source| source.strand.orientations());
+        put_quaternions(edges, group, orientations, |e| &mut e.q);
     }
     for (group, four) in rest.as_chunks::<4>().0.iter().enumerate() {
         put_quaternions(edges, group, four.map(|rest| &rest.darboux[..]), |e| &mut e.rest);
@@ -177,5 +232,28 @@ fn gather_frames(block: &mut BlockLanes, from: &[Source<'_>; LANES], items: &[Ro
     }
     for (lane, source) in from.iter().enumerate() {
         put4(&mut block.root, lane, source.strand.root_frame());
+    }
+}
+
+fn gather_tensions(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
+    for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
+        let tensions = four.map(|source| source.strand.tensions());
+        put_numbers(&mut block.edges, group, tensions, |e| &mut e.tension);
+    }
+}
+
+/// Where roots come from.
+fn gather_roots(block: &mut BlockLanes, from: &[Source<'_>; LANES], carry: Isometry3d) {
+    for (lane, source) in from.iter().enumerate() {
+        let (place, frame) = source.strand.root_before();
+        put3(&mut block.nodes[0].from, lane, carry * place);
+        put4(&mut block.root_from, lane, carry.rotation * frame);
+    }
+}
+
+fn gather_spins(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
+    for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
+        let spins = four.map(|source| source.strand.angular_velocities());
+        put_vectors(&mut block.edges, group, spins, |e| &mut e.omega);
     }
 }

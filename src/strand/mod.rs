@@ -92,7 +92,9 @@ pub struct Strand {
     orientations: Vec<Quat>,
     angular_velocities: Vec<Vec3>,
     rest_lengths: Vec<f32>,
+    tensions: Vec<f32>,
     root_frame: Quat,
+    root_before: Option<(Vec3, Quat)>,
     was_put_back: bool,
 }
 
@@ -204,8 +206,10 @@ impl Strand {
             angular_velocities: vec![Vec3::ZERO; orientations.len()],
             positions: points.to_vec(),
             root_frame: orientations[0],
+            tensions: vec![0.0; orientations.len()],
             orientations,
             rest_lengths,
+            root_before: None,
             was_put_back: false,
         })
     }
@@ -306,6 +310,7 @@ impl Strand {
     pub fn rest(&mut self) {
         self.velocities.fill(Vec3::ZERO);
         self.angular_velocities.fill(Vec3::ZERO);
+        self.tensions.fill(0.0);
     }
 
     /// Puts the strand into the shape given by a Darboux vector per joint, at rest, from its root
@@ -333,8 +338,10 @@ impl Strand {
     #[cfg(feature = "groom")]
     pub(crate) fn put_root(&mut self, place: Vec3, frame: Quat) {
         if place.is_finite() && frame.is_finite() {
+            let frame = frame.normalize();
+            self.root_before.get_or_insert((self.positions[0], self.root_frame));
             self.positions[0] = place;
-            self.root_frame = frame.normalize();
+            self.root_frame = frame;
         }
     }
 
@@ -350,20 +357,36 @@ impl Strand {
         *self = Self {
             velocities: vec![Vec3::ZERO; positions.len()],
             angular_velocities: vec![Vec3::ZERO; orientations.len()],
+            tensions: vec![0.0; orientations.len()],
             positions,
             orientations,
             rest_lengths,
             root_frame,
+            root_before: None,
             was_put_back: false,
         };
     }
 
-    /// Asks for the memory of what moves: positions, velocities, orientations, angular velocities.
+    /// Asks for the memory of what moves: positions, velocities, orientations.
     pub(crate) fn prefetch(&self) {
         prefetch(&self.positions);
         prefetch(&self.velocities);
         prefetch(&self.orientations);
-        prefetch(&self.angular_velocities);
+    }
+
+    /// Tension that the last substep of the direct solver left in each edge, for hair of which a whole
+    /// node weighs 1 kg (N).
+    pub(crate) fn tensions(&self) -> &[f32] {
+        &self.tensions
+    }
+
+    pub(crate) fn tensions_mut(&mut self) -> &mut [f32] {
+        &mut self.tensions
+    }
+
+    /// Where in the hair's frame the root was at the end of the last substep, with the scalp's frame.
+    pub(crate) fn root_before(&self) -> (Vec3, Quat) {
+        self.root_before.unwrap_or((self.positions[0], self.root_frame))
     }
 
     pub(crate) fn parts(&self) -> (&[Vec3], &[Vec3], &[Quat], &[Vec3]) {
@@ -405,6 +428,7 @@ impl Strand {
 
     pub(crate) fn stepped_well(&mut self) {
         self.was_put_back = false;
+        self.root_before = None;
     }
 }
 

@@ -14,6 +14,7 @@ pub type Probe = Box<dyn FnMut(&Strand) -> f64 + Send + Sync>;
 pub struct Lab {
     pub app: App,
     hairs: HashMap<u32, Entity>,
+    damping: f32,
     /// Length of a substep (s).
     pub substep: f64,
 }
@@ -46,8 +47,12 @@ impl Lab {
         app.finish();
         app.cleanup();
         app.update();
-        let mut lab =
-            Self { app, hairs: HashMap::new(), substep: 1.0 / (hertz * f64::from(substeps)) };
+        let mut lab = Self {
+            app,
+            hairs: HashMap::new(),
+            damping: Stiffness::default().damping,
+            substep: 1.0 / (hertz * f64::from(substeps)),
+        };
         lab.drag(0.0);
         lab
     }
@@ -65,16 +70,16 @@ impl Lab {
         self.app.insert_resource(HairGravity(gravity));
     }
 
-    /// The least damping that hair may be given, for all hair.
+    /// The least damping that hair may be given, for all hair to come.
     pub fn undamped(&mut self) {
-        self.app.insert_resource(HairDefault(HairSolver { internal_damping: 0.0, ..default() }));
+        self.damping = 0.0;
     }
 
     /// The hair of this stiffness (m).
     pub fn hair(&mut self, bending_length: f32) -> Entity {
         let world = self.app.world_mut();
         *self.hairs.entry(bending_length.to_bits()).or_insert_with(|| {
-            let stiffness = Stiffness { bending_length, ..default() };
+            let stiffness = Stiffness { bending_length, damping: self.damping };
             world.spawn((Hair, stiffness)).id()
         })
     }

@@ -1,0 +1,466 @@
+//! One Newton step of a strand: down the strand to assemble and eliminate, up to solve.
+//!
+//! With e_i the vector of edge i, t_i its frame's tangent and r_i = 1/|e_i|, a displacement turns the
+//! edge by δφ_i = t_i × δe_i r_i. Energies: ½ (EA/l)(|e| − l)² of an edge, 2K|Q − sQ0|² of a joint,
+//! whose exact gradient is the moment m = 2K s Im(q_j (q_{j−1} Q0)‾) and whose Gauss–Newton Hessian
+//! is that of ½K|δφ_j − δφ_{j−1}|².
+
+use super::{
+    matrix::{Matrix, Pivot, Symmetric},
+    width::Width,
+};
+use crate::{
+    lanes::{Quaternion, Real, V3},
+    rod::block::{EdgeLanes, NodeLanes},
+};
+
+/// What the way up needs of the way down: at index i of edge i and the node at its end.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub(crate) struct Row<C> {
+    near: [[C; 3]; 3],
+    far: [[C; 3]; 3],
+    solution: [C; 3],
+    lower: [C; 3],
+    twist: C,
+    twist_next: C,
+}
+
+/// What is the same for all nodes of a strand.
+#[derive(Clone, Copy)]
+pub(crate) struct Stage<R> {
+    /// How far into the substep the forces are taken (s): θ dt.
+    pub ahead: R,
+    /// How much farther nodes go than is solved for: 1/θ.
+    pub beyond: R,
+    /// Gravity (m/s²).
+    pub gravity: V3<R>,
+    /// Kelvin–Voigt time (s), less what the step itself damps.
+    pub damping: R,
+    /// 1 in lanes that take this Newton step, 0 in lanes that are done. Where nothing touches, all do.
+    pub again: R,
+    /// 1 in lanes that touch an obstacle, else 0: others start where their inertia takes them.
+    pub touching: R,
+}
+
+/// How firmly a node that rests on an obstacle is held out of it, in shares of its inertia. Without
+/// end it would make fine strands jump off; loosely held they are pushed out after the solve, which
+/// bends them.
+pub(crate) const HOLD: f64 = 100.0;
+
+/// An edge as the way down carries it.
+#[derive(Clone, Copy)]
+struct Carried<R> {
+    q: Quaternion<R>,
+    t: V3<R>,
+    /// 1/|e|.
+    r: R,
+    /// How far it has turned since the substep began.
+    turn: V3<R>,
+    /// What holds its ends where they are across it, but for the joint at its end.
+    across: R,
+    axial: R,
+    /// The gradient of the energy by its vector.
+    pull: V3<R>,
+    /// The coupling with the edge before.
+    coupling: Matrix<R>,
+}
+
+/// What the elimination has left for the nodes that come.
+#[derive(Clone, Copy)]
+struct Left<R> {
+    /// Off the diagonal of the next node, and of the one after.
+    next: Symmetric<R>,
+    after: Symmetric<R>,
+    /// Off the block between the two.
+    between: Matrix<R>,
+    b_next: V3<R>,
+    b_after: V3<R>,
+}
+
+/// Turns `q` the shortest way so that its tangent is along `e`, of length `len`. Returns twice the
+/// vector part of the turn: the turn itself where it is small.
+#[inline(always)]
+pub(crate) fn carry<R: Real>(q: Quaternion<R>, e: V3<R>, len: R) -> (Quaternion<R>, V3<R>) {
+    let d = q.tangent();
+    let along = d.dot(e);
+    let cosine = len + along;
+    // Turned back on itself: half a turn about the frame's first axis.
+    let folded = cosine.lt(len * len.lit(1e-6));
+    let one = len.lit(1.0);
+    let scale = one / (len.lit(2.0) * len * cosine).max(len.lit(1e-30)).sqrt();
+    let turn = Quaternion::new(d.cross(e).scale(scale), cosine * scale);
+    let half = Quaternion::new(first_axis(q), len.lit(0.0));
+    let turn =
+        Quaternion::new(V3::select(folded, half.v, turn.v), R::select(folded, half.w, turn.w));
+    let turned = turn.product(q);
+    // Off by round-off only, so that one step of Newton's does for a root.
+    let length = len.lit(-0.5).mul_add(turned.dot(turned), len.lit(1.5));
+    let turned = Quaternion::new(turned.v.scale(length), turned.w * length);
+    (turned, turn.v + turn.v)
+}
+
+/// `yes` where the mask holds, else `no`.
+#[inline(always)]
+fn choose<R: Real>(mask: R::Mask, yes: Quaternion<R>, no: Quaternion<R>) -> Quaternion<R> {
+    Quaternion::new(V3::select(mask, yes.v, no.v), R::select(mask, yes.w, no.w))
+}
+
+/// The moment of a joint on the edge `q` behind it, in the frame of the nodes: 2K s Im(q (before Q0)‾).
+#[inline(always)]
+fn moment<W: Width>(
+    w: W,
+    before: Quaternion<W::Real>,
+    q: Quaternion<W::Real>,
+    rest: Quaternion<W::Real>,
+    k: W::Real,
+) -> V3<W::Real> {
+    let apart = q.product(before.product(rest).conjugate());
+    let two = w.lit(2.0) * k;
+    apart.v.scale(W::Real::select(apart.w.lt(w.lit(0.0)), -two, two))
+}
+
+/// R(q) e1.
+#[inline(always)]
+fn first_axis<R: Real>(q: Quaternion<R>) -> V3<R> {
+    let Quaternion { v: V3 { x, y, z }, w } = q;
+    let two = w.lit(2.0);
+    V3::new(
+        w.lit(1.0) - two * y.mul_add(y, z * z),
+        two * x.mul_add(y, w * z),
+        two * x.mul_add(z, -(w * y)),
+    )
+}
+
+/// Assembles and eliminates from the root to the tip, with frames carried to where the nodes are.
+/// `TOUCHING`: something touches, so obstacles are heeded, and lanes may have to wait.
+#[inline(always)]
+pub(crate) fn down<W: Width, const TOUCHING: bool>(
+    w: W,
+    nodes: &[NodeLanes<W::Cell>],
+    edges: &mut [EdgeLanes<W::Cell>],
+    rows: &mut [Row<W::Cell>],
+    root: &[W::Cell; 4],
+    stage: &Stage<W::Real>,
+) {
+    let zero = w.lit(0.0);
+    let none = w.zero3();
+    let rate = w.lit(1.0) / stage.ahead;
+    let inertia = rate * rate;
+    let damped = stage.damping * rate;
+    let stiffer = w.lit(1.0) + damped;
+    let frame = w.get4(root);
+    let mut before = Carried {
+        q: frame,
+        t: frame.tangent(),
+        r: zero,
+        turn: none,
+        across: zero,
+        axial: zero,
+        pull: none,
+        coupling: Matrix::zero(zero),
+    };
+    let mut stiff_before = Symmetric::zero(zero);
+    let mut pull_before = none;
+    let mut left = Left {
+        next: Symmetric::zero(zero),
+        after: Symmetric::zero(zero),
+        between: Matrix::zero(zero),
+        b_next: none,
+        b_after: none,
+    };
+    let mut x = w.get3(&nodes[0].p);
+    let count = edges.len();
+    for j in 0..=count {
+        // The edge and the joint before it; past the tip there is neither.
+        let mut now = Carried { r: zero, coupling: Matrix::zero(zero), ..before };
+        let (mut couple, mut stiff) = (none, zero);
+        if j < count {
+            let edge = &mut edges[j];
+            let to = w.get3(&nodes[j + 1].p);
+            let e = to - x;
+            x = to;
+            let l = w.get(&edge.l);
+            let axial = w.get(&edge.axial);
+            let length = e.dot(e).max(w.lit(1e-30)).sqrt();
+            let crushed = length.lt(l * w.lit(0.5));
+            let q = w.get4(&edge.q);
+            let (turned, turn) = carry(q, e, length);
+            let stays = q;
+            let q = choose(crushed, q, turned);
+            let turn = V3::select(crushed, none, turn);
+            let r = w.lit(1.0) / length.max(l * w.lit(0.2));
+            let t = V3::select(crushed, q.tangent(), e.scale(r));
+            w.put4(if TOUCHING { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
+            let tension = (axial * (length - l)).max(w.get(&edge.tension)).max(zero);
+            let across = W::Real::select(crushed, axial, tension * r);
+            let k = w.get(&edge.k);
+            let elastic = moment(w, before.q, q, w.get4(&edge.rest), k);
+            couple = (turn - before.turn).scale_add(k * damped, elastic);
+            stiff = k * stiffer;
+            let dot = t.dot(before.t);
+            now = Carried {
+                q,
+                t,
+                r,
+                turn,
+                across: (stiff * r).mul_add(r, across),
+                axial,
+                pull: couple.cross(t).scale_add(r, t.scale_add(-l, e).scale(axial)),
+                coupling: Matrix::coupling(before.t, t, dot, stiff * r * before.r),
+            };
+        }
+        if j > 0 {
+            let i = j - 1;
+            // The edge before is whole now.
+            let across = (stiff * before.r).mul_add(before.r, before.across);
+            let h = Symmetric::uniaxial(before.t, before.axial - across, across);
+            let pull = couple.cross(before.t).scale_add(-before.r, before.pull);
+            if i > 0 {
+                // Node i, between edges i − 1 and i.
+                left = eliminate::<W, TOUCHING>(
+                    w,
+                    &nodes[i],
+                    &mut rows[i - 1],
+                    stage,
+                    inertia,
+                    stiff_before.plus(h).minus_both(&before.coupling),
+                    before.coupling.plus(now.coupling).minus_symmetric(&h),
+                    &now.coupling,
+                    pull - pull_before,
+                    &left,
+                );
+            }
+            (stiff_before, pull_before) = (h, pull);
+        }
+        before = now;
+    }
+    // The tip.
+    let nothing = Matrix::zero(zero);
+    eliminate::<W, TOUCHING>(
+        w,
+        &nodes[count],
+        &mut rows[count - 1],
+        stage,
+        inertia,
+        stiff_before,
+        nothing,
+        &nothing,
+        -pull_before,
+        &left,
+    );
+}
+
+/// Node `node` out of the system: `diagonal` and `next` its blocks, −`far` that with the node after
+/// the next, `force` what edges pull it with.
+#[inline(always)]
+fn eliminate<W: Width, const TOUCHING: bool>(
+    w: W,
+    node: &NodeLanes<W::Cell>,
+    row: &mut Row<W::Cell>,
+    stage: &Stage<W::Real>,
+    inertia: W::Real,
+    diagonal: Symmetric<W::Real>,
+    next: Matrix<W::Real>,
+    far: &Matrix<W::Real>,
+    force: V3<W::Real>,
+    left: &Left<W::Real>,
+) -> Left<W::Real> {
+    let mass = w.get(&node.mass);
+    let held = w.get(&node.w).lt(w.lit(1e-12));
+    let inert = mass * inertia;
+    let mut a = diagonal.plus(left.next).plus_diagonal(inert);
+    let mut b = stage.gravity.scale_add(mass, force + left.b_next);
+    if TOUCHING {
+        let n = w.get3(&node.rests_on);
+        a = a.plus_outer(n, inert * w.lit(HOLD));
+        let inertial = w.get3(&node.v).scale_add(stage.ahead, w.get3(&node.from));
+        let pulled = (inertial - w.get3(&node.p)).scale_add(inert, b);
+        b = V3::select(w.lit(0.0).lt(stage.touching), pulled, b);
+    }
+    let next = next.plus(left.between);
+    let pivot = Pivot::new(&a, inert * w.lit(1e-3), held);
+    let near_unscaled = pivot.unscaled(&next);
+    let far_unscaled = pivot.unscaled(far);
+    let near = pivot.scaled(&near_unscaled);
+    let far = pivot.scaled(&far_unscaled);
+    let y = pivot.forward(b);
+    for (row, cells) in near.rows.into_iter().zip(&mut row.near) {
+        w.put3(row, cells);
+    }
+    for (row, cells) in far.rows.into_iter().zip(&mut row.far) {
+        w.put3(row, cells);
+    }
+    w.put3(pivot.divide(y), &mut row.solution);
+    w.put3(V3::new(pivot.yx, pivot.zx, pivot.zy), &mut row.lower);
+    let none = Symmetric::zero(w.lit(0.0));
+    Left {
+        next: left.after.minus_product(&near, &near_unscaled),
+        after: none.minus_product(&far, &far_unscaled),
+        // `far` is minus the block, so this adds.
+        between: Matrix::zero(w.lit(0.0)).plus_product(&far, &near_unscaled),
+        b_next: near.times_from(y, left.b_after),
+        b_after: far.times_to(y, w.zero3()),
+    }
+}
+
+/// Solves from the tip to the root and moves nodes, beyond the solution as the stage says.
+#[inline(always)]
+pub(crate) fn up<W: Width, const TOUCHING: bool>(
+    w: W,
+    nodes: &mut [NodeLanes<W::Cell>],
+    edges: &mut [EdgeLanes<W::Cell>],
+    rows: &[Row<W::Cell>],
+    stage: &Stage<W::Real>,
+) {
+    let none = w.zero3();
+    let (mut next, mut after) = (none, none);
+    let mut end = none;
+    for i in (0..=edges.len()).rev() {
+        let node = &mut nodes[i];
+        let mut y = w.get3(&node.p);
+        let mut solved = none;
+        if i > 0 {
+            let row = &rows[i - 1];
+            let near =
+                Matrix { rows: [w.get3(&row.near[0]), w.get3(&row.near[1]), w.get3(&row.near[2])] };
+            let far =
+                Matrix { rows: [w.get3(&row.far[0]), w.get3(&row.far[1]), w.get3(&row.far[2])] };
+            let from = far.transposed_to(after, near.transposed_from(next, w.get3(&row.solution)));
+            let l = w.get3(&row.lower);
+            let y1 = (-l.z).mul_add(from.z, from.y);
+            let x1 = (-l.y).mul_add(from.z, (-l.x).mul_add(y1, from.x));
+            solved = V3::new(x1, y1, from.z);
+            if TOUCHING {
+                // Lanes that are done stay, to the bit, and so does their tension.
+                solved = V3::select(w.lit(0.0).lt(stage.again), solved, none);
+            }
+            y = y + solved;
+        }
+        let start = w.get3(&node.from);
+        let to = (y - start).scale_add(stage.beyond, start);
+        let to = if TOUCHING { V3::select(w.lit(0.0).lt(stage.again), to, y) } else { to };
+        w.put3(to, &mut node.p);
+        if i < edges.len() {
+            let edge = &mut edges[i];
+            let q = w.get4(&edge.q);
+            let t = q.tangent();
+            let tension = w.get(&edge.axial) * (t.dot(end - y) - w.get(&edge.l));
+            let again = w.lit(0.0).lt(stage.again);
+            let tension = if TOUCHING {
+                W::Real::select(again, tension, w.get(&edge.tension))
+            } else {
+                tension
+            };
+            w.put(tension, &mut edge.tension);
+        }
+        end = y;
+        (after, next) = (next, solved);
+    }
+}
+
+/// Frames to where nodes have come to, velocities, and the twist of all edges on the way down.
+/// Returns zero where all is finite.
+#[inline(always)]
+pub(crate) fn finish<W: Width>(
+    w: W,
+    nodes: &mut [NodeLanes<W::Cell>],
+    edges: &mut [EdgeLanes<W::Cell>],
+    rows: &mut [Row<W::Cell>],
+    root: &[W::Cell; 4],
+    dt: f32,
+    stage: &Stage<W::Real>,
+) -> W::Real {
+    let (zero, one) = (w.lit(0.0), w.lit(1.0));
+    let rate = w.lit(1.0 / f64::from(dt));
+    let theta = stage.ahead * rate;
+    let forth = rate * stage.beyond;
+    let back = stage.beyond * (theta - one);
+    let mut sum = zero;
+    let mut x = w.zero3();
+    // A row of the tridiagonal system for the turns α about the tangents: of each joint K, its
+    // moment along the tangents it joins, and −K t·t′ off the diagonal.
+    let mut before = Twist { q: w.get4(root), t: w.zero3(), k: zero, moment: zero, coupling: zero };
+    before.t = before.q.tangent();
+    let (mut rhs, mut upper) = (zero, zero);
+    for i in 0..nodes.len() {
+        let node = &mut nodes[i];
+        let to = w.get3(&node.p);
+        let v = w.get3(&node.v).scale_add(back, (to - w.get3(&node.from)).scale(forth));
+        w.put3(v, &mut node.v);
+        sum = v.dot(v) + sum;
+        let e = to - x;
+        x = to;
+        if i == 0 {
+            continue;
+        }
+        let edge = &mut edges[i - 1];
+        let length = e.dot(e).max(w.lit(1e-30)).sqrt();
+        let crushed = length.lt(w.get(&edge.l) * w.lit(0.5));
+        let kept = w.get4(&edge.q);
+        let q = choose(crushed, kept, carry(kept, e, length).0);
+        w.put4(q, &mut edge.q);
+        sum = q.dot(q) + sum;
+        let (t, k) = (q.tangent(), w.get(&edge.k));
+        let elastic = moment(w, before.q, q, w.get4(&edge.rest), k);
+        let now = Twist { q, t, k, moment: elastic.dot(t), coupling: -(k * t.dot(before.t)) };
+        if i > 1 {
+            before.moment = before.moment - elastic.dot(before.t);
+            (rhs, upper) = before.eliminate(k, rhs, upper, &mut rows[i - 2], w);
+            upper = now.coupling * upper;
+            w.put(upper, &mut rows[i - 2].twist_next);
+        }
+        before = now;
+    }
+    let last = edges.len() - 1;
+    before.eliminate(zero, rhs, upper, &mut rows[last], w);
+    w.put(zero, &mut rows[last].twist_next);
+    sum * zero
+}
+
+/// An edge as the elimination of twist carries it.
+#[derive(Clone, Copy)]
+struct Twist<R> {
+    q: Quaternion<R>,
+    t: V3<R>,
+    /// Stiffness of the joint at its start.
+    k: R,
+    /// What turns it about its tangent.
+    moment: R,
+    /// With the edge before.
+    coupling: R,
+}
+
+impl<R: Real> Twist<R> {
+    /// Returns the right-hand side of its row and the inverse of its pivot.
+    #[inline(always)]
+    fn eliminate<W: Width<Real = R>>(
+        &self,
+        k_next: R,
+        rhs: R,
+        upper: R,
+        row: &mut Row<W::Cell>,
+        w: W,
+    ) -> (R, R) {
+        let pivot = (-self.coupling).mul_add(upper, self.k + k_next);
+        let inverse = w.lit(1.0) / pivot.max(w.lit(1e-30));
+        let rhs = -(self.coupling.mul_add(rhs, self.moment)) * inverse;
+        w.put(rhs, &mut row.twist);
+        (rhs, inverse)
+    }
+}
+
+/// Turns edges about their tangents until twist is in balance.
+#[inline(always)]
+pub(crate) fn untwist<W: Width>(w: W, edges: &mut [EdgeLanes<W::Cell>], rows: &[Row<W::Cell>]) {
+    let mut twist = w.lit(0.0);
+    for (edge, row) in edges.iter_mut().zip(rows).rev() {
+        twist = (-w.get(&row.twist_next)).mul_add(twist, w.get(&row.twist));
+        twist = twist.max(w.lit(-1.5)).min(w.lit(1.5));
+        // About the tangent, which in the edge's own frame is e3.
+        let q = w.get4(&edge.q);
+        let half = twist * w.lit(0.5);
+        let along = Quaternion::new(V3::new(q.v.y, -q.v.x, q.w), -q.v.z);
+        w.put4(q.add_scaled(along, half).renormalize(), &mut edge.q);
+    }
+}

@@ -1,0 +1,286 @@
+//! The default solver: one direct implicit step of a whole strand per substep.
+//!
+//! Projections that go from joint to joint make stiffness of the inverse inertia of orientations, so
+//! stiff hair gets a rotary inertia that no hair has, and converge like the square of the number of
+//! segments. Here nodes are the only unknowns: orientations follow the edges (their tangents are the
+//! edges' directions, always, carried along without twist), and twist is in balance at every step.
+//! What remains is a system of 3×3 blocks, each coupled with two nodes before and two behind, which
+//! Cholesky solves in one pass down the strand and one up.
+//!
+//! | file | what |
+//! |---|---|
+//! | `kernel` | a Newton step: assembly and elimination in one pass, solution, frames, twist |
+//! | `matrix` | the blocks |
+//! | `width` | the same lines for lanes and for one strand of f64 |
+//!
+//! One substep of length h:
+//! 1. Predict: nodes to x + θh v, where gravity would take them out of obstacles.
+//! 2. One Newton step for the positions at θh: inertia, stretching, bending, what obstacles bear.
+//!    Strands that touch take a second, with what it showed to touch.
+//! 3. On to the end of the substep, x + (x_θ − x)/θ. With θ = ½ nothing would be damped and nothing
+//!    be calmed; with θ = 1, implicit Euler, all swings would be damped like by a Kelvin–Voigt time of
+//!    h. θ = 0.65 damps like 0.3 h, which is taken off the material's damping, and stiff motion decays
+//!    to 7/13 in each substep. Strands that touch take θ = 1.
+//! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 %.
+//! 5. Frames carried to the new directions; velocities; twist by a tridiagonal solve.
+//!
+//! Per segment and Newton step: about 450 multiply–adds and 12 divisions or roots; 24 + 2 numbers of
+//! scratch. One strand needs nothing of another, so one GPU thread may take one strand.
+//!
+//! After Deul, Kugelstadt, Weiler, Bender, *Direct Position-Based Solver for Stiff Rods* (2018) for the
+//! direct solve, Baraff & Witkin (1998) for the implicit step, Bergou et al. (2008) for frames and
+//! quasi-static twist.
+
+mod kernel;
+mod matrix;
+mod width;
+
+use super::{
+    block::BlockLanes,
+    limiter::limit_strained,
+    obstacle::Obstacle,
+    step::{Grip, contacts, contacts_with, predict_nodes},
+    stiffness::REFERENCE_GRAVITY,
+};
+use crate::lanes::{LANES, Quaternion, Real, V3, load, load3, load4, splat3, store3, store4};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use glam::Vec3;
+pub(crate) use kernel::Row;
+use kernel::{HOLD, Stage};
+use width::{Half, Whole, Width};
+
+/// What a substep does to a block.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct DirectParams {
+    /// Substep (s).
+    pub dt: f32,
+    /// Gravity, in the frame of the positions (m/s²): what of the velocities it has given them in this
+    /// substep already.
+    pub gravity: Vec3,
+    /// Kelvin–Voigt time of the material (s).
+    pub damping: f32,
+    /// Newton steps of the length limiter, at most.
+    pub limiter_steps: u32,
+    /// Distance that nodes keep from obstacles (m).
+    pub skin: f32,
+}
+
+/// Where in the substep forces are taken; see the [module](self).
+const THETA: f32 = 0.65;
+
+/// Strain at the root of a straight hanging strand, which says how stiff hair is against stretching.
+/// Stiffer, f32 would not carry it; softer, the limiter would have to take stretching away, which bends.
+const STRAIN: f32 = 1e-4;
+
+/// Strain that the limiter leaves.
+const TOLERANCE: f32 = 5e-4;
+
+/// Takes the block through one substep, on the instruction set that the machine has.
+#[doc(hidden)]
+pub fn step(level: Level, block: &mut BlockLanes, params: &DirectParams, obstacles: &[Obstacle]) {
+    dispatch!(level, simd => step_simd(simd, block, params, obstacles));
+}
+
+#[inline(always)]
+fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacles: &[Obstacle]) {
+    let theta = predict(simd, b, params, obstacles);
+    let one = f32x16::splat(simd, 1.0);
+    theta.store_array(&mut b.theta);
+    b.touching = b.touched;
+    let (from, to) = (load4(simd, &b.root_from), load4(simd, &b.root));
+    let backwards = Real::lt(from.dot(to), f32x16::splat(simd, 0.0));
+    let share = Real::select(backwards, -theta, theta);
+    let between = Quaternion::new(from.v.scale(one - theta), from.w * (one - theta));
+    store4(&mut b.root_between, between.add_scaled(to, share).normalize());
+    if b.touched == [0.0; LANES] {
+        newton::<S, false>(simd, b, params, 1);
+    } else {
+        // Which nodes an obstacle bears is not known before: the first step shows.
+        for left in [2, 1] {
+            newton::<S, true>(simd, b, params, left);
+            if left > 1 {
+                let touching = load(simd, &b.touching);
+                contacts_with(simd, b, params.skin, obstacles, Grip::NONE, touching);
+            }
+        }
+    }
+    // What obstacles hold has left that share of its depth.
+    let grip = Grip { resting: 1.0 + HOLD as f32, others: 1.0 };
+    let all = f32x16::splat(simd, 1.0);
+    contacts_with(simd, b, params.skin, obstacles, grip, all);
+    for pass in 0..params.limiter_steps {
+        if !limit_strained(simd, b, if pass == 0 { -1.0 } else { TOLERANCE }) {
+            break;
+        }
+        contacts(simd, b, params.skin, obstacles);
+    }
+    finish(simd, b, params);
+}
+
+/// The kernel's widths: all lanes at once where registers hold sixteen, else two halves, because what is
+/// twice as wide as registers would not stay in them.
+macro_rules! in_lanes {
+    ($simd:expr, $w:ident => $work:expr) => {
+        if <S::f32s as SimdBase<S>>::LEN >= LANES {
+            let $w = Whole($simd);
+            $work;
+        } else {
+            for index in 0..2 {
+                let $w = Half { simd: $simd, index };
+                $work;
+            }
+        }
+    };
+}
+
+/// One Newton step; `left` counts this one and those that follow.
+#[inline(always)]
+fn newton<S: Simd, const TOUCHING: bool>(
+    simd: S,
+    b: &mut BlockLanes,
+    params: &DirectParams,
+    left: u32,
+) {
+    in_lanes!(simd, w => {
+        let mut stage = stage(w, b, params);
+        if left == 1 && TOUCHING {
+            stage.again = stage.touching;
+        }
+        let BlockLanes { nodes, edges, rows, root_between, .. } = &mut *b;
+        kernel::down::<_, TOUCHING>(w, nodes, edges, rows, root_between, &stage);
+        kernel::up::<_, TOUCHING>(w, nodes, edges, rows, &stage);
+    });
+}
+
+/// Frames, velocities, twist.
+#[inline(always)]
+fn finish<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams) {
+    in_lanes!(simd, w => {
+        let stage = stage(w, b, params);
+        let BlockLanes { nodes, edges, rows, root, finite, .. } = &mut *b;
+        let sum = kernel::finish(w, nodes, edges, rows, root, params.dt, &stage);
+        kernel::untwist(w, edges, rows);
+        w.put(sum, finite);
+    });
+}
+
+#[inline(always)]
+fn stage<W: Width<Cell = crate::lanes::Lane>>(
+    w: W,
+    b: &BlockLanes,
+    params: &DirectParams,
+) -> Stage<W::Real> {
+    let (theta, dt) = (w.get(&b.theta), w.lit(params.dt.into()));
+    let own = (w.lit(2.0) * theta - w.lit(1.0)) * dt;
+    Stage {
+        ahead: theta * dt,
+        beyond: w.lit(1.0) / theta,
+        gravity: V3::new(
+            w.lit(params.gravity.x.into()),
+            w.lit(params.gravity.y.into()),
+            w.lit(params.gravity.z.into()),
+        ),
+        damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
+        again: w.lit(1.0),
+        touching: w.get(&b.touching),
+    }
+}
+
+/// Nodes to the first guess, and what touches: those that would fall into an obstacle are set on it.
+/// Returns θ of each lane.
+#[inline(always)]
+fn predict<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    params: &DirectParams,
+    obstacles: &[Obstacle],
+) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let dt = f32x16::splat(simd, params.dt);
+    let gravity = splat3(simd, params.gravity);
+    let mut theta = f32x16::splat(simd, THETA);
+    // Gravity has given its share of the whole substep already.
+    let gain = gravity.scale(dt);
+    for n in &mut b.nodes {
+        let v = load3(simd, &n.v) - gain;
+        store3(&mut n.v, v);
+    }
+    fall(simd, b, dt * theta, gravity, params.skin, obstacles);
+    if b.touched != [0.0; LANES] {
+        let touched = Real::lt(zero, load(simd, &b.touched));
+        theta = Real::select(touched, one, theta);
+        for n in &mut b.nodes {
+            let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+            let back = V3::select(held, load3(simd, &n.p), load3(simd, &n.from));
+            store3(&mut n.p, back);
+        }
+        fall(simd, b, dt * theta, gravity, params.skin, obstacles);
+    }
+    let ahead = dt * theta;
+    let fallen = gravity.scale(ahead * ahead);
+    for n in &mut b.nodes {
+        let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+        let (from, p) = (load3(simd, &n.from), load3(simd, &n.p));
+        let on_the_way = (p - from).scale_add(theta, from);
+        let support = load3(simd, &n.rests_on);
+        let rests = Real::lt(zero, support.dot(support));
+        // The first guess is without gravity: else settled hair would be turned by it in each step.
+        let free = V3::select(rests, p, p - fallen);
+        store3(&mut n.p, V3::select(held, on_the_way, free));
+    }
+    theta
+}
+
+/// Nodes to where they would be after `ahead` by themselves, or on what is in the way.
+#[inline(always)]
+fn fall<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    ahead: f32x16<S>,
+    gravity: V3<f32x16<S>>,
+    skin: f32,
+    obstacles: &[Obstacle],
+) {
+    predict_nodes(simd, b, ahead, gravity.scale(ahead), skin, obstacles);
+    contacts_with(simd, b, skin, obstacles, Grip::NONE, f32x16::splat(simd, 1.0));
+}
+
+/// Makes masses and stiffnesses of what was gathered: of a node `w` in those of dry nodes, of a joint
+/// `k` as its share of what hair of this gravity-bending length (m) has.
+#[doc(hidden)]
+pub fn weigh(level: Level, block: &mut BlockLanes, bending_length: f32) {
+    dispatch!(level, simd => weigh_simd(simd, block, bending_length));
+}
+
+#[inline(always)]
+fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32) {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let half = f32x16::splat(simd, 0.5);
+    let mut sum = zero;
+    for e in &b.edges {
+        sum += load(simd, &e.l);
+    }
+    let edges = b.edges.len() as f32;
+    // A whole node weighs 1: what is per mass is to be multiplied by that.
+    let density = f32x16::splat(simd, edges) / sum;
+    let bending = 2.0 * REFERENCE_GRAVITY * bending_length * bending_length * bending_length;
+    let bending = density * f32x16::splat(simd, bending);
+    let axial = f32x16::splat(simd, REFERENCE_GRAVITY * edges / STRAIN);
+    let mut before = zero;
+    for (i, n) in b.nodes.iter_mut().enumerate() {
+        let mut after = zero;
+        if let Some(e) = b.edges.get_mut(i) {
+            after = load(simd, &e.l);
+            (load(simd, &e.k) * bending / (before + after)).store_array(&mut e.k);
+            (axial / after).store_array(&mut e.axial);
+        }
+        // Half a cell on either side, so the tip carries half a mass.
+        let dry_nodes = load(simd, &n.w);
+        let held = Real::lt(dry_nodes, f32x16::splat(simd, 1e-12));
+        let mass = (before + after) * dry_nodes * density * half;
+        mass.store_array(&mut n.mass);
+        Real::select(held, zero, one / mass).store_array(&mut n.w);
+        before = after;
+    }
+}
