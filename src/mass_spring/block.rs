@@ -16,7 +16,7 @@ use crate::{
         block::{BlockLanes, NodeLanes},
         limiter::{along_support, mobility},
         obstacle::{Obstacle, splat},
-        step::{contacts, predict_nodes},
+        touch::{contacts, predict_nodes},
     },
 };
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};

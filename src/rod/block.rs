@@ -11,7 +11,7 @@
 //! memory is asked for (`prefetch`) while the block before is solved. Number by number and without
 //! asking ahead it took longer than all five.
 
-use super::{direct, obstacle::Obstacle, sweep::Shares};
+use super::{constraint::Shares, direct::row::Row as DirectRow, obstacle::Obstacle};
 use crate::lanes::{LANES, Lane, V3, load3, store3};
 use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
@@ -89,7 +89,7 @@ pub struct BlockLanes {
     pub(super) root_between: [Lane; 4],
     pub(crate) scratch: Vec<Row>,
     pub(super) shares: Vec<Shares>,
-    pub(super) rows: Vec<direct::Row<Lane>>,
+    pub(super) rows: Vec<DirectRow<Lane>>,
 }
 
 impl BlockLanes {
@@ -99,7 +99,7 @@ impl BlockLanes {
         self.edges.resize(nodes - 1, EdgeLanes::default());
         self.scratch.resize(nodes - 1, Row::default());
         self.shares.resize(nodes - 1, Shares::default());
-        self.rows.resize(nodes - 1, direct::Row::default());
+        self.rows.resize(nodes - 1, DirectRow::default());
     }
 
     /// The obstacles that any lane may touch in a step of `dt`.

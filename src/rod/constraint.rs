@@ -4,7 +4,7 @@
 //! `Ω` Darboux vectors as full quaternions `q̄1 q2`. All functions are generic over [`Real`], so
 //! the same lines run on one `f64` and on sixteen lanes.
 
-use crate::lanes::{Quaternion, Real, V3};
+use crate::lanes::{Lane, Quaternion, Real, V3};
 
 /// Keeps the denominators away from zero where everything at a constraint is fixed. The published
 /// reference implementation adds the same value, so golden vectors hold to the last digits.
@@ -118,6 +118,13 @@ impl<R: Real> BendShares<R> {
         let share = stiffness / (w1 + w2 + w1.lit(EPSILON));
         Self { first: w1 * share, second: w2 * share }
     }
+}
+
+/// What the iterations of a substep need of an edge's weights and of its joint's stiffness.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Shares {
+    pub(super) stretch: StretchShares<Lane>,
+    pub(super) bend: BendShares<Lane>,
 }
 
 /// Corrections of one stretch–shear projection: of both nodes and, unnormalised, of the orientation.

@@ -31,6 +31,7 @@ pub mod obstacle;
 pub mod step;
 pub mod stiffness;
 mod sweep;
+pub(crate) mod touch;
 
 pub use constraint::StretchProjection;
 pub use stiffness::{HairSolver, SolverMethod, Stiffness, Sweeps};

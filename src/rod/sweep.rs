@@ -10,20 +10,13 @@ use super::{
         BendShares, EdgeWeights, StretchProjection, StretchShares, bend_twist, stretch_shear,
     },
     obstacle::Obstacle,
-    step::{Grip, StepParams, touch},
+    touch::{Grip, touch},
 };
-use crate::lanes::{LANES, Lane, Quaternion, Real, V3, load, load4, store3, store4};
+use crate::lanes::{LANES, Quaternion, Real, V3, load, load4, store3, store4};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// How many iterations run down a strand one behind the other, at most.
 const ABREAST: usize = 8;
-
-/// What the iterations of a substep need of an edge's weights and of its joint's stiffness.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Shares {
-    stretch: StretchShares<Lane>,
-    bend: BendShares<Lane>,
-}
 
 /// How stretch–shear is projected, by the number that the sweeps are compiled for.
 const PROJECTIONS: [StretchProjection; 3] =
@@ -34,14 +27,15 @@ const PROJECTIONS: [StretchProjection; 3] =
 pub(super) fn project<S: Simd, const P: usize>(
     simd: S,
     b: &mut BlockLanes,
-    params: &StepParams,
+    iterations: u32,
+    skin: f32,
     obstacles: &[Obstacle],
 ) {
     share::<S, P>(simd, b);
-    let mut left = params.iterations as usize;
+    let mut left = iterations as usize;
     while left > 0 {
         let abreast = left.div_ceil(left.div_ceil(ABREAST));
-        sweeps::<S, P>(simd, b, abreast, params.skin, obstacles);
+        sweeps::<S, P>(simd, b, abreast, skin, obstacles);
         left -= abreast;
     }
     b.touched = [0.0; LANES];

@@ -7,24 +7,13 @@
 
 use super::{
     matrix::{Matrix, Pivot, Symmetric},
+    row::Row,
     width::Width,
 };
 use crate::{
     lanes::{Quaternion, Real, V3},
     rod::block::{EdgeLanes, NodeLanes},
 };
-
-/// What the way up needs of the way down: at index i of edge i and the node at its end.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C)]
-pub(crate) struct Row<C> {
-    near: [[C; 3]; 3],
-    far: [[C; 3]; 3],
-    solution: [C; 3],
-    lower: [C; 3],
-    twist: C,
-    twist_next: C,
-}
 
 /// What is the same for all nodes of a strand.
 #[derive(Clone, Copy)]

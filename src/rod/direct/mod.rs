@@ -33,19 +33,19 @@
 
 mod kernel;
 mod matrix;
+pub(super) mod row;
 mod width;
 
 use super::{
     block::BlockLanes,
     limiter::limit_strained,
     obstacle::Obstacle,
-    step::{Grip, contacts, contacts_with, predict_nodes},
     stiffness::REFERENCE_GRAVITY,
+    touch::{Grip, contacts, contacts_with, predict_nodes},
 };
 use crate::lanes::{LANES, Quaternion, Real, V3, load, load3, load4, splat3, store3, store4};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use glam::Vec3;
-pub(crate) use kernel::Row;
 use kernel::{HOLD, Stage};
 use width::{Half, Whole, Width};
 

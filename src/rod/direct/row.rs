@@ -1,0 +1,13 @@
+//! What the solve of a strand keeps of each edge.
+
+/// What the way up needs of the way down: at index i of edge i and the node at its end.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub(crate) struct Row<C> {
+    pub(super) near: [[C; 3]; 3],
+    pub(super) far: [[C; 3]; 3],
+    pub(super) solution: [C; 3],
+    pub(super) lower: [C; 3],
+    pub(super) twist: C,
+    pub(super) twist_next: C,
+}
