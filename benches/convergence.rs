@@ -1,11 +1,10 @@
 //! `cargo bench --bench convergence`: what a substep, an iteration and a Newton step of the limiter
-//! buy. Each row runs the same hair with another [`HairSolver`]; time and error stand side by side, so
-//! that settings of equal cost can be compared.
+//! buy. Each row runs the same hair with another solver; time and error stand side by side, so that
+//! settings of equal cost can be compared.
 //!
-//! Of the ways to solve a strand this compares: Gauss–Seidel sweeps from root to tip in all three
-//! projections, the same time spent on more substeps with fewer sweeps, and with or without the
-//! direct tridiagonal solve of the lengths (`limiter`). A direct solve of bending, a block tridiagonal
-//! system of 6 × 6 blocks, was not tried.
+//! Of the ways to solve a strand this compares: the direct solver at several substeps, Gauss–Seidel
+//! sweeps from root to tip in all three projections, the same time spent on more substeps with fewer
+//! sweeps, and with or without the direct tridiagonal solve of the lengths (`limiter`).
 //!
 //! The best of four runs on a 2-core x86-64 server machine with AVX-512 that others use, too:
 //!
@@ -45,6 +44,16 @@ fn main() {
         "projection | substeps × iterations | limiter | a second of 1,000 × 16, ms | \
          sag of 8; 32 segments over theory | strain of 64 segments shaken"
     );
+    for substeps in [1, 2, 3, 4, 6, 12] {
+        let app = || app(HairSolver::default(), Sweeps::default(), substeps);
+        println!(
+            "direct | {substeps} | | {:.1} | {:.3}; {:.3} | {:.4}",
+            cost(app()) * 1e3,
+            sag(app(), 8),
+            sag(app(), 32),
+            shaken(app()),
+        );
+    }
     for (projection, substeps, iterations, limiter_steps) in [
         (Split, 6, 5, 2),
         (Split, 6, 5, 1),
@@ -63,8 +72,9 @@ fn main() {
         (Split, 6, 20, 2),
         (Split, 12, 5, 2),
     ] {
-        let solver = Sweeps { projection, iterations, limiter_steps, ..default() };
-        let app = || app(solver, substeps);
+        let sweeps = Sweeps { projection, iterations, limiter_steps, ..default() };
+        let solver = HairSolver { method: SolverMethod::Sweeps, ..default() };
+        let app = || app(solver, sweeps, substeps);
         println!(
             "{projection:?} | {substeps} × {iterations} | {limiter_steps} | {:.1} | {:.3}; {:.3} | {:.4}",
             cost(app()) * 1e3,
@@ -75,13 +85,14 @@ fn main() {
     }
 }
 
-fn app(solver: HairSolver, substeps: u32) -> App {
+fn app(solver: HairSolver, sweeps: Sweeps, substeps: u32) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, HairPlugins::default()))
         .insert_resource(Time::<Fixed>::from_hz(60.0))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
         .insert_resource(HairSubsteps::Fixed(substeps))
         .insert_resource(HairDefault(solver))
+        .insert_resource(HairDefault(sweeps))
         .insert_resource(HairDefault(Cuticle { damage: 0.0, ..default() }))
         .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);

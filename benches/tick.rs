@@ -26,6 +26,7 @@ use bevy_keratin::{
     prelude::*,
     rod::{
         block::BlockLanes,
+        direct::{self, DirectParams},
         step::{StepParams, step},
     },
 };
@@ -110,6 +111,28 @@ fn projection_limiter_1(bencher: Bencher<'_, '_>, nodes: usize) {
 #[divan::bench(args = [9, 16, 64])]
 fn projection_limiter_2(bencher: Bencher<'_, '_>, nodes: usize) {
     substep(bencher, nodes, 5, 2);
+}
+
+/// A substep of the direct solver, with its limiter.
+#[divan::bench(args = [9, 16, 64])]
+fn direct_step(bencher: Bencher<'_, '_>, nodes: usize) {
+    let params = DirectParams {
+        dt: 1.0 / 360.0,
+        gravity: Vec3::NEG_Y * 9.8,
+        damping: 0.003,
+        limiter_steps: 6,
+        skin: 0.0,
+    };
+    let level = Level::new();
+    let mut block = block(nodes);
+    block.root_from = block.root;
+    block.nodes.iter_mut().for_each(|n| n.w = n.w.map(|w| if w == 0.0 { 0.0 } else { 1.0 }));
+    block.edges.iter_mut().for_each(|e| e.k = [1.0; LANES]);
+    direct::weigh(level, &mut block, 0.13);
+    // Items are segments, so that divan prints them per second.
+    bencher.counter(ItemsCount::new(LANES * (nodes - 1))).bench_local(|| {
+        direct::step(level, &mut block, &params, &[]);
+    });
 }
 
 /// A simulated second of 200 strands of 9 nodes over a floor, everything on, in a whole app: the

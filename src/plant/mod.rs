@@ -45,6 +45,7 @@ impl Plugin for PlantPlugin {
             .register_type::<PresetSettings>()
             .register_type::<Scalp>()
             .register_type::<ImageMap>()
+            .register_type::<MapChannel>()
             .register_type::<RootPlace>();
     }
 }

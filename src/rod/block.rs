@@ -83,7 +83,7 @@ pub struct BlockLanes {
     /// Whether any node moves so fast against an obstacle that it might pass through.
     pub(super) sweeps: bool,
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
-    pub(crate) root_from: [Lane; 4],
+    pub root_from: [Lane; 4],
     pub(super) theta: Lane,
     pub(super) touching: Lane,
     pub(super) root_between: [Lane; 4],

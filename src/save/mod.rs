@@ -220,6 +220,8 @@ pub struct SavePlugin;
 
 impl Plugin for SavePlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<Hairdo>().register_type::<HairdoError>();
+        app.register_type::<Hairdo>()
+            .register_type::<StyledStrand>()
+            .register_type::<HairdoError>();
     }
 }

@@ -130,12 +130,6 @@ impl<R: Real> Matrix<R> {
     }
 
     #[inline(always)]
-    pub fn minus(self, o: Self) -> Self {
-        let ([a, b, c], [x, y, z]) = (self.rows, o.rows);
-        Self { rows: [a - x, b - y, c - z] }
-    }
-
-    #[inline(always)]
     pub fn minus_symmetric(self, s: &Symmetric<R>) -> Self {
         let [x, y, z] = self.rows;
         Self {
@@ -143,19 +137,6 @@ impl<R: Real> Matrix<R> {
                 V3::new(x.x - s.xx, x.y - s.yx, x.z - s.zx),
                 V3::new(y.x - s.yx, y.y - s.yy, y.z - s.zy),
                 V3::new(z.x - s.zx, z.y - s.zy, z.z - s.zz),
-            ],
-        }
-    }
-
-    /// `self − a bᵀ`.
-    #[inline(always)]
-    pub fn minus_product(self, a: &Self, b: &Self) -> Self {
-        let ([x, y, z], [ax, ay, az], [bx, by, bz]) = (self.rows, a.rows, b.rows);
-        Self {
-            rows: [
-                row_from(x, ax, bx, by, bz),
-                row_from(y, ay, bx, by, bz),
-                row_from(z, az, bx, by, bz),
             ],
         }
     }

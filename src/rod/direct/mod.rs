@@ -34,6 +34,8 @@
 mod kernel;
 mod matrix;
 pub(super) mod row;
+#[cfg(test)]
+mod tests;
 mod width;
 
 use super::{

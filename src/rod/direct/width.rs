@@ -1,6 +1,7 @@
 //! How numbers lie in memory and in registers, so that one kernel serves lanes and a scalar twin.
 
 use crate::lanes::{Lane, Quaternion, Real, V3};
+#[cfg(test)]
 use core::marker::PhantomData;
 use fearless_simd::{Simd, f32x8, f32x16, prelude::*};
 
@@ -101,9 +102,11 @@ impl<S: Simd> Width for Half<S> {
 }
 
 /// One strand alone.
+#[cfg(test)]
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Single<T>(PhantomData<T>);
 
+#[cfg(test)]
 macro_rules! single {
     ($t:ty) => {
         impl Width for Single<$t> {
@@ -124,5 +127,5 @@ macro_rules! single {
         }
     };
 }
-single!(f32);
+#[cfg(test)]
 single!(f64);
