@@ -50,13 +50,13 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacle
     // The projection is chosen outside the loops, so that each has straight code inside.
     match params.projection {
         StretchProjection::Split => {
-            project::<S, 0>(simd, b, params.iterations, params.skin, obstacles)
+            project::<S, 0>(simd, b, params.iterations, params.skin, obstacles);
         }
         StretchProjection::Coupled => {
-            project::<S, 1>(simd, b, params.iterations, params.skin, obstacles)
+            project::<S, 1>(simd, b, params.iterations, params.skin, obstacles);
         }
         StretchProjection::Printed => {
-            project::<S, 2>(simd, b, params.iterations, params.skin, obstacles)
+            project::<S, 2>(simd, b, params.iterations, params.skin, obstacles);
         }
     }
     for _ in 0..params.limiter_steps {
