@@ -1,7 +1,7 @@
 //! Planting: hair for a mesh that has none, by rule.
 //!
 //! [`Planting`] says how dense, how long, which way and how curly; [`PlantingMaps`] says where more
-//! or less of it; [`Planting::plant`] makes a [`Groom`] of it and says on which triangle each strand
+//! or less of it; [`Planting::plant`] makes a [`Groom`](crate::groom::Groom) of it and says on which triangle each strand
 //! grows. The same settings, mesh and seed give the same bits.
 //!
 //! ```

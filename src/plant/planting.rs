@@ -36,7 +36,7 @@ impl Planting {
     ///
     /// # Errors
     /// When a setting is out of its range, the mesh has no triangles with an area or vertices that
-    /// are not finite, there would be more than [`MAX_ROOTS`] strands, or the curl has fewer than
+    /// are not finite, there would be more than [`MAX_ROOTS`](super::MAX_ROOTS) strands, or the curl has fewer than
     /// four nodes a turn.
     pub fn plant(&self, mesh: &Mesh) -> Result<Planted, PlantError> {
         self.plant_with(mesh, &PlantingMaps::new())

@@ -67,7 +67,7 @@ setting! {
 }
 
 /// Which way strands are combed: the direction in which they [lean](Planting::lean). A direction map
-/// ([`PlantingMaps::direction`]) goes before it.
+/// ([`PlantingMaps::direction`](super::PlantingMaps::direction)) goes before it.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum Comb {

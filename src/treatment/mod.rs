@@ -43,7 +43,7 @@ pub struct Treat {
 pub const LOTION_DISULFIDE: f32 = 0.8;
 
 impl Treat {
-    /// The range of [`rates`](Self::rates).
+    /// The range of the rates that bonds are brought to.
     pub const RATES: ValueRange = JointBonds::RATES.named("Treat::rates");
     /// The range of [`seconds`](Self::seconds).
     pub const SECONDS: ValueRange =
