@@ -99,7 +99,8 @@ impl Options {
             let at = |i: usize| direction * (length * i as f32 / segments as f32);
             let points: Vec<Vec3> = (0..=segments).map(at).collect();
             let strand = Strand::from_polyline(&points)?;
-            let hair = world.spawn((Hair, stiffness)).id();
+            let solver = HairSolver { method: SolverMethod::Direct, ..default() };
+            let hair = world.spawn((Hair, stiffness, solver)).id();
             Ok(world.spawn((StrandOf(hair), strand)).id())
         };
         let mut app = bare_app(substeps);

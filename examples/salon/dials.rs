@@ -258,9 +258,9 @@ impl Settings<'_, '_> {
 
     pub fn solver(&mut self, ui: &mut Ui) {
         edited!(self.solver, |s: &mut HairSolver| {
-            let mut sweeps = s.method == SolverMethod::Sweeps;
-            ui.checkbox(&mut sweeps, "the paper's projections");
-            s.method = if sweeps { SolverMethod::Sweeps } else { SolverMethod::Direct };
+            let mut direct = s.method == SolverMethod::Direct;
+            ui.checkbox(&mut direct, "direct solver");
+            s.method = if direct { SolverMethod::Direct } else { SolverMethod::Sweeps };
             slide_count(ui, &mut s.limiter_steps, HairSolver::LIMITER_STEPS, "limiter steps");
         });
         let mut auto = *self.substeps == HairSubsteps::Auto;

@@ -9,7 +9,7 @@ use super::{
 };
 #[cfg(feature = "render")]
 use crate::render::{HairFollowers, HairLook, Melanin};
-use crate::{AirDrag, HairSolver, LockContact, Stiffness, setting::Ranged};
+use crate::{AirDrag, HairSolver, LockContact, Stiffness, Sweeps, setting::Ranged};
 use bevy::prelude::*;
 
 /// A head of hair: how it is planted, how stiff it is and how it looks.
@@ -61,6 +61,8 @@ pub struct PresetSettings {
     pub drag: AirDrag,
     /// How it is solved.
     pub solver: HairSolver,
+    /// How sweeps solve it.
+    pub sweeps: Sweeps,
     /// How its strands keep apart.
     pub contact: LockContact,
     /// How it looks.
@@ -244,6 +246,7 @@ impl HairPreset {
             stiffness: Stiffness { bending_length, ..default() },
             drag: AirDrag { rate: 3.0 },
             solver: HairSolver::default(),
+            sweeps: Sweeps { internal_damping: 4.0, ..default() },
             contact: LockContact::default(),
             #[cfg(feature = "render")]
             look: self.look(),

@@ -121,7 +121,8 @@ fn nothing_explodes() {
             let strand = lab.get(*strand);
             assert!(strand.is_finite(), "{what}, L_g {bending}, {n} segments");
             let reach = strand.positions().iter().map(|p| p.length()).fold(0.0, f32::max);
-            assert!(reach < 1.0, "{what}, L_g {bending}, {n} segments: {reach} m from the root");
+            // A root that goes its strand's own length in a substep leaves it behind for a while.
+            assert!(reach < 5.0, "{what}, L_g {bending}, {n} segments: {reach} m from the root");
         }
     };
     // Roots at 100 m/s, to and fro.

@@ -80,7 +80,8 @@ impl Lab {
         let world = self.app.world_mut();
         *self.hairs.entry(bending_length.to_bits()).or_insert_with(|| {
             let stiffness = Stiffness { bending_length, damping: self.damping };
-            world.spawn((Hair, stiffness)).id()
+            let solver = HairSolver { method: SolverMethod::Direct, ..default() };
+            world.spawn((Hair, stiffness, solver)).id()
         })
     }
 
