@@ -1,6 +1,8 @@
 //! Hair grown from a groom: a few strands are simulated, the others drawn between them.
 
-use super::{Groom, GroomError, GroomStrand};
+#[cfg(feature = "render")]
+use super::GroomStrand;
+use super::{Groom, GroomError};
 use crate::{
     fault::{FaultKind, HairFault},
     setting::{Ranged, ValueRange, setting},
