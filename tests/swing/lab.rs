@@ -41,6 +41,7 @@ impl Lab {
             .insert_resource(HairDefault(Cuticle { damage: 0.0, ..default() }))
             .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }))
             .insert_resource(HairDefault(HairSleep::never()))
+            .insert_resource(HairDefault(HairSolver { method: SolverMethod::Direct, ..default() }))
             .init_resource::<Recording>()
             .add_systems(HairTick, record.in_set(HairSystems::Last));
         app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
@@ -80,8 +81,7 @@ impl Lab {
         let world = self.app.world_mut();
         *self.hairs.entry(bending_length.to_bits()).or_insert_with(|| {
             let stiffness = Stiffness { bending_length, damping: self.damping };
-            let solver = HairSolver { method: SolverMethod::Direct, ..default() };
-            world.spawn((Hair, stiffness, solver)).id()
+            world.spawn((Hair, stiffness)).id()
         })
     }
 
