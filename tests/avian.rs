@@ -7,7 +7,7 @@ use avian3d::prelude::{
     Collider, ColliderDisabled, Gravity, LinearVelocity, PhysicsPlugins, RigidBody,
 };
 use bevy::{prelude::*, time::TimeUpdateStrategy, transform::TransformPlugin};
-use bevy_keratin::{AvianHairCollider, AvianShapeError, ColliderShape, FaultKind, prelude::*};
+use bevy_keratin::{AvianHairCollider, AvianShapeError, ColliderShape, prelude::*};
 use common::{faults, one_strand, run, strand, test_app};
 
 /// Where the colliders of these tests are: below the middle of a strand along X.
