@@ -45,7 +45,8 @@ fn main() {
          sag of 8; 32 segments over theory | strain of 64 segments shaken"
     );
     for substeps in [1, 2, 3, 4, 6, 12] {
-        let app = || app(HairSolver::default(), Sweeps::default(), substeps);
+        let solver = HairSolver { method: SolverMethod::Direct, ..default() };
+        let app = || app(solver, Sweeps::default(), substeps);
         println!(
             "direct | {substeps} | | {:.1} | {:.3}; {:.3} | {:.4}",
             cost(app()) * 1e3,

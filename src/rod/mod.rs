@@ -11,7 +11,7 @@
 //! | [`stiffness`] | weights from the gravity-bending length (the paper gives none) |
 //! | [`block`] | strands side by side: their layout, into it and back |
 //! | [`step`] | one substep: predict, project, limit lengths, velocities |
-//! | [`direct`] | the default solver: one implicit step of a whole strand per substep |
+//! | [`direct`] | the direct solver: one implicit step of a whole strand per substep |
 //! | `sweep` | the iterations, root to tip, several at once |
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
 //! | [`obstacle`] | colliders as half-space, capsule and cylinder, with friction |

@@ -1,4 +1,4 @@
-//! StrandSleep: strands that lie still are left alone until something happens to them.
+//! Sleep: strands that lie still are left alone until something happens to them.
 //!
 //! Once a tick each strand is asked: has it stayed in its place for a while, and is nothing going on
 //! that could move it or its bonds? Then it sleeps ([`StrandSleep`](crate::StrandSleep)): velocities are zero,

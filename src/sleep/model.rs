@@ -1,4 +1,4 @@
-//! StrandSleep as mathematics: what counts as the same place.
+//! Sleep as mathematics: what counts as the same place.
 
 use crate::rod::obstacle::Solid;
 use glam::{Quat, Vec3};

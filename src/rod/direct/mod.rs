@@ -1,4 +1,4 @@
-//! The default solver: one direct implicit step of a whole strand per substep.
+//! The direct solver: one direct implicit step of a whole strand per substep.
 //!
 //! Projections that go from joint to joint make stiffness of the inverse inertia of orientations, so
 //! stiff hair gets a rotary inertia that no hair has, and converge like the square of the number of
