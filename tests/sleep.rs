@@ -325,7 +325,7 @@ fn water_wakes_it_and_wet_hair_does_not_sleep() {
 #[test]
 fn settings_wake_it() {
     wakes(set(Stiffness::from_bending_length(0.2).unwrap()));
-    wakes(set(HairSolver { method: SolverMethod::Direct, ..default() }));
+    wakes(set(HairSolver { method: SolverMethod::Sweeps, ..default() }));
     wakes(set(Sweeps { iterations: 7, ..default() }));
     wakes(set(BondInfluence { hydrogen: 0.4, ..default() }));
     wakes(set(Cuticle { damage: 0.5, ..default() }));

@@ -7,8 +7,8 @@ use super::{
     kind::BondKind,
     model::{FEW, JointBonds, Remembered, changed, remembered, rest_shape},
 };
-use crate::lanes::{Quaternion, Real, V3, transposed};
-use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, prelude::*};
+use crate::lanes::{Quaternion, Real, V3, dispatch, transposed};
+use fearless_simd::{Level, Simd, f32x4, f32x8, prelude::*};
 use glam::Quat;
 
 /// A strand's edges as its joints see them.

@@ -11,9 +11,9 @@ use super::{
     lanes::{self, Bridges, Penalty, Pieces, Row, Stack, Sum, WIDTH, WetRow},
     model::{Bridged, Film},
 };
-use crate::{grid::UniformGrid, parallel::for_each_block};
+use crate::{grid::UniformGrid, lanes::dispatch, parallel::for_each_block};
 use core::ops::Range;
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, Simd};
 use glam::Vec3;
 
 /// Margin of the lists, in units of the reach. More means longer lists, built less often.

@@ -1,8 +1,8 @@
 //! Balls, found by boxes that they reach into.
 
 use super::{Run, UniformGrid};
-use crate::lanes::{Real, V3, lanes_in, splat3};
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use crate::lanes::{Real, V3, dispatch, lanes_in, splat3};
+use fearless_simd::{Level, Simd, f32x16, prelude::*, u32x16};
 use glam::Vec3;
 
 const WIDTH: usize = 16;

@@ -4,12 +4,14 @@
 //! Mathematics is written once, generic over [`Real`], and runs on one `f64` as on sixteen lanes.
 
 mod algebra;
+mod dispatch;
 mod memory;
 mod real;
 mod transpose;
 
 pub(crate) use algebra::splat3;
 pub use algebra::{Quaternion, V3};
+pub(crate) use dispatch::{dispatch, with_token};
 pub use memory::{Lane, put3, put4, take3, take4};
 pub(crate) use memory::{load, load3, load4, store3, store4};
 pub(crate) use real::lanes_in;

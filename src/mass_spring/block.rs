@@ -11,15 +11,16 @@
 
 use super::{Springs, model::Xpbd};
 use crate::{
-    lanes::{LANES, Lane, Quaternion, Real, V3, load, load3, load4, store3, store4},
+    lanes::{LANES, Lane, Quaternion, Real, V3, dispatch, load, load3, load4, store3, store4},
     rod::{
         block::{BlockLanes, NodeLanes},
         limiter::{along_support, mobility},
         obstacle::{Obstacle, splat},
         touch::{contacts, predict_nodes},
+        tridiagonal::{Elimination, back},
     },
 };
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use glam::Vec3;
 
 /// How often a step that gains energy is halved before it is given up.
@@ -121,130 +122,146 @@ fn place<S: Simd>(simd: S, n: &NodeLanes) -> (V3<f32x16<S>>, V3<f32x16<S>>) {
 }
 
 /// The springs to the next but one node, one after the other from the root on.
-#[inline(always)]
+#[inline(never)]
 fn solve_over<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     tensions: &mut [Tensions],
     spring: Xpbd<f32x16<S>>,
 ) {
-    for i in 1..b.edges.len() {
-        let length = load(simd, &b.edges[i - 1].l) + load(simd, &b.edges[i].l);
-        let ((a, moved_a), (c, moved_c)) =
-            (place(simd, &b.nodes[i - 1]), place(simd, &b.nodes[i + 1]));
-        let (wa, wc) = (load(simd, &b.nodes[i - 1].w), load(simd, &b.nodes[i + 1].w));
-        let (u, distance) = span(a, c);
-        let held = &mut tensions[i - 1].over;
-        let tension = load(simd, held);
-        let excess = spring.excess(distance - length, (moved_c - moved_a).dot(u), tension);
-        let more = excess / (wa + wc + spring.compliance);
-        (tension + more).store_array(held);
-        store3(&mut b.nodes[i - 1].p, u.scale_add(wa * more, a));
-        store3(&mut b.nodes[i + 1].p, u.scale_add(-(wc * more), c));
-    }
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for i in 1..b.edges.len() {
+                let length = load(simd, &b.edges[i - 1].l) + load(simd, &b.edges[i].l);
+                let ((a, moved_a), (c, moved_c)) =
+                    (place(simd, &b.nodes[i - 1]), place(simd, &b.nodes[i + 1]));
+                let (wa, wc) = (load(simd, &b.nodes[i - 1].w), load(simd, &b.nodes[i + 1].w));
+                let (u, distance) = span(a, c);
+                let held = &mut tensions[i - 1].over;
+                let tension = load(simd, held);
+                let excess = spring.excess(distance - length, (moved_c - moved_a).dot(u), tension);
+                let more = excess / (wa + wc + spring.compliance);
+                (tension + more).store_array(held);
+                store3(&mut b.nodes[i - 1].p, u.scale_add(wa * more, a));
+                store3(&mut b.nodes[i + 1].p, u.scale_add(-(wc * more), c));
+            }
+        },
+    )
 }
 
 /// One Newton step on all springs along the strand at once: (J W Jᵀ + give) Δλ = excess, by the
 /// Thomas algorithm. `TOUCHING` heeds obstacles, as the rods' limiter does: a node that rests on one
 /// moves along it, or off it.
-#[inline(always)]
+#[inline(never)]
 fn solve_next<S: Simd, const TOUCHING: bool>(
     simd: S,
     b: &mut BlockLanes,
     tensions: &mut [Tensions],
     spring: Xpbd<f32x16<S>>,
 ) {
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    let none = V3::new(zero, zero, zero);
-    let (mut a, mut moved_a) = place(simd, &b.nodes[0]);
-    let (mut before, mut inverse, mut rhs) = (none, zero, zero);
-    for (i, tension) in tensions.iter().enumerate() {
-        let (c, moved_c) = place(simd, &b.nodes[i + 1]);
-        let (u, distance) = span(a, c);
-        let stretch = distance - load(simd, &b.edges[i].l);
-        let excess = spring.excess(stretch, (moved_c - moved_a).dot(u), load(simd, &tension.next));
-        // Neighbouring springs share a node: −u·W u′.
-        let coupling = -mobility::<S, TOUCHING>(simd, b, i, before, u);
-        let upper = coupling * inverse;
-        let pivot = mobility::<S, TOUCHING>(simd, b, i, u, u)
-            + mobility::<S, TOUCHING>(simd, b, i + 1, u, u)
-            + spring.compliance
-            - coupling * upper;
-        inverse = one / pivot;
-        rhs = (excess - coupling * rhs) * inverse;
-        let row = &mut b.scratch[i];
-        store3(&mut row.direction, u);
-        upper.store_array(&mut row.upper);
-        rhs.store_array(&mut row.rhs);
-        (a, moved_a, before) = (c, moved_c, u);
-    }
-    let (mut more, mut upper, mut pull) = (zero, zero, none);
-    for (i, held) in tensions.iter_mut().enumerate().rev() {
-        let row = &b.scratch[i];
-        more = load(simd, &row.rhs) - upper * more;
-        upper = load(simd, &row.upper);
-        let tension = load3(simd, &row.direction).scale(more);
-        (load(simd, &held.next) + more).store_array(&mut held.next);
-        let n = &mut b.nodes[i + 1];
-        let mut force = pull - tension;
-        if TOUCHING {
-            force = along_support(simd, n, force);
-        }
-        let p = force.scale_add(load(simd, &n.w), load3(simd, &n.p));
-        store3(&mut n.p, p);
-        pull = tension;
-    }
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let [zero, least] = [0.0, 1e-30].map(|value| f32x16::splat(simd, value));
+            let none = V3::new(zero, zero, zero);
+            let (mut a, mut moved_a) = place(simd, &b.nodes[0]);
+            let (mut before, mut rows) = (none, Elimination::new(zero));
+            for (i, tension) in tensions.iter().enumerate() {
+                let (c, moved_c) = place(simd, &b.nodes[i + 1]);
+                let (u, distance) = span(a, c);
+                let stretch = distance - load(simd, &b.edges[i].l);
+                let excess =
+                    spring.excess(stretch, (moved_c - moved_a).dot(u), load(simd, &tension.next));
+                // Neighbouring springs share a node: −u·W u′.
+                let coupling = -mobility::<S, TOUCHING>(simd, b, i, before, u);
+                let diagonal = mobility::<S, TOUCHING>(simd, b, i, u, u)
+                    + mobility::<S, TOUCHING>(simd, b, i + 1, u, u)
+                    + spring.compliance;
+                let upper = rows.row(coupling, diagonal, excess, least);
+                if i > 0 {
+                    upper.store_array(&mut b.scratch[i - 1].upper);
+                }
+                let row = &mut b.scratch[i];
+                store3(&mut row.direction, u);
+                zero.store_array(&mut row.upper);
+                rows.rhs.store_array(&mut row.rhs);
+                (a, moved_a, before) = (c, moved_c, u);
+            }
+            let (mut more, mut pull) = (zero, none);
+            for (i, held) in tensions.iter_mut().enumerate().rev() {
+                let row = &b.scratch[i];
+                more = back(load(simd, &row.rhs), load(simd, &row.upper), more);
+                let tension = load3(simd, &row.direction).scale(more);
+                (load(simd, &held.next) + more).store_array(&mut held.next);
+                let n = &mut b.nodes[i + 1];
+                let mut force = pull - tension;
+                if TOUCHING {
+                    force = along_support(simd, n, force);
+                }
+                let p = force.scale_add(load(simd, &n.w), load3(simd, &n.p));
+                store3(&mut n.p, p);
+                pull = tension;
+            }
+        },
+    )
 }
 
 /// Velocities from the change of the step. Where `alone` holds, nothing but gravity gave energy: what
 /// ends with more than it began with is taken back halfway until it does not, then slowed down.
-#[inline(always)]
+#[inline(never)]
 fn keep_energy<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     params: &StepParams,
     alone: <f32x16<S> as Real>::Mask,
 ) {
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    let half = f32x16::splat(simd, 0.5);
-    let gravity = splat(zero, params.gravity);
-    let pull = splat(zero, params.gravity * -params.dt);
-    let mut before = stored::<S, true>(simd, b, params);
-    for n in &b.nodes {
-        let v = load3(simd, &n.v) + pull;
-        before += half * mass(simd, n) * v.dot(v);
-    }
-    let mut left = left_of(simd, b, params, gravity, before);
-    for halved in 0..=HALVINGS {
-        let shorten = Real::select(alone, left, zero);
-        let gains = Real::lt(shorten, zero);
-        if gains.to_bitmask() == 0 {
-            break;
-        }
-        let keep = Real::select(gains, if halved < HALVINGS { half } else { zero }, one);
-        for n in &mut b.nodes {
-            let (p, moved) = place(simd, n);
-            let shorter = moved.scale_add(keep, load3(simd, &n.from));
-            store3(&mut n.p, V3::select(gains, shorter, p));
-        }
-        left = left_of(simd, b, params, gravity, before);
-    }
-    let rate = f32x16::splat(simd, 1.0 / params.dt);
-    let mut moving = zero;
-    for n in &b.nodes {
-        let (_, moved) = place(simd, n);
-        moving += half * mass(simd, n) * (rate * rate) * moved.dot(moved);
-    }
-    let slower = Real::sqrt(Real::max(left, zero) / Real::max(moving, f32x16::splat(simd, 1e-30)));
-    let slower = Real::select(alone, Real::min(slower, one), one);
-    let mut sum = zero;
-    for n in &mut b.nodes {
-        let (_, moved) = place(simd, n);
-        let v = moved.scale(rate * slower);
-        store3(&mut n.v, v);
-        sum += v.dot(v);
-    }
-    (sum * zero).store_array(&mut b.finite);
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+            let half = f32x16::splat(simd, 0.5);
+            let gravity = splat(zero, params.gravity);
+            let pull = splat(zero, params.gravity * -params.dt);
+            let mut before = stored::<S, true>(simd, b, params);
+            for n in &b.nodes {
+                let v = load3(simd, &n.v) + pull;
+                before += half * mass(simd, n) * v.dot(v);
+            }
+            let mut left = left_of(simd, b, params, gravity, before);
+            for halved in 0..=HALVINGS {
+                let shorten = Real::select(alone, left, zero);
+                let gains = Real::lt(shorten, zero);
+                if gains.to_bitmask() == 0 {
+                    break;
+                }
+                let keep = Real::select(gains, if halved < HALVINGS { half } else { zero }, one);
+                for n in &mut b.nodes {
+                    let (p, moved) = place(simd, n);
+                    let shorter = moved.scale_add(keep, load3(simd, &n.from));
+                    store3(&mut n.p, V3::select(gains, shorter, p));
+                }
+                left = left_of(simd, b, params, gravity, before);
+            }
+            let rate = f32x16::splat(simd, 1.0 / params.dt);
+            let mut moving = zero;
+            for n in &b.nodes {
+                let (_, moved) = place(simd, n);
+                moving += half * mass(simd, n) * (rate * rate) * moved.dot(moved);
+            }
+            let slower =
+                Real::sqrt(Real::max(left, zero) / Real::max(moving, f32x16::splat(simd, 1e-30)));
+            let slower = Real::select(alone, Real::min(slower, one), one);
+            let mut sum = zero;
+            for n in &mut b.nodes {
+                let (_, moved) = place(simd, n);
+                let v = moved.scale(rate * slower);
+                store3(&mut n.v, v);
+                sum += v.dot(v);
+            }
+            (sum * zero).store_array(&mut b.finite);
+        },
+    )
 }
 
 /// What there is for speeds: `before` and what gravity gave, less what the springs store now.

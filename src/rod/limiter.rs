@@ -9,7 +9,10 @@
 //! mended along the surface instead of against it, which would end in compression. A node that the
 //! strand pulls off the surface is let go.
 
-use super::block::{BlockLanes, NodeLanes};
+use super::{
+    block::{BlockLanes, NodeLanes},
+    tridiagonal::{Elimination, back},
+};
 use crate::lanes::{LANES, Real, V3, load};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
@@ -19,41 +22,100 @@ const FIRMNESS: f32 = 0.95;
 
 /// One Newton step on the lengths of every strand in the block; with `touched_only` of those that
 /// touch an obstacle. What a strand does never depends on the others in its block.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes, touched_only: bool) {
-    let touched = load(simd, &b.touched);
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    if b.touched == [0.0; LANES] {
-        eliminate::<S, false>(simd, b);
-        solve::<S, false, false>(simd, b, one);
-    } else {
-        eliminate::<S, true>(simd, b);
-        if touched_only {
-            solve::<S, true, true>(simd, b, Real::select(Real::lt(zero, touched), one, zero));
-        } else {
-            solve::<S, true, false>(simd, b, one);
-        }
-    }
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let touched = load(simd, &b.touched);
+            let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+            if b.touched == [0.0; LANES] {
+                eliminate::<S, false>(simd, b);
+                solve::<S, false, false>(simd, b, one);
+            } else {
+                eliminate::<S, true>(simd, b);
+                if touched_only {
+                    solve::<S, true, true>(
+                        simd,
+                        b,
+                        Real::select(Real::lt(zero, touched), one, zero),
+                    );
+                } else {
+                    solve::<S, true, false>(simd, b, one);
+                }
+            }
+        },
+    )
 }
 
-/// One Newton step for strands of which an edge is off its length by more than the share `tolerance`.
-/// Returns whether there were any.
-#[inline(always)]
-pub(super) fn limit_strained<S: Simd>(simd: S, b: &mut BlockLanes, tolerance: f32) -> bool {
-    let touching = b.touched != [0.0; LANES];
-    let worst =
-        if touching { eliminate::<S, true>(simd, b) } else { eliminate::<S, false>(simd, b) };
-    let strained = Real::lt(f32x16::splat(simd, tolerance), worst);
-    if strained.to_bitmask() == 0 {
-        return false;
-    }
-    let moves = Real::select(strained, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
-    if touching {
-        solve::<S, true, true>(simd, b, moves);
-    } else {
-        solve::<S, false, true>(simd, b, moves);
-    }
-    true
+/// One Newton step for strands of which an edge is off its length by more than the share `tolerance`,
+/// among the `lanes` that are not 0. Returns whether there were any.
+#[inline(never)]
+pub(super) fn limit_strained<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    tolerance: f32,
+    lanes: f32x16<S>,
+) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let touching = b.touched != [0.0; LANES];
+            let worst = if touching {
+                eliminate::<S, true>(simd, b)
+            } else {
+                eliminate::<S, false>(simd, b)
+            };
+            let strained = Real::lt(f32x16::splat(simd, tolerance), worst)
+                & Real::lt(f32x16::splat(simd, 0.0), lanes);
+            if strained.to_bitmask() == 0 {
+                return false;
+            }
+            let moves = Real::select(strained, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+            if touching {
+                solve::<S, true, true>(simd, b, moves);
+            } else {
+                solve::<S, false, true>(simd, b, moves);
+            }
+            true
+        },
+    )
+}
+
+/// The last resort where Newton steps on the lengths have failed, as when a root leaps farther than its
+/// strand is long: every edge off by more than the share `torn` gets its length back, root to tip, in the
+/// direction that it has. Edges before a held node are left: there is nowhere to go. Returns whether
+/// there were any.
+#[inline(never)]
+pub(super) fn clamp_lengths<S: Simd>(simd: S, b: &mut BlockLanes, torn: f32) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let [zero, one] = [0.0, 1.0].map(|value| f32x16::splat(simd, value));
+            let [least, most] = [1.0 - torn, 1.0 + torn].map(|share| f32x16::splat(simd, share));
+            let mut free = one;
+            for (node, row) in b.nodes[1..].iter().zip(&mut b.scratch).rev() {
+                let held = Real::lt(load(simd, &node.w), f32x16::splat(simd, 1e-12));
+                free = Real::select(held, zero, free);
+                free.store_array(&mut row.rhs);
+            }
+            let mut any = false;
+            for i in 0..b.edges.len() {
+                let l = load(simd, &b.edges[i].l);
+                let start = b.nodes[i].position(simd);
+                let (direction, length) = span(simd, start, b.nodes[i + 1].position(simd));
+                let off = Real::lt(length, l * least) | Real::lt(l * most, length);
+                let torn = off & Real::lt(zero, load(simd, &b.scratch[i].rhs));
+                if torn.to_bitmask() != 0 {
+                    any = true;
+                    let node = &mut b.nodes[i + 1];
+                    let to = direction.scale_add(l, start);
+                    node.set_position(V3::select(torn, to, node.position(simd)));
+                }
+            }
+            any
+        },
+    )
 }
 
 // Closures would be compiled without the instruction set of their caller where the compiler does not
@@ -106,34 +168,35 @@ pub(crate) fn along_support<S: Simd>(
 #[inline(always)]
 fn eliminate<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes) -> f32x16<S> {
     let edges = b.edges.len();
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let zero = f32x16::splat(simd, 0.0);
     // Pivots below this belong to edges with both ends held: nothing there can move.
     let tiny = f32x16::splat(simd, 1e-6);
     let mut worst = zero;
     let mut end = b.nodes[1].position(simd);
     let (mut d, mut length) = span(simd, b.nodes[0].position(simd), end);
-    let (mut lower, mut upper, mut rhs) = (zero, zero, zero);
+    let mut coupling = zero;
+    let mut rows = Elimination::new(zero);
     for i in 0..edges {
-        // Row i: lower λ_{i−1} + d_i·(W_i + W_{i+1})d_i λ_i + coupling λ_{i+1} = C_i, where the
-        // coupling of two rows is −d·W d′ of the node they share, and so the next row's `lower`.
-        let pivot = mobility::<S, TOUCHING>(simd, b, i, d, d)
-            + mobility::<S, TOUCHING>(simd, b, i + 1, d, d)
-            - lower * upper;
-        let inverse = Real::select(Real::lt(pivot, tiny), zero, one / pivot);
+        // Row i: coupling λ_{i−1} + d_i·(W_i + W_{i+1})d_i λ_i + … = C_i, where the coupling of two rows
+        // is −d·W d′ of the node they share.
+        let diagonal = mobility::<S, TOUCHING>(simd, b, i, d, d)
+            + mobility::<S, TOUCHING>(simd, b, i + 1, d, d);
         let off = length - load(simd, &b.edges[i].l);
         worst = Real::max(worst, Real::max(off, -off) / load(simd, &b.edges[i].l));
-        rhs = (off - lower * rhs) * inverse;
+        let upper = rows.row(coupling, diagonal, off, tiny);
+        if i > 0 {
+            b.scratch[i - 1].upper = upper.to_array();
+        }
         let s = &mut b.scratch[i];
         s.direction = [d.x.to_array(), d.y.to_array(), d.z.to_array()];
-        s.rhs = rhs.to_array();
+        s.rhs = rows.rhs.to_array();
+        s.upper = zero.to_array();
         if i + 1 < edges {
             let next = b.nodes[i + 2].position(simd);
             let (ahead, ahead_length) = span(simd, end, next);
-            let coupling = -mobility::<S, TOUCHING>(simd, b, i + 1, d, ahead);
-            upper = coupling * inverse;
-            (lower, d, length, end) = (coupling, ahead, ahead_length, next);
+            coupling = -mobility::<S, TOUCHING>(simd, b, i + 1, d, ahead);
+            (d, length, end) = (ahead, ahead_length, next);
         }
-        b.scratch[i].upper = upper.to_array();
     }
     worst
 }
@@ -153,7 +216,7 @@ fn solve<S: Simd, const TOUCHING: bool, const SOME: bool>(
     let mut pull = V3::new(zero, zero, zero);
     for i in (0..edges).rev() {
         let s = &b.scratch[i];
-        lambda = load(simd, &s.rhs) - load(simd, &s.upper) * lambda;
+        lambda = back(load(simd, &s.rhs), load(simd, &s.upper), lambda);
         let d = V3::new(
             load(simd, &s.direction[0]),
             load(simd, &s.direction[1]),

@@ -14,6 +14,7 @@
 //! | [`direct`] | the direct solver: one implicit step of a whole strand per substep |
 //! | `sweep` | the iterations, root to tip, several at once |
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
+//! | `tridiagonal` | the Thomas algorithm |
 //! | [`obstacle`] | colliders as half-space, capsule and cylinder, with friction |
 //!
 //! Strands of equal node count are solved [`LANES`](crate::lanes::LANES) side by side; see [`block`] for the layout.
@@ -32,6 +33,7 @@ pub mod step;
 pub mod stiffness;
 mod sweep;
 pub(crate) mod touch;
+pub(crate) mod tridiagonal;
 
 pub use constraint::StretchProjection;
 pub use stiffness::{HairSolver, SolverMethod, Stiffness, Sweeps};

@@ -13,8 +13,8 @@ use super::{
     sweep::project,
     touch::{contacts, predict_nodes},
 };
-use crate::lanes::{LANES, Real, V3, load, load3, load4, store3, store4};
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use crate::lanes::{LANES, Real, V3, dispatch, load, load3, load4, store3, store4};
+use fearless_simd::{Level, Simd, f32x16, prelude::*};
 
 /// Passes that a limiter step takes for strands that touch something.
 const PASSES_IN_TOUCH: u32 = 3;

@@ -72,12 +72,11 @@ impl Stiffness {
 #[reflect(Default, Clone, PartialEq)]
 pub enum SolverMethod {
     /// One direct implicit step of a whole strand per substep ([`direct`](super::direct)): stiffness,
-    /// periods, decay and sag are the hair's own at any segment count and step. New: hair that lies on
-    /// colliders does not come to rest as well as with sweeps yet, and stays awake.
+    /// periods, decay and sag are the hair's own at any segment count and step.
+    #[default]
     Direct,
     /// The paper's Gauss–Seidel projections, as [`Sweeps`] say: to compare with \[B\]. Stiff or finely
     /// divided hair swings too slowly and sags too far.
-    #[default]
     Sweeps,
 }
 
@@ -88,7 +87,7 @@ setting! {
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairSolver {
         /// Which method is used.
-        pub method: SolverMethod = SolverMethod::Sweeps;
+        pub method: SolverMethod = SolverMethod::Direct;
         /// Newton steps of the length limiter of the direct method, at most: it stops where lengths
         /// are right within 0.05 %. 0 turns it off.
         pub limiter_steps: u32 = 6, in LIMITER_STEPS: 0.0..=16.0, safe 1.0..=8.0,

@@ -77,7 +77,7 @@ struct Follower<S: Simd> {
 /// `abreast` Gauss–Seidel sweeps from root to tip: at each edge its bend–twist joint, then its
 /// stretch–shear, then the edge's start node against obstacles, which nothing else in this sweep
 /// moves. A sweep may follow two edges behind another: all that it reads there is as that leaves it.
-#[inline(always)]
+#[inline(never)]
 fn sweeps<S: Simd, const P: usize>(
     simd: S,
     b: &mut BlockLanes,
@@ -85,29 +85,40 @@ fn sweeps<S: Simd, const P: usize>(
     skin: f32,
     obstacles: &[Obstacle],
 ) {
-    let edges = b.edges.len();
-    let all = f32x16::splat(simd, 1.0);
-    let (before, p1) = (load4(simd, &b.root), b.nodes[0].position(simd));
-    let mut carried = [Follower { before, p1 }; ABREAST];
-    for step in 0..edges + 2 * (abreast - 1) {
-        for (k, carried) in carried.iter_mut().take(abreast).enumerate() {
-            let i = step.wrapping_sub(2 * k);
-            if i >= edges {
-                continue;
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let edges = b.edges.len();
+            let touching = !obstacles.is_empty();
+            let all = f32x16::splat(simd, 1.0);
+            let (before, p1) = (load4(simd, &b.root), b.nodes[0].position(simd));
+            let mut carried = [Follower { before, p1 }; ABREAST];
+            for step in 0..edges + 2 * (abreast - 1) {
+                for (k, carried) in carried.iter_mut().take(abreast).enumerate() {
+                    let i = step.wrapping_sub(2 * k);
+                    if i >= edges {
+                        continue;
+                    }
+                    if i == 0 {
+                        // The sweep before has left it here.
+                        carried.p1 = b.nodes[0].position(simd);
+                    }
+                    pass_edge::<S, P>(simd, b, i, carried);
+                    if touching {
+                        touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles, Grip::WHOLE, all);
+                    }
+                    if i + 1 == edges {
+                        store4(&mut b.edges[i].q, carried.before);
+                        store3(&mut b.nodes[i + 1].p, carried.p1);
+                        if touching {
+                            let tip = &mut b.nodes[i + 1];
+                            touch(simd, tip, b.sweeps, skin, obstacles, Grip::WHOLE, all);
+                        }
+                    }
+                }
             }
-            if i == 0 {
-                // The sweep before has left it here.
-                carried.p1 = b.nodes[0].position(simd);
-            }
-            pass_edge::<S, P>(simd, b, i, carried);
-            touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles, Grip::WHOLE, all);
-            if i + 1 == edges {
-                store4(&mut b.edges[i].q, carried.before);
-                store3(&mut b.nodes[i + 1].p, carried.p1);
-                touch(simd, &mut b.nodes[i + 1], b.sweeps, skin, obstacles, Grip::WHOLE, all);
-            }
-        }
-    }
+        },
+    )
 }
 
 /// One edge of a sweep.
@@ -139,8 +150,9 @@ fn pass_edge<S: Simd, const P: usize>(
 mod tests {
     use super::super::obstacle::Solid;
     use super::*;
+    use crate::lanes::dispatch;
     use crate::lanes::{V3, put3, put4};
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::Level;
     use glam::{Quat, Vec3};
 
     /// Strands that are far from where their constraints want them, each in its own way.

@@ -8,7 +8,7 @@ use crate::lanes::{LANES, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// v is already that of the forces, but for what `gain` adds to it; p* = p + v dt.
-#[inline(always)]
+#[inline(never)]
 pub(crate) fn predict_nodes<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
@@ -17,33 +17,38 @@ pub(crate) fn predict_nodes<S: Simd>(
     skin: f32,
     obstacles: &[Obstacle],
 ) {
-    let zero = f32x16::splat(simd, 0.0);
-    b.sweeps = false;
-    for n in &mut b.nodes {
-        let w = load(simd, &n.w);
-        let held = Real::lt(w, f32x16::splat(simd, 1e-12));
-        let p = load3(simd, &n.p);
-        // Nodes that begin inside an obstacle are set on its surface before the step, so that
-        // getting them out gives them no velocity. What comes at them gives them some.
-        let mut from = p;
-        for o in obstacles {
-            let start = o.taken_along(from);
-            if let Some((out, _)) = push_out(o, start, start, zero, skin, true) {
-                from = V3::select(held, from, from + (out - start));
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let zero = f32x16::splat(simd, 0.0);
+            b.sweeps = false;
+            for n in &mut b.nodes {
+                let w = load(simd, &n.w);
+                let held = Real::lt(w, f32x16::splat(simd, 1e-12));
+                let p = load3(simd, &n.p);
+                // Nodes that begin inside an obstacle are set on its surface before the step, so that
+                // getting them out gives them no velocity. What comes at them gives them some.
+                let mut from = p;
+                for o in obstacles {
+                    let start = o.taken_along(from);
+                    if let Some((out, _)) = push_out(o, start, start, zero, skin, true) {
+                        from = V3::select(held, from, from + (out - start));
+                    }
+                }
+                let v = load3(simd, &n.v);
+                // Held nodes carry where they come from in `from` and where they are to be in `p`.
+                let came_from = V3::select(held, load3(simd, &n.from), from);
+                store3(&mut n.from, came_from);
+                let mut to = (v + gain).scale_add(dt, from);
+                for o in obstacles {
+                    if let Some((before, _)) = hold_back(o, o.taken_along(from), to, skin) {
+                        (to, b.sweeps) = (before, true);
+                    }
+                }
+                store3(&mut n.p, V3::select(held, p, to));
             }
-        }
-        let v = load3(simd, &n.v);
-        // Held nodes carry where they come from in `from` and where they are to be in `p`.
-        let came_from = V3::select(held, load3(simd, &n.from), from);
-        store3(&mut n.from, came_from);
-        let mut to = (v + gain).scale_add(dt, from);
-        for o in obstacles {
-            if let Some((before, _)) = hold_back(o, o.taken_along(from), to, skin) {
-                (to, b.sweeps) = (before, true);
-            }
-        }
-        store3(&mut n.p, V3::select(held, p, to));
-    }
+        },
+    )
 }
 
 /// Takes nodes out of obstacles, with friction, and notes what touches.
@@ -67,7 +72,7 @@ impl Grip {
 }
 
 /// [`contacts`], where depths are not what a whole step's forces came to, and of lanes that are not 0.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn contacts_with<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
@@ -76,20 +81,26 @@ pub(super) fn contacts_with<S: Simd>(
     grip: Grip,
     lanes: f32x16<S>,
 ) {
-    b.touched = [0.0; LANES];
-    if obstacles.is_empty() {
-        return;
-    }
-    let mut touched = f32x16::splat(simd, 0.0);
-    for n in &mut b.nodes {
-        touched = Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles, grip, lanes));
-    }
-    touched.store_array(&mut b.touched);
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            b.touched = [0.0; LANES];
+            if obstacles.is_empty() {
+                return;
+            }
+            let mut touched = f32x16::splat(simd, 0.0);
+            for n in &mut b.nodes {
+                touched =
+                    Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles, grip, lanes));
+            }
+            touched.store_array(&mut b.touched);
+        },
+    )
 }
 
 /// Takes one node out of obstacles, with friction, and notes what it rests on. Returns 1 where it
 /// rests on any.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn touch<S: Simd>(
     simd: S,
     n: &mut NodeLanes,
@@ -99,38 +110,41 @@ pub(super) fn touch<S: Simd>(
     grip: Grip,
     lanes: f32x16<S>,
 ) -> f32x16<S> {
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    let mut touched = zero;
-    if obstacles.is_empty() {
-        return touched;
-    }
-    let held = Real::lt(load(simd, &n.w) * lanes, f32x16::splat(simd, 1e-12));
-    let from = load3(simd, &n.from);
-    let rested = n.support(simd);
-    let grip = Real::select(
-        Real::lt(zero, rested.dot(rested)),
-        f32x16::splat(simd, grip.resting),
-        f32x16::splat(simd, grip.others),
-    );
-    let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
-    for o in obstacles {
-        // What would take a node through has to be stopped in every pass: the shortest way out
-        // may be the wrong one.
-        if sweeps && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin) {
-            p = V3::select(held, p, before);
-            let stopped = Real::lt(zero, normal.dot(normal) * lanes);
-            rests_on = V3::select(stopped, normal, rests_on);
-            touched = Real::select(stopped, one, touched);
-        }
-        let friction = grip * f32x16::splat(simd, o.friction);
-        if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
-            p = V3::select(held, p, out);
-            let pushed = Real::lt(zero, normal.dot(normal) * lanes);
-            rests_on = V3::select(pushed, normal, rests_on);
-            touched = Real::select(pushed, one, touched);
-        }
-    }
-    store3(&mut n.p, p);
-    store3(&mut n.rests_on, rests_on);
-    touched
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+            let mut touched = zero;
+            let held = Real::lt(load(simd, &n.w) * lanes, f32x16::splat(simd, 1e-12));
+            let from = load3(simd, &n.from);
+            let rested = n.support(simd);
+            let grip = Real::select(
+                Real::lt(zero, rested.dot(rested)),
+                f32x16::splat(simd, grip.resting),
+                f32x16::splat(simd, grip.others),
+            );
+            let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
+            for o in obstacles {
+                // What would take a node through has to be stopped in every pass: the shortest way out
+                // may be the wrong one.
+                if sweeps && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin)
+                {
+                    p = V3::select(held, p, before);
+                    let stopped = Real::lt(zero, normal.dot(normal) * lanes);
+                    rests_on = V3::select(stopped, normal, rests_on);
+                    touched = Real::select(stopped, one, touched);
+                }
+                let friction = grip * f32x16::splat(simd, o.friction);
+                if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
+                    p = V3::select(held, p, out);
+                    let pushed = Real::lt(zero, normal.dot(normal) * lanes);
+                    rests_on = V3::select(pushed, normal, rests_on);
+                    touched = Real::select(pushed, one, touched);
+                }
+            }
+            store3(&mut n.p, p);
+            store3(&mut n.rests_on, rests_on);
+            touched
+        },
+    )
 }

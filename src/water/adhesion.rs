@@ -8,9 +8,9 @@ use super::{
     strand_block::{Row, StrandBlock, StrandLane},
 };
 use crate::grid::Found;
-use crate::lanes::{LANES, Lane, Real, V3, lanes_in, load, load3, splat3, store3};
+use crate::lanes::{LANES, Lane, Real, V3, dispatch, lanes_in, load, load3, splat3, store3};
 use bevy::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*, u32x16};
 
 /// A node whose squared distance from a droplet's centre (m²) is not more is pulled nowhere.
 const SAME_PLACE: f32 = 1e-18;

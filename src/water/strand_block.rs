@@ -5,11 +5,14 @@
 
 use super::Wetting;
 use crate::{
-    lanes::{LANES, Lane, V3, load3, put_numbers, put_vectors, put3, splat3, take_vectors, take3},
+    lanes::{
+        LANES, Lane, V3, dispatch, load3, put_numbers, put_vectors, put3, splat3, take_vectors,
+        take3,
+    },
     strand::Hair,
 };
 use bevy::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, f32x16, prelude::*};
 
 /// A strand among droplets.
 pub(super) struct StrandLane<'a> {

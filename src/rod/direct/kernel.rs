@@ -12,7 +12,10 @@ use super::{
 };
 use crate::{
     lanes::{Quaternion, Real, V3},
-    rod::block::{EdgeLanes, NodeLanes},
+    rod::{
+        block::{EdgeLanes, NodeLanes},
+        tridiagonal::{Elimination, back},
+    },
 };
 
 /// What is the same for all nodes of a strand.
@@ -28,8 +31,8 @@ pub(crate) struct Stage<R> {
     pub damping: R,
     /// 1 in lanes that take this Newton step, 0 in lanes that are done. Where nothing touches, all do.
     pub again: R,
-    /// 1 in lanes that touch an obstacle, else 0: others start where their inertia takes them.
-    pub touching: R,
+    /// 1 in lanes that take two Newton steps, else 0: others start where their inertia takes them.
+    pub twice: R,
 }
 
 /// How firmly a node that rests on an obstacle is held out of it, in shares of its inertia. Without
@@ -122,9 +125,9 @@ fn first_axis<R: Real>(q: Quaternion<R>) -> V3<R> {
 }
 
 /// Assembles and eliminates from the root to the tip, with frames carried to where the nodes are.
-/// `TOUCHING`: something touches, so obstacles are heeded, and lanes may have to wait.
+/// `TWICE`: some lanes take two Newton steps, which heed obstacles, and others have to wait.
 #[inline(always)]
-pub(crate) fn down<W: Width, const TOUCHING: bool>(
+pub(crate) fn down<W: Width, const TWICE: bool>(
     w: W,
     nodes: &[NodeLanes<W::Cell>],
     edges: &mut [EdgeLanes<W::Cell>],
@@ -180,7 +183,7 @@ pub(crate) fn down<W: Width, const TOUCHING: bool>(
             let turn = V3::select(crushed, none, turn);
             let r = w.lit(1.0) / length.max(l * w.lit(0.2));
             let t = V3::select(crushed, q.tangent(), e.scale(r));
-            w.put4(if TOUCHING { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
+            w.put4(if TWICE { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
             let tension = (axial * (length - l)).max(w.get(&edge.tension)).max(zero);
             let across = W::Real::select(crushed, axial, tension * r);
             let k = w.get(&edge.k);
@@ -207,7 +210,7 @@ pub(crate) fn down<W: Width, const TOUCHING: bool>(
             let pull = couple.cross(before.t).scale_add(-before.r, before.pull);
             if i > 0 {
                 // Node i, between edges i − 1 and i.
-                left = eliminate::<W, TOUCHING>(
+                left = eliminate::<W, TWICE>(
                     w,
                     &nodes[i],
                     &mut rows[i - 1],
@@ -226,7 +229,7 @@ pub(crate) fn down<W: Width, const TOUCHING: bool>(
     }
     // The tip.
     let nothing = Matrix::zero(zero);
-    eliminate::<W, TOUCHING>(
+    eliminate::<W, TWICE>(
         w,
         &nodes[count],
         &mut rows[count - 1],
@@ -243,7 +246,7 @@ pub(crate) fn down<W: Width, const TOUCHING: bool>(
 /// Node `node` out of the system: `diagonal` and `next` its blocks, −`far` that with the node after
 /// the next, `force` what edges pull it with.
 #[inline(always)]
-fn eliminate<W: Width, const TOUCHING: bool>(
+fn eliminate<W: Width, const TWICE: bool>(
     w: W,
     node: &NodeLanes<W::Cell>,
     row: &mut Row<W::Cell>,
@@ -260,12 +263,12 @@ fn eliminate<W: Width, const TOUCHING: bool>(
     let inert = mass * inertia;
     let mut a = diagonal.plus(left.next).plus_diagonal(inert);
     let mut b = stage.gravity.scale_add(mass, force + left.b_next);
-    if TOUCHING {
+    if TWICE {
         let n = w.get3(&node.rests_on);
         a = a.plus_outer(n, inert * w.lit(HOLD));
         let inertial = w.get3(&node.v).scale_add(stage.ahead, w.get3(&node.from));
         let pulled = (inertial - w.get3(&node.p)).scale_add(inert, b);
-        b = V3::select(w.lit(0.0).lt(stage.touching), pulled, b);
+        b = V3::select(w.lit(0.0).lt(stage.twice), pulled, b);
     }
     let next = next.plus(left.between);
     let pivot = Pivot::new(&a, inert * w.lit(1e-3), held);
@@ -295,7 +298,7 @@ fn eliminate<W: Width, const TOUCHING: bool>(
 
 /// Solves from the tip to the root and moves nodes, beyond the solution as the stage says.
 #[inline(always)]
-pub(crate) fn up<W: Width, const TOUCHING: bool>(
+pub(crate) fn up<W: Width, const TWICE: bool>(
     w: W,
     nodes: &mut [NodeLanes<W::Cell>],
     edges: &mut [EdgeLanes<W::Cell>],
@@ -320,7 +323,7 @@ pub(crate) fn up<W: Width, const TOUCHING: bool>(
             let y1 = (-l.z).mul_add(from.z, from.y);
             let x1 = (-l.y).mul_add(from.z, (-l.x).mul_add(y1, from.x));
             solved = V3::new(x1, y1, from.z);
-            if TOUCHING {
+            if TWICE {
                 // Lanes that are done stay, to the bit, and so does their tension.
                 solved = V3::select(w.lit(0.0).lt(stage.again), solved, none);
             }
@@ -328,7 +331,7 @@ pub(crate) fn up<W: Width, const TOUCHING: bool>(
         }
         let start = w.get3(&node.from);
         let to = (y - start).scale_add(stage.beyond, start);
-        let to = if TOUCHING { V3::select(w.lit(0.0).lt(stage.again), to, y) } else { to };
+        let to = if TWICE { V3::select(w.lit(0.0).lt(stage.again), to, y) } else { to };
         w.put3(to, &mut node.p);
         if i < edges.len() {
             let edge = &mut edges[i];
@@ -336,11 +339,8 @@ pub(crate) fn up<W: Width, const TOUCHING: bool>(
             let t = q.tangent();
             let tension = w.get(&edge.axial) * (t.dot(end - y) - w.get(&edge.l));
             let again = w.lit(0.0).lt(stage.again);
-            let tension = if TOUCHING {
-                W::Real::select(again, tension, w.get(&edge.tension))
-            } else {
-                tension
-            };
+            let tension =
+                if TWICE { W::Real::select(again, tension, w.get(&edge.tension)) } else { tension };
             w.put(tension, &mut edge.tension);
         }
         end = y;
@@ -371,7 +371,7 @@ pub(crate) fn finish<W: Width>(
     // moment along the tangents it joins, and −K t·t′ off the diagonal.
     let mut before = Twist { q: w.get4(root), t: w.zero3(), k: zero, moment: zero, coupling: zero };
     before.t = before.q.tangent();
-    let (mut rhs, mut upper) = (zero, zero);
+    let mut turns = Elimination::new(zero);
     for i in 0..nodes.len() {
         let node = &mut nodes[i];
         let to = w.get3(&node.p);
@@ -395,15 +395,11 @@ pub(crate) fn finish<W: Width>(
         let now = Twist { q, t, k, moment: elastic.dot(t), coupling: -(k * t.dot(before.t)) };
         if i > 1 {
             before.moment = before.moment - elastic.dot(before.t);
-            (rhs, upper) = before.eliminate(k, rhs, upper, &mut rows[i - 2], w);
-            upper = now.coupling * upper;
-            w.put(upper, &mut rows[i - 2].twist_next);
+            before.eliminate(k, &mut turns, rows, i - 2, w);
         }
         before = now;
     }
-    let last = edges.len() - 1;
-    before.eliminate(zero, rhs, upper, &mut rows[last], w);
-    w.put(zero, &mut rows[last].twist_next);
+    before.eliminate(zero, &mut turns, rows, edges.len() - 1, w);
     sum * zero
 }
 
@@ -421,21 +417,22 @@ struct Twist<R> {
 }
 
 impl<R: Real> Twist<R> {
-    /// Returns the right-hand side of its row and the inverse of its pivot.
+    /// Eliminates the row of edge `i`, before a joint of stiffness `k_next`.
     #[inline(always)]
     fn eliminate<W: Width<Real = R>>(
         &self,
         k_next: R,
-        rhs: R,
-        upper: R,
-        row: &mut Row<W::Cell>,
+        turns: &mut Elimination<R>,
+        rows: &mut [Row<W::Cell>],
+        i: usize,
         w: W,
-    ) -> (R, R) {
-        let pivot = (-self.coupling).mul_add(upper, self.k + k_next);
-        let inverse = w.lit(1.0) / pivot.max(w.lit(1e-30));
-        let rhs = -(self.coupling.mul_add(rhs, self.moment)) * inverse;
-        w.put(rhs, &mut row.twist);
-        (rhs, inverse)
+    ) {
+        let upper = turns.row(self.coupling, self.k + k_next, -self.moment, w.lit(1e-30));
+        if i > 0 {
+            w.put(upper, &mut rows[i - 1].twist_next);
+        }
+        w.put(turns.rhs, &mut rows[i].twist);
+        w.put(w.lit(0.0), &mut rows[i].twist_next);
     }
 }
 
@@ -444,7 +441,7 @@ impl<R: Real> Twist<R> {
 pub(crate) fn untwist<W: Width>(w: W, edges: &mut [EdgeLanes<W::Cell>], rows: &[Row<W::Cell>]) {
     let mut twist = w.lit(0.0);
     for (edge, row) in edges.iter_mut().zip(rows).rev() {
-        twist = (-w.get(&row.twist_next)).mul_add(twist, w.get(&row.twist));
+        twist = back(w.get(&row.twist), w.get(&row.twist_next), twist);
         twist = twist.max(w.lit(-1.5)).min(w.lit(1.5));
         // About the tangent, which in the edge's own frame is e3.
         let q = w.get4(&edge.q);

@@ -40,13 +40,15 @@ mod width;
 
 use super::{
     block::BlockLanes,
-    limiter::limit_strained,
+    limiter::{clamp_lengths, limit_strained},
     obstacle::Obstacle,
     stiffness::REFERENCE_GRAVITY,
     touch::{Grip, contacts, contacts_with, predict_nodes},
 };
-use crate::lanes::{LANES, Quaternion, Real, V3, load, load3, load4, splat3, store3, store4};
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use crate::lanes::{
+    LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,
+};
+use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use glam::Vec3;
 use kernel::{HOLD, Stage};
 use width::{Half, Whole, Width};
@@ -71,12 +73,25 @@ pub struct DirectParams {
 /// Where in the substep forces are taken; see the [module](self).
 const THETA: f32 = 0.65;
 
+/// Turn of an edge in a substep (rad) from which on a strand takes two Newton steps.
+const WHIP: f32 = 0.05;
+
 /// Strain at the root of a straight hanging strand, which says how stiff hair is against stretching.
 /// Stiffer, f32 would not carry it; softer, the limiter would have to take stretching away, which bends.
 const STRAIN: f32 = 1e-4;
 
 /// Strain that the limiter leaves.
 const TOLERANCE: f32 = 5e-4;
+
+/// Strain beyond which Newton steps on the lengths have failed.
+const TORN: f32 = 0.01;
+
+/// Depth in an obstacle, in edges, from which on a strand is taken out of it before the step.
+const DEEP: f32 = 0.25;
+
+/// L_g in lengths of the strand, at most. Such hair sags by less than a thousandth of its length; f32
+/// would not carry it much stiffer.
+const STIFFEST: f32 = 6.0;
 
 /// Takes the block through one substep, on the instruction set that the machine has.
 #[doc(hidden)]
@@ -89,33 +104,34 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
     let theta = predict(simd, b, params, obstacles);
     let one = f32x16::splat(simd, 1.0);
     theta.store_array(&mut b.theta);
-    b.touching = b.touched;
+    let whips = whips(simd, b, params.dt);
+    Real::max(load(simd, &b.touched), whips).store_array(&mut b.twice);
     let (from, to) = (load4(simd, &b.root_from), load4(simd, &b.root));
     let backwards = Real::lt(from.dot(to), f32x16::splat(simd, 0.0));
     let share = Real::select(backwards, -theta, theta);
     let between = Quaternion::new(from.v.scale(one - theta), from.w * (one - theta));
     store4(&mut b.root_between, between.add_scaled(to, share).normalize());
-    if b.touched == [0.0; LANES] {
+    if b.twice == [0.0; LANES] {
         newton::<S, false>(simd, b, params, 1);
     } else {
+        newton::<S, true>(simd, b, params, 2);
         // Which nodes an obstacle bears is not known before: the first step shows.
-        for left in [2, 1] {
-            newton::<S, true>(simd, b, params, left);
-            if left > 1 {
-                let touching = load(simd, &b.touching);
-                contacts_with(simd, b, params.skin, obstacles, Grip::NONE, touching);
-            }
-        }
+        let twice = load(simd, &b.twice);
+        contacts_with(simd, b, params.skin, obstacles, Grip::NONE, twice);
+        newton::<S, true>(simd, b, params, 1);
     }
     // What obstacles hold has left that share of its depth.
     let grip = Grip { resting: 1.0 + HOLD as f32, others: 1.0 };
     let all = f32x16::splat(simd, 1.0);
     contacts_with(simd, b, params.skin, obstacles, grip, all);
     for pass in 0..params.limiter_steps {
-        if !limit_strained(simd, b, if pass == 0 { -1.0 } else { TOLERANCE }) {
+        if !limit_strained(simd, b, if pass == 0 { -1.0 } else { TOLERANCE }, all) {
             break;
         }
         contacts(simd, b, params.skin, obstacles);
+        if pass + 1 == params.limiter_steps && clamp_lengths(simd, b, TORN) {
+            contacts(simd, b, params.skin, obstacles);
+        }
     }
     finish(simd, b, params);
 }
@@ -137,34 +153,48 @@ macro_rules! in_lanes {
 }
 
 /// One Newton step; `left` counts this one and those that follow.
-#[inline(always)]
-fn newton<S: Simd, const TOUCHING: bool>(
+#[inline(never)]
+fn newton<S: Simd, const TWICE: bool>(
     simd: S,
     b: &mut BlockLanes,
     params: &DirectParams,
     left: u32,
 ) {
-    in_lanes!(simd, w => {
-        let mut stage = stage(w, b, params);
-        if left == 1 && TOUCHING {
-            stage.again = stage.touching;
-        }
-        let BlockLanes { nodes, edges, rows, root_between, .. } = &mut *b;
-        kernel::down::<_, TOUCHING>(w, nodes, edges, rows, root_between, &stage);
-        kernel::up::<_, TOUCHING>(w, nodes, edges, rows, &stage);
-    });
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            in_lanes!(simd, w => {
+                let mut stage = stage(w, b, params);
+            if TWICE && left == 1 {
+                stage.again = stage.twice;
+            }
+            if TWICE && left == 2 {
+                let on_the_way = w.lit(0.0).lt(stage.twice);
+                stage.beyond = <_ as Real>::select(on_the_way, w.lit(1.0), stage.beyond);
+            }
+            let BlockLanes { nodes, edges, rows, root_between, .. } = &mut *b;
+                kernel::down::<_, TWICE>(w, nodes, edges, rows, root_between, &stage);
+                kernel::up::<_, TWICE>(w, nodes, edges, rows, &stage);
+            });
+        },
+    )
 }
 
 /// Frames, velocities, twist.
-#[inline(always)]
+#[inline(never)]
 fn finish<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams) {
-    in_lanes!(simd, w => {
-        let stage = stage(w, b, params);
-        let BlockLanes { nodes, edges, rows, root, finite, .. } = &mut *b;
-        let sum = kernel::finish(w, nodes, edges, rows, root, params.dt, &stage);
-        kernel::untwist(w, edges, rows);
-        w.put(sum, finite);
-    });
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            in_lanes!(simd, w => {
+                let stage = stage(w, b, params);
+                let BlockLanes { nodes, edges, rows, root, finite, .. } = &mut *b;
+                let sum = kernel::finish(w, nodes, edges, rows, root, params.dt, &stage);
+                kernel::untwist(w, edges, rows);
+                w.put(sum, finite);
+            });
+        },
+    )
 }
 
 #[inline(always)]
@@ -185,7 +215,7 @@ fn stage<W: Width<Cell = crate::lanes::Lane>>(
         ),
         damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
         again: w.lit(1.0),
-        touching: w.get(&b.touching),
+        twice: w.get(&b.twice),
     }
 }
 
@@ -208,6 +238,7 @@ fn predict<S: Simd>(
         let v = load3(simd, &n.v) - gain;
         store3(&mut n.v, v);
     }
+    surface(simd, b, params, obstacles);
     fall(simd, b, dt * theta, gravity, params.skin, obstacles);
     if b.touched != [0.0; LANES] {
         let touched = Real::lt(zero, load(simd, &b.touched));
@@ -234,8 +265,61 @@ fn predict<S: Simd>(
     theta
 }
 
-/// Nodes to where they would be after `ahead` by themselves, or on what is in the way.
+/// 1 in lanes of which an edge is about to turn far, else 0. One Newton step does not end near the solution
+/// there, and a whip that cracks would gain energy.
 #[inline(always)]
+fn whips<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let mut before = load3(simd, &b.nodes[0].v);
+    let mut fastest = zero;
+    for (n, e) in b.nodes[1..].iter().zip(&b.edges) {
+        let v = load3(simd, &n.v);
+        let (l, apart) = (load(simd, &e.l), v - before);
+        fastest = Real::max(fastest, apart.dot(apart) / (l * l));
+        before = v;
+    }
+    let limit = f32x16::splat(simd, (WHIP / dt) * (WHIP / dt));
+    Real::select(Real::lt(limit, fastest), one, zero)
+}
+
+/// Strands that begin deep inside an obstacle, as where they are spawned in one, get out of it with
+/// their lengths before the step, so that it gives them no velocity. What is only pushed in by other
+/// hair is left to the step.
+#[inline(never)]
+fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacles: &[Obstacle]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut deepest = f32x16::splat(simd, f32::NEG_INFINITY);
+            for o in obstacles {
+                for n in &b.nodes[1..] {
+                    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+                    let (_, depth) = o.solid.depth(o.taken_along(load3(simd, &n.p)), params.skin);
+                    deepest = Real::select(held, deepest, Real::max(deepest, depth));
+                }
+            }
+            let deep = Real::lt(load(simd, &b.edges[0].l) * f32x16::splat(simd, DEEP), deepest);
+            if deep.to_bitmask() == 0 {
+                return;
+            }
+            let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+            b.sweeps = false;
+            for n in &mut b.nodes {
+                n.rests_on = Default::default();
+            }
+            // Each round carries what was mended by about an edge.
+            for _ in 0..2 * b.edges.len() {
+                contacts_with(simd, b, params.skin, obstacles, Grip::NONE, deep);
+                if !limit_strained(simd, b, TORN, deep) {
+                    return;
+                }
+            }
+        },
+    )
+}
+
+/// Nodes to where they would be after `ahead` by themselves, or on what is in the way.
+#[inline(never)]
 fn fall<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
@@ -244,8 +328,13 @@ fn fall<S: Simd>(
     skin: f32,
     obstacles: &[Obstacle],
 ) {
-    predict_nodes(simd, b, ahead, gravity.scale(ahead), skin, obstacles);
-    contacts_with(simd, b, skin, obstacles, Grip::NONE, f32x16::splat(simd, 1.0));
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            predict_nodes(simd, b, ahead, gravity.scale(ahead), skin, obstacles);
+            contacts_with(simd, b, skin, obstacles, Grip::NONE, f32x16::splat(simd, 1.0));
+        },
+    )
 }
 
 /// Makes masses and stiffnesses of what was gathered: of a node `w` in those of dry nodes, of a joint
@@ -266,8 +355,8 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32) {
     let edges = b.edges.len() as f32;
     // A whole node weighs 1: what is per mass is to be multiplied by that.
     let density = f32x16::splat(simd, edges) / sum;
-    let bending = 2.0 * REFERENCE_GRAVITY * bending_length * bending_length * bending_length;
-    let bending = density * f32x16::splat(simd, bending);
+    let stiff = Real::min(f32x16::splat(simd, bending_length), sum * f32x16::splat(simd, STIFFEST));
+    let bending = density * f32x16::splat(simd, 2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
     let axial = f32x16::splat(simd, REFERENCE_GRAVITY * edges / STRAIN);
     let mut before = zero;
     for (i, n) in b.nodes.iter_mut().enumerate() {

@@ -114,7 +114,7 @@ fn lanes_agree_with_a_strand_of_f64_alone() {
         gravity: V3::new(0.0, -9.8, 0.0),
         damping: 0.003 - (2.0 * theta - 1.0) * dt,
         again: 1.0,
-        touching: 0.0,
+        twice: 0.0,
     };
     let mut rows = vec![Row::default(); edges.len()];
     let root = block.root.each_ref().map(wide);
