@@ -111,6 +111,7 @@ fn hair_goes_along_with_a_teleport_and_is_at_rest() {
     for (announced, jump) in [(false, 100.0), (true, 0.4)] {
         let mut app = test_app(60.0);
         let head = head(&mut app, 50, 1.0);
+        run(&mut app, 4.0);
         let before = all(&mut app);
         let hair = app.world_mut().query_filtered::<Entity, With<Hair>>().single(app.world());
         if announced {

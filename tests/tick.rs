@@ -49,7 +49,8 @@ fn each_set_does_its_part_and_no_other() {
             }
         }
     };
-    // Wet hair's rest shape follows the present one, so it changes in every substep.
+    // With sweeps wet hair's rest shape follows the present one, so it changes in every substep.
+    app.insert_resource(HairDefault(HairSolver { method: SolverMethod::Sweeps, ..default() }));
     let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::X);
     app.world_mut().write_message(Treat::wet(hair));
     app.update();

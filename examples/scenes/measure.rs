@@ -32,12 +32,13 @@ pub fn kept(now: &[Vec<Vec3>], held: &[Vec<Vec3>]) -> f64 {
 }
 
 /// The mean radius of curvature from sin(θ/2) = l/(2R) (m), over the joints that are on the curl:
-/// those that `held` bends at least half as much as its most bent one. None for straight hair.
+/// those that `held` bends at least three quarters as much as its most bent one, so not the one where it
+/// goes on the rod. None for straight hair.
 pub fn curl_radius(shapes: &[Vec<Vec3>], held: &[Vec<Vec3>], segment: f32) -> Option<f64> {
     let most = held.iter().flatten().map(|o| o.length()).fold(0.0, f32::max);
     let (mut sum, mut n) = (0.0, 0);
     for (now, held) in shapes.iter().flatten().zip(held.iter().flatten()) {
-        if held.length() >= 0.5 * most {
+        if held.length() >= 0.75 * most {
             sum += f64::from(segment / (2.0 * now.length()));
             n += 1;
         }

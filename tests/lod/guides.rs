@@ -123,8 +123,9 @@ fn nothing_pops_while_hair_swings_and_velocities_are_those_of_the_motion() {
              {plain} m without; {apart} m apart after the first tick; strain {strain}; velocities off by {off} m a tick"
     );
     assert!(seen[0][58] == seen[1][58] && apart > 0.0, "the same until then");
-    assert!(apart < 4e-3, "{apart} m");
-    assert!(begun < 1.2 * plain + 1e-3, "{begun} m, {plain} m without");
+    // By its own motion alone: what swings is pulled by up to five times its weight.
+    assert!(apart < 8e-3, "{apart} m apart");
+    assert!(begun < 1.2 * plain + 3e-3, "{begun} m, {plain} m without");
     assert!(ended < 1.2 * plain + 1e-3, "{ended} m, {plain} m without");
     assert!(strain < 0.03, "{strain}");
     assert!(off < 1e-5, "{off} m");

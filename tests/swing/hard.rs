@@ -51,8 +51,10 @@ fn lead(step: Res<HairStep>, turning: Res<Turning>, mut strands: Query<&mut Held
 #[test]
 fn on_a_turning_head_hair_moves_as_in_the_worlds_frame() {
     let mut lab = Lab::usual();
-    let head =
-        lab.app.world_mut().spawn((Hair, Stiffness { bending_length: 0.13, ..default() })).id();
+    // A root that is led does not turn about itself, as one on the head does; internal friction feels it.
+    lab.undamped();
+    let stiffness = Stiffness { bending_length: 0.13, damping: 0.0 };
+    let head = lab.app.world_mut().spawn((Hair, stiffness)).id();
     let mut pairs = Vec::new();
     let mut led = Vec::new();
     for n in [8, 16, 32] {
@@ -106,7 +108,6 @@ fn nothing_explodes() {
 }
 
 #[test]
-#[ignore = "open: roots at 100 m/s throw endlessly stiff hair 150 m away"]
 fn nothing_explodes_that_is_endlessly_stiff() {
     abuse(&[100.0, f32::INFINITY]);
 }

@@ -201,8 +201,10 @@ pub fn energy(strand: &Strand, bending_length: f64) -> f64 {
         .map(|i| {
             let before = if i == 0 { 0.0 } else { f64::from(l[i - 1]) };
             let cell = 0.5 * (before + f64::from(l[i]));
-            // ½ (E I / l) θ² with θ ≈ 2 |Ω|
-            2.0 * stiffness / cell * f64::from(strand.darboux(i).xyz().length_squared())
+            // 2 (E I / l) |Q − 1|² = 4 (E I / l) (1 − cos θ/2), for small θ ½ (E I / l) θ².
+            let q = strand.darboux(i);
+            let off = f64::from(q.xyz().length_squared()) / (1.0 + f64::from(q.w.abs()));
+            4.0 * stiffness / cell * off
         })
         .sum();
     motion + bends

@@ -6,6 +6,7 @@
 //! is that of ½K|δφ_j − δφ_{j−1}|².
 
 use super::{
+    frames::{carry, choose, moment, turned_since},
     matrix::{Matrix, Pivot, Symmetric},
     row::Row,
     width::Width,
@@ -21,14 +22,20 @@ use crate::{
 /// What is the same for all nodes of a strand.
 #[derive(Clone, Copy)]
 pub(crate) struct Stage<R> {
-    /// How far into the substep the forces are taken (s): θ dt.
+    /// Where in the substep the forces are taken.
+    pub theta: R,
+    /// θ dt (s).
     pub ahead: R,
     /// How much farther nodes go than is solved for: 1/θ.
     pub beyond: R,
+    /// How far the scalp's frame turns until there.
+    pub root_turn: V3<R>,
     /// Gravity (m/s²).
     pub gravity: V3<R>,
     /// Kelvin–Voigt time (s), less what the step itself damps.
     pub damping: R,
+    /// Whether this is the second Newton step, so that frames have left where they began.
+    pub second: bool,
     /// 1 in lanes that take this Newton step, 0 in lanes that are done. Where nothing touches, all do.
     pub again: R,
     /// 1 in lanes that take two Newton steps, else 0: others start where their inertia takes them.
@@ -47,7 +54,7 @@ struct Carried<R> {
     t: V3<R>,
     /// 1/|e|.
     r: R,
-    /// How far it has turned since the substep began.
+    /// How far it has turned since the substep began, twist and all.
     turn: V3<R>,
     /// What holds its ends where they are across it, but for the joint at its end.
     across: R,
@@ -70,58 +77,17 @@ struct Left<R> {
     b_after: V3<R>,
 }
 
-/// Turns `q` the shortest way so that its tangent is along `e`, of length `len`. Returns twice the
-/// vector part of the turn: the turn itself where it is small.
+/// Where a node is at θ of the substep: held ones are on the way to where they are led.
 #[inline(always)]
-pub(crate) fn carry<R: Real>(q: Quaternion<R>, e: V3<R>, len: R) -> (Quaternion<R>, V3<R>) {
-    let d = q.tangent();
-    let along = d.dot(e);
-    let cosine = len + along;
-    // Turned back on itself: half a turn about the frame's first axis.
-    let folded = cosine.lt(len * len.lit(1e-6));
-    let one = len.lit(1.0);
-    let scale = one / (len.lit(2.0) * len * cosine).max(len.lit(1e-30)).sqrt();
-    let turn = Quaternion::new(d.cross(e).scale(scale), cosine * scale);
-    let half = Quaternion::new(first_axis(q), len.lit(0.0));
-    let turn =
-        Quaternion::new(V3::select(folded, half.v, turn.v), R::select(folded, half.w, turn.w));
-    let turned = turn.product(q);
-    // Off by round-off only, so that one step of Newton's does for a root.
-    let length = len.lit(-0.5).mul_add(turned.dot(turned), len.lit(1.5));
-    let turned = Quaternion::new(turned.v.scale(length), turned.w * length);
-    (turned, turn.v + turn.v)
+fn place<W: Width>(w: W, node: &NodeLanes<W::Cell>, stage: &Stage<W::Real>) -> V3<W::Real> {
+    let (p, from) = (w.get3(&node.p), w.get3(&node.from));
+    let led = (p - from).scale_add(stage.theta, from);
+    V3::select(is_held(w, node), led, p)
 }
 
-/// `yes` where the mask holds, else `no`.
 #[inline(always)]
-fn choose<R: Real>(mask: R::Mask, yes: Quaternion<R>, no: Quaternion<R>) -> Quaternion<R> {
-    Quaternion::new(V3::select(mask, yes.v, no.v), R::select(mask, yes.w, no.w))
-}
-
-/// The moment of a joint on the edge `q` behind it, in the frame of the nodes: 2K s Im(q (before Q0)‾).
-#[inline(always)]
-fn moment<W: Width>(
-    w: W,
-    before: Quaternion<W::Real>,
-    q: Quaternion<W::Real>,
-    rest: Quaternion<W::Real>,
-    k: W::Real,
-) -> V3<W::Real> {
-    let apart = q.product(before.product(rest).conjugate());
-    let two = w.lit(2.0) * k;
-    apart.v.scale(W::Real::select(apart.w.lt(w.lit(0.0)), -two, two))
-}
-
-/// R(q) e1.
-#[inline(always)]
-fn first_axis<R: Real>(q: Quaternion<R>) -> V3<R> {
-    let Quaternion { v: V3 { x, y, z }, w } = q;
-    let two = w.lit(2.0);
-    V3::new(
-        w.lit(1.0) - two * y.mul_add(y, z * z),
-        two * x.mul_add(y, w * z),
-        two * x.mul_add(z, -(w * y)),
-    )
+fn is_held<W: Width>(w: W, node: &NodeLanes<W::Cell>) -> <W::Real as Real>::Mask {
+    w.get(&node.w).lt(w.lit(1e-12))
 }
 
 /// Assembles and eliminates from the root to the tip, with frames carried to where the nodes are.
@@ -146,7 +112,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
         q: frame,
         t: frame.tangent(),
         r: zero,
-        turn: none,
+        turn: stage.root_turn,
         across: zero,
         axial: zero,
         pull: none,
@@ -161,7 +127,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
         b_next: none,
         b_after: none,
     };
-    let mut x = w.get3(&nodes[0].p);
+    let mut x = place(w, &nodes[0], stage);
     let count = edges.len();
     for j in 0..=count {
         // The edge and the joint before it; past the tip there is neither.
@@ -169,7 +135,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
         let (mut couple, mut stiff) = (none, zero);
         if j < count {
             let edge = &mut edges[j];
-            let to = w.get3(&nodes[j + 1].p);
+            let to = place(w, &nodes[j + 1], stage);
             let e = to - x;
             x = to;
             let l = w.get(&edge.l);
@@ -180,9 +146,16 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             let (turned, turn) = carry(q, e, length);
             let stays = q;
             let q = choose(crushed, q, turned);
-            let turn = V3::select(crushed, none, turn);
             let r = w.lit(1.0) / length.max(l * w.lit(0.2));
             let t = V3::select(crushed, q.tangent(), e.scale(r));
+            let turn = if TWICE && stage.second {
+                turned_since(w, &nodes[j], &nodes[j + 1], t)
+            } else {
+                turn
+            };
+            // Twist is in balance at all times, so no joint's changes: what the edge before turns about
+            // this one's tangent takes it along.
+            let turn = t.scale_add(before.turn.dot(t), V3::select(crushed, none, turn));
             w.put4(if TWICE { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
             let tension = (axial * (length - l)).max(w.get(&edge.tension)).max(zero);
             let across = W::Real::select(crushed, axial, tension * r);
@@ -191,6 +164,9 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             couple = (turn - before.turn).scale_add(k * damped, elastic);
             stiff = k * stiffer;
             let dot = t.dot(before.t);
+            // How the moment of twist turns with the edges; without, twisted strands flutter.
+            let twist = elastic.dot(t) * w.lit(-0.25) * r * before.r;
+            let coupling = Matrix::coupling(before.t, t, dot, stiff * r * before.r);
             now = Carried {
                 q,
                 t,
@@ -199,7 +175,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
                 across: (stiff * r).mul_add(r, across),
                 axial,
                 pull: couple.cross(t).scale_add(r, t.scale_add(-l, e).scale(axial)),
-                coupling: Matrix::coupling(before.t, t, dot, stiff * r * before.r),
+                coupling: coupling.plus_cross((t + before.t).scale(twist)),
             };
         }
         if j > 0 {
@@ -259,7 +235,7 @@ fn eliminate<W: Width, const TWICE: bool>(
     left: &Left<W::Real>,
 ) -> Left<W::Real> {
     let mass = w.get(&node.mass);
-    let held = w.get(&node.w).lt(w.lit(1e-12));
+    let held = is_held(w, node);
     let inert = mass * inertia;
     let mut a = diagonal.plus(left.next).plus_diagonal(inert);
     let mut b = stage.gravity.scale_add(mass, force + left.b_next);
@@ -310,7 +286,7 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
     let mut end = none;
     for i in (0..=edges.len()).rev() {
         let node = &mut nodes[i];
-        let mut y = w.get3(&node.p);
+        let mut y = place(w, node, stage);
         let mut solved = none;
         if i > 0 {
             let row = &rows[i - 1];
@@ -332,6 +308,7 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
         let start = w.get3(&node.from);
         let to = (y - start).scale_add(stage.beyond, start);
         let to = if TWICE { V3::select(w.lit(0.0).lt(stage.again), to, y) } else { to };
+        let to = V3::select(is_held(w, node), w.get3(&node.p), to);
         w.put3(to, &mut node.p);
         if i < edges.len() {
             let edge = &mut edges[i];
@@ -375,7 +352,9 @@ pub(crate) fn finish<W: Width>(
     for i in 0..nodes.len() {
         let node = &mut nodes[i];
         let to = w.get3(&node.p);
-        let v = w.get3(&node.v).scale_add(back, (to - w.get3(&node.from)).scale(forth));
+        let moved = to - w.get3(&node.from);
+        let v = w.get3(&node.v).scale_add(back, moved.scale(forth));
+        let v = V3::select(is_held(w, node), moved.scale(rate), v);
         w.put3(v, &mut node.v);
         sum = v.dot(v) + sum;
         let e = to - x;
@@ -447,6 +426,6 @@ pub(crate) fn untwist<W: Width>(w: W, edges: &mut [EdgeLanes<W::Cell>], rows: &[
         let q = w.get4(&edge.q);
         let half = twist * w.lit(0.5);
         let along = Quaternion::new(V3::new(q.v.y, -q.v.x, q.w), -q.v.z);
-        w.put4(q.add_scaled(along, half).renormalize(), &mut edge.q);
+        w.put4(q.add_scaled(along, half).normalize(), &mut edge.q);
     }
 }

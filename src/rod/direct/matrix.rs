@@ -123,6 +123,19 @@ impl<R: Real> Matrix<R> {
         }
     }
 
+    /// `self + v×`, the matrix of the vector product with `v`.
+    #[inline(always)]
+    pub fn plus_cross(self, v: V3<R>) -> Self {
+        let [x, y, z] = self.rows;
+        Self {
+            rows: [
+                V3::new(x.x, x.y - v.z, x.z + v.y),
+                V3::new(y.x + v.z, y.y, y.z - v.x),
+                V3::new(z.x - v.y, z.y + v.x, z.z),
+            ],
+        }
+    }
+
     #[inline(always)]
     pub fn plus(self, o: Self) -> Self {
         let ([a, b, c], [x, y, z]) = (self.rows, o.rows);

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | `kernel` | a Newton step: assembly and elimination in one pass, solution, frames, twist |
 //! | `matrix` | the blocks |
+//! | `frames` | edges' frames: carried, bent, turned |
 //! | `width` | the same lines for lanes and for one strand of f64 |
 //!
 //! One substep of length h:
@@ -31,6 +32,7 @@
 //! direct solve, Baraff & Witkin (1998) for the implicit step, Bergou et al. (2008) for frames and
 //! quasi-static twist.
 
+mod frames;
 mod kernel;
 mod matrix;
 pub(super) mod row;
@@ -74,7 +76,7 @@ pub struct DirectParams {
 const THETA: f32 = 0.65;
 
 /// Turn of an edge in a substep (rad) from which on a strand takes two Newton steps.
-const WHIP: f32 = 0.05;
+const WHIP: f32 = 0.03;
 
 /// Strain at the root of a straight hanging strand, which says how stiff hair is against stretching.
 /// Stiffer, f32 would not carry it; softer, the limiter would have to take stretching away, which bends.
@@ -166,7 +168,7 @@ fn newton<S: Simd, const TWICE: bool>(
             in_lanes!(simd, w => {
                 let mut stage = stage(w, b, params);
             if TWICE && left == 1 {
-                stage.again = stage.twice;
+                (stage.again, stage.second) = (stage.twice, true);
             }
             if TWICE && left == 2 {
                 let on_the_way = w.lit(0.0).lt(stage.twice);
@@ -205,15 +207,22 @@ fn stage<W: Width<Cell = crate::lanes::Lane>>(
 ) -> Stage<W::Real> {
     let (theta, dt) = (w.get(&b.theta), w.lit(params.dt.into()));
     let own = (w.lit(2.0) * theta - w.lit(1.0)) * dt;
+    let (from, to) = (w.get4(&b.root_from), w.get4(&b.root_between));
+    let turn = to.product(from.conjugate());
+    let two = w.lit(2.0);
+    let two = <_ as Real>::select(turn.w.lt(w.lit(0.0)), -two, two);
     Stage {
+        theta,
         ahead: theta * dt,
         beyond: w.lit(1.0) / theta,
+        root_turn: turn.v.scale(two),
         gravity: V3::new(
             w.lit(params.gravity.x.into()),
             w.lit(params.gravity.y.into()),
             w.lit(params.gravity.z.into()),
         ),
         damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
+        second: false,
         again: w.lit(1.0),
         twice: w.get(&b.twice),
     }
@@ -253,14 +262,11 @@ fn predict<S: Simd>(
     let ahead = dt * theta;
     let fallen = gravity.scale(ahead * ahead);
     for n in &mut b.nodes {
-        let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
-        let (from, p) = (load3(simd, &n.from), load3(simd, &n.p));
-        let on_the_way = (p - from).scale_add(theta, from);
+        let (held, p) = (Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12)), load3(simd, &n.p));
         let support = load3(simd, &n.rests_on);
         let rests = Real::lt(zero, support.dot(support));
         // The first guess is without gravity: else settled hair would be turned by it in each step.
-        let free = V3::select(rests, p, p - fallen);
-        store3(&mut n.p, V3::select(held, on_the_way, free));
+        store3(&mut n.p, V3::select(held | rests, p, p - fallen));
     }
     theta
 }

@@ -109,10 +109,13 @@ fn lanes_agree_with_a_strand_of_f64_alone() {
         }
     }
     let stage = Stage {
+        theta,
         ahead: theta * dt,
         beyond: 1.0 / theta,
+        root_turn: w.zero3(),
         gravity: V3::new(0.0, -9.8, 0.0),
         damping: 0.003 - (2.0 * theta - 1.0) * dt,
+        second: false,
         again: 1.0,
         twice: 0.0,
     };
