@@ -1,4 +1,4 @@
-//! The table: what a tick of 1/60 s, 6 substeps of 5 iterations, costs in a whole app.
+//! The table: what a tick of 1/60 s, 6 substeps, costs in a whole app; sweeps take 5 iterations.
 //!
 //! What is compared is run in turns, and of each the best is kept: others on the machine slow single
 //! turns down, not ratios. Bevy's thread pools are made once a process, so each number of threads
@@ -39,8 +39,8 @@ pub fn print() -> bool {
         return false;
     }
     println!(
-        "strands × nodes | threads | scalar, ns | projection, ns | scalar / projection | tick, ms | \
-         tick / projection | bonds at rest | bonds moving | contacts | 1,000 droplets"
+        "strands × nodes | threads | scalar sweeps, sweeps, direct, ns a segment and substep | tick, ms | \
+         with sweeps, ms | direct / sweeps | bonds at rest | bonds moving | contacts | 1,000 droplets"
     );
     for threads in ["1", "2"] {
         let this = std::env::current_exe().expect("a running program");
@@ -125,7 +125,7 @@ fn sleep_row(threads: usize) {
 
 fn row(threads: usize, strands: usize, nodes: usize) {
     let hair = head(strands, nodes);
-    let work = (strands * (nodes - 1) * 5 * 6) as f64;
+    let work = (strands * (nodes - 1) * 6) as f64;
     let turns = (1_600_000 / (strands * nodes)).clamp(3, 20);
     let mut twins: Vec<Twin> = hair.iter().take(1000).map(Twin::of).collect();
     let mut scalar = || {
@@ -133,12 +133,19 @@ fn row(threads: usize, strands: usize, nodes: usize) {
             twins.iter_mut().for_each(|t| t.step(1.0 / 360.0, 5));
         }
     };
-    let kinds = [Kind::Projection, Kind::NoBonds, Kind::Tick, Kind::BondsMoving];
+    let kinds = [
+        Kind::Projection,
+        Kind::NoBonds,
+        Kind::Tick,
+        Kind::BondsMoving,
+        Kind::SweepsAlone,
+        Kind::Sweeps,
+    ];
     let mut apps = kinds.map(|kind| app(threads, kind, &hair, Some(head_radius(strands))));
     for _ in 0..if strands > 10_000 { 2 } else { 30 } {
         apps.iter_mut().for_each(App::update);
     }
-    let (mut best_scalar, mut best) = (f64::INFINITY, [f64::INFINITY; 4]);
+    let (mut best_scalar, mut best) = (f64::INFINITY, [f64::INFINITY; 6]);
     for _ in 0..turns {
         best_scalar = best_scalar.min(seconds(&mut scalar));
         for (best, app) in best.iter_mut().zip(&mut apps) {
@@ -148,7 +155,7 @@ fn row(threads: usize, strands: usize, nodes: usize) {
         }
     }
     best_scalar *= strands as f64 / strands.min(1000) as f64;
-    let [projection, no_bonds, tick, moving] = best;
+    let [projection, no_bonds, tick, moving, sweeps_alone, sweeps] = best;
     // Settled under contact, then with and without; then wetted, and beside the dry one.
     let percent = |a: f64, b: f64| format!("{:+.0} %", (a / b - 1.0) * 100.0);
     let [contacts, droplets] = if strands > 10_000 {
@@ -165,12 +172,13 @@ fn row(threads: usize, strands: usize, nodes: usize) {
         [percent(with, without), percent(wet, without)]
     };
     println!(
-        "{strands} × {nodes} | {threads} | {:.1} | {:.2} | {:.1} | {:.2} | {:.2} | {} | {} | {contacts} | {droplets}",
+        "{strands} × {nodes} | {threads} | {:.0}, {:.1}, {:.1} | {:.2} | {:.2} | {:.2} | {} | {} | {contacts} | {droplets}",
         best_scalar / work * 1e9,
+        sweeps_alone / work * 1e9,
         projection / work * 1e9,
-        best_scalar / projection,
         tick * 1e3,
-        tick / projection,
+        sweeps * 1e3,
+        tick / sweeps,
         percent(tick, no_bonds),
         percent(moving, no_bonds),
     );
@@ -278,6 +286,10 @@ enum Kind {
     Tick,
     /// The same while every bond's rate moves.
     BondsMoving,
+    /// The paper's projections alone.
+    SweepsAlone,
+    /// The tick with the paper's projections.
+    Sweeps,
 }
 
 fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
@@ -299,7 +311,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     let plugins = HairPlugins::default().build();
     match kind {
-        Kind::Projection => app.add_plugins(
+        Kind::Projection | Kind::SweepsAlone => app.add_plugins(
             plugins
                 .disable::<EnvironmentPlugin>()
                 .disable::<BondPlugin>()
@@ -310,16 +322,19 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
                 .disable::<SleepPlugin>(),
         ),
         Kind::NoBonds => app.add_plugins(plugins.disable::<BondPlugin>().disable::<SleepPlugin>()),
-        Kind::Tick | Kind::BondsMoving => app.add_plugins(plugins),
+        Kind::Tick | Kind::BondsMoving | Kind::Sweeps => app.add_plugins(plugins),
     };
     // What the plugins left out would have brought, and no contact between strands to begin with.
     app.init_resource::<HairDefault<BondInfluence>>()
         .insert_resource(HairDefault(AirDrag { rate: 3.0 }))
         .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
-    if kind == Kind::Projection {
-        app.insert_resource(HairDefault(HairSolver { limiter_steps: 0, ..default() }));
-    } else if let Some(radius) = head {
+    if matches!(kind, Kind::Sweeps | Kind::SweepsAlone) {
+        let solver = HairSolver { method: SolverMethod::Sweeps, ..default() };
+        app.insert_resource(HairDefault(solver));
+    }
+    let alone = matches!(kind, Kind::Projection | Kind::SweepsAlone);
+    if let Some(radius) = head.filter(|_| !alone) {
         let floor = HairCollider::plane(Dir3::Y);
         app.world_mut().spawn((HairCollider::sphere(radius).expect("a head"), Transform::IDENTITY));
         app.world_mut().spawn((floor, Transform::from_xyz(0.0, -2.0 * radius, 0.0)));

@@ -22,6 +22,14 @@ impl Bonds {
         Self { joints }
     }
 
+    /// As many as the strand has joints: those of the part that is kept, counted from the root, stay as they
+    /// are; new ones are closed around the present shape.
+    pub(super) fn fit(&mut self, strand: &Strand) {
+        let new = Self::of(strand).joints.into_iter().skip(self.joints.len());
+        self.joints.extend(new);
+        self.joints.truncate(strand.edges());
+    }
+
     /// The rates of one kind, root first.
     pub fn rates(&self, kind: BondKind) -> impl Iterator<Item = f32> + '_ {
         self.joints.iter().map(move |j| j.rates[kind as usize])
@@ -38,6 +46,9 @@ pub struct BondChanges {
     any: bool,
 }
 
+/// More than any strand has: what lies beyond cannot be meant.
+const MOST_JOINTS: usize = 1 << 16;
+
 impl BondChanges {
     /// Asks for a change of `kind` at `joint`. Requests beyond the strand's joints and non-finite
     /// ones do nothing; peptide bonds are never cut.
@@ -47,6 +58,10 @@ impl BondChanges {
             return;
         }
         if joint >= self.joints.len() {
+            // The strand's number of joints is not known here; no strand has more than this.
+            if joint >= MOST_JOINTS {
+                return;
+            }
             self.joints.resize(joint + 1, [0.0; BondKind::COUNT]);
         }
         self.joints[joint][kind as usize] += change;

@@ -39,17 +39,24 @@ impl Plugin for BondPlugin {
     }
 }
 
-/// Gives new strands their bonds, and mends what game code wrote into them. Our own writes bypass
-/// change detection, so `Changed` means somebody else's.
+/// Gives new strands their bonds, those of another node count theirs, and mends what game code wrote
+/// into them. Our own writes bypass change detection, so `Changed` means somebody else's.
 fn fit_bonds(
-    mut strands: Query<(Entity, &Strand, &mut Bonds, &mut RestShape), Changed<Bonds>>,
+    mut strands: Query<
+        (Entity, &Strand, &mut Bonds, &mut RestShape),
+        Or<(Changed<Bonds>, Changed<Strand>)>,
+    >,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (entity, strand, mut bonds, mut rest) in &mut strands {
+        let fits = bonds.joints.len() == strand.edges();
+        if fits && !bonds.is_changed() {
+            continue;
+        }
         rest.bypass_change_detection().closed = false;
         let bonds = bonds.bypass_change_detection();
-        if bonds.joints.len() != strand.edges() {
-            *bonds = Bonds::of(strand);
+        if !fits {
+            bonds.fit(strand);
         }
         let mut violations = Violations::new();
         bonds.joints.clamp_values(&mut violations);

@@ -6,6 +6,7 @@
 mod bytes;
 mod format;
 pub mod gltf;
+mod grown_hair;
 mod guides;
 mod loader;
 mod losses;
@@ -13,7 +14,6 @@ mod reshape;
 mod settings;
 mod size;
 pub mod tressfx;
-mod wear;
 pub mod yuksel;
 
 pub use bytes::GroomFileError;
@@ -21,9 +21,9 @@ pub use format::{GroomFormat, UpAxis};
 pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
 
+pub use grown_hair::{GroomGuides, GroomedHair};
 pub use settings::GroomSettings;
 pub use size::OddSize;
-pub use wear::{GroomGuides, GroomedHair};
 
 use crate::setting::InvalidValue;
 use bevy::prelude::*;

@@ -30,16 +30,16 @@
 //!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
+mod choose;
 #[doc(hidden)]
 pub mod follow;
-mod guides;
 #[doc(hidden)]
 pub mod model;
 #[doc(hidden)]
 pub mod spread;
 mod systems;
 
-pub use guides::{Follower, Guides};
+pub use choose::{Follower, Guides};
 pub use systems::LodPlugin;
 
 use crate::{

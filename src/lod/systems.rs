@@ -2,7 +2,7 @@
 
 use super::{
     Follower, Guides, HairLod, LodLevel, PresentLod, ScreenShare,
-    guides::{choose_guides, let_go, move_followers, sync_follower_sleep},
+    choose::{choose_guides, let_go, move_followers, sync_follower_sleep},
     model,
 };
 use crate::{

@@ -38,7 +38,7 @@ const NEAR: usize = 8;
 const SHAPE: f32 = 0.3;
 
 /// The followers that grow from given roots.
-pub(super) fn grow(
+pub(super) fn lay_followers(
     given: &[FollowerRoot],
     guides: &[GuideRoot],
     settings: &HairFollowers,
@@ -142,7 +142,7 @@ mod tests {
                 reach: Vec3::Y * *length,
             })
             .collect();
-        let grown = grow(&given, &guides, &plain(100));
+        let grown = lay_followers(&given, &guides, &plain(100));
         assert_eq!(grown.len(), 3);
         for (strand, given) in grown.iter().zip(&given) {
             let (root, tip) = drawn(strand, &guides);
@@ -151,8 +151,8 @@ mod tests {
             assert!((strand.weights.iter().sum::<f32>() - 1.0).abs() < 1e-5);
             assert!(strand.weights[0] >= strand.weights[1].max(strand.weights[2]));
         }
-        assert_eq!(grow(&given, &guides, &plain(2)).len(), 2);
-        assert!(grow(&given, &guides, &plain(0)).is_empty());
+        assert_eq!(lay_followers(&given, &guides, &plain(2)).len(), 2);
+        assert!(lay_followers(&given, &guides, &plain(0)).is_empty());
     }
 
     #[test]
@@ -160,7 +160,7 @@ mod tests {
         let guides = [guide(0.0, Vec3::Y * 0.2), guide(0.004, Vec3::X * 0.2)];
         let own = |reach| FollowerRoot { place: Vec3::X * 0.001, length: 0.2, reach };
         for (reach, like) in [(Vec3::Y * 0.2, 0), (Vec3::X * 0.2, 1)] {
-            let strand = grow(&[own(reach)], &guides, &plain(1))[0];
+            let strand = lay_followers(&[own(reach)], &guides, &plain(1))[0];
             assert_eq!(strand.guides[0], like);
             assert!(strand.weights[0] > 0.9, "{strand:?}");
         }
@@ -172,9 +172,9 @@ mod tests {
         let flat = FollowerRoot { length: 0.0, ..default() };
         let good = FollowerRoot { length: 0.1, ..default() };
         let guides = [guide(0.0, Vec3::Y), guide(f32::NAN, Vec3::Y), guide(0.1, Vec3::ZERO)];
-        let grown = grow(&[nan, flat, good], &guides, &plain(9));
+        let grown = lay_followers(&[nan, flat, good], &guides, &plain(9));
         assert_eq!(grown.len(), 1);
         assert_eq!(grown[0].guides, [0; 3]);
-        assert!(grow(&[good], &[], &plain(9)).is_empty());
+        assert!(lay_followers(&[good], &[], &plain(9)).is_empty());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     drawn_strand::{DrawnStrand, GuideRoot, direction},
-    follower_roots::{FollowerRoots, grow},
+    follower_roots::{FollowerRoots, lay_followers},
     followers::HairFollowers,
 };
 use crate::grid::KdTree;
@@ -17,7 +17,7 @@ pub(super) fn scatter(
 ) -> Vec<DrawnStrand> {
     let mut drawn: Vec<_> = (0..roots.len() as u32).map(DrawnStrand::guide).collect();
     if let Some(given) = given {
-        drawn.extend(grow(&given.0, roots, followers));
+        drawn.extend(lay_followers(&given.0, roots, followers));
         return drawn;
     }
     if roots.is_empty() || followers.count == 0 {

@@ -146,10 +146,19 @@ impl Solid {
     }
 }
 
+/// How a node gets out of a solid.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Way {
+    /// The shortest way: for states.
+    Shortest,
+    /// The shortest way, then back along the surface by friction: for steps.
+    WithFriction,
+}
+
 /// Moves `p` out of the solid where it is inside, and holds it back along the surface by Coulomb
 /// friction, measured from where the node was (`from`) and against the surface's own motion.
 ///
-/// With `silent`, nothing but the shortest way out: for states, not for steps. Returns the new place
+/// Returns the new place
 /// and the solid's normal there, or zero for lanes that are not inside; nothing where no lane is.
 #[inline(always)]
 pub(super) fn push_out<S: Simd>(
@@ -158,7 +167,7 @@ pub(super) fn push_out<S: Simd>(
     from: V3<f32x16<S>>,
     friction: f32x16<S>,
     skin: f32,
-    silent: bool,
+    way: Way,
 ) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
     let simd = p.x.simd;
     let zero = f32x16::splat(simd, 0.0);
@@ -171,7 +180,7 @@ pub(super) fn push_out<S: Simd>(
     let touching = V3::select(inside, normal, V3::new(zero, zero, zero));
     let depth = Real::max(depth, zero);
     let out = normal.scale_add(depth, p);
-    if silent {
+    if way == Way::Shortest {
         return Some((V3::select(inside, out, p), touching));
     }
     let slip = out - obstacle.taken_along(from);
@@ -190,7 +199,7 @@ pub(super) fn push_out<S: Simd>(
 /// The way is looked at where it comes nearest to the solid's axis, in its middle and at its end:
 /// what moves by less than half the solid's thickness does not pass.
 #[inline(always)]
-pub(super) fn hold_back<S: Simd>(
+pub(super) fn continuous_collision<S: Simd>(
     obstacle: &Obstacle,
     start: V3<f32x16<S>>,
     p: V3<f32x16<S>>,

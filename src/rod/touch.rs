@@ -2,7 +2,7 @@
 
 use super::{
     block::{BlockLanes, NodeLanes},
-    obstacle::{Obstacle, hold_back, push_out},
+    obstacle::{Obstacle, Way, continuous_collision, push_out},
 };
 use crate::lanes::{LANES, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -31,7 +31,7 @@ pub(crate) fn predict_nodes<S: Simd>(
                 let mut from = p;
                 for o in obstacles {
                     let start = o.taken_along(from);
-                    if let Some((out, _)) = push_out(o, start, start, zero, skin, true) {
+                    if let Some((out, _)) = push_out(o, start, start, zero, skin, Way::Shortest) {
                         from = V3::select(held, from, from + (out - start));
                     }
                 }
@@ -41,7 +41,9 @@ pub(crate) fn predict_nodes<S: Simd>(
                 store3(&mut n.from, came_from);
                 let mut to = (v + gain).scale_add(dt, from);
                 for o in obstacles {
-                    if let Some((before, _)) = hold_back(o, o.taken_along(from), to, skin) {
+                    if let Some((before, _)) =
+                        continuous_collision(o, o.taken_along(from), to, skin)
+                    {
                         (to, b.sweeps) = (before, true);
                     }
                 }
@@ -127,7 +129,9 @@ pub(super) fn touch<S: Simd>(
             for o in obstacles {
                 // What would take a node through has to be stopped in every pass: the shortest way out
                 // may be the wrong one.
-                if sweeps && let Some((before, normal)) = hold_back(o, o.taken_along(from), p, skin)
+                if sweeps
+                    && let Some((before, normal)) =
+                        continuous_collision(o, o.taken_along(from), p, skin)
                 {
                     p = V3::select(held, p, before);
                     let stopped = Real::lt(zero, normal.dot(normal) * lanes);
@@ -135,7 +139,8 @@ pub(super) fn touch<S: Simd>(
                     touched = Real::select(stopped, one, touched);
                 }
                 let friction = grip * f32x16::splat(simd, o.friction);
-                if let Some((out, normal)) = push_out(o, p, from, friction, skin, false) {
+                if let Some((out, normal)) = push_out(o, p, from, friction, skin, Way::WithFriction)
+                {
                     p = V3::select(held, p, out);
                     let pushed = Real::lt(zero, normal.dot(normal) * lanes);
                     rests_on = V3::select(pushed, normal, rests_on);

@@ -14,8 +14,8 @@
 mod blend;
 mod bytes;
 mod error;
+mod put_on;
 mod resample;
-mod wear;
 
 pub use bytes::NEWEST_FORMAT;
 pub use error::HairdoError;

@@ -10,14 +10,15 @@
 //! in the hair's units: a scaled character's hair behaves as if unscaled.
 
 pub mod frame;
+mod mend;
 mod per_hair;
-mod sleep;
+mod strand_sleep;
 mod systems;
 mod teleport;
 
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use per_hair::PerHair;
-pub use sleep::{Sleepers, StillPose, StrandSleep};
+pub use strand_sleep::{Sleepers, StillPose, StrandSleep};
 pub use systems::StrandPlugin;
 
 use crate::{

@@ -36,7 +36,7 @@ impl Plugin for StrandPlugin {
             .add_systems(
                 HairTick,
                 (
-                    remember_drawn.in_set(HairSystems::History),
+                    (mend_strands, remember_drawn).chain().in_set(HairSystems::History),
                     move_poses.in_set(HairSystems::Poses),
                     apply_frame_inertia.in_set(HairSystems::FrameInertia),
                 ),
@@ -63,6 +63,19 @@ fn report_unusable(
             let message =
                 "the strand belongs to no hair: spawn it with StrandOf(hair), hair carrying Hair";
             faults.write(HairFault::new(FaultKind::NoHair, message).of(entity));
+        }
+    }
+}
+
+/// What somebody wrote into a strand's private parts, as an inspector or a scene file may. Our own writes
+/// bypass change detection.
+fn mend_strands(
+    mut strands: Query<(Entity, &mut Strand), Changed<Strand>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, mut strand) in &mut strands {
+        if let Some(found) = strand.bypass_change_detection().mend() {
+            faults.write(HairFault::new(FaultKind::Strand, found).of(entity));
         }
     }
 }

@@ -196,7 +196,7 @@ setting! {
         /// How many drops it has made.
         pub made: u64 = 0;
         /// The part of the next drop that is due.
-        pub owed: f32 = 0.0;
+        pub owed: f32 = 0.0, "drops" in OWED: 0.0..=1.0, "less than one: what a tick makes is made";
     }
 }
 

@@ -65,7 +65,7 @@ impl Row {
     #[inline(always)]
     fn bounds<S: Simd>(&self, simd: S) -> (Vec3, Vec3) {
         let p = load3(simd, &self.p);
-        // Without what is no number or endless, of which nothing times is not zero.
+        // Non-finite values are left out: zero times them is not zero.
         let zero = f32x16::splat(simd, 0.0);
         let none = p.scale(zero);
         let is_somewhere = none.dot(none).simd_eq(zero);

@@ -165,7 +165,7 @@ pub(super) fn build(app: &mut App) {
 
 /// Needs grooms to be assets.
 pub(super) fn with_assets(app: &mut App) {
-    app.add_systems(PreUpdate, (shave, grow).chain());
+    app.add_systems(PreUpdate, (shave, spawn_grown).chain());
 }
 
 #[cfg(feature = "render")]
@@ -173,7 +173,7 @@ type Look = crate::render::HairLook;
 #[cfg(not(feature = "render"))]
 type Look = Hair;
 
-fn grow(
+fn spawn_grown(
     mut commands: Commands,
     mut hairs: Query<(Entity, &GroomedHair, Option<&mut Grown>, Has<Look>)>,
     mut events: MessageReader<AssetEvent<Groom>>,

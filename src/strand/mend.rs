@@ -1,0 +1,116 @@
+//! Strands that were written into by reflection: inspectors and scene files reach private parts, too.
+
+use super::{MIN_SEGMENT, Strand};
+use crate::rod::frame::parallel_transport;
+use bevy::prelude::*;
+
+/// A segment whose length nobody knows (m).
+const UNKNOWN_LENGTH: f32 = 0.01;
+
+impl Strand {
+    /// Makes the parts fit each other: all as long as there are nodes, lengths above zero, orientations
+    /// unit. Says what was found first.
+    pub(super) fn mend(&mut self) -> Option<String> {
+        let nodes = self.positions.len();
+        let edges = nodes.saturating_sub(1);
+        let mut found = None;
+        fn fit<T: Clone>(
+            name: &str,
+            values: &mut Vec<T>,
+            count: usize,
+            with: T,
+            found: &mut Option<String>,
+        ) {
+            if values.len() != count {
+                let length = values.len();
+                found.get_or_insert_with(|| {
+                    format!("the strand has {length} {name}, expected {count}: cut or filled up")
+                });
+                values.resize(count, with);
+            }
+        }
+        fit("velocities", &mut self.velocities, nodes, Vec3::ZERO, &mut found);
+        fit("rest lengths", &mut self.rest_lengths, edges, f32::NAN, &mut found);
+        fit("orientations", &mut self.orientations, edges, Quat::from_array([0.0; 4]), &mut found);
+        fit("angular velocities", &mut self.angular_velocities, edges, Vec3::ZERO, &mut found);
+        fit("tensions", &mut self.tensions, edges, 0.0, &mut found);
+        for (i, length) in self.rest_lengths.iter_mut().enumerate() {
+            if !(MIN_SEGMENT..f32::MAX).contains(length) {
+                let is = *length;
+                let apart = self.positions[i].distance(self.positions[i + 1]);
+                let known = (MIN_SEGMENT..f32::MAX).contains(&apart);
+                *length = if known { apart } else { UNKNOWN_LENGTH };
+                found.get_or_insert_with(|| {
+                    format!(
+                        "rest length {i} of the strand is {is} m, expected more than {MIN_SEGMENT}: \
+                         {length} m is taken"
+                    )
+                });
+            }
+        }
+        let is_unit = |q: &Quat| (0.5..2.0).contains(&q.length_squared());
+        if !is_unit(&self.root_frame) {
+            let is = self.root_frame;
+            found.get_or_insert_with(|| {
+                format!("the root frame of the strand is {is}, expected a unit quaternion")
+            });
+            self.root_frame =
+                self.orientations.first().filter(|q| is_unit(q)).map_or(Quat::IDENTITY, |q| *q);
+        }
+        if let Some(i) = self.orientations.iter().position(|q| !is_unit(q)) {
+            let is = self.orientations[i];
+            found.get_or_insert_with(|| {
+                format!("orientation {i} of the strand is {is}, expected a unit quaternion")
+            });
+            if self.positions.iter().all(|p| p.is_finite()) {
+                self.orientations = parallel_transport(&self.positions, Some(self.root_frame));
+            } else {
+                self.orientations.fill(self.root_frame);
+            }
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn strand() -> Strand {
+        Strand::from_polyline(&[Vec3::ZERO, Vec3::X * 0.1, Vec3::X * 0.2]).unwrap()
+    }
+
+    #[test]
+    fn a_sound_strand_is_left_alone() {
+        let mut strand = strand();
+        let before = format!("{strand:?}");
+        assert_eq!(strand.mend(), None);
+        assert_eq!(format!("{strand:?}"), before);
+        assert_eq!(Strand::default().mend(), None);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_made_to_and_told() {
+        type Spoil = fn(&mut Strand);
+        let spoils: [(Spoil, &str); 9] = [
+            (|s| s.velocities.clear(), "0 velocities, expected 3"),
+            (|s| s.tensions.push(1.0), "3 tensions, expected 2"),
+            (|s| s.rest_lengths.truncate(1), "1 rest lengths, expected 2"),
+            (|s| s.orientations.clear(), "0 orientations, expected 2"),
+            (|s| s.positions.truncate(2), "3 velocities, expected 2"),
+            (|s| s.positions.clear(), "3 velocities, expected 0"),
+            (|s| s.rest_lengths[1] = f32::NAN, "rest length 1 of the strand is NaN"),
+            (|s| s.rest_lengths[0] = -1.0, "rest length 0 of the strand is -1"),
+            (|s| s.orientations[1] = Quat::from_array([0.0; 4]), "orientation 1"),
+        ];
+        for (spoil, tells) in spoils {
+            let mut strand = strand();
+            spoil(&mut strand);
+            let told = strand.mend().unwrap();
+            assert!(told.contains(tells), "{told}");
+            assert_eq!(strand.mend(), None, "once is enough");
+            assert!(strand.rest_lengths.iter().all(|l| (*l - 0.1).abs() < 1e-6));
+            assert!(strand.is_finite());
+        }
+    }
+}
