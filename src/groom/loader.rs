@@ -2,7 +2,7 @@
 
 use super::{
     Groom, GroomError, GroomFileError, GroomFormat, GroomLosses, GroomSettings, OddSize, gltf,
-    tressfx, wear, yuksel,
+    grown_hair, tressfx, yuksel,
 };
 use bevy::{
     asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
@@ -149,7 +149,7 @@ impl Plugin for GroomPlugin {
             .register_type::<GroomLosses>()
             .register_type::<GroomError>()
             .register_type::<OddSize>();
-        wear::build(app);
+        grown_hair::build(app);
         add_loader(app);
     }
 
@@ -163,6 +163,6 @@ fn add_loader(app: &mut App) {
     let world = app.world();
     if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<Groom>>() {
         app.init_asset::<Groom>().register_asset_loader(GroomLoader);
-        wear::with_assets(app);
+        grown_hair::with_assets(app);
     }
 }

@@ -20,6 +20,18 @@ use crate::{
 };
 use bevy::prelude::*;
 
+/// What somebody wrote into moisture, as an inspector may. Our own writes bypass change detection.
+pub(super) fn mend_moistures(
+    mut moistures: Query<(Entity, &mut Moisture), Changed<Moisture>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, mut moisture) in &mut moistures {
+        if let Some(found) = moisture.bypass_change_detection().mend() {
+            faults.write(HairFault::new(FaultKind::Setting, found).of(entity));
+        }
+    }
+}
+
 pub(super) fn run_showers(
     mut commands: Commands,
     step: Res<HairStep>,

@@ -4,7 +4,7 @@ use super::{
     Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting,
     bridge::join_wet_strands,
     droplet_contact::{WaterField, wet_strands},
-    exchange::{exchange_water, run_showers},
+    exchange::{exchange_water, mend_moistures, run_showers},
     motion::{follow_strands, merge_droplets, move_droplets},
     strand_block,
 };
@@ -36,7 +36,9 @@ impl Plugin for WaterPlugin {
             .add_observer(count_lost_moisture)
             .add_systems(
                 HairTick,
-                (run_showers, exchange_water).chain().in_set(HairSystems::WaterExchange),
+                (mend_moistures, run_showers, exchange_water)
+                    .chain()
+                    .in_set(HairSystems::WaterExchange),
             )
             .add_systems(
                 HairTick,

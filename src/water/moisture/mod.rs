@@ -156,6 +156,44 @@ impl Moisture {
         lost
     }
 
+    /// Makes what somebody wrote into it by reflection fit: all as long as there is film, volumes finite and
+    /// not negative. Says what was found first.
+    pub(super) fn mend(&mut self) -> Option<String> {
+        let nodes = self.film.len();
+        let mut found = None;
+        for (name, volumes) in [("film", &mut self.film), ("bound water", &mut self.bound)] {
+            if volumes.len() != nodes {
+                let length = volumes.len();
+                found.get_or_insert_with(|| {
+                    format!("{name} of {length} nodes, expected {nodes}: cut or filled up")
+                });
+                volumes.resize(nodes, 0.0);
+            }
+            for (i, volume) in volumes.iter_mut().enumerate() {
+                if !(0.0..1.0).contains(volume) {
+                    found.get_or_insert_with(|| {
+                        format!(
+                            "{name} of node {i} is {volume} m³, expected 0 to 1: there is none now"
+                        )
+                    });
+                    *volume = 0.0;
+                }
+            }
+        }
+        for (name, shares) in [("wetness", &mut self.wetness), ("sheen", &mut self.sheen)] {
+            shares.resize(nodes, 0.0);
+            for (i, share) in shares.iter_mut().enumerate() {
+                if !(0.0..=1.0).contains(share) {
+                    found.get_or_insert_with(|| {
+                        format!("{name} of node {i} is {share}, expected 0 to 1: it is 0 now")
+                    });
+                    *share = 0.0;
+                }
+            }
+        }
+        found
+    }
+
     pub(super) fn add_film(&mut self, node: usize, volume: f64) {
         self.film[node] += volume;
     }
