@@ -147,7 +147,7 @@ fn solve_over<S: Simd>(
                 store3(&mut b.nodes[i + 1].p, u.scale_add(-(wc * more), c));
             }
         },
-    )
+    );
 }
 
 /// One Newton step on all springs along the strand at once: (J W Jᵀ + give) Δλ = excess, by the
@@ -204,7 +204,7 @@ fn solve_next<S: Simd, const TOUCHING: bool>(
                 pull = tension;
             }
         },
-    )
+    );
 }
 
 /// Velocities from the change of the step. Where `alone` holds, nothing but gravity gave energy: what
@@ -261,7 +261,7 @@ fn keep_energy<S: Simd>(
             }
             (sum * zero).store_array(&mut b.finite);
         },
-    )
+    );
 }
 
 /// What there is for speeds: `before` and what gravity gave, less what the springs store now.

@@ -45,7 +45,7 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes, touched_only: 
                 }
             }
         },
-    )
+    );
 }
 
 /// One Newton step for strands of which an edge is off its length by more than the share `tolerance`,

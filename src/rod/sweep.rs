@@ -118,7 +118,7 @@ fn sweeps<S: Simd, const P: usize>(
                 }
             }
         },
-    )
+    );
 }
 
 /// One edge of a sweep.

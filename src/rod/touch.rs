@@ -50,7 +50,7 @@ pub(crate) fn predict_nodes<S: Simd>(
                 store3(&mut n.p, V3::select(held, p, to));
             }
         },
-    )
+    );
 }
 
 /// Takes nodes out of obstacles, with friction, and notes what touches.
@@ -97,7 +97,7 @@ pub(super) fn contacts_with<S: Simd>(
             }
             touched.store_array(&mut b.touched);
         },
-    )
+    );
 }
 
 /// Takes one node out of obstacles, with friction, and notes what it rests on. Returns 1 where it

@@ -200,7 +200,7 @@ fn newton<S: Simd, const TWICE: bool>(
                 kernel::up::<_, TWICE>(w, nodes, edges, rows, &stage);
             });
         },
-    )
+    );
 }
 
 /// Frames, velocities, twist.
@@ -217,7 +217,7 @@ fn finish<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams) {
                 w.put(sum, finite);
             });
         },
-    )
+    );
 }
 
 #[inline(always)]
@@ -342,7 +342,7 @@ fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacle
                 }
             }
         },
-    )
+    );
 }
 
 /// Nodes to where they would be after `ahead` by themselves, or on what is in the way.
@@ -361,7 +361,7 @@ fn fall<S: Simd>(
             predict_nodes(simd, b, ahead, gravity.scale(ahead), skin, obstacles);
             contacts_with(simd, b, skin, obstacles, Grip::NONE, f32x16::splat(simd, 1.0));
         },
-    )
+    );
 }
 
 /// Makes masses and stiffnesses of what was gathered: of a node `w` in those of dry nodes, of a joint
