@@ -6,28 +6,31 @@
 //! sweeps from root to tip in all three projections, the same time spent on more substeps with fewer
 //! sweeps, and with or without the direct tridiagonal solve of the lengths (`limiter`).
 //!
-//! The best of four runs on a 2-core x86-64 server machine with AVX-512 that others use, too:
+//! A quiet run on a 2-core x86-64 server machine with AVX-512:
 //!
 //! ```text
-//! substeps × iterations | limiter | ms a second | sag of 8; 32 segments | strain of 64
-//!                 6 × 5 | 2       | 143         | 1.061; 1.485          | 0.0008
-//!                 6 × 5 | 1       | 170         | 1.061; 1.483          | 0.0121
-//!                 6 × 5 | 0       | 172         | 1.061; 1.491          | 0.4523
-//!                3 × 10 | 2       | 111         | 1.155; 2.014          | 1.4588
-//!                2 × 15 | 2       | 95          | 1.289; 2.569          | 0.7958
-//!                10 × 3 | 2       | 215         | 1.036; 1.283          | 0.0000
-//!                15 × 2 | 1       | 299         | 1.026; 1.185          | 0.0002
-//!                30 × 1 | 1       | 518         | 1.018; 1.088          | 0.0000
-//!                6 × 10 | 2       | 231         | 1.048; 1.251          | 0.0000
-//!                6 × 20 | 2       | 329         | 1.043; 1.132          | 0.0000
-//!                12 × 5 | 2       | 264         | 1.024; 1.116          | 0.0000
+//! substeps (× iterations, limiter) | ms a second | sag of 8; 32 segments over theory | strain of 64
+//!                     direct     1 |  58         | 1.012; 0.998                      | 0.0098
+//!                     direct     2 |  74         | 1.012; 0.998                      | 0.0005
+//!                     direct     3 |  82         | 1.012; 0.998                      | 0.0005
+//!                     direct     4 |  96         | 1.012; 0.998                      | 0.0004
+//!                     direct     6 | 139         | 1.012; 0.998                      | 0.0001
+//!                     direct    12 | 253         | 1.012; 0.998                      | 0.0000
+//!                   split  6 × 5, 2 | 147        | 1.061; 1.485                      | 0.0008
+//!                   split  6 × 5, 0 | 135        | 1.061; 1.491                      | 0.4523
+//!                 coupled  6 × 5, 2 | 138        | 1.061; 1.485                      | 0.0008
+//!                 printed  6 × 5, 0 | 161        | 0.544; 0.982                      | 0.5300
+//!                   split 3 × 10, 2 | 104        | 1.155; 2.014                      | 1.4588
+//!                   split 10 × 3, 2 | 209        | 1.036; 1.283                      | 0.0000
+//!                   split 30 × 1, 1 | 457        | 1.018; 1.088                      | 0.0000
+//!                   split 6 × 20, 2 | 274        | 1.043; 1.132                      | 0.0000
+//!                   split 12 × 5, 2 | 267        | 1.024; 1.116                      | 0.0000
 //! ```
 //!
-//! So the direct solve of lengths takes the strain away for less than what runs differ by. Fewer
-//! substeps than six are cheaper and bad. For less than twice the time twelve substeps of five are the
-//! best buy; ten of three are the best for less. Many substeps of one iteration cost most: gathering
-//! strands and all other systems run in each of them. The coupled projection costs and errs as the
-//! split one. The printed one sags by half in coarse segments.
+//! So the direct solver is right at any number of substeps, where sweeps are not at many times its cost:
+//! two or three carry rods as well as six. Sweeps need six. Their length limiter takes the strain away for
+//! less than what runs differ by; the coupled projection costs and errs as the split one, the printed one
+//! sags by half in coarse segments.
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{Cuticle, prelude::*};

@@ -326,6 +326,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
     };
     // What the plugins left out would have brought, and no contact between strands to begin with.
     app.init_resource::<HairDefault<BondInfluence>>()
+        .init_resource::<HairGravity>()
         .insert_resource(HairDefault(AirDrag { rate: 3.0 }))
         .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
@@ -347,7 +348,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
         let mut rest = RestShape::default();
         rest.darboux = (0..strand.edges()).map(|i| strand.darboux(i)).collect();
         rest.stiffness = vec![0.01; strand.edges()];
-        app.world_mut().spawn((StrandOf(of), strand.clone(), rest));
+        app.world_mut().spawn((StrandOf(of), strand.clone(), rest, Bonds::default()));
     }
     app.update();
     app
