@@ -21,7 +21,12 @@ fn headless(arguments: &[&str]) -> Output {
 }
 
 fn scene(scene: &str, variant: &str) -> Value {
-    let out = headless(&["--scene", scene, "--variant", variant, "--json", "--threads", "1"]);
+    scene_by(scene, variant, "direct")
+}
+
+fn scene_by(scene: &str, variant: &str, solver: &str) -> Value {
+    let run = ["--scene", scene, "--variant", variant, "--json", "--threads", "1"];
+    let out = headless(&[&run[..], &["--solver", solver]].concat());
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let report: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(
@@ -87,6 +92,15 @@ fn perm_curls_and_its_controls_hang_straight() {
         near(&report, "kept_zero_gravity", 0.0, 0.01);
         assert!(number(&report, "turns") < 0.1);
     }
+}
+
+#[test]
+fn the_papers_projections_keep_the_same_shares() {
+    near(&scene_by("bedhead", "treated", "sweeps"), "kept_zero_gravity", 0.33, 0.01);
+    near(&scene_by("perm", "treated", "sweeps"), "kept_zero_gravity", 0.67, 0.01);
+    let dried = scene_by("blow-dry", "treated", "sweeps");
+    near(&dried, "drying_error", 0.0, 1e-4);
+    near(&dried, "relaxed_error", 0.0, 1e-3);
 }
 
 fn swing(from: &str, segments: &str, more: &[&str]) -> Value {

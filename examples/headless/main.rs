@@ -74,8 +74,19 @@ struct Arguments {
     /// Threads that solve strands; Bevy's own choice if left out.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
+    /// What solves rods: `direct`, or `sweeps`, the paper's projections.
+    #[arg(long, value_parser = solver)]
+    solver: Option<SolverMethod>,
     #[command(flatten)]
     swing: swing::Options,
+}
+
+fn solver(name: &str) -> Result<SolverMethod, String> {
+    match name {
+        "direct" => Ok(SolverMethod::Direct),
+        "sweeps" => Ok(SolverMethod::Sweeps),
+        _ => Err("there are direct and sweeps".into()),
+    }
 }
 
 fn main() -> ExitCode {
@@ -108,6 +119,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let mut csv = arguments.csv.as_deref().map(Table::create).transpose()?;
     let mut app =
         headless_app(scene, arguments.threads, Strewn { count: arguments.droplets, ..default() });
+    if let Some(method) = arguments.solver {
+        app.insert_resource(HairDefault(HairSolver { method, ..default() }));
+    }
     let bar = ProgressBar::new(frames)
         .with_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} frames, {eta} left")?);
     bar.set_message(format!("{} {}", scene.kind.name(), scene.variant));
@@ -160,8 +174,14 @@ impl<'a> Table<'a> {
 }
 
 fn swing(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    if arguments.variant.is_some() || arguments.seconds.is_some() || arguments.csv.is_some() {
-        return Err("--variant, --seconds and --csv are not for swing".into());
+    let scenes_alone = [
+        arguments.variant.is_some(),
+        arguments.seconds.is_some(),
+        arguments.csv.is_some(),
+        arguments.solver.is_some(),
+    ];
+    if scenes_alone.contains(&true) {
+        return Err("--variant, --seconds, --csv and --solver are not for swing".into());
     }
     print(&arguments.swing.run()?, arguments.json)
 }

@@ -34,10 +34,10 @@ setting! {
         /// swing of angular frequency ω decays by c ω/2 of critical, at any segment count and step.
         /// The step itself damps like 0.3 of its length, which is taken off: less than that is as that.
         ///
-        /// We know of no measurement that gives it for locks. 0.006 loses as much in a swing of 2.5 Hz as a
-        /// loss tangent of 0.09 would, and locks that touch come to rest with it.
-        pub damping: f32 = 0.006, "s" in DAMPING: 0.0..=10.0, safe 0.0..=0.02,
-            "0.006 swings for a second or two, 0.02 is syrup";
+        /// We know of no measurement that gives it for locks. 0.01 loses as much in a swing of 2.5 Hz as a
+        /// loss tangent of 0.16 would, and locks that touch come to rest with it.
+        pub damping: f32 = 0.01, "s" in DAMPING: 0.0..=10.0, safe 0.0..=0.02,
+            "0.01 swings for a second, 0.03 is syrup";
     }
 }
 

@@ -3,6 +3,7 @@
 
 mod hard;
 mod lab;
+mod obstacles;
 mod settled;
 mod swings;
 mod theory;
