@@ -257,9 +257,9 @@ fn dried(bonds_move: bool) -> (f64, f64) {
     strew(&mut app, 500);
     run(&mut app, 4.0);
     let wet = tip_spacing(&tips(&mut app)) / dry;
-    // An hour passes in ten seconds, then another one.
+    // An hour passes in ten seconds, the last drops take a second and third.
     app.insert_resource(ProcessTime(1000.0));
-    run(&mut app, 15.0);
+    run(&mut app, 25.0);
     assert_eq!(droplets(&mut app), 0, "all have dried up");
     assert!(ledger(&app).error() < 1e-5, "{:?}", ledger(&app));
     let mut water = app.world_mut().query::<&Moisture>();
