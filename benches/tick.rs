@@ -119,7 +119,7 @@ fn direct_step(bencher: Bencher<'_, '_>, nodes: usize) {
     let params = DirectParams {
         dt: 1.0 / 360.0,
         gravity: Vec3::NEG_Y * 9.8,
-        damping: 0.006,
+        damping: Stiffness::default().damping,
         limiter_steps: 6,
         skin: 0.0,
     };

@@ -23,7 +23,7 @@
 //! 3. On to the end of the substep, x + (x_θ − x)/θ. With θ = ½ nothing would be damped and nothing
 //!    be calmed; with θ = 1, implicit Euler, all swings would be damped like by a Kelvin–Voigt time of
 //!    h. θ = 0.65 damps like 0.3 h, which is taken off the material's damping, and stiff motion decays
-//!    to 7/13 in each substep. Strands that touch take θ = 1. BDF2 was not better: it needs two more
+//!    to 7/13 in each substep. Strands that touch take θ = 1. BDF2 was not built: it needs two more
 //!    vectors a node and a new start at each contact.
 //! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 %.
 //! 5. Frames carried to the new directions; velocities; twist by a tridiagonal solve.
@@ -35,9 +35,9 @@
 //! |---|---|---|---|---|
 //! | settled sag / length, root level | 8, 16, 32, 64 | 0.3963 | 0.4019, 0.3977, 0.3966, 0.3964 | |
 //! | the same, 5 cm | 8, 16, 32, 64 | 0.0071 | 0.0072, 0.0071, 0.0071, 0.0071 | 0.014, 0.041, 0.149, 0.47 |
-//! | period hanging (s) | 8, 16, 32, 64 | 0.403 | 0.408, 0.405, 0.404, 0.403 | 0.61, 1.00, 1.86 |
-//! | period level (s) | 8, 16, 32, 64 | 0.442 | 0.448, 0.444, 0.443, 0.442 | |
-//! | let go level, lowest after (s) | 8, 16, 32, 64 | | 0.225, 0.223, 0.222, 0.222 | 0.37, 0.58, 1.07, 1.35 |
+//! | period hanging (s) | 8, 16, 32, 64 | 0.403 | 0.409, 0.405, 0.404, 0.404 | 0.61, 1.00, 1.86 |
+//! | period level (s) | 8, 16, 32, 64 | 0.442 | 0.448, 0.444, 0.443, 0.443 | |
+//! | let go level, lowest after (s) | 8, 16, 32, 64 | | 0.225, 0.223, 0.223, 0.223 | 0.37, 0.58, 1.07, 1.35 |
 //! | height of a hanging curl (cm; 24 cm of hair, radius 1, pitch 2, L_g 6) | 18 … 96 | 8.55 | 8.41 … 8.55 | |
 //! | twist that buckles, M L / EI | 32 | 8.99 | 9.37 | |
 //!
@@ -188,14 +188,14 @@ fn newton<S: Simd, const TWICE: bool>(
         || {
             in_lanes!(simd, w => {
                 let mut stage = stage(w, b, params);
-            if TWICE && left == 1 {
-                (stage.again, stage.second) = (stage.twice, true);
-            }
-            if TWICE && left == 2 {
-                let on_the_way = w.lit(0.0).lt(stage.twice);
-                stage.beyond = <_ as Real>::select(on_the_way, w.lit(1.0), stage.beyond);
-            }
-            let BlockLanes { nodes, edges, rows, root_between, .. } = &mut *b;
+                if TWICE && left == 1 {
+                    (stage.again, stage.second) = (stage.twice, true);
+                }
+                if TWICE && left == 2 {
+                    let on_the_way = w.lit(0.0).lt(stage.twice);
+                    stage.beyond = <_ as Real>::select(on_the_way, w.lit(1.0), stage.beyond);
+                }
+                let BlockLanes { nodes, edges, rows, root_between, .. } = &mut *b;
                 kernel::down::<_, TWICE>(w, nodes, edges, rows, root_between, &stage);
                 kernel::up::<_, TWICE>(w, nodes, edges, rows, &stage);
             });
