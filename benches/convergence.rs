@@ -48,7 +48,7 @@ fn main() {
          sag of 8; 32 segments over theory | strain of 64 segments shaken"
     );
     for substeps in [1, 2, 3, 4, 6, 12] {
-        let solver = HairSolver { method: SolverMethod::Direct, ..default() };
+        let solver = HairSolver { substep: 1e-6, ..default() };
         let app = || app(solver, Sweeps::default(), substeps);
         println!(
             "direct | {substeps} | | {:.1} | {:.3}; {:.3} | {:.4}",

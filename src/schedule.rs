@@ -80,6 +80,7 @@ substep! {
         History: "What was drawn becomes the past",
         Poses: "Frames of hair, colliders, rods and blowers move by a substep",
         LevelOfDetail: "Levels and guides are chosen, once a tick",
+        SubstepLength: "How many substeps each hair takes as one, once a tick",
         Sleep: "Strands at rest fall asleep, disturbed ones wake, once a tick",
         FollowerSleep: "Followers sleep while all their guides do, once a tick",
         FrameInertia: "Free nodes stay behind when the hair's frame moves",
@@ -114,9 +115,9 @@ substep! {
 
 /// Into how many substeps a tick is divided.
 ///
-/// Rods carry the same accuracy in three substeps of a tick of 1/60 s as in six, for 60 % of the time
-/// (settled shapes are equal, strain under hard shaking stays below 0.1 %): `HairSubsteps::Fixed(3)`. Six
-/// are the default because water, springs and the paper's projections want them.
+/// Droplets, springs and the paper's projections want the paper's step. Dry hair that is solved directly
+/// carries the same accuracy in longer ones and takes several as one, as
+/// [`HairSolver::substep`](crate::HairSolver::substep) says.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub enum HairSubsteps {
@@ -197,11 +198,31 @@ impl Default for SubstepLimits {
     }
 }
 
+/// How many of the tick's substeps the solver of a hair takes as one, where its level of detail does not
+/// ask for more. Chosen once a tick.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MergedSubsteps(pub(crate) u32);
+
+impl Default for MergedSubsteps {
+    fn default() -> Self {
+        Self(1)
+    }
+}
+
+impl MergedSubsteps {
+    /// As many as fit into `longest` (s), all of a tick equally long.
+    pub(crate) fn within(longest: f32, step: &HairStep) -> Self {
+        let fit = ((longest / step.dt + 1e-3) as u32).clamp(1, step.count.max(1));
+        let divides = |together: &u32| step.count.is_multiple_of(*together);
+        Self((1..=fit).rev().find(divides).unwrap_or(1))
+    }
+}
+
 /// The substep as each hair takes it.
 #[derive(SystemParam)]
 pub(crate) struct EffectiveSubsteps<'w, 's> {
     step: Res<'w, HairStep>,
-    limits: Query<'w, 's, &'static SubstepLimits>,
+    hairs: Query<'w, 's, (Option<&'static SubstepLimits>, Option<&'static MergedSubsteps>)>,
 }
 
 /// One hair's substep.
@@ -211,17 +232,38 @@ pub(crate) struct EffectiveSubstep {
     pub(crate) dt: f32,
     /// How many substeps it stands for.
     pub(crate) substeps: u32,
+    /// Whether the hair takes no other before it in this tick.
+    pub(crate) is_first: bool,
+    /// How long the tick is (s).
+    pub(crate) tick: f32,
     most_iterations: u32,
 }
 
 impl EffectiveSubsteps<'_, '_> {
+    fn together(&self, hair: Entity) -> (u32, SubstepLimits) {
+        let (limits, own) = self.hairs.get(hair).unwrap_or_default();
+        let limits = limits.copied().unwrap_or_default();
+        (limits.substeps.max(own.copied().unwrap_or_default().0), limits)
+    }
+
+    /// Whether the substep that `hair` takes next began before the one that is running.
+    pub(crate) fn began_before(&self, hair: Entity) -> bool {
+        let HairStep { index, count, .. } = *self.step;
+        index > 0 && merged(index - 1, count, self.together(hair).0).is_none()
+    }
+
     /// The substep that `hair` takes now, or `None` while it waits for a longer one.
     pub(crate) fn of(&self, hair: Entity) -> Option<EffectiveSubstep> {
         let HairStep { dt, index, count } = *self.step;
-        let limits = self.limits.get(hair).copied().unwrap_or_default();
-        let substeps = merged(index, count, limits.substeps)?;
-        let most_iterations = limits.iterations;
-        Some(EffectiveSubstep { dt: dt * substeps as f32, substeps, most_iterations })
+        let (together, limits) = self.together(hair);
+        let substeps = merged(index, count, together)?;
+        Some(EffectiveSubstep {
+            dt: dt * substeps as f32,
+            substeps,
+            is_first: index + 1 == substeps,
+            tick: dt * count as f32,
+            most_iterations: limits.iterations,
+        })
     }
 }
 
@@ -372,6 +414,22 @@ mod tests {
         }
         assert_eq!(HairSubsteps::Fixed(0).count(0.1), 1);
         assert!(HairSubsteps::fixed(0).is_err());
+    }
+
+    #[test]
+    fn as_many_substeps_are_merged_as_fit_and_divide_the_tick() {
+        let merged = |longest, rate: f32, count| {
+            let step = HairStep { dt: 1.0 / (rate * count as f32), index: 0, count };
+            MergedSubsteps::within(longest, &step).0
+        };
+        let longest = 1.0 / 180.0;
+        for (rate, count, expected) in
+            [(60.0, 6, 2), (120.0, 3, 1), (240.0, 2, 2), (30.0, 12, 2), (64.0, 6, 2), (20.0, 1, 1)]
+        {
+            assert_eq!(merged(longest, rate, count), expected, "{rate} Hz, {count} substeps");
+        }
+        assert_eq!(merged(1.0 / 90.0, 60.0, 6), 3, "four do not divide six");
+        assert_eq!([merged(1e-9, 60.0, 6), merged(9.0, 60.0, 6)], [1, 6]);
     }
 
     #[test]

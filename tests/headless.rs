@@ -122,7 +122,7 @@ fn a_strand_let_go_swings_as_a_rod() {
         near(&report, "sag", sag, if segments == "8" { 0.025 } else { 0.01 });
         near(&report, "period", hanging, 0.05 * hanging);
         assert!(report["low_point"].is_null(), "{report}");
-        assert_eq!(report["substeps"], 6);
+        assert_eq!(report["substeps"], 3);
     }
     let report = swing("level", "16", &["--substeps", "12"]);
     near(&report, "sag", sag, 0.01);

@@ -308,10 +308,11 @@ fn settings_and_colliders_changed_at_run_time_act_in_the_next_tick() {
     app.world_mut().entity_mut(hair).insert(AirDrag { rate: 1e4 });
     app.update();
     app.update();
-    assert!(rms_speed(strand(&app, e)) < 0.03, "its own drag overrides the default");
+    // What gravity gives in one substep is left.
+    assert!(rms_speed(strand(&app, e)) < 9.8 / 170.0, "its own drag overrides the default");
     app.world_mut().entity_mut(hair).remove::<AirDrag>();
     run(&mut app, 0.1);
-    assert!(rms_speed(strand(&app, e)) > 0.03);
+    assert!(rms_speed(strand(&app, e)) > 9.8 / 100.0);
 }
 
 #[test]

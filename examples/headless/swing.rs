@@ -26,7 +26,7 @@ pub struct Options {
     /// Where it is clamped to and let go, for `swing`.
     #[arg(long, required_if_eq("scene", "swing"))]
     from: Option<From>,
-    /// Substeps a tick of 1/60 s, for `swing`; the hair's own choice if left out.
+    /// Substeps a tick of 1/60 s, for `swing`; three if left out, as dry hair takes.
     #[arg(long)]
     substeps: Option<u32>,
 }
@@ -94,12 +94,12 @@ impl Options {
             return Err(format!("--segments is {segments}, expected 1 to 1024").into());
         }
         let stiffness = Stiffness::from_bending_length(bending_length)?;
-        let substeps = self.substeps.map(HairSubsteps::fixed).transpose()?.unwrap_or_default();
+        let substeps = HairSubsteps::fixed(self.substeps.unwrap_or(3))?;
         let spawn = |world: &mut World, direction: Vec3| -> Result<Entity, Box<dyn Error>> {
             let at = |i: usize| direction * (length * i as f32 / segments as f32);
             let points: Vec<Vec3> = (0..=segments).map(at).collect();
             let strand = Strand::from_polyline(&points)?;
-            let solver = HairSolver { method: SolverMethod::Direct, ..default() };
+            let solver = HairSolver { substep: 1e-6, ..default() };
             let hair = world.spawn((Hair, stiffness, solver)).id();
             Ok(world.spawn((StrandOf(hair), strand)).id())
         };

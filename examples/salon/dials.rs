@@ -262,6 +262,7 @@ impl Settings<'_, '_> {
             ui.checkbox(&mut direct, "direct solver");
             s.method = if direct { SolverMethod::Direct } else { SolverMethod::Sweeps };
             slide_count(ui, &mut s.limiter_steps, HairSolver::LIMITER_STEPS, "limiter steps");
+            slide(ui, &mut s.substep, HairSolver::SUBSTEP, "longest substep of dry hair");
         });
         let mut auto = *self.substeps == HairSubsteps::Auto;
         let now = self.substeps.count(1.0 / 60.0);

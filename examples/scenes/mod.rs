@@ -195,6 +195,7 @@ pub struct Surroundings<'w> {
     wetting: ResMut<'w, HairDefault<Wetting>>,
     contact: ResMut<'w, HairDefault<LockContact>>,
     substeps: ResMut<'w, HairSubsteps>,
+    solver: ResMut<'w, HairDefault<HairSolver>>,
     climate: ResMut<'w, Climate>,
     process: ResMut<'w, ProcessTime>,
     rules: ResMut<'w, DropletRules>,
@@ -207,6 +208,8 @@ impl Surroundings<'_> {
         **self.wetting = default();
         **self.contact = default();
         *self.substeps = default();
+        // The papers' scenes are computed at the papers' step.
+        self.solver.substep = 1.0 / 360.0;
         *self.climate = default();
         *self.process = default();
         *self.rules = default();

@@ -12,13 +12,16 @@ use super::{
 use crate::{
     fault::HairFault,
     lanes::LANES,
-    parallel::{Columns, for_each_block_ahead, for_each_part_of},
+    parallel::{Columns, Nanos, for_each_block_ahead, for_each_part_of},
     strand::PerHair,
 };
 use bevy::prelude::*;
 
 /// About how many nodes are worth a thread of their own: it takes tens of microseconds to wake up.
 const NODES: usize = 4096;
+
+/// About what a node takes (ns).
+const NODE: usize = 30;
 
 /// One block of strands of equal node count through one substep.
 fn solve<T: Batched>(lanes: &mut T::Lanes, items: &mut [T], params: &T::Params) -> Vec<HairFault> {
@@ -68,6 +71,7 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
     let mut blocks: Vec<_> = blocks.map(|block| (block, Vec::new())).collect();
     for_each_block_ahead(
         &mut blocks,
+        Nanos(LANES * nodes * NODE),
         || (T::Lanes::default(), PerHair::default()),
         |(strands, _)| strands.iter().for_each(T::prefetch),
         |(lanes, params), (strands, faults)| *faults = solve(lanes, params, strands),

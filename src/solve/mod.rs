@@ -10,6 +10,7 @@
 //! | `batch` | which strands are solved side by side, on all threads |
 //! | `gather` | strands' arrays into lanes and back; strands that left the finite numbers |
 //! | `rods` | Cosserat rods ([`rod`](crate::rod)) |
+//! | `substeps` | how many of the tick's substeps a hair takes as one |
 //! | `springs` | masses and springs ([`mass_spring`](crate::mass_spring)) |
 
 mod batch;
@@ -17,6 +18,7 @@ mod batched;
 mod gather;
 mod rods;
 mod springs;
+mod substeps;
 
 pub use rods::RodPlugin;
 pub use springs::SpringPlugin;

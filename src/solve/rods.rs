@@ -4,6 +4,7 @@ use super::{
     batch::for_each_batch,
     batched::{Batched, Kept, Source},
     gather::in_lanes,
+    substeps,
 };
 use crate::{
     bond::{BondInfluence, Bonds, RestShape},
@@ -35,6 +36,7 @@ impl Plugin for RodPlugin {
         setting::plugin::<Stiffness>(app);
         setting::plugin::<HairSolver>(app);
         setting::plugin::<Sweeps>(app);
+        substeps::plugin(app);
         app.add_systems(HairTick, step_rods.in_set(HairSystems::Rods));
     }
 }
@@ -198,7 +200,7 @@ fn step_rods(
             skin,
             bending_length: stiffness.bending_length,
             influence: influence.of(hair).as_array(),
-            obstacles: obstacles.map_or_else(Vec::new, |all| all.over(substep.substeps)),
+            obstacles: obstacles.map_or_else(Vec::new, |all| all.solids.clone()),
         })
     };
     let nodes = strands.iter().next().map_or(0, |(_, strand, ..)| strand.nodes());

@@ -124,7 +124,7 @@ fn step_springs(
                 gravity: pose.now().direction_in(gravity),
                 skin: contact.of(hair).radius,
             };
-            let obstacles = obstacles.map_or_else(Vec::new, |all| all.over(substep.substeps));
+            let obstacles = obstacles.map_or_else(Vec::new, |all| all.solids.clone());
             HairParams { level, step, obstacles }
         })
     };

@@ -21,7 +21,10 @@ pub struct TickPose {
     from: Option<Pose>,
     to: Pose,
     now: Pose,
+    /// Where the present substep began; for a hair that takes several as one, the first of those.
     before: Pose,
+    /// The shares of the tick at which it is `now` and was `before`.
+    shares: [f32; 2],
     /// The shares of the frame's moving and turning that its hair is left behind by.
     inertia: Vec2,
     jumps: bool,
@@ -76,6 +79,7 @@ impl Default for TickPose {
             to: pose,
             now: pose,
             before: pose,
+            shares: [0.0; 2],
             inertia: Vec2::ONE,
             jumps: false,
             was_invalid: false,
@@ -200,23 +204,25 @@ impl TickPose {
         &self.now
     }
 
-    /// The pose at the end of the substep before.
+    /// The pose at the end of the substep before; of a hair that takes several as one, before the first
+    /// of those.
     pub fn before(&self) -> &Pose {
         &self.before
     }
 
-    /// How this pose goes from before to now as seen in `hair`: what carries a point of its surface
-    /// along; `None` if it rests. Nodes have been carried into the hair's frame as it is now, so with
+    /// How this pose moves during the substep of `hair`, as seen in that: what carries a point of its
+    /// surface along; `None` if it rests. Nodes have been carried into the hair's frame as it is now, so with
     /// full inertia what rests in the world rests in it, whatever the frame did.
     pub fn motion_in(&self, hair: &TickPose) -> Option<Affine3A> {
+        let began = self.at(hair.shares[0]);
         if hair.inertia == Vec2::ONE {
-            return (self.now != self.before).then(|| {
+            return (self.now != began).then(|| {
                 let hair = hair.now.affine();
-                hair.inverse() * self.now.affine() * self.before.affine().inverse() * hair
+                hair.inverse() * self.now.affine() * began.affine().inverse() * hair
             });
         }
         let seen = |own: &Pose, hair: &Pose| hair.affine().inverse() * own.affine();
-        let (before, now) = (seen(&self.before, &hair.before), seen(&self.now, &hair.now));
+        let (before, now) = (seen(&began, &hair.before), seen(&self.now, &hair.now));
         let carried = hair.frame_delta().map_or(before, |carry| Affine3A::from(carry) * before);
         (now != carried).then(|| now * carried.inverse())
     }
@@ -253,6 +259,7 @@ impl TickPose {
             self.now = self.to;
         }
         self.from = from;
+        self.shares[1] = 0.0;
         (put, report)
     }
 
@@ -263,10 +270,20 @@ impl TickPose {
         }
     }
 
-    /// Goes to the share `t` of the tick's motion.
-    pub(super) fn advance(&mut self, t: f32) {
-        self.before = self.now;
-        self.now = self.from.unwrap_or(self.to).toward(&self.to, t);
+    /// Goes to the share `t` of the tick's motion, in the same substep as before where a hair `waits` to
+    /// take several as one.
+    pub(super) fn advance(&mut self, t: f32, waits: bool) {
+        if !waits {
+            self.before = self.now;
+            self.shares[0] = self.shares[1];
+        }
+        self.now = self.at(t);
+        self.shares[1] = t;
+    }
+
+    fn at(&self, t: f32) -> Pose {
+        let from = self.from.unwrap_or(self.to);
+        if t > 0.0 { from.toward(&self.to, t) } else { from }
     }
 
     /// How a point at rest in the world moves in this frame during the substep; `None` if the frame
@@ -328,19 +345,37 @@ mod tests {
         let mut frame = TickPose::default();
         let inertia = HairInertia { teleport_distance: 10.0, ..default() };
         assert_eq!(frame.aim(Some(a), 0.0, &inertia), (false, false));
-        frame.advance(1.0);
+        frame.advance(1.0, false);
         assert!(frame.frame_delta().is_none(), "the first tick begins where the frame is");
         frame.aim(Some(b), 0.0, &inertia);
         let world = Vec3::new(0.2, 0.4, -0.3);
         let mut local = a.point_in(world);
         for i in 1..=6 {
-            frame.advance(i as f32 / 6.0);
+            frame.advance(i as f32 / 6.0, false);
             local = frame.frame_delta().unwrap() * local;
         }
         assert!(b.point_out(local).distance(world) < 1e-5);
+        // Back again, two substeps as one; what moves along is seen to move as far.
+        let mut beside = frame.clone();
+        frame.aim(Some(a), 0.0, &inertia);
+        beside.aim(Some(Pose { translation: b.translation + Vec3::X * 0.6, ..b }), 0.0, &inertia);
+        for i in 1..=6 {
+            frame.advance(i as f32 / 6.0, i % 2 == 0);
+            beside.advance(i as f32 / 6.0, false);
+            if i % 2 == 0 {
+                local = frame.frame_delta().unwrap() * local;
+                let moved = beside.motion_in(&frame).unwrap();
+                let point = frame.now().point_in(Vec3::Y);
+                let moved = frame.now().point_out(moved.transform_point3(point));
+                assert!(moved.distance(Vec3::new(0.2, 1.0, 0.0)) < 1e-5, "{moved}");
+            }
+        }
+        assert!(a.point_out(local).distance(world) < 1e-5);
+        frame.aim(Some(b), 0.0, &inertia);
+        frame.advance(1.0, false);
         let mut reports = || frame.aim(None, 0.0, &inertia).1;
         assert!(reports() && !reports(), "reported once");
-        frame.advance(1.0);
+        frame.advance(1.0, false);
         assert_eq!(*frame.now(), b);
     }
 }

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     fault::{FaultKind, HairFault},
     parallel::{for_each_part, tables},
-    schedule::{HairStep, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick},
     setting::{self, Settings},
 };
 use bevy::{math::Isometry3d, prelude::*};
@@ -121,6 +121,7 @@ fn move_poses(
     (time, frames): (Res<Time>, Res<Time<Virtual>>),
     transforms: TransformHelper,
     inertia: Settings<HairInertia>,
+    substeps: EffectiveSubsteps,
     mut poses: Query<(Entity, &mut TickPose, Option<&Strands>)>,
     mut strands: Query<&mut Strand>,
     mut faults: MessageWriter<HairFault>,
@@ -144,12 +145,14 @@ fn move_poses(
                 }
             }
         }
-        frame.advance((step.index + 1) as f32 / step.count as f32);
+        let waits = members.is_some() && substeps.began_before(entity);
+        frame.advance((step.index + 1) as f32 / step.count as f32, waits);
     }
 }
 
 /// Inertia: free nodes are carried by the inverse of the frame's motion; the root stays.
 fn apply_frame_inertia(
+    substeps: EffectiveSubsteps,
     hairs: Query<&TickPose, With<Hair>>,
     mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand)>,
 ) {
@@ -162,7 +165,10 @@ fn apply_frame_inertia(
         |(), rows| {
             let mut carries = PerHair::default();
             for (of, sleep, strand) in rows {
-                let carry = || hairs.get(of.0).ok()?.frame_delta();
+                let carry = || {
+                    substeps.of(of.0)?;
+                    hairs.get(of.0).ok()?.frame_delta()
+                };
                 if sleep.is_simulated()
                     && let Some(index) = carries.index(of.0, carry)
                 {

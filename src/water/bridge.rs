@@ -9,28 +9,44 @@ use crate::{
 };
 use bevy::prelude::*;
 
+/// Whether water has touched any strand of a hair. Seen once a tick.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct IsWet(pub(crate) bool);
+
+pub(super) fn see_wet_hair(
+    mut hairs: Query<(&Strands, &mut IsWet), With<Hair>>,
+    strands: Query<&Moisture>,
+) {
+    for (members, mut wet) in &mut hairs {
+        let mut moistures = strands.iter_many(members.collection());
+        wet.set_if_neq(IsWet(moistures.any(|moisture| !moisture.is_untouched())));
+    }
+}
+
 /// Bridges of water between the wet strands of each hair, found through the lists of its contacts.
 pub(super) fn join_wet_strands(
     steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
     wetting: Settings<Wetting>,
     mut scratch: ResMut<WaterField>,
-    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
+    mut hairs: Query<
+        (Entity, &Strands, &IsWet, &mut LockNeighbours, Option<&Sleepers>),
+        With<Hair>,
+    >,
     mut strands: Query<(&mut Strand, &Moisture, &AddedMass, &StrandSleep), With<StrandOf>>,
 ) {
     let rows = &mut scratch.bypass_change_detection().rows;
-    for (hair, members, mut neighbours, sleepers) in &mut hairs {
+    for (hair, members, wet, mut neighbours, sleepers) in &mut hairs {
         if sleepers.is_some_and(Sleepers::all) {
             continue;
         }
         let Some(stride) = steps.of(hair) else { continue };
         let LockContact { radius, strength } = contact.of(hair);
         let wetting = wetting.of(hair);
-        let mut moistures = strands.iter_many(members.collection()).map(|(_, m, ..)| m);
         let joins = radius > 0.0
             && strength > 0.0
             && (wetting.cohesion > 0.0 || wetting.film_drag > 0.0)
-            && moistures.any(|moisture| !moisture.is_untouched());
+            && wet.0;
         let list = neighbours.bypass_change_detection();
         let film = Film::between(2.0 * radius);
         list.set_extra_margin(if joins { film.longest } else { 0.0 });

@@ -24,6 +24,7 @@ mod motion;
 mod strand_block;
 mod systems;
 
+pub(crate) use bridge::IsWet;
 pub use droplet::{Droplet, Ride, Shower};
 pub use moisture::{Moisture, Wetting};
 pub use systems::WaterPlugin;

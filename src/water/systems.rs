@@ -2,16 +2,16 @@
 
 use super::{
     Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting,
-    bridge::join_wet_strands,
+    bridge::{IsWet, join_wet_strands, see_wet_hair},
     droplet_contact::{WaterField, wet_strands},
     exchange::{exchange_water, mend_moistures, run_showers},
     motion::{follow_strands, merge_droplets, move_droplets},
     strand_block,
 };
 use crate::{
-    schedule::{HairStep, HairSystems, HairTick},
+    schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting,
-    strand::Strand,
+    strand::{Hair, Strand},
 };
 use bevy::prelude::*;
 
@@ -32,11 +32,12 @@ impl Plugin for WaterPlugin {
             .register_type::<Moisture>()
             .register_type::<SoakHair>()
             .register_required_components::<Strand, Moisture>()
+            .register_required_components::<Hair, IsWet>()
             .add_observer(count_lost_droplet)
             .add_observer(count_lost_moisture)
             .add_systems(
                 HairTick,
-                (mend_moistures, run_showers, exchange_water)
+                (mend_moistures, run_showers, exchange_water, see_wet_hair.run_if(first_substep))
                     .chain()
                     .in_set(HairSystems::WaterExchange),
             )

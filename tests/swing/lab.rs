@@ -31,7 +31,7 @@ fn record(mut recording: ResMut<Recording>, strands: Query<&Strand>) {
 }
 
 impl Lab {
-    /// At `hertz` with `substeps` each tick.
+    /// At `hertz` with `substeps` each tick, none of them taken together.
     pub fn new(hertz: f64, substeps: u32) -> Self {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, HairPlugins::default()))
@@ -41,7 +41,7 @@ impl Lab {
             .insert_resource(HairDefault(Cuticle { damage: 0.0, ..default() }))
             .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }))
             .insert_resource(HairDefault(HairSleep::never()))
-            .insert_resource(HairDefault(HairSolver { method: SolverMethod::Direct, ..default() }))
+            .insert_resource(HairDefault(HairSolver { substep: 1e-6, ..default() }))
             .init_resource::<Recording>()
             .add_systems(HairTick, record.in_set(HairSystems::Last));
         app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
