@@ -156,18 +156,6 @@ pub struct Obstacles {
     pub solids: Vec<Obstacle>,
 }
 
-impl Obstacles {
-    /// The same for a step over the last `substeps` substeps: surfaces go as much farther.
-    pub(crate) fn over(&self, substeps: u32) -> Vec<Obstacle> {
-        let mut solids = self.solids.clone();
-        for motion in solids.iter_mut().filter_map(|solid| solid.motion.as_mut()) {
-            let once = *motion;
-            (1..substeps).for_each(|_| *motion = once * *motion);
-        }
-        solids
-    }
-}
-
 /// The pairs of strands of one hair that may touch.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]

@@ -11,13 +11,24 @@ use super::{
     lanes::{self, Bridges, Penalty, Pieces, Row, Stack, Sum, WIDTH, WetRow},
     model::{Bridged, Film},
 };
-use crate::{grid::UniformGrid, lanes::dispatch, parallel::for_each_block};
+use crate::{
+    grid::UniformGrid,
+    lanes::dispatch,
+    parallel::{Nanos, for_each_block},
+};
 use core::ops::Range;
 use fearless_simd::{Level, Simd};
 use glam::Vec3;
 
 /// Margin of the lists, in units of the reach. More means longer lists, built less often.
 const MARGIN: f32 = 1.6;
+
+/// The same where strands are so fast that lists have to be built anew soon, whatever their margin.
+const FAST_MARGIN: f32 = 0.5;
+
+/// Groups that turn out to be out of reach cost as much as new lists where there have been so many for
+/// each node.
+const IDLE_GROUPS: usize = 10;
 
 /// Half the length of the pieces in which edges are put into the grid, in units of reach and margin.
 /// Shorter ones are more to sort (0.5: scene 1 takes 5 % longer), longer ones sift less.
@@ -30,16 +41,41 @@ pub(super) const LONGEST_BRIDGE: f32 = 0.6;
 /// Strands that are one piece of work.
 const PART: usize = 16;
 
+/// About what a node takes (ns): to see whether it has moved, to look up who is near, to be pushed, to be
+/// joined by water.
+const WATCH: usize = 2;
+const SEARCH: usize = 250;
+const PUSH: usize = 40;
+const BRIDGE: usize = 60;
+
+/// The work of a part where a node takes so many `nanos`.
+fn per_part(nanos: usize, rows: &[Row], strands: usize) -> Nanos {
+    Nanos(nanos * PART * rows.len() / strands.max(1))
+}
+
 /// The nodes of one hair, the lists of edges near them, and what these do to them.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     rows: Vec<Row>,
+    /// Where the nodes are expected in the middle of the time that lists are to be used for; empty if
+    /// that is where they are.
+    expected: Vec<Row>,
     /// The nodes of each strand.
     strands: Vec<Range<u32>>,
     lists: Lists,
     parts: Vec<Part>,
     /// How much farther than the reach bridges of water are asked for (m).
     beyond: f32,
+}
+
+/// When lists that may miss a pair are built anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lookup {
+    /// Now.
+    Now,
+    /// Another time: strands in fast motion are looked up once for several substeps. Who comes near
+    /// faster than the lists' margin allows is found then.
+    Later,
 }
 
 /// What the lists were built from.
@@ -51,8 +87,11 @@ struct Lists {
     rows: Vec<Row>,
     strands: Vec<Range<u32>>,
     reach: f32,
+    margin: f32,
     /// The farthest that a node has moved since (m).
     moved: f32,
+    /// How many groups out of reach have been looked at since.
+    idle: usize,
 }
 
 /// The lists and pushes of some strands' nodes.
@@ -66,6 +105,8 @@ struct Part {
     slacks: Vec<f32>,
     /// The square of how far a node has moved since (m²).
     moved: f32,
+    /// How many groups out of reach the last pushes looked at.
+    idle: usize,
     pushes: Vec<Vec3>,
     bridged: Vec<Bridged>,
 }
@@ -92,6 +133,7 @@ impl Neighbours {
     /// Forgets the nodes, not the lists.
     pub fn clear(&mut self) {
         self.rows.clear();
+        self.expected.clear();
         self.strands.clear();
     }
 
@@ -102,43 +144,95 @@ impl Neighbours {
         self.strands.push(start..self.rows.len() as u32);
     }
 
+    /// Says where the nodes of the strand that was added last are expected, if all are said.
+    pub fn expect(&mut self, nodes: impl Iterator<Item = Vec3>) {
+        let Some(strand) = self.strands.last() else { return };
+        let own = &self.rows[strand.start as usize..strand.end as usize];
+        self.expected.extend(own.iter().zip(nodes).map(|(row, p)| [p.x, p.y, p.z, row[3]]));
+    }
+
     /// Equation 18 for every node (m/s²), in the order they were added. The sums' order does not
     /// depend on threads.
-    pub fn pushes(&mut self, radius: f32, strength: f32) -> impl Iterator<Item = Vec3> {
+    pub fn pushes(
+        &mut self,
+        radius: f32,
+        strength: f32,
+        lookup: Lookup,
+    ) -> impl Iterator<Item = Vec3> {
         // Lists are filled up with an edge that is nowhere.
         self.rows.extend([[f32::NAN; 4]; 2]);
         let reach = 2.0 * radius;
         let level = Level::new();
-        let stale = self.are_stale(reach);
-        if stale {
-            self.lists.begin(&self.rows, &self.strands, reach);
-            self.parts.resize_with(self.strands.len().div_ceil(PART), Part::default);
+        if self.are_stale(reach, lookup) {
+            self.look_up(level, reach);
+            self.watch();
         }
         let Self { rows, strands, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let penalty = Penalty { reach, strength };
-        for_each_block(&mut work, Default::default, |scratch: &mut Scratch, (part, strands)| {
-            if stale {
-                dispatch!(level, simd => part.search(simd, rows, strands, lists, scratch));
-            }
-            dispatch!(level, simd => part.push(simd, rows, strands, lists.moved, penalty));
-        });
+        for_each_block(
+            &mut work,
+            per_part(PUSH, rows, strands.len()),
+            || (),
+            |(), (part, strands)| {
+                dispatch!(level, simd => part.push(simd, rows, strands, lists.moved, penalty));
+            },
+        );
+        lists.idle += parts.iter().map(|part| part.idle).sum::<usize>();
         parts.iter().flat_map(|part| part.pushes.iter().copied())
     }
 
-    /// Whether the lists may miss a pair of the nodes as they are now.
-    fn are_stale(&mut self, reach: f32) -> bool {
-        let Self { rows, strands, lists, parts, beyond } = self;
-        if lists.reach != reach || lists.strands != *strands {
+    /// Builds the lists.
+    fn look_up(&mut self, level: Level, reach: f32) {
+        let Self { rows, expected, strands, lists, parts, beyond } = self;
+        let (mut places, mut fast) = (&*rows, false);
+        if expected.len() + 2 == rows.len() {
+            let way = |(a, b)| lanes::place(a).distance_squared(lanes::place(b));
+            let farthest = rows.iter().zip(&*expected).map(way).fold(0.0, f32::max).sqrt();
+            fast = *beyond == 0.0 && farthest >= 0.5 * MARGIN * reach;
+            expected.extend([[f32::NAN; 4]; 2]);
+            places = expected;
+        }
+        lists.begin(places, strands, reach, if fast { FAST_MARGIN } else { MARGIN });
+        parts.resize_with(strands.len().div_ceil(PART), Part::default);
+        let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
+        let each = per_part(SEARCH, places, strands.len());
+        for_each_block(
+            &mut work,
+            each,
+            Default::default,
+            |scratch: &mut Scratch, (part, strands)| {
+                dispatch!(level, simd => part.search(simd, places, strands, lists, scratch));
+            },
+        );
+    }
+
+    /// Whether the lists are to be built anew for the nodes as they are now.
+    fn are_stale(&mut self, reach: f32, lookup: Lookup) -> bool {
+        if self.lists.reach != reach || self.lists.strands != self.strands {
             return true;
         }
+        self.watch();
+        let Self { rows, lists, beyond, .. } = self;
+        let complete = lists.moved < 0.5 * (lists.margin * reach - *beyond);
+        let pays = lists.idle > IDLE_GROUPS * rows.len();
+        lookup == Lookup::Now && (!complete || pays)
+    }
+
+    /// Looks how far nodes are from where the lists were built.
+    fn watch(&mut self) {
+        let Self { rows, strands, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
-        for_each_block(&mut work, || (), |(), (part, strands)| part.watch(rows, strands, lists));
+        let each = per_part(WATCH, rows, strands.len());
+        for_each_block(
+            &mut work,
+            each,
+            || (),
+            |(), (part, strands)| part.watch(rows, strands, lists),
+        );
         // A non-finite node moves the maximum to no number, which is not less than the limit.
         let squared = parts.iter().map(|part| part.moved).fold(0.0, larger);
         lists.moved = squared.sqrt();
-        let complete = lists.moved < 0.5 * (MARGIN * reach - *beyond);
-        !complete
     }
 
     /// How many nodes there are.
@@ -166,6 +260,7 @@ impl Neighbours {
         let reaches = film.longest + 2.0 * lists.moved;
         for_each_block(
             &mut work,
+            per_part(BRIDGE, rows, strands.len()),
             || (),
             |(), (part, strands)| {
                 dispatch!(level, simd => part.bridge(simd, rows, wet, strands, reaches, film));
@@ -183,7 +278,7 @@ impl Neighbours {
 impl Lists {
     /// How far from a node the edges in its list are, at most (m).
     fn within(&self) -> f32 {
-        self.reach * (1.0 + MARGIN)
+        self.reach * (1.0 + self.margin)
     }
 
     /// How far from a node the middles of their pieces are, at most (m).
@@ -192,9 +287,9 @@ impl Lists {
     }
 
     /// Puts all edges into the grid.
-    fn begin(&mut self, rows: &[Row], strands: &[Range<u32>], reach: f32) {
-        self.moved = 0.0;
-        self.reach = reach;
+    fn begin(&mut self, rows: &[Row], strands: &[Range<u32>], reach: f32, margin: f32) {
+        (self.moved, self.idle) = (0.0, 0);
+        (self.reach, self.margin) = (reach, margin);
         self.rows.clear();
         self.rows.extend_from_slice(rows);
         self.strands.clear();
@@ -296,6 +391,7 @@ impl Part {
     ) {
         // Neither a node nor an edge has moved by more, so what was farther cannot touch yet.
         let may_touch = 2.0 * moved;
+        self.idle = 0;
         let nodes = strands.first().map_or(0, |s| s.start) as usize;
         self.pushes.clear();
         let ends = self.starts.windows(2).zip(&self.slacks);
@@ -309,6 +405,7 @@ impl Part {
                 if group.slack > may_touch {
                     break;
                 }
+                self.idle += usize::from(group.slack > 0.0);
                 sum.add(simd, rows, &group.edges);
             }
             self.pushes.push(sum.total());
@@ -364,7 +461,7 @@ mod tests {
     fn pushes(list: &mut Neighbours, strands: &[Vec<Vec3>], radius: f32) -> Vec<Vec3> {
         list.clear();
         strands.iter().for_each(|s| list.add(s));
-        list.pushes(radius, 20.0).collect()
+        list.pushes(radius, 20.0, Lookup::Now).collect()
     }
 
     proptest! {
@@ -484,6 +581,37 @@ mod tests {
                 prop_assert!(found.drift.distance(expected.drift) < most, "drift {}", k);
             }
         }
+    }
+
+    #[test]
+    fn lists_for_where_nodes_are_going_serve_on_the_whole_way() {
+        // Two bundles fly 4 cm past each other, 4 mm a substep; lists are good for 1.6 mm to each side.
+        let bundle = |at: Vec3| -> Vec<Vec<Vec3>> {
+            let strand =
+                |k: usize| (0..6).map(move |i| Vec3::new(1.5e-3 * k as f32, 5e-3 * i as f32, 0.0));
+            (0..8).map(|k| strand(k).map(|p| p + at).collect()).collect()
+        };
+        let (way, steps) = (Vec3::X * 4e-3, 10);
+        let mut list = Neighbours::default();
+        let mut looked_up = 0;
+        for step in 0..steps {
+            let strands = bundle(way * step as f32);
+            list.clear();
+            let middle = way * ((steps - 1) as f32 / 2.0 - step as f32);
+            for strand in &strands {
+                list.add(strand);
+                list.expect(strand.iter().map(|p| *p + middle));
+            }
+            let lookup = if step == 0 { Lookup::Now } else { Lookup::Later };
+            let before = list.lists.rows.clone();
+            let found: Vec<Vec3> = list.pushes(1e-3, 20.0, lookup).collect();
+            looked_up += usize::from(list.lists.rows[..1] != before[..before.len().min(1)]);
+            for (k, a) in found.into_iter().enumerate().filter(|(k, _)| k % 6 > 0) {
+                let b = brute(&strands, k / 6, strands[k / 6][k % 6], 1e-3);
+                assert!(a.distance(b) < 1e-2, "step {step}, node {k}: {a} against {b}");
+            }
+        }
+        assert_eq!(looked_up, 1);
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! `Interaction`: strands push each other apart, colliders are seen from each hair's frame.
 
-use super::{ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles};
+use super::{
+    ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles, neighbours::Lookup,
+};
 use crate::{
     parallel::prefetch,
     rod::obstacle::{Obstacle, Solid},
-    schedule::{EffectiveSubsteps, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
     strand::{Hair, Sleepers, StillPose, Strand, StrandOf, StrandSleep, Strands, TickPose},
 };
@@ -27,10 +29,13 @@ impl Plugin for ContactPlugin {
             .register_type::<LockNeighbours>()
             .register_required_components::<Hair, Obstacles>()
             .register_required_components::<Hair, LockNeighbours>()
+            .register_required_components::<Hair, HairReach>()
             .add_systems(
                 HairTick,
                 (
-                    gather_obstacles.in_set(HairSystems::Obstacles),
+                    (find_reach.run_if(first_substep), gather_obstacles)
+                        .chain()
+                        .in_set(HairSystems::Obstacles),
                     push_strands_apart.in_set(HairSystems::StrandContact),
                 ),
             );
@@ -61,15 +66,75 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
     Obstacle { solid, motion, friction: collider.friction }
 }
 
+/// A ball that holds all of a hair however it swings, in its own frame. Found once a tick.
+#[derive(Component, Clone, Copy, Debug, Default)]
+struct HairReach {
+    center: Vec3,
+    radius: f32,
+}
+
+impl HairReach {
+    /// Around strands that are rooted in these places and so long (m).
+    fn around(strands: impl Iterator<Item = (Vec3, f32)>) -> Self {
+        let (mut low, mut high, mut longest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
+        for (root, length) in strands {
+            (low, high, longest) = (low.min(root), high.max(root), longest.max(length));
+        }
+        Self { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) + longest }
+    }
+}
+
+fn find_reach(mut hairs: Query<(&Strands, &mut HairReach), With<Hair>>, strands: Query<&Strand>) {
+    for (members, mut reach) in &mut hairs {
+        let of_strand = |strand: &Strand| {
+            (strand.positions().first().copied().unwrap_or_default(), strand.length())
+        };
+        *reach = HairReach::around(strands.iter_many(members.collection()).map(of_strand));
+    }
+}
+
+/// Room for what moves within a substep and for strands that are drawn out (shares of the reach).
+const ROOM: f32 = 1.25;
+
+/// A ball around a collider in the world, and how far it goes in a substep (m).
+fn ball_around(collider: &HairCollider, pose: &TickPose) -> (Vec3, f32, f32) {
+    let (before, now) = (pose.before(), pose.now());
+    let radius = match collider.shape {
+        ColliderShape::Sphere(s) => s.radius,
+        ColliderShape::Capsule(c) => c.radius + c.half_length,
+        ColliderShape::Cylinder(c) => c.radius.hypot(c.half_height),
+        ColliderShape::Plane(_) => f32::INFINITY,
+    };
+    let travel = before.translation.distance(now.translation);
+    (now.translation, radius * now.scale.max(before.scale), travel)
+}
+
 fn gather_obstacles(
+    steps: EffectiveSubsteps,
     colliders: Query<(&HairCollider, &TickPose)>,
-    mut hairs: Query<(&TickPose, &mut Obstacles), With<Hair>>,
+    mut hairs: Query<(Entity, &TickPose, &HairReach, &mut Obstacles), With<Hair>>,
 ) {
-    for (hair, mut obstacles) in &mut hairs {
+    let solids: Vec<_> = colliders
+        .iter()
+        .map(|(collider, pose)| {
+            let collider = collider.clamped();
+            (ball_around(&collider, pose), collider, pose)
+        })
+        .collect();
+    for (hair, pose, reach, mut obstacles) in &mut hairs {
         obstacles.solids.clear();
-        obstacles
-            .solids
-            .extend(colliders.iter().map(|(c, pose)| seen_from(hair, &c.clamped(), pose)));
+        let Some(step) = steps.of(hair) else { continue };
+        let (before, now) = (pose.before(), pose.now());
+        let travel = before.translation.distance(now.translation);
+        let center = now.point_out(reach.center);
+        let radius = ROOM * reach.radius * now.scale + travel;
+        let is_near = |(at, size, travel): (Vec3, f32, f32)| {
+            let apart = radius + size + travel * step.substeps as f32;
+            // A place that is no number is near: the collider's own checks say so.
+            !(at.distance_squared(center) > apart * apart)
+        };
+        let near = solids.iter().filter(|(ball, ..)| is_near(*ball));
+        obstacles.solids.extend(near.map(|(_, collider, at)| seen_from(pose, collider, at)));
     }
 }
 
@@ -89,15 +154,23 @@ pub(crate) fn push_strands_apart(
         list.clear();
         // Follower strands neither push nor are pushed. Where water joins strands, it joins them too.
         let with_followers = list.has_extra_margin();
+        // Water wants all bridges. Dry strands are looked up once a tick, for where they are in its
+        // middle: most fly along with their neighbours.
+        let lookup = if stride.is_first || with_followers { Lookup::Now } else { Lookup::Later };
+        let ahead = (stride.is_first && !with_followers).then_some(0.5 * (stride.tick - stride.dt));
         for some in members.collection().chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
             for (strand, sleep, _) in strands.iter_many(some) {
                 if with_followers || !sleep.is_follower() {
                     list.add(strand.positions());
+                    if let Some(seconds) = ahead {
+                        let moving = strand.positions().iter().zip(strand.velocities());
+                        list.expect(moving.map(|(p, v)| *p + *v * seconds));
+                    }
                 }
             }
         }
-        let mut pushes = list.pushes(radius, strength);
+        let mut pushes = list.pushes(radius, strength, lookup);
         for some in members.collection().chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.velocities()));
             let mut some = strands.iter_many_mut(some);

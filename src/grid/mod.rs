@@ -8,10 +8,14 @@
 
 mod balls;
 mod kd_tree;
+#[cfg(feature = "groom")]
+mod order;
 
 pub use balls::{BallGrid, Found};
 pub use kd_tree::KdTree;
 pub(crate) use kd_tree::split_at_median;
+#[cfg(feature = "groom")]
+pub(crate) use order::compact_groups;
 
 use core::ops::Range;
 use glam::{IVec3, Vec3};

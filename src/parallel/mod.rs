@@ -13,7 +13,14 @@ pub(crate) use prefetch::prefetch;
 #[cfg(feature = "parallel")]
 use bevy::tasks::ComputeTaskPool;
 
-/// Fewer strands than this are not worth a task.
+/// The least work of a task, on one thread: to wake a thread for less takes longer than to do it.
+pub(crate) const TASK: Nanos = Nanos(50_000);
+
+/// About how long one item takes (ns). Decides whether threads are asked for help, never what comes out.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Nanos(pub(crate) usize);
+
+/// Rows of parts come in multiples of this.
 const GRAIN: usize = 32;
 
 /// The most parts that a table is cut into, unless they would be larger than [`MOST_ROWS`].
@@ -28,30 +35,30 @@ const MOST_ROWS: usize = 512;
 pub(crate) const AHEAD: usize = 6;
 
 /// Calls `work` with every item. Items are independent, so the order cannot matter.
-pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + Sync) {
-    let sizes = Sizes { grain: GRAIN, ahead: 1 };
-    for_each_init(items, sizes, || (), |_| {}, |(), item| work(item));
+pub(crate) fn for_each<T: Send>(items: &mut [T], each: Nanos, work: impl Fn(&mut T) + Send + Sync) {
+    for_each_init(items, each, || (), |_| {}, |(), item| work(item));
 }
 
 /// Calls `work` with every block of about sixteen strands and scratch space that `init` makes once
 /// a task.
 pub(crate) fn for_each_block<T: Send, S>(
     blocks: &mut [T],
+    each: Nanos,
     init: impl Fn() -> S + Send + Sync,
     work: impl Fn(&mut S, &mut T) + Send + Sync,
 ) {
-    for_each_block_ahead(blocks, init, |_| {}, work);
+    for_each_init(blocks, each, init, |_| {}, work);
 }
 
 /// The same, with `ahead` called for every block one block before `work`, to ask for its memory.
 pub(crate) fn for_each_block_ahead<T: Send, S>(
     blocks: &mut [T],
+    each: Nanos,
     init: impl Fn() -> S + Send + Sync,
     ahead: impl Fn(&T) + Send + Sync,
     work: impl Fn(&mut S, &mut T) + Send + Sync,
 ) {
-    let sizes = Sizes { grain: GRAIN / 16, ahead: 1 };
-    for_each_init(blocks, sizes, init, ahead, work);
+    for_each_init(blocks, each, init, ahead, work);
 }
 
 /// The tables that a query finds its entities in.
@@ -86,10 +93,10 @@ pub(crate) fn for_each_part_of<C: Columns, S, O: Send>(
         table.parts(rows.clamp(least, MOST_ROWS))
     });
     let mut parts: Vec<_> = parts.map(|part| (Some(part), None)).collect();
-    let sizes = Sizes { grain: 1, ahead: 1 };
     for_each_init(
         &mut parts,
-        sizes,
+        // Parts are cut to be worth a task each.
+        TASK,
         init,
         |_| {},
         |scratch, (part, made)| {
@@ -99,29 +106,25 @@ pub(crate) fn for_each_part_of<C: Columns, S, O: Send>(
     parts.into_iter().filter_map(|(_, made)| made).collect()
 }
 
-struct Sizes {
-    grain: usize,
-    ahead: usize,
-}
-
 fn for_each_init<T: Send, S>(
     items: &mut [T],
-    Sizes { grain, ahead: distance }: Sizes,
+    each: Nanos,
     init: impl Fn() -> S + Send + Sync,
     ahead: impl Fn(&T) + Send + Sync,
     work: impl Fn(&mut S, &mut T) + Send + Sync,
 ) {
     let serial = |items: &mut [T]| {
         let mut scratch = init();
-        in_turn(items, distance, &ahead, |item| work(&mut scratch, item));
+        in_turn(items, 1, &ahead, |item| work(&mut scratch, item));
     };
     // The thread that waits for the scope works too, so one pool thread makes two workers.
     #[cfg(feature = "parallel")]
     if let Some(pool) = ComputeTaskPool::try_get() {
         let workers = pool.thread_num() + 1;
-        if workers > 1 && items.len() >= 2 * grain {
+        let least = TASK.0.div_ceil(each.0.max(1));
+        if workers > 1 && items.len() >= 2 * least {
             // More than threads, because some are longer than others.
-            let chunk = items.len().div_ceil(workers * 8).max(grain);
+            let chunk = items.len().div_ceil(workers * 8).max(least);
             pool.scope(|scope| {
                 for chunk in items.chunks_mut(chunk) {
                     scope.spawn(async { serial(chunk) });
@@ -131,7 +134,7 @@ fn for_each_init<T: Send, S>(
         }
     }
     #[cfg(not(feature = "parallel"))]
-    let _ = grain;
+    let _ = each;
     serial(items);
 }
 

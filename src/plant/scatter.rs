@@ -9,7 +9,10 @@ use super::{
     recipe::MAX_ROOTS,
     surface::{Root, Surface},
 };
-use crate::grid::UniformGrid;
+use crate::{
+    grid::{UniformGrid, compact_groups},
+    lanes::LANES,
+};
 use core::cmp::Ordering;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::collections::BinaryHeap;
@@ -60,7 +63,10 @@ pub(super) fn scatter(
     }
     let kept = eliminate(&candidates, density, wanted);
     let least = 0.5 / density.sqrt();
-    Ok(apart(kept.into_iter().map(|i| candidates[i].0).collect(), least))
+    let roots = apart(kept.into_iter().map(|i| candidates[i].0).collect(), least);
+    // Neighbours are solved side by side: what one of them touches, all have to look at.
+    let places: Vec<_> = roots.iter().map(|root| root.place.position).collect();
+    Ok(compact_groups(&places, LANES).into_iter().map(|i| roots[i as usize]).collect())
 }
 
 /// Indices of the `wanted` candidates that are left, in order.

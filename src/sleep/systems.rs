@@ -9,7 +9,7 @@ use crate::{
     contact::{HairCollider, LockContact, seen_from},
     environment::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, wind::wind},
     mass_spring::Springs,
-    parallel::for_each,
+    parallel::{Nanos, for_each},
     rod::{
         HairSolver, Stiffness, Sweeps,
         obstacle::{Obstacle, Solid},
@@ -263,7 +263,7 @@ fn update_sleep(
         items.push(Item { hair, strand, sleep, still, held, restless });
     }
     let seconds = step.dt * step.count as f32;
-    for_each(&mut items, |item| decide(item, &wake_events[item.hair], seconds));
+    for_each(&mut items, Nanos(500), |item| decide(item, &wake_events[item.hair], seconds));
     let mut counts = vec![Sleepers::default(); wake_events.len()];
     for item in &items {
         // The carried sleep when those do whom they follow.

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     bond::{BondChanges, BondKind, Bonds},
     fault::{FaultKind, HairFault},
-    parallel::for_each,
+    parallel::{Nanos, for_each},
     schedule::{HairStep, HairSystems, HairTick, ProcessTime},
     setting::{self, Ranged, report},
     strand::{HeldNodes, Strand, StrandOf, Strands, TickPose},
@@ -68,7 +68,7 @@ fn apply_treatments(
 ) {
     let dt = step.dt * process.clamped().0;
     let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();
-    for_each(&mut items, |(bonds, changes, treatments)| {
+    for_each(&mut items, Nanos(1_000), |(bonds, changes, treatments)| {
         let changes = changes.bypass_change_detection();
         for treat in &mut treatments.acting {
             let share = if treat.seconds > dt { dt / treat.seconds } else { 1.0 };
@@ -115,7 +115,7 @@ fn wind_strands(
             Some((rod, (*hair, *pose), strand, settings.clamped(), wound, held))
         })
         .collect();
-    for_each(&mut items, |(rod, (hair, pose), strand, settings, wound, held)| {
+    for_each(&mut items, Nanos(2_000), |(rod, (hair, pose), strand, settings, wound, held)| {
         let from = settings.from_node;
         if from >= strand.edges() {
             return;

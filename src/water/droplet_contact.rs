@@ -13,7 +13,7 @@ use crate::{
     contact::WetRow,
     environment::HairGravity,
     lanes::LANES,
-    parallel::{emptied, for_each_block, prefetch},
+    parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
     schedule::HairStep,
     setting::{Ranged, Settings},
     strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
@@ -241,6 +241,7 @@ fn contact_all(mut work: Work<'_, '_>, met: &ContactParams<'_>) {
     let level = Level::new();
     for_each_block(
         &mut work,
+        TASK,
         || (),
         |(), (strands, out)| {
             out.clear(met.field.drops.len());
@@ -265,6 +266,7 @@ fn contact_all(mut work: Work<'_, '_>, met: &ContactParams<'_>) {
 fn absorb_all(mut work: Work<'_, '_>, shares: &[f64]) {
     for_each_block(
         &mut work,
+        TASK,
         || (),
         |(), (strands, out)| {
             for touch in &out.touches {
@@ -305,6 +307,7 @@ fn sum_up(pieces: &[DropletContacts], rotation: Quat, outcomes: &mut [Outcome]) 
     let mut parts: Vec<_> = (0..).step_by(PART).zip(outcomes.chunks_mut(PART)).collect();
     for_each_block(
         &mut parts,
+        Nanos(10_000),
         || (),
         |(), (first, outcomes)| {
             for piece in pieces {

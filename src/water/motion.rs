@@ -15,7 +15,7 @@ use crate::{
     fault::HairFault,
     grid::UniformGrid,
     lanes::V3,
-    parallel::for_each,
+    parallel::{Nanos, for_each},
     rod::obstacle::Obstacle,
     schedule::{HairStep, ProcessTime},
     setting::{Ranged, Settings, Violations, report},
@@ -73,49 +73,54 @@ pub(super) fn move_droplets(
             ends: false,
         })
         .collect();
-    for_each(&mut items, |Moving { drop, violations, new, evaporated, ends, .. }| {
-        drop.repair(violations);
-        *new = drop.volume - drop.counted;
-        drop.before = drop.position;
+    for_each(
+        &mut items,
+        Nanos(500),
+        |Moving { drop, violations, new, evaporated, ends, .. }| {
+            drop.repair(violations);
+            *new = drop.volume - drop.counted;
+            drop.before = drop.position;
 
-        let blown = Blown::at(&blowers, 1.0, drop.position, Vec3::ZERO);
-        let (wind, warmth) = (blown.velocity, blown.warmth(air.celsius));
-        let radius = drop.radius();
-        let speed = air.draught + (wind - drop.velocity).length();
-        let area = 4.0 * core::f32::consts::PI * radius * radius;
-        let flux = transfer(speed, 2.0 * radius.max(1e-6)) * air.drive(warmth);
-        *evaporated = (f64::from(flux * area * process * dt) / WATER).min(drop.volume);
-        drop.volume -= *evaporated;
-        drop.counted = drop.volume;
+            let blown = Blown::at(&blowers, 1.0, drop.position, Vec3::ZERO);
+            let (wind, warmth) = (blown.velocity, blown.warmth(air.celsius));
+            let radius = drop.radius();
+            let speed = air.draught + (wind - drop.velocity).length();
+            let area = 4.0 * core::f32::consts::PI * radius * radius;
+            let flux = transfer(speed, 2.0 * radius.max(1e-6)) * air.drive(warmth);
+            *evaporated = (f64::from(flux * area * process * dt) / WATER).min(drop.volume);
+            drop.volume -= *evaporated;
+            drop.counted = drop.volume;
 
-        let carrier = drop.ride.and_then(|ride| {
-            let (of, strand) = strands.get(ride.strand).ok()?;
-            (strand.nodes() >= 2).then_some((ride, strand, hairs.get(of.0).ok()?.now(), of.0))
-        });
-        match carrier {
-            Some((ride, strand, pose, hair)) => {
-                let wetting = wetting.of(hair);
-                let (at, holds) = slid(ride, strand, pose, drop, &wetting, gravity, dt);
-                drop.ride = holds.then_some(Ride { at, ..ride });
-                if !holds {
-                    let free = let_go(pose, strand, at, drop.volume, &wetting, gravity);
-                    (drop.position, drop.velocity) = (free.position, free.velocity);
-                    drop.before = drop.position;
+            let carrier = drop.ride.and_then(|ride| {
+                let (of, strand) = strands.get(ride.strand).ok()?;
+                (strand.nodes() >= 2).then_some((ride, strand, hairs.get(of.0).ok()?.now(), of.0))
+            });
+            match carrier {
+                Some((ride, strand, pose, hair)) => {
+                    let wetting = wetting.of(hair);
+                    let (at, holds) = slid(ride, strand, pose, drop, &wetting, gravity, dt);
+                    drop.ride = holds.then_some(Ride { at, ..ride });
+                    if !holds {
+                        let free = let_go(pose, strand, at, drop.volume, &wetting, gravity);
+                        (drop.position, drop.velocity) = (free.position, free.velocity);
+                        drop.before = drop.position;
+                    }
+                }
+                None => {
+                    drop.ride = None;
+                    drop.company = 1;
+                    drop.velocity = fall(drop.velocity, gravity, wind, radius, dt);
+                    drop.position += drop.velocity * dt;
+                    // All of them: a drop may lie where two meet.
+                    let lies =
+                        obstacles.iter().fold(false, |lies, o| rest_on(o, drop, radius) | lies);
+                    drop.lying = if lies { drop.lying + dt } else { 0.0 };
                 }
             }
-            None => {
-                drop.ride = None;
-                drop.company = 1;
-                drop.velocity = fall(drop.velocity, gravity, wind, radius, dt);
-                drop.position += drop.velocity * dt;
-                // All of them: a drop may lie where two meet.
-                let lies = obstacles.iter().fold(false, |lies, o| rest_on(o, drop, radius) | lies);
-                drop.lying = if lies { drop.lying + dt } else { 0.0 };
-            }
-        }
-        let inside = (drop.position.cmpge(rules.min) & drop.position.cmple(rules.max)).all();
-        *ends = !inside || drop.lying > rules.lying || drop.volume < 1e-15;
-    });
+            let inside = (drop.position.cmpge(rules.min) & drop.position.cmple(rules.max)).all();
+            *ends = !inside || drop.lying > rules.lying || drop.volume < 1e-15;
+        },
+    );
     for Moving { entity, violations, new, evaporated, ends, .. } in items {
         ledger.book(new);
         ledger.book(-evaporated);
