@@ -2,17 +2,19 @@
 
 use super::{
     PresentLod,
-    follow::{Frame, GUIDES, Pose, StrandState, Ties},
+    follow::{Frame, GUIDES, StrandState, Ties},
     spread::spread_order,
 };
 use crate::{
     grid::KdTree,
-    parallel::for_each,
-    schedule::HairStep,
+    parallel::{Nanos, for_each},
     setting::Settings,
-    strand::{Hair, HeldNodes, PerHair, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
+    strand::{Hair, HeldNodes, PerHair, Strand, StrandModel, StrandOf, StrandSleep, Strands},
 };
-use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use bevy::{
+    ecs::entity::{EntityHashMap, EntityHashSet},
+    prelude::*,
+};
 
 /// How many of the nearest guides are looked at for those that run most alike.
 const CANDIDATES: usize = 8;
@@ -30,11 +32,11 @@ pub struct Follower {
     /// Its index among the hair's guides.
     guide: Option<u32>,
     #[reflect(ignore)]
-    ties: Ties,
+    pub(super) ties: Ties,
     /// Where its root was when it came to lie still (m).
-    root: Vec3,
+    pub(super) root: Vec3,
     /// Whether it sleeps because its guides do.
-    synced_asleep: bool,
+    pub(super) synced_asleep: bool,
 }
 
 /// The strands of a [`Hair`] that others are carried by. Kept by the tick.
@@ -42,22 +44,24 @@ pub struct Follower {
 #[reflect(Component, Default, Clone)]
 pub struct Guides {
     /// In their even order.
-    strands: Vec<Entity>,
+    pub(super) strands: Vec<Entity>,
     /// Where each one's frames begin in the list, and where the last one's end.
     starts: Vec<u32>,
     /// Orientations of their edges as they were last seen.
     turns: Vec<Quat>,
     /// Which may be followed, and which of them move.
     usable: Vec<bool>,
-    awake: Vec<bool>,
+    pub(super) awake: Vec<bool>,
     level: usize,
+    /// What the strands were told apart by: share that is simulated, level, number of strands.
+    told_apart: Option<(f32, usize, usize)>,
     /// How the hair's own frame has moved in this tick.
     #[reflect(ignore)]
-    frame: Frame,
+    pub(super) frame: Frame,
 }
 
 impl Guides {
-    fn turns(&self, guide: u32) -> Option<&[Quat]> {
+    pub(super) fn turns(&self, guide: u32) -> Option<&[Quat]> {
         let i = guide as usize;
         let (from, to) = (*self.starts.get(i)?, *self.starts.get(i + 1)?);
         self.turns.get(from as usize..to as usize).filter(|_| self.usable[i])
@@ -82,7 +86,7 @@ impl Guides {
     }
 
     /// Sees where a guide is now.
-    fn see(&mut self, i: usize, strand: Option<&Strand>) {
+    pub(super) fn see(&mut self, i: usize, strand: Option<&Strand>) {
         let (from, to) = (self.starts[i] as usize, self.starts[i + 1] as usize);
         let seen = strand.map_or(&[][..], Strand::orientations);
         self.usable[i] = seen.len() == to - from && is_usable(seen);
@@ -116,7 +120,9 @@ struct Member<'a> {
 /// At the start of a tick: who is simulated, and who goes along with whom.
 pub(crate) fn choose_guides(
     models: Settings<StrandModel>,
-    mut hairs: Query<(Entity, &mut PresentLod, &mut Guides), With<Hair>>,
+    touched: Query<&StrandOf, Or<(Changed<Strand>, Changed<HeldNodes>, Changed<StrandOf>)>>,
+    mut let_go: RemovedComponents<HeldNodes>,
+    mut hairs: Query<(Entity, &Strands, &mut PresentLod, &mut Guides), With<Hair>>,
     mut strands: Query<(
         Entity,
         &StrandOf,
@@ -126,24 +132,48 @@ pub(crate) fn choose_guides(
         Option<&HeldNodes>,
     )>,
 ) {
+    // Springs have no twist that a neighbour could follow.
+    let share_of = |hair: Entity, present: &PresentLod| match models.of(hair) {
+        StrandModel::Rod => present.share(),
+        StrandModel::MassSpring => 1.0,
+    };
     let concerns = |present: &PresentLod, guides: &Guides| {
         present.share() < 1.0 || present.carried > 0 || !guides.strands.is_empty()
     };
-    if !hairs.iter().any(|(_, present, guides)| concerns(present, guides)) {
+    // Hair whose strands nobody touched is told apart as before.
+    let mut as_before = EntityHashSet::default();
+    let any_let_go = let_go.read().count() > 0;
+    let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
+    let mut any = false;
+    for (hair, members, present, mut guides) in &mut hairs {
+        if !concerns(&present, &guides) {
+            continue;
+        }
+        let told_apart = Some((share_of(hair, &present), present.level, members.len()));
+        let guides = guides.bypass_change_detection();
+        if guides.told_apart == told_apart && !any_let_go && !touched.contains(&hair) {
+            as_before.insert(hair);
+        } else {
+            any = true;
+        }
+        guides.told_apart = told_apart;
+    }
+    if !any {
         return;
     }
     let mut groups = PerHair::default();
     for (entity, of, strand, sleep, carried, held) in &mut strands {
         let index = groups.index(of.0, || {
-            let (hair, present, guides) = hairs.get(of.0).ok()?;
+            let (hair, _, present, guides) = hairs.get(of.0).ok()?;
             let (members, strands) = default();
-            // Springs have no twist that a neighbour could follow.
-            let share = match models.of(hair) {
-                StrandModel::Rod => present.share(),
-                StrandModel::MassSpring => 1.0,
-            };
-            let level = present.level;
-            concerns(present, guides).then_some(Group { hair, share, level, members, strands })
+            let (share, level) = (share_of(hair, present), present.level);
+            (concerns(present, guides) && !as_before.contains(&hair)).then_some(Group {
+                hair,
+                share,
+                level,
+                members,
+                strands,
+            })
         });
         let Some(index) = index else { continue };
         let is_held = held.is_some_and(|held| held.targets.iter().any(Option::is_some));
@@ -160,7 +190,10 @@ pub(crate) fn choose_guides(
             counts.insert(group.hair, part(group, guides.bypass_change_detection()));
         }
     }
-    for (hair, mut present, mut guides) in &mut hairs {
+    for (hair, _, mut present, mut guides) in &mut hairs {
+        if as_before.contains(&hair) {
+            continue;
+        }
         let carried = counts.get(&hair).copied().unwrap_or(0);
         if present.carried != carried {
             present.carried = carried;
@@ -179,17 +212,21 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
         rank(members, strands);
         ranks.extend(members.iter().filter(|m| m.free).filter_map(|m| m.carried.rank));
     }
-    // The first so many of the free ones are guides; the last of them has this rank.
-    let wanted = ((*share * ranks.len() as f32 - 1e-3).ceil() as usize).max(1);
-    let last =
-        if wanted < ranks.len() { *ranks.select_nth_unstable(wanted - 1).1 } else { u32::MAX };
+    // The first so many of the free ones are guides; none of hair that is frozen.
+    let wanted = match *share {
+        share if share > 0.0 => ((share * ranks.len() as f32 - 1e-3).ceil() as usize).max(1),
+        _ => 0,
+    };
+    // From this rank on they are carried.
+    let first_carried =
+        if wanted < ranks.len() { *ranks.select_nth_unstable(wanted).1 } else { u32::MAX };
     let mut same = guides.strands.len() == wanted && guides.level == *level;
     let mut count = 0;
     for (member, strand) in members.iter_mut().zip(strands.iter()) {
         let Member { entity, sleep, carried, free } = member;
         let (sleep, carried) = (sleep.bypass_change_detection(), carried.bypass_change_detection());
-        let is_follower = *free && carried.rank.is_some_and(|rank| rank > last);
-        let is_guide = *free && !is_follower && last < u32::MAX;
+        let is_follower = *free && carried.rank.is_some_and(|rank| rank >= first_carried);
+        let is_guide = *free && !is_follower && first_carried < u32::MAX;
         let guide = carried.guide.filter(|_| is_guide);
         same &= !is_guide || guide.is_some_and(|i| guides.strands.get(i as usize) == Some(entity));
         count += usize::from(is_follower);
@@ -214,7 +251,7 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
     if !same {
         let keep = guides.level == *level;
         guides.level = *level;
-        renew(members, strands, guides, last, keep);
+        renew(members, strands, guides, first_carried, keep);
     }
     tie(members, strands, guides);
     count
@@ -241,11 +278,11 @@ fn renew(
     members: &mut [Member<'_>],
     strands: &[Ref<'_, Strand>],
     guides: &mut Guides,
-    last: u32,
+    first_carried: u32,
     keep: bool,
 ) {
     let mut chosen: Vec<(u32, usize)> = (members.iter().enumerate())
-        .filter_map(|(i, m)| Some((m.carried.rank.filter(|r| m.free && *r <= last)?, i)))
+        .filter_map(|(i, m)| Some((m.carried.rank.filter(|r| m.free && *r < first_carried)?, i)))
         .collect();
     chosen.sort_unstable();
     let before = core::mem::take(&mut guides.strands);
@@ -277,6 +314,13 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
     if !members.iter().any(is_loose) {
         return;
     }
+    if guides.strands.is_empty() {
+        // Frozen: there is nobody to hang on.
+        for member in members.iter_mut().filter(|m| is_loose(m) && !m.sleep.is_follower()) {
+            member.sleep.bypass_change_detection().set_follower(true);
+        }
+        return;
+    }
     let mut ahead: Vec<Option<&Strand>> = vec![None; guides.strands.len()];
     for (member, strand) in members.iter().zip(strands) {
         if let Some(place) = member.carried.guide.and_then(|i| ahead.get_mut(i as usize)) {
@@ -297,7 +341,7 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
             (m.carried.bypass_change_detection(), &**strand)
         })
         .collect();
-    for_each(&mut loose, |(carried, strand)| {
+    for_each(&mut loose, Nanos(5_000), |(carried, strand)| {
         let own = waypoints(strand);
         let mut found: Vec<(f32, u32, StrandState<'_>)> = nearest
             .nearest::<CANDIDATES>(own[0])
@@ -333,98 +377,6 @@ fn waypoints(strand: &Strand) -> [Vec3; 3] {
     let p = strand.positions();
     let last = p.len().saturating_sub(1);
     [0, last / 2, last].map(|i| p.get(i).copied().unwrap_or_default())
-}
-
-/// After sleep has been decided on: the carried sleep while all their guides do.
-pub(crate) fn sync_follower_sleep(
-    mut hairs: Query<&mut Guides, With<Hair>>,
-    mut strands: Query<(&StrandOf, &mut Strand, &mut StrandSleep, &mut Follower)>,
-) {
-    let mut any = false;
-    for mut guides in &mut hairs {
-        let Guides { strands: ahead, awake, .. } = guides.bypass_change_detection();
-        for (guide, awake) in ahead.iter().zip(awake) {
-            *awake = strands.get(*guide).is_ok_and(|(.., sleep, _)| !sleep.is_asleep());
-            any = true;
-        }
-    }
-    if !any {
-        return;
-    }
-    let mut per_hair = PerHair::default();
-    for (of, mut strand, mut sleep, mut carried) in &mut strands {
-        if !sleep.is_follower() {
-            continue;
-        }
-        let index = per_hair.index(of.0, || hairs.get(of.0).ok());
-        let Some(guides) = index.map(|i| per_hair.values[i]) else { continue };
-        let is_awake = |guide: &(u32, f32)| guides.awake.get(guide.0 as usize) == Some(&true);
-        let sleep = sleep.bypass_change_detection();
-        let root = strand.positions().first().copied().unwrap_or_default();
-        let carried = carried.bypass_change_detection();
-        let moves = carried.ties.guides.iter().any(is_awake) || carried.root != root;
-        if moves && sleep.is_asleep() {
-            sleep.wake_up();
-            carried.synced_asleep = false;
-        } else if !moves && !sleep.is_asleep() {
-            sleep.fall_asleep();
-            strand.bypass_change_detection().rest();
-            carried.synced_asleep = true;
-        }
-        carried.root = root;
-    }
-}
-
-/// At the end of a tick, after the projection: who is carried goes along. Once a tick is enough for
-/// what is seen once a tick, and costs a sixth of once a substep.
-pub(crate) fn move_followers(
-    step: Res<HairStep>,
-    mut hairs: Query<(&TickPose, &mut Guides), With<Hair>>,
-    mut strands: Query<(&StrandOf, &mut Strand, &StrandSleep, &mut Follower)>,
-) {
-    let is_last = step.index + 1 == step.count;
-    let mut any = false;
-    for (pose, mut guides) in &mut hairs {
-        let guides = guides.bypass_change_detection();
-        if step.index == 0 {
-            guides.frame = Frame::default();
-        }
-        if guides.strands.is_empty() {
-            continue;
-        }
-        if let Some(carry) = pose.frame_delta() {
-            guides.frame.then(carry.rotation, carry.translation.into());
-        }
-        for i in 0..if is_last { guides.strands.len() } else { 0 } {
-            if guides.awake[i] {
-                let strand = strands.get(guides.strands[i]).ok().map(|(_, strand, ..)| strand);
-                guides.see(i, strand);
-            }
-            any = true;
-        }
-    }
-    if !any {
-        return;
-    }
-    let mut per_hair = PerHair::default();
-    let mut items = Vec::new();
-    for (of, strand, sleep, carried) in &mut strands {
-        if sleep.is_follower()
-            && !sleep.is_asleep()
-            && let Some(index) = per_hair.index(of.0, || Some(hairs.get(of.0).ok()?.1))
-        {
-            items.push((index, strand, carried));
-        }
-    }
-    let seconds = step.dt * step.count as f32;
-    for_each(&mut items, |(index, strand, carried)| {
-        let guides = per_hair.values[*index];
-        let (positions, velocities, orientations, spins) =
-            strand.bypass_change_detection().parts_mut();
-        let mut pose = Pose { positions, velocities, orientations, spins };
-        let ties = &mut carried.bypass_change_detection().ties;
-        ties.follow(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds);
-    });
 }
 
 /// A strand that leaves its hair, or goes over to another, is simulated until it is chosen there.

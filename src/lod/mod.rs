@@ -24,12 +24,17 @@
 //! | [`HeldNodes`](crate::HeldNodes), wound on a rod | it is simulated, and nobody follows it |
 //! | game code that writes to its [`Strand`](crate::Strand) | it goes on from there; velocities are lost |
 //!
+//! At a level without simulated strands hair is **frozen**: it goes along with its head in the shape it
+//! has, a strand whose root moves goes with that, and near again it goes on from there, at rest. It costs
+//! next to nothing.
+//!
 //! What a strand lags behind its guides when a level begins stays until it ends. A strand that comes at
 //! a level keeps the shape it came with, as far as its guides keep theirs; all strands take new places
 //! in the order then.
 //!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
+mod carry;
 mod choose;
 #[doc(hidden)]
 pub mod follow;
@@ -64,7 +69,8 @@ setting! {
     #[require(ScreenShare, PresentLod, SubstepLimits)]
     pub struct HairLod {
         /// The levels, from near to far, each for smaller hair than the one before.
-        pub levels: Vec<LodLevel> = vec![LodLevel::NEAR, LodLevel::FAR] => Ranged::clamp_values;
+        pub levels: Vec<LodLevel> =
+            vec![LodLevel::NEAR, LodLevel::BACKGROUND, LodLevel::FROZEN] => Ranged::clamp_values;
         /// By which share more than a level's limit hair has to grow before it leaves the level again.
         pub hysteresis: f32 = 0.2, in HYSTERESIS: 0.0..=100.0, safe 0.05..=1.0, "0.2 is a fifth";
     }
@@ -82,14 +88,15 @@ setting! {
         /// tip by 0.5 mm.
         pub iterations: u32 = 2, in ITERATIONS: 1.0..=1000.0, safe 2.0..=5.0,
             "2 are enough from afar";
-        /// How many substeps are taken as one; 1 leaves them as they are. The last of a tick may be
-        /// shorter. Hair sags more in longer ones: the same tip by 8 mm at 2, 2 cm at 3, which is two
-        /// pixels where hair is as far away as the default level's.
+        /// How many substeps are taken as one, if that is more than
+        /// [`HairSolver::substep`](crate::HairSolver::substep) takes anyway. The last of a tick may be
+        /// shorter. Rods that are solved directly settle to the same shape in longer ones; by
+        /// [`Sweeps`](crate::Sweeps) hair sags more, the same tip by 8 mm at 2, 2 cm at 3.
         pub substeps: u32 = 2, in SUBSTEPS: 1.0..=1000.0, safe 1.0..=3.0, "2 makes three of six";
-        /// Share of the hair's strands that are simulated, rounded up, at least one; the others go
-        /// along with those, as the [module](self) says. Hair of springs is simulated whole at every
-        /// level.
-        pub strands: f32 = 1.0, in STRANDS: 0.0..=1.0, safe 0.1..=1.0, "0.25 is one of four";
+        /// Share of the hair's strands that are simulated, rounded up; the others go along with those, as
+        /// the [module](self) says. With 0 the hair is frozen: it goes along with the head in the shape
+        /// it has. Hair of springs is simulated whole at every level.
+        pub strands: f32 = 1.0, in STRANDS: 0.0..=1.0, safe 0.0..=1.0, "0.25 is one of four";
     }
 }
 
@@ -125,10 +132,12 @@ impl PresentLod {
 }
 
 impl LodLevel {
-    /// For hair under a group of the view's height: three iterations, half of the strands.
-    pub const NEAR: Self = Self { below: 0.25, iterations: 3, substeps: 1, strands: 0.5 };
-    /// For hair under a tenth: two, substeps twice as long, a group of the strands.
-    pub const FAR: Self = Self { below: 0.1, iterations: 2, substeps: 2, strands: 0.25 };
+    /// For hair under a third of the view's height: half of the strands.
+    pub const NEAR: Self = Self { below: 0.3, iterations: 3, substeps: 1, strands: 0.5 };
+    /// For hair under a seventh: one strand of sixteen, two substeps a tick at 60 Hz.
+    pub const BACKGROUND: Self = Self { below: 0.15, iterations: 2, substeps: 3, strands: 0.0625 };
+    /// For hair under a thirtieth: none.
+    pub const FROZEN: Self = Self { below: 0.03, iterations: 1, substeps: 3, strands: 0.0 };
 
     /// A level for hair below a share of the view's height, with its iterations, and how many substeps
     /// are taken as one.

@@ -2,7 +2,8 @@
 
 use super::{
     Follower, Guides, HairLod, LodLevel, PresentLod, ScreenShare,
-    choose::{choose_guides, let_go, move_followers, sync_follower_sleep},
+    carry::{move_followers, sync_follower_sleep},
+    choose::{choose_guides, let_go},
     model,
 };
 use crate::{

@@ -316,3 +316,37 @@ fn hair_that_sleeps_sleeps_on_when_fewer_strands_are_simulated_and_when_all_are_
         }
     }
 }
+
+#[test]
+fn frozen_hair_keeps_its_shape_on_the_head_and_goes_on_from_it() {
+    let mut app = test_app(60.0);
+    let (hair, ids) = head(&mut app, 60, 9, 0.24);
+    put(&mut app, hair, fewer(0.0), 1.0);
+    for tick in 0..60 {
+        turn(&mut app, hair, tick as f32 / 60.0);
+        app.update();
+    }
+    put(&mut app, hair, fewer(0.0), 0.1);
+    app.update();
+    let frozen = places(&app, hair, &ids);
+    let shape = |app: &App| -> Vec<Vec3> {
+        ids.iter().flat_map(|e| strand(app, *e).positions().to_vec()).collect()
+    };
+    let before = shape(&app);
+    assert_eq!(carried(&app, &ids).len(), 60);
+    assert!(!frozen.is_empty());
+    for tick in 60..120 {
+        turn(&mut app, hair, tick as f32 / 60.0);
+        app.update();
+    }
+    assert_eq!(shape(&app), before, "to the bit");
+    // Near again it goes on from there, at rest.
+    put(&mut app, hair, fewer(0.0), 1.0);
+    app.update();
+    assert_eq!(carried(&app, &ids), []);
+    let jump = shape(&app).iter().zip(&before).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+    assert!((1e-6..0.02).contains(&jump), "{jump} m in one tick");
+    run(&mut app, 6.0);
+    assert!(ids.iter().all(|e| strand(&app, *e).peak_strain() < 0.01));
+    assert_eq!(faults(&mut app), []);
+}

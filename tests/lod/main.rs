@@ -35,12 +35,14 @@ fn levels_follow_the_screen_with_hysteresis_and_end_with_the_component() {
     let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
     app.world_mut().entity_mut(hair).insert(HairLod::default());
     let mut levels = Vec::new();
-    for share in [1.0, 0.26, 0.24, 0.26, 0.29, 0.31, 0.05, 0.11, 0.13, f32::NAN, 0.4, 0.05] {
+    for share in
+        [1.0, 0.31, 0.29, 0.33, 0.35, 0.37, 0.05, 0.16, 0.17, f32::NAN, 0.19, 0.02, 0.033, 0.04]
+    {
         zoom(&mut app, hair, share);
         app.update();
         levels.push(level(&app, hair));
     }
-    assert_eq!(levels, [0, 0, 1, 1, 1, 0, 2, 2, 1, 1, 0, 2]);
+    assert_eq!(levels, [0, 0, 1, 1, 1, 0, 2, 2, 2, 2, 1, 3, 3, 2]);
     app.world_mut().entity_mut(hair).remove::<HairLod>();
     app.update();
     assert_eq!(*app.world().get::<PresentLod>(hair).unwrap(), PresentLod::default());
@@ -121,7 +123,7 @@ fn hair_far_away_sleeps_on_when_its_level_changes() {
     run(&mut app, 1.0);
     zoom(&mut app, hair, 0.01);
     run(&mut app, 0.1);
-    assert!(level(&app, hair) == 2 && app.world().get::<StrandSleep>(e).unwrap().is_asleep());
+    assert!(level(&app, hair) == 3 && app.world().get::<StrandSleep>(e).unwrap().is_asleep());
 }
 
 #[test]

@@ -1,0 +1,112 @@
+//! How carried strands go along: they sleep while their guides do, and move once a tick.
+
+use super::{
+    choose::{Follower, Guides},
+    follow::{Frame, Pose},
+};
+use crate::{
+    parallel::{Nanos, for_each},
+    schedule::{EffectiveSubsteps, HairStep},
+    strand::{Hair, PerHair, Strand, StrandOf, StrandSleep, TickPose},
+};
+use bevy::prelude::*;
+
+/// After sleep has been decided on: the carried sleep while all their guides do.
+pub(crate) fn sync_follower_sleep(
+    mut hairs: Query<&mut Guides, With<Hair>>,
+    mut strands: Query<(&StrandOf, &mut Strand, &mut StrandSleep, &mut Follower)>,
+) {
+    let mut any = false;
+    for mut guides in &mut hairs {
+        let Guides { strands: ahead, awake, .. } = guides.bypass_change_detection();
+        for (guide, awake) in ahead.iter().zip(awake) {
+            *awake = strands.get(*guide).is_ok_and(|(.., sleep, _)| !sleep.is_asleep());
+            any = true;
+        }
+    }
+    if !any {
+        return;
+    }
+    let mut per_hair = PerHair::default();
+    for (of, mut strand, mut sleep, mut carried) in &mut strands {
+        if !sleep.is_follower() {
+            continue;
+        }
+        let index = per_hair.index(of.0, || hairs.get(of.0).ok());
+        let Some(guides) = index.map(|i| per_hair.values[i]) else { continue };
+        let is_awake = |guide: &(u32, f32)| guides.awake.get(guide.0 as usize) == Some(&true);
+        let sleep = sleep.bypass_change_detection();
+        let root = strand.positions().first().copied().unwrap_or_default();
+        let carried = carried.bypass_change_detection();
+        let moves = carried.ties.guides.iter().any(is_awake) || carried.root != root;
+        if moves && sleep.is_asleep() {
+            sleep.wake_up();
+            carried.synced_asleep = false;
+        } else if !moves && !sleep.is_asleep() {
+            sleep.fall_asleep();
+            strand.bypass_change_detection().rest();
+            carried.synced_asleep = true;
+        }
+        carried.root = root;
+    }
+}
+
+/// At the end of a tick, after the projection: who is carried goes along. Once a tick is enough for
+/// what is seen once a tick, and costs a sixth of once a substep.
+pub(crate) fn move_followers(
+    step: Res<HairStep>,
+    substeps: EffectiveSubsteps,
+    mut hairs: Query<(Entity, &TickPose, &mut Guides), With<Hair>>,
+    mut strands: Query<(&StrandOf, &mut Strand, &StrandSleep, &mut Follower)>,
+) {
+    let is_last = step.index + 1 == step.count;
+    let mut any = false;
+    for (hair, pose, mut guides) in &mut hairs {
+        let guides = guides.bypass_change_detection();
+        if step.index == 0 {
+            guides.frame = Frame::default();
+        }
+        if guides.strands.is_empty() {
+            continue;
+        }
+        if let Some(carry) = pose.frame_delta().filter(|_| substeps.of(hair).is_some()) {
+            guides.frame.then(carry.rotation, carry.translation.into());
+        }
+        for i in 0..if is_last { guides.strands.len() } else { 0 } {
+            if guides.awake[i] {
+                let strand = strands.get(guides.strands[i]).ok().map(|(_, strand, ..)| strand);
+                guides.see(i, strand);
+            }
+            any = true;
+        }
+    }
+    if !any {
+        return;
+    }
+    let mut per_hair = PerHair::default();
+    let mut items = Vec::new();
+    for (of, strand, sleep, carried) in &mut strands {
+        if sleep.is_follower()
+            && !sleep.is_asleep()
+            && let Some(index) = per_hair.index(of.0, || Some(hairs.get(of.0).ok()?.2))
+        {
+            items.push((index, strand, carried));
+        }
+    }
+    let seconds = step.dt * step.count as f32;
+    for_each(&mut items, Nanos(1_000), |(index, strand, carried)| {
+        let guides = per_hair.values[*index];
+        let (positions, velocities, orientations, spins) =
+            strand.bypass_change_detection().parts_mut();
+        let mut pose = Pose { positions: &mut *positions, velocities, orientations, spins };
+        let carried = carried.bypass_change_detection();
+        let ties = &mut carried.ties;
+        if !ties.follow(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds) {
+            // Without guides it goes with its root.
+            let way = positions.first().map_or(Vec3::ZERO, |root| *root - carried.root);
+            if way.is_finite() {
+                positions.iter_mut().skip(1).for_each(|p| *p += way);
+            }
+        }
+    });
+}
