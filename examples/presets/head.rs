@@ -29,6 +29,19 @@ pub fn skull() -> Vec<(Vec3, Vec3, f32)> {
     [core].into_iter().chain(balls).chain([face, jaw]).collect()
 }
 
+/// What hair lies on, as balls and capsules (upright, m).
+pub fn body() -> Result<Vec<(HairCollider, Transform)>> {
+    // Neck, shoulders, chest.
+    let bust = [
+        (Vec3::new(0.0, -0.05, -0.012), Vec3::new(0.0, -0.2, -0.03), 0.050),
+        (Vec3::new(-0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058),
+        (Vec3::new(0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058),
+        (Vec3::new(-0.08, -0.30, -0.02), Vec3::new(0.08, -0.30, -0.02), 0.07),
+    ];
+    let parts = skull().into_iter().chain(bust);
+    parts.map(|(a, b, radius)| limb(a, b, radius)).collect()
+}
+
 /// The skin under the hair, darker.
 pub fn with_scalp(mut mesh: Mesh, scalp: &Scalp) -> Mesh {
     use VertexAttributeValues::{Float32x3, Float32x4};

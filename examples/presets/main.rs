@@ -206,21 +206,8 @@ fn wear(app: &mut App, preset: HairPreset, planted: &Planted, head: Mesh) -> Res
     for strand in planted.groom.strands() {
         world.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
     }
-    for (collider, place) in body()? {
+    for (collider, place) in head::body()? {
         world.spawn((collider, place));
     }
     Ok(hair)
-}
-
-/// What hair lies on, as balls and capsules (upright, m).
-fn body() -> Result<Vec<(HairCollider, Transform)>> {
-    // Neck, shoulders, chest.
-    let bust = [
-        (Vec3::new(0.0, -0.05, -0.012), Vec3::new(0.0, -0.2, -0.03), 0.050),
-        (Vec3::new(-0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058),
-        (Vec3::new(0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058),
-        (Vec3::new(-0.08, -0.30, -0.02), Vec3::new(0.08, -0.30, -0.02), 0.07),
-    ];
-    let parts = head::skull().into_iter().chain(bust);
-    parts.map(|(a, b, radius)| head::limb(a, b, radius)).collect()
 }

@@ -155,7 +155,7 @@ impl HairPreset {
             Fall { toward: -up - front * 0.15, over: 0.035, clearance: 5e-3, layering: 0.07 };
         let parted = Comb::Parted { at: scalp.center, across: right, along: -front * 0.4 };
         let base = Planting {
-            density: 1.0e4,
+            density: 0.5e4,
             nodes: 20,
             length: 0.3,
             length_variation: 0.1,
@@ -173,15 +173,16 @@ impl HairPreset {
             }
             Self::Wavy => Planting {
                 length: 0.33,
-                nodes: 40,
+                nodes: 32,
                 curl: curl(6e-3, 60e-3, CurlPhase::PerClump),
                 clump: Some(Clump { spacing: 22e-3, strength: 0.35 }),
                 fall: Some(Fall { layering: 0.12, ..fall }),
                 ..base
             },
             Self::Curly => Planting {
+                density: 0.35e4,
                 length: 0.34,
-                nodes: 64,
+                nodes: 48,
                 lean: 0.9,
                 curl: curl(7e-3, 26e-3, CurlPhase::PerStrand),
                 clump: None,
@@ -189,10 +190,10 @@ impl HairPreset {
                 ..base
             },
             Self::Coily => Planting {
-                density: 2.0e4,
+                density: 1.0e4,
                 length: 0.17,
                 length_variation: 0.15,
-                nodes: 52,
+                nodes: 36,
                 comb: Comb::Out,
                 lean: 0.0,
                 jitter: 0.25,
@@ -202,7 +203,7 @@ impl HairPreset {
                 ..base
             },
             Self::Short => Planting {
-                density: 1.5e4,
+                density: 1.0e4,
                 length: 0.065,
                 length_variation: 0.2,
                 nodes: 10,
@@ -227,7 +228,7 @@ impl HairPreset {
                 clump: Some(Clump { spacing: 25e-3, strength: 0.15 }),
                 ..base
             },
-            Self::Long => Planting { length: 0.5, nodes: 30, ..base },
+            Self::Long => Planting { length: 0.5, nodes: 28, ..base },
         }
     }
 

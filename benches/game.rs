@@ -1,0 +1,221 @@
+//! `cargo bench --bench game`: what hair costs a game, in milliseconds a tick of 1/60 s.
+//!
+//! Each preset on a head with shoulders, at rest and on somebody who walks and looks about, with and
+//! without contact between strands; then crowds. Medians of five runs of 20 ticks; nothing is drawn and
+//! nothing sleeps. `KERATIN_BENCH_ONLY=wavy,crowd` prints these rows alone.
+
+#[path = "../examples/presets/head.rs"]
+#[allow(dead_code, reason = "the pictures use all of it")]
+mod head;
+#[path = "../examples/salon/mannequin.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod mannequin;
+
+/// What the mannequin takes from the scenes.
+mod scenes {
+    pub const HEAD_RADIUS: f32 = 0.1;
+}
+
+use bevy::{
+    app::{TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy},
+    prelude::*,
+    time::TimeUpdateStrategy,
+};
+use bevy_keratin::{
+    ScreenShare,
+    plant::{HairPreset, Scalp},
+    prelude::*,
+};
+use std::{
+    process::Command,
+    time::{Duration, Instant},
+};
+
+const THREADS: &str = "KERATIN_BENCH_THREADS";
+
+/// The rows to print, if not all: presets by name, `crowd`.
+const ONLY: &str = "KERATIN_BENCH_ONLY";
+
+/// Ticks in a run, and runs of which the median is printed.
+const TICKS: u32 = 20;
+const RUNS: usize = 5;
+
+fn main() {
+    if let Ok(threads) = std::env::var(THREADS) {
+        rows(threads.parse().expect("a number of threads"));
+        return;
+    }
+    println!("name | threads | contact | ms");
+    // Bevy's thread pools are made once a process.
+    for threads in ["1", "2"] {
+        let this = std::env::current_exe().expect("a running program");
+        let status = Command::new(this).env(THREADS, threads).status();
+        assert!(status.is_ok_and(|s| s.success()), "rows for {threads} threads");
+    }
+}
+
+fn rows(threads: usize) {
+    let only = std::env::var(ONLY).ok();
+    let wanted = |name: &str| only.as_ref().is_none_or(|only| only.split(',').any(|o| o == name));
+    for preset in HairPreset::ALL {
+        let name = format!("{preset:?}").to_lowercase();
+        if wanted(&name) {
+            preset_rows(&name, preset, threads);
+        }
+    }
+    if wanted("crowd") {
+        crowd_rows(threads);
+    }
+}
+
+fn preset_rows(name: &str, preset: HairPreset, threads: usize) {
+    let strands = plant(preset);
+    let mut app = app(threads);
+    let hair = person(&mut app, preset, &strands, Vec3::ZERO);
+    let contact = preset.settings().contact;
+    let without = LockContact { strength: 0.0, ..contact };
+    settle(&mut app);
+    for moving in [false, true] {
+        if moving {
+            app.world_mut().entity_mut(hair).insert(Walks { phase: 0.0 });
+            settle(&mut app);
+        }
+        let state = if moving { "moving" } else { "at rest" };
+        let [on, off] = in_turns(&mut app, |app, turn| {
+            let contact = if turn == 0 { contact } else { without };
+            app.world_mut().entity_mut(hair).insert(contact);
+        });
+        println!("{name} {state} | {threads} | on | {on:.2}");
+        println!("{name} {state} | {threads} | off | {off:.2}");
+    }
+    let nodes = strands.first().map_or(0, Strand::nodes);
+    println!("{name}: {} guides of {nodes} nodes", strands.len());
+}
+
+/// Two near characters, twenty in the background beside them, then a hundred far off as well.
+fn crowd_rows(threads: usize) {
+    let presets = HairPreset::ALL;
+    let planted: Vec<_> = presets.map(plant).into();
+    let mut app = app(threads);
+    let mut place = 0;
+    let mut add = |app: &mut App, count: usize, share: f32| {
+        for _ in 0..count {
+            let which = place % presets.len();
+            let at = Vec3::new((place % 12) as f32, 0.0, (place / 12) as f32) * 1.5;
+            let hair = person(app, presets[which], &planted[which], at);
+            app.world_mut().entity_mut(hair).insert((
+                HairLod::default(),
+                ScreenShare(share),
+                Walks { phase: place as f32 },
+            ));
+            place += 1;
+        }
+    };
+    for (name, count, share) in
+        [("2 near", 2, 0.6), ("2 near + 20 background", 20, 0.12), ("+ 100 far", 100, 0.02)]
+    {
+        add(&mut app, count, share);
+        settle(&mut app);
+        let [all] = in_turns(&mut app, |_, _| ());
+        println!("{name} | {threads} | on | {all:.2}");
+    }
+}
+
+/// Medians of runs that are taken in turns, each made ready by `ready` (ms a tick).
+fn in_turns<const N: usize>(app: &mut App, ready: impl Fn(&mut App, usize)) -> [f64; N] {
+    let mut runs = [[0.0; RUNS]; N];
+    for run in 0..RUNS {
+        for (turn, runs) in runs.iter_mut().enumerate() {
+            ready(app, turn);
+            (0..4).for_each(|_| app.update());
+            let start = Instant::now();
+            (0..TICKS).for_each(|_| app.update());
+            runs[run] = start.elapsed().as_secs_f64() * 1e3 / f64::from(TICKS);
+        }
+    }
+    runs.map(|mut runs| {
+        runs.sort_by(f64::total_cmp);
+        runs[RUNS / 2]
+    })
+}
+
+fn settle(app: &mut App) {
+    (0..90).for_each(|_| app.update());
+}
+
+/// The mannequin lies; its crown is at +X and its face at +Y. This puts it upright.
+fn upright() -> Transform {
+    Transform::from_matrix(Mat4::from_mat3(Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::X)))
+}
+
+fn plant(preset: HairPreset) -> Vec<Strand> {
+    let scalp = Scalp { up: Dir3::X, front: Dir3::Y, height: 0.118, ..default() };
+    let planted = preset.plant(&mannequin::mesh(), &scalp).expect("hair grows on the mannequin");
+    let strand = |points: &[Vec3]| Strand::from_polyline(points).expect("points are apart");
+    planted.groom.strands().map(|s| strand(s.points)).collect()
+}
+
+/// Somebody with hair and what it lies on, at a place.
+fn person(app: &mut App, preset: HairPreset, strands: &[Strand], at: Vec3) -> Entity {
+    let world = app.world_mut();
+    let body = world.spawn((Transform::from_translation(at), Person { at })).id();
+    for (collider, place) in head::body().expect("solids of a body") {
+        world.spawn((collider, place, ChildOf(body)));
+    }
+    let hair = world.spawn((Hair, upright(), preset.settings(), ChildOf(body))).id();
+    for strand in strands {
+        world.spawn((StrandOf(hair), strand.clone()));
+    }
+    hair
+}
+
+#[derive(Component)]
+struct Person {
+    at: Vec3,
+}
+
+/// On a hair: who wears it walks and looks about.
+#[derive(Component)]
+struct Walks {
+    phase: f32,
+}
+
+/// Two steps a second that lift the head by 3 cm, looks 40° to both sides.
+fn walk(
+    time: Res<Time>,
+    walkers: Query<(&Walks, &ChildOf)>,
+    mut people: Query<(&Person, &mut Transform)>,
+) {
+    let t = time.elapsed_secs_wrapped();
+    for (Walks { phase }, of) in &walkers {
+        let Ok((Person { at }, mut place)) = people.get_mut(of.parent()) else { continue };
+        let step = (12.6 * t + phase).sin();
+        place.translation = *at + Vec3::new(0.02 * (6.3 * t + phase).sin(), 0.03 * step, 0.0);
+        place.rotation = Quat::from_rotation_y(0.7 * (3.0 * t + phase).sin());
+    }
+}
+
+fn app(threads: usize) -> App {
+    // The thread that runs the app works too.
+    let pools = TaskPoolOptions {
+        compute: TaskPoolThreadAssignmentPolicy {
+            min_threads: threads - 1,
+            max_threads: threads - 1,
+            percent: 1.0,
+            on_thread_spawn: None,
+            on_thread_destroy: None,
+        },
+        ..default()
+    };
+    let mut app = App::new();
+    app.add_plugins((
+        MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools }),
+        HairPlugins::default(),
+    ))
+    .insert_resource(Time::<Fixed>::from_hz(60.0))
+    .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
+    .insert_resource(HairDefault(HairSleep::never()))
+    .add_systems(FixedUpdate, walk);
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    app
+}
