@@ -199,3 +199,39 @@ fn update_bonds(
         items.clear();
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::stiffness::REFERENCE_DT;
+
+    /// The cuticle is the joint's own: damage counts from the root to where the edge begins.
+    #[test]
+    fn every_joint_has_the_cuticle_of_its_place() {
+        let places = [0.0, 0.01, 0.03, 0.08, 0.1];
+        let points = places.map(|x| Vec3::X * x);
+        let strand = Strand::from_polyline(&points).unwrap();
+        let bonds = Bonds::of(&strand);
+        let softening = [0.0, 0.1, 0.2, 0.3];
+        let added = AddedMass { softening: softening.to_vec(), ..default() };
+        let cuticle = Cuticle { damage: 4.0, softening: 0.5 };
+        let influence = BondInfluence::default().as_array();
+        let sweeps = Sweeps::default();
+        for key in [None, Some((sweeps, REFERENCE_DT))] {
+            let key = Key { influence, cuticle, sweeps: key };
+            let mut rest = RestShape::default();
+            shape(Level::new(), &key, &strand, &bonds, &added, &mut rest);
+            for i in 0..4 {
+                let factor = cuticle_factor(places[i], 4.0, 0.5) * (1.0 - softening[i]);
+                let expected = match key.sweeps {
+                    None => factor,
+                    Some((s, dt)) => {
+                        stiffness_per_iteration(s.per_substep(dt, factor), s.iterations)
+                    }
+                };
+                let found = rest.stiffness[i];
+                assert!((found / expected - 1.0).abs() < 1e-4, "{i}: {found}, not {expected}");
+            }
+        }
+    }
+}
