@@ -43,7 +43,7 @@ impl Plugin for BondPlugin {
 /// into them. Our own writes bypass change detection, so `Changed` means somebody else's.
 fn fit_bonds(
     mut strands: Query<
-        (Entity, &Strand, &mut Bonds, &mut RestShape),
+        (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
         Or<(Changed<Bonds>, Changed<Strand>)>,
     >,
     mut faults: MessageWriter<HairFault>,
@@ -53,7 +53,9 @@ fn fit_bonds(
         if fits && !bonds.is_changed() {
             continue;
         }
-        rest.bypass_change_detection().closed = false;
+        if let Some(rest) = &mut rest {
+            rest.bypass_change_detection().closed = false;
+        }
         let bonds = bonds.bypass_change_detection();
         if !fits {
             bonds.fit(strand);

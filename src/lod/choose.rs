@@ -28,6 +28,7 @@ pub struct Follower {
     /// Its place in the hair's even order, once that was asked for.
     rank: Option<u32>,
     /// Its index among the hair's guides.
+    #[reflect(ignore)]
     guide: Option<u32>,
     #[reflect(ignore)]
     ties: Ties,
@@ -42,13 +43,18 @@ pub struct Follower {
 #[reflect(Component, Default, Clone)]
 pub struct Guides {
     /// In their even order.
+    #[reflect(ignore)]
     strands: Vec<Entity>,
     /// Where each one's frames begin in the list, and where the last one's end.
+    #[reflect(ignore)]
     starts: Vec<u32>,
     /// Orientations of their edges as they were last seen.
+    #[reflect(ignore)]
     turns: Vec<Quat>,
     /// Which may be followed, and which of them move.
+    #[reflect(ignore)]
     usable: Vec<bool>,
+    #[reflect(ignore)]
     awake: Vec<bool>,
     level: usize,
     /// How the hair's own frame has moved in this tick.

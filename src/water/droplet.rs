@@ -38,16 +38,16 @@ setting! {
         pub r_min: f32 = 1e-3, "m" in R_MIN: 1e-6..=1.0, "about the drop's own radius";
         /// Distance up to which it pulls strands, more than `r_min`.
         pub r_max: f32 = 1e-3 * INFLUENCE;
-        pub(super) ride: Option<Ride> = None;
+        pub(super) ride: Option<Ride> = None => Ranged::clamp_values;
         /// Where it was a substep ago.
-        pub(super) before: Vec3 = Vec3::ZERO;
+        pub(super) before: Vec3 = Vec3::ZERO, "m" in BEFORE: -1e6..=1e6, "where it was";
         /// How much of it the ledger knows (m³).
         #[reflect(ignore)]
         pub(super) counted: Counted = Counted(0.0);
         /// How many strands are at it.
         pub(super) company: u32 = 1;
         /// For how long it has lain on a collider (s).
-        pub(crate) lying: f32 = 0.0;
+        pub(crate) lying: f32 = 0.0, "s" in LYING: 0.0..=1e9, "0 has just come to lie";
     }
     then Self::pulls_from_beyond_its_core
 }
@@ -59,6 +59,13 @@ pub struct Ride {
     pub strand: Entity,
     /// Where on it, in segments from the root.
     pub at: f32,
+}
+
+impl Ranged for Ride {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        const AT: ValueRange = ValueRange::new("Ride::at", 0.0..=65536.0, "segments from the root");
+        AT.clamp(&mut self.at, || 0.0, violations);
+    }
 }
 
 /// r_max over r_min where nobody says otherwise, as in the clumping experiment.

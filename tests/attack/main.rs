@@ -245,11 +245,10 @@ fn a_drop_that_is_too_fast_is_told_its_speed() {
 #[test]
 fn very_fine_strands_are_held_together_and_told() {
     let mut app = test_app(60.0);
-    let solver = HairSolver { method: SolverMethod::Sweeps, ..default() };
-    let hair = app.world_mut().spawn((Hair, solver)).id();
+    let hair = app.world_mut().spawn(Hair).id();
     for k in 0..6 {
         let points: Vec<Vec3> =
-            (0..1000).map(|i| Vec3::new(1.5e-4 * i as f32, 0.0, 7e-4 * k as f32)).collect();
+            (0..300).map(|i| Vec3::new(5e-4 * i as f32, 0.0, 7e-4 * k as f32)).collect();
         app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
     }
     let mut strands = app.world_mut().query::<&Strand>();
@@ -259,10 +258,10 @@ fn very_fine_strands_are_held_together_and_told() {
         most = strands.iter(app.world()).map(Strand::peak_strain).fold(most, f32::max);
     }
     println!("peak strain {most}");
-    assert!(most < 0.1, "{most}");
+    assert!(most < 0.03, "{most}");
     let told = faults(&mut app);
     assert!(
-        matches!(&told[..], [f] if f.kind == FaultKind::Strand && f.message.contains("0.150 mm")),
+        matches!(&told[..], [f] if f.kind == FaultKind::Strand && f.message.contains("0.500 mm")),
         "{told:?}"
     );
 }
@@ -315,31 +314,6 @@ fn springs_that_were_shaken_against_a_head_are_whole_again() {
         let strain = strands.iter(app.world()).map(Strand::peak_strain).fold(0.0, f32::max);
         println!("{torn} while it was shaken, {strain} after");
         assert!(strain < 0.05, "{strain}");
-    }
-}
-
-#[test]
-#[ignore]
-fn probe() {
-    for method in [SolverMethod::Sweeps, SolverMethod::Direct] {
-        for (nodes, segment, strength) in [(1000, 1.5e-4, 0.0), (1000, 1.5e-4, 20.0), (300, 1.5e-4, 0.0), (300, 5e-4, 20.0), (300, 5e-4, 0.0), (100, 1.5e-4, 0.0)] {
-            let mut app = test_app(60.0);
-            app.insert_resource(HairDefault(LockContact { strength, ..default() }));
-            let solver = HairSolver { method, ..default() };
-            let hair = app.world_mut().spawn((Hair, solver)).id();
-            for k in 0..6 {
-                let points: Vec<Vec3> =
-                    (0..nodes).map(|i| Vec3::new(segment * i as f32, 0.0, 7e-4 * k as f32)).collect();
-                app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
-            }
-            let mut strands = app.world_mut().query::<&Strand>();
-            let mut most = 0.0_f32;
-            for _ in 0..6 {
-                app.update();
-                most = strands.iter(app.world()).map(Strand::peak_strain).fold(most, f32::max);
-            }
-            println!("{method:?} {nodes} {segment} {strength}: {most} {}", faults(&mut app).len());
-        }
     }
 }
 
@@ -406,9 +380,9 @@ fn a_world_that_anything_is_done_to_goes_on() {
 #[test]
 #[ignore = "takes minutes: a million operations"]
 fn a_world_that_anything_is_done_to_goes_on_for_long() {
-    let number = |name: &str| std::env::var(name).ok()?.parse::<u64>().ok();
-    let (first, count) = (number("SEED").unwrap_or(100), number("SEEDS").unwrap_or(20));
-    for seed in first..first + count {
+    // SEED is where to go on.
+    let first = std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(100);
+    for seed in first..first + 20 {
         attack(seed, 50_000);
     }
 }

@@ -103,15 +103,8 @@ fn search(value: &dyn PartialReflect) -> Option<String> {
 }
 
 /// What the tick keeps and nobody sets.
-const STATE: [&str; 7] = [
-    "Strand",
-    "StrandHistory",
-    "Moisture",
-    "Droplet",
-    "AddedMass",
-    "Bonds",
-    "TickPose",
-];
+const STATE: [&str; 7] =
+    ["Strand", "StrandHistory", "Moisture", "Droplet", "AddedMass", "Bonds", "TickPose"];
 
 /// A number of the world's state that is not finite, if there is one.
 pub fn not_finite(app: &mut App) -> Option<String> {
