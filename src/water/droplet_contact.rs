@@ -373,10 +373,11 @@ mod tests {
     fn sums_are_turned_to_the_world_and_the_first_landing_counts() {
         let strand = |i| Entity::from_raw_u32(i).unwrap();
         let landing = |i, when| Landing { drop: 0, strand: strand(i), at: 1.0, when };
-        let piece = |landings: Vec<Landing>| DropletContacts {
-            sums: vec![Sum { impulse: Vec3::X, company: 2, wanted: 3e-9 }],
-            landings,
-            ..default()
+        let piece = |landings: Vec<Landing>| {
+            let mut piece = DropletContacts::default();
+            piece.sums = vec![Sum { impulse: Vec3::X, company: 2, wanted: 3e-9 }];
+            piece.landings = landings;
+            piece
         };
         let pieces = [
             piece(vec![landing(7, 0.5), landing(8, 0.2)]),
