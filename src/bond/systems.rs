@@ -16,7 +16,7 @@ use crate::{
     setting::{self, Ranged, Settings, Violations, report},
     strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep},
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use fearless_simd::Level;
 
 /// Rest shapes from bonds and bonds' memory.
@@ -44,7 +44,8 @@ impl Plugin for BondPlugin {
 fn fit_bonds(
     mut strands: Query<
         (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
-        Or<(Changed<Bonds>, Changed<Strand>)>,
+        // What is written while a strand is disabled is no change any more when it is enabled.
+        (Or<(Changed<Bonds>, Changed<Strand>)>, Allow<Disabled>),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {

@@ -149,7 +149,7 @@ mod tests {
         assert_eq!(stride(&[0.03; 8], 2e-3), 1);
         assert_eq!(stride(&[1e-4; 16], 2e-3), 1, "a strand of few nodes");
         assert_eq!(stride(&[2.4e-3; 100], 2e-3), 1);
-        assert_eq!(stride(&[1e-4; 1000], 2e-3), 10);
+        assert_eq!(stride(&[9e-5; 1000], 2e-3), 11);
         assert_eq!(stride(&[1e-6; 1000], 2.0), 1000);
         assert_eq!(stride(&[f32::NAN; 1000], 2e-3), 1);
         assert_eq!(stride(&[0.0; 1000], 2e-3), 1000);

@@ -110,7 +110,7 @@ pub(crate) fn push_strands_apart(
                     let stride = coarse::stride(strand.rest_lengths(), reach);
                     list.add(strand.positions(), stride);
                     if stride > 1 && !core::mem::replace(is_told, true) {
-                        faults.write(too_fine(&strand, radius, stride).of(hair));
+                        faults.write(too_fine(strand, radius, stride).of(hair));
                     }
                 }
             }

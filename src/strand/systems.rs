@@ -11,7 +11,7 @@ use crate::{
     schedule::{HairStep, HairSystems, HairTick},
     setting::{self, Settings},
 };
-use bevy::{math::Isometry3d, prelude::*};
+use bevy::{ecs::entity_disabling::Disabled, math::Isometry3d, prelude::*};
 
 /// Hair and strands as entities, and the frame they live in.
 pub struct StrandPlugin;
@@ -70,7 +70,7 @@ fn report_unusable(
 /// What somebody wrote into a strand's private parts, as an inspector or a scene file may. Our own writes
 /// bypass change detection.
 fn mend_strands(
-    mut strands: Query<(Entity, &mut Strand), Changed<Strand>>,
+    mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Allow<Disabled>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (entity, mut strand) in &mut strands {

@@ -18,12 +18,12 @@ use crate::{
     setting::{Ranged, Settings, report},
     strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
 /// What came with new strands, and what somebody wrote into moisture, as an inspector may. Our own
 /// writes bypass change detection.
 pub(super) fn mend_moistures(
-    mut moistures: Query<(Entity, &mut Moisture), Changed<Moisture>>,
+    mut moistures: Query<(Entity, &mut Moisture), (Changed<Moisture>, Allow<Disabled>)>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
 ) {

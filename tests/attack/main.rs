@@ -253,7 +253,7 @@ fn very_fine_strands_are_held_together_and_told() {
     }
     let mut strands = app.world_mut().query::<&Strand>();
     let mut most = 0.0_f32;
-    for _ in 0..20 {
+    for _ in 0..10 {
         app.update();
         most = strands.iter(app.world()).map(Strand::peak_strain).fold(most, f32::max);
     }
