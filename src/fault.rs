@@ -46,7 +46,7 @@ pub enum FaultKind {
     Rebuilt,
     /// A strand points to a hair that does not exist or carries no `Hair`: it is left out.
     NoHair,
-    /// A strand that cannot be simulated at all.
+    /// A strand that cannot be simulated at all, or not as it is.
     Strand,
     /// A transform that cannot be inverted, or is not finite: the last valid one is used.
     Transform,

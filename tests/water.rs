@@ -471,3 +471,39 @@ fn a_droplet_lands_rides_slides_down_and_drips() {
     assert!(drop.ride().is_none() && drop.position.y < -0.3, "{:?}", drop.position);
     assert!(ledger(&app).error() < 1e-5);
 }
+
+#[test]
+fn a_drop_that_is_carried_weighs_on_its_strand() {
+    let mut app = test_app(60.0);
+    let (_, id) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+    let wetting = Wetting { uptake: 0.0, sliding: 0.0, ..default() };
+    app.insert_resource(HairDefault(wetting));
+    app.insert_resource(ProcessTime(0.0));
+    app.world_mut().spawn(Droplet::new(Vec3::NEG_Y * 0.1, 5e-9).unwrap());
+    for _ in 0..5 {
+        app.update();
+        let lengths = strand(&app, id).rest_lengths();
+        let dry = |i: usize| 0.5 * (lengths.get(i).unwrap_or(&0.0) + lengths[i - 1]);
+        let added = &app.world().get::<bevy_keratin::AddedMass>(id).unwrap().mass;
+        let mass: f32 = (1..9).map(|i| added[i] * dry(i) * wetting.dry_mass()).sum();
+        assert!((mass / 5e-6 - 1.0).abs() < 1e-3, "{mass} kg are carried, not 5 mg");
+    }
+}
+
+#[test]
+fn a_drop_dries_as_fast_as_vapour_leaves_it() {
+    let mut app = test_app(60.0);
+    no_gravity(&mut app);
+    app.insert_resource(ProcessTime(10.0));
+    let drop = app.world_mut().spawn(Droplet::new(Vec3::ZERO, 4e-9).unwrap()).id();
+    app.update();
+    let volume = |app: &App| app.world().get::<Droplet>(drop).unwrap().volume;
+    let (before, seconds) = (volume(&app), 10.0);
+    run(&mut app, 1.0);
+    let (air, radius) = (vapour::DryingAir::of(&Climate::default()), 9.85e-4_f32);
+    let flux = vapour::transfer(air.draught, 2.0 * radius) * air.drive(0.0);
+    let expected = f64::from(flux * 4.0 * PI * radius * radius) * seconds / vapour::WATER;
+    let lost = before - volume(&app);
+    assert!((lost / expected - 1.0).abs() < 0.03, "{lost} m³, expected {expected}");
+    assert!(ledger(&app).error() < 1e-9, "{:?}", ledger(&app));
+}

@@ -77,10 +77,12 @@ pub fn folder(path: &Path) -> io::Result<()> {
     std::fs::create_dir_all(path).map_err(|error| unwritable(path, error))
 }
 
-/// Writes a PNG.
+/// Writes a PNG, whole or not at all: whoever looks at the folder meanwhile finds no half of one.
 pub fn save(picture: Image, path: &Path) -> io::Result<()> {
     let picture = picture.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
-    picture.save(path).map_err(|error| unwritable(path, error))
+    let unfinished = path.with_extension("part.png");
+    picture.save(&unfinished).map_err(|error| unwritable(path, error))?;
+    std::fs::rename(unfinished, path).map_err(|error| unwritable(path, error))
 }
 
 /// Says which path it was: the system's errors do not.

@@ -2,7 +2,11 @@
 
 use bevy::prelude::*;
 use bevy_keratin::prelude::*;
-use std::{error::Error, fs, path::PathBuf};
+use std::{
+    error::Error,
+    fs, io,
+    path::{Path, PathBuf},
+};
 
 /// What is wished for. Orders of a frame are carried out at the beginning of the next, before its
 /// ticks.
@@ -23,6 +27,13 @@ pub struct Hairdos {
     future: Vec<Hairdo>,
     /// How the last order went.
     pub told: String,
+}
+
+/// Writes a file whole or not at all: who is interrupted keeps the one that was there.
+fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let unfinished = path.with_added_extension("part");
+    fs::write(&unfinished, bytes)?;
+    fs::rename(unfinished, path)
 }
 
 /// How many steps can be undone, and how many nodes they may have together: 100 MB or so.
@@ -100,7 +111,7 @@ fn carry_out(order: &Order, world: &mut World, hair: Entity) -> Result<String, B
         }
         Order::Save(path) => {
             let bytes = now.to_bytes();
-            fs::write(path, &bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+            write(path, &bytes).map_err(|error| format!("{}: {error}", path.display()))?;
             return Ok(format!("saved {} kB", bytes.len().div_ceil(1000)));
         }
         Order::Load(path) => {

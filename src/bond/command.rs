@@ -43,9 +43,10 @@ fn for_each_strand(
     let members: Vec<Entity> = hair.get::<Strands>().into_iter().flat_map(Strands::iter).collect();
     hair.world_scope(|world| {
         for strand in members {
-            if let Ok((mut strand, mut bonds, mut history)) = world
-                .entity_mut(strand)
-                .get_components_mut::<(&mut Strand, &mut Bonds, &mut StrandHistory)>()
+            // Somebody may have written one that is not there.
+            if let Ok(mut strand) = world.get_entity_mut(strand)
+                && let Ok((mut strand, mut bonds, mut history)) =
+                    strand.get_components_mut::<(&mut Strand, &mut Bonds, &mut StrandHistory)>()
             {
                 act(&mut strand, &mut bonds, &mut history);
             }

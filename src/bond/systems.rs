@@ -16,7 +16,7 @@ use crate::{
     setting::{self, Ranged, Settings, Violations, report},
     strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep},
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use fearless_simd::Level;
 
 /// Rest shapes from bonds and bonds' memory.
@@ -43,8 +43,9 @@ impl Plugin for BondPlugin {
 /// into them. Our own writes bypass change detection, so `Changed` means somebody else's.
 fn fit_bonds(
     mut strands: Query<
-        (Entity, &Strand, &mut Bonds, &mut RestShape),
-        Or<(Changed<Bonds>, Changed<Strand>)>,
+        (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
+        // What is written while a strand is disabled is no change any more when it is enabled.
+        (Or<(Changed<Bonds>, Changed<Strand>)>, Allow<Disabled>),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -53,7 +54,9 @@ fn fit_bonds(
         if fits && !bonds.is_changed() {
             continue;
         }
-        rest.bypass_change_detection().closed = false;
+        if let Some(rest) = &mut rest {
+            rest.bypass_change_detection().closed = false;
+        }
         let bonds = bonds.bypass_change_detection();
         if !fits {
             bonds.fit(strand);
@@ -198,4 +201,40 @@ fn update_bonds(
         });
         items.clear();
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::stiffness::REFERENCE_DT;
+
+    /// The cuticle is the joint's own: damage counts from the root to where the edge begins.
+    #[test]
+    fn every_joint_has_the_cuticle_of_its_place() {
+        let places = [0.0, 0.01, 0.03, 0.08, 0.1];
+        let points = places.map(|x| Vec3::X * x);
+        let strand = Strand::from_polyline(&points).unwrap();
+        let bonds = Bonds::of(&strand);
+        let softening = [0.0, 0.1, 0.2, 0.3];
+        let added = AddedMass { softening: softening.to_vec(), ..default() };
+        let cuticle = Cuticle { damage: 4.0, softening: 0.5 };
+        let influence = BondInfluence::default().as_array();
+        let sweeps = Sweeps::default();
+        for key in [None, Some((sweeps, REFERENCE_DT))] {
+            let key = Key { influence, cuticle, sweeps: key };
+            let mut rest = RestShape::default();
+            shape(Level::new(), &key, &strand, &bonds, &added, &mut rest);
+            for i in 0..4 {
+                let factor = cuticle_factor(places[i], 4.0, 0.5) * (1.0 - softening[i]);
+                let expected = match key.sweeps {
+                    None => factor,
+                    Some((s, dt)) => {
+                        stiffness_per_iteration(s.per_substep(dt, factor), s.iterations)
+                    }
+                };
+                let found = rest.stiffness[i];
+                assert!((found / expected - 1.0).abs() < 1e-4, "{i}: {found}, not {expected}");
+            }
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "avian")]
 mod avian;
+mod coarse;
 mod lanes;
 pub mod model;
 mod neighbours;
@@ -159,7 +160,13 @@ pub struct Obstacles {
 /// The pairs of strands of one hair that may touch.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub struct LockNeighbours(#[reflect(ignore)] neighbours::Neighbours);
+pub struct LockNeighbours {
+    #[reflect(ignore)]
+    lists: neighbours::Neighbours,
+    /// Whether it has been told that strands are too fine.
+    #[reflect(ignore)]
+    is_told: bool,
+}
 
 impl Film {
     /// The bridges between strands that touch at a distance of axes of `reach` (m), as long as lists
@@ -172,12 +179,12 @@ impl Film {
 impl LockNeighbours {
     /// How many nodes the lists are for.
     pub(crate) fn nodes(&self) -> usize {
-        self.0.nodes()
+        self.lists.nodes()
     }
 
     /// Asks for lists that know bridges of water this long (m), from the next ones on.
     pub(crate) fn set_extra_margin(&mut self, longest: f32) {
-        self.0.set_extra_margin(longest);
+        self.lists.set_extra_margin(longest);
     }
 
     /// The bridges of water at every node, where contact has seen them last. `wet` has a row for each,
@@ -187,11 +194,11 @@ impl LockNeighbours {
         wet: &mut Vec<WetRow>,
         film: Film,
     ) -> impl Iterator<Item = Bridged> {
-        self.0.bridges(wet, film)
+        self.lists.bridges(wet, film)
     }
 
     /// How many pairs of node and edge are watched, rounded up to groups of eight for each node.
     pub fn pairs(&self) -> usize {
-        self.0.pairs()
+        self.lists.pairs()
     }
 }

@@ -52,6 +52,19 @@ pub struct Bridged {
     pub grip: f32,
 }
 
+impl Bridged {
+    /// From `self` (0) to `to` (1), as a node between two has it.
+    pub fn lerp(self, to: Self, t: f32) -> Self {
+        let mix = |a: f32, b: f32| a + (b - a) * t;
+        Self {
+            pull: self.pull.lerp(to.pull, t),
+            steepness: mix(self.steepness, to.steepness),
+            drift: self.drift.lerp(to.drift, t),
+            grip: mix(self.grip, to.grip),
+        }
+    }
+}
+
 /// A bridge of water from a node at `p` to the foot `f` of its perpendicular on a strand that moves
 /// with `velocity`, both films together of cross-section `area` (m²).
 ///

@@ -8,6 +8,7 @@
 //! With exact tests on all edges of the cells, scene 1 took 1.3 times as long.
 
 use super::{
+    coarse::Coarse,
     lanes::{self, Bridges, Penalty, Pieces, Row, Stack, Sum, WIDTH, WetRow},
     model::{Bridged, Film},
 };
@@ -62,6 +63,8 @@ pub struct Neighbours {
     expected: Vec<Row>,
     /// The nodes of each strand.
     strands: Vec<Range<u32>>,
+    /// Which nodes of fine strands the rows are.
+    coarse: Coarse,
     lists: Lists,
     parts: Vec<Part>,
     /// How much farther than the reach bridges of water are asked for (m).
@@ -135,19 +138,26 @@ impl Neighbours {
         self.rows.clear();
         self.expected.clear();
         self.strands.clear();
+        self.coarse.clear();
     }
 
-    /// Adds a strand with its nodes where they are now.
-    pub fn add(&mut self, nodes: &[Vec3]) {
+    /// Adds a strand with its nodes where they are now. Of every `stride` nodes one is looked at, the
+    /// others get what their neighbours get.
+    pub fn add(&mut self, nodes: &[Vec3], stride: usize) {
         let start = self.rows.len() as u32;
-        self.rows.extend(lanes::rows(nodes));
+        self.rows.extend(lanes::rows(self.coarse.add(nodes, stride)));
         self.strands.push(start..self.rows.len() as u32);
     }
 
-    /// Says where the nodes of the strand that was added last are expected, if all are said.
-    pub fn expect(&mut self, nodes: impl Iterator<Item = Vec3>) {
+    /// Says where the nodes of the strand that was added last are expected, if all are said. Of strands
+    /// of which not all nodes are looked at, they are expected where they are.
+    pub fn expect(&mut self, nodes: impl ExactSizeIterator<Item = Vec3>) {
         let Some(strand) = self.strands.last() else { return };
         let own = &self.rows[strand.start as usize..strand.end as usize];
+        if nodes.len() != own.len() {
+            self.expected.extend_from_slice(own);
+            return;
+        }
         self.expected.extend(own.iter().zip(nodes).map(|(row, p)| [p.x, p.y, p.z, row[3]]));
     }
 
@@ -167,7 +177,7 @@ impl Neighbours {
             self.look_up(level, reach);
             self.watch();
         }
-        let Self { rows, strands, lists, parts, .. } = self;
+        let Self { rows, strands, coarse, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let penalty = Penalty { reach, strength };
         for_each_block(
@@ -179,12 +189,13 @@ impl Neighbours {
             },
         );
         lists.idle += parts.iter().map(|part| part.idle).sum::<usize>();
-        parts.iter().flat_map(|part| part.pushes.iter().copied())
+        let pushes = parts.iter().flat_map(|part| part.pushes.iter().copied());
+        coarse.spread(pushes, Vec3::lerp)
     }
 
     /// Builds the lists.
     fn look_up(&mut self, level: Level, reach: f32) {
-        let Self { rows, expected, strands, lists, parts, beyond } = self;
+        let Self { rows, expected, strands, lists, parts, beyond, .. } = self;
         let (mut places, mut fast) = (&*rows, false);
         if expected.len() + 2 == rows.len() {
             let way = |(a, b)| lanes::place(a).distance_squared(lanes::place(b));
@@ -237,7 +248,7 @@ impl Neighbours {
 
     /// How many nodes there are.
     pub fn nodes(&self) -> usize {
-        self.rows.len().saturating_sub(2)
+        self.coarse.nodes()
     }
 
     /// From the next lists on, they are complete to `beyond` (m) more than strands' reach.
@@ -253,9 +264,10 @@ impl Neighbours {
     /// The bridges of water at every node, after [`pushes`](Self::pushes) of the same places. `wet` has
     /// a row for each node, in the order they were added.
     pub fn bridges(&mut self, wet: &mut Vec<WetRow>, film: Film) -> impl Iterator<Item = Bridged> {
+        self.coarse.pick(wet);
         wet.resize(self.rows.len(), [f32::NAN; 4]);
         let level = Level::new();
-        let Self { rows, strands, lists, parts, .. } = self;
+        let Self { rows, strands, coarse, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let reaches = film.longest + 2.0 * lists.moved;
         for_each_block(
@@ -266,7 +278,8 @@ impl Neighbours {
                 dispatch!(level, simd => part.bridge(simd, rows, wet, strands, reaches, film));
             },
         );
-        parts.iter().flat_map(|part| part.bridged.iter().copied())
+        let bridged = parts.iter().flat_map(|part| part.bridged.iter().copied());
+        coarse.spread(bridged, Bridged::lerp)
     }
 
     /// How many pairs of node and edge are kept, rounded up to groups of eight for each node.
@@ -460,7 +473,7 @@ mod tests {
 
     fn pushes(list: &mut Neighbours, strands: &[Vec<Vec3>], radius: f32) -> Vec<Vec3> {
         list.clear();
-        strands.iter().for_each(|s| list.add(s));
+        strands.iter().for_each(|s| list.add(s, 1));
         list.pushes(radius, 20.0, Lookup::Now).collect()
     }
 
@@ -599,7 +612,7 @@ mod tests {
             list.clear();
             let middle = way * ((steps - 1) as f32 / 2.0 - step as f32);
             for strand in &strands {
-                list.add(strand);
+                list.add(strand, 1);
                 list.expect(strand.iter().map(|p| *p + middle));
             }
             let lookup = if step == 0 { Lookup::Now } else { Lookup::Later };
@@ -628,5 +641,45 @@ mod tests {
             // its finite nodes and edges still count
             assert!(found[1].z < 0.0 && found[6].z > 0.0);
         }
+    }
+
+    #[test]
+    fn lists_are_complete_whatever_has_moved_since() {
+        // Two strands beyond the margin come together by little more than half of it each.
+        let (radius, reach) = (1e-3_f32, 2e-3_f32);
+        let strand =
+            |z: f32| -> Vec<Vec3> { (0..4).map(|i| Vec3::new(0.02 * i as f32, 0.0, z)).collect() };
+        let apart = (1.0 + MARGIN + 0.05) * reach;
+        for share in [0.45, 0.52, 0.6, 0.9] {
+            let mut list = Neighbours::default();
+            let pushed = pushes(&mut list, &[strand(0.0), strand(apart)], radius);
+            assert!(pushed.iter().all(|push| *push == Vec3::ZERO));
+            let way = share * MARGIN * reach;
+            let moved = [strand(way), strand(apart - way)];
+            let expected = brute(&moved, 0, moved[0][1], radius);
+            let found = pushes(&mut list, &moved, radius)[1];
+            assert!(found.distance(expected) < 1e-3, "{share}: {found}, not {expected}");
+            assert_eq!(expected == Vec3::ZERO, apart - 2.0 * way >= reach, "{share}");
+        }
+    }
+
+    #[test]
+    fn a_fine_strand_is_pushed_like_a_coarse_one_and_costs_little_more() {
+        let strand = |nodes: usize, z: f32| -> Vec<Vec3> {
+            (0..nodes).map(|i| Vec3::new(0.15 * i as f32 / (nodes - 1) as f32, 0.0, z)).collect()
+        };
+        let (mut coarse, mut fine) = (Neighbours::default(), Neighbours::default());
+        for k in 0..8 {
+            coarse.add(&strand(151, 7e-4 * k as f32), 1);
+            fine.add(&strand(1501, 7e-4 * k as f32), 10);
+        }
+        let expected: Vec<Vec3> = coarse.pushes(1e-3, 20.0, Lookup::Now).collect();
+        let found: Vec<Vec3> = fine.pushes(1e-3, 20.0, Lookup::Now).collect();
+        assert_eq!((fine.nodes(), found.len()), (8 * 1501, 8 * 1501));
+        for (k, push) in expected.iter().enumerate() {
+            let (s, i) = (k / 151, k % 151);
+            assert!(push.distance(found[1501 * s + 10 * i]) < 0.1, "strand {s} node {i}");
+        }
+        assert!(fine.pairs() <= coarse.pairs() + 8, "{} {}", fine.pairs(), coarse.pairs());
     }
 }

@@ -1,9 +1,10 @@
 //! `Interaction`: strands push each other apart, colliders are seen from each hair's frame.
 
 use super::{
-    ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles, neighbours::Lookup,
+    ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles, coarse, neighbours::Lookup,
 };
 use crate::{
+    fault::{FaultKind, HairFault},
     parallel::prefetch,
     rod::obstacle::{Obstacle, Solid},
     schedule::{EffectiveSubsteps, HairSystems, HairTick, first_substep},
@@ -138,34 +139,51 @@ fn gather_obstacles(
     }
 }
 
+fn too_fine(strand: &Strand, radius: f32, stride: usize) -> HairFault {
+    let segment = 1e3 * strand.length() / strand.edges() as f32;
+    let message = format!(
+        "segments of a strand are {segment:.3} mm long, expected at least its lock's radius of {} mm: \
+         contact looks at every {stride}th of its {} nodes, fewer nodes would do",
+        1e3 * radius,
+        strand.nodes(),
+    );
+    HairFault::new(FaultKind::Strand, message)
+}
+
 pub(crate) fn push_strands_apart(
     steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
     mut strands: Query<(&mut Strand, &mut StrandSleep, &mut StillPose), With<StrandOf>>,
+    mut faults: MessageWriter<HairFault>,
 ) {
     for (hair, members, mut neighbours, sleepers) in &mut hairs {
         let LockContact { radius, strength } = contact.of(hair);
         if radius <= 0.0 || strength <= 0.0 || sleepers.is_some_and(Sleepers::all) {
             continue;
         }
-        let Some(stride) = steps.of(hair) else { continue };
-        let list = &mut neighbours.bypass_change_detection().0;
+        let Some(step) = steps.of(hair) else { continue };
+        let LockNeighbours { lists: list, is_told } = neighbours.bypass_change_detection();
+        let reach = 2.0 * radius;
         list.clear();
         // Follower strands neither push nor are pushed. Where water joins strands, it joins them too.
         let with_followers = list.has_extra_margin();
         // Water wants all bridges. Dry strands are looked up once a tick, for where they are in its
         // middle: most fly along with their neighbours.
-        let lookup = if stride.is_first || with_followers { Lookup::Now } else { Lookup::Later };
-        let ahead = (stride.is_first && !with_followers).then_some(0.5 * (stride.tick - stride.dt));
+        let lookup = if step.is_first || with_followers { Lookup::Now } else { Lookup::Later };
+        let ahead = (step.is_first && !with_followers).then_some(0.5 * (step.tick - step.dt));
         for some in members.collection().chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
             for (strand, sleep, _) in strands.iter_many(some) {
                 if with_followers || !sleep.is_follower() {
-                    list.add(strand.positions());
+                    let stride = coarse::stride(strand.rest_lengths(), reach);
+                    list.add(strand.positions(), stride);
                     if let Some(seconds) = ahead {
                         let moving = strand.positions().iter().zip(strand.velocities());
                         list.expect(moving.map(|(p, v)| *p + *v * seconds));
+                    }
+                    if stride > 1 && !core::mem::replace(is_told, true) {
+                        faults.write(too_fine(strand, radius, stride).of(hair));
                     }
                 }
             }
@@ -186,7 +204,7 @@ pub(crate) fn push_strands_apart(
                     continue;
                 }
                 let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
-                velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * stride.dt);
+                velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * step.dt);
             }
         }
     }

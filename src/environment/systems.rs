@@ -156,3 +156,38 @@ fn blow(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_node_gets_its_wind_once() {
+        let points: Vec<Vec3> = (0..4).map(|i| Vec3::new(0.0, 0.01 * i as f32, 0.2)).collect();
+        let mut strand = Strand::from_polyline(&points).unwrap();
+        let blower = Blower { drying: 0.5, ..default() };
+        let blowers = vec![LocalBlower { nozzle: Vec3::ZERO, aim: Vec3::Z, blower }];
+        let blown: Vec<Blown> =
+            (0..4).map(|i| Blown::at(&blowers, 1.0, points[i], Vec3::Y * 0.01)).collect();
+        let air = LocalAir { gravity: Vec3::ZERO, keep: 1.0, dt: 0.01, scale: 1.0, blowers };
+        let (mut changes, mut at_nodes) = (BondChanges::default(), BlownAir::default());
+        let mut received = WindReceived::default();
+        let mut wet = AddedMass { mass: vec![1.0; 4], ..default() };
+        blow(&air, &mut strand, &wet, &mut changes, &mut at_nodes, Some(&mut received));
+        for (i, blown) in blown.iter().enumerate() {
+            let expected = blown.acceleration * (0.01 / 2.0);
+            assert!(expected.length() > 1e-4);
+            assert!(strand.velocities()[i].distance(expected) < 1e-6, "node {i}");
+        }
+        assert_eq!(received.total.len(), 3, "edges receive wind");
+        for (i, total) in received.total.iter().enumerate() {
+            assert!((total - 0.01 * blown[i].acceleration.length()).abs() < 1e-6, "edge {i}");
+        }
+        assert!(at_nodes.nodes.is_empty() && !changes.is_empty());
+        // Over water the wind dries that, at every node.
+        wet.moves_bonds = true;
+        let mut changes = BondChanges::default();
+        blow(&air, &mut strand, &wet, &mut changes, &mut at_nodes, None);
+        assert!(at_nodes.nodes.len() == 4 && changes.is_empty());
+    }
+}

@@ -30,6 +30,7 @@ pub struct Follower {
     /// Its place in the hair's even order, once that was asked for.
     rank: Option<u32>,
     /// Its index among the hair's guides.
+    #[reflect(ignore)]
     guide: Option<u32>,
     #[reflect(ignore)]
     pub(super) ties: Ties,
@@ -44,16 +45,22 @@ pub struct Follower {
 #[reflect(Component, Default, Clone)]
 pub struct Guides {
     /// In their even order.
+    #[reflect(ignore)]
     pub(super) strands: Vec<Entity>,
     /// Where each one's frames begin in the list, and where the last one's end.
+    #[reflect(ignore)]
     starts: Vec<u32>,
     /// Orientations of their edges as they were last seen.
+    #[reflect(ignore)]
     turns: Vec<Quat>,
     /// Which may be followed, and which of them move.
+    #[reflect(ignore)]
     usable: Vec<bool>,
+    #[reflect(ignore)]
     pub(super) awake: Vec<bool>,
     level: usize,
     /// What the strands were told apart by: share that is simulated, level, number of strands.
+    #[reflect(ignore)]
     told_apart: Option<(f32, usize, usize)>,
     /// How the hair's own frame has moved in this tick.
     #[reflect(ignore)]

@@ -26,6 +26,9 @@ use glam::Vec3;
 /// How often a step that gains energy is halved before it is given up.
 const HALVINGS: u32 = 8;
 
+/// No spring that touches anything is longer than this many times its length after a step.
+const TORN: f32 = 1.5;
+
 /// A block of strands with what their springs hold.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SpringLanes {
@@ -89,6 +92,7 @@ fn step_simd<S: Simd>(
         let pulled = Real::select(held, v.dot(v), zero);
         moved = Real::select(Real::lt(zero, pulled), one, moved);
     }
+    let mut in_touch = false;
     for _ in 0..iterations {
         if bend > 0.0 {
             solve_over(simd, b, tensions, over);
@@ -100,6 +104,10 @@ fn step_simd<S: Simd>(
         }
         contacts(simd, b, params.skin, obstacles);
         moved = Real::max(moved, load(simd, &b.touched));
+        in_touch |= b.touched != [0.0; LANES];
+    }
+    if in_touch {
+        bring_back(simd, b);
     }
     keep_energy(simd, b, params, Real::lt(moved, one));
     turn_edges(simd, b);
@@ -119,6 +127,31 @@ fn span<S: Simd>(from: V3<f32x16<S>>, to: V3<f32x16<S>>) -> (V3<f32x16<S>>, f32x
 fn place<S: Simd>(simd: S, n: &NodeLanes) -> (V3<f32x16<S>>, V3<f32x16<S>>) {
     let p = load3(simd, &n.p);
     (p, p - load3(simd, &n.from))
+}
+
+/// Brings edges that are torn back to [`TORN`] times their length, from the root on and without a change of
+/// speed. A node that was shaken to the far side of an obstacle is pressed on it by what pulls it home,
+/// and friction would hold it there for ever.
+#[inline(never)]
+fn bring_back<S: Simd>(simd: S, b: &mut BlockLanes) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let zero = f32x16::splat(simd, 0.0);
+            let mut a = load3(simd, &b.nodes[0].p);
+            for (edge, n) in b.edges.iter().zip(&mut b.nodes[1..]) {
+                let c = load3(simd, &n.p);
+                let (u, distance) = span(a, c);
+                let most = load(simd, &edge.l) * TORN;
+                let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+                let back = Real::select(held, zero, Real::min(most - distance, zero));
+                a = u.scale_add(back, c);
+                store3(&mut n.p, a);
+                let from = u.scale_add(back, load3(simd, &n.from));
+                store3(&mut n.from, from);
+            }
+        },
+    );
 }
 
 /// The springs to the next but one node, one after the other from the root on.
@@ -462,6 +495,21 @@ mod tests {
         let head = Obstacle { solid: head, motion: None, friction: 0.2 };
         let peak = peak_strain(&mut block, Springs::default(), &[head]);
         assert!(peak < 0.05, "{peak}");
+    }
+
+    #[test]
+    fn a_strand_that_is_torn_across_a_head_comes_back() {
+        // All but the root are on the far side, where the springs press them on the head.
+        let far = |i: usize| Vec3::new(0.0, -0.091 - 0.03 * i as f32, 0.0);
+        let at = |i| if i == 0 { Vec3::Y * 0.091 } else { far(i) };
+        let mut block = block(9, |_, i| (at(i), Vec3::ZERO));
+        let head = Solid::Capsule { a: Vec3::ZERO, b: Vec3::ZERO, radius: 0.09 };
+        let head = Obstacle { solid: head, motion: None, friction: 0.3 };
+        peak_strain(&mut block, Springs::default(), &[head]);
+        let strain =
+            |pair: &[NodeLanes]| take3(&pair[0].p, 0).distance(take3(&pair[1].p, 0)) / 0.03 - 1.0;
+        let most = block.strands.nodes.windows(2).map(strain).fold(0.0, f32::max);
+        assert!(most < 0.05, "{most}");
     }
 
     fn peak_strain(block: &mut SpringLanes, springs: Springs, obstacles: &[Obstacle]) -> f32 {

@@ -220,4 +220,23 @@ mod tests {
             println!("10,000 guides of 16 nodes: {:?}", start.elapsed());
         }
     }
+
+    #[test]
+    fn every_node_shows_the_bonds_of_its_own_joint_and_the_tip_those_of_the_last() {
+        let points: Vec<Vec3> = (0..4).map(|i| Vec3::X * i as f32).collect();
+        let strand = Strand::from_polyline(&points).unwrap();
+        let mut bonds = Bonds::of(&strand);
+        for (i, joint) in bonds.joints.iter_mut().enumerate() {
+            joint.rates = [0.1 * i as f32, 0.5, 0.2 * i as f32, 1.0];
+        }
+        let mut out = vec![[0; 8]; 4];
+        let history = StrandHistory::default();
+        pack_guide(&mut out, false, &strand, &history, &bonds, &[0.0, 0.25, 0.5, 1.0], 1.0);
+        for (i, node) in out.iter().enumerate() {
+            let joint = i.min(2) as f32;
+            assert_eq!(node[3], unorm8([0.1 * joint, 0.5, 0.2 * joint, 1.0]), "node {i}");
+            assert_eq!(node[4] >> 16, half([0.0, 0.25, 0.5, 1.0][i]), "node {i}");
+            assert_eq!(f32::from_bits(node[5]), i as f32, "length from the root");
+        }
+    }
 }

@@ -150,3 +150,40 @@ fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
     }
     (sum * zero).store_array(&mut b.finite);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::{LANES, put4, take3};
+    use glam::{Quat, Vec3};
+
+    #[test]
+    fn neighbours_lose_their_relative_spin_at_the_rate_that_is_asked_for() {
+        let (dt, damping) = (1.0 / 360.0, 20.0);
+        let spins = |internal_damping: f32| -> [Vec3; 2] {
+            let mut b = BlockLanes::default();
+            b.resize(3);
+            for (e, angle) in b.edges.iter_mut().zip([0.01, -0.03]) {
+                for lane in 0..LANES {
+                    put4(&mut e.from, lane, Quat::IDENTITY);
+                    put4(&mut e.q, lane, Quat::from_rotation_x(angle));
+                }
+            }
+            let params = StepParams {
+                dt,
+                iterations: 0,
+                projection: StretchProjection::Split,
+                limiter_steps: 0,
+                internal_damping,
+                skin: 0.0,
+            };
+            dispatch!(Level::new(), simd => velocities(simd, &mut b, &params));
+            [take3(&b.edges[0].omega, 3), take3(&b.edges[1].omega, 3)]
+        };
+        let ([a, b], [c, d]) = (spins(0.0), spins(damping));
+        assert!((a.x * dt - 0.01).abs() < 1e-4 && (b.x * dt + 0.03).abs() < 1e-4);
+        let left = (-damping * dt).exp();
+        assert!(((d - c).x / (b - a).x / left - 1.0).abs() < 1e-4, "{} {}", c.x, d.x);
+        assert!((c + d - a - b).length() < 1e-3, "what they have in common stays");
+    }
+}

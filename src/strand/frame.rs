@@ -48,6 +48,12 @@ struct Frames {
 }
 
 impl Frames {
+    fn are_valid(&self) -> bool {
+        let last = self.last.iter().flatten();
+        last.clone().all(|(seconds, _)| seconds.is_finite())
+            && last.map(|(_, pose)| pose).chain(&self.seen).all(Pose::is_valid)
+    }
+
     fn record(&mut self, seconds: f64, pose: Pose) {
         if self.seen.is_some_and(|seen| seen != pose) {
             self.moved_by_ticks = false;
@@ -153,17 +159,23 @@ impl Pose {
     pub fn of(transform: &GlobalTransform) -> Option<Self> {
         let (scale, rotation, translation) = transform.to_scale_rotation_translation();
         let scale = scale.element_product().abs().cbrt();
-        let valid = translation.is_finite()
+        let pose = Self { translation, rotation, scale };
+        pose.is_valid().then(|| Self { rotation: rotation.normalize(), ..pose })
+    }
+
+    fn is_valid(&self) -> bool {
+        let Self { translation, rotation, scale } = self;
+        translation.is_finite()
             && rotation.is_finite()
             && rotation.length_squared() > 0.5
             && scale.is_finite()
-            && scale > 1e-9;
-        valid.then(|| Self { translation, rotation: rotation.normalize(), scale })
+            && *scale > 1e-9
     }
 
     /// From `self` (0) to `to` (1).
     pub(crate) fn toward(&self, to: &Self, t: f32) -> Self {
-        if t >= 1.0 {
+        // What rests is to rest to the last bit: far from the origin an ulp is a jolt.
+        if t >= 1.0 || self == to {
             return *to;
         }
         Self {
@@ -243,6 +255,11 @@ impl TickPose {
     ) -> (bool, bool) {
         let report = to.is_none() && !self.was_invalid;
         self.was_invalid = to.is_none();
+        // Somebody wrote into it, as an inspector may: it begins anew.
+        let known = [self.to, self.now, self.before, self.from.unwrap_or_default()];
+        if !known.iter().all(Pose::is_valid) || !self.frames.are_valid() {
+            *self = Self { jumps: self.jumps, was_invalid: self.was_invalid, ..default() };
+        }
         self.inertia = Vec2::new(inertia.moving, inertia.turning);
         let first = self.from.is_none();
         let asked = core::mem::take(&mut self.jumps);
@@ -377,5 +394,43 @@ mod tests {
         assert!(reports() && !reports(), "reported once");
         frame.advance(1.0, false);
         assert_eq!(*frame.now(), b);
+    }
+
+    #[test]
+    fn what_is_written_into_a_pose_is_gone_with_the_next_tick() {
+        let a = Pose { translation: Vec3::X, ..default() };
+        let broken = Pose { scale: 0.0, ..a };
+        let spoils: [fn(&mut TickPose, Pose); 5] = [
+            |pose, broken| pose.to = broken,
+            |pose, broken| pose.now = broken,
+            |pose, _| pose.before.rotation = Quat::from_array([0.0; 4]),
+            |pose, broken| pose.from = Some(Pose { translation: Vec3::NAN, ..broken }),
+            |pose, broken| pose.frames.last = [Some((f64::NAN, broken)), Some((1.0, broken))],
+        ];
+        for spoil in spoils {
+            let mut pose = TickPose::default();
+            pose.aim(Some(a), 0.0, &HairInertia::default());
+            pose.advance(1.0);
+            spoil(&mut pose, broken);
+            pose.aim(Some(a), 0.0, &HairInertia::default());
+            pose.advance(1.0);
+            assert_eq!((pose.now, pose.before), (a, a));
+        }
+    }
+
+    #[test]
+    fn what_rests_far_away_rests_to_the_last_bit() {
+        for far in [1234.567, 98_765.43, 1e30] {
+            let rotation = Quat::from_rotation_y(0.7);
+            let at = Pose { translation: Vec3::new(far, -far, 0.3 * far), rotation, scale: 1.1 };
+            let mut pose = TickPose::default();
+            for _ in 0..3 {
+                pose.aim(Some(at), 0.0, &HairInertia::default());
+                for i in 1..=7 {
+                    pose.advance(i as f32 / 7.0);
+                    assert!(pose.frame_delta().is_none(), "{far}");
+                }
+            }
+        }
     }
 }

@@ -80,6 +80,10 @@ pub enum StrandError {
 /// The shortest segment that a strand may have (m).
 pub const MIN_SEGMENT: f32 = 1e-6;
 
+/// So many good steps, a second or so, make a strand well again that was put back: what breaks it once a
+/// tick is told once.
+const CONVALESCENCE: u16 = 360;
+
 /// A strand's nodes and edges, in its hair's frame, root first.
 ///
 /// Made by [`Strand::from_polyline`]. Game code may read all and write positions and velocities; the
@@ -96,7 +100,8 @@ pub struct Strand {
     tensions: Vec<f32>,
     root_frame: Quat,
     root_before: Option<(Vec3, Quat)>,
-    was_put_back: bool,
+    /// For how many good steps on end it is still known that it was put back.
+    unwell: u16,
 }
 
 /// Where a strand's nodes were at the end of the tick before, in the hair's frame: drawing goes from
@@ -211,7 +216,7 @@ impl Strand {
             orientations,
             rest_lengths,
             root_before: None,
-            was_put_back: false,
+            unwell: 0,
         })
     }
 
@@ -364,7 +369,7 @@ impl Strand {
             rest_lengths,
             root_frame,
             root_before: None,
-            was_put_back: false,
+            unwell: 0,
         };
     }
 
@@ -408,7 +413,7 @@ impl Strand {
     }
 
     /// After a step that left the finite numbers: back to what it was, at rest, or if that is not
-    /// finite either to the pose its bonds remember. Says what happened unless it did last time too.
+    /// finite either to the pose its bonds remember. Says what happened unless it did a short while ago, too.
     pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<HairFault> {
         let how = if self.is_pose_finite() {
             self.rest();
@@ -423,12 +428,12 @@ impl Strand {
                 "the strand's state was not finite; its rest pose was rebuilt from root and bonds",
             )
         };
-        let again = core::mem::replace(&mut self.was_put_back, true);
+        let again = core::mem::replace(&mut self.unwell, CONVALESCENCE) > 0;
         (!again).then_some(how)
     }
 
     pub(crate) fn stepped_well(&mut self) {
-        self.was_put_back = false;
+        self.unwell = self.unwell.saturating_sub(1);
         self.root_before = None;
     }
 }

@@ -120,8 +120,11 @@ impl StillPose {
             self.pushes.extend(pushes);
             return false;
         }
-        let known = self.pushes.iter();
+        let is_new = |(i, push): &(usize, Vec3)| match self.pushes.get(*i) {
+            Some(known) => known.distance_squared(*push) > most * most,
+            None => true,
+        };
         // All are taken, because the next strand's come behind them.
-        known.zip(pushes).filter(|(a, b)| a.distance_squared(*b) > most * most).count() > 0
+        pushes.enumerate().filter(is_new).count() > 0
     }
 }

@@ -11,7 +11,7 @@ use crate::{
     schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick},
     setting::{self, Settings},
 };
-use bevy::{math::Isometry3d, prelude::*};
+use bevy::{ecs::entity_disabling::Disabled, math::Isometry3d, prelude::*};
 
 /// Hair and strands as entities, and the frame they live in.
 pub struct StrandPlugin;
@@ -70,7 +70,7 @@ fn report_unusable(
 /// What somebody wrote into a strand's private parts, as an inspector or a scene file may. Our own writes
 /// bypass change detection.
 fn mend_strands(
-    mut strands: Query<(Entity, &mut Strand), Changed<Strand>>,
+    mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Allow<Disabled>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (entity, mut strand) in &mut strands {
@@ -185,4 +185,31 @@ fn shift_by(strand: &mut Strand, carry: &Isometry3d) {
     strand.velocities.iter_mut().for_each(|v| *v = turn * *v);
     strand.orientations.iter_mut().for_each(|q| *q = (turn * *q).normalize());
     strand.angular_velocities.iter_mut().for_each(|v| *v = turn * *v);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f32::consts::FRAC_PI_2;
+
+    #[test]
+    fn all_that_moves_is_carried_along_and_the_root_stays() {
+        let points: Vec<Vec3> = (0..4).map(|i| Vec3::X * (0.03 * i as f32)).collect();
+        let mut strand = Strand::from_polyline(&points).unwrap();
+        strand.velocities_mut().copy_from_slice(&[Vec3::X, Vec3::X, Vec3::Y, Vec3::Z]);
+        strand.angular_velocities.copy_from_slice(&[Vec3::X, Vec3::Y, Vec3::Z]);
+        let turn = Quat::from_rotation_z(FRAC_PI_2);
+        let carry = Isometry3d::new(Vec3::new(0.1, 0.2, 0.3), turn);
+        shift_by(&mut strand, &carry);
+        assert_eq!(strand.positions()[0], Vec3::ZERO);
+        for (p, q) in strand.positions()[1..].iter().zip(&points[1..]) {
+            assert!(p.distance(turn * *q + Vec3::new(0.1, 0.2, 0.3)) < 1e-6);
+        }
+        let near = |found: &[Vec3], expected: &[Vec3]| {
+            found.iter().zip(expected).all(|(a, b)| a.distance(*b) < 1e-6)
+        };
+        assert!(near(strand.velocities(), &[Vec3::Y, Vec3::Y, Vec3::NEG_X, Vec3::Z]));
+        assert!(near(strand.angular_velocities(), &[Vec3::Y, Vec3::NEG_X, Vec3::Z]));
+        assert!(strand.orientations().iter().all(|q| (*q * Vec3::Z).distance(Vec3::Y) < 1e-6));
+    }
 }

@@ -25,9 +25,10 @@ impl Hair {
             hair.get::<Strands>().into_iter().flat_map(Strands::iter).collect();
         hair.world_scope(|world| {
             for strand in members {
-                if let Ok((mut strand, mut history)) = world
-                    .entity_mut(strand)
-                    .get_components_mut::<(&mut Strand, &mut StrandHistory)>()
+                // Somebody may have written one that is not there.
+                if let Ok(mut strand) = world.get_entity_mut(strand)
+                    && let Ok((mut strand, mut history)) =
+                        strand.get_components_mut::<(&mut Strand, &mut StrandHistory)>()
                 {
                     strand.rest();
                     history.remember(&strand);

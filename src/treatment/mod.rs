@@ -192,8 +192,10 @@ setting! {
 pub struct WindingProgress {
     progress: f32,
     /// Where the strand was when winding began, in the hair's frame.
+    #[reflect(ignore)]
     start: Vec<Vec3>,
     /// Where its nodes are on the rod once they are wound, in the rod's frame.
+    #[reflect(ignore)]
     on_rod: Vec<Vec3>,
 }
 

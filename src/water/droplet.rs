@@ -1,6 +1,9 @@
 //! Drops of water as entities, and where they come from.
 
-use super::model::{ball_radius, ball_volume};
+use super::{
+    Counted,
+    model::{ball_radius, ball_volume},
+};
 use crate::{
     setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
     strand::TickPose,
@@ -11,7 +14,7 @@ use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 setting! {
     /// A drop of water: falls, lands on strands, rides on one and pulls others to it (\[W\] equation 2),
     /// soaks in, merges, drips off. Spawn it to wet hair; its water is counted until it has evaporated
-    /// or left [`DropletRules`](crate::water::DropletRules).
+    /// or left [`DropletRules`](crate::water::DropletRules). A clone brings its water into the world.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -35,15 +38,16 @@ setting! {
         pub r_min: f32 = 1e-3, "m" in R_MIN: 1e-6..=1.0, "about the drop's own radius";
         /// Distance up to which it pulls strands, more than `r_min`.
         pub r_max: f32 = 1e-3 * INFLUENCE;
-        pub(super) ride: Option<Ride> = None;
+        pub(super) ride: Option<Ride> = None => Ranged::clamp_values;
         /// Where it was a substep ago.
-        pub(super) before: Vec3 = Vec3::ZERO;
+        pub(super) before: Vec3 = Vec3::ZERO, "m" in BEFORE: -1e6..=1e6, "where it was";
         /// How much of it the ledger knows (m³).
-        pub(super) counted: f64 = 0.0;
+        #[reflect(ignore)]
+        pub(super) counted: Counted = Counted(0.0);
         /// How many strands are at it.
         pub(super) company: u32 = 1;
         /// For how long it has lain on a collider (s).
-        pub(crate) lying: f32 = 0.0;
+        pub(crate) lying: f32 = 0.0, "s" in LYING: 0.0..=1e9, "0 has just come to lie";
     }
     then Self::pulls_from_beyond_its_core
 }
@@ -55,6 +59,13 @@ pub struct Ride {
     pub strand: Entity,
     /// Where on it, in segments from the root.
     pub at: f32,
+}
+
+impl Ranged for Ride {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        const AT: ValueRange = ValueRange::new("Ride::at", 0.0..=65536.0, "segments from the root");
+        AT.clamp(&mut self.at, || 0.0, violations);
+    }
 }
 
 /// r_max over r_min where nobody says otherwise, as in the clumping experiment.
@@ -144,6 +155,14 @@ impl Droplet {
         );
     }
 
+    /// Brings back into their ranges what the tick itself may bring out of them: the place of a drop on
+    /// hair at the end of the world, the fall of a drop under absurd gravity. No fault of anybody.
+    pub(super) fn keep_in_range(&mut self) {
+        let mut known = Violations::new();
+        Self::POSITION.clamp(&mut self.position, || self.before, &mut known);
+        Self::VELOCITY.clamp(&mut self.velocity, || Vec3::ZERO, &mut known);
+    }
+
     /// Brings what was written into it back into its ranges. Water that was known is never lost: an
     /// impossible volume counts as unchanged.
     pub(super) fn repair(&mut self, violations: &mut Violations) {
@@ -157,7 +176,7 @@ impl Droplet {
         if has_run_out {
             self.volume = volume;
         } else if self.volume != volume {
-            self.volume = self.counted;
+            self.volume = self.counted.0;
         }
         if self.position != position {
             self.position = Self::POSITION.check(self.before).unwrap_or(Vec3::ZERO);
@@ -225,9 +244,10 @@ impl Shower {
         let count = owed as u64;
         self.owed = owed - count as f32;
         let first = self.made;
-        self.made += count;
+        self.made = first.wrapping_add(count);
         let Self { drop_radius, speed, spread, opening, influence, seed, .. } = *self;
-        (first..first + count).map(move |number| {
+        (0..count).map(move |i| {
+            let number = first.wrapping_add(i);
             let mut random = Xoshiro256PlusPlus::seed_from_u64(
                 seed ^ number.wrapping_mul(0x9E37_79B9_7F4A_7C15),
             );
@@ -272,7 +292,7 @@ mod tests {
     #[test]
     fn nonsense_written_later_is_repaired_and_its_water_kept() {
         let mut drop = Droplet::new(Vec3::ONE, 4e-9).unwrap();
-        drop.counted = 4e-9;
+        drop.counted = Counted(4e-9);
         drop.volume = f64::NAN;
         drop.position = Vec3::NAN;
         drop.velocity = Vec3::NAN;

@@ -99,7 +99,7 @@ pub(super) fn wet_strands(
             *added_mass.bypass_change_detection() = default();
         }
     }
-    let mut drops: Vec<&mut Droplet> = droplets.iter_mut().map(Mut::into_inner).collect();
+    let mut drops: Vec<Mut<'_, Droplet>> = droplets.iter_mut().collect();
     if drops.is_empty() {
         return;
     }
@@ -135,8 +135,11 @@ pub(super) fn wet_strands(
         sum_up(pieces, pose.rotation, outcomes);
     }
     // What all want together may be more than there is.
-    let shares: Vec<f64> =
-        drops.iter().zip(&*outcomes).map(|(drop, o)| (drop.counted / o.wanted).min(1.0)).collect();
+    let shares: Vec<f64> = drops
+        .iter()
+        .zip(&*outcomes)
+        .map(|(drop, o)| (drop.counted.0 / o.wanted).min(1.0))
+        .collect();
     for (Head { strands, .. }, (_, pieces)) in heads.iter_mut().zip(&mut *fields) {
         let piece = piece(strands.len(), drops.len());
         absorb_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &shares);
@@ -146,9 +149,10 @@ pub(super) fn wet_strands(
         room.1 = emptied(head.strands);
     }
     for ((drop, outcome), share) in drops.iter_mut().zip(&*outcomes).zip(shares) {
+        let drop = drop.bypass_change_detection();
         // Less than nothing only by what sums are rounded.
         drop.volume = (drop.volume - share * outcome.wanted).max(0.0);
-        drop.counted = drop.volume;
+        drop.counted.0 = drop.volume;
         drop.company = outcome.company.max(1);
         let lands = drop.ride.is_none() && outcome.landing.is_some();
         if let Some(landing) = outcome.landing.filter(|_| lands) {
@@ -216,7 +220,7 @@ fn heads<'a>(
 
 impl Field {
     /// The droplets in a hair's frame.
-    fn see(&mut self, drops: &[&mut Droplet], pose: &Pose) {
+    fn see(&mut self, drops: &[Mut<'_, Droplet>], pose: &Pose) {
         let scale = pose.scale.recip();
         self.drops.clear();
         self.drops.extend(drops.iter().map(|d| SeenDrop {
@@ -360,5 +364,53 @@ fn push(strand: &mut Strand, added_mass: &AddedMass, wetting: &Wetting, at: f32,
     let (_, velocities, _) = strand.motion_parts();
     for end in 0..2 {
         velocities[edge + end] += impulse * (share[end] * mobility[end]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::adhesion::Sum, *};
+    use core::f32::consts::FRAC_PI_2;
+
+    #[test]
+    fn sums_are_turned_to_the_world_and_the_first_landing_counts() {
+        let strand = |i| Entity::from_raw_u32(i).unwrap();
+        let landing = |i, when| Landing { drop: 0, strand: strand(i), at: 1.0, when };
+        let piece = |landings: Vec<Landing>| {
+            let mut piece = DropletContacts::default();
+            piece.sums = vec![Sum { impulse: Vec3::X, company: 2, wanted: 3e-9 }];
+            piece.landings = landings;
+            piece
+        };
+        let pieces = [
+            piece(vec![landing(7, 0.5), landing(8, 0.2)]),
+            piece(vec![landing(9, 0.3), landing(10, 0.2)]),
+        ];
+        let mut outcomes = [Outcome::default()];
+        sum_up(&pieces, Quat::from_rotation_z(FRAC_PI_2), &mut outcomes);
+        let Outcome { impulse, company, landing, wanted } = outcomes[0];
+        assert!(impulse.distance(Vec3::Y * 2.0) < 1e-6, "{impulse}");
+        assert_eq!((company, wanted), (4, 6e-9));
+        // Of those at the same time the strands' order decides.
+        assert_eq!(landing.map(|first| first.strand), Some(strand(8)));
+    }
+
+    #[test]
+    fn what_bears_a_drop_is_heavier_by_it_and_moves_as_one_with_it() {
+        let points: Vec<Vec3> = (0..5).map(|i| Vec3::X * (0.03 * i as f32)).collect();
+        let mut strand = Strand::from_polyline(&points).unwrap();
+        let (mut added, wetting) = (AddedMass::default(), Wetting::default());
+        weigh(&strand, &mut added, &wetting, 2.25, 4e-6);
+        let dry: Vec<f32> =
+            node_lengths(strand.rest_lengths()).map(|l| l * wetting.dry_mass()).collect();
+        let borne: Vec<f32> = added.mass.iter().zip(&dry).map(|(load, dry)| load * dry).collect();
+        let near = |a: f32, b: f32| (a - b).abs() < 1e-11;
+        assert!(near(borne[2], 3e-6) && near(borne[3], 1e-6), "{borne:?}");
+        assert_eq!((borne[0], borne[1], borne[4]), (0.0, 0.0, 0.0));
+        push(&mut strand, &added, &wetting, 2.25, Vec3::Z * 1e-6);
+        let got: f32 = (strand.velocities().iter().zip(&dry).zip(&borne))
+            .map(|((v, dry), borne)| v.z * (dry + borne))
+            .sum();
+        assert!((got / 1e-6 - 1.0).abs() < 1e-5, "all of the impulse: {got}");
     }
 }

@@ -1,7 +1,7 @@
 //! `ExternalForces`: showers run, hair soaks and dries, and hydrogen bonds follow the water.
 
 use super::{
-    Droplet, Moisture, Shower, SoakHair, WaterLedger, Wetting,
+    Counted, Droplet, Moisture, Shower, SoakHair, WaterLedger, Wetting,
     model::ball_radius,
     moisture::{Exposure, Left, Surroundings, node_lengths},
 };
@@ -18,17 +18,21 @@ use crate::{
     setting::{Ranged, Settings, report},
     strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
-/// What somebody wrote into moisture, as an inspector may. Our own writes bypass change detection.
+/// What came with new strands, and what somebody wrote into moisture, as an inspector may. Our own
+/// writes bypass change detection.
 pub(super) fn mend_moistures(
-    mut moistures: Query<(Entity, &mut Moisture), Changed<Moisture>>,
+    mut moistures: Query<(Entity, &mut Moisture), (Changed<Moisture>, Allow<Disabled>)>,
+    mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (entity, mut moisture) in &mut moistures {
-        if let Some(found) = moisture.bypass_change_detection().mend() {
+        let moisture = moisture.bypass_change_detection();
+        if let Some(found) = moisture.mend() {
             faults.write(HairFault::new(FaultKind::Setting, found).of(entity));
         }
+        ledger.book(moisture.recount());
     }
 }
 
@@ -211,6 +215,8 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
         })
     };
     moisture.exchange(positions, lengths, around, exposure, &mut wet.left);
+    // All of what has left is in `left`.
+    moisture.recount();
     open_bonds(bonds, moisture.wetness(), *bonds_follow, changes);
     let capacity = wetting.capacity() * f64::from(strand.length());
     if !damp
@@ -255,7 +261,7 @@ pub(super) fn let_go(
     let mut drop = Droplet::ball(pose.point_out(place) + below, radius);
     drop.velocity = pose.rotation * velocity;
     // The ledger has counted this water already.
-    (drop.volume, drop.counted) = (volume, volume);
+    (drop.volume, drop.counted) = (volume, Counted(volume));
     drop
 }
 

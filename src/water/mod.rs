@@ -18,6 +18,7 @@ mod droplet;
 mod droplet_contact;
 mod exchange;
 mod field;
+mod merge;
 pub mod model;
 pub mod moisture;
 mod motion;
@@ -74,12 +75,34 @@ impl Ranged for SoakHair {
     }
 }
 
+/// How much of a component's water the [`WaterLedger`] knows (m³). The water of a clone is new to it,
+/// and what is known of two equal drops does not tell them apart.
+#[derive(Debug, Default)]
+pub(crate) struct Counted(pub f64);
+
+impl Clone for Counted {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl PartialEq for Counted {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 /// The water that came, is there and has gone (m³). A resource, kept by the tick; `held` is of the
 /// tick's end.
+///
+/// Water is in the world as soon as a [`Droplet`] or a [`Moisture`] that holds it is: a clone brings its
+/// water along, whether of a droplet, of moisture or of a strand with both, as does a component that
+/// is inserted. What is overwritten, removed or despawned takes its water along. The next tick counts
+/// what has come, and what has been written over.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub struct WaterLedger {
-    /// Spawned as droplets, soaked in, taken from damp air.
+    /// Spawned as droplets, soaked in, cloned, written, taken from damp air.
     pub water_in: f64,
     /// In droplets, on and in hair.
     pub held: f64,

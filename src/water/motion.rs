@@ -3,7 +3,7 @@
 use super::{
     Droplet, DropletRules, Ride, WaterLedger, Wetting,
     exchange::{let_go, on_strand},
-    model::{ball_radius, clinging, fall, hanging, slide},
+    model::{clinging, fall, hanging, slide},
 };
 use crate::{
     Blower, HairCollider,
@@ -13,7 +13,6 @@ use crate::{
         vapour::{DryingAir, WATER, transfer},
     },
     fault::HairFault,
-    grid::UniformGrid,
     lanes::V3,
     parallel::{Nanos, for_each},
     rod::obstacle::Obstacle,
@@ -26,7 +25,7 @@ use bevy::prelude::*;
 /// What becomes of a droplet in this substep.
 struct Moving<'a> {
     entity: Entity,
-    drop: &'a mut Droplet,
+    drop: Mut<'a, Droplet>,
     violations: Violations,
     /// Water that the ledger did not know (m³); negative for water that somebody took.
     new: f64,
@@ -66,7 +65,7 @@ pub(super) fn move_droplets(
         .iter_mut()
         .map(|(entity, drop)| Moving {
             entity,
-            drop: drop.into_inner(),
+            drop,
             violations: Violations::new(),
             new: 0.0,
             evaporated: 0.0,
@@ -77,8 +76,9 @@ pub(super) fn move_droplets(
         &mut items,
         Nanos(500),
         |Moving { drop, violations, new, evaporated, ends, .. }| {
+            let drop = drop.bypass_change_detection();
             drop.repair(violations);
-            *new = drop.volume - drop.counted;
+            *new = drop.volume - drop.counted.0;
             drop.before = drop.position;
 
             let blown = Blown::at(&blowers, 1.0, drop.position, Vec3::ZERO);
@@ -89,7 +89,7 @@ pub(super) fn move_droplets(
             let flux = transfer(speed, 2.0 * radius.max(1e-6)) * air.drive(warmth);
             *evaporated = (f64::from(flux * area * process * dt) / WATER).min(drop.volume);
             drop.volume -= *evaporated;
-            drop.counted = drop.volume;
+            drop.counted.0 = drop.volume;
 
             let carrier = drop.ride.and_then(|ride| {
                 let (of, strand) = strands.get(ride.strand).ok()?;
@@ -118,6 +118,8 @@ pub(super) fn move_droplets(
                 }
             }
             let inside = (drop.position.cmpge(rules.min) & drop.position.cmple(rules.max)).all();
+            let inside = inside && Droplet::POSITION.check(drop.position).is_ok();
+            drop.keep_in_range();
             *ends = !inside || drop.lying > rules.lying || drop.volume < 1e-15;
         },
     );
@@ -174,63 +176,6 @@ fn rest_on(obstacle: &Obstacle, drop: &mut Droplet, radius: f32) -> bool {
     true
 }
 
-/// Once a tick: droplets that touch become one, where the larger was.
-pub(super) fn merge_droplets(
-    mut commands: Commands,
-    step: Res<HairStep>,
-    rules: Res<DropletRules>,
-    mut droplets: Query<(Entity, &mut Droplet)>,
-) {
-    if step.index != 0 || !rules.merging || droplets.iter().len() < 2 {
-        return;
-    }
-    let mut drops: Vec<(Entity, Mut<'_, Droplet>)> = droplets.iter_mut().collect();
-    let places: Vec<(Vec3, f32)> = drops.iter().map(|(_, d)| (d.position, d.radius())).collect();
-    let largest = places.iter().map(|p| p.1).fold(0.0, f32::max);
-    let mut grid = UniformGrid::default();
-    grid.build(2.0 * largest, places.iter().zip(0..).map(|(p, i)| (p.0, i)));
-    for i in 0..drops.len() {
-        let (place, radius) = places[i];
-        let mut touching: Vec<usize> = Vec::new();
-        grid.for_each_near(place, |j| {
-            let (other, size) = places[j as usize];
-            let near = radius + size;
-            if j as usize > i && other.distance_squared(place) < near * near {
-                touching.push(j as usize);
-            }
-        });
-        // Cells come in the order of their keys; entities' order is the same everywhere.
-        touching.sort_unstable();
-        for j in touching {
-            let [(_, a), (_, b)] = drops.get_disjoint_mut([i, j]).expect("i is before j");
-            if a.volume > 0.0 && b.volume > 0.0 {
-                let (a, b) = (a.bypass_change_detection(), b.bypass_change_detection());
-                if a.volume >= b.volume { a.merge(b) } else { b.merge(a) }
-            }
-        }
-    }
-    for (entity, drop) in drops.iter().filter(|(_, d)| d.volume == 0.0) {
-        debug_assert_eq!(drop.counted, 0.0);
-        commands.entity(*entity).despawn();
-    }
-}
-
-impl Droplet {
-    /// Takes another drop in, with its momentum.
-    fn merge(&mut self, other: &mut Droplet) {
-        let volume = self.volume + other.volume;
-        let share = (other.volume / volume) as f32;
-        if self.ride.is_none() {
-            self.position = self.position.lerp(other.position, share);
-        }
-        self.velocity = self.velocity.lerp(other.velocity, share);
-        (self.volume, self.counted) = (volume, self.counted + other.counted);
-        (other.volume, other.counted) = (0.0, 0.0);
-        self.r_min = self.r_min.max(other.r_min).max(ball_radius(volume));
-        self.r_max = self.r_max.max(other.r_max).max(1.5 * self.r_min);
-    }
-}
-
 /// After the strands have moved: riding droplets are where their strands went.
 pub(super) fn follow_strands(
     hairs: Query<&TickPose, With<Hair>>,
@@ -247,6 +192,7 @@ pub(super) fn follow_strands(
             let drop = drop.bypass_change_detection();
             drop.position = pose.now().point_out(place);
             drop.velocity = pose.now().rotation * velocity;
+            drop.keep_in_range();
         }
     }
 }

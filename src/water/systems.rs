@@ -5,7 +5,8 @@ use super::{
     bridge::{IsWet, join_wet_strands, see_wet_hair},
     droplet_contact::{WaterField, wet_strands},
     exchange::{exchange_water, mend_moistures, run_showers},
-    motion::{follow_strands, merge_droplets, move_droplets},
+    merge::merge_droplets,
+    motion::{follow_strands, move_droplets},
     strand_block,
 };
 use crate::{
@@ -13,7 +14,7 @@ use crate::{
     setting,
     strand::{Hair, Strand},
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
 /// Droplets, showers, moisture and the air that dries.
 pub struct WaterPlugin;
@@ -37,7 +38,13 @@ impl Plugin for WaterPlugin {
             .add_observer(count_lost_moisture)
             .add_systems(
                 HairTick,
-                (mend_moistures, run_showers, exchange_water, see_wet_hair.run_if(first_substep))
+                (
+                    mend_moistures,
+                    count_overwritten,
+                    run_showers,
+                    exchange_water,
+                    see_wet_hair.run_if(first_substep),
+                )
                     .chain()
                     .in_set(HairSystems::WaterExchange),
             )
@@ -59,34 +66,55 @@ impl Plugin for WaterPlugin {
 /// Droplets that somebody despawns take their water with them.
 fn count_lost_droplet(
     lost: On<Discard, Droplet>,
-    droplets: Query<&Droplet>,
+    mut droplets: Query<&mut Droplet, Allow<Disabled>>,
     mut ledger: ResMut<WaterLedger>,
 ) {
-    if let Ok(droplet) = droplets.get(lost.entity) {
-        ledger.water_out += droplet.counted;
+    if let Ok(mut droplet) = droplets.get_mut(lost.entity) {
+        // Who has taken it off its entity may insert it elsewhere: then it is new.
+        ledger.water_out += core::mem::take(&mut droplet.counted).0;
     }
 }
 
 /// Strands that somebody despawns while wet, likewise.
 fn count_lost_moisture(
     lost: On<Discard, Moisture>,
-    strands: Query<&Moisture>,
+    mut strands: Query<&mut Moisture, Allow<Disabled>>,
     mut ledger: ResMut<WaterLedger>,
 ) {
-    if let Ok(moisture) = strands.get(lost.entity) {
-        ledger.water_out += moisture.volume();
+    if let Ok(mut moisture) = strands.get_mut(lost.entity) {
+        ledger.water_out += moisture.forget();
+    }
+}
+
+/// Once a tick: components that somebody assigned another value to have lost count of what was in
+/// them. Only where there was an assignment, so that the ledger still finds the tick's own errors.
+fn count_overwritten(
+    step: Res<HairStep>,
+    droplets: Query<Ref<Droplet>, Allow<Disabled>>,
+    strands: Query<Ref<Moisture>, Allow<Disabled>>,
+    mut ledger: ResMut<WaterLedger>,
+) {
+    let written = || {
+        droplets.iter().any(|d| d.is_changed() && !d.is_added())
+            || strands.iter().any(|m| m.is_changed() && !m.is_added())
+    };
+    if step.index == 0 && ledger.water_in > 0.0 && written() {
+        let counted = droplets.iter().map(|d| d.counted.0).sum::<f64>()
+            + strands.iter().map(|m| m.counted()).sum::<f64>();
+        let lost = ledger.water_in - ledger.water_out - counted;
+        ledger.book(-lost);
     }
 }
 
 /// At the end of a tick: what there is, summed in the order of the entities.
 fn close_books(
     step: Res<HairStep>,
-    droplets: Query<&Droplet>,
-    strands: Query<&Moisture>,
+    droplets: Query<&Droplet, Allow<Disabled>>,
+    strands: Query<&Moisture, Allow<Disabled>>,
     mut ledger: ResMut<WaterLedger>,
 ) {
     if step.index + 1 == step.count && ledger.water_in > 0.0 {
-        ledger.held = droplets.iter().map(|d| d.counted).sum::<f64>()
+        ledger.held = droplets.iter().map(|d| d.counted.0).sum::<f64>()
             + strands.iter().map(Moisture::volume).sum::<f64>();
     }
 }

@@ -289,4 +289,38 @@ mod tests {
             prop_assert!((after - before).abs() < 1e-12 * before.max(1e-12));
         }
     }
+
+    #[test]
+    fn films_flow_the_same_way_whichever_end_is_the_root() {
+        let (wetting, air) = (Wetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
+        let around = around(wetting, &air, 1.0);
+        let lengths: Vec<f32> = (0..8).map(|i| 0.02 + 0.003 * i as f32).collect();
+        // Up and down, so that films run to and fro.
+        let mut points = vec![Vec3::ZERO];
+        for (i, l) in lengths.iter().enumerate() {
+            let slope = Vec3::new(1.0, [-1.0, 0.5, -0.3][i % 3], 0.0).normalize();
+            points.push(points[i] + slope * *l);
+        }
+        let back = |v: &[f32]| v.iter().rev().copied().collect::<Vec<_>>();
+        let turned: Vec<Vec3> = points.iter().rev().copied().collect();
+        let [mut forth, mut reverse] = [Moisture::default(), Moisture::default()];
+        [&mut forth, &mut reverse].into_iter().for_each(|m| _ = m.fit(9));
+        for i in 0..9 {
+            let film = 1e-9 * (1.0 + (i * 5 % 7) as f64);
+            forth.add_film(i, film);
+            reverse.add_film(8 - i, film);
+        }
+        let energy = |m: &Moisture| -> f64 {
+            m.film().iter().zip(&points).map(|(film, p)| film * f64::from(p.y)).sum()
+        };
+        let before = energy(&forth);
+        for _ in 0..90 {
+            forth.flow(&points, &lengths, &around);
+            reverse.flow(&turned, &back(&lengths), &around);
+        }
+        for (i, (a, b)) in forth.film().iter().zip(reverse.film().iter().rev()).enumerate() {
+            assert!((a - b).abs() < 1e-15, "node {i}: {a} and {b}");
+        }
+        assert!(energy(&forth) < before, "down on the whole");
+    }
 }

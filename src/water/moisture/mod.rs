@@ -8,6 +8,7 @@ mod flow;
 
 pub use flow::{Exposure, Left, Surroundings};
 
+use super::Counted;
 use crate::environment::vapour::WATER;
 use crate::{parallel::prefetch, setting::setting};
 use bevy::prelude::*;
@@ -98,7 +99,8 @@ impl Wetting {
 /// hair costs nothing, and its hydrogen bonds are left to [`Treat`](crate::Treat) and equation 19.
 ///
 /// Where there is water, hydrogen bonds follow it. The tick writes it; to wet hair from game code
-/// spawn a [`Droplet`](crate::Droplet) or send a [`SoakHair`](crate::SoakHair).
+/// spawn a [`Droplet`](crate::Droplet) or send a [`SoakHair`](crate::SoakHair). A clone brings its water
+/// into the world: the [`WaterLedger`](crate::WaterLedger) counts it as it appears.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Moisture {
@@ -106,6 +108,9 @@ pub struct Moisture {
     bound: Vec<f64>,
     wetness: Vec<f32>,
     sheen: Vec<f32>,
+    /// How much of it the ledger knows (m³).
+    #[reflect(ignore)]
+    counted: Counted,
 }
 
 /// Share of the film that a node can hold at which it looks wet all over.
@@ -153,6 +158,7 @@ impl Moisture {
         self.bound.resize(nodes, 0.0);
         self.wetness.resize(nodes, 0.0);
         self.sheen.resize(nodes, 0.0);
+        self.counted.0 -= lost;
         lost
     }
 
@@ -196,12 +202,12 @@ impl Moisture {
 
     pub(super) fn add_film(&mut self, node: usize, volume: f64) {
         self.film[node] += volume;
+        self.counted.0 += volume;
     }
 
     /// Brings bound water to a share of what each node can bind and takes the film off. Returns how
     /// much more there is than before.
     pub(super) fn soak(&mut self, share: f32, capacities: impl Iterator<Item = f64>) -> f64 {
-        let before = self.volume();
         self.film.fill(0.0);
         for ((bound, wetness), capacity) in
             self.bound.iter_mut().zip(&mut self.wetness).zip(capacities)
@@ -209,7 +215,7 @@ impl Moisture {
             *bound = capacity * f64::from(share);
             *wetness = share;
         }
-        self.volume() - before
+        self.recount()
     }
 
     /// Puts other water in the place of what there is: film and bound water (m³) of each node, or
@@ -223,16 +229,34 @@ impl Moisture {
         wetting: &Wetting,
         gravity: f32,
     ) -> f64 {
-        let before = self.volume();
+        let counted = core::mem::take(&mut self.counted);
         let held = super::model::clinging(wetting.bundle(1.0), gravity);
-        *self = Self { film: film.to_vec(), bound: bound.to_vec(), ..default() };
+        *self = Self { film: film.to_vec(), bound: bound.to_vec(), counted, ..default() };
         for ((film, bound), length) in film.iter().zip(bound).zip(node_lengths(lengths)) {
             let capacity = wetting.capacity() * f64::from(length);
             let wetness = ((bound / capacity) as f32).clamp(0.0, 1.0);
             self.wetness.push(wetness);
             self.sheen.push(sheen(*film, wetness, held));
         }
-        self.volume() - before
+        self.recount()
+    }
+
+    /// Takes its water as known to the ledger. Returns how much of it was not (m³); less than nothing
+    /// where there is less than was known.
+    pub(super) fn recount(&mut self) -> f64 {
+        let volume = self.volume();
+        volume - core::mem::replace(&mut self.counted, Counted(volume)).0
+    }
+
+    /// How much of its water the ledger knows (m³).
+    pub(super) fn counted(&self) -> f64 {
+        self.counted.0
+    }
+
+    /// What goes with it as it goes (m³). The ledger knows nothing of it afterwards: who has taken it
+    /// off an entity may insert it elsewhere.
+    pub(super) fn forget(&mut self) -> f64 {
+        core::mem::take(&mut self.counted).0
     }
 
     /// Asks for its memory.

@@ -1,0 +1,234 @@
+//! `Interaction`: droplets that touch become one.
+
+use super::{Droplet, DropletRules, model::ball_radius};
+use crate::schedule::HairStep;
+use bevy::{platform::collections::HashMap, prelude::*};
+
+/// How many drops that it cannot join one drop looks at in a tick. Drops that do not touch are never so
+/// many in a place; drops that would be too large together may be.
+const FRUITLESS: usize = 64;
+
+/// Drops of less have run out, they go by themselves (m³).
+const LEAST: f64 = *Droplet::VOLUME.valid.start() as f64;
+
+/// What is larger than one drop may be does not come together (m³).
+const MOST: f64 = *Droplet::VOLUME.valid.end() as f64;
+
+/// The farthest cell from the origin; beyond all share it.
+const FAR: Vec3 = Vec3::splat(1e9);
+
+/// Once a tick: droplets that touch become one, where the larger was.
+pub(super) fn merge_droplets(
+    mut commands: Commands,
+    step: Res<HairStep>,
+    rules: Res<DropletRules>,
+    mut droplets: Query<(Entity, &mut Droplet)>,
+    mut merging: Local<Merging>,
+) {
+    if step.index != 0 || !rules.merging || droplets.iter().len() < 2 {
+        return;
+    }
+    let mut drops: Vec<(Entity, Mut<'_, Droplet>)> = droplets.iter_mut().collect();
+    for [into, from] in merging.pairs(drops.iter().map(|(_, d)| (d.position, d.volume))) {
+        if let Ok([(_, into), (entity, from)]) = drops.get_disjoint_mut([*into, *from]) {
+            into.bypass_change_detection().merge(from.bypass_change_detection());
+            commands.entity(*entity).despawn();
+        }
+    }
+}
+
+/// Finds the drops that touch, from the largest down: every drop looks only among those that are as
+/// large or larger and have not gone into another, in cells as wide as these are. So the cost is that
+/// of the drops which are left, however many lie in one place.
+#[derive(Default)]
+pub(super) struct Merging {
+    /// Place, radius, and volume with what has come to it.
+    drops: Vec<(Vec3, f32, f64)>,
+    order: Vec<usize>,
+    /// The radius of the largest drop of each level; in a level are drops of up to half of it.
+    levels: Vec<f32>,
+    /// The drop that came last into a cell of a level.
+    cells: HashMap<(usize, IVec3), usize>,
+    /// For each drop the one that came into its cell before it; itself for the first one.
+    before: Vec<usize>,
+    pairs: Vec<[usize; 2]>,
+    /// How many drops were looked at.
+    looked_at: usize,
+}
+
+impl Merging {
+    /// Pairs of a drop and a smaller one that goes into it, of drops with place and volume (m³).
+    pub fn pairs(&mut self, drops: impl Iterator<Item = (Vec3, f64)>) -> &[[usize; 2]] {
+        self.drops.clear();
+        self.drops.extend(drops.map(|(place, volume)| (place, ball_radius(volume), volume)));
+        let Self { drops, order, levels, cells, before, pairs, looked_at } = self;
+        *looked_at = 0;
+        levels.clear();
+        cells.clear();
+        pairs.clear();
+        before.clear();
+        before.extend(0..drops.len());
+        order.clear();
+        let counts = |i: &usize| drops[*i].2 >= LEAST && drops[*i].0.is_finite();
+        order.extend((0..drops.len()).filter(counts));
+        // Equal ones in the order of their entities, which is the same everywhere.
+        order.sort_unstable_by(|a, b| drops[*b].2.total_cmp(&drops[*a].2).then(a.cmp(b)));
+        for &i in &*order {
+            let (place, radius, volume) = drops[i];
+            let taker = levels.iter().enumerate().find_map(|(level, &largest)| {
+                let reach = radius + largest;
+                let [low, high] = [-reach, reach].map(|by| cell(place + by, largest));
+                let mut fruitless = 0;
+                for z in low.z..=high.z {
+                    for y in low.y..=high.y {
+                        for x in low.x..=high.x {
+                            let mut next = cells.get(&(level, IVec3::new(x, y, z))).copied();
+                            while let Some(other) = next.filter(|_| fruitless < FRUITLESS) {
+                                *looked_at += 1;
+                                let (center, size, holds) = drops[other];
+                                let near = radius + size;
+                                let touches = center.distance_squared(place) < near * near;
+                                if touches && holds + volume <= MOST {
+                                    return Some(other);
+                                }
+                                fruitless += 1;
+                                next = Some(before[other]).filter(|b| *b != other);
+                            }
+                        }
+                    }
+                }
+                None
+            });
+            if let Some(taker) = taker {
+                drops[taker].2 += volume;
+                pairs.push([taker, i]);
+                continue;
+            }
+            if levels.last().is_none_or(|largest| radius < 0.5 * largest) {
+                levels.push(radius);
+            }
+            let level = levels.len() - 1;
+            if let Some(last) = cells.insert((level, cell(place, levels[level])), i) {
+                before[i] = last;
+            }
+        }
+        pairs
+    }
+}
+
+/// The cell that a place is in, of a level with drops of up to this radius (m): two drops that touch
+/// are at most one cell apart along each axis.
+fn cell(place: Vec3, largest: f32) -> IVec3 {
+    (place / (4.0 * largest)).clamp(-FAR, FAR).floor().as_ivec3()
+}
+
+impl Droplet {
+    /// Takes another drop in, with its momentum.
+    fn merge(&mut self, other: &mut Droplet) {
+        let volume = self.volume + other.volume;
+        let share = (other.volume / volume) as f32;
+        if self.ride.is_none() {
+            self.position = self.position.lerp(other.position, share);
+        }
+        self.velocity = self.velocity.lerp(other.velocity, share);
+        (self.volume, self.counted.0) = (volume, self.counted.0 + other.counted.0);
+        (other.volume, other.counted.0) = (0.0, 0.0);
+        self.r_min = self.r_min.max(other.r_min).max(ball_radius(volume));
+        self.r_max = self.r_max.max(other.r_max).max(1.5 * self.r_min);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+
+    /// Drops of 0.5 to 2 mm strewn over a cube with sides of `size` (m).
+    fn strewn(count: usize, size: f32) -> Vec<(Vec3, f64)> {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
+        let mut share = || random.random_range(0.0..1.0f32);
+        let mut drop = || {
+            let radius = 0.5e-3 + 1.5e-3 * share();
+            (size * Vec3::new(share(), share(), share()), super::super::model::ball_volume(radius))
+        };
+        (0..count).map(|_| drop()).collect()
+    }
+
+    fn looked_at(drops: &[(Vec3, f64)]) -> (usize, usize) {
+        let mut merging = Merging::default();
+        let merged = merging.pairs(drops.iter().copied()).len();
+        (merging.looked_at, merged)
+    }
+
+    #[test]
+    fn sixteen_thousand_drops_in_one_place_cost_no_more_than_spread_out() {
+        const COUNT: usize = 16_000;
+        let (spread, few) = looked_at(&strewn(COUNT, 0.2));
+        let (in_one_place, merged) = looked_at(&strewn(COUNT, 0.0));
+        println!("{spread} looked at ({few} merged), {in_one_place} in one place");
+        assert!(few > 100 && merged == COUNT - 1);
+        assert!(in_one_place <= 10 * spread && in_one_place <= 2 * COUNT);
+        // Drops that are too large together stay, and are not all looked at by all.
+        let full: Vec<_> = strewn(COUNT, 0.0).iter().map(|(at, _)| (*at, 0.9e-3)).collect();
+        let (fruitless, none) = looked_at(&full);
+        assert!(none == 0 && fruitless <= FRUITLESS * COUNT, "{fruitless}");
+        // One as large as a melon does not have all others look at each other.
+        let mut among = strewn(COUNT, 0.2);
+        among.push((Vec3::splat(0.1), 0.9e-3));
+        assert!(looked_at(&among).0 < 2 * (spread + COUNT));
+    }
+
+    #[test]
+    fn no_drop_grows_beyond_the_bound() {
+        assert_eq!(looked_at(&[(Vec3::ZERO, 0.6e-3), (Vec3::ZERO, 0.6e-3)]).1, 0);
+        let mut merging = Merging::default();
+        let three = [(Vec3::ZERO, 0.3e-3), (Vec3::X * 0.01, 0.5e-3), (Vec3::ZERO, 0.3e-3)];
+        assert_eq!(merging.pairs(three.into_iter()), [[1, 0]]);
+    }
+
+    #[test]
+    fn drops_that_merge_share_one_velocity() {
+        let ball = |x: f32, volume| Droplet::new(Vec3::X * x, volume).unwrap();
+        let mut a = ball(0.0, 3e-9).with_velocity(Vec3::X).unwrap();
+        let mut b = ball(1e-3, 1e-9).with_velocity(Vec3::X * -3.0 + Vec3::Y * 4.0).unwrap();
+        a.merge(&mut b);
+        assert!(a.velocity.distance(Vec3::Y) < 1e-6, "momentum is kept: {}", a.velocity);
+        assert!((a.volume - 4e-9).abs() < 1e-20 && b.volume == 0.0);
+        assert!(a.position.distance(Vec3::X * 0.25e-3) < 1e-9);
+    }
+
+    proptest! {
+        #[test]
+        fn every_drop_that_is_left_touches_no_other(
+            raw in proptest::collection::vec(
+                (0.0f32..1.0, 0.0f32..1.0, 0.0f32..1.0, 1e-4f32..0.1), 1..60
+            ),
+            size in 0.1f32..1.0,
+        ) {
+            let drops: Vec<(Vec3, f64)> = raw
+                .iter()
+                .map(|&(x, y, z, r)| (size * Vec3::new(x, y, z), super::super::model::ball_volume(0.5 * r)))
+                .collect();
+            let mut merging = Merging::default();
+            let pairs = merging.pairs(drops.iter().copied()).to_vec();
+            let gone: Vec<usize> = pairs.iter().map(|p| p[1]).collect();
+            let touch = |i: usize, j: usize| {
+                let near = ball_radius(drops[i].1) + ball_radius(drops[j].1);
+                drops[i].0.distance(drops[j].0) < near - 1e-6
+            };
+            for [into, from] in &pairs {
+                prop_assert!(drops[*into].1 >= drops[*from].1);
+                prop_assert!(!gone.contains(into), "what takes a drop in stays");
+            }
+            let left: Vec<usize> = (0..drops.len()).filter(|i| !gone.contains(i)).collect();
+            for (k, &i) in left.iter().enumerate() {
+                for &j in &left[..k] {
+                    let full = merging.drops[i].2 + drops[j].1 > MOST
+                        || merging.drops[j].2 + drops[i].1 > MOST;
+                    prop_assert!(!touch(i, j) || full, "{} and {}", i, j);
+                }
+            }
+        }
+    }
+}

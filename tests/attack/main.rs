@@ -1,0 +1,388 @@
+//! What inspectors, scene files and careless game code may do to a world with hair: no panic, no
+//! strand that stays non-finite.
+//!
+//! `cargo test --release --test attack -- --ignored` goes on for a million operations.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod operations;
+
+use bevy::{prelude::*, reflect::ReflectMut};
+use bevy_keratin::{BondChanges, DropletRules, FaultKind, SoakHair, prelude::*};
+use common::*;
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+
+#[test]
+fn a_haircut_by_another_strand_keeps_the_bonds_of_what_is_left() {
+    let mut app = test_app(60.0);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    run(&mut app, 0.2);
+    app.world_mut().get_mut::<Bonds>(id).unwrap().joints[2].shapes = [Vec3::X * 0.1; 4];
+    app.world_mut().write_message(Treat::wet(hair));
+    run(&mut app, 0.1);
+    for segments in [5, 11] {
+        let points: Vec<Vec3> = (0..=segments).map(|i| Vec3::X * 0.03 * i as f32).collect();
+        let cut = Strand::from_polyline(&points).unwrap();
+        app.world_mut().entity_mut(id).insert(cut);
+        app.update();
+        let bonds = app.world().get::<Bonds>(id).unwrap();
+        assert_eq!(bonds.joints.len(), segments);
+        assert_eq!(bonds.joints[2].shapes[3], Vec3::X * 0.1, "the kept part remembers");
+        let before = strand(&app, id).positions().to_vec();
+        run(&mut app, 0.2);
+        assert!(
+            strand(&app, id).positions()[segments].distance(before[segments]) > 1e-3,
+            "it falls"
+        );
+        assert!(strand(&app, id).is_finite());
+    }
+    assert_eq!(faults(&mut app), []);
+}
+
+#[test]
+fn requests_for_joints_that_no_strand_has_do_nothing() {
+    let mut changes = BondChanges::default();
+    changes.ask(usize::MAX, BondKind::Hydrogen, -1.0);
+    changes.ask(100_000_000, BondKind::Hydrogen, -1.0);
+    assert!(changes.is_empty());
+    changes.ask(3, BondKind::Hydrogen, -1.0);
+    assert!(!changes.is_empty());
+}
+
+#[test]
+fn a_shower_that_owes_too_much_is_told_and_goes_on() {
+    for owed in [f32::NAN, 1e12, -1e12] {
+        let mut app = test_app(60.0);
+        let shower = Shower { owed, ..Shower::new(120.0, 1.5e-3).unwrap() };
+        app.world_mut().spawn((shower, Transform::from_xyz(0.0, 1.0, 0.0)));
+        run(&mut app, 0.1);
+        let drops = app.world_mut().query::<&Droplet>().iter(app.world()).count();
+        assert!((10..16).contains(&drops), "{drops} drops from {owed}");
+    }
+}
+
+#[test]
+fn what_is_written_into_a_strands_private_parts_is_mended_and_told() {
+    let mut app = test_app(60.0);
+    let (_, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    run(&mut app, 0.1);
+    for (part, value) in [("rest_lengths", f32::NAN), ("velocities", 0.0), ("tensions", 0.0)] {
+        {
+            let mut strand = app.world_mut().get_mut::<Strand>(id).unwrap();
+            let ReflectMut::Struct(parts) = strand.reflect_mut() else { panic!() };
+            let ReflectMut::List(list) = parts.field_mut(part).unwrap().reflect_mut() else {
+                panic!()
+            };
+            if value.is_nan() {
+                *list.get_mut(3).unwrap().try_downcast_mut::<f32>().unwrap() = value;
+            } else {
+                list.pop();
+            }
+        }
+        run(&mut app, 0.2);
+        let told = faults(&mut app);
+        assert!(matches!(&told[..], [f] if f.kind == FaultKind::Strand), "{part}: {told:?}");
+        assert!(strand(&app, id).is_finite() && strand(&app, id).peak_strain() < 0.01);
+    }
+}
+
+/// The ledger's error is below `1e-9` in each of the next ticks.
+fn nothing_is_lost(app: &mut App, after: &str) {
+    for _ in 0..5 {
+        app.update();
+        let ledger = app.world().resource::<WaterLedger>();
+        assert!(ledger.error() < 1e-9, "after {after}: {:.1e}, {ledger:?}", ledger.error());
+    }
+}
+
+#[test]
+fn clones_bring_their_water_into_the_world() {
+    let mut app = test_app(60.0);
+    let (hair, first) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    let points: Vec<Vec3> = (0..9).map(|i| Vec3::new(0.03 * i as f32, 0.0, 0.1)).collect();
+    let second = (StrandOf(hair), Strand::from_polyline(&points).unwrap());
+    let second = app.world_mut().spawn(second).id();
+    // Nothing dries or moves away, so that all is to be seen.
+    let still = Wetting { evaporation: 0.0, uptake: 0.0, sliding: 0.0, ..default() };
+    app.insert_resource(HairDefault(still));
+    app.insert_resource(ProcessTime(0.0));
+    app.insert_resource(DropletRules { merging: false, ..default() });
+    app.world_mut().write_message(SoakHair { target: first, wetness: 0.7 });
+    let drop = Droplet::new(Vec3::new(0.1, 0.02, 0.0), 4e-9).unwrap();
+    let drop = app.world_mut().spawn(drop).id();
+    nothing_is_lost(&mut app, "the first water");
+    let known = |app: &App| *app.world().resource::<WaterLedger>();
+    let soaked = app.world().get::<Moisture>(first).unwrap().volume();
+    assert!((known(&app).held / (soaked + 4e-9) - 1.0).abs() < 1e-9);
+
+    let before = known(&app);
+    let clone = app.world_mut().entity_mut(first).clone_and_spawn();
+    nothing_is_lost(&mut app, "a strand's clone");
+    assert!(((known(&app).water_in - before.water_in) / soaked - 1.0).abs() < 1e-9);
+    app.world_mut().despawn(clone);
+    nothing_is_lost(&mut app, "the clone's end");
+    assert!(((known(&app).water_out - before.water_out) / soaked - 1.0).abs() < 1e-9);
+
+    // A clone that no tick has seen leaves no trace.
+    let before = known(&app);
+    let clone = app.world_mut().entity_mut(first).clone_and_spawn();
+    app.world_mut().despawn(clone);
+    nothing_is_lost(&mut app, "a short life");
+    assert_eq!(known(&app).water_in, before.water_in);
+
+    let moisture = app.world().get::<Moisture>(first).unwrap().clone();
+    app.world_mut().entity_mut(second).insert(moisture.clone());
+    nothing_is_lost(&mut app, "moisture on another strand");
+    app.world_mut().entity_mut(second).insert(moisture);
+    nothing_is_lost(&mut app, "the same again");
+    let taken = app.world_mut().entity_mut(second).take::<Moisture>().unwrap();
+    nothing_is_lost(&mut app, "moisture that is taken off");
+    app.world_mut().entity_mut(second).insert(taken);
+    nothing_is_lost(&mut app, "and put on again");
+    *app.world_mut().get_mut::<Moisture>(second).unwrap() = Moisture::default();
+    nothing_is_lost(&mut app, "moisture that is assigned");
+
+    let before = known(&app);
+    app.world_mut().entity_mut(drop).clone_and_spawn();
+    nothing_is_lost(&mut app, "a droplet's clone");
+    assert!(((known(&app).water_in - before.water_in) / 4e-9 - 1.0).abs() < 1e-9);
+    let copy = app.world().get::<Droplet>(drop).unwrap().clone();
+    app.world_mut().spawn_batch([copy.clone(), copy.clone(), copy.clone()]);
+    nothing_is_lost(&mut app, "droplets' copies");
+    app.world_mut().entity_mut(drop).insert(copy.clone());
+    nothing_is_lost(&mut app, "a droplet in its own place");
+    let taken = app.world_mut().entity_mut(drop).take::<Droplet>().unwrap();
+    app.world_mut().spawn(taken);
+    nothing_is_lost(&mut app, "a droplet that changes its entity");
+    let mut another = copy;
+    another.volume = 9e-9;
+    let mut drops = app.world_mut().query::<&mut Droplet>();
+    *drops.iter_mut(app.world_mut()).next().unwrap() = another;
+    nothing_is_lost(&mut app, "a droplet that is assigned");
+    app.world_mut().entity_mut(first).insert(bevy::ecs::entity_disabling::Disabled);
+    nothing_is_lost(&mut app, "a strand that is disabled");
+    app.world_mut().despawn(first);
+    nothing_is_lost(&mut app, "and despawned");
+    app.world_mut().despawn(hair);
+    nothing_is_lost(&mut app, "all hair's end");
+}
+
+#[test]
+fn moisture_that_is_written_into_is_counted() {
+    let mut app = test_app(60.0);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.world_mut().write_message(SoakHair { target: hair, wetness: 0.5 });
+    nothing_is_lost(&mut app, "soaking");
+    for (part, value) in [("film", 5e-9), ("bound", 0.0), ("bound", f64::NAN), ("film", -1.0)] {
+        {
+            let mut moisture = app.world_mut().get_mut::<Moisture>(id).unwrap();
+            let ReflectMut::Struct(parts) = moisture.reflect_mut() else { panic!() };
+            let ReflectMut::List(list) = parts.field_mut(part).unwrap().reflect_mut() else {
+                panic!()
+            };
+            *list.get_mut(3).unwrap().try_downcast_mut::<f64>().unwrap() = value;
+        }
+        nothing_is_lost(&mut app, &format!("{part} of {value}"));
+    }
+}
+
+/// The faults of two seconds.
+fn told_in_two_seconds(app: &mut App) -> Vec<HairFault> {
+    run(app, 2.0);
+    faults(app)
+}
+
+#[test]
+fn what_goes_on_is_told_once() {
+    // Two drops that would be too large for one.
+    let mut app = test_app(60.0);
+    for _ in 0..2 {
+        app.world_mut().spawn(Droplet::new(Vec3::Y, 0.8e-3).unwrap());
+    }
+    assert_eq!(told_in_two_seconds(&mut app), []);
+    assert_eq!(app.world_mut().query::<&Droplet>().iter(app.world()).count(), 2);
+
+    // Drops that fall out of the world where nobody bounds it.
+    let mut app = test_app(60.0);
+    let [min, max] = [Vec3::NEG_INFINITY, Vec3::INFINITY];
+    app.insert_resource(DropletRules { min, max, ..default() });
+    app.insert_resource(HairGravity(Vec3::Y * -1e6));
+    app.world_mut().spawn(Droplet::new(Vec3::ZERO, 1e-3).unwrap());
+    app.world_mut().spawn(Droplet::new(Vec3::Y * -999_999.0, 1e-3).unwrap());
+    run(&mut app, 0.05);
+    let _ = faults(&mut app);
+    assert_eq!(told_in_two_seconds(&mut app), []);
+
+    // Hair at the end of the world, dry and wet.
+    let mut app = test_app(60.0);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.insert_resource(DropletRules { min, max, ..default() });
+    app.world_mut().spawn(Droplet::new(Vec3::X * 0.1, 4e-9).unwrap());
+    app.world_mut().write_message(SoakHair { target: hair, wetness: 0.5 });
+    run(&mut app, 0.1);
+    let _ = faults(&mut app);
+    for far in [1e7, 1e30, 1e38] {
+        app.world_mut().get_mut::<Transform>(hair).unwrap().translation.x = far;
+        let told = told_in_two_seconds(&mut app);
+        println!("at {far} m: {told:?}");
+        assert!(told.len() <= 1, "at {far} m: {told:?}");
+        assert!(strand(&app, id).is_finite());
+    }
+}
+
+#[test]
+fn a_drop_that_is_too_fast_is_told_its_speed() {
+    let told = Droplet::default().with_velocity(Vec3::NEG_Y * 5000.0).unwrap_err().to_string();
+    assert!(told.contains("velocity") && told.contains("-5000"), "{told}");
+    let mut app = test_app(60.0);
+    let drop = app.world_mut().spawn(Droplet::new(Vec3::ZERO, 1e-9).unwrap()).id();
+    app.update();
+    app.world_mut().get_mut::<Droplet>(drop).unwrap().velocity.y = -5000.0;
+    let told = told_in_two_seconds(&mut app);
+    assert!(matches!(&told[..], [f] if f.message.contains("is -5000, expected")), "{told:?}");
+}
+
+#[test]
+fn very_fine_strands_are_held_together_and_told() {
+    let mut app = test_app(60.0);
+    let hair = app.world_mut().spawn(Hair).id();
+    for k in 0..6 {
+        let points: Vec<Vec3> =
+            (0..300).map(|i| Vec3::new(5e-4 * i as f32, 0.0, 7e-4 * k as f32)).collect();
+        app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    let mut strands = app.world_mut().query::<&Strand>();
+    let mut most = 0.0_f32;
+    for _ in 0..10 {
+        app.update();
+        most = strands.iter(app.world()).map(Strand::peak_strain).fold(most, f32::max);
+    }
+    println!("peak strain {most}");
+    assert!(most < 0.03, "{most}");
+    let told = faults(&mut app);
+    assert!(
+        matches!(&told[..], [f] if f.kind == FaultKind::Strand && f.message.contains("0.500 mm")),
+        "{told:?}"
+    );
+}
+
+#[test]
+fn requests_reach_hair_whose_list_of_strands_was_written_into() {
+    let mut app = test_app(60.0);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    run(&mut app, 0.1);
+    {
+        let mut strands = app.world_mut().get_mut::<Strands>(hair).unwrap();
+        let ReflectMut::TupleStruct(parts) = strands.reflect_mut() else { panic!() };
+        let ReflectMut::List(list) = parts.field_mut(0).unwrap().reflect_mut() else { panic!() };
+        list.insert(0, Box::new(Entity::PLACEHOLDER));
+    }
+    for request in [Hair::teleport, Hair::reset, Hair::restyle] {
+        app.world_mut().commands().entity(hair).queue(request);
+        run(&mut app, 0.1);
+    }
+    assert!(strand(&app, id).is_finite());
+}
+
+#[test]
+fn springs_that_were_shaken_against_a_head_are_whole_again() {
+    for together in [true, false] {
+        let mut app = test_app(60.0);
+        let hair = app.world_mut().spawn((Hair, StrandModel::MassSpring)).id();
+        let head =
+            app.world_mut().spawn((HairCollider::sphere(0.09).unwrap(), Transform::default())).id();
+        if together {
+            app.world_mut().entity_mut(head).insert(ChildOf(hair));
+        }
+        for i in 0..24 {
+            let (sine, cosine) = (0.26 * i as f32).sin_cos();
+            let out = Vec3::new(cosine, 0.3, sine).normalize();
+            let points: Vec<Vec3> = (0..9).map(|k| out * (0.092 + 0.03 * k as f32)).collect();
+            app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+        }
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+        let mut strands = app.world_mut().query::<&Strand>();
+        let mut torn = 0.0_f32;
+        for _ in 0..120 {
+            let place = Vec3::from_array([(); 3].map(|()| random.random_range(-0.4..0.4)));
+            app.world_mut().get_mut::<Transform>(hair).unwrap().translation = place;
+            app.update();
+            torn = strands.iter(app.world()).map(Strand::peak_strain).fold(torn, f32::max);
+        }
+        app.world_mut().get_mut::<Transform>(hair).unwrap().translation = Vec3::ZERO;
+        run(&mut app, 3.0);
+        let strain = strands.iter(app.world()).map(Strand::peak_strain).fold(0.0, f32::max);
+        println!("{torn} while it was shaken, {strain} after");
+        assert!(strain < 0.05, "{strain}");
+    }
+}
+
+/// A world with two heads of hair.
+fn world() -> App {
+    let mut app = test_app(60.0);
+    for x in [0.0, 1.0] {
+        let hair = app.world_mut().spawn((Hair, Transform::from_xyz(x, 0.0, 0.0))).id();
+        for i in 0..8 {
+            let points: Vec<Vec3> =
+                (0..9).map(|k| Vec3::new(0.02 * k as f32, 0.0, 0.01 * i as f32)).collect();
+            app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+        }
+    }
+    app
+}
+
+/// Operations on worlds of which each gets a thousand.
+fn attack(seed: u64, operations: usize) {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (mut done, mut app) = (Vec::new(), world());
+    for i in 0..operations {
+        if i % 1000 == 0 {
+            (done, app) = (Vec::new(), world());
+        }
+        done.push(operations::one(&mut app, &mut random));
+        let told = |done: &[String]| {
+            format!(
+                "seed {seed}, operation {i}, after {:#?}",
+                &done[done.len().saturating_sub(8)..]
+            )
+        };
+        if random.random_range(0..3) == 0 {
+            let ticked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| app.update()));
+            assert!(ticked.is_ok(), "{}", told(&done));
+            let ledger = app.world().resource::<WaterLedger>();
+            assert!(ledger.error() < 1e-9, "{}: {ledger:?}", told(&done));
+        }
+        if i % 100 == 99 {
+            // What has been spoilt by settings may still be on its way back.
+            (0..4).for_each(|_| app.update());
+            let _ = faults(&mut app);
+            for _ in 0..4 {
+                app.update();
+                if let Some(found) = operations::not_finite(&mut app) {
+                    panic!("{}: {found}", told(&done));
+                }
+            }
+            let again = faults(&mut app);
+            for (k, fault) in again.iter().enumerate() {
+                assert!(!again[..k].contains(fault), "{}: told again: {fault}", told(&done));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_world_that_anything_is_done_to_goes_on() {
+    for seed in 0..4 {
+        attack(seed, 2000);
+    }
+}
+
+#[test]
+#[ignore = "takes minutes: a million operations"]
+fn a_world_that_anything_is_done_to_goes_on_for_long() {
+    // SEED is where to go on.
+    let first = std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(100);
+    for seed in first..first + 20 {
+        attack(seed, 50_000);
+    }
+}

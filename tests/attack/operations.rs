@@ -1,0 +1,382 @@
+//! The operations: what users, inspectors and scene files may do to a world.
+
+use bevy::{
+    ecs::{
+        entity_disabling::Disabled,
+        query::QueryFilter,
+        reflect::{AppTypeRegistry, ReflectComponent},
+        resource::IsResource,
+    },
+    prelude::*,
+    reflect::{PartialReflect, ReflectMut, ReflectRef},
+};
+use bevy_keratin::{
+    BondChanges, HairLod, HairSleep, HairSubsteps, SoakHair, WindReceived, prelude::*,
+};
+use rand::{RngExt, rngs::Xoshiro256PlusPlus, seq::IndexedRandom};
+
+type Random = Xoshiro256PlusPlus;
+
+const WRONG: [f32; 12] = [
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    0.0,
+    -0.0,
+    -1.0,
+    1e-30,
+    1e30,
+    f32::MAX,
+    1.0,
+    0.37,
+    1e6,
+];
+
+/// Writes something into a part of a value, however deep. Says where.
+fn spoil(value: &mut dyn PartialReflect, random: &mut Random) -> String {
+    let wrong = *WRONG.choose(random).unwrap();
+    let small = random.random_range(0..20_u64);
+    let count = if small == 19 { u64::MAX } else { small };
+    macro_rules! put {
+        ($($number:ty: $wrong:expr),*) => {
+            $(if let Some(number) = value.try_downcast_mut::<$number>() {
+                *number = $wrong;
+                return format!(" = {number}");
+            })*
+        };
+    }
+    put!(
+        f32: wrong, f64: wrong.into(), u32: count as u32, u64: count, usize: count as usize,
+        bool: small < 10, Entity: Entity::PLACEHOLDER
+    );
+    let name = value.reflect_type_path().to_owned();
+    let at = |len: usize, random: &mut Random| (len > 0).then(|| random.random_range(0..len));
+    let inside = match value.reflect_mut() {
+        ReflectMut::Struct(parts) => at(parts.field_len(), random).map(|i| {
+            let field = parts.name_at(i).unwrap_or_default().to_owned();
+            format!(".{field}{}", spoil(parts.field_at_mut(i).unwrap(), random))
+        }),
+        ReflectMut::TupleStruct(parts) => at(parts.field_len(), random)
+            .map(|i| format!(".{i}{}", spoil(parts.field_mut(i).unwrap(), random))),
+        ReflectMut::Tuple(parts) => at(parts.field_len(), random)
+            .map(|i| format!(".{i}{}", spoil(parts.field_mut(i).unwrap(), random))),
+        ReflectMut::Array(parts) => at(parts.len(), random)
+            .map(|i| format!("[{i}]{}", spoil(parts.get_mut(i).unwrap(), random))),
+        ReflectMut::Enum(parts) => at(parts.field_len(), random)
+            .map(|i| format!(".{i}{}", spoil(parts.field_at_mut(i).unwrap(), random))),
+        ReflectMut::List(list) if small < 5 => list.pop().map(|_| ".pop()".to_owned()),
+        ReflectMut::List(list) if small == 5 => {
+            list.drain();
+            Some(".clear()".to_owned())
+        }
+        ReflectMut::List(list) => at(list.len(), random)
+            .map(|i| format!("[{i}]{}", spoil(list.get_mut(i).unwrap(), random))),
+        _ => None,
+    };
+    inside.unwrap_or(name)
+}
+
+/// Where a number is not finite, if one is.
+fn search(value: &dyn PartialReflect) -> Option<String> {
+    if let Some(number) = value.try_downcast_ref::<f32>() {
+        return (!number.is_finite()).then(|| format!(" = {number}"));
+    }
+    if let Some(number) = value.try_downcast_ref::<f64>() {
+        return (!number.is_finite()).then(|| format!(" = {number}"));
+    }
+    let each = |i: usize, part: &dyn PartialReflect| search(part).map(|at| format!(".{i}{at}"));
+    match value.reflect_ref() {
+        ReflectRef::Struct(parts) => {
+            parts.iter_fields().find_map(|(name, part)| Some(format!(".{name}{}", search(part)?)))
+        }
+        ReflectRef::TupleStruct(parts) => {
+            parts.iter_fields().enumerate().find_map(|(i, part)| each(i, part))
+        }
+        ReflectRef::Tuple(parts) => parts.iter_fields().enumerate().find_map(|(i, p)| each(i, p)),
+        ReflectRef::Array(parts) => parts.iter().enumerate().find_map(|(i, part)| each(i, part)),
+        ReflectRef::List(parts) => parts.iter().enumerate().find_map(|(i, part)| each(i, part)),
+        ReflectRef::Enum(parts) => {
+            parts.iter_fields().enumerate().find_map(|(i, part)| each(i, part.value()))
+        }
+        _ => None,
+    }
+}
+
+/// What the tick keeps and nobody sets.
+const STATE: [&str; 7] =
+    ["Strand", "StrandHistory", "Moisture", "Droplet", "AddedMass", "Bonds", "TickPose"];
+
+/// A number of the world's state that is not finite, if there is one.
+pub fn not_finite(app: &mut App) -> Option<String> {
+    let world = app.world_mut();
+    let registry = world.resource::<AppTypeRegistry>().clone();
+    let registry = registry.read();
+    let hairs: Vec<Entity> = world.query_filtered::<Entity, With<Hair>>().iter(world).collect();
+    let all: Vec<Entity> = world
+        .query_filtered::<Entity, Or<(With<Hair>, With<Droplet>, With<Strand>)>>()
+        .iter(world)
+        .collect();
+    for name in STATE {
+        let component = registry.get_with_short_type_path(name)?.data::<ReflectComponent>()?;
+        for entity in &all {
+            // What belongs to nobody is left as it is.
+            let is_lost = world.get::<StrandOf>(*entity).is_none_or(|of| !hairs.contains(&of.0))
+                && world.get::<Strand>(*entity).is_some();
+            let is_stub = world.get::<Strand>(*entity).is_some_and(|strand| strand.nodes() < 2);
+            if !is_lost
+                && !is_stub
+                && let Some(value) = component.reflect(world.entity(*entity))
+                && let Some(found) = search(value.as_partial_reflect())
+            {
+                return Some(format!("{entity}: {name}{found}"));
+            }
+        }
+    }
+    None
+}
+
+/// Writes into a component, or takes it off. Says which.
+fn write(world: &mut World, entity: Entity, may_go: bool, random: &mut Random) -> String {
+    let registry = world.resource::<AppTypeRegistry>().clone();
+    let registry = registry.read();
+    let components: Vec<_> = (registry.iter())
+        .filter(|t| t.type_info().type_path().starts_with("bevy_keratin"))
+        // Relationships are immutable, and the books are nobody's but the tick's.
+        .filter(|t| {
+            !["StrandOf", "WoundOn", "WaterLedger"]
+                .contains(&t.type_info().type_path_table().ident().unwrap_or_default())
+        })
+        .filter_map(|t| Some((t.type_info().type_path(), t.data::<ReflectComponent>()?)))
+        .filter(|(_, component)| component.contains(world.entity(entity)))
+        .collect();
+    let Some((name, component)) = components.choose(random) else {
+        return "nothing".into();
+    };
+    let mut entity = world.entity_mut(entity);
+    if may_go && random.random_range(0..12) == 0 {
+        component.remove(&mut entity);
+        return format!("without {name}");
+    }
+    match component.reflect_mut(&mut entity) {
+        Some(mut value) => {
+            format!("{name}{}", spoil(value.as_partial_reflect_mut(), random))
+        }
+        None => "nothing".into(),
+    }
+}
+
+fn with<F: QueryFilter>(world: &mut World) -> Vec<Entity> {
+    world.query_filtered::<Entity, F>().iter(world).collect()
+}
+
+/// One operation on the world. Says which.
+pub fn one(app: &mut App, random: &mut Random) -> String {
+    let world = app.world_mut();
+    let (hairs, strands) = (with::<With<Hair>>(world), with::<With<Strand>>(world));
+    let drops = with::<With<Droplet>>(world);
+    let tools = with::<Or<(With<HairCollider>, With<Blower>, With<PermRod>, With<Shower>)>>(world);
+    if drops.len() > 500 {
+        drops[100..].iter().for_each(|drop| _ = world.despawn(*drop));
+        return "most drops gone".into();
+    }
+    let all: Vec<Entity> = [&hairs[..], &strands, &tools, &drops[..drops.len().min(10)]].concat();
+    let (hair, one) = (hairs.choose(random).copied(), strands.choose(random).copied());
+    let (any, drop) = (all.choose(random).copied(), drops.choose(random).copied());
+    let place = Vec3::from_array([(); 3].map(|()| random.random_range(-0.3..0.3)));
+    let wrong = *WRONG.choose(random).unwrap();
+    let line = |segments: usize| {
+        let points: Vec<Vec3> =
+            (0..=segments).map(|i| place * 0.1 + Vec3::X * 0.02 * i as f32).collect();
+        Strand::from_polyline(&points).unwrap()
+    };
+    match (random.random_range(0..42), hair, one, any) {
+        (0, Some(hair), ..) if strands.len() < 40 => {
+            let segments = random.random_range(1..20);
+            world.spawn((StrandOf(hair), line(segments)));
+            format!("a strand of {segments} segments")
+        }
+        (1, _, Some(strand), _) if strands.len() > 8 => {
+            world.despawn(strand);
+            "a strand gone".into()
+        }
+        (2, _, Some(strand), _) if strands.len() < 40 => {
+            world.entity_mut(strand).clone_and_spawn();
+            "a strand cloned".into()
+        }
+        (3, Some(hair), Some(strand), _) => {
+            world.entity_mut(strand).insert(StrandOf(hair));
+            "a strand on another head".into()
+        }
+        (4, _, Some(strand), _) => {
+            world.entity_mut(strand).insert(line(random.random_range(1..12)));
+            "a haircut".into()
+        }
+        (5, Some(hair), ..) => {
+            world.write_message(Treat::wet(hair));
+            "wet".into()
+        }
+        (6, Some(hair), ..) => {
+            world.write_message(Treat::dry(hair).over(wrong.abs()));
+            format!("dry over {}", wrong.abs())
+        }
+        (7, _, Some(strand), _) => {
+            let wetness = random.random_range(0.0..1.0);
+            world.write_message(SoakHair { target: strand, wetness });
+            "soaked".into()
+        }
+        (8, Some(hair), ..) => {
+            world.commands().entity(hair).queue(Hair::teleport);
+            world.get_mut::<Transform>(hair).unwrap().translation = place * 100.0;
+            "a teleport".into()
+        }
+        (9, Some(hair), ..) => {
+            world.get_mut::<Transform>(hair).unwrap().translation += place;
+            "a jump".into()
+        }
+        (10, ..) if tools.len() < 20 => {
+            let at = Transform::from_translation(place);
+            match random.random_range(0..5) {
+                0 => world.spawn((HairCollider::sphere(0.05).unwrap(), at)),
+                1 => world.spawn(PermRod::default()),
+                2 => world.spawn((Shower::new(100.0, 1e-3).unwrap(), at)),
+                3 => world.spawn((HairCollider::plane(Dir3::Y), at)),
+                _ => world.spawn((Blower::default(), at)),
+            };
+            "a tool".into()
+        }
+        (11, ..) if tools.len() > 4 => {
+            world.despawn(*tools.choose(random).unwrap());
+            "a tool gone".into()
+        }
+        (12, Some(hair), ..) => {
+            let model = [StrandModel::Rod, StrandModel::MassSpring][random.random_range(0..2)];
+            world.entity_mut(hair).insert(model);
+            "another model".into()
+        }
+        (13, Some(hair), ..) => {
+            let method = [SolverMethod::Direct, SolverMethod::Sweeps][random.random_range(0..2)];
+            world.entity_mut(hair).insert(HairSolver { method, ..default() });
+            "another solver".into()
+        }
+        (14, ..) => {
+            world.spawn(Droplet::new(place, 3e-8).unwrap());
+            "a drop".into()
+        }
+        (15, ..) if drop.is_some() => {
+            world.entity_mut(drop.unwrap()).clone_and_spawn();
+            "a drop cloned".into()
+        }
+        (16, _, Some(strand), _) => {
+            let other = *strands.choose(random).unwrap();
+            if let Some(moisture) = world.get::<Moisture>(other).cloned() {
+                world.entity_mut(strand).insert(moisture);
+            }
+            "another's moisture".into()
+        }
+        (17, _, Some(strand), _) => {
+            if let Some(moisture) = world.entity_mut(strand).take::<Moisture>() {
+                world.entity_mut(*strands.choose(random).unwrap()).insert(moisture);
+            }
+            "moisture that goes over".into()
+        }
+        (18, Some(hair), ..) => {
+            if let Some(tool) = tools.choose(random)
+                && world.get::<ChildOf>(*tool).is_none()
+            {
+                world.entity_mut(hair).insert(ChildOf(*tool));
+            }
+            "another parent".into()
+        }
+        (19, Some(hair), ..) => {
+            world.entity_mut(hair).remove::<ChildOf>();
+            "no parent".into()
+        }
+        (20, Some(hair), ..) => {
+            let scale = [0.5, 2.0, -1.0, 1.0, 1.0, wrong][random.random_range(0..6)];
+            world.get_mut::<Transform>(hair).unwrap().scale = Vec3::splat(scale);
+            format!("scale {scale}")
+        }
+        (21, Some(hair), ..) => {
+            let mut transform = world.get_mut::<Transform>(hair).unwrap();
+            transform.rotation = Quat::from_axis_angle(Vec3::Y, wrong.min(10.0));
+            transform.translation.y = wrong;
+            format!("height {wrong}")
+        }
+        (22, Some(hair), ..) => {
+            *world.get_mut::<Transform>(hair).unwrap() = Transform::default();
+            "home".into()
+        }
+        (23, _, Some(strand), _) => {
+            let nodes = random.random_range(0..12);
+            let far = place * [1.0, 1.0, wrong][random.random_range(0..3)];
+            let targets = (0..nodes).map(|i| (i % 2 == 0).then_some(far)).collect();
+            world.entity_mut(strand).insert(HeldNodes { targets });
+            format!("{nodes} nodes held at {far}")
+        }
+        (24, _, Some(strand), _) => {
+            world.entity_mut(strand).remove::<HeldNodes>();
+            "let go".into()
+        }
+        (25, _, Some(strand), _) => {
+            if let Some(rod) = tools.iter().find(|tool| world.get::<PermRod>(**tool).is_some()) {
+                world.entity_mut(strand).insert(WoundOn(*rod));
+            }
+            "wound".into()
+        }
+        (26, _, Some(strand), _) => {
+            world.entity_mut(strand).remove::<WoundOn>();
+            "unwound".into()
+        }
+        (27, ..) => {
+            let hertz = random.random_range(20.0..240.0);
+            world.insert_resource(Time::<Fixed>::from_hz(hertz));
+            format!("{hertz} Hz")
+        }
+        (28, ..) => {
+            world.insert_resource(HairSubsteps::default());
+            world.insert_resource(ProcessTime(wrong));
+            format!("process time {wrong}")
+        }
+        (29, _, Some(strand), _) => {
+            if let Some(mut changes) = world.get_mut::<BondChanges>(strand) {
+                let joint = [0, 3, 100, usize::MAX][random.random_range(0..4)];
+                changes.ask(joint, BondKind::Hydrogen, wrong);
+            }
+            format!("bonds by {wrong}")
+        }
+        (30, Some(hair), ..) => {
+            world.entity_mut(hair).insert((HairLod::default(), ScreenShare(0.01)));
+            "far away".into()
+        }
+        (31, Some(hair), ..) => {
+            world.entity_mut(hair).insert(HairSleep::default());
+            "may sleep".into()
+        }
+        (32, _, Some(strand), _) => {
+            world.entity_mut(strand).insert(WindReceived::default());
+            "counts wind".into()
+        }
+        (33, _, Some(strand), _) if strands.len() > 8 => {
+            world.entity_mut(strand).insert(Disabled);
+            "disabled".into()
+        }
+        (34, ..) => {
+            let mut hidden = world.query_filtered::<Entity, With<Disabled>>();
+            let hidden: Vec<Entity> = hidden.iter(world).collect();
+            hidden.iter().for_each(|entity| _ = world.entity_mut(*entity).remove::<Disabled>());
+            "enabled again".into()
+        }
+        (35, ..) => {
+            let resources = with::<With<IsResource>>(world);
+            let ours: Vec<Entity> = resources.into_iter().collect();
+            let entity = *ours.choose(random).unwrap();
+            write(world, entity, false, random)
+        }
+        (36, Some(hair), _, _) if hairs.len() < 4 => {
+            world.entity_mut(hair).clone_and_spawn();
+            "a head cloned".into()
+        }
+        (_, _, _, Some(entity)) => write(world, entity, true, random),
+        _ => "nothing".into(),
+    }
+}
