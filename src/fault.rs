@@ -58,6 +58,8 @@ pub enum FaultKind {
     Groom,
     /// A hairdo that the hair cannot wear: it keeps the one that it has.
     Hairdo,
+    /// Hair that cannot be worn: the wearer stays as it is.
+    Wear,
     /// A request that names something that is not there.
     NoTarget,
 }

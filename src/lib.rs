@@ -35,6 +35,8 @@ pub mod solve;
 pub mod strand;
 pub mod treatment;
 pub mod water;
+#[cfg(feature = "groom")]
+pub mod wear;
 
 pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
 #[cfg(feature = "avian")]
@@ -59,6 +61,8 @@ pub use strand::{
 };
 pub use treatment::{PermRod, Treat, Winding, WoundOn, WoundStrands};
 pub use water::{Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting};
+#[cfg(feature = "groom")]
+pub use wear::{HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair};
 
 /// What most games need.
 pub mod prelude {
@@ -74,6 +78,9 @@ pub mod prelude {
     #[cfg(feature = "save")]
     #[doc(hidden)]
     pub use crate::save::{Hairdo, HairdoError};
+    #[cfg(feature = "groom")]
+    #[doc(hidden)]
+    pub use crate::wear::{HairNotWorn, HairWorn, WearHair, WornHair};
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,

@@ -70,7 +70,8 @@ impl PluginGroup for HairPlugins {
             .add(crate::groom::GroomPlugin)
             .add(crate::plant::PlantPlugin)
             .add(crate::collider_fit::ColliderFitPlugin)
-            .add(crate::attach::AttachPlugin);
+            .add(crate::attach::AttachPlugin)
+            .add(crate::wear::WearPlugin);
         group
     }
 }

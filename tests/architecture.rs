@@ -11,7 +11,7 @@ use std::{
 };
 
 /// Rooms from the ground up: each may import those before it, none after it.
-const FLOORS: [&str; 27] = [
+const FLOORS: [&str; 28] = [
     "fault",
     "setting",
     "parallel",
@@ -35,6 +35,7 @@ const FLOORS: [&str; 27] = [
     "plant",
     "attach",
     "collider_fit",
+    "wear",
     "plugins",
     "prelude",
     "lib",

@@ -357,7 +357,11 @@ mod skinned {
                 world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap())).id()
             })
             .collect();
-        world.entity_mut(hair).insert(RootsOnMesh { mesh: Some(mesh), roots: roots() });
+        world.entity_mut(hair).insert(RootsOnMesh {
+            mesh: Some(mesh),
+            roots: roots(),
+            ..default()
+        });
         // The neck turns by up to 720 degrees a second, the head bends on it.
         app.add_systems(Update, move |time: Res<Time>, mut bones: Query<&mut Transform>| {
             let t = time.elapsed_secs();

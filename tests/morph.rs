@@ -72,7 +72,7 @@ fn strand_on(app: &mut App, mesh: Entity) -> (Entity, Entity) {
     let world = app.world_mut();
     let hair = world.spawn((Hair, Transform::from_xyz(0.1, 0.2, 0.3))).id();
     let id = world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap())).id();
-    world.entity_mut(hair).insert(RootsOnMesh { mesh: Some(mesh), roots: vec![ROOT] });
+    world.entity_mut(hair).insert(RootsOnMesh { mesh: Some(mesh), roots: vec![ROOT], ..default() });
     (hair, id)
 }
 
@@ -244,7 +244,11 @@ fn roots_that_fit_no_mesh_tell_what_was_expected() {
         (drawn_only, vec![ROOT], RootsError::Extracted),
         (jointless, vec![ROOT], RootsError::NoJoints { joints: 2, poses: 0 }),
     ] {
-        app.world_mut().entity_mut(hair).insert(RootsOnMesh { mesh: Some(mesh), roots });
+        app.world_mut().entity_mut(hair).insert(RootsOnMesh {
+            mesh: Some(mesh),
+            roots,
+            ..default()
+        });
         run(&mut app, 0.2);
         let told = faults(&mut app);
         assert!(matches!(&told[..], [f] if f.kind == FaultKind::Roots && f.cause() == Some(&why)));

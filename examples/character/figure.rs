@@ -41,6 +41,11 @@ impl Plugin for FigurePlugin {
     }
 }
 
+/// The middle between the ears; the hairline follows from it.
+pub fn scalp() -> Scalp {
+    Scalp { center: SKULL, height: 0.118, ..default() }
+}
+
 fn build(
     mut commands: Commands,
     mut paint: Paint,
@@ -56,8 +61,7 @@ fn build(
     }
     let inverse: Vec<Mat4> =
         (0..skeleton::COUNT).map(|bone| Mat4::from_translation(-joint(bone))).collect();
-    // The middle between the ears; the hairline follows from it.
-    let scalp = Scalp { center: SKULL, height: 0.118, ..default() };
+    let scalp = scalp();
     let skin = body::mesh();
     let preset = arguments.preset.0;
     let planted = preset.plant(&skin, &scalp)?;
@@ -80,7 +84,11 @@ fn build(
         commands.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
     }
     println!("{preset:?}: {} guides", planted.groom.len());
-    commands.entity(hair).insert(RootsOnMesh { mesh: Some(body), roots: planted.roots });
+    commands.entity(hair).insert(RootsOnMesh {
+        mesh: Some(body),
+        roots: planted.roots,
+        ..default()
+    });
 
     // A head is no capsule: hair lies on its skull by several.
     for (a, b, radius) in head::skull() {

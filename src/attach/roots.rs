@@ -3,7 +3,7 @@
 use super::{corner::Corner, pose::Movers};
 use crate::plant::RootOnMesh;
 use bevy::{
-    math::{Isometry3d, Mat3A},
+    math::{Affine3A, Isometry3d, Mat3A},
     prelude::*,
 };
 
@@ -11,7 +11,7 @@ use bevy::{
 /// Component of the hair, which best sits on the bone that moves most of it.
 ///
 /// Give strands as they grow on the mesh in its own space, before any skinning, as planting gives
-/// them. In the first tick in which mesh and joints are there every strand is taken to its place on
+/// them, or say by [`strands_from_mesh`](Self::strands_from_mesh) in which other space. In the first tick in which mesh and joints are there every strand is taken to its place on
 /// the mesh as it is posed; lengths are scaled as the mesh is. From then on roots go with their
 /// triangles, turning with them: with the joints of a `SkinnedMesh`, and with the mesh's morph targets
 /// as `MeshMorphWeights` weighs them. What does not fit is told once as
@@ -24,6 +24,9 @@ pub struct RootsOnMesh {
     pub mesh: Option<Entity>,
     /// One for each strand, in the order of the hair's [`Strands`](crate::Strands).
     pub roots: Vec<RootOnMesh>,
+    /// From the mesh's own space to the one that strands are given in; the identity where that is the
+    /// mesh's. With the hair's frame at rest as that space, strands are in place before they are tied.
+    pub strands_from_mesh: Affine3A,
 }
 
 /// What was read from the mesh when the strands were tied to it, so that its asset may go.

@@ -8,11 +8,10 @@ use super::{
     roots::{RootsOnMesh, Tied, TiedRoots, triangle},
 };
 use crate::{
-    bond::Bonds,
     fault::{FaultKind, HairFault},
     plant::RootOnMesh,
     schedule::HairStep,
-    strand::{Hair, Strand, StrandHistory, Strands, TickPose},
+    strand::{Hair, MIN_SEGMENT, Strand, StrandHistory, Strands, TickPose},
 };
 use bevy::{
     math::Isometry3d,
@@ -32,7 +31,7 @@ pub(super) fn tie(
     skins: Query<(&Mesh3d, Option<&SkinnedMesh>)>,
     morphs: Morphs,
     mut hairs: Query<(Entity, Ref<RootsOnMesh>, &mut TiedRoots, &Strands, &TickPose), With<Hair>>,
-    mut strands: Query<(&mut Strand, &mut Bonds, &mut StrandHistory)>,
+    mut strands: Query<(&mut Strand, &mut StrandHistory)>,
     mut faults: MessageWriter<HairFault>,
 ) {
     let Some(meshes) = meshes.filter(|_| step.index == 0) else { return };
@@ -75,7 +74,8 @@ pub(super) fn tie(
                 let now = corners.map(|c| seen(posed.corner(&c)));
                 let unmorphed = corners.map(|c| seen(posed.unmorphed(&c)));
                 let strand = strands.get_mut(member).ok()?;
-                let tied = tie_strand(member, root, corners, now, unmorphed, strand);
+                let bind = corners.map(|c| roots.strands_from_mesh.transform_point3(c.at));
+                let tied = tie_strand(member, root, corners, bind, now, unmorphed, strand);
                 flat += usize::from(tied.is_none());
                 tied
             },
@@ -107,30 +107,38 @@ fn read(
     Ok((movers, read))
 }
 
-/// Puts a strand that was given in the mesh's own space to its place in the hair's frame, where the
-/// corners of its triangle are `posed`. Morph targets move and turn it, but hair is no longer on a
+/// Puts a strand that was given where the corners of its triangle are at `bind` to its place in the
+/// hair's frame, where they are `posed`. Morph targets move and turn it, but hair is no longer on a
 /// face that happens to be puffed when it is tied: lengths are those of the `unmorphed` mesh.
+///
+/// It is moved, turned and scaled as a whole: pose, lengths and what its bonds remember of its shape
+/// stay what they are.
 fn tie_strand(
     member: Entity,
     root: &RootOnMesh,
     corners: [Corner; 3],
+    bind: [Vec3; 3],
     posed: [Vec3; 3],
     unmorphed: [Vec3; 3],
-    (mut strand, mut bonds, mut history): (Mut<'_, Strand>, Mut<'_, Bonds>, Mut<'_, StrandHistory>),
+    (mut strand, mut history): (Mut<'_, Strand>, Mut<'_, StrandHistory>),
 ) -> Option<Tied> {
-    let bind = triangle(corners.map(|c| c.at), root.weights)?;
-    let now = triangle(posed, root.weights)?;
     let size = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).length().sqrt();
-    let scale = size(unmorphed) / size(corners.map(|c| c.at));
-    let points: Vec<Vec3> =
-        strand.positions().iter().map(|p| now * ((bind.inverse() * *p) * scale)).collect();
+    let scale = size(unmorphed) / size(bind);
+    let bind = triangle(bind, root.weights)?;
+    let now = triangle(posed, root.weights)?;
     let turn = now.rotation * bind.rotation.inverse();
-    let frame = turn * strand.root_frame();
-    let leaves = Dir3::new(frame * Vec3::Z).ok()?;
-    *strand = Strand::from_polyline(&points).ok()?.leaving_along(leaves);
-    *bonds = Bonds::of(&strand);
+    let place = |p: &Vec3| now * ((bind.inverse() * *p) * scale);
+    let turned = |q: &Quat| (turn * *q).normalize();
+    let points: Vec<Vec3> = strand.positions().iter().map(place).collect();
+    let lengths: Vec<f32> = strand.rest_lengths().iter().map(|l| l * scale).collect();
+    let usable = points.iter().all(|p| p.is_finite()) && lengths.iter().all(|l| *l >= MIN_SEGMENT);
+    if !usable {
+        return None;
+    }
+    let at = Isometry3d::new(points[0], turned(&strand.root_frame()));
+    let orientations = strand.orientations().iter().map(turned).collect();
+    strand.replace(points, orientations, lengths, at.rotation);
     history.positions.clear();
-    let at = Isometry3d::new(points[0], strand.root_frame());
     Some(Tied {
         strand: member,
         weights: root.weights,

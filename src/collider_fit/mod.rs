@@ -1,10 +1,12 @@
 //! Colliders fitted to what they stand for: capsules to the joints of a skinned mesh, a ball to the
 //! head below a groom.
 
+mod balls;
 mod capsules;
 mod head;
 mod linear;
 
+pub(crate) use balls::{BallRules, inscribed_balls};
 pub use capsules::{FitError, JointCapsule, fit_joint_capsules};
 
 use bevy::prelude::*;

@@ -45,6 +45,17 @@ impl KdTree {
         self.nearest_of::<N, _>(point, |_, _| true)
     }
 
+    /// The nearest to `point` if it is nearer than `known`, a number with its squared distance; else
+    /// that. A search that begins near its end is short.
+    #[cfg(feature = "groom")]
+    pub(crate) fn nearer_than(&self, point: Vec3, known: (u32, f32)) -> (u32, f32) {
+        let mut found = [(known.1, known.0)];
+        if point.is_finite() {
+            search(&self.nodes, point, &|_, _| true, &mut found);
+        }
+        (found[0].1, found[0].0)
+    }
+
     /// The same among those that `is_meant` takes by their number and squared distance.
     pub fn nearest_of<const N: usize, F: Fn(u32, f32) -> bool>(
         &self,
@@ -65,6 +76,17 @@ fn search(
     is_meant: &impl Fn(u32, f32) -> bool,
     found: &mut [(f32, u32)],
 ) {
+    search_box(nodes, point, Vec3::ZERO, is_meant, found);
+}
+
+/// Searches the places in a box of which `point` is outside by `off` in each direction.
+fn search_box(
+    nodes: &[Node],
+    point: Vec3,
+    off: Vec3,
+    is_meant: &impl Fn(u32, f32) -> bool,
+    found: &mut [(f32, u32)],
+) {
     let middle = nodes.len() / 2;
     let Some(node) = nodes.get(middle) else { return };
     let square = node.place.distance_squared(point);
@@ -74,9 +96,13 @@ fn search(
     let beyond = point[node.axis] - node.place[node.axis];
     let (near, far) = (&nodes[..middle], &nodes[middle + 1..]);
     let (near, far) = if beyond < 0.0 { (near, far) } else { (far, near) };
-    search(near, point, is_meant, found);
-    if found.last().is_some_and(|last| beyond * beyond <= last.0) {
-        search(far, point, is_meant, found);
+    search_box(near, point, off, is_meant, found);
+    let mut off = off;
+    off[node.axis] = beyond;
+    // Rounding must not cut off one that is as far as the last.
+    const SLACK: f32 = 1.0 - 1e-5;
+    if found.last().is_some_and(|last| off.length_squared() * SLACK <= last.0) {
+        search_box(far, point, off, is_meant, found);
     }
 }
 

@@ -107,6 +107,20 @@ impl Groom {
         hair: Entity,
         guides: &GroomGuides,
     ) -> Result<Vec<Entity>, GroomError> {
+        let sown = self.sown(guides)?;
+        if sown.short > 0 {
+            tracing::warn!(
+                "hair, entity {hair}: {} guides without length are left out",
+                sown.short
+            );
+        }
+        #[cfg(feature = "render")]
+        commands.entity(hair).try_insert(sown.followers);
+        Ok(sown.strands.into_iter().map(|s| commands.spawn((StrandOf(hair), s)).id()).collect())
+    }
+
+    /// What [`Groom::spawn`] spawns.
+    pub(crate) fn sown(&self, guides: &GroomGuides) -> Result<Sown, GroomError> {
         guides.checked()?;
         self.check()?;
         if self.is_empty() {
@@ -127,13 +141,12 @@ impl Groom {
         if strands.is_empty() {
             return Err(GroomError::Empty);
         }
-        if strands.len() < chosen.len() {
-            let short = chosen.len() - strands.len();
-            tracing::warn!("hair, entity {hair}: {short} guides without length are left out");
-        }
-        #[cfg(feature = "render")]
-        commands.entity(hair).try_insert(self.followers_of(&chosen));
-        Ok(strands.into_iter().map(|s| commands.spawn((StrandOf(hair), s)).id()).collect())
+        Ok(Sown {
+            short: chosen.len() - strands.len(),
+            strands,
+            #[cfg(feature = "render")]
+            followers: self.followers_of(&chosen),
+        })
     }
 
     #[cfg(feature = "render")]
@@ -148,6 +161,18 @@ impl Groom {
         };
         FollowerRoots(others.map(|(strand, _)| root(strand)).collect())
     }
+}
+
+/// Hair of a groom before it is anywhere.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sown {
+    /// The guides.
+    pub strands: Vec<Strand>,
+    /// All others.
+    #[cfg(feature = "render")]
+    pub followers: crate::render::FollowerRoots,
+    /// How many guides have no length and are left out.
+    pub short: usize,
 }
 
 /// What a hair has grown from its groom.

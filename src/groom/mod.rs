@@ -21,6 +21,7 @@ pub use format::{GroomFormat, UpAxis};
 pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
 
+pub(crate) use grown_hair::Sown;
 pub use grown_hair::{GroomGuides, GroomedHair};
 pub use settings::GroomSettings;
 pub use size::OddSize;

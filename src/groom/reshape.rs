@@ -2,7 +2,7 @@
 
 use super::{Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis};
 use crate::setting::ValueRange;
-use bevy::prelude::*;
+use bevy::{math::Affine3A, prelude::*};
 use core::ops::Range;
 
 const SCALE: ValueRange = GroomSettings::SCALE.named("a groom's scale");
@@ -34,6 +34,17 @@ impl Groom {
     /// When a node leaves the finite numbers.
     pub fn moved(mut self, way: Vec3) -> Result<Self, GroomError> {
         self.points.iter_mut().for_each(|p| *p += way);
+        self.checked()
+    }
+
+    /// The groom in another space; widths scale with it.
+    ///
+    /// # Errors
+    /// When a node leaves the finite numbers.
+    pub(crate) fn mapped(mut self, space: &Affine3A) -> Result<Self, GroomError> {
+        let scale = space.matrix3.determinant().abs().cbrt();
+        self.points.iter_mut().for_each(|p| *p = space.transform_point3(*p));
+        self.widths.iter_mut().for_each(|w| *w *= scale);
         self.checked()
     }
 

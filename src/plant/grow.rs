@@ -3,7 +3,7 @@
 use super::{
     map::{PlantingMaps, RootPlace},
     recipe::{Comb, Curl, CurlPhase, Planting},
-    shell::Shell,
+    shell::{Felt, Shell},
     surface::{Root, Surface},
 };
 use crate::{
@@ -208,6 +208,7 @@ fn axis(
     let mut way = lot.way;
     let mut points = Vec::with_capacity(steps + 1);
     points.push(place.position);
+    let mut felt = Felt::default();
     for i in 0..steps {
         let from = points[i];
         if let Some(fall) = planting.fall {
@@ -228,7 +229,7 @@ fn axis(
         if let Some(shell) = shell {
             // It rises to its layer little by little: hair is flat where it parts.
             let clearance = lot.clearance.min(0.4 * step * (i + 1) as f32);
-            if let Some((depth, off)) = shell.depth(next, clearance) {
+            if let Some((depth, off)) = shell.depth(next, clearance, &mut felt) {
                 go = (next + off * depth - from).normalize_or(off);
                 next = from + go * step;
                 // Along the surface: what it was pushed by does not throw it off.

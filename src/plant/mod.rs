@@ -16,6 +16,7 @@
 mod error;
 mod grow;
 mod map;
+mod place;
 mod planting;
 mod preset;
 mod recipe;
@@ -26,6 +27,7 @@ mod surface;
 
 pub use error::PlantError;
 pub use map::{ImageMap, MapChannel, PlantingMaps, RootPlace, vertex_color};
+pub(crate) use place::{SurfacePoint, surface_points};
 pub use planting::{Planted, RootOnMesh};
 pub use preset::{HairPreset, PresetSettings};
 pub use recipe::{Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, MAX_ROOTS, Planting};

@@ -107,8 +107,19 @@ impl HairPreset {
         mesh: &Mesh,
         scalp: &Scalp,
     ) -> Result<Planted, PlantError> {
+        self.plant_where(planting, mesh, scalp, &|_| 1.0)
+    }
+
+    /// The same where `share` leaves it.
+    pub(crate) fn plant_where(
+        self,
+        planting: &Planting,
+        mesh: &Mesh,
+        scalp: &Scalp,
+        share: &dyn Fn(&RootPlace) -> f32,
+    ) -> Result<Planted, PlantError> {
         let scalp = &scalp.checked()?;
-        let density = scalp.mask();
+        let density = |place: &RootPlace| scalp.share(place.position) * share(place);
         let length = |place: &RootPlace| self.length_share(scalp, place.position);
         let direction = |place: &RootPlace| self.direction(scalp, place.position);
         let mut maps = PlantingMaps::new().density(&density).length(&length);

@@ -140,6 +140,11 @@ impl Surface {
         }
     }
 
+    /// The places of a triangle's vertices (m).
+    pub(super) fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.triangles[triangle].map(|v| self.positions[v as usize])
+    }
+
     /// The triangle's own normal, by the order of its vertices.
     pub(super) fn flat_normal(&self, triangle: usize) -> Vec3 {
         let [a, b, c] = self.triangles[triangle].map(|v| self.positions[v as usize].as_dvec3());

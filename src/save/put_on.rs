@@ -83,6 +83,17 @@ impl Hairdo {
         command(move |world, hair| self.apply(world, hair))
     }
 
+    /// [`Hairdo::apply`] as an entity command where the hair has as many strands and nodes, else
+    /// [`Hairdo::apply_resampled`]. What is wrong is told as a [`HairFault`].
+    pub fn put_on_fitting(self) -> impl EntityCommand<Out = ()> {
+        command(move |world, hair| match self.apply(world, hair) {
+            Err(HairdoError::Strands { .. } | HairdoError::Nodes { .. }) => {
+                self.apply_resampled(world, hair)
+            }
+            applied => applied,
+        })
+    }
+
     /// [`Hairdo::apply_resampled`] as an entity command. What is wrong is told as a [`HairFault`].
     pub fn put_on_resampled(self) -> impl EntityCommand<Out = ()> {
         command(move |world, hair| self.apply_resampled(world, hair))

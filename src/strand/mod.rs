@@ -352,7 +352,7 @@ impl Strand {
     }
 
     /// Puts it into another state of as many nodes, at rest.
-    #[cfg(feature = "save")]
+    #[cfg(any(feature = "save", feature = "groom"))]
     pub(crate) fn replace(
         &mut self,
         positions: Vec<Vec3>,

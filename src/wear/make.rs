@@ -1,0 +1,218 @@
+//! Making hair for a head: planting or sowing, roots, colliders. Pure, and so for any thread.
+
+use super::{
+    error::WearError,
+    space::{Fitting, Part, cropped, fit},
+    target::Target,
+    what::{HairSource, WearHair},
+};
+#[cfg(feature = "render")]
+use crate::render::HairLook;
+use crate::{
+    collider_fit::{BallRules, fit_joint_capsules, inscribed_balls},
+    contact::HairCollider,
+    grid::KdTree,
+    groom::{Groom, GroomGuides, Sown},
+    plant::{
+        HUMAN_DENSITY, HairPreset, Planting, PresetSettings, RootOnMesh, RootPlace, SurfacePoint,
+        surface_points,
+    },
+    strand::Strand,
+    water::Wetting,
+};
+use bevy::{math::Affine3A, platform::collections::HashMap, prelude::*};
+
+/// Points by which head and body are felt when balls are fitted.
+const POINTS: usize = 2500;
+/// The most balls for a head.
+const MOST_BALLS: usize = 16;
+/// Beyond the hair's length, how far from the head something may touch it (m).
+const BESIDE: f32 = 0.15;
+/// Half of a groom's strands must grow nearer to the mesh than this (m).
+const MOST_BESIDE: f32 = 0.03;
+/// Moved less than this share by the head, a vertex is of the neck.
+const OF_HEAD: f32 = 0.5;
+
+/// What is to be made, of what.
+pub(super) struct Order {
+    pub(super) wear: WearHair,
+    pub(super) target: Target,
+    /// The groom, where one is worn.
+    pub(super) groom: Option<Groom>,
+}
+
+/// Hair that is ready to be put on.
+pub(super) struct Made {
+    /// The bone or mesh that it goes below, and its place there.
+    pub(super) parent: Entity,
+    pub(super) place: Transform,
+    /// The mesh that its roots are tied to, and from which space to the strands'.
+    pub(super) mesh: Entity,
+    pub(super) from_mesh: Affine3A,
+    pub(super) roots: Vec<RootOnMesh>,
+    pub(super) hair: Sown,
+    pub(super) settings: Option<PresetSettings>,
+    #[cfg(feature = "render")]
+    pub(super) look: Option<HairLook>,
+    /// Fibres for each strand.
+    pub(super) fibres: f32,
+    /// Colliders in the hair's space.
+    pub(super) balls: Vec<(HairCollider, Transform)>,
+    /// Colliders of joints.
+    pub(super) capsules: Vec<(Entity, (HairCollider, Transform))>,
+}
+
+/// Makes the hair.
+pub(super) fn make(mut order: Order) -> Result<Made, WearError> {
+    let fitting = fit(&mut order.target.parts, &order.wear)?;
+    let grown = match (&order.wear.hair, &order.groom) {
+        (HairSource::Groom { guides, .. }, Some(groom)) => {
+            sow(groom, guides, &fitting, &order.wear.place)?
+        }
+        (HairSource::Groom { .. }, None) => return Err(WearError::NoMesh),
+        (HairSource::Preset(preset), _) => plant(*preset, order.wear.seed, &fitting)?,
+    };
+    let part = &order.target.parts[fitting.part];
+    let to_mesh = fitting.to_hair.inverse();
+    let (parent, place) = match &part.skin {
+        Some(skin) => {
+            let head = skin.head.unwrap_or(0);
+            (skin.joints[head], skin.poses[head] * to_mesh)
+        }
+        None => (part.entity, to_mesh),
+    };
+    let (balls, capsules) = if order.wear.colliders && !order.target.has_colliders {
+        let reach = grown.hair.strands.iter().map(Strand::length).fold(0.0, f32::max) + BESIDE;
+        (balls(&fitting, reach)?, capsules(&order.target.parts, &fitting, reach))
+    } else {
+        default()
+    };
+    let fibres = Wetting::FIBRES.safe;
+    Ok(Made {
+        parent,
+        place: Transform::from_matrix(place.into()),
+        mesh: part.entity,
+        from_mesh: fitting.to_hair,
+        roots: grown.roots,
+        hair: grown.hair,
+        settings: grown.settings,
+        #[cfg(feature = "render")]
+        look: order.groom.as_ref().and_then(Groom::look),
+        fibres: grown.fibres.clamp(*fibres.start(), *fibres.end()),
+        balls,
+        capsules,
+    })
+}
+
+/// Hair on a mesh.
+struct Grown {
+    hair: Sown,
+    roots: Vec<RootOnMesh>,
+    settings: Option<PresetSettings>,
+    fibres: f32,
+}
+
+fn plant(preset: HairPreset, seed: u64, fitting: &Fitting) -> Result<Grown, WearError> {
+    let planting = Planting { seed, ..preset.planting(&fitting.scalp) };
+    let mesh = cropped(&fitting.mesh, planting.length + BESIDE);
+    let of_head = |place: &RootPlace| {
+        place.color.map_or(1.0, |color| if color.x > OF_HEAD { 1.0 } else { 0.0 })
+    };
+    let planted = preset.plant_where(&planting, &mesh, &fitting.scalp, &of_head)?;
+    let strands = planted.groom.strands().map(|s| Strand::from_polyline(s.points));
+    Ok(Grown {
+        hair: Sown { strands: strands.collect::<Result<_, _>>()?, ..default() },
+        roots: planted.roots,
+        settings: Some(preset.settings()),
+        fibres: HUMAN_DENSITY / planting.density,
+    })
+}
+
+fn sow(
+    groom: &Groom,
+    guides: &GroomGuides,
+    fitting: &Fitting,
+    place: &Transform,
+) -> Result<Grown, WearError> {
+    let groom = groom.clone().mapped(&(fitting.from_wearer * place.compute_affine()))?;
+    let hair = groom.sown(guides)?;
+    let places: Vec<Vec3> = hair.strands.iter().map(|s| s.positions()[0]).collect();
+    let (roots, mut apart): (Vec<_>, Vec<_>) =
+        RootOnMesh::nearest(&fitting.mesh, places.iter().copied())?.into_iter().unzip();
+    let found = median(&mut apart).unwrap_or(0.0);
+    if found > MOST_BESIDE {
+        return Err(WearError::Beside { found, most: MOST_BESIDE });
+    }
+    Ok(Grown { fibres: HUMAN_DENSITY * area_of_each(&places), hair, roots, settings: None })
+}
+
+/// About how much skin each root stands for (m²), from how far apart neighbours are.
+fn area_of_each(places: &[Vec3]) -> f32 {
+    let tree = KdTree::new(places.iter().copied().zip(0u32..));
+    let apart = |p: &Vec3| tree.nearest::<2>(*p).nth(1).map(|(_, square)| square);
+    let mut squares: Vec<f32> = places.iter().filter_map(apart).collect();
+    median(&mut squares).unwrap_or(0.0)
+}
+
+fn median(values: &mut [f32]) -> Option<f32> {
+    values.sort_by(f32::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Balls within the head; within all that hair reaches of a mesh without joints.
+fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>, WearError> {
+    let points = surface_points(&cropped(&fitting.mesh, reach), POINTS)?;
+    let height = fitting.scalp.height;
+    let is_meant = |p: &SurfacePoint| p.red > OF_HEAD && p.at.length() < reach;
+    let places: Vec<_> = points.iter().map(|p| (p.at, p.normal)).collect();
+    let rules = BallRules {
+        widest: 0.9 * height,
+        within: 0.01 * height,
+        near: 0.02 * height,
+        most: MOST_BALLS,
+    };
+    let balls = inscribed_balls(&places, |i| is_meant(&points[i]), &rules);
+    let each = balls.into_iter().map(|ball| {
+        let place = Transform::from_translation(ball.center.into());
+        Ok((HairCollider::sphere(ball.radius())?, place))
+    });
+    each.collect()
+}
+
+/// A capsule for each joint other than the head's that hair reaches. A skin that none can be fitted
+/// to has none.
+fn capsules(
+    parts: &[Part],
+    fitting: &Fitting,
+    reach: f32,
+) -> Vec<(Entity, (HairCollider, Transform))> {
+    let mut best: HashMap<Entity, (f32, (HairCollider, Transform))> = default();
+    let mut order = Vec::new();
+    for part in parts {
+        let Some(skin) = &part.skin else { continue };
+        let poses: Vec<Mat4> = skin.poses.iter().map(|pose| (*pose).into()).collect();
+        let to_hair = fitting.from_wearer * part.to_wearer;
+        let Ok(fitted) = fit_joint_capsules(&part.mesh, &poses) else { continue };
+        for (i, capsule) in fitted.into_iter().enumerate() {
+            let Some(capsule) = capsule.filter(|_| !skin.of_head[i]) else { continue };
+            let there = to_hair * skin.poses[i].inverse();
+            let scale = there.matrix3.determinant().abs().cbrt();
+            let [a, b] = [capsule.from, capsule.to].map(|end| there.transform_point3(end));
+            let radius = capsule.radius * scale;
+            let nearest = Segment3d::new(a, b).closest_point(Vec3::ZERO).length() - radius;
+            let is_near = nearest < reach;
+            let Some(collider) = capsule.collider().ok().filter(|_| is_near) else { continue };
+            let joint = skin.joints[i];
+            match best.get(&joint) {
+                Some(known) if known.0 >= radius => {}
+                known => {
+                    if known.is_none() {
+                        order.push(joint);
+                    }
+                    best.insert(joint, (radius, collider));
+                }
+            }
+        }
+    }
+    order.into_iter().filter_map(|joint| Some((joint, best.remove(&joint)?.1))).collect()
+}
