@@ -114,7 +114,7 @@ fn register(app: &mut App) {
 struct Worn(u32);
 
 fn camera() -> impl Bundle {
-    let place = Transform::from_xyz(0.6, 1.65, 1.3).looking_at(Vec3::Y * 1.47, Vec3::Y);
+    let place = Transform::from_xyz(0.4, 1.62, 0.9).looking_at(Vec3::Y * 1.52, Vec3::Y);
     (Camera3d::default(), Msaa::Sample4, DepthPrepass, place)
 }
 
