@@ -6,6 +6,7 @@ use crate::{
 };
 use bevy::{asset::RenderAssetUsages, mesh::VertexAttributeValues, prelude::*};
 
+/// Size of the surface's cells (m).
 const CELL: f32 = 0.005;
 const LOW: Vec3 = Vec3::new(-0.54, -0.02, -0.22);
 const HIGH: Vec3 = Vec3::new(0.54, 1.76, 0.24);
@@ -133,7 +134,12 @@ fn weights(p: Vec3) -> ([u16; 4], [f32; 4]) {
 
 /// The body as a skinned mesh at rest (m): its feet on the floor at the origin, its face toward +Z.
 pub fn mesh() -> Mesh {
-    let mut mesh = mannequin::surface((LOW, HIGH), CELL, &skin, &color);
+    mesh_of(CELL)
+}
+
+/// The same in cells of another size (m).
+pub fn mesh_of(cell: f32) -> Mesh {
+    let mut mesh = mannequin::surface((LOW, HIGH), cell, &skin, &color);
     mesh.asset_usage = RenderAssetUsages::default();
     let places =
         mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(VertexAttributeValues::as_float3);

@@ -24,6 +24,7 @@ mod solid;
 mod studio;
 
 mod body;
+mod export;
 mod figure;
 mod measure;
 mod skeleton;
@@ -60,6 +61,9 @@ struct Arguments {
     /// Draws no window, but PNGs into this folder.
     #[arg(long, value_name = "DIR")]
     offscreen: Option<PathBuf>,
+    /// Draws nothing, but writes the figure without hair into this file, as binary glTF.
+    #[arg(long, value_name = "FILE")]
+    export: Option<PathBuf>,
     /// How long it walks for the pictures (s).
     #[arg(long, default_value_t = 6.0, value_parser = seconds)]
     seconds: f32,
@@ -96,6 +100,10 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    if let Some(file) = &arguments.export {
+        let body = body::mesh_of(0.009);
+        return export::write(&head::with_scalp(body, &figure::scalp()), file);
+    }
     // Before anything that takes long.
     arguments.offscreen.as_deref().map(picture::folder).transpose()?;
     let offscreen = arguments.offscreen.is_some();
