@@ -42,12 +42,17 @@ impl Bonds {
 #[reflect(Component, Default, Clone)]
 pub struct BondChanges {
     /// Δb per joint; may be empty when nobody asks.
+    #[reflect(ignore)]
     joints: Vec<[f32; BondKind::COUNT]>,
+    #[reflect(ignore)]
     any: bool,
 }
 
 /// More than any strand has: what lies beyond cannot be meant.
 const MOST_JOINTS: usize = 1 << 16;
+
+/// More than any rate can change by.
+const MOST_CHANGE: f32 = 1e6;
 
 impl BondChanges {
     /// Asks for a change of `kind` at `joint`. Requests beyond the strand's joints and non-finite
@@ -64,7 +69,9 @@ impl BondChanges {
             }
             self.joints.resize(joint + 1, [0.0; BondKind::COUNT]);
         }
-        self.joints[joint][kind as usize] += change;
+        let sum = &mut self.joints[joint][kind as usize];
+        // Two requests without end would add up to one that is not finite.
+        *sum = (*sum + change).clamp(-MOST_CHANGE, MOST_CHANGE);
         self.any = true;
     }
 

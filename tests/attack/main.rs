@@ -50,6 +50,20 @@ fn requests_for_joints_that_no_strand_has_do_nothing() {
 }
 
 #[test]
+fn requests_without_end_leave_bonds_finite() {
+    let mut app = test_app(60.0);
+    let (_, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    run(&mut app, 0.1);
+    for change in [f32::MAX, f32::MIN] {
+        let mut changes = app.world_mut().get_mut::<BondChanges>(id).unwrap();
+        (0..3).for_each(|_| changes.ask(3, BondKind::Hydrogen, change));
+        run(&mut app, 0.1);
+        let bonds = app.world().get::<Bonds>(id).unwrap();
+        assert!(bonds.joints.iter().all(|joint| joint.is_valid()), "{:?}", bonds.joints[3]);
+    }
+}
+
+#[test]
 fn a_shower_that_owes_too_much_is_told_and_goes_on() {
     for owed in [f32::NAN, 1e12, -1e12] {
         let mut app = test_app(60.0);
