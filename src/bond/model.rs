@@ -186,7 +186,9 @@ pub(super) fn changed<R: Real>(
     let to = (bond.rate + change).max(zero).min(one);
     let formed = to - bond.rate;
     let present = R::select(bond.is_opposite(omega), -formed, formed);
-    let mean = omega.v.scale_add(present, bond.shape.scale(bond.rate)).scale(one / to);
+    // Of hardly any bonds the inverse would be without end.
+    let least = zero.lit(1e-30);
+    let mean = omega.v.scale_add(present, bond.shape.scale(bond.rate)).scale(one / to.max(least));
     Remembered { shape: V3::select(zero.lt(formed), mean, bond.shape), rate: to }
 }
 
@@ -208,6 +210,18 @@ pub fn cuticle_factor(distance: f32, damage: f32, softening: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn hardly_any_bonds_remember_a_finite_shape() {
+        for change in [1e-45_f32, 1e-40, 1e-30, 1e-20] {
+            let mut joint = JointBonds { rates: [0.0; BondKind::COUNT], ..Default::default() };
+            let bent = Quat::from_rotation_x(1.0);
+            joint.change(0, change, bent);
+            assert!(joint.is_valid(), "{change}: {joint:?}");
+            joint.change(0, 0.5, bent);
+            assert!(joint.shapes[0].distance(bent.xyz()) < 1e-6, "{change}: {joint:?}");
+        }
+    }
     use crate::rod::frame::full;
     use proptest::prelude::*;
 
