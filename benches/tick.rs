@@ -128,7 +128,7 @@ fn direct_step(bencher: Bencher<'_, '_>, nodes: usize) {
     block.root_from = block.root;
     block.nodes.iter_mut().for_each(|n| n.w = n.w.map(|w| if w == 0.0 { 0.0 } else { 1.0 }));
     block.edges.iter_mut().for_each(|e| e.k = [1.0; LANES]);
-    direct::weigh(level, &mut block, 0.13);
+    direct::weigh(level, &mut block, 0.13, 1.0 / 360.0);
     // Items are segments, so that divan prints them per second.
     bencher.counter(ItemsCount::new(LANES * (nodes - 1))).bench_local(|| {
         direct::step(level, &mut block, &params, &[]);

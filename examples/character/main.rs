@@ -8,6 +8,7 @@
 #[path = "../salon/failure.rs"]
 mod failure;
 #[path = "../presets/head.rs"]
+#[allow(dead_code, reason = "the presets use all of it")]
 mod head;
 #[path = "../salon/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]

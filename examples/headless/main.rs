@@ -120,7 +120,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let mut app =
         headless_app(scene, arguments.threads, Strewn { count: arguments.droplets, ..default() });
     if let Some(method) = arguments.solver {
-        app.insert_resource(HairDefault(HairSolver { method, ..default() }));
+        app.world_mut().resource_mut::<HairDefault<HairSolver>>().method = method;
     }
     let bar = ProgressBar::new(frames)
         .with_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} frames, {eta} left")?);

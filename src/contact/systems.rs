@@ -131,8 +131,9 @@ fn gather_obstacles(
         let radius = ROOM * reach.radius * now.scale + travel;
         let is_near = |(at, size, travel): (Vec3, f32, f32)| {
             let apart = radius + size + travel * step.substeps as f32;
-            // A place that is no number is near: the collider's own checks say so.
-            !(at.distance_squared(center) > apart * apart)
+            let squared = at.distance_squared(center);
+            // A place that is no number is near: what meets it tells.
+            squared <= apart * apart || squared.is_nan() || apart.is_nan()
         };
         let near = solids.iter().filter(|(ball, ..)| is_near(*ball));
         obstacles.solids.extend(near.map(|(_, collider, at)| seen_from(pose, collider, at)));

@@ -1,6 +1,7 @@
 //! How carried strands go along: they sleep while their guides do, and move once a tick.
 
 use super::{
+    PresentLod,
     choose::{Follower, Guides},
     follow::{Frame, Pose},
 };
@@ -13,15 +14,16 @@ use bevy::prelude::*;
 
 /// After sleep has been decided on: the carried sleep while all their guides do.
 pub(crate) fn sync_follower_sleep(
-    mut hairs: Query<&mut Guides, With<Hair>>,
+    step: Res<HairStep>,
+    mut hairs: Query<(&PresentLod, &mut Guides), With<Hair>>,
     mut strands: Query<(&StrandOf, &mut Strand, &mut StrandSleep, &mut Follower)>,
 ) {
     let mut any = false;
-    for mut guides in &mut hairs {
-        let Guides { strands: ahead, awake, .. } = guides.bypass_change_detection();
+    for (present, mut guides) in &mut hairs {
+        let Guides { strands: ahead, awake, thaws, .. } = guides.bypass_change_detection();
+        any |= core::mem::take(thaws) || present.carried > 0;
         for (guide, awake) in ahead.iter().zip(awake) {
             *awake = strands.get(*guide).is_ok_and(|(.., sleep, _)| !sleep.is_asleep());
-            any = true;
         }
     }
     if !any {
@@ -29,10 +31,20 @@ pub(crate) fn sync_follower_sleep(
     }
     let mut per_hair = PerHair::default();
     for (of, mut strand, mut sleep, mut carried) in &mut strands {
+        if carried.thaws && !sleep.is_follower() {
+            carried.bypass_change_detection().thaws = false;
+            if let Ok((_, guides)) = hairs.get(of.0) {
+                let seconds = step.dt * step.count as f32;
+                let (positions, velocities, _) = strand.bypass_change_detection().motion_parts();
+                for (v, p) in velocities.iter_mut().zip(positions) {
+                    *v = guides.frame.velocity(*p, seconds);
+                }
+            }
+        }
         if !sleep.is_follower() {
             continue;
         }
-        let index = per_hair.index(of.0, || hairs.get(of.0).ok());
+        let index = per_hair.index(of.0, || Some(hairs.get(of.0).ok()?.1));
         let Some(guides) = index.map(|i| per_hair.values[i]) else { continue };
         let is_awake = |guide: &(u32, f32)| guides.awake.get(guide.0 as usize) == Some(&true);
         let sleep = sleep.bypass_change_detection();
@@ -56,19 +68,20 @@ pub(crate) fn sync_follower_sleep(
 pub(crate) fn move_followers(
     step: Res<HairStep>,
     substeps: EffectiveSubsteps,
-    mut hairs: Query<(Entity, &TickPose, &mut Guides), With<Hair>>,
+    mut hairs: Query<(Entity, &TickPose, &PresentLod, &mut Guides), With<Hair>>,
     mut strands: Query<(&StrandOf, &mut Strand, &StrandSleep, &mut Follower)>,
 ) {
     let is_last = step.index + 1 == step.count;
     let mut any = false;
-    for (hair, pose, mut guides) in &mut hairs {
+    for (hair, pose, present, mut guides) in &mut hairs {
         let guides = guides.bypass_change_detection();
         if step.index == 0 {
             guides.frame = Frame::default();
         }
-        if guides.strands.is_empty() {
+        if present.carried == 0 {
             continue;
         }
+        any |= is_last;
         if let Some(carry) = pose.frame_delta().filter(|_| substeps.of(hair).is_some()) {
             guides.frame.then(carry.rotation, carry.translation.into());
         }
@@ -77,7 +90,6 @@ pub(crate) fn move_followers(
                 let strand = strands.get(guides.strands[i]).ok().map(|(_, strand, ..)| strand);
                 guides.see(i, strand);
             }
-            any = true;
         }
     }
     if !any {
@@ -88,7 +100,7 @@ pub(crate) fn move_followers(
     for (of, strand, sleep, carried) in &mut strands {
         if sleep.is_follower()
             && !sleep.is_asleep()
-            && let Some(index) = per_hair.index(of.0, || Some(hairs.get(of.0).ok()?.2))
+            && let Some(index) = per_hair.index(of.0, || Some(hairs.get(of.0).ok()?.3))
         {
             items.push((index, strand, carried));
         }

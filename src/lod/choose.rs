@@ -36,6 +36,9 @@ pub struct Follower {
     pub(super) ties: Ties,
     /// Where its root was when it came to lie still (m).
     pub(super) root: Vec3,
+    /// Whether it was frozen and goes on in this tick.
+    #[reflect(ignore)]
+    pub(super) thaws: bool,
     /// Whether it sleeps because its guides do.
     pub(super) synced_asleep: bool,
 }
@@ -59,6 +62,9 @@ pub struct Guides {
     #[reflect(ignore)]
     pub(super) awake: Vec<bool>,
     level: usize,
+    /// Whether any strand was frozen and goes on in this tick.
+    #[reflect(ignore)]
+    pub(super) thaws: bool,
     /// What the strands were told apart by: share that is simulated, level, number of strands.
     #[reflect(ignore)]
     told_apart: Option<(f32, usize, usize)>,
@@ -112,6 +118,8 @@ struct Group<'a> {
     hair: Entity,
     share: f32,
     level: usize,
+    /// Whether a strand is simulated only until it is whole again.
+    mends: bool,
     members: Vec<Member<'a>>,
     strands: Vec<Ref<'a, Strand>>,
 }
@@ -178,6 +186,7 @@ pub(crate) fn choose_guides(
                 hair,
                 share,
                 level,
+                mends: false,
                 members,
                 strands,
             })
@@ -188,13 +197,16 @@ pub(crate) fn choose_guides(
         let is_whole = strand.nodes() >= 2 && (!strand.is_changed() || strand.is_finite());
         let free = is_whole && !is_held;
         let group: &mut Group<'_> = &mut groups.values[index];
+        group.mends |= !is_whole && strand.nodes() >= 2;
         group.members.push(Member { entity, sleep, carried, free });
         group.strands.push(strand);
     }
     let mut counts = EntityHashMap::<usize>::default();
     for group in &mut groups.values {
         if let Ok((.., mut guides)) = hairs.get_mut(group.hair) {
-            counts.insert(group.hair, part(group, guides.bypass_change_detection()));
+            let guides = guides.bypass_change_detection();
+            counts.insert(group.hair, part(group, guides));
+            guides.told_apart = guides.told_apart.filter(|_| !group.mends);
         }
     }
     for (hair, _, mut present, mut guides) in &mut hairs {
@@ -240,6 +252,8 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
         if !is_follower && sleep.is_follower() {
             // It goes on from where it is, as fast as it is.
             sleep.set_follower(false);
+            carried.thaws = carried.ties.guides.is_empty();
+            guides.thaws |= carried.thaws;
             if core::mem::take(&mut carried.synced_asleep) {
                 sleep.wake_up();
             }

@@ -74,6 +74,12 @@ impl Frame {
         self.0 = Some(((turn * turned).normalize(), turn * gone + way));
     }
 
+    /// The velocity (m/s) of a place that rested in the moving frame for so long (s).
+    pub(super) fn velocity(&self, place: Vec3, seconds: f32) -> Vec3 {
+        let v = (place - self.taken(place, Quat::IDENTITY).0) / seconds;
+        if v.is_finite() { v } else { Vec3::ZERO }
+    }
+
     #[inline]
     fn taken(&self, place: Vec3, orientation: Quat) -> (Vec3, Quat) {
         match self.0 {

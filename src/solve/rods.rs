@@ -130,7 +130,7 @@ impl Batched for Rod<'_> {
             Method::Direct { params: direct, carry } => {
                 gather_tensions(block, sources);
                 gather_roots(block, sources, carry.unwrap_or_default());
-                direct::weigh(params.level, block, params.bending_length);
+                direct::weigh(params.level, block, params.bending_length, params.dt);
                 direct::step(params.level, block, direct, &near);
             }
             Method::Sweeps(sweeps, settings) => {

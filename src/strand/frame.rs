@@ -410,10 +410,10 @@ mod tests {
         for spoil in spoils {
             let mut pose = TickPose::default();
             pose.aim(Some(a), 0.0, &HairInertia::default());
-            pose.advance(1.0);
+            pose.advance(1.0, false);
             spoil(&mut pose, broken);
             pose.aim(Some(a), 0.0, &HairInertia::default());
-            pose.advance(1.0);
+            pose.advance(1.0, false);
             assert_eq!((pose.now, pose.before), (a, a));
         }
     }
@@ -427,7 +427,7 @@ mod tests {
             for _ in 0..3 {
                 pose.aim(Some(at), 0.0, &HairInertia::default());
                 for i in 1..=7 {
-                    pose.advance(i as f32 / 7.0);
+                    pose.advance(i as f32 / 7.0, false);
                     assert!(pose.frame_delta().is_none(), "{far}");
                 }
             }

@@ -48,6 +48,15 @@ impl Strand {
                 });
             }
         }
+        // A strand that is not simulated would keep them.
+        for (i, v) in self.velocities.iter_mut().enumerate() {
+            if !v.is_finite() {
+                found.get_or_insert_with(|| {
+                    format!("velocity {i} of the strand is {v}, expected a finite one")
+                });
+                *v = Vec3::ZERO;
+            }
+        }
         // The direct solver keeps no angular velocities, so nothing else would notice.
         for (i, spin) in self.angular_velocities.iter_mut().enumerate() {
             if !spin.is_finite() {

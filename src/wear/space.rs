@@ -273,7 +273,10 @@ pub(super) fn cropped(mesh: &Mesh, reach: f32) -> Mesh {
     let is_list = mesh.primitive_topology() == PrimitiveTopology::TriangleList;
     // What cannot be is left in, for planting to say so.
     let is_near = |v: &usize| {
-        places.get(*v).is_none_or(|p| !(Vec3::from_array(*p).length_squared() > reach * reach))
+        places.get(*v).is_none_or(|p| {
+            let squared = Vec3::from_array(*p).length_squared();
+            squared <= reach * reach || squared.is_nan()
+        })
     };
     let kept: Vec<u32> = triangles(mesh)
         .filter(|triangle| triangle.iter().any(is_near))

@@ -47,7 +47,7 @@ enum Stage {
 
 enum Making {
     Elsewhere(Task<Result<Made, WearError>>),
-    Ready(Option<Result<Made, WearError>>),
+    Ready(Option<Box<Result<Made, WearError>>>),
 }
 
 struct Worn {
@@ -189,7 +189,7 @@ pub(super) fn seek(
 fn begin(order: Order) -> Making {
     match AsyncComputeTaskPool::try_get() {
         Some(pool) => Making::Elsewhere(pool.spawn(async move { make(order) })),
-        None => Making::Ready(Some(make(order))),
+        None => Making::Ready(Some(Box::new(make(order)))),
     }
 }
 
@@ -219,7 +219,7 @@ pub(super) fn put_on(
         let Stage::Making(making) = &mut wearing.bypass_change_detection().stage else { continue };
         let ready = match making {
             Making::Elsewhere(task) => check_ready(task),
-            Making::Ready(made) => made.take(),
+            Making::Ready(made) => made.take().map(|made| *made),
         };
         let Some(ready) = ready else { continue };
         wearing.stage = Stage::Done;
@@ -228,7 +228,7 @@ pub(super) fn put_on(
                 if let Some(old) = wearing.worn.take() {
                     old.take_off(&mut commands);
                 }
-                let wetting = wetting.as_ref().map(|default| default.0.clone()).unwrap_or_default();
+                let wetting = wetting.as_ref().map(|default| default.0).unwrap_or_default();
                 let worn = dress(&mut commands, wearer, wear, made, wetting);
                 commands.trigger(HairWorn { entity: wearer, hair: worn.hair });
                 wearing.worn = Some(worn);

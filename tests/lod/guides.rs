@@ -32,7 +32,7 @@ fn the_share_that_is_simulated_is_spread_evenly_and_finer_levels_hold_coarser_on
     let mut app = test_app(60.0);
     let (hair, ids) = head(&mut app, 400, 4, 0.1);
     let level = |below, share| LodLevel::new(below, 5, 1).unwrap().with_strands(share).unwrap();
-    let levels = vec![level(0.5, 0.5), level(0.2, 0.1), level(0.1, 0.0)];
+    let levels = vec![level(0.5, 0.5), level(0.2, 0.1), level(0.1, 0.002)];
     put(&mut app, hair, HairLod { levels, ..default() }, 1.0);
     assert_eq!(simulated(&app, &ids).len(), 400);
     let mut before: Vec<Entity> = ids.clone();

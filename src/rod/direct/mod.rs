@@ -42,7 +42,8 @@
 //! | twist that buckles, M L / EI | 32 | 8.99 | 9.37 | |
 //!
 //! Periods below 40 substeps come out longer, by 10 % at 11 substeps; stubs that ring faster only settle.
-//! Hair stiffer than L_g of six times its length is taken as of that.
+//! Hair stiffer than L_g of six times its length is taken as of that, and segments much shorter than 1 mm as
+//! softer than they are: f32 would not carry them.
 //!
 //! Per segment and Newton step: about 480 multiply–adds and 12 divisions or roots; 24 + 2 numbers of
 //! scratch. Of a node come in and go out position, velocity, mass and what it rests on, of an edge frame,
@@ -115,6 +116,11 @@ const DEEP: f32 = 0.25;
 /// L_g in lengths of the strand, at most. Such hair sags by less than a thousandth of its length; f32
 /// would not carry it much stiffer.
 const STIFFEST: f32 = 6.0;
+
+/// How many times firmer than by its own inertia in a substep a node is held by its neighbours, at most,
+/// for a strand of one segment; of more, so many times less. f32 would not carry more. Only segments much
+/// shorter than 1 mm come there.
+const FIRMEST: f32 = 1.5e8;
 
 /// Takes the block through one substep, on the instruction set that the machine has.
 #[doc(hidden)]
@@ -365,14 +371,15 @@ fn fall<S: Simd>(
 }
 
 /// Makes masses and stiffnesses of what was gathered: of a node `w` in those of dry nodes, of a joint
-/// `k` as its share of what hair of this gravity-bending length (m) has.
+/// `k` as its share of what hair of this gravity-bending length (m) has, as far as a substep of `dt` (s)
+/// carries it.
 #[doc(hidden)]
-pub fn weigh(level: Level, block: &mut BlockLanes, bending_length: f32) {
-    dispatch!(level, simd => weigh_simd(simd, block, bending_length));
+pub fn weigh(level: Level, block: &mut BlockLanes, bending_length: f32, dt: f32) {
+    dispatch!(level, simd => weigh_simd(simd, block, bending_length, dt));
 }
 
 #[inline(always)]
-fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32) {
+fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32) {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let half = f32x16::splat(simd, 0.5);
     let mut sum = zero;
@@ -385,13 +392,15 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32) {
     let stiff = Real::min(f32x16::splat(simd, bending_length), sum * f32x16::splat(simd, STIFFEST));
     let bending = density * f32x16::splat(simd, 2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
     let axial = f32x16::splat(simd, REFERENCE_GRAVITY * edges / STRAIN);
+    let firmest = f32x16::splat(simd, FIRMEST / (edges * dt * dt));
     let mut before = zero;
     for (i, n) in b.nodes.iter_mut().enumerate() {
         let mut after = zero;
         if let Some(e) = b.edges.get_mut(i) {
             after = load(simd, &e.l);
-            (load(simd, &e.k) * bending / (before + after)).store_array(&mut e.k);
-            (axial / after).store_array(&mut e.axial);
+            let joint = load(simd, &e.k) * bending / (before + after);
+            Real::min(joint, firmest * after * after).store_array(&mut e.k);
+            Real::min(axial / after, firmest).store_array(&mut e.axial);
         }
         // Half a cell on either side, so the tip carries half a mass.
         let dry_nodes = load(simd, &n.w);

@@ -46,7 +46,7 @@ fn substep(block: &mut BlockLanes, bending_length: f32, obstacles: &[Obstacle]) 
     block.nodes[0].from = block.nodes[0].p;
     block.root_from = block.root;
     block.edges.iter_mut().for_each(|edge| edge.k = [1.0; LANES]);
-    weigh(Level::new(), block, bending_length);
+    weigh(Level::new(), block, bending_length, DT);
     step(Level::new(), block, &params, obstacles);
 }
 
