@@ -164,8 +164,10 @@ impl Ranged for StrandModel {}
 #[reflect(Component, Default, Clone)]
 pub struct AddedMass {
     /// Added mass of each node, over its dry mass. Inverse masses, wind and contacts heed it.
+    #[reflect(ignore)]
     pub mass: Vec<f32>,
     /// Share of its stiffness that each joint has lost, beyond open bonds.
+    #[reflect(ignore)]
     pub softening: Vec<f32>,
     /// Whether the strand's water moves its hydrogen bonds: then wind dries that water, not the bonds.
     pub moves_bonds: bool,

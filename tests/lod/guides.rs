@@ -340,7 +340,8 @@ fn frozen_hair_keeps_its_shape_on_the_head_and_goes_on_from_it() {
         app.update();
     }
     assert_eq!(shape(&app), before, "to the bit");
-    // Near again it goes on from there, at rest.
+    // Near again it goes on from there; the head rests, so it does not stay behind.
+    run(&mut app, 0.2);
     put(&mut app, hair, fewer(0.0), 1.0);
     app.update();
     assert_eq!(carried(&app, &ids), []);

@@ -118,9 +118,9 @@ const DEEP: f32 = 0.25;
 const STIFFEST: f32 = 6.0;
 
 /// How many times firmer than by its own inertia in a substep a node is held by its neighbours, at most,
-/// for a strand of one segment; of more, so many times less. f32 would not carry more. Only segments much
-/// shorter than 1 mm come there.
-const FIRMEST: f32 = 1.5e8;
+/// for a strand of one segment; of n, 1/n² of that. f32 would not carry more. Only segments much shorter
+/// than 1 mm come there.
+const FIRMEST: f32 = 2.5e10;
 
 /// Takes the block through one substep, on the instruction set that the machine has.
 #[doc(hidden)]
@@ -392,7 +392,7 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32
     let stiff = Real::min(f32x16::splat(simd, bending_length), sum * f32x16::splat(simd, STIFFEST));
     let bending = density * f32x16::splat(simd, 2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
     let axial = f32x16::splat(simd, REFERENCE_GRAVITY * edges / STRAIN);
-    let firmest = f32x16::splat(simd, FIRMEST / (edges * dt * dt));
+    let firmest = f32x16::splat(simd, FIRMEST / (edges * edges * dt * dt));
     let mut before = zero;
     for (i, n) in b.nodes.iter_mut().enumerate() {
         let mut after = zero;
