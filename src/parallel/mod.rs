@@ -18,6 +18,7 @@ pub(crate) const TASK: Nanos = Nanos(50_000);
 
 /// About how long one item takes (ns). Decides whether threads are asked for help, never what comes out.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "parallel"), allow(dead_code, reason = "there is one thread"))]
 pub(crate) struct Nanos(pub(crate) usize);
 
 /// Rows of parts come in multiples of this.

@@ -57,6 +57,14 @@ impl Strand {
                 *v = Vec3::ZERO;
             }
         }
+        for (i, tension) in self.tensions.iter_mut().enumerate() {
+            if !tension.is_finite() {
+                found.get_or_insert_with(|| {
+                    format!("tension {i} of the strand is {tension} N, expected a finite one")
+                });
+                *tension = 0.0;
+            }
+        }
         // The direct solver keeps no angular velocities, so nothing else would notice.
         for (i, spin) in self.angular_velocities.iter_mut().enumerate() {
             if !spin.is_finite() {

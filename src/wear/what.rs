@@ -26,7 +26,7 @@ use bevy::prelude::*;
 /// # }
 /// ```
 ///
-/// The hair is a [`Hair`] entity of its own, below the bone (or the mesh where there is none), with
+/// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there is none), with
 /// [`WornHair`]; [`HairWorn`] tells which. Its settings are the preset's, and a
 /// [`Wetting`](crate::Wetting) that counts as many fibres as grow there; to change them, wait for it:
 ///
