@@ -4,6 +4,7 @@
 //! without contact between strands; then crowds. Medians of five runs of 20 ticks; nothing is drawn and
 //! nothing sleeps. `KERATIN_BENCH_ONLY=wavy,crowd` prints these rows alone.
 
+mod common;
 #[path = "../examples/presets/head.rs"]
 #[allow(dead_code, reason = "the pictures use all of it")]
 mod head;
@@ -16,20 +17,13 @@ mod scenes {
     pub const HEAD_RADIUS: f32 = 0.1;
 }
 
-use bevy::{
-    app::{TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy},
-    prelude::*,
-    time::TimeUpdateStrategy,
-};
+use bevy::prelude::*;
 use bevy_keratin::{
     ScreenShare,
     plant::{HairPreset, Scalp},
     prelude::*,
 };
-use std::{
-    process::Command,
-    time::{Duration, Instant},
-};
+use std::{process::Command, time::Instant};
 
 const THREADS: &str = "KERATIN_BENCH_THREADS";
 
@@ -196,26 +190,9 @@ fn walk(
 }
 
 fn app(threads: usize) -> App {
-    // The thread that runs the app works too.
-    let pools = TaskPoolOptions {
-        compute: TaskPoolThreadAssignmentPolicy {
-            min_threads: threads - 1,
-            max_threads: threads - 1,
-            percent: 1.0,
-            on_thread_spawn: None,
-            on_thread_destroy: None,
-        },
-        ..default()
-    };
-    let mut app = App::new();
-    app.add_plugins((
-        MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools }),
-        HairPlugins::default(),
-    ))
-    .insert_resource(Time::<Fixed>::from_hz(60.0))
-    .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
-    .insert_resource(HairDefault(HairSleep::never()))
-    .add_systems(FixedUpdate, walk);
-    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    let mut app = common::app(threads);
+    app.add_plugins(HairPlugins::default())
+        .insert_resource(HairDefault(HairSleep::never()))
+        .add_systems(FixedUpdate, walk);
     app
 }

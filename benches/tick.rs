@@ -14,6 +14,7 @@
 //!     target/release/deps/tick-… 'projection::16$' --bench --sample-count 1 --sample-size 1
 //! ```
 
+mod common;
 #[path = "tick/scalar.rs"]
 mod scalar;
 #[path = "tick/table.rs"]

@@ -42,11 +42,13 @@ pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
 #[cfg(feature = "avian")]
 pub use contact::{AvianHairCollider, AvianShapeError};
 pub use contact::{ColliderShape, HairCollider, LockContact};
-pub use environment::{AirDrag, Blower, Climate, HairGravity, WindReceived};
+pub use environment::{
+    AirDrag, Blower, Climate, HairGravity, Wind, WindReceived, WindZone, ZoneShape,
+};
 pub use fault::{FaultKind, HairFault};
 #[cfg(feature = "groom")]
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
-pub use lod::{HairLod, LodLevel, PresentLod, ScreenShare};
+pub use lod::{HairBudget, HairEstimate, HairLod, LodLevel, PresentLod, ScreenShare};
 pub use mass_spring::Springs;
 pub use plugins::HairPlugins;
 pub use rod::{HairSolver, SolverMethod, Stiffness, StretchProjection, Sweeps};
@@ -56,8 +58,8 @@ pub use schedule::{HairStep, HairSubsteps, HairSystems, HairTick, ProcessTime};
 pub use setting::{HairDefault, InvalidValue, ValueRange};
 pub use sleep::HairSleep;
 pub use strand::{
-    AddedMass, Hair, HairInertia, HeldNodes, Sleepers, Strand, StrandError, StrandModel, StrandOf,
-    StrandSleep, Strands,
+    AddedMass, Hair, HairInertia, HeldNodes, HeldReach, Sleepers, Strand, StrandError, StrandModel,
+    StrandOf, StrandSleep, Strands,
 };
 pub use treatment::{PermRod, Treat, Winding, WoundOn, WoundStrands};
 pub use water::{Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting};
@@ -84,10 +86,10 @@ pub mod prelude {
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
-        HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairLod, HairPlugins,
-        HairSleep, HairSolver, HairSubsteps, HairSystems, HairTick, HeldNodes, LockContact,
-        Moisture, PermRod, ProcessTime, ScreenShare, Shower, SoakHair, SolverMethod, Stiffness,
-        Strand, StrandModel, StrandOf, StrandSleep, Strands, StretchProjection, Sweeps, Treat,
-        WaterLedger, Wetting, Winding, WoundOn,
+        HairBudget, HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairLod,
+        HairPlugins, HairSleep, HairSolver, HairSubsteps, HairSystems, HairTick, HeldNodes,
+        LockContact, Moisture, PermRod, ProcessTime, ScreenShare, Shower, SoakHair, SolverMethod,
+        Stiffness, Strand, StrandModel, StrandOf, StrandSleep, Strands, StretchProjection, Sweeps,
+        Treat, WaterLedger, Wetting, Wind, WindZone, Winding, WoundOn,
     };
 }

@@ -157,14 +157,18 @@ fn a_strand_that_goes_wrong_is_put_back_and_its_neighbours_do_not_notice() {
     let (mut healthy, ids) = build();
     run(&mut healthy, 0.2);
 
-    // a velocity from somewhere
-    let (mut app, ids_b) = build();
-    app.world_mut().get_mut::<Strand>(ids_b[2]).unwrap().velocities_mut()[3] = Vec3::NAN;
-    run(&mut app, 0.2);
-    assert_eq!(fault_kinds(&mut app), [FaultKind::PutBack], "told once");
-    assert!(strand(&app, ids_b[2]).is_finite());
-    for i in [0, 1, 3, 4] {
-        assert_eq!(strand(&app, ids_b[i]).positions(), strand(&healthy, ids[i]).positions());
+    // a velocity from somewhere: no number, or one that the step cannot carry
+    for (velocity, kind) in
+        [(Vec3::NAN, FaultKind::Strand), (Vec3::splat(1e30), FaultKind::PutBack)]
+    {
+        let (mut app, ids_b) = build();
+        app.world_mut().get_mut::<Strand>(ids_b[2]).unwrap().velocities_mut()[3] = velocity;
+        run(&mut app, 0.2);
+        assert_eq!(fault_kinds(&mut app), [kind], "told once");
+        assert!(strand(&app, ids_b[2]).is_finite());
+        for i in [0, 1, 3, 4] {
+            assert_eq!(strand(&app, ids_b[i]).positions(), strand(&healthy, ids[i]).positions());
+        }
     }
 
     // the pose itself

@@ -5,13 +5,8 @@
 //! turns down, not ratios. Bevy's thread pools are made once a process, so each number of threads
 //! gets a process of its own.
 
-use super::scalar::Twin;
-use bevy::{
-    app::{TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy},
-    prelude::*,
-    tasks::ComputeTaskPool,
-    time::TimeUpdateStrategy,
-};
+use super::{common, scalar::Twin};
+use bevy::{prelude::*, tasks::ComputeTaskPool};
 use bevy_keratin::{
     BondChanges, DropletRules, HairStep, Sleepers,
     bond::{BondPlugin, RestShape},
@@ -23,10 +18,7 @@ use bevy_keratin::{
     treatment::TreatmentPlugin,
     water::WaterPlugin,
 };
-use std::{
-    process::Command,
-    time::{Duration, Instant},
-};
+use std::{process::Command, time::Instant};
 
 const THREADS: &str = "KERATIN_BENCH_THREADS";
 
@@ -294,22 +286,7 @@ enum Kind {
 }
 
 fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
-    // The thread that runs the app works too.
-    let pools = TaskPoolOptions {
-        compute: TaskPoolThreadAssignmentPolicy {
-            min_threads: threads - 1,
-            max_threads: threads - 1,
-            percent: 1.0,
-            on_thread_spawn: None,
-            on_thread_destroy: None,
-        },
-        ..default()
-    };
-    let mut app = App::new();
-    app.add_plugins(MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools }))
-        .insert_resource(Time::<Fixed>::from_hz(60.0))
-        .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
-    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    let mut app = common::app(threads);
     let plugins = HairPlugins::default().build();
     match kind {
         Kind::Projection | Kind::SweepsAlone => app.add_plugins(

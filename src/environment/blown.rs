@@ -1,14 +1,20 @@
-//! What the air of blowers does at a node: worked out once, for velocities, bonds and water.
+//! What the air does at a node: worked out once, for velocities, bonds and water.
 
-use super::{blower::LocalBlower, vapour::jet, wind::wind};
+use super::{local::LocalBlower, vapour::jet, wind::wind};
 use crate::bond::model::drying;
 use bevy::prelude::*;
 
-/// The air that blowers send past a node.
+/// The wind in which hair sleeps (m/s): at any usual drag it bends hair by a thousandth of what gravity
+/// does.
+const CALM: f32 = 5e-3;
+
+/// The air that comes past a node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Blown {
     /// Acceleration of the edge that begins here, equation 17 (m/s²).
     pub(crate) acceleration: Vec3,
+    /// Velocity of the wind and of zones, which drag takes hair along with (m/s).
+    pub(crate) flow: Vec3,
     /// Rate at which it dries, equation 19 (1/s).
     pub(crate) drying: f32,
     /// Velocity of the air beyond the room's draught (m/s).
@@ -16,12 +22,14 @@ pub(crate) struct Blown {
     /// The air's share of the jets, and their temperature weighted by it (°C).
     share: f32,
     celsius: f32,
+    /// How much warmer zones make it (K).
+    warmth: f32,
 }
 
 impl Blown {
     /// At a place of an `edge`, in a frame of `scale` world units to one. Aside of its axis a jet falls
     /// off like equation 17's wind.
-    pub(crate) fn at(blowers: &[LocalBlower], scale: f32, p: Vec3, edge: Vec3) -> Self {
+    pub(super) fn at(blowers: &[LocalBlower], scale: f32, p: Vec3, edge: Vec3) -> Self {
         let mut all = Self::default();
         for LocalBlower { nozzle, aim, blower } in blowers {
             let acceleration = wind(blower.strength, *nozzle, *aim, p, edge);
@@ -37,13 +45,22 @@ impl Blown {
         all
     }
 
+    /// Whether hair may sleep in it: it neither moves nor sets anything.
+    pub(crate) fn is_calm(&self) -> bool {
+        self.flow.length_squared() < CALM * CALM && self.drying < 1e-6
+    }
+
     /// How much warmer it is than a `room` (K).
     pub(crate) fn warmth(&self, room: f32) -> f32 {
-        self.celsius - room * self.share
+        self.celsius - room * self.share + self.warmth
+    }
+
+    pub(super) fn add_warmth(&mut self, warmth: f32) {
+        self.warmth += warmth;
     }
 }
 
-/// What blowers do to each node of a wet strand, root first. Kept by the tick while any blower blows.
+/// What the air does to each node of a wet strand, root first. Kept by the tick while any air moves.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct BlownAir {

@@ -1,17 +1,21 @@
-//! What surrounds hair: gravity, the wind of blowers, the drag of the air, and how fast it dries.
+//! What surrounds hair: gravity, the wind of the place, of zones and of blowers, the drag of the air,
+//! and how fast it dries.
 
-mod blower;
 mod blown;
 mod climate;
+mod gust;
+mod local;
 mod systems;
 pub mod vapour;
 pub mod wind;
+mod zone;
 
-pub(crate) use blower::{LocalBlower, local_blowers};
 pub(crate) use blown::Blown;
 pub use blown::BlownAir;
 pub use climate::Climate;
+pub(crate) use local::{LocalBlower, LocalWinds, Winds};
 pub use systems::EnvironmentPlugin;
+pub use zone::{Wind, WindZone, ZoneShape};
 
 use crate::{
     setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
@@ -44,12 +48,12 @@ impl Ranged for HairGravity {
 }
 
 setting! {
-    /// Drag of still air. Component of a [`Hair`](crate::Hair); where absent,
+    /// Drag of the air: hair's velocity becomes that of the air around it. Component of a [`Hair`](crate::Hair); where absent,
     /// [`HairDefault<AirDrag>`](crate::HairDefault) holds.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct AirDrag {
-        /// Rate at which velocities die away, v′ = −rate · v.
+        /// Rate at which velocities over the air's die away, v′ = −rate · (v − u).
         pub rate: f32 = 2.0, "1/s" in RATE: 0.0..=1e4, safe 0.0..=50.0, "2 is air, 20 is water";
     }
 }

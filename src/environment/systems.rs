@@ -1,9 +1,9 @@
 //! `ExternalForces`: what the air and gravity do to velocities, and what wind asks of the bonds.
 
 use super::{
-    AirDrag, Blower, Climate, HairGravity, WindReceived,
-    blower::{LocalBlower, local_blowers},
-    blown::{Blown, BlownAir},
+    AirDrag, Blower, Climate, HairGravity, Wind, WindReceived, WindZone, ZoneShape,
+    blown::BlownAir,
+    local::{LocalWinds, Winds},
     vapour::DryingAir,
 };
 use crate::{
@@ -22,9 +22,12 @@ impl Plugin for EnvironmentPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<AirDrag>(app);
         setting::component::<Blower>(app);
+        setting::component::<WindZone>(app);
+        setting::resource::<Wind>(app);
         setting::resource::<HairGravity>(app);
         setting::resource::<Climate>(app);
         app.register_type::<WindReceived>()
+            .register_type::<ZoneShape>()
             .register_type::<BlownAir>()
             .register_required_components::<Strand, BlownAir>()
             .init_resource::<DryingAir>()
@@ -45,8 +48,7 @@ struct LocalAir {
     gravity: Vec3,
     keep: f32,
     dt: f32,
-    scale: f32,
-    blowers: Vec<LocalBlower>,
+    winds: LocalWinds,
 }
 
 /// A strand that air acts on, with the number of its hair's air.
@@ -64,7 +66,7 @@ fn apply_air(
     gravity: Res<HairGravity>,
     drag: Settings<AirDrag>,
     hairs: Query<&TickPose, With<Hair>>,
-    blowers: Query<(&Blower, &TickPose)>,
+    winds: Winds,
     mut strands: Query<(
         &StrandOf,
         &StrandSleep,
@@ -83,13 +85,12 @@ fn apply_air(
             gravity: pose.direction_in(gravity) * dt,
             keep: bevy::math::ops::exp(-drag.of(hair).rate * dt),
             dt,
-            scale: pose.scale,
-            blowers: local_blowers(pose, &blowers),
+            winds: winds.seen_from(pose),
         })
     };
     // Wind also dries hair that is carried.
-    let is_spared =
-        |sleep: &StrandSleep| sleep.is_asleep() || (sleep.is_follower() && blowers.is_empty());
+    let dries = winds.dry();
+    let is_spared = |sleep: &StrandSleep| sleep.is_asleep() || (sleep.is_follower() && !dries);
     let ahead = |(_, strand, ..): &InAir<'_>| {
         let (_, velocities, _, spins) = strand.parts();
         prefetch(velocities);
@@ -122,6 +123,7 @@ fn blow(
     mut received: Option<&mut WindReceived>,
 ) {
     at_nodes.clear();
+    let (length, winds) = (strand.length(), &air.winds);
     let (positions, velocities, _, spins) = strand.parts_mut();
     for v in velocities.iter_mut() {
         *v = *v * air.keep + air.gravity;
@@ -131,9 +133,12 @@ fn blow(
     for spin in spins {
         *spin *= air.keep;
     }
-    if air.blowers.is_empty() {
+    if winds.are_still() {
         return;
     }
+    let wind = winds.gusty(positions[0]);
+    let zones = winds.zones_near(positions[0], length);
+    let taken_along = 1.0 - air.keep;
     let edges = positions.len().saturating_sub(1);
     // Wet hair is heavier: the same wind moves it less.
     let heed = |i: usize| 1.0 / (1.0 + added_mass.mass.get(i).copied().unwrap_or(0.0));
@@ -142,8 +147,8 @@ fn blow(
         // The tip has no edge of its own: it takes the last one's wind.
         let e = i.min(edges - 1);
         let edge = positions[e + 1] - positions[e];
-        let blown = Blown::at(&air.blowers, air.scale, positions[i], edge);
-        *velocity += blown.acceleration * (air.dt * heed(i));
+        let blown = winds.at(wind, zones, positions[i], edge);
+        *velocity += blown.acceleration * (air.dt * heed(i)) + blown.flow * taken_along;
         // Where there is water, the wind dries that, and the bonds follow it.
         if is_wet {
             at_nodes.push(blown);
@@ -159,7 +164,10 @@ fn blow(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{
+        super::{blown::Blown, local::LocalBlower},
+        *,
+    };
 
     #[test]
     fn every_node_gets_its_wind_once() {
@@ -169,7 +177,8 @@ mod tests {
         let blowers = vec![LocalBlower { nozzle: Vec3::ZERO, aim: Vec3::Z, blower }];
         let blown: Vec<Blown> =
             (0..4).map(|i| Blown::at(&blowers, 1.0, points[i], Vec3::Y * 0.01)).collect();
-        let air = LocalAir { gravity: Vec3::ZERO, keep: 1.0, dt: 0.01, scale: 1.0, blowers };
+        let winds = LocalWinds { blowers, ..default() };
+        let air = LocalAir { gravity: Vec3::ZERO, keep: 1.0, dt: 0.01, winds };
         let (mut changes, mut at_nodes) = (BondChanges::default(), BlownAir::default());
         let mut received = WindReceived::default();
         let mut wet = AddedMass { mass: vec![1.0; 4], ..default() };

@@ -32,8 +32,13 @@
 //! a level keeps the shape it came with, as far as its guides keep theirs; all strands take new places
 //! in the order then.
 //!
+//! # A budget
+//!
+//! A [`HairBudget`] bounds what all hair takes: beyond it the least important goes on to coarser levels.
+//!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
+mod budget;
 mod carry;
 mod choose;
 #[doc(hidden)]
@@ -44,6 +49,7 @@ pub mod model;
 pub mod spread;
 mod systems;
 
+pub use budget::{HairBudget, HairEstimate};
 pub use choose::{Follower, Guides};
 pub use systems::LodPlugin;
 
@@ -73,6 +79,9 @@ setting! {
             vec![LodLevel::NEAR, LodLevel::BACKGROUND, LodLevel::FROZEN] => Ranged::clamp_values;
         /// By which share more than a level's limit hair has to grow before it leaves the level again.
         pub hysteresis: f32 = 0.2, in HYSTERESIS: 0.0..=100.0, safe 0.05..=1.0, "0.2 is a fifth";
+        /// How much its share of the view counts where a [`HairBudget`] is short: a hero's more than a
+        /// passer-by's.
+        pub importance: f32 = 1.0, in IMPORTANCE: 0.0..=1e6, safe 0.1..=10.0, "1 is a passer-by's";
     }
 }
 
@@ -121,7 +130,11 @@ pub struct PresentLod {
     pub level: usize,
     /// How many strands are not simulated but carried by others.
     pub carried: usize,
+    /// How many levels coarser it is than it would be without a [`HairBudget`].
+    pub saved: usize,
     strands: Option<f32>,
+    /// Segments of all its strands, and how many strands there were when they were counted.
+    segments: (usize, usize),
 }
 
 impl PresentLod {

@@ -1,15 +1,16 @@
 //! Levels are chosen at the start of a tick; the systems that move hair ask what they are.
 
 use super::{
-    Follower, Guides, HairLod, LodLevel, PresentLod, ScreenShare,
+    Follower, Guides, HairBudget, HairEstimate, HairLod, LodLevel, PresentLod, ScreenShare,
+    budget::{Candidate, costs, fit},
     carry::{move_followers, sync_follower_sleep},
     choose::{choose_guides, let_go},
     model,
 };
 use crate::{
-    schedule::{HairSystems, HairTick, SubstepLimits, first_substep},
+    schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
     setting::{self, Ranged},
-    strand::{Hair, Strand},
+    strand::{Hair, Strand, Strands},
 };
 use bevy::prelude::*;
 
@@ -19,7 +20,10 @@ pub struct LodPlugin;
 impl Plugin for LodPlugin {
     fn build(&self, app: &mut App) {
         setting::component::<HairLod>(app);
-        app.register_type::<LodLevel>()
+        setting::resource::<HairBudget>(app);
+        app.init_resource::<HairEstimate>()
+            .register_type::<HairEstimate>()
+            .register_type::<LodLevel>()
             .register_type::<ScreenShare>()
             .register_type::<PresentLod>()
             .register_type::<Follower>()
@@ -50,16 +54,51 @@ fn forget(left: On<Remove, HairLod>, mut hairs: Query<(&mut PresentLod, &mut Sub
 }
 
 fn choose(
-    mut hairs: Query<(&HairLod, &ScreenShare, &mut PresentLod, &mut SubstepLimits), With<Hair>>,
+    step: Res<HairStep>,
+    budget: Res<HairBudget>,
+    mut estimate: ResMut<HairEstimate>,
+    mut hairs: Query<
+        (&HairLod, &ScreenShare, &Strands, &mut PresentLod, &mut SubstepLimits),
+        With<Hair>,
+    >,
+    strands: Query<&Strand>,
 ) {
-    for (lod, share, mut present, mut limits) in &mut hairs {
-        let lod = lod.clamped();
-        let level = model::choose(&lod.levels, lod.hysteresis, present.level, share.0);
-        let settings = level.checked_sub(1).and_then(|i| lod.levels.get(i));
+    let budget = budget.clamped();
+    let mut chosen: Vec<_> = hairs
+        .iter_mut()
+        .map(|(lod, share, members, mut present, limits)| {
+            let lod = lod.clamped();
+            let before = present.level.saturating_sub(present.saved);
+            let wanted = model::choose(&lod.levels, lod.hysteresis, before, share.0);
+            let segments = match present.segments {
+                (segments, counted) if counted == members.len() => segments,
+                _ => strands.iter_many(members.collection()).map(Strand::edges).sum(),
+            };
+            present.bypass_change_detection().segments = (segments, members.len());
+            // Who is made to save goes on with it until somebody is clearly less important.
+            let held = if present.saved > 0 { 1.0 + lod.hysteresis } else { 1.0 };
+            let importance = share.0.max(0.0) * lod.importance / held;
+            let costs = costs(&lod.levels, segments, step.count);
+            (Candidate { importance, wanted, costs }, lod.levels.clone(), present, limits)
+        })
+        .collect();
+    let candidates: Vec<Candidate> = chosen.iter().map(|c| c.0.clone()).collect();
+    let levels = fit(&candidates, budget.milliseconds / budget.slowness);
+    let cost_of = |level: &dyn Fn(usize) -> usize| -> f32 {
+        let costs = candidates.iter().enumerate().map(|(i, c)| c.costs[level(i)]);
+        costs.sum::<f32>() * budget.slowness
+    };
+    estimate.set_if_neq(HairEstimate {
+        wanted: cost_of(&|i| candidates[i].wanted),
+        present: cost_of(&|i| levels[i]),
+    });
+    for ((candidate, settings, present, limits), level) in chosen.iter_mut().zip(levels) {
+        let settings = level.checked_sub(1).and_then(|i| settings.get(i));
         present.set_if_neq(PresentLod {
             level,
+            saved: level - candidate.wanted,
             strands: settings.map(|l| l.strands),
-            carried: present.carried,
+            ..**present
         });
         let limits_of =
             |l: &LodLevel| SubstepLimits { substeps: l.substeps, iterations: l.iterations };

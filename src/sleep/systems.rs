@@ -7,7 +7,7 @@ use super::{
 use crate::{
     bond::{BondChanges, BondInfluence, Bonds, Cuticle},
     contact::{HairCollider, LockContact, seen_from},
-    environment::{AirDrag, Blower, HairGravity, LocalBlower, local_blowers, wind::wind},
+    environment::{AirDrag, HairGravity, LocalBlower, LocalWinds, Winds, wind::wind},
     mass_spring::Springs,
     parallel::{Nanos, for_each},
     rod::{
@@ -116,7 +116,7 @@ struct WakeEvents {
     stirred: bool,
     /// Where colliders have come, gone or moved: what is within reach of these (m).
     solids: Vec<(Solid, f32)>,
-    blowers: Vec<LocalBlower>,
+    winds: LocalWinds,
 }
 
 impl SleepSnapshot {
@@ -147,7 +147,7 @@ impl SleepSnapshot {
             sleep: conditions.sleep,
             stirred: !(rests && same),
             solids,
-            blowers: Vec::new(),
+            winds: LocalWinds::default(),
         }
     }
 
@@ -218,7 +218,7 @@ fn update_sleep(
     step: Res<HairStep>,
     settings: RestSettings,
     colliders: Query<(&HairCollider, &TickPose)>,
-    blowers: Query<(&Blower, &TickPose)>,
+    winds: Winds,
     mut hairs: Query<
         (Entity, &TickPose, &mut SleepSnapshot, &mut Sleepers, Option<&Strands>),
         With<Hair>,
@@ -245,7 +245,7 @@ fn update_sleep(
         let snapshot = snapshot.bypass_change_detection();
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), members, seen, step.count);
-        new.blowers = local_blowers(frame.now(), &blowers);
+        new.winds = winds.seen_from(frame.now());
         index_of.insert(hair, wake_events.len());
         wake_events.push(new);
     }
@@ -295,7 +295,7 @@ fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
             || has_moved_root(strand, still, distance, angle)
             || pulls(strand, still, targets, distance)
             || comes_near(still, &wake_events.solids)
-            || is_blown(strand, &wake_events.blowers)
+            || is_blown(strand, &wake_events.winds)
         {
             sleep.bypass_change_detection().wake_up();
             still.bypass_change_detection().begin(strand, held_nodes(targets));
@@ -312,7 +312,7 @@ fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
         || !keeps_turn(&still.orientations, strand.orientations(), angle)
         || has_moved_root(strand, still, distance, angle)
         || pulls(strand, still, targets, distance)
-        || is_blown(strand, &wake_events.blowers)
+        || is_blown(strand, &wake_events.winds)
     {
         sleep.wake_up();
         still.begin(strand, held_nodes(targets));
@@ -361,10 +361,13 @@ fn comes_near(still: &StillPose, solids: &[(Solid, f32)]) -> bool {
     })
 }
 
-/// Whether a blower reaches the strand's root, middle or tip.
-fn is_blown(strand: &Strand, blowers: &[LocalBlower]) -> bool {
+/// Whether air that moves reaches the strand's root, middle or tip.
+fn is_blown(strand: &Strand, winds: &LocalWinds) -> bool {
     let (p, last) = (strand.positions(), strand.edges().saturating_sub(1));
-    blowers.iter().any(|LocalBlower { nozzle, aim, blower }| {
+    if winds.flows() && [0, last / 2, last].into_iter().any(|i| !winds.around(p[i]).is_calm()) {
+        return true;
+    }
+    winds.blowers.iter().any(|LocalBlower { nozzle, aim, blower }| {
         [0, last / 2, last].into_iter().any(|i| {
             let felt = wind(blower.strength, *nozzle, *aim, p[i], p[i + 1] - p[i]);
             !within(felt.length(), BREEZE)

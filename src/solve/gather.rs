@@ -46,11 +46,8 @@ pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], d
         };
         let positions = strand.positions();
         hold(&mut block.nodes[0], positions[0], positions[0]);
-        let targets = held.iter().flat_map(|held| &held.targets);
-        for ((node, from), target) in block.nodes.iter_mut().zip(positions).zip(targets) {
-            if let Some(target) = target {
-                hold(node, *from, *target);
-            }
+        for (node, target) in held.iter().flat_map(|held| held.within_reach(strand)) {
+            hold(&mut block.nodes[node], positions[node], target);
         }
     }
 }

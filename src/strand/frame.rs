@@ -115,11 +115,15 @@ setting! {
         pub moving: f32 = 1.0, in MOVING: 0.0..=1.0, "1 is as in nature";
         /// The same of the head's turning.
         pub turning: f32 = 1.0, in TURNING: 0.0..=1.0, "1 is as in nature";
-        /// A head that moves farther than this within one tick is taken to have been put elsewhere:
-        /// its hair goes along in its present shape, at rest. In the hair's own scale; 1 is 60 m/s at
-        /// 60 Hz.
-        pub teleport_distance: f32 = 1.0, "m" in TELEPORT_DISTANCE: 0.0..=f32::INFINITY,
-            safe 0.1..=f32::INFINITY, "1 suits games";
+        /// A head that moves farther than this within one tick, and farther than
+        /// [`teleport_lengths`](Self::teleport_lengths), is taken to have been put elsewhere: its hair
+        /// goes along in its present shape, at rest. In the hair's own scale; 0.5 is 30 m/s at 60 Hz.
+        pub teleport_distance: f32 = 0.5, "m" in TELEPORT_DISTANCE: 0.0..=f32::INFINITY,
+            safe 0.1..=f32::INFINITY, "0.5 suits games";
+        /// The same in lengths of its longest strand: long hair can be swept along by what short hair
+        /// cannot. Colliders, rods and blowers that move as some hair does jump when that does.
+        pub teleport_lengths: f32 = 3.0, in TELEPORT_LENGTHS: 0.0..=f32::INFINITY,
+            safe 1.0..=10.0, "3 whips a hair round once";
         /// The same for a head that turns by more than this. 1.6 is more than 5000° a second at
         /// 60 Hz; π and above never happen.
         pub teleport_angle: f32 = 1.6, "rad" in TELEPORT_ANGLE: 0.0..=f32::INFINITY,
@@ -129,9 +133,9 @@ setting! {
 
 impl HairInertia {
     /// Whether going from one pose to another within a tick is being put there.
-    fn is_jump(&self, from: &Pose, to: &Pose) -> bool {
-        let scale = to.scale.max(from.scale);
-        to.translation.distance(from.translation) > self.teleport_distance * scale
+    fn is_jump(&self, from: &Pose, to: &Pose, longest: impl FnOnce() -> f32) -> bool {
+        let distance = to.translation.distance(from.translation) / to.scale.max(from.scale);
+        distance > self.teleport_distance && distance > self.teleport_lengths * longest()
             || to.rotation.angle_between(from.rotation) > self.teleport_angle
     }
 }
@@ -245,13 +249,14 @@ impl TickPose {
     }
 
     /// Begins a tick: the frame is to go to `to`, from where it was; from `to` itself the first time
-    /// and when it is put there. Says whether it was put, and whether an invalid pose should be
-    /// reported.
+    /// and when it is put there, for which the `longest` strand (m) may be asked. Says whether it was
+    /// put, and whether an invalid pose should be reported.
     pub(super) fn aim(
         &mut self,
         to: Option<Pose>,
         seconds: f64,
         inertia: &HairInertia,
+        longest: impl FnOnce() -> f32,
     ) -> (bool, bool) {
         let report = to.is_none() && !self.was_invalid;
         self.was_invalid = to.is_none();
@@ -263,7 +268,7 @@ impl TickPose {
         self.inertia = Vec2::new(inertia.moving, inertia.turning);
         let first = self.from.is_none();
         let asked = core::mem::take(&mut self.jumps);
-        let put = !first && to.is_some_and(|to| asked || inertia.is_jump(&self.to, &to));
+        let put = !first && to.is_some_and(|to| asked || inertia.is_jump(&self.to, &to, longest));
         let to = to.map(|present| {
             if put {
                 self.frames = Frames::default();
@@ -278,6 +283,11 @@ impl TickPose {
         self.from = from;
         self.shares[1] = 0.0;
         (put, report)
+    }
+
+    /// The way of the entity's tick (m).
+    pub(super) fn way_to(&self, to: &Pose) -> Vec3 {
+        to.translation - self.to.translation
     }
 
     /// Notes where the entity is as a frame begins, `seconds` being the frame before's time.
@@ -361,10 +371,10 @@ mod tests {
         };
         let mut frame = TickPose::default();
         let inertia = HairInertia { teleport_distance: 10.0, ..default() };
-        assert_eq!(frame.aim(Some(a), 0.0, &inertia), (false, false));
+        assert_eq!(frame.aim(Some(a), 0.0, &inertia, || 0.0), (false, false));
         frame.advance(1.0, false);
         assert!(frame.frame_delta().is_none(), "the first tick begins where the frame is");
-        frame.aim(Some(b), 0.0, &inertia);
+        frame.aim(Some(b), 0.0, &inertia, || 0.0);
         let world = Vec3::new(0.2, 0.4, -0.3);
         let mut local = a.point_in(world);
         for i in 1..=6 {
@@ -374,8 +384,13 @@ mod tests {
         assert!(b.point_out(local).distance(world) < 1e-5);
         // Back again, two substeps as one; what moves along is seen to move as far.
         let mut beside = frame.clone();
-        frame.aim(Some(a), 0.0, &inertia);
-        beside.aim(Some(Pose { translation: b.translation + Vec3::X * 0.6, ..b }), 0.0, &inertia);
+        frame.aim(Some(a), 0.0, &inertia, || 0.0);
+        beside.aim(
+            Some(Pose { translation: b.translation + Vec3::X * 0.6, ..b }),
+            0.0,
+            &inertia,
+            || 0.0,
+        );
         for i in 1..=6 {
             frame.advance(i as f32 / 6.0, i % 2 == 0);
             beside.advance(i as f32 / 6.0, false);
@@ -388,9 +403,9 @@ mod tests {
             }
         }
         assert!(a.point_out(local).distance(world) < 1e-5);
-        frame.aim(Some(b), 0.0, &inertia);
+        frame.aim(Some(b), 0.0, &inertia, || 0.0);
         frame.advance(1.0, false);
-        let mut reports = || frame.aim(None, 0.0, &inertia).1;
+        let mut reports = || frame.aim(None, 0.0, &inertia, || 0.0).1;
         assert!(reports() && !reports(), "reported once");
         frame.advance(1.0, false);
         assert_eq!(*frame.now(), b);
@@ -409,10 +424,10 @@ mod tests {
         ];
         for spoil in spoils {
             let mut pose = TickPose::default();
-            pose.aim(Some(a), 0.0, &HairInertia::default());
+            pose.aim(Some(a), 0.0, &HairInertia::default(), || 0.0);
             pose.advance(1.0, false);
             spoil(&mut pose, broken);
-            pose.aim(Some(a), 0.0, &HairInertia::default());
+            pose.aim(Some(a), 0.0, &HairInertia::default(), || 0.0);
             pose.advance(1.0, false);
             assert_eq!((pose.now, pose.before), (a, a));
         }
@@ -425,7 +440,7 @@ mod tests {
             let at = Pose { translation: Vec3::new(far, -far, 0.3 * far), rotation, scale: 1.1 };
             let mut pose = TickPose::default();
             for _ in 0..3 {
-                pose.aim(Some(at), 0.0, &HairInertia::default());
+                pose.aim(Some(at), 0.0, &HairInertia::default(), || 0.0);
                 for i in 1..=7 {
                     pose.advance(i as f32 / 7.0, false);
                     assert!(pose.frame_delta().is_none(), "{far}");

@@ -1,6 +1,6 @@
 //! Strands that were written into by reflection: inspectors and scene files reach private parts, too.
 
-use super::{MIN_SEGMENT, Strand};
+use super::{AddedMass, MAX_SEGMENT, MIN_SEGMENT, Strand};
 use crate::rod::frame::parallel_transport;
 use bevy::prelude::*;
 
@@ -35,14 +35,14 @@ impl Strand {
         fit("angular velocities", &mut self.angular_velocities, edges, Vec3::ZERO, &mut found);
         fit("tensions", &mut self.tensions, edges, 0.0, &mut found);
         for (i, length) in self.rest_lengths.iter_mut().enumerate() {
-            if !(MIN_SEGMENT..f32::MAX).contains(length) {
+            if !(MIN_SEGMENT..MAX_SEGMENT).contains(length) {
                 let is = *length;
                 let apart = self.positions[i].distance(self.positions[i + 1]);
-                let known = (MIN_SEGMENT..f32::MAX).contains(&apart);
+                let known = (MIN_SEGMENT..MAX_SEGMENT).contains(&apart);
                 *length = if known { apart } else { UNKNOWN_LENGTH };
                 found.get_or_insert_with(|| {
                     format!(
-                        "rest length {i} of the strand is {is} m, expected more than {MIN_SEGMENT}: \
+                        "rest length {i} of the strand is {is} m, expected {MIN_SEGMENT} to {MAX_SEGMENT}: \
                          {length} m is taken"
                     )
                 });
@@ -98,6 +98,30 @@ impl Strand {
     }
 }
 
+/// The most that a node's load may weigh, over its dry mass.
+const MOST_ADDED: f32 = 1e6;
+
+impl AddedMass {
+    /// Brings loads and softening into their ranges. Says what was found first.
+    pub(super) fn mend(&mut self) -> Option<String> {
+        let lists =
+            [("added mass", &mut self.mass, MOST_ADDED), ("softening", &mut self.softening, 1.0)];
+        let mut found = None;
+        for (name, values, most) in lists {
+            for (i, value) in values.iter_mut().enumerate() {
+                if !(0.0..=most).contains(value) {
+                    found.get_or_insert_with(|| {
+                        format!("{name} {i} of the strand is {value}, expected 0 to {most}")
+                    });
+                    // No number becomes 0.
+                    *value = value.max(0.0).min(most);
+                }
+            }
+        }
+        found
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,5 +163,18 @@ mod tests {
             assert!(strand.rest_lengths.iter().all(|l| (*l - 0.1).abs() < 1e-6));
             assert!(strand.is_finite());
         }
+    }
+    #[test]
+    fn loads_that_somebody_wrote_are_brought_into_range() {
+        let mut added =
+            AddedMass { mass: vec![1.0, f32::NAN, -2.0], softening: vec![0.5, 7.0], ..default() };
+        assert!(
+            added.mend().is_some_and(|told| told.contains("added mass 1 of the strand is NaN"))
+        );
+        assert_eq!(
+            (&added.mass[..], &added.softening[..]),
+            (&[1.0, 0.0, 0.0][..], &[0.5, 1.0][..])
+        );
+        assert_eq!(added.mend(), None);
     }
 }

@@ -10,6 +10,7 @@
 //! in the hair's units: a scaled character's hair behaves as if unscaled.
 
 pub mod frame;
+mod held;
 mod mend;
 mod per_hair;
 mod strand_sleep;
@@ -17,6 +18,8 @@ mod systems;
 mod teleport;
 
 pub use frame::{HairInertia, Pose, TickPose};
+pub(crate) use held::drawn_out;
+pub use held::{HeldNodes, HeldReach};
 pub(crate) use per_hair::PerHair;
 pub use strand_sleep::{Sleepers, StillPose, StrandSleep};
 pub use systems::StrandPlugin;
@@ -75,10 +78,22 @@ pub enum StrandError {
         /// Index of the segment from the root.
         segment: usize,
     },
+    /// Two neighbouring nodes too far apart for single precision.
+    #[error(
+        "segment {segment} of the strand is longer than {MAX_SEGMENT} m: strands are in metres, \
+         scale the source"
+    )]
+    TooLong {
+        /// Index of the segment from the root.
+        segment: usize,
+    },
 }
 
 /// The shortest segment that a strand may have (m).
 pub const MIN_SEGMENT: f32 = 1e-6;
+
+/// The longest one (m): squares of longer ones leave what f32 carries.
+pub const MAX_SEGMENT: f32 = 1e9;
 
 /// So many good steps, a second or so, make a strand well again that was put back: what breaks it once a
 /// tick is told once.
@@ -173,16 +188,6 @@ pub struct AddedMass {
     pub moves_bonds: bool,
 }
 
-/// Nodes that something else holds: a rod they are wound on, a hand, a clip. Held nodes have no
-/// inverse mass and go where they are told. Add it to a strand entity.
-#[derive(Component, Reflect, Clone, Debug, Default)]
-#[reflect(Component, Default, Clone)]
-pub struct HeldNodes {
-    /// For each node from the root where it is to be at the end of the next substep (m, in the
-    /// hair's frame), or `None`. May be shorter than the strand.
-    pub targets: Vec<Option<Vec3>>,
-}
-
 impl Strand {
     /// A strand at rest along `points`, root first, in its hair's frame. Lengths and the angle at
     /// which it leaves the scalp are taken from them.
@@ -195,7 +200,8 @@ impl Strand {
     /// ```
     ///
     /// # Errors
-    /// With fewer than two points, a point that is not finite, or a segment shorter than 1 µm.
+    /// With fewer than two points, a point that is not finite, or a segment shorter than 1 µm or longer
+    /// than a million kilometres.
     pub fn from_polyline(points: &[Vec3]) -> Result<Self, StrandError> {
         if points.len() < 2 {
             return Err(StrandError::TooFewNodes { found: points.len() });
@@ -204,9 +210,11 @@ impl Strand {
             return Err(StrandError::NonFinite { node });
         }
         let rest_lengths: Vec<f32> = points.windows(2).map(|p| p[0].distance(p[1])).collect();
-        let usable = |l: &f32| *l >= MIN_SEGMENT && l.is_finite();
-        if let Some(segment) = rest_lengths.iter().position(|l| !usable(l)) {
+        if let Some(segment) = rest_lengths.iter().position(|l| *l < MIN_SEGMENT) {
             return Err(StrandError::ZeroLength { segment });
+        }
+        if let Some(segment) = rest_lengths.iter().position(|l| *l > MAX_SEGMENT) {
+            return Err(StrandError::TooLong { segment });
         }
         let orientations = parallel_transport(points, None);
         Ok(Self {
@@ -454,7 +462,7 @@ mod tests {
         assert!(zero.to_string().ends_with("merge nodes 1 and 2"), "{zero}");
         assert!(matches!(
             refuse(&[Vec3::splat(-3e38), Vec3::splat(3e38)]),
-            StrandError::ZeroLength { segment: 0 }
+            StrandError::TooLong { segment: 0 }
         ));
     }
 

@@ -1,14 +1,15 @@
 //! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
 
 use super::{
-    AddedMass, Hair, HeldNodes, PerHair, Sleepers, StillPose, Strand, StrandError, StrandHistory,
-    StrandModel, StrandOf, StrandSleep, Strands, TickPose,
+    AddedMass, Hair, HeldNodes, HeldReach, PerHair, Sleepers, StillPose, Strand, StrandError,
+    StrandHistory, StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     frame::{HairInertia, Pose},
+    held::report_out_of_reach,
 };
 use crate::{
     fault::{FaultKind, HairFault},
     parallel::{for_each_part, tables},
-    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Settings},
 };
 use bevy::{ecs::entity_disabling::Disabled, math::Isometry3d, prelude::*};
@@ -28,6 +29,7 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandHistory>()
             .register_type::<StrandError>()
             .register_type::<HeldNodes>()
+            .register_type::<HeldReach>()
             .register_type::<AddedMass>()
             .register_type::<StrandSleep>()
             .register_type::<Sleepers>()
@@ -36,8 +38,12 @@ impl Plugin for StrandPlugin {
             .add_systems(
                 HairTick,
                 (
-                    (mend_strands, remember_drawn).chain().in_set(HairSystems::History),
-                    move_poses.in_set(HairSystems::Poses),
+                    (mend_strands, report_out_of_reach.run_if(first_substep), remember_drawn)
+                        .chain()
+                        .in_set(HairSystems::History),
+                    (aim_poses.run_if(first_substep), advance_poses)
+                        .chain()
+                        .in_set(HairSystems::Poses),
                     apply_frame_inertia.in_set(HairSystems::FrameInertia),
                 ),
             );
@@ -71,10 +77,13 @@ fn report_unusable(
 /// bypass change detection.
 fn mend_strands(
     mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Allow<Disabled>)>,
+    mut loads: Query<(Entity, &mut AddedMass), (Changed<AddedMass>, Allow<Disabled>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    for (entity, mut strand) in &mut strands {
-        if let Some(found) = strand.bypass_change_detection().mend() {
+    let strands = strands.iter_mut().map(|(e, mut s)| (e, s.bypass_change_detection().mend()));
+    let loads = loads.iter_mut().map(|(e, mut l)| (e, l.bypass_change_detection().mend()));
+    for (entity, found) in strands.chain(loads) {
+        if let Some(found) = found {
             faults.write(HairFault::new(FaultKind::Strand, found).of(entity));
         }
     }
@@ -116,36 +125,64 @@ fn record_frame(
     }
 }
 
-fn move_poses(
-    step: Res<HairStep>,
+/// As a tick begins: where each pose is to go. Hair that is put elsewhere comes to rest.
+fn aim_poses(
     (time, frames): (Res<Time>, Res<Time<Virtual>>),
     transforms: TransformHelper,
     inertia: Settings<HairInertia>,
-    substeps: EffectiveSubsteps,
     mut poses: Query<(Entity, &mut TickPose, Option<&Strands>)>,
     mut strands: Query<&mut Strand>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    for (entity, mut frame, members) in &mut poses {
-        if step.index == 0 {
+    let seconds = time.elapsed_secs_f64() - frames.delta_secs_f64();
+    // Which way each hair goes that moves, and whether it is put there. The others go with these.
+    let mut ways: Vec<(Vec3, bool)> = Vec::new();
+    for others in [false, true] {
+        for (entity, mut frame, members) in &mut poses {
+            if members.is_none() != others {
+                continue;
+            }
             // With MinimalPlugins nothing propagates transforms, so the helper computes them.
             let pose = transforms.compute_global_transform(entity).ok();
             let pose = pose.as_ref().and_then(Pose::of);
-            let a_frame_ago = time.elapsed_secs_f64() - frames.delta_secs_f64();
-            let (put, report) = frame.aim(pose, a_frame_ago, &inertia.of(entity));
+            let way = pose.map_or(Vec3::ZERO, |pose| frame.way_to(&pose));
+            let alike = |with: &Vec3| way.distance(*with) < 0.1 * way.length();
+            let longest = || match members {
+                Some(members) => {
+                    let theirs = strands.iter_many(members.collection());
+                    theirs.map(|strand| strand.length()).fold(0.0, f32::max)
+                }
+                None if ways.iter().any(|(with, put)| !put && alike(with)) => f32::INFINITY,
+                None => 0.0,
+            };
+            let (put, report) = frame.aim(pose, seconds, &inertia.of(entity), longest);
             if report {
                 let message =
                     "the transform is not finite or has no inverse: the last valid pose is used";
                 faults.write(HairFault::new(FaultKind::Transform, message).of(entity));
             }
-            if let Some(members) = members.filter(|_| put) {
+            let Some(members) = members else { continue };
+            if way != Vec3::ZERO {
+                ways.push((way, put));
+            }
+            if put {
                 let mut theirs = strands.iter_many_mut(members.collection());
                 while let Some(mut strand) = theirs.fetch_next() {
                     strand.bypass_change_detection().rest();
                 }
             }
         }
-        let waits = members.is_some() && substeps.began_before(entity);
+    }
+}
+
+/// Poses go on by a substep.
+fn advance_poses(
+    step: Res<HairStep>,
+    substeps: EffectiveSubsteps,
+    mut poses: Query<(Entity, &mut TickPose, Has<Strands>)>,
+) {
+    for (entity, mut frame, is_hair) in &mut poses {
+        let waits = is_hair && substeps.began_before(entity);
         frame.advance((step.index + 1) as f32 / step.count as f32, waits);
     }
 }

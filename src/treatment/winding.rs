@@ -1,5 +1,6 @@
 //! Winding as mathematics: the path of a strand onto a rod.
 
+use crate::strand::drawn_out;
 use bevy::math::{FloatPow, Quat, Vec3, ops};
 
 /// A rod in the strand's frame.
@@ -37,8 +38,9 @@ pub fn winding(
     let outward = off.try_normalize().unwrap_or_else(|| rod.axis.any_orthonormal_vector());
     let mut touch = rod.center + rod.axis * along + outward * rod.radius;
     let slack: f32 = lengths[..from].iter().sum();
-    if touch.distance(start[0]) > slack {
-        touch = start[0] + (touch - start[0]).clamp_length_max(slack * 0.999);
+    let away = touch.distance(start[0]);
+    if away > slack {
+        touch = start[0] + (touch - start[0]) * (drawn_out(away, slack) / away);
     }
     // Round the rod the way the strand already goes.
     let mut tangent = rod.axis.cross(outward);

@@ -6,10 +6,9 @@ use super::{
     moisture::{Exposure, Left, Surroundings, node_lengths},
 };
 use crate::{
-    Blower,
     bond::{BondChanges, BondKind, Bonds},
     environment::{
-        Blown, BlownAir, HairGravity,
+        Blown, BlownAir, HairGravity, Winds,
         vapour::{DryingAir, WATER},
     },
     fault::{FaultKind, HairFault},
@@ -71,7 +70,7 @@ struct LocalWater<'a> {
 struct Wet<'a> {
     strand: &'a Strand,
     bonds: &'a Bonds,
-    /// What blowers do to each node; nothing while none blows.
+    /// What the air does to each node; nothing while it is still.
     blown: &'a [Blown],
     moisture: &'a mut Moisture,
     added_mass: &'a mut AddedMass,
@@ -99,7 +98,7 @@ pub(super) fn exchange_water(
     (air, process, gravity): (Res<DryingAir>, Res<ProcessTime>, Res<HairGravity>),
     wetting: Settings<Wetting>,
     hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
-    blowers: Query<(), With<Blower>>,
+    winds: Winds,
     mut strands: Query<(
         &StrandOf,
         &Strand,
@@ -136,7 +135,7 @@ pub(super) fn exchange_water(
         }
     }
     let damp = air.equilibrium > 0.0;
-    let is_still = blowers.is_empty();
+    let is_still = winds.are_still();
     let process = process.clamped().0;
     let gravity = gravity.clamped().0;
     let water_of = |hair: Entity| {

@@ -6,10 +6,10 @@ use super::{
     model::{clinging, fall, hanging, slide},
 };
 use crate::{
-    Blower, HairCollider,
+    HairCollider,
     contact::seen_from,
     environment::{
-        Blown, HairGravity, local_blowers,
+        HairGravity, Winds,
         vapour::{DryingAir, WATER, transfer},
     },
     fault::HairFault,
@@ -44,7 +44,7 @@ pub(super) fn move_droplets(
     ),
     wetting: Settings<Wetting>,
     colliders: Query<(&HairCollider, &TickPose)>,
-    blowers: Query<(&Blower, &TickPose)>,
+    winds: Winds,
     hairs: Query<&TickPose, With<Hair>>,
     strands: Query<(&StrandOf, &Strand)>,
     mut droplets: Query<(Entity, &mut Droplet)>,
@@ -60,7 +60,7 @@ pub(super) fn move_droplets(
     let world = TickPose::default();
     let obstacles: Vec<Obstacle> =
         colliders.iter().map(|(c, pose)| seen_from(&world, &c.clamped(), pose)).collect();
-    let blowers = local_blowers(world.now(), &blowers);
+    let winds = winds.seen_from(world.now());
     let mut items: Vec<Moving<'_>> = droplets
         .iter_mut()
         .map(|(entity, drop)| Moving {
@@ -81,7 +81,7 @@ pub(super) fn move_droplets(
             *new = drop.volume - drop.counted.0;
             drop.before = drop.position;
 
-            let blown = Blown::at(&blowers, 1.0, drop.position, Vec3::ZERO);
+            let blown = winds.around(drop.position);
             let (wind, warmth) = (blown.velocity, blown.warmth(air.celsius));
             let radius = drop.radius();
             let speed = air.draught + (wind - drop.velocity).length();

@@ -174,7 +174,9 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
     let world = app.world_mut();
     let (hairs, strands) = (with::<With<Hair>>(world), with::<With<Strand>>(world));
     let drops = with::<With<Droplet>>(world);
-    let tools = with::<Or<(With<HairCollider>, With<Blower>, With<PermRod>, With<Shower>)>>(world);
+    let tools = with::<
+        Or<(With<HairCollider>, With<Blower>, With<PermRod>, With<Shower>, With<WindZone>)>,
+    >(world);
     if drops.len() > 500 {
         drops[100..].iter().for_each(|drop| _ = world.despawn(*drop));
         return "most drops gone".into();
@@ -235,7 +237,8 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
         }
         (10, ..) if tools.len() < 20 => {
             let at = Transform::from_translation(place);
-            match random.random_range(0..5) {
+            match random.random_range(0..6) {
+                5 => world.spawn((WindZone::fire(), at)),
                 0 => world.spawn((HairCollider::sphere(0.05).unwrap(), at)),
                 1 => world.spawn(PermRod::default()),
                 2 => world.spawn((Shower::new(100.0, 1e-3).unwrap(), at)),
@@ -332,7 +335,13 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             world.insert_resource(Time::<Fixed>::from_hz(hertz));
             format!("{hertz} Hz")
         }
+        (28, ..) if random.random() => {
+            let seed = random.random();
+            world.insert_resource(Wind { velocity: place * 10.0, seed, ..default() });
+            "wind".into()
+        }
         (28, ..) => {
+            world.insert_resource(HairBudget { milliseconds: wrong, ..default() });
             world.insert_resource(HairSubsteps::default());
             world.insert_resource(ProcessTime(wrong));
             format!("process time {wrong}")

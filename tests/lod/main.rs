@@ -7,7 +7,9 @@ mod head;
 mod treated;
 
 use bevy::prelude::*;
-use bevy_keratin::{FaultKind, LodLevel, PresentLod, prelude::*, strand::StrandHistory};
+use bevy_keratin::{
+    FaultKind, HairEstimate, LodLevel, PresentLod, prelude::*, strand::StrandHistory,
+};
 use common::*;
 use std::time::Instant;
 
@@ -50,11 +52,68 @@ fn levels_follow_the_screen_with_hysteresis_and_end_with_the_component() {
 }
 
 #[test]
+fn a_budget_makes_the_least_important_hair_coarser_and_nobody_flickers() {
+    let mut app = test_app(60.0);
+    let hairs: Vec<Entity> = (0..6)
+        .map(|_| {
+            let hair = app.world_mut().spawn((Hair, HairLod::default())).id();
+            for i in 0..40 {
+                let points: Vec<Vec3> =
+                    (0..17).map(|k| Vec3::new(0.01 * k as f32, 0.0, 0.01 * i as f32)).collect();
+                app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+            }
+            hair
+        })
+        .collect();
+    let levels = |app: &App| hairs.iter().map(|h| level(app, *h)).collect::<Vec<_>>();
+    for (i, hair) in hairs.iter().enumerate() {
+        zoom(&mut app, *hair, 0.4 + 0.01 * i as f32);
+    }
+    app.update();
+    assert_eq!(levels(&app), [0; 6], "endless by default");
+    let estimate = *app.world().resource::<HairEstimate>();
+    assert!(estimate.wanted > 0.5 && estimate.present == estimate.wanted, "{estimate:?}");
+
+    let budget = HairBudget { milliseconds: 0.8 * estimate.wanted, ..default() };
+    app.insert_resource(budget);
+    app.update();
+    let saving = levels(&app);
+    assert_eq!(saving.iter().filter(|l| **l > 0).count(), 3, "{saving:?}");
+    assert_eq!(saving[3..], [0; 3], "the largest are left alone");
+    let estimate = *app.world().resource::<HairEstimate>();
+    assert!(estimate.present <= budget.milliseconds, "{estimate:?}");
+    // Two that are as large change places again and again: nobody goes from level to level.
+    for tick in 0..20 {
+        let by = if tick % 2 == 0 { 0.01 } else { -0.01 };
+        zoom(&mut app, hairs[2], 0.42 + by);
+        zoom(&mut app, hairs[3], 0.43 - by);
+        app.update();
+        assert_eq!(levels(&app), saving);
+    }
+    // A hero is simulated in full, however small; nobody else's level is finer for that.
+    app.world_mut().get_mut::<HairLod>(hairs[0]).unwrap().importance = 10.0;
+    app.update();
+    assert_eq!(level(&app, hairs[0]), 0);
+    // Half the speed is half the budget.
+    app.insert_resource(HairBudget { slowness: 1e3, ..budget });
+    app.update();
+    assert_eq!(levels(&app), [3; 6]);
+    app.insert_resource(HairBudget { milliseconds: f32::NAN, slowness: -1.0 });
+    app.update();
+    assert_eq!(levels(&app), [0; 6]);
+    assert_eq!(faults(&mut app).len(), 2);
+}
+
+#[test]
 fn nonsense_is_told_and_mended() {
     let mut app = test_app(60.0);
     let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
     let wrong = LodLevel { below: f32::NAN, iterations: 0, substeps: 0, strands: -1.0 };
-    app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![wrong], hysteresis: -1.0 });
+    app.world_mut().entity_mut(hair).insert(HairLod {
+        levels: vec![wrong],
+        hysteresis: -1.0,
+        ..default()
+    });
     zoom(&mut app, hair, -5.0);
     run(&mut app, 0.2);
     let told = faults(&mut app);

@@ -63,6 +63,14 @@ impl Lab {
         Self::new(60.0, 6)
     }
 
+    /// As games run it: substeps taken together as far as the solver's default says.
+    pub fn in_games() -> Self {
+        let mut lab = Self::usual();
+        lab.app.insert_resource(HairDefault(HairSolver::default()));
+        lab.substep = f64::from(HairSolver::default().substep);
+        lab
+    }
+
     pub fn drag(&mut self, rate: f32) {
         self.app.insert_resource(HairDefault(AirDrag { rate }));
     }

@@ -1,6 +1,7 @@
 //! Hair sags, swings, curls and twists as rods do, at any segment count and step: through an app,
 //! against theory that shares nothing with the crate.
 
+mod fast;
 mod hard;
 mod lab;
 mod obstacles;

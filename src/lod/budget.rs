@@ -1,0 +1,143 @@
+//! All hair of an app within a budget of time.
+
+use super::LodLevel;
+use crate::setting::setting;
+use bevy::prelude::*;
+
+setting! {
+    /// How long a tick may take for all hair that has a [`HairLod`](super::HairLod). A resource.
+    ///
+    /// When the hair would take longer at the levels that its size on the screen asks for, the least
+    /// important hair, by [`HairLod::importance`](super::HairLod::importance) times its share of the
+    /// view, goes on to coarser levels until all of it fits. What a tick takes is estimated from numbers
+    /// of segments and substeps, not measured: the same game has the same hair on any machine and in
+    /// any replay. [`HairEstimate`] tells the result.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # let mut app = App::new();
+    /// // 6 ms of one thread, on machines of half the speed of the one that the estimates are from
+    /// app.insert_resource(HairBudget { milliseconds: 6.0, slowness: 2.0 });
+    /// ```
+    #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Resource, Default, Clone, PartialEq)]
+    pub struct HairBudget {
+        /// Time that a tick may take on one thread. Endless by default.
+        pub milliseconds: f32 = f32::INFINITY, "ms" in MILLISECONDS: 0.0..=f32::INFINITY,
+            safe 0.5..=16.0, "a tick of 1/60 s has 16.7";
+        /// How many times longer than estimated hair takes on the players' machines. Estimates are of
+        /// one core of a server of 2023 with vectors of 512 bits.
+        pub slowness: f32 = 1.0, in SLOWNESS: 1e-3..=1e3, safe 0.5..=10.0,
+            "2 is a machine of half the speed";
+    }
+}
+
+/// How long hair takes, as far as its [`HairBudget`] knows. A resource, kept by the tick.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct HairEstimate {
+    /// At the levels that its size on the screen asks for (ms a tick on one thread).
+    pub wanted: f32,
+    /// At the levels that it has.
+    pub present: f32,
+}
+
+/// Time of a simulated segment in a substep, strand contact and one collider in reach included (ms).
+const SEGMENT: f32 = 80e-6;
+
+/// Time of the segment of a strand that is carried, each tick (ms).
+const CARRIED_SEGMENT: f32 = 10e-6;
+
+/// Time that a hair takes each tick whatever it has (ms).
+const HAIR: f32 = 0.01;
+
+/// By which factor hair becomes more important with each level that it has been made to take: about as
+/// much as levels' limits are apart.
+const RELUCTANCE: f32 = 3.0;
+
+/// A hair as the budget sees it.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    /// The greater, the later it is made coarser.
+    pub importance: f32,
+    /// The level that it would have without a budget.
+    pub wanted: usize,
+    /// Time at each level (ms), the full one first.
+    pub costs: Vec<f32>,
+}
+
+/// Time of a hair of so many segments at each of its levels (ms a tick).
+pub(super) fn costs(levels: &[LodLevel], segments: usize, substeps: u32) -> Vec<f32> {
+    let full = LodLevel { substeps: 2, strands: 1.0, ..default() };
+    core::iter::once(&full)
+        .chain(levels)
+        .map(|level| {
+            let steps = substeps.div_ceil(level.substeps.max(full.substeps)) as f32;
+            let simulated = SEGMENT * level.strands * steps;
+            let carried =
+                if level.strands > 0.0 { CARRIED_SEGMENT * (1.0 - level.strands) } else { 0.0 };
+            HAIR + segments as f32 * (simulated + carried)
+        })
+        .collect()
+}
+
+/// The level of each hair with which all fit into `budget` (ms), or their coarsest ones.
+pub(super) fn fit(hairs: &[Candidate], budget: f32) -> Vec<usize> {
+    let mut levels: Vec<usize> = hairs.iter().map(|h| h.wanted).collect();
+    let mut left: f32 = budget - hairs.iter().map(|h| h.costs[h.wanted]).sum::<f32>();
+    while left < 0.0 {
+        let reluctance =
+            |i: usize| hairs[i].importance * RELUCTANCE.powi((levels[i] - hairs[i].wanted) as i32);
+        let coarser = (0..hairs.len())
+            .filter(|i| levels[*i] + 1 < hairs[*i].costs.len())
+            .min_by(|a, b| reluctance(*a).total_cmp(&reluctance(*b)));
+        let Some(i) = coarser else { break };
+        left += hairs[i].costs[levels[i]] - hairs[i].costs[levels[i] + 1];
+        levels[i] += 1;
+    }
+    levels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn hair(importance: f32) -> Candidate {
+        Candidate { importance, wanted: 0, costs: vec![4.0, 2.0, 0.5, 0.01] }
+    }
+
+    #[test]
+    fn the_least_important_goes_first_and_within_a_large_budget_nobody() {
+        let hairs = [hair(1.0), hair(0.1), hair(0.2)];
+        assert_eq!(fit(&hairs, f32::INFINITY), [0, 0, 0]);
+        assert_eq!(fit(&hairs, 12.0), [0, 0, 0]);
+        assert_eq!(fit(&hairs, 11.0), [0, 1, 0]);
+        assert_eq!(fit(&hairs, 9.0), [0, 1, 1]);
+        assert_eq!(fit(&hairs, 5.5), [0, 2, 2]);
+        assert_eq!(fit(&hairs, 0.0), [3, 3, 3], "as little as there is");
+        assert_eq!(fit(&[], 0.0), [] as [usize; 0]);
+    }
+
+    #[test]
+    fn coarser_levels_are_estimated_to_be_cheaper() {
+        let costs = costs(&[LodLevel::NEAR, LodLevel::BACKGROUND, LodLevel::FROZEN], 10_000, 6);
+        assert!(costs.windows(2).all(|c| c[1] < 0.6 * c[0]), "{costs:?}");
+        assert!(costs[3] < 0.02);
+    }
+
+    proptest! {
+        #[test]
+        fn what_fits_fits_and_nothing_gets_finer_than_it_wants(
+            given in proptest::collection::vec((0.0f32..1.0, 0usize..4), 0..20),
+            budget in 0.0f32..40.0,
+        ) {
+            let hairs: Vec<_> =
+                given.iter().map(|(importance, wanted)| Candidate { wanted: *wanted, ..hair(*importance) }).collect();
+            let levels = fit(&hairs, budget);
+            let cost: f32 = hairs.iter().zip(&levels).map(|(h, l)| h.costs[*l]).sum();
+            prop_assert!(cost <= budget + 1e-3 || levels.iter().all(|l| *l == 3));
+            prop_assert!(hairs.iter().zip(&levels).all(|(h, l)| *l >= h.wanted));
+        }
+    }
+}
