@@ -14,7 +14,7 @@ pub use systems::ContactPlugin;
 pub(crate) use {
     lanes::WetRow,
     model::{Bridged, Film},
-    systems::seen_from,
+    systems::{Ball, HairReach, seen_from},
 };
 
 use crate::{
@@ -163,6 +163,9 @@ pub struct Obstacles {
 pub struct LockNeighbours {
     #[reflect(ignore)]
     lists: neighbours::Neighbours,
+    /// The strands that take part in this tick, and whether the carried ones do.
+    #[reflect(ignore)]
+    members: (Vec<Entity>, bool),
     /// Whether it has been told that strands are too fine.
     #[reflect(ignore)]
     is_told: bool,

@@ -11,7 +11,7 @@ use crate::{
     setting::{self, Ranged, Settings},
     strand::{Hair, Sleepers, StillPose, Strand, StrandOf, StrandSleep, Strands, TickPose},
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
 /// How many strands' memory is asked for at once.
 const TOGETHER: usize = 16;
@@ -67,11 +67,20 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
     Obstacle { solid, motion, friction: collider.friction }
 }
 
-/// A ball that holds all of a hair however it swings, in its own frame. Found once a tick.
-#[derive(Component, Clone, Copy, Debug, Default)]
-struct HairReach {
+/// A ball that holds all of a hair however it swings, in its own frame.
+#[derive(Component, Clone, Copy, Debug)]
+pub(crate) struct HairReach {
     center: Vec3,
     radius: f32,
+    /// Of so many strands, found so many ticks ago.
+    members: usize,
+    age: u32,
+}
+
+impl Default for HairReach {
+    fn default() -> Self {
+        Self { center: Vec3::ZERO, radius: f32::INFINITY, members: 0, age: 0 }
+    }
 }
 
 impl HairReach {
@@ -81,16 +90,42 @@ impl HairReach {
         for (root, length) in strands {
             (low, high, longest) = (low.min(root), high.max(root), longest.max(length));
         }
-        Self { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) + longest }
+        let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high) + longest);
+        Self { center, radius, ..default() }
+    }
+
+    /// Whether hair of a frame may touch within a tick's `substeps` what a ball holds.
+    pub(crate) fn is_near(&self, frame: &TickPose, ball: &Ball, substeps: u32) -> bool {
+        let (before, now) = (frame.before(), frame.now());
+        let travel = before.translation.distance(now.translation);
+        let radius = ROOM * self.radius * now.scale + travel;
+        let apart = radius + ball.radius + ball.travel * substeps as f32;
+        let squared = ball.center.distance_squared(now.point_out(self.center));
+        // A place that is no number is near: what meets it tells.
+        squared <= apart * apart || squared.is_nan() || apart.is_nan()
     }
 }
 
-fn find_reach(mut hairs: Query<(&Strands, &mut HairReach), With<Hair>>, strands: Query<&Strand>) {
-    for (members, mut reach) in &mut hairs {
+/// Roots move little on a head: strands that nobody wrote to are looked at now and then.
+const LOOK_AGAIN: u32 = 16;
+
+fn find_reach(
+    mut hairs: Query<(Entity, &Strands, &mut HairReach), With<Hair>>,
+    touched: Query<&StrandOf, Changed<Strand>>,
+    strands: Query<&Strand>,
+) {
+    let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
+    for (hair, members, mut reach) in &mut hairs {
+        let reach = reach.bypass_change_detection();
+        reach.age += 1;
+        if reach.members == members.len() && reach.age < LOOK_AGAIN && !touched.contains(&hair) {
+            continue;
+        }
         let of_strand = |strand: &Strand| {
             (strand.positions().first().copied().unwrap_or_default(), strand.length())
         };
-        *reach = HairReach::around(strands.iter_many(members.collection()).map(of_strand));
+        let found = HairReach::around(strands.iter_many(members.collection()).map(of_strand));
+        *reach = HairReach { members: members.len(), ..found };
     }
 }
 
@@ -98,16 +133,25 @@ fn find_reach(mut hairs: Query<(&Strands, &mut HairReach), With<Hair>>, strands:
 const ROOM: f32 = 1.25;
 
 /// A ball around a collider in the world, and how far it goes in a substep (m).
-fn ball_around(collider: &HairCollider, pose: &TickPose) -> (Vec3, f32, f32) {
-    let (before, now) = (pose.before(), pose.now());
-    let radius = match collider.shape {
-        ColliderShape::Sphere(s) => s.radius,
-        ColliderShape::Capsule(c) => c.radius + c.half_length,
-        ColliderShape::Cylinder(c) => c.radius.hypot(c.half_height),
-        ColliderShape::Plane(_) => f32::INFINITY,
-    };
-    let travel = before.translation.distance(now.translation);
-    (now.translation, radius * now.scale.max(before.scale), travel)
+pub(crate) struct Ball {
+    center: Vec3,
+    radius: f32,
+    travel: f32,
+}
+
+impl Ball {
+    pub(crate) fn around(collider: &HairCollider, pose: &TickPose) -> Self {
+        let (before, now) = (pose.before(), pose.now());
+        let radius = match collider.shape {
+            ColliderShape::Sphere(s) => s.radius,
+            ColliderShape::Capsule(c) => c.radius + c.half_length,
+            ColliderShape::Cylinder(c) => c.radius.hypot(c.half_height),
+            ColliderShape::Plane(_) => f32::INFINITY,
+        };
+        let travel = before.translation.distance(now.translation);
+        let radius = radius * now.scale.max(before.scale);
+        Self { center: now.translation, radius, travel }
+    }
 }
 
 fn gather_obstacles(
@@ -119,23 +163,13 @@ fn gather_obstacles(
         .iter()
         .map(|(collider, pose)| {
             let collider = collider.clamped();
-            (ball_around(&collider, pose), collider, pose)
+            (Ball::around(&collider, pose), collider, pose)
         })
         .collect();
     for (hair, pose, reach, mut obstacles) in &mut hairs {
         obstacles.solids.clear();
         let Some(step) = steps.of(hair) else { continue };
-        let (before, now) = (pose.before(), pose.now());
-        let travel = before.translation.distance(now.translation);
-        let center = now.point_out(reach.center);
-        let radius = ROOM * reach.radius * now.scale + travel;
-        let is_near = |(at, size, travel): (Vec3, f32, f32)| {
-            let apart = radius + size + travel * step.substeps as f32;
-            let squared = at.distance_squared(center);
-            // A place that is no number is near: what meets it tells.
-            squared <= apart * apart || squared.is_nan() || apart.is_nan()
-        };
-        let near = solids.iter().filter(|(ball, ..)| is_near(*ball));
+        let near = solids.iter().filter(|(ball, ..)| reach.is_near(pose, ball, step.substeps));
         obstacles.solids.extend(near.map(|(_, collider, at)| seen_from(pose, collider, at)));
     }
 }
@@ -160,43 +194,48 @@ pub(crate) fn push_strands_apart(
 ) {
     for (hair, members, mut neighbours, sleepers) in &mut hairs {
         let LockContact { radius, strength } = contact.of(hair);
-        if radius <= 0.0 || strength <= 0.0 || sleepers.is_some_and(Sleepers::all) {
+        let LockNeighbours { lists: list, members: (present, had_followers), is_told } =
+            neighbours.bypass_change_detection();
+        // Follower strands neither push nor are pushed. Where water joins strands, it joins them too.
+        let with_followers = list.has_extra_margin();
+        let all_rest = sleepers.is_some_and(|s| s.awake == 0 && (s.asleep > 0 || !with_followers));
+        if radius <= 0.0 || strength <= 0.0 || all_rest {
             continue;
         }
         let Some(step) = steps.of(hair) else { continue };
-        let LockNeighbours { lists: list, is_told } = neighbours.bypass_change_detection();
         let reach = 2.0 * radius;
         list.clear();
-        // Follower strands neither push nor are pushed. Where water joins strands, it joins them too.
-        let with_followers = list.has_extra_margin();
+        if step.is_first || with_followers != *had_followers {
+            let takes_part = |id: &&Entity| {
+                strands.get(**id).is_ok_and(|(_, sleep, _)| with_followers || !sleep.is_follower())
+            };
+            present.clear();
+            present.extend(members.collection().iter().filter(takes_part));
+            *had_followers = with_followers;
+        }
         // Water wants all bridges. Dry strands are looked up once a tick, for where they are in its
         // middle: most fly along with their neighbours.
         let lookup = if step.is_first || with_followers { Lookup::Now } else { Lookup::Later };
         let ahead = (step.is_first && !with_followers).then_some(0.5 * (step.tick - step.dt));
-        for some in members.collection().chunks(TOGETHER) {
+        for some in present.chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
-            for (strand, sleep, _) in strands.iter_many(some) {
-                if with_followers || !sleep.is_follower() {
-                    let stride = coarse::stride(strand.rest_lengths(), reach);
-                    list.add(strand.positions(), stride);
-                    if let Some(seconds) = ahead {
-                        let moving = strand.positions().iter().zip(strand.velocities());
-                        list.expect(moving.map(|(p, v)| *p + *v * seconds));
-                    }
-                    if stride > 1 && !core::mem::replace(is_told, true) {
-                        faults.write(too_fine(strand, radius, stride).of(hair));
-                    }
+            for (strand, ..) in strands.iter_many(some) {
+                let stride = coarse::stride(strand.rest_lengths(), reach);
+                list.add(strand.positions(), stride);
+                if let Some(seconds) = ahead {
+                    let moving = strand.positions().iter().zip(strand.velocities());
+                    list.expect(moving.map(|(p, v)| *p + *v * seconds));
+                }
+                if stride > 1 && !core::mem::replace(is_told, true) {
+                    faults.write(too_fine(strand, radius, stride).of(hair));
                 }
             }
         }
         let mut pushes = list.pushes(radius, strength, lookup);
-        for some in members.collection().chunks(TOGETHER) {
+        for some in present.chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.velocities()));
             let mut some = strands.iter_many_mut(some);
             while let Some((mut strand, mut sleep, mut still)) = some.fetch_next() {
-                if sleep.is_follower() && !with_followers {
-                    continue;
-                }
                 if sleep.is_asleep() {
                     let pushes = pushes.by_ref().take(strand.nodes());
                     if still.bypass_change_detection().feels(pushes, strength / (2.0 * radius)) {

@@ -19,6 +19,9 @@ use bevy::{
 /// How many of the nearest guides are looked at for those that run most alike.
 const CANDIDATES: usize = 8;
 
+/// Where a smaller share of the strands is simulated, each of the others follows one.
+const FEW: f32 = 0.125;
+
 /// Guides that run as near as this count alike (m).
 const ALIKE: f32 = 1e-3;
 
@@ -351,6 +354,8 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
     // Whoever was written to since the last tick is elsewhere now.
     ahead.iter().enumerate().for_each(|(i, strand)| guides.see(i, *strand));
     let guides = &*guides;
+    // Where so few are simulated nobody sees that neighbours go alike.
+    let most = if (guides.strands.len() as f32) < FEW * members.len() as f32 { 1 } else { GUIDES };
     let waypoints_of: Vec<[Vec3; 3]> =
         ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
     let nearest = KdTree::new(waypoints_of.iter().map(|c| c[0]).zip(0..));
@@ -375,7 +380,7 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
             })
             .collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        found.truncate(GUIDES);
+        found.truncate(most);
         let weight = |apart: f32| 1.0 / (apart + ALIKE * ALIKE);
         let sum: f32 = found.iter().map(|f| weight(f.0)).sum();
         let guides = found.into_iter().map(|(apart, i, guide)| (i, weight(apart) / sum, guide));

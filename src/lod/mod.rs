@@ -9,7 +9,8 @@
 //!
 //! Strands stand in an order of which every beginning is spread evenly over the roots ([`spread`]). At a
 //! level its first ones are simulated, so that who is at a coarse level is at all finer ones. Each of
-//! the others is **carried** by up to three guides that are near and run alike ([`follow`]): once a tick
+//! the others is **carried** by up to three guides that are near and run alike ([`follow`]), by one where
+//! less than an eighth is simulated: once a tick
 //! its edges turn as theirs have turned at the same distance from the root since the level began. So
 //! it begins and ends where it is, keeps its lengths and its root, and goes on with the velocity it
 //! has. The motion of its own with which it begins ebbs away within a second.

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     bond::{BondChanges, BondInfluence, Bonds, Cuticle},
-    contact::{HairCollider, LockContact, seen_from},
+    contact::{Ball, HairCollider, HairReach, LockContact, seen_from},
     environment::{AirDrag, HairGravity, LocalBlower, LocalWinds, Winds, wind::wind},
     mass_spring::Springs,
     parallel::{Nanos, for_each},
@@ -220,7 +220,14 @@ fn update_sleep(
     colliders: Query<(&HairCollider, &TickPose)>,
     winds: Winds,
     mut hairs: Query<
-        (Entity, &TickPose, &mut SleepSnapshot, &mut Sleepers, Option<&Strands>),
+        (
+            Entity,
+            &TickPose,
+            &mut SleepSnapshot,
+            &mut Sleepers,
+            Option<&Strands>,
+            Option<&HairReach>,
+        ),
         With<Hair>,
     >,
     mut strands: Query<(
@@ -234,9 +241,20 @@ fn update_sleep(
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
-    for (hair, frame, mut snapshot, _, members) in &mut hairs {
-        let seen = colliders.iter().map(|(collider, pose)| {
-            let Obstacle { solid, friction, .. } = seen_from(frame, &collider.clamped(), pose);
+    let colliders: Vec<_> = colliders
+        .iter()
+        .map(|(collider, pose)| {
+            let collider = collider.clamped();
+            (Ball::around(&collider, pose), collider, pose)
+        })
+        .collect();
+    for (hair, frame, mut snapshot, _, members, reach) in &mut hairs {
+        // What comes within reach is seen as come, far from any strand.
+        let near = colliders
+            .iter()
+            .filter(|(ball, ..)| reach.is_none_or(|reach| reach.is_near(frame, ball, step.count)));
+        let seen = near.map(|(_, collider, pose)| {
+            let Obstacle { solid, friction, .. } = seen_from(frame, collider, pose);
             let rotation = frame.now().rotation.inverse() * pose.now().rotation;
             SeenCollider { solid, friction, rotation }
         });
@@ -274,7 +292,7 @@ fn update_sleep(
         *(if item.sleep.is_asleep() { &mut count.asleep } else { &mut count.awake }) += 1;
     }
     drop(items);
-    for (hair, .., mut sleepers, _) in &mut hairs {
+    for (hair, _, _, mut sleepers, ..) in &mut hairs {
         sleepers.set_if_neq(counts[index_of[&hair]]);
     }
 }
