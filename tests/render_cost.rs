@@ -6,8 +6,8 @@ mod offscreen;
 
 use bevy::{
     core_pipeline::{
-        core_3d::Opaque3d,
-        prepass::{DepthPrepass, MotionVectorPrepass, NormalPrepass, Opaque3dPrepass},
+        core_3d::AlphaMask3d,
+        prepass::{AlphaMask3dPrepass, DepthPrepass, MotionVectorPrepass, NormalPrepass},
     },
     light::CascadeShadowConfigBuilder,
     pbr::Shadow,
@@ -66,8 +66,8 @@ fn a_hair_is_one_draw_call_in_every_view() {
     assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
     for hair in hairs {
         let drawn = scene.app.world().get::<HairBuffers>(hair).unwrap().drawn;
-        let camera = draws::<Opaque3d>(&scene, drawn);
-        let prepass = draws::<Opaque3dPrepass>(&scene, drawn);
+        let camera = draws::<AlphaMask3d>(&scene, drawn);
+        let prepass = draws::<AlphaMask3dPrepass>(&scene, drawn);
         let (shadow, views) = draws::<Shadow>(&scene, drawn);
         println!(
             "2040 strands: {camera:?} camera, {prepass:?} prepass, {shadow} in {views} shadows"

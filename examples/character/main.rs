@@ -141,7 +141,7 @@ fn pictures(
     folder: &Path,
 ) -> Result<(), Box<dyn std::error::Error>> {
     app.add_plugins(measure::MeasurePlugin);
-    let pictures = picture::Pictures::new(app, arguments.size, stage::camera());
+    let pictures = picture::Pictures::new(app, arguments.size, 1, stage::camera());
     let name = format!("{:?}", arguments.preset.0).to_lowercase();
     let end = (arguments.seconds * 60.0).round() as u32;
     let take = |app: &mut App, tick: u32, (view, follow): (&str, Follow)| {

@@ -152,7 +152,7 @@ fn pictures(
     folder: &Path,
 ) -> Result<(), Box<dyn std::error::Error>> {
     app.add_systems(Update, camera::frame);
-    let pictures = picture::Pictures::new(app, arguments.size, camera::bundle());
+    let pictures = picture::Pictures::new(app, arguments.size, 1, camera::bundle());
     while !app.world().contains_resource::<Shown>() {
         app.update();
         let (assets, shown) =

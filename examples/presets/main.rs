@@ -1,6 +1,8 @@
 //! Every hair preset on the training head after two seconds, as pictures:
 //! `cargo run --release --example presets -- [FOLDER] [PRESET …]`.
 
+#[path = "../salon/environment.rs"]
+mod environment;
 #[path = "../salon/failure.rs"]
 mod failure;
 #[path = "../salon/mannequin.rs"]
@@ -23,7 +25,7 @@ mod scenes {
 use bevy::{
     asset::RenderAssetUsages,
     core_pipeline::prepass::DepthPrepass,
-    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, ShadowFilteringMethod},
+    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap},
     prelude::*,
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
     time::TimeUpdateStrategy,
@@ -38,7 +40,6 @@ use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 /// Seconds until hair has settled.
 const SETTLING: f32 = 2.0;
-const SIZE: (u32, u32) = (560, 640);
 /// Where the camera is (m): in front to the side, at the side, behind.
 const VIEWS: [Vec3; 3] =
     [Vec3::new(0.30, 0.06, 0.62), Vec3::new(0.68, 0.05, 0.02), Vec3::new(-0.35, 0.12, -0.58)];
@@ -62,6 +63,12 @@ struct Arguments {
     /// straight, wavy, curly, coily, short, bob, long; all if left out.
     #[arg(value_parser = preset)]
     presets: Vec<HairPreset>,
+    /// Width and height of each view (pixels).
+    #[arg(long, default_value = "560x640", value_name = "WxH", value_parser = renderer::size)]
+    size: (u32, u32),
+    /// How many times larger, along and across, pictures are drawn and averaged.
+    #[arg(long, default_value = "3", value_parser = clap::value_parser!(u32).range(1..=4))]
+    supersample: u32,
 }
 
 fn name(preset: HairPreset) -> String {
@@ -85,23 +92,23 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(Arguments { folder, presets }: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let Arguments { folder, presets, size, .. } = arguments;
     picture::folder(folder)?;
     for preset in HairPreset::ALL {
         if !presets.is_empty() && !presets.contains(&preset) {
             continue;
         }
-        let views = draw(preset).map_err(|error| error.to_string())?;
+        let views = draw(preset, arguments).map_err(|error| error.to_string())?;
         let path = folder.join(format!("{}.png", name(preset)));
-        picture::save(beside(&views), &path)?;
+        picture::save(beside(&views, *size), &path)?;
         println!("{}", path.display());
     }
     Ok(())
 }
 
 /// The views as one picture, from left to right.
-fn beside(views: &[Image]) -> Image {
-    let (width, height) = SIZE;
+fn beside(views: &[Image], (width, height): (u32, u32)) -> Image {
     let row = |image: &Image, y: u32| {
         let bytes = image.data.as_deref().unwrap_or_default();
         let start = (4 * y * width) as usize;
@@ -118,17 +125,18 @@ fn beside(views: &[Image]) -> Image {
     )
 }
 
-fn draw(preset: HairPreset) -> Result<Vec<Image>> {
+fn draw(preset: HairPreset, arguments: &Arguments) -> Result<Vec<Image>> {
     let start = Instant::now();
-    let mut app = app();
+    let mut app = app(preset);
     studio(&mut app);
     let mesh = mannequin::mesh();
     let planted = preset.plant(&mesh, &scalp())?;
     let took = start.elapsed();
     let hair = wear(&mut app, preset, &planted, head::with_scalp(mesh, &scalp()))?;
-    let camera =
-        (Camera3d::default(), Msaa::Sample4, DepthPrepass, ShadowFilteringMethod::Hardware2x2);
-    let pictures = Pictures::new(&mut app, SIZE, camera);
+    let surroundings =
+        environment::studio(&mut app.world_mut().resource_mut::<Assets<Image>>(), 450.0);
+    let camera = (Camera3d::default(), Msaa::Sample4, DepthPrepass, surroundings);
+    let pictures = Pictures::new(&mut app, arguments.size, arguments.supersample, camera);
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     let start = Instant::now();
     for _ in 0..(60.0 * SETTLING) as u32 {
@@ -165,34 +173,50 @@ fn report(app: &mut App, hair: Entity) {
     println!("  strain {strain:.3}, speed {speed:.3} m/s, deepest {:.1} mm", inside * 1e3);
 }
 
-fn app() -> App {
-    let mut app = renderer::app("presets", SIZE, true, default());
+/// What stands out from the hair: dark behind pale hair, pale behind dark.
+fn ground(preset: HairPreset) -> Color {
+    match preset.settings().look.melanin.color().luminance() {
+        pale if pale > 0.1 => Color::srgb(0.13, 0.14, 0.16),
+        dark if dark < 0.005 => Color::srgb(0.62, 0.63, 0.64),
+        _ => Color::srgb(0.44, 0.46, 0.48),
+    }
+}
+
+fn app(preset: HairPreset) -> App {
+    let mut app = renderer::app("presets", (0, 0), true, default());
     app.insert_resource(Time::<Fixed>::from_hz(60.0))
-        .insert_resource(DirectionalLightShadowMap { size: 2048 })
-        .insert_resource(GlobalAmbientLight { brightness: 300.0, ..default() })
-        .insert_resource(ClearColor(Color::srgb(0.17, 0.18, 0.2)));
+        .insert_resource(DirectionalLightShadowMap { size: 4096 })
+        .insert_resource(GlobalAmbientLight::NONE)
+        .insert_resource(ClearColor(ground(preset)));
     app
 }
 
-/// Three lights.
+/// Key and fill from the front, two kickers at the hair's height from behind. All cast shadows, or
+/// light from one side would shine through the head.
 fn studio(app: &mut App) {
-    let light = |at: Vec3, lux: f32, color: Color, shadows: bool| {
+    let light = |at: Vec3, lux: f32, color: Color| {
         let light = DirectionalLight {
             illuminance: lux,
             color,
-            shadow_maps_enabled: shadows,
+            shadow_maps_enabled: true,
             shadow_normal_bias: 0.6,
+            shadow_depth_bias: 0.002,
             ..default()
         };
-        let cascades =
-            CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 1.6, ..default() };
+        let cascades = CascadeShadowConfigBuilder {
+            num_cascades: 1,
+            minimum_distance: 0.3,
+            maximum_distance: 1.1,
+            ..default()
+        };
         let at = Transform::from_translation(at).looking_at(Vec3::ZERO, Vec3::Y);
         (light, cascades.build(), at)
     };
     let world = app.world_mut();
-    world.spawn(light(Vec3::new(1.0, 1.3, 1.2), 9000.0, Color::srgb(1.0, 0.95, 0.88), true));
-    world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 3000.0, Color::srgb(0.8, 0.88, 1.0), false));
-    world.spawn(light(Vec3::new(-0.7, 1.0, -1.5), 6000.0, Color::WHITE, false));
+    world.spawn(light(Vec3::new(1.0, 1.1, 1.2), 8000.0, Color::srgb(1.0, 0.95, 0.88)));
+    world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2000.0, Color::srgb(0.8, 0.88, 1.0)));
+    world.spawn(light(Vec3::new(1.0, 0.35, -1.4), 6000.0, Color::WHITE));
+    world.spawn(light(Vec3::new(-1.0, 0.35, -1.4), 6000.0, Color::WHITE));
 }
 
 /// The head with the preset's hair.

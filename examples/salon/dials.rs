@@ -380,7 +380,8 @@ impl Settings<'_, '_> {
             slide(ui, &mut l.melanin.pheomelanin, Melanin::PHEOMELANIN, "pheomelanin");
             slide(ui, &mut l.roughness, HairLook::ROUGHNESS, "roughness");
             slide(ui, &mut l.gloss, HairLook::GLOSS, "gloss");
-            slide_mm(ui, &mut l.self_shadow, HairLook::SELF_SHADOW, "light depth (mm)");
+            slide(ui, &mut l.grey, HairLook::GREY, "grey");
+            slide(ui, &mut l.shadow_density, HairLook::SHADOW_DENSITY, "shadow density");
             ui.horizontal(|ui| {
                 ui.label("model");
                 ui.selectable_value(&mut l.shading, HairShading::Fibre, "fibre");

@@ -9,6 +9,7 @@ mod scenes;
 
 mod camera;
 mod dials;
+mod environment;
 mod failure;
 mod mannequin;
 mod offscreen;
@@ -56,6 +57,10 @@ pub struct Arguments {
     #[arg(long, requires = "offscreen", value_delimiter = ',', value_name = "N,N",
           value_parser = clap::value_parser!(u32).range(..=100_000))]
     frames: Option<Vec<u32>>,
+    /// How many times larger, along and across, pictures are drawn and averaged.
+    #[arg(long, requires = "offscreen", default_value = "3",
+          value_parser = clap::value_parser!(u32).range(1..=4))]
+    supersample: u32,
     /// Width and height of pictures or window (pixels).
     #[arg(long, default_value = "1280x720", value_name = "WxH", value_parser = renderer::size)]
     size: (u32, u32),
@@ -142,9 +147,23 @@ fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
         .add_plugins((ScenePlugin(scene), overlay::OverlayPlugin))
         .insert_resource(HairDefault(HairView::from(arguments.view)))
         .add_systems(Startup, stage::build.before(scenes::spawn_scene))
+        .add_systems(PreUpdate, surround)
         .add_systems(PostUpdate, (stage::embody, stage::slide).before(TransformSystems::Propagate));
     let mut gizmos = app.world_mut().resource_mut::<GizmoConfigStore>();
     gizmos.config_mut::<overlay::HairGizmos>().0.enabled = arguments.gizmos;
+}
+
+/// Gives each camera the studio to be reflected, which is also what light comes from all around.
+fn surround(
+    mut commands: Commands,
+    mut images: ResMut<Assets<Image>>,
+    mut ambient: ResMut<GlobalAmbientLight>,
+    cameras: Query<Entity, Added<Camera3d>>,
+) {
+    for camera in &cameras {
+        commands.entity(camera).insert(environment::studio(&mut images, 450.0));
+        ambient.brightness = 0.0;
+    }
 }
 
 fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {

@@ -19,7 +19,8 @@ pub fn run(
     frames.sort_unstable();
     frames.dedup();
 
-    let pictures = Pictures::new(app, arguments.size, camera::bundle(scene.kind));
+    let pictures =
+        Pictures::new(app, arguments.size, arguments.supersample, camera::bundle(scene.kind));
 
     let mut written = Vec::new();
     let mut ticks = 0;

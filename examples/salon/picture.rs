@@ -1,10 +1,11 @@
 //! Pictures of an app that has no window.
 
 use bevy::{
+    asset::RenderAssetUsages,
     camera::RenderTarget,
     prelude::*,
     render::{
-        render_resource::{TextureFormat, TextureUsages},
+        render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages},
         view::screenshot::{Screenshot, ScreenshotCaptured},
     },
     time::TimeUpdateStrategy,
@@ -21,15 +22,28 @@ const PATIENCE: u32 = 100;
 /// Drawn updates until meshes, textures and pipelines are on the device.
 const WARM_UP: u32 = 2;
 
+/// The largest side that every graphics device draws (pixels).
+const LARGEST: u32 = 8192;
+
 /// A camera that draws into an image when asked to.
 pub struct Pictures {
     camera: Entity,
     target: Handle<Image>,
+    /// How many pixels along and across are averaged into one.
+    times: u32,
 }
 
 impl Pictures {
-    /// Finishes the app's plugins and gets everything onto the device, without a tick.
-    pub fn new(app: &mut App, (width, height): (u32, u32), camera: impl Bundle) -> Self {
+    /// Finishes the app's plugins and gets everything onto the device, without a tick. Pictures are
+    /// drawn `times` larger and averaged in linear light: 3 is what a still deserves.
+    pub fn new(
+        app: &mut App,
+        (width, height): (u32, u32),
+        times: u32,
+        camera: impl Bundle,
+    ) -> Self {
+        let times = times.min(LARGEST / width.max(height)).max(1);
+        let (width, height) = (times * width, times * height);
         let mut image =
             Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
         image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
@@ -44,7 +58,7 @@ impl Pictures {
         }
         // Nothing is drawn on the way: only the ticks count.
         activate(app, camera, false);
-        Self { camera, target }
+        Self { camera, target, times }
     }
 
     /// Draws the world as it is now into a PNG.
@@ -65,11 +79,35 @@ impl Pictures {
             // Once is enough; the rest is waiting.
             activate(app, self.camera, false);
             if let Some(image) = app.world_mut().resource_mut::<Captured>().0.take() {
-                return Ok(image);
+                return Ok(averaged(&image, self.times));
             }
         }
         Err(io::Error::other("the graphics device gave no picture back"))
     }
+}
+
+/// The picture with `times` by `times` pixels averaged into one, in linear light.
+fn averaged(picture: &Image, times: u32) -> Image {
+    let (width, height) = (picture.width() / times, picture.height() / times);
+    let bytes = picture.data.as_deref().unwrap_or_default();
+    let light: [f32; 256] = core::array::from_fn(|i| Color::srgb_u8(i as u8, 0, 0).to_linear().red);
+    let mean = |x: u32, y: u32, channel: u32| {
+        let near = (0..times * times).map(|i| (times * x + i % times, times * y + i / times));
+        let places = near.map(|(x, y)| (4 * (y * times * width + x) + channel) as usize);
+        places.map(|i| light[usize::from(bytes.get(i).copied().unwrap_or(0))]).sum::<f32>()
+            / (times * times) as f32
+    };
+    let pixels = (0..width * height).flat_map(|i| {
+        let [red, green, blue] = [0, 1, 2].map(|channel| mean(i % width, i / width, channel));
+        Color::linear_rgb(red, green, blue).to_srgba().to_u8_array()
+    });
+    Image::new(
+        Extent3d { width, height, depth_or_array_layers: 1 },
+        TextureDimension::D2,
+        pixels.collect(),
+        TextureFormat::Rgba8UnormSrgb,
+        RenderAssetUsages::default(),
+    )
 }
 
 /// Makes the folder that pictures go into.

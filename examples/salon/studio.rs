@@ -7,9 +7,11 @@ use core::f32::consts::FRAC_PI_2;
 /// What the lights are set for (m).
 pub const FOCUS: Vec3 = Vec3::new(-0.03, 0.25, 0.0);
 
-/// Key, fill and rim light upon `focus`, for things of a head's size times `size`.
+/// Key and fill from the front, two kickers at the hair's height from behind, upon `focus`, for
+/// things of a head's size times `size`. What comes from behind must not shine through the head: all
+/// but the fill cast shadows.
 pub fn light(commands: &mut Commands, focus: Vec3, size: f32) {
-    let light = |colour, lumens: f32, from: Vec3, shadow| {
+    let light = |colour, lumens: f32, from: Vec3, outer_angle, shadow| {
         (
             SpotLight {
                 color: colour,
@@ -19,21 +21,20 @@ pub fn light(commands: &mut Commands, focus: Vec3, size: f32) {
                 shadow_maps_enabled: shadow,
                 shadow_normal_bias: 0.6,
                 shadow_depth_bias: 0.004,
-                inner_angle: 0.35,
-                outer_angle: 0.75,
+                inner_angle: 0.6 * outer_angle,
+                outer_angle,
                 ..default()
             },
             Transform::from_translation(focus + size * (from - FOCUS)).looking_at(focus, Vec3::Y),
         )
     };
-    commands.spawn(light(Color::srgb(1.0, 0.95, 0.88), 230_000.0, Vec3::new(1.0, 1.5, 1.5), true));
-    commands.spawn(light(Color::srgb(0.82, 0.9, 1.0), 75_000.0, Vec3::new(-1.6, 0.8, 1.3), false));
-    commands.spawn(light(
-        Color::srgb(1.0, 0.98, 0.95),
-        150_000.0,
-        Vec3::new(0.7, 1.3, -1.5),
-        false,
-    ));
+    let (warm, cold) = (Color::srgb(1.0, 0.95, 0.88), Color::srgb(0.82, 0.9, 1.0));
+    commands.spawn(light(warm, 230_000.0, Vec3::new(1.0, 1.5, 1.5), 0.75, true));
+    commands.spawn(light(cold, 60_000.0, Vec3::new(-1.6, 0.8, 1.3), 0.75, false));
+    for side in [-1.0, 1.0] {
+        let from = FOCUS + Vec3::new(1.15 * side, 0.45, -1.65);
+        commands.spawn(light(Color::WHITE, 110_000.0, from, 0.35, true));
+    }
     commands.insert_resource(GlobalAmbientLight {
         color: Color::srgb(0.9, 0.94, 1.0),
         brightness: 260.0,

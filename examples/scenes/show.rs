@@ -144,7 +144,7 @@ fn pictures(
     size: (u32, u32),
 ) -> Result<(), Box<dyn Error>> {
     picture::folder(folder)?;
-    let pictures = picture::Pictures::new(app, size, camera());
+    let pictures = picture::Pictures::new(app, size, 1, camera());
     for (i, (keys, name)) in script.iter().enumerate() {
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
         for key in *keys {

@@ -8,6 +8,7 @@ use super::{
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
     scatter::scatter,
     sets::Interpolate,
+    thickness::Thickness,
 };
 use crate::{
     Moisture,
@@ -32,7 +33,7 @@ pub(super) struct Packed {
     followers: Option<HairFollowers>,
     /// Whether roots are elsewhere than when followers were laid.
     roots_moved: bool,
-    centre: Vec3,
+    thickness: Thickness,
     /// How far apart guides grow (m).
     spacing: f32,
     /// How far followers reach beyond the guides (m).
@@ -300,8 +301,6 @@ impl Packed {
             }));
         }
         let roots = core::mem::take(&mut self.roots);
-        let usable = || roots.iter().map(|r| r.place).filter(|p| p.is_finite());
-        self.centre = usable().sum::<Vec3>() / usable().count().max(1) as f32;
         self.note_roots();
         let drawn = scatter(&roots, given, followers);
         let reach = |strand: &DrawnStrand| {
@@ -315,7 +314,20 @@ impl Packed {
         };
         self.margin = drawn.iter().map(reach).fold(0.005, f32::max);
         self.roots = roots;
+        self.thickness = self.thickness_of(&drawn, followers);
         drawn
+    }
+
+    fn thickness_of(&self, drawn: &[DrawnStrand], followers: &HairFollowers) -> Thickness {
+        let nodes: Vec<Vec3> = self.nodes.iter().map(packed_place).collect();
+        let mut rest = &nodes[..];
+        let guides = self.layout.iter().map(|guide| {
+            let (own, others) = rest.split_at(guide.nodes as usize);
+            rest = others;
+            own
+        });
+        let guides: Vec<&[Vec3]> = guides.collect();
+        Thickness::of(drawn, |k| guides[k as usize], followers)
     }
 
     /// Notes where roots are, now that followers are laid.
@@ -340,6 +352,6 @@ impl Packed {
         view: HairView,
         (guides, strands): (u32, u32),
     ) -> Ribbon {
-        Ribbon::new(look, followers, view, self.centre, guides, strands)
+        Ribbon::new(look, followers, view, self.thickness, guides, strands)
     }
 }

@@ -3,6 +3,9 @@
 use crate::setting::{Ranged, setting};
 use bevy::prelude::*;
 
+/// Of the albedo with the root of absorption: Chiang et al. equation 9 at azimuthal roughness 0.3.
+const ALBEDO_FALL: f32 = 5.888;
+
 setting! {
     /// How much of the two pigments hair holds, which gives its colour.
     ///
@@ -42,12 +45,18 @@ impl Melanin {
         Self { eumelanin, pheomelanin }
     }
 
+    /// How much of red, green and blue light a fibre takes, by its radius: light straight through
+    /// loses e^(−2 times this).
+    pub fn absorption(&self) -> Vec3 {
+        let absorption = Vec3::new(0.419, 0.697, 1.37) * self.eumelanin
+            + Vec3::new(0.187, 0.4, 1.05) * self.pheomelanin;
+        absorption.max(Vec3::ZERO)
+    }
+
     /// The colour of a head of such hair.
     pub fn color(&self) -> LinearRgba {
-        let absorbed = Vec3::new(0.419, 0.697, 1.37) * self.eumelanin
-            + Vec3::new(0.187, 0.4, 1.05) * self.pheomelanin;
-        // Chiang et al. equation 9 at azimuthal roughness 0.3.
-        let [red, green, blue] = absorbed.to_array().map(|a| (-5.888 * a.max(0.0).sqrt()).exp());
+        let [red, green, blue] =
+            self.absorption().to_array().map(|a| (-ALBEDO_FALL * a.sqrt()).exp());
         LinearRgba::rgb(red, green, blue)
     }
 }
@@ -83,6 +92,8 @@ setting! {
         pub dye: Color = Color::WHITE;
         /// How much the amount of pigment differs from strand to strand, a share.
         pub variation: f32 = 0.2, in VARIATION: 0.0..=1.0, safe 0.0..=0.5, "0.2 is natural";
+        /// Share of strands without pigment: what makes hair grey.
+        pub grey: f32 = 0.0, in GREY: 0.0..=1.0, "0.5 is salt and pepper";
         /// Share of the pigment that sun has taken at the tips.
         pub tip_bleach: f32 = 0.25, in TIP_BLEACH: 0.0..=1.0, "0.25 is a summer";
         /// Drawn width of a strand at the root. Real hair has 0.07 mm; a drawn strand stands for
@@ -91,18 +102,22 @@ setting! {
             "0.00035 suits a head";
         /// Width at the tip as a share of that at the root.
         pub taper: f32 = 0.3, in TAPER: 0.0..=1.0, "0.3 is natural";
-        /// Roughness of the fibre: width of the highlights. Lower is sleeker.
+        /// Roughness of the fibre: its square is the standard deviation of the first highlight along
+        /// the fibre in radians (Karis 2016; 0.38 makes 8°, Marschner et al. 2003 measured 5° to 10°).
+        /// Lower is sleeker.
         pub roughness: f32 = 0.38, in ROUGHNESS: 0.05..=1.0, safe 0.1..=1.0,
             "0.38 suits clean hair";
-        /// Strength of the highlights; 1 is a clean fibre.
+        /// Strength of the highlights off and from inside the fibre; 1 is a clean fibre, above that
+        /// hair returns more light than it receives.
         pub gloss: f32 = 1.0, in GLOSS: 0.0..=100.0, safe 0.0..=4.0, "1 is natural";
-        /// Strength of the light that shines through against the light.
-        pub backlight: f32 = 0.4, in BACKLIGHT: 0.0..=100.0, safe 0.0..=2.0, "0.4 is natural";
-        /// How deep light goes into the hair where a light casts shadows. Lower gives harder shade
-        /// between locks.
-        pub self_shadow: f32 = 12e-3, "m" in SELF_SHADOW: 0.0..=10.0, safe 1e-3..=0.1,
-            "0.012 suits a head";
-        /// How much darker it is at the roots, a share.
+        /// Strength of the light straight through the fibre, seen against the light; 1 is a whole
+        /// fibre.
+        pub backlight: f32 = 1.0, in BACKLIGHT: 0.0..=100.0, safe 0.0..=2.0, "1 is natural";
+        /// How dense hair is to light that casts shadows, as a multiple of what the drawn strands
+        /// come to. Higher gives darker shade between locks.
+        pub shadow_density: f32 = 1.0, in SHADOW_DENSITY: 0.0..=1e3, safe 0.0..=4.0,
+            "1 is as drawn";
+        /// How much less light from all around comes to the roots, a share.
         pub root_shade: f32 = 0.5, in ROOT_SHADE: 0.0..=1.0, "0.5 is full hair";
         /// The reflection model.
         pub shading: HairShading = HairShading::Fibre;
@@ -110,23 +125,27 @@ setting! {
 }
 
 impl HairLook {
-    /// The colours at root and tip.
-    pub(super) fn colors(&self) -> (Vec3, Vec3) {
+    /// The fibres' absorption at root and tip, dye included.
+    pub(super) fn absorptions(&self) -> (Vec3, Vec3) {
         let dye = self.dye.to_linear();
-        let dye = Vec3::new(dye.red, dye.green, dye.blue).clamp(Vec3::ZERO, Vec3::ONE);
-        let dye = if dye.is_nan() { Vec3::ONE } else { dye };
+        let dye = Vec3::new(dye.red, dye.green, dye.blue);
+        // NaN is no dye; black takes all that black hair takes, and more.
+        let dye = dye.map(|c| if c.is_nan() { 1.0 } else { c.clamp(1e-4, 1.0) });
+        let dyed = |melanin: Melanin| {
+            let root = melanin.absorption().map(f32::sqrt) - dye.map(f32::ln) / ALBEDO_FALL;
+            root * root
+        };
         let tip = Melanin {
             eumelanin: self.melanin.eumelanin * (1.0 - self.tip_bleach),
             pheomelanin: self.melanin.pheomelanin * (1.0 - self.tip_bleach),
         };
-        let rgb = |m: &Melanin| Vec3::from(m.color().to_f32_array_no_alpha()) * dye;
-        (rgb(&self.melanin), rgb(&tip))
+        (dyed(self.melanin), dyed(tip))
     }
 }
 
 /// How wet each node of a strand looks, root first: 0 dry, 1 soaked. Component of a strand for those
 /// who know better than its water ([`Moisture::sheen`](crate::Moisture::sheen)), which is what shows
-/// where this is absent. Wet hair is drawn darker, glossier and in tighter locks ([`HairFollowers::wet_clump`](super::HairFollowers::wet_clump)).
+/// where this is absent. Wet hair is drawn darker, with a film's sheen and in tighter locks ([`HairFollowers::wet_clump`](super::HairFollowers::wet_clump)).
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct WetLook(pub Vec<f32>);
@@ -158,6 +177,23 @@ mod tests {
         let clamped = broken.clamped();
         assert_eq!(clamped.width, HairLook::default().width);
         assert_eq!(clamped.roughness, 0.05);
-        assert!(clamped.colors().0.is_finite());
+        let (root, tip) = clamped.absorptions();
+        assert!(root.is_finite() && tip.is_finite());
+        let black = HairLook { dye: Color::BLACK, ..default() };
+        assert!(black.absorptions().0.is_finite() && black.absorptions().0.min_element() > 1.0);
+    }
+
+    #[test]
+    fn dye_multiplies_the_colour_that_a_head_shows() {
+        let look = HairLook {
+            melanin: Melanin::BLOND,
+            dye: Color::linear_rgb(0.9, 0.2, 0.5),
+            tip_bleach: 0.0,
+            ..default()
+        };
+        let albedo = look.absorptions().0.map(|a| (-ALBEDO_FALL * a.sqrt()).exp());
+        let expected =
+            Vec3::from(Melanin::BLOND.color().to_f32_array_no_alpha()) * Vec3::new(0.9, 0.2, 0.5);
+        assert!((albedo - expected).abs().max_element() < 1e-4, "{albedo} for {expected}");
     }
 }

@@ -1,6 +1,6 @@
 //! The material that draws ribbons, and the mesh that counts them.
 
-use super::{HairFollowers, HairLook, HairShading, HairView};
+use super::{HairFollowers, HairLook, HairShading, HairView, thickness::Thickness};
 use bevy::{
     asset::RenderAssetUsages,
     material::OpaqueRendererMethod,
@@ -16,7 +16,7 @@ use bevy::{
         },
         storage::ShaderBuffer,
     },
-    shader::ShaderRef,
+    shader::{ShaderDefVal, ShaderRef},
 };
 
 /// The material of drawn hair; made and kept up to date from [`HairLook`], [`HairFollowers`] and
@@ -58,17 +58,18 @@ impl From<&RibbonMaterial> for RibbonKey {
 /// `Ribbon` of `strands.wgsl`.
 #[derive(ShaderType, Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Ribbon {
-    root_color: Vec3,
+    root_absorption: Vec3,
     variation: f32,
-    tip_color: Vec3,
+    tip_absorption: Vec3,
     root_shade: f32,
-    centre: Vec3,
     width: f32,
     taper: f32,
     roughness: f32,
     gloss: f32,
     backlight: f32,
-    self_shadow: f32,
+    grey: f32,
+    density: f32,
+    layers: f32,
     clump: f32,
     parting: f32,
     wet_clump: f32,
@@ -83,23 +84,25 @@ impl Ribbon {
         look: &HairLook,
         followers: &HairFollowers,
         view: HairView,
-        centre: Vec3,
+        thickness: Thickness,
         guides: u32,
         strands: u32,
     ) -> Self {
-        let (root_color, tip_color) = look.colors();
+        let (root_absorption, tip_absorption) = look.absorptions();
+        let taken = look.width * look.shadow_density;
         Self {
-            root_color,
+            root_absorption,
             variation: look.variation,
-            tip_color,
+            tip_absorption,
             root_shade: look.root_shade,
-            centre,
             width: look.width,
             taper: look.taper,
             roughness: look.roughness,
             gloss: look.gloss,
             backlight: look.backlight,
-            self_shadow: look.self_shadow,
+            grey: look.grey,
+            density: thickness.density * taken,
+            layers: thickness.layers * taken,
             clump: followers.clump,
             parting: followers.parting,
             wet_clump: followers.wet_clump,
@@ -132,6 +135,16 @@ impl Material for RibbonMaterial {
         PREPASS.into()
     }
 
+    fn prepass_fragment_shader() -> ShaderRef {
+        PREPASS.into()
+    }
+
+    /// Makes Bevy run the fragment stage in the prepasses and shadow maps too, where strands light
+    /// their share of the samples. Nothing is cut off by alpha.
+    fn alpha_mode(&self) -> AlphaMode {
+        AlphaMode::Mask(0.5)
+    }
+
     fn opaque_render_method(&self) -> OpaqueRendererMethod {
         OpaqueRendererMethod::Forward
     }
@@ -144,12 +157,12 @@ impl Material for RibbonMaterial {
     ) -> Result<(), SpecializedMeshPipelineError> {
         descriptor.vertex.buffers = vec![layout.0.get_layout(&[CORNER.at_shader_location(0)])?];
         descriptor.primitive.cull_mode = None;
-        if descriptor.multisample.count > 1 {
-            descriptor.vertex.shader_defs.push("HAIR_SAMPLES".into());
-        }
+        let samples = ShaderDefVal::UInt("HAIR_SAMPLES".into(), descriptor.multisample.count);
+        descriptor.vertex.shader_defs.push(samples.clone());
         if let Some(fragment) = &mut descriptor.fragment {
             let RibbonKey { heat, kajiya_kay } = key.bind_group_data;
             let defs = &mut fragment.shader_defs;
+            defs.push(samples);
             defs.extend(heat.then(|| "HAIR_HEAT".into()));
             defs.extend(kajiya_kay.then(|| "HAIR_KAJIYA_KAY".into()));
         }

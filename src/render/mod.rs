@@ -12,11 +12,13 @@
 //! [`HairFollowers`], [`HairView`]. For a look of your own write a material around [`HairBuffers`].
 //!
 //! Vertex shaders read storage buffers, so WebGL2 cannot draw this; WebGPU and native can. Strands
-//! thinner than a pixel are drawn one pixel wide and cover part of its samples; without MSAA fewer
-//! strands are drawn instead.
+//! thinner than a pixel are drawn one pixel wide and light as many of its samples as they cover of it;
+//! without MSAA they light some pixels and others not, which temporal antialiasing smooths.
 
 #[doc(hidden)]
 pub mod curve;
+#[doc(hidden)]
+pub mod fibre;
 
 mod beads;
 mod buffers;
@@ -29,6 +31,7 @@ mod material;
 mod scatter;
 mod screen_share;
 mod sets;
+mod thickness;
 mod upload;
 mod view;
 
@@ -123,6 +126,9 @@ impl Plugin for HairRenderPlugin {
         }
         load_shader_library!(app, "strands.wgsl");
         load_shader_library!(app, "ribbon.wgsl");
+        load_shader_library!(app, "coverage.wgsl");
+        load_shader_library!(app, "fibre.wgsl");
+        load_shader_library!(app, "passage.wgsl");
         load_shader_library!(app, "shading.wgsl");
         embedded_asset!(app, "ribbon_forward.wgsl");
         embedded_asset!(app, "ribbon_prepass.wgsl");

@@ -4,30 +4,28 @@
 
 #import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_view_bindings::view
-#import bevy_keratin::strands::{ribbon, strands, strand_point, strand_state, hash, StrandState, DrawnStrand}
+#import bevy_keratin::strands::{ribbon, strands, strand_point, strand_state, StrandState, DrawnStrand}
 #ifdef MOTION_VECTOR_PREPASS
 #import bevy_keratin::strands::past_strand_position
 #endif
 
 const VIEW_GUIDES: u32 = 6u;
-// The least drawn width. Samples within a pixel find what is thinner than a pixel.
-#ifdef HAIR_SAMPLES
-const LEAST_PIXELS: f32 = 0.6;
-#else
-const LEAST_PIXELS: f32 = 1.0;
-#endif
+// Up to where cut hair keeps its width.
+const BLUNT: f32 = 0.9;
 
 struct RibbonVertex {
     world_position: vec3<f32>,
     // The point of the strand beside which this is.
     center: vec3<f32>,
     tangent: vec3<f32>,
-    // Away from the head, across the strand: stands for the surface that many strands make up.
-    outward: vec3<f32>,
+    // Of the hair's frame to the world.
+    scale: f32,
     // 0 root ... 1 tip.
     along: f32,
     seed: u32,
     state: StrandState,
+    // How much of what is drawn the strand covers.
+    share: f32,
     shown: bool,
 }
 
@@ -46,6 +44,11 @@ fn toward_eye(position: vec3<f32>) -> vec3<f32> {
 fn safe_normalize(v: vec3<f32>, otherwise: vec3<f32>) -> vec3<f32> {
     let square = dot(v, v);
     return select(otherwise, v * inverseSqrt(max(square, 1e-30)), square > 1e-20);
+}
+
+// What stands for the surface that many strands make up: across the strand, to the eye.
+fn facing_normal(tangent: vec3<f32>, eye: vec3<f32>) -> vec3<f32> {
+    return safe_normalize(eye - tangent * dot(eye, tangent), eye);
 }
 
 // `corner` counts through all strands: two for each ring of each strand.
@@ -71,19 +74,16 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     let world = mesh_functions::get_world_from_local(instance);
     let linear = mat3x3(world[0].xyz, world[1].xyz, world[2].xyz);
     let scale = pow(abs(determinant(linear)), 1.0 / 3.0);
+    out.scale = scale;
     let center = (world * vec4(point.position, 1.0)).xyz;
     out.center = center;
     out.tangent = safe_normalize(linear * point.slope, vec3(0.0, 1.0, 0.0));
-    let from_centre = center - (world * vec4(ribbon.centre, 1.0)).xyz;
     let eye = toward_eye(center);
-    out.outward = safe_normalize(from_centre - out.tangent * dot(from_centre, out.tangent), eye);
 
-    let least = LEAST_PIXELS * pixel_size((view.clip_from_world * vec4(center, 1.0)).w);
-    let width = scale * ribbon.width * mix(1.0, ribbon.taper, out.along * out.along);
-    // Strands thinner than can be drawn are drawn so wide, and fewer of them, so that hair covers
-    // as much from afar. Which ones is the same in every frame; guides go last.
-    let kept = width / max(least, 1e-9) - hash(strand.seed) * (1.0 - strand.guide);
-    let drawn = max(width, least) * saturate(kept * 8.0 + 0.5);
+    let width = scale * ribbon.width * mix(1.0, ribbon.taper, smoothstep(BLUNT, 1.0, out.along));
+    // Of a shadow map, a texel.
+    let drawn = max(width, pixel_size((view.clip_from_world * vec4(center, 1.0)).w));
+    out.share = width / max(drawn, 1e-9);
     let across = safe_normalize(cross(out.tangent, eye), normalize(view.world_from_view[0].xyz));
     out.world_position = center + across * (side * drawn);
     return out;

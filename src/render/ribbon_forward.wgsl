@@ -4,8 +4,9 @@
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
 #import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
-#import bevy_keratin::ribbon::{ribbon_vertex, toward_eye}
+#import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, facing_normal, safe_normalize}
 #import bevy_keratin::strands::ribbon
+#import bevy_keratin::coverage::covered_samples
 #import bevy_keratin::shading::{Fibre, lit_hair}
 
 // The strain that is drawn red.
@@ -15,10 +16,15 @@ struct ForwardVertex {
     @invariant @builtin(position) position: vec4<f32>,
     @location(0) world_position: vec3<f32>,
     @location(1) tangent: vec3<f32>,
-    @location(2) outward: vec3<f32>,
-    // Along the strand, value of the heat map, moisture.
-    @location(3) along: vec3<f32>,
+    // Along the strand, value of the heat map, moisture, density of strands around.
+    @location(2) along: vec4<f32>,
+    @location(3) share: f32,
     @location(4) @interpolate(flat) seed: u32,
+}
+
+struct Fragment {
+    @location(0) color: vec4<f32>,
+    @builtin(sample_mask) samples: u32,
 }
 
 @vertex
@@ -32,8 +38,8 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
     out.world_position = vertex.world_position;
     out.position = position_world_to_clip(vertex.world_position);
     out.tangent = vertex.tangent;
-    out.outward = vertex.outward;
     out.seed = vertex.seed;
+    out.share = vertex.share;
     var value = 0.0;
     switch ribbon.view {
         case 1u, 2u, 3u, 4u: { value = vertex.state.rates[ribbon.view - 1u]; }
@@ -41,7 +47,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
         case 7u: { value = vertex.state.moisture; }
         default: {}
     }
-    out.along = vec3(vertex.along, value, vertex.state.moisture);
+    out.along = vec4(vertex.along, value, vertex.state.moisture, ribbon.density / max(vertex.scale, 1e-6));
     return out;
 }
 
@@ -53,25 +59,32 @@ fn heat(value: f32) -> vec3<f32> {
 }
 
 @fragment
-fn fragment(in: ForwardVertex) -> @location(0) vec4<f32> {
+fn fragment(in: ForwardVertex) -> Fragment {
+    var out: Fragment;
+    out.samples = covered_samples(in.share, in.seed, in.position.xy);
+    if out.samples == 0u {
+        discard;
+    }
 #ifdef HAIR_HEAT
-    return vec4(heat(in.along.y), 1.0);
+    out.color = vec4(heat(in.along.y), 1.0);
 #else
     var fibre: Fibre;
     fibre.position = in.world_position;
     fibre.frag_coord = in.position;
-    fibre.tangent = normalize(in.tangent);
+    fibre.tangent = safe_normalize(in.tangent, vec3(0.0, 1.0, 0.0));
     fibre.eye = toward_eye(in.world_position);
-    fibre.outward = normalize(in.outward);
+    fibre.normal = facing_normal(fibre.tangent, fibre.eye);
     fibre.along = in.along.x;
     fibre.seed = in.seed;
     fibre.moisture = saturate(in.along.z);
+    fibre.density = in.along.w;
     let lit = lit_hair(fibre);
 
     var pbr = pbr_input_new();
     pbr.frag_coord = in.position;
     pbr.world_position = vec4(in.world_position, 1.0);
     pbr.material.flags |= STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT;
-    return main_pass_post_lighting_processing(pbr, vec4(lit, 1.0));
+    out.color = main_pass_post_lighting_processing(pbr, vec4(lit, 1.0));
 #endif
+    return out;
 }

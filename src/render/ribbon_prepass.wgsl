@@ -1,26 +1,40 @@
 // Hair in shadow maps, as seen from the light, and in the camera's prepasses: depth, normals, motion.
-// What follows in the fragment stage is Bevy's own prepass, which reads these locations.
 
 #import bevy_pbr::view_transformations::position_world_to_clip
-#import bevy_keratin::ribbon::ribbon_vertex
+#import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, facing_normal}
+#import bevy_keratin::coverage::covered_samples
 #ifdef MOTION_VECTOR_PREPASS
 #import bevy_keratin::ribbon::place_before
+#import bevy_pbr::mesh_view_bindings::view
+#import bevy_pbr::prepass_bindings
 #endif
 
 struct PrepassVertex {
     @invariant @builtin(position) position: vec4<f32>,
+    @location(0) share: f32,
+    @location(1) @interpolate(flat) seed: u32,
 #ifdef NORMAL_PREPASS_OR_DEFERRED_PREPASS
     @location(2) world_normal: vec3<f32>,
 #endif
-    @location(4) world_position: vec4<f32>,
 #ifdef MOTION_VECTOR_PREPASS
-    @location(5) previous_world_position: vec4<f32>,
+    @location(3) world_position: vec3<f32>,
+    @location(4) previous_world_position: vec3<f32>,
 #endif
 #ifdef UNCLIPPED_DEPTH_ORTHO_EMULATION
-    @location(6) unclipped_depth: f32,
+    @location(5) unclipped_depth: f32,
 #endif
-#ifdef VERTEX_OUTPUT_INSTANCE_INDEX
-    @location(7) instance_index: u32,
+}
+
+struct PrepassFragment {
+    @builtin(sample_mask) samples: u32,
+#ifdef NORMAL_PREPASS
+    @location(0) normal: vec4<f32>,
+#endif
+#ifdef MOTION_VECTOR_PREPASS
+    @location(1) motion: vec2<f32>,
+#endif
+#ifdef UNCLIPPED_DEPTH_ORTHO_EMULATION
+    @builtin(frag_depth) depth: f32,
 #endif
 }
 
@@ -28,13 +42,15 @@ struct PrepassVertex {
 fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> PrepassVertex {
     var out: PrepassVertex;
     let ribbon = ribbon_vertex(corner, instance);
-    out.world_position = vec4(ribbon.world_position, 1.0);
     out.position = position_world_to_clip(ribbon.world_position);
+    out.share = ribbon.share;
+    out.seed = ribbon.seed;
 #ifdef NORMAL_PREPASS_OR_DEFERRED_PREPASS
-    out.world_normal = ribbon.outward;
+    out.world_normal = facing_normal(ribbon.tangent, toward_eye(ribbon.center));
 #endif
 #ifdef MOTION_VECTOR_PREPASS
-    out.previous_world_position = vec4(place_before(ribbon, corner, instance), 1.0);
+    out.world_position = ribbon.world_position;
+    out.previous_world_position = place_before(ribbon, corner, instance);
 #endif
     if !ribbon.shown {
         out.position = vec4(0.0, 0.0, 0.0, 1.0);
@@ -43,8 +59,28 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> P
     out.unclipped_depth = out.position.z;
     out.position.z = min(out.position.z, 1.0);
 #endif
-#ifdef VERTEX_OUTPUT_INSTANCE_INDEX
-    out.instance_index = instance;
+    return out;
+}
+
+@fragment
+fn fragment(in: PrepassVertex) -> PrepassFragment {
+    var out: PrepassFragment;
+    out.samples = covered_samples(in.share, in.seed, in.position.xy);
+    if out.samples == 0u {
+        discard;
+    }
+#ifdef NORMAL_PREPASS
+    out.normal = vec4(in.world_normal * 0.5 + 0.5, 1.0);
+#endif
+#ifdef MOTION_VECTOR_PREPASS
+    let now = view.unjittered_clip_from_world * vec4(in.world_position, 1.0);
+    let before = prepass_bindings::previous_view_uniforms.clip_from_world
+        * vec4(in.previous_world_position, 1.0);
+    // Across the screen, whose y goes down.
+    out.motion = (now.xy / now.w - before.xy / before.w) * vec2(0.5, -0.5);
+#endif
+#ifdef UNCLIPPED_DEPTH_ORTHO_EMULATION
+    out.depth = in.unclipped_depth;
 #endif
     return out;
 }

@@ -1,6 +1,5 @@
-// How hair reflects light: Kajiya-Kay as in [W] equation 3, and a Marschner-like fibre with the
-// lobes R, TT and TRT in the real-time form of Karis (2016, "Physically based hair shading in
-// Unreal"), under all of Bevy's lights.
+// How hair reflects light: the fibre of fibre.wgsl, or Kajiya-Kay as in [W] equation 3, under all of
+// Bevy's lights.
 #define_import_path bevy_keratin::shading
 
 #import bevy_pbr::mesh_view_bindings as view_bindings
@@ -8,46 +7,64 @@
 #import bevy_pbr::mesh_view_types
 #import bevy_pbr::clustered_forward as clustering
 #import bevy_pbr::lighting
-#import bevy_pbr::shadows
 #ifdef ENVIRONMENT_MAP
 #import bevy_pbr::environment_map
 #endif
 #import bevy_render::maths::PI
 #import bevy_keratin::strands::{ribbon, hash}
+#import bevy_keratin::fibre::{
+    Optics, Passage, angles_of, scattered, forward_share, backward_share, bulk_of,
+}
+#import bevy_keratin::passage::{Way, slab_passage, sun_passage, spot_passage, point_passage}
 
 struct Fibre {
     position: vec3<f32>,
     frag_coord: vec4<f32>,
     tangent: vec3<f32>,
     eye: vec3<f32>,
-    outward: vec3<f32>,
+    // Faces the eye as far as it can across the fibre: a normal that never flips (Karis 2016).
+    normal: vec3<f32>,
     along: f32,
     seed: u32,
     moisture: f32,
+    // Of strands around, seen from beside (1/m).
+    density: f32,
 }
 
 // What a fibre is made of at one place.
 struct Surface {
-    color: vec3<f32>,
-    roughness: f32,
-    gloss: f32,
-    // Light that the cuticles' rough edges scatter before it meets a pigment.
-    pale: f32,
+    optics: Optics,
+    // Of all the hair, under light from all around.
+    reflectance: vec3<f32>,
+}
+
+// How far strands keep their looks, as a share of the length: some millimetres.
+const PIECES: f32 = 48.0;
+
+// Noise of a strand's own in -1 ... 1, smooth along it.
+fn along_noise(seed: u32, share: f32) -> f32 {
+    let place = share * PIECES;
+    let piece = u32(max(place, 0.0));
+    let f = fract(place);
+    let low = hash(seed + piece * 1013u);
+    let high = hash(seed + (piece + 1u) * 1013u);
+    return 2.0 * mix(low, high, f * f * (3.0 - 2.0 * f)) - 1.0;
 }
 
 fn surface_of(fibre: Fibre) -> Surface {
     var surface: Surface;
-    let color = mix(ribbon.root_color, ribbon.tip_color, fibre.along);
-    // Absorption varies with the melanin of each strand: colour = exp(-k sqrt(melanin)).
-    let melanin = max(1.0 + ribbon.variation * (4.0 * hash(fibre.seed + 7u) - 2.0), 0.0);
-    // Water fills the gaps between fibres: darker and glossier.
-    let wet = fibre.moisture;
-    surface.color = pow(max(color, vec3(1e-4)), vec3(sqrt(melanin) * (1.0 + 0.7 * wet)));
-    let uneven = 1.0 + 0.3 * (hash(fibre.seed + 11u) - 0.5);
-    surface.roughness = clamp(ribbon.roughness * uneven * (1.0 - 0.35 * wet), 0.04, 1.0);
-    surface.gloss = ribbon.gloss * (1.0 + 1.2 * wet);
-    // No two strands are alike, which even black hair shows; a film of water smooths the edges.
-    surface.pale = 0.012 * (0.4 + 1.2 * hash(fibre.seed + 13u)) * (1.0 - 0.8 * wet);
+    // Pigment varies from strand to strand; grey hair is a mixture with strands that have none.
+    let melanin = max(1.0 + ribbon.variation * (4.0 * hash(fibre.seed + 7u) - 2.0), 0.0)
+        * step(ribbon.grey, hash(fibre.seed + 17u));
+    let absorption = melanin * mix(ribbon.root_absorption, ribbon.tip_absorption, fibre.along);
+    // No two strands are alike, nor two pieces of one: 15 % in roughness, 1.5 degrees in tilt.
+    let uneven = 1.0 + 0.15 * (2.0 * hash(fibre.seed + 11u) - 1.0);
+    let rough = clamp(ribbon.roughness * uneven * (1.0 - 0.3 * fibre.moisture), 0.05, 1.0);
+    let tilt = 0.026 * along_noise(fibre.seed, fibre.along);
+    surface.optics = Optics(absorption, rough * rough * rough * rough, ribbon.gloss,
+        ribbon.backlight, fibre.moisture, tilt);
+    surface.reflectance = bulk_of(forward_share(surface.optics),
+        backward_share(surface.optics), ribbon.layers).reflectance;
     return surface;
 }
 
@@ -60,93 +77,32 @@ fn kajiya_kay(t: vec3<f32>, l: vec3<f32>, v: vec3<f32>, exponent: f32) -> vec2<f
     return vec2(sin_l, pow(max(sin_l * sin_v - lt * vt, 0.0), exponent));
 }
 
-fn gauss(width: f32, x: f32) -> f32 {
-    return exp(-0.5 * x * x / (width * width)) / (sqrt(2.0 * PI) * width);
-}
-
-// Schlick, for keratin's index of refraction 1.55.
-fn fresnel(cosine: f32) -> f32 {
-    let f0 = 0.0465;
-    return f0 + (1.0 - f0) * pow(1.0 - saturate(cosine), 5.0);
-}
-
-fn luminance(color: vec3<f32>) -> f32 {
-    return dot(color, vec3(0.2126, 0.7152, 0.0722));
-}
-
-// Light that has bounced between fibres: soft, tinted more the deeper it went.
-fn scattered(fibre: Fibre, surface: Surface, l: vec3<f32>, shadow: f32) -> vec3<f32> {
-    let lt = dot(l, fibre.tangent);
-    let cylinder = sqrt(max(1.0 - lt * lt, 0.0));
-    let wrapped = saturate((dot(fibre.outward, l) + 0.5) / 2.25);
-    let tint = pow(surface.color / max(luminance(surface.color), 1e-4), vec3(1.0 - shadow));
-    let pale = surface.color + surface.pale;
-    return sqrt(surface.color) * surface.color * tint * mix(wrapped, cylinder, 0.4) * (1.0 / PI)
-        + pale * wrapped / PI;
-}
-
-// Reflected share of light from `l`, shadow (1 lit) included. Not yet weighted by the light.
-fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, shadow: f32) -> vec3<f32> {
-    // The far side of the head is dark even where lights cast no shadow.
-    let facing = smoothstep(-0.45, 0.25, dot(fibre.outward, l));
-    let t = fibre.tangent;
-    let v = fibre.eye;
-    let r = surface.roughness;
-
+// Reflected share of light from `l` that came by `p`. Not yet weighted by the light.
+fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, p: Passage) -> vec3<f32> {
 #ifdef HAIR_KAJIYA_KAY
-    // Two lobes, shifted to root and tip; the second went through the fibre and is tinted.
-    let exponent = 2.0 / (r * r);
-    let first = kajiya_kay(normalize(t + 0.05 * fibre.outward), l, v, exponent);
-    let second = kajiya_kay(normalize(t - 0.1 * fibre.outward), l, v, 0.25 * exponent);
-    let bright = surface.gloss * facing * (exponent + 2.0) / (64.0 * PI);
-    return shadow * (surface.color * first.x * mix(0.4, 1.0, facing) / PI
+    // Two lobes, shifted to tip and root; the second went through the fibre and is tinted.
+    let t = fibre.tangent;
+    let exponent = 2.0 / sqrt(surface.optics.variance);
+    let first = kajiya_kay(normalize(t + 0.05 * fibre.normal), l, fibre.eye, exponent);
+    let second = kajiya_kay(normalize(t - 0.1 * fibre.normal), l, fibre.eye, 0.25 * exponent);
+    let facing = smoothstep(-0.45, 0.25, dot(fibre.normal, l));
+    let bright = surface.optics.gloss * facing * (exponent + 2.0) / (64.0 * PI);
+    // What goes into the fibres; the lobes are what their surface reflects.
+    let body = max(surface.reflectance - backward_share(surface.optics), vec3(0.0));
+    return p.lit * (body * first.x * mix(0.4, 1.0, facing) / PI
         + bright * first.y * 0.35
-        + bright * second.y * 0.5 * sqrt(surface.color));
+        + bright * second.y * 0.5 * sqrt(body));
 #else
-    let sin_l = clamp(dot(t, l), -1.0, 1.0);
-    let sin_v = clamp(dot(t, v), -1.0, 1.0);
-    let cos_d = cos(0.5 * abs(asin(sin_v) - asin(sin_l)));
-    let l_across = l - sin_l * t;
-    let v_across = v - sin_v * t;
-    let cos_phi = dot(l_across, v_across)
-        * inverseSqrt(dot(l_across, l_across) * dot(v_across, v_across) + 1e-4);
-    let cos_half = sqrt(saturate(0.5 + 0.5 * cos_phi));
-    let n = 1.19 / cos_d + 0.36 * cos_d;
-    let shift = 0.035;
-    let b = r * r;
-    let sum = sin_l + sin_v;
-
-    // R: off the cuticle, uncoloured, shifted to the root by its scales.
-    let sa = sin(-2.0 * shift);
-    let ca = cos(-2.0 * shift);
-    let r_shift = 2.0 * sa * (ca * cos_half * sqrt(1.0 - sin_v * sin_v) + sa * sin_v);
-    let r_lobe = gauss(b * 1.4142 * max(cos_half, 0.1), sum - r_shift) * 0.25 * cos_half
-        * fresnel(sqrt(saturate(0.5 + 0.5 * dot(v, l))));
-
-    // TT: straight through, the glow around hair against the light.
-    let a = 1.0 / n;
-    let h = cos_half * (1.0 + a * (0.6 - 0.8 * cos_phi));
-    let f_tt = fresnel(cos_d * sqrt(saturate(1.0 - h * h)));
-    let tt_color = pow(surface.color, vec3(0.5 * sqrt(saturate(1.0 - h * h * a * a)) / cos_d));
-    let tt_lobe = gauss(b * 0.5 + 0.02, sum - shift) * exp(-3.65 * cos_phi - 3.98)
-        * (1.0 - f_tt) * (1.0 - f_tt) * tt_color;
-
-    // TRT: off the far wall inside, coloured, shifted to the tip.
-    let f_trt = fresnel(cos_d * 0.5);
-    let trt_lobe = gauss(b * 2.0, sum - 4.0 * shift) * exp(17.0 * cos_phi - 16.78)
-        * (1.0 - f_trt) * (1.0 - f_trt) * f_trt * pow(surface.color, vec3(0.8 / cos_d));
-
-    let through = ribbon.backlight * tt_lobe * smoothstep(-1.0, -0.2, -abs(dot(fibre.outward, l)));
-    let mirror = surface.gloss * facing * (r_lobe + trt_lobe * 2.0);
-    return shadow * (mirror + through) + shadow * scattered(fibre, surface, l, shadow);
+    return scattered(
+        angles_of(fibre.tangent, l, fibre.eye), surface.optics, p, ribbon.layers);
 #endif
 }
 
-// Shadow is looked up at two places above: hair is not a wall, light fades as it goes in.
-const DEPTHS: vec2<f32> = vec2(0.4, 1.6);
-
-fn at_depth(fibre: Fibre, l: vec3<f32>, depth: f32) -> vec4<f32> {
-    return vec4(fibre.position + l * depth, 1.0);
+// Across the light's way, fibres are met as their length is seen.
+fn way_of(fibre: Fibre, l: vec3<f32>) -> Way {
+    let lt = dot(l, fibre.tangent);
+    let sine = sqrt(max(1.0 - lt * lt, 0.0));
+    return Way(fibre.position, fibre.density * sine, min(abs(lt) / max(sine, 0.1), 3.0));
 }
 
 fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32> {
@@ -167,21 +123,15 @@ fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32>
     if strength <= 0.0 {
         return vec3(0.0);
     }
-    var shadow = 1.0;
-    if ((*light).flags & mesh_view_types::POINT_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) != 0u {
-        shadow = 0.0;
-        for (var i = 0; i < 2; i++) {
-            let place = at_depth(fibre, l, ribbon.self_shadow * DEPTHS[i]);
-            if spot {
-                shadow += 0.5 * shadows::fetch_spot_shadow(
-                    id, place, fibre.outward, (*light).shadow_map_near_z, fibre.frag_coord.xy);
-            } else {
-                shadow += 0.5 * shadows::fetch_point_shadow(
-                    id, place, fibre.outward, fibre.frag_coord.xy);
-            }
-        }
+    var p: Passage;
+    if ((*light).flags & mesh_view_types::POINT_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
+        p = slab_passage(dot(fibre.normal, l), ribbon.layers);
+    } else if spot {
+        p = spot_passage(id, way_of(fibre, l));
+    } else {
+        p = point_passage(id, way_of(fibre, l), fibre.frag_coord.xy);
     }
-    return reflected(fibre, surface, l, shadow) * (*light).color_inverse_square_range.rgb * strength;
+    return reflected(fibre, surface, l, p) * (*light).color_inverse_square_range.rgb * strength;
 }
 
 fn lit_hair(fibre: Fibre) -> vec3<f32> {
@@ -201,15 +151,13 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
     for (var i = 0u; i < lights.n_directional_lights; i++) {
         let sun = &view_bindings::lights.directional_lights[i];
         let l = (*sun).direction_to_light;
-        var shadow = 1.0;
-        if ((*sun).flags & mesh_view_types::DIRECTIONAL_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) != 0u {
-            shadow = 0.0;
-            for (var k = 0; k < 2; k++) {
-                shadow += 0.5 * shadows::fetch_directional_shadow(
-                    i, at_depth(fibre, l, ribbon.self_shadow * DEPTHS[k]), fibre.outward, view_z, fibre.frag_coord.xy);
-            }
+        var p: Passage;
+        if ((*sun).flags & mesh_view_types::DIRECTIONAL_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
+            p = slab_passage(dot(fibre.normal, l), ribbon.layers);
+        } else {
+            p = sun_passage(i, way_of(fibre, l), view_z);
         }
-        light += reflected(fibre, surface, l, shadow) * (*sun).color.rgb;
+        light += reflected(fibre, surface, l, p) * (*sun).color.rgb;
     }
     // A rectangle is a point at its middle that shines to its front, spread by its size.
     for (var i = 0u; i < lights.n_rect_lights; i++) {
@@ -220,38 +168,32 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         let front = saturate(dot(cross((*panel).up, (*panel).right), -l));
         let area = (*panel).width * (*panel).height;
         let falloff = lighting::getRangeFalloff(square, 1.0 / max((*panel).range * (*panel).range, 1e-4));
-        light += reflected(fibre, surface, l, 1.0) * (*panel).color.rgb
+        let p = slab_passage(dot(fibre.normal, l), ribbon.layers);
+        light += reflected(fibre, surface, l, p) * (*panel).color.rgb
             * (front * area / (square + area) * falloff);
     }
 
     // What comes from everywhere reaches roots least.
     let open = 1.0 - ribbon.root_shade * (1.0 - smoothstep(0.0, 0.35, fibre.along));
-    let indirect_color = surface.color * (0.8 + 0.2 * sqrt(surface.color)) + surface.pale * surface.gloss;
-    var indirect = lights.ambient_color.rgb * indirect_color;
+    var indirect = lights.ambient_color.rgb * surface.reflectance;
 #ifdef ENVIRONMENT_MAP
+    // The cuticle mirrors about the normal, stretched along the fibre; the rest comes out as from
+    // a matt body.
+    let mirrored = min(backward_share(surface.optics), surface.reflectance).b;
     var input: lighting::LightingInput;
-    let toward = safe_outward(fibre);
-    input.layers[0].NdotV = max(dot(toward, fibre.eye), 0.05);
-    input.layers[0].N = toward;
-    input.layers[0].R = reflect(-fibre.eye, toward);
-    input.layers[0].perceptual_roughness = sqrt(surface.roughness);
-    input.layers[0].roughness = surface.roughness;
+    input.layers[0].NdotV = max(dot(fibre.normal, fibre.eye), 0.05);
+    input.layers[0].N = fibre.normal;
+    input.layers[0].R = reflect(-fibre.eye, fibre.normal);
+    input.layers[0].perceptual_roughness = pow(surface.optics.variance, 0.125);
+    input.layers[0].roughness = pow(surface.optics.variance, 0.25);
     input.P = fibre.position;
     input.V = fibre.eye;
-    input.diffuse_color = surface.color;
-    input.F0_dielectric = vec3(0.0465 * 0.5 * surface.gloss);
+    input.diffuse_color = surface.reflectance - mirrored;
+    input.F0_dielectric = vec3(mirrored);
     input.F0_metallic = vec3(0.0);
-    input.F_ab = lighting::F_AB(sqrt(surface.roughness), input.layers[0].NdotV);
+    input.F_ab = lighting::F_AB(input.layers[0].perceptual_roughness, input.layers[0].NdotV);
     let surround = environment_map::environment_map_light(&input, &ranges, false);
     indirect += surround.diffuse + surround.specular;
 #endif
-    // Shade from the strands above also holds for direct light without shadow maps, in part.
-    return view.exposure * (light * mix(1.0, open, 0.6) + indirect * open);
-}
-
-// The outward direction, turned toward the eye as a shiny cylinder's normal is.
-fn safe_outward(fibre: Fibre) -> vec3<f32> {
-    let across = fibre.eye - fibre.tangent * dot(fibre.eye, fibre.tangent);
-    let n = fibre.outward + across;
-    return n * inverseSqrt(max(dot(n, n), 1e-8));
+    return view.exposure * (light + indirect * open);
 }

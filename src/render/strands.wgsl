@@ -28,17 +28,18 @@ struct DrawnStrand {
 }
 
 struct Ribbon {
-    root_color: vec3<f32>,
+    root_absorption: vec3<f32>,
     variation: f32,
-    tip_color: vec3<f32>,
+    tip_absorption: vec3<f32>,
     root_shade: f32,
-    centre: vec3<f32>,     // mean of the roots, in the hair's frame
     width: f32,
     taper: f32,
     roughness: f32,
     gloss: f32,
     backlight: f32,
-    self_shadow: f32,
+    grey: f32,
+    density: f32,          // of strands, seen from beside (1/m)
+    layers: f32,           // of strands, one behind the other
     clump: f32,
     parting: f32,
     wet_clump: f32,

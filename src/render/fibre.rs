@@ -1,0 +1,345 @@
+//! Light on one fibre, and what many fibres make of it: the Rust twin of `fibre.wgsl`, where the
+//! sources of the formulas are named.
+
+use bevy::prelude::*;
+use core::f32::consts::PI;
+
+const TILT: f32 = 0.035;
+const DRY_SURFACE: f32 = 0.0465;
+const WET_SURFACE: f32 = 0.0058;
+const FILM_SURFACE: f32 = 0.02;
+const TT_FOCUS: f32 = 3.65;
+const TRT_FOCUS: f32 = 17.0;
+const TT_SHARE: f32 = 0.96;
+const TRT_SHARE: f32 = 0.757;
+
+/// What a fibre is made of at one place.
+#[derive(Clone, Copy, Debug)]
+pub struct Optics {
+    /// Absorption of its pigment, by the fibre's radius.
+    pub absorption: Vec3,
+    /// Variance of R's lobe along the fibre (rad²).
+    pub variance: f32,
+    /// Strength of R and TRT; 1 is a clean fibre.
+    pub gloss: f32,
+    /// Strength of TT; 1 is a whole fibre.
+    pub through: f32,
+    /// 0 dry … 1 in water.
+    pub wet: f32,
+    /// Tilt of this fibre's piece against the others' (rad).
+    pub tilt: f32,
+}
+
+impl Optics {
+    /// A clean, dry, straight fibre; `roughness` as in [`HairLook`](super::HairLook).
+    pub fn new(absorption: Vec3, roughness: f32) -> Self {
+        Self {
+            absorption,
+            variance: roughness.powi(4),
+            gloss: 1.0,
+            through: 1.0,
+            wet: 0.0,
+            tilt: 0.0,
+        }
+    }
+
+    /// The light that it sends on, a share of what meets it.
+    pub fn forward_share(&self) -> Vec3 {
+        let dry = 0.041 + 0.868 * (-1.88 * self.absorption).exp();
+        dry.lerp(0.004 + 0.973 * (-1.63 * self.absorption).exp(), self.wet)
+    }
+
+    /// The light that it sends back, a share of what meets it.
+    pub fn backward_share(&self) -> Vec3 {
+        let dry = 0.034 + 0.057 * (-3.75 * self.absorption).exp();
+        dry.lerp(0.0044 + 0.0182 * (-2.8 * self.absorption).exp(), self.wet)
+    }
+
+    /// What it sends to the eye of light that has gone through `depth` fibres before.
+    pub fn lobes(&self, a: &Angles, depth: f32) -> Vec3 {
+        let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
+        let spread = 0.25 * self.variance * depth;
+        let turned = depth / TT_FOCUS;
+        let f0 = lerp(DRY_SURFACE, WET_SURFACE, self.wet);
+        let ratio = 1.0 / (1.19 / a.cos_d + 0.36 * a.cos_d);
+        let cos_inside = (1.0 - 0.416 * a.sin_r * a.sin_r).sqrt();
+
+        let grazing = a.cos_d * a.cos_half;
+        let surface = 0.25
+            * a.cos_half
+            * (fresnel(f0, grazing) * a.along(self.variance + spread, self.tilt - 2.0 * TILT)
+                + self.wet
+                    * fresnel(FILM_SURFACE, grazing)
+                    * a.along(self.variance + spread, self.tilt));
+
+        let own = (1.0 + a.cos_phi) / (1.0 + depth) - 1.0;
+        let h = (0.5 + 0.5 * own).clamp(0.0, 1.0).sqrt() * (1.0 + ratio * (0.6 - 0.8 * own));
+        let f_tt = fresnel(f0, 0.78 * a.cos_d);
+        let cos_tt = (1.0 - h * h * ratio * ratio).clamp(0.0, 1.0).sqrt();
+        let tt = TT_SHARE
+            * around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi)
+            * a.along(0.25 * self.variance + spread, self.tilt + TILT)
+            * (1.0 - f_tt).powi(2)
+            * (-2.0 * cos_tt / cos_inside * self.absorption).exp();
+
+        let f_trt = fresnel(f0, 0.5 * a.cos_d);
+        let cos_trt = (1.0 - 0.75 * ratio * ratio).clamp(0.0, 1.0).sqrt();
+        let trt = TRT_SHARE
+            * around(1.0 / (1.0 / TRT_FOCUS + turned), a.cos_phi)
+            * a.along(4.0 * self.variance + spread, self.tilt + 4.0 * TILT)
+            * (1.0 - f_trt).powi(2)
+            * f_trt
+            * (-4.0 * cos_trt / cos_inside * self.absorption).exp();
+        self.gloss * (surface + trt) + self.through * tt
+    }
+
+    /// The reflected share of light that arrives by `p` in hair so many layers thick.
+    pub fn scattered(&self, a: &Angles, p: &Passage, layers: f32) -> Vec3 {
+        let (a_f, a_b) = (self.forward_share(), self.backward_share());
+        let bulk = Bulk::of(a_f, a_b, layers);
+        let onward = (1.0 - p.lit) * a_f * (-(1.0 - a_f) * p.behind).exp();
+        let wide = self.variance * (1.0 + 0.25 * (bulk.bounces + p.depth));
+        let body = (bulk.reflectance - a_b) * matt(a.cos_phi) * a.along(wide, 0.0);
+        p.lit * self.lobes(a, 0.0)
+            + onward * self.lobes(a, p.depth)
+            + (p.lit + onward) * body.max(Vec3::ZERO)
+    }
+}
+
+/// How light comes to a fibre and goes to the eye.
+#[derive(Clone, Copy, Debug)]
+pub struct Angles {
+    sum: f32,
+    cos_i: f32,
+    sin_r: f32,
+    cos_r: f32,
+    cos_d: f32,
+    cos_phi: f32,
+    cos_half: f32,
+}
+
+impl Angles {
+    /// Of the tangent `t` toward the tip, `l` to the light and `v` to the eye, all of length 1.
+    pub fn of(t: Vec3, l: Vec3, v: Vec3) -> Self {
+        let sin_i = t.dot(l).clamp(-1.0, 1.0);
+        let sin_r = t.dot(v).clamp(-1.0, 1.0);
+        let (theta_i, theta_r) = (sin_i.asin(), sin_r.asin());
+        let (across_i, across_r) = (l - sin_i * t, v - sin_r * t);
+        let scale = across_i.length_squared() * across_r.length_squared();
+        let cos_phi = (across_i.dot(across_r) / scale.max(1e-12).sqrt()).clamp(-1.0, 1.0);
+        Self {
+            sum: theta_i + theta_r,
+            cos_i: theta_i.cos(),
+            sin_r,
+            cos_r: theta_r.cos(),
+            cos_d: (0.5 * (theta_r - theta_i)).cos(),
+            cos_phi,
+            cos_half: (0.5 + 0.5 * cos_phi).clamp(0.0, 1.0).sqrt(),
+        }
+    }
+
+    fn along(&self, variance: f32, shift: f32) -> f32 {
+        let v = variance.max(1e-6);
+        let cos_r = (self.cos_r * shift.cos() + self.sin_r * shift.sin()).max(0.0);
+        (((self.sum - shift).cos() - 1.0) / v).exp() * bessel(self.cos_i * cos_r / v)
+            / (v * (1.0 - (-2.0 / v).exp()))
+    }
+}
+
+fn bessel(x: f32) -> f32 {
+    let q = x * x;
+    0.5 * (1.0 + (-2.0 * x).exp()) * (1.0 + 0.24273 * q)
+        / ((1.0 + 0.43023 * q) * (1.0 + 0.25 * q).sqrt().sqrt())
+}
+
+fn around(focus: f32, c: f32) -> f32 {
+    (focus * (c - 1.0)).exp() / (2.0 * PI * bessel(focus))
+}
+
+fn fresnel(f0: f32, cosine: f32) -> f32 {
+    f0 + (1.0 - f0) * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
+}
+
+fn matt(cos_phi: f32) -> f32 {
+    let c = cos_phi.clamp(-1.0, 1.0);
+    ((PI - c.acos()) * c + (1.0 - c * c).sqrt()) / 8.0
+}
+
+/// What fibres one behind the other make of light.
+#[derive(Clone, Copy, Debug)]
+pub struct Bulk {
+    /// Of so many layers.
+    pub reflectance: Vec3,
+    /// Mean number of fibres on the way back out.
+    pub bounces: f32,
+}
+
+impl Bulk {
+    /// Of so many layers, each of which sends on `a_f` and back `a_b`.
+    pub fn of(a_f: Vec3, a_b: Vec3, layers: f32) -> Self {
+        let k = 1.0 - a_f * a_f + a_b * a_b;
+        let root = (k * k - 4.0 * a_b * a_b).max(Vec3::splat(1e-6)).map(f32::sqrt);
+        let endless = (k - root) / (2.0 * a_b);
+        let one = a_f / (1.0 - a_b * endless);
+        let one = one.clamp(Vec3::splat(1e-6), Vec3::ONE);
+        let left = (2.0 * layers.max(1.0) * one.map(f32::ln)).exp();
+        let bounces = ((1.0 + a_f * a_f - a_b * a_b) / root).element_sum();
+        Self {
+            reflectance: endless * (1.0 - left) / (1.0 - endless * endless * left),
+            bounces: 1.0 / (3.0 / bounces + 1.0 / layers.max(1.0)),
+        }
+    }
+}
+
+/// How light has come to a place within hair.
+#[derive(Clone, Copy, Debug)]
+pub struct Passage {
+    /// The share that met no fibre.
+    pub lit: f32,
+    /// Fibres on the way.
+    pub depth: f32,
+    /// Fibres between the place and the first one on the way, where that is not 0.
+    pub behind: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::Melanin;
+
+    const ALONG: u32 = 4000;
+    const AROUND: u32 = 180;
+
+    /// The mean over all directions of light, evenly in sin θ and φ, times the sphere's 4π; the eye
+    /// at `theta` from the fibre's normal plane. `y` is the fibre.
+    fn over_all_light(theta: f32, f: impl Fn(&Angles) -> Vec3) -> Vec3 {
+        let eye = Vec3::new(theta.cos(), theta.sin(), 0.0);
+        let mut sum = bevy::math::DVec3::ZERO;
+        for i in 0..ALONG {
+            let y = 2.0 * (i as f32 + 0.5) / ALONG as f32 - 1.0;
+            let flat = (1.0 - y * y).sqrt();
+            for j in 0..AROUND {
+                let (sin, cos) = (PI * (j as f32 + 0.5) / AROUND as f32).sin_cos();
+                let light = Vec3::new(flat * cos, y, flat * sin);
+                sum += f(&Angles::of(Vec3::Y, light, eye)).as_dvec3();
+            }
+        }
+        sum.as_vec3() * (4.0 * PI / (ALONG * AROUND) as f32)
+    }
+
+    #[test]
+    fn a_fibre_returns_the_light_that_it_gets_and_pigment_only_takes() {
+        for roughness in [0.15, 0.38, 0.6] {
+            for degrees in [0.0f32, 20.0, 45.0, 60.0] {
+                let theta = degrees.to_radians();
+                let sent = |absorption: Vec3| {
+                    let fibre = Optics::new(absorption, roughness);
+                    over_all_light(theta, |a| fibre.lobes(a, 0.0))
+                };
+                let white = sent(Vec3::ZERO).x;
+                println!("roughness {roughness}, {degrees}°: {white:.3}");
+                assert!((0.75..=1.10).contains(&white), "{white} at {degrees}°, {roughness}");
+                if degrees == 0.0 {
+                    assert!((white - 1.0).abs() < 0.02, "{white}");
+                }
+                for melanin in [Melanin::PLATINUM, Melanin::RED, Melanin::BLACK] {
+                    let colour = sent(melanin.absorption());
+                    assert!(colour.max_element() < white && colour.min_element() > 0.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn shares_of_one_fibre_are_those_of_its_lobes() {
+        for melanin in [Melanin::new(0.0, 0.0), Melanin::BLOND, Melanin::BROWN, Melanin::BLACK] {
+            let fibre = Optics::new(melanin.absorption(), 0.5);
+            let half = |sign: f32| {
+                over_all_light(0.0, |a| {
+                    if a.cos_phi * sign > 0.0 { fibre.lobes(a, 0.0) } else { Vec3::ZERO }
+                })
+            };
+            let (on, back) = (half(-1.0), half(1.0));
+            println!(
+                "{melanin:?}: on {on} for {}, back {back} for {}",
+                fibre.forward_share(),
+                fibre.backward_share()
+            );
+            assert!((on - fibre.forward_share()).abs().max_element() < 0.03);
+            assert!((back - fibre.backward_share()).abs().max_element() < 0.012);
+        }
+    }
+
+    #[test]
+    fn light_that_went_through_others_is_spread_not_added() {
+        let fibre = Optics::new(Vec3::ZERO, 0.38);
+        for depth in [0.5, 2.0, 10.0] {
+            let sent = over_all_light(0.3, |a| fibre.lobes(a, depth)).x;
+            assert!((0.9..=1.1).contains(&sent), "{sent} after {depth} fibres");
+        }
+    }
+
+    #[test]
+    fn endless_hair_has_the_colour_of_its_melanin() {
+        // Chiang et al. 2016, equation 9, knows no surface: that adds its 0.034.
+        for melanin in [Melanin::PLATINUM, Melanin::BLOND, Melanin::BROWN] {
+            let fibre = Optics::new(melanin.absorption(), 0.5);
+            let bulk = Bulk::of(fibre.forward_share(), fibre.backward_share(), 1e3);
+            let chiang = Vec3::from(melanin.color().to_f32_array_no_alpha());
+            println!("{melanin:?}: {} for {chiang}", bulk.reflectance);
+            assert!((bulk.reflectance - chiang).min_element() > -0.01);
+            assert!((bulk.reflectance - chiang).max_element() < 0.04);
+        }
+        let white = Optics::new(Vec3::ZERO, 0.5);
+        let of = |layers| Bulk::of(white.forward_share(), white.backward_share(), layers);
+        assert!((0.98..=1.0).contains(&of(1e4).reflectance.x));
+        assert!((of(1.0).reflectance - white.backward_share()).abs().max_element() < 1e-3);
+        assert!(of(5.0).reflectance.x < of(20.0).reflectance.x);
+    }
+
+    /// Where on a fibre whose eye is at `eye` (radians from its normal plane) light is sent most, as
+    /// the half angle between light and eye.
+    fn peak(look: impl Fn(&Angles) -> f32) -> f32 {
+        let to = |angle: f32| Vec3::new(angle.cos(), angle.sin(), 0.0);
+        let steps = (-4000..=4000).map(|i| i as f32 * 1e-4);
+        let sent = steps.map(|light| (look(&Angles::of(Vec3::Y, to(light), Vec3::X)), light));
+        let (_, light) = sent.reduce(|a, b| if b.0 > a.0 { b } else { a }).unwrap();
+        (0.5 * light).to_degrees()
+    }
+
+    #[test]
+    fn the_clear_highlight_leans_to_the_root_and_the_coloured_one_to_the_tip() {
+        // The path-traced references: the half vector leans by the tilt of 2°, TRT by twice that.
+        let black = Optics::new(Vec3::splat(50.0), 0.3);
+        let clear = peak(|a| black.lobes(a, 0.0).y);
+        let blond = Optics::new(Melanin::BLOND.absorption(), 0.3);
+        let coloured = peak(|a| (blond.lobes(a, 0.0) - black.lobes(a, 0.0)).y);
+        println!("R {clear}°, TRT {coloured}°");
+        assert!((clear + 2.0).abs() < 1.0 && (coloured - 4.0).abs() < 1.5);
+        let back = Angles::of(Vec3::Y, Vec3::X, Vec3::X);
+        let (r, all) = (black.lobes(&back, 0.0), blond.lobes(&back, 0.0));
+        assert!((r.x - r.z).abs() < 1e-6, "R has no colour");
+        assert!((all - r).x > 1.5 * (all - r).z, "TRT has the pigment's");
+    }
+
+    #[test]
+    fn nothing_is_endless_whatever_the_fibre_and_the_light() {
+        let ways = [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(0.6, 0.8, 0.0), Vec3::Z];
+        for absorption in [0.0, 1e-9, 3.0, 1e3, 1e6] {
+            for roughness in [0.05, 0.4, 1.0] {
+                for wet in [0.0, 1.0] {
+                    let fibre = Optics { wet, ..Optics::new(Vec3::splat(absorption), roughness) };
+                    for (l, v) in ways.iter().flat_map(|l| ways.map(|v| (*l, v))) {
+                        for (lit, depth, behind) in
+                            [(1.0, 0.0, 0.0), (0.0, 1e6, 1e6), (0.5, 2.0, 1.0)]
+                        {
+                            let passage = Passage { lit, depth, behind };
+                            let sent = fibre.scattered(&Angles::of(Vec3::Y, l, v), &passage, 20.0);
+                            assert!(sent.is_finite() && sent.min_element() >= 0.0, "{sent}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

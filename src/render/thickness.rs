@@ -1,0 +1,134 @@
+//! How dense the drawn strands of a groom are, which says how far light goes into it.
+
+use super::{
+    curve::{Guide, guide_point, strand_point},
+    drawn_strand::DrawnStrand,
+    followers::HairFollowers,
+};
+use bevy::{platform::collections::HashMap, prelude::*};
+
+/// How close strands stand, whatever their width.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Thickness {
+    /// Length of strands in a volume, seen from a strand (m/m³).
+    pub(super) density: f32,
+    /// Strands that a line through the hair meets, for each metre of their width.
+    pub(super) layers: f32,
+}
+
+/// Points looked at, at most about so many.
+const POINTS: usize = 65_536;
+/// How far points of a strand are apart, at least (m): about as far as light goes.
+const STEP: f32 = 3e-3;
+/// Side of the cells that the hair's surface is counted in (m): no strand is alone in one.
+const BLOCK: f32 = 12e-3;
+/// Points in a cell, in the mean over points, from which the count is a density.
+const ENOUGH: f64 = 8.0;
+/// The faces of cells along the axes are so much larger than the surface they stand for, in the mean
+/// over its directions.
+const STAIRS: f32 = 1.5;
+
+impl Thickness {
+    /// Of `drawn` strands; `guide` gives the nodes of each guide where they are now.
+    pub(super) fn of<'a>(
+        drawn: &[DrawnStrand],
+        guide: impl Fn(u32) -> &'a [Vec3] + Copy,
+        followers: &HairFollowers,
+    ) -> Self {
+        let length = |strand: &DrawnStrand| {
+            let nodes = guide(strand.guides[0]);
+            let whole: f32 = nodes.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+            let length = whole * (strand.length - strand.phase).max(0.0);
+            if length.is_finite() { length } else { 0.0 }
+        };
+        let total: f32 = drawn.iter().map(length).sum();
+        // Evenly over strands and along them.
+        let every = (total / (STEP * POINTS as f32)).ceil().max(1.0) as usize;
+        let dry = |k: u32| Guide { nodes: guide(k), moisture: &[] };
+        let mut points = Vec::new();
+        for strand in drawn.iter().step_by(every) {
+            let pieces = (length(strand) / STEP).round().clamp(1.0, 256.0) as u32;
+            // Where the first lies differs by strand, so that rows of points make no pattern.
+            let offset = (strand.seed >> 8) as f32 / (1 << 24) as f32;
+            let places = (0..pieces).map(|i| (i as f32 + offset) / pieces as f32).map(|t| {
+                match strand.is_guide {
+                    true => guide_point(guide(strand.guides[0]), t).position,
+                    false => strand_point(strand, dry, t, followers).position,
+                }
+            });
+            points.extend(places.filter(|p| p.is_finite() && p.abs().max_element() < 1e3));
+        }
+        if points.is_empty() {
+            return Self::default();
+        }
+        let (blocks, mut neighbours) = count(&points, BLOCK);
+        let faces = blocks.keys().flat_map(|cell| {
+            [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|d| [*cell + d, *cell - d])
+        });
+        let faces = faces.filter(|beside| !blocks.contains_key(beside)).count();
+        let surface = faces as f32 * BLOCK * BLOCK / STAIRS;
+        // Hair is in locks and layers: the finest cells that hold enough see them.
+        let mut cell = BLOCK;
+        while cell > STEP {
+            let (_, finer) = count(&points, 0.5 * cell);
+            if finer < ENOUGH {
+                break;
+            }
+            (cell, neighbours) = (0.5 * cell, finer);
+        }
+        let each = total / points.len() as f32;
+        Self {
+            density: neighbours as f32 * each / (cell * cell * cell),
+            layers: 2.0 * total / surface.max(BLOCK * BLOCK),
+        }
+    }
+}
+
+/// How many points are in each cell, and in the cell of a point in the mean.
+fn count(points: &[Vec3], cell: f32) -> (HashMap<IVec3, u32>, f64) {
+    let mut cells = HashMap::<IVec3, u32>::new();
+    for point in points {
+        *cells.entry((point / cell).floor().as_ivec3()).or_default() += 1;
+    }
+    let squares: f64 = cells.values().map(|n| f64::from(*n).powi(2)).sum();
+    (cells, squares / points.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Hair of `count` straight strands, 0.2 m long, spread at random over a square of `side`.
+    fn of(count: u32, side: f32) -> Thickness {
+        let root = |i: u32| {
+            let share = |k: f32| (i as f32 * k).fract();
+            Vec3::new(share(0.754_877_7), 0.0, share(0.569_840_3)) * side
+        };
+        let nodes: Vec<[Vec3; 2]> =
+            (0..count).map(|i| [root(i), root(i) - Vec3::Y * 0.2]).collect();
+        let drawn: Vec<_> = (0..count).map(DrawnStrand::guide).collect();
+        Thickness::of(&drawn, |k| &nodes[k as usize], &HairFollowers::default())
+    }
+
+    #[test]
+    fn a_block_of_strands_has_its_density_and_its_layers() {
+        for (count, side) in [(2000, 0.1), (8000, 0.1), (3000, 0.05)] {
+            let thickness = of(count, side);
+            let (density, layers) = (count as f32 / (side * side), count as f32 / side);
+            println!("{count} strands on {side} m: {thickness:?} for {density} 1/m², {layers} 1/m");
+            assert!((thickness.density / density - 1.0).abs() < 0.2);
+            // A square post is as thick as half its side twice: its four faces see two pairs.
+            assert!((0.35..1.5).contains(&(thickness.layers / layers)));
+        }
+    }
+
+    #[test]
+    fn no_hair_and_broken_hair_have_no_thickness() {
+        let none = Thickness::of(&[], |_| &[], &HairFollowers::default());
+        assert_eq!(none, Thickness::default());
+        let broken = [Vec3::NAN; 4];
+        let strand = DrawnStrand::guide(0);
+        let thickness = Thickness::of(&[strand], |_| &broken, &HairFollowers::default());
+        assert!(thickness.density.is_finite() && thickness.layers.is_finite());
+    }
+}

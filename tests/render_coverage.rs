@@ -1,0 +1,123 @@
+//! Hair covers as much of a picture as its strands do, from near and far, at root and tip.
+
+mod common;
+#[path = "common/linear.rs"]
+mod linear;
+#[path = "common/offscreen.rs"]
+mod offscreen;
+
+use bevy::prelude::*;
+use bevy_keratin::prelude::*;
+use linear::{light_at, measure};
+use offscreen::{Offscreen, head_of_guides};
+
+/// 500 strands at random over 0.3 m, 0.2 m long.
+fn curtain() -> Vec<Vec<Vec3>> {
+    let strand = |i: u32| {
+        let x = 0.3 * ((i as f32 * 0.618_034).fract() - 0.5);
+        (0..9).map(|n| Vec3::new(x, 0.1 - 0.025 * n as f32, 0.0)).collect()
+    };
+    (0..500).map(strand).collect()
+}
+
+/// The area (m²) that is covered between two heights (m), the mean over views some pixels aside:
+/// which samples a thin strand lights is drawn by lot in each.
+fn area(scene: &mut Offscreen, height: f32, bands: &[(f32, f32)]) -> Vec<f32> {
+    let mut areas = vec![0.0; bands.len()];
+    const VIEWS: u32 = 6;
+    for view in 0..VIEWS {
+        let pixel = height / 256.0;
+        let shift = Vec3::X * (3.0 * pixel * view as f32);
+        scene.look(Vec3::new(0.0, 0.0, 0.5) + shift, shift);
+        let picture = if view == 0 { scene.draw() } else { scene.draw_now() };
+        let y = |row: u32| 0.5 * height - (row as f32 + 0.5) * pixel;
+        for (area, (from, to)) in areas.iter_mut().zip(bands) {
+            for row in 0..picture.height {
+                // Rows that the band cuts count in part, or far pictures would have none.
+                let (low, high) = (y(row) - 0.5 * pixel, y(row) + 0.5 * pixel);
+                let part = ((high.min(*from) - low.max(*to)) / pixel).clamp(0.0, 1.0);
+                let line = (0..picture.width).map(|x| light_at(&picture, x, row).x);
+                *area += line.sum::<f32>() * part * pixel * pixel / VIEWS as f32;
+            }
+        }
+    }
+    areas
+}
+
+#[test]
+fn strands_cover_as_much_from_near_and_far_and_at_their_tips() {
+    let Some(mut scene) = Offscreen::new(256, 256) else {
+        return;
+    };
+    let world = scene.app.world_mut();
+    // Unlit and red: what a pixel holds is how much of it is covered.
+    let look = HairLook { width: 0.1e-3, taper: 1.0, ..default() };
+    let view = HairView::Bond(BondKind::Hydrogen);
+    let hair = world.spawn((Hair, look, HairFollowers::none(), view)).id();
+    for points in curtain() {
+        world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    let camera = scene.camera;
+    // Whole, root, middle and the last twentieth.
+    let bands = [(0.2, -0.2), (0.1, 0.08), (0.01, -0.01), (-0.09, -0.1)];
+    for msaa in [Msaa::Sample4, Msaa::Off] {
+        scene.app.world_mut().entity_mut(camera).insert(msaa);
+        let areas = [0.35, 0.8, 1.6].map(|height| {
+            measure(&mut scene, height, height);
+            area(&mut scene, height, &bands)
+        });
+        for (i, (from, to)) in bands.into_iter().enumerate() {
+            let truth = 500.0 * 0.1e-3 * (f32::min(from, 0.1) - f32::max(to, -0.1));
+            let areas = [areas[0][i], areas[1][i], areas[2][i]];
+            println!("{msaa:?}, {from} to {to} m: {areas:.6?} m² for {truth:.6}");
+            // Without samples a pixel is lit or not: few pixels of a band say little.
+            let slack = match (i, msaa) {
+                (0, _) => 0.05,
+                (_, Msaa::Off) => 0.25,
+                _ => 0.1,
+            };
+            for area in areas {
+                // Where strands are drawn in one pixel they hide one another: a sixth is covered.
+                assert!(area < (1.0 + slack) * truth && area > (0.92 - slack) * truth);
+            }
+        }
+    }
+}
+
+#[test]
+fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
+    let head = |size: u32| {
+        let mut scene = Offscreen::new(size, size)?;
+        scene.look(Vec3::new(0.1, 0.05, 0.45), Vec3::new(0.0, -0.02, 0.0));
+        let world = scene.app.world_mut();
+        let look = HairLook { melanin: Melanin::BLOND, width: 0.15e-3, ..default() };
+        let hair = world.spawn((Hair, look, HairFollowers::new(8000))).id();
+        for points in head_of_guides(200, 0.09, 0.2, 12) {
+            world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+        }
+        let sun = DirectionalLight { illuminance: 6000.0, ..default() };
+        let place = Transform::from_xyz(0.4, 0.7, 1.0).looking_at(Vec3::ZERO, Vec3::Y);
+        world.spawn((sun, place));
+        Some(scene.draw())
+    };
+    let (Some(plain), Some(fine)) = (head(256), head(1024)) else {
+        return;
+    };
+    let (mut errors, mut sum) = (Vec::new(), 0.0);
+    for y in 0..256 {
+        for x in 0..256 {
+            let near = (0..16).map(|i| light_at(&fine, 4 * x + i % 4, 4 * y + i / 4));
+            let truth = near.sum::<Vec3>() / 16.0;
+            if truth.max_element() > 0.002 {
+                errors.push((light_at(&plain, x, y) - truth).abs().element_sum() / 3.0);
+                sum += truth.element_sum() / 3.0;
+            }
+        }
+    }
+    let mean = sum / errors.len() as f32;
+    errors.sort_by(f32::total_cmp);
+    let error = errors.iter().sum::<f32>() / errors.len() as f32 / mean;
+    let worst = errors[errors.len() * 99 / 100] / mean;
+    println!("error of one pixel {error:.3}, of the worst in a hundred {worst:.3} of the mean");
+    assert!(error < 0.4 && worst < 2.2);
+}
