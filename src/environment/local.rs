@@ -132,7 +132,7 @@ impl LocalWinds {
         for LocalZone { zone, rotation, origin, scale } in &self.zones {
             let place = *rotation * (p - *origin) * *scale;
             let share = zone.share(place);
-            if !(share > 0.0) {
+            if share <= 0.0 {
                 continue;
             }
             open *= 1.0 - zone.shelter * share;
