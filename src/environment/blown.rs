@@ -1,8 +1,16 @@
 //! What the air does at a node: worked out once, for velocities, bonds and water.
 
-use super::{local::LocalBlower, vapour::jet, wind::wind};
+use super::{Blower, vapour::jet, wind::wind};
 use crate::bond::model::drying;
 use bevy::prelude::*;
+
+/// A blower as seen in a frame, its values valid.
+pub(crate) struct LocalBlower {
+    pub nozzle: Vec3,
+    /// Unit direction of its wind.
+    pub aim: Vec3,
+    pub blower: Blower,
+}
 
 /// The wind in which hair sleeps (m/s): at any usual drag it bends hair by a thousandth of what gravity
 /// does.

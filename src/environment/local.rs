@@ -1,20 +1,16 @@
 //! The air as seen from a hair: blowers, the wind of the place, zones.
 
-use super::{Blower, Wind, WindZone, blown::Blown, gust::gust};
+use super::{
+    Blower, Wind, WindZone,
+    blown::{Blown, LocalBlower},
+    gust::gust,
+};
 use crate::{
     schedule::HairStep,
     setting::Ranged,
     strand::{Pose, TickPose},
 };
 use bevy::{ecs::system::SystemParam, math::DVec3, prelude::*};
-
-/// A blower as seen in a frame, its values valid.
-pub(crate) struct LocalBlower {
-    pub nozzle: Vec3,
-    /// Unit direction of its wind.
-    pub aim: Vec3,
-    pub blower: Blower,
-}
 
 /// A zone as seen from a frame, its values valid.
 pub(super) struct LocalZone {

@@ -10,10 +10,10 @@ pub mod vapour;
 pub mod wind;
 mod zone;
 
-pub(crate) use blown::Blown;
 pub use blown::BlownAir;
+pub(crate) use blown::{Blown, LocalBlower};
 pub use climate::Climate;
-pub(crate) use local::{LocalBlower, LocalWinds, Winds};
+pub(crate) use local::{LocalWinds, Winds};
 pub use systems::EnvironmentPlugin;
 pub use zone::{Wind, WindZone, ZoneShape};
 

@@ -165,7 +165,7 @@ fn blow(
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{blown::Blown, local::LocalBlower},
+        super::blown::{Blown, LocalBlower},
         *,
     };
 

@@ -118,6 +118,10 @@ impl WindZone {
 
     /// Its share of the air at a place in its own frame (m): 1 inside, 0 beyond the falloff.
     pub(super) fn share(&self, place: Vec3) -> f32 {
+        // No number is nowhere.
+        if place.is_nan() {
+            return 0.0;
+        }
         let outside = match self.shape {
             ZoneShape::Box => (place.abs() - self.half_size).max(Vec3::ZERO).length(),
             // Exact for balls; for ellipsoids the first order of the distance (Quilez).
@@ -132,7 +136,6 @@ impl WindZone {
         if outside <= 0.0 {
             return 1.0;
         }
-        // No number is nowhere.
         let t = (1.0 - outside / self.falloff.max(1e-9)).max(0.0);
         t * t * (3.0 - 2.0 * t)
     }

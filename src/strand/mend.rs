@@ -1,6 +1,6 @@
 //! Strands that were written into by reflection: inspectors and scene files reach private parts, too.
 
-use super::{AddedMass, MAX_SEGMENT, MIN_SEGMENT, Strand};
+use super::{AddedMass, MAX_SEGMENT, MIN_SEGMENT, Strand, StrandHistory};
 use crate::rod::frame::parallel_transport;
 use bevy::prelude::*;
 
@@ -119,6 +119,19 @@ impl AddedMass {
             }
         }
         found
+    }
+}
+
+impl StrandHistory {
+    /// Forgets a past that is no number: the strand is drawn where it is.
+    pub(super) fn mend(&mut self) -> Option<String> {
+        if self.root.take_if(|root| !root.is_finite()).is_some() {
+            return Some("the strand's drawn root is no number: forgotten".into());
+        }
+        let unknown = self.positions.iter().position(|p| !p.is_finite())?;
+        let is = self.positions[unknown];
+        self.positions.clear();
+        Some(format!("position {unknown} of the strand's history is {is}, expected a finite one"))
     }
 }
 

@@ -78,11 +78,14 @@ fn report_unusable(
 fn mend_strands(
     mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Allow<Disabled>)>,
     mut loads: Query<(Entity, &mut AddedMass), (Changed<AddedMass>, Allow<Disabled>)>,
+    mut histories: Query<(Entity, &mut StrandHistory), (Changed<StrandHistory>, Allow<Disabled>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
+    // A sleeper's would not be remembered anew.
+    let histories = histories.iter_mut().map(|(e, mut h)| (e, h.bypass_change_detection().mend()));
     let strands = strands.iter_mut().map(|(e, mut s)| (e, s.bypass_change_detection().mend()));
     let loads = loads.iter_mut().map(|(e, mut l)| (e, l.bypass_change_detection().mend()));
-    for (entity, found) in strands.chain(loads) {
+    for (entity, found) in strands.chain(loads).chain(histories) {
         if let Some(found) = found {
             faults.write(HairFault::new(FaultKind::Strand, found).of(entity));
         }
