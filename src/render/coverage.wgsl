@@ -1,7 +1,7 @@
 // Strands thinner than a pixel are drawn a pixel wide and light so many of its samples as they cover
 // of it (Enderton et al. 2010, "Stochastic transparency"): any number of layers, in any order, with
-// depth. Which samples is drawn by lot from the strand alone: a strand that lights one of four does so
-// all along, a fine line and no row of dots, and stays as it is when the camera moves.
+// depth. Which samples is drawn by lot from strand and pixel, so that all passes of a frame agree and
+// a still picture stands still.
 #define_import_path bevy_keratin::coverage
 
 #import bevy_pbr::mesh_view_bindings::view
@@ -15,16 +15,15 @@ fn scramble(seed: u32) -> u32 {
     return (word >> 22u) ^ word;
 }
 
-// Which samples of a pixel a strand lights that covers `share` of it.
-fn covered_samples(share: f32, strand: u32) -> u32 {
-    // Temporal antialiasing shifts the view by parts of a pixel, each time another lot; a shadow map
-    // draws another than a camera, or what is seen would be what casts shadows.
+// Which samples of its pixel a strand that covers `share` of it lights.
+fn covered_samples(share: f32, seed: u32, frag_coord: vec2<f32>) -> u32 {
+    let pixel = vec2<u32>(frag_coord);
+    // Temporal antialiasing shifts the view by parts of a pixel, each time another lot.
     let jitter = bitcast<u32>(view.clip_from_view[2].x) ^ (bitcast<u32>(view.clip_from_view[2].y) << 1u);
-    let lots = scramble(jitter ^ bitcast<u32>(view.viewport.z));
-    // Multiples of the golden ratio, in 32 bits: any run of strands has all lots evenly.
-    let part = f32((strand * 2654435769u + lots) >> 8u) / 16777216.0;
+    let lot = scramble(seed ^ scramble(pixel.x ^ scramble(pixel.y ^ jitter)));
+    let part = f32(lot >> 8u) / 16777216.0;
     let count = min(u32(max(share, 0.0) * f32(SAMPLES) + part), SAMPLES);
-    let turn = scramble(strand ^ lots) % SAMPLES;
+    let turn = lot % SAMPLES;
     let row = (1u << count) - 1u;
     return ((row << turn) | (row >> (SAMPLES - turn))) & ((1u << SAMPLES) - 1u);
 }

@@ -22,8 +22,6 @@ struct RibbonVertex {
     scale: f32,
     // 0 root ... 1 tip.
     along: f32,
-    // Its number among the drawn strands.
-    strand: u32,
     seed: u32,
     state: StrandState,
     // How much of what is drawn the strand covers.
@@ -70,7 +68,6 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
         return out;
     }
     out.shown = true;
-    out.strand = index;
     out.seed = strand.seed;
     out.state = strand_state(strand, point);
 

@@ -20,7 +20,6 @@ struct ForwardVertex {
     @location(2) along: vec4<f32>,
     @location(3) share: f32,
     @location(4) @interpolate(flat) seed: u32,
-    @location(5) @interpolate(flat) strand: u32,
 }
 
 struct Fragment {
@@ -40,7 +39,6 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
     out.position = position_world_to_clip(vertex.world_position);
     out.tangent = vertex.tangent;
     out.seed = vertex.seed;
-    out.strand = vertex.strand;
     out.share = vertex.share;
     var value = 0.0;
     switch ribbon.view {
@@ -63,7 +61,7 @@ fn heat(value: f32) -> vec3<f32> {
 @fragment
 fn fragment(in: ForwardVertex) -> Fragment {
     var out: Fragment;
-    out.samples = covered_samples(in.share, in.strand);
+    out.samples = covered_samples(in.share, in.seed, in.position.xy);
     if out.samples == 0u {
         discard;
     }
