@@ -14,7 +14,7 @@ pub use systems::ContactPlugin;
 pub(crate) use {
     lanes::WetRow,
     model::{Bridged, Film},
-    systems::{Ball, HairReach, seen_from},
+    systems::{HairReach, seen_from, with_balls},
 };
 
 use crate::{

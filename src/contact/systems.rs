@@ -154,18 +154,23 @@ impl Ball {
     }
 }
 
+/// All colliders, their values valid, with the balls that hold them.
+pub(crate) fn with_balls<'a>(
+    colliders: &'a Query<(&HairCollider, &TickPose)>,
+) -> Vec<(Ball, HairCollider, &'a TickPose)> {
+    let with_ball = |(collider, pose): (&HairCollider, &'a TickPose)| {
+        let collider = collider.clamped();
+        (Ball::around(&collider, pose), collider, pose)
+    };
+    colliders.iter().map(with_ball).collect()
+}
+
 fn gather_obstacles(
     steps: EffectiveSubsteps,
     colliders: Query<(&HairCollider, &TickPose)>,
     mut hairs: Query<(Entity, &TickPose, &HairReach, &mut Obstacles), With<Hair>>,
 ) {
-    let solids: Vec<_> = colliders
-        .iter()
-        .map(|(collider, pose)| {
-            let collider = collider.clamped();
-            (Ball::around(&collider, pose), collider, pose)
-        })
-        .collect();
+    let solids = with_balls(&colliders);
     for (hair, pose, reach, mut obstacles) in &mut hairs {
         obstacles.solids.clear();
         let Some(step) = steps.of(hair) else { continue };

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     bond::{BondChanges, BondInfluence, Bonds, Cuticle},
-    contact::{Ball, HairCollider, HairReach, LockContact, seen_from},
+    contact::{HairCollider, HairReach, LockContact, seen_from, with_balls},
     environment::{AirDrag, HairGravity, LocalBlower, LocalWinds, Winds, wind::wind},
     mass_spring::Springs,
     parallel::{Nanos, for_each},
@@ -241,13 +241,7 @@ fn update_sleep(
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
-    let colliders: Vec<_> = colliders
-        .iter()
-        .map(|(collider, pose)| {
-            let collider = collider.clamped();
-            (Ball::around(&collider, pose), collider, pose)
-        })
-        .collect();
+    let colliders = with_balls(&colliders);
     for (hair, frame, mut snapshot, _, members, reach) in &mut hairs {
         // What comes within reach is seen as come, far from any strand.
         let near = colliders
