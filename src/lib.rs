@@ -33,6 +33,7 @@ pub mod setting;
 pub mod sleep;
 pub mod solve;
 pub mod strand;
+pub mod style;
 pub mod treatment;
 pub mod water;
 #[cfg(feature = "groom")]
@@ -50,7 +51,7 @@ pub use fault::{FaultKind, HairFault};
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 pub use lod::{HairBudget, HairEstimate, HairLod, LodLevel, PresentLod, ScreenShare};
 pub use mass_spring::Springs;
-pub use plugins::HairPlugins;
+pub use plugins::{HairPlugins, run_ticks};
 pub use rod::{HairSolver, SolverMethod, Stiffness, StretchProjection, Sweeps};
 #[cfg(feature = "save")]
 pub use save::{Hairdo, HairdoError};
@@ -61,8 +62,9 @@ pub use strand::{
     AddedMass, Hair, HairInertia, HeldNodes, HeldReach, Sleepers, Strand, StrandError, StrandModel,
     StrandOf, StrandSleep, Strands,
 };
+pub use style::{HairCondition, HairStyle, KeptStyle, StyleFaded};
 pub use treatment::{PermRod, Treat, Winding, WoundOn, WoundStrands};
-pub use water::{Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting};
+pub use water::{Droplet, DropletRules, HairDried, Moisture, Shower, SoakHair, WaterLedger, Wetting};
 #[cfg(feature = "groom")]
 pub use wear::{HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair};
 
@@ -86,8 +88,8 @@ pub mod prelude {
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
-        HairBudget, HairCollider, HairDefault, HairFault, HairGravity, HairInertia, HairLod,
-        HairPlugins, HairSleep, HairSolver, HairSubsteps, HairSystems, HairTick, HeldNodes,
+        HairBudget, HairCollider, HairCondition, HairDefault, HairDried, HairFault, HairGravity, HairInertia, HairLod,
+        HairPlugins, HairSleep, HairSolver, HairStyle, HairSubsteps, KeptStyle, StyleFaded, HairSystems, HairTick, HeldNodes,
         LockContact, Moisture, PermRod, ProcessTime, ScreenShare, Shower, SoakHair, SolverMethod,
         Stiffness, Strand, StrandModel, StrandOf, StrandSleep, Strands, StretchProjection, Sweeps,
         Treat, WaterLedger, Wetting, Wind, WindZone, Winding, WoundOn,

@@ -9,6 +9,7 @@ use crate::{
     sleep::SleepPlugin,
     solve::{RodPlugin, SpringPlugin},
     strand::StrandPlugin,
+    style::StylePlugin,
     treatment::TreatmentPlugin,
     water::WaterPlugin,
 };
@@ -16,6 +17,7 @@ use bevy::{
     app::PluginGroupBuilder,
     ecs::schedule::{InternedScheduleLabel, ScheduleLabel},
     prelude::*,
+    time::TimeUpdateStrategy,
 };
 
 /// Everything that makes hair move, and with the feature `render` be seen.
@@ -40,6 +42,27 @@ impl HairPlugins {
     }
 }
 
+/// Advances an app by so many fixed ticks, one a frame, whatever the clock says: for a game's tests.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_keratin::{prelude::*, run_ticks};
+///
+/// let mut app = App::new();
+/// app.add_plugins((MinimalPlugins, HairPlugins::default()));
+/// let hair = app.world_mut().spawn(Hair).id();
+/// let hanging = Strand::from_polyline(&[Vec3::ZERO, Vec3::X * 0.05, Vec3::X * 0.1]).unwrap();
+/// let strand = app.world_mut().spawn((StrandOf(hair), hanging)).id();
+/// run_ticks(&mut app, 30);
+/// assert!(app.world().get::<Strand>(strand).unwrap().positions()[2].y < 0.0, "it falls");
+/// ```
+pub fn run_ticks(app: &mut App, ticks: u32) {
+    let clock = app.world_mut().remove_resource::<TimeUpdateStrategy>();
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    (0..ticks).for_each(|_| app.update());
+    app.insert_resource(clock.unwrap_or_default());
+}
+
 impl Default for HairPlugins {
     /// Ticks in [`FixedPostUpdate`].
     fn default() -> Self {
@@ -60,7 +83,8 @@ impl PluginGroup for HairPlugins {
             .add(RodPlugin)
             .add(SpringPlugin)
             .add(SleepPlugin)
-            .add(LodPlugin);
+            .add(LodPlugin)
+            .add(StylePlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
         #[cfg(feature = "save")]

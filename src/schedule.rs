@@ -109,6 +109,7 @@ substep! {
     BondUpdate: "Bonds that re-formed remember the present shape (16)" {
         BondRates: "Rates move, memories follow (16)",
         Ledger: "Droplets ride along; the water's books are closed",
+        Styles: "What is left of styles that are watched, once a tick",
     }
     Last: "Empty, for users" {}
 }
@@ -180,6 +181,11 @@ pub(crate) fn first_substep(step: Res<HairStep>) -> bool {
     step.index == 0
 }
 
+/// For what is done once a tick, at its end.
+pub(crate) fn last_substep(step: Res<HairStep>) -> bool {
+    step.index + 1 == step.count
+}
+
 /// How many of the tick's substeps a hair takes as one, and with how many iterations at most. A
 /// component of a [`Hair`](crate::Hair), written by its level of detail; without it every substep is
 /// taken.
@@ -222,7 +228,12 @@ impl MergedSubsteps {
 #[derive(SystemParam)]
 pub(crate) struct EffectiveSubsteps<'w, 's> {
     step: Res<'w, HairStep>,
-    hairs: Query<'w, 's, (Option<&'static SubstepLimits>, Option<&'static MergedSubsteps>)>,
+    hairs: Query<
+        'w,
+        's,
+        (Option<&'static SubstepLimits>, Option<&'static MergedSubsteps>),
+        With<MergedSubsteps>,
+    >,
 }
 
 /// One hair's substep.
@@ -230,8 +241,6 @@ pub(crate) struct EffectiveSubsteps<'w, 's> {
 pub(crate) struct EffectiveSubstep {
     /// How long it is (s).
     pub(crate) dt: f32,
-    /// How many substeps it stands for.
-    pub(crate) substeps: u32,
     /// Whether the hair takes no other before it in this tick.
     pub(crate) is_first: bool,
     /// How long the tick is (s).
@@ -242,14 +251,27 @@ pub(crate) struct EffectiveSubstep {
 impl EffectiveSubsteps<'_, '_> {
     fn together(&self, hair: Entity) -> (u32, SubstepLimits) {
         let (limits, own) = self.hairs.get(hair).unwrap_or_default();
-        let limits = limits.copied().unwrap_or_default();
-        (limits.substeps.max(own.copied().unwrap_or_default().0), limits)
+        (Self::longer(limits, own), limits.copied().unwrap_or_default())
     }
 
     /// Whether the substep that `hair` takes next began before the one that is running.
     pub(crate) fn began_before(&self, hair: Entity) -> bool {
         let HairStep { index, count, .. } = *self.step;
         index > 0 && merged(index - 1, count, self.together(hair).0).is_none()
+    }
+
+    /// Whether any hair takes a substep now. Most waits for longer ones.
+    pub(crate) fn any(&self) -> bool {
+        let HairStep { index, count, .. } = *self.step;
+        let takes = |(limits, own): (Option<&SubstepLimits>, Option<&MergedSubsteps>)| {
+            merged(index, count, Self::longer(limits, own)).is_some()
+        };
+        self.hairs.iter().any(takes)
+    }
+
+    fn longer(limits: Option<&SubstepLimits>, own: Option<&MergedSubsteps>) -> u32 {
+        let limits = limits.copied().unwrap_or_default();
+        limits.substeps.max(own.copied().unwrap_or_default().0)
     }
 
     /// The substep that `hair` takes now, or `None` while it waits for a longer one.
@@ -259,7 +281,6 @@ impl EffectiveSubsteps<'_, '_> {
         let substeps = merged(index, count, together)?;
         Some(EffectiveSubstep {
             dt: dt * substeps as f32,
-            substeps,
             is_first: index + 1 == substeps,
             tick: dt * count as f32,
             most_iterations: limits.iterations,

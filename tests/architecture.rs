@@ -11,7 +11,7 @@ use std::{
 };
 
 /// Rooms from the ground up: each may import those before it, none after it.
-const FLOORS: [&str; 28] = [
+const FLOORS: [&str; 29] = [
     "fault",
     "setting",
     "parallel",
@@ -29,6 +29,7 @@ const FLOORS: [&str; 28] = [
     "lod",
     "sleep",
     "solve",
+    "style",
     "save",
     "render",
     "groom",

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     fault::HairFault,
-    parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
+    parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Ranged, Settings, Violations, report},
@@ -18,6 +18,10 @@ use crate::{
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use fearless_simd::Level;
+
+/// About what a strand takes (ns): some are to be shaped anew or changed, most are looked at.
+const SHAPE: Nanos = Nanos(200);
+const CHANGE: Nanos = Nanos(200);
 
 /// Rest shapes from bonds and bonds' memory.
 pub struct BondPlugin;
@@ -79,6 +83,9 @@ fn generate_rest_shapes(
     solver: Settings<HairSolver>,
     mut strands: Query<(&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape)>,
 ) {
+    if !steps.any() {
+        return;
+    }
     let key_of = |hair: Entity| {
         let stride = steps.of(hair)?;
         Some(Key {
@@ -96,7 +103,7 @@ fn generate_rest_shapes(
         prefetch(&rest.darboux);
     };
     let level = Level::new();
-    for_each_part(tables(&mut strands), Vec::new, |items, rows| {
+    for_each_part(SHAPE, tables(&mut strands), Vec::new, |items, rows| {
         let mut keys = PerHair::default();
         for (of, sleep, strand, (bonds, is_changed), added_mass, rest) in rows {
             if !sleep.is_simulated() {
@@ -191,7 +198,7 @@ fn update_bonds(
         changes.prefetch();
     };
     let level = Level::new();
-    for_each_part(tables(&mut strands), Vec::new, |items: &mut Vec<Changing<'_>>, rows| {
+    for_each_part(CHANGE, tables(&mut strands), Vec::new, |items: &mut Vec<Changing<'_>>, rows| {
         items.extend(rows.filter(|(_, _, changes, ..)| !changes.is_empty()));
         in_turn(items, AHEAD, ahead, |(strand, bonds, changes, rest, sleep)| {
             sleep.wake();

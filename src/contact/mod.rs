@@ -155,6 +155,9 @@ pub struct Obstacles {
     /// The solids.
     #[reflect(ignore)]
     pub solids: Vec<Obstacle>,
+    /// The colliders that it may touch in this tick.
+    #[reflect(ignore)]
+    near: Vec<Entity>,
 }
 
 /// The pairs of strands of one hair that may touch.

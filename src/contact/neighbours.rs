@@ -27,6 +27,10 @@ const MARGIN: f32 = 1.6;
 /// The same where strands are so fast that lists have to be built anew soon, whatever their margin.
 const FAST_MARGIN: f32 = 0.5;
 
+/// For how many lookups such lists are used. Neighbours fly along together: who comes near faster than
+/// the margin allows meets a tick later.
+const FAST_LOOKUPS: u32 = 2;
+
 /// Groups that turn out to be out of reach cost as much as new lists where there have been so many for
 /// each node.
 const IDLE_GROUPS: usize = 10;
@@ -38,6 +42,10 @@ const HALF_PIECE: f32 = 0.8;
 /// How long bridges of water may get, in units of the reach: what is left of the margin is what nodes
 /// may move before lists are built anew.
 pub(super) const LONGEST_BRIDGE: f32 = 0.6;
+
+/// The grid's cells are twice as wide as pieces are looked for, so that a node has to look into few rows
+/// of them, and along the rows they are cut into so many, so that rows are not long.
+const SLICED: Vec3 = Vec3::new(4.0, 1.0, 1.0);
 
 /// Strands that are one piece of work.
 const PART: usize = 16;
@@ -95,6 +103,8 @@ struct Lists {
     moved: f32,
     /// How many groups out of reach have been looked at since.
     idle: usize,
+    /// How many more lookups these lists are good for, however far nodes move.
+    good_for: u32,
 }
 
 /// The lists and pushes of some strands' nodes.
@@ -147,6 +157,11 @@ impl Neighbours {
         let start = self.rows.len() as u32;
         self.rows.extend(lanes::rows(self.coarse.add(nodes, stride)));
         self.strands.push(start..self.rows.len() as u32);
+    }
+
+    /// For how many lookups the next lists will probably be used.
+    pub fn lookups(&self) -> u32 {
+        if self.lists.margin == FAST_MARGIN { FAST_LOOKUPS } else { 1 }
     }
 
     /// Says where the nodes of the strand that was added last are expected, if all are said. Of strands
@@ -205,6 +220,7 @@ impl Neighbours {
             places = expected;
         }
         lists.begin(places, strands, reach, if fast { FAST_MARGIN } else { MARGIN });
+        lists.good_for = if fast { FAST_LOOKUPS - 1 } else { 0 };
         parts.resize_with(strands.len().div_ceil(PART), Part::default);
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let each = per_part(SEARCH, places, strands.len());
@@ -225,6 +241,10 @@ impl Neighbours {
         }
         self.watch();
         let Self { rows, lists, beyond, .. } = self;
+        if lookup == Lookup::Now && lists.good_for > 0 {
+            lists.good_for -= 1;
+            return false;
+        }
         let complete = lists.moved < 0.5 * (lists.margin * reach - *beyond);
         let pays = lists.idle > IDLE_GROUPS * rows.len();
         lookup == Lookup::Now && (!complete || pays)
@@ -253,6 +273,9 @@ impl Neighbours {
 
     /// From the next lists on, they are complete to `beyond` (m) more than strands' reach.
     pub fn set_extra_margin(&mut self, beyond: f32) {
+        if beyond > self.beyond {
+            self.lists.good_for = 0;
+        }
         self.beyond = beyond;
     }
 
@@ -299,6 +322,13 @@ impl Lists {
         self.within() * (1.0 + HALF_PIECE)
     }
 
+    /// Where in the grid's order all pieces are whose middles are close to `p`, and others.
+    #[inline(always)]
+    fn around(&self, p: Vec3) -> [Range<usize>; 4] {
+        let close = self.close();
+        self.grid.rows_in_box((p - close) * SLICED, (p + close) * SLICED)
+    }
+
     /// Puts all edges into the grid.
     fn begin(&mut self, rows: &[Row], strands: &[Range<u32>], reach: f32, margin: f32) {
         (self.moved, self.idle) = (0.0, 0);
@@ -318,8 +348,8 @@ impl Lists {
                 self.unsorted.extend(middles);
             }
         }
-        let numbered = self.unsorted.iter().zip(0..).map(|((middle, _), k)| (*middle, k));
-        self.grid.build(1.001 * self.close(), numbered);
+        let numbered = self.unsorted.iter().zip(0..).map(|((middle, _), k)| (*middle * SLICED, k));
+        self.grid.build(2.002 * self.close(), numbered);
         let sorted = self.grid.order().map(|k| self.unsorted[k as usize]);
         Pieces::collect(sorted, &mut self.pieces);
     }
@@ -360,9 +390,11 @@ impl Part {
             for i in own.clone() {
                 let p = lanes::place(&rows[i as usize]);
                 // The root is held; pushing it would do nothing.
-                let rows_around =
-                    if i > own.start { lists.grid.rows_around(p) } else { Default::default() };
-                let sixteens = rows_around.map(|r| &lists.pieces[r.start / 16..r.end.div_ceil(16)]);
+                let rows_around = if i > own.start { lists.around(p) } else { Default::default() };
+                let sixteens = rows_around.map(|r| match r.is_empty() {
+                    true => &[],
+                    false => &lists.pieces[r.start / 16..r.end.div_ceil(16)],
+                });
                 close_by.clear(sixteens.iter().map(|s| s.len() * 16).sum());
                 for pieces in sixteens.into_iter().flatten() {
                     pieces.close(simd, p, close, close_by);

@@ -7,7 +7,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     parallel::prefetch,
     rod::obstacle::{Obstacle, Solid},
-    schedule::{EffectiveSubsteps, HairSystems, HairTick, first_substep},
+    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
     strand::{Hair, Sleepers, StillPose, Strand, StrandOf, StrandSleep, Strands, TickPose},
 };
@@ -34,7 +34,10 @@ impl Plugin for ContactPlugin {
             .add_systems(
                 HairTick,
                 (
-                    (find_reach.run_if(first_substep), gather_obstacles)
+                    (
+                        (find_reach, choose_colliders).chain().run_if(first_substep),
+                        gather_obstacles,
+                    )
                         .chain()
                         .in_set(HairSystems::Obstacles),
                     push_strands_apart.in_set(HairSystems::StrandContact),
@@ -94,12 +97,11 @@ impl HairReach {
         Self { center, radius, ..default() }
     }
 
-    /// Whether hair of a frame may touch within a tick's `substeps` what a ball holds.
+    /// Whether hair of a frame may touch within a tick of so many `substeps` what a ball holds.
     pub(crate) fn is_near(&self, frame: &TickPose, ball: &Ball, substeps: u32) -> bool {
         let (before, now) = (frame.before(), frame.now());
-        let travel = before.translation.distance(now.translation);
-        let radius = ROOM * self.radius * now.scale + travel;
-        let apart = radius + ball.radius + ball.travel * substeps as f32;
+        let travel = before.translation.distance(now.translation) + ball.travel;
+        let apart = ROOM * self.radius * now.scale + ball.radius + travel * substeps as f32;
         let squared = ball.center.distance_squared(now.point_out(self.center));
         // A place that is no number is near: what meets it tells.
         squared <= apart * apart || squared.is_nan() || apart.is_nan()
@@ -165,17 +167,38 @@ pub(crate) fn with_balls<'a>(
     colliders.iter().map(with_ball).collect()
 }
 
+/// At the start of a tick: which colliders a hair may touch in it. A hair of which no strand is
+/// simulated asks for none.
+fn choose_colliders(
+    step: Res<HairStep>,
+    colliders: Query<(Entity, &HairCollider, &TickPose)>,
+    mut hairs: Query<(&TickPose, &HairReach, Option<&Sleepers>, &mut Obstacles), With<Hair>>,
+) {
+    let balls: Vec<(Ball, Entity)> = colliders
+        .iter()
+        .map(|(entity, collider, pose)| (Ball::around(&collider.clamped(), pose), entity))
+        .collect();
+    for (pose, reach, sleepers, mut obstacles) in &mut hairs {
+        obstacles.near.clear();
+        if sleepers.is_none_or(|sleepers| sleepers.awake > 0) {
+            let near = balls.iter().filter(|(ball, _)| reach.is_near(pose, ball, step.count));
+            obstacles.near.extend(near.map(|(_, entity)| *entity));
+        }
+    }
+}
+
 fn gather_obstacles(
     steps: EffectiveSubsteps,
     colliders: Query<(&HairCollider, &TickPose)>,
-    mut hairs: Query<(Entity, &TickPose, &HairReach, &mut Obstacles), With<Hair>>,
+    mut hairs: Query<(Entity, &TickPose, &mut Obstacles), With<Hair>>,
 ) {
-    let solids = with_balls(&colliders);
-    for (hair, pose, reach, mut obstacles) in &mut hairs {
-        obstacles.solids.clear();
-        let Some(step) = steps.of(hair) else { continue };
-        let near = solids.iter().filter(|(ball, ..)| reach.is_near(pose, ball, step.substeps));
-        obstacles.solids.extend(near.map(|(_, collider, at)| seen_from(pose, collider, at)));
+    for (hair, pose, mut obstacles) in &mut hairs {
+        let Obstacles { solids, near } = &mut *obstacles;
+        solids.clear();
+        if steps.of(hair).is_some() {
+            let near = colliders.iter_many(near);
+            solids.extend(near.map(|(collider, at)| seen_from(pose, &collider.clamped(), at)));
+        }
     }
 }
 
@@ -218,10 +241,11 @@ pub(crate) fn push_strands_apart(
             present.extend(members.collection().iter().filter(takes_part));
             *had_followers = with_followers;
         }
-        // Water wants all bridges. Dry strands are looked up once a tick, for where they are in its
-        // middle: most fly along with their neighbours.
+        // Water wants all bridges. Dry strands are looked up once a tick at most, for where they are in
+        // the middle of the time until the next lookup: most fly along with their neighbours.
         let lookup = if step.is_first || with_followers { Lookup::Now } else { Lookup::Later };
-        let ahead = (step.is_first && !with_followers).then_some(0.5 * (step.tick - step.dt));
+        let until = list.lookups() as f32 * step.tick - step.dt;
+        let ahead = (step.is_first && !with_followers).then_some(0.5 * until);
         for some in present.chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
             for (strand, ..) in strands.iter_many(some) {

@@ -85,6 +85,19 @@ setting! {
 }
 
 impl Blower {
+    /// A hair dryer at `from` that is aimed at `at` (m, in the world or in its parent).
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # fn setup(mut commands: Commands) {
+    /// commands.spawn(Blower::blow_dry(Vec3::new(0.3, 1.7, 0.2), Vec3::new(0.0, 1.6, 0.0)));
+    /// # }
+    /// ```
+    pub fn blow_dry(from: Vec3, at: Vec3) -> (Self, Transform) {
+        let up = if (at - from).cross(Vec3::Y).length_squared() > 1e-12 { Vec3::Y } else { Vec3::X };
+        (Self::default(), Transform::from_translation(from).looking_at(at, up))
+    }
+
     /// A blower of `strength` (m/s²) with the paper's drying.
     ///
     /// # Errors

@@ -8,12 +8,16 @@ use super::{
 };
 use crate::{
     bond::{BondChanges, BondKind},
-    parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
+    parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     schedule::{EffectiveSubsteps, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
     strand::{AddedMass, Hair, PerHair, Strand, StrandOf, StrandSleep, TickPose},
 };
 use bevy::prelude::*;
+
+/// About what a strand takes (ns): of what falls, and of what is blown at.
+const STILL: usize = 150;
+const WINDY: usize = 2_000;
 
 /// Gravity, wind and drag.
 pub struct EnvironmentPlugin;
@@ -77,6 +81,9 @@ fn apply_air(
         Option<&mut WindReceived>,
     )>,
 ) {
+    if !steps.any() {
+        return;
+    }
     let gravity = gravity.clamped().0;
     let air_of = |hair: Entity| {
         let pose = hairs.get(hair).ok()?.now();
@@ -96,7 +103,8 @@ fn apply_air(
         prefetch(velocities);
         prefetch(spins);
     };
-    for_each_part(tables(&mut strands), Vec::new, |items, rows| {
+    let each = Nanos(if winds.are_still() { STILL } else { WINDY });
+    for_each_part(each, tables(&mut strands), Vec::new, |items, rows| {
         let mut airs = PerHair::default();
         for (of, sleep, strand, added_mass, changes, blown, received) in rows {
             if !is_spared(sleep)

@@ -25,6 +25,9 @@ const FAR: Vec3 = Vec3::splat(1e9);
 /// The fewest buckets. A few items in as few buckets would be met in most of empty space, too.
 const FEWEST: usize = 8192;
 
+/// The most cells of a row that [`UniformGrid::rows_in_box`] looks at.
+pub const WIDEST: usize = 8;
+
 /// Points sorted by cell: equations 4 and 5 of \[W\].
 #[derive(Clone, Debug, Default)]
 pub struct UniformGrid {
@@ -121,9 +124,9 @@ impl UniformGrid {
 
     /// The items in the grid's own order, in which neighbouring cells lie together: for callers that
     /// keep what they look at in this order, to read it in a row. The first few come again at the
-    /// end, so that no row of cells is torn.
+    /// end, so that no row of up to [`WIDEST`] cells is torn.
     pub fn order(&self) -> impl Iterator<Item = u32> {
-        let first = self.starts.get(2).map_or(0, |end| *end as usize);
+        let first = self.starts.get(WIDEST).map_or(0, |end| *end as usize);
         self.entries.iter().chain(&self.entries[..first]).map(|e| e.item)
     }
 
@@ -158,18 +161,25 @@ impl UniformGrid {
         }
     }
 
-    /// Where in [`order`](Self::order) the items of the 27 cells around `point` are, three cells a
-    /// row: all that lie within one cell size of it, some that do not, and with bad luck some twice.
+    /// Where in [`order`](Self::order) the items of all cells are that a box from `low` to `high`
+    /// touches, a row of cells along x each, for boxes no larger than a cell along y and z: so there are
+    /// four rows at most, of at most [`WIDEST`] cells. Some items are of other cells, and with bad luck
+    /// some come twice.
     #[inline]
-    pub fn rows_around(&self, point: Vec3) -> [Range<usize>; 9] {
-        if self.entries.is_empty() || !point.is_finite() {
-            return [const { 0..0 }; 9];
+    pub fn rows_in_box(&self, low: Vec3, high: Vec3) -> [Range<usize>; 4] {
+        if self.entries.is_empty() || !(low.is_finite() && high.is_finite()) {
+            return [const { 0..0 }; 4];
         }
-        let low = self.cell_of(point) - 1;
+        let (low, high) = (self.cell_of(low), self.cell_of(high));
         let buckets = self.starts.len() - 1;
+        let width = (high.x.abs_diff(low.x) as usize + 1).min(WIDEST);
         core::array::from_fn(|k| {
-            let row = bucket(low + IVec3::new(0, k as i32 % 3, k as i32 / 3), buckets - 1);
-            let end = row + 3;
+            let row = IVec3::new(low.x, low.y + (k as i32 & 1), low.z + (k as i32 >> 1));
+            if row.y > high.y || row.z > high.z {
+                return 0..0;
+            }
+            let row = bucket(row, buckets - 1);
+            let end = row + width;
             let end = match end.checked_sub(buckets) {
                 None | Some(0) => self.starts[end],
                 // Behind the last bucket the first ones come again.
@@ -232,6 +242,29 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn rows_hold_all_that_a_box_holds(
+            raw in proptest::collection::vec((-1.0f32..1.0, -1.0f32..1.0, -1.0f32..1.0), 1..200),
+            cell in 0.01f32..0.5,
+            (long, wide) in (0.0f32..6.9, 0.0f32..0.99),
+        ) {
+            let points: Vec<Vec3> = raw.iter().map(|&(x, y, z)| Vec3::new(x, y, z)).collect();
+            let mut grid = UniformGrid::default();
+            grid.build(cell, points.iter().zip(0..).map(|(p, i)| (*p, i)));
+            let order: Vec<u32> = grid.order().collect();
+            let half = 0.5 * cell * Vec3::new(long, wide, wide);
+            for &p in &points {
+                let rows = grid.rows_in_box(p - half, p + half);
+                let found: Vec<u32> = rows.into_iter().flat_map(|r| order[r].to_vec()).collect();
+                for (q, i) in points.iter().zip(0..) {
+                    let inside = (*q - p).abs().cmple(half).all();
+                    prop_assert!(!inside || found.contains(&i), "{q} beside {p}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn outliers_and_nonsense_do_not_disturb() {
         let points = [Vec3::ZERO, Vec3::splat(1e30), Vec3::NAN, Vec3::X * 0.05, Vec3::NEG_X * 1e9];
@@ -241,5 +274,6 @@ mod tests {
         grid.for_each_near(Vec3::NAN, |_| panic!("nothing is near nowhere"));
         grid.build(0.1, core::iter::empty());
         grid.for_each_near(Vec3::ZERO, |_| panic!("an empty grid is empty"));
+        assert_eq!(grid.rows_in_box(Vec3::ZERO, Vec3::ZERO), [const { 0..0 }; 4]);
     }
 }

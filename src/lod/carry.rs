@@ -7,7 +7,9 @@ use super::{
 };
 use crate::{
     parallel::{Nanos, for_each},
+    rod::{HairSolver, SolverMethod},
     schedule::{EffectiveSubsteps, HairStep},
+    setting::Settings,
     strand::{Hair, PerHair, Strand, StrandOf, StrandSleep, TickPose},
 };
 use bevy::prelude::*;
@@ -68,6 +70,7 @@ pub(crate) fn sync_follower_sleep(
 pub(crate) fn move_followers(
     step: Res<HairStep>,
     substeps: EffectiveSubsteps,
+    solver: Settings<HairSolver>,
     mut hairs: Query<(Entity, &TickPose, &PresentLod, &mut Guides), With<Hair>>,
     mut strands: Query<(&StrandOf, &mut Strand, &StrandSleep, &mut Follower)>,
 ) {
@@ -100,16 +103,21 @@ pub(crate) fn move_followers(
     for (of, strand, sleep, carried) in &mut strands {
         if sleep.is_follower()
             && !sleep.is_asleep()
-            && let Some(index) = per_hair.index(of.0, || Some(hairs.get(of.0).ok()?.3))
+            && let Some(index) = per_hair.index(of.0, || {
+                // Orientations of rods that are solved directly have no inertia of their own.
+                let spins = solver.of(of.0).method == SolverMethod::Sweeps;
+                Some((hairs.get(of.0).ok()?.3, spins))
+            })
         {
             items.push((index, strand, carried));
         }
     }
     let seconds = step.dt * step.count as f32;
     for_each(&mut items, Nanos(1_000), |(index, strand, carried)| {
-        let guides = per_hair.values[*index];
+        let (guides, has_spins) = per_hair.values[*index];
         let (positions, velocities, orientations, spins) =
             strand.bypass_change_detection().parts_mut();
+        let spins = if has_spins { spins } else { &mut [] };
         let mut pose = Pose { positions: &mut *positions, velocities, orientations, spins };
         let carried = carried.bypass_change_detection();
         let ties = &mut carried.ties;

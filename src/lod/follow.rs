@@ -98,7 +98,7 @@ pub struct Pose<'a> {
     pub velocities: &'a mut [Vec3],
     /// Orientations of the edges.
     pub orientations: &'a mut [Quat],
-    /// Their angular velocities (rad/s).
+    /// Their angular velocities (rad/s), or none where nobody asks for them.
     pub spins: &'a mut [Vec3],
 }
 
@@ -153,7 +153,10 @@ impl Ties {
         let frames: [_; GUIDES] =
             core::array::from_fn(|g| self.guides.get(g).and_then(|guide| turns(guide.0)));
         let root = pose.positions.first().copied().unwrap_or(Vec3::NAN);
-        if frames.iter().all(Option::is_none) || !root.is_finite() || !self.fit(pose.spins.len()) {
+        if frames.iter().all(Option::is_none)
+            || !root.is_finite()
+            || !self.fit(pose.orientations.len())
+        {
             pose.velocities.fill(Vec3::ZERO);
             pose.spins.fill(Vec3::ZERO);
             return false;
@@ -179,7 +182,9 @@ impl Ties {
             }
             p += turn * *segment;
             pose.orientations[i] = turn;
-            pose.spins[i] = finite(spin(before, turn) * per_second);
+            if let Some(spins) = pose.spins.get_mut(i) {
+                *spins = finite(spin(before, turn) * per_second);
+            }
             pose.velocities[i + 1] = finite((p - place) * per_second);
             pose.positions[i + 1] = p;
         }
@@ -189,6 +194,10 @@ impl Ties {
     /// The frame of an edge that its guides give it.
     #[inline]
     fn turn(&self, ties: &[Tie], frames: &[Option<&[Quat]>; GUIDES]) -> Quat {
+        // From afar all have one guide.
+        if let ([tie], Some(turns)) = (ties, frames[0]) {
+            return between(turns, tie.at) * tie.relative;
+        }
         let mut first = None;
         let mut sum = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
         for ((tie, turns), (_, weight)) in ties.iter().zip(frames).zip(&self.guides) {

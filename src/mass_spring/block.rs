@@ -15,7 +15,7 @@ use crate::{
     rod::{
         block::{BlockLanes, NodeLanes},
         limiter::{along_support, mobility},
-        obstacle::{Obstacle, splat},
+        obstacle::{NearObstacles, Obstacle, splat},
         touch::{contacts, predict_nodes},
         tridiagonal::{Elimination, back},
     },
@@ -82,6 +82,7 @@ fn step_simd<S: Simd>(
     let over = Xpbd::new(zero, bend, damping, params.dt);
     let zero = f32x16::splat(simd, 0.0);
     let none = V3::new(zero, zero, zero);
+    b.near_obstacles.fill(NearObstacles::ALL);
     predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.skin, obstacles);
     b.touched = [0.0; LANES];
     // Who is moved by something else may get energy from there.

@@ -2,6 +2,8 @@
 
 mod columns;
 mod prefetch;
+#[cfg(feature = "parallel")]
+mod queue;
 
 use bevy::{
     ecs::query::{ArchetypeFilter, ContiguousQueryData, QueryContiguousIter},
@@ -11,7 +13,7 @@ pub(crate) use columns::Columns;
 pub(crate) use prefetch::prefetch;
 
 #[cfg(feature = "parallel")]
-use bevy::tasks::ComputeTaskPool;
+use {bevy::tasks::ComputeTaskPool, queue::Queue};
 
 /// The least work of a task, on one thread: to wake a thread for less takes longer than to do it.
 pub(crate) const TASK: Nanos = Nanos(50_000);
@@ -21,14 +23,13 @@ pub(crate) const TASK: Nanos = Nanos(50_000);
 #[cfg_attr(not(feature = "parallel"), allow(dead_code, reason = "there is one thread"))]
 pub(crate) struct Nanos(pub(crate) usize);
 
-/// Rows of parts come in multiples of this.
-const GRAIN: usize = 32;
+/// Rows of parts come in multiples of this, so that blocks of lanes fill up.
+const GRAIN: usize = 16;
 
 /// The most parts that a table is cut into, unless they would be larger than [`MOST_ROWS`].
 const MOST_PARTS: usize = 32;
 
-/// The least and the most rows of a part.
-const LEAST_ROWS: usize = 256;
+/// The most rows of a part.
 const MOST_ROWS: usize = 512;
 
 /// How many strands ahead of the present one memory is asked for: far enough for it to come, near
@@ -41,7 +42,7 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], each: Nanos, work: impl Fn(&mut
 }
 
 /// Calls `work` with every block of about sixteen strands and scratch space that `init` makes once
-/// a task.
+/// a thread.
 pub(crate) fn for_each_block<T: Send, S>(
     blocks: &mut [T],
     each: Nanos,
@@ -70,28 +71,17 @@ pub(crate) fn tables<'a, 's, D: ContiguousQueryData, F: ArchetypeFilter>(
 }
 
 /// Goes through the rows of tables in parts: `work` gets some rows at a time, and scratch space that
-/// `init` makes once a task. Says what it made of each part, in the order of the rows. What the parts
-/// are does not depend on the number of threads.
+/// `init` makes once a thread. A row takes about `each`. Says what it made of each part, in the order of
+/// the rows. What the parts are does not depend on the number of threads.
 pub(crate) fn for_each_part<C: Columns, S, O: Send>(
-    tables: impl Iterator<Item = C>,
-    init: impl Fn() -> S + Send + Sync,
-    work: impl Fn(&mut S, C::Part) -> O + Send + Sync,
-) -> Vec<O> {
-    for_each_part_of(LEAST_ROWS, tables, init, work)
-}
-
-/// The same with at least so many rows in a part: fewer where there is much to do for each, so that
-/// all threads get some.
-pub(crate) fn for_each_part_of<C: Columns, S, O: Send>(
-    least: usize,
+    each: Nanos,
     tables: impl Iterator<Item = C>,
     init: impl Fn() -> S + Send + Sync,
     work: impl Fn(&mut S, C::Part) -> O + Send + Sync,
 ) -> Vec<O> {
     let parts = tables.flat_map(|table| {
-        // Enough parts for many threads, each so small that what is gathered of it stays in the cache.
-        let rows = table.rows().div_ceil(MOST_PARTS).next_multiple_of(GRAIN);
-        table.parts(rows.clamp(least, MOST_ROWS))
+        let rows = part_rows(table.rows(), each);
+        table.parts(rows)
     });
     let mut parts: Vec<_> = parts.map(|part| (Some(part), None)).collect();
     for_each_init(
@@ -107,6 +97,15 @@ pub(crate) fn for_each_part_of<C: Columns, S, O: Send>(
     parts.into_iter().filter_map(|(_, made)| made).collect()
 }
 
+/// How many of a table's `rows` are one part: worth a task, about equal, and no more than what stays in
+/// the cache.
+fn part_rows(rows: usize, each: Nanos) -> usize {
+    let worth = TASK.0.div_ceil(each.0.max(1));
+    let most = rows.div_ceil(MOST_PARTS).max(worth).min(MOST_ROWS);
+    let parts = (rows / most).max(rows.div_ceil(MOST_ROWS)).max(1);
+    rows.div_ceil(parts).next_multiple_of(GRAIN)
+}
+
 fn for_each_init<T: Send, S>(
     items: &mut [T],
     each: Nanos,
@@ -114,11 +113,7 @@ fn for_each_init<T: Send, S>(
     ahead: impl Fn(&T) + Send + Sync,
     work: impl Fn(&mut S, &mut T) + Send + Sync,
 ) {
-    let serial = |items: &mut [T]| {
-        let mut scratch = init();
-        in_turn(items, 1, &ahead, |item| work(&mut scratch, item));
-    };
-    // The thread that waits for the scope works too, so one pool thread makes two workers.
+    // The calling thread works too, so one pool thread makes two workers.
     #[cfg(feature = "parallel")]
     if let Some(pool) = ComputeTaskPool::try_get() {
         let workers = pool.thread_num() + 1;
@@ -126,17 +121,26 @@ fn for_each_init<T: Send, S>(
         if workers > 1 && items.len() >= 2 * least {
             // More than threads, because some are longer than others.
             let chunk = items.len().div_ceil(workers * 8).max(least);
+            let chunks = items.len().div_ceil(chunk);
+            let queue = Queue::new(items.chunks_mut(chunk));
+            let work = || {
+                let mut scratch = init();
+                queue.empty(|chunk| in_turn(chunk, 1, &ahead, |item| work(&mut scratch, item)));
+            };
             pool.scope(|scope| {
-                for chunk in items.chunks_mut(chunk) {
-                    scope.spawn(async { serial(chunk) });
+                for _ in 0..pool.thread_num().min(chunks - 1) {
+                    scope.spawn(async { work() });
                 }
+                work();
+                queue.wait();
             });
             return;
         }
     }
     #[cfg(not(feature = "parallel"))]
     let _ = each;
-    serial(items);
+    let mut scratch = init();
+    in_turn(items, 1, &ahead, |item| work(&mut scratch, item));
 }
 
 /// Calls `work` with one item after the other, and `ahead` with the one that is `distance` later, to
@@ -170,6 +174,23 @@ pub(crate) fn emptied<A, B>(mut items: Vec<A>) -> Vec<B> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_are_worth_a_task_and_about_equal() {
+        // Too little for two threads is one part, whatever it is made of.
+        assert!(part_rows(294, Nanos(200)) >= 294 && part_rows(9, Nanos(10_000)) >= 9);
+        assert!(part_rows(0, Nanos(200)) > 0, "parts of nothing");
+        for (rows, nanos) in
+            [(294, 2_400), (1_000, 500), (10_000, 1_600), (100_000, 20), (7_000, 0)]
+        {
+            let part = part_rows(rows, Nanos(nanos));
+            let parts = rows.div_ceil(part);
+            let last = rows - (parts - 1) * part;
+            assert!(part <= MOST_ROWS + GRAIN, "{rows} rows of {nanos} ns: {part}");
+            assert!(part == MOST_ROWS || part * nanos + GRAIN * nanos >= TASK.0, "{rows}: {part}");
+            assert!(parts < 3 || last + parts * GRAIN > part, "{rows}: {parts} of {part}, {last}");
+        }
+    }
 
     #[test]
     fn a_vector_keeps_its_room_for_other_items() {

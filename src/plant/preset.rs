@@ -166,7 +166,7 @@ impl HairPreset {
             Fall { toward: -up - front * 0.15, over: 0.035, clearance: 5e-3, layering: 0.07 };
         let parted = Comb::Parted { at: scalp.center, across: right, along: -front * 0.4 };
         let base = Planting {
-            density: 0.5e4,
+            density: 0.35e4,
             nodes: 20,
             length: 0.3,
             length_variation: 0.1,
@@ -183,15 +183,16 @@ impl HairPreset {
                 Planting { nodes: 24, curl: curl(1.4e-3, 54e-3, CurlPhase::PerClump), ..base }
             }
             Self::Wavy => Planting {
+                density: 0.33e4,
                 length: 0.33,
-                nodes: 32,
+                nodes: 28,
                 curl: curl(6e-3, 60e-3, CurlPhase::PerClump),
                 clump: Some(Clump { spacing: 22e-3, strength: 0.35 }),
                 fall: Some(Fall { layering: 0.12, ..fall }),
                 ..base
             },
             Self::Curly => Planting {
-                density: 0.35e4,
+                density: 0.21e4,
                 length: 0.34,
                 nodes: 48,
                 lean: 0.9,
@@ -201,7 +202,7 @@ impl HairPreset {
                 ..base
             },
             Self::Coily => Planting {
-                density: 1.0e4,
+                density: 0.58e4,
                 length: 0.17,
                 length_variation: 0.15,
                 nodes: 36,
@@ -214,7 +215,7 @@ impl HairPreset {
                 ..base
             },
             Self::Short => Planting {
-                density: 1.0e4,
+                density: 0.8e4,
                 length: 0.065,
                 length_variation: 0.2,
                 nodes: 10,
@@ -239,7 +240,7 @@ impl HairPreset {
                 clump: Some(Clump { spacing: 25e-3, strength: 0.15 }),
                 ..base
             },
-            Self::Long => Planting { length: 0.5, nodes: 28, ..base },
+            Self::Long => Planting { density: 0.3e4, length: 0.5, nodes: 28, ..base },
         }
     }
 

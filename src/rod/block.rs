@@ -11,7 +11,11 @@
 //! memory is asked for (`prefetch`) while the block before is solved. Number by number and without
 //! asking ahead it took longer than all five.
 
-use super::{constraint::Shares, direct::row::Row as DirectRow, obstacle::Obstacle};
+use super::{
+    constraint::Shares,
+    direct::row::Row as DirectRow,
+    obstacle::{NearObstacles, Obstacle},
+};
 use crate::lanes::{LANES, Lane, V3, load3, store3};
 use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
@@ -82,6 +86,8 @@ pub struct BlockLanes {
     pub(crate) touched: Lane,
     /// Whether any node moves so fast against an obstacle that it might pass through.
     pub(super) sweeps: bool,
+    /// Which obstacles each node may touch in this substep, in any lane.
+    pub(crate) near_obstacles: Vec<NearObstacles>,
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
     pub root_from: [Lane; 4],
     pub(super) theta: Lane,
@@ -101,6 +107,7 @@ impl BlockLanes {
         self.scratch.resize(nodes - 1, Row::default());
         self.shares.resize(nodes - 1, Shares::default());
         self.rows.resize(nodes - 1, DirectRow::default());
+        self.near_obstacles.resize(nodes, NearObstacles::ALL);
     }
 
     /// The obstacles that any lane may touch in a step of `dt`.

@@ -1,7 +1,7 @@
 //! Colliders as rod mathematics sees them: half-spaces, capsules and cylinders, in lanes.
 
 use crate::lanes::{LANES, Real, V3};
-use fearless_simd::{Simd, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 use glam::{Affine3A, BVec3, Vec3};
 
 /// The solid part of space that an [`Obstacle`] fills, in the frame of the nodes.
@@ -45,6 +45,28 @@ pub struct Obstacle {
     pub motion: Option<Affine3A>,
     /// Coulomb coefficient.
     pub friction: f32,
+}
+
+/// A choice of a block's obstacles, in their order. Of more than 64 some are chosen together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct NearObstacles(u64);
+
+impl NearObstacles {
+    pub(crate) const NONE: Self = Self(0);
+    pub(crate) const ALL: Self = Self(u64::MAX);
+
+    /// Adds the obstacle of this index.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, index: usize) {
+        self.0 |= 1 << (index % 64);
+    }
+
+    /// Those of `obstacles` that are chosen.
+    #[inline(always)]
+    pub(crate) fn of(self, obstacles: &[Obstacle]) -> impl Iterator<Item = &Obstacle> {
+        let chosen = move |(i, _): &(usize, _)| self.0 >> (i % 64) & 1 != 0;
+        obstacles.iter().enumerate().filter(chosen).map(|(_, obstacle)| obstacle)
+    }
 }
 
 impl Obstacle {
@@ -141,6 +163,37 @@ impl Solid {
                 let nearer_cap = cap.lt(side);
                 // Outside where either is negative: the smaller of the two decides.
                 (V3::select(nearer_cap, cap_normal, radial), cap.min(side))
+            }
+        }
+    }
+}
+
+impl Solid {
+    /// Whether `p` is farther than `distance` (m) outside. Wrongly denies near corners only, and of what
+    /// is no number; cheaper than [`depth`](Self::depth), which knows the normal as well.
+    #[inline(always)]
+    pub(super) fn is_beyond<S: Simd>(&self, p: V3<f32x16<S>>, distance: f32x16<S>) -> mask32x16<S> {
+        let lit = |value: f32| f32x16::splat(p.x.simd, value);
+        match *self {
+            Solid::HalfSpace { normal, point } => {
+                Real::lt(distance, (p - splat(p.x, point)).dot(splat(p.x, normal)))
+            }
+            Solid::Capsule { a, b, radius } => {
+                let axis = b - a;
+                let inverse = 1.0 / axis.length_squared().max(1e-20);
+                let rel = p - splat(p.x, a);
+                let t = rel.dot(splat(p.x, axis * inverse));
+                let t = Real::min(Real::max(t, lit(0.0)), lit(1.0));
+                let off = splat(p.x, axis).scale_add(-t, rel);
+                let reach = lit(radius) + distance;
+                Real::lt(reach * reach, off.dot(off))
+            }
+            Solid::Cylinder { center, axis, radius, half_height } => {
+                let rel = p - splat(p.x, center);
+                let along = rel.dot(splat(p.x, axis));
+                let off = splat(p.x, axis).scale_add(-along, rel);
+                let (side, cap) = (lit(radius) + distance, lit(half_height) + distance);
+                Real::lt(side * side, off.dot(off)) | Real::lt(cap * cap, along * along)
             }
         }
     }

@@ -105,14 +105,17 @@ fn sweeps<S: Simd, const P: usize>(
                     }
                     pass_edge::<S, P>(simd, b, i, carried);
                     if touching {
-                        touch(simd, &mut b.nodes[i], b.sweeps, skin, obstacles, Grip::WHOLE, all);
+                        let near = b.near_obstacles[i];
+                        let node = &mut b.nodes[i];
+                        touch(simd, node, near, b.sweeps, skin, obstacles, Grip::WHOLE, all);
                     }
                     if i + 1 == edges {
                         store4(&mut b.edges[i].q, carried.before);
                         store3(&mut b.nodes[i + 1].p, carried.p1);
                         if touching {
+                            let near = b.near_obstacles[i + 1];
                             let tip = &mut b.nodes[i + 1];
-                            touch(simd, tip, b.sweeps, skin, obstacles, Grip::WHOLE, all);
+                            touch(simd, tip, near, b.sweeps, skin, obstacles, Grip::WHOLE, all);
                         }
                     }
                 }

@@ -2,10 +2,66 @@
 
 use super::{
     block::{BlockLanes, NodeLanes},
-    obstacle::{Obstacle, Way, continuous_collision, push_out},
+    obstacle::{NearObstacles, Obstacle, Way, continuous_collision, push_out},
 };
 use crate::lanes::{LANES, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
+
+/// How far a node may go in a substep, in ways that its velocity alone would take it. More than 1,
+/// because forces of the substep act too.
+const FASTER: f32 = 1.5;
+
+/// Chooses which obstacles each node may touch in a substep of `dt`, so that no pass of it looks at
+/// others: on a head of a dozen solids most nodes are near one or none. Held nodes must know where they
+/// come from.
+#[inline(never)]
+pub(crate) fn choose_near<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    dt: f32,
+    skin: f32,
+    obstacles: &[Obstacle],
+) {
+    if obstacles.is_empty() {
+        return;
+    }
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let zero = f32x16::splat(simd, 0.0);
+            // Nodes are pulled beyond where they would go by themselves by what is led, and by no more
+            // than about an edge by forces.
+            let mut pull = zero;
+            for n in &b.nodes {
+                let led = load3(simd, &n.p) - load3(simd, &n.from);
+                let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+                pull = Real::max(pull, Real::select(held, led.dot(led), zero));
+            }
+            let mut edge = zero;
+            for e in &b.edges {
+                edge = Real::max(edge, load(simd, &e.l));
+            }
+            let margin = Real::sqrt(pull) + edge + f32x16::splat(simd, skin);
+            let ahead = f32x16::splat(simd, FASTER * dt);
+            for (n, near) in b.nodes.iter_mut().zip(&mut b.near_obstacles) {
+                n.rests_on = Default::default();
+                let (p, v) = (load3(simd, &n.p), load3(simd, &n.v));
+                let reach = Real::mul_add(Real::sqrt(v.dot(v)), ahead, margin);
+                *near = NearObstacles::NONE;
+                for (i, o) in obstacles.iter().enumerate() {
+                    let mut reach = reach;
+                    if o.motion.is_some() {
+                        let moved = o.taken_along(p) - p;
+                        reach += Real::sqrt(moved.dot(moved));
+                    }
+                    if o.solid.is_beyond(p, reach).any_false() {
+                        near.add(i);
+                    }
+                }
+            }
+        },
+    );
+}
 
 /// v is already that of the forces, but for what `gain` adds to it; p* = p + v dt.
 #[inline(never)]
@@ -22,14 +78,14 @@ pub(crate) fn predict_nodes<S: Simd>(
         || {
             let zero = f32x16::splat(simd, 0.0);
             b.sweeps = false;
-            for n in &mut b.nodes {
+            for (n, near) in b.nodes.iter_mut().zip(&b.near_obstacles) {
                 let w = load(simd, &n.w);
                 let held = Real::lt(w, f32x16::splat(simd, 1e-12));
                 let p = load3(simd, &n.p);
                 // Nodes that begin inside an obstacle are set on its surface before the step, so that
                 // getting them out gives them no velocity. What comes at them gives them some.
                 let mut from = p;
-                for o in obstacles {
+                for o in near.of(obstacles) {
                     let start = o.taken_along(from);
                     if let Some((out, _)) = push_out(o, start, start, zero, skin, Way::Shortest) {
                         from = V3::select(held, from, from + (out - start));
@@ -40,7 +96,7 @@ pub(crate) fn predict_nodes<S: Simd>(
                 let came_from = V3::select(held, load3(simd, &n.from), from);
                 store3(&mut n.from, came_from);
                 let mut to = (v + gain).scale_add(dt, from);
-                for o in obstacles {
+                for o in near.of(obstacles) {
                     if let Some((before, _)) =
                         continuous_collision(o, o.taken_along(from), to, skin)
                     {
@@ -91,9 +147,11 @@ pub(super) fn contacts_with<S: Simd>(
                 return;
             }
             let mut touched = f32x16::splat(simd, 0.0);
-            for n in &mut b.nodes {
-                touched =
-                    Real::max(touched, touch(simd, n, b.sweeps, skin, obstacles, grip, lanes));
+            for (n, near) in b.nodes.iter_mut().zip(&b.near_obstacles) {
+                if *near != NearObstacles::NONE {
+                    let touches = touch(simd, n, *near, b.sweeps, skin, obstacles, grip, lanes);
+                    touched = Real::max(touched, touches);
+                }
             }
             touched.store_array(&mut b.touched);
         },
@@ -106,6 +164,7 @@ pub(super) fn contacts_with<S: Simd>(
 pub(super) fn touch<S: Simd>(
     simd: S,
     n: &mut NodeLanes,
+    near: NearObstacles,
     sweeps: bool,
     skin: f32,
     obstacles: &[Obstacle],
@@ -126,7 +185,7 @@ pub(super) fn touch<S: Simd>(
                 f32x16::splat(simd, grip.others),
             );
             let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
-            for o in obstacles {
+            for o in near.of(obstacles) {
                 // What would take a node through has to be stopped in every pass: the shortest way out
                 // may be the wrong one.
                 if sweeps
@@ -152,4 +211,81 @@ pub(super) fn touch<S: Simd>(
             touched
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::obstacle::Solid;
+    use fearless_simd::{Level, dispatch};
+    use glam::{Affine3A, Quat, Vec3};
+    use proptest::prelude::*;
+
+    fn vector(size: f32) -> impl Strategy<Value = Vec3> {
+        [-size..size, -size..size, -size..size].prop_map(Vec3::from)
+    }
+
+    fn obstacle() -> impl Strategy<Value = Obstacle> {
+        let shape = (0..3, vector(0.2), vector(0.2), 0.002f32..0.1);
+        let motion = proptest::option::of((vector(0.02), vector(0.1)));
+        (shape, motion).prop_map(|((which, a, b, radius), motion)| {
+            let solid = match which {
+                0 => Solid::HalfSpace { normal: b.normalize_or(Vec3::Y), point: a },
+                1 => Solid::Capsule { a, b, radius },
+                _ => Solid::Cylinder {
+                    center: a,
+                    axis: b.normalize_or(Vec3::Y),
+                    radius,
+                    half_height: 2.0 * radius,
+                },
+            };
+            let turned = |v: Vec3| Affine3A::from_quat(Quat::from_scaled_axis(v));
+            let motion = motion.map(|(way, turn)| Affine3A::from_translation(way) * turned(turn));
+            Obstacle { solid, motion, friction: 0.3 }
+        })
+    }
+
+    proptest! {
+        /// What is left out is out of reach of anything that a node may do in the substep.
+        #[test]
+        fn no_obstacle_within_reach_is_left_out(
+            obstacles in proptest::collection::vec(obstacle(), 1..80),
+            nodes in proptest::collection::vec((vector(0.2), vector(3.0)), 2..6),
+            ways in proptest::collection::vec(vector(1.0), 8),
+            led in vector(0.05),
+        ) {
+            let (dt, skin, length) = (1.0 / 180.0, 1e-3, 0.01);
+            let mut b = BlockLanes::default();
+            b.resize(nodes.len());
+            for (n, (p, v)) in b.nodes.iter_mut().zip(&nodes) {
+                n.p = p.to_array().map(|x| [x; LANES]);
+                n.v = v.to_array().map(|x| [x; LANES]);
+                n.w = [1.0; LANES];
+            }
+            b.edges.iter_mut().for_each(|e| e.l = [length; LANES]);
+            // The root is led; one lane lies elsewhere.
+            b.nodes[0].w = [0.0; LANES];
+            b.nodes[0].from = (nodes[0].0 - led).to_array().map(|x| [x; LANES]);
+            b.nodes[1].p[1][7] += 0.1;
+            dispatch!(Level::new(), simd => choose_near(simd, &mut b, dt, skin, &obstacles));
+            for (n, near) in b.nodes.iter().zip(&b.near_obstacles) {
+                for lane in [0, 7] {
+                    let at = |c: &[[f32; LANES]; 3]| Vec3::from_array(c.map(|c| c[lane]));
+                    let (p, v) = (at(&n.p), at(&n.v));
+                    let reach = v.length() * dt + length + led.length();
+                    for o in obstacles.iter().filter(|o| near.of(&obstacles).all(|n| !core::ptr::eq(n, *o))) {
+                        // From where the node is taken along as well.
+                        let starts = [p, o.motion.map_or(p, |m| m.transform_point3(p))];
+                        for start in starts {
+                            for way in &ways {
+                                let to = start + way.normalize_or_zero() * reach;
+                                let depth = o.solid.depth(V3::new(to.x, to.y, to.z), skin).1;
+                                prop_assert!(depth < 1e-6, "{o:?}: {depth} m deep at {to}");
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
 }

@@ -242,8 +242,10 @@ fn update_sleep(
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
     let colliders = with_balls(&colliders);
-    for (hair, frame, mut snapshot, _, members, reach) in &mut hairs {
-        // What comes within reach is seen as come, far from any strand.
+    for (hair, frame, mut snapshot, sleepers, members, reach) in &mut hairs {
+        // What comes within reach is seen as come, far from any strand. Where all are carried, nobody
+        // has to be woken.
+        let colliders = if sleepers.awake + sleepers.asleep > 0 { &colliders[..] } else { &[] };
         let near = colliders
             .iter()
             .filter(|(ball, ..)| reach.is_none_or(|reach| reach.is_near(frame, ball, step.count)));
@@ -261,9 +263,23 @@ fn update_sleep(
         index_of.insert(hair, wake_events.len());
         wake_events.push(new);
     }
+    // Strands come mostly hair by hair.
+    let mut last = None;
+    let mut hair_of = |hair: Entity| match last {
+        Some((known, index)) if known == hair => index,
+        _ => {
+            let index = index_of.get(&hair).copied();
+            last = Some((hair, index));
+            index
+        }
+    };
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
     for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
-        let Some(&hair) = index_of.get(&of.0) else { continue };
+        // The carried sleep when those do whom they follow.
+        if sleep.is_follower() {
+            continue;
+        }
+        let Some(hair) = hair_of(of.0) else { continue };
         let (treatments, water, held) = others;
         let restless = strand.is_changed()
             || bonds.is_changed()
@@ -278,10 +294,6 @@ fn update_sleep(
     for_each(&mut items, Nanos(500), |item| decide(item, &wake_events[item.hair], seconds));
     let mut counts = vec![Sleepers::default(); wake_events.len()];
     for item in &items {
-        // The carried sleep when those do whom they follow.
-        if item.sleep.is_follower() {
-            continue;
-        }
         let count = &mut counts[item.hair];
         *(if item.sleep.is_asleep() { &mut count.asleep } else { &mut count.awake }) += 1;
     }
@@ -294,9 +306,6 @@ fn update_sleep(
 /// Whether one strand sleeps from now on.
 fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
     let Item { strand, sleep, still, held, restless, .. } = item;
-    if sleep.is_follower() {
-        return;
-    }
     let strand = strand.bypass_change_detection();
     let (distance, angle) = (wake_events.sleep.distance(), wake_events.sleep.angle());
     let targets = held.map_or(&[][..], |held| &held.targets);

@@ -12,16 +12,13 @@ use super::{
 use crate::{
     fault::HairFault,
     lanes::LANES,
-    parallel::{Columns, Nanos, for_each_block_ahead, for_each_part_of},
+    parallel::{Columns, Nanos, for_each_block_ahead, for_each_part},
     strand::PerHair,
 };
 use bevy::prelude::*;
 
-/// About how many nodes are worth a thread of their own: it takes tens of microseconds to wake up.
-const NODES: usize = 4096;
-
 /// About what a node takes (ns).
-const NODE: usize = 30;
+const NODE: usize = 100;
 
 /// One block of strands of equal node count through one substep.
 fn solve<T: Batched>(lanes: &mut T::Lanes, items: &mut [T], params: &T::Params) -> Vec<HairFault> {
@@ -51,9 +48,9 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
         let index = params.index(hair, || params_of(hair));
         index.map_or_else(Vec::new, |index| solve(lanes, block, &params.values[index]))
     };
-    let least = (NODES / nodes.max(1)).next_multiple_of(LANES).clamp(2 * LANES, 16 * LANES);
+    let each = nodes * NODE;
     let scratch = || (T::Lanes::default(), PerHair::default(), Vec::new());
-    let parts = for_each_part_of(least, tables, scratch, |(lanes, params, strands), rows| {
+    let parts = for_each_part(Nanos(each), tables, scratch, |(lanes, params, strands), rows| {
         strands.extend(rows.filter_map(&item).filter(|strand: &T| {
             let hair = strand.hair();
             params.index(hair, || params_of(hair)).is_some()
@@ -71,7 +68,7 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
     let mut blocks: Vec<_> = blocks.map(|block| (block, Vec::new())).collect();
     for_each_block_ahead(
         &mut blocks,
-        Nanos(LANES * nodes * NODE),
+        Nanos(LANES * each),
         || (T::Lanes::default(), PerHair::default()),
         |(strands, _)| strands.iter().for_each(T::prefetch),
         |(lanes, params), (strands, faults)| *faults = solve(lanes, params, strands),

@@ -161,6 +161,9 @@ fn step_rods(
     )>,
     mut faults: MessageWriter<HairFault>,
 ) {
+    if !substeps.any() {
+        return;
+    }
     let level = Level::new();
     let gravity = gravity.clamped().0;
     let params_of = |hair: Entity| {

@@ -10,7 +10,7 @@ use crate::{
 use bevy::prelude::*;
 
 pub(super) fn plugin(app: &mut App) {
-    app.register_required_components::<Hair, MergedSubsteps>().add_systems(
+    app.add_systems(
         HairTick,
         choose_substeps.in_set(HairSystems::SubstepLength).run_if(first_substep),
     );

@@ -28,6 +28,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     parallel::prefetch,
     rod::frame::{darboux, full, parallel_transport},
+    schedule::MergedSubsteps,
     setting::Ranged,
 };
 use bevy::prelude::*;
@@ -38,7 +39,7 @@ use bevy::prelude::*;
 /// [`Cuticle`](crate::Cuticle), [`LockContact`](crate::LockContact)) may be added as components.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
-#[require(Transform, TickPose)]
+#[require(Transform, TickPose, MergedSubsteps)]
 pub struct Hair;
 
 /// Makes an entity a strand of a [`Hair`].

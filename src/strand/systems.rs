@@ -8,11 +8,15 @@ use super::{
 };
 use crate::{
     fault::{FaultKind, HairFault},
-    parallel::{for_each_part, tables},
+    parallel::{Nanos, for_each_part, tables},
     schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Settings},
 };
 use bevy::{ecs::entity_disabling::Disabled, math::Isometry3d, prelude::*};
+
+/// About what a strand takes (ns) to be copied, and to be carried along by its hair's frame.
+const COPY: Nanos = Nanos(100);
+const CARRY: Nanos = Nanos(250);
 
 /// Hair and strands as entities, and the frame they live in.
 pub struct StrandPlugin;
@@ -101,6 +105,7 @@ fn remember_drawn(
         return;
     }
     for_each_part(
+        COPY,
         tables(&mut strands),
         || (),
         |(), rows| {
@@ -196,10 +201,11 @@ fn apply_frame_inertia(
     hairs: Query<&TickPose, With<Hair>>,
     mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand)>,
 ) {
-    if hairs.iter().all(|hair| hair.frame_delta().is_none()) {
+    if !substeps.any() || hairs.iter().all(|hair| hair.frame_delta().is_none()) {
         return;
     }
     for_each_part(
+        CARRY,
         tables(&mut strands),
         || (),
         |(), rows| {

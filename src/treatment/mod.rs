@@ -37,6 +37,8 @@ pub struct Treat {
     pub rates: [Option<f32>; BondKind::COUNT],
     /// Time to get there (s). Default 0: in one substep.
     pub seconds: f32,
+    /// Time until it begins (s). Default 0.
+    pub delay: f32,
 }
 
 /// The share of disulfide bonds that perm lotion leaves (\[B\] §4).
@@ -49,8 +51,31 @@ impl Treat {
     pub const SECONDS: ValueRange =
         ValueRange::new("Treat::seconds (s)", 0.0..=1e6, "0 acts at once").with_safe(0.0..=60.0);
 
+    /// The range of [`delay`](Self::delay).
+    pub const DELAY: ValueRange =
+        ValueRange::new("Treat::delay (s)", 0.0..=1e6, "0 begins at once").with_safe(0.0..=600.0);
+
     fn rates(target: Entity, rates: [Option<f32>; BondKind::COUNT]) -> Self {
-        Self { target, joints: None, rates, seconds: 0.0 }
+        Self { target, joints: None, rates, seconds: 0.0, delay: 0.0 }
+    }
+
+    /// A whole perm on hair that is wound or held as it shall be: lotion, neutraliser and drying, each
+    /// taking so many `seconds`, of which [`ProcessTime`](crate::ProcessTime) makes fewer. Release the hair
+    /// after three times that.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// fn perm(hair: Single<Entity, With<Hair>>, mut treat: MessageWriter<Treat>) {
+    ///     treat.write_batch(Treat::perm_set(*hair, 5.0));
+    /// }
+    /// ```
+    pub fn perm_set(target: Entity, seconds: f32) -> [Self; 3] {
+        let steps = [Self::lotion(target), Self::neutraliser(target), Self::dry(target)];
+        let mut delay = -seconds;
+        steps.map(|step| {
+            delay += seconds;
+            step.over(seconds).after(delay)
+        })
     }
 
     /// Soaks: cuts the hydrogen bonds.
@@ -99,6 +124,13 @@ impl Treat {
         self
     }
 
+    /// The same treatment, beginning after `seconds`, of which [`ProcessTime`](crate::ProcessTime) makes
+    /// fewer.
+    pub fn after(mut self, seconds: f32) -> Self {
+        self.delay = seconds;
+        self
+    }
+
     /// The same treatment, taking `seconds`, of which [`ProcessTime`](crate::ProcessTime) makes fewer.
     pub fn over(mut self, seconds: f32) -> Self {
         self.seconds = seconds;
@@ -109,6 +141,7 @@ impl Treat {
 impl Ranged for Treat {
     fn clamp_values(&mut self, violations: &mut Violations) {
         Self::SECONDS.clamp(&mut self.seconds, || 0.0, violations);
+        Self::DELAY.clamp(&mut self.delay, || 0.0, violations);
         for rate in self.rates.iter_mut().flatten() {
             Self::RATES.clamp(rate, || 1.0, violations);
         }
@@ -123,7 +156,7 @@ pub struct Treatments {
 }
 
 impl Treatments {
-    /// The treatments, oldest first, with the time they still take.
+    /// The treatments, oldest first, with the time until they begin and the time they still take.
     pub fn acting(&self) -> &[Treat] {
         &self.acting
     }

@@ -71,6 +71,11 @@ fn apply_treatments(
     for_each(&mut items, Nanos(1_000), |(bonds, changes, treatments)| {
         let changes = changes.bypass_change_detection();
         for treat in &mut treatments.acting {
+            // Half a substep: sums of substeps do not come out to the bit.
+            if treat.delay > 0.5 * dt {
+                treat.delay -= dt;
+                continue;
+            }
             let share = if treat.seconds > dt { dt / treat.seconds } else { 1.0 };
             let range = treat.joints.clone().unwrap_or(0..bonds.joints.len());
             for (i, joint) in bonds.joints.iter().enumerate().filter(|(i, _)| range.contains(i)) {
@@ -81,8 +86,9 @@ fn apply_treatments(
                 }
             }
             treat.seconds -= dt;
+            treat.delay = 0.0;
         }
-        treatments.acting.retain(|t| t.seconds > 0.0);
+        treatments.acting.retain(|t| t.delay > 0.0 || t.seconds > 0.0);
     });
 }
 

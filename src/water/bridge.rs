@@ -13,13 +13,34 @@ use bevy::prelude::*;
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct IsWet(pub(crate) bool);
 
+/// Triggered on a [`Hair`] that was wet when the last of its water is gone: it is as dry as the air of a
+/// room leaves it.
+///
+/// ```
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+/// fn watch(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
+///     commands.entity(*hair).observe(|dried: On<HairDried>| info!("{} is dry", dried.entity));
+/// }
+/// ```
+#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct HairDried {
+    /// The hair.
+    pub entity: Entity,
+}
+
 pub(super) fn see_wet_hair(
-    mut hairs: Query<(&Strands, &mut IsWet), With<Hair>>,
+    mut hairs: Query<(Entity, &Strands, &mut IsWet), With<Hair>>,
     strands: Query<&Moisture>,
+    mut commands: Commands,
 ) {
-    for (members, mut wet) in &mut hairs {
+    for (entity, members, mut wet) in &mut hairs {
         let mut moistures = strands.iter_many(members.collection());
-        wet.set_if_neq(IsWet(moistures.any(|moisture| !moisture.is_untouched())));
+        let is_wet = moistures.any(|moisture| !moisture.is_untouched());
+        if wet.0 && !is_wet {
+            commands.trigger(HairDried { entity });
+        }
+        wet.set_if_neq(IsWet(is_wet));
     }
 }
 

@@ -237,6 +237,27 @@ impl Shower {
             .checked()
     }
 
+    /// Rain on a head at `center` (m): 1,000 drops a second over a disc of 0.3 m, from 1 m above it.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # fn setup(mut commands: Commands) {
+    /// commands.spawn(Shower::rain_on(Vec3::new(0.0, 1.6, 0.0)));
+    /// # }
+    /// ```
+    pub fn rain_on(center: Vec3) -> (Self, Transform) {
+        let from_above = Transform::from_translation(center + Vec3::Y);
+        let rain = Self {
+            rate: 1000.0,
+            opening: 0.3,
+            drop_radius: 1e-3,
+            speed: 6.5,
+            spread: 0.0,
+            ..default()
+        };
+        (rain, from_above.looking_to(Dir3::NEG_Y, Dir3::X))
+    }
+
     /// The drops of the next `seconds`, seen from the head (drops leave along −Z). Settings must be
     /// valid.
     pub(super) fn make(&mut self, seconds: f32) -> impl Iterator<Item = Droplet> + use<> {

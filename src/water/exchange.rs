@@ -12,12 +12,15 @@ use crate::{
         vapour::{DryingAir, WATER},
     },
     fault::{FaultKind, HairFault},
-    parallel::{AHEAD, for_each_part, in_turn, prefetch, tables},
+    parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     schedule::{HairStep, ProcessTime},
     setting::{Ranged, Settings, report},
     strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
+
+/// About what a strand takes (ns), some wet and others dry.
+const EXCHANGE: Nanos = Nanos(500);
 
 /// What came with new strands, and what somebody wrote into moisture, as an inspector may. Our own
 /// writes bypass change detection.
@@ -150,7 +153,7 @@ pub(super) fn exchange_water(
             pose,
         })
     };
-    let done = for_each_part(tables(&mut strands), Vec::new, |items, rows| {
+    let done = for_each_part(EXCHANGE, tables(&mut strands), Vec::new, |items, rows| {
         let (mut waters, mut done) = (PerHair::default(), Done::default());
         for (of, strand, bonds, air, moisture, added_mass, changes) in rows {
             if (damp || !moisture.is_untouched())

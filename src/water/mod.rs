@@ -25,6 +25,7 @@ mod motion;
 mod strand_block;
 mod systems;
 
+pub use bridge::HairDried;
 pub(crate) use bridge::IsWet;
 pub use droplet::{Droplet, Ride, Shower};
 pub use moisture::{Moisture, Wetting};

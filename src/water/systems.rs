@@ -2,7 +2,7 @@
 
 use super::{
     Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting,
-    bridge::{IsWet, join_wet_strands, see_wet_hair},
+    bridge::{HairDried, IsWet, join_wet_strands, see_wet_hair},
     droplet_contact::{WaterField, wet_strands},
     exchange::{exchange_water, mend_moistures, run_showers},
     merge::merge_droplets,
@@ -30,6 +30,7 @@ impl Plugin for WaterPlugin {
             .add_message::<SoakHair>()
             .register_type::<WaterLedger>()
             .register_type::<Droplet>()
+            .register_type::<HairDried>()
             .register_type::<Moisture>()
             .register_type::<SoakHair>()
             .register_required_components::<Strand, Moisture>()

@@ -65,9 +65,9 @@ mod width;
 use super::{
     block::BlockLanes,
     limiter::{clamp_lengths, limit_strained},
-    obstacle::Obstacle,
+    obstacle::{NearObstacles, Obstacle},
     stiffness::REFERENCE_GRAVITY,
-    touch::{Grip, contacts, contacts_with, predict_nodes},
+    touch::{Grip, choose_near, contacts, contacts_with, predict_nodes},
 };
 use crate::lanes::{
     LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,
@@ -274,6 +274,7 @@ fn predict<S: Simd>(
         let v = load3(simd, &n.v) - gain;
         store3(&mut n.v, v);
     }
+    choose_near(simd, b, params.dt, params.skin, obstacles);
     surface(simd, b, params, obstacles);
     fall(simd, b, dt * theta, gravity, params.skin, obstacles);
     if b.touched != [0.0; LANES] {
@@ -324,8 +325,8 @@ fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacle
         #[inline(always)]
         || {
             let mut deepest = f32x16::splat(simd, f32::NEG_INFINITY);
-            for o in obstacles {
-                for n in &b.nodes[1..] {
+            for (n, near) in b.nodes.iter().zip(&b.near_obstacles).skip(1) {
+                for o in near.of(obstacles) {
                     let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
                     let (_, depth) = o.solid.depth(o.taken_along(load3(simd, &n.p)), params.skin);
                     deepest = Real::select(held, deepest, Real::max(deepest, depth));
@@ -337,6 +338,8 @@ fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacle
             }
             let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
             b.sweeps = false;
+            // Nobody knows where it gets out.
+            b.near_obstacles.fill(NearObstacles::ALL);
             for n in &mut b.nodes {
                 n.rests_on = Default::default();
             }

@@ -1,0 +1,74 @@
+//! Work that several threads take from, piece by piece.
+
+use core::{
+    hint::spin_loop,
+    sync::atomic::{AtomicUsize, Ordering},
+};
+use std::{
+    sync::{Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+/// How long the caller looks whether others have finished before it sleeps until they have. To fall
+/// asleep and be woken takes tens of microseconds, as long as a piece of work.
+const PATIENCE: Duration = Duration::from_micros(200);
+
+/// Pieces of work, each taken by whoever is free first.
+pub(super) struct Queue<I> {
+    pieces: Mutex<I>,
+    /// How many threads have a piece.
+    busy: AtomicUsize,
+}
+
+impl<I: Iterator> Queue<I> {
+    pub(super) fn new(pieces: I) -> Self {
+        Self { pieces: Mutex::new(pieces), busy: AtomicUsize::new(0) }
+    }
+
+    /// Calls `work` with one piece after the other, until there is none.
+    pub(super) fn empty(&self, mut work: impl FnMut(I::Item)) {
+        self.busy.fetch_add(1, Ordering::Relaxed);
+        loop {
+            let piece = self.pieces.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some(piece) = piece else { break };
+            work(piece);
+        }
+        self.busy.fetch_sub(1, Ordering::Release);
+    }
+
+    /// Waits a while for the others' last pieces. Only saves time: whether they are done has to be asked
+    /// where they were sent.
+    pub(super) fn wait(&self) {
+        let start = Instant::now();
+        while self.busy.load(Ordering::Acquire) > 0 && start.elapsed() < PATIENCE {
+            spin_loop();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_piece_is_taken_once_by_somebody() {
+        let mut items = vec![0u32; 10_000];
+        let queue = Queue::new(items.chunks_mut(7));
+        std::thread::scope(|scope| {
+            let take = || queue.empty(|piece| piece.iter_mut().for_each(|item| *item += 1));
+            (0..4).for_each(|_| drop(scope.spawn(take)));
+            take();
+            queue.wait();
+        });
+        assert!(items.iter().all(|item| *item == 1));
+    }
+
+    #[test]
+    fn nobody_waits_for_ever() {
+        let queue = Queue::new([1, 2].into_iter());
+        let start = Instant::now();
+        // As if somebody had a long piece.
+        queue.empty(|_| queue.wait());
+        assert!(start.elapsed() >= 2 * PATIENCE && queue.busy.load(Ordering::Relaxed) == 0);
+    }
+}
