@@ -149,15 +149,22 @@ impl HairPreset {
         }
     }
 
+    /// How far to the right of the parting a place is (m).
+    pub(super) fn aside(self, scalp: &Scalp, place: Vec3) -> f32 {
+        let [right, _, front] = scalp.axes();
+        let off = (place - scalp.center) / scalp.height;
+        // No comb draws a straight line: 3 mm to and fro.
+        let zigzag = ((off.dot(front) * 7.0).rem_euclid(2.0) - 1.0).abs() - 0.5;
+        let parting = if self == Self::Bob { -0.22 } else { 0.0 } + 0.05 * zigzag;
+        (off.dot(right) - parting) * scalp.height
+    }
+
     /// Away from the parting; in front to the back as well, so that the face is free.
     pub(super) fn direction(self, scalp: &Scalp, place: Vec3) -> Vec3 {
         let [right, _, front] = scalp.axes();
         let off = (place - scalp.center) / scalp.height;
         let forward = off.dot(front);
-        // No comb draws a straight line: 3 mm to and fro.
-        let zigzag = ((forward * 7.0).rem_euclid(2.0) - 1.0).abs() - 0.5;
-        let parting = if self == Self::Bob { -0.22 } else { 0.0 } + 0.05 * zigzag;
-        let side = if off.dot(right) < parting { -1.0 } else { 1.0 };
+        let side = if self.aside(scalp, place) < 0.0 { -1.0 } else { 1.0 };
         // Behind the crown there is no parting; before it, down would be into the face.
         let across = (0.6 + 2.0 * (forward + 0.2)).clamp(0.0, 1.0);
         let down = (0.5 - forward).clamp(0.0, 0.6);
@@ -285,7 +292,7 @@ impl HairPreset {
 
     #[cfg(feature = "render")]
     fn look(self) -> HairLook {
-        let base = HairLook { width: 0.16e-3, ..default() };
+        let base = HairLook { width: 0.18e-3, ..default() };
         match self {
             Self::Straight => HairLook { melanin: Melanin::DARK_BROWN, ..base },
             Self::Wavy => HairLook { melanin: Melanin::AUBURN, ..base },
@@ -294,7 +301,7 @@ impl HairPreset {
                 melanin: Melanin::BLACK,
                 roughness: 0.55,
                 gloss: 0.4,
-                width: 0.18e-3,
+                width: 0.2e-3,
                 ..base
             },
             Self::Short => HairLook { melanin: Melanin::DARK_BROWN, gloss: 0.6, ..base },

@@ -45,15 +45,19 @@ pub(super) fn draw_together(
         let leap = if own.random::<f32>() < LEAPS { own.random::<f32>() } else { 0.0 };
         let phase = strand.phase + settings.lock_phase * (lot(middle) + leap);
         strand.phase = phase.min(0.5 * strand.length.min(1.0));
+        // Hair arches outward from its root: that is the part of its first way across the whole.
+        let GuideRoot { normal, reach, .. } = guides[strand.guides[0] as usize];
+        let outward = normal.reject_from_normalized(reach.normalize_or_zero()).normalize_or_zero();
+        // Nothing strays into the skin.
+        strand.stray -= 2.0 * outward * strand.stray.dot(outward).min(0.0);
         if own.random::<f32>() < settings.flyaways {
-            let normal = guides[strand.guides[0] as usize].normal;
-            stand_off(strand, normal, settings.flyaway_reach, own);
+            stand_off(strand, outward, settings.flyaway_reach, own);
         }
     }
 }
 
 /// Makes a flyaway of a strand.
-fn stand_off(strand: &mut DrawnStrand, normal: Vec3, most: f32, random: &mut Xoshiro256PlusPlus) {
+fn stand_off(strand: &mut DrawnStrand, outward: Vec3, most: f32, random: &mut Xoshiro256PlusPlus) {
     strand.locks[1..].fill(ToMiddle::default());
     strand.width *= FINE;
     if random.random::<f32>() < BROKEN {
@@ -64,8 +68,7 @@ fn stand_off(strand: &mut DrawnStrand, normal: Vec3, most: f32, random: &mut Xos
     }
     // Aside by no more than what lengthens it little.
     let far = (most * (0.2 + 0.8 * random.random::<f32>())).min(0.25 * strand.size);
-    let outward = if normal.is_finite() { normal } else { Vec3::ZERO };
-    strand.stray = (outward + direction(random)).normalize_or(outward) * far;
+    strand.stray = (outward + 0.8 * direction(random)).normalize_or_zero() * far;
 }
 
 /// Where followers grow.
@@ -145,9 +148,9 @@ impl Roots {
             shares.filter(|(g, _)| **g == guide).map(|(_, w)| w).sum::<f32>()
         });
         // Guides that are not used repeat the first.
-        for k in 1..3 {
-            if own.guides[k] == own.guides[0] {
-                weights[k] = 0.0;
+        for (weight, guide) in weights.iter_mut().zip(own.guides).skip(1) {
+            if guide == own.guides[0] {
+                *weight = 0.0;
             }
         }
         let known: f32 = weights.iter().sum();
