@@ -22,7 +22,7 @@ use bevy::{
     shader::ShaderDefVal,
 };
 use bevy_keratin::render::{
-    DrawnStrand, HairFollowers,
+    DrawnStrand, HairFollowers, ToMiddle,
     curve::{CurvePoint, Guide, strand_point},
     fibre::{Angles, Optics, Passage},
 };
@@ -120,8 +120,16 @@ fn random_strand(random: &mut Random, k: u32) -> DrawnStrand {
         root: random.vector() * 0.01,
         phase: 0.1 * random.share(),
         stray: random.vector() * 0.02,
+        seed: (random.share() * 1e6) as u32,
+        size: 0.3 * random.share(),
+        locks: [(); 3].map(|()| random_lock(random)),
         ..default()
     }
+}
+
+fn random_lock(random: &mut Random) -> ToMiddle {
+    let (u, v) = (random.share() - 0.5, random.share() - 0.5);
+    ToMiddle { root: random.vector() * 0.02, weights: [-u - v, u, v] }
 }
 
 /// What a compute shader writes to its fifth binding, given a uniform and three buffers.
@@ -223,8 +231,15 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     let Some(mut scene) = Offscreen::new(16, 16) else {
         return;
     };
-    let followers =
-        HairFollowers { clump: 0.3, parting: 2.0, wet_clump: 0.6, ..HairFollowers::none() };
+    let followers = HairFollowers {
+        clump: 0.3,
+        parting: 2.0,
+        wet_clump: 0.6,
+        locks: Vec3::new(0.3, 0.5, 0.7),
+        lock_shape: 1.3,
+        frizz: 0.4e-3,
+        ..HairFollowers::none()
+    };
     let mut random = Random(7);
     let guides = random_guides(&mut random);
     let strands: Vec<_> = (0..120).map(|k| random_strand(&mut random, k)).collect();
@@ -235,10 +250,13 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         ranges.push([nodes.len() as u32, guide.nodes.len() as u32]);
         nodes.extend(guide.packed());
     }
-    let mut ribbon = [0.0f32; 24];
+    let mut ribbon = [0.0f32; 32];
+    ribbon[23] = followers.frizz;
+    ribbon[24..27].copy_from_slice(&followers.locks.to_array());
+    ribbon[27] = followers.lock_shape;
     (ribbon[16], ribbon[17], ribbon[18]) =
         (followers.clump, followers.parting, followers.wet_clump);
-    let packed: Vec<[u32; 16]> = strands.iter().map(DrawnStrand::packed).collect();
+    let packed: Vec<[u32; 32]> = strands.iter().map(DrawnStrand::packed).collect();
 
     let defs =
         vec![ShaderDefVal::UInt("MATERIAL_BIND_GROUP".into(), 0), "MOTION_VECTOR_PREPASS".into()];

@@ -65,12 +65,15 @@ fn build(
     let skin = body::mesh();
     let preset = arguments.preset.0;
     let planted = preset.plant(&skin, &scalp)?;
+    let count = preset.settings().followers.count;
+    let line = preset.hairline();
+    let followers = preset.follower_roots(&planted, &skin, &scalp, &line, count, 0)?;
     let capsules = fit_joint_capsules(&skin, &inverse)?;
 
     let body = commands
         .spawn((
             Body,
-            Mesh3d(paint.meshes.add(head::with_scalp(skin, &scalp))),
+            Mesh3d(paint.meshes.add(head::with_scalp(skin, &scalp, preset))),
             MeshMaterial3d(paint.matte(Color::WHITE, 0.55)),
             SkinnedMesh { inverse_bindposes: poses.add(inverse), joints: bones.clone() },
             // Its bounds are those at rest.
@@ -79,7 +82,7 @@ fn build(
         ))
         .id();
 
-    let hair = commands.spawn((Hair, preset.settings(), ChildOf(bones[HEAD]))).id();
+    let hair = commands.spawn((Hair, preset.settings(), followers, ChildOf(bones[HEAD]))).id();
     for strand in planted.groom.strands() {
         commands.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
     }

@@ -103,7 +103,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if let Some(file) = &arguments.export {
         let body = body::mesh_of(0.009);
-        return export::write(&head::with_scalp(body, &figure::scalp()), file);
+        return export::write(&head::with_scalp(body, &figure::scalp(), default()), file);
     }
     // Before anything that takes long.
     arguments.offscreen.as_deref().map(picture::folder).transpose()?;

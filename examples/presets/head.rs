@@ -1,7 +1,10 @@
 //! What hair wants of the mannequin's head: solids to lie on, and a dark scalp.
 
-use bevy::{mesh::VertexAttributeValues, prelude::*};
-use bevy_keratin::{plant::Scalp, prelude::*};
+use bevy::prelude::*;
+use bevy_keratin::{
+    plant::{HairPreset, Scalp},
+    prelude::*,
+};
 use core::f32::consts::PI;
 
 /// A capsule as a collider, between the centres of its ends (m).
@@ -42,20 +45,12 @@ pub fn body() -> Result<Vec<(HairCollider, Transform)>> {
     parts.map(|(a, b, radius)| limb(a, b, radius)).collect()
 }
 
-/// The skin under the hair, darker.
-pub fn with_scalp(mut mesh: Mesh, scalp: &Scalp) -> Mesh {
-    use VertexAttributeValues::{Float32x3, Float32x4};
-    let Some(Float32x3(places)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION).cloned() else {
-        return mesh;
-    };
-    if let Some(Float32x4(colors)) = mesh.attribute_mut(Mesh::ATTRIBUTE_COLOR) {
-        for (color, place) in colors.iter_mut().zip(places) {
-            let share = 0.95 * scalp.share(Vec3::from(place));
-            let skin = Vec4::new(0.62, 0.40, 0.29, 1.0);
-            let bare = scalp.share(Vec3::from(place)) > 0.0;
-            let skin = if bare { skin } else { Vec4::from(*color) };
-            *color = skin.lerp(Vec4::new(0.05, 0.03, 0.022, 1.0), share).to_array();
-        }
-    }
+/// The share of the skin that hair hides where it is dense.
+const COVER: f32 = 0.85;
+
+/// The skin under the hair, tinted by it.
+pub fn with_scalp(mut mesh: Mesh, scalp: &Scalp, preset: HairPreset) -> Mesh {
+    let hair = preset.settings().look.melanin.color();
+    scalp.tint(&mut mesh, &preset.hairline(), hair, COVER);
     mesh
 }

@@ -129,10 +129,14 @@ fn draw(preset: HairPreset, arguments: &Arguments) -> Result<Vec<Image>> {
     let start = Instant::now();
     let mut app = app(preset);
     studio(&mut app);
-    let mesh = mannequin::mesh();
+    let mesh = mannequin::plain();
     let planted = preset.plant(&mesh, &scalp())?;
     let took = start.elapsed();
-    let hair = wear(&mut app, preset, &planted, head::with_scalp(mesh, &scalp()))?;
+    let count = preset.settings().followers.count;
+    let line = preset.hairline();
+    let roots = preset.follower_roots(&planted, &mesh, &scalp(), &line, count, 0)?;
+    let hair = wear(&mut app, preset, &planted, head::with_scalp(mesh, &scalp(), preset))?;
+    app.world_mut().entity_mut(hair).insert(roots);
     let surroundings =
         environment::studio(&mut app.world_mut().resource_mut::<Assets<Image>>(), 450.0);
     let camera = (Camera3d::default(), Msaa::Sample4, DepthPrepass, surroundings);

@@ -119,6 +119,11 @@ pub fn mesh() -> Mesh {
     surface((LOW, HIGH), CELL, &head, &colour)
 }
 
+/// The same without the dark patch at the back.
+pub fn plain() -> Mesh {
+    surface((LOW, HIGH), CELL, &head, &|p| skin(p).extend(1.0).to_array())
+}
+
 /// What a distance is 0 on within a box, as a mesh with vertex colours: one vertex in each cell that
 /// the surface crosses, put onto the surface; one quad around each grid edge that it crosses.
 pub fn surface(

@@ -7,6 +7,10 @@ use crate::{
     studio,
 };
 use bevy::prelude::*;
+use bevy_keratin::{
+    plant::{Hairline, Scalp},
+    render::Melanin,
+};
 use core::f32::consts::{FRAC_PI_2, PI};
 
 /// Where the stand's pole is (m).
@@ -16,6 +20,8 @@ const POLE: Vec3 = Vec3::new(-0.60, 0.0, -0.03);
 #[derive(Resource)]
 pub struct Studio {
     head: Handle<Mesh>,
+    /// With hair all over.
+    full: Handle<Mesh>,
     skin: Handle<StandardMaterial>,
     chrome: Handle<StandardMaterial>,
 }
@@ -31,6 +37,10 @@ pub struct Pole;
 /// Lights, backdrop and stand, which every scene shares.
 pub fn build(mut commands: Commands, mut paint: Paint) {
     let head = paint.meshes.add(mannequin::mesh());
+    let mut full = mannequin::plain();
+    let scalp = Scalp { up: Dir3::X, front: Dir3::Y, height: 0.118, ..default() };
+    scalp.tint(&mut full, &Hairline::default(), Melanin::DARK_BROWN.color(), 0.9);
+    let full = paint.meshes.add(full);
     let skin = paint.matte(Color::WHITE, 0.55);
     let chrome = paint.metal(Color::srgb(0.72, 0.73, 0.75));
 
@@ -68,7 +78,7 @@ pub fn build(mut commands: Commands, mut paint: Paint) {
         MeshMaterial3d(chrome.clone()),
         Transform::from_translation(POLE),
     ));
-    commands.insert_resource(Studio { head, skin, chrome });
+    commands.insert_resource(Studio { head, full, skin, chrome });
 }
 
 /// Gives a body to every model that has appeared or changed.
@@ -145,7 +155,7 @@ fn bust(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity,
     let dark = paint.matte(Color::srgb(0.09, 0.085, 0.085), 0.45);
     commands.entity(on).with_children(|head| {
         let place = Transform::from_xyz(0.0, radius - CROWN, 0.0).with_rotation(upright);
-        head.spawn(part(studio.head.clone(), studio.skin.clone(), place.with_scale(broad)));
+        head.spawn(part(studio.full.clone(), studio.skin.clone(), place.with_scale(broad)));
         head.spawn(part(column, dark, Transform::from_xyz(0.0, 0.0, -0.02)));
     });
 }

@@ -32,7 +32,9 @@ pub fn light(commands: &mut Commands, focus: Vec3, size: f32) {
     commands.spawn(light(warm, 230_000.0, Vec3::new(1.0, 1.5, 1.5), 0.75, true));
     commands.spawn(light(cold, 60_000.0, Vec3::new(-1.6, 0.8, 1.3), 0.75, false));
     for side in [-1.0, 1.0] {
-        let from = FOCUS + Vec3::new(1.15 * side, 0.45, -1.65);
+        // Off round numbers: Bevy's shadow lookup divides by nothing where a pixel is exactly in a
+        // lamp's own plane, and a black dot stands on the wall.
+        let from = FOCUS + Vec3::new(1.1537 * side, 0.4519, -1.6461);
         commands.spawn(light(Color::WHITE, 110_000.0, from, 0.35, true));
     }
     commands.insert_resource(GlobalAmbientLight {

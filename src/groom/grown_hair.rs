@@ -157,7 +157,7 @@ impl Groom {
         let others = self.strands().zip(&is_guide).filter(|(_, guide)| !**guide);
         let root = |strand: GroomStrand<'_>| {
             let (root, tip) = (strand.points[0], strand.points[strand.points.len() - 1]);
-            FollowerRoot { place: root, length: strand.length(), reach: tip - root }
+            FollowerRoot { place: root, length: strand.length(), reach: tip - root, ..default() }
         };
         FollowerRoots(others.map(|(strand, _)| root(strand)).collect())
     }

@@ -14,7 +14,10 @@
 //! ```
 
 mod error;
+#[cfg(feature = "render")]
+mod followers;
 mod grow;
+mod hairline;
 mod map;
 mod place;
 mod planting;
@@ -26,6 +29,9 @@ mod shell;
 mod surface;
 
 pub use error::PlantError;
+#[cfg(feature = "render")]
+pub(crate) use followers::Sowing;
+pub use hairline::Hairline;
 pub use map::{ImageMap, MapChannel, PlantingMaps, RootPlace, vertex_color};
 pub(crate) use place::{SurfacePoint, surface_points};
 pub use planting::{Planted, RootOnMesh};

@@ -2,6 +2,7 @@
 
 use super::{
     error::PlantError,
+    hairline::Hairline,
     map::{PlantingMaps, RootPlace},
     planting::Planted,
     recipe::{Clump, Comb, Curl, CurlPhase, Cut, Fall, Planting},
@@ -131,17 +132,39 @@ impl HairPreset {
 }
 
 impl HairPreset {
-    fn is_parted(self) -> bool {
+    pub(super) fn is_parted(self) -> bool {
         !matches!(self, Self::Short | Self::Coily)
     }
 
-    /// Away from the parting; in front to the back as well, so that the face is free.
-    fn direction(self, scalp: &Scalp, place: Vec3) -> Vec3 {
+    /// How hair begins at the hairline of its drawn strands.
+    pub fn hairline(self) -> Hairline {
+        let base = Hairline::default();
+        match self {
+            Self::Short => Hairline { least_length: 0.25, length_over: 12e-3, ..base },
+            Self::Coily => {
+                Hairline { least_length: 0.15, density_over: 12e-3, baby_length: 12e-3, ..base }
+            }
+            Self::Bob => Hairline { least_length: 0.6, ..base },
+            _ => base,
+        }
+    }
+
+    /// How far to the right of the parting a place is (m).
+    pub(super) fn aside(self, scalp: &Scalp, place: Vec3) -> f32 {
         let [right, _, front] = scalp.axes();
         let off = (place - scalp.center) / scalp.height;
-        let parting = if self == Self::Bob { -0.22 } else { 0.0 };
-        let side = if off.dot(right) < parting { -1.0 } else { 1.0 };
+        // No comb draws a straight line: 3 mm to and fro.
+        let zigzag = ((off.dot(front) * 7.0).rem_euclid(2.0) - 1.0).abs() - 0.5;
+        let parting = if self == Self::Bob { -0.22 } else { 0.0 } + 0.05 * zigzag;
+        (off.dot(right) - parting) * scalp.height
+    }
+
+    /// Away from the parting; in front to the back as well, so that the face is free.
+    pub(super) fn direction(self, scalp: &Scalp, place: Vec3) -> Vec3 {
+        let [right, _, front] = scalp.axes();
+        let off = (place - scalp.center) / scalp.height;
         let forward = off.dot(front);
+        let side = if self.aside(scalp, place) < 0.0 { -1.0 } else { 1.0 };
         // Behind the crown there is no parting; before it, down would be into the face.
         let across = (0.6 + 2.0 * (forward + 0.2)).clamp(0.0, 1.0);
         let down = (0.5 - forward).clamp(0.0, 0.6);
@@ -149,7 +172,7 @@ impl HairPreset {
     }
 
     /// Hair is cut shorter at the sides and the nape.
-    fn length_share(self, scalp: &Scalp, place: Vec3) -> f32 {
+    pub(super) fn length_share(self, scalp: &Scalp, place: Vec3) -> f32 {
         if self != Self::Short {
             return 1.0;
         }
@@ -270,7 +293,7 @@ impl HairPreset {
 
     #[cfg(feature = "render")]
     fn look(self) -> HairLook {
-        let base = HairLook { width: 0.2e-3, ..default() };
+        let base = HairLook { width: 0.18e-3, ..default() };
         match self {
             Self::Straight => HairLook { melanin: Melanin::DARK_BROWN, ..base },
             Self::Wavy => HairLook { melanin: Melanin::AUBURN, ..base },
@@ -279,42 +302,87 @@ impl HairPreset {
                 melanin: Melanin::BLACK,
                 roughness: 0.55,
                 gloss: 0.4,
-                width: 0.25e-3,
+                width: 0.2e-3,
                 ..base
             },
             Self::Short => HairLook { melanin: Melanin::DARK_BROWN, gloss: 0.6, ..base },
             Self::Bob => HairLook { melanin: Melanin::BLACK, roughness: 0.32, ..base },
-            Self::Long => HairLook { melanin: Melanin::BLOND, ..base },
+            Self::Long => HairLook { melanin: Melanin::BLOND, variation: 0.25, ..base },
         }
     }
 
     #[cfg(feature = "render")]
     fn followers(self) -> HairFollowers {
-        let base = HairFollowers { segments: 24, stray: 0.02, ..HairFollowers::new(20_000) };
+        let base = HairFollowers {
+            segments: 24,
+            stray: 0.012,
+            clump: 0.0,
+            frizz: 0.2e-3,
+            ..HairFollowers::new(40_000)
+        };
         match self {
-            Self::Straight | Self::Long => HairFollowers { clump: 0.3, ..base },
-            Self::Wavy => HairFollowers { segments: 40, clump: 0.4, parting: 2.5, ..base },
+            Self::Straight => HairFollowers { locks: Vec3::new(0.25, 0.35, 0.3), ..base },
+            Self::Wavy => HairFollowers {
+                segments: 40,
+                locks: Vec3::new(0.3, 0.5, 0.5),
+                lock_shape: 0.9,
+                lock_phase: 0.04,
+                frizz: 0.4e-3,
+                flyaways: 0.02,
+                parting: 2.5,
+                ..base
+            },
             // Curls of neighbours blended would be none: each follows its nearest.
             Self::Curly => HairFollowers {
                 segments: 64,
-                clump: 0.75,
+                locks: Vec3::new(0.2, 0.75, 0.6),
+                lock_shape: 0.7,
+                lock_phase: 0.12,
+                frizz: 0.5e-3,
+                flyaways: 0.025,
                 parting: 1.0,
-                phase_variation: 0.01,
-                stray: 0.03,
+                phase_variation: 0.008,
+                stray: 0.02,
                 ..base
             },
             Self::Coily => HairFollowers {
-                count: 24_000,
                 segments: 52,
-                clump: 0.1,
+                locks: Vec3::new(0.1, 0.7, 0.6),
+                lock_spacing: Vec3::new(0.03, 0.008, 0.004),
+                lock_shape: 0.7,
+                lock_phase: 0.12,
+                lock_length_variation: 0.12,
+                frizz: 0.6e-3,
+                flyaways: 0.03,
                 parting: 1.0,
-                phase_variation: 0.04,
-                stray: 0.1,
-                length_variation: 0.25,
+                phase_variation: 0.02,
+                stray: 0.05,
                 ..base
             },
-            Self::Short => HairFollowers { segments: 12, clump: 0.2, ..base },
-            Self::Bob => HairFollowers { clump: 0.15, stray: 0.01, length_variation: 0.03, ..base },
+            Self::Short => HairFollowers {
+                segments: 12,
+                locks: Vec3::new(0.3, 0.35, 0.2),
+                lock_spacing: Vec3::new(0.014, 0.007, 0.0035),
+                flyaways: 0.01,
+                flyaway_reach: 8e-3,
+                ..base
+            },
+            Self::Bob => HairFollowers {
+                locks: Vec3::new(0.15, 0.25, 0.2),
+                lock_length_variation: 0.01,
+                stray: 0.006,
+                frizz: 0.12e-3,
+                flyaways: 0.008,
+                length_variation: 0.02,
+                ..base
+            },
+            Self::Long => HairFollowers {
+                locks: Vec3::new(0.3, 0.5, 0.4),
+                lock_length_variation: 0.1,
+                flyaways: 0.02,
+                length_variation: 0.2,
+                ..base
+            },
         }
     }
 }

@@ -69,14 +69,24 @@ impl Scalp {
 
     /// The share of full density at a place, 0…1.
     pub fn share(&self, place: Vec3) -> f32 {
+        let (_, above) = self.beyond_hairline(place);
+        // A fade of nothing is a sharp line.
+        let share = (above / self.fade.max(1e-6)).clamp(0.0, 1.0);
+        if share.is_nan() { 0.0 } else { share * share * (3.0 - 2.0 * share) }
+    }
+
+    /// Angles at the centre: from the face around (°), and above the hairline there (rad).
+    pub(super) fn beyond_hairline(&self, place: Vec3) -> (f32, f32) {
         let axes = self.axes();
         let [right, up, front] = axes.map(|axis| (place - self.center).dot(axis));
         let flat = right.hypot(front);
         let around = atan2(right.abs(), front) * 180.0 / PI;
-        let above = atan2(up, flat) - hairline(around) * PI / 180.0 - self.recede;
-        // A fade of nothing is a sharp line.
-        let share = (above / self.fade.max(1e-6)).clamp(0.0, 1.0);
-        if share.is_nan() { 0.0 } else { share * share * (3.0 - 2.0 * share) }
+        (around, atan2(up, flat) - hairline(around) * PI / 180.0 - self.recede)
+    }
+
+    /// How much the hairline rises for as much way around.
+    pub(super) fn hairline_slope(&self, around: f32) -> f32 {
+        (hairline((around + 2.0).min(180.0)) - hairline((around - 2.0).max(0.0))) / 4.0
     }
 
     /// The scalp as a density map.

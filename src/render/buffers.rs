@@ -17,7 +17,7 @@ use half::{f16, slice::HalfFloatSliceExt};
 /// |---|---|---|
 /// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain and moisture (2 × f16), length from the root at rest (m), motion since the frame before (3 × f16, in m/1024), 1 if the guide may be shown (f16) |
 /// | `guides` | 8 | first node and number of nodes of each guide |
-/// | `strands` | 64 | [`DrawnStrand`]: the guides first, then the followers |
+/// | `strands` | 128 | [`DrawnStrand`]: the guides first, then the followers |
 ///
 /// `nodes` is written once a frame into the same GPU buffer. When the groom changes the handles
 /// change too.
@@ -138,7 +138,7 @@ fn unorm8(rates: [f32; 4]) -> u32 {
 
 /// The static buffers' contents.
 pub(super) fn pack_strands(drawn: &[DrawnStrand]) -> Vec<u8> {
-    let words: Vec<[u32; 16]> = drawn.iter().map(DrawnStrand::packed).collect();
+    let words: Vec<[u32; 32]> = drawn.iter().map(DrawnStrand::packed).collect();
     bytemuck::cast_slice(&words).to_vec()
 }
 

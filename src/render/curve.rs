@@ -1,7 +1,13 @@
 //! Points on drawn strands: the Rust twin of `strands.wgsl`, for tools, tests and effects that
 //! need to know where a follower is.
 
-use super::{drawn_strand::DrawnStrand, followers::HairFollowers};
+use super::{
+    drawn_strand::{DrawnStrand, GuideRoot},
+    follower_roots::FollowerRoots,
+    followers::HairFollowers,
+    locks::lot,
+    scatter::scatter,
+};
 use bevy::prelude::*;
 
 /// A point on a curve and the derivative by the share of the length.
@@ -47,6 +53,28 @@ pub struct Guide<'a> {
     pub moisture: &'a [f32],
 }
 
+/// The strands that are drawn for guides that stand as `guides` (their nodes, root first): the guides,
+/// then the followers.
+pub fn drawn_strands(
+    guides: &[&[Vec3]],
+    given: Option<&FollowerRoots>,
+    followers: &HairFollowers,
+) -> Vec<DrawnStrand> {
+    let root = |nodes: &&[Vec3]| {
+        let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else {
+            return GuideRoot::default();
+        };
+        GuideRoot {
+            place: *first,
+            normal: nodes.get(1).map_or(Vec3::Y, |next| (*next - *first).normalize_or(Vec3::Y)),
+            length: nodes.windows(2).map(|pair| pair[0].distance(pair[1])).sum(),
+            reach: *last - *first,
+        }
+    };
+    let roots: Vec<_> = guides.iter().map(root).collect();
+    scatter(&roots, given, followers)
+}
+
 /// The point at `t` (0 root, 1 tip) of a drawn strand, in the hair's frame; `guide` gives the guides
 /// by their index.
 pub fn strand_point<'a>(
@@ -58,54 +86,157 @@ pub fn strand_point<'a>(
     let reach = strand.length.min(1.0) - strand.phase;
     // What is longer than its guides is like them, but larger.
     let larger = strand.length.max(1.0);
-    let share = strand.phase + t * reach;
+    let eased = eased(t);
+    let share = strand.phase * eased.value + t * reach;
+    let pace = reach + strand.phase * eased.rate;
     let near_guide = guide(strand.guides[0]);
     let near = near_guide.nodes;
     let near_root = near.first().copied().unwrap_or_default();
     let near_point = guide_point(near, share);
 
-    let mut sum = strand.weights[0];
-    let mut root = strand.root + sum * near_root;
-    let near_way = near_point.position - guide_point(near, strand.phase).position;
-    let mut way = sum * near_way;
-    let mut slope = sum * near_point.slope;
+    let locks = locks_at(strand, t, followers);
+    let own = (strand.weights[0] + locks.weights[0]).max(0.0);
+    let mut sum = own;
+    let mut root = strand.root + strand.weights[0] * near_root;
+    let from = |nodes: &[Vec3], root: Vec3, point: CurvePoint| {
+        let shift = guide_point(nodes, strand.phase).position - root;
+        let way = point.position - root - shift * eased.value;
+        (way, point.slope * pace - shift * eased.rate)
+    };
+    let (near_way, near_slope) = from(near, near_root, near_point);
+    let mut way = own * near_way;
+    let mut slope = own * near_slope + locks.rates[0] * near_way;
     for k in 1..3 {
-        if strand.weights[k] <= 0.0 {
+        let own = (strand.weights[k] + locks.weights[k]).max(0.0);
+        if strand.weights[k] <= 0.0 && own <= 0.0 {
             continue;
         }
         let nodes = guide(strand.guides[k]).nodes;
         let guide_root = nodes.first().copied().unwrap_or_default();
         let point = guide_point(nodes, share);
         root += strand.weights[k] * guide_root;
-        let guide_way = point.position - guide_point(nodes, strand.phase).position;
+        let (guide_way, guide_slope) = from(nodes, guide_root, point);
         let apart =
             point.position.distance(near_point.position) / guide_root.distance(near_root).max(1e-4);
         let together =
             guide_way.dot(near_way) / (guide_way.length() * near_way.length()).max(1e-12);
-        let together = match share <= strand.phase {
-            true => 1.0,
-            false => smoothstep(0.0, 0.6, together),
-        };
+        let together = if t <= 0.0 { 1.0 } else { smoothstep(0.0, 0.6, together) };
         let parting = followers.parting;
-        let weight =
-            strand.weights[k] * (1.0 - smoothstep(parting, 1.5 * parting, apart)) * together;
-        sum += weight;
-        way += weight * guide_way;
-        slope += weight * point.slope;
+        let goes = (1.0 - smoothstep(parting, 1.5 * parting, apart)) * together;
+        sum += own * goes;
+        way += own * goes * guide_way;
+        slope += goes * (own * guide_slope + locks.rates[k] * guide_way);
     }
     let (gather, most) = match strand.is_guide {
         true => (Vec3::ZERO, 0.0),
         false => ((near_root - root) * followers.clump, followers.wet_clump),
     };
-    let loose = root + way * (larger / sum) + gather * t + strand.stray * t * t;
-    let loose_slope = slope * (reach * larger / sum) + gather + 2.0 * t * strand.stray;
+    let frizz = match strand.is_guide {
+        true => CurvePoint::default(),
+        false => frizz_at(strand, root, t, followers.frizz),
+    };
+    let sum = sum.max(1e-6);
+    let loose = root
+        + way * (larger / sum)
+        + locks.root
+        + gather * t
+        + strand.stray * t * t
+        + frizz.position;
+    let loose_slope =
+        slope * (larger / sum) + locks.root_rate + gather + 2.0 * t * strand.stray + frizz.slope;
     let (moisture, rise) = moisture_at(&near_guide, share);
     let tight = most * moisture * t * (2.0 - t);
-    let tighter = most * (rise * reach * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
+    let tighter = most * (rise * pace * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
     let inward = near_point.position - loose;
     CurvePoint {
         position: loose + inward * tight,
-        slope: loose_slope.lerp(near_point.slope * reach, tight) + inward * tighter,
+        slope: loose_slope.lerp(near_point.slope * pace, tight) + inward * tighter,
+    }
+}
+
+/// A value and its derivative.
+#[derive(Clone, Copy, Debug)]
+struct Rising {
+    value: f32,
+    rate: f32,
+}
+
+/// The share of the length over which a strand leaves its root for where its phase puts it.
+const EASE: f32 = 0.2;
+
+/// How far it has left it at `t`.
+fn eased(t: f32) -> Rising {
+    let u = (t / EASE).clamp(0.0, 1.0);
+    Rising { value: u * (2.0 - u), rate: 2.0 * (1.0 - u) / EASE }
+}
+
+/// What its locks do to a strand, with the derivatives.
+#[derive(Clone, Copy, Debug)]
+struct Locks {
+    root: Vec3,
+    root_rate: Vec3,
+    weights: [f32; 3],
+    rates: [f32; 3],
+}
+
+/// Every level draws what the levels before have left.
+fn locks_at(strand: &DrawnStrand, t: f32, followers: &HairFollowers) -> Locks {
+    let gone = t.max(1e-4).powf(followers.lock_shape);
+    let rising = followers.lock_shape * gone / t.max(1e-4);
+    let mut locks =
+        Locks { root: Vec3::ZERO, root_rate: Vec3::ZERO, weights: [0.0; 3], rates: [0.0; 3] };
+    let mut left = Rising { value: 1.0, rate: 0.0 };
+    for (level, to) in strand.locks.iter().enumerate() {
+        let pull = followers.locks[level] * gone;
+        let pulling = followers.locks[level] * rising;
+        let share = pull * left.value;
+        let rate = pulling * left.value + pull * left.rate;
+        left.rate = left.rate * (1.0 - pull) - left.value * pulling;
+        left.value *= 1.0 - pull;
+        locks.root += to.root * share;
+        locks.root_rate += to.root * rate;
+        for k in 0..3 {
+            locks.weights[k] += to.weights[k] * share;
+            locks.rates[k] += to.weights[k] * rate;
+        }
+    }
+    locks
+}
+
+/// Waves whose sum has no divergence, as curl noise has none: ways they run, ways they lean (at right
+/// angles to that), waves in a length, and where they begin.
+const WAVES: [(Vec3, Vec3, f32, f32); 4] = [
+    (Vec3::new(0.8, 0.6, 0.0), Vec3::new(0.0, 0.0, 1.0), 1.0, 0.0),
+    (Vec3::new(0.0, 0.8, 0.6), Vec3::new(1.0, 0.0, 0.0), 1.31, 0.37),
+    (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 1.0, 0.0), 0.77, 0.71),
+    (Vec3::new(0.48, -0.64, 0.6), Vec3::new(0.8, 0.6, 0.0), 1.13, 0.13),
+];
+/// Where in the noise a strand goes, for each metre of its length.
+const THROUGH: Vec3 = Vec3::new(0.6, 0.8, -1.4);
+/// Lengths of the waves (m), and their heights as a share.
+const OCTAVES: [(f32, f32); 2] = [(12e-3, 0.7), (3e-3, 0.18)];
+
+/// How far frizz puts a strand off its way.
+fn frizz_at(strand: &DrawnStrand, root: Vec3, t: f32, most: f32) -> CurvePoint {
+    use core::f32::consts::TAU;
+    let height = most * t.max(1e-4).powf(1.3);
+    let rising = 1.3 * height / t.max(1e-4);
+    let place = root + THROUGH * (strand.size * t);
+    // Neighbours wave nearly alike.
+    let own = 0.2 * lot(strand.seed.wrapping_add(31));
+    let mut sum = CurvePoint::default();
+    for (length, share) in OCTAVES {
+        for (along, lean, waves, begin) in WAVES {
+            let count = waves / length;
+            let turn = (count * along.dot(place) + begin + own).rem_euclid(1.0) * TAU;
+            let pace = TAU * count * along.dot(THROUGH) * strand.size;
+            sum.position += lean * (share * turn.sin());
+            sum.slope += lean * (share * pace * turn.cos());
+        }
+    }
+    CurvePoint {
+        position: sum.position * height,
+        slope: sum.slope * height + sum.position * rising,
     }
 }
 
@@ -129,6 +260,7 @@ fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::drawn_strand::ToMiddle;
     use super::*;
 
     const BENT: [Vec3; 4] = [
@@ -157,7 +289,7 @@ mod tests {
         let mut right: Vec<Vec3> = BENT.iter().map(|p| *p + Vec3::X * 0.01).collect();
         let strand =
             DrawnStrand { guides: [0, 1, 0], weights: [0.6, 0.4, 0.0], length: 1.0, ..default() };
-        let followers = HairFollowers { clump: 0.0, parting: 5.0, ..default() };
+        let followers = HairFollowers { clump: 0.0, parting: 5.0, frizz: 0.0, ..default() };
         let tip = |right: &[Vec3]| {
             let guide = |i| Guide { nodes: if i == 0 { &left } else { right }, moisture: &[] };
             strand_point(&strand, guide, 1.0, &followers).position
@@ -177,7 +309,7 @@ mod tests {
             stray: Vec3::Z * 0.02,
             ..default()
         };
-        let followers = HairFollowers { wet_clump: 0.8, clump: 0.0, ..default() };
+        let followers = HairFollowers { wet_clump: 0.8, clump: 0.0, frizz: 0.0, ..default() };
         let point = |t: f32, moisture: &[f32]| {
             strand_point(&strand, |_| Guide { nodes: &BENT, moisture }, t, &followers)
         };
@@ -192,6 +324,36 @@ mod tests {
             let (t, h) = (k as f32 / 31.0, 1e-3);
             let rise = point(t + h, &uneven).position - point(t - h, &uneven).position;
             assert!((rise / (2.0 * h)).distance(point(t, &uneven).slope) < 2e-2, "{t}");
+        }
+    }
+
+    #[test]
+    fn the_slope_of_locks_frizz_and_phase_is_the_derivative() {
+        let other: Vec<Vec3> = BENT.iter().map(|p| *p * 1.2 + Vec3::Z * 0.01).collect();
+        let lock = |x: f32| ToMiddle {
+            root: Vec3::new(x, 0.002, -x) * 0.01,
+            weights: [-0.2 * x, 0.3 * x, -0.1 * x],
+        };
+        let strand = DrawnStrand {
+            guides: [0, 1, 0],
+            weights: [0.6, 0.4, 0.0],
+            length: 0.9,
+            phase: 0.1,
+            size: 0.3,
+            locks: [lock(1.0), lock(-0.5), lock(0.7)],
+            ..default()
+        };
+        let followers = HairFollowers { parting: 1e6, frizz: 0.5e-3, ..default() };
+        let nodes = [&BENT[..], &other];
+        let at = |t: f32| {
+            let of = |i: u32| Guide { nodes: nodes[i as usize], ..default() };
+            strand_point(&strand, of, t, &followers)
+        };
+        assert!(at(0.0).position.distance(Vec3::Z * 0.004) < 1e-5, "{}", at(0.0).position);
+        for k in 1..60 {
+            let (t, h) = (k as f32 / 61.0, 2e-4);
+            let rise = (at(t + h).position - at(t - h).position) / (2.0 * h);
+            assert!(rise.distance(at(t).slope) < 0.06 * rise.length() + 0.01, "{t} {rise}");
         }
     }
 }

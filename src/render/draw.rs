@@ -230,7 +230,14 @@ impl Packed {
             changed = true;
         }
         // What the shader reads from the uniform needs no new strands.
-        let grown = |f: &HairFollowers| HairFollowers { clump: 0.0, parting: 0.0, ..*f };
+        let grown = |f: &HairFollowers| HairFollowers {
+            clump: 0.0,
+            parting: 0.0,
+            locks: Vec3::ZERO,
+            lock_shape: 0.0,
+            frizz: 0.0,
+            ..*f
+        };
         changed |= self.followers.as_ref().map(grown) != Some(grown(followers));
         self.followers = Some(*followers);
         changed | core::mem::take(&mut self.roots_moved)
@@ -308,11 +315,15 @@ impl Packed {
             let apart = |k: usize| roots[strand.guides[k] as usize].place.distance(own);
             let larger = (strand.length - 1.0).max(0.0)
                 * strand.guides.iter().map(|g| roots[*g as usize].length).fold(0.0, f32::max);
-            let reach =
-                apart(1).max(apart(2)) + strand.root.length() + strand.stray.length() + larger;
+            let locks = strand.locks.iter().map(|lock| lock.root.length()).fold(0.0, f32::max);
+            let reach = apart(1).max(apart(2))
+                + strand.root.length()
+                + strand.stray.length()
+                + larger
+                + locks;
             if reach.is_finite() { reach } else { 0.0 }
         };
-        self.margin = drawn.iter().map(reach).fold(0.005, f32::max);
+        self.margin = drawn.iter().map(reach).fold(0.005 + followers.frizz, f32::max);
         self.roots = roots;
         self.thickness = self.thickness_of(&drawn, followers);
         drawn

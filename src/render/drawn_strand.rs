@@ -3,9 +3,18 @@
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// A strand as it is drawn: which guides it goes with and how it differs from them. 64 bytes in the
-/// buffer, see [`HairBuffers`](super::HairBuffers).
+/// The way from a strand to the one in the middle of its lock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToMiddle {
+    /// Between their roots (m); along the strand it has no part, which keeps its length.
+    pub root: Vec3,
+    /// By how much more the middle goes with each guide, sum 0.
+    pub weights: [f32; 3],
+}
+
+/// A strand as it is drawn: which guides it goes with and how it differs from them. 128 bytes in the
+/// buffer, see [`HairBuffers`](super::HairBuffers).
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawnStrand {
     /// Indices of its guides, nearest first; unused ones repeat the first and weigh nothing.
     pub guides: [u32; 3],
@@ -24,6 +33,30 @@ pub struct DrawnStrand {
     pub stray: Vec3,
     /// Whether it is a guide itself.
     pub is_guide: bool,
+    /// Length at rest (m).
+    pub size: f32,
+    /// Width as a share of the look's.
+    pub width: f32,
+    /// To the middles of its locks, large to small.
+    pub locks: [ToMiddle; 3],
+}
+
+impl Default for DrawnStrand {
+    fn default() -> Self {
+        Self {
+            guides: [0; 3],
+            seed: 0,
+            weights: [0.0; 3],
+            length: 0.0,
+            root: Vec3::ZERO,
+            phase: 0.0,
+            stray: Vec3::ZERO,
+            is_guide: false,
+            size: 0.0,
+            width: 1.0,
+            locks: default(),
+        }
+    }
 }
 
 impl DrawnStrand {
@@ -40,14 +73,29 @@ impl DrawnStrand {
     }
 
     /// As the shader reads it.
-    pub fn packed(&self) -> [u32; 16] {
-        let [a, b, c] = self.guides;
-        let [u, v, w] = self.weights.map(f32::to_bits);
-        let [rx, ry, rz] = self.root.to_array().map(f32::to_bits);
-        let [sx, sy, sz] = self.stray.to_array().map(f32::to_bits);
-        let (length, phase) = (self.length.to_bits(), self.phase.to_bits());
-        let guide = f32::from(u8::from(self.is_guide)).to_bits();
-        [a, b, c, self.seed, u, v, w, length, rx, ry, rz, phase, sx, sy, sz, guide]
+    pub fn packed(&self) -> [u32; 32] {
+        let mut words = [0; 32];
+        words[..3].copy_from_slice(&self.guides);
+        words[3] = self.seed;
+        let mut put = |at: usize, numbers: &[f32]| {
+            for (word, number) in words[at..].iter_mut().zip(numbers) {
+                *word = number.to_bits();
+            }
+        };
+        put(4, &self.weights);
+        put(7, &[self.length]);
+        put(8, &self.root.to_array());
+        put(11, &[self.phase]);
+        put(12, &self.stray.to_array());
+        put(15, &[self.size]);
+        for (level, lock) in self.locks.iter().enumerate() {
+            put(16 + 4 * level, &lock.root.to_array());
+            put(19 + 4 * level, &lock.weights[1..2]);
+            put(28 + level, &lock.weights[2..]);
+        }
+        // Guides are marked by a sign.
+        put(31, &[if self.is_guide { -1.0 } else { self.width.max(0.0) }]);
+        words
     }
 }
 

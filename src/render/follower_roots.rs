@@ -19,7 +19,7 @@ use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 pub struct FollowerRoots(pub Vec<FollowerRoot>);
 
 /// Where one follower grows.
-#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct FollowerRoot {
     /// The root's place at rest, in the hair's frame (m).
@@ -28,6 +28,14 @@ pub struct FollowerRoot {
     pub length: f32,
     /// From root to tip at rest (m); zero if that is not known.
     pub reach: Vec3,
+    /// Width as a share of [`HairLook::width`](super::HairLook::width). Default 1, safe 0.3 to 2.
+    pub width: f32,
+}
+
+impl Default for FollowerRoot {
+    fn default() -> Self {
+        Self { place: Vec3::ZERO, length: 0.0, reach: Vec3::ZERO, width: 1.0 }
+    }
 }
 
 /// The most that a follower's length may be of its guides'.
@@ -76,10 +84,15 @@ fn follower(
     };
     let mut best: Vec<(f32, u32)> = near.map(cost).collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    // Shares fall to nothing toward the fourth guide, so that none comes or goes with a jump.
+    let fourth = best.get(3).map_or(f32::INFINITY, |fourth| fourth.0);
     best.truncate(3);
     let nearest = best.first()?.1;
 
-    let weight = |cost: f32| 1.0 / (cost + 1e-8);
+    let weight = |cost: f32| match fourth.is_finite() {
+        true => ((1.0 - cost / (fourth + 1e-12)).max(0.0).powi(2)).max(1e-9),
+        false => 1.0 / (cost + 1e-8),
+    };
     let sum: f32 = best.iter().map(|(cost, _)| weight(*cost)).sum();
     let (mut chosen, mut weights) = ([nearest; 3], [0.0; 3]);
     let (mut root, mut length) = (own.place, 0.0);
@@ -102,7 +115,9 @@ fn follower(
         root,
         phase: (settings.phase_variation * random.random::<f32>()).min(0.5 * share),
         stray: direction(random) * (settings.stray * own.length * far),
-        is_guide: false,
+        size: own.length,
+        width: if own.width.is_finite() { own.width.max(0.0) } else { 1.0 },
+        ..default()
     })
 }
 
@@ -117,7 +132,16 @@ mod tests {
     }
 
     fn plain(count: u32) -> HairFollowers {
-        HairFollowers { phase_variation: 0.0, stray: 0.0, clump: 0.0, ..HairFollowers::new(count) }
+        HairFollowers {
+            phase_variation: 0.0,
+            stray: 0.0,
+            clump: 0.0,
+            locks: Vec3::ZERO,
+            lock_length_variation: 0.0,
+            frizz: 0.0,
+            flyaways: 0.0,
+            ..HairFollowers::new(count)
+        }
     }
 
     /// Root and tip as drawn.
@@ -140,6 +164,7 @@ mod tests {
                 place: Vec3::new(0.013 * i as f32 + 0.002, 0.001, 0.004),
                 length: *length,
                 reach: Vec3::Y * *length,
+                ..default()
             })
             .collect();
         let grown = lay_followers(&given, &guides, &plain(100));
@@ -158,7 +183,7 @@ mod tests {
     #[test]
     fn among_near_guides_those_of_its_shape_count() {
         let guides = [guide(0.0, Vec3::Y * 0.2), guide(0.004, Vec3::X * 0.2)];
-        let own = |reach| FollowerRoot { place: Vec3::X * 0.001, length: 0.2, reach };
+        let own = |reach| FollowerRoot { place: Vec3::X * 0.001, length: 0.2, reach, ..default() };
         for (reach, like) in [(Vec3::Y * 0.2, 0), (Vec3::X * 0.2, 1)] {
             let strand = lay_followers(&[own(reach)], &guides, &plain(1))[0];
             assert_eq!(strand.guides[0], like);
@@ -168,7 +193,7 @@ mod tests {
 
     #[test]
     fn broken_roots_and_guides_are_left_out() {
-        let nan = FollowerRoot { place: Vec3::NAN, length: 0.1, reach: Vec3::Y };
+        let nan = FollowerRoot { place: Vec3::NAN, length: 0.1, reach: Vec3::Y, ..default() };
         let flat = FollowerRoot { length: 0.0, ..default() };
         let good = FollowerRoot { length: 0.1, ..default() };
         let guides = [guide(0.0, Vec3::Y), guide(f32::NAN, Vec3::Y), guide(0.1, Vec3::ZERO)];

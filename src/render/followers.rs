@@ -36,6 +36,32 @@ setting! {
         pub stray: f32 = 0.03, in STRAY: 0.0..=1.0, safe 0.0..=0.5, "0.03 is natural";
         /// How much tips draw together around their guide, a share.
         pub clump: f32 = 0.25, in CLUMP: 0.0..=1.0, "0.25 is natural";
+        /// How much tips draw together in locks of three sizes, each within the one before: shares of the
+        /// way to the strand in the middle.
+        pub locks: Vec3 = Vec3::new(0.2, 0.3, 0.3), in LOCKS: 0.0..=0.95,
+            "0.2, 0.3, 0.3 suit most hair; curls have more";
+        /// How far apart the middles of locks of each size are at the scalp.
+        pub lock_spacing: Vec3 = Vec3::new(0.03, 0.011, 0.0045), "m" in LOCK_SPACING: 1e-4..=1e3,
+            safe 1e-3..=0.2, "0.03, 0.011 and 0.0045 m are natural";
+        /// Where along the strand locks draw together: the power of the share of the length. Below 1
+        /// near the roots, above 1 at the tips.
+        pub lock_shape: f32 = 1.0, in LOCK_SHAPE: 0.25..=8.0, safe 0.5..=3.0, "1 is natural";
+        /// How much shorter the strands of a large lock may be than those of another, a share.
+        pub lock_length_variation: f32 = 0.06, in LOCK_LENGTH_VARIATION: 0.0..=0.9, safe 0.0..=0.5,
+            "0.06 is natural";
+        /// By how much a lock of the middle size may be shifted along its guides, as a share of the
+        /// length: what lets curls turn lock by lock.
+        pub lock_phase: f32 = 0.0, in LOCK_PHASE: 0.0..=0.5, safe 0.0..=0.3,
+            "a turn's share of the length suits curls";
+        /// How far strands wave about their way toward the tip, over 12 mm and over 3 mm a quarter as
+        /// far.
+        pub frizz: f32 = 0.1e-3, "m" in FRIZZ: 0.0..=1.0, safe 0.0..=3e-3,
+            "0.0002 is straight hair, 0.0012 frizzy";
+        /// Share of strands that leave their locks and stand off; a fifth of them are broken.
+        pub flyaways: f32 = 0.015, in FLYAWAYS: 0.0..=1.0, safe 0.0..=0.2, "0.015 is natural";
+        /// How far flyaways stand off at most.
+        pub flyaway_reach: f32 = 20e-3, "m" in FLYAWAY_REACH: 0.0..=10.0, safe 0.0..=0.1,
+            "0.02 is natural";
         /// How far water draws the strands of a lock to their guide where it soaks them, a share of
         /// the way.
         pub wet_clump: f32 = 0.75, in WET_CLUMP: 0.0..=1.0, safe 0.0..=0.95, "0.75 is natural";

@@ -102,6 +102,9 @@ setting! {
             "0.00035 suits a head";
         /// Width at the tip as a share of that at the root.
         pub taper: f32 = 0.3, in TAPER: 0.0..=1.0, "0.3 is natural";
+        /// Over what length strands grow visible out of the scalp.
+        pub root_fade: f32 = 1.5e-3, "m" in ROOT_FADE: 0.0..=1.0, safe 0.0..=0.01,
+            "0.0015 is natural";
         /// Roughness of the fibre: its square is the standard deviation of the first highlight along
         /// the fibre in radians (Karis 2016; 0.38 makes 8°, Marschner et al. 2003 measured 5° to 10°).
         /// Lower is sleeker.

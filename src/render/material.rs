@@ -77,6 +77,10 @@ pub(super) struct Ribbon {
     guides: u32,
     strands: u32,
     view: u32,
+    frizz: f32,
+    locks: Vec3,
+    lock_shape: f32,
+    root_fade: f32,
 }
 
 impl Ribbon {
@@ -110,6 +114,10 @@ impl Ribbon {
             guides,
             strands,
             view: view.number(),
+            frizz: followers.frizz,
+            locks: followers.locks,
+            lock_shape: followers.lock_shape,
+            root_fade: look.root_fade,
         }
     }
 }

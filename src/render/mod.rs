@@ -26,6 +26,7 @@ mod draw;
 mod drawn_strand;
 mod follower_roots;
 mod followers;
+mod locks;
 mod look;
 mod material;
 mod scatter;
@@ -37,7 +38,7 @@ mod view;
 
 pub use beads::{Bead, HairBeadSystems, HairBeads};
 pub use buffers::HairBuffers;
-pub use drawn_strand::DrawnStrand;
+pub use drawn_strand::{DrawnStrand, ToMiddle};
 pub use follower_roots::{FollowerRoot, FollowerRoots};
 pub use followers::HairFollowers;
 pub use look::{HairLook, HairShading, Melanin, WetLook};

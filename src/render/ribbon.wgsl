@@ -24,8 +24,9 @@ struct RibbonVertex {
     along: f32,
     seed: u32,
     state: StrandState,
-    // How much of what is drawn the strand covers.
+    // How much of what is drawn the strand covers, and how far it has come out of the scalp: 1 is all.
     share: f32,
+    grown: f32,
     shown: bool,
 }
 
@@ -80,7 +81,9 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     out.tangent = safe_normalize(linear * point.slope, vec3(0.0, 1.0, 0.0));
     let eye = toward_eye(center);
 
-    let width = scale * ribbon.width * mix(1.0, ribbon.taper, smoothstep(BLUNT, 1.0, out.along));
+    let own_width = select(strand.width, 1.0, strand.width < 0.0);
+    out.grown = out.along * strand.size / max(ribbon.root_fade, 1e-9);
+    let width = scale * ribbon.width * own_width * mix(1.0, ribbon.taper, smoothstep(BLUNT, 1.0, out.along));
     // Of a shadow map, a texel.
     let drawn = max(width, pixel_size((view.clip_from_world * vec4(center, 1.0)).w));
     out.share = width / max(drawn, 1e-9);

@@ -18,7 +18,8 @@ struct ForwardVertex {
     @location(1) tangent: vec3<f32>,
     // Along the strand, value of the heat map, moisture, density of strands around.
     @location(2) along: vec4<f32>,
-    @location(3) share: f32,
+    // Share of what is drawn that the strand covers, and how far it has come out of the scalp.
+    @location(3) share: vec2<f32>,
     @location(4) @interpolate(flat) seed: u32,
 }
 
@@ -39,7 +40,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
     out.position = position_world_to_clip(vertex.world_position);
     out.tangent = vertex.tangent;
     out.seed = vertex.seed;
-    out.share = vertex.share;
+    out.share = vec2(vertex.share, vertex.grown);
     var value = 0.0;
     switch ribbon.view {
         case 1u, 2u, 3u, 4u: { value = vertex.state.rates[ribbon.view - 1u]; }
@@ -61,7 +62,7 @@ fn heat(value: f32) -> vec3<f32> {
 @fragment
 fn fragment(in: ForwardVertex) -> Fragment {
     var out: Fragment;
-    out.samples = covered_samples(in.share, in.seed, in.position.xy);
+    out.samples = covered_samples(in.share.x * saturate(in.share.y), in.seed, in.position.xy);
     if out.samples == 0u {
         discard;
     }

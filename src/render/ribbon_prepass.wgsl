@@ -11,7 +11,7 @@
 
 struct PrepassVertex {
     @invariant @builtin(position) position: vec4<f32>,
-    @location(0) share: f32,
+    @location(0) share: vec2<f32>,
     @location(1) @interpolate(flat) seed: u32,
 #ifdef NORMAL_PREPASS_OR_DEFERRED_PREPASS
     @location(2) world_normal: vec3<f32>,
@@ -43,7 +43,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> P
     var out: PrepassVertex;
     let ribbon = ribbon_vertex(corner, instance);
     out.position = position_world_to_clip(ribbon.world_position);
-    out.share = ribbon.share;
+    out.share = vec2(ribbon.share, ribbon.grown);
     out.seed = ribbon.seed;
 #ifdef NORMAL_PREPASS_OR_DEFERRED_PREPASS
     out.world_normal = facing_normal(ribbon.tangent, toward_eye(ribbon.center));
@@ -65,7 +65,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> P
 @fragment
 fn fragment(in: PrepassVertex) -> PrepassFragment {
     var out: PrepassFragment;
-    out.samples = covered_samples(in.share, in.seed, in.position.xy);
+    out.samples = covered_samples(in.share.x * saturate(in.share.y), in.seed, in.position.xy);
     if out.samples == 0u {
         discard;
     }

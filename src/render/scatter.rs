@@ -4,6 +4,7 @@ use super::{
     drawn_strand::{DrawnStrand, GuideRoot, direction},
     follower_roots::{FollowerRoots, lay_followers},
     followers::HairFollowers,
+    locks::draw_together,
 };
 use crate::grid::KdTree;
 use bevy::prelude::*;
@@ -15,13 +16,23 @@ pub(super) fn scatter(
     given: Option<&FollowerRoots>,
     followers: &HairFollowers,
 ) -> Vec<DrawnStrand> {
-    let mut drawn: Vec<_> = (0..roots.len() as u32).map(DrawnStrand::guide).collect();
-    if let Some(given) = given {
-        drawn.extend(lay_followers(&given.0, roots, followers));
-        return drawn;
+    let guide = |(root, i): (&GuideRoot, u32)| {
+        let size = if root.length.is_finite() { root.length } else { 0.0 };
+        DrawnStrand { size, ..DrawnStrand::guide(i) }
+    };
+    let mut drawn: Vec<_> = roots.iter().zip(0..).map(guide).collect();
+    match given {
+        Some(given) => drawn.extend(lay_followers(&given.0, roots, followers)),
+        None => strew(&mut drawn, roots, followers),
     }
+    draw_together(&mut drawn[roots.len()..], roots, followers);
+    drawn
+}
+
+/// Adds followers evenly between the guides.
+fn strew(drawn: &mut Vec<DrawnStrand>, roots: &[GuideRoot], followers: &HairFollowers) {
     if roots.is_empty() || followers.count == 0 {
-        return drawn;
+        return;
     }
     drawn.reserve(followers.count as usize);
     let cells = fans(roots);
@@ -41,7 +52,6 @@ pub(super) fn scatter(
         }
         drawn.push(follower(near, roots, &cells[near], followers, &mut random));
     }
-    drawn
 }
 
 fn follower(
@@ -64,15 +74,18 @@ fn follower(
     };
     // Most strands keep to their lock, few leave it far.
     let far = random.random::<f32>().powi(3) * 2.0 + 0.3;
+    let seed = random.random();
+    let share = 1.0 - settings.length_variation * random.random::<f32>();
     DrawnStrand {
         guides,
-        seed: random.random(),
+        seed,
         weights,
-        length: 1.0 - settings.length_variation * random.random::<f32>(),
+        length: share,
         root,
         phase: settings.phase_variation * random.random::<f32>(),
         stray: direction(random) * (settings.stray * length * far),
-        is_guide: false,
+        size: if length.is_finite() { length * share } else { 0.0 },
+        ..default()
     }
 }
 

@@ -24,7 +24,14 @@ struct DrawnStrand {
     root: vec3<f32>,       // root's place besides the weighted guides' roots (m)
     phase: f32,            // where on the guides the strand begins, a share of their length
     stray: vec3<f32>,      // by how much the tip leaves the lock (m)
-    guide: f32,            // 1 for guides themselves, 0 for followers
+    size: f32,             // length at rest (m)
+    // To the middles of its locks, large to small: between the roots (m), and by how much more the
+    // middle goes with the second guide; with the third below.
+    lock_large: vec4<f32>,
+    lock_middle: vec4<f32>,
+    lock_small: vec4<f32>,
+    lock_third: vec3<f32>,
+    width: f32,            // share of the look's; below 0 for guides themselves
 }
 
 struct Ribbon {
@@ -47,6 +54,10 @@ struct Ribbon {
     guides: u32,
     strands: u32,
     view: u32,
+    frizz: f32,
+    locks: vec3<f32>,
+    lock_shape: f32,
+    root_fade: f32,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(0) var<uniform> ribbon: Ribbon;
@@ -123,62 +134,170 @@ struct StrandPoint {
     share: f32,
 }
 
+// A value and its derivative.
+struct Rising {
+    value: f32,
+    rate: f32,
+}
+
+// The share of the length over which a strand leaves its root for where its phase puts it.
+const EASE: f32 = 0.2;
+
+fn eased_at(t: f32) -> Rising {
+    let u = saturate(t / EASE);
+    return Rising(u * (2.0 - u), 2.0 * (1.0 - u) / EASE);
+}
+
+// What its locks do to a strand, with the derivatives.
+struct Locks {
+    root: vec3<f32>,
+    root_rate: vec3<f32>,
+    weights: vec3<f32>,
+    rates: vec3<f32>,
+}
+
+// Every level draws what the levels before have left.
+fn locks_at(strand: DrawnStrand, t: f32) -> Locks {
+    let gone = pow(max(t, 1e-4), ribbon.lock_shape);
+    let rising = ribbon.lock_shape * gone / max(t, 1e-4);
+    let pull = ribbon.locks * gone;
+    let pulling = ribbon.locks * rising;
+    let left_large = 1.0 - pull.x;
+    let left_middle = left_large * (1.0 - pull.y);
+    let falling = -pulling.x * (1.0 - pull.y) - left_large * pulling.y;
+    let share = vec3(pull.x, pull.y * left_large, pull.z * left_middle);
+    let rate = vec3(pulling.x, pulling.y * left_large - pull.y * pulling.x,
+        pulling.z * left_middle + pull.z * falling);
+    let second = vec3(strand.lock_large.w, strand.lock_middle.w, strand.lock_small.w);
+    let weights = vec2(dot(second, share), dot(strand.lock_third, share));
+    let rates = vec2(dot(second, rate), dot(strand.lock_third, rate));
+    var out: Locks;
+    out.root = strand.lock_large.xyz * share.x + strand.lock_middle.xyz * share.y + strand.lock_small.xyz * share.z;
+    out.root_rate = strand.lock_large.xyz * rate.x + strand.lock_middle.xyz * rate.y + strand.lock_small.xyz * rate.z;
+    out.weights = vec3(-weights.x - weights.y, weights);
+    out.rates = vec3(-rates.x - rates.y, rates);
+    return out;
+}
+
+// Where in the noise a strand goes, for each metre of its length.
+const THROUGH: vec3<f32> = vec3(0.6, 0.8, -1.4);
+const TAU: f32 = 6.2831855;
+
+// Waves whose sum has no divergence, as curl noise has none: each leans at right angles to the way it
+// runs. Those of `length` (m) at `place`, with the derivative by the strand's share.
+fn waves(place: vec3<f32>, through: vec3<f32>, length: f32, begin: f32) -> CurvePoint {
+    let count = vec4(1.0, 1.31, 0.77, 1.13) / length;
+    let at = vec4(dot(vec3(0.8, 0.6, 0.0), place), dot(vec3(0.0, 0.8, 0.6), place),
+        dot(vec3(0.6, 0.0, 0.8), place), dot(vec3(0.48, -0.64, 0.6), place));
+    let go = vec4(dot(vec3(0.8, 0.6, 0.0), through), dot(vec3(0.0, 0.8, 0.6), through),
+        dot(vec3(0.6, 0.0, 0.8), through), dot(vec3(0.48, -0.64, 0.6), through));
+    let turn = fract(count * at + vec4(0.0, 0.37, 0.71, 0.13) + begin) * TAU;
+    let high = sin(turn);
+    let rise = cos(turn) * count * go * TAU;
+    var out: CurvePoint;
+    out.position = vec3(high.y + 0.8 * high.w, high.z + 0.6 * high.w, high.x);
+    out.slope = vec3(rise.y + 0.8 * rise.w, rise.z + 0.6 * rise.w, rise.x);
+    return out;
+}
+
+// How far frizz puts a strand off its way.
+fn frizz_at(strand: DrawnStrand, root: vec3<f32>, t: f32) -> CurvePoint {
+    let height = ribbon.frizz * pow(max(t, 1e-4), 1.3);
+    let rising = 1.3 * height / max(t, 1e-4);
+    let through = THROUGH * strand.size;
+    let place = root + through * t;
+    // Neighbours wave nearly alike.
+    let own = 0.2 * hash(strand.seed + 31u);
+    let coarse = waves(place, through, 12e-3, own);
+    let fine = waves(place, through, 3e-3, own);
+    let position = 0.7 * coarse.position + 0.18 * fine.position;
+    var out: CurvePoint;
+    out.position = position * height;
+    out.slope = (0.7 * coarse.slope + 0.18 * fine.slope) * height + position * rising;
+    return out;
+}
+
+// The way that a guide has gone from its root at a point, shifted by the phase.
+fn way_along(guide: vec2<u32>, root: vec3<f32>, point: CurvePoint, phase: f32, eased: Rising,
+    pace: f32) -> CurvePoint {
+    var shift = vec3(0.0);
+    if phase > 0.0 {
+        shift = guide_point(guide, phase).position - root;
+    }
+    var out: CurvePoint;
+    out.position = point.position - root - shift * eased.value;
+    out.slope = point.slope * pace - shift * eased.rate;
+    return out;
+}
+
 fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     var out: StrandPoint;
+    let follows = select(1.0, 0.0, strand.width < 0.0);
     let reach = min(strand.length, 1.0) - strand.phase;
     // What is longer than its guides is like them, but larger.
     let larger = max(strand.length, 1.0);
-    out.share = strand.phase + t * reach;
+    let eased = eased_at(t);
+    out.share = strand.phase * eased.value + t * reach;
+    let pace = reach + strand.phase * eased.rate;
     let near = guides[strand.guides.x];
     let near_root = node_place(near.x);
     let near_point = guide_point(near, out.share);
 
-    var weights = vec3(strand.weights.x * node_shown(near.x), 0.0, 0.0);
+    let locks = locks_at(strand, t);
+    let own = max(strand.weights + locks.weights, vec3(0.0));
+    var weights = vec3(own.x * node_shown(near.x), 0.0, 0.0);
     var root = strand.root + strand.weights.x * near_root;
-    let near_way = near_point.position - guide_point(near, strand.phase).position;
-    var way = weights.x * near_way;
-    var slope = weights.x * near_point.slope;
+    let near_way = way_along(near, near_root, near_point, strand.phase, eased, pace);
+    var way = weights.x * near_way.position;
+    var slope = weights.x * near_way.slope
+        + locks.rates.x * node_shown(near.x) * near_way.position;
     for (var i = 1; i < 3; i++) {
-        if strand.weights[i] <= 0.0 {
+        if strand.weights[i] <= 0.0 && own[i] <= 0.0 {
             continue;
         }
         let guide = guides[strand.guides[i]];
         let guide_root = node_place(guide.x);
         let point = guide_point(guide, out.share);
         root += strand.weights[i] * guide_root;
-        let guide_way = point.position - guide_point(guide, strand.phase).position;
+        let guide_way = way_along(guide, guide_root, point, strand.phase, eased, pace);
         // Guides that went apart, or other ways, stop blending: the strand goes with its nearest.
         let apart = distance(point.position, near_point.position)
             / max(distance(guide_root, near_root), 1e-4);
-        let together = dot(guide_way, near_way)
-            / max(length(guide_way) * length(near_way), 1e-12);
-        let weight = strand.weights[i] * node_shown(guide.x)
+        let together = dot(guide_way.position, near_way.position)
+            / max(length(guide_way.position) * length(near_way.position), 1e-12);
+        let goes = node_shown(guide.x)
             * (1.0 - smoothstep(ribbon.parting, 1.5 * ribbon.parting, apart))
-            * select(smoothstep(0.0, 0.6, together), 1.0, out.share <= strand.phase);
-        weights[i] = weight;
-        way += weight * guide_way;
-        slope += weight * point.slope;
+            * select(smoothstep(0.0, 0.6, together), 1.0, t <= 0.0);
+        weights[i] = own[i] * goes;
+        way += weights[i] * guide_way.position;
+        slope += goes * (own[i] * guide_way.slope + locks.rates[i] * guide_way.position);
     }
     let sum = weights.x + weights.y + weights.z;
-    if sum <= 0.0 {
+    if sum <= 1e-6 {
         return out;
     }
     out.weights = weights / sum;
-    // Toward the tip locks draw together around their guide, and strays leave them.
-    let gather = (near_root - root) * ribbon.clump * (1.0 - strand.guide);
-    let loose = root + way * (larger / sum) + gather * t + strand.stray * t * t;
-    let loose_slope = slope * (reach * larger / sum) + gather + 2.0 * t * strand.stray;
+    // Toward the tip locks draw together around their middles, and strays leave them.
+    let gather = (near_root - root) * ribbon.clump * follows;
+    var frizz: CurvePoint;
+    if follows > 0.0 && ribbon.frizz > 0.0 {
+        frizz = frizz_at(strand, root, t);
+    }
+    let loose = root + way * (larger / sum) + locks.root + gather * t + strand.stray * t * t
+        + frizz.position;
+    let loose_slope = slope * (larger / sum) + locks.root_rate + gather + 2.0 * t * strand.stray
+        + frizz.slope;
     // Water draws a lock together around its guide, from the root on.
     let at = node_below(near, out.share);
     let low = node_moisture(near.x + u32(at.x));
     let rise = node_moisture(near.x + u32(at.x) + 1u) - low;
-    let most = ribbon.wet_clump * (1.0 - strand.guide) * node_shown(near.x);
+    let most = ribbon.wet_clump * follows * node_shown(near.x);
     let moisture = low + rise * at.y;
     let tight = most * moisture * t * (2.0 - t);
-    let tighter = most * (rise * f32(near.y - 1u) * reach * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
+    let tighter = most * (rise * f32(near.y - 1u) * pace * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
     let inward = near_point.position - loose;
     out.position = loose + inward * tight;
-    out.slope = mix(loose_slope, near_point.slope * reach, tight) + inward * tighter;
+    out.slope = mix(loose_slope, near_point.slope * pace, tight) + inward * tighter;
     return out;
 }
 

@@ -6,8 +6,6 @@ use super::{
     target::Target,
     what::{HairSource, WearHair},
 };
-#[cfg(feature = "render")]
-use crate::render::HairLook;
 use crate::{
     collider_fit::{BallRules, fit_joint_capsules, inscribed_balls},
     contact::HairCollider,
@@ -20,6 +18,8 @@ use crate::{
     strand::Strand,
     water::Wetting,
 };
+#[cfg(feature = "render")]
+use crate::{plant::Sowing, render::HairLook, setting::Ranged};
 use bevy::{math::Affine3A, platform::collections::HashMap, prelude::*};
 
 /// Points by which head and body are felt when balls are fitted.
@@ -70,7 +70,7 @@ pub(super) fn make(mut order: Order) -> Result<Made, WearError> {
             sow(groom, guides, &fitting, &order.wear.place)?
         }
         (HairSource::Groom { .. }, None) => return Err(WearError::NoMesh),
-        (HairSource::Preset(preset), _) => plant(*preset, order.wear.seed, &fitting)?,
+        (HairSource::Preset(preset), _) => plant(*preset, &order.wear, &fitting)?,
     };
     let part = &order.target.parts[fitting.part];
     let to_mesh = fitting.to_hair.inverse();
@@ -112,16 +112,29 @@ struct Grown {
     fibres: f32,
 }
 
-fn plant(preset: HairPreset, seed: u64, fitting: &Fitting) -> Result<Grown, WearError> {
-    let planting = Planting { seed, ..preset.planting(&fitting.scalp) };
+fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown, WearError> {
+    let planting = Planting { seed: wear.seed, ..preset.planting(&fitting.scalp) };
     let mesh = cropped(&fitting.mesh, planting.length + BESIDE);
     let of_head = |place: &RootPlace| {
         place.color.map_or(1.0, |color| if color.x > OF_HEAD { 1.0 } else { 0.0 })
     };
     let planted = preset.plant_where(&planting, &mesh, &fitting.scalp, &of_head)?;
     let strands = planted.groom.strands().map(|s| Strand::from_polyline(s.points));
+    let hair = Sown {
+        strands: strands.collect::<Result<_, _>>()?,
+        #[cfg(feature = "render")]
+        followers: Sowing {
+            preset,
+            scalp: fitting.scalp,
+            hairline: wear.hairline.unwrap_or_else(|| preset.hairline()).clamped(),
+            count: preset.settings().followers.count,
+            seed: wear.seed,
+        }
+        .sow(&planted, &mesh, &of_head)?,
+        ..default()
+    };
     Ok(Grown {
-        hair: Sown { strands: strands.collect::<Result<_, _>>()?, ..default() },
+        hair,
         roots: planted.roots,
         settings: Some(preset.settings()),
         fibres: HUMAN_DENSITY / planting.density,

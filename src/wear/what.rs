@@ -5,7 +5,7 @@ use super::error::WearError;
 use crate::save::Hairdo;
 use crate::{
     groom::{Groom, GroomGuides},
-    plant::{HairPreset, Scalp},
+    plant::{HairPreset, Hairline, Scalp},
 };
 use bevy::prelude::*;
 
@@ -68,6 +68,9 @@ pub struct WearHair {
     /// skeleton. Its front goes before [`facing`](Self::facing). Default `None`: found from the
     /// head's shape.
     pub scalp: Option<Scalp>,
+    /// How a preset's hair begins at the hairline. Default `None`: as
+    /// [`HairPreset::hairline`] says.
+    pub hairline: Option<Hairline>,
     /// Where a groom's origin is, and how it is turned and scaled, in this entity's space. Default
     /// the identity: it was made around the character as it stands there.
     pub place: Transform,
@@ -90,6 +93,7 @@ impl Default for WearHair {
             facing: Dir3::NEG_Z,
             seed: 0,
             scalp: None,
+            hairline: None,
             place: Transform::IDENTITY,
             colliders: true,
             #[cfg(feature = "save")]

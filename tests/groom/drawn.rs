@@ -31,6 +31,7 @@ fn followers_are_drawn_where_they_are_given_and_no_more_than_asked_for() {
         // Longer than the guide, which then is followed larger.
         length: 0.22,
         reach: Vec3::NEG_Y * 0.22,
+        ..default()
     };
     let followers = HairFollowers { stray: 0.0, clump: 0.0, ..HairFollowers::new(2) };
     let look = HairLook { width: 5e-3, taper: 1.0, ..default() };

@@ -1,0 +1,305 @@
+//! Drawn strands at full count, planted by the scalp's own mask: guides are far too few to show a
+//! hairline or a parting.
+
+use super::{
+    error::PlantError,
+    hairline::{BABY_WIDTH, Hairline},
+    map::RootPlace,
+    planting::Planted,
+    preset::HairPreset,
+    scalp::Scalp,
+    surface::Surface,
+};
+use crate::{
+    grid::KdTree,
+    render::{FollowerRoot, FollowerRoots},
+    setting::Ranged,
+};
+use bevy::prelude::*;
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+
+/// How far below the skin strands begin (m).
+const BELOW: f32 = 0.3e-3;
+/// Places that are looked at to find out how much of the mesh is scalp.
+const PROBES: usize = 40_000;
+/// The most places that are looked at.
+const MOST: f64 = 2e7;
+/// How far from a parting more strands are drawn (m), and what share of them elsewhere.
+const PARTED: f32 = 14e-3;
+const ELSEWHERE: f32 = 0.7;
+/// How many guides near a root are looked at.
+const NEAR: usize = 16;
+/// How far from its neighbours' way a baby hair lies (rad, about).
+const BABY_TURN: f32 = 0.5;
+
+impl HairPreset {
+    /// Where the drawn strands of a planted preset grow: as many as `count` by the scalp's own mask, few,
+    /// short and fine ones at the hairline, with the lengths of the guides around. Goes on the
+    /// [`Hair`](crate::Hair) entity with the preset's settings. `planted`, `mesh` and `scalp` are
+    /// those of [`plant`](Self::plant).
+    ///
+    /// ```
+    /// # use bevy_keratin::{prelude::*, plant::*}; use bevy::prelude::*;
+    /// # fn grow(mut commands: Commands) -> Result {
+    /// let (head, scalp) = (Sphere::new(0.1).mesh().build(), Scalp::default());
+    /// let preset = HairPreset::Long;
+    /// let planted = preset.plant(&head, &scalp)?;
+    /// let settings = preset.settings();
+    /// let count = settings.followers.count;
+    /// let roots = preset.follower_roots(&planted, &head, &scalp, &preset.hairline(), count, 0)?;
+    /// commands.spawn((Hair, settings, roots));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// When the mesh cannot be planted, or a value of `scalp` or `hairline` is out of its range.
+    pub fn follower_roots(
+        self,
+        planted: &Planted,
+        mesh: &Mesh,
+        scalp: &Scalp,
+        hairline: &Hairline,
+        count: u32,
+        seed: u64,
+    ) -> Result<FollowerRoots, PlantError> {
+        let (scalp, hairline) = (scalp.checked()?, hairline.checked()?);
+        let sowing = Sowing { preset: self, scalp, hairline, count, seed };
+        sowing.sow(planted, mesh, &|_| 1.0)
+    }
+}
+
+/// What is to be sown.
+pub(crate) struct Sowing {
+    pub(crate) preset: HairPreset,
+    pub(crate) scalp: Scalp,
+    pub(crate) hairline: Hairline,
+    pub(crate) count: u32,
+    pub(crate) seed: u64,
+}
+
+/// A strand that is simulated.
+struct Guide {
+    place: Vec3,
+    length: f32,
+    /// From root to tip.
+    reach: Vec3,
+    /// Which way it is combed.
+    comb: Vec3,
+}
+
+impl Sowing {
+    /// Followers between planted guides where `share` leaves them.
+    pub(crate) fn sow(
+        &self,
+        planted: &Planted,
+        mesh: &Mesh,
+        share: &dyn Fn(&RootPlace) -> f32,
+    ) -> Result<FollowerRoots, PlantError> {
+        let surface = Surface::of(mesh)?;
+        let guides = self.guides(planted);
+        let tree = KdTree::new(guides.iter().map(|guide| guide.place).zip(0u32..));
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x0f01_10e5);
+        let growth = |place: &RootPlace| {
+            let behind =
+                self.scalp.behind_hairline(place.position) + self.hairline.break_at(place.position);
+            let mut growth = self.hairline.growth(behind);
+            let share = share(place).clamp(0.0, 1.0) * self.beside_parting(place.position);
+            growth.density *= share;
+            growth.baby *= share;
+            growth
+        };
+        let probes = surface.draw(PROBES, &mut random).map(|root| {
+            let growth = growth(&root.place);
+            f64::from(growth.density + growth.baby)
+        });
+        let mean = probes.sum::<f64>() / PROBES as f64;
+        if mean <= 0.0 || guides.is_empty() {
+            return Ok(FollowerRoots::default());
+        }
+        // What is drawn beyond the count is left out at the end, evenly.
+        let drawn = (1.02 * f64::from(self.count) / mean).ceil().min(MOST);
+        let mut roots = Vec::with_capacity(self.count as usize + self.count as usize / 8);
+        let mut lots = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x4a1b_22c7);
+        for root in surface.draw(drawn as usize, &mut random) {
+            let [lot, long, fine, turn_x, turn_y, turn_z] = lots.random::<[f32; 6]>();
+            let growth = growth(&root.place);
+            if lot >= growth.density + growth.baby {
+                continue;
+            }
+            let Some((length, reach)) = self.around(&root.place, &guides, &tree) else { continue };
+            let place = root.place.position - root.place.normal * BELOW;
+            let is_baby = lot >= growth.density;
+            roots.push(if is_baby {
+                let turn = Vec3::new(turn_x, turn_y, turn_z) * 2.0 - 1.0;
+                let baby = self.hairline.baby_length * (0.2 + 0.8 * long * long);
+                let length = baby.min(length);
+                let way = reach.normalize_or_zero() + turn * BABY_TURN;
+                let width = BABY_WIDTH * (0.8 + 0.4 * fine);
+                FollowerRoot { place, length, reach: way.normalize_or_zero() * length, width }
+            } else {
+                let variation = self.length_variation();
+                let own = growth.length * (1.0 - variation * long);
+                let width = growth.width * (0.85 + 0.3 * fine);
+                FollowerRoot { place, length: length * own, reach: reach * own, width }
+            });
+        }
+        let count = roots.len().min(self.count as usize);
+        let kept = (0..count).map(|k| roots[k * roots.len() / count]).collect();
+        Ok(FollowerRoots(kept))
+    }
+
+    /// Beside a parting there is no hair from farther up to hide the scalp: more is drawn there.
+    fn beside_parting(&self, place: Vec3) -> f32 {
+        if !self.preset.is_parted() {
+            return 1.0;
+        }
+        let near = 1.0 - self.preset.aside(&self.scalp, place).abs() / PARTED;
+        ELSEWHERE + (1.0 - ELSEWHERE) * near.clamp(0.0, 1.0).sqrt()
+    }
+
+    fn length_variation(&self) -> f32 {
+        self.preset.settings().followers.length_variation
+    }
+
+    fn comb(&self, place: Vec3) -> Vec3 {
+        match self.preset.is_parted() {
+            true => self.preset.direction(&self.scalp, place).normalize_or_zero(),
+            false => Vec3::ZERO,
+        }
+    }
+
+    fn guides(&self, planted: &Planted) -> Vec<Guide> {
+        let guide = |points: &[Vec3]| {
+            let (first, last) = (points.first()?, points.last()?);
+            let length: f32 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+            (length > 0.0).then(|| Guide {
+                place: *first,
+                // The length map is taken anew at every root.
+                length: length / self.preset.length_share(&self.scalp, *first).max(1e-3),
+                reach: *last - *first,
+                comb: self.comb(*first),
+            })
+        };
+        planted.groom.strands().filter_map(|strand| guide(strand.points)).collect()
+    }
+
+    /// Length and reach of what grows at a place, by the guides around that are combed as it is.
+    fn around(&self, place: &RootPlace, guides: &[Guide], tree: &KdTree) -> Option<(f32, Vec3)> {
+        let comb = self.comb(place.position);
+        // Locks of guides may reach across a parting; what is drawn there does not.
+        let alike = |i: u32| {
+            let guide = &guides[i as usize];
+            comb == Vec3::ZERO || (guide.comb.dot(comb) > 0.2 && guide.reach.dot(comb) > 0.0)
+        };
+        let near: Vec<(u32, f32)> = tree.nearest::<NEAR>(place.position).collect();
+        let chosen: Vec<&(u32, f32)> = near.iter().filter(|(i, _)| alike(*i)).take(3).collect();
+        let chosen = if chosen.is_empty() { near.iter().take(1).collect() } else { chosen };
+        let (mut sum, mut length, mut reach) = (0.0, 0.0, Vec3::ZERO);
+        for (i, square) in chosen {
+            let (guide, weight) = (&guides[*i as usize], 1.0 / (square + 1e-6));
+            sum += weight;
+            length += weight * guide.length;
+            reach += weight * guide.reach;
+        }
+        let share = self.preset.length_share(&self.scalp, place.position);
+        let (length, reach) = (length / sum * share, reach / sum);
+        // Where no shape is meant, place alone decides.
+        let reach = if comb == Vec3::ZERO { Vec3::ZERO } else { reach };
+        (length.is_finite() && length > 0.0 && reach.is_finite()).then_some((length, reach))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sown(preset: HairPreset, count: u32) -> (Scalp, FollowerRoots) {
+        let mesh = Sphere::new(0.1).mesh().ico(24).unwrap();
+        let scalp = Scalp::default();
+        let planting = super::super::Planting { density: 0.2e4, ..preset.planting(&scalp) };
+        let planted = preset.plant_as(&planting, &mesh, &scalp).unwrap();
+        let line = preset.hairline();
+        (scalp, preset.follower_roots(&planted, &mesh, &scalp, &line, count, 3).unwrap())
+    }
+
+    #[test]
+    fn followers_fill_the_scalp_and_begin_under_the_skin() {
+        let (scalp, roots) = sown(HairPreset::Straight, 6000);
+        assert_eq!(roots.0.len(), 6000);
+        for root in &roots.0 {
+            let depth = 0.1 - root.place.length();
+            assert!((1e-4..1e-3).contains(&depth), "{depth}");
+            assert!(scalp.behind_hairline(root.place) > -0.012);
+            assert!(root.length > 1e-3 && root.length < 0.35 && root.width > 0.3);
+        }
+        assert_eq!(roots, sown(HairPreset::Straight, 6000).1);
+    }
+
+    #[test]
+    fn hair_falls_to_both_sides_of_a_parting() {
+        let (scalp, roots) = sown(HairPreset::Straight, 6000);
+        let [right, _, front] = scalp.axes();
+        let (mut wrong, mut all) = (0, 0);
+        for root in roots.0.iter().filter(|root| root.length > 0.1) {
+            let aside = root.place.dot(right);
+            if root.place.dot(front) < 0.0 || !(6e-3..0.02).contains(&aside.abs()) {
+                continue;
+            }
+            all += 1;
+            wrong += u32::from(root.reach.dot(right) * aside < 0.0);
+        }
+        println!("{wrong} of {all} go to the other side");
+        assert!(all > 50 && wrong * 8 < all, "{wrong} of {all}");
+    }
+
+    /// Density by distance behind the line must be a ramp and the line no line: T13.
+    #[test]
+    fn the_hairline_is_a_ramp_of_its_own_and_not_of_the_guides() {
+        let (scalp, roots) = sown(HairPreset::Straight, 40_000);
+        let [_, _, front] = scalp.axes();
+        // In front, where lines of equal distance are as long.
+        let ahead = |p: Vec3| p.normalize().dot(front) > 0.25 && p.x.abs() < 0.04;
+        let mut bins = [0u32; 8];
+        for root in roots.0.iter().filter(|r| r.length > 0.03 && ahead(r.place)) {
+            let behind = scalp.behind_hairline(root.place) / 4e-3;
+            if (0.0..8.0).contains(&behind) {
+                bins[behind as usize] += 1;
+            }
+        }
+        println!("roots by 4 mm behind the line: {bins:?}");
+        let full = bins[4..].iter().sum::<u32>() as f32 / 4.0;
+        assert!((bins[0] as f32) < 0.4 * full, "{bins:?}");
+        assert!((bins[3] as f32) > 0.7 * full, "{bins:?}");
+        assert!(bins[..4].is_sorted(), "{bins:?}");
+        // The foremost root of each column of 2 mm: no run of more than 8 mm in one line.
+        let mut foremost = [f32::MAX; 40];
+        for root in roots.0.iter().filter(|r| r.length > 0.03 && ahead(r.place)) {
+            let column = ((root.place.x + 0.04) / 2e-3).floor();
+            if (0.0..40.0).contains(&column) {
+                let least = &mut foremost[column as usize];
+                *least = least.min(scalp.behind_hairline(root.place));
+            }
+        }
+        let (mut run, mut longest) = (1, 1);
+        for pair in foremost.windows(2) {
+            run = if (pair[1] - pair[0]).abs() < 0.4e-3 { run + 1 } else { 1 };
+            longest = longest.max(run);
+        }
+        println!("longest straight run {} mm", 2 * longest);
+        assert!(longest <= 4, "{longest} columns of 2 mm: {foremost:?}");
+    }
+
+    #[test]
+    fn a_mesh_without_scalp_grows_nothing_and_bad_settings_are_told() {
+        let (head, scalp) = (Sphere::new(0.1).mesh().build(), Scalp::default());
+        let planted = HairPreset::Short.plant(&head, &scalp).unwrap();
+        let bald = Scalp { recede: 3.0, ..scalp };
+        let preset = HairPreset::Short;
+        let line = Hairline::default();
+        let none = preset.follower_roots(&planted, &head, &bald, &line, 100, 0).unwrap();
+        assert!(none.0.is_empty());
+        let wrong = Hairline { ragged: f32::NAN, ..line };
+        assert!(preset.follower_roots(&planted, &head, &scalp, &wrong, 100, 0).is_err());
+    }
+}

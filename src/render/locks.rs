@@ -1,0 +1,279 @@
+//! Locks: which strands draw together, in three sizes, each within the one before.
+
+use super::{
+    drawn_strand::{DrawnStrand, GuideRoot, ToMiddle, direction},
+    followers::HairFollowers,
+};
+use crate::grid::KdTree;
+use bevy::{platform::collections::HashMap, prelude::*};
+use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+
+/// Middles are at least this share of a spacing apart, which makes the mean about the spacing.
+const CLOSEST: f32 = 0.8;
+/// How much less than others a lock may draw together, a share.
+const LOOSER: f32 = 0.3;
+/// Of flyaways, the share that is broken off.
+const BROKEN: f32 = 0.2;
+/// Width of flyaways, a share.
+const FINE: f32 = 0.7;
+/// Share of strands that leap out of the step of their lock's curl.
+const LEAPS: f32 = 0.05;
+
+/// Gives every follower its locks, and what it shares with the others there; makes flyaways of some.
+pub(super) fn draw_together(
+    followers: &mut [DrawnStrand],
+    guides: &[GuideRoot],
+    settings: &HairFollowers,
+) {
+    let roots = Roots::of(followers, guides);
+    let levels = settings.lock_spacing.to_array().map(|spacing| roots.middles(spacing));
+    for i in 0..followers.len() {
+        let small = roots.nearest(&levels[2], i);
+        let middle = roots.nearest(&levels[1], small);
+        let large = roots.nearest(&levels[0], middle);
+        let mut locks = [ToMiddle::default(); 3];
+        for (lock, to) in locks.iter_mut().zip([large, middle, small]) {
+            *lock = roots.way(followers, guides, i, to);
+        }
+        let lot = |of: usize| lot(roots.seeds[of] ^ 0x51ed_270b);
+        let strand = &mut followers[i];
+        strand.locks = locks;
+        let shorter = 1.0 - settings.lock_length_variation * lot(large);
+        strand.length *= shorter;
+        strand.size *= shorter;
+        let own = &mut Xoshiro256PlusPlus::seed_from_u64(u64::from(strand.seed) << 8);
+        let leap = if own.random::<f32>() < LEAPS { own.random::<f32>() } else { 0.0 };
+        let phase = strand.phase + settings.lock_phase * (lot(middle) + leap);
+        strand.phase = phase.min(0.5 * strand.length.min(1.0));
+        // Hair arches outward from its root: that is the part of its first way across the whole.
+        let GuideRoot { normal, reach, .. } = guides[strand.guides[0] as usize];
+        let outward = normal.reject_from_normalized(reach.normalize_or_zero()).normalize_or_zero();
+        // Nothing strays into the skin.
+        strand.stray -= 2.0 * outward * strand.stray.dot(outward).min(0.0);
+        if own.random::<f32>() < settings.flyaways {
+            stand_off(strand, outward, settings.flyaway_reach, own);
+        }
+    }
+}
+
+/// Makes a flyaway of a strand.
+fn stand_off(strand: &mut DrawnStrand, outward: Vec3, most: f32, random: &mut Xoshiro256PlusPlus) {
+    strand.locks[1..].fill(ToMiddle::default());
+    strand.width *= FINE;
+    if random.random::<f32>() < BROKEN {
+        let left = 0.1 + 0.2 * random.random::<f32>();
+        strand.length *= left;
+        strand.size *= left;
+        strand.phase *= left;
+    }
+    // Aside by no more than what lengthens it little.
+    let far = (most * (0.2 + 0.8 * random.random::<f32>())).min(0.25 * strand.size);
+    strand.stray = (outward + 0.8 * direction(random)).normalize_or_zero() * far;
+}
+
+/// Where followers grow.
+struct Roots {
+    places: Vec<Vec3>,
+    /// Which way they leave the scalp: locks do not reach across a parting.
+    leave: Vec<Vec3>,
+    seeds: Vec<u32>,
+}
+
+impl Roots {
+    fn of(followers: &[DrawnStrand], guides: &[GuideRoot]) -> Self {
+        let place = |strand: &DrawnStrand| {
+            let near = strand.guides.iter().zip(strand.weights).filter(|(_, w)| *w > 0.0);
+            near.fold(strand.root, |sum, (g, w)| sum + guides[*g as usize].place * w)
+        };
+        let leave = |strand: &DrawnStrand| guides[strand.guides[0] as usize].normal;
+        Self {
+            places: followers.iter().map(place).collect(),
+            leave: followers.iter().map(leave).collect(),
+            seeds: followers.iter().map(|strand| strand.seed).collect(),
+        }
+    }
+
+    fn go_together(&self, a: usize, b: usize) -> bool {
+        self.leave[a].dot(self.leave[b]) > 0.0
+    }
+
+    /// The strands in the middle of locks: some that are about a spacing apart.
+    fn middles(&self, spacing: f32) -> KdTree {
+        let least = CLOSEST * spacing;
+        let mut cells = HashMap::<IVec3, Vec<usize>>::new();
+        let mut found = Vec::new();
+        for (i, place) in self.places.iter().enumerate().filter(|(_, place)| place.is_finite()) {
+            let cell = (place / least).floor().as_ivec3();
+            let around = (0..27).map(|k| cell + IVec3::new(k % 3, k / 3 % 3, k / 9) - 1);
+            let mut near = around.filter_map(|cell| cells.get(&cell)).flatten();
+            if near.any(|j| place.distance(self.places[*j]) < least && self.go_together(i, *j)) {
+                continue;
+            }
+            cells.entry(cell).or_default().push(i);
+            found.push((*place, i as u32));
+        }
+        KdTree::new(found)
+    }
+
+    /// The nearest middle; itself where there is none.
+    fn nearest(&self, middles: &KdTree, i: usize) -> usize {
+        let is_meant = |j: u32, _| self.go_together(i, j as usize);
+        let mut near = middles.nearest_of::<1, _>(self.places[i], is_meant);
+        near.next().map_or(i, |(j, _)| j as usize)
+    }
+
+    /// From strand `i` to the one in the middle.
+    fn way(
+        &self,
+        followers: &[DrawnStrand],
+        guides: &[GuideRoot],
+        i: usize,
+        to: usize,
+    ) -> ToMiddle {
+        if i == to {
+            return default();
+        }
+        let (own, middle) = (&followers[i], &followers[to]);
+        let strength = 1.0 - LOOSER * lot(self.seeds[to]);
+        let apart = self.places[to] - self.places[i];
+        let near = own.guides.iter().zip(own.weights).filter(|(_, w)| *w > 0.0);
+        let along = near.fold(Vec3::ZERO, |sum, (g, w)| sum + guides[*g as usize].reach * w);
+        let across = apart.reject_from_normalized(along.normalize_or_zero());
+        if !across.is_finite() {
+            return default();
+        }
+        // What the middle takes of guides that this strand does not have is left to its own.
+        let mut weights = own.guides.map(|guide| {
+            let shares = middle.guides.iter().zip(middle.weights);
+            shares.filter(|(g, _)| **g == guide).map(|(_, w)| w).sum::<f32>()
+        });
+        // Guides that are not used repeat the first.
+        for (weight, guide) in weights.iter_mut().zip(own.guides).skip(1) {
+            if guide == own.guides[0] {
+                *weight = 0.0;
+            }
+        }
+        let known: f32 = weights.iter().sum();
+        for (weight, own) in weights.iter_mut().zip(own.weights) {
+            *weight = strength * (*weight - known * own);
+        }
+        ToMiddle { root: across * strength, weights }
+    }
+}
+
+/// A number in 0…1 from a seed: the hash of `strands.wgsl`.
+pub(super) fn lot(seed: u32) -> f32 {
+    let state = seed.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (((word >> 22) ^ word) >> 8) as f32 / 16_777_216.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::curve::{Guide, strand_point};
+    use super::*;
+
+    /// Guides on a square field that all hang down, 2 cm apart, and followers at random between them.
+    fn field() -> (Vec<GuideRoot>, Vec<DrawnStrand>) {
+        let guide = |i: i32| GuideRoot {
+            place: Vec3::new((i % 6) as f32, 0.0, (i / 6) as f32) * 0.02,
+            normal: Vec3::X,
+            length: 0.2,
+            reach: Vec3::new(0.05, -0.19, 0.0),
+        };
+        let guides: Vec<_> = (0..36).map(guide).collect();
+        let settings = HairFollowers {
+            flyaways: 0.0,
+            stray: 0.0,
+            clump: 0.0,
+            length_variation: 0.0,
+            lock_length_variation: 0.0,
+            phase_variation: 0.0,
+            ..HairFollowers::new(3000)
+        };
+        let drawn = super::super::scatter::scatter(&guides, None, &settings);
+        (guides, drawn[36..].to_vec())
+    }
+
+    #[test]
+    fn the_hash_is_within_bounds_and_even() {
+        let mean = (0..1000).map(lot).sum::<f32>() / 1000.0;
+        assert!((0..1000).map(lot).all(|x| (0.0..1.0).contains(&x)));
+        assert!((mean - 0.5).abs() < 0.05, "{mean}");
+    }
+
+    /// Mean distance of each tip to the nearest others, drawn with these strengths.
+    fn crowding(guides: &[GuideRoot], drawn: &[DrawnStrand], locks: Vec3) -> f32 {
+        let nodes: Vec<[Vec3; 2]> = guides.iter().map(|g| [g.place, g.place + g.reach]).collect();
+        let settings = HairFollowers { clump: 0.0, frizz: 0.0, locks, ..default() };
+        let of = |i: u32| Guide { nodes: &nodes[i as usize], ..default() };
+        let tip = |strand: &DrawnStrand| strand_point(strand, of, 1.0, &settings).position;
+        let tips: Vec<Vec3> = drawn.iter().map(tip).collect();
+        let tree = KdTree::new(tips.iter().copied().zip(0u32..));
+        let near = |p: &Vec3| tree.nearest::<8>(*p).map(|(_, square)| square.sqrt()).sum::<f32>();
+        tips.iter().map(near).sum::<f32>() / tips.len() as f32 / 7.0
+    }
+
+    #[test]
+    fn every_level_draws_tips_together_more() {
+        let (guides, drawn) = field();
+        let open = crowding(&guides, &drawn, Vec3::ZERO);
+        let mut before = open;
+        for locks in [Vec3::new(0.0, 0.0, 0.6), Vec3::new(0.0, 0.6, 0.6), Vec3::splat(0.6)] {
+            let now = crowding(&guides, &drawn, locks);
+            println!("{locks}: {now} m for {open} m");
+            assert!(now < 0.9 * before, "{now} after {before}");
+            before = now;
+        }
+    }
+
+    #[test]
+    fn locks_keep_the_length_of_strands() {
+        let (guides, drawn) = field();
+        let nodes: Vec<[Vec3; 2]> = guides.iter().map(|g| [g.place, g.place + g.reach]).collect();
+        let of = |i: u32| Guide { nodes: &nodes[i as usize], ..default() };
+        let settings = HairFollowers { clump: 0.0, locks: Vec3::splat(0.6), ..default() };
+        let mut worst = 0.0f32;
+        for strand in &drawn {
+            let at = |k: u32| strand_point(strand, of, k as f32 / 24.0, &settings).position;
+            let length: f32 = (0..24).map(|k| at(k).distance(at(k + 1))).sum();
+            worst = worst.max((length / (strand.size * (1.0 - strand.phase)) - 1.0).abs());
+        }
+        println!("largest change of length {worst}");
+        assert!(worst < 0.05, "{worst}");
+    }
+
+    #[test]
+    fn locks_do_not_reach_across_a_parting() {
+        let side = |x: f32| GuideRoot {
+            place: Vec3::X * 0.005 * x,
+            normal: Vec3::X * x,
+            length: 0.2,
+            reach: Vec3::new(0.1 * x, -0.1, 0.0),
+        };
+        let guides = [side(-1.0), side(1.0)];
+        let strand = |i: u32| DrawnStrand {
+            guides: [i % 2; 3],
+            weights: [1.0, 0.0, 0.0],
+            length: 1.0,
+            seed: i,
+            ..default()
+        };
+        let mut drawn: Vec<_> = (0..40).map(strand).collect();
+        draw_together(&mut drawn, &guides, &HairFollowers::default());
+        for strand in &drawn {
+            assert!(strand.locks.iter().all(|lock| lock.root == Vec3::ZERO), "{strand:?}");
+        }
+    }
+
+    #[test]
+    fn broken_strands_do_not_disturb() {
+        let nan = GuideRoot { place: Vec3::NAN, normal: Vec3::NAN, ..default() };
+        let strand = DrawnStrand { weights: [1.0, 0.0, 0.0], length: 1.0, ..default() };
+        let mut drawn = [strand; 4];
+        let all = HairFollowers { flyaways: 1.0, ..default() };
+        draw_together(&mut drawn, &[nan], &all);
+        assert!(drawn.iter().all(|strand| strand.stray.is_finite()), "{drawn:?}");
+        draw_together(&mut [], &[], &all);
+    }
+}
