@@ -64,7 +64,9 @@ pub use strand::{
 };
 pub use style::{HairCondition, HairStyle, KeptStyle, StyleFaded};
 pub use treatment::{PermRod, Treat, Winding, WoundOn, WoundStrands};
-pub use water::{Droplet, DropletRules, HairDried, Moisture, Shower, SoakHair, WaterLedger, Wetting};
+pub use water::{
+    Droplet, DropletRules, HairDried, Moisture, Shower, SoakHair, WaterLedger, Wetting,
+};
 #[cfg(feature = "groom")]
 pub use wear::{HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair};
 
@@ -88,10 +90,11 @@ pub mod prelude {
     #[doc(hidden)]
     pub use crate::{
         AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
-        HairBudget, HairCollider, HairCondition, HairDefault, HairDried, HairFault, HairGravity, HairInertia, HairLod,
-        HairPlugins, HairSleep, HairSolver, HairStyle, HairSubsteps, KeptStyle, StyleFaded, HairSystems, HairTick, HeldNodes,
-        LockContact, Moisture, PermRod, ProcessTime, ScreenShare, Shower, SoakHair, SolverMethod,
-        Stiffness, Strand, StrandModel, StrandOf, StrandSleep, Strands, StretchProjection, Sweeps,
-        Treat, WaterLedger, Wetting, Wind, WindZone, Winding, WoundOn,
+        HairBudget, HairCollider, HairCondition, HairDefault, HairDried, HairFault, HairGravity,
+        HairInertia, HairLod, HairPlugins, HairSleep, HairSolver, HairStyle, HairSubsteps,
+        HairSystems, HairTick, HeldNodes, KeptStyle, LockContact, Moisture, PermRod, ProcessTime,
+        ScreenShare, Shower, SoakHair, SolverMethod, Stiffness, Strand, StrandModel, StrandOf,
+        StrandSleep, Strands, StretchProjection, StyleFaded, Sweeps, Treat, WaterLedger, Wetting,
+        Wind, WindZone, Winding, WoundOn,
     };
 }

@@ -585,6 +585,40 @@ fn soaked_hair_is_darker_and_droplets_are_seen() {
     assert_eq!(scene.draw().covered(BLACK), 0, "no water, no beads");
 }
 
+/// A second view of another format beside it, and one that has no pixels.
+#[test]
+fn views_do_not_disturb_each_other_nor_does_a_minimised_window() {
+    use bevy::{
+        camera::{Hdr, RenderTarget},
+        render::render_resource::TextureFormat,
+        window::{WindowRef, WindowResolution},
+    };
+    let Some(mut scene) = Offscreen::new(80, 80) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
+    sun(&mut scene, Vec3::new(1.0, 2.0, 2.0), true);
+    let parts = (wide(2e-3), HairFollowers::new(60), HairLod::default());
+    let hair = hair(&mut scene, &curtain(12, 0.2), parts);
+    let alone = scene.draw();
+    assert!(alone.covered(BLACK) > 500);
+    let world = scene.app.world_mut();
+    let image = Image::new_target_texture(40, 30, TextureFormat::Rgba16Float, None);
+    let image = world.resource_mut::<Assets<Image>>().add(image);
+    let close = Transform::from_xyz(0.1, 0.0, 0.2).looking_at(Vec3::ZERO, Vec3::Y);
+    let after = |order| Camera { order, ..default() };
+    let target = RenderTarget::Image(image.into());
+    world.spawn((Camera3d::default(), after(1), target, Hdr, Msaa::Off, close));
+    let size = WindowResolution::new(0, 0);
+    let window = world.spawn(Window { resolution: size, ..default() }).id();
+    let target = RenderTarget::Window(WindowRef::Entity(window));
+    world.spawn((Camera3d::default(), after(2), target, close));
+    assert!(scene.draw() == alone, "the first view is as it was");
+    let share = scene.app.world().get::<ScreenShare>(hair).unwrap().0;
+    assert!(share.is_finite() && share > 0.1, "{share}");
+    assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
+}
+
 /// Bevy quits when the device is lost, unless the app says how to go on.
 #[test]
 fn hair_and_water_outlive_a_lost_device() {

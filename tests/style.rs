@@ -130,3 +130,113 @@ fn a_rod_that_moves_takes_the_hair_along() {
     let turned = strand(&app, e).positions()[10] - before - Vec3::Y * 0.015;
     assert!((turned.length() - 0.003).abs() < 2e-4, "turned {turned}");
 }
+
+/// How often each event came.
+#[derive(Resource, Default)]
+struct Told {
+    faded: Vec<f32>,
+    dried: u32,
+}
+
+fn watched(app: &mut App, hair: Entity) {
+    app.init_resource::<Told>();
+    app.world_mut()
+        .entity_mut(hair)
+        .observe(|faded: On<StyleFaded>, mut told: ResMut<Told>| told.faded.push(faded.kept))
+        .observe(|_: On<HairDried>, mut told: ResMut<Told>| told.dried += 1);
+}
+
+fn kept(app: &mut App, hair: Entity) -> Option<f32> {
+    app.world().get::<KeptStyle>(hair).and_then(KeptStyle::share)
+}
+
+/// Bent by gravity while wet and dried so: washing takes that style away.
+#[test]
+fn a_style_is_kept_until_it_is_washed_out_and_that_is_told_once() {
+    let mut app = test_app(60.0);
+    let (hair, e) = one_strand(&mut app, 0.12, 8, Vec3::X);
+    watched(&mut app, hair);
+    app.world_mut().entity_mut(hair).insert(HairStyle::default());
+    run(&mut app, 0.2);
+    assert_eq!(kept(&mut app, hair), None, "hair as it grew has no style");
+    app.world_mut().write_message(Treat::wet(hair));
+    run(&mut app, 1.0);
+    app.world_mut().write_message(Treat::dry(hair));
+    run(&mut app, 0.2);
+    app.world_mut().entity_mut(hair).insert(HairStyle { fades_below: 0.4 });
+    run(&mut app, 0.5);
+    let share = kept(&mut app, hair).expect("gravity has bent it");
+    assert!((share - 1.0).abs() < 0.05, "{share}");
+    assert!(app.world().resource::<Told>().faded.is_empty());
+    // Half of the hydrogen bonds hold half of it, and remember none of the shape that it takes meanwhile.
+    app.world_mut().write_message(Treat::set(hair, BondKind::Hydrogen, 0.5).unwrap());
+    run(&mut app, 0.1);
+    let half = kept(&mut app, hair).unwrap();
+    assert!((0.45..0.8).contains(&half), "{half}");
+    app.world_mut().write_message(Treat::wet(e));
+    run(&mut app, 0.5);
+    assert!(kept(&mut app, hair).unwrap().abs() < 0.05);
+    let told = app.world().resource::<Told>();
+    assert!(told.faded.len() == 1 && told.faded[0] < 0.4, "{:?}", told.faded);
+}
+
+#[test]
+fn a_perm_is_set_by_one_call() {
+    let mut app = test_app(60.0);
+    no_gravity(&mut app);
+    let (hair, e) = one_strand(&mut app, 0.12, 8, Vec3::X);
+    run(&mut app, 0.1);
+    app.world_mut().write_message_batch(Treat::perm_set(hair, 0.5));
+    let rates = |app: &App| app.world().get::<Bonds>(e).unwrap().joints[4].rates;
+    run(&mut app, 0.48);
+    assert!(rates(&app)[0] < 0.05 && rates(&app)[1] < 0.05, "lotion: {:?}", rates(&app));
+    run(&mut app, 0.5);
+    assert!(rates(&app)[0] < 0.05 && rates(&app)[1] > 0.9, "neutraliser: {:?}", rates(&app));
+    run(&mut app, 0.6);
+    assert!(rates(&app).iter().all(|rate| *rate > 0.99), "dry: {:?}", rates(&app));
+    assert!(app.world().get::<bevy_keratin::treatment::Treatments>(e).unwrap().acting().is_empty());
+}
+
+#[test]
+fn wet_hair_tells_when_it_is_dry() {
+    let mut app = test_app(60.0);
+    let (hair, _) = one_strand(&mut app, 0.12, 8, Vec3::NEG_Y);
+    watched(&mut app, hair);
+    app.insert_resource(ProcessTime(1000.0));
+    let wetness = |app: &mut App| {
+        app.world_mut()
+            .run_system_cached_with(
+                |In(hair): In<Entity>, c: HairCondition| (c.wetness(hair), c.water(hair)),
+                hair,
+            )
+            .unwrap()
+    };
+    run(&mut app, 0.1);
+    assert_eq!(wetness(&mut app), (0.0, 0.0));
+    app.world_mut().write_message(SoakHair { target: hair, wetness: 1.0 });
+    run(&mut app, 0.05);
+    let (wet, water) = wetness(&mut app);
+    assert!(wet > 0.9 && water > 0.0, "{wet}, {water} kg");
+    assert_eq!(app.world().resource::<Told>().dried, 0);
+    for _ in 0..200 {
+        run(&mut app, 1.0);
+        if app.world().resource::<Told>().dried > 0 {
+            break;
+        }
+    }
+    let left = wetness(&mut app);
+    assert_eq!(app.world().resource::<Told>().dried, 1, "{left:?}");
+    run(&mut app, 1.0);
+    assert_eq!(app.world().resource::<Told>().dried, 1, "told once");
+}
+
+#[test]
+fn tools_are_aimed_by_one_call() {
+    let (_, dryer) = Blower::blow_dry(Vec3::new(0.3, 1.7, 0.0), Vec3::new(0.0, 1.7, 0.0));
+    assert!(dryer.forward().distance(Vec3::NEG_X) < 1e-6);
+    let (_, above) = Blower::blow_dry(Vec3::Y, Vec3::ZERO);
+    assert!(above.forward().distance(Vec3::NEG_Y) < 1e-6);
+    let (rain, cloud) = Shower::rain_on(Vec3::new(0.0, 1.6, 0.5));
+    assert!(cloud.forward().distance(Vec3::NEG_Y) < 1e-6 && rain.rate > 0.0);
+    assert!(cloud.translation.distance(Vec3::new(0.0, 2.6, 0.5)) < 1e-6);
+}

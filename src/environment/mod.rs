@@ -94,7 +94,8 @@ impl Blower {
     /// # }
     /// ```
     pub fn blow_dry(from: Vec3, at: Vec3) -> (Self, Transform) {
-        let up = if (at - from).cross(Vec3::Y).length_squared() > 1e-12 { Vec3::Y } else { Vec3::X };
+        let up =
+            if (at - from).cross(Vec3::Y).length_squared() > 1e-12 { Vec3::Y } else { Vec3::X };
         (Self::default(), Transform::from_translation(from).looking_at(at, up))
     }
 

@@ -103,7 +103,7 @@ fn part_rows(rows: usize, each: Nanos) -> usize {
     let worth = TASK.0.div_ceil(each.0.max(1));
     let most = rows.div_ceil(MOST_PARTS).max(worth).min(MOST_ROWS);
     let parts = (rows / most).max(rows.div_ceil(MOST_ROWS)).max(1);
-    rows.div_ceil(parts).next_multiple_of(GRAIN)
+    rows.div_ceil(parts).next_multiple_of(GRAIN).max(GRAIN)
 }
 
 fn for_each_init<T: Send, S>(

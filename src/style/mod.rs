@@ -27,10 +27,9 @@ pub struct StylePlugin;
 impl Plugin for StylePlugin {
     fn build(&self, app: &mut App) {
         setting::component::<HairStyle>(app);
-        app.register_type::<KeptStyle>().register_type::<StyleFaded>().add_systems(
-            HairTick,
-            measure_styles.in_set(HairSystems::Styles).run_if(last_substep),
-        );
+        app.register_type::<KeptStyle>()
+            .register_type::<StyleFaded>()
+            .add_systems(HairTick, measure_styles.in_set(HairSystems::Styles).run_if(last_substep));
     }
 }
 
@@ -160,7 +159,8 @@ impl HairCondition<'_, '_> {
     /// The water on and in a hair, beyond what it holds in a room (kg).
     pub fn water(&self, hair: Entity) -> f64 {
         let Ok(members) = self.hairs.get(hair) else { return 0.0 };
-        let of = |moisture: &Moisture| -> f64 { moisture.film().iter().chain(moisture.bound()).sum() };
+        let of =
+            |moisture: &Moisture| -> f64 { moisture.film().iter().chain(moisture.bound()).sum() };
         members.iter().filter_map(|id| self.moistures.get(id).ok()).map(of).sum::<f64>() * WATER
     }
 
