@@ -598,7 +598,8 @@ fn views_do_not_disturb_each_other_nor_does_a_minimised_window() {
     };
     scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
     sun(&mut scene, Vec3::new(1.0, 2.0, 2.0), true);
-    let parts = (wide(2e-3), HairFollowers::new(60), HairLod::default());
+    let view = HairView::Bond(BondKind::Hydrogen);
+    let parts = (wide(2e-3), HairFollowers::new(60), HairLod::default(), view);
     let hair = hair(&mut scene, &curtain(12, 0.2), parts);
     let alone = scene.draw();
     assert!(alone.covered(BLACK) > 500);

@@ -155,9 +155,9 @@ fn a_preset_waits_for_the_character_and_is_planted_on_its_head() {
     let is = world.get::<WornHair>(hair).unwrap();
     assert_eq!((is.wearer, is.preset()), (root, Some(HairPreset::Short)));
     assert_eq!(world.get::<Stiffness>(hair), Some(&HairPreset::Short.settings().stiffness));
-    // 223 fibres for each cm², one guide.
+    // 223 fibres for each cm², 0.8 guides.
     let fibres = world.get::<Wetting>(hair).unwrap().fibres;
-    assert!((fibres - 223.0).abs() < 1.5, "{fibres} fibres");
+    assert!((fibres - 223.0 / 0.8).abs() < 1.5, "{fibres} fibres");
     let to_root = place_in(&app, hair, root);
     let all = strands(&mut app, hair);
     assert!(all.len() > 200, "{} strands", all.len());

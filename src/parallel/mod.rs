@@ -18,6 +18,11 @@ use {bevy::tasks::ComputeTaskPool, queue::Queue};
 /// The least work of a task, on one thread: to wake a thread for less takes longer than to do it.
 pub(crate) const TASK: Nanos = Nanos(50_000);
 
+/// How many tasks of that size have to be there before threads are woken: to wake one and to be woken by
+/// it at the end takes about two of them.
+#[cfg(feature = "parallel")]
+const WORTH_WAKING: usize = 4;
+
 /// About how long one item takes (ns). Decides whether threads are asked for help, never what comes out.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "parallel"), allow(dead_code, reason = "there is one thread"))]
@@ -118,7 +123,7 @@ fn for_each_init<T: Send, S>(
     if let Some(pool) = ComputeTaskPool::try_get() {
         let workers = pool.thread_num() + 1;
         let least = TASK.0.div_ceil(each.0.max(1));
-        if workers > 1 && items.len() >= 2 * least {
+        if workers > 1 && items.len() >= WORTH_WAKING * least {
             // More than threads, because some are longer than others.
             let chunk = items.len().div_ceil(workers * 8).max(least);
             let chunks = items.len().div_ceil(chunk);

@@ -94,7 +94,7 @@ impl HairPreset {
     /// # use bevy_keratin::plant::*; use bevy::prelude::*;
     /// # let (head, scalp) = (Sphere::new(0.1).mesh().build(), Scalp::default());
     /// let bob = HairPreset::Bob;
-    /// let fewer = Planting { density: 0.2e4, ..bob.planting(&scalp) };
+    /// let fewer = Planting { density: 0.15e4, ..bob.planting(&scalp) };
     /// let planted = bob.plant_as(&fewer, &head, &scalp).unwrap();
     /// let all = bob.plant(&head, &scalp).unwrap();
     /// assert!(2 * planted.groom.len() < all.groom.len());

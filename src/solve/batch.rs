@@ -18,7 +18,7 @@ use crate::{
 use bevy::prelude::*;
 
 /// About what a node takes (ns).
-const NODE: usize = 100;
+const NODE: usize = 60;
 
 /// One block of strands of equal node count through one substep.
 fn solve<T: Batched>(lanes: &mut T::Lanes, items: &mut [T], params: &T::Params) -> Vec<HairFault> {
