@@ -74,7 +74,7 @@ fn a_budget_makes_the_least_important_hair_coarser_and_nobody_flickers() {
     let estimate = *app.world().resource::<HairEstimate>();
     assert!(estimate.wanted > 0.5 && estimate.present == estimate.wanted, "{estimate:?}");
 
-    let budget = HairBudget { milliseconds: 0.8 * estimate.wanted, ..default() };
+    let budget = HairBudget { milliseconds: 0.85 * estimate.wanted, ..default() };
     app.insert_resource(budget);
     app.update();
     let saving = levels(&app);
