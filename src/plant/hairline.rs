@@ -1,5 +1,7 @@
 //! The hairline: how hair begins.
 
+#![cfg_attr(not(feature = "render"), allow(dead_code, reason = "what is drawn asks for it"))]
+
 use super::scalp::Scalp;
 use crate::setting::setting;
 use bevy::{math::ops::sin, prelude::*};
