@@ -1,13 +1,12 @@
 //! Work that several threads take from, piece by piece.
 
+use bevy::platform::time::Instant;
 use core::{
     hint::spin_loop,
     sync::atomic::{AtomicUsize, Ordering},
+    time::Duration,
 };
-use std::{
-    sync::{Mutex, PoisonError},
-    time::{Duration, Instant},
-};
+use std::sync::{Mutex, PoisonError};
 
 /// How long the caller looks whether others have finished before it sleeps until they have. To fall
 /// asleep and be woken takes tens of microseconds, as long as a piece of work.

@@ -35,7 +35,7 @@ impl Plugin for StylePlugin {
 
 setting! {
     /// The shape in which a hair's bonds hold it now is its style, to be watched. Component of a
-    /// [`Hair`]; insert it again when the hair has been styled anew. Costs about 15 ns a joint and tick.
+    /// [`Hair`]; insert it again when the hair has been styled anew. It looks at each joint once a tick.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
