@@ -33,7 +33,7 @@
 //! sags by half in coarse segments.
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{Cuticle, prelude::*};
+use bevy_keratin::{Cuticle, SolverMethod, StretchProjection, Sweeps, prelude::*};
 use core::f32::consts::TAU;
 use std::time::{Duration, Instant};
 
@@ -127,7 +127,7 @@ fn cost(mut app: App) -> f64 {
 /// The settled sag of a cantilever over beam theory's.
 fn sag(mut app: App, segments: usize) -> f32 {
     app.insert_resource(HairDefault(AirDrag { rate: 8.0 })).insert_resource(HairDefault(
-        Stiffness::from_bending_length(BENDING_LENGTH).expect("a length"),
+        HairStiffness::from_bending_length(BENDING_LENGTH).expect("a length"),
     ));
     let hair = app.world_mut().spawn(Hair).id();
     let strand = app.world_mut().spawn((StrandOf(hair), line(Vec3::X, LENGTH, segments))).id();

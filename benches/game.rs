@@ -19,7 +19,7 @@ mod scenes {
 
 use bevy::prelude::*;
 use bevy_keratin::{
-    ScreenShare,
+    HairScreenShare,
     plant::{HairPreset, Scalp},
     prelude::*,
 };
@@ -88,8 +88,10 @@ fn preset_rows(name: &str, preset: HairPreset, threads: usize) {
 
 /// Two near characters, twenty in the background beside them, then a hundred far off as well.
 fn crowd_rows(threads: usize) {
-    let presets = HairPreset::ALL;
-    let planted: Vec<_> = presets.map(plant).into();
+    // Heads of hair, no fur.
+    let presets = HairPreset::ALL.into_iter().filter(|preset| *preset != HairPreset::Fur);
+    let presets: Vec<_> = presets.collect();
+    let planted: Vec<_> = presets.iter().copied().map(plant).collect();
     let mut app = app(threads);
     let mut place = 0;
     let mut add = |app: &mut App, count: usize, share: f32| {
@@ -99,7 +101,7 @@ fn crowd_rows(threads: usize) {
             let hair = person(app, presets[which], &planted[which], at);
             app.world_mut().entity_mut(hair).insert((
                 HairLod::default(),
-                ScreenShare(share),
+                HairScreenShare(share),
                 Walks { phase: place as f32 },
             ));
             place += 1;

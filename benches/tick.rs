@@ -22,13 +22,13 @@ mod table;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
-    WindReceived,
+    StretchProjection, Sweeps, WindReceived,
     lanes::{LANES, put4},
     prelude::*,
     rod::{
         block::BlockLanes,
         direct::{self, DirectParams},
-        step::{StepParams, step},
+        step::{SweepParams, step},
     },
 };
 use divan::{Bencher, counter::ItemsCount};
@@ -80,13 +80,13 @@ fn block(nodes: usize) -> BlockLanes {
 }
 
 fn substep(bencher: Bencher<'_, '_>, nodes: usize, iterations: u32, limiter_steps: u32) {
-    let params = StepParams {
+    let params = SweepParams {
         dt: 1.0 / 360.0,
         iterations,
         projection: StretchProjection::Split,
         limiter_steps,
         internal_damping: 0.0,
-        skin: 0.0,
+        clearance: 0.0,
     };
     let level = Level::new();
     let mut block = block(nodes);
@@ -120,9 +120,9 @@ fn direct_step(bencher: Bencher<'_, '_>, nodes: usize) {
     let params = DirectParams {
         dt: 1.0 / 360.0,
         gravity: Vec3::NEG_Y * 9.8,
-        damping: Stiffness::default().damping,
+        damping: HairStiffness::default().damping,
         limiter_steps: 6,
-        skin: 0.0,
+        clearance: 0.0,
     };
     let level = Level::new();
     let mut block = block(nodes);

@@ -11,7 +11,7 @@ mod scenes;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
-    grid::{BallGrid, Found},
+    grid::{BallGrid, FoundBalls},
     prelude::*,
 };
 use fearless_simd::Level;
@@ -84,7 +84,7 @@ fn wet(variant: &str, count: usize, uptake: f32) -> App {
         .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
         // After the scene has set its own.
-        .add_systems(PostStartup, move |mut wetting: ResMut<HairDefault<Wetting>>| {
+        .add_systems(PostStartup, move |mut wetting: ResMut<HairDefault<HairWetting>>| {
             wetting.uptake = uptake;
         });
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
@@ -107,9 +107,9 @@ fn query(count: usize) -> f64 {
         .map(|_| Vec3::from_array([side, LONG, side].map(|side| random.random_range(0.0..side))))
         .collect();
     // Four by four strands, level by level.
-    let tufts = rows as usize / 4;
-    let nodes: Vec<[Vec3; 16]> = (0..tufts * tufts)
-        .flat_map(|tuft| (0..6).map(move |level| (tuft / tufts, level, tuft % tufts)))
+    let locks = rows as usize / 4;
+    let nodes: Vec<[Vec3; 16]> = (0..locks * locks)
+        .flat_map(|lock| (0..6).map(move |level| (lock / locks, level, lock % locks)))
         .map(|(x, level, z)| {
             core::array::from_fn(|k| {
                 let [x, z] = [4 * x + k % 4, 4 * z + k / 4].map(|i| 0.0025 * i as f32);
@@ -119,7 +119,7 @@ fn query(count: usize) -> f64 {
         .collect();
     let mut grid = BallGrid::default();
     grid.build(drops.iter().map(|drop| (*drop, REACH)));
-    let (level, mut found) = (Level::new(), Found::default());
+    let (level, mut found) = (Level::new(), FoundBalls::default());
     let mut best = f64::INFINITY;
     for _ in 0..5 {
         let start = Instant::now();

@@ -1,11 +1,14 @@
-//! Faults: what went wrong and was contained, told once, as messages and in the log.
+//! Faults: errors that were contained, reported once, as messages and in the log.
 
-use bevy::prelude::*;
+use bevy::{
+    ecs::schedule::{ScheduleLabel, SingleThreadedExecutor},
+    prelude::*,
+};
 use core::{error::Error, fmt};
 use std::sync::Arc;
 
-/// Something that was wrong and has been contained. Written once per occurrence, so that game code
-/// can react; also logged as a warning.
+/// An error that was contained. Written once per occurrence, so that game code can react; also logged
+/// as a warning.
 ///
 /// ```
 /// # use bevy_keratin::{prelude::*, FaultKind, InvalidValue}; use bevy::prelude::*;
@@ -21,9 +24,9 @@ use std::sync::Arc;
 pub struct HairFault {
     /// The hair, strand, collider, blower or rod concerned; `None` for resources.
     pub entity: Option<Entity>,
-    /// What kind of fault it is, for code to tell them apart.
+    /// What kind of fault it is, for code to match on.
     pub kind: FaultKind,
-    /// What was wrong, what was expected, how to mend it and what happens meanwhile.
+    /// What was wrong, what was expected, how to fix it and what happens meanwhile.
     pub message: String,
     #[reflect(ignore)]
     source: Source,
@@ -42,7 +45,8 @@ pub enum FaultKind {
     Setting,
     /// A strand left the finite numbers and was put back to the state of the substep before.
     PutBack,
-    /// A strand's stored state was not finite: its pose was rebuilt from root, lengths and bonds.
+    /// A strand's stored state was not finite, was torn, or no step led on from it: its pose was rebuilt
+    /// from root, lengths and bonds.
     Rebuilt,
     /// A strand points to a hair that does not exist or carries no `Hair`: it is left out.
     NoHair,
@@ -50,7 +54,7 @@ pub enum FaultKind {
     Strand,
     /// A transform that cannot be inverted, or is not finite: the last valid one is used.
     Transform,
-    /// A physics collider that hair does not know: hair goes through it.
+    /// A physics collider of a shape that is not supported: hair passes through it.
     Collider,
     /// Roots that cannot be tied to their mesh: the strands stay as they are.
     Roots,
@@ -60,6 +64,8 @@ pub enum FaultKind {
     Hairdo,
     /// Hair that cannot be worn: the wearer stays as it is.
     Wear,
+    /// A component that another needs was removed: its default is put back.
+    Component,
     /// A request that names something that is not there.
     NoTarget,
 }
@@ -80,13 +86,13 @@ impl HairFault {
         Self { source: Source(Some(Arc::new(source))), ..Self::new(kind, message) }
     }
 
-    /// The same fault of this entity.
+    /// The same fault with this entity.
     pub fn of(mut self, entity: Entity) -> Self {
         self.entity = Some(entity);
         self
     }
 
-    /// The error behind it, where there is one and it is an `E`.
+    /// The source error, if there is one and it is an `E`.
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
         self.source.0.as_deref()?.downcast_ref()
     }
@@ -113,10 +119,19 @@ impl Error for HairFault {
     }
 }
 
+/// Checks of what user code has written, once a frame in [`PreUpdate`]. One thread runs them: there are
+/// dozens, and each is done before another thread would have woken.
+#[derive(ScheduleLabel, Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct HairChecks;
+
 pub(crate) fn plugin(app: &mut App) {
     app.add_message::<HairFault>()
         .register_type::<HairFault>()
         .register_type::<FaultKind>()
+        .edit_schedule(HairChecks, |schedule| {
+            schedule.set_executor(SingleThreadedExecutor::new());
+        })
+        .add_systems(PreUpdate, |world: &mut World| world.run_schedule(HairChecks))
         .add_systems(Last, log_faults);
 }
 

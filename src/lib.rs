@@ -12,12 +12,16 @@ pub mod collider_fit;
 pub mod contact;
 pub mod environment;
 pub mod fault;
+#[cfg(feature = "gpu")]
+#[doc(hidden)]
+pub mod gpu;
 pub mod grid;
 #[cfg(feature = "groom")]
 pub mod groom;
 #[doc(hidden)]
 pub mod lanes;
 pub mod lod;
+pub mod look;
 pub mod mass_spring;
 mod parallel;
 #[cfg(feature = "groom")]
@@ -30,6 +34,7 @@ pub mod rod;
 pub mod save;
 pub mod schedule;
 pub mod setting;
+pub mod settle;
 pub mod sleep;
 pub mod solve;
 pub mod strand;
@@ -42,35 +47,40 @@ pub mod wear;
 pub use bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
 #[cfg(feature = "avian")]
 pub use contact::{AvianHairCollider, AvianShapeError};
-pub use contact::{ColliderShape, HairCollider, LockContact};
+pub use contact::{BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, LockContact};
 pub use environment::{
-    AirDrag, Blower, Climate, HairGravity, Wind, WindReceived, WindZone, ZoneShape,
+    AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindZone, ZoneShape,
 };
 pub use fault::{FaultKind, HairFault};
 #[cfg(feature = "groom")]
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
-pub use lod::{HairBudget, HairEstimate, HairLod, LodLevel, PresentLod, ScreenShare};
+pub use lod::{HairBudget, HairEstimate, HairLod, HairScreenShare, LodLevel, PresentLod};
+pub use look::{DyeLayer, HairColor, HairDye, HairLook, HairShading, Melanin, Streaks, WornPreset};
 pub use mass_spring::Springs;
 pub use plugins::{HairPlugins, run_ticks};
-pub use rod::{HairSolver, SolverMethod, Stiffness, StretchProjection, Sweeps};
+pub use rod::{HairSolver, HairStiffness, SolverMethod, StretchProjection, Sweeps};
 #[cfg(feature = "save")]
-pub use save::{Hairdo, HairdoError};
-pub use schedule::{HairStep, HairSubsteps, HairSystems, HairTick, ProcessTime};
+pub use save::{
+    Hairdo, HairdoError, HairdoPutOn, HairdoRefused, HairdoTaken, PutOnHairdo, TakeHairdo,
+};
+pub use schedule::{HairProcessTime, HairSettle, HairStep, HairSubsteps, HairSystems, HairTick};
 pub use setting::{HairDefault, InvalidValue, ValueRange};
+pub use settle::{HairSettling, Settling};
 pub use sleep::HairSleep;
 pub use strand::{
-    AddedMass, Hair, HairInertia, HeldNodes, HeldReach, Sleepers, Strand, StrandError, StrandModel,
-    StrandOf, StrandSleep, Strands,
+    AddedMass, Hair, HairInertia, HeldNodes, HeldNodesState, Sleepers, Strand, StrandError,
+    StrandModel, StrandOf, StrandSleep, Strands,
 };
 pub use style::{HairCondition, HairStyle, KeptStyle, StyleFaded};
-pub use treatment::{PermRod, Treat, Winding, WoundOn, WoundStrands};
+pub use treatment::{HairTreatment, PermRod, PermWinding, WoundOn, WoundStrands};
 pub use water::{
-    Droplet, DropletRules, HairDried, Moisture, Shower, SoakHair, WaterLedger, Wetting,
+    Droplet, DropletRules, HairDried, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
+    WaterVolume,
 };
 #[cfg(feature = "groom")]
 pub use wear::{HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair};
 
-/// What most games need.
+/// The types that most games need.
 pub mod prelude {
     #[cfg(feature = "avian")]
     #[doc(hidden)]
@@ -80,21 +90,24 @@ pub mod prelude {
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};
     #[cfg(feature = "render")]
     #[doc(hidden)]
-    pub use crate::render::{HairFollowers, HairLook, HairShading, HairView, Melanin};
+    pub use crate::render::{HairFollowers, HairView};
     #[cfg(feature = "save")]
     #[doc(hidden)]
-    pub use crate::save::{Hairdo, HairdoError};
+    pub use crate::save::{
+        Hairdo, HairdoError, HairdoPutOn, HairdoRefused, HairdoTaken, PutOnHairdo, TakeHairdo,
+    };
     #[cfg(feature = "groom")]
     #[doc(hidden)]
     pub use crate::wear::{HairNotWorn, HairWorn, WearHair, WornHair};
     #[doc(hidden)]
     pub use crate::{
-        AirDrag, Blower, BondInfluence, BondKind, Bonds, Climate, Cuticle, Droplet, Hair,
-        HairBudget, HairCollider, HairCondition, HairDefault, HairDried, HairFault, HairGravity,
-        HairInertia, HairLod, HairPlugins, HairSleep, HairSolver, HairStyle, HairSubsteps,
-        HairSystems, HairTick, HeldNodes, KeptStyle, LockContact, Moisture, PermRod, ProcessTime,
-        ScreenShare, Shower, SoakHair, SolverMethod, Stiffness, Strand, StrandModel, StrandOf,
-        StrandSleep, Strands, StretchProjection, StyleFaded, Sweeps, Treat, WaterLedger, Wetting,
-        Wind, WindZone, Winding, WoundOn,
+        AirDrag, Blower, BondInfluence, BondKind, Bonds, Cuticle, Droplet, DyeLayer, Hair,
+        HairBudget, HairClimate, HairCollider, HairColor, HairCondition, HairDefault, HairDried,
+        HairDye, HairFault, HairGravity, HairInertia, HairLod, HairLook, HairPlugins,
+        HairProcessTime, HairScreenShare, HairSettling, HairShading, HairSleep, HairSolver,
+        HairStiffness, HairStyle, HairSubsteps, HairSystems, HairTick, HairTreatment, HairWetting,
+        HairWind, HeldNodes, KeptStyle, LockContact, Melanin, Moisture, PermRod, PermWinding,
+        Settling, SoakHair, Strand, StrandModel, StrandOf, StrandSleep, Strands, Streaks,
+        StyleFaded, WaterLedger, WaterVolume, WornPreset, WoundOn,
     };
 }

@@ -5,7 +5,9 @@ use crate::{
     contact::ContactPlugin,
     environment::EnvironmentPlugin,
     lod::LodPlugin,
+    look::LookPlugin,
     schedule::TickPlugin,
+    settle::SettlePlugin,
     sleep::SleepPlugin,
     solve::{RodPlugin, SpringPlugin},
     strand::StrandPlugin,
@@ -82,9 +84,11 @@ impl PluginGroup for HairPlugins {
             .add(WaterPlugin)
             .add(RodPlugin)
             .add(SpringPlugin)
+            .add(SettlePlugin::for_schedule(self.schedule))
             .add(SleepPlugin)
             .add(LodPlugin)
-            .add(StylePlugin);
+            .add(StylePlugin)
+            .add(LookPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
         #[cfg(feature = "save")]

@@ -1,4 +1,4 @@
-//! The tick: figure 1 of \[B\], read from top to bottom. The one place that knows the order.
+//! The tick: figure 1 of \[B\], read from top to bottom. The only file that defines the order.
 //!
 //! Each fixed tick runs the schedule [`HairTick`] once per substep, with the sets of
 //! [`HairSystems`] one after the other. It runs on a single thread and treats ambiguities as errors;
@@ -10,6 +10,7 @@ use crate::{
 };
 use bevy::{
     ecs::{
+        entity::EntityHashSet,
         schedule::{
             InternedScheduleLabel, LogLevel, ScheduleBuildSettings, ScheduleLabel,
             SingleThreadedExecutor,
@@ -22,6 +23,19 @@ use bevy::{
 /// The schedule of one substep. Add systems to it in one of [`HairSystems`], `First` and `Last` best.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairTick;
+
+/// The schedule of a substep of hair that is simulated ahead: what moves strands, in the sets of
+/// [`HairSystems`], and nothing of bonds, water and treatments. See [`Settling`](crate::Settling).
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct HairSettle;
+
+/// The tick in the schedule that it runs in.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct HairTicks;
+
+/// The hair that is simulated ahead while all other waits; `None` in the tick itself.
+#[derive(Resource, Clone, Debug, Default)]
+pub(crate) struct Ahead(pub(crate) Option<EntityHashSet>);
 
 /// States the order of a substep once: sets, their parts, and what each does. The enum, the order of
 /// the schedule and the table in the docs are made from it.
@@ -77,23 +91,24 @@ macro_rules! substep {
 substep! {
     First: "Empty, for users" {}
     Roots: "Where the scalp is now" {
-        History: "What was drawn becomes the past",
+        StrandHistory: "The present positions become the previous ones, for drawing between ticks",
         Poses: "Frames of hair, colliders, rods and blowers move by a substep",
         LevelOfDetail: "Levels and guides are chosen, once a tick",
         SubstepLength: "How many substeps each hair takes as one, once a tick",
         Sleep: "Strands at rest fall asleep, disturbed ones wake, once a tick",
         FollowerSleep: "Followers sleep while all their guides do, once a tick",
-        FrameInertia: "Free nodes stay behind when the hair's frame moves",
-        MeshRoots: "Roots go with the triangles that they grow on",
-        BondFit: "New and changed strands get as many bonds as joints",
+        FrameInertia: "Inertia of free nodes when the hair's frame moves",
+        MeshRoots: "Roots follow the triangles that they grow on",
+        BondFit: "New and changed strands get bonds for each joint",
     }
-    ExternalForces: "What acts from outside, and what asks bonds to change" {
+    ExternalForces: "Forces from outside, and requests for changes of bonds" {
+        Submersion: "Buoyancy, drag and wetting of hair under water",
         Air: "Gravity, wind (equation 17) and drag; drying (19) of hair without water",
-        Treatments: "Lotions, heat and whatever else a game does to bonds",
-        WaterExchange: "Showers run; hair soaks, films flow, water dries and hydrogen bonds follow",
+        Treatments: "Lotions, heat and other treatments of bonds",
+        WaterExchange: "Showers spawn drops; hair soaks, films flow, water dries and hydrogen bonds follow",
     }
-    Interaction: "What touches what" {
-        Obstacles: "Colliders are seen from each hair",
+    Interaction: "Contacts" {
+        Obstacles: "Colliders are transformed into the frame of each hair",
         StrandContact: "Strands push each other apart (equation 18)",
         Droplets: "Droplets move, land and merge",
         DropletContact: "Droplets pull the strands they touch (\\[W\\] 2 to 5)",
@@ -108,17 +123,17 @@ substep! {
     }
     BondUpdate: "Bonds that re-formed remember the present shape (16)" {
         BondRates: "Rates move, memories follow (16)",
-        Ledger: "Droplets ride along; the water's books are closed",
-        Styles: "What is left of styles that are watched, once a tick",
+        WaterLedger: "Droplets follow their strands; the water balance is summed",
+        Styles: "How much is left of styles, once a tick",
     }
     Last: "Empty, for users" {}
 }
 
 /// Into how many substeps a tick is divided.
 ///
-/// Droplets, springs and the paper's projections want the paper's step. Dry hair that is solved directly
-/// carries the same accuracy in longer ones and takes several as one, as
-/// [`HairSolver::substep`](crate::HairSolver::substep) says.
+/// Droplets, springs and the paper's projections need the paper's step. Dry hair that is solved directly
+/// is as accurate in longer ones and takes several as one: see
+/// [`HairSolver::substep`](crate::HairSolver::substep).
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub enum HairSubsteps {
@@ -126,12 +141,12 @@ pub enum HairSubsteps {
     /// 6 at 60 Hz, 3 at 120 Hz.
     #[default]
     Auto,
-    /// This many; 0 counts as 1.
+    /// This many; values outside [`RANGE`](Self::RANGE) are clamped.
     Fixed(u32),
 }
 
 impl HairSubsteps {
-    /// The range of their number.
+    /// The range of the number of substeps.
     pub const RANGE: ValueRange =
         ValueRange::new("HairSubsteps", 1.0..=1000.0, "6 suit a tick of 1/60 s")
             .with_safe(1.0..=24.0);
@@ -139,7 +154,7 @@ impl HairSubsteps {
     /// A fixed number of substeps.
     ///
     /// # Errors
-    /// When it is 0 or more than 1000.
+    /// When it is outside [`RANGE`](Self::RANGE).
     pub fn fixed(count: u32) -> Result<Self, InvalidValue> {
         Self::Fixed(count).checked()
     }
@@ -147,7 +162,7 @@ impl HairSubsteps {
     /// The number of substeps for a tick of `seconds`.
     pub fn count(&self, seconds: f32) -> u32 {
         let mut count = match *self {
-            // Clocks count nanoseconds: 1/60 s is not quite six times 1/360 s.
+            // Clocks round to nanoseconds: 1/60 s is not exactly six times 1/360 s.
             Self::Auto => (seconds * 360.0 - 1e-3).ceil() as u32,
             Self::Fixed(count) => count,
         };
@@ -181,7 +196,7 @@ pub(crate) fn first_substep(step: Res<HairStep>) -> bool {
     step.index == 0
 }
 
-/// For what is done once a tick, at its end.
+/// Run condition: in the last substep of a tick.
 pub(crate) fn last_substep(step: Res<HairStep>) -> bool {
     step.index + 1 == step.count
 }
@@ -192,7 +207,7 @@ pub(crate) fn last_substep(step: Res<HairStep>) -> bool {
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct SubstepLimits {
-    /// So many substeps are taken as one; 0 counts as 1.
+    /// How many substeps are taken as one; 0 counts as 1.
     pub substeps: u32,
     /// The most iterations in each.
     pub iterations: u32,
@@ -204,8 +219,8 @@ impl Default for SubstepLimits {
     }
 }
 
-/// How many of the tick's substeps the solver of a hair takes as one, where its level of detail does not
-/// ask for more. Chosen once a tick.
+/// How many of the tick's substeps the solver of a hair takes as one, unless its level of detail takes
+/// more. Chosen once a tick.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MergedSubsteps(pub(crate) u32);
 
@@ -216,7 +231,7 @@ impl Default for MergedSubsteps {
 }
 
 impl MergedSubsteps {
-    /// As many as fit into `longest` (s), all of a tick equally long.
+    /// As many as fit into `longest` (s) and divide the tick evenly.
     pub(crate) fn within(longest: f32, step: &HairStep) -> Self {
         let fit = ((longest / step.dt + 1e-3) as u32).clamp(1, step.count.max(1));
         let divides = |together: &u32| step.count.is_multiple_of(*together);
@@ -224,10 +239,11 @@ impl MergedSubsteps {
     }
 }
 
-/// The substep as each hair takes it.
+/// The effective substep of each hair.
 #[derive(SystemParam)]
 pub(crate) struct EffectiveSubsteps<'w, 's> {
     step: Res<'w, HairStep>,
+    ahead: Res<'w, Ahead>,
     hairs: Query<
         'w,
         's,
@@ -241,7 +257,7 @@ pub(crate) struct EffectiveSubsteps<'w, 's> {
 pub(crate) struct EffectiveSubstep {
     /// How long it is (s).
     pub(crate) dt: f32,
-    /// Whether the hair takes no other before it in this tick.
+    /// Whether it is the hair's first in this tick.
     pub(crate) is_first: bool,
     /// How long the tick is (s).
     pub(crate) tick: f32,
@@ -260,8 +276,11 @@ impl EffectiveSubsteps<'_, '_> {
         index > 0 && merged(index - 1, count, self.together(hair).0).is_none()
     }
 
-    /// Whether any hair takes a substep now. Most waits for longer ones.
+    /// Whether any hair takes a substep now; others wait until several are merged.
     pub(crate) fn any(&self) -> bool {
+        if let Some(ahead) = &self.ahead.0 {
+            return ahead.iter().any(|hair| self.of(*hair).is_some());
+        }
         let HairStep { index, count, .. } = *self.step;
         let takes = |(limits, own): (Option<&SubstepLimits>, Option<&MergedSubsteps>)| {
             merged(index, count, Self::longer(limits, own)).is_some()
@@ -276,6 +295,9 @@ impl EffectiveSubsteps<'_, '_> {
 
     /// The substep that `hair` takes now, or `None` while it waits for a longer one.
     pub(crate) fn of(&self, hair: Entity) -> Option<EffectiveSubstep> {
+        if self.ahead.0.as_ref().is_some_and(|ahead| !ahead.contains(&hair)) {
+            return None;
+        }
         let HairStep { dt, index, count } = *self.step;
         let (together, limits) = self.together(hair);
         let substeps = merged(index, count, together)?;
@@ -289,14 +311,14 @@ impl EffectiveSubsteps<'_, '_> {
 }
 
 impl EffectiveSubstep {
-    /// So many iterations of `full`.
+    /// `full` iterations, limited by the level of detail.
     pub(crate) fn iterations(&self, full: u32) -> u32 {
         self.most_iterations.min(full)
     }
 }
 
 /// How many substeps the hair takes as one at the end of substep `index` of `count`, if `together`
-/// are taken at a time; `None` while it waits. What is left at the tick's end is taken then.
+/// are merged; `None` while it waits. A remainder at the tick's end is taken then.
 fn merged(index: u32, count: u32, together: u32) -> Option<u32> {
     let together = together.max(1);
     let done = (index + 1) % together;
@@ -307,28 +329,28 @@ fn merged(index: u32, count: u32, together: u32) -> Option<u32> {
     }
 }
 
-/// How much faster wetting, drying and the bonds' chemistry ([`Treat`](crate::Treat)) go than in life.
-/// A resource, default 1, safe 1…1000.
+/// How much faster wetting, drying and the bonds' chemistry ([`HairTreatment`](crate::HairTreatment)) go than in life.
+/// A resource, default 1, with the range [`RANGE`](Self::RANGE).
 ///
-/// Hair dries in minutes, players wait seconds. Mechanics are untouched.
+/// Hair dries in minutes, players wait seconds. Mechanics are not affected.
 #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Resource, Default, Clone, PartialEq)]
-pub struct ProcessTime(pub f32);
+pub struct HairProcessTime(pub f32);
 
-impl Default for ProcessTime {
+impl Default for HairProcessTime {
     fn default() -> Self {
         Self(1.0)
     }
 }
 
-impl ProcessTime {
+impl HairProcessTime {
     /// Its range.
     pub const RANGE: ValueRange =
-        ValueRange::new("ProcessTime", 0.0..=1e6, "60 makes minutes of seconds")
+        ValueRange::new("HairProcessTime", 0.0..=1e6, "60 makes minutes of seconds")
             .with_safe(1.0..=1000.0);
 }
 
-impl Ranged for ProcessTime {
+impl Ranged for HairProcessTime {
     fn clamp_values(&mut self, violations: &mut Violations) {
         Self::RANGE.clamp(&mut self.0, || 1.0, violations);
     }
@@ -357,30 +379,33 @@ impl Plugin for TickPlugin {
     fn build(&self, app: &mut App) {
         fault::plugin(app);
         setting::resource::<HairSubsteps>(app);
-        setting::resource::<ProcessTime>(app);
+        setting::resource::<HairProcessTime>(app);
+        let ordered = |schedule: &mut Schedule| {
+            schedule.set_executor(SingleThreadedExecutor::new()).set_build_settings(
+                ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() },
+            );
+            for pair in HairSystems::ALL.windows(2) {
+                schedule.configure_sets(pair[0].before(pair[1]));
+            }
+            for set in HairSystems::ALL {
+                for part in set.parts() {
+                    schedule.configure_sets(part.in_set(set));
+                }
+                for pair in set.parts().windows(2) {
+                    schedule.configure_sets(pair[0].before(pair[1]));
+                }
+            }
+        };
         app.init_resource::<HairStep>()
+            .init_resource::<Ahead>()
             .register_type::<HairStep>()
             .register_type::<SubstepLimits>()
             .register_type::<InvalidValue>()
-            .edit_schedule(HairTick, |schedule| {
-                schedule.set_executor(SingleThreadedExecutor::new()).set_build_settings(
-                    ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() },
-                );
-                for pair in HairSystems::ALL.windows(2) {
-                    schedule.configure_sets(pair[0].before(pair[1]));
-                }
-                for set in HairSystems::ALL {
-                    for part in set.parts() {
-                        schedule.configure_sets(part.in_set(set));
-                    }
-                    for pair in set.parts().windows(2) {
-                        schedule.configure_sets(pair[0].before(pair[1]));
-                    }
-                }
-            })
+            .edit_schedule(HairTick, ordered)
+            .edit_schedule(HairSettle, ordered)
             .add_systems(self.schedule, {
-                let tick = run_hair_tick.into_configs();
-                // Where both are in one schedule, hair sees where bodies have come to.
+                let tick = run_hair_tick.in_set(HairTicks).into_configs();
+                // In the same schedule, hair reads the bodies' poses after the physics step.
                 #[cfg(feature = "avian")]
                 let tick = tick.after(avian3d::prelude::PhysicsSystems::Writeback);
                 tick
@@ -388,7 +413,7 @@ impl Plugin for TickPlugin {
     }
 }
 
-/// One tick: as many substeps as [`HairSubsteps`] asks for. No time, no tick.
+/// One tick: as many substeps as [`HairSubsteps`] gives; none if no time has passed.
 fn run_hair_tick(world: &mut World) {
     let seconds = world.resource::<Time>().delta_secs();
     if seconds <= 0.0 {
@@ -406,7 +431,7 @@ fn run_hair_tick(world: &mut World) {
 mod tests {
     use super::*;
 
-    /// `KERATIN_WRITE_DOCS=1 cargo test --lib docs_show` writes the table anew.
+    /// `KERATIN_WRITE_DOCS=1 cargo test --lib docs_show` rewrites the table.
     #[test]
     fn docs_show_the_substep_as_it_runs() {
         let mut table = String::from(
@@ -454,7 +479,7 @@ mod tests {
     }
 
     #[test]
-    fn substeps_taken_together_make_up_the_tick() {
+    fn merged_substeps_sum_to_the_tick() {
         for count in 1..20 {
             for together in 0..8 {
                 let all: Vec<_> = (0..count).map(|i| merged(i, count, together)).collect();

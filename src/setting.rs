@@ -1,14 +1,14 @@
 //! Values that users set: settings of hair, tools, rules of the world.
 //!
 //! Each is stated once, with its unit, default, range and a hint; docs, `Default`, constructors' checks
-//! and the [`ValueRange`] constants are made of that. A value outside its range is an error where a
-//! constructor takes it. Where it is edited it is reported once and used as the nearest valid one, the
-//! default in place of what is not a number; the component keeps what the user wrote.
+//! and the [`ValueRange`] constants are generated from that. A value outside its range is an error in a
+//! constructor. In an edited component or resource it is reported once and the nearest valid value is
+//! used, the default for NaN; the component keeps what the user wrote.
 //!
 //! Settings have a default for all hair as a resource and an override as a component on a `Hair`. In
 //! Bevy 0.19 one type cannot be both, so [`HairDefault<T>`] carries the default of `T`.
 
-use crate::fault::{FaultKind, HairFault};
+use crate::fault::{FaultKind, HairChecks, HairFault};
 use bevy::{
     ecs::system::SystemParam,
     prelude::*,
@@ -17,20 +17,20 @@ use bevy::{
 use core::ops::RangeInclusive;
 
 /// A value that a constructor or a setting refuses: which, what was found, what was expected and
-/// how to mend it.
+/// how to fix it.
 #[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 #[error("{what} is {found}, expected {low} to {high}: {hint}")]
 pub struct InvalidValue {
     /// The value's name and unit.
     pub what: &'static str,
-    /// What was given.
+    /// The value found.
     pub found: f32,
     /// The least that is valid.
     pub low: f32,
     /// The most that is valid.
     pub high: f32,
-    /// How to mend it.
+    /// How to fix it.
     pub hint: &'static str,
 }
 
@@ -40,7 +40,7 @@ impl From<InvalidValue> for HairFault {
     }
 }
 
-/// The range of one value: what is valid, what does well, and how to mend what is outside.
+/// The range of one value: what is valid, what works well, and how to fix a value outside.
 ///
 /// Settings and tools have one as a constant for each value, for sliders and the like:
 ///
@@ -53,15 +53,15 @@ impl From<InvalidValue> for HairFault {
 pub struct ValueRange {
     /// The value's name and unit.
     pub what: &'static str,
-    /// What is outside is reported, and the nearest value inside is used.
+    /// Values outside are reported, and the nearest value inside is used.
     pub valid: RangeInclusive<f32>,
-    /// What does well; all that is valid where nothing narrower is known.
+    /// What works well; equal to `valid` where nothing narrower is known.
     pub safe: RangeInclusive<f32>,
-    /// How to mend a value that is outside.
+    /// How to fix a value outside.
     pub hint: &'static str,
 }
 
-/// What was outside its range, in the order met.
+/// Values found outside their range, in the order found.
 pub type Violations = Vec<InvalidValue>;
 
 impl ValueRange {
@@ -78,19 +78,19 @@ impl ValueRange {
         Self { what: self.what, valid: self.valid, safe, hint: self.hint }
     }
 
-    /// For constructors: the value, or why not.
+    /// For constructors: the value, or the error.
     pub(crate) fn check<T: Value>(&self, value: T) -> Result<T, InvalidValue> {
         let Some(found) = value.outside(&self.valid) else { return Ok(value) };
         let (low, high) = (*self.valid.start(), *self.valid.end());
         Err(InvalidValue { what: self.what, found, low, high, hint: self.hint })
     }
 
-    /// The same rule under another name, for what is no field.
+    /// The same range under another name, for a value that is not a field.
     pub(crate) const fn named(self, what: &'static str) -> Self {
         Self { what, valid: self.valid, safe: self.safe, hint: self.hint }
     }
 
-    /// For what was edited: the nearest valid value, `default` for what is not a number.
+    /// For edited values: clamps to the nearest valid value, NaN to `default`.
     pub(crate) fn clamp<T: Value>(
         &self,
         value: &mut T,
@@ -104,11 +104,11 @@ impl ValueRange {
     }
 }
 
-/// What can have a [`ValueRange`].
+/// Types that can have a [`ValueRange`].
 pub(crate) trait Value: Copy {
     /// The first of its numbers that is outside.
     fn outside(self, range: &RangeInclusive<f32>) -> Option<f32>;
-    /// The nearest value inside; `None` when it is not a number.
+    /// The nearest value inside; `None` for NaN.
     fn nearest(self, range: &RangeInclusive<f32>) -> Option<Self>;
 }
 
@@ -158,33 +158,32 @@ impl Value for Vec3 {
     }
 }
 
-/// Settings or a tool of which every value has its range. One rule for what constructors take and
-/// what is edited later.
+/// Settings or a tool of which every value has its range, checked by the same rule in constructors and
+/// after editing.
 pub trait Ranged: Clone {
-    /// Brings every value into its range: to the nearest that is valid, to the default what is not a
-    /// number. Adds what was outside to `violations`.
+    /// Clamps every value to its range, NaN to the default. Adds what was outside to `violations`.
     fn clamp_values(&mut self, violations: &mut Violations) {
         let _ = violations;
     }
 
-    /// The same with every value in its range.
+    /// A copy with every value clamped.
     fn clamped(&self) -> Self {
         let mut clamped = self.clone();
         clamped.clamp_values(&mut Violations::new());
         clamped
     }
 
-    /// What is outside its range.
+    /// The values outside their range.
     fn violations(&self) -> Violations {
         let mut violations = Violations::new();
         self.clone().clamp_values(&mut violations);
         violations
     }
 
-    /// For constructors: itself, if every value is in its range.
+    /// For constructors: `self`, if every value is in its range.
     ///
     /// # Errors
-    /// The first value that is not.
+    /// The first value outside its range.
     fn checked(self) -> Result<Self, InvalidValue> {
         self.violations().into_iter().next().map_or(Ok(self), Err)
     }
@@ -202,8 +201,8 @@ impl<T: Ranged> Ranged for Option<T> {
     }
 }
 
-/// States the values of a setting or tool once: field, default, unit, range and hint. Of it are made
-/// the struct with these in its docs, `Default`, the [`ValueRange`] constants, and [`Ranged`].
+/// States the values of a setting or tool once: field, default, unit, range and hint. Generates the
+/// struct with these in its docs, `Default`, the [`ValueRange`] constants, and [`Ranged`].
 ///
 /// ```ignore
 /// setting! {
@@ -216,8 +215,8 @@ impl<T: Ranged> Ranged for Option<T> {
 /// }
 /// ```
 ///
-/// A field without `in` may be anything; `=> function` gives one whose values are checked by another
-/// rule. After the struct `then function` checks what no single value shows.
+/// A field without `in` is not checked; with `=> function` it is checked by that function. After the
+/// struct, `then function` checks conditions between several values.
 macro_rules! setting {
     (
         $(#[$attribute:meta])*
@@ -286,7 +285,7 @@ impl<T: Component + Ranged + Default + Typed + FromReflect + GetTypeRegistration
 {
 }
 
-/// What holds for every hair that carries no `T` of its own.
+/// The default of a setting: used for every hair without a `T` component of its own.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -303,10 +302,10 @@ impl<T: HairSetting> Ranged for HairDefault<T> {
     }
 }
 
-/// Reads the settings `T` that hold for a hair, always valid.
+/// Reads the settings `T` of a hair, clamped to their ranges.
 #[derive(SystemParam)]
 pub struct Settings<'w, 's, T: HairSetting> {
-    /// None while the plugin that has these settings is switched off.
+    /// `None` while the plugin of these settings is disabled.
     default: Option<Res<'w, HairDefault<T>>>,
     overrides: Query<'w, 's, &'static T>,
 }
@@ -320,7 +319,7 @@ impl<T: HairSetting> Settings<'_, '_, T> {
     }
 }
 
-/// Reports what was outside its range.
+/// Reports values outside their range.
 pub(crate) fn report(
     entity: Option<Entity>,
     violations: Violations,
@@ -354,14 +353,14 @@ pub(crate) fn plugin<T: HairSetting>(app: &mut App) {
 
 /// Registers a tool: its type, and the report of invalid values.
 pub(crate) fn component<T: Component + Ranged + GetTypeRegistration>(app: &mut App) {
-    app.register_type::<T>().add_systems(PreUpdate, report_changed::<T>);
+    app.register_type::<T>().add_systems(HairChecks, report_changed::<T>);
 }
 
-/// Registers values that hold for all hair: the resource, its type, and the report of invalid values.
+/// Registers a resource of global values: the resource, its type, and the report of invalid values.
 pub(crate) fn resource<T: Resource + Ranged + Default + GetTypeRegistration>(app: &mut App) {
     app.init_resource::<T>()
         .register_type::<T>()
-        .add_systems(PreUpdate, report_resource::<T>.run_if(resource_changed::<T>));
+        .add_systems(HairChecks, report_resource::<T>.run_if(resource_changed::<T>));
 }
 
 #[cfg(test)]
@@ -419,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn one_rule_for_constructors_and_for_what_is_edited() {
+    fn constructors_and_edited_values_follow_the_same_rule() {
         let edited = Tool {
             rate: f32::NAN,
             seconds: f32::NEG_INFINITY,

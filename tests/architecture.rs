@@ -11,9 +11,10 @@ use std::{
 };
 
 /// Rooms from the ground up: each may import those before it, none after it.
-const FLOORS: [&str; 29] = [
+const FLOORS: [&str; 32] = [
     "fault",
     "setting",
+    "look",
     "parallel",
     "lanes",
     "schedule",
@@ -29,9 +30,11 @@ const FLOORS: [&str; 29] = [
     "lod",
     "sleep",
     "solve",
+    "settle",
     "style",
     "save",
     "render",
+    "gpu",
     "groom",
     "plant",
     "attach",
@@ -55,6 +58,8 @@ struct Import {
 #[derive(Debug, Default)]
 struct Source {
     imports: Vec<Import>,
+    /// The words outside `use`: names that the file's own code may use.
+    words: BTreeSet<String>,
 }
 
 struct Crate {
@@ -121,9 +126,12 @@ impl Crate {
         for (module, (_, source)) in &self.files {
             let mut to = BTreeMap::new();
             for import in &source.imports {
-                // Re-exporting what is below is the index of a room, not an import.
+                // Re-exporting what is below is the index of a room, not an import, as long as the
+                // file's own code does not use the name.
                 let own = import.path.len() > module.len() && import.path.starts_with(module);
-                if own && import.name.is_some() {
+                let is_index =
+                    import.name.as_ref().is_some_and(|name| !source.words.contains(name));
+                if own && is_index {
                     continue;
                 }
                 let home = self.home(&import.path);
@@ -178,10 +186,14 @@ impl Source {
                 }
                 // A path from here: perhaps into a child.
                 TokenTree::Ident(word) if path_end(&tokens, i) > i + 1 => {
+                    self.words.insert(word.to_string());
                     let line = word.span().start().line;
                     let path = [module, &[word.to_string()]].concat();
                     self.imports.push(Import { path, line, name: None });
                     i = path_end(&tokens, i) - 1;
+                }
+                TokenTree::Ident(word) => {
+                    self.words.insert(word.to_string());
                 }
                 TokenTree::Group(group) => self.walk(group.stream(), module),
                 _ => {}
@@ -391,4 +403,25 @@ fn the_reader_of_paths_finds_all_kinds() {
             "room::file::child"
         ]
     );
+}
+
+#[test]
+fn a_childs_name_that_is_used_in_code_is_an_import() {
+    let source = |module: &[&str], text: &str| {
+        let module: Vec<String> = module.iter().map(|part| (*part).to_owned()).collect();
+        let source = Source::parse(text, &module);
+        (module, (PathBuf::new(), source))
+    };
+    let arrows_of = |room: &str| {
+        let child = source(&["room", "child"], "use super::Below; pub struct Above;");
+        let files = [source(&[], "pub mod room;"), source(&["room"], room), child];
+        let files = Crate { files: files.into_iter().collect() };
+        let arrows = files.arrows();
+        let room = vec!["room".to_owned()];
+        arrows[&room].keys().map(|to| to.join("::")).collect::<Vec<_>>()
+    };
+    let index = "mod child; pub use child::Above; pub struct Below;";
+    assert!(arrows_of(index).is_empty());
+    let required = index.to_owned() + "#[require(Above)] pub struct Whole;";
+    assert_eq!(arrows_of(&required), ["room::child"]);
 }

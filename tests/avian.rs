@@ -18,7 +18,7 @@ fn body(app: &mut App, collider: Collider, place: Transform) -> Entity {
 }
 
 fn hair_colliders(app: &mut App) -> Vec<HairCollider> {
-    app.world_mut().query::<&HairCollider>().iter(app.world()).copied().collect()
+    app.world_mut().query::<&HairCollider>().iter(app.world()).cloned().collect()
 }
 
 /// How deep below the surface of a capsule a point is (m).
@@ -26,6 +26,13 @@ fn in_capsule(p: Vec3, [a, b]: [Vec3; 2], radius: f32) -> f32 {
     let along = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
     radius - p.distance(a.lerp(b, along))
 }
+
+fn octahedron() -> Vec<Vec3> {
+    [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z].map(|p| p * 0.1).to_vec()
+}
+
+const OCTAHEDRON: [[u32; 3]; 8] =
+    [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
 
 /// Drops a strand on a collider for five seconds: the deepest that a node is within (m). A lock is
 /// kept its radius of 1 mm outside.
@@ -50,7 +57,7 @@ fn hair_lies_on_every_shape_of_avian_and_never_in_it() {
         (Vec3::new(0.05, 0.0, 0.0), Quat::IDENTITY, Collider::sphere(0.07)),
         (Vec3::new(-0.06, -0.02, 0.0), turned, Collider::capsule(0.06, 0.1)),
     ]);
-    let shapes: [(Collider, Quat, fn(Vec3) -> f32); 7] = [
+    let shapes: [(Collider, Quat, fn(Vec3) -> f32); 11] = [
         (Collider::sphere(0.1), Quat::IDENTITY, |p| 0.1 - p.length()),
         (Collider::capsule(0.1, 0.1), Quat::IDENTITY, |p| {
             in_capsule(p, [Vec3::Y * 0.05, Vec3::Y * -0.05], 0.1)
@@ -66,6 +73,21 @@ fn hair_lies_on_every_shape_of_avian_and_never_in_it() {
             -p.dot(Vec3::new(0.6, 0.8, 0.0))
         }),
         (pair, turned, |p| (0.07 - p.distance(Vec3::X * -0.05)).max(in_capsule(p, BENT, 0.06))),
+        (Collider::cuboid(0.16, 0.12, 0.2), Quat::IDENTITY, |p| {
+            (Vec3::new(0.08, 0.06, 0.1) - p.abs()).min_element()
+        }),
+        (Collider::convex_hull(octahedron()).unwrap(), Quat::IDENTITY, |p| {
+            (0.1 - p.abs().element_sum()) / 3f32.sqrt()
+        }),
+        (Collider::cone(0.1, 0.12), Quat::IDENTITY, |p| {
+            // From its side; the tip is above.
+            let out = Vec2::new(0.12, 0.1).normalize();
+            (p.y + 0.06).min(-out.dot(Vec2::new(p.xz().length(), p.y - 0.06)))
+        }),
+        (Collider::trimesh(octahedron(), OCTAHEDRON.to_vec()), Quat::IDENTITY, |p| {
+            // Edges are rounded off by a share of the cell, 0.2 / 48.
+            (0.1 - p.abs().element_sum()) / 3f32.sqrt() - 5e-4
+        }),
     ];
     for (i, (collider, turn, inside)) in shapes.into_iter().enumerate() {
         let mut app = test_app(60.0);
@@ -99,7 +121,7 @@ fn hair_follows_a_collider_that_changes_and_one_that_is_scaled() {
     // Its body grows, by its scale.
     app.world_mut().get_mut::<Transform>(body).unwrap().scale = Vec3::splat(1.25);
     on_ball_of(&mut app, 0.1);
-    app.world_mut().entity_mut(body).insert(AvianHairCollider { friction: 0.8 });
+    app.world_mut().entity_mut(body).insert(AvianHairCollider { friction: 0.8, ..default() });
     app.update();
     let expected = HairCollider::sphere(0.08).unwrap().with_friction(0.8).unwrap();
     assert_eq!(hair_colliders(&mut app), [expected]);
@@ -152,46 +174,48 @@ fn a_collider_that_goes_lets_go_of_hair() {
 }
 
 #[test]
-fn a_shape_that_hair_does_not_know_is_told_once_with_what_to_use() {
+fn an_unsupported_shape_is_reported_once_with_a_hint() {
     let mut app = test_app(60.0);
-    let cuboid = || Collider::cuboid(0.1, 0.2, 0.3);
-    let entity = body(&mut app, cuboid(), Transform::IDENTITY);
-    let told = |app: &mut App| {
+    let line = || Collider::segment(Vec3::ZERO, Vec3::X);
+    let entity = body(&mut app, line(), Transform::IDENTITY);
+    let reported = |app: &mut App| {
         run(app, 0.5);
-        let told = faults(app);
+        let reported = faults(app);
         assert_eq!(hair_colliders(app), []);
-        assert_eq!(told.len(), 1, "{told:?}");
-        told[0].to_string()
+        assert_eq!(reported.len(), 1, "{reported:?}");
+        reported[0].to_string()
     };
-    let text = told(&mut app);
-    assert!(text.contains("cuboid") && text.contains("half space"), "{text}");
-    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].to_vec();
-    app.world_mut().entity_mut(entity).insert(Collider::convex_hull(corners).unwrap());
-    let text = told(&mut app);
-    assert!(text.contains("convex hull") && text.contains("fit_joint_capsules"), "{text}");
+    let text = reported(&mut app);
+    assert!(text.contains("line") && text.contains("half space"), "{text}");
+    // A sheet has no inside.
+    let sheet = vec![Vec3::ZERO, Vec3::X, Vec3::Z, Vec3::X + Vec3::Z];
+    let sheet = Collider::trimesh(sheet, vec![[0, 2, 1], [1, 2, 3]]);
+    app.world_mut().entity_mut(entity).insert(sheet);
+    let text = reported(&mut app);
+    assert!(text.contains("triangle mesh") && text.contains("Openings::Shell"), "{text}");
     app.world_mut().entity_mut(entity).insert(Collider::half_space(Vec3::ZERO));
-    assert!(told(&mut app).contains("normal"));
+    assert!(reported(&mut app).contains("normal"));
     // Of a compound the rest holds.
     let mixed = vec![
-        (Vec3::ZERO, Quat::IDENTITY, cuboid()),
+        (Vec3::ZERO, Quat::IDENTITY, line()),
         (Vec3::X, Quat::IDENTITY, Collider::sphere(0.1)),
     ];
     app.world_mut().entity_mut(entity).insert(Collider::compound(mixed));
     run(&mut app, 0.5);
-    let told = faults(&mut app);
+    let reported = faults(&mut app);
     assert!(
         matches!(
-            &told[..],
-            [f] if f.cause::<AvianShapeError>().is_some_and(|why| why.found == "cuboid")
+            &reported[..],
+            [f] if f.cause::<AvianShapeError>().is_some_and(|why| why.found == "line or triangle")
         ),
-        "{told:?}"
+        "{reported:?}"
     );
     assert_eq!(hair_colliders(&mut app).len(), 1);
-    // Mended there is nothing to tell; wrong again there is.
+    // Repaired it is not reported; invalid again it is.
     app.world_mut().entity_mut(entity).insert(Collider::sphere(0.1));
     run(&mut app, 0.5);
     assert_eq!(faults(&mut app), []);
-    app.world_mut().entity_mut(entity).insert(cuboid());
+    app.world_mut().entity_mut(entity).insert(line());
     run(&mut app, 0.5);
     assert_eq!(faults(&mut app).len(), 1);
 }

@@ -7,7 +7,7 @@ use std::{
     process::{Command, Output},
 };
 
-/// A path below a file, where nobody can make a folder.
+/// A path below a file, where no folder can be created.
 const NO_FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml/pictures");
 
 /// An example as `cargo test` has just built it.

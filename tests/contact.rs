@@ -27,7 +27,7 @@ fn hair_lies_on_every_shape_and_never_in_it() {
     for (collider, inside) in shapes {
         let mut app = test_app(60.0);
         let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
-        app.world_mut().spawn((collider, Transform::from_translation(down)));
+        app.world_mut().spawn((collider.clone(), Transform::from_translation(down)));
         let mut deepest = 0.0_f32;
         for _ in 0..300 {
             app.update();
@@ -102,7 +102,7 @@ fn strands_in_one_place_part_by_two_radii_only_with_contact() {
         let mut app = test_app(60.0);
         no_gravity(&mut app);
         app.insert_resource(HairDefault(LockContact { radius: 2e-3, strength }))
-            .insert_resource(HairDefault(Stiffness::from_bending_length(0.02).unwrap()));
+            .insert_resource(HairDefault(HairStiffness::from_bending_length(0.02).unwrap()));
         let hair = app.world_mut().spawn(Hair).id();
         let ids = [-1e-4_f32, 1e-4].map(|z| {
             let points: Vec<Vec3> = (0..9).map(|k| Vec3::new(0.03 * k as f32, 0.0, z)).collect();

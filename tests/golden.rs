@@ -1,14 +1,22 @@
-//! Golden vectors of a published reference implementation against the coupled projection.
+//! Golden vectors: of a published reference implementation against the coupled projection, and of a dense
+//! solve in another language against the direct solver.
 //!
-//! `data/cosserat.json` tells its conventions in `meta`; here are its cases with full stiffness.
+//! `data/cosserat.json` and `data/direct.json` tell their conventions in `meta`; of the first here are its
+//! cases with full stiffness.
 
+use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
-    lanes::{Quaternion, Real, V3},
-    rod::constraint::{
-        BendShares, EPSILON, EdgeWeights, StretchProjection, StretchShares, bend_twist,
-        stretch_shear,
+    lanes::{LANES, Lane, Quaternion, Real, V3, put3, put4, take3, take4},
+    rod::{
+        block::BlockLanes,
+        constraint::{
+            BendShares, EPSILON, EdgeWeights, StretchProjection, StretchShares, bend_twist,
+            stretch_shear,
+        },
+        direct::{DirectParams, step},
     },
 };
+use fearless_simd::Level;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -92,6 +100,7 @@ fn length(a: &[f64]) -> f64 {
     a.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
+/// The reference sums in another order and rounds its file, so that not even f64 is the same to the bit.
 /// Compares within `absolute` plus 1e-5 of the largest component expected (f32), or `absolute`.
 fn same(what: &str, case: usize, found: &[f64], expected: &[f64], relative: f64, absolute: f64) {
     let most = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -164,4 +173,102 @@ fn coupled_projection_in_f64() {
 #[test]
 fn coupled_projection_in_f32() {
     check::<f32>(1e-5, EPS32);
+}
+
+#[derive(Deserialize)]
+struct Substeps {
+    cases: Vec<Substep>,
+}
+
+#[derive(Deserialize)]
+struct Substep {
+    name: String,
+    dt: f32,
+    damping: f32,
+    gravity: [f32; 3],
+    held: Vec<bool>,
+    from: Vec<[f32; 3]>,
+    p: Vec<[f32; 3]>,
+    v: Vec<[f32; 3]>,
+    mass: Vec<f32>,
+    q: Vec<[f32; 4]>,
+    rest: Vec<[f32; 4]>,
+    l: Vec<f32>,
+    k: Vec<f32>,
+    axial: Vec<f32>,
+    tension: Vec<f32>,
+    root: [f32; 4],
+    root_from: [f32; 4],
+    after: After,
+}
+
+#[derive(Deserialize)]
+struct After {
+    p: Vec<[f32; 3]>,
+    v: Vec<[f32; 3]>,
+    q: Vec<[f32; 4]>,
+}
+
+#[test]
+fn a_substep_of_the_direct_solver_in_f32() {
+    let golden: Substeps = serde_json::from_str(include_str!("data/direct.json")).unwrap();
+    assert_eq!(golden.cases.len(), 7);
+    let all = |value: f32| -> Lane { [value; LANES] };
+    for c in golden.cases {
+        let mut block = BlockLanes::default();
+        block.resize(c.p.len());
+        let gravity = Vec3::from(c.gravity);
+        for (i, node) in block.nodes.iter_mut().enumerate() {
+            // The tick's forces have been given before the solver begins.
+            let (p, v) = if c.held[i] {
+                (c.p[i], Vec3::from(c.v[i]))
+            } else {
+                (c.from[i], Vec3::from(c.v[i]) + gravity * c.dt)
+            };
+            for lane in 0..LANES {
+                put3(&mut node.p, lane, p.into());
+                put3(&mut node.from, lane, c.from[i].into());
+                put3(&mut node.v, lane, v);
+            }
+            node.mass = all(c.mass[i]);
+            node.w = all(if c.held[i] { 0.0 } else { 1.0 / c.mass[i] });
+        }
+        for (i, edge) in block.edges.iter_mut().enumerate() {
+            for lane in 0..LANES {
+                put4(&mut edge.q, lane, Quat::from_array(c.q[i]));
+                put4(&mut edge.rest, lane, Quat::from_array(c.rest[i]));
+                put4(&mut block.root, lane, Quat::from_array(c.root));
+                put4(&mut block.root_from, lane, Quat::from_array(c.root_from));
+            }
+            (edge.l, edge.k) = (all(c.l[i]), all(c.k[i]));
+            (edge.axial, edge.tension) = (all(c.axial[i]), all(c.tension[i]));
+        }
+        let params = DirectParams {
+            dt: c.dt,
+            gravity,
+            damping: c.damping,
+            limiter_steps: 0,
+            clearance: 0.0,
+        };
+        step(Level::new(), &mut block, &params, &[]);
+        let mut off = [0.0_f32; 3];
+        let mut moved = 0.0_f32;
+        for lane in [0, LANES - 1] {
+            for (i, node) in block.nodes.iter().enumerate() {
+                let [p, v] = [c.after.p[i], c.after.v[i]].map(Vec3::from);
+                moved = moved.max(p.distance(c.from[i].into()));
+                off[0] = off[0].max(take3(&node.p, lane).distance(p));
+                off[1] = off[1].max(take3(&node.v, lane).distance(v));
+            }
+            for (edge, q) in block.edges.iter().zip(&c.after.q) {
+                let turn = take4(&edge.q, lane).angle_between(Quat::from_array(*q).normalize());
+                off[2] = off[2].max(turn);
+            }
+        }
+        println!("{}: off by {off:?}; moved {moved} m", c.name);
+        // What velocities are off by is what positions are, over the substep.
+        assert!(off[0] < 1e-6 + 1e-4 * moved, "{}: {} m of {moved}", c.name, off[0]);
+        assert!(off[1] * c.dt < 2e-6 + 2e-4 * moved, "{}: {} m/s", c.name, off[1]);
+        assert!(off[2] < 2e-3, "{}: {} rad", c.name, off[2]);
+    }
 }

@@ -43,10 +43,10 @@ fn treated(strands: usize, nodes: usize) -> (App, Entity) {
     let hair = curls(&mut app, strands, nodes);
     run(&mut app, 0.2);
     let first = members(&app, hair)[0];
-    app.world_mut().write_message(Treat::lotion(first).joints(1..3));
-    app.world_mut().write_message(Treat::wet(hair).joints(0..2));
+    app.world_mut().write_message(HairTreatment::lotion(first).joints(1..3));
+    app.world_mut().write_message(HairTreatment::wet(hair).joints(0..2));
     run(&mut app, 0.1);
-    app.world_mut().write_message(Treat::neutraliser(first).over(0.05));
+    app.world_mut().write_message(HairTreatment::neutraliser(first).over(0.05));
     app.world_mut().write_message(SoakHair { target: first, wetness: 0.6 });
     run(&mut app, 0.2);
     app.world_mut().entity_mut(hair).insert(Cuticle { damage: 0.7, softening: 0.5 });
@@ -166,7 +166,11 @@ fn permed() -> (App, Entity, Entity, Vec<Vec3>) {
     }
     run(&mut app, 0.5);
     let held = shape(strand(&app, entity));
-    for treat in [Treat::lotion(entity), Treat::neutraliser(entity), Treat::dry(entity)] {
+    for treat in [
+        HairTreatment::lotion(entity),
+        HairTreatment::neutraliser(entity),
+        HairTreatment::dry(entity),
+    ] {
         app.world_mut().write_message(treat);
         run(&mut app, 0.1);
     }
@@ -241,7 +245,7 @@ fn wet_hair_keeps_its_water_and_the_books_stay_true() {
 fn what_was_under_way_ends() {
     let (mut app, hair, entity) = straight();
     let before = of(&app, hair);
-    app.world_mut().write_message(Treat::wet(hair).over(10.0));
+    app.world_mut().write_message(HairTreatment::wet(hair).over(10.0));
     run(&mut app, 1.0);
     assert!(!app.world().get::<Treatments>(entity).unwrap().acting().is_empty());
     apply(&mut app, hair, &before);
@@ -251,11 +255,11 @@ fn what_was_under_way_ends() {
 }
 
 #[test]
-fn hair_on_a_rod_is_wound_anew_and_never_torn() {
+fn hair_on_a_rod_is_wound_again_and_never_torn() {
     let (mut app, hair, entity) = straight();
     let before = of(&app, hair);
     let rod = app.world_mut().spawn((PermRod::default(), Transform::from_xyz(0.03, 0.1, 0.0))).id();
-    let winding = Winding { seconds: 0.5, ..default() };
+    let winding = PermWinding { seconds: 0.5, ..default() };
     app.world_mut().entity_mut(entity).insert((WoundOn(rod), winding));
     run(&mut app, 1.0);
     apply(&mut app, hair, &before);
@@ -282,7 +286,7 @@ fn strands_go_with_their_roots() {
 }
 
 #[test]
-fn another_groom_is_told_and_the_hair_is_left_alone() {
+fn another_groom_is_reported_and_the_hair_is_left_alone() {
     let (mut app, hair) = treated(3, 9);
     let mut others = test_app(60.0);
     let fewer = curls(&mut others, 2, 9);
@@ -305,9 +309,9 @@ fn another_groom_is_told_and_the_hair_is_left_alone() {
         queue(&mut app, hair, hairdo.put_on());
         assert!(bits(&app, hair) == before);
         app.update();
-        let told = faults(&mut app);
+        let reported = faults(&mut app);
         assert!(
-            matches!(&told[..], [f] if f.kind == FaultKind::Hairdo && f.cause() == Some(&expected))
+            matches!(&reported[..], [f] if f.kind == FaultKind::Hairdo && f.cause() == Some(&expected))
         );
     }
     let before = bits(&app, hair);
@@ -380,19 +384,19 @@ fn sealed(format: u16, payload: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn other_files_are_told_and_the_hair_is_left_alone() {
+fn other_files_are_reported_and_the_hair_is_left_alone() {
     let (app, hair) = treated(2, 5);
     let before = bits(&app, hair);
     let good = before.0.clone();
     let payload = &good[HEAD..good.len() - 4];
-    assert_eq!(sealed(NEWEST_FORMAT, payload), good);
+    assert_eq!(sealed(1, payload), good, "without looks the first format is written");
     let error = |bytes: &[u8]| Hairdo::from_bytes(bytes).unwrap_err();
 
     for bytes in [&b"glTF"[..], b"\x8bhairdu\n1234567890123456", b"{}", &[0; 100]] {
         assert_eq!(error(bytes), HairdoError::NotAHairdo);
     }
     let future = error(&sealed(NEWEST_FORMAT + 6, &[1, 2, 3]));
-    assert_eq!(future, HairdoError::FutureVersion { found: 7, newest: 1 });
+    assert_eq!(future, HairdoError::FutureVersion { found: 8, newest: 2 });
     assert!(future.to_string().contains("update"), "{future}");
     assert!(matches!(error(&sealed(0, payload)), HairdoError::Malformed { offset: 8, .. }));
     let mut damaged = good.clone();
@@ -402,7 +406,7 @@ fn other_files_are_told_and_the_hair_is_left_alone() {
     longer.push(0);
     let end = good.len() as u64;
     assert!(matches!(error(&longer), HairdoError::Malformed { offset, .. } if offset == end));
-    // well sealed, but more than is told, or than is there
+    // a valid checksum, but a wrong length
     let more: Vec<u8> = payload.iter().copied().chain([0]).collect();
     let at = (good.len() - 4) as u64;
     assert!(
@@ -431,7 +435,7 @@ fn no_truncation_is_taken_for_a_hairdo() {
         let error = Hairdo::from_bytes(&good[..end]).unwrap_err();
         let expected = if end < HEAD { HEAD + 4 } else { good.len() } as u64;
         assert_eq!(error, HairdoError::Truncated { found: end as u64, expected }, "{end}");
-        // cut off, and sealed by someone who did not notice
+        // cut off, with a valid checksum
         if end >= HEAD && end + 4 < good.len() {
             let error = Hairdo::from_bytes(&sealed(1, &good[HEAD..end])).unwrap_err();
             assert!(matches!(error, HairdoError::Malformed { .. }), "{end}: {error}");
@@ -603,7 +607,7 @@ fn blending_is_exact_at_its_ends_and_keeps_lengths() {
 fn order(app: &mut App, order: Order) -> String {
     app.world_mut().write_message(order);
     app.update();
-    app.world().resource::<Hairdos>().told.clone()
+    app.world().resource::<Hairdos>().reported.clone()
 }
 
 #[test]
@@ -622,8 +626,8 @@ fn the_salon_undoes_redoes_saves_and_loads() {
     };
     assert_eq!(undoable(&app), (false, false));
     assert_eq!(order(&mut app, Order::Undo), "there is no such step");
-    treat(&mut app, Treat::wet(hair));
-    treat(&mut app, Treat::set(hair, BondKind::Hydrogen, 0.5).unwrap());
+    treat(&mut app, HairTreatment::wet(hair));
+    treat(&mut app, HairTreatment::set(hair, BondKind::Hydrogen, 0.5).unwrap());
     assert_eq!(rate(&app), 0.5);
     for (step, expected, able) in [
         (Order::Undo, 0.0, (true, true)),
@@ -635,31 +639,31 @@ fn the_salon_undoes_redoes_saves_and_loads() {
         assert_eq!(order(&mut app, step), "");
         assert_eq!((rate(&app), undoable(&app)), (expected, able));
     }
-    treat(&mut app, Treat::dry(hair));
+    treat(&mut app, HairTreatment::dry(hair));
     assert_eq!(undoable(&app), (true, false), "a new way was taken");
 
     let folder = std::env::temp_dir();
     let path = folder.join(format!("bevy_keratin-{}.keratin", std::process::id()));
-    let told = order(&mut app, Order::Save(path.clone()));
-    assert!(told.starts_with("saved"), "{told}");
-    treat(&mut app, Treat::wet(hair));
+    let reported = order(&mut app, Order::Save(path.clone()));
+    assert!(reported.starts_with("saved"), "{reported}");
+    treat(&mut app, HairTreatment::wet(hair));
     assert_eq!(order(&mut app, Order::Load(path.clone())), "loaded");
     assert_eq!(rate(&app), 1.0);
     assert_eq!(order(&mut app, Order::Undo), "");
     assert_eq!(rate(&app), 0.0);
     // a step of other hair waits until it fits
     let more = app.world_mut().spawn((StrandOf(hair), curl(Vec3::X, 9, 0.02, 1.0))).id();
-    let told = order(&mut app, Order::Undo);
-    assert!(told.contains("another groom"), "{told}");
+    let reported = order(&mut app, Order::Undo);
+    assert!(reported.contains("another groom"), "{reported}");
     app.world_mut().despawn(more);
     let able = undoable(&app);
     assert_eq!(able, (true, true));
     std::fs::write(&path, b"no hair").unwrap();
-    let told = order(&mut app, Order::Load(path.clone()));
-    assert!(told.contains("not a hairdo"), "{told}");
+    let reported = order(&mut app, Order::Load(path.clone()));
+    assert!(reported.contains("not a hairdo"), "{reported}");
     std::fs::remove_file(&path).unwrap();
-    let told = order(&mut app, Order::Load(path));
-    assert!(told.contains("keratin: "), "{told}");
+    let reported = order(&mut app, Order::Load(path));
+    assert!(reported.contains("keratin: "), "{reported}");
     assert_eq!(rate(&app), 0.0, "the hair is left alone");
 }
 
@@ -720,4 +724,235 @@ fn two_nodes_are_a_strand_too() {
     apply(&mut app, coarse, &few);
     assert_eq!(Hairdo::from_bytes(&few.to_bytes()).unwrap(), few);
     assert_eq!(Hairdo::blend(&few, &few, 0.5).unwrap().nodes(), 2);
+}
+
+/// A hairdo of one strand of three nodes with a cuticle in the first format, as its description has it.
+const FORMAT_1: &[u8] = include_bytes!("data/format-1.hairdo");
+
+#[test]
+fn files_of_the_first_format_are_read_as_before() {
+    let hairdo = Hairdo::from_bytes(FORMAT_1).unwrap();
+    let strand = &hairdo.strands()[0];
+    let places = [Vec3::ZERO, Vec3::new(0.0, -0.0625, 0.0), Vec3::new(0.0, -0.125, 0.0)];
+    assert_eq!((hairdo.strands().len(), strand.positions()), (1, &places[..]));
+    assert_eq!(strand.joints()[1].rates, [0.25, 1.0, 1.0, 1.0]);
+    assert_eq!(hairdo.cuticle(), Some(Cuticle { damage: 0.5, softening: 0.25 }));
+    assert_eq!((hairdo.look(), hairdo.dye(), hairdo.preset()), (None, &HairDye::default(), None));
+    assert_eq!(hairdo.to_bytes(), FORMAT_1, "and written alike");
+}
+
+fn look() -> HairLook {
+    HairLook {
+        melanin: Melanin::AUBURN,
+        dye: HairColor::new(0.9, 0.8, 0.7),
+        grey: 0.375,
+        shading: HairShading::KajiyaKay,
+        ..default()
+    }
+}
+
+fn dye() -> HairDye {
+    let streaks = Streaks { width: 0.02, seed: 9, ..default() };
+    HairDye::of(DyeLayer::bleached(HairColor::PINK).tips(0.4))
+        .with(DyeLayer { streaks: Some(streaks), ..DyeLayer::bleach(0.5) })
+}
+
+fn preset() -> WornPreset {
+    WornPreset { name: "Curly".into(), seed: 77, length: 1.25 }
+}
+
+/// Hair with looks.
+fn dyed() -> (App, Entity, Vec<u8>) {
+    let (mut app, hair) = treated(2, 5);
+    app.world_mut().entity_mut(hair).insert((look(), dye(), preset()));
+    let bytes = of(&app, hair).to_bytes();
+    (app, hair, bytes)
+}
+
+#[test]
+fn looks_travel_with_the_hairdo() {
+    let (mut app, hair, bytes) = dyed();
+    let read = Hairdo::from_bytes(&bytes).unwrap();
+    assert_eq!((read.look(), read.dye(), read.preset()), (Some(&look()), &dye(), Some(&preset())));
+    assert_eq!(read, of(&app, hair));
+    assert_eq!(read.to_bytes(), bytes);
+    let mean = read.strands().iter().map(|s| s.rest_lengths().iter().sum::<f32>()).sum::<f32>();
+    assert!((read.length() - 0.5 * mean).abs() < 1e-6);
+
+    // Onto other hair, that keeps what it has grown from.
+    let other = curls(&mut app, 3, 9);
+    app.world_mut().entity_mut(other).insert(HairDye::from_color(HairColor::COBALT));
+    queue(&mut app, other, read.clone().put_on_resampled());
+    let world = app.world();
+    assert_eq!(
+        (world.get::<HairLook>(other), world.get::<HairDye>(other)),
+        (Some(&look()), Some(&dye()))
+    );
+    assert_eq!(world.get::<WornPreset>(other), None);
+    // What has no look of its own leaves that of the hair, and takes its dye away.
+    let bare = read.without_looks();
+    apply(&mut app, hair, &bare);
+    let world = app.world();
+    assert_eq!((world.get::<HairLook>(hair), world.get::<HairDye>(hair)), (Some(&look()), None));
+    assert!(faults(&mut app).is_empty());
+}
+
+#[test]
+fn no_flipped_bit_or_cut_in_looks_goes_unnoticed() {
+    let (.., good) = dyed();
+    for bit in 0..good.len() * 8 {
+        let mut bad = good.clone();
+        bad[bit / 8] ^= 1 << (bit % 8);
+        assert!(Hairdo::from_bytes(&bad).is_err(), "bit {bit}");
+    }
+    let payload = &good[HEAD..good.len() - 4];
+    let looks = payload.len() - 220;
+    for end in looks..payload.len() {
+        let error = Hairdo::from_bytes(&sealed(2, &payload[..end])).unwrap_err();
+        assert!(matches!(error, HairdoError::Malformed { .. }), "{end}: {error}");
+    }
+    // Changed and sealed: told, or a hairdo that can be written again.
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+    let mut read = 0;
+    for _ in 0..5000 {
+        let mut changed = payload.to_vec();
+        let at = random.random_range(looks..changed.len());
+        changed[at] = random.random();
+        if let Ok(hairdo) = Hairdo::from_bytes(&sealed(2, &changed)) {
+            read += 1;
+            assert_eq!(Hairdo::from_bytes(&hairdo.to_bytes()).unwrap(), hairdo);
+        }
+    }
+    println!("{read} of 5000 could be read");
+    assert!(read > 500);
+}
+
+#[test]
+fn looks_that_cannot_be_are_reported() {
+    let (.., good) = dyed();
+    let mut payload = good[HEAD..good.len() - 4].to_vec();
+    let grey = 0.375f32.to_le_bytes();
+    let at = payload.windows(4).rposition(|w| w == grey).unwrap();
+    payload[at..at + 4].copy_from_slice(&7f32.to_le_bytes());
+    let error = Hairdo::from_bytes(&sealed(2, &payload)).unwrap_err();
+    assert!(error.to_string().contains("HairLook::grey is 7, expected 0 to 1"), "{error}");
+}
+
+#[test]
+fn looks_are_blended_by_what_they_absorb() {
+    let (mut app, hair) = treated(2, 5);
+    let of_look = |app: &mut App, melanin, dye: HairDye| {
+        app.world_mut().entity_mut(hair).insert((HairLook { melanin, ..default() }, dye));
+        of(app, hair)
+    };
+    let pink = HairDye::pink();
+    let black = of_look(&mut app, Melanin::BLACK, HairDye::default());
+    let blond = of_look(&mut app, Melanin::BLOND, pink.clone());
+    for (t, end) in [(0.0, &black), (1.0, &blond)] {
+        assert_eq!(Hairdo::blend(&black, &blond, t).unwrap().to_bytes(), end.to_bytes());
+    }
+    let half = Hairdo::blend(&black, &blond, 0.5).unwrap();
+    let absorbed = half.look().unwrap().melanin.absorption();
+    let expected = 0.5 * (Melanin::BLACK.absorption() + Melanin::BLOND.absorption());
+    assert!(absorbed.distance(expected) < 1e-6);
+    let layer = half.dye().layers[0];
+    assert_eq!((half.dye().layers.len(), layer.bleach), (1, 0.5));
+    let expected = 0.5 * HairColor::PINK.absorption();
+    assert!(layer.absorption().distance(expected) < 1e-6);
+}
+
+#[test]
+fn dyes_fade_into_each_other_without_a_jump() {
+    let (mut app, hair) = treated(2, 5);
+    let streaks = HairDye::of(DyeLayer::bleached(HairColor::COBALT).in_streaks(0.4));
+    let mut with = |dye: HairDye| {
+        app.world_mut().entity_mut(hair).insert(dye);
+        of(&app, hair)
+    };
+    let hairdos = [HairDye::pink(), HairDye::default(), streaks].map(&mut with);
+    let natural = Melanin::BROWN.absorption();
+    for (a, b) in [(0, 1), (1, 2), (0, 2), (2, 0)] {
+        let (a, b) = (&hairdos[a], &hairdos[b]);
+        let at = |t: f32| {
+            let dye = Hairdo::blend(a, b, t).unwrap().dye().clone();
+            dye.absorption(natural, 0.5, |_| true)
+        };
+        let mut before = at(0.0);
+        assert_eq!(before, a.dye().absorption(natural, 0.5, |_| true));
+        for step in 1..=200 {
+            let now = at(step as f32 * 0.005);
+            assert!(now.distance(before) < 0.02, "{before} jumps to {now}");
+            before = now;
+        }
+        assert_eq!(before, b.dye().absorption(natural, 0.5, |_| true));
+    }
+}
+
+#[derive(Resource, Default)]
+struct Answers {
+    taken: Vec<(Entity, Hairdo)>,
+    put_on: Vec<Entity>,
+    refused: Vec<(Entity, HairdoError)>,
+}
+
+#[test]
+fn systems_take_and_put_on_by_events() {
+    let (mut app, hair, _) = dyed();
+    let twin = curls(&mut app, 2, 5);
+    let other = curls(&mut app, 4, 9);
+    app.init_resource::<Answers>()
+        .add_observer(|of: On<HairdoTaken>, mut reported: ResMut<Answers>| {
+            reported.taken.push((of.entity, of.hairdo.clone()));
+        })
+        .add_observer(|of: On<HairdoPutOn>, mut reported: ResMut<Answers>| {
+            reported.put_on.push(of.entity);
+        })
+        .add_observer(|of: On<HairdoRefused>, mut reported: ResMut<Answers>| {
+            reported.refused.push((of.entity, of.error.clone()));
+        });
+    app.add_systems(
+        Update,
+        (move |mut commands: Commands, mut done: Local<bool>| {
+            if !core::mem::replace(&mut *done, true) {
+                commands.trigger(TakeHairdo { entity: hair });
+            }
+        },),
+    );
+    app.update();
+    let [(from, hairdo)] = &app.world().resource::<Answers>().taken[..] else {
+        panic!("one answer")
+    };
+    let (from, hairdo) = (*from, hairdo.clone());
+    assert_eq!((from, &hairdo), (hair, &of(&app, hair)));
+    let strand = members(&app, hair)[0];
+    for entity in [twin, other, strand] {
+        let request = PutOnHairdo { entity, hairdo: hairdo.clone() };
+        app.world_mut().commands().trigger(request);
+    }
+    app.world_mut().flush();
+    app.world_mut().commands().trigger(TakeHairdo { entity: strand });
+    app.world_mut().flush();
+    let reported = app.world().resource::<Answers>();
+    assert_eq!(reported.put_on, [twin, other]);
+    let refused = HairdoError::NoHair { entity: strand };
+    assert_eq!(reported.refused, [(strand, refused.clone()), (strand, refused)]);
+    assert_eq!(of(&app, twin).strands()[1].joints(), hairdo.strands()[1].joints());
+    assert_eq!(app.world().get::<HairDye>(other), Some(&dye()));
+    app.update();
+    assert_eq!(fault_kinds(&mut app), [FaultKind::Hairdo; 2]);
+}
+
+#[test]
+fn a_hairdo_is_known_to_reflection() {
+    use bevy::ecs::reflect::AppTypeRegistry;
+    let (app, hair, _) = dyed();
+    let hairdo = of(&app, hair);
+    let copy: Box<dyn PartialReflect> = hairdo.reflect_clone().unwrap().into_partial_reflect();
+    assert_eq!(Hairdo::take_from_reflect(copy).unwrap(), hairdo);
+    let dye = <HairDye as FromReflect>::from_reflect(dye().to_dynamic().as_ref()).unwrap();
+    assert_eq!(dye, self::dye());
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    for name in ["Hairdo", "HairDye", "DyeLayer", "HairLook", "WornPreset", "PutOnHairdo"] {
+        assert!(registry.get_with_short_type_path(name).is_some(), "{name}");
+    }
 }

@@ -214,7 +214,7 @@ fn bad_weights_count_as_none_and_break_nothing() {
     assert_eq!(faults(&mut app), []);
 }
 
-/// What is wrong is told once, with its numbers, and strands stay where they are.
+/// Errors are reported once, with their numbers, and strands stay where they are.
 #[test]
 fn roots_that_fit_no_mesh_tell_what_was_expected() {
     let mut app = app_with_meshes(60.0);
@@ -250,8 +250,10 @@ fn roots_that_fit_no_mesh_tell_what_was_expected() {
             ..default()
         });
         run(&mut app, 0.2);
-        let told = faults(&mut app);
-        assert!(matches!(&told[..], [f] if f.kind == FaultKind::Roots && f.cause() == Some(&why)));
+        let reported = faults(&mut app);
+        assert!(
+            matches!(&reported[..], [f] if f.kind == FaultKind::Roots && f.cause() == Some(&why))
+        );
         assert_eq!(strand(&app, id).positions()[0], before);
     }
 }

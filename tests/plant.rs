@@ -131,7 +131,7 @@ fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
         nodes: 40,
         curl: Some(Curl::default()),
         clump: Some(Clump::default()),
-        fall: Some(Fall::default()),
+        drape: Some(Drape::default()),
         ..default()
     };
     let ball = Sphere::new(0.1).mesh().ico(10).unwrap();
@@ -227,7 +227,7 @@ fn vertex_colours_and_images_are_masks() {
     assert_eq!(image.at(Vec2::splat(1.25)), 1.0);
     assert!((image.at(Vec2::new(0.5, 0.25)) - 0.5).abs() < 1e-6);
     assert_eq!(image.at(Vec2::new(f32::NAN, 0.5)), 0.0);
-    let painted = image.share();
+    let painted = image.mask();
     let maps = PlantingMaps::new().density(&painted);
     let planted = straight(5e4).plant_with(&mesh, &maps).unwrap();
     assert!((planted.groom.len() as f32 / all - 0.25).abs() < 0.02);
@@ -293,7 +293,7 @@ fn strands_are_as_long_as_asked_and_evenly_divided() {
     let ball = Sphere::new(0.1).mesh().ico(10).unwrap();
     let fallen = Planting {
         clump: Some(Clump::default()),
-        fall: Some(Fall::default()),
+        drape: Some(Drape::default()),
         length: 0.25,
         nodes: 20,
         ..straight(1e4)
@@ -375,18 +375,18 @@ fn strands_lean_the_way_they_are_combed() {
         assert!(way.distance(Vec3::Y) < 1e-4);
     }
     let along = Vec3::new(1.0, 5.0, 1.0);
-    expect(Planting { comb: Comb::Along(along), ..base }, &|_| Vec3::new(1.0, 0.0, 1.0));
+    expect(Planting { comb: CombPattern::Along(along), ..base }, &|_| Vec3::new(1.0, 0.0, 1.0));
     let center = Vec3::new(0.02, 0.0, 0.01);
-    let whorl = |turn| Planting { comb: Comb::Whorl { center, turn }, ..base };
+    let whorl = |turn| Planting { comb: CombPattern::Whorl { center, turn }, ..base };
     expect(whorl(0.0), &|root| root - center);
     expect(whorl(PI), &|root| center - root);
     expect(whorl(0.5 * PI), &|root| Vec3::Y.cross(root - center));
-    let parted = Comb::Parted { at: Vec3::ZERO, across: Vec3::X, along: Vec3::Z };
+    let parted = CombPattern::Parted { at: Vec3::ZERO, across: Vec3::X, along: Vec3::Z };
     expect(Planting { comb: parted, ..base }, &|root| Vec3::new(root.x.signum(), 0.0, 1.0));
     // A map goes before the settings.
     let field = |place: &RootPlace| Vec3::new(-place.position.z, 0.0, place.position.x);
     let maps = PlantingMaps::new().direction(&field);
-    let mapped = Planting { comb: Comb::Along(Vec3::X), ..base }
+    let mapped = Planting { comb: CombPattern::Along(Vec3::X), ..base }
         .plant_with(&plane(0.2, 0.2), &maps)
         .unwrap();
     for strand in mapped.groom.strands() {
@@ -394,7 +394,8 @@ fn strands_lean_the_way_they_are_combed() {
         assert!(way.xz().normalize().distance(Vec2::new(-root.z, root.x).normalize()) < 1e-2);
     }
     // Flat to the scalp and jittered: still out of it.
-    let flat = Planting { lean: 1.4, jitter: 0.5, comb: Comb::Along(Vec3::X), ..straight(5e3) };
+    let flat =
+        Planting { lean: 1.4, jitter: 0.5, comb: CombPattern::Along(Vec3::X), ..straight(5e3) };
     for (_, way) in directions(flat) {
         assert!(way.y > 0.09, "{way}");
     }
@@ -438,9 +439,9 @@ fn falling_hair_lies_on_the_mesh_and_ends_below() {
             length: 0.3,
             nodes: 60,
             lean: 1.0,
-            comb: Comb::Whorl { center: Vec3::Y * 0.09, turn: 0.3 },
+            comb: CombPattern::Whorl { center: Vec3::Y * 0.09, turn: 0.3 },
             curl,
-            fall: Some(Fall::default()),
+            drape: Some(Drape::default()),
             ..straight(1e4)
         };
         let planted = planting.plant_with(&ball, &maps).unwrap();
@@ -461,7 +462,7 @@ fn a_cut_ends_strands_at_its_plane() {
     let planting = Planting {
         length: 0.4,
         nodes: 40,
-        fall: Some(Fall::default()),
+        drape: Some(Drape::default()),
         cut: Some(cut),
         ..straight(1e4)
     };
@@ -507,7 +508,7 @@ fn lists_strips_and_indices_say_the_same() {
         mesh(list, pick(&[0, 1, 2, 2, 1, 3])),
         mesh(strip, corners.clone()),
         mesh(strip, corners.clone()).with_inserted_indices(Indices::U16(vec![0, 1, 2, 3])),
-        // Twice the first triangle's edge, as strips are joined; then begun anew.
+        // Twice the first triangle's edge, as strips are joined; then restarted.
         mesh(strip, corners.clone()).with_inserted_indices(Indices::U16(vec![0, 0, 0, 1, 2, 3])),
         mesh(strip, corners.clone()).with_inserted_indices(Indices::U16(vec![
             0,
@@ -587,7 +588,8 @@ fn what_cannot_be_planted_says_why() {
 
     let curl =
         |radius, pitch, variation| Some(Curl { radius, pitch, variation, phase: CurlPhase::Same });
-    let fall = |toward, over, clearance, layering| Some(Fall { toward, over, clearance, layering });
+    let drape =
+        |toward, over, clearance, layering| Some(Drape { toward, over, clearance, layering });
     let down = Vec3::NEG_Y;
     let odd = [
         ("density", Planting { density: f32::NAN, ..base }),
@@ -600,22 +602,22 @@ fn what_cannot_be_planted_says_why() {
         ("length_variation", Planting { length_variation: 1.0, ..base }),
         ("lean", Planting { lean: 1.6, ..base }),
         ("jitter", Planting { jitter: -0.1, ..base }),
-        ("Comb::Along", Planting { comb: Comb::Along(Vec3::ZERO), ..base }),
-        ("Comb::Along", Planting { comb: Comb::Along(Vec3::NAN), ..base }),
-        ("turn", Planting { comb: Comb::Whorl { center: Vec3::Y, turn: f32::NAN }, ..base }),
+        ("CombPattern::Along", Planting { comb: CombPattern::Along(Vec3::ZERO), ..base }),
+        ("CombPattern::Along", Planting { comb: CombPattern::Along(Vec3::NAN), ..base }),
+        ("turn", Planting { comb: CombPattern::Whorl { center: Vec3::Y, turn: f32::NAN }, ..base }),
         (
             "Whorl::center",
-            Planting { comb: Comb::Whorl { center: Vec3::INFINITY, turn: 0.0 }, ..base },
+            Planting { comb: CombPattern::Whorl { center: Vec3::INFINITY, turn: 0.0 }, ..base },
         ),
         ("radius", Planting { curl: curl(0.0, 0.02, 0.0), ..base }),
         ("pitch", Planting { curl: curl(5e-3, f32::NAN, 0.0), ..base }),
         ("variation", Planting { curl: curl(5e-3, 0.05, 2.0), ..base }),
         ("spacing", Planting { clump: Some(Clump { spacing: 0.0, strength: 0.5 }), ..base }),
         ("strength", Planting { clump: Some(Clump { spacing: 0.1, strength: 1.0 }), ..base }),
-        ("Fall::toward", Planting { fall: fall(Vec3::ZERO, 0.1, 0.0, 0.0), ..base }),
-        ("over", Planting { fall: fall(down, 0.0, 0.0, 0.0), ..base }),
-        ("clearance", Planting { fall: fall(down, 0.1, -1.0, 0.0), ..base }),
-        ("layering", Planting { fall: fall(down, 0.1, 0.0, f32::NAN), ..base }),
+        ("Drape::toward", Planting { drape: drape(Vec3::ZERO, 0.1, 0.0, 0.0), ..base }),
+        ("over", Planting { drape: drape(down, 0.0, 0.0, 0.0), ..base }),
+        ("clearance", Planting { drape: drape(down, 0.1, -1.0, 0.0), ..base }),
+        ("layering", Planting { drape: drape(down, 0.1, 0.0, f32::NAN), ..base }),
         ("Cut::normal", Planting { cut: Some(Cut { normal: Vec3::ZERO, ..default() }), ..base }),
         ("least", Planting { cut: Some(Cut { least: 0.0, ..default() }), ..base }),
     ];
@@ -642,7 +644,7 @@ fn the_hairline_leaves_face_and_ears_free() {
     let at = |right: f32, up: f32, front: f32| {
         let place = Vec3::new(right, up, front);
         let (share, mirrored) =
-            (scalp.share(place), scalp.share(place * Vec3::new(-1.0, 1.0, 1.0)));
+            (scalp.density(place), scalp.density(place * Vec3::new(-1.0, 1.0, 1.0)));
         assert!((share - mirrored).abs() < 1e-6);
         share
     };
@@ -655,10 +657,12 @@ fn the_hairline_leaves_face_and_ears_free() {
     assert_eq!(at(f32::NAN, 0.0, 0.0), 0.0);
     // Turned with its head.
     let lying = Scalp { up: Dir3::X, front: Dir3::Y, ..scalp };
-    assert_eq!(lying.share(Vec3::X), 1.0);
-    assert_eq!(lying.share(Vec3::new(0.05, 0.08, 0.0)), 0.0);
+    assert_eq!(lying.density(Vec3::X), 1.0);
+    assert_eq!(lying.density(Vec3::new(0.05, 0.08, 0.0)), 0.0);
     let receded = Scalp { recede: 0.3, ..scalp };
-    assert!(receded.share(Vec3::new(0.0, 0.08, 0.06)) < scalp.share(Vec3::new(0.0, 0.08, 0.06)));
+    assert!(
+        receded.density(Vec3::new(0.0, 0.08, 0.06)) < scalp.density(Vec3::new(0.0, 0.08, 0.06))
+    );
 }
 
 /// Each preset on a ball of a head: no strand is torn, restless or in the head a second after it
@@ -736,7 +740,7 @@ proptest! {
             nodes,
             curl: curls.then_some(Curl { radius: 4e-3, pitch: 0.1, ..default() }),
             clump: curls.then_some(Clump::default()),
-            fall: falls.then_some(Fall::default()),
+            drape: falls.then_some(Drape::default()),
             ..default()
         };
         // What a mesh of 50 m would carry is not the point.

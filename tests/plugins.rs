@@ -54,10 +54,9 @@ fn all_parts_switch_off_together() {
     falls("all of them", none);
 }
 
-#[test]
-fn hair_is_drawn_without_them() {
-    let none = OPTIONAL.iter().fold(HairPlugins::default().build(), |group, (_, off)| off(group));
-    let Some(mut scene) = Offscreen::with_plugins(160, 120, none) else { return };
+/// A head of hair, drawn with these plugins.
+fn is_drawn(what: &str, plugins: PluginGroupBuilder) {
+    let Some(mut scene) = Offscreen::with_plugins(160, 120, plugins) else { return };
     let hair = scene.app.world_mut().spawn((Hair, Transform::default())).id();
     scene.app.world_mut().spawn((DirectionalLight::default(), Transform::default()));
     for line in offscreen::head_of_guides(60, 0.1, 0.1, 6) {
@@ -66,5 +65,18 @@ fn hair_is_drawn_without_them() {
     scene.ticking(1);
     scene.look(Vec3::new(0.0, 0.1, 0.6), Vec3::ZERO);
     let covered = scene.draw().covered([0; 3]);
-    assert!(covered > 300, "{covered} pixels of hair");
+    assert!(covered > 300, "without {what}: {covered} pixels of hair");
+}
+
+#[test]
+fn hair_is_drawn_without_any_one_of_them() {
+    for (what, switch) in OPTIONAL {
+        is_drawn(what, switch(HairPlugins::default().build()));
+    }
+}
+
+#[test]
+fn hair_is_drawn_without_all_of_them() {
+    let none = OPTIONAL.iter().fold(HairPlugins::default().build(), |group, (_, off)| off(group));
+    is_drawn("all of them", none);
 }

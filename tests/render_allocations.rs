@@ -40,7 +40,7 @@ mod counting {
         if !HERE.try_with(Cell::get).unwrap_or(false) || std::thread::panicking() {
             return;
         }
-        // Looking at who called allocates, too.
+        // Capturing a backtrace allocates, too.
         HERE.set(false);
         let counts = !OURS.get() || {
             let stack = Backtrace::force_capture().to_string();
@@ -79,7 +79,7 @@ mod counting {
     }
 
     /// From here on those of this thread's allocations count that have the crate's code on the
-    /// stack. Whoever takes a backtrace meanwhile, as wgpu may, waits for ever.
+    /// stack. A thread that takes a backtrace meanwhile, as wgpu may, waits for ever.
     pub fn begin_ours() {
         OURS.set(true);
         HERE.set(true);
@@ -117,7 +117,7 @@ fn least(scene: &mut Offscreen) -> u64 {
     (0..12).map(frame).min().unwrap_or(0)
 }
 
-fn grow(world: &mut World, place: f32) {
+fn spawn_hair(world: &mut World, place: f32) {
     let parts = (HairFollowers::new(20), Transform::from_xyz(place, 0.1, 0.0));
     let hair = world.spawn((Hair, parts)).id();
     for i in 0..40 {
@@ -146,12 +146,12 @@ fn drawing_allocates_nothing_once_it_runs() {
             }
         }
         let none = least(&mut scene);
-        grow(scene.app.world_mut(), 0.0);
+        spawn_hair(scene.app.world_mut(), 0.0);
         counted();
         scene.app.update();
         let appearing = counted();
         let one = least(&mut scene);
-        (0..3).for_each(|k| grow(scene.app.world_mut(), 0.1 * (k + 1) as f32));
+        (0..3).for_each(|k| spawn_hair(scene.app.world_mut(), 0.1 * (k + 1) as f32));
         let four = least(&mut scene);
         println!("{stage:?}: {none} without hair, {one} with one, {four} with four");
         match stage {

@@ -56,8 +56,8 @@ fn a_renderer_without_a_device_is_fine() {
             app.add_plugins((bevy, HairPlugins::default()));
         }
         let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
-        let told = Told::default();
-        tracing::subscriber::with_default(told.clone(), || {
+        let reported = Reported::default();
+        tracing::subscriber::with_default(reported.clone(), || {
             app.finish();
             app.cleanup();
             for _ in 0..3 {
@@ -65,23 +65,23 @@ fn a_renderer_without_a_device_is_fine() {
             }
         });
         assert!(app.world().get::<Strands>(hair).is_some());
-        let told = told.0.lock().unwrap();
-        assert_eq!(told.len(), 1, "one message: {told:?}");
-        assert!(told[0].contains("no graphics device"), "{told:?}");
+        let reported = reported.0.lock().unwrap();
+        assert_eq!(reported.len(), 1, "one message: {reported:?}");
+        assert!(reported[0].contains("no graphics device"), "{reported:?}");
     }
 }
 
 /// What the crate has logged.
 #[derive(Clone, Default)]
-struct Told(Arc<Mutex<Vec<String>>>);
+struct Reported(Arc<Mutex<Vec<String>>>);
 
-impl tracing::field::Visit for Told {
+impl tracing::field::Visit for Reported {
     fn record_debug(&mut self, _: &tracing::field::Field, value: &dyn core::fmt::Debug) {
         self.0.lock().unwrap().push(format!("{value:?}"));
     }
 }
 
-impl tracing::Subscriber for Told {
+impl tracing::Subscriber for Reported {
     fn enabled(&self, metadata: &tracing::Metadata<'_>) -> bool {
         metadata.is_event() && metadata.target().starts_with("bevy_keratin")
     }

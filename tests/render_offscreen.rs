@@ -407,7 +407,7 @@ fn prepasses_leave_no_holes_and_motion_moves_nothing() {
 }
 
 #[test]
-fn followers_are_laid_anew_when_roots_are_edited_and_rest() {
+fn followers_are_laid_out_again_when_roots_are_edited_and_rest() {
     let Some(mut scene) = Offscreen::new(120, 120) else {
         return;
     };
@@ -615,7 +615,7 @@ fn views_do_not_disturb_each_other_nor_does_a_minimised_window() {
     let target = RenderTarget::Window(WindowRef::Entity(window));
     world.spawn((Camera3d::default(), after(2), target, close));
     assert!(scene.draw() == alone, "the first view is as it was");
-    let share = scene.app.world().get::<ScreenShare>(hair).unwrap().0;
+    let share = scene.app.world().get::<HairScreenShare>(hair).unwrap().0;
     assert!(share.is_finite() && share > 0.1, "{share}");
     assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
 }

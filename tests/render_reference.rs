@@ -93,7 +93,7 @@ impl Bench {
         Some(Self { scene, sun, hair })
     }
 
-    /// With `gain` times as much light, which is divided out by whoever measures.
+    /// With `gain` times as much light, which measurements divide out.
     fn draw(&mut self, name: &str, to_light: Vec3, eumelanin: f32, gain: f32) -> (Picture, f32) {
         let look = HairLook {
             melanin: Melanin::new(eumelanin, 0.0),

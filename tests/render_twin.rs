@@ -22,7 +22,7 @@ use bevy::{
     shader::ShaderDefVal,
 };
 use bevy_keratin::render::{
-    DrawnStrand, HairFollowers, ToMiddle,
+    DrawnStrand, HairFollowers, LockOffset,
     curve::{CurvePoint, Guide, strand_point},
     fibre::{Angles, Optics, Passage},
 };
@@ -31,7 +31,7 @@ use offscreen::Offscreen;
 const SAMPLES: usize = 24;
 const SHADER: &str = "
 #import bevy_keratin::strands::{strands, strand_point, past_strand_position}
-@group(0) @binding(4) var<storage, read_write> out: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> out: array<vec4<f32>>;
 @compute @workgroup_size(1)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let t = f32(id.y) / f32(SAMPLES - 1u);
@@ -127,17 +127,17 @@ fn random_strand(random: &mut Random, k: u32) -> DrawnStrand {
     }
 }
 
-fn random_lock(random: &mut Random) -> ToMiddle {
+fn random_lock(random: &mut Random) -> LockOffset {
     let (u, v) = (random.share() - 0.5, random.share() - 0.5);
-    ToMiddle { root: random.vector() * 0.02, weights: [-u - v, u, v] }
+    LockOffset { root: random.vector() * 0.02, weights: [-u - v, u, v] }
 }
 
-/// What a compute shader writes to its fifth binding, given a uniform and three buffers.
+/// What a compute shader writes to its last binding, given a uniform and four buffers.
 fn compute(
     scene: &mut Offscreen,
     source: &'static str,
     shader_defs: Vec<ShaderDefVal>,
-    inputs: [&[u32]; 4],
+    inputs: [&[u32]; 5],
     [x, y]: [u32; 2],
     numbers: usize,
 ) -> Vec<f32> {
@@ -150,6 +150,7 @@ fn compute(
             ShaderStages::COMPUTE,
             (
                 uniform_buffer_sized(false, None),
+                read(),
                 read(),
                 read(),
                 read(),
@@ -199,7 +200,7 @@ fn compute(
     let out = made(storage | BufferUsages::COPY_SRC);
     let back = made(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
     let uniform = buffer(inputs[0], BufferUsages::UNIFORM);
-    let [a, b, c] = [1, 2, 3].map(|i| buffer(inputs[i], storage));
+    let [a, b, c, d] = [1, 2, 3, 4].map(|i| buffer(inputs[i], storage));
     let group = device.create_bind_group(
         None,
         &pipelines.get_bind_group_layout(&layout),
@@ -208,6 +209,7 @@ fn compute(
             a.as_entire_binding(),
             b.as_entire_binding(),
             c.as_entire_binding(),
+            d.as_entire_binding(),
             out.as_entire_binding(),
         )),
     );
@@ -250,7 +252,8 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         ranges.push([nodes.len() as u32, guide.nodes.len() as u32]);
         nodes.extend(guide.packed());
     }
-    let mut ribbon = [0.0f32; 32];
+    // Of the size of the shader's uniform: no dye, so only its head counts.
+    let mut ribbon = [0.0f32; 64];
     ribbon[23] = followers.frizz;
     ribbon[24..27].copy_from_slice(&followers.locks.to_array());
     ribbon[27] = followers.lock_shape;
@@ -265,6 +268,7 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         nodes.as_flattened(),
         ranges.as_flattened(),
         packed.as_flattened(),
+        &[0][..],
     ];
     let groups = [strands.len() as u32, SAMPLES as u32];
     let out = compute(&mut scene, SHADER, defs, inputs, groups, strands.len() * SAMPLES * 12);
@@ -306,7 +310,7 @@ const FIBRE: &str = "
 @group(0) @binding(1) var<storage, read> fibres: array<array<vec4<f32>, 4>>;
 @group(0) @binding(2) var<storage, read> unused: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> unused_too: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read_write> out: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> out: array<vec4<f32>>;
 @compute @workgroup_size(1)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let f = fibres[id.x];
@@ -340,7 +344,8 @@ fn the_shader_lights_fibres_as_its_rust_twin_does() {
     let bits = |v: &Vec4| v.to_array().map(f32::to_bits);
     let words: Vec<u32> = fibres.iter().flatten().flat_map(bits).collect();
     let tangent_words = bits(&tangent.extend(0.0));
-    let inputs = [&tangent_words[..], &words[..], &[0; 4][..], &[0; 4][..]];
+    let none = &[0; 4][..];
+    let inputs = [&tangent_words[..], &words[..], none, none, none];
     let out = compute(&mut scene, FIBRE, Vec::new(), inputs, [COUNT as u32, 1], 4 * COUNT);
     let (mut worst, mut sum) = (0.0f32, 0.0);
     for (f, sent) in fibres.iter().zip(out.chunks_exact(4)) {

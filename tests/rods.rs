@@ -2,7 +2,9 @@
 
 mod common;
 use bevy::prelude::*;
-use bevy_keratin::{Cuticle, prelude::*, rod::stiffness::REFERENCE_GRAVITY};
+use bevy_keratin::{
+    Cuticle, SolverMethod, StretchProjection, Sweeps, prelude::*, rod::stiffness::REFERENCE_GRAVITY,
+};
 use common::*;
 
 fn no_wear(app: &mut App) {
@@ -19,7 +21,7 @@ fn cantilever(hertz: f64, method: SolverMethod, segments: usize, bending_length:
     no_wear(&mut app);
     app.insert_resource(HairDefault(AirDrag { rate: 8.0 }))
         .insert_resource(HairDefault(HairSolver { method, ..default() }))
-        .insert_resource(HairDefault(Stiffness::from_bending_length(bending_length).unwrap()));
+        .insert_resource(HairDefault(HairStiffness::from_bending_length(bending_length).unwrap()));
     let (_, entity) = one_strand(&mut app, 0.24, segments, Vec3::X);
     run(&mut app, 10.0);
     settle(&mut app, entity, 60.0);
@@ -44,9 +46,10 @@ fn sag_grows_as_bonds_break() {
         let mut app = test_app(60.0);
         no_wear(&mut app);
         app.insert_resource(HairDefault(AirDrag { rate: 8.0 }))
-            .insert_resource(HairDefault(Stiffness::from_bending_length(0.3).unwrap()));
+            .insert_resource(HairDefault(HairStiffness::from_bending_length(0.3).unwrap()));
         let (_, entity) = one_strand(&mut app, 0.24, 8, Vec3::X);
-        app.world_mut().write_message(Treat::set(entity, BondKind::Hydrogen, rate).unwrap());
+        app.world_mut()
+            .write_message(HairTreatment::set(entity, BondKind::Hydrogen, rate).unwrap());
         run(&mut app, 20.0);
         settle(&mut app, entity, 60.0);
         -tip(&app, entity).y
@@ -105,7 +108,7 @@ fn literal_projections_can_be_chosen_and_stretch_more() {
 }
 
 /// Kinetic, gravitational and elastic energy of a strand, per mass of one node (m²/s²).
-fn energy(strand: &Strand, stiffness: &Stiffness) -> f64 {
+fn energy(strand: &Strand, stiffness: &HairStiffness) -> f64 {
     let n = strand.nodes();
     let l = strand.rest_lengths()[0];
     let mass = |i: usize| if i + 1 == n { 0.5 } else { 1.0 };
@@ -155,7 +158,7 @@ fn long_hair_holds_its_length_when_shaken_and_comes_to_rest() {
     // What velocities and bends hold at the end of a substep sways against each other by a few per
     // cent, as in any staggered integrator, and shear that five iterations leave holds a little too.
     // So the energy is compared by its maxima over quarters of a second.
-    let stiffness = Stiffness::default();
+    let stiffness = HairStiffness::default();
     let mut before = f64::INFINITY;
     for _ in 0..28 {
         let mut highest = f64::NEG_INFINITY;
@@ -224,4 +227,42 @@ fn scale_changes_nothing_in_the_hairs_own_units() {
     };
     assert_eq!(tip_at(1.0), tip_at(0.01));
     assert_eq!(tip_at(1.0), tip_at(100.0));
+}
+
+/// Blocks are used again for other strands, which may be far from any obstacle.
+#[test]
+fn a_block_keeps_nothing_of_the_strands_before() {
+    use bevy_keratin::{
+        lanes::LANES,
+        rod::{
+            block::BlockLanes,
+            direct::{DirectParams, step, weigh},
+        },
+    };
+    let stepped = |rested: f32| {
+        let mut block = BlockLanes::default();
+        block.resize(9);
+        for (i, node) in block.nodes.iter_mut().enumerate() {
+            node.p[0] = [0.02 * i as f32; LANES];
+            // So fast that they take two Newton steps.
+            node.v[1] = [-(i as f32); LANES];
+            node.w = [if i == 0 { 0.0 } else { 1.0 }; LANES];
+            node.rests_on[1] = [rested; LANES];
+        }
+        let along_x = Quat::from_rotation_y(core::f32::consts::FRAC_PI_2).to_array();
+        for edge in &mut block.edges {
+            edge.q = along_x.map(|x| [x; LANES]);
+            edge.rest = [0.0, 0.0, 0.0, 1.0].map(|x| [x; LANES]);
+            (edge.l, edge.k) = ([0.02; LANES], [1.0; LANES]);
+        }
+        (block.root, block.root_from) = (block.edges[0].q, block.edges[0].q);
+        let level = fearless_simd::Level::new();
+        let dt = 1.0 / 180.0;
+        let gravity = Vec3::NEG_Y * REFERENCE_GRAVITY;
+        let params = DirectParams { dt, gravity, damping: 0.01, limiter_steps: 6, clearance: 1e-3 };
+        weigh(level, &mut block, 0.13, dt);
+        step(level, &mut block, &params, &[]);
+        block.nodes.iter().map(|n| n.p).collect::<Vec<_>>()
+    };
+    assert_eq!(stepped(1.0), stepped(0.0));
 }

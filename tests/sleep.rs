@@ -2,7 +2,7 @@
 
 mod common;
 use bevy::prelude::*;
-use bevy_keratin::{Sleepers, StrandError, prelude::*};
+use bevy_keratin::{Sleepers, SolverMethod, StrandError, Sweeps, prelude::*};
 use common::*;
 use std::time::Instant;
 
@@ -24,7 +24,7 @@ fn bits(strand: &Strand) -> Vec<[u32; 3]> {
 }
 
 /// Hair that bends and swings before it lies still, on a head or off it.
-fn tuft(app: &mut App, strands: usize) -> (Entity, Vec<Entity>) {
+fn lock(app: &mut App, strands: usize) -> (Entity, Vec<Entity>) {
     let hair = app.world_mut().spawn(Hair).id();
     let grow = |i: usize| {
         let root = Vec3::new((i % 10) as f32, 0.0, (i / 10) as f32) * 3e-3;
@@ -81,7 +81,7 @@ fn hair_at_rest_falls_asleep_and_then_stays_to_the_last_bit() {
     let mut app = test_app(60.0);
     app.world_mut()
         .spawn((HairCollider::sphere(0.05).unwrap(), Transform::from_xyz(0.1, -0.06, 0.0)));
-    let (hair, ids) = tuft(&mut app, 60);
+    let (hair, ids) = lock(&mut app, 60);
     run(&mut app, 0.2);
     assert_eq!(*app.world().get::<Sleepers>(hair).unwrap(), Sleepers { asleep: 0, awake: 60 });
     let seconds = until_asleep(&mut app, hair, 30.0);
@@ -117,7 +117,7 @@ fn a_swing_does_not_fall_asleep_at_its_turning_points() {
     let mut app = test_app(60.0);
     app.insert_resource(HairGravity(Vec3::NEG_Y * 0.1))
         .insert_resource(HairDefault(AirDrag { rate: 0.0 }))
-        .insert_resource(HairDefault(Stiffness::from_bending_length(0.01).unwrap()));
+        .insert_resource(HairDefault(HairStiffness::from_bending_length(0.01).unwrap()));
     let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::new(0.2, -1.0, 0.0).normalize());
     let (mut turns, mut before) = (0, 0.0);
     for _ in 0..60 * 20 {
@@ -155,7 +155,7 @@ fn a_head_that_creeps_is_noticed_in_time() {
 #[test]
 fn gravity_wakes_it() {
     wakes(|app, _, _| no_gravity(app));
-    // The same again is no news.
+    // The same again is no change.
     let (mut app, _, e) = sleeper();
     app.insert_resource(HairGravity::default());
     run(&mut app, 0.1);
@@ -275,13 +275,13 @@ fn bonds_that_change_wake_it_and_keep_it_awake() {
     });
     wakes(|app, _, e| app.world_mut().get_mut::<Bonds>(e).unwrap().joints[2].rates[0] = 0.5);
     wakes(|app, hair, _| {
-        app.world_mut().write_message(Treat::wet(hair));
+        app.world_mut().write_message(HairTreatment::wet(hair));
     });
     let (mut app, hair, e) = sleeper();
-    app.world_mut().write_message(Treat::wet(hair));
+    app.world_mut().write_message(HairTreatment::wet(hair));
     run(&mut app, 3.0);
     assert!(is_asleep(&app, e), "open bonds alone keep nobody awake");
-    app.world_mut().write_message(Treat::dry(hair).over(2.0));
+    app.world_mut().write_message(HairTreatment::dry(hair).over(2.0));
     app.update();
     app.update();
     for _ in 0..110 {
@@ -295,7 +295,7 @@ fn bonds_that_change_wake_it_and_keep_it_awake() {
 #[test]
 fn water_wakes_it_and_wet_hair_does_not_sleep() {
     let mut app = woken(|app, hair, _| {
-        app.insert_resource(ProcessTime(100.0));
+        app.insert_resource(HairProcessTime(100.0));
         app.world_mut().write_message(SoakHair { target: hair, wetness: 1.0 });
     });
     let e = app.world_mut().query_filtered::<Entity, With<Strand>>().single(app.world()).unwrap();
@@ -311,8 +311,8 @@ fn water_wakes_it_and_wet_hair_does_not_sleep() {
     assert!(is_asleep(&app, e), "dry again");
     // A droplet that falls on it
     let (mut app, _, e) = sleeper();
-    app.insert_resource(ProcessTime(1e-6))
-        .insert_resource(HairDefault(Wetting { uptake: 0.0, ..default() }));
+    app.insert_resource(HairProcessTime(1e-6))
+        .insert_resource(HairDefault(HairWetting { uptake: 0.0, ..default() }));
     app.world_mut().spawn(Droplet::new(Vec3::new(0.001, 0.02, 0.0), 4e-9).unwrap());
     let mut waited = 0;
     while is_asleep(&app, e) {
@@ -324,7 +324,7 @@ fn water_wakes_it_and_wet_hair_does_not_sleep() {
 
 #[test]
 fn settings_wake_it() {
-    wakes(set(Stiffness::from_bending_length(0.2).unwrap()));
+    wakes(set(HairStiffness::from_bending_length(0.2).unwrap()));
     wakes(set(HairSolver { method: SolverMethod::Sweeps, ..default() }));
     wakes(set(Sweeps { iterations: 7, ..default() }));
     wakes(set(BondInfluence { hydrogen: 0.4, ..default() }));
@@ -339,7 +339,7 @@ fn settings_wake_it() {
     let (mut app, hair, e) = sleeper();
     app.world_mut().entity_mut(hair).insert(AirDrag::default());
     run(&mut app, 0.1);
-    assert!(is_asleep(&app, e), "the value that held anyway is no news");
+    assert!(is_asleep(&app, e), "the value that held anyway is no change");
 }
 
 #[test]
@@ -403,19 +403,16 @@ fn a_sleeper_is_drawn_where_it_lies_and_does_not_jump_there() {
 
 #[test]
 fn sleep_loses_nothing_that_bonds_remember() {
-    // Wet hair dried on the floor and lifted from it.
+    // Wet hair dried as gravity bends it, and let go by gravity.
     let bedhead = |sleep: HairSleep| {
         let mut app = test_app(60.0);
         app.insert_resource(HairDefault(sleep));
-        let floor = HairCollider::plane(Dir3::Y);
-        let floor = app.world_mut().spawn((floor, Transform::from_xyz(0.0, -0.06, 0.0))).id();
-        let (hair, ids) = tuft(&mut app, 20);
-        app.world_mut().write_message(Treat::wet(hair));
+        let (hair, ids) = lock(&mut app, 20);
+        app.world_mut().write_message(HairTreatment::wet(hair));
         run(&mut app, 8.0);
-        app.world_mut().write_message(Treat::dry(hair).over(1.0));
+        app.world_mut().write_message(HairTreatment::dry(hair).over(1.0));
         run(&mut app, 6.0);
         let slept = app.world().get::<Sleepers>(hair).unwrap().asleep;
-        app.world_mut().entity_mut(floor).despawn();
         no_gravity(&mut app);
         run(&mut app, 10.0);
         let tips: Vec<Vec3> = ids.iter().map(|e| strand(&app, *e).positions()[8]).collect();
@@ -423,7 +420,7 @@ fn sleep_loses_nothing_that_bonds_remember() {
     };
     let (with, slept) = bedhead(HairSleep::default());
     let (without, none) = bedhead(HairSleep::never());
-    assert!(slept > 10 && none == 0, "{slept} of 20 have slept on the floor");
+    assert!(slept > 10 && none == 0, "{slept} of 20 slept");
     let apart = with.iter().zip(&without).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
     assert!(apart < 2e-3, "{apart} m apart");
 }
@@ -433,7 +430,7 @@ fn digest() -> u64 {
     let mut app = test_app(60.0);
     app.world_mut()
         .spawn((HairCollider::sphere(0.05).unwrap(), Transform::from_xyz(0.1, -0.06, 0.0)));
-    let (_, ids) = tuft(&mut app, 150);
+    let (_, ids) = lock(&mut app, 150);
     run(&mut app, 6.0);
     for e in ids.iter().step_by(7) {
         app.world_mut().get_mut::<Strand>(*e).unwrap().velocities_mut()[5] = Vec3::X * 0.3;
@@ -446,7 +443,7 @@ fn digest() -> u64 {
 
 /// Pools of threads are made once a process, so each number of threads gets one of its own.
 #[test]
-fn who_sleeps_does_not_depend_on_threads() {
+fn sleep_does_not_depend_on_threads() {
     use bevy::tasks::{ComputeTaskPool, TaskPoolBuilder};
     const THREADS: &str = "KERATIN_SLEEP_THREADS";
     if let Ok(threads) = std::env::var(THREADS) {
@@ -457,7 +454,7 @@ fn who_sleeps_does_not_depend_on_threads() {
     }
     let digests = ["1", "3"].map(|threads| {
         let out = std::process::Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "who_sleeps_does_not_depend_on_threads", "--nocapture"])
+            .args(["--exact", "sleep_does_not_depend_on_threads", "--nocapture"])
             .env(THREADS, threads)
             .output()
             .unwrap();

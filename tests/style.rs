@@ -2,7 +2,7 @@
 
 mod common;
 use bevy::prelude::*;
-use bevy_keratin::{WindReceived, prelude::*, treatment::WindingProgress};
+use bevy_keratin::{Shower, WindReceived, prelude::*, treatment::WindingProgress};
 use common::*;
 
 fn wind_on(at: Vec3, aim: Vec3, direction: Vec3) -> f32 {
@@ -36,7 +36,7 @@ fn despawning_the_blower_ends_the_wind() {
     app.world_mut().entity_mut(e).insert(WindReceived::default());
     let at = Transform::from_xyz(-0.2, 0.0, 0.0).looking_to(Vec3::X, Vec3::Y);
     let blower = app.world_mut().spawn((Blower::default(), at)).id();
-    app.world_mut().write_message(Treat::wet(e));
+    app.world_mut().write_message(HairTreatment::wet(e));
     run(&mut app, 0.5);
     let total = |app: &App| app.world().get::<WindReceived>(e).unwrap().total[1];
     let rate = |app: &App| app.world().get::<Bonds>(e).unwrap().joints[1].rates[0];
@@ -54,7 +54,7 @@ fn drying_follows_equation_19_and_stops_when_dry() {
     no_gravity(&mut app);
     let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::Y);
     app.world_mut().entity_mut(e).insert(WindReceived::default());
-    app.world_mut().write_message(Treat::wet(e));
+    app.world_mut().write_message(HairTreatment::wet(e));
     app.update();
     app.world_mut().spawn((
         Blower::default(),
@@ -133,51 +133,53 @@ fn a_rod_that_moves_takes_the_hair_along() {
 
 /// How often each event came.
 #[derive(Resource, Default)]
-struct Told {
+struct Reported {
     faded: Vec<f32>,
     dried: u32,
 }
 
 fn watched(app: &mut App, hair: Entity) {
-    app.init_resource::<Told>();
+    app.init_resource::<Reported>();
     app.world_mut()
         .entity_mut(hair)
-        .observe(|faded: On<StyleFaded>, mut told: ResMut<Told>| told.faded.push(faded.kept))
-        .observe(|_: On<HairDried>, mut told: ResMut<Told>| told.dried += 1);
+        .observe(|faded: On<StyleFaded>, mut reported: ResMut<Reported>| {
+            reported.faded.push(faded.kept);
+        })
+        .observe(|_: On<HairDried>, mut reported: ResMut<Reported>| reported.dried += 1);
 }
 
 fn kept(app: &mut App, hair: Entity) -> Option<f32> {
-    app.world().get::<KeptStyle>(hair).and_then(KeptStyle::share)
+    app.world().get::<KeptStyle>(hair).and_then(KeptStyle::kept)
 }
 
 /// Bent by gravity while wet and dried so: washing takes that style away.
 #[test]
-fn a_style_is_kept_until_it_is_washed_out_and_that_is_told_once() {
+fn a_style_is_kept_until_it_is_washed_out_and_that_is_reported_once() {
     let mut app = test_app(60.0);
     let (hair, e) = one_strand(&mut app, 0.12, 8, Vec3::X);
     watched(&mut app, hair);
     app.world_mut().entity_mut(hair).insert(HairStyle::default());
     run(&mut app, 0.2);
     assert_eq!(kept(&mut app, hair), None, "hair as it grew has no style");
-    app.world_mut().write_message(Treat::wet(hair));
+    app.world_mut().write_message(HairTreatment::wet(hair));
     run(&mut app, 1.0);
-    app.world_mut().write_message(Treat::dry(hair));
+    app.world_mut().write_message(HairTreatment::dry(hair));
     run(&mut app, 0.2);
     app.world_mut().entity_mut(hair).insert(HairStyle { fades_below: 0.4 });
     run(&mut app, 0.5);
     let share = kept(&mut app, hair).expect("gravity has bent it");
     assert!((share - 1.0).abs() < 0.05, "{share}");
-    assert!(app.world().resource::<Told>().faded.is_empty());
+    assert!(app.world().resource::<Reported>().faded.is_empty());
     // Half of the hydrogen bonds hold half of it, and remember none of the shape that it takes meanwhile.
-    app.world_mut().write_message(Treat::set(hair, BondKind::Hydrogen, 0.5).unwrap());
+    app.world_mut().write_message(HairTreatment::set(hair, BondKind::Hydrogen, 0.5).unwrap());
     run(&mut app, 0.1);
     let half = kept(&mut app, hair).unwrap();
     assert!((0.45..0.8).contains(&half), "{half}");
-    app.world_mut().write_message(Treat::wet(e));
+    app.world_mut().write_message(HairTreatment::wet(e));
     run(&mut app, 0.5);
     assert!(kept(&mut app, hair).unwrap().abs() < 0.05);
-    let told = app.world().resource::<Told>();
-    assert!(told.faded.len() == 1 && told.faded[0] < 0.4, "{:?}", told.faded);
+    let reported = app.world().resource::<Reported>();
+    assert!(reported.faded.len() == 1 && reported.faded[0] < 0.4, "{:?}", reported.faded);
 }
 
 #[test]
@@ -186,7 +188,7 @@ fn a_perm_is_set_by_one_call() {
     no_gravity(&mut app);
     let (hair, e) = one_strand(&mut app, 0.12, 8, Vec3::X);
     run(&mut app, 0.1);
-    app.world_mut().write_message_batch(Treat::perm_set(hair, 0.5));
+    app.world_mut().write_message_batch(HairTreatment::perm_set(hair, 0.5));
     let rates = |app: &App| app.world().get::<Bonds>(e).unwrap().joints[4].rates;
     run(&mut app, 0.48);
     assert!(rates(&app)[0] < 0.05 && rates(&app)[1] < 0.05, "lotion: {:?}", rates(&app));
@@ -198,11 +200,11 @@ fn a_perm_is_set_by_one_call() {
 }
 
 #[test]
-fn wet_hair_tells_when_it_is_dry() {
+fn wet_hair_triggers_an_event_when_it_is_dry() {
     let mut app = test_app(60.0);
     let (hair, _) = one_strand(&mut app, 0.12, 8, Vec3::NEG_Y);
     watched(&mut app, hair);
-    app.insert_resource(ProcessTime(1000.0));
+    app.insert_resource(HairProcessTime(1000.0));
     let wetness = |app: &mut App| {
         app.world_mut()
             .run_system_cached_with(
@@ -217,17 +219,17 @@ fn wet_hair_tells_when_it_is_dry() {
     run(&mut app, 0.05);
     let (wet, water) = wetness(&mut app);
     assert!(wet > 0.9 && water > 0.0, "{wet}, {water} kg");
-    assert_eq!(app.world().resource::<Told>().dried, 0);
+    assert_eq!(app.world().resource::<Reported>().dried, 0);
     for _ in 0..200 {
         run(&mut app, 1.0);
-        if app.world().resource::<Told>().dried > 0 {
+        if app.world().resource::<Reported>().dried > 0 {
             break;
         }
     }
     let left = wetness(&mut app);
-    assert_eq!(app.world().resource::<Told>().dried, 1, "{left:?}");
+    assert_eq!(app.world().resource::<Reported>().dried, 1, "{left:?}");
     run(&mut app, 1.0);
-    assert_eq!(app.world().resource::<Told>().dried, 1, "told once");
+    assert_eq!(app.world().resource::<Reported>().dried, 1, "reported once");
 }
 
 #[test]

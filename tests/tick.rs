@@ -1,8 +1,11 @@
 //! The tick: its order, its clock, its determinism, and what it does with what is wrong.
 
 mod common;
-use bevy::prelude::*;
-use bevy_keratin::{DropletRules, FaultKind, HairStep, InvalidValue, bond::RestShape, prelude::*};
+use bevy::{prelude::*, reflect::ReflectMut};
+use bevy_keratin::{
+    DropletRules, FaultKind, HairStep, InvalidValue, SolverMethod, Sweeps, bond::RestShape,
+    prelude::*,
+};
 use common::*;
 
 #[derive(Resource, Default)]
@@ -52,7 +55,7 @@ fn each_set_does_its_part_and_no_other() {
     // With sweeps wet hair's rest shape follows the present one, so it changes in every substep.
     app.insert_resource(HairDefault(HairSolver { method: SolverMethod::Sweeps, ..default() }));
     let (hair, _) = one_strand(&mut app, 0.24, 8, Vec3::X);
-    app.world_mut().write_message(Treat::wet(hair));
+    app.world_mut().write_message(HairTreatment::wet(hair));
     app.update();
     for (before, after) in [
         (HairSystems::First, HairSystems::Roots),
@@ -62,7 +65,7 @@ fn each_set_does_its_part_and_no_other() {
     ] {
         app.add_systems(HairTick, watch(before).after(before).before(after).ambiguous_with_all());
     }
-    app.world_mut().write_message(Treat::dry(hair));
+    app.world_mut().write_message(HairTreatment::dry(hair));
     app.update();
     let seen = &app.world().resource::<Seen>().0;
     assert_eq!(seen.len(), 4);
@@ -164,33 +167,54 @@ fn a_strand_that_goes_wrong_is_put_back_and_its_neighbours_do_not_notice() {
         let (mut app, ids_b) = build();
         app.world_mut().get_mut::<Strand>(ids_b[2]).unwrap().velocities_mut()[3] = velocity;
         run(&mut app, 0.2);
-        assert_eq!(fault_kinds(&mut app), [kind], "told once");
+        assert_eq!(fault_kinds(&mut app), [kind], "reported once");
         assert!(strand(&app, ids_b[2]).is_finite());
         for i in [0, 1, 3, 4] {
             assert_eq!(strand(&app, ids_b[i]).positions(), strand(&healthy, ids[i]).positions());
         }
     }
 
-    // the pose itself
-    let (mut app, ids_c) = build();
-    app.world_mut().get_mut::<Strand>(ids_c[2]).unwrap().positions_mut()[5] =
-        Vec3::splat(f32::INFINITY);
-    run(&mut app, 0.2);
-    assert_eq!(fault_kinds(&mut app), [FaultKind::Rebuilt]);
-    let s = strand(&app, ids_c[2]);
-    assert!(s.is_finite() && s.peak_strain() < 0.01, "{}", s.peak_strain());
-    for i in [0, 1, 3, 4] {
-        assert_eq!(strand(&app, ids_c[i]).positions(), strand(&healthy, ids[i]).positions());
+    // the pose itself: no number, or numbers from which no step leads on
+    for far in [f32::INFINITY, f32::MAX, 1e30] {
+        let (mut app, ids_c) = build();
+        app.world_mut().get_mut::<Strand>(ids_c[2]).unwrap().positions_mut()[5] = Vec3::splat(far);
+        run(&mut app, 0.2);
+        assert_eq!(fault_kinds(&mut app), [FaultKind::Rebuilt]);
+        let s = strand(&app, ids_c[2]);
+        assert!(s.is_finite() && s.peak_strain() < 0.01, "{}", s.peak_strain());
+        for i in [0, 1, 3, 4] {
+            assert_eq!(strand(&app, ids_c[i]).positions(), strand(&healthy, ids[i]).positions());
+        }
     }
 }
 
 #[test]
-fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
+fn springs_whose_frames_were_spoiled_are_rebuilt() {
+    let mut app = test_app(60.0);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.world_mut().entity_mut(hair).insert(StrandModel::MassSpring);
+    run(&mut app, 0.1);
+    {
+        let mut strand = app.world_mut().get_mut::<Strand>(id).unwrap();
+        let ReflectMut::Struct(parts) = strand.bypass_change_detection().reflect_mut() else {
+            panic!()
+        };
+        let turns = parts.field_mut("orientations").unwrap();
+        let turns = turns.try_downcast_mut::<Vec<Quat>>().unwrap();
+        turns[0] = Quat::from_array([f32::NAN; 4]);
+    }
+    run(&mut app, 0.1);
+    assert!(strand(&app, id).is_finite(), "{:?}", strand(&app, id).orientations());
+    assert_eq!(fault_kinds(&mut app), [FaultKind::Rebuilt]);
+}
+
+#[test]
+fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
     let mut app = test_app(60.0);
     let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
     app.update();
     app.world_mut().entity_mut(hair).insert((
-        Stiffness { bending_length: -1.0, damping: -7.0 },
+        HairStiffness { bending_length: -1.0, damping: -7.0 },
         AirDrag { rate: f32::NAN },
         BondInfluence { hydrogen: 0.0, ionic: 0.0, disulfide: 0.0, peptide: 0.0 },
         HairSolver { limiter_steps: 99, ..default() },
@@ -204,12 +228,13 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
     });
     app.world_mut().spawn(Blower { strength: -5.0, ..default() });
     app.world_mut().spawn(PermRod { radius: 0.0, length: 0.1 });
-    app.world_mut().spawn(Winding { from_node: 0, pitch: f32::NAN, seconds: -1.0 });
+    app.world_mut().spawn(PermWinding { from_node: 0, pitch: f32::NAN, seconds: -1.0 });
     app.insert_resource(HairSubsteps::Fixed(0)).insert_resource(HairGravity(Vec3::NAN));
     app.insert_resource(DropletRules { min: Vec3::NAN, lying: -2.0, ..default() });
     app.update();
-    let told = faults(&mut app);
-    let mut names: Vec<_> = told.iter().map(|f| f.cause::<InvalidValue>().unwrap().what).collect();
+    let reported = faults(&mut app);
+    let mut names: Vec<_> =
+        reported.iter().map(|f| f.cause::<InvalidValue>().unwrap().what).collect();
     names.sort_unstable();
     assert_eq!(
         names,
@@ -222,24 +247,24 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
             "HairCollider::friction",
             "HairGravity (m/s²)",
             "HairSolver::limiter_steps",
+            "HairStiffness::bending_length (m)",
+            "HairStiffness::damping (s)",
             "HairSubsteps",
             "LockContact::radius (m)",
             "LockContact::strength (m/s²)",
             "PermRod::radius (m)",
-            "Stiffness::bending_length (m)",
-            "Stiffness::damping (s)",
+            "PermWinding::from_node",
+            "PermWinding::pitch (m)",
+            "PermWinding::seconds (s)",
             "Sweeps::bend",
             "Sweeps::iterations",
-            "Winding::from_node",
-            "Winding::pitch (m)",
-            "Winding::seconds (s)",
             "the sum of BondInfluence",
         ]
     );
-    assert!(told.iter().all(|f| f.kind == FaultKind::Setting));
+    assert!(reported.iter().all(|f| f.kind == FaultKind::Setting));
     // What is edited and what a constructor takes are checked by the same rule.
     let told_of =
-        |what| told.iter().filter_map(|f| f.cause::<InvalidValue>()).find(|v| v.what == what);
+        |what| reported.iter().filter_map(|f| f.cause::<InvalidValue>()).find(|v| v.what == what);
     assert_eq!(told_of("Blower::strength (m/s²)"), Blower::new(-5.0).err().as_ref());
     assert_eq!(told_of("PermRod::radius (m)"), PermRod::new(0.0, 0.1).err().as_ref());
     assert_eq!(told_of("ColliderShape::radius (m)"), HairCollider::sphere(-0.05).err().as_ref());
@@ -247,7 +272,8 @@ fn edited_nonsense_is_told_once_and_the_nearest_valid_value_used() {
     run(&mut app, 0.5);
     assert_eq!(faults(&mut app), []);
     assert!(strand(&app, e).is_finite());
-    let text = told.iter().map(|f| f.to_string()).find(|t| t.contains("bending_length")).unwrap();
+    let text =
+        reported.iter().map(|f| f.to_string()).find(|t| t.contains("bending_length")).unwrap();
     assert!(text.contains("is -1, expected 0.001 to 100"), "{text}");
 }
 
@@ -264,12 +290,41 @@ fn edited_bond_rates_are_brought_into_range() {
     let bonds = app.world().get::<Bonds>(e).unwrap();
     assert_eq!(bonds.joints[1].rates, [1.0, 0.0, 1.0, 0.5]);
     assert_eq!(bonds.joints[2].shapes[0], Vec3::ZERO);
+    app.world_mut().get_mut::<Bonds>(e).unwrap().joints[3].shapes[1] = Vec3::NAN;
+    app.update();
+    let found = faults(&mut app);
+    let names_the_shape = found[0].to_string().contains("JointBonds::shapes");
+    assert!(names_the_shape && found.len() == 1, "{found:?}");
     run(&mut app, 0.5);
     assert_eq!(faults(&mut app), []);
 }
 
 #[test]
-fn strands_without_hair_or_nodes_are_told_and_left_out() {
+fn reset_with_an_invalid_influence_keeps_the_shape_that_bonds_remember() {
+    let mut app = test_app(60.0);
+    let hair = app.world_mut().spawn(Hair).id();
+    let angle = |i: usize| 0.3 * i as f32;
+    let bent: Vec<Vec3> = (0..9)
+        .scan(Vec3::ZERO, |p, i| {
+            let here = *p;
+            *p += 0.03 * Vec3::new(angle(i).cos(), angle(i).sin(), 0.0);
+            Some(here)
+        })
+        .collect();
+    let strand = Strand::from_polyline(&bent).unwrap();
+    let strand = app.world_mut().spawn((StrandOf(hair), strand)).id();
+    app.update();
+    app.world_mut().get_mut::<Strand>(strand).unwrap().pose([]);
+    let tip = |app: &App| app.world().get::<Strand>(strand).unwrap().positions()[8];
+    assert!(tip(&app).distance(bent[8]) > 0.05, "straightened");
+    let invalid = BondInfluence { hydrogen: f32::NAN, ..default() };
+    app.world_mut().entity_mut(hair).insert(invalid);
+    Hair::reset(app.world_mut().entity_mut(hair));
+    assert!(tip(&app).distance(bent[8]) < 1e-3, "{} is not {}", tip(&app), bent[8]);
+}
+
+#[test]
+fn strands_without_hair_or_nodes_are_reported_and_left_out() {
     let mut app = test_app(60.0);
     let not_hair = app.world_mut().spawn_empty().id();
     let points = [Vec3::ZERO, Vec3::X * 0.1];
@@ -277,11 +332,11 @@ fn strands_without_hair_or_nodes_are_told_and_left_out() {
         app.world_mut().spawn((StrandOf(not_hair), Strand::from_polyline(&points).unwrap())).id();
     let hair = app.world_mut().spawn(Hair).id();
     app.world_mut().spawn((StrandOf(hair), Strand::default()));
-    app.world_mut().write_message(Treat::wet(not_hair));
+    app.world_mut().write_message(HairTreatment::wet(not_hair));
     run(&mut app, 0.1);
-    let told = faults(&mut app);
-    assert_eq!(told.iter().filter(|f| f.kind == FaultKind::NoHair).count(), 1);
-    assert_eq!(told.iter().filter(|f| f.kind == FaultKind::Strand).count(), 1);
+    let reported = faults(&mut app);
+    assert_eq!(reported.iter().filter(|f| f.kind == FaultKind::NoHair).count(), 1);
+    assert_eq!(reported.iter().filter(|f| f.kind == FaultKind::Strand).count(), 1);
     assert_eq!(strand(&app, homeless).positions(), points);
 }
 

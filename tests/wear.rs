@@ -27,42 +27,44 @@ const BONES: [(&str, Vec3); 4] = [
 ];
 
 #[derive(Resource, Default)]
-struct Told {
+struct Reported {
     worn: Vec<HairWorn>,
     refused: Vec<(Entity, WearError)>,
 }
 
 fn app() -> App {
     let mut app = app_with_meshes(60.0);
-    app.init_resource::<Told>()
-        .add_observer(|worn: On<HairWorn>, mut told: ResMut<Told>| told.worn.push(*worn))
-        .add_observer(|not: On<HairNotWorn>, mut told: ResMut<Told>| {
-            told.refused.push((not.entity, not.error.clone()));
+    app.init_resource::<Reported>()
+        .add_observer(|worn: On<HairWorn>, mut reported: ResMut<Reported>| {
+            reported.worn.push(*worn);
+        })
+        .add_observer(|not: On<HairNotWorn>, mut reported: ResMut<Reported>| {
+            reported.refused.push((not.entity, not.error.clone()));
         });
     app
 }
 
-fn told(app: &mut App) -> Told {
-    core::mem::take(&mut *app.world_mut().resource_mut::<Told>())
+fn reported(app: &mut App) -> Reported {
+    core::mem::take(&mut *app.world_mut().resource_mut::<Reported>())
 }
 
-/// Updates until something is told of wearing.
-fn wait(app: &mut App) -> Told {
+/// Updates until an event of wearing is triggered.
+fn wait(app: &mut App) -> Reported {
     for _ in 0..4000 {
         app.update();
-        let told = told(app);
-        if !(told.worn.is_empty() && told.refused.is_empty()) {
-            return told;
+        let reported = reported(app);
+        if !(reported.worn.is_empty() && reported.refused.is_empty()) {
+            return reported;
         }
         sleep(Duration::from_millis(2));
     }
-    panic!("nothing was told of wearing");
+    panic!("nothing was reported of wearing");
 }
 
 fn worn(app: &mut App) -> Entity {
-    let told = wait(app);
-    assert_eq!(told.refused, [], "refused");
-    told.worn[0].hair
+    let reported = wait(app);
+    assert_eq!(reported.refused, [], "refused");
+    reported.worn[0].hair
 }
 
 fn part(mesh: Mesh, place: Transform, joint: u16) -> Mesh {
@@ -147,16 +149,16 @@ fn a_preset_waits_for_the_character_and_is_planted_on_its_head() {
     let at = Transform::from_xyz(3.0, 0.5, -1.0).with_rotation(Quat::from_rotation_y(0.7));
     let root = app.world_mut().spawn((at, WearHair::new(HairPreset::Short))).id();
     (0..20).for_each(|_| app.update());
-    assert_eq!(told(&mut app).worn, []);
+    assert_eq!(reported(&mut app).worn, []);
     let (head, _) = character(&mut app, root, 1.0);
     let hair = worn(&mut app);
     let world = app.world();
     assert_eq!(world.get::<ChildOf>(hair).unwrap().parent(), head);
     let is = world.get::<WornHair>(hair).unwrap();
     assert_eq!((is.wearer, is.preset()), (root, Some(HairPreset::Short)));
-    assert_eq!(world.get::<Stiffness>(hair), Some(&HairPreset::Short.settings().stiffness));
+    assert_eq!(world.get::<HairStiffness>(hair), Some(&HairPreset::Short.settings().stiffness));
     // 223 fibres for each cm², 0.8 guides.
-    let fibres = world.get::<Wetting>(hair).unwrap().fibres;
+    let fibres = world.get::<HairWetting>(hair).unwrap().fibres;
     assert!((fibres - 223.0 / 0.8).abs() < 1.5, "{fibres} fibres");
     let to_root = place_in(&app, hair, root);
     let all = strands(&mut app, hair);
@@ -170,13 +172,13 @@ fn a_preset_waits_for_the_character_and_is_planted_on_its_head() {
     // It looks along −Z, and hair grows on crown and nape.
     assert!(behind * 10 > all.len() * 6, "{behind} of {} behind the middle", all.len());
     assert!(faults(&mut app).is_empty());
-    // It goes on: ticks move no root off the head, and nothing is told twice.
+    // Later ticks move no root off the head, and nothing is reported twice.
     (0..30).for_each(|_| app.update());
     for strand in strands(&mut app, hair) {
         let root = to_root.transform_point3(strand.positions()[0]);
         assert!(off_head(root).abs() < 2e-3 && strand.is_finite());
     }
-    assert_eq!(told(&mut app).worn, []);
+    assert_eq!(reported(&mut app).worn, []);
     assert!(faults(&mut app).is_empty());
 }
 
@@ -194,10 +196,10 @@ fn hair_is_swapped_when_the_new_is_ready_and_gone_with_its_component() {
     assert!(world.get_entity(bob).is_err(), "the old is gone with the new");
     assert_eq!(world.get::<WornHair>(coily).unwrap().preset(), Some(HairPreset::Coily));
     assert_eq!(wearers(&mut app), 1);
-    // What is written without a change makes nothing anew.
+    // A write without a change makes no new hair.
     app.world_mut().get_mut::<WearHair>(root).unwrap().hair = HairPreset::Coily.into();
     (0..20).for_each(|_| app.update());
-    assert_eq!(told(&mut app).worn, []);
+    assert_eq!(reported(&mut app).worn, []);
     let colliders =
         |app: &mut App| app.world_mut().query::<&HairCollider>().iter(app.world()).count();
     assert!((8..30).contains(&colliders(&mut app)), "{} colliders", colliders(&mut app));
@@ -211,11 +213,11 @@ fn hair_is_swapped_when_the_new_is_ready_and_gone_with_its_component() {
     app.update();
     app.world_mut().entity_mut(root).remove::<WearHair>();
     (0..100).for_each(|_| app.update());
-    assert_eq!((wearers(&mut app), told(&mut app).worn.len()), (0, 0));
+    assert_eq!((wearers(&mut app), reported(&mut app).worn.len()), (0, 0));
 }
 
 #[test]
-fn a_bone_that_is_not_there_is_told_once_with_those_that_are() {
+fn a_bone_that_is_not_there_is_reported_once_with_those_that_are() {
     let mut app = app();
     let wear = WearHair::new(HairPreset::Short).on("Skull");
     let root = app.world_mut().spawn((Transform::default(), wear)).id();
@@ -223,9 +225,9 @@ fn a_bone_that_is_not_there_is_told_once_with_those_that_are() {
     assert!(faults(&mut app).is_empty(), "before the scene is there nothing is missing");
     let (head, _) = character(&mut app, root, 1.0);
     (0..50).for_each(|_| app.update());
-    let told = faults(&mut app);
-    assert_eq!(told.len(), 1, "{told:?}");
-    let fault = &told[0];
+    let reported = faults(&mut app);
+    assert_eq!(reported.len(), 1, "{reported:?}");
+    let fault = &reported[0];
     assert_eq!((fault.kind, fault.entity), (FaultKind::Wear, Some(root)));
     for name in ["\"Skull\"", "\"Hips\"", "\"Head\""] {
         assert!(fault.message.contains(name), "{}", fault.message);
@@ -233,22 +235,22 @@ fn a_bone_that_is_not_there_is_told_once_with_those_that_are() {
     // It may still come, or be another.
     app.world_mut().get_mut::<WearHair>(root).unwrap().on = Some("Head".into());
     let hair = {
-        let told = wait(&mut app);
-        told.worn.first().map(|w| w.hair).unwrap_or_else(|| worn(&mut app))
+        let reported = wait(&mut app);
+        reported.worn.first().map(|w| w.hair).unwrap_or_else(|| worn(&mut app))
     };
     assert_eq!(app.world().get::<ChildOf>(hair).unwrap().parent(), head);
 }
 
 #[test]
-fn nothing_to_wear_hair_on_is_told_after_a_while() {
+fn nothing_to_wear_hair_on_is_reported_after_a_while() {
     let mut app = app();
     let id = app.world_mut().spawn((Transform::default(), WearHair::default())).id();
     (0..60 * 9).for_each(|_| app.update());
     assert!(faults(&mut app).is_empty());
     (0..60 * 4).for_each(|_| app.update());
-    let told = faults(&mut app);
-    assert_eq!(told.len(), 1, "{told:?}");
-    assert_eq!((told[0].kind, told[0].entity), (FaultKind::Wear, Some(id)));
+    let reported = faults(&mut app);
+    assert_eq!(reported.len(), 1, "{reported:?}");
+    assert_eq!((reported[0].kind, reported[0].entity), (FaultKind::Wear, Some(id)));
 }
 
 fn ball(radius: f32) -> Mesh {
@@ -303,18 +305,18 @@ fn meshes_that_are_no_heads_are_refused_in_one_clear_fault() {
         let good = app.world_mut().spawn((Mesh3d(good), Transform::default(), wear())).id();
         let (mut refused, mut worn) = (Vec::new(), Vec::new());
         while worn.is_empty() || refused.is_empty() {
-            let told = wait(&mut app);
-            refused.extend(told.refused);
-            worn.extend(told.worn);
+            let reported = wait(&mut app);
+            refused.extend(reported.refused);
+            worn.extend(reported.worn);
         }
         (0..30).for_each(|_| app.update());
-        refused.extend(told(&mut app).refused);
-        let told = faults(&mut app);
-        println!("{what}: {}", told[0].message);
-        assert_eq!((refused.len(), told.len(), worn.len()), (1, 1, 1), "{what}: {told:?}");
+        refused.extend(reported(&mut app).refused);
+        let reported = faults(&mut app);
+        println!("{what}: {}", reported[0].message);
+        assert_eq!((refused.len(), reported.len(), worn.len()), (1, 1, 1), "{what}: {reported:?}");
         assert_eq!((refused[0].0, worn[0].entity), (bad, good), "{what}");
-        assert_eq!((told[0].kind, told[0].entity), (FaultKind::Wear, Some(bad)), "{what}");
-        assert!(told[0].message.contains(expected), "{what}: {}", told[0].message);
+        assert_eq!((reported[0].kind, reported[0].entity), (FaultKind::Wear, Some(bad)), "{what}");
+        assert!(reported[0].message.contains(expected), "{what}: {}", reported[0].message);
     }
 }
 
@@ -332,9 +334,9 @@ fn numbers_that_are_none_are_refused() {
         let mut app = app();
         let mesh = head(&mut app);
         let id = app.world_mut().spawn((mesh, Transform::default(), wear)).id();
-        let told = wait(&mut app);
-        assert_eq!((told.worn.len(), told.refused.len()), (0, 1), "{what}");
-        assert_eq!(told.refused[0].0, id);
+        let reported = wait(&mut app);
+        assert_eq!((reported.worn.len(), reported.refused.len()), (0, 1), "{what}");
+        assert_eq!(reported.refused[0].0, id);
         assert_eq!(faults(&mut app).len(), 1, "{what}");
     }
     // A head of no size on a body, which may grow.
@@ -343,9 +345,9 @@ fn numbers_that_are_none_are_refused() {
     let root = app.world_mut().spawn((Transform::default(), WearHair::new(HairPreset::Bob))).id();
     let place = Transform::from_scale(Vec3::NAN);
     app.world_mut().spawn((mesh, Name::new("head"), place, ChildOf(root)));
-    let told = wait(&mut app);
-    assert_eq!((told.worn.len(), told.refused.len()), (0, 1));
-    assert_eq!(told.refused[0].1, WearError::Pose);
+    let reported = wait(&mut app);
+    assert_eq!((reported.worn.len(), reported.refused.len()), (0, 1));
+    assert_eq!(reported.refused[0].1, WearError::Pose);
 }
 
 #[test]
@@ -358,8 +360,8 @@ fn a_second_preset_on_one_head_is_refused() {
     let wear = WearHair::new(HairPreset::Curly);
     let other = app.world_mut().spawn((Transform::default(), wear)).id();
     app.world_mut().entity_mut(root).insert(ChildOf(other));
-    let told = wait(&mut app);
-    assert_eq!(told.refused, [(other, WearError::Taken { by: root })]);
+    let reported = wait(&mut app);
+    assert_eq!(reported.refused, [(other, WearError::Taken { by: root })]);
     (0..30).for_each(|_| app.update());
     assert_eq!((wearers(&mut app), faults(&mut app).len()), (1, 1));
     assert!(app.world().get::<Hair>(bob).is_some());
@@ -444,7 +446,7 @@ fn a_saved_hairdo_is_worn_again() {
     character(&mut app, root, 1.0);
     let hair = worn(&mut app);
     (0..20).for_each(|_| app.update());
-    app.world_mut().write_message(Treat::wet(hair));
+    app.world_mut().write_message(HairTreatment::wet(hair));
     (0..20).for_each(|_| app.update());
     let saved = Hairdo::of(app.world(), hair).unwrap();
     let bytes = saved.to_bytes();
@@ -506,14 +508,14 @@ fn a_groom_is_worn_where_it_was_made() {
     let root = app.world_mut().spawn((Transform::from_xyz(1.0, 0.0, 0.0), wear)).id();
     character(&mut app, root, 1.0);
     (0..20).for_each(|_| app.update());
-    assert_eq!(told(&mut app).worn, [], "it waits for the groom");
+    assert_eq!(reported(&mut app).worn, [], "it waits for the groom");
     app.world_mut().resource_mut::<Assets<Groom>>().insert(&handle, groom()).unwrap();
     let hair = worn(&mut app);
     let is = app.world().get::<WornHair>(hair).unwrap();
     assert!(matches!(&is.hair, HairSource::Groom { groom, .. } if *groom == handle));
     assert_eq!(is.preset(), None);
     // Each stands for the skin around it: the upper 0.4 of 0.12 m² at 223 a cm², 300 strands.
-    let fibres = app.world().get::<Wetting>(hair).unwrap().fibres;
+    let fibres = app.world().get::<HairWetting>(hair).unwrap().fibres;
     assert!((200.0..900.0).contains(&fibres), "{fibres} fibres");
     let to_root = place_in(&app, hair, root);
     for _ in 0..10 {
@@ -523,20 +525,20 @@ fn a_groom_is_worn_where_it_was_made() {
         }
         app.update();
     }
-    // Reloaded it is worn anew.
+    // Reloaded it is made again.
     let half = groom().thinned(2).unwrap();
     app.world_mut().resource_mut::<Assets<Groom>>().insert(&handle, half).unwrap();
     let hair = worn(&mut app);
     assert_eq!(strands(&mut app, hair).len(), 150);
-    // Beside the character it is told.
+    // A groom far from the character is an error.
     app.world_mut().get_mut::<WearHair>(root).unwrap().place = Transform::from_xyz(0.0, 0.0, 0.5);
-    let told = wait(&mut app);
-    assert!(matches!(told.refused[0].1, WearError::Beside { .. }), "{:?}", told.refused);
+    let reported = wait(&mut app);
+    assert!(matches!(reported.refused[0].1, WearError::Beside { .. }), "{:?}", reported.refused);
     assert!(app.world().get::<Hair>(hair).is_some(), "the old stays");
     app.world_mut().get_mut::<WearHair>(root).unwrap().place =
         Transform::from_translation(Vec3::NAN);
-    let told = wait(&mut app);
-    assert!(matches!(told.refused[0].1, WearError::Groom(_)), "{:?}", told.refused);
+    let reported = wait(&mut app);
+    assert!(matches!(reported.refused[0].1, WearError::Groom(_)), "{:?}", reported.refused);
 }
 
 #[test]
@@ -577,7 +579,7 @@ fn own_colliders_are_kept_to() {
 }
 
 #[test]
-fn hair_comes_back_with_a_scene_that_is_spawned_anew() {
+fn hair_comes_back_with_a_scene_that_is_spawned_again() {
     let mut app = app();
     let root = app.world_mut().spawn((Transform::default(), WearHair::new(HairPreset::Short))).id();
     character(&mut app, root, 1.0);
@@ -593,4 +595,93 @@ fn hair_comes_back_with_a_scene_that_is_spawned_anew() {
     (0..5).for_each(|_| app.update());
     assert_eq!(app.world_mut().query::<&Strand>().iter(app.world()).count(), 0);
     assert!(faults(&mut app).is_empty());
+}
+
+fn mean_length(app: &mut App, hair: Entity) -> f32 {
+    let all = strands(app, hair);
+    all.iter().map(Strand::length).sum::<f32>() / all.len() as f32
+}
+
+#[test]
+fn hair_is_worn_longer_and_remembers_what_it_is() {
+    let mut app = app();
+    let wear = WearHair { seed: 5, ..WearHair::new(HairPreset::Curly) };
+    let root = app.world_mut().spawn((Transform::default(), wear.clone())).id();
+    character(&mut app, root, 1.0);
+    let hair = worn(&mut app);
+    let own = mean_length(&mut app, hair);
+    let nodes = strands(&mut app, hair)[0].nodes();
+    app.world_mut().entity_mut(root).insert(wear.clone().long(0.5));
+    let short = worn(&mut app);
+    let half = mean_length(&mut app, short);
+    println!("{own} m, at a half {half} m");
+    assert!((half / own - 0.5).abs() < 0.02);
+    // Segments stay as long as they are.
+    assert!(strands(&mut app, short)[0].nodes().abs_diff(nodes / 2) <= 1);
+    let is = app.world().get::<WornPreset>(short).unwrap();
+    assert_eq!((is.preset(), is.seed, is.length), (Some(HairPreset::Curly), 5, 0.5));
+    app.world_mut().entity_mut(root).insert(wear.long(f32::NAN));
+    let reported = wait(&mut app);
+    assert!(matches!(&reported.refused[..], [(by, WearError::Setting(_))] if *by == root));
+    assert_eq!(wearers(&mut app), 1, "it keeps the hair that it has");
+}
+
+#[test]
+fn looks_change_on_the_hair_that_is_worn() {
+    let mut app = app();
+    let wear = WearHair::new(HairPreset::Short).dyed(HairDye::pink());
+    let root = app.world_mut().spawn((Transform::default(), wear)).id();
+    character(&mut app, root, 1.0);
+    let hair = worn(&mut app);
+    let world = app.world();
+    assert_eq!(world.get::<HairDye>(hair), Some(&HairDye::pink()));
+    assert_eq!(world.get::<HairStyle>(hair), Some(&HairStyle::default()));
+    let look = HairLook { melanin: Melanin::RED, ..default() };
+    let mut wear = app.world_mut().get_mut::<WearHair>(root).unwrap();
+    (wear.look, wear.dye, wear.style) = (Some(look.clone()), None, None);
+    (0..20).for_each(|_| app.update());
+    assert_eq!(reported(&mut app).worn, [], "nothing is made anew");
+    let world = app.world();
+    assert_eq!(world.get::<HairLook>(hair), Some(&look));
+    assert!(
+        !world.entity(hair).contains::<HairDye>() && !world.entity(hair).contains::<HairStyle>()
+    );
+    // Hair that nobody has styled has no style to keep.
+    app.world_mut().entity_mut(hair).insert(HairStyle::default());
+    (0..5).for_each(|_| app.update());
+    assert_eq!(app.world().get::<KeptStyle>(hair).unwrap().kept(), None);
+}
+
+#[test]
+fn a_hairdo_grows_its_preset_again_and_is_worn_strand_by_strand() {
+    let mut app = app();
+    let wear = WearHair { seed: 3, ..WearHair::new(HairPreset::Bob) }.long(0.8);
+    let root = app.world_mut().spawn((Transform::default(), wear)).id();
+    character(&mut app, root, 1.0);
+    let hair = worn(&mut app);
+    app.world_mut().entity_mut(hair).insert(HairDye::from_color(HairColor::COBALT));
+    (0..10).for_each(|_| app.update());
+    app.world_mut().write_message(HairTreatment::set(hair, BondKind::Hydrogen, 0.25).unwrap());
+    (0..5).for_each(|_| app.update());
+    let saved = Hairdo::of(app.world(), hair).unwrap().to_bytes();
+
+    app.world_mut().entity_mut(root).insert(WearHair::new(HairPreset::Short));
+    worn(&mut app);
+    let hairdo = Hairdo::from_bytes(&saved).unwrap();
+    let wear = WearHair::try_from(hairdo.clone()).unwrap();
+    assert_eq!((wear.hair.clone(), wear.seed, wear.length), (HairPreset::Bob.into(), 3, 0.8));
+    app.world_mut().entity_mut(root).insert(wear);
+    let again = worn(&mut app);
+    let now = Hairdo::of(app.world(), again).unwrap();
+    assert_eq!(
+        (now.preset(), now.dye(), now.look()),
+        (hairdo.preset(), hairdo.dye(), hairdo.look())
+    );
+    assert_eq!(now.strands().len(), hairdo.strands().len());
+    for (now, saved) in now.strands().iter().zip(hairdo.strands()) {
+        assert_eq!(now.joints(), saved.joints(), "strand by strand, not resampled");
+    }
+    assert!(faults(&mut app).is_empty());
+    let error = WearHair::try_from(Hairdo::default()).unwrap_err();
+    assert_eq!(error, HairdoError::NoPreset);
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use bevy::prelude::*;
-use bevy_keratin::{Wind, WindZone, ZoneShape, prelude::*, water::WaterPlugin};
+use bevy_keratin::{HairWind, WindZone, ZoneShape, prelude::*, water::WaterPlugin};
 use common::*;
 
 /// Angle from straight down at which hair hangs after some seconds, on the mean of the last (rad).
@@ -21,13 +21,13 @@ fn leans(app: &mut App, e: Entity) -> Vec3 {
 /// Soft hair that hangs.
 fn hanging() -> (App, Entity, Entity) {
     let mut app = test_app(60.0);
-    app.insert_resource(HairDefault(Stiffness::from_bending_length(0.02).unwrap()));
+    app.insert_resource(HairDefault(HairStiffness::from_bending_length(0.02).unwrap()));
     let (hair, e) = one_strand(&mut app, 0.2, 16, Vec3::NEG_Y);
     (app, hair, e)
 }
 
-fn wind(velocity: Vec3, gusts: f32) -> Wind {
-    Wind { velocity, gusts, ..default() }
+fn wind(velocity: Vec3, gusts: f32) -> HairWind {
+    HairWind { velocity, gusts, ..default() }
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn a_turned_and_scaled_head_feels_the_wind_of_the_world() {
 fn gusts_move_hair_and_are_the_seeds_own() {
     let sway = |gusts: f32, seed: u32| {
         let (mut app, _, e) = hanging();
-        app.insert_resource(Wind { seed, ..wind(Vec3::X * 3.0, gusts) });
+        app.insert_resource(HairWind { seed, ..wind(Vec3::X * 3.0, gusts) });
         run(&mut app, 3.0);
         let xs: Vec<f32> = (0..240)
             .map(|_| {
@@ -82,7 +82,7 @@ fn gusts_move_hair_and_are_the_seeds_own() {
 #[test]
 fn indoors_there_is_no_wind_and_outside_there_is() {
     let mut app = test_app(60.0);
-    app.insert_resource(HairDefault(Stiffness::from_bending_length(0.02).unwrap()))
+    app.insert_resource(HairDefault(HairStiffness::from_bending_length(0.02).unwrap()))
         .insert_resource(wind(Vec3::X * 5.0, 0.5));
     let shelter = WindZone { half_size: Vec3::splat(1.0), falloff: 0.1, ..WindZone::shelter() };
     app.world_mut().spawn((shelter, Transform::from_rotation(Quat::from_rotation_y(0.5))));
@@ -124,7 +124,7 @@ fn wind_wakes_hair_that_sleeps_and_calm_lets_it_sleep_again() {
     run(&mut app, 0.5);
     assert!(!asleep(&app));
     assert!(strand(&app, e).positions()[8].x > 1e-3);
-    app.insert_resource(Wind::default());
+    app.insert_resource(HairWind::default());
     run(&mut app, 12.0);
     assert!(asleep(&app));
 }
@@ -133,7 +133,7 @@ fn wind_wakes_hair_that_sleeps_and_calm_lets_it_sleep_again() {
 fn a_fire_and_wind_dry_wet_hair() {
     let left = |zone: Option<WindZone>, velocity: Vec3| {
         let (mut app, hair, e) = hanging();
-        app.insert_resource(wind(velocity, 0.3)).insert_resource(ProcessTime(60.0));
+        app.insert_resource(wind(velocity, 0.3)).insert_resource(HairProcessTime(60.0));
         if let Some(zone) = zone {
             app.world_mut().spawn((zone, Transform::from_xyz(0.5, -0.1, 0.0)));
         }
@@ -155,7 +155,7 @@ fn a_fire_sets_dry_hair() {
     run(&mut app, 0.1);
     let rates =
         |app: &App| app.world().get::<Bonds>(e).unwrap().rates(BondKind::Hydrogen).sum::<f32>();
-    app.world_mut().write_message(Treat::set(e, BondKind::Hydrogen, 0.0).unwrap());
+    app.world_mut().write_message(HairTreatment::set(e, BondKind::Hydrogen, 0.0).unwrap());
     run(&mut app, 0.1);
     assert!(rates(&app) < 0.1);
     run(&mut app, 1.0);
@@ -176,12 +176,12 @@ fn droplets_drift_with_the_wind() {
 }
 
 #[test]
-fn nonsense_is_told_and_breaks_nothing_and_the_water_is_not_needed() {
+fn nonsense_is_reported_and_breaks_nothing_and_the_water_is_not_needed() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, HairPlugins::default().build().disable::<WaterPlugin>()));
     let mut app2 = test_app(60.0);
     for app in [&mut app, &mut app2] {
-        app.insert_resource(Wind {
+        app.insert_resource(HairWind {
             velocity: Vec3::new(f32::NAN, 1e9, 0.0),
             gusts: -1.0,
             gust_length: 0.0,

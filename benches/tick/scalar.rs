@@ -3,6 +3,7 @@
 
 use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
+    StretchProjection, Sweeps,
     lanes::{Quaternion, V3},
     prelude::*,
     rod::constraint::{BendShares, EdgeWeights, StretchShares, bend_twist, stretch_shear},

@@ -8,7 +8,7 @@
 use super::{common, scalar::Twin};
 use bevy::{prelude::*, tasks::ComputeTaskPool};
 use bevy_keratin::{
-    BondChanges, DropletRules, HairStep, Sleepers,
+    BondChanges, DropletRules, HairStep, Sleepers, SolverMethod,
     bond::{BondPlugin, RestShape},
     contact::{ContactPlugin, Obstacles},
     environment::EnvironmentPlugin,
@@ -22,7 +22,7 @@ use std::{process::Command, time::Instant};
 
 const THREADS: &str = "KERATIN_BENCH_THREADS";
 
-/// The rows to print, if not all: `memory`, `sleep`, `hanging`, or strands and nodes such as `10000x16`.
+/// The rows to print, if not all: `memory`, `empty`, `sleep`, `hanging`, or strands and nodes such as `10000x16`.
 const ONLY: &str = "KERATIN_BENCH_ONLY";
 
 /// Prints the whole table, or in a process of its own the rows of one number of threads.
@@ -54,6 +54,9 @@ fn rows(threads: usize) {
              with contact"
         );
     }
+    if wanted("empty") {
+        empty_row(threads);
+    }
     if wanted("sleep") {
         sleep_row(threads);
     }
@@ -65,6 +68,19 @@ fn rows(threads: usize) {
     if wanted("hanging") {
         hanging_rows(threads);
     }
+}
+
+/// Frames without any hair: what Bevy takes for its own systems, then with ours that find nothing.
+fn empty_row(threads: usize) {
+    let bare = common::app(threads);
+    let mut apps = [bare, app(threads, Kind::Tick, &[], None)];
+    let mut best = [f64::INFINITY; 2];
+    for _ in 0..300 {
+        for (best, app) in best.iter_mut().zip(&mut apps) {
+            *best = best.min(seconds(|| app.update()));
+        }
+    }
+    println!("no strands | {threads} | {:.3} ms, Bevy alone {:.3}", best[1] * 1e3, best[0] * 1e3);
 }
 
 /// Contact between strands that hang equally dense, however many there are.
@@ -95,7 +111,7 @@ fn sleep_row(threads: usize) {
     for _ in 0..6 {
         app.insert_resource(HairDefault(HairSleep::never()));
         for (best, share) in awake.iter_mut().zip([0.05, 0.2, 1.0]) {
-            app.world_mut().entity_mut(hair).insert(ScreenShare(share));
+            app.world_mut().entity_mut(hair).insert(HairScreenShare(share));
             app.update();
             *best = best.min(seconds(|| app.update()));
         }
@@ -159,7 +175,7 @@ fn row(threads: usize, strands: usize, nodes: usize) {
         (0..240).for_each(|_| app.update());
         let [without, with] = contacts_off_and_on(app, turns);
         app.insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
-        strew(app, 1000);
+        scatter_droplets(app, 1000);
         (0..30).for_each(|_| app.update());
         let wet = (0..turns).map(|_| seconds(|| app.update())).fold(f64::INFINITY, f64::min);
         [percent(with, without), percent(wet, without)]
@@ -199,8 +215,8 @@ fn resident() -> f64 {
 }
 
 /// Droplets of 1 mm on the strands' nodes, that neither spread nor slide.
-fn strew(app: &mut App, count: usize) {
-    let pinned = Wetting { uptake: 0.0, sliding: 0.0, evaporation: 0.0, ..default() };
+fn scatter_droplets(app: &mut App, count: usize) {
+    let pinned = HairWetting { uptake: 0.0, sliding: 0.0, evaporation: 0.0, ..default() };
     app.insert_resource(HairDefault(pinned));
     app.insert_resource(DropletRules { merging: false, min: Vec3::splat(-10.0), ..default() });
     let mut strands = app.world_mut().query::<&Strand>();

@@ -2,7 +2,7 @@
 
 use crate::{Arguments, figure::Figure};
 use bevy::prelude::*;
-use bevy_keratin::prelude::*;
+use bevy_keratin::{Shower, prelude::*};
 
 /// What of the weather is on.
 #[derive(Resource, Default)]
@@ -95,7 +95,7 @@ fn rain(
         (Some((cloud, _)), false) => commands.entity(cloud).despawn(),
         (None, true) => {
             // A soaking of minutes, in seconds.
-            commands.insert_resource(ProcessTime(30.0));
+            commands.insert_resource(HairProcessTime(30.0));
             commands.spawn((Cloud, Shower::rain(RAIN, RAIN_RADIUS)?, place));
         }
         (None, false) => {}

@@ -114,7 +114,7 @@ fn load(
     let name = arguments.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let load = assets.load_builder().with_settings(move |s: &mut GroomSettings| {
         // What is short is known once the scale is.
-        (s.scale, s.up, s.merge) = (scale, up, 0.0);
+        (s.scale, s.up, s.shortest_segment) = (scale, up, 0.0);
     });
     commands.insert_resource(Loading(load.load(name)));
 }
@@ -130,7 +130,8 @@ fn sized(groom: &Groom, kind: GroomFormat, asked: Option<f32>) -> Result<Groom> 
             factor = odd.scale / scale;
         }
     }
-    let (groom, losses) = groom.clone().scaled(factor)?.merged(GroomSettings::default().merge)?;
+    let (groom, losses) =
+        groom.clone().scaled(factor)?.merged(GroomSettings::default().shortest_segment)?;
     if groom.is_empty() {
         return Err(GroomError::Empty.into());
     }
@@ -187,7 +188,7 @@ fn put_on(
     let (count, nodes) = (arguments.guides as usize, arguments.nodes as usize);
     let guides = GroomGuides { count, nodes, ..default() };
     let hair = GroomedHair { groom: grooms.add(groom), guides };
-    let stiffness = Stiffness::from_bending_length(arguments.stiffness)?;
+    let stiffness = HairStiffness::from_bending_length(arguments.stiffness)?;
     head.with_child((hair, stiffness, HairFollowers::new(100_000)));
     commands.insert_resource(Shown { middle, reach, pivot, rest });
     Ok(())
@@ -234,7 +235,7 @@ fn measure(
         measure.peak_strain = measure.strain;
         measure.peak_at = measure.ticks as f32 / 60.0;
     }
-    let radius = heads.iter().find_map(|head| match head.shape {
+    let radius = heads.iter().find_map(|head| match &head.shape {
         bevy_keratin::contact::ColliderShape::Sphere(ball) => Some(ball.radius),
         _ => None,
     });

@@ -49,7 +49,7 @@ struct Arguments {
           value_parser = clap::value_parser!(u32).range(2..=4096))]
     nodes: u32,
     /// How long hair can be that stands by itself: the gravity-bending length (m).
-    #[arg(long, value_name = "M", default_value_t = Stiffness::default().bending_length,
+    #[arg(long, value_name = "M", default_value_t = HairStiffness::default().bending_length,
           value_parser = stiffness)]
     stiffness: f32,
     /// Draws no window, but PNGs into this folder.
@@ -88,7 +88,7 @@ fn scale(text: &str) -> Result<f32, String> {
 
 fn stiffness(text: &str) -> Result<f32, String> {
     let metres = text.parse().map_err(|_| "expected metres, such as 0.13")?;
-    Stiffness::from_bending_length(metres).map(|_| metres).map_err(|error| error.to_string())
+    HairStiffness::from_bending_length(metres).map(|_| metres).map_err(|error| error.to_string())
 }
 
 fn seconds(text: &str) -> Result<f32, String> {

@@ -17,7 +17,7 @@ use bevy::{
     prelude::*,
     time::TimeUpdateStrategy,
 };
-use bevy_keratin::prelude::*;
+use bevy_keratin::{SolverMethod, prelude::*};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use report::Report;

@@ -52,6 +52,11 @@ pub struct Report {
     water_out: f64,
     water_error: f64,
     droplets: usize,
+    /// The most droplets at a time, and how much higher than when it was dry any node has come, and is
+    /// in the end (m), wet only.
+    droplets_peak: usize,
+    lift_peak: f32,
+    lift: f32,
     /// Mean nearest distance between tips over the dry one, wet only.
     tip_spacing_ratio: Option<f64>,
     /// Share of strands in clusters linked at half the dry distance, wet only.
@@ -116,6 +121,9 @@ impl Report {
             water_out: ledger.water_out,
             water_error: ledger.error(),
             droplets: world.query::<&Droplet>().iter(world).count(),
+            droplets_peak: world.resource::<measure::Lift>().droplets,
+            lift_peak: world.resource::<measure::Lift>().highest,
+            lift: world.resource::<measure::Lift>().now,
             tip_spacing_ratio: director.dry_spacing.map(|dry| locks::tip_spacing(&tips) / dry),
             clustered_share: (director.dry_spacing)
                 .map(|dry| locks::clustered_share(&tips, 0.5 * dry as f32)),

@@ -93,7 +93,7 @@ impl Options {
         if !(1..=1024).contains(&segments) {
             return Err(format!("--segments is {segments}, expected 1 to 1024").into());
         }
-        let stiffness = Stiffness::from_bending_length(bending_length)?;
+        let stiffness = HairStiffness::from_bending_length(bending_length)?;
         let substeps = HairSubsteps::fixed(self.substeps.unwrap_or(3))?;
         let spawn = |world: &mut World, direction: Vec3| -> Result<Entity, Box<dyn Error>> {
             let at = |i: usize| direction * (length * i as f32 / segments as f32);

@@ -60,7 +60,7 @@ struct Arguments {
     /// The folder that the pictures go into.
     #[arg(default_value = "target/presets")]
     folder: PathBuf,
-    /// straight, wavy, curly, coily, short, bob, long; all if left out.
+    /// straight, wavy, curly, coily, short, bob, long, fur; all if left out.
     #[arg(value_parser = preset)]
     presets: Vec<HairPreset>,
     /// Width and height of each view (pixels).

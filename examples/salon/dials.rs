@@ -10,6 +10,7 @@ use crate::{
 use bevy::{ecs::system::SystemParam, prelude::*};
 use bevy_egui::egui::{self, Color32, Slider, Ui};
 use bevy_keratin::{
+    Shower, SolverMethod,
     prelude::*,
     render::{HairFollowers, HairLook, HairShading, HairView, Melanin, heat},
     setting::{HairSetting, ValueRange},
@@ -19,7 +20,7 @@ use core::ops::RangeInclusive;
 /// Everything that sliders change.
 #[derive(SystemParam)]
 pub struct Settings<'w, 's> {
-    stiffness: ResMut<'w, HairDefault<Stiffness>>,
+    stiffness: ResMut<'w, HairDefault<HairStiffness>>,
     influence: ResMut<'w, HairDefault<BondInfluence>>,
     cuticle: ResMut<'w, HairDefault<Cuticle>>,
     contact: ResMut<'w, HairDefault<LockContact>>,
@@ -31,14 +32,14 @@ pub struct Settings<'w, 's> {
     look: ResMut<'w, HairDefault<HairLook>>,
     followers: ResMut<'w, HairDefault<HairFollowers>>,
     tools: ResMut<'w, Tools>,
-    wetting: ResMut<'w, HairDefault<Wetting>>,
+    wetting: ResMut<'w, HairDefault<HairWetting>>,
     water: Water<'w, 's>,
     gizmos: ResMut<'w, GizmoConfigStore>,
     lights: Query<'w, 's, &'static mut SpotLight>,
     blowers: Query<'w, 's, (Entity, &'static Blower, &'static Transform)>,
     hairs: Query<'w, 's, (Entity, &'static Strands), With<Hair>>,
     strands: Query<'w, 's, &'static Strand>,
-    treat: MessageWriter<'w, Treat>,
+    treat: MessageWriter<'w, HairTreatment>,
     /// Shared by all of the panel: a system may have but one of these.
     pub orders: MessageWriter<'w, Order>,
     commands: Commands<'w, 's>,
@@ -47,8 +48,8 @@ pub struct Settings<'w, 's> {
 /// What of the world's water sliders change and show.
 #[derive(SystemParam)]
 pub struct Water<'w, 's> {
-    climate: ResMut<'w, Climate>,
-    process: ResMut<'w, ProcessTime>,
+    climate: ResMut<'w, HairClimate>,
+    process: ResMut<'w, HairProcessTime>,
     strewn: ResMut<'w, Strewn>,
     ledger: Res<'w, WaterLedger>,
     droplets: Query<'w, 's, (), With<Droplet>>,
@@ -130,13 +131,21 @@ impl Settings<'_, '_> {
         let Ok((hair, members)) = self.hairs.single() else { return };
         let joints = members.iter().find_map(|s| self.strands.get(s).ok()).map_or(0, Strand::edges);
         let mut asked = None;
-        let kinds: [(&str, &str, fn(Entity) -> Treat); 6] = [
-            ("Wet", "cuts hydrogen bonds", Treat::wet),
-            ("Dry", "hydrogen bonds close in the present shape", Treat::dry),
-            ("Shampoo", "cuts hydrogen and ionic bonds", Treat::shampoo),
-            ("Lotion", "cuts hydrogen, ionic and a fifth of the disulfide bonds", Treat::lotion),
-            ("Neutraliser", "ionic and disulfide bonds close", Treat::neutraliser),
-            ("Set everything", "the present shape becomes the hair's own", Treat::set_everything),
+        let kinds: [(&str, &str, fn(Entity) -> HairTreatment); 6] = [
+            ("Wet", "cuts hydrogen bonds", HairTreatment::wet),
+            ("Dry", "hydrogen bonds close in the present shape", HairTreatment::dry),
+            ("Shampoo", "cuts hydrogen and ionic bonds", HairTreatment::shampoo),
+            (
+                "Lotion",
+                "cuts hydrogen, ionic and a fifth of the disulfide bonds",
+                HairTreatment::lotion,
+            ),
+            ("Neutraliser", "ionic and disulfide bonds close", HairTreatment::neutraliser),
+            (
+                "Set everything",
+                "the present shape becomes the hair's own",
+                HairTreatment::set_everything,
+            ),
         ];
         ui.horizontal_wrapped(|ui| {
             for (label, what, treat) in kinds {
@@ -146,7 +155,7 @@ impl Settings<'_, '_> {
                 }
             }
         });
-        slide(ui, &mut hand.seconds, Treat::SECONDS, "takes (s)");
+        slide(ui, &mut hand.seconds, HairTreatment::SECONDS, "takes (s)");
         ui.horizontal(|ui| {
             ui.checkbox(&mut hand.only, "only joints");
             let last = joints.saturating_sub(1);
@@ -163,7 +172,8 @@ impl Settings<'_, '_> {
         for kind in BondKind::ALL {
             let mut rate = measured.rates[kind as usize] as f32;
             let text = egui::RichText::new(name(kind)).color(colour(kind));
-            let slider = Slider::new(&mut rate, Treat::RATES.safe).text(text).max_decimals(2);
+            let slider =
+                Slider::new(&mut rate, HairTreatment::RATES.safe).text(text).max_decimals(2);
             // The backbone is never cut.
             let response = ui.add_enabled(kind != BondKind::Peptide, slider);
             // A drag is one step to undo.
@@ -171,7 +181,7 @@ impl Settings<'_, '_> {
                 self.orders.write(Order::Remember);
             }
             if response.changed() {
-                asked = Treat::set(hair, kind, rate).ok();
+                asked = HairTreatment::set(hair, kind, rate).ok();
             }
         }
         if let Some(treat) = asked {
@@ -185,9 +195,9 @@ impl Settings<'_, '_> {
     }
 
     pub fn hair(&mut self, ui: &mut Ui) {
-        edited!(self.stiffness, |s: &mut Stiffness| {
-            slide_mm(ui, &mut s.bending_length, Stiffness::BENDING_LENGTH, "bend length (mm)");
-            slide(ui, &mut s.damping, Stiffness::DAMPING, "damping (s)");
+        edited!(self.stiffness, |s: &mut HairStiffness| {
+            slide_mm(ui, &mut s.bending_length, HairStiffness::BENDING_LENGTH, "bend length (mm)");
+            slide(ui, &mut s.damping, HairStiffness::DAMPING, "damping (s)");
         });
         ui.label("Influence of each kind of bond:");
         edited!(self.influence, |f: &mut BondInfluence| {
@@ -219,7 +229,7 @@ impl Settings<'_, '_> {
         let Water { climate, process, strewn, ledger, droplets, soak } = &mut self.water;
         if let Ok((hair, _)) = self.hairs.single() {
             ui.horizontal(|ui| {
-                for (label, wetness) in [("SoakHair through", 1.0), ("Towel", 0.3), ("Dry", 0.0)] {
+                for (label, wetness) in [("Drench", 2.0), ("Towel", 0.3), ("Dry", 0.0)] {
                     if ui.button(label).clicked() {
                         self.orders.write(Order::Remember);
                         soak.write(SoakHair { target: hair, wetness });
@@ -237,20 +247,20 @@ impl Settings<'_, '_> {
         ui.add(Slider::new(&mut wanted.count, 0..=1000).text("droplets"));
         slide_mm(ui, &mut wanted.radius, Shower::DROP_RADIUS, "their radius (mm)");
         strewn.set_if_neq(wanted);
-        edited!(self.wetting, |w: &mut Wetting| {
-            slide(ui, &mut w.adhesion, Wetting::ADHESION, "adhesion (m/s²)");
-            slide(ui, &mut w.cohesion, Wetting::COHESION, "film's pull (m/s²)");
-            slide(ui, &mut w.film_drag, Wetting::FILM_DRAG, "film's drag (1/s)");
-            slide(ui, &mut w.uptake, Wetting::UPTAKE, "uptake (1/s)");
-            slide(ui, &mut w.evaporation, Wetting::EVAPORATION, "evaporation");
-            slide(ui, &mut w.sliding, Wetting::SLIDING, "sliding (s)");
+        edited!(self.wetting, |w: &mut HairWetting| {
+            slide(ui, &mut w.adhesion, HairWetting::ADHESION, "adhesion (m/s²)");
+            slide(ui, &mut w.cohesion, HairWetting::COHESION, "film's pull (m/s²)");
+            slide(ui, &mut w.film_drag, HairWetting::FILM_DRAG, "film's drag (1/s)");
+            slide(ui, &mut w.uptake, HairWetting::UPTAKE, "uptake (1/s)");
+            slide(ui, &mut w.evaporation, HairWetting::EVAPORATION, "evaporation");
+            slide(ui, &mut w.sliding, HairWetting::SLIDING, "sliding (s)");
         });
         let mut air = **climate;
-        slide(ui, &mut air.celsius, Climate::CELSIUS, "air (°C)");
-        slide(ui, &mut air.humidity, Climate::HUMIDITY, "humidity");
+        slide(ui, &mut air.celsius, HairClimate::CELSIUS, "air (°C)");
+        slide(ui, &mut air.humidity, HairClimate::HUMIDITY, "humidity");
         climate.set_if_neq(air);
         let mut faster = process.0;
-        let slider = Slider::new(&mut faster, ProcessTime::RANGE.safe).logarithmic(true);
+        let slider = Slider::new(&mut faster, HairProcessTime::RANGE.safe).logarithmic(true);
         if ui.add(slider.text("× life's speed").max_decimals(0)).changed() {
             process.0 = faster;
         }

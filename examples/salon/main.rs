@@ -28,7 +28,7 @@ mod wardrobe;
 use bevy::{prelude::*, render::renderer::RenderAdapterInfo};
 use bevy_keratin::{
     prelude::*,
-    render::{HairFollowers, HairView},
+    render::{HairFollowers, HairView, WetLook},
 };
 use clap::{CommandFactory, Parser, error::ErrorKind};
 use scenes::{Scene, SceneKind, ScenePlugin};
@@ -148,7 +148,8 @@ fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
         .insert_resource(HairDefault(HairView::from(arguments.view)))
         .add_systems(Startup, stage::build.before(scenes::spawn_scene))
         .add_systems(PreUpdate, surround)
-        .add_systems(PostUpdate, (stage::embody, stage::slide).before(TransformSystems::Propagate));
+        .add_systems(PostUpdate, (stage::embody, stage::slide).before(TransformSystems::Propagate))
+        .add_systems(Update, look_wet);
     let mut gizmos = app.world_mut().resource_mut::<GizmoConfigStore>();
     gizmos.config_mut::<overlay::HairGizmos>().0.enabled = arguments.gizmos;
 }
@@ -163,6 +164,26 @@ fn surround(
     for camera in &cameras {
         commands.entity(camera).insert(environment::studio(&mut images, 450.0));
         ambient.brightness = 0.0;
+    }
+}
+
+/// Water that only cuts bonds, as the bonds' paper has it, shows, too: hair looks as wet as its hydrogen
+/// bonds are open, where it carries no water.
+fn look_wet(
+    mut commands: Commands,
+    strands: Query<(Entity, &Bonds, &Moisture, Option<&WetLook>), With<StrandOf>>,
+) {
+    for (strand, bonds, moisture, look) in &strands {
+        let mut open: Vec<f32> =
+            bonds.rates(BondKind::Hydrogen).map(|rate| (1.0 - rate).clamp(0.0, 1.0)).collect();
+        let is_wet = moisture.is_untouched() && open.iter().any(|open| *open > 0.01);
+        open.extend(open.last().copied());
+        match look {
+            Some(_) if !is_wet => _ = commands.entity(strand).remove::<WetLook>(),
+            Some(look) if look.0 == open => {}
+            _ if is_wet => _ = commands.entity(strand).insert(WetLook(open)),
+            _ => {}
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 //! and styled by the config of [`HairGizmos`], as all gizmos are.
 
 use bevy::prelude::*;
-use bevy_keratin::{ColliderShape, prelude::*};
+use bevy_keratin::{ColliderShape, Shower, prelude::*};
 use core::f32::consts::{FRAC_PI_2, TAU};
 
 /// The lines of the overlay. Off until switched on in the `GizmoConfigStore`.
@@ -36,7 +36,7 @@ fn colliders(mut gizmos: Gizmos<HairGizmos>, colliders: Query<(&HairCollider, &G
         let (scale, rotation, translation) = place.to_scale_rotation_translation();
         let at = Isometry3d::new(translation, rotation);
         let scale = scale.x;
-        match collider.shape {
+        match collider.shape.clone() {
             ColliderShape::Sphere(ball) => _ = gizmos.sphere(at, ball.radius * scale, SOLID),
             ColliderShape::Capsule(mut capsule) => {
                 capsule.radius *= scale;
@@ -54,6 +54,22 @@ fn colliders(mut gizmos: Gizmos<HairGizmos>, colliders: Query<(&HairCollider, &G
                 let at = Isometry3d::new(translation, turn);
                 gizmos.grid(at, UVec2::splat(12), Vec2::splat(0.06), SOLID.with_alpha(0.4));
             }
+            ColliderShape::Cuboid { mut cuboid, .. } => {
+                cuboid.half_size *= scale;
+                gizmos.primitive_3d(&cuboid, at, SOLID);
+            }
+            ColliderShape::Ellipsoid { radii } => {
+                // An ellipse around each axis.
+                for turn in [Quat::IDENTITY, Quat::from_rotation_x(FRAC_PI_2)] {
+                    let half = (turn.inverse() * radii).abs() * scale;
+                    gizmos.ellipse(Isometry3d::new(translation, rotation * turn), half.xy(), SOLID);
+                }
+                let turn = Quat::from_rotation_y(FRAC_PI_2);
+                let at = Isometry3d::new(translation, rotation * turn);
+                gizmos.ellipse(at, radii.zy() * scale, SOLID);
+            }
+            // The salon has none.
+            ColliderShape::Hull(_) | ColliderShape::Grid(_) => {}
         }
     }
 }

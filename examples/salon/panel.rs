@@ -125,8 +125,8 @@ impl Wardrobe<'_, '_> {
                 orders.write(Order::Redo);
             }
         });
-        if !self.hairdos.told.is_empty() {
-            ui.small(&self.hairdos.told);
+        if !self.hairdos.reported.is_empty() {
+            ui.small(&self.hairdos.reported);
         }
     }
 }

@@ -26,7 +26,7 @@ pub struct Hairdos {
     past: Vec<Hairdo>,
     future: Vec<Hairdo>,
     /// How the last order went.
-    pub told: String,
+    pub reported: String,
 }
 
 /// Writes a file whole or not at all: who is interrupted keeps the one that was there.
@@ -95,8 +95,8 @@ fn serve(
         let Ok(hair) = hairs.single() else { continue };
         let order = order.clone();
         commands.queue(move |world: &mut World| {
-            let told = carry_out(&order, world, hair).unwrap_or_else(|error| error.to_string());
-            world.resource_mut::<Hairdos>().told = told;
+            let reported = carry_out(&order, world, hair).unwrap_or_else(|error| error.to_string());
+            world.resource_mut::<Hairdos>().reported = reported;
         });
     }
 }

@@ -16,6 +16,33 @@ pub fn watch_strain(strands: Query<&Strand>, mut peak: ResMut<StrainPeak>) {
         .fold(peak.0, |a, b| if b <= a || a.is_nan() { a } else { b });
 }
 
+/// wet: what droplets have done to hair that had settled dry.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Lift {
+    /// How high each node was, strand by strand (m); empty until droplets fall.
+    pub dry: Vec<f32>,
+    /// How much higher than that any has come since, and is now (m).
+    pub highest: f32,
+    pub now: f32,
+    /// The most droplets that there were at a time.
+    pub droplets: usize,
+}
+
+/// How high each node is, strand by strand (m).
+pub fn heights<'a>(strands: impl Iterator<Item = &'a Strand>) -> Vec<f32> {
+    strands.flat_map(|s| s.positions()).map(|p| p.y).collect()
+}
+
+pub fn watch_lift(strands: Query<&Strand>, droplets: Query<&Droplet>, mut lift: ResMut<Lift>) {
+    if lift.dry.is_empty() {
+        return;
+    }
+    let rise = heights(strands.iter()).into_iter().zip(&lift.dry).map(|(now, dry)| now - dry);
+    let now = rise.fold(0.0, f32::max);
+    (lift.highest, lift.now) = (lift.highest.max(now), now);
+    lift.droplets = lift.droplets.max(droplets.iter().len());
+}
+
 /// Ω of every joint, by strand.
 pub fn shapes<'a>(strands: impl Iterator<Item = &'a Strand>) -> Vec<Vec<Vec3>> {
     strands.map(|s| (0..s.edges()).map(|i| s.darboux(i).xyz()).collect()).collect()

@@ -10,7 +10,7 @@
 //! straight hair, presses it on the floor, lets a night dry it, lifts it, and showers it again; no code
 //! sets a bond's rate there.
 //!
-//! Winding is done by the simulation's own [`Winding`]: nodes are guided through ever tighter
+//! Winding is done by the simulation's own [`PermWinding`]: nodes are guided through ever tighter
 //! helices onto the rod.
 
 #![allow(dead_code, reason = "each example uses its own part")]
@@ -176,13 +176,16 @@ impl Plugin for ScenePlugin {
             .init_resource::<Director>()
             .init_resource::<Strewn>()
             .init_resource::<measure::StrainPeak>()
+            .init_resource::<measure::Lift>()
             .add_systems(Startup, spawn_scene)
             .add_systems(FixedUpdate, script::direct)
             .add_systems(
                 HairTick,
-                measure::watch_strain
-                    .in_set(HairSystems::Last)
-                    .run_if(resource_exists::<measure::StrainPeak>),
+                (
+                    measure::watch_strain.run_if(resource_exists::<measure::StrainPeak>),
+                    measure::watch_lift,
+                )
+                    .in_set(HairSystems::Last),
             );
     }
 }
@@ -192,12 +195,12 @@ impl Plugin for ScenePlugin {
 pub struct Surroundings<'w> {
     gravity: ResMut<'w, HairGravity>,
     drag: ResMut<'w, HairDefault<AirDrag>>,
-    wetting: ResMut<'w, HairDefault<Wetting>>,
+    wetting: ResMut<'w, HairDefault<HairWetting>>,
     contact: ResMut<'w, HairDefault<LockContact>>,
     substeps: ResMut<'w, HairSubsteps>,
     solver: ResMut<'w, HairDefault<HairSolver>>,
-    climate: ResMut<'w, Climate>,
-    process: ResMut<'w, ProcessTime>,
+    climate: ResMut<'w, HairClimate>,
+    process: ResMut<'w, HairProcessTime>,
     rules: ResMut<'w, DropletRules>,
 }
 
@@ -247,6 +250,7 @@ pub fn spawn_scene(
     commands.insert_resource(WaterLedger::default());
     *director = Director::default();
     *peak = default();
+    commands.insert_resource(measure::Lift::default());
     surroundings.set(scene.kind);
     // The paper's floor.
     commands.spawn((Prop, HairCollider::plane(Dir3::Y)));
@@ -260,7 +264,7 @@ pub fn spawn_scene(
                 _ => StrandModel::Rod,
             };
             // Soft hair, that hangs.
-            let stiffness = Stiffness::from_bending_length(0.06).expect("6 cm is valid");
+            let stiffness = HairStiffness::from_bending_length(0.06).expect("6 cm is valid");
             commands.entity(hair).insert((model, stiffness));
             commands.spawn((
                 Prop,

@@ -2,10 +2,10 @@
 
 use super::{
     Model, Prop, Scene, SceneKind, Strewn, locks,
-    measure::{shapes, tips, weighted_rate},
+    measure::{Lift, heights, shapes, tips, weighted_rate},
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
-use bevy_keratin::{WindReceived, prelude::*};
+use bevy_keratin::{Shower, WindReceived, prelude::*};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// The clock of a scene, and what it has seen.
@@ -106,7 +106,7 @@ pub fn direct(
     strands: Query<&Strand>,
     bonds: Query<&Bonds>,
     tools: Query<Entity, Or<(With<PermRod>, With<Blower>)>>,
-    mut treat: MessageWriter<Treat>,
+    mut treat: MessageWriter<HairTreatment>,
     mut water: Water,
 ) {
     if director.ended {
@@ -126,15 +126,15 @@ pub fn direct(
     match scene.kind {
         SceneKind::Bedhead => {
             if passes(0.0) && variant != "never-wet" {
-                treat.write(Treat::wet(hair));
+                treat.write(HairTreatment::wet(hair));
             }
             if passes(Moment::TREATED) && variant == "treated" {
-                treat.write(Treat::dry(hair).over(3.0));
+                treat.write(HairTreatment::dry(hair).over(3.0));
             }
         }
         SceneKind::BlowDry => {
             if passes(0.0) {
-                treat.write(Treat::wet(hair));
+                treat.write(HairTreatment::wet(hair));
             }
             if passes(Moment::TREATED) {
                 let drying = if variant == "treated" { 0.3 } else { 0.0 };
@@ -147,7 +147,7 @@ pub fn direct(
                         .looking_at(Vec3::new(0.01, 0.0, 0.0), Vec3::Y),
                 ));
                 if variant == "uniform" {
-                    treat.write(Treat::dry(hair).over(6.5));
+                    treat.write(HairTreatment::dry(hair).over(6.5));
                 }
             }
         }
@@ -169,28 +169,29 @@ pub fn direct(
                 for strand in members.iter() {
                     commands.entity(strand).insert((
                         WoundOn(rod),
-                        Winding { from_node: 2, pitch: 0.0, seconds: WINDING },
+                        PermWinding { from_node: 2, pitch: 0.0, seconds: WINDING },
                     ));
                 }
             }
             if passes(Moment::TREATED) {
                 match variant {
-                    "treated" | "cut-only" => _ = treat.write(Treat::lotion(hair)),
-                    "water-set" => _ = treat.write(Treat::shampoo(hair)),
+                    "treated" | "cut-only" => _ = treat.write(HairTreatment::lotion(hair)),
+                    "water-set" => _ = treat.write(HairTreatment::shampoo(hair)),
                     _ => {}
                 }
             }
             if passes(Moment::RINSED) && matches!(variant, "treated" | "water-set") {
-                treat.write(Treat::neutraliser(hair).over(1.0));
-                treat.write(Treat::dry(hair).over(1.0));
+                treat.write(HairTreatment::neutraliser(hair).over(1.0));
+                treat.write(HairTreatment::dry(hair).over(1.0));
             }
         }
         SceneKind::Wet | SceneKind::Shower => {}
     }
     if scene.kind == SceneKind::Wet && passes(Moment::STREWN) {
         director.dry_spacing = Some(locks::tip_spacing(&tips(strands.iter())));
+        water.lift.dry = heights(strands.iter());
         let center = transform.translation;
-        strew(&mut commands, *water.strewn, strands.iter(), center);
+        scatter_droplets(&mut commands, *water.strewn, strands.iter(), center);
     }
     if scene.kind == SceneKind::Shower {
         let all = || members.iter().filter_map(|s| bonds.get(s).ok());
@@ -237,8 +238,9 @@ pub fn direct(
 pub struct Water<'w, 's> {
     strewn: Res<'w, Strewn>,
     showers: Query<'w, 's, Entity, With<Shower>>,
-    process: ResMut<'w, ProcessTime>,
+    process: ResMut<'w, HairProcessTime>,
     soak: MessageWriter<'w, SoakHair>,
+    lift: ResMut<'w, Lift>,
 }
 
 /// A hand shower beside the roots of the hair that hangs from `scalp`: water runs down from there.
@@ -260,7 +262,7 @@ fn shower(scalp: Vec3) -> impl Bundle {
 }
 
 /// Droplets on nodes chosen by a seed: [W]'s experiment.
-fn strew<'a>(
+fn scatter_droplets<'a>(
     commands: &mut Commands,
     drops: Strewn,
     strands: impl Iterator<Item = &'a Strand>,

@@ -59,8 +59,6 @@ pub fn run(title: &str, script: &[Step], build: impl FnOnce(&mut App)) -> ExitCo
         .insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
         .insert_resource(DirectionalLightShadowMap { size: 4096 })
         .insert_resource(GlobalAmbientLight { brightness: 320.0, ..default() })
-        .init_resource::<Worn>()
-        .add_observer(|_: On<HairWorn>, mut worn: ResMut<Worn>| worn.0 += 1)
         .add_systems(Startup, light);
     register(&mut app);
     build(&mut app);
@@ -109,9 +107,17 @@ fn register(app: &mut App) {
         .register_type::<GltfMeshName>();
 }
 
-/// How often hair was worn.
-#[derive(Resource, Default)]
-struct Worn(u32);
+/// Whether everybody wears the hair that they are to wear.
+fn is_worn(world: &mut World) -> bool {
+    let mut worn = world.query::<(&WornHair, Option<&WornPreset>)>();
+    let mut wearers = world.query::<(Entity, &WearHair)>();
+    wearers.iter(world).all(|(wearer, wear)| {
+        worn.iter(world).any(|(worn, preset)| {
+            let is_as_long = preset.is_none_or(|preset| preset.length == wear.length);
+            worn.wearer == wearer && worn.hair == wear.hair && is_as_long
+        })
+    })
+}
 
 fn camera() -> impl Bundle {
     let place = Transform::from_xyz(0.4, 1.62, 0.9).looking_at(Vec3::Y * 1.52, Vec3::Y);
@@ -145,7 +151,7 @@ fn pictures(
 ) -> Result<(), Box<dyn Error>> {
     picture::folder(folder)?;
     let pictures = picture::Pictures::new(app, size, 1, camera());
-    for (i, (keys, name)) in script.iter().enumerate() {
+    for (keys, name) in script {
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
         for key in *keys {
             press(app, *key, ButtonState::Pressed);
@@ -154,7 +160,8 @@ fn pictures(
             app.update();
         }
         let mut ticks = 0;
-        while app.world().resource::<Worn>().0 <= i as u32 {
+        app.update();
+        while !is_worn(app.world_mut()) {
             app.update();
             ticks += 1;
             if ticks == PATIENCE {

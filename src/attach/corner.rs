@@ -1,4 +1,4 @@
-//! The few vertices of a mesh that carry roots, and what moves them.
+//! The few vertices of a mesh that have roots, with their joints and morph targets.
 
 use super::{error::RootsError, morph::Shift};
 use crate::plant::RootOnMesh;
@@ -8,19 +8,19 @@ use bevy::{
 };
 use core::ops::Range;
 
-/// A vertex at rest, and what moves it.
+/// A vertex at rest, with its joints and morph targets.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
     pub at: Vec3,
-    /// Every one is there, see [`Corners::joints_of`].
+    /// Always valid indices, see [`Corners::joints_of`].
     pub joints: [u16; 4],
     pub weights: [f32; 4],
-    /// Which shifts of its hair are this corner's: first and behind last, the same for most.
+    /// Its range in the shifts of its hair: first and one past the last; empty for most.
     shifts: [u32; 2],
 }
 
 impl Corner {
-    /// Where its shifts are among those of its hair.
+    /// The range of its shifts among those of its hair.
     pub fn shifts(&self) -> Range<usize> {
         self.shifts[0] as usize..self.shifts[1] as usize
     }
@@ -31,12 +31,12 @@ pub(super) struct Corners<'a> {
     positions: &'a [[f32; 3]],
     skin: Option<(&'a [[u16; 4]], &'a [[f32; 4]])>,
     joints: usize,
-    /// One target after the other, each with all vertices.
+    /// Target after target, each with all vertices.
     morphs: &'a [MorphAttributes],
 }
 
 impl<'a> Corners<'a> {
-    /// Of a mesh with so many joints, one or more.
+    /// Reads a mesh with `joints` joints, at least one.
     pub fn of(mesh: &'a Mesh, skinned: bool, joints: usize) -> Result<Self, RootsError> {
         let attribute = |id| mesh.try_attribute_option(id);
         let positions = match attribute(Mesh::ATTRIBUTE_POSITION) {
@@ -77,7 +77,7 @@ impl<'a> Corners<'a> {
         Ok(Corner { at: (*at).into(), joints, weights, shifts })
     }
 
-    /// The joints of a vertex with their weights; `None` where they make no sense.
+    /// The joints of a vertex with their weights; `None` where they are invalid.
     fn joints_of(&self, v: usize) -> Option<([u16; 4], [f32; 4])> {
         let (indices, weights) = self.skin?;
         let (indices, weights) = (*indices.get(v)?, *weights.get(v)?);

@@ -1,9 +1,9 @@
-//! Why roots cannot go with a mesh.
+//! Why roots cannot follow a mesh.
 
 use bevy::prelude::*;
 
 /// Why the strands of a [`RootsOnMesh`](super::RootsOnMesh) do not follow its mesh: which value, what
-/// was expected and how to mend it. Told as [`FaultKind::Roots`](crate::FaultKind::Roots).
+/// was expected and how to fix it. Reported as [`FaultKind::Roots`](crate::FaultKind::Roots).
 #[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 #[non_exhaustive]
@@ -53,7 +53,7 @@ pub enum RootsError {
         /// How many inverse bind poses.
         poses: usize,
     },
-    /// Roots on triangles that have no area, so no way up, or that are not finite.
+    /// Roots on triangles that have no area, and so no normal, or that are not finite.
     #[error(
         "{found} roots of RootsOnMesh are on triangles without area, expected none: they stay on \
          the hair; plant them elsewhere or repair the mesh"

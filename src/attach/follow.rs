@@ -1,5 +1,4 @@
-//! Tied roots go with their triangles: in equal parts through a tick, and once a frame to where the
-//! mesh is drawn.
+//! Tied roots follow their triangles: in equal parts through a tick, and once a frame to the drawn mesh.
 
 use super::{
     morph::Morphs,
@@ -12,7 +11,7 @@ use crate::{
 };
 use bevy::{math::Isometry3d, prelude::*};
 
-/// Where the tied roots are on the mesh in this pose, seen from a hair.
+/// Poses of the tied roots on the posed mesh, in a hair's frame.
 fn places(
     tied: &TiedRoots,
     mesh: &MeshPose,
@@ -24,7 +23,7 @@ fn places(
     })
 }
 
-/// At the start of a tick: where roots are to be at its end.
+/// At the start of a tick: targets of the roots at its end.
 pub(super) fn aim_roots(
     step: Res<HairStep>,
     transforms: TransformHelper,
@@ -47,7 +46,7 @@ pub(super) fn aim_roots(
     }
 }
 
-/// Roots in equal parts on their way.
+/// Moves roots by a substep's part of their way.
 pub(super) fn move_roots(
     step: Res<HairStep>,
     hairs: Query<&TiedRoots, With<Hair>>,

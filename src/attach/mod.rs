@@ -1,10 +1,10 @@
-//! Roots that go with the triangles of a mesh that is skinned or morphs.
+//! Roots that follow the triangles of a skinned or morphed mesh.
 //!
 //! Hair on a head that only turns needs no more than a [`Hair`](crate::Hair) on the head's bone. Where
 //! the scalp itself stretches (a neck, a beard, fur) every root has to follow its own triangle.
 //! [`RootsOnMesh`] morphs and skins those few triangles on the CPU: once a tick for the simulation,
-//! which takes roots there in equal parts over its substeps, and once a frame from the pose that is
-//! drawn, so that no root is ever seen beside its scalp.
+//! which moves roots there in equal parts over its substeps, and once a frame from the pose that is
+//! drawn, so that roots are always drawn on their scalp.
 
 mod corner;
 mod error;

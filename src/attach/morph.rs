@@ -1,4 +1,4 @@
-//! What the morph targets of a mesh do to the few vertices that carry roots.
+//! Morph targets of the few vertices that have roots.
 
 use bevy::{
     ecs::system::SystemParam,
@@ -6,7 +6,7 @@ use bevy::{
     prelude::*,
 };
 
-/// Where one morph target takes one corner.
+/// The displacement of one corner by one morph target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shift {
     target: u32,
@@ -15,12 +15,12 @@ pub(super) struct Shift {
 }
 
 impl Shift {
-    /// `None` where the target leaves the corner alone.
+    /// `None` where the target does not move the corner.
     pub fn new(target: usize, by: Vec3) -> Option<Self> {
         (by != Vec3::ZERO && by.is_finite()).then_some(Self { target: target as u32, by })
     }
 
-    /// With these weights of all targets. A weight that is missing or not finite counts as none.
+    /// The displacement with these weights of all targets. A missing or non-finite weight counts as 0.
     pub fn at(&self, weights: &[f32]) -> Vec3 {
         let weight = weights.get(self.target as usize).copied().unwrap_or(0.0);
         if weight.is_finite() { self.by * weight } else { Vec3::ZERO }

@@ -1,4 +1,4 @@
-//! The mesh as joints and morph targets pose it now.
+//! The mesh as posed by joints and morph targets.
 
 use super::{
     corner::Corner,
@@ -18,7 +18,7 @@ struct Joint {
     inverse_bind: Affine3A,
 }
 
-/// What moves the corners that roots are tied to.
+/// The joints and morph targets of the corners that roots are tied to.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Movers {
     mesh: Option<Entity>,
@@ -28,7 +28,7 @@ pub(super) struct Movers {
 }
 
 impl Movers {
-    /// Those of a mesh's entity.
+    /// The movers of a mesh's entity.
     pub fn of(
         mesh: Entity,
         skin: Option<(&SkinnedMesh, &SkinnedMeshInverseBindposes)>,
@@ -52,7 +52,7 @@ impl Movers {
         self.joints.len()
     }
 
-    /// Where they take the corners now; `None` while a joint is nowhere.
+    /// The present pose; `None` while a joint has no transform.
     pub fn pose<'a>(
         &'a self,
         place: impl Fn(Entity) -> Option<GlobalTransform>,

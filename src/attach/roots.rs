@@ -7,14 +7,14 @@ use bevy::{
     prelude::*,
 };
 
-/// Ties the strands of a [`Hair`](crate::Hair) to triangles of a mesh, at rest, skinned or morphed.
+/// Ties the strands of a [`Hair`](crate::Hair) to triangles of a mesh, static, skinned or morphed.
 /// Component of the hair, which best sits on the bone that moves most of it.
 ///
-/// Give strands as they grow on the mesh in its own space, before any skinning, as planting gives
-/// them, or say by [`strands_from_mesh`](Self::strands_from_mesh) in which other space. In the first tick in which mesh and joints are there every strand is taken to its place on
-/// the mesh as it is posed; lengths are scaled as the mesh is. From then on roots go with their
-/// triangles, turning with them: with the joints of a `SkinnedMesh`, and with the mesh's morph targets
-/// as `MeshMorphWeights` weighs them. What does not fit is told once as
+/// Strands are in the mesh's own space, before any skinning, as planting gives them, or in the space
+/// set by [`strands_from_mesh`](Self::strands_from_mesh). In the first tick in which mesh and joints
+/// exist every strand is moved to its place on the posed mesh; lengths are scaled as the mesh is. From
+/// then on roots move and rotate with their triangles: by the joints of a `SkinnedMesh`, and by the
+/// mesh's morph targets with the weights of `MeshMorphWeights`. Invalid data are reported once as
 /// [`FaultKind::Roots`](crate::FaultKind::Roots).
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
@@ -24,12 +24,12 @@ pub struct RootsOnMesh {
     pub mesh: Option<Entity>,
     /// One for each strand, in the order of the hair's [`Strands`](crate::Strands).
     pub roots: Vec<RootOnMesh>,
-    /// From the mesh's own space to the one that strands are given in; the identity where that is the
-    /// mesh's. With the hair's frame at rest as that space, strands are in place before they are tied.
+    /// Transform from the mesh's own space to that of the strands; the identity by default. With the
+    /// hair's frame at rest as that space, strands are in place before they are tied.
     pub strands_from_mesh: Affine3A,
 }
 
-/// What was read from the mesh when the strands were tied to it, so that its asset may go.
+/// Data read from the mesh when the strands were tied to it, so that its asset may be unloaded.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct TiedRoots {
@@ -45,7 +45,7 @@ pub(super) struct Tied {
     pub(super) strand: Entity,
     pub(super) weights: Vec3,
     pub(super) corners: [Corner; 3],
-    /// Where the root's frame is in its triangle's.
+    /// The root's frame relative to its triangle's.
     pub(super) offset: Isometry3d,
     pub(super) from: Isometry3d,
     pub(super) to: Isometry3d,

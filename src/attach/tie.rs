@@ -1,4 +1,4 @@
-//! Tying strands to their mesh, once it is there.
+//! Tying strands to their mesh, once it is loaded.
 
 use super::{
     corner::{Corner, Corners},
@@ -49,7 +49,7 @@ pub(super) fn tie(
         if skin.is_some() && poses.is_none() {
             continue;
         }
-        let mut told = |why| {
+        let mut report = |why| {
             faults.write(
                 HairFault::caused(FaultKind::Roots, why, "those strands do not follow the mesh")
                     .of(hair),
@@ -61,7 +61,7 @@ pub(super) fn tie(
             Ok(read) => read,
             Err(why) => {
                 tied.failed = true;
-                told(why);
+                report(why);
                 continue;
             }
         };
@@ -84,7 +84,7 @@ pub(super) fn tie(
         tied.failed = tied.roots.is_empty();
         tied.movers = movers;
         if flat > 0 {
-            told(RootsError::Flat { found: flat });
+            report(RootsError::Flat { found: flat });
         }
     }
 }
@@ -107,12 +107,12 @@ fn read(
     Ok((movers, read))
 }
 
-/// Puts a strand that was given where the corners of its triangle are at `bind` to its place in the
-/// hair's frame, where they are `posed`. Morph targets move and turn it, but hair is no longer on a
-/// face that happens to be puffed when it is tied: lengths are those of the `unmorphed` mesh.
+/// Moves a strand from its triangle in the `bind` pose to the triangle as `posed`, in the hair's frame.
+/// Morph targets move and rotate it, but do not scale it: lengths are those of the `unmorphed` mesh,
+/// whatever the face's expression when the strand is tied.
 ///
-/// It is moved, turned and scaled as a whole: pose, lengths and what its bonds remember of its shape
-/// stay what they are.
+/// It is moved, rotated and scaled as a whole: its shape and the shapes that its bonds remember stay
+/// the same.
 fn tie_strand(
     member: Entity,
     root: &RootOnMesh,
@@ -131,7 +131,9 @@ fn tie_strand(
     let turned = |q: &Quat| (turn * *q).normalize();
     let points: Vec<Vec3> = strand.positions().iter().map(place).collect();
     let lengths: Vec<f32> = strand.rest_lengths().iter().map(|l| l * scale).collect();
-    let usable = points.iter().all(|p| p.is_finite()) && lengths.iter().all(|l| *l >= MIN_SEGMENT);
+    let usable = points.len() >= 2
+        && points.iter().all(|p| p.is_finite())
+        && lengths.iter().all(|l| *l >= MIN_SEGMENT);
     if !usable {
         return None;
     }

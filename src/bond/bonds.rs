@@ -1,4 +1,4 @@
-//! A strand's bonds, and what is asked of them.
+//! A strand's bonds, and requested changes of them.
 
 use super::{kind::BondKind, model::JointBonds};
 use crate::{parallel::prefetch, strand::Strand};
@@ -22,8 +22,8 @@ impl Bonds {
         Self { joints }
     }
 
-    /// As many as the strand has joints: those of the part that is kept, counted from the root, stay as they
-    /// are; new ones are closed around the present shape.
+    /// Resizes to the strand's joints: kept joints, counted from the root, stay unchanged; new ones are
+    /// closed around the present shape.
     pub(super) fn fit(&mut self, strand: &Strand) {
         let new = Self::of(strand).joints.into_iter().skip(self.joints.len());
         self.joints.extend(new);
@@ -36,27 +36,27 @@ impl Bonds {
     }
 }
 
-/// What the tick will do to a strand's rates: requested Δb per joint and kind, summed over all who
-/// ask in `ExternalForces`, taken by `BondUpdate` through equation 16.
+/// Requested changes of a strand's rates: Δb per joint and kind, summed over all requests of
+/// `ExternalForces`, applied by `BondUpdate` through equation 16.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct BondChanges {
-    /// Δb per joint; may be empty when nobody asks.
+    /// Δb per joint; empty without requests.
     #[reflect(ignore)]
     joints: Vec<[f32; BondKind::COUNT]>,
     #[reflect(ignore)]
     any: bool,
 }
 
-/// More than any strand has: what lies beyond cannot be meant.
+/// More joints than any strand has; requests beyond are ignored.
 const MOST_JOINTS: usize = 1 << 16;
 
 /// More than any rate can change by.
 const MOST_CHANGE: f32 = 1e6;
 
 impl BondChanges {
-    /// Asks for a change of `kind` at `joint`. Requests beyond the strand's joints and non-finite
-    /// ones do nothing; peptide bonds are never cut.
+    /// Requests a change of `kind` at `joint`. Requests beyond the strand's joints and non-finite
+    /// ones are ignored; peptide bonds are never cut.
     #[inline]
     pub fn ask(&mut self, joint: usize, kind: BondKind, change: f32) {
         if change == 0.0 || !change.is_finite() || (kind == BondKind::Peptide && change < 0.0) {
@@ -70,29 +70,33 @@ impl BondChanges {
             self.joints.resize(joint + 1, [0.0; BondKind::COUNT]);
         }
         let sum = &mut self.joints[joint][kind as usize];
-        // Two requests without end would add up to one that is not finite.
+        // The sum of two huge requests must stay finite.
         *sum = (*sum + change).clamp(-MOST_CHANGE, MOST_CHANGE);
         self.any = true;
     }
 
-    /// Whether anything was asked.
+    /// Whether nothing was requested.
     pub fn is_empty(&self) -> bool {
         !self.any
     }
 
-    /// Asks for the memory of what was asked for.
+    /// Prefetches the requests.
     pub(crate) fn prefetch(&self) {
         prefetch(&self.joints);
     }
 
-    /// What was asked of each joint, root first.
+    /// The requested change of each joint, root first.
     pub(super) fn asked(&self) -> &[[f32; BondKind::COUNT]] {
         &self.joints
     }
 
-    /// All of it is done.
-    pub(super) fn clear(&mut self) {
+    /// All of it is done. Memory for joints beyond the strand's `edges` is given back.
+    pub(super) fn clear(&mut self, edges: usize) {
         self.any = false;
+        if self.joints.len() > edges {
+            self.joints.truncate(edges);
+            self.joints.shrink_to_fit();
+        }
         self.joints.fill([0.0; BondKind::COUNT]);
     }
 }

@@ -1,15 +1,16 @@
-//! What a game may do to a hair's shape at once: put it back, or make the present one its own.
+//! Commands on the shape of a hair: reset it, or keep the present one.
 
 use super::{bonds::Bonds, kind::BondKind, settings::BondInfluence};
 use crate::{
+    fault::{FaultKind, HairFault},
     setting::{HairDefault, Ranged},
     strand::{Hair, Strand, StrandHistory, Strands},
 };
 use bevy::prelude::*;
 
 impl Hair {
-    /// Puts every strand into the shape that its bonds hold it to, as without gravity, at rest: after
-    /// a cut, or when a game has twisted hair beyond use. Water and bonds stay as they are.
+    /// Resets every strand to the rest shape of its bonds (its shape without gravity), at rest: after a
+    /// camera cut, or when hair is badly tangled. Water and bonds stay as they are.
     ///
     /// `commands.entity(hair).queue(Hair::reset)`
     pub fn reset(mut hair: EntityWorldMut<'_>) {
@@ -24,11 +25,12 @@ impl Hair {
         });
     }
 
-    /// Makes the present shape the hair's own: all bonds remember it, closed or not.
+    /// Makes the present shape the hair's natural shape: all bonds remember it, closed or not.
     ///
     /// `commands.entity(hair).queue(Hair::restyle)`
     pub fn restyle(mut hair: EntityWorldMut<'_>) {
         for_each_strand(&mut hair, |strand, bonds, _| {
+            bonds.fit(strand);
             for (i, joint) in bonds.joints.iter_mut().enumerate() {
                 joint.shapes = [strand.darboux(i).xyz(); BondKind::COUNT];
             }
@@ -43,12 +45,18 @@ fn for_each_strand(
     let members: Vec<Entity> = hair.get::<Strands>().into_iter().flat_map(Strands::iter).collect();
     hair.world_scope(|world| {
         for strand in members {
-            // Somebody may have written one that is not there.
-            if let Ok(mut strand) = world.get_entity_mut(strand)
-                && let Ok((mut strand, mut bonds, mut history)) =
-                    strand.get_components_mut::<(&mut Strand, &mut Bonds, &mut StrandHistory)>()
-            {
-                act(&mut strand, &mut bonds, &mut history);
+            // User code may have listed one that does not exist.
+            let Ok(mut entity) = world.get_entity_mut(strand) else { continue };
+            let Ok((mut parts, mut bonds, mut history)) =
+                entity.get_components_mut::<(&mut Strand, &mut Bonds, &mut StrandHistory)>()
+            else {
+                continue;
+            };
+            // No tick may have seen what user code wrote into it in this frame.
+            let repaired = parts.repair();
+            act(&mut parts, &mut bonds, &mut history);
+            if let Some(repaired) = repaired {
+                world.write_message(HairFault::new(FaultKind::Strand, repaired).of(strand));
             }
         }
     });

@@ -1,13 +1,12 @@
-//! Side-chain bonds: why this hair remembers.
+//! Side-chain bonds, which let hair remember its shape.
 //!
 //! Every joint carries four kinds of bonds. Each has a shape it remembers and a rate, the share of
 //! its bonds that are closed. Water, lotions, heat and wind move the rates; bonds that re-form
 //! remember the shape of that moment ([`JointBonds::change`], equation 16); the rest shape the rod
 //! springs back to is their weighted mean ([`JointBonds::rest_shape`], equation 15).
 //!
-//! Mathematics in [`model`], components here, systems beside. Nothing but `BondUpdate` moves rates:
-//! whoever wants a change asks for it in [`BondChanges`], which game code does through
-//! [`Treat`](crate::treatment::Treat).
+//! The equations are in [`model`]. Only `BondUpdate` changes rates: other systems add requests to
+//! [`BondChanges`], game code sends [`HairTreatment`](crate::treatment::HairTreatment).
 
 mod bonds;
 mod command;

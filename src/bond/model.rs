@@ -1,4 +1,4 @@
-//! Side-chain bonds as mathematics: equations 13–16 and 19 of \[B\], on one joint at a time.
+//! Side-chain bonds as pure functions: equations 13–16 and 19 of \[B\], on one joint at a time.
 
 use super::kind::BondKind;
 use crate::{
@@ -33,8 +33,8 @@ impl JointBonds {
     /// Equation 15: Ω0 = Σ f_j {Ω_j + (1−b_j)(Ω − Ω_j)} / Σ f_j, as a full quaternion.
     ///
     /// `omega` is the present shape with real part ≥ 0, `influence` the shares f_j. Broken bonds
-    /// follow the present shape: the joint gets softer by B = Σ f b / Σ f and feels only what bonds
-    /// remain. Ω is taken in the hemisphere of each Ω_j.
+    /// follow the present shape: the joint's stiffness falls to the share B = Σ f b / Σ f and only the
+    /// remaining bonds act. Ω is taken in the hemisphere of each Ω_j.
     #[inline]
     pub fn rest_shape(&self, omega: Quat, influence: &[f32; BondKind::COUNT]) -> Quat {
         let bonds = core::array::from_fn(|j| self.kind(j));
@@ -43,7 +43,7 @@ impl JointBonds {
     }
 
     /// Equation 16: bonds of kind `j` that form (Δb > 0) remember the present shape,
-    /// Ω_j ← (b Ω_j + Δb Ω)/(b + Δb); bonds that break forget nothing. b stays in \[0, 1\].
+    /// Ω_j ← (b Ω_j + Δb Ω)/(b + Δb); breaking bonds keep Ω_j. b stays in \[0, 1\].
     #[inline]
     pub fn change(&mut self, j: usize, change: f32, omega: Quat) {
         let Remembered { shape: V3 { x, y, z }, rate } =
@@ -114,7 +114,7 @@ pub(super) struct Remembered<R> {
 
 impl<R: Real> Remembered<R> {
     /// Whether the present shape is in the other hemisphere than the remembered one, so that −Ω is
-    /// what is nearer to it. Real parts are ≥ 0.
+    /// nearer to it. Real parts are ≥ 0.
     #[inline(always)]
     fn is_opposite(&self, omega: Quaternion<R>) -> R::Mask {
         // Ω·Ω_j + w √(1 − |Ω_j|²) < 0, without the root.
@@ -145,13 +145,13 @@ pub(super) fn rest_shape<R: Real>(
     Quaternion::new(v, (zero.lit(1.0) - v.dot(v)).max(zero).sqrt())
 }
 
-/// Below this share of closed bonds a joint has no shape of its own.
+/// Below this share of closed bonds a joint has no remembered shape.
 pub(super) const FEW: f32 = 1e-3;
 
-/// The equivalent of equation 15 that does not follow the present shape, for a solver to which that
-/// would be inertia: Ω* = M/B = Σ f b Ω_j / Σ f b with the share of the stiffness that is left,
-/// B = Σ f b / Σ f. The equilibria are the same. Where hardly any bond is closed the rest shape is the
-/// present one, with as little stiffness as twist needs to be determined.
+/// The equivalent of equation 15 that does not follow the present shape, for a solver in which that
+/// would act as inertia: Ω* = M/B = Σ f b Ω_j / Σ f b with the remaining share of the stiffness,
+/// B = Σ f b / Σ f. The equilibria are the same. With almost no closed bonds the rest shape is the
+/// present one, with just enough stiffness to determine twist.
 #[inline(always)]
 pub(super) fn remembered<R: Real>(
     omega: Quaternion<R>,
@@ -186,7 +186,7 @@ pub(super) fn changed<R: Real>(
     let to = (bond.rate + change).max(zero).min(one);
     let formed = to - bond.rate;
     let present = R::select(bond.is_opposite(omega), -formed, formed);
-    // Of hardly any bonds the inverse would be without end.
+    // Keeps the inverse finite where there are almost no bonds.
     let least = zero.lit(1e-30);
     let mean = omega.v.scale_add(present, bond.shape.scale(bond.rate)).scale(one / to.max(least));
     Remembered { shape: V3::select(zero.lt(formed), mean, bond.shape), rate: to }
@@ -212,7 +212,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hardly_any_bonds_remember_a_finite_shape() {
+    fn almost_no_bonds_remember_a_finite_shape() {
         for change in [1e-45_f32, 1e-40, 1e-30, 1e-20] {
             let mut joint = JointBonds { rates: [0.0; BondKind::COUNT], ..Default::default() };
             let bent = Quat::from_rotation_x(1.0);

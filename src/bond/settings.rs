@@ -1,4 +1,4 @@
-//! What bonds count for, and the wear of the cuticle.
+//! Settings: influence of each kind of bond, and wear of the cuticle.
 
 use super::kind::BondKind;
 use crate::setting::{InvalidValue, Ranged, ValueRange, Violations, setting};
@@ -63,7 +63,7 @@ setting! {
     pub struct Cuticle {
         /// s, share of the cuticle lost per length from the root.
         pub damage: f32 = 0.33, "1/m" in DAMAGE: 0.0..=1e4, safe 0.0..=10.0, "the paper uses 0.33";
-        /// k_cut / k_o, the share of stiffness that is gone where the cuticle is.
+        /// k_cut / k_o, the share of stiffness lost where the cuticle is gone.
         pub softening: f32 = 0.5764, in SOFTENING: 0.0..=0.99, safe 0.0..=0.9,
             "the paper uses 0.5764";
     }

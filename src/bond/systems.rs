@@ -3,7 +3,7 @@
 use super::{
     bonds::{BondChanges, Bonds},
     kind::BondKind,
-    lanes::{Frames, change, remembered_shapes, rest_shapes},
+    lanes::{JointFrames, change, remembered_shapes, rest_shapes},
     model::cuticle_factor,
     rest::{Key, RestShape},
     settings::{BondInfluence, Cuticle},
@@ -12,14 +12,14 @@ use crate::{
     fault::HairFault,
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
-    schedule::{EffectiveSubsteps, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings, Violations, report},
-    strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep},
+    strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep, keep_required},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use fearless_simd::Level;
 
-/// About what a strand takes (ns): some are to be shaped anew or changed, most are looked at.
+/// About what a strand takes (ns) on average; most need no update.
 const SHAPE: Nanos = Nanos(200);
 const CHANGE: Nanos = Nanos(200);
 
@@ -30,6 +30,9 @@ impl Plugin for BondPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<BondInfluence>(app);
         setting::plugin::<Cuticle>(app);
+        keep_required::<Strand, Bonds>(app);
+        keep_required::<Strand, BondChanges>(app);
+        keep_required::<Strand, RestShape>(app);
         app.register_type::<BondKind>()
             .register_type::<Bonds>()
             .register_type::<BondChanges>()
@@ -39,27 +42,34 @@ impl Plugin for BondPlugin {
             .register_required_components::<Strand, RestShape>()
             .add_systems(HairTick, fit_bonds.in_set(HairSystems::BondFit))
             .add_systems(HairTick, generate_rest_shapes.in_set(HairSystems::RestShape))
+            .add_systems(HairSettle, generate_rest_shapes.in_set(HairSystems::RestShape))
             .add_systems(HairTick, update_bonds.in_set(HairSystems::BondRates));
     }
 }
 
-/// Gives new strands their bonds, those of another node count theirs, and mends what game code wrote
-/// into them. Our own writes bypass change detection, so `Changed` means somebody else's.
+/// Gives new and resized strands their bonds, and repairs invalid values written from outside. Our own
+/// writes bypass change detection, so `Changed` means a write from outside the tick.
 fn fit_bonds(
     mut strands: Query<
         (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
         // What is written while a strand is disabled is no change any more when it is enabled.
-        (Or<(Changed<Bonds>, Changed<Strand>)>, Allow<Disabled>),
+        (Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>, Allow<Disabled>),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (entity, strand, mut bonds, mut rest) in &mut strands {
+        // Stiffness depends on the lengths, the shape on the bonds; user code may have written either.
+        if let Some(rest) = &mut rest {
+            let rest = rest.bypass_change_detection();
+            (rest.closed, rest.key) = (false, None);
+            // Strands that are not simulated keep theirs until they are.
+            if !rest.is_finite() {
+                *rest = RestShape::default();
+            }
+        }
         let fits = bonds.joints.len() == strand.edges();
         if fits && !bonds.is_changed() {
             continue;
-        }
-        if let Some(rest) = &mut rest {
-            rest.bypass_change_detection().closed = false;
         }
         let bonds = bonds.bypass_change_detection();
         if !fits {
@@ -72,7 +82,7 @@ fn fit_bonds(
     }
 }
 
-/// A strand whose rest shape is not what it was.
+/// A strand whose rest shape has to be updated.
 type Shaped<'a> = (Key, &'a Strand, &'a Bonds, &'a AddedMass, &'a mut RestShape);
 
 fn generate_rest_shapes(
@@ -87,13 +97,13 @@ fn generate_rest_shapes(
         return;
     }
     let key_of = |hair: Entity| {
-        let stride = steps.of(hair)?;
+        let substep = steps.of(hair)?;
         Some(Key {
             influence: influence.of(hair).as_array(),
             cuticle: cuticle.of(hair),
             sweeps: (solver.of(hair).method == SolverMethod::Sweeps).then(|| {
                 let full = sweeps.of(hair);
-                (Sweeps { iterations: stride.iterations(full.iterations), ..full }, stride.dt)
+                (Sweeps { iterations: substep.iterations(full.iterations), ..full }, substep.dt)
             }),
         })
     };
@@ -111,7 +121,7 @@ fn generate_rest_shapes(
             }
             let index = keys.index(of.0, || key_of(of.0));
             let Some(key) = index.map(|index| keys.values[index]) else { continue };
-            // Hair whose bonds are all closed, most hair most of the time, costs no more than this.
+            // Hair with all bonds closed, the usual case, costs only this test.
             if !rest.closed
                 || rest.key != Some(key)
                 || is_changed
@@ -175,17 +185,17 @@ fn shape(
     }
 }
 
-fn frames(strand: &Strand) -> Frames<'_> {
-    Frames { root: strand.root_frame(), orientations: strand.orientations() }
+fn frames(strand: &Strand) -> JointFrames<'_> {
+    JointFrames { root: strand.root_frame(), orientations: strand.orientations() }
 }
 
-/// Whether joints are softer or harder than `before` by what could be seen. Water moves a little in
-/// every substep; powers are not taken anew for that.
+/// Whether softening differs visibly from `before`. Water moves a little in every substep; the powers
+/// are not recomputed for that.
 fn has_softened(before: &[f32], now: &[f32]) -> bool {
     before.len() != now.len() || before.iter().zip(now).any(|(a, b)| (a - b).abs() > 2e-3)
 }
 
-/// A strand whose bonds are to change.
+/// A strand with requested changes of its bonds.
 type Changing<'a> =
     (&'a Strand, &'a mut Bonds, &'a mut BondChanges, &'a mut RestShape, &'a mut StrandSleep);
 
@@ -204,7 +214,7 @@ fn update_bonds(
             sleep.wake();
             rest.closed = false;
             change(level, frames(strand), &mut bonds.joints, changes.asked());
-            changes.clear();
+            changes.clear(strand.edges());
         });
         items.clear();
     });
@@ -215,7 +225,7 @@ mod tests {
     use super::*;
     use crate::rod::stiffness::REFERENCE_DT;
 
-    /// The cuticle is the joint's own: damage counts from the root to where the edge begins.
+    /// Damage of the cuticle is measured from the root to the start of the joint's edge.
     #[test]
     fn every_joint_has_the_cuticle_of_its_place() {
         let places = [0.0, 0.01, 0.03, 0.08, 0.1];

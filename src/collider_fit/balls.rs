@@ -1,4 +1,4 @@
-//! Balls inside a surface that come close to it: colliders for what is no capsule, such as a head.
+//! Balls inscribed in a surface: colliders for shapes that are no capsule, such as a head.
 //!
 //! For each of many points of the surface the largest ball that touches it there from within, by
 //! shrinking one until no other point lies in it (Ma, Bae, Choi 2012, "3D medial axis point
@@ -10,12 +10,12 @@ use bevy::{math::bounding::BoundingSphere, prelude::*};
 
 /// Steps in which a ball shrinks; few need more than five.
 const STEPS: usize = 24;
-/// Balls smaller than this share of the widest fill nothing but creases.
+/// Balls smaller than this share of the largest fill only creases.
 const SMALLEST: f32 = 0.2;
 /// The share of the points that a further ball must add.
 const LEAST_GAIN: f32 = 0.01;
 
-/// What balls are to be like.
+/// Parameters of the fit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BallRules {
     /// The largest radius (m).
@@ -43,7 +43,7 @@ pub(crate) fn inscribed_balls(
         let off = p.distance(ball.center.into()) - ball.radius();
         off.abs() <= rules.near + rules.within
     };
-    // Which points each ball is near, one bit a point.
+    // Bit set of the points near each ball.
     let words = meant.len().div_ceil(64);
     let near: Vec<Vec<u64>> = balls
         .iter()
@@ -60,7 +60,7 @@ pub(crate) fn inscribed_balls(
         let gain = |ball: &Vec<u64>| -> u32 {
             ball.iter().zip(&left).map(|(near, left)| (near & left).count_ones()).sum()
         };
-        // Of equals the first.
+        // Ties: the first.
         let best = (0..balls.len()).rev().max_by_key(|k| gain(&near[*k]));
         let Some(best) = best.filter(|k| gain(&near[*k]) as f32 > LEAST_GAIN * meant.len() as f32)
         else {
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_solid_gets_no_balls() {
+    fn points_without_a_solid_give_no_balls() {
         let rules = BallRules { widest: 0.1, within: 1e-3, near: 2e-3, most: 14 };
         assert!(inscribed_balls(&[], |_| true, &rules).is_empty());
         let nowhere = [(Vec3::NAN, Vec3::NAN); 20];

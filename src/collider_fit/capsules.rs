@@ -18,8 +18,8 @@ pub struct JointCapsule {
     pub to: Vec3,
     /// Its radius (m).
     pub radius: f32,
-    /// How far the skin is off the capsule, as the root of the mean square (m): a round limb has a
-    /// millimetre or two, and what has two centimetres wants several colliders by hand.
+    /// Root-mean-square distance of the skin from the capsule (m): a millimetre or two for a round limb;
+    /// at two centimetres place several colliders by hand.
     pub deviation: f32,
 }
 
@@ -50,7 +50,9 @@ pub enum FitError {
         what: &'static str,
     },
     /// An attribute that does not go with the vertices.
-    #[error("{what} has {found} elements, expected {expected}, one for each vertex: mend the mesh")]
+    #[error(
+        "{what} has {found} elements, expected {expected}, one for each vertex: repair the mesh"
+    )]
     Length {
         /// Which.
         what: &'static str,
@@ -73,7 +75,7 @@ pub enum FitError {
         joints: usize,
     },
     /// A triangle with a vertex that is not there.
-    #[error("a triangle names vertex {vertex}, expected less than {vertices}: mend the indices")]
+    #[error("a triangle names vertex {vertex}, expected less than {vertices}: repair the indices")]
     UnknownVertex {
         /// The vertex.
         vertex: usize,
@@ -81,7 +83,7 @@ pub enum FitError {
         vertices: usize,
     },
     /// A number that is not finite.
-    #[error("{what} {index} is not finite: mend the mesh or leave the part out")]
+    #[error("{what} {index} is not finite: repair the mesh or leave the part out")]
     NonFinite {
         /// What it is of: a position, a joint weight, an inverse bind pose.
         what: &'static str,
@@ -100,8 +102,8 @@ const STEPS: usize = 40;
 /// than eight vertices, or none that curve.
 ///
 /// `inverse_bindposes` are those of the mesh's `SkinnedMesh`, in the order of its joints; capsules
-/// have the unit of the joints' space (m as a rule). The skin is partly without, partly within: that
-/// is what colliders for hair should be, for what grows inside one is pushed out of it.
+/// have the unit of the joints' space (usually m). The skin lies partly outside, partly inside, as
+/// colliders for hair should: hair that grows inside one is pushed out of it.
 ///
 /// ```
 /// # use bevy::{mesh::skinning::*, prelude::*}; use bevy_keratin::{collider_fit::*, prelude::*};
@@ -131,14 +133,14 @@ pub fn fit_joint_capsules(
     mesh: &Mesh,
     inverse_bindposes: &[Mat4],
 ) -> Result<Vec<Option<JointCapsule>>, FitError> {
-    let skin = Skin::of(mesh, inverse_bindposes.len())?;
+    let skin = SkinArrays::of(mesh, inverse_bindposes.len())?;
     if let Some(index) = inverse_bindposes.iter().position(|pose| !pose.is_finite()) {
         return Err(FitError::NonFinite { what: "inverse bind pose", index });
     }
     let areas = areas(mesh, skin.positions)?;
     let mut parts = vec![Vec::new(); inverse_bindposes.len()];
     for (vertex, (indices, weights)) in skin.joints.iter().zip(skin.weights).enumerate() {
-        // The first of equals, so that the same mesh gives the same capsules.
+        // Ties: the first, so that the same mesh gives the same capsules.
         let most = (0..4).fold(0, |most, k| if weights[k] > weights[most] { k } else { most });
         if weights[most] <= 0.0 || areas[vertex] <= 0.0 {
             continue;
@@ -152,13 +154,13 @@ pub fn fit_joint_capsules(
 }
 
 /// A mesh's skin, its arrays known to fit together.
-struct Skin<'a> {
+struct SkinArrays<'a> {
     positions: &'a [[f32; 3]],
     joints: &'a [[u16; 4]],
     weights: &'a [[f32; 4]],
 }
 
-impl<'a> Skin<'a> {
+impl<'a> SkinArrays<'a> {
     fn of(mesh: &'a Mesh, joint_count: usize) -> Result<Self, FitError> {
         let attribute = |id: MeshVertexAttribute| mesh.try_attribute_option(id).ok().flatten();
         let Some(Values::Float32x3(positions)) = attribute(Mesh::ATTRIBUTE_POSITION) else {
@@ -193,8 +195,8 @@ impl<'a> Skin<'a> {
     }
 }
 
-/// The part of the surface that belongs to each vertex; all alike where there are no triangles. So a
-/// capsule does not lean toward where a mesh is finer.
+/// The surface area of each vertex, equal where there are no triangles: weights, so that finer parts of
+/// a mesh do not bias the capsule.
 fn areas(mesh: &Mesh, positions: &[[f32; 3]]) -> Result<Vec<f64>, FitError> {
     let vertices = positions.len();
     if mesh.primitive_topology() != PrimitiveTopology::TriangleList {
@@ -224,8 +226,8 @@ struct Capsule {
 }
 
 impl Capsule {
-    /// How far a point is off the surface, the way that distance grows, and the share of the second
-    /// end in the axis' nearest point.
+    /// Signed distance of a point from the surface, its gradient, and the parameter of the nearest point
+    /// on the axis.
     fn distance(&self, point: DVec3) -> (f64, DVec3, f64) {
         let [a, b] = self.ends;
         let way = b - a;
@@ -239,7 +241,7 @@ impl Capsule {
         points.iter().map(|(p, weight)| weight * self.distance(*p).0.powi(2)).sum()
     }
 
-    /// A damped step of Gauss and Newton; `None` where there is none.
+    /// A damped Gauss–Newton step; `None` where the system is singular.
     fn step(&self, points: &[(DVec3, f64)], damping: f64) -> Option<Self> {
         let (mut sums, mut rights) = ([[0.0; 7]; 7], [0.0; 7]);
         for &(point, weight) in points {
@@ -287,7 +289,7 @@ fn fit(points: &[(DVec3, f64)]) -> Option<JointCapsule> {
             }
         }
         let deviation = (error / total).sqrt();
-        // What hardly curves fits a ball as large as one likes.
+        // A nearly flat patch fits arbitrarily large balls.
         let curved = best.radius > 1e-6 * reach && best.radius < 3.0 * reach;
         (deviation.is_finite() && curved).then_some((best, deviation))
     });
@@ -302,7 +304,7 @@ fn along(points: &[(DVec3, f64)], (middle, total): (DVec3, f64), axis: DVec3) ->
     let radius = points.iter().map(|(p, weight)| weight * off(*p)).sum::<f64>() / total;
     let heights = points.iter().map(|(p, _)| (p - middle).dot(axis));
     let (low, high) = heights.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-    // Not a point: its ends could not part.
+    // Not degenerate: from a point the ends could not separate.
     let half = (0.5 * (high - low) - radius).max(0.05 * radius);
     let centre = middle + axis * (0.5 * (low + high));
     Capsule { ends: [centre - axis * half, centre + axis * half], radius }

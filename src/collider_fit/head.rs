@@ -5,13 +5,13 @@ use crate::groom::Groom;
 use bevy::math::{DVec3, bounding::BoundingSphere};
 
 impl Groom {
-    /// The ball (m) whose surface the roots lie on best, by least squares: a collider for a groom
-    /// whose head is not at hand, and its place. It is shrunk until no root lies within, because what
-    /// grows inside a collider is stretched out of it.
+    /// The ball (m) that best fits the roots, by least squares: a collider for a groom without a head
+    /// mesh, and its place. It is shrunk until no root lies inside, because hair that grows inside a
+    /// collider is pushed out of it.
     ///
-    /// `None` where that would be a guess: fewer than four roots, roots that hardly curve or lie on
-    /// no ball, or a patch such as a tail's, whose roots are all within half a radius of their
-    /// middle. Nor is a ball ever wider than the groom itself.
+    /// `None` where the fit is unreliable: fewer than four roots, nearly flat roots or roots that do not
+    /// lie on a ball, or a patch such as a tail's, whose roots are all within half a radius of their
+    /// middle. The ball is never wider than the groom itself.
     ///
     /// ```
     /// # use bevy_keratin::groom::Groom; use bevy::prelude::*;
@@ -45,11 +45,11 @@ impl Groom {
         let centre = DVec3::new(x, y, z) * 0.5;
         let radius = (d + centre.length_squared()).max(0.0).sqrt() * spread;
         let centre = (middle + centre * spread).as_vec3();
-        // To a small part of a ball one of almost any size fits.
+        // A small patch fits balls of almost any size.
         let reach = self.roots().map(|r| r.as_dvec3().distance(middle)).fold(0.0, f64::max);
         let is_patch = radius.is_nan() || reach < 0.5 * radius;
         let nearest = self.roots().map(|r| r.distance(centre)).fold(f32::MAX, f32::min);
-        // Most of it shrunk away: they lie on no ball.
+        // Shrunk too much: the roots do not lie on a ball.
         let is_ball = f64::from(nearest) >= 0.5 * radius;
         let radius = nearest.min(radius as f32);
         let (low, high) = self.extents()?;

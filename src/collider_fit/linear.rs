@@ -1,10 +1,10 @@
 //! Small systems of linear equations: four unknowns for a head, seven for a capsule.
 //!
-//! glam's matrices end at four by four, and their inverse of a matrix that is all but singular is
-//! large without saying so; pivots tell.
+//! glam has matrices up to four by four, and its inverse does not detect nearly singular matrices;
+//! pivots do.
 
-/// Gauss's elimination with pivots: the solution of `rows` · x = `right`; `None` where a pivot is not
-/// above `least`.
+/// Gaussian elimination with pivoting: the solution of `rows` · x = `right`; `None` where a pivot is
+/// not above `least`.
 pub(super) fn solve<const N: usize>(
     mut rows: [[f64; N]; N],
     mut right: [f64; N],

@@ -1,6 +1,7 @@
-//! Colliders fitted to what they stand for: capsules to the joints of a skinned mesh, a ball to the
-//! head below a groom.
+//! Fitting of colliders: capsules to the joints of a skinned mesh, a ball to the head below a groom,
+//! distance grids baked from a mesh.
 
+mod bake;
 mod balls;
 mod capsules;
 mod head;
@@ -11,7 +12,7 @@ pub use capsules::{FitError, JointCapsule, fit_joint_capsules};
 
 use bevy::prelude::*;
 
-/// Registers what fitting gives for reflection.
+/// Registers the results of fitting for reflection.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ColliderFitPlugin;
 

@@ -1,24 +1,27 @@
 //! Avian's colliders as obstacles for hair (feature `avian`).
 
-use super::{ColliderShape, HairCollider};
+use super::{Bake, ColliderShape, ConvexHull, DistanceGrid, HairCollider, Openings};
 use crate::{
     fault::{FaultKind, HairFault},
     schedule::{HairStep, HairSystems, HairTick},
 };
 use avian3d::{
-    parry::shape::{SharedShape, TypedShape},
+    parry::shape::{Cone, SharedShape, TriMesh, TypedShape},
     prelude::{Collider, ColliderDisabled},
 };
 use bevy::{math::Isometry3d, prelude::*};
+use std::sync::Arc;
 
 /// Keeps hair out of the avian [`Collider`] of the same entity, with or without a rigid body.
 ///
-/// Balls, capsules, cylinders, half spaces and compounds of these become [`HairCollider`]s on children
-/// that follow the collider: its shape in the next tick when that changes, the body in every tick.
-/// They go when the collider, its body or this component does, or while the collider carries
-/// [`ColliderDisabled`]. What hair does not know is told once as
-/// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider an uneven scale counts as its mean.
-/// Hair pushes no bodies.
+/// Balls, capsules, cylinders, cones, half spaces, cuboids, convex hulls, triangle meshes and compounds of
+/// these become [`HairCollider`]s on children that follow the collider: its shape in the next tick when
+/// that changes, the body in every tick. A triangle mesh is baked in the tick that first sees it, which
+/// takes that long; one with large openings has no inside and is a fault.
+/// They are removed with the collider, its body or this component, and while the collider has
+/// [`ColliderDisabled`]. Unsupported shapes are reported once as
+/// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider a non-uniform scale
+/// counts as its mean. Hair does not push bodies.
 ///
 /// ```
 /// # use avian3d::prelude::*; use bevy::prelude::*; use bevy_keratin::prelude::*;
@@ -30,34 +33,87 @@ use bevy::{math::Isometry3d, prelude::*};
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(Unknown)]
 pub struct AvianHairCollider {
-    /// Coulomb friction of hair on it, whatever bodies feel: [`HairCollider::friction`].
+    /// Coulomb friction of hair on it, independent of the body's: [`HairCollider::friction`].
     pub friction: f32,
+    /// Into how many cells the longest side of a triangle mesh is parted: what is thinner than two of
+    /// them is lost. Default 48; 4 to 200 are taken.
+    pub cells: u32,
 }
 
 impl Default for AvianHairCollider {
     fn default() -> Self {
-        Self { friction: HairCollider::default().friction }
+        Self { friction: HairCollider::default().friction, cells: 48 }
     }
 }
 
-/// An avian shape that hair does not know: which, what was expected and what to use instead.
+/// An unsupported avian shape: which, what was expected and what to use instead.
 #[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 #[error(
-    "hair cannot touch avian's {found}, expected a ball, capsule, cylinder, half space or a \
-     compound of these: {hint}"
+    "hair cannot touch avian's {found}, expected a ball, capsule, cylinder, cone, half space, cuboid, \
+     convex hull, closed triangle mesh or a compound of these: {hint}"
 )]
 pub struct AvianShapeError {
     /// The shape.
     pub found: &'static str,
-    /// What to use instead.
-    pub hint: &'static str,
+    /// What is wrong with it, or what to use instead.
+    pub hint: String,
 }
 
-/// What of a collider hair does not know, and has been told.
+/// The unsupported shape of a collider that has been reported.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
+#[require(Baked)]
 struct Unknown(Option<AvianShapeError>);
+
+/// What was made of hulls and triangle meshes of a collider, with so many cells.
+#[derive(Component, Reflect, Clone, Default)]
+#[reflect(Component, Default, Clone)]
+struct Baked {
+    cells: u32,
+    #[reflect(ignore)]
+    shapes: Vec<BakedShape>,
+}
+
+#[derive(Clone)]
+struct BakedShape {
+    of: SharedShape,
+    made: Result<ColliderShape, String>,
+    /// Whether it was asked for in this tick.
+    is_used: bool,
+}
+
+impl Baked {
+    /// What `make` makes of a shape, once.
+    fn get(
+        &mut self,
+        of: &SharedShape,
+        make: impl FnOnce(f32) -> Result<ColliderShape, String>,
+    ) -> Result<ColliderShape, String> {
+        if let Some(known) = self.shapes.iter_mut().find(|known| Arc::ptr_eq(&known.of.0, &of.0)) {
+            known.is_used = true;
+            return known.made.clone();
+        }
+        let made = make(self.cells as f32);
+        self.shapes.push(BakedShape { of: of.clone(), made: made.clone(), is_used: true });
+        made
+    }
+}
+
+/// The hull of points.
+fn hull(points: &[Vec3]) -> Result<ColliderShape, String> {
+    ConvexHull::new(points).map(ColliderShape::Hull).map_err(|error| error.to_string())
+}
+
+/// The inside of a mesh, its longest side parted into so many cells.
+fn bake(mesh: &TriMesh, cells: f32) -> Result<ColliderShape, String> {
+    let vertices = mesh.vertices();
+    let bounds = |(low, high): (Vec3, Vec3), p: &Vec3| (low.min(*p), high.max(*p));
+    let (low, high) = vertices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), bounds);
+    let how = Bake { cell: (high - low).max_element() / cells, openings: Openings::Fill };
+    let grid = DistanceGrid::bake_as(vertices, mesh.indices(), &how);
+    grid.map(ColliderShape::Grid).map_err(|error| error.to_string())
+}
 
 /// A child that stands for the collider of its parent, or for a part of it.
 #[derive(Component, Reflect, Clone, Debug, Default)]
@@ -67,6 +123,7 @@ struct AvianPart;
 pub(super) fn plugin(app: &mut App) {
     app.register_type::<AvianHairCollider>()
         .register_type::<Unknown>()
+        .register_type::<Baked>()
         .register_type::<AvianShapeError>()
         .register_type::<AvianPart>()
         .add_systems(
@@ -75,11 +132,11 @@ pub(super) fn plugin(app: &mut App) {
         );
 }
 
-/// Makes the parts of every body what its collider is now.
+/// Updates the child colliders of every body to its present collider.
 fn follow_colliders(
     step: Res<HairStep>,
     mut bodies: Query<
-        (Entity, &Collider, &AvianHairCollider, &mut Unknown, Option<&Children>),
+        (Entity, &Collider, &AvianHairCollider, &mut Unknown, &mut Baked, Option<&Children>),
         Without<ColliderDisabled>,
     >,
     mut parts: Query<
@@ -97,9 +154,16 @@ fn follow_colliders(
             commands.entity(part).despawn();
         }
     }
-    for (body, collider, &AvianHairCollider { friction }, mut unknown, children) in &mut bodies {
+    for (body, collider, settings, mut unknown, mut baked, children) in &mut bodies {
+        let AvianHairCollider { friction, cells } = *settings;
+        let baked = baked.bypass_change_detection();
+        let cells = cells.clamp(4, 200);
+        if baked.cells != cells {
+            *baked = Baked { cells, ..default() };
+        }
         let mut shapes = Vec::new();
-        let why = gather(collider.shape(), Isometry3d::IDENTITY, &mut shapes).err();
+        let why = gather(collider.shape(), Isometry3d::IDENTITY, baked, &mut shapes).err();
+        baked.shapes.retain_mut(|shape| core::mem::take(&mut shape.is_used));
         if unknown.set_if_neq(Unknown(why.clone()))
             && let Some(why) = why
         {
@@ -131,9 +195,14 @@ fn follow_colliders(
 fn gather(
     shape: &SharedShape,
     at: Isometry3d,
+    baked: &mut Baked,
     into: &mut Vec<(ColliderShape, Isometry3d)>,
 ) -> Result<(), AvianShapeError> {
-    let unknown = |found, hint| Err(AvianShapeError { found, hint });
+    let unknown = |found, hint: &str| Err(AvianShapeError { found, hint: hint.to_owned() });
+    let made = |found, made: Result<ColliderShape, String>| match made {
+        Ok(shape) => Ok((shape, at)),
+        Err(hint) => Err(AvianShapeError { found, hint }),
+    };
     let known = match shape.as_typed_shape() {
         TypedShape::Ball(ball) => (ColliderShape::Sphere(Sphere::new(ball.radius)), at),
         TypedShape::Capsule(capsule) => {
@@ -155,25 +224,32 @@ fn gather(
         TypedShape::Compound(compound) => {
             let parts = compound.shapes().iter().map(|(pose, shape)| {
                 let pose = Isometry3d::new(pose.translation, pose.rotation);
-                gather(shape, at * pose, into)
+                gather(shape, at * pose, baked, into)
             });
             // All of them, whatever one of them is.
             return parts.fold(Ok(()), Result::and);
         }
-        TypedShape::Cuboid(_) | TypedShape::RoundCuboid(_) => {
-            return unknown(
-                "cuboid",
-                "a half space does for floors and walls, capsules or a cylinder for furniture",
-            );
+        TypedShape::Cuboid(c) => {
+            let cuboid = Cuboid { half_size: c.half_extents };
+            (ColliderShape::Cuboid { cuboid, rounding: 0.0 }, at)
         }
-        TypedShape::Cone(_) | TypedShape::RoundCone(_) => {
-            return unknown("cone", "use a capsule or a cylinder");
+        TypedShape::RoundCuboid(round) => {
+            let rounding = round.border_radius;
+            let cuboid = Cuboid { half_size: round.inner_shape.half_extents + rounding };
+            (ColliderShape::Cuboid { cuboid, rounding }, at)
         }
+        TypedShape::Cone(cone) => made("cone", baked.get(shape, |_| hull(&around(cone))))?,
+        TypedShape::RoundCone(_) => return unknown("round cone", "use a plain one"),
         TypedShape::RoundCylinder(_) => return unknown("round cylinder", "use a plain one"),
-        TypedShape::ConvexPolyhedron(_) | TypedShape::RoundConvexPolyhedron(_) => {
-            return unknown("convex hull", FIT);
+        TypedShape::ConvexPolyhedron(convex) => {
+            made("convex hull", baked.get(shape, |_| hull(convex.points())))?
         }
-        TypedShape::TriMesh(_) => return unknown("triangle mesh", FIT),
+        TypedShape::RoundConvexPolyhedron(_) => {
+            return unknown("round convex hull", "use a plain one");
+        }
+        TypedShape::TriMesh(mesh) => {
+            made("triangle mesh", baked.get(shape, |cells| bake(mesh, cells)))?
+        }
         TypedShape::HeightField(_) | TypedShape::Voxels(_) => {
             return unknown("terrain", "use a half space where hair comes near it");
         }
@@ -187,4 +263,17 @@ fn gather(
     Ok(())
 }
 
-const FIT: &str = "use a compound of capsules, or groom::fit_joint_capsules for a character's skin";
+/// Corners around a cone.
+fn around(cone: &Cone) -> Vec<Vec3> {
+    const SIDES: usize = 24;
+    let side = core::f32::consts::TAU / SIDES as f32;
+    let radius = cone.radius / (0.5 * side).cos();
+    let foot = |k: usize| {
+        let (sine, cosine) = (side * k as f32).sin_cos();
+        Vec3::new(radius * cosine, -cone.half_height, radius * sine)
+    };
+    (0..SIDES).map(foot).chain([Vec3::Y * cone.half_height]).collect()
+}
+
+const FIT: &str =
+    "use a compound of capsules, or collider_fit::fit_joint_capsules for a character's skin";

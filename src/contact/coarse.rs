@@ -1,16 +1,16 @@
-//! Strands whose segments are much shorter than their locks are thick, as contact sees them.
+//! Coarse sampling for contact of strands with segments much shorter than the contact radius.
 //!
-//! Equation 18 adds up what all edges within reach do to a node: a strand of 1,000 nodes a tenth of a
+//! Equation 18 sums over all edges within reach of a node: a strand of 1,000 nodes a tenth of a
 //! millimetre apart would push forty times as hard as the same strand with usual nodes, and cost a
-//! thousand times as much. So contact looks at nodes that are about half the reach apart, and what is
-//! between two of them gets a share of what both get.
+//! thousand times as much. So contact samples nodes that are about half the reach apart, and
+//! interpolates the result for the nodes between.
 
 use glam::Vec3;
 
-/// The segments that contact looks at are no shorter than this share of the reach.
+/// Sampled segments are no shorter than this share of the reach.
 const FINEST: f32 = 0.5;
 
-/// Strands of fewer nodes are looked at as they are.
+/// Strands with fewer nodes are not resampled.
 const FEW: usize = 32;
 
 /// How many nodes of a strand with these rest lengths (m) contact takes for one: 1 for all but very
@@ -20,22 +20,22 @@ pub(super) fn stride(lengths: &[f32], reach: f32) -> usize {
         return 1;
     }
     let length: f32 = lengths.iter().sum();
-    // `as` saturates, and of what is no number it makes 0.
+    // `as` saturates, and NaN becomes 0.
     ((FINEST * reach * lengths.len() as f32 / length) as usize).clamp(1, lengths.len())
 }
 
-/// Which nodes of which strands are looked at.
+/// The sampled nodes of all strands.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Coarse {
-    /// For each strand its nodes and how many of its edges are looked at.
+    /// For each strand its number of nodes and of sampled edges.
     strands: Vec<[usize; 2]>,
     nodes: usize,
     is_any: bool,
     places: Vec<Vec3>,
 }
 
-/// Which node is the `k`-th that is looked at, of a strand of `nodes` that has `edges` such edges:
-/// root and tip are always.
+/// The node of the `k`-th sample, of a strand of `nodes` with `edges` sampled edges: root and tip are
+/// always sampled.
 fn node(k: usize, [nodes, edges]: [usize; 2]) -> usize {
     k * nodes.saturating_sub(1) / edges.max(1)
 }
@@ -66,7 +66,7 @@ impl Coarse {
         &self.places
     }
 
-    /// Leaves of one row for each node those of the nodes that are looked at.
+    /// Keeps the rows of the sampled nodes, of one row for each node.
     pub fn pick<T: Copy>(&self, rows: &mut Vec<T>) {
         if !self.is_any {
             return;
@@ -83,14 +83,14 @@ impl Coarse {
         rows.truncate(picked);
     }
 
-    /// A value for each node, of one for each that is looked at.
+    /// Interpolates values of the sampled nodes to all nodes.
     pub fn spread<T: Copy>(
         &self,
         values: impl Iterator<Item = T>,
         lerp: fn(T, T, f32) -> T,
     ) -> impl Iterator<Item = T> {
         let mut values = values.fuse();
-        // None of them is fine: nothing to work out.
+        // No strand is resampled: nothing to interpolate.
         let count = if self.is_any { self.strands.len() } else { 0 };
         let mut strands = self.strands[..count].iter();
         let mut between: Option<Between<T>> = None;
@@ -126,14 +126,14 @@ impl Coarse {
     }
 }
 
-/// Where in a strand the spreading of values is at.
+/// State of the interpolation within a strand.
 struct Between<T> {
     seen: [usize; 2],
-    /// The number of `next` among the nodes that are looked at.
+    /// The index of `next` among the sampled nodes.
     k: usize,
     last: usize,
     next: usize,
-    /// The node whose turn it is.
+    /// The node to be interpolated next.
     at: usize,
     from: T,
     to: T,
@@ -145,7 +145,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn only_very_fine_strands_are_looked_at_coarsely() {
+    fn only_very_fine_strands_are_resampled() {
         assert_eq!(stride(&[0.03; 8], 2e-3), 1);
         assert_eq!(stride(&[1e-4; 16], 2e-3), 1, "a strand of few nodes");
         assert_eq!(stride(&[2.4e-3; 100], 2e-3), 1);

@@ -1,9 +1,9 @@
 //! Equation 18 for eight edges side by side, against one node.
 //!
-//! The mathematics of [`model`](super::model), which the tests hold it against. Nearly every branch
-//! of it (is the foot mine, does it touch) is a coin toss in a pile of hair, and the guesses that
-//! fail cost more than the arithmetic: masks guess nothing. Collecting eight edges costs little,
-//! because an edge is two neighbouring rows of [`Row`]s, each one load.
+//! The same as [`model`](super::model), which the tests compare it with. Branches (does the foot belong
+//! to this edge, does it touch) are unpredictable in dense hair, and mispredictions cost more than the
+//! arithmetic, so lanes are masked instead. Collecting eight edges costs little, because an edge is two
+//! neighbouring [`NodeRow`]s, each one load.
 
 use super::model::{BREAKS_AT, Bridged, Film, SAME_PLACE, THIN};
 use crate::lanes::{Real, V3};
@@ -11,19 +11,18 @@ use core::ops::Range;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16, mask32x8, prelude::*, u32x8, u32x16};
 use glam::Vec3;
 
-/// How many edges are met side by side.
+/// How many edges are tested side by side.
 pub(super) const WIDTH: usize = 8;
 
-/// A node as the edge that starts at it sees it: x, y, z (m), and the share of the edge from which
-/// on feet are not its own: 1, but without end for the last edge, and nothing for the tip.
-pub(super) type Row = [f32; 4];
+/// A node with data of the edge that starts at it: x, y, z (m), and the parameter along the edge above
+/// which a foot belongs to the next edge: 1, ∞ for the last edge, −∞ for the tip, which starts none.
+pub(super) type NodeRow = [f32; 4];
 
-/// What a node brings to a bridge of water: its velocity (m/s), and the cross-section of the film on
-/// it (m²).
+/// A node's input to bridges of water: its velocity (m/s), and the cross-section of the film on it (m²).
 pub type WetRow = [f32; 4];
 
 /// The nodes of one strand as rows.
-pub(super) fn rows(nodes: &[Vec3]) -> impl Iterator<Item = Row> {
+pub(super) fn rows(nodes: &[Vec3]) -> impl Iterator<Item = NodeRow> {
     nodes.iter().enumerate().map(|(i, p)| {
         let end = match nodes.len() - i {
             1 => f32::NEG_INFINITY,
@@ -36,11 +35,11 @@ pub(super) fn rows(nodes: &[Vec3]) -> impl Iterator<Item = Row> {
 
 /// The node of a row.
 #[inline(always)]
-pub(super) fn place(row: &Row) -> Vec3 {
+pub(super) fn place(row: &NodeRow) -> Vec3 {
     Vec3::new(row[0], row[1], row[2])
 }
 
-/// Numbers that lanes append some of theirs to, without a branch on how many.
+/// Numbers to which masked lanes are appended without branches.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stack {
     items: Vec<u32>,
@@ -48,8 +47,8 @@ pub(super) struct Stack {
 }
 
 impl Stack {
-    /// Empties it and makes room for `most` numbers. Growing while lanes append would have them go
-    /// through memory each time, for the call that may be.
+    /// Empties it and reserves `most` numbers. A call that may reallocate in the loop would spill the
+    /// lanes' registers each time.
     pub fn clear(&mut self, most: usize) {
         self.len = 0;
         if self.items.len() < most + 16 {
@@ -122,8 +121,8 @@ pub(super) struct Penalty {
     pub strength: f32,
 }
 
-/// From the nearest point of each edge to one node, where on the edge that is (0…1), and which edges
-/// count it as their own.
+/// The offset from the nearest point of each edge to one node, the parameter along the edge (0…1), and
+/// the mask of edges that the foot belongs to.
 struct Off<S: Simd> {
     off: V3<f32x8<S>>,
     squared: f32x8<S>,
@@ -133,7 +132,7 @@ struct Off<S: Simd> {
 
 /// Four rows, by column.
 #[inline(always)]
-fn four<S: Simd>(simd: S, rows: [Row; 4]) -> [f32x4<S>; 4] {
+fn four<S: Simd>(simd: S, rows: [NodeRow; 4]) -> [f32x4<S>; 4] {
     let mut flat = [0.0; 16];
     flat.copy_from_slice(rows.as_flattened());
     simd.load_four_interleaved_f32x4(&flat)
@@ -143,7 +142,7 @@ fn four<S: Simd>(simd: S, rows: [Row; 4]) -> [f32x4<S>; 4] {
 #[inline(always)]
 fn eight<S: Simd>(
     simd: S,
-    rows: &[Row],
+    rows: &[NodeRow],
     edges: &[u32; WIDTH],
     after: usize,
 ) -> (V3<f32x8<S>>, f32x8<S>) {
@@ -159,7 +158,7 @@ fn eight<S: Simd>(
 }
 
 #[inline(always)]
-fn off<S: Simd>(simd: S, rows: &[Row], edges: &[u32; WIDTH], p: V3<f32x8<S>>) -> Off<S> {
+fn off<S: Simd>(simd: S, rows: &[NodeRow], edges: &[u32; WIDTH], p: V3<f32x8<S>>) -> Off<S> {
     let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
     let (start, end_share) = eight(simd, rows, edges, 0);
     let (end, _) = eight(simd, rows, edges, 1);
@@ -182,7 +181,7 @@ fn splat<S: Simd>(simd: S, p: Vec3) -> V3<f32x8<S>> {
 #[inline(always)]
 pub(super) fn near<S: Simd>(
     simd: S,
-    rows: &[Row],
+    rows: &[NodeRow],
     eight: &[u32; WIDTH],
     (p, own): (Vec3, &Range<u32>),
     limit: f32,
@@ -198,22 +197,22 @@ pub(super) fn near<S: Simd>(
 }
 
 /// Equation 18 of groups of eight edges on a node, lane by lane: see [`total`](Self::total).
-pub(super) struct Sum<S: Simd> {
+pub(super) struct PenaltySum<S: Simd> {
     p: V3<f32x8<S>>,
     sum: V3<f32x8<S>>,
     penalty: Penalty,
 }
 
-impl<S: Simd> Sum<S> {
-    /// Nothing yet, for a node at `p`.
+impl<S: Simd> PenaltySum<S> {
+    /// A zero sum for a node at `p`.
     #[inline(always)]
     pub fn new(simd: S, p: Vec3, penalty: Penalty) -> Self {
         Self { p: splat(simd, p), sum: splat(simd, Vec3::ZERO), penalty }
     }
 
-    /// Adds what eight edges do. What is not finite fails every comparison and adds nothing.
+    /// Adds the contributions of eight edges. NaN fails every comparison and adds nothing.
     #[inline(always)]
-    pub fn add(&mut self, simd: S, rows: &[Row], edges: &[u32; WIDTH]) {
+    pub fn add(&mut self, simd: S, rows: &[NodeRow], edges: &[u32; WIDTH]) {
         let Off { off, squared, own, .. } = off(simd, rows, edges, self.p);
         let reach = f32x8::splat(simd, self.penalty.reach);
         let touching = own
@@ -246,7 +245,7 @@ pub(super) struct Bridges<S: Simd> {
 }
 
 impl<S: Simd> Bridges<S> {
-    /// Nothing yet, for a node at `p` with a film of `area` (m²).
+    /// A zero sum for a node at `p` with a film of `area` (m²).
     #[inline(always)]
     pub fn new(simd: S, p: Vec3, area: f32, film: Film) -> Self {
         let zero = f32x8::splat(simd, 0.0);
@@ -261,9 +260,9 @@ impl<S: Simd> Bridges<S> {
         }
     }
 
-    /// Adds the bridges to eight edges. What is not finite fails every comparison and adds nothing.
+    /// Adds the bridges to eight edges. NaN fails every comparison and adds nothing.
     #[inline(always)]
-    pub fn add(&mut self, simd: S, rows: &[Row], wet: &[WetRow], edges: &[u32; WIDTH]) {
+    pub fn add(&mut self, simd: S, rows: &[NodeRow], wet: &[WetRow], edges: &[u32; WIDTH]) {
         let lit = |value: f32| f32x8::splat(simd, value);
         let (zero, one) = (lit(0.0), lit(1.0));
         let Film { reach, longest } = self.film;

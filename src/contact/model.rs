@@ -1,10 +1,10 @@
-//! Contact between strands as mathematics: equation 18 of \[B\], one node and one edge at a time.
+//! Contact between strands as pure functions: equation 18 of \[B\], one node and one edge at a time.
 //!
-//! The tick meets eight edges at a time (`lanes.rs`); these lines say what that means.
+//! The tick computes eight edges at a time (`lanes.rs`); this is the reference.
 
 use glam::Vec3;
 
-/// Nodes whose squared distance (m²) is not more have no direction to part in.
+/// Squared distance (m²) up to which points coincide: there is no direction to push.
 pub(super) const SAME_PLACE: f32 = 1e-18;
 
 /// Equation 18: the acceleration of a node at `p` away from the foot `f` of its perpendicular on
@@ -25,12 +25,13 @@ pub fn penalty(p: Vec3, foot: Vec3, radius: f32, strength: f32) -> Vec3 {
 /// the contact angle θ of 60° that hair has.
 pub(super) const BREAKS_AT: f32 = 1.5;
 
-/// A film of less than this, as a share of the reach squared, pulls in proportion; of more, as
-/// capillary bridges do, no stronger but farther.
+/// Film cross-section, as a share of the squared reach, up to which the pull is proportional to the
+/// film; with more the pull is constant but reaches farther, as of capillary bridges.
 pub(super) const THIN: f32 = 0.02;
 
 /// Where water bridges two strands.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[doc(hidden)]
 pub struct Film {
     /// 2r: the distance of axes at which strands touch (m).
     pub reach: f32,
@@ -38,22 +39,23 @@ pub struct Film {
     pub longest: f32,
 }
 
-/// What the bridges at a node do to it.
+/// The sum of the bridges at a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[doc(hidden)]
 pub struct Bridged {
-    /// Toward the strands it is bridged to: one for a bridge in full, less for one that is about to
-    /// break, and for strands that are pressed together.
+    /// Sum of directions toward the bridged strands: length 1 for a full bridge, less for one about to
+    /// break and for strands that are pressed together.
     pub pull: Vec3,
-    /// How fast that changes with the node's place, at most (1/m).
+    /// Upper bound of the gradient of `pull` (1/m).
     pub steepness: f32,
-    /// The velocities of what it is bridged to, each times its share in `grip` (m/s).
+    /// Sum of the velocities of the bridged points, each weighted by its part of `grip` (m/s).
     pub drift: Vec3,
-    /// How firmly it is held, 1 for each bridge in full.
+    /// Total strength: 1 for each full bridge.
     pub grip: f32,
 }
 
 impl Bridged {
-    /// From `self` (0) to `to` (1), as a node between two has it.
+    /// Interpolates from `self` (0) to `to` (1), for a node between two sampled ones.
     pub fn lerp(self, to: Self, t: f32) -> Self {
         let mix = |a: f32, b: f32| a + (b - a) * t;
         Self {
@@ -69,8 +71,9 @@ impl Bridged {
 /// with `velocity`, both films together of cross-section `area` (m²).
 ///
 /// Between two fibres the pull of a capillary bridge hardly depends on its volume, but its reach
-/// does: it breaks at (1 + θ/2) √A (Fei et al. 2017). Taken to fall evenly to there, and to fade
-/// where strands are pressed into one another, since a film has no more to gain there.
+/// does: it breaks at (1 + θ/2) √A (Fei et al. 2017). Taken to fall linearly to there, and to fade
+/// where strands are pressed together, since the film gains no surface there.
+#[doc(hidden)]
 pub fn bridged(p: Vec3, foot: Vec3, velocity: Vec3, area: f32, film: Film) -> Bridged {
     let off = p - foot;
     let distance = off.length();
@@ -90,8 +93,9 @@ pub fn bridged(p: Vec3, foot: Vec3, velocity: Vec3, area: f32, film: Film) -> Br
     }
 }
 
-/// An edge of a strand with what is needed to drop perpendiculars on it.
+/// An edge of a strand, prepared for projecting points on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[doc(hidden)]
 pub struct Edge {
     start: Vec3,
     along: Vec3,
@@ -108,8 +112,8 @@ impl Edge {
         Self { start: a, along, inverse_squared, is_last }
     }
 
-    /// The foot of the perpendicular from `p`, clamped to the edge, or `None` where another edge of
-    /// the strand counts it: a foot on a node that two edges share belongs to the second one.
+    /// The foot of the perpendicular from `p`, clamped to the edge, or `None` where it belongs to
+    /// another edge of the strand: a foot on a shared node belongs to the second edge.
     #[inline]
     pub fn foot(&self, p: Vec3) -> Option<Vec3> {
         let t = (p - self.start).dot(self.along) * self.inverse_squared;

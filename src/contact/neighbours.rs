@@ -1,15 +1,16 @@
-//! Which strands are near which: lists of the edges around every node, and their push.
+//! Verlet lists of the edges around every node, and the contact forces from them.
 //!
-//! A list holds every edge within the reach 2r of equation 18 plus a margin. It stays complete until
-//! some node has moved by half the margin, and is built anew then, so hair at rest looks nobody up.
+//! A list holds every edge within the reach 2r of equation 18 plus a margin (the Verlet skin). It stays
+//! complete until some node has moved by half the margin, and is rebuilt then, so hair at rest needs no
+//! neighbour search.
 //!
-//! Lists are built in three sieves, each in lanes and each finer than the one before: the grid's
+//! The search has three stages, each in lanes and each finer than the previous one: the grid's
 //! cells around a node, the short pieces of edges whose middles are near, the edges that are near.
 //! With exact tests on all edges of the cells, scene 1 took 1.3 times as long.
 
 use super::{
     coarse::Coarse,
-    lanes::{self, Bridges, Penalty, Pieces, Row, Stack, Sum, WIDTH, WetRow},
+    lanes::{self, Bridges, NodeRow, Penalty, PenaltySum, Pieces, Stack, WIDTH, WetRow},
     model::{Bridged, Film},
 };
 use crate::{
@@ -24,101 +25,100 @@ use glam::Vec3;
 /// Margin of the lists, in units of the reach. More means longer lists, built less often.
 const MARGIN: f32 = 1.6;
 
-/// The same where strands are so fast that lists have to be built anew soon, whatever their margin.
+/// The same for fast strands, whose lists are soon rebuilt whatever their margin.
 const FAST_MARGIN: f32 = 0.5;
 
-/// For how many lookups such lists are used. Neighbours fly along together: who comes near faster than
-/// the margin allows meets a tick later.
+/// For how many lookups such lists are used. Neighbours mostly move together; strands that approach
+/// faster than the margin allows are found one tick later.
 const FAST_LOOKUPS: u32 = 2;
 
-/// Groups that turn out to be out of reach cost as much as new lists where there have been so many for
-/// each node.
+/// Groups out of reach tested per node since the last rebuild, at which a rebuild pays off.
 const IDLE_GROUPS: usize = 10;
 
 /// Half the length of the pieces in which edges are put into the grid, in units of reach and margin.
-/// Shorter ones are more to sort (0.5: scene 1 takes 5 % longer), longer ones sift less.
+/// Shorter ones are more to sort (0.5: scene 1 takes 5 % longer), longer ones filter less.
 const HALF_PIECE: f32 = 0.8;
 
-/// How long bridges of water may get, in units of the reach: what is left of the margin is what nodes
-/// may move before lists are built anew.
+/// Longest bridge of water, in units of the reach: the rest of the margin is how far nodes may move
+/// before lists are rebuilt.
 pub(super) const LONGEST_BRIDGE: f32 = 0.6;
 
-/// The grid's cells are twice as wide as pieces are looked for, so that a node has to look into few rows
-/// of them, and along the rows they are cut into so many, so that rows are not long.
+/// Subdivision of the grid's cells. They are twice as wide as the search radius, so that a node visits
+/// few rows, and subdivided along the rows to keep these short.
 const SLICED: Vec3 = Vec3::new(4.0, 1.0, 1.0);
 
-/// Strands that are one piece of work.
+/// Strands per piece of work.
 const PART: usize = 16;
 
-/// About what a node takes (ns): to see whether it has moved, to look up who is near, to be pushed, to be
-/// joined by water.
-const WATCH: usize = 2;
+/// About what a node takes (ns): its displacement, its neighbour search, its contacts, its bridges of
+/// water.
+const MEASURE: usize = 2;
 const SEARCH: usize = 250;
 const PUSH: usize = 40;
 const BRIDGE: usize = 60;
 
 /// The work of a part where a node takes so many `nanos`.
-fn per_part(nanos: usize, rows: &[Row], strands: usize) -> Nanos {
+fn per_part(nanos: usize, rows: &[NodeRow], strands: usize) -> Nanos {
     Nanos(nanos * PART * rows.len() / strands.max(1))
 }
 
-/// The nodes of one hair, the lists of edges near them, and what these do to them.
+/// The nodes of one hair, the lists of edges near them, and the forces from these.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
-    rows: Vec<Row>,
-    /// Where the nodes are expected in the middle of the time that lists are to be used for; empty if
-    /// that is where they are.
-    expected: Vec<Row>,
+    rows: Vec<NodeRow>,
+    /// Where the nodes are expected in the middle of the time that lists are used for; empty for the
+    /// present positions.
+    expected: Vec<NodeRow>,
     /// The nodes of each strand.
     strands: Vec<Range<u32>>,
-    /// Which nodes of fine strands the rows are.
+    /// Which nodes of fine strands are sampled as rows.
     coarse: Coarse,
     lists: Lists,
-    parts: Vec<Part>,
-    /// How much farther than the reach bridges of water are asked for (m).
+    parts: Vec<PartLists>,
+    /// Extra margin for bridges of water (m).
     beyond: f32,
 }
 
-/// When lists that may miss a pair are built anew.
+/// When lists that may miss a pair are rebuilt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lookup {
     /// Now.
     Now,
-    /// Another time: strands in fast motion are looked up once for several substeps. Who comes near
-    /// faster than the lists' margin allows is found then.
+    /// Later: the search for strands in fast motion serves several substeps. Strands that approach
+    /// faster than the lists' margin allows are found then.
     Later,
 }
 
-/// What the lists were built from.
+/// The state that the lists were built from.
 #[derive(Clone, Debug, Default)]
 struct Lists {
     grid: UniformGrid,
     pieces: Vec<Pieces>,
     unsorted: Vec<(Vec3, u32)>,
-    rows: Vec<Row>,
+    rows: Vec<NodeRow>,
     strands: Vec<Range<u32>>,
     reach: f32,
     margin: f32,
     /// The farthest that a node has moved since (m).
     moved: f32,
-    /// How many groups out of reach have been looked at since.
+    /// Groups out of reach tested since.
     idle: usize,
-    /// How many more lookups these lists are good for, however far nodes move.
+    /// For how many more lookups these lists are used, however far nodes move.
     good_for: u32,
 }
 
 /// The lists and pushes of some strands' nodes.
 #[derive(Clone, Debug, Default)]
-struct Part {
+struct PartLists {
     /// Where each node's groups begin, and where the last one's end.
     starts: Vec<u32>,
-    groups: Vec<Group>,
-    /// For each node how far its nearest edge was beyond the reach (m): most nodes of loose hair need
-    /// no more than that.
+    groups: Vec<EdgeGroup>,
+    /// For each node how far its nearest edge was beyond the reach (m): most nodes of loose hair are
+    /// rejected by this alone.
     slacks: Vec<f32>,
     /// The square of how far a node has moved since (m²).
     moved: f32,
-    /// How many groups out of reach the last pushes looked at.
+    /// Groups out of reach tested for the last pushes.
     idle: usize,
     pushes: Vec<Vec3>,
     bridged: Vec<Bridged>,
@@ -126,19 +126,19 @@ struct Part {
 
 /// Eight edges near a node, by their start node.
 #[derive(Clone, Copy, Debug)]
-struct Group {
+struct EdgeGroup {
     edges: [u32; WIDTH],
     /// How far the nearest of them was beyond the reach (m); no edge of a later group was nearer.
     slack: f32,
 }
 
-/// What a search is at, node by node.
+/// Scratch space of the search for one node.
 #[derive(Default)]
-struct Scratch {
+struct SearchScratch {
     close_by: Stack,
     edges: Stack,
     distances: Stack,
-    /// Squared distances with edges behind them, as one number to sort.
+    /// Sort keys: squared distance in the high bits, edge in the low bits.
     found: Vec<u64>,
 }
 
@@ -151,8 +151,8 @@ impl Neighbours {
         self.coarse.clear();
     }
 
-    /// Adds a strand with its nodes where they are now. Of every `stride` nodes one is looked at, the
-    /// others get what their neighbours get.
+    /// Adds a strand with its present nodes. Of every `stride` nodes one is sampled, the others are
+    /// interpolated.
     pub fn add(&mut self, nodes: &[Vec3], stride: usize) {
         let start = self.rows.len() as u32;
         self.rows.extend(lanes::rows(self.coarse.add(nodes, stride)));
@@ -164,8 +164,8 @@ impl Neighbours {
         if self.lists.margin == FAST_MARGIN { FAST_LOOKUPS } else { 1 }
     }
 
-    /// Says where the nodes of the strand that was added last are expected, if all are said. Of strands
-    /// of which not all nodes are looked at, they are expected where they are.
+    /// Sets where the nodes of the strand that was added last are expected. Takes effect only if set for
+    /// all strands. Sampled strands are expected at their present positions.
     pub fn expect(&mut self, nodes: impl ExactSizeIterator<Item = Vec3>) {
         let Some(strand) = self.strands.last() else { return };
         let own = &self.rows[strand.start as usize..strand.end as usize];
@@ -176,7 +176,7 @@ impl Neighbours {
         self.expected.extend(own.iter().zip(nodes).map(|(row, p)| [p.x, p.y, p.z, row[3]]));
     }
 
-    /// Equation 18 for every node (m/s²), in the order they were added. The sums' order does not
+    /// Equation 18 for every node (m/s²), in the order they were added. The order of summation does not
     /// depend on threads.
     pub fn pushes(
         &mut self,
@@ -184,13 +184,13 @@ impl Neighbours {
         strength: f32,
         lookup: Lookup,
     ) -> impl Iterator<Item = Vec3> {
-        // Lists are filled up with an edge that is nowhere.
+        // Lists are padded with an edge at NaN.
         self.rows.extend([[f32::NAN; 4]; 2]);
         let reach = 2.0 * radius;
         let level = Level::new();
         if self.are_stale(reach, lookup) {
             self.look_up(level, reach);
-            self.watch();
+            self.measure_displacement();
         }
         let Self { rows, strands, coarse, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
@@ -221,25 +221,25 @@ impl Neighbours {
         }
         lists.begin(places, strands, reach, if fast { FAST_MARGIN } else { MARGIN });
         lists.good_for = if fast { FAST_LOOKUPS - 1 } else { 0 };
-        parts.resize_with(strands.len().div_ceil(PART), Part::default);
+        parts.resize_with(strands.len().div_ceil(PART), PartLists::default);
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let each = per_part(SEARCH, places, strands.len());
         for_each_block(
             &mut work,
             each,
             Default::default,
-            |scratch: &mut Scratch, (part, strands)| {
+            |scratch: &mut SearchScratch, (part, strands)| {
                 dispatch!(level, simd => part.search(simd, places, strands, lists, scratch));
             },
         );
     }
 
-    /// Whether the lists are to be built anew for the nodes as they are now.
+    /// Whether the lists have to be rebuilt for the present nodes.
     fn are_stale(&mut self, reach: f32, lookup: Lookup) -> bool {
         if self.lists.reach != reach || self.lists.strands != self.strands {
             return true;
         }
-        self.watch();
+        self.measure_displacement();
         let Self { rows, lists, beyond, .. } = self;
         if lookup == Lookup::Now && lists.good_for > 0 {
             lists.good_for -= 1;
@@ -250,18 +250,18 @@ impl Neighbours {
         lookup == Lookup::Now && (!complete || pays)
     }
 
-    /// Looks how far nodes are from where the lists were built.
-    fn watch(&mut self) {
+    /// Measures how far nodes are from where the lists were built.
+    fn measure_displacement(&mut self) {
         let Self { rows, strands, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
-        let each = per_part(WATCH, rows, strands.len());
+        let each = per_part(MEASURE, rows, strands.len());
         for_each_block(
             &mut work,
             each,
             || (),
-            |(), (part, strands)| part.watch(rows, strands, lists),
+            |(), (part, strands)| part.measure_displacement(rows, strands, lists),
         );
-        // A non-finite node moves the maximum to no number, which is not less than the limit.
+        // A non-finite node makes the maximum NaN, which is not below the limit.
         let squared = parts.iter().map(|part| part.moved).fold(0.0, larger);
         lists.moved = squared.sqrt();
     }
@@ -271,7 +271,7 @@ impl Neighbours {
         self.coarse.nodes()
     }
 
-    /// From the next lists on, they are complete to `beyond` (m) more than strands' reach.
+    /// From the next rebuild on, lists are complete up to `beyond` (m) more than strands' reach.
     pub fn set_extra_margin(&mut self, beyond: f32) {
         if beyond > self.beyond {
             self.lists.good_for = 0;
@@ -279,7 +279,7 @@ impl Neighbours {
         self.beyond = beyond;
     }
 
-    /// Whether bridges of water are asked for.
+    /// Whether lists cover bridges of water.
     pub fn has_extra_margin(&self) -> bool {
         self.beyond > 0.0
     }
@@ -322,7 +322,7 @@ impl Lists {
         self.within() * (1.0 + HALF_PIECE)
     }
 
-    /// Where in the grid's order all pieces are whose middles are close to `p`, and others.
+    /// Ranges of the grid's order with all pieces whose middles are close to `p`, and some others.
     #[inline(always)]
     fn around(&self, p: Vec3) -> [Range<usize>; 4] {
         let close = self.close();
@@ -330,7 +330,7 @@ impl Lists {
     }
 
     /// Puts all edges into the grid.
-    fn begin(&mut self, rows: &[Row], strands: &[Range<u32>], reach: f32, margin: f32) {
+    fn begin(&mut self, rows: &[NodeRow], strands: &[Range<u32>], reach: f32, margin: f32) {
         (self.moved, self.idle) = (0.0, 0);
         (self.reach, self.margin) = (reach, margin);
         self.rows.clear();
@@ -342,7 +342,7 @@ impl Lists {
         for strand in strands {
             for i in strand.start..strand.end.saturating_sub(1) {
                 let (a, b) = (lanes::place(&rows[i as usize]), lanes::place(&rows[i as usize + 1]));
-                // An edge torn to absurd length is cut coarsely rather than for ever.
+                // An absurdly long edge is cut into at most 64 pieces.
                 let n = (a.distance(b) / piece).ceil().clamp(1.0, 64.0);
                 let middles = (0..n as u32).map(|k| (a.lerp(b, (k as f32 + 0.5) / n), i));
                 self.unsorted.extend(middles);
@@ -355,14 +355,14 @@ impl Lists {
     }
 }
 
-/// The larger of two numbers, and no number if one is none.
+/// The larger of two numbers, NaN if either is.
 fn larger(a: f32, b: f32) -> f32 {
     if b <= a || a.is_nan() { a } else { b }
 }
 
-impl Part {
-    /// Looks how far these strands' nodes have moved since the lists were built.
-    fn watch(&mut self, rows: &[Row], strands: &[Range<u32>], lists: &Lists) {
+impl PartLists {
+    /// Measures how far these strands' nodes have moved since the lists were built.
+    fn measure_displacement(&mut self, rows: &[NodeRow], strands: &[Range<u32>], lists: &Lists) {
         let start = strands.first().map_or(0, |s| s.start) as usize;
         let nodes = start..strands.last().map_or(start, |s| s.end as usize);
         let squared = (rows[nodes.clone()].iter().zip(&lists.rows[nodes]))
@@ -375,10 +375,10 @@ impl Part {
     fn search<S: Simd>(
         &mut self,
         simd: S,
-        rows: &[Row],
+        rows: &[NodeRow],
         strands: &[Range<u32>],
         lists: &Lists,
-        Scratch { close_by, edges, distances, found }: &mut Scratch,
+        SearchScratch { close_by, edges, distances, found }: &mut SearchScratch,
     ) {
         let (within, close) = (lists.within() * lists.within(), lists.close() * lists.close());
         let nowhere = rows.len() as u32 - 2;
@@ -389,7 +389,7 @@ impl Part {
         for own in strands {
             for i in own.clone() {
                 let p = lanes::place(&rows[i as usize]);
-                // The root is held; pushing it would do nothing.
+                // The root is held: pushes have no effect.
                 let rows_around = if i > own.start { lists.around(p) } else { Default::default() };
                 let sixteens = rows_around.map(|r| match r.is_empty() {
                     true => &[],
@@ -414,7 +414,7 @@ impl Part {
                     let mut edges = [nowhere; WIDTH];
                     edges.iter_mut().zip(found).for_each(|(e, f)| *e = *f as u32);
                     let nearest = f32::from_bits((found[0] >> 32) as u32).sqrt();
-                    self.groups.push(Group { edges, slack: nearest - lists.reach });
+                    self.groups.push(EdgeGroup { edges, slack: nearest - lists.reach });
                 }
                 let first = self.starts.last().map_or(0, |start| *start as usize);
                 let nearest = self.groups[first..].first().map_or(f32::INFINITY, |g| g.slack);
@@ -429,12 +429,12 @@ impl Part {
     fn push<S: Simd>(
         &mut self,
         simd: S,
-        rows: &[Row],
+        rows: &[NodeRow],
         strands: &[Range<u32>],
         moved: f32,
         penalty: Penalty,
     ) {
-        // Neither a node nor an edge has moved by more, so what was farther cannot touch yet.
+        // Neither a node nor an edge has moved by more, so farther ones cannot touch yet.
         let may_touch = 2.0 * moved;
         self.idle = 0;
         let nodes = strands.first().map_or(0, |s| s.start) as usize;
@@ -445,7 +445,7 @@ impl Part {
                 self.pushes.push(Vec3::ZERO);
                 continue;
             }
-            let mut sum = Sum::new(simd, lanes::place(row), penalty);
+            let mut sum = PenaltySum::new(simd, lanes::place(row), penalty);
             for group in &self.groups[ends[0] as usize..ends[1] as usize] {
                 if group.slack > may_touch {
                     break;
@@ -462,7 +462,7 @@ impl Part {
     fn bridge<S: Simd>(
         &mut self,
         simd: S,
-        rows: &[Row],
+        rows: &[NodeRow],
         wet: &[WetRow],
         strands: &[Range<u32>],
         reaches: f32,
@@ -540,8 +540,8 @@ mod tests {
                 }
                 let p = strands[s][i];
                 let b = brute(&strands, s, p, radius);
-                // Lanes round otherwise: as if the node were some rounding errors away, which next to
-                // an edge or where a foot goes over to the next one is a lot.
+                // Lanes round differently: as if the node were some rounding errors away, which matters
+                // next to an edge or where a foot changes to the next edge.
                 let rounding: f32 = Vec3::AXES
                     .into_iter()
                     .flat_map(|d| [p + d * 2e-6, p - d * 2e-6])
@@ -629,7 +629,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_for_where_nodes_are_going_serve_on_the_whole_way() {
+    fn lists_for_expected_positions_cover_the_whole_path() {
         // Two bundles fly 4 cm past each other, 4 mm a substep; lists are good for 1.6 mm to each side.
         let bundle = |at: Vec3| -> Vec<Vec<Vec3>> {
             let strand =
@@ -660,7 +660,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_pushes_nobody() {
+    fn non_finite_nodes_push_nothing() {
         let strand =
             |z: f32| -> Vec<Vec3> { (0..5).map(|i| Vec3::new(0.01 * i as f32, 0.0, z)).collect() };
         let mut strands = vec![strand(0.0), strand(1e-3), strand(5e-4)];

@@ -1,19 +1,25 @@
-//! `Interaction`: strands push each other apart, colliders are seen from each hair's frame.
+//! `Interaction`: contact between strands, and colliders in each hair's frame.
 
 use super::{
-    ColliderShape, HairCollider, LockContact, LockNeighbours, Obstacles, coarse, neighbours::Lookup,
+    Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError, LockContact,
+    LockNeighbours, Obstacles, Openings, coarse, neighbours::Lookup,
 };
 use crate::{
     fault::{FaultKind, HairFault},
     parallel::prefetch,
-    rod::obstacle::{Obstacle, Solid},
-    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick, first_substep},
+    rod::{
+        obstacle::{Obstacle, Solid},
+        shape::{Placed, Shape},
+    },
+    schedule::{EffectiveSubsteps, HairSettle, HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
-    strand::{Hair, Sleepers, StillPose, Strand, StrandOf, StrandSleep, Strands, TickPose},
+    strand::{
+        Hair, SleepPose, Sleepers, Strand, StrandOf, StrandSleep, Strands, TickPose, keep_required,
+    },
 };
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
-/// How many strands' memory is asked for at once.
+/// How many strands are prefetched at once.
 const TOGETHER: usize = 16;
 
 /// Colliders and contact between strands.
@@ -25,7 +31,17 @@ impl Plugin for ContactPlugin {
         #[cfg(feature = "avian")]
         super::avian::plugin(app);
         setting::component::<HairCollider>(app);
+        keep_required::<HairCollider, TickPose>(app);
+        keep_required::<Hair, Obstacles>(app);
+        keep_required::<Hair, LockNeighbours>(app);
+        keep_required::<Hair, HairReach>(app);
         app.register_type::<ColliderShape>()
+            .register_type::<ConvexHull>()
+            .register_type::<DistanceGrid>()
+            .register_type::<HullError>()
+            .register_type::<BakeError>()
+            .register_type::<Bake>()
+            .register_type::<Openings>()
             .register_type::<Obstacles>()
             .register_type::<LockNeighbours>()
             .register_required_components::<Hair, Obstacles>()
@@ -42,17 +58,32 @@ impl Plugin for ContactPlugin {
                         .in_set(HairSystems::Obstacles),
                     push_strands_apart.in_set(HairSystems::StrandContact),
                 ),
+            )
+            .add_systems(
+                HairSettle,
+                (
+                    gather_obstacles.in_set(HairSystems::Obstacles),
+                    push_strands_apart.in_set(HairSystems::StrandContact),
+                ),
             );
     }
 }
 
-/// A collider in a hair's frame, with the way its surface goes there during the substep.
+/// A collider in a hair's frame, with the motion of its surface during the substep.
 pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obstacle {
     let (now, own) = (hair.now(), pose.now());
     let scale = own.scale / now.scale;
     let at = now.point_in(own.translation);
     let turned = |d: Vec3| now.direction_in(own.rotation * d);
-    let solid = match collider.shape {
+    let placed = |shape: Shape| {
+        Solid::Placed(Placed {
+            shape,
+            center: at,
+            axes: Mat3::from_cols(turned(Vec3::X), turned(Vec3::Y), turned(Vec3::Z)),
+            scale,
+        })
+    };
+    let solid = match &collider.shape {
         ColliderShape::Sphere(s) => Solid::Capsule { a: at, b: at, radius: s.radius * scale },
         ColliderShape::Capsule(c) => {
             let half = turned(Vec3::Y) * (c.half_length * scale);
@@ -65,17 +96,23 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
             radius: c.radius * scale,
             half_height: c.half_height * scale,
         },
+        ColliderShape::Cuboid { cuboid, rounding } => {
+            placed(Shape::Cuboid { half: cuboid.half_size, rounding: *rounding })
+        }
+        ColliderShape::Ellipsoid { radii } => placed(Shape::Ellipsoid { radii: *radii }),
+        ColliderShape::Hull(hull) => placed(Shape::Hull(hull.clone())),
+        ColliderShape::Grid(grid) => placed(Shape::Grid(grid.clone())),
     };
     let motion = pose.motion_in(hair);
     Obstacle { solid, motion, friction: collider.friction }
 }
 
-/// A ball that holds all of a hair however it swings, in its own frame.
+/// A bounding ball of a hair in any pose, in its own frame.
 #[derive(Component, Clone, Copy, Debug)]
 pub(crate) struct HairReach {
     center: Vec3,
     radius: f32,
-    /// Of so many strands, found so many ticks ago.
+    /// Number of strands, and ticks since it was computed.
     members: usize,
     age: u32,
 }
@@ -87,7 +124,7 @@ impl Default for HairReach {
 }
 
 impl HairReach {
-    /// Around strands that are rooted in these places and so long (m).
+    /// Around strands with these roots and lengths (m).
     fn around(strands: impl Iterator<Item = (Vec3, f32)>) -> Self {
         let (mut low, mut high, mut longest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
         for (root, length) in strands {
@@ -97,18 +134,18 @@ impl HairReach {
         Self { center, radius, ..default() }
     }
 
-    /// Whether hair of a frame may touch within a tick of so many `substeps` what a ball holds.
+    /// Whether hair in `frame` may touch the content of `ball` within a tick of `substeps`.
     pub(crate) fn is_near(&self, frame: &TickPose, ball: &Ball, substeps: u32) -> bool {
         let (before, now) = (frame.before(), frame.now());
         let travel = before.translation.distance(now.translation) + ball.travel;
         let apart = ROOM * self.radius * now.scale + ball.radius + travel * substeps as f32;
         let squared = ball.center.distance_squared(now.point_out(self.center));
-        // A place that is no number is near: what meets it tells.
+        // NaN counts as near, so that it is reported where it is used.
         squared <= apart * apart || squared.is_nan() || apart.is_nan()
     }
 }
 
-/// Roots move little on a head: strands that nobody wrote to are looked at now and then.
+/// Ticks between checks of strands without outside writes: roots move little on a head.
 const LOOK_AGAIN: u32 = 16;
 
 fn find_reach(
@@ -131,10 +168,10 @@ fn find_reach(
     }
 }
 
-/// Room for what moves within a substep and for strands that are drawn out (shares of the reach).
+/// Safety factor on the reach, for motion within a substep and stretched strands.
 const ROOM: f32 = 1.25;
 
-/// A ball around a collider in the world, and how far it goes in a substep (m).
+/// A ball around a collider in the world, and how far it moves in a substep (m).
 pub(crate) struct Ball {
     center: Vec3,
     radius: f32,
@@ -144,11 +181,15 @@ pub(crate) struct Ball {
 impl Ball {
     pub(crate) fn around(collider: &HairCollider, pose: &TickPose) -> Self {
         let (before, now) = (pose.before(), pose.now());
-        let radius = match collider.shape {
+        let radius = match &collider.shape {
             ColliderShape::Sphere(s) => s.radius,
             ColliderShape::Capsule(c) => c.radius + c.half_length,
             ColliderShape::Cylinder(c) => c.radius.hypot(c.half_height),
             ColliderShape::Plane(_) => f32::INFINITY,
+            ColliderShape::Cuboid { cuboid, .. } => cuboid.half_size.length(),
+            ColliderShape::Ellipsoid { radii } => radii.max_element(),
+            ColliderShape::Hull(hull) => hull.reach(),
+            ColliderShape::Grid(grid) => grid.reach(),
         };
         let travel = before.translation.distance(now.translation);
         let radius = radius * now.scale.max(before.scale);
@@ -156,7 +197,7 @@ impl Ball {
     }
 }
 
-/// All colliders, their values valid, with the balls that hold them.
+/// All colliders with valid values, and their bounding balls.
 pub(crate) fn with_balls<'a>(
     colliders: &'a Query<(&HairCollider, &TickPose)>,
 ) -> Vec<(Ball, HairCollider, &'a TickPose)> {
@@ -167,8 +208,8 @@ pub(crate) fn with_balls<'a>(
     colliders.iter().map(with_ball).collect()
 }
 
-/// At the start of a tick: which colliders a hair may touch in it. A hair of which no strand is
-/// simulated asks for none.
+/// At the start of a tick: which colliders a hair may touch in it; none for a hair without simulated
+/// strands.
 fn choose_colliders(
     step: Res<HairStep>,
     colliders: Query<(Entity, &HairCollider, &TickPose)>,
@@ -217,14 +258,14 @@ pub(crate) fn push_strands_apart(
     steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
     mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
-    mut strands: Query<(&mut Strand, &mut StrandSleep, &mut StillPose), With<StrandOf>>,
+    mut strands: Query<(&mut Strand, &mut StrandSleep, &mut SleepPose), With<StrandOf>>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (hair, members, mut neighbours, sleepers) in &mut hairs {
         let LockContact { radius, strength } = contact.of(hair);
-        let LockNeighbours { lists: list, members: (present, had_followers), is_told } =
+        let LockNeighbours { lists: list, members: (present, had_followers), is_reported } =
             neighbours.bypass_change_detection();
-        // Follower strands neither push nor are pushed. Where water joins strands, it joins them too.
+        // Followers take no part in contact, but in bridges of water.
         let with_followers = list.has_extra_margin();
         let all_rest = sleepers.is_some_and(|s| s.awake == 0 && (s.asleep > 0 || !with_followers));
         if radius <= 0.0 || strength <= 0.0 || all_rest {
@@ -241,8 +282,9 @@ pub(crate) fn push_strands_apart(
             present.extend(members.collection().iter().filter(takes_part));
             *had_followers = with_followers;
         }
-        // Water wants all bridges. Dry strands are looked up once a tick at most, for where they are in
-        // the middle of the time until the next lookup: most fly along with their neighbours.
+        // Bridges of water need complete lists. Dry strands are searched once a tick at most, at their
+        // expected positions in the middle of the time until the next search: most move with their
+        // neighbours.
         let lookup = if step.is_first || with_followers { Lookup::Now } else { Lookup::Later };
         let until = list.lookups() as f32 * step.tick - step.dt;
         let ahead = (step.is_first && !with_followers).then_some(0.5 * until);
@@ -255,7 +297,7 @@ pub(crate) fn push_strands_apart(
                     let moving = strand.positions().iter().zip(strand.velocities());
                     list.expect(moving.map(|(p, v)| *p + *v * seconds));
                 }
-                if stride > 1 && !core::mem::replace(is_told, true) {
+                if stride > 1 && !core::mem::replace(is_reported, true) {
                     faults.write(too_fine(strand, radius, stride).of(hair));
                 }
             }

@@ -1,10 +1,10 @@
-//! What the air does at a node: worked out once, for velocities, bonds and water.
+//! The effect of the air at a node: computed once, for velocities, bonds and water.
 
 use super::{Blower, vapour::jet, wind::wind};
 use crate::bond::model::drying;
 use bevy::prelude::*;
 
-/// A blower as seen in a frame, its values valid.
+/// A blower in a hair's frame, with valid values.
 pub(crate) struct LocalBlower {
     pub nozzle: Vec3,
     /// Unit direction of its wind.
@@ -12,16 +12,16 @@ pub(crate) struct LocalBlower {
     pub blower: Blower,
 }
 
-/// The wind in which hair sleeps (m/s): at any usual drag it bends hair by a thousandth of what gravity
-/// does.
+/// Wind up to which hair may sleep (m/s): at any usual drag it bends hair by a thousandth of what
+/// gravity does.
 const CALM: f32 = 5e-3;
 
-/// The air that comes past a node.
+/// The air flow at a node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Blown {
     /// Acceleration of the edge that begins here, equation 17 (m/s²).
     pub(crate) acceleration: Vec3,
-    /// Velocity of the wind and of zones, which drag takes hair along with (m/s).
+    /// Velocity of the wind and of zones, used by drag (m/s).
     pub(crate) flow: Vec3,
     /// Rate at which it dries, equation 19 (1/s).
     pub(crate) drying: f32,
@@ -35,7 +35,7 @@ pub(crate) struct Blown {
 }
 
 impl Blown {
-    /// At a place of an `edge`, in a frame of `scale` world units to one. Aside of its axis a jet falls
+    /// At a point of an `edge`, in a frame with `scale` world units per unit. Off its axis a jet falls
     /// off like equation 17's wind.
     pub(super) fn at(blowers: &[LocalBlower], scale: f32, p: Vec3, edge: Vec3) -> Self {
         let mut all = Self::default();
@@ -53,7 +53,7 @@ impl Blown {
         all
     }
 
-    /// Whether hair may sleep in it: it neither moves nor sets anything.
+    /// Whether hair may sleep in it: it neither moves hair nor sets bonds.
     pub(crate) fn is_calm(&self) -> bool {
         self.flow.length_squared() < CALM * CALM && self.drying < 1e-6
     }
@@ -68,7 +68,7 @@ impl Blown {
     }
 }
 
-/// What the air does to each node of a wet strand, root first. Kept by the tick while any air moves.
+/// The effect of the air on each node of a wet strand, root first. Kept by the tick while any air moves.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct BlownAir {

@@ -7,7 +7,7 @@ setting! {
     /// The air of the room. A resource.
     #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Resource, Default, Clone, PartialEq)]
-    pub struct Climate {
+    pub struct HairClimate {
         /// Temperature.
         pub celsius: f32 = 22.0, "°C" in CELSIUS: -60.0..=100.0, safe -20.0..=50.0, "a room has 22";
         /// Relative humidity. At 0.5 hair is dry; damper air wets it.
@@ -17,11 +17,11 @@ setting! {
     }
 }
 
-impl Climate {
+impl HairClimate {
     /// The air of a room: temperature (°C) and relative humidity (0…1).
     ///
     /// # Errors
-    /// When the temperature is outside −60…100 °C or the humidity outside 0…1.
+    /// When a value is outside [`CELSIUS`](Self::CELSIUS) or [`HUMIDITY`](Self::HUMIDITY).
     pub fn new(celsius: f32, humidity: f32) -> Result<Self, InvalidValue> {
         Self { celsius, humidity, ..default() }.checked()
     }

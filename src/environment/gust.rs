@@ -1,4 +1,4 @@
-//! Gusts: smooth noise that the wind carries along.
+//! Gusts: smooth noise advected by the wind.
 
 use bevy::math::{DVec3, Vec3};
 
@@ -17,10 +17,10 @@ pub fn noise(seed: u32, at: DVec3) -> Vec3 {
     face(0).lerp(face(1), fade.z)
 }
 
-/// Gusts of a length (m) in a wind that has come so far (m) past a place (m): strength 1 at the most,
-/// with eddies of a seventh of the length.
+/// Gusts of a length (m) at a place (m), after the wind has travelled by `come` (m): components of at
+/// most 1, with eddies of a seventh of the length.
 ///
-/// Turbulence goes by a place as if frozen in the mean wind (Taylor 1938).
+/// Turbulence is advected as if frozen in the mean wind (Taylor 1938).
 pub fn gust(seed: u32, place: Vec3, come: DVec3, length: f32) -> Vec3 {
     let at = (place.as_dvec3() - come) / f64::from(length);
     0.75 * noise(seed, at) + 0.25 * noise(seed ^ 0x9e37_79b9, at * 7.0)
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gusts_are_smooth_even_and_the_seeds_own() {
+    fn gusts_are_smooth_unbiased_and_depend_on_the_seed() {
         let (mut sum, mut squares) = (Vec3::ZERO, 0.0);
         let mut before = noise(7, DVec3::ZERO);
         for i in 1..20_000 {
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn gusts_go_with_the_wind() {
+    fn gusts_are_advected_by_the_wind() {
         let come = DVec3::new(3.0, 0.0, 1.0);
         let here = gust(1, Vec3::new(0.2, 1.0, 0.1), DVec3::ZERO, 4.0);
         let there = gust(1, Vec3::new(3.2, 1.0, 1.1), come, 4.0);

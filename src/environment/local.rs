@@ -1,7 +1,7 @@
-//! The air as seen from a hair: blowers, the wind of the place, zones.
+//! The air in the frame of a hair: blowers, global wind, zones.
 
 use super::{
-    Blower, Wind, WindZone,
+    Blower, HairWind, WindZone,
     blown::{Blown, LocalBlower},
     gust::gust,
 };
@@ -12,32 +12,32 @@ use crate::{
 };
 use bevy::{ecs::system::SystemParam, math::DVec3, prelude::*};
 
-/// A zone as seen from a frame, its values valid.
+/// A zone in a hair's frame, with valid values.
 pub(super) struct LocalZone {
     zone: WindZone,
-    /// From the frame to the zone's, in metres of the zone.
+    /// Transform from the frame to the zone's, in the zone's metres.
     rotation: Quat,
     origin: Vec3,
     scale: f32,
 }
 
-/// All that moves the air, seen in a frame.
+/// All sources of wind in a hair's frame.
 #[derive(Default)]
 pub(crate) struct LocalWinds {
     pub blowers: Vec<LocalBlower>,
     pub(super) zones: Vec<LocalZone>,
-    /// The wind of the place (m/s).
+    /// The global wind (m/s).
     pub(super) wind: Vec3,
-    pub(super) settings: Wind,
-    /// How far it has come by now (m, in the world).
+    pub(super) settings: HairWind,
+    /// How far it has travelled so far (m, in the world).
     pub(super) come: DVec3,
     pub(super) pose: Pose,
 }
 
-/// All that moves the air.
+/// All sources of wind.
 #[derive(SystemParam)]
 pub(crate) struct Winds<'w, 's> {
-    wind: Option<Res<'w, Wind>>,
+    wind: Option<Res<'w, HairWind>>,
     blowers: Query<'w, 's, (&'static Blower, &'static TickPose)>,
     zones: Query<'w, 's, (&'static WindZone, &'static TickPose)>,
     time: Res<'w, Time>,
@@ -45,21 +45,21 @@ pub(crate) struct Winds<'w, 's> {
 }
 
 impl Winds<'_, '_> {
-    fn wind(&self) -> Wind {
-        self.wind.as_ref().map_or_else(Wind::default, |wind| wind.clamped())
+    fn wind(&self) -> HairWind {
+        self.wind.as_ref().map_or_else(HairWind::default, |wind| wind.clamped())
     }
 
-    /// Whether no air moves anywhere, and none is warmer than elsewhere.
+    /// Whether the air is at rest and equally warm everywhere.
     pub(crate) fn are_still(&self) -> bool {
         self.blowers.is_empty() && self.zones.is_empty() && self.wind().velocity == Vec3::ZERO
     }
 
-    /// Whether there is anything that sets hair which is not wet.
+    /// Whether any source sets the bonds of dry hair.
     pub(crate) fn dry(&self) -> bool {
         !self.blowers.is_empty() || self.zones.iter().any(|(zone, _)| zone.drying > 0.0)
     }
 
-    /// Seen in the frame of `pose`.
+    /// Transformed into the frame of `pose`.
     pub(crate) fn seen_from(&self, pose: &Pose) -> LocalWinds {
         let blowers = (self.blowers.iter())
             .map(|(blower, at)| (blower.clamped(), at.now()))
@@ -93,20 +93,27 @@ impl Winds<'_, '_> {
 }
 
 impl LocalWinds {
-    /// Whether no air moves, and none is warmer than elsewhere.
+    /// Whether the air is at rest and equally warm.
     pub(crate) fn are_still(&self) -> bool {
         self.blowers.is_empty() && !self.flows()
     }
 
-    /// Whether there is more than blowers.
+    /// Whether there are sources other than blowers.
     pub(crate) fn flows(&self) -> bool {
         self.wind != Vec3::ZERO || !self.zones.is_empty()
     }
 
+    /// The wind of the place where it is the same everywhere and at all times (m/s).
+    #[cfg(feature = "gpu")]
+    pub(crate) fn steady_wind(&self) -> Option<Vec3> {
+        let is_steady = self.settings.gusts <= 0.0 || self.wind == Vec3::ZERO;
+        (is_steady && self.zones.is_empty()).then_some(self.wind)
+    }
+
     /// The wind of the place with its gusts near a place: of a strand at its root, for gusts are longer
     /// than hair (m/s).
-    pub(super) fn gusty(&self, place: Vec3) -> Vec3 {
-        let Wind { gusts, gust_length, seed, .. } = self.settings;
+    pub(super) fn gusty_wind(&self, place: Vec3) -> Vec3 {
+        let HairWind { gusts, gust_length, seed, .. } = self.settings;
         if gusts <= 0.0 || self.wind == Vec3::ZERO {
             return self.wind;
         }
@@ -114,7 +121,7 @@ impl LocalWinds {
         self.wind + self.pose.direction_in(gust) * (gusts * self.wind.length())
     }
 
-    /// The zones that may be felt within a distance of a place.
+    /// Whether any zone may act within a distance of a point.
     pub(super) fn zones_near(&self, place: Vec3, distance: f32) -> bool {
         self.zones.iter().any(|seen| {
             let apart = place.distance(seen.origin) - distance;
@@ -122,12 +129,12 @@ impl LocalWinds {
         })
     }
 
-    /// Adds the zones' air at a place to what is there of the `wind` of the place.
+    /// Adds the zones' air at a point and the part of the global `wind` that they let through.
     fn add_flow(&self, air: &mut Blown, wind: Vec3, p: Vec3) {
         let (mut open, mut flow) = (1.0, Vec3::ZERO);
         for LocalZone { zone, rotation, origin, scale } in &self.zones {
             let place = *rotation * (p - *origin) * *scale;
-            let share = zone.share(place);
+            let share = zone.weight(place);
             if share <= 0.0 {
                 continue;
             }
@@ -141,8 +148,8 @@ impl LocalWinds {
         air.velocity += air.flow;
     }
 
-    /// The air at a place of an `edge`, where the wind of the place with its gusts is `wind`; `zones` says
-    /// whether any is near.
+    /// The air at a point of an `edge`; `wind` is the global wind with gusts there, `zones` whether any
+    /// zone is near.
     pub(super) fn at(&self, wind: Vec3, zones: bool, p: Vec3, edge: Vec3) -> Blown {
         let mut air = Blown::at(&self.blowers, self.pose.scale, p, edge);
         if zones {
@@ -154,8 +161,13 @@ impl LocalWinds {
         air
     }
 
-    /// The air around a small thing (m).
+    /// The air at a point (m), for small objects such as droplets.
     pub(crate) fn around(&self, p: Vec3) -> Blown {
-        self.at(self.gusty(p), !self.zones.is_empty(), p, Vec3::ZERO)
+        self.around_edge(p, Vec3::ZERO)
+    }
+
+    /// The air at the start `p` (m) of an `edge`, for single queries.
+    pub(crate) fn around_edge(&self, p: Vec3, edge: Vec3) -> Blown {
+        self.at(self.gusty_wind(p), !self.zones.is_empty(), p, edge)
     }
 }

@@ -1,5 +1,5 @@
-//! What surrounds hair: gravity, the wind of the place, of zones and of blowers, the drag of the air,
-//! and how fast it dries.
+//! The environment of hair: gravity, global wind, wind zones, blowers, drag of the air, and how fast
+//! water evaporates.
 
 mod blown;
 mod climate;
@@ -10,12 +10,12 @@ pub mod vapour;
 pub mod wind;
 mod zone;
 
+pub(crate) use blown::Blown;
 pub use blown::BlownAir;
-pub(crate) use blown::{Blown, LocalBlower};
-pub use climate::Climate;
+pub use climate::HairClimate;
 pub(crate) use local::{LocalWinds, Winds};
 pub use systems::EnvironmentPlugin;
-pub use zone::{Wind, WindZone, ZoneShape};
+pub use zone::{HairWind, WindZone, ZoneShape};
 
 use crate::{
     setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
@@ -23,8 +23,8 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// The acceleration that pulls all hair (m/s², in the world). Default (0, −9.80, 0), as in \[B\]
-/// table 1. Not scaled with a character.
+/// Gravity of all hair (m/s², in the world). Default (0, −9.80, 0), as in \[B\] table 1. Not scaled
+/// with a character. Range of each component: [`RANGE`](Self::RANGE).
 #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq, Deref, DerefMut)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub struct HairGravity(pub Vec3);
@@ -48,13 +48,13 @@ impl Ranged for HairGravity {
 }
 
 setting! {
-    /// Drag of the air: hair's velocity becomes that of the air around it. Component of a [`Hair`](crate::Hair); where absent,
-    /// [`HairDefault<AirDrag>`](crate::HairDefault) holds.
+    /// Drag of the air: relaxes hair's velocity to that of the air around it. Component of a
+    /// [`Hair`](crate::Hair); where absent, [`HairDefault<AirDrag>`](crate::HairDefault) holds.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct AirDrag {
-        /// Rate at which velocities over the air's die away, v′ = −rate · (v − u).
-        pub rate: f32 = 2.0, "1/s" in RATE: 0.0..=1e4, safe 0.0..=50.0, "2 is air, 20 is water";
+        /// Rate at which velocities relative to the air decay, v′ = −rate · (v − u).
+        pub rate: f32 = 2.0, "1/s" in RATE: 0.0..=1e4, safe 0.0..=50.0, "2 is air";
     }
 }
 
@@ -110,7 +110,7 @@ impl Blower {
     /// The same blower with warmer or colder air (°C at the nozzle).
     ///
     /// # Errors
-    /// Below absolute zero, above 1000 °C, or when not a number.
+    /// When it is outside [`CELSIUS`](Self::CELSIUS).
     pub fn with_celsius(self, celsius: f32) -> Result<Self, InvalidValue> {
         Self { celsius, ..self }.checked()
     }

@@ -1,7 +1,7 @@
-//! `ExternalForces`: what the air and gravity do to velocities, and what wind asks of the bonds.
+//! `ExternalForces`: air and gravity act on velocities, and wind on bonds.
 
 use super::{
-    AirDrag, Blower, Climate, HairGravity, Wind, WindReceived, WindZone, ZoneShape,
+    AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindZone, ZoneShape,
     blown::BlownAir,
     local::{LocalWinds, Winds},
     vapour::DryingAir,
@@ -9,13 +9,13 @@ use super::{
 use crate::{
     bond::{BondChanges, BondKind},
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
-    schedule::{EffectiveSubsteps, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, Hair, PerHair, Strand, StrandOf, StrandSleep, TickPose},
+    strand::{AddedMass, Hair, PerHair, Strand, StrandOf, StrandSleep, TickPose, keep_required},
 };
 use bevy::prelude::*;
 
-/// About what a strand takes (ns): of what falls, and of what is blown at.
+/// About what a strand takes (ns) in still air, and in wind.
 const STILL: usize = 150;
 const WINDY: usize = 2_000;
 
@@ -27,9 +27,12 @@ impl Plugin for EnvironmentPlugin {
         setting::plugin::<AirDrag>(app);
         setting::component::<Blower>(app);
         setting::component::<WindZone>(app);
-        setting::resource::<Wind>(app);
+        setting::resource::<HairWind>(app);
         setting::resource::<HairGravity>(app);
-        setting::resource::<Climate>(app);
+        setting::resource::<HairClimate>(app);
+        keep_required::<Strand, BlownAir>(app);
+        keep_required::<Blower, TickPose>(app);
+        keep_required::<WindZone, TickPose>(app);
         app.register_type::<WindReceived>()
             .register_type::<ZoneShape>()
             .register_type::<BlownAir>()
@@ -37,13 +40,14 @@ impl Plugin for EnvironmentPlugin {
             .init_resource::<DryingAir>()
             .add_systems(
                 HairTick,
-                settle_climate.in_set(HairSystems::Air).run_if(resource_changed::<Climate>),
+                update_drying_air.in_set(HairSystems::Air).run_if(resource_changed::<HairClimate>),
             )
-            .add_systems(HairTick, apply_air.in_set(HairSystems::Air));
+            .add_systems(HairTick, apply_air.in_set(HairSystems::Air))
+            .add_systems(HairSettle, apply_air.in_set(HairSystems::Air));
     }
 }
 
-fn settle_climate(climate: Res<Climate>, mut air: ResMut<DryingAir>) {
+fn update_drying_air(climate: Res<HairClimate>, mut air: ResMut<DryingAir>) {
     *air = DryingAir::of(&climate.clamped());
 }
 
@@ -55,7 +59,7 @@ struct LocalAir {
     winds: LocalWinds,
 }
 
-/// A strand that air acts on, with the number of its hair's air.
+/// A strand that air acts on, with the index of its hair's air.
 type InAir<'a> = (
     usize,
     &'a mut Strand,
@@ -95,7 +99,7 @@ fn apply_air(
             winds: winds.seen_from(pose),
         })
     };
-    // Wind also dries hair that is carried.
+    // Wind also dries followers.
     let dries = winds.dry();
     let is_spared = |sleep: &StrandSleep| sleep.is_asleep() || (sleep.is_follower() && !dries);
     let ahead = |(_, strand, ..): &InAir<'_>| {
@@ -121,7 +125,7 @@ fn apply_air(
     });
 }
 
-/// What a hair's air does to one strand in a substep.
+/// Applies a hair's air to one strand in a substep.
 fn blow(
     air: &LocalAir,
     strand: &mut Strand,
@@ -133,31 +137,43 @@ fn blow(
     at_nodes.clear();
     let (length, winds) = (strand.length(), &air.winds);
     let (positions, velocities, _, spins) = strand.parts_mut();
-    for v in velocities.iter_mut() {
-        *v = *v * air.keep + air.gravity;
+    let under = &added_mass.in_water;
+    if under.is_empty() {
+        for v in velocities.iter_mut() {
+            *v = *v * air.keep + air.gravity;
+        }
+    } else {
+        for (i, v) in velocities.iter_mut().enumerate() {
+            let water = under.get(i).copied().unwrap_or_default();
+            let keep = 1.0 - (1.0 - air.keep) * (1.0 - water.share);
+            *v = *v * keep + air.gravity * water.gravity;
+        }
     }
-    // Edges carry rotary inertia of their own, much of it on fine stiff strands: air that slowed
-    // the nodes alone would leave them ringing.
-    for spin in spins {
-        *spin *= air.keep;
+    // Edges have rotary inertia of their own, large on fine stiff strands: drag on the nodes alone
+    // would leave them ringing. The same holds under water.
+    for (i, spin) in spins.iter_mut().enumerate() {
+        *spin *= under.get(i).map_or(air.keep, |water| air.keep * water.keep);
     }
-    if winds.are_still() {
+    if winds.are_still() || positions.is_empty() {
         return;
     }
-    let wind = winds.gusty(positions[0]);
+    let wind = winds.gusty_wind(positions[0]);
     let zones = winds.zones_near(positions[0], length);
     let taken_along = 1.0 - air.keep;
     let edges = positions.len().saturating_sub(1);
     // Wet hair is heavier: the same wind moves it less.
-    let heed = |i: usize| 1.0 / (1.0 + added_mass.mass.get(i).copied().unwrap_or(0.0));
+    let response = |i: usize| 1.0 / (1.0 + added_mass.mass.get(i).copied().unwrap_or(0.0));
+    // No wind blows under water.
+    let open = |i: usize| under.get(i).map_or(1.0, |water| 1.0 - water.share);
     let is_wet = added_mass.moves_bonds;
     for (i, velocity) in velocities.iter_mut().enumerate().take(edges + 1).filter(|_| edges > 0) {
-        // The tip has no edge of its own: it takes the last one's wind.
+        // The tip has no edge of its own: it uses the last one's wind.
         let e = i.min(edges - 1);
         let edge = positions[e + 1] - positions[e];
         let blown = winds.at(wind, zones, positions[i], edge);
-        *velocity += blown.acceleration * (air.dt * heed(i)) + blown.flow * taken_along;
-        // Where there is water, the wind dries that, and the bonds follow it.
+        let wind = blown.acceleration * (air.dt * response(i)) + blown.flow * taken_along;
+        *velocity += if under.is_empty() { wind } else { wind * open(i) };
+        // On wet hair the wind dries the water, and the bonds follow that.
         if is_wet {
             at_nodes.push(blown);
         } else if i < edges {
@@ -165,7 +181,9 @@ fn blow(
         }
         if let Some(received) = received.as_deref_mut().filter(|_| i < edges) {
             received.total.resize(edges, 0.0);
-            received.total[i] += blown.acceleration.length() * air.dt;
+            let total = &mut received.total[i];
+            let before = if total.is_finite() { *total } else { 0.0 };
+            *total = before + blown.acceleration.length() * air.dt;
         }
     }
 }
@@ -178,7 +196,7 @@ mod tests {
     };
 
     #[test]
-    fn every_node_gets_its_wind_once() {
+    fn wind_acts_on_every_node_once() {
         let points: Vec<Vec3> = (0..4).map(|i| Vec3::new(0.0, 0.01 * i as f32, 0.2)).collect();
         let mut strand = Strand::from_polyline(&points).unwrap();
         let blower = Blower { drying: 0.5, ..default() };
@@ -201,7 +219,7 @@ mod tests {
             assert!((total - 0.01 * blown[i].acceleration.length()).abs() < 1e-6, "edge {i}");
         }
         assert!(at_nodes.nodes.is_empty() && !changes.is_empty());
-        // Over water the wind dries that, at every node.
+        // On wet hair the wind dries the water at every node.
         wet.moves_bonds = true;
         let mut changes = BondChanges::default();
         blow(&air, &mut strand, &wet, &mut changes, &mut at_nodes, None);

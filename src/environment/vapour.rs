@@ -4,7 +4,7 @@
 //! law for a cylinder in a cross flow; a hand dryer's air at 15, 10 and 5 cm has 47, 61 and 95 °C and
 //! dries a tress in 60, 30 and 15 s (Lee 2011).
 
-use super::Climate;
+use super::HairClimate;
 use bevy::{
     math::ops::{exp, powf},
     prelude::Resource,
@@ -21,18 +21,18 @@ const VISCOSITY: f32 = 1.5e-5;
 const WET_BULB: f32 = 2.45e6 / 1085.0;
 
 /// Density of saturated vapour (kg/m³) at a temperature (°C).
-pub fn saturated(celsius: f32) -> f32 {
+pub(crate) fn saturated(celsius: f32) -> f32 {
     let pressure = 610.94 * exp(17.625 * celsius / (celsius + 243.04));
     pressure * 0.018_015 / (8.314 * (celsius + 273.15))
 }
 
-/// How much denser vapour is on a wet surface that the air has cooled than in that air (kg/m³): what
-/// drives evaporation. `vapour` is the density in the air.
+/// The drive of evaporation: how much denser vapour is at a wet surface at its wet-bulb temperature than
+/// in the air (kg/m³). `vapour` is the density in the air.
 ///
 /// The surface has its wet-bulb temperature, where the heat it takes from the air is the heat that
 /// evaporation takes.
-pub fn drive(celsius: f32, vapour: f32) -> f32 {
-    // The balance rises steadily with the surface's temperature; halving cannot miss.
+pub(crate) fn drive(celsius: f32, vapour: f32) -> f32 {
+    // The balance is monotonic in the surface temperature: bisection.
     let (mut low, mut high) = (-80.0_f32, celsius);
     for _ in 0..24 {
         let middle = 0.5 * (low + high);
@@ -46,6 +46,7 @@ pub fn drive(celsius: f32, vapour: f32) -> f32 {
 /// Transfer of vapour from a cylinder of `diameter` (m) across air of `speed` (m/s), as a speed
 /// (m/s): Sh D/d with Churchill and Bernstein's Sh.
 #[inline]
+#[doc(hidden)]
 pub fn transfer(speed: f32, diameter: f32) -> f32 {
     const SCHMIDT: f32 = VISCOSITY / DIFFUSIVITY;
     // 0.62 Sc^(1/3) / (1 + (0.4/Sc)^(2/3))^(1/4), a constant of the air.
@@ -61,17 +62,17 @@ pub fn regain(humidity: f32) -> f32 {
 }
 
 /// The humidity of a room, at which hair counts as dry.
-pub const ROOM_HUMIDITY: f32 = 0.5;
+pub(crate) const ROOM_HUMIDITY: f32 = 0.5;
 
 /// The wetness that hair takes on in air of a relative humidity: 0 in a room and in drier air, 1 in
 /// saturated air.
-pub fn equilibrium(humidity: f32) -> f32 {
+pub(crate) fn equilibrium(humidity: f32) -> f32 {
     let dry = regain(ROOM_HUMIDITY);
     ((regain(humidity) - dry) / (regain(1.0) - dry)).clamp(0.0, 1.0)
 }
 
 /// How far from the nozzle a dryer's air keeps its speed and temperature (m).
-pub const JET_CORE: f32 = 0.045;
+pub(crate) const JET_CORE: f32 = 0.045;
 
 /// The share of its speed, and of its warmth above the room's, that a dryer's air has left at a
 /// distance along its axis (m): a free round jet falls as 1/x beyond its core.
@@ -80,9 +81,10 @@ pub fn jet(along: f32) -> f32 {
     JET_CORE / along.max(JET_CORE)
 }
 
-/// Evaporation's drive over temperature, tabulated: the wet bulb is not found anew for every node, nor
-/// the table for every substep. As a resource, the air of the [`Climate`].
+/// Evaporation's drive over temperature as a table, because solving for the wet bulb at every node is
+/// too slow. The resource holds the air of the [`HairClimate`].
 #[derive(Resource, Clone, Debug)]
+#[doc(hidden)]
 pub struct DryingAir {
     /// Temperature of the room (°C).
     pub celsius: f32,
@@ -95,7 +97,7 @@ pub struct DryingAir {
 
 impl Default for DryingAir {
     fn default() -> Self {
-        Self::of(&Climate::default())
+        Self::of(&HairClimate::default())
     }
 }
 
@@ -111,7 +113,7 @@ impl DryingAir {
     }
 
     /// The air of a climate, whose values are valid.
-    pub fn of(&Climate { celsius, humidity, draught }: &Climate) -> Self {
+    pub fn of(&HairClimate { celsius, humidity, draught }: &HairClimate) -> Self {
         Self::new(celsius, humidity, draught)
     }
 

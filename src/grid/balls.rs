@@ -1,4 +1,4 @@
-//! Balls, found by boxes that they reach into.
+//! Box queries on balls.
 
 use super::{Run, UniformGrid};
 use crate::lanes::{Real, V3, dispatch, lanes_in, splat3};
@@ -9,24 +9,24 @@ const WIDTH: usize = 16;
 
 const NUMBERS: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// Balls of different sizes in a [`UniformGrid`]. A box finds those that reach into it, sixteen at a
-/// time: rows of cells lie together, so there are few rows to look up and many balls in each.
+/// Balls of different sizes in a [`UniformGrid`]. A box query finds those that overlap it, sixteen at a
+/// time: cells of a row are contiguous, so there are few rows to look up and many balls in each.
 #[derive(Clone, Debug, Default)]
 pub struct BallGrid {
     grid: UniformGrid,
     /// As they came, each a centre and a radius.
     balls: Vec<(Vec3, f32)>,
     widest: f32,
-    /// In the grid's order, filled up with balls that are nowhere.
+    /// In the grid's order, padded with balls at NaN.
     center: [Vec<f32>; 3],
     squared_radius: Vec<f32>,
     row: [Vec<u32>; 2],
     ball: Vec<u32>,
 }
 
-/// What a search found, and its room to work in.
+/// Result and scratch space of a search.
 #[derive(Clone, Debug, Default)]
-pub struct Found {
+pub struct FoundBalls {
     /// The numbers of the balls, in the grid's order.
     pub balls: Vec<u32>,
     runs: Vec<Run>,
@@ -40,7 +40,7 @@ impl BallGrid {
         unsorted.clear();
         unsorted.extend(balls);
         *widest = unsorted.iter().map(|(_, radius)| *radius).fold(0.0, f32::max);
-        // In smaller cells there is more to look up, in larger ones more to look at.
+        // Smaller cells mean more lookups, larger ones more balls to test.
         let numbered = unsorted.iter().zip(0..).map(|((center, _), k)| (*center, k));
         grid.build(2.0 * widest.max(1e-4), numbered);
         let sorted = || grid.entries.iter().map(|e| unsorted[e.item as usize]);
@@ -60,11 +60,11 @@ impl BallGrid {
         ball.extend(grid.entries.iter().map(|e| e.item));
     }
 
-    /// Finds the balls that reach into the box from `low` to `high`, each once. A box that is not finite
-    /// finds none.
-    pub fn reaching(&self, level: Level, low: Vec3, high: Vec3, found: &mut Found) {
+    /// Finds the balls that overlap the box from `low` to `high`, each once; none for a box that is not
+    /// finite.
+    pub fn reaching(&self, level: Level, low: Vec3, high: Vec3, found: &mut FoundBalls) {
         found.balls.clear();
-        let Found { balls, runs } = found;
+        let FoundBalls { balls, runs } = found;
         self.grid.runs_in_box(low - self.widest, high + self.widest, runs);
         if !runs.is_empty() {
             dispatch!(level, simd => self.sift(simd, low, high, runs, balls));
@@ -122,7 +122,7 @@ mod tests {
                 raw.iter().map(|&(x, y, z, r)| (Vec3::new(x, y, z) * stretch, r * radius)).collect();
             let mut grid = BallGrid::default();
             grid.build(balls.iter().copied());
-            let mut found = Found::default();
+            let mut found = FoundBalls::default();
             for &(low, _) in &balls {
                 let high = low + Vec3::from(size);
                 let brute: Vec<u32> = (0..)
@@ -140,9 +140,9 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_nowhere() {
+    fn non_finite_balls_and_boxes_find_nothing() {
         let mut grid = BallGrid::default();
-        let mut found = Found::default();
+        let mut found = FoundBalls::default();
         grid.build([(Vec3::NAN, 1.0), (Vec3::splat(1e30), 1.0), (Vec3::ZERO, 1.0)].into_iter());
         let mut balls = |low, high| {
             grid.reaching(Level::new(), low, high, &mut found);

@@ -1,11 +1,11 @@
-//! Who is nearest: a k-d tree.
+//! Nearest neighbours: a k-d tree.
 //!
-//! In place of a crate, because equally far ones have to come by their number, the same on every
-//! machine and in every version, and callers leave some out while searching.
+//! Not a crate, because ties have to be ordered by index, the same on every machine and in every
+//! version, and callers filter while searching.
 
 use glam::Vec3;
 
-/// Places of which the nearest to a point are found, each with a number of the caller's.
+/// A k-d tree of points, each with an index of the caller's.
 ///
 /// ```
 /// # use bevy_keratin::grid::KdTree; use bevy::math::Vec3;
@@ -15,7 +15,7 @@ use glam::Vec3;
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct KdTree {
-    /// A part's root in its middle, those before and after it on either side.
+    /// A subtree's root in its middle, the two halves on either side.
     nodes: Vec<Node>,
 }
 
@@ -23,12 +23,12 @@ pub struct KdTree {
 struct Node {
     place: Vec3,
     item: u32,
-    /// The direction in which it parts those around it.
+    /// The axis along which it splits.
     axis: usize,
 }
 
 impl KdTree {
-    /// A tree of these places. Non-finite ones are left out.
+    /// Builds a tree of these points. Non-finite ones are left out.
     pub fn new(places: impl IntoIterator<Item = (Vec3, u32)>) -> Self {
         let usable = places.into_iter().filter(|(place, _)| place.is_finite());
         let mut nodes: Vec<_> = usable.map(|(place, item)| Node { place, item, axis: 0 }).collect();
@@ -37,7 +37,7 @@ impl KdTree {
     }
 
     /// The `N` nearest to `point`, nearest first, with their squared distances; fewer where there are
-    /// not as many, none for a non-finite point. Equally far ones by their number.
+    /// not as many, none for a non-finite point. Ties are ordered by index.
     pub fn nearest<const N: usize>(
         &self,
         point: Vec3,
@@ -45,8 +45,8 @@ impl KdTree {
         self.nearest_of::<N, _>(point, |_, _| true)
     }
 
-    /// The nearest to `point` if it is nearer than `known`, a number with its squared distance; else
-    /// that. A search that begins near its end is short.
+    /// The nearest to `point` if it is nearer than `known` (index and squared distance), else `known`. A
+    /// good start makes the search short.
     #[cfg(feature = "groom")]
     pub(crate) fn nearer_than(&self, point: Vec3, known: (u32, f32)) -> (u32, f32) {
         let mut found = [(known.1, known.0)];
@@ -56,7 +56,7 @@ impl KdTree {
         (found[0].1, found[0].0)
     }
 
-    /// The same among those that `is_meant` takes by their number and squared distance.
+    /// The same among those that `is_meant` accepts by index and squared distance.
     pub fn nearest_of<const N: usize, F: Fn(u32, f32) -> bool>(
         &self,
         point: Vec3,
@@ -79,7 +79,7 @@ fn search(
     search_box(nodes, point, Vec3::ZERO, is_meant, found);
 }
 
-/// Searches the places in a box of which `point` is outside by `off` in each direction.
+/// Searches the points in a box that `point` is outside of by `off` along each axis.
 fn search_box(
     nodes: &[Node],
     point: Vec3,
@@ -99,7 +99,7 @@ fn search_box(
     search_box(near, point, off, is_meant, found);
     let mut off = off;
     off[node.axis] = beyond;
-    // Rounding must not cut off one that is as far as the last.
+    // Rounding must not prune a point as far as the last one found.
     const SLACK: f32 = 1.0 - 1e-5;
     if found.last().is_some_and(|last| off.length_squared() * SLACK <= last.0) {
         search_box(far, point, off, is_meant, found);
@@ -118,16 +118,19 @@ fn build(nodes: &mut [Node]) {
 }
 
 /// Puts one into a list that is sorted, and lets the last fall out.
-fn insert(found: &mut [(f32, u32)], mut one: (f32, u32)) {
-    for known in found {
-        if one.0.total_cmp(&known.0).then(one.1.cmp(&known.1)).is_lt() {
-            core::mem::swap(known, &mut one);
-        }
+fn insert(found: &mut [(f32, u32)], one: (f32, u32)) {
+    let is_before =
+        |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).is_lt();
+    // Most are farther than all that have been found.
+    if found.last().is_some_and(|last| is_before(&one, last)) {
+        let at = found.partition_point(|known| is_before(known, &one));
+        found[at..].rotate_right(1);
+        found[at] = one;
     }
 }
 
-/// Parts items so that `first` of them come first, across the widest direction of their places; says
-/// which that is. Those in one place go by their number: the same halves on every machine.
+/// Partitions items so that `first` of them come first along the widest axis of their points; returns
+/// that axis. Ties are ordered by index: the same halves on every machine.
 pub(crate) fn split_at_median<T>(
     items: &mut [T],
     first: usize,
@@ -172,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_are_found_and_equally_far_ones_by_number() {
+    fn the_nearest_are_found_and_ties_ordered_by_index() {
         let places = places(500, 7);
         let tree = tree(&places);
         for point in self::places(50, 8).into_iter().chain([Vec3::ZERO, Vec3::splat(0.3)]) {
@@ -185,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_is_not_found() {
+    fn empty_trees_and_non_finite_points_find_nothing() {
         let some = tree(&[Vec3::ZERO, Vec3::NAN, Vec3::X, Vec3::INFINITY]);
         assert_eq!(some.nearest::<8>(Vec3::Z).collect::<Vec<_>>(), [(0, 1.0), (2, 2.0)]);
         assert_eq!(some.nearest::<8>(Vec3::NAN).count(), 0);

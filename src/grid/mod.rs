@@ -1,4 +1,4 @@
-//! The uniform grid, pure: who is near whom, without looking at all pairs.
+//! The uniform grid as pure functions: neighbours without testing all pairs.
 //!
 //! Wet-hair paper (\[W\]) equations 4 and 5, as meant: a point's cell is ⌊p / h⌋ with the cell size h
 //! at least the search radius, so that its neighbours lie in the 27 cells around. The paper's cells
@@ -10,23 +10,26 @@ mod balls;
 mod kd_tree;
 #[cfg(feature = "groom")]
 mod order;
+mod soup;
 
-pub use balls::{BallGrid, Found};
+#[doc(hidden)]
+pub use balls::{BallGrid, FoundBalls};
 pub use kd_tree::KdTree;
 pub(crate) use kd_tree::split_at_median;
 #[cfg(feature = "groom")]
 pub(crate) use order::compact_groups;
+pub(crate) use soup::TriangleSoup;
 
 use core::ops::Range;
 use glam::{IVec3, Vec3};
 
 const FAR: Vec3 = Vec3::splat(1e9);
 
-/// The fewest buckets. A few items in as few buckets would be met in most of empty space, too.
+/// The fewest buckets. With few buckets, queries in empty space would collide with items.
 const FEWEST: usize = 8192;
 
 /// The most cells of a row that [`UniformGrid::rows_in_box`] looks at.
-pub const WIDEST: usize = 8;
+pub(crate) const WIDEST: usize = 8;
 
 /// Points sorted by cell: equations 4 and 5 of \[W\].
 #[derive(Clone, Debug, Default)]
@@ -56,8 +59,8 @@ impl UniformGrid {
             + IVec3::select(toward_zero.as_vec3().cmpgt(scaled), IVec3::NEG_ONE, IVec3::ZERO)
     }
 
-    /// Sorts `items`, each a point and a number of the caller's, into cells of size `cell` (> 0): from
-    /// here on they are found, in each cell in the order they came. Non-finite points are left out.
+    /// Sorts `items`, each a point and an index of the caller's, into cells of size `cell` (> 0), in each
+    /// cell in their given order. Non-finite points are left out.
     pub fn build(&mut self, cell: f32, items: impl Iterator<Item = (Vec3, u32)>) {
         self.inverse_cell = 1.0 / cell.max(1e-9);
         self.unsorted.clear();
@@ -96,7 +99,7 @@ impl UniformGrid {
     fn for_each_in(&self, cell: IVec3, mask: usize, found: &mut impl FnMut(u32)) {
         let b = bucket(cell, mask);
         for e in &self.entries[self.starts[b] as usize..self.starts[b + 1] as usize] {
-            // Cells that share a bucket are told apart here.
+            // Different cells may share a bucket.
             if e.cell == cell {
                 found(e.item);
             }
@@ -122,18 +125,17 @@ impl UniformGrid {
         }
     }
 
-    /// The items in the grid's own order, in which neighbouring cells lie together: for callers that
-    /// keep what they look at in this order, to read it in a row. The first few come again at the
-    /// end, so that no row of up to [`WIDEST`] cells is torn.
-    pub fn order(&self) -> impl Iterator<Item = u32> {
+    /// The items in the grid's own order, in which neighbouring cells are contiguous: callers keep their
+    /// data in this order to read it sequentially. The first few are repeated at the end, so that no row
+    /// of up to [`WIDEST`] cells is split.
+    pub(crate) fn order(&self) -> impl Iterator<Item = u32> {
         let first = self.starts.get(WIDEST).map_or(0, |end| *end as usize);
         self.entries.iter().chain(&self.entries[..first]).map(|e| e.item)
     }
 
-    /// Where in [`order`](Self::order) the items of all cells are that a box from `low` to `high`
-    /// touches, row by row. A run may hold items of other rows too: [`Run::row`] tells them apart, and
-    /// then each comes once.
-    pub fn runs_in_box(&self, low: Vec3, high: Vec3, runs: &mut Vec<Run>) {
+    /// The ranges in [`order`](Self::order) of all cells that a box from `low` to `high` overlaps, row by
+    /// row. A run may hold items of other rows too: filtered by [`Run::row`] each item occurs once.
+    pub(crate) fn runs_in_box(&self, low: Vec3, high: Vec3, runs: &mut Vec<Run>) {
         runs.clear();
         if self.entries.is_empty() || !(low.is_finite() && high.is_finite()) {
             return;
@@ -141,7 +143,7 @@ impl UniformGrid {
         let (low, high) = (self.cell_of(low), self.cell_of(high));
         let buckets = self.starts.len() - 1;
         let [width, deep, tall] = (high.as_i64vec3() - low.as_i64vec3() + 1).to_array();
-        // More rows than items: all items are looked at sooner.
+        // More rows than items: testing all items is cheaper.
         if width >= buckets as i64 || deep * tall > self.entries.len() as i64 {
             runs.push(Run { row: None, places: [0, self.entries.len() as u32] });
             return;
@@ -161,12 +163,11 @@ impl UniformGrid {
         }
     }
 
-    /// Where in [`order`](Self::order) the items of all cells are that a box from `low` to `high`
-    /// touches, a row of cells along x each, for boxes no larger than a cell along y and z: so there are
-    /// four rows at most, of at most [`WIDEST`] cells. Some items are of other cells, and with bad luck
-    /// some come twice.
+    /// The ranges in [`order`](Self::order) of all cells that a box from `low` to `high` overlaps, one
+    /// row of cells along x each, for boxes no larger than a cell along y and z: at most four rows of at
+    /// most [`WIDEST`] cells. Hash collisions may add items of other cells, and items twice.
     #[inline]
-    pub fn rows_in_box(&self, low: Vec3, high: Vec3) -> [Range<usize>; 4] {
+    pub(crate) fn rows_in_box(&self, low: Vec3, high: Vec3) -> [Range<usize>; 4] {
         if self.entries.is_empty() || !(low.is_finite() && high.is_finite()) {
             return [const { 0..0 }; 4];
         }
@@ -190,16 +191,16 @@ impl UniformGrid {
     }
 }
 
-/// Items that stand together in a grid's order.
+/// A contiguous range of items in a grid's order.
 #[derive(Clone, Copy, Debug)]
-pub struct Run {
-    /// Whose items are meant, those of one row of cells; `None` for all.
+pub(crate) struct Run {
+    /// The row of cells whose items are meant; `None` for all.
     pub row: Option<[i32; 2]>,
     /// The first place, and the one behind the last.
     pub places: [u32; 2],
 }
 
-/// Equation 5's role: a table index for a cell. Cells in a row along x have neighbouring ones.
+/// The role of equation 5: a table index for a cell. Neighbouring cells along x have neighbouring ones.
 #[inline]
 fn bucket(cell: IVec3, mask: usize) -> usize {
     let h = (cell.y as u32).wrapping_mul(0x85EB_CA77) ^ (cell.z as u32).wrapping_mul(0xC2B2_AE3D);
@@ -266,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn outliers_and_nonsense_do_not_disturb() {
+    fn outliers_and_non_finite_points_do_no_harm() {
         let points = [Vec3::ZERO, Vec3::splat(1e30), Vec3::NAN, Vec3::X * 0.05, Vec3::NEG_X * 1e9];
         let mut grid = UniformGrid::default();
         grid.build(0.1, points.iter().zip(0..).map(|(p, i)| (*p, i)));

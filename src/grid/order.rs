@@ -1,11 +1,10 @@
-//! An order of points in which those that follow each other lie together.
+//! A spatially coherent order of points.
 
 use super::split_at_median;
 use glam::Vec3;
 
-/// Numbers of `points` in an order in which every `group` of them that follow each other, from a multiple
-/// of `group` on, fill a small box: boxes are halved across their longest side, in whole groups, until
-/// they hold no more than one.
+/// Indices of `points` in an order in which each consecutive `group` of them fills a small box: boxes
+/// are halved across their longest side, in whole groups, until they hold one group.
 pub(crate) fn compact_groups(points: &[Vec3], group: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     halve(&mut order, points, group.max(1));

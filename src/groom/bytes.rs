@@ -3,7 +3,7 @@
 
 use super::{Groom, GroomError};
 
-/// Why a file cannot be read as a groom: where, what was expected, what was found and how to mend it.
+/// Why a file cannot be read as a groom: where, what was expected, what was found and how to fix it.
 #[derive(thiserror::Error, Clone, Debug, PartialEq)]
 pub enum GroomFileError {
     /// The file ends before something that it should hold.
@@ -32,10 +32,10 @@ pub enum GroomFileError {
         found: String,
         /// What may be there.
         expected: String,
-        /// How to mend it.
+        /// How to fix it.
         hint: &'static str,
     },
-    /// A number that is infinite or none.
+    /// A number that is infinite or NaN.
     #[error(
         "byte {offset}: {what} is {found}, expected a finite number: repair or leave out that strand"
     )]
@@ -64,10 +64,10 @@ pub enum GroomFileError {
         found: String,
         /// What may be there.
         expected: String,
-        /// How to mend it.
+        /// How to fix it.
         hint: &'static str,
     },
-    /// What was read is no groom.
+    /// The data read are no valid groom.
     #[error(transparent)]
     Groom(#[from] GroomError),
 }
@@ -142,7 +142,7 @@ pub(super) fn widths(offset: u64, widths: Vec<f32>) -> Result<Vec<f32>, GroomFil
     }
 }
 
-/// A groom that has something to show.
+/// The groom, if it has at least one strand.
 pub(super) fn some_strands(offset: u64, groom: Groom) -> Result<Groom, GroomFileError> {
     if groom.is_empty() {
         let hint = "export hair of strands with two nodes or more";

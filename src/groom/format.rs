@@ -18,7 +18,7 @@ pub enum GroomFormat {
 }
 
 impl GroomFormat {
-    /// The format that bytes are in, by how they begin: files' names may lie. `None` for others.
+    /// The format of a file by its first bytes, independent of its name. `None` for other formats.
     pub fn of(file: &[u8]) -> Option<Self> {
         let version = file.first_chunk().map_or(0.0, |bytes| f32::from_le_bytes(*bytes));
         match file {
@@ -31,8 +31,8 @@ impl GroomFormat {
         }
     }
 
-    /// Metres per unit as the format's own samples have it: tenths of an inch, centimetres, metres.
-    /// Only glTF says so itself; [`Groom::odd_size`](super::Groom::odd_size) tells where it cannot be.
+    /// Metres per unit in the format's own samples: tenths of an inch, centimetres, metres. Only glTF
+    /// specifies its unit; [`Groom::odd_size`](super::Groom::odd_size) detects implausible sizes.
     pub fn scale(self) -> f32 {
         match self {
             Self::Yuksel => 0.00254,
@@ -41,7 +41,7 @@ impl GroomFormat {
         }
     }
 
-    /// The axis that is up in most files of this format; glTF says so itself.
+    /// The axis that is up in most files of this format; glTF specifies it.
     pub fn up(self) -> UpAxis {
         match self {
             Self::Yuksel => UpAxis::Z,

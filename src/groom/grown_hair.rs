@@ -10,12 +10,12 @@ use crate::{
 };
 use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 
-/// Hair that grows as a [`Groom`] says. Put it on the entity that is to be the [`Hair`], such as a
-/// head bone; once the groom is loaded its strands appear.
+/// Hair made from a [`Groom`] asset. Put it on the entity that becomes the [`Hair`], such as a head bone;
+/// its strands are spawned once the groom is loaded.
 ///
 /// The groom's origin becomes the entity's: see [`GroomSettings::origin`](super::GroomSettings::origin).
-/// Changing this component, or reloading the asset, grows the hair anew; removing it shaves it off.
-/// A groom that cannot be used is told as a [`HairFault`].
+/// Changing this component, or reloading the asset, makes the hair again; removing it despawns it.
+/// A groom that cannot be used is reported as a [`HairFault`].
 ///
 /// With the feature `render` all strands that are not guides become
 /// [`FollowerRoots`](crate::render::FollowerRoots), and a hair without
@@ -54,17 +54,17 @@ setting! {
         pub count: usize = 500, in COUNT: 1.0..=1e6, safe 1.0..=1e4, "500 suit a head";
         /// Nodes of a strand, evenly along it.
         pub nodes: usize = 16, in NODES: 2.0..=4096.0, safe 2.0..=64.0, "16 suit hair of a head";
-        /// Short strands have fewer nodes, but three at least, so that their segments are no shorter
-        /// than this. Strands that are shorter themselves are not simulated as long as there are
-        /// others: they are stubble beside the distance that hair keeps from the head. Whatever is
-        /// asked for, no segment is shorter than 1 mm.
+        /// Short strands have fewer nodes, but at least three, so that their segments are no shorter
+        /// than this. Strands shorter than one segment are simulated only if there are no others,
+        /// because they are shorter than the distance that hair keeps from the head. No segment is
+        /// shorter than 1 mm in any case.
         pub segment: f32 = 5e-3, "m" in SEGMENT: FINEST..=10.0, safe 1e-3..=0.05,
             "0.005 suits a head";
     }
 }
 
-/// The shortest segment of a guide (m): contact stretches those of a tenth of it many times over,
-/// and their strands take seconds a tick.
+/// The shortest segment of a guide (m): with a tenth of it contact overstretches strands, and a tick
+/// takes seconds.
 const FINEST: f32 = 1e-3;
 const LONGEST: ValueRange = ValueRange::new(
     "the longest strand's length (m)",
@@ -81,12 +81,12 @@ impl GroomGuides {
 }
 
 impl Groom {
-    /// Grows this groom on `hair` at once: what [`GroomedHair`] does, for game code that makes its
-    /// grooms itself. Gives the simulated strands; despawn them to take them off again.
+    /// Spawns this groom on `hair` at once, as [`GroomedHair`] does, for game code that makes its grooms
+    /// itself. Returns the simulated strands; despawn them to remove the hair.
     ///
     /// ```
     /// # use bevy_keratin::{prelude::*, groom::*}; use bevy::prelude::*;
-    /// fn tuft(commands: &mut Commands) -> Result {
+    /// fn spawn_lock(commands: &mut Commands) -> Result {
     ///     let roots = (0..100).map(|i| Vec3::new(i as f32 * 1e-3, 0.0, 0.0));
     ///     let groom = Groom::from_polylines(roots.map(|r| [r, r + Vec3::Y * 0.1]))?;
     ///     let hair = commands.spawn(Hair).id();
@@ -94,7 +94,7 @@ impl Groom {
     ///     Ok(())
     /// }
     /// # let mut world = World::new();
-    /// # tuft(&mut world.commands()).unwrap();
+    /// # spawn_lock(&mut world.commands()).unwrap();
     /// # world.flush();
     /// # assert_eq!(world.query::<&Strand>().iter(&world).count(), 20);
     /// ```
@@ -107,20 +107,24 @@ impl Groom {
         hair: Entity,
         guides: &GroomGuides,
     ) -> Result<Vec<Entity>, GroomError> {
-        let sown = self.sown(guides)?;
-        if sown.short > 0 {
+        let grown_strands = self.grown_strands(guides)?;
+        if grown_strands.short > 0 {
             tracing::warn!(
                 "hair, entity {hair}: {} guides without length are left out",
-                sown.short
+                grown_strands.short
             );
         }
         #[cfg(feature = "render")]
-        commands.entity(hair).try_insert(sown.followers);
-        Ok(sown.strands.into_iter().map(|s| commands.spawn((StrandOf(hair), s)).id()).collect())
+        commands.entity(hair).try_insert(grown_strands.followers);
+        Ok(grown_strands
+            .strands
+            .into_iter()
+            .map(|s| commands.spawn((StrandOf(hair), s)).id())
+            .collect())
     }
 
-    /// What [`Groom::spawn`] spawns.
-    pub(crate) fn sown(&self, guides: &GroomGuides) -> Result<Sown, GroomError> {
+    /// The strands and followers that [`Groom::spawn`] spawns.
+    pub(crate) fn grown_strands(&self, guides: &GroomGuides) -> Result<GrownStrands, GroomError> {
         guides.checked()?;
         self.check()?;
         if self.is_empty() {
@@ -141,7 +145,7 @@ impl Groom {
         if strands.is_empty() {
             return Err(GroomError::Empty);
         }
-        Ok(Sown {
+        Ok(GrownStrands {
             short: chosen.len() - strands.len(),
             strands,
             #[cfg(feature = "render")]
@@ -163,22 +167,22 @@ impl Groom {
     }
 }
 
-/// Hair of a groom before it is anywhere.
+/// Strands and followers of a groom before they are spawned.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sown {
+pub(crate) struct GrownStrands {
     /// The guides.
     pub strands: Vec<Strand>,
-    /// All others.
+    /// All other strands.
     #[cfg(feature = "render")]
     pub followers: crate::render::FollowerRoots,
     /// How many guides have no length and are left out.
     pub short: usize,
 }
 
-/// What a hair has grown from its groom.
+/// The strands that a hair has from its groom.
 #[derive(Component, Debug, Default)]
 pub(super) struct Grown {
-    /// What it has grown from, or has failed to.
+    /// The groom that was used, or has failed.
     from: Option<GroomedHair>,
     strands: Vec<Entity>,
     gave_look: bool,
@@ -190,7 +194,7 @@ pub(super) fn build(app: &mut App) {
 
 /// Needs grooms to be assets.
 pub(super) fn with_assets(app: &mut App) {
-    app.add_systems(PreUpdate, (shave, spawn_grown).chain());
+    app.add_systems(PreUpdate, (remove_groomed, spawn_grown).chain());
 }
 
 #[cfg(feature = "render")]
@@ -222,7 +226,7 @@ fn spawn_grown(
         }
         let Some(groom) = grooms.get(&wanted.groom) else {
             if let LoadState::Failed(error) = assets.load_state(&wanted.groom) {
-                // The asset server has logged the whole of it.
+                // The asset server has logged the full error.
                 let error = error.to_string();
                 let error = error.lines().next().unwrap_or_default().to_owned();
                 let message = format!("the hair's groom was not loaded: {error}");
@@ -253,9 +257,9 @@ fn spawn_grown(
 }
 
 impl Grown {
-    /// Takes off what has grown.
+    /// Despawns the strands.
     fn take_off(&mut self, commands: &mut Commands, hair: Entity) {
-        // From the back: that is where a hair looks for a strand that leaves it.
+        // From the back, where `Strands` searches for a removed strand first.
         while let Some(strand) = self.strands.pop() {
             commands.entity(strand).try_despawn();
         }
@@ -270,8 +274,11 @@ impl Grown {
     }
 }
 
-/// Hair that is no longer to be of a groom.
-fn shave(mut commands: Commands, mut hairs: Query<(Entity, &mut Grown), Without<GroomedHair>>) {
+/// Removes the strands of hair whose [`GroomedHair`] was removed.
+fn remove_groomed(
+    mut commands: Commands,
+    mut hairs: Query<(Entity, &mut Grown), Without<GroomedHair>>,
+) {
     for (hair, mut grown) in &mut hairs {
         grown.take_off(&mut commands, hair);
         commands.entity(hair).remove::<Grown>();

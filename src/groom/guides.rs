@@ -4,9 +4,9 @@ use super::Groom;
 use bevy::{math::DVec3, prelude::*};
 
 impl Groom {
-    /// Indices of `count` strands (or of all, if there are fewer) whose roots are spread evenly:
-    /// each one is the farthest from all before it, the first the nearest to the middle. The same
-    /// groom always gives the same ones, and fewer are the first of more.
+    /// Indices of `count` strands (or of all, if there are fewer) whose roots are spread evenly, by
+    /// farthest-point sampling: each is the farthest from all before it, the first is nearest to the
+    /// middle. Deterministic, and a smaller `count` gives a prefix of a larger one.
     ///
     /// 1000 of 50,000 take about 0.15 s; the time grows with both.
     ///
@@ -76,7 +76,7 @@ fn spread(points: &[Vec3], count: usize) -> Vec<usize> {
     let count = count.min(points.len());
     let sum: DVec3 = points.iter().map(|p| p.as_dvec3()).sum();
     let middle = (sum / points.len().max(1) as f64).as_vec3();
-    // A point that is chosen is as near as it gets, nearer than one in the same place.
+    // A chosen point is marked as nearer than any other, even one at the same place.
     const CHOSEN: f32 = -1.0;
     let mut apart = vec![f32::MAX; points.len()];
     let by_middle = |a: &usize, b: &usize| {

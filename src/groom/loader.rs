@@ -30,11 +30,11 @@ pub enum GroomLoadError {
     File(#[from] GroomFileError),
 }
 
-/// Loads a [`Groom`] from `.hair`, `.tfx`, `.gltf` and `.glb`, which it tells by their contents.
+/// Loads a [`Groom`] from `.hair`, `.tfx`, `.gltf` and `.glb`, detected by their contents.
 ///
-/// It announces the first two extensions only, so that it takes no glTF away from Bevy's own loader:
-/// ask for the type, as in `assets.load::<Groom>("hair.glb")`. The unit and the axis that were taken,
-/// and what is left out of a file, are told in the log, once.
+/// It registers the first two extensions only, so as not to replace Bevy's own glTF loader: name the
+/// type, as in `assets.load::<Groom>("hair.glb")`. The unit and the axis used, and what is left out of a
+/// file, are logged once.
 #[derive(TypePath, Clone, Copy, Debug, Default)]
 pub struct GroomLoader;
 
@@ -59,7 +59,7 @@ impl AssetLoader for GroomLoader {
             for uri in uris {
                 let failed =
                     |source| GroomLoadError::Buffer { uri: uri.clone(), source: Box::new(source) };
-                // Codes that make no UTF-8 are meant as they stand.
+                // Escapes that are no UTF-8 are taken literally.
                 let name = percent_decode_str(&uri).decode_utf8().unwrap_or(uri.as_str().into());
                 let path = context.path().resolve_embed_str(&name);
                 let path = path.map_err(|_| {
@@ -76,7 +76,7 @@ impl AssetLoader for GroomLoader {
             let (scale, up) = (settings.scale_of(format), settings.up_of(format));
             let (path, count) = (context.path(), groom.len());
             tracing::info!("groom {path}: {count} strands, {scale} m a unit, {up:?} up; {losses}");
-            // Who states a scale knows it.
+            // No warning if the user has set a scale.
             if let (None, Some(odd)) = (settings.scale, groom.odd_size(scale)) {
                 tracing::warn!("groom {path}: {odd}: set GroomSettings::scale to {}", odd.scale);
             }

@@ -1,9 +1,9 @@
-//! What reading and reshaping a groom has left out.
+//! Counts of what reading and reshaping a groom left out.
 
 use bevy::prelude::*;
 use core::{fmt, ops::AddAssign};
 
-/// What was left out of a groom on its way from the file, counted. Loading tells it once in the log;
+/// Counts of what was left out of a groom when it was read. Loading logs it once;
 /// [`Display`](fmt::Display) gives the sentence.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Default, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! Grooms: hair as a modeller hands it over, before it is simulated.
+//! Grooms: hair as an artist made it, before it is simulated.
 //!
 //! A [`Groom`] holds strands as polylines, root first, in metres. It comes from a file, from game
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
@@ -21,7 +21,7 @@ pub use format::{GroomFormat, UpAxis};
 pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::GroomLosses;
 
-pub(crate) use grown_hair::Sown;
+pub(crate) use grown_hair::GrownStrands;
 pub use grown_hair::{GroomGuides, GroomedHair};
 pub use settings::GroomSettings;
 pub use size::OddSize;
@@ -29,8 +29,8 @@ pub use size::OddSize;
 use crate::setting::InvalidValue;
 use bevy::prelude::*;
 
-/// Many strands as polylines, root first (m), with what a modeller gave along: widths, colours and
-/// places on the scalp's texture. An asset; immutable, so that its arrays always fit together.
+/// Many strands as polylines, root first (m), optionally with widths, colours and UVs of the roots. An
+/// asset; immutable, so that its arrays are always consistent.
 #[derive(Asset, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct Groom {
@@ -74,18 +74,20 @@ pub enum GroomError {
         /// The node's index from the root.
         node: usize,
     },
-    /// A width, colour or place on the texture that cannot be one.
-    #[error("{what} {at} of strand {strand} is {found}, expected {expected}: mend or leave it out")]
+    /// An invalid width, colour or UV.
+    #[error(
+        "{what} {at} of strand {strand} is {found}, expected {expected}: repair or leave it out"
+    )]
     OutOfRange {
         /// Which number, with its unit.
         what: &'static str,
         /// The strand's index.
         strand: usize,
-        /// The node's index from the root; 0 for what a strand has once.
+        /// The node's index from the root; 0 for values of the whole strand.
         at: usize,
         /// What was found.
         found: f32,
-        /// What may be.
+        /// The allowed values.
         expected: &'static str,
     },
     /// An array whose length does not go with the nodes or strands.
@@ -187,7 +189,7 @@ impl Groom {
         self.check().map(|()| self)
     }
 
-    /// Whether it is what it says to be: grooms also come from files and through reflection.
+    /// Validates it: grooms also come from files and through reflection.
     fn check(&self) -> Result<(), GroomError> {
         self.check_ends()?;
         let fits = |what, found: usize, expected: usize| {

@@ -7,7 +7,7 @@ use core::ops::Range;
 
 const SCALE: ValueRange = GroomSettings::SCALE.named("a groom's scale");
 const NODES: ValueRange = GroomSettings::NODES.named("nodes to resample to");
-const SHORTEST: ValueRange = GroomSettings::MERGE.named("the shortest segment (m)");
+const SHORTEST: ValueRange = GroomSettings::SHORTEST_SEGMENT.named("the shortest segment (m)");
 const EVERY: ValueRange = GroomSettings::KEEP_EVERY.named("keep every k-th strand, k");
 
 impl Groom {
@@ -137,7 +137,7 @@ impl Groom {
                 continue;
             };
             (0..strand.points.len()).for_each(|k| made.push_node(&strand, k));
-            // Some strands of a groom have no more nodes than all, unless some come twice.
+            // A subset cannot have too many nodes, unless strands are repeated.
             if made.end_strand(strand.uv).is_err() {
                 break;
             }

@@ -21,9 +21,9 @@ setting! {
     /// }
     /// ```
     ///
-    /// Files other than glTF do not know their unit; the defaults are what the formats' own samples
-    /// are in. Which ones were taken is logged, and warned of where hair cannot be as large or as small
-    /// as they make it, with a scale that would fit: see [`Groom::odd_size`].
+    /// Files other than glTF do not specify their unit; the defaults are those of the formats' own
+    /// samples. The unit used is logged, with a warning and a better scale if the size is implausible for
+    /// hair: see [`Groom::odd_size`].
     ///
     /// | file | metres per unit | up |
     /// |---|---|---|
@@ -44,11 +44,11 @@ setting! {
         pub origin: Vec3 = Vec3::ZERO;
         /// Segments shorter than this are merged and strands shorter than this left out. Strands of
         /// the simulation need more than 1e-6.
-        pub merge: f32 = 1e-5, "m" in MERGE: 0.0..=1e6, safe 2e-6..=1e-3,
+        pub shortest_segment: f32 = 1e-5, "m" in SHORTEST_SEGMENT: 0.0..=1e6, safe 2e-6..=1e-3,
             "1e-5 takes away what has no length";
         /// Resamples every strand to so many nodes, evenly along it; `None` is as in the file.
         pub nodes: Option<usize> = None, in NODES: 2.0..=4096.0, "16 suit hair of a head";
-        /// Keeps every so-manieth strand; 1 keeps all.
+        /// Keeps every n-th strand; 1 keeps all.
         pub keep_every: usize = 1, in KEEP_EVERY: 1.0..=1e9, "1 keeps all";
         /// Keeps at most so many strands, taken evenly from their order; `None` keeps all.
         pub limit: Option<usize> = None, in LIMIT: 1.0..=1e9, "None keeps all";
@@ -78,7 +78,7 @@ impl GroomSettings {
         let thinned_strands = before - groom.len();
         let groom =
             groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?.moved(-self.origin)?;
-        let (mut groom, mut losses) = groom.merged(self.merge)?;
+        let (mut groom, mut losses) = groom.merged(self.shortest_segment)?;
         losses.thinned_strands = thinned_strands;
         if groom.is_empty() {
             return Err(GroomError::Empty);

@@ -1,27 +1,27 @@
-//! Whether a groom is as large as hair is: few files say what unit they are in.
+//! Whether a groom has a plausible size: few files specify their unit.
 
 use super::Groom;
 use bevy::prelude::*;
 use core::{fmt, ops::RangeInclusive};
 
-/// How large a groom may be that nobody wonders at (m): from a lash to a horse.
+/// Plausible sizes of a groom (m): from a lash to a horse.
 const SIZES: RangeInclusive<f32> = 5e-3..=4.0;
-/// The same of the strand in the middle, by length (m): from stubble to the floor.
+/// Plausible median lengths of strands (m): from stubble to the floor.
 const LENGTHS: RangeInclusive<f32> = 1e-3..=2.0;
-/// Hair of a head (m): the most likely thing to be in a file.
+/// Size of the hair of a head (m), the most likely content of a file.
 const HEAD: f32 = 0.4;
 /// Units that files are made in (m): metre, foot, decimetre, inch, centimetre, a tenth of an inch,
 /// millimetre.
 const UNITS: [f32; 7] = [1.0, 0.3048, 0.1, 0.0254, 0.01, 0.00254, 0.001];
 
-/// What is odd about a groom's size, and what scale would fit: see [`Groom::odd_size`].
+/// An implausible size of a groom, and a better scale: see [`Groom::odd_size`].
 /// [`Display`](fmt::Display) gives the sentence.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct OddSize {
     /// The longest side of the box around it (m).
     pub size: f32,
-    /// The length of the strand in the middle, by length (m).
+    /// The median length of the strands (m).
     pub length: f32,
     /// Metres per unit of the file that would fit.
     pub scale: f32,
@@ -52,11 +52,11 @@ impl Groom {
         Some(self.points.iter().fold((first, first), grown))
     }
 
-    /// Says when hair can hardly be as large or as small as this, because a file was read with the
-    /// wrong `scale` (metres per unit; 1 for what is no file's). Gives the scale that would fit: that
-    /// of the usual unit which comes nearest to the hair of a head, or else what makes it as large.
+    /// Detects a size implausible for hair, because a file was read with the wrong `scale` (metres per
+    /// unit; 1 for grooms not from a file). Gives a better scale: that of the usual unit which comes
+    /// nearest to the hair of a head, or else one that makes it as large.
     ///
-    /// `None` for what may well be hair: 5 mm to 4 m large, of strands that are mostly 1 mm to 2 m.
+    /// `None` for a plausible size: 5 mm to 4 m large, with a median strand of 1 mm to 2 m.
     ///
     /// ```
     /// # use bevy_keratin::groom::Groom; use bevy::prelude::*;

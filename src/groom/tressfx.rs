@@ -16,7 +16,7 @@ use super::{
 };
 use bevy::prelude::*;
 
-/// Where a version keeps what.
+/// Offsets of a version's header.
 struct Layout {
     header: u64,
     positions: u64,

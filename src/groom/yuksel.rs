@@ -19,15 +19,15 @@ const THICKNESS: u32 = 4;
 const TRANSPARENCY: u32 = 8;
 const COLOURS: u32 = 16;
 
-/// The values that stand in the header when nobody has set them: they say nothing about the hair.
+/// Values of unset header fields, which say nothing about the hair.
 const UNSET_THICKNESS: f32 = 1.0;
 const UNSET_COLOUR: [f32; 3] = [1.0; 3];
 
 /// A groom from the bytes of a `.hair` file, in the file's own unit and axes, and what was left out.
 ///
 /// Thickness becomes the diameter of each node; transparency becomes one minus alpha of the colours.
-/// Where an array is absent the header's default stands for every node, unless it is the one that
-/// stands there unset: thickness 1 (or 0), transparency 0, white. Strands without segments are left
+/// Where an array is absent the header's default is used for every node, unless it is the unset
+/// value: thickness 1 (or 0), transparency 0, white. Strands without segments are left
 /// out; the header's free text is not kept.
 ///
 /// ```
@@ -192,7 +192,7 @@ pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
     Ok(file)
 }
 
-/// The value that all have.
+/// The common value, if all are equal.
 fn same<T: PartialEq>(mut values: impl Iterator<Item = T>) -> Option<T> {
     let first = values.next()?;
     values.all(|v| v == first).then_some(first)

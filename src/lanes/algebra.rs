@@ -159,8 +159,8 @@ impl<R: Real> Quaternion<R> {
         Self::new(self.v.scale(s), self.w * s)
     }
 
-    /// A step toward the unit quaternion of the same direction, `2q/(1 + |q|²)`: what is off by e from
-    /// length 1 is off by e²/2 after it, and never longer than 1. Without the latency of a root.
+    /// A step toward the unit quaternion of the same direction, `2q/(1 + |q|²)`: a length error of e
+    /// becomes e²/2, and the result is never longer than 1. Avoids the latency of a square root.
     #[inline(always)]
     pub fn renormalize(self) -> Self {
         let s = self.w.lit(2.0) / (self.w.lit(1.0) + self.dot(self));
@@ -178,6 +178,12 @@ impl<R: Real> Quaternion<R> {
             w.lit(1.0) - two * x.mul_add(x, y * y),
         )
     }
+}
+
+/// One vector in all lanes that `like` has.
+#[inline(always)]
+pub(crate) fn splat<R: Real>(like: R, v: Vec3) -> V3<R> {
+    V3::new(like.lit(v.x.into()), like.lit(v.y.into()), like.lit(v.z.into()))
 }
 
 /// One vector in all lanes.

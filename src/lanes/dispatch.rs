@@ -2,9 +2,9 @@
 
 /// Runs `work` with the token of the machine's instruction set bound to `simd`, compiled for that set.
 ///
-/// As [`fearless_simd::dispatch`] does it, but on x86-64 for AVX-512, AVX2 and SSE2 only: kernels of
-/// sixteen lanes are long where registers hold four numbers, and SSE4.2 has nothing that they need, so
-/// compiling them for it as well would only take time.
+/// Like [`fearless_simd::dispatch`], but on x86-64 for AVX-512, AVX2 and SSE2 only: kernels of sixteen
+/// lanes are long where registers hold four numbers, and SSE4.2 adds nothing that they use, so
+/// compiling them for it would only cost build time.
 macro_rules! dispatch {
     ($level:expr, $simd:pat => $work:expr) => {{
         let level: fearless_simd::Level = $level;

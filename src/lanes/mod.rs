@@ -9,8 +9,8 @@ mod memory;
 mod real;
 mod transpose;
 
-pub(crate) use algebra::splat3;
 pub use algebra::{Quaternion, V3};
+pub(crate) use algebra::{splat, splat3};
 pub(crate) use dispatch::{dispatch, with_token};
 pub use memory::{Lane, put3, put4, take3, take4};
 pub(crate) use memory::{load, load3, load4, store3, store4};

@@ -7,7 +7,7 @@
 //! own joints lie side by side.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
-use fearless_simd::{f32x8, f32x16, mask32x8, mask32x16, prelude::*};
+use fearless_simd::{Simd, f32x8, f32x16, mask32x8, mask32x16, prelude::*};
 
 /// How many strands one block solves side by side.
 pub const LANES: usize = 16;
@@ -37,6 +37,24 @@ pub trait Real:
     fn lt(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// The largest integer that is not above.
+    fn floor(self) -> Self;
+    /// Lane by lane the values of a table at `self`, an integer, and so many places after it. Zero where
+    /// the table has none.
+    fn gather<const N: usize>(self, table: &[f32], after: [usize; N]) -> [Self; N];
+    /// Runs `work` in a function of its own, compiled for the instruction set of these lanes: what is
+    /// rarely needed does not crowd the registers of those who call it.
+    fn apart<T>(self, work: impl FnOnce() -> T) -> T;
+}
+
+#[inline(never)]
+fn vectorized<S: Simd, T>(simd: S, work: impl FnOnce() -> T) -> T {
+    simd.vectorize(work)
+}
+
+#[inline(always)]
+fn look_up(table: &[f32], at: f32, after: usize) -> f32 {
+    table.get(at as usize + after).copied().unwrap_or(0.0)
 }
 
 macro_rules! scalar {
@@ -71,6 +89,18 @@ macro_rules! scalar {
             fn select(mask: bool, yes: Self, no: Self) -> Self {
                 if mask { yes } else { no }
             }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                <$t>::floor(self)
+            }
+            #[inline(always)]
+            fn gather<const N: usize>(self, table: &[f32], after: [usize; N]) -> [Self; N] {
+                after.map(|after| look_up(table, self as f32, after) as $t)
+            }
+            #[inline(always)]
+            fn apart<T>(self, work: impl FnOnce() -> T) -> T {
+                work()
+            }
         }
     };
 }
@@ -78,7 +108,7 @@ scalar!(f32);
 scalar!(f64);
 
 macro_rules! lanes {
-    ($lanes:ident, $mask:ident) => {
+    ($lanes:ident, $mask:ident, $count:literal) => {
         impl<S: Simd> Real for $lanes<S> {
             type Mask = $mask<S>;
             #[inline(always)]
@@ -109,11 +139,28 @@ macro_rules! lanes {
             fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
                 mask.select(yes, no)
             }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                SimdFloat::floor(self)
+            }
+            #[inline(always)]
+            fn gather<const N: usize>(self, table: &[f32], after: [usize; N]) -> [Self; N] {
+                let mut at = [0.0; $count];
+                self.store_array(&mut at);
+                after.map(|after| {
+                    let found = at.map(|at| look_up(table, at, after));
+                    Self::load_array_ref(self.simd, &found)
+                })
+            }
+            #[inline(always)]
+            fn apart<T>(self, work: impl FnOnce() -> T) -> T {
+                vectorized(self.simd, work)
+            }
         }
     };
 }
-lanes!(f32x8, mask32x8);
-lanes!(f32x16, mask32x16);
+lanes!(f32x8, mask32x8, 8);
+lanes!(f32x16, mask32x16, 16);
 
 /// The lanes whose bits are set.
 #[inline(always)]

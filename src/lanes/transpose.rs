@@ -1,16 +1,16 @@
-//! Strands' arrays into lanes and back: four strands by four numbers at a time are turned in registers,
-//! so that a store takes four numbers and not one.
+//! Strands' arrays into lanes and back: four strands by four numbers at a time are transposed in
+//! registers, so that a store takes four numbers and not one.
 //!
-//! Arrays of four are written out: what `map` calls is not always inlined, which costs more than all the
-//! rest.
+//! Arrays of four are written out: closures passed to `map` are not always inlined, which costs more
+//! than everything else here.
 
 use super::memory::{Lane, put3, take3};
 use glam::{Mat4, Quat, Vec3};
 
-/// Four strands' arrays of what a lane is filled from.
+/// Source arrays of four strands.
 pub(crate) type Four<'a, T> = [&'a [T]; 4];
 
-/// The same, to be written.
+/// Target arrays of four strands.
 pub(crate) type FourMut<'a, T> = [&'a mut [T]; 4];
 
 /// Rows as columns.
@@ -41,7 +41,7 @@ pub(crate) fn put_vectors<T>(
     let fours = from.map(|strand| strand.as_chunks::<4>().0);
     let (chunks, rest) = to.as_chunks_mut::<4>();
     for (i, chunk) in chunks.iter_mut().enumerate() {
-        // Four vectors of a strand are three times four numbers on end.
+        // Four vectors of a strand are three groups of four contiguous numbers.
         let [a, b, c, d] = &fours;
         let [a, b, c, d]: [[[f32; 4]; 3]; 4] = [
             bytemuck::cast(a[i]),
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_put_into_a_quarter_is_there_and_comes_back_whatever_the_length() {
+    fn values_put_into_a_lane_group_come_back_for_any_length() {
         for length in 1..=13 {
             let value =
                 |strand: usize, i: usize, part: usize| (100 * strand + 10 * i + part) as f32;

@@ -1,4 +1,4 @@
-//! All hair of an app within a budget of time.
+//! A time budget for all hair of an app.
 
 use super::LodLevel;
 use crate::setting::setting;
@@ -7,11 +7,11 @@ use bevy::prelude::*;
 setting! {
     /// How long a tick may take for all hair that has a [`HairLod`](super::HairLod). A resource.
     ///
-    /// When the hair would take longer at the levels that its size on the screen asks for, the least
+    /// When the hair would take longer at the levels chosen by its size on the screen, the least
     /// important hair, by [`HairLod::importance`](super::HairLod::importance) times its share of the
-    /// view, goes on to coarser levels until all of it fits. What a tick takes is estimated from numbers
-    /// of segments and substeps, not measured: the same game has the same hair on any machine and in
-    /// any replay. [`HairEstimate`] tells the result.
+    /// view, takes coarser levels until all of it fits. The time is estimated from numbers of segments
+    /// and substeps, not measured: the same game has the same hair on any machine and in any replay.
+    /// [`HairEstimate`] holds the result.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -22,7 +22,7 @@ setting! {
     #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Resource, Default, Clone, PartialEq)]
     pub struct HairBudget {
-        /// Time that a tick may take on one thread. Endless by default.
+        /// Time that a tick may take on one thread. Infinite by default.
         pub milliseconds: f32 = f32::INFINITY, "ms" in MILLISECONDS: 0.0..=f32::INFINITY,
             safe 0.5..=16.0, "a tick of 1/60 s has 16.7";
         /// How many times longer than estimated hair takes on the players' machines. Estimates are of
@@ -32,13 +32,14 @@ setting! {
     }
 }
 
-/// How long hair takes, as far as its [`HairBudget`] knows. A resource, kept by the tick.
+/// The estimated time of a tick of all hair, compared with the [`HairBudget`]. A resource, kept by the
+/// tick.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub struct HairEstimate {
-    /// At the levels that its size on the screen asks for (ms a tick on one thread).
-    pub wanted: f32,
-    /// At the levels that it has.
+    /// At the levels chosen by size on the screen alone (ms a tick on one thread).
+    pub unbudgeted: f32,
+    /// At the present levels (ms a tick on one thread).
     pub present: f32,
 }
 
@@ -46,25 +47,25 @@ pub struct HairEstimate {
 /// on, took 115 to 240 ns by `cargo bench --bench game`, the median of seven 170.
 const SEGMENT: f32 = 170e-6;
 
-/// Time of the segment of a strand that is carried, each tick (ms): the same bench's twenty hairs in the
-/// background, less what is simulated of them.
-const CARRIED_SEGMENT: f32 = 90e-6;
+/// Time of a follower's segment, each tick (ms): the same bench's twenty hairs in the background, less
+/// what is simulated of them.
+const FOLLOWER_SEGMENT: f32 = 90e-6;
 
 /// Time of any segment, each tick, at whatever level (ms): the same bench's hundred hairs that are frozen
 /// took 13 ns, of which some is their [`HAIR`].
 const KEPT_SEGMENT: f32 = 10e-6;
 
-/// Time that a hair takes each tick whatever it has (ms).
+/// Fixed time of a hair, each tick (ms).
 const HAIR: f32 = 0.01;
 
-/// By which factor hair becomes more important with each level that it has been made to take: about as
-/// much as levels' limits are apart.
+/// Factor by which importance grows with each level that the budget has made a hair coarser: about the
+/// ratio of successive levels' limits.
 const RELUCTANCE: f32 = 3.0;
 
-/// A hair as the budget sees it.
+/// A hair's input to the budget.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
-    /// The greater, the later it is made coarser.
+    /// Hair with less is made coarser first.
     pub importance: f32,
     /// The level that it would have without a budget.
     pub wanted: usize,
@@ -80,9 +81,9 @@ pub(super) fn costs(levels: &[LodLevel], segments: usize, substeps: u32) -> Vec<
         .map(|level| {
             let steps = substeps.div_ceil(level.substeps.max(full.substeps)) as f32;
             let simulated = SEGMENT * level.strands * steps;
-            let carried =
-                if level.strands > 0.0 { CARRIED_SEGMENT * (1.0 - level.strands) } else { 0.0 };
-            HAIR + segments as f32 * (KEPT_SEGMENT + simulated + carried)
+            let followers =
+                if level.strands > 0.0 { FOLLOWER_SEGMENT * (1.0 - level.strands) } else { 0.0 };
+            HAIR + segments as f32 * (KEPT_SEGMENT + simulated + followers)
         })
         .collect()
 }
@@ -114,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_important_goes_first_and_within_a_large_budget_nobody() {
+    fn the_least_important_gets_coarser_first_and_a_large_budget_changes_nothing() {
         let hairs = [hair(1.0), hair(0.1), hair(0.2)];
         assert_eq!(fit(&hairs, f32::INFINITY), [0, 0, 0]);
         assert_eq!(fit(&hairs, 12.0), [0, 0, 0]);

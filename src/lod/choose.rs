@@ -1,4 +1,4 @@
-//! Which strands are simulated at a level, and the others' way after them.
+//! Which strands are simulated at a level, and which guides the others follow.
 
 use super::{
     PresentLod,
@@ -12,65 +12,68 @@ use crate::{
     strand::{Hair, HeldNodes, PerHair, Strand, StrandModel, StrandOf, StrandSleep, Strands},
 };
 use bevy::{
-    ecs::entity::{EntityHashMap, EntityHashSet},
+    ecs::{
+        entity::{EntityHashMap, EntityHashSet},
+        entity_disabling::Disabled,
+    },
     prelude::*,
 };
 
-/// How many of the nearest guides are looked at for those that run most alike.
+/// How many of the nearest guides are candidates; the most similar ones are taken.
 const CANDIDATES: usize = 8;
 
-/// Where a smaller share of the strands is simulated, each of the others follows one.
+/// Below this simulated share of the strands each follower has one guide.
 const FEW: f32 = 0.125;
 
-/// Guides that run as near as this count alike (m).
+/// Distance from a guide below which its weight hardly grows (m).
 const ALIKE: f32 = 1e-3;
 
-/// How a strand that is not simulated at its hair's level goes along with its guides, see
+/// How a strand that is not simulated at its hair's level follows its guides, see
 /// [`LodLevel::strands`](crate::LodLevel::strands). Kept by the tick.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct Follower {
-    /// Its place in the hair's even order, once that was asked for.
+    /// Its place in the hair's spread order, once computed.
     rank: Option<u32>,
     /// Its index among the hair's guides.
     #[reflect(ignore)]
     guide: Option<u32>,
     #[reflect(ignore)]
     pub(super) ties: Ties,
-    /// Where its root was when it came to lie still (m).
+    /// Position of its root when last updated (m).
     pub(super) root: Vec3,
-    /// Whether it was frozen and goes on in this tick.
+    /// Whether it was frozen and is simulated again from this tick on.
     #[reflect(ignore)]
     pub(super) thaws: bool,
     /// Whether it sleeps because its guides do.
     pub(super) synced_asleep: bool,
 }
 
-/// The strands of a [`Hair`] that others are carried by. Kept by the tick.
+/// The strands of a [`Hair`] that others follow. Kept by the tick.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct Guides {
-    /// In their even order.
+    /// In spread order.
     #[reflect(ignore)]
     pub(super) strands: Vec<Entity>,
     /// Where each one's frames begin in the list, and where the last one's end.
     #[reflect(ignore)]
     starts: Vec<u32>,
-    /// Orientations of their edges as they were last seen.
+    /// Orientations of their edges in this tick.
     #[reflect(ignore)]
     turns: Vec<Quat>,
-    /// Which may be followed, and which of them move.
+    /// Which are valid to follow, and which of them are awake.
     #[reflect(ignore)]
     usable: Vec<bool>,
     #[reflect(ignore)]
     pub(super) awake: Vec<bool>,
     level: usize,
-    /// Whether any strand was frozen and goes on in this tick.
+    /// Whether any strand was frozen and is simulated again from this tick on.
     #[reflect(ignore)]
     pub(super) thaws: bool,
-    /// What the strands were told apart by: share that is simulated, level, number of strands.
+    /// Key of the present partition: simulated share, level, number of strands.
     #[reflect(ignore)]
-    told_apart: Option<(f32, usize, usize)>,
+    partition_key: Option<(f32, usize, usize)>,
     /// How the hair's own frame has moved in this tick.
     #[reflect(ignore)]
     pub(super) frame: Frame,
@@ -101,7 +104,7 @@ impl Guides {
         self.awake.push(true);
     }
 
-    /// Sees where a guide is now.
+    /// Reads a guide's present pose.
     pub(super) fn see(&mut self, i: usize, strand: Option<&Strand>) {
         let (from, to) = (self.starts[i] as usize, self.starts[i + 1] as usize);
         let seen = strand.map_or(&[][..], Strand::orientations);
@@ -116,30 +119,31 @@ fn is_usable(turns: &[Quat]) -> bool {
     turns.iter().all(|q| (0.5..2.0).contains(&q.length_squared()))
 }
 
-/// A hair whose strands are to be told apart.
-struct Group<'a> {
+/// A hair whose strands are to be partitioned into guides and followers.
+struct HairPartition<'a> {
     hair: Entity,
     share: f32,
     level: usize,
-    /// Whether a strand is simulated only until it is whole again.
-    mends: bool,
-    members: Vec<Member<'a>>,
+    /// Whether a strand is simulated only until its state is finite again.
+    repairs: bool,
+    members: Vec<GroupStrand<'a>>,
     strands: Vec<Ref<'a, Strand>>,
 }
 
-struct Member<'a> {
+struct GroupStrand<'a> {
     entity: Entity,
     sleep: Mut<'a, StrandSleep>,
-    carried: Mut<'a, Follower>,
-    /// Whether it may be a guide or be carried: nothing holds it, and it is a strand at all.
+    follower: Mut<'a, Follower>,
+    /// Whether it may be a guide or a follower: a valid strand that nothing holds.
     free: bool,
 }
 
-/// At the start of a tick: who is simulated, and who goes along with whom.
+/// At the start of a tick: which strands are simulated, and which guides each other one follows.
 pub(crate) fn choose_guides(
     models: Settings<StrandModel>,
     touched: Query<&StrandOf, Or<(Changed<Strand>, Changed<HeldNodes>, Changed<StrandOf>)>>,
-    mut let_go: RemovedComponents<HeldNodes>,
+    mut released: RemovedComponents<HeldNodes>,
+    (mut enabled, mut forgotten): (RemovedComponents<Disabled>, RemovedComponents<Follower>),
     mut hairs: Query<(Entity, &Strands, &mut PresentLod, &mut Guides), With<Hair>>,
     mut strands: Query<(
         Entity,
@@ -150,58 +154,66 @@ pub(crate) fn choose_guides(
         Option<&HeldNodes>,
     )>,
 ) {
-    // Springs have no twist that a neighbour could follow.
+    // Strands of springs have no twist for a neighbour to follow.
     let share_of = |hair: Entity, present: &PresentLod| match models.of(hair) {
-        StrandModel::Rod => present.share(),
+        StrandModel::Rod => present.simulated_share(),
         StrandModel::MassSpring => 1.0,
     };
     let concerns = |present: &PresentLod, guides: &Guides| {
-        present.share() < 1.0 || present.carried > 0 || !guides.strands.is_empty()
+        present.simulated_share() < 1.0 || present.followers > 0 || !guides.strands.is_empty()
     };
-    // Hair whose strands nobody touched is told apart as before.
-    let mut as_before = EntityHashSet::default();
-    let any_let_go = let_go.read().count() > 0;
+    // Hair without outside writes keeps its partition.
+    let mut unchanged = EntityHashSet::default();
+    let any_released =
+        released.read().count() + enabled.read().count() + forgotten.read().count() > 0;
     let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
     let mut any = false;
     for (hair, members, present, mut guides) in &mut hairs {
         if !concerns(&present, &guides) {
             continue;
         }
-        let told_apart = Some((share_of(hair, &present), present.level, members.len()));
+        let partition_key = Some((share_of(hair, &present), present.level, members.len()));
         let guides = guides.bypass_change_detection();
-        if guides.told_apart == told_apart && !any_let_go && !touched.contains(&hair) {
-            as_before.insert(hair);
+        if guides.partition_key == partition_key && !any_released && !touched.contains(&hair) {
+            unchanged.insert(hair);
         } else {
             any = true;
         }
-        guides.told_apart = told_apart;
+        guides.partition_key = partition_key;
     }
     if !any {
         return;
     }
     let mut groups = PerHair::default();
-    for (entity, of, strand, sleep, carried, held) in &mut strands {
+    for (entity, of, strand, sleep, follower, held) in &mut strands {
         let index = groups.index(of.0, || {
             let (hair, _, present, guides) = hairs.get(of.0).ok()?;
             let (members, strands) = default();
             let (share, level) = (share_of(hair, present), present.level);
-            (concerns(present, guides) && !as_before.contains(&hair)).then_some(Group {
+            (concerns(present, guides) && !unchanged.contains(&hair)).then_some(HairPartition {
                 hair,
                 share,
                 level,
-                mends: false,
+                repairs: false,
                 members,
                 strands,
             })
         });
         let Some(index) = index else { continue };
         let is_held = held.is_some_and(|held| held.targets.iter().any(Option::is_some));
-        // What is not finite is mended by being simulated. Only others than the tick make it so.
-        let is_whole = strand.nodes() >= 2 && (!strand.is_changed() || strand.is_finite());
+        // A non-finite strand is repaired by being simulated. Only writes from outside make it so, also
+        // while it is disabled and no system notices. Guides overwrite all but a follower's root.
+        let is_followed = sleep.is_follower() && !strand.is_changed();
+        let is_finite = if is_followed && follower.ties.fit(strand.edges()) {
+            strand.positions().first().is_some_and(|root| root.is_finite())
+        } else {
+            strand.is_finite()
+        };
+        let is_whole = strand.nodes() >= 2 && is_finite;
         let free = is_whole && !is_held;
-        let group: &mut Group<'_> = &mut groups.values[index];
-        group.mends |= !is_whole && strand.nodes() >= 2;
-        group.members.push(Member { entity, sleep, carried, free });
+        let group: &mut HairPartition<'_> = &mut groups.values[index];
+        group.repairs |= !is_whole && strand.nodes() >= 2;
+        group.members.push(GroupStrand { entity, sleep, follower, free });
         group.strands.push(strand);
     }
     let mut counts = EntityHashMap::<usize>::default();
@@ -209,16 +221,16 @@ pub(crate) fn choose_guides(
         if let Ok((.., mut guides)) = hairs.get_mut(group.hair) {
             let guides = guides.bypass_change_detection();
             counts.insert(group.hair, part(group, guides));
-            guides.told_apart = guides.told_apart.filter(|_| !group.mends);
+            guides.partition_key = guides.partition_key.filter(|_| !group.repairs);
         }
     }
     for (hair, _, mut present, mut guides) in &mut hairs {
-        if as_before.contains(&hair) {
+        if unchanged.contains(&hair) {
             continue;
         }
-        let carried = counts.get(&hair).copied().unwrap_or(0);
-        if present.carried != carried {
-            present.carried = carried;
+        let followers = counts.get(&hair).copied().unwrap_or(0);
+        if present.followers != followers {
+            present.followers = followers;
         }
         if !counts.contains_key(&hair) && !guides.strands.is_empty() {
             guides.bypass_change_detection().begin();
@@ -226,47 +238,48 @@ pub(crate) fn choose_guides(
     }
 }
 
-/// Parts a hair's strands into guides and carried ones; says how many are carried.
-fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
-    let Group { share, level, members, strands, .. } = group;
+/// Partitions a hair's strands into guides and followers; returns the number of followers.
+fn part(group: &mut HairPartition<'_>, guides: &mut Guides) -> usize {
+    let HairPartition { share, level, members, strands, .. } = group;
     let mut ranks = Vec::new();
     if *share < 1.0 {
         rank(members, strands);
-        ranks.extend(members.iter().filter(|m| m.free).filter_map(|m| m.carried.rank));
+        ranks.extend(members.iter().filter(|m| m.free).filter_map(|m| m.follower.rank));
     }
-    // The first so many of the free ones are guides; none of hair that is frozen.
+    // The first free strands in spread order are guides; frozen hair has none.
     let wanted = match *share {
         share if share > 0.0 => ((share * ranks.len() as f32 - 1e-3).ceil() as usize).max(1),
         _ => 0,
     };
-    // From this rank on they are carried.
-    let first_carried =
+    // From this rank on they are followers.
+    let first_follower =
         if wanted < ranks.len() { *ranks.select_nth_unstable(wanted).1 } else { u32::MAX };
     let mut same = guides.strands.len() == wanted && guides.level == *level;
     let mut count = 0;
     for (member, strand) in members.iter_mut().zip(strands.iter()) {
-        let Member { entity, sleep, carried, free } = member;
-        let (sleep, carried) = (sleep.bypass_change_detection(), carried.bypass_change_detection());
-        let is_follower = *free && carried.rank.is_some_and(|rank| rank >= first_carried);
-        let is_guide = *free && !is_follower && first_carried < u32::MAX;
-        let guide = carried.guide.filter(|_| is_guide);
+        let GroupStrand { entity, sleep, follower, free } = member;
+        let (sleep, follower) =
+            (sleep.bypass_change_detection(), follower.bypass_change_detection());
+        let is_follower = *free && follower.rank.is_some_and(|rank| rank >= first_follower);
+        let is_guide = *free && !is_follower && first_follower < u32::MAX;
+        let guide = follower.guide.filter(|_| is_guide);
         same &= !is_guide || guide.is_some_and(|i| guides.strands.get(i as usize) == Some(entity));
         count += usize::from(is_follower);
         if !is_follower && sleep.is_follower() {
-            // It goes on from where it is, as fast as it is.
+            // It continues from its present position and velocity.
             sleep.set_follower(false);
-            carried.thaws = carried.ties.guides.is_empty();
-            guides.thaws |= carried.thaws;
-            if core::mem::take(&mut carried.synced_asleep) {
+            follower.thaws = follower.ties.guides.is_empty();
+            guides.thaws |= follower.thaws;
+            if core::mem::take(&mut follower.synced_asleep) {
                 sleep.wake_up();
             }
-            carried.ties = Ties::default();
+            follower.ties = Ties::default();
         }
-        // Who was written to has been put somewhere: it stays there and goes on from there.
-        if is_follower && (strand.is_changed() || !carried.ties.fit(strand.edges())) {
-            carried.ties = Ties::default();
+        // A strand that was written to stays where it was put and follows from there.
+        if is_follower && (strand.is_changed() || !follower.ties.fit(strand.edges())) {
+            follower.ties = Ties::default();
         }
-        carried.guide = guide;
+        follower.guide = guide;
     }
     if count == 0 {
         guides.begin();
@@ -275,15 +288,15 @@ fn part(group: &mut Group<'_>, guides: &mut Guides) -> usize {
     if !same {
         let keep = guides.level == *level;
         guides.level = *level;
-        renew(members, strands, guides, first_carried, keep);
+        renew(members, strands, guides, first_follower, keep);
     }
     tie(members, strands, guides);
     count
 }
 
-/// Gives every strand its place in the even order, if one has none yet.
-fn rank(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>]) {
-    if members.iter().all(|m| !m.free || m.carried.rank.is_some()) {
+/// Gives every strand its place in the spread order, if one has none yet.
+fn rank(members: &mut [GroupStrand<'_>], strands: &[Ref<'_, Strand>]) {
+    if members.iter().all(|m| !m.free || m.follower.rank.is_some()) {
         return;
     }
     let root = |strand: &Strand| strand.positions().first().copied();
@@ -292,21 +305,21 @@ fn rank(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>]) {
         .unzip();
     for (rank, i) in spread_order(&places).into_iter().enumerate() {
         let member = &mut members[whole[i as usize]];
-        member.carried.bypass_change_detection().rank = Some(rank as u32);
+        member.follower.bypass_change_detection().rank = Some(rank as u32);
     }
 }
 
-/// Takes new guides. Strands whose guides stay go on with them, unless the level is another: then
-/// there are nearer ones.
+/// Takes new guides. Followers whose guides stay keep them, unless the level has changed: then there may
+/// be nearer ones.
 fn renew(
-    members: &mut [Member<'_>],
+    members: &mut [GroupStrand<'_>],
     strands: &[Ref<'_, Strand>],
     guides: &mut Guides,
-    first_carried: u32,
+    first_follower: u32,
     keep: bool,
 ) {
     let mut chosen: Vec<(u32, usize)> = (members.iter().enumerate())
-        .filter_map(|(i, m)| Some((m.carried.rank.filter(|r| m.free && *r < first_carried)?, i)))
+        .filter_map(|(i, m)| Some((m.follower.rank.filter(|r| m.free && *r < first_follower)?, i)))
         .collect();
     chosen.sort_unstable();
     let before = core::mem::take(&mut guides.strands);
@@ -314,13 +327,13 @@ fn renew(
     let mut now = EntityHashMap::<u32>::default();
     for ((_, i), index) in chosen.into_iter().zip(0..) {
         let member = &mut members[i];
-        member.carried.bypass_change_detection().guide = Some(index);
+        member.follower.bypass_change_detection().guide = Some(index);
         guides.add(member.entity, &strands[i]);
         now.insert(member.entity, index);
     }
     let index_now: Vec<Option<u32>> = before.iter().map(|e| now.get(e).copied()).collect();
     for member in members {
-        let ties = &mut member.carried.bypass_change_detection().ties;
+        let ties = &mut member.follower.bypass_change_detection().ties;
         let stays = |(guide, _): &mut (u32, f32)| {
             let index = index_now.get(*guide as usize).copied().flatten();
             index.map(|index| *guide = index).is_some()
@@ -331,15 +344,16 @@ fn renew(
     }
 }
 
-/// Ties those that are to be carried and hang on nobody to guides that are near and run alike.
-fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Guides) {
-    let is_loose =
-        |m: &Member<'_>| m.free && m.carried.guide.is_none() && m.carried.ties.guides.is_empty();
+/// Ties followers without guides to guides that are near and similar.
+fn tie(members: &mut [GroupStrand<'_>], strands: &[Ref<'_, Strand>], guides: &mut Guides) {
+    let is_loose = |m: &GroupStrand<'_>| {
+        m.free && m.follower.guide.is_none() && m.follower.ties.guides.is_empty()
+    };
     if !members.iter().any(is_loose) {
         return;
     }
     if guides.strands.is_empty() {
-        // Frozen: there is nobody to hang on.
+        // Frozen hair has no guides.
         for member in members.iter_mut().filter(|m| is_loose(m) && !m.sleep.is_follower()) {
             member.sleep.bypass_change_detection().set_follower(true);
         }
@@ -347,14 +361,14 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
     }
     let mut ahead: Vec<Option<&Strand>> = vec![None; guides.strands.len()];
     for (member, strand) in members.iter().zip(strands) {
-        if let Some(place) = member.carried.guide.and_then(|i| ahead.get_mut(i as usize)) {
+        if let Some(place) = member.follower.guide.and_then(|i| ahead.get_mut(i as usize)) {
             *place = Some(strand);
         }
     }
-    // Whoever was written to since the last tick is elsewhere now.
+    // Guides may have been written to since the last tick.
     ahead.iter().enumerate().for_each(|(i, strand)| guides.see(i, *strand));
     let guides = &*guides;
-    // Where so few are simulated nobody sees that neighbours go alike.
+    // With so few guides, neighbours that move alike are not noticeable.
     let most = if (guides.strands.len() as f32) < FEW * members.len() as f32 { 1 } else { GUIDES };
     let waypoints_of: Vec<[Vec3; 3]> =
         ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
@@ -364,10 +378,10 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
         .filter(|(m, _)| is_loose(m))
         .map(|(m, strand)| {
             m.sleep.bypass_change_detection().set_follower(true);
-            (m.carried.bypass_change_detection(), &**strand)
+            (m.follower.bypass_change_detection(), &**strand)
         })
         .collect();
-    for_each(&mut loose, Nanos(5_000), |(carried, strand)| {
+    for_each(&mut loose, Nanos(5_000), |(follower, strand)| {
         let own = waypoints(strand);
         let mut found: Vec<(f32, u32, StrandState<'_>)> = nearest
             .nearest::<CANDIDATES>(own[0])
@@ -384,8 +398,8 @@ fn tie(members: &mut [Member<'_>], strands: &[Ref<'_, Strand>], guides: &mut Gui
         let weight = |apart: f32| 1.0 / (apart + ALIKE * ALIKE);
         let sum: f32 = found.iter().map(|f| weight(f.0)).sum();
         let guides = found.into_iter().map(|(apart, i, guide)| (i, weight(apart) / sum, guide));
-        carried.ties = Ties::new(state_of(strand), guides);
-        carried.root = own[0];
+        follower.ties = Ties::new(state_of(strand), guides);
+        follower.root = own[0];
     });
 }
 
@@ -398,23 +412,34 @@ fn state_of(strand: &Strand) -> StrandState<'_> {
     }
 }
 
-/// Root, middle and tip: where a strand runs.
+/// Root, middle and tip of a strand.
 fn waypoints(strand: &Strand) -> [Vec3; 3] {
     let p = strand.positions();
     let last = p.len().saturating_sub(1);
     [0, last / 2, last].map(|i| p.get(i).copied().unwrap_or_default())
 }
 
-/// A strand that leaves its hair, or goes over to another, is simulated until it is chosen there.
-pub(super) fn let_go(
+/// A strand that leaves its hair or moves to another is simulated until a level is chosen there.
+pub(super) fn release_follower(
     left: On<Discard, StrandOf>,
     mut strands: Query<(&mut StrandSleep, &mut Follower)>,
 ) {
-    if let Ok((mut sleep, mut carried)) = strands.get_mut(left.entity) {
-        if sleep.is_follower() {
-            sleep.set_follower(false);
-            sleep.wake_up();
-        }
-        *carried = Follower::default();
+    if let Ok((mut sleep, mut follower)) = strands.get_mut(left.entity) {
+        release(&mut sleep);
+        *follower = Follower::default();
+    }
+}
+
+/// A strand that does not know its guides any more is simulated until it has some again.
+pub(super) fn release_forgetful(left: On<Remove, Follower>, mut strands: Query<&mut StrandSleep>) {
+    if let Ok(mut sleep) = strands.get_mut(left.entity) {
+        release(&mut sleep);
+    }
+}
+
+fn release(sleep: &mut StrandSleep) {
+    if sleep.is_follower() {
+        sleep.set_follower(false);
+        sleep.wake_up();
     }
 }

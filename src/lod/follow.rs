@@ -1,9 +1,9 @@
-//! Carrying as mathematics: how a strand that is not simulated goes along with its guides.
+//! Followers as pure functions: how a strand that is not simulated follows its guides.
 //!
-//! Each of its edges turns as its guides' edges turn at the same distance from the root, and the
-//! strand is built up from its own root with its own segments. So it keeps its lengths exactly, its
-//! root stays on the scalp, and in the moment it is tied it is where it was: turns begin with none.
-//! What its edges turned faster than their guides then, they go on doing, ever less, and come back.
+//! Each of its edges rotates with its guides' edges at the same distance from the root, and the
+//! strand is rebuilt from its own root with its own segments. So it keeps its lengths exactly, its
+//! root stays on the scalp, and it is continuous when it is tied: rotations start at zero.
+//! Its angular velocity relative to the guides at that time decays and its displacement returns to zero.
 
 use bevy::math::ops;
 use glam::{Quat, Vec3};
@@ -11,10 +11,10 @@ use glam::{Quat, Vec3};
 /// How many guides a strand has at most.
 pub const GUIDES: usize = 3;
 
-/// How soon a strand gives up the motion of its own that it was tied with (s).
+/// Time constant with which a follower's relative motion decays (s).
 const OWN_MOTION: f32 = 0.15;
 
-/// How a strand hangs on its guides.
+/// A follower's guides and its pose relative to them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ties {
     /// The guides, by their index among the hair's, with their weights.
@@ -23,23 +23,23 @@ pub struct Ties {
     edges: Vec<Tie>,
     /// Each segment in the frame of its edge (m).
     segments: Vec<Vec3>,
-    /// How much faster each edge turned than its guides when it was tied (rad/s); empty once that is
-    /// over.
+    /// Angular velocity of each edge relative to its guides when it was tied (rad/s); empty once that
+    /// has decayed.
     own: Vec<Vec3>,
-    /// How long ago that was (s).
+    /// Time since then (s).
     since: f32,
 }
 
-/// What ties an edge to a guide.
+/// An edge's pose relative to a guide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tie {
     /// The edge's frame in that of the guide.
     relative: Quat,
-    /// Which edge of the guide, with the share of the way to the next.
+    /// Edge of the guide, with the fraction toward the next.
     at: f32,
 }
 
-/// A strand as it is when it is tied, or is to be tied to.
+/// State of a strand that is tied, or of a guide that it is tied to.
 #[derive(Clone, Copy, Debug)]
 pub struct StrandState<'a> {
     /// Node positions (m).
@@ -53,7 +53,7 @@ pub struct StrandState<'a> {
 }
 
 impl StrandState<'_> {
-    /// How fast edge `i` turns across itself (rad/s).
+    /// Angular velocity of edge `i` without its axial part (rad/s).
     fn spin(&self, i: usize) -> Vec3 {
         let (p, v) = (self.positions, self.velocities);
         let (Some(p), Some(v)) = (p.get(i..i + 2), v.get(i..i + 2)) else { return Vec3::ZERO };
@@ -63,18 +63,18 @@ impl StrandState<'_> {
     }
 }
 
-/// How far what rests in the world has gone in the frame of the nodes, which moves itself.
+/// The displacement, in the moving frame of the nodes, of points at rest in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Frame(Option<(Quat, Vec3)>);
 
 impl Frame {
-    /// Then it goes on by this turn and this way (m).
+    /// Appends a rotation and translation (m).
     pub fn then(&mut self, turn: Quat, way: Vec3) {
         let (turned, gone) = self.0.unwrap_or((Quat::IDENTITY, Vec3::ZERO));
         self.0 = Some(((turn * turned).normalize(), turn * gone + way));
     }
 
-    /// The velocity (m/s) of a place that rested in the moving frame for so long (s).
+    /// The world velocity (m/s) of a point that rested in the moving frame for `seconds`.
     pub(super) fn velocity(&self, place: Vec3, seconds: f32) -> Vec3 {
         let v = (place - self.taken(place, Quat::IDENTITY).0) / seconds;
         if v.is_finite() { v } else { Vec3::ZERO }
@@ -89,16 +89,16 @@ impl Frame {
     }
 }
 
-/// A strand in motion, all of it.
+/// The state of a strand, mutable.
 #[derive(Debug)]
-pub struct Pose<'a> {
+pub struct StrandPose<'a> {
     /// Node positions (m).
     pub positions: &'a mut [Vec3],
     /// Node velocities (m/s).
     pub velocities: &'a mut [Vec3],
     /// Orientations of the edges.
     pub orientations: &'a mut [Quat],
-    /// Their angular velocities (rad/s), or none where nobody asks for them.
+    /// Their angular velocities (rad/s); empty if not needed.
     pub spins: &'a mut [Vec3],
 }
 
@@ -140,12 +140,12 @@ impl Ties {
             && self.edges.len() == edges * self.guides.len()
     }
 
-    /// Goes along with the guides, whose frames `turns` gives: none for one that is not usable.
-    /// Velocities are those of the motion in `dt` (s), in which what rests in the world went by
-    /// `frame`. Says whether there was any guide; without one the strand stays where it is, at rest.
+    /// Follows the guides, whose frames `turns` gives: `None` for an invalid one. Velocities are those of
+    /// the motion in `dt` (s), in which points at rest in the world moved by `frame`. Returns whether
+    /// there was any guide; without one the strand stays where it is, at rest.
     pub fn follow<'a>(
         &mut self,
-        pose: &mut Pose<'_>,
+        pose: &mut StrandPose<'_>,
         turns: impl Fn(u32) -> Option<&'a [Quat]>,
         frame: &Frame,
         dt: f32,
@@ -165,7 +165,7 @@ impl Ties {
         if self.since > 10.0 * OWN_MOTION {
             self.own.clear();
         }
-        // It sets out as fast as it was and ends where it began.
+        // Starts with the initial relative velocity and returns to zero displacement.
         let own_motion = self.since * ops::exp(-self.since / OWN_MOTION);
         let per_second = 1.0 / dt;
         let finite = |v: Vec3| if v.is_finite() { v } else { Vec3::ZERO };
@@ -194,7 +194,7 @@ impl Ties {
     /// The frame of an edge that its guides give it.
     #[inline]
     fn turn(&self, ties: &[Tie], frames: &[Option<&[Quat]>; GUIDES]) -> Quat {
-        // From afar all have one guide.
+        // Fast path: at coarse levels followers have one guide.
         if let ([tie], Some(turns)) = (ties, frames[0]) {
             return between(turns, tie.at) * tie.relative;
         }
@@ -203,17 +203,17 @@ impl Ties {
         for ((tie, turns), (_, weight)) in ties.iter().zip(frames).zip(&self.guides) {
             let Some(turns) = turns else { continue };
             let one = between(turns, tie.at) * tie.relative;
-            // A turn and its negative are the same.
+            // q and −q are the same rotation.
             let like = *first.get_or_insert(one);
             sum += one * if like.dot(one) < 0.0 { -*weight } else { *weight };
         }
         let square = sum.length_squared();
-        // Guides that have turned apart in opposite ways have no mean.
+        // Opposite rotations have no mean.
         if square > 1e-3 { sum * (1.0 / square.sqrt()) } else { first.unwrap_or(Quat::IDENTITY) }
     }
 }
 
-/// The edge at `distance` (m) from the root, by edges' middles, with the share of the way to the next.
+/// The edge at `distance` (m) from the root, by edges' middles, with the fraction toward the next.
 fn edge_at(lengths: &[f32], distance: f32) -> f32 {
     let (mut middle, mut before) = (0.0, 0.0);
     for (i, length) in lengths.iter().enumerate() {
@@ -223,7 +223,7 @@ fn edge_at(lengths: &[f32], distance: f32) -> f32 {
                 return 0.0;
             }
             let share = (distance - before) / (middle - before);
-            // Strands in equal segments go edge by edge, which is cheaper.
+            // Equal segments map edge to edge, which is cheaper.
             return match share {
                 share if share > 0.99 => i as f32,
                 share if share < 0.01 => i as f32 - 1.0,
@@ -251,7 +251,7 @@ fn between(turns: &[Quat], at: f32) -> Quat {
     }
 }
 
-/// The turn from one orientation to another as a vector (rad), exact to a thousandth up to a tenth of
+/// The rotation vector from one orientation to another (rad), accurate to a thousandth up to a tenth of
 /// a turn.
 #[inline]
 fn spin(before: Quat, now: Quat) -> Vec3 {
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn a_strand_goes_on_as_fast_as_it_was_and_comes_back() {
+    fn a_follower_starts_with_its_own_velocity_which_decays() {
         let guide = straight(Vec3::ZERO, 9, 0.02);
         let mut own = straight(Vec3::X * 0.01, 9, 0.02);
         let before = own.clone();
@@ -308,7 +308,7 @@ mod tests {
         let mut ties = Ties::new(strand, guides);
         let mut step = |own: &mut Parts| {
             let (mut v, mut w) = (vec![Vec3::ZERO; 9], vec![Vec3::ZERO; 8]);
-            let mut pose = Pose {
+            let mut pose = StrandPose {
                 positions: &mut own.0,
                 velocities: &mut v,
                 orientations: &mut own.1,
@@ -328,11 +328,11 @@ mod tests {
         assert!(own.0[8].distance(before.0[8]) < 1e-5, "{}", own.0[8]);
     }
 
-    /// Carries a strand; what it was before comes back as velocities.
-    fn carried(ties: &mut Ties, own: &mut Parts, guides: &[Option<&[Quat]>]) -> (bool, Vec<Vec3>) {
+    /// Moves a follower; returns whether it followed, and its velocities.
+    fn moved(ties: &mut Ties, own: &mut Parts, guides: &[Option<&[Quat]>]) -> (bool, Vec<Vec3>) {
         let mut velocities = vec![Vec3::NAN; own.0.len()];
         let mut spins = vec![Vec3::NAN; own.1.len()];
-        let mut pose = Pose {
+        let mut pose = StrandPose {
             positions: &mut own.0,
             velocities: &mut velocities,
             orientations: &mut own.1,
@@ -344,13 +344,13 @@ mod tests {
     }
 
     #[test]
-    fn who_is_tied_stays_where_it_is_until_guides_move() {
+    fn a_tied_strand_stays_where_it_is_until_guides_move() {
         let guides = [curl(9, 0.0), curl(12, 2.0), straight(Vec3::X, 5, 0.03)];
         let before = curl(9, 1.0);
         let mut own = before.clone();
         let mut ties = tied(&own, &[(&guides[0], 0.5), (&guides[1], 0.3), (&guides[2], 0.2)]);
         let turns = guides.each_ref().map(|g| Some(&g.1[..]));
-        let (went, velocities) = carried(&mut ties, &mut own, &turns);
+        let (went, velocities) = moved(&mut ties, &mut own, &turns);
         assert!(went && ties.fit(8) && !ties.fit(9));
         for (a, b) in own.0.iter().zip(&before.0) {
             assert!(a.distance(*b) < 1e-6, "{a} {b}");
@@ -366,7 +366,7 @@ mod tests {
         let mut ties = tied(&own, &[(&guide, 1.0)]);
         let turn = Quat::from_rotation_z(0.8);
         let turned: Vec<Quat> = guide.1.iter().map(|q| turn * *q).collect();
-        let (_, velocities) = carried(&mut ties, &mut own, &[Some(&turned)]);
+        let (_, velocities) = moved(&mut ties, &mut own, &[Some(&turned)]);
         for (i, p) in own.0.iter().enumerate() {
             let expected = before.0[0] + turn * (before.0[i] - before.0[0]);
             assert!(p.distance(expected) < 1e-6);
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_stay_whatever_guides_do_and_however_many_nodes_they_have() {
+    fn lengths_stay_for_any_motion_and_node_count_of_guides() {
         let (a, b) = (straight(Vec3::ZERO, 9, 0.02), straight(Vec3::X, 4, 0.07));
         let mut own = curl(14, 0.3);
         let mut ties = tied(&own, &[(&a, 0.7), (&b, 0.3)]);
@@ -385,13 +385,13 @@ mod tests {
             parts.1.iter().enumerate().map(|(i, q)| turn(i) * *q).collect()
         };
         let (to, other) = (bent(&a, 0.2), bent(&b, -0.3));
-        carried(&mut ties, &mut own, &[Some(&to), Some(&other)]);
+        moved(&mut ties, &mut own, &[Some(&to), Some(&other)]);
         let now = own.0.windows(2).map(|p| p[0].distance(p[1]));
         assert!(now.zip(&own.2).all(|(now, rest)| (now / rest - 1.0).abs() < 1e-4));
         // Opposite turns have no mean: the first guide's is taken.
         let half = |q: &Quat| Quat::from_rotation_x(core::f32::consts::PI) * *q;
         let turned: Vec<Quat> = a.1.iter().map(half).collect();
-        let (went, _) = carried(&mut ties, &mut own, &[Some(&turned), Some(&b.1)]);
+        let (went, _) = moved(&mut ties, &mut own, &[Some(&turned), Some(&b.1)]);
         assert!(went && own.0.iter().all(|p| p.is_finite()));
     }
 
@@ -414,16 +414,16 @@ mod tests {
         let before = curl(9, 0.7);
         let mut own = before.clone();
         let mut ties = tied(&own, &[(&guide, 1.0)]);
-        let (went, velocities) = carried(&mut ties, &mut own, &[None]);
+        let (went, velocities) = moved(&mut ties, &mut own, &[None]);
         assert!(!went && own.0 == before.0 && velocities == [Vec3::ZERO; 9]);
-        assert!(!carried(&mut Ties::default(), &mut own, &[]).0);
+        assert!(!moved(&mut Ties::default(), &mut own, &[]).0);
         own.0[0] = Vec3::NAN;
-        assert!(!carried(&mut ties, &mut own, &[Some(&guide.1)]).0);
+        assert!(!moved(&mut ties, &mut own, &[Some(&guide.1)]).0);
         assert_eq!(own.0[1..], before.0[1..]);
     }
 
     #[test]
-    fn what_rests_in_the_world_while_the_frame_moves_has_no_velocity() {
+    fn points_at_rest_in_the_world_have_no_velocity_in_a_moving_frame() {
         let guide = straight(Vec3::ZERO, 9, 0.02);
         let mut own = straight(Vec3::X * 0.01, 9, 0.02);
         let mut ties = tied(&own, &[(&guide, 1.0)]);
@@ -434,7 +434,7 @@ mod tests {
         frame.then(Quat::IDENTITY, Vec3::ZERO);
         let turned: Vec<Quat> = guide.1.iter().map(|q| turn * *q).collect();
         let (mut v, mut w) = (vec![Vec3::ONE; 9], vec![Vec3::ONE; 8]);
-        let mut pose = Pose {
+        let mut pose = StrandPose {
             positions: &mut own.0,
             velocities: &mut v,
             orientations: &mut own.1,

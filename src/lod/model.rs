@@ -1,10 +1,10 @@
-//! Level of detail as mathematics: which level, which substeps, how large on the screen.
+//! Level of detail as pure functions: which level, and how large hair is on the screen.
 
 use super::LodLevel;
 
-/// The level for hair that takes up `share` of the view's height and was at `before`: 0 in full, n
-/// the n-th of `levels`. Coarser at a level's limit, finer again only `hysteresis` beyond it. A share
-/// that is not a number changes nothing.
+/// The level for hair that takes up `share` of the view's height and was at level `before`: 0 in full, n
+/// the n-th of `levels`. Coarser at a level's limit, finer again only `hysteresis` beyond it. A NaN
+/// share keeps the level.
 pub fn choose(levels: &[LodLevel], hysteresis: f32, before: usize, share: f32) -> usize {
     let mut level = before.min(levels.len());
     if share.is_nan() {
@@ -22,7 +22,7 @@ pub fn choose(levels: &[LodLevel], hysteresis: f32, before: usize, share: f32) -
 /// The share of the view's height that a ball of `radius` (m) takes up at `distance` (m) in a
 /// perspective whose scale (1 / tan of half the vertical angle) is `scale`.
 pub fn screen_share(radius: f32, distance: f32, scale: f32) -> f32 {
-    // Its outline is where sight touches it: sine, not tangent. From inside it is all there is.
+    // The outline is tangent to the lines of sight: sine, not tangent. From inside it fills the view.
     let apart = distance * distance - radius * radius;
     if apart > 0.0 { (scale * radius / apart.sqrt()).min(100.0) } else { 100.0 }
 }
@@ -42,7 +42,7 @@ mod tests {
         assert_eq!([0.5, 0.41, 0.39, 0.21, 0.19].map(|s| go(0, s)), [0, 0, 1, 1, 2]);
         assert_eq!([0.19, 0.24, 0.26, 0.45, 0.51].map(|s| go(2, s)), [2, 2, 1, 1, 0]);
         assert_eq!([0.41, 0.49, 0.5].map(|s| go(1, s)), [1, 1, 0]);
-        // Wherever it stays, it stays when asked again.
+        // The choice is stable.
         for before in 0..=5 {
             for i in 0..100 {
                 let level = go(before, 0.01 * i as f32);

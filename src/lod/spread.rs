@@ -1,4 +1,4 @@
-//! Even choices among roots.
+//! Spread order: prefixes that sample roots evenly.
 //!
 //! Roots are split in two at the median across their widest direction, again and again. Halves hold
 //! equally many strands, so that a choice is dense where hair is.
@@ -6,9 +6,9 @@
 use crate::grid::split_at_median;
 use glam::Vec3;
 
-/// The places' indices in an order whose every beginning is spread evenly: of the strands in any part
-/// that the splits made, it holds the same share but for one strand. So what is chosen at a coarse
-/// level is chosen at all finer ones. Places have to be finite.
+/// The points' indices in an order of which any prefix is spread evenly: from each half of each split it
+/// holds the same share up to one strand. So strands chosen at a coarse level are chosen at all finer
+/// ones. Points have to be finite.
 pub fn spread_order(places: &[Vec3]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..places.len() as u32).collect();
     let mut scratch = order.clone();
@@ -26,7 +26,7 @@ fn arrange(places: &[Vec3], ids: &mut [u32], scratch: &mut [u32]) {
     let (for_one, for_other) = scratch.split_at_mut(half);
     arrange(places, one, for_one);
     arrange(places, other, for_other);
-    // One strand of one half, one of the other, beginning with who is nearer to the middle of both.
+    // Alternates between the halves, beginning with the one whose first point is nearer to the middle.
     let place = |id: &u32| places[*id as usize];
     let middle = ids.iter().map(place).sum::<Vec3>() / ids.len() as f32;
     let from_middle = |i: usize| place(&ids[i]).distance_squared(middle);
@@ -72,13 +72,13 @@ mod tests {
     }
 
     #[test]
-    fn every_beginning_of_the_order_is_spread_evenly() {
+    fn every_prefix_of_the_order_is_spread_evenly() {
         let places = head(2000);
         let order = spread_order(&places);
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert!(sorted.iter().zip(0..).all(|(a, b)| *a == b), "everyone once");
-        // By chance: the order in which they were made.
+        // Random: the order in which they were made.
         let chance: Vec<u32> = (0..2000).collect();
         for count in [20, 137, 500, 1000] {
             let (mean, most) = cover(&places, &order[..count]);
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_does_not_depend_on_how_roots_came_unless_they_are_in_one_place() {
+    fn the_order_does_not_depend_on_the_input_order_except_for_coinciding_roots() {
         let places = head(300);
         let order = spread_order(&places);
         let reversed: Vec<Vec3> = places.iter().rev().copied().collect();

@@ -1,16 +1,16 @@
-//! Levels are chosen at the start of a tick; the systems that move hair ask what they are.
+//! Levels are chosen at the start of a tick; the systems that move hair read them.
 
 use super::{
-    Follower, Guides, HairBudget, HairEstimate, HairLod, LodLevel, PresentLod, ScreenShare,
+    Follower, Guides, HairBudget, HairEstimate, HairLod, HairScreenShare, LodLevel, PresentLod,
     budget::{Candidate, costs, fit},
-    carry::{move_followers, sync_follower_sleep},
-    choose::{choose_guides, let_go},
+    choose::{choose_guides, release_follower, release_forgetful},
+    followers::{move_followers, sync_follower_sleep},
     model,
 };
 use crate::{
     schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
     setting::{self, Ranged},
-    strand::{Hair, Strand, Strands},
+    strand::{Hair, Strand, Strands, keep_required},
 };
 use bevy::prelude::*;
 
@@ -21,17 +21,19 @@ impl Plugin for LodPlugin {
     fn build(&self, app: &mut App) {
         setting::component::<HairLod>(app);
         setting::resource::<HairBudget>(app);
+        keep_required::<Strand, Follower>(app);
         app.init_resource::<HairEstimate>()
             .register_type::<HairEstimate>()
             .register_type::<LodLevel>()
-            .register_type::<ScreenShare>()
+            .register_type::<HairScreenShare>()
             .register_type::<PresentLod>()
             .register_type::<Follower>()
             .register_type::<Guides>()
             .register_required_components::<Strand, Follower>()
             .register_required_components::<HairLod, Guides>()
             .add_observer(forget)
-            .add_observer(let_go)
+            .add_observer(release_follower)
+            .add_observer(release_forgetful)
             .add_systems(
                 HairTick,
                 (
@@ -58,7 +60,7 @@ fn choose(
     budget: Res<HairBudget>,
     mut estimate: ResMut<HairEstimate>,
     mut hairs: Query<
-        (&HairLod, &ScreenShare, &Strands, &mut PresentLod, &mut SubstepLimits),
+        (&HairLod, &HairScreenShare, &Strands, &mut PresentLod, &mut SubstepLimits),
         With<Hair>,
     >,
     strands: Query<&Strand>,
@@ -68,15 +70,15 @@ fn choose(
         .iter_mut()
         .map(|(lod, share, members, mut present, limits)| {
             let lod = lod.clamped();
-            let before = present.level.saturating_sub(present.saved);
+            let before = present.level.saturating_sub(present.budget_levels);
             let wanted = model::choose(&lod.levels, lod.hysteresis, before, share.0);
             let segments = match present.segments {
                 (segments, counted) if counted == members.len() => segments,
                 _ => strands.iter_many(members.collection()).map(Strand::edges).sum(),
             };
             present.bypass_change_detection().segments = (segments, members.len());
-            // Who is made to save goes on with it until somebody is clearly less important.
-            let held = if present.saved > 0 { 1.0 + lod.hysteresis } else { 1.0 };
+            // Hair already made coarser stays so until other hair is clearly less important.
+            let held = if present.budget_levels > 0 { 1.0 + lod.hysteresis } else { 1.0 };
             let importance = share.0.max(0.0) * lod.importance / held;
             let costs = costs(&lod.levels, segments, step.count);
             (Candidate { importance, wanted, costs }, lod.levels.clone(), present, limits)
@@ -89,14 +91,14 @@ fn choose(
         costs.sum::<f32>() * budget.slowness
     };
     estimate.set_if_neq(HairEstimate {
-        wanted: cost_of(&|i| candidates[i].wanted),
+        unbudgeted: cost_of(&|i| candidates[i].wanted),
         present: cost_of(&|i| levels[i]),
     });
     for ((candidate, settings, present, limits), level) in chosen.iter_mut().zip(levels) {
         let settings = level.checked_sub(1).and_then(|i| settings.get(i));
         present.set_if_neq(PresentLod {
             level,
-            saved: level - candidate.wanted,
+            budget_levels: level - candidate.wanted,
             strands: settings.map(|l| l.strands),
             ..**present
         });

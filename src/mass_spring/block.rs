@@ -1,21 +1,22 @@
 //! [`LANES`] mass-spring strands, side by side, through one substep.
 //!
-//! The springs along a strand are stiff and its nodes may weigh very differently: one that carries a
-//! droplet a hundred times as much as its neighbour. One spring after the other would take as many
-//! iterations; so they are solved together, a tridiagonal system like that of the rods' length
-//! limiter, with the springs' compliance on its diagonal. The soft ones to the next but one node are
-//! solved one by one.
+//! The springs along a strand are stiff and the masses of its nodes may differ a hundredfold where one
+//! carries a droplet. Gauss–Seidel would take as many iterations; so they are solved together, a
+//! tridiagonal system like that of the rods' length limiter, with the springs' compliance on its
+//! diagonal. The soft ones to the next but one node are solved one by one.
 //!
-//! What few iterations leave undone cannot feed energy in: a step that would end with more than it
-//! began with is shortened, and its speeds with it.
+//! Incomplete convergence cannot add energy: a step that would end with more than it began with is
+//! shortened, and its speeds with it.
 
 use super::{Springs, model::Xpbd};
 use crate::{
-    lanes::{LANES, Lane, Quaternion, Real, V3, dispatch, load, load3, load4, store3, store4},
+    lanes::{
+        LANES, Lane, Quaternion, Real, V3, dispatch, load, load3, load4, splat, store3, store4,
+    },
     rod::{
-        block::{BlockLanes, NodeLanes},
+        block::{BlockLanes, NodeLanes, pulled},
         limiter::{along_support, mobility},
-        obstacle::{NearObstacles, Obstacle, splat},
+        obstacle::{NearObstacles, Obstacle},
         touch::{contacts, predict_nodes},
         tridiagonal::{Elimination, back},
     },
@@ -23,13 +24,13 @@ use crate::{
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use glam::Vec3;
 
-/// How often a step that gains energy is halved before it is given up.
+/// How often a step that gains energy is halved before it is rejected.
 const HALVINGS: u32 = 8;
 
-/// No spring that touches anything is longer than this many times its length after a step.
+/// Largest length of an edge of a touching strand after a step, as a multiple of its rest length.
 const TORN: f32 = 1.5;
 
-/// A block of strands with what their springs hold.
+/// A block of strands with the tensions of their springs.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SpringLanes {
     pub strands: BlockLanes,
@@ -43,15 +44,15 @@ struct Tensions {
     over: Lane,
 }
 
-/// What a substep does to a block.
+/// Parameters of a substep.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct StepParams {
+pub(crate) struct SpringParams {
     pub dt: f32,
     pub springs: Springs,
-    /// Gravity (m/s²). It is in the velocities already, and asked for what it gave.
+    /// Gravity (m/s²). Velocities already contain it; used for the energy balance.
     pub gravity: Vec3,
     /// Distance that nodes keep from obstacles (m).
-    pub skin: f32,
+    pub clearance: f32,
 }
 
 /// Takes the block through one substep, on the instruction set that the machine has. Node 0 of every
@@ -59,7 +60,7 @@ pub(crate) struct StepParams {
 pub(crate) fn step(
     level: Level,
     block: &mut SpringLanes,
-    params: &StepParams,
+    params: &SpringParams,
     obstacles: &[Obstacle],
 ) {
     block.tensions.clear();
@@ -73,7 +74,7 @@ fn step_simd<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     tensions: &mut [Tensions],
-    params: &StepParams,
+    params: &SpringParams,
     obstacles: &[Obstacle],
 ) {
     let Springs { stretch, bend, damping, iterations } = params.springs;
@@ -83,9 +84,9 @@ fn step_simd<S: Simd>(
     let zero = f32x16::splat(simd, 0.0);
     let none = V3::new(zero, zero, zero);
     b.near_obstacles.fill(NearObstacles::ALL);
-    predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.skin, obstacles);
+    predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.clearance, obstacles);
     b.touched = [0.0; LANES];
-    // Who is moved by something else may get energy from there.
+    // Strands that something else moves may gain energy from it.
     let mut moved = zero;
     for n in &b.nodes {
         let v = load3(simd, &n.v);
@@ -103,7 +104,7 @@ fn step_simd<S: Simd>(
         } else {
             solve_next::<S, true>(simd, b, tensions, next);
         }
-        contacts(simd, b, params.skin, obstacles);
+        contacts(simd, b, params.clearance, obstacles);
         moved = Real::max(moved, load(simd, &b.touched));
         in_touch |= b.touched != [0.0; LANES];
     }
@@ -114,8 +115,8 @@ fn step_simd<S: Simd>(
     turn_edges(simd, b);
 }
 
-/// The direction from one node to another and the distance between them; where they are at one place
-/// no direction.
+/// The direction from one node to another and the distance between them; a zero direction where they
+/// coincide.
 #[inline(always)]
 fn span<S: Simd>(from: V3<f32x16<S>>, to: V3<f32x16<S>>) -> (V3<f32x16<S>>, f32x16<S>) {
     let d = to - from;
@@ -130,9 +131,9 @@ fn place<S: Simd>(simd: S, n: &NodeLanes) -> (V3<f32x16<S>>, V3<f32x16<S>>) {
     (p, p - load3(simd, &n.from))
 }
 
-/// Brings edges that are torn back to [`TORN`] times their length, from the root on and without a change of
-/// speed. A node that was shaken to the far side of an obstacle is pressed on it by what pulls it home,
-/// and friction would hold it there for ever.
+/// Shortens overstretched edges to [`TORN`] times their length, from the root on and without a change of
+/// speed. A node that was shaken to the far side of an obstacle is pressed on it by its springs, and
+/// friction would hold it there for ever.
 #[inline(never)]
 fn bring_back<S: Simd>(simd: S, b: &mut BlockLanes) {
     simd.vectorize(
@@ -184,8 +185,8 @@ fn solve_over<S: Simd>(
     );
 }
 
-/// One Newton step on all springs along the strand at once: (J W Jᵀ + give) Δλ = excess, by the
-/// Thomas algorithm. `TOUCHING` heeds obstacles, as the rods' limiter does: a node that rests on one
+/// One Newton step on all springs along the strand at once: (J W Jᵀ + compliance) Δλ = excess, by the
+/// Thomas algorithm. `TOUCHING` respects obstacles, as the rods' limiter does: a node that rests on one
 /// moves along it, or off it.
 #[inline(never)]
 fn solve_next<S: Simd, const TOUCHING: bool>(
@@ -241,13 +242,13 @@ fn solve_next<S: Simd, const TOUCHING: bool>(
     );
 }
 
-/// Velocities from the change of the step. Where `alone` holds, nothing but gravity gave energy: what
-/// ends with more than it began with is taken back halfway until it does not, then slowed down.
+/// Velocities from the change in the step. Where `alone` holds, only gravity added energy: a step that
+/// ends with more than it began with is halved until it does not, then slowed down.
 #[inline(never)]
 fn keep_energy<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
-    params: &StepParams,
+    params: &SpringParams,
     alone: <f32x16<S> as Real>::Mask,
 ) {
     simd.vectorize(
@@ -258,8 +259,8 @@ fn keep_energy<S: Simd>(
             let gravity = splat(zero, params.gravity);
             let pull = splat(zero, params.gravity * -params.dt);
             let mut before = stored::<S, true>(simd, b, params);
-            for n in &b.nodes {
-                let v = load3(simd, &n.v) + pull;
+            for (i, n) in b.nodes.iter().enumerate() {
+                let v = load3(simd, &n.v) + pulled(simd, &b.gravity, i, pull);
                 before += half * mass(simd, n) * v.dot(v);
             }
             let mut left = left_of(simd, b, params, gravity, before);
@@ -298,24 +299,24 @@ fn keep_energy<S: Simd>(
     );
 }
 
-/// What there is for speeds: `before` and what gravity gave, less what the springs store now.
+/// The kinetic energy available: `before` and the work of gravity, less what the springs store now.
 #[inline(always)]
 fn left_of<S: Simd>(
     simd: S,
     b: &BlockLanes,
-    params: &StepParams,
+    params: &SpringParams,
     gravity: V3<f32x16<S>>,
     before: f32x16<S>,
 ) -> f32x16<S> {
     let mut left = before - stored::<S, false>(simd, b, params);
-    for n in &b.nodes {
+    for (i, n) in b.nodes.iter().enumerate() {
         let (_, moved) = place(simd, n);
-        left += mass(simd, n) * gravity.dot(moved);
+        left += mass(simd, n) * pulled(simd, &b.gravity, i, gravity).dot(moved);
     }
     left
 }
 
-/// A node's mass; none where it is held, for it takes no part in the energy.
+/// A node's mass; 0 where it is held, because it takes no part in the energy balance.
 #[inline(always)]
 fn mass<S: Simd>(simd: S, n: &NodeLanes) -> f32x16<S> {
     let w = load(simd, &n.w);
@@ -323,9 +324,9 @@ fn mass<S: Simd>(simd: S, n: &NodeLanes) -> f32x16<S> {
     Real::select(Real::lt(w, tiny), f32x16::splat(simd, 0.0), w.lit(1.0) / Real::max(w, tiny))
 }
 
-/// What the springs store, per mass of a node (J/kg); with `FROM` at the start of the step.
+/// Energy of the springs, per mass of a node (J/kg); with `FROM` at the start of the step.
 #[inline(always)]
-fn stored<S: Simd, const FROM: bool>(simd: S, b: &BlockLanes, params: &StepParams) -> f32x16<S> {
+fn stored<S: Simd, const FROM: bool>(simd: S, b: &BlockLanes, params: &SpringParams) -> f32x16<S> {
     let (mut next, mut over) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
     let mut length_before = next;
     for i in 0..b.edges.len() {
@@ -350,13 +351,14 @@ fn at<S: Simd, const FROM: bool>(simd: S, n: &NodeLanes) -> V3<f32x16<S>> {
     load3(simd, if FROM { &n.from } else { &n.p })
 }
 
-/// Masses and springs have no orientations: edges turn with their nodes by the shortest way.
+/// Springs have no orientations: frames follow the edges by the shortest rotation.
 #[inline(always)]
 fn turn_edges<S: Simd>(simd: S, b: &mut BlockLanes) {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let still = V3::new(zero, zero, zero);
-    // About its own first axis, for an edge that has turned round.
+    // An edge that has reversed rotates about its own first axis.
     let half_turn = Quaternion::new(V3::new(one, zero, zero), zero);
+    let mut sum = zero;
     for i in 0..b.edges.len() {
         let (to, length) = span(load3(simd, &b.nodes[i].p), load3(simd, &b.nodes[i + 1].p));
         let e = &mut b.edges[i];
@@ -368,9 +370,12 @@ fn turn_edges<S: Simd>(simd: S, b: &mut BlockLanes) {
         let opposite = Real::lt(turned.dot(turned), f32x16::splat(simd, 1e-8));
         let turned = select(opposite, round, turned).normalize();
         let nowhere = Real::lt(length, f32x16::splat(simd, 1e-12));
-        store4(&mut e.q, select(nowhere, q, turned));
+        let turned = select(nowhere, q, turned);
+        sum += turned.dot(turned);
+        store4(&mut e.q, turned);
         store3(&mut e.omega, still);
     }
+    (load(simd, &b.finite) + sum * zero).store_array(&mut b.finite);
 }
 
 #[inline(always)]
@@ -390,8 +395,8 @@ mod tests {
 
     const G: Vec3 = Vec3::new(0.0, -9.8, 0.0);
 
-    fn params(springs: Springs, gravity: Vec3, rate: f32) -> StepParams {
-        StepParams { dt: 1.0 / rate, springs, gravity, skin: 0.0 }
+    fn params(springs: Springs, gravity: Vec3, rate: f32) -> SpringParams {
+        SpringParams { dt: 1.0 / rate, springs, gravity, clearance: 0.0 }
     }
 
     /// Sixteen strands with edges of 3 cm, held at the root.
@@ -414,11 +419,42 @@ mod tests {
         block
     }
 
-    fn advance(block: &mut SpringLanes, params: &StepParams, drag: f32) {
+    /// A step on C with compliance α̃ and inverse masses w leaves α̃/(Σ w + α̃) of C, and moves the ends by
+    /// their shares of the rest (Macklin, Müller, Chentanez 2016, equation 18).
+    #[test]
+    fn a_bending_spring_moves_its_ends_by_their_inverse_masses() {
+        let mut block = block(3, |_, i| (Vec3::X * (0.033 * i as f32), Vec3::ZERO));
+        let (masses, dt) = ([0.7, 1.0, 2.0], 1.0 / 360.0);
+        for (n, w) in block.strands.nodes.iter_mut().zip(masses) {
+            n.w = [w; LANES];
+        }
+        let spring = Xpbd::new(0.0_f64, 1e5, 0.0, dt);
+        dispatch!(Level::new(), simd => {
+            let spring = Xpbd::new(f32x16::splat(simd, 0.0), 1e5, 0.0, dt);
+            let SpringLanes { strands, tensions } = &mut block;
+            tensions.clear();
+            tensions.resize_with(2, Default::default);
+            solve_over(simd, strands, tensions, spring);
+        });
+        let at = |i: usize| f64::from(take3(&block.strands.nodes[i].p, 5).x);
+        let sum = f64::from(masses[0] + masses[2]) + spring.compliance;
+        let more = 0.006 / sum;
+        assert!((at(0) - 0.7 * more).abs() < 1e-7, "{}", at(0));
+        assert!((0.066 - at(2) - 2.0 * more).abs() < 1e-7, "{}", at(2));
+        assert_eq!(take3(&block.strands.nodes[1].p, 5).x, 0.033);
+        assert!((f64::from(block.tensions[0].over[5]) - more).abs() < 1e-7);
+    }
+
+    fn advance(block: &mut SpringLanes, params: &SpringParams, drag: f32) {
         advance_on(block, params, drag, &[]);
     }
 
-    fn advance_on(block: &mut SpringLanes, params: &StepParams, drag: f32, obstacles: &[Obstacle]) {
+    fn advance_on(
+        block: &mut SpringLanes,
+        params: &SpringParams,
+        drag: f32,
+        obstacles: &[Obstacle],
+    ) {
         for n in &mut block.strands.nodes[1..] {
             for lane in 0..LANES {
                 let v = take3(&n.v, lane) * drag + params.gravity * params.dt;
@@ -499,7 +535,7 @@ mod tests {
     }
 
     #[test]
-    fn a_strand_that_is_torn_across_a_head_comes_back() {
+    fn a_strand_overstretched_across_a_head_comes_back() {
         // All but the root are on the far side, where the springs press them on the head.
         let far = |i: usize| Vec3::new(0.0, -0.091 - 0.03 * i as f32, 0.0);
         let at = |i| if i == 0 { Vec3::Y * 0.091 } else { far(i) };
@@ -526,7 +562,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_turn_with_their_nodes_even_right_round() {
+    fn frames_follow_their_edges_even_when_these_reverse() {
         let mut block = block(3, |lane, i| {
             let tip = [Vec3::X, Vec3::Z, Vec3::NEG_Z][lane % 3];
             (tip * (0.03 * i as f32), Vec3::ZERO)

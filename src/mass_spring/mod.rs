@@ -1,4 +1,4 @@
-//! The wet-hair paper's strand: masses and springs, for comparison and for cheap far hair.
+//! The wet-hair paper's strand: masses and springs, for comparison and for cheap distant hair.
 //!
 //! \[W\] equation 1 with a true damper, springs to the next and to the next-but-one node, stepped so
 //! that no step can blow up. The same forces, droplets, colliders and contacts act on it as on rods.
@@ -17,12 +17,12 @@ setting! {
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct Springs {
-        /// k/m of springs to the next node. A drop weighs fifty times as much as the node that bears
-        /// it.
+        /// k/m of springs to the next node. High, because a drop weighs fifty times as much as the node
+        /// that bears it.
         pub stretch: f32 = 1e7, "1/s²" in STRETCH: 1.0..=1e12, safe 1e4..=1e8,
             "1e7 hardly stretches";
         /// k/m of springs to the next-but-one node, which resist bending. A straight pair of segments
-        /// resists a small bend hardly at all: that is the model's.
+        /// hardly resists a small bend: a property of the model.
         pub bend: f32 = 1e4, "1/s²" in BEND: 0.0..=1e12, safe 0.0..=1e7, "1e4 bends easily";
         /// c/m of the dampers along the springs.
         pub damping: f32 = 10.0, "1/s" in DAMPING: 0.0..=1e6, safe 0.0..=1000.0,

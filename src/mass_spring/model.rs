@@ -1,8 +1,8 @@
-//! Mass-spring strands as mathematics: \[W\] equation 1, stepped without a limit to the step.
+//! Mass-spring strands as pure functions: \[W\] equation 1, stable at any step.
 //!
 //! Print's damper, c |v_b − v_a|, has no sign and feeds energy in; a true one acts on how fast the
 //! spring gets longer. An explicit step of stiff springs blows up beyond √(2m/k), here 1 ms. So each
-//! spring is solved for the end of the step ([`Xpbd`]), on positions (compliant position based
+//! spring is solved for the end of the step (`Xpbd`), on positions (compliant position based
 //! dynamics): the stiffer the spring, the nearer to its length.
 
 use crate::lanes::Real;
@@ -22,11 +22,11 @@ pub fn force(d: Vec3, rate: Vec3, length: f32, stiffness: f32, damping: f32) -> 
 ///
 /// Tensions here are forces times dt², per mass of a node (m): by so much they move a free one.
 #[derive(Clone, Copy, Debug)]
-pub struct Xpbd<R> {
+pub(crate) struct Xpbd<R> {
     inverse_stiffness: R,
     friction: R,
     share: R,
-    /// What a spring itself gives way for each unit of tension, added to its ends' inverse masses.
+    /// Compliance of the spring: its extension per tension, added to its ends' inverse masses.
     pub compliance: R,
 }
 
@@ -46,9 +46,9 @@ impl<R: Real> Xpbd<R> {
         }
     }
 
-    /// How much too long a spring is for the `tension` it has got so far: `stretch` over its length,
-    /// having got longer by `moved` since the step began (m). Divided by what it gives way, ends and
-    /// all, it is the tension that is missing.
+    /// Residual of a spring with the present `tension`: `stretch` is its extension over the rest length,
+    /// `moved` its extension since the step began (m). Divided by compliance plus the ends' inverse
+    /// masses it gives the missing tension.
     #[inline(always)]
     pub fn excess(&self, stretch: R, moved: R, tension: R) -> R {
         self.friction.mul_add(moved, stretch - self.inverse_stiffness * tension) * self.share

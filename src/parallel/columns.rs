@@ -1,4 +1,4 @@
-//! The components of a table, side by side, cut into parts of some rows each.
+//! The component columns of a table, iterated side by side and split into parts of some rows each.
 
 use bevy::ecs::change_detection::{ContiguousMut, ContiguousRef, Tick};
 use core::{
@@ -6,14 +6,14 @@ use core::{
     slice::{Iter, IterMut},
 };
 
-/// What a query has of a table. Mutable components bypass change detection: for us it means that
-/// somebody else wrote.
+/// The columns of a table that a query reads. Mutable components bypass change detection, so that
+/// `Changed` means a write from outside the tick.
 pub(crate) trait Columns: Sized {
     /// Some rows, one after the other.
     type Part: Iterator + Send;
     /// How many rows there are.
     fn rows(&self) -> usize;
-    /// All rows in parts of `rows`, the last of what is left.
+    /// All rows in parts of `rows`; the last part has the remainder.
     fn parts(self, rows: usize) -> impl Iterator<Item = Self::Part>;
 }
 
@@ -94,7 +94,7 @@ impl<C: Columns> Columns for Option<C> {
     }
 }
 
-/// A component that all rows have, or none: then it goes on for as long as the others do.
+/// A component that all rows have, or none: then it yields `None` for every row.
 pub(crate) struct Optional<I>(Option<I>);
 
 impl<I: Iterator> Iterator for Optional<I> {
@@ -164,7 +164,7 @@ mod tests {
     struct Odd;
 
     #[test]
-    fn parts_have_every_row_once_with_what_belongs_to_it() {
+    fn parts_have_every_row_once_with_its_own_components() {
         let mut world = World::new();
         for i in 0..100 {
             let mut entity = world.spawn((Number(i), Twice(0)));

@@ -18,17 +18,17 @@ use {bevy::tasks::ComputeTaskPool, queue::Queue};
 /// The least work of a task, on one thread: to wake a thread for less takes longer than to do it.
 pub(crate) const TASK: Nanos = Nanos(50_000);
 
-/// How many tasks of that size have to be there before threads are woken: to wake one and to be woken by
-/// it at the end takes about two of them.
+/// The least number of such tasks for which other threads are woken: waking one and being woken by it
+/// at the end takes about as long as two tasks.
 #[cfg(feature = "parallel")]
 const WORTH_WAKING: usize = 4;
 
-/// About how long one item takes (ns). Decides whether threads are asked for help, never what comes out.
+/// About how long one item takes (ns). Decides whether other threads are used, never the result.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "parallel"), allow(dead_code, reason = "there is one thread"))]
 pub(crate) struct Nanos(pub(crate) usize);
 
-/// Rows of parts come in multiples of this, so that blocks of lanes fill up.
+/// Parts have a multiple of this many rows, so that blocks of lanes fill up.
 const GRAIN: usize = 16;
 
 /// The most parts that a table is cut into, unless they would be larger than [`MOST_ROWS`].
@@ -37,8 +37,8 @@ const MOST_PARTS: usize = 32;
 /// The most rows of a part.
 const MOST_ROWS: usize = 512;
 
-/// How many strands ahead of the present one memory is asked for: far enough for it to come, near
-/// enough for it not to be pushed out again.
+/// How many strands ahead memory is prefetched: far enough to arrive in time, near enough not to be
+/// evicted again.
 pub(crate) const AHEAD: usize = 6;
 
 /// Calls `work` with every item. Items are independent, so the order cannot matter.
@@ -57,7 +57,7 @@ pub(crate) fn for_each_block<T: Send, S>(
     for_each_init(blocks, each, init, |_| {}, work);
 }
 
-/// The same, with `ahead` called for every block one block before `work`, to ask for its memory.
+/// The same, with `ahead` called for every block one block before `work`, to prefetch it.
 pub(crate) fn for_each_block_ahead<T: Send, S>(
     blocks: &mut [T],
     each: Nanos,
@@ -68,16 +68,16 @@ pub(crate) fn for_each_block_ahead<T: Send, S>(
     for_each_init(blocks, each, init, ahead, work);
 }
 
-/// The tables that a query finds its entities in.
+/// The tables that a query matches.
 pub(crate) fn tables<'a, 's, D: ContiguousQueryData, F: ArchetypeFilter>(
     query: &'a mut Query<'_, 's, D, F>,
 ) -> QueryContiguousIter<'a, 's, D, F> {
     query.contiguous_iter_mut().expect("components of strands lie in tables")
 }
 
-/// Goes through the rows of tables in parts: `work` gets some rows at a time, and scratch space that
-/// `init` makes once a thread. A row takes about `each`. Says what it made of each part, in the order of
-/// the rows. What the parts are does not depend on the number of threads.
+/// Processes the rows of tables in parts: `work` gets some rows at a time, and scratch space that
+/// `init` makes once a thread. A row takes about `each`. Returns the result of each part, in the order
+/// of the rows. Parts do not depend on the number of threads.
 pub(crate) fn for_each_part<C: Columns, S, O: Send>(
     each: Nanos,
     tables: impl Iterator<Item = C>,
@@ -91,7 +91,7 @@ pub(crate) fn for_each_part<C: Columns, S, O: Send>(
     let mut parts: Vec<_> = parts.map(|part| (Some(part), None)).collect();
     for_each_init(
         &mut parts,
-        // Parts are cut to be worth a task each.
+        // Each part is large enough for a task.
         TASK,
         init,
         |_| {},
@@ -102,8 +102,8 @@ pub(crate) fn for_each_part<C: Columns, S, O: Send>(
     parts.into_iter().filter_map(|(_, made)| made).collect()
 }
 
-/// How many of a table's `rows` are one part: worth a task, about equal, and no more than what stays in
-/// the cache.
+/// Rows per part of a table with `rows`: enough work for a task, about equal, and small enough for the
+/// cache.
 fn part_rows(rows: usize, each: Nanos) -> usize {
     let worth = TASK.0.div_ceil(each.0.max(1));
     let most = rows.div_ceil(MOST_PARTS).max(worth).min(MOST_ROWS);
@@ -124,7 +124,7 @@ fn for_each_init<T: Send, S>(
         let workers = pool.thread_num() + 1;
         let least = TASK.0.div_ceil(each.0.max(1));
         if workers > 1 && items.len() >= WORTH_WAKING * least {
-            // More than threads, because some are longer than others.
+            // More chunks than threads, because some take longer than others.
             let chunk = items.len().div_ceil(workers * 8).max(least);
             let chunks = items.len().div_ceil(chunk);
             let queue = Queue::new(items.chunks_mut(chunk));
@@ -148,8 +148,8 @@ fn for_each_init<T: Send, S>(
     in_turn(items, 1, &ahead, |item| work(&mut scratch, item));
 }
 
-/// Calls `work` with one item after the other, and `ahead` with the one that is `distance` later, to
-/// ask for its memory.
+/// Calls `work` with one item after the other, and `ahead` with the one `distance` later, to prefetch
+/// it.
 pub(crate) fn in_turn<T>(
     items: &mut [T],
     distance: usize,
@@ -167,12 +167,12 @@ pub(crate) fn in_turn<T>(
     }
 }
 
-/// The room of a vector whose items are not needed any more, for items that borrow something else. What
-/// is gathered for a substep takes up to megabytes: asked for and given back each time, the system would
-/// make and clear their pages each time.
+/// Reuses the allocation of a vector for items of another lifetime. What is gathered for a substep
+/// takes up to megabytes: allocated anew each time, the operating system would map and clear its pages
+/// each time.
 pub(crate) fn emptied<A, B>(mut items: Vec<A>) -> Vec<B> {
     items.clear();
-    // Collected in place, so that no memory changes hands.
+    // `collect` reuses the allocation in place.
     items.into_iter().filter_map(|_| None).collect()
 }
 
@@ -181,8 +181,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_are_worth_a_task_and_about_equal() {
-        // Too little for two threads is one part, whatever it is made of.
+    fn parts_are_large_enough_for_a_task_and_about_equal() {
+        // Too little work for two threads is one part.
         assert!(part_rows(294, Nanos(200)) >= 294 && part_rows(9, Nanos(10_000)) >= 9);
         assert!(part_rows(0, Nanos(200)) > 0, "parts of nothing");
         for (rows, nanos) in
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vector_keeps_its_room_for_other_items() {
+    fn a_vector_keeps_its_allocation_for_other_items() {
         let mut items: Vec<&u64> = Vec::with_capacity(1000);
         let number = 7;
         items.push(&number);
@@ -207,15 +207,15 @@ mod tests {
     }
 
     #[test]
-    fn memory_of_every_item_is_asked_for_once_and_before_its_turn() {
+    fn every_item_is_prefetched_once_and_before_its_turn() {
         use core::sync::atomic::{AtomicBool, Ordering};
         for count in [0, 1, 5, 6, 7, 500] {
             let mut items: Vec<_> = (0..count).map(|_| AtomicBool::new(false)).collect();
             in_turn(
                 &mut items,
                 AHEAD,
-                |item| assert!(!item.swap(true, Ordering::Relaxed), "asked for twice"),
-                |item| assert!(*item.get_mut(), "not asked for"),
+                |item| assert!(!item.swap(true, Ordering::Relaxed), "prefetched twice"),
+                |item| assert!(*item.get_mut(), "not prefetched"),
             );
         }
     }

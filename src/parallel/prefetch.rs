@@ -1,13 +1,12 @@
-//! Memory that will be read soon, asked for ahead.
+//! Prefetching of memory that will be read soon.
 //!
-//! Strands lie all over the heap. The three hundred cache lines of a block of sixteen take about as long
-//! to come from memory as the block takes to solve, and a processor does not look far enough ahead to
-//! ask for them by itself: with this the projection of ten thousand strands takes 20 to 30 % less time,
-//! the tick of a hundred thousand 12 %. Safe Rust has no way to say so, which makes this the one
-//! place in the crate that is not.
+//! Strands are scattered over the heap. The three hundred cache lines of a block of sixteen take about
+//! as long to load as the block takes to solve, and hardware prefetchers do not see that far ahead: with
+//! this the projection of ten thousand strands takes 20 to 30 % less time, the tick of a hundred
+//! thousand 12 %. Safe Rust has no prefetch, so this is the only unsafe code of the crate.
 #![allow(unsafe_code)]
 
-/// Asks for the memory of `values` without waiting for it. A hint: nothing that a program sees changes.
+/// Prefetches `values` without waiting. Only a hint: results do not change.
 #[inline(always)]
 pub(crate) fn prefetch<T>(values: &[T]) {
     #[cfg(target_arch = "x86_64")]
@@ -28,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn any_slice_may_be_asked_for_and_stays_what_it_was() {
+    fn any_slice_may_be_prefetched_and_stays_unchanged() {
         prefetch::<u64>(&[]);
         prefetch(&[(); 3]);
         for length in 0..200 {

@@ -8,11 +8,11 @@ use core::{
 };
 use std::sync::{Mutex, PoisonError};
 
-/// How long the caller looks whether others have finished before it sleeps until they have. To fall
-/// asleep and be woken takes tens of microseconds, as long as a piece of work.
+/// How long the caller spins for the last pieces before it blocks. Blocking and being woken takes tens
+/// of microseconds, as long as a piece of work.
 const PATIENCE: Duration = Duration::from_micros(200);
 
-/// Pieces of work, each taken by whoever is free first.
+/// Pieces of work, each taken by the next free thread.
 pub(super) struct Queue<I> {
     pieces: Mutex<I>,
     /// How many threads have a piece.
@@ -35,8 +35,8 @@ impl<I: Iterator> Queue<I> {
         self.busy.fetch_sub(1, Ordering::Release);
     }
 
-    /// Waits a while for the others' last pieces. Only saves time: whether they are done has to be asked
-    /// where they were sent.
+    /// Spins for a while until other threads have finished their last pieces. Only saves time: the
+    /// caller still has to join the tasks.
     pub(super) fn wait(&self) {
         let start = Instant::now();
         while self.busy.load(Ordering::Acquire) > 0 && start.elapsed() < PATIENCE {
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_piece_is_taken_once_by_somebody() {
+    fn every_piece_is_taken_exactly_once() {
         let mut items = vec![0u32; 10_000];
         let queue = Queue::new(items.chunks_mut(7));
         std::thread::scope(|scope| {
@@ -63,10 +63,10 @@ mod tests {
     }
 
     #[test]
-    fn nobody_waits_for_ever() {
+    fn waiting_ends() {
         let queue = Queue::new([1, 2].into_iter());
         let start = Instant::now();
-        // As if somebody had a long piece.
+        // As if another thread had a long piece.
         queue.empty(|_| queue.wait());
         assert!(start.elapsed() >= 2 * PATIENCE && queue.busy.load(Ordering::Relaxed) == 0);
     }

@@ -4,7 +4,7 @@ use super::recipe::MAX_ROOTS;
 use crate::{groom::GroomError, setting::InvalidValue};
 use bevy::mesh::PrimitiveTopology;
 
-/// Why hair cannot be planted: which value, what was expected and how to mend it.
+/// Why hair cannot be planted: which value, what was expected and how to fix it.
 #[derive(thiserror::Error, Clone, Debug, PartialEq)]
 pub enum PlantError {
     /// A setting out of its range.
@@ -50,7 +50,7 @@ pub enum PlantError {
         /// The area (m²).
         found: f32,
     },
-    /// A mesh so far from its origin that neighbouring nodes would be one in single precision.
+    /// A mesh so far from its origin that neighbouring nodes would coincide in single precision.
     #[error(
         "vertex {vertex} of the mesh is {found} m from the origin, expected at most {most} m for \
          segments of this length: move the mesh to its origin, or plant fewer nodes"
@@ -63,7 +63,7 @@ pub enum PlantError {
         /// The most that still works (m).
         most: f32,
     },
-    /// A curl that the nodes cannot show.
+    /// A curl too tight for the number of nodes.
     #[error(
         "Planting::nodes is {nodes}, expected {expected} or more: the curl turns {turns:.1} times \
          and needs 4 nodes a turn"
@@ -78,7 +78,7 @@ pub enum PlantError {
     },
     /// More strands than [`MAX_ROOTS`].
     #[error(
-        "{found:.0} strands were asked for, expected at most {MAX_ROOTS}: lower Planting::density \
+        "the density gives {found:.0} strands, expected at most {MAX_ROOTS}: lower Planting::density \
          or mask the mesh, and let followers fill up"
     )]
     TooMany {
@@ -112,7 +112,7 @@ pub enum PlantError {
         /// Bevy's reason.
         reason: String,
     },
-    /// What a groom refuses.
+    /// An error of the groom.
     #[error(transparent)]
     Groom(#[from] GroomError),
 }

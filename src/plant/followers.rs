@@ -1,5 +1,5 @@
-//! Drawn strands at full count, planted by the scalp's own mask: guides are far too few to show a
-//! hairline or a parting.
+//! Drawn strands at full count, planted by the scalp's mask: guides are too few to show a hairline or a
+//! parting.
 
 use super::{
     error::PlantError,
@@ -20,27 +20,27 @@ use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// How far below the skin strands begin (m).
 const BELOW: f32 = 0.3e-3;
-/// Places that are looked at to find out how much of the mesh is scalp.
+/// Samples of the mesh for estimating the share that is scalp.
 const PROBES: usize = 40_000;
-/// The most places that are looked at.
+/// The most samples.
 const MOST: f64 = 2e7;
-/// How far from a parting more strands are drawn (m), and what share of them elsewhere.
+/// Distance from a parting within which strands are drawn at full density (m), and the share elsewhere.
 const PARTED: f32 = 14e-3;
 const ELSEWHERE: f32 = 0.7;
-/// How many guides near a root are looked at.
+/// How many of the nearest guides are candidates for a root.
 const NEAR: usize = 16;
-/// How far from its neighbours' way a baby hair lies (rad, about).
+/// Deviation of a baby hair's direction from its neighbours' (rad, approximately).
 const BABY_TURN: f32 = 0.5;
 
 impl HairPreset {
-    /// Where the drawn strands of a planted preset grow: as many as `count` by the scalp's own mask, few,
-    /// short and fine ones at the hairline, with the lengths of the guides around. Goes on the
+    /// Roots of the drawn strands of a planted preset: up to `count` strands by the scalp's mask, few,
+    /// short and fine ones at the hairline, with the lengths of the guides around. Put the result on the
     /// [`Hair`](crate::Hair) entity with the preset's settings. `planted`, `mesh` and `scalp` are
     /// those of [`plant`](Self::plant).
     ///
     /// ```
     /// # use bevy_keratin::{prelude::*, plant::*}; use bevy::prelude::*;
-    /// # fn grow(mut commands: Commands) -> Result {
+    /// # fn setup(mut commands: Commands) -> Result {
     /// let (head, scalp) = (Sphere::new(0.1).mesh().build(), Scalp::default());
     /// let preset = HairPreset::Long;
     /// let planted = preset.plant(&head, &scalp)?;
@@ -64,13 +64,13 @@ impl HairPreset {
         seed: u64,
     ) -> Result<FollowerRoots, PlantError> {
         let (scalp, hairline) = (scalp.checked()?, hairline.checked()?);
-        let sowing = Sowing { preset: self, scalp, hairline, count, seed };
-        sowing.sow(planted, mesh, &|_| 1.0)
+        let planting = FollowerPlanting { preset: self, scalp, hairline, count, seed };
+        planting.plant(planted, mesh, &|_| 1.0)
     }
 }
 
-/// What is to be sown.
-pub(crate) struct Sowing {
+/// Parameters of the followers to be planted.
+pub(crate) struct FollowerPlanting {
     pub(crate) preset: HairPreset,
     pub(crate) scalp: Scalp,
     pub(crate) hairline: Hairline,
@@ -78,19 +78,19 @@ pub(crate) struct Sowing {
     pub(crate) seed: u64,
 }
 
-/// A strand that is simulated.
-struct Guide {
+/// A simulated strand.
+struct PlantedGuide {
     place: Vec3,
     length: f32,
     /// From root to tip.
     reach: Vec3,
-    /// Which way it is combed.
+    /// Its combing direction.
     comb: Vec3,
 }
 
-impl Sowing {
-    /// Followers between planted guides where `share` leaves them.
-    pub(crate) fn sow(
+impl FollowerPlanting {
+    /// Plants followers between guides, thinned by `share`.
+    pub(crate) fn plant(
         &self,
         planted: &Planted,
         mesh: &Mesh,
@@ -101,8 +101,14 @@ impl Sowing {
         let tree = KdTree::new(guides.iter().map(|guide| guide.place).zip(0u32..));
         let mut random = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x0f01_10e5);
         let growth = |place: &RootPlace| {
-            let behind =
-                self.scalp.behind_hairline(place.position) + self.hairline.break_at(place.position);
+            // Where there is no hairline all is far behind it.
+            let behind = match self.preset.is_everywhere() {
+                true => 1.0,
+                false => {
+                    let at = place.position;
+                    self.scalp.behind_hairline(at) + self.hairline.break_at(at)
+                }
+            };
             let mut growth = self.hairline.growth(behind);
             let share = share(place).clamp(0.0, 1.0) * self.beside_parting(place.position);
             growth.density *= share;
@@ -117,7 +123,7 @@ impl Sowing {
         if mean <= 0.0 || guides.is_empty() {
             return Ok(FollowerRoots::default());
         }
-        // What is drawn beyond the count is left out at the end, evenly.
+        // Surplus roots are removed evenly at the end.
         let drawn = (1.02 * f64::from(self.count) / mean).ceil().min(MOST);
         let mut roots = Vec::with_capacity(self.count as usize + self.count as usize / 8);
         let mut lots = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x4a1b_22c7);
@@ -149,7 +155,7 @@ impl Sowing {
         Ok(FollowerRoots(kept))
     }
 
-    /// Beside a parting there is no hair from farther up to hide the scalp: more is drawn there.
+    /// Density near a parting: higher, because no hair from farther up hides the scalp there.
     fn beside_parting(&self, place: Vec3) -> f32 {
         if !self.preset.is_parted() {
             return 1.0;
@@ -169,13 +175,13 @@ impl Sowing {
         }
     }
 
-    fn guides(&self, planted: &Planted) -> Vec<Guide> {
+    fn guides(&self, planted: &Planted) -> Vec<PlantedGuide> {
         let guide = |points: &[Vec3]| {
             let (first, last) = (points.first()?, points.last()?);
             let length: f32 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-            (length > 0.0).then(|| Guide {
+            (length > 0.0).then(|| PlantedGuide {
                 place: *first,
-                // The length map is taken anew at every root.
+                // Without the length map, which is applied at every follower's root.
                 length: length / self.preset.length_share(&self.scalp, *first).max(1e-3),
                 reach: *last - *first,
                 comb: self.comb(*first),
@@ -184,13 +190,25 @@ impl Sowing {
         planted.groom.strands().filter_map(|strand| guide(strand.points)).collect()
     }
 
-    /// Length and reach of what grows at a place, by the guides around that are combed as it is.
-    fn around(&self, place: &RootPlace, guides: &[Guide], tree: &KdTree) -> Option<(f32, Vec3)> {
+    /// Length and reach of a follower at a place, from the nearby guides with a similar combing
+    /// direction.
+    fn around(
+        &self,
+        place: &RootPlace,
+        guides: &[PlantedGuide],
+        tree: &KdTree,
+    ) -> Option<(f32, Vec3)> {
         let comb = self.comb(place.position);
-        // Locks of guides may reach across a parting; what is drawn there does not.
+        // Locks of guides may reach across a parting; what is drawn there does not. Most of the way is
+        // back and down on both sides, so the sideways part is compared on its own.
+        let [right, ..] = self.scalp.axes();
+        let aside = comb.dot(right);
         let alike = |i: u32| {
             let guide = &guides[i as usize];
-            comb == Vec3::ZERO || (guide.comb.dot(comb) > 0.2 && guide.reach.dot(comb) > 0.0)
+            comb == Vec3::ZERO
+                || (guide.comb.dot(comb) > 0.2
+                    && guide.reach.dot(comb) > 0.0
+                    && (aside.abs() < 0.3 || guide.reach.dot(right) * aside > 0.0))
         };
         let near: Vec<(u32, f32)> = tree.nearest::<NEAR>(place.position).collect();
         let chosen: Vec<&(u32, f32)> = near.iter().filter(|(i, _)| alike(*i)).take(3).collect();
@@ -204,7 +222,7 @@ impl Sowing {
         }
         let share = self.preset.length_share(&self.scalp, place.position);
         let (length, reach) = (length / sum * share, reach / sum);
-        // Where no shape is meant, place alone decides.
+        // Without a combing direction only the distance counts.
         let reach = if comb == Vec3::ZERO { Vec3::ZERO } else { reach };
         (length.is_finite() && length > 0.0 && reach.is_finite()).then_some((length, reach))
     }
@@ -214,7 +232,7 @@ impl Sowing {
 mod tests {
     use super::*;
 
-    fn sown(preset: HairPreset, count: u32) -> (Scalp, FollowerRoots) {
+    fn planted_followers(preset: HairPreset, count: u32) -> (Scalp, FollowerRoots) {
         let mesh = Sphere::new(0.1).mesh().ico(24).unwrap();
         let scalp = Scalp::default();
         let planting = super::super::Planting { density: 0.2e4, ..preset.planting(&scalp) };
@@ -225,7 +243,7 @@ mod tests {
 
     #[test]
     fn followers_fill_the_scalp_and_begin_under_the_skin() {
-        let (scalp, roots) = sown(HairPreset::Straight, 6000);
+        let (scalp, roots) = planted_followers(HairPreset::Straight, 6000);
         assert_eq!(roots.0.len(), 6000);
         for root in &roots.0 {
             let depth = 0.1 - root.place.length();
@@ -233,12 +251,12 @@ mod tests {
             assert!(scalp.behind_hairline(root.place) > -0.012);
             assert!(root.length > 1e-3 && root.length < 0.35 && root.width > 0.3);
         }
-        assert_eq!(roots, sown(HairPreset::Straight, 6000).1);
+        assert_eq!(roots, planted_followers(HairPreset::Straight, 6000).1);
     }
 
     #[test]
     fn hair_falls_to_both_sides_of_a_parting() {
-        let (scalp, roots) = sown(HairPreset::Straight, 6000);
+        let (scalp, roots) = planted_followers(HairPreset::Straight, 6000);
         let [right, _, front] = scalp.axes();
         let (mut wrong, mut all) = (0, 0);
         for root in roots.0.iter().filter(|root| root.length > 0.1) {
@@ -250,13 +268,13 @@ mod tests {
             wrong += u32::from(root.reach.dot(right) * aside < 0.0);
         }
         println!("{wrong} of {all} go to the other side");
-        assert!(all > 50 && wrong * 8 < all, "{wrong} of {all}");
+        assert!(all > 50 && wrong * 50 < all, "{wrong} of {all}");
     }
 
-    /// Density by distance behind the line must be a ramp and the line no line: T13.
+    /// Density must rise gradually behind the line, and the line must be ragged.
     #[test]
-    fn the_hairline_is_a_ramp_of_its_own_and_not_of_the_guides() {
-        let (scalp, roots) = sown(HairPreset::Straight, 40_000);
+    fn the_hairline_is_a_ramp_independent_of_the_guides() {
+        let (scalp, roots) = planted_followers(HairPreset::Straight, 40_000);
         let [_, _, front] = scalp.axes();
         // In front, where lines of equal distance are as long.
         let ahead = |p: Vec3| p.normalize().dot(front) > 0.25 && p.x.abs() < 0.04;
@@ -291,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_without_scalp_grows_nothing_and_bad_settings_are_told() {
+    fn a_mesh_without_scalp_grows_nothing_and_invalid_settings_are_errors() {
         let (head, scalp) = (Sphere::new(0.1).mesh().build(), Scalp::default());
         let planted = HairPreset::Short.plant(&head, &scalp).unwrap();
         let bald = Scalp { recede: 3.0, ..scalp };

@@ -1,9 +1,9 @@
-//! How strands grow from their roots: an axis that is stepped along, and a helix around it.
+//! How strands grow from their roots: an axis integrated in steps, and a helix around it.
 
 use super::{
     map::{PlantingMaps, RootPlace},
-    recipe::{Comb, Curl, CurlPhase, Planting},
-    shell::{Felt, Shell},
+    recipe::{CombPattern, Curl, CurlPhase, Planting},
+    shell::{Shell, SurfaceQuery},
     surface::{Root, Surface},
 };
 use crate::{
@@ -22,8 +22,8 @@ const STEPS_A_TURN: f32 = 24.0;
 const STEPS_A_NODE: u32 = 2;
 const MAX_STEPS: usize = 100_000;
 
-/// What a strand draws by lot.
-struct Lot {
+/// The random numbers of a strand.
+struct StrandRandom {
     length: f32,
     way: Vec3,
     outward: f32,
@@ -40,14 +40,14 @@ pub(super) fn grow(
     roots: &[Root],
 ) -> Vec<Option<Vec<Vec3>>> {
     let leaders = leaders(planting, roots);
-    let lots = lots(planting, maps, surface, roots, &leaders);
+    let draw_random = draw_random(planting, maps, surface, roots, &leaders);
     let steps = steps(planting);
-    let reach = lots.iter().map(|lot| lot.clearance).fold(0.0, f32::max);
-    let shell = planting.fall.map(|fall| Shell::of(surface, reach, 0.6 * fall.over));
+    let reach = draw_random.iter().map(|lot| lot.clearance).fold(0.0, f32::max);
+    let shell = planting.drape.map(|drape| Shell::of(surface, reach, 0.6 * drape.over));
     let axis_of = |i: usize, leader: Option<&[Vec3]>| {
-        axis(planting, &roots[i].place, &lots[i], shell.as_ref(), steps, leader)
+        axis(planting, &roots[i].place, &draw_random[i], shell.as_ref(), steps, leader)
     };
-    // Those in the middle of a lock first, because the others go by them.
+    // Leaders of locks first, because the others follow them.
     let is_leader = |i: usize| leaders[i] == i;
     let mut axes: Vec<Vec<Vec3>> = (0..roots.len())
         .map(|i| if is_leader(i) { axis_of(i, None) } else { Vec::new() })
@@ -57,10 +57,10 @@ pub(super) fn grow(
             axes[i] = axis_of(i, Some(&axes[leaders[i]]));
         }
     }
-    (axes.iter().zip(&lots)).map(|(axis, lot)| finish(planting, axis, lot)).collect()
+    (axes.iter().zip(&draw_random)).map(|(axis, lot)| finish(planting, axis, lot)).collect()
 }
 
-/// For each root the one in the middle of its lock: the nearest of some that are a spacing apart.
+/// For each root the leader of its lock: the nearest of a subset with the given spacing.
 fn leaders(planting: &Planting, roots: &[Root]) -> Vec<usize> {
     let Some(clump) = planting.clump else {
         return (0..roots.len()).collect();
@@ -83,17 +83,17 @@ fn leaders(planting: &Planting, roots: &[Root]) -> Vec<usize> {
     (0..roots.len()).map(|i| if is_middle[i] { i } else { leader(i) }).collect()
 }
 
-fn lots(
+fn draw_random(
     planting: &Planting,
     maps: &PlantingMaps,
     surface: &Surface,
     roots: &[Root],
     leaders: &[usize],
-) -> Vec<Lot> {
+) -> Vec<StrandRandom> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(planting.seed ^ 0x60b0_d4a1);
-    let up = planting.fall.map_or(Vec3::ZERO, |fall| -fall.toward.normalize_or_zero());
+    let up = planting.drape.map_or(Vec3::ZERO, |drape| -drape.toward.normalize_or_zero());
     let lowest = roots.iter().map(|r| r.place.position.dot(up)).fold(f32::MAX, f32::min);
-    let mut lots: Vec<Lot> = Vec::with_capacity(roots.len());
+    let mut draw_random: Vec<StrandRandom> = Vec::with_capacity(roots.len());
     for root in roots {
         // The same number of draws for each strand, so that a setting does not reshuffle the rest.
         let [short, tilt, around, phase, hand, wide, long, layer] =
@@ -117,35 +117,42 @@ fn lots(
             Some(Curl { phase: CurlPhase::Same, .. }) => 0.0,
             _ => phase * TAU,
         };
-        let clearance = planting.fall.map_or(0.0, |fall| {
-            let layers = fall.layering * (place.position.dot(up) - lowest);
-            (fall.clearance + layers * (0.6 + 0.8 * layer)) + curl.map_or(0.0, |c| c.radius)
+        let clearance = planting.drape.map_or(0.0, |drape| {
+            let layers = drape.layering * (place.position.dot(up) - lowest);
+            (drape.clearance + layers * (0.6 + 0.8 * layer)) + curl.map_or(0.0, |c| c.radius)
         });
-        lots.push(Lot { length, way, outward: way.dot(flat), curl, phase, clearance });
+        draw_random.push(StrandRandom {
+            length,
+            way,
+            outward: way.dot(flat),
+            curl,
+            phase,
+            clearance,
+        });
     }
     if planting.curl.is_some_and(|curl| curl.phase == CurlPhase::PerClump) {
         for (i, &leader) in leaders.iter().enumerate() {
-            lots[i].phase = lots[leader].phase;
-            let pitch = lots[leader].curl.map_or(1.0, |curl| curl.pitch);
-            if let Some(curl) = &mut lots[i].curl {
+            draw_random[i].phase = draw_random[leader].phase;
+            let pitch = draw_random[leader].curl.map_or(1.0, |curl| curl.pitch);
+            if let Some(curl) = &mut draw_random[i].curl {
                 curl.pitch = curl.pitch.abs().copysign(pitch);
             }
         }
     }
-    lots
+    draw_random
 }
 
-/// Which way a strand leaves the surface.
+/// The direction in which a strand leaves the surface.
 fn combed(planting: &Planting, maps: &PlantingMaps, place: &RootPlace) -> Vec3 {
     let comb = maps.direction_at(place).unwrap_or_else(|| match planting.comb {
-        Comb::Out => Vec3::ZERO,
-        Comb::Along(along) => along,
-        Comb::Whorl { center, turn } => {
+        CombPattern::Out => Vec3::ZERO,
+        CombPattern::Along(along) => along,
+        CombPattern::Whorl { center, turn } => {
             let away = place.position - center;
             let away = away.reject_from_normalized(place.normal).normalize_or_zero();
             Quat::from_axis_angle(place.normal, turn) * away
         }
-        Comb::Parted { at, across, along } => {
+        CombPattern::Parted { at, across, along } => {
             let side = (place.position - at).dot(across);
             across * if side < 0.0 { -1.0 } else { 1.0 } + along
         }
@@ -164,7 +171,7 @@ fn jittered(way: Vec3, angle: f32, around: f32) -> Vec3 {
     (way + (x * cosine + y * sine) * tan(angle.min(1.5))).normalize_or(way)
 }
 
-/// The same way with an outward part.
+/// The direction with at least a small outward component.
 fn off_the_scalp(way: Vec3, normal: Vec3) -> Vec3 {
     const LEAST: f32 = 0.1;
     let out = way.dot(normal);
@@ -175,7 +182,7 @@ fn off_the_scalp(way: Vec3, normal: Vec3) -> Vec3 {
     (along * (1.0 - LEAST * LEAST).sqrt() + normal * LEAST).normalize_or(normal)
 }
 
-/// How many steps every axis has.
+/// The number of steps of every axis.
 fn steps(planting: &Planting) -> usize {
     let between_nodes = ((planting.nodes - 1) * STEPS_A_NODE) as usize;
     let turns = planting.curl.map_or(0.0, |curl| {
@@ -186,7 +193,7 @@ fn steps(planting: &Planting) -> usize {
     between_nodes.max((turns * STEPS_A_TURN) as usize).min(MAX_STEPS)
 }
 
-/// How long an axis is for a strand of that length (m), with some to spare.
+/// The length of an axis for a strand of `length` (m), with some margin.
 fn axis_length(length: f32, curl: Option<&Curl>) -> f32 {
     curl.map_or(length, |curl| {
         let pitch = curl.pitch.abs();
@@ -198,7 +205,7 @@ fn axis_length(length: f32, curl: Option<&Curl>) -> f32 {
 fn axis(
     planting: &Planting,
     place: &RootPlace,
-    lot: &Lot,
+    lot: &StrandRandom,
     shell: Option<&Shell>,
     steps: usize,
     leader: Option<&[Vec3]>,
@@ -208,15 +215,15 @@ fn axis(
     let mut way = lot.way;
     let mut points = Vec::with_capacity(steps + 1);
     points.push(place.position);
-    let mut felt = Felt::default();
+    let mut query = SurfaceQuery::default();
     for i in 0..steps {
         let from = points[i];
-        if let Some(fall) = planting.fall {
-            way = (way + fall.toward.normalize_or_zero() * (step / fall.over)).normalize_or(way);
+        if let Some(drape) = planting.drape {
+            way = (way + drape.toward.normalize_or_zero() * (step / drape.over)).normalize_or(way);
         }
         let mut go = way;
         if let Some(leader) = leader {
-            // So that what is left of the distance is 1 − strength · share².
+            // So that the remaining distance is 1 − strength · share².
             let share = i as f32 / steps as f32;
             let lead = leader[i + 1] - leader[i];
             let along = lead.normalize_or(way);
@@ -227,12 +234,12 @@ fn axis(
         }
         let mut next = from + go * step;
         if let Some(shell) = shell {
-            // It rises to its layer little by little: hair is flat where it parts.
+            // The clearance grows gradually: hair lies flat at its roots.
             let clearance = lot.clearance.min(0.4 * step * (i + 1) as f32);
-            if let Some((depth, off)) = shell.depth(next, clearance, &mut felt) {
+            if let Some((depth, off)) = shell.depth(next, clearance, &mut query) {
                 go = (next + off * depth - from).normalize_or(off);
                 next = from + go * step;
-                // Along the surface: what it was pushed by does not throw it off.
+                // Along the surface, so that the push does not bend it outward.
                 way = (go - off * go.dot(off).max(0.0) * 0.5).normalize_or(go);
             }
         }
@@ -241,8 +248,8 @@ fn axis(
     points
 }
 
-/// Curled, cut and brought to the number of nodes.
-fn finish(planting: &Planting, axis: &[Vec3], lot: &Lot) -> Option<Vec<Vec3>> {
+/// Curls, cuts and resamples an axis to the number of nodes.
+fn finish(planting: &Planting, axis: &[Vec3], lot: &StrandRandom) -> Option<Vec<Vec3>> {
     let segments = (planting.nodes - 1) as usize;
     let curled = lot.curl.map(|curl| curled(axis, &curl, lot));
     let line = curled.as_deref().unwrap_or(axis);
@@ -255,12 +262,12 @@ fn finish(planting: &Planting, axis: &[Vec3], lot: &Lot) -> Option<Vec<Vec3>> {
         }
     }
     let segment = length / segments as f32;
-    // Too short to be told apart from its root.
+    // Too short for distinct nodes.
     (segment > 10.0 * MIN_SEGMENT).then(|| resampled(line, segment, segments))
 }
 
 /// The helix around an axis.
-fn curled(axis: &[Vec3], curl: &Curl, lot: &Lot) -> Vec<Vec3> {
+fn curled(axis: &[Vec3], curl: &Curl, lot: &StrandRandom) -> Vec<Vec3> {
     let tangent = |i: usize| {
         let (a, b) = (axis[i.saturating_sub(1)], axis[(i + 1).min(axis.len() - 1)]);
         (b - a).normalize_or(lot.way)
@@ -277,7 +284,7 @@ fn curled(axis: &[Vec3], curl: &Curl, lot: &Lot) -> Vec<Vec3> {
             along = next;
             let passed = step * i as f32;
             let angle = lot.phase + TAU * passed / curl.pitch;
-            // It grows out of the root, and no faster than its axis leaves the scalp.
+            // The radius grows from the root on, no faster than the axis leaves the scalp.
             let grown = (passed / grown_over).min(1.0);
             let grown = sin(grown * FRAC_PI_2);
             let radius = (curl.radius * grown * grown).min(0.7 * lot.outward * passed);
@@ -287,7 +294,7 @@ fn curled(axis: &[Vec3], curl: &Curl, lot: &Lot) -> Vec<Vec3> {
         .collect()
 }
 
-/// `segments` pieces of that length along the line; what is missing goes straight on.
+/// Resamples a line to `segments` pieces of that length, extended straight if it is too short.
 fn resampled(line: &[Vec3], segment: f32, segments: usize) -> Vec<Vec3> {
     let mut points = Vec::with_capacity(segments + 1);
     points.push(line[0]);

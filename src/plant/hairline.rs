@@ -1,34 +1,34 @@
 //! The hairline: how hair begins.
 
-#![cfg_attr(not(feature = "render"), allow(dead_code, reason = "what is drawn asks for it"))]
+#![cfg_attr(not(feature = "render"), allow(dead_code, reason = "used by drawn strands only"))]
 
 use super::scalp::Scalp;
-use crate::setting::setting;
+use crate::setting::{Ranged, setting};
 use bevy::{math::ops::sin, prelude::*};
 use core::f32::consts::TAU;
 
 setting! {
-    /// How hair begins behind the line where the [`Scalp`] ends: few, short, fine hairs first, and the
-    /// line itself is not a line. Of drawn strands; guides grow by [`Scalp::fade`].
+    /// How hair begins at the edge of the [`Scalp`]: few, short, fine hairs first, along a ragged line.
+    /// Applies to drawn strands; guides use [`Scalp::fade`].
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
     pub struct Hairline {
-        /// Over what distance behind the line density rises to all.
+        /// Distance behind the line over which density rises to its full value.
         pub density_over: f32 = 16e-3, "m" in DENSITY_OVER: 0.0..=10.0, safe 0.0..=0.05,
             "0.012 to 0.02 are natural";
         /// Density at the line, a share.
         pub least_density: f32 = 0.25, in LEAST_DENSITY: 0.0..=1.0, "0.25 is natural";
-        /// Over what distance behind the line lengths rise to all.
+        /// Distance behind the line over which length rises to its full value.
         pub length_over: f32 = 15e-3, "m" in LENGTH_OVER: 0.0..=10.0, safe 0.0..=0.05,
             "0.015 is natural";
-        /// Length at the line, as a share of what grows behind it.
+        /// Length at the line, as a share of the full length.
         pub least_length: f32 = 0.4, in LEAST_LENGTH: 0.01..=1.0, safe 0.05..=1.0,
             "0.4 is long hair, 0.1 a fade";
-        /// Width at the line, a share; it rises as lengths do.
+        /// Width at the line, as a share of the full width; it rises with length.
         pub least_width: f32 = 0.6, in LEAST_WIDTH: 0.05..=1.0, safe 0.3..=1.0, "0.6 is natural";
-        /// How far the line is broken to and fro.
+        /// Amplitude of the line's irregularity.
         pub ragged: f32 = 3e-3, "m" in RAGGED: 0.0..=1.0, safe 0.0..=0.01, "0.003 is natural";
-        /// Baby hairs about the line, as a share of the full density.
+        /// Density of baby hairs around the line, as a share of the full density.
         pub baby_hair: f32 = 0.35, in BABY_HAIR: 0.0..=1.0, "0.35 is natural";
         /// The longest baby hairs; the shortest have a fifth of that.
         pub baby_length: f32 = 22e-3, "m" in BABY_LENGTH: 1e-4..=1.0, safe 2e-3..=0.05,
@@ -36,7 +36,7 @@ setting! {
     }
 }
 
-/// What grows at a place, as shares of what grows behind.
+/// Growth at a place, relative to that far behind the hairline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Growth {
     pub(super) density: f32,
@@ -46,13 +46,13 @@ pub(super) struct Growth {
     pub(super) baby: f32,
 }
 
-/// Baby hairs grow from so far before the line to so far behind it (m).
+/// Baby hairs grow between these distances behind the line (m).
 const BABY_BAND: (f32, f32) = (-3e-3, 9e-3);
 /// Width of baby hairs: 0.04 mm of 0.07 mm.
 pub(super) const BABY_WIDTH: f32 = 0.57;
 
 impl Hairline {
-    /// What grows `behind` (m) the line; `before` it where that is below 0.
+    /// Growth at a distance `behind` the line (m), negative in front of it.
     pub(super) fn growth(&self, behind: f32) -> Growth {
         let rise = |over: f32, least: f32| least + (1.0 - least) * smooth(behind / over.max(1e-9));
         let is_in = behind >= 0.0;
@@ -66,9 +66,9 @@ impl Hairline {
         }
     }
 
-    /// How far the line is broken inward or outward at a place (m).
+    /// Offset of the ragged line at a place (m).
     pub(super) fn break_at(&self, place: Vec3) -> f32 {
-        // Several waves of some millimetres, none of which divides another.
+        // Several incommensurable waves of some millimetres.
         let waves = [
             (Vec3::new(0.62, 0.31, 0.72), 6.1e-3),
             (Vec3::new(-0.71, 0.55, 0.44), 8.3e-3),
@@ -81,18 +81,19 @@ impl Hairline {
 }
 
 impl Scalp {
-    /// How far behind the hairline a place of the head is, along its surface (m, about); below 0
-    /// before it.
+    /// How far behind the hairline a place of the head is, along its surface (m, approximately);
+    /// negative in front of it.
     pub fn behind_hairline(&self, place: Vec3) -> f32 {
         let (around, above) = self.beyond_hairline(place);
-        // Where the line is steep it is nearer than it is below.
+        // Where the line is steep its distance is less than the vertical one.
         let slope = self.hairline_slope(around);
         above * place.distance(self.center) / (1.0 + slope * slope).sqrt()
     }
 
-    /// Tints the skin under the hair by the share of it that hair hides, `cover`, where hair is dense:
-    /// the mesh's vertex colours are mixed with half of `hair`, the hair's own colour
-    /// ([`Melanin::color`](crate::render::Melanin::color)). A mesh without colours is given white ones.
+    /// Tints the skin under the hair: the mesh's vertex colours are mixed with half of `hair`, the hair's
+    /// colour ([`Melanin::color`](crate::render::Melanin::color)), by `cover`, the share of the skin that
+    /// dense hair hides, 0…1. A mesh without colours gets white ones first. Values of `hairline` and
+    /// `cover` out of their ranges are clamped; a mesh without positions stays as it is.
     ///
     /// ```
     /// # use bevy_keratin::plant::*; use bevy::prelude::*;
@@ -114,10 +115,11 @@ impl Scalp {
             return;
         };
         let half = Vec3::new(hair.red, hair.green, hair.blue) * 0.5;
+        let (hairline, cover) = (hairline.clamped(), cover.clamp(0.0, 1.0));
         for (color, place) in colors.iter_mut().zip(places) {
             let behind = self.behind_hairline(place);
-            // Fuller than the hair itself is: what lies there shades the skin as well.
-            let share = smooth(behind / hairline.density_over.max(1e-9)) * cover.clamp(0.0, 1.0);
+            // More than the roots there alone: hair that lies over the place shades the skin, too.
+            let share = smooth(behind / hairline.density_over.max(1e-9)) * cover;
             let skin = Vec4::from(*color);
             *color = skin.truncate().lerp(half, share).extend(skin.w).to_array();
         }

@@ -1,9 +1,9 @@
-//! Maps: what differs from place to place.
+//! Maps: properties that vary over the mesh.
 
 use super::error::PlantError;
 use bevy::prelude::*;
 
-/// A place on a mesh, as maps see it.
+/// A place on a mesh, the input of maps.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct RootPlace {
@@ -19,7 +19,7 @@ pub struct RootPlace {
 
 type Map<'a, T> = Option<&'a dyn Fn(&RootPlace) -> T>;
 
-/// What differs from place to place: functions of a [`RootPlace`], each optional. Masks painted as
+/// Properties that vary over the mesh: functions of a [`RootPlace`], each optional. Masks painted as
 /// [`vertex_color`] or as an [`ImageMap`] are such functions.
 ///
 /// ```
@@ -41,8 +41,8 @@ impl<'a> PlantingMaps<'a> {
         Self::default()
     }
 
-    /// Shares of [`Planting::density`](super::Planting::density), 0…1; what lies outside is taken as
-    /// the nearest, what is not a number as 0.
+    /// Shares of [`Planting::density`](super::Planting::density), 0…1; values outside are clamped, NaN
+    /// counts as 0.
     pub fn density(mut self, map: &'a dyn Fn(&RootPlace) -> f32) -> Self {
         self.density = Some(map);
         self
@@ -62,11 +62,11 @@ impl<'a> PlantingMaps<'a> {
     }
 
     pub(super) fn density_at(&self, place: &RootPlace) -> f32 {
-        share(self.density, place)
+        clamped_share(self.density, place)
     }
 
     pub(super) fn length_at(&self, place: &RootPlace) -> f32 {
-        share(self.length, place)
+        clamped_share(self.length, place)
     }
 
     pub(super) fn direction_at(&self, place: &RootPlace) -> Option<Vec3> {
@@ -74,7 +74,7 @@ impl<'a> PlantingMaps<'a> {
     }
 }
 
-fn share(map: Map<'_, f32>, place: &RootPlace) -> f32 {
+fn clamped_share(map: Map<'_, f32>, place: &RootPlace) -> f32 {
     let share = map.map_or(1.0, |map| map(place));
     if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
 }
@@ -134,7 +134,7 @@ impl ImageMap {
                     .get_color_at(x, y)
                     .map_err(|e| PlantError::Image { reason: e.to_string() })?;
                 let painted = match color {
-                    // Data images count as they are, pictures as they look.
+                    // Linear images are read as data, others as sRGB brightness.
                     Color::LinearRgba(linear) => linear.to_f32_array(),
                     other => other.to_srgba().to_f32_array(),
                 };
@@ -162,7 +162,7 @@ impl ImageMap {
     }
 
     /// The map as a function for [`PlantingMaps`]; nothing where the mesh has no UVs.
-    pub fn share(&self) -> impl Fn(&RootPlace) -> f32 + '_ {
+    pub fn mask(&self) -> impl Fn(&RootPlace) -> f32 + '_ {
         |place| place.uv.map_or(0.0, |uv| self.at(uv))
     }
 }

@@ -30,18 +30,20 @@ mod surface;
 
 pub use error::PlantError;
 #[cfg(feature = "render")]
-pub(crate) use followers::Sowing;
+pub(crate) use followers::FollowerPlanting;
 pub use hairline::Hairline;
 pub use map::{ImageMap, MapChannel, PlantingMaps, RootPlace, vertex_color};
 pub(crate) use place::{SurfacePoint, surface_points};
 pub use planting::{Planted, RootOnMesh};
 pub use preset::{HairPreset, PresetSettings};
-pub use recipe::{Clump, Comb, Curl, CurlPhase, Cut, Fall, HUMAN_DENSITY, MAX_ROOTS, Planting};
+pub use recipe::{
+    Clump, CombPattern, Curl, CurlPhase, Cut, Drape, HUMAN_DENSITY, MAX_ROOTS, Planting,
+};
 pub use scalp::Scalp;
 
 use bevy::prelude::*;
 
-/// Registers what planting is told for reflection: inspectors, scene files.
+/// Registers the settings of planting for reflection: inspectors, scene files.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PlantPlugin;
 

@@ -5,7 +5,7 @@ use crate::grid::KdTree;
 use bevy::prelude::*;
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// How many triangles are looked at for each place: those with the nearest middles.
+/// How many triangles are tested for each place: those with the nearest centroids.
 const LOOKED_AT: usize = 24;
 
 impl RootOnMesh {

@@ -17,7 +17,7 @@ pub struct RootOnMesh {
     pub weights: Vec3,
 }
 
-/// What planting gives.
+/// The result of planting.
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct Planted {
@@ -32,7 +32,8 @@ impl Planting {
     /// Directions follow its normals, where it has some.
     ///
     /// Spacing is even: density is met within a per cent, and no two roots are nearer than half the
-    /// mean spacing 1/√density. Where surfaces lie on each other within that, the latter goes first.
+    /// mean spacing 1/√density. Where surfaces overlap within that distance, the minimum distance takes
+    /// precedence over density.
     ///
     /// # Errors
     /// When a setting is out of its range, the mesh has no triangles with an area or vertices that
@@ -55,7 +56,7 @@ impl Planting {
         let mut planted = Planted::default();
         let (mut kept, mut uvs) = (Vec::with_capacity(lines.len()), Vec::new());
         for (root, line) in roots.iter().zip(lines) {
-            // The length map leaves places bald, too.
+            // Length 0 leaves places bald, too.
             let Some(line) = line else {
                 continue;
             };
@@ -88,7 +89,7 @@ impl Planting {
         Ok(())
     }
 
-    /// Nodes must be told apart in single precision, however far the mesh is from its origin.
+    /// Neighbouring nodes must differ in single precision, however far the mesh is from its origin.
     fn check_reach(&self, surface: &Surface) -> Result<(), PlantError> {
         let segment = self.length / (self.nodes - 1) as f32;
         let most = segment * 1e5;

@@ -5,12 +5,15 @@ use super::{
     hairline::Hairline,
     map::{PlantingMaps, RootPlace},
     planting::Planted,
-    recipe::{Clump, Comb, Curl, CurlPhase, Cut, Fall, Planting},
+    recipe::{Clump, CombPattern, Curl, CurlPhase, Cut, Drape, HUMAN_DENSITY, Planting},
     scalp::Scalp,
 };
 #[cfg(feature = "render")]
 use crate::render::{HairFollowers, HairLook, Melanin};
-use crate::{AirDrag, HairSolver, LockContact, Stiffness, Sweeps, setting::Ranged};
+use crate::{
+    AirDrag, HairSolver, HairStiffness, HairWetting, LockContact, Settling, Sweeps,
+    look::WornPreset, setting::Ranged,
+};
 use bevy::prelude::*;
 
 /// A head of hair: how it is planted, how stiff it is and how it looks.
@@ -22,7 +25,7 @@ use bevy::prelude::*;
 ///
 /// ```
 /// # use bevy_keratin::{prelude::*, plant::*}; use bevy::prelude::*;
-/// # fn grow(mut commands: Commands) -> Result {
+/// # fn setup(mut commands: Commands) -> Result {
 /// let head = Sphere::new(0.1).mesh().build();
 /// let planted = HairPreset::Wavy.plant(&head, &Scalp::default())?;
 /// let hair = commands.spawn((Hair, HairPreset::Wavy.settings())).id();
@@ -50,14 +53,17 @@ pub enum HairPreset {
     Bob,
     /// Straight down the back.
     Long,
+    /// Short fur of 15 mm, combed from front to back and down, that covers all of any mesh: it has no
+    /// hairline. Cheap guides, 50 per dm², and twice as many drawn strands as on a head.
+    Fur,
 }
 
-/// What a [`HairPreset`] puts on the [`Hair`](crate::Hair) entity.
+/// The settings of a [`HairPreset`], a bundle for the [`Hair`](crate::Hair) entity.
 #[derive(Bundle, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct PresetSettings {
     /// How stiff it is.
-    pub stiffness: Stiffness,
+    pub stiffness: HairStiffness,
     /// How it swings.
     pub drag: AirDrag,
     /// How it is solved.
@@ -66,18 +72,40 @@ pub struct PresetSettings {
     pub sweeps: Sweeps,
     /// How its strands keep apart.
     pub contact: LockContact,
+    /// How it wets, with as many fibres in a strand as grow around a guide.
+    pub wetting: HairWetting,
+    /// It settles before it is first drawn.
+    pub settling: Settling,
     /// How it looks.
     #[cfg(feature = "render")]
     pub look: HairLook,
-    /// What is drawn between the guides.
+    /// The strands drawn between the guides.
     #[cfg(feature = "render")]
     pub followers: HairFollowers,
 }
 
 impl HairPreset {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Straight, Self::Wavy, Self::Curly, Self::Coily, Self::Short, Self::Bob, Self::Long];
+    pub const ALL: [Self; 8] = [
+        Self::Straight,
+        Self::Wavy,
+        Self::Curly,
+        Self::Coily,
+        Self::Short,
+        Self::Bob,
+        Self::Long,
+        Self::Fur,
+    ];
+
+    /// Its name, as in [`WornPreset`].
+    pub fn name(self) -> String {
+        format!("{self:?}")
+    }
+
+    /// The preset of this name, `None` where there is none.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|preset| preset.name() == name)
+    }
 
     /// Plants it on a head's mesh, which may have neck and shoulders for hair to lie on. Settings are
     /// in metres: the mesh is of life size.
@@ -120,7 +148,8 @@ impl HairPreset {
         share: &dyn Fn(&RootPlace) -> f32,
     ) -> Result<Planted, PlantError> {
         let scalp = &scalp.checked()?;
-        let density = |place: &RootPlace| scalp.share(place.position) * share(place);
+        let on_scalp = |at: Vec3| if self.is_everywhere() { 1.0 } else { scalp.density(at) };
+        let density = |place: &RootPlace| on_scalp(place.position) * share(place);
         let length = |place: &RootPlace| self.length_share(scalp, place.position);
         let direction = |place: &RootPlace| self.direction(scalp, place.position);
         let mut maps = PlantingMaps::new().density(&density).length(&length);
@@ -131,9 +160,26 @@ impl HairPreset {
     }
 }
 
+impl WornPreset {
+    /// Hair of a preset as it is.
+    pub fn of(preset: HairPreset) -> Self {
+        Self { name: preset.name(), ..Self::default() }
+    }
+
+    /// Which preset it is; `None` where none of that name is known.
+    pub fn preset(&self) -> Option<HairPreset> {
+        HairPreset::named(&self.name)
+    }
+}
+
 impl HairPreset {
     pub(super) fn is_parted(self) -> bool {
-        !matches!(self, Self::Short | Self::Coily)
+        !matches!(self, Self::Short | Self::Coily | Self::Fur)
+    }
+
+    /// Whether it grows on all of a mesh, not behind a hairline.
+    pub(crate) fn is_everywhere(self) -> bool {
+        self == Self::Fur
     }
 
     /// How hair begins at the hairline of its drawn strands.
@@ -153,7 +199,7 @@ impl HairPreset {
     pub(super) fn aside(self, scalp: &Scalp, place: Vec3) -> f32 {
         let [right, _, front] = scalp.axes();
         let off = (place - scalp.center) / scalp.height;
-        // No comb draws a straight line: 3 mm to and fro.
+        // A natural parting is a zigzag of 3 mm.
         let zigzag = ((off.dot(front) * 7.0).rem_euclid(2.0) - 1.0).abs() - 0.5;
         let parting = if self == Self::Bob { -0.22 } else { 0.0 } + 0.05 * zigzag;
         (off.dot(right) - parting) * scalp.height
@@ -185,9 +231,9 @@ impl HairPreset {
     pub fn planting(self, scalp: &Scalp) -> Planting {
         let [right, up, front] = scalp.axes();
         let crown = scalp.place(0.05, 0.9, -0.35);
-        let fall =
-            Fall { toward: -up - front * 0.15, over: 0.035, clearance: 5e-3, layering: 0.07 };
-        let parted = Comb::Parted { at: scalp.center, across: right, along: -front * 0.4 };
+        let drape =
+            Drape { toward: -up - front * 0.15, over: 0.035, clearance: 5e-3, layering: 0.07 };
+        let parted = CombPattern::Parted { at: scalp.center, across: right, along: -front * 0.4 };
         let base = Planting {
             density: 0.35e4,
             nodes: 20,
@@ -197,7 +243,7 @@ impl HairPreset {
             lean: 1.2,
             jitter: 0.06,
             clump: Some(Clump { spacing: 25e-3, strength: 0.25 }),
-            fall: Some(fall),
+            drape: Some(drape),
             ..default()
         };
         let curl = |radius, pitch, phase| Some(Curl { radius, pitch, variation: 0.12, phase });
@@ -211,7 +257,7 @@ impl HairPreset {
                 nodes: 28,
                 curl: curl(6e-3, 60e-3, CurlPhase::PerClump),
                 clump: Some(Clump { spacing: 22e-3, strength: 0.35 }),
-                fall: Some(Fall { layering: 0.12, ..fall }),
+                drape: Some(Drape { layering: 0.12, ..drape }),
                 ..base
             },
             Self::Curly => Planting {
@@ -221,7 +267,7 @@ impl HairPreset {
                 lean: 0.9,
                 curl: curl(7e-3, 26e-3, CurlPhase::PerStrand),
                 clump: None,
-                fall: Some(Fall { over: 0.05, layering: 0.2, ..fall }),
+                drape: Some(Drape { over: 0.05, layering: 0.2, ..drape }),
                 ..base
             },
             Self::Coily => Planting {
@@ -229,12 +275,12 @@ impl HairPreset {
                 length: 0.17,
                 length_variation: 0.15,
                 nodes: 36,
-                comb: Comb::Out,
+                comb: CombPattern::Out,
                 lean: 0.0,
                 jitter: 0.25,
                 curl: curl(3.5e-3, 9e-3, CurlPhase::PerStrand),
                 clump: None,
-                fall: None,
+                drape: None,
                 ..base
             },
             Self::Short => Planting {
@@ -242,18 +288,18 @@ impl HairPreset {
                 length: 0.065,
                 length_variation: 0.2,
                 nodes: 10,
-                comb: Comb::Whorl { center: crown, turn: 0.5 },
+                comb: CombPattern::Whorl { center: crown, turn: 0.5 },
                 lean: 1.2,
                 jitter: 0.12,
                 clump: Some(Clump { spacing: 14e-3, strength: 0.25 }),
-                fall: Some(Fall { over: 0.09, clearance: 4e-3, layering: 0.03, ..fall }),
+                drape: Some(Drape { over: 0.09, clearance: 4e-3, layering: 0.03, ..drape }),
                 ..base
             },
             Self::Bob => Planting {
                 length: 0.32,
                 length_variation: 0.04,
                 nodes: 18,
-                fall: Some(Fall { layering: 0.09, ..fall }),
+                drape: Some(Drape { layering: 0.09, ..drape }),
                 // Higher in front, where the way down is longer: it hangs in one line.
                 cut: Some(Cut {
                     at: scalp.place(0.0, -0.9, 0.0),
@@ -264,10 +310,22 @@ impl HairPreset {
                 ..base
             },
             Self::Long => Planting { density: 0.3e4, length: 0.5, nodes: 28, ..base },
+            Self::Fur => Planting {
+                density: 0.5e4,
+                length: 0.015,
+                length_variation: 0.25,
+                nodes: 4,
+                comb: CombPattern::Along(-front - up * 0.5),
+                lean: 0.95,
+                jitter: 0.15,
+                clump: Some(Clump { spacing: 12e-3, strength: 0.3 }),
+                drape: None,
+                ..base
+            },
         }
     }
 
-    /// What goes on the [`Hair`](crate::Hair) entity with it.
+    /// The settings for the [`Hair`](crate::Hair) entity.
     pub fn settings(self) -> PresetSettings {
         // A bare fibre has 0.045 m; hair holds together and stands better.
         let bending_length = match self {
@@ -277,13 +335,22 @@ impl HairPreset {
             Self::Curly => 0.085,
             Self::Coily => 0.2,
             Self::Short => 0.12,
+            Self::Fur => 0.05,
         };
+        // Tufts of fur are too short to reach across each other.
+        let contact = match self {
+            Self::Fur => LockContact { strength: 0.0, ..default() },
+            _ => LockContact::default(),
+        };
+        let fibres = HUMAN_DENSITY / self.planting(&Scalp::default()).density;
         PresetSettings {
-            stiffness: Stiffness { bending_length, ..default() },
+            stiffness: HairStiffness { bending_length, ..default() },
             drag: AirDrag { rate: 3.0 },
             solver: HairSolver::default(),
             sweeps: Sweeps { internal_damping: 4.0, ..default() },
-            contact: LockContact::default(),
+            contact,
+            wetting: HairWetting { fibres, ..default() },
+            settling: Settling::default(),
             #[cfg(feature = "render")]
             look: self.look(),
             #[cfg(feature = "render")]
@@ -308,6 +375,13 @@ impl HairPreset {
             Self::Short => HairLook { melanin: Melanin::DARK_BROWN, gloss: 0.6, ..base },
             Self::Bob => HairLook { melanin: Melanin::BLACK, roughness: 0.32, ..base },
             Self::Long => HairLook { melanin: Melanin::BLOND, variation: 0.25, ..base },
+            Self::Fur => HairLook {
+                melanin: Melanin::AUBURN,
+                variation: 0.3,
+                roughness: 0.45,
+                width: 0.12e-3,
+                ..base
+            },
         }
     }
 
@@ -332,7 +406,7 @@ impl HairPreset {
                 parting: 2.5,
                 ..base
             },
-            // Curls of neighbours blended would be none: each follows its nearest.
+            // Blending neighbouring curls would straighten them: each follows its nearest guide.
             Self::Curly => HairFollowers {
                 segments: 64,
                 locks: Vec3::new(0.2, 0.75, 0.6),
@@ -381,6 +455,16 @@ impl HairPreset {
                 lock_length_variation: 0.1,
                 flyaways: 0.02,
                 length_variation: 0.2,
+                ..base
+            },
+            Self::Fur => HairFollowers {
+                count: 80_000,
+                segments: 6,
+                locks: Vec3::new(0.2, 0.3, 0.2),
+                lock_spacing: Vec3::new(0.012, 0.006, 0.003),
+                frizz: 0.1e-3,
+                stray: 1e-3,
+                length_variation: 0.3,
                 ..base
             },
         }

@@ -47,12 +47,12 @@ setting! {
         pub length_variation: f32 = 0.1, in LENGTH_VARIATION: 0.0..=0.95, safe 0.0..=0.9,
             "0.1 is natural";
         /// Which way strands are combed.
-        pub comb: Comb = Comb::Out => Ranged::clamp_values;
+        pub comb: CombPattern = CombPattern::Out => Ranged::clamp_values;
         /// How far strands lean from the surface's normal the way they are combed; never flat, so
         /// that they leave the scalp. Hair on a head leans by about 1.
         pub lean: f32 = 0.0, "rad" in LEAN: 0.0..=1.45, safe 0.0..=1.4,
             "0 stands on the surface; flatter than 1.45 strands would run into it";
-        /// How far a strand's own direction may be off.
+        /// Random deviation of a strand's direction.
         pub jitter: f32 = 0.08, "rad" in JITTER: 0.0..=1.5, safe 0.0..=1.0,
             "0.08 is combed, 0.5 wild";
         /// Curls; `None` is straight.
@@ -60,9 +60,32 @@ setting! {
         /// Locks, whose tips draw together.
         pub clump: Option<Clump> = None => Ranged::clamp_values;
         /// How strands turn and lie down over the mesh; with `None` each grows straight on.
-        pub fall: Option<Fall> = None => Ranged::clamp_values;
+        pub drape: Option<Drape> = None => Ranged::clamp_values;
         /// Where strands are cut.
         pub cut: Option<Cut> = None => Ranged::clamp_values;
+    }
+}
+
+impl Planting {
+    /// How much lower a [`Cut`] is than before, as a share of what hair gets longer.
+    const CUT_GOES_ALONG: f32 = 0.5;
+    /// The fewest segments of a strand that is made shorter.
+    const FEWEST_SEGMENTS: f32 = 6.0;
+
+    /// The same with strands so many times as long, in segments as long as before. A cut goes along by
+    /// half of what they get longer.
+    #[must_use]
+    pub fn lengthened(self, times: f32) -> Self {
+        let segments = self.nodes.saturating_sub(1) as f32;
+        let fewest = segments.min(Self::FEWEST_SEGMENTS);
+        let longer = self.length * (times - 1.0) * Self::CUT_GOES_ALONG;
+        let cut = self.cut.map(|cut| Cut {
+            at: cut.at - cut.normal.normalize_or_zero() * longer,
+            least: cut.least * times,
+            ..cut
+        });
+        let nodes = (segments * times).ceil().max(fewest) as u32 + 1;
+        Self { length: self.length * times, nodes, cut, ..self }
     }
 }
 
@@ -70,7 +93,7 @@ setting! {
 /// ([`PlantingMaps::direction`](super::PlantingMaps::direction)) goes before it.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
-pub enum Comb {
+pub enum CombPattern {
     /// Not at all: straight out of the surface.
     #[default]
     Out,
@@ -90,26 +113,26 @@ pub enum Comb {
         at: Vec3,
         /// The plane's normal; its length weighs against `along`.
         across: Vec3,
-        /// What is added on both sides, such as a little to the back.
+        /// A direction that is added on both sides, such as a little to the back.
         along: Vec3,
     },
 }
 
-impl Ranged for Comb {
+impl Ranged for CombPattern {
     fn clamp_values(&mut self, violations: &mut Violations) {
         const TURN: ValueRange =
-            ValueRange::new("Comb::Whorl::turn (rad)", -1e3..=1e3, "0 is away, π/2 around");
+            ValueRange::new("CombPattern::Whorl::turn (rad)", -1e3..=1e3, "0 is away, π/2 around");
         match self {
             Self::Out => {}
-            Self::Along(along) => direction("Comb::Along", along, violations),
+            Self::Along(along) => direction("CombPattern::Along", along, violations),
             Self::Whorl { center, turn } => {
-                place("Comb::Whorl::center (m)", center, violations);
+                place("CombPattern::Whorl::center (m)", center, violations);
                 TURN.clamp(turn, || 0.0, violations);
             }
             Self::Parted { at, across, along } => {
-                place("Comb::Parted::at (m)", at, violations);
-                direction("Comb::Parted::across", across, violations);
-                place("Comb::Parted::along", along, violations);
+                place("CombPattern::Parted::at (m)", at, violations);
+                direction("CombPattern::Parted::across", across, violations);
+                place("CombPattern::Parted::along", along, violations);
             }
         }
     }
@@ -187,14 +210,14 @@ setting! {
 }
 
 setting! {
-    /// How strands turn toward a direction as they grow, as hair does that is heavy or combed down. They
-    /// keep off the mesh on their way, at rest already.
+    /// How strands turn toward a direction as they grow, like heavy hair or hair combed down. Their rest
+    /// shape already keeps off the mesh.
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
-    pub struct Fall {
+    pub struct Drape {
         /// Where they turn.
-        pub toward: Vec3 = Vec3::NEG_Y => |way, violations| direction("Fall::toward", way, violations);
-        /// Over what length they turn there.
+        pub toward: Vec3 = Vec3::NEG_Y => |way, violations| direction("Drape::toward", way, violations);
+        /// Length over which they turn there.
         pub over: f32 = 0.03, "m" in OVER: 1e-4..=1e6, safe 0.002..=10.0, "0.03 is soft hair";
         /// How far off the mesh they stay.
         pub clearance: f32 = 4e-3, "m" in CLEARANCE: 0.0..=1e3, safe 0.0..=0.1,

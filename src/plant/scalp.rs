@@ -30,7 +30,7 @@ setting! {
         /// How much higher the hairline is, as an angle at the centre: a high forehead above 0, a low
         /// one below.
         pub recede: f32 = 0.0, "rad" in RECEDE: -3.2..=3.2, safe -0.2..=0.3, "0 is an adult's";
-        /// Over what angle at the centre density fades out at the hairline.
+        /// Angle at the centre over which density fades out at the hairline.
         pub fade: f32 = 0.1, "rad" in FADE: 0.0..=3.2, safe 0.0..=0.5, "0.1 is soft";
     }
 }
@@ -68,9 +68,9 @@ impl Scalp {
     }
 
     /// The share of full density at a place, 0…1.
-    pub fn share(&self, place: Vec3) -> f32 {
+    pub fn density(&self, place: Vec3) -> f32 {
         let (_, above) = self.beyond_hairline(place);
-        // A fade of nothing is a sharp line.
+        // Without fade the line is sharp.
         let share = (above / self.fade.max(1e-6)).clamp(0.0, 1.0);
         if share.is_nan() { 0.0 } else { share * share * (3.0 - 2.0 * share) }
     }
@@ -92,7 +92,7 @@ impl Scalp {
     /// The scalp as a density map.
     pub fn mask(&self) -> impl Fn(&RootPlace) -> f32 + use<> {
         let scalp = *self;
-        move |place| scalp.share(place.position)
+        move |place| scalp.density(place.position)
     }
 }
 

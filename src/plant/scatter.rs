@@ -1,7 +1,7 @@
 //! Even spacing: many candidates, of which the most crowded go one by one.
 //!
 //! Weighted sample elimination after Yuksel 2015 ("Sample Elimination for Generating Poisson Disk
-//! Sample Sets"), with distances that shrink where the density map asks for less.
+//! Sample Sets"), with distances that adapt to the density map.
 
 use super::{
     error::PlantError,
@@ -37,7 +37,7 @@ pub(super) fn scatter(
     if drawn > MAX_DRAWN {
         return Err(PlantError::TooMany { found: unmasked });
     }
-    // Whole strata, or density would be off on meshes with few strands.
+    // Whole strata; otherwise density would be wrong on meshes with few strands.
     let share = unmasked / drawn;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut choice = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x5eed_0f3a);
@@ -64,7 +64,7 @@ pub(super) fn scatter(
     let kept = eliminate(&candidates, density, wanted);
     let least = 0.5 / density.sqrt();
     let roots = apart(kept.into_iter().map(|i| candidates[i].0).collect(), least);
-    // Neighbours are solved side by side: what one of them touches, all have to look at.
+    // Spatial order, because neighbours are solved side by side and share their contacts.
     let places: Vec<_> = roots.iter().map(|root| root.place.position).collect();
     Ok(compact_groups(&places, LANES).into_iter().map(|i| roots[i as usize]).collect())
 }
@@ -99,7 +99,7 @@ fn eliminate(candidates: &[(Root, f32)], density: f32, wanted: usize) -> Vec<usi
         let Some(top) = heap.pop() else {
             break;
         };
-        // Weights only fall, so an entry that is too heavy is put back where it belongs.
+        // Weights only decrease, so an outdated entry is pushed back with its present weight.
         if top.weight > weights[top.index] {
             heap.push(entry(top.index, weights[top.index]));
             continue;
@@ -114,8 +114,7 @@ fn eliminate(candidates: &[(Root, f32)], density: f32, wanted: usize) -> Vec<usi
     (0..candidates.len()).filter(|i| is_left[*i]).collect()
 }
 
-/// Without those that are nearer than `least` (m) to one before: there are some only where surfaces
-/// lie on each other.
+/// Removes roots nearer than `least` (m) to an earlier one; these exist only where surfaces overlap.
 fn apart(roots: Vec<Root>, least: f32) -> Vec<Root> {
     let mut grid = UniformGrid::default();
     grid.build(least, roots.iter().map(|r| r.place.position).zip(0u32..));

@@ -1,4 +1,4 @@
-//! How far off a mesh a point is, near it: for strands that lie on it.
+//! Distance to a mesh near its surface, for strands that lie on it.
 
 use super::surface::Surface;
 use crate::grid::{KdTree, UniformGrid};
@@ -6,16 +6,16 @@ use bevy::prelude::*;
 use core::cell::Cell;
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// Points by which the mesh is felt.
+/// Number of sample points of the mesh.
 const POINTS: usize = 40_000;
 
 /// Over how many points in a row normals are smoothed at most.
 const MOST_SMOOTH: f32 = 6.0;
 
-/// Of so many points one is in the coarse search, which finds where the fine one begins.
+/// One of so many points is in the coarse search, which gives the start of the fine one.
 const COARSE: usize = 8;
 
-/// Steps of a fine search at most; two are the rule.
+/// The most steps of a fine search; usually two.
 const MOST_STEPS: usize = 64;
 
 /// Points all over a surface with its normals.
@@ -23,9 +23,9 @@ pub(super) struct Shell {
     points: Vec<(Vec3, Vec3)>,
     /// How far apart they are (m).
     spacing: f32,
-    /// Beyond this the surface is not felt (m).
+    /// Distance beyond which the surface has no effect (m).
     reach: f32,
-    /// Some of the points.
+    /// The coarse points.
     coarse: KdTree,
     /// Finds a point's neighbours.
     fine: UniformGrid,
@@ -33,14 +33,14 @@ pub(super) struct Shell {
     around: UniformGrid,
     /// How far these are away at most (m).
     smooth: f32,
-    /// The mean normals that were asked for: strands feel a small part of most meshes.
+    /// Cache of mean normals: strands come near only a small part of most meshes.
     means: Vec<Cell<Option<Vec3>>>,
 }
 
-/// What a strand felt last: the next step is near it.
+/// Result of a strand's last query, where the next one starts.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Felt {
-    /// Where the whole surface was searched, and how far from there that holds (m).
+pub(super) struct SurfaceQuery {
+    /// Point of the last coarse search, and the distance from there within which it stays valid (m).
     at: Vec3,
     holds: f32,
     /// The nearest point.
@@ -48,7 +48,7 @@ pub(super) struct Felt {
 }
 
 impl Shell {
-    /// A shell that is felt up to `reach` (m). Its normals are means over about `smooth` (m): hair
+    /// A shell that acts up to `reach` (m). Its normals are means over about `smooth` (m): hair
     /// that bends over that length slides over an ear and does not follow its rim.
     pub(super) fn of(surface: &Surface, reach: f32, smooth: f32) -> Self {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
@@ -75,36 +75,38 @@ impl Shell {
         }
     }
 
-    /// How far `point` is short of being `clearance` (m) off the surface, and which way is off.
-    /// `felt` is of the step before.
+    /// How much nearer than `clearance` (m) `point` is to the surface, and the direction away from it.
+    /// `query` is the result of the previous step.
     pub(super) fn depth(
         &self,
         point: Vec3,
         clearance: f32,
-        felt: &mut Felt,
+        query: &mut SurfaceQuery,
     ) -> Option<(f32, Vec3)> {
-        // Whatever else comes near is as far as this by then, less the way: half of it is left.
+        // Another part of the surface cannot be nearer until the point has moved half this distance.
         let most = 8.0 * self.spacing;
-        if point.distance(felt.at) >= felt.holds {
+        if point.distance(query.at) >= query.holds {
             let none = (u32::MAX, (self.reach + most).powi(2));
             let (found, square) = self.coarse.nearer_than(point, none);
-            felt.nearest = (found != u32::MAX).then_some(found as usize);
-            felt.at = point;
-            felt.holds = (0.5 * square.sqrt()).clamp(self.spacing, most);
+            query.nearest = (found != u32::MAX).then_some(found as usize);
+            query.at = point;
+            query.holds = (0.5 * square.sqrt()).clamp(self.spacing, most);
         }
-        let nearest = self.walk(point, felt.nearest?);
-        felt.nearest = Some(nearest);
+        let nearest = self.walk(point, query.nearest?);
+        query.nearest = Some(nearest);
         let place = self.points[nearest].0;
         let square = point.distance_squared(place);
         let normal = self.normal(nearest);
         let height = (point - place).dot(normal);
-        // Beside the surface, beyond its rim, nothing is in the way.
+        // Beyond the rim of an open surface there is nothing to avoid.
         let beside = (square - height * height).max(0.0).sqrt();
         let depth = clearance - height;
         (depth > 0.0 && beside < 3.0 * self.spacing).then_some((depth, normal))
     }
 
-    /// From a point of the surface over its neighbours to the one that is nearest to `to`.
+    /// Walks from a point of the surface over its neighbours to the one nearest to `to`. Successive
+    /// queries of a strand are close together, so a few steps on the grid from the previous result are
+    /// cheaper than a search in a k-d tree of all points; the coarse tree is needed only for the start.
     fn walk(&self, to: Vec3, from: usize) -> usize {
         let square = |i: usize| to.distance_squared(self.points[i].0);
         let mut best = (square(from), from);
@@ -136,7 +138,7 @@ impl Shell {
             let square = place.distance_squared(other) / (radius * radius).max(1e-12);
             sum += turned * (1.0 - square).max(0.0);
         });
-        // Sheets that lie back to back cancel each other.
+        // Normals of opposite sheets cancel.
         let mean = sum.normalize_or(normal);
         let mean = if mean.dot(normal) > 0.0 { mean } else { normal };
         self.means[i].set(Some(mean));

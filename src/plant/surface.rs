@@ -55,7 +55,7 @@ impl Surface {
         if kept.is_empty() {
             return Err(PlantError::NoArea { found: 0.0 });
         }
-        // An attribute that does not go with the vertices or is odd in type counts as absent.
+        // An attribute of wrong length or type counts as absent.
         let count = positions.len();
         let fits = |values: &&Values| values.len() == count;
         let normals = match attribute(mesh, Mesh::ATTRIBUTE_NORMAL)?.filter(fits) {
@@ -121,7 +121,7 @@ impl Surface {
         let normal = self.normals.as_ref().map_or(flat, |normals| {
             let [a, b, c] = corners.map(|v| normals[v]);
             let smooth = (a * weights.x + b * weights.y + c * weights.z).normalize_or(flat);
-            // Painted normals may look anywhere; hair must not grow inward.
+            // Custom normals may point anywhere; hair must not grow inward.
             if smooth.is_finite() && smooth.dot(flat) > 0.2 { smooth } else { flat }
         });
         let uv = self.uvs.as_ref().map(|uvs| {

@@ -1,8 +1,8 @@
 //! Water as beads: small clear drops, all of them one draw call.
 //!
-//! Every frame [`HairBeads`] is filled with the [`Droplet`]s; others may be added to it. What is in it
-//! is drawn, stretched along the way it flies. Each bead is a square that faces the eye, on which a
-//! sphere is shaded; the squares are counted by a mesh and pulled from one buffer, as ribbons are.
+//! Every frame [`HairBeads`] is filled with the [`Droplet`]s; others may be added to it. Beads are drawn
+//! stretched along their velocity. Each bead is a camera-facing square on which a sphere is shaded; the
+//! squares are pulled from one buffer by vertex index, as ribbons are.
 
 use super::sets::{HairRenderSystems, Interpolate, supported};
 use crate::{Droplet, DropletRules, HairGravity, setting::Ranged, water::model::ball_radius};
@@ -51,7 +51,7 @@ impl Bead {
         Self { position, radius: ball_radius(volume), velocity }
     }
 
-    /// As the shader reads it: 32 bytes. Beads that are not finite are none.
+    /// As the shader reads it: 32 bytes. Non-finite beads have radius 0.
     fn packed(&self) -> PackedBead {
         let [x, y, z] = self.position.to_array();
         let [u, v, w] = self.velocity.to_array();
@@ -77,8 +77,8 @@ pub struct HairBeadSystems;
 const SINKING: f32 = 0.06;
 const SUNK: f32 = 0.6;
 
-/// Droplets where they are between two ticks. Lying ones are caps, not balls: the lower part is in what
-/// they lie on; and smaller the more of them has run off.
+/// Droplets interpolated between two ticks. Lying ones are sunk into the surface as caps, and shrink as
+/// they run off.
 pub(super) fn show_droplets(
     mut beads: ResMut<HairBeads>,
     droplets: Query<&Droplet>,
@@ -105,7 +105,7 @@ pub(super) fn show_droplets(
         }
         let sunk = SUNK * (drop.lying / SINKING).min(1.0);
         let left = (1.0 - drop.lying / longest).clamp(0.0, 1.0).sqrt();
-        // It stands on what is under it as it shrinks; water that sinks goes to the sides.
+        // The cap stays on the surface as it shrinks.
         let position = position + down * (radius * (1.0 - left * (1.0 - sunk)));
         Bead { position, radius: radius * left * (1.0 + 0.3 * sunk), velocity: Vec3::ZERO }
     }));
@@ -113,7 +113,7 @@ pub(super) fn show_droplets(
 
 type PackedBead = [f32; 8];
 
-/// The beads as they are drawn: a buffer with room for more, so that few frames allocate.
+/// The buffer of drawn beads, with spare capacity so that few frames reallocate.
 #[derive(Resource, Default)]
 struct DrawnBeads {
     packed: Vec<PackedBead>,
@@ -163,14 +163,14 @@ impl Material for BeadMaterial {
         descriptor.vertex.buffers = vec![layout.0.get_layout(&[CORNER.at_shader_location(0)])?];
         descriptor.primitive.cull_mode = None;
         if let Some(fragment) = &mut descriptor.fragment {
-            // Light that falls through the drop glows on its far side.
+            // Light refracted through the drop lights its far side.
             fragment.shader_defs.push("STANDARD_MATERIAL_DIFFUSE_TRANSMISSION".into());
         }
         Ok(())
     }
 }
 
-/// Called once all that there is of a renderer has been added.
+/// Called in `Plugin::finish`, when all render plugins have been added.
 pub(super) fn finish(app: &mut App) {
     embedded_asset!(app, "beads.wgsl");
     app.add_plugins(MaterialPlugin::<BeadMaterial>::default());
@@ -192,7 +192,7 @@ fn pack(
     mut bounds: Query<&mut Aabb>,
 ) {
     let count = beads.len().min(MOST);
-    // The first bead brings the rest along.
+    // Mesh and material are spawned with the first bead.
     if !beads.is_changed() || (count == 0 && drawn.entity.is_none()) {
         return;
     }
@@ -231,7 +231,7 @@ fn pack(
     drawn.entity = Some(commands.spawn(parts).id());
 }
 
-/// A buffer made in this frame is not there yet and brings its beads along.
+/// Writes the beads to the GPU. A buffer created in this frame is uploaded with its contents instead.
 fn upload(
     drawn: Extract<Option<Res<DrawnBeads>>>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
@@ -241,7 +241,7 @@ fn upload(
         return;
     };
     let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
-    // Not in the frame in which a new device's queue stands beside buffers of a lost one.
+    // Not in the frame in which a new device's queue is combined with buffers of a lost one.
     if let Some(gpu) = buffers.get(&drawn.buffer)
         && !queue.is_changed()
         && gpu.buffer.size() == bytes.len() as u64
@@ -250,7 +250,7 @@ fn upload(
     }
 }
 
-/// A mesh of nothing but counted corners: four for each bead.
+/// A mesh of only corner indices: four for each bead.
 fn quads(count: u32) -> Mesh {
     let indices = (0..count).flat_map(|i| [0, 1, 2, 2, 1, 3].map(|corner| 4 * i + corner));
     Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
@@ -263,7 +263,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bead_holds_its_volume_and_a_broken_one_is_none() {
+    fn a_bead_has_its_volume_and_a_non_finite_one_is_not_drawn() {
         let bead = Bead::of_volume(Vec3::X, 4.0 / 3.0 * core::f64::consts::PI * 8e-9, Vec3::Y);
         assert!((bead.radius - 2e-3).abs() < 1e-8);
         assert_eq!(Bead::of_volume(Vec3::X, -1.0, Vec3::Y).radius, 0.0);

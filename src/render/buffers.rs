@@ -1,4 +1,4 @@
-//! What a hair hands to the GPU: its nodes in every frame, guides and drawn strands once.
+//! The GPU buffers of a hair: nodes in every frame, guides and drawn strands once.
 
 use super::drawn_strand::DrawnStrand;
 use crate::{
@@ -42,16 +42,16 @@ pub struct HairBuffers {
 /// A node as the shader reads it: 32 bytes.
 pub(super) type PackedNode = [u32; 8];
 
-/// Hair farther from its own origin than this (m) is as broken as hair at NaN.
+/// Nodes farther from the hair's origin than this (m) count as invalid, like NaN.
 const FAR: f32 = 1e6;
 
 fn usable(p: Vec3) -> bool {
     p.is_finite() && p.abs().max_element() < FAR
 }
 
-/// Packs a guide's nodes into `out`, one each; `known` says that `out` holds those of the frame
-/// before. Unusable nodes take the place of the node before them; a guide with none left is not
-/// shown. Gives the box around what was packed.
+/// Packs a guide's nodes into `out`, one each; `known` if `out` holds those of the previous frame.
+/// Invalid nodes take the place of the node before them; a guide without valid nodes is not shown.
+/// Returns the box around the packed nodes.
 pub(super) fn pack_guide(
     out: &mut [PackedNode],
     known: bool,
@@ -74,16 +74,16 @@ pub(super) fn pack_guide(
             last = p;
         }
         (low, high) = (low.min(last), high.max(last));
-        let strain_above = strand.rest_lengths().get(i).map(|l| {
-            let length = strand.positions()[i].distance(strand.positions()[i + 1]);
-            (length / l - 1.0).abs()
-        });
+        // User code may have shortened a list of the strand since the last tick.
+        let ends = strand.positions().get(i).zip(strand.positions().get(i + 1));
+        let strain_above = (strand.rest_lengths().get(i).zip(ends))
+            .map(|(length, (a, b))| (a.distance(*b) / length - 1.0).abs());
         let strain = match (strain_below, strain_above) {
             (Some(a), Some(b)) => 0.5 * (a + b),
             (a, b) => a.or(b).unwrap_or(0.0),
         };
         strain_below = strain_above;
-        // The tip has no joint: it shows the last one's. Hair not yet ticked has all bonds closed.
+        // The tip has no joint: it shows the last one's. Before the first tick all bonds are closed.
         let joint = bonds.joints.get(i).or(bonds.joints.last());
         let rates = joint.map_or([1.0; 4], |j| j.rates);
         let moisture = wet.get(i).copied().unwrap_or(0.0);
@@ -109,18 +109,18 @@ pub(super) fn pack_guide(
     first.map(|_| (low, high))
 }
 
-/// Motion is packed in these units per m, so that what a frame moves lies well within an f16.
+/// Units per m of packed motion, so that the motion of a frame is well within the range of f16.
 const MOTION_UNITS: f32 = 1024.0;
 
-/// Where a packed node is.
+/// The position of a packed node.
 pub(super) fn packed_place(node: &PackedNode) -> Vec3 {
     Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
 }
 
-/// The nearest f16s, two in a word. NaN becomes 0; what is too large the largest.
+/// The nearest f16s, two in a word. NaN becomes 0; too large values become the largest.
 fn halves(x: [f32; 6]) -> [u32; 3] {
     let most = f16::MAX.to_f32_const();
-    // Eight are converted by one instruction where there is one.
+    // Eight at a time, for which some targets have an instruction.
     let mut all = [0.0; 8];
     for (to, x) in all.iter_mut().zip(x) {
         *to = if x.is_nan() { 0.0 } else { x.clamp(-most, most) };

@@ -44,7 +44,7 @@ pub fn guide_point(nodes: &[Vec3], share: f32) -> CurvePoint {
     }
 }
 
-/// What a guide is made of, root first.
+/// The nodes of a guide, root first.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Guide<'a> {
     /// Its nodes, in the hair's frame (m).
@@ -53,11 +53,10 @@ pub struct Guide<'a> {
     pub moisture: &'a [f32],
 }
 
-/// The strands that are drawn for guides that stand as `guides` (their nodes, root first): the guides,
-/// then the followers.
+/// The drawn strands for `guides` (their nodes, root first): the guides, then the followers.
 pub fn drawn_strands(
     guides: &[&[Vec3]],
-    given: Option<&FollowerRoots>,
+    follower_roots: Option<&FollowerRoots>,
     followers: &HairFollowers,
 ) -> Vec<DrawnStrand> {
     let root = |nodes: &&[Vec3]| {
@@ -72,7 +71,7 @@ pub fn drawn_strands(
         }
     };
     let roots: Vec<_> = guides.iter().map(root).collect();
-    scatter(&roots, given, followers)
+    scatter(&roots, follower_roots, followers)
 }
 
 /// The point at `t` (0 root, 1 tip) of a drawn strand, in the hair's frame; `guide` gives the guides
@@ -84,7 +83,7 @@ pub fn strand_point<'a>(
     followers: &HairFollowers,
 ) -> CurvePoint {
     let reach = strand.length.min(1.0) - strand.phase;
-    // What is longer than its guides is like them, but larger.
+    // A strand longer than its guides has their shape, scaled.
     let larger = strand.length.max(1.0);
     let eased = eased(t);
     let share = strand.phase * eased.value + t * reach;
@@ -161,16 +160,16 @@ struct Rising {
     rate: f32,
 }
 
-/// The share of the length over which a strand leaves its root for where its phase puts it.
+/// The share of the length over which a strand blends from its root to its phase-shifted curve.
 const EASE: f32 = 0.2;
 
-/// How far it has left it at `t`.
+/// The blend weight at `t`.
 fn eased(t: f32) -> Rising {
     let u = (t / EASE).clamp(0.0, 1.0);
     Rising { value: u * (2.0 - u), rate: 2.0 * (1.0 - u) / EASE }
 }
 
-/// What its locks do to a strand, with the derivatives.
+/// The offset of a strand by its locks, with the derivatives.
 #[derive(Clone, Copy, Debug)]
 struct Locks {
     root: Vec3,
@@ -179,7 +178,7 @@ struct Locks {
     rates: [f32; 3],
 }
 
-/// Every level draws what the levels before have left.
+/// Every level acts on the distance that the previous levels have left.
 fn locks_at(strand: &DrawnStrand, t: f32, followers: &HairFollowers) -> Locks {
     let gone = t.max(1e-4).powf(followers.lock_shape);
     let rising = followers.lock_shape * gone / t.max(1e-4);
@@ -203,26 +202,26 @@ fn locks_at(strand: &DrawnStrand, t: f32, followers: &HairFollowers) -> Locks {
     locks
 }
 
-/// Waves whose sum has no divergence, as curl noise has none: ways they run, ways they lean (at right
-/// angles to that), waves in a length, and where they begin.
+/// Waves whose sum is free of divergence, as curl noise is: direction, polarisation (perpendicular to
+/// it), waves per length, and phase.
 const WAVES: [(Vec3, Vec3, f32, f32); 4] = [
     (Vec3::new(0.8, 0.6, 0.0), Vec3::new(0.0, 0.0, 1.0), 1.0, 0.0),
     (Vec3::new(0.0, 0.8, 0.6), Vec3::new(1.0, 0.0, 0.0), 1.31, 0.37),
     (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 1.0, 0.0), 0.77, 0.71),
     (Vec3::new(0.48, -0.64, 0.6), Vec3::new(0.8, 0.6, 0.0), 1.13, 0.13),
 ];
-/// Where in the noise a strand goes, for each metre of its length.
+/// The path of a strand through the noise, per metre of its length.
 const THROUGH: Vec3 = Vec3::new(0.6, 0.8, -1.4);
-/// Lengths of the waves (m), and their heights as a share.
+/// Wavelengths (m), and relative amplitudes.
 const OCTAVES: [(f32, f32); 2] = [(12e-3, 0.7), (3e-3, 0.18)];
 
-/// How far frizz puts a strand off its way.
+/// The offset of a strand by frizz.
 fn frizz_at(strand: &DrawnStrand, root: Vec3, t: f32, most: f32) -> CurvePoint {
     use core::f32::consts::TAU;
     let height = most * t.max(1e-4).powf(1.3);
     let rising = 1.3 * height / t.max(1e-4);
     let place = root + THROUGH * (strand.size * t);
-    // Neighbours wave nearly alike.
+    // Neighbours have nearly equal frizz.
     let own = 0.2 * lot(strand.seed.wrapping_add(31));
     let mut sum = CurvePoint::default();
     for (length, share) in OCTAVES {
@@ -260,7 +259,7 @@ fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::drawn_strand::ToMiddle;
+    use super::super::drawn_strand::LockOffset;
     use super::*;
 
     const BENT: [Vec3; 4] = [
@@ -330,7 +329,7 @@ mod tests {
     #[test]
     fn the_slope_of_locks_frizz_and_phase_is_the_derivative() {
         let other: Vec<Vec3> = BENT.iter().map(|p| *p * 1.2 + Vec3::Z * 0.01).collect();
-        let lock = |x: f32| ToMiddle {
+        let lock = |x: f32| LockOffset {
             root: Vec3::new(x, 0.002, -x) * 0.01,
             weights: [-0.2 * x, 0.3 * x, -0.1 * x],
         };

@@ -1,7 +1,7 @@
-//! From strands to what is drawn, once a frame.
+//! Packs strands for drawing, once a frame.
 
 use super::{
-    HairFollowers, HairLook, HairView, WetLook,
+    HairFollowers, HairView, WetLook,
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     drawn_strand::{DrawnStrand, GuideRoot},
     follower_roots::FollowerRoots,
@@ -13,7 +13,9 @@ use super::{
 use crate::{
     Moisture,
     bond::Bonds,
+    look::{HairDye, HairLook, Streaks},
     setting::Settings,
+    settle::Settling,
     strand::{Hair, Strand, StrandHistory, Strands},
 };
 use bevy::{
@@ -23,15 +25,15 @@ use bevy::{
     render::{renderer::RenderDevice, storage::ShaderBuffer},
 };
 
-/// What was packed for a hair, kept so that nothing is allocated again.
+/// Packed data of a hair, kept to reuse the allocations.
 #[derive(Component, Clone, Debug, Default)]
 pub(super) struct Packed {
     pub(super) nodes: Vec<PackedNode>,
-    layout: Vec<Guide>,
-    /// Where guides grew when the layout was new: given roots of followers are of that time.
+    layout: Vec<PackedGuide>,
+    /// Roots of guides when the layout was made: `FollowerRoots` refer to these.
     roots: Vec<GuideRoot>,
     followers: Option<HairFollowers>,
-    /// Whether roots are elsewhere than when followers were laid.
+    /// Whether roots have moved since followers were laid out.
     roots_moved: bool,
     thickness: Thickness,
     /// How far apart guides grow (m).
@@ -40,15 +42,19 @@ pub(super) struct Packed {
     margin: f32,
     ribbon: Ribbon,
     key: RibbonKey,
+    /// Where drawn strands grow at rest: what streaks go by.
+    places: Vec<Vec3>,
+    /// The streaks that the GPU has.
+    streaks: Vec<Option<Streaks>>,
 }
 
 /// A strand that is a guide.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Guide {
+struct PackedGuide {
     strand: Entity,
     /// How many nodes it has.
     nodes: u32,
-    /// Where its root was when followers were laid (m).
+    /// Where its root was when followers were laid out (m).
     root: Vec3,
 }
 
@@ -60,7 +66,7 @@ type GuideParts = (
     Option<&'static WetLook>,
 );
 
-/// Hair that appeared, and hair that is no more.
+/// Prepares new hair for drawing, and cleans up removed hair.
 pub(super) fn appear(
     mut commands: Commands,
     hairs: Query<Entity, (With<Hair>, Without<Packed>)>,
@@ -77,22 +83,26 @@ pub(super) fn appear(
     }
 }
 
-/// Packs all nodes where they are drawn in this frame; when the groom has changed, what depends on
-/// it is made anew.
+/// Packs all nodes at their drawn positions; when the groom has changed, everything that depends on it is
+/// rebuilt.
 pub(super) fn pack(
     mut commands: Commands,
-    mut hairs: Query<(
-        Entity,
-        &mut Packed,
-        Option<&HairBuffers>,
-        Option<&Strands>,
-        Option<Ref<FollowerRoots>>,
-        &GlobalTransform,
-    )>,
+    mut hairs: Query<
+        (
+            Entity,
+            &mut Packed,
+            Option<&HairBuffers>,
+            Option<&Strands>,
+            Option<Ref<FollowerRoots>>,
+            &GlobalTransform,
+        ),
+        Without<Settling>,
+    >,
     mut shorn: RemovedComponents<FollowerRoots>,
     strands: Query<GuideParts>,
     mut drawn: Query<(&mut Aabb, &MeshMaterial3d<RibbonMaterial>)>,
-    (looks, views, followers): (Settings<HairLook>, Settings<HairView>, Settings<HairFollowers>),
+    (looks, dyes, views): (Settings<HairLook>, Settings<HairDye>, Settings<HairView>),
+    followers: Settings<HairFollowers>,
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
     device: Option<Res<RenderDevice>>,
     mut meshes: ResMut<Assets<Mesh>>,
@@ -105,17 +115,17 @@ pub(super) fn pack(
     };
     let new_device = device.is_some_and(|device| device.is_changed());
     let shorn: Vec<Entity> = shorn.read().collect();
-    for (hair, mut packed, buffers, members, given, place) in &mut hairs {
+    for (hair, mut packed, buffers, members, follower_roots, place) in &mut hairs {
         let packed = packed.bypass_change_detection();
         let guides = || members.into_iter().flat_map(|m| m.iter());
         let settings = followers.of(hair);
         let mut regroomed = packed.note_layout(guides(), &strands, &settings);
-        regroomed |= given.as_ref().map_or(shorn.contains(&hair), Ref::is_changed);
+        regroomed |= follower_roots.as_ref().map_or(shorn.contains(&hair), Ref::is_changed);
 
         let bounds = packed.pack_nodes(&strands, overstep, !regroomed);
         let (low, high) = bounds.unwrap_or_default();
         let around = |margin: f32| Aabb::from_min_max(low - margin, high + margin);
-        let look = looks.of(hair);
+        let (look, dye) = (looks.of(hair), dyes.of(hair));
         let view = views.of(hair);
         let key = RibbonKey::new(&look, view);
 
@@ -129,49 +139,52 @@ pub(super) fn pack(
         }
         if !regroomed && let Some(((mut bounds, material), buffers)) = known {
             bounds.set_if_neq(around(packed.margin));
-            // A device that takes a lost one's place is given all buffers; these nodes are of now.
+            // A new device after a loss gets all buffers again; these nodes are the present ones.
             if new_device && let Some(mut nodes) = shader_buffers.get_mut(&buffers.nodes) {
                 nodes.data = Some(bytemuck::cast_slice(&packed.nodes).to_vec());
             }
             let counts = (buffers.guide_count, buffers.strand_count);
-            let ribbon = packed.ribbon(&look, &settings, view, counts);
-            if (packed.ribbon, packed.key) != (ribbon, key) {
+            let ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
+            let is_streaked_anew = packed.note_streaks(&dye);
+            if is_streaked_anew || (packed.ribbon, packed.key) != (ribbon, key) {
                 (packed.ribbon, packed.key) = (ribbon, key);
                 if let Some(mut material) = materials.get_mut(&material.0) {
                     material.key = key;
                     material.ribbon = ribbon;
+                    if is_streaked_anew {
+                        material.streaks = shader_buffers.add(buffer(&packed.pack_streaks()));
+                    }
                 }
             }
             continue;
         }
 
-        let strands = packed.scatter(&strands, given.as_deref(), &settings);
+        let strands = packed.scatter(&strands, follower_roots.as_deref(), &settings);
         let counts = (packed.layout.len() as u32, strands.len() as u32);
-        packed.ribbon = packed.ribbon(&look, &settings, view, counts);
+        packed.ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
         packed.key = key;
+        packed.note_streaks(&dye);
         let mut first = 0;
         let ranges = packed.layout.iter().map(|guide| {
             first += guide.nodes;
             [first - guide.nodes, guide.nodes]
         });
         let ranges: Vec<[u32; 2]> = ranges.collect();
-        // Kept here as well, for the case that the device is lost and another takes its place.
-        let mut add = |bytes: &[u8]| {
-            shader_buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::default()))
-        };
+        let mut add = |bytes: &[u8]| shader_buffers.add(buffer(bytes));
         let material = RibbonMaterial {
             key,
             ribbon: packed.ribbon,
             nodes: add(bytemuck::cast_slice(&packed.nodes)),
             guides: add(bytemuck::cast_slice(&ranges)),
             strands: add(&pack_strands(&strands)),
+            streaks: add(&packed.pack_streaks()),
         };
         let (nodes, guides) = (material.nodes.clone(), material.guides.clone());
         let strands = material.strands.clone();
         let mesh = meshes.add(ribbon_mesh(counts.1, settings.segments));
         let material = MeshMaterial3d(materials.add(material));
         let parts = (Mesh3d(mesh), material, around(packed.margin), NoAutoAabb);
-        // The child stays what it is for whatever a game has put on it.
+        // The child entity is kept, with the components that a game has put on it.
         let drawn = match known {
             Some((_, old)) => {
                 commands.entity(old.drawn).try_insert(parts);
@@ -194,7 +207,37 @@ pub(super) fn pack(
     }
 }
 
+/// Kept here as well, for the case that the device is lost and another takes its place.
+fn buffer(bytes: &[u8]) -> ShaderBuffer {
+    ShaderBuffer::new(bytes, RenderAssetUsages::default())
+}
+
 impl Packed {
+    /// Notes which strands are in streaks; says whether they are others than before.
+    fn note_streaks(&mut self, dye: &HairDye) -> bool {
+        let streaks = || dye.layers.iter().map(|layer| layer.streaks);
+        let has_changed = !self.streaks.iter().copied().eq(streaks());
+        if has_changed {
+            self.streaks.clear();
+            self.streaks.extend(streaks());
+        }
+        has_changed
+    }
+
+    /// The layers in whose streaks each drawn strand is; a word that is not looked at where no layer
+    /// has any.
+    fn pack_streaks(&self) -> Vec<u8> {
+        let mut words = vec![0u32; 1];
+        for (layer, streaks) in self.streaks.iter().enumerate() {
+            let Some(streaks) = streaks else { continue };
+            words.resize(self.places.len().max(1), 0);
+            for (word, is_chosen) in words.iter_mut().zip(streaks.chosen(&self.places)) {
+                *word |= u32::from(is_chosen) << layer;
+            }
+        }
+        bytemuck::cast_slice(&words).to_vec()
+    }
+
     /// Notes which strands are guides; says whether that, or how they are followed, has changed.
     fn note_layout(
         &mut self,
@@ -215,7 +258,7 @@ impl Packed {
             match self.layout.get(count) {
                 Some(known) if known.strand == guide && known.nodes == nodes => {}
                 _ => {
-                    let entry = Guide { strand: guide, nodes, root: Vec3::ZERO };
+                    let entry = PackedGuide { strand: guide, nodes, root: Vec3::ZERO };
                     self.layout.truncate(count);
                     self.layout.push(entry);
                     self.roots.clear();
@@ -229,7 +272,7 @@ impl Packed {
             self.roots.clear();
             changed = true;
         }
-        // What the shader reads from the uniform needs no new strands.
+        // Settings that the shader reads from the uniform need no new strands.
         let grown = |f: &HairFollowers| HairFollowers {
             clump: 0.0,
             parting: 0.0,
@@ -243,8 +286,8 @@ impl Packed {
         changed | core::mem::take(&mut self.roots_moved)
     }
 
-    /// Packs the nodes of all guides; `known` says that those of the frame before are there. Gives
-    /// the box around them.
+    /// Packs the nodes of all guides; `known` if those of the previous frame are present. Returns the box
+    /// around them.
     fn pack_nodes(
         &mut self,
         strands: &Query<GuideParts>,
@@ -280,36 +323,37 @@ impl Packed {
                 (a, b) => a.or(b),
             };
         }
-        // Followers go with their roots; who their neighbours are is decided anew once those rest.
+        // Followers move with their roots; neighbours are chosen again once roots rest.
         self.roots_moved = known && still && elsewhere;
         bounds
     }
 
-    /// Decides which strands are drawn.
+    /// Chooses the drawn strands.
     fn scatter(
         &mut self,
         strands: &Query<GuideParts>,
-        given: Option<&FollowerRoots>,
+        follower_roots: Option<&FollowerRoots>,
         followers: &HairFollowers,
     ) -> Vec<DrawnStrand> {
-        if given.is_none() || self.roots.is_empty() {
+        if follower_roots.is_none() || self.roots.is_empty() {
             self.roots.clear();
             self.roots.extend(self.layout.iter().map(|guide| {
                 let Ok((strand, ..)) = strands.get(guide.strand) else {
                     return GuideRoot::default();
                 };
                 let places = strand.positions();
+                let [root, .., tip] = places else { return GuideRoot::default() };
                 GuideRoot {
-                    place: places[0],
+                    place: *root,
                     normal: strand.root_frame() * Vec3::Z,
                     length: strand.length(),
-                    reach: places[places.len() - 1] - places[0],
+                    reach: *tip - *root,
                 }
             }));
         }
         let roots = core::mem::take(&mut self.roots);
         self.note_roots();
-        let drawn = scatter(&roots, given, followers);
+        let drawn = scatter(&roots, follower_roots, followers);
         let reach = |strand: &DrawnStrand| {
             let own = roots[strand.guides[0] as usize].place;
             let apart = |k: usize| roots[strand.guides[k] as usize].place.distance(own);
@@ -323,6 +367,8 @@ impl Packed {
                 + locks;
             if reach.is_finite() { reach } else { 0.0 }
         };
+        self.places.clear();
+        self.places.extend(drawn.iter().map(|strand| strand.place(&roots)));
         self.margin = drawn.iter().map(reach).fold(0.005 + followers.frizz, f32::max);
         self.roots = roots;
         self.thickness = self.thickness_of(&drawn, followers);
@@ -341,7 +387,7 @@ impl Packed {
         Thickness::of(drawn, |k| guides[k as usize], followers)
     }
 
-    /// Notes where roots are, now that followers are laid.
+    /// Records the present roots, now that followers are laid out.
     fn note_roots(&mut self) {
         let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
         let mut first = 0;
@@ -350,15 +396,15 @@ impl Packed {
             first += guide.nodes as usize;
             (low, high) = (low.min(guide.root), high.max(guide.root));
         }
-        // About so far are guides apart if they cover the box's largest side. A guide alone, or all
-        // in one place, has no neighbours to choose.
+        // Approximate spacing of guides that cover the box. A single guide, or all in one place, has
+        // no neighbours to choose.
         let spacing = (high - low).length() / (self.layout.len() as f32).sqrt();
         self.spacing = if spacing > 1e-6 { spacing } else { f32::MAX };
     }
 
     fn ribbon(
         &self,
-        look: &HairLook,
+        look: (&HairLook, &HairDye),
         followers: &HairFollowers,
         view: HairView,
         (guides, strands): (u32, u32),

@@ -3,22 +3,22 @@
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// The way from a strand to the one in the middle of its lock.
+/// The offset from a strand to the one in the middle of its lock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ToMiddle {
+pub struct LockOffset {
     /// Between their roots (m); along the strand it has no part, which keeps its length.
     pub root: Vec3,
-    /// By how much more the middle goes with each guide, sum 0.
+    /// Difference of the middle's guide weights, sum 0.
     pub weights: [f32; 3],
 }
 
-/// A strand as it is drawn: which guides it goes with and how it differs from them. 128 bytes in the
-/// buffer, see [`HairBuffers`](super::HairBuffers).
+/// A drawn strand: the guides it follows and how it differs from them. 128 bytes in the buffer, see
+/// [`HairBuffers`](super::HairBuffers).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawnStrand {
-    /// Indices of its guides, nearest first; unused ones repeat the first and weigh nothing.
+    /// Indices of its guides, nearest first; unused ones repeat the first with weight 0.
     pub guides: [u32; 3],
-    /// From which it takes whatever is random in the shader.
+    /// Seed of its random numbers in the shader.
     pub seed: u32,
     /// Shares of the guides, sum 1.
     pub weights: [f32; 3],
@@ -38,7 +38,7 @@ pub struct DrawnStrand {
     /// Width as a share of the look's.
     pub width: f32,
     /// To the middles of its locks, large to small.
-    pub locks: [ToMiddle; 3],
+    pub locks: [LockOffset; 3],
 }
 
 impl Default for DrawnStrand {
@@ -72,6 +72,12 @@ impl DrawnStrand {
         }
     }
 
+    /// Where it grows at rest between these guides (m).
+    pub(super) fn place(&self, guides: &[GuideRoot]) -> Vec3 {
+        let near = self.guides.iter().zip(self.weights).filter(|(_, w)| *w > 0.0);
+        near.fold(self.root, |sum, (g, w)| sum + guides[*g as usize].place * w)
+    }
+
     /// As the shader reads it.
     pub fn packed(&self) -> [u32; 32] {
         let mut words = [0; 32];
@@ -103,7 +109,7 @@ impl DrawnStrand {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct GuideRoot {
     pub(super) place: Vec3,
-    /// Which way it leaves the scalp.
+    /// Its direction at the scalp.
     pub(super) normal: Vec3,
     pub(super) length: f32,
     /// From root to tip (m).

@@ -1,5 +1,5 @@
-//! Light on one fibre, and what many fibres make of it: the Rust twin of `fibre.wgsl`, where the
-//! sources of the formulas are named.
+//! Scattering by one fibre and by many: the Rust twin of `fibre.wgsl`, where the sources of the formulas
+//! are named.
 
 use bevy::prelude::*;
 use core::f32::consts::PI;
@@ -13,7 +13,7 @@ const TRT_FOCUS: f32 = 17.0;
 const TT_SHARE: f32 = 0.96;
 const TRT_SHARE: f32 = 0.757;
 
-/// What a fibre is made of at one place.
+/// Optical properties of a fibre at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Optics {
     /// Absorption of its pigment, by the fibre's radius.
@@ -26,7 +26,7 @@ pub struct Optics {
     pub through: f32,
     /// 0 dry … 1 in water.
     pub wet: f32,
-    /// Tilt of this fibre's piece against the others' (rad).
+    /// Random tilt of this piece of fibre (rad).
     pub tilt: f32,
 }
 
@@ -43,19 +43,19 @@ impl Optics {
         }
     }
 
-    /// The light that it sends on, a share of what meets it.
+    /// The forward-scattered share of incident light.
     pub fn forward_share(&self) -> Vec3 {
         let dry = 0.041 + 0.868 * (-1.88 * self.absorption).exp();
         dry.lerp(0.004 + 0.973 * (-1.63 * self.absorption).exp(), self.wet)
     }
 
-    /// The light that it sends back, a share of what meets it.
+    /// The backward-scattered share of incident light.
     pub fn backward_share(&self) -> Vec3 {
         let dry = 0.034 + 0.057 * (-3.75 * self.absorption).exp();
         dry.lerp(0.0044 + 0.0182 * (-2.8 * self.absorption).exp(), self.wet)
     }
 
-    /// What it sends to the eye of light that has gone through `depth` fibres before.
+    /// Light scattered to the eye, of light that has passed through `depth` fibres before.
     pub fn lobes(&self, a: &Angles, depth: f32) -> Vec3 {
         let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
         let spread = 0.25 * self.variance * depth;
@@ -93,7 +93,7 @@ impl Optics {
         self.gloss * (surface + trt) + self.through * tt
     }
 
-    /// The reflected share of light that arrives by `p` in hair so many layers thick.
+    /// Multiple scattering: the reflected share of light that arrives by `p` in hair of `layers` layers.
     pub fn scattered(&self, a: &Angles, p: &Passage, layers: f32) -> Vec3 {
         let (a_f, a_b) = (self.forward_share(), self.backward_share());
         let bulk = Bulk::of(a_f, a_b, layers);
@@ -106,7 +106,7 @@ impl Optics {
     }
 }
 
-/// How light comes to a fibre and goes to the eye.
+/// Directions of light and eye relative to a fibre.
 #[derive(Clone, Copy, Debug)]
 pub struct Angles {
     sum: f32,
@@ -165,17 +165,17 @@ fn matt(cos_phi: f32) -> f32 {
     ((PI - c.acos()) * c + (1.0 - c * c).sqrt()) / 8.0
 }
 
-/// What fibres one behind the other make of light.
+/// Multiple scattering in layers of fibres.
 #[derive(Clone, Copy, Debug)]
 pub struct Bulk {
-    /// Of so many layers.
+    /// Reflectance of the layers.
     pub reflectance: Vec3,
     /// Mean number of fibres on the way back out.
     pub bounces: f32,
 }
 
 impl Bulk {
-    /// Of so many layers, each of which sends on `a_f` and back `a_b`.
+    /// For `layers` layers, each of which transmits `a_f` and reflects `a_b`.
     pub fn of(a_f: Vec3, a_b: Vec3, layers: f32) -> Self {
         let k = 1.0 - a_f * a_f + a_b * a_b;
         let root = (k * k - 4.0 * a_b * a_b).max(Vec3::splat(1e-6)).map(f32::sqrt);
@@ -191,14 +191,14 @@ impl Bulk {
     }
 }
 
-/// How light has come to a place within hair.
+/// The path of light to a point within hair.
 #[derive(Clone, Copy, Debug)]
 pub struct Passage {
-    /// The share that met no fibre.
+    /// The share that hit no fibre.
     pub lit: f32,
-    /// Fibres on the way.
+    /// Number of fibres on the path.
     pub depth: f32,
-    /// Fibres between the place and the first one on the way, where that is not 0.
+    /// Fibres between the point and the first one on the path, where that is not 0.
     pub behind: f32,
 }
 
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fibre_returns_the_light_that_it_gets_and_pigment_only_takes() {
+    fn a_fibre_conserves_energy_and_pigment_only_absorbs() {
         for roughness in [0.15, 0.38, 0.6] {
             for degrees in [0.0f32, 20.0, 45.0, 60.0] {
                 let theta = degrees.to_radians();
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn endless_hair_has_the_colour_of_its_melanin() {
+    fn infinitely_deep_hair_has_the_colour_of_its_melanin() {
         // Chiang et al. 2016, equation 9, knows no surface: that adds its 0.034.
         for melanin in [Melanin::PLATINUM, Melanin::BLOND, Melanin::BROWN] {
             let fibre = Optics::new(melanin.absorption(), 0.5);
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_endless_whatever_the_fibre_and_the_light() {
+    fn all_results_are_finite_for_any_fibre_and_light() {
         let ways = [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(0.6, 0.8, 0.0), Vec3::Z];
         for absorption in [0.0, 1e-9, 3.0, 1e3, 1e6] {
             for roughness in [0.05, 0.4, 1.0] {

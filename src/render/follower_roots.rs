@@ -1,66 +1,66 @@
-//! Followers that grow where they are told to, instead of evenly between the guides.
+//! Followers with given roots, instead of roots scattered between the guides.
 
 use super::{
     drawn_strand::{DrawnStrand, GuideRoot, direction},
     followers::HairFollowers,
 };
-use crate::grid::KdTree;
+use crate::{
+    grid::KdTree,
+    setting::{Ranged, setting},
+};
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// Where the followers of a hair grow. Component of a [`Hair`](crate::Hair); where absent they are
+/// Roots of the followers of a hair. Component of a [`Hair`](crate::Hair); where absent they are
 /// scattered evenly between the guides. [`HairFollowers::count`] limits how many are drawn, taken
-/// evenly; its length variation is not used, as lengths are given.
+/// evenly; its length variation is not used, because lengths are given.
 ///
-/// A follower goes with up to three guides near its root, most with those that are shaped as it is
-/// at rest.
+/// A follower follows up to three guides near its root, weighted toward those of similar rest shape.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct FollowerRoots(pub Vec<FollowerRoot>);
 
-/// Where one follower grows.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub struct FollowerRoot {
-    /// The root's place at rest, in the hair's frame (m).
-    pub place: Vec3,
-    /// The strand's length (m). Up to four times that of its guides.
-    pub length: f32,
-    /// From root to tip at rest (m); zero if that is not known.
-    pub reach: Vec3,
-    /// Width as a share of [`HairLook::width`](super::HairLook::width). Default 1, safe 0.3 to 2.
-    pub width: f32,
+setting! {
+   /// The root of one follower. Roots without a finite place or a length above 0 are left out; other
+   /// values out of their ranges are clamped.
+   #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+   #[reflect(Default, Clone, PartialEq)]
+   pub struct FollowerRoot {
+       /// The root's place at rest, in the hair's frame (m).
+       pub place: Vec3 = Vec3::ZERO;
+       /// The strand's length, up to four times that of its guides.
+       pub length: f32 = 0.0, "m" in LENGTH: 0.0..=f32::INFINITY, safe 0.0..=2.0,
+           "hair of a head has up to 1";
+       /// From root to tip at rest (m); zero if that is not known.
+       pub reach: Vec3 = Vec3::ZERO;
+       /// Width as a share of [`HairLook::width`](super::HairLook::width).
+       pub width: f32 = 1.0, in WIDTH: 0.0..=1e3, safe 0.3..=2.0, "1 is the look's width";
+   }
 }
 
-impl Default for FollowerRoot {
-    fn default() -> Self {
-        Self { place: Vec3::ZERO, length: 0.0, reach: Vec3::ZERO, width: 1.0 }
-    }
-}
-
-/// The most that a follower's length may be of its guides'.
+/// Largest length of a follower, as a multiple of its guides'.
 const LONGEST: f32 = 4.0;
-/// How many guides near a root are looked at.
+/// How many of the nearest guides are candidates.
 const NEAR: usize = 8;
-/// How much a difference in shape counts against one in place.
+/// Weight of a difference in shape relative to one in position.
 const SHAPE: f32 = 0.3;
 
-/// The followers that grow from given roots.
+/// The followers with given roots.
 pub(super) fn lay_followers(
-    given: &[FollowerRoot],
+    follower_roots: &[FollowerRoot],
     guides: &[GuideRoot],
     settings: &HairFollowers,
 ) -> Vec<DrawnStrand> {
     let usable = |r: &FollowerRoot| r.place.is_finite() && r.length.is_finite() && r.length > 0.0;
-    let given: Vec<&FollowerRoot> = given.iter().filter(|r| usable(r)).collect();
-    let count = given.len().min(settings.count as usize);
+    let follower_roots: Vec<&FollowerRoot> = follower_roots.iter().filter(|r| usable(r)).collect();
+    let count = follower_roots.len().min(settings.count as usize);
     let usable = (0..).zip(guides).filter(|(_, guide)| guide.length > 0.0);
     let tree = KdTree::new(usable.map(|(i, guide)| (guide.place, i)));
     (0..count)
-        .map(|k| k * given.len() / count)
+        .map(|k| k * follower_roots.len() / count)
         .filter_map(|i| {
-            let near = tree.nearest::<NEAR>(given[i].place);
-            follower(i as u32, given[i], guides, near, settings)
+            let near = tree.nearest::<NEAR>(follower_roots[i].place);
+            follower(i as u32, follower_roots[i], guides, near, settings)
         })
         .collect()
 }
@@ -84,7 +84,7 @@ fn follower(
     };
     let mut best: Vec<(f32, u32)> = near.map(cost).collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    // Shares fall to nothing toward the fourth guide, so that none comes or goes with a jump.
+    // Weights fall to 0 toward the fourth guide, so that the choice is continuous.
     let fourth = best.get(3).map_or(f32::INFINITY, |fourth| fourth.0);
     best.truncate(3);
     let nearest = best.first()?.1;
@@ -102,7 +102,7 @@ fn follower(
         root -= weights[k] * guide.place;
         length += weights[k] * guide.length;
     }
-    // Its own, so that a follower stays the same when others come or go.
+    // A seed of its own, so that a follower does not change when others are added or removed.
     let seed = u64::from(settings.seed) << 32 | u64::from(index);
     let random = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
     let far = random.random::<f32>().powi(3) * 2.0 + 0.3;
@@ -116,7 +116,7 @@ fn follower(
         phase: (settings.phase_variation * random.random::<f32>()).min(0.5 * share),
         stray: direction(random) * (settings.stray * own.length * far),
         size: own.length,
-        width: if own.width.is_finite() { own.width.max(0.0) } else { 1.0 },
+        width: own.clamped().width,
         ..default()
     })
 }
@@ -155,9 +155,9 @@ mod tests {
     }
 
     #[test]
-    fn followers_grow_where_they_are_told_and_as_long() {
+    fn followers_have_the_given_roots_and_lengths() {
         let guides: Vec<_> = (0..5).map(|i| guide(0.01 * i as f32, Vec3::Y * 0.2)).collect();
-        let given: Vec<_> = [0.05, 0.2, 0.3]
+        let follower_roots: Vec<_> = [0.05, 0.2, 0.3]
             .iter()
             .zip(0..)
             .map(|(length, i)| FollowerRoot {
@@ -167,17 +167,24 @@ mod tests {
                 ..default()
             })
             .collect();
-        let grown = lay_followers(&given, &guides, &plain(100));
+        let grown = lay_followers(&follower_roots, &guides, &plain(100));
         assert_eq!(grown.len(), 3);
-        for (strand, given) in grown.iter().zip(&given) {
+        for (strand, follower_roots) in grown.iter().zip(&follower_roots) {
             let (root, tip) = drawn(strand, &guides);
-            assert!(root.distance(given.place) < 1e-6, "{root} for {}", given.place);
-            assert!(tip.distance(given.place + given.reach) < 1e-5, "{tip} of {given:?}");
+            assert!(
+                root.distance(follower_roots.place) < 1e-6,
+                "{root} for {}",
+                follower_roots.place
+            );
+            assert!(
+                tip.distance(follower_roots.place + follower_roots.reach) < 1e-5,
+                "{tip} of {follower_roots:?}"
+            );
             assert!((strand.weights.iter().sum::<f32>() - 1.0).abs() < 1e-5);
             assert!(strand.weights[0] >= strand.weights[1].max(strand.weights[2]));
         }
-        assert_eq!(lay_followers(&given, &guides, &plain(2)).len(), 2);
-        assert!(lay_followers(&given, &guides, &plain(0)).is_empty());
+        assert_eq!(lay_followers(&follower_roots, &guides, &plain(2)).len(), 2);
+        assert!(lay_followers(&follower_roots, &guides, &plain(0)).is_empty());
     }
 
     #[test]

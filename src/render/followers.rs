@@ -1,6 +1,5 @@
-//! Followers: the strands between the simulated ones. Where they grow and which guides they go with
-//! is decided once for a groom; where they are is computed in the vertex shader (and in
-//! [`curve`](super::curve)).
+//! Followers: the strands between the simulated ones. Their roots and guides are chosen once for a
+//! groom; their shape is computed in the vertex shader (and in [`curve`](super::curve)).
 
 use crate::setting::setting;
 use bevy::prelude::*;
@@ -34,10 +33,10 @@ setting! {
             "0.03 is natural";
         /// How far strays leave their lock at the tip, as a share of the length.
         pub stray: f32 = 0.03, in STRAY: 0.0..=1.0, safe 0.0..=0.5, "0.03 is natural";
-        /// How much tips draw together around their guide, a share.
+        /// How far tips converge on their guide, as a share of the distance.
         pub clump: f32 = 0.25, in CLUMP: 0.0..=1.0, "0.25 is natural";
-        /// How much tips draw together in locks of three sizes, each within the one before: shares of the
-        /// way to the strand in the middle.
+        /// How far tips converge in locks of three nested sizes: shares of the distance to the strand in
+        /// the middle.
         pub locks: Vec3 = Vec3::new(0.2, 0.3, 0.3), in LOCKS: 0.0..=0.95,
             "0.2, 0.3, 0.3 suit most hair; curls have more";
         /// How far apart the middles of locks of each size are at the scalp.

@@ -1,7 +1,7 @@
-//! Locks: which strands draw together, in three sizes, each within the one before.
+//! Locks: which strands converge, in three nested sizes.
 
 use super::{
-    drawn_strand::{DrawnStrand, GuideRoot, ToMiddle, direction},
+    drawn_strand::{DrawnStrand, GuideRoot, LockOffset, direction},
     followers::HairFollowers,
 };
 use crate::grid::KdTree;
@@ -10,16 +10,16 @@ use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// Middles are at least this share of a spacing apart, which makes the mean about the spacing.
 const CLOSEST: f32 = 0.8;
-/// How much less than others a lock may draw together, a share.
+/// By how much the convergence of locks varies, a share.
 const LOOSER: f32 = 0.3;
 /// Of flyaways, the share that is broken off.
 const BROKEN: f32 = 0.2;
 /// Width of flyaways, a share.
 const FINE: f32 = 0.7;
-/// Share of strands that leap out of the step of their lock's curl.
+/// Share of strands out of phase with their lock's curl.
 const LEAPS: f32 = 0.05;
 
-/// Gives every follower its locks, and what it shares with the others there; makes flyaways of some.
+/// Assigns every follower its locks and their shared variations, and turns some into flyaways.
 pub(super) fn draw_together(
     followers: &mut [DrawnStrand],
     guides: &[GuideRoot],
@@ -31,7 +31,7 @@ pub(super) fn draw_together(
         let small = roots.nearest(&levels[2], i);
         let middle = roots.nearest(&levels[1], small);
         let large = roots.nearest(&levels[0], middle);
-        let mut locks = [ToMiddle::default(); 3];
+        let mut locks = [LockOffset::default(); 3];
         for (lock, to) in locks.iter_mut().zip([large, middle, small]) {
             *lock = roots.way(followers, guides, i, to);
         }
@@ -45,7 +45,7 @@ pub(super) fn draw_together(
         let leap = if own.random::<f32>() < LEAPS { own.random::<f32>() } else { 0.0 };
         let phase = strand.phase + settings.lock_phase * (lot(middle) + leap);
         strand.phase = phase.min(0.5 * strand.length.min(1.0));
-        // Hair arches outward from its root: that is the part of its first way across the whole.
+        // Outward: the component of the root direction perpendicular to the reach.
         let GuideRoot { normal, reach, .. } = guides[strand.guides[0] as usize];
         let outward = normal.reject_from_normalized(reach.normalize_or_zero()).normalize_or_zero();
         // Nothing strays into the skin.
@@ -58,7 +58,7 @@ pub(super) fn draw_together(
 
 /// Makes a flyaway of a strand.
 fn stand_off(strand: &mut DrawnStrand, outward: Vec3, most: f32, random: &mut Xoshiro256PlusPlus) {
-    strand.locks[1..].fill(ToMiddle::default());
+    strand.locks[1..].fill(LockOffset::default());
     strand.width *= FINE;
     if random.random::<f32>() < BROKEN {
         let left = 0.1 + 0.2 * random.random::<f32>();
@@ -66,7 +66,7 @@ fn stand_off(strand: &mut DrawnStrand, outward: Vec3, most: f32, random: &mut Xo
         strand.size *= left;
         strand.phase *= left;
     }
-    // Aside by no more than what lengthens it little.
+    // Limited, so that the strand hardly gets longer.
     let far = (most * (0.2 + 0.8 * random.random::<f32>())).min(0.25 * strand.size);
     strand.stray = (outward + 0.8 * direction(random)).normalize_or_zero() * far;
 }
@@ -74,20 +74,16 @@ fn stand_off(strand: &mut DrawnStrand, outward: Vec3, most: f32, random: &mut Xo
 /// Where followers grow.
 struct Roots {
     places: Vec<Vec3>,
-    /// Which way they leave the scalp: locks do not reach across a parting.
+    /// Their directions at the scalp: locks do not reach across a parting.
     leave: Vec<Vec3>,
     seeds: Vec<u32>,
 }
 
 impl Roots {
     fn of(followers: &[DrawnStrand], guides: &[GuideRoot]) -> Self {
-        let place = |strand: &DrawnStrand| {
-            let near = strand.guides.iter().zip(strand.weights).filter(|(_, w)| *w > 0.0);
-            near.fold(strand.root, |sum, (g, w)| sum + guides[*g as usize].place * w)
-        };
         let leave = |strand: &DrawnStrand| guides[strand.guides[0] as usize].normal;
         Self {
-            places: followers.iter().map(place).collect(),
+            places: followers.iter().map(|strand| strand.place(guides)).collect(),
             leave: followers.iter().map(leave).collect(),
             seeds: followers.iter().map(|strand| strand.seed).collect(),
         }
@@ -129,7 +125,7 @@ impl Roots {
         guides: &[GuideRoot],
         i: usize,
         to: usize,
-    ) -> ToMiddle {
+    ) -> LockOffset {
         if i == to {
             return default();
         }
@@ -142,7 +138,7 @@ impl Roots {
         if !across.is_finite() {
             return default();
         }
-        // What the middle takes of guides that this strand does not have is left to its own.
+        // Weights of guides that this strand does not have are distributed to its own.
         let mut weights = own.guides.map(|guide| {
             let shares = middle.guides.iter().zip(middle.weights);
             shares.filter(|(g, _)| **g == guide).map(|(_, w)| w).sum::<f32>()
@@ -157,7 +153,7 @@ impl Roots {
         for (weight, own) in weights.iter_mut().zip(own.weights) {
             *weight = strength * (*weight - known * own);
         }
-        ToMiddle { root: across * strength, weights }
+        LockOffset { root: across * strength, weights }
     }
 }
 

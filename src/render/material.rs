@@ -1,6 +1,7 @@
-//! The material that draws ribbons, and the mesh that counts them.
+//! The material of ribbons, and the mesh of their corner indices.
 
-use super::{HairFollowers, HairLook, HairShading, HairView, thickness::Thickness};
+use super::{HairFollowers, HairView, thickness::Thickness};
+use crate::look::{HairDye, HairLook, HairShading, MOST_LAYERS};
 use bevy::{
     asset::RenderAssetUsages,
     material::OpaqueRendererMethod,
@@ -33,9 +34,13 @@ pub(super) struct RibbonMaterial {
     pub(super) guides: Handle<ShaderBuffer>,
     #[storage(3, read_only)]
     pub(super) strands: Handle<ShaderBuffer>,
+    /// Of each strand the layers of dye whose streaks it is in, a bit each. Read only where a layer has
+    /// streaks.
+    #[storage(4, read_only)]
+    pub(super) streaks: Handle<ShaderBuffer>,
 }
 
-/// What needs a shader of its own.
+/// Specialisation key of the shader.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct RibbonKey {
     heat: bool,
@@ -81,11 +86,39 @@ pub(super) struct Ribbon {
     locks: Vec3,
     lock_shape: f32,
     root_fade: f32,
+    dye_count: u32,
+    dyes: [Dye; MOST_LAYERS],
+}
+
+/// `Dye` of `strands.wgsl`: a layer of dye.
+#[derive(ShaderType, Clone, Copy, Debug, Default, PartialEq)]
+struct Dye {
+    absorption: Vec3,
+    bleach: f32,
+    begin: f32,
+    end: f32,
+    fade: f32,
+    in_streaks: u32,
+}
+
+fn dyes(dye: &HairDye) -> [Dye; MOST_LAYERS] {
+    let mut dyes = [Dye::default(); MOST_LAYERS];
+    for (to, layer) in dyes.iter_mut().zip(&dye.layers) {
+        *to = Dye {
+            absorption: layer.absorption(),
+            bleach: layer.bleach,
+            begin: layer.from,
+            end: layer.to,
+            fade: layer.fade,
+            in_streaks: layer.streaks.is_some().into(),
+        };
+    }
+    dyes
 }
 
 impl Ribbon {
     pub(super) fn new(
-        look: &HairLook,
+        (look, dye): (&HairLook, &HairDye),
         followers: &HairFollowers,
         view: HairView,
         thickness: Thickness,
@@ -118,6 +151,8 @@ impl Ribbon {
             locks: followers.locks,
             lock_shape: followers.lock_shape,
             root_fade: look.root_fade,
+            dye_count: dye.layers.len().min(MOST_LAYERS) as u32,
+            dyes: dyes(dye),
         }
     }
 }
@@ -125,8 +160,8 @@ impl Ribbon {
 const FORWARD: &str = "embedded://bevy_keratin/render/ribbon_forward.wgsl";
 const PREPASS: &str = "embedded://bevy_keratin/render/ribbon_prepass.wgsl";
 
-/// Which corner of which ring of which strand a vertex is. An attribute rather than the vertex
-/// index, because that counts from wherever Bevy put the mesh.
+/// Corner, ring and strand of a vertex. An attribute rather than the vertex index, which depends on
+/// where Bevy allocates the mesh.
 const CORNER: MeshVertexAttribute =
     MeshVertexAttribute::new("Hair_Corner", 0x6b65_7261_7469_6e01, VertexFormat::Uint32);
 
@@ -147,8 +182,8 @@ impl Material for RibbonMaterial {
         PREPASS.into()
     }
 
-    /// Makes Bevy run the fragment stage in the prepasses and shadow maps too, where strands light
-    /// their share of the samples. Nothing is cut off by alpha.
+    /// Makes Bevy run the fragment stage in the prepasses and shadow maps too, where strands cover
+    /// their share of the samples. No alpha test is done.
     fn alpha_mode(&self) -> AlphaMode {
         AlphaMode::Mask(0.5)
     }
@@ -178,7 +213,7 @@ impl Material for RibbonMaterial {
     }
 }
 
-/// A mesh of nothing but counted corners: two for each ring of each strand.
+/// A mesh of only corner indices: two for each ring of each strand.
 pub(super) fn ribbon_mesh(strands: u32, segments: u32) -> Mesh {
     let per_strand = 2 * (segments + 1);
     let corners: Vec<u32> = (0..strands * per_strand).collect();

@@ -1,4 +1,4 @@
-//! Draws the hair: what is simulated, and many strands between, from one buffer of nodes.
+//! Draws the hair: simulated strands and many followers between them, from one buffer of nodes.
 //!
 //! Each [`Hair`] is one mesh and one draw call (one more for each shadow map). Once a
 //! frame its nodes are packed where the fixed clock's overstep puts them and written to the GPU; all
@@ -8,7 +8,7 @@
 //!
 //! Water is drawn as beads: see [`HairBeads`].
 //!
-//! How it looks is edited at run time through components of the hair: [`HairLook`],
+//! How it looks is edited at run time through components of the hair: [`HairLook`], [`HairDye`],
 //! [`HairFollowers`], [`HairView`]. For a look of your own write a material around [`HairBuffers`].
 //!
 //! Vertex shaders read storage buffers, so WebGL2 cannot draw this; WebGPU and native can. Strands
@@ -27,7 +27,6 @@ mod drawn_strand;
 mod follower_roots;
 mod followers;
 mod locks;
-mod look;
 mod material;
 mod scatter;
 mod screen_share;
@@ -35,15 +34,20 @@ mod sets;
 mod thickness;
 mod upload;
 mod view;
+mod wet_look;
 
 pub use beads::{Bead, HairBeadSystems, HairBeads};
 pub use buffers::HairBuffers;
-pub use drawn_strand::{DrawnStrand, ToMiddle};
+pub use drawn_strand::{DrawnStrand, LockOffset};
 pub use follower_roots::{FollowerRoot, FollowerRoots};
 pub use followers::HairFollowers;
-pub use look::{HairLook, HairShading, Melanin, WetLook};
 pub use sets::HairRenderSystems;
 pub use view::{HairView, STRAIN_FULL, heat};
+pub use wet_look::WetLook;
+
+/// What is drawn by it; see [`look`](crate::look).
+#[doc(no_inline)]
+pub use crate::look::{HairDye, HairLook, HairShading, Melanin};
 
 use crate::{setting, strand::Hair};
 use bevy::{
@@ -90,7 +94,6 @@ impl HairRenderPlugin {
 
 impl Plugin for HairRenderPlugin {
     fn build(&self, app: &mut App) {
-        setting::plugin::<HairLook>(app);
         setting::plugin::<HairFollowers>(app);
         setting::plugin::<HairView>(app);
         app.insert_resource(Interpolate(self.interpolate))
@@ -111,7 +114,7 @@ impl Plugin for HairRenderPlugin {
         let _ = app.try_register_required_components::<Hair, Visibility>();
     }
 
-    /// Here, because now all that there is of a renderer has been added, whatever the order.
+    /// In `finish`, because all render plugins have been added by then, in any order.
     fn finish(&self, app: &mut App) {
         let world = app.world();
         let can_draw = world.contains_resource::<EmbeddedAssetRegistry>()
@@ -134,7 +137,7 @@ impl Plugin for HairRenderPlugin {
         embedded_asset!(app, "ribbon_forward.wgsl");
         embedded_asset!(app, "ribbon_prepass.wgsl");
         app.add_plugins(MaterialPlugin::<RibbonMaterial>::default());
-        // Bevy finishes only the plugins that were there when it began to finish.
+        // Bevy does not call `finish` of plugins added in `finish`.
         ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial>>::default().finish(app);
         let draw = (draw::appear, draw::pack).chain().run_if(supported);
         app.add_systems(PostUpdate, draw.in_set(HairRenderSystems)).configure_sets(

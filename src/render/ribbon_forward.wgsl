@@ -5,7 +5,7 @@
 #import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
 #import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
 #import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, facing_normal, safe_normalize}
-#import bevy_keratin::strands::ribbon
+#import bevy_keratin::strands::{ribbon, streaks}
 #import bevy_keratin::coverage::covered_samples
 #import bevy_keratin::shading::{Fibre, lit_hair}
 
@@ -20,7 +20,8 @@ struct ForwardVertex {
     @location(2) along: vec4<f32>,
     // Share of what is drawn that the strand covers, and how far it has come out of the scalp.
     @location(3) share: vec2<f32>,
-    @location(4) @interpolate(flat) seed: u32,
+    // And the layers of dye whose streaks it is in.
+    @location(4) @interpolate(flat) seed: vec2<u32>,
 }
 
 struct Fragment {
@@ -39,7 +40,8 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
     out.world_position = vertex.world_position;
     out.position = position_world_to_clip(vertex.world_position);
     out.tangent = vertex.tangent;
-    out.seed = vertex.seed;
+    let strand = min(corner / (2u * (ribbon.segments + 1u)), arrayLength(&streaks) - 1u);
+    out.seed = vec2(vertex.seed, streaks[strand]);
     out.share = vec2(vertex.share, vertex.grown);
     var value = 0.0;
     switch ribbon.view {
@@ -62,7 +64,7 @@ fn heat(value: f32) -> vec3<f32> {
 @fragment
 fn fragment(in: ForwardVertex) -> Fragment {
     var out: Fragment;
-    out.samples = covered_samples(in.share.x * saturate(in.share.y), in.seed, in.position.xy);
+    out.samples = covered_samples(in.share.x * saturate(in.share.y), in.seed.x, in.position.xy);
     if out.samples == 0u {
         discard;
     }
@@ -76,7 +78,8 @@ fn fragment(in: ForwardVertex) -> Fragment {
     fibre.eye = toward_eye(in.world_position);
     fibre.normal = facing_normal(fibre.tangent, fibre.eye);
     fibre.along = in.along.x;
-    fibre.seed = in.seed;
+    fibre.seed = in.seed.x;
+    fibre.streaks = in.seed.y;
     fibre.moisture = saturate(in.along.z);
     fibre.density = in.along.w;
     let lit = lit_hair(fibre);

@@ -13,7 +13,7 @@ use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 /// The drawn strands of a groom: the guides in their order, then the followers.
 pub(super) fn scatter(
     roots: &[GuideRoot],
-    given: Option<&FollowerRoots>,
+    follower_roots: Option<&FollowerRoots>,
     followers: &HairFollowers,
 ) -> Vec<DrawnStrand> {
     let guide = |(root, i): (&GuideRoot, u32)| {
@@ -21,16 +21,16 @@ pub(super) fn scatter(
         DrawnStrand { size, ..DrawnStrand::guide(i) }
     };
     let mut drawn: Vec<_> = roots.iter().zip(0..).map(guide).collect();
-    match given {
-        Some(given) => drawn.extend(lay_followers(&given.0, roots, followers)),
-        None => strew(&mut drawn, roots, followers),
+    match follower_roots {
+        Some(follower_roots) => drawn.extend(lay_followers(&follower_roots.0, roots, followers)),
+        None => scatter_followers(&mut drawn, roots, followers),
     }
     draw_together(&mut drawn[roots.len()..], roots, followers);
     drawn
 }
 
 /// Adds followers evenly between the guides.
-fn strew(drawn: &mut Vec<DrawnStrand>, roots: &[GuideRoot], followers: &HairFollowers) {
+fn scatter_followers(drawn: &mut Vec<DrawnStrand>, roots: &[GuideRoot], followers: &HairFollowers) {
     if roots.is_empty() || followers.count == 0 {
         return;
     }
@@ -40,7 +40,7 @@ fn strew(drawn: &mut Vec<DrawnStrand>, roots: &[GuideRoot], followers: &HairFoll
     let mut random = Xoshiro256PlusPlus::seed_from_u64(followers.seed.into());
     let (mut near, mut passed) = (0, 0.0);
     for i in 0..followers.count {
-        // As many followers per area everywhere; equally many per guide where there is no area.
+        // Equal density per area; equal numbers per guide where there is no area.
         if total > 0.0 {
             let target = (i as f32 + 0.5) / followers.count as f32 * total;
             while near + 1 < cells.len() && passed + cells[near].area < target {
@@ -72,7 +72,7 @@ fn follower(
     } else {
         Vec3::ZERO
     };
-    // Most strands keep to their lock, few leave it far.
+    // Most strands stay near their lock, few leave it far.
     let far = random.random::<f32>().powi(3) * 2.0 + 0.3;
     let seed = random.random();
     let share = 1.0 - settings.length_variation * random.random::<f32>();
@@ -120,7 +120,7 @@ impl Fan {
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }
-        // Folded into this guide's corner, so that it is the nearest.
+        // Reflected into this guide's corner, so that it is the nearest.
         let mut w = 1.0 - u - v;
         if u > w && u >= v {
             core::mem::swap(&mut u, &mut w);
@@ -156,7 +156,7 @@ fn fan_of(root: &GuideRoot, near: impl Iterator<Item = (u32, f32)>, roots: &[Gui
     for (k, &(angle, b)) in around.iter().enumerate() {
         let (next, c) = around[(k + 1) % around.len()];
         let gap = (next - angle).rem_euclid(core::f32::consts::TAU);
-        // Beyond this gap there is no neighbour on that side: the hairline.
+        // With a larger gap there is no neighbour on that side: the hairline.
         if b == c || gap > 2.2 {
             continue;
         }

@@ -1,17 +1,17 @@
 //! How large hair is on the screen, for its level of detail.
 
 use super::HairBuffers;
-use crate::lod::{ScreenShare, model::screen_share};
+use crate::lod::{HairScreenShare, model::screen_share};
 use bevy::{
     camera::{Camera, primitives::Aabb},
     prelude::*,
 };
 
-/// Once a frame, after hair has been drawn where it is: the largest share in any view that is active.
-/// Without one, what a game wrote stays.
+/// Once a frame, after hair has been packed: the largest share in any active view. Without a view the
+/// value is not changed.
 pub(super) fn measure(
     cameras: Query<(&Camera, &GlobalTransform)>,
-    mut hairs: Query<(&HairBuffers, &GlobalTransform, &mut ScreenShare)>,
+    mut hairs: Query<(&HairBuffers, &GlobalTransform, &mut HairScreenShare)>,
     drawn: Query<&Aabb>,
 ) {
     for (buffers, place, mut share) in &mut hairs {
@@ -24,7 +24,7 @@ pub(super) fn measure(
         if let Some(largest) = seen.reduce(f32::max)
             && largest.is_finite()
         {
-            share.set_if_neq(ScreenShare(largest));
+            share.set_if_neq(HairScreenShare(largest));
         }
     }
 }
@@ -36,7 +36,7 @@ fn seen_in(camera: &Camera, from: &GlobalTransform, center: Vec3, radius: f32) -
         return 0.0;
     }
     if clip.w_axis.w == 1.0 {
-        // Parallel: as large from anywhere.
+        // Orthographic: the size does not depend on the distance.
         return clip.y_axis.y * radius;
     }
     screen_share(radius, from.translation().distance(center), clip.y_axis.y)
@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hair_behind_the_camera_takes_up_nothing() {
+    fn hair_behind_the_camera_has_no_share() {
         let camera = Camera::default();
         let from = GlobalTransform::IDENTITY;
         assert_eq!(seen_in(&camera, &from, Vec3::Z, 0.1), 0.0);

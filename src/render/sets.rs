@@ -14,8 +14,8 @@ pub struct HairRenderSystems;
 #[derive(Resource, Clone, Copy, Debug)]
 pub(super) struct Interpolate(pub(super) bool);
 
-/// Whether the graphics device can draw hair; tells once if not. Asked only while running, because
-/// the device may come with a plugin that is finished later.
+/// Run condition: whether the graphics device can draw hair; logs once if not. Checked at run time,
+/// because the device may be created by a plugin that finishes later.
 pub(super) fn supported(
     adapter: Option<Res<RenderAdapter>>,
     mut known: Local<Option<bool>>,

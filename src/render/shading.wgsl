@@ -29,6 +29,8 @@ struct Fibre {
     moisture: f32,
     // Of strands around, seen from beside (1/m).
     density: f32,
+    // The layers of dye whose streaks it is in, a bit each.
+    streaks: u32,
 }
 
 // What a fibre is made of at one place.
@@ -51,12 +53,30 @@ fn along_noise(seed: u32, share: f32) -> f32 {
     return 2.0 * mix(low, high, f * f * (3.0 - 2.0 * f)) - 1.0;
 }
 
+// What a fibre absorbs that has been bleached and dyed. Rust twin: `HairDye::absorption`.
+fn dyed(natural: vec3<f32>, along: f32, in_streaks: u32) -> vec3<f32> {
+    var absorption = natural;
+    for (var i = 0u; i < ribbon.dye_count; i++) {
+        let dye = ribbon.dyes[i];
+        if dye.in_streaks != 0u && (in_streaks & (1u << i)) == 0u {
+            continue;
+        }
+        let half = max(0.5 * dye.fade, 5e-7);
+        let begun = select(smoothstep(dye.begin - half, dye.begin + half, along), 1.0, dye.begin <= 0.0);
+        let ended = select(smoothstep(dye.end - half, dye.end + half, along), 0.0, dye.end >= 1.0);
+        let cover = begun * (1.0 - ended);
+        absorption = absorption * (1.0 - dye.bleach * cover) + dye.absorption * cover;
+    }
+    return absorption;
+}
+
 fn surface_of(fibre: Fibre) -> Surface {
     var surface: Surface;
     // Pigment varies from strand to strand; grey hair is a mixture with strands that have none.
     let melanin = max(1.0 + ribbon.variation * (4.0 * hash(fibre.seed + 7u) - 2.0), 0.0)
         * step(ribbon.grey, hash(fibre.seed + 17u));
-    let absorption = melanin * mix(ribbon.root_absorption, ribbon.tip_absorption, fibre.along);
+    let natural = melanin * mix(ribbon.root_absorption, ribbon.tip_absorption, fibre.along);
+    let absorption = dyed(natural, fibre.along, fibre.streaks);
     // No two strands are alike, nor two pieces of one: 15 % in roughness, 1.5 degrees in tilt.
     let uneven = 1.0 + 0.15 * (2.0 * hash(fibre.seed + 11u) - 1.0);
     let rough = clamp(ribbon.roughness * uneven * (1.0 - 0.3 * fibre.moisture), 0.05, 1.0);

@@ -34,6 +34,16 @@ struct DrawnStrand {
     width: f32,            // share of the look's; below 0 for guides themselves
 }
 
+// A layer of bleach and dye, from `begin` to `end` of the length.
+struct Dye {
+    absorption: vec3<f32>,
+    bleach: f32,
+    begin: f32,
+    end: f32,
+    fade: f32,
+    in_streaks: u32,       // whether only some strands have it
+}
+
 struct Ribbon {
     root_absorption: vec3<f32>,
     variation: f32,
@@ -58,6 +68,8 @@ struct Ribbon {
     locks: vec3<f32>,
     lock_shape: f32,
     root_fade: f32,
+    dye_count: u32,
+    dyes: array<Dye, 4>,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(0) var<uniform> ribbon: Ribbon;
@@ -65,6 +77,8 @@ struct Ribbon {
 // First node and number of nodes of each guide.
 @group(#{MATERIAL_BIND_GROUP}) @binding(2) var<storage, read> guides: array<vec2<u32>>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(3) var<storage, read> strands: array<DrawnStrand>;
+// Of each strand the layers of dye whose streaks it is in, a bit each; one word where none has streaks.
+@group(#{MATERIAL_BIND_GROUP}) @binding(4) var<storage, read> streaks: array<u32>;
 
 #ifdef MOTION_VECTOR_PREPASS
 // 1 computes points as they were in the frame before, 0 as they are.

@@ -1,4 +1,4 @@
-//! How dense the drawn strands of a groom are, which says how far light goes into it.
+//! Density of the drawn strands of a groom, which determines how far light penetrates.
 
 use super::{
     curve::{Guide, guide_point, strand_point},
@@ -7,25 +7,24 @@ use super::{
 };
 use bevy::{platform::collections::HashMap, prelude::*};
 
-/// How close strands stand, whatever their width.
+/// Density of strands, independent of their width.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Thickness {
     /// Length of strands in a volume, seen from a strand (m/m³).
     pub(super) density: f32,
-    /// Strands that a line through the hair meets, for each metre of their width.
+    /// Strands that a line through the hair crosses, per metre of their width.
     pub(super) layers: f32,
 }
 
-/// Points looked at, at most about so many.
+/// Largest number of sample points, approximately.
 const POINTS: usize = 65_536;
-/// How far points of a strand are apart, at least (m): about as far as light goes.
+/// Least distance of sample points along a strand (m): about the penetration depth of light.
 const STEP: f32 = 3e-3;
-/// Side of the cells that the hair's surface is counted in (m): no strand is alone in one.
+/// Side of the cells for counting the hair's surface (m): large enough to hold several strands.
 const BLOCK: f32 = 12e-3;
 /// Points in a cell, in the mean over points, from which the count is a density.
 const ENOUGH: f64 = 8.0;
-/// The faces of cells along the axes are so much larger than the surface they stand for, in the mean
-/// over its directions.
+/// Mean ratio of the area of axis-aligned cell faces to the surface that they approximate.
 const STAIRS: f32 = 1.5;
 
 impl Thickness {
@@ -48,7 +47,7 @@ impl Thickness {
         let mut points = Vec::new();
         for strand in drawn.iter().step_by(every) {
             let pieces = (length(strand) / STEP).round().clamp(1.0, 256.0) as u32;
-            // Where the first lies differs by strand, so that rows of points make no pattern.
+            // A random offset by strand avoids patterns.
             let offset = (strand.seed >> 8) as f32 / (1 << 24) as f32;
             let places = (0..pieces).map(|i| (i as f32 + offset) / pieces as f32).map(|t| {
                 match strand.is_guide {
@@ -67,7 +66,7 @@ impl Thickness {
         });
         let faces = faces.filter(|beside| !blocks.contains_key(beside)).count();
         let surface = faces as f32 * BLOCK * BLOCK / STAIRS;
-        // Hair is in locks and layers: the finest cells that hold enough see them.
+        // The finest cells with enough points resolve locks and layers.
         let mut cell = BLOCK;
         while cell > STEP {
             let (_, finer) = count(&points, 0.5 * cell);
@@ -84,7 +83,7 @@ impl Thickness {
     }
 }
 
-/// How many points are in each cell, and in the cell of a point in the mean.
+/// Points per cell, and their mean over points.
 fn count(points: &[Vec3], cell: f32) -> (HashMap<IVec3, u32>, f64) {
     let mut cells = HashMap::<IVec3, u32>::new();
     for point in points {

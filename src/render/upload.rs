@@ -1,4 +1,4 @@
-//! The one write a frame: packed nodes into the GPU buffer that is there already.
+//! The single write a frame: packed nodes into the existing GPU buffer.
 
 use super::{buffers::HairBuffers, draw::Packed, sets::HairRenderSystems};
 use bevy::{
@@ -15,9 +15,8 @@ pub(super) fn plugin(app: &mut App) {
     }
 }
 
-/// While extracting, the frame before has been submitted and this one's transforms are taken over:
-/// nodes written now are drawn with them. A buffer made in this frame is not there yet and brings
-/// its nodes along.
+/// Runs in extraction, after the previous frame was submitted, so that nodes and transforms of the same
+/// frame are drawn together. A buffer created in this frame is uploaded with its contents instead.
 fn upload(
     hairs: Extract<Query<(&HairBuffers, &Packed)>>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
@@ -26,7 +25,7 @@ fn upload(
     let (Some(buffers), Some(queue)) = (buffers, queue) else {
         return;
     };
-    // Until the frame after, a new device's queue stands beside buffers of a lost one.
+    // For one frame after a device loss the new queue is combined with buffers of the lost device.
     if queue.is_changed() {
         return;
     }

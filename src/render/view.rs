@@ -1,4 +1,4 @@
-//! What of the hair is shown: its looks, or a quantity as a heat map.
+//! What is shown of the hair: its look, or a quantity as a heat map.
 
 use crate::{bond::BondKind, setting::Ranged};
 use bevy::prelude::*;

@@ -1,22 +1,19 @@
 //! A block: [`LANES`] strands of equal node count, side by side, through one substep.
 //!
 //! Layout: an array of nodes and an array of edges, each an array of lanes (AoSoA), so that a
-//! constraint reads whole vectors and a strand's sequence runs down the array. A block of sixteen
-//! nodes is about 43 kB, of which the iterations of a substep take turns on 18: they stay in the first
-//! cache. The arrays are plain old data and may be handed to a compute shader as they are.
+//! constraint reads whole vectors and a strand's sequence runs down the array. A block of sixteen nodes is
+//! about 71 kB, of which a pass of the direct solver goes through 34 to 50 and an iteration of the
+//! sweeps through 18. The arrays are plain old data and may be handed to a compute shader as they are.
 //!
-//! Strands keep their own vectors, so that game code reads and writes them, and are gathered into lanes
-//! and scattered back in each substep. At ten thousand strands of sixteen nodes that takes about as long
-//! as three of five iterations: four strands by four numbers are turned at a time (`turn`), and their
-//! memory is asked for (`prefetch`) while the block before is solved. Number by number and without
-//! asking ahead it took longer than all five.
+//! Strands keep their own vectors, so that game code reads and writes them; [`solve`](crate::solve)
+//! gathers them into lanes and scatters them back in each substep.
 
 use super::{
     constraint::Shares,
-    direct::row::Row as DirectRow,
+    direct::row::DirectRow,
     obstacle::{NearObstacles, Obstacle},
 };
-use crate::lanes::{LANES, Lane, V3, load3, store3};
+use crate::lanes::{LANES, Lane, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
 
@@ -65,7 +62,7 @@ pub struct EdgeLanes<C = Lane> {
 
 /// A row of a tridiagonal system over a strand's edges, eliminated from the root on.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Row {
+pub(crate) struct TridiagonalRow {
     pub(crate) direction: [Lane; 3],
     pub(crate) upper: Lane,
     pub(crate) rhs: Lane,
@@ -78,9 +75,12 @@ pub struct BlockLanes {
     pub nodes: Vec<NodeLanes>,
     /// Edges, root first.
     pub edges: Vec<EdgeLanes>,
+    /// The share of gravity that each node falls with; empty where all fall with all of it. Water bears
+    /// hair up.
+    pub(crate) gravity: Vec<Lane>,
     /// The scalp's frame q_{−1} of each strand.
     pub root: [Lane; 4],
-    /// Zero for lanes whose state is finite, else not a number; written by [`step`](super::step::step).
+    /// Zero for lanes whose state is finite, else NaN; written by [`step`](super::step::step).
     pub finite: Lane,
     /// 1 for lanes with a node that rests on an obstacle, else 0; written by the contact passes.
     pub(crate) touched: Lane,
@@ -94,7 +94,7 @@ pub struct BlockLanes {
     /// 1 for lanes that take two Newton steps, else 0.
     pub(super) twice: Lane,
     pub(super) root_between: [Lane; 4],
-    pub(crate) scratch: Vec<Row>,
+    pub(crate) scratch: Vec<TridiagonalRow>,
     pub(super) shares: Vec<Shares>,
     pub(super) rows: Vec<DirectRow<Lane>>,
 }
@@ -104,21 +104,21 @@ impl BlockLanes {
     pub fn resize(&mut self, nodes: usize) {
         self.nodes.resize(nodes, NodeLanes::default());
         self.edges.resize(nodes - 1, EdgeLanes::default());
-        self.scratch.resize(nodes - 1, Row::default());
+        self.scratch.resize(nodes - 1, TridiagonalRow::default());
         self.shares.resize(nodes - 1, Shares::default());
         self.rows.resize(nodes - 1, DirectRow::default());
         self.near_obstacles.resize(nodes, NearObstacles::ALL);
     }
 
     /// The obstacles that any lane may touch in a step of `dt`.
-    pub(crate) fn near(&self, obstacles: &[Obstacle], dt: f32, skin: f32) -> Vec<Obstacle> {
+    pub(crate) fn near(&self, obstacles: &[Obstacle], dt: f32, clearance: f32) -> Vec<Obstacle> {
         if obstacles.is_empty() {
             return Vec::new();
         }
         let (low, high) = self.bounds(dt);
-        // Nodes may be pulled beyond their prediction, never by more than an edge in a substep.
-        let margin = skin + self.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
-        obstacles.iter().filter(|o| o.may_touch(low, high, margin)).copied().collect()
+        // Nodes may move beyond their prediction, by at most an edge length in a substep.
+        let margin = clearance + self.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
+        obstacles.iter().filter(|o| o.may_touch(low, high, margin)).cloned().collect()
     }
 
     /// The box that holds every node of every lane, before and after prediction with `dt`.
@@ -141,6 +141,17 @@ impl BlockLanes {
         };
         (over_lanes(low, f32::min), over_lanes(high, f32::max))
     }
+}
+
+/// What gravity gives node `node`, of what it gives nodes in the air.
+#[inline(always)]
+pub(crate) fn pulled<S: Simd>(
+    simd: S,
+    shares: &[Lane],
+    node: usize,
+    gives: V3<f32x16<S>>,
+) -> V3<f32x16<S>> {
+    shares.get(node).map_or(gives, |share| gives.scale(load(simd, share)))
 }
 
 impl NodeLanes {

@@ -36,15 +36,15 @@ pub struct EdgeWeights<R> {
     pub l: R,
 }
 
-/// What a stretch–shear projection makes of its [`EdgeWeights`]. They do not change within a substep,
-/// so that its iterations need not divide.
+/// Factors of a stretch–shear projection, computed from its [`EdgeWeights`] once a substep, so that
+/// iterations need no division.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StretchShares<R> {
     /// 1/l.
     pub inverse_length: R,
     /// 1 over the denominator of the part along the tangent.
     pub along: R,
-    /// 1 over the denominator of the part that can be taken up by turning.
+    /// 1 over the denominator of the part that rotation can correct.
     pub across: R,
     /// w1 l: moves the start node.
     pub start: R,
@@ -55,7 +55,7 @@ pub struct StretchShares<R> {
 }
 
 impl<R> StretchShares<R> {
-    /// The same with each number as `of` makes it.
+    /// Applies `of` to each number.
     #[inline(always)]
     pub(super) fn map<T>(&self, of: impl Fn(&R) -> T) -> StretchShares<T> {
         StretchShares {
@@ -103,7 +103,7 @@ pub struct BendShares<R> {
 }
 
 impl<R> BendShares<R> {
-    /// The same with each number as `of` makes it.
+    /// Applies `of` to each number.
     #[inline(always)]
     pub(super) fn map<T>(&self, of: impl Fn(&R) -> T) -> BendShares<T> {
         BendShares { first: of(&self.first), second: of(&self.second) }
@@ -120,7 +120,7 @@ impl<R: Real> BendShares<R> {
     }
 }
 
-/// What the iterations of a substep need of an edge's weights and of its joint's stiffness.
+/// The factors of an edge and its joint that all iterations of a substep use.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shares {
     pub(super) stretch: StretchShares<Lane>,
@@ -149,8 +149,8 @@ pub fn stretch_shear<R: Real>(
 ) -> StretchCorrection<R> {
     let tangent = q.tangent();
     let c = (p2 - p1).scale(e.inverse_length) - tangent;
-    // Along the tangent a unit quaternion can take nothing up, so that part need not share the
-    // denominator with the rotation.
+    // Rotation cannot correct an error along the tangent, so that part need not share its
+    // denominator.
     let (gamma_over_d, rotating) = match projection {
         StretchProjection::Split => {
             let axial = c.dot(tangent);

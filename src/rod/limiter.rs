@@ -6,8 +6,8 @@
 //! Node masses alone enter: the rods' orientations are left as the iterations put them.
 //!
 //! A node that rests on an obstacle cannot go into it, so there W = w (I − a n nᵀ): lengths are
-//! mended along the surface instead of against it, which would end in compression. A node that the
-//! strand pulls off the surface is let go.
+//! corrected along the surface instead of against it, which would end in compression. A node that
+//! tension pulls off the surface is released.
 
 use super::{
     block::{BlockLanes, NodeLanes},
@@ -16,12 +16,21 @@ use super::{
 use crate::lanes::{LANES, Real, V3, load};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// a: how firmly an obstacle holds against being pushed into. Below 1, so that a strand pressed
-/// straight down is not asked to fold within one substep.
+/// a: the share of a node's mobility that an obstacle removes along its normal. Below 1, so that a
+/// strand pressed straight down need not fold within one substep.
 const FIRMNESS: f32 = 0.95;
 
+/// Strain at which the limiter stops.
+pub(super) const TOLERANCE: f32 = 5e-4;
+
+/// How much a pressed edge gives way in a [`GUARDED`](limit_strained) step, in shares of its strain. A
+/// strand that is pressed end to end while it is straight has to fold; how far, its lengths do not say in
+/// first order, and Newton's step would throw it as far as it is straight. With an eighth it folds by about
+/// as much as makes up for the strain, and steps go on converging as strain goes.
+const FOLDING: f32 = 0.125;
+
 /// One Newton step on the lengths of every strand in the block; with `touched_only` of those that
-/// touch an obstacle. What a strand does never depends on the others in its block.
+/// touch an obstacle. Strands of a block are independent.
 #[inline(never)]
 pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes, touched_only: bool) {
     simd.vectorize(
@@ -30,26 +39,27 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes, touched_only: 
             let touched = load(simd, &b.touched);
             let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
             if b.touched == [0.0; LANES] {
-                eliminate::<S, false>(simd, b);
-                solve::<S, false, false>(simd, b, one);
+                eliminate::<S, false, false>(simd, b);
+                solve::<S, false, false, false>(simd, b, one);
             } else {
-                eliminate::<S, true>(simd, b);
+                eliminate::<S, true, false>(simd, b);
                 if touched_only {
-                    solve::<S, true, true>(
+                    solve::<S, true, true, false>(
                         simd,
                         b,
                         Real::select(Real::lt(zero, touched), one, zero),
                     );
                 } else {
-                    solve::<S, true, false>(simd, b, one);
+                    solve::<S, true, false, false>(simd, b, one);
                 }
             }
         },
     );
 }
 
-/// One Newton step for strands of which an edge is off its length by more than the share `tolerance`,
-/// among the `lanes` that are not 0. Returns whether there were any.
+/// One guarded Newton step for strands of which an edge is off its length by more than the share
+/// `tolerance`, among the `lanes` that are not 0: strands that are pressed fold no farther than they have
+/// to, and what is pulled taut does not zigzag. Returns whether there were any.
 #[inline(never)]
 pub(super) fn limit_strained<S: Simd>(
     simd: S,
@@ -62,9 +72,9 @@ pub(super) fn limit_strained<S: Simd>(
         || {
             let touching = b.touched != [0.0; LANES];
             let worst = if touching {
-                eliminate::<S, true>(simd, b)
+                eliminate::<S, true, true>(simd, b)
             } else {
-                eliminate::<S, false>(simd, b)
+                eliminate::<S, false, true>(simd, b)
             };
             let strained = Real::lt(f32x16::splat(simd, tolerance), worst)
                 & Real::lt(f32x16::splat(simd, 0.0), lanes);
@@ -73,19 +83,19 @@ pub(super) fn limit_strained<S: Simd>(
             }
             let moves = Real::select(strained, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
             if touching {
-                solve::<S, true, true>(simd, b, moves);
+                solve::<S, true, true, true>(simd, b, moves);
             } else {
-                solve::<S, false, true>(simd, b, moves);
+                solve::<S, false, true, true>(simd, b, moves);
             }
             true
         },
     )
 }
 
-/// The last resort where Newton steps on the lengths have failed, as when a root leaps farther than its
-/// strand is long: every edge off by more than the share `torn` gets its length back, root to tip, in the
-/// direction that it has. Edges before a held node are left: there is nowhere to go. Returns whether
-/// there were any.
+/// The fallback where Newton steps on the lengths have failed, as when a root moves farther than its
+/// strand is long: every edge off by more than the share `torn` is set to its length in its present
+/// direction, root to tip. Edges before a held node are left, because both ends are fixed. Returns
+/// whether there were any.
 #[inline(never)]
 pub(super) fn clamp_lengths<S: Simd>(simd: S, b: &mut BlockLanes, torn: f32) -> bool {
     simd.vectorize(
@@ -148,7 +158,7 @@ pub(crate) fn mobility<S: Simd, const TOUCHING: bool>(
     }
 }
 
-/// What a force on a node comes to where an obstacle bears it; a node that is pulled off is let go.
+/// The part of a force that moves a supported node; a node that is pulled off is released.
 #[inline(always)]
 pub(crate) fn along_support<S: Simd>(
     simd: S,
@@ -163,10 +173,13 @@ pub(crate) fn along_support<S: Simd>(
     V3::select(lifts, force, n.scale_add(-(firmness * off), force))
 }
 
-/// Eliminates from the root to the tip. `TOUCHING` heeds obstacles; where there are none it changes no
-/// bit. Returns the largest strain of each lane.
+/// Eliminates from the root to the tip. `TOUCHING` respects obstacles; where there are none it changes
+/// no bit. Returns the largest strain of each lane.
 #[inline(always)]
-fn eliminate<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes) -> f32x16<S> {
+fn eliminate<S: Simd, const TOUCHING: bool, const GUARDED: bool>(
+    simd: S,
+    b: &mut BlockLanes,
+) -> f32x16<S> {
     let edges = b.edges.len();
     let zero = f32x16::splat(simd, 0.0);
     // Pivots below this belong to edges with both ends held: nothing there can move.
@@ -179,10 +192,19 @@ fn eliminate<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes) -> f32x
     for i in 0..edges {
         // Row i: coupling λ_{i−1} + d_i·(W_i + W_{i+1})d_i λ_i + … = C_i, where the coupling of two rows
         // is −d·W d′ of the node they share.
-        let diagonal = mobility::<S, TOUCHING>(simd, b, i, d, d)
+        let mut diagonal = mobility::<S, TOUCHING>(simd, b, i, d, d)
             + mobility::<S, TOUCHING>(simd, b, i + 1, d, d);
-        let off = length - load(simd, &b.edges[i].l);
-        worst = Real::max(worst, Real::max(off, -off) / load(simd, &b.edges[i].l));
+        let l = load(simd, &b.edges[i].l);
+        let off = length - l;
+        let strain = Real::max(off, -off) / l;
+        worst = Real::max(worst, strain);
+        if GUARDED {
+            // Levenberg–Marquardt, where there is something to be folded: hair within tolerance is at rest,
+            // and is to settle.
+            let beyond = Real::max(zero, strain - f32x16::splat(simd, TOLERANCE));
+            let pressed = Real::select(Real::lt(off, zero), beyond, zero);
+            diagonal += f32x16::splat(simd, FOLDING) * pressed * diagonal;
+        }
         let upper = rows.row(coupling, diagonal, off, tiny);
         if i > 0 {
             b.scratch[i - 1].upper = upper.to_array();
@@ -203,8 +225,12 @@ fn eliminate<S: Simd, const TOUCHING: bool>(simd: S, b: &mut BlockLanes) -> f32x
 
 /// Solves from the tip to the root and moves the nodes of all lanes, or with `SOME` of those that are
 /// not 0 in `moves`.
+///
+/// What pulls a node across the strand is the bend there times the tension λ. On fine strands that is much,
+/// and taken in full it throws a node over to the other side, from step to step farther: `GUARDED`, a node
+/// goes as far across as if λ bore on it where it comes to, 1/(1 + wλ/l) of the way.
 #[inline(always)]
-fn solve<S: Simd, const TOUCHING: bool, const SOME: bool>(
+fn solve<S: Simd, const TOUCHING: bool, const SOME: bool, const GUARDED: bool>(
     simd: S,
     b: &mut BlockLanes,
     moves: f32x16<S>,
@@ -212,8 +238,12 @@ fn solve<S: Simd, const TOUCHING: bool, const SOME: bool>(
     let (edges, zero) = (b.edges.len(), f32x16::splat(simd, 0.0));
     let moves = Real::lt(zero, moves);
     // Back substitution, and Δp_{i+1} = W_{i+1} (λ_{i+1} d_{i+1} − λ_i d_i) from the tip upward.
+    let one = f32x16::splat(simd, 1.0);
+    let half = f32x16::splat(simd, 0.5);
     let mut lambda = zero;
     let mut pull = V3::new(zero, zero, zero);
+    // The edge after this one: its λ and direction.
+    let (mut after, mut ahead) = (zero, pull);
     for i in (0..edges).rev() {
         let s = &b.scratch[i];
         lambda = back(load(simd, &s.rhs), load(simd, &s.upper), lambda);
@@ -227,6 +257,12 @@ fn solve<S: Simd, const TOUCHING: bool, const SOME: bool>(
         let w = load(simd, &node.w);
         let p = node.position(simd);
         let mut force = pull - tension;
+        if GUARDED && i + 1 < edges {
+            let taut = Real::max(zero, half * (lambda + after));
+            let stiff = taut * w / load(simd, &b.edges[i].l);
+            force = force - (ahead - d).scale(taut * stiff / (one + stiff));
+        }
+        (after, ahead) = (lambda, d);
         if TOUCHING {
             force = along_support(simd, node, force);
         }

@@ -9,13 +9,14 @@
 //! |---|---|
 //! | [`constraint`] | 1–5 stretch–shear, 6–11 bend–twist, 12 stiffness per iteration |
 //! | [`stiffness`] | weights from the gravity-bending length (the paper gives none) |
-//! | [`block`] | strands side by side: their layout, into it and back |
+//! | [`block`] | strands side by side: the layout of their lanes |
 //! | [`step`] | one substep: predict, project, limit lengths, velocities |
 //! | [`direct`] | the direct solver: one implicit step of a whole strand per substep |
 //! | `sweep` | the iterations, root to tip, several at once |
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
 //! | `tridiagonal` | the Thomas algorithm |
-//! | [`obstacle`] | colliders as half-space, capsule and cylinder, with friction |
+//! | [`obstacle`] | colliders as half-space, capsule, cylinder or placed shape, with friction |
+//! | [`shape`] | boxes, ellipsoids, hulls and distance grids, each in its own frame |
 //!
 //! Strands of equal node count are solved [`LANES`](crate::lanes::LANES) side by side; see [`block`] for the layout.
 
@@ -29,6 +30,8 @@ pub(crate) mod limiter;
 #[doc(hidden)]
 pub mod obstacle;
 #[doc(hidden)]
+pub mod shape;
+#[doc(hidden)]
 pub mod step;
 pub mod stiffness;
 mod sweep;
@@ -36,4 +39,4 @@ pub(crate) mod touch;
 pub(crate) mod tridiagonal;
 
 pub use constraint::StretchProjection;
-pub use stiffness::{HairSolver, SolverMethod, Stiffness, Sweeps};
+pub use stiffness::{HairSolver, HairStiffness, SolverMethod, Sweeps};

@@ -1,11 +1,12 @@
-//! Colliders as rod mathematics sees them: half-spaces, capsules and cylinders, in lanes.
+//! Colliders as rod mathematics sees them: half-spaces, capsules, cylinders and what is placed, in lanes.
 
-use crate::lanes::{LANES, Real, V3};
+use super::shape::Placed;
+use crate::lanes::{LANES, Real, V3, splat};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 use glam::{Affine3A, BVec3, Vec3};
 
 /// The solid part of space that an [`Obstacle`] fills, in the frame of the nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Solid {
     /// Everything on the far side of a plane.
     HalfSpace {
@@ -34,10 +35,12 @@ pub enum Solid {
         /// Half the length along the axis (m).
         half_height: f32,
     },
+    /// Any other shape.
+    Placed(Placed),
 }
 
 /// A solid that nodes cannot enter.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Obstacle {
     /// What space it fills at the end of the substep.
     pub solid: Solid,
@@ -47,7 +50,7 @@ pub struct Obstacle {
     pub friction: f32,
 }
 
-/// A choice of a block's obstacles, in their order. Of more than 64 some are chosen together.
+/// A subset of a block's obstacles as bits. With more than 64, several obstacles share a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NearObstacles(u64);
 
@@ -81,44 +84,48 @@ impl Obstacle {
     }
 
     /// Whether any point of the box `low…high`, grown by `margin`, may lie inside during the
-    /// substep. Never wrongly denies.
+    /// substep. Conservative: true where in doubt.
     pub fn may_touch(&self, low: Vec3, high: Vec3, margin: f32) -> bool {
-        let center = 0.5 * (low + high);
         let motion = self.motion.map_or(0.0, |motion| {
-            // Of an affine motion the largest is at a corner.
+            // An affine displacement is largest at a corner.
             let corners = (0..8).map(|i| {
                 let upper = BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
                 Vec3::select(upper, high, low)
             });
             corners.map(|x| motion.transform_point3(x).distance(x)).fold(0.0, f32::max)
         });
-        let margin = margin + motion;
+        self.solid.may_reach(low, high, margin + motion)
+    }
+}
+
+impl Solid {
+    /// Whether any point of the box `low…high`, grown by `margin`, may lie inside. Never wrongly denies.
+    pub fn may_reach(&self, low: Vec3, high: Vec3, margin: f32) -> bool {
+        let center = 0.5 * (low + high);
         let half = 0.5 * (high - low) + margin;
-        match self.solid {
+        let meets =
+            |low: Vec3, high: Vec3| (low.cmple(center + half) & high.cmpge(center - half)).all();
+        match *self {
             Solid::HalfSpace { normal, point } => {
                 (center - point).dot(normal) <= normal.abs().dot(half)
             }
-            Solid::Capsule { a, b, radius } => {
-                let (l, h) = (a.min(b) - radius, a.max(b) + radius);
-                (l.cmple(center + half) & h.cmpge(center - half)).all()
-            }
+            Solid::Capsule { a, b, radius } => meets(a.min(b) - radius, a.max(b) + radius),
             Solid::Cylinder { center: c, axis, radius, half_height } => {
                 let across = (Vec3::ONE - axis * axis).max(Vec3::ZERO);
                 let reach = axis.abs() * half_height
                     + radius * Vec3::new(across.x.sqrt(), across.y.sqrt(), across.z.sqrt());
-                ((c - reach).cmple(center + half) & (c + reach).cmpge(center - half)).all()
+                meets(c - reach, c + reach)
+            }
+            Solid::Placed(ref placed) => {
+                let (c, reach) = placed.bounds();
+                meets(c - reach, c + reach)
             }
         }
     }
 }
 
-#[inline(always)]
-pub(crate) fn splat<R: Real>(like: R, v: Vec3) -> V3<R> {
-    V3::new(like.lit(v.x.into()), like.lit(v.y.into()), like.lit(v.z.into()))
-}
-
-/// The direction and length of `v`. A point on a collider's own axis has no way out that is shorter
-/// than another: it goes along `or`.
+/// The direction and length of `v`. A point on a collider's axis has no unique shortest way out: the
+/// direction is `or`.
 #[inline(always)]
 fn unit_or<R: Real>(v: V3<R>, or: Vec3) -> (V3<R>, R) {
     let tiny = v.x.lit(1e-12);
@@ -129,16 +136,16 @@ fn unit_or<R: Real>(v: V3<R>, or: Vec3) -> (V3<R>, R) {
 }
 
 impl Solid {
-    /// The unit normal of the surface nearest to `p`, and how deep `p` is below a layer of `skin`
+    /// The unit normal of the surface nearest to `p`, and how deep `p` is below a layer of `clearance`
     /// (m) on it: negative outside.
     #[inline(always)]
-    pub(crate) fn depth<R: Real>(&self, p: V3<R>, skin: f32) -> (V3<R>, R) {
+    pub(crate) fn depth<R: Real>(&self, p: V3<R>, clearance: f32) -> (V3<R>, R) {
         let one = p.x;
         let lit = |value: f32| one.lit(value.into());
         match *self {
             Solid::HalfSpace { normal, point } => {
                 let n = splat(one, normal);
-                (n, lit(skin) - (p - splat(one, point)).dot(n))
+                (n, lit(clearance) - (p - splat(one, point)).dot(n))
             }
             Solid::Capsule { a, b, radius } => {
                 let axis = b - a;
@@ -148,7 +155,7 @@ impl Solid {
                 let t = t.max(lit(0.0)).min(lit(1.0));
                 let off = rel - splat(one, axis).scale(t);
                 let (n, distance) = unit_or(off, across(axis));
-                (n, lit(radius + skin) - distance)
+                (n, lit(radius + clearance) - distance)
             }
             Solid::Cylinder { center, axis, radius, half_height } => {
                 let u = splat(one, axis);
@@ -156,21 +163,22 @@ impl Solid {
                 let along = rel.dot(u);
                 let off = rel - u.scale(along);
                 let (radial, distance) = unit_or(off, across(axis));
-                let side = lit(radius + skin) - distance;
+                let side = lit(radius + clearance) - distance;
                 let below = along.lt(lit(0.0));
-                let cap = lit(half_height + skin) - R::select(below, -along, along);
+                let cap = lit(half_height + clearance) - R::select(below, -along, along);
                 let cap_normal = V3::select(below, -u, u);
                 let nearer_cap = cap.lt(side);
                 // Outside where either is negative: the smaller of the two decides.
                 (V3::select(nearer_cap, cap_normal, radial), cap.min(side))
             }
+            Solid::Placed(ref placed) => placed.depth(p, clearance),
         }
     }
 }
 
 impl Solid {
-    /// Whether `p` is farther than `distance` (m) outside. Wrongly denies near corners only, and of what
-    /// is no number; cheaper than [`depth`](Self::depth), which knows the normal as well.
+    /// Whether `p` is farther than `distance` (m) outside. Conservative: false near corners and for NaN;
+    /// cheaper than [`depth`](Self::depth), which computes the normal as well.
     #[inline(always)]
     pub(super) fn is_beyond<S: Simd>(&self, p: V3<f32x16<S>>, distance: f32x16<S>) -> mask32x16<S> {
         let lit = |value: f32| f32x16::splat(p.x.simd, value);
@@ -195,11 +203,12 @@ impl Solid {
                 let (side, cap) = (lit(radius) + distance, lit(half_height) + distance);
                 Real::lt(side * side, off.dot(off)) | Real::lt(cap * cap, along * along)
             }
+            Solid::Placed(ref placed) => placed.is_beyond(p, distance),
         }
     }
 }
 
-/// How a node gets out of a solid.
+/// How a node is moved out of a solid.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Way {
     /// The shortest way: for states.
@@ -219,13 +228,13 @@ pub(super) fn push_out<S: Simd>(
     p: V3<f32x16<S>>,
     from: V3<f32x16<S>>,
     friction: f32x16<S>,
-    skin: f32,
+    clearance: f32,
     way: Way,
 ) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
     let simd = p.x.simd;
     let zero = f32x16::splat(simd, 0.0);
     let one = f32x16::splat(simd, 1.0);
-    let (normal, depth) = obstacle.solid.depth(p, skin);
+    let (normal, depth) = obstacle.solid.depth(p, clearance);
     let inside = Real::lt(zero, depth);
     if inside.to_bitmask() == 0 {
         return None;
@@ -244,19 +253,19 @@ pub(super) fn push_out<S: Simd>(
     Some((V3::select(inside, tangential.scale_add(-held, out), p), touching))
 }
 
-/// Holds a node back that would pass through a thin or fast solid within the substep: a node that
-/// was on one side of it (`start`, taken along by the solid) and would be on the other stays before
-/// the plane that touches the solid where it was nearest. Returns as [`push_out`] does; `None` where
-/// no lane moves so fast against the solid that it might.
+/// Continuous collision: stops a node that would pass through a thin or fast solid within the substep.
+/// A node that was on one side of it (`start`, moved with the solid) and would be on the other stays
+/// before the tangent plane of the solid where it was nearest. Returns as [`push_out`] does; `None`
+/// where no lane moves fast enough against the solid to pass.
 ///
-/// The way is looked at where it comes nearest to the solid's axis, in its middle and at its end:
-/// what moves by less than half the solid's thickness does not pass.
+/// The path is sampled where it comes nearest to the solid's axis, in its middle and at its end: a
+/// node that moves by less than half the solid's thickness cannot pass.
 #[inline(always)]
 pub(super) fn continuous_collision<S: Simd>(
     obstacle: &Obstacle,
     start: V3<f32x16<S>>,
     p: V3<f32x16<S>>,
-    skin: f32,
+    clearance: f32,
 ) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
     let simd = p.x.simd;
     let lit = |value: f32| f32x16::splat(simd, value);
@@ -266,6 +275,7 @@ pub(super) fn continuous_collision<S: Simd>(
         Solid::Cylinder { center, axis, radius, half_height } => {
             (radius.min(half_height), center, axis)
         }
+        Solid::Placed(ref placed) => (placed.thickness(), placed.center, Vec3::Y),
     };
     let way = p - start;
     // Slower ones are still on their side, where the nearest way out is the right one.
@@ -273,7 +283,7 @@ pub(super) fn continuous_collision<S: Simd>(
     if fast.to_bitmask() == 0 {
         return None;
     }
-    let (facing, depth) = obstacle.solid.depth(start, skin);
+    let (facing, depth) = obstacle.solid.depth(start, clearance);
     let mut deepest = lit(f32::NEG_INFINITY);
     let mut leaving = facing;
     let across = |v: V3<f32x16<S>>| {
@@ -282,9 +292,12 @@ pub(super) fn continuous_collision<S: Simd>(
     };
     let (from, along) = (across(start - splat(p.x, center)), across(way));
     let nearest = -from.dot(along) / Real::max(along.dot(along), lit(1e-20));
-    let nearest = Real::min(Real::max(nearest, lit(0.0)), lit(1.0));
+    let nearest = match &obstacle.solid {
+        Solid::Placed(placed) => placed.deepest(start, way),
+        _ => Real::min(Real::max(nearest, lit(0.0)), lit(1.0)),
+    };
     for share in [nearest, lit(0.5), lit(1.0)] {
-        let (normal, depth) = obstacle.solid.depth(way.scale_add(share, start), skin);
+        let (normal, depth) = obstacle.solid.depth(way.scale_add(share, start), clearance);
         deepest = Real::max(deepest, depth);
         leaving = normal;
     }

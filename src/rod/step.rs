@@ -19,9 +19,9 @@ use fearless_simd::{Level, Simd, f32x16, prelude::*};
 /// Passes that a limiter step takes for strands that touch something.
 const PASSES_IN_TOUCH: u32 = 3;
 
-/// What a substep does to a block.
+/// Parameters of a substep.
 #[derive(Clone, Copy, Debug)]
-pub struct StepParams {
+pub struct SweepParams {
     /// Substep (s).
     pub dt: f32,
     /// Iterations of the projection.
@@ -33,49 +33,49 @@ pub struct StepParams {
     /// Damping of neighbouring edges' relative angular velocity (1/s).
     pub internal_damping: f32,
     /// Distance that nodes keep from obstacles (m).
-    pub skin: f32,
+    pub clearance: f32,
 }
 
 /// Takes the block through one substep, on the instruction set that the machine has.
-pub fn step(level: Level, block: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
+pub fn step(level: Level, block: &mut BlockLanes, params: &SweepParams, obstacles: &[Obstacle]) {
     dispatch!(level, simd => step_simd(simd, block, params, obstacles));
 }
 
 #[inline(always)]
-fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams, obstacles: &[Obstacle]) {
+fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams, obstacles: &[Obstacle]) {
     let zero = f32x16::splat(simd, 0.0);
     let none = V3::new(zero, zero, zero);
     b.near_obstacles.fill(NearObstacles::ALL);
-    predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.skin, obstacles);
+    predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.clearance, obstacles);
     predict_edges(simd, b, params.dt);
     // The projection is chosen outside the loops, so that each has straight code inside.
     match params.projection {
         StretchProjection::Split => {
-            project::<S, 0>(simd, b, params.iterations, params.skin, obstacles);
+            project::<S, 0>(simd, b, params.iterations, params.clearance, obstacles);
         }
         StretchProjection::Coupled => {
-            project::<S, 1>(simd, b, params.iterations, params.skin, obstacles);
+            project::<S, 1>(simd, b, params.iterations, params.clearance, obstacles);
         }
         StretchProjection::Printed => {
-            project::<S, 2>(simd, b, params.iterations, params.skin, obstacles);
+            project::<S, 2>(simd, b, params.iterations, params.clearance, obstacles);
         }
     }
     for _ in 0..params.limiter_steps {
         limit_lengths(simd, b, false);
-        contacts(simd, b, params.skin, obstacles);
-        // Pressed on something, hair has to fold: the more it has, the better the next pass can.
+        contacts(simd, b, params.clearance, obstacles);
+        // Hair pressed on a surface has to fold; each pass can fold it further.
         for _ in 1..PASSES_IN_TOUCH {
             if b.touched != [0.0; LANES] {
                 limit_lengths(simd, b, true);
-                contacts(simd, b, params.skin, obstacles);
+                contacts(simd, b, params.clearance, obstacles);
             }
         }
     }
     velocities(simd, b, params);
 }
 
-/// Makes inverse masses of the masses that were gathered, which are in those of dry nodes, and, given
-/// the sweeps' settings with the gravity-bending length, inverse rotational masses of the edges.
+/// Converts gathered masses (in dry nodes) to inverse masses and, with the sweeps' settings and the
+/// gravity-bending length, computes the inverse rotational masses of the edges.
 pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<(&Sweeps, f32)>) {
     dispatch!(level, simd => weigh_simd(simd, block, stiffness));
 }
@@ -106,7 +106,7 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<(&Sweeps, 
     }
 }
 
-/// Orientations from angular velocity likewise: without, a strand is overdamped and never settles.
+/// Predicts orientations from angular velocities: without, a strand is overdamped and never settles.
 #[inline(always)]
 fn predict_edges<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
     let half = f32x16::splat(simd, 0.5 * dt);
@@ -118,9 +118,9 @@ fn predict_edges<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
     }
 }
 
-/// Velocities from the change of the step, the joints' damping, and the check that all is finite.
+/// Velocities from the change in the step, the joints' damping, and the finiteness check.
 #[inline(always)]
-fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &StepParams) {
+fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams) {
     let rate = f32x16::splat(simd, 1.0 / params.dt);
     let zero = f32x16::splat(simd, 0.0);
     let mut sum = zero;
@@ -159,7 +159,7 @@ mod tests {
     use glam::{Quat, Vec3};
 
     #[test]
-    fn neighbours_lose_their_relative_spin_at_the_rate_that_is_asked_for() {
+    fn neighbours_lose_their_relative_spin_at_the_given_rate() {
         let (dt, damping) = (1.0 / 360.0, 20.0);
         let spins = |internal_damping: f32| -> [Vec3; 2] {
             let mut b = BlockLanes::default();
@@ -170,13 +170,13 @@ mod tests {
                     put4(&mut e.q, lane, Quat::from_rotation_x(angle));
                 }
             }
-            let params = StepParams {
+            let params = SweepParams {
                 dt,
                 iterations: 0,
                 projection: StretchProjection::Split,
                 limiter_steps: 0,
                 internal_damping,
-                skin: 0.0,
+                clearance: 0.0,
             };
             dispatch!(Level::new(), simd => velocities(simd, &mut b, &params));
             [take3(&b.edges[0].omega, 3), take3(&b.edges[1].omega, 3)]

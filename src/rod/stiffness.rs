@@ -20,12 +20,13 @@ pub const REFERENCE_GRAVITY: f32 = 9.8;
 
 setting! {
     /// How strongly the hair resists bending. Component of a [`Hair`](crate::Hair); where absent,
-    /// [`HairDefault<Stiffness>`](crate::HairDefault) holds.
+    /// [`HairDefault<HairStiffness>`](crate::HairDefault) holds.
     ///
-    /// Strands much shorter than `bending_length` stand, much longer ones hang.
+    /// Strands much shorter than `bending_length` stand, much longer ones hang. Hair resists twist as much as
+    /// bending: G J = E I.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    pub struct Stiffness {
+    pub struct HairStiffness {
         /// Gravity-bending length L_g, in the Hair's own length unit. A real dry hair of 70 µm has
         /// 0.045; the paper's look wants 0.12…0.2.
         pub bending_length: f32 = 0.13, "m" in BENDING_LENGTH: 1e-3..=100.0, safe 0.02..=1.0,
@@ -41,11 +42,11 @@ setting! {
     }
 }
 
-impl Stiffness {
+impl HairStiffness {
     /// Stiffness from the gravity-bending length (m).
     ///
     /// # Errors
-    /// When it is not a number between 1 mm and 100 m.
+    /// When it is outside [`BENDING_LENGTH`](Self::BENDING_LENGTH).
     pub fn from_bending_length(metres: f32) -> Result<Self, InvalidValue> {
         Self { bending_length: metres, ..default() }.checked()
     }
@@ -54,7 +55,8 @@ impl Stiffness {
     /// EI/μ = E d²/(16 ρ). Dry hair: 3.9e9, 70e-6, 1310.
     ///
     /// # Errors
-    /// When a value is not positive, or the fibre's L_g leaves 1 mm … 100 m.
+    /// When a value is not positive, or the fibre's L_g is outside
+    /// [`BENDING_LENGTH`](Self::BENDING_LENGTH).
     pub fn from_fibre(young: f32, diameter: f32, density: f32) -> Result<Self, InvalidValue> {
         const YOUNG: ValueRange =
             ValueRange::new("Young's modulus (Pa)", 1.0..=1e12, "dry hair has 3.9e9");
@@ -86,6 +88,11 @@ pub enum SolverMethod {
 setting! {
     /// How the rods are solved. Component of a [`Hair`](crate::Hair); where absent,
     /// [`HairDefault<HairSolver>`](crate::HairDefault) holds.
+    ///
+    /// Quality is how short the substeps are: [`HairSubsteps`](crate::HairSubsteps) divides the tick for all
+    /// hair, water and contact included, and `substep` here takes some of them together for a hair that needs
+    /// no better. What hair looks like does not depend on either; what they buy is how fast a motion it
+    /// follows and how well long, finely divided hair keeps its length meanwhile.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairSolver {
@@ -118,7 +125,7 @@ setting! {
         /// \[B\] table 1. Changes how the solver works, and through it how fast hair swings.
         pub bend: f32 = 0.05, in BEND: 0.0..=1.0, safe 0.005..=0.1, "the paper uses 0.05";
         /// χ = w_q l² at the paper's step, set directly as a reader of the paper might; replaces what
-        /// [`Stiffness::bending_length`] gives.
+        /// [`HairStiffness::bending_length`] gives.
         pub orientation_weight: Option<f32> = None, in ORIENTATION_WEIGHT: 1e-9..=1e3,
             "0.03 is 13 cm at 3 cm edges";
         /// Newton steps of the direct length limiter after the iterations. 0 turns it off; 1 leaves
@@ -134,8 +141,9 @@ setting! {
 
 impl Sweeps {
     /// Inverse rotational mass w_q (1/m²) of an edge of length `l` on a strand whose edges average
-    /// `mean`. On even strands it is χ/l²; on uneven ones it keeps EI the same in every joint.
+    /// `mean`. With equal edges it is χ/l²; otherwise it keeps EI the same in every joint.
     #[inline(always)]
+    #[doc(hidden)]
     pub fn rotational_weight<R: Real>(&self, bending_length: f32, l: R, mean: R) -> R {
         match self.orientation_weight {
             Some(chi) => l.lit(chi.into()) / (l * mean),
@@ -186,8 +194,8 @@ mod tests {
 
     #[test]
     fn a_real_fibre_bends_over_four_and_a_half_centimetres() {
-        let s = Stiffness::from_fibre(3.9e9, 70e-6, 1310.0).unwrap();
+        let s = HairStiffness::from_fibre(3.9e9, 70e-6, 1310.0).unwrap();
         assert!((s.bending_length - 0.0453).abs() < 1e-4);
-        assert!(Stiffness::from_fibre(-1.0, 70e-6, 1310.0).is_err());
+        assert!(HairStiffness::from_fibre(-1.0, 70e-6, 1310.0).is_err());
     }
 }

@@ -1,8 +1,8 @@
 //! The iterations of a substep: Gauss–Seidel sweeps from root to tip (\[B\] equations 1–12).
 //!
-//! One edge after the other is a chain in which everything waits for what was before. So several sweeps
-//! run down the strand at once, each two edges behind the one before: that is as far as one reaches,
-//! so each finds all as if the one before had ended, and the result is the same to the bit.
+//! Edge after edge is one long dependency chain, so several sweeps run down the strand at once
+//! (pipelined), each two edges behind the previous one. An edge's projection reaches no farther, so
+//! each sweep reads what it would after the previous one had ended: the result is the same to the bit.
 
 use super::{
     block::BlockLanes,
@@ -15,27 +15,27 @@ use super::{
 use crate::lanes::{LANES, Quaternion, Real, V3, load, load4, store3, store4};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// How many iterations run down a strand one behind the other, at most.
-const ABREAST: usize = 8;
+/// The most sweeps in the pipeline.
+const PIPELINE: usize = 8;
 
-/// How stretch–shear is projected, by the number that the sweeps are compiled for.
+/// How stretch–shear is projected, by the constant that the sweeps are compiled for.
 const PROJECTIONS: [StretchProjection; 3] =
     [StretchProjection::Split, StretchProjection::Coupled, StretchProjection::Printed];
 
-/// All iterations, up to [`ABREAST`] of them at once.
+/// All iterations, up to [`PIPELINE`] of them at once.
 #[inline(always)]
 pub(super) fn project<S: Simd, const P: usize>(
     simd: S,
     b: &mut BlockLanes,
     iterations: u32,
-    skin: f32,
+    clearance: f32,
     obstacles: &[Obstacle],
 ) {
-    share::<S, P>(simd, b);
+    compute_factors::<S, P>(simd, b);
     let mut left = iterations as usize;
     while left > 0 {
-        let abreast = left.div_ceil(left.div_ceil(ABREAST));
-        sweeps::<S, P>(simd, b, abreast, skin, obstacles);
+        let abreast = left.div_ceil(left.div_ceil(PIPELINE));
+        sweeps::<S, P>(simd, b, abreast, clearance, obstacles);
         left -= abreast;
     }
     b.touched = [0.0; LANES];
@@ -50,9 +50,9 @@ pub(super) fn project<S: Simd, const P: usize>(
     }
 }
 
-/// What stays the same in all iterations.
+/// Computes the factors that stay the same in all iterations.
 #[inline(always)]
-fn share<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
+fn compute_factors<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
     let mut w_before = f32x16::splat(simd, 0.0);
     let mut w1 = load(simd, &b.nodes[0].w);
     for ((e, node), shares) in b.edges.iter().zip(&b.nodes[1..]).zip(&mut b.shares) {
@@ -65,10 +65,10 @@ fn share<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
     }
 }
 
-/// What a sweep carries in registers from one edge to the next.
+/// What a sweep keeps in registers from one edge to the next.
 #[derive(Clone, Copy)]
-struct Follower<S: Simd> {
-    /// The edge before, which has yet to turn for the joint that follows.
+struct SweepState<S: Simd> {
+    /// The previous edge, which the next joint still corrects.
     before: Quaternion<f32x16<S>>,
     /// The node between them.
     p1: V3<f32x16<S>>,
@@ -76,13 +76,13 @@ struct Follower<S: Simd> {
 
 /// `abreast` Gauss–Seidel sweeps from root to tip: at each edge its bend–twist joint, then its
 /// stretch–shear, then the edge's start node against obstacles, which nothing else in this sweep
-/// moves. A sweep may follow two edges behind another: all that it reads there is as that leaves it.
+/// moves. A sweep may follow two edges behind another: there it reads only final values of that.
 #[inline(never)]
 fn sweeps<S: Simd, const P: usize>(
     simd: S,
     b: &mut BlockLanes,
     abreast: usize,
-    skin: f32,
+    clearance: f32,
     obstacles: &[Obstacle],
 ) {
     simd.vectorize(
@@ -92,30 +92,39 @@ fn sweeps<S: Simd, const P: usize>(
             let touching = !obstacles.is_empty();
             let all = f32x16::splat(simd, 1.0);
             let (before, p1) = (load4(simd, &b.root), b.nodes[0].position(simd));
-            let mut carried = [Follower { before, p1 }; ABREAST];
+            let mut state = [SweepState { before, p1 }; PIPELINE];
             for step in 0..edges + 2 * (abreast - 1) {
-                for (k, carried) in carried.iter_mut().take(abreast).enumerate() {
+                for (k, state) in state.iter_mut().take(abreast).enumerate() {
                     let i = step.wrapping_sub(2 * k);
                     if i >= edges {
                         continue;
                     }
                     if i == 0 {
                         // The sweep before has left it here.
-                        carried.p1 = b.nodes[0].position(simd);
+                        state.p1 = b.nodes[0].position(simd);
                     }
-                    pass_edge::<S, P>(simd, b, i, carried);
+                    pass_edge::<S, P>(simd, b, i, state);
                     if touching {
                         let near = b.near_obstacles[i];
                         let node = &mut b.nodes[i];
-                        touch(simd, node, near, b.sweeps, skin, obstacles, Grip::WHOLE, all);
+                        touch(simd, node, near, b.sweeps, clearance, obstacles, Grip::WHOLE, all);
                     }
                     if i + 1 == edges {
-                        store4(&mut b.edges[i].q, carried.before);
-                        store3(&mut b.nodes[i + 1].p, carried.p1);
+                        store4(&mut b.edges[i].q, state.before);
+                        store3(&mut b.nodes[i + 1].p, state.p1);
                         if touching {
                             let near = b.near_obstacles[i + 1];
                             let tip = &mut b.nodes[i + 1];
-                            touch(simd, tip, near, b.sweeps, skin, obstacles, Grip::WHOLE, all);
+                            touch(
+                                simd,
+                                tip,
+                                near,
+                                b.sweeps,
+                                clearance,
+                                obstacles,
+                                Grip::WHOLE,
+                                all,
+                            );
                         }
                     }
                 }
@@ -130,10 +139,10 @@ fn pass_edge<S: Simd, const P: usize>(
     simd: S,
     b: &mut BlockLanes,
     i: usize,
-    carried: &mut Follower<S>,
+    state: &mut SweepState<S>,
 ) {
     let one = f32x16::splat(simd, 1.0);
-    let Follower { before, p1 } = *carried;
+    let SweepState { before, p1 } = *state;
     let (e, shares) = (&b.edges[i], &b.shares[i]);
     let q = load4(simd, &e.q);
     let (d_before, d_q) =
@@ -146,7 +155,7 @@ fn pass_edge<S: Simd, const P: usize>(
         store4(&mut b.edges[i - 1].q, turned);
     }
     store3(&mut b.nodes[i].p, p1 + c.p1);
-    *carried = Follower { before: q.add_scaled(c.q, one).renormalize(), p1: p2 + c.p2 };
+    *state = SweepState { before: q.add_scaled(c.q, one).renormalize(), p1: p2 + c.p2 };
 }
 
 #[cfg(test)]
@@ -183,18 +192,18 @@ mod tests {
     }
 
     #[test]
-    fn sweeps_abreast_are_to_the_bit_sweeps_one_after_the_other() {
+    fn pipelined_sweeps_equal_sequential_sweeps_to_the_bit() {
         let floor = Solid::HalfSpace { normal: Vec3::Y, point: Vec3::NEG_Y * 0.05 };
         let floor = Obstacle { solid: floor, motion: None, friction: 0.3 };
         for nodes in [2, 3, 4, 9, 16] {
-            for count in 2..=ABREAST {
-                for obstacles in [&[][..], &[floor]] {
+            for count in 2..=PIPELINE {
+                for obstacles in [&[][..], core::slice::from_ref(&floor)] {
                     let (mut one, mut many) = (bent(nodes), bent(nodes));
                     dispatch!(Level::new(), simd => {
-                        share::<_, 0>(simd, &mut many);
+                        compute_factors::<_, 0>(simd, &mut many);
                         sweeps::<_, 0>(simd, &mut many, count, 1e-3, obstacles);
                     });
-                    dispatch!(Level::new(), simd => share::<_, 0>(simd, &mut one));
+                    dispatch!(Level::new(), simd => compute_factors::<_, 0>(simd, &mut one));
                     for _ in 0..count {
                         dispatch!(Level::new(), simd => {
                             sweeps::<_, 0>(simd, &mut one, 1, 1e-3, obstacles);
@@ -213,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn renormalizing_comes_to_length_one_from_any_and_is_exact_to_second_order() {
+    fn renormalizing_converges_to_length_one_and_is_exact_to_second_order() {
         for length in [1e-3, 0.5, 0.99, 1.0, 1.02, 3.0, 1e4] {
             let mut q = Quaternion::new(V3::new(0.48 * length, -0.64 * length, 0.0), 0.6 * length);
             let off: f64 = length - 1.0;

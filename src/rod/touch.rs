@@ -1,4 +1,4 @@
-//! Nodes against obstacles: where they fall to, and out of what they have fallen into.
+//! Nodes against obstacles: prediction, and push-out with friction.
 
 use super::{
     block::{BlockLanes, NodeLanes},
@@ -7,30 +7,32 @@ use super::{
 use crate::lanes::{LANES, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// How far a node may go in a substep, in ways that its velocity alone would take it. More than 1,
+/// How far a node may move in a substep, as a multiple of the path by its velocity alone. More than 1,
 /// because forces of the substep act too.
 const FASTER: f32 = 1.5;
 
-/// Chooses which obstacles each node may touch in a substep of `dt`, so that no pass of it looks at
-/// others: on a head of a dozen solids most nodes are near one or none. Held nodes must know where they
-/// come from.
+/// Chooses which obstacles each node may touch in a substep of `dt`, so that its passes skip the
+/// others: on a head of a dozen solids most nodes are near one or none. `from` of held nodes must be
+/// set.
 #[inline(never)]
 pub(crate) fn choose_near<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     dt: f32,
-    skin: f32,
+    clearance: f32,
     obstacles: &[Obstacle],
 ) {
     if obstacles.is_empty() {
+        // The block may have held others, which rested on something.
+        b.nodes.iter_mut().for_each(|n| n.rests_on = Default::default());
         return;
     }
     simd.vectorize(
         #[inline(always)]
         || {
             let zero = f32x16::splat(simd, 0.0);
-            // Nodes are pulled beyond where they would go by themselves by what is led, and by no more
-            // than about an edge by forces.
+            // Held nodes drag others beyond their ballistic path; forces move nodes by at most about
+            // an edge.
             let mut pull = zero;
             for n in &b.nodes {
                 let led = load3(simd, &n.p) - load3(simd, &n.from);
@@ -41,7 +43,7 @@ pub(crate) fn choose_near<S: Simd>(
             for e in &b.edges {
                 edge = Real::max(edge, load(simd, &e.l));
             }
-            let margin = Real::sqrt(pull) + edge + f32x16::splat(simd, skin);
+            let margin = Real::sqrt(pull) + edge + f32x16::splat(simd, clearance);
             let ahead = f32x16::splat(simd, FASTER * dt);
             for (n, near) in b.nodes.iter_mut().zip(&mut b.near_obstacles) {
                 n.rests_on = Default::default();
@@ -63,14 +65,14 @@ pub(crate) fn choose_near<S: Simd>(
     );
 }
 
-/// v is already that of the forces, but for what `gain` adds to it; p* = p + v dt.
+/// Predicts p* = p + v dt; v already contains the forces, apart from `gain`.
 #[inline(never)]
 pub(crate) fn predict_nodes<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     dt: f32x16<S>,
     gain: V3<f32x16<S>>,
-    skin: f32,
+    clearance: f32,
     obstacles: &[Obstacle],
 ) {
     simd.vectorize(
@@ -82,23 +84,25 @@ pub(crate) fn predict_nodes<S: Simd>(
                 let w = load(simd, &n.w);
                 let held = Real::lt(w, f32x16::splat(simd, 1e-12));
                 let p = load3(simd, &n.p);
-                // Nodes that begin inside an obstacle are set on its surface before the step, so that
-                // getting them out gives them no velocity. What comes at them gives them some.
+                // Nodes that begin inside an obstacle are placed on its surface before the step, so
+                // that the push-out adds no velocity. A moving obstacle does add its own.
                 let mut from = p;
                 for o in near.of(obstacles) {
                     let start = o.taken_along(from);
-                    if let Some((out, _)) = push_out(o, start, start, zero, skin, Way::Shortest) {
+                    if let Some((out, _)) =
+                        push_out(o, start, start, zero, clearance, Way::Shortest)
+                    {
                         from = V3::select(held, from, from + (out - start));
                     }
                 }
                 let v = load3(simd, &n.v);
-                // Held nodes carry where they come from in `from` and where they are to be in `p`.
+                // Held nodes have their start in `from` and their target in `p`.
                 let came_from = V3::select(held, load3(simd, &n.from), from);
                 store3(&mut n.from, came_from);
                 let mut to = (v + gain).scale_add(dt, from);
                 for o in near.of(obstacles) {
                     if let Some((before, _)) =
-                        continuous_collision(o, o.taken_along(from), to, skin)
+                        continuous_collision(o, o.taken_along(from), to, clearance)
                     {
                         (to, b.sweeps) = (before, true);
                     }
@@ -109,14 +113,19 @@ pub(crate) fn predict_nodes<S: Simd>(
     );
 }
 
-/// Takes nodes out of obstacles, with friction, and notes what touches.
+/// Pushes nodes out of obstacles, with friction, and records what touches.
 #[inline(always)]
-pub(crate) fn contacts<S: Simd>(simd: S, b: &mut BlockLanes, skin: f32, obstacles: &[Obstacle]) {
-    contacts_with(simd, b, skin, obstacles, Grip::WHOLE, f32x16::splat(simd, 1.0));
+pub(crate) fn contacts<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    clearance: f32,
+    obstacles: &[Obstacle],
+) {
+    contacts_with(simd, b, clearance, obstacles, Grip::WHOLE, f32x16::splat(simd, 1.0));
 }
 
-/// How much of the depth that a node is found at says how hard it is pressed on an obstacle: of nodes
-/// that rested on one in the pass before, and of others.
+/// The share of a node's penetration depth that counts as normal force for friction: for nodes that
+/// rested on an obstacle in the previous pass, and for others.
 #[derive(Clone, Copy)]
 pub(super) struct Grip {
     pub(super) resting: f32,
@@ -129,12 +138,12 @@ impl Grip {
     pub(super) const NONE: Self = Self { resting: 0.0, others: 0.0 };
 }
 
-/// [`contacts`], where depths are not what a whole step's forces came to, and of lanes that are not 0.
+/// [`contacts`] with another normal force for friction, in the lanes that are not 0.
 #[inline(never)]
 pub(super) fn contacts_with<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
-    skin: f32,
+    clearance: f32,
     obstacles: &[Obstacle],
     grip: Grip,
     lanes: f32x16<S>,
@@ -149,7 +158,8 @@ pub(super) fn contacts_with<S: Simd>(
             let mut touched = f32x16::splat(simd, 0.0);
             for (n, near) in b.nodes.iter_mut().zip(&b.near_obstacles) {
                 if *near != NearObstacles::NONE {
-                    let touches = touch(simd, n, *near, b.sweeps, skin, obstacles, grip, lanes);
+                    let touches =
+                        touch(simd, n, *near, b.sweeps, clearance, obstacles, grip, lanes);
                     touched = Real::max(touched, touches);
                 }
             }
@@ -158,15 +168,15 @@ pub(super) fn contacts_with<S: Simd>(
     );
 }
 
-/// Takes one node out of obstacles, with friction, and notes what it rests on. Returns 1 where it
-/// rests on any.
+/// Pushes one node out of obstacles, with friction, and records the normal that it rests on. Returns 1
+/// where it rests on any.
 #[inline(never)]
 pub(super) fn touch<S: Simd>(
     simd: S,
     n: &mut NodeLanes,
     near: NearObstacles,
     sweeps: bool,
-    skin: f32,
+    clearance: f32,
     obstacles: &[Obstacle],
     grip: Grip,
     lanes: f32x16<S>,
@@ -186,11 +196,11 @@ pub(super) fn touch<S: Simd>(
             );
             let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
             for o in near.of(obstacles) {
-                // What would take a node through has to be stopped in every pass: the shortest way out
-                // may be the wrong one.
+                // Tunnelling has to be stopped in every pass: the shortest way out may be on the wrong
+                // side.
                 if sweeps
                     && let Some((before, normal)) =
-                        continuous_collision(o, o.taken_along(from), p, skin)
+                        continuous_collision(o, o.taken_along(from), p, clearance)
                 {
                     p = V3::select(held, p, before);
                     let stopped = Real::lt(zero, normal.dot(normal) * lanes);
@@ -198,7 +208,8 @@ pub(super) fn touch<S: Simd>(
                     touched = Real::select(stopped, one, touched);
                 }
                 let friction = grip * f32x16::splat(simd, o.friction);
-                if let Some((out, normal)) = push_out(o, p, from, friction, skin, Way::WithFriction)
+                if let Some((out, normal)) =
+                    push_out(o, p, from, friction, clearance, Way::WithFriction)
                 {
                     p = V3::select(held, p, out);
                     let pushed = Real::lt(zero, normal.dot(normal) * lanes);
@@ -216,9 +227,12 @@ pub(super) fn touch<S: Simd>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rod::obstacle::Solid;
+    use crate::rod::{
+        obstacle::Solid,
+        shape::{Placed, fixture::all_shapes},
+    };
     use fearless_simd::{Level, dispatch};
-    use glam::{Affine3A, Quat, Vec3};
+    use glam::{Affine3A, Mat3, Quat, Vec3};
     use proptest::prelude::*;
 
     fn vector(size: f32) -> impl Strategy<Value = Vec3> {
@@ -226,18 +240,24 @@ mod tests {
     }
 
     fn obstacle() -> impl Strategy<Value = Obstacle> {
-        let shape = (0..3, vector(0.2), vector(0.2), 0.002f32..0.1);
+        let shape = (0usize..7, vector(0.2), vector(0.2), 0.002f32..0.1);
         let motion = proptest::option::of((vector(0.02), vector(0.1)));
         (shape, motion).prop_map(|((which, a, b, radius), motion)| {
             let solid = match which {
                 0 => Solid::HalfSpace { normal: b.normalize_or(Vec3::Y), point: a },
                 1 => Solid::Capsule { a, b, radius },
-                _ => Solid::Cylinder {
+                2 => Solid::Cylinder {
                     center: a,
                     axis: b.normalize_or(Vec3::Y),
                     radius,
                     half_height: 2.0 * radius,
                 },
+                other => Solid::Placed(Placed {
+                    shape: all_shapes()[other - 3].clone(),
+                    center: a,
+                    axes: Mat3::from_quat(Quat::from_scaled_axis(20.0 * b)),
+                    scale: 10.0 * radius,
+                }),
             };
             let turned = |v: Vec3| Affine3A::from_quat(Quat::from_scaled_axis(v));
             let motion = motion.map(|(way, turn)| Affine3A::from_translation(way) * turned(turn));
@@ -246,7 +266,7 @@ mod tests {
     }
 
     proptest! {
-        /// What is left out is out of reach of anything that a node may do in the substep.
+        /// No node can reach an obstacle that was left out.
         #[test]
         fn no_obstacle_within_reach_is_left_out(
             obstacles in proptest::collection::vec(obstacle(), 1..80),
@@ -254,7 +274,7 @@ mod tests {
             ways in proptest::collection::vec(vector(1.0), 8),
             led in vector(0.05),
         ) {
-            let (dt, skin, length) = (1.0 / 180.0, 1e-3, 0.01);
+            let (dt, clearance, length) = (1.0 / 180.0, 1e-3, 0.01);
             let mut b = BlockLanes::default();
             b.resize(nodes.len());
             for (n, (p, v)) in b.nodes.iter_mut().zip(&nodes) {
@@ -263,23 +283,23 @@ mod tests {
                 n.w = [1.0; LANES];
             }
             b.edges.iter_mut().for_each(|e| e.l = [length; LANES]);
-            // The root is led; one lane lies elsewhere.
+            // The root is held; one lane lies elsewhere.
             b.nodes[0].w = [0.0; LANES];
             b.nodes[0].from = (nodes[0].0 - led).to_array().map(|x| [x; LANES]);
             b.nodes[1].p[1][7] += 0.1;
-            dispatch!(Level::new(), simd => choose_near(simd, &mut b, dt, skin, &obstacles));
+            dispatch!(Level::new(), simd => choose_near(simd, &mut b, dt, clearance, &obstacles));
             for (n, near) in b.nodes.iter().zip(&b.near_obstacles) {
                 for lane in [0, 7] {
                     let at = |c: &[[f32; LANES]; 3]| Vec3::from_array(c.map(|c| c[lane]));
                     let (p, v) = (at(&n.p), at(&n.v));
                     let reach = v.length() * dt + length + led.length();
                     for o in obstacles.iter().filter(|o| near.of(&obstacles).all(|n| !core::ptr::eq(n, *o))) {
-                        // From where the node is taken along as well.
+                        // Also when the node moves with the obstacle.
                         let starts = [p, o.motion.map_or(p, |m| m.transform_point3(p))];
                         for start in starts {
                             for way in &ways {
                                 let to = start + way.normalize_or_zero() * reach;
-                                let depth = o.solid.depth(V3::new(to.x, to.y, to.z), skin).1;
+                                let depth = o.solid.depth(V3::new(to.x, to.y, to.z), clearance).1;
                                 prop_assert!(depth < 1e-6, "{o:?}: {depth} m deep at {to}");
                             }
                         }

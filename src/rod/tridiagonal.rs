@@ -3,7 +3,7 @@
 
 use crate::lanes::Real;
 
-/// The elimination, row after row from the root on: what the last row has left.
+/// State of the elimination, row after row from the root on.
 #[derive(Clone, Copy)]
 pub(crate) struct Elimination<R> {
     inverse: R,
@@ -12,7 +12,7 @@ pub(crate) struct Elimination<R> {
 }
 
 impl<R: Real> Elimination<R> {
-    /// Before the first row.
+    /// The state before the first row.
     #[inline(always)]
     pub(crate) fn new(zero: R) -> Self {
         Self { inverse: zero, rhs: zero }

@@ -16,14 +16,15 @@ impl Hairdo {
     ///
     /// Strands are blended by shape, joint by joint, and laid out from the root, so that hair swings
     /// over and keeps its lengths, where blended positions would shrink it. Shapes that bonds remember
-    /// count by how many of them are closed. Where only one has a cuticle of its own, the nearer one's
-    /// holds.
+    /// count by how many of them are closed. Pigments, bleach and dyes are blended by what they absorb,
+    /// [`HairLook::dye`](crate::look::HairLook::dye) in linear light. Where only one has a cuticle or a
+    /// look of its own, the nearer one's holds; so does its preset.
     ///
     /// # Errors
     /// When the hairdos differ in strands or nodes, or `t` is outside 0…1.
     pub fn blend(a: &Self, b: &Self, t: f32) -> Result<Self, HairdoError> {
         let t = SHARE.check(t)?;
-        b.must_fit(a.strands.iter().map(|strand| strand.positions.len()))?;
+        b.check_fit(a.strands.iter().map(|strand| strand.positions.len()))?;
         if t == 0.0 || t == 1.0 {
             return Ok(if t == 0.0 { a } else { b }.clone());
         }
@@ -41,7 +42,13 @@ impl Hairdo {
                 }
             }
         };
-        Self { strands, cuticle }.checked()
+        let nearer = if t < 0.5 { a } else { b };
+        let look = match (&a.look, &b.look) {
+            (Some(a), Some(b)) => Some(a.blend(b, t)),
+            _ => nearer.look.clone(),
+        };
+        let (dye, preset) = (a.dye.blend(&b.dye, t), nearer.preset.clone());
+        Self { strands, cuticle, look, dye, preset }.checked()
     }
 }
 

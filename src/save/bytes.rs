@@ -12,15 +12,19 @@
 //! softening as an option; then strand by strand its nodes, whether it is wet, the root's frame,
 //! positions, orientations, rest lengths, joints, and if wet film and bound water. Counts are
 //! varints. A joint is a byte that says which of its shapes and rates are not told because they can
-//! be known, then the others.
+//! be known, then the others. Format 2 has looks behind that, as `looks` says; a hairdo without any is
+//! written in format 1.
 
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::bond::{BondKind, Cuticle, JointBonds};
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// The newest format that can be read, and the one that is written.
-pub const NEWEST_FORMAT: u16 = 1;
+/// The newest format that can be read. What is written is the oldest that holds all that there is.
+pub const NEWEST_FORMAT: u16 = 2;
+
+/// The first format that has looks.
+const WITH_LOOKS: u16 = 2;
 
 const MAGIC: [u8; 8] = *b"\x8bhairdo\n";
 /// Magic, format and length.
@@ -39,11 +43,15 @@ impl Hairdo {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Writer(Vec::with_capacity(HEAD + CHECKSUM + 48 * self.nodes()));
         out.0.extend(MAGIC);
-        out.0.extend(NEWEST_FORMAT.to_le_bytes());
+        let format = if self.has_looks() { WITH_LOOKS } else { 1 };
+        out.0.extend(format.to_le_bytes());
         out.0.extend([0; 8]);
         out.put(&(self.strands.len() as u64));
         out.put(&self.cuticle.map(|c| (c.damage, c.softening)));
         self.strands.iter().for_each(|strand| out.strand(strand));
+        if self.has_looks() {
+            self.write_looks(&mut out);
+        }
         let length = (out.0.len() - HEAD) as u64;
         out.0[HEAD - 8..HEAD].copy_from_slice(&length.to_le_bytes());
         let checksum = crc32fast::hash(&out.0);
@@ -72,9 +80,9 @@ impl Hairdo {
             let expected_here = "the end of the hairdo";
             return Err(HairdoError::Malformed { offset: expected, expected: expected_here });
         }
-        let (told, tail) = bytes.split_at(bytes.len() - CHECKSUM);
+        let (body, tail) = bytes.split_at(bytes.len() - CHECKSUM);
         let expected = tail.iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte));
-        let found = crc32fast::hash(told);
+        let found = crc32fast::hash(body);
         if found != expected {
             return Err(HairdoError::Checksum { found, expected });
         }
@@ -85,8 +93,11 @@ impl Hairdo {
             let offset = MAGIC.len() as u64;
             return Err(HairdoError::Malformed { offset, expected: "a format from 1 on" });
         }
-        let mut reader = Reader { rest: &told[HEAD..], end: told.len() };
-        let hairdo = reader.hairdo()?;
+        let mut reader = Reader { rest: &body[HEAD..], end: body.len() };
+        let mut hairdo = reader.hairdo()?;
+        if format >= WITH_LOOKS {
+            hairdo.read_looks(&mut reader)?;
+        }
         if !reader.rest.is_empty() {
             return Err(reader.wrong("the checksum"));
         }
@@ -101,10 +112,10 @@ fn head(bytes: &[u8]) -> Option<(u16, u64)> {
     Some((u16::from_le_bytes(*format), u64::from_le_bytes(*length)))
 }
 
-struct Writer(Vec<u8>);
+pub(super) struct Writer(Vec<u8>);
 
 impl Writer {
-    fn put(&mut self, value: &impl Serialize) {
+    pub(super) fn put(&mut self, value: &impl Serialize) {
         // Plain numbers into a vector cannot fail.
         if let Ok(written) = postcard::to_extend(value, core::mem::take(&mut self.0)) {
             self.0 = written;
@@ -124,55 +135,58 @@ impl Writer {
     }
 
     fn joint(&mut self, joint: &JointBonds) {
-        let known = known(joint);
-        self.put(&known);
+        let omitted = omitted(joint);
+        self.put(&omitted);
         for kind in 0..BondKind::COUNT {
-            if known & 1 << kind == 0 {
+            if omitted & 1 << kind == 0 {
                 self.put(&joint.shapes[kind].to_array());
             }
         }
         for kind in 0..BondKind::COUNT {
-            if known & 16 << kind == 0 {
+            if omitted & 16 << kind == 0 {
                 self.put(&joint.rates[kind]);
             }
         }
     }
 }
 
-/// What of a joint need not be told, one bit each: a shape that is the one of the kind before (the
-/// first: straight), a rate that is 1. To the bit, so that what is read is what was written.
-fn known(joint: &JointBonds) -> u8 {
+/// Values of a joint that are omitted, one bit each: a shape equal to that of the previous kind (the
+/// first: straight), a rate of 1. Compared to the bit, so that reading restores what was written.
+fn omitted(joint: &JointBonds) -> u8 {
     let bits = |v: Vec3| v.to_array().map(f32::to_bits);
     let mut before = Vec3::ZERO;
-    let mut known = 0;
+    let mut omitted = 0;
     for (kind, (shape, rate)) in joint.shapes.into_iter().zip(joint.rates).enumerate() {
-        known |= u8::from(bits(shape) == bits(before)) << kind;
-        known |= u8::from(rate == 1.0) << (4 + kind);
+        omitted |= u8::from(bits(shape) == bits(before)) << kind;
+        omitted |= u8::from(rate == 1.0) << (4 + kind);
         before = shape;
     }
-    known
+    omitted
 }
 
-struct Reader<'a> {
+pub(super) struct Reader<'a> {
     rest: &'a [u8],
     /// Where the rest ends, from the file's beginning.
     end: usize,
 }
 
 impl<'a> Reader<'a> {
-    fn wrong(&self, expected: &'static str) -> HairdoError {
+    pub(super) fn wrong(&self, expected: &'static str) -> HairdoError {
         HairdoError::Malformed { offset: (self.end - self.rest.len()) as u64, expected }
     }
 
-    fn take<T: Deserialize<'a>>(&mut self, expected: &'static str) -> Result<T, HairdoError> {
+    pub(super) fn take<T: Deserialize<'a>>(
+        &mut self,
+        expected: &'static str,
+    ) -> Result<T, HairdoError> {
         let (value, rest) =
             postcard::take_from_bytes(self.rest).map_err(|_| self.wrong(expected))?;
         self.rest = rest;
         Ok(value)
     }
 
-    /// A count of things of `size` bytes at least: no more than there are bytes for, so that nobody
-    /// is made to reserve what is not there.
+    /// A count of items of at least `size` bytes each, checked against the bytes that are left, so that a
+    /// damaged file causes no huge allocation.
     fn count(&mut self, size: usize, expected: &'static str) -> Result<usize, HairdoError> {
         let before = self.rest;
         let count: u64 = self.take(expected)?;
@@ -199,7 +213,7 @@ impl<'a> Reader<'a> {
         let cuticle: Option<(f32, f32)> = self.take("the cuticle's wear")?;
         let cuticle = cuticle.map(|(damage, softening)| Cuticle { damage, softening });
         let strands = (0..count).map(|_| self.strand()).collect::<Result<_, _>>()?;
-        Ok(Hairdo { strands, cuticle })
+        Ok(Hairdo { strands, cuticle, ..Hairdo::default() })
     }
 
     fn strand(&mut self) -> Result<StyledStrand, HairdoError> {
@@ -222,16 +236,17 @@ impl<'a> Reader<'a> {
     }
 
     fn joint(&mut self) -> Result<JointBonds, HairdoError> {
-        let known: u8 = self.take("a joint")?;
+        let omitted: u8 = self.take("a joint")?;
         let mut joint = JointBonds::closed(Vec3::ZERO);
         let mut before = Vec3::ZERO;
         for (kind, shape) in joint.shapes.iter_mut().enumerate() {
-            let told = known & 1 << kind == 0;
-            *shape = if told { Vec3::from_array(self.take("a bond's shape")?) } else { before };
+            let is_stored = omitted & 1 << kind == 0;
+            *shape =
+                if is_stored { Vec3::from_array(self.take("a bond's shape")?) } else { before };
             before = *shape;
         }
         for (kind, rate) in joint.rates.iter_mut().enumerate() {
-            if known & 16 << kind == 0 {
+            if omitted & 16 << kind == 0 {
                 *rate = self.take("a bond's rate")?;
             }
         }

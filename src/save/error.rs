@@ -16,7 +16,7 @@ pub enum HairdoError {
         entity: Entity,
     },
     /// The bytes begin like no hairdo.
-    #[error("these bytes are not a hairdo: give what Hairdo::to_bytes has made")]
+    #[error("these bytes are not a hairdo: use bytes from Hairdo::to_bytes")]
     NotAHairdo,
     /// Written by a newer version of this crate.
     #[error("the hairdo has format {found}, expected {newest} at most: update bevy_keratin")]
@@ -27,21 +27,21 @@ pub enum HairdoError {
         newest: u16,
     },
     /// The end is missing.
-    #[error("the hairdo has {found} bytes, expected {expected}: its end is missing, copy it anew")]
+    #[error("the hairdo has {found} bytes, expected {expected}: its end is missing, copy it again")]
     Truncated {
         /// How many bytes there are.
         found: u64,
-        /// How many there should be, as far as can be told.
+        /// How many there should be, as far as known.
         expected: u64,
     },
     /// The bytes are not those that were written.
     #[error(
-        "the hairdo's checksum is {found:08x}, expected {expected:08x}: it was damaged, copy it anew"
+        "the hairdo's checksum is {found:08x}, expected {expected:08x}: it was damaged, copy it again"
     )]
     Checksum {
         /// Of the bytes that are there.
         found: u32,
-        /// What the file says of itself.
+        /// The checksum in the file.
         expected: u32,
     },
     /// The checksum fits, but the bytes make no sense: written by something else.
@@ -53,7 +53,7 @@ pub enum HairdoError {
         expected: &'static str,
     },
     /// A number that is not finite.
-    #[error("{what} {at} of strand {strand} is not finite, expected a number: mend the source")]
+    #[error("{what} {at} of strand {strand} is not finite, expected a number: repair the source")]
     NonFinite {
         /// Which number.
         what: &'static str,
@@ -62,8 +62,8 @@ pub enum HairdoError {
         /// The index from the root of node, edge or joint.
         at: usize,
     },
-    /// A number beyond what it may be.
-    #[error("{what} {at} of strand {strand} is {found}, expected {expected}: mend the source")]
+    /// A number out of its range.
+    #[error("{what} {at} of strand {strand} is {found}, expected {expected}: repair the source")]
     OutOfRange {
         /// Which number, with its unit.
         what: &'static str,
@@ -73,12 +73,12 @@ pub enum HairdoError {
         at: usize,
         /// What was found.
         found: f64,
-        /// What may be.
+        /// The allowed range.
         expected: &'static str,
     },
     /// A cuticle's wear that is not finite.
     #[error(
-        "damage or softening of the hair's Cuticle is not finite, expected 0.33 or so: mend it"
+        "damage or softening of the hair's Cuticle is not finite, expected 0.33 or so: correct it"
     )]
     Cuticle,
     /// A strand that is no line.
@@ -113,10 +113,16 @@ pub enum HairdoError {
         /// How many it has in the hair.
         expected: usize,
     },
-    /// Nothing to go by.
+    /// A hairdo without strands.
     #[error("the hairdo has no strands, expected one at least: take it from hair that has grown")]
     Bald,
-    /// A number given to a function.
+    /// The hairdo does not know which preset it was made on.
+    #[error(
+        "the hairdo was made on no preset that is known here: wear the hair that it was made on, \
+         styled by it"
+    )]
+    NoPreset,
+    /// A number given to a function, or of a look or dye.
     #[error(transparent)]
     Value(#[from] InvalidValue),
 }

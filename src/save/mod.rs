@@ -1,35 +1,44 @@
-//! Hairdos: the present style of a hair, to be saved with the game, put on again, carried over to
+//! Hairdos: the present style of a hair, to be saved with the game, applied again, resampled for
 //! another groom, blended and undone.
 //!
 //! A [`Hairdo`] holds everything that makes a style: where the nodes are, which shapes the bonds
-//! remember and how many of them are closed, the water, and the cuticle's wear. It does not hold
-//! what else a hair is: roots belong to the scalp, settings such as
-//! [`Stiffness`](crate::Stiffness) to the character, drops of water to the world.
+//! remember and how many of them are closed, the water, the cuticle's wear, its look with bleach and
+//! dye, and which preset it was made on. It does not hold what else a hair is: roots belong to the
+//! scalp, settings such as [`HairStiffness`](crate::HairStiffness) to the character, drops of water to the
+//! world.
 //!
 //! [`Hairdo::of`] takes it from a hair, [`Hairdo::apply`] puts it on the same groom,
-//! [`Hairdo::apply_resampled`] on another. [`Hairdo::to_bytes`] and [`Hairdo::from_bytes`] are its
+//! [`Hairdo::apply_resampled`] on another. Systems ask for both by events: [`TakeHairdo`] and
+//! [`PutOnHairdo`]. [`Hairdo::to_bytes`] and [`Hairdo::from_bytes`] are its
 //! file: compact, with a checksum, and of a numbered format ([`NEWEST_FORMAT`]); files of older formats
-//! stay readable, newer ones are told. [`Hairdo::blend`] goes from one to another.
+//! stay readable, newer ones are refused with an error. [`Hairdo::blend`] interpolates two hairdos.
 
 mod blend;
 mod bytes;
 mod error;
+mod events;
+mod looks;
+mod plugin;
 mod put_on;
 mod resample;
 
 pub use bytes::NEWEST_FORMAT;
 pub use error::HairdoError;
+pub use events::{HairdoPutOn, HairdoRefused, HairdoTaken, PutOnHairdo, TakeHairdo};
+pub use plugin::SavePlugin;
 
 use crate::{
     bond::{BondKind, Cuticle, JointBonds},
+    look::{HairDye, HairLook, WornPreset},
     rod::frame::darboux,
+    setting::Ranged,
     strand::MIN_SEGMENT,
 };
 use bevy::prelude::*;
 
 /// The style of one [`Hair`](crate::Hair) at one moment: nodes, bonds, water and wear of every
-/// strand, in the order of [`Strands`](crate::Strands). Lengths are in the hair's own units (m),
-/// water in m³.
+/// strand, in the order of [`Strands`](crate::Strands), with look and dye. Lengths are in the hair's
+/// own units (m), water in m³.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -57,6 +66,9 @@ use bevy::prelude::*;
 pub struct Hairdo {
     strands: Vec<StyledStrand>,
     cuticle: Option<Cuticle>,
+    look: Option<HairLook>,
+    dye: HairDye,
+    preset: Option<WornPreset>,
 }
 
 /// One strand of a [`Hairdo`].
@@ -88,6 +100,33 @@ impl Hairdo {
         self.cuticle
     }
 
+    /// The hair's own look; `None` where [`HairDefault<HairLook>`](crate::HairDefault) held, and in
+    /// files of format 1. Hair that such a hairdo is put on keeps its look.
+    pub fn look(&self) -> Option<&HairLook> {
+        self.look.as_ref()
+    }
+
+    /// Bleach and dye; without layers where there was none.
+    pub fn dye(&self) -> &HairDye {
+        &self.dye
+    }
+
+    /// Which preset the hair had grown from, where that is known.
+    pub fn preset(&self) -> Option<&WornPreset> {
+        self.preset.as_ref()
+    }
+
+    /// The same without look and dye: only the style, for hair that is to keep its colour.
+    pub fn without_looks(self) -> Self {
+        Self { look: None, dye: HairDye::default(), ..self }
+    }
+
+    /// The mean length of its strands (m); 0 without strands.
+    pub fn length(&self) -> f32 {
+        let lengths = self.strands.iter().map(|strand| strand.rest_lengths.iter().sum::<f32>());
+        lengths.sum::<f32>() / self.strands.len().max(1) as f32
+    }
+
     /// How many nodes all strands have together.
     pub fn nodes(&self) -> usize {
         self.strands.iter().map(|strand| strand.positions.len()).sum()
@@ -98,7 +137,7 @@ impl Hairdo {
         self.strands.iter().map(StyledStrand::water).sum()
     }
 
-    /// The hairdo, if all its numbers are what they may be.
+    /// The hairdo, if all its numbers are valid.
     fn checked(self) -> Result<Self, HairdoError> {
         for (index, strand) in self.strands.iter().enumerate() {
             strand.check(index)?;
@@ -108,11 +147,16 @@ impl Hairdo {
         {
             return Err(HairdoError::Cuticle);
         }
-        Ok(self)
+        let looks = self.look.iter().flat_map(Ranged::violations);
+        let preset = self.preset.iter().flat_map(Ranged::violations);
+        match looks.chain(self.dye.violations()).chain(preset).next() {
+            Some(wrong) => Err(wrong.into()),
+            None => Ok(self),
+        }
     }
 
     /// Says how `self` differs from a groom of strands with as many nodes as these.
-    fn must_fit(&self, nodes: impl ExactSizeIterator<Item = usize>) -> Result<(), HairdoError> {
+    fn check_fit(&self, nodes: impl ExactSizeIterator<Item = usize>) -> Result<(), HairdoError> {
         if self.strands.len() != nodes.len() {
             let (found, expected) = (self.strands.len(), nodes.len());
             return Err(HairdoError::Strands { found, expected });
@@ -211,17 +255,5 @@ impl StyledStrand {
         within("rate (four of each joint)", "0 to 1", rates, 0.0, 1.0)?;
         let water = &mut self.film.iter().chain(&self.bound).copied();
         within("water (m³; film, then bound) of node", "0 to 1", water, 0.0, MOST_WATER)
-    }
-}
-
-/// Registers hairdos for reflection.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SavePlugin;
-
-impl Plugin for SavePlugin {
-    fn build(&self, app: &mut App) {
-        app.register_type::<Hairdo>()
-            .register_type::<StyledStrand>()
-            .register_type::<HairdoError>();
     }
 }

@@ -5,15 +5,16 @@ use crate::{
     bond::{BondChanges, Bonds, Cuticle, RestShape},
     environment::HairGravity,
     fault::{FaultKind, HairFault},
+    look::{HairDye, HairLook, WornPreset},
     setting::{HairDefault, HairSetting, Ranged},
     strand::{AddedMass, Hair, HeldNodes, Strand, StrandHistory, Strands},
     treatment::{Treatments, WindingProgress, WoundOn},
-    water::{Moisture, WaterLedger, Wetting},
+    water::{HairWetting, Moisture, WaterLedger},
 };
 use bevy::{ecs::system::EntityCommand, prelude::*};
 
 impl Hairdo {
-    /// The present hairdo of a [`Hair`]. Hair that moves is caught in its motion.
+    /// The present hairdo of a [`Hair`], a snapshot of its pose even in motion.
     ///
     /// # Errors
     /// When `hair` is no hair, or a strand has fewer than two nodes or numbers that cannot be.
@@ -27,18 +28,22 @@ impl Hairdo {
             })
             .collect();
         let cuticle = world.get::<Cuticle>(hair).copied();
-        Self { strands, cuticle }.checked()
+        let look = world.get::<HairLook>(hair).map(Ranged::clamped);
+        let dye = world.get::<HairDye>(hair).map(Ranged::clamped).unwrap_or_default();
+        let preset = world.get::<WornPreset>(hair).map(Ranged::clamped);
+        Self { strands, cuticle, look, dye, preset }.checked()
     }
 
     /// Puts the hairdo on a hair of the same groom, at rest: all strands, or in case of an error
     /// none.
     ///
     /// Roots stay where they are; a strand whose root has moved since, as on a skinned mesh, is
-    /// taken along. Treatments that were still acting end, winding on a rod begins anew, nodes held
+    /// moved with it. Treatments that were still acting end, winding on a rod starts again, nodes held
     /// by [`HeldNodes`] otherwise stay held. Drops stay where they are in the world. Water that comes
-    /// with the hairdo, or goes with the old one, is booked in the [`WaterLedger`].
+    /// with the hairdo, or goes with the old one, is booked in the [`WaterLedger`]. Look and dye are
+    /// put on too; without a [`look`](Self::look) of the hairdo's own the hair keeps its.
     ///
-    /// In a system use [`Hairdo::put_on`].
+    /// In a system use [`Hairdo::put_on`], or [`PutOnHairdo`](super::PutOnHairdo) to be answered.
     ///
     /// # Errors
     /// When `hair` is no hair, or has other strands than the hairdo.
@@ -46,14 +51,14 @@ impl Hairdo {
         let mut members = members(world, hair)?;
         members.retain(|member| world.get::<Strand>(*member).is_some());
         let nodes = members.iter().map(|m| world.get::<Strand>(*m).map_or(0, Strand::nodes));
-        self.must_fit(nodes)?;
-        let surroundings = Surroundings {
+        self.check_fit(nodes)?;
+        let conditions = WettingConditions {
             wetting: setting(world, hair),
             gravity: (world.get_resource::<HairGravity>()).map_or(0.0, |g| g.clamped().length()),
         };
         let mut came = 0.0;
         for (member, style) in members.into_iter().zip(&self.strands) {
-            came += style.put_on(world.entity_mut(member), &surroundings);
+            came += style.put_on(world.entity_mut(member), &conditions);
         }
         if let Some(mut ledger) = world.get_resource_mut::<WaterLedger>()
             && came != 0.0
@@ -65,10 +70,18 @@ impl Hairdo {
             Some(cuticle) => hair.insert(cuticle),
             None => hair.remove::<Cuticle>(),
         };
+        if let Some(look) = self.look.clone() {
+            hair.insert(look);
+        }
+        if !self.dye.is_none() {
+            hair.insert(self.dye.clone());
+        } else if hair.contains::<HairDye>() {
+            hair.remove::<HairDye>();
+        }
         Ok(())
     }
 
-    /// [`Hairdo::apply`] as an entity command. What is wrong is told as a [`HairFault`].
+    /// [`Hairdo::apply`] as an entity command. Errors are reported as a [`HairFault`].
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -84,17 +97,23 @@ impl Hairdo {
     }
 
     /// [`Hairdo::apply`] as an entity command where the hair has as many strands and nodes, else
-    /// [`Hairdo::apply_resampled`]. What is wrong is told as a [`HairFault`].
+    /// [`Hairdo::apply_resampled`]. Errors are reported as a [`HairFault`].
     pub fn put_on_fitting(self) -> impl EntityCommand<Out = ()> {
-        command(move |world, hair| match self.apply(world, hair) {
+        command(move |world, hair| self.apply_fitting(world, hair))
+    }
+
+    /// [`Hairdo::apply`] where the hair has as many strands and nodes, else
+    /// [`Hairdo::apply_resampled`].
+    pub(super) fn apply_fitting(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
+        match self.apply(world, hair) {
             Err(HairdoError::Strands { .. } | HairdoError::Nodes { .. }) => {
                 self.apply_resampled(world, hair)
             }
             applied => applied,
-        })
+        }
     }
 
-    /// [`Hairdo::apply_resampled`] as an entity command. What is wrong is told as a [`HairFault`].
+    /// [`Hairdo::apply_resampled`] as an entity command. Errors are reported as a [`HairFault`].
     pub fn put_on_resampled(self) -> impl EntityCommand<Out = ()> {
         command(move |world, hair| self.apply_resampled(world, hair))
     }
@@ -107,16 +126,14 @@ fn command(
         let entity = hair.id();
         let world = hair.into_world_mut();
         if let Err(wrong) = act(world, entity) {
-            world.write_message(
-                HairFault::caused(
-                    FaultKind::Hairdo,
-                    wrong,
-                    "the hair keeps the hairdo that it has",
-                )
-                .of(entity),
-            );
+            tell(world, entity, wrong);
         }
     }
+}
+
+pub(super) fn tell(world: &mut World, hair: Entity, wrong: HairdoError) {
+    let outcome = "the hair keeps the hairdo that it has";
+    world.write_message(HairFault::caused(FaultKind::Hairdo, wrong, outcome).of(hair));
 }
 
 fn members(world: &World, hair: Entity) -> Result<Vec<Entity>, HairdoError> {
@@ -130,16 +147,16 @@ fn setting<T: HairSetting>(world: &World, hair: Entity) -> T {
     own.cloned().unwrap_or_default().clamped()
 }
 
-/// What decides how wet hair with some water is.
-struct Surroundings {
-    wetting: Wetting,
+/// Settings that determine how wet hair with some water is.
+struct WettingConditions {
+    wetting: HairWetting,
     /// Strength of gravity (m/s²).
     gravity: f32,
 }
 
 impl StyledStrand {
     fn of(strand: &Strand, bonds: Option<&Bonds>, water: Option<&Moisture>) -> Self {
-        // What the next tick would make of it.
+        // Bonds that do not fit would be replaced in the next tick.
         let bonds = bonds.filter(|bonds| bonds.joints.len() == strand.edges());
         let joints = bonds.map_or_else(|| Bonds::of(strand).joints, |bonds| bonds.joints.clone());
         let water = water.filter(|water| !water.is_untouched());
@@ -175,7 +192,7 @@ impl StyledStrand {
     }
 
     /// Gives a strand of as many nodes this style, at rest. Returns how much more water it has (m³).
-    fn put_on(&self, mut entity: EntityWorldMut<'_>, around: &Surroundings) -> f64 {
+    fn put_on(&self, mut entity: EntityWorldMut<'_>, around: &WettingConditions) -> f64 {
         let placed = entity.get_mut::<Strand>().map(|mut strand| {
             let root = strand.positions().first().copied().unwrap_or_default();
             let Self { positions, orientations, rest_lengths, root_frame, .. } =
@@ -183,14 +200,14 @@ impl StyledStrand {
             strand.replace(positions.clone(), orientations, rest_lengths, root_frame);
             positions
         });
-        // Drawn between the tick before and now, it would streak across.
+        // Without this it would be drawn interpolated across the jump.
         if let Some(mut history) = entity.get_mut::<StrandHistory>() {
             history.positions = placed.unwrap_or_default();
         }
         if let Some(mut bonds) = entity.get_mut::<Bonds>() {
             bonds.joints.clone_from(&self.joints);
         }
-        // What was under way belongs to the hairdo that goes.
+        // Running treatments belong to the replaced hairdo.
         fn forget<T: Component<Mutability = bevy::ecs::component::Mutable> + Default>(
             entity: &mut EntityWorldMut<'_>,
         ) {
@@ -207,7 +224,7 @@ impl StyledStrand {
             forget::<HeldNodes>(&mut entity);
         }
         entity.get_mut::<Moisture>().map_or(0.0, |mut water| {
-            let Surroundings { wetting, gravity } = around;
+            let WettingConditions { wetting, gravity } = around;
             water.replace(&self.film, &self.bound, &self.rest_lengths, wetting, *gravity)
         })
     }

@@ -1,4 +1,4 @@
-//! A hairdo carried over to another groom.
+//! Resampling a hairdo for another groom.
 
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::{
@@ -9,8 +9,8 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// The sharpest turn of a resampled joint, sin(θ/2): 150°. Beyond half a turn a joint would be
-/// taken for one that turns the other way.
+/// The sharpest bend of a resampled joint, sin(θ/2): 150°. Beyond 180° it would be a bend to the other
+/// side.
 const SHARPEST: f32 = 0.966;
 
 impl Hairdo {
@@ -25,10 +25,10 @@ impl Hairdo {
     ///
     /// # Limits
     /// Directions are kept as they are in the hair's frame: both heads have to face the same way and
-    /// be of about the same size and shape, for nothing is bent round a skull that is in the way. A
-    /// joint turns by at most 150°; curls tighter than the new segments allow get wider. Details
-    /// finer than a segment are evened out. A strand is styled by one other alone: from few strands
-    /// to many, neighbours wear the same.
+    /// be of about the same size and shape, because strands are not bent around the new head. A
+    /// joint bends by at most 150°; curls tighter than the new segments allow get wider. Details
+    /// finer than a segment are smoothed. Each strand takes the style of one other: from few strands
+    /// to many, neighbours get the same.
     ///
     /// # Errors
     /// When `hair` is no hair or has numbers that cannot be, or this hairdo has no strands at all.
@@ -36,7 +36,7 @@ impl Hairdo {
         self.resampled_for(&Self::of(world, hair)?)?.apply(world, hair)
     }
 
-    /// The hairdo as the groom of `other` would wear it: what [`Hairdo::apply_resampled`] puts on.
+    /// The hairdo resampled for the groom of `other`: what [`Hairdo::apply_resampled`] applies.
     ///
     /// # Errors
     /// When this hairdo has no strands and the other has.
@@ -52,7 +52,9 @@ impl Hairdo {
             let source = if by_index { i } else { of(layout.positions[0]) };
             self.strands[source].resampled(layout)
         });
-        Self { strands: strands.collect(), cuticle: self.cuticle }.checked()
+        let (strands, preset) = (strands.collect(), other.preset.clone());
+        let (look, dye) = (self.look.clone(), self.dye.clone());
+        Self { strands, cuticle: self.cuticle, look, dye, preset }.checked()
     }
 }
 
@@ -69,12 +71,13 @@ impl StyledStrand {
             return same;
         }
         let along = Along::new(&self.rest_lengths, lengths);
-        let course = |shapes: Vec<Vec3>| along.course(self.root_frame, &shapes, layout.root_frame);
+        let resample_shapes =
+            |shapes: Vec<Vec3>| along.resample_shapes(self.root_frame, &shapes, layout.root_frame);
 
         let mut turn = layout.root_frame;
         let mut place = layout.positions[0];
         let (mut positions, mut orientations) = (vec![place], Vec::new());
-        for (shape, length) in course(self.shape().collect()).into_iter().zip(lengths) {
+        for (shape, length) in resample_shapes(self.shape().collect()).into_iter().zip(lengths) {
             turn = (turn * full(shape)).normalize();
             place += turn * Vec3::Z * *length;
             orientations.push(turn);
@@ -83,7 +86,7 @@ impl StyledStrand {
 
         let mut joints = vec![JointBonds::default(); lengths.len()];
         for kind in BondKind::ALL {
-            let shapes = course(self.remembered(kind).collect());
+            let shapes = resample_shapes(self.remembered(kind).collect());
             let rates: Vec<f64> =
                 self.joints.iter().map(|j| f64::from(j.rates[kind as usize])).collect();
             for (j, (joint, shape)) in joints.iter_mut().zip(shapes).enumerate() {
@@ -140,7 +143,7 @@ impl Along {
     /// Shapes of the new joints. Edge orientations are those at the edges' middles, so a joint turns
     /// by the curvature between two of them. |Im Ω| = sin(θ/2) is half the edge over the radius of
     /// the circle through the nodes: Ω per length, unlike the angle, keeps that radius exactly.
-    fn course(&self, old_root: Quat, shapes: &[Vec3], new_root: Quat) -> Vec<Vec3> {
+    fn resample_shapes(&self, old_root: Quat, shapes: &[Vec3], new_root: Quat) -> Vec<Vec3> {
         let first = shapes.first().copied().unwrap_or_default();
         let onward = self.turn(shapes, self.old_middles[0], self.new_middles[0]);
         let first = darboux(new_root, old_root * full(first) * full(onward)).xyz();
@@ -148,7 +151,7 @@ impl Along {
         core::iter::once(first).chain(others).collect()
     }
 
-    /// Ω gathered between two places; before the first joint as at it, behind the last likewise.
+    /// Ω integrated between two places; constant before the first joint and behind the last.
     fn turn(&self, shapes: &[Vec3], from: f32, to: f32) -> Vec3 {
         if to < from {
             return -self.turn(shapes, to, from);
@@ -165,7 +168,7 @@ impl Along {
         (sum * self.scale).clamp_length_max(SHARPEST)
     }
 
-    /// What has `values` at the old nodes, at a new one; behind the last value as at it.
+    /// Interpolates `values` of the old nodes at a new one; constant behind the last.
     fn at_node(&self, values: &[f64], new: usize) -> f64 {
         let place = self.new_nodes[new];
         let after = self.old_nodes.partition_point(|node| *node <= place);

@@ -1,15 +1,15 @@
-//! Sleep: strands that lie still are left alone until something happens to them.
+//! Sleep: strands at rest are not simulated until something disturbs them.
 //!
-//! Once a tick each strand is asked: has it stayed in its place for a while, and is nothing going on
-//! that could move it or its bonds? Then it sleeps ([`StrandSleep`](crate::StrandSleep)): velocities are zero,
-//! and forces, contacts, rest shapes and projection pass it by. It wakes when the head moves,
-//! gravity or a setting changes, a blower reaches it, a collider comes, goes or moves near it, a
-//! neighbour pushes it otherwise than before, its held nodes or its root move, bonds are treated,
-//! water or a droplet is on it, or somebody writes to its [`Strand`](crate::Strand) or
+//! Once a tick each strand is checked: has it been still for a while, and does nothing act that could
+//! move it or its bonds? Then it sleeps ([`StrandSleep`](crate::StrandSleep)): velocities are zero,
+//! and forces, contacts, rest shapes and projection skip it. It wakes when the head moves,
+//! gravity or a setting changes, a blower reaches it, a collider appears, disappears or moves near it,
+//! contact with a neighbour changes, its held nodes or its root move, bonds are treated,
+//! water or a droplet is on it, or game code writes to its [`Strand`](crate::Strand) or
 //! [`Bonds`](crate::Bonds).
 //!
 //! Wet hair, hair in the wind and hair whose bonds are moving never sleeps: a style that is still
-//! forming would freeze. The mathematics is in [`model`].
+//! forming would freeze. The equations are in [`model`].
 
 #[doc(hidden)]
 pub mod model;
@@ -24,16 +24,16 @@ setting! {
     /// When strands fall asleep. Component of a [`Hair`](crate::Hair), may change at any time; where
     /// absent, [`HairDefault<HairSleep>`](crate::HairDefault) holds.
     ///
-    /// A strand sleeps once none of its nodes has been farther than `speed` · `seconds`, and no edge
-    /// turned by more than `turning` · `seconds`, from where it was `seconds` ago. A swing's turning
-    /// point does not last that long; trembling in one place does.
+    /// A strand sleeps once none of its nodes has moved farther than `speed` · `seconds`, and no edge
+    /// has turned by more than `turning` · `seconds`, from where it was `seconds` ago. The turning point
+    /// of a swing does not last that long, so it does not count as rest; trembling in place does.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
     /// # let mut world = World::new();
-    /// // hair that a story's camera looks at closely: it is to come to rest completely
+    /// // hair in a close-up, which has to come to rest completely
     /// world.spawn((Hair, HairSleep { speed: 1e-5, ..default() }));
-    /// // hair that is never left alone
+    /// // hair that is always simulated
     /// world.spawn((Hair, HairSleep::never()));
     /// ```
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
@@ -58,12 +58,12 @@ impl HairSleep {
         Self { seconds: f32::INFINITY, ..default() }
     }
 
-    /// How far a node may stray while it counts as still (m).
+    /// How far a node may move while it counts as still (m).
     pub fn distance(&self) -> f32 {
         self.speed * self.window()
     }
 
-    /// How far an edge may turn meanwhile (rad).
+    /// How far an edge may turn while it counts as still (rad).
     pub fn angle(&self) -> f32 {
         self.turning * self.window()
     }

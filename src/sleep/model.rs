@@ -1,18 +1,18 @@
-//! Sleep as mathematics: what counts as the same place.
+//! Sleep as pure functions: what counts as the same place.
 
 use crate::rod::obstacle::Solid;
 use glam::{Quat, Vec3};
 
-/// Whether something has changed by no more than `most`; what is not a number has.
+/// Whether a change is at most `most`; false for NaN.
 pub fn within(change: f32, most: f32) -> bool {
     change <= most
 }
 
-/// Whether all points are within `distance` (m) of where they were. Points that are not finite, and
-/// lists of other lengths, are elsewhere.
+/// Whether all points are within `distance` (m) of where they were; false for non-finite points and
+/// lists of different lengths.
 pub fn stays(before: &[Vec3], now: &[Vec3], distance: f32) -> bool {
     let square = distance * distance;
-    // From the tip, which moves most.
+    // From the tip, which moves most, for an early exit.
     before.len() == now.len()
         && before.iter().rev().zip(now.iter().rev()).all(|(a, b)| a.distance_squared(*b) <= square)
 }
@@ -30,19 +30,20 @@ pub fn turn(a: Quat, b: Quat) -> f32 {
     2.0 * apart.sqrt()
 }
 
-/// How far from its centre the surface of a solid reaches (m); of a half-space, where hair is.
+/// Distance from its centre to the farthest point of a solid's surface (m); 1 for a half-space.
 pub fn lever(solid: &Solid) -> f32 {
     match *solid {
+        Solid::Placed(ref placed) => placed.shape.reach() * placed.scale,
         Solid::HalfSpace { .. } => 1.0,
         Solid::Capsule { a, b, radius } => 0.5 * a.distance(b) + radius,
         Solid::Cylinder { radius, half_height, .. } => radius + half_height,
     }
 }
 
-/// How far a solid has gone from one place to another, apart from turning about its own centre (m).
+/// How far a solid has moved from one pose to another, without rotation about its own centre (m).
 /// Infinite between solids of different kinds.
 pub fn displacement(before: &Solid, now: &Solid) -> f32 {
-    match (*before, *now) {
+    match (before.clone(), now.clone()) {
         (Solid::HalfSpace { normal: n, point: p }, Solid::HalfSpace { normal: m, point: q }) => {
             p.distance(q) + n.distance(m) * lever(now)
         }
@@ -58,11 +59,16 @@ pub fn displacement(before: &Solid, now: &Solid) -> f32 {
                 + (radius - r).abs()
                 + (half_height - h).abs()
         }
+        (Solid::Placed(one), Solid::Placed(other)) => {
+            let change = one.shape.change(&other.shape) * other.scale;
+            let grown = (one.scale - other.scale).abs() * other.shape.reach();
+            one.center.distance(other.center) + grown + change
+        }
         _ => f32::INFINITY,
     }
 }
 
-/// Which nodes are held, in one number: other nodes give another one.
+/// Hash of which nodes are held.
 pub fn held_nodes(targets: &[Option<Vec3>]) -> u64 {
     let held = targets.iter().zip(1u64..).filter(|(target, _)| target.is_some());
     held.fold(0, |sum, (_, i)| sum.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(i))
@@ -73,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_trembles_stays_and_what_creeps_does_not() {
+    fn trembling_counts_as_still_and_creeping_does_not() {
         let at = |x: f32| [Vec3::ZERO, Vec3::X * x];
         assert!(stays(&at(1.0), &at(1.00004), 5e-5));
         assert!(!stays(&at(1.0), &at(1.00006), 5e-5));
@@ -94,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn solids_go_as_far_as_their_farthest_point() {
+    fn solids_move_as_far_as_their_farthest_point() {
         let ball = |x: f32, radius: f32| Solid::Capsule { a: Vec3::X * x, b: Vec3::X * x, radius };
         assert!((displacement(&ball(0.0, 0.1), &ball(0.02, 0.1)) - 0.02).abs() < 1e-7);
         assert!((displacement(&ball(0.0, 0.1), &ball(0.0, 0.13)) - 0.03).abs() < 1e-7);
@@ -104,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn other_held_nodes_make_another_number() {
+    fn other_held_nodes_have_another_hash() {
         let held = |at: &[usize]| {
             let mut targets = [None; 8];
             at.iter().for_each(|i| targets[*i] = Some(Vec3::ONE));

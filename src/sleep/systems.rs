@@ -1,4 +1,4 @@
-//! At the start of a tick, in `Roots`: who sleeps in it.
+//! At the start of a tick, in `Roots`: which strands sleep in it.
 
 use super::{
     HairSleep,
@@ -7,17 +7,17 @@ use super::{
 use crate::{
     bond::{BondChanges, BondInfluence, Bonds, Cuticle},
     contact::{HairCollider, HairReach, LockContact, seen_from, with_balls},
-    environment::{AirDrag, HairGravity, LocalBlower, LocalWinds, Winds, wind::wind},
+    environment::{AirDrag, HairGravity, LocalWinds, Winds},
     mass_spring::Springs,
     parallel::{Nanos, for_each},
     rod::{
-        HairSolver, Stiffness, Sweeps,
+        HairSolver, HairStiffness, Sweeps,
         obstacle::{Obstacle, Solid},
     },
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
     strand::{
-        AddedMass, Hair, HeldNodes, Pose, Sleepers, StillPose, Strand, StrandModel, StrandOf,
+        AddedMass, Hair, HeldNodes, Pose, SleepPose, Sleepers, Strand, StrandModel, StrandOf,
         StrandSleep, Strands, TickPose,
     },
     treatment::Treatments,
@@ -28,14 +28,14 @@ use bevy::{
     prelude::*,
 };
 
-/// The wind in which no strand sleeps (m/s²): it would bend hair by a thousandth of what gravity
-/// does, and dry it.
+/// Wind from which on no strand sleeps (m/s²): it bends hair by a thousandth of what gravity does, and
+/// dries it.
 const BREEZE: f32 = 0.01;
 
-/// How much room a strand has to a moving collider beyond its own distance from it (m).
+/// Extra distance to a moving collider, beyond the contact radius, within which strands wake (m).
 const CLEARANCE: f32 = 1e-3;
 
-/// Strands that lie still fall asleep, and wake when something happens to them.
+/// Strands at rest fall asleep, and wake when something disturbs them.
 pub struct SleepPlugin;
 
 impl Plugin for SleepPlugin {
@@ -48,12 +48,12 @@ impl Plugin for SleepPlugin {
     }
 }
 
-/// All settings by which hair at rest might come to rest elsewhere.
+/// All settings on which the equilibrium of hair depends.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 struct Conditions {
     gravity: Vec3,
     sleep: HairSleep,
-    stiffness: Stiffness,
+    stiffness: HairStiffness,
     solver: HairSolver,
     sweeps: Sweeps,
     influence: BondInfluence,
@@ -68,7 +68,7 @@ struct Conditions {
 struct RestSettings<'w, 's> {
     gravity: Res<'w, HairGravity>,
     sleep: Settings<'w, 's, HairSleep>,
-    stiffness: Settings<'w, 's, Stiffness>,
+    stiffness: Settings<'w, 's, HairStiffness>,
     solver: Settings<'w, 's, HairSolver>,
     sweeps: Settings<'w, 's, Sweeps>,
     influence: Settings<'w, 's, BondInfluence>,
@@ -97,7 +97,7 @@ impl RestSettings<'_, '_> {
     }
 }
 
-/// What a hair was like when something last happened to it.
+/// The conditions of a hair when they last changed.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub(super) struct SleepSnapshot {
@@ -109,18 +109,18 @@ pub(super) struct SleepSnapshot {
     solids: Vec<SeenCollider>,
 }
 
-/// What happened to a hair as a whole since the tick before.
+/// Changes of a hair as a whole since the previous tick.
 struct WakeEvents {
     sleep: HairSleep,
-    /// All its strands are awake.
+    /// All its strands wake.
     stirred: bool,
-    /// Where colliders have come, gone or moved: what is within reach of these (m).
+    /// Colliders that appeared, disappeared or moved: strands within reach of these wake (m).
     solids: Vec<(Solid, f32)>,
     winds: LocalWinds,
 }
 
 impl SleepSnapshot {
-    /// Notes what is otherwise, and says what that means for the strands.
+    /// Stores the present conditions and returns which strands the changes wake.
     fn wake_events(
         &mut self,
         conditions: Conditions,
@@ -131,7 +131,7 @@ impl SleepSnapshot {
     ) -> WakeEvents {
         let distance = conditions.sleep.distance();
         let apart = pose.translation.distance(self.pose.translation) / pose.scale;
-        // A turn counts as what it does to the tip of a long strand.
+        // Rotation counts as the displacement of the tip of a long strand.
         let turned = turn(self.pose.rotation, pose.rotation) * LONG_STRAND;
         let scaled = (pose.scale / self.pose.scale - 1.0).abs() * LONG_STRAND;
         let rests = apart <= distance && turned <= distance && scaled <= distance;
@@ -141,8 +141,8 @@ impl SleepSnapshot {
         }
         self.conditions = Some(conditions);
         self.members = members;
-        let skin = conditions.contact.radius + CLEARANCE;
-        let solids = self.compare_solids(seen, distance, skin, substeps);
+        let clearance = conditions.contact.radius + CLEARANCE;
+        let solids = self.compare_solids(seen, distance, clearance, substeps);
         WakeEvents {
             sleep: conditions.sleep,
             stirred: !(rests && same),
@@ -151,25 +151,25 @@ impl SleepSnapshot {
         }
     }
 
-    /// The solids that have changed, before and after, with the reach in which they may be felt
-    /// within this tick.
+    /// The solids that have changed, before and after, with the distance within which they may act in
+    /// this tick.
     fn compare_solids(
         &mut self,
         now: Vec<SeenCollider>,
         distance: f32,
-        skin: f32,
+        clearance: f32,
         substeps: u32,
     ) -> Vec<(Solid, f32)> {
         let mut changed = Vec::new();
         if now.len() == self.solids.len() {
             for (known, now) in self.solids.iter_mut().zip(now) {
                 let moved = known.moved(&now);
-                // What is not finite moves too.
+                // NaN counts as moved.
                 if !within(moved, distance) {
-                    // It goes on for the rest of the tick.
-                    let reach = skin + moved * substeps as f32;
-                    changed.extend([(known.solid, reach), (now.solid, reach)]);
-                    *known = now;
+                    // It keeps moving for the rest of the tick.
+                    let reach = clearance + moved * substeps as f32;
+                    let before = core::mem::replace(known, now);
+                    changed.extend([(before.solid, reach), (known.solid.clone(), reach)]);
                 }
             }
             return changed;
@@ -177,15 +177,16 @@ impl SleepSnapshot {
         let unknown = |one: &&SeenCollider, others: &[SeenCollider]| {
             others.iter().all(|other| !within(other.moved(one), distance))
         };
-        changed.extend(now.iter().filter(|s| unknown(s, &self.solids)).map(|s| (s.solid, skin)));
-        changed.extend(self.solids.iter().filter(|s| unknown(s, &now)).map(|s| (s.solid, skin)));
+        let told = |s: &SeenCollider| (s.solid.clone(), clearance);
+        changed.extend(now.iter().filter(|s| unknown(s, &self.solids)).map(told));
+        changed.extend(self.solids.iter().filter(|s| unknown(s, &now)).map(told));
         self.solids = now;
         changed
     }
 }
 
-/// A collider as a hair saw it.
-#[derive(Clone, Copy, Debug)]
+/// A collider in the frame of a hair.
+#[derive(Clone, Debug)]
 struct SeenCollider {
     solid: Solid,
     friction: f32,
@@ -193,7 +194,7 @@ struct SeenCollider {
 }
 
 impl SeenCollider {
-    /// How far its surface has moved (m): a ball that only turns takes hair along too.
+    /// How far its surface has moved (m): a rotating ball drags hair, too.
     fn moved(&self, now: &Self) -> f32 {
         let friction = if self.friction == now.friction { 0.0 } else { f32::INFINITY };
         let turned = turn(self.rotation, now.rotation) * lever(&now.solid);
@@ -201,16 +202,16 @@ impl SeenCollider {
     }
 }
 
-/// How long a long strand is (m).
+/// Length of a long strand (m), the lever for rotations of the head.
 const LONG_STRAND: f32 = 0.3;
 
 struct Item<'a> {
     hair: usize,
     strand: Mut<'a, Strand>,
     sleep: Mut<'a, StrandSleep>,
-    still: Mut<'a, StillPose>,
+    still: Mut<'a, SleepPose>,
     held: Option<&'a HeldNodes>,
-    /// Whether its bonds or its water are on the move, or somebody wrote to it.
+    /// Whether its bonds or its water are changing, or it was written to from outside the tick.
     restless: bool,
 }
 
@@ -234,7 +235,7 @@ fn update_sleep(
         &StrandOf,
         &mut Strand,
         &mut StrandSleep,
-        &mut StillPose,
+        &mut SleepPose,
         (Ref<Bonds>, &BondChanges, &AddedMass),
         (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
     )>,
@@ -243,9 +244,9 @@ fn update_sleep(
     let mut index_of = EntityHashMap::<usize>::default();
     let colliders = with_balls(&colliders);
     for (hair, frame, mut snapshot, sleepers, members, reach) in &mut hairs {
-        // What comes within reach is seen as come, far from any strand. Where all are carried, nobody
-        // has to be woken.
-        let colliders = if sleepers.awake + sleepers.asleep > 0 { &colliders[..] } else { &[] };
+        // A collider that comes within reach counts as new while it is still far from any strand.
+        // Without simulated strands there is none to wake.
+        let colliders = if *sleepers != Sleepers::default() { &colliders[..] } else { &[] };
         let near = colliders
             .iter()
             .filter(|(ball, ..)| reach.is_none_or(|reach| reach.is_near(frame, ball, step.count)));
@@ -263,7 +264,7 @@ fn update_sleep(
         index_of.insert(hair, wake_events.len());
         wake_events.push(new);
     }
-    // Strands come mostly hair by hair.
+    // Strands are mostly grouped by hair.
     let mut last = None;
     let mut hair_of = |hair: Entity| match last {
         Some((known, index)) if known == hair => index,
@@ -275,7 +276,7 @@ fn update_sleep(
     };
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
     for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
-        // The carried sleep when those do whom they follow.
+        // Followers sleep when their guides do.
         if sleep.is_follower() {
             continue;
         }
@@ -319,7 +320,12 @@ fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
             || is_blown(strand, &wake_events.winds)
         {
             sleep.bypass_change_detection().wake_up();
-            still.bypass_change_detection().begin(strand, held_nodes(targets));
+            still.bypass_change_detection().begin(
+                strand.positions(),
+                strand.orientations(),
+                strand.root_frame(),
+                held_nodes(targets),
+            );
         }
         return;
     }
@@ -336,7 +342,12 @@ fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
         || is_blown(strand, &wake_events.winds)
     {
         sleep.wake_up();
-        still.begin(strand, held_nodes(targets));
+        still.begin(
+            strand.positions(),
+            strand.orientations(),
+            strand.root_frame(),
+            held_nodes(targets),
+        );
         return;
     }
     sleep.lie_still(seconds);
@@ -346,7 +357,7 @@ fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
         for p in strand.positions() {
             (still.low, still.high) = (still.low.min(*p), still.high.max(*p));
         }
-        // What comes in this very tick would find it asleep.
+        // A collider that arrives in this tick would meet it asleep.
         if !comes_near(still, &wake_events.solids) {
             sleep.fall_asleep();
             strand.rest();
@@ -354,19 +365,19 @@ fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
     }
 }
 
-/// A sleeper's velocities are zero: who gave it another has pushed it.
+/// A sleeper's velocities are zero: any other was written from outside.
 fn was_pushed(strand: &Strand) -> bool {
     strand.velocities().iter().any(|v| *v != Vec3::ZERO)
 }
 
-fn has_moved_root(strand: &Strand, still: &StillPose, distance: f32, angle: f32) -> bool {
+fn has_moved_root(strand: &Strand, still: &SleepPose, distance: f32, angle: f32) -> bool {
     let stays = still.positions.first().zip(strand.positions().first());
     !stays.is_some_and(|(a, b)| a.distance(*b) <= distance)
         || !within(turn(still.root_frame, strand.root_frame()), angle)
 }
 
-/// Whether other nodes are held than before, or the same ones elsewhere.
-fn pulls(strand: &Strand, still: &StillPose, targets: &[Option<Vec3>], distance: f32) -> bool {
+/// Whether other nodes are held than before, or the same ones at other targets.
+fn pulls(strand: &Strand, still: &SleepPose, targets: &[Option<Vec3>], distance: f32) -> bool {
     if targets.is_empty() && still.held == 0 {
         return false;
     }
@@ -375,23 +386,17 @@ fn pulls(strand: &Strand, still: &StillPose, targets: &[Option<Vec3>], distance:
         || held.filter_map(|(t, p)| Some(t.as_ref()?.distance(*p))).any(|d| !within(d, distance))
 }
 
-fn comes_near(still: &StillPose, solids: &[(Solid, f32)]) -> bool {
-    solids.iter().any(|&(solid, reach)| {
-        let near = Obstacle { solid, motion: None, friction: 0.0 };
-        !reach.is_finite() || near.may_touch(still.low, still.high, reach)
-    })
+fn comes_near(still: &SleepPose, solids: &[(Solid, f32)]) -> bool {
+    solids
+        .iter()
+        .any(|(solid, reach)| !reach.is_finite() || solid.may_reach(still.low, still.high, *reach))
 }
 
-/// Whether air that moves reaches the strand's root, middle or tip.
+/// Whether moving air reaches the strand's root, middle or tip.
 fn is_blown(strand: &Strand, winds: &LocalWinds) -> bool {
     let (p, last) = (strand.positions(), strand.edges().saturating_sub(1));
-    if winds.flows() && [0, last / 2, last].into_iter().any(|i| !winds.around(p[i]).is_calm()) {
-        return true;
-    }
-    winds.blowers.iter().any(|LocalBlower { nozzle, aim, blower }| {
-        [0, last / 2, last].into_iter().any(|i| {
-            let felt = wind(blower.strength, *nozzle, *aim, p[i], p[i + 1] - p[i]);
-            !within(felt.length(), BREEZE)
-        })
+    [0, last / 2, last].into_iter().any(|i| {
+        let air = winds.around_edge(p[i], p[i + 1] - p[i]);
+        !within(air.acceleration.length(), BREEZE) || winds.flows() && !air.is_calm()
     })
 }

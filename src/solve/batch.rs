@@ -1,9 +1,8 @@
-//! Which strands are solved side by side: those of one hair with equal node count, as they lie in their
+//! Which strands are solved side by side: those of one hair with equal node count, in the order of their
 //! tables.
 //!
-//! Tables are cut into parts, and each thread gathers its own parts' strands and solves what fills a
-//! block. What is left over, few where strands are alike, is put together in a second round, so that
-//! lanes are full however uneven the strands are.
+//! Tables are split into parts, and each thread gathers the strands of its parts and solves full blocks.
+//! The remainders are combined in a second round, so that lanes are full however node counts vary.
 
 use super::{
     batched::Batched,
@@ -34,9 +33,9 @@ fn key<T: Batched>(item: &T) -> (Entity, usize) {
     (item.hair(), item.source().strand.nodes())
 }
 
-/// Solves all strands of about so many `nodes`. `item` makes an item of a row that is to be solved;
-/// strands of hairs without `params_of` are left out. Faults come in the same order on any number of
-/// threads.
+/// Solves all strands, of about `nodes` nodes each (for the cost estimate). `item` makes an item of a
+/// row to be solved; strands of hairs without `params_of` are skipped. Faults are in the same order on
+/// any number of threads.
 pub(super) fn for_each_batch<C: Columns, T: Batched>(
     tables: impl Iterator<Item = C>,
     nodes: usize,
@@ -77,8 +76,8 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
     faults.into_iter().flatten().collect()
 }
 
-/// Calls `work` with blocks of alike strands as long as they are full, and returns what is left over.
-/// Lanes do not see each other, so how strands are grouped changes no bit of the result.
+/// Calls `work` with full blocks of strands of equal node count, and returns the remainder. Lanes are
+/// independent, so the grouping changes no bit of the result.
 fn full_blocks<T: Batched>(strands: &mut Vec<T>, mut work: impl FnMut(&mut [T])) -> Vec<T> {
     if !strands.is_sorted_by_key(key) {
         strands.sort_by_key(key);
@@ -155,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn every_strand_is_in_one_block_of_its_like_and_blocks_are_full() {
+    fn every_strand_is_in_one_block_of_equal_node_count_and_blocks_are_full() {
         for lengths in [1, 3, 16, 40] {
             let mut world = World::new();
             let [hair, bald] = [1, 2].map(|i| Entity::from_raw_u32(i).unwrap());

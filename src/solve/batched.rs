@@ -1,4 +1,4 @@
-//! What a kernel offers so that strands can be solved in batches.
+//! The trait of kernels that solve strands in batches.
 
 use crate::{
     lanes::LANES,
@@ -7,7 +7,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// What a lane is filled from.
+/// The data that a lane is filled from.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub(super) strand: &'a Strand,
@@ -15,7 +15,7 @@ pub(super) struct Source<'a> {
     pub(super) held: Option<&'a HeldNodes>,
 }
 
-/// What a method keeps of edges from substep to substep, beside orientations.
+/// Edge state that a method keeps from substep to substep, beside orientations.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kept {
     Nothing,
@@ -23,22 +23,22 @@ pub(super) enum Kept {
     Tensions,
 }
 
-/// A strand as it is taken from its table, of one kind of kernel: rods or springs.
+/// A strand taken from its table for one kind of kernel: rods or springs.
 pub(super) trait Batched: Sized + Send {
-    /// What holds for a hair's strands in a substep.
+    /// Parameters of a hair's strands in a substep.
     type Params;
-    /// A block with what else the kernel needs.
+    /// A block with the additional state of the kernel.
     type Lanes: Default;
 
     /// The strand.
     fn entity(&self) -> Entity;
     /// Its hair.
     fn hair(&self) -> Entity;
-    /// What its lane is filled from.
+    /// The data that its lane is filled from.
     fn source(&self) -> Source<'_>;
-    /// Its state, to be written.
+    /// Its state, for writing.
     fn strand_mut(&mut self) -> &mut Strand;
-    /// Asks for its memory.
+    /// Prefetches it.
     fn prefetch(&self) {
         self.source().strand.prefetch();
     }
@@ -46,7 +46,7 @@ pub(super) trait Batched: Sized + Send {
     fn remembered(&self, _params: &Self::Params) -> Vec<Vec3> {
         Vec::new()
     }
-    /// What of edges goes back into strands, beside orientations.
+    /// Edge state that is written back, beside orientations.
     fn kept(_params: &Self::Params) -> Kept {
         Kept::Nothing
     }
@@ -54,7 +54,7 @@ pub(super) trait Batched: Sized + Send {
     fn dt(params: &Self::Params) -> f32;
     /// The block's nodes and edges.
     fn block(lanes: &mut Self::Lanes) -> &mut BlockLanes;
-    /// Takes a block, whose nodes are gathered, through a substep.
+    /// Advances a block with gathered nodes by a substep.
     fn step(
         lanes: &mut Self::Lanes,
         sources: &[Source<'_>; LANES],

@@ -21,9 +21,9 @@ pub(super) fn in_lanes<'a, T, U>(items: &'a [T], of: impl Fn(&'a T) -> U) -> [U;
     core::array::from_fn(|lane| of(items.get(lane).unwrap_or(&items[0])))
 }
 
-/// Puts strands' nodes and lengths into the lanes; held nodes with where they are to be and the
-/// velocity that takes them there. [`weigh`](crate::rod::step::weigh) has to follow: until then `w` is
-/// how many dry nodes a node weighs.
+/// Writes strands' nodes and lengths into the lanes; held nodes with their target and the velocity
+/// toward it. [`weigh`](crate::rod::step::weigh) has to follow: until then `w` is a node's mass in dry
+/// nodes.
 pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], dt: f32) {
     for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
         let strands = four.map(|source| source.strand);
@@ -34,9 +34,18 @@ pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], d
     for node in &mut block.nodes {
         node.w = [1.0; LANES];
     }
+    block.gravity.clear();
+    if from.iter().any(|source| !source.added.in_water.is_empty()) {
+        block.gravity.resize(block.nodes.len(), [1.0; LANES]);
+    }
     for (lane, Source { strand, added, held }) in from.iter().enumerate() {
         for (node, load) in block.nodes.iter_mut().zip(&added.mass) {
             node.w[lane] += load;
+        }
+        let in_water = block.nodes.iter_mut().zip(&mut block.gravity).zip(&added.in_water);
+        for ((node, gravity), water) in in_water {
+            node.w[lane] *= water.inertia;
+            gravity[lane] = water.gravity;
         }
         let hold = |node: &mut NodeLanes, from: Vec3, to: Vec3| {
             put3(&mut node.from, lane, from);
@@ -52,8 +61,8 @@ pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], d
     }
 }
 
-/// Puts what became of the lanes back into the strands of `items`. A strand whose state is not finite
-/// any more is put back to what it was; says which ones were, the first time.
+/// Writes the lanes back into the strands of `items`. A strand whose new state is not finite is reset to
+/// its previous one; returns faults for those not reported before.
 pub(super) fn scatter<T: Batched>(
     block: &BlockLanes,
     items: &mut [T],

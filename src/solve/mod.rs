@@ -1,4 +1,4 @@
-//! `Projection`: strands from their tables into lanes, through their kernel, and back.
+//! `Projection`: gathers strands from their tables into lanes, runs their kernel, and scatters back.
 //!
 //! The only room that knows both entities and lanes. Strands keep their own vectors, so that game code
 //! reads and writes them; those of a hair with equal node count are gathered into a block of

@@ -14,13 +14,13 @@ use crate::{
     lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4},
     parallel::{prefetch, tables},
     rod::{
-        HairSolver, SolverMethod, Stiffness, Sweeps,
+        HairSolver, HairStiffness, SolverMethod, Sweeps,
         block::BlockLanes,
         direct::{self, DirectParams},
         obstacle::Obstacle,
-        step::{self, StepParams},
+        step::{self, SweepParams},
     },
-    schedule::{EffectiveSubsteps, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
     strand::{AddedMass, Hair, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
 };
@@ -33,20 +33,21 @@ pub struct RodPlugin;
 
 impl Plugin for RodPlugin {
     fn build(&self, app: &mut App) {
-        setting::plugin::<Stiffness>(app);
+        setting::plugin::<HairStiffness>(app);
         setting::plugin::<HairSolver>(app);
         setting::plugin::<Sweeps>(app);
         substeps::plugin(app);
-        app.add_systems(HairTick, step_rods.in_set(HairSystems::Rods));
+        app.add_systems(HairTick, step_rods.in_set(HairSystems::Rods))
+            .add_systems(HairSettle, step_rods.in_set(HairSystems::Rods));
     }
 }
 
-/// What the projection needs of a hair, resolved once a substep.
+/// Parameters of a hair for the projection, resolved once a substep.
 struct HairParams {
     level: Level,
     method: Method,
     dt: f32,
-    skin: f32,
+    clearance: f32,
     bending_length: f32,
     influence: [f32; 4],
     obstacles: Vec<Obstacle>,
@@ -55,13 +56,13 @@ struct HairParams {
 enum Method {
     Direct {
         params: DirectParams,
-        /// What the motion of the hair's frame did to what rests in the world.
-        carry: Option<Isometry3d>,
+        /// How points at rest in the world moved in the hair's frame.
+        frame_delta: Option<Isometry3d>,
     },
-    Sweeps(StepParams, Sweeps),
+    Sweeps(SweepParams, Sweeps),
 }
 
-struct Rod<'a> {
+struct RodStrand<'a> {
     entity: Entity,
     hair: Entity,
     strand: &'a mut Strand,
@@ -71,7 +72,7 @@ struct Rod<'a> {
     held: Option<&'a HeldNodes>,
 }
 
-impl Batched for Rod<'_> {
+impl Batched for RodStrand<'_> {
     type Params = HairParams;
     type Lanes = BlockLanes;
 
@@ -125,11 +126,11 @@ impl Batched for Rod<'_> {
         params: &HairParams,
     ) {
         gather_frames(block, sources, items);
-        let near = block.near(&params.obstacles, params.dt, params.skin);
+        let near = block.near(&params.obstacles, params.dt, params.clearance);
         match &params.method {
-            Method::Direct { params: direct, carry } => {
+            Method::Direct { params: direct, frame_delta } => {
                 gather_tensions(block, sources);
-                gather_roots(block, sources, carry.unwrap_or_default());
+                gather_roots(block, sources, frame_delta.unwrap_or_default());
                 direct::weigh(params.level, block, params.bending_length, params.dt);
                 direct::step(params.level, block, direct, &near);
             }
@@ -147,7 +148,7 @@ fn step_rods(
     model: Settings<StrandModel>,
     (solver, sweeps): (Settings<HairSolver>, Settings<Sweeps>),
     gravity: Res<HairGravity>,
-    stiffness: Settings<Stiffness>,
+    stiffness: Settings<HairStiffness>,
     influence: Settings<BondInfluence>,
     contact: Settings<LockContact>,
     hairs: Query<(Option<&Obstacles>, &TickPose), With<Hair>>,
@@ -170,7 +171,7 @@ fn step_rods(
         let (obstacles, pose) =
             hairs.get(hair).ok().filter(|_| model.of(hair) == StrandModel::Rod)?;
         let substep = substeps.of(hair)?;
-        let (dt, skin, stiffness) = (substep.dt, contact.of(hair).radius, stiffness.of(hair));
+        let (dt, clearance, stiffness) = (substep.dt, contact.of(hair).radius, stiffness.of(hair));
         let solver = solver.of(hair);
         let method = match solver.method {
             SolverMethod::Direct => Method::Direct {
@@ -179,19 +180,19 @@ fn step_rods(
                     gravity: pose.now().direction_in(gravity),
                     damping: stiffness.damping,
                     limiter_steps: solver.limiter_steps,
-                    skin,
+                    clearance,
                 },
-                carry: pose.frame_delta(),
+                frame_delta: pose.frame_delta(),
             },
             SolverMethod::Sweeps => {
                 let sweeps = sweeps.of(hair);
-                let params = StepParams {
+                let params = SweepParams {
                     dt,
                     iterations: substep.iterations(sweeps.iterations),
                     projection: sweeps.projection,
                     limiter_steps: sweeps.limiter_steps,
                     internal_damping: sweeps.internal_damping,
-                    skin,
+                    clearance,
                 };
                 Method::Sweeps(params, sweeps)
             }
@@ -200,7 +201,7 @@ fn step_rods(
             level,
             method,
             dt,
-            skin,
+            clearance,
             bending_length: stiffness.bending_length,
             influence: influence.of(hair).as_array(),
             obstacles: obstacles.map_or_else(Vec::new, |all| all.solids.clone()),
@@ -217,14 +218,14 @@ fn step_rods(
                 && rest.darboux.len() == strand.edges()
                 && rest.stiffness.len() == strand.edges();
             let (entity, hair) = (*entity, of.0);
-            is_stepped.then_some(Rod { entity, hair, strand, rest, bonds, added, held })
+            is_stepped.then_some(RodStrand { entity, hair, strand, rest, bonds, added, held })
         },
     );
     faults.write_batch(lost);
 }
 
 /// Orientations, rest shapes and stiffness.
-fn gather_frames(block: &mut BlockLanes, from: &[Source<'_>; LANES], items: &[Rod<'_>]) {
+fn gather_frames(block: &mut BlockLanes, from: &[Source<'_>; LANES], items: &[RodStrand<'_>]) {
     let rest = in_lanes(items, |item| item.rest);
     let edges = &mut block.edges;
     for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
@@ -247,12 +248,12 @@ fn gather_tensions(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
     }
 }
 
-/// Where roots come from.
-fn gather_roots(block: &mut BlockLanes, from: &[Source<'_>; LANES], carry: Isometry3d) {
+/// Start positions and frames of the roots.
+fn gather_roots(block: &mut BlockLanes, from: &[Source<'_>; LANES], frame_delta: Isometry3d) {
     for (lane, source) in from.iter().enumerate() {
         let (place, frame) = source.strand.root_before();
-        put3(&mut block.nodes[0].from, lane, carry * place);
-        put4(&mut block.root_from, lane, carry.rotation * frame);
+        put3(&mut block.nodes[0].from, lane, frame_delta * place);
+        put4(&mut block.root_from, lane, frame_delta.rotation * frame);
     }
 }
 

@@ -11,11 +11,11 @@ use crate::{
     lanes::{LANES, put_quaternions},
     mass_spring::{
         Springs,
-        block::{SpringLanes, StepParams, step},
+        block::{SpringLanes, SpringParams, step},
     },
     parallel::tables,
     rod::{block::BlockLanes, obstacle::Obstacle, step::weigh},
-    schedule::{EffectiveSubsteps, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
     strand::{AddedMass, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
 };
@@ -29,14 +29,15 @@ pub struct SpringPlugin;
 impl Plugin for SpringPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<Springs>(app);
-        app.add_systems(HairTick, step_springs.in_set(HairSystems::Springs));
+        app.add_systems(HairTick, step_springs.in_set(HairSystems::Springs))
+            .add_systems(HairSettle, step_springs.in_set(HairSystems::Springs));
     }
 }
 
-/// What one hair's strands share in a substep.
+/// Parameters of a hair's strands in a substep.
 struct HairParams {
     level: Level,
-    step: StepParams,
+    step: SpringParams,
     obstacles: Vec<Obstacle>,
 }
 
@@ -88,7 +89,7 @@ impl Batched for SpringStrand<'_> {
             put_quaternions(&mut strands.edges, group, orientations, |e| &mut e.q);
         }
         weigh(*level, strands, None);
-        let near = strands.near(obstacles, params.dt, params.skin);
+        let near = strands.near(obstacles, params.dt, params.clearance);
         step(*level, lanes, params, &near);
     }
 }
@@ -118,11 +119,11 @@ fn step_springs(
         (model.of(hair) == StrandModel::MassSpring).then(|| {
             let full = springs.of(hair);
             let iterations = substep.iterations(full.iterations);
-            let step = StepParams {
+            let step = SpringParams {
                 dt: substep.dt,
                 springs: Springs { iterations, ..full },
                 gravity: pose.now().direction_in(gravity),
-                skin: contact.of(hair).radius,
+                clearance: contact.of(hair).radius,
             };
             let obstacles = obstacles.map_or_else(Vec::new, |all| all.solids.clone());
             HairParams { level, step, obstacles }

@@ -16,7 +16,7 @@ pub(super) fn plugin(app: &mut App) {
     );
 }
 
-/// Rods that are solved directly and have nothing to do with water take longer ones.
+/// Directly solved rods without water take longer substeps.
 fn choose_substeps(
     step: Res<HairStep>,
     solver: Settings<HairSolver>,

@@ -1,10 +1,10 @@
-//! Where things are within a tick, and what the motion of the hair's own frame does to the hair.
+//! Poses of entities within a tick, and inertia from the motion of the hair's frame.
 //!
 //! Transforms change once a tick or a frame; a substep wants them in between. [`TickPose`] takes
 //! hair, colliders, rods and blowers from where they were to where they are in equal parts.
 //!
 //! Strands live in the frame of their `Hair`, where roots do not move. In a frame that moves, things
-//! at rest in the world seem to move the other way: each substep the nodes are carried by the inverse
+//! at rest in the world seem to move the other way: each substep the nodes are moved by the inverse
 //! of the frame's motion, which is exactly inertia.
 
 use crate::setting::setting;
@@ -29,25 +29,25 @@ pub struct TickPose {
     inertia: Vec2,
     jumps: bool,
     was_invalid: bool,
-    frames: Frames,
+    frames: FramePoses,
 }
 
 /// Where an entity was in the last frames. Frames and ticks do not keep step: a head that turns evenly
 /// from frame to frame would be seen to turn by two frames' worth in one tick and by three in the next,
 /// and its hair would stutter. So ticks look at where it was one frame ago by their own clock, between
-/// the last two frames. What is moved by ticks itself is seen as it is.
+/// the last two frames. An entity that a tick has moved is taken where it is.
 #[derive(Reflect, Clone, Debug, Default)]
 #[reflect(Default, Clone)]
-struct Frames {
+struct FramePoses {
     /// The last two frames' poses with their times (s), the newer one second.
     last: [Option<(f64, Pose)>; 2],
-    /// What the last tick saw.
+    /// The pose used by the last tick.
     seen: Option<Pose>,
     /// Whether the last change came from within the ticks.
     moved_by_ticks: bool,
 }
 
-impl Frames {
+impl FramePoses {
     fn are_valid(&self) -> bool {
         let last = self.last.iter().flatten();
         last.clone().all(|(seconds, _)| seconds.is_finite())
@@ -66,7 +66,7 @@ impl Frames {
         self.moved_by_ticks |= self.seen.is_some_and(|seen| seen != present);
         self.seen = Some(present);
         match self.last {
-            // What rests is to rest to the last bit.
+            // At rest the pose has to stay the same to the last bit.
             [Some((t0, before)), Some((t1, after))]
                 if t0 < t1 && before != after && !self.moved_by_ticks =>
             {
@@ -89,35 +89,35 @@ impl Default for TickPose {
             inertia: Vec2::ONE,
             jumps: false,
             was_invalid: false,
-            frames: Frames::default(),
+            frames: FramePoses::default(),
         }
     }
 }
 
 setting! {
-    /// What the motion of the head does to its hair. Component of a [`Hair`](crate::Hair), may change at
+    /// How much the motion of the head acts on its hair. Component of a [`Hair`](crate::Hair), may change at
     /// any time; where absent, [`HairDefault<HairInertia>`](crate::HairDefault) holds.
     ///
-    /// The fastest characters run and turn harder than any person could; with less inertia their hair
-    /// still flies behind them, but by less.
+    /// Game characters accelerate and turn harder than any person; with less inertia their hair still
+    /// trails behind them, but by less.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
     /// # let mut world = World::new();
-    /// // a cartoon hero who dashes about
+    /// // a fast cartoon character
     /// world.spawn((Hair, HairInertia { moving: 0.3, turning: 0.5, ..default() }));
     /// ```
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairInertia {
-        /// Share of the head's movement that hair is left behind by: 1 as in nature, 0 for hair that
-        /// goes along as if the head rested. Headwind and drag are scaled along.
+        /// Share of the head's translation that acts on the hair as inertia: 1 as in nature, 0 for hair
+        /// that moves with the head as if it rested. Headwind and drag are scaled by the same share.
         pub moving: f32 = 1.0, in MOVING: 0.0..=1.0, "1 is as in nature";
-        /// The same of the head's turning.
+        /// The same for the head's rotation.
         pub turning: f32 = 1.0, in TURNING: 0.0..=1.0, "1 is as in nature";
         /// A head that moves farther than this within one tick, and farther than
-        /// [`teleport_lengths`](Self::teleport_lengths), is taken to have been put elsewhere: its hair
-        /// goes along in its present shape, at rest. In the hair's own scale; 0.5 is 30 m/s at 60 Hz.
+        /// [`teleport_lengths`](Self::teleport_lengths), counts as teleported: its hair moves with it
+        /// in its present shape, at rest. In the hair's own scale; 0.5 is 30 m/s at 60 Hz.
         pub teleport_distance: f32 = 0.5, "m" in TELEPORT_DISTANCE: 0.0..=f32::INFINITY,
             safe 0.1..=f32::INFINITY, "0.5 suits games";
         /// The same in lengths of its longest strand: long hair can be swept along by what short hair
@@ -132,7 +132,7 @@ setting! {
 }
 
 impl HairInertia {
-    /// Whether going from one pose to another within a tick is being put there.
+    /// Whether a change from one pose to another within a tick counts as a teleport.
     fn is_jump(&self, from: &Pose, to: &Pose, longest: impl FnOnce() -> f32) -> bool {
         let distance = to.translation.distance(from.translation) / to.scale.max(from.scale);
         distance > self.teleport_distance && distance > self.teleport_lengths * longest()
@@ -178,7 +178,7 @@ impl Pose {
 
     /// From `self` (0) to `to` (1).
     pub(crate) fn toward(&self, to: &Self, t: f32) -> Self {
-        // What rests is to rest to the last bit: far from the origin an ulp is a jolt.
+        // At rest the pose has to stay the same to the last bit: far from the origin an ulp is a visible jump.
         if t >= 1.0 || self == to {
             return *to;
         }
@@ -226,9 +226,9 @@ impl TickPose {
         &self.before
     }
 
-    /// How this pose moves during the substep of `hair`, as seen in that: what carries a point of its
-    /// surface along; `None` if it rests. Nodes have been carried into the hair's frame as it is now, so with
-    /// full inertia what rests in the world rests in it, whatever the frame did.
+    /// How this pose moves during the substep of `hair`, in the hair's frame: the motion of a point
+    /// fixed to it; `None` if it rests. Nodes are already in the hair's frame as it is now, so with
+    /// full inertia what rests in the world has no motion here, whatever the frame did.
     pub fn motion_in(&self, hair: &TickPose) -> Option<Affine3A> {
         let began = self.at(hair.shares[0]);
         if hair.inertia == Vec2::ONE {
@@ -243,14 +243,20 @@ impl TickPose {
         (now != carried).then(|| now * carried.inverse())
     }
 
-    /// Takes the next tick's change of pose as being put elsewhere, not as motion.
+    /// Rests where it is until the next tick: its motion in the last substep is over.
+    pub(crate) fn hold(&mut self) {
+        self.before = self.now;
+        self.shares[0] = self.shares[1];
+    }
+
+    /// Treats the next tick's change of pose as a teleport, not as motion.
     pub fn jump(&mut self) {
         self.jumps = true;
     }
 
-    /// Begins a tick: the frame is to go to `to`, from where it was; from `to` itself the first time
-    /// and when it is put there, for which the `longest` strand (m) may be asked. Says whether it was
-    /// put, and whether an invalid pose should be reported.
+    /// Begins a tick in which the frame moves to `to` from where it was; from `to` itself the first time
+    /// and on a teleport, which depends on the `longest` strand (m). Returns whether it was a teleport,
+    /// and whether an invalid pose should be reported.
     pub(super) fn aim(
         &mut self,
         to: Option<Pose>,
@@ -260,7 +266,7 @@ impl TickPose {
     ) -> (bool, bool) {
         let report = to.is_none() && !self.was_invalid;
         self.was_invalid = to.is_none();
-        // Somebody wrote into it, as an inspector may: it begins anew.
+        // Written from outside, for instance by an inspector: start over.
         let known = [self.to, self.now, self.before, self.from.unwrap_or_default()];
         if !known.iter().all(Pose::is_valid) || !self.frames.are_valid() {
             *self = Self { jumps: self.jumps, was_invalid: self.was_invalid, ..default() };
@@ -271,7 +277,7 @@ impl TickPose {
         let put = !first && to.is_some_and(|to| asked || inertia.is_jump(&self.to, &to, longest));
         let to = to.map(|present| {
             if put {
-                self.frames = Frames::default();
+                self.frames = FramePoses::default();
             }
             self.frames.at(seconds, present)
         });
@@ -285,12 +291,12 @@ impl TickPose {
         (put, report)
     }
 
-    /// The way of the entity's tick (m).
+    /// The displacement of the entity in this tick (m).
     pub(super) fn way_to(&self, to: &Pose) -> Vec3 {
         to.translation - self.to.translation
     }
 
-    /// Notes where the entity is as a frame begins, `seconds` being the frame before's time.
+    /// Records where the entity is as a frame begins; `seconds` is the time of the previous frame.
     pub(super) fn record(&mut self, seconds: f64, pose: Option<Pose>) {
         if let Some(pose) = pose {
             self.frames.record(seconds, pose);
@@ -336,14 +342,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_see_frames_evenly_and_what_they_move_as_it_is() {
+    fn ticks_interpolate_frames_and_take_their_own_writes_as_they_are() {
         let at = |x: f32| Pose { translation: Vec3::X * x, ..default() };
-        let mut frames = Frames::default();
+        let mut frames = FramePoses::default();
         assert_eq!(frames.at(0.0, at(1.0)), at(1.0), "nothing is known yet");
         frames.record(1.0, at(1.0));
         frames.record(2.0, at(2.0));
         assert_eq!(frames.at(1.25, at(2.0)), at(1.25));
-        assert_eq!(frames.at(9.0, at(2.0)), at(2.0), "nothing is foretold");
+        assert_eq!(frames.at(9.0, at(2.0)), at(2.0), "no extrapolation");
         // A tick moves it: it is where the tick put it, also after it stopped there.
         assert_eq!(frames.at(2.5, at(2.5)), at(2.5));
         frames.record(3.0, at(2.5));
@@ -358,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn what_rests_in_the_world_is_carried_so_that_it_still_does() {
+    fn what_rests_in_the_world_keeps_resting_in_a_moving_frame() {
         let a = Pose {
             translation: Vec3::new(1.0, 2.0, 3.0),
             rotation: Quat::from_rotation_y(0.3),
@@ -412,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_into_a_pose_is_gone_with_the_next_tick() {
+    fn values_written_into_a_pose_are_replaced_in_the_next_tick() {
         let a = Pose { translation: Vec3::X, ..default() };
         let broken = Pose { scale: 0.0, ..a };
         let spoils: [fn(&mut TickPose, Pose); 5] = [
@@ -434,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn what_rests_far_away_rests_to_the_last_bit() {
+    fn a_pose_at_rest_far_from_the_origin_stays_the_same_to_the_last_bit() {
         for far in [1234.567, 98_765.43, 1e30] {
             let rotation = Quat::from_rotation_y(0.7);
             let at = Pose { translation: Vec3::new(far, -far, 0.3 * far), rotation, scale: 1.1 };

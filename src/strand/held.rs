@@ -4,50 +4,51 @@ use super::Strand;
 use crate::fault::{FaultKind, HairFault};
 use bevy::prelude::*;
 
-/// Nodes that something else holds: a rod they are wound on, a hand, a clip. Held nodes have no
-/// inverse mass and go where they are told, as far as the strand reaches: no edge is stretched to get
-/// there, what asks for more is told as a fault of kind [`FaultKind::Strand`]. Add it to a strand entity.
+/// Nodes that something else holds: a rod they are wound on, a hand, a clip. Held nodes have inverse
+/// mass 0 and move to their targets as far as the strand reaches: no edge is stretched. A target out of
+/// reach is reported once as a fault of kind [`FaultKind::Strand`]. Add it to a strand entity.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-#[require(HeldReach)]
+#[require(HeldNodesState)]
 pub struct HeldNodes {
-    /// For each node from the root where it is to be at the end of the next substep (m, in the
-    /// hair's frame), or `None`. May be shorter than the strand.
+    /// For each node from the root its target at the end of the next substep (m, in the hair's
+    /// frame), or `None` for a free node. May be shorter than the strand.
     pub targets: Vec<Option<Vec3>>,
 }
 
 /// Whether a strand's nodes are held farther away than it reaches. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
-pub struct HeldReach {
-    /// It does not reach; that has been told.
-    pub exceeded: bool,
+pub struct HeldNodesState {
+    /// A target is out of reach, which has been reported.
+    pub out_of_reach: bool,
 }
 
-/// The share of its length to which hair is drawn out between held nodes that would be farther apart.
-/// Drawn out straight it has one more length than ways to give, and its tensions are anything.
+/// The most that hair between two held nodes is extended, as a share of its length. Fully straight
+/// hair has more length constraints than degrees of freedom, and its tensions are undetermined.
 const TAUT: f32 = 0.99;
 
-/// How far apart the ends of free hair of a `length` are held that are to be `distance` apart (m).
-/// Hair that is straight already is left so; beyond that it is given way the more, down to [`TAUT`].
+/// How far apart the ends of free hair of a `length` are held whose targets are `distance` apart (m).
+/// Hair that is nearly straight already stays so; farther targets are reduced more, down to [`TAUT`].
 pub(crate) fn drawn_out(distance: f32, length: f32) -> f32 {
     let excess = (distance - length).clamp(0.0, (1.0 - TAUT) * length.max(0.0));
     distance.min(length) - excess
 }
 
-/// Rounding of lengths is no stretch.
+/// Tolerance for the rounding of lengths.
 const SLACK: f32 = 1e-3;
 
 impl HeldNodes {
-    /// Number and place of each held node. A place that the hair between it and the held node before,
-    /// or the root, cannot reach is brought near enough, and what is held next to it follows at the
-    /// length of its edge; one that is not finite leaves the node free.
+    /// Index and position of each held node. A target out of reach of the previous held node, or of
+    /// the root, is moved within reach, and adjacent held nodes follow at the length of their edges; a
+    /// target that is not finite leaves the node free.
     pub(crate) fn within_reach<'a>(
         &'a self,
         strand: &'a Strand,
     ) -> impl Iterator<Item = (usize, Vec3)> + 'a {
         let targets = self.targets.iter().take(strand.nodes()).enumerate();
-        let (mut last, mut length) = (strand.positions[0], 0.0);
+        let root = strand.positions.first().copied().unwrap_or_default();
+        let (mut last, mut length) = (root, 0.0);
         let (mut is_drawn, mut is_displaced) = (false, false);
         targets.filter_map(move |(node, target)| {
             let edge = node.checked_sub(1);
@@ -60,7 +61,7 @@ impl HeldNodes {
                 last = target;
                 return Some((node, last));
             };
-            // Squares of what somebody wrote may be beyond f32.
+            // Squares of user values may overflow f32.
             let way = (target - last).as_dvec3();
             let distance = way.length() as f32;
             let apart = if is_drawn {
@@ -80,7 +81,7 @@ impl HeldNodes {
         })
     }
 
-    /// The first node that cannot be where it is to be held, and by how much (m).
+    /// The first node whose target is out of reach, and by how much (m).
     fn out_of_reach(&self, strand: &Strand) -> Option<(usize, f32)> {
         let unknown = self.targets.iter().position(|t| t.is_some_and(|t| !t.is_finite()));
         let unknown = unknown.map(|node| (node, f32::INFINITY));
@@ -93,14 +94,14 @@ impl HeldNodes {
     }
 }
 
-/// What is held out of reach is told once, until it is within reach again.
+/// Reports targets out of reach once, until they are within reach again.
 pub(super) fn report_out_of_reach(
-    mut strands: Query<(Entity, &Strand, &HeldNodes, &mut HeldReach)>,
+    mut strands: Query<(Entity, &Strand, &HeldNodes, &mut HeldNodesState)>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (entity, strand, held, mut reach) in strands.iter_mut().filter(|s| s.1.nodes() > 1) {
         let found = held.out_of_reach(strand);
-        if let (Some((node, short)), false) = (found, reach.exceeded) {
+        if let (Some((node, short)), false) = (found, reach.out_of_reach) {
             let message = format!(
                 "node {node} of the strand is held {short} m farther away than hair of {} m reaches; \
                  it is held as near as it comes",
@@ -108,7 +109,7 @@ pub(super) fn report_out_of_reach(
             );
             faults.write(HairFault::new(FaultKind::Strand, message).of(entity));
         }
-        reach.set_if_neq(HeldReach { exceeded: found.is_some() });
+        reach.set_if_neq(HeldNodesState { out_of_reach: found.is_some() });
     }
 }
 
@@ -147,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_place_holds_nothing_and_is_told() {
+    fn a_target_that_is_not_finite_holds_nothing_and_is_reported() {
         let strand = strand();
         let out = |first: Option<Vec3>, x: f32| {
             let held = HeldNodes { targets: vec![None, first, Some(Vec3::X * x)] };

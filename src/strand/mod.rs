@@ -1,27 +1,29 @@
 //! Strands and the hair they make up: the entities that everything else works on.
 //!
 //! A [`Hair`] is the wearer's hair as one thing. Its strands are entities of their own, tied to it
-//! by [`StrandOf`] (despawning the hair takes them along). A strand holds arrays of nodes, because
+//! by [`StrandOf`] (despawning the hair despawns them). A strand holds arrays of nodes, because
 //! a rod is solved in sequence.
 //!
 //! All of a strand's state is in its hair's own frame: the space of the `Hair` entity's children.
-//! When that frame moves, [`frame`] carries the motion over to the nodes as inertia, spread over the
+//! When that frame moves, [`frame`] applies the motion to the nodes as inertia, spread over the
 //! substeps; drawing places the nodes with the pose that is drawn, so roots never lag. Lengths are
 //! in the hair's units: a scaled character's hair behaves as if unscaled.
 
 pub mod frame;
 mod held;
-mod mend;
 mod per_hair;
+mod repair;
+mod required;
 mod strand_sleep;
 mod systems;
 mod teleport;
 
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::drawn_out;
-pub use held::{HeldNodes, HeldReach};
+pub use held::{HeldNodes, HeldNodesState};
 pub(crate) use per_hair::PerHair;
-pub use strand_sleep::{Sleepers, StillPose, StrandSleep};
+pub(crate) use required::keep_required;
+pub use strand_sleep::{SleepPose, Sleepers, StrandSleep};
 pub use systems::StrandPlugin;
 
 use crate::{
@@ -34,7 +36,7 @@ use crate::{
 use bevy::prelude::*;
 
 /// The wearer's hair as one thing. Put it on any entity with a transform, such as a head bone; spawn
-/// strands with [`StrandOf`] pointing here. Settings ([`Stiffness`](crate::Stiffness),
+/// strands with [`StrandOf`] pointing here. Settings ([`HairStiffness`](crate::HairStiffness),
 /// [`HairSolver`](crate::HairSolver), [`AirDrag`](crate::AirDrag), [`BondInfluence`](crate::BondInfluence),
 /// [`Cuticle`](crate::Cuticle), [`LockContact`](crate::LockContact)) may be added as components.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
@@ -93,20 +95,20 @@ pub enum StrandError {
 /// The shortest segment that a strand may have (m).
 pub const MIN_SEGMENT: f32 = 1e-6;
 
-/// The longest one (m): squares of longer ones leave what f32 carries.
+/// The longest one (m): squares of longer ones overflow f32.
 pub const MAX_SEGMENT: f32 = 1e9;
 
-/// So many good steps, a second or so, make a strand well again that was put back: what breaks it once a
-/// tick is told once.
-const CONVALESCENCE: u16 = 360;
+/// Finite steps after a reset until a fault is reported again (about a second): what breaks a strand in
+/// every tick is reported once.
+const FAULT_COOLDOWN: u16 = 360;
 
 /// A strand's nodes and edges, in its hair's frame, root first.
 ///
-/// Made by [`Strand::from_polyline`]. Game code may read all and write positions and velocities; the
-/// number of nodes stays what it was.
+/// Made by [`Strand::from_polyline`]. Game code may read everything and write positions and velocities;
+/// the number of nodes is fixed.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-#[require(StrandHistory, AddedMass, StrandSleep, StillPose)]
+#[require(StrandHistory, AddedMass, StrandSleep, SleepPose)]
 pub struct Strand {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
@@ -116,24 +118,24 @@ pub struct Strand {
     tensions: Vec<f32>,
     root_frame: Quat,
     root_before: Option<(Vec3, Quat)>,
-    /// For how many good steps on end it is still known that it was put back.
-    unwell: u16,
+    /// Finite steps left until a reset is reported again.
+    fault_cooldown: u16,
 }
 
-/// Where a strand's nodes were at the end of the tick before, in the hair's frame: drawing goes from
-/// there to the present by the overstep of the fixed clock.
+/// Where a strand's nodes were at the end of the previous tick, in the hair's frame: drawing
+/// interpolates from there to the present by the overstep of the fixed clock.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct StrandHistory {
     /// Positions (m), root first; empty until the first tick.
     pub positions: Vec<Vec3>,
-    /// Where the root is drawn, if known better than from the ticks: on a skinned mesh, where that is
-    /// drawn (m). The strand is drawn as much beside its ticks as its root.
+    /// Where the root is drawn, if known better than from the ticks: on a skinned mesh, the root's
+    /// place on the drawn mesh (m). The whole strand is drawn with the same offset.
     pub root: Option<Vec3>,
 }
 
 impl StrandHistory {
-    /// Takes the present for the past: the strand is drawn where it is, as if it had not moved.
+    /// Stores the present as history: the strand is drawn where it is, without motion.
     pub(crate) fn remember(&mut self, strand: &Strand) {
         self.positions.clone_from(&strand.positions);
     }
@@ -148,8 +150,8 @@ impl StrandHistory {
         }
     }
 
-    /// Where a node is drawn, in the hair's frame: between the tick before and the present by the
-    /// overstep of the fixed clock (0…1).
+    /// Where a node is drawn, in the hair's frame: interpolated between the previous tick and the
+    /// present by the overstep of the fixed clock (0…1).
     pub fn drawn(&self, strand: &Strand, node: usize, overstep: f32) -> Vec3 {
         let place = self.between(strand, node, overstep);
         match self.root {
@@ -174,19 +176,42 @@ pub enum StrandModel {
 
 impl Ranged for StrandModel {}
 
-/// What weighs on a strand and softens it, beside its own dry state: water does. Written by the
-/// tick; empty on dry hair.
+/// What makes a strand heavier and softer than in its dry state, such as water. Written by the tick;
+/// empty on dry hair.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct AddedMass {
-    /// Added mass of each node, over its dry mass. Inverse masses, wind and contacts heed it.
+    /// Added mass of each node, over its dry mass. Inverse masses, wind and contacts depend on it.
     #[reflect(ignore)]
     pub mass: Vec<f32>,
     /// Share of its stiffness that each joint has lost, beyond open bonds.
     #[reflect(ignore)]
     pub softening: Vec<f32>,
-    /// Whether the strand's water moves its hydrogen bonds: then wind dries that water, not the bonds.
+    /// Whether hydrogen bonds follow the strand's water: then wind dries that water, not the bonds.
     pub moves_bonds: bool,
+    /// What water does to each node of a strand that is under it; empty where it is under none.
+    #[reflect(ignore)]
+    pub(crate) in_water: Vec<InWater>,
+}
+
+/// What water does in a substep to a node that is under it, wholly or in part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct InWater {
+    /// The share of the node that is under water.
+    pub(crate) share: f32,
+    /// Its inertia over that which it has out of the water: with the water that goes along, and with
+    /// drag, whose implicit step is that of a heavier node.
+    pub(crate) inertia: f32,
+    /// Its weight, less buoyancy, over that inertia: the share of gravity that it falls with.
+    pub(crate) gravity: f32,
+    /// The share of its velocity over the water's that drag leaves.
+    pub(crate) keep: f32,
+}
+
+impl Default for InWater {
+    fn default() -> Self {
+        Self { share: 0.0, inertia: 1.0, gravity: 1.0, keep: 1.0 }
+    }
 }
 
 impl Strand {
@@ -201,8 +226,8 @@ impl Strand {
     /// ```
     ///
     /// # Errors
-    /// With fewer than two points, a point that is not finite, or a segment shorter than 1 µm or longer
-    /// than a million kilometres.
+    /// With fewer than two points, a point that is not finite, or a segment outside
+    /// [`MIN_SEGMENT`]…[`MAX_SEGMENT`].
     pub fn from_polyline(points: &[Vec3]) -> Result<Self, StrandError> {
         if points.len() < 2 {
             return Err(StrandError::TooFewNodes { found: points.len() });
@@ -227,12 +252,12 @@ impl Strand {
             orientations,
             rest_lengths,
             root_before: None,
-            unwell: 0,
+            fault_cooldown: 0,
         })
     }
 
     /// The same strand, leaving the scalp along `direction` whatever its first edge does: curly hair
-    /// that is drawn bent at the root springs to it.
+    /// whose polyline is bent at the root springs to it.
     pub fn leaving_along(mut self, direction: Dir3) -> Self {
         if let Some(&first) = self.orientations.first() {
             let turn = Quat::from_rotation_arc(first * Vec3::Z, *direction);
@@ -323,6 +348,12 @@ impl Strand {
             && self.orientations.iter().all(|q| q.is_finite() && q.length_squared() > 0.25)
     }
 
+    /// Whether an edge is a thousand times as long as it should be: no step leads back from there.
+    fn is_torn(&self) -> bool {
+        let mut edges = self.positions.windows(2).zip(&self.rest_lengths);
+        !edges.all(|(p, rest)| p[0].distance_squared(p[1]) < (1e3 * rest).powi(2))
+    }
+
     /// Sets every velocity to zero.
     pub fn rest(&mut self) {
         self.velocities.fill(Vec3::ZERO);
@@ -351,18 +382,20 @@ impl Strand {
         self.rest();
     }
 
-    /// Puts the root elsewhere, with the scalp's frame.
+    /// Moves the root, with the scalp's frame.
     #[cfg(feature = "groom")]
     pub(crate) fn put_root(&mut self, place: Vec3, frame: Quat) {
-        if place.is_finite() && frame.is_finite() {
-            let frame = frame.normalize();
-            self.root_before.get_or_insert((self.positions[0], self.root_frame));
-            self.positions[0] = place;
-            self.root_frame = frame;
+        if let Some(root) = self.positions.first_mut()
+            && place.is_finite()
+            && frame.is_finite()
+        {
+            self.root_before.get_or_insert((*root, self.root_frame));
+            *root = place;
+            self.root_frame = frame.normalize();
         }
     }
 
-    /// Puts it into another state of as many nodes, at rest.
+    /// Replaces its state by another of as many nodes, at rest.
     #[cfg(any(feature = "save", feature = "groom"))]
     pub(crate) fn replace(
         &mut self,
@@ -380,11 +413,11 @@ impl Strand {
             rest_lengths,
             root_frame,
             root_before: None,
-            unwell: 0,
+            fault_cooldown: 0,
         };
     }
 
-    /// Asks for the memory of what moves: positions, velocities, orientations.
+    /// Prefetches what moves: positions, velocities, orientations.
     pub(crate) fn prefetch(&self) {
         prefetch(&self.positions);
         prefetch(&self.velocities);
@@ -423,10 +456,13 @@ impl Strand {
         )
     }
 
-    /// After a step that left the finite numbers: back to what it was, at rest, or if that is not
-    /// finite either to the pose its bonds remember. Says what happened unless it did a short while ago, too.
+    /// After a step with a non-finite result: back to the previous state, at rest, or if that is not
+    /// finite, torn, or where the last step failed, to the pose its bonds remember. Returns the fault,
+    /// unless one was reported shortly before.
     pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<HairFault> {
-        let how = if self.is_pose_finite() {
+        // A pose from which the last step failed, too, is none to return to again.
+        let failed_again = self.fault_cooldown == FAULT_COOLDOWN;
+        let how = if self.is_pose_finite() && !self.is_torn() && !failed_again {
             self.rest();
             HairFault::new(
                 FaultKind::PutBack,
@@ -436,15 +472,15 @@ impl Strand {
             self.pose(bonds.into_iter().map(|o| if o.is_finite() { o } else { Vec3::ZERO }));
             HairFault::new(
                 FaultKind::Rebuilt,
-                "the strand's state was not finite; its rest pose was rebuilt from root and bonds",
+                "no step led on from the strand's state; its rest pose was rebuilt from root and bonds",
             )
         };
-        let again = core::mem::replace(&mut self.unwell, CONVALESCENCE) > 0;
+        let again = core::mem::replace(&mut self.fault_cooldown, FAULT_COOLDOWN) > 0;
         (!again).then_some(how)
     }
 
     pub(crate) fn stepped_well(&mut self) {
-        self.unwell = self.unwell.saturating_sub(1);
+        self.fault_cooldown = self.fault_cooldown.saturating_sub(1);
         self.root_before = None;
     }
 }
@@ -468,7 +504,7 @@ mod tests {
     }
 
     #[test]
-    fn posing_in_its_own_shape_changes_nothing() {
+    fn posing_a_strand_in_its_own_shape_changes_nothing() {
         let points: Vec<Vec3> = (0..10)
             .map(|i| i as f32)
             .map(|t| Vec3::new((t * 0.5).cos(), t * 0.3, (t * 0.5).sin()) * 0.05)

@@ -1,11 +1,11 @@
-//! What holds for all strands of a hair, worked out once a substep.
+//! Values shared by all strands of a hair, computed once a substep.
 
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
-/// Values by hair, in the order in which hairs were met first.
+/// Values by hair, in the order in which hairs were first looked up.
 ///
-/// Strands come mostly hair by hair, so that the last one's answer is the next one's, too: with ten
-/// thousand strands a look into a map for each is as long as their forces.
+/// Strands are mostly grouped by hair, so the last lookup usually answers the next: with ten thousand
+/// strands a map lookup for each would take as long as their forces.
 pub(crate) struct PerHair<T> {
     pub values: Vec<T>,
     index_of: EntityHashMap<Option<usize>>,
@@ -19,8 +19,8 @@ impl<T> Default for PerHair<T> {
 }
 
 impl<T> PerHair<T> {
-    /// The index of the value of `hair`, which `make` makes when it is met first; `None` where there
-    /// is none to be made.
+    /// The index of the value of `hair`, which `make` makes on the first lookup; `None` where `make`
+    /// gives none.
     #[inline]
     pub fn index(&mut self, hair: Entity, make: impl FnOnce() -> Option<T>) -> Option<usize> {
         if let Some((last, index)) = self.last
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_hair_is_asked_once() {
+    fn each_hair_is_made_once() {
         let [a, b, none] = [1, 2, 3].map(|i| Entity::from_raw_u32(i).unwrap());
         let mut asked = Vec::new();
         let mut per_hair = PerHair::default();

@@ -1,35 +1,34 @@
-//! What a strand keeps of its sleep. Who falls asleep and who wakes is decided in
-//! [`sleep`](crate::sleep); here is only what the other systems ask: is it asleep?
+//! A strand's sleep state. Which strands fall asleep and wake is decided in [`sleep`](crate::sleep);
+//! here is only the state that other systems read.
 
-use super::Strand;
 use bevy::prelude::*;
 
-/// Whether a strand is simulated in this tick. One that sleeps keeps its pose and is left out of all
-/// that moves hair, see [`HairSleep`](crate::HairSleep); one that is carried goes along with others,
-/// see [`LodLevel::strands`](crate::LodLevel::strands). Changes only at the start of a tick.
+/// Whether a strand is simulated in this tick. One that sleeps keeps its pose and is skipped by all
+/// systems that move hair, see [`HairSleep`](crate::HairSleep); a follower moves with its guides, see
+/// [`LodLevel::strands`](crate::LodLevel::strands). Changes only at the start of a tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct StrandSleep {
     /// How long the strand has stayed where it is (s).
     still: f32,
     asleep: bool,
-    carried: bool,
+    follower: bool,
     disturbed: bool,
 }
 
 impl StrandSleep {
-    /// Whether forces, rest shapes and the projection act on it: it neither sleeps nor is carried.
+    /// Whether forces, rest shapes and the projection act on it: it neither sleeps nor is a follower.
     pub fn is_simulated(&self) -> bool {
-        !self.asleep && !self.carried
+        !self.asleep && !self.follower
     }
 
-    /// Whether it goes along with others instead of being simulated.
+    /// Whether it follows guides instead of being simulated.
     pub fn is_follower(&self) -> bool {
-        self.carried
+        self.follower
     }
 
-    pub(crate) fn set_follower(&mut self, carried: bool) {
-        self.carried = carried;
+    pub(crate) fn set_follower(&mut self, follower: bool) {
+        self.follower = follower;
     }
 
     /// Whether it sleeps in this tick.
@@ -42,18 +41,18 @@ impl StrandSleep {
         self.still
     }
 
-    /// Wakes the strand at the start of the next tick, or keeps it awake. For what the tick cannot
-    /// see: all that it sees wakes strands by itself.
+    /// Wakes the strand at the start of the next tick, or keeps it awake. For causes that the tick
+    /// cannot detect; changes of components and settings wake strands anyway.
     pub fn wake(&mut self) {
         self.disturbed = true;
     }
 
-    /// Whether somebody wanted it awake since the last call.
+    /// Whether [`wake`](Self::wake) was called since the last call of this.
     pub(crate) fn take_disturbed(&mut self) -> bool {
         core::mem::take(&mut self.disturbed)
     }
 
-    /// It lay still for `seconds` more.
+    /// Adds `seconds` to the time it has been still.
     pub(crate) fn lie_still(&mut self, seconds: f32) {
         self.still += seconds;
     }
@@ -67,7 +66,7 @@ impl StrandSleep {
     }
 }
 
-/// How many of the strands that are not carried by others sleep. Kept by the tick.
+/// How many of a hair's strands sleep; followers are not counted. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Sleepers {
@@ -84,36 +83,41 @@ impl Sleepers {
     }
 }
 
-/// The pose in which a strand has stayed since it last moved, and what holds it there.
+/// The pose in which a strand has stayed since it last moved, and the forces that hold it there.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-pub struct StillPose {
+pub struct SleepPose {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) orientations: Vec<Quat>,
     pub(crate) root_frame: Quat,
-    /// Which nodes were held, in one number.
+    /// Hash of which nodes were held.
     pub(crate) held: u64,
     /// The corners of the box around a sleeper (m).
     pub(crate) low: Vec3,
     pub(crate) high: Vec3,
     /// How far a node may be from where it was (m).
     pub(crate) distance: f32,
-    /// What other strands did to a sleeper's nodes when that was first asked (m/s²).
+    /// Contact accelerations on a sleeper's nodes when first measured (m/s²).
     pushes: Vec<Vec3>,
 }
 
-impl StillPose {
-    /// The strand's present pose.
-    pub(crate) fn begin(&mut self, strand: &Strand, held: u64) {
-        self.positions.clone_from(&strand.positions);
-        self.orientations.clone_from(&strand.orientations);
-        self.root_frame = strand.root_frame;
-        self.held = held;
+impl SleepPose {
+    /// Stores a strand's present pose: node positions, edge orientations and the scalp's frame.
+    pub(crate) fn begin(
+        &mut self,
+        positions: &[Vec3],
+        orientations: &[Quat],
+        root_frame: Quat,
+        held: u64,
+    ) {
+        positions.clone_into(&mut self.positions);
+        orientations.clone_into(&mut self.orientations);
+        (self.root_frame, self.held) = (root_frame, held);
         self.pushes.clear();
     }
 
-    /// Whether other strands push a sleeper otherwise than they did: by as much as one does that has
-    /// come nearer by twice what counts as still, `gradient` (1/s²) being what pushes grow by.
+    /// Whether contact with other strands has changed by more than an approach by twice the still
+    /// distance would change it; `gradient` (1/s²) is how much contact grows with distance.
     pub(crate) fn feels(&mut self, pushes: impl Iterator<Item = Vec3>, gradient: f32) -> bool {
         let most = 2.0 * self.distance * gradient;
         if self.pushes.is_empty() {
@@ -124,7 +128,7 @@ impl StillPose {
             Some(known) => known.distance_squared(*push) > most * most,
             None => true,
         };
-        // All are taken, because the next strand's come behind them.
+        // Consumes all items: the next strand's follow in the same iterator.
         pushes.enumerate().filter(is_new).count() > 0
     }
 }

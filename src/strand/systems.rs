@@ -1,22 +1,23 @@
-//! Strands' own part of the tick: where the scalp is now, and what its motion does to the nodes.
+//! Strands in the tick: poses of the scalp, and inertia of the nodes.
 
 use super::{
-    AddedMass, Hair, HeldNodes, HeldReach, PerHair, Sleepers, StillPose, Strand, StrandError,
+    AddedMass, Hair, HeldNodes, HeldNodesState, PerHair, SleepPose, Sleepers, Strand, StrandError,
     StrandHistory, StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     frame::{HairInertia, Pose},
     held::report_out_of_reach,
+    keep_required,
 };
 use crate::{
-    fault::{FaultKind, HairFault},
+    fault::{FaultKind, HairChecks, HairFault},
     parallel::{Nanos, for_each_part, tables},
-    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick, first_substep},
+    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick, MergedSubsteps, first_substep},
     setting::{self, Settings},
 };
 use bevy::{ecs::entity_disabling::Disabled, math::Isometry3d, prelude::*};
 
-/// About what a strand takes (ns) to be copied, and to be carried along by its hair's frame.
+/// About what a strand takes (ns) to be copied, and to be moved by its hair's frame delta.
 const COPY: Nanos = Nanos(100);
-const CARRY: Nanos = Nanos(250);
+const FRAME_DELTA: Nanos = Nanos(250);
 
 /// Hair and strands as entities, and the frame they live in.
 pub struct StrandPlugin;
@@ -25,6 +26,14 @@ impl Plugin for StrandPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<StrandModel>(app);
         setting::plugin::<HairInertia>(app);
+        keep_required::<Hair, Transform>(app);
+        keep_required::<Hair, TickPose>(app);
+        keep_required::<Hair, MergedSubsteps>(app);
+        keep_required::<Strand, StrandHistory>(app);
+        keep_required::<Strand, AddedMass>(app);
+        keep_required::<Strand, StrandSleep>(app);
+        keep_required::<Strand, SleepPose>(app);
+        keep_required::<HeldNodes, HeldNodesState>(app);
         app.register_type::<Hair>()
             .register_type::<TickPose>()
             .register_type::<Strand>()
@@ -33,18 +42,19 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandHistory>()
             .register_type::<StrandError>()
             .register_type::<HeldNodes>()
-            .register_type::<HeldReach>()
+            .register_type::<HeldNodesState>()
             .register_type::<AddedMass>()
             .register_type::<StrandSleep>()
             .register_type::<Sleepers>()
-            .register_type::<StillPose>()
-            .add_systems(PreUpdate, (report_unusable, record_frame))
+            .register_type::<SleepPose>()
+            .add_systems(HairChecks, report_unusable)
+            .add_systems(PreUpdate, record_frame)
             .add_systems(
                 HairTick,
                 (
-                    (mend_strands, report_out_of_reach.run_if(first_substep), remember_drawn)
+                    (repair_strands, report_out_of_reach.run_if(first_substep), remember_drawn)
                         .chain()
-                        .in_set(HairSystems::History),
+                        .in_set(HairSystems::StrandHistory),
                     (aim_poses.run_if(first_substep), advance_poses)
                         .chain()
                         .in_set(HairSystems::Poses),
@@ -54,9 +64,12 @@ impl Plugin for StrandPlugin {
     }
 }
 
-/// Strands that cannot take part are told once, when they appear.
+/// Reports strands that cannot take part, once, when they are spawned or assigned to a hair.
 fn report_unusable(
-    strands: Query<(Entity, Ref<Strand>, Option<Ref<StrandOf>>)>,
+    strands: Query<
+        (Entity, Ref<Strand>, Option<Ref<StrandOf>>),
+        Or<(Added<Strand>, Added<StrandOf>)>,
+    >,
     hairs: Query<(), With<Hair>>,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -77,18 +90,20 @@ fn report_unusable(
     }
 }
 
-/// What somebody wrote into a strand's private parts, as an inspector or a scene file may. Our own writes
-/// bypass change detection.
-fn mend_strands(
+/// Repairs private fields written by an inspector or a scene file. Our own writes bypass change
+/// detection. Runs in every substep, because game code may write in systems of its own within the tick;
+/// without writes it costs a scan of change ticks.
+fn repair_strands(
     mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Allow<Disabled>)>,
     mut loads: Query<(Entity, &mut AddedMass), (Changed<AddedMass>, Allow<Disabled>)>,
     mut histories: Query<(Entity, &mut StrandHistory), (Changed<StrandHistory>, Allow<Disabled>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    // A sleeper's would not be remembered anew.
-    let histories = histories.iter_mut().map(|(e, mut h)| (e, h.bypass_change_detection().mend()));
-    let strands = strands.iter_mut().map(|(e, mut s)| (e, s.bypass_change_detection().mend()));
-    let loads = loads.iter_mut().map(|(e, mut l)| (e, l.bypass_change_detection().mend()));
+    // Also sleepers: their history is not written again.
+    let histories =
+        histories.iter_mut().map(|(e, mut h)| (e, h.bypass_change_detection().repair()));
+    let strands = strands.iter_mut().map(|(e, mut s)| (e, s.bypass_change_detection().repair()));
+    let loads = loads.iter_mut().map(|(e, mut l)| (e, l.bypass_change_detection().repair()));
     for (entity, found) in strands.chain(loads).chain(histories) {
         if let Some(found) = found {
             faults.write(HairFault::new(FaultKind::Strand, found).of(entity));
@@ -96,7 +111,7 @@ fn mend_strands(
     }
 }
 
-/// Before the first substep of a tick: what was present becomes history.
+/// Before the first substep of a tick: the present becomes history.
 fn remember_drawn(
     step: Res<HairStep>,
     mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory)>,
@@ -110,7 +125,7 @@ fn remember_drawn(
         || (),
         |(), rows| {
             for (strand, sleep, history) in rows {
-                // A sleeper was remembered as it fell asleep. Only its root may go a hair's breadth.
+                // A sleeper's history was stored as it fell asleep; only its root may have moved.
                 if sleep.is_asleep() && history.positions.first() == strand.positions.first() {
                     continue;
                 }
@@ -120,7 +135,7 @@ fn remember_drawn(
     );
 }
 
-/// As a frame begins: where the frame before left everything.
+/// As a frame begins: records the poses that the previous frame ended with.
 fn record_frame(
     time: Res<Time<Virtual>>,
     transforms: TransformHelper,
@@ -133,7 +148,7 @@ fn record_frame(
     }
 }
 
-/// As a tick begins: where each pose is to go. Hair that is put elsewhere comes to rest.
+/// As a tick begins: the target of each pose. Hair that teleports comes to rest.
 fn aim_poses(
     (time, frames): (Res<Time>, Res<Time<Virtual>>),
     transforms: TransformHelper,
@@ -143,7 +158,8 @@ fn aim_poses(
     mut faults: MessageWriter<HairFault>,
 ) {
     let seconds = time.elapsed_secs_f64() - frames.delta_secs_f64();
-    // Which way each hair goes that moves, and whether it is put there. The others go with these.
+    // Displacement of each hair that moves, and whether it teleports. Colliders and tools that move
+    // the same way teleport with it.
     let mut ways: Vec<(Vec3, bool)> = Vec::new();
     for others in [false, true] {
         for (entity, mut frame, members) in &mut poses {
@@ -183,7 +199,7 @@ fn aim_poses(
     }
 }
 
-/// Poses go on by a substep.
+/// Advances poses by a substep.
 fn advance_poses(
     step: Res<HairStep>,
     substeps: EffectiveSubsteps,
@@ -195,7 +211,7 @@ fn advance_poses(
     }
 }
 
-/// Inertia: free nodes are carried by the inverse of the frame's motion; the root stays.
+/// Inertia: free nodes are moved by the inverse of the frame's motion; the root stays.
 fn apply_frame_inertia(
     substeps: EffectiveSubsteps,
     hairs: Query<&TickPose, With<Hair>>,
@@ -205,29 +221,29 @@ fn apply_frame_inertia(
         return;
     }
     for_each_part(
-        CARRY,
+        FRAME_DELTA,
         tables(&mut strands),
         || (),
         |(), rows| {
-            let mut carries = PerHair::default();
+            let mut frame_deltas = PerHair::default();
             for (of, sleep, strand) in rows {
-                let carry = || {
+                let frame_delta = || {
                     substeps.of(of.0)?;
                     hairs.get(of.0).ok()?.frame_delta()
                 };
                 if sleep.is_simulated()
-                    && let Some(index) = carries.index(of.0, carry)
+                    && let Some(index) = frame_deltas.index(of.0, frame_delta)
                 {
-                    shift_by(strand, &carries.values[index]);
+                    shift_by(strand, &frame_deltas.values[index]);
                 }
             }
         },
     );
 }
 
-fn shift_by(strand: &mut Strand, carry: &Isometry3d) {
-    let turn = carry.rotation;
-    strand.positions.iter_mut().skip(1).for_each(|p| *p = *carry * *p);
+fn shift_by(strand: &mut Strand, frame_delta: &Isometry3d) {
+    let turn = frame_delta.rotation;
+    strand.positions.iter_mut().skip(1).for_each(|p| *p = *frame_delta * *p);
     strand.velocities.iter_mut().for_each(|v| *v = turn * *v);
     strand.orientations.iter_mut().for_each(|q| *q = (turn * *q).normalize());
     strand.angular_velocities.iter_mut().for_each(|v| *v = turn * *v);
@@ -239,14 +255,14 @@ mod tests {
     use core::f32::consts::FRAC_PI_2;
 
     #[test]
-    fn all_that_moves_is_carried_along_and_the_root_stays() {
+    fn all_moving_state_is_shifted_and_the_root_stays() {
         let points: Vec<Vec3> = (0..4).map(|i| Vec3::X * (0.03 * i as f32)).collect();
         let mut strand = Strand::from_polyline(&points).unwrap();
         strand.velocities_mut().copy_from_slice(&[Vec3::X, Vec3::X, Vec3::Y, Vec3::Z]);
         strand.angular_velocities.copy_from_slice(&[Vec3::X, Vec3::Y, Vec3::Z]);
         let turn = Quat::from_rotation_z(FRAC_PI_2);
-        let carry = Isometry3d::new(Vec3::new(0.1, 0.2, 0.3), turn);
-        shift_by(&mut strand, &carry);
+        let frame_delta = Isometry3d::new(Vec3::new(0.1, 0.2, 0.3), turn);
+        shift_by(&mut strand, &frame_delta);
         assert_eq!(strand.positions()[0], Vec3::ZERO);
         for (p, q) in strand.positions()[1..].iter().zip(&points[1..]) {
             assert!(p.distance(turn * *q + Vec3::new(0.1, 0.2, 0.3)) < 1e-6);

@@ -1,11 +1,11 @@
-//! A character that is put elsewhere takes its hair along.
+//! Teleporting a character with its hair.
 
 use super::{Hair, Strand, StrandHistory, Strands, TickPose};
 use bevy::prelude::*;
 
 impl Hair {
-    /// Before the character is put elsewhere: its hair goes along in its present shape, at rest,
-    /// and so do colliders, rods and blowers of the same character. Long jumps are noticed without
+    /// Call before a character is teleported: its hair moves with it in its present shape, at rest,
+    /// and so do colliders, rods and blowers of the same character. Long jumps are detected without
     /// this, see [`HairInertia`](crate::HairInertia).
     ///
     /// ```
@@ -25,7 +25,7 @@ impl Hair {
             hair.get::<Strands>().into_iter().flat_map(Strands::iter).collect();
         hair.world_scope(|world| {
             for strand in members {
-                // Somebody may have written one that is not there.
+                // User code may have listed an entity that does not exist.
                 if let Ok(mut strand) = world.get_entity_mut(strand)
                     && let Ok((mut strand, mut history)) =
                         strand.get_components_mut::<(&mut Strand, &mut StrandHistory)>()

@@ -1,10 +1,10 @@
-//! Styles: how much of the shape that hair was given is left, and what a game asks of hair's state.
+//! Styles: how much of a styled shape is left, and queries of hair's state for games.
 //!
-//! Put [`HairStyle`] on a [`Hair`] once it is styled. From then on [`KeptStyle`] tells how much of that
-//! style is left, [`model`] by which measure, and [`StyleFaded`] is triggered when too much has gone:
-//! by washing, rain, sleep or steam, whatever it was.
+//! Put [`HairStyle`] on a [`Hair`] once it is styled. From then on [`KeptStyle`] holds how much of that
+//! style is left, as defined in `model.rs`, and [`StyleFaded`] is triggered when too much is lost, be it
+//! by washing, rain, sleep or steam.
 
-pub mod model;
+mod model;
 
 use crate::{
     bond::{BondInfluence, Bonds},
@@ -20,7 +20,7 @@ use bevy::{
 };
 use model::{KeptSum, styled};
 
-/// Styles that are watched.
+/// Measures styles.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StylePlugin;
 
@@ -35,7 +35,8 @@ impl Plugin for StylePlugin {
 
 setting! {
     /// The shape in which a hair's bonds hold it now is its style, to be watched. Component of a
-    /// [`Hair`]; insert it again when the hair has been styled anew. It looks at each joint once a tick.
+    /// [`Hair`]; insert it again when the hair has been styled anew. It looks at each joint once a
+    /// tick where there is a style.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -66,16 +67,16 @@ pub struct KeptStyle {
 }
 
 impl KeptStyle {
-    /// The share that is left: 1 as it was made, 0 when all of it is gone, less when hair bends the other
-    /// way. `None` before the first tick, and for hair that its bonds hold in the shape it grew in: it has no
-    /// style.
-    pub fn share(&self) -> Option<f32> {
+    /// The share that is left: 1 when inserted, 0 when all of it is gone, negative when hair bends the
+    /// other way. `None` before the first tick, and for hair whose bonds hold it in its natural shape:
+    /// it has no style.
+    pub fn kept(&self) -> Option<f32> {
         self.share
     }
 }
 
-/// Triggered on a [`Hair`] of whose [`HairStyle`] less is left than
-/// [`fades_below`](HairStyle::fades_below): once, and again when it was styled anew or had come back.
+/// Triggered on a [`Hair`] when less of its [`HairStyle`] is left than
+/// [`fades_below`](HairStyle::fades_below): once, and again after restyling or recovery.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct StyleFaded {
@@ -85,7 +86,7 @@ pub struct StyleFaded {
     pub kept: f32,
 }
 
-/// How far above its limit a style has to come back before it can fade again.
+/// How far above its limit a style has to recover before it can fade again.
 const BACK_BY: f32 = 0.05;
 
 fn measure_styles(
@@ -101,9 +102,12 @@ fn measure_styles(
             bonds.joints.iter().map(|joint| styled(joint, &influence)).collect()
         };
         if style.is_changed() {
-            kept.faded = false;
+            (kept.faded, kept.share) = (false, None);
             let strands = members.iter().filter_map(|id| Some((id, joints(bonds.get(id).ok()?))));
             kept.styles = strands.collect();
+        }
+        if kept.styles.is_empty() {
+            continue;
         }
         let mut sum = KeptSum::default();
         // In the order of the strands, so that the sum is always the same.
@@ -113,7 +117,11 @@ fn measure_styles(
                 sum.add(*style, styled(joint, &influence));
             }
         }
-        kept.share = sum.share();
+        kept.share = sum.kept();
+        if kept.share.is_none() {
+            // Hair without a style costs nothing more.
+            kept.styles.clear();
+        }
         let limit = style.clamped().fades_below;
         match kept.share {
             Some(share) if share < limit && !kept.faded => {
@@ -126,7 +134,7 @@ fn measure_styles(
     }
 }
 
-/// What a game may ask of hair's state.
+/// System parameter with queries of a hair's state.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -142,8 +150,8 @@ pub struct HairCondition<'w, 's> {
 }
 
 impl HairCondition<'_, '_> {
-    /// How wet a hair is inside, the mean over all nodes: 0 as in a room, 1 as under water. 0 too for what
-    /// is no hair.
+    /// Mean wetness inside a hair over all nodes: 0 as in a room, 1 as under water. 0 for an entity that
+    /// is not a hair.
     pub fn wetness(&self, hair: Entity) -> f32 {
         let Ok(members) = self.hairs.get(hair) else { return 0.0 };
         let (mut sum, mut strands) = (0.0, 0);
@@ -156,7 +164,7 @@ impl HairCondition<'_, '_> {
         (sum / f64::from(strands.max(1))) as f32
     }
 
-    /// The water on and in a hair, beyond what it holds in a room (kg).
+    /// The water on and in a hair, beyond the regain of a room (kg).
     pub fn water(&self, hair: Entity) -> f64 {
         let Ok(members) = self.hairs.get(hair) else { return 0.0 };
         let of =
@@ -164,8 +172,8 @@ impl HairCondition<'_, '_> {
         members.iter().filter_map(|id| self.moistures.get(id).ok()).map(of).sum::<f64>() * WATER
     }
 
-    /// How much of its style a hair has kept; see [`KeptStyle::share`].
+    /// How much of its style a hair has kept; see [`KeptStyle::kept`].
     pub fn kept_style(&self, hair: Entity) -> Option<f32> {
-        self.kept.get(hair).ok()?.share()
+        self.kept.get(hair).ok()?.kept()
     }
 }

@@ -1,26 +1,26 @@
-//! How much of a style is left, as mathematics.
+//! How much of a style is left, as pure functions.
 //!
-//! Peptide bonds never break, so the shape that they remember is hair's own. A style is what the other
-//! bonds make of it: at each joint the shape Ω* in which all bonds together rest (equation 15) less that
-//! of the peptide bonds. What is left of it later is the part of that difference which is still there.
+//! Peptide bonds never break, so the shape that they remember is hair's natural shape. A style is the
+//! difference that the other bonds make: at each joint the rest shape Ω* of all bonds together
+//! (equation 15) minus that of the peptide bonds. The share left later is the projection of the
+//! present difference on the original one.
 
 use crate::bond::{BondKind, model::JointBonds};
 use glam::Vec3;
 
-/// Where the bonds of a joint lead it, off the shape that is hair's own.
-pub fn styled(joint: &JointBonds, influence: &[f32; BondKind::COUNT]) -> Vec3 {
+/// The rest shape of a joint's bonds relative to hair's natural shape.
+pub(crate) fn styled(joint: &JointBonds, influence: &[f32; BondKind::COUNT]) -> Vec3 {
     joint.relaxed(influence) - joint.shapes[BondKind::Peptide as usize]
 }
 
 /// Sums over joints.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct KeptSum {
+pub(crate) struct KeptSum {
     left: f64,
     whole: f64,
 }
 
-/// A style that bends joints by less than this (Σ over joints of squared parts of their Darboux
-/// quaternions) is none.
+/// A style with a smaller Σ over joints of squared differences of Darboux vectors counts as none.
 const NO_STYLE: f64 = 1e-8;
 
 impl KeptSum {
@@ -34,7 +34,7 @@ impl KeptSum {
     }
 
     /// The share that is left: 1 as it was made, 0 gone; `None` where there was no style.
-    pub fn share(&self) -> Option<f32> {
+    pub fn kept(&self) -> Option<f32> {
         (self.whole > NO_STYLE).then(|| (self.left / self.whole) as f32)
     }
 }
@@ -44,26 +44,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_left_is_what_goes_the_styles_way() {
+    fn the_share_left_is_the_part_along_the_style() {
         let styles = [Vec3::X * 0.1, Vec3::Y * 0.2, Vec3::new(0.05, 0.0, -0.1)];
         let share = |of: &dyn Fn(Vec3) -> Vec3| {
             let mut sum = KeptSum::default();
             styles.iter().for_each(|style| sum.add(*style, of(*style)));
-            sum.share().unwrap()
+            sum.kept().unwrap()
         };
         assert!((share(&|style| style) - 1.0).abs() < 1e-6);
         assert!((share(&|style| style * 0.25) - 0.25).abs() < 1e-6);
         assert!(share(&|style| style.any_orthogonal_vector()).abs() < 1e-6, "bent another way");
         assert!((share(&|style| -style) + 1.0).abs() < 1e-6, "to the other side");
-        // No style, and what is no number, say nothing.
+        // No style and NaN give `None`.
         let mut sum = KeptSum::default();
         sum.add(Vec3::ZERO, Vec3::X);
         sum.add(Vec3::NAN, Vec3::X);
-        assert_eq!(sum.share(), None);
+        assert_eq!(sum.kept(), None);
     }
 
     #[test]
-    fn a_joint_is_styled_by_all_but_its_peptide_bonds() {
+    fn a_style_is_made_by_all_but_peptide_bonds() {
         let own = Vec3::new(0.01, 0.0, 0.0);
         let mut joint = JointBonds::closed(own);
         let influence = [0.3, 0.2, 0.2, 0.3];

@@ -1,7 +1,7 @@
-//! Tools on bonds: treatments that cut or re-form them, and perm rods that hair is wound on.
+//! Treatments that cut or re-form bonds, and perm rods that hair is wound on.
 
 mod systems;
-pub mod winding;
+mod winding;
 
 pub use systems::TreatmentPlugin;
 
@@ -13,21 +13,21 @@ use crate::{
 use bevy::prelude::*;
 use core::ops::Range;
 
-/// A request to move bond rates, for a hair or one strand, all joints or some, at once or over
-/// time. A message: write it from anywhere, the next tick takes it up and lets it act through
-/// equation 16, so that bonds which re-form remember the shape of that moment.
+/// A request to change bond rates, for a hair or one strand, all joints or some, at once or over
+/// time. A message: write it from anywhere; from the next tick on it acts through equation 16, so that
+/// bonds which re-form remember the shape of that moment.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// fn shower(hair: Single<Entity, With<Hair>>, mut treat: MessageWriter<Treat>) {
-///     treat.write(Treat::wet(*hair));
+/// fn shower(hair: Single<Entity, With<Hair>>, mut treat: MessageWriter<HairTreatment>) {
+///     treat.write(HairTreatment::wet(*hair));
 ///     // dry the outer half in two seconds
-///     treat.write(Treat::dry(*hair).over(2.0).joints(4..8));
+///     treat.write(HairTreatment::dry(*hair).over(2.0).joints(4..8));
 /// }
 /// ```
 #[derive(Message, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
-pub struct Treat {
+pub struct HairTreatment {
     /// The [`Hair`](crate::Hair) or strand to treat.
     pub target: Entity,
     /// The joints to treat, from the root; `None` all.
@@ -35,38 +35,40 @@ pub struct Treat {
     /// The rate that each [`BondKind`] is to reach, `None` where it stays. Peptide bonds are never
     /// cut.
     pub rates: [Option<f32>; BondKind::COUNT],
-    /// Time to get there (s). Default 0: in one substep.
+    /// Time to reach the rates (s). Default 0: one substep. Range [`SECONDS`](Self::SECONDS).
     pub seconds: f32,
-    /// Time until it begins (s). Default 0.
+    /// Time until it begins (s). Default 0. Range [`DELAY`](Self::DELAY).
     pub delay: f32,
 }
 
 /// The share of disulfide bonds that perm lotion leaves (\[B\] §4).
 pub const LOTION_DISULFIDE: f32 = 0.8;
 
-impl Treat {
+impl HairTreatment {
     /// The range of the rates that bonds are brought to.
-    pub const RATES: ValueRange = JointBonds::RATES.named("Treat::rates");
+    pub const RATES: ValueRange = JointBonds::RATES.named("HairTreatment::rates");
     /// The range of [`seconds`](Self::seconds).
     pub const SECONDS: ValueRange =
-        ValueRange::new("Treat::seconds (s)", 0.0..=1e6, "0 acts at once").with_safe(0.0..=60.0);
+        ValueRange::new("HairTreatment::seconds (s)", 0.0..=1e6, "0 acts at once")
+            .with_safe(0.0..=60.0);
 
     /// The range of [`delay`](Self::delay).
     pub const DELAY: ValueRange =
-        ValueRange::new("Treat::delay (s)", 0.0..=1e6, "0 begins at once").with_safe(0.0..=600.0);
+        ValueRange::new("HairTreatment::delay (s)", 0.0..=1e6, "0 begins at once")
+            .with_safe(0.0..=600.0);
 
     fn rates(target: Entity, rates: [Option<f32>; BondKind::COUNT]) -> Self {
         Self { target, joints: None, rates, seconds: 0.0, delay: 0.0 }
     }
 
-    /// A whole perm on hair that is wound or held as it shall be: lotion, neutraliser and drying, each
-    /// taking so many `seconds`, of which [`ProcessTime`](crate::ProcessTime) makes fewer. Release the hair
-    /// after three times that.
+    /// A whole perm on hair that is wound or held in the desired shape: lotion, neutraliser and drying,
+    /// each taking `seconds`, which [`HairProcessTime`](crate::HairProcessTime) shortens. Release the hair after
+    /// three times that.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-    /// fn perm(hair: Single<Entity, With<Hair>>, mut treat: MessageWriter<Treat>) {
-    ///     treat.write_batch(Treat::perm_set(*hair, 5.0));
+    /// fn perm(hair: Single<Entity, With<Hair>>, mut treat: MessageWriter<HairTreatment>) {
+    ///     treat.write_batch(HairTreatment::perm_set(*hair, 5.0));
     /// }
     /// ```
     pub fn perm_set(target: Entity, seconds: f32) -> [Self; 3] {
@@ -103,7 +105,7 @@ impl Treat {
         Self::rates(target, [Some(0.0), Some(0.0), None, None])
     }
 
-    /// Everything re-forms around the present shape, which becomes the hair's own.
+    /// All bonds re-form around the present shape, which becomes the hair's natural shape.
     pub fn set_everything(target: Entity) -> Self {
         Self::rates(target, [Some(1.0); BondKind::COUNT])
     }
@@ -111,7 +113,7 @@ impl Treat {
     /// Brings one kind to a rate.
     ///
     /// # Errors
-    /// When the rate is outside 0 to 1.
+    /// When the rate is outside [`RATES`](Self::RATES).
     pub fn set(target: Entity, kind: BondKind, rate: f32) -> Result<Self, InvalidValue> {
         let mut rates = [None; BondKind::COUNT];
         rates[kind as usize] = Some(Self::RATES.check(rate)?);
@@ -124,21 +126,24 @@ impl Treat {
         self
     }
 
-    /// The same treatment, beginning after `seconds`, of which [`ProcessTime`](crate::ProcessTime) makes
-    /// fewer.
+    /// The same treatment, beginning after `seconds` ([`DELAY`](Self::DELAY)), which
+    /// [`HairProcessTime`](crate::HairProcessTime) shortens. A value out of range is clamped and reported when
+    /// the treatment begins.
     pub fn after(mut self, seconds: f32) -> Self {
         self.delay = seconds;
         self
     }
 
-    /// The same treatment, taking `seconds`, of which [`ProcessTime`](crate::ProcessTime) makes fewer.
+    /// The same treatment, taking `seconds` ([`SECONDS`](Self::SECONDS)), which
+    /// [`HairProcessTime`](crate::HairProcessTime) shortens. A value out of range is clamped and reported when
+    /// the treatment begins.
     pub fn over(mut self, seconds: f32) -> Self {
         self.seconds = seconds;
         self
     }
 }
 
-impl Ranged for Treat {
+impl Ranged for HairTreatment {
     fn clamp_values(&mut self, violations: &mut Violations) {
         Self::SECONDS.clamp(&mut self.seconds, || 0.0, violations);
         Self::DELAY.clamp(&mut self.delay, || 0.0, violations);
@@ -152,18 +157,18 @@ impl Ranged for Treat {
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone)]
 pub struct Treatments {
-    acting: Vec<Treat>,
+    acting: Vec<HairTreatment>,
 }
 
 impl Treatments {
-    /// The treatments, oldest first, with the time until they begin and the time they still take.
-    pub fn acting(&self) -> &[Treat] {
+    /// The treatments, oldest first, with the remaining delay and duration.
+    pub fn acting(&self) -> &[HairTreatment] {
         &self.acting
     }
 }
 
 setting! {
-    /// A cylinder along Y that strands are wound round: see [`Winding`]. Despawn it to release them.
+    /// A cylinder along Y that strands are wound round: see [`PermWinding`]. Despawn it to release them.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     #[require(Transform, TickPose)]
@@ -181,7 +186,7 @@ impl PermRod {
     /// A rod of `radius` and `length` (m).
     ///
     /// # Errors
-    /// When one is not between 1 mm and 10 m (radius) or 100 m (length).
+    /// When one is outside [`RADIUS`](Self::RADIUS) or [`LENGTH`](Self::LENGTH).
     pub fn new(radius: f32, length: f32) -> Result<Self, InvalidValue> {
         Self { radius, length }.checked()
     }
@@ -191,7 +196,7 @@ impl PermRod {
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component, Clone, PartialEq)]
 #[relationship(relationship_target = WoundStrands)]
-#[require(Winding, WindingProgress, HeldNodes)]
+#[require(PermWinding, WindingProgress, HeldNodes)]
 pub struct WoundOn(pub Entity);
 
 /// The strands on a [`PermRod`]. Kept by Bevy.
@@ -203,13 +208,13 @@ pub struct WoundStrands(Vec<Entity>);
 setting! {
     /// How a strand is wound on its rod.
     ///
-    /// The nodes are guided, as by a hairdresser's hand: from where the strand is when winding begins,
-    /// through ever tighter helices whose radius shrinks to the rod's, each of the strand's own length,
-    /// so nothing is stretched on the way. Their shape is the bonds' to remember.
+    /// The nodes are held and guided from the strand's pose when winding begins, through helices whose
+    /// radius shrinks to the rod's, each of the strand's own length, so that nothing is stretched on the
+    /// way. Bonds may then set in that shape.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    pub struct Winding {
-        /// The first node on the rod, from the root, which is the scalp's.
+    pub struct PermWinding {
+        /// Index of the first node on the rod; the root, 0, stays on the scalp.
         pub from_node: usize = 2, in FROM_NODE: 1.0..=1e6, safe 1.0..=64.0, "2 keeps off the scalp";
         /// Advance along the rod's axis per turn. At 4 mm turns lie side by side.
         pub pitch: f32 = 0.004, "m" in PITCH: -10.0..=10.0, safe 0.0..=0.1,
@@ -219,7 +224,7 @@ setting! {
     }
 }
 
-/// How far winding has come. Kept by the tick.
+/// Progress of winding. Kept by the tick.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone)]
 pub struct WindingProgress {

@@ -1,16 +1,16 @@
-//! Treatments ask for bond changes in `ExternalForces`; rods guide their strands in `Interaction`.
+//! Treatments request bond changes in `ExternalForces`; rods guide their strands in `Interaction`.
 
 use super::{
-    PermRod, Treat, Treatments, Winding, WindingProgress, WoundOn, WoundStrands,
-    winding::{Rod, winding},
+    HairTreatment, PermRod, PermWinding, Treatments, WindingProgress, WoundOn, WoundStrands,
+    winding::{LocalRod, winding},
 };
 use crate::{
     bond::{BondChanges, BondKind, Bonds},
     fault::{FaultKind, HairFault},
     parallel::{Nanos, for_each},
-    schedule::{HairStep, HairSystems, HairTick, ProcessTime},
+    schedule::{HairProcessTime, HairStep, HairSystems, HairTick},
     setting::{self, Ranged, report},
-    strand::{HeldNodes, Strand, StrandOf, Strands, TickPose},
+    strand::{HeldNodes, Strand, StrandOf, Strands, TickPose, keep_required},
 };
 use bevy::prelude::*;
 
@@ -20,9 +20,11 @@ pub struct TreatmentPlugin;
 impl Plugin for TreatmentPlugin {
     fn build(&self, app: &mut App) {
         setting::component::<PermRod>(app);
-        setting::component::<Winding>(app);
-        app.add_message::<Treat>()
-            .register_type::<Treat>()
+        setting::component::<PermWinding>(app);
+        keep_required::<Strand, Treatments>(app);
+        keep_required::<PermRod, TickPose>(app);
+        app.add_message::<HairTreatment>()
+            .register_type::<HairTreatment>()
             .register_type::<Treatments>()
             .register_type::<WoundOn>()
             .register_type::<WoundStrands>()
@@ -38,7 +40,7 @@ impl Plugin for TreatmentPlugin {
 }
 
 fn begin_treatments(
-    mut requests: MessageReader<Treat>,
+    mut requests: MessageReader<HairTreatment>,
     hairs: Query<&Strands>,
     mut strands: Query<&mut Treatments, With<StrandOf>>,
     mut faults: MessageWriter<HairFault>,
@@ -60,10 +62,10 @@ fn begin_treatments(
     }
 }
 
-/// Asks for this substep's part of what each treatment still has to do.
+/// Requests this substep's part of each acting treatment.
 fn apply_treatments(
     step: Res<HairStep>,
-    process: Res<ProcessTime>,
+    process: Res<HairProcessTime>,
     mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
 ) {
     let dt = step.dt * process.clamped().0;
@@ -71,7 +73,7 @@ fn apply_treatments(
     for_each(&mut items, Nanos(1_000), |(bonds, changes, treatments)| {
         let changes = changes.bypass_change_detection();
         for treat in &mut treatments.acting {
-            // Half a substep: sums of substeps do not come out to the bit.
+            // Half a substep of tolerance: sums of substeps are rounded.
             if treat.delay > 0.5 * dt {
                 treat.delay -= dt;
                 continue;
@@ -100,7 +102,7 @@ fn wind_strands(
         &StrandOf,
         &WoundOn,
         &Strand,
-        &Winding,
+        &PermWinding,
         &mut WindingProgress,
         &mut HeldNodes,
     )>,
@@ -112,7 +114,7 @@ fn wind_strands(
             let (rod, pose) = rods.get(on.0).ok()?;
             let (rod, pose) = (rod.clamped(), pose.now());
             let scale = pose.scale / hair.scale;
-            let rod = Rod {
+            let rod = LocalRod {
                 center: hair.point_in(pose.translation),
                 axis: hair.direction_in(pose.rotation * Vec3::Y),
                 radius: rod.radius * scale,
@@ -129,7 +131,7 @@ fn wind_strands(
         if wound.start.len() != strand.nodes() {
             **wound = WindingProgress { start: strand.positions().to_vec(), ..default() };
         }
-        // Once wound, hair is fast on its rod and goes where that goes and turns.
+        // Once wound, hair is fixed to its rod and moves and rotates with it.
         if wound.on_rod.is_empty() {
             wound.progress = (wound.progress + step.dt / settings.seconds.max(step.dt)).min(1.0);
             let (lengths, progress) = (strand.rest_lengths(), wound.progress);
@@ -152,7 +154,7 @@ fn hold(held: &mut HeldNodes, from: usize, nodes: impl Iterator<Item = Vec3>) {
     held.targets.extend(nodes.map(Some));
 }
 
-/// A strand that leaves its rod, for whatever reason, is free.
+/// Releases the nodes of a strand that leaves its rod for any reason.
 fn release(left: On<Remove, WoundOn>, mut strands: Query<(&mut WindingProgress, &mut HeldNodes)>) {
     if let Ok((mut wound, mut held)) = strands.get_mut(left.entity) {
         held.targets.clear();

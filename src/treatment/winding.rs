@@ -1,11 +1,11 @@
-//! Winding as mathematics: the path of a strand onto a rod.
+//! Winding as a pure function: the path of a strand onto a rod.
 
 use crate::strand::drawn_out;
 use bevy::math::{FloatPow, Quat, Vec3, ops};
 
 /// A rod in the strand's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rod {
+pub(crate) struct LocalRod {
     /// Its centre (m).
     pub center: Vec3,
     /// Unit direction of its axis.
@@ -16,15 +16,15 @@ pub struct Rod {
     pub half_length: f32,
 }
 
-/// Where the nodes from `from` on are when winding has come to `progress` (0 to 1).
+/// Positions of the nodes from `from` on at `progress` (0 to 1) of winding.
 ///
 /// The strand leaves its `start` for the rod's nearest point and curls along circles that touch it
 /// there, their radius falling from infinity to the rod's. Nodes are laid out from edge directions,
 /// so at every moment each edge has its rest length, on the rod as chords of a helix of the given
 /// `pitch` (m per turn). `start` is the whole strand, root first; a rod out of the root's reach is
 /// wound as near to it as the strand comes.
-pub fn winding(
-    rod: &Rod,
+pub(crate) fn winding(
+    rod: &LocalRod,
     start: &[Vec3],
     lengths: &[f32],
     from: usize,
@@ -42,7 +42,7 @@ pub fn winding(
     if away > slack {
         touch = start[0] + (touch - start[0]) * (drawn_out(away, slack) / away);
     }
-    // Round the rod the way the strand already goes.
+    // Around the rod in the direction the strand already has.
     let mut tangent = rod.axis.cross(outward);
     let heading = start.get(from + 1).map_or(tangent, |next| *next - origin);
     let sense = if heading.dot(tangent) < 0.0 { -1.0 } else { 1.0 };
@@ -84,8 +84,12 @@ mod tests {
         (points, vec![0.03; n])
     }
 
-    const ROD: Rod =
-        Rod { center: Vec3::new(0.03, -0.06, 0.0), axis: Vec3::Z, radius: 0.03, half_length: 0.1 };
+    const ROD: LocalRod = LocalRod {
+        center: Vec3::new(0.03, -0.06, 0.0),
+        axis: Vec3::Z,
+        radius: 0.03,
+        half_length: 0.1,
+    };
 
     #[test]
     fn a_wound_strand_lies_on_the_rod() {
@@ -97,6 +101,19 @@ mod tests {
     }
 
     proptest! {
+        /// Once the edges have turned to a rod in reach, at every moment the coil is around it, not in it.
+        #[test]
+        fn a_coil_that_closes_is_never_in_its_rod(u in 0.34f32..=1.0, from in 2usize..5) {
+            let (start, lengths) = straight(16);
+            // Inverse of the smoothstep.
+            let progress = 0.5 - ops::sin(ops::asin(1.0 - 2.0 * u) / 3.0);
+            for p in winding(&ROD, &start, &lengths, from, 0.004, progress) {
+                let rel = p - ROD.center;
+                let depth = ROD.radius - rel.reject_from_normalized(ROD.axis).length();
+                prop_assert!(depth < 3e-5, "{depth} m inside at {progress}");
+            }
+        }
+
         #[test]
         fn no_edge_is_stretched_on_the_way(progress in 0f32..=1.0, from in 0usize..10) {
             let (start, lengths) = straight(16);

@@ -1,63 +1,66 @@
-//! A block of strands among droplets: pulled by them (\[W\] equation 2), touched by them, landed on.
+//! Droplets on a block of strands: adhesion (\[W\] equation 2), touching and landing.
 
 use super::{
-    Wetting,
+    HairWetting,
     field::{Falling, Field, Puller},
     model,
     moisture::node_lengths,
-    strand_block::{Row, StrandBlock, StrandLane},
+    strand_block::{NodeSlice, StrandBlock, StrandLane},
 };
-use crate::grid::Found;
+use crate::grid::FoundBalls;
 use crate::lanes::{LANES, Lane, Real, V3, dispatch, lanes_in, load, load3, splat3, store3};
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*, u32x16};
 
-/// A node whose squared distance from a droplet's centre (m²) is not more is pulled nowhere.
+/// Squared distance (m²) from a droplet's centre up to which there is no direction of pull.
 const SAME_PLACE: f32 = 1e-18;
 
-/// The steepest field of force, in units of 1/dt², that a substep follows without overshooting. A
-/// node among more droplets than make it (about thirteen of 3/15 mm at 30 m/s² and 1/360 s) is
-/// pulled as by so many.
+/// Steepest force gradient, in units of 1/dt², that a substep follows without overshooting. With more
+/// droplets at a node than give this (about thirteen of 3/15 mm at 30 m/s² and 1/360 s) the pull is
+/// scaled down.
 const STEEPEST: f32 = 1.0;
 
-/// What strands did to droplets, in the order of blocks.
+/// Largest upward acceleration by droplets, as a share of gravity.
+const LIFT: f32 = 0.2;
+
+/// Effects of strands on droplets, in the order of blocks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DropletContacts {
-    /// What was done to each droplet.
-    pub sums: Vec<Sum>,
+    /// The effect on each droplet.
+    pub sums: Vec<DropletSum>,
     pub touches: Vec<Touch>,
     pub landings: Vec<Landing>,
-    /// Water that was on nodes that are gone (m³).
+    /// Water of removed nodes (m³).
     pub gone: f64,
-    scratch: Scratch,
+    scratch: ContactScratch,
 }
 
-/// What a piece of the strands did to a droplet.
+/// The effect of some strands on a droplet.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sum {
-    /// What they gave it (kg m/s, in the hair's frame).
+pub(super) struct DropletSum {
+    /// Impulse on it (kg m/s, in the hair's frame).
     pub impulse: Vec3,
-    /// How many of them are at it.
+    /// How many of them touch it.
     pub company: u32,
     /// The most that they would absorb of it (m³).
     pub wanted: f64,
 }
 
 #[derive(Clone, Debug, Default)]
-struct Scratch {
+struct ContactScratch {
     strand_block: StrandBlock,
-    near: Found,
+    near: FoundBalls,
     hits: Vec<Hit>,
-    /// Which lanes are at each puller, and at which ones there are any.
+    /// Mask of the lanes that touch each puller, and the pullers with any.
     at: Vec<u64>,
-    met: Vec<u32>,
+    touched: Vec<u32>,
 }
 
 impl DropletContacts {
-    /// Nothing yet, of so many droplets.
+    /// Resets for `drops` droplets.
     pub fn clear(&mut self, drops: usize) {
         self.sums.clear();
-        self.sums.resize(drops, Sum::default());
+        self.sums.resize(drops, DropletSum::default());
         self.touches.clear();
         self.landings.clear();
         self.gone = 0.0;
@@ -70,22 +73,22 @@ struct Hit {
     puller: u32,
     /// Lanes that touch it.
     touches: u64,
-    /// The nodes' change of velocity (m/s), if they bear nothing.
+    /// The nodes' change of velocity (m/s) without added mass.
     change: [Lane; 3],
 }
 
-/// A node that drinks from a droplet.
+/// A node that absorbs water from a droplet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch {
     pub drop: u32,
-    /// The strand's number among those of the piece of work.
+    /// The strand's index in the piece of work.
     pub strand: u32,
     pub node: u32,
-    /// What it would take (m³).
+    /// The volume that it would absorb (m³).
     pub wants: f64,
 }
 
-/// A falling droplet that met a strand.
+/// A falling droplet that hit a strand.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Landing {
     pub drop: u32,
@@ -96,16 +99,18 @@ pub(super) struct Landing {
     pub when: f32,
 }
 
-/// What holds for all strands of a hair in a substep.
+/// Parameters of all strands of a hair in a substep.
 #[derive(Clone, Copy)]
 pub(super) struct ContactParams<'a> {
-    pub wetting: &'a Wetting,
+    pub wetting: &'a HairWetting,
     pub field: &'a Field,
     pub dt: f32,
     /// Share of the free room on a node that a droplet fills in this substep.
     pub uptake: f32,
     /// The most film that a node holds (m³).
     pub most_film: f64,
+    /// Gravity, in the hair's frame (m/s²): droplets lift hair by no more than it weighs.
+    pub gravity: Vec3,
 }
 
 #[inline(always)]
@@ -114,12 +119,12 @@ fn sum<S: Simd>(v: V3<f32x16<S>>) -> Vec3 {
 }
 
 impl ContactParams<'_> {
-    /// Pulls the nodes of up to sixteen strands, the first of them number `first` of its piece of work,
-    /// and adds up what droplets get from them.
+    /// Applies droplets to the nodes of up to sixteen strands, the first with index `first` in its piece
+    /// of work, and sums the reactions on droplets.
     pub fn contact(
         &self,
         level: Level,
-        members: &mut [StrandLane<'_>],
+        strand_lanes: &mut [StrandLane<'_>],
         first: usize,
         out: &mut DropletContacts,
     ) {
@@ -127,7 +132,7 @@ impl ContactParams<'_> {
             return;
         }
         let mut strand_block = core::mem::take(&mut out.scratch.strand_block);
-        strand_block.place(level, members);
+        strand_block.place(level, strand_lanes);
         let mut is_weighed = false;
         out.scratch.at.resize(self.field.pullers.len(), 0);
         for i in 0..strand_block.rows.len() {
@@ -135,21 +140,22 @@ impl ContactParams<'_> {
             self.field.pulling(level, row.low, row.high, &mut out.scratch.near);
             if !out.scratch.near.balls.is_empty() {
                 if !core::mem::replace(&mut is_weighed, true) {
-                    strand_block.weigh(members, self.wetting);
+                    strand_block.weigh(strand_lanes, self.wetting);
                 }
                 let row = &mut strand_block.rows[i];
-                let at = Place { node: i, first, own: &strand_block.own };
-                dispatch!(level, simd => self.pull(simd, row, at, members, out));
+                let at = Place { node: i, first, own: &strand_block.strand_index };
+                dispatch!(level, simd => self.pull(simd, row, at, strand_lanes, out));
             }
         }
-        let DropletContacts { sums, scratch: Scratch { at, met, .. }, .. } = out;
-        for puller in met.drain(..) {
+        let DropletContacts { sums, scratch: ContactScratch { at, touched, .. }, .. } = out;
+        for puller in touched.drain(..) {
             let lanes = core::mem::take(&mut at[puller as usize]);
             sums[self.field.pullers[puller as usize].drop as usize].company += lanes.count_ones();
         }
-        // Who carries a droplet is heavy.
-        for (k, member) in members.iter().enumerate().filter(|(_, m)| !m.load.is_empty()) {
-            self.absorb_from_riders(member, first + k, out);
+        // Strands that carry a droplet have added mass.
+        for (k, strand_lane) in strand_lanes.iter().enumerate().filter(|(_, m)| !m.load.is_empty())
+        {
+            self.absorb_from_riders(strand_lane, first + k, out);
         }
         let edges = if self.field.fallers.is_empty() { &[] } else { &strand_block.rows[..] };
         for (i, ends) in edges.windows(2).enumerate() {
@@ -159,14 +165,14 @@ impl ContactParams<'_> {
                 let falling = &self.field.fallers[out.scratch.near.balls[k] as usize];
                 let (lanes, when, along) = dispatch!(level, simd => caught(simd, ends, falling));
                 for lane in lanes_in(lanes) {
-                    let (strand, at) = (members[lane].strand, i as f32 + along[lane]);
+                    let (strand, at) = (strand_lanes[lane].strand, i as f32 + along[lane]);
                     let landing = Landing { drop: falling.drop, strand, at, when: when[lane] };
                     out.landings.push(landing);
                 }
             }
         }
         if is_weighed {
-            strand_block.scatter(members);
+            strand_block.scatter(strand_lanes);
         }
         out.scratch.strand_block = strand_block;
     }
@@ -176,9 +182,9 @@ impl ContactParams<'_> {
     fn pull<S: Simd>(
         &self,
         simd: S,
-        row: &mut Row,
+        row: &mut NodeSlice,
         place: Place<'_>,
-        members: &[StrandLane<'_>],
+        strand_lanes: &[StrandLane<'_>],
         out: &mut DropletContacts,
     ) {
         let own = u32x16::load_array_ref(simd, place.own);
@@ -197,7 +203,7 @@ impl ContactParams<'_> {
             if touches != 0 {
                 let at = &mut out.scratch.at[number as usize];
                 if *at == 0 {
-                    out.scratch.met.push(number);
+                    out.scratch.touched.push(number);
                 }
                 *at |= touches;
             }
@@ -209,14 +215,21 @@ impl ContactParams<'_> {
         }
         let bears = load(simd, &row.load) + 1.0;
         let share = Real::min(bears * STEEPEST / steepness, f32x16::splat(simd, 1.0));
-        let mut v = change.scale_add(share / bears, load3(simd, &row.v));
+        // What a droplet hangs on is hair, too, and no firmer. Hair that floated up to it would stand out.
+        let up = splat3(simd, -self.gravity.normalize_or_zero());
+        let lift = change.dot(up) * share / bears;
+        let weight = f32x16::splat(simd, LIFT * self.gravity.length() * self.dt);
+        let lowered = weight / Real::max(lift, weight) - 1.0;
+        let lowered = Real::select(Real::lt(weight, lift), lowered, f32x16::splat(simd, 0.0));
+        let held = |change: V3<f32x16<S>>| up.scale_add(change.dot(up) * lowered, change);
+        let mut v = held(change).scale_add(share / bears, load3(simd, &row.v));
         let mass = load(simd, &row.mass);
-        // Roots do not move, nor do they hold what touches them back.
+        // Roots are held and exert no reaction on droplets.
         let given = if place.node > 0 { share * mass } else { f32x16::splat(simd, 0.0) };
         for k in 0..out.scratch.hits.len() {
             let hit = out.scratch.hits[k];
             let puller = &self.field.pullers[hit.puller as usize];
-            let mut impulse = -load3(simd, &hit.change).scale(given);
+            let mut impulse = -held(load3(simd, &hit.change)).scale(given);
             if hit.touches != 0 {
                 let others = mask32x16::from_bitmask(simd, hit.touches)
                     & !own.simd_eq(u32x16::splat(simd, puller.rides));
@@ -224,14 +237,14 @@ impl ContactParams<'_> {
                     let (changed, got) = self.drag(simd, v, mass * bears, others, puller);
                     (v, impulse) = (changed, impulse + got);
                 }
-                self.absorb(others.to_bitmask(), puller.drop, &place, members, out);
+                self.absorb(others.to_bitmask(), puller.drop, &place, strand_lanes, out);
             }
             out.sums[puller.drop as usize].impulse += sum(impulse);
         }
         store3(&mut row.v, v);
     }
 
-    /// What a droplet does to sixteen nodes at `p`.
+    /// The effect of a droplet on sixteen nodes at `p`.
     #[inline(always)]
     fn adhesion_at<S: Simd>(
         &self,
@@ -246,7 +259,7 @@ impl ContactParams<'_> {
         let squared = offset.dot(offset);
         let inside = squared.simd_lt(f32x16::splat(simd, puller.reach));
         let touches = squared.simd_lt(f32x16::splat(simd, puller.touch)).to_bitmask();
-        // Between a strand and the drop on it the pull is an inner force.
+        // Between a strand and the drop it carries the pull is an internal force.
         let pulls = inside
             & !own.simd_eq(u32x16::splat(simd, puller.rides))
             & squared.simd_lt(f32x16::splat(simd, puller.pulls_within))
@@ -271,8 +284,8 @@ impl ContactParams<'_> {
         }
     }
 
-    /// The water between nodes and a droplet that touches them takes their motion against each other:
-    /// the nodes' velocity then, and what the droplet gets.
+    /// Viscous drag of the film between nodes and a droplet that touches them, on their relative
+    /// velocity: returns the nodes' new velocity and the impulse on the droplet.
     #[inline(always)]
     fn drag<S: Simd>(
         &self,
@@ -284,7 +297,7 @@ impl ContactParams<'_> {
     ) -> (V3<f32x16<S>>, V3<f32x16<S>>) {
         let zero = f32x16::splat(simd, 0.0);
         let drop = &self.field.drops[puller.drop as usize];
-        // All that are at it together must not throw it beyond their common motion.
+        // All strands that touch it together must not overshoot the common velocity.
         let rate = self.wetting.film_drag * self.dt * drop.strength;
         let rate = rate / (1.0 + rate * drop.company);
         let share = f32x16::splat(simd, drop.mass * rate) / (node + drop.mass);
@@ -293,21 +306,23 @@ impl ContactParams<'_> {
         (v + change, -change.scale(node))
     }
 
-    /// What each of some lanes would take from a droplet.
+    /// The volume that each of some lanes would absorb from a droplet.
     fn absorb(
         &self,
         lanes: u64,
         drop: u32,
         place: &Place<'_>,
-        members: &[StrandLane<'_>],
+        strand_lanes: &[StrandLane<'_>],
         out: &mut DropletContacts,
     ) {
-        for (lane, member) in lanes_in(lanes).filter_map(|lane| Some((lane, members.get(lane)?))) {
-            self.want(drop, place.first + lane, place.node, member.film, out);
+        for (lane, strand_lane) in
+            lanes_in(lanes).filter_map(|lane| Some((lane, strand_lanes.get(lane)?)))
+        {
+            self.want(drop, place.first + lane, place.node, strand_lane.film, out);
         }
     }
 
-    /// A node under its strand's `film` (m³) touches a droplet, and would fill what room it has.
+    /// Records a node with `film` (m³) that touches a droplet and would absorb up to its free capacity.
     fn want(&self, drop: u32, strand: usize, node: usize, film: &[f64], out: &mut DropletContacts) {
         let room = self.most_film - film.get(node).copied().unwrap_or(0.0);
         let wants = room * f64::from(self.uptake);
@@ -317,36 +332,36 @@ impl ContactParams<'_> {
         }
     }
 
-    /// Between two nodes a droplet touches the nearer one of its strand, however far off that is.
+    /// A droplet between two nodes touches the nearer one of its own strand at any distance.
     fn absorb_from_riders(
         &self,
-        member: &StrandLane<'_>,
+        strand_lane: &StrandLane<'_>,
         strand: usize,
         out: &mut DropletContacts,
     ) {
-        for (drop, seen) in self.field.on(member.strand) {
+        for (drop, seen) in self.field.on(strand_lane.strand) {
             let touch = seen.touch(self.wetting.lock_radius());
-            for (node, length) in node_lengths(member.lengths).enumerate() {
+            for (node, length) in node_lengths(strand_lane.lengths).enumerate() {
                 let near = touch.max(0.5 * length);
-                if member.positions[node].distance_squared(seen.at) < near * near {
-                    self.want(drop, strand, node, member.film, out);
+                if strand_lane.positions[node].distance_squared(seen.at) < near * near {
+                    self.want(drop, strand, node, strand_lane.film, out);
                 }
             }
         }
     }
 }
 
-/// Which nodes a row is.
+/// The nodes of a row.
 #[derive(Clone, Copy)]
 struct Place<'a> {
     node: usize,
-    /// The number of the first lane's strand in its piece of work.
+    /// Index of the first lane's strand in its piece of work.
     first: usize,
     /// The index of each lane's strand.
     own: &'a [u32; LANES],
 }
 
-/// What a droplet does to nodes side by side.
+/// The effect of a droplet on nodes side by side.
 #[derive(Clone, Copy)]
 struct Adhesion<S: Simd> {
     touches: u64,
@@ -355,10 +370,10 @@ struct Adhesion<S: Simd> {
     steep: f32x16<S>,
 }
 
-/// The edges between two rows that a falling droplet has hit on its way of this substep: which lanes,
-/// when (0…1), and where along them (0…1).
+/// The edges between two rows that a falling droplet has hit in this substep: the lanes, the time
+/// (0…1), and the position along them (0…1).
 #[inline(always)]
-fn caught<S: Simd>(simd: S, ends: &[Row], falling: &Falling) -> (u64, Lane, Lane) {
+fn caught<S: Simd>(simd: S, ends: &[NodeSlice], falling: &Falling) -> (u64, Lane, Lane) {
     let start = load3(simd, &ends[0].p);
     let edge = load3(simd, &ends[1].p) - start;
     let (from, way) = (splat3(simd, falling.from), splat3(simd, falling.way));
@@ -390,26 +405,34 @@ mod tests {
         }
     }
 
-    fn member<'a>(i: u32, positions: &'a [Vec3], velocities: &'a mut [Vec3]) -> StrandLane<'a> {
+    fn strand_lane<'a>(
+        i: u32,
+        positions: &'a [Vec3],
+        velocities: &'a mut [Vec3],
+    ) -> StrandLane<'a> {
         const LENGTHS: [f32; 8] = [0.03; 8];
         let strand = Entity::from_raw_u32(7 + i).unwrap();
         let lengths = &LENGTHS[..positions.len() - 1];
         StrandLane { strand, positions, velocities, lengths, load: &[], film: &[] }
     }
 
-    fn contact_params<'a>(wetting: &'a Wetting, field: &'a Field, dt: f32) -> ContactParams<'a> {
-        ContactParams { wetting, field, dt, uptake: 0.0, most_film: 0.0 }
+    fn contact_params<'a>(
+        wetting: &'a HairWetting,
+        field: &'a Field,
+        dt: f32,
+    ) -> ContactParams<'a> {
+        ContactParams { wetting, field, dt, uptake: 0.0, most_film: 0.0, gravity: Vec3::ZERO }
     }
 
     #[test]
-    fn every_node_feels_every_droplet_in_reach_and_no_other() {
+    fn every_droplet_in_reach_acts_on_every_node_and_no_other() {
         // Five strands beside each other, each shorter than the one before.
         let strands: Vec<Vec<Vec3>> = (0..5)
             .map(|s| {
                 (0..9 - s).map(|i| Vec3::new(0.03 * i as f32, 0.004 * s as f32, 0.0)).collect()
             })
             .collect();
-        let wetting = Wetting { film_drag: 0.0, ..default() };
+        let wetting = HairWetting { film_drag: 0.0, ..default() };
         let mut random = 1u32;
         let mut next = || {
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -428,31 +451,31 @@ mod tests {
         let mut velocities: Vec<_> = strands.iter().map(|s| vec![Vec3::ZERO; s.len()]).collect();
         let mut out = DropletContacts::default();
         out.clear(field.drops.len());
-        let mut members: Vec<_> = (0..)
+        let mut strand_lanes: Vec<_> = (0..)
             .zip(strands.iter().zip(&mut velocities))
-            .map(|(i, (positions, velocities))| member(i, positions, velocities))
+            .map(|(i, (positions, velocities))| strand_lane(i, positions, velocities))
             .collect();
         contact_params(&wetting, &field, 1.0 / 3600.0).contact(
             Level::new(),
-            &mut members,
+            &mut strand_lanes,
             0,
             &mut out,
         );
         let mut given = Vec3::ZERO;
-        for (s, member) in members.iter().enumerate() {
-            for (i, p) in member.positions.iter().enumerate() {
-                let others = field.drops.iter().filter(|d| d.ride != Some(member.strand));
+        for (s, strand_lane) in strand_lanes.iter().enumerate() {
+            for (i, p) in strand_lane.positions.iter().enumerate() {
+                let others = field.drops.iter().filter(|d| d.ride != Some(strand_lane.strand));
                 let expected: Vec3 = others
                     .map(|d| model::pull(d.at - *p, d.r_min, d.r_max) * (30.0 / 3600.0))
                     .sum();
                 let expected = if i == 0 { Vec3::ZERO } else { expected };
-                assert!(member.velocities[i].distance(expected) < 1e-5, "{s} {i}");
+                assert!(strand_lane.velocities[i].distance(expected) < 1e-5, "{s} {i}");
             }
-            given += (member.velocities.iter().zip(node_lengths(member.lengths)))
+            given += (strand_lane.velocities.iter().zip(node_lengths(strand_lane.lengths)))
                 .map(|(v, l)| *v * (l * wetting.dry_mass()))
                 .sum::<Vec3>();
         }
-        // What droplets get is what strands gave: momentum in, momentum out.
+        // Impulses on droplets are opposite to those on strands: momentum is conserved.
         let got: Vec3 = out.sums.iter().map(|sum| sum.impulse).sum();
         assert!((given + got).length() < 1e-6 * given.length());
         for (k, d) in field.drops.iter().enumerate() {
@@ -465,15 +488,15 @@ mod tests {
     fn drag_takes_motion_and_keeps_momentum() {
         let positions = [Vec3::ZERO, Vec3::X * 0.03, Vec3::X * 0.06];
         let mut velocities = [Vec3::ZERO, Vec3::Y, Vec3::Z];
-        let wetting = Wetting { adhesion: 0.0, film_drag: 30.0, ..default() };
+        let wetting = HairWetting { adhesion: 0.0, film_drag: 30.0, ..default() };
         let mut field = Field::default();
         field.drops.push(SeenDrop { company: 3.0, ..drop(positions[1]) });
         field.sort(1e-3);
         let mut out = DropletContacts::default();
         out.clear(1);
         let dt = 1.0 / 360.0;
-        let mut members = [member(0, &positions, &mut velocities)];
-        contact_params(&wetting, &field, dt).contact(Level::new(), &mut members, 0, &mut out);
+        let mut strand_lanes = [strand_lane(0, &positions, &mut velocities)];
+        contact_params(&wetting, &field, dt).contact(Level::new(), &mut strand_lanes, 0, &mut out);
         let node = wetting.dry_mass() * 0.03;
         let share = 1.1e-4 / (1.1e-4 + node) * (30.0 * dt) / (1.0 + 3.0 * 30.0 * dt);
         assert!(velocities[1].distance(Vec3::Y * (1.0 - share)) < 1e-6, "{velocities:?}");
@@ -497,11 +520,11 @@ mod tests {
         let mut out = DropletContacts::default();
         out.clear(field.drops.len());
         let mut velocities = [Vec3::ZERO; 3];
-        let mut members = [member(0, &positions, &mut velocities)];
-        let wetting = Wetting::default();
+        let mut strand_lanes = [strand_lane(0, &positions, &mut velocities)];
+        let wetting = HairWetting::default();
         contact_params(&wetting, &field, 1.0 / 360.0).contact(
             Level::new(),
-            &mut members,
+            &mut strand_lanes,
             0,
             &mut out,
         );

@@ -1,6 +1,6 @@
-//! `Interaction`: strands that a film of water joins draw together and move as one.
+//! `Interaction`: bridges of water pull wet strands together and damp their relative motion.
 
-use super::{Moisture, Wetting, droplet_contact::WaterField, moisture::node_lengths};
+use super::{HairWetting, Moisture, droplet_contact::WaterField, moisture::node_lengths};
 use crate::{
     contact::{Bridged, Film, LockContact, LockNeighbours},
     schedule::EffectiveSubsteps,
@@ -9,12 +9,11 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// Whether water has touched any strand of a hair. Seen once a tick.
+/// Whether any strand of a hair is wet. Updated once a tick.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct IsWet(pub(crate) bool);
 
-/// Triggered on a [`Hair`] that was wet when the last of its water is gone: it is as dry as the air of a
-/// room leaves it.
+/// Triggered on a wet [`Hair`] when it has lost the last of its water, down to the regain of a room.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -29,7 +28,7 @@ pub struct HairDried {
     pub entity: Entity,
 }
 
-pub(super) fn see_wet_hair(
+pub(super) fn update_is_wet(
     mut hairs: Query<(Entity, &Strands, &mut IsWet), With<Hair>>,
     strands: Query<&Moisture>,
     mut commands: Commands,
@@ -44,11 +43,11 @@ pub(super) fn see_wet_hair(
     }
 }
 
-/// Bridges of water between the wet strands of each hair, found through the lists of its contacts.
+/// Bridges of water between the wet strands of each hair, found by its contact lists.
 pub(super) fn join_wet_strands(
     steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
-    wetting: Settings<Wetting>,
+    wetting: Settings<HairWetting>,
     mut scratch: ResMut<WaterField>,
     mut hairs: Query<
         (Entity, &Strands, &IsWet, &mut LockNeighbours, Option<&Sleepers>),
@@ -61,7 +60,7 @@ pub(super) fn join_wet_strands(
         if sleepers.is_some_and(Sleepers::all) {
             continue;
         }
-        let Some(stride) = steps.of(hair) else { continue };
+        let Some(substep) = steps.of(hair) else { continue };
         let LockContact { radius, strength } = contact.of(hair);
         let wetting = wetting.of(hair);
         let joins = radius > 0.0
@@ -82,7 +81,7 @@ pub(super) fn join_wet_strands(
                 |(i, (v, length))| [v.x, v.y, v.z, (film(i) / f64::from(length.max(1e-9))) as f32],
             ));
         }
-        // Contact may have had no turn since strands came or went.
+        // Contact may not have run since strands were added or removed.
         if list.nodes() != rows.len() {
             continue;
         }
@@ -97,18 +96,18 @@ pub(super) fn join_wet_strands(
             let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
             for (i, (v, bridged)) in velocities.iter_mut().zip(&mut bridges).enumerate() {
                 let load = added_mass.mass.get(i).copied().unwrap_or(0.0);
-                *v = joined(*v, &bridged, &wetting, load, stride.dt);
+                *v = joined(*v, &bridged, &wetting, load, substep.dt);
             }
         }
     }
 }
 
-/// The velocity of a node under a `load` (in dry masses) after bridges had it for a substep of `dt`
-/// (s).
+/// The velocity of a node with added mass `load` (in dry masses) after a substep of `dt` (s) with its
+/// bridges.
 ///
-/// The pull is taken explicitly and held to what the substep can follow; the film's drag goes to the
-/// common velocity exactly, however strong it is.
-fn joined(v: Vec3, bridged: &Bridged, wetting: &Wetting, load: f32, dt: f32) -> Vec3 {
+/// The pull is explicit and limited to what the substep can follow; the film's drag relaxes to the
+/// common velocity by the exact solution, stable at any strength.
+fn joined(v: Vec3, bridged: &Bridged, wetting: &HairWetting, load: f32, dt: f32) -> Vec3 {
     if bridged.grip <= 0.0 {
         return v;
     }
@@ -124,9 +123,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bridge_pulls_within_what_a_substep_follows_and_shares_motion() {
+    fn a_bridge_pulls_up_to_the_stable_limit_and_shares_motion() {
         let bridged = Bridged { pull: Vec3::X, steepness: 1e3, drift: Vec3::Y * 2.0, grip: 2.0 };
-        let wetting = Wetting { cohesion: 10.0, film_drag: 0.0, ..default() };
+        let wetting = HairWetting { cohesion: 10.0, film_drag: 0.0, ..default() };
         let dt = 1.0 / 360.0;
         let v = joined(Vec3::ZERO, &bridged, &wetting, 0.0, dt);
         assert!(v.distance(Vec3::X * 10.0 * dt) < 1e-7, "{v}");
@@ -136,10 +135,10 @@ mod tests {
         let steep = Bridged { steepness: 2.0 / (10.0 * dt * dt), ..bridged };
         let v = joined(Vec3::ZERO, &steep, &wetting, 0.0, dt);
         assert!(v.distance(Vec3::X * 5.0 * dt) < 1e-6, "{v}");
-        // The common velocity is drift over grip, and drag for ever ends there.
-        let wetting = Wetting { cohesion: 0.0, film_drag: 1e9, ..default() };
+        // The common velocity is drift over grip: the limit of infinite drag.
+        let wetting = HairWetting { cohesion: 0.0, film_drag: 1e9, ..default() };
         assert!(joined(Vec3::X, &bridged, &wetting, 0.0, dt).distance(Vec3::Y) < 1e-6);
-        let wetting = Wetting { cohesion: 0.0, film_drag: 30.0, ..default() };
+        let wetting = HairWetting { cohesion: 0.0, film_drag: 30.0, ..default() };
         let v = joined(Vec3::X, &bridged, &wetting, 0.0, dt);
         let left = (-60.0 * dt).exp();
         assert!(v.distance(Vec3::X * left + Vec3::Y * (1.0 - left)) < 1e-6);

@@ -1,4 +1,4 @@
-//! Drops of water as entities, and where they come from.
+//! Drops of water as entities, and showers that spawn them.
 
 use super::{
     Counted,
@@ -12,9 +12,10 @@ use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 setting! {
-    /// A drop of water: falls, lands on strands, rides on one and pulls others to it (\[W\] equation 2),
-    /// soaks in, merges, drips off. Spawn it to wet hair; its water is counted until it has evaporated
-    /// or left [`DropletRules`](crate::water::DropletRules). A clone brings its water into the world.
+    /// A drop of water: falls, lands on strands, slides along one and pulls others to it (\[W\]
+    /// equation 2), soaks in, merges, drips off. Spawn it to wet hair; its water is accounted for until it
+    /// has evaporated or left the box of [`DropletRules`](crate::water::DropletRules). A clone adds its
+    /// water to the world.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -31,51 +32,55 @@ setting! {
             "a finite place in the world";
         /// Its velocity.
         pub velocity: Vec3 = Vec3::ZERO, "m/s" in VELOCITY: -1e3..=1e3, "rain falls at 6";
-        /// Its volume. `f64`, for what goes from drop to hair is counted.
+        /// Its volume; `f64` for the exact balance of water.
         pub volume: f64 = ball_volume(1e-3), "m³" in VOLUME: 1e-15..=1e-3, safe 1e-10..=2e-7,
             "4.2e-9 is a drop of 1 mm";
-        /// Distance within which it keeps strands off its core.
+        /// Distance within which it repels strands.
         pub r_min: f32 = 1e-3, "m" in R_MIN: 1e-6..=1.0, "about the drop's own radius";
         /// Distance up to which it pulls strands, more than `r_min`.
-        pub r_max: f32 = 1e-3 * INFLUENCE;
-        pub(super) ride: Option<Ride> = None => Ranged::clamp_values;
+        pub r_max: f32 = 1e-3 * INFLUENCE, "m" in R_MAX: 1e-6..=10.0,
+            "more than r_min, usually five times as much";
+        pub(super) ride: Option<StrandPoint> = None => Ranged::clamp_values;
         /// Where it was a substep ago.
         pub(super) before: Vec3 = Vec3::ZERO, "m" in BEFORE: -1e6..=1e6, "where it was";
-        /// How much of it the ledger knows (m³).
+        /// How much of it the ledger has counted (m³).
         #[reflect(ignore)]
         pub(super) counted: Counted = Counted(0.0);
-        /// How many strands are at it.
+        /// How many strands touch it.
         pub(super) company: u32 = 1;
+        /// Whether it is a drip: the film of hair let it go.
+        pub(super) drip: bool = false;
         /// For how long it has lain on a collider (s).
         pub(crate) lying: f32 = 0.0, "s" in LYING: 0.0..=1e9, "0 has just come to lie";
     }
     then Self::pulls_from_beyond_its_core
 }
 
-/// What carries a drop.
+/// The strand that carries a drop.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-pub struct Ride {
+pub struct StrandPoint {
     /// The strand.
     pub strand: Entity,
     /// Where on it, in segments from the root.
     pub at: f32,
 }
 
-impl Ranged for Ride {
+impl Ranged for StrandPoint {
     fn clamp_values(&mut self, violations: &mut Violations) {
-        const AT: ValueRange = ValueRange::new("Ride::at", 0.0..=65536.0, "segments from the root");
+        const AT: ValueRange =
+            ValueRange::new("StrandPoint::at", 0.0..=65536.0, "segments from the root");
         AT.clamp(&mut self.at, || 0.0, violations);
     }
 }
 
-/// r_max over r_min where nobody says otherwise, as in the clumping experiment.
+/// Default of r_max over r_min, as in the clumping experiment.
 const INFLUENCE: f32 = 5.0;
 
 impl Droplet {
     /// A drop at rest, of `volume` (m³), that pulls up to five times its radius.
     ///
     /// # Errors
-    /// When the place is not finite or the volume outside 1e-15…1e-3 m³.
+    /// When the place is not finite or the volume outside [`VOLUME`](Self::VOLUME).
     pub fn new(position: Vec3, volume: f64) -> Result<Self, InvalidValue> {
         Self::VOLUME.check(volume)?;
         Self { volume, ..Self::ball(position, ball_radius(volume)) }.checked()
@@ -92,7 +97,7 @@ impl Droplet {
     /// The same drop, moving (m/s).
     ///
     /// # Errors
-    /// When the velocity is not finite or beyond 1000 m/s.
+    /// When the velocity is outside [`VELOCITY`](Self::VELOCITY).
     pub fn with_velocity(self, velocity: Vec3) -> Result<Self, InvalidValue> {
         Self { velocity, ..self }.checked()
     }
@@ -125,12 +130,11 @@ impl Droplet {
     }
 
     /// The strand that carries it, if any.
-    pub fn ride(&self) -> Option<Ride> {
+    pub fn ride(&self) -> Option<StrandPoint> {
         self.ride
     }
 
-    /// How strongly it pulls: 1 from the size on that its r_min is made for, less when it has given
-    /// water away.
+    /// Strength of its pull: 1 if its radius is at least r_min, less once it has lost water.
     pub fn strength(&self) -> f32 {
         (self.radius() / self.r_min).min(1.0)
     }
@@ -147,27 +151,30 @@ impl Droplet {
     }
 
     fn pulls_from_beyond_its_core(&mut self, violations: &mut Violations) {
-        let hint = "more than r_min, five times as a rule";
-        ValueRange::new("Droplet::r_max (m)", self.r_min * 1.001..=10.0, hint).clamp(
+        let ValueRange { what, valid, hint, .. } = Self::R_MAX;
+        // A value that is out of the setting's own range has been reported already.
+        let mut known = Violations::new();
+        let is_reported = violations.iter().any(|violation| violation.what == what);
+        ValueRange::new(what, self.r_min * 1.001..=*valid.end(), hint).clamp(
             &mut self.r_max,
             || self.r_min * INFLUENCE,
-            violations,
+            if is_reported { &mut known } else { violations },
         );
     }
 
-    /// Brings back into their ranges what the tick itself may bring out of them: the place of a drop on
-    /// hair at the end of the world, the fall of a drop under absurd gravity. No fault of anybody.
+    /// Clamps positions and velocities that the tick itself may drive out of range, such as of a drop on
+    /// hair far from the origin or under extreme gravity. Not reported as a fault.
     pub(super) fn keep_in_range(&mut self) {
         let mut known = Violations::new();
         Self::POSITION.clamp(&mut self.position, || self.before, &mut known);
         Self::VELOCITY.clamp(&mut self.velocity, || Vec3::ZERO, &mut known);
     }
 
-    /// Brings what was written into it back into its ranges. Water that was known is never lost: an
-    /// impossible volume counts as unchanged.
+    /// Clamps values written from outside. Counted water is never lost: an invalid volume is replaced by
+    /// the counted one.
     pub(super) fn repair(&mut self, violations: &mut Violations) {
         let Self { volume, position, velocity, .. } = *self;
-        // What has run out is gone by the end of the substep.
+        // An empty drop is despawned at the end of the substep.
         let has_run_out = (0.0..1e-15).contains(&volume);
         if has_run_out {
             self.volume = 1e-15;
@@ -216,10 +223,16 @@ setting! {
         pub made: u64 = 0;
         /// The part of the next drop that is due.
         pub owed: f32 = 0.0, "drops" in OWED: 0.0..=1.0, "less than one: what a tick makes is made";
+        /// Whether the last substep would have made more than [`Shower::MOST`]: reported as it begins.
+        pub cut_short: bool = false;
     }
 }
 
 impl Shower {
+    /// The most drops of one substep: what the highest rate makes in 1/50 s. A longer substep makes no
+    /// more; the rest never exists, which is reported.
+    pub const MOST: u64 = 2000;
+
     /// A shower head of `rate` drops per second, each of `drop_radius` (m).
     ///
     /// # Errors
@@ -240,7 +253,7 @@ impl Shower {
     /// Rain on a head at `center` (m): 1,000 drops a second over a disc of 0.3 m, from 1 m above it.
     ///
     /// ```
-    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # use bevy_keratin::{Shower, prelude::*}; use bevy::prelude::*;
     /// # fn setup(mut commands: Commands) {
     /// commands.spawn(Shower::rain_on(Vec3::new(0.0, 1.6, 0.0)));
     /// # }
@@ -258,12 +271,13 @@ impl Shower {
         (rain, from_above.looking_to(Dir3::NEG_Y, Dir3::X))
     }
 
-    /// The drops of the next `seconds`, seen from the head (drops leave along −Z). Settings must be
-    /// valid.
+    /// The drops of the next `seconds`, seen from the head (drops leave along −Z), at most
+    /// [`Shower::MOST`]. Settings must be valid.
     pub(super) fn make(&mut self, seconds: f32) -> impl Iterator<Item = Droplet> + use<> {
         let owed = self.owed + self.rate * seconds;
-        let count = owed as u64;
-        self.owed = owed - count as f32;
+        self.owed = owed.fract();
+        self.cut_short = owed as u64 > Self::MOST;
+        let count = (owed as u64).min(Self::MOST);
         let first = self.made;
         self.made = first.wrapping_add(count);
         let Self { drop_radius, speed, spread, opening, influence, seed, .. } = *self;
@@ -293,7 +307,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bad_drops_are_refused() {
+    fn invalid_drops_are_refused() {
         assert!(Droplet::new(Vec3::NAN, 1e-9).is_err());
         for volume in [0.0, -1e-9, f64::NAN, f64::INFINITY] {
             let error = Droplet::new(Vec3::ZERO, volume).unwrap_err().to_string();
@@ -311,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_written_later_is_repaired_and_its_water_kept() {
+    fn invalid_values_written_later_are_repaired_and_water_is_kept() {
         let mut drop = Droplet::new(Vec3::ONE, 4e-9).unwrap();
         drop.counted = Counted(4e-9);
         drop.volume = f64::NAN;

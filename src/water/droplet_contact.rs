@@ -1,7 +1,7 @@
-//! `Interaction`: strands meet droplets.
+//! `Interaction`: contact of strands with droplets.
 
 use super::{
-    Droplet, Moisture, Ride, WaterLedger, Wetting,
+    Droplet, HairWetting, Moisture, StrandPoint, WaterLedger,
     adhesion::{ContactParams, DropletContacts, Landing},
     exchange::on_strand,
     field::{Field, SeenDrop},
@@ -18,7 +18,7 @@ use crate::{
     setting::{Ranged, Settings},
     strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
 };
-use crate::{environment::vapour::WATER, schedule::ProcessTime};
+use crate::{environment::vapour::WATER, schedule::HairProcessTime};
 use bevy::prelude::*;
 use core::slice::from_ref;
 use fearless_simd::Level;
@@ -29,34 +29,35 @@ const SUMS: usize = 1 << 18;
 /// How many droplets are summed for at a time.
 const PART: usize = 64;
 
-/// How many strands meet droplets as one piece of work, whole blocks: the same on any number of
-/// threads, so that what droplets get is always summed in the same order. Every piece keeps room for
-/// all droplets' sums, so of many droplets there are few pieces.
+/// Strands per piece of work, a multiple of a block: the same on any number of threads, so that effects
+/// on droplets are summed in the same order. Every piece needs sums for all droplets, so with many
+/// droplets there are few pieces.
 fn piece(strands: usize, drops: usize) -> usize {
     let pieces = (SUMS / drops.max(1)).clamp(4, 64);
-    strands.div_ceil(pieces).next_multiple_of(LANES)
+    // Hair whose strands have no edges has none here.
+    strands.div_ceil(pieces).max(1).next_multiple_of(LANES)
 }
 
-/// Room for the work of a substep, kept from one to the next.
+/// Buffers of a substep, reused in the next.
 #[derive(Resource, Default)]
 pub(super) struct WaterField {
-    /// The droplets around each hair, and what its pieces of work came to.
+    /// The droplets around each hair, and the results of its pieces of work.
     fields: Vec<(Field, Vec<DropletContacts>)>,
     /// Strands that carry a droplet's weight.
     loaded: Vec<Entity>,
-    /// What nodes bring to bridges of water.
+    /// The nodes' input to bridges of water.
     pub(super) rows: Vec<WetRow>,
     outcomes: Vec<Outcome>,
     rooms: Vec<Room>,
 }
 
-/// Room for a hair's strands, as they come and in order.
+/// Buffers for a hair's strands, unsorted and sorted.
 type Room = (Vec<Option<WetStrand<'static>>>, Vec<WetStrand<'static>>);
 
 /// A hair and its strands among droplets.
 struct Head<'a> {
     pose: Pose,
-    wetting: Wetting,
+    wetting: HairWetting,
     strands: Vec<WetStrand<'a>>,
 }
 
@@ -67,12 +68,12 @@ struct WetStrand<'a> {
     moisture: Mut<'a, Moisture>,
 }
 
-/// What a substep did to one droplet.
+/// Total effect of a substep on one droplet.
 #[derive(Clone, Copy, Debug, Default)]
 struct Outcome {
-    /// What strands gave it (kg m/s, in the world).
+    /// Impulse from strands (kg m/s, in the world).
     impulse: Vec3,
-    /// How many strands are at it.
+    /// How many strands touch it.
     company: u32,
     landing: Option<Landing>,
     /// The most that strands would absorb (m³).
@@ -82,8 +83,8 @@ struct Outcome {
 pub(super) fn wet_strands(
     step: Res<HairStep>,
     gravity: Res<HairGravity>,
-    process: Res<ProcessTime>,
-    wetting: Settings<Wetting>,
+    process: Res<HairProcessTime>,
+    wetting: Settings<HairWetting>,
     mut scratch: ResMut<WaterField>,
     mut hairs: Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
     mut strands: Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
@@ -91,7 +92,7 @@ pub(super) fn wet_strands(
     mut ledger: ResMut<WaterLedger>,
 ) {
     let WaterField { fields, loaded, outcomes, rooms, .. } = scratch.bypass_change_detection();
-    // Water's own weight is written anew by its exchange; to dry hair only droplets are a added_mass.
+    // The exchange rewrites the added mass of wet hair; on dry hair only droplets add mass.
     for strand in loaded.drain(..) {
         if let Ok((.., mut added_mass, moisture)) = strands.get_mut(strand)
             && moisture.is_untouched()
@@ -103,7 +104,8 @@ pub(super) fn wet_strands(
     if drops.is_empty() {
         return;
     }
-    // Who carries a drop is heavy for all that pulls.
+    let gravity = gravity.clamped().0;
+    // A drop adds its mass to the strand that carries it.
     for drop in &drops {
         if let Some(ride) = drop.ride
             && let Ok((_, of, strand, mut added_mass, _)) = strands.get_mut(ride.strand)
@@ -122,19 +124,20 @@ pub(super) fn wet_strands(
     for (Head { pose, wetting, strands }, (field, pieces)) in heads.iter_mut().zip(&mut *fields) {
         field.see(&drops, pose);
         field.sort(wetting.lock_radius());
-        let met = ContactParams {
+        let params = ContactParams {
             wetting,
             field,
             dt: step.dt,
             uptake: 1.0 - bevy::math::ops::exp(-wetting.uptake * process * step.dt),
             most_film: clinging(wetting.bundle(1.0), gravity.length()),
+            gravity: pose.direction_in(gravity),
         };
         let piece = piece(strands.len(), drops.len());
         pieces.resize_with(strands.len().div_ceil(piece), default);
-        contact_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &met);
+        contact_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &params);
         sum_up(pieces, pose.rotation, outcomes);
     }
-    // What all want together may be more than there is.
+    // Together they may want more than the droplet has.
     let shares: Vec<f64> = drops
         .iter()
         .zip(&*outcomes)
@@ -150,13 +153,13 @@ pub(super) fn wet_strands(
     }
     for ((drop, outcome), share) in drops.iter_mut().zip(&*outcomes).zip(shares) {
         let drop = drop.bypass_change_detection();
-        // Less than nothing only by what sums are rounded.
+        // Negative only by rounding.
         drop.volume = (drop.volume - share * outcome.wanted).max(0.0);
         drop.counted.0 = drop.volume;
         drop.company = outcome.company.max(1);
         let lands = drop.ride.is_none() && outcome.landing.is_some();
         if let Some(landing) = outcome.landing.filter(|_| lands) {
-            drop.ride = Some(Ride { strand: landing.strand, at: landing.at });
+            drop.ride = Some(StrandPoint { strand: landing.strand, at: landing.at });
             drop.lying = 0.0;
         }
         if let Some(ride) = drop.ride
@@ -166,7 +169,8 @@ pub(super) fn wet_strands(
             let (pose, wetting) = (pose.now(), wetting.of(of.0));
             let (strand, added_mass) =
                 (strand.bypass_change_detection(), added_mass.bypass_change_detection());
-            let mut impulse = pose.direction_in(outcome.impulse);
+            let mut impulse =
+                without_lift(pose.direction_in(outcome.impulse), pose.direction_in(gravity));
             if lands {
                 weigh(strand, added_mass, &wetting, ride.at, mass_of(drop));
                 loaded.push(ride.strand);
@@ -178,10 +182,10 @@ pub(super) fn wet_strands(
     }
 }
 
-/// All strands by their hair, those that grow together together.
+/// All strands grouped by hair, neighbouring roots next to each other.
 fn heads<'a>(
     hairs: &mut Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
-    wetting: &Settings<Wetting>,
+    wetting: &Settings<HairWetting>,
     strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
     anew: bool,
     rooms: &mut Vec<Room>,
@@ -206,7 +210,7 @@ fn heads<'a>(
             let roots = unsorted.iter().flatten().map(|s| s.strand.positions()[0]);
             let order = blocks.bypass_change_detection().order(anew, unsorted.len(), roots);
             for (i, k) in order.iter().enumerate() {
-                // They are taken from all over.
+                // The order jumps in memory.
                 let later = order.get(i + 16).and_then(|k| unsorted.get(*k as usize));
                 prefetch(later.map_or(&[], from_ref));
                 head.strands.extend(unsorted.get_mut(*k as usize).and_then(Option::take));
@@ -219,7 +223,7 @@ fn heads<'a>(
 }
 
 impl Field {
-    /// The droplets in a hair's frame.
+    /// Transforms the droplets into a hair's frame.
     fn see(&mut self, drops: &[Mut<'_, Droplet>], pose: &Pose) {
         let scale = pose.scale.recip();
         self.drops.clear();
@@ -238,17 +242,17 @@ impl Field {
     }
 }
 
-/// Strands and what became of them, piece by piece.
+/// Strands and their results, piece by piece.
 type Work<'w, 'a> = Vec<(&'w mut [WetStrand<'a>], &'w mut DropletContacts)>;
 
-fn contact_all(mut work: Work<'_, '_>, met: &ContactParams<'_>) {
+fn contact_all(mut work: Work<'_, '_>, params: &ContactParams<'_>) {
     let level = Level::new();
     for_each_block(
         &mut work,
         TASK,
         || (),
         |(), (strands, out)| {
-            out.clear(met.field.drops.len());
+            out.clear(params.field.drops.len());
             let (mut rest, mut first) = (&mut **strands, 0);
             rest.iter().take(2 * LANES).for_each(|one| prefetch(from_ref(&*one.strand)));
             rest.iter().take(LANES).for_each(WetStrand::prefetch);
@@ -257,16 +261,16 @@ fn contact_all(mut work: Work<'_, '_>, met: &ContactParams<'_>) {
                 let later = after.get(LANES..).unwrap_or_default();
                 later.iter().take(LANES).for_each(|one| prefetch(from_ref(&*one.strand)));
                 after.iter().take(LANES).for_each(WetStrand::prefetch);
-                let mut members: Vec<StrandLane<'_>> =
-                    strand_block.iter_mut().map(WetStrand::member).collect();
-                met.contact(level, &mut members, first, out);
+                let mut strand_lanes: Vec<StrandLane<'_>> =
+                    strand_block.iter_mut().map(WetStrand::strand_lane).collect();
+                params.contact(level, &mut strand_lanes, first, out);
                 (rest, first) = (after, first + LANES);
             }
         },
     );
 }
 
-/// Gives every node its share of what it wanted.
+/// Gives every node its share of the volume that it wanted.
 fn absorb_all(mut work: Work<'_, '_>, shares: &[f64]) {
     for_each_block(
         &mut work,
@@ -292,7 +296,7 @@ impl WetStrand<'_> {
         prefetch(self.strand.rest_lengths());
     }
 
-    fn member(&mut self) -> StrandLane<'_> {
+    fn strand_lane(&mut self) -> StrandLane<'_> {
         let (positions, velocities, lengths) = self.strand.bypass_change_detection().motion_parts();
         StrandLane {
             strand: self.entity,
@@ -305,9 +309,9 @@ impl WetStrand<'_> {
     }
 }
 
-/// Adds up what the pieces of the strands did to droplets, and whom they met, in the strands' order.
+/// Sums the effects on droplets, and the strands that these hit, over all pieces in the strands' order.
 fn sum_up(pieces: &[DropletContacts], rotation: Quat, outcomes: &mut [Outcome]) {
-    // Droplets side by side, for what other threads wrote is slow to read.
+    // Blocked over droplets: data written by other threads are slow to read.
     let mut parts: Vec<_> = (0..).step_by(PART).zip(outcomes.chunks_mut(PART)).collect();
     for_each_block(
         &mut parts,
@@ -342,17 +346,32 @@ fn shares(strand: &Strand, at: f32) -> (usize, [f32; 2]) {
     (edge, [1.0 - t, t])
 }
 
-/// Lets a strand bear `mass` (kg) at a point: its nodes get heavier.
-fn weigh(strand: &Strand, added_mass: &mut AddedMass, wetting: &Wetting, at: f32, mass: f32) {
+/// Adds `mass` (kg) at a point of a strand to its nodes.
+fn weigh(strand: &Strand, added_mass: &mut AddedMass, wetting: &HairWetting, at: f32, mass: f32) {
     added_mass.mass.resize(strand.nodes(), 0.0);
     let (edge, share) = shares(strand, at);
     for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
-        added_mass.mass[i] += share[i - edge] * mass / (wetting.dry_mass() * length);
+        let added = share[i - edge] * mass / (wetting.dry_mass() * length);
+        // More drops than a short strand can carry are as heavy as the heaviest that it can.
+        added_mass.mass[i] = (added_mass.mass[i] + added).min(AddedMass::MOST);
     }
 }
 
-/// Gives a strand an impulse (kg m/s) at a point, which moves as one with what it bears.
-fn push(strand: &mut Strand, added_mass: &AddedMass, wetting: &Wetting, at: f32, impulse: Vec3) {
+/// An impulse (kg m/s) without its upward part: strands that a droplet attracts from all sides are no
+/// support to push a strand up from.
+fn without_lift(impulse: Vec3, gravity: Vec3) -> Vec3 {
+    let up = -gravity.normalize_or_zero();
+    impulse - up * impulse.dot(up).max(0.0)
+}
+
+/// Applies an impulse (kg m/s) at a point of a strand, including its added mass.
+fn push(
+    strand: &mut Strand,
+    added_mass: &AddedMass,
+    wetting: &HairWetting,
+    at: f32,
+    impulse: Vec3,
+) {
     let (edge, share) = shares(strand, at);
     let mut mobility = [0.0; 2];
     for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
@@ -369,16 +388,16 @@ fn push(strand: &mut Strand, added_mass: &AddedMass, wetting: &Wetting, at: f32,
 
 #[cfg(test)]
 mod tests {
-    use super::{super::adhesion::Sum, *};
+    use super::{super::adhesion::DropletSum, *};
     use core::f32::consts::FRAC_PI_2;
 
     #[test]
-    fn sums_are_turned_to_the_world_and_the_first_landing_counts() {
+    fn sums_are_rotated_to_the_world_and_the_first_landing_counts() {
         let strand = |i| Entity::from_raw_u32(i).unwrap();
         let landing = |i, when| Landing { drop: 0, strand: strand(i), at: 1.0, when };
         let piece = |landings: Vec<Landing>| {
             let mut piece = DropletContacts::default();
-            piece.sums = vec![Sum { impulse: Vec3::X, company: 2, wanted: 3e-9 }];
+            piece.sums = vec![DropletSum { impulse: Vec3::X, company: 2, wanted: 3e-9 }];
             piece.landings = landings;
             piece
         };
@@ -396,10 +415,10 @@ mod tests {
     }
 
     #[test]
-    fn what_bears_a_drop_is_heavier_by_it_and_moves_as_one_with_it() {
+    fn a_drop_adds_its_mass_and_moves_with_the_strand() {
         let points: Vec<Vec3> = (0..5).map(|i| Vec3::X * (0.03 * i as f32)).collect();
         let mut strand = Strand::from_polyline(&points).unwrap();
-        let (mut added, wetting) = (AddedMass::default(), Wetting::default());
+        let (mut added, wetting) = (AddedMass::default(), HairWetting::default());
         weigh(&strand, &mut added, &wetting, 2.25, 4e-6);
         let dry: Vec<f32> =
             node_lengths(strand.rest_lengths()).map(|l| l * wetting.dry_mass()).collect();

@@ -1,9 +1,9 @@
-//! `ExternalForces`: showers run, hair soaks and dries, and hydrogen bonds follow the water.
+//! `ExternalForces`: showers spawn drops, hair soaks and dries, and hydrogen bonds follow the water.
 
 use super::{
-    Counted, Droplet, Moisture, Shower, SoakHair, WaterLedger, Wetting,
-    model::ball_radius,
-    moisture::{Exposure, Left, Surroundings, node_lengths},
+    Counted, Droplet, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
+    model::{ball_radius, clinging},
+    moisture::{AFTER_DRIP, Exposure, WaterConditions, WaterLoss, node_lengths},
 };
 use crate::{
     bond::{BondChanges, BondKind, Bonds},
@@ -13,25 +13,25 @@ use crate::{
     },
     fault::{FaultKind, HairFault},
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
-    schedule::{HairStep, ProcessTime},
+    schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings, report},
-    strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
+    strand::{AddedMass, Hair, InWater, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
 /// About what a strand takes (ns), some wet and others dry.
 const EXCHANGE: Nanos = Nanos(500);
 
-/// What came with new strands, and what somebody wrote into moisture, as an inspector may. Our own
-/// writes bypass change detection.
-pub(super) fn mend_moistures(
+/// Repairs moisture of new strands and moisture written from outside, for instance by an inspector. Our
+/// own writes bypass change detection.
+pub(super) fn repair_moistures(
     mut moistures: Query<(Entity, &mut Moisture), (Changed<Moisture>, Allow<Disabled>)>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (entity, mut moisture) in &mut moistures {
         let moisture = moisture.bypass_change_detection();
-        if let Some(found) = moisture.mend() {
+        if let Some(found) = moisture.repair() {
             faults.write(HairFault::new(FaultKind::Setting, found).of(entity));
         }
         ledger.book(moisture.recount());
@@ -41,9 +41,10 @@ pub(super) fn mend_moistures(
 pub(super) fn run_showers(
     mut commands: Commands,
     step: Res<HairStep>,
-    mut showers: Query<(&mut Shower, &TickPose)>,
+    mut showers: Query<(Entity, &mut Shower, &TickPose)>,
+    mut faults: MessageWriter<HairFault>,
 ) {
-    for (mut shower, pose) in &mut showers {
+    for (entity, mut shower, pose) in &mut showers {
         let shower = shower.bypass_change_detection();
         let mut valid = shower.clamped();
         let pose = pose.now();
@@ -54,32 +55,42 @@ pub(super) fn run_showers(
                 Droplet { position, velocity, before: position, ..drop }
             })
             .collect();
-        (shower.made, shower.owed) = (valid.made, valid.owed);
+        if valid.cut_short && !shower.cut_short {
+            let message = format!(
+                "the shower's rate of {} drops/s makes more than {} in a substep of {} s: the rest is left \
+                 out; lower `Shower::rate` or take a shorter fixed timestep",
+                valid.rate,
+                Shower::MOST,
+                step.dt
+            );
+            faults.write(HairFault::new(FaultKind::Setting, message).of(entity));
+        }
+        (shower.made, shower.owed, shower.cut_short) = (valid.made, valid.owed, valid.cut_short);
         if !drops.is_empty() {
             commands.spawn_batch(drops);
         }
     }
 }
 
-/// Water's surroundings as one hair has them, in its frame.
+/// The conditions for water in the frame of one hair.
 struct LocalWater<'a> {
-    wetting: Wetting,
+    wetting: HairWetting,
     pose: Pose,
-    around: Surroundings<'a>,
-    /// The share of the way that hydrogen bonds go after the water.
+    around: WaterConditions<'a>,
+    /// The share of the difference that hydrogen bonds follow in this substep.
     bonds_follow: f32,
 }
 
 struct Wet<'a> {
     strand: &'a Strand,
     bonds: &'a Bonds,
-    /// What the air does to each node; nothing while it is still.
+    /// The air at each node; `None` while it is still.
     blown: &'a [Blown],
     moisture: &'a mut Moisture,
     added_mass: &'a mut AddedMass,
     changes: &'a mut BondChanges,
-    left: Left,
-    /// Water that has nowhere to be any more (m³).
+    left: WaterLoss,
+    /// Water of removed nodes (m³).
     gone: f64,
 }
 
@@ -98,8 +109,8 @@ impl Wet<'_> {
 pub(super) fn exchange_water(
     mut commands: Commands,
     step: Res<HairStep>,
-    (air, process, gravity): (Res<DryingAir>, Res<ProcessTime>, Res<HairGravity>),
-    wetting: Settings<Wetting>,
+    (air, process, gravity): (Res<DryingAir>, Res<HairProcessTime>, Res<HairGravity>),
+    wetting: Settings<HairWetting>,
     hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
     winds: Winds,
     mut strands: Query<(
@@ -115,6 +126,7 @@ pub(super) fn exchange_water(
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
 ) {
+    let held = |hair: Entity| clinging(wetting.of(hair).bundle(1.0), gravity.clamped().0.length());
     for soak in soaks.read() {
         let members = match hairs.get(soak.target) {
             Ok((_, members)) => members.map(|m| m.collection().to_vec()).unwrap_or_default(),
@@ -133,7 +145,9 @@ pub(super) fn exchange_water(
                 let lengths = node_lengths(strand.rest_lengths());
                 let moisture = moisture.bypass_change_detection();
                 ledger.water_out += moisture.fit(strand.nodes());
-                ledger.book(moisture.soak(share, lengths.map(|l| capacity * f64::from(l))));
+                let capacities = lengths.map(|l| capacity * f64::from(l));
+                let film = f64::from((share - 1.0).max(0.0)) * AFTER_DRIP * held(of.0);
+                ledger.book(moisture.soak(share.min(1.0), film, capacities));
             }
         }
     }
@@ -144,7 +158,8 @@ pub(super) fn exchange_water(
     let water_of = |hair: Entity| {
         let pose = *hairs.get(hair).ok()?.0.now();
         let wetting = wetting.of(hair);
-        let around = Surroundings::new(wetting, pose.direction_in(gravity), &air, step.dt, process);
+        let around =
+            WaterConditions::new(wetting, pose.direction_in(gravity), &air, step.dt, process);
         let seconds = process * step.dt;
         Some(LocalWater {
             wetting,
@@ -156,12 +171,12 @@ pub(super) fn exchange_water(
     let done = for_each_part(EXCHANGE, tables(&mut strands), Vec::new, |items, rows| {
         let (mut waters, mut done) = (PerHair::default(), Done::default());
         for (of, strand, bonds, air, moisture, added_mass, changes) in rows {
-            if (damp || !moisture.is_untouched())
+            if (damp || !moisture.is_untouched() || !added_mass.in_water.is_empty())
                 && let Some(hair) = waters.index(of.0, || water_of(of.0))
                 && strand.nodes() >= 2
                 && bonds.joints.len() == strand.edges()
             {
-                let left = Left::default();
+                let left = WaterLoss::default();
                 let blown = if is_still { &[][..] } else { &air.nodes };
                 let wet =
                     Wet { strand, bonds, blown, moisture, added_mass, changes, left, gone: 0.0 };
@@ -174,6 +189,7 @@ pub(super) fn exchange_water(
         });
         for (hair, wet) in items.drain(..) {
             done.evaporated += wet.left.evaporated;
+            done.merged += wet.left.merged;
             done.gone += wet.gone;
             let LocalWater { pose, wetting, .. } = &waters.values[hair];
             done.drips.extend(wet.left.drips.iter().map(|&(node, volume)| {
@@ -182,8 +198,9 @@ pub(super) fn exchange_water(
         }
         done
     });
-    for Done { evaporated, gone, drips } in done {
+    for Done { evaporated, merged, gone, drips } in done {
         ledger.book(-evaporated);
+        ledger.book(-merged);
         ledger.water_out += gone;
         if !drips.is_empty() {
             commands.spawn_batch(drips);
@@ -191,37 +208,44 @@ pub(super) fn exchange_water(
     }
 }
 
-/// What came of some strands' water.
+/// Water balance of some strands.
 #[derive(Default)]
 struct Done {
-    /// What went into the air (m³); less than nothing where hair took more from it.
+    /// Evaporated water (m³); negative where hair absorbed vapour.
     evaporated: f64,
-    /// Water that has nowhere to be any more (m³).
+    /// Water that went into the water around it (m³); negative where hair soaked it up.
+    merged: f64,
+    /// Water of removed nodes (m³).
     gone: f64,
     drips: Vec<Droplet>,
 }
 
-/// One strand's water in one substep, what follows from it for bonds and weight.
+/// One strand's water in one substep, with its effects on bonds and weight.
 fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bool, dt: f32) {
     let LocalWater { wetting, around, bonds_follow, .. } = water;
     let Wet { strand, bonds, blown, moisture, added_mass, changes, .. } = wet;
     wet.gone += moisture.fit(strand.nodes());
     let (positions, lengths, edges) = (strand.positions(), strand.rest_lengths(), strand.edges());
     let exposure = |i: usize| {
+        if added_mass.in_water.get(i).is_some_and(InWater::is_under) {
+            return Some(Exposure { submerged: true, ..default() });
+        }
         let (e, blown) = (i.min(edges - 1), blown.get(i)?);
         let along = (positions[e + 1] - positions[e]).normalize_or_zero();
         Some(Exposure {
             speed: blown.velocity.cross(along).length(),
             warmth: blown.warmth(air.celsius),
             blown: blown.drying * dt,
+            submerged: false,
         })
     };
     moisture.exchange(positions, lengths, around, exposure, &mut wet.left);
-    // All of what has left is in `left`.
+    // All water that left is in `left`.
     moisture.recount();
     open_bonds(bonds, moisture.wetness(), *bonds_follow, changes);
     let capacity = wetting.capacity() * f64::from(strand.length());
     if !damp
+        && added_mass.in_water.is_empty()
         && moisture.volume() < 1e-4 * capacity
         && bonds.rates(BondKind::Hydrogen).all(|rate| rate > 0.999)
     {
@@ -240,8 +264,8 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
     added_mass.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
 }
 
-/// Hydrogen bonds go a `share` of their way toward 1 − wetness; equation 16 remembers the shape in
-/// which they close.
+/// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close remember
+/// the present shape by equation 16.
 fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChanges) {
     for (i, (b, wet)) in bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate() {
         changes.ask(i, BondKind::Hydrogen, (1.0 - wet - b) * share);
@@ -254,7 +278,7 @@ pub(super) fn let_go(
     strand: &Strand,
     at: f32,
     volume: f64,
-    wetting: &Wetting,
+    wetting: &HairWetting,
     gravity: Vec3,
 ) -> Droplet {
     let (place, velocity) = on_strand(strand, at);
@@ -262,6 +286,7 @@ pub(super) fn let_go(
     let below = gravity.normalize_or_zero() * (1.01 * (radius + wetting.lock_radius()) + 1e-5);
     let mut drop = Droplet::ball(pose.point_out(place) + below, radius);
     drop.velocity = pose.rotation * velocity;
+    drop.drip = true;
     // The ledger has counted this water already.
     (drop.volume, drop.counted) = (volume, Counted(volume));
     drop

@@ -1,10 +1,10 @@
-//! The droplets around one hair, as its strands find them: by place, in the grid's order.
+//! The droplets around one hair in a spatial index, in the grid's order.
 
-use crate::grid::{BallGrid, Found};
+use crate::grid::{BallGrid, FoundBalls};
 use bevy::prelude::*;
 use fearless_simd::Level;
 
-/// A droplet as the strands of one hair see it, in the hair's frame.
+/// A droplet in the frame of one hair.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SeenDrop {
     pub at: Vec3,
@@ -17,24 +17,24 @@ pub(super) struct SeenDrop {
     pub strength: f32,
     /// kg.
     pub mass: f32,
-    /// How many strands were at it a substep ago.
+    /// How many strands touched it a substep ago.
     pub company: f32,
     pub ride: Option<Entity>,
 }
 
 impl SeenDrop {
-    /// How near a strand of locks of radius `skin` touches it: its core keeps strands away at r_min.
-    pub fn touch(&self, skin: f32) -> f32 {
-        self.radius.max(self.r_min) + skin
+    /// Distance at which a lock of radius `clearance` touches it: its core repels strands within r_min.
+    pub fn touch(&self, clearance: f32) -> f32 {
+        self.radius.max(self.r_min) + clearance
     }
 }
 
-/// A droplet that rides on a strand and pulls, with what of \[W\] equation 2 is the same for all
+/// A droplet on a strand, which pulls, with the factors of \[W\] equation 2 that are the same for all
 /// nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Puller {
     pub center: Vec3,
-    /// Squared distance from which on it does nothing.
+    /// Squared distance beyond which it has no effect.
     pub reach: f32,
     /// Squared distance up to which a strand touches it.
     pub touch: f32,
@@ -56,9 +56,9 @@ pub(super) struct Puller {
 pub(super) struct Falling {
     /// Where it was a substep ago.
     pub from: Vec3,
-    /// What it has gone since.
+    /// Its displacement since.
     pub way: Vec3,
-    /// How near to its way an edge is that it hits (m).
+    /// Distance from its path within which it hits an edge (m).
     pub near: f32,
     /// Which droplet it is.
     pub drop: u32,
@@ -74,13 +74,13 @@ pub(super) struct Field {
     /// Droplets that fall, by number.
     pub fallers: Vec<Falling>,
     falling: BallGrid,
-    /// Who is ridden by which droplet, sorted.
+    /// Pairs of strand and droplet on it, sorted.
     riders: Vec<(Entity, u32)>,
 }
 
 impl Field {
-    /// Sorts the droplets for strands of locks of radius `skin` (m).
-    pub fn sort(&mut self, skin: f32) {
+    /// Sorts the droplets for strands of locks of radius `clearance` (m).
+    pub fn sort(&mut self, clearance: f32) {
         let Self { drops, pullers, riding, fallers, falling, riders } = self;
         let numbered = || (0..).zip(&*drops);
         riders.clear();
@@ -88,7 +88,7 @@ impl Field {
         riders.sort_unstable();
         pullers.clear();
         pullers.extend(numbered().filter_map(|(drop, seen)| {
-            let touch = seen.touch(skin);
+            let touch = seen.touch(clearance);
             let reach = seen.r_max.max(touch);
             let width = seen.r_max - seen.r_min;
             Some(Puller {
@@ -106,28 +106,28 @@ impl Field {
         riding.build(pullers.iter().map(|p| (p.center, p.reach.sqrt())));
         fallers.clear();
         fallers.extend(numbered().filter(|(_, seen)| seen.ride.is_none()).map(|(drop, seen)| {
-            // What was set elsewhere has not been on all of the way.
+            // A droplet that was moved from outside has not travelled the whole way.
             let way = (seen.at - seen.before).clamp_length_max(0.2);
-            Falling { from: seen.at - way, way, near: seen.radius + skin, drop }
+            Falling { from: seen.at - way, way, near: seen.radius + clearance, drop }
         }));
         falling
             .build(fallers.iter().map(|f| (f.from + 0.5 * f.way, f.near + 0.5 * f.way.length())));
     }
 
-    /// The droplets that ride a strand.
+    /// The droplets on a strand.
     pub fn on(&self, strand: Entity) -> impl Iterator<Item = (u32, &SeenDrop)> {
         let first = self.riders.partition_point(|(ridden, _)| *ridden < strand);
         let theirs = self.riders[first..].iter().take_while(move |(ridden, _)| *ridden == strand);
         theirs.map(|&(_, k)| (k, &self.drops[k as usize]))
     }
 
-    /// The [`pullers`](Self::pullers) whose reach a box is in.
-    pub fn pulling(&self, level: Level, low: Vec3, high: Vec3, found: &mut Found) {
+    /// The [`pullers`](Self::pullers) that reach a box.
+    pub fn pulling(&self, level: Level, low: Vec3, high: Vec3, found: &mut FoundBalls) {
         self.riding.reaching(level, low, high, found);
     }
 
     /// The [`fallers`](Self::fallers) that may have hit something in a box.
-    pub fn falling(&self, level: Level, low: Vec3, high: Vec3, found: &mut Found) {
+    pub fn falling(&self, level: Level, low: Vec3, high: Vec3, found: &mut FoundBalls) {
         self.falling.reaching(level, low, high, found);
     }
 }

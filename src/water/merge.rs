@@ -1,23 +1,23 @@
-//! `Interaction`: droplets that touch become one.
+//! `Interaction`: droplets that touch merge.
 
 use super::{Droplet, DropletRules, model::ball_radius};
 use crate::schedule::HairStep;
 use bevy::{platform::collections::HashMap, prelude::*};
 
-/// How many drops that it cannot join one drop looks at in a tick. Drops that do not touch are never so
-/// many in a place; drops that would be too large together may be.
+/// Failed candidates after which a drop stops searching in a tick. Only drops that would be too large
+/// together can be so many in one place.
 const FRUITLESS: usize = 64;
 
-/// Drops of less have run out, they go by themselves (m³).
+/// Smaller drops count as empty and are despawned elsewhere (m³).
 const LEAST: f64 = *Droplet::VOLUME.valid.start() as f64;
 
-/// What is larger than one drop may be does not come together (m³).
+/// Largest volume of a merged drop (m³).
 const MOST: f64 = *Droplet::VOLUME.valid.end() as f64;
 
 /// The farthest cell from the origin; beyond all share it.
 const FAR: Vec3 = Vec3::splat(1e9);
 
-/// Once a tick: droplets that touch become one, where the larger was.
+/// Once a tick: droplets that touch merge at the position of the larger one.
 pub(super) fn merge_droplets(
     mut commands: Commands,
     step: Res<HairStep>,
@@ -25,11 +25,15 @@ pub(super) fn merge_droplets(
     mut droplets: Query<(Entity, &mut Droplet)>,
     mut merging: Local<Merging>,
 ) {
-    if step.index != 0 || !rules.merging || droplets.iter().len() < 2 {
+    if step.index != 0 || droplets.iter().len() < 2 {
         return;
     }
     let mut drops: Vec<(Entity, Mut<'_, Droplet>)> = droplets.iter_mut().collect();
-    for [into, from] in merging.pairs(drops.iter().map(|(_, d)| (d.position, d.volume))) {
+    if !rules.merging && drops.iter().all(|(_, drop)| !drop.drip) {
+        return;
+    }
+    let places = drops.iter().map(|(_, d)| (d.position, d.volume));
+    for [into, from] in merging.pairs(places, |i| rules.merging || drops[i].1.drip) {
         if let Ok([(_, into), (entity, from)]) = drops.get_disjoint_mut([*into, *from]) {
             into.bypass_change_detection().merge(from.bypass_change_detection());
             commands.entity(*entity).despawn();
@@ -37,9 +41,9 @@ pub(super) fn merge_droplets(
     }
 }
 
-/// Finds the drops that touch, from the largest down: every drop looks only among those that are as
-/// large or larger and have not gone into another, in cells as wide as these are. So the cost is that
-/// of the drops which are left, however many lie in one place.
+/// Finds the drops that touch, from the largest down: every drop searches only larger or equal drops
+/// that have not been merged, in cells of their size. So the cost depends on the drops that remain,
+/// however many are in one place.
 #[derive(Default)]
 pub(super) struct Merging {
     /// Place, radius, and volume with what has come to it.
@@ -47,9 +51,9 @@ pub(super) struct Merging {
     order: Vec<usize>,
     /// The radius of the largest drop of each level; in a level are drops of up to half of it.
     levels: Vec<f32>,
-    /// The drop that came last into a cell of a level.
+    /// The last drop inserted into a cell of a level.
     cells: HashMap<(usize, IVec3), usize>,
-    /// For each drop the one that came into its cell before it; itself for the first one.
+    /// For each drop the previous one in its cell; itself for the first one.
     before: Vec<usize>,
     pairs: Vec<[usize; 2]>,
     /// How many drops were looked at.
@@ -57,8 +61,13 @@ pub(super) struct Merging {
 }
 
 impl Merging {
-    /// Pairs of a drop and a smaller one that goes into it, of drops with place and volume (m³).
-    pub fn pairs(&mut self, drops: impl Iterator<Item = (Vec3, f64)>) -> &[[usize; 2]] {
+    /// Pairs of a drop and a smaller one that goes into it, of drops with place and volume (m³). Only
+    /// those that `go` are taken in by others.
+    pub fn pairs(
+        &mut self,
+        drops: impl Iterator<Item = (Vec3, f64)>,
+        goes: impl Fn(usize) -> bool,
+    ) -> &[[usize; 2]] {
         self.drops.clear();
         self.drops.extend(drops.map(|(place, volume)| (place, ball_radius(volume), volume)));
         let Self { drops, order, levels, cells, before, pairs, looked_at } = self;
@@ -75,7 +84,8 @@ impl Merging {
         order.sort_unstable_by(|a, b| drops[*b].2.total_cmp(&drops[*a].2).then(a.cmp(b)));
         for &i in &*order {
             let (place, radius, volume) = drops[i];
-            let taker = levels.iter().enumerate().find_map(|(level, &largest)| {
+            let levels_of_takers = if goes(i) { &levels[..] } else { &[] };
+            let taker = levels_of_takers.iter().enumerate().find_map(|(level, &largest)| {
                 let reach = radius + largest;
                 let [low, high] = [-reach, reach].map(|by| cell(place + by, largest));
                 let mut fruitless = 0;
@@ -123,7 +133,7 @@ fn cell(place: Vec3, largest: f32) -> IVec3 {
 }
 
 impl Droplet {
-    /// Takes another drop in, with its momentum.
+    /// Absorbs another drop, with its momentum.
     fn merge(&mut self, other: &mut Droplet) {
         let volume = self.volume + other.volume;
         let share = (other.volume / volume) as f32;
@@ -157,7 +167,7 @@ mod tests {
 
     fn looked_at(drops: &[(Vec3, f64)]) -> (usize, usize) {
         let mut merging = Merging::default();
-        let merged = merging.pairs(drops.iter().copied()).len();
+        let merged = merging.pairs(drops.iter().copied(), |_| true).len();
         (merging.looked_at, merged)
     }
 
@@ -184,7 +194,11 @@ mod tests {
         assert_eq!(looked_at(&[(Vec3::ZERO, 0.6e-3), (Vec3::ZERO, 0.6e-3)]).1, 0);
         let mut merging = Merging::default();
         let three = [(Vec3::ZERO, 0.3e-3), (Vec3::X * 0.01, 0.5e-3), (Vec3::ZERO, 0.3e-3)];
-        assert_eq!(merging.pairs(three.into_iter()), [[1, 0]]);
+        assert_eq!(merging.pairs(three.into_iter(), |_| true), [[1, 0]]);
+        // Among drops that stay whole only drips go.
+        let drops = [(Vec3::ZERO, 1e-9), (Vec3::ZERO, 2e-9), (Vec3::ZERO, 3e-9)];
+        assert_eq!(merging.pairs(drops.into_iter(), |i| i == 0), [[1, 0]]);
+        assert!(merging.pairs(drops.into_iter(), |_| false).is_empty());
     }
 
     #[test]
@@ -211,7 +225,7 @@ mod tests {
                 .map(|&(x, y, z, r)| (size * Vec3::new(x, y, z), super::super::model::ball_volume(0.5 * r)))
                 .collect();
             let mut merging = Merging::default();
-            let pairs = merging.pairs(drops.iter().copied()).to_vec();
+            let pairs = merging.pairs(drops.iter().copied(), |_| true).to_vec();
             let gone: Vec<usize> = pairs.iter().map(|p| p[1]).collect();
             let touch = |i: usize, j: usize| {
                 let near = ball_radius(drops[i].1) + ball_radius(drops[j].1);

@@ -4,16 +4,17 @@
 //! The wet-hair paper's droplets as entities, then what both papers leave open: an unbroken loop. A
 //! [`Droplet`] lands on a strand, rides on it, pulls other strands together, spreads into a film and
 //! soaks in ([`Moisture`]). Where fibres are wet, hydrogen bonds open; the air, damp or dry, still
-//! or out of a [`Blower`](crate::Blower), takes the water again; the bonds close around the shape of
-//! that moment. Nobody sets a rate.
+//! or from a [`Blower`](crate::Blower), dries it again; the bonds close around the shape of that
+//! moment. Bond rates follow from the water alone.
 //!
-//! Droplets find strands through the [uniform grid](crate::grid), neither by all pairs nor in a unit
-//! box. They are rows of one table and never change archetype: ten thousands move in one pass.
+//! Droplets find strands through the [uniform grid](crate::grid), without testing all pairs and without
+//! bounds. They are rows of one table and never change archetype: tens of thousands move in one pass.
 //!
 //! Every drop of water is accounted for in [`WaterLedger`]: in = held + out.
 
 mod adhesion;
 mod bridge;
+pub mod drag;
 mod droplet;
 mod droplet_contact;
 mod exchange;
@@ -23,19 +24,22 @@ pub mod model;
 pub mod moisture;
 mod motion;
 mod strand_block;
+mod submerge;
 mod systems;
+mod volume;
 
 pub use bridge::HairDried;
 pub(crate) use bridge::IsWet;
-pub use droplet::{Droplet, Ride, Shower};
-pub use moisture::{Moisture, Wetting};
+pub use droplet::{Droplet, Shower, StrandPoint};
+pub use moisture::{HairWetting, Moisture};
 pub use systems::WaterPlugin;
+pub use volume::WaterVolume;
 
 use crate::setting::{Ranged, ValueRange, Violations, setting};
 use bevy::prelude::*;
 
 setting! {
-    /// What droplets may do. A resource.
+    /// Rules for droplets. A resource.
     #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Resource, Default, Clone, PartialEq)]
     pub struct DropletRules {
@@ -44,30 +48,59 @@ setting! {
             "-100 is far below";
         /// Upper corner.
         pub max: Vec3 = Vec3::splat(100.0), "m" in MAX: f32::NEG_INFINITY..=f32::INFINITY,
-            "100 is far above, and more than the lower corner";
-        /// How long a drop lies on a collider before it has run off.
+            "100 is far above; at least the lower corner";
+        /// How long a drop lies on a collider before it is removed as run off.
         pub lying: f32 = 2.0, "s" in LYING: 0.0..=f32::INFINITY, safe 0.0..=60.0,
             "2 lets it run off";
-        /// Whether drops that touch become one; \[W\]'s own drops do not.
+        /// Whether drops that touch merge; in \[W\] they do not. Drips, which hair sheds, merge with what
+        /// they touch in any case.
         pub merging: bool = true;
+        /// Depth below all hair at which a falling drop is removed.
+        pub below: f32 = 5.0, "m" in BELOW: 0.0..=f32::INFINITY, safe 0.5..=100.0,
+            "5 is below any floor that a character stands on";
+    }
+    then Self::corners_in_order
+}
+
+impl DropletRules {
+    fn corners_in_order(&mut self, violations: &mut Violations) {
+        for (min, max) in self.min.to_array().into_iter().zip(self.max.as_mut()) {
+            let ValueRange { what, valid, hint, .. } = Self::MAX;
+            ValueRange::new(what, min..=*valid.end(), hint).clamp(max, || min, violations);
+        }
     }
 }
 
-/// Sets the bound water of a hair or strand at once and takes the film off it: a dive into a lake, a
-/// towel. A message; the [`WaterLedger`] counts the difference.
+/// Sets the water of a hair or strand at once: a bucket of it, a towel. A message; the [`WaterLedger`]
+/// counts the difference.
+///
+/// ```
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+/// fn bath(hair: Single<Entity, With<Hair>>, mut soak: MessageWriter<SoakHair>) {
+///     soak.write(SoakHair::dripping(*hair));
+///     // and to dry it off at once
+///     soak.write(SoakHair { target: *hair, wetness: 0.0 });
+/// }
+/// ```
 #[derive(Message, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct SoakHair {
     /// The [`Hair`](crate::Hair) or strand.
     pub target: Entity,
-    /// Share of what hair can bind: 1 soaks through, 0 dries.
+    /// Share of what hair can bind: 1 soaks through, 0 dries. Up to 1 the film is removed; the excess
+    /// over 1 is film, as a share of what stays on hair: 2 is dripping wet. Range [`WETNESS`](Self::WETNESS).
     pub wetness: f32,
 }
 
 impl SoakHair {
     /// The range of [`wetness`](Self::wetness).
     pub const WETNESS: ValueRange =
-        ValueRange::new("SoakHair::wetness", 0.0..=1.0, "1 soaks through, 0 dries");
+        ValueRange::new("SoakHair::wetness", 0.0..=2.0, "2 drips, 1 soaks through, 0 dries");
+
+    /// Soaked through, with as much water on it as stays there: heavy, soft and dark, in locks.
+    pub fn dripping(target: Entity) -> Self {
+        Self { target, wetness: 2.0 }
+    }
 }
 
 impl Ranged for SoakHair {
@@ -76,8 +109,8 @@ impl Ranged for SoakHair {
     }
 }
 
-/// How much of a component's water the [`WaterLedger`] knows (m³). The water of a clone is new to it,
-/// and what is known of two equal drops does not tell them apart.
+/// How much of a component's water the [`WaterLedger`] has counted (m³). A clone starts with 0, and it
+/// is ignored in comparisons.
 #[derive(Debug, Default)]
 pub(crate) struct Counted(pub f64);
 
@@ -93,38 +126,37 @@ impl PartialEq for Counted {
     }
 }
 
-/// The water that came, is there and has gone (m³). A resource, kept by the tick; `held` is of the
-/// tick's end.
+/// The balance of water: added, present and removed (m³). A resource, kept by the tick; `held` is that
+/// of the tick's end.
 ///
-/// Water is in the world as soon as a [`Droplet`] or a [`Moisture`] that holds it is: a clone brings its
-/// water along, whether of a droplet, of moisture or of a strand with both, as does a component that
-/// is inserted. What is overwritten, removed or despawned takes its water along. The next tick counts
-/// what has come, and what has been written over.
+/// The water of every [`Droplet`] and [`Moisture`] counts: a spawned, inserted or cloned component adds
+/// its water, an overwritten, removed or despawned one removes it. The next tick counts what was added
+/// and overwritten.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub struct WaterLedger {
-    /// Spawned as droplets, soaked in, cloned, written, taken from damp air.
+    /// Spawned as droplets, soaked in, cloned, written, taken from damp air or out of a [`WaterVolume`].
     pub water_in: f64,
     /// In droplets, on and in hair.
     pub held: f64,
-    /// Evaporated, run off, out of bounds, despawned.
+    /// Evaporated, run off, out of bounds, into a [`WaterVolume`], despawned.
     pub water_out: f64,
 }
 
 impl WaterLedger {
-    /// Books water that came (m³), or with a negative sign went.
+    /// Counts water that was added (m³), or removed if negative.
     fn book(&mut self, came: f64) {
         *(if came > 0.0 { &mut self.water_in } else { &mut self.water_out }) += came.abs();
     }
 
-    /// Books water that was put on or taken off hair at once (m³), also as held.
+    /// Counts water that was put on or taken off hair at once (m³), also as held.
     #[cfg(feature = "save")]
     pub(crate) fn replace(&mut self, came: f64) {
         self.book(came);
         self.held += came;
     }
 
-    /// |in − held − out| / in, what has been lost count of; 0 where no water came.
+    /// |in − held − out| / in, the relative error of the balance; 0 if no water was added.
     pub fn error(&self) -> f64 {
         if self.water_in > 0.0 {
             (self.water_in - self.held - self.water_out).abs() / self.water_in

@@ -1,19 +1,19 @@
-//! Droplets as mathematics: the wet-hair paper's equation 2, falling, sliding, hanging.
+//! Droplets as pure functions: the wet-hair paper's equation 2, falling, sliding, hanging.
 
 use crate::lanes::{Real, V3};
 use glam::Vec3;
 
 /// Surface tension of water (N/m).
-pub const SURFACE_TENSION: f32 = 0.072;
+pub(crate) const SURFACE_TENSION: f32 = 0.072;
 /// Dynamic viscosity of water (Pa s).
-pub const WATER_VISCOSITY: f32 = 1e-3;
+pub(crate) const WATER_VISCOSITY: f32 = 1e-3;
 /// 3/8 of the drag coefficient of a sphere (0.5) times the density of air over that of water.
 const SPHERE_DRAG: f32 = 0.375 * 0.5 * 0.0012;
 
-/// \[W\] equation 2: how strongly a droplet pulls what is at a `distance` (m) from its centre,
+/// \[W\] equation 2: strength of a droplet's pull at a `distance` (m) from its centre,
 /// f = 1 − ((2d − r_min − r_max)/(r_min − r_max))² within r_max, else 0.
 ///
-/// It is 1 midway, 0 at both radii and negative inside r_min: a droplet keeps strands off its core.
+/// It is 1 midway, 0 at both radii and negative inside r_min, where it repels.
 #[inline]
 pub fn adhesion(distance: f32, r_min: f32, r_max: f32) -> f32 {
     if distance > r_max {
@@ -23,8 +23,8 @@ pub fn adhesion(distance: f32, r_min: f32, r_max: f32) -> f32 {
     1.0 - x * x
 }
 
-/// Equation 2 with the direction that print omits: along `offset`, from the node to the droplet. A
-/// node in the droplet's very centre is pulled nowhere.
+/// Equation 2 with the direction that print omits: along `offset`, from the node to the droplet. Zero
+/// at the droplet's centre.
 #[inline]
 pub fn pull(offset: Vec3, r_min: f32, r_max: f32) -> Vec3 {
     let squared = offset.length_squared();
@@ -49,9 +49,9 @@ pub fn ball_volume(radius: f32) -> f64 {
 }
 
 /// Velocity (m/s) of a falling ball of water after `dt` in air that moves with `wind`. Drag grows
-/// with the square of the speed; taken implicitly it never turns a drop round.
+/// with the square of the speed; the implicit step never reverses a drop.
 #[inline]
-pub fn fall(velocity: Vec3, gravity: Vec3, wind: Vec3, radius: f32, dt: f32) -> Vec3 {
+pub(crate) fn fall(velocity: Vec3, gravity: Vec3, wind: Vec3, radius: f32, dt: f32) -> Vec3 {
     let relative = velocity + gravity * dt - wind;
     let rate = SPHERE_DRAG * relative.length() / radius.max(1e-5);
     relative / (1.0 + rate * dt) + wind
@@ -61,7 +61,7 @@ pub fn fall(velocity: Vec3, gravity: Vec3, wind: Vec3, radius: f32, dt: f32) -> 
 /// `along` (m/s²). `mobility` (s) is that of a droplet of 1 mm; as with all films it grows with the
 /// square of the size.
 #[inline]
-pub fn slide(along: f32, radius: f32, mobility: f32) -> f32 {
+pub(crate) fn slide(along: f32, radius: f32, mobility: f32) -> f32 {
     const FASTEST: f32 = 0.3;
     let size = radius / 1e-3;
     (along * mobility * size * size).clamp(-FASTEST, FASTEST)
@@ -70,7 +70,7 @@ pub fn slide(along: f32, radius: f32, mobility: f32) -> f32 {
 /// The most water (m³) that hangs on the tip of a bundle of radius `bundle` (m) against an
 /// acceleration: Tate's law with the share 0.6 that a real drop leaves by.
 #[inline]
-pub fn hanging(bundle: f32, acceleration: f32) -> f64 {
+pub(crate) fn hanging(bundle: f32, acceleration: f32) -> f64 {
     let weight = WATER_DENSITY * acceleration.abs().max(0.1);
     f64::from(0.6 * core::f32::consts::TAU * bundle * SURFACE_TENSION / weight)
 }
@@ -78,17 +78,16 @@ pub fn hanging(bundle: f32, acceleration: f32) -> f64 {
 /// The most water (m³) that a bundle of radius `bundle` (m) holds as one drop somewhere along it:
 /// Lorenceau, Clanet and Quéré's drop on a fibre, 4π b σ/(ρ a) k² with k = 0.5.
 #[inline]
-pub fn clinging(bundle: f32, acceleration: f32) -> f64 {
+pub(crate) fn clinging(bundle: f32, acceleration: f32) -> f64 {
     let weight = WATER_DENSITY * acceleration.abs().max(0.1);
     f64::from(core::f32::consts::PI * bundle * SURFACE_TENSION / weight)
 }
 
 const WATER_DENSITY: f32 = 1000.0;
 
-/// Where two points that move evenly, or two segments, come closest: the shares of both ways,
-/// 0…1.
+/// Closest approach of two segments, or of two points in uniform motion: parameters along both, 0…1.
 #[inline(always)]
-pub fn closest<R: Real>(a: V3<R>, along_a: V3<R>, b: V3<R>, along_b: V3<R>) -> (R, R) {
+pub(crate) fn closest<R: Real>(a: V3<R>, along_a: V3<R>, b: V3<R>, along_b: V3<R>) -> (R, R) {
     let (zero, one) = (a.x.lit(0.0), a.x.lit(1.0));
     let between = b - a;
     let (aa, bb, ab) = (along_a.dot(along_a), along_b.dot(along_b), along_a.dot(along_b));

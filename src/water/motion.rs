@@ -1,9 +1,10 @@
 //! `Interaction` and `BondUpdate`: droplets fall, slide, merge and follow their strands.
 
 use super::{
-    Droplet, DropletRules, Ride, WaterLedger, Wetting,
+    Droplet, DropletRules, HairWetting, StrandPoint, WaterLedger,
     exchange::{let_go, on_strand},
     model::{clinging, fall, hanging, slide},
+    volume::Volumes,
 };
 use crate::{
     HairCollider,
@@ -16,18 +17,18 @@ use crate::{
     lanes::V3,
     parallel::{Nanos, for_each},
     rod::obstacle::Obstacle,
-    schedule::{HairStep, ProcessTime},
+    schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings, Violations, report},
-    strand::{Hair, Pose, Strand, StrandOf, TickPose},
+    strand::{Hair, PerHair, Pose, Strand, StrandOf, TickPose},
 };
 use bevy::prelude::*;
 
-/// What becomes of a droplet in this substep.
+/// The state of a droplet in this substep.
 struct Moving<'a> {
     entity: Entity,
     drop: Mut<'a, Droplet>,
     violations: Violations,
-    /// Water that the ledger did not know (m³); negative for water that somebody took.
+    /// Water not counted by the ledger (m³); negative for water removed from outside.
     new: f64,
     evaporated: f64,
     ends: bool,
@@ -38,29 +39,38 @@ pub(super) fn move_droplets(
     step: Res<HairStep>,
     (air, process, gravity, rules): (
         Res<DryingAir>,
-        Res<ProcessTime>,
+        Res<HairProcessTime>,
         Res<HairGravity>,
         Res<DropletRules>,
     ),
-    wetting: Settings<Wetting>,
+    wetting: Settings<HairWetting>,
     colliders: Query<(&HairCollider, &TickPose)>,
     winds: Winds,
+    volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,
     strands: Query<(&StrandOf, &Strand)>,
     mut droplets: Query<(Entity, &mut Droplet)>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
+    mut lowest: Local<Option<f32>>,
 ) {
     if droplets.is_empty() {
+        *lowest = None;
         return;
     }
     let (dt, rules) = (step.dt, rules.clamped());
     let gravity = gravity.clamped().0;
+    let down = gravity.normalize_or_zero();
+    if step.index == 0 || lowest.is_none() {
+        *lowest = lowest_of(&hairs, &strands, down);
+    }
+    let lowest = lowest.map_or(f32::INFINITY, |lowest| lowest + rules.below);
     let process = process.clamped().0;
     let world = TickPose::default();
     let obstacles: Vec<Obstacle> =
         colliders.iter().map(|(c, pose)| seen_from(&world, &c.clamped(), pose)).collect();
     let winds = winds.seen_from(world.now());
+    let volumes = volumes.seen_from(world.now());
     let mut items: Vec<Moving<'_>> = droplets
         .iter_mut()
         .map(|(entity, drop)| Moving {
@@ -99,7 +109,7 @@ pub(super) fn move_droplets(
                 Some((ride, strand, pose, hair)) => {
                     let wetting = wetting.of(hair);
                     let (at, holds) = slid(ride, strand, pose, drop, &wetting, gravity, dt);
-                    drop.ride = holds.then_some(Ride { at, ..ride });
+                    drop.ride = holds.then_some(StrandPoint { at, ..ride });
                     if !holds {
                         let free = let_go(pose, strand, at, drop.volume, &wetting, gravity);
                         (drop.position, drop.velocity) = (free.position, free.velocity);
@@ -118,9 +128,13 @@ pub(super) fn move_droplets(
                 }
             }
             let inside = (drop.position.cmpge(rules.min) & drop.position.cmple(rules.max)).all();
+            let inside = inside && (drop.ride.is_some() || drop.position.dot(down) <= lowest);
             let inside = inside && Droplet::POSITION.check(drop.position).is_ok();
             drop.keep_in_range();
-            *ends = !inside || drop.lying > rules.lying || drop.volume < 1e-15;
+            *ends = !inside
+                || volumes.contain(drop.position)
+                || drop.lying > rules.lying
+                || drop.volume < 1e-15;
         },
     );
     for Moving { entity, violations, new, evaporated, ends, .. } in items {
@@ -128,20 +142,37 @@ pub(super) fn move_droplets(
         ledger.book(-evaporated);
         report(Some(entity), violations, &mut faults);
         if ends {
-            // What is left is counted when it goes.
+            // Its remaining water is counted when it is despawned.
             commands.entity(entity).despawn();
         }
     }
 }
 
-/// Where on its strand a droplet has slid to, and whether it holds on there: at the tip it hangs,
-/// elsewhere it clings, the more strands are at it the heavier it may be. Pinned drops hold always.
+/// How far down the lowest hair reaches (m in the world, along `down`), by roots, middles and tips.
+fn lowest_of(
+    hairs: &Query<&TickPose, With<Hair>>,
+    strands: &Query<(&StrandOf, &Strand)>,
+    down: Vec3,
+) -> Option<f32> {
+    let mut poses = PerHair::default();
+    let depths = strands.iter().filter_map(|(of, strand)| {
+        let pose = poses.index(of.0, || hairs.get(of.0).ok().map(|pose| *pose.now()))?;
+        let p = strand.positions();
+        let places = [p.first()?, p.get(p.len() / 2)?, p.last()?];
+        let pose: &Pose = &poses.values[pose];
+        Some(places.map(|p| pose.point_out(*p).dot(down)).into_iter().fold(f32::MIN, f32::max))
+    });
+    depths.reduce(f32::max)
+}
+
+/// Where on its strand a droplet has slid to, and whether it stays attached: at the tip it hangs,
+/// elsewhere it clings; the more strands touch it, the heavier it may be. Pinned drops always stay.
 fn slid(
-    ride: Ride,
+    ride: StrandPoint,
     strand: &Strand,
     pose: &Pose,
     drop: &Droplet,
-    wetting: &Wetting,
+    wetting: &HairWetting,
     gravity: Vec3,
     dt: f32,
 ) -> (f32, bool) {
@@ -156,14 +187,15 @@ fn slid(
     let most = if at == edges as f32 {
         hanging(bundle, gravity.length())
     } else {
-        // Along a strand that hangs a drop only slides; it has to let go of one that lies.
+        // Along a hanging strand a drop only slides; from a horizontal one it detaches.
         let across = (gravity.length_squared() - along * along).max(0.0).sqrt();
         clinging(bundle, across)
     };
     (at, wetting.sliding == 0.0 || drop.volume <= most)
 }
 
-/// Sets a drop that is inside a solid on its surface; its velocity into it is gone. Says whether.
+/// Moves a drop out of a solid onto its surface and removes the velocity into it. Returns whether it was
+/// inside.
 fn rest_on(obstacle: &Obstacle, drop: &mut Droplet, radius: f32) -> bool {
     let [x, y, z] = drop.position.to_array();
     let (normal, depth) = obstacle.solid.depth(V3::new(x, y, z), radius);
@@ -176,7 +208,7 @@ fn rest_on(obstacle: &Obstacle, drop: &mut Droplet, radius: f32) -> bool {
     true
 }
 
-/// After the strands have moved: riding droplets are where their strands went.
+/// After the strands have moved: droplets on strands move with them.
 pub(super) fn follow_strands(
     hairs: Query<&TickPose, With<Hair>>,
     strands: Query<(&StrandOf, &Strand)>,

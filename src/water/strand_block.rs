@@ -1,9 +1,9 @@
-//! Sixteen strands side by side, as droplets meet them.
+//! Sixteen strands side by side, for contact with droplets.
 //!
-//! Strands that grow together hang together, so what is near one node is near its fifteen
-//! neighbours: they ask the grid once, and every droplet that it names is held against all of them.
+//! Neighbouring strands hang together, so a droplet near one node is near its fifteen neighbours: they
+//! query the grid once, and every droplet found is tested against all of them.
 
-use super::Wetting;
+use super::HairWetting;
 use crate::{
     lanes::{
         LANES, Lane, V3, dispatch, load3, put_numbers, put_vectors, put3, splat3, take_vectors,
@@ -26,10 +26,10 @@ pub(super) struct StrandLane<'a> {
     pub film: &'a [f64],
 }
 
-/// The nodes that are equally far down their strands.
+/// The nodes with the same index of all strands.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
-    /// Positions (m); no numbers where a strand is shorter.
+pub(super) struct NodeSlice {
+    /// Positions (m); NaN where a strand is shorter.
     pub p: [Lane; 3],
     /// Velocities (m/s).
     pub v: [Lane; 3],
@@ -44,7 +44,7 @@ pub(super) struct Row {
     pub high: Vec3,
 }
 
-impl Default for Row {
+impl Default for NodeSlice {
     fn default() -> Self {
         let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let none = [0.0; LANES];
@@ -60,8 +60,8 @@ impl Default for Row {
     }
 }
 
-impl Row {
-    /// The box around those nodes that are somewhere.
+impl NodeSlice {
+    /// The box around the finite nodes.
     #[inline(always)]
     fn bounds<S: Simd>(&self, simd: S) -> (Vec3, Vec3) {
         let p = load3(simd, &self.p);
@@ -82,22 +82,22 @@ impl Row {
 #[derive(Clone, Debug, Default)]
 pub(super) struct StrandBlock {
     /// Root first, as many as the longest strand has nodes.
-    pub rows: Vec<Row>,
+    pub rows: Vec<NodeSlice>,
     /// The index of each lane's strand.
-    pub own: [u32; LANES],
+    pub strand_index: [u32; LANES],
 }
 
 impl StrandBlock {
-    /// Takes strands in, where they are and no more: most are near no droplet.
-    pub fn place(&mut self, level: Level, members: &[StrandLane<'_>]) {
+    /// Loads positions only: most strands are near no droplet.
+    pub fn place(&mut self, level: Level, strand_lanes: &[StrandLane<'_>]) {
         self.rows.clear();
-        let longest = members.iter().map(|m| m.positions.len()).max().unwrap_or(0);
-        self.rows.resize(longest, Row::default());
-        self.own = [u32::MAX; LANES];
-        for (own, member) in self.own.iter_mut().zip(members) {
-            *own = member.strand.index_u32();
+        let longest = strand_lanes.iter().map(|m| m.positions.len()).max().unwrap_or(0);
+        self.rows.resize(longest, NodeSlice::default());
+        self.strand_index = [u32::MAX; LANES];
+        for (strand_index, strand_lane) in self.strand_index.iter_mut().zip(strand_lanes) {
+            *strand_index = strand_lane.strand.index_u32();
         }
-        for (group, four) in members.chunks(4).enumerate() {
+        for (group, four) in strand_lanes.chunks(4).enumerate() {
             if let [a, b, c, d] = four
                 && is_of(longest, four)
             {
@@ -105,8 +105,8 @@ impl StrandBlock {
                 put_vectors(&mut self.rows, group, four, |row| &mut row.p);
                 continue;
             }
-            for (lane, member) in (4 * group..).zip(four) {
-                for (p, row) in member.positions.iter().zip(&mut self.rows) {
+            for (lane, strand_lane) in (4 * group..).zip(four) {
+                for (p, row) in strand_lane.positions.iter().zip(&mut self.rows) {
                     put3(&mut row.p, lane, *p);
                 }
             }
@@ -118,9 +118,9 @@ impl StrandBlock {
         });
     }
 
-    /// How they move and what they weigh, before droplets act on them.
-    pub fn weigh(&mut self, members: &[StrandLane<'_>], wetting: &Wetting) {
-        for (group, four) in members.chunks(4).enumerate() {
+    /// Loads velocities and masses, before droplets act.
+    pub fn weigh(&mut self, strand_lanes: &[StrandLane<'_>], wetting: &HairWetting) {
+        for (group, four) in strand_lanes.chunks(4).enumerate() {
             if let [a, b, c, d] = four
                 && is_of(self.rows.len(), four)
             {
@@ -131,21 +131,21 @@ impl StrandBlock {
                 put_numbers(&mut self.rows[..edges], group, lengths, |row| &mut row.length);
                 continue;
             }
-            for (lane, member) in (4 * group..).zip(four) {
-                for (v, row) in member.velocities.iter().zip(&mut self.rows) {
+            for (lane, strand_lane) in (4 * group..).zip(four) {
+                for (v, row) in strand_lane.velocities.iter().zip(&mut self.rows) {
                     put3(&mut row.v, lane, *v);
                 }
-                for (length, row) in member.lengths.iter().zip(&mut self.rows) {
+                for (length, row) in strand_lane.lengths.iter().zip(&mut self.rows) {
                     row.length[lane] = *length;
                 }
             }
         }
-        for (lane, member) in members.iter().enumerate() {
-            for (load, row) in member.load.iter().zip(&mut self.rows) {
+        for (lane, strand_lane) in strand_lanes.iter().enumerate() {
+            for (load, row) in strand_lane.load.iter().zip(&mut self.rows) {
                 row.load[lane] = *load;
             }
         }
-        // A node weighs what half of the edges beside it do.
+        // A node has half the mass of its adjacent edges.
         let half = 0.5 * wetting.dry_mass();
         let mut before = [0.0; LANES];
         for row in &mut self.rows {
@@ -156,9 +156,9 @@ impl StrandBlock {
         }
     }
 
-    /// Puts velocities back.
-    pub fn scatter(&self, members: &mut [StrandLane<'_>]) {
-        for (group, four) in members.chunks_mut(4).enumerate() {
+    /// Writes velocities back.
+    pub fn scatter(&self, strand_lanes: &mut [StrandLane<'_>]) {
+        for (group, four) in strand_lanes.chunks_mut(4).enumerate() {
             let is_whole = is_of(self.rows.len(), four);
             if let [a, b, c, d] = &mut *four
                 && is_whole
@@ -167,8 +167,8 @@ impl StrandBlock {
                 take_vectors(&self.rows, group, four, |row| &row.v);
                 continue;
             }
-            for (lane, member) in (4 * group..).zip(four) {
-                for (v, row) in member.velocities.iter_mut().zip(&self.rows) {
+            for (lane, strand_lane) in (4 * group..).zip(four) {
+                for (v, row) in strand_lane.velocities.iter_mut().zip(&self.rows) {
                     *v = take3(&row.v, lane);
                 }
             }
@@ -177,12 +177,11 @@ impl StrandBlock {
 }
 
 /// Whether all strands have so many nodes.
-fn is_of(nodes: usize, members: &[StrandLane<'_>]) -> bool {
-    members.iter().all(|member| member.positions.len() == nodes)
+fn is_of(nodes: usize, strand_lanes: &[StrandLane<'_>]) -> bool {
+    strand_lanes.iter().all(|strand_lane| strand_lane.positions.len() == nodes)
 }
 
-/// The order in which a hair's strands are taken side by side: along a curve that fills space
-/// (Morton's), by their roots.
+/// The order in which a hair's strands are grouped into blocks: their roots along a Morton curve.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub(super) struct StrandBlocks {
@@ -190,8 +189,8 @@ pub(super) struct StrandBlocks {
 }
 
 impl StrandBlocks {
-    /// The numbers of `count` strands with these `roots`, in order. Sorted anew if `anew` or if there are
-    /// others than last time; which strands stand together changes only how fast it goes.
+    /// The indices of `count` strands with these `roots`, in order. Sorted again if `anew` or if their
+    /// number has changed; the grouping affects only speed.
     pub fn order(&mut self, anew: bool, count: usize, roots: impl Iterator<Item = Vec3>) -> &[u32] {
         if anew || self.order.len() != count {
             let mut keys: Vec<(u64, u32)> = roots.map(place_on_curve).zip(0..).collect();
@@ -229,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strands_that_stand_together_are_taken_together() {
+    fn neighbouring_strands_are_in_the_same_block() {
         // A square of 32 by 32 roots, 3 mm apart, in an order that jumps about.
         let roots = (0..1024u32).map(|i| i * 389 % 1024);
         let roots = roots.map(|i| Vec3::new((i % 32) as f32, 5.0, (i / 32) as f32) * 0.003);
@@ -246,13 +245,13 @@ mod tests {
         });
         let mean = widths.sum::<f32>() / 64.0;
         assert!(mean < 0.02, "sixteen strands fill 12 mm by 12 mm, here {mean} m");
-        // Kept while nothing is asked anew, but not for another number of strands.
+        // Kept while `anew` is false, but not for another number of strands.
         assert_eq!(blocks.order(false, 1024, [Vec3::NAN; 1024].into_iter()), order);
         assert_eq!(blocks.order(false, 3, roots[..3].iter().copied()).len(), 3);
     }
 
     #[test]
-    fn strands_of_any_lengths_are_in_lanes_what_they_were_and_come_back() {
+    fn strands_of_any_length_survive_the_round_trip_through_lanes() {
         // All alike; a group with a shorter one among them; a group that is not full.
         for lengths in [vec![6; 16], vec![6, 6, 6, 6, 6, 5, 6, 6, 2, 3, 4, 5, 6, 6], vec![7; 3]] {
             let number = |s: usize, i: usize| (100 * s + 10 * i) as f32;
@@ -266,7 +265,7 @@ mod tests {
                 .collect();
             let before: Vec<_> = (0..lengths.len()).map(|s| vectors(s, 3.0)).collect();
             let mut velocities = before.clone();
-            let mut members: Vec<_> = (0..)
+            let mut strand_lanes: Vec<_> = (0..)
                 .zip(positions.iter().zip(&edges).zip(&mut velocities))
                 .map(|(s, ((positions, lengths), velocities))| {
                     let load: &[f32] = if s == 2 { &[0.5, 0.25] } else { &[] };
@@ -274,19 +273,19 @@ mod tests {
                     StrandLane { strand, positions, velocities, lengths, load, film: &[] }
                 })
                 .collect();
-            let (mut strand_block, wetting) = (StrandBlock::default(), Wetting::default());
+            let (mut strand_block, wetting) = (StrandBlock::default(), HairWetting::default());
             // What was in it before must not stay.
             strand_block.rows =
-                vec![Row { v: [[7.0; LANES]; 3], load: [7.0; LANES], ..default() }; 9];
-            strand_block.place(Level::new(), &members);
-            strand_block.weigh(&members, &wetting);
-            for (s, member) in members.iter().enumerate() {
-                let masses = super::super::moisture::node_lengths(member.lengths);
+                vec![NodeSlice { v: [[7.0; LANES]; 3], load: [7.0; LANES], ..default() }; 9];
+            strand_block.place(Level::new(), &strand_lanes);
+            strand_block.weigh(&strand_lanes, &wetting);
+            for (s, strand_lane) in strand_lanes.iter().enumerate() {
+                let masses = super::super::moisture::node_lengths(strand_lane.lengths);
                 for (i, length) in masses.enumerate() {
                     let row = &strand_block.rows[i];
-                    assert_eq!(take3(&row.p, s), member.positions[i]);
-                    assert_eq!(take3(&row.v, s), member.velocities[i]);
-                    assert_eq!(row.load[s], member.load.get(i).copied().unwrap_or(0.0));
+                    assert_eq!(take3(&row.p, s), strand_lane.positions[i]);
+                    assert_eq!(take3(&row.v, s), strand_lane.velocities[i]);
+                    assert_eq!(row.load[s], strand_lane.load.get(i).copied().unwrap_or(0.0));
                     let mass = wetting.dry_mass() * length;
                     assert!((row.mass[s] - mass).abs() <= 1e-6 * mass, "{s} {i}");
                 }
@@ -302,17 +301,17 @@ mod tests {
             for row in &mut strand_block.rows {
                 row.v = row.v.map(|v| v.map(|v| 2.0 * v));
             }
-            strand_block.scatter(&mut members);
+            strand_block.scatter(&mut strand_lanes);
             let doubled = |v: &Vec<Vec3>| v.iter().map(|v| *v * 2.0).collect::<Vec<_>>();
             assert_eq!(velocities, before.iter().map(doubled).collect::<Vec<_>>());
         }
     }
 
     #[test]
-    fn what_is_nowhere_is_in_no_box() {
+    fn non_finite_nodes_are_in_no_box() {
         let places = [Vec3::ONE, Vec3::NAN, Vec3::INFINITY, Vec3::new(2.0, f32::NEG_INFINITY, 0.0)];
         let mut velocities = [[Vec3::ZERO]; 4];
-        let members: Vec<_> = places
+        let strand_lanes: Vec<_> = places
             .each_ref()
             .into_iter()
             .zip(&mut velocities)
@@ -326,12 +325,12 @@ mod tests {
             })
             .collect();
         let mut strand_block = StrandBlock::default();
-        strand_block.place(Level::new(), &members);
+        strand_block.place(Level::new(), &strand_lanes);
         assert_eq!((strand_block.rows[0].low, strand_block.rows[0].high), (Vec3::ONE, Vec3::ONE));
     }
 
     #[test]
-    fn places_that_are_no_places_have_an_order_too() {
+    fn non_finite_roots_have_an_order_too() {
         let mut blocks = StrandBlocks::default();
         let roots = [Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::ZERO];
         let mut order = blocks.order(true, 4, roots.into_iter()).to_vec();

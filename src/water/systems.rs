@@ -1,18 +1,20 @@
-//! Water's places in the tick, and what it tells and counts.
+//! Water in the tick, and the balance of the ledger.
 
 use super::{
-    Droplet, DropletRules, Moisture, Shower, SoakHair, WaterLedger, Wetting,
-    bridge::{HairDried, IsWet, join_wet_strands, see_wet_hair},
+    Droplet, DropletRules, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
+    bridge::{HairDried, IsWet, join_wet_strands, update_is_wet},
     droplet_contact::{WaterField, wet_strands},
-    exchange::{exchange_water, mend_moistures, run_showers},
+    exchange::{exchange_water, repair_moistures, run_showers},
     merge::merge_droplets,
     motion::{follow_strands, move_droplets},
     strand_block,
+    submerge::submerge,
+    volume::WaterVolume,
 };
 use crate::{
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting,
-    strand::{Hair, Strand},
+    strand::{Hair, Strand, TickPose, keep_required},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -21,10 +23,12 @@ pub struct WaterPlugin;
 
 impl Plugin for WaterPlugin {
     fn build(&self, app: &mut App) {
-        setting::plugin::<Wetting>(app);
+        setting::plugin::<HairWetting>(app);
         strand_block::plugin(app);
         setting::resource::<DropletRules>(app);
         setting::component::<Shower>(app);
+        keep_required::<Shower, TickPose>(app);
+        setting::component::<WaterVolume>(app);
         app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
             .add_message::<SoakHair>()
@@ -37,14 +41,15 @@ impl Plugin for WaterPlugin {
             .register_required_components::<Hair, IsWet>()
             .add_observer(count_lost_droplet)
             .add_observer(count_lost_moisture)
+            .add_systems(HairTick, submerge.in_set(HairSystems::Submersion))
             .add_systems(
                 HairTick,
                 (
-                    mend_moistures,
+                    repair_moistures,
                     count_overwritten,
                     run_showers,
                     exchange_water,
-                    see_wet_hair.run_if(first_substep),
+                    update_is_wet.run_if(first_substep),
                 )
                     .chain()
                     .in_set(HairSystems::WaterExchange),
@@ -59,24 +64,24 @@ impl Plugin for WaterPlugin {
             )
             .add_systems(
                 HairTick,
-                (follow_strands, close_books).chain().in_set(HairSystems::Ledger),
+                (follow_strands, close_books).chain().in_set(HairSystems::WaterLedger),
             );
     }
 }
 
-/// Droplets that somebody despawns take their water with them.
+/// Counts the water of droplets despawned from outside as removed.
 fn count_lost_droplet(
     lost: On<Discard, Droplet>,
     mut droplets: Query<&mut Droplet, Allow<Disabled>>,
     mut ledger: ResMut<WaterLedger>,
 ) {
     if let Ok(mut droplet) = droplets.get_mut(lost.entity) {
-        // Who has taken it off its entity may insert it elsewhere: then it is new.
+        // A component taken off its entity may be inserted elsewhere, where it counts as new.
         ledger.water_out += core::mem::take(&mut droplet.counted).0;
     }
 }
 
-/// Strands that somebody despawns while wet, likewise.
+/// The same for wet strands.
 fn count_lost_moisture(
     lost: On<Discard, Moisture>,
     mut strands: Query<&mut Moisture, Allow<Disabled>>,
@@ -87,8 +92,8 @@ fn count_lost_moisture(
     }
 }
 
-/// Once a tick: components that somebody assigned another value to have lost count of what was in
-/// them. Only where there was an assignment, so that the ledger still finds the tick's own errors.
+/// Once a tick: counts the water of components that were assigned another value from outside. Only where
+/// there was an assignment, so that the ledger still detects errors of the tick itself.
 fn count_overwritten(
     step: Res<HairStep>,
     droplets: Query<Ref<Droplet>, Allow<Disabled>>,
@@ -107,7 +112,7 @@ fn count_overwritten(
     }
 }
 
-/// At the end of a tick: what there is, summed in the order of the entities.
+/// At the end of a tick: the water present, summed in the order of the entities.
 fn close_books(
     step: Res<HairStep>,
     droplets: Query<&Droplet, Allow<Disabled>>,

@@ -4,7 +4,7 @@ use crate::{groom::GroomError, plant::PlantError, setting::InvalidValue, strand:
 use bevy::prelude::*;
 
 /// Why a [`WearHair`](super::WearHair) puts no hair on its entity: what was found, what was expected
-/// and how to mend it. Told as [`FaultKind::Wear`](crate::FaultKind::Wear).
+/// and how to fix it. Reported as [`FaultKind::Wear`](crate::FaultKind::Wear).
 #[derive(thiserror::Error, Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum WearError {
@@ -14,7 +14,7 @@ pub enum WearError {
          mesh, or on the root of a character"
     )]
     NoMesh,
-    /// No bone or mesh of the name that was asked for.
+    /// No bone or mesh of the given name.
     #[error("nothing is named {name:?} below WearHair's entity; there are {there}")]
     NoBone {
         /// The name.
@@ -69,7 +69,7 @@ pub enum WearError {
         /// What it is.
         found: Vec3,
     },
-    /// A head that is no head.
+    /// A head of implausible size.
     #[error(
         "the head is {found} m from the middle between the ears to the crown, expected {} to {} m: \
          scale the character, or say where its head is by WearHair::scalp",
@@ -88,7 +88,7 @@ pub enum WearError {
         /// The other wearer.
         by: Entity,
     },
-    /// A groom beside the character.
+    /// A groom far from the character.
     #[error(
         "half of the groom's strands grow farther than {found} m from the mesh, expected less than \
          {most} m: say where it lies by WearHair::place"
@@ -99,21 +99,21 @@ pub enum WearError {
         /// The most (m).
         most: f32,
     },
-    /// What planting refuses.
+    /// An error of planting.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// What a groom refuses.
+    /// An error of the groom.
     #[error(transparent)]
     Groom(#[from] GroomError),
     /// A setting out of its range.
     #[error(transparent)]
     Setting(#[from] InvalidValue),
-    /// A strand that cannot be one.
+    /// An invalid strand.
     #[error(transparent)]
     Strand(#[from] StrandError),
 }
 
-/// How long a wearer without a mesh is waited for before that is told (s).
+/// How long a missing mesh is waited for before it is reported (s).
 pub(super) const PATIENCE: f32 = 10.0;
 
 /// Heights of heads on which hair can be simulated (m).

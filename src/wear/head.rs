@@ -1,4 +1,4 @@
-//! Where a head is, from its shape.
+//! Finding the head's centre and height from its shape.
 
 use bevy::prelude::*;
 
@@ -6,7 +6,7 @@ use bevy::prelude::*;
 /// back: 0.13 and 0.20 m on men and women (tragion to vertex and glabella to occiput of ANSUR II),
 /// with the middle between the ears a little above the ear's hole.
 const HEIGHT_OF_DEPTH: f32 = 0.6;
-/// Rounds until height and depth fit.
+/// Iterations until height and depth are consistent.
 const ROUNDS: usize = 8;
 
 /// A head's middle between the ears, and its height above that (m).
@@ -51,6 +51,13 @@ pub(super) fn is_head(name: &str) -> bool {
     before.is_none_or(|c| !c.is_alphabetic() || is_new)
 }
 
+/// Whether a bone is the head by Rigify's name for it, the last of the spine: `spine.006`,
+/// `DEF-spine.006`, `DEF-spine006`.
+pub(super) fn is_head_of_rigify(name: &str) -> bool {
+    let name = name.rsplit(['-', ':', '|']).next().unwrap_or(name);
+    name.eq_ignore_ascii_case("spine.006") || name.eq_ignore_ascii_case("spine006")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,6 +89,16 @@ mod tests {
             "头",
         ] {
             assert!(!is_head(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn rigifys_head_is_the_last_of_its_spine() {
+        for name in ["spine.006", "DEF-spine.006", "DEF-spine006", "ORG-Spine.006"] {
+            assert!(is_head_of_rigify(name), "{name}");
+        }
+        for name in ["", "spine.005", "DEF-spine.0061", "tweak_spine.006x", "my spine.006"] {
+            assert!(!is_head_of_rigify(name), "{name}");
         }
     }
 

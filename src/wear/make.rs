@@ -2,7 +2,7 @@
 
 use super::{
     error::WearError,
-    space::{Fitting, Part, cropped, fit},
+    space::{Fitting, MeshPart, cropped, fit},
     target::Target,
     what::{HairSource, WearHair},
 };
@@ -10,19 +10,21 @@ use crate::{
     collider_fit::{BallRules, fit_joint_capsules, inscribed_balls},
     contact::HairCollider,
     grid::KdTree,
-    groom::{Groom, GroomGuides, Sown},
+    groom::{Groom, GroomGuides, GrownStrands},
+    look::WornPreset,
     plant::{
         HUMAN_DENSITY, HairPreset, Planting, PresetSettings, RootOnMesh, RootPlace, SurfacePoint,
         surface_points,
     },
+    setting::Ranged,
     strand::Strand,
-    water::Wetting,
+    water::HairWetting,
 };
 #[cfg(feature = "render")]
-use crate::{plant::Sowing, render::HairLook, setting::Ranged};
+use crate::{look::HairLook, plant::FollowerPlanting};
 use bevy::{math::Affine3A, platform::collections::HashMap, prelude::*};
 
-/// Points by which head and body are felt when balls are fitted.
+/// Surface points of head and body for fitting balls.
 const POINTS: usize = 2500;
 /// The most balls for a head.
 const MOST_BALLS: usize = 16;
@@ -30,10 +32,10 @@ const MOST_BALLS: usize = 16;
 const BESIDE: f32 = 0.15;
 /// Half of a groom's strands must grow nearer to the mesh than this (m).
 const MOST_BESIDE: f32 = 0.03;
-/// Moved less than this share by the head, a vertex is of the neck.
+/// Least weight of the head joint at a vertex that counts as the head, not the neck.
 const OF_HEAD: f32 = 0.5;
 
-/// What is to be made, of what.
+/// The input for making hair.
 pub(super) struct Order {
     pub(super) wear: WearHair,
     pub(super) target: Target,
@@ -41,7 +43,7 @@ pub(super) struct Order {
     pub(super) groom: Option<Groom>,
 }
 
-/// Hair that is ready to be put on.
+/// Finished hair, ready to be spawned.
 pub(super) struct Made {
     /// The bone or mesh that it goes below, and its place there.
     pub(super) parent: Entity,
@@ -50,8 +52,9 @@ pub(super) struct Made {
     pub(super) mesh: Entity,
     pub(super) from_mesh: Affine3A,
     pub(super) roots: Vec<RootOnMesh>,
-    pub(super) hair: Sown,
+    pub(super) hair: GrownStrands,
     pub(super) settings: Option<PresetSettings>,
+    pub(super) preset: Option<WornPreset>,
     #[cfg(feature = "render")]
     pub(super) look: Option<HairLook>,
     /// Fibres for each strand.
@@ -67,7 +70,7 @@ pub(super) fn make(mut order: Order) -> Result<Made, WearError> {
     let fitting = fit(&mut order.target.parts, &order.wear)?;
     let grown = match (&order.wear.hair, &order.groom) {
         (HairSource::Groom { guides, .. }, Some(groom)) => {
-            sow(groom, guides, &fitting, &order.wear.place)?
+            from_groom(groom, guides, &fitting, &order.wear.place)?
         }
         (HairSource::Groom { .. }, None) => return Err(WearError::NoMesh),
         (HairSource::Preset(preset), _) => plant(*preset, &order.wear, &fitting)?,
@@ -87,7 +90,7 @@ pub(super) fn make(mut order: Order) -> Result<Made, WearError> {
     } else {
         default()
     };
-    let fibres = Wetting::FIBRES.safe;
+    let fibres = HairWetting::FIBRES.safe;
     Ok(Made {
         parent,
         place: Transform::from_matrix(place.into()),
@@ -96,6 +99,7 @@ pub(super) fn make(mut order: Order) -> Result<Made, WearError> {
         roots: grown.roots,
         hair: grown.hair,
         settings: grown.settings,
+        preset: grown.preset,
         #[cfg(feature = "render")]
         look: order.groom.as_ref().and_then(Groom::look),
         fibres: grown.fibres.clamp(*fibres.start(), *fibres.end()),
@@ -106,49 +110,62 @@ pub(super) fn make(mut order: Order) -> Result<Made, WearError> {
 
 /// Hair on a mesh.
 struct Grown {
-    hair: Sown,
+    hair: GrownStrands,
     roots: Vec<RootOnMesh>,
     settings: Option<PresetSettings>,
+    preset: Option<WornPreset>,
     fibres: f32,
 }
 
 fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown, WearError> {
-    let planting = Planting { seed: wear.seed, ..preset.planting(&fitting.scalp) };
-    let mesh = cropped(&fitting.mesh, planting.length + BESIDE);
-    let of_head = |place: &RootPlace| {
-        place.color.map_or(1.0, |color| if color.x > OF_HEAD { 1.0 } else { 0.0 })
+    let worn = WornPreset { seed: wear.seed, length: wear.length, ..WornPreset::of(preset) };
+    let worn = worn.checked()?;
+    let mut planting = Planting { seed: wear.seed, ..preset.planting(&fitting.scalp) };
+    if worn.length != 1.0 {
+        planting = planting.lengthened(worn.length);
+    }
+    let whole = preset.is_everywhere();
+    let mesh = match whole {
+        true => fitting.mesh.clone(),
+        false => cropped(&fitting.mesh, planting.length + BESIDE),
+    };
+    let of_head = |place: &RootPlace| match place.color {
+        Some(color) if !whole && color.x <= OF_HEAD => 0.0,
+        _ => 1.0,
     };
     let planted = preset.plant_where(&planting, &mesh, &fitting.scalp, &of_head)?;
     let strands = planted.groom.strands().map(|s| Strand::from_polyline(s.points));
-    let hair = Sown {
+    let hair = GrownStrands {
         strands: strands.collect::<Result<_, _>>()?,
         #[cfg(feature = "render")]
-        followers: Sowing {
+        followers: FollowerPlanting {
             preset,
             scalp: fitting.scalp,
-            hairline: wear.hairline.unwrap_or_else(|| preset.hairline()).clamped(),
+            hairline: (wear.hairline.map(Ranged::checked).transpose()?)
+                .unwrap_or_else(|| preset.hairline()),
             count: preset.settings().followers.count,
             seed: wear.seed,
         }
-        .sow(&planted, &mesh, &of_head)?,
+        .plant(&planted, &mesh, &of_head)?,
         ..default()
     };
     Ok(Grown {
         hair,
         roots: planted.roots,
         settings: Some(preset.settings()),
+        preset: Some(worn),
         fibres: HUMAN_DENSITY / planting.density,
     })
 }
 
-fn sow(
+fn from_groom(
     groom: &Groom,
     guides: &GroomGuides,
     fitting: &Fitting,
     place: &Transform,
 ) -> Result<Grown, WearError> {
     let groom = groom.clone().mapped(&(fitting.from_wearer * place.compute_affine()))?;
-    let hair = groom.sown(guides)?;
+    let hair = groom.grown_strands(guides)?;
     let places: Vec<Vec3> = hair.strands.iter().map(|s| s.positions()[0]).collect();
     let (roots, mut apart): (Vec<_>, Vec<_>) =
         RootOnMesh::nearest(&fitting.mesh, places.iter().copied())?.into_iter().unzip();
@@ -156,7 +173,13 @@ fn sow(
     if found > MOST_BESIDE {
         return Err(WearError::Beside { found, most: MOST_BESIDE });
     }
-    Ok(Grown { fibres: HUMAN_DENSITY * area_of_each(&places), hair, roots, settings: None })
+    Ok(Grown {
+        fibres: HUMAN_DENSITY * area_of_each(&places),
+        hair,
+        roots,
+        settings: None,
+        preset: None,
+    })
 }
 
 /// About how much skin each root stands for (m²), from how far apart neighbours are.
@@ -172,7 +195,7 @@ fn median(values: &mut [f32]) -> Option<f32> {
     values.get(values.len() / 2).copied()
 }
 
-/// Balls within the head; within all that hair reaches of a mesh without joints.
+/// Balls inside the head; for a mesh without joints, inside all of it that hair reaches.
 fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>, WearError> {
     let points = surface_points(&cropped(&fitting.mesh, reach), POINTS)?;
     let height = fitting.scalp.height;
@@ -192,10 +215,9 @@ fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>
     each.collect()
 }
 
-/// A capsule for each joint other than the head's that hair reaches. A skin that none can be fitted
-/// to has none.
+/// A capsule for each joint other than the head's that hair reaches; none where the fit fails.
 fn capsules(
-    parts: &[Part],
+    parts: &[MeshPart],
     fitting: &Fitting,
     reach: f32,
 ) -> Vec<(Entity, (HairCollider, Transform))> {

@@ -27,7 +27,7 @@ pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair};
 
 use bevy::prelude::*;
 
-/// Puts hair on what carries [`WearHair`].
+/// Puts hair on entities with [`WearHair`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WearPlugin;
 
@@ -37,10 +37,12 @@ impl Plugin for WearPlugin {
             .register_type::<HairSource>()
             .register_type::<WornHair>()
             .register_type::<HairWorn>()
+            .register_type::<HairNotWorn>()
             .register_required_components::<WearHair, systems::Wearing>()
             .add_systems(
                 PreUpdate,
-                (systems::take_off, systems::note_changes, systems::seek, systems::put_on).chain(),
+                (systems::take_off, systems::note_changes, systems::find_heads, systems::put_on)
+                    .chain(),
             );
     }
 }

@@ -1,8 +1,8 @@
 //! Mesh and hair in one space.
 //!
-//! Hair is planted where the face looks along −Z, the middle between the ears is the origin and the
-//! head is of life size. So presets find the head that they are made for, a hairdo of one character
-//! fits another, and hair of dolls and giants swings as hair does.
+//! Hair is planted in a space where the face looks along −Z, the origin is the middle between the ears,
+//! and the head is of life size. So presets fit, a hairdo of one character fits another, and hair of
+//! dolls and giants swings as at life size.
 
 use super::{
     error::{HEAD_SIZES, WearError},
@@ -23,8 +23,8 @@ use bevy::{
 /// Heights of heads of life size (m).
 const LIFE: core::ops::RangeInclusive<f32> = 0.08..=0.16;
 
-/// What moves a mesh.
-pub(super) struct Skin {
+/// The joints of a mesh.
+pub(super) struct MeshSkin {
     pub(super) joints: Vec<Entity>,
     /// Inverse bind poses.
     pub(super) poses: Vec<Affine3A>,
@@ -35,16 +35,16 @@ pub(super) struct Skin {
 }
 
 /// A mesh on which hair may grow.
-pub(super) struct Part {
+pub(super) struct MeshPart {
     pub(super) entity: Entity,
     /// Its positions, normals, triangles and skin.
     pub(super) mesh: Mesh,
-    pub(super) skin: Option<Skin>,
+    pub(super) skin: Option<MeshSkin>,
     /// From the mesh, as it is bound, to the wearer.
     pub(super) to_wearer: Affine3A,
 }
 
-/// What planting, ties and fits need of a mesh.
+/// Copies the attributes of a mesh that planting, ties and fits need.
 pub(super) fn skin_of(mesh: &Mesh) -> Result<Mesh, WearError> {
     let extracted = |_| PlantError::Extracted;
     let mut copy = Mesh::new(mesh.primitive_topology(), RenderAssetUsages::default());
@@ -110,7 +110,7 @@ pub(super) struct Fitting {
 }
 
 /// Finds the head among the parts and puts its mesh into the space of the hair.
-pub(super) fn fit(parts: &mut [Part], wear: &WearHair) -> Result<Fitting, WearError> {
+pub(super) fn fit(parts: &mut [MeshPart], wear: &WearHair) -> Result<Fitting, WearError> {
     let given = wear.scalp.map(Ranged::checked).transpose()?;
     let turn = upright(given.as_ref(), wear.facing)?;
     let mut best: Option<(f32, usize, Vec<f32>)> = None;
@@ -133,7 +133,7 @@ pub(super) fn fit(parts: &mut [Part], wear: &WearHair) -> Result<Fitting, WearEr
             let of_head = places.filter(|(_, share)| **share > 0.5).map(|(p, _)| p);
             let there: Vec<Vec3> =
                 of_head.map(|p| canonical.transform_point3(Vec3::from_array(*p))).collect();
-            // A mesh that is none is told by planting, which says what is wrong with it.
+            // An invalid mesh is reported by planting.
             find_head(&there).unwrap_or(HeadPlace { center: Vec3::ZERO, height: 0.11 })
         }
     };
@@ -185,7 +185,7 @@ fn positions(mesh: &Mesh) -> &[[f32; 3]] {
 
 /// By how much the head moves each vertex: all of a mesh without a skin. Where no joint is known to
 /// be the head, it is the one that moves the highest vertex most.
-fn head_shares(part: &mut Part, turn: Mat3A) -> Result<Vec<f32>, WearError> {
+fn head_shares(part: &mut MeshPart, turn: Mat3A) -> Result<Vec<f32>, WearError> {
     let places = positions(&part.mesh);
     let Some(skin) = &mut part.skin else { return Ok(vec![1.0; places.len()]) };
     let (Some(Values::Uint16x4(joints)), Some(Values::Float32x4(weights))) = (
@@ -234,7 +234,7 @@ fn head_area(mesh: &Mesh, shares: &[f32]) -> f32 {
     triangles(mesh).map(area).filter(|area| area.is_finite()).sum()
 }
 
-/// The vertices of each triangle; those of a strip without heed to their order.
+/// The vertices of each triangle; the winding of strips is ignored.
 fn triangles(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> {
     let step = if mesh.primitive_topology() == PrimitiveTopology::TriangleStrip { 1 } else { 3 };
     let indices: Vec<usize> = match mesh.indices() {
@@ -271,7 +271,7 @@ pub(super) fn cropped(mesh: &Mesh, reach: f32) -> Mesh {
     let mut part = mesh.clone();
     let places = positions(mesh);
     let is_list = mesh.primitive_topology() == PrimitiveTopology::TriangleList;
-    // What cannot be is left in, for planting to say so.
+    // Invalid triangles are kept, for planting to report.
     let is_near = |v: &usize| {
         places.get(*v).is_none_or(|p| {
             let squared = Vec3::from_array(*p).length_squared();

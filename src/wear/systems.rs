@@ -1,4 +1,4 @@
-//! The systems: look for heads, have hair made, put it on, take it off.
+//! The systems: find heads, start tasks that make hair, spawn and despawn it.
 
 use super::{
     error::{PATIENCE, WearError},
@@ -10,9 +10,12 @@ use crate::{
     attach::RootsOnMesh,
     fault::{FaultKind, HairFault},
     groom::Groom,
+    look::HairDye,
     setting::HairDefault,
+    settle::Settling,
     strand::{Hair, StrandOf},
-    water::Wetting,
+    style::{HairStyle, KeptStyle},
+    water::HairWetting,
 };
 use bevy::{
     platform::collections::{HashMap, HashSet},
@@ -20,25 +23,25 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-/// How far a wearer is.
+/// State of a wearer.
 #[derive(Component, Default)]
 pub(super) struct Wearing {
-    /// What is worn, or is to be.
+    /// What is worn or being made.
     wanted: Option<WearHair>,
-    stage: Stage,
+    stage: WearStage,
     /// The bone or mesh that it is worn on.
     head: Option<Entity>,
-    /// What is there.
+    /// The entities of the worn hair.
     worn: Option<Worn>,
 }
 
 #[derive(Default)]
-enum Stage {
-    /// Looks for its head.
+enum WearStage {
+    /// Searching for the head.
     #[default]
     Begun,
-    /// The same, for so long (s); what was missing may have been told.
-    Seeking { seconds: f32, told: bool },
+    /// The same, for `seconds`; `reported` once a failure has been reported.
+    Searching { seconds: f32, reported: bool },
     /// Its hair is being made.
     Making(Making),
     /// It has its hair, or cannot have it.
@@ -64,7 +67,7 @@ impl Worn {
     }
 }
 
-/// Takes the hair off those that are no longer to wear any.
+/// Removes the hair of entities without [`WearHair`].
 pub(super) fn take_off(
     mut commands: Commands,
     mut bald: Query<(Entity, &mut Wearing), Without<WearHair>>,
@@ -77,8 +80,10 @@ pub(super) fn take_off(
     }
 }
 
-/// Begins anew where what is worn has changed, or is gone with the scene that it was on.
+/// Begins anew where what is worn has changed, or is gone with the scene that it was on. What can be put
+/// on the hair that is worn is.
 pub(super) fn note_changes(
+    mut commands: Commands,
     mut wearers: Query<(Ref<WearHair>, &mut Wearing)>,
     mut events: Option<MessageReader<AssetEvent<Groom>>>,
     hairs: Query<(), With<Hair>>,
@@ -92,22 +97,54 @@ pub(super) fn note_changes(
         })
         .collect();
     for (wear, mut wearing) in &mut wearers {
-        let is_other = wear.is_changed() && wearing.wanted.as_ref() != Some(&*wear);
+        let mut is_other = wear.is_changed() && wearing.wanted.as_ref() != Some(&*wear);
+        if is_other
+            && let Some(worn) = &wearing.worn
+            && matches!(wearing.stage, WearStage::Done)
+            && let Some(before) =
+                wearing.wanted.as_ref().filter(|before| before.is_same_hair(&wear))
+        {
+            restyle(&mut commands, worn.hair, before, &wear);
+            wearing.wanted = Some(WearHair::clone(&wear));
+            is_other = false;
+        }
         let is_reloaded = match &wear.hair {
             HairSource::Groom { groom, .. } => changed.contains(&groom.id()),
             HairSource::Preset(_) => false,
         };
         let is_gone = wearing.worn.as_ref().is_some_and(|worn| !hairs.contains(worn.hair));
-        if is_other || is_reloaded || (is_gone && matches!(wearing.stage, Stage::Done)) {
+        if is_other || is_reloaded || (is_gone && matches!(wearing.stage, WearStage::Done)) {
             wearing.wanted = Some(WearHair::clone(&wear));
-            wearing.stage = Stage::Begun;
+            wearing.stage = WearStage::Begun;
             wearing.head = None;
         }
     }
 }
 
+/// Puts look, dye and watch over the style on worn hair, where they are others than before.
+fn restyle(commands: &mut Commands, hair: Entity, before: &WearHair, wear: &WearHair) {
+    let mut hair = commands.entity(hair);
+    if before.look != wear.look
+        && let Some(look) = wear.look.clone()
+    {
+        hair.try_insert(look);
+    }
+    if before.dye != wear.dye {
+        match wear.dye.clone() {
+            Some(dye) => hair.try_insert(dye),
+            None => hair.try_remove::<HairDye>(),
+        };
+    }
+    if before.style != wear.style {
+        match wear.style {
+            Some(style) => hair.try_insert(style),
+            None => hair.try_remove::<(HairStyle, KeptStyle)>(),
+        };
+    }
+}
+
 /// Looks for heads, and has hair made for those that are there.
-pub(super) fn seek(
+pub(super) fn find_heads(
     mut commands: Commands,
     time: Option<Res<Time<Real>>>,
     characters: Characters,
@@ -115,7 +152,7 @@ pub(super) fn seek(
     mut wearers: Query<(Entity, &WearHair, &mut Wearing)>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    // Whose preset is worn where.
+    // The wearer of a preset on each head.
     let mut taken: HashMap<Entity, Entity> = wearers
         .iter()
         .filter(|(_, wear, _)| matches!(wear.hair, HairSource::Preset(_)))
@@ -123,13 +160,13 @@ pub(super) fn seek(
         .collect();
     let step = time.map_or(0.0, |time| time.delta_secs());
     for (wearer, wear, mut wearing) in &mut wearers {
-        let (seconds, told) = match wearing.stage {
-            Stage::Begun => (0.0, false),
-            Stage::Seeking { seconds, told } => (seconds + step, told),
-            Stage::Making(_) | Stage::Done => continue,
+        let (seconds, reported) = match wearing.stage {
+            WearStage::Begun => (0.0, false),
+            WearStage::Searching { seconds, reported } => (seconds + step, reported),
+            WearStage::Making(_) | WearStage::Done => continue,
         };
-        let mut failed = |error: WearError, told: bool| {
-            if !told {
+        let mut failed = |error: WearError, reported: bool| {
+            if !reported {
                 refuse(&mut commands, &mut faults, wearer, error);
             }
         };
@@ -140,10 +177,10 @@ pub(super) fn seek(
                     Some(groom) => Some(groom),
                     None => {
                         if let Some(reason) = characters.failure(groom.id().untyped()) {
-                            failed(WearError::NotLoaded { what: "groom", reason }, told);
-                            wearing.stage = Stage::Done;
+                            failed(WearError::NotLoaded { what: "groom", reason }, reported);
+                            wearing.stage = WearStage::Done;
                         } else {
-                            wearing.stage = Stage::Seeking { seconds, told };
+                            wearing.stage = WearStage::Searching { seconds, reported };
                         }
                         continue;
                     }
@@ -151,25 +188,25 @@ pub(super) fn seek(
             }
         };
         wearing.stage = match characters.search(wearer, wear) {
-            Search::Loading => Stage::Seeking { seconds, told },
+            Search::Loading => WearStage::Searching { seconds, reported },
             Search::Nothing => {
                 let is_late = seconds > PATIENCE;
                 if is_late {
-                    failed(WearError::NoMesh, told);
+                    failed(WearError::NoMesh, reported);
                 }
-                Stage::Seeking { seconds, told: told || is_late }
+                WearStage::Searching { seconds, reported: reported || is_late }
             }
-            // What is missing may still come.
+            // Missing parts may still load.
             Search::Failed(error) => {
-                failed(error, told);
-                Stage::Seeking { seconds, told: true }
+                failed(error, reported);
+                WearStage::Searching { seconds, reported: true }
             }
             Search::Found(target) => {
                 let is_preset = matches!(wear.hair, HairSource::Preset(_));
                 match taken.get(&target.head).filter(|by| is_preset && **by != wearer) {
                     Some(&by) => {
                         failed(WearError::Taken { by }, false);
-                        Stage::Done
+                        WearStage::Done
                     }
                     None => {
                         if is_preset {
@@ -177,7 +214,7 @@ pub(super) fn seek(
                         }
                         wearing.head = Some(target.head);
                         let order = Order { wear: wear.clone(), target, groom: groom.cloned() };
-                        Stage::Making(begin(order))
+                        WearStage::Making(begin(order))
                     }
                 }
             }
@@ -185,7 +222,7 @@ pub(super) fn seek(
     }
 }
 
-/// Has hair made on the async compute pool; here, in an app without pools.
+/// Makes hair on the async compute pool, or at once in an app without pools.
 fn begin(order: Order) -> Making {
     match AsyncComputeTaskPool::try_get() {
         Some(pool) => Making::Elsewhere(pool.spawn(async move { make(order) })),
@@ -204,37 +241,39 @@ fn refuse(
     commands.trigger(HairNotWorn { entity: wearer, error });
 }
 
-/// Puts on hair that is ready, in place of what was worn.
+/// Replaces worn hair by finished new hair.
 pub(super) fn put_on(
     mut commands: Commands,
     mut wearers: Query<(Entity, &WearHair, &mut Wearing)>,
     entities: Query<()>,
-    wetting: Option<Res<HairDefault<Wetting>>>,
+    wetting: Option<Res<HairDefault<HairWetting>>>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (wearer, wear, mut wearing) in &mut wearers {
-        if !matches!(wearing.stage, Stage::Making(_)) {
+        if !matches!(wearing.stage, WearStage::Making(_)) {
             continue;
         }
-        let Stage::Making(making) = &mut wearing.bypass_change_detection().stage else { continue };
+        let WearStage::Making(making) = &mut wearing.bypass_change_detection().stage else {
+            continue;
+        };
         let ready = match making {
             Making::Elsewhere(task) => check_ready(task),
             Making::Ready(made) => made.take().map(|made| *made),
         };
         let Some(ready) = ready else { continue };
-        wearing.stage = Stage::Done;
+        wearing.stage = WearStage::Done;
         match ready {
             Ok(made) if entities.contains(made.parent) && entities.contains(made.mesh) => {
                 if let Some(old) = wearing.worn.take() {
                     old.take_off(&mut commands);
                 }
                 let wetting = wetting.as_ref().map(|default| default.0).unwrap_or_default();
-                let worn = dress(&mut commands, wearer, wear, made, wetting);
+                let worn = spawn_hair(&mut commands, wearer, wear, made, wetting);
                 commands.trigger(HairWorn { entity: wearer, hair: worn.hair });
                 wearing.worn = Some(worn);
             }
-            // The scene went while its hair was made.
-            Ok(_) => wearing.stage = Stage::Begun,
+            // The scene was despawned while the hair was made.
+            Ok(_) => wearing.stage = WearStage::Begun,
             Err(error) => {
                 wearing.head = None;
                 refuse(&mut commands, &mut faults, wearer, error);
@@ -243,20 +282,34 @@ pub(super) fn put_on(
     }
 }
 
-fn dress(
+fn spawn_hair(
     commands: &mut Commands,
     wearer: Entity,
     wear: &WearHair,
     made: Made,
-    wetting: Wetting,
+    wetting: HairWetting,
 ) -> Worn {
     let roots =
         RootsOnMesh { mesh: Some(made.mesh), roots: made.roots, strands_from_mesh: made.from_mesh };
     let is = WornHair { wearer, hair: wear.hair.clone() };
-    let wetting = Wetting { fibres: made.fibres, ..wetting };
+    let wetting = HairWetting { fibres: made.fibres, ..wetting };
     let mut hair = commands.spawn((Hair, made.place, ChildOf(made.parent), is, wetting, roots));
-    if let Some(settings) = made.settings {
+    if let Some(mut settings) = made.settings {
+        settings.wetting = wetting;
         hair.insert(settings);
+    }
+    if let Some(preset) = made.preset {
+        hair.insert(preset);
+    }
+    // A style is put on as it was saved.
+    #[cfg(feature = "save")]
+    let is_styled = wear.hairdo.is_some();
+    #[cfg(not(feature = "save"))]
+    let is_styled = false;
+    if is_styled {
+        hair.remove::<Settling>();
+    } else {
+        hair.insert(Settling::default());
     }
     #[cfg(feature = "render")]
     {
@@ -281,6 +334,17 @@ fn dress(
     #[cfg(feature = "save")]
     if let Some(hairdo) = wear.hairdo.clone() {
         commands.entity(hair).queue(hairdo.put_on_fitting());
+    }
+    // Over the hairdo's.
+    let mut own = commands.entity(hair);
+    if let Some(look) = wear.look.clone() {
+        own.insert(look);
+    }
+    if let Some(dye) = wear.dye.clone() {
+        own.insert(dye);
+    }
+    if let Some(style) = wear.style {
+        own.insert(style);
     }
     Worn { hair, colliders }
 }

@@ -2,8 +2,8 @@
 
 use super::{
     error::WearError,
-    head::is_head,
-    space::{Part, Skin, bound_to, skin_of},
+    head::{is_head, is_head_of_rigify},
+    space::{MeshPart, MeshSkin, bound_to, skin_of},
     what::WearHair,
 };
 use crate::{contact::HairCollider, strand::Hair};
@@ -28,12 +28,12 @@ pub(super) struct Fitted;
 pub(super) struct Target {
     /// The bone or mesh that it is worn on.
     pub(super) head: Entity,
-    pub(super) parts: Vec<Part>,
+    pub(super) parts: Vec<MeshPart>,
     /// Whether the character has colliders that were not fitted for worn hair.
     pub(super) has_colliders: bool,
 }
 
-/// What came of looking for a head.
+/// Result of the search for a head.
 pub(super) enum Search {
     /// There is no mesh.
     Nothing,
@@ -64,8 +64,8 @@ pub(super) struct Characters<'w, 's> {
 }
 
 impl Characters<'_, '_> {
-    /// Looks for the head on which `wearer` is to wear its hair: on a rider only where the horse has
-    /// none.
+    /// Finds the head for the hair of `wearer`. Heads of other wearers below it (a rider on a horse) count
+    /// only if it has none of its own.
     pub(super) fn search(&self, wearer: Entity, wear: &WearHair) -> Search {
         let own = self.search_among(wearer, wear, &self.below(wearer, false));
         let is_missing = match &own {
@@ -114,15 +114,15 @@ impl Characters<'_, '_> {
     pub(super) fn failure(&self, id: impl Into<bevy::asset::UntypedAssetId>) -> Option<String> {
         match self.server.as_ref()?.load_state(id) {
             LoadState::Failed(error) => {
-                // The asset server has logged the whole of it.
+                // The asset server has logged the full error.
                 Some(error.to_string().lines().next().unwrap_or_default().to_owned())
             }
             _ => None,
         }
     }
 
-    /// An entity and all below it, level by level, without hair and what is below other wearers, if
-    /// these are not asked for.
+    /// An entity and all its descendants, level by level, without hair and, unless `with_wearers`,
+    /// without descendants of other wearers.
     fn below(&self, top: Entity, with_wearers: bool) -> Vec<Entity> {
         let (mut found, mut todo) = (Vec::new(), VecDeque::from([top]));
         while let Some(entity) = todo.pop_front() {
@@ -161,7 +161,12 @@ impl Characters<'_, '_> {
             None => {
                 let is_called = |e: &&Entity| self.name(**e).is_some_and(is_head);
                 let joint = all.iter().filter(is_called).find(|e| joints.contains(*e));
-                let any = joint.or_else(|| all.iter().find(is_called));
+                let is_last = |e: &&Entity| {
+                    joints.contains(*e) && self.name(**e).is_some_and(is_head_of_rigify)
+                };
+                let any = joint
+                    .or_else(|| all.iter().find(is_called))
+                    .or_else(|| all.iter().find(is_last));
                 let only = (skinned.len() == 1).then_some(&skinned[0].0);
                 *any.or(only)
                     .ok_or_else(|| WearError::NoHead { there: self.names(all, &joints) })?
@@ -189,7 +194,7 @@ impl Characters<'_, '_> {
                 Some(skin) => self.bound(skin, wearer)?,
                 None => self.relative(entity, wearer).ok_or(WearError::Pose)?,
             };
-            Ok(Part { entity, mesh, skin, to_wearer })
+            Ok(MeshPart { entity, mesh, skin, to_wearer })
         };
         Ok(Target {
             head,
@@ -203,8 +208,11 @@ impl Characters<'_, '_> {
         skin: &SkinnedMesh,
         poses: &[Mat4],
         bone: Option<(Entity, &HashSet<Entity>)>,
-    ) -> Skin {
-        let called = || skin.joints.iter().position(|j| self.name(*j).is_some_and(is_head));
+    ) -> MeshSkin {
+        let position = |is_meant: fn(&str) -> bool| {
+            skin.joints.iter().position(|j| self.name(*j).is_some_and(is_meant))
+        };
+        let called = || position(is_head).or_else(|| position(is_head_of_rigify));
         let head = match bone {
             Some((head, _)) => skin.joints.iter().position(|joint| *joint == head),
             None => called(),
@@ -217,11 +225,11 @@ impl Characters<'_, '_> {
         };
         let of_head = skin.joints.iter().map(|joint| below.contains(joint)).collect();
         let poses = poses.iter().map(|pose| Affine3A::from_mat4(*pose)).collect();
-        Skin { joints: skin.joints.clone(), poses, head, of_head }
+        MeshSkin { joints: skin.joints.clone(), poses, head, of_head }
     }
 
     /// From a skinned mesh, as it is bound, to the wearer, by the joint that is nearest to the root.
-    fn bound(&self, skin: &Skin, wearer: Entity) -> Result<Affine3A, WearError> {
+    fn bound(&self, skin: &MeshSkin, wearer: Entity) -> Result<Affine3A, WearError> {
         let above = |entity: Entity| {
             core::iter::successors(Some(entity), |e| {
                 self.places.get(*e).ok()?.1.map(ChildOf::parent)
@@ -253,7 +261,7 @@ impl Characters<'_, '_> {
         if is_below {
             return way.is_finite().then_some(way);
         }
-        // A skeleton beside its mesh: by way of the world.
+        // A skeleton that is not above its mesh: through world space.
         let (_, above) = parent(wearer).map_or(Some((false, Affine3A::IDENTITY)), chain)?;
         let way = (above * own(wearer)?).inverse() * way;
         way.is_finite().then_some(way)

@@ -1,11 +1,13 @@
-//! What is worn, by whom, and what is told of it.
+//! The components and events of worn hair.
 
 use super::error::WearError;
 #[cfg(feature = "save")]
-use crate::save::Hairdo;
+use crate::save::{Hairdo, HairdoError};
 use crate::{
     groom::{Groom, GroomGuides},
+    look::{HairDye, HairLook},
     plant::{HairPreset, Hairline, Scalp},
+    style::HairStyle,
 };
 use bevy::prelude::*;
 
@@ -27,8 +29,9 @@ use bevy::prelude::*;
 /// ```
 ///
 /// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there is none), with
-/// [`WornHair`]; [`HairWorn`] tells which. Its settings are the preset's, and a
-/// [`Wetting`](crate::Wetting) that counts as many fibres as grow there; to change them, wait for it:
+/// [`WornHair`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] tells which. It settles before it is first
+/// drawn ([`Settling`](crate::Settling)) unless it is styled. Its settings are the preset's, and a
+/// [`HairWetting`](crate::HairWetting) that counts as many fibres as grow there; to change them, wait for it:
 ///
 /// ```
 /// # use bevy_keratin::{plant::HairPreset, prelude::*}; use bevy::prelude::*;
@@ -43,7 +46,8 @@ use bevy::prelude::*;
 /// ```
 ///
 /// Hair is made off the main thread, in the frame's [`PreUpdate`] it is put on. Whenever this
-/// component changes the hair is made anew, and the old one stays until the new one is there. What
+/// component changes the hair is made anew, and the old one stays until the new one is there; another
+/// [`look`](Self::look), [`dye`](Self::dye) or [`style`](Self::style) is put on the hair that is worn. What
 /// cannot be worn is told once, as a [`HairFault`](crate::HairFault) and by [`HairNotWorn`]; the
 /// wearer keeps the hair that it has.
 ///
@@ -57,19 +61,30 @@ pub struct WearHair {
     pub hair: HairSource,
     /// The name of the bone, or of the mesh, that it is worn on. Default `None`: the entity's own
     /// mesh, else the bone whose name ends with the word head (`Head`, `mixamorig:Head`,
-    /// `J_Bip_C_Head`), else the only mesh there is.
+    /// `J_Bip_C_Head`) or is Rigify's (`DEF-spine.006`), else the only mesh there is: on the joint that
+    /// moves the highest of it.
     pub on: Option<String>,
-    /// Where the face looks, in this entity's space; its part along Y is not heeded, Y is up. Default
-    /// −Z, Bevy's forward; characters of glTF files look along +Z unless they are converted.
+    /// Where the face looks, in this entity's space; Y is up and the component along Y is ignored.
+    /// Default −Z, Bevy's forward; characters of glTF files look along +Z unless they are converted.
     pub facing: Dir3,
-    /// Draws the strands' places and differences: the same seed gives the same hair. Default 0.
+    /// Seed of the strands' places and variations: the same seed gives the same hair. Default 0.
     pub seed: u64,
+    /// How long a preset's hair is, as a multiple of its own length. Default 1, range that of
+    /// [`WornPreset::LENGTH`](crate::WornPreset::LENGTH).
+    pub length: f32,
+    /// How it looks. Default `None`: as the hairdo, the preset or the groom has it; on hair that is worn
+    /// already, as it looks now.
+    pub look: Option<HairLook>,
+    /// Bleach and dye. Default `None`: as the hairdo has it, else none.
+    pub dye: Option<HairDye>,
+    /// Whether and how its style is watched: see [`HairStyle`]. Default `Some(HairStyle::default())`; where
+    /// there is no style, as on a preset that nobody has styled, it costs nothing.
+    pub style: Option<HairStyle>,
     /// Where a preset's hairline is, in this entity's space, with the character as it is bound to its
-    /// skeleton. Its front goes before [`facing`](Self::facing). Default `None`: found from the
-    /// head's shape.
+    /// skeleton. Its front overrides [`facing`](Self::facing). Default `None`: found from the head's
+    /// shape.
     pub scalp: Option<Scalp>,
-    /// How a preset's hair begins at the hairline. Default `None`: as
-    /// [`HairPreset::hairline`] says.
+    /// How a preset's hair begins at the hairline. Default `None`: [`HairPreset::hairline`].
     pub hairline: Option<Hairline>,
     /// Where a groom's origin is, and how it is turned and scaled, in this entity's space. Default
     /// the identity: it was made around the character as it stands there.
@@ -79,8 +94,9 @@ pub struct WearHair {
     /// keeps to those. Default `true`.
     pub colliders: bool,
     /// How the hair is styled: put on at once, or resampled where it is of other strands. What is
-    /// saved from hair that was worn fits the same [`hair`](Self::hair) and [`seed`](Self::seed) on the
-    /// same character strand by strand. Default `None`.
+    /// saved from hair that was worn fits the same [`hair`](Self::hair), [`seed`](Self::seed) and
+    /// [`length`](Self::length) on the same character strand by strand: `WearHair::try_from(hairdo)` has
+    /// them. Default `None`.
     #[cfg(feature = "save")]
     pub hairdo: Option<Hairdo>,
 }
@@ -92,6 +108,10 @@ impl Default for WearHair {
             on: None,
             facing: Dir3::NEG_Z,
             seed: 0,
+            length: 1.0,
+            look: None,
+            dye: None,
+            style: Some(HairStyle::default()),
             scalp: None,
             hairline: None,
             place: Transform::IDENTITY,
@@ -120,11 +140,45 @@ impl WearHair {
         self
     }
 
+    /// The same so many times as long as the preset.
+    pub fn long(mut self, times: f32) -> Self {
+        self.length = times;
+        self
+    }
+
+    /// The same bleached and dyed.
+    pub fn dyed(mut self, dye: HairDye) -> Self {
+        self.dye = Some(dye);
+        self
+    }
+
+    /// Whether all but what can be put on worn hair is the same.
+    pub(super) fn is_same_hair(&self, other: &Self) -> bool {
+        let bare = |wear: &Self| Self { look: None, dye: None, style: None, ..wear.clone() };
+        bare(self) == bare(other)
+    }
+
     /// The same styled like this.
     #[cfg(feature = "save")]
     pub fn styled(mut self, hairdo: Hairdo) -> Self {
         self.hairdo = Some(hairdo);
         self
+    }
+}
+
+/// A hairdo as it was saved: the preset that it was made on, with seed and length, styled by it.
+///
+/// # Errors
+/// [`HairdoError::NoPreset`] when it was made on something else, or on a preset that is not known.
+#[cfg(feature = "save")]
+impl TryFrom<Hairdo> for WearHair {
+    type Error = HairdoError;
+
+    fn try_from(hairdo: Hairdo) -> Result<Self, HairdoError> {
+        let of = hairdo.preset().ok_or(HairdoError::NoPreset)?;
+        let preset = of.preset().ok_or(HairdoError::NoPreset)?;
+        let (seed, length) = (of.seed, of.length);
+        Ok(Self { seed, length, ..Self::new(preset) }.styled(hairdo))
     }
 }
 
@@ -134,7 +188,7 @@ impl WearHair {
 pub enum HairSource {
     /// Planted by rule.
     Preset(HairPreset),
-    /// Made by an artist; waits until it is loaded and is worn anew when it is reloaded.
+    /// A groom asset; waits until it is loaded, and follows reloads.
     Groom {
         /// The groom.
         groom: Handle<Groom>,
@@ -161,8 +215,8 @@ impl From<Handle<Groom>> for HairSource {
     }
 }
 
-/// What a worn [`Hair`](crate::Hair) is and who wears it. Component of the hair, written when it is
-/// put on.
+/// The source and the wearer of a worn [`Hair`](crate::Hair). Component of the hair, written when it is
+/// spawned.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Clone, PartialEq)]
 pub struct WornHair {
@@ -182,8 +236,7 @@ impl WornHair {
     }
 }
 
-/// Triggered on an entity with [`WearHair`] once its hair is there: when it is first worn, and
-/// whenever it was swapped.
+/// Triggered on an entity with [`WearHair`] once its hair is spawned, at first and after each change.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct HairWorn {
@@ -193,12 +246,14 @@ pub struct HairWorn {
     pub hair: Entity,
 }
 
-/// Triggered on an entity with [`WearHair`] whose hair cannot be worn; told as a
-/// [`HairFault`](crate::HairFault) too.
-#[derive(EntityEvent, Clone, Debug, PartialEq)]
+/// Triggered on an entity with [`WearHair`] whose hair cannot be made; also reported as a
+/// [`HairFault`](crate::HairFault).
+#[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq, from_reflect = false)]
 pub struct HairNotWorn {
     /// The wearer, with the hair that it had.
     pub entity: Entity,
     /// Why.
+    #[reflect(ignore)]
     pub error: WearError,
 }

@@ -4,14 +4,17 @@ use bevy::{
     ecs::{
         entity_disabling::Disabled,
         query::QueryFilter,
-        reflect::{AppTypeRegistry, ReflectComponent},
+        reflect::{AppTypeRegistry, ReflectComponent, ReflectResource},
         resource::IsResource,
     },
     prelude::*,
-    reflect::{PartialReflect, ReflectMut, ReflectRef},
+    reflect::{PartialReflect, ReflectMut, ReflectRef, std_traits::ReflectDefault},
 };
 use bevy_keratin::{
-    BondChanges, HairLod, HairSleep, HairSubsteps, SoakHair, WindReceived, prelude::*,
+    AddedMass, BondChanges, HairLod, HairSleep, HairSubsteps, Shower, SoakHair, SolverMethod,
+    WindReceived, WindZone,
+    prelude::*,
+    strand::{StrandSleep, TickPose},
 };
 use rand::{RngExt, rngs::Xoshiro256PlusPlus, seq::IndexedRandom};
 
@@ -102,9 +105,9 @@ fn search(value: &dyn PartialReflect) -> Option<String> {
     }
 }
 
-/// What the tick keeps and nobody sets.
+/// What the tick keeps and users do not set. Sums of wind are user code's to reset. A pose of sleep is written anew before it is read again.
 const STATE: [&str; 7] =
-    ["Strand", "StrandHistory", "Moisture", "Droplet", "AddedMass", "Bonds", "TickPose"];
+    ["Strand", "StrandHistory", "Moisture", "Droplet", "Bonds", "TickPose", "RestShape"];
 
 /// A number of the world's state that is not finite, if there is one.
 pub fn not_finite(app: &mut App) -> Option<String> {
@@ -113,13 +116,14 @@ pub fn not_finite(app: &mut App) -> Option<String> {
     let registry = registry.read();
     let hairs: Vec<Entity> = world.query_filtered::<Entity, With<Hair>>().iter(world).collect();
     let all: Vec<Entity> = world
-        .query_filtered::<Entity, Or<(With<Hair>, With<Droplet>, With<Strand>)>>()
+        .query_filtered::<Entity, Or<(With<Hair>, With<Droplet>, With<Strand>, With<TickPose>)>>()
         .iter(world)
         .collect();
     for name in STATE {
-        let component = registry.get_with_short_type_path(name)?.data::<ReflectComponent>()?;
+        let component = registry.get_with_short_type_path(name).expect(name);
+        let component = component.data::<ReflectComponent>().expect(name);
         for entity in &all {
-            // What belongs to nobody is left as it is.
+            // Entities of other crates are left unchanged.
             let is_lost = world.get::<StrandOf>(*entity).is_none_or(|of| !hairs.contains(&of.0))
                 && world.get::<Strand>(*entity).is_some();
             let is_stub = world.get::<Strand>(*entity).is_some_and(|strand| strand.nodes() < 2);
@@ -128,11 +132,122 @@ pub fn not_finite(app: &mut App) -> Option<String> {
                 && let Some(value) = component.reflect(world.entity(*entity))
                 && let Some(found) = search(value.as_partial_reflect())
             {
-                return Some(format!("{entity}: {name}{found}"));
+                return Some(format!("{entity}: {name}{found}: {value:?}"));
             }
         }
     }
+    for entity in &all {
+        if let Some(added) = world.get::<AddedMass>(*entity)
+            && let Some(load) = added.mass.iter().chain(&added.softening).find(|x| !x.is_finite())
+        {
+            return Some(format!("{entity}: AddedMass has {load}"));
+        }
+    }
     None
+}
+
+/// Whether `strand` belongs to a hair, and is long enough to swing with its first edge held.
+fn can_swing(world: &World, entity: Entity) -> bool {
+    let strand = world.get::<Strand>(entity);
+    strand.is_some_and(|strand| {
+        strand.nodes() >= 4 && (0.04..1.0).contains(&strand.rest_lengths().iter().sum::<f32>())
+    }) && world.get::<StrandOf>(entity).is_some_and(|of| world.get::<Hair>(of.0).is_some())
+}
+
+/// Puts the world's surroundings back to what they are by default, each strand on a new hair, and
+/// gives the strands a push. Those that do not move are dead: whatever was done to them must not last.
+pub fn find_dead(app: &mut App) -> Option<String> {
+    let world = app.world_mut();
+    let registry = world.resource::<AppTypeRegistry>().clone();
+    let registry = registry.read();
+    let old: Vec<Entity> = world
+        .query_filtered::<Entity, (
+            Or<(With<TickPose>, With<Droplet>)>,
+            Without<Hair>,
+            Without<IsResource>,
+        )>()
+        .iter(world)
+        .collect();
+    old.iter().for_each(|tool| _ = world.despawn(*tool));
+    let resources = with::<With<IsResource>>(world);
+    for kind in registry.iter().filter(|kind| {
+        let table = kind.type_info().type_path_table();
+        kind.type_info().type_path().starts_with("bevy_keratin")
+            && table.ident() != Some("WaterLedger")
+    }) {
+        let parts = (kind.data::<ReflectComponent>(), kind.data::<ReflectDefault>());
+        let (Some(component), Some(default)) = parts else { continue };
+        for resource in &resources {
+            let mut resource = world.entity_mut(*resource);
+            if component.contains(&resource) {
+                component.apply(&mut resource, default.default().as_partial_reflect());
+            }
+        }
+    }
+    world.insert_resource(Time::<Fixed>::from_hz(60.0));
+    // Also colliders that were put on strands and heads.
+    for entity in with::<With<HairCollider>>(world) {
+        world.entity_mut(entity).remove::<HairCollider>();
+    }
+    let strands: Vec<Entity> = world.query_filtered::<Entity, With<Strand>>().iter(world).collect();
+    let whole: Vec<Entity> = strands.into_iter().filter(|e| can_swing(world, *e)).collect();
+    for entity in &whole {
+        let hair = world.spawn(Hair).id();
+        world
+            .entity_mut(*entity)
+            .remove::<(HeldNodes, WoundOn, Disabled)>()
+            .insert((StrandOf(hair), Moisture::default()));
+    }
+    // What was put on the strands is noticed, and what has been wrong is repaired.
+    (0..3).for_each(|_| app.update());
+    let mut before = Vec::new();
+    for entity in &whole {
+        let mut strand = app.world_mut().get_mut::<Strand>(*entity).unwrap();
+        let along = strand.root_frame() * Vec3::Z;
+        let push = along.any_orthonormal_vector();
+        strand.velocities_mut()[1..].fill(push);
+        before.push(*strand.positions().last().unwrap());
+    }
+    let mut farthest = vec![0.0_f32; whole.len()];
+    for _ in 0..3 {
+        app.update();
+        for ((entity, before), way) in whole.iter().zip(&before).zip(&mut farthest) {
+            let strand = app.world().get::<Strand>(*entity).unwrap();
+            *way = way.max(strand.positions().last().unwrap().distance(*before));
+        }
+    }
+    for (entity, way) in whole.into_iter().zip(farthest) {
+        let strand = app.world().get::<Strand>(entity).unwrap();
+        if !strand.is_finite() || way < 1e-4 {
+            let names: Vec<String> = (app.world().inspect_entity(entity).unwrap())
+                .map(|part| part.name().shortname().to_string())
+                .collect();
+            return Some(format!(
+                "{entity} of {} nodes moves by {way} m: {names:?}, {:?}",
+                strand.nodes(),
+                app.world().get::<StrandSleep>(entity)
+            ));
+        }
+    }
+    None
+}
+
+/// Puts the default of any component of ours on an entity. Says which.
+fn insert_any(world: &mut World, entity: Entity, random: &mut Random) -> String {
+    let registry = world.resource::<AppTypeRegistry>().clone();
+    let registry = registry.read();
+    let components: Vec<_> = (registry.iter())
+        .filter(|kind| kind.type_info().type_path().starts_with("bevy_keratin"))
+        .filter(|kind| kind.data::<ReflectResource>().is_none())
+        .filter_map(|kind| {
+            let component = kind.data::<ReflectComponent>()?;
+            Some((kind.type_info().type_path(), component, kind.data::<ReflectDefault>()?))
+        })
+        .collect();
+    let (name, component, default) = components.choose(random).unwrap();
+    let value = default.default();
+    component.insert(&mut world.entity_mut(entity), value.as_partial_reflect(), &registry);
+    format!("{name} put on")
 }
 
 /// Writes into a component, or takes it off. Says which.
@@ -141,7 +256,7 @@ fn write(world: &mut World, entity: Entity, may_go: bool, random: &mut Random) -
     let registry = registry.read();
     let components: Vec<_> = (registry.iter())
         .filter(|t| t.type_info().type_path().starts_with("bevy_keratin"))
-        // Relationships are immutable, and the books are nobody's but the tick's.
+        // Relationships are immutable, and the ledger belongs to the tick.
         .filter(|t| {
             !["StrandOf", "WoundOn", "WaterLedger"]
                 .contains(&t.type_info().type_path_table().ident().unwrap_or_default())
@@ -191,7 +306,7 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             (0..=segments).map(|i| place * 0.1 + Vec3::X * 0.02 * i as f32).collect();
         Strand::from_polyline(&points).unwrap()
     };
-    match (random.random_range(0..42), hair, one, any) {
+    match (random.random_range(0..58), hair, one, any) {
         (0, Some(hair), ..) if strands.len() < 40 => {
             let segments = random.random_range(1..20);
             world.spawn((StrandOf(hair), line(segments)));
@@ -214,11 +329,11 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             "a haircut".into()
         }
         (5, Some(hair), ..) => {
-            world.write_message(Treat::wet(hair));
+            world.write_message(HairTreatment::wet(hair));
             "wet".into()
         }
         (6, Some(hair), ..) => {
-            world.write_message(Treat::dry(hair).over(wrong.abs()));
+            world.write_message(HairTreatment::dry(hair).over(wrong.abs()));
             format!("dry over {}", wrong.abs())
         }
         (7, _, Some(strand), _) => {
@@ -227,7 +342,7 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             "soaked".into()
         }
         (8, Some(hair), ..) => {
-            world.commands().entity(hair).queue(Hair::teleport);
+            Hair::teleport(world.entity_mut(hair));
             world.get_mut::<Transform>(hair).unwrap().translation = place * 100.0;
             "a teleport".into()
         }
@@ -337,24 +452,25 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
         }
         (28, ..) if random.random() => {
             let seed = random.random();
-            world.insert_resource(Wind { velocity: place * 10.0, seed, ..default() });
+            world.insert_resource(HairWind { velocity: place * 10.0, seed, ..default() });
             "wind".into()
         }
         (28, ..) => {
             world.insert_resource(HairBudget { milliseconds: wrong, ..default() });
             world.insert_resource(HairSubsteps::default());
-            world.insert_resource(ProcessTime(wrong));
+            world.insert_resource(HairProcessTime(wrong));
             format!("process time {wrong}")
         }
         (29, _, Some(strand), _) => {
             if let Some(mut changes) = world.get_mut::<BondChanges>(strand) {
-                let joint = [0, 3, 100, usize::MAX][random.random_range(0..4)];
+                let far = [0, 3, 100, 65_535, 100_000_000, usize::MAX];
+                let joint = far[random.random_range(0..far.len())];
                 changes.ask(joint, BondKind::Hydrogen, wrong);
             }
             format!("bonds by {wrong}")
         }
         (30, Some(hair), ..) => {
-            world.entity_mut(hair).insert((HairLod::default(), ScreenShare(0.01)));
+            world.entity_mut(hair).insert((HairLod::default(), HairScreenShare(0.01)));
             "far away".into()
         }
         (31, Some(hair), ..) => {
@@ -385,6 +501,72 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             world.entity_mut(hair).clone_and_spawn();
             "a head cloned".into()
         }
+        (37, Some(hair), ..) => {
+            let treat = [
+                HairTreatment::lotion,
+                HairTreatment::neutraliser,
+                HairTreatment::shampoo,
+                HairTreatment::set_everything,
+            ];
+            let from = random.random_range(0..12);
+            let joints = from..[from, from + 3, usize::MAX][random.random_range(0..3)];
+            let delay = *WRONG.choose(random).unwrap();
+            let treat = treat.choose(random).unwrap()(hair).joints(joints.clone());
+            world.write_message(treat.over(wrong).after(delay));
+            format!("treated at {joints:?} over {wrong} s after {delay} s")
+        }
+        (38, Some(hair), ..) => {
+            let request = [Hair::reset, Hair::restyle, Hair::teleport].choose(random).unwrap();
+            request(world.entity_mut(hair));
+            "reset, restyled or teleported".into()
+        }
+        (39, Some(hair), ..) => {
+            let other = *hairs.choose(random).unwrap();
+            match Hairdo::of(world, other) {
+                Ok(hairdo) => format!("a hairdo: {:?}", hairdo.apply(world, hair)),
+                Err(error) => format!("no hairdo: {error}"),
+            }
+        }
+        (40, Some(hair), ..) if strands.len() < 20 => {
+            let length = [1e-4, 2e-4, 5e-4][random.random_range(0..3)];
+            let points: Vec<Vec3> = (0..120).map(|i| Vec3::X * length * i as f32).collect();
+            world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+            format!("a strand of {length} m segments")
+        }
+        (41, Some(hair), ..) if hairs.len() > 1 => {
+            world.despawn(hair);
+            "a head gone".into()
+        }
+        (42, ..) if hairs.len() < 2 => {
+            let hair = world.spawn((Hair, Transform::from_translation(place))).id();
+            (0..4).for_each(|_| _ = world.spawn((StrandOf(hair), line(6))));
+            "a head".into()
+        }
+        (43, ..) => {
+            (0..2).for_each(|_| _ = world.spawn(Droplet::new(place, 0.8e-3).unwrap()));
+            "two drops that are too large for one".into()
+        }
+        (44, Some(hair), ..) => {
+            world.entity_mut(hair).despawn_related::<Strands>();
+            let segments = random.random_range(1..12);
+            (0..6).for_each(|_| _ = world.spawn((StrandOf(hair), line(segments))));
+            format!("another groom of {segments} segments")
+        }
+        (45, ..) => {
+            (0..40).for_each(|_| _ = world.spawn(Droplet::new(place, 1e-9).unwrap()));
+            "drops in one place".into()
+        }
+        (46, ..) => {
+            let substeps = random.random_range(0..13);
+            world.insert_resource(HairSubsteps::Fixed(substeps));
+            format!("{substeps} substeps")
+        }
+        (47, ..) => {
+            let mut showers = world.query::<&mut Shower>();
+            showers.iter_mut(world).for_each(|mut shower| shower.owed = wrong);
+            format!("showers that owe {wrong}")
+        }
+        (48, _, _, Some(entity)) => insert_any(world, entity, random),
         (_, _, _, Some(entity)) => write(world, entity, true, random),
         _ => "nothing".into(),
     }

@@ -36,7 +36,7 @@ pub fn app_with_meshes(fps: f64) -> App {
 
 fn ready(app: &mut App) {
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
-    app.init_resource::<Told>().add_systems(Last, listen);
+    app.init_resource::<Reported>().add_systems(Last, listen);
     app.finish();
     app.cleanup();
 }
@@ -91,15 +91,15 @@ pub fn no_gravity(app: &mut App) {
 }
 
 #[derive(Resource, Default)]
-struct Told(Vec<HairFault>);
+struct Reported(Vec<HairFault>);
 
-fn listen(mut messages: MessageReader<HairFault>, mut told: ResMut<Told>) {
-    told.0.extend(messages.read().cloned());
+fn listen(mut messages: MessageReader<HairFault>, mut reported: ResMut<Reported>) {
+    reported.0.extend(messages.read().cloned());
 }
 
-/// The faults that were told since the last call.
+/// The faults reported since the last call.
 pub fn faults(app: &mut App) -> Vec<HairFault> {
-    core::mem::take(&mut app.world_mut().resource_mut::<Told>().0)
+    core::mem::take(&mut app.world_mut().resource_mut::<Reported>().0)
 }
 
 /// Their kinds.

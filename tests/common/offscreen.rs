@@ -110,7 +110,7 @@ pub fn has_adapter() -> bool {
 
 impl Offscreen {
     /// `None`, with the reason printed, where nothing can draw. The tick stands still until
-    /// `ticking` is told.
+    /// `ticking` is set.
     pub fn new(width: u32, height: u32) -> Option<Self> {
         Self::with_plugins(width, height, HairPlugins::default().build())
     }

@@ -100,7 +100,7 @@ fn settings_apply_in_order_and_refuse_nonsense() {
         GroomSettings { limit: Some(0), ..default() },
         GroomSettings { nodes: Some(1), ..default() },
         GroomSettings { nodes: Some(usize::MAX), ..default() },
-        GroomSettings { merge: -1.0, ..default() },
+        GroomSettings { shortest_segment: -1.0, ..default() },
         GroomSettings { origin: Vec3::NAN, ..default() },
     ] {
         assert!(Groom::from_file(&file, &wrong).is_err(), "{wrong:?}");
@@ -216,7 +216,7 @@ fn a_patch_gives_no_head_and_no_head_is_wider_than_its_groom() {
 }
 
 #[test]
-fn an_odd_size_is_told_with_the_unit_that_fits() {
+fn an_odd_size_is_reported_with_the_unit_that_fits() {
     let head = scalp(300, Vec3::ZERO);
     assert_eq!(head.odd_size(1.0), None);
     for unit in [0.01f32, 0.0254, 0.001] {

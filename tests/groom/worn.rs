@@ -21,7 +21,7 @@ use bevy_keratin::{
 use std::{path::Path, time::Duration};
 
 #[derive(Resource, Default)]
-struct Told(Vec<HairFault>);
+struct Reported(Vec<HairFault>);
 
 /// An app whose assets are these files.
 fn app(files: &[(&str, Vec<u8>)]) -> App {
@@ -34,10 +34,13 @@ fn app(files: &[(&str, Vec<u8>)]) -> App {
     app.register_asset_source(AssetSourceId::Default, source)
         .add_plugins((MinimalPlugins, AssetPlugin::default(), HairPlugins::default()))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
-        .init_resource::<Told>()
-        .add_systems(Last, |mut faults: MessageReader<HairFault>, mut told: ResMut<Told>| {
-            told.0.extend(faults.read().cloned());
-        });
+        .init_resource::<Reported>()
+        .add_systems(
+            Last,
+            |mut faults: MessageReader<HairFault>, mut reported: ResMut<Reported>| {
+                reported.0.extend(faults.read().cloned());
+            },
+        );
     app.finish();
     app.cleanup();
     app
@@ -99,7 +102,7 @@ fn every_format_loads_as_an_asset() {
 }
 
 #[test]
-fn hair_grows_once_its_groom_is_there_and_anew_when_that_changes() {
+fn hair_grows_once_its_groom_is_loaded_and_again_when_that_changes() {
     let files =
         [("a.tfx", tfx(4.0, 30, 8, Arrays::ALL)), ("b.tfx", tfx(4.0, 12, 8, Arrays::default()))];
     let mut app = app(&files);
@@ -141,17 +144,17 @@ fn hair_grows_once_its_groom_is_there_and_anew_when_that_changes() {
     app.update();
     assert_eq!((strands(&app, hair), followers(&app, hair)), (1, 0));
     assert!(app.world().get::<Strand>(own).is_some());
-    assert!(app.world().resource::<Told>().0.is_empty());
+    assert!(app.world().resource::<Reported>().0.is_empty());
     app.world_mut().despawn(hair);
     app.update();
 }
 
 #[test]
-fn grooms_that_cannot_be_used_are_told_once() {
+fn grooms_that_cannot_be_used_are_reported_once() {
     let mut app = app(&[("broken.tfx", vec![0; 200])]);
     let broken = load(&app, "broken.tfx");
     app.world_mut().spawn(GroomedHair::new(broken));
-    until(&mut app, |app| !app.world().resource::<Told>().0.is_empty());
+    until(&mut app, |app| !app.world().resource::<Reported>().0.is_empty());
     let empty = app.world_mut().resource_mut::<Assets<Groom>>().add(Groom::default());
     app.world_mut().spawn(GroomedHair::new(empty));
     let one = Groom::from_polylines([[Vec3::ZERO, Vec3::Y]]).unwrap();
@@ -161,11 +164,14 @@ fn grooms_that_cannot_be_used_are_told_once() {
     for _ in 0..20 {
         app.update();
     }
-    let told = &app.world().resource::<Told>().0;
-    assert!(told[0].kind == FaultKind::Groom && told[0].message.contains("not loaded"), "{told:?}");
-    assert_eq!(told[1].cause(), Some(&GroomError::Empty));
-    assert!(told[2].to_string().contains("GroomGuides::nodes is 1"), "{}", told[2]);
-    assert_eq!(told.len(), 3, "{told:?}");
+    let reported = &app.world().resource::<Reported>().0;
+    assert!(
+        reported[0].kind == FaultKind::Groom && reported[0].message.contains("not loaded"),
+        "{reported:?}"
+    );
+    assert_eq!(reported[1].cause(), Some(&GroomError::Empty));
+    assert!(reported[2].to_string().contains("GroomGuides::nodes is 1"), "{}", reported[2]);
+    assert_eq!(reported.len(), 3, "{reported:?}");
 }
 
 #[test]

@@ -5,8 +5,10 @@ use super::{
     head::{HEAD, carried, fewer, head, is_follower, turn},
     zoom,
 };
-use bevy::prelude::*;
-use bevy_keratin::{FaultKind, LodLevel, PresentLod, Sleepers, prelude::*, strand::TickPose};
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
+use bevy_keratin::{
+    FaultKind, LodLevel, PresentLod, Sleepers, lod::Follower, prelude::*, strand::TickPose,
+};
 
 fn simulated(app: &App, ids: &[Entity]) -> Vec<Entity> {
     ids.iter().copied().filter(|e| !is_follower(app, *e)).collect()
@@ -42,7 +44,7 @@ fn the_share_that_is_simulated_is_spread_evenly_and_finer_levels_hold_coarser_on
         app.update();
         let now = simulated(&app, &ids);
         assert_eq!(now.len(), count);
-        assert_eq!(app.world().get::<PresentLod>(hair).unwrap().carried, 400 - count);
+        assert_eq!(app.world().get::<PresentLod>(hair).unwrap().followers, 400 - count);
         assert!(now.iter().all(|e| before.contains(e)), "nested");
         // Each stands for an area of the half sphere; none is farther from one than a few radii.
         let area = core::f32::consts::TAU * HEAD * HEAD / count as f32;
@@ -160,7 +162,7 @@ fn roots_stay_and_hair_goes_along_when_it_is_put_elsewhere() {
         let apart = now.iter().zip(before).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
         assert!(apart < 5e-3, "{apart} m");
     }
-    // Back into shape: everybody, also who is carried.
+    // All strands are reset, followers as well.
     app.world_mut().commands().entity(hair).queue(Hair::reset);
     app.insert_resource(HairGravity(Vec3::ZERO));
     run(&mut app, 0.5);
@@ -173,7 +175,7 @@ fn roots_stay_and_hair_goes_along_when_it_is_put_elsewhere() {
 }
 
 #[test]
-fn guides_that_sleep_let_who_hangs_on_them_sleep_and_wake_it() {
+fn followers_sleep_and_wake_with_their_guides() {
     let mut app = test_app(60.0);
     let (hair, ids) = head(&mut app, 60, 9, 0.24);
     put(&mut app, hair, fewer(0.25), 0.1);
@@ -201,7 +203,7 @@ fn guides_that_sleep_let_who_hangs_on_them_sleep_and_wake_it() {
 }
 
 #[test]
-fn who_is_held_is_simulated_and_nobody_hangs_on_it() {
+fn a_held_strand_is_simulated_and_is_no_guide() {
     let (mut app, hair, ids) = group();
     run(&mut app, 1.0);
     let (guide, other) = (simulated(&app, &ids)[3], carried(&app, &ids)[7]);
@@ -254,14 +256,15 @@ fn strands_may_come_go_and_change_their_hair_at_a_level() {
     assert!(!is_follower(&app, none));
     assert!([come, broken].iter().all(|e| strand(&app, *e).is_finite()));
     assert_eq!(simulated(&app, &ids).len() + simulated(&app, &[come, broken]).len(), 14);
-    // A guide that is not finite is put back; nobody follows it into nowhere.
+    // A non-finite guide is reset; no strand follows it meanwhile.
     let guide = simulated(&app, &ids)[0];
     app.world_mut().get_mut::<Strand>(guide).unwrap().positions_mut()[3] = Vec3::NAN;
     run(&mut app, 0.2);
     assert!(ids.iter().all(|e| strand(&app, *e).is_finite()));
-    let told = faults(&mut app);
+    let reported = faults(&mut app);
     assert!(
-        told.iter()
+        reported
+            .iter()
             .all(|f| matches!(f.kind, FaultKind::Strand | FaultKind::PutBack | FaultKind::Rebuilt))
     );
     // One goes over to other hair, which has no levels; one to none.
@@ -315,6 +318,45 @@ fn hair_that_sleeps_sleeps_on_when_fewer_strands_are_simulated_and_when_all_are_
             assert_eq!((carried(&app, &ids).len(), asleep(&app)), (count, 60));
         }
     }
+}
+
+#[test]
+fn what_is_spoiled_while_disabled_is_repaired_once_enabled() {
+    for share in [0.0, 0.25] {
+        let mut app = test_app(60.0);
+        let (hair, ids) = head(&mut app, 60, 9, 0.24);
+        put(&mut app, hair, fewer(share), 0.1);
+        run(&mut app, 0.5);
+        let followers = carried(&app, &ids);
+        app.world_mut().entity_mut(followers[3]).insert(Disabled);
+        app.world_mut().get_mut::<Strand>(followers[3]).unwrap().positions_mut()[0].y =
+            f32::INFINITY;
+        run(&mut app, 0.5);
+        app.world_mut().entity_mut(followers[3]).remove::<Disabled>();
+        run(&mut app, 0.1);
+        let repaired = strand(&app, followers[3]);
+        assert!(repaired.is_finite(), "{share}: {:?}", repaired.positions());
+    }
+}
+
+#[test]
+fn a_follower_that_forgets_its_guides_gets_some_again() {
+    let mut app = test_app(60.0);
+    let (hair, ids) = head(&mut app, 60, 9, 0.24);
+    put(&mut app, hair, fewer(0.25), 0.1);
+    run(&mut app, 0.2);
+    let lost = carried(&app, &ids)[3];
+    app.world_mut().entity_mut(lost).remove::<Follower>();
+    assert!(!is_follower(&app, lost));
+    run(&mut app, 0.1);
+    assert!(is_follower(&app, lost));
+    // Where no levels are any more, it is simulated.
+    app.world_mut().entity_mut(lost).remove::<Follower>();
+    app.world_mut().entity_mut(hair).remove::<HairLod>();
+    let before = strand(&app, lost).positions()[8];
+    turn(&mut app, hair, 0.5);
+    run(&mut app, 0.2);
+    assert!(strand(&app, lost).positions()[8].distance(before) > 1e-3);
 }
 
 #[test]

@@ -58,7 +58,7 @@ fn heads(strands: f32, bending_length: Option<f32>) -> [(App, Entity, Vec<Entity
         let mut app = test_app(60.0);
         app.insert_resource(HairDefault(HairSleep::never()));
         if let Some(length) = bending_length {
-            app.insert_resource(HairDefault(Stiffness::from_bending_length(length).unwrap()));
+            app.insert_resource(HairDefault(HairStiffness::from_bending_length(length).unwrap()));
         }
         let (hair, ids) = head(&mut app, 400, 9, 0.24);
         app.world_mut().entity_mut(hair).insert(fewer(strands));
@@ -172,5 +172,5 @@ fn strands_that_are_carried_cost_little() {
         );
         assert!(best[1] < if strength > 0.0 { 0.75 } else { 0.9 } * best[0], "{best:?}");
     }
-    assert_eq!(app.world().get::<PresentLod>(hair).unwrap().carried, 1500);
+    assert_eq!(app.world().get::<PresentLod>(hair).unwrap().followers, 1500);
 }

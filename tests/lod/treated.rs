@@ -33,10 +33,10 @@ fn shape(app: &App, entity: Entity) -> Vec<Vec3> {
 #[test]
 fn a_style_put_on_from_afar_is_there_from_near() {
     let (mut app, hair, ids) = row();
-    app.world_mut().write_message(Treat::wet(hair));
+    app.world_mut().write_message(HairTreatment::wet(hair));
     run(&mut app, 3.0);
     let hung: Vec<_> = ids.iter().map(|e| (*e, shape(&app, *e))).collect();
-    app.world_mut().write_message(Treat::dry(hair));
+    app.world_mut().write_message(HairTreatment::dry(hair));
     run(&mut app, 0.1);
     no_gravity(&mut app);
     zoom(&mut app, hair, 1.0);
@@ -52,13 +52,13 @@ fn a_style_put_on_from_afar_is_there_from_near() {
 }
 
 #[test]
-fn wind_dries_and_water_wets_who_is_carried() {
+fn wind_dries_and_water_wets_followers() {
     let (mut app, hair, ids) = row();
     let rate = |app: &App, e: Entity| {
         let bonds = app.world().get::<Bonds>(e).unwrap();
         bonds.rates(BondKind::Hydrogen).sum::<f32>() / 8.0
     };
-    app.world_mut().write_message(Treat::wet(hair));
+    app.world_mut().write_message(HairTreatment::wet(hair));
     run(&mut app, 1.0);
     assert!(ids.iter().all(|e| rate(&app, *e) == 0.0));
     let blower = Blower { strength: 20.0, ..default() };
@@ -69,7 +69,7 @@ fn wind_dries_and_water_wets_who_is_carried() {
     println!("dried by wind: {dried:?}");
     assert!(dried.iter().all(|r| *r > 0.2), "{dried:?}");
     app.world_mut().despawn(blower);
-    app.world_mut().write_message(Treat::dry(hair));
+    app.world_mut().write_message(HairTreatment::dry(hair));
     run(&mut app, 0.5);
     app.world_mut().write_message(SoakHair { target: hair, wetness: 1.0 });
     run(&mut app, 8.0);

@@ -7,21 +7,22 @@ use core::f32::consts::TAU;
 
 #[test]
 fn hair_that_is_shaken_hard_keeps_its_length() {
-    let mut lab = Lab::usual();
-    let strand = lab.straight(0.13, 0.30, 64, Vec3::NEG_Y);
-    let hair = lab.hair(0.13);
-    lab.drag(2.0);
-    lab.run(1.0);
-    let mut peak = 0.0_f64;
-    for frame in 1..=300 {
-        let x = 0.1 * (TAU * 3.0 * frame as f32 / 60.0).sin();
-        lab.app.world_mut().get_mut::<Transform>(hair).unwrap().translation.x = x;
-        let strain: Probe = Box::new(|s| s.peak_strain().into());
-        let strains = lab.record(1.0 / 60.0, vec![(strand, strain)]);
-        peak = strains[0].iter().copied().fold(peak, f64::max);
+    for (substep, mut lab) in Lab::both() {
+        let strand = lab.straight(0.13, 0.30, 64, Vec3::NEG_Y);
+        let hair = lab.hair(0.13);
+        lab.drag(2.0);
+        lab.run(1.0);
+        let mut peak = 0.0_f64;
+        for frame in 1..=300 {
+            let x = 0.1 * (TAU * 3.0 * frame as f32 / 60.0).sin();
+            lab.app.world_mut().get_mut::<Transform>(hair).unwrap().translation.x = x;
+            let strain: Probe = Box::new(|s| s.peak_strain().into());
+            let strains = lab.record(1.0 / 60.0, vec![(strand, strain)]);
+            peak = strains[0].iter().copied().fold(peak, f64::max);
+        }
+        println!("{substep}: peak strain {:.3} %", 100.0 * peak);
+        assert!(peak <= 0.015, "{substep}: peak strain {peak}");
     }
-    println!("peak strain {:.3} %", 100.0 * peak);
-    assert!(peak <= 0.015, "peak strain {peak}");
 }
 
 /// A head that turns about the vertical: its hair in the head's frame, and the same hair in the
@@ -50,14 +51,20 @@ fn lead(step: Res<HairStep>, turning: Res<Turning>, mut strands: Query<&mut Held
 
 #[test]
 fn on_a_turning_head_hair_moves_as_in_the_worlds_frame() {
-    let mut lab = Lab::usual();
+    // Whipped round, hair amplifies rounding: 2.8 mm were measured, and more than 5 with 64 segments at 1/180 s.
+    for ((substep, lab), most) in Lab::both().into_iter().zip([3e-3, 1e-2]) {
+        turn_by(substep, lab, most);
+    }
+}
+
+fn turn_by(substep: &str, mut lab: Lab, most: f32) {
     // A root that is led does not turn about itself, as one on the head does; internal friction feels it.
     lab.undamped();
-    let stiffness = Stiffness { bending_length: 0.13, damping: 0.0 };
+    let stiffness = HairStiffness { bending_length: 0.13, damping: 0.0 };
     let head = lab.app.world_mut().spawn((Hair, stiffness)).id();
     let mut pairs = Vec::new();
     let mut led = Vec::new();
-    for n in [8, 16, 32] {
+    for n in SEGMENTS {
         for (root, direction) in [
             (Vec3::X * 0.09, Vec3::X),
             (Vec3::X * 0.09, Vec3::NEG_Y),
@@ -94,26 +101,36 @@ fn on_a_turning_head_hair_moves_as_in_the_worlds_frame() {
             let nodes = lab.get(*on_head).positions().iter().zip(lab.get(*world).positions());
             let off = nodes.map(|(a, b)| (turn * *a).distance(*b)).fold(0.0, f32::max);
             worst = worst.max(off);
-            assert!(off < 3e-3, "frame {frame}, {n} segments along {direction}: {off} m apart");
+            assert!(
+                off < most,
+                "{substep}, frame {frame}, {n} segments along {direction}: {off} m apart"
+            );
         }
     }
-    println!("worst {:.4} mm", 1e3 * worst);
+    println!("{substep}: {:.4} mm apart at most", 1e3 * worst);
     let flown = lab.tip(pairs[0].2).distance(Vec3::new(0.33, 0.0, 0.0));
     assert!(flown > 0.02, "the head did turn its hair");
 }
 
 #[test]
 fn nothing_explodes() {
-    abuse(&[0.0, 1e-3, 0.06, 0.13]);
+    abuse("1/360 s", Lab::usual(), &[0.0, 1e-3, 0.06, 0.13]);
+}
+
+#[test]
+fn nothing_explodes_in_games() {
+    abuse("1/180 s", Lab::in_games(), &[0.0, 0.13, f32::INFINITY]);
 }
 
 #[test]
 fn nothing_explodes_that_is_endlessly_stiff() {
-    abuse(&[100.0, f32::INFINITY]);
+    abuse("1/360 s", Lab::usual(), &[100.0, f32::INFINITY]);
 }
 
-fn abuse(bending_lengths: &[f32]) {
-    let mut lab = Lab::usual();
+/// Length of the hair that is abused (m).
+const ABUSED: f32 = 0.24;
+
+fn abuse(substep: &str, mut lab: Lab, bending_lengths: &[f32]) {
     lab.app.insert_resource(HairDefault(HairInertia {
         teleport_distance: f32::INFINITY,
         ..default()
@@ -122,16 +139,21 @@ fn abuse(bending_lengths: &[f32]) {
     let mut strands = Vec::new();
     for &bending in bending_lengths {
         for n in SEGMENTS {
-            strands.push((bending, n, lab.straight(bending, 0.24, n, Vec3::X)));
+            strands.push((bending, n, lab.straight(bending, ABUSED, n, Vec3::X)));
         }
     }
     let hairs: Vec<Entity> = bending_lengths.iter().map(|b| lab.hair(*b)).collect();
-    let check = |lab: &Lab, what: &str| {
+    let mut farthest = 0.0_f32;
+    let mut check = |lab: &Lab, what: &str| {
         for (bending, n, strand) in &strands {
             let strand = lab.get(*strand);
             assert!(strand.is_finite(), "{what}, L_g {bending}, {n} segments");
             let reach = strand.positions().iter().map(|p| p.length()).fold(0.0, f32::max);
-            assert!(reach < 1.0, "{what}, L_g {bending}, {n} segments: {reach} m from the root");
+            farthest = farthest.max(reach);
+            assert!(
+                reach < 1.01 * ABUSED,
+                "{substep}, {what}, L_g {bending}, {n} segments: {reach} m from the root"
+            );
         }
     };
     // Roots at 100 m/s, to and fro.
@@ -155,6 +177,7 @@ fn abuse(bending_lengths: &[f32]) {
     lab.gravity(Vec3::NEG_Y * 9.8);
     lab.settle(4.0);
     check(&lab, "afterwards");
+    println!("{substep}, L_g {bending_lengths:?}: {farthest:.4} m from the root at most");
     for (bending, n, strand) in &strands {
         let strain = lab.get(*strand).peak_strain();
         assert!(strain < 0.01, "L_g {bending}, {n} segments: strain {strain} afterwards");

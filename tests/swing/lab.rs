@@ -3,7 +3,7 @@
 //! All settings that the tests need are made here.
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::prelude::*;
+use bevy_keratin::{HairStep, prelude::*};
 use core::time::Duration;
 use std::collections::HashMap;
 
@@ -17,14 +17,20 @@ pub struct Lab {
     damping: f32,
     /// Length of a substep (s).
     pub substep: f64,
+    together: u32,
 }
 
 #[derive(Resource, Default)]
 struct Recording {
     probes: Vec<(Entity, Probe, Vec<f64>)>,
+    /// How many substeps the hair takes as one.
+    together: u32,
 }
 
-fn record(mut recording: ResMut<Recording>, strands: Query<&Strand>) {
+fn record(step: Res<HairStep>, mut recording: ResMut<Recording>, strands: Query<&Strand>) {
+    if !(step.index + 1).is_multiple_of(recording.together) {
+        return;
+    }
     for (entity, probe, values) in &mut recording.probes {
         values.push(probe(strands.get(*entity).unwrap()));
     }
@@ -51,8 +57,9 @@ impl Lab {
         let mut lab = Self {
             app,
             hairs: HashMap::new(),
-            damping: Stiffness::default().damping,
+            damping: HairStiffness::default().damping,
             substep: 1.0 / (hertz * f64::from(substeps)),
+            together: 1,
         };
         lab.drag(0.0);
         lab
@@ -67,8 +74,15 @@ impl Lab {
     pub fn in_games() -> Self {
         let mut lab = Self::usual();
         lab.app.insert_resource(HairDefault(HairSolver::default()));
-        lab.substep = f64::from(HairSolver::default().substep);
+        lab.together = 2;
+        lab.substep *= 2.0;
+        assert!((lab.substep / f64::from(HairSolver::default().substep) - 1.0).abs() < 1e-6);
         lab
+    }
+
+    /// At the papers' substep, and at that of games.
+    pub fn both() -> [(&'static str, Self); 2] {
+        [("1/360 s", Self::usual()), ("1/180 s", Self::in_games())]
     }
 
     pub fn drag(&mut self, rate: f32) {
@@ -88,7 +102,7 @@ impl Lab {
     pub fn hair(&mut self, bending_length: f32) -> Entity {
         let world = self.app.world_mut();
         *self.hairs.entry(bending_length.to_bits()).or_insert_with(|| {
-            let stiffness = Stiffness { bending_length, damping: self.damping };
+            let stiffness = HairStiffness { bending_length, damping: self.damping };
             world.spawn((Hair, stiffness)).id()
         })
     }
@@ -146,7 +160,7 @@ impl Lab {
             (entity, probe, vec![now])
         };
         let probes = probes.into_iter().map(begin).collect();
-        self.app.insert_resource(Recording { probes });
+        self.app.insert_resource(Recording { probes, together: self.together });
         self.run(seconds);
         let recorded =
             core::mem::take(&mut self.app.world_mut().resource_mut::<Recording>().probes);

@@ -7,6 +7,12 @@ use bevy_keratin::prelude::*;
 const SEGMENTS: [usize; 3] = [8, 16, 64];
 const LENGTH: f32 = 0.3;
 
+/// How far an edge of the strand is off its length at most (m).
+fn off_length(strand: &Strand) -> f64 {
+    let pairs = strand.positions().windows(2).zip(strand.rest_lengths());
+    pairs.map(|(p, l)| f64::from((p[0].distance(p[1]) - l).abs())).fold(0.0, f64::max)
+}
+
 /// Deepest node in a collider (m), and largest strain.
 fn worst(lab: &Lab, strands: &[Entity], depth: impl Fn(Vec3) -> f32) -> (f32, f32) {
     let of = |s: &Entity| {
@@ -17,44 +23,41 @@ fn worst(lab: &Lab, strands: &[Entity], depth: impl Fn(Vec3) -> f32) -> (f32, f3
     strands.iter().map(of).fold((f32::MIN, 0.0), |a, b| (a.0.max(b.0), a.1.max(b.1)))
 }
 
-/// The papers' substeps, and those of games.
-fn labs() -> [(&'static str, Lab); 2] {
-    [("1/360 s", Lab::usual()), ("1/180 s", Lab::in_games())]
-}
-
-/// Moves a collider, which may strain hair by no more than `most` at either substep, as `path` says for `seconds`, then
-/// leaves it there for three more.
+/// Moves a collider, which may put edges off their lengths by no more than `most` (m) in any substep, as
+/// `path` says for `seconds`, then leaves it there for three more.
 fn lead(
-    (name, most): (&str, [f32; 2]),
+    (name, most): (&str, f64),
     collider: HairCollider,
     seconds: f32,
     path: impl Fn(f32) -> Transform,
     depth: impl Fn(Vec3, Transform) -> f32,
 ) {
-    for ((substep, mut lab), most) in labs().into_iter().zip(most) {
+    for (substep, mut lab) in Lab::both() {
         lab.drag(2.0);
         let strands = SEGMENTS.map(|n| lab.straight(0.13, LENGTH, n, Vec3::NEG_Y));
-        let entity = lab.app.world_mut().spawn((collider, path(0.0))).id();
+        let entity = lab.app.world_mut().spawn((collider.clone(), path(0.0))).id();
         lab.run(0.5);
-        let (mut deepest, mut peak) = (f32::MIN, 0.0_f32);
+        let (mut deepest, mut peak, mut off) = (f32::MIN, 0.0_f32, 0.0_f64);
         for frame in 1..=(seconds * 60.0) as usize {
             let place = path((frame as f32 / 60.0).min(seconds));
             *lab.app.world_mut().get_mut::<Transform>(entity).unwrap() = place;
-            lab.run(1.0 / 60.0);
+            let probes = strands.map(|s| (s, Box::new(off_length) as Probe));
+            let offs = lab.record(1.0 / 60.0, probes.into());
+            off = offs.into_iter().flatten().fold(off, f64::max);
             let now = worst(&lab, &strands, |p| depth(p, place));
             (deepest, peak) = (deepest.max(now.0), peak.max(now.1));
         }
         lab.run(3.0);
         let (late_depth, late) = worst(&lab, &strands, |p| depth(p, path(seconds)));
         println!(
-            "{name} at {substep}: deepest {deepest:.2e} m, peak strain {peak:.4}; late \
-             {late_depth:.2e} m, {late:.5}"
+            "{name} at {substep}: deepest {deepest:.2e} m, edges off by {off:.2e} m, at ends of ticks \
+             strained by {peak:.4}; late {late_depth:.2e} m, {late:.5}"
         );
         // Nodes keep a lock's radius away.
         let inside = deepest.max(late_depth) + LockContact::default().radius;
         assert!(inside < 1e-5, "{name}: {deepest} m inside, late {late_depth}");
         assert!(late < 5e-4, "{name}: strain {late} late");
-        assert!(peak < most, "{name}: peak strain {peak}");
+        assert!(off < most, "{name} at {substep}: an edge is off by {off} m");
     }
 }
 
@@ -62,7 +65,7 @@ fn lead(
 fn a_comb_goes_through_hair() {
     let radius = 0.005;
     lead(
-        ("comb", [5e-3; 2]),
+        ("comb", 2e-4),
         HairCollider::capsule(radius, 0.3).unwrap(),
         1.0,
         |t| {
@@ -76,7 +79,9 @@ fn a_comb_goes_through_hair() {
 #[test]
 fn hair_falls_end_on_onto_a_floor_that_rises() {
     lead(
-        ("floor", [0.08, 0.25]),
+        // Straight hair that is met end-on is pressed for a substep or two until it gives way sideways: its
+        // last edge is shorter by what the floor has come meanwhile, however long that edge is.
+        ("floor", 2.2e-3),
         HairCollider::plane(Dir3::Y),
         1.0,
         |t| Transform::from_xyz(0.0, -0.32 + 0.2 * t, 0.0),
@@ -87,7 +92,7 @@ fn hair_falls_end_on_onto_a_floor_that_rises() {
 #[test]
 fn a_ball_swings_into_hair() {
     lead(
-        ("ball", [5e-3; 2]),
+        ("ball", 2e-4),
         HairCollider::sphere(0.06).unwrap(),
         1.0,
         |t| Transform::from_xyz(0.3 * (3.0 * t).cos(), -0.15, 0.01),
@@ -97,12 +102,12 @@ fn a_ball_swings_into_hair() {
 
 #[test]
 fn hair_is_wound_under_tension_and_gives_way_when_its_rod_is_taken_too_far() {
-    // Hair that buckles as its rod comes and is then drawn taut cracks like a whip; the finest cannot be
-    // followed in the longer step.
-    for ((substep, mut lab), most) in labs().into_iter().zip([0.05, 1.5]) {
+    for (substep, mut lab) in Lab::both() {
         lab.drag(2.0);
         let strands = SEGMENTS.map(|n| lab.straight(0.13, LENGTH, n, Vec3::NEG_Y));
-        // Out of reach of the quarter of the hair that is not to be wound.
+        // Out of reach of the quarter of the hair that is not to be wound: the coil closes as near to the
+        // rod as the hair comes, beside it and partly in it. How deep is told, not bound; coils in reach
+        // are never in their rods (unit tests of `winding`).
         let rod = lab.app.world_mut();
         let rod = rod.spawn((
             PermRod::new(0.01, 0.1).unwrap(),
@@ -110,42 +115,53 @@ fn hair_is_wound_under_tension_and_gives_way_when_its_rod_is_taken_too_far() {
         ));
         let rod = rod.id();
         for (strand, n) in strands.iter().zip(SEGMENTS) {
-            let winding = Winding { from_node: n / 4, seconds: 1.0, ..default() };
+            let winding = PermWinding { from_node: n / 4, seconds: 1.0, ..default() };
             lab.app.world_mut().entity_mut(*strand).insert((WoundOn(rod), winding));
         }
-        let (mut peak, mut told) = (0.0_f32, Vec::new());
+        let (mut peak, mut reported) = (0.0_f32, Vec::new());
+        let mut deepest = f32::MIN;
         let mut go_on = |lab: &mut Lab, seconds: f32, by: f32| {
             for _ in 0..(seconds * 60.0) as usize {
                 lab.app.world_mut().get_mut::<Transform>(rod).unwrap().translation.x += by / 60.0;
                 lab.run(1.0 / 60.0);
                 peak = peak.max(worst(lab, &strands, |_| 0.0).1);
-                told.extend(faults(lab));
+                reported.extend(faults(lab));
+                let place = *lab.app.world().get::<Transform>(rod).unwrap();
+                let axis = place.rotation * Vec3::Y;
+                let depth = |p: &Vec3| {
+                    0.01 - (*p - place.translation).reject_from_normalized(axis).length()
+                };
+                for (strand, n) in strands.iter().zip(SEGMENTS) {
+                    let wound = &lab.get(*strand).positions()[n / 4..];
+                    deepest = wound.iter().map(depth).fold(deepest, f32::max);
+                }
             }
-            (worst(lab, &strands, |_| 0.0).1, peak, told.clone())
+            (worst(lab, &strands, |_| 0.0).1, peak, reported.clone(), deepest)
         };
-        let (late, wound, told) = go_on(&mut lab, 4.0, 0.0);
-        assert_eq!(told, [], "what the winding does by itself is within reach");
+        let (late, wound, reported, deepest) = go_on(&mut lab, 4.0, 0.0);
+        assert_eq!(reported, [], "what the winding does by itself is within reach");
         go_on(&mut lab, 1.0, 0.5);
-        let (late_away, away, told) = go_on(&mut lab, 3.0, 0.0);
+        let (late_away, away, reported, _) = go_on(&mut lab, 3.0, 0.0);
         println!(
             "winding at {substep}: peak strain {wound:.5}, late {late:.5}; half a metre away \
-             {away:.5}, late {late_away:.5}"
+             {away:.5}, late {late_away:.5}; {deepest:.2e} m in the rod"
         );
-        assert!(late < 5e-3 && late_away < 5e-3, "strain {late}, {late_away} late");
-        assert!(away < most, "peak strain {away}");
-        assert_eq!(told, strands, "each strand's reach is told once");
+        // What a rod far out of reach draws tight keeps up to 0.75 %.
+        assert!(late < 5e-3 && late_away < 1e-2, "strain {late}, {late_away} late");
+        assert!(wound < 5e-3 && away < 1.5e-2, "peak strain {wound}, {away}");
+        assert_eq!(reported, strands, "each strand's reach is reported once");
     }
 }
 
-/// The strands of which something was told.
+/// The strands with reported faults.
 fn faults(lab: &mut Lab) -> Vec<Entity> {
-    let mut told = lab.app.world_mut().resource_mut::<Messages<HairFault>>();
-    told.drain().inspect(|fault| println!("{fault}")).filter_map(|fault| fault.entity).collect()
+    let mut reported = lab.app.world_mut().resource_mut::<Messages<HairFault>>();
+    reported.drain().inspect(|fault| println!("{fault}")).filter_map(|fault| fault.entity).collect()
 }
 
 #[test]
 fn strands_that_push_each_other_keep_their_length() {
-    for (substep, mut lab) in labs() {
+    for (substep, mut lab) in Lab::both() {
         lab.app.insert_resource(HairDefault(LockContact::default()));
         lab.drag(2.0);
         // Three rows that fall through one another: crosswise, end-on and side by side.

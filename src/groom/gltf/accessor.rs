@@ -7,7 +7,7 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use bevy::platform::collections::HashMap;
 use std::borrow::Cow;
 
-/// How buffers begin that are in the JSON themselves.
+/// Prefix of the URI of embedded buffers.
 pub const DATA: &str = "data:";
 const EXPORT_AGAIN: &str = "export the file again";
 
@@ -144,7 +144,7 @@ impl Elements<'_> {
         (0..self.count).map(|i| &self.data[i * self.stride..i * self.stride + self.size])
     }
 
-    /// Its elements as groups of N numbers: those that they lack are 1.
+    /// Its elements as groups of N numbers; missing ones are 1.
     pub fn vectors<const N: usize>(&self) -> Result<Vectors<'_, N>, GroomFileError> {
         let has = self.size / self.component.size();
         // Colours come with alpha or without.

@@ -1,4 +1,4 @@
-//! Strands out of loose lines: which segments follow each other.
+//! Joins loose segments to strands.
 
 /// Chains of nodes, root first.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -65,7 +65,7 @@ impl Chains {
         };
         let count = edges.count();
         chains.branches = (0..count).filter(|v| edges.degree(*v) > 2).count();
-        // From ends first, then from what has none: branches, and at last loops.
+        // From ends first, then from branches, and finally loops.
         let begins: [fn(usize) -> bool; 3] = [|d| d == 1, |d| d > 2, |d| d == 2];
         let mut open = Vec::new();
         for begins in begins {
@@ -158,7 +158,7 @@ impl Edges {
         self.first[v + 1] - self.first[v]
     }
 
-    /// A neighbour by an edge that has not been used; it is then.
+    /// A neighbour by an unused edge, which is marked as used.
     fn take(&mut self, v: usize) -> Option<usize> {
         while self.next[v] < self.first[v + 1] {
             let (other, edge) = self.neighbours[self.next[v]];

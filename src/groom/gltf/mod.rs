@@ -137,7 +137,7 @@ fn local(node: &Node) -> Mat4 {
         Some(matrix) => Mat4::from_cols_array(matrix),
         None => Mat4::from_scale_rotation_translation(
             node.scale.map_or(Vec3::ONE, Vec3::from),
-            // Without requiring unit length here: what is not finite shows in the places.
+            // Unit length is not required here; non-finite values show in the positions.
             node.rotation.as_ref().map_or(Quat::IDENTITY, |q| Quat::from_array(q.0)),
             node.translation.map_or(Vec3::ZERO, Vec3::from),
         ),
@@ -191,7 +191,7 @@ impl Reading<'_> {
         let indices =
             primitive.indices.as_ref().map(|i| buffers.elements(accessor(i))).transpose()?;
         let order_count = indices.as_ref().map_or(count, |i| i.count());
-        // Before anything is allocated for them. No mode makes more nodes than it has indices.
+        // Checked before allocation. No mode makes more nodes than it has indices.
         if self.groom.points.len().saturating_add(order_count) > self.limit {
             let expected = "copies that the file's size justifies";
             let found = "many more nodes than the file has bytes";

@@ -1,4 +1,4 @@
-//! Frames of edges: carried along, bent against each other, turned.
+//! Frames of edges: parallel transport, bending moments, rotation vectors.
 
 use super::width::Width;
 use crate::{
@@ -9,7 +9,11 @@ use crate::{
 /// Turns `q` the shortest way so that its tangent is along `e`, of length `len`. Returns twice the
 /// vector part of the turn: the turn itself where it is small.
 #[inline(always)]
-pub(super) fn carry<R: Real>(q: Quaternion<R>, e: V3<R>, len: R) -> (Quaternion<R>, V3<R>) {
+pub(super) fn parallel_transport<R: Real>(
+    q: Quaternion<R>,
+    e: V3<R>,
+    len: R,
+) -> (Quaternion<R>, V3<R>) {
     let d = q.tangent();
     let along = d.dot(e);
     let cosine = len + along;
@@ -65,7 +69,7 @@ pub(super) fn first_axis<R: Real>(q: Quaternion<R>) -> V3<R> {
 }
 
 /// How far the edge between two nodes has turned from where the substep began until it points along `t`,
-/// as [`carry`] says it.
+/// as [`parallel_transport`] says it.
 #[inline(always)]
 pub(super) fn turned_since<W: Width>(
     w: W,

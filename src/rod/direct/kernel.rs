@@ -6,9 +6,9 @@
 //! is that of ½K|δφ_j − δφ_{j−1}|².
 
 use super::{
-    frames::{carry, choose, moment, turned_since},
+    frames::{choose, moment, parallel_transport, turned_since},
     matrix::{Matrix, Pivot, Symmetric},
-    row::Row,
+    row::DirectRow,
     width::Width,
 };
 use crate::{
@@ -19,22 +19,22 @@ use crate::{
     },
 };
 
-/// What is the same for all nodes of a strand.
+/// Values that are the same for all nodes of a strand.
 #[derive(Clone, Copy)]
-pub(crate) struct Stage<R> {
+pub(crate) struct NewtonStage<R> {
     /// Where in the substep the forces are taken.
     pub theta: R,
     /// θ dt (s).
     pub ahead: R,
-    /// How much farther nodes go than is solved for: 1/θ.
+    /// Factor from the solution at θ to the end of the substep: 1/θ.
     pub beyond: R,
-    /// How far the scalp's frame turns until there.
+    /// Rotation of the scalp's frame up to θ.
     pub root_turn: V3<R>,
     /// Gravity (m/s²).
     pub gravity: V3<R>,
     /// Kelvin–Voigt time (s), less what the step itself damps.
     pub damping: R,
-    /// Whether this is the second Newton step, so that frames have left where they began.
+    /// Whether this is the second Newton step, where frames differ from the start of the substep.
     pub second: bool,
     /// 1 in lanes that take this Newton step, 0 in lanes that are done. Where nothing touches, all do.
     pub again: R,
@@ -42,44 +42,46 @@ pub(crate) struct Stage<R> {
     pub twice: R,
 }
 
-/// How firmly a node that rests on an obstacle is held out of it, in shares of its inertia. Without
-/// end it would make fine strands jump off; loosely held they are pushed out after the solve, which
-/// bends them.
+/// Stiffness with which an obstacle holds a resting node, as a multiple of the node's inertia. Much
+/// stiffer makes fine strands jump off; softer leaves the push-out to the contact pass, which bends
+/// them.
 pub(crate) const HOLD: f64 = 100.0;
 
-/// An edge as the way down carries it.
+/// State of an edge in the elimination pass.
 #[derive(Clone, Copy)]
-struct Carried<R> {
+struct EdgeState<R> {
     q: Quaternion<R>,
     t: V3<R>,
     /// 1/|e|.
     r: R,
     /// How far it has turned since the substep began, twist and all.
     turn: V3<R>,
+    /// The same without twist: across itself.
+    swing: V3<R>,
     /// What holds its ends where they are across it, but for the joint at its end.
     across: R,
     axial: R,
-    /// The gradient of the energy by its vector.
+    /// Gradient of the energy with respect to its vector.
     pull: V3<R>,
-    /// The coupling with the edge before.
+    /// Coupling with the previous edge.
     coupling: Matrix<R>,
 }
 
-/// What the elimination has left for the nodes that come.
+/// What the elimination passes on to the next nodes.
 #[derive(Clone, Copy)]
-struct Left<R> {
-    /// Off the diagonal of the next node, and of the one after.
+struct FillIn<R> {
+    /// Subtracted from the diagonal of the next node, and of the one after.
     next: Symmetric<R>,
     after: Symmetric<R>,
-    /// Off the block between the two.
+    /// Subtracted from the block between the two.
     between: Matrix<R>,
     b_next: V3<R>,
     b_after: V3<R>,
 }
 
-/// Where a node is at θ of the substep: held ones are on the way to where they are led.
+/// Position of a node at θ of the substep; held nodes are interpolated to their targets.
 #[inline(always)]
-fn place<W: Width>(w: W, node: &NodeLanes<W::Cell>, stage: &Stage<W::Real>) -> V3<W::Real> {
+fn place<W: Width>(w: W, node: &NodeLanes<W::Cell>, stage: &NewtonStage<W::Real>) -> V3<W::Real> {
     let (p, from) = (w.get3(&node.p), w.get3(&node.from));
     let led = (p - from).scale_add(stage.theta, from);
     V3::select(is_held(w, node), led, p)
@@ -90,16 +92,17 @@ fn is_held<W: Width>(w: W, node: &NodeLanes<W::Cell>) -> <W::Real as Real>::Mask
     w.get(&node.w).lt(w.lit(1e-12))
 }
 
-/// Assembles and eliminates from the root to the tip, with frames carried to where the nodes are.
-/// `TWICE`: some lanes take two Newton steps, which heed obstacles, and others have to wait.
+/// Assembles and eliminates from the root to the tip, with frames transported to the present edges.
+/// `TWICE`: some lanes take two Newton steps, which respect obstacles; the others are masked.
 #[inline(always)]
 pub(crate) fn down<W: Width, const TWICE: bool>(
     w: W,
     nodes: &[NodeLanes<W::Cell>],
     edges: &mut [EdgeLanes<W::Cell>],
-    rows: &mut [Row<W::Cell>],
+    rows: &mut [DirectRow<W::Cell>],
+    gravity: &[W::Cell],
     root: &[W::Cell; 4],
-    stage: &Stage<W::Real>,
+    stage: &NewtonStage<W::Real>,
 ) {
     let zero = w.lit(0.0);
     let none = w.zero3();
@@ -108,11 +111,12 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
     let damped = stage.damping * rate;
     let stiffer = w.lit(1.0) + damped;
     let frame = w.get4(root);
-    let mut before = Carried {
+    let mut before = EdgeState {
         q: frame,
         t: frame.tangent(),
         r: zero,
         turn: stage.root_turn,
+        swing: stage.root_turn,
         across: zero,
         axial: zero,
         pull: none,
@@ -120,7 +124,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
     };
     let mut stiff_before = Symmetric::zero(zero);
     let mut pull_before = none;
-    let mut left = Left {
+    let mut left = FillIn {
         next: Symmetric::zero(zero),
         after: Symmetric::zero(zero),
         between: Matrix::zero(zero),
@@ -131,7 +135,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
     let count = edges.len();
     for j in 0..=count {
         // The edge and the joint before it; past the tip there is neither.
-        let mut now = Carried { r: zero, coupling: Matrix::zero(zero), ..before };
+        let mut now = EdgeState { r: zero, coupling: Matrix::zero(zero), ..before };
         let (mut couple, mut stiff) = (none, zero);
         if j < count {
             let edge = &mut edges[j];
@@ -143,7 +147,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             let length = e.dot(e).max(w.lit(1e-30)).sqrt();
             let crushed = length.lt(l * w.lit(0.5));
             let q = w.get4(&edge.q);
-            let (turned, turn) = carry(q, e, length);
+            let (turned, turn) = parallel_transport(q, e, length);
             let stays = q;
             let q = choose(crushed, q, turned);
             let r = w.lit(1.0) / length.max(l * w.lit(0.2));
@@ -155,23 +159,31 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             };
             // Twist is in balance at all times, so no joint's changes: what the edge before turns about
             // this one's tangent takes it along.
-            let turn = t.scale_add(before.turn.dot(t), V3::select(crushed, none, turn));
+            let swing = V3::select(crushed, none, turn);
+            let turn = t.scale_add(before.turn.dot(t), swing);
             w.put4(if TWICE { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
             let tension = (axial * (length - l)).max(w.get(&edge.tension)).max(zero);
             let across = W::Real::select(crushed, axial, tension * r);
             let k = w.get(&edge.k);
             let elastic = moment(w, before.q, q, w.get4(&edge.rest), k);
-            couple = (turn - before.turn).scale_add(k * damped, elastic);
+            // Where bends lie in many directions, twist gives way somewhere along the strand, and turns
+            // that are handed on from the root are not what edges do. Friction only ever takes energy.
+            let rate = turn - before.turn;
+            let square = rate.dot(rate).max(w.lit(1e-30));
+            let taken = rate.dot(swing - before.swing) / square;
+            let friction = k * damped * taken.max(zero).min(w.lit(1.0));
+            couple = rate.scale_add(friction, elastic);
             stiff = k * stiffer;
             let dot = t.dot(before.t);
-            // How the moment of twist turns with the edges; without, twisted strands flutter.
+            // Change of the twisting moment as edges rotate; without it twisted strands flutter.
             let twist = elastic.dot(t) * w.lit(-0.25) * r * before.r;
             let coupling = Matrix::coupling(before.t, t, dot, stiff * r * before.r);
-            now = Carried {
+            now = EdgeState {
                 q,
                 t,
                 r,
                 turn,
+                swing,
                 across: (stiff * r).mul_add(r, across),
                 axial,
                 pull: couple.cross(t).scale_add(r, t.scale_add(-l, e).scale(axial)),
@@ -180,7 +192,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
         }
         if j > 0 {
             let i = j - 1;
-            // The edge before is whole now.
+            // The previous edge is complete now.
             let across = (stiff * before.r).mul_add(before.r, before.across);
             let h = Symmetric::uniaxial(before.t, before.axial - across, across);
             let pull = couple.cross(before.t).scale_add(-before.r, before.pull);
@@ -191,6 +203,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
                     &nodes[i],
                     &mut rows[i - 1],
                     stage,
+                    gravity.get(i),
                     inertia,
                     stiff_before.plus(h).minus_both(&before.coupling),
                     before.coupling.plus(now.coupling).minus_symmetric(&h),
@@ -210,6 +223,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
         &nodes[count],
         &mut rows[count - 1],
         stage,
+        gravity.get(count),
         inertia,
         stiff_before,
         nothing,
@@ -219,26 +233,29 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
     );
 }
 
-/// Node `node` out of the system: `diagonal` and `next` its blocks, −`far` that with the node after
-/// the next, `force` what edges pull it with.
+/// Eliminates node `node`: `diagonal` and `next` are its blocks, −`far` the one with the node after
+/// the next, `force` the force of its edges,
+/// `gravity` the share of gravity that acts on it.
 #[inline(always)]
 fn eliminate<W: Width, const TWICE: bool>(
     w: W,
     node: &NodeLanes<W::Cell>,
-    row: &mut Row<W::Cell>,
-    stage: &Stage<W::Real>,
+    row: &mut DirectRow<W::Cell>,
+    stage: &NewtonStage<W::Real>,
+    gravity: Option<&W::Cell>,
     inertia: W::Real,
     diagonal: Symmetric<W::Real>,
     next: Matrix<W::Real>,
     far: &Matrix<W::Real>,
     force: V3<W::Real>,
-    left: &Left<W::Real>,
-) -> Left<W::Real> {
+    left: &FillIn<W::Real>,
+) -> FillIn<W::Real> {
     let mass = w.get(&node.mass);
     let held = is_held(w, node);
     let inert = mass * inertia;
     let mut a = diagonal.plus(left.next).plus_diagonal(inert);
-    let mut b = stage.gravity.scale_add(mass, force + left.b_next);
+    let weight = gravity.map_or(mass, |share| mass * w.get(share));
+    let mut b = stage.gravity.scale_add(weight, force + left.b_next);
     if TWICE {
         let n = w.get3(&node.rests_on);
         a = a.plus_outer(n, inert * w.lit(HOLD));
@@ -262,7 +279,7 @@ fn eliminate<W: Width, const TWICE: bool>(
     w.put3(pivot.divide(y), &mut row.solution);
     w.put3(V3::new(pivot.yx, pivot.zx, pivot.zy), &mut row.lower);
     let none = Symmetric::zero(w.lit(0.0));
-    Left {
+    FillIn {
         next: left.after.minus_product(&near, &near_unscaled),
         after: none.minus_product(&far, &far_unscaled),
         // `far` is minus the block, so this adds.
@@ -278,8 +295,8 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
     w: W,
     nodes: &mut [NodeLanes<W::Cell>],
     edges: &mut [EdgeLanes<W::Cell>],
-    rows: &[Row<W::Cell>],
-    stage: &Stage<W::Real>,
+    rows: &[DirectRow<W::Cell>],
+    stage: &NewtonStage<W::Real>,
 ) {
     let none = w.zero3();
     let (mut next, mut after) = (none, none);
@@ -300,7 +317,7 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
             let x1 = (-l.y).mul_add(from.z, (-l.x).mul_add(y1, from.x));
             solved = V3::new(x1, y1, from.z);
             if TWICE {
-                // Lanes that are done stay, to the bit, and so does their tension.
+                // Finished lanes and their tensions stay the same to the bit.
                 solved = V3::select(w.lit(0.0).lt(stage.again), solved, none);
             }
             y = y + solved;
@@ -325,17 +342,17 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
     }
 }
 
-/// Frames to where nodes have come to, velocities, and the twist of all edges on the way down.
-/// Returns zero where all is finite.
+/// Transports frames to the final nodes, computes velocities, and assembles the twist of all edges.
+/// Returns zero where everything is finite.
 #[inline(always)]
 pub(crate) fn finish<W: Width>(
     w: W,
     nodes: &mut [NodeLanes<W::Cell>],
     edges: &mut [EdgeLanes<W::Cell>],
-    rows: &mut [Row<W::Cell>],
+    rows: &mut [DirectRow<W::Cell>],
     root: &[W::Cell; 4],
     dt: f32,
-    stage: &Stage<W::Real>,
+    stage: &NewtonStage<W::Real>,
 ) -> W::Real {
     let (zero, one) = (w.lit(0.0), w.lit(1.0));
     let rate = w.lit(1.0 / f64::from(dt));
@@ -366,7 +383,7 @@ pub(crate) fn finish<W: Width>(
         let length = e.dot(e).max(w.lit(1e-30)).sqrt();
         let crushed = length.lt(w.get(&edge.l) * w.lit(0.5));
         let kept = w.get4(&edge.q);
-        let q = choose(crushed, kept, carry(kept, e, length).0);
+        let q = choose(crushed, kept, parallel_transport(kept, e, length).0);
         w.put4(q, &mut edge.q);
         sum = q.dot(q) + sum;
         let (t, k) = (q.tangent(), w.get(&edge.k));
@@ -382,16 +399,16 @@ pub(crate) fn finish<W: Width>(
     sum * zero
 }
 
-/// An edge as the elimination of twist carries it.
+/// State of an edge in the elimination of twist.
 #[derive(Clone, Copy)]
 struct Twist<R> {
     q: Quaternion<R>,
     t: V3<R>,
     /// Stiffness of the joint at its start.
     k: R,
-    /// What turns it about its tangent.
+    /// Moment about its tangent.
     moment: R,
-    /// With the edge before.
+    /// Coupling with the previous edge.
     coupling: R,
 }
 
@@ -402,7 +419,7 @@ impl<R: Real> Twist<R> {
         &self,
         k_next: R,
         turns: &mut Elimination<R>,
-        rows: &mut [Row<W::Cell>],
+        rows: &mut [DirectRow<W::Cell>],
         i: usize,
         w: W,
     ) {
@@ -415,9 +432,13 @@ impl<R: Real> Twist<R> {
     }
 }
 
-/// Turns edges about their tangents until twist is in balance.
+/// Rotates edges about their tangents so that twist is in equilibrium.
 #[inline(always)]
-pub(crate) fn untwist<W: Width>(w: W, edges: &mut [EdgeLanes<W::Cell>], rows: &[Row<W::Cell>]) {
+pub(crate) fn untwist<W: Width>(
+    w: W,
+    edges: &mut [EdgeLanes<W::Cell>],
+    rows: &[DirectRow<W::Cell>],
+) {
     let mut twist = w.lit(0.0);
     for (edge, row) in edges.iter_mut().zip(rows).rev() {
         twist = back(w.get(&row.twist), w.get(&row.twist_next), twist);

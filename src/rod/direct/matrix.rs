@@ -71,7 +71,7 @@ impl<R: Real> Symmetric<R> {
         }
     }
 
-    /// `self − a bᵀ`, of which the caller knows that it is symmetric.
+    /// `self − a bᵀ`, which the caller guarantees to be symmetric.
     #[inline(always)]
     pub fn minus_product(self, a: &Matrix<R>, b: &Matrix<R>) -> Self {
         let ([ax, ay, az], [bx, by, bz]) = (a.rows, b.rows);
@@ -194,7 +194,7 @@ impl<R: Real> Matrix<R> {
     }
 }
 
-/// `A = L D Lᵀ`, with the inverses of D. Where D is given as without end, what is divided by it is 0.
+/// `A = L D Lᵀ`, with the inverses of D; 0 for an infinite D.
 #[derive(Clone, Copy)]
 pub(super) struct Pivot<R> {
     pub yx: R,
@@ -204,8 +204,8 @@ pub(super) struct Pivot<R> {
 }
 
 impl<R: Real> Pivot<R> {
-    /// Of a matrix that round-off may have made indefinite: pivots are at least `least`. Where `held`,
-    /// nothing moves.
+    /// Factors a matrix that round-off may have made indefinite: pivots are at least `least`. Where
+    /// `held`, the inverse is 0.
     #[inline(always)]
     pub fn new(a: &Symmetric<R>, least: R, held: R::Mask) -> Self {
         let (zero, one) = (least.lit(0.0), least.lit(1.0));

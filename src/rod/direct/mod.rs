@@ -1,17 +1,17 @@
 //! The direct solver: one direct implicit step of a whole strand per substep.
 //!
-//! Projections that go from joint to joint make stiffness of the inverse inertia of orientations, so
-//! stiff hair gets a rotary inertia that no hair has, and converge like the square of the number of
-//! segments. Here nodes are the only unknowns: orientations follow the edges (their tangents are the
-//! edges' directions, always, carried along without twist), and twist is in balance at every step.
+//! Projections joint by joint express stiffness through the inverse inertia of orientations, so stiff
+//! hair gets an unphysical rotary inertia, and the iterations needed grow like the square of the number
+//! of segments. Here nodes are the only unknowns: orientations follow the edges (their tangents are
+//! always the edges' directions, by parallel transport), and twist is in equilibrium at every step.
 //! What remains is a system of 3×3 blocks, each coupled with two nodes before and two behind, which
-//! Cholesky solves in one pass down the strand and one up.
+//! a Cholesky factorisation solves in one pass down the strand and one up.
 //!
 //! | file | what |
 //! |---|---|
 //! | `kernel` | a Newton step: assembly and elimination in one pass, solution, frames, twist |
 //! | `matrix` | the blocks |
-//! | `frames` | edges' frames: carried, bent, turned |
+//! | `frames` | edges' frames: parallel transport, moments, rotation vectors |
 //! | `width` | the same lines for lanes and for one strand of f64 |
 //!
 //! One substep of length h:
@@ -23,32 +23,54 @@
 //! 3. On to the end of the substep, x + (x_θ − x)/θ. With θ = ½ nothing would be damped and nothing
 //!    be calmed; with θ = 1, implicit Euler, all swings would be damped like by a Kelvin–Voigt time of
 //!    h. θ = 0.65 damps like 0.3 h, which is taken off the material's damping, and stiff motion decays
-//!    to 7/13 in each substep. Strands that touch take θ = 1. BDF2 was not built: it needs two more
-//!    vectors a node and a new start at each contact.
-//! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 %.
+//!    to 7/13 in each substep. Strands that touch take θ = 1.
+//! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 %, guarded so that
+//!    what is pressed folds no farther than it must and what is taut does not zigzag.
 //! 5. Frames carried to the new directions; velocities; twist by a tridiagonal solve.
 //!
-//! Against theory and the sweeps (default settings of both, drag 0, 6 substeps of 1/360 s; strand 20 cm,
-//! L_g 13 cm unless said; the elastica, and a beam under its own weight, hanging and about the elastica):
+//! # Why not BDF2
+//! Tried in a prototype (20 cm, L_g 13 cm, drag 0, no damping, 16 and 64 segments alike), of the energy of a
+//! swing of 0.4 s there is left after 1 s at 6; 3; 2 substeps of a tick at 60 Hz: θ = 0.65 80; 66; 54 %, BDF2
+//! 99.8; 99.2; 97.8 %, implicit Euler 51; 26; 14 %. But in a strand let go level BDF2 adds 0.14; 1.3 % of the
+//! swing's energy at 6; 3 substeps where the other two add none, and it keeps the last positions and velocities,
+//! 6 numbers a node beside the 10 that a substep writes, which have to begin anew at teleports, contacts and
+//! changes of the substep. With the default damping all of them decay as the hair does: θ stays.
 //!
-//! | | segments | theory | direct | sweeps |
+//! # Against theory and the sweeps
+//! Drag 0; strand 20 cm, L_g 13 cm unless said; theory is the elastica, and a beam under its own weight, hanging
+//! and about the elastica. The direct solver at the papers' 1/360 s and at the default 1/180 s
+//! (`tests/swing` prints these numbers), sweeps with their defaults at 1/360 s.
+//!
+//! | | segments | theory | direct, 1/360 s | direct, 1/180 s | sweeps |
+//! |---|---|---|---|---|---|
+//! | settled sag / length, root level | 8, 16, 32, 64 | 0.3963 | 0.4019, 0.3977, 0.3966, 0.3964 | the same | not run |
+//! | the same, L_g 6 cm | 8, 16, 32, 64 | 0.8894 | 0.9037, 0.8932, 0.8905, 0.8898 | 0.9037, 0.8932, 0.8904, 0.8897 | not run |
+//! | the same, L_g 30 cm | 8, 16, 32, 64 | 0.0370 | 0.0376, 0.0371, 0.0370, 0.0370 | the same | not run |
+//! | the same, 5 cm, L_g 13 cm | 8, 16, 32, 64 | 0.0071 | 0.0072, 0.0071, 0.0071, 0.0071 | the same | 0.014, 0.041, 0.149, 0.47 |
+//! | period hanging (s) | 8, 16, 32, 64 | 0.403 | 0.408, 0.404, 0.403, 0.403 | 0.408, 0.405, 0.404, 0.403 | 0.61, 1.00, 1.86, not run |
+//! | period level (s) | 8, 16, 32, 64 | 0.442 | 0.447, 0.443, 0.442, 0.442 | 0.448, 0.444, 0.443, 0.442 | not run |
+//! | let go level, 24 cm, lowest after (s) | 8, 16, 32, 64 | 0.285 at 128 | 0.295, 0.288, 0.286, 0.286 | 0.294, 0.288, 0.286, 0.286 | 0.37, 0.58, 1.07, 1.35 (20 cm) |
+//! | height of a hanging curl (cm; 24 cm of hair, radius 1, pitch 2, L_g 6) | 18, 24, 36, 48, 64, 96 | 8.55 | 8.41, 8.47, 8.52, 8.53, 8.54, 8.55 | the same | not run |
+//! | twist that buckles, M L / EI | 32 | 8.99 | 9.37 | 9.14 | not run |
+//!
+//! Periods below 40 substeps come out longer, by 10 % at 11 substeps; faster modes are only damped.
+//! L_g is limited to six times the strand's length, and segments much shorter than 1 mm are softened:
+//! f32 is not precise enough for more.
+//!
+//! # For a compute port
+//! One strand needs nothing of another, so one GPU thread may take one strand. Numbers by segment (a node
+//! and the edge before it):
+//!
+//! | pass | reads | writes | scratch | multiply–adds, divisions and roots |
 //! |---|---|---|---|---|
-//! | settled sag / length, root level | 8, 16, 32, 64 | 0.3963 | 0.4019, 0.3977, 0.3966, 0.3964 | |
-//! | the same, 5 cm | 8, 16, 32, 64 | 0.0071 | 0.0072, 0.0071, 0.0071, 0.0071 | 0.014, 0.041, 0.149, 0.47 |
-//! | period hanging (s) | 8, 16, 32, 64 | 0.403 | 0.409, 0.405, 0.404, 0.404 | 0.61, 1.00, 1.86 |
-//! | period level (s) | 8, 16, 32, 64 | 0.442 | 0.448, 0.444, 0.443, 0.443 | |
-//! | let go level, lowest after (s) | 8, 16, 32, 64 | | 0.225, 0.223, 0.223, 0.223 | 0.37, 0.58, 1.07, 1.35 |
-//! | height of a hanging curl (cm; 24 cm of hair, radius 1, pitch 2, L_g 6) | 18 … 96 | 8.55 | 8.41 … 8.55 | |
-//! | twist that buckles, M L / EI | 32 | 8.99 | 9.37 | |
+//! | down: assemble and eliminate | p, from, v, mass, w, what it rests on (14); q, rest, l, k, axial, tension (12) | q (4) | 24 written | about 420, 6 |
+//! | up: solve | p, from, w (7); q, l, axial (6) | p (3), tension (1) | 24 read | about 60, 0 |
+//! | finish: frames, velocities, twist | p, from, v, w (10); q, rest, l, k (10) | v (3), q (4) | 2 written | about 130, 5 |
+//! | untwist | q (4) | q (4) | 2 read | about 15, 1 |
+//! | limiter, each Newton step | p, w (4), what it rests on (3), l (1) | p (3) | 5 written, 5 read | about 45, 4 |
 //!
-//! Periods below 40 substeps come out longer, by 10 % at 11 substeps; stubs that ring faster only settle.
-//! Hair stiffer than L_g of six times its length is taken as of that, and segments much shorter than 1 mm as
-//! softer than they are: f32 would not carry them.
-//!
-//! Per segment and Newton step: about 480 multiply–adds and 12 divisions or roots; 24 + 2 numbers of
-//! scratch. Of a node come in and go out position, velocity, mass and what it rests on, of an edge frame,
-//! rest shape, length, stiffness and tension: 30 numbers. One strand needs nothing of another, so one GPU
-//! thread may take one strand.
+//! The operations of a Newton step are counted from the formulas, not measured. Of a strand's own state p, v,
+//! q and tension (11) come in and go out once a substep; rest, k, l and the water's mass (7) come in.
 //!
 //! After Deul, Kugelstadt, Weiler, Bender, *Direct Position-Based Solver for Stiff Rods* (2018) for the
 //! direct solve, Baraff & Witkin (1998) for the implicit step, Bergou et al. (2008) for frames and
@@ -63,8 +85,8 @@ mod tests;
 mod width;
 
 use super::{
-    block::BlockLanes,
-    limiter::{clamp_lengths, limit_strained},
+    block::{BlockLanes, pulled},
+    limiter::{TOLERANCE, clamp_lengths, limit_strained},
     obstacle::{NearObstacles, Obstacle},
     stiffness::REFERENCE_GRAVITY,
     touch::{Grip, choose_near, contacts, contacts_with, predict_nodes},
@@ -74,52 +96,51 @@ use crate::lanes::{
 };
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use glam::Vec3;
-use kernel::{HOLD, Stage};
+use kernel::{HOLD, NewtonStage};
 use width::{Half, Whole, Width};
 
-/// What a substep does to a block.
+/// Parameters of a substep.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct DirectParams {
     /// Substep (s).
     pub dt: f32,
-    /// Gravity, in the frame of the positions (m/s²): what of the velocities it has given them in this
-    /// substep already.
+    /// Gravity, in the frame of the positions (m/s²). Velocities already contain it for this substep.
     pub gravity: Vec3,
     /// Kelvin–Voigt time of the material (s).
     pub damping: f32,
     /// Newton steps of the length limiter, at most.
     pub limiter_steps: u32,
     /// Distance that nodes keep from obstacles (m).
-    pub skin: f32,
+    pub clearance: f32,
 }
 
-/// Where in the substep forces are taken; see the [module](self).
+/// θ: where in the substep forces are evaluated; see the [module](self).
 const THETA: f32 = 0.65;
 
-/// Turn of an edge in a substep (rad) from which on a strand takes two Newton steps.
-const WHIP: f32 = 0.03;
+/// Rotation of an edge in a substep (rad) above which a strand takes two Newton steps.
+const FAST_TURN: f32 = 0.03;
 
-/// Strain at the root of a straight hanging strand, which says how stiff hair is against stretching.
-/// Stiffer, f32 would not carry it; softer, the limiter would have to take stretching away, which bends.
+/// Strain at the root of a straight hanging strand, which sets the stretching stiffness. Stiffer
+/// exceeds the precision of f32; softer leaves more to the length limiter, which bends hair.
 const STRAIN: f32 = 1e-4;
-
-/// Strain that the limiter leaves.
-const TOLERANCE: f32 = 5e-4;
 
 /// Strain beyond which Newton steps on the lengths have failed.
 const TORN: f32 = 0.01;
 
-/// Depth in an obstacle, in edges, from which on a strand is taken out of it before the step.
+/// Most repetitions of restoring the lengths of torn strands and the push-out that follows.
+const REPAIRS: u32 = 4;
+
+/// Depth in an obstacle, in edge lengths, above which a strand is moved out of it before the step.
 const DEEP: f32 = 0.25;
 
-/// L_g in lengths of the strand, at most. Such hair sags by less than a thousandth of its length; f32
-/// would not carry it much stiffer.
+/// Largest L_g, in lengths of the strand. Such hair sags by less than a thousandth of its length; f32
+/// is not precise enough for much stiffer hair.
 const STIFFEST: f32 = 6.0;
 
-/// How many times firmer than by its own inertia in a substep a node is held by its neighbours, at most,
-/// for a strand of one segment; of n, 1/n² of that. f32 would not carry more. Only segments much shorter
-/// than 1 mm come there.
+/// Largest ratio of a node's elastic stiffness to its inertia in a substep, for a strand of one segment;
+/// 1/n² of that for n segments. f32 is not precise enough for more. Only segments much shorter than 1 mm
+/// reach it.
 const FIRMEST: f32 = 2.5e10;
 
 /// Takes the block through one substep, on the instruction set that the machine has.
@@ -133,8 +154,8 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
     let theta = predict(simd, b, params, obstacles);
     let one = f32x16::splat(simd, 1.0);
     theta.store_array(&mut b.theta);
-    let whips = whips(simd, b, params.dt);
-    Real::max(load(simd, &b.touched), whips).store_array(&mut b.twice);
+    let turns_fast = turns_fast(simd, b, params.dt);
+    Real::max(load(simd, &b.touched), turns_fast).store_array(&mut b.twice);
     let (from, to) = (load4(simd, &b.root_from), load4(simd, &b.root));
     let backwards = Real::lt(from.dot(to), f32x16::splat(simd, 0.0));
     let share = Real::select(backwards, -theta, theta);
@@ -144,29 +165,35 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
         newton::<S, false>(simd, b, params, 1);
     } else {
         newton::<S, true>(simd, b, params, 2);
-        // Which nodes an obstacle bears is not known before: the first step shows.
+        // The first step shows which nodes rest on an obstacle.
         let twice = load(simd, &b.twice);
-        contacts_with(simd, b, params.skin, obstacles, Grip::NONE, twice);
+        contacts_with(simd, b, params.clearance, obstacles, Grip::NONE, twice);
         newton::<S, true>(simd, b, params, 1);
     }
-    // What obstacles hold has left that share of its depth.
+    // Share of the depth that is left at nodes which the solve has held by obstacles.
     let grip = Grip { resting: 1.0 + HOLD as f32, others: 1.0 };
     let all = f32x16::splat(simd, 1.0);
-    contacts_with(simd, b, params.skin, obstacles, grip, all);
+    contacts_with(simd, b, params.clearance, obstacles, grip, all);
     for pass in 0..params.limiter_steps {
         if !limit_strained(simd, b, if pass == 0 { -1.0 } else { TOLERANCE }, all) {
             break;
         }
-        contacts(simd, b, params.skin, obstacles);
-        if pass + 1 == params.limiter_steps && clamp_lengths(simd, b, TORN) {
-            contacts(simd, b, params.skin, obstacles);
+        contacts(simd, b, params.clearance, obstacles);
+        if pass + 1 == params.limiter_steps {
+            // Restored lengths may end in an obstacle, and the push-out may tear them again.
+            for _ in 0..REPAIRS {
+                if !clamp_lengths(simd, b, TORN) {
+                    break;
+                }
+                contacts(simd, b, params.clearance, obstacles);
+            }
         }
     }
     finish(simd, b, params);
 }
 
-/// The kernel's widths: all lanes at once where registers hold sixteen, else two halves, because what is
-/// twice as wide as registers would not stay in them.
+/// The kernel's widths: all lanes at once where registers hold sixteen, else two halves, because
+/// wider values would spill.
 macro_rules! in_lanes {
     ($simd:expr, $w:ident => $work:expr) => {
         if <S::f32s as SimdBase<S>>::LEN >= LANES {
@@ -201,8 +228,8 @@ fn newton<S: Simd, const TWICE: bool>(
                     let on_the_way = w.lit(0.0).lt(stage.twice);
                     stage.beyond = <_ as Real>::select(on_the_way, w.lit(1.0), stage.beyond);
                 }
-                let BlockLanes { nodes, edges, rows, root_between, .. } = &mut *b;
-                kernel::down::<_, TWICE>(w, nodes, edges, rows, root_between, &stage);
+                let BlockLanes { nodes, edges, rows, gravity, root_between, .. } = &mut *b;
+                kernel::down::<_, TWICE>(w, nodes, edges, rows, gravity, root_between, &stage);
                 kernel::up::<_, TWICE>(w, nodes, edges, rows, &stage);
             });
         },
@@ -231,14 +258,14 @@ fn stage<W: Width<Cell = crate::lanes::Lane>>(
     w: W,
     b: &BlockLanes,
     params: &DirectParams,
-) -> Stage<W::Real> {
+) -> NewtonStage<W::Real> {
     let (theta, dt) = (w.get(&b.theta), w.lit(params.dt.into()));
     let own = (w.lit(2.0) * theta - w.lit(1.0)) * dt;
     let (from, to) = (w.get4(&b.root_from), w.get4(&b.root_between));
     let turn = to.product(from.conjugate());
     let two = w.lit(2.0);
     let two = <_ as Real>::select(turn.w.lt(w.lit(0.0)), -two, two);
-    Stage {
+    NewtonStage {
         theta,
         ahead: theta * dt,
         beyond: w.lit(1.0) / theta,
@@ -255,7 +282,7 @@ fn stage<W: Width<Cell = crate::lanes::Lane>>(
     }
 }
 
-/// Nodes to the first guess, and what touches: those that would fall into an obstacle are set on it.
+/// Moves nodes to the first guess; those that would enter an obstacle are placed on its surface.
 /// Returns θ of each lane.
 #[inline(always)]
 fn predict<S: Simd>(
@@ -268,15 +295,15 @@ fn predict<S: Simd>(
     let dt = f32x16::splat(simd, params.dt);
     let gravity = splat3(simd, params.gravity);
     let mut theta = f32x16::splat(simd, THETA);
-    // Gravity has given its share of the whole substep already.
+    // Velocities already contain gravity for the whole substep.
     let gain = gravity.scale(dt);
-    for n in &mut b.nodes {
-        let v = load3(simd, &n.v) - gain;
+    for (i, n) in b.nodes.iter_mut().enumerate() {
+        let v = load3(simd, &n.v) - pulled(simd, &b.gravity, i, gain);
         store3(&mut n.v, v);
     }
-    choose_near(simd, b, params.dt, params.skin, obstacles);
+    choose_near(simd, b, params.dt, params.clearance, obstacles);
     surface(simd, b, params, obstacles);
-    fall(simd, b, dt * theta, gravity, params.skin, obstacles);
+    fall(simd, b, dt * theta, gravity, params.clearance, obstacles);
     if b.touched != [0.0; LANES] {
         let touched = Real::lt(zero, load(simd, &b.touched));
         theta = Real::select(touched, one, theta);
@@ -285,7 +312,7 @@ fn predict<S: Simd>(
             let back = V3::select(held, load3(simd, &n.p), load3(simd, &n.from));
             store3(&mut n.p, back);
         }
-        fall(simd, b, dt * theta, gravity, params.skin, obstacles);
+        fall(simd, b, dt * theta, gravity, params.clearance, obstacles);
     }
     let ahead = dt * theta;
     let fallen = gravity.scale(ahead * ahead);
@@ -293,16 +320,16 @@ fn predict<S: Simd>(
         let (held, p) = (Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12)), load3(simd, &n.p));
         let support = load3(simd, &n.rests_on);
         let rests = Real::lt(zero, support.dot(support));
-        // The first guess is without gravity: else settled hair would be turned by it in each step.
+        // The first guess leaves gravity out: otherwise it would rotate settled hair in each step.
         store3(&mut n.p, V3::select(held | rests, p, p - fallen));
     }
     theta
 }
 
-/// 1 in lanes of which an edge is about to turn far, else 0. One Newton step does not end near the solution
-/// there, and a whip that cracks would gain energy.
+/// 1 in lanes of which an edge is about to rotate by more than [`FAST_TURN`], else 0. One Newton step does not
+/// converge there, and fast-swinging tips would gain energy.
 #[inline(always)]
-fn whips<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
+fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let mut before = load3(simd, &b.nodes[0].v);
     let mut fastest = zero;
@@ -312,13 +339,13 @@ fn whips<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
         fastest = Real::max(fastest, apart.dot(apart) / (l * l));
         before = v;
     }
-    let limit = f32x16::splat(simd, (WHIP / dt) * (WHIP / dt));
+    let limit = f32x16::splat(simd, (FAST_TURN / dt) * (FAST_TURN / dt));
     Real::select(Real::lt(limit, fastest), one, zero)
 }
 
-/// Strands that begin deep inside an obstacle, as where they are spawned in one, get out of it with
-/// their lengths before the step, so that it gives them no velocity. What is only pushed in by other
-/// hair is left to the step.
+/// Moves strands that begin deep inside an obstacle, as when spawned there, out of it before the step and
+/// restores their lengths, so that they gain no velocity. Shallow penetration, as by the push of other
+/// hair, is left to the step.
 #[inline(never)]
 fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacles: &[Obstacle]) {
     simd.vectorize(
@@ -328,7 +355,8 @@ fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacle
             for (n, near) in b.nodes.iter().zip(&b.near_obstacles).skip(1) {
                 for o in near.of(obstacles) {
                     let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
-                    let (_, depth) = o.solid.depth(o.taken_along(load3(simd, &n.p)), params.skin);
+                    let (_, depth) =
+                        o.solid.depth(o.taken_along(load3(simd, &n.p)), params.clearance);
                     deepest = Real::select(held, deepest, Real::max(deepest, depth));
                 }
             }
@@ -338,14 +366,14 @@ fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacle
             }
             let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
             b.sweeps = false;
-            // Nobody knows where it gets out.
+            // Infinitely deep: no way out.
             b.near_obstacles.fill(NearObstacles::ALL);
             for n in &mut b.nodes {
                 n.rests_on = Default::default();
             }
-            // Each round carries what was mended by about an edge.
+            // A correction travels about one edge per round.
             for _ in 0..2 * b.edges.len() {
-                contacts_with(simd, b, params.skin, obstacles, Grip::NONE, deep);
+                contacts_with(simd, b, params.clearance, obstacles, Grip::NONE, deep);
                 if !limit_strained(simd, b, TORN, deep) {
                     return;
                 }
@@ -354,28 +382,28 @@ fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacle
     );
 }
 
-/// Nodes to where they would be after `ahead` by themselves, or on what is in the way.
+/// Moves nodes ballistically for `ahead` (s), and onto obstacles in the way.
 #[inline(never)]
 fn fall<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     ahead: f32x16<S>,
     gravity: V3<f32x16<S>>,
-    skin: f32,
+    clearance: f32,
     obstacles: &[Obstacle],
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            predict_nodes(simd, b, ahead, gravity.scale(ahead), skin, obstacles);
-            contacts_with(simd, b, skin, obstacles, Grip::NONE, f32x16::splat(simd, 1.0));
+            predict_nodes(simd, b, ahead, gravity.scale(ahead), clearance, obstacles);
+            contacts_with(simd, b, clearance, obstacles, Grip::NONE, f32x16::splat(simd, 1.0));
         },
     );
 }
 
-/// Makes masses and stiffnesses of what was gathered: of a node `w` in those of dry nodes, of a joint
-/// `k` as its share of what hair of this gravity-bending length (m) has, as far as a substep of `dt` (s)
-/// carries it.
+/// Converts gathered values to masses and stiffnesses: a node's `w` is its mass in dry nodes, a joint's
+/// `k` the share of the stiffness of hair with this gravity-bending length (m), limited by what a
+/// substep of `dt` (s) can resolve.
 #[doc(hidden)]
 pub fn weigh(level: Level, block: &mut BlockLanes, bending_length: f32, dt: f32) {
     dispatch!(level, simd => weigh_simd(simd, block, bending_length, dt));
@@ -390,7 +418,7 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32
         sum += load(simd, &e.l);
     }
     let edges = b.edges.len() as f32;
-    // A whole node weighs 1: what is per mass is to be multiplied by that.
+    // Stiffness per mass, for a whole node's mass of 1.
     let density = f32x16::splat(simd, edges) / sum;
     let stiff = Real::min(f32x16::splat(simd, bending_length), sum * f32x16::splat(simd, STIFFEST));
     let bending = density * f32x16::splat(simd, 2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;

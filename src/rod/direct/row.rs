@@ -1,9 +1,9 @@
-//! What the solve of a strand keeps of each edge.
+//! Scratch of the solve for each edge.
 
-/// What the way up needs of the way down: at index i of edge i and the node at its end.
+/// What back substitution needs from the elimination: at index i of edge i and the node at its end.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
-pub(crate) struct Row<C> {
+pub(crate) struct DirectRow<C> {
     pub(super) near: [[C; 3]; 3],
     pub(super) far: [[C; 3]; 3],
     pub(super) solution: [C; 3],

@@ -1,18 +1,27 @@
-use super::{kernel, kernel::Stage, row::Row, width::Single, *};
+use super::{kernel, kernel::NewtonStage, row::DirectRow, width::Single, *};
 use crate::{
-    lanes::{Lane, put3, put4, take3},
+    lanes::{Lane, put3, put4, take3, take4},
     rod::{
         block::{EdgeLanes, NodeLanes},
         frame::parallel_transport,
         obstacle::Solid,
     },
 };
-use glam::Quat;
+use glam::{DQuat, DVec3, Quat};
+
+mod any_hair;
+mod golden;
 
 const DT: f32 = 1.0 / 360.0;
 
 fn params() -> DirectParams {
-    DirectParams { dt: DT, gravity: Vec3::NEG_Y * 9.8, damping: 0.003, limiter_steps: 6, skin: 0.0 }
+    DirectParams {
+        dt: DT,
+        gravity: Vec3::NEG_Y * 9.8,
+        damping: 0.003,
+        limiter_steps: 6,
+        clearance: 0.0,
+    }
 }
 
 /// A strand of `edges` edges in each lane, as `place` says, at rest there.
@@ -36,7 +45,7 @@ fn strands(edges: usize, place: impl Fn(usize, usize) -> Vec3) -> BlockLanes {
     block
 }
 
-/// One substep, with what the tick gathers before it.
+/// One substep, including the preparation that the tick does.
 fn substep(block: &mut BlockLanes, bending_length: f32, obstacles: &[Obstacle]) {
     let params = params();
     for (i, node) in block.nodes.iter_mut().enumerate() {
@@ -74,25 +83,103 @@ fn small_sag_is_that_of_a_beam() {
     }
 }
 
-#[test]
-fn lanes_agree_with_a_strand_of_f64_alone() {
-    let mut block = strands(14, wavy);
-    substep(&mut block, 0.08, &[]);
-    // From there on, without limiter, in both.
-    let (lane, w) = (3, Single::<f64>::default());
-    let wide = |cell: &Lane| f64::from(cell[lane]);
-    let mut nodes: Vec<NodeLanes<f64>> = (block.nodes.iter())
-        .map(|n| NodeLanes {
+/// What the kernel is given: a block's strands, or one alone in f64.
+#[derive(Clone)]
+struct Strands<C> {
+    nodes: Vec<NodeLanes<C>>,
+    edges: Vec<EdgeLanes<C>>,
+    root: [C; 4],
+    root_from: [C; 4],
+    root_between: [C; 4],
+    theta: C,
+    twice: C,
+}
+
+#[derive(Clone, Copy)]
+struct Step {
+    dt: f32,
+    damping: f64,
+    gravity: [f64; 3],
+}
+
+impl<C: Copy + Default> Strands<C> {
+    /// A substep but for contacts and lengths: with `TWICE` as where something touches or whips.
+    /// Returns zero where all is finite.
+    fn solve<W: Width<Cell = C>, const TWICE: bool>(&mut self, w: W, step: &Step) -> W::Real {
+        let dt = f64::from(step.dt);
+        let theta = w.get(&self.theta);
+        let own = (theta + theta - w.lit(1.0)) * w.lit(dt);
+        let (from, to) = (w.get4(&self.root_from), w.get4(&self.root_between));
+        let turn = to.product(from.conjugate());
+        let minus = w.lit(-2.0);
+        let two = <_ as Real>::select(turn.w.lt(w.lit(0.0)), minus, w.lit(2.0));
+        let mut stage = NewtonStage {
+            theta,
+            ahead: theta * w.lit(dt),
+            beyond: w.lit(1.0) / theta,
+            root_turn: turn.v.scale(two),
+            gravity: V3::new(
+                w.lit(step.gravity[0]),
+                w.lit(step.gravity[1]),
+                w.lit(step.gravity[2]),
+            ),
+            damping: (w.lit(step.damping) - own).max(w.lit(0.0)),
+            second: false,
+            again: w.lit(1.0),
+            twice: w.get(&self.twice),
+        };
+        let finish = stage;
+        let mut rows = vec![DirectRow::default(); self.edges.len()];
+        let Self { nodes, edges, root, root_between, .. } = self;
+        if TWICE {
+            let on_the_way = w.lit(0.0).lt(stage.twice);
+            stage.beyond = <_ as Real>::select(on_the_way, w.lit(1.0), stage.beyond);
+        }
+        kernel::down::<_, TWICE>(w, nodes, edges, &mut rows, &[], root_between, &stage);
+        kernel::up::<_, TWICE>(w, nodes, edges, &rows, &stage);
+        if TWICE {
+            let again = stage.twice;
+            stage = NewtonStage { second: true, again, ..finish };
+            kernel::down::<_, TWICE>(w, nodes, edges, &mut rows, &[], root_between, &stage);
+            kernel::up::<_, TWICE>(w, nodes, edges, &rows, &stage);
+        }
+        let sum = kernel::finish(w, nodes, edges, &mut rows, root, step.dt, &finish);
+        kernel::untwist(w, edges, &rows);
+        sum
+    }
+}
+
+impl Strands<Lane> {
+    /// Of a block that has been weighed, its nodes where they are to start from; what the whole step
+    /// does before the first Newton step.
+    fn of(block: &BlockLanes, theta: f32, dt: f32) -> Self {
+        let BlockLanes { mut nodes, edges, root, root_from, twice, .. } = block.clone();
+        let mut root_between = root;
+        for lane in 0..LANES {
+            let (from, to) = (take4(&root_from, lane), take4(&root, lane));
+            put4(&mut root_between, lane, from.lerp(to, theta));
+            for node in &mut nodes {
+                if node.w[lane] > 0.0 {
+                    let from = take3(&node.p, lane);
+                    put3(&mut node.from, lane, from);
+                    put3(&mut node.p, lane, from + theta * dt * take3(&node.v, lane));
+                }
+            }
+        }
+        Self { nodes, edges, root, root_from, root_between, theta: [theta; LANES], twice }
+    }
+
+    fn alone(&self, lane: usize) -> Strands<f64> {
+        let wide = |cell: &Lane| f64::from(cell[lane]);
+        let node = |n: &NodeLanes| NodeLanes {
             p: n.p.each_ref().map(wide),
-            from: n.p.each_ref().map(wide),
+            from: n.from.each_ref().map(wide),
             v: n.v.each_ref().map(wide),
             w: wide(&n.w),
             mass: wide(&n.mass),
-            ..Default::default()
-        })
-        .collect();
-    let mut edges: Vec<EdgeLanes<f64>> = (block.edges.iter())
-        .map(|e| EdgeLanes {
+            rests_on: n.rests_on.each_ref().map(wide),
+        };
+        let edge = |e: &EdgeLanes| EdgeLanes {
             q: e.q.each_ref().map(wide),
             rest: e.rest.each_ref().map(wide),
             l: wide(&e.l),
@@ -100,47 +187,83 @@ fn lanes_agree_with_a_strand_of_f64_alone() {
             axial: wide(&e.axial),
             tension: wide(&e.tension),
             ..Default::default()
-        })
-        .collect();
-    let (theta, dt) = (f64::from(THETA), f64::from(DT));
-    for node in &mut nodes[1..] {
-        for axis in 0..3 {
-            node.p[axis] += theta * dt * node.v[axis];
+        };
+        Strands {
+            nodes: self.nodes.iter().map(node).collect(),
+            edges: self.edges.iter().map(edge).collect(),
+            root: self.root.each_ref().map(wide),
+            root_from: self.root_from.each_ref().map(wide),
+            root_between: self.root_between.each_ref().map(wide),
+            theta: wide(&self.theta),
+            twice: wide(&self.twice),
         }
     }
-    let stage = Stage {
-        theta,
-        ahead: theta * dt,
-        beyond: 1.0 / theta,
-        root_turn: w.zero3(),
-        gravity: V3::new(0.0, -9.8, 0.0),
-        damping: 0.003 - (2.0 * theta - 1.0) * dt,
-        second: false,
-        again: 1.0,
-        twice: 0.0,
-    };
-    let mut rows = vec![Row::default(); edges.len()];
-    let root = block.root.each_ref().map(wide);
-    kernel::down::<_, false>(w, &nodes, &mut edges, &mut rows, &root, &stage);
-    kernel::up::<_, false>(w, &mut nodes, &mut edges, &rows, &stage);
-    let sum = kernel::finish(w, &mut nodes, &mut edges, &mut rows, &root, DT, &stage);
-    kernel::untwist(w, &mut edges, &rows);
-    assert_eq!(sum, 0.0);
 
-    let before = block.nodes.clone();
-    let gravity = params();
-    block.nodes.iter_mut().for_each(|n| n.v[1] = n.v[1].map(|v| v + gravity.gravity.y * DT));
-    step(Level::new(), &mut block, &DirectParams { limiter_steps: 0, ..gravity }, &[]);
-    for (i, (node, alone)) in block.nodes.iter().zip(&nodes).enumerate() {
-        let alone = Vec3::from_array(alone.p.map(|x| x as f32));
-        let moved = take3(&before[i].p, lane).distance(alone);
-        let off = take3(&node.p, lane).distance(alone);
-        assert!(off < 3e-7 + 1e-3 * moved, "node {i}: {off} of {moved}");
+    /// Solves all lanes, at the width that the machine has or by halves.
+    fn solve_lanes(&mut self, twice: bool, halves: bool, step: &Step) -> Lane {
+        let mut finite = [0.0; LANES];
+        dispatch!(Level::new(), simd => {
+            if halves {
+                for index in 0..2 {
+                    let w = Half { simd, index };
+                    let sum = if twice {
+                        self.solve::<_, true>(w, step)
+                    } else {
+                        self.solve::<_, false>(w, step)
+                    };
+                    w.put(sum, &mut finite);
+                }
+            } else {
+                let w = Whole(simd);
+                let sum = if twice {
+                    self.solve::<_, true>(w, step)
+                } else {
+                    self.solve::<_, false>(w, step)
+                };
+                w.put(sum, &mut finite);
+            }
+        });
+        finite
     }
-    for (i, (edge, alone)) in block.edges.iter().zip(&edges).enumerate() {
-        let q = crate::lanes::take4(&edge.q, lane);
-        let alone = Quat::from_array(alone.q.map(|x| x as f32));
-        assert!(q.angle_between(alone) < 3e-3, "edge {i}: {}", q.angle_between(alone));
+
+    fn bits(&self) -> Vec<Lane> {
+        let nodes = self.nodes.iter().flat_map(|n| n.p.into_iter().chain(n.v));
+        nodes.chain(self.edges.iter().flat_map(|e| e.q.into_iter().chain([e.tension]))).collect()
+    }
+}
+
+impl Strands<f64> {
+    /// The same strand, turned as a whole.
+    fn turned(&self, turn: DQuat) -> Self {
+        let vector = |v: [f64; 3]| (turn * DVec3::from_array(v)).to_array();
+        let frame = |q: [f64; 4]| (turn * DQuat::from_array(q)).to_array();
+        let mut turned = self.clone();
+        for n in &mut turned.nodes {
+            let NodeLanes { p, from, v, rests_on, .. } = n;
+            [p, from, v, rests_on].into_iter().for_each(|v3| *v3 = vector(*v3));
+        }
+        turned.edges.iter_mut().for_each(|e| e.q = frame(e.q));
+        let Self { root, root_from, root_between, .. } = &mut turned;
+        [root, root_from, root_between].into_iter().for_each(|q| *q = frame(*q));
+        turned
+    }
+
+    /// How far the nodes of two are apart at most (m), and their edges' frames (rad).
+    fn apart(&self, other: &Self) -> (f64, f64) {
+        let nodes = self.nodes.iter().zip(&other.nodes);
+        let nodes = nodes.map(|(a, b)| DVec3::from(a.p).distance(b.p.into()));
+        let edges = self.edges.iter().zip(&other.edges);
+        let edges = edges.map(|(a, b)| {
+            let [a, b] = [a.q, b.q].map(|q| DQuat::from_array(q).normalize());
+            a.angle_between(b)
+        });
+        (nodes.fold(0.0, f64::max), edges.fold(0.0, f64::max))
+    }
+
+    /// How far nodes have come at most (m).
+    fn moved(&self) -> f64 {
+        let ways = self.nodes.iter().map(|n| DVec3::from(n.p).distance(n.from.into()));
+        ways.fold(0.0, f64::max)
     }
 }
 
@@ -154,7 +277,7 @@ fn half_blocks_do_to_the_bit_what_whole_blocks_do() {
         let w = Whole(simd);
         let stage = stage(w, &whole, &params());
         let BlockLanes { nodes, edges, rows, root, .. } = &mut whole;
-        kernel::down::<_, true>(w, nodes, edges, rows, root, &stage);
+        kernel::down::<_, true>(w, nodes, edges, rows, &[], root, &stage);
         kernel::up::<_, true>(w, nodes, edges, rows, &stage);
         kernel::finish(w, nodes, edges, rows, root, DT, &stage);
     });
@@ -163,7 +286,7 @@ fn half_blocks_do_to_the_bit_what_whole_blocks_do() {
             let w = Half { simd, index };
             let stage = stage(w, &halves, &params());
             let BlockLanes { nodes, edges, rows, root, .. } = &mut halves;
-            kernel::down::<_, true>(w, nodes, edges, rows, root, &stage);
+            kernel::down::<_, true>(w, nodes, edges, rows, &[], root, &stage);
             kernel::up::<_, true>(w, nodes, edges, rows, &stage);
             kernel::finish(w, nodes, edges, rows, root, DT, &stage);
         }
@@ -175,7 +298,7 @@ fn half_blocks_do_to_the_bit_what_whole_blocks_do() {
 }
 
 #[test]
-fn what_a_strand_does_does_not_depend_on_those_beside_it() {
+fn a_strand_does_not_depend_on_the_other_lanes() {
     let floor = Solid::HalfSpace { normal: Vec3::Y, point: Vec3::NEG_Y * 0.012 };
     let floor = [Obstacle { solid: floor, motion: None, friction: 0.4 }];
     let high = |lane: usize, i: usize| wavy(lane, i) + Vec3::Y * 0.01 * (lane % 3) as f32;

@@ -7,9 +7,9 @@ use fearless_simd::{Simd, f32x8, f32x16, prelude::*};
 
 /// A register type and the cell of memory it is loaded from.
 pub trait Width: Copy {
-    /// What is computed with.
+    /// The register type.
     type Real: Real;
-    /// What lies in memory.
+    /// The memory type.
     type Cell: Copy;
     /// `value` in every lane.
     fn lit(self, value: f64) -> Self::Real;

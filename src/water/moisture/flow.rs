@@ -1,50 +1,61 @@
-//! The ways of a strand's water in a substep: along it, into it, off it.
+//! Transport of a strand's water in a substep: along it, into it, off it.
 
-use super::super::model::{WATER_VISCOSITY, clinging, hanging};
-use super::{Moisture, Wetting, node_lengths, sheen};
+use super::super::{
+    droplet::Droplet,
+    model::{WATER_VISCOSITY, clinging, hanging},
+};
+use super::{AFTER_DRIP, HairWetting, Moisture, node_lengths, sheen};
 use crate::environment::vapour::{DryingAir, WATER, transfer};
 use bevy::prelude::*;
 use core::f32::consts::PI;
 
-/// Thickest change that the flow makes in one substep, as a share of a segment.
+/// Courant number of the film's flow: how far it moves in one step, as a share of a segment.
 const COURANT: f32 = 0.4;
 
-/// What moving air does at a node in a substep.
+/// Exposure of a node to moving air in a substep.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Exposure {
+pub(crate) struct Exposure {
     /// Speed of the air beyond the room's draught (m/s).
     pub speed: f32,
     /// Its temperature above the room's (K).
     pub warmth: f32,
     /// Share of the node's capacity that equation 19 dries away in this substep: Σ drying |Δv_w|.
     pub blown: f32,
+    /// Whether there is water all around it instead: it soaks, and has no film.
+    pub submerged: bool,
 }
 
-/// What a substep has for the water of all strands of a hair, worked out once.
+/// Conditions of a substep for the water of all strands of a hair, computed once.
 #[derive(Clone, Debug)]
-pub struct Surroundings<'a> {
-    wetting: Wetting,
+pub(crate) struct WaterConditions<'a> {
+    wetting: HairWetting,
     gravity: Vec3,
     air: &'a DryingAir,
     /// Time for chemistry and evaporation (s).
     process: f32,
     dt: f32,
     diameter: f32,
-    /// What a metre of strand binds (m³/m).
+    /// Capacity for bound water per metre of strand (m³/m).
     capacity: f64,
-    /// Share of what it lacks that hair binds in this substep.
+    /// Share of the free capacity that soaks in this substep.
     soaked: f64,
     /// The most film on a node, and on a tip (m³).
     held: f64,
     hung: f64,
-    /// What the room's air takes off a metre of strand (m³/m).
+    /// Evaporation into still room air per metre of strand (m³/m).
     still: f64,
 }
 
-impl<'a> Surroundings<'a> {
+impl<'a> WaterConditions<'a> {
     /// For a hair that wets as `wetting` says, under `gravity` in its frame (m/s²), in a room's `air`,
     /// in a substep of `dt` (s) in which chemistry goes `process` times as fast as in life.
-    pub fn new(wetting: Wetting, gravity: Vec3, air: &'a DryingAir, dt: f32, process: f32) -> Self {
+    pub fn new(
+        wetting: HairWetting,
+        gravity: Vec3,
+        air: &'a DryingAir,
+        dt: f32,
+        process: f32,
+    ) -> Self {
         let (bundle, g) = (wetting.bundle(1.0), gravity.length());
         let mut around = Self {
             gravity,
@@ -63,7 +74,7 @@ impl<'a> Surroundings<'a> {
         around
     }
 
-    /// What air takes off a metre of strand in this substep (m³/m).
+    /// Evaporation per metre of strand in this substep (m³/m).
     fn drying(&self, exposed: &Exposure) -> f64 {
         let speed = self.air.draught + exposed.speed;
         let drive = self.air.drive(exposed.warmth) * self.wetting.evaporation;
@@ -72,12 +83,14 @@ impl<'a> Surroundings<'a> {
     }
 }
 
-/// What left a strand in a substep.
+/// Water that left a strand in a substep.
 #[derive(Clone, Debug, Default)]
-pub struct Left {
-    /// Into the air (m³); negative where air was damp.
+pub(crate) struct WaterLoss {
+    /// Evaporated (m³); negative in damp air.
     pub evaporated: f64,
-    /// Node and volume (m³) of drops that let go.
+    /// Into water around it (m³); negative where hair soaked it up.
+    pub merged: f64,
+    /// Node and volume (m³) of drops that detach.
     pub drips: Vec<(usize, f64)>,
 }
 
@@ -85,19 +98,30 @@ impl Moisture {
     /// One substep of the water of a strand with nodes at `positions` and segments of rest `lengths`
     /// (m): the film flows and creeps, soaks in, dries and drips. `exposure` is `None` in still air. Needs
     /// room for all nodes.
-    pub fn exchange(
+    pub(crate) fn exchange(
         &mut self,
         positions: &[Vec3],
         lengths: &[f32],
-        around: &Surroundings<'_>,
+        around: &WaterConditions<'_>,
         exposure: impl Fn(usize) -> Option<Exposure>,
-        left: &mut Left,
+        left: &mut WaterLoss,
     ) {
         self.flow(positions, lengths, around);
         let last = lengths.len();
         let damp = around.air.equilibrium > 0.0;
         for (i, length) in node_lengths(lengths).enumerate() {
             let (film, bound) = (&mut self.film[i], &mut self.bound[i]);
+            let exposed = exposure(i);
+            if exposed.is_some_and(|e| e.submerged) {
+                let capacity = around.capacity * f64::from(length);
+                let soaks = (capacity - *bound) * around.soaked;
+                left.merged += *film - soaks;
+                *film = 0.0;
+                *bound += soaks;
+                self.wetness[i] = ((*bound / capacity) as f32).clamp(0.0, 1.0);
+                self.sheen[i] = 1.0;
+                continue;
+            }
             if *film == 0.0 && *bound == 0.0 && !damp {
                 (self.wetness[i], self.sheen[i]) = (0.0, 0.0);
                 continue;
@@ -105,13 +129,12 @@ impl Moisture {
             let length = f64::from(length);
             let capacity = around.capacity * length;
             let of_capacity = capacity.recip();
-            // Beyond capacity only after the settings changed: what no longer fits comes out.
+            // Exceeds capacity only after settings changed: the excess returns to the film.
             let soaks =
                 ((capacity - *bound) * around.soaked).min(*film).max((capacity - *bound).min(0.0));
             *film -= soaks;
             *bound += soaks;
 
-            let exposed = exposure(i);
             let blown = exposed.map_or(0.0, |e| capacity * f64::from(e.blown));
             let drying = length * exposed.map_or(around.still, |e| around.drying(&e));
             let from_film = (drying + blown).min(*film);
@@ -130,8 +153,10 @@ impl Moisture {
 
             let limit = if i == last { around.hung } else { around.held };
             if *film > limit {
-                // A drop takes all but a neck with it; along the strand only what is too much.
-                let drop = if i == last { 0.8 * *film } else { *film - 0.7 * limit };
+                // A drop at the tip takes most of the film; elsewhere only the excess drips.
+                let drop = if i == last { 0.8 * *film } else { *film - AFTER_DRIP * limit };
+                // The rest of a film that no drop can hold follows in the next substeps.
+                let drop = drop.min(f64::from(*Droplet::VOLUME.valid.end()));
                 *film -= drop;
                 left.drips.push((i, drop));
             }
@@ -140,8 +165,8 @@ impl Moisture {
     }
 
     /// The film flows along each segment as gravity pulls, and creeps from full to empty.
-    fn flow(&mut self, positions: &[Vec3], lengths: &[f32], around: &Surroundings<'_>) {
-        let Surroundings { wetting, gravity, dt, process, diameter, .. } = around;
+    fn flow(&mut self, positions: &[Vec3], lengths: &[f32], around: &WaterConditions<'_>) {
+        let WaterConditions { wetting, gravity, dt, process, diameter, .. } = around;
         let girth = PI * diameter;
         let thinning = WATER as f32 / (3.0 * WATER_VISCOSITY);
         let mut came = 0.0;
@@ -158,7 +183,7 @@ impl Moisture {
             let creep = (wetting.wicking * process / (length * length)).min(0.5 * COURANT);
             let creeping = (above - below) * f64::from(creep);
             let crossing = flowing.copysign(f64::from(along)) + creeping;
-            // Every node is left with what the step before brought: no film below nothing.
+            // Limits the flow so that no film becomes negative.
             let crossing = crossing.clamp(-0.5 * below, 0.5 * above);
             self.film[i] += came - crossing;
             came = crossing;
@@ -182,19 +207,19 @@ mod tests {
         ((0..=n).map(|i| Vec3::NEG_Y * 0.03 * i as f32).collect(), vec![0.03; n])
     }
 
-    fn around(wetting: Wetting, air: &DryingAir, process: f32) -> Surroundings<'_> {
-        Surroundings::new(wetting, Vec3::NEG_Y * 9.8, air, 1.0 / 360.0, process)
+    fn around(wetting: HairWetting, air: &DryingAir, process: f32) -> WaterConditions<'_> {
+        WaterConditions::new(wetting, Vec3::NEG_Y * 9.8, air, 1.0 / 360.0, process)
     }
 
     #[test]
     fn the_film_runs_down_and_drips() {
         let strand = hanging_strand(8);
-        let (wetting, air) = (Wetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
+        let (wetting, air) = (HairWetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
         let around = around(wetting, &air, 1.0);
         let mut m = Moisture::default();
         m.fit(9);
         m.add_film(1, 15e-9);
-        let mut left = Left::default();
+        let mut left = WaterLoss::default();
         // A film is the slower the thinner it is.
         let mut middle = 1.0;
         for seconds in [1, 4, 15] {
@@ -219,17 +244,17 @@ mod tests {
     }
 
     #[test]
-    fn in_the_papers_limit_drying_is_equation_19() {
+    fn drying_in_the_papers_limit_is_equation_19() {
         // Soaked through, no drying but the wind's, no film: dw = −0.3 |Δv_w|.
         let strand = hanging_strand(4);
-        let (wetting, air) = (Wetting { evaporation: 0.0, ..default() }, still());
+        let (wetting, air) = (HairWetting { evaporation: 0.0, ..default() }, still());
         let around = around(wetting, &air, 1.0);
         let mut m = Moisture::default();
         m.fit(5);
-        m.soak(1.0, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
+        m.soak(1.0, 0.0, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
         for _ in 0..100 {
             let blown = |i: usize| Some(Exposure { blown: 0.3 * 0.004 * i as f32, ..default() });
-            m.exchange(&strand.0, &strand.1, &around, blown, &mut Left::default());
+            m.exchange(&strand.0, &strand.1, &around, blown, &mut WaterLoss::default());
         }
         for (i, wet) in m.wetness().iter().enumerate() {
             assert!((wet - (1.0 - 0.12 * i as f32)).abs() < 1e-5, "{i}: {wet}");
@@ -239,12 +264,12 @@ mod tests {
     #[test]
     fn damp_air_wets_and_a_room_dries() {
         let strand = hanging_strand(4);
-        let wetting = Wetting::default();
+        let wetting = HairWetting::default();
         let damp = DryingAir::new(22.0, 0.9, 0.1);
         let mut m = Moisture::default();
         m.fit(5);
-        let mut left = Left::default();
-        let run = |m: &mut Moisture, air: &DryingAir, left: &mut Left| {
+        let mut left = WaterLoss::default();
+        let run = |m: &mut Moisture, air: &DryingAir, left: &mut WaterLoss| {
             let around = around(wetting, air, 3600.0);
             for _ in 0..3600 {
                 m.exchange(&strand.0, &strand.1, &around, |_| None, left);
@@ -268,18 +293,18 @@ mod tests {
             dt in 1e-4f32..0.1,
         ) {
             let strand = hanging_strand(8);
-            let (wetting, air) = (Wetting::default(), still());
+            let (wetting, air) = (HairWetting::default(), still());
             let positions: Vec<Vec3> =
                 points.iter().map(|(x, y)| Vec3::new(*x, *y, 0.0) * 0.1).collect();
-            let around = Surroundings::new(wetting, Vec3::NEG_Y * 9.8, &air, dt, process);
+            let around = WaterConditions::new(wetting, Vec3::NEG_Y * 9.8, &air, dt, process);
             let mut m = Moisture::default();
             m.fit(9);
-            m.soak(share, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
+            m.soak(share, 0.0, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
             film.iter().enumerate().for_each(|(i, f)| m.add_film(i, *f));
             let before = m.volume();
-            let mut left = Left::default();
+            let mut left = WaterLoss::default();
             for _ in 0..50 {
-                let exposed = |_| Some(Exposure { speed: 3.0, warmth: 40.0, blown: 0.001 });
+                let exposed = |_| Some(Exposure { speed: 3.0, warmth: 40.0, blown: 0.001, submerged: false });
                 m.exchange(&positions, &strand.1, &around, exposed, &mut left);
                 prop_assert!(m.film().iter().chain(m.bound()).all(|v| *v >= 0.0 && v.is_finite()));
                 prop_assert!(m.wetness().iter().all(|w| (0.0..=1.0).contains(w)));
@@ -291,8 +316,25 @@ mod tests {
     }
 
     #[test]
+    fn a_film_that_no_drop_can_hold_leaves_in_several() {
+        let strand = hanging_strand(4);
+        let (wetting, air) = (HairWetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
+        let around = around(wetting, &air, 1.0);
+        let mut m = Moisture::default();
+        m.fit(5);
+        m.add_film(2, 5e-3);
+        m.add_film(4, 5e-3);
+        let mut left = WaterLoss::default();
+        (0..60).for_each(|_| m.exchange(&strand.0, &strand.1, &around, |_| None, &mut left));
+        assert!(left.drips.len() >= 10, "{:?}", left.drips);
+        assert!(left.drips.iter().all(|(_, volume)| Droplet::VOLUME.check(*volume).is_ok()));
+        let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
+        assert!((dripped + m.volume() - 10e-3).abs() < 1e-15 && m.volume() < 1e-3, "{dripped}");
+    }
+
+    #[test]
     fn films_flow_the_same_way_whichever_end_is_the_root() {
-        let (wetting, air) = (Wetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
+        let (wetting, air) = (HairWetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
         let around = around(wetting, &air, 1.0);
         let lengths: Vec<f32> = (0..8).map(|i| 0.02 + 0.003 * i as f32).collect();
         // Up and down, so that films run to and fro.

@@ -1,4 +1,4 @@
-//! Water on and in a strand: a film on its surface, water bound inside, and their ways.
+//! Water on and in a strand: a film on its surface, bound water inside, and their transport.
 //!
 //! Two states a node (m³ in `f64`, so that nothing is lost by rounding): the **film** lies on the
 //! lock, flows down, creeps along and drips; the **bound** water has soaked into the fibres, where it
@@ -6,9 +6,9 @@
 
 mod flow;
 
-pub use flow::{Exposure, Left, Surroundings};
+pub(crate) use flow::{Exposure, WaterConditions, WaterLoss};
 
-use super::Counted;
+use super::{Counted, drag::Lock};
 use crate::environment::vapour::WATER;
 use crate::{parallel::prefetch, setting::setting};
 use bevy::prelude::*;
@@ -22,11 +22,11 @@ const PACKING: f32 = 0.6;
 const SATURATION: f32 = 0.31 - 0.0957;
 
 setting! {
-    /// How hair takes water up, gives it away and is pulled by it. Component of a
-    /// [`Hair`](crate::Hair); where absent, [`HairDefault<Wetting>`](crate::HairDefault) holds.
+    /// How hair absorbs and loses water, and the forces of water on it. Component of a
+    /// [`Hair`](crate::Hair); where absent, [`HairDefault<HairWetting>`](crate::HairDefault) holds.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    pub struct Wetting {
+    pub struct HairWetting {
         /// How many fibres a simulated strand stands for: with the diameter its mass, its thickness
         /// and what it holds. At 500 two hundred strands are a head of hair.
         pub fibres: f32 = 500.0, in FIBRES: 1.0..=1e6, safe 1.0..=1e4,
@@ -42,8 +42,8 @@ setting! {
         /// none. Capillary forces give up to 2σ/λ, 57 m/s² for the default's mass λ of a metre of
         /// strand, where all of an edge is bridged.
         pub cohesion: f32 = 10.0, "m/s²" in COHESION: 0.0..=1e3, safe 0.0..=50.0, "10 holds locks";
-        /// Rate at which strands lose their motion against each other where a film or a droplet joins
-        /// them; 0 lets them slip.
+        /// Rate at which the relative velocity of strands decays where a film or a droplet joins them;
+        /// 0 lets them slip.
         pub film_drag: f32 = 30.0, "1/s" in FILM_DRAG: 0.0..=1e6, safe 0.0..=1000.0,
             "30 holds locks";
         /// Rate at which a droplet spreads into the film of what it touches; 0 leaves droplets whole.
@@ -72,7 +72,7 @@ setting! {
     }
 }
 
-impl Wetting {
+impl HairWetting {
     /// Radius of a bundle of `strands` strands' fibres that holds a drop together, √N r (m).
     pub fn bundle(&self, strands: f32) -> f32 {
         (self.fibres * strands).sqrt() * 0.5 * self.fibre_diameter
@@ -89,14 +89,20 @@ impl Wetting {
         self.fibres * KERATIN * PI * radius * radius
     }
 
-    /// What a metre of strand binds when soaked, beyond what it holds in a room (m³/m).
+    /// A metre of strand as surrounding water acts on it.
+    pub(super) fn lock(&self) -> Lock {
+        let dry_mass = self.dry_mass();
+        Lock { diameter: 2.0 * self.lock_radius(), dry_mass, fibres: dry_mass / KERATIN }
+    }
+
+    /// Capacity for bound water of a metre of strand, beyond the regain of a room (m³/m).
     pub fn capacity(&self) -> f64 {
         f64::from(self.dry_mass() * SATURATION) / WATER
     }
 }
 
 /// The water of a strand, node by node, root first. Empty on hair that no water has touched: such
-/// hair costs nothing, and its hydrogen bonds are left to [`Treat`](crate::Treat) and equation 19.
+/// hair costs nothing, and its hydrogen bonds are left to [`HairTreatment`](crate::HairTreatment) and equation 19.
 ///
 /// Where there is water, hydrogen bonds follow it. The tick writes it; to wet hair from game code
 /// spawn a [`Droplet`](crate::Droplet) or send a [`SoakHair`](crate::SoakHair). A clone brings its water
@@ -108,16 +114,19 @@ pub struct Moisture {
     bound: Vec<f64>,
     wetness: Vec<f32>,
     sheen: Vec<f32>,
-    /// How much of it the ledger knows (m³).
+    /// How much of it the ledger has counted (m³).
     #[reflect(ignore)]
     counted: Counted,
 }
+
+/// What a drop that falls off leaves of the film that a node can hold.
+pub(super) const AFTER_DRIP: f64 = 0.7;
 
 /// Share of the film that a node can hold at which it looks wet all over.
 const SHINES_AT: f64 = 0.15;
 
 impl Moisture {
-    /// Whether no water has touched the strand since it was last dry.
+    /// Whether the strand has had no water since it was last dry.
     pub fn is_untouched(&self) -> bool {
         self.film.is_empty()
     }
@@ -147,7 +156,7 @@ impl Moisture {
         self.film.iter().chain(&self.bound).sum()
     }
 
-    /// Makes room for `nodes`. What lay on nodes that are gone is returned.
+    /// Resizes to `nodes`. Returns the water of removed nodes (m³).
     pub(super) fn fit(&mut self, nodes: usize) -> f64 {
         if self.film.len() == nodes {
             return 0.0;
@@ -162,9 +171,9 @@ impl Moisture {
         lost
     }
 
-    /// Makes what somebody wrote into it by reflection fit: all as long as there is film, volumes finite and
-    /// not negative. Says what was found first.
-    pub(super) fn mend(&mut self) -> Option<String> {
+    /// Repairs values written by reflection: arrays of equal length, volumes finite and not negative.
+    /// Returns what was found first.
+    pub(super) fn repair(&mut self) -> Option<String> {
         let nodes = self.film.len();
         let mut found = None;
         for (name, volumes) in [("film", &mut self.film), ("bound water", &mut self.bound)] {
@@ -205,10 +214,15 @@ impl Moisture {
         self.counted.0 += volume;
     }
 
-    /// Brings bound water to a share of what each node can bind and takes the film off. Returns how
-    /// much more there is than before.
-    pub(super) fn soak(&mut self, share: f32, capacities: impl Iterator<Item = f64>) -> f64 {
-        self.film.fill(0.0);
+    /// Sets bound water to a share of each node's capacity and the film to `film` (m³) on each node.
+    /// Returns the change of volume (m³).
+    pub(super) fn soak(
+        &mut self,
+        share: f32,
+        film: f64,
+        capacities: impl Iterator<Item = f64>,
+    ) -> f64 {
+        self.film.fill(film);
         for ((bound, wetness), capacity) in
             self.bound.iter_mut().zip(&mut self.wetness).zip(capacities)
         {
@@ -218,15 +232,15 @@ impl Moisture {
         self.recount()
     }
 
-    /// Puts other water in the place of what there is: film and bound water (m³) of each node, or
-    /// none. Returns how much more there is than before.
+    /// Replaces the water by film and bound water (m³) of each node, or none. Returns the change of
+    /// volume (m³).
     #[cfg(feature = "save")]
     pub(crate) fn replace(
         &mut self,
         film: &[f64],
         bound: &[f64],
         lengths: &[f32],
-        wetting: &Wetting,
+        wetting: &HairWetting,
         gravity: f32,
     ) -> f64 {
         let counted = core::mem::take(&mut self.counted);
@@ -241,25 +255,23 @@ impl Moisture {
         self.recount()
     }
 
-    /// Takes its water as known to the ledger. Returns how much of it was not (m³); less than nothing
-    /// where there is less than was known.
+    /// Marks its water as counted. Returns the difference to what was counted before (m³).
     pub(super) fn recount(&mut self) -> f64 {
         let volume = self.volume();
         volume - core::mem::replace(&mut self.counted, Counted(volume)).0
     }
 
-    /// How much of its water the ledger knows (m³).
+    /// How much of its water the ledger has counted (m³).
     pub(super) fn counted(&self) -> f64 {
         self.counted.0
     }
 
-    /// What goes with it as it goes (m³). The ledger knows nothing of it afterwards: who has taken it
-    /// off an entity may insert it elsewhere.
+    /// Marks its water as not counted and returns it (m³): a removed component may be inserted elsewhere.
     pub(super) fn forget(&mut self) -> f64 {
         core::mem::take(&mut self.counted).0
     }
 
-    /// Asks for its memory.
+    /// Prefetches it.
     pub(super) fn prefetch(&self) {
         prefetch(&self.film);
         prefetch(&self.bound);
@@ -267,7 +279,7 @@ impl Moisture {
         prefetch(&self.sheen);
     }
 
-    /// Forgets the last traces; returns them.
+    /// Removes the last traces of water; returns them (m³).
     pub(super) fn clear(&mut self) -> f64 {
         let rest = self.volume();
         *self = Self::default();
@@ -275,7 +287,7 @@ impl Moisture {
     }
 }
 
-/// How wet a node looks that can hold a film of `held` (m³).
+/// Apparent wetness of a node that can hold a film of `held` (m³).
 fn sheen(film: f64, wetness: f32, held: f64) -> f32 {
     wetness.max((film / (SHINES_AT * held)).min(1.0) as f32)
 }
@@ -295,11 +307,11 @@ mod tests {
     #[test]
     fn a_head_of_hair_weighs_and_holds_what_is_measured() {
         // 100,000 fibres of 25 cm: 127 g, 30 % of it water when soaked.
-        let w = Wetting { fibres: 100_000.0, ..default() };
+        let w = HairWetting { fibres: 100_000.0, ..default() };
         assert!((w.dry_mass() * 0.25 - 0.126).abs() < 0.002);
         let room_to_soaked = w.capacity() * 0.25 * WATER / f64::from(w.dry_mass() * 0.25);
         assert!((room_to_soaked - 0.214).abs() < 0.002);
-        let lock = Wetting::default();
+        let lock = HairWetting::default();
         assert!((lock.lock_radius() - 1.0e-3).abs() < 2e-5);
     }
 }

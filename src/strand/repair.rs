@@ -1,16 +1,16 @@
-//! Strands that were written into by reflection: inspectors and scene files reach private parts, too.
+//! Repair of strands written by reflection: inspectors and scene files reach private fields, too.
 
 use super::{AddedMass, MAX_SEGMENT, MIN_SEGMENT, Strand, StrandHistory};
 use crate::rod::frame::parallel_transport;
 use bevy::prelude::*;
 
-/// A segment whose length nobody knows (m).
+/// Rest length used where the stored one is invalid and cannot be measured (m).
 const UNKNOWN_LENGTH: f32 = 0.01;
 
 impl Strand {
     /// Makes the parts fit each other: all as long as there are nodes, lengths above zero, orientations
     /// unit. Says what was found first.
-    pub(super) fn mend(&mut self) -> Option<String> {
+    pub(crate) fn repair(&mut self) -> Option<String> {
         let nodes = self.positions.len();
         let edges = nodes.saturating_sub(1);
         let mut found = None;
@@ -65,6 +65,12 @@ impl Strand {
                 *tension = 0.0;
             }
         }
+        if self.root_before.take_if(|(p, q)| !(p.is_finite() && q.is_finite())).is_some() {
+            found.get_or_insert_with(|| {
+                "the strand's root before this tick is not finite, expected finite numbers: forgotten"
+                    .into()
+            });
+        }
         // The direct solver keeps no angular velocities, so nothing else would notice.
         for (i, spin) in self.angular_velocities.iter_mut().enumerate() {
             if !spin.is_finite() {
@@ -98,14 +104,14 @@ impl Strand {
     }
 }
 
-/// The most that a node's load may weigh, over its dry mass.
-const MOST_ADDED: f32 = 1e6;
-
 impl AddedMass {
-    /// Brings loads and softening into their ranges. Says what was found first.
-    pub(super) fn mend(&mut self) -> Option<String> {
+    /// The largest added mass of a node, in masses of the dry node.
+    pub(crate) const MOST: f32 = 1e6;
+
+    /// Clamps loads and softening to their ranges. Returns what was found first.
+    pub(super) fn repair(&mut self) -> Option<String> {
         let lists =
-            [("added mass", &mut self.mass, MOST_ADDED), ("softening", &mut self.softening, 1.0)];
+            [("added mass", &mut self.mass, Self::MOST), ("softening", &mut self.softening, 1.0)];
         let mut found = None;
         for (name, values, most) in lists {
             for (i, value) in values.iter_mut().enumerate() {
@@ -113,7 +119,7 @@ impl AddedMass {
                     found.get_or_insert_with(|| {
                         format!("{name} {i} of the strand is {value}, expected 0 to {most}")
                     });
-                    // No number becomes 0.
+                    // NaN becomes 0.
                     *value = value.max(0.0).min(most);
                 }
             }
@@ -123,10 +129,10 @@ impl AddedMass {
 }
 
 impl StrandHistory {
-    /// Forgets a past that is no number: the strand is drawn where it is.
-    pub(super) fn mend(&mut self) -> Option<String> {
+    /// Clears a history that is not finite: the strand is drawn where it is.
+    pub(super) fn repair(&mut self) -> Option<String> {
         if self.root.take_if(|root| !root.is_finite()).is_some() {
-            return Some("the strand's drawn root is no number: forgotten".into());
+            return Some("the strand's drawn root is not finite: ignored".into());
         }
         let unknown = self.positions.iter().position(|p| !p.is_finite())?;
         let is = self.positions[unknown];
@@ -144,18 +150,19 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_strand_is_left_alone() {
+    fn a_valid_strand_is_left_unchanged() {
         let mut strand = strand();
         let before = format!("{strand:?}");
-        assert_eq!(strand.mend(), None);
+        assert_eq!(strand.repair(), None);
         assert_eq!(format!("{strand:?}"), before);
-        assert_eq!(Strand::default().mend(), None);
+        assert_eq!(Strand::default().repair(), None);
     }
 
     #[test]
-    fn what_does_not_fit_is_made_to_and_told() {
+    fn invalid_parts_are_repaired_and_reported() {
         type Spoil = fn(&mut Strand);
-        let spoils: [(Spoil, &str); 10] = [
+        let spoils: [(Spoil, &str); 11] = [
+            (|s| s.root_before = Some((Vec3::NAN, Quat::IDENTITY)), "root before this tick"),
             (|s| s.angular_velocities[1].x = f32::NAN, "angular velocity 1"),
             (|s| s.velocities.clear(), "0 velocities, expected 3"),
             (|s| s.tensions.push(1.0), "3 tensions, expected 2"),
@@ -167,27 +174,27 @@ mod tests {
             (|s| s.rest_lengths[0] = -1.0, "rest length 0 of the strand is -1"),
             (|s| s.orientations[1] = Quat::from_array([0.0; 4]), "orientation 1"),
         ];
-        for (spoil, tells) in spoils {
+        for (spoil, message) in spoils {
             let mut strand = strand();
             spoil(&mut strand);
-            let told = strand.mend().unwrap();
-            assert!(told.contains(tells), "{told}");
-            assert_eq!(strand.mend(), None, "once is enough");
+            let found = strand.repair().unwrap();
+            assert!(found.contains(message), "{found}");
+            assert_eq!(strand.repair(), None, "once is enough");
             assert!(strand.rest_lengths.iter().all(|l| (*l - 0.1).abs() < 1e-6));
             assert!(strand.is_finite());
         }
     }
     #[test]
-    fn loads_that_somebody_wrote_are_brought_into_range() {
+    fn loads_are_clamped_to_their_range() {
         let mut added =
             AddedMass { mass: vec![1.0, f32::NAN, -2.0], softening: vec![0.5, 7.0], ..default() };
         assert!(
-            added.mend().is_some_and(|told| told.contains("added mass 1 of the strand is NaN"))
+            added.repair().is_some_and(|found| found.contains("added mass 1 of the strand is NaN"))
         );
         assert_eq!(
             (&added.mass[..], &added.softening[..]),
             (&[1.0, 0.0, 0.0][..], &[0.5, 1.0][..])
         );
-        assert_eq!(added.mend(), None);
+        assert_eq!(added.repair(), None);
     }
 }

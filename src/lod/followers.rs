@@ -1,9 +1,9 @@
-//! How carried strands go along: they sleep while their guides do, and move once a tick.
+//! Followers in the tick: they sleep while their guides do, and move once a tick.
 
 use super::{
     PresentLod,
     choose::{Follower, Guides},
-    follow::{Frame, Pose},
+    follow::{Frame, StrandPose},
 };
 use crate::{
     parallel::{Nanos, for_each},
@@ -14,7 +14,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// After sleep has been decided on: the carried sleep while all their guides do.
+/// After sleep has been decided: followers sleep while all their guides do.
 pub(crate) fn sync_follower_sleep(
     step: Res<HairStep>,
     mut hairs: Query<(&PresentLod, &mut Guides), With<Hair>>,
@@ -23,7 +23,7 @@ pub(crate) fn sync_follower_sleep(
     let mut any = false;
     for (present, mut guides) in &mut hairs {
         let Guides { strands: ahead, awake, thaws, .. } = guides.bypass_change_detection();
-        any |= core::mem::take(thaws) || present.carried > 0;
+        any |= core::mem::take(thaws) || present.followers > 0;
         for (guide, awake) in ahead.iter().zip(awake) {
             *awake = strands.get(*guide).is_ok_and(|(.., sleep, _)| !sleep.is_asleep());
         }
@@ -32,9 +32,9 @@ pub(crate) fn sync_follower_sleep(
         return;
     }
     let mut per_hair = PerHair::default();
-    for (of, mut strand, mut sleep, mut carried) in &mut strands {
-        if carried.thaws && !sleep.is_follower() {
-            carried.bypass_change_detection().thaws = false;
+    for (of, mut strand, mut sleep, mut follower) in &mut strands {
+        if follower.thaws && !sleep.is_follower() {
+            follower.bypass_change_detection().thaws = false;
             if let Ok((_, guides)) = hairs.get(of.0) {
                 let seconds = step.dt * step.count as f32;
                 let (positions, velocities, _) = strand.bypass_change_detection().motion_parts();
@@ -51,22 +51,22 @@ pub(crate) fn sync_follower_sleep(
         let is_awake = |guide: &(u32, f32)| guides.awake.get(guide.0 as usize) == Some(&true);
         let sleep = sleep.bypass_change_detection();
         let root = strand.positions().first().copied().unwrap_or_default();
-        let carried = carried.bypass_change_detection();
-        let moves = carried.ties.guides.iter().any(is_awake) || carried.root != root;
+        let follower = follower.bypass_change_detection();
+        let moves = follower.ties.guides.iter().any(is_awake) || follower.root != root;
         if moves && sleep.is_asleep() {
             sleep.wake_up();
-            carried.synced_asleep = false;
+            follower.synced_asleep = false;
         } else if !moves && !sleep.is_asleep() {
             sleep.fall_asleep();
             strand.bypass_change_detection().rest();
-            carried.synced_asleep = true;
+            follower.synced_asleep = true;
         }
-        carried.root = root;
+        follower.root = root;
     }
 }
 
-/// At the end of a tick, after the projection: who is carried goes along. Once a tick is enough for
-/// what is seen once a tick, and costs a sixth of once a substep.
+/// At the end of a tick, after the projection: moves followers with their guides. Once a tick is enough
+/// for drawing, and costs a sixth of once a substep.
 pub(crate) fn move_followers(
     step: Res<HairStep>,
     substeps: EffectiveSubsteps,
@@ -81,12 +81,12 @@ pub(crate) fn move_followers(
         if step.index == 0 {
             guides.frame = Frame::default();
         }
-        if present.carried == 0 {
+        if present.followers == 0 {
             continue;
         }
         any |= is_last;
-        if let Some(carry) = pose.frame_delta().filter(|_| substeps.of(hair).is_some()) {
-            guides.frame.then(carry.rotation, carry.translation.into());
+        if let Some(delta) = pose.frame_delta().filter(|_| substeps.of(hair).is_some()) {
+            guides.frame.then(delta.rotation, delta.translation.into());
         }
         for i in 0..if is_last { guides.strands.len() } else { 0 } {
             if guides.awake[i] {
@@ -100,30 +100,30 @@ pub(crate) fn move_followers(
     }
     let mut per_hair = PerHair::default();
     let mut items = Vec::new();
-    for (of, strand, sleep, carried) in &mut strands {
+    for (of, strand, sleep, follower) in &mut strands {
         if sleep.is_follower()
             && !sleep.is_asleep()
             && let Some(index) = per_hair.index(of.0, || {
-                // Orientations of rods that are solved directly have no inertia of their own.
+                // Orientations of directly solved rods have no angular velocity of their own.
                 let spins = solver.of(of.0).method == SolverMethod::Sweeps;
                 Some((hairs.get(of.0).ok()?.3, spins))
             })
         {
-            items.push((index, strand, carried));
+            items.push((index, strand, follower));
         }
     }
     let seconds = step.dt * step.count as f32;
-    for_each(&mut items, Nanos(1_000), |(index, strand, carried)| {
+    for_each(&mut items, Nanos(1_000), |(index, strand, follower)| {
         let (guides, has_spins) = per_hair.values[*index];
         let (positions, velocities, orientations, spins) =
             strand.bypass_change_detection().parts_mut();
         let spins = if has_spins { spins } else { &mut [] };
-        let mut pose = Pose { positions: &mut *positions, velocities, orientations, spins };
-        let carried = carried.bypass_change_detection();
-        let ties = &mut carried.ties;
+        let mut pose = StrandPose { positions: &mut *positions, velocities, orientations, spins };
+        let follower = follower.bypass_change_detection();
+        let ties = &mut follower.ties;
         if !ties.follow(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds) {
-            // Without guides it goes with its root.
-            let way = positions.first().map_or(Vec3::ZERO, |root| *root - carried.root);
+            // Without guides it translates with its root.
+            let way = positions.first().map_or(Vec3::ZERO, |root| *root - follower.root);
             if way.is_finite() {
                 positions.iter_mut().skip(1).for_each(|p| *p += way);
             }

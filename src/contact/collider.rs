@@ -1,0 +1,206 @@
+//! Colliders and their shapes.
+
+use super::{ConvexHull, DistanceGrid, bake::HullError};
+use crate::{
+    setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+    strand::TickPose,
+};
+use bevy::prelude::*;
+
+setting! {
+    /// A solid that hair cannot enter: head, shoulders, floor, pillow. Placed by its transform, which
+    /// may move, turn and scale it; axes of capsule and cylinder are along Y, a plane's solid side is
+    /// against its normal.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # fn setup(mut commands: Commands) {
+    /// commands.spawn((HairCollider::sphere(0.09).unwrap(), Transform::from_xyz(0.0, 1.6, 0.0)));
+    /// # }
+    /// ```
+    #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Transform, TickPose)]
+    pub struct HairCollider {
+        /// Its shape, in the units of its transform.
+        pub shape: ColliderShape = ColliderShape::Sphere(Sphere { radius: 0.09 })
+            => Ranged::clamp_values;
+        /// Coulomb friction of hair on it; 0.4 when wet.
+        pub friction: f32 = 0.3, in FRICTION: 0.0..=100.0, safe 0.0..=2.0, "hair has 0.2 to 0.4";
+    }
+}
+
+/// The shapes of a [`HairCollider`]: Bevy's primitives and what is made of points and meshes. A grid costs
+/// most for nodes that are near it: it is looked up lane by lane.
+#[derive(Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub enum ColliderShape {
+    /// A ball.
+    Sphere(Sphere),
+    /// A capsule along Y.
+    Capsule(Capsule3d),
+    /// The half-space below a plane through the origin.
+    Plane(InfinitePlane3d),
+    /// A solid cylinder along Y.
+    Cylinder(Cylinder),
+    /// A box, with round edges if asked for.
+    Cuboid {
+        /// Its size, edges included.
+        cuboid: Cuboid,
+        /// Radius of its edges (m): at most half of its shortest side.
+        rounding: f32,
+    },
+    /// An ellipsoid along the axes. Distances are exact to a millionth of its size.
+    Ellipsoid {
+        /// Half its axes (m): the longest at most 100 times the shortest.
+        radii: Vec3,
+    },
+    /// The convex hull of points.
+    Hull(ConvexHull),
+    /// Any shape, baked.
+    Grid(DistanceGrid),
+}
+
+impl ColliderShape {
+    /// The range of the length of a plane's normal.
+    pub const NORMAL: ValueRange = ValueRange::new(
+        "ColliderShape::normal's length",
+        0.999..=1.001,
+        "Dir3::new gives a direction",
+    );
+    /// The range of a radius.
+    pub const RADIUS: ValueRange =
+        ValueRange::new("ColliderShape::radius (m)", 1e-5..=1e5, "a head has 0.09");
+    /// The range of each half side of a box.
+    pub const HALF_SIZE: ValueRange =
+        ValueRange::new("ColliderShape::half_size (m)", 1e-5..=1e5, "a pillow has 0.3, 0.1, 0.2");
+    /// The range of the radius of a box' edges.
+    pub const ROUNDING: ValueRange =
+        ValueRange::new("ColliderShape::rounding (m)", 0.0..=1e5, "0 makes edges sharp");
+    /// How many times as long as the shortest axis of an ellipsoid the longest may be.
+    const LONGEST: f32 = 100.0;
+    /// The range of half the length between a capsule's centres, or half a cylinder's height.
+    pub const HALF_LENGTH: ValueRange =
+        ValueRange::new("ColliderShape::half_length (m)", 0.0..=1e5, "0 makes it a point");
+}
+
+impl Ranged for ColliderShape {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        let (radius, half_length) = match self {
+            Self::Sphere(s) => (&mut s.radius, None),
+            Self::Capsule(c) => (&mut c.radius, Some(&mut c.half_length)),
+            Self::Cylinder(c) => (&mut c.radius, Some(&mut c.half_height)),
+            Self::Hull(_) | Self::Grid(_) => return,
+            // `Dir3` keeps its length, but reflection writes into it.
+            Self::Plane(InfinitePlane3d { normal }) => {
+                Self::NORMAL.clamp(&mut normal.length(), || 1.0, violations);
+                *normal = Dir3::new(**normal).unwrap_or(Dir3::Y);
+                return;
+            }
+            Self::Cuboid { cuboid, rounding } => {
+                for side in cuboid.half_size.as_mut() {
+                    Self::HALF_SIZE.clamp(side, || 0.1, violations);
+                }
+                Self::ROUNDING.clamp(rounding, || 0.0, violations);
+                *rounding = rounding.min(cuboid.half_size.min_element());
+                return;
+            }
+            Self::Ellipsoid { radii } => {
+                for radius in radii.as_mut() {
+                    Self::RADIUS.clamp(radius, || 0.09, violations);
+                }
+                *radii = radii.max(Vec3::splat(radii.max_element() / Self::LONGEST));
+                return;
+            }
+        };
+        Self::RADIUS.clamp(radius, || 0.09, violations);
+        if let Some(half_length) = half_length {
+            Self::HALF_LENGTH.clamp(half_length, || 0.0, violations);
+        }
+    }
+}
+
+impl HairCollider {
+    /// A ball of `radius` (m).
+    ///
+    /// # Errors
+    /// When the radius is not positive and finite.
+    pub fn sphere(radius: f32) -> Result<Self, InvalidValue> {
+        Self::from(ColliderShape::Sphere(Sphere::new(radius))).checked()
+    }
+
+    /// A capsule along Y: `radius` and `length` between the centres of its ends (m).
+    ///
+    /// # Errors
+    /// When the radius is not positive or the length negative.
+    pub fn capsule(radius: f32, length: f32) -> Result<Self, InvalidValue> {
+        Self::from(ColliderShape::Capsule(Capsule3d::new(radius, length))).checked()
+    }
+
+    /// A cylinder along Y: `radius` and `height` (m).
+    ///
+    /// # Errors
+    /// When the radius is not positive or the height negative.
+    pub fn cylinder(radius: f32, height: f32) -> Result<Self, InvalidValue> {
+        Self::from(ColliderShape::Cylinder(Cylinder::new(radius, height))).checked()
+    }
+
+    /// The half-space below a plane with this normal.
+    pub fn plane(normal: Dir3) -> Self {
+        ColliderShape::Plane(InfinitePlane3d::new(normal)).into()
+    }
+
+    /// A box of this size (m).
+    ///
+    /// # Errors
+    /// When a side is not positive and finite.
+    pub fn cuboid(size: Vec3) -> Result<Self, InvalidValue> {
+        Self::rounded_cuboid(size, 0.0)
+    }
+
+    /// A box of this size with edges of this radius (m); of at most half of its shortest side.
+    ///
+    /// # Errors
+    /// When a side is not positive, the radius negative, or something not finite.
+    pub fn rounded_cuboid(size: Vec3, rounding: f32) -> Result<Self, InvalidValue> {
+        let cuboid = Cuboid { half_size: 0.5 * size };
+        let made = Self::from(ColliderShape::Cuboid { cuboid, rounding }).checked()?;
+        Ok(made.clamped())
+    }
+
+    /// An ellipsoid of these half axes (m).
+    ///
+    /// # Errors
+    /// When one is not positive and finite.
+    pub fn ellipsoid(radii: Vec3) -> Result<Self, InvalidValue> {
+        let made = Self::from(ColliderShape::Ellipsoid { radii }).checked()?;
+        Ok(made.clamped())
+    }
+
+    /// The convex hull of points (m): [`ConvexHull::new`].
+    ///
+    /// # Errors
+    /// When points are not finite or span no volume.
+    pub fn hull(points: &[Vec3]) -> Result<Self, HullError> {
+        Ok(ColliderShape::Hull(ConvexHull::new(points)?).into())
+    }
+
+    /// What was baked: [`DistanceGrid::bake`].
+    pub fn grid(grid: DistanceGrid) -> Self {
+        ColliderShape::Grid(grid).into()
+    }
+
+    /// The same collider with another friction.
+    ///
+    /// # Errors
+    /// When it is negative or not finite.
+    pub fn with_friction(self, friction: f32) -> Result<Self, InvalidValue> {
+        Self { friction, ..self }.checked()
+    }
+}
+
+impl From<ColliderShape> for HairCollider {
+    fn from(shape: ColliderShape) -> Self {
+        Self { shape, ..default() }
+    }
+}

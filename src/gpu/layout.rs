@@ -1,0 +1,220 @@
+//! Where a strand's numbers lie on the GPU.
+//!
+//! Strands of equal node count form blocks of [`LANES`]; within a block the same vector of neighbouring
+//! strands lies side by side, so that neighbouring threads read neighbouring words. Part `m` of `M` vectors
+//! of node `i` is at `((first + i) · M + m) · LANES + lane`, counted in vectors of four numbers.
+
+use crate::{
+    bond::{Bonds, model::JointBonds},
+    strand::Strand,
+};
+use bevy::math::{Quat, Vec3};
+
+/// How many strands stand side by side.
+pub const LANES: usize = 32;
+
+/// Vectors a node of each buffer.
+pub(super) const POSE: usize = 2;
+pub(super) const MOTION: usize = 2;
+pub(super) const REST: usize = 2;
+pub(super) const BONDS: usize = 4;
+pub(super) const SCRATCH: usize = 8;
+
+/// Bytes a node of all buffers of a hair together.
+pub const BYTES_PER_NODE: usize = 16 * (2 * POSE + MOTION + REST + BONDS + SCRATCH);
+
+/// Where one strand lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Place {
+    first: u32,
+    lane: u32,
+    nodes: u32,
+}
+
+/// Where the strands of a hair lie.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Layout {
+    /// Of each block first node slot, nodes of a strand, strands, number of its first strand.
+    blocks: Vec<[u32; 4]>,
+    places: Vec<Place>,
+    /// Strands in the order of their numbers on the GPU.
+    order: Vec<u32>,
+    slots: u32,
+}
+
+impl Layout {
+    /// For strands of so many nodes each.
+    pub fn of(nodes: &[usize]) -> Self {
+        let mut order: Vec<u32> = (0..nodes.len() as u32).collect();
+        let count = |strand: &u32| nodes[*strand as usize];
+        order.sort_by_key(count);
+        let mut layout = Self { places: vec![Place::default(); nodes.len()], ..Self::default() };
+        let mut number = 0;
+        for alike in order.chunk_by(|a, b| count(a) == count(b)) {
+            let nodes = count(&alike[0]) as u32;
+            for block in alike.chunks(LANES) {
+                let first = layout.slots;
+                layout.blocks.push([first, nodes, block.len() as u32, number]);
+                for (lane, strand) in block.iter().enumerate() {
+                    layout.places[*strand as usize] = Place { first, lane: lane as u32, nodes };
+                }
+                layout.slots += nodes;
+                number += block.len() as u32;
+            }
+        }
+        layout.order = order;
+        layout
+    }
+
+    /// How many strands there are.
+    pub fn strands(&self) -> usize {
+        self.places.len()
+    }
+
+    /// How many blocks, and workgroups, there are.
+    pub fn blocks(&self) -> &[[u32; 4]] {
+        &self.blocks
+    }
+
+    /// How many nodes a strand has.
+    pub fn nodes(&self, strand: usize) -> usize {
+        self.places[strand].nodes as usize
+    }
+
+    /// The strand that has this number on the GPU.
+    pub fn strand_of(&self, number: u32) -> Option<usize> {
+        self.order.get(number as usize).map(|strand| *strand as usize)
+    }
+
+    /// How many vectors a buffer of `parts` vectors a node has.
+    pub fn vectors(&self, parts: usize) -> usize {
+        self.slots as usize * parts * LANES
+    }
+
+    /// Where part `part` of `parts` of a strand's node lies.
+    pub fn index(&self, strand: usize, node: usize, part: usize, parts: usize) -> usize {
+        let Place { first, lane, .. } = self.places[strand];
+        ((first as usize + node) * parts + part) * LANES + lane as usize
+    }
+}
+
+/// A strand as it is handed over.
+#[derive(Clone, Copy, Debug)]
+pub struct StrandView<'a> {
+    /// Places of the nodes (m), root first.
+    pub positions: &'a [Vec3],
+    /// Velocities of the nodes (m/s).
+    pub velocities: &'a [Vec3],
+    /// Frames of the edges.
+    pub orientations: &'a [Quat],
+    /// The scalp's frame.
+    pub root_frame: Quat,
+    /// Rest lengths of the edges (m).
+    pub lengths: &'a [f32],
+    /// Tensions that the last substep left (N, for hair of which a whole node weighs 1 kg).
+    pub tensions: &'a [f32],
+    /// Bonds of the joints.
+    pub joints: &'a [JointBonds],
+}
+
+impl<'a> StrandView<'a> {
+    /// A strand of the tick.
+    pub fn of(strand: &'a Strand, bonds: &'a Bonds) -> Self {
+        Self {
+            positions: strand.positions(),
+            velocities: strand.velocities(),
+            orientations: strand.orientations(),
+            root_frame: strand.root_frame(),
+            lengths: strand.rest_lengths(),
+            tensions: strand.tensions(),
+            joints: &bonds.joints,
+        }
+    }
+}
+
+/// A strand as it is read back.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StrandState {
+    /// Places of the nodes (m), root first.
+    pub positions: Vec<Vec3>,
+    /// Velocities of the nodes (m/s).
+    pub velocities: Vec<Vec3>,
+    /// Frames of the edges.
+    pub orientations: Vec<Quat>,
+    /// The scalp's frame.
+    pub root_frame: Quat,
+    /// Tensions of the edges.
+    pub tensions: Vec<f32>,
+    /// Bonds of the joints.
+    pub joints: Vec<JointBonds>,
+    /// Places of the nodes when the tick began (m).
+    pub before: Vec<Vec3>,
+}
+
+/// What all buffers of a hair hold.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Contents {
+    /// Place; frame, at the tip the scalp's.
+    pub pose: Vec<[f32; 4]>,
+    /// Velocity and tension; place at the tick's start.
+    pub motion: Vec<[f32; 4]>,
+    /// Rest shape; length, share of stiffness, weight in dry nodes, share softened.
+    pub rest: Vec<[f32; 4]>,
+    /// Remembered shape and rate, kind by kind.
+    pub bonds: Vec<[f32; 4]>,
+}
+
+impl Contents {
+    /// Nothing yet, with room for all.
+    pub fn new(layout: &Layout) -> Self {
+        let room = |parts| vec![[0.0; 4]; layout.vectors(parts)];
+        Self { pose: room(POSE), motion: room(MOTION), rest: room(REST), bonds: room(BONDS) }
+    }
+
+    /// Puts a strand into its slots.
+    pub fn put(&mut self, layout: &Layout, strand: usize, view: &StrandView<'_>) {
+        let edges = view.lengths.len();
+        for node in 0..=edges {
+            let at = |part, parts| layout.index(strand, node, part, parts);
+            let place = view.positions[node];
+            let frame = view.orientations.get(node).copied().unwrap_or(view.root_frame);
+            let tension = view.tensions.get(node).copied().unwrap_or(0.0);
+            self.pose[at(0, POSE)] = place.extend(0.0).to_array();
+            self.pose[at(1, POSE)] = frame.to_array();
+            self.motion[at(0, MOTION)] = view.velocities[node].extend(tension).to_array();
+            self.motion[at(1, MOTION)] = place.extend(0.0).to_array();
+            let length = view.lengths.get(node).copied().unwrap_or(0.0);
+            let weight = if node == 0 { 0.0 } else { 1.0 };
+            self.rest[at(0, REST)] = Quat::IDENTITY.to_array();
+            self.rest[at(1, REST)] = [length, 1.0, weight, 0.0];
+            let Some(joint) = view.joints.get(node) else { continue };
+            for (kind, (shape, rate)) in joint.shapes.iter().zip(joint.rates).enumerate() {
+                self.bonds[at(kind, BONDS)] = shape.extend(rate).to_array();
+            }
+        }
+    }
+
+    /// Reads a strand from its slots.
+    pub fn get(&self, layout: &Layout, strand: usize) -> StrandState {
+        let nodes = layout.nodes(strand);
+        let mut state = StrandState::default();
+        let vector = |v: [f32; 4]| Vec3::new(v[0], v[1], v[2]);
+        for node in 0..nodes {
+            let at = |part, parts| layout.index(strand, node, part, parts);
+            let frame = Quat::from_array(self.pose[at(1, POSE)]);
+            let moving = self.motion[at(0, MOTION)];
+            state.positions.push(vector(self.pose[at(0, POSE)]));
+            state.velocities.push(vector(moving));
+            state.before.push(vector(self.motion[at(1, MOTION)]));
+            if node + 1 == nodes {
+                state.root_frame = frame;
+                continue;
+            }
+            state.orientations.push(frame);
+            state.tensions.push(moving[3]);
+            let kinds: [[f32; 4]; 4] = core::array::from_fn(|kind| self.bonds[at(kind, BONDS)]);
+            state.joints.push(JointBonds { shapes: kinds.map(vector), rates: kinds.map(|k| k[3]) });
+        }
+        state
+    }
+}

@@ -1,0 +1,171 @@
+//! What acts on a hair in one substep, as the kernel reads it.
+
+use crate::{
+    bond::Cuticle,
+    rod::obstacle::{Obstacle, Solid},
+};
+use bevy::math::{Affine3A, Isometry3d, Vec3};
+
+/// Obstacles that a record holds at most.
+pub const MOST_OBSTACLES: usize = 64;
+
+/// Blowers that a record holds at most.
+pub const MOST_BLOWERS: usize = 4;
+
+/// Words of a record. Uniform buffers are bound at multiples of 256 bytes.
+pub(super) const WORDS: usize = (HEADER + 32 * MOST_OBSTACLES).next_multiple_of(64);
+
+/// Words before the obstacles.
+const HEADER: usize = 68;
+
+/// A blower in the hair's frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BlowerRecord {
+    /// Its nozzle (m).
+    pub nozzle: Vec3,
+    /// Unit direction of its wind.
+    pub aim: Vec3,
+    /// α of equation 17 (m/s²).
+    pub strength: f32,
+    /// Rate per velocity of equation 19 (s/m).
+    pub drying: f32,
+}
+
+/// What acts on a hair in one substep.
+#[derive(Clone, Debug, Default)]
+pub struct SubstepRecord {
+    /// Length (s).
+    pub dt: f32,
+    /// Gravity in the hair's frame (m/s²).
+    pub gravity: Vec3,
+    /// What the frame's motion does to what rests in the world.
+    pub carry: Option<Isometry3d>,
+    /// The wind of the place in the hair's frame (m/s).
+    pub wind: Vec3,
+    /// Share of its velocity over the air's that hair keeps.
+    pub keep: f32,
+    /// Influences f_j of the bonds.
+    pub influence: [f32; 4],
+    /// Δb asked of every joint, by kind.
+    pub change: [f32; 4],
+    /// The share of its rate that is taken off it besides: a treatment that takes rates the share s of
+    /// the way to b asks for a change of s b and a share of s.
+    pub share: [f32; 4],
+    /// Gravity-bending length (m).
+    pub bending_length: f32,
+    /// Kelvin–Voigt time (s).
+    pub damping: f32,
+    /// Distance that nodes keep from obstacles (m).
+    pub skin: f32,
+    /// Newton steps of the length limiter, at most.
+    pub limiter_steps: u32,
+    /// Wear of the cuticle.
+    pub cuticle: Cuticle,
+    /// Blowers, [`MOST_BLOWERS`] at most.
+    pub blowers: Vec<BlowerRecord>,
+    /// Obstacles in the hair's frame, [`MOST_OBSTACLES`] at most.
+    pub obstacles: Vec<Obstacle>,
+    /// Whether it is the tick's first, which notes where nodes were.
+    pub notes_before: bool,
+    /// Whether the hair comes to rest first, as where it is put elsewhere.
+    pub rests: bool,
+    /// Whether rest shapes are made of the bonds first.
+    pub shapes: bool,
+}
+
+const CARRIES: u32 = 1;
+const SHAPES: u32 = 2;
+const REMEMBERS: u32 = 4;
+const NOTES_BEFORE: u32 = 8;
+const RESTS: u32 = 16;
+
+impl SubstepRecord {
+    /// Appends the record's words.
+    pub fn write(&self, out: &mut Vec<u32>) {
+        let start = out.len();
+        let mut words = Words(out);
+        let blowers = &self.blowers[..self.blowers.len().min(MOST_BLOWERS)];
+        let obstacles = &self.obstacles[..self.obstacles.len().min(MOST_OBSTACLES)];
+        let remembers = blowers.iter().any(|b| b.drying != 0.0)
+            || self.change.iter().chain(&self.share).any(|c| *c != 0.0);
+        let flags = [
+            (self.carry.is_some(), CARRIES),
+            (self.shapes, SHAPES),
+            (remembers, REMEMBERS),
+            (self.notes_before, NOTES_BEFORE),
+            (self.rests, RESTS),
+        ];
+        let flags = flags.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
+        let carry = self.carry.unwrap_or_default();
+        words.vector(self.gravity, self.dt.to_bits());
+        words.numbers(carry.rotation.to_array());
+        words.vector(carry.translation.into(), flags);
+        words.vector(self.wind, self.keep.to_bits());
+        words.numbers(self.influence);
+        words.numbers(self.change);
+        words.numbers(self.share);
+        words.numbers([self.bending_length, self.damping, self.skin]);
+        words.word(self.limiter_steps);
+        words.numbers([self.cuticle.damage, self.cuticle.softening]);
+        words.word(blowers.len() as u32);
+        words.word(obstacles.len() as u32);
+        for blower in blowers {
+            words.vector(blower.nozzle, blower.strength.to_bits());
+            words.vector(blower.aim, blower.drying.to_bits());
+        }
+        words.0.resize(start + HEADER, 0);
+        for obstacle in obstacles {
+            words.obstacle(obstacle);
+        }
+        out.resize(start + WORDS, 0);
+    }
+}
+
+struct Words<'a>(&'a mut Vec<u32>);
+
+impl Words<'_> {
+    fn word(&mut self, word: u32) {
+        self.0.push(word);
+    }
+
+    fn numbers<const N: usize>(&mut self, numbers: [f32; N]) {
+        self.0.extend(numbers.map(f32::to_bits));
+    }
+
+    fn vector(&mut self, v: Vec3, last: u32) {
+        self.numbers(v.to_array());
+        self.word(last);
+    }
+
+    fn obstacle(&mut self, Obstacle { solid, motion, friction }: &Obstacle) {
+        // What the shaders lack is nowhere near any hair; the journal says so.
+        const FAR: Vec3 = Vec3::splat(1e6);
+        let (kind, a, b, radius, half_height) = match *solid {
+            Solid::Placed(_) => (1, FAR, Vec3::ZERO, 0.0, 0.0),
+            Solid::HalfSpace { normal, point } => (0, normal, point, 0.0, 0.0),
+            Solid::Capsule { a, b, radius } => (1, a, b - a, radius, 0.0),
+            Solid::Cylinder { center, axis, radius, half_height } => {
+                (2, center, axis, radius, half_height)
+            }
+        };
+        let (axis, thickness) = match kind {
+            0 => (Vec3::ZERO, 0.0),
+            1 => (b.normalize_or_zero(), radius),
+            _ => (b, radius.min(half_height)),
+        };
+        let across = b.try_normalize().map_or(Vec3::Y, |u| u.any_orthonormal_vector());
+        let moved = motion.unwrap_or(Affine3A::IDENTITY);
+        let rows = moved.matrix3.transpose();
+        let row = |axis: Vec3, offset: f32| axis.extend(offset).to_array();
+        self.vector(a, kind);
+        self.vector(b, radius.to_bits());
+        self.vector(across, half_height.to_bits());
+        self.vector(axis, friction.to_bits());
+        self.numbers(row(rows.x_axis.into(), moved.translation.x));
+        self.numbers(row(rows.y_axis.into(), moved.translation.y));
+        self.numbers(row(rows.z_axis.into(), moved.translation.z));
+        self.numbers([1.0 / b.length_squared().max(1e-20), thickness]);
+        self.word(motion.is_some().into());
+        self.word(0);
+    }
+}

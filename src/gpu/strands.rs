@@ -1,0 +1,224 @@
+//! A hair's strands on a device, and their substeps on a command encoder.
+
+use super::{
+    layout::{BONDS, Contents, Layout, MOTION, POSE, SCRATCH, StrandState, StrandView},
+    pipelines::HairKernels,
+    record::{SubstepRecord, WORDS},
+};
+use bevy::render::{
+    render_resource::{
+        BindGroup, BindGroupEntries, Buffer, BufferBinding, BufferDescriptor, BufferInitDescriptor,
+        BufferUsages, CommandEncoder, MapMode, PollType,
+    },
+    renderer::{RenderDevice, RenderQueue},
+};
+use core::num::NonZeroU64;
+
+/// How strands fared in the substeps since the last report was read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GpuReport {
+    /// Strands that were put back to where a substep began, because it left the finite numbers.
+    pub put_back: u32,
+    /// Strands that were rebuilt from their bonds, because they began it so.
+    pub rebuilt: u32,
+    /// One of them.
+    pub first: Option<usize>,
+}
+
+/// A hair's strands on a device.
+#[derive(Debug)]
+pub struct GpuStrands {
+    layout: Layout,
+    /// In which of the two the present pose is.
+    pub(super) present: usize,
+    pub(super) blocks: Buffer,
+    pub(super) poses: [Buffer; 2],
+    pub(super) motion: Buffer,
+    pub(super) rest: Buffer,
+    pub(super) bonds: Buffer,
+    report: Buffer,
+    /// From the first pose to the second, and back.
+    groups: [BindGroup; 2],
+    records: Option<(Buffer, BindGroup)>,
+    words: Vec<u32>,
+}
+
+impl GpuStrands {
+    /// Hands strands over. Each must have two nodes or more, and a bond for each joint.
+    pub fn new(device: &RenderDevice, kernels: &HairKernels, strands: &[StrandView<'_>]) -> Self {
+        let nodes: Vec<usize> = strands.iter().map(|view| view.positions.len()).collect();
+        let layout = Layout::of(&nodes);
+        let mut contents = Contents::new(&layout);
+        for (strand, view) in strands.iter().enumerate() {
+            contents.put(&layout, strand, view);
+        }
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+        let with = |label, contents: &[u8]| {
+            let label = Some(label);
+            device.create_buffer_with_data(&BufferInitDescriptor { label, contents, usage })
+        };
+        let bytes = |contents: &[[f32; 4]]| bytemuck::cast_slice(contents).to_vec();
+        let pose = bytes(&contents.pose);
+        let blocks = with("hair blocks", bytemuck::cast_slice(layout.blocks()));
+        let poses = [with("hair pose", &pose), with("hair pose", &pose)];
+        let motion = with("hair motion", &bytes(&contents.motion));
+        let rest = with("hair rest shapes", &bytes(&contents.rest));
+        let bonds = with("hair bonds", &bytes(&contents.bonds));
+        let report = with("hair report", &[0; 16]);
+        let scratch = device.create_buffer(&BufferDescriptor {
+            label: Some("hair scratch"),
+            size: 16 * layout.vectors(SCRATCH) as u64,
+            usage,
+            mapped_at_creation: false,
+        });
+        let group = |from: &Buffer, to: &Buffer| {
+            device.create_bind_group(
+                "hair",
+                &kernels.hair,
+                &BindGroupEntries::sequential((
+                    blocks.as_entire_binding(),
+                    from.as_entire_binding(),
+                    to.as_entire_binding(),
+                    motion.as_entire_binding(),
+                    rest.as_entire_binding(),
+                    bonds.as_entire_binding(),
+                    scratch.as_entire_binding(),
+                    report.as_entire_binding(),
+                )),
+            )
+        };
+        let groups = [group(&poses[0], &poses[1]), group(&poses[1], &poses[0])];
+        Self {
+            layout,
+            present: 0,
+            blocks,
+            poses,
+            motion,
+            rest,
+            bonds,
+            report,
+            groups,
+            records: None,
+            words: Vec::new(),
+        }
+    }
+
+    /// Where strands lie.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Adds these substeps to a command encoder, which has to be submitted before the next call.
+    pub fn encode(
+        &mut self,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+        kernels: &HairKernels,
+        encoder: &mut CommandEncoder,
+        substeps: &[SubstepRecord],
+    ) {
+        if substeps.is_empty() || self.layout.strands() == 0 {
+            return;
+        }
+        self.words.clear();
+        for record in substeps {
+            record.write(&mut self.words);
+        }
+        let bytes: &[u8] = bytemuck::cast_slice(&self.words);
+        let size = bytes.len() as u64;
+        if self.records.as_ref().is_none_or(|(buffer, _)| buffer.size() < size) {
+            let buffer = device.create_buffer(&BufferDescriptor {
+                label: Some("hair substeps"),
+                size,
+                usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            let binding = BufferBinding {
+                buffer: &buffer,
+                offset: 0,
+                size: NonZeroU64::new(4 * WORDS as u64),
+            };
+            let entries = BindGroupEntries::single(binding);
+            let group = device.create_bind_group("hair substeps", &kernels.record, &entries);
+            self.records = Some((buffer, group));
+        }
+        let Some((buffer, records)) = &self.records else { return };
+        queue.write_buffer(buffer, 0, bytes);
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&kernels.substep);
+        for index in 0..substeps.len() {
+            pass.set_bind_group(0, &self.groups[self.present], &[]);
+            pass.set_bind_group(1, records, &[(4 * WORDS * index) as u32]);
+            pass.dispatch_workgroups(self.layout.blocks().len() as u32, 1, 1);
+            self.present = 1 - self.present;
+        }
+    }
+
+    /// Submits these substeps alone.
+    pub fn run(
+        &mut self,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+        kernels: &HairKernels,
+        substeps: &[SubstepRecord],
+    ) {
+        let mut encoder = device.create_command_encoder(&Default::default());
+        self.encode(device, queue, kernels, &mut encoder, substeps);
+        queue.submit([encoder.finish()]);
+    }
+
+    /// Waits for the device and reads all strands back; `None` where it does not answer, as when it is
+    /// lost.
+    pub fn read(&self, device: &RenderDevice, queue: &RenderQueue) -> Option<Vec<StrandState>> {
+        let layout = &self.layout;
+        let pose = read_back(device, queue, &self.poses[self.present], layout.vectors(POSE))?;
+        let motion = read_back(device, queue, &self.motion, layout.vectors(MOTION))?;
+        let bonds = read_back(device, queue, &self.bonds, layout.vectors(BONDS))?;
+        let rest = Vec::new();
+        let contents = Contents { pose, motion, rest, bonds };
+        Some((0..layout.strands()).map(|strand| contents.get(layout, strand)).collect())
+    }
+
+    /// Waits for the device and reads how strands fared since the last report.
+    pub fn take_report(&self, device: &RenderDevice, queue: &RenderQueue) -> Option<GpuReport> {
+        let words = read_back(device, queue, &self.report, 1)?[0].map(f32::to_bits);
+        queue.write_buffer(&self.report, 0, &[0; 16]);
+        let first = (words[2] != 0).then(|| self.layout.strand_of(!words[2]));
+        Some(GpuReport { put_back: words[0], rebuilt: words[1], first: first.flatten() })
+    }
+}
+
+/// The first vectors of a buffer.
+fn read_back(
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    buffer: &Buffer,
+    vectors: usize,
+) -> Option<Vec<[f32; 4]>> {
+    if vectors == 0 {
+        return Some(Vec::new());
+    }
+    let size = 16 * vectors as u64;
+    let staging = device.create_buffer(&BufferDescriptor {
+        label: Some("hair read back"),
+        size,
+        usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
+    queue.submit([encoder.finish()]);
+    let (send, receive) = std::sync::mpsc::channel();
+    device.map_buffer(&staging.slice(..), MapMode::Read, move |mapped| {
+        // Nobody listens any more if the device did not answer in time.
+        let _ = send.send(mapped.is_ok());
+    });
+    device.poll(PollType::wait_indefinitely()).ok()?;
+    if !receive.recv().ok()? {
+        return None;
+    }
+    let bytes = staging.slice(..).get_mapped_range();
+    let numbers = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let numbers: Vec<f32> = numbers.collect();
+    Some(numbers.as_chunks::<4>().0.to_vec())
+}

@@ -1,0 +1,45 @@
+// Gravity, drag and wind. Rust twins: src/environment/{systems,wind,blown}.rs.
+
+// The distance in equation 17's d + 1 (m).
+const REFERENCE_DISTANCE: f32 = 0.01;
+
+// Equation 17: wind of a blower on an edge, as an acceleration along its aim (m/s²).
+fn wind_of(b: u32, p: vec3<f32>, e: vec3<f32>) -> f32 {
+    let aim = record.blower[b].aim;
+    let to = p - record.blower[b].nozzle;
+    let along = dot(to, aim);
+    if along <= 0.0 {
+        return 0.0;
+    }
+    let off = to - aim * along;
+    let sine = sqrt(dot(cross(aim, e), cross(aim, e))) / max(sqrt(dot(e, e)), 1e-12);
+    return record.blower[b].strength * sine / (sqrt(dot(off, off)) / REFERENCE_DISTANCE + 1.0);
+}
+
+// What the air does to velocities, and what it asks of hydrogen bonds (equation 19).
+fn blow() {
+    let fallen = record.gravity * record.dt;
+    let taken_along = 1.0 - record.keep;
+    for (var i = 0u; i <= edges; i++) {
+        let m = moving(i);
+        let weight = edge(i).z;
+        var v = m.xyz * record.keep + fallen;
+        var drying = 0.0;
+        if record.blowers > 0u {
+            // The tip has no edge of its own: it takes the last one's wind.
+            let e = min(i, edges - 1u);
+            let along = node(e + 1u).xyz - node(e).xyz;
+            let p = node(i).xyz;
+            var acceleration = vec3(0.0);
+            for (var b = 0u; b < record.blowers; b++) {
+                let wind = wind_of(b, p, along);
+                acceleration += record.blower[b].aim * wind;
+                drying += record.blower[b].drying * wind;
+            }
+            v += acceleration * (record.dt / max(weight, 1.0));
+        }
+        v += record.wind * taken_along;
+        set_moving(i, select(v, vec3(0.0), is_held(weight)), m.w);
+        motion[slot(i, 1u, 2u)].w = drying * record.dt;
+    }
+}

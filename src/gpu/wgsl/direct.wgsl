@@ -1,0 +1,495 @@
+// One direct implicit step of a strand. Rust twins: src/rod/direct/{mod,kernel}.rs.
+
+const THETA: f32 = 0.65;
+const WHIP: f32 = 0.03;
+const STRAIN: f32 = 1e-4;
+const TORN: f32 = 0.01;
+const REPAIRS: u32 = 4u;
+const DEEP: f32 = 0.25;
+const STIFFEST: f32 = 6.0;
+const FIRMEST: f32 = 2.5e10;
+const HOLD: f32 = 100.0;
+const REFERENCE_GRAVITY: f32 = 9.8;
+
+// What makes masses and stiffnesses of a strand.
+var<private> density: f32;
+var<private> bending: f32;
+var<private> axial_stiffness: f32;
+var<private> firmest: f32;
+// The scalp's frame as the substep began, and at θ of it.
+var<private> root_between: vec4<f32>;
+
+fn weigh() {
+    var sum = 0.0;
+    for (var i = 0u; i < edges; i++) {
+        sum += edge(i).x;
+    }
+    let count = f32(edges);
+    density = count / sum;
+    let stiff = min(record.bending_length, sum * STIFFEST);
+    bending = density * (2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
+    axial_stiffness = REFERENCE_GRAVITY * count / STRAIN;
+    firmest = FIRMEST / (count * count * record.dt * record.dt);
+}
+
+// Of a node between edges of lengths `before` and `after`.
+fn mass_of(before: f32, after: f32, weight: f32) -> f32 {
+    return (before + after) * weight * density * 0.5;
+}
+
+fn joint_of(before: f32, after: f32, share: f32) -> f32 {
+    return min(share * bending / (before + after), firmest * after * after);
+}
+
+fn axial_of(length: f32) -> f32 {
+    return min(axial_stiffness / length, firmest);
+}
+
+// Inverse masses beside the places.
+fn weigh_nodes() {
+    var before = 0.0;
+    for (var i = 0u; i <= edges; i++) {
+        let e = edge(i);
+        let after = select(e.x, 0.0, i == edges);
+        set_node(i, node(i).xyz, select(1.0 / mass_of(before, after, e.z), 0.0, is_held(e.z)));
+        before = after;
+    }
+}
+
+struct Stage {
+    theta: f32,
+    ahead: f32,
+    beyond: f32,
+    root_turn: vec3<f32>,
+    damping: f32,
+    // Whether the strand takes two Newton steps, and whether this is the second.
+    twice: bool,
+    second: bool,
+}
+
+struct CarriedEdge {
+    q: vec4<f32>,
+    t: vec3<f32>,
+    r: f32,
+    turn: vec3<f32>,
+    // The same without twist: across itself.
+    swing: vec3<f32>,
+    across: f32,
+    axial: f32,
+    pull: vec3<f32>,
+    coupling: Matrix,
+}
+
+struct Left {
+    next: Symmetric,
+    after: Symmetric,
+    between: Matrix,
+    b_next: vec3<f32>,
+    b_after: vec3<f32>,
+}
+
+// Where a node is at θ of the substep: held ones are on the way to where they are led.
+fn place_at(i: u32, theta: f32) -> vec3<f32> {
+    let n = node(i);
+    if is_held(n.w) {
+        let start = start_of(i);
+        return fma(n.xyz - start, vec3(theta), start);
+    }
+    return n.xyz;
+}
+
+// How far an edge has turned since the substep began until it points along t.
+fn turned_since(i: u32, t: vec3<f32>) -> vec3<f32> {
+    let e = start_of(i + 1u) - start_of(i);
+    let length = sqrt(max(dot(e, e), 1e-30));
+    let cosine = length + dot(e, t);
+    let scale = 2.0 / sqrt(max(2.0 * length * cosine, 1e-30));
+    return select(cross(e, t) * scale, vec3(0.0), cosine < length * 1e-6);
+}
+
+fn newton_down(stage: Stage) {
+    let rate = 1.0 / stage.ahead;
+    let inertia = rate * rate;
+    let damped = stage.damping * rate;
+    let stiffer = 1.0 + damped;
+    var before = CarriedEdge(
+        root_between, tangent(root_between), 0.0, stage.root_turn, stage.root_turn, 0.0, 0.0, vec3(0.0),
+        NO_MATRIX,
+    );
+    var stiff_before = NO_SYMMETRIC;
+    var pull_before = vec3(0.0);
+    var left = Left(NO_SYMMETRIC, NO_SYMMETRIC, NO_MATRIX, vec3(0.0), vec3(0.0));
+    var x = place_at(0u, stage.theta);
+    var length_before = 0.0;
+    for (var j = 0u; j <= edges; j++) {
+        var now = before;
+        now.r = 0.0;
+        now.coupling = NO_MATRIX;
+        var couple = vec3(0.0);
+        var stiff = 0.0;
+        let props = edge(j);
+        let l = select(props.x, 0.0, j == edges);
+        if j < edges {
+            let to = place_at(j + 1u, stage.theta);
+            let e = to - x;
+            x = to;
+            let axial = axial_of(l);
+            let length = sqrt(max(dot(e, e), 1e-30));
+            let crushed = length < l * 0.5;
+            let kept = frame(j);
+            let carried = carry(kept, e, length);
+            let q = select(carried.q, kept, crushed);
+            let r = 1.0 / max(length, l * 0.2);
+            let t = select(e * r, tangent(q), crushed);
+            var turn = carried.turn;
+            if stage.second {
+                turn = turned_since(j, t);
+            }
+            let swing = select(turn, vec3(0.0), crushed);
+            turn = fma(t, vec3(dot(before.turn, t)), swing);
+            set_frame(j, q);
+            let tension = max(max(axial * (length - l), moving(j).w), 0.0);
+            let across = select(tension * r, axial, crushed);
+            let k = joint_of(length_before, l, props.y);
+            let elastic = moment(before.q, q, rest_shape(j), k);
+            // Friction only ever takes energy, also where twist gives way along the strand.
+            let rate = turn - before.turn;
+            let square = max(dot(rate, rate), 1e-30);
+            let taken = clamp(dot(rate, swing - before.swing) / square, 0.0, 1.0);
+            couple = fma(rate, vec3(k * damped * taken), elastic);
+            stiff = k * stiffer;
+            // How the moment of twist turns with the edges; without, twisted strands flutter.
+            let twist = dot(elastic, t) * -0.25 * r * before.r;
+            let coupling = coupling_of(before.t, t, dot(t, before.t), stiff * r * before.r);
+            now = CarriedEdge(
+                q, t, r, turn, swing,
+                fma(stiff * r, r, across),
+                axial,
+                fma(cross(couple, t), vec3(r), fma(t, vec3(-l), e) * axial),
+                plus_cross(coupling, (t + before.t) * twist),
+            );
+        }
+        if j > 0u {
+            // The edge before is whole now.
+            let across = fma(stiff * before.r, before.r, before.across);
+            let h = uniaxial(before.t, before.axial - across, across);
+            let pull = fma(cross(couple, before.t), vec3(-before.r), before.pull);
+            let i = j - 1u;
+            if i > 0u {
+                let e = edge(i);
+                let mass = mass_of(edge(i - 1u).x, e.x, e.z);
+                left = eliminate(
+                    i, mass, stage, inertia,
+                    minus_both(plus_symmetric(stiff_before, h), before.coupling),
+                    minus_symmetric(plus_matrix(before.coupling, now.coupling), h),
+                    now.coupling,
+                    pull - pull_before,
+                    left,
+                );
+            }
+            stiff_before = h;
+            pull_before = pull;
+        }
+        before = now;
+        length_before = l;
+    }
+    let tip = mass_of(edge(edges - 1u).x, 0.0, edge(edges).z);
+    _ = eliminate(edges, tip, stage, inertia, stiff_before, NO_MATRIX, NO_MATRIX, -pull_before, left);
+}
+
+// Node i out of the system: `diagonal` and `next` its blocks, −`far` that with the node after the next,
+// `force` what edges pull it with.
+fn eliminate(
+    i: u32,
+    mass: f32,
+    stage: Stage,
+    inertia: f32,
+    diagonal: Symmetric,
+    next: Matrix,
+    far: Matrix,
+    force: vec3<f32>,
+    left: Left,
+) -> Left {
+    let n = node(i);
+    let inert = mass * inertia;
+    var a = plus_symmetric(diagonal, left.next);
+    a.d += vec3(inert);
+    var b = fma(record.gravity, vec3(mass), force + left.b_next);
+    if stage.twice {
+        a = plus_symmetric(a, uniaxial(support_of(i), inert * HOLD, 0.0));
+        let inertial = fma(moving(i).xyz, vec3(stage.ahead), start_of(i));
+        b = fma(inertial - n.xyz, vec3(inert), b);
+    }
+    let pivot = pivot_of(a, inert * 1e-3, is_held(n.w));
+    let near_unscaled = unscaled(pivot, plus_matrix(next, left.between));
+    let far_unscaled = unscaled(pivot, far);
+    let near_block = scaled(pivot, near_unscaled);
+    let far_block = scaled(pivot, far_unscaled);
+    let y = forward(pivot, b);
+    let solution = y * pivot.inverse;
+    let k = i - 1u;
+    set_row(k, 0u, vec4(near_block.x, solution.x));
+    set_row(k, 1u, vec4(near_block.y, solution.y));
+    set_row(k, 2u, vec4(near_block.z, solution.z));
+    set_row(k, 3u, vec4(far_block.x, pivot.l.x));
+    set_row(k, 4u, vec4(far_block.y, pivot.l.y));
+    set_row(k, 5u, vec4(far_block.z, pivot.l.z));
+    return Left(
+        minus_product(left.after, near_block, near_unscaled),
+        minus_product(NO_SYMMETRIC, far_block, far_unscaled),
+        // `far` is minus the block, so this adds.
+        Matrix(
+            row_from(vec3(0.0), -far_block.x, near_unscaled),
+            row_from(vec3(0.0), -far_block.y, near_unscaled),
+            row_from(vec3(0.0), -far_block.z, near_unscaled),
+        ),
+        times_from(near_block, y, left.b_after),
+        times_from(far_block, -y, vec3(0.0)),
+    );
+}
+
+// From the tip to the root.
+fn newton_up(stage: Stage) {
+    var next = vec3(0.0);
+    var after = vec3(0.0);
+    var end = vec3(0.0);
+    for (var k = 0u; k <= edges; k++) {
+        let i = edges - k;
+        let n = node(i);
+        var y = place_at(i, stage.theta);
+        var solved = vec3(0.0);
+        if i > 0u {
+            let n0 = row(i - 1u, 0u);
+            let n1 = row(i - 1u, 1u);
+            let n2 = row(i - 1u, 2u);
+            let f0 = row(i - 1u, 3u);
+            let f1 = row(i - 1u, 4u);
+            let f2 = row(i - 1u, 5u);
+            let start = transposed_from(
+                Matrix(f0.xyz, f1.xyz, f2.xyz), -after,
+                transposed_from(Matrix(n0.xyz, n1.xyz, n2.xyz), next, vec3(n0.w, n1.w, n2.w)),
+            );
+            let y1 = fma(-f2.w, start.z, start.y);
+            solved = vec3(fma(-f1.w, start.z, fma(-f0.w, y1, start.x)), y1, start.z);
+            y += solved;
+        }
+        if !is_held(n.w) {
+            let start = start_of(i);
+            set_node(i, fma(y - start, vec3(stage.beyond), start), n.w);
+        }
+        if i < edges {
+            let l = edge(i).x;
+            let tension = axial_of(l) * (dot(tangent(frame(i)), end - y) - l);
+            set_moving(i, moving(i).xyz, tension);
+        }
+        end = y;
+        after = next;
+        next = solved;
+    }
+}
+
+// Frames to where nodes have come to, velocities, and the twist of all edges.
+fn finish(stage: Stage) {
+    let rate = 1.0 / record.dt;
+    let forth = rate * stage.beyond;
+    let back = stage.beyond * (stage.ahead * rate - 1.0);
+    var x = vec3(0.0);
+    var q_before = root_frame();
+    var t_before = tangent(q_before);
+    var k_before = 0.0;
+    var moment_before = 0.0;
+    var coupling_before = 0.0;
+    var turns = Elimination(0.0, 0.0, 0.0);
+    var length_before = 0.0;
+    for (var i = 0u; i <= edges; i++) {
+        let n = node(i);
+        let moved = n.xyz - start_of(i);
+        let m = moving(i);
+        var v = fma(m.xyz, vec3(back), moved * forth);
+        if is_held(n.w) {
+            v = moved * rate;
+        }
+        set_moving(i, v, m.w);
+        let e = n.xyz - x;
+        x = n.xyz;
+        if i == 0u {
+            continue;
+        }
+        let props = edge(i - 1u);
+        let length = sqrt(max(dot(e, e), 1e-30));
+        var q = frame(i - 1u);
+        if !(length < props.x * 0.5) {
+            q = carry(q, e, length).q;
+        }
+        set_frame(i - 1u, q);
+        let t = tangent(q);
+        let k = joint_of(length_before, props.x, props.y);
+        let elastic = moment(q_before, q, rest_shape(i - 1u), k);
+        if i > 1u {
+            moment_before -= dot(elastic, t_before);
+            turns = eliminated(turns, coupling_before, k_before + k, -moment_before, 1e-30);
+            note_twist(i - 2u, turns);
+        }
+        coupling_before = -(k * dot(t, t_before));
+        moment_before = dot(elastic, t);
+        q_before = q;
+        t_before = t;
+        k_before = k;
+        length_before = props.x;
+    }
+    turns = eliminated(turns, coupling_before, k_before, -moment_before, 1e-30);
+    note_twist(edges - 1u, turns);
+}
+
+fn note_twist(i: u32, turns: Elimination) {
+    if i > 0u {
+        scratch[slot(i - 1u, 0u, 8u)].y = turns.upper;
+    }
+    set_row(i, 0u, vec4(turns.rhs, 0.0, 0.0, 0.0));
+}
+
+// Turns edges about their tangents until twist is in balance.
+fn untwist() {
+    var twist = 0.0;
+    for (var k = 0u; k < edges; k++) {
+        let i = edges - 1u - k;
+        let r = row(i, 0u);
+        twist = clamp(r.x - r.y * twist, -1.5, 1.5);
+        let q = frame(i);
+        set_frame(i, normalized(fma(vec4(q.y, -q.x, q.w, -q.z), vec4(twist * 0.5), q)));
+    }
+}
+
+// What begins deep inside an obstacle gets out of it with its lengths before the step.
+fn surface() {
+    if record.obstacles == 0u {
+        return;
+    }
+    var deepest = -3.0e38;
+    for (var i = 1u; i <= edges; i++) {
+        let n = node(i);
+        if is_held(n.w) {
+            continue;
+        }
+        for (var o = 0u; o < record.obstacles; o++) {
+            if is_near(o) {
+                deepest = max(deepest, depth_in(o, taken_along(o, n.xyz)).w);
+            }
+        }
+    }
+    if !(edge(0u).x * DEEP < deepest) {
+        return;
+    }
+    sweeps = false;
+    near = vec2(0xffffffffu);
+    for (var i = 0u; i <= edges; i++) {
+        set_support(i, vec3(0.0));
+    }
+    for (var round = 0u; round < 2u * edges; round++) {
+        contacts(0.0, 0.0);
+        if !limit_strained(TORN) {
+            return;
+        }
+    }
+}
+
+fn fall(ahead: f32) {
+    predict_nodes(ahead, record.gravity * ahead);
+    contacts(0.0, 0.0);
+}
+
+// Nodes to the first guess, and what touches. Returns θ.
+fn predict() -> f32 {
+    let gain = record.gravity * record.dt;
+    for (var i = 0u; i <= edges; i++) {
+        let m = moving(i);
+        set_moving(i, m.xyz - gain, m.w);
+        set_support(i, vec3(0.0));
+    }
+    choose_near();
+    surface();
+    var theta = THETA;
+    fall(record.dt * theta);
+    if touched {
+        theta = 1.0;
+        for (var i = 0u; i <= edges; i++) {
+            let n = node(i);
+            if !is_held(n.w) {
+                set_node(i, start_of(i), n.w);
+            }
+        }
+        fall(record.dt);
+    }
+    let ahead = record.dt * theta;
+    let fallen = record.gravity * (ahead * ahead);
+    for (var i = 0u; i <= edges; i++) {
+        let n = node(i);
+        let support = support_of(i);
+        if !(is_held(n.w) || 0.0 < dot(support, support)) {
+            set_node(i, n.xyz - fallen, n.w);
+        }
+    }
+    return theta;
+}
+
+// Whether an edge is about to turn far.
+fn whips() -> bool {
+    var before = moving(0u).xyz;
+    var fastest = 0.0;
+    for (var i = 0u; i < edges; i++) {
+        let v = moving(i + 1u).xyz;
+        let apart = v - before;
+        let l = edge(i).x;
+        fastest = max(fastest, dot(apart, apart) / (l * l));
+        before = v;
+    }
+    return (WHIP / record.dt) * (WHIP / record.dt) < fastest;
+}
+
+// One substep; the scalp's frame was `root_from` when it began.
+fn direct_step(root_from: vec4<f32>) {
+    weigh();
+    weigh_nodes();
+    let theta = predict();
+    let twice = touched || whips();
+    let root = root_frame();
+    let share = select(theta, -theta, dot(root_from, root) < 0.0);
+    root_between = normalized(fma(root, vec4(share), root_from * (1.0 - theta)));
+    let turn = product(root_between, conjugate(root_from));
+    let own = (2.0 * theta - 1.0) * record.dt;
+    var stage = Stage(
+        theta,
+        theta * record.dt,
+        select(1.0 / theta, 1.0, twice),
+        turn.xyz * select(2.0, -2.0, turn.w < 0.0),
+        max(record.damping - own, 0.0),
+        twice,
+        false,
+    );
+    newton_down(stage);
+    newton_up(stage);
+    stage.beyond = 1.0 / theta;
+    if twice {
+        // Which nodes an obstacle bears is not known before: the first step shows.
+        contacts(0.0, 0.0);
+        stage.second = true;
+        newton_down(stage);
+        newton_up(stage);
+    }
+    // What obstacles hold has left that share of its depth.
+    contacts(1.0 + HOLD, 1.0);
+    for (var done = 0u; done < record.limiter_steps; done++) {
+        if !limit_strained(select(TOLERANCE, -1.0, done == 0u)) {
+            break;
+        }
+        contacts(1.0, 1.0);
+        for (var k = 0u; done + 1u == record.limiter_steps && k < REPAIRS; k++) {
+            if !clamp_lengths(TORN) {
+                break;
+            }
+            contacts(1.0, 1.0);
+        }
+    }
+    finish(stage);
+    untwist();
+}

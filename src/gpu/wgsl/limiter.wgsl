@@ -1,0 +1,125 @@
+// Lengths of a whole strand at once. Rust twin: src/rod/limiter.rs.
+
+const FIRMNESS: f32 = 0.95;
+const FOLDING: f32 = 0.125;
+const TOLERANCE: f32 = 5e-4;
+
+struct Elimination {
+    inverse: f32,
+    rhs: f32,
+    upper: f32,
+}
+
+// A row of a symmetric tridiagonal system; where its pivot is below `least`, nothing moves.
+fn eliminated(e: Elimination, coupling: f32, diagonal: f32, rhs: f32, least: f32) -> Elimination {
+    let upper = coupling * e.inverse;
+    let pivot = diagonal - coupling * upper;
+    let inverse = select(1.0 / pivot, 0.0, pivot < least);
+    return Elimination(inverse, (rhs - coupling * e.rhs) * inverse, upper);
+}
+
+// Direction from one node to the next, and the distance.
+fn span(start: vec3<f32>, to: vec3<f32>) -> vec4<f32> {
+    let along = to - start;
+    let length = sqrt(max(dot(along, along), 1e-20));
+    return vec4(along * (1.0 / length), length);
+}
+
+// x · W y of a node.
+fn mobility(w: f32, support: vec3<f32>, x: vec3<f32>, y: vec3<f32>) -> f32 {
+    return w * (dot(x, y) - FIRMNESS * dot(x, support) * dot(y, support));
+}
+
+// One Newton step on the lengths where one is off by more than the share `tolerance`; whether there was.
+fn limit_strained(tolerance: f32) -> bool {
+    var worst = 0.0;
+    var start = node(0u);
+    var start_support = support_of(0u);
+    var end = node(1u);
+    var d = span(start.xyz, end.xyz);
+    var coupling = 0.0;
+    var rows = Elimination(0.0, 0.0, 0.0);
+    for (var i = 0u; i < edges; i++) {
+        let end_support = support_of(i + 1u);
+        var diagonal = mobility(start.w, start_support, d.xyz, d.xyz)
+            + mobility(end.w, end_support, d.xyz, d.xyz);
+        let l = edge(i).x;
+        let off = d.w - l;
+        let strain = abs(off) / l;
+        worst = max(worst, strain);
+        if off < 0.0 {
+            // Levenberg-Marquardt, where there is something to be folded.
+            diagonal = fma(FOLDING * max(strain - TOLERANCE, 0.0), diagonal, diagonal);
+        }
+        rows = eliminated(rows, coupling, diagonal, off, 1e-6);
+        if i > 0u {
+            scratch[slot(i - 1u, 1u, 8u)].x = rows.upper;
+        }
+        set_row(i, 0u, vec4(d.xyz, rows.rhs));
+        scratch[slot(i, 1u, 8u)].x = 0.0;
+        if i + 1u < edges {
+            let next = node(i + 2u);
+            let ahead = span(end.xyz, next.xyz);
+            coupling = -mobility(end.w, end_support, d.xyz, ahead.xyz);
+            d = ahead;
+            start = end;
+            start_support = end_support;
+            end = next;
+        }
+    }
+    if !(tolerance < worst) {
+        return false;
+    }
+    var lambda = 0.0;
+    var pull = vec3(0.0);
+    // The edge after this one: its λ and direction.
+    var after = vec4(0.0);
+    for (var k = 0u; k < edges; k++) {
+        let i = edges - 1u - k;
+        let direction = row(i, 0u);
+        lambda = direction.w - scratch[slot(i, 1u, 8u)].x * lambda;
+        let tension = direction.xyz * lambda;
+        let n = node(i + 1u);
+        var force = pull - tension;
+        if 0u < k {
+            // What pulls a node across a taut strand bears on it where it comes to.
+            let taut = max(0.5 * (lambda + after.w), 0.0);
+            let stiff = taut * n.w / edge(i).x;
+            force -= (after.xyz - direction.xyz) * (taut * stiff / (1.0 + stiff));
+        }
+        after = vec4(direction.xyz, lambda);
+        let support = support_of(i + 1u);
+        let off = dot(force, support);
+        if 0.0 < off {
+            // The strand pulls it off the surface: it is let go.
+            set_support(i + 1u, vec3(0.0));
+        } else {
+            force = fma(support, vec3(-(FIRMNESS * off)), force);
+        }
+        set_node(i + 1u, fma(force, vec3(n.w), n.xyz), n.w);
+        pull = tension;
+    }
+    return true;
+}
+
+// Where Newton steps have failed every torn edge gets its length back, root to tip, but before held nodes.
+fn clamp_lengths(torn: f32) -> bool {
+    var last_held = 0u;
+    for (var i = 1u; i <= edges; i++) {
+        if is_held(node(i).w) {
+            last_held = i;
+        }
+    }
+    var any = false;
+    for (var i = last_held; i < edges; i++) {
+        let l = edge(i).x;
+        let start = node(i).xyz;
+        let end = node(i + 1u);
+        let d = span(start, end.xyz);
+        if d.w < l * (1.0 - torn) || l * (1.0 + torn) < d.w {
+            any = true;
+            set_node(i + 1u, fma(d.xyz, vec3(l), start), end.w);
+        }
+    }
+    return any;
+}

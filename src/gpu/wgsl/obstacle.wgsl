@@ -1,0 +1,250 @@
+// Obstacles and nodes. Rust twins: src/rod/obstacle.rs, src/rod/touch.rs.
+
+const HALF_SPACE: u32 = 0u;
+const CAPSULE: u32 = 1u;
+const CYLINDER: u32 = 2u;
+
+// How far a node may go in a substep, in ways that its velocity alone would take it.
+const FASTER: f32 = 1.5;
+
+// Obstacles that this strand may touch in this substep; whether a node moves so fast against one that it
+// might pass through; whether a node rests on one.
+var<private> near: vec2<u32>;
+var<private> sweeps: bool;
+var<private> touched: bool;
+
+fn is_near(o: u32) -> bool {
+    return ((near[o >> 5u] >> (o & 31u)) & 1u) != 0u;
+}
+
+// Where a point of the surface goes during the substep.
+fn taken_along(o: u32, p: vec3<f32>) -> vec3<f32> {
+    if record.obstacle[o].moves == 0u {
+        return p;
+    }
+    let q = vec4(p, 1.0);
+    return vec3(
+        dot(record.obstacle[o].moved_x, q),
+        dot(record.obstacle[o].moved_y, q),
+        dot(record.obstacle[o].moved_z, q),
+    );
+}
+
+// Direction and length of v; along `other` where it has none.
+fn unit_or(v: vec3<f32>, other: vec3<f32>) -> vec4<f32> {
+    let length = sqrt(dot(v, v));
+    return vec4(select(v * (1.0 / max(length, 1e-12)), other, length < 1e-12), length);
+}
+
+// Normal of the surface nearest to p, and how deep p is below a layer of skin on it.
+fn depth_in(o: u32, p: vec3<f32>) -> vec4<f32> {
+    let kind = record.obstacle[o].kind;
+    let a = record.obstacle[o].a;
+    let b = record.obstacle[o].b;
+    if kind == HALF_SPACE {
+        return vec4(a, record.skin - dot(p - b, a));
+    }
+    let rel = p - a;
+    if kind == CAPSULE {
+        let t = clamp(dot(rel, b * record.obstacle[o].inverse), 0.0, 1.0);
+        let off = unit_or(rel - b * t, record.obstacle[o].across);
+        return vec4(off.xyz, record.obstacle[o].radius + record.skin - off.w);
+    }
+    let along = dot(rel, b);
+    let off = unit_or(rel - b * along, record.obstacle[o].across);
+    let side = record.obstacle[o].radius + record.skin - off.w;
+    let cap = record.obstacle[o].half_height + record.skin - abs(along);
+    if cap < side {
+        return vec4(select(b, -b, along < 0.0), cap);
+    }
+    return vec4(off.xyz, side);
+}
+
+// Whether p is farther than `distance` outside. Wrongly denies near corners only.
+fn is_beyond(o: u32, p: vec3<f32>, distance: f32) -> bool {
+    let kind = record.obstacle[o].kind;
+    let a = record.obstacle[o].a;
+    let b = record.obstacle[o].b;
+    if kind == HALF_SPACE {
+        return distance < dot(p - b, a);
+    }
+    let rel = p - a;
+    let reach = record.obstacle[o].radius + distance;
+    if kind == CAPSULE {
+        let off = rel - b * clamp(dot(rel, b * record.obstacle[o].inverse), 0.0, 1.0);
+        return reach * reach < dot(off, off);
+    }
+    let along = dot(rel, b);
+    let off = rel - b * along;
+    let cap = record.obstacle[o].half_height + distance;
+    return reach * reach < dot(off, off) || cap * cap < along * along;
+}
+
+// Where a node gets to, and whether there was anything in its way with which normal.
+struct Met {
+    place: vec3<f32>,
+    meets: bool,
+    normal: vec3<f32>,
+}
+
+// Out of the solid the shortest way, then back along the surface by Coulomb friction.
+fn push_out(o: u32, p: vec3<f32>, start: vec3<f32>, friction: f32, slides: bool) -> Met {
+    let found = depth_in(o, p);
+    let normal = found.xyz;
+    let depth = found.w;
+    if !(depth > 0.0) {
+        return Met(p, false, vec3(0.0));
+    }
+    let out = fma(normal, vec3(depth), p);
+    if !slides {
+        return Met(out, true, normal);
+    }
+    let slip = out - taken_along(o, start);
+    let tangential = slip - normal * dot(slip, normal);
+    let length = sqrt(dot(tangential, tangential));
+    let held = min(1.0, friction * depth / max(length, 1e-12));
+    return Met(fma(tangential, vec3(-held), out), true, normal);
+}
+
+// Holds a node back that would pass through a thin or fast solid. `fast` says whether it might have.
+struct Swept {
+    place: vec3<f32>,
+    fast: bool,
+    normal: vec3<f32>,
+    passes: bool,
+}
+
+fn continuous_collision(o: u32, start: vec3<f32>, p: vec3<f32>) -> Swept {
+    if record.obstacle[o].kind == HALF_SPACE {
+        return Swept(p, false, vec3(0.0), false);
+    }
+    let thickness = record.obstacle[o].thickness;
+    let way = p - start;
+    if !(0.2 * thickness * thickness < dot(way, way)) {
+        return Swept(p, false, vec3(0.0), false);
+    }
+    let facing = depth_in(o, start);
+    let axis = record.obstacle[o].axis;
+    let apart = start - record.obstacle[o].a;
+    let across_from = fma(axis, vec3(-dot(apart, axis)), apart);
+    let along = fma(axis, vec3(-dot(way, axis)), way);
+    let nearest = clamp(-dot(across_from, along) / max(dot(along, along), 1e-20), 0.0, 1.0);
+    let at_nearest = depth_in(o, fma(way, vec3(nearest), start));
+    let at_middle = depth_in(o, fma(way, vec3(0.5), start));
+    let at_end = depth_in(o, fma(way, vec3(1.0), start));
+    let deepest = max(max(at_nearest.w, at_middle.w), at_end.w);
+    let passes = 0.0 < deepest
+        && dot(at_end.xyz, facing.xyz) < 0.0
+        && facing.w < 1e-3 * thickness;
+    if !passes {
+        return Swept(p, true, vec3(0.0), false);
+    }
+    let behind = max(-dot(way, facing.xyz) + facing.w, 0.0);
+    return Swept(fma(facing.xyz, vec3(behind), p), true, facing.xyz, true);
+}
+
+// Chooses the obstacles of this strand. Held nodes must know where they come from.
+fn choose_near() {
+    near = vec2(0u);
+    if record.obstacles == 0u {
+        return;
+    }
+    var pull = 0.0;
+    var longest = 0.0;
+    for (var i = 0u; i <= edges; i++) {
+        let n = node(i);
+        if is_held(n.w) {
+            let led = n.xyz - start_of(i);
+            pull = max(pull, dot(led, led));
+        }
+        longest = max(longest, select(edge(i).x, 0.0, i == edges));
+    }
+    let margin = sqrt(pull) + longest + record.skin;
+    let ahead = FASTER * record.dt;
+    for (var i = 0u; i <= edges; i++) {
+        let p = node(i).xyz;
+        let v = moving(i).xyz;
+        let own = fma(sqrt(dot(v, v)), ahead, margin);
+        for (var o = 0u; o < record.obstacles; o++) {
+            if is_near(o) {
+                continue;
+            }
+            let moved = taken_along(o, p) - p;
+            let reach = own + sqrt(dot(moved, moved));
+            if !is_beyond(o, p, reach) {
+                near[o >> 5u] |= 1u << (o & 31u);
+            }
+        }
+    }
+}
+
+// p* = p + (v + gain) dt, or on what is in the way.
+fn predict_nodes(dt: f32, gain: vec3<f32>) {
+    sweeps = false;
+    for (var i = 0u; i <= edges; i++) {
+        let n = node(i);
+        if is_held(n.w) {
+            continue;
+        }
+        // What begins inside is set on the surface before the step, which gives it no velocity.
+        var start = n.xyz;
+        for (var o = 0u; o < record.obstacles; o++) {
+            if is_near(o) {
+                let along = taken_along(o, start);
+                let out = push_out(o, along, along, 0.0, false);
+                if out.meets {
+                    start += out.place - along;
+                }
+            }
+        }
+        set_start(i, start);
+        var to = fma(moving(i).xyz + gain, vec3(dt), start);
+        for (var o = 0u; o < record.obstacles; o++) {
+            if is_near(o) {
+                let swept = continuous_collision(o, taken_along(o, start), to);
+                to = swept.place;
+                sweeps = sweeps || swept.fast;
+            }
+        }
+        set_node(i, to, n.w);
+    }
+}
+
+// Takes nodes out of obstacles, and notes what touches. Friction heeds `resting` of the depth where a node
+// rested in the pass before, else `others`.
+fn contacts(resting: f32, others: f32) {
+    touched = false;
+    if near.x == 0u && near.y == 0u {
+        return;
+    }
+    for (var i = 0u; i <= edges; i++) {
+        let n = node(i);
+        let held = is_held(n.w);
+        let start = start_of(i);
+        let rested = support_of(i);
+        let grip = select(others, resting, dot(rested, rested) > 0.0);
+        var p = n.xyz;
+        var rests_on = vec3(0.0);
+        for (var o = 0u; o < record.obstacles; o++) {
+            if !is_near(o) {
+                continue;
+            }
+            if sweeps {
+                let swept = continuous_collision(o, taken_along(o, start), p);
+                if swept.passes {
+                    p = select(swept.place, p, held);
+                    rests_on = swept.normal;
+                    touched = true;
+                }
+            }
+            let out = push_out(o, p, start, grip * record.obstacle[o].friction, true);
+            if out.meets {
+                p = select(out.place, p, held);
+                rests_on = out.normal;
+                touched = true;
+            }
+        }
+        set_node(i, p, n.w);
+        set_support(i, rests_on);
+    }
+}

@@ -1,0 +1,168 @@
+// A strand in memory and what acts on it in a substep. Layout: src/gpu/layout.rs; the record:
+// src/gpu/record.rs.
+
+const LANES: u32 = 32u;
+const MOST_OBSTACLES: u32 = 64u;
+
+struct Obstacle {
+    // Half-space: its normal. Capsule: one end. Cylinder: its centre.
+    a: vec3<f32>,
+    kind: u32,
+    // Half-space: a point. Capsule: from one end to the other. Cylinder: the axis.
+    b: vec3<f32>,
+    radius: f32,
+    // Some direction across the axis.
+    across: vec3<f32>,
+    half_height: f32,
+    // The unit axis; zero where there is none.
+    axis: vec3<f32>,
+    friction: f32,
+    // How a point of the surface moves: three rows of an affine map.
+    moved_x: vec4<f32>,
+    moved_y: vec4<f32>,
+    moved_z: vec4<f32>,
+    // Inverse square of the axis' length, thickness, 1 if it moves.
+    inverse: f32,
+    thickness: f32,
+    moves: u32,
+    unused: u32,
+}
+
+struct Blower {
+    nozzle: vec3<f32>,
+    strength: f32,
+    aim: vec3<f32>,
+    drying: f32,
+}
+
+struct Substep {
+    // Gravity in the hair's frame (m/s²), length (s).
+    gravity: vec3<f32>,
+    dt: f32,
+    // What the frame's motion does to what rests in the world.
+    carry_turn: vec4<f32>,
+    carry_move: vec3<f32>,
+    flags: u32,
+    // The wind of the place (m/s), share of its velocity that hair keeps against the air.
+    wind: vec3<f32>,
+    keep: f32,
+    influence: vec4<f32>,
+    // Δb asked of every joint, by kind, and the share of its rate that is taken off it.
+    change: vec4<f32>,
+    share: vec4<f32>,
+    bending_length: f32,
+    damping: f32,
+    skin: f32,
+    limiter_steps: u32,
+    cuticle_damage: f32,
+    cuticle_softening: f32,
+    blowers: u32,
+    obstacles: u32,
+    blower: array<Blower, 4>,
+    obstacle: array<Obstacle, MOST_OBSTACLES>,
+}
+
+// Bits of Substep::flags.
+const CARRIES: u32 = 1u;
+const SHAPES: u32 = 2u;
+const REMEMBERS: u32 = 4u;
+const NOTES_BEFORE: u32 = 8u;
+const RESTS: u32 = 16u;
+
+// Of each block of strands: first node slot, nodes of a strand, strands, number of its first strand.
+@group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;
+// Two a node: place and nothing; frame, at the tip the scalp's.
+@group(0) @binding(1) var<storage, read> pose_in: array<vec4<f32>>;
+// The same; beside the place stands the inverse mass.
+@group(0) @binding(2) var<storage, read_write> pose_out: array<vec4<f32>>;
+// Two a node: velocity and tension; place at the tick's start and drying.
+@group(0) @binding(3) var<storage, read_write> motion: array<vec4<f32>>;
+// Two a node: rest shape; length, share of stiffness, weight in dry nodes (0 held), share softened.
+@group(0) @binding(4) var<storage, read_write> rest: array<vec4<f32>>;
+// Four a node: remembered shape and rate of each kind.
+@group(0) @binding(5) var<storage, read_write> bonds: array<vec4<f32>>;
+// Eight a node, of no meaning between substeps.
+@group(0) @binding(6) var<storage, read_write> scratch: array<vec4<f32>>;
+// Strands put back, rebuilt, and of the first of them the number from the end.
+@group(0) @binding(7) var<storage, read_write> report: array<atomic<u32>, 4>;
+@group(1) @binding(0) var<uniform> record: Substep;
+
+// The strand of this thread.
+var<private> first: u32;
+var<private> lane: u32;
+var<private> edges: u32;
+var<private> number: u32;
+
+fn slot(i: u32, part: u32, parts: u32) -> u32 {
+    return ((first + i) * parts + part) * LANES + lane;
+}
+
+// Place and inverse mass.
+fn node(i: u32) -> vec4<f32> {
+    return pose_out[slot(i, 0u, 2u)];
+}
+
+fn set_node(i: u32, place: vec3<f32>, w: f32) {
+    pose_out[slot(i, 0u, 2u)] = vec4(place, w);
+}
+
+fn frame(i: u32) -> vec4<f32> {
+    return pose_out[slot(i, 1u, 2u)];
+}
+
+fn set_frame(i: u32, q: vec4<f32>) {
+    pose_out[slot(i, 1u, 2u)] = q;
+}
+
+// The scalp's frame.
+fn root_frame() -> vec4<f32> {
+    return pose_in[slot(edges, 1u, 2u)];
+}
+
+// Velocity and tension.
+fn moving(i: u32) -> vec4<f32> {
+    return motion[slot(i, 0u, 2u)];
+}
+
+fn set_moving(i: u32, v: vec3<f32>, tension: f32) {
+    motion[slot(i, 0u, 2u)] = vec4(v, tension);
+}
+
+// Length, share of stiffness, weight, share softened.
+fn edge(i: u32) -> vec4<f32> {
+    return rest[slot(i, 1u, 2u)];
+}
+
+fn rest_shape(i: u32) -> vec4<f32> {
+    return rest[slot(i, 0u, 2u)];
+}
+
+fn row(i: u32, part: u32) -> vec4<f32> {
+    return scratch[slot(i, part, 8u)];
+}
+
+fn set_row(i: u32, part: u32, value: vec4<f32>) {
+    scratch[slot(i, part, 8u)] = value;
+}
+
+// Where a node began the substep.
+fn start_of(i: u32) -> vec3<f32> {
+    return scratch[slot(i, 6u, 8u)].xyz;
+}
+
+fn set_start(i: u32, place: vec3<f32>) {
+    scratch[slot(i, 6u, 8u)] = vec4(place, 0.0);
+}
+
+// Normal of the obstacle that it rests on, or zero.
+fn support_of(i: u32) -> vec3<f32> {
+    return scratch[slot(i, 7u, 8u)].xyz;
+}
+
+fn set_support(i: u32, normal: vec3<f32>) {
+    scratch[slot(i, 7u, 8u)] = vec4(normal, 0.0);
+}
+
+fn is_held(w: f32) -> bool {
+    return w < 1e-12;
+}

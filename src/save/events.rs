@@ -1,0 +1,94 @@
+//! Hairdos for systems: requests, and what comes of them.
+
+use super::{Hairdo, HairdoError, put_on::tell};
+use bevy::prelude::*;
+
+/// A request: what is the hairdo of this [`Hair`](crate::Hair)? Answered by [`HairdoTaken`] on the
+/// same entity, or by [`HairdoRefused`].
+///
+/// ```
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+/// #[derive(Resource)]
+/// struct Photo(Vec<u8>);
+///
+/// fn at_the_hairdresser(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
+///     commands.entity(*hair).observe(|taken: On<HairdoTaken>, mut commands: Commands| {
+///         commands.insert_resource(Photo(taken.hairdo.to_bytes()));
+///     });
+///     commands.trigger(TakeHairdo { entity: *hair });
+/// }
+///
+/// fn the_same_please(hair: Single<Entity, With<Hair>>, photo: Res<Photo>, mut commands: Commands) -> Result {
+///     let hairdo = Hairdo::from_bytes(&photo.0)?;
+///     commands.trigger(PutOnHairdo { entity: *hair, hairdo });
+///     Ok(())
+/// }
+/// ```
+#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct TakeHairdo {
+    /// The hair.
+    pub entity: Entity,
+}
+
+/// The answer to [`TakeHairdo`].
+#[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct HairdoTaken {
+    /// The hair.
+    pub entity: Entity,
+    /// Its hairdo at the moment of the request.
+    pub hairdo: Hairdo,
+}
+
+/// A request: put this hairdo on this [`Hair`](crate::Hair), strand by strand where it has as many
+/// strands and nodes ([`Hairdo::apply`]), else resampled ([`Hairdo::apply_resampled`]). Answered by
+/// [`HairdoPutOn`] on the same entity, or by [`HairdoRefused`].
+#[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct PutOnHairdo {
+    /// The hair.
+    pub entity: Entity,
+    /// What it is to wear.
+    pub hairdo: Hairdo,
+}
+
+/// Triggered on a [`Hair`](crate::Hair) that wears the hairdo of a [`PutOnHairdo`].
+#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct HairdoPutOn {
+    /// The hair.
+    pub entity: Entity,
+}
+
+/// Triggered on what a [`TakeHairdo`] or [`PutOnHairdo`] named when it cannot be; told as a
+/// [`HairFault`](crate::HairFault) too. The hair is as it was.
+#[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct HairdoRefused {
+    /// What was named.
+    pub entity: Entity,
+    /// Why.
+    pub error: HairdoError,
+}
+
+pub(super) fn take(request: On<TakeHairdo>, mut commands: Commands) {
+    let hair = request.entity;
+    commands.queue(move |world: &mut World| match Hairdo::of(world, hair) {
+        Ok(hairdo) => world.trigger(HairdoTaken { entity: hair, hairdo }),
+        Err(error) => refuse(world, hair, error),
+    });
+}
+
+pub(super) fn put_on(request: On<PutOnHairdo>, mut commands: Commands) {
+    let PutOnHairdo { entity: hair, hairdo } = request.event().clone();
+    commands.queue(move |world: &mut World| match hairdo.apply_fitting(world, hair) {
+        Ok(()) => world.trigger(HairdoPutOn { entity: hair }),
+        Err(error) => refuse(world, hair, error),
+    });
+}
+
+fn refuse(world: &mut World, hair: Entity, error: HairdoError) {
+    tell(world, hair, error.clone());
+    world.trigger(HairdoRefused { entity: hair, error });
+}

@@ -1,0 +1,23 @@
+//! The plugin.
+
+use super::{Hairdo, HairdoError, StyledStrand, events};
+use bevy::prelude::*;
+
+/// Registers hairdos for reflection, and serves requests for them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SavePlugin;
+
+impl Plugin for SavePlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Hairdo>()
+            .register_type::<StyledStrand>()
+            .register_type::<HairdoError>()
+            .register_type::<events::TakeHairdo>()
+            .register_type::<events::HairdoTaken>()
+            .register_type::<events::PutOnHairdo>()
+            .register_type::<events::HairdoPutOn>()
+            .register_type::<events::HairdoRefused>()
+            .add_observer(events::take)
+            .add_observer(events::put_on);
+    }
+}

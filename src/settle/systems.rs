@@ -1,0 +1,146 @@
+//! After a tick of the game: some ticks of hair that settles.
+
+use super::{HairSettling, Settling};
+use crate::{
+    bond::BondChanges,
+    schedule::{Ahead, HairSettle, HairStep, HairTicks},
+    setting::{self, Settings},
+    strand::{Hair, Strand, StrandHistory, Strands, TickPose},
+};
+use bevy::{
+    ecs::{
+        schedule::{InternedScheduleLabel, ScheduleLabel},
+        system::SystemState,
+    },
+    prelude::*,
+};
+
+/// Hair settles before it is drawn.
+#[derive(Clone, Debug)]
+pub struct SettlePlugin {
+    schedule: InternedScheduleLabel,
+}
+
+impl SettlePlugin {
+    /// For hair that ticks in `schedule`.
+    pub fn for_schedule(schedule: impl ScheduleLabel) -> Self {
+        Self { schedule: schedule.intern() }
+    }
+}
+
+impl Plugin for SettlePlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<HairSettling>(app);
+        app.register_type::<Settling>().add_systems(
+            self.schedule,
+            settle.after(HairTicks).run_if(any_with_component::<Settling>),
+        );
+    }
+}
+
+/// For how long all of it has to be still (s): a swing's turning point does not last so long.
+const OUTLASTS: f32 = 0.25;
+
+/// What settles in this tick of the game, and how.
+type Settlers = Vec<(Entity, HairSettling)>;
+
+fn settlers(
+    hairs: Query<(Entity, Option<&Strands>), (With<Hair>, With<Settling>)>,
+    settings: Settings<HairSettling>,
+    strands: Query<(&Strand, &StrandHistory)>,
+) -> Settlers {
+    // A tick of the game has to come first: it ties roots, fits bonds and sees what is around.
+    let has_ticked = |members: &Strands| {
+        let mut theirs = strands.iter_many(members.collection());
+        theirs.all(|(strand, history)| history.positions.len() == strand.nodes())
+    };
+    let ready = hairs.iter().filter(|(_, members)| members.is_some_and(has_ticked));
+    ready.map(|(hair, _)| (hair, settings.of(hair))).collect()
+}
+
+/// Takes hair that settles through some ticks of its own, all of it together.
+fn settle(world: &mut World) {
+    let mut hairs = world.run_system_cached(settlers).unwrap_or_default();
+    let present = *world.resource::<HairStep>();
+    if hairs.is_empty() || present.count == 0 {
+        return;
+    }
+    // Nothing moves meanwhile: neither the head nor what is around.
+    for mut pose in world.query::<&mut TickPose>().iter_mut(world) {
+        pose.bypass_change_detection().hold();
+    }
+    let mut calm = SystemState::<Calm>::new(world);
+    for round in 0.. {
+        hairs.retain(|(hair, settings)| {
+            let settling = world.get::<Settling>(*hair);
+            let goes_on = settling.is_some_and(|settling| {
+                settling.done < settings.ticks && settling.still < OUTLASTS
+            });
+            if !goes_on {
+                end(world, *hair);
+            }
+            goes_on && round < settings.at_once
+        });
+        if hairs.is_empty() {
+            break;
+        }
+        world.resource_mut::<Ahead>().0 = Some(hairs.iter().map(|(hair, _)| *hair).collect());
+        for index in 0..present.count {
+            *world.resource_mut::<HairStep>() = HairStep { index, ..present };
+            world.run_schedule(HairSettle);
+        }
+        let seconds = present.dt * present.count as f32;
+        for (hair, settings) in &hairs {
+            let Ok(calm) = calm.get_mut(world) else { continue };
+            calm.slow_down(*hair, settings, seconds);
+        }
+    }
+    world.resource_mut::<Ahead>().0 = None;
+    *world.resource_mut::<HairStep>() = present;
+}
+
+/// What a hair that settles is slowed down by.
+#[derive(bevy::ecs::system::SystemParam)]
+struct Calm<'w, 's> {
+    hairs: Query<'w, 's, (&'static mut Settling, &'static Strands)>,
+    strands: Query<'w, 's, (&'static mut Strand, &'static mut BondChanges)>,
+}
+
+impl Calm<'_, '_> {
+    /// After a tick ahead of so many seconds.
+    fn slow_down(mut self, hair: Entity, settings: &HairSettling, seconds: f32) {
+        let Ok((mut settling, members)) = self.hairs.get_mut(hair) else { return };
+        let keep = bevy::math::ops::exp(-settings.damping * seconds);
+        let mut fastest: f32 = 0.0;
+        let mut members = self.strands.iter_many_mut(members.collection());
+        while let Some((mut strand, mut changes)) = members.fetch_next() {
+            // A dryer that blows meanwhile has dried nothing.
+            *changes.bypass_change_detection() = default();
+            let (_, velocities, _, spins) = strand.bypass_change_detection().parts_mut();
+            for v in velocities.iter_mut().chain(spins) {
+                *v *= keep;
+            }
+            fastest = velocities.iter().map(|v| v.length_squared()).fold(fastest, f32::max);
+        }
+        settling.done += 1;
+        settling.still =
+            if fastest.sqrt() < settings.speed { settling.still + seconds } else { 0.0 };
+    }
+}
+
+/// The hair is at rest and is drawn from now on.
+fn end(world: &mut World, hair: Entity) {
+    let members = world.get::<Strands>(hair).map(|members| members.collection().to_vec());
+    for strand in members.unwrap_or_default() {
+        if let Ok(mut strand) = world.get_entity_mut(strand)
+            && let Ok((mut strand, mut history)) =
+                strand.get_components_mut::<(&mut Strand, &mut StrandHistory)>()
+        {
+            strand.bypass_change_detection().rest();
+            history.bypass_change_detection().remember(&strand);
+        }
+    }
+    if let Ok(mut hair) = world.get_entity_mut(hair) {
+        hair.remove::<Settling>();
+    }
+}

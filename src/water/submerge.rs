@@ -1,0 +1,145 @@
+//! `ExternalForces`: what hair meets in a [`WaterVolume`](super::WaterVolume), before the air acts on it.
+
+use super::{
+    HairWetting, Moisture, WaterLedger,
+    drag::Lock,
+    model::clinging,
+    moisture::AFTER_DRIP,
+    volume::{LocalVolumes, Volumes},
+};
+use crate::{
+    environment::HairGravity,
+    parallel::{Nanos, for_each_part, tables},
+    schedule::EffectiveSubsteps,
+    setting::{Ranged, Settings},
+    strand::{AddedMass, Hair, InWater, PerHair, Strand, StrandOf, StrandSleep, TickPose},
+};
+use bevy::prelude::*;
+
+/// About what a strand takes (ns).
+const SUBMERGE: Nanos = Nanos(800);
+
+/// A node that is under water by more than this has no film.
+const UNDER: f32 = 0.5;
+
+impl InWater {
+    /// Whether water is all around, rather than on it.
+    pub(super) fn is_under(&self) -> bool {
+        self.share >= UNDER
+    }
+}
+
+/// What all strands of a hair meet.
+struct LocalWater {
+    volumes: LocalVolumes,
+    lock: Lock,
+    /// The film that a node has as it comes out (m³).
+    film: f64,
+    /// How long the substep is that the hair takes now; `None` where it waits.
+    dt: Option<f32>,
+}
+
+pub(super) fn submerge(
+    steps: EffectiveSubsteps,
+    gravity: Res<HairGravity>,
+    wetting: Settings<HairWetting>,
+    volumes: Volumes,
+    hairs: Query<&TickPose, With<Hair>>,
+    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture)>,
+    mut ledger: ResMut<WaterLedger>,
+    mut were_any: Local<bool>,
+) {
+    // Once more when the last one is gone: what was under it is out of it.
+    if volumes.are_none() && !core::mem::take(&mut *were_any) {
+        return;
+    }
+    *were_any = !volumes.are_none();
+    let gravity = gravity.clamped().0.length();
+    let water_of = |hair: Entity| {
+        let pose = hairs.get(hair).ok()?.now();
+        let wetting = wetting.of(hair);
+        Some(LocalWater {
+            volumes: volumes.seen_from(pose),
+            lock: wetting.lock(),
+            film: AFTER_DRIP * clinging(wetting.bundle(1.0), gravity),
+            dt: steps.of(hair).map(|step| step.dt),
+        })
+    };
+    let came = for_each_part(
+        SUBMERGE,
+        tables(&mut strands),
+        || (),
+        |(), rows| {
+            let (mut waters, mut came) = (PerHair::default(), [0.0, 0.0]);
+            for (of, sleep, strand, added, moisture) in rows {
+                if let Some(water) = waters.index(of.0, || water_of(of.0)) {
+                    let dt = waters.values[water].dt.filter(|_| sleep.is_simulated());
+                    let [film, lost] = immerse(&waters.values[water], dt, strand, added, moisture);
+                    came[0] += film;
+                    came[1] += lost;
+                }
+            }
+            came
+        },
+    );
+    for [film, lost] in came {
+        ledger.water_in += film;
+        ledger.water_out += lost;
+    }
+}
+
+/// Takes a strand into the water, or out of it: its nodes' velocities and weights and, where it comes
+/// out, their film. Returns how much that is (m³), and what was on nodes that are gone.
+fn immerse(
+    water: &LocalWater,
+    dt: Option<f32>,
+    strand: &mut Strand,
+    added: &mut AddedMass,
+    moisture: &mut Moisture,
+) -> [f64; 2] {
+    let nodes = strand.nodes();
+    let root = strand.positions().first().copied().unwrap_or(Vec3::NAN);
+    let near = water.volumes.depth(root).is_some_and(|(depth, _)| depth > -strand.length());
+    if nodes < 2 || (!near && added.in_water.is_empty()) {
+        return [0.0; 2];
+    }
+    // Somebody may have given it fewer nodes.
+    added.in_water.resize(nodes, InWater::default());
+    let lost = moisture.fit(nodes);
+    let mut came = 0.0;
+    let mut any = false;
+    for i in 0..nodes {
+        let (positions, lengths) = (strand.positions(), strand.rest_lengths());
+        let place = positions[i];
+        let segment = |i: Option<usize>| i.and_then(|i| lengths.get(i)).copied().unwrap_or(0.0);
+        let own = 0.5 * (segment(i.checked_sub(1)) + segment(Some(i)));
+        let depth = water.volumes.depth(place);
+        // As far as half the segments on either side reach.
+        let share = depth.map_or(0.0, |(depth, _)| (0.5 + depth / own.max(1e-6)).clamp(0.0, 1.0));
+        let before = added.in_water[i];
+        added.in_water[i] = InWater { share, ..default() };
+        if let Some((_, medium)) = depth.filter(|_| share > 0.0) {
+            any = true;
+            let (a, b) = (positions[i.saturating_sub(1)], positions[(i + 1).min(nodes - 1)]);
+            let load = added.mass.get(i).copied().unwrap_or(0.0);
+            // While it waits for a longer substep, it is as it was.
+            added.in_water[i] = InWater { share, ..before };
+            if let Some(dt) = dt {
+                let velocity = &mut strand.velocities_mut()[i];
+                let tangent = (b - a).normalize_or(Vec3::Y);
+                let (slowed, in_water) =
+                    water.lock.immerse(*velocity, tangent, load, (share, medium), dt);
+                (*velocity, added.in_water[i]) = (slowed, in_water);
+            }
+        }
+        if before.is_under() && share < UNDER {
+            let film = (water.film - moisture.film()[i]).max(0.0);
+            moisture.add_film(i, film);
+            came += film;
+        }
+    }
+    if !any {
+        added.in_water.clear();
+    }
+    [came, lost]
+}

@@ -1,0 +1,154 @@
+//! Places that are full of water.
+
+use super::drag::Water;
+use crate::{
+    environment::ZoneShape,
+    setting::{InvalidValue, Ranged, setting},
+    strand::{Pose, TickPose},
+};
+use bevy::{ecs::system::SystemParam, prelude::*};
+
+setting! {
+    /// A place full of water: a lake, a pool, a drop as large as a head. Hair that is under it weighs what
+    /// buoyancy leaves, is slowed by the water and goes with its current; it soaks, has neither film nor
+    /// droplets, and locks come apart. What comes out of it is dripping wet. Droplets that fall in are
+    /// gone; the [`WaterLedger`](crate::WaterLedger) counts what goes in and comes out.
+    ///
+    /// Where volumes overlap a node is in that in which it is deepest.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # let mut world = World::new();
+    /// // a lake whose surface is at the height of a character's chest, flowing slowly
+    /// let lake = WaterVolume { current: Vec3::X * 0.1, ..WaterVolume::lake() };
+    /// world.spawn((lake, Transform::from_xyz(0.0, 1.3, 0.0)));
+    /// ```
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Transform, TickPose)]
+    pub struct WaterVolume {
+        /// What it looks like.
+        pub shape: ZoneShape = ZoneShape::Box;
+        /// Half its size along each of its axes, scaled with its transform; a
+        /// [`HalfSpace`](ZoneShape::HalfSpace) has none.
+        pub half_size: Vec3 = Vec3::ONE, "m" in HALF_SIZE: 1e-3..=1e6, safe 0.1..=1000.0,
+            "1 is a tub";
+        /// Density. Hair has 1310 and floats on what is denser.
+        pub density: f32 = 1000.0, "kg/m³" in DENSITY: 1.0..=2e4, safe 500.0..=2000.0,
+            "fresh water has 1000, the sea 1025";
+        /// Dynamic viscosity.
+        pub viscosity: f32 = 1e-3, "Pa s" in VISCOSITY: 1e-6..=1e3, safe 1e-4..=10.0,
+            "water has 1e-3, oil 0.1";
+        /// Velocity of the water, along the volume's axes.
+        pub current: Vec3 = Vec3::ZERO, "m/s" in CURRENT: -100.0..=100.0, safe -5.0..=5.0,
+            "a stream has 1 m/s";
+    }
+}
+
+impl WaterVolume {
+    /// A box of so much to each side of its middle (m).
+    ///
+    /// # Errors
+    /// When a side is not between 1 mm and 1000 km.
+    pub fn pool(half_size: Vec3) -> Result<Self, InvalidValue> {
+        Self { half_size, ..default() }.checked()
+    }
+
+    /// All that is below the entity.
+    pub fn lake() -> Self {
+        Self { shape: ZoneShape::HalfSpace, ..default() }
+    }
+}
+
+/// A volume as seen from a frame, its values valid.
+#[derive(Clone, Copy, Debug)]
+struct LocalVolume {
+    shape: ZoneShape,
+    half_size: Vec3,
+    /// From the frame to the volume's, in metres of the volume.
+    rotation: Quat,
+    origin: Vec3,
+    scale: f32,
+    water: Water,
+}
+
+/// All volumes as seen from a frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LocalVolumes(Vec<LocalVolume>);
+
+/// All volumes.
+#[derive(SystemParam)]
+pub(super) struct Volumes<'w, 's> {
+    volumes: Query<'w, 's, (&'static WaterVolume, &'static TickPose)>,
+}
+
+impl Volumes<'_, '_> {
+    pub fn are_none(&self) -> bool {
+        self.volumes.is_empty()
+    }
+
+    /// Seen in the frame of `pose`.
+    pub fn seen_from(&self, pose: &Pose) -> LocalVolumes {
+        let seen = self.volumes.iter().map(|(volume, at)| {
+            let (volume, at) = (volume.clamped(), at.now());
+            let WaterVolume { shape, half_size, density, viscosity, current } = volume;
+            let current = pose.direction_in(at.rotation * current);
+            LocalVolume {
+                shape,
+                half_size,
+                rotation: at.rotation.inverse() * pose.rotation,
+                origin: pose.point_in(at.translation),
+                scale: pose.scale / at.scale,
+                water: Water { density, viscosity, current },
+            }
+        });
+        LocalVolumes(seen.collect())
+    }
+}
+
+impl LocalVolumes {
+    /// How deep a place is in the volume in which it is deepest (m), less than nothing outside, and that
+    /// volume's water. A place that is not finite is in none.
+    pub fn depth(&self, place: Vec3) -> Option<(f32, &Water)> {
+        let depths = self.0.iter().map(|volume| {
+            let LocalVolume { shape, half_size, rotation, origin, scale, water } = volume;
+            let place = *rotation * (place - *origin) * *scale;
+            (-shape.distance(*half_size, place) / scale, water)
+        });
+        depths.filter(|(depth, _)| depth.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Whether a place is in any.
+    pub fn contain(&self, place: Vec3) -> bool {
+        self.depth(place).is_some_and(|(depth, _)| depth > 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f32::consts::FRAC_PI_2;
+
+    #[test]
+    fn depths_are_those_of_the_deepest_volume_in_the_hairs_own_measure() {
+        let local = |shape, at: Vec3, rotation, scale, density| LocalVolume {
+            shape,
+            half_size: Vec3::new(1.0, 0.5, 2.0),
+            rotation,
+            origin: at,
+            scale,
+            water: Water { density, viscosity: 1e-3, current: Vec3::ZERO },
+        };
+        let quarter = Quat::from_rotation_z(FRAC_PI_2);
+        let pool = local(ZoneShape::Box, Vec3::X, quarter, 2.0, 1.0);
+        let lake = local(ZoneShape::HalfSpace, Vec3::NEG_Y, Quat::IDENTITY, 1.0, 2.0);
+        let both = LocalVolumes(vec![pool, lake]);
+        // The box lies on its side, and is half as large to the hair: 0.25 m along X, 0.5 along Y.
+        let at = |x: f32, y: f32| both.depth(Vec3::new(x, y, 0.0)).unwrap();
+        assert!((at(1.1, 0.0).0 - 0.15).abs() < 1e-6 && at(1.1, 0.0).1.density == 1.0);
+        assert!((at(1.0, 0.7).0 + 0.2).abs() < 1e-6);
+        assert!((at(1.0, -3.0).0 - 2.0).abs() < 1e-6 && at(1.0, -3.0).1.density == 2.0);
+        assert!(both.contain(Vec3::X) && !both.contain(Vec3::Y) && !both.contain(Vec3::NAN));
+        assert!(LocalVolumes::default().depth(Vec3::ZERO).is_none());
+    }
+}

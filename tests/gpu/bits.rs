@@ -1,0 +1,143 @@
+//! What never changes a bit, and what is contained.
+
+use crate::lab::{Device, LabStrand, Random, plain};
+use bevy::{math::Isometry3d, prelude::*};
+use bevy_keratin::{
+    bond::model::JointBonds,
+    gpu::{StrandState, SubstepRecord},
+    rod::obstacle::{Obstacle, Solid},
+};
+
+/// Strands of mixed lengths that fall onto a ball and a floor.
+fn strands(count: usize) -> Vec<LabStrand> {
+    let mut random = Random(5);
+    (0..count).map(|i| LabStrand::random(&mut random, 2 + i * 7 % 31, 0.5)).collect()
+}
+
+fn records(count: usize) -> Vec<SubstepRecord> {
+    let solids = [
+        Solid::HalfSpace { normal: Vec3::Y, point: Vec3::NEG_Y * 0.12 },
+        Solid::Capsule { a: Vec3::ZERO, b: Vec3::ZERO, radius: 0.06 },
+    ];
+    let obstacles = solids.map(|solid| Obstacle { solid, motion: None, friction: 0.4 });
+    let turn = Isometry3d::from_rotation(Quat::from_rotation_y(0.01));
+    (0..count)
+        .map(|i| SubstepRecord {
+            obstacles: obstacles.to_vec(),
+            carry: (i % 4 < 2).then_some(turn),
+            change: [if i % 2 == 0 { -0.01 } else { 0.01 }, 0.0, 0.0, 0.0],
+            ..plain()
+        })
+        .collect()
+}
+
+fn bits(strand: &StrandState) -> Vec<u32> {
+    let vectors = [&strand.positions, &strand.velocities];
+    let mut numbers: Vec<f32> =
+        vectors.iter().flat_map(|v| v.iter().flat_map(|v| v.to_array())).collect();
+    numbers.extend(strand.orientations.iter().flat_map(|q| q.to_array()));
+    numbers.extend(&strand.tensions);
+    for JointBonds { shapes, rates } in &strand.joints {
+        numbers.extend(shapes.iter().flat_map(|s| s.to_array()).chain(*rates));
+    }
+    numbers.iter().map(|x| x.to_bits()).collect()
+}
+
+#[test]
+fn hand_over_and_return_without_a_substep_change_no_bit() {
+    let Some(device) = Device::get() else { return };
+    let strands = strands(70);
+    let on = device.hand_over(&strands);
+    for (strand, back) in strands.iter().zip(on.read(&device.device, &device.queue).unwrap()) {
+        let expected = StrandState {
+            positions: strand.positions.clone(),
+            velocities: strand.velocities.clone(),
+            orientations: strand.orientations.clone(),
+            root_frame: strand.root_frame,
+            tensions: strand.tensions.clone(),
+            joints: strand.joints.clone(),
+            before: strand.positions.clone(),
+        };
+        assert_eq!(bits(&back), bits(&expected));
+        assert_eq!((back.root_frame, back.before), (expected.root_frame, expected.before));
+    }
+}
+
+#[test]
+fn ten_runs_are_equal_to_the_bit_whatever_stands_beside_and_however_they_are_submitted() {
+    let Some(device) = Device::get() else { return };
+    let (strands, records) = (strands(70), records(12));
+    let all = device.run(&mut device.hand_over(&strands), &records);
+    for run in 1..10 {
+        let mut on = device.hand_over(&strands);
+        // So many substeps a submission.
+        for some in records.chunks(run) {
+            on.run(&device.device, &device.queue, &device.kernels, some);
+        }
+        let again = on.read(&device.device, &device.queue).unwrap();
+        assert!(all.iter().zip(&again).all(|(a, b)| bits(a) == bits(b)), "run {run}");
+    }
+    let mut fewer: Vec<LabStrand> = strands.iter().step_by(3).cloned().collect();
+    fewer.reverse();
+    let few = device.run(&mut device.hand_over(&fewer), &records);
+    for (a, b) in all.iter().step_by(3).zip(few.iter().rev()) {
+        assert_eq!(bits(a), bits(b));
+    }
+}
+
+#[test]
+fn what_is_no_number_stays_with_its_strand_and_is_counted_once() {
+    let Some(device) = Device::get() else { return };
+    let (sound, records) = (strands(70), records(6));
+    let expected = device.run(&mut device.hand_over(&sound), &records);
+    let mut broken = sound.clone();
+    broken[9].velocities[1] = Vec3::splat(f32::NAN);
+    broken[23].velocities[1].x = f32::INFINITY;
+    broken[40].positions[1].y = f32::NAN;
+    broken[55].orientations[0] = Quat::from_xyzw(f32::NAN, 0.0, 0.0, 1.0);
+    broken[61].positions[1].x = f32::MAX;
+    let mut on = device.hand_over(&broken);
+    let found = device.run(&mut on, &records);
+    let report = on.take_report(&device.device, &device.queue).unwrap();
+    assert_eq!((report.put_back, report.rebuilt), (2, 3));
+    let first = report.first.unwrap();
+    assert!([9, 23, 40, 55, 61].contains(&first), "{first}");
+    assert_eq!(on.take_report(&device.device, &device.queue), Some(default()));
+    for (i, (a, b)) in expected.iter().zip(&found).enumerate() {
+        if [9, 23, 40, 55, 61].contains(&i) {
+            let numbers = bits(b).into_iter().map(f32::from_bits);
+            assert!(numbers.clone().all(f32::is_finite), "strand {i}");
+            assert_eq!(b.positions[0], sound[i].positions[0], "strand {i} keeps its root");
+        } else {
+            assert_eq!(bits(a), bits(b), "strand {i}");
+        }
+    }
+}
+
+#[test]
+fn a_shaken_strand_of_64_segments_holds_its_length() {
+    let Some(device) = Device::get() else { return };
+    let points: Vec<Vec3> = (0..65).map(|i| Vec3::NEG_Y * (0.24 / 64.0 * i as f32)).collect();
+    let mut strand = LabStrand::along(&points);
+    let dt: f32 = 1.0 / 360.0;
+    let place = |i: usize| 0.1 * (core::f32::consts::TAU * 3.0 * dt * i as f32).sin();
+    let substep = |i: usize| SubstepRecord {
+        dt,
+        keep: (-2.0 * dt).exp(),
+        // In the frame of the root, which is shaken.
+        carry: Some(Isometry3d::from_translation(Vec3::X * (place(i) - place(i + 1)))),
+        ..plain()
+    };
+    let records: Vec<SubstepRecord> = (0..720).map(substep).collect();
+    let mut on = device.hand_over(std::slice::from_ref(&strand));
+    let (mut peak, mut widest) = (0.0f32, 0.0f32);
+    for some in records.chunks(2) {
+        let state = device.run(&mut on, some).remove(0);
+        strand.take(&state);
+        peak = peak.max(strand.peak_strain());
+        widest = widest.max(strand.positions[64].x.abs());
+    }
+    println!("peak strain {peak:.2e}, the tip goes {widest:.3} m aside");
+    assert!(peak < 0.015, "strain {peak}");
+    assert!(widest > 0.05, "it is shaken: {widest}");
+}

@@ -1,0 +1,16 @@
+//! Hair by compute shaders.
+#![cfg(feature = "gpu")]
+
+#[path = "../common/mod.rs"]
+mod common;
+mod lab;
+#[path = "../common/offscreen.rs"]
+mod offscreen;
+mod twin;
+
+mod bits;
+mod closed_forms;
+mod journal;
+mod layout;
+mod present;
+mod substep;

@@ -1,0 +1,646 @@
+//! A substep of one strand in f64, written for itself: dense matrices, no lanes. What the lanes and the
+//! shader are both measured against.
+
+use crate::lab::LabStrand;
+use bevy::math::{DAffine3, DMat3, DQuat, DVec3, Isometry3d, Quat, Vec3};
+use bevy_keratin::{
+    bond::model::cuticle_factor,
+    gpu::SubstepRecord,
+    rod::obstacle::{Obstacle, Solid},
+};
+
+const THETA: f64 = 0.65;
+const HOLD: f64 = 100.0;
+const FIRMNESS: f64 = 0.95;
+const GRAVITY: f64 = 9.8_f32 as f64;
+
+fn d(v: Vec3) -> DVec3 {
+    v.as_dvec3()
+}
+
+fn dq(q: Quat) -> DQuat {
+    q.as_dquat()
+}
+
+fn tangent(q: DQuat) -> DVec3 {
+    q * DVec3::Z
+}
+
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+fn cross_matrix(v: DVec3) -> DMat3 {
+    DMat3::from_cols(v.cross(DVec3::X), v.cross(DVec3::Y), v.cross(DVec3::Z))
+}
+
+/// q turned the shortest way so that its tangent is along e, and twice the turn's vector part.
+fn carry(q: DQuat, e: DVec3) -> (DQuat, DVec3) {
+    let (t, len) = (tangent(q), e.length());
+    let cosine = len + t.dot(e);
+    let turn = if cosine < len * 1e-6 {
+        DQuat::from_vec4((q * DVec3::X).extend(0.0))
+    } else {
+        let scale = 1.0 / (2.0 * len * cosine).sqrt();
+        DQuat::from_vec4((t.cross(e) * scale).extend(cosine * scale))
+    };
+    ((turn * q).normalize(), 2.0 * turn.xyz())
+}
+
+fn moment(before: DQuat, q: DQuat, rest: DQuat, k: f64) -> DVec3 {
+    let apart = q * (before * rest).conjugate();
+    apart.xyz() * if apart.w < 0.0 { -2.0 * k } else { 2.0 * k }
+}
+
+/// Ω with real part ≥ 0.
+fn darboux(before: DQuat, q: DQuat) -> DQuat {
+    let omega = before.conjugate() * q;
+    if omega.w < 0.0 { -omega } else { omega }
+}
+
+pub struct Twin {
+    pub p: Vec<DVec3>,
+    pub v: Vec<DVec3>,
+    pub q: Vec<DQuat>,
+    pub tension: Vec<f64>,
+    /// Remembered shape and rate of each joint's kinds.
+    pub bonds: Vec<[(DVec3, f64); 4]>,
+    from: Vec<DVec3>,
+    root: DQuat,
+    l: Vec<f64>,
+    k: Vec<f64>,
+    axial: Vec<f64>,
+    rest: Vec<DQuat>,
+    mass: Vec<f64>,
+    support: Vec<DVec3>,
+    drying: Vec<f64>,
+    touched: bool,
+    sweeps: bool,
+}
+
+impl Twin {
+    pub fn of(s: &LabStrand) -> Self {
+        let edges = s.lengths.len();
+        let kinds = |j: usize| {
+            let joint = &s.joints[j];
+            core::array::from_fn(|kind| (d(joint.shapes[kind]), f64::from(joint.rates[kind])))
+        };
+        Self {
+            p: s.positions.iter().map(|p| d(*p)).collect(),
+            v: s.velocities.iter().map(|v| d(*v)).collect(),
+            q: s.orientations.iter().map(|q| dq(*q)).collect(),
+            tension: s.tensions.iter().map(|t| f64::from(*t)).collect(),
+            bonds: (0..edges).map(kinds).collect(),
+            from: vec![DVec3::ZERO; edges + 1],
+            root: dq(s.root_frame),
+            l: s.lengths.iter().map(|l| f64::from(*l)).collect(),
+            k: vec![0.0; edges],
+            axial: vec![0.0; edges],
+            rest: vec![DQuat::IDENTITY; edges],
+            mass: vec![0.0; edges + 1],
+            support: vec![DVec3::ZERO; edges + 1],
+            drying: vec![0.0; edges],
+            touched: false,
+            sweeps: false,
+        }
+    }
+
+    fn edges(&self) -> usize {
+        self.l.len()
+    }
+
+    fn w(&self, i: usize) -> f64 {
+        if i == 0 { 0.0 } else { 1.0 / self.mass[i] }
+    }
+
+    pub fn substep(&mut self, r: &SubstepRecord) {
+        let dt = f64::from(r.dt);
+        let mut root_from = self.root;
+        let mut root_place = self.p[0];
+        if let Some(Isometry3d { rotation, translation }) = r.carry {
+            let (turn, way) = (dq(rotation), d(translation.into()));
+            root_place = turn * self.p[0] + way;
+            self.p.iter_mut().skip(1).for_each(|p| *p = turn * *p + way);
+            self.v.iter_mut().for_each(|v| *v = turn * *v);
+            self.q.iter_mut().for_each(|q| *q = (turn * *q).normalize());
+            root_from = turn * self.root;
+        }
+        self.blow(r);
+        self.shape(r);
+        self.weigh(r);
+        self.from.clone_from(&self.p);
+        self.from[0] = root_place;
+        self.v[0] = DVec3::ZERO;
+        let theta = self.predict(r);
+        let twice = self.touched || self.whips(dt);
+        let share = if root_from.dot(self.root) < 0.0 { -theta } else { theta };
+        let between = (root_from * (1.0 - theta) + self.root * share).normalize();
+        let turn = between * root_from.conjugate();
+        let root_turn = turn.xyz() * if turn.w < 0.0 { -2.0 } else { 2.0 };
+        let damping = (f64::from(r.damping) - (2.0 * theta - 1.0) * dt).max(0.0);
+        let stage = (theta, between, root_turn, damping, twice);
+        self.newton(r, stage, if twice { 1.0 } else { 1.0 / theta }, false);
+        if twice {
+            self.contacts(r, 0.0, 0.0);
+            self.newton(r, stage, 1.0 / theta, true);
+        }
+        self.contacts(r, 1.0 + HOLD, 1.0);
+        for pass in 0..r.limiter_steps {
+            if !self.limit(if pass == 0 { -1.0 } else { 5e-4 }) {
+                break;
+            }
+            self.contacts(r, 1.0, 1.0);
+            if pass + 1 == r.limiter_steps && self.clamp_lengths(0.01) {
+                self.contacts(r, 1.0, 1.0);
+            }
+        }
+        self.finish(dt, theta);
+        self.remember(r);
+    }
+
+    fn blow(&mut self, r: &SubstepRecord) {
+        let (dt, keep) = (f64::from(r.dt), f64::from(r.keep));
+        let edges = self.edges();
+        for i in 0..=edges {
+            let e = i.min(edges - 1);
+            let edge = self.p[e + 1] - self.p[e];
+            let (mut acceleration, mut drying) = (DVec3::ZERO, 0.0);
+            for b in &r.blowers {
+                let (to, aim) = (self.p[i] - d(b.nozzle), d(b.aim));
+                let along = to.dot(aim);
+                if along > 0.0 {
+                    let sine = aim.cross(edge).length() / edge.length();
+                    let apart = (to - aim * along).length();
+                    let wind = f64::from(b.strength) * sine / (apart / 0.01 + 1.0);
+                    acceleration += aim * wind;
+                    drying += f64::from(b.drying) * wind;
+                }
+            }
+            self.v[i] =
+                self.v[i] * keep + d(r.gravity) * dt + acceleration * dt + d(r.wind) * (1.0 - keep);
+            if i < edges {
+                self.drying[i] = drying * dt;
+            }
+        }
+    }
+
+    fn omega(&self, i: usize) -> DQuat {
+        darboux(if i == 0 { self.root } else { self.q[i - 1] }, self.q[i])
+    }
+
+    fn shape(&mut self, r: &SubstepRecord) {
+        let mut distance = 0.0;
+        for i in 0..self.edges() {
+            let (mut sum, mut closed, mut total) = (DVec3::ZERO, 0.0, 0.0);
+            for ((shape, rate), f) in self.bonds[i].iter().zip(r.influence) {
+                let f = f64::from(f);
+                (sum, closed, total) = (sum + *shape * f * *rate, closed + f * rate, total + f);
+            }
+            let share = closed / total;
+            self.rest[i] = if share < 1e-3 {
+                self.omega(i)
+            } else {
+                let v = sum / closed;
+                DQuat::from_vec4(v.extend((1.0 - v.length_squared()).max(0.0).sqrt()))
+            };
+            let factor = cuticle_factor(distance as f32, r.cuticle.damage, r.cuticle.softening);
+            self.k[i] = share.max(1e-3) * f64::from(factor);
+            distance += self.l[i];
+        }
+    }
+
+    fn weigh(&mut self, r: &SubstepRecord) {
+        let sum: f64 = self.l.iter().sum();
+        let count = self.edges() as f64;
+        let density = count / sum;
+        let stiff = f64::from(r.bending_length).min(6.0 * sum);
+        let bending = density * 2.0 * GRAVITY * stiff.powi(3);
+        let firmest = 2.5e10 / (count * count * f64::from(r.dt).powi(2));
+        let mut before = 0.0;
+        for i in 0..=self.edges() {
+            let after = self.l.get(i).copied().unwrap_or(0.0);
+            if i < self.edges() {
+                self.k[i] = (self.k[i] * bending / (before + after)).min(firmest * after * after);
+                self.axial[i] = (GRAVITY * count / 1e-4 / after).min(firmest);
+            }
+            self.mass[i] = (before + after) * density * 0.5;
+            before = after;
+        }
+    }
+
+    fn predict(&mut self, r: &SubstepRecord) -> f64 {
+        let (dt, gravity) = (f64::from(r.dt), d(r.gravity));
+        self.v.iter_mut().for_each(|v| *v -= gravity * dt);
+        self.support.fill(DVec3::ZERO);
+        self.surface(r);
+        let mut theta = THETA;
+        self.fall(r, dt * theta);
+        if self.touched {
+            theta = 1.0;
+            let edges = self.edges();
+            self.p[1..=edges].copy_from_slice(&self.from[1..=edges]);
+            self.fall(r, dt);
+        }
+        for i in 1..=self.edges() {
+            if self.support[i] == DVec3::ZERO {
+                self.p[i] -= gravity * (dt * theta).powi(2);
+            }
+        }
+        theta
+    }
+
+    fn fall(&mut self, r: &SubstepRecord, ahead: f64) {
+        self.sweeps = false;
+        for i in 1..=self.edges() {
+            let mut from = self.p[i];
+            for o in &r.obstacles {
+                let start = along(o, from);
+                if let Some((out, _)) = push_out(o, start, start, 0.0, r.skin, false) {
+                    from += out - start;
+                }
+            }
+            self.from[i] = from;
+            let mut to = from + (self.v[i] + d(r.gravity) * ahead) * ahead;
+            for o in &r.obstacles {
+                let (place, fast, _) = swept(o, along(o, from), to, r.skin);
+                to = place;
+                self.sweeps |= fast;
+            }
+            self.p[i] = to;
+        }
+        self.contacts(r, 0.0, 0.0);
+    }
+
+    fn surface(&mut self, r: &SubstepRecord) {
+        let mut deepest = f64::NEG_INFINITY;
+        for p in &self.p[1..] {
+            for o in &r.obstacles {
+                deepest = deepest.max(depth(&o.solid, along(o, *p), r.skin).1);
+            }
+        }
+        if self.l[0] * 0.25 < deepest {
+            self.sweeps = false;
+            for _ in 0..2 * self.edges() {
+                self.contacts(r, 0.0, 0.0);
+                if !self.limit(0.01) {
+                    return;
+                }
+            }
+        }
+    }
+
+    fn whips(&self, dt: f64) -> bool {
+        let fast = |i: usize| ((self.v[i + 1] - self.v[i]) / self.l[i]).length_squared();
+        (0..self.edges()).map(fast).fold(0.0, f64::max) > (0.03 / dt).powi(2)
+    }
+
+    fn contacts(&mut self, r: &SubstepRecord, resting: f64, others: f64) {
+        self.touched = false;
+        for i in 0..=self.edges() {
+            let grip = if self.support[i] == DVec3::ZERO { others } else { resting };
+            let (mut p, mut support) = (self.p[i], DVec3::ZERO);
+            for o in &r.obstacles {
+                if self.sweeps {
+                    let (place, _, normal) = swept(o, along(o, self.from[i]), p, r.skin);
+                    if normal != DVec3::ZERO {
+                        (p, support) = (if i == 0 { p } else { place }, normal);
+                    }
+                }
+                let friction = grip * f64::from(o.friction);
+                if let Some((out, normal)) = push_out(o, p, self.from[i], friction, r.skin, true) {
+                    (p, support) = (if i == 0 { p } else { out }, normal);
+                }
+            }
+            (self.p[i], self.support[i]) = (p, support);
+            self.touched |= support != DVec3::ZERO;
+        }
+    }
+
+    /// One Newton step, all at once.
+    fn newton(
+        &mut self,
+        r: &SubstepRecord,
+        (theta, between, root_turn, damping, twice): (f64, DQuat, DVec3, f64, bool),
+        beyond: f64,
+        second: bool,
+    ) {
+        let edges = self.edges();
+        let ahead = theta * f64::from(r.dt);
+        let (inertia, damped) = (1.0 / (ahead * ahead), damping / ahead);
+        let mut at = self.p.clone();
+        at[0] = self.from[0] + (self.p[0] - self.from[0]) * theta;
+        // Blocks of edges: the diagonal, with the edge before, and the gradient.
+        let mut h = vec![DMat3::ZERO; edges];
+        let mut coupled = vec![DMat3::ZERO; edges];
+        let mut pull = vec![DVec3::ZERO; edges];
+        let (mut q_before, mut t_before, mut turn_before, mut r_before) =
+            (between, tangent(between), root_turn, 0.0);
+        for j in 0..edges {
+            let e = at[j + 1] - at[j];
+            let (l, length, axial) = (self.l[j], e.length(), self.axial[j]);
+            let crushed = length < 0.5 * l;
+            let (carried, mut turn) = carry(self.q[j], e);
+            let q = if crushed { self.q[j] } else { carried };
+            let inverse = 1.0 / length.max(0.2 * l);
+            let t = if crushed { tangent(q) } else { e * inverse };
+            if second {
+                let e = self.from[j + 1] - self.from[j];
+                let cosine = e.length() + e.dot(t);
+                turn = e.cross(t) * (2.0 / (2.0 * e.length() * cosine).sqrt());
+            }
+            let turn = if crushed { DVec3::ZERO } else { turn } + t * turn_before.dot(t);
+            self.q[j] = q;
+            let tension = (axial * (length - l)).max(self.tension[j]).max(0.0);
+            let k = self.k[j];
+            let elastic = moment(q_before, q, self.rest[j], k);
+            let couple = elastic + (turn - turn_before) * (k * damped);
+            let stiff = k * (1.0 + damped);
+            let bent = |t: DVec3, r: f64| (DMat3::IDENTITY - outer(t, t)) * (stiff * r * r);
+            let across = if crushed { axial } else { tension * inverse };
+            h[j] += outer(t, t) * axial + (DMat3::IDENTITY - outer(t, t)) * across;
+            h[j] += bent(t, inverse);
+            pull[j] += couple.cross(t) * inverse + (e - t * l) * axial;
+            if j > 0 {
+                h[j - 1] += bent(t_before, r_before);
+                pull[j - 1] -= couple.cross(t_before) * r_before;
+                let twist = elastic.dot(t) * -0.25 * inverse * r_before;
+                coupled[j] = (outer(t_before, t) - DMat3::IDENTITY * t.dot(t_before))
+                    * (stiff * inverse * r_before)
+                    + cross_matrix((t + t_before) * twist);
+            }
+            (q_before, t_before, turn_before, r_before) = (q, t, turn, inverse);
+        }
+        // Nodes 1 to n; the root is held.
+        let size = 3 * edges;
+        let (mut a, mut b) = (vec![vec![0.0; size]; size], vec![0.0; size]);
+        let mut add = |row: usize, column: usize, m: DMat3| {
+            if row > 0 && column > 0 {
+                for x in 0..3 {
+                    for y in 0..3 {
+                        a[3 * (row - 1) + x][3 * (column - 1) + y] += m.col(y)[x];
+                    }
+                }
+            }
+        };
+        for j in 0..edges {
+            for (row, s) in [(j + 1, 1.0), (j, -1.0)] {
+                for (column, t) in [(j + 1, 1.0), (j, -1.0)] {
+                    add(row, column, h[j] * (s * t));
+                }
+                if j > 0 {
+                    for (column, t) in [(j, 1.0), (j - 1, -1.0)] {
+                        add(row, column, coupled[j] * (s * t));
+                        add(column, row, coupled[j].transpose() * (s * t));
+                    }
+                }
+            }
+        }
+        for i in 1..=edges {
+            let inert = self.mass[i] * inertia;
+            let n = self.support[i];
+            let mut diagonal = DMat3::IDENTITY * inert;
+            let mut force = d(r.gravity) * self.mass[i] - pull[i - 1];
+            force += pull.get(i).copied().unwrap_or(DVec3::ZERO);
+            if twice {
+                diagonal += outer(n, n) * (inert * HOLD);
+                force += (self.from[i] + self.v[i] * ahead - self.p[i]) * inert;
+            }
+            add(i, i, diagonal);
+            b[3 * (i - 1)..3 * i].copy_from_slice(&force.to_array());
+        }
+        let x = solve(a, b);
+        let mut solved = at.clone();
+        for i in 1..=edges {
+            solved[i] += DVec3::from_slice(&x[3 * (i - 1)..3 * i]);
+            self.p[i] = self.from[i] + (solved[i] - self.from[i]) * beyond;
+        }
+        for j in 0..edges {
+            let along = tangent(self.q[j]).dot(solved[j + 1] - solved[j]);
+            self.tension[j] = self.axial[j] * (along - self.l[j]);
+        }
+    }
+
+    fn limit(&mut self, tolerance: f64) -> bool {
+        let edges = self.edges();
+        let way = |i: usize| self.p[i + 1] - self.p[i];
+        let off: Vec<f64> = (0..edges).map(|i| way(i).length() - self.l[i]).collect();
+        let worst = (0..edges).map(|i| (off[i] / self.l[i]).abs()).fold(0.0, f64::max);
+        if worst <= tolerance {
+            return false;
+        }
+        let t: Vec<DVec3> = (0..edges).map(|i| way(i).normalize()).collect();
+        let mobile = |i: usize, x: DVec3, y: DVec3| {
+            let n = self.support[i];
+            self.w(i) * (x.dot(y) - FIRMNESS * x.dot(n) * y.dot(n))
+        };
+        let mut a = vec![vec![0.0; edges]; edges];
+        for i in 0..edges {
+            a[i][i] = mobile(i, t[i], t[i]) + mobile(i + 1, t[i], t[i]);
+            if i > 0 {
+                let coupling = -mobile(i, t[i - 1], t[i]);
+                (a[i][i - 1], a[i - 1][i]) = (coupling, coupling);
+            }
+        }
+        let lambda = solve(a, off);
+        for i in 0..edges {
+            let next = if i + 1 < edges { t[i + 1] * lambda[i + 1] } else { DVec3::ZERO };
+            let force = next - t[i] * lambda[i];
+            let n = self.support[i + 1];
+            let lift = force.dot(n);
+            let force = if lift > 0.0 {
+                self.support[i + 1] = DVec3::ZERO;
+                force
+            } else {
+                force - n * (FIRMNESS * lift)
+            };
+            let w = self.w(i + 1);
+            self.p[i + 1] += force * w;
+        }
+        true
+    }
+
+    fn clamp_lengths(&mut self, torn: f64) -> bool {
+        let mut any = false;
+        for i in 0..self.edges() {
+            let way = self.p[i + 1] - self.p[i];
+            if (way.length() / self.l[i] - 1.0).abs() > torn {
+                any = true;
+                self.p[i + 1] = self.p[i] + way.normalize() * self.l[i];
+            }
+        }
+        any
+    }
+
+    fn finish(&mut self, dt: f64, theta: f64) {
+        let edges = self.edges();
+        for i in 0..=edges {
+            let moved = (self.p[i] - self.from[i]) / dt;
+            self.v[i] = if i == 0 { moved } else { (moved + self.v[i] * (theta - 1.0)) / theta };
+        }
+        // Diagonal, coupling with the edge before, and what turns it.
+        let mut rows = vec![[0.0; 3]; edges];
+        let (mut q_before, mut t_before) = (self.root, tangent(self.root));
+        for i in 0..edges {
+            let e = self.p[i + 1] - self.p[i];
+            if e.length() >= 0.5 * self.l[i] {
+                self.q[i] = carry(self.q[i], e).0;
+            }
+            let (t, k) = (tangent(self.q[i]), self.k[i]);
+            let elastic = moment(q_before, self.q[i], self.rest[i], k);
+            rows[i][0] += k;
+            rows[i][2] -= elastic.dot(t);
+            if i > 0 {
+                rows[i - 1][0] += k;
+                rows[i - 1][2] += elastic.dot(t_before);
+                rows[i][1] = -k * t.dot(t_before);
+            }
+            (q_before, t_before) = (self.q[i], t);
+        }
+        for i in 1..edges {
+            let share = rows[i][1] / rows[i - 1][0];
+            rows[i][0] -= share * rows[i][1];
+            rows[i][2] -= share * rows[i - 1][2];
+        }
+        // An edge that would turn too far is stopped, and those before it heed that.
+        let (mut turn, mut coupling) = (0.0, 0.0);
+        for (q, [diagonal, before, rhs]) in self.q.iter_mut().zip(rows).rev() {
+            turn = ((rhs - coupling * turn) / diagonal).clamp(-1.5_f64, 1.5);
+            coupling = before;
+            *q = (DQuat::from_vec4((tangent(*q) * (0.5 * turn)).extend(1.0)) * *q).normalize();
+        }
+    }
+
+    fn remember(&mut self, r: &SubstepRecord) {
+        for i in 0..self.edges() {
+            let omega = self.omega(i);
+            for kind in 0..4 {
+                let mut change = f64::from(r.change[kind]);
+                if kind == 0 {
+                    change += self.drying[i];
+                }
+                let (shape, rate) = &mut self.bonds[i][kind];
+                let to = (*rate + change).clamp(0.0, 1.0);
+                let formed = to - *rate;
+                if formed > 0.0 {
+                    let full = (1.0 - shape.length_squared()).max(0.0).sqrt();
+                    let near = omega.xyz().dot(*shape) + omega.w * full >= 0.0;
+                    let present = if near { omega.xyz() } else { -omega.xyz() };
+                    *shape = (*shape * *rate + present * formed) / to;
+                }
+                *rate = to;
+            }
+        }
+    }
+}
+
+fn along(o: &Obstacle, p: DVec3) -> DVec3 {
+    o.motion.map_or(p, |motion| {
+        let [x, y, z, w] = [
+            motion.matrix3.x_axis.into(),
+            motion.matrix3.y_axis.into(),
+            motion.matrix3.z_axis.into(),
+            motion.translation.into(),
+        ]
+        .map(|v: Vec3| d(v));
+        DAffine3::from_cols(x, y, z, w).transform_point3(p)
+    })
+}
+
+fn depth(solid: &Solid, p: DVec3, skin: f32) -> (DVec3, f64) {
+    let skin = f64::from(skin);
+    match *solid {
+        Solid::Placed(_) => unreachable!("the shaders have no other shapes"),
+        Solid::HalfSpace { normal, point } => (d(normal), skin - (p - d(point)).dot(d(normal))),
+        Solid::Capsule { a, b, radius } => {
+            let (axis, rel) = (d(b) - d(a), p - d(a));
+            let share = (rel.dot(axis) / axis.length_squared().max(1e-20)).clamp(0.0, 1.0);
+            let off = rel - axis * share;
+            (off.normalize_or(DVec3::Y), f64::from(radius) + skin - off.length())
+        }
+        Solid::Cylinder { center, axis, radius, half_height } => {
+            let (u, rel) = (d(axis), p - d(center));
+            let along = rel.dot(u);
+            let off = rel - u * along;
+            let side = f64::from(radius) + skin - off.length();
+            let cap = f64::from(half_height) + skin - along.abs();
+            match cap < side {
+                true => (u * along.signum(), cap),
+                false => (off.normalize_or(DVec3::Y), side),
+            }
+        }
+    }
+}
+
+fn push_out(
+    o: &Obstacle,
+    p: DVec3,
+    from: DVec3,
+    friction: f64,
+    skin: f32,
+    slides: bool,
+) -> Option<(DVec3, DVec3)> {
+    let (normal, depth) = depth(&o.solid, p, skin);
+    if depth <= 0.0 {
+        return None;
+    }
+    let out = p + normal * depth;
+    if !slides {
+        return Some((out, normal));
+    }
+    let slip = out - along(o, from);
+    let tangential = slip - normal * slip.dot(normal);
+    let held = (friction * depth / tangential.length().max(1e-12)).min(1.0);
+    Some((out - tangential * held, normal))
+}
+
+/// Where a node gets to, whether it might pass through, and the normal of what stops it.
+fn swept(o: &Obstacle, start: DVec3, p: DVec3, skin: f32) -> (DVec3, bool, DVec3) {
+    let (thickness, center, axis) = match o.solid {
+        Solid::HalfSpace { .. } | Solid::Placed(_) => return (p, false, DVec3::ZERO),
+        Solid::Capsule { a, b, radius } => (radius, a, (b - a).normalize_or_zero()),
+        Solid::Cylinder { center, axis, radius, half_height } => {
+            (radius.min(half_height), center, axis)
+        }
+    };
+    let (thickness, axis, way) = (f64::from(thickness), d(axis), p - start);
+    if way.length_squared() <= 0.2 * thickness * thickness {
+        return (p, false, DVec3::ZERO);
+    }
+    let (facing, outside) = depth(&o.solid, start, skin);
+    let across = |v: DVec3| v - axis * v.dot(axis);
+    let (from, flat) = (across(start - d(center)), across(way));
+    let nearest = (-from.dot(flat) / flat.length_squared().max(1e-20)).clamp(0.0, 1.0);
+    let looks = [nearest, 0.5, 1.0].map(|share| depth(&o.solid, start + way * share, skin));
+    let deepest = looks.iter().map(|look| look.1).fold(f64::NEG_INFINITY, f64::max);
+    if deepest > 0.0 && looks[2].0.dot(facing) < 0.0 && outside < 1e-3 * thickness {
+        let behind = (outside - way.dot(facing)).max(0.0);
+        return (p + facing * behind, true, facing);
+    }
+    (p, true, DVec3::ZERO)
+}
+
+/// Of a symmetric positive definite system, by Gauss without pivoting, within its band.
+fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
+    let size = b.len();
+    let reach = |(i, row): (usize, &Vec<f64>)| {
+        let last = row.iter().rposition(|x| *x != 0.0).unwrap_or(i);
+        last.saturating_sub(i)
+    };
+    let band = a.iter().enumerate().map(reach).max().unwrap_or(0);
+    for i in 0..size {
+        let end = size.min(i + band + 1);
+        let (above, below) = a.split_at_mut(i + 1);
+        let row = &above[i];
+        for (k, other) in below.iter_mut().enumerate().take(band) {
+            let share = other[i] / row[i];
+            (i..end).for_each(|c| other[c] -= share * row[c]);
+            b[i + 1 + k] -= share * b[i];
+        }
+    }
+    for i in (0..size).rev() {
+        let end = size.min(i + band + 1);
+        let known: f64 = (i + 1..end).map(|c| a[i][c] * b[c]).sum();
+        b[i] = (b[i] - known) / a[i][i];
+    }
+    b
+}

@@ -1,0 +1,65 @@
+//! The README's samples can be pasted: they are whole, and name the Bevy that the crate is built on.
+//! That they compile is seen by the doc tests, which are made of them.
+
+const README: &str = include_str!("../README.md");
+const MANIFEST: &str = include_str!("../Cargo.toml");
+
+/// The blocks of code that begin so, without the fences.
+fn blocks(language: &str) -> Vec<Vec<&'static str>> {
+    let mut found = Vec::new();
+    let mut lines = README.lines();
+    while let Some(line) = lines.next() {
+        let Some(fence) = line.strip_prefix("```") else { continue };
+        let block: Vec<_> = lines.by_ref().take_while(|line| !line.starts_with("```")).collect();
+        if fence.split(',').next() == Some(language) {
+            found.push(block);
+        }
+    }
+    found
+}
+
+#[test]
+fn samples_are_whole() {
+    let samples = blocks("rust");
+    assert!(samples.len() >= 8, "only {} samples", samples.len());
+    for sample in samples {
+        let text = sample.join("\n");
+        // Hidden lines are hidden in the docs only: who pastes from the README has them.
+        assert!(!sample.iter().any(|line| line.trim_start().starts_with("# ")), "{text}");
+        assert!(text.contains("use bevy::prelude::*;"), "{text}");
+        assert!(text.contains("use bevy_keratin::"), "{text}");
+        let is_item = |line: &&str| {
+            ["use ", "fn ", "#[", "struct ", "//"].iter().any(|w| line.starts_with(w))
+        };
+        let is_inside = |line: &&str| line.is_empty() || line.starts_with([' ', '}', ')']);
+        let stray = sample.iter().find(|line| !is_item(line) && !is_inside(line));
+        assert_eq!(stray, None, "a statement outside of a function:\n{text}");
+    }
+}
+
+#[test]
+fn the_bevy_that_is_named_is_the_one_that_it_is_built_on() {
+    let version = |text: &str, before: &str| {
+        let at = text.find(before).unwrap_or_else(|| panic!("no {before}")) + before.len();
+        text[at..].split('"').next().unwrap().to_owned()
+    };
+    let built_on = version(MANIFEST, "bevy = { version = \"");
+    let install = blocks("toml").into_iter().find(|block| block[0] == "[dependencies]").unwrap();
+    assert_eq!(version(&install.join("\n"), "bevy = \""), built_on);
+}
+
+#[test]
+fn examples_that_are_named_are_there() {
+    let words = README.split("--example ").skip(1);
+    let names = words.filter_map(|rest| rest.split([' ', '\n', '`']).next());
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let mut count = 0;
+    for name in names {
+        let is_there = folder.join(format!("{name}.rs")).exists()
+            || folder.join(name).join("main.rs").exists()
+            || MANIFEST.contains(&format!("name = \"{name}\"\npath = \"examples/"));
+        assert!(is_there, "--example {name}");
+        count += 1;
+    }
+    assert!(count >= 8, "only {count} examples are named");
+}
