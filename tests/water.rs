@@ -579,6 +579,21 @@ fn drops_that_have_fallen_below_all_hair_are_gone() {
 }
 
 #[test]
+fn a_drop_that_lies_on_a_solid_is_gone_after_its_time() {
+    let mut app = test_app(60.0);
+    app.insert_resource(DropletRules { lying: 0.5, ..default() });
+    app.insert_resource(HairProcessTime(0.0));
+    app.world_mut().spawn(HairCollider::plane(Dir3::Y));
+    let above = Vec3::Y * 5e-4;
+    app.world_mut().spawn(Droplet::new(above, 4e-9).unwrap());
+    run(&mut app, 0.45);
+    assert_eq!(droplets(&mut app), 1, "it lies");
+    run(&mut app, 0.1);
+    assert_eq!(droplets(&mut app), 0, "and has been taken up");
+    assert!(ledger(&app).error() < 1e-9, "{:?}", ledger(&app));
+}
+
+#[test]
 fn drips_go_into_what_they_touch_where_drops_stay_whole() {
     let mut app = test_app(60.0);
     app.insert_resource(DropletRules { merging: false, ..default() });

@@ -129,6 +129,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_bridge_of_much_water_is_as_long_as_the_lists_cover() {
+        let reach = 2e-3;
+        let grip = |distance: f32| {
+            let film = Film::between(reach);
+            bridged(Vec3::X * distance, Vec3::ZERO, Vec3::ZERO, 1e-4, film).grip
+        };
+        let ends = reach * 1.6;
+        assert!(grip(ends - 1e-5) > 0.0 && grip(ends + 1e-5) == 0.0);
+    }
+
+    #[test]
     fn penalty_is_strongest_in_touch_and_gone_at_two_radii() {
         let a = |d: f32| penalty(Vec3::X * d, Vec3::ZERO, 1e-3, 20.0).x;
         assert!((a(1e-3) - 10.0).abs() < 1e-4);

@@ -320,3 +320,27 @@ pub(crate) fn push_strands_apart(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::strand::Pose;
+    use bevy::reflect::GetPath;
+
+    #[test]
+    fn a_hair_is_near_what_it_can_reach_in_a_tick() {
+        // On a frame of twice the size that moves 5 mm a substep, beside a ball that moves 10 mm.
+        let reach = HairReach { radius: 0.1, ..default() };
+        let mut frame = TickPose::default();
+        let now = Pose { scale: 2.0, ..default() };
+        *frame.path_mut("now").unwrap() = now;
+        *frame.path_mut("before").unwrap() = Pose { translation: Vec3::Y * 5e-3, ..now };
+        let is_near = |distance: f32| {
+            let ball = Ball { center: Vec3::X * distance, radius: 0.05, travel: 0.01 };
+            reach.is_near(&frame, &ball, 6)
+        };
+        let touches = ROOM * 0.1 * 2.0 + 0.05 + (5e-3 + 0.01) * 6.0;
+        assert!(is_near(touches - 1e-3) && !is_near(touches + 1e-3));
+        assert!(is_near(f32::NAN), "what is no number is seen where it is used");
+    }
+}
