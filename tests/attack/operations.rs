@@ -203,10 +203,11 @@ pub fn find_dead(app: &mut App) -> Option<String> {
     let mut before = Vec::new();
     for entity in &whole {
         let mut strand = app.world_mut().get_mut::<Strand>(*entity).unwrap();
-        let along = strand.root_frame() * Vec3::Z;
-        let push = along.any_orthonormal_vector();
+        // Across the last edge: what is pushed along itself need not move.
+        let &[.., inner, tip] = strand.positions() else { unreachable!("it can swing") };
+        let push = (tip - inner).normalize_or(Vec3::X).any_orthonormal_vector();
         strand.velocities_mut()[1..].fill(push);
-        before.push(*strand.positions().last().unwrap());
+        before.push(tip);
     }
     let mut farthest = vec![0.0_f32; whole.len()];
     for _ in 0..3 {
