@@ -146,11 +146,14 @@ pub fn not_finite(app: &mut App) -> Option<String> {
     None
 }
 
-/// Whether `strand` belongs to a hair, and is long enough to swing with its first edge held.
+/// Whether `strand` belongs to a hair, is long enough to swing with its first edge held, and near enough
+/// to the hair's origin for single precision to resolve it: 200 km away its steps are of 16 mm.
 fn can_swing(world: &World, entity: Entity) -> bool {
     let strand = world.get::<Strand>(entity);
     strand.is_some_and(|strand| {
-        strand.nodes() >= 4 && (0.04..1.0).contains(&strand.rest_lengths().iter().sum::<f32>())
+        strand.nodes() >= 4
+            && (0.04..1.0).contains(&strand.rest_lengths().iter().sum::<f32>())
+            && strand.positions()[0].abs().max_element() < 1e3
     }) && world.get::<StrandOf>(entity).is_some_and(|of| world.get::<Hair>(of.0).is_some())
 }
 
