@@ -62,10 +62,10 @@ pub struct Obstacles {
 pub struct LockNeighbours {
     #[reflect(ignore)]
     lists: neighbours::Neighbours,
-    /// The strands that take part in this tick, and whether followers do.
+    /// The strands that take part in this tick, and whether followers are among them.
     #[reflect(ignore)]
     members: (Vec<Entity>, bool),
-    /// Whether too fine strands have been reported.
+    /// Whether strands with too many nodes have been reported.
     #[reflect(ignore)]
     is_reported: bool,
 }

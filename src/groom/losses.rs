@@ -16,7 +16,7 @@ pub struct GroomLosses {
     pub merged_nodes: usize,
     /// Nodes besides the root that the file marks as fixed; only roots are held.
     pub freed_nodes: usize,
-    /// Arrays of the file that a groom has no place for.
+    /// Arrays of the file that a groom cannot hold.
     pub unread_arrays: usize,
     /// Primitives of a glTF file that are no lines.
     pub skipped_primitives: usize,
