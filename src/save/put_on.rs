@@ -126,12 +126,12 @@ fn command(
         let entity = hair.id();
         let world = hair.into_world_mut();
         if let Err(wrong) = act(world, entity) {
-            tell(world, entity, wrong);
+            report(world, entity, wrong);
         }
     }
 }
 
-pub(super) fn tell(world: &mut World, hair: Entity, wrong: HairdoError) {
+pub(super) fn report(world: &mut World, hair: Entity, wrong: HairdoError) {
     let outcome = "the hair keeps the hairdo that it has";
     world.write_message(HairFault::caused(FaultKind::Hairdo, wrong, outcome).of(hair));
 }
