@@ -309,7 +309,10 @@ pub(crate) fn push_strands_apart(
             while let Some((mut strand, mut sleep, mut still)) = some.fetch_next() {
                 if sleep.is_asleep() {
                     let pushes = pushes.by_ref().take(strand.nodes());
-                    if still.bypass_change_detection().feels(pushes, strength / (2.0 * radius)) {
+                    if still
+                        .bypass_change_detection()
+                        .has_new_contact(pushes, strength / (2.0 * radius))
+                    {
                         sleep.bypass_change_detection().wake();
                     }
                     continue;

@@ -1,6 +1,6 @@
 //! Hairdos for systems: requests and answers by events.
 
-use super::{Hairdo, HairdoError, put_on::tell};
+use super::{Hairdo, HairdoError, put_on::report};
 use bevy::prelude::*;
 
 /// Requests the hairdo of a [`Hair`](crate::Hair). Answered by [`HairdoTaken`] on the
