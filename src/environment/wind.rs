@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-/// The distance in equation 17's d + 1, which print gives in cm (m).
+/// The distance in equation 17's d + 1, which the paper gives in cm (m).
 pub const REFERENCE_DISTANCE: f32 = 0.01;
 
 /// Wind of a blower on an edge, as an acceleration (m/s²): equation 17,

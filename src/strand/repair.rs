@@ -24,7 +24,7 @@ impl Strand {
             if values.len() != count {
                 let length = values.len();
                 found.get_or_insert_with(|| {
-                    format!("the strand has {length} {name}, expected {count}: cut or filled up")
+                    format!("the strand has {length} {name}, expected {count}: truncated or padded")
                 });
                 values.resize(count, with);
             }

@@ -41,7 +41,7 @@ impl Plugin for WearPlugin {
             .register_required_components::<WearHair, systems::Wearing>()
             .add_systems(
                 PreUpdate,
-                (systems::take_off, systems::note_changes, systems::find_heads, systems::put_on)
+                (systems::take_off, systems::detect_changes, systems::find_heads, systems::put_on)
                     .chain(),
             );
     }
