@@ -1,7 +1,6 @@
 //! `cargo bench --bench convergence`: what accuracy a substep, an iteration and a Newton step of
 //! the limiter add. Each row runs the same hair with another solver; time and error stand side by
-//! side, so that
-//! settings of equal cost can be compared.
+//! side, so that settings of equal cost can be compared.
 //!
 //! Of the ways to solve a strand this compares: the direct solver at several substeps, Gauss–Seidel
 //! sweeps from root to tip in all three projections, the same time spent on more substeps with fewer

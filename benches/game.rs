@@ -2,8 +2,7 @@
 //!
 //! Each preset on a head with shoulders, at rest and on a character who walks and looks around,
 //! with and without contact between strands; then crowds. Medians of five runs of 20 ticks; nothing
-//! is drawn and
-//! nothing sleeps. `KERATIN_BENCH_ONLY=wavy,crowd` prints only these rows.
+//! is drawn and nothing sleeps. `KERATIN_BENCH_ONLY=wavy,crowd` prints only these rows.
 
 mod common;
 #[path = "../examples/presets/head.rs"]

@@ -6,9 +6,8 @@
 //!
 //! Read the ratios: all rows come from one run on one machine. Only instruction counts do not
 //! depend on the load of the machine. The projection alone, gather and scatter left out, takes 43
-//! to 46 of them per
-//! segment and iteration on AVX2 (29,318, 53,447 and 218,903 a substep of sixteen strands of 9, 16 and
-//! 64 nodes), counted by
+//! to 46 of them per segment and iteration on AVX2 (29,318, 53,447 and 218,903 a substep of sixteen
+//! strands of 9, 16 and 64 nodes), counted by
 //!
 //! ```text
 //! valgrind --tool=callgrind --toggle-collect='*vectorize*' \

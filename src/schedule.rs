@@ -331,8 +331,8 @@ fn merged(index: u32, count: u32, together: u32) -> Option<u32> {
 }
 
 /// How much faster than in life wetting, drying and the bonds' chemistry
-/// ([`HairTreatment`](crate::HairTreatment)) go.
-/// A resource, default 1, with the range [`RANGE`](Self::RANGE).
+/// ([`HairTreatment`](crate::HairTreatment)) go. A resource, default 1, with the range
+/// [`RANGE`](Self::RANGE).
 ///
 /// Hair dries in minutes, players wait seconds. Mechanics are not affected.
 #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]

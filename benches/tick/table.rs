@@ -3,8 +3,7 @@
 //!
 //! What is compared runs interleaved, and the best of each is kept: load on the machine slows
 //! single runs down, not ratios. Bevy's thread pools are made once a process, so each number of
-//! threads
-//! gets a process of its own.
+//! threads gets a process of its own.
 
 use super::{common, scalar::Twin};
 use bevy::{prelude::*, tasks::ComputeTaskPool};

@@ -1,6 +1,6 @@
 //! Colliders from a character: the capsule for each joint of a skinned mesh.
 
-use super::linear::solve;
+use super::linear_system::solve;
 use crate::{contact::HairCollider, setting::InvalidValue};
 use bevy::{
     math::{DMat3, DVec3},

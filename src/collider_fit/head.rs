@@ -1,6 +1,6 @@
 //! A head for a groom that comes without one.
 
-use super::linear::solve;
+use super::linear_system::solve;
 use crate::groom::Groom;
 use bevy::math::{DVec3, bounding::BoundingSphere};
 

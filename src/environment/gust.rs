@@ -18,8 +18,7 @@ pub fn noise(seed: u32, at: DVec3) -> Vec3 {
 }
 
 /// Gusts of a length (m) at a place (m), after the wind has travelled by `travelled` (m):
-/// components of at
-/// most 1, with eddies of a seventh of the length.
+/// components of at most 1, with eddies of a seventh of the length.
 ///
 /// Turbulence is advected as if frozen in the mean wind (Taylor 1938).
 pub fn gust(seed: u32, place: Vec3, travelled: DVec3, length: f32) -> Vec3 {

@@ -1,9 +1,8 @@
 //! TressFX files (`.tfx`), versions 3 and 4.
 //!
 //! A header, then arrays at the offsets given there; 0 means that an array is absent. All strands
-//! have the
-//! same number of nodes. All little-endian. The versions differ in the layout of the header, and
-//! version 4 has a fourth number with each position: 0 for a fixed node.
+//! have the same number of nodes. All little-endian. The versions differ in the layout of the
+//! header, and version 4 has a fourth number with each position: 0 for a fixed node.
 //!
 //! | | version 3 | version 4 |
 //! |---|---|---|

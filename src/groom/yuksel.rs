@@ -1,10 +1,9 @@
 //! Cem Yuksel's HAIR files (`.hair`), read and written.
 //!
 //! A header of 128 bytes, then up to five arrays in a fixed order, present according to the
-//! header's bits:
-//! segments per strand (u16), points (3 × f32), thickness (f32), transparency (f32), colours
-//! (3 × f32). All little-endian, points root first. The format specifies neither unit nor axes: see
-//! [`GroomSettings`](super::GroomSettings).
+//! header's bits: segments per strand (u16), points (3 × f32), thickness (f32), transparency (f32),
+//! colours (3 × f32). All little-endian, points root first. The format specifies neither unit nor
+//! axes: see [`GroomSettings`](super::GroomSettings).
 
 use super::{
     Groom, GroomError, GroomFileError, GroomLosses,

@@ -28,7 +28,7 @@ const SINGLE_GUIDE_SHARE: f32 = 0.125;
 /// Distance from a guide below which its weight hardly grows (m).
 const ALIKE: f32 = 1e-3;
 
-/// How a strand that is not simulated at its hair's level follows its guides, update_pose
+/// How a strand that is not simulated at its hair's level follows its guides, see
 /// [`LodLevel::strands`](crate::LodLevel::strands). Kept by the tick.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]

@@ -8,8 +8,7 @@ use glam::Vec3;
 
 /// Indices of the points in an order of which any prefix is an evenly spaced subset: it has equally
 /// many points of both halves of every split, up to one. So strands chosen at a coarse level are
-/// chosen at all finer
-/// ones. Points have to be finite.
+/// chosen at all finer ones. Points have to be finite.
 pub fn spread_order(places: &[Vec3]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..places.len() as u32).collect();
     let mut scratch = order.clone();

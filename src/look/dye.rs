@@ -1,8 +1,8 @@
 //! Bleach and dye.
 //!
 //! Both act on the fibre's absorption: bleach removes a share of it, dye adds its own. So colours
-//! mix as they do in hair: dye on dark hair hardly shows, dye over dye
-//! darkens, and bleached hair can become anything.
+//! mix as they do in hair: dye on dark hair hardly shows, dye over dye darkens, and bleached hair
+//! can become anything.
 
 use super::{pigment::HairColor, streaks::Streaks};
 use crate::setting::{Ranged, ValueRange, Violations, setting};

@@ -77,8 +77,7 @@ pub(crate) fn tables<'a, 's, D: ContiguousQueryData, F: ArchetypeFilter>(
 
 /// Processes the rows of tables in parts: `work` gets the rows of a part, and scratch space that
 /// `init` makes once per thread. A row takes about `each`. Returns the result of each part, in the
-/// order
-/// of the rows. Parts do not depend on the number of threads.
+/// order of the rows. Parts do not depend on the number of threads.
 pub(crate) fn for_each_part<C: Columns, S, O: Send>(
     each: Nanos,
     tables: impl Iterator<Item = C>,

@@ -35,9 +35,8 @@ const BABY_TURN: f32 = 0.5;
 impl HairPreset {
     /// Roots of the drawn strands of a planted preset: up to `count` strands by the scalp's mask,
     /// sparser, shorter and finer at the hairline, with lengths interpolated from the guides. Put
-    /// the result on the
-    /// [`Hair`](crate::Hair) entity with the preset's settings. `planted`, `mesh` and `scalp` are
-    /// those of [`plant`](Self::plant).
+    /// the result on the [`Hair`](crate::Hair) entity with the preset's settings. `planted`, `mesh`
+    /// and `scalp` are those of [`plant`](Self::plant).
     ///
     /// ```
     /// # use bevy_keratin::{prelude::*, plant::*}; use bevy::prelude::*;

@@ -9,8 +9,7 @@ use core::f32::consts::TAU;
 
 setting! {
     /// Density, length and width of hair at the edge of the [`Scalp`]: sparse, short and fine at
-    /// first, along a ragged line.
-    /// Applies to drawn strands; guides use [`Scalp::fade`].
+    /// first, along a ragged line. Applies to drawn strands; guides use [`Scalp::fade`].
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
     pub struct Hairline {

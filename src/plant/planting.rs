@@ -32,9 +32,8 @@ impl Planting {
     /// Directions follow its normals, where it has some.
     ///
     /// Spacing is even (Poisson disk): the density is exact to a per cent, and no two roots are
-    /// nearer than half the
-    /// mean spacing 1/√density. Where surfaces overlap within that distance, the minimum distance takes
-    /// precedence over density.
+    /// nearer than half the mean spacing 1/√density. Where surfaces overlap within that distance,
+    /// the minimum distance takes precedence over density.
     ///
     /// # Errors
     /// When a setting is out of its range, the mesh has no triangles with an area or vertices that

@@ -53,8 +53,7 @@ fn usable(p: Vec3) -> bool {
 
 /// Packs a guide's nodes into `out`, one each; `known` if `out` holds those of the previous frame.
 /// Invalid nodes take the position of the node before them; a guide without valid nodes is not
-/// drawn.
-/// Returns the box around the packed nodes.
+/// drawn. Returns the box around the packed nodes.
 pub(super) fn pack_guide(
     out: &mut [PackedNode],
     known: bool,

@@ -296,7 +296,7 @@ mod tests {
         let root = Vec3::X * -0.002;
         assert!(tip(&right).distance(BENT[3] + root) < 1e-6);
         right[3] += Vec3::X * 0.2;
-        assert!(tip(&right).distance(BENT[3] + root) < 1e-6, "blending with the nearest");
+        assert!(tip(&right).distance(BENT[3] + root) < 1e-6, "goes with the nearest");
     }
 
     #[test]

@@ -22,8 +22,7 @@ pub struct FollowerRoots(pub Vec<FollowerRoot>);
 
 setting! {
    /// The root of one follower. Roots without a finite position or a length above 0 are left out;
-   /// other
-   /// values out of their ranges are clamped.
+   /// other values out of their ranges are clamped.
    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
    #[reflect(Default, Clone, PartialEq)]
    pub struct FollowerRoot {

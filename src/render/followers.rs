@@ -11,8 +11,7 @@ setting! {
     ///
     /// A follower grows between up to three near guides and blends their shapes. Where these guides
     /// move apart it follows only the nearest. [`FollowerRoots`](super::FollowerRoots) says where
-    /// followers grow if
-    /// that is known.
+    /// followers grow if that is known.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairFollowers {

@@ -95,8 +95,7 @@ pub(super) fn limit_strained<S: Simd>(
 /// The fallback where Newton steps on the lengths have failed, as when a root moves farther than
 /// its strand is long: every edge of strain above `torn` is set to its length in its present
 /// direction, root to tip. Edges before a held node are skipped, because both ends are fixed.
-/// Returns
-/// whether there were any.
+/// Returns whether there were any.
 #[inline(never)]
 pub(super) fn clamp_lengths<S: Simd>(simd: S, b: &mut BlockLanes, torn: f32) -> bool {
     simd.vectorize(

@@ -254,11 +254,10 @@ pub(super) fn push_out<S: Simd>(
     Some((V3::select(inside, tangential.scale_add(-held, out), p), touching))
 }
 
-/// Continuous collision: stops a node that would pass through a thin or fast solid within the substep.
-/// A node that was on one side of it (`start`, moved with the solid) and would be on the other is
-/// kept in front of the tangent plane at the surface point nearest to `start`. Returns as
-/// [`push_out`] does; `None`
-/// where no lane moves fast enough against the solid to pass.
+/// Continuous collision: stops a node that would pass through a thin or fast solid within the
+/// substep. A node that was on one side of it (`start`, moved with the solid) and would be on the
+/// other is kept in front of the tangent plane at the surface point nearest to `start`. Returns as
+/// [`push_out`] does; `None` where no lane moves fast enough against the solid to pass.
 ///
 /// The path is sampled where it comes nearest to the solid's axis, in its middle and at its end: a
 /// node that moves by less than half the solid's thickness cannot pass.

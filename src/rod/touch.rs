@@ -13,8 +13,7 @@ const FASTER: f32 = 1.5;
 
 /// Finds the obstacles that each node may touch in a substep of `dt`, so that its passes skip the
 /// others: on a head of a dozen solids most nodes are near one or none. `from` of held nodes must
-/// be
-/// set.
+/// be set.
 #[inline(never)]
 pub(crate) fn choose_near<S: Simd>(
     simd: S,

@@ -9,12 +9,11 @@
 //! | 4 | CRC-32 of all bytes before, as in zip files and PNGs |
 //!
 //! This frame is the same in all formats. In format 1 the numbers are: strands; the cuticle's
-//! damage and
-//! softening as an option; then strand by strand its nodes, whether it is wet, the root's frame,
-//! positions, orientations, rest lengths, joints, and if wet film and bound water. Counts are
-//! varints. A joint is a byte that marks which of its shapes and rates are omitted because they can
-//! be derived, then the others. Format 2 appends looks, see `looks`; a hairdo without any is
-//! written in format 1.
+//! damage and softening as an option; then strand by strand its nodes, whether it is wet, the
+//! root's frame, positions, orientations, rest lengths, joints, and if wet film and bound water.
+//! Counts are varints. A joint is a byte that marks which of its shapes and rates are omitted
+//! because they can be derived, then the others. Format 2 appends looks, see `looks`; a hairdo
+//! without any is written in format 1.
 
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::bond::{BondKind, Cuticle, JointBonds};
@@ -39,10 +38,9 @@ const EDGE: usize = 16 + 4 + 1;
 const STRAND: usize = 1 + 1 + 16 + 2 * NODE + EDGE;
 
 impl Hairdo {
-    /// The hairdo as bytes, for a file or a save game: about 45 for each node of untreated hair,
-    /// up to 120 for wet hair where every kind of bond has its own shape. The same hairdo gives the
-    /// same
-    /// bytes.
+    /// The hairdo as bytes, for a file or a save game: about 45 for each node of untreated hair, up
+    /// to 120 for wet hair where every kind of bond has its own shape. The same hairdo gives the
+    /// same bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Writer(Vec::with_capacity(HEAD + CHECKSUM + 48 * self.nodes()));
         out.0.extend(MAGIC);

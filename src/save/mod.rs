@@ -2,11 +2,10 @@
 //! another groom, blended and undone.
 //!
 //! A [`Hairdo`] holds everything that makes a style: where the nodes are, which shapes the bonds
-//! remember and how many of them are closed, the water, the cuticle's wear, its look with bleach and
-//! dye, and which preset it was made on. It does not hold the rest of a hair: roots belong to the
-//! scalp, settings such as [`HairStiffness`](crate::HairStiffness) to the character, drops of water
-//! to the
-//! world.
+//! remember and how many of them are closed, the water, the cuticle's wear, its look with bleach
+//! and dye, and which preset it was made on. It does not hold the rest of a hair: roots belong to
+//! the scalp, settings such as [`HairStiffness`](crate::HairStiffness) to the character, drops of
+//! water to the world.
 //!
 //! [`Hairdo::of`] takes it from a hair, [`Hairdo::apply`] puts it on the same groom,
 //! [`Hairdo::apply_resampled`] on another. Systems request both by events: [`TakeHairdo`] and

@@ -19,8 +19,7 @@ impl Hairdo {
     ///
     /// With as many strands, each takes the style of the one with its index; else of the one with
     /// the nearest root. Along a strand everything is mapped by the share of its length. Curvature
-    /// is
-    /// kept, not the angles of joints: a curl has the same radius on fewer or more nodes, and on
+    /// is kept, not the angles of joints: a curl has the same radius on fewer or more nodes, and on
     /// longer hair more turns. Water is kept per length. Lengths, roots and the scalp's frames are
     /// the new groom's.
     ///
@@ -143,8 +142,8 @@ impl Along {
 
     /// Shapes of the new joints. Edge orientations are those at the edges' middles, so a joint
     /// bends by the curvature between two of them. |Im Ω| = sin(θ/2) is half the edge over the
-    /// radius of
-    /// the circle through the nodes: Ω per length, unlike the angle, keeps that radius exactly.
+    /// radius of the circle through the nodes: Ω per length, unlike the angle, keeps that radius
+    /// exactly.
     fn resample_shapes(&self, old_root: Quat, shapes: &[Vec3], new_root: Quat) -> Vec<Vec3> {
         let first = shapes.first().copied().unwrap_or_default();
         let onward = self.turn(shapes, self.old_middles[0], self.new_middles[0]);

@@ -205,7 +205,7 @@ impl SeenCollider {
 /// Length of a long strand (m), the lever for rotations of the head.
 const LONG_STRAND: f32 = 0.3;
 
-struct Item<'a> {
+struct SleepCandidate<'a> {
     hair: usize,
     strand: Mut<'a, Strand>,
     sleep: Mut<'a, StrandSleep>,
@@ -274,7 +274,7 @@ fn update_sleep(
             index
         }
     };
-    let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
+    let mut items: Vec<SleepCandidate<'_>> = Vec::with_capacity(strands.iter().len());
     for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
         // Followers sleep when their guides do.
         if sleep.is_follower() {
@@ -289,7 +289,7 @@ fn update_sleep(
             || !added_mass.mass.is_empty()
             || treatments.is_some_and(|t| !t.acting().is_empty())
             || water.is_some_and(|water| !water.is_untouched());
-        items.push(Item { hair, strand, sleep, still, held, restless });
+        items.push(SleepCandidate { hair, strand, sleep, still, held, restless });
     }
     let seconds = step.dt * step.count as f32;
     for_each(&mut items, Nanos(500), |item| decide(item, &wake_events[item.hair], seconds));
@@ -305,8 +305,8 @@ fn update_sleep(
 }
 
 /// Whether one strand sleeps from now on.
-fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
-    let Item { strand, sleep, still, held, restless, .. } = item;
+fn decide(item: &mut SleepCandidate<'_>, wake_events: &WakeEvents, seconds: f32) {
+    let SleepCandidate { strand, sleep, still, held, restless, .. } = item;
     let strand = strand.bypass_change_detection();
     let (distance, angle) = (wake_events.sleep.distance(), wake_events.sleep.angle());
     let targets = held.map_or(&[][..], |held| &held.targets);

@@ -14,8 +14,7 @@ use bevy::{
 };
 
 /// The pose of an entity within the tick, interpolated over its substeps. Written by `Roots` from
-/// the
-/// entity's global transform.
+/// the entity's global transform.
 #[derive(Component, Reflect, Clone, Debug)]
 #[reflect(Component, Default, Clone)]
 pub struct TickPose {

@@ -151,8 +151,7 @@ impl StrandHistory {
     }
 
     /// Position at which a node is drawn, in the hair's frame: interpolated between the previous
-    /// tick and the
-    /// present by the overstep of the fixed clock (0…1).
+    /// tick and the present by the overstep of the fixed clock (0…1).
     pub fn drawn(&self, strand: &Strand, node: usize, overstep: f32) -> Vec3 {
         let place = self.between(strand, node, overstep);
         match self.root {
@@ -178,8 +177,7 @@ pub enum StrandModel {
 impl Ranged for StrandModel {}
 
 /// What makes a strand heavier and softer than in its dry state, such as water. Written by the
-/// tick;
-/// empty on dry hair.
+/// tick; empty on dry hair.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct AddedMass {

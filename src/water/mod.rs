@@ -2,11 +2,10 @@
 //! follow.
 //!
 //! The wet-hair paper's droplets as entities, and the full cycle of wetting and drying, which both
-//! papers leave open. A
-//! [`Droplet`] lands on a strand, rides on it, pulls other strands together, spreads into a film and
-//! soaks in ([`Moisture`]). Where fibres are wet, hydrogen bonds open; the air, damp or dry, still
-//! or from a [`Blower`](crate::Blower), dries it again; the bonds close in the current shape. Bond
-//! rates follow from the water alone.
+//! papers leave open. A [`Droplet`] lands on a strand, rides on it, pulls other strands together,
+//! spreads into a film and soaks in ([`Moisture`]). Where fibres are wet, hydrogen bonds open; the
+//! air, damp or dry, still or from a [`Blower`](crate::Blower), dries it again; the bonds close in
+//! the current shape. Bond rates follow from the water alone.
 //!
 //! Droplets find strands through the unbounded [uniform grid](crate::grid), without testing all
 //! pairs. They never change archetype: tens of thousands move in one pass.
@@ -73,8 +72,7 @@ impl DropletRules {
 }
 
 /// Sets the water of a hair or strand at once, like a bucket of water or a towel. A message; the
-/// [`WaterLedger`]
-/// counts the difference.
+/// [`WaterLedger`] counts the difference.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;

@@ -24,8 +24,7 @@ pub fn adhesion(distance: f32, r_min: f32, r_max: f32) -> f32 {
 }
 
 /// Equation 2 with the direction that the paper omits: along `offset`, from the node to the
-/// droplet. Zero
-/// at the droplet's centre.
+/// droplet. Zero at the droplet's centre.
 #[inline]
 pub fn pull(offset: Vec3, r_min: f32, r_max: f32) -> Vec3 {
     let squared = offset.length_squared();
@@ -77,8 +76,7 @@ pub(crate) fn hanging(bundle: f32, acceleration: f32) -> f64 {
 }
 
 /// Largest volume of water (m³) that a bundle of radius `bundle` (m) holds as one drop somewhere
-/// along it:
-/// Lorenceau, Clanet and Quéré's drop on a fibre, 4π b σ/(ρ a) k² with k = 0.5.
+/// along it: Lorenceau, Clanet and Quéré's drop on a fibre, 4π b σ/(ρ a) k² with k = 0.5.
 #[inline]
 pub(crate) fn clinging(bundle: f32, acceleration: f32) -> f64 {
     let weight = WATER_DENSITY * acceleration.abs().max(0.1);

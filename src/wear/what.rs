@@ -28,12 +28,11 @@ use bevy::prelude::*;
 /// # }
 /// ```
 ///
-/// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there is none), with
-/// [`WornHair`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] has its entity. It settles
-/// before it is first
-/// drawn ([`Settling`](crate::Settling)) unless it is styled. Its settings are the preset's, and a
-/// [`HairWetting`](crate::HairWetting) with the number of fibres that grow there; to change them,
-/// wait for it:
+/// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there
+/// is none), with [`WornHair`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] has its entity.
+/// It settles before it is first drawn ([`Settling`](crate::Settling)) unless it is styled. Its
+/// settings are the preset's, and a [`HairWetting`](crate::HairWetting) with the number of fibres
+/// that grow there; to change them, wait for it:
 ///
 /// ```
 /// # use bevy_keratin::{plant::HairPreset, prelude::*}; use bevy::prelude::*;
@@ -51,8 +50,7 @@ use bevy::prelude::*;
 /// the hair is made again, and the old one stays until the new one is ready; another
 /// [`look`](Self::look), [`dye`](Self::dye) or [`style`](Self::style) is applied to the worn hair.
 /// Hair that cannot be worn is reported once, as a [`HairFault`](crate::HairFault) and by
-/// [`HairNotWorn`]; the
-/// wearer keeps the hair that it has.
+/// [`HairNotWorn`]; the wearer keeps the hair that it has.
 ///
 /// The character may be of any size from that of a doll to that of a giant: presets have life size
 /// on heads of life size, 8 to 16 cm from the middle between the ears to the crown, and are scaled
@@ -68,8 +66,8 @@ pub struct WearHair {
     /// that moves its highest vertex.
     pub on: Option<String>,
     /// The direction in which the face looks, in this entity's space; Y is up and the component
-    /// along Y is ignored.
-    /// Default −Z, Bevy's forward; characters of glTF files look along +Z unless they are converted.
+    /// along Y is ignored. Default −Z, Bevy's forward; characters of glTF files look along +Z
+    /// unless they are converted.
     pub facing: Dir3,
     /// Seed of the strands' places and variations: the same seed gives the same hair. Default 0.
     pub seed: u64,

@@ -29,8 +29,7 @@ impl ConvexHull {
     ///
     /// Hulls with more than 64 faces keep 64 evenly distributed ones: all points are inside, and
     /// corners stick out by a few percent of the size. A [`DistanceGrid`](crate::DistanceGrid) is
-    /// better there.
-    /// Edges are sharp: a layer on the hull, such as a lock's radius, is mitred.
+    /// better there. Edges are sharp: a layer on the hull, such as a lock's radius, is mitred.
     ///
     /// # Errors
     /// When points are not finite, span no volume, or less than 0.1 mm or more than 5 km.

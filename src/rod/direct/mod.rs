@@ -40,8 +40,8 @@
 //! # Against theory and the sweeps
 //! Drag 0; strand 20 cm, L_g 13 cm unless noted; theory is the elastica, and the vibration of a
 //! beam under its own weight, hanging or about the elastica. The direct solver at the papers' 1/360
-//! s and at the default 1/180 s
-//! (`tests/swing` prints these numbers), sweeps with their defaults at 1/360 s.
+//! s and at the default 1/180 s (`tests/swing` prints these numbers), sweeps with their defaults at
+//! 1/360 s.
 //!
 //! | | segments | theory | direct, 1/360 s | direct, 1/180 s | sweeps |
 //! |---|---|---|---|---|---|
@@ -333,8 +333,7 @@ fn predict<S: Simd>(
 }
 
 /// 1 in lanes where an edge is about to rotate by more than [`FAST_TURN`], else 0. One Newton step
-/// does not
-/// converge there, and fast-swinging tips would gain energy.
+/// does not converge there, and fast-swinging tips would gain energy.
 #[inline(always)]
 fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
