@@ -73,6 +73,7 @@ impl JointBonds {
     }
 
     /// Whether every number is finite and every rate in \[0, 1\].
+    #[doc(hidden)]
     pub fn is_valid(&self) -> bool {
         self.shapes.iter().all(|s| s.is_finite())
             && self.rates.iter().all(|b| (0.0..=1.0).contains(b))

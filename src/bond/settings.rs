@@ -41,6 +41,7 @@ impl BondInfluence {
     }
 
     /// The influences by [`BondKind`] as index.
+    #[doc(hidden)]
     pub fn as_array(&self) -> [f32; BondKind::COUNT] {
         [self.hydrogen, self.ionic, self.disulfide, self.peptide]
     }

@@ -45,6 +45,7 @@ setting! {
 
 /// The colliders near one hair in this substep, in its frame. Written by `Interaction`, read by
 /// `Projection`.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct Obstacles {
@@ -57,6 +58,7 @@ pub struct Obstacles {
 }
 
 /// The pairs of strands of one hair that may touch.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct LockNeighbours {

@@ -13,6 +13,7 @@ use glam::Vec3;
 /// let two: Vec<_> = tree.nearest::<2>(Vec3::X * 2.9).map(|(i, _)| i).collect();
 /// assert_eq!(two, [3, 2]);
 /// ```
+#[doc(hidden)]
 #[derive(Clone, Debug, Default)]
 pub struct KdTree {
     /// A subtree's root in its middle, the two halves on either side.

@@ -30,6 +30,7 @@ const ALIKE: f32 = 1e-3;
 
 /// How a strand that is not simulated at its hair's level follows its guides, see
 /// [`LodLevel::strands`](crate::LodLevel::strands). Kept by the tick.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct Follower {
@@ -50,6 +51,7 @@ pub struct Follower {
 }
 
 /// The strands of a [`Hair`] that others follow. Kept by the tick.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct Guides {

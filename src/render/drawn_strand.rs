@@ -79,6 +79,7 @@ impl DrawnStrand {
     }
 
     /// As the shader reads it.
+    #[doc(hidden)]
     pub fn packed(&self) -> [u32; 32] {
         let mut words = [0; 32];
         words[..3].copy_from_slice(&self.guides);

@@ -128,6 +128,7 @@ pub(super) struct Shares {
 }
 
 /// Corrections of one stretch–shear projection: of both nodes and, unnormalised, of the orientation.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct StretchCorrection<R> {
     /// Δp1.

@@ -160,6 +160,7 @@ impl Sweeps {
 
     /// k of one substep of `dt` (s), from K = k/(1−k) ∝ Δt², times a `factor` on the true
     /// stiffness: cuticle (equation 13), wetness, material.
+    #[doc(hidden)]
     pub fn per_substep(&self, dt: f32, factor: f32) -> f32 {
         let k = self.bend.min(0.999_999);
         let ratio = dt / REFERENCE_DT;

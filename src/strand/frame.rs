@@ -231,6 +231,7 @@ impl TickPose {
     /// How this pose moves during the substep of `hair`, in the hair's frame: the motion of a point
     /// fixed to it; `None` if it rests. Nodes are already in the present frame of the hair, so with
     /// full inertia an entity at rest in the world has no motion here, whatever the frame does.
+    #[doc(hidden)]
     pub fn motion_in(&self, hair: &TickPose) -> Option<Affine3A> {
         let began = self.at(hair.shares[0]);
         if hair.inertia == Vec2::ONE {
@@ -325,6 +326,7 @@ impl TickPose {
 
     /// How a point at rest in the world moves in this frame during the substep; `None` if the frame
     /// did not move. With less than full [`HairInertia`] it is only that share of the motion.
+    #[doc(hidden)]
     pub fn frame_delta(&self) -> Option<Isometry3d> {
         (self.before != self.now).then(|| {
             let rotation = (self.now.rotation.inverse() * self.before.rotation).normalize();

@@ -84,6 +84,7 @@ impl Sleepers {
 }
 
 /// The pose in which a strand has been still, and the contact forces on it.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct SleepPose {

@@ -14,6 +14,7 @@
 
 mod adhesion;
 mod bridge;
+#[doc(hidden)]
 pub mod drag;
 mod droplet;
 mod droplet_contact;

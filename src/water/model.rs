@@ -36,12 +36,14 @@ pub fn pull(offset: Vec3, r_min: f32, r_max: f32) -> Vec3 {
 }
 
 /// Radius (m) of a ball of `volume` (m³).
+#[doc(hidden)]
 #[inline]
 pub fn ball_radius(volume: f64) -> f32 {
     bevy::math::ops::cbrt((volume.max(0.0) * (0.75 / core::f64::consts::PI)) as f32)
 }
 
 /// Volume (m³) of a ball of `radius` (m).
+#[doc(hidden)]
 #[inline]
 pub fn ball_volume(radius: f32) -> f64 {
     let r = f64::from(radius);
