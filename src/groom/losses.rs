@@ -30,7 +30,7 @@ impl GroomLosses {
     fn counts(&self) -> [(usize, &'static str); 8] {
         [
             (self.short_strands, "strands without length left out"),
-            (self.thinned_strands, "strands left out as the settings ask"),
+            (self.thinned_strands, "strands left out by the settings"),
             (self.merged_nodes, "nodes merged with the one before"),
             (self.freed_nodes, "fixed nodes besides roots set free"),
             (self.unread_arrays, "arrays not read"),

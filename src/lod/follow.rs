@@ -274,7 +274,7 @@ mod tests {
         (positions, orientations, lengths)
     }
 
-    /// A curl of so many nodes.
+    /// A curl with this number of nodes.
     fn curl(nodes: u32, phase: f32) -> Parts {
         strand((0..nodes).map(|i| {
             let angle = 0.5 * i as f32 + phase;

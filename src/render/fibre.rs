@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn infinitely_deep_hair_has_the_colour_of_its_melanin() {
-        // Chiang et al. 2016, equation 9, knows no surface: that adds its 0.034.
+        // Chiang et al. 2016, equation 9, has no surface reflection, which adds 0.034.
         for melanin in [Melanin::PLATINUM, Melanin::BLOND, Melanin::BROWN] {
             let fibre = Optics::new(melanin.absorption(), 0.5);
             let bulk = Bulk::of(fibre.forward_share(), fibre.backward_share(), 1e3);

@@ -40,7 +40,7 @@ pub fn heat(value: f32) -> Color {
 }
 
 impl HairView {
-    /// The number by which the shader knows the view.
+    /// The view's number in the shader.
     pub(super) fn number(self) -> u32 {
         match self {
             Self::Natural => 0,

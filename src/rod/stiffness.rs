@@ -28,7 +28,7 @@ setting! {
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairStiffness {
         /// Gravity-bending length L_g, in the Hair's own length unit. A real dry hair of 70 µm has
-        /// 0.045; the paper's look wants 0.12…0.2.
+        /// 0.045; the paper's look needs 0.12…0.2.
         pub bending_length: f32 = 0.13, "m" in BENDING_LENGTH: 1e-3..=100.0, safe 0.02..=1.0,
             "0.13 is soft hair, 0.045 a bare fibre";
         /// Internal friction as a Kelvin–Voigt time c: the moment of a joint is K (κ + c dκ/dt), so a
@@ -37,7 +37,7 @@ setting! {
         /// no further effect.
         ///
         /// We know of no measurement of it for locks. 0.01 dissipates as much in a swing of 2.5 Hz
-        /// as a loss tangent of 0.16 would, and locks that touch come to rest with it.
+        /// as a loss tangent of 0.16 would, and lets touching locks come to rest.
         pub damping: f32 = 0.01, "s" in DAMPING: 0.0..=10.0, safe 0.0..=0.02,
             "0.01 swings for a second, 0.03 is syrup";
     }

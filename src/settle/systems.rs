@@ -114,7 +114,7 @@ impl Calm<'_, '_> {
         let mut fastest: f32 = 0.0;
         let mut members = self.strands.iter_many_mut(members.collection());
         while let Some((mut strand, mut changes)) = members.fetch_next() {
-            // Discards what a blower would have dried meanwhile.
+            // Discards the drying by blowers meanwhile.
             *changes.bypass_change_detection() = default();
             let (_, velocities, _, spins) = strand.bypass_change_detection().parts_mut();
             for v in velocities.iter_mut().chain(spins) {

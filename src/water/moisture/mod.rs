@@ -47,7 +47,8 @@ setting! {
         /// 0 lets them slip.
         pub film_drag: f32 = 30.0, "1/s" in FILM_DRAG: 0.0..=1e6, safe 0.0..=1000.0,
             "30 holds locks";
-        /// Rate at which a droplet spreads into the film of what it touches; 0 leaves droplets whole.
+        /// Rate at which a droplet spreads into the film of strands that it touches; 0 leaves
+        /// droplets whole.
         pub uptake: f32 = 20.0, "1/s" in UPTAKE: 0.0..=1e4, safe 0.0..=100.0,
             "20 absorbs a drop at once";
         /// Rate at which film soaks into the fibres. 1/120 is virgin hair; bleached hair is two to
