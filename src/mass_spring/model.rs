@@ -1,7 +1,7 @@
 //! Mass-spring strands as pure functions: \[W\] equation 1, stable at any step.
 //!
-//! Print's damper, c |v_b − v_a|, has no sign and adds energy; a true one acts on the rate of
-//! extension. An explicit step of stiff springs blows up beyond √(2m/k), here 1 ms. So each spring
+//! The damper in the paper, c |v_b − v_a|, has no sign and adds energy; a correct one acts on the
+//! rate of extension. An explicit step of stiff springs blows up beyond √(2m/k), here 1 ms. So each spring
 //! is solved implicitly, for the end of the step, on positions (extended position based dynamics,
 //! `Xpbd`): the stiffer the spring, the nearer to its rest length.
 

@@ -15,9 +15,7 @@ use half::{f16, slice::HalfFloatSliceExt};
 ///
 /// | buffer | stride | holds |
 /// |---|---|---|
-/// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8
-/// from the lowest byte), strain and moisture (2 × f16), length from the root at rest (m), motion
-/// since the frame before (3 × f16, in m/1024), 1 if the guide is valid (f16) |
+/// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain and moisture (2 × f16), length from the root at rest (m), motion since the frame before (3 × f16, in m/1024), 1 if the guide is valid (f16) |
 /// | `guides` | 8 | first node and number of nodes of each guide |
 /// | `strands` | 128 | [`DrawnStrand`]: the guides first, then the followers |
 ///

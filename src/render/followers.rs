@@ -20,8 +20,7 @@ setting! {
         // With more the mesh could exceed the guaranteed size of a GPU buffer (256 MiB).
         pub count: u32 = 12_000, in COUNT: 0.0..=1e5, "20000 suit a head";
         /// Straight segments drawn for each strand, along a smooth curve; for curls at least as
-        /// many as
-        /// the guides have edges.
+        /// many as the guides have edges.
         pub segments: u32 = 16, in SEGMENTS: 1.0..=64.0, safe 2.0..=64.0, "16 suit most hair";
         /// The same seed gives the same followers.
         pub seed: u32 = 0;

@@ -1,9 +1,8 @@
 //! `Projection`: gathers strands from their tables into lanes, runs their kernel, and scatters back.
 //!
 //! The only module that handles both entities and lanes. Strands keep their own vectors, so that
-//! game
-//! code reads and writes them; those of a hair with equal node count are gathered into a block of
-//! [`LANES`](crate::lanes::LANES), stepped side by side and scattered back in each substep.
+//! game code reads and writes them; those of a hair with equal node count are gathered into a block
+//! of [`LANES`](crate::lanes::LANES), stepped side by side and scattered back in each substep.
 //!
 //! | file | what |
 //! |---|---|

@@ -97,7 +97,7 @@ pub(crate) struct WaterLoss {
 impl Moisture {
     /// One substep of the water of a strand with nodes at `positions` and segments of rest `lengths`
     /// (m): the film flows and creeps, soaks in, dries and drips. `exposure` is `None` in still
-    /// air. Its arrays must have an element for each node.
+    /// air. The arrays must have an element for each node.
     pub(crate) fn exchange(
         &mut self,
         positions: &[Vec3],
