@@ -30,8 +30,8 @@ setting! {
     }
 }
 
-/// The shapes of a [`HairCollider`]: Bevy's primitives and what is made of points and meshes. A grid costs
-/// most for nodes that are near it: it is looked up lane by lane.
+/// The shapes of a [`HairCollider`]: Bevy's primitives and what is made of points and meshes. A
+/// grid is the most expensive for nodes near it: it is sampled lane by lane.
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub enum ColliderShape {
@@ -43,7 +43,7 @@ pub enum ColliderShape {
     Plane(InfinitePlane3d),
     /// A solid cylinder along Y.
     Cylinder(Cylinder),
-    /// A box, with round edges if asked for.
+    /// A box, optionally with rounded edges.
     Cuboid {
         /// Its size, edges included.
         cuboid: Cuboid,
@@ -77,8 +77,8 @@ impl ColliderShape {
     /// The range of the radius of a box' edges.
     pub const ROUNDING: ValueRange =
         ValueRange::new("ColliderShape::rounding (m)", 0.0..=1e5, "0 makes edges sharp");
-    /// How many times as long as the shortest axis of an ellipsoid the longest may be.
-    const LONGEST: f32 = 100.0;
+    /// Largest ratio of an ellipsoid's longest to its shortest axis.
+    const MAX_RATIO: f32 = 100.0;
     /// The range of half the length between a capsule's centres, or half a cylinder's height.
     pub const HALF_LENGTH: ValueRange =
         ValueRange::new("ColliderShape::half_length (m)", 0.0..=1e5, "0 makes it a point");
@@ -109,7 +109,7 @@ impl Ranged for ColliderShape {
                 for radius in radii.as_mut() {
                     Self::RADIUS.clamp(radius, || 0.09, violations);
                 }
-                *radii = radii.max(Vec3::splat(radii.max_element() / Self::LONGEST));
+                *radii = radii.max(Vec3::splat(radii.max_element() / Self::MAX_RATIO));
                 return;
             }
         };
@@ -158,10 +158,10 @@ impl HairCollider {
         Self::rounded_cuboid(size, 0.0)
     }
 
-    /// A box of this size with edges of this radius (m); of at most half of its shortest side.
+    /// A box of this size with edges of this radius (m), clamped to half of its shortest side.
     ///
     /// # Errors
-    /// When a side is not positive, the radius negative, or something not finite.
+    /// When a side is not positive, the radius negative, or a value not finite.
     pub fn rounded_cuboid(size: Vec3, rounding: f32) -> Result<Self, InvalidValue> {
         let cuboid = Cuboid { half_size: 0.5 * size };
         let made = Self::from(ColliderShape::Cuboid { cuboid, rounding }).checked()?;
@@ -185,7 +185,7 @@ impl HairCollider {
         Ok(ColliderShape::Hull(ConvexHull::new(points)?).into())
     }
 
-    /// What was baked: [`DistanceGrid::bake`].
+    /// A baked grid: [`DistanceGrid::bake`].
     pub fn grid(grid: DistanceGrid) -> Self {
         ColliderShape::Grid(grid).into()
     }
