@@ -4,6 +4,7 @@ use super::{Bake, ColliderShape, ConvexHull, DistanceGrid, HairCollider, Opening
 use crate::{
     fault::{FaultKind, HairFault},
     schedule::{HairStep, HairSystems, HairTick},
+    setting::{self, Ranged, setting},
 };
 use avian3d::{
     parry::shape::{Cone, SharedShape, TriMesh, TypedShape},
@@ -12,37 +13,33 @@ use avian3d::{
 use bevy::{math::Isometry3d, prelude::*};
 use std::sync::Arc;
 
-/// Keeps hair out of the avian [`Collider`] of the same entity, with or without a rigid body.
-///
-/// Balls, capsules, cylinders, cones, half spaces, cuboids, convex hulls, triangle meshes and compounds of
-/// these become [`HairCollider`]s on children that follow the collider: its shape in the next tick when
-/// that changes, the body in every tick. A triangle mesh is baked in the first tick that finds it,
-/// which makes that tick slow; one with large openings has no inside and is a fault.
-/// They are removed with the collider, its body or this component, and while the collider has
-/// [`ColliderDisabled`]. Unsupported shapes are reported once as
-/// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider a non-uniform scale
-/// counts as its mean. Hair does not push bodies.
-///
-/// ```
-/// # use avian3d::prelude::*; use bevy::prelude::*; use bevy_keratin::prelude::*;
-/// # fn setup(mut commands: Commands) {
-/// commands.spawn((RigidBody::Kinematic, Collider::capsule(0.2, 0.5), AvianHairCollider::default()));
-/// # }
-/// ```
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-#[require(Unknown)]
-pub struct AvianHairCollider {
-    /// Coulomb friction of hair on it, independent of the body's: [`HairCollider::friction`].
-    pub friction: f32,
-    /// Number of cells along the longest side of a triangle mesh: parts thinner than two cells are
-    /// lost. Default 48, clamped to 4 to 200.
-    pub cells: u32,
-}
-
-impl Default for AvianHairCollider {
-    fn default() -> Self {
-        Self { friction: HairCollider::default().friction, cells: 48 }
+setting! {
+    /// Keeps hair out of the avian [`Collider`] of the same entity, with or without a rigid body.
+    ///
+    /// Balls, capsules, cylinders, cones, half spaces, cuboids, convex hulls, triangle meshes and compounds of
+    /// these become [`HairCollider`]s on children that follow the collider: its shape in the next tick when
+    /// that changes, the body in every tick. A triangle mesh is baked in the first tick that finds it,
+    /// which makes that tick slow; one with large openings has no inside and is a fault.
+    /// They are removed with the collider, its body or this component, and while the collider has
+    /// [`ColliderDisabled`]. Unsupported shapes are reported once as
+    /// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider a non-uniform scale
+    /// counts as its mean. Hair does not push bodies.
+    ///
+    /// ```
+    /// # use avian3d::prelude::*; use bevy::prelude::*; use bevy_keratin::prelude::*;
+    /// # fn setup(mut commands: Commands) {
+    /// commands.spawn((RigidBody::Kinematic, Collider::capsule(0.2, 0.5), AvianHairCollider::default()));
+    /// # }
+    /// ```
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Unknown)]
+    pub struct AvianHairCollider {
+        /// Coulomb friction of hair on it, independent of the body's: [`HairCollider::friction`].
+        pub friction: f32 = 0.3, in FRICTION: 0.0..=100.0, safe 0.0..=2.0, "hair has 0.2 to 0.4";
+        /// Number of cells along the longest side of a triangle mesh: parts thinner than two cells
+        /// are lost.
+        pub cells: u32 = 48, in CELLS: 4.0..=200.0, "the memory grows with its cube";
     }
 }
 
@@ -121,8 +118,8 @@ fn bake(mesh: &TriMesh, cells: f32) -> Result<ColliderShape, String> {
 struct AvianPart;
 
 pub(super) fn plugin(app: &mut App) {
-    app.register_type::<AvianHairCollider>()
-        .register_type::<Unknown>()
+    setting::component::<AvianHairCollider>(app);
+    app.register_type::<Unknown>()
         .register_type::<Baked>()
         .register_type::<AvianShapeError>()
         .register_type::<AvianPart>()
@@ -155,9 +152,8 @@ fn follow_colliders(
         }
     }
     for (body, collider, settings, mut unknown, mut baked, children) in &mut bodies {
-        let AvianHairCollider { friction, cells } = *settings;
+        let AvianHairCollider { friction, cells } = settings.clamped();
         let baked = baked.bypass_change_detection();
-        let cells = cells.clamp(4, 200);
         if baked.cells != cells {
             *baked = Baked { cells, ..default() };
         }

@@ -101,15 +101,22 @@ impl Ranged for ColliderShape {
                 for side in cuboid.half_size.as_mut() {
                     Self::HALF_SIZE.clamp(side, || 0.1, violations);
                 }
-                Self::ROUNDING.clamp(rounding, || 0.0, violations);
-                *rounding = rounding.min(cuboid.half_size.min_element());
+                let inner = 0.0..=cuboid.half_size.min_element();
+                let hint = "at most half of the shortest side; 0 makes edges sharp";
+                let range = ValueRange::new(Self::ROUNDING.what, inner, hint);
+                range.clamp(rounding, || 0.0, violations);
                 return;
             }
             Self::Ellipsoid { radii } => {
                 for radius in radii.as_mut() {
                     Self::RADIUS.clamp(radius, || 0.09, violations);
                 }
-                *radii = radii.max(Vec3::splat(radii.max_element() / Self::MAX_RATIO));
+                let within = radii.max_element() / Self::MAX_RATIO..=*Self::RADIUS.valid.end();
+                let hint = "the longest axis is at most 100 times the shortest";
+                let range = ValueRange::new(Self::RADIUS.what, within, hint);
+                for radius in radii.as_mut() {
+                    range.clamp(radius, || 0.09, violations);
+                }
                 return;
             }
         };
@@ -158,23 +165,22 @@ impl HairCollider {
         Self::rounded_cuboid(size, 0.0)
     }
 
-    /// A box of this size with edges of this radius (m), clamped to half of its shortest side.
+    /// A box of this size with edges of this radius (m).
     ///
     /// # Errors
-    /// When a side is not positive, the radius negative, or a value not finite.
+    /// When a side is not positive, the radius negative or more than half of the shortest side, or a
+    /// value not finite.
     pub fn rounded_cuboid(size: Vec3, rounding: f32) -> Result<Self, InvalidValue> {
         let cuboid = Cuboid { half_size: 0.5 * size };
-        let made = Self::from(ColliderShape::Cuboid { cuboid, rounding }).checked()?;
-        Ok(made.clamped())
+        Self::from(ColliderShape::Cuboid { cuboid, rounding }).checked()
     }
 
     /// An ellipsoid of these half axes (m).
     ///
     /// # Errors
-    /// When one is not positive and finite.
+    /// When one is not positive and finite, or the longest more than 100 times the shortest.
     pub fn ellipsoid(radii: Vec3) -> Result<Self, InvalidValue> {
-        let made = Self::from(ColliderShape::Ellipsoid { radii }).checked()?;
-        Ok(made.clamped())
+        Self::from(ColliderShape::Ellipsoid { radii }).checked()
     }
 
     /// The convex hull of points (m): [`ConvexHull::new`].
