@@ -665,6 +665,87 @@ fn the_hairline_leaves_face_and_ears_free() {
     );
 }
 
+/// Guides of a preset on a ball of a head: where each begins and ends, and its length (m).
+fn guides_on_a_ball(preset: HairPreset) -> Vec<(Vec3, Vec3, f32)> {
+    let head = Sphere::new(0.1).mesh().ico(24).unwrap();
+    let planted = preset.plant(&head, &Scalp { height: 0.1, ..default() }).unwrap();
+    let of = |points: &[Vec3]| {
+        let length = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        (points[0], points[points.len() - 1], length)
+    };
+    planted.groom.strands().map(|strand| of(strand.points)).collect()
+}
+
+#[test]
+fn a_beard_grows_on_the_lower_face_only() {
+    let guides = guides_on_a_ball(HairPreset::Beard);
+    assert!(guides.len() > 60, "{}", guides.len());
+    for (root, _, length) in &guides {
+        assert!(root.y < 0.035 && root.z > -0.001 && *length < 0.035, "{root} {length}");
+        // The lips are free.
+        let up = root.y.atan2(root.x.hypot(root.z)).to_degrees();
+        assert!((up + 36.5).abs() > 4.0 || root.x.abs() > 0.012, "{root}");
+    }
+    // Chin, and both cheeks before the ear.
+    for place in [Vec3::new(0.0, -0.075, 0.066), Vec3::new(0.082, -0.04, 0.04)] {
+        for side in [-1.0, 1.0] {
+            let there = place * Vec3::new(side, 1.0, 1.0);
+            assert!(guides.iter().any(|(root, ..)| root.distance(there) < 0.02), "{there}");
+        }
+    }
+}
+
+#[test]
+fn a_fringe_ends_above_the_brows() {
+    let guides = guides_on_a_ball(HairPreset::Fringe);
+    let over_forehead = |root: &Vec3| root.z > 0.05 && root.y > 0.07 && root.x.abs() < 0.026;
+    let fringe: Vec<_> = guides.iter().filter(|(root, ..)| over_forehead(root)).collect();
+    assert!(fringe.len() > 1, "{}", fringe.len());
+    for (root, tip, length) in fringe {
+        let up = tip.y.atan2(tip.x.hypot(tip.z));
+        assert!((0.05..0.5).contains(&up) && tip.z > 0.06, "from {root} to {tip}");
+        assert!(*length < 0.16, "{length}");
+    }
+    // Elsewhere it is chin-long.
+    assert!(guides.iter().any(|(.., length)| *length > 0.2));
+}
+
+#[test]
+fn an_undercut_is_close_at_the_sides_and_long_on_top() {
+    for (root, _, length) in guides_on_a_ball(HairPreset::Undercut) {
+        if root.y < 0.04 {
+            assert!(length < 0.02, "{root} {length}");
+        }
+        if root.y > 0.07 && root.x > -0.02 {
+            assert!(length > 0.1, "{root} {length}");
+        }
+    }
+}
+
+/// Locks of guides keep to their side of a parting, and a fringe's strands are no lock with long ones.
+#[test]
+fn locks_do_not_reach_across_a_parting() {
+    for (root, tip, _) in guides_on_a_ball(HairPreset::Straight) {
+        if root.z > 0.02 && (0.006..0.05).contains(&root.x.abs()) {
+            assert!(root.x * (tip.x - root.x) > 0.0, "from {root} to {tip}");
+        }
+    }
+    for (root, tip, length) in guides_on_a_ball(HairPreset::Fringe) {
+        // Nothing long hangs before the face.
+        let is_in_the_face = tip.z > 0.09 && tip.x.abs() < 0.04 && tip.y < -0.02;
+        assert!(!is_in_the_face, "from {root} to {tip}, {length} m");
+    }
+}
+
+#[test]
+fn presets_are_known_by_their_names() {
+    for preset in HairPreset::ALL {
+        assert_eq!(HairPreset::named(&preset.name()), Some(preset));
+        assert_eq!(HairPreset::ALL.iter().filter(|p| **p == preset).count(), 1);
+    }
+    assert_eq!(HairPreset::named("Bald"), None);
+}
+
 /// Each preset on a ball of a head: no strand is torn, restless or in the head a second after it
 /// is let go.
 #[test]

@@ -6,8 +6,9 @@ use crate::{
 };
 use bevy::{asset::RenderAssetUsages, mesh::VertexAttributeValues, prelude::*};
 
-/// Size of the surface's cells (m).
-const CELL: f32 = 0.005;
+/// Size of the surface's cells, of the face and of the rest (m).
+const FINE: f32 = 0.0018;
+const CELL: f32 = 0.006;
 const LOW: Vec3 = Vec3::new(-0.54, -0.02, -0.22);
 const HIGH: Vec3 = Vec3::new(0.54, 1.76, 0.24);
 /// Over what distance the pull of a bone fades (m).
@@ -134,12 +135,16 @@ fn weights(p: Vec3) -> ([u16; 4], [f32; 4]) {
 
 /// The body as a skinned mesh at rest (m): its feet on the floor at the origin, its face toward +Z.
 pub fn mesh() -> Mesh {
-    mesh_of(CELL)
+    mesh_of(FINE, CELL)
 }
 
-/// The same in cells of another size (m).
-pub fn mesh_of(cell: f32) -> Mesh {
-    let mut mesh = mannequin::surface((LOW, HIGH), cell, &skin, &color);
+/// The same in cells of other sizes (m), of the face and of the rest.
+pub fn mesh_of(fine: f32, cell: f32) -> Mesh {
+    let up = [(SKULL.y - 0.1, SKULL.y + 0.026)];
+    let front = [(SKULL.z - 0.026, SKULL.z + 0.02), (SKULL.z + 0.06, SKULL.z + 0.122)];
+    let across = [(-0.09, -0.066), (-0.05, 0.05), (0.066, 0.09)];
+    let grid = mannequin::Grid::graded((LOW, HIGH), [&across, &up, &front], fine, cell);
+    let mut mesh = grid.surface(&skin, &color);
     mesh.asset_usage = RenderAssetUsages::default();
     let places =
         mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(VertexAttributeValues::as_float3);

@@ -1,7 +1,7 @@
 //! The figure: bones, skin, hair and what hair lies on.
 
 use crate::{
-    Arguments, body, head,
+    body, dressed, head,
     skeleton::{self, *},
     solid::Paint,
 };
@@ -20,6 +20,10 @@ pub struct Figure {
     /// Where the middle of its circle is (m).
     pub place: Vec3,
 }
+
+/// What hair it wears.
+#[derive(Resource)]
+pub struct Wears(pub HairPreset);
 
 /// A bone, by its number.
 #[derive(Component)]
@@ -50,7 +54,7 @@ fn build(
     mut commands: Commands,
     mut paint: Paint,
     mut poses: ResMut<Assets<SkinnedMeshInverseBindposes>>,
-    arguments: Res<Arguments>,
+    wears: Res<Wears>,
 ) -> Result {
     let figure = commands.spawn((Figure::default(), path(0.0), Visibility::default())).id();
     let mut bones: Vec<Entity> = Vec::new();
@@ -63,7 +67,7 @@ fn build(
         (0..skeleton::COUNT).map(|bone| Mat4::from_translation(-joint(bone))).collect();
     let scalp = scalp();
     let skin = body::mesh();
-    let preset = arguments.preset.0;
+    let preset = wears.0;
     let planted = preset.plant(&skin, &scalp)?;
     let count = preset.settings().followers.count;
     let line = preset.hairline();
@@ -92,6 +96,12 @@ fn build(
         roots: planted.roots,
         ..default()
     });
+
+    let brows = dressed::brows(preset.settings().look.melanin);
+    let face = dressed::face(Vec3::ONE, brows)?.spawn(&mut commands);
+    let upright = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::X));
+    let at = Transform::from_translation(SKULL - joint(HEAD)).with_rotation(upright);
+    commands.entity(face).insert((at, ChildOf(bones[HEAD])));
 
     // A head is no capsule: hair lies on its skull by several.
     for (a, b, radius) in head::skull() {

@@ -5,6 +5,9 @@
 //!
 //! W wind, R rain, T a jump of 3 m, Space pause; drag to look around, wheel to come near.
 
+#[path = "../salon/dressed.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod dressed;
 #[path = "../salon/failure.rs"]
 mod failure;
 #[path = "../presets/head.rs"]
@@ -50,7 +53,7 @@ use std::{
 #[derive(Parser, Resource, Clone)]
 #[command(version)]
 struct Arguments {
-    /// straight, wavy, curly, coily, short, bob or long.
+    /// straight, wavy, curly, coily, short, bob, long, fringe, undercut, pixie, locs, beard or fur.
     #[arg(long, default_value = "wavy", value_parser = preset)]
     preset: Preset,
     /// It is windy.
@@ -102,7 +105,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if let Some(file) = &arguments.export {
-        let body = body::mesh_of(0.009);
+        let body = body::mesh_of(0.003, 0.009);
         return export::write(&head::with_scalp(body, &figure::scalp(), default()), file);
     }
     // Before anything that takes long.
@@ -112,6 +115,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     app.insert_resource(Time::<Fixed>::from_hz(60.0))
         .insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
         .insert_resource(arguments.clone())
+        .insert_resource(figure::Wears(arguments.preset.0))
         .add_plugins((figure::FigurePlugin, weather::WeatherPlugin, stage::StagePlugin));
     match &arguments.offscreen {
         Some(folder) => pictures(&mut app, arguments, folder),

@@ -4,7 +4,7 @@ use crate::{figure::Figure, solid::Paint, studio};
 use bevy::{
     core_pipeline::{prepass::DepthPrepass, tonemapping::Tonemapping},
     input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll},
-    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, ShadowFilteringMethod},
+    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap},
     prelude::*,
 };
 use core::f32::consts::FRAC_PI_2;
@@ -39,7 +39,6 @@ pub fn camera() -> impl Bundle {
         Tonemapping::TonyMcMapface,
         Msaa::Sample4,
         DepthPrepass,
-        ShadowFilteringMethod::Hardware2x2,
         Follow::default(),
     )
 }
@@ -75,7 +74,7 @@ fn light(mut commands: Commands, mut paint: Paint) {
     };
     commands.spawn(light(Vec3::new(1.0, 1.6, 1.2), 8000.0, Color::srgb(1.0, 0.95, 0.88), true));
     commands.spawn(light(Vec3::new(-1.5, 0.5, 0.9), 2500.0, Color::srgb(0.8, 0.88, 1.0), false));
-    commands.spawn(light(Vec3::new(-0.7, 1.0, -1.5), 4000.0, Color::WHITE, false));
+    commands.spawn(light(Vec3::new(-0.7, 1.0, -1.5), 4000.0, Color::WHITE, true));
     studio::room(&mut commands, &mut paint, 0.0, 4.0);
 }
 

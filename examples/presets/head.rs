@@ -1,4 +1,4 @@
-//! What hair wants of the mannequin's head: solids to lie on, and a dark scalp.
+//! What hair wants of the mannequin's head: solids to lie on, and a scalp in its colour.
 
 use bevy::prelude::*;
 use bevy_keratin::{
@@ -39,6 +39,9 @@ pub fn body() -> Result<Vec<(HairCollider, Transform)>> {
         (Vec3::new(0.0, -0.05, -0.012), Vec3::new(0.0, -0.2, -0.03), 0.050),
         (Vec3::new(-0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058),
         (Vec3::new(0.15, -0.27, -0.04), Vec3::new(0.0, -0.235, -0.035), 0.058),
+        // Between neck and shoulders.
+        (Vec3::new(-0.03, -0.15, -0.045), Vec3::new(-0.115, -0.215, -0.045), 0.037),
+        (Vec3::new(0.03, -0.15, -0.045), Vec3::new(0.115, -0.215, -0.045), 0.037),
         (Vec3::new(-0.08, -0.30, -0.02), Vec3::new(0.08, -0.30, -0.02), 0.07),
     ];
     let parts = skull().into_iter().chain(bust);
@@ -46,11 +49,10 @@ pub fn body() -> Result<Vec<(HairCollider, Transform)>> {
 }
 
 /// The share of the skin that hair hides where it is dense.
-const COVER: f32 = 0.85;
+pub const COVER: f32 = 0.85;
 
 /// The skin under the hair, tinted by it.
 pub fn with_scalp(mut mesh: Mesh, scalp: &Scalp, preset: HairPreset) -> Mesh {
-    let hair = preset.settings().look.melanin.color();
-    scalp.tint(&mut mesh, &preset.hairline(), hair, COVER);
+    preset.tint(&mut mesh, scalp, preset.settings().look.melanin.color(), COVER);
     mesh
 }

@@ -3,7 +3,7 @@
 use crate::{
     overlay::HairGizmos,
     plots::{Measured, colour, name},
-    scenes::Strewn,
+    scenes::{Strewn, Treated},
     tools::{self, Tools},
     wardrobe::Order,
 };
@@ -37,7 +37,7 @@ pub struct Settings<'w, 's> {
     gizmos: ResMut<'w, GizmoConfigStore>,
     lights: Query<'w, 's, &'static mut SpotLight>,
     blowers: Query<'w, 's, (Entity, &'static Blower, &'static Transform)>,
-    hairs: Query<'w, 's, (Entity, &'static Strands), With<Hair>>,
+    hairs: Query<'w, 's, (Entity, &'static Strands), With<Treated>>,
     strands: Query<'w, 's, &'static Strand>,
     treat: MessageWriter<'w, HairTreatment>,
     /// Shared by all of the panel: a system may have but one of these.
@@ -325,39 +325,31 @@ impl Settings<'_, '_> {
         self.tools.set_if_neq(wanted);
     }
 
-    /// The heat map's switch and its scale, as in the paper's figure 5.
-    pub fn view(&mut self, ui: &mut Ui, kind: &mut BondKind) {
+    /// What of the hair is shown, one thing at a time, and the scale of its colours, as in the paper's
+    /// figure 5.
+    pub fn view(&mut self, ui: &mut Ui) {
         let mut view = self.view.0;
-        let mut coloured = matches!(view, HairView::Bond(_));
-        ui.checkbox(&mut coloured, "colour by bond rate");
-        ui.horizontal(|ui| {
-            for k in BondKind::ALL {
-                coloured |= ui.selectable_value(kind, k, name(k)).clicked();
-            }
-        });
-        view = match (coloured, view) {
-            (true, _) => HairView::Bond(*kind),
-            (false, HairView::Bond(_)) => HairView::Natural,
-            (false, other) => other,
-        };
-        if coloured {
-            scale(ui, "0 cut", "1 closed");
-        }
-        ui.horizontal(|ui| {
-            ui.label("or");
+        ui.horizontal_wrapped(|ui| {
             ui.selectable_value(&mut view, HairView::Natural, "natural");
             ui.selectable_value(&mut view, HairView::Guides, "guides");
-            ui.selectable_value(&mut view, HairView::Strain, "strain");
+            ui.selectable_value(&mut view, HairView::Strain, "stretch");
             ui.selectable_value(&mut view, HairView::Moisture, "water");
         });
-        if view == HairView::Strain {
-            scale(ui, "0 %", "5 %");
-        }
-        if view == HairView::Moisture {
-            scale(ui, "dry", "soaked");
+        ui.small("or the rate of bonds:");
+        ui.horizontal_wrapped(|ui| {
+            for kind in BondKind::ALL {
+                ui.selectable_value(&mut view, HairView::Bond(kind), name(kind));
+            }
+        });
+        // Always a row, so that nothing below moves.
+        match view {
+            HairView::Bond(_) => scale(ui, "0 cut", "1 closed"),
+            HairView::Strain => scale(ui, "0 %", "5 %"),
+            HairView::Moisture => scale(ui, "dry", "soaked"),
+            _ => _ = ui.small("as it looks"),
         }
         let mut lines = self.gizmos.config::<HairGizmos>().0.enabled;
-        if ui.checkbox(&mut lines, "colliders, wind, showers, rods as lines").changed() {
+        if ui.checkbox(&mut lines, "colliders, wind, rods as lines").changed() {
             self.gizmos.config_mut::<HairGizmos>().0.enabled = lines;
         }
         if view != self.view.0 {
@@ -376,11 +368,13 @@ impl Settings<'_, '_> {
             ui.horizontal_wrapped(|ui| {
                 let colours = [
                     ("black", Melanin::BLACK),
+                    ("dark brown", Melanin::DARK_BROWN),
                     ("brown", Melanin::BROWN),
                     ("auburn", Melanin::AUBURN),
                     ("red", Melanin::RED),
                     ("blond", Melanin::BLOND),
                     ("platinum", Melanin::PLATINUM),
+                    ("white", Melanin::new(0.0, 0.0)),
                 ];
                 for (label, melanin) in colours {
                     ui.selectable_value(&mut l.melanin, melanin, label);

@@ -4,34 +4,38 @@
 //! `cargo run --release --example salon`
 //! `cargo run --release --example salon -- --scene perm --offscreen pictures`
 
+#[path = "../presets/head.rs"]
+mod head;
 #[path = "../scenes/mod.rs"]
 mod scenes;
 
 mod camera;
 mod dials;
+mod dressed;
 mod environment;
 mod failure;
 mod mannequin;
 mod offscreen;
+mod orbit;
 mod overlay;
 mod panel;
 mod picture;
 mod plots;
 mod renderer;
+mod set;
 mod solid;
+mod spare;
 mod stage;
 mod story;
 mod studio;
 mod tools;
 mod wardrobe;
+mod worn;
 
-use bevy::{prelude::*, render::renderer::RenderAdapterInfo};
-use bevy_keratin::{
-    prelude::*,
-    render::{HairFollowers, HairView, WetLook},
-};
+use bevy::prelude::*;
+use bevy_keratin::{prelude::*, render::HairView};
 use clap::{CommandFactory, Parser, error::ErrorKind};
-use scenes::{Scene, SceneKind, ScenePlugin};
+use scenes::{Scene, SceneKind};
 use std::{path::PathBuf, process::ExitCode};
 
 /// A head with hair that remembers, in a window or in pictures.
@@ -141,58 +145,26 @@ fn refuse(error: &clap::Error) -> ExitCode {
     ExitCode::from(if error.use_stderr() { 2 } else { 0 })
 }
 
-/// What both share: the scene, the hair, the studio.
+/// What both share.
 fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
-    app.insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
-        .add_plugins((ScenePlugin(scene), overlay::OverlayPlugin))
-        .insert_resource(HairDefault(HairView::from(arguments.view)))
-        .add_systems(Startup, stage::build.before(scenes::spawn_scene))
-        .add_systems(PreUpdate, surround)
-        .add_systems(PostUpdate, (stage::embody, stage::slide).before(TransformSystems::Propagate))
-        .add_systems(Update, look_wet);
+    set::furnish(app, scene, arguments.view.into());
+    app.add_plugins(overlay::OverlayPlugin);
     let mut gizmos = app.world_mut().resource_mut::<GizmoConfigStore>();
     gizmos.config_mut::<overlay::HairGizmos>().0.enabled = arguments.gizmos;
 }
 
-/// Gives each camera the studio to be reflected, which is also what light comes from all around.
-fn surround(
-    mut commands: Commands,
-    mut images: ResMut<Assets<Image>>,
-    mut ambient: ResMut<GlobalAmbientLight>,
-    cameras: Query<Entity, Added<Camera3d>>,
-) {
-    for camera in &cameras {
-        commands.entity(camera).insert(environment::studio(&mut images, 450.0));
-        ambient.brightness = 0.0;
-    }
-}
-
-/// Water that only cuts bonds, as the bonds' paper has it, shows, too: hair looks as wet as its hydrogen
-/// bonds are open, where it carries no water.
-fn look_wet(
-    mut commands: Commands,
-    strands: Query<(Entity, &Bonds, &Moisture, Option<&WetLook>), With<StrandOf>>,
-) {
-    for (strand, bonds, moisture, look) in &strands {
-        let mut open: Vec<f32> =
-            bonds.rates(BondKind::Hydrogen).map(|rate| (1.0 - rate).clamp(0.0, 1.0)).collect();
-        let is_wet = moisture.is_untouched() && open.iter().any(|open| *open > 0.01);
-        open.extend(open.last().copied());
-        match look {
-            Some(_) if !is_wet => _ = commands.entity(strand).remove::<WetLook>(),
-            Some(look) if look.0 == open => {}
-            _ if is_wet => _ = commands.entity(strand).insert(WetLook(open)),
-            _ => {}
-        }
-    }
-}
-
 fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
     let mut app = renderer::app("bevy_keratin salon", arguments.size, false, default());
-    app.add_plugins((panel::PanelPlugin, story::StoryPlugin, wardrobe::WardrobePlugin));
+    app.add_plugins((
+        panel::PanelPlugin,
+        story::StoryPlugin,
+        wardrobe::WardrobePlugin,
+        worn::WornPlugin(scene),
+    ));
     salon(&mut app, scene, arguments);
-    app.add_systems(Startup, (open_eye, spare_software).chain().after(stage::build))
-        .add_systems(Update, (camera::frame_scene, camera::orbit, camera::place).chain());
+    app.add_systems(Startup, (open_eye, spare::software).chain().after(stage::build))
+        .add_systems(PreUpdate, spare::strands)
+        .add_systems(Update, (camera::frame_stage, camera::orbit, camera::place).chain());
     match app.run() {
         AppExit::Success => ExitCode::SUCCESS,
         AppExit::Error(code) => ExitCode::from(code.get()),
@@ -200,21 +172,7 @@ fn windowed(scene: Scene, arguments: &Arguments) -> ExitCode {
 }
 
 fn open_eye(mut commands: Commands, scene: Res<Scene>) {
-    commands.spawn(camera::bundle(scene.kind));
-}
-
-/// Without a graphics card a window is drawn with fewer strands and plain edges, or it would crawl.
-fn spare_software(
-    adapter: Option<Res<RenderAdapterInfo>>,
-    mut followers: ResMut<HairDefault<HairFollowers>>,
-    mut lights: Query<&mut SpotLight>,
-    mut edges: Query<&mut Msaa>,
-) {
-    if adapter.is_some_and(|a| format!("{:?}", a.device_type) == "Cpu") {
-        followers.count = followers.count.min(1500);
-        lights.iter_mut().for_each(|mut light| light.shadow_maps_enabled = false);
-        edges.iter_mut().for_each(|mut edges| *edges = Msaa::Off);
-    }
+    commands.spawn(orbit::bundle(scene.kind));
 }
 
 fn windowless(scene: Scene, arguments: &Arguments) -> App {

@@ -1,187 +1,155 @@
-//! A training head, made by rule: a smooth union of simple solids, turned into a mesh.
+//! A training head, made by rule: the surface on which a distance is 0, turned into a mesh.
 //!
 //! It lies on its back: +X to the crown, +Y to the face. Its origin is the centre of the skull and
 //! the back of the skull is flattened at −Y, where the hair grows.
 
-use crate::scenes::HEAD_RADIUS;
+#[path = "sculpt.rs"]
+mod sculpt;
+
 use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, PrimitiveTopology},
     platform::collections::HashMap,
     prelude::*,
 };
+pub use sculpt::*;
 
-/// Edge of the grid on which the surface is found (m).
-const CELL: f32 = 0.0045;
+/// Edges of the grid on which the surface is found: where the face and the ears are, and elsewhere (m).
+const FINE: f32 = 0.0014;
+const COARSE: f32 = 0.0042;
 /// The box that holds all of the head.
-const LOW: Vec3 = Vec3::new(-0.33, -0.13, -0.235);
-const HIGH: Vec3 = Vec3::new(0.14, 0.15, 0.235);
-/// Where the bust is cut off (m).
-pub const BUST_END: f32 = -0.30;
-
-/// Blends two distances over a width of `k`.
-pub fn join(a: f32, b: f32, k: f32) -> f32 {
-    let h = (k - (a - b).abs()).max(0.0) / k;
-    a.min(b) - 0.25 * h * h * k
-}
-
-/// Takes `b` away from `a`, with an edge of width `k`.
-pub fn carve(a: f32, b: f32, k: f32) -> f32 {
-    -join(-a, b, k)
-}
-
-fn ball(p: Vec3, centre: Vec3, radius: f32) -> f32 {
-    p.distance(centre) - radius
-}
-
-fn ellipsoid(p: Vec3, centre: Vec3, radii: Vec3) -> f32 {
-    let q = p - centre;
-    let (near, far) = ((q / radii).length(), (q / (radii * radii)).length());
-    near * (near - 1.0) / far.max(1e-6)
-}
-
-/// A capsule whose radius goes from `ra` at `a` to `rb` at `b`.
-pub fn limb(p: Vec3, a: Vec3, b: Vec3, ra: f32, rb: f32) -> f32 {
-    let way = b - a;
-    let t = ((p - a).dot(way) / way.length_squared()).clamp(0.0, 1.0);
-    p.distance(a + way * t) - (ra + (rb - ra) * t)
-}
-
-fn block(p: Vec3, centre: Vec3, half: Vec3, round: f32) -> f32 {
-    let q = (p - centre).abs() - half + round;
-    q.max(Vec3::ZERO).length() + q.max_element().min(0.0) - round
-}
-
-/// Distance to the surface of head, neck and shoulders (m), negative inside.
-pub fn head(p: Vec3) -> f32 {
-    let p = Vec3::new(p.x, p.y, p.z.abs());
-    let v = Vec3::new;
-    let mut d = face(p);
-    // Neck, shoulders, chest, cut off below.
-    d = join(d, limb(p, v(-0.05, -0.012, 0.0), v(-0.2, -0.03, 0.0), 0.05, 0.056), 0.03);
-    d = join(d, limb(p, v(-0.235, -0.035, 0.0), v(-0.27, -0.04, 0.15), 0.05, 0.058), 0.06);
-    d = join(d, ellipsoid(p, v(-0.31, -0.02, 0.0), v(0.09, 0.07, 0.15)), 0.05);
-    carve(d, p.x - BUST_END, 0.012)
-}
-
-/// Distance to the surface of the head without its neck (m), negative inside. Both halves are alike.
-pub fn face(p: Vec3) -> f32 {
-    let p = Vec3::new(p.x, p.y, p.z.abs());
-    let v = Vec3::new;
-    let skull = ellipsoid(p, v(0.018, 0.0, 0.0), v(0.1, 0.095, 0.077));
-    // Flat where the hair's roots are, so that they all sit in the scalp.
-    let back = block(p, v(0.0, 0.026 - HEAD_RADIUS, 0.0), v(0.036, 0.026, 0.058), 0.02);
-    let mut d = join(skull, back, 0.05);
-    let face = ellipsoid(p, v(-0.03, 0.04, 0.0), v(0.072, 0.05, 0.058));
-    let jaw = ellipsoid(p, v(-0.066, 0.032, 0.0), v(0.04, 0.05, 0.05));
-    d = join(d, join(face, jaw, 0.04), 0.04);
-    d = join(d, ball(p, v(-0.094, 0.074, 0.0), 0.013), 0.03);
-    // Brow, sockets, closed eyes.
-    d = join(d, limb(p, v(0.014, 0.088, 0.008), v(0.008, 0.076, 0.044), 0.006, 0.004), 0.02);
-    d = carve(d, ball(p, v(-0.012, 0.103, 0.031), 0.0135), 0.022);
-    d = join(d, ellipsoid(p, v(-0.013, 0.076, 0.031), v(0.0105, 0.0115, 0.0155)), 0.005);
-    // Nose with its wings.
-    d = join(d, limb(p, v(0.002, 0.089, 0.0), v(-0.036, 0.108, 0.0), 0.006, 0.0085), 0.014);
-    d = join(d, ball(p, v(-0.041, 0.097, 0.0105), 0.0062), 0.009);
-    // Cheek bones, lips.
-    d = join(d, ball(p, v(-0.03, 0.062, 0.042), 0.014), 0.03);
-    let upper = ellipsoid(p, v(-0.0595, 0.0885, 0.0), v(0.0045, 0.0085, 0.021));
-    let lower = ellipsoid(p, v(-0.0685, 0.0875, 0.0), v(0.0055, 0.0085, 0.017));
-    d = join(d, upper.min(lower), 0.007);
-    // Ear: a shell with a hollow.
-    let shell = ellipsoid(p, v(-0.016, -0.002, 0.077), v(0.031, 0.018, 0.0085));
-    let ear = carve(shell, ellipsoid(p, v(-0.012, 0.0, 0.084), v(0.02, 0.01, 0.007)), 0.005);
-    join(d, ear, 0.008)
-}
-
-/// The unit direction in which a distance grows.
-pub fn normal(distance: &impl Fn(Vec3) -> f32, p: Vec3) -> Vec3 {
-    let step = |axis: Vec3| distance(p + axis * 1e-3) - distance(p - axis * 1e-3);
-    Vec3::new(step(Vec3::X), step(Vec3::Y), step(Vec3::Z)).normalize_or(Vec3::Y)
-}
-
-/// Skin, and the darker scalp that shows between strands.
-fn colour(p: Vec3) -> [f32; 4] {
-    let scalp = block(p, Vec3::new(0.0, -0.1, 0.0), Vec3::new(0.044, 0.034, 0.064), 0.02);
-    let share = (1.0 - scalp / 0.006).clamp(0.0, 1.0);
-    skin(p).lerp(Vec3::new(0.09, 0.05, 0.035), share * 0.9).extend(1.0).to_array()
-}
-
-/// Skin and lips.
-pub fn skin(p: Vec3) -> Vec3 {
-    let lips = ellipsoid(p, Vec3::new(-0.064, 0.09, 0.0), Vec3::new(0.0095, 0.012, 0.02));
-    let red = (1.0 - lips / 0.004).clamp(0.0, 1.0) * 0.45;
-    Vec3::new(0.62, 0.40, 0.29).lerp(Vec3::new(0.50, 0.18, 0.15), red)
-}
+const LOW: Vec3 = Vec3::new(-0.31, -0.13, -0.20);
+const HIGH: Vec3 = Vec3::new(0.14, 0.15, 0.20);
+/// Which part of each axis is fine; of the last, on both sides of the middle: the face and the ears.
+const FINE_X: [(f32, f32); 1] = [(-0.105, 0.028)];
+const FINE_Y: [(f32, f32); 2] = [(-0.026, 0.022), (0.060, 0.124)];
+const FINE_Z: [(f32, f32); 3] = [(-0.094, -0.066), (-0.052, 0.052), (0.066, 0.094)];
 
 /// The head as a mesh with vertex colours.
 pub fn mesh() -> Mesh {
-    surface((LOW, HIGH), CELL, &head, &colour)
+    grid().surface(&head, &|p| skin(p).extend(1.0).to_array())
 }
 
-/// The same without the dark patch at the back.
-pub fn plain() -> Mesh {
-    surface((LOW, HIGH), CELL, &head, &|p| skin(p).extend(1.0).to_array())
+/// Fine where it must be.
+fn grid() -> Grid {
+    let fine: [&[(f32, f32)]; 3] = [&FINE_X, &FINE_Y, &FINE_Z];
+    Grid::graded((LOW, HIGH), fine, FINE, COARSE)
 }
 
-/// What a distance is 0 on within a box, as a mesh with vertex colours: one vertex in each cell that
-/// the surface crosses, put onto the surface; one quad around each grid edge that it crosses.
-pub fn surface(
-    (low, high): (Vec3, Vec3),
-    cell: f32,
-    distance: &impl Fn(Vec3) -> f32,
-    colour: &impl Fn(Vec3) -> [f32; 4],
-) -> Mesh {
-    let count = ((high - low) / cell).ceil().as_uvec3();
-    let place = |c: UVec3| low + c.as_vec3() * cell;
-    let index = |c: UVec3| (c.x + count.x * (c.y + count.y * c.z)) as usize;
-    let mut field = Vec::with_capacity(count.element_product() as usize);
-    for z in 0..count.z {
-        for y in 0..count.y {
-            field.extend((0..count.x).map(|x| distance(place(UVec3::new(x, y, z)))));
-        }
+/// Steps from `low` to `high`, fine in the given parts; from one size to the other by a fifth at a time.
+fn steps((low, high): (f32, f32), fine: &[(f32, f32)], least: f32, most: f32) -> Vec<f32> {
+    let mut at = vec![low];
+    let mut last = low;
+    while last < high {
+        let apart = |part: &(f32, f32)| (part.0 - last).max(last - part.1).max(0.0);
+        let away = fine.iter().map(apart).fold(f32::MAX, f32::min);
+        last += (least + 0.2 * away).min(most);
+        at.push(last);
     }
-    let inside = |c: UVec3| field[index(c)] < 0.0;
+    at
+}
 
-    let mut positions: Vec<[f32; 3]> = Vec::new();
-    let mut normals: Vec<[f32; 3]> = Vec::new();
-    let mut colours: Vec<[f32; 4]> = Vec::new();
-    let mut vertex_of: HashMap<UVec3, u32> = HashMap::default();
-    let mut vertex = |corner: UVec3| {
-        *vertex_of.entry(corner).or_insert_with(|| {
-            let mut p = place(corner) + 0.5 * cell;
-            for _ in 0..4 {
-                p -= normal(distance, p) * distance(p);
+/// Planes across each axis, from low to high.
+pub struct Grid([Vec<f32>; 3]);
+
+/// Cells along the side of a block that is looked at as a whole.
+const BLOCK: u32 = 8;
+/// By how much a blended distance may be greater than the true one.
+const BLENDED: f32 = 1.6;
+
+impl Grid {
+    /// Over a box, with edges of `least` in the fine parts of each axis and up to `most` elsewhere (m).
+    pub fn graded(
+        (low, high): (Vec3, Vec3),
+        fine: [&[(f32, f32)]; 3],
+        least: f32,
+        most: f32,
+    ) -> Self {
+        Self([0, 1, 2].map(|i| steps((low[i], high[i]), fine[i], least, most)))
+    }
+
+    fn count(&self) -> UVec3 {
+        let [x, y, z] = &self.0;
+        UVec3::new(x.len() as u32, y.len() as u32, z.len() as u32)
+    }
+
+    fn place(&self, c: UVec3) -> Vec3 {
+        Vec3::new(self.0[0][c.x as usize], self.0[1][c.y as usize], self.0[2][c.z as usize])
+    }
+
+    /// The distance at the grid's points, those far from the surface from the middle of their block.
+    fn field(&self, distance: &impl Fn(Vec3) -> f32) -> Vec<f32> {
+        let count = self.count();
+        let mut field = vec![0.0; count.element_product() as usize];
+        let index = |c: UVec3| (c.x + count.x * (c.y + count.y * c.z)) as usize;
+        let blocks = count.map(|n| n.div_ceil(BLOCK));
+        for block in each(UVec3::ZERO, blocks) {
+            let (first, end) = (block * BLOCK, ((block + 1) * BLOCK).min(count));
+            let (a, b) = (self.place(first), self.place(end - 1));
+            let whole = distance(0.5 * (a + b));
+            let is_far = whole.abs() > BLENDED * 0.5 * a.distance(b);
+            for c in each(first, end) {
+                field[index(c)] = if is_far { whole } else { distance(self.place(c)) };
             }
-            positions.push(p.to_array());
-            normals.push(normal(distance, p).to_array());
-            colours.push(colour(p));
-            positions.len() as u32 - 1
-        })
-    };
-    let mut indices: Vec<u32> = Vec::new();
-    for z in 1..count.z - 1 {
-        for y in 1..count.y - 1 {
-            for x in 1..count.x - 1 {
-                let c = UVec3::new(x, y, z);
-                for (axis, u, v) in [
-                    (UVec3::X, UVec3::Y, UVec3::Z),
-                    (UVec3::Y, UVec3::Z, UVec3::X),
-                    (UVec3::Z, UVec3::X, UVec3::Y),
-                ] {
-                    if inside(c) == inside(c + axis) {
-                        continue;
-                    }
-                    let quad = [c - u - v, c - v, c, c - u].map(&mut vertex);
-                    let order = if inside(c) { [0, 1, 2, 0, 2, 3] } else { [0, 2, 1, 0, 3, 2] };
-                    indices.extend(order.map(|i| quad[i]));
+        }
+        field
+    }
+
+    /// What a distance is 0 on, as a mesh with vertex colours: one vertex in each cell that the surface
+    /// crosses, put onto the surface; one quad around each grid edge that it crosses.
+    pub fn surface(
+        &self,
+        distance: &impl Fn(Vec3) -> f32,
+        colour: &impl Fn(Vec3) -> [f32; 4],
+    ) -> Mesh {
+        let count = self.count();
+        let field = self.field(distance);
+        let inside = |c: UVec3| field[(c.x + count.x * (c.y + count.y * c.z)) as usize] < 0.0;
+        let mut positions: Vec<[f32; 3]> = Vec::new();
+        let mut normals: Vec<[f32; 3]> = Vec::new();
+        let mut colours: Vec<[f32; 4]> = Vec::new();
+        let mut vertex_of: HashMap<UVec3, u32> = HashMap::default();
+        let mut vertex = |corner: UVec3| {
+            *vertex_of.entry(corner).or_insert_with(|| {
+                let (low, high) = (self.place(corner), self.place(corner + 1));
+                let mut p = 0.5 * (low + high);
+                for _ in 0..3 {
+                    p -= normal(distance, p) * distance(p);
                 }
+                // Where the surface has an edge, it may have gone astray.
+                let p = p.clamp(2.0 * low - high, 2.0 * high - low);
+                positions.push(p.to_array());
+                normals.push(normal(distance, p).to_array());
+                colours.push(colour(p));
+                positions.len() as u32 - 1
+            })
+        };
+        let mut indices: Vec<u32> = Vec::new();
+        for c in each(UVec3::ONE, count - 1) {
+            for (axis, u, v) in [
+                (UVec3::X, UVec3::Y, UVec3::Z),
+                (UVec3::Y, UVec3::Z, UVec3::X),
+                (UVec3::Z, UVec3::X, UVec3::Y),
+            ] {
+                if inside(c) == inside(c + axis) {
+                    continue;
+                }
+                let quad = [c - u - v, c - v, c, c - u].map(&mut vertex);
+                let order = if inside(c) { [0, 1, 2, 0, 2, 3] } else { [0, 2, 1, 0, 3, 2] };
+                indices.extend(order.map(|i| quad[i]));
             }
         }
+        Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colours)
+            .with_inserted_indices(Indices::U32(indices))
     }
-    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colours)
-        .with_inserted_indices(Indices::U32(indices))
+}
+
+/// All of a range, along x first.
+fn each(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
+    (low.z..high.z).flat_map(move |z| {
+        (low.y..high.y).flat_map(move |y| (low.x..high.x).map(move |x| UVec3::new(x, y, z)))
+    })
 }

@@ -1,6 +1,6 @@
 //! Pictures without a window: exactly one tick an update, drawn at the frames asked for.
 
-use crate::{Arguments, camera, picture::Pictures, scenes::Scene};
+use crate::{Arguments, orbit, picture::Pictures, scenes::Scene};
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use std::{
     io,
@@ -20,7 +20,7 @@ pub fn run(
     frames.dedup();
 
     let pictures =
-        Pictures::new(app, arguments.size, arguments.supersample, camera::bundle(scene.kind));
+        Pictures::new(app, arguments.size, arguments.supersample, orbit::bundle(scene.kind));
 
     let mut written = Vec::new();
     let mut ticks = 0;

@@ -1,24 +1,27 @@
 //! The panel: choosing and playing scenes, and all that can be changed while they run.
 
 use crate::{
-    camera::Orbit,
     dials::{Hand, Settings},
-    plots::{Measured, PlotsPlugin},
+    orbit::Orbit,
+    plots::{Measured, PlotsPlugin, PlotsShown},
     scenes::{Director, Scene, SceneKind},
+    spare::Spared,
     story::{Restart, Step, moments, toggle},
     tools,
     wardrobe::{Hairdos, Order},
+    worn::{self, Shake, Shown},
 };
 use bevy::prelude::*;
 use bevy_egui::{
     EguiContexts, EguiPlugin, EguiPrimaryContextPass,
     egui::{self, CollapsingHeader, Slider, Ui, UiBuilder},
 };
-use bevy_keratin::BondKind;
 
-/// How wide the panel and the plots are (points).
-pub const WIDTH: f32 = 300.0;
-const PLOTS: f32 = 310.0;
+/// How wide the panel is (points).
+pub const WIDTH: f32 = 270.0;
+/// How wide the plots are, and from which width of the window on they are shown unasked (points).
+pub const PLOTS: f32 = 310.0;
+pub const WIDE: f32 = 1100.0;
 
 pub struct PanelPlugin;
 
@@ -37,10 +40,10 @@ fn show(
     mut settings: Settings,
     measured: Res<Measured>,
     mut hand: Local<Hand>,
-    mut kind: Local<Option<BondKind>>,
     mut calm: Local<u32>,
     mut orbits: Query<&mut Orbit>,
     mut wardrobe: Wardrobe,
+    (plots, spared): (Res<PlotsShown>, Option<Res<Spared>>),
 ) -> Result {
     let ctx = contexts.ctx_mut()?;
     // Drawn in software a frame may last longer than a click may by default.
@@ -48,21 +51,24 @@ fn show(
     let area = ctx.viewport_rect();
     let layer = UiBuilder::new().layer_id(egui::LayerId::background()).max_rect(area);
     let mut root = Ui::new(ctx.clone(), "salon".into(), layer);
-    let kind = kind.get_or_insert(BondKind::Hydrogen);
     egui::Panel::left("panel").exact_size(WIDTH).resizable(false).show(&mut root, |ui| {
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            ui.spacing_mut().slider_width = 110.0;
+            ui.spacing_mut().slider_width = 90.0;
             player.show(ui, &mut settings.orders);
+            if let Some(spared) = &spared {
+                ui.small(egui::RichText::new(spared.to_string()).italics());
+                ui.separator();
+            }
             section(ui, "Bond rates", true, |ui| settings.treatments(ui, &mut hand, &measured));
             section(ui, "Hairdo", false, |ui| {
                 wardrobe.show(ui, &mut settings.orders);
             });
-            section(ui, "Colours", true, |ui| settings.view(ui, kind));
+            section(ui, "Colours", true, |ui| settings.view(ui));
             section(ui, "Hair", false, |ui| settings.hair(ui));
             section(ui, "Air", false, |ui| settings.air(ui));
             section(ui, "Water", false, |ui| settings.water(ui));
             section(ui, "Blower and rod", false, |ui| settings.tools(ui));
-            section(ui, "HairSolver", false, |ui| settings.solver(ui));
+            section(ui, "Solver", false, |ui| settings.solver(ui));
             section(ui, "Looks", false, |ui| settings.look(ui));
             ui.add_space(6.0);
             if ui.button("Everything as in the paper").clicked() {
@@ -74,7 +80,8 @@ fn show(
     });
     release_focus(ctx, &mut calm);
     // The action in the middle of what is left free.
-    let shift = 0.5 * (WIDTH - PLOTS) / area.height().max(1.0);
+    let right = if plots.0 { PLOTS } else { 0.0 };
+    let shift = 0.5 * (WIDTH - right) / area.height().max(1.0);
     for mut orbit in &mut orbits {
         if orbit.shift != shift {
             orbit.shift = shift;
@@ -135,28 +142,48 @@ impl Wardrobe<'_, '_> {
 #[derive(bevy::ecs::system::SystemParam)]
 pub struct Player<'w> {
     scene: Res<'w, Scene>,
+    shown: Res<'w, Shown>,
     director: Res<'w, Director>,
     time: ResMut<'w, Time<Virtual>>,
     restarts: MessageWriter<'w, Restart>,
     steps: MessageWriter<'w, Step>,
+    shakes: MessageWriter<'w, Shake>,
 }
 
 impl Player<'_> {
     fn show(&mut self, ui: &mut Ui, orders: &mut MessageWriter<Order>) {
         ui.add_space(4.0);
-        let mut wanted = *self.scene;
-        ui.horizontal(|ui| {
+        let shown = *self.shown;
+        let mut wanted = shown;
+        ui.label("A story of bonds");
+        ui.horizontal_wrapped(|ui| {
             for kind in SceneKind::ALL {
-                if ui.selectable_label(wanted.kind == kind, kind.name()).clicked() {
-                    wanted = Scene { kind, variant: kind.variants()[0] };
+                let is_on = matches!(shown, Shown::Scene(scene) if scene.kind == kind);
+                if ui.selectable_label(is_on, kind.name()).clicked() {
+                    wanted = Shown::Scene(Scene { kind, variant: kind.variants()[0] });
                 }
             }
         });
+        ui.label("or a head of hair");
         ui.horizontal_wrapped(|ui| {
-            for variant in wanted.kind.variants() {
-                ui.selectable_value(&mut wanted.variant, *variant, *variant);
+            for preset in worn::PRESETS {
+                let name = preset.name().to_lowercase();
+                if ui.selectable_label(shown == Shown::Preset(preset), name).clicked() {
+                    wanted = Shown::Preset(preset);
+                }
             }
         });
+        // Below what is picked, so that nothing of that moves.
+        if let Shown::Scene(scene) = &mut wanted {
+            ui.horizontal_wrapped(|ui| {
+                ui.small("variant");
+                for variant in scene.kind.variants() {
+                    ui.selectable_value(&mut scene.variant, *variant, *variant);
+                }
+            });
+        } else {
+            ui.small("Wet it, dry it, blow on it, dye it.");
+        }
         ui.horizontal(|ui| {
             let label = if self.time.is_paused() { "▶ Play" } else { "⏸ Pause" };
             if ui.button(label).clicked() {
@@ -165,16 +192,21 @@ impl Player<'_> {
             if ui.button("Step").on_hover_text("one tick of 1/60 s").clicked() {
                 self.steps.write(Step);
             }
-            if ui.button("Reset").clicked() || wanted != *self.scene {
+            if ui.button("Reset").clicked() || wanted != shown {
                 orders.write(Order::Remember);
                 self.restarts.write(Restart(wanted));
+            }
+            if matches!(shown, Shown::Preset(_)) && ui.button("Shake").clicked() {
+                self.shakes.write(Shake);
             }
         });
         let mut speed = self.time.relative_speed();
         if ui.add(Slider::new(&mut speed, 0.1..=4.0).logarithmic(true).text("speed")).changed() {
             self.time.set_relative_speed(speed);
         }
-        self.story(ui);
+        if matches!(shown, Shown::Scene(_)) {
+            self.story(ui);
+        }
         ui.separator();
     }
 
@@ -184,7 +216,11 @@ impl Player<'_> {
         let frame = self.director.frame;
         let end = self.scene.kind.frames();
         let share = frame as f32 / end as f32;
-        let text = format!("{now:.1} s, frame {frame} of {end}");
+        let seconds = end as f32 / 60.0;
+        let text = match frame > end {
+            true => format!("{now:.1} s; the story ended at {seconds:.1} s"),
+            false => format!("{now:.1} of {seconds:.1} s (frame {frame} of {end})"),
+        };
         ui.add(egui::ProgressBar::new(share.min(1.0)).text(egui::RichText::new(text).small()));
         let moments = moments(*self.scene);
         let present = moments.iter().rposition(|(from, _)| *from <= now).unwrap_or(0);

@@ -62,6 +62,7 @@ impl Pictures {
     }
 
     /// Draws the world as it is now into a PNG.
+    #[allow(dead_code, reason = "presets and gallery put pictures together")]
     pub fn take(&self, app: &mut App, path: &Path) -> io::Result<()> {
         save(self.draw(app)?, path)
     }
@@ -101,10 +102,36 @@ fn averaged(picture: &Image, times: u32) -> Image {
         let [red, green, blue] = [0, 1, 2].map(|channel| mean(i % width, i / width, channel));
         Color::linear_rgb(red, green, blue).to_srgba().to_u8_array()
     });
+    of_pixels(width, height, pixels.collect())
+}
+
+/// Pictures of one height as one, from left to right.
+#[allow(dead_code, reason = "the presets and the gallery do")]
+pub fn beside(views: &[Image]) -> Image {
+    let height = views.iter().map(Image::height).min().unwrap_or(0);
+    let row = |image: &Image, y: u32| {
+        let bytes = image.data.as_deref().unwrap_or_default();
+        let wide = 4 * image.width() as usize;
+        let start = y as usize * wide;
+        bytes.get(start..start + wide).unwrap_or_default().to_vec()
+    };
+    let rows = (0..height).flat_map(|y| views.iter().flat_map(move |view| row(view, y)));
+    of_pixels(views.iter().map(Image::width).sum(), height, rows.collect())
+}
+
+/// Pictures of one width as one, from top to bottom.
+#[allow(dead_code, reason = "the gallery does")]
+pub fn below(views: &[Image]) -> Image {
+    let bytes = views.iter().flat_map(|view| view.data.clone().unwrap_or_default());
+    let width = views.iter().map(Image::width).min().unwrap_or(0);
+    of_pixels(width, views.iter().map(Image::height).sum(), bytes.collect())
+}
+
+fn of_pixels(width: u32, height: u32, bytes: Vec<u8>) -> Image {
     Image::new(
         Extent3d { width, height, depth_or_array_layers: 1 },
         TextureDimension::D2,
-        pixels.collect(),
+        bytes,
         TextureFormat::Rgba8UnormSrgb,
         RenderAssetUsages::default(),
     )

@@ -1,6 +1,9 @@
 //! What is measured while the scene runs, and its curves over time.
 
-use crate::scenes::{Director, measure};
+use crate::{
+    panel,
+    scenes::{Director, Treated, measure},
+};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Color32};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
@@ -32,11 +35,16 @@ struct Sample {
     kept: Option<f64>,
 }
 
+/// Whether the plots are unfolded.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+pub struct PlotsShown(pub bool);
+
 pub struct PlotsPlugin;
 
 impl Plugin for PlotsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Measured>()
+            .init_resource::<PlotsShown>()
             .add_systems(Update, measure_now)
             .add_systems(EguiPrimaryContextPass, show);
     }
@@ -46,7 +54,7 @@ fn measure_now(
     mut measured: ResMut<Measured>,
     director: Res<Director>,
     peak: Res<measure::StrainPeak>,
-    hairs: Query<&Strands, With<Hair>>,
+    hairs: Query<&Strands, With<Treated>>,
     strands: Query<(&Strand, &Bonds)>,
 ) {
     if director.frame < measured.frame {
@@ -103,12 +111,19 @@ pub fn colour(kind: BondKind) -> Color32 {
     COLOURS[kind as usize]
 }
 
-fn show(mut contexts: EguiContexts, measured: Res<Measured>) -> Result {
-    egui::Window::new("Over time")
+fn show(
+    mut contexts: EguiContexts,
+    measured: Res<Measured>,
+    mut shown: ResMut<PlotsShown>,
+) -> Result {
+    let ctx = contexts.ctx_mut()?;
+    let is_wide = ctx.viewport_rect().width() >= panel::WIDE;
+    let window = egui::Window::new("Over time")
         .anchor(egui::Align2::RIGHT_TOP, [-10.0, 10.0])
         .resizable(false)
-        .default_width(290.0)
-        .show(contexts.ctx_mut()?, |ui| {
+        .default_open(is_wide)
+        .default_width(panel::PLOTS - 20.0)
+        .show(ctx, |ui| {
             ui.label("Mean bond rate (0 cut, 1 closed)");
             let lines: Vec<Line> =
                 BondKind::ALL.into_iter().map(|k| rate_line(&measured, k)).collect();
@@ -122,8 +137,13 @@ fn show(mut contexts: EguiContexts, measured: Res<Measured>) -> Result {
             });
             ui.add_space(6.0);
             ui.horizontal(|ui| {
-                ui.label("Kept share of the held shape");
-                let kept = measured.kept.map_or("not yet held".into(), |k| format!("{k:.2}"));
+                ui.label("Shape kept").on_hover_text(
+                    "How much of the shape that the hair was held in is there now, over all joints: \
+                     1 all, 0 none, less than 0 bent the other way.",
+                );
+                let kept = measured.kept.map_or("not held yet".into(), |k| {
+                    format!("{:.0} % of what was held", 100.0 * k)
+                });
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     ui.strong(kept);
                 });
@@ -137,8 +157,10 @@ fn show(mut contexts: EguiContexts, measured: Res<Measured>) -> Result {
                 ui.line(Line::new("kept", points).color(KEPT).width(2.0));
             });
             ui.small("time (s)");
-            ui.small(format!("largest strain so far {:.2} %", 100.0 * measured.strain));
+            ui.small(format!("largest stretch so far {:.2} %", 100.0 * measured.strain));
         });
+    // Folded there is nothing inside.
+    shown.0 = window.is_some_and(|window| window.inner.is_some());
     Ok(())
 }
 

@@ -1,28 +1,34 @@
 //! The studio: three lights, a backdrop, the stand, and the models of head, rod and blower.
 
 use crate::{
+    dressed::{self, Carried},
     mannequin,
     scenes::{BUST_HIGH, HEAD_RADIUS, Model, Scene, SceneKind},
     solid::{Paint, lathe},
     studio,
 };
 use bevy::prelude::*;
-use bevy_keratin::{
-    plant::{Hairline, Scalp},
-    render::Melanin,
-};
+use bevy_keratin::{plant::Hairline, render::Melanin};
 use core::f32::consts::{FRAC_PI_2, PI};
 
+/// The skull is slimmer than the ball that the hair of a bust feels by that much.
+const BROAD: Vec3 = Vec3::new(1.0, 1.0, 1.12);
 /// Where the stand's pole is (m).
 const POLE: Vec3 = Vec3::new(-0.60, 0.0, -0.03);
 
 /// What is made once.
 #[derive(Resource)]
 pub struct Studio {
+    /// The head without hair.
+    pub bare: Mesh,
+    pub bare_mesh: Handle<Mesh>,
+    /// Its scalp tinted by hair.
     head: Handle<Mesh>,
-    /// With hair all over.
-    full: Handle<Mesh>,
-    skin: Handle<StandardMaterial>,
+    /// Brows and lashes, of a head as it is and of one as broad as a bust's.
+    faces: [Carried; 2],
+    /// What is not let down of a lying head's hair.
+    up: Carried,
+    pub skin: Handle<StandardMaterial>,
     chrome: Handle<StandardMaterial>,
 }
 
@@ -35,13 +41,19 @@ pub struct Sleeve;
 pub struct Pole;
 
 /// Lights, backdrop and stand, which every scene shares.
-pub fn build(mut commands: Commands, mut paint: Paint) {
-    let head = paint.meshes.add(mannequin::mesh());
-    let mut full = mannequin::plain();
-    let scalp = Scalp { up: Dir3::X, front: Dir3::Y, height: 0.118, ..default() };
-    scalp.tint(&mut full, &Hairline::default(), Melanin::DARK_BROWN.color(), 0.9);
-    let full = paint.meshes.add(full);
-    let skin = paint.matte(Color::WHITE, 0.55);
+pub fn build(mut commands: Commands, mut paint: Paint) -> Result {
+    let bare = mannequin::mesh();
+    let faces = [
+        dressed::face(Vec3::ONE, Melanin::DARK_BROWN)?,
+        dressed::face(BROAD, Melanin::DARK_BROWN)?,
+    ];
+    let up = dressed::up(&bare)?;
+    let hair = Melanin::DARK_BROWN.color();
+    let mut head = bare.clone();
+    dressed::scalp().tint(&mut head, &Hairline::default(), hair, 0.9);
+    let head = paint.meshes.add(head);
+    let bare_mesh = paint.meshes.add(bare.clone());
+    let skin = paint.matte(Color::WHITE, 0.46);
     let chrome = paint.metal(Color::srgb(0.72, 0.73, 0.75));
 
     studio::light(&mut commands, studio::FOCUS, 1.0);
@@ -78,7 +90,8 @@ pub fn build(mut commands: Commands, mut paint: Paint) {
         MeshMaterial3d(chrome.clone()),
         Transform::from_translation(POLE),
     ));
-    commands.insert_resource(Studio { head, full, skin, chrome });
+    commands.insert_resource(Studio { bare, bare_mesh, head, faces, up, skin, chrome });
+    Ok(())
 }
 
 /// Gives a body to every model that has appeared or changed.
@@ -113,7 +126,8 @@ fn head(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity,
     let arm = paint.meshes.add(Cylinder::new(0.009, 0.5));
     let sleeve = paint.meshes.add(Cuboid::new(0.05, 0.045, 0.085));
     let dark = paint.matte(Color::srgb(0.05, 0.05, 0.06), 0.5);
-    commands.entity(on).with_children(|head| {
+    let worn = [studio.faces[0].spawn(commands), studio.up.spawn(commands)];
+    commands.entity(on).add_children(&worn).with_children(|head| {
         head.spawn(part(studio.head.clone(), studio.skin.clone(), default()));
         head.spawn(part(
             arm,
@@ -136,8 +150,6 @@ fn bust(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity,
     // It is made lying: the crown at +X, the face at +Y.
     let upright = Quat::from_rotation_y(FRAC_PI_2) * Quat::from_rotation_z(FRAC_PI_2);
     const CROWN: f32 = 0.118;
-    // The skull is slimmer than the ball by that much.
-    let broad = Vec3::new(1.0, 1.0, 1.12);
     let end = radius - CROWN + mannequin::BUST_END;
     // From the floor up to within the bust, which is a little behind its own axis.
     let column = [
@@ -153,9 +165,11 @@ fn bust(commands: &mut Commands, paint: &mut Paint, studio: &Studio, on: Entity,
     ];
     let column = paint.meshes.add(lathe(&column, 64));
     let dark = paint.matte(Color::srgb(0.09, 0.085, 0.085), 0.45);
-    commands.entity(on).with_children(|head| {
-        let place = Transform::from_xyz(0.0, radius - CROWN, 0.0).with_rotation(upright);
-        head.spawn(part(studio.full.clone(), studio.skin.clone(), place.with_scale(broad)));
+    let place = Transform::from_xyz(0.0, radius - CROWN, 0.0).with_rotation(upright);
+    let face = studio.faces[1].spawn(commands);
+    commands.entity(face).insert(place);
+    commands.entity(on).add_child(face).with_children(|head| {
+        head.spawn(part(studio.head.clone(), studio.skin.clone(), place.with_scale(BROAD)));
         head.spawn(part(column, dark, Transform::from_xyz(0.0, 0.0, -0.02)));
     });
 }

@@ -1,13 +1,16 @@
 //! Playing a scene: what happens when, in words, and choosing, restarting, pausing, stepping it.
 
-use crate::scenes::{self, Moment, Scene, SceneKind};
+use crate::{
+    scenes::{self, Director, Moment, Scene, SceneKind},
+    worn::{self, Shown},
+};
 use bevy::prelude::*;
 use bevy_egui::input::egui_wants_any_keyboard_input;
 use bevy_keratin::prelude::*;
 
-/// Sets the stage anew, for this scene.
+/// Sets the stage anew, for this.
 #[derive(Message, Clone, Copy, Debug)]
-pub struct Restart(pub Scene);
+pub struct Restart(pub Shown);
 
 /// Lets exactly one tick pass while paused.
 #[derive(Message, Clone, Copy, Debug)]
@@ -26,7 +29,7 @@ impl Plugin for StoryPlugin {
 
 fn keys(
     keys: Res<ButtonInput<KeyCode>>,
-    scene: Res<Scene>,
+    shown: Res<Shown>,
     mut time: ResMut<Time<Virtual>>,
     mut restarts: MessageWriter<Restart>,
     mut steps: MessageWriter<Step>,
@@ -35,7 +38,7 @@ fn keys(
         toggle(&mut time);
     }
     if keys.just_pressed(KeyCode::KeyR) {
-        restarts.write(Restart(*scene));
+        restarts.write(Restart(*shown));
     }
     if keys.just_pressed(KeyCode::ArrowRight) {
         steps.write(Step);
@@ -57,14 +60,29 @@ fn restart(
     gravity: Res<HairGravity>,
     drag: Res<HairDefault<AirDrag>>,
 ) {
-    let Some(&Restart(scene)) = restarts.read().last() else { return };
+    let Some(&Restart(wanted)) = restarts.read().last() else { return };
     // The stage is set with the paper's air; the sliders' stays.
     let (gravity, drag) = (*gravity, drag.clone());
     commands.queue(move |world: &mut World| -> Result {
-        world.insert_resource(scene);
-        world.run_system_cached(scenes::spawn_scene)?;
+        let before = *world.resource::<Shown>();
+        world.insert_resource(wanted);
+        world.run_system_cached(scenes::clear)?;
+        match wanted {
+            Shown::Scene(scene) => {
+                worn::take_off(world);
+                world.insert_resource(scene);
+                world.run_system_cached(scenes::spawn_scene)?;
+                if matches!(before, Shown::Scene(_)) {
+                    world.insert_resource(drag);
+                }
+            }
+            Shown::Preset(preset) => {
+                // Nothing is directed any more.
+                world.resource_mut::<Director>().ended = true;
+                worn::put_on(world, preset)?;
+            }
+        }
         world.insert_resource(gravity);
-        world.insert_resource(drag);
         Ok(())
     });
 }

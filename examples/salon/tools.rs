@@ -1,6 +1,6 @@
 //! What the panel does to the blower and the rod: values that the user has set win over the scene's.
 
-use crate::scenes::{Model, Prop};
+use crate::scenes::{Model, Prop, Treated};
 use bevy::prelude::*;
 use bevy_keratin::prelude::*;
 
@@ -47,7 +47,7 @@ pub fn apply(
     tools: Res<Tools>,
     mut blowers: Query<(&mut Blower, &mut Transform), Without<PermRod>>,
     mut rods: Query<(&mut PermRod, &mut Transform, &mut Model), Without<Blower>>,
-    hairs: Query<&Transform, (With<Hair>, Without<PermRod>, Without<Blower>)>,
+    hairs: Query<&Transform, (With<Treated>, Without<PermRod>, Without<Blower>)>,
 ) {
     for (mut blower, mut transform) in &mut blowers {
         if !tools.is_changed() && !blower.is_added() {

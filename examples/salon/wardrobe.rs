@@ -1,5 +1,6 @@
 //! Hairdos: saved, loaded, undone and redone. Knows nothing of the panel that asks for it.
 
+use crate::scenes::Treated;
 use bevy::prelude::*;
 use bevy_keratin::prelude::*;
 use std::{
@@ -89,7 +90,7 @@ impl Plugin for WardrobePlugin {
 fn serve(
     mut commands: Commands,
     mut orders: MessageReader<Order>,
-    hairs: Query<Entity, With<Hair>>,
+    hairs: Query<Entity, With<Treated>>,
 ) {
     for order in orders.read() {
         let Ok(hair) = hairs.single() else { continue };

@@ -1,6 +1,6 @@
 //! What a scene came to, in numbers.
 
-use super::Director;
+use super::{Director, Treated};
 use bevy::prelude::*;
 use bevy_keratin::prelude::*;
 
@@ -33,11 +33,20 @@ pub fn heights<'a>(strands: impl Iterator<Item = &'a Strand>) -> Vec<f32> {
     strands.flat_map(|s| s.positions()).map(|p| p.y).collect()
 }
 
-pub fn watch_lift(strands: Query<&Strand>, droplets: Query<&Droplet>, mut lift: ResMut<Lift>) {
+pub fn watch_lift(
+    hairs: Query<&Strands, With<Treated>>,
+    strands: Query<&Strand>,
+    droplets: Query<&Droplet>,
+    mut lift: ResMut<Lift>,
+) {
     if lift.dry.is_empty() {
         return;
     }
-    let rise = heights(strands.iter()).into_iter().zip(&lift.dry).map(|(now, dry)| now - dry);
+    let own = hairs.iter().flat_map(|members| members.iter());
+    let rise = heights(own.filter_map(|s| strands.get(s).ok()))
+        .into_iter()
+        .zip(&lift.dry)
+        .map(|(now, dry)| now - dry);
     let now = rise.fold(0.0, f32::max);
     (lift.highest, lift.now) = (lift.highest.max(now), now);
     lift.droplets = lift.droplets.max(droplets.iter().len());

@@ -134,6 +134,10 @@ impl Scene {
 #[derive(Component, Clone, Copy, Debug, Default)]
 pub struct Prop;
 
+/// The hair that a scene is about; others are there to be seen only.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub struct Treated;
+
 /// What a thing is, for whoever draws it.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub enum Model {
@@ -234,13 +238,11 @@ impl Surroundings<'_> {
     }
 }
 
-/// Clears what is there and sets the stage for the scene in the resource.
-pub fn spawn_scene(
+/// Clears what is there.
+pub fn clear(
     mut commands: Commands,
-    scene: Res<Scene>,
     mut director: ResMut<Director>,
     mut peak: ResMut<measure::StrainPeak>,
-    mut surroundings: Surroundings,
     props: Query<Entity, Or<(With<Prop>, With<Droplet>)>>,
 ) {
     for prop in &props {
@@ -251,11 +253,20 @@ pub fn spawn_scene(
     *director = Director::default();
     *peak = default();
     commands.insert_resource(measure::Lift::default());
+}
+
+/// Sets the stage, which is clear, for the scene in the resource.
+pub fn spawn_scene(mut commands: Commands, scene: Res<Scene>, mut surroundings: Surroundings) {
     surroundings.set(scene.kind);
     // The paper's floor.
     commands.spawn((Prop, HairCollider::plane(Dir3::Y)));
     let hair = commands
-        .spawn((Prop, Hair, Transform::from_translation(script::root_path(scene.kind, 0.0))))
+        .spawn((
+            Prop,
+            Treated,
+            Hair,
+            Transform::from_translation(script::root_path(scene.kind, 0.0)),
+        ))
         .id();
     match scene.kind {
         SceneKind::Wet => {

@@ -1,7 +1,7 @@
 //! What happens when, in seconds of the scene's own clock.
 
 use super::{
-    Model, Prop, Scene, SceneKind, Strewn, locks,
+    Model, Prop, Scene, SceneKind, Strewn, Treated, locks,
     measure::{Lift, heights, shapes, tips, weighted_rate},
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
@@ -102,7 +102,7 @@ pub fn direct(
     time: Res<Time>,
     scene: Res<Scene>,
     mut director: ResMut<Director>,
-    mut hair: Single<(Entity, &mut Transform, &Strands), With<Hair>>,
+    mut hair: Single<(Entity, &mut Transform, &Strands), With<Treated>>,
     strands: Query<&Strand>,
     bonds: Query<&Bonds>,
     tools: Query<Entity, Or<(With<PermRod>, With<Blower>)>>,
@@ -188,10 +188,11 @@ pub fn direct(
         SceneKind::Wet | SceneKind::Shower => {}
     }
     if scene.kind == SceneKind::Wet && passes(Moment::STREWN) {
-        director.dry_spacing = Some(locks::tip_spacing(&tips(strands.iter())));
-        water.lift.dry = heights(strands.iter());
+        let own = || members.iter().filter_map(|s| strands.get(s).ok());
+        director.dry_spacing = Some(locks::tip_spacing(&tips(own())));
+        water.lift.dry = heights(own());
         let center = transform.translation;
-        scatter_droplets(&mut commands, *water.strewn, strands.iter(), center);
+        scatter_droplets(&mut commands, *water.strewn, own(), center);
     }
     if scene.kind == SceneKind::Shower {
         let all = || members.iter().filter_map(|s| bonds.get(s).ok());

@@ -101,14 +101,9 @@ impl FollowerPlanting {
         let tree = KdTree::new(guides.iter().map(|guide| guide.place).zip(0u32..));
         let mut random = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x0f01_10e5);
         let growth = |place: &RootPlace| {
-            // Without a hairline every place is far behind it.
-            let behind = match self.preset.is_everywhere() {
-                true => 1.0,
-                false => {
-                    let at = place.position;
-                    self.scalp.behind_hairline(at) + self.hairline.break_at(at)
-                }
-            };
+            let at = place.position;
+            let ragged = if self.preset.is_everywhere() { 0.0 } else { self.hairline.break_at(at) };
+            let behind = self.preset.behind_line(&self.scalp, at) + ragged;
             let mut growth = self.hairline.growth(behind);
             let share = share(place).clamp(0.0, 1.0) * self.beside_parting(place.position);
             growth.density *= share;
@@ -170,7 +165,7 @@ impl FollowerPlanting {
     }
 
     fn comb(&self, place: Vec3) -> Vec3 {
-        match self.preset.is_parted() {
+        match self.preset.is_combed() {
             true => self.preset.direction(&self.scalp, place).normalize_or_zero(),
             false => Vec3::ZERO,
         }

@@ -39,7 +39,7 @@ pub(super) fn grow(
     surface: &Surface,
     roots: &[Root],
 ) -> Vec<Option<Vec<Vec3>>> {
-    let leaders = leaders(planting, roots);
+    let leaders = leaders(planting, maps, roots);
     let draws = draw_random(planting, maps, surface, roots, &leaders);
     let steps = steps(planting);
     let reach = draws.iter().map(|drawn| drawn.clearance).fold(0.0, f32::max);
@@ -60,26 +60,38 @@ pub(super) fn grow(
     (axes.iter().zip(&draws)).map(|(axis, drawn)| finish(planting, axis, drawn)).collect()
 }
 
-/// For each root the leader of its lock: the nearest of a subset with the given spacing.
-fn leaders(planting: &Planting, roots: &[Root]) -> Vec<usize> {
+/// How alike the ways of two strands of a lock are at least, as a cosine: locks do not reach across a
+/// parting.
+const ALIKE: f32 = 0.5;
+
+/// For each root the leader of its lock: the nearest of a subset with the given spacing, among those that
+/// are combed a similar way.
+fn leaders(planting: &Planting, maps: &PlantingMaps, roots: &[Root]) -> Vec<usize> {
     let Some(clump) = planting.clump else {
         return (0..roots.len()).collect();
     };
     let mut grid = UniformGrid::default();
     let place = |i: usize| roots[i].place.position;
+    let ways: Vec<Vec3> = roots.iter().map(|root| combed(planting, maps, &root.place)).collect();
+    let is_alike = |i: usize, j: usize| ways[i].dot(ways[j]) > ALIKE;
     grid.build(clump.spacing, (0..roots.len()).map(place).zip(0u32..));
     let mut is_middle = vec![false; roots.len()];
     for i in 0..roots.len() {
         let mut is_free = true;
         grid.for_each_near(place(i), |j| {
-            let near = place(i).distance(place(j as usize)) < clump.spacing;
-            is_free &= !(near && is_middle[j as usize]);
+            let j = j as usize;
+            let near = place(i).distance(place(j)) < clump.spacing;
+            is_free &= !(near && is_middle[j] && is_alike(i, j));
         });
         is_middle[i] = is_free;
     }
     let middles = (0..).zip(&is_middle).filter(|(_, is_middle)| **is_middle);
     let middles = KdTree::new(middles.map(|(i, _)| (place(i as usize), i)));
-    let leader = |i: usize| middles.nearest::<1>(place(i)).next().map_or(i, |(j, _)| j as usize);
+    let leader = |i: usize| {
+        let is_meant = |j: u32, _| is_alike(i, j as usize);
+        let mut near = middles.nearest_of::<1, _>(place(i), is_meant);
+        near.next().map_or(i, |(j, _)| j as usize)
+    };
     (0..roots.len()).map(|i| if is_middle[i] { i } else { leader(i) }).collect()
 }
 

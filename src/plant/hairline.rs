@@ -2,7 +2,7 @@
 
 #![cfg_attr(not(feature = "render"), allow(dead_code, reason = "used by drawn strands only"))]
 
-use super::scalp::Scalp;
+use super::{preset::HairPreset, scalp::Scalp};
 use crate::setting::{Ranged, setting};
 use bevy::{math::ops::sin, prelude::*};
 use core::f32::consts::TAU;
@@ -102,32 +102,54 @@ impl Scalp {
     /// assert!(head.contains_attribute(Mesh::ATTRIBUTE_COLOR));
     /// ```
     pub fn tint(&self, mesh: &mut Mesh, hairline: &Hairline, hair: LinearRgba, cover: f32) {
-        use bevy::mesh::VertexAttributeValues::{Float32x3, Float32x4};
-        let Ok(Some(Float32x3(places))) = mesh.try_attribute_option(Mesh::ATTRIBUTE_POSITION)
-        else {
-            return;
-        };
-        let places: Vec<Vec3> = places.iter().copied().map(Vec3::from).collect();
-        if !mesh.contains_attribute(Mesh::ATTRIBUTE_COLOR) {
-            mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, vec![[1.0f32; 4]; places.len()]);
-        }
-        let Some(Float32x4(colors)) = mesh.attribute_mut(Mesh::ATTRIBUTE_COLOR) else {
-            return;
-        };
-        let half = Vec3::new(hair.red, hair.green, hair.blue) * 0.5;
-        let (hairline, cover) = (hairline.clamped(), cover.clamp(0.0, 1.0));
-        for (color, place) in colors.iter_mut().zip(places) {
-            let behind = self.behind_hairline(place);
-            // Independent of the density of roots: hair that lies over the place shades the skin as
-            // well.
-            let share = smooth(behind / hairline.density_over.max(1e-9)) * cover;
-            let skin = Vec4::from(*color);
-            *color = skin.truncate().lerp(half, share).extend(skin.w).to_array();
-        }
+        tint(mesh, |place| self.behind_hairline(place), hairline, hair, cover);
     }
 }
 
-fn smooth(x: f32) -> f32 {
+impl HairPreset {
+    /// Tints the skin under the hair as [`Scalp::tint`] does, wherever this preset grows: the lower face
+    /// under a beard.
+    ///
+    /// ```
+    /// # use bevy_keratin::plant::*; use bevy::prelude::*;
+    /// let (mut head, scalp) = (Sphere::new(0.1).mesh().build(), Scalp::default());
+    /// HairPreset::Beard.tint(&mut head, &scalp, LinearRgba::rgb(0.02, 0.01, 0.01), 0.5);
+    /// ```
+    pub fn tint(self, mesh: &mut Mesh, scalp: &Scalp, hair: LinearRgba, cover: f32) {
+        tint(mesh, |place| self.behind_line(scalp, place), &self.hairline(), hair, cover);
+    }
+}
+
+/// Mixes vertex colours with half of `hair` where a place is `behind` a line.
+fn tint(
+    mesh: &mut Mesh,
+    behind: impl Fn(Vec3) -> f32,
+    hairline: &Hairline,
+    hair: LinearRgba,
+    cover: f32,
+) {
+    use bevy::mesh::VertexAttributeValues::{Float32x3, Float32x4};
+    let Ok(Some(Float32x3(places))) = mesh.try_attribute_option(Mesh::ATTRIBUTE_POSITION) else {
+        return;
+    };
+    let places: Vec<Vec3> = places.iter().copied().map(Vec3::from).collect();
+    if !mesh.contains_attribute(Mesh::ATTRIBUTE_COLOR) {
+        mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, vec![[1.0f32; 4]; places.len()]);
+    }
+    let Some(Float32x4(colors)) = mesh.attribute_mut(Mesh::ATTRIBUTE_COLOR) else {
+        return;
+    };
+    let half = Vec3::new(hair.red, hair.green, hair.blue) * 0.5;
+    let (hairline, cover) = (hairline.clamped(), cover.clamp(0.0, 1.0));
+    for (color, place) in colors.iter_mut().zip(places) {
+        // More than the roots there alone: hair that lies over the place shades the skin, too.
+        let share = smooth(behind(place) / hairline.density_over.max(1e-9)) * cover;
+        let skin = Vec4::from(*color);
+        *color = skin.truncate().lerp(half, share).extend(skin.w).to_array();
+    }
+}
+
+pub(super) fn smooth(x: f32) -> f32 {
     let x = if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) };
     x * x * (3.0 - 2.0 * x)
 }

@@ -22,6 +22,9 @@ mod map;
 mod place;
 mod planting;
 mod preset;
+mod preset_field;
+#[cfg(feature = "render")]
+mod preset_look;
 mod recipe;
 mod scalp;
 mod scatter;

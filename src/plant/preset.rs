@@ -2,14 +2,13 @@
 
 use super::{
     error::PlantError,
-    hairline::Hairline,
     map::{PlantingMaps, RootPlace},
     planting::Planted,
     recipe::{Clump, CombPattern, Curl, CurlPhase, Cut, Drape, HUMAN_DENSITY, Planting},
     scalp::Scalp,
 };
 #[cfg(feature = "render")]
-use crate::render::{HairFollowers, HairLook, Melanin};
+use crate::render::{HairFollowers, HairLook};
 use crate::{
     AirDrag, HairSolver, HairStiffness, HairWetting, LockContact, Settling, Sweeps,
     look::WornPreset, setting::Ranged,
@@ -53,7 +52,18 @@ pub enum HairPreset {
     Bob,
     /// Straight down the back.
     Long,
-    /// Short fur of 15 mm, combed from front to back and down, that covers a whole mesh: it has no
+    /// Chin-long with a fringe: hair in front hangs over the forehead, cut off above the brows.
+    Fringe,
+    /// Cut close at the sides and the nape, and 14 cm on top, all combed to the right.
+    Undercut,
+    /// Short and layered, a long side of it swept over the forehead, the nape close.
+    Pixie,
+    /// Locs as thick as a little finger, to the shoulders.
+    Locs,
+    /// A full beard of 3 cm with moustache and sideburns. It grows on the lower face only; hair on the
+    /// head is another hair.
+    Beard,
+    /// Short fur of 15 mm, combed from front to back and down, that covers all of any mesh: it has no
     /// hairline. Cheap guides, 50 per dm², and twice as many drawn strands as on a head.
     Fur,
 }
@@ -86,7 +96,7 @@ pub struct PresetSettings {
 
 impl HairPreset {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 13] = [
         Self::Straight,
         Self::Wavy,
         Self::Curly,
@@ -94,6 +104,11 @@ impl HairPreset {
         Self::Short,
         Self::Bob,
         Self::Long,
+        Self::Fringe,
+        Self::Undercut,
+        Self::Pixie,
+        Self::Locs,
+        Self::Beard,
         Self::Fur,
     ];
 
@@ -148,12 +163,11 @@ impl HairPreset {
         share: &dyn Fn(&RootPlace) -> f32,
     ) -> Result<Planted, PlantError> {
         let scalp = &scalp.checked()?;
-        let on_scalp = |at: Vec3| if self.is_everywhere() { 1.0 } else { scalp.density(at) };
-        let density = |place: &RootPlace| on_scalp(place.position) * share(place);
+        let density = |place: &RootPlace| self.density(scalp, place.position) * share(place);
         let length = |place: &RootPlace| self.length_share(scalp, place.position);
         let direction = |place: &RootPlace| self.direction(scalp, place.position);
         let mut maps = PlantingMaps::new().density(&density).length(&length);
-        if self.is_parted() {
+        if self.is_combed() {
             maps = maps.direction(&direction);
         }
         planting.plant_with(mesh, &maps)
@@ -173,67 +187,12 @@ impl WornPreset {
 }
 
 impl HairPreset {
-    pub(super) fn is_parted(self) -> bool {
-        !matches!(self, Self::Short | Self::Coily | Self::Fur)
-    }
-
-    /// Whether it grows on all of a mesh, not behind a hairline.
-    pub(crate) fn is_everywhere(self) -> bool {
-        self == Self::Fur
-    }
-
-    /// The hairline of its drawn strands.
-    pub fn hairline(self) -> Hairline {
-        let base = Hairline::default();
-        match self {
-            Self::Short => Hairline { least_length: 0.25, length_over: 12e-3, ..base },
-            Self::Coily => {
-                Hairline { least_length: 0.15, density_over: 12e-3, baby_length: 12e-3, ..base }
-            }
-            Self::Bob => Hairline { least_length: 0.6, ..base },
-            _ => base,
-        }
-    }
-
-    /// How far to the right of the parting a place is (m).
-    pub(super) fn aside(self, scalp: &Scalp, place: Vec3) -> f32 {
-        let [right, _, front] = scalp.axes();
-        let off = (place - scalp.center) / scalp.height;
-        // A natural parting is a zigzag of 3 mm.
-        let zigzag = ((off.dot(front) * 7.0).rem_euclid(2.0) - 1.0).abs() - 0.5;
-        let parting = if self == Self::Bob { -0.22 } else { 0.0 } + 0.05 * zigzag;
-        (off.dot(right) - parting) * scalp.height
-    }
-
-    /// Combing direction: away from the parting, in front to the back as well to keep the face
-    /// free.
-    pub(super) fn direction(self, scalp: &Scalp, place: Vec3) -> Vec3 {
-        let [right, _, front] = scalp.axes();
-        let off = (place - scalp.center) / scalp.height;
-        let forward = off.dot(front);
-        let side = if self.aside(scalp, place) < 0.0 { -1.0 } else { 1.0 };
-        // Behind the crown there is no parting; in front of it, down would be into the face.
-        let across = (0.6 + 2.0 * (forward + 0.2)).clamp(0.0, 1.0);
-        let down = (0.5 - forward).clamp(0.0, 0.6);
-        right * (side * across) - front * (0.35 + 1.4 * forward.max(0.0)) - *scalp.up * down
-    }
-
-    /// Share of the length: shorter at the sides and the nape.
-    pub(super) fn length_share(self, scalp: &Scalp, place: Vec3) -> f32 {
-        if self != Self::Short {
-            return 1.0;
-        }
-        let off = (place - scalp.center) / scalp.height;
-        let height = (off.dot(*scalp.up) / 0.85).clamp(0.0, 1.0);
-        0.28 + 0.72 * height * height * (3.0 - 2.0 * height)
-    }
-
-    /// Its planting settings, to be changed before [`Planting::plant_with`].
+    /// How it is planted; to be changed before [`Planting::plant_with`].
     pub fn planting(self, scalp: &Scalp) -> Planting {
         let [right, up, front] = scalp.axes();
         let crown = scalp.place(0.05, 0.9, -0.35);
         let drape =
-            Drape { toward: -up - front * 0.15, over: 0.035, clearance: 5e-3, layering: 0.07 };
+            Drape { toward: -up - front * 0.15, over: 0.035, clearance: 4e-3, layering: 0.05 };
         let parted = CombPattern::Parted { at: scalp.center, across: right, along: -front * 0.4 };
         let base = Planting {
             density: 0.35e4,
@@ -258,7 +217,7 @@ impl HairPreset {
                 nodes: 28,
                 curl: curl(6e-3, 60e-3, CurlPhase::PerClump),
                 clump: Some(Clump { spacing: 22e-3, strength: 0.35 }),
-                drape: Some(Drape { layering: 0.12, ..drape }),
+                drape: Some(Drape { layering: 0.1, ..drape }),
                 ..base
             },
             Self::Curly => Planting {
@@ -300,8 +259,8 @@ impl HairPreset {
                 length: 0.32,
                 length_variation: 0.04,
                 nodes: 18,
-                drape: Some(Drape { layering: 0.09, ..drape }),
-                // Higher in front, where hair hangs lower, so that all ends in one line.
+                drape: Some(Drape { layering: 0.07, ..drape }),
+                // Higher in front, where the way down is longer: it hangs in one line.
                 cut: Some(Cut {
                     at: scalp.place(0.0, -0.9, 0.0),
                     normal: up - front * 0.25,
@@ -311,6 +270,62 @@ impl HairPreset {
                 ..base
             },
             Self::Long => Planting { density: 0.3e4, length: 0.5, nodes: 28, ..base },
+            Self::Fringe => Planting {
+                length: 0.3,
+                length_variation: 0.05,
+                nodes: 22,
+                curl: curl(1.2e-3, 60e-3, CurlPhase::PerClump),
+                // Curved in at the chin.
+                cut: Some(Cut { at: scalp.place(0.0, -1.05, 0.0), normal: up, least: 0.03 }),
+                clump: Some(Clump { spacing: 25e-3, strength: 0.2 }),
+                ..base
+            },
+            Self::Undercut => Planting {
+                density: 0.6e4,
+                length: 0.14,
+                length_variation: 0.15,
+                nodes: 12,
+                lean: 1.3,
+                jitter: 0.08,
+                clump: Some(Clump { spacing: 18e-3, strength: 0.35 }),
+                drape: Some(Drape { over: 0.04, clearance: 4e-3, layering: 0.03, ..drape }),
+                ..base
+            },
+            Self::Pixie => Planting {
+                density: 0.65e4,
+                length: 0.11,
+                length_variation: 0.3,
+                nodes: 11,
+                lean: 1.2,
+                jitter: 0.16,
+                clump: Some(Clump { spacing: 16e-3, strength: 0.4 }),
+                drape: Some(Drape { over: 0.05, clearance: 4e-3, layering: 0.05, ..drape }),
+                ..base
+            },
+            Self::Locs => Planting {
+                density: 0.3e4,
+                length: 0.3,
+                length_variation: 0.2,
+                nodes: 20,
+                lean: 1.0,
+                jitter: 0.2,
+                curl: curl(2.5e-3, 70e-3, CurlPhase::PerStrand),
+                clump: None,
+                drape: Some(Drape { clearance: 7e-3, layering: 0.14, ..drape }),
+                ..base
+            },
+            Self::Beard => Planting {
+                density: 0.9e4,
+                length: 0.03,
+                length_variation: 0.25,
+                nodes: 6,
+                lean: 0.9,
+                jitter: 0.2,
+                curl: curl(1.5e-3, 24e-3, CurlPhase::PerStrand),
+                clump: Some(Clump { spacing: 9e-3, strength: 0.35 }),
+                drape: Some(Drape { over: 0.03, clearance: 3e-3, layering: 0.0, ..drape }),
+                ..base
+            },
             Self::Fur => Planting {
                 density: 0.5e4,
                 length: 0.015,
@@ -330,17 +345,22 @@ impl HairPreset {
     pub fn settings(self) -> PresetSettings {
         // A single fibre has 0.045 m; locks are stiffer.
         let bending_length = match self {
-            Self::Straight | Self::Bob => 0.08,
+            Self::Straight | Self::Bob | Self::Fringe => 0.08,
             Self::Long => 0.075,
             Self::Wavy => 0.09,
             Self::Curly => 0.085,
             Self::Coily => 0.2,
-            Self::Short => 0.12,
+            Self::Short | Self::Undercut => 0.12,
+            Self::Pixie => 0.1,
+            // Felted hair is stiff.
+            Self::Locs => 0.11,
+            Self::Beard => 0.06,
             Self::Fur => 0.05,
         };
         // Strands of fur are too short to cross each other.
         let contact = match self {
             Self::Fur => LockContact { strength: 0.0, ..default() },
+            Self::Locs => LockContact { radius: 3e-3, ..default() },
             _ => LockContact::default(),
         };
         let fibres = HUMAN_DENSITY / self.planting(&Scalp::default()).density;
@@ -356,118 +376,6 @@ impl HairPreset {
             look: self.look(),
             #[cfg(feature = "render")]
             followers: self.followers(),
-        }
-    }
-
-    #[cfg(feature = "render")]
-    fn look(self) -> HairLook {
-        let base = HairLook { width: 0.18e-3, ..default() };
-        match self {
-            Self::Straight => HairLook { melanin: Melanin::DARK_BROWN, ..base },
-            Self::Wavy => HairLook { melanin: Melanin::AUBURN, ..base },
-            Self::Curly => HairLook { melanin: Melanin::BROWN, roughness: 0.45, ..base },
-            Self::Coily => HairLook {
-                melanin: Melanin::BLACK,
-                roughness: 0.55,
-                gloss: 0.4,
-                width: 0.2e-3,
-                ..base
-            },
-            Self::Short => HairLook { melanin: Melanin::DARK_BROWN, gloss: 0.6, ..base },
-            Self::Bob => HairLook { melanin: Melanin::BLACK, roughness: 0.32, ..base },
-            Self::Long => HairLook { melanin: Melanin::BLOND, variation: 0.25, ..base },
-            Self::Fur => HairLook {
-                melanin: Melanin::AUBURN,
-                variation: 0.3,
-                roughness: 0.45,
-                width: 0.12e-3,
-                ..base
-            },
-        }
-    }
-
-    #[cfg(feature = "render")]
-    fn followers(self) -> HairFollowers {
-        let base = HairFollowers {
-            segments: 24,
-            stray: 0.012,
-            clump: 0.0,
-            frizz: 0.2e-3,
-            ..HairFollowers::new(40_000)
-        };
-        match self {
-            Self::Straight => HairFollowers { locks: Vec3::new(0.25, 0.35, 0.3), ..base },
-            Self::Wavy => HairFollowers {
-                segments: 40,
-                locks: Vec3::new(0.3, 0.5, 0.5),
-                lock_shape: 0.9,
-                lock_phase: 0.04,
-                frizz: 0.4e-3,
-                flyaways: 0.02,
-                parting: 2.5,
-                ..base
-            },
-            // Blending neighbouring curls would straighten them: each follows its nearest guide.
-            Self::Curly => HairFollowers {
-                segments: 64,
-                locks: Vec3::new(0.2, 0.75, 0.6),
-                lock_shape: 0.7,
-                lock_phase: 0.12,
-                frizz: 0.5e-3,
-                flyaways: 0.025,
-                parting: 1.0,
-                phase_variation: 0.008,
-                stray: 0.02,
-                ..base
-            },
-            Self::Coily => HairFollowers {
-                segments: 52,
-                locks: Vec3::new(0.1, 0.7, 0.6),
-                lock_spacing: Vec3::new(0.03, 0.008, 0.004),
-                lock_shape: 0.7,
-                lock_phase: 0.12,
-                lock_length_variation: 0.12,
-                frizz: 0.6e-3,
-                flyaways: 0.03,
-                parting: 1.0,
-                phase_variation: 0.02,
-                stray: 0.05,
-                ..base
-            },
-            Self::Short => HairFollowers {
-                segments: 12,
-                locks: Vec3::new(0.3, 0.35, 0.2),
-                lock_spacing: Vec3::new(0.014, 0.007, 0.0035),
-                flyaways: 0.01,
-                flyaway_reach: 8e-3,
-                ..base
-            },
-            Self::Bob => HairFollowers {
-                locks: Vec3::new(0.15, 0.25, 0.2),
-                lock_length_variation: 0.01,
-                stray: 0.006,
-                frizz: 0.12e-3,
-                flyaways: 0.008,
-                length_variation: 0.02,
-                ..base
-            },
-            Self::Long => HairFollowers {
-                locks: Vec3::new(0.3, 0.5, 0.4),
-                lock_length_variation: 0.1,
-                flyaways: 0.02,
-                length_variation: 0.2,
-                ..base
-            },
-            Self::Fur => HairFollowers {
-                count: 80_000,
-                segments: 6,
-                locks: Vec3::new(0.2, 0.3, 0.2),
-                lock_spacing: Vec3::new(0.012, 0.006, 0.003),
-                frizz: 0.1e-3,
-                stray: 1e-3,
-                length_variation: 0.3,
-                ..base
-            },
         }
     }
 }

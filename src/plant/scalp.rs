@@ -75,13 +75,18 @@ impl Scalp {
         if share.is_nan() { 0.0 } else { share * share * (3.0 - 2.0 * share) }
     }
 
-    /// Angles at the centre: from the face around (°), and above the hairline there (rad).
-    pub(super) fn beyond_hairline(&self, place: Vec3) -> (f32, f32) {
+    /// Angles at the centre: from the face around (°), alike on both sides, and up (°).
+    pub(super) fn angles(&self, place: Vec3) -> (f32, f32) {
         let axes = self.axes();
         let [right, up, front] = axes.map(|axis| (place - self.center).dot(axis));
         let flat = right.hypot(front);
-        let around = atan2(right.abs(), front) * 180.0 / PI;
-        (around, atan2(up, flat) - hairline(around) * PI / 180.0 - self.recede)
+        (atan2(right.abs(), front) * 180.0 / PI, atan2(up, flat) * 180.0 / PI)
+    }
+
+    /// Angles at the centre: from the face around (°), and above the hairline there (rad).
+    pub(super) fn beyond_hairline(&self, place: Vec3) -> (f32, f32) {
+        let (around, elevation) = self.angles(place);
+        (around, (elevation - hairline(around)) * PI / 180.0 - self.recede)
     }
 
     /// Slope of the hairline: elevation over the angle around the head.

@@ -1,0 +1,219 @@
+//! The pictures that the README shows: loops and sheets, each from the same seed, camera and light.
+//!
+//! `cargo run --release --example gallery` makes all of them in `assets/`. Loops are assembled by
+//! `img2webp` of libwebp (Debian's `webp`); without it their frames stay where they were drawn.
+
+#[path = "../character/body.rs"]
+mod body;
+#[path = "../presets/bust.rs"]
+#[allow(dead_code, reason = "the presets use all of it")]
+mod bust;
+#[path = "../salon/dressed.rs"]
+mod dressed;
+#[path = "../salon/environment.rs"]
+mod environment;
+#[path = "../salon/failure.rs"]
+mod failure;
+#[path = "../character/figure.rs"]
+#[allow(dead_code, reason = "the character uses all of it")]
+mod figure;
+#[path = "../presets/head.rs"]
+mod head;
+#[path = "../salon/mannequin.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod mannequin;
+#[path = "../salon/orbit.rs"]
+mod orbit;
+#[path = "../salon/picture.rs"]
+mod picture;
+#[path = "../salon/renderer.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod renderer;
+#[path = "../scenes/mod.rs"]
+mod scenes;
+#[path = "../salon/set.rs"]
+mod set;
+#[path = "../character/skeleton.rs"]
+mod skeleton;
+#[path = "../salon/solid.rs"]
+mod solid;
+#[path = "../salon/stage.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod stage;
+#[path = "../salon/studio.rs"]
+mod studio;
+
+mod loops;
+mod sheets;
+
+use bevy::prelude::*;
+use bevy_keratin::{prelude::*, render::HairFollowers};
+use clap::{Parser, ValueEnum};
+use std::{
+    io,
+    path::{Path, PathBuf},
+    process::{Command, ExitCode},
+};
+
+/// What there is to be seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Piece {
+    /// A rod is wound, lotion, the rod is taken out.
+    Perm,
+    /// Slept on wet, beside hair that was dry.
+    Bedhead,
+    /// A blower dries hair in the shape it has there, beside its hydrogen bonds.
+    BlowDry,
+    /// Rain on long hair.
+    Rain,
+    /// A head is shaken.
+    Shake,
+    /// A figure walks in the wind.
+    Walk,
+    /// Dry and wet, untreated and permed, natural and its bonds.
+    Before,
+    /// Pigment across, water down.
+    Melanin,
+    /// All presets, from in front and from behind.
+    Presets,
+    /// One picture with fewer and more samples.
+    Quality,
+}
+
+/// Draws the README's pictures.
+#[derive(Parser)]
+#[command(version)]
+pub struct Arguments {
+    /// Which; all if left out.
+    #[arg(value_enum)]
+    pieces: Vec<Piece>,
+    /// The folder that they go into.
+    #[arg(long, default_value = "assets", value_name = "DIR")]
+    out: PathBuf,
+    /// The folder of the loops' frames.
+    #[arg(long, default_value = "target/gallery", value_name = "DIR")]
+    frames: PathBuf,
+    /// The most frames of a loop.
+    #[arg(long, default_value = "1000", value_parser = clap::value_parser!(u32).range(1..))]
+    most: u32,
+    /// Height of loops, of each picture of a sheet, and the width that goes with it, in pixels for a
+    /// size of 1.
+    #[arg(long, default_value = "1.0", value_parser = size)]
+    size: f32,
+    /// The most drawn strands of a hair. Fewer than it has are drawn wider.
+    #[arg(long, default_value = "40000", value_parser = clap::value_parser!(u32).range(100..))]
+    strands: u32,
+    /// How many times larger, along and across, pictures are drawn and averaged.
+    #[arg(long, default_value = "2", value_parser = clap::value_parser!(u32).range(1..=4))]
+    supersample: u32,
+}
+
+fn size(text: &str) -> Result<f32, String> {
+    let size = text.parse().ok().filter(|size| (0.1..=4.0).contains(size));
+    size.ok_or_else(|| "expected a number from 0.1 to 4".into())
+}
+
+impl Arguments {
+    /// A picture's width and height (pixels).
+    fn scaled(&self, width: u32, height: u32) -> (u32, u32) {
+        let scaled = |side: u32| ((side as f32 * self.size).round() as u32).max(16);
+        (scaled(width), scaled(height))
+    }
+
+    /// Draws no more strands than asked for, those wider.
+    fn thin_out(&self, app: &mut App) {
+        let most = self.strands;
+        let thin = move |followers: &mut HairFollowers, look: Option<&mut HairLook>| {
+            let times = followers.count as f32 / most as f32;
+            followers.count = followers.count.min(most);
+            if let Some(look) = look {
+                look.width *= times.max(1.0).sqrt();
+            }
+        };
+        app.add_systems(
+            PreUpdate,
+            move |mut hairs: Query<
+                (&mut HairFollowers, Option<&mut HairLook>),
+                Added<HairFollowers>,
+            >| {
+                for (mut followers, look) in &mut hairs {
+                    thin(&mut followers, look.map(Mut::into_inner));
+                }
+            },
+        );
+    }
+
+    /// Writes a still.
+    fn save(&self, picture: Image, name: &str) -> io::Result<()> {
+        let path = self.out.join(format!("{name}.png"));
+        picture::save(picture, &path)?;
+        println!("{}", path.display());
+        Ok(())
+    }
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    failure::explain_known();
+    let all = Piece::value_variants().to_vec();
+    let pieces = if arguments.pieces.is_empty() { all } else { arguments.pieces.clone() };
+    for piece in pieces {
+        if let Err(error) = make(piece, &arguments) {
+            eprintln!("error: {error}");
+            return ExitCode::FAILURE;
+        }
+    }
+    ExitCode::SUCCESS
+}
+
+fn make(piece: Piece, arguments: &Arguments) -> Result {
+    picture::folder(&arguments.out)?;
+    let name = match piece.to_possible_value() {
+        Some(value) => value.get_name().to_owned(),
+        None => return Ok(()),
+    };
+    let frames = match piece {
+        Piece::Perm => loops::perm(arguments)?,
+        Piece::Bedhead => loops::bedhead(arguments)?,
+        Piece::BlowDry => loops::blow_dry(arguments)?,
+        Piece::Rain => loops::rain(arguments)?,
+        Piece::Shake => loops::shake(arguments)?,
+        Piece::Walk => loops::walk(arguments)?,
+        Piece::Before => return sheets::before(arguments),
+        Piece::Melanin => return sheets::melanin(arguments),
+        Piece::Presets => return sheets::presets(arguments),
+        Piece::Quality => return sheets::quality(arguments),
+    };
+    let folder = arguments.frames.join(&name);
+    picture::folder(&folder)?;
+    let count = frames.pictures.len();
+    let mut paths = Vec::with_capacity(count);
+    for (i, picture) in frames.pictures.into_iter().enumerate() {
+        let path = folder.join(format!("{i:04}.png"));
+        picture::save(picture, &path)?;
+        paths.push(path);
+    }
+    assemble(&paths, frames.milliseconds, &arguments.out.join(format!("{name}.webp")))?;
+    Ok(())
+}
+
+/// One animated WebP of the frames, if there is a program for it.
+fn assemble(frames: &[PathBuf], milliseconds: u32, to: &Path) -> io::Result<()> {
+    let each = milliseconds.to_string();
+    let mut command = Command::new("img2webp");
+    command.args(["-loop", "0", "-min_size"]);
+    for (i, frame) in frames.iter().enumerate() {
+        // The last one stays a while.
+        let last = if i + 1 == frames.len() { "900" } else { each.as_str() };
+        command.args(["-lossy", "-q", "78", "-m", "6", "-d", last]).arg(frame);
+    }
+    match command.arg("-o").arg(to).output() {
+        Ok(output) if output.status.success() => println!("{}", to.display()),
+        Ok(output) => return Err(io::Error::other(String::from_utf8_lossy(&output.stderr))),
+        Err(_) => {
+            let place = frames.first().and_then(|frame| frame.parent()).unwrap_or(to);
+            println!("{}: no img2webp to assemble them", place.display());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,181 @@
+//! The sheets: stills of several pictures.
+
+use crate::{
+    Arguments, bust,
+    loops::{FROM, MIDDLE, settled},
+    orbit,
+    picture::{self, Pictures},
+    renderer,
+    scenes::{Scene, SceneKind},
+    set,
+};
+use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy_keratin::{plant::HairPreset, prelude::*, render::HairView};
+
+/// Lets time pass (ticks).
+fn run(app: &mut App, ticks: u32) {
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    (0..ticks).for_each(|_| app.update());
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+}
+
+/// The left half of one picture and the right half of another of the same size, a pale line between.
+fn wiped(left: &Image, right: &Image) -> Image {
+    let mut wiped = left.clone();
+    let (width, half) = (left.width() as usize, left.width() as usize / 2);
+    let (Some(to), Some(from)) = (wiped.data.as_mut(), right.data.as_ref()) else { return wiped };
+    for (to, from) in to.chunks_mut(4 * width).zip(from.chunks(4 * width)) {
+        to[4 * half..].copy_from_slice(&from[4 * half..]);
+        to[4 * (half - 1)..4 * (half + 1)].fill(235);
+    }
+    wiped
+}
+
+/// A scene at one of its frames.
+fn scene(arguments: &Arguments, scene: Scene, view: HairView, frame: u32) -> Result<Image> {
+    let mut app = renderer::app("", (0, 0), true, default());
+    set::furnish(&mut app, scene, view);
+    arguments.thin_out(&mut app);
+    let camera = orbit::bundle(scene.kind);
+    let size = arguments.scaled(400, 400);
+    let pictures = Pictures::new(&mut app, size, arguments.supersample, camera);
+    let mut orbits = app.world_mut().query::<(&mut orbit::Orbit, &mut Transform)>();
+    for (mut orbit, mut place) in orbits.iter_mut(app.world_mut()) {
+        // What is treated is in the middle.
+        orbit.distance *= 0.62;
+        orbit.focus.x += 0.02;
+        *place = orbit.pose();
+    }
+    run(&mut app, frame);
+    Ok(pictures.draw(&mut app)?)
+}
+
+/// Dry and soaked; untreated and permed; as it looks and its hydrogen bonds: each in one picture.
+pub fn before(arguments: &Arguments) -> Result {
+    let size = arguments.scaled(400, 400);
+    let (mut app, bust, pictures) = settled(arguments, HairPreset::Long, size)?;
+    bust::look(&mut app, FROM * Vec3::new(0.0, 1.0, 1.05), MIDDLE);
+    run(&mut app, 0);
+    let dry = pictures.draw(&mut app)?;
+    app.world_mut().write_message(SoakHair { target: bust.hair, wetness: 1.0 });
+    run(&mut app, if arguments.most > 1 { 60 } else { 2 });
+    let wet = pictures.draw(&mut app)?;
+    if arguments.most == 1 {
+        return Ok(arguments.save(wiped(&dry, &wet), "before-after")?);
+    }
+    let perm = |variant| {
+        let scene_of = Scene::new(SceneKind::Perm, Some(variant))?;
+        scene(arguments, scene_of, HairView::Natural, 900)
+    };
+    let dried = Scene::new(SceneKind::BlowDry, None)?;
+    let natural = scene(arguments, dried, HairView::Natural, 1170)?;
+    let bonds = scene(arguments, dried, HairView::Bond(BondKind::Hydrogen), 1170)?;
+    let pairs =
+        [wiped(&dry, &wet), wiped(&perm("untreated")?, &perm("treated")?), wiped(&natural, &bonds)];
+    Ok(arguments.save(picture::beside(&pairs), "before-after")?)
+}
+
+/// Seven pigments across; dry, damp and soaked down.
+pub fn melanin(arguments: &Arguments) -> Result {
+    let pigments = [
+        Melanin::BLACK,
+        Melanin::DARK_BROWN,
+        Melanin::BROWN,
+        Melanin::AUBURN,
+        Melanin::RED,
+        Melanin::BLOND,
+        Melanin::PLATINUM,
+    ];
+    let size = arguments.scaled(180, 220);
+    let (mut app, bust, pictures) = settled(arguments, HairPreset::Wavy, size)?;
+    bust::look(&mut app, Vec3::new(0.5, 0.08, 0.5), MIDDLE);
+    let few = if arguments.most > 1 { pigments.len() } else { 2 };
+    let mut rows = Vec::new();
+    for wetness in [0.0, 0.4, 1.0] {
+        if wetness > 0.0 {
+            app.world_mut().write_message(SoakHair { target: bust.hair, wetness });
+            run(&mut app, if arguments.most > 1 { 30 } else { 2 });
+        }
+        let mut row = Vec::new();
+        for melanin in pigments.into_iter().take(few) {
+            if let Some(mut look) = app.world_mut().get_mut::<HairLook>(bust.hair) {
+                look.melanin = melanin;
+            }
+            run(&mut app, 0);
+            row.push(pictures.draw(&mut app)?);
+        }
+        rows.push(picture::beside(&row));
+    }
+    Ok(arguments.save(picture::below(&rows), "melanin-moisture")?)
+}
+
+/// All presets, each from in front and from behind.
+pub fn presets(arguments: &Arguments) -> Result {
+    const IN_A_ROW: usize = 7;
+    let size = arguments.scaled(240, 290);
+    // In a hurry one stands for all.
+    let few = if arguments.most > 1 { HairPreset::ALL.len() } else { 1 };
+    let mut front = Vec::new();
+    let mut back = Vec::new();
+    for (i, preset) in HairPreset::ALL.into_iter().take(few).enumerate() {
+        let (mut app, _, pictures) = settled(arguments, preset, size)?;
+        // Turned differently.
+        let aside = if i % 2 == 0 { 1.0 } else { -1.0 };
+        let mut from = |from: Vec3| {
+            bust::look(&mut app, from * Vec3::new(aside, 1.0, 1.0), MIDDLE);
+            Ok::<_, BevyError>(pictures.draw(&mut app)?)
+        };
+        front.push(from(FROM)?);
+        back.push(from(FROM * Vec3::new(1.0, 1.8, -1.0))?);
+    }
+    let blank = {
+        let mut blank = front[0].clone();
+        blank.data.iter_mut().for_each(|data| data.fill(255));
+        blank
+    };
+    let row = |pictures: &[Image]| {
+        let mut row = pictures.to_vec();
+        row.resize(IN_A_ROW.min(few), blank.clone());
+        picture::beside(&row)
+    };
+    let pairs = front.chunks(IN_A_ROW).zip(back.chunks(IN_A_ROW));
+    let rows: Vec<Image> = pairs.flat_map(|(front, back)| [row(front), row(back)]).collect();
+    Ok(arguments.save(picture::below(&rows), "presets")?)
+}
+
+/// One sample a pixel, four of the hardware's, and those at two and four times the size; the mean error
+/// against the last, as a share of its mean light, is printed.
+pub fn quality(arguments: &Arguments) -> Result {
+    let size = arguments.scaled(300, 360);
+    let mut drawn = Vec::new();
+    let few = if arguments.most > 1 { 4 } else { 2 };
+    for (edges, times) in
+        [(Msaa::Off, 1), (Msaa::Sample4, 1), (Msaa::Sample4, 2), (Msaa::Sample4, 4)]
+            .into_iter()
+            .take(few)
+    {
+        let mut app = bust::app("", bust::ground(HairPreset::Curly));
+        bust::light(&mut app);
+        arguments.thin_out(&mut app);
+        bust::wear(&mut app, HairPreset::Curly)?;
+        let camera = bust::camera(&mut app);
+        let pictures = Pictures::new(&mut app, size, times.min(2 * arguments.supersample), camera);
+        let mut cameras = app.world_mut().query_filtered::<&mut Msaa, With<Camera3d>>();
+        cameras.iter_mut(app.world_mut()).for_each(|mut msaa| *msaa = edges);
+        bust::look(&mut app, Vec3::new(0.26, 0.05, 0.46), Vec3::new(0.02, -0.02, 0.03));
+        run(&mut app, if arguments.most > 1 { 120 } else { 2 });
+        drawn.push(pictures.draw(&mut app)?);
+    }
+    let light = |image: &Image| -> Vec<f32> {
+        let bytes = image.data.as_deref().unwrap_or_default();
+        let pixels = bytes.chunks(4).map(|p| Color::srgb_u8(p[0], p[1], p[2]).luminance());
+        pixels.collect()
+    };
+    let best = light(&drawn[drawn.len() - 1]);
+    let mean = best.iter().sum::<f32>() / best.len() as f32;
+    for (image, name) in drawn.iter().zip(["1 sample", "MSAA 4", "2 × 2 × MSAA 4"]) {
+        let off = light(image).iter().zip(&best).map(|(a, b)| (a - b).abs()).sum::<f32>();
+        println!("{name}: {:.1} % off", 100.0 * off / best.len() as f32 / mean);
+    }
+    Ok(arguments.save(picture::beside(&drawn), "quality")?)
+}

@@ -1,0 +1,115 @@
+//! The training head upright, with a preset's hair, in light that flatters it.
+
+use crate::{dressed, environment, head, mannequin, renderer};
+use bevy::{
+    core_pipeline::prepass::DepthPrepass,
+    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap},
+    prelude::*,
+};
+use bevy_keratin::{plant::HairPreset, prelude::*};
+
+/// Seconds until hair has settled.
+pub const SETTLING: f32 = 2.0;
+
+/// The mannequin lies; its crown is at +X and its face at +Y. This puts it upright.
+pub fn upright() -> Transform {
+    Transform::from_matrix(Mat4::from_mat3(Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::X)))
+}
+
+/// What stands out from the hair: dark behind pale hair, pale behind dark.
+pub fn ground(preset: HairPreset) -> Color {
+    match preset.settings().look.melanin.color().luminance() {
+        pale if pale > 0.1 => Color::srgb(0.13, 0.14, 0.16),
+        dark if dark < 0.005 => Color::srgb(0.62, 0.63, 0.64),
+        _ => Color::srgb(0.44, 0.46, 0.48),
+    }
+}
+
+/// An app without a window.
+pub fn app(title: &str, ground: Color) -> App {
+    let mut app = renderer::app(title, (0, 0), true, default());
+    app.insert_resource(Time::<Fixed>::from_hz(60.0))
+        .insert_resource(DirectionalLightShadowMap { size: 4096 })
+        .insert_resource(GlobalAmbientLight::NONE)
+        .insert_resource(ClearColor(ground));
+    app
+}
+
+/// The camera's components.
+pub fn camera(app: &mut App) -> impl Bundle + use<> {
+    let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+    let surroundings = environment::studio(&mut images, 450.0);
+    (Camera3d::default(), Msaa::Sample4, DepthPrepass, surroundings)
+}
+
+/// Puts all cameras there.
+pub fn look(app: &mut App, from: Vec3, to: Vec3) {
+    let place = Transform::from_translation(from).looking_at(to, Vec3::Y);
+    let mut cameras = app.world_mut().query_filtered::<&mut Transform, With<Camera>>();
+    cameras.iter_mut(app.world_mut()).for_each(|mut camera| *camera = place);
+}
+
+/// Key and fill from the front, two kickers at the hair's height from behind. All cast shadows, or
+/// light from one side would shine through the head.
+pub fn light(app: &mut App) {
+    let light = |at: Vec3, lux: f32, color: Color| {
+        let light = DirectionalLight {
+            illuminance: lux,
+            color,
+            shadow_maps_enabled: true,
+            shadow_normal_bias: 0.6,
+            shadow_depth_bias: 0.002,
+            ..default()
+        };
+        let cascades = CascadeShadowConfigBuilder {
+            num_cascades: 1,
+            minimum_distance: 0.3,
+            maximum_distance: 1.1,
+            ..default()
+        };
+        let at = Transform::from_translation(at).looking_at(Vec3::ZERO, Vec3::Y);
+        (light, cascades.build(), at)
+    };
+    let world = app.world_mut();
+    world.spawn(light(Vec3::new(1.0, 1.1, 1.2), 8000.0, Color::srgb(1.0, 0.95, 0.88)));
+    world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2000.0, Color::srgb(0.8, 0.88, 1.0)));
+    world.spawn(light(Vec3::new(1.0, 0.35, -1.4), 6000.0, Color::WHITE));
+    world.spawn(light(Vec3::new(-1.0, 0.35, -1.4), 6000.0, Color::WHITE));
+}
+
+/// A head with hair.
+pub struct Bust {
+    /// Turn this, and all of it turns.
+    pub hair: Entity,
+    /// How many strands are simulated.
+    pub guides: usize,
+}
+
+/// The head with the preset's hair.
+pub fn wear(app: &mut App, preset: HairPreset) -> Result<Bust> {
+    let scalp = dressed::scalp();
+    let mesh = mannequin::mesh();
+    let settings = preset.settings();
+    let planted = preset.plant(&mesh, &scalp)?;
+    let (line, count) = (preset.hairline(), settings.followers.count);
+    let roots = preset.follower_roots(&planted, &mesh, &scalp, &line, count, 0)?;
+    let face = dressed::face(Vec3::ONE, dressed::brows(settings.look.melanin))?;
+    let world = app.world_mut();
+    let mesh = head::with_scalp(mesh, &scalp, preset);
+    let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh);
+    let skin = StandardMaterial { perceptual_roughness: 0.46, ..default() };
+    let skin = world.resource_mut::<Assets<StandardMaterial>>().add(skin);
+    let hair = world.spawn((Hair, upright(), Visibility::default(), settings, roots)).id();
+    for strand in planted.groom.strands() {
+        world.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
+    }
+    world.spawn((Mesh3d(mesh), MeshMaterial3d(skin), ChildOf(hair)));
+    let lying = Transform::from_rotation(upright().rotation.inverse());
+    for (collider, place) in head::body()? {
+        world.spawn((collider, lying * place, ChildOf(hair)));
+    }
+    let face = face.spawn(&mut world.commands());
+    world.flush();
+    world.entity_mut(hair).add_child(face);
+    Ok(Bust { hair, guides: planted.groom.len() })
+}
