@@ -8,6 +8,8 @@
 mod scenes;
 
 mod camera;
+#[cfg(feature = "gpu")]
+mod device;
 mod dials;
 mod environment;
 mod failure;
@@ -150,6 +152,8 @@ fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
         .add_systems(PreUpdate, surround)
         .add_systems(PostUpdate, (stage::embody, stage::slide).before(TransformSystems::Propagate))
         .add_systems(Update, look_wet);
+    #[cfg(feature = "gpu")]
+    app.add_systems(FixedPreUpdate, device::fetch);
     let mut gizmos = app.world_mut().resource_mut::<GizmoConfigStore>();
     gizmos.config_mut::<overlay::HairGizmos>().0.enabled = arguments.gizmos;
 }

@@ -4,6 +4,7 @@ use super::{
     HairFollowers, HairView, WetLook,
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     drawn_strand::{DrawnStrand, GuideRoot},
+    elsewhere::DrawnElsewhere,
     follower_roots::FollowerRoots,
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
     scatter::scatter,
@@ -35,6 +36,8 @@ pub(super) struct Packed {
     followers: Option<HairFollowers>,
     /// Whether roots have moved since followers were laid out.
     roots_moved: bool,
+    /// Whether the nodes here are not those that were drawn in the frame before.
+    is_stale: bool,
     thickness: Thickness,
     /// How far apart guides grow (m).
     spacing: f32,
@@ -95,6 +98,7 @@ pub(super) fn pack(
             Option<&Strands>,
             Option<Ref<FollowerRoots>>,
             &GlobalTransform,
+            Option<&mut DrawnElsewhere>,
         ),
         Without<Settling>,
     >,
@@ -115,15 +119,33 @@ pub(super) fn pack(
     };
     let new_device = device.is_some_and(|device| device.is_changed());
     let shorn: Vec<Entity> = shorn.read().collect();
-    for (hair, mut packed, buffers, members, follower_roots, place) in &mut hairs {
+    for (hair, mut packed, buffers, members, follower_roots, place, elsewhere) in &mut hairs {
         let packed = packed.bypass_change_detection();
         let guides = || members.into_iter().flat_map(|m| m.iter());
         let settings = followers.of(hair);
-        let mut regroomed = packed.note_layout(guides(), &strands, &settings);
+        // What is drawn elsewhere keeps its guides: hair whose strands change comes back first.
+        let elsewhere = elsewhere.map(|mut drawn| {
+            let drawn = drawn.bypass_change_detection();
+            drawn.overstep = if drawn.rests { 1.0 } else { overstep };
+            (drawn.low, drawn.high)
+        });
+        let elsewhere = elsewhere.filter(|_| buffers.is_some() && !packed.layout.is_empty());
+        let mut regroomed = packed.note_followers(&settings);
+        if elsewhere.is_none() {
+            regroomed |= packed.note_layout(guides(), &strands);
+        }
         regroomed |= follower_roots.as_ref().map_or(shorn.contains(&hair), Ref::is_changed);
 
-        let bounds = packed.pack_nodes(&strands, overstep, !regroomed);
-        let (low, high) = bounds.unwrap_or_default();
+        let (low, high) = match elsewhere {
+            Some(corners) => {
+                packed.is_stale = true;
+                corners
+            }
+            None => {
+                let known = !regroomed && !core::mem::take(&mut packed.is_stale);
+                packed.pack_nodes(&strands, overstep, known).unwrap_or_default()
+            }
+        };
         let around = |margin: f32| Aabb::from_min_max(low - margin, high + margin);
         let (look, dye) = (looks.of(hair), dyes.of(hair));
         let view = views.of(hair);
@@ -238,12 +260,11 @@ impl Packed {
         bytemuck::cast_slice(&words).to_vec()
     }
 
-    /// Notes which strands are guides; says whether that, or how they are followed, has changed.
+    /// Notes which strands are guides; says whether that has changed.
     fn note_layout(
         &mut self,
         members: impl Iterator<Item = Entity>,
         strands: &Query<GuideParts>,
-        followers: &HairFollowers,
     ) -> bool {
         let mut count = 0;
         let mut changed = false;
@@ -272,6 +293,11 @@ impl Packed {
             self.roots.clear();
             changed = true;
         }
+        changed | core::mem::take(&mut self.roots_moved)
+    }
+
+    /// Notes how guides are followed; says whether that has changed.
+    fn note_followers(&mut self, followers: &HairFollowers) -> bool {
         // Settings that the shader reads from the uniform need no new strands.
         let grown = |f: &HairFollowers| HairFollowers {
             clump: 0.0,
@@ -281,9 +307,9 @@ impl Packed {
             frizz: 0.0,
             ..*f
         };
-        changed |= self.followers.as_ref().map(grown) != Some(grown(followers));
+        let changed = self.followers.as_ref().map(grown) != Some(grown(followers));
         self.followers = Some(*followers);
-        changed | core::mem::take(&mut self.roots_moved)
+        changed
     }
 
     /// Packs the nodes of all guides; `known` if those of the previous frame are present. Returns the box

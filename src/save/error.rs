@@ -15,6 +15,14 @@ pub enum HairdoError {
         /// What was named.
         entity: Entity,
     },
+    /// The hair is simulated on the graphics device.
+    #[error(
+        "{entity} is simulated on the graphics device: ask by TakeHairdo, and HairdoTaken brings its hairdo"
+    )]
+    OnGpu {
+        /// The hair.
+        entity: Entity,
+    },
     /// The bytes begin like no hairdo.
     #[error("these bytes are not a hairdo: use bytes from Hairdo::to_bytes")]
     NotAHairdo,

@@ -12,7 +12,7 @@ use crate::{
     parallel::{Nanos, for_each_part, tables},
     schedule::EffectiveSubsteps,
     setting::{Ranged, Settings},
-    strand::{AddedMass, Hair, InWater, PerHair, Strand, StrandOf, StrandSleep, TickPose},
+    strand::{AddedMass, Hair, InWater, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose},
 };
 use bevy::prelude::*;
 
@@ -45,7 +45,10 @@ pub(super) fn submerge(
     wetting: Settings<HairWetting>,
     volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture)>,
+    mut strands: Query<
+        (&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture),
+        Without<OnGpu>,
+    >,
     mut ledger: ResMut<WaterLedger>,
     mut were_any: Local<bool>,
 ) {
