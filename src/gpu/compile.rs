@@ -17,24 +17,41 @@ use bevy::{
     },
     shader::{Shader, ShaderCacheError, ValidateShader},
 };
+use core::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What both worlds know of the kernels.
+/// What both worlds know of the kernels and of the device.
 #[derive(Resource, Clone, Default)]
-pub(super) struct Compiled(Arc<Mutex<State>>);
+pub(super) struct Compiled {
+    state: Arc<Mutex<State>>,
+    /// How many devices there have been: two of them may look alike.
+    devices: Arc<AtomicU64>,
+}
 
 #[derive(Default)]
 enum State {
     #[default]
     Idle,
     Asked,
-    Ready(RenderDevice, Arc<HairKernels>),
+    /// On this device.
+    Ready(u64, Arc<HairKernels>),
     Broken,
 }
 
 impl Compiled {
     fn with<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
-        act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+        act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// The number of the present device.
+    pub(super) fn device(&self) -> u64 {
+        self.devices.load(Ordering::Acquire)
+    }
+
+    /// There is another device.
+    pub(super) fn renew(&self) {
+        self.devices.fetch_add(1, Ordering::AcqRel);
+        self.with(|state| *state = State::Idle);
     }
 }
 
@@ -76,7 +93,6 @@ struct Queued(Option<[CachedComputePipelineId; 3]>);
 fn compile(
     compiled: Res<Compiled>,
     sources: Res<Sources>,
-    device: Res<RenderDevice>,
     cache: Res<PipelineCache>,
     mut queued: ResMut<Queued>,
 ) {
@@ -114,7 +130,7 @@ fn compile(
     };
     let layouts = layouts.map(|layout| cache.get_bind_group_layout(&layout));
     let kernels = Arc::new(HairKernels::of(layouts, [a, b, c]));
-    compiled.with(|state| *state = State::Ready(device.clone(), kernels));
+    compiled.with(|state| *state = State::Ready(compiled.device(), kernels));
 }
 
 /// The app's device as far as the main world needs it.
@@ -132,6 +148,8 @@ pub(super) struct AppDevice<'w> {
 /// What hair is handed over with.
 #[derive(Clone)]
 pub(super) struct Ready {
+    /// The device's number.
+    pub(super) number: u64,
     pub(super) device: RenderDevice,
     pub(super) queue: RenderQueue,
     pub(super) kernels: Arc<HairKernels>,
@@ -157,7 +175,8 @@ impl AppDevice<'_> {
             return Err(WhyCpu::Software);
         }
         self.compiled.with(|state| match state {
-            State::Ready(of, kernels) if of.wgpu_device() == device.wgpu_device() => Ok(Ready {
+            State::Ready(number, kernels) if *number == self.compiled.device() => Ok(Ready {
+                number: *number,
                 device: RenderDevice::clone(device),
                 queue: RenderQueue::clone(queue),
                 kernels: kernels.clone(),

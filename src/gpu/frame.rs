@@ -1,7 +1,7 @@
 //! A frame on the graphics device, in the render world: what the ticks have written down is run, before any
 //! camera draws, and the nodes go into the buffers that drawing reads.
 
-use super::{hair::GpuHair, record::GpuJournal, shared::Link};
+use super::{compile::Compiled, hair::GpuHair, record::GpuJournal, shared::Link};
 use crate::render::{DrawnElsewhere, HairBuffers};
 use bevy::{
     core_pipeline::schedule::camera_driver,
@@ -35,8 +35,16 @@ struct Frame {
 }
 
 /// Substeps and requests are taken here, between two frames, so that none is run before its frame.
-fn extract(mut main: ResMut<MainWorld>, mut extracted: ResMut<Extracted>) {
+fn extract(
+    mut main: ResMut<MainWorld>,
+    mut extracted: ResMut<Extracted>,
+    compiled: Option<Res<Compiled>>,
+    device: Res<RenderDevice>,
+) {
     extracted.0.clear();
+    if let Some(compiled) = compiled.filter(|_| device.is_changed()) {
+        compiled.renew();
+    }
     let mut hairs = main.query_filtered::<(
         &mut GpuHair,
         Option<&mut GpuJournal>,
@@ -65,6 +73,7 @@ fn extract(mut main: ResMut<MainWorld>, mut extracted: ResMut<Extracted>) {
 /// All substeps of all hair, the outer loop over substeps: hairs share no buffer, so only it meets barriers.
 fn run(
     extracted: Res<Extracted>,
+    compiled: Option<Res<Compiled>>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
@@ -74,7 +83,8 @@ fn run(
     }
     let hairs = extracted.0.iter().map(|frame| (frame.link.lock(), frame));
     // What is left of a lost device belongs to nobody.
-    let mut hairs: Vec<_> = hairs.filter(|(shared, _)| shared.is_on(&device)).collect();
+    let present = compiled.map_or(0, |compiled| compiled.device());
+    let mut hairs: Vec<_> = hairs.filter(|(shared, _)| shared.is_on(present)).collect();
     let counts: Vec<usize> = hairs.iter_mut().map(|(shared, _)| shared.upload()).collect();
     let mut encoder = device.create_command_encoder(&default());
     let most = counts.iter().copied().max().unwrap_or(0);

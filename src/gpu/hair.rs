@@ -178,7 +178,7 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
     let treatments = GpuTreatments::new(acting.unwrap_or_default().to_vec());
     let strands = members.iter().filter_map(|member| world.get::<Strand>(*member));
     let gpu = GpuHair {
-        link: Link::new((&ready.device, &ready.queue), ready.kernels.clone(), on),
+        link: Link::new((ready.number, &ready.device, &ready.queue), ready.kernels.clone(), on),
         prints: strands.map(Print::of).collect(),
         at: world.read_change_tick(),
         newest: 0,

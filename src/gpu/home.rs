@@ -2,6 +2,7 @@
 //! for.
 
 use super::{
+    compile::Compiled,
     hair::{GpuHair, Print, StaysHome},
     layout::{Contents, StrandState},
     record::GpuJournal,
@@ -181,6 +182,7 @@ const MOST_WAITING: usize = 3600;
 /// As a frame begins: what has come from the device, and what has become of it.
 pub(super) fn collect(world: &mut World) {
     let device = world.get_resource::<RenderDevice>().cloned();
+    let present = world.get_resource::<Compiled>().map_or(0, Compiled::device);
     let mut hairs = world.query_filtered::<(Entity, &GpuHair), Allow<Disabled>>();
     let all: Vec<(Entity, Link, bool)> =
         hairs.iter(world).map(|(hair, gpu)| (hair, gpu.link.clone(), gpu.is_urgent())).collect();
@@ -199,7 +201,7 @@ pub(super) fn collect(world: &mut World) {
             shared.pending.append(&mut waiting);
             shared.run_pending();
         }
-        let is_lost = device.as_ref().is_none_or(|device| !shared.is_on(device));
+        let is_lost = !shared.is_on(present);
         let state = shared.take_state();
         let reports: Vec<Measured> = core::iter::from_fn(|| shared.take_report()).collect();
         let named = |report: &Measured| shared.strands.layout().strand_of(report.first?);

@@ -33,6 +33,12 @@ impl Plugin for HairGpuPlugin {
         .register_type::<Unsupported>()
         .register_required_components::<Hair, HairResidence>()
         .add_observer(ask)
+        .add_observer(|left: On<Remove, Hair>, mut commands: Commands| {
+            let hair = left.entity;
+            commands.queue(move |world: &mut World| {
+                home_now(world, hair, WhyCpu::Unsupported(Unsupported::Strands));
+            });
+        })
         .add_systems(PreUpdate, collect.run_if(any_with_component::<GpuHair>))
         .add_systems(
             HairTick,

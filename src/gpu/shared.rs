@@ -6,13 +6,13 @@ use super::{
     pipelines::HairKernels,
     present::DrawnNodes,
     record::SubstepRecord,
-    strands::{GpuStrands, REPORT_BYTES},
+    strands::{GpuStrands, REPORT_BYTES, read_mapped},
 };
 use bevy::render::{
-    render_resource::{Buffer, BufferDescriptor, BufferId, BufferUsages, CommandEncoder, MapMode},
+    render_resource::{Buffer, BufferDescriptor, BufferId, BufferUsages, CommandEncoder},
     renderer::{RenderDevice, RenderQueue},
 };
-use core::sync::atomic::{AtomicU8, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
 use std::{
     collections::VecDeque,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -23,6 +23,8 @@ use std::{
 pub(super) struct Link(Arc<Mutex<Shared>>);
 
 pub(super) struct Shared {
+    /// The number of its device.
+    number: u64,
     pub(super) device: RenderDevice,
     pub(super) queue: RenderQueue,
     pub(super) kernels: Arc<HairKernels>,
@@ -41,7 +43,7 @@ pub(super) struct Shared {
 
 impl Link {
     pub(super) fn new(
-        (device, queue): (&RenderDevice, &RenderQueue),
+        (number, device, queue): (u64, &RenderDevice, &RenderQueue),
         kernels: Arc<HairKernels>,
         strands: GpuStrands,
     ) -> Self {
@@ -52,6 +54,7 @@ impl Link {
             next - layout.nodes(strand) as u32
         });
         Self(Arc::new(Mutex::new(Shared {
+            number,
             device: device.clone(),
             queue: queue.clone(),
             kernels,
@@ -71,9 +74,9 @@ impl Link {
 }
 
 impl Shared {
-    /// Whether it is on this device.
-    pub(super) fn is_on(&self, device: &RenderDevice) -> bool {
-        self.device.wgpu_device() == device.wgpu_device()
+    /// Whether it is on the device of this number.
+    pub(super) fn is_on(&self, device: u64) -> bool {
+        self.number == device
     }
 
     /// Hands the pending substeps to the device; returns how many there are.
@@ -137,40 +140,32 @@ impl Shared {
 
     /// The state that has arrived, with the number of its request; `Err` where the device failed.
     pub(super) fn take_state(&mut self) -> Option<(u64, Result<Contents, ()>)> {
-        let arrived = self.copy.as_ref()?.1.arrived()?;
-        let (number, crossing) = self.copy.take()?;
-        let read = |bytes: &[u8]| Contents::of_bytes(self.strands.layout(), bytes);
-        Some((number, arrived.then(|| crossing.read(read)).ok_or(())))
+        let bytes = self.copy.as_ref()?.1.take()?;
+        let (number, _) = self.copy.take()?;
+        let read = |bytes: Vec<u8>| Contents::of_bytes(self.strands.layout(), &bytes);
+        Some((number, bytes.map(read).ok_or(())))
     }
 
     /// A report that has arrived.
     pub(super) fn take_report(&mut self) -> Option<Measured> {
-        let crossing = self.reports.0.front()?;
-        let arrived = crossing.arrived()?;
-        let report = arrived.then(|| crossing.read(Measured::of));
+        let bytes = self.reports.0.front()?.take()?;
         let crossing = self.reports.0.pop_front()?;
-        match report {
-            Some(_) => {
-                crossing.state.store(FREE, Ordering::Release);
-                self.reports.1.push(crossing);
-            }
-            None => drop(crossing),
-        }
-        report
+        let report = Measured::of(&bytes?);
+        crossing.is_mapped.store(false, Ordering::Release);
+        self.reports.1.push(crossing);
+        Some(report)
     }
 }
 
 /// A buffer on its way from the device.
-#[derive(Debug)]
 struct Crossing {
     buffer: Buffer,
-    state: Arc<AtomicU8>,
+    is_mapped: AtomicBool,
+    arrived: Arc<Mutex<Option<Arrived>>>,
 }
 
-const FREE: u8 = 0;
-const MAPPING: u8 = 1;
-const ARRIVED: u8 = 2;
-const FAILED: u8 = 3;
+/// What it held; `None` where the device failed.
+type Arrived = Option<Vec<u8>>;
 
 impl Crossing {
     fn new(device: &RenderDevice, size: u64) -> Self {
@@ -180,40 +175,27 @@ impl Crossing {
             usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        Self { buffer, state: Arc::new(AtomicU8::new(FREE)) }
+        Self { buffer, is_mapped: AtomicBool::new(false), arrived: Arc::default() }
     }
 
     /// Mapped once, after the commands that fill it have been submitted.
     fn map(&self, device: &RenderDevice) {
-        if self.state.compare_exchange(FREE, MAPPING, Ordering::AcqRel, Ordering::Acquire).is_ok() {
-            let state = self.state.clone();
-            device.map_buffer(&self.buffer.slice(..), MapMode::Read, move |mapped| {
-                let arrived = if mapped.is_ok() { ARRIVED } else { FAILED };
-                state.store(arrived, Ordering::Release);
+        if !self.is_mapped.swap(true, Ordering::AcqRel) {
+            let arrived = self.arrived.clone();
+            read_mapped(device, &self.buffer, move |bytes| {
+                *arrived.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes);
             });
         }
     }
 
-    /// Whether it is there, or never will be.
-    fn arrived(&self) -> Option<bool> {
-        match self.state.load(Ordering::Acquire) {
-            ARRIVED => Some(true),
-            FAILED => Some(false),
-            _ => None,
-        }
-    }
-
-    fn read<T>(&self, read: impl FnOnce(&[u8]) -> T) -> T {
-        let bytes = self.buffer.slice(..).get_mapped_range();
-        let value = read(&bytes);
-        drop(bytes);
-        self.buffer.unmap();
-        value
+    /// What it held, once that is known.
+    fn take(&self) -> Option<Arrived> {
+        self.arrived.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
 
 /// Reports under way, oldest first, and buffers for more.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Reports(VecDeque<Crossing>, Vec<Crossing>);
 
 /// How many reports may be under way; later frames' counts are added to the next one's.

@@ -280,16 +280,30 @@ fn read_back(
     encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
     queue.submit([encoder.finish()]);
     let (send, receive) = std::sync::mpsc::channel();
-    device.map_buffer(&staging.slice(..), MapMode::Read, move |mapped| {
+    read_mapped(device, &staging, move |bytes| {
         // Nobody listens any more if the device did not answer in time.
-        let _ = send.send(mapped.is_ok());
+        let _ = send.send(bytes);
     });
     device.poll(PollType::wait_indefinitely()).ok()?;
-    if !receive.recv().ok()? {
-        return None;
-    }
-    let bytes = staging.slice(..).get_mapped_range();
+    let bytes = receive.recv().ok()??;
     let numbers = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let numbers: Vec<f32> = numbers.collect();
     Some(numbers.as_chunks::<4>().0.to_vec())
+}
+
+/// Has a buffer mapped and read, all in one: in between the device may be lost, and the mapped bytes with
+/// it. `None` where it is.
+pub(super) fn read_mapped(
+    device: &RenderDevice,
+    buffer: &Buffer,
+    done: impl FnOnce(Option<Vec<u8>>) + Send + 'static,
+) {
+    let mapped = buffer.clone();
+    device.map_buffer(&buffer.slice(..), MapMode::Read, move |result| {
+        done(result.is_ok().then(|| {
+            let bytes = mapped.slice(..).get_mapped_range().to_vec();
+            mapped.unmap();
+            bytes
+        }));
+    });
 }
