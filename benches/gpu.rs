@@ -32,6 +32,7 @@ mod gpu {
         gpu::{BYTES_PER_NODE, GpuStrands, HairKernels, StrandView, SubstepRecord},
         prelude::*,
         rod::obstacle::{Obstacle, Solid},
+        strand::StrandHistory,
     };
     use std::{path::Path, time::Instant};
 
@@ -150,8 +151,11 @@ mod gpu {
                     (strand, bonds)
                 })
                 .collect();
-            let views: Vec<StrandView<'_>> =
-                made.iter().map(|(strand, bonds)| StrandView::of(strand, bonds)).collect();
+            let history = StrandHistory::default();
+            let views: Vec<StrandView<'_>> = made
+                .iter()
+                .map(|(strand, bonds)| StrandView::of(strand, bonds, &history))
+                .collect();
             let start = Instant::now();
             let strands = GpuStrands::new(&self.device, &self.kernels, &views);
             (strands, start.elapsed().as_secs_f64())

@@ -13,7 +13,6 @@ pub mod contact;
 pub mod environment;
 pub mod fault;
 #[cfg(feature = "gpu")]
-#[doc(hidden)]
 pub mod gpu;
 pub mod grid;
 #[cfg(feature = "groom")]
@@ -52,6 +51,8 @@ pub use environment::{
     AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindZone, ZoneShape,
 };
 pub use fault::{FaultKind, HairFault};
+#[cfg(feature = "gpu")]
+pub use gpu::{HairGpu, HairResidence, SimulateOn};
 #[cfg(feature = "groom")]
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 pub use lod::{HairBudget, HairEstimate, HairLod, HairScreenShare, LodLevel, PresentLod};
@@ -68,7 +69,7 @@ pub use setting::{HairDefault, InvalidValue, ValueRange};
 pub use settle::{HairSettling, Settling};
 pub use sleep::HairSleep;
 pub use strand::{
-    AddedMass, Hair, HairInertia, HeldNodes, HeldNodesState, Sleepers, Strand, StrandError,
+    AddedMass, Hair, HairInertia, HeldNodes, HeldNodesState, OnGpu, Sleepers, Strand, StrandError,
     StrandModel, StrandOf, StrandSleep, Strands,
 };
 pub use style::{HairCondition, HairStyle, KeptStyle, StyleFaded};
@@ -85,6 +86,9 @@ pub mod prelude {
     #[cfg(feature = "avian")]
     #[doc(hidden)]
     pub use crate::contact::AvianHairCollider;
+    #[cfg(feature = "gpu")]
+    #[doc(hidden)]
+    pub use crate::gpu::{HairGpu, HairResidence, SimulateOn};
     #[cfg(feature = "groom")]
     #[doc(hidden)]
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};

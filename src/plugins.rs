@@ -92,6 +92,8 @@ impl PluginGroup for HairPlugins {
             .add(LookPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
+        #[cfg(feature = "gpu")]
+        let group = group.add(crate::gpu::HairGpuPlugin);
         #[cfg(feature = "save")]
         let group = group.add(crate::save::SavePlugin);
         #[cfg(feature = "groom")]

@@ -8,6 +8,8 @@
 #[path = "../scenes/mod.rs"]
 mod scenes;
 
+#[cfg(feature = "gpu")]
+mod device;
 mod report;
 mod swing;
 mod trace;
@@ -77,6 +79,13 @@ struct Arguments {
     /// What solves rods: `direct`, or `sweeps`, the paper's projections.
     #[arg(long, value_parser = solver)]
     solver: Option<SolverMethod>,
+    /// Simulates on the graphics device, a software one too (feature gpu); without contact between
+    /// strands.
+    #[arg(long)]
+    gpu: bool,
+    /// Leaves contact between strands out, as --gpu does.
+    #[arg(long)]
+    no_contact: bool,
     #[command(flatten)]
     swing: swing::Options,
 }
@@ -116,9 +125,14 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         let expected = "expected 0.017, which is one frame, to 100000";
         return Err(format!("--seconds is {seconds}, {expected}").into());
     }
+    if arguments.gpu && cfg!(not(feature = "gpu")) {
+        return Err("--gpu needs --features gpu".into());
+    }
     let mut csv = arguments.csv.as_deref().map(Table::create).transpose()?;
-    let mut app =
-        headless_app(scene, arguments.threads, Strewn { count: arguments.droplets, ..default() });
+    let mut app = headless_app(scene, arguments, Strewn { count: arguments.droplets, ..default() });
+    if arguments.gpu || arguments.no_contact {
+        app.world_mut().resource_mut::<HairDefault<LockContact>>().strength = 0.0;
+    }
     if let Some(method) = arguments.solver {
         app.world_mut().resource_mut::<HairDefault<HairSolver>>().method = method;
     }
@@ -129,11 +143,13 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     for _ in 0..frames {
         app.update();
         if let Some(table) = &mut csv {
+            present(&mut app);
             table.line(&frame_line(app.world_mut()))?;
         }
         bar.inc(1);
     }
     let wall = start.elapsed();
+    present(&mut app);
     let mut report = Report::new(app.world_mut(), scene, frames, wall);
     // Where nothing was held there is nothing to keep.
     if !app.world().resource::<Director>().held.is_empty() {
@@ -146,6 +162,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         report.weightless(app.world_mut());
     }
     bar.finish_and_clear();
+    #[cfg(feature = "gpu")]
+    if arguments.gpu {
+        let ticks = app.world().resource::<device::Ticks>();
+        ticks.check()?;
+        report.on_device(ticks.on_gpu, device::adapter(app.world()));
+    }
     print(&report, arguments.json)
 }
 
@@ -179,9 +201,13 @@ fn swing(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         arguments.seconds.is_some(),
         arguments.csv.is_some(),
         arguments.solver.is_some(),
+        arguments.gpu || arguments.no_contact,
     ];
     if scenes_alone.contains(&true) {
-        return Err("--variant, --seconds, --csv and --solver are not for swing".into());
+        return Err(
+            "--variant, --seconds, --csv, --solver, --gpu and --no-contact are not for swing"
+                .into(),
+        );
     }
     print(&arguments.swing.run()?, arguments.json)
 }
@@ -199,11 +225,18 @@ fn print(report: &impl Serialize, json: bool) -> Result<(), Box<dyn std::error::
     Ok(())
 }
 
+/// The present state into the strands, wherever hair is simulated.
+fn present(app: &mut App) {
+    #[cfg(feature = "gpu")]
+    device::fetch(app.world_mut());
+    let _ = app;
+}
+
 /// Exactly one tick an update, on as many threads as asked for.
-fn headless_app(scene: Scene, threads: Option<u16>, droplets: Strewn) -> App {
+fn headless_app(scene: Scene, arguments: &Arguments, droplets: Strewn) -> App {
     // The thread that runs the app solves strands too, next to those of the pool.
     let mut pools = TaskPoolOptions::default();
-    if let Some(threads) = threads {
+    if let Some(threads) = arguments.threads {
         let count = usize::from(threads - 1);
         pools.compute = TaskPoolThreadAssignmentPolicy {
             min_threads: count,
@@ -214,13 +247,16 @@ fn headless_app(scene: Scene, threads: Option<u16>, droplets: Strewn) -> App {
         };
     }
     let mut app = App::new();
-    app.add_plugins((
-        MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools }),
-        HairPlugins::default(),
-        ScenePlugin(scene),
-    ))
-    .insert_resource(droplets)
-    .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    if arguments.gpu {
+        #[cfg(feature = "gpu")]
+        device::plugins(&mut app, pools);
+    } else {
+        let bevy = MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools });
+        app.add_plugins((bevy, HairPlugins::default()));
+    }
+    app.add_plugins(ScenePlugin(scene))
+        .insert_resource(droplets)
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.finish();
     app.cleanup();
@@ -236,6 +272,7 @@ fn settle(app: &mut App) {
         for _ in 0..30 {
             app.update();
         }
+        present(app);
         let mut strands = app.world_mut().query::<&Strand>();
         let (sum, n) = strands
             .iter(app.world())

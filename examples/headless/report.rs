@@ -67,6 +67,10 @@ pub struct Report {
     /// it, shower only.
     kept_dried: Option<f64>,
     b_rewet: Option<f64>,
+    /// Where the hair was simulated, how many ticks on the graphics device, and which that is.
+    residence: &'static str,
+    gpu_ticks: u64,
+    adapter: Option<String>,
     /// A number made of every bit of the state when the story ended.
     state_hash: String,
     wall_seconds: f64,
@@ -130,6 +134,9 @@ impl Report {
             b_pressed: director.rate(0),
             kept_dried: director.kept_dried,
             b_rewet: director.rate(1),
+            residence: "cpu",
+            gpu_ticks: 0,
+            adapter: None,
             state_hash: format!("{:016x}", state_hash(&strands, &bonds, &ledger)),
             wall_seconds: wall.as_secs_f64(),
             sim_seconds,
@@ -147,11 +154,20 @@ impl Report {
             let rates = bonds.iter().flat_map(|b| b.rates(BondKind::Hydrogen));
             let pairs: Vec<(f32, f32)> = wind.into_iter().zip(rates).collect();
             let error = |&(w, b): &(f32, f32)| f64::from((b - (0.3 * w).min(1.0)).abs());
-            report.drying_error = Some(pairs.iter().map(error).fold(0.0, f64::max));
-            let open: Vec<_> = pairs.iter().filter(|(_, b)| *b < 1.0).copied().collect();
-            report.wind_rate_correlation = Some(measure::rank_correlation(&open));
+            // On the graphics device nobody counts it.
+            if !pairs.is_empty() {
+                report.drying_error = Some(pairs.iter().map(error).fold(0.0, f64::max));
+                let open: Vec<_> = pairs.iter().filter(|(_, b)| *b < 1.0).copied().collect();
+                report.wind_rate_correlation = Some(measure::rank_correlation(&open));
+            }
         }
         report
+    }
+
+    /// All of it was simulated on this graphics device.
+    #[cfg(feature = "gpu")]
+    pub fn on_device(&mut self, ticks: u64, adapter: Option<String>) {
+        (self.residence, self.gpu_ticks, self.adapter) = ("gpu", ticks, adapter);
     }
 
     /// Measures the settled hair under gravity.

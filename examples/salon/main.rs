@@ -10,6 +10,8 @@ mod head;
 mod scenes;
 
 mod camera;
+#[cfg(feature = "gpu")]
+mod device;
 mod dials;
 mod dressed;
 mod environment;
@@ -149,6 +151,8 @@ fn refuse(error: &clap::Error) -> ExitCode {
 fn salon(app: &mut App, scene: Scene, arguments: &Arguments) {
     set::furnish(app, scene, arguments.view.into());
     app.add_plugins(overlay::OverlayPlugin);
+    #[cfg(feature = "gpu")]
+    app.add_systems(FixedPreUpdate, device::fetch);
     let mut gizmos = app.world_mut().resource_mut::<GizmoConfigStore>();
     gizmos.config_mut::<overlay::HairGizmos>().0.enabled = arguments.gizmos;
 }

@@ -44,6 +44,7 @@ fn show(
     mut orbits: Query<&mut Orbit>,
     mut wardrobe: Wardrobe,
     (plots, spared): (Res<PlotsShown>, Option<Res<Spared>>),
+    #[cfg(feature = "gpu")] mut residence: crate::device::Residence,
 ) -> Result {
     let ctx = contexts.ctx_mut()?;
     // Drawn in software a frame may last longer than a click may by default.
@@ -69,6 +70,8 @@ fn show(
             section(ui, "Water", false, |ui| settings.water(ui));
             section(ui, "Blower and rod", false, |ui| settings.tools(ui));
             section(ui, "Solver", false, |ui| settings.solver(ui));
+            #[cfg(feature = "gpu")]
+            section(ui, "Graphics device", false, |ui| residence.show(ui));
             section(ui, "Looks", false, |ui| settings.look(ui));
             ui.add_space(6.0);
             if ui.button("Everything as in the paper").clicked() {

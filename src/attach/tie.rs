@@ -11,7 +11,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     plant::RootOnMesh,
     schedule::HairStep,
-    strand::{Hair, MIN_SEGMENT, Strand, StrandHistory, Strands, TickPose},
+    strand::{Hair, MIN_SEGMENT, OnGpu, Strand, StrandHistory, Strands, TickPose},
 };
 use bevy::{
     math::Isometry3d,
@@ -30,7 +30,10 @@ pub(super) fn tie(
     transforms: TransformHelper,
     skins: Query<(&Mesh3d, Option<&SkinnedMesh>)>,
     morphs: Morphs,
-    mut hairs: Query<(Entity, Ref<RootsOnMesh>, &mut TiedRoots, &Strands, &TickPose), With<Hair>>,
+    mut hairs: Query<
+        (Entity, Ref<RootsOnMesh>, &mut TiedRoots, &Strands, &TickPose),
+        (With<Hair>, Without<OnGpu>),
+    >,
     mut strands: Query<(&mut Strand, &mut StrandHistory)>,
     mut faults: MessageWriter<HairFault>,
 ) {

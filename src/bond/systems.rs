@@ -14,7 +14,7 @@ use crate::{
     rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
     schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings, Violations, report},
-    strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep, keep_required},
+    strand::{AddedMass, OnGpu, PerHair, Strand, StrandOf, StrandSleep, keep_required},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use fearless_simd::Level;
@@ -53,7 +53,11 @@ fn fit_bonds(
     mut strands: Query<
         (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
         // A write to a disabled strand would no longer count as a change once it is enabled.
-        (Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>, Allow<Disabled>),
+        (
+            Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>,
+            Without<OnGpu>,
+            Allow<Disabled>,
+        ),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -91,7 +95,10 @@ fn generate_rest_shapes(
     sweeps: Settings<Sweeps>,
     cuticle: Settings<Cuticle>,
     solver: Settings<HairSolver>,
-    mut strands: Query<(&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape)>,
+    mut strands: Query<
+        (&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape),
+        Without<OnGpu>,
+    >,
 ) {
     if !steps.any() {
         return;
@@ -200,7 +207,10 @@ type Changing<'a> =
     (&'a Strand, &'a mut Bonds, &'a mut BondChanges, &'a mut RestShape, &'a mut StrandSleep);
 
 fn update_bonds(
-    mut strands: Query<(&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut StrandSleep)>,
+    mut strands: Query<
+        (&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut StrandSleep),
+        Without<OnGpu>,
+    >,
 ) {
     let ahead = |(strand, bonds, changes, ..): &Changing<'_>| {
         prefetch(&bonds.joints);

@@ -14,7 +14,8 @@ use crate::{
     schedule::{EffectiveSubsteps, HairSettle, HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
     strand::{
-        Hair, SleepPose, Sleepers, Strand, StrandOf, StrandSleep, Strands, TickPose, keep_required,
+        Hair, OnGpu, SleepPose, Sleepers, Strand, StrandOf, StrandSleep, Strands, TickPose,
+        keep_required,
     },
 };
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
@@ -149,8 +150,8 @@ impl HairReach {
 const LOOK_AGAIN: u32 = 16;
 
 fn find_reach(
-    mut hairs: Query<(Entity, &Strands, &mut HairReach), With<Hair>>,
-    touched: Query<&StrandOf, Changed<Strand>>,
+    mut hairs: Query<(Entity, &Strands, &mut HairReach), (With<Hair>, Without<OnGpu>)>,
+    touched: Query<&StrandOf, (Changed<Strand>, Without<OnGpu>)>,
     strands: Query<&Strand>,
 ) {
     let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
@@ -257,7 +258,10 @@ fn too_fine(strand: &Strand, radius: f32, stride: usize) -> HairFault {
 pub(crate) fn push_strands_apart(
     steps: EffectiveSubsteps,
     contact: Settings<LockContact>,
-    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>), With<Hair>>,
+    mut hairs: Query<
+        (Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>),
+        (With<Hair>, Without<OnGpu>),
+    >,
     mut strands: Query<(&mut Strand, &mut StrandSleep, &mut SleepPose), With<StrandOf>>,
     mut faults: MessageWriter<HairFault>,
 ) {

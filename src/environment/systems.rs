@@ -11,7 +11,9 @@ use crate::{
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, Hair, PerHair, Strand, StrandOf, StrandSleep, TickPose, keep_required},
+    strand::{
+        AddedMass, Hair, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose, keep_required,
+    },
 };
 use bevy::prelude::*;
 
@@ -75,15 +77,18 @@ fn apply_air(
     drag: Settings<AirDrag>,
     hairs: Query<&TickPose, With<Hair>>,
     winds: Winds,
-    mut strands: Query<(
-        &StrandOf,
-        &StrandSleep,
-        &mut Strand,
-        &AddedMass,
-        &mut BondChanges,
-        &mut BlownAir,
-        Option<&mut WindReceived>,
-    )>,
+    mut strands: Query<
+        (
+            &StrandOf,
+            &StrandSleep,
+            &mut Strand,
+            &AddedMass,
+            &mut BondChanges,
+            &mut BlownAir,
+            Option<&mut WindReceived>,
+        ),
+        Without<OnGpu>,
+    >,
 ) {
     if !steps.any() {
         return;

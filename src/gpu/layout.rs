@@ -6,7 +6,7 @@
 
 use crate::{
     bond::{Bonds, model::JointBonds},
-    strand::Strand,
+    strand::{Strand, StrandHistory},
 };
 use bevy::math::{Quat, Vec3};
 
@@ -115,11 +115,13 @@ pub struct StrandView<'a> {
     pub tensions: &'a [f32],
     /// Bonds of the joints.
     pub joints: &'a [JointBonds],
+    /// Where the nodes were when the last tick began (m); where they are, if there are not as many.
+    pub before: &'a [Vec3],
 }
 
 impl<'a> StrandView<'a> {
     /// A strand of the tick.
-    pub fn of(strand: &'a Strand, bonds: &'a Bonds) -> Self {
+    pub fn of(strand: &'a Strand, bonds: &'a Bonds, history: &'a StrandHistory) -> Self {
         Self {
             positions: strand.positions(),
             velocities: strand.velocities(),
@@ -128,6 +130,7 @@ impl<'a> StrandView<'a> {
             lengths: strand.rest_lengths(),
             tensions: strand.tensions(),
             joints: &bonds.joints,
+            before: &history.positions,
         }
     }
 }
@@ -174,6 +177,7 @@ impl Contents {
     /// Puts a strand into its slots.
     pub fn put(&mut self, layout: &Layout, strand: usize, view: &StrandView<'_>) {
         let edges = view.lengths.len();
+        let before = if view.before.len() > edges { view.before } else { view.positions };
         for node in 0..=edges {
             let at = |part, parts| layout.index(strand, node, part, parts);
             let place = view.positions[node];
@@ -182,7 +186,7 @@ impl Contents {
             self.pose[at(0, POSE)] = place.extend(0.0).to_array();
             self.pose[at(1, POSE)] = frame.to_array();
             self.motion[at(0, MOTION)] = view.velocities[node].extend(tension).to_array();
-            self.motion[at(1, MOTION)] = place.extend(0.0).to_array();
+            self.motion[at(1, MOTION)] = before[node].extend(0.0).to_array();
             let length = view.lengths.get(node).copied().unwrap_or(0.0);
             let weight = if node == 0 { 0.0 } else { 1.0 };
             self.rest[at(0, REST)] = Quat::IDENTITY.to_array();
@@ -192,6 +196,26 @@ impl Contents {
                 self.bonds[at(kind, BONDS)] = shape.extend(rate).to_array();
             }
         }
+    }
+
+    /// What a copy of pose, motion and bonds, one after the other, holds.
+    pub(super) fn of_bytes(layout: &Layout, bytes: &[u8]) -> Self {
+        let mut rest = bytes;
+        let mut part = |parts| {
+            let mut vectors = vec![[0.0; 4]; layout.vectors(parts)];
+            let (own, others) = rest.split_at((16 * vectors.len()).min(rest.len()));
+            bytemuck::cast_slice_mut::<[f32; 4], u8>(&mut vectors)[..own.len()]
+                .copy_from_slice(own);
+            rest = others;
+            vectors
+        };
+        let (pose, motion, bonds) = (part(POSE), part(MOTION), part(BONDS));
+        Self { pose, motion, rest: Vec::new(), bonds }
+    }
+
+    /// Bytes of such a copy.
+    pub(super) fn bytes(layout: &Layout) -> u64 {
+        16 * layout.vectors(POSE + MOTION + BONDS) as u64
     }
 
     /// Reads a strand from its slots.

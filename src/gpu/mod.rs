@@ -1,14 +1,29 @@
-//! Hair by compute shaders: the direct solver, its obstacles, bonds and air, one strand a thread. Nothing in
-//! the tick uses it yet.
+//! Hair by compute shaders: the direct solver, its obstacles, bonds, air and treatments, one strand a
+//! thread.
+//!
+//! [`SimulateOn::Gpu`] on a hair asks for it, [`HairResidence`] tells where the hair is and why. The tick
+//! goes on as always and writes down what acts on the hair; once a frame, before any camera, the graphics
+//! device runs what was written down and puts the nodes into the buffer that drawing reads. No node crosses
+//! the bus for that.
 //!
 //! | file | what |
 //! |---|---|
-//! | `layout` | where a strand's numbers lie on the GPU |
+//! | `residence` | where hair is, where it is asked to be, and why it is elsewhere |
+//! | `support` | what keeps it on the processor |
+//! | `compile` | the kernels of the app's device |
+//! | `hair` | hair goes there |
+//! | `home` | hair comes home, and what else comes from there |
+//! | `tick` | where each hair is from this tick on; what acts on it |
 //! | `journal` | a record of each substep of the tick |
+//! | `treatments` | the clocks of treatments |
+//! | `frame` | a frame in the render world |
+//! | `shared` | a hair as both worlds hold it |
+//! | `layout` | where a strand's numbers lie on the GPU |
 //! | `record` | what acts on a hair in one substep |
 //! | `pipelines` | the kernels on a device |
 //! | `strands` | a hair's strands there, substeps on a command encoder, reading back |
 //! | `present` | nodes into the buffer that drawing reads |
+//! | `plugin` | all of it in an app |
 //! | `wgsl/` | the mathematics, file by file the twins of `rod::direct`, `rod`, `bond` and `environment` |
 //!
 //! A thread takes its strand from root to tip in the CPU's order, without barriers and without atomics of
@@ -20,16 +35,36 @@
 //! search for whips 45, Newton step down 851 and up 141, limiter 183 and a look at lengths about 100, frames
 //! and twist 300, check 51: about 2,300. A second Newton step, of strands that touch or are fast, adds 1,000.
 
+mod compile;
+mod frame;
+mod hair;
+mod home;
 mod journal;
 mod layout;
 mod pipelines;
+mod plugin;
 mod present;
 mod record;
+mod residence;
+mod shared;
 mod strands;
+mod support;
+mod tick;
+mod treatments;
 
-pub use journal::{GpuJournal, GpuJournalPlugin};
+pub use home::fetch_strands;
+#[doc(hidden)]
 pub use layout::{BYTES_PER_NODE, Contents, LANES, Layout, StrandState, StrandView};
+#[doc(hidden)]
 pub use pipelines::{HairKernels, SOURCE};
+pub use plugin::HairGpuPlugin;
+#[doc(hidden)]
 pub use present::DrawnNodes;
-pub use record::{BlowerRecord, MOST_BLOWERS, MOST_OBSTACLES, SubstepRecord};
+#[doc(hidden)]
+pub use record::{
+    BlowerRecord, GpuJournal, MOST_BLOWERS, MOST_OBSTACLES, MOST_TREATMENTS, SubstepRecord,
+    TreatmentRecord,
+};
+pub use residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu};
+#[doc(hidden)]
 pub use strands::{GpuReport, GpuStrands};

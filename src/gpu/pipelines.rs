@@ -3,8 +3,9 @@
 use super::record::WORDS;
 use bevy::render::{
     render_resource::{
-        BindGroupLayout, BindGroupLayoutEntries, ComputePipeline, PipelineLayoutDescriptor,
-        RawComputePipelineDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+        BindGroupLayout, BindGroupLayoutEntries, BindGroupLayoutEntry, ComputePipeline,
+        PipelineLayoutDescriptor, RawComputePipelineDescriptor, ShaderModuleDescriptor,
+        ShaderSource, ShaderStages,
         binding_types::{
             storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer_sized,
         },
@@ -25,6 +26,32 @@ pub const SOURCE: &str = concat!(
     include_str!("wgsl/substep.wgsl"),
 );
 
+/// Entry points with their sources and which of [`layouts`] they bind.
+pub(super) const KERNELS: [(&str, &str, &[usize]); 3] = [
+    ("substep", SOURCE, &[0, 1]),
+    ("present", include_str!("wgsl/present.wgsl"), &[2]),
+    ("measure", include_str!("wgsl/measure.wgsl"), &[3]),
+];
+
+/// The groups that kernels bind, with their labels: a hair, a record, what packing binds, what measuring
+/// binds.
+pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); 4] {
+    const STAGE: ShaderStages = ShaderStages::COMPUTE;
+    let read = || storage_buffer_read_only_sized(false, None);
+    let write = || storage_buffer_sized(false, None);
+    let frame = uniform_buffer_sized(false, None);
+    let record = uniform_buffer_sized(true, NonZeroU64::new(4 * WORDS as u64));
+    let hair = (read(), read(), write(), write(), write(), write(), write(), write());
+    let drawn = (read(), read(), read(), read(), read(), read(), write(), frame);
+    let measured = (read(), read(), read(), write());
+    [
+        ("hair", BindGroupLayoutEntries::sequential(STAGE, hair).to_vec()),
+        ("hair substep", BindGroupLayoutEntries::single(STAGE, record).to_vec()),
+        ("drawn hair", BindGroupLayoutEntries::sequential(STAGE, drawn).to_vec()),
+        ("measured hair", BindGroupLayoutEntries::sequential(STAGE, measured).to_vec()),
+    ]
+}
+
 /// The kernels on a device.
 #[derive(Clone, Debug)]
 pub struct HairKernels {
@@ -35,47 +62,28 @@ pub struct HairKernels {
     /// What packing binds.
     pub(super) drawn: BindGroupLayout,
     pub(super) present: ComputePipeline,
+    /// What measuring binds.
+    pub(super) measured: BindGroupLayout,
+    pub(super) measure: ComputePipeline,
 }
 
 impl HairKernels {
-    /// Compiles the kernels.
+    /// Compiles the kernels, which takes a while.
     pub fn new(device: &RenderDevice) -> Self {
-        let read = || storage_buffer_read_only_sized(false, None);
-        let write = || storage_buffer_sized(false, None);
-        let hair = device.create_bind_group_layout(
-            "hair",
-            &BindGroupLayoutEntries::sequential(
-                ShaderStages::COMPUTE,
-                (read(), read(), write(), write(), write(), write(), write(), write()),
-            ),
-        );
-        let size = NonZeroU64::new(4 * WORDS as u64);
-        let record = device.create_bind_group_layout(
-            "hair substep",
-            &BindGroupLayoutEntries::single(
-                ShaderStages::COMPUTE,
-                uniform_buffer_sized(true, size),
-            ),
-        );
-        let drawn = device.create_bind_group_layout(
-            "drawn hair",
-            &BindGroupLayoutEntries::sequential(
-                ShaderStages::COMPUTE,
-                (
-                    read(),
-                    read(),
-                    read(),
-                    read(),
-                    read(),
-                    read(),
-                    write(),
-                    uniform_buffer_sized(false, None),
-                ),
-            ),
-        );
-        let substep = pipeline(device, "substep", SOURCE, &[&hair, &record]);
-        let present = pipeline(device, "present", include_str!("wgsl/present.wgsl"), &[&drawn]);
-        Self { hair, record, substep, drawn, present }
+        let layouts =
+            layouts().map(|(label, entries)| device.create_bind_group_layout(label, &entries[..]));
+        let pipelines = KERNELS.map(|(name, source, groups)| {
+            let groups: Vec<_> = groups.iter().map(|group| &layouts[*group]).collect();
+            pipeline(device, name, source, &groups)
+        });
+        Self::of(layouts, pipelines)
+    }
+
+    /// Of what [`layouts`] and [`KERNELS`] list.
+    pub(super) fn of(layouts: [BindGroupLayout; 4], pipelines: [ComputePipeline; 3]) -> Self {
+        let [hair, record, drawn, measured] = layouts;
+        let [substep, present, measure] = pipelines;
+        Self { hair, record, substep, drawn, present, measured, measure }
     }
 }
 

@@ -4,7 +4,11 @@ use crate::{
     bond::Cuticle,
     rod::obstacle::{Obstacle, Solid},
 };
-use bevy::math::{Affine3A, Isometry3d, Vec3};
+use bevy::{
+    ecs::component::Component,
+    math::{Affine3A, Isometry3d, Vec3},
+};
+use core::ops::Range;
 
 /// The maximum number of obstacles in a record.
 pub const MOST_OBSTACLES: usize = 64;
@@ -12,11 +16,15 @@ pub const MOST_OBSTACLES: usize = 64;
 /// The maximum number of blowers in a record.
 pub const MOST_BLOWERS: usize = 4;
 
+/// Treatments of some joints that a record holds at most.
+pub const MOST_TREATMENTS: usize = 8;
+
 /// Words of a record. Uniform buffers are bound at multiples of 256 bytes.
 pub(super) const WORDS: usize = (HEADER + 32 * MOST_OBSTACLES).next_multiple_of(64);
 
-/// Words before the obstacles.
-const HEADER: usize = 68;
+/// Words before the obstacles, and before the treatments.
+const HEADER: usize = BEFORE_TREATMENTS + 4 + 12 * MOST_TREATMENTS;
+const BEFORE_TREATMENTS: usize = 36 + 8 * MOST_BLOWERS;
 
 /// A blower in the hair's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,6 +37,25 @@ pub struct BlowerRecord {
     pub strength: f32,
     /// Rate per velocity of equation 19 (s/m).
     pub drying: f32,
+}
+
+/// The substeps of a hair, in their order. Component of a [`Hair`](crate::Hair); filled by the tick, emptied
+/// by whoever runs them.
+#[derive(Component, Clone, Debug, Default)]
+pub struct GpuJournal {
+    /// The substeps.
+    pub records: Vec<SubstepRecord>,
+}
+
+/// A treatment of some joints of every strand.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TreatmentRecord {
+    /// As [`SubstepRecord::change`].
+    pub change: [f32; 4],
+    /// As [`SubstepRecord::share`].
+    pub share: [f32; 4],
+    /// The joints, from the root.
+    pub joints: Range<u32>,
 }
 
 /// What acts on a hair in one substep.
@@ -52,6 +79,8 @@ pub struct SubstepRecord {
     /// The share of its rate that is subtracted as well: a treatment that moves rates toward b by a
     /// share s requests a change of s b and a share of s.
     pub share: [f32; 4],
+    /// The same of some joints, [`MOST_TREATMENTS`] at most.
+    pub treatments: Vec<TreatmentRecord>,
     /// Gravity-bending length (m).
     pub bending_length: f32,
     /// Kelvin–Voigt time (s).
@@ -88,7 +117,8 @@ impl SubstepRecord {
         let blowers = &self.blowers[..self.blowers.len().min(MOST_BLOWERS)];
         let obstacles = &self.obstacles[..self.obstacles.len().min(MOST_OBSTACLES)];
         let remembers = blowers.iter().any(|b| b.drying != 0.0)
-            || self.change.iter().chain(&self.share).any(|c| *c != 0.0);
+            || self.change.iter().chain(&self.share).any(|c| *c != 0.0)
+            || !self.treatments.is_empty();
         let flags = [
             (self.carry.is_some(), CARRIES),
             (self.shapes, SHAPES),
@@ -113,6 +143,17 @@ impl SubstepRecord {
         for blower in blowers {
             words.vector(blower.nozzle, blower.strength.to_bits());
             words.vector(blower.aim, blower.drying.to_bits());
+        }
+        words.0.resize(start + BEFORE_TREATMENTS, 0);
+        let treatments = &self.treatments[..self.treatments.len().min(MOST_TREATMENTS)];
+        words.word(treatments.len() as u32);
+        words.0.resize(start + BEFORE_TREATMENTS + 4, 0);
+        for treatment in treatments {
+            words.numbers(treatment.change);
+            words.numbers(treatment.share);
+            words.word(treatment.joints.start);
+            words.word(treatment.joints.end);
+            words.numbers([0.0; 2]);
         }
         words.0.resize(start + HEADER, 0);
         for obstacle in obstacles {

@@ -8,11 +8,14 @@ use super::{
 use bevy::render::{
     render_resource::{
         BindGroup, BindGroupEntries, Buffer, BufferBinding, BufferDescriptor, BufferInitDescriptor,
-        BufferUsages, CommandEncoder, MapMode, PollType,
+        BufferUsages, CommandEncoder, ComputePass, MapMode, PollType,
     },
     renderer::{RenderDevice, RenderQueue},
 };
 use core::num::NonZeroU64;
+
+/// Bytes of a report.
+pub(super) const REPORT_BYTES: usize = 64;
 
 /// Counts of faulty strands in the substeps since the last report was read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,7 +39,8 @@ pub struct GpuStrands {
     pub(super) motion: Buffer,
     pub(super) rest: Buffer,
     pub(super) bonds: Buffer,
-    report: Buffer,
+    pub(super) report: Buffer,
+    measured: [BindGroup; 2],
     /// From the first pose to the second, and back.
     groups: [BindGroup; 2],
     records: Option<(Buffer, BindGroup)>,
@@ -57,14 +61,13 @@ impl GpuStrands {
             let label = Some(label);
             device.create_buffer_with_data(&BufferInitDescriptor { label, contents, usage })
         };
-        let bytes = |contents: &[[f32; 4]]| bytemuck::cast_slice(contents).to_vec();
-        let pose = bytes(&contents.pose);
         let blocks = with("hair blocks", bytemuck::cast_slice(layout.blocks()));
-        let poses = [with("hair pose", &pose), with("hair pose", &pose)];
-        let motion = with("hair motion", &bytes(&contents.motion));
-        let rest = with("hair rest shapes", &bytes(&contents.rest));
-        let bonds = with("hair bonds", &bytes(&contents.bonds));
-        let report = with("hair report", &[0; 16]);
+        let pose = bytemuck::cast_slice(&contents.pose);
+        let poses = [with("hair pose", pose), with("hair pose", pose)];
+        let motion = with("hair motion", bytemuck::cast_slice(&contents.motion));
+        let rest = with("hair rest shapes", bytemuck::cast_slice(&contents.rest));
+        let bonds = with("hair bonds", bytemuck::cast_slice(&contents.bonds));
+        let report = with("hair report", &[0; REPORT_BYTES]);
         let scratch = device.create_buffer(&BufferDescriptor {
             label: Some("hair scratch"),
             size: 16 * layout.vectors(SCRATCH) as u64,
@@ -88,6 +91,18 @@ impl GpuStrands {
             )
         };
         let groups = [group(&poses[0], &poses[1]), group(&poses[1], &poses[0])];
+        let measured = [&poses[0], &poses[1]].map(|pose| {
+            device.create_bind_group(
+                "measured hair",
+                &kernels.measured,
+                &BindGroupEntries::sequential((
+                    blocks.as_entire_binding(),
+                    pose.as_entire_binding(),
+                    motion.as_entire_binding(),
+                    report.as_entire_binding(),
+                )),
+            )
+        });
         Self {
             layout,
             present: 0,
@@ -97,6 +112,7 @@ impl GpuStrands {
             rest,
             bonds,
             report,
+            measured,
             groups,
             records: None,
             words: Vec::new(),
@@ -117,7 +133,22 @@ impl GpuStrands {
         encoder: &mut CommandEncoder,
         substeps: &[SubstepRecord],
     ) {
-        if substeps.is_empty() || self.layout.strands() == 0 {
+        self.upload(device, queue, kernels, substeps);
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        for index in 0..substeps.len() {
+            self.dispatch(kernels, &mut pass, index);
+        }
+    }
+
+    /// Has the device take these substeps before the next submission.
+    pub(super) fn upload(
+        &mut self,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+        kernels: &HairKernels,
+        substeps: &[SubstepRecord],
+    ) {
+        if substeps.is_empty() {
             return;
         }
         self.words.clear();
@@ -142,15 +173,47 @@ impl GpuStrands {
             let group = device.create_bind_group("hair substeps", &kernels.record, &entries);
             self.records = Some((buffer, group));
         }
-        let Some((buffer, records)) = &self.records else { return };
-        queue.write_buffer(buffer, 0, bytes);
-        let mut pass = encoder.begin_compute_pass(&Default::default());
+        if let Some((buffer, _)) = &self.records {
+            queue.write_buffer(buffer, 0, bytes);
+        }
+    }
+
+    /// One of the uploaded substeps.
+    pub(super) fn dispatch(
+        &mut self,
+        kernels: &HairKernels,
+        pass: &mut ComputePass<'_>,
+        index: usize,
+    ) {
+        let Some((_, records)) = self.records.as_ref().filter(|_| self.layout.strands() > 0) else {
+            return;
+        };
         pass.set_pipeline(&kernels.substep);
-        for index in 0..substeps.len() {
-            pass.set_bind_group(0, &self.groups[self.present], &[]);
-            pass.set_bind_group(1, records, &[(4 * WORDS * index) as u32]);
+        pass.set_bind_group(0, &self.groups[self.present], &[]);
+        pass.set_bind_group(1, records, &[(4 * WORDS * index) as u32]);
+        pass.dispatch_workgroups(self.layout.blocks().len() as u32, 1, 1);
+        self.present = 1 - self.present;
+    }
+
+    /// Measures the present state; what the report held of
+    /// another has to be cleared before.
+    pub(super) fn measure(&self, kernels: &HairKernels, pass: &mut ComputePass<'_>) {
+        if self.layout.strands() > 0 {
+            pass.set_pipeline(&kernels.measure);
+            pass.set_bind_group(0, &self.measured[self.present], &[]);
             pass.dispatch_workgroups(self.layout.blocks().len() as u32, 1, 1);
-            self.present = 1 - self.present;
+        }
+    }
+
+    /// Copies the present state: pose, motion and bonds, one after the other.
+    pub(super) fn copy_state(&self, encoder: &mut CommandEncoder, to: &Buffer) {
+        let mut at = 0;
+        let parts =
+            [(&self.poses[self.present], POSE), (&self.motion, MOTION), (&self.bonds, BONDS)];
+        for (buffer, parts) in parts {
+            let size = 16 * self.layout.vectors(parts) as u64;
+            encoder.copy_buffer_to_buffer(buffer, 0, to, at, size);
+            at += size;
         }
     }
 
@@ -170,13 +233,21 @@ impl GpuStrands {
     /// Waits for the device and reads all strands back; `None` if it does not answer, as after a
     /// device loss.
     pub fn read(&self, device: &RenderDevice, queue: &RenderQueue) -> Option<Vec<StrandState>> {
+        let contents = self.read_contents(device, queue)?;
+        Some((0..self.layout.strands()).map(|strand| contents.get(&self.layout, strand)).collect())
+    }
+
+    /// The same as it lies there.
+    pub(super) fn read_contents(
+        &self,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+    ) -> Option<Contents> {
         let layout = &self.layout;
         let pose = read_back(device, queue, &self.poses[self.present], layout.vectors(POSE))?;
         let motion = read_back(device, queue, &self.motion, layout.vectors(MOTION))?;
         let bonds = read_back(device, queue, &self.bonds, layout.vectors(BONDS))?;
-        let rest = Vec::new();
-        let contents = Contents { pose, motion, rest, bonds };
-        Some((0..layout.strands()).map(|strand| contents.get(layout, strand)).collect())
+        Some(Contents { pose, motion, rest: Vec::new(), bonds })
     }
 
     /// Waits for the device, and reads and resets the report.
@@ -209,16 +280,30 @@ fn read_back(
     encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
     queue.submit([encoder.finish()]);
     let (send, receive) = std::sync::mpsc::channel();
-    device.map_buffer(&staging.slice(..), MapMode::Read, move |mapped| {
+    read_mapped(device, &staging, move |bytes| {
         // The receiver is gone if the device did not answer in time.
-        let _ = send.send(mapped.is_ok());
+        let _ = send.send(bytes);
     });
     device.poll(PollType::wait_indefinitely()).ok()?;
-    if !receive.recv().ok()? {
-        return None;
-    }
-    let bytes = staging.slice(..).get_mapped_range();
+    let bytes = receive.recv().ok()??;
     let numbers = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let numbers: Vec<f32> = numbers.collect();
     Some(numbers.as_chunks::<4>().0.to_vec())
+}
+
+/// Has a buffer mapped and read, all in one: in between the device may be lost, and the mapped bytes with
+/// it. `None` where it is.
+pub(super) fn read_mapped(
+    device: &RenderDevice,
+    buffer: &Buffer,
+    done: impl FnOnce(Option<Vec<u8>>) + Send + 'static,
+) {
+    let mapped = buffer.clone();
+    device.map_buffer(&buffer.slice(..), MapMode::Read, move |result| {
+        done(result.is_ok().then(|| {
+            let bytes = mapped.slice(..).get_mapped_range().to_vec();
+            mapped.unmap();
+            bytes
+        }));
+    });
 }

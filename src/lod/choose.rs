@@ -9,7 +9,9 @@ use crate::{
     grid::KdTree,
     parallel::{Nanos, for_each},
     setting::Settings,
-    strand::{Hair, HeldNodes, PerHair, Strand, StrandModel, StrandOf, StrandSleep, Strands},
+    strand::{
+        Hair, HeldNodes, OnGpu, PerHair, Strand, StrandModel, StrandOf, StrandSleep, Strands,
+    },
 };
 use bevy::{
     ecs::{
@@ -143,7 +145,10 @@ struct GroupStrand<'a> {
 /// At the start of a tick: which strands are simulated, and which guides each other one follows.
 pub(crate) fn choose_guides(
     models: Settings<StrandModel>,
-    touched: Query<&StrandOf, Or<(Changed<Strand>, Changed<HeldNodes>, Changed<StrandOf>)>>,
+    touched: Query<
+        &StrandOf,
+        (Or<(Changed<Strand>, Changed<HeldNodes>, Changed<StrandOf>)>, Without<OnGpu>),
+    >,
     mut released: RemovedComponents<HeldNodes>,
     (mut enabled, mut forgotten): (RemovedComponents<Disabled>, RemovedComponents<Follower>),
     mut hairs: Query<(Entity, &Strands, &mut PresentLod, &mut Guides), With<Hair>>,

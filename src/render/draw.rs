@@ -4,6 +4,7 @@ use super::{
     HairFollowers, HairView, WetLook,
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     drawn_strand::{DrawnStrand, GuideRoot},
+    elsewhere::DrawnElsewhere,
     follower_roots::FollowerRoots,
     material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
     scatter::scatter,
@@ -35,6 +36,8 @@ pub(super) struct Packed {
     followers: Option<HairFollowers>,
     /// Whether roots have moved since followers were laid out.
     roots_moved: bool,
+    /// Whether the nodes here are not those that were drawn in the frame before.
+    is_stale: bool,
     thickness: Thickness,
     /// How far apart guides grow (m).
     spacing: f32,
@@ -95,6 +98,7 @@ pub(super) fn pack(
             Option<&Strands>,
             Option<Ref<FollowerRoots>>,
             &GlobalTransform,
+            Option<&mut DrawnElsewhere>,
         ),
         Without<Settling>,
     >,
@@ -115,16 +119,34 @@ pub(super) fn pack(
     };
     let new_device = device.is_some_and(|device| device.is_changed());
     let roots_removed: Vec<Entity> = roots_removed.read().collect();
-    for (hair, mut packed, buffers, members, follower_roots, place) in &mut hairs {
+    for (hair, mut packed, buffers, members, follower_roots, place, elsewhere) in &mut hairs {
         let packed = packed.bypass_change_detection();
         let guides = || members.into_iter().flat_map(|m| m.iter());
         let settings = followers.of(hair);
-        let mut has_new_layout = packed.update_layout(guides(), &strands, &settings);
+        // What is drawn elsewhere keeps its guides: hair whose strands change comes back first.
+        let elsewhere = elsewhere.map(|mut drawn| {
+            let drawn = drawn.bypass_change_detection();
+            drawn.overstep = if drawn.rests { 1.0 } else { overstep };
+            (drawn.low, drawn.high)
+        });
+        let elsewhere = elsewhere.filter(|_| buffers.is_some() && !packed.layout.is_empty());
+        let mut has_new_layout = packed.update_followers(&settings);
+        if elsewhere.is_none() {
+            has_new_layout |= packed.update_layout(guides(), &strands);
+        }
         has_new_layout |=
             follower_roots.as_ref().map_or(roots_removed.contains(&hair), Ref::is_changed);
 
-        let bounds = packed.pack_nodes(&strands, overstep, !has_new_layout);
-        let (low, high) = bounds.unwrap_or_default();
+        let (low, high) = match elsewhere {
+            Some(corners) => {
+                packed.is_stale = true;
+                corners
+            }
+            None => {
+                let known = !has_new_layout && !core::mem::take(&mut packed.is_stale);
+                packed.pack_nodes(&strands, overstep, known).unwrap_or_default()
+            }
+        };
         let around = |margin: f32| Aabb::from_min_max(low - margin, high + margin);
         let (look, dye) = (looks.of(hair), dyes.of(hair));
         let view = views.of(hair);
@@ -239,12 +261,11 @@ impl Packed {
         bytemuck::cast_slice(&words).to_vec()
     }
 
-    /// Updates the list of guides; returns whether it, or the settings of followers, have changed.
+    /// Updates the list of guides; returns whether it has changed.
     fn update_layout(
         &mut self,
         members: impl Iterator<Item = Entity>,
         strands: &Query<GuideParts>,
-        followers: &HairFollowers,
     ) -> bool {
         let mut count = 0;
         let mut changed = false;
@@ -273,6 +294,11 @@ impl Packed {
             self.roots.clear();
             changed = true;
         }
+        changed | core::mem::take(&mut self.roots_moved)
+    }
+
+    /// Updates the settings of followers; returns whether they have changed.
+    fn update_followers(&mut self, followers: &HairFollowers) -> bool {
         // Settings that the shader reads from the uniform do not change the strands.
         let grown = |f: &HairFollowers| HairFollowers {
             clump: 0.0,
@@ -282,9 +308,9 @@ impl Packed {
             frizz: 0.0,
             ..*f
         };
-        changed |= self.followers.as_ref().map(grown) != Some(grown(followers));
+        let changed = self.followers.as_ref().map(grown) != Some(grown(followers));
         self.followers = Some(*followers);
-        changed | core::mem::take(&mut self.roots_moved)
+        changed
     }
 
     /// Packs the nodes of all guides; `known` if those of the previous frame are present. Returns the box

@@ -24,6 +24,7 @@ mod beads;
 mod buffers;
 mod draw;
 mod drawn_strand;
+mod elsewhere;
 mod follower_roots;
 mod followers;
 mod locks;
@@ -39,6 +40,8 @@ mod wet_look;
 pub use beads::{Bead, HairBeadSystems, HairBeads};
 pub use buffers::HairBuffers;
 pub use drawn_strand::{DrawnStrand, LockOffset};
+#[cfg(feature = "gpu")]
+pub(crate) use elsewhere::DrawnElsewhere;
 pub use follower_roots::{FollowerRoot, FollowerRoots};
 pub use followers::HairFollowers;
 pub use sets::HairRenderSystems;

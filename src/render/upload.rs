@@ -1,6 +1,8 @@
 //! The single write a frame: packed nodes into the existing GPU buffer.
 
-use super::{buffers::HairBuffers, draw::Packed, sets::HairRenderSystems};
+use super::{
+    buffers::HairBuffers, draw::Packed, elsewhere::DrawnElsewhere, sets::HairRenderSystems,
+};
 use bevy::{
     prelude::*,
     render::{
@@ -18,7 +20,7 @@ pub(super) fn plugin(app: &mut App) {
 /// Runs in extraction, after the previous frame was submitted, so that nodes and transforms of the same
 /// frame are drawn together. A buffer created in this frame is uploaded with its contents instead.
 fn upload(
-    hairs: Extract<Query<(&HairBuffers, &Packed)>>,
+    hairs: Extract<Query<(&HairBuffers, &Packed), Without<DrawnElsewhere>>>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
     queue: Option<Res<RenderQueue>>,
 ) {

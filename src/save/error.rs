@@ -15,6 +15,14 @@ pub enum HairdoError {
         /// What was named.
         entity: Entity,
     },
+    /// The hair is simulated on the graphics device.
+    #[error(
+        "{entity} is simulated on the graphics device: request it by TakeHairdo, HairdoTaken answers"
+    )]
+    OnGpu {
+        /// The hair.
+        entity: Entity,
+    },
     /// The bytes do not begin with a hairdo's magic number.
     #[error("these bytes are not a hairdo: use bytes from Hairdo::to_bytes")]
     NotAHairdo,

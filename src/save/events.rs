@@ -1,6 +1,8 @@
 //! Hairdos for systems: requests and answers by events.
 
 use super::{Hairdo, HairdoError, put_on::report};
+#[cfg(feature = "gpu")]
+use crate::strand::{AskForStrands, OnGpu, StrandsArrived};
 use bevy::prelude::*;
 
 /// Requests the hairdo of a [`Hair`](crate::Hair). Answered by [`HairdoTaken`] on the
@@ -37,7 +39,7 @@ pub struct TakeHairdo {
 pub struct HairdoTaken {
     /// The hair.
     pub entity: Entity,
-    /// Its hairdo at the moment of the request.
+    /// Its hairdo at the moment of the request; of hair on the graphics device a few frames later.
     pub hairdo: Hairdo,
 }
 
@@ -74,10 +76,40 @@ pub struct HairdoRefused {
 
 pub(super) fn take(request: On<TakeHairdo>, mut commands: Commands) {
     let hair = request.entity;
-    commands.queue(move |world: &mut World| match Hairdo::of(world, hair) {
+    commands.queue(move |world: &mut World| {
+        #[cfg(feature = "gpu")]
+        if world.get::<OnGpu>(hair).is_some() {
+            world.entity_mut(hair).insert(Awaited);
+            world.trigger(AskForStrands { entity: hair });
+            return;
+        }
+        answer(world, hair);
+    });
+}
+
+fn answer(world: &mut World, hair: Entity) {
+    match Hairdo::of_strands(world, hair) {
         Ok(hairdo) => world.trigger(HairdoTaken { entity: hair, hairdo }),
         Err(error) => refuse(world, hair, error),
-    });
+    }
+}
+
+/// Somebody waits for the hairdo of hair that is on the graphics device.
+#[cfg(feature = "gpu")]
+#[derive(Component)]
+pub(super) struct Awaited;
+
+#[cfg(feature = "gpu")]
+pub(super) fn answer_arrived(
+    arrived: On<StrandsArrived>,
+    awaited: Query<(), With<Awaited>>,
+    mut commands: Commands,
+) {
+    let hair = arrived.entity;
+    if awaited.contains(hair) {
+        commands.entity(hair).remove::<Awaited>();
+        commands.queue(move |world: &mut World| answer(world, hair));
+    }
 }
 
 pub(super) fn put_on(request: On<PutOnHairdo>, mut commands: Commands) {

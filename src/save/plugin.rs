@@ -19,5 +19,7 @@ impl Plugin for SavePlugin {
             .register_type::<events::HairdoRefused>()
             .add_observer(events::take)
             .add_observer(events::put_on);
+        #[cfg(feature = "gpu")]
+        app.add_observer(events::answer_arrived);
     }
 }

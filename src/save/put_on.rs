@@ -7,7 +7,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     look::{HairDye, HairLook, WornPreset},
     setting::{HairDefault, HairSetting, Ranged},
-    strand::{AddedMass, Hair, HeldNodes, Strand, StrandHistory, Strands},
+    strand::{AddedMass, Hair, HeldNodes, OnGpu, Strand, StrandHistory, Strands, bring_home},
     treatment::{Treatments, WindingProgress, WoundOn},
     water::{HairWetting, Moisture, WaterLedger},
 };
@@ -17,8 +17,17 @@ impl Hairdo {
     /// The present hairdo of a [`Hair`], a snapshot of its pose even in motion.
     ///
     /// # Errors
-    /// When `hair` is no hair, or a strand has fewer than two nodes or invalid numbers.
+    /// When `hair` is no hair, is on the graphics device, or a strand has fewer than two nodes or
+    /// invalid numbers.
     pub fn of(world: &World, hair: Entity) -> Result<Self, HairdoError> {
+        if world.get::<OnGpu>(hair).is_some() {
+            return Err(HairdoError::OnGpu { entity: hair });
+        }
+        Self::of_strands(world, hair)
+    }
+
+    /// Of what its strands hold, wherever it is simulated.
+    pub(super) fn of_strands(world: &World, hair: Entity) -> Result<Self, HairdoError> {
         let strands = members(world, hair)?
             .into_iter()
             .filter_map(|member| {
@@ -48,6 +57,7 @@ impl Hairdo {
     /// # Errors
     /// When `hair` is no hair, or its strands do not match the hairdo's.
     pub fn apply(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
+        bring_home(world, hair);
         let mut members = members(world, hair)?;
         members.retain(|member| world.get::<Strand>(*member).is_some());
         let nodes = members.iter().map(|m| world.get::<Strand>(*m).map_or(0, Strand::nodes));

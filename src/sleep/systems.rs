@@ -17,8 +17,8 @@ use crate::{
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
     strand::{
-        AddedMass, Hair, HeldNodes, Pose, SleepPose, Sleepers, Strand, StrandModel, StrandOf,
-        StrandSleep, Strands, TickPose,
+        AddedMass, Hair, HeldNodes, OnGpu, Pose, SleepPose, Sleepers, Strand, StrandModel,
+        StrandOf, StrandSleep, Strands, TickPose,
     },
     treatment::Treatments,
     water::Moisture,
@@ -229,16 +229,19 @@ fn update_sleep(
             Option<&Strands>,
             Option<&HairReach>,
         ),
-        With<Hair>,
+        (With<Hair>, Without<OnGpu>),
     >,
-    mut strands: Query<(
-        &StrandOf,
-        &mut Strand,
-        &mut StrandSleep,
-        &mut SleepPose,
-        (Ref<Bonds>, &BondChanges, &AddedMass),
-        (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
-    )>,
+    mut strands: Query<
+        (
+            &StrandOf,
+            &mut Strand,
+            &mut StrandSleep,
+            &mut SleepPose,
+            (Ref<Bonds>, &BondChanges, &AddedMass),
+            (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
+        ),
+        Without<OnGpu>,
+    >,
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();

@@ -17,7 +17,7 @@ use crate::{
     rod::{block::BlockLanes, obstacle::Obstacle, step::weigh},
     schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
+    strand::{AddedMass, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
 };
 use bevy::prelude::*;
 use fearless_simd::Level;
@@ -101,14 +101,10 @@ fn step_springs(
     contact: Settings<LockContact>,
     gravity: Res<HairGravity>,
     hairs: Query<(Option<&Obstacles>, &TickPose)>,
-    mut strands: Query<(
-        Entity,
-        &StrandOf,
-        &StrandSleep,
-        &mut Strand,
-        &AddedMass,
-        Option<&HeldNodes>,
-    )>,
+    mut strands: Query<
+        (Entity, &StrandOf, &StrandSleep, &mut Strand, &AddedMass, Option<&HeldNodes>),
+        Without<OnGpu>,
+    >,
     mut faults: MessageWriter<HairFault>,
 ) {
     let gravity = gravity.clamped().0;

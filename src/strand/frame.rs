@@ -29,6 +29,8 @@ pub struct TickPose {
     /// The shares of the frame's translation and rotation that act on its hair as inertia.
     inertia: Vec2,
     jumps: bool,
+    /// Whether this tick is one of a teleport.
+    jumped: bool,
     was_invalid: bool,
     frames: FramePoses,
 }
@@ -90,6 +92,7 @@ impl Default for TickPose {
             shares: [0.0; 2],
             inertia: Vec2::ONE,
             jumps: false,
+            jumped: false,
             was_invalid: false,
             frames: FramePoses::default(),
         }
@@ -292,7 +295,14 @@ impl TickPose {
         }
         self.from = from;
         self.shares[1] = 0.0;
+        self.jumped = put;
         (put, report)
+    }
+
+    /// Whether it was teleported at the beginning of this tick.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn has_jumped(&self) -> bool {
+        self.jumped
     }
 
     /// The displacement of the entity in this tick (m).

@@ -11,6 +11,7 @@
 
 pub mod frame;
 mod held;
+mod on_gpu;
 mod per_hair;
 mod repair;
 mod required;
@@ -21,6 +22,10 @@ mod teleport;
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
+pub use on_gpu::OnGpu;
+pub(crate) use on_gpu::bring_home;
+#[cfg(feature = "gpu")]
+pub(crate) use on_gpu::{AskForStrands, BringHome, StrandsArrived};
 pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
 pub use strand_sleep::{SleepPose, Sleepers, StrandSleep};

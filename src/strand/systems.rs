@@ -1,8 +1,8 @@
 //! Strands in the tick: poses of the scalp, and inertia of the nodes.
 
 use super::{
-    AddedMass, Hair, HeldNodes, HeldNodesState, PerHair, SleepPose, Sleepers, Strand, StrandError,
-    StrandHistory, StrandModel, StrandOf, StrandSleep, Strands, TickPose,
+    AddedMass, Hair, HeldNodes, HeldNodesState, OnGpu, PerHair, SleepPose, Sleepers, Strand,
+    StrandError, StrandHistory, StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     frame::{HairInertia, Pose},
     held::report_out_of_reach,
     keep_required,
@@ -47,6 +47,7 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandSleep>()
             .register_type::<Sleepers>()
             .register_type::<SleepPose>()
+            .register_type::<OnGpu>()
             .add_systems(HairChecks, report_unusable)
             .add_systems(PreUpdate, record_frame)
             .add_systems(
@@ -94,9 +95,15 @@ fn report_unusable(
 /// detection. Runs in every substep, because systems of game code within the tick may write as
 /// well; without writes it only scans change ticks.
 fn repair_strands(
-    mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Allow<Disabled>)>,
-    mut loads: Query<(Entity, &mut AddedMass), (Changed<AddedMass>, Allow<Disabled>)>,
-    mut histories: Query<(Entity, &mut StrandHistory), (Changed<StrandHistory>, Allow<Disabled>)>,
+    mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Without<OnGpu>, Allow<Disabled>)>,
+    mut loads: Query<
+        (Entity, &mut AddedMass),
+        (Changed<AddedMass>, Without<OnGpu>, Allow<Disabled>),
+    >,
+    mut histories: Query<
+        (Entity, &mut StrandHistory),
+        (Changed<StrandHistory>, Without<OnGpu>, Allow<Disabled>),
+    >,
     mut faults: MessageWriter<HairFault>,
 ) {
     // Also of sleeping strands, whose history is not written again.
@@ -114,7 +121,7 @@ fn repair_strands(
 /// Before the first substep of a tick: the present positions become history.
 fn store_history(
     step: Res<HairStep>,
-    mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory)>,
+    mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory), Without<OnGpu>>,
 ) {
     if step.index > 0 {
         return;
@@ -218,7 +225,7 @@ fn advance_poses(
 fn apply_frame_inertia(
     substeps: EffectiveSubsteps,
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand)>,
+    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand), Without<OnGpu>>,
 ) {
     if !substeps.any() || hairs.iter().all(|hair| hair.frame_delta().is_none()) {
         return;

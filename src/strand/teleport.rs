@@ -1,6 +1,6 @@
 //! Teleporting a character with its hair.
 
-use super::{Hair, Strand, StrandHistory, Strands, TickPose};
+use super::{Hair, OnGpu, Strand, StrandHistory, Strands, TickPose};
 use bevy::prelude::*;
 
 impl Hair {
@@ -21,8 +21,9 @@ impl Hair {
     /// ```
     pub fn teleport(mut hair: EntityWorldMut<'_>) {
         let id = hair.id();
-        let members: Vec<Entity> =
-            hair.get::<Strands>().into_iter().flat_map(Strands::iter).collect();
+        // On the graphics device they come to rest in the next tick.
+        let members = hair.get::<Strands>().filter(|_| !hair.contains::<OnGpu>());
+        let members: Vec<Entity> = members.into_iter().flat_map(Strands::iter).collect();
         hair.world_scope(|world| {
             for strand in members {
                 // User code may have listed an entity that does not exist.

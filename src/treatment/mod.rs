@@ -165,6 +165,12 @@ impl Treatments {
     pub fn acting(&self) -> &[HairTreatment] {
         &self.acting
     }
+
+    /// The treatments, for those that hand hair over.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn acting_mut(&mut self) -> &mut Vec<HairTreatment> {
+        &mut self.acting
+    }
 }
 
 setting! {

@@ -10,7 +10,7 @@ use crate::{
     parallel::{Nanos, for_each},
     schedule::{HairProcessTime, HairStep, HairSystems, HairTick},
     setting::{self, Ranged, report},
-    strand::{HeldNodes, Strand, StrandOf, Strands, TickPose, keep_required},
+    strand::{HeldNodes, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required},
 };
 use bevy::prelude::*;
 
@@ -42,7 +42,8 @@ impl Plugin for TreatmentPlugin {
 fn begin_treatments(
     mut requests: MessageReader<HairTreatment>,
     hairs: Query<&Strands>,
-    mut strands: Query<&mut Treatments, With<StrandOf>>,
+    mut strands: Query<&mut Treatments, (With<StrandOf>, Without<OnGpu>)>,
+    on_gpu: Query<(), With<OnGpu>>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for request in requests.read() {
@@ -55,7 +56,7 @@ fn begin_treatments(
             }
         } else if let Ok(mut treatments) = strands.get_mut(entity) {
             treatments.acting.push(treat);
-        } else {
+        } else if !on_gpu.contains(entity) {
             let message = "the treatment's target is neither a Hair nor a strand";
             faults.write(HairFault::new(FaultKind::NoTarget, message).of(entity));
         }
@@ -66,7 +67,7 @@ fn begin_treatments(
 fn apply_treatments(
     step: Res<HairStep>,
     process: Res<HairProcessTime>,
-    mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments)>,
+    mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments), Without<OnGpu>>,
 ) {
     let dt = step.dt * process.clamped().0;
     let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();

@@ -5,7 +5,7 @@ use crate::{
     contact::{Bridged, Film, LockContact, LockNeighbours},
     schedule::EffectiveSubsteps,
     setting::Settings,
-    strand::{AddedMass, Hair, Sleepers, Strand, StrandOf, StrandSleep, Strands},
+    strand::{AddedMass, Hair, OnGpu, Sleepers, Strand, StrandOf, StrandSleep, Strands},
 };
 use bevy::prelude::*;
 
@@ -29,7 +29,7 @@ pub struct HairDried {
 }
 
 pub(super) fn update_is_wet(
-    mut hairs: Query<(Entity, &Strands, &mut IsWet), With<Hair>>,
+    mut hairs: Query<(Entity, &Strands, &mut IsWet), (With<Hair>, Without<OnGpu>)>,
     strands: Query<&Moisture>,
     mut commands: Commands,
 ) {

@@ -16,7 +16,7 @@ use crate::{
     parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
     schedule::HairStep,
     setting::{Ranged, Settings},
-    strand::{AddedMass, Hair, PerHair, Pose, Strand, StrandOf, TickPose},
+    strand::{AddedMass, Hair, OnGpu, PerHair, Pose, Strand, StrandOf, TickPose},
 };
 use crate::{environment::vapour::WATER, schedule::HairProcessTime};
 use bevy::prelude::*;
@@ -87,7 +87,10 @@ pub(super) fn wet_strands(
     wetting: Settings<HairWetting>,
     mut scratch: ResMut<WaterField>,
     mut hairs: Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
-    mut strands: Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
+    mut strands: Query<
+        (Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture),
+        Without<OnGpu>,
+    >,
     mut droplets: Query<&mut Droplet>,
     mut ledger: ResMut<WaterLedger>,
 ) {
@@ -188,7 +191,10 @@ pub(super) fn wet_strands(
 fn wet_hairs<'a>(
     hairs: &mut Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
     wetting: &Settings<HairWetting>,
-    strands: &'a mut Query<(Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture)>,
+    strands: &'a mut Query<
+        (Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture),
+        Without<OnGpu>,
+    >,
     resort: bool,
     buffers: &mut Vec<Buffers>,
 ) -> Vec<WetHair<'a>> {

@@ -15,7 +15,7 @@ use crate::{
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings, report},
-    strand::{AddedMass, Hair, InWater, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
+    strand::{AddedMass, Hair, InWater, OnGpu, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -25,7 +25,10 @@ const EXCHANGE: Nanos = Nanos(500);
 /// Repairs moisture of new strands and moisture written from outside, for instance by an inspector. Our
 /// own writes bypass change detection.
 pub(super) fn repair_moistures(
-    mut moistures: Query<(Entity, &mut Moisture), (Changed<Moisture>, Allow<Disabled>)>,
+    mut moistures: Query<
+        (Entity, &mut Moisture),
+        (Changed<Moisture>, Without<OnGpu>, Allow<Disabled>),
+    >,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -113,15 +116,11 @@ pub(super) fn exchange_water(
     wetting: Settings<HairWetting>,
     hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
     winds: Winds,
-    mut strands: Query<(
-        &StrandOf,
-        &Strand,
-        &Bonds,
-        &BlownAir,
-        &mut Moisture,
-        &mut AddedMass,
-        &mut BondChanges,
-    )>,
+    mut strands: Query<
+        (&StrandOf, &Strand, &Bonds, &BlownAir, &mut Moisture, &mut AddedMass, &mut BondChanges),
+        Without<OnGpu>,
+    >,
+    on_gpu: Query<(), With<OnGpu>>,
     mut soaks: MessageReader<SoakHair>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
@@ -131,6 +130,8 @@ pub(super) fn exchange_water(
         let members = match hairs.get(soak.target) {
             Ok((_, members)) => members.map(|m| m.collection().to_vec()).unwrap_or_default(),
             Err(_) if strands.contains(soak.target) => vec![soak.target],
+            // It is soaked when it is back.
+            Err(_) if on_gpu.contains(soak.target) => continue,
             Err(_) => {
                 let message = "the target of SoakHair is neither a Hair nor a strand";
                 faults.write(HairFault::new(FaultKind::NoTarget, message).of(soak.target));

@@ -13,7 +13,7 @@ use crate::{
     parallel::{Nanos, for_each_part, tables},
     schedule::EffectiveSubsteps,
     setting::{Ranged, Settings},
-    strand::{AddedMass, Hair, InWater, PerHair, Strand, StrandOf, StrandSleep, TickPose},
+    strand::{AddedMass, Hair, InWater, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose},
 };
 use bevy::prelude::*;
 
@@ -46,7 +46,10 @@ pub(super) fn submerge(
     wetting: Settings<HairWetting>,
     volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture)>,
+    mut strands: Query<
+        (&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture),
+        Without<OnGpu>,
+    >,
     mut ledger: ResMut<WaterLedger>,
     mut had_volumes: Local<bool>,
 ) {

@@ -4,14 +4,14 @@ use crate::{common::*, lab::Device};
 use bevy::prelude::*;
 use bevy_keratin::{
     SolverMethod,
-    gpu::{GpuJournal, GpuJournalPlugin, GpuStrands, StrandState, StrandView},
+    gpu::{GpuJournal, GpuStrands, HairResidence, StrandState, StrandView, Unsupported, WhyCpu},
     prelude::*,
+    strand::StrandHistory,
 };
 
 /// Strands on a ball, over a floor, in wind and before a blower; a second ball goes by.
 fn scene() -> (App, Entity, Entity) {
     let mut app = test_app(60.0);
-    GpuJournalPlugin.build(&mut app);
     app.insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }))
         .insert_resource(HairDefault(HairSleep::never()))
         .insert_resource(HairWind { velocity: Vec3::new(0.6, 0.0, 0.2), gusts: 0.0, ..default() });
@@ -51,7 +51,11 @@ fn members(app: &App, hair: Entity) -> Vec<Entity> {
 fn hand_over(device: &Device, app: &App, members: &[Entity]) -> GpuStrands {
     let world = app.world();
     let view = |e: &Entity| {
-        StrandView::of(world.get::<Strand>(*e).unwrap(), world.get::<Bonds>(*e).unwrap())
+        StrandView::of(
+            world.get::<Strand>(*e).unwrap(),
+            world.get::<Bonds>(*e).unwrap(),
+            world.get::<StrandHistory>(*e).unwrap(),
+        )
     };
     let views: Vec<StrandView<'_>> = members.iter().map(view).collect();
     GpuStrands::new(&device.device, &device.kernels, &views)
@@ -92,7 +96,7 @@ fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
         journal.records.clear();
         tick(&mut app, hair, passing, start);
         let journal = app.world().get::<GpuJournal>(hair).unwrap();
-        assert_eq!((journal.records.len(), journal.missing), (3, None));
+        assert_eq!(journal.records.len(), 3);
         assert!(journal.records.iter().all(|r| r.carry.is_some() && !r.blowers.is_empty()));
         let states = device.run(&mut on, &journal.records);
         let (moved, dried) = apart(&app, &members, &before);
@@ -113,34 +117,60 @@ fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
     }
 }
 
+/// An app without a graphics device says so once nothing else keeps hair from it.
 #[test]
-fn what_a_record_cannot_hold_is_reported() {
+fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
     let reported = |change: fn(&mut App, Entity)| {
         let (mut app, hair, passing) = scene();
+        app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);
         change(&mut app, hair);
-        tick(&mut app, hair, passing, 0);
-        app.world().get::<GpuJournal>(hair).unwrap().missing
+        // What is near is seen a tick later.
+        (0..2).for_each(|number| tick(&mut app, hair, passing, number));
+        match app.world().get::<HairResidence>(hair) {
+            Some(HairResidence::Cpu(WhyCpu::Unsupported(what))) => Some(*what),
+            Some(HairResidence::Cpu(WhyCpu::NoRenderer)) => None,
+            other => panic!("{other:?}"),
+        }
     };
     assert_eq!(reported(|_, _| ()), None);
     let contact = reported(|app, hair| {
         app.world_mut().entity_mut(hair).insert(LockContact::default());
     });
-    assert_eq!(contact, Some("contact between strands"));
+    assert_eq!(contact, Some(Unsupported::StrandContact));
     let sweeps = reported(|app, hair| {
         let sweeps = HairSolver { method: SolverMethod::Sweeps, ..default() };
         app.world_mut().entity_mut(hair).insert(sweeps);
     });
-    assert_eq!(sweeps, Some("the paper's projections"));
+    assert_eq!(sweeps, Some(Unsupported::Sweeps));
     let springs = reported(|app, hair| {
         app.world_mut().entity_mut(hair).insert(StrandModel::MassSpring);
     });
-    assert_eq!(springs, Some("springs"));
+    assert_eq!(springs, Some(Unsupported::Springs));
     let gusts = reported(|app, _| app.world_mut().resource_mut::<HairWind>().gusts = 0.5);
-    assert_eq!(gusts, Some("gusts or wind zones"));
+    assert_eq!(gusts, Some(Unsupported::UnsteadyWind));
     let blowers = reported(|app, _| {
         for _ in 0..4 {
             app.world_mut().spawn(Blower::default());
         }
     });
-    assert_eq!(blowers, Some("more blowers than four"));
+    assert_eq!(blowers, Some(Unsupported::Blowers));
+    let boxes = reported(|app, hair| {
+        let cuboid = HairCollider::cuboid(Vec3::splat(0.1)).unwrap();
+        app.world_mut().spawn((cuboid, Transform::default(), ChildOf(hair)));
+    });
+    assert_eq!(boxes, Some(Unsupported::ColliderShape));
+    let water = reported(|app, _| {
+        app.world_mut().spawn(Droplet::new(Vec3::Y * 9.0, 1e-9).unwrap());
+    });
+    assert_eq!(water, Some(Unsupported::Water));
+    let held = reported(|app, hair| {
+        let strand = members(app, hair)[3];
+        let targets = vec![None, Some(Vec3::X)];
+        app.world_mut().entity_mut(strand).insert(HeldNodes { targets });
+    });
+    assert_eq!(held, Some(Unsupported::HeldNodes));
+    let settles = reported(|app, hair| {
+        app.world_mut().entity_mut(hair).insert(Settling::default());
+    });
+    assert_eq!(settles, Some(Unsupported::Settling));
 }

@@ -113,6 +113,7 @@ impl LabStrand {
             lengths: &self.lengths,
             tensions: &self.tensions,
             joints: &self.joints,
+            before: &[],
         }
     }
 

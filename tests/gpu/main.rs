@@ -10,7 +10,11 @@ mod twin;
 
 mod bits;
 mod closed_forms;
+mod cost;
 mod journal;
 mod layout;
+mod pictures;
 mod present;
+mod residence;
+mod stage;
 mod substep;

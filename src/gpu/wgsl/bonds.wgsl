@@ -78,6 +78,11 @@ fn remember() {
         let drying = motion[slot(i, 1u, 2u)].w;
         let rates = vec4(bond(i, 0u).w, bond(i, 1u).w, bond(i, 2u).w, bond(i, 3u).w);
         var asked = fma(rates, -record.share, record.change);
+        for (var t = 0u; t < record.treatments; t++) {
+            if record.treatment[t].from_joint <= i && i < record.treatment[t].to_joint {
+                asked += fma(rates, -record.treatment[t].share, record.treatment[t].change);
+            }
+        }
         asked.x += drying;
         // Peptide bonds are never cut.
         asked.w = max(asked.w, 0.0);

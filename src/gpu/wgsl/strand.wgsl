@@ -35,6 +35,16 @@ struct Blower {
     drying: f32,
 }
 
+struct Treatment {
+    // As those of the whole hair.
+    change: vec4<f32>,
+    share: vec4<f32>,
+    // From this joint on, up to that one.
+    from_joint: u32,
+    to_joint: u32,
+    unused: vec2<u32>,
+}
+
 struct Substep {
     // Gravity in the hair's frame (m/s²), length (s).
     gravity: vec3<f32>,
@@ -59,6 +69,11 @@ struct Substep {
     blowers: u32,
     obstacles: u32,
     blower: array<Blower, 4>,
+    treatments: u32,
+    unused_1: u32,
+    unused_2: u32,
+    unused_3: u32,
+    treatment: array<Treatment, 8>,
     obstacle: array<Obstacle, MOST_OBSTACLES>,
 }
 

@@ -1,0 +1,113 @@
+//! A frame on the graphics device, in the render world: what the ticks have written down is run, before any
+//! camera draws, and the nodes go into the buffers that drawing reads.
+
+use super::{compile::Compiled, hair::GpuHair, record::GpuJournal, shared::Link};
+use crate::render::{DrawnElsewhere, HairBuffers};
+use bevy::{
+    core_pipeline::schedule::camera_driver,
+    ecs::entity_disabling::Disabled,
+    prelude::*,
+    render::{
+        ExtractSchedule, MainWorld, RenderApp,
+        render_asset::RenderAssets,
+        renderer::{RenderDevice, RenderGraph, RenderGraphSystems, RenderQueue},
+        storage::{GpuShaderBuffer, ShaderBuffer},
+    },
+};
+
+pub(super) fn plugin(app: &mut App) {
+    if let Some(render) = app.get_sub_app_mut(RenderApp) {
+        render
+            .init_resource::<Extracted>()
+            .add_systems(ExtractSchedule, extract)
+            .add_systems(RenderGraph, run.in_set(RenderGraphSystems::Render).before(camera_driver));
+    }
+}
+
+/// The hair of this frame.
+#[derive(Resource, Default)]
+struct Extracted(Vec<Frame>);
+
+struct Frame {
+    link: Link,
+    nodes: Option<AssetId<ShaderBuffer>>,
+    overstep: f32,
+}
+
+/// Substeps and requests are taken here, between two frames, so that none is run before its frame.
+fn extract(
+    mut main: ResMut<MainWorld>,
+    mut extracted: ResMut<Extracted>,
+    compiled: Option<Res<Compiled>>,
+    device: Res<RenderDevice>,
+) {
+    extracted.0.clear();
+    if let Some(compiled) = compiled.filter(|_| device.is_changed()) {
+        compiled.renew();
+    }
+    let mut hairs = main.query_filtered::<(
+        &mut GpuHair,
+        Option<&mut GpuJournal>,
+        Option<&HairBuffers>,
+        Option<&DrawnElsewhere>,
+    ), Allow<Disabled>>();
+    for (mut hair, journal, buffers, drawn) in hairs.iter_mut(&mut main) {
+        let link = hair.link.clone();
+        let mut shared = link.lock();
+        if let Some(mut journal) = journal {
+            shared.pending.append(&mut journal.records);
+        }
+        if let Some(number) = hair.bypass_change_detection().take_request() {
+            shared.asked = Some(number);
+        }
+        drop(shared);
+        let nodes = buffers.zip(drawn).map(|(buffers, _)| buffers.nodes.id());
+        extracted.0.push(Frame {
+            link,
+            nodes,
+            overstep: drawn.map_or(1.0, |drawn| drawn.overstep),
+        });
+    }
+}
+
+/// All substeps of all hair, the outer loop over substeps: hairs share no buffer, so only it meets barriers.
+fn run(
+    extracted: Res<Extracted>,
+    compiled: Option<Res<Compiled>>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
+) {
+    if extracted.0.is_empty() {
+        return;
+    }
+    let hairs = extracted.0.iter().map(|frame| (frame.link.lock(), frame));
+    // What is left of a lost device belongs to nobody.
+    let present = compiled.map_or(0, |compiled| compiled.device());
+    let mut hairs: Vec<_> = hairs.filter(|(shared, _)| shared.is_on(present)).collect();
+    let counts: Vec<usize> = hairs.iter_mut().map(|(shared, _)| shared.upload()).collect();
+    let mut encoder = device.create_command_encoder(&default());
+    let most = counts.iter().copied().max().unwrap_or(0);
+    if most > 0 {
+        let mut pass = encoder.begin_compute_pass(&default());
+        for index in 0..most {
+            for ((shared, _), _) in hairs.iter_mut().zip(&counts).filter(|(_, n)| index < **n) {
+                let kernels = shared.kernels.clone();
+                shared.strands.dispatch(&kernels, &mut pass, index);
+            }
+        }
+        for ((shared, _), _) in hairs.iter().zip(&counts).filter(|(_, n)| **n > 0) {
+            shared.strands.measure(&shared.kernels, &mut pass);
+        }
+    }
+    for ((shared, frame), count) in hairs.iter_mut().zip(&counts) {
+        let nodes = frame.nodes.and_then(|id| buffers.as_ref()?.get(id));
+        if let Some(nodes) = nodes {
+            shared.draw(&nodes.buffer, &mut encoder, frame.overstep);
+        }
+        shared.copy(&mut encoder, *count > 0);
+    }
+    // Submitted here and not with the cameras: whoever else runs this hair's substeps comes after.
+    queue.submit([encoder.finish()]);
+    hairs.iter().for_each(|(shared, _)| shared.map());
+}

@@ -1,0 +1,208 @@
+//! Hair goes to the graphics device.
+
+use super::{
+    compile::Ready,
+    layout::{Contents, Layout, SCRATCH, StrandView},
+    record::GpuJournal,
+    residence::{HairResidence, Unsupported, WhyCpu},
+    shared::Link,
+    strands::GpuStrands,
+    treatments::GpuTreatments,
+};
+use crate::{
+    bond::Bonds,
+    render::DrawnElsewhere,
+    strand::{AddedMass, OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, Strands},
+    treatment::{HairTreatment, Treatments},
+    water::{Moisture, SoakHair},
+};
+use bevy::{
+    ecs::{change_detection::Tick, entity_disabling::Disabled},
+    prelude::*,
+};
+
+/// A hair on the graphics device, on the hair's entity.
+#[derive(Component)]
+pub(super) struct GpuHair {
+    pub(super) link: Link,
+    /// Its strands in their order.
+    pub(super) members: Vec<Entity>,
+    /// What the strands' arrays were when they were last written to by us, and when that was.
+    pub(super) prints: Vec<Print>,
+    pub(super) at: Tick,
+    /// Number of the newest request for its state, and whether that is still to be passed on.
+    newest: u64,
+    is_new: bool,
+    /// Why it is to come home, and with which answer.
+    pub(super) returns: Option<(WhyCpu, u64)>,
+    /// Somebody waits for the answer of this number.
+    pub(super) awaited: Option<u64>,
+    /// The last state that was read back.
+    pub(super) checkpoint: Option<Contents>,
+    /// Time since that was asked for (s), and ticks since the hair was handed over.
+    pub(super) since_checkpoint: f32,
+    pub(super) ticks: u32,
+    /// Ticks until a strand's fault is told of again.
+    pub(super) told: u32,
+    /// Requests that came on the way home.
+    pub(super) soaked: Vec<SoakHair>,
+    pub(super) treated: Vec<HairTreatment>,
+}
+
+/// What tells whether arrays were written to, without keeping them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Print {
+    pub(super) places: u64,
+    pub(super) velocities: u64,
+}
+
+impl Print {
+    pub(super) fn of(strand: &Strand) -> Self {
+        let of = |vectors: &[Vec3]| {
+            let words = vectors.iter().flat_map(|v| v.to_array()).map(|x| u64::from(x.to_bits()));
+            words.fold(0xcbf2_9ce4_8422_2325, |sum: u64, word| {
+                (sum ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
+            })
+        };
+        Self { places: of(strand.positions()), velocities: of(strand.velocities()) }
+    }
+}
+
+/// Has just come home, and stays for so long (s).
+#[derive(Component, Debug)]
+pub(super) struct StaysHome(pub(super) f32);
+
+impl GpuHair {
+    /// Asks for its state; returns the request's number.
+    pub(super) fn request(&mut self) -> u64 {
+        self.newest += 1;
+        self.is_new = true;
+        self.newest
+    }
+
+    /// The number of a request that has not been passed on.
+    pub(super) fn take_request(&mut self) -> Option<u64> {
+        core::mem::take(&mut self.is_new).then_some(self.newest)
+    }
+
+    /// Whether it is on its way home.
+    pub(super) fn is_returning(&self) -> bool {
+        self.returns.is_some()
+    }
+
+    /// Whether an answer is waited for by anybody but the checkpoint.
+    pub(super) fn is_urgent(&self) -> bool {
+        self.returns.is_some() || self.awaited.is_some()
+    }
+
+    /// Asks for its state for the case that the device is lost.
+    pub(super) fn note_checkpoint(&mut self) {
+        self.since_checkpoint = 0.0;
+        self.request();
+    }
+
+    /// Asks for its state for its strands.
+    pub(super) fn await_state(&mut self) {
+        let number = self.request();
+        self.awaited.get_or_insert(number);
+    }
+}
+
+/// Hands a hair over, if all its strands can be.
+pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Result<(), WhyCpu> {
+    let refused = |what| Err(WhyCpu::Unsupported(what));
+    let Some(members) = world.get::<Strands>(hair).map(|all| all.collection().to_vec()) else {
+        return refused(Unsupported::Strands);
+    };
+    let mut views = Vec::with_capacity(members.len());
+    let mut acting: Option<&[HairTreatment]> = None;
+    for member in &members {
+        let Ok(entity) = world.get_entity(*member) else { return refused(Unsupported::Strands) };
+        let parts = entity.get_components::<(
+            &Strand,
+            &Bonds,
+            &StrandHistory,
+            &AddedMass,
+            &StrandSleep,
+            &Moisture,
+            &Treatments,
+        )>();
+        let Ok((strand, bonds, history, added, sleep, moisture, treatments)) = parts else {
+            return refused(Unsupported::Strands);
+        };
+        let Some(root) = strand.positions().first().copied() else {
+            return refused(Unsupported::Strands);
+        };
+        let reasons = [
+            (strand.nodes() < 2 || bonds.joints.len() != strand.edges(), Unsupported::Strands),
+            (entity.contains::<Disabled>(), Unsupported::Strands),
+            (
+                history.root.is_some() || strand.root_before() != (root, strand.root_frame()),
+                Unsupported::MovingRoots,
+            ),
+            (
+                !added.mass.is_empty() || !added.in_water.is_empty() || !moisture.is_untouched(),
+                Unsupported::Water,
+            ),
+            (!added.softening.is_empty(), Unsupported::Water),
+            (sleep.is_follower(), Unsupported::LevelOfDetail),
+            (
+                *acting.get_or_insert(treatments.acting()) != treatments.acting(),
+                Unsupported::Treatments,
+            ),
+        ];
+        if let Some((_, what)) = reasons.into_iter().find(|(is_there, _)| *is_there) {
+            return refused(what);
+        }
+        views.push(StrandView::of(strand, bonds, history));
+    }
+    if views.is_empty() {
+        return refused(Unsupported::Strands);
+    }
+    let nodes: Vec<usize> = views.iter().map(|view| view.positions.len()).collect();
+    let layout = Layout::of(&nodes);
+    let limits = ready.device.limits();
+    let largest = 16 * layout.vectors(SCRATCH) as u64;
+    if largest > limits.max_storage_buffer_binding_size.into()
+        || largest > limits.max_buffer_size
+        || layout.blocks().len() > limits.max_compute_workgroups_per_dimension as usize
+    {
+        return Err(WhyCpu::TooLarge);
+    }
+    let on = GpuStrands::new(&ready.device, &ready.kernels, &views);
+    let (mut low, mut high, mut longest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
+    for view in &views {
+        (low, high) = (low.min(view.positions[0]), high.max(view.positions[0]));
+        longest = longest.max(view.lengths.iter().sum());
+    }
+    let treatments = GpuTreatments::new(acting.unwrap_or_default().to_vec());
+    let strands = members.iter().filter_map(|member| world.get::<Strand>(*member));
+    let gpu = GpuHair {
+        link: Link::new((ready.number, &ready.device, &ready.queue), ready.kernels.clone(), on),
+        prints: strands.map(Print::of).collect(),
+        at: world.read_change_tick(),
+        newest: 0,
+        is_new: false,
+        returns: None,
+        awaited: None,
+        checkpoint: None,
+        since_checkpoint: 0.0,
+        ticks: 0,
+        told: 0,
+        soaked: Vec::new(),
+        treated: Vec::new(),
+        members: members.clone(),
+    };
+    let drawn =
+        DrawnElsewhere { low: low - longest, high: high + longest, overstep: 1.0, rests: false };
+    let sleepers = Sleepers { asleep: 0, awake: members.len() };
+    let parts = (gpu, treatments, GpuJournal::default(), drawn, OnGpu, sleepers);
+    world.entity_mut(hair).insert((parts, HairResidence::Gpu));
+    for member in &members {
+        if let Some(mut treatments) = world.get_mut::<Treatments>(*member) {
+            treatments.bypass_change_detection().acting_mut().clear();
+        }
+    }
+    world.insert_batch(members.into_iter().map(|member| (member, OnGpu)));
+    Ok(())
+}

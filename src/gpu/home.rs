@@ -1,0 +1,272 @@
+//! Hair comes home from the graphics device, and what else comes from there: reports, states that were asked
+//! for.
+
+use super::{
+    compile::Compiled,
+    hair::{GpuHair, Print, StaysHome},
+    layout::{Contents, StrandState},
+    record::GpuJournal,
+    residence::{HairResidence, WhyCpu},
+    shared::{Link, Measured},
+    treatments::GpuTreatments,
+};
+use crate::{
+    bond::Bonds,
+    fault::{FaultKind, HairFault},
+    render::DrawnElsewhere,
+    strand::{OnGpu, Strand, StrandHistory, StrandSleep, StrandsArrived},
+    treatment::Treatments,
+    water::Moisture,
+};
+use bevy::{
+    ecs::{change_detection::ComponentTicks, entity_disabling::Disabled},
+    prelude::*,
+    render::{render_resource::PollType, renderer::RenderDevice},
+};
+
+/// Ticks for which a strand's fault is not told of again, as on the processor.
+const TOLD_FOR: u32 = 60;
+
+/// Seconds for which hair that has come home stays.
+const STAYS: f32 = 1.0;
+
+/// Has a hair come home, as soon as its state is there.
+pub(super) fn call_home(world: &mut World, hair: Entity, why: WhyCpu, is_blocking: bool) {
+    if is_blocking {
+        return home_now(world, hair, why);
+    }
+    let Some(mut gpu) = world.get_mut::<GpuHair>(hair).filter(|gpu| !gpu.is_returning()) else {
+        return;
+    };
+    let number = gpu.request();
+    gpu.returns = Some((why, number));
+    let mut entity = world.entity_mut(hair);
+    if let Some(mut drawn) = entity.get_mut::<DrawnElsewhere>() {
+        drawn.rests = true;
+    }
+    entity.insert(HairResidence::Returning(why));
+}
+
+/// Waits for the device and has a hair home.
+pub(super) fn home_now(world: &mut World, hair: Entity, why: WhyCpu) {
+    let Some(link) = world.get::<GpuHair>(hair).map(|gpu| gpu.link.clone()) else { return };
+    let records = world.get_mut::<GpuJournal>(hair);
+    let mut records = records.map_or_else(Vec::new, |mut all| core::mem::take(&mut all.records));
+    let state = {
+        let mut shared = link.lock();
+        shared.pending.append(&mut records);
+        shared.run_pending();
+        shared.strands.read_contents(&shared.device, &shared.queue)
+    };
+    home(world, hair, state, why);
+}
+
+/// Waits for the graphics device and puts the present state of hair that is simulated there into its
+/// [`Strand`]s and [`Bonds`], which are otherwise as they were handed over. The hair stays there. Returns
+/// whether it was there.
+///
+/// For tests and tools: a game asks by [`TakeHairdo`](crate::TakeHairdo), which waits for nothing.
+pub fn fetch_strands(world: &mut World, hair: Entity) -> bool {
+    let records = world.get_mut::<GpuJournal>(hair);
+    let mut records = records.map_or_else(Vec::new, |mut all| core::mem::take(&mut all.records));
+    let Some(mut gpu) = world.get_entity_mut(hair).ok().and_then(|mut e| e.take::<GpuHair>())
+    else {
+        return false;
+    };
+    let state = {
+        let mut shared = gpu.link.lock();
+        shared.pending.append(&mut records);
+        shared.run_pending();
+        shared.strands.read_contents(&shared.device, &shared.queue)
+    };
+    if let Some(state) = state {
+        write_back(world, &mut gpu, &state);
+    }
+    world.entity_mut(hair).insert(gpu);
+    true
+}
+
+/// Takes a hair home in this state; without one in that of its last checkpoint.
+fn home(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyCpu) {
+    let Ok(mut entity) = world.get_entity_mut(hair) else { return };
+    let Some(mut gpu) = entity.take::<GpuHair>() else { return };
+    let acting = entity.take::<GpuTreatments>().map(GpuTreatments::into_acting);
+    entity.remove::<(GpuJournal, OnGpu, DrawnElsewhere)>();
+    entity.insert((HairResidence::Cpu(why), StaysHome(STAYS)));
+    if let Some(state) = state.or_else(|| gpu.checkpoint.take()) {
+        write_back(world, &mut gpu, &state);
+    }
+    for member in &gpu.members {
+        let Ok(mut strand) = world.get_entity_mut(*member) else { continue };
+        strand.remove::<OnGpu>();
+        if gpu.ticks > 0
+            && let Some(mut sleep) = strand.get_mut::<StrandSleep>()
+        {
+            sleep.bypass_change_detection().wake_up();
+        }
+        if let Some(mut treatments) = strand.get_mut::<Treatments>()
+            && let Some(acting) = &acting
+        {
+            treatments.bypass_change_detection().acting_mut().extend_from_slice(acting);
+        }
+    }
+    world.write_message_batch(gpu.soaked);
+    world.write_message_batch(gpu.treated);
+    if gpu.awaited.is_some() {
+        world.trigger(StrandsArrived { entity: hair });
+        world.flush();
+    }
+}
+
+/// Puts a state into the strands. What the game has written stays: a pose whole, with its velocities;
+/// velocities alone; bonds.
+fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
+    let shared = gpu.link.lock();
+    let layout = shared.strands.layout();
+    let now = world.change_tick();
+    for (index, member) in gpu.members.iter().enumerate() {
+        let Ok(mut entity) = world.get_entity_mut(*member) else { continue };
+        let ticks = |ticks: Option<ComponentTicks>| {
+            ticks.is_some_and(|ticks| ticks.is_changed(gpu.at, now))
+        };
+        let written = ticks(entity.get_change_ticks::<Strand>());
+        let (bonds_written, water_written) = (
+            ticks(entity.get_change_ticks::<Bonds>()),
+            ticks(entity.get_change_ticks::<Moisture>()),
+        );
+        let Ok((mut strand, mut bonds, mut history)) =
+            entity.get_components_mut::<(&mut Strand, &mut Bonds, &mut StrandHistory)>()
+        else {
+            continue;
+        };
+        if strand.nodes() != layout.nodes(index) {
+            continue;
+        }
+        let own = state.get(layout, index);
+        let print = Print::of(&strand);
+        let has = |of: fn(&Print) -> u64| written && of(&print) != of(&gpu.prints[index]);
+        let (poses, moves) = (has(|print| print.places), has(|print| print.velocities));
+        let StrandState { positions, velocities, orientations, tensions, joints, before, .. } = own;
+        let to = strand.bypass_change_detection();
+        if !poses {
+            let (places, speeds, frames, _) = to.parts_mut();
+            places.copy_from_slice(&positions);
+            frames.copy_from_slice(&orientations);
+            if !moves {
+                speeds.copy_from_slice(&velocities);
+            }
+            to.tensions_mut().copy_from_slice(&tensions);
+            history.bypass_change_detection().positions = before;
+        }
+        if !bonds_written && bonds.joints.len() == joints.len() {
+            bonds.bypass_change_detection().joints.copy_from_slice(&joints);
+        }
+        gpu.prints[index] = Print::of(to);
+        // The tick has not seen yet what was written meanwhile.
+        if written {
+            strand.set_changed();
+        }
+        if bonds_written {
+            bonds.set_changed();
+        }
+        if water_written && let Some(mut moisture) = entity.get_mut::<Moisture>() {
+            moisture.set_changed();
+        }
+    }
+    drop(shared);
+}
+
+/// Substeps that wait at most for a frame: after ten seconds without one they are run all the same.
+const MOST_WAITING: usize = 3600;
+
+/// As a frame begins: what has come from the device, and what has become of it.
+pub(super) fn collect(world: &mut World) {
+    let device = world.get_resource::<RenderDevice>().cloned();
+    let present = world.get_resource::<Compiled>().map_or(0, Compiled::device);
+    let mut hairs = world.query_filtered::<(Entity, &GpuHair), Allow<Disabled>>();
+    let all: Vec<(Entity, Link, bool)> =
+        hairs.iter(world).map(|(hair, gpu)| (hair, gpu.link.clone(), gpu.is_urgent())).collect();
+    if let Some(device) = &device
+        && all.iter().any(|(.., is_urgent)| *is_urgent)
+    {
+        // Callbacks come with the next submission otherwise.
+        let _ = device.poll(PollType::Poll);
+    }
+    for (hair, link, _) in all {
+        let waiting = world.get_mut::<GpuJournal>(hair);
+        let waiting = waiting.filter(|journal| journal.records.len() > MOST_WAITING);
+        let waiting = waiting.map(|mut journal| core::mem::take(&mut journal.records));
+        let mut shared = link.lock();
+        if let Some(mut waiting) = waiting {
+            shared.pending.append(&mut waiting);
+            shared.run_pending();
+        }
+        let is_lost = !shared.is_on(present);
+        let state = shared.take_state();
+        let reports: Vec<Measured> = core::iter::from_fn(|| shared.take_report()).collect();
+        let named = |report: &Measured| shared.strands.layout().strand_of(report.first?);
+        let reports: Vec<_> = reports.iter().map(|report| (*report, named(report))).collect();
+        drop(shared);
+        for (report, strand) in reports {
+            heed(world, hair, &report, strand);
+        }
+        if is_lost {
+            home(world, hair, None, WhyCpu::DeviceLost);
+            continue;
+        }
+        let Some((number, state)) = state else { continue };
+        let Some(mut gpu) = world.get_mut::<GpuHair>(hair) else { continue };
+        match (gpu.returns, state) {
+            (Some((why, least)), Ok(state)) if least <= number => {
+                home(world, hair, Some(state), why);
+            }
+            (Some((why, _)), Err(())) => home(world, hair, None, why),
+            (_, Err(())) => {}
+            (_, Ok(state)) => {
+                let answers = gpu.awaited.is_some_and(|least| least <= number);
+                if answers {
+                    gpu.awaited = None;
+                    let Some(mut gpu) = world.entity_mut(hair).take::<GpuHair>() else { continue };
+                    write_back(world, &mut gpu, &state);
+                    gpu.checkpoint = Some(state);
+                    world.entity_mut(hair).insert(gpu);
+                    world.trigger(StrandsArrived { entity: hair });
+                    world.flush();
+                } else {
+                    gpu.checkpoint = Some(state);
+                }
+            }
+        }
+    }
+}
+
+/// Box and faults of a report.
+fn heed(world: &mut World, hair: Entity, report: &Measured, strand: Option<usize>) {
+    let Ok(mut entity) = world.get_entity_mut(hair) else { return };
+    if let Some(mut drawn) = entity.get_mut::<DrawnElsewhere>() {
+        let (low, high) = (Vec3::from(report.low), Vec3::from(report.high));
+        // Some ticks will have passed before the next report is there.
+        let margin = Vec3::splat(0.01 + 0.1 * report.speed.min(100.0));
+        if low.is_finite() && high.is_finite() && low.cmple(high).all() {
+            (drawn.low, drawn.high) = (low - margin, high + margin);
+        }
+    }
+    let count = report.put_back + report.rebuilt;
+    let Some(mut gpu) = entity.get_mut::<GpuHair>().filter(|_| count > 0) else { return };
+    let is_told = core::mem::replace(&mut gpu.told, TOLD_FOR) > 0;
+    if is_told {
+        return;
+    }
+    let named = strand.and_then(|strand| gpu.members.get(strand).copied()).unwrap_or(hair);
+    let (kind, what) = if report.put_back > 0 {
+        (FaultKind::PutBack, "became non-finite and was put back to its last finite state, at rest")
+    } else {
+        (
+            FaultKind::Rebuilt,
+            "could not be stepped on; its rest pose was rebuilt from root and bonds",
+        )
+    };
+    let others = count.saturating_sub(1);
+    let message = format!("a strand on the graphics device {what} (and {others} times more)");
+    world.write_message(HairFault::new(kind, message).of(named));
+}

@@ -1,0 +1,64 @@
+//! All of it in an app.
+
+use super::{
+    compile, frame,
+    hair::GpuHair,
+    home::{collect, home_now},
+    journal::write_journals,
+    residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
+    tick::{ask, decide, follow, treat},
+};
+use crate::{
+    schedule::{HairSystems, HairTick, first_substep},
+    setting,
+    strand::{BringHome, Hair, keep_required},
+};
+use bevy::prelude::*;
+
+/// Simulates hair on the graphics device where [`SimulateOn`] asks for it. Part of
+/// [`HairPlugins`](crate::HairPlugins) with the feature `gpu`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HairGpuPlugin;
+
+impl Plugin for HairGpuPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<SimulateOn>(app);
+        setting::resource::<HairGpu>(app);
+        keep_required::<Hair, HairResidence>(app);
+        app.insert_resource(BringHome(|world, hair| {
+            home_now(world, hair, WhyCpu::Unsupported(Unsupported::Requested));
+        }))
+        .register_type::<HairResidence>()
+        .register_type::<WhyCpu>()
+        .register_type::<Unsupported>()
+        .register_required_components::<Hair, HairResidence>()
+        .add_observer(ask)
+        .add_observer(|left: On<Remove, Hair>, mut commands: Commands| {
+            let hair = left.entity;
+            commands.queue(move |world: &mut World| {
+                home_now(world, hair, WhyCpu::Unsupported(Unsupported::Strands));
+            });
+        })
+        .add_systems(PreUpdate, collect.run_if(any_with_component::<GpuHair>))
+        .add_systems(
+            HairTick,
+            (
+                decide
+                    .pipe(follow)
+                    .in_set(HairSystems::Roots)
+                    .before(HairSystems::StrandHistory)
+                    .run_if(first_substep)
+                    // It is before all parts; systems of a game that are in none do not mind it.
+                    .ambiguous_with_all(),
+                treat.in_set(HairSystems::Treatments),
+                write_journals.in_set(HairSystems::Rods),
+            ),
+        );
+    }
+
+    /// In `finish`, because all render plugins have been added by then, in any order.
+    fn finish(&self, app: &mut App) {
+        compile::plugin(app);
+        frame::plugin(app);
+    }
+}

@@ -1,0 +1,183 @@
+//! Where hair is simulated, where it is asked to be, and why it is elsewhere.
+
+use crate::setting::{Ranged, setting};
+use bevy::prelude::*;
+use core::fmt;
+
+/// Where a hair is asked to be simulated. Component of a [`Hair`](crate::Hair); where absent,
+/// [`HairDefault<SimulateOn>`](crate::HairDefault) holds. [`HairResidence`] tells where it is.
+///
+/// Hair is on the graphics device only while all that acts on it is supported there, and comes back by
+/// itself where something else does.
+///
+/// ```
+/// # use bevy_keratin::{gpu::SimulateOn, prelude::*}; use bevy::prelude::*;
+/// fn crowd(mut commands: Commands) {
+///     let free = LockContact { strength: 0.0, ..default() };
+///     commands.spawn((Hair, SimulateOn::Gpu, free));
+/// }
+/// ```
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub enum SimulateOn {
+    /// On the processor.
+    #[default]
+    Cpu,
+    /// By compute shaders on the graphics device, as far as that can.
+    Gpu,
+}
+
+impl Ranged for SimulateOn {}
+
+/// Where a [`Hair`](crate::Hair) is simulated, and why. Kept by the tick.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub enum HairResidence {
+    /// On the graphics device.
+    Gpu,
+    /// On its way back, at rest on its head for some frames.
+    Returning(WhyCpu),
+    /// On the processor.
+    Cpu(WhyCpu),
+}
+
+impl Default for HairResidence {
+    fn default() -> Self {
+        Self::Cpu(WhyCpu::NotAsked)
+    }
+}
+
+/// Why hair is simulated on the processor.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Clone, PartialEq)]
+#[non_exhaustive]
+pub enum WhyCpu {
+    /// [`SimulateOn`] asks for it.
+    NotAsked,
+    /// The app has no graphics device, or no assets for its shaders.
+    NoRenderer,
+    /// The device has no compute shaders with eight storage buffers.
+    NoCompute,
+    /// The device is a processor that plays one, slower than the tick itself; see [`HairGpu::software`].
+    Software,
+    /// The kernels are being compiled.
+    Compiling,
+    /// The kernels cannot be compiled; the log says why.
+    Broken,
+    /// The graphics device was lost. It goes there again when there is another.
+    DeviceLost,
+    /// The device cannot hold that many strands in one buffer.
+    TooLarge,
+    /// It has just come back, and stays for a second.
+    JustBack,
+    /// Something acts on it that is not supported there.
+    Unsupported(Unsupported),
+}
+
+/// What keeps hair on the processor.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Unsupported {
+    /// Strands push each other ([`LockContact`](crate::LockContact)); a radius or strength of 0 has them not.
+    StrandContact,
+    /// Water on the hair, droplets, showers or volumes of water anywhere.
+    Water,
+    /// Hair made of [`Springs`](crate::Springs).
+    Springs,
+    /// The paper's projections ([`Sweeps`](crate::Sweeps)).
+    Sweeps,
+    /// Gusts of wind, or a [`WindZone`](crate::WindZone).
+    UnsteadyWind,
+    /// More than four blowers.
+    Blowers,
+    /// More than 64 colliders near.
+    Colliders,
+    /// A collider near that is no ball, capsule, cylinder or half-space.
+    ColliderShape,
+    /// Nodes that are held or wound on a rod.
+    HeldNodes,
+    /// Roots on a skinned or morphed mesh.
+    MovingRoots,
+    /// A level of detail at which not all strands are simulated.
+    LevelOfDetail,
+    /// It is still [`Settling`](crate::Settling).
+    Settling,
+    /// Its [`HairStyle`](crate::HairStyle) is watched.
+    WatchedStyle,
+    /// Its strands count the wind that they receive ([`WindReceived`](crate::WindReceived)).
+    WindReceived,
+    /// A treatment of single strands, or of more than eight ranges of joints.
+    Treatments,
+    /// It has no strands, or strands that cannot be simulated.
+    Strands,
+    /// Strands have come or gone.
+    Regroomed,
+    /// The game wrote to a strand or its bonds.
+    Written,
+    /// A request that needs its strands on the processor.
+    Requested,
+}
+
+impl fmt::Display for WhyCpu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotAsked => "it is not asked to be elsewhere",
+            Self::NoRenderer => "the app has no graphics device",
+            Self::NoCompute => "the graphics device lacks compute shaders with 8 storage buffers",
+            Self::Software => {
+                "the graphics device is software; HairGpu { software: true } takes it"
+            }
+            Self::Compiling => "its kernels are being compiled",
+            Self::Broken => "its kernels cannot be compiled on this device",
+            Self::DeviceLost => "the graphics device was lost",
+            Self::TooLarge => "it is too large for one buffer of the graphics device",
+            Self::JustBack => "it has just come back",
+            Self::Unsupported(what) => return what.fmt(f),
+        })
+    }
+}
+
+impl fmt::Display for Unsupported {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::StrandContact => "contact between strands is not supported there",
+            Self::Water => "water is not supported there",
+            Self::Springs => "springs are not supported there",
+            Self::Sweeps => "the paper's projections are not supported there",
+            Self::UnsteadyWind => "gusts and wind zones are not supported there",
+            Self::Blowers => "more than four blowers are not supported there",
+            Self::Colliders => "more than 64 colliders are not supported there",
+            Self::ColliderShape => {
+                "colliders other than balls, capsules, cylinders and half-spaces are not supported there"
+            }
+            Self::HeldNodes => "held and wound hair is not supported there",
+            Self::MovingRoots => "roots on a mesh are not supported there",
+            Self::LevelOfDetail => "levels of detail with fewer strands are not supported there",
+            Self::Settling => "it is still settling",
+            Self::WatchedStyle => "its style is watched",
+            Self::WindReceived => "the wind that it receives is counted",
+            Self::Treatments => "treatments of single strands are not supported there",
+            Self::Strands => "it has no strands that can be simulated",
+            Self::Regroomed => "strands have come or gone",
+            Self::Written => "the game wrote to its strands",
+            Self::Requested => "its strands were asked for",
+        })
+    }
+}
+
+setting! {
+    /// How the graphics device is used for hair.
+    #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Resource, Default, Clone, PartialEq)]
+    pub struct HairGpu {
+        /// Whether a software device counts. It is slower than the processor by itself; tests want it.
+        pub software: bool = false;
+        /// Whether the tick waits for hair that comes back, where it otherwise rests on its head for some
+        /// frames. For tests and loading screens.
+        pub blocking: bool = false;
+        /// How often the state of hair is kept for the case that the device is lost; 0 never, then such
+        /// hair goes on from where it was handed over. A copy takes 128 bytes a node over the bus.
+        pub checkpoint: f32 = 1.0, "s" in CHECKPOINT: 0.0..=1e6, "1 loses a second";
+    }
+}

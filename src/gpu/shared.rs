@@ -1,0 +1,272 @@
+//! A hair on the graphics device as both worlds hold it: the main world, which ticks, and the render world,
+//! which runs what was written down.
+
+use super::{
+    layout::Contents,
+    pipelines::HairKernels,
+    present::DrawnNodes,
+    record::SubstepRecord,
+    strands::{GpuStrands, REPORT_BYTES, read_mapped},
+};
+use bevy::render::{
+    render_resource::{Buffer, BufferDescriptor, BufferId, BufferUsages, CommandEncoder},
+    renderer::{RenderDevice, RenderQueue},
+};
+use core::sync::atomic::{AtomicBool, Ordering};
+use std::{
+    collections::VecDeque,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+/// One hair; whoever has it at hand may run its substeps, which are kept in order.
+#[derive(Clone)]
+pub(super) struct Link(Arc<Mutex<Shared>>);
+
+pub(super) struct Shared {
+    /// The number of its device.
+    number: u64,
+    pub(super) device: RenderDevice,
+    pub(super) queue: RenderQueue,
+    pub(super) kernels: Arc<HairKernels>,
+    pub(super) strands: GpuStrands,
+    /// What has been written down and not been run.
+    pub(super) pending: Vec<SubstepRecord>,
+    /// Where the nodes are drawn from.
+    pub(super) drawn: Option<(BufferId, DrawnNodes)>,
+    /// The first drawn node of each strand.
+    pub(super) firsts: Vec<u32>,
+    /// The number of the request for the state, if there is one.
+    pub(super) asked: Option<u64>,
+    copy: Option<(u64, Crossing)>,
+    reports: Reports,
+}
+
+impl Link {
+    pub(super) fn new(
+        (number, device, queue): (u64, &RenderDevice, &RenderQueue),
+        kernels: Arc<HairKernels>,
+        strands: GpuStrands,
+    ) -> Self {
+        let layout = strands.layout();
+        let mut next = 0;
+        let firsts = (0..layout.strands()).map(|strand| {
+            next += layout.nodes(strand) as u32;
+            next - layout.nodes(strand) as u32
+        });
+        Self(Arc::new(Mutex::new(Shared {
+            number,
+            device: device.clone(),
+            queue: queue.clone(),
+            kernels,
+            firsts: firsts.collect(),
+            strands,
+            pending: Vec::new(),
+            drawn: None,
+            asked: None,
+            copy: None,
+            reports: Reports::default(),
+        })))
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Shared> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Shared {
+    /// Whether it is on the device of this number.
+    pub(super) fn is_on(&self, device: u64) -> bool {
+        self.number == device
+    }
+
+    /// Hands the pending substeps to the device; returns how many there are.
+    pub(super) fn upload(&mut self) -> usize {
+        let Self { device, queue, kernels, strands, pending, .. } = self;
+        strands.upload(device, queue, kernels, pending);
+        let count = pending.len();
+        pending.clear();
+        count
+    }
+
+    /// Runs what is pending by itself.
+    pub(super) fn run_pending(&mut self) {
+        let Self { device, queue, kernels, strands, pending, .. } = self;
+        if !pending.is_empty() {
+            strands.run(device, queue, kernels, pending);
+            pending.clear();
+        }
+    }
+
+    /// The pose of the nodes into the buffer that drawing reads.
+    pub(super) fn draw(&mut self, nodes: &Buffer, encoder: &mut CommandEncoder, overstep: f32) {
+        let Self { device, queue, kernels, strands, drawn, firsts, .. } = self;
+        let count: usize = (0..strands.layout().strands()).map(|i| strands.layout().nodes(i)).sum();
+        // Drawing knows other strands for as long as the hair takes to come back.
+        if nodes.size() != 32 * count as u64 {
+            return;
+        }
+        let known = drawn.as_ref().is_some_and(|(id, _)| *id == nodes.id());
+        if !known {
+            let new = DrawnNodes::new(device, kernels, strands, nodes, firsts);
+            *drawn = Some((nodes.id(), new));
+        }
+        if let Some((_, drawn)) = drawn {
+            drawn.encode(queue, kernels, strands, encoder, overstep, known);
+        }
+    }
+
+    /// Copies what was asked for, and the report.
+    pub(super) fn copy(&mut self, encoder: &mut CommandEncoder, has_run: bool) {
+        if self.copy.is_none()
+            && let Some(number) = self.asked.take()
+        {
+            let size = Contents::bytes(self.strands.layout());
+            let crossing = Crossing::new(&self.device, size);
+            self.strands.copy_state(encoder, &crossing.buffer);
+            self.copy = Some((number, crossing));
+        }
+        if has_run {
+            self.reports.copy(&self.device, &self.strands.report, encoder);
+        }
+    }
+
+    /// After the submission: has the copies mapped.
+    pub(super) fn map(&self) {
+        if let Some((_, crossing)) = &self.copy {
+            crossing.map(&self.device);
+        }
+        self.reports.0.iter().for_each(|crossing| crossing.map(&self.device));
+    }
+
+    /// The state that has arrived, with the number of its request; `Err` where the device failed.
+    pub(super) fn take_state(&mut self) -> Option<(u64, Result<Contents, ()>)> {
+        let bytes = self.copy.as_ref()?.1.take()?;
+        let (number, _) = self.copy.take()?;
+        let read = |bytes: Vec<u8>| Contents::of_bytes(self.strands.layout(), &bytes);
+        Some((number, bytes.map(read).ok_or(())))
+    }
+
+    /// A report that has arrived.
+    pub(super) fn take_report(&mut self) -> Option<Measured> {
+        let bytes = self.reports.0.front()?.take()?;
+        let crossing = self.reports.0.pop_front()?;
+        let report = Measured::of(&bytes?);
+        crossing.is_mapped.store(false, Ordering::Release);
+        self.reports.1.push(crossing);
+        Some(report)
+    }
+}
+
+/// A buffer on its way from the device.
+struct Crossing {
+    buffer: Buffer,
+    is_mapped: AtomicBool,
+    arrived: Arc<Mutex<Option<Arrived>>>,
+}
+
+/// What it held; `None` where the device failed.
+type Arrived = Option<Vec<u8>>;
+
+impl Crossing {
+    fn new(device: &RenderDevice, size: u64) -> Self {
+        let buffer = device.create_buffer(&BufferDescriptor {
+            label: Some("hair read back"),
+            size,
+            usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self { buffer, is_mapped: AtomicBool::new(false), arrived: Arc::default() }
+    }
+
+    /// Mapped once, after the commands that fill it have been submitted.
+    fn map(&self, device: &RenderDevice) {
+        if !self.is_mapped.swap(true, Ordering::AcqRel) {
+            let arrived = self.arrived.clone();
+            read_mapped(device, &self.buffer, move |bytes| {
+                *arrived.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes);
+            });
+        }
+    }
+
+    /// What it held, once that is known.
+    fn take(&self) -> Option<Arrived> {
+        self.arrived.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+/// Reports under way, oldest first, and buffers for more.
+#[derive(Default)]
+struct Reports(VecDeque<Crossing>, Vec<Crossing>);
+
+/// How many reports may be under way; later frames' counts are added to the next one's.
+const REPORTS: usize = 3;
+
+impl Reports {
+    fn copy(&mut self, device: &RenderDevice, report: &Buffer, encoder: &mut CommandEncoder) {
+        if self.0.len() == REPORTS {
+            return;
+        }
+        let size = REPORT_BYTES as u64;
+        let crossing = self.1.pop().unwrap_or_else(|| Crossing::new(device, size));
+        encoder.copy_buffer_to_buffer(report, 0, &crossing.buffer, 0, size);
+        encoder.clear_buffer(report, 0, None);
+        self.0.push_back(crossing);
+    }
+}
+
+/// What a report says of the substeps since the one before.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Measured {
+    /// Strands that were put back, and rebuilt.
+    pub(super) put_back: u32,
+    pub(super) rebuilt: u32,
+    /// The number of one of them.
+    pub(super) first: Option<u32>,
+    /// The corners of the box around all nodes (m), and their highest speed (m/s).
+    pub(super) low: [f32; 3],
+    pub(super) high: [f32; 3],
+    pub(super) speed: f32,
+}
+
+impl Measured {
+    fn of(bytes: &[u8]) -> Self {
+        let mut words = [0u32; REPORT_BYTES / 4];
+        let own = bytes.len().min(REPORT_BYTES);
+        bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..own].copy_from_slice(&bytes[..own]);
+        let number =
+            |word: u32| f32::from_bits(if word >> 31 == 1 { word ^ 1 << 31 } else { !word });
+        Self {
+            put_back: words[0],
+            rebuilt: words[1],
+            first: (words[2] != 0).then_some(!words[2]),
+            high: [4, 5, 6].map(|i| number(words[i])),
+            low: [7, 8, 9].map(|i| number(!words[i])),
+            speed: f32::from_bits(words[10]).sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_is_read_as_the_kernel_writes_it() {
+        let ordered = |x: f32| {
+            let bits = x.to_bits();
+            if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
+        };
+        let mut words = [0u32; 16];
+        (words[0], words[1], words[2]) = (3, 1, !17);
+        let (high, low) = ([0.5, -0.25, 1e-3], [-0.5, -2.0, 0.0]);
+        for axis in 0..3 {
+            words[4 + axis] = ordered(high[axis]);
+            words[7 + axis] = !ordered(low[axis]);
+        }
+        words[10] = 4.0f32.to_bits();
+        let read = Measured::of(bytemuck::cast_slice(&words));
+        let expected = Measured { put_back: 3, rebuilt: 1, first: Some(17), low, high, speed: 2.0 };
+        assert_eq!(read, expected);
+        assert!(ordered(-1.0) < ordered(-0.5) && ordered(-0.5) < ordered(0.25), "in order");
+    }
+}

@@ -1,0 +1,99 @@
+//! What keeps a hair on the processor: everything that acts on it and is not in the kernels.
+
+use super::{
+    record::{MOST_BLOWERS, MOST_OBSTACLES},
+    residence::Unsupported,
+    treatments::GpuTreatments,
+};
+#[cfg(feature = "groom")]
+use crate::attach::RootsOnMesh;
+use crate::{
+    contact::{LockContact, Obstacles},
+    environment::{WindReceived, Winds},
+    lod::PresentLod,
+    rod::{HairSolver, SolverMethod, obstacle::Solid},
+    setting::Settings,
+    settle::Settling,
+    strand::{Hair, HeldNodes, OnGpu, StrandModel, StrandOf, Strands, TickPose},
+    style::HairStyle,
+    water::{Droplet, IsWet, Shower, WaterVolume},
+};
+use bevy::{
+    ecs::{entity::EntityHashMap, entity_disabling::Disabled, system::SystemParam},
+    prelude::*,
+};
+
+#[derive(SystemParam)]
+pub(super) struct Support<'w, 's> {
+    model: Settings<'w, 's, StrandModel>,
+    solver: Settings<'w, 's, HairSolver>,
+    contact: Settings<'w, 's, LockContact>,
+    winds: Winds<'w, 's>,
+    water: Query<'w, 's, (), Or<(With<WaterVolume>, With<Droplet>, With<Shower>)>>,
+    hairs: Query<
+        'w,
+        's,
+        (
+            &'static TickPose,
+            Option<&'static Obstacles>,
+            Option<&'static IsWet>,
+            Option<&'static PresentLod>,
+            Has<Settling>,
+            Has<HairStyle>,
+            Option<&'static GpuTreatments>,
+            Option<&'static Strands>,
+        ),
+        With<Hair>,
+    >,
+    held: Query<'w, 's, (&'static StrandOf, &'static HeldNodes)>,
+    counted: Query<'w, 's, &'static StrandOf, With<WindReceived>>,
+    disabled: Query<'w, 's, &'static StrandOf, (With<OnGpu>, With<Disabled>)>,
+    #[cfg(feature = "groom")]
+    on_mesh: Query<'w, 's, (), With<RootsOnMesh>>,
+}
+
+impl Support<'_, '_> {
+    /// Reasons of single strands, by hair.
+    pub(super) fn of_strands(&self) -> EntityHashMap<Unsupported> {
+        let mut found = EntityHashMap::default();
+        let held = self.held.iter().filter(|(_, held)| held.targets.iter().any(Option::is_some));
+        found.extend(held.map(|(of, _)| (of.0, Unsupported::HeldNodes)));
+        found.extend(self.counted.iter().map(|of| (of.0, Unsupported::WindReceived)));
+        found.extend(self.disabled.iter().map(|of| (of.0, Unsupported::Strands)));
+        found
+    }
+
+    /// The first reason of a hair.
+    pub(super) fn missing(&self, hair: Entity) -> Option<Unsupported> {
+        let (frame, obstacles, wet, lod, settles, is_watched, treatments, members) =
+            self.hairs.get(hair).ok()?;
+        let (contact, solver) = (self.contact.of(hair), self.solver.of(hair));
+        let air = self.winds.seen_from(frame.now());
+        // Of the tick before: what is near is looked at before it touches.
+        let solids = obstacles.map_or(&[][..], |all| &all.solids);
+        #[cfg(feature = "groom")]
+        let on_mesh = self.on_mesh.contains(hair);
+        #[cfg(not(feature = "groom"))]
+        let on_mesh = false;
+        let reasons = [
+            (members.is_none_or(|members| members.is_empty()), Unsupported::Strands),
+            (self.model.of(hair) == StrandModel::MassSpring, Unsupported::Springs),
+            (solver.method == SolverMethod::Sweeps, Unsupported::Sweeps),
+            (contact.radius > 0.0 && contact.strength > 0.0, Unsupported::StrandContact),
+            (wet.is_some_and(|wet| wet.0) || !self.water.is_empty(), Unsupported::Water),
+            (air.steady_wind().is_none(), Unsupported::UnsteadyWind),
+            (air.blowers.len() > MOST_BLOWERS, Unsupported::Blowers),
+            (solids.len() > MOST_OBSTACLES, Unsupported::Colliders),
+            (
+                solids.iter().any(|o| matches!(o.solid, Solid::Placed(_))),
+                Unsupported::ColliderShape,
+            ),
+            (on_mesh, Unsupported::MovingRoots),
+            (lod.is_some_and(|lod| lod.simulated_share() < 1.0), Unsupported::LevelOfDetail),
+            (settles, Unsupported::Settling),
+            (is_watched, Unsupported::WatchedStyle),
+            (treatments.is_some_and(GpuTreatments::are_too_many), Unsupported::Treatments),
+        ];
+        reasons.into_iter().find(|(is_there, _)| *is_there).map(|(_, what)| what)
+    }
+}

@@ -1,0 +1,198 @@
+//! Hair on the graphics device in the tick: where each is from this tick on, and what acts on it there.
+
+use super::{
+    compile::{AppDevice, Ready},
+    hair::{GpuHair, StaysHome, hand_over},
+    home::call_home,
+    residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
+    support::Support,
+    treatments::GpuTreatments,
+};
+use crate::{
+    bond::Bonds,
+    schedule::{HairProcessTime, HairStep},
+    setting::{Ranged, Settings},
+    strand::{AskForStrands, Hair, OnGpu, Strand, StrandOf, Strands},
+    treatment::HairTreatment,
+    water::{Moisture, SoakHair},
+};
+use bevy::{ecs::entity::EntityHashSet, prelude::*};
+
+/// What becomes of a hair in this tick.
+pub(super) enum Decision {
+    /// It goes to the device.
+    Goes(Ready),
+    /// It comes home.
+    Returns(WhyCpu),
+    /// It stays where it is, on the processor.
+    Stays(WhyCpu),
+}
+
+/// Where each hair is from this tick on. Runs before anything acts on it.
+pub(super) fn decide(
+    step: Res<HairStep>,
+    settings: Res<HairGpu>,
+    device: AppDevice,
+    asked: Settings<SimulateOn>,
+    support: Support,
+    mut hairs: Query<
+        (
+            Entity,
+            &HairResidence,
+            Option<&mut GpuHair>,
+            Option<&mut StaysHome>,
+            Option<Ref<Strands>>,
+        ),
+        With<Hair>,
+    >,
+    written: Query<
+        &StrandOf,
+        (With<OnGpu>, Or<(Changed<Strand>, Changed<Bonds>, Changed<Moisture>)>),
+    >,
+    of: Query<&StrandOf>,
+    mut soaks: MessageReader<SoakHair>,
+    mut treats: MessageReader<HairTreatment>,
+) -> Vec<(Entity, Decision)> {
+    let hair_of = |target: Entity| of.get(target).map_or(target, |of| of.0);
+    let mut soaked: Vec<_> = soaks.read().map(|soak| (hair_of(soak.target), *soak)).collect();
+    // Of a hair as a whole they are no reason to come home.
+    let mut treated: Vec<_> = (treats.read().filter(|treat| of.contains(treat.target)))
+        .map(|treat| (hair_of(treat.target), treat.clone()))
+        .collect();
+    let mut decisions = Vec::new();
+    if hairs.iter().all(|(hair, _, on, ..)| on.is_none() && asked.of(hair) == SimulateOn::Cpu) {
+        let left = hairs.iter().filter(|(_, at, ..)| **at != HairResidence::default());
+        decisions.extend(left.map(|(hair, ..)| (hair, Decision::Stays(WhyCpu::NotAsked))));
+        return decisions;
+    }
+    let wetted: Vec<Entity> = soaked.iter().map(|(hair, _)| *hair).collect();
+    let singly: Vec<Entity> = treated.iter().map(|(hair, _)| *hair).collect();
+    let of_strands = support.of_strands();
+    let written: EntityHashSet = written.iter().map(|of| of.0).collect();
+    let seconds = step.dt * step.count as f32;
+    let checkpoint = settings.clamped().checkpoint;
+    for (hair, _, on, stays, members) in &mut hairs {
+        let wants = asked.of(hair) == SimulateOn::Gpu;
+        let missing = || {
+            let known = of_strands.get(&hair).copied().or_else(|| support.missing(hair));
+            known.map(WhyCpu::Unsupported)
+        };
+        let Some(mut on) = on else {
+            // What is asked of it in this tick is asked of the processor.
+            let is_asked = |all: &[Entity]| all.contains(&hair);
+            let why = if !wants {
+                Some(WhyCpu::NotAsked)
+            } else if is_asked(&wetted) {
+                Some(WhyCpu::Unsupported(Unsupported::Water))
+            } else if is_asked(&singly) {
+                Some(WhyCpu::Unsupported(Unsupported::Treatments))
+            } else if let Some(mut stays) = stays
+                && stays.0 > 0.0
+            {
+                stays.0 -= seconds;
+                Some(WhyCpu::JustBack)
+            } else {
+                missing()
+            };
+            let decision = match why.map_or_else(|| device.ready(), Err) {
+                Ok(ready) => Decision::Goes(ready),
+                Err(why) => Decision::Stays(why),
+            };
+            decisions.push((hair, decision));
+            continue;
+        };
+        let on = &mut *on;
+        on.ticks += 1;
+        on.told = on.told.saturating_sub(1);
+        on.since_checkpoint += seconds;
+        if on.is_returning() || !settings.blocking {
+            let own = soaked.extract_if(.., |(target, _)| *target == hair).map(|(_, soak)| soak);
+            on.soaked.extend(own);
+            let own = treated.extract_if(.., |(target, _)| *target == hair).map(|(_, treat)| treat);
+            on.treated.extend(own);
+        }
+        if on.is_returning() {
+            continue;
+        }
+        let regroomed = members.is_none_or(|members| {
+            members.is_changed() && members.collection()[..] != on.members[..]
+        });
+        let reasons = [
+            (!wants, WhyCpu::NotAsked),
+            (regroomed, WhyCpu::Unsupported(Unsupported::Regroomed)),
+            (written.contains(&hair), WhyCpu::Unsupported(Unsupported::Written)),
+            (wetted.contains(&hair), WhyCpu::Unsupported(Unsupported::Water)),
+            (singly.contains(&hair), WhyCpu::Unsupported(Unsupported::Treatments)),
+        ];
+        let reason = reasons.into_iter().find(|(is_there, _)| *is_there).map(|(_, why)| why);
+        if let Some(why) = reason.or_else(missing) {
+            decisions.push((hair, Decision::Returns(why)));
+        } else if checkpoint > 0.0 && on.since_checkpoint >= checkpoint {
+            on.note_checkpoint();
+        }
+    }
+    decisions
+}
+
+pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut World) {
+    let is_blocking = world.resource::<HairGpu>().blocking;
+    for (hair, decision) in decisions {
+        let why = match decision {
+            Decision::Goes(ready) => match hand_over(world, hair, &ready) {
+                Ok(()) => {
+                    tracing::debug!("hair, entity {hair}: simulated on the graphics device");
+                    continue;
+                }
+                Err(why) => why,
+            },
+            Decision::Returns(why) => {
+                call_home(world, hair, why, is_blocking);
+                tell(hair, why);
+                continue;
+            }
+            Decision::Stays(why) => why,
+        };
+        let Some(mut residence) = world.get_mut::<HairResidence>(hair) else { continue };
+        // What is said while it waits says less than why it came.
+        if *residence != HairResidence::Cpu(why) && why != WhyCpu::JustBack {
+            *residence = HairResidence::Cpu(why);
+            tell(hair, why);
+        }
+    }
+}
+
+/// Says once why a hair that is to be on the device is not.
+fn tell(hair: Entity, why: WhyCpu) {
+    match why {
+        WhyCpu::NotAsked | WhyCpu::Compiling => {}
+        WhyCpu::Broken | WhyCpu::DeviceLost | WhyCpu::NoCompute | WhyCpu::TooLarge => {
+            tracing::warn!("hair, entity {hair}, is simulated on the processor: {why}");
+        }
+        _ => tracing::info!("hair, entity {hair}, is simulated on the processor: {why}"),
+    }
+}
+
+/// Treatments of hair on the device.
+pub(super) fn treat(
+    step: Res<HairStep>,
+    process: Res<HairProcessTime>,
+    mut requests: MessageReader<HairTreatment>,
+    mut hairs: Query<(&mut GpuTreatments, &GpuHair)>,
+) {
+    for request in requests.read() {
+        if let Ok((mut treatments, _)) = hairs.get_mut(request.target) {
+            treatments.push(request.clamped());
+        }
+    }
+    let dt = step.dt * process.clamped().0;
+    for (mut treatments, _) in hairs.iter_mut().filter(|(_, on)| !on.is_returning()) {
+        treatments.step(dt);
+    }
+}
+
+/// Somebody asks for a hair's strands.
+pub(super) fn ask(request: On<AskForStrands>, mut hairs: Query<&mut GpuHair>) {
+    if let Ok(mut hair) = hairs.get_mut(request.entity) {
+        hair.await_state();
+    }
+}
