@@ -10,7 +10,8 @@ setting! {
     /// [`HairDefault<HairFollowers>`](crate::HairDefault) holds.
     ///
     /// A follower grows between up to three near guides and takes their shape in shares. Guides that
-    /// move apart let go of it: it stays with its nearest. [`FollowerRoots`](super::FollowerRoots) says where followers grow if
+    /// move apart let go of it: it stays with its nearest. Balls, capsules and ellipsoids that hair collides
+    /// with push it out of themselves. [`FollowerRoots`](super::FollowerRoots) says where followers grow if
     /// that is known.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]

@@ -1,15 +1,18 @@
 //! Draws the hair: simulated strands and many followers between them, from one buffer of nodes.
 //!
-//! Each [`Hair`] is one mesh and one draw call (one more for each shadow map). Once a
-//! frame its nodes are packed where the fixed clock's overstep puts them and written to the GPU; all
-//! else happens in the vertex shader: curves through the nodes, followers between guides, ribbons
-//! that face the camera. Places stay in the hair's frame up to there, so roots never lag behind the
+//! Each [`Hair`] is one draw call (one more for each shadow map), of a mesh that all hair of as many strands
+//! shares. Once a frame its nodes are packed where the fixed clock's overstep puts them and written to the
+//! GPU; all else happens in the vertex shader: curves through the nodes, followers between guides, ribbons
+//! that face the camera. Followers are pushed out of the balls, capsules and ellipsoids among
+//! [`HairCollider`](crate::HairCollider)s near them, at most sixteen; those keep light from the hair behind
+//! them, too, that of lights without shadow maps as well. Places stay in the hair's frame up to there, so roots never lag behind the
 //! head.
 //!
 //! Water is drawn as beads: see [`HairBeads`].
 //!
 //! How it looks is edited at run time through components of the hair: [`HairLook`], [`HairDye`],
-//! [`HairFollowers`], [`HairView`]. For a look of your own write a material around [`HairBuffers`].
+//! [`HairFollowers`], [`HairDetail`], [`HairView`]. Far hair is drawn with fewer and wider strands,
+//! smoothly; [`HairDetail::strands`] is the switch for slow graphics devices. For a look of your own write a material around [`HairBuffers`].
 //!
 //! Vertex shaders read storage buffers, so WebGL2 cannot draw this; WebGPU and native can. Strands
 //! thinner than a pixel are drawn one pixel wide and light as many of its samples as they cover of it;
@@ -22,15 +25,19 @@ pub mod fibre;
 
 mod beads;
 mod buffers;
+mod detail;
 mod draw;
 mod drawn_strand;
 mod follower_roots;
 mod followers;
+mod frame;
 mod locks;
 mod material;
+mod ribbon_mesh;
 mod scatter;
 mod screen_share;
 mod sets;
+mod solids;
 mod thickness;
 mod upload;
 mod view;
@@ -38,6 +45,7 @@ mod wet_look;
 
 pub use beads::{Bead, HairBeadSystems, HairBeads};
 pub use buffers::HairBuffers;
+pub use detail::HairDetail;
 pub use drawn_strand::{DrawnStrand, LockOffset};
 pub use follower_roots::{FollowerRoot, FollowerRoots};
 pub use followers::HairFollowers;
@@ -96,6 +104,7 @@ impl Plugin for HairRenderPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<HairFollowers>(app);
         setting::plugin::<HairView>(app);
+        setting::plugin::<HairDetail>(app);
         app.insert_resource(Interpolate(self.interpolate))
             .init_resource::<HairBeads>()
             .register_type::<HairBeads>()
@@ -139,7 +148,8 @@ impl Plugin for HairRenderPlugin {
         app.add_plugins(MaterialPlugin::<RibbonMaterial>::default());
         // Bevy does not call `finish` of plugins added in `finish`.
         ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial>>::default().finish(app);
-        let draw = (draw::appear, draw::pack).chain().run_if(supported);
+        let draw = (draw::appear, draw::pack, frame::prepare).chain().run_if(supported);
+        app.init_resource::<ribbon_mesh::RibbonMeshes>();
         app.add_systems(PostUpdate, draw.in_set(HairRenderSystems)).configure_sets(
             PostUpdate,
             HairRenderSystems
