@@ -10,6 +10,7 @@ const WET_SURFACE: f32 = 0.0058;
 const FILM_SURFACE: f32 = 0.02;
 const FILM_VARIANCE: f32 = 0.0064;
 const WET_INSIDE: f32 = 0.7;
+const WET_SLEEK: f32 = 0.24;
 const TT_FOCUS: f32 = 3.65;
 const TRT_FOCUS: f32 = 17.0;
 const TT_SHARE: f32 = 0.96;
@@ -70,9 +71,10 @@ impl Optics {
         let cos_inside = (1.0 - 0.416 * a.sin_r * a.sin_r).sqrt();
 
         let grazing = a.cos_d * a.cos_half;
+        let sleek = self.variance * lerp(1.0, WET_SLEEK, self.wet);
         let surface = 0.25
             * a.cos_half
-            * (fresnel(f0, grazing) * a.along(self.variance + spread, self.tilt - 2.0 * TILT)
+            * (fresnel(f0, grazing) * a.along(sleek + spread, self.tilt - 2.0 * TILT)
                 + self.film
                     * fresnel(FILM_SURFACE, grazing)
                     * a.along(FILM_VARIANCE + spread, self.tilt));
@@ -83,7 +85,7 @@ impl Optics {
         let cos_tt = (1.0 - h * h * ratio * ratio).clamp(0.0, 1.0).sqrt();
         let tt = TT_SHARE
             * around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi)
-            * a.along(0.25 * self.variance + spread, self.tilt + TILT)
+            * a.along(0.25 * sleek + spread, self.tilt + TILT)
             * (1.0 - f_tt).powi(2)
             * (-2.0 * cos_tt / cos_inside * self.absorption).exp();
 
@@ -91,7 +93,7 @@ impl Optics {
         let cos_trt = (1.0 - 0.75 * ratio * ratio).clamp(0.0, 1.0).sqrt();
         let trt = TRT_SHARE
             * around(1.0 / (1.0 / TRT_FOCUS + turned), a.cos_phi)
-            * a.along(4.0 * self.variance + spread, self.tilt + 4.0 * TILT)
+            * a.along(4.0 * sleek + spread, self.tilt + 4.0 * TILT)
             * (1.0 - f_trt).powi(2)
             * f_trt
             * (-4.0 * cos_trt / cos_inside * self.absorption).exp();

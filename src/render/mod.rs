@@ -18,6 +18,22 @@
 //! thinner than a pixel are drawn one pixel wide and light as many of its samples as they cover of it;
 //! without MSAA they light some pixels and others not, which temporal antialiasing smooths.
 
+//! # Against path tracing
+//!
+//! Scenes of `tests/render_reference.rs`, rebuilt from path-traced ones of the same strands, melanin and light
+//! (Cycles' Chiang model, up to 512 bounces). Ratios of this renderer to the reference, for hair with no, a
+//! blond's, a brown's and a black's melanin; red where channels differ.
+//!
+//! | scene | none | blond | brown | black |
+//! |---|---|---|---|---|
+//! | flat tress, sun from the side | 0.67 | 0.90 | 1.16 | 1.18 |
+//! | ball, sun 60° aside, mean of the disc | 0.45 | 0.44 | 0.41 | 0.55 |
+//! | ball, sun behind, mean of the ring | 0.68 | 0.43 | 0.34 | 0.99 |
+//!
+//! Pigmented tresses are within 15 % and 0.01. Light that goes through many fibres of many directions is half
+//! of what it should be: hair is lit as a slab of parallel fibres. On a cylinder highlights lie within 2° of
+//! the reference (a unit test); under a sky of one colour white hair has 0.98 of it (`tests/render_look.rs`).
+
 #[doc(hidden)]
 pub mod curve;
 #[doc(hidden)]

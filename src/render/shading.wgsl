@@ -90,7 +90,7 @@ fn surface_of(fibre: Fibre) -> Surface {
     let absorption = dyed(natural, fibre.along, fibre.streaks);
     // No two strands are alike, nor two pieces of one: 15 % in roughness, 1.5 degrees in tilt.
     let uneven = 1.0 + 0.15 * apart * (2.0 * hash(fibre.seed + 11u) - 1.0);
-    let rough = clamp(ribbon.roughness * uneven * (1.0 - 0.3 * fibre.moisture), 0.05, 1.0);
+    let rough = clamp(ribbon.roughness * uneven, 0.05, 1.0);
     let tilt = 0.026 * apart * along_noise(fibre.seed, fibre.along);
     surface.optics = Optics(absorption, rough * rough * rough * rough, ribbon.gloss,
         ribbon.backlight, fibre.moisture, tilt, 0.0);
@@ -105,6 +105,8 @@ const LOCK_FOCUS: f32 = 11.0;
 const LOCK_PEAK: f32 = 2.66;
 // From this far from its middle a strand lies on the surface of a lock (m).
 const LOCK_SURFACE: f32 = 1e-3;
+// Share of the film that lies so; the rest lies around the strands.
+const LOCK_STREAKS: f32 = 0.6;
 
 // A film of water covers a lock as a whole and mirrors about the lock's normal: how strongly where this
 // strand lies on it, against the mean over the lock.
@@ -114,7 +116,7 @@ fn film_of(fibre: Fibre, l: vec3<f32>) -> f32 {
     let out = fibre.outward - fibre.tangent * dot(fibre.outward, fibre.tangent);
     let far = dot(out, out);
     let facing = dot(across, out) * inverseSqrt(max(dot(across, across) * far, 1e-20));
-    let on = smoothstep(0.0, LOCK_SURFACE, sqrt(far));
+    let on = LOCK_STREAKS * smoothstep(0.0, LOCK_SURFACE, sqrt(far));
     return fibre.moisture * mix(1.0, LOCK_PEAK * exp(LOCK_FOCUS * (facing - 1.0)), on);
 }
 
