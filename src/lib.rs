@@ -94,7 +94,7 @@ pub mod prelude {
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};
     #[cfg(feature = "render")]
     #[doc(hidden)]
-    pub use crate::render::{HairFollowers, HairView};
+    pub use crate::render::{HairDetail, HairFollowers, HairView};
     #[cfg(feature = "save")]
     #[doc(hidden)]
     pub use crate::save::{

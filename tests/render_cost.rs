@@ -108,3 +108,102 @@ fn frames_a_second() {
         }
     }
 }
+
+/// Far heads draw few strands, from meshes that all share.
+#[test]
+fn a_hundred_heads_share_a_mesh_of_few_strands() {
+    let Some(mut scene) = Offscreen::new(128, 96) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 2.0, 9.0), Vec3::ZERO);
+    let guides = head_of_guides(20, 0.09, 0.2, 5);
+    let world = scene.app.world_mut();
+    let look = HairLook { width: 0.2e-3, ..default() };
+    let view = HairView::Bond(BondKind::Hydrogen);
+    let mut hairs = Vec::new();
+    for k in 0..100 {
+        let place = Transform::from_xyz((k % 10) as f32 - 4.5, 0.0, -0.8 * (k / 10) as f32);
+        let hair = world.spawn((Hair, look.clone(), HairFollowers::new(10_000), view, place)).id();
+        for points in &guides {
+            world.spawn((StrandOf(hair), Strand::from_polyline(points).unwrap()));
+        }
+        hairs.push(hair);
+    }
+    let start = std::time::Instant::now();
+    let picture = scene.draw_once();
+    println!("{:?} until the picture is there", start.elapsed());
+    if let Ok(folder) = std::env::var("REFERENCE") {
+        picture.save(&format!("{folder}/crowd.png"));
+    }
+    let mut used = std::collections::BTreeSet::new();
+    let mut triangles = 0;
+    for hair in &hairs {
+        let drawn = scene.app.world().get::<HairBuffers>(*hair).unwrap().drawn;
+        let mesh = scene.app.world().get::<Mesh3d>(drawn).unwrap().0.clone();
+        let meshes = scene.app.world().resource::<Assets<Mesh>>();
+        triangles += meshes.get(&mesh).unwrap().indices().unwrap().len() / 3;
+        used.insert(mesh.id());
+    }
+    let all = 100 * (10_000 + guides.len()) * 16 * 2;
+    println!("{triangles} triangles of {all}, {} meshes", used.len());
+    assert!(triangles < all / 6 && used.len() <= 3);
+    let lit = picture.pixels().filter(|p| p[0] > 12).count();
+    println!("{lit} pixels show hair");
+    assert!(lit > 300, "{lit}");
+}
+
+/// A head that fills the picture: what each stage costs, and what the quality switches save.
+#[test]
+#[ignore = "a timing, to be read"]
+fn what_each_stage_costs() {
+    let Some(mut scene) = Offscreen::new(480, 360) else {
+        return;
+    };
+    scene.look(Vec3::new(0.22, 0.08, 0.5), Vec3::new(0.0, -0.05, 0.0));
+    let camera = scene.camera;
+    let world = scene.app.world_mut();
+    let look = HairLook { width: 0.15e-3, ..default() };
+    let hair = world.spawn((Hair, HairFollowers::new(20_000), look.clone())).id();
+    for points in head_of_guides(220, 0.09, 0.26, 16) {
+        world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    let at = Transform::from_xyz(0.5, 0.6, 0.7).looking_at(Vec3::ZERO, Vec3::Y);
+    let cascades =
+        CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 1.5, ..default() };
+    let sun = DirectionalLight { shadow_maps_enabled: true, ..default() };
+    let sun = world.spawn((sun, cascades.build(), at)).id();
+    let unlit = HairView::Bond(BondKind::Hydrogen);
+    let kajiya = HairLook { shading: HairShading::KajiyaKay, ..look.clone() };
+    let share = |strands| HairDetail { strands, ..default() };
+    let rows = [
+        ("all", look.clone(), HairView::Natural, share(1.0), true, false),
+        ("with a depth prepass", look.clone(), HairView::Natural, share(1.0), true, true),
+        ("without shadow maps", look.clone(), HairView::Natural, share(1.0), false, false),
+        ("unlit, without shadow maps", look.clone(), unlit, share(1.0), false, false),
+        ("Kajiya-Kay", kajiya, HairView::Natural, share(1.0), true, false),
+        ("half the strands", look.clone(), HairView::Natural, share(0.5), true, false),
+        ("a quarter", look.clone(), HairView::Natural, share(0.25), true, false),
+        ("a quarter and prepass", look.clone(), HairView::Natural, share(0.25), true, true),
+        ("a tenth", look, HairView::Natural, share(0.1), true, false),
+    ];
+    for (what, look, view, detail, shadows, prepass) in rows {
+        let world = scene.app.world_mut();
+        world.entity_mut(hair).insert((look, view, detail));
+        world.get_mut::<DirectionalLight>(sun).unwrap().shadow_maps_enabled = shadows;
+        match prepass {
+            true => world.entity_mut(camera).insert(DepthPrepass),
+            false => world.entity_mut(camera).remove::<DepthPrepass>(),
+        };
+        let picture = scene.draw();
+        if let Ok(folder) = std::env::var("REFERENCE") {
+            picture.save(&format!("{folder}/{what}.png"));
+        }
+        let frame = || {
+            let start = std::time::Instant::now();
+            scene.app.update();
+            start.elapsed()
+        };
+        let least = core::iter::repeat_with(frame).take(4).min().unwrap();
+        println!("{what}: {least:?} a frame");
+    }
+}

@@ -121,3 +121,75 @@ fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
     println!("error of one pixel {error:.3}, of the worst in a hundred {worst:.3} of the mean");
     assert!(error < 0.4 && worst < 2.2);
 }
+
+/// A tuft of 3,000 strands at random, unlit and red, that a camera sees from `from` metres in some steps to
+/// `to` metres, with as many pixels for an angle as a screen of 1,080 lines: the area (m²) that it covers in
+/// each picture, and by how much each picture differs from the one before, a share of its light.
+fn flight(detail: HairDetail, (from, to): (f32, f32)) -> Option<(Vec<f32>, Vec<f32>)> {
+    const SIZE: u32 = 96;
+    let mut scene = Offscreen::new(SIZE, SIZE)?;
+    let half = 22.5f32.to_radians().tan() * SIZE as f32 / 1080.0;
+    let camera = scene.camera;
+    let world = scene.app.world_mut();
+    let view = PerspectiveProjection { fov: 2.0 * half.atan(), ..default() };
+    world.entity_mut(camera).insert(Projection::Perspective(view));
+    let look = HairLook { width: 0.2e-3, taper: 1.0, ..default() };
+    let view = HairView::Bond(BondKind::Hydrogen);
+    let followers = HairFollowers { segments: 4, ..HairFollowers::none() };
+    let hair = world.spawn((Hair, look, followers, view, detail)).id();
+    for i in 0..3000 {
+        let share = |k: f32| (i as f32 * k).fract() - 0.5;
+        let x = 0.2 * share(0.754_877_7);
+        let lean = Vec3::new(0.05 * share(0.569_840_3), -1.0, 0.05 * share(0.818_917_3));
+        let points = [0.0, 0.1, 0.2].map(|y| Vec3::new(x, 0.1, 0.0) + lean * y);
+        world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    let (mut areas, mut steps) = (Vec::new(), Vec::new());
+    let mut before: Option<offscreen::Picture> = None;
+    const STEPS: u32 = 16;
+    for step in 0..=STEPS {
+        let away = from * (to / from).powf(step as f32 / STEPS as f32);
+        scene.look(Vec3::new(0.0, 0.0, away), Vec3::ZERO);
+        let picture = if step == 0 { scene.draw() } else { scene.draw_now() };
+        let pixel = 2.0 * away * half / SIZE as f32;
+        let red = |p: [u8; 3]| linear::linear(p[0]);
+        let light: f32 = picture.pixels().map(red).sum();
+        areas.push(light * pixel * pixel);
+        if let Some(before) = before.replace(picture.clone()) {
+            let apart = picture.pixels().zip(before.pixels());
+            steps.push(apart.map(|(a, b)| (red(a) - red(b)).abs()).sum::<f32>() / light);
+        }
+    }
+    Some((areas, steps))
+}
+
+#[test]
+fn nothing_pops_as_a_camera_flies_away() {
+    let all = HairDetail { least_width: 0.0, ..default() };
+    let few = HairDetail { least_strands: 100, ..default() };
+    // Near, where not all is in sight, and far.
+    for path in [(0.5, 4.0), (4.0, 20.0)] {
+        let (Some((_, whole)), Some((areas, steps))) = (flight(all, path), flight(few, path))
+        else {
+            return;
+        };
+        let most = |steps: &[f32]| steps.iter().copied().fold(0.0, f32::max);
+        let mean = |steps: &[f32]| steps.iter().sum::<f32>() / steps.len() as f32;
+        println!(
+            "{path:?} m, change with all strands: mean {:.3}, most {:.3}",
+            mean(&whole),
+            most(&whole)
+        );
+        println!("with fewer and wider ones: mean {:.3}, most {:.3}", mean(&steps), most(&steps));
+        // The picture shrinks by a tenth from frame to frame, which changes it in any case; fewer strands
+        // have more of a share in that each.
+        assert!(mean(&steps) < 1.3 * mean(&whole), "{steps:.3?}");
+        assert!(most(&steps) < 1.6 * most(&whole), "{steps:.3?}");
+        if path.0 > 1.0 {
+            let jumps = areas.windows(2).map(|w| (w[1] / w[0] - 1.0).abs());
+            let jump = jumps.fold(0.0, f32::max);
+            println!("area {areas:.5?} m², largest step {jump:.4}");
+            assert!(jump < 0.15, "{jump}");
+        }
+    }
+}

@@ -8,7 +8,7 @@ use bevy_keratin::{
     plant::{HairPreset, Planting, Scalp},
     render::{
         DrawnStrand, HairFollowers,
-        curve::{Guide, drawn_strands, strand_point},
+        curve::{DrawnSolid, Guide, drawn_strands, strand_point},
     },
 };
 
@@ -21,6 +21,7 @@ struct Worn {
     followers: HairFollowers,
     width: f32,
     scalp: Scalp,
+    skin: Vec<DrawnSolid>,
 }
 
 impl Worn {
@@ -38,12 +39,13 @@ impl Worn {
         let strands = drawn_strands(&nodes, Some(&roots), &settings.followers);
         println!("{preset:?}: {} guides, {} strands", guides.len(), strands.len());
         let width = settings.look.width;
-        Self { guides, strands, followers: settings.followers, width, scalp }
+        let skin = vec![DrawnSolid::ball(Vec3::ZERO, RADIUS).unwrap()];
+        Self { guides, strands, followers: settings.followers, width, scalp, skin }
     }
 
     fn at(&self, strand: &DrawnStrand, t: f32) -> Vec3 {
         let guide = |i: u32| Guide { nodes: &self.guides[i as usize], ..default() };
-        strand_point(strand, guide, t, &self.followers).position
+        strand_point(strand, guide, t, &self.followers, &self.skin).position
     }
 
     fn drawn(&self) -> impl Iterator<Item = &DrawnStrand> {
@@ -51,12 +53,11 @@ impl Worn {
     }
 }
 
-/// T12. Roots are under the skin and not yet drawn there; all other rings are outside but for a few:
-/// 0.15 % are deeper than 0.5 mm, the deepest by 8.3 mm. The aim is 0.1 % and 2 mm, which needs followers
-/// that are pushed out of the skin.
+/// T12. Roots are under the skin and not yet drawn there; all other rings are outside. Without a collider in
+/// the skin's place 0.15 % were deeper than 0.5 mm, the deepest by 8.3 mm.
 #[test]
 fn drawn_strands_stay_out_of_the_skin() {
-    for preset in [HairPreset::Straight] {
+    for preset in [HairPreset::Straight, HairPreset::Curly] {
         let worn = Worn::new(preset);
         let (mut rings, mut deep, mut worst) = (0u32, 0u32, 0.0f32);
         for strand in worn.drawn().step_by(5) {
@@ -72,7 +73,7 @@ fn drawn_strands_stay_out_of_the_skin() {
         }
         let share = deep as f32 / rings as f32;
         println!("{preset:?}: {share} deeper than 0.5 mm, deepest {} mm", worst * 1e3);
-        assert!(share < 0.002 && worst < 9e-3, "{preset:?}: {share} {worst}");
+        assert!(share < 1e-3 && worst < 2e-3, "{preset:?}: {share} {worst}");
     }
 }
 
@@ -144,7 +145,7 @@ fn locks_have_sizes_and_no_period() {
         let mut density = vec![0.0f32; bins];
         for strand in strands.iter().filter(|strand| !strand.is_guide) {
             let guide = |i: u32| Guide { nodes: &guides[i as usize], ..default() };
-            let x = (strand_point(strand, guide, 0.6, &followers).position.x - 0.01) / BIN;
+            let x = (strand_point(strand, guide, 0.6, &followers, &[]).position.x - 0.01) / BIN;
             if x >= 0.0 && x < bins as f32 {
                 density[x as usize] += 1.0;
             }

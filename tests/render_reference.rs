@@ -79,7 +79,9 @@ impl Bench {
         let sun = DirectionalLight { shadow_maps_enabled: true, ..default() };
         let sun = world.spawn((sun, cascades.build())).id();
         let followers = HairFollowers { segments: 4, ..HairFollowers::none() };
-        let hair = world.spawn((Hair, followers)).id();
+        // Every strand as wide as it is.
+        let detail = HairDetail { least_width: 0.0, ..default() };
+        let hair = world.spawn((Hair, followers, detail)).id();
         for points in strands {
             world.spawn((StrandOf(hair), Strand::from_polyline(points).unwrap()));
         }
@@ -88,7 +90,8 @@ impl Bench {
             let black =
                 StandardMaterial { base_color: Color::BLACK, reflectance: 0.0, ..default() };
             let black = world.resource_mut::<Assets<StandardMaterial>>().add(black);
-            world.spawn((Mesh3d(mesh), MeshMaterial3d(black)));
+            let solid = HairCollider::sphere(0.0495).unwrap();
+            world.spawn((Mesh3d(mesh), MeshMaterial3d(black), solid));
         }
         Some(Self { scene, sun, hair })
     }

@@ -6,6 +6,7 @@ mod common;
 mod offscreen;
 
 use bevy::{
+    math::Affine3A,
     prelude::*,
     render::{
         RenderApp,
@@ -21,17 +22,20 @@ use bevy::{
     },
     shader::ShaderDefVal,
 };
-use bevy_keratin::render::{
-    DrawnStrand, HairFollowers, LockOffset,
-    curve::{CurvePoint, Guide, strand_point},
-    fibre::{Angles, Optics, Passage},
+use bevy_keratin::{
+    contact::ColliderShape,
+    render::{
+        DrawnStrand, HairFollowers, LockOffset,
+        curve::{CurvePoint, DrawnSolid, Guide, strand_point},
+        fibre::{Angles, Optics, Passage},
+    },
 };
 use offscreen::Offscreen;
 
 const SAMPLES: usize = 24;
 const SHADER: &str = "
 #import bevy_keratin::strands::{strands, strand_point, past_strand_position}
-@group(0) @binding(5) var<storage, read_write> out: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read_write> out: array<vec4<f32>>;
 @compute @workgroup_size(1)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let t = f32(id.y) / f32(SAMPLES - 1u);
@@ -132,12 +136,12 @@ fn random_lock(random: &mut Random) -> LockOffset {
     LockOffset { root: random.vector() * 0.02, weights: [-u - v, u, v] }
 }
 
-/// What a compute shader writes to its last binding, given a uniform and four buffers.
+/// What a compute shader writes to its last binding, given a uniform and five buffers.
 fn compute(
     scene: &mut Offscreen,
     source: &'static str,
     shader_defs: Vec<ShaderDefVal>,
-    inputs: [&[u32]; 5],
+    inputs: [&[u32]; 6],
     [x, y]: [u32; 2],
     numbers: usize,
 ) -> Vec<f32> {
@@ -150,6 +154,7 @@ fn compute(
             ShaderStages::COMPUTE,
             (
                 uniform_buffer_sized(false, None),
+                read(),
                 read(),
                 read(),
                 read(),
@@ -200,7 +205,7 @@ fn compute(
     let out = made(storage | BufferUsages::COPY_SRC);
     let back = made(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
     let uniform = buffer(inputs[0], BufferUsages::UNIFORM);
-    let [a, b, c, d] = [1, 2, 3, 4].map(|i| buffer(inputs[i], storage));
+    let [a, b, c, d, e] = [1, 2, 3, 4, 5].map(|i| buffer(inputs[i], storage));
     let group = device.create_bind_group(
         None,
         &pipelines.get_bind_group_layout(&layout),
@@ -210,6 +215,7 @@ fn compute(
             b.as_entire_binding(),
             c.as_entire_binding(),
             d.as_entire_binding(),
+            e.as_entire_binding(),
             out.as_entire_binding(),
         )),
     );
@@ -259,6 +265,18 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     ribbon[27] = followers.lock_shape;
     (ribbon[16], ribbon[17], ribbon[18]) =
         (followers.clump, followers.parting, followers.wet_clump);
+    // Two solids among the strands, one of them turned.
+    let place = Affine3A::from_rotation_translation(Quat::from_rotation_z(0.7), Vec3::Y * -0.1);
+    let capsule = ColliderShape::Capsule(Capsule3d::new(0.03, 0.05));
+    let solids = [
+        DrawnSolid::ball(Vec3::new(0.02, -0.03, 0.01), 0.04).unwrap(),
+        DrawnSolid::new(&capsule, &place).unwrap(),
+    ];
+    let mut frame = [0u32; 4 + 16 * 16];
+    frame[3] = solids.len() as u32;
+    for (k, solid) in solids.iter().enumerate() {
+        frame[4 + 16 * k..][..16].copy_from_slice(&solid.packed());
+    }
     let packed: Vec<[u32; 32]> = strands.iter().map(DrawnStrand::packed).collect();
 
     let defs =
@@ -269,6 +287,7 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         ranges.as_flattened(),
         packed.as_flattened(),
         &[0][..],
+        &frame[..],
     ];
     let groups = [strands.len() as u32, SAMPLES as u32];
     let out = compute(&mut scene, SHADER, defs, inputs, groups, strands.len() * SAMPLES * 12);
@@ -283,25 +302,26 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     let dry = |k: u32| Guide { moisture: &[], ..now(k) };
     let parted = HairFollowers { parting: 1e6, ..followers };
     let [mut worst, mut worst_past] = [0.0f32; 2];
-    let [mut parts, mut drawn_in] = [0; 2];
+    let [mut parts, mut drawn_in, mut pushed] = [0; 3];
     for (k, strand) in strands.iter().enumerate() {
         for i in 0..SAMPLES {
             let t = i as f32 / (SAMPLES - 1) as f32;
-            let twin = strand_point(strand, now, t, &followers);
+            let twin = strand_point(strand, now, t, &followers, &solids);
             let at = 3 * (k * SAMPLES + i);
             worst = worst.max(vector(at).distance(twin.position));
             worst = worst.max(vector(at + 1).distance(twin.slope) * 0.01);
-            let past = strand_point(strand, before, t, &followers).position;
+            let past = strand_point(strand, before, t, &followers, &solids).position;
             worst_past = worst_past.max(vector(at + 2).distance(past));
             let differs = |other: CurvePoint| other.position.distance(twin.position) > 1e-4;
-            parts += u32::from(differs(strand_point(strand, now, t, &parted)));
-            drawn_in += u32::from(differs(strand_point(strand, dry, t, &followers)));
+            parts += u32::from(differs(strand_point(strand, now, t, &parted, &solids)));
+            drawn_in += u32::from(differs(strand_point(strand, dry, t, &followers, &solids)));
+            pushed += u32::from(differs(strand_point(strand, now, t, &followers, &[])));
         }
     }
     println!("largest difference {worst} m, in the frame before {worst_past} m");
-    println!("{parts} points where guides had parted, {drawn_in} that water had drawn in");
+    println!("{parts} points of parted guides, {drawn_in} drawn in by water, {pushed} pushed out");
     assert!(worst < 1e-5 && worst_past < 1e-5, "shader and twin differ by {worst}, {worst_past} m");
-    assert!(parts > 100 && drawn_in > 100, "the data must contain parted and wet guides");
+    assert!(parts > 100 && drawn_in > 100 && pushed > 100, "the data must contain all kinds");
 }
 
 const FIBRE: &str = "
@@ -310,12 +330,12 @@ const FIBRE: &str = "
 @group(0) @binding(1) var<storage, read> fibres: array<array<vec4<f32>, 4>>;
 @group(0) @binding(2) var<storage, read> unused: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> unused_too: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read_write> out: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read_write> out: array<vec4<f32>>;
 @compute @workgroup_size(1)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let f = fibres[id.x];
     let a = angles_of(tangent.xyz, f[2].xyz, f[3].xyz);
-    let o = Optics(f[0].xyz, f[0].w, 0.8, 1.2, f[1].x, f[2].w);
+    let o = Optics(f[0].xyz, f[0].w, 0.8, 1.2, f[1].x, f[2].w, 1.5 * f[1].x);
     let keep = (unused[0].x + unused_too[0].x) * 0.0;
     out[id.x] = vec4(scattered(a, o, Passage(f[1].y, f[1].z, f[1].w), f[3].w) + keep, 1.0);
 }
@@ -345,7 +365,7 @@ fn the_shader_lights_fibres_as_its_rust_twin_does() {
     let words: Vec<u32> = fibres.iter().flatten().flat_map(bits).collect();
     let tangent_words = bits(&tangent.extend(0.0));
     let none = &[0; 4][..];
-    let inputs = [&tangent_words[..], &words[..], none, none, none];
+    let inputs = [&tangent_words[..], &words[..], none, none, none, none];
     let out = compute(&mut scene, FIBRE, Vec::new(), inputs, [COUNT as u32, 1], 4 * COUNT);
     let (mut worst, mut sum) = (0.0f32, 0.0);
     for (f, sent) in fibres.iter().zip(out.chunks_exact(4)) {
@@ -356,6 +376,7 @@ fn the_shader_lights_fibres_as_its_rust_twin_does() {
             through: 1.2,
             wet: f[1].x,
             tilt: f[2].w,
+            film: 1.5 * f[1].x,
         };
         let angles = Angles::of(tangent, f[2].truncate(), f[3].truncate());
         let passage = Passage { lit: f[1].y, depth: f[1].z, behind: f[1].w };

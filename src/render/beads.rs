@@ -142,8 +142,9 @@ impl Material for BeadMaterial {
         SHADER.into()
     }
 
-    fn alpha_mode(&self) -> AlphaMode {
-        AlphaMode::Premultiplied
+    /// Drawn after everything solid, of which it gets a copy to look through.
+    fn reads_view_transmission_texture(&self) -> bool {
+        true
     }
 
     fn enable_prepass() -> bool {

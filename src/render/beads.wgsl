@@ -1,11 +1,11 @@
-// Drops of water: squares that face the eye, on which clear spheres are shaded.
+// Drops of water: squares that face the eye, on which clear spheres are shaded that bend the light of what
+// is behind them.
 
-#import bevy_pbr::mesh_view_bindings::view
+#import bevy_pbr::mesh_view_bindings::{view, view_transmission_texture}
 #import bevy_pbr::mesh_bindings::mesh
 #import bevy_pbr::view_transformations::position_world_to_clip
-#import bevy_pbr::pbr_types::{
-    pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT, STANDARD_MATERIAL_FLAGS_ALPHA_MODE_PREMULTIPLIED,
-}
+#import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
+#import bevy_pbr::transmission::fetch_transmissive_background_non_rough
 #import bevy_pbr::pbr_functions::{apply_pbr_lighting, main_pass_post_lighting_processing}
 
 struct Bead {
@@ -32,6 +32,9 @@ struct BeadVertex {
     @location(2) along: vec3<f32>,
     @location(3) across: vec3<f32>,
     @location(4) @interpolate(flat) instance: u32,
+    // Half its length and width (m).
+    @location(5) @interpolate(flat) size: vec2<f32>,
+    @location(6) @interpolate(flat) center: vec3<f32>,
 }
 
 fn toward_eye(position: vec3<f32>) -> vec3<f32> {
@@ -69,7 +72,37 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> B
     out.position = position_world_to_clip(world);
     out.disc = vec3(side, size.x * size.y / (drawn.x * drawn.y));
     out.instance = instance;
+    out.size = drawn;
+    out.center = bead.position;
     return out;
+}
+
+// How far behind it a bead's light is taken to come from, in its radii.
+const BEHIND: f32 = 3.0;
+// The index of refraction of water.
+const WATER: f32 = 1.33;
+
+// What has been drawn behind the beads at a place of the world.
+fn background(place: vec3<f32>, frag_coord: vec4<f32>) -> vec4<f32> {
+    let clip = view.clip_from_world * vec4(place, 1.0);
+    let part = clip.xy / max(clip.w, 1e-6) * vec2(0.5, -0.5) + 0.5;
+    let size = vec2<f32>(textureDimensions(view_transmission_texture));
+    let at = (clamp(part, vec2(0.0), vec2(1.0)) * view.viewport.zw + view.viewport.xy) / size;
+    return fetch_transmissive_background_non_rough(at, frag_coord.xyz);
+}
+
+// Light that comes through the sphere, refracted where it goes in and where it comes out.
+fn refracted(in: BeadVertex, normal: vec3<f32>, eye: vec3<f32>) -> vec3<f32> {
+    let inside = refract(vec3(0.0, 0.0, -1.0), normal, 1.0 / WATER);
+    let exit = normal - 2.0 * dot(normal, inside) * inside;
+    let onward = refract(inside, -exit, WATER);
+    let far = exit + BEHIND * onward;
+    let place = in.center + in.along * (far.x * in.size.x) + in.across * (far.y * in.size.y)
+        + eye * (far.z * in.size.y);
+    let seen = background(place, in.position);
+    // What is nearer than the bead is not seen through it.
+    let straight = background(in.world_position, in.position);
+    return mix(straight.rgb, seen.rgb, seen.a);
 }
 
 @fragment
@@ -79,7 +112,8 @@ fn fragment(in: BeadVertex) -> @location(0) vec4<f32> {
         discard;
     }
     let eye = toward_eye(in.world_position);
-    let normal = normalize(in.along * in.disc.x + in.across * in.disc.y + eye * sqrt(1.0 - square));
+    let own = vec3(in.disc.xy, sqrt(1.0 - square));
+    let normal = normalize(in.along * own.x + in.across * own.y + eye * own.z);
 
     var pbr = pbr_input_new();
     pbr.flags = mesh[in.instance].flags;
@@ -89,17 +123,14 @@ fn fragment(in: BeadVertex) -> @location(0) vec4<f32> {
     pbr.world_normal = normal;
     pbr.N = normal;
     pbr.V = eye;
-    // Water: index of refraction 1.33. Light that enters comes out on the far side.
     pbr.material.reflectance = vec3(0.354);
     pbr.material.perceptual_roughness = 0.22;
-    pbr.material.base_color = vec4(vec3(0.45), 1.0);
+    // What lamps throw through the drop onto its far side.
+    pbr.material.base_color = vec4(vec3(0.12), 1.0);
     pbr.material.diffuse_transmission = 1.0;
-    pbr.material.flags = STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT
-        | STANDARD_MATERIAL_FLAGS_ALPHA_MODE_PREMULTIPLIED;
-    let light = apply_pbr_lighting(pbr).rgb;
-    // Clear in the middle; toward the rim what is behind is bent out of sight.
-    let rim = square * square;
-    let hides = mix(0.12, 0.75, rim);
-    let shown = main_pass_post_lighting_processing(pbr, vec4(light, 1.0)).rgb;
-    return vec4(shown, hides) * in.disc.z;
+    pbr.material.flags = STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT;
+    let mirrored = 0.02 + 0.98 * pow(1.0 - own.z, 5.0);
+    let light = apply_pbr_lighting(pbr).rgb + (1.0 - mirrored) * refracted(in, own, eye);
+    let shown = mix(background(in.world_position, in.position).rgb, light, in.disc.z);
+    return main_pass_post_lighting_processing(pbr, vec4(shown, 1.0));
 }

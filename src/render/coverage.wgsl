@@ -16,14 +16,22 @@ fn scramble(seed: u32) -> u32 {
 }
 
 // Which samples of its pixel a strand that covers `share` of it lights.
+//
+// How many is rounded by a lot. Lots of neighbouring pixels differ as much as they can (Roberts' R2
+// sequence), so that a few pixels along a strand have its mean: that is less to be seen than dots. Each
+// strand goes through the sequence its own way, or strands would hide one another all along.
 fn covered_samples(share: f32, seed: u32, frag_coord: vec2<f32>) -> u32 {
-    let pixel = vec2<u32>(frag_coord);
     // Temporal antialiasing shifts the view by parts of a pixel, each time another lot.
     let jitter = bitcast<u32>(view.clip_from_view[2].x) ^ (bitcast<u32>(view.clip_from_view[2].y) << 1u);
-    let lot = scramble(seed ^ scramble(pixel.x ^ scramble(pixel.y ^ jitter)));
-    let part = f32(lot >> 8u) / 16777216.0;
+    let own = scramble(seed ^ jitter);
+    let turned = scramble(own);
+    let pixel = vec2<u32>(frag_coord);
+    var way = select(pixel, pixel.yx, (turned & 1u) != 0u);
+    way.x = select(way.x, ~way.x, (turned & 2u) != 0u);
+    let part = f32((own + way.x * 3242174889u + way.y * 2447445414u) >> 8u) / 16777216.0;
     let count = min(u32(max(share, 0.0) * f32(SAMPLES) + part), SAMPLES);
-    let turn = lot % SAMPLES;
+    let turn = (turned + way.y * 3242174889u + way.x * 1640531527u) >> 16u;
     let row = (1u << count) - 1u;
-    return ((row << turn) | (row >> (SAMPLES - turn))) & ((1u << SAMPLES) - 1u);
+    let first = turn % SAMPLES;
+    return ((row << first) | (row >> (SAMPLES - first))) & ((1u << SAMPLES) - 1u);
 }

@@ -10,6 +10,8 @@ use super::{
 };
 use bevy::prelude::*;
 
+pub use super::solids::DrawnSolid;
+
 /// A point on a curve and the derivative by the share of the length.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CurvePoint {
@@ -75,12 +77,13 @@ pub fn drawn_strands(
 }
 
 /// The point at `t` (0 root, 1 tip) of a drawn strand, in the hair's frame; `guide` gives the guides
-/// by their index.
+/// by their index. Pushed out of `solids`.
 pub fn strand_point<'a>(
     strand: &DrawnStrand,
     guide: impl Fn(u32) -> Guide<'a>,
     t: f32,
     followers: &HairFollowers,
+    solids: &[DrawnSolid],
 ) -> CurvePoint {
     let reach = strand.length.min(1.0) - strand.phase;
     // A strand longer than its guides has their shape, scaled.
@@ -147,10 +150,12 @@ pub fn strand_point<'a>(
     let tight = most * moisture * t * (2.0 - t);
     let tighter = most * (rise * pace * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
     let inward = near_point.position - loose;
-    CurvePoint {
-        position: loose + inward * tight,
-        slope: loose_slope.lerp(near_point.slope * pace, tight) + inward * tighter,
+    let mut position = loose + inward * tight;
+    let mut slope = loose_slope.lerp(near_point.slope * pace, tight) + inward * tighter;
+    for solid in solids {
+        solid.push(t * strand.size, &mut position, &mut slope);
     }
+    CurvePoint { position, slope }
 }
 
 /// A value and its derivative.
@@ -291,7 +296,7 @@ mod tests {
         let followers = HairFollowers { clump: 0.0, parting: 5.0, frizz: 0.0, ..default() };
         let tip = |right: &[Vec3]| {
             let guide = |i| Guide { nodes: if i == 0 { &left } else { right }, moisture: &[] };
-            strand_point(&strand, guide, 1.0, &followers).position
+            strand_point(&strand, guide, 1.0, &followers, &[]).position
         };
         let root = Vec3::X * -0.002;
         assert!(tip(&right).distance(BENT[3] + root) < 1e-6);
@@ -310,7 +315,7 @@ mod tests {
         };
         let followers = HairFollowers { wet_clump: 0.8, clump: 0.0, frizz: 0.0, ..default() };
         let point = |t: f32, moisture: &[f32]| {
-            strand_point(&strand, |_| Guide { nodes: &BENT, moisture }, t, &followers)
+            strand_point(&strand, |_| Guide { nodes: &BENT, moisture }, t, &followers, &[])
         };
         let apart = |t, moisture: &[f32]| {
             point(t, moisture).position.distance(guide_point(&BENT, t).position)
@@ -346,7 +351,7 @@ mod tests {
         let nodes = [&BENT[..], &other];
         let at = |t: f32| {
             let of = |i: u32| Guide { nodes: nodes[i as usize], ..default() };
-            strand_point(&strand, of, t, &followers)
+            strand_point(&strand, of, t, &followers, &[])
         };
         assert!(at(0.0).position.distance(Vec3::Z * 0.004) < 1e-5, "{}", at(0.0).position);
         for k in 1..60 {

@@ -6,7 +6,9 @@ use super::{
     drawn_strand::{DrawnStrand, GuideRoot},
     elsewhere::DrawnElsewhere,
     follower_roots::FollowerRoots,
-    material::{Ribbon, RibbonKey, RibbonMaterial, ribbon_mesh},
+    frame::{DrawnFrame, PackedFrame},
+    material::{Ribbon, RibbonKey, RibbonMaterial},
+    ribbon_mesh::{RibbonLevel, RibbonMeshes},
     scatter::scatter,
     sets::Interpolate,
     thickness::Thickness,
@@ -76,13 +78,13 @@ pub(super) fn appear(
     bald: Query<(Entity, Option<&HairBuffers>), (With<Packed>, Without<Hair>)>,
 ) {
     for hair in &hairs {
-        commands.entity(hair).insert(Packed::default());
+        commands.entity(hair).insert((Packed::default(), DrawnFrame::default()));
     }
     for (entity, buffers) in &bald {
         if let Some(buffers) = buffers {
             commands.entity(buffers.drawn).try_despawn();
         }
-        commands.entity(entity).remove::<(Packed, HairBuffers)>();
+        commands.entity(entity).remove::<(Packed, DrawnFrame, HairBuffers)>();
     }
 }
 
@@ -109,7 +111,7 @@ pub(super) fn pack(
     followers: Settings<HairFollowers>,
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
     device: Option<Res<RenderDevice>>,
-    mut meshes: ResMut<Assets<Mesh>>,
+    (mut known_meshes, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
     mut materials: ResMut<Assets<RibbonMaterial>>,
     mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
 ) {
@@ -201,10 +203,12 @@ pub(super) fn pack(
             guides: add(bytemuck::cast_slice(&ranges)),
             strands: add(&pack_strands(&strands)),
             streaks: add(&packed.pack_streaks()),
+            frame: add(bytemuck::bytes_of(&PackedFrame::default())),
         };
         let (nodes, guides) = (material.nodes.clone(), material.guides.clone());
-        let strands = material.strands.clone();
-        let mesh = meshes.add(ribbon_mesh(counts.1, settings.segments));
+        let (strands, frame) = (material.strands.clone(), material.frame.clone());
+        let level = RibbonLevel::full(counts.1, settings.segments);
+        let mesh = known_meshes.get(level, &mut meshes);
         let material = MeshMaterial3d(materials.add(material));
         let parts = (Mesh3d(mesh), material, around(packed.margin), NoAutoAabb);
         // The child entity is kept, with the components that a game has put on it.
@@ -223,6 +227,7 @@ pub(super) fn pack(
             nodes,
             guides,
             strands,
+            frame,
             guide_count: counts.0,
             strand_count: counts.1,
             drawn,
@@ -236,6 +241,11 @@ fn buffer(bytes: &[u8]) -> ShaderBuffer {
 }
 
 impl Packed {
+    /// Straight segments of each drawn strand.
+    pub(super) fn segments(&self) -> u32 {
+        self.followers.map_or(1, |followers| followers.segments)
+    }
+
     /// Updates the streaks; returns whether they have changed.
     fn update_streaks(&mut self, dye: &HairDye) -> bool {
         let streaks = || dye.layers.iter().map(|layer| layer.streaks);

@@ -14,6 +14,13 @@ const TILT: f32 = 0.035;
 const DRY_SURFACE: f32 = 0.0465;
 const WET_SURFACE: f32 = 0.0058;
 const FILM_SURFACE: f32 = 0.02;
+// In water light is mirrored less inside than Schlick's form says: by the exact equations at 60 degrees.
+const WET_INSIDE: f32 = 0.7;
+// By how much water narrows a fibre's own lobes: it fills the scales' edges, and bends light less. Light of
+// many fibres keeps its spread, which is their disarray.
+const WET_SLEEK: f32 = 0.24;
+// Variance of the film's lobe (rad^2): it lies over the scales, smooth as the lock is straight.
+const FILM_VARIANCE: f32 = 0.0064;
 // Concentrations of TT and TRT around the fibre (1/rad^2) and the light in them, after Karis.
 const TT_FOCUS: f32 = 3.65;
 const TRT_FOCUS: f32 = 17.0;
@@ -28,6 +35,7 @@ struct Optics {
     through: f32,           // strength of TT, 1 is a whole fibre
     wet: f32,               // 0 dry ... 1 in water
     tilt: f32,              // of this fibre's piece against the others' (rad)
+    film: f32,              // strength of what the film of water reflects
 }
 
 // How light comes to a fibre and goes to the eye.
@@ -96,9 +104,10 @@ fn lobes(a: Angles, o: Optics, depth: f32) -> vec3<f32> {
 
     // R: off the cuticle, uncoloured; off the film of water too, which has no scales.
     let grazing = a.cos_d * a.cos_half;
+    let sleek = o.variance * mix(1.0, WET_SLEEK, o.wet);
     let surface = 0.25 * a.cos_half
-        * (fresnel(f0, grazing) * along(a, o.variance + spread, o.tilt - 2.0 * TILT)
-            + o.wet * fresnel(FILM_SURFACE, grazing) * along(a, o.variance + spread, o.tilt));
+        * (fresnel(f0, grazing) * along(a, sleek + spread, o.tilt - 2.0 * TILT)
+            + o.film * fresnel(FILM_SURFACE, grazing) * along(a, FILM_VARIANCE + spread, o.tilt));
 
     // TT: straight through. Of the angle, this fibre's share is its own; what the surface reflects
     // away is the mean over the width, which keeps the energy at all angles.
@@ -107,14 +116,14 @@ fn lobes(a: Angles, o: Optics, depth: f32) -> vec3<f32> {
     let f_tt = fresnel(f0, 0.78 * a.cos_d);
     let cos_tt = sqrt(saturate(1.0 - h * h * ratio * ratio));
     let tt = TT_SHARE * around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi)
-        * along(a, 0.25 * o.variance + spread, o.tilt + TILT) * (1.0 - f_tt) * (1.0 - f_tt)
+        * along(a, 0.25 * sleek + spread, o.tilt + TILT) * (1.0 - f_tt) * (1.0 - f_tt)
         * exp(-2.0 * cos_tt / cos_inside * o.absorption);
 
     // TRT: off the far wall inside, most of it at h = sqrt(3) / 2.
-    let f_trt = fresnel(f0, 0.5 * a.cos_d);
+    let f_trt = fresnel(f0, 0.5 * a.cos_d) * mix(1.0, WET_INSIDE, o.wet);
     let cos_trt = sqrt(saturate(1.0 - 0.75 * ratio * ratio));
     let trt = TRT_SHARE * around(1.0 / (1.0 / TRT_FOCUS + turned), a.cos_phi)
-        * along(a, 4.0 * o.variance + spread, o.tilt + 4.0 * TILT)
+        * along(a, 4.0 * sleek + spread, o.tilt + 4.0 * TILT)
         * (1.0 - f_trt) * (1.0 - f_trt) * f_trt * exp(-4.0 * cos_trt / cos_inside * o.absorption);
     return o.gloss * (surface + trt) + o.through * tt;
 }
@@ -132,6 +141,7 @@ fn backward_share(o: Optics) -> vec3<f32> {
 // What fibres one behind the other make of light, each of which sends on `a_f` and back `a_b`.
 struct Bulk {
     reflectance: vec3<f32>, // of so many layers
+    transmittance: vec3<f32>,
     bounces: f32,           // mean number of fibres on the way back out
 }
 
@@ -142,8 +152,11 @@ fn bulk_of(a_f: vec3<f32>, a_b: vec3<f32>, layers: f32) -> Bulk {
     let root = sqrt(max(k * k - 4.0 * a_b * a_b, vec3(1e-6)));
     let endless = (k - root) / (2.0 * a_b);
     let one = a_f / (1.0 - a_b * endless);
-    let left = exp(2.0 * max(layers, 1.0) * log(clamp(one, vec3(1e-6), vec3(1.0))));
-    out.reflectance = endless * (1.0 - left) / (1.0 - endless * endless * left);
+    let through = exp(max(layers, 1.0) * log(clamp(one, vec3(1e-6), vec3(1.0))));
+    let left = through * through;
+    let inner = max(1.0 - endless * endless * left, vec3(1e-6));
+    out.reflectance = endless * (1.0 - left) / inner;
+    out.transmittance = through * (1.0 - endless * endless) / inner;
     let bounces = (1.0 + a_f * a_f - a_b * a_b) / root;
     out.bounces = 1.0 / (3.0 / (bounces.x + bounces.y + bounces.z) + 1.0 / max(layers, 1.0));
     return out;

@@ -149,7 +149,7 @@ mod tests {
         let nodes: Vec<[Vec3; 2]> = guides.iter().map(|g| [g.place, g.place + g.reach]).collect();
         let at = |t| {
             let of = |i: u32| Guide { nodes: &nodes[i as usize], ..default() };
-            strand_point(strand, of, t, &plain(0)).position
+            strand_point(strand, of, t, &plain(0), &[]).position
         };
         (at(0.0), at(1.0))
     }

@@ -10,8 +10,8 @@ setting! {
     /// [`HairDefault<HairFollowers>`](crate::HairDefault) holds.
     ///
     /// A follower grows between up to three near guides and blends their shapes. Where these guides
-    /// move apart it follows only the nearest. [`FollowerRoots`](super::FollowerRoots) says where
-    /// followers grow if that is known.
+    /// move apart it follows only the nearest. Balls, capsules and ellipsoids that hair collides with
+    /// push it out. [`FollowerRoots`](super::FollowerRoots) says where followers grow if that is known.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairFollowers {

@@ -204,7 +204,7 @@ mod tests {
         let nodes: Vec<[Vec3; 2]> = guides.iter().map(|g| [g.place, g.place + g.reach]).collect();
         let settings = HairFollowers { clump: 0.0, frizz: 0.0, locks, ..default() };
         let of = |i: u32| Guide { nodes: &nodes[i as usize], ..default() };
-        let tip = |strand: &DrawnStrand| strand_point(strand, of, 1.0, &settings).position;
+        let tip = |strand: &DrawnStrand| strand_point(strand, of, 1.0, &settings, &[]).position;
         let tips: Vec<Vec3> = drawn.iter().map(tip).collect();
         let tree = KdTree::new(tips.iter().copied().zip(0u32..));
         let near = |p: &Vec3| tree.nearest::<8>(*p).map(|(_, square)| square.sqrt()).sum::<f32>();
@@ -232,7 +232,7 @@ mod tests {
         let settings = HairFollowers { clump: 0.0, locks: Vec3::splat(0.6), ..default() };
         let mut worst = 0.0f32;
         for strand in &drawn {
-            let at = |k: u32| strand_point(strand, of, k as f32 / 24.0, &settings).position;
+            let at = |k: u32| strand_point(strand, of, k as f32 / 24.0, &settings, &[]).position;
             let length: f32 = (0..24).map(|k| at(k).distance(at(k + 1))).sum();
             worst = worst.max((length / (strand.size * (1.0 - strand.phase)) - 1.0).abs());
         }

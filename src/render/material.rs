@@ -1,14 +1,14 @@
-//! The material of ribbons, and the mesh of their corner indices.
+//! The material of ribbons.
 
-use super::{HairFollowers, HairView, thickness::Thickness};
+use super::{
+    HairFollowers, HairView,
+    ribbon_mesh::{CORNER, DrawOrder},
+    thickness::Thickness,
+};
 use crate::look::{HairDye, HairLook, HairShading, MOST_LAYERS};
 use bevy::{
-    asset::RenderAssetUsages,
     material::OpaqueRendererMethod,
-    mesh::{
-        Indices, MeshVertexAttribute, MeshVertexBufferLayoutRef, PrimitiveTopology,
-        VertexAttributeValues, VertexFormat,
-    },
+    mesh::MeshVertexBufferLayoutRef,
     pbr::{MaterialPipeline, MaterialPipelineKey},
     prelude::*,
     render::{
@@ -28,16 +28,19 @@ pub(super) struct RibbonMaterial {
     pub(super) key: RibbonKey,
     #[uniform(0)]
     pub(super) ribbon: Ribbon,
-    #[storage(1, read_only)]
+    #[storage(1, read_only, visibility(vertex))]
     pub(super) nodes: Handle<ShaderBuffer>,
-    #[storage(2, read_only)]
+    #[storage(2, read_only, visibility(vertex))]
     pub(super) guides: Handle<ShaderBuffer>,
-    #[storage(3, read_only)]
+    #[storage(3, read_only, visibility(vertex))]
     pub(super) strands: Handle<ShaderBuffer>,
     /// For each strand a bit mask of the layers of dye whose streaks it is in. Read only where a
     /// layer has streaks.
-    #[storage(4, read_only)]
+    #[storage(4, read_only, visibility(vertex))]
     pub(super) streaks: Handle<ShaderBuffer>,
+    /// What differs from frame to frame besides nodes.
+    #[storage(5, read_only, visibility(vertex, fragment))]
+    pub(super) frame: Handle<ShaderBuffer>,
 }
 
 /// Specialisation key of the shader.
@@ -87,6 +90,7 @@ pub(super) struct Ribbon {
     lock_shape: f32,
     root_fade: f32,
     dye_count: u32,
+    rank_step: u32,
     dyes: [Dye; MOST_LAYERS],
 }
 
@@ -152,6 +156,7 @@ impl Ribbon {
             lock_shape: followers.lock_shape,
             root_fade: look.root_fade,
             dye_count: dye.layers.len().min(MOST_LAYERS) as u32,
+            rank_step: DrawOrder::new(strands).rank_step(),
             dyes: dyes(dye),
         }
     }
@@ -159,11 +164,6 @@ impl Ribbon {
 
 const FORWARD: &str = "embedded://bevy_keratin/render/ribbon_forward.wgsl";
 const PREPASS: &str = "embedded://bevy_keratin/render/ribbon_prepass.wgsl";
-
-/// Corner, ring and strand of a vertex. An attribute rather than the vertex index, which depends on
-/// where Bevy allocates the mesh.
-const CORNER: MeshVertexAttribute =
-    MeshVertexAttribute::new("Hair_Corner", 0x6b65_7261_7469_6e01, VertexFormat::Uint32);
 
 impl Material for RibbonMaterial {
     fn vertex_shader() -> ShaderRef {
@@ -211,20 +211,4 @@ impl Material for RibbonMaterial {
         }
         Ok(())
     }
-}
-
-/// A mesh of only corner indices: two for each ring of each strand.
-pub(super) fn ribbon_mesh(strands: u32, segments: u32) -> Mesh {
-    let per_strand = 2 * (segments + 1);
-    let corners: Vec<u32> = (0..strands * per_strand).collect();
-    let mut indices = Vec::with_capacity((strands * segments * 6) as usize);
-    for strand in 0..strands {
-        for ring in 0..segments {
-            let a = strand * per_strand + 2 * ring;
-            indices.extend([a, a + 1, a + 2, a + 2, a + 1, a + 3]);
-        }
-    }
-    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
-        .with_inserted_attribute(CORNER, VertexAttributeValues::Uint32(corners))
-        .with_inserted_indices(Indices::U32(indices))
 }

@@ -1,19 +1,39 @@
 //! Draws the hair: simulated strands and many followers between them, from one buffer of nodes.
 //!
-//! Each [`Hair`] is one mesh and one draw call (one more for each shadow map). Once a frame its
-//! nodes are packed, interpolated by the fixed clock's overstep, and written to the GPU; all else
-//! happens in the vertex shader: curves through the nodes, followers between guides, ribbons that
-//! face the camera. Positions stay in the hair's frame up to there, so roots never lag behind the
+//! Each [`Hair`] is one draw call (one more for each shadow map), of a mesh that all hair with as many
+//! strands shares. Once a frame its nodes are packed, interpolated by the fixed clock's overstep, and
+//! written to the GPU; all else happens in the vertex shader: curves through the nodes, followers
+//! between guides, ribbons that face the camera. Followers are pushed out of the balls, capsules and
+//! ellipsoids among the [`HairCollider`](crate::HairCollider)s near them, at most sixteen; these also
+//! shade the hair behind them, for lights without shadow maps as well. Positions stay in the hair's
+//! frame up to there, so roots never lag behind the
 //! head.
 //!
 //! Water is drawn as beads: see [`HairBeads`].
 //!
 //! How it looks is edited at run time through components of the hair: [`HairLook`], [`HairDye`],
-//! [`HairFollowers`], [`HairView`]. For a look of your own write a material around [`HairBuffers`].
+//! [`HairFollowers`], [`HairDetail`], [`HairView`]. Far hair is drawn with fewer and wider strands,
+//! smoothly; [`HairDetail::strands`] is the switch for slow graphics devices. For a look of your own write a material around [`HairBuffers`].
 //!
 //! Vertex shaders read storage buffers, so this needs WebGPU or native, not WebGL2. Strands thinner
 //! than a pixel are drawn one pixel wide and cover a share of its samples equal to their coverage;
 //! without MSAA they cover some pixels and others not, which temporal antialiasing smooths.
+
+//! # Against path tracing
+//!
+//! Scenes of `tests/render_reference.rs`, rebuilt from path-traced ones of the same strands, melanin and light
+//! (Cycles' Chiang model, up to 512 bounces). Ratios of this renderer to the reference, for hair with no, a
+//! blond's, a brown's and a black's melanin; red where channels differ.
+//!
+//! | scene | none | blond | brown | black |
+//! |---|---|---|---|---|
+//! | flat tress, sun from the side | 0.67 | 0.90 | 1.16 | 1.18 |
+//! | ball, sun 60° aside, mean of the disc | 0.45 | 0.44 | 0.41 | 0.55 |
+//! | ball, sun behind, mean of the ring | 0.68 | 0.43 | 0.34 | 0.99 |
+//!
+//! Pigmented tresses are within 15 % and 0.01. Light that goes through many fibres of many directions is half
+//! of what it should be: hair is lit as a slab of parallel fibres. On a cylinder highlights lie within 2° of
+//! the reference (a unit test); under a sky of one colour white hair has 0.98 of it (`tests/render_look.rs`).
 
 #[doc(hidden)]
 pub mod curve;
@@ -22,16 +42,20 @@ pub mod fibre;
 
 mod beads;
 mod buffers;
+mod detail;
 mod draw;
 mod drawn_strand;
 mod elsewhere;
 mod follower_roots;
 mod followers;
+mod frame;
 mod locks;
 mod material;
+mod ribbon_mesh;
 mod scatter;
 mod screen_share;
 mod sets;
+mod solids;
 mod thickness;
 mod upload;
 mod view;
@@ -39,6 +63,7 @@ mod wet_look;
 
 pub use beads::{Bead, HairBeadSystems, HairBeads};
 pub use buffers::HairBuffers;
+pub use detail::HairDetail;
 pub use drawn_strand::{DrawnStrand, LockOffset};
 #[cfg(feature = "gpu")]
 pub(crate) use elsewhere::DrawnElsewhere;
@@ -99,6 +124,7 @@ impl Plugin for HairRenderPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<HairFollowers>(app);
         setting::plugin::<HairView>(app);
+        setting::plugin::<HairDetail>(app);
         app.insert_resource(Interpolate(self.interpolate))
             .init_resource::<HairBeads>()
             .register_type::<HairBeads>()
@@ -142,7 +168,8 @@ impl Plugin for HairRenderPlugin {
         app.add_plugins(MaterialPlugin::<RibbonMaterial>::default());
         // Bevy does not call `finish` of plugins added in `finish`.
         ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial>>::default().finish(app);
-        let draw = (draw::appear, draw::pack).chain().run_if(supported);
+        let draw = (draw::appear, draw::pack, frame::prepare).chain().run_if(supported);
+        app.init_resource::<ribbon_mesh::RibbonMeshes>();
         app.add_systems(PostUpdate, draw.in_set(HairRenderSystems)).configure_sets(
             PostUpdate,
             HairRenderSystems

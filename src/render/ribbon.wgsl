@@ -4,7 +4,9 @@
 
 #import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_view_bindings::view
-#import bevy_keratin::strands::{ribbon, strands, strand_point, strand_state, StrandState, DrawnStrand}
+#import bevy_keratin::strands::{
+    ribbon, strands, frame, strand_point, strand_alpha, strand_state, StrandState, DrawnStrand,
+}
 #ifdef MOTION_VECTOR_PREPASS
 #import bevy_keratin::strands::past_strand_position
 #endif
@@ -18,6 +20,8 @@ struct RibbonVertex {
     // The point of the strand beside which this is.
     center: vec3<f32>,
     tangent: vec3<f32>,
+    // From the middle of the lock that water draws together.
+    outward: vec3<f32>,
     // Of the hair's frame to the world.
     scale: f32,
     // 0 root ... 1 tip.
@@ -60,6 +64,10 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     if index >= ribbon.strands || (ribbon.view == VIEW_GUIDES && index >= ribbon.guides) {
         return out;
     }
+    let alpha = strand_alpha(index);
+    if alpha <= 0.0 {
+        return out;
+    }
     let strand = strands[index];
     let in_strand = corner - index * per_strand;
     out.along = f32(in_strand / 2u) / f32(ribbon.segments);
@@ -79,14 +87,15 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     let center = (world * vec4(point.position, 1.0)).xyz;
     out.center = center;
     out.tangent = safe_normalize(linear * point.slope, vec3(0.0, 1.0, 0.0));
+    out.outward = linear * point.outward;
     let eye = toward_eye(center);
 
     let own_width = select(strand.width, 1.0, strand.width < 0.0);
     out.grown = out.along * strand.size / max(ribbon.root_fade, 1e-9);
-    let width = scale * ribbon.width * own_width * mix(1.0, ribbon.taper, smoothstep(BLUNT, 1.0, out.along));
+    let width = scale * ribbon.width * frame.wider * own_width * mix(1.0, ribbon.taper, smoothstep(BLUNT, 1.0, out.along));
     // Of a shadow map, a texel.
     let drawn = max(width, pixel_size((view.clip_from_world * vec4(center, 1.0)).w));
-    out.share = width / max(drawn, 1e-9);
+    out.share = alpha * width / max(drawn, 1e-9);
     let across = safe_normalize(cross(out.tangent, eye), normalize(view.world_from_view[0].xyz));
     out.world_position = center + across * (side * drawn);
     return out;

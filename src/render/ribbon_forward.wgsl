@@ -14,6 +14,7 @@ const STRAIN_FULL: f32 = 0.05;
 
 struct ForwardVertex {
     @invariant @builtin(position) position: vec4<f32>,
+    // Of the middle of the strand: beside it a ribbon would lie in its own shadow.
     @location(0) world_position: vec3<f32>,
     @location(1) tangent: vec3<f32>,
     // Along the strand, value of the heat map, moisture, density of strands around.
@@ -22,6 +23,10 @@ struct ForwardVertex {
     @location(3) share: vec2<f32>,
     // And the layers of dye whose streaks it is in.
     @location(4) @interpolate(flat) seed: vec2<u32>,
+    // From the middle of the lock that water draws together.
+    @location(5) outward: vec3<f32>,
+    // Of the hair's frame.
+    @location(6) @interpolate(flat) instance: u32,
 }
 
 struct Fragment {
@@ -37,9 +42,11 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
         out.position = vec4(0.0, 0.0, 0.0, 1.0);
         return out;
     }
-    out.world_position = vertex.world_position;
+    out.world_position = vertex.center;
     out.position = position_world_to_clip(vertex.world_position);
     out.tangent = vertex.tangent;
+    out.outward = vertex.outward;
+    out.instance = instance;
     let strand = min(corner / (2u * (ribbon.segments + 1u)), arrayLength(&streaks) - 1u);
     out.seed = vec2(vertex.seed, streaks[strand]);
     out.share = vec2(vertex.share, vertex.grown);
@@ -82,6 +89,9 @@ fn fragment(in: ForwardVertex) -> Fragment {
     fibre.streaks = in.seed.y;
     fibre.moisture = saturate(in.along.z);
     fibre.density = in.along.w;
+    fibre.outward = in.outward;
+    fibre.share = in.share.x;
+    fibre.instance = in.instance;
     let lit = lit_hair(fibre);
 
     var pbr = pbr_input_new();

@@ -1,4 +1,4 @@
-//! How large hair is on the screen, for its level of detail.
+//! How large hair is on the screen, for its levels of detail.
 
 use super::HairBuffers;
 use crate::lod::{HairScreenShare, model::screen_share};
@@ -40,6 +40,24 @@ fn seen_in(camera: &Camera, from: &GlobalTransform, center: Vec3, radius: f32) -
         return clip.y_axis.y * radius;
     }
     screen_share(radius, from.translation().distance(center), clip.y_axis.y)
+}
+
+/// The size of a pixel (m) where a ball is nearest; `None` where it is out of sight.
+pub(super) fn pixel_in(
+    camera: &Camera,
+    from: &GlobalTransform,
+    center: Vec3,
+    radius: f32,
+) -> Option<f32> {
+    let height = camera.physical_viewport_size()?.y as f32;
+    let clip = camera.clip_from_view();
+    let ahead = (center - from.translation()).dot(*from.forward());
+    let away = match clip.w_axis.w == 1.0 {
+        true => 1.0,
+        false => (from.translation().distance(center) - radius).max(0.0),
+    };
+    let pixel = 2.0 * away / (clip.y_axis.y.abs() * height);
+    (ahead >= -radius && pixel.is_finite()).then_some(pixel)
 }
 
 #[cfg(test)]

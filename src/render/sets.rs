@@ -6,7 +6,7 @@ use bevy::{
 };
 
 /// The systems that draw: in `PostUpdate` after transforms have been propagated and before visibility
-/// is, and in the render world's `ExtractSchedule` the one write to the GPU.
+/// is, and in the render world's `ExtractSchedule` the writes to the GPU.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairRenderSystems;
 

@@ -11,7 +11,8 @@
 #import bevy_pbr::environment_map
 #endif
 #import bevy_render::maths::PI
-#import bevy_keratin::strands::{ribbon, hash}
+#import bevy_pbr::mesh_functions
+#import bevy_keratin::strands::{ribbon, frame, hash, DrawnSolid}
 #import bevy_keratin::fibre::{
     Optics, Passage, angles_of, scattered, forward_share, backward_share, bulk_of,
 }
@@ -31,6 +32,12 @@ struct Fibre {
     density: f32,
     // The layers of dye whose streaks it is in, a bit each.
     streaks: u32,
+    // From the middle of the lock that water draws together (m).
+    outward: vec3<f32>,
+    // Of what is drawn, that the strand covers: the rest of a pixel belongs to others.
+    share: f32,
+    // Of the hair's frame.
+    instance: u32,
 }
 
 // What a fibre is made of at one place.
@@ -38,6 +45,7 @@ struct Surface {
     optics: Optics,
     // Of all the hair, under light from all around.
     reflectance: vec3<f32>,
+    transmittance: vec3<f32>,
 }
 
 // How far strands keep their looks, as a share of the length: some millimetres.
@@ -72,20 +80,44 @@ fn dyed(natural: vec3<f32>, along: f32, in_streaks: u32) -> vec3<f32> {
 
 fn surface_of(fibre: Fibre) -> Surface {
     var surface: Surface;
+    // Strands in one pixel differ from their mean by the root of their number: what one sample sees of
+    // them would be noise.
+    let apart = sqrt(saturate(fibre.share));
     // Pigment varies from strand to strand; grey hair is a mixture with strands that have none.
-    let melanin = max(1.0 + ribbon.variation * (4.0 * hash(fibre.seed + 7u) - 2.0), 0.0)
+    let melanin = max(1.0 + apart * ribbon.variation * (4.0 * hash(fibre.seed + 7u) - 2.0), 0.0)
         * step(ribbon.grey, hash(fibre.seed + 17u));
     let natural = melanin * mix(ribbon.root_absorption, ribbon.tip_absorption, fibre.along);
     let absorption = dyed(natural, fibre.along, fibre.streaks);
     // No two strands are alike, nor two pieces of one: 15 % in roughness, 1.5 degrees in tilt.
-    let uneven = 1.0 + 0.15 * (2.0 * hash(fibre.seed + 11u) - 1.0);
-    let rough = clamp(ribbon.roughness * uneven * (1.0 - 0.3 * fibre.moisture), 0.05, 1.0);
-    let tilt = 0.026 * along_noise(fibre.seed, fibre.along);
+    let uneven = 1.0 + 0.15 * apart * (2.0 * hash(fibre.seed + 11u) - 1.0);
+    let rough = clamp(ribbon.roughness * uneven, 0.05, 1.0);
+    let tilt = 0.026 * apart * along_noise(fibre.seed, fibre.along);
     surface.optics = Optics(absorption, rough * rough * rough * rough, ribbon.gloss,
-        ribbon.backlight, fibre.moisture, tilt);
-    surface.reflectance = bulk_of(forward_share(surface.optics),
-        backward_share(surface.optics), ribbon.layers).reflectance;
+        ribbon.backlight, fibre.moisture, tilt, 0.0);
+    let bulk = bulk_of(forward_share(surface.optics), backward_share(surface.optics), ribbon.layers);
+    surface.reflectance = bulk.reflectance;
+    surface.transmittance = bulk.transmittance;
     return surface;
+}
+
+// Spread of the film's normals about a lock's own (1/rad^2), and the peak that makes their mean 1.
+const LOCK_FOCUS: f32 = 11.0;
+const LOCK_PEAK: f32 = 2.66;
+// From this far from its middle a strand lies on the surface of a lock (m).
+const LOCK_SURFACE: f32 = 1e-3;
+// Share of the film that lies so; the rest lies around the strands.
+const LOCK_STREAKS: f32 = 0.6;
+
+// A film of water covers a lock as a whole and mirrors about the lock's normal: how strongly where this
+// strand lies on it, against the mean over the lock.
+fn film_of(fibre: Fibre, l: vec3<f32>) -> f32 {
+    let h = l + fibre.eye;
+    let across = h - fibre.tangent * dot(h, fibre.tangent);
+    let out = fibre.outward - fibre.tangent * dot(fibre.outward, fibre.tangent);
+    let far = dot(out, out);
+    let facing = dot(across, out) * inverseSqrt(max(dot(across, across) * far, 1e-20));
+    let on = LOCK_STREAKS * smoothstep(0.0, LOCK_SURFACE, sqrt(far));
+    return fibre.moisture * mix(1.0, LOCK_PEAK * exp(LOCK_FOCUS * (facing - 1.0)), on);
 }
 
 // [W] equation 3: l to the light, v to the eye, t the tangent.
@@ -113,8 +145,9 @@ fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, p: Passage) -> vec3<f
         + bright * first.y * 0.35
         + bright * second.y * 0.5 * sqrt(body));
 #else
-    return scattered(
-        angles_of(fibre.tangent, l, fibre.eye), surface.optics, p, ribbon.layers);
+    var optics = surface.optics;
+    optics.film = film_of(fibre, l);
+    return scattered(angles_of(fibre.tangent, l, fibre.eye), optics, p, ribbon.layers);
 #endif
 }
 
@@ -123,6 +156,45 @@ fn way_of(fibre: Fibre, l: vec3<f32>) -> Way {
     let lt = dot(l, fibre.tangent);
     let sine = sqrt(max(1.0 - lt * lt, 0.0));
     return Way(fibre.position, fibre.density * sine, min(abs(lt) / max(sine, 0.1), 3.0));
+}
+
+// How far away the sun is (m).
+const FAR: f32 = 1e6;
+
+// How much of the way of light from a place is free of a solid: 0 where it goes through its middle.
+fn beside(solid: DrawnSolid, place: vec4<f32>, l: vec3<f32>, away: f32) -> f32 {
+    let begin = vec3(dot(solid.x, place), dot(solid.y, place), dot(solid.z, place));
+    let way = vec3(dot(solid.x.xyz, l), dot(solid.y.xyz, l), dot(solid.z.xyz, l));
+    let square = max(dot(way, way), 1e-12);
+    // Nearest places of the ray and of the segment, in turn.
+    var nearest = 0.0;
+    var t = 0.0;
+    for (var i = 0; i < 3; i++) {
+        t = clamp(dot(vec3(0.0, nearest, 0.0) - begin, way) / square, 0.0, away);
+        nearest = clamp(begin.y + t * way.y, -solid.half, solid.half);
+    }
+    let off = begin + t * way - vec3(0.0, nearest, 0.0);
+    // What lies on the surface is lit until light grazes it.
+    return select(smoothstep(0.8, 1.0, dot(off, off)), 1.0, t <= 0.0);
+}
+
+// How much of a light that shines from `l`, `away` metres from here, is let by solids that strands are
+// pushed out of: a head. Lights without shadow maps do not shine through a head either.
+fn past_solids(fibre: Fibre, l: vec3<f32>, away: f32) -> f32 {
+    var free = 1.0;
+    if frame.solid_count == 0u {
+        return free;
+    }
+    let world = mesh_functions::get_world_from_local(fibre.instance);
+    // Its inverse, for it turns and scales alike all ways.
+    let linear = mat3x3(world[0].xyz, world[1].xyz, world[2].xyz);
+    let square = max(dot(world[0].xyz, world[0].xyz), 1e-12);
+    let place = (fibre.position - world[3].xyz) * linear / square;
+    let toward = l * linear / square;
+    for (var i = 0u; i < frame.solid_count; i++) {
+        free = min(free, beside(frame.solids[i], vec4(place, 1.0), toward, away));
+    }
+    return free;
 }
 
 fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32> {
@@ -151,6 +223,7 @@ fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32>
     } else {
         p = point_passage(id, way_of(fibre, l), fibre.frag_coord.xy);
     }
+    strength *= past_solids(fibre, l, sqrt(square));
     return reflected(fibre, surface, l, p) * (*light).color_inverse_square_range.rgb * strength;
 }
 
@@ -177,7 +250,7 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         } else {
             p = sun_passage(i, way_of(fibre, l), view_z);
         }
-        light += reflected(fibre, surface, l, p) * (*sun).color.rgb;
+        light += reflected(fibre, surface, l, p) * (*sun).color.rgb * past_solids(fibre, l, FAR);
     }
     // A rectangle is a point at its middle that shines to its front, spread by its size.
     for (var i = 0u; i < lights.n_rect_lights; i++) {
@@ -190,12 +263,12 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         let falloff = lighting::getRangeFalloff(square, 1.0 / max((*panel).range * (*panel).range, 1e-4));
         let p = slab_passage(dot(fibre.normal, l), ribbon.layers);
         light += reflected(fibre, surface, l, p) * (*panel).color.rgb
-            * (front * area / (square + area) * falloff);
+            * (front * area / (square + area) * falloff * past_solids(fibre, l, sqrt(square)));
     }
 
     // What comes from everywhere reaches roots least.
     let open = 1.0 - ribbon.root_shade * (1.0 - smoothstep(0.0, 0.35, fibre.along));
-    var indirect = lights.ambient_color.rgb * surface.reflectance;
+    var indirect = lights.ambient_color.rgb * (surface.reflectance + surface.transmittance);
 #ifdef ENVIRONMENT_MAP
     // The cuticle mirrors about the normal, stretched along the fibre; the rest comes out as from
     // a matt body.
@@ -214,6 +287,12 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
     input.F_ab = lighting::F_AB(input.layers[0].perceptual_roughness, input.layers[0].NdotV);
     let surround = environment_map::environment_map_light(&input, &ranges, false);
     indirect += surround.diffuse + surround.specular;
+    // And what shines through from behind.
+    input.layers[0].N = -fibre.normal;
+    input.layers[0].R = -fibre.eye;
+    input.diffuse_color = surface.transmittance;
+    input.F0_dielectric = vec3(0.0);
+    indirect += environment_map::environment_map_light(&input, &ranges, false).diffuse;
 #endif
     return view.exposure * (light + indirect * open);
 }

@@ -69,7 +69,27 @@ struct Ribbon {
     lock_shape: f32,
     root_fade: f32,
     dye_count: u32,
+    rank_step: u32,        // strand * rank_step modulo their number is the strand's rank
     dyes: array<Dye, 4>,
+}
+
+// A ball, capsule or ellipsoid: in its own frame, all within 1 of a segment along Y.
+struct DrawnSolid {
+    x: vec4<f32>,          // the frame's axes, by which a place's coordinates are found
+    y: vec4<f32>,
+    z: vec4<f32>,
+    half: f32,             // of the segment's length
+    room: f32,             // how far outside strands stay
+    unused: vec2<f32>,
+}
+
+// What differs from frame to frame besides nodes.
+struct DrawnFrame {
+    share: f32,            // of the strands, that is drawn
+    fade: f32,             // the part of it, from its end, in which they fade
+    wider: f32,            // how many times wider they are
+    solid_count: u32,
+    solids: array<DrawnSolid, 16>,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(0) var<uniform> ribbon: Ribbon;
@@ -79,6 +99,7 @@ struct Ribbon {
 @group(#{MATERIAL_BIND_GROUP}) @binding(3) var<storage, read> strands: array<DrawnStrand>;
 // Of each strand the layers of dye whose streaks it is in, a bit each; one word where none has streaks.
 @group(#{MATERIAL_BIND_GROUP}) @binding(4) var<storage, read> streaks: array<u32>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(5) var<storage, read> frame: DrawnFrame;
 
 #ifdef MOTION_VECTOR_PREPASS
 // 1 computes points as they were in the frame before, 0 as they are.
@@ -146,6 +167,8 @@ struct StrandPoint {
     weights: vec3<f32>,
     // Where on the guides this is.
     share: f32,
+    // From the guide that water draws it to (m).
+    outward: vec3<f32>,
 }
 
 // A value and its derivative.
@@ -244,6 +267,37 @@ fn way_along(guide: vec2<u32>, root: vec3<f32>, point: CurvePoint, phase: f32, e
     return out;
 }
 
+// Length from the root over which pushing sets in (m): roots are in the skin.
+const ROOT: f32 = 5e-3;
+
+// Moves a point of a strand out of a solid, and turns its slope along the surface.
+fn push_out(solid: DrawnSolid, grown: f32, point: ptr<function, StrandPoint>) {
+    let place = vec4((*point).position, 1.0);
+    var own = vec3(dot(solid.x, place), dot(solid.y, place), dot(solid.z, place));
+    own.y -= clamp(own.y, -solid.half, solid.half);
+    let apart = length(own);
+    let missing = 1.0 + solid.room - apart;
+    if missing <= 0.0 {
+        return;
+    }
+    let out = own / max(apart, 1e-6);
+    let x = solid.x.xyz;
+    let y = solid.y.xyz;
+    let z = solid.z.xyz;
+    (*point).position += grown * missing
+        * (x * (out.x / dot(x, x)) + y * (out.y / dot(y, y)) + z * (out.z / dot(z, z)));
+    let normal = x * out.x + y * out.y + z * out.z;
+    (*point).slope -= grown * normal * (dot(normal, (*point).slope) / max(dot(normal, normal), 1e-12));
+}
+
+// How much of a strand of so many is drawn in this frame: 1 all, 0 nothing.
+fn strand_alpha(index: u32) -> f32 {
+    // The product, in parts of 32 bits.
+    let high = (index * (ribbon.rank_step >> 8u)) % ribbon.strands;
+    let rank = (high * 256u + index * (ribbon.rank_step & 255u)) % ribbon.strands;
+    return saturate((frame.share - f32(rank) / f32(ribbon.strands)) / max(frame.fade, 1e-6));
+}
+
 fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     var out: StrandPoint;
     let follows = select(1.0, 0.0, strand.width < 0.0);
@@ -311,7 +365,12 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     let tighter = most * (rise * f32(near.y - 1u) * pace * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
     let inward = near_point.position - loose;
     out.position = loose + inward * tight;
+    out.outward = inward * (tight - 1.0);
     out.slope = mix(loose_slope, near_point.slope * pace, tight) + inward * tighter;
+    let grown = saturate(t * strand.size / ROOT);
+    for (var i = 0u; i < frame.solid_count; i++) {
+        push_out(frame.solids[i], grown, &out);
+    }
     return out;
 }
 

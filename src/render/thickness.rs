@@ -52,7 +52,7 @@ impl Thickness {
             let places = (0..pieces).map(|i| (i as f32 + offset) / pieces as f32).map(|t| {
                 match strand.is_guide {
                     true => guide_point(guide(strand.guides[0]), t).position,
-                    false => strand_point(strand, dry, t, followers).position,
+                    false => strand_point(strand, dry, t, followers, &[]).position,
                 }
             });
             points.extend(places.filter(|p| p.is_finite() && p.abs().max_element() < 1e3));

@@ -1,7 +1,8 @@
-//! The single write a frame: packed nodes into the existing GPU buffer.
+//! What a frame writes: packed nodes and the frame's own numbers into the existing GPU buffers.
 
 use super::{
-    buffers::HairBuffers, draw::Packed, elsewhere::DrawnElsewhere, sets::HairRenderSystems,
+    buffers::HairBuffers, draw::Packed, elsewhere::DrawnElsewhere, frame::DrawnFrame,
+    sets::HairRenderSystems,
 };
 use bevy::{
     prelude::*,
@@ -20,7 +21,7 @@ pub(super) fn plugin(app: &mut App) {
 /// Runs in extraction, after the previous frame was submitted, so that nodes and transforms of the same
 /// frame are drawn together. A buffer created in this frame is uploaded with its contents instead.
 fn upload(
-    hairs: Extract<Query<(&HairBuffers, &Packed), Without<DrawnElsewhere>>>,
+    hairs: Extract<Query<(&HairBuffers, &Packed, &DrawnFrame, Has<DrawnElsewhere>)>>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
     queue: Option<Res<RenderQueue>>,
 ) {
@@ -31,12 +32,16 @@ fn upload(
     if queue.is_changed() {
         return;
     }
-    for (hair, packed) in &hairs {
-        let bytes: &[u8] = bytemuck::cast_slice(&packed.nodes);
-        if let Some(gpu) = buffers.get(&hair.nodes)
-            && gpu.buffer.size() == bytes.len() as u64
-        {
-            queue.write_buffer(&gpu.buffer, 0, bytes);
+    for (hair, packed, frame, is_drawn_elsewhere) in &hairs {
+        let nodes: &[u8] = bytemuck::cast_slice(&packed.nodes);
+        let frame = bytemuck::bytes_of(&frame.packed);
+        let nodes = (!is_drawn_elsewhere).then_some((&hair.nodes, nodes));
+        for (buffer, bytes) in nodes.into_iter().chain([(&hair.frame, frame)]) {
+            if let Some(gpu) = buffers.get(buffer)
+                && gpu.buffer.size() == bytes.len() as u64
+            {
+                queue.write_buffer(&gpu.buffer, 0, bytes);
+            }
         }
     }
 }

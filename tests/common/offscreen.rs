@@ -3,6 +3,7 @@
 
 use bevy::{
     app::PluginGroupBuilder,
+    asset::io::embedded::EmbeddedAssetRegistry,
     camera::RenderTarget,
     prelude::*,
     render::{
@@ -108,6 +109,22 @@ pub fn has_adapter() -> bool {
     found
 }
 
+/// With `SHADERS` in the environment, shaders are read from this folder: changes are seen without building
+/// the crate again.
+fn read_shaders(app: &mut App) {
+    let Some(folder) = std::env::var_os("SHADERS") else { return };
+    let files = std::fs::read_dir(&folder).unwrap().map(|file| file.unwrap().path());
+    for file in files.filter(|file| file.extension().is_some_and(|end| end == "wgsl")) {
+        let path = std::path::Path::new("bevy_keratin/render").join(file.file_name().unwrap());
+        let source = std::fs::read(&file).unwrap();
+        let known = app.world().resource::<EmbeddedAssetRegistry>();
+        known.insert_asset(file, &path, source);
+        let url = format!("embedded://{}", path.display());
+        app.world().resource::<AssetServer>().reload(url);
+    }
+    (0..20).for_each(|_| app.update());
+}
+
 impl Offscreen {
     /// `None`, with the reason printed, where nothing can draw. The tick stands still until
     /// `ticking` is set.
@@ -151,6 +168,7 @@ impl Offscreen {
             .id();
         app.finish();
         app.cleanup();
+        read_shaders(&mut app);
         Some(Self { app, camera, target })
     }
 

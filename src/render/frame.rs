@@ -1,0 +1,113 @@
+//! What differs from frame to frame besides nodes: how many strands are drawn, and what they are pushed
+//! out of.
+
+use super::{
+    buffers::HairBuffers,
+    detail::{DrawnShare, HairDetail},
+    draw::Packed,
+    ribbon_mesh::{RibbonLevel, RibbonMeshes},
+    screen_share::pixel_in,
+    solids::{Ball, DrawnSolid, MOST_SOLIDS},
+    view::HairView,
+};
+use crate::{contact::HairCollider, look::HairLook, setting::Settings};
+use bevy::{camera::primitives::Aabb, prelude::*, render::storage::ShaderBuffer};
+
+/// `DrawnFrame` of `strands.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(super) struct PackedFrame {
+    share: f32,
+    fade: f32,
+    wider: f32,
+    solid_count: u32,
+    solids: [DrawnSolid; MOST_SOLIDS],
+}
+
+impl Default for PackedFrame {
+    fn default() -> Self {
+        Self::new(DrawnShare::ALL)
+    }
+}
+
+impl PackedFrame {
+    fn new(drawn: DrawnShare) -> Self {
+        Self {
+            share: drawn.share,
+            fade: drawn.fade,
+            wider: drawn.wider(),
+            solid_count: 0,
+            solids: [DrawnSolid::default(); MOST_SOLIDS],
+        }
+    }
+
+    fn push(&mut self, solid: DrawnSolid) {
+        if let Some(free) = self.solids.get_mut(self.solid_count as usize) {
+            *free = solid;
+            self.solid_count += 1;
+        }
+    }
+}
+
+/// A hair's frame.
+#[derive(Component, Clone, Debug, Default)]
+pub(super) struct DrawnFrame {
+    pub(super) packed: PackedFrame,
+    /// Size of a pixel where a camera is nearest, in the hair's frame (m); unknown before the first view.
+    pixel: Option<f32>,
+    level: u32,
+}
+
+/// After strands have been packed: chooses how many are drawn, and gathers the solids near them.
+pub(super) fn prepare(
+    mut hairs: Query<(Entity, Ref<HairBuffers>, &Packed, &GlobalTransform, &mut DrawnFrame)>,
+    mut drawn: Query<(&mut Mesh3d, &Aabb)>,
+    colliders: Query<(Entity, &HairCollider, &GlobalTransform)>,
+    (looks, views, details): (Settings<HairLook>, Settings<HairView>, Settings<HairDetail>),
+    cameras: Query<(&Camera, &GlobalTransform)>,
+    (mut known, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
+    mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
+    mut balls: Local<Vec<Ball>>,
+) {
+    balls.clear();
+    balls
+        .extend(colliders.iter().filter_map(|(entity, of, place)| Ball::around(entity, of, place)));
+    for (hair, buffers, packed, place, mut frame) in &mut hairs {
+        let frame = frame.bypass_change_detection();
+        let Ok((mut mesh, around)) = drawn.get_mut(buffers.drawn) else { continue };
+        let hair_place = place.affine();
+        let inside = (Vec3::from(around.center), Vec3::from(around.half_extents));
+        let scale = hair_place.matrix3.determinant().abs().cbrt();
+        let center = place.transform_point(inside.0);
+        let seen = cameras.iter().filter(|(camera, _)| camera.is_active);
+        let pixels = seen
+            .filter_map(|(camera, from)| pixel_in(camera, from, center, inside.1.length() * scale));
+        frame.pixel = pixels.reduce(f32::min).map(|finest| finest / scale).or(frame.pixel);
+        let count = buffers.strand_count;
+        let share = match views.of(hair) {
+            HairView::Guides => DrawnShare::ALL,
+            _ => DrawnShare::new(&details.of(hair), count, looks.of(hair).width, frame.pixel),
+        };
+        let level = RibbonLevel::holding(count, packed.segments(), share.share, frame.level);
+        frame.level = level.level();
+        let wanted = known.get(level, &mut meshes);
+        if mesh.0 != wanted {
+            mesh.0 = wanted;
+        }
+
+        frame.packed = PackedFrame::new(share);
+        let from_world = hair_place.inverse();
+        for ball in balls.iter().filter(|ball| ball.is_near(inside, &hair_place)) {
+            let Ok((_, of, at)) = colliders.get(ball.collider) else { continue };
+            if let Some(solid) = DrawnSolid::new(&of.shape, &(from_world * at.affine())) {
+                frame.packed.push(solid);
+            }
+        }
+        // New buffers are uploaded with their contents.
+        if buffers.is_changed()
+            && let Some(mut buffer) = shader_buffers.get_mut(&buffers.frame)
+        {
+            buffer.data = Some(bytemuck::bytes_of(&frame.packed).to_vec());
+        }
+    }
+}

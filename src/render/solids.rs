@@ -1,0 +1,171 @@
+//! Solids that drawn strands are pushed out of: guides stay out of a head, followers between them may
+//! not.
+
+use crate::contact::{ColliderShape, HairCollider};
+use bevy::{math::Affine3A, prelude::*};
+
+/// How many solids a hair's drawn strands are pushed out of at most.
+pub(super) const MOST_SOLIDS: usize = 16;
+/// How far outside strands are drawn (m).
+const CLEARANCE: f32 = 0.5e-3;
+/// Length from the root over which pushing sets in (m): roots are in the skin.
+const ROOT: f32 = 5e-3;
+
+/// A ball, a capsule or an ellipsoid in a hair's frame, as the shader reads it: in its own frame all
+/// points within 1 of a segment along Y.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct DrawnSolid {
+    /// The axes, by which a point's coordinates are found, and where they begin.
+    axes: [Vec4; 3],
+    /// Half the segment's length.
+    half: f32,
+    /// The clearance.
+    room: f32,
+    unused: [f32; 2],
+}
+
+impl DrawnSolid {
+    /// What `shape` fills at this place in the hair's frame; `None` if that is no finite solid of these
+    /// kinds.
+    pub fn new(shape: &ColliderShape, place: &Affine3A) -> Option<Self> {
+        let (radii, half_length) = size(shape)?;
+        if radii.min_element() <= 0.0 {
+            return None;
+        }
+        let from = place.inverse();
+        let rows = from.matrix3.transpose();
+        let row = |of: Vec3, begin: f32, radius: f32| of.extend(begin) / radius;
+        let begin = Vec3::from(from.translation);
+        let axes = [
+            row(rows.x_axis.into(), begin.x, radii.x),
+            row(rows.y_axis.into(), begin.y, radii.y),
+            row(rows.z_axis.into(), begin.z, radii.z),
+        ];
+        let scale = place.matrix3.determinant().abs().cbrt();
+        let (half, room) = (half_length / radii.y, CLEARANCE / (radii.min_element() * scale));
+        let is_usable = axes.iter().all(|row| row.is_finite() && row.truncate() != Vec3::ZERO);
+        (is_usable && half.is_finite() && room.is_finite()).then_some(Self {
+            axes,
+            half,
+            room,
+            unused: [0.0; 2],
+        })
+    }
+
+    /// A ball (m), for tests and tools.
+    pub fn ball(center: Vec3, radius: f32) -> Option<Self> {
+        let ball = ColliderShape::Sphere(Sphere { radius });
+        Self::new(&ball, &Affine3A::from_translation(center))
+    }
+
+    /// As the shader reads it.
+    pub fn packed(&self) -> [u32; 16] {
+        bytemuck::cast(*self)
+    }
+
+    /// Moves a point of a strand out, `length` (m) from its root, and turns its slope along the surface.
+    pub(super) fn push(&self, length: f32, position: &mut Vec3, slope: &mut Vec3) {
+        let grown = (length / ROOT).clamp(0.0, 1.0);
+        let own = Vec3::from(self.axes.map(|row| row.truncate().dot(*position) + row.w));
+        let own = own - Vec3::Y * own.y.clamp(-self.half, self.half);
+        let apart = own.length();
+        let missing = 1.0 + self.room - apart;
+        if missing <= 0.0 {
+            return;
+        }
+        let out = own / apart.max(1e-6);
+        let rows = self.axes.map(Vec4::truncate);
+        let way = |row: Vec3| row / row.length_squared();
+        *position += (way(rows[0]) * out.x + way(rows[1]) * out.y + way(rows[2]) * out.z)
+            * (grown * missing);
+        let normal = (rows[0] * out.x + rows[1] * out.y + rows[2] * out.z).normalize_or_zero();
+        *slope -= normal * (grown * normal.dot(*slope));
+    }
+}
+
+/// Radii and half the length of a solid that the shader knows.
+fn size(shape: &ColliderShape) -> Option<(Vec3, f32)> {
+    match shape {
+        ColliderShape::Sphere(s) => Some((Vec3::splat(s.radius), 0.0)),
+        ColliderShape::Capsule(c) => Some((Vec3::splat(c.radius), c.half_length)),
+        ColliderShape::Ellipsoid { radii } => Some((*radii, 0.0)),
+        _ => None,
+    }
+}
+
+/// A ball around a collider in the world.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball {
+    center: Vec3,
+    radius: f32,
+    pub(super) collider: Entity,
+}
+
+impl Ball {
+    /// `None` for shapes that the shader does not know.
+    pub(super) fn around(
+        entity: Entity,
+        of: &HairCollider,
+        place: &GlobalTransform,
+    ) -> Option<Self> {
+        let (radii, half_length) = size(&of.shape)?;
+        let scale = place.affine().matrix3.determinant().abs().cbrt();
+        let radius = (radii.max_element() + half_length) * scale;
+        Some(Self { center: place.translation(), radius, collider: entity })
+    }
+
+    /// Whether it may touch what is in a box in a hair's frame.
+    pub(super) fn is_near(&self, (center, half): (Vec3, Vec3), hair: &Affine3A) -> bool {
+        let scale = hair.matrix3.determinant().abs().cbrt();
+        let center = hair.transform_point3(center);
+        center.distance(self.center) <= half.length() * scale + self.radius
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pushed(solid: &DrawnSolid, length: f32, mut p: Vec3) -> Vec3 {
+        let mut slope = Vec3::X;
+        solid.push(length, &mut p, &mut slope);
+        p
+    }
+
+    #[test]
+    fn points_inside_come_out_by_the_clearance_and_others_stay() {
+        let ball = DrawnSolid::ball(Vec3::X, 0.1).unwrap();
+        let out = pushed(&ball, 0.1, Vec3::new(1.0, 0.06, 0.0));
+        assert!(out.distance(Vec3::new(1.0, 0.1005, 0.0)) < 1e-6, "{out}");
+        let free = Vec3::new(1.0, 0.2, 0.0);
+        assert_eq!(pushed(&ball, 0.1, free), free);
+        let root = Vec3::new(1.0, 0.0995, 0.0);
+        assert_eq!(pushed(&ball, 0.0, root), root, "roots are in the skin");
+    }
+
+    #[test]
+    fn a_capsule_that_is_turned_and_scaled_pushes_across_its_axis() {
+        let capsule = ColliderShape::Capsule(Capsule3d::new(0.1, 0.4));
+        let turn = Quat::from_rotation_z(core::f32::consts::FRAC_PI_2);
+        let place = Affine3A::from_scale_rotation_translation(Vec3::splat(2.0), turn, Vec3::Z);
+        let capsule = DrawnSolid::new(&capsule, &place).unwrap();
+        let out = pushed(&capsule, 0.1, Vec3::new(0.3, 0.1, 1.0));
+        assert!(out.distance(Vec3::new(0.3, 0.2005, 1.0)) < 1e-5, "{out}");
+        let end = pushed(&capsule, 0.1, Vec3::new(-0.45, 0.0, 1.0));
+        assert!(end.distance(Vec3::new(-0.6005, 0.0, 1.0)) < 1e-5, "{end}");
+    }
+
+    #[test]
+    fn what_is_no_finite_solid_is_left_out() {
+        let at = Affine3A::from_translation;
+        let ball = |radius| ColliderShape::Sphere(Sphere { radius });
+        assert_eq!(DrawnSolid::new(&ball(0.1), &at(Vec3::NAN)), None);
+        assert_eq!(DrawnSolid::new(&ball(0.0), &at(Vec3::ZERO)), None);
+        assert_eq!(DrawnSolid::new(&ball(0.1), &Affine3A::from_scale(Vec3::ZERO)), None);
+        let plane = ColliderShape::Plane(InfinitePlane3d::new(Vec3::Y));
+        assert_eq!(DrawnSolid::new(&plane, &at(Vec3::ZERO)), None);
+        let inside = pushed(&DrawnSolid::ball(Vec3::ZERO, 0.1).unwrap(), 0.1, Vec3::ZERO);
+        assert!(inside.is_finite());
+    }
+}
