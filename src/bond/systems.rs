@@ -12,11 +12,14 @@ use crate::{
     fault::HairFault,
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
-    schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick, first_substep, last_substep},
     setting::{self, Ranged, Settings, Violations, report},
-    strand::{AddedMass, PerHair, Strand, StrandOf, StrandSleep, keep_required},
+    strand::{AddedMass, KinematicStrand, PerHair, Strand, StrandOf, StrandSleep, keep_required},
 };
-use bevy::{ecs::entity_disabling::Disabled, prelude::*};
+use bevy::{
+    ecs::{entity_disabling::Disabled, query::QueryFilter},
+    prelude::*,
+};
 use fearless_simd::Level;
 
 /// About what a strand takes (ns) on average; most need no update.
@@ -40,7 +43,16 @@ impl Plugin for BondPlugin {
             .register_required_components::<Strand, Bonds>()
             .register_required_components::<Strand, BondChanges>()
             .register_required_components::<Strand, RestShape>()
-            .add_systems(HairTick, fit_bonds.in_set(HairSystems::BondFit))
+            .add_systems(
+                HairTick,
+                (
+                    fit_bonds::<Without<KinematicStrand>>,
+                    // Also in the last one, lest a strand that is simulated from the next tick on is missed.
+                    fit_bonds::<With<KinematicStrand>>.run_if(first_substep.or_else(last_substep)),
+                )
+                    .chain()
+                    .in_set(HairSystems::BondFit),
+            )
             .add_systems(HairTick, generate_rest_shapes.in_set(HairSystems::RestShape))
             .add_systems(HairSettle, generate_rest_shapes.in_set(HairSystems::RestShape))
             .add_systems(HairTick, update_bonds.in_set(HairSystems::BondRates));
@@ -49,11 +61,11 @@ impl Plugin for BondPlugin {
 
 /// Gives new and resized strands their bonds, and repairs invalid values written from outside. Our own
 /// writes bypass change detection, so `Changed` means a write from outside the tick.
-fn fit_bonds(
+fn fit_bonds<F: QueryFilter>(
     mut strands: Query<
         (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
         // What is written while a strand is disabled is no change any more when it is enabled.
-        (Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>, Allow<Disabled>),
+        (Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>, Allow<Disabled>, F),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -91,7 +103,10 @@ fn generate_rest_shapes(
     sweeps: Settings<Sweeps>,
     cuticle: Settings<Cuticle>,
     solver: Settings<HairSolver>,
-    mut strands: Query<(&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape)>,
+    mut strands: Query<
+        (&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape),
+        Without<KinematicStrand>,
+    >,
 ) {
     if !steps.any() {
         return;

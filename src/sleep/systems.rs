@@ -17,8 +17,8 @@ use crate::{
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
     strand::{
-        AddedMass, Hair, HeldNodes, Pose, SleepPose, Sleepers, Strand, StrandModel, StrandOf,
-        StrandSleep, Strands, TickPose,
+        AddedMass, Hair, HeldNodes, KinematicStrand, Pose, SleepPose, Sleepers, Strand,
+        StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     },
     treatment::Treatments,
     water::Moisture,
@@ -231,14 +231,18 @@ fn update_sleep(
         ),
         With<Hair>,
     >,
-    mut strands: Query<(
-        &StrandOf,
-        &mut Strand,
-        &mut StrandSleep,
-        &mut SleepPose,
-        (Ref<Bonds>, &BondChanges, &AddedMass),
-        (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
-    )>,
+    mut strands: Query<
+        (
+            &StrandOf,
+            &mut Strand,
+            &mut StrandSleep,
+            &mut SleepPose,
+            (Ref<Bonds>, &BondChanges, &AddedMass),
+            (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
+        ),
+        // Followers sleep when their guides do.
+        Without<KinematicStrand>,
+    >,
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
@@ -276,10 +280,6 @@ fn update_sleep(
     };
     let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
     for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
-        // Followers sleep when their guides do.
-        if sleep.is_follower() {
-            continue;
-        }
         let Some(hair) = hair_of(of.0) else { continue };
         let (treatments, water, held) = others;
         let restless = strand.is_changed()

@@ -22,7 +22,10 @@ use crate::{
     },
     schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, Hair, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
+    strand::{
+        AddedMass, Hair, HeldNodes, KinematicStrand, Strand, StrandModel, StrandOf, StrandSleep,
+        TickPose,
+    },
 };
 use bevy::{math::Isometry3d, prelude::*};
 use fearless_simd::Level;
@@ -152,14 +155,17 @@ fn step_rods(
     influence: Settings<BondInfluence>,
     contact: Settings<LockContact>,
     hairs: Query<(Option<&Obstacles>, &TickPose), With<Hair>>,
-    mut strands: Query<(
-        (Entity, &StrandOf, &StrandSleep),
-        &mut Strand,
-        &RestShape,
-        &Bonds,
-        &AddedMass,
-        Option<&HeldNodes>,
-    )>,
+    mut strands: Query<
+        (
+            (Entity, &StrandOf, &StrandSleep),
+            &mut Strand,
+            &RestShape,
+            &Bonds,
+            &AddedMass,
+            Option<&HeldNodes>,
+        ),
+        Without<KinematicStrand>,
+    >,
     mut faults: MessageWriter<HairFault>,
 ) {
     if !substeps.any() {

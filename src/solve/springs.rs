@@ -17,7 +17,9 @@ use crate::{
     rod::{block::BlockLanes, obstacle::Obstacle, step::weigh},
     schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, HeldNodes, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
+    strand::{
+        AddedMass, HeldNodes, KinematicStrand, Strand, StrandModel, StrandOf, StrandSleep, TickPose,
+    },
 };
 use bevy::prelude::*;
 use fearless_simd::Level;
@@ -101,14 +103,10 @@ fn step_springs(
     contact: Settings<LockContact>,
     gravity: Res<HairGravity>,
     hairs: Query<(Option<&Obstacles>, &TickPose)>,
-    mut strands: Query<(
-        Entity,
-        &StrandOf,
-        &StrandSleep,
-        &mut Strand,
-        &AddedMass,
-        Option<&HeldNodes>,
-    )>,
+    mut strands: Query<
+        (Entity, &StrandOf, &StrandSleep, &mut Strand, &AddedMass, Option<&HeldNodes>),
+        Without<KinematicStrand>,
+    >,
     mut faults: MessageWriter<HairFault>,
 ) {
     let gravity = gravity.clamped().0;

@@ -23,6 +23,7 @@ pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
 pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
+pub(crate) use strand_sleep::KinematicStrand;
 pub use strand_sleep::{SleepPose, Sleepers, StrandSleep};
 pub use systems::StrandPlugin;
 

@@ -66,6 +66,12 @@ impl StrandSleep {
     }
 }
 
+/// On a strand that follows guides or is frozen at its hair's level of detail. It puts such strands into
+/// tables of their own: systems that act on simulated strands do not even look at them. Set and removed
+/// where [`StrandSleep::is_follower`] changes.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct KinematicStrand;
+
 /// How many of a hair's strands sleep; followers are not counted. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]

@@ -1,8 +1,8 @@
 //! Strands in the tick: poses of the scalp, and inertia of the nodes.
 
 use super::{
-    AddedMass, Hair, HeldNodes, HeldNodesState, PerHair, SleepPose, Sleepers, Strand, StrandError,
-    StrandHistory, StrandModel, StrandOf, StrandSleep, Strands, TickPose,
+    AddedMass, Hair, HeldNodes, HeldNodesState, KinematicStrand, PerHair, SleepPose, Sleepers,
+    Strand, StrandError, StrandHistory, StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     frame::{HairInertia, Pose},
     held::report_out_of_reach,
     keep_required,
@@ -10,10 +10,17 @@ use super::{
 use crate::{
     fault::{FaultKind, HairChecks, HairFault},
     parallel::{Nanos, for_each_part, tables},
-    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick, MergedSubsteps, first_substep},
+    schedule::{
+        EffectiveSubsteps, HairFrame, HairStep, HairSystems, HairTick, MergedSubsteps,
+        first_substep,
+    },
     setting::{self, Settings},
 };
-use bevy::{ecs::entity_disabling::Disabled, math::Isometry3d, prelude::*};
+use bevy::{
+    ecs::{entity_disabling::Disabled, query::QueryFilter},
+    math::Isometry3d,
+    prelude::*,
+};
 
 /// About what a strand takes (ns) to be copied, and to be moved by its hair's frame delta.
 const COPY: Nanos = Nanos(100);
@@ -48,11 +55,16 @@ impl Plugin for StrandPlugin {
             .register_type::<Sleepers>()
             .register_type::<SleepPose>()
             .add_systems(HairChecks, report_unusable)
-            .add_systems(PreUpdate, record_frame)
+            .add_systems(HairFrame, record_frame)
             .add_systems(
                 HairTick,
                 (
-                    (repair_strands, report_out_of_reach.run_if(first_substep), remember_drawn)
+                    (
+                        repair_strands::<Without<KinematicStrand>>,
+                        repair_strands::<With<KinematicStrand>>.run_if(first_substep),
+                        report_out_of_reach.run_if(first_substep),
+                        remember_drawn,
+                    )
                         .chain()
                         .in_set(HairSystems::StrandHistory),
                     (aim_poses.run_if(first_substep), advance_poses)
@@ -91,12 +103,15 @@ fn report_unusable(
 }
 
 /// Repairs private fields written by an inspector or a scene file. Our own writes bypass change
-/// detection. Runs in every substep, because game code may write in systems of its own within the tick;
-/// without writes it costs a scan of change ticks.
-fn repair_strands(
-    mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Allow<Disabled>)>,
-    mut loads: Query<(Entity, &mut AddedMass), (Changed<AddedMass>, Allow<Disabled>)>,
-    mut histories: Query<(Entity, &mut StrandHistory), (Changed<StrandHistory>, Allow<Disabled>)>,
+/// detection. Simulated strands are looked at in every substep, because game code may write in systems of
+/// its own within the tick; without writes that costs a scan of change ticks.
+fn repair_strands<F: QueryFilter>(
+    mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Allow<Disabled>, F)>,
+    mut loads: Query<(Entity, &mut AddedMass), (Changed<AddedMass>, Allow<Disabled>, F)>,
+    mut histories: Query<
+        (Entity, &mut StrandHistory),
+        (Changed<StrandHistory>, Allow<Disabled>, F),
+    >,
     mut faults: MessageWriter<HairFault>,
 ) {
     // Also sleepers: their history is not written again.
@@ -111,10 +126,11 @@ fn repair_strands(
     }
 }
 
-/// Before the first substep of a tick: the present becomes history.
+/// Before the first substep of a tick: the present becomes history. Strands that are not simulated write
+/// theirs where they are moved.
 fn remember_drawn(
     step: Res<HairStep>,
-    mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory)>,
+    mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory), Without<KinematicStrand>>,
 ) {
     if step.index > 0 {
         return;
@@ -215,7 +231,7 @@ fn advance_poses(
 fn apply_frame_inertia(
     substeps: EffectiveSubsteps,
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand)>,
+    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand), Without<KinematicStrand>>,
 ) {
     if !substeps.any() || hairs.iter().all(|hair| hair.frame_delta().is_none()) {
         return;
