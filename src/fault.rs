@@ -132,7 +132,7 @@ pub(crate) fn plugin(app: &mut App) {
             schedule.set_executor(SingleThreadedExecutor::new());
         })
         .add_systems(PreUpdate, |world: &mut World| world.run_schedule(HairChecks))
-        .add_systems(Last, log_faults);
+        .add_systems(Last, log_faults.run_if(on_message::<HairFault>));
 }
 
 fn log_faults(mut faults: MessageReader<HairFault>) {

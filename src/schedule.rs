@@ -30,6 +30,11 @@ pub struct HairTick;
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairSettle;
 
+/// What is done once a frame, in [`PreUpdate`], before the ticks. On a single thread: each of its
+/// systems is done before another thread would have woken.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct HairFrame;
+
 /// The set of the tick in the schedule that runs it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct HairTicks;
@@ -403,6 +408,10 @@ impl Plugin for TickPlugin {
             .register_type::<HairStep>()
             .register_type::<SubstepLimits>()
             .register_type::<InvalidValue>()
+            .edit_schedule(HairFrame, |schedule| {
+                schedule.set_executor(SingleThreadedExecutor::new());
+            })
+            .add_systems(PreUpdate, |world: &mut World| world.run_schedule(HairFrame))
             .edit_schedule(HairTick, ordered)
             .edit_schedule(HairSettle, ordered)
             .add_systems(self.schedule, {

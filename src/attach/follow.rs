@@ -3,23 +3,47 @@
 use super::{
     morph::Morphs,
     pose::MeshPose,
-    roots::{TiedRoots, triangle},
+    roots::{Tied, TiedRoots, triangle},
 };
 use crate::{
+    lod::PresentLod,
     schedule::HairStep,
-    strand::{Hair, Pose, Strand, StrandHistory, StrandOf},
+    strand::{Hair, Pose, Sleepers, Strand, StrandHistory, StrandOf, StrandSleep},
 };
 use bevy::{math::Isometry3d, prelude::*};
 
-/// Poses of the tied roots on the posed mesh, in a hair's frame.
-fn places(
-    tied: &TiedRoots,
+/// How far a root may be from where it is (m) and still counts as at rest, where that is not looked at
+/// closely.
+const STAYS: f32 = 5e-5;
+
+/// How many roots of a hair of which few strands are simulated are looked at, to see whether any moves.
+const PROBES: usize = 16;
+
+/// The pose of a tied root on the posed mesh, in a hair's frame.
+fn place_of(root: &Tied, mesh: &MeshPose, hair: &Pose) -> Option<Isometry3d> {
+    let corners = root.corners.map(|c| hair.point_in(mesh.corner(&c)));
+    triangle(corners, root.weights).map(|now| now * root.offset)
+}
+
+/// Whether the roots of a hair stay where they were, by a few of them. Most heads are rigid, and hair
+/// that is small on the screen hides what moves between these.
+fn stay(
+    roots: &[Tied],
     mesh: &MeshPose,
     hair: &Pose,
-) -> impl Iterator<Item = Option<Isometry3d>> {
-    tied.roots.iter().map(|root| {
-        let corners = root.corners.map(|c| hair.point_in(mesh.corner(&c)));
-        triangle(corners, root.weights).map(|now| now * root.offset)
+    before: impl Fn(&Tied) -> Option<Vec3>,
+) -> bool {
+    let step = roots.len().div_ceil(PROBES).max(1);
+    roots.iter().step_by(step).all(|root| {
+        let now = place_of(root, mesh, hair).zip(before(root));
+        now.is_some_and(|(now, before)| Vec3::from(now.translation).distance(before) < STAYS)
+    })
+}
+
+/// Whether only few of a hair's strands are simulated, if any.
+fn is_coarse(present: Option<&PresentLod>, sleepers: Option<&Sleepers>) -> bool {
+    present.is_some_and(|present| {
+        present.followers > sleepers.map_or(0, |sleepers| sleepers.awake + sleepers.asleep)
     })
 }
 
@@ -28,20 +52,25 @@ pub(super) fn aim_roots(
     step: Res<HairStep>,
     transforms: TransformHelper,
     morphs: Morphs,
-    mut hairs: Query<(Entity, &mut TiedRoots), With<Hair>>,
+    mut hairs: Query<(Entity, &mut TiedRoots, Option<&PresentLod>, Option<&Sleepers>), With<Hair>>,
 ) {
     if step.index != 0 {
         return;
     }
     let place = |entity| transforms.compute_global_transform(entity).ok();
-    for (hair, mut tied) in &mut hairs {
+    for (hair, mut tied, present, sleepers) in &mut hairs {
         // The pose at the end of the tick, where the mesh will be too.
         let Some(pose) = place(hair).as_ref().and_then(Pose::of) else { continue };
-        let Some(mesh) = tied.movers.pose(place, &morphs) else { continue };
-        let aims: Vec<_> = places(&tied, &mesh, &pose).collect();
-        for (root, to) in tied.bypass_change_detection().roots.iter_mut().zip(aims) {
+        let TiedRoots { roots, movers, rest, .. } = tied.bypass_change_detection();
+        let Some(mesh) = movers.pose(place, &morphs) else { continue };
+        let aimed = |root: &Tied| Some(root.to.translation.into());
+        *rest = is_coarse(present, sleepers) && stay(roots, &mesh, &pose, aimed);
+        if *rest {
+            continue;
+        }
+        for root in roots {
             root.from = root.to;
-            root.to = to.unwrap_or(root.to);
+            root.to = place_of(root, &mesh, &pose).unwrap_or(root.to);
         }
     }
 }
@@ -50,15 +79,24 @@ pub(super) fn aim_roots(
 pub(super) fn move_roots(
     step: Res<HairStep>,
     hairs: Query<&TiedRoots, With<Hair>>,
-    mut strands: Query<&mut Strand, With<StrandOf>>,
+    mut strands: Query<(&mut Strand, &mut StrandSleep), With<StrandOf>>,
 ) {
     let t = (step.index + 1) as f32 / step.count as f32;
-    for root in hairs.iter().flat_map(|tied| &tied.roots) {
-        if let Ok(mut strand) = strands.get_mut(root.strand) {
-            let at = root.from.translation.lerp(root.to.translation, t);
-            let turn = root.from.rotation.slerp(root.to.rotation, t);
-            strand.bypass_change_detection().put_root(at.into(), turn);
+    for root in hairs.iter().filter(|tied| !tied.rest).flat_map(|tied| &tied.roots) {
+        let Ok((mut strand, mut sleep)) = strands.get_mut(root.strand) else { continue };
+        // Followers move once, at the end of a tick.
+        if sleep.is_follower() && t < 1.0 {
+            continue;
         }
+        let at = Vec3::from(root.from.translation.lerp(root.to.translation, t));
+        if sleep.is_follower() && sleep.is_asleep() {
+            if strand.positions().first().is_some_and(|root| at.distance(*root) < STAYS) {
+                continue;
+            }
+            sleep.bypass_change_detection().wake();
+        }
+        let turn = root.from.rotation.slerp(root.to.rotation, t);
+        strand.bypass_change_detection().put_root(at, turn);
     }
 }
 
@@ -66,14 +104,22 @@ pub(super) fn move_roots(
 pub(super) fn draw_roots(
     globals: Query<&GlobalTransform>,
     morphs: Morphs,
-    hairs: Query<(&GlobalTransform, &TiedRoots), With<Hair>>,
+    hairs: Query<
+        (&GlobalTransform, &TiedRoots, Option<&PresentLod>, Option<&Sleepers>),
+        With<Hair>,
+    >,
     mut strands: Query<&mut StrandHistory>,
 ) {
-    for (hair, tied) in &hairs {
+    for (hair, tied, present, sleepers) in &hairs {
         let Some(pose) = Pose::of(hair) else { continue };
         let place = |joint| globals.get(joint).ok().copied();
         let Some(mesh) = tied.movers.pose(place, &morphs) else { continue };
-        for (root, at) in tied.roots.iter().zip(places(tied, &mesh, &pose)) {
+        let drawn = |root: &Tied| strands.get(root.strand).ok()?.root;
+        if is_coarse(present, sleepers) && stay(&tied.roots, &mesh, &pose, drawn) {
+            continue;
+        }
+        for root in &tied.roots {
+            let at = place_of(root, &mesh, &pose);
             if let (Some(at), Ok(mut history)) = (at, strands.get_mut(root.strand)) {
                 history.bypass_change_detection().root = Some(at.translation.into());
             }

@@ -36,6 +36,11 @@ impl Plugin for AttachPlugin {
                     .chain()
                     .in_set(HairSystems::MeshRoots),
             )
-            .add_systems(PostUpdate, follow::draw_roots.after(TransformSystems::Propagate));
+            .add_systems(
+                PostUpdate,
+                follow::draw_roots
+                    .after(TransformSystems::Propagate)
+                    .run_if(any_with_component::<TiedRoots>),
+            );
     }
 }

@@ -39,6 +39,9 @@ pub struct TiedRoots {
     #[reflect(ignore)]
     pub(super) movers: Movers,
     pub(super) failed: bool,
+    /// Whether the roots stay where they are in this tick.
+    #[reflect(ignore)]
+    pub(super) rest: bool,
 }
 
 #[derive(Clone, Copy, Debug)]

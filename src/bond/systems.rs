@@ -12,11 +12,16 @@ use crate::{
     fault::HairFault,
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
-    schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
+    schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick, first_substep, last_substep},
     setting::{self, Ranged, Settings, Violations, report},
-    strand::{AddedMass, OnGpu, PerHair, Strand, StrandOf, StrandSleep, keep_required},
+    strand::{
+        AddedMass, KinematicStrand, OnGpu, PerHair, Strand, StrandOf, StrandSleep, keep_required,
+    },
 };
-use bevy::{ecs::entity_disabling::Disabled, prelude::*};
+use bevy::{
+    ecs::{entity_disabling::Disabled, query::QueryFilter},
+    prelude::*,
+};
 use fearless_simd::Level;
 
 /// Average cost per strand (ns); most need no update.
@@ -40,7 +45,16 @@ impl Plugin for BondPlugin {
             .register_required_components::<Strand, Bonds>()
             .register_required_components::<Strand, BondChanges>()
             .register_required_components::<Strand, RestShape>()
-            .add_systems(HairTick, fit_bonds.in_set(HairSystems::BondFit))
+            .add_systems(
+                HairTick,
+                (
+                    fit_bonds::<Without<KinematicStrand>>,
+                    // Also in the last one, lest a strand that is simulated from the next tick on is missed.
+                    fit_bonds::<With<KinematicStrand>>.run_if(first_substep.or_else(last_substep)),
+                )
+                    .chain()
+                    .in_set(HairSystems::BondFit),
+            )
             .add_systems(HairTick, generate_rest_shapes.in_set(HairSystems::RestShape))
             .add_systems(HairSettle, generate_rest_shapes.in_set(HairSystems::RestShape))
             .add_systems(HairTick, update_bonds.in_set(HairSystems::BondRates));
@@ -49,7 +63,7 @@ impl Plugin for BondPlugin {
 
 /// Gives new and resized strands their bonds, and repairs invalid values written from outside. Our own
 /// writes bypass change detection, so `Changed` means a write from outside the tick.
-fn fit_bonds(
+fn fit_bonds<F: QueryFilter>(
     mut strands: Query<
         (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
         // A write to a disabled strand would no longer count as a change once it is enabled.
@@ -57,6 +71,7 @@ fn fit_bonds(
             Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>,
             Without<OnGpu>,
             Allow<Disabled>,
+            F,
         ),
     >,
     mut faults: MessageWriter<HairFault>,
@@ -97,7 +112,7 @@ fn generate_rest_shapes(
     solver: Settings<HairSolver>,
     mut strands: Query<
         (&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape),
-        Without<OnGpu>,
+        (Without<KinematicStrand>, Without<OnGpu>),
     >,
 ) {
     if !steps.any() {

@@ -20,6 +20,10 @@ use crate::{
 };
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
+/// Strands do not touch each other where more than so many are followers for each one that is not: the
+/// guides of background hair are centimetres apart.
+const SPARSE: usize = 8;
+
 /// How many strands are prefetched at once.
 const TOGETHER: usize = 16;
 
@@ -272,7 +276,10 @@ pub(crate) fn push_strands_apart(
         // Followers take no part in contact, but in bridges of water.
         let with_followers = list.has_extra_margin();
         let all_rest = sleepers.is_some_and(|s| s.awake == 0 && (s.asleep > 0 || !with_followers));
-        if radius <= 0.0 || strength <= 0.0 || all_rest {
+        // Of so few strands none is near another. Bridges of water are between all.
+        let simulated = sleepers.map_or(members.len(), |s| s.awake + s.asleep);
+        let is_sparse = !with_followers && simulated * SPARSE < members.len();
+        if radius <= 0.0 || strength <= 0.0 || all_rest || is_sparse {
             continue;
         }
         let Some(step) = steps.of(hair) else { continue };

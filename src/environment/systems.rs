@@ -12,7 +12,8 @@ use crate::{
     schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
     strand::{
-        AddedMass, Hair, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose, keep_required,
+        AddedMass, Hair, KinematicStrand, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose,
+        keep_required,
     },
 };
 use bevy::prelude::*;
@@ -71,24 +72,25 @@ type InAir<'a> = (
     Option<&'a mut WindReceived>,
 );
 
+/// A strand in the air, as a query reads it.
+type AirStrand = (
+    &'static StrandOf,
+    &'static StrandSleep,
+    &'static mut Strand,
+    &'static AddedMass,
+    &'static mut BondChanges,
+    &'static mut BlownAir,
+    Option<&'static mut WindReceived>,
+);
+
 fn apply_air(
     steps: EffectiveSubsteps,
     gravity: Res<HairGravity>,
     drag: Settings<AirDrag>,
     hairs: Query<&TickPose, With<Hair>>,
     winds: Winds,
-    mut strands: Query<
-        (
-            &StrandOf,
-            &StrandSleep,
-            &mut Strand,
-            &AddedMass,
-            &mut BondChanges,
-            &mut BlownAir,
-            Option<&mut WindReceived>,
-        ),
-        Without<OnGpu>,
-    >,
+    mut simulated: Query<AirStrand, (Without<KinematicStrand>, Without<OnGpu>)>,
+    mut followers: Query<AirStrand, (With<KinematicStrand>, Without<OnGpu>)>,
 ) {
     if !steps.any() {
         return;
@@ -106,17 +108,17 @@ fn apply_air(
     };
     // Wind also dries followers.
     let dries = winds.dry();
-    let is_skipped = |sleep: &StrandSleep| sleep.is_asleep() || (sleep.is_follower() && !dries);
     let ahead = |(_, strand, ..): &InAir<'_>| {
         let (_, velocities, _, spins) = strand.parts();
         prefetch(velocities);
         prefetch(spins);
     };
     let each = Nanos(if winds.are_still() { STILL } else { WINDY });
-    for_each_part(each, tables(&mut strands), Vec::new, |items, rows| {
+    let followers = dries.then(|| tables(&mut followers)).into_iter().flatten();
+    for_each_part(each, tables(&mut simulated).chain(followers), Vec::new, |items, rows| {
         let mut airs = PerHair::default();
         for (of, sleep, strand, added_mass, changes, blown, received) in rows {
-            if !is_skipped(sleep)
+            if !sleep.is_asleep()
                 && let Some(air) = airs.index(of.0, || air_of(of.0))
             {
                 items.push((air, strand, added_mass, changes, blown, received));

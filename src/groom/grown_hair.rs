@@ -5,6 +5,7 @@ use super::GroomStrand;
 use super::{Groom, GroomError};
 use crate::{
     fault::{FaultKind, HairFault},
+    schedule::HairFrame,
     setting::{Ranged, ValueRange, setting},
     strand::{Hair, Strand, StrandOf},
 };
@@ -194,7 +195,7 @@ pub(super) fn build(app: &mut App) {
 
 /// Needs grooms to be assets.
 pub(super) fn with_assets(app: &mut App) {
-    app.add_systems(PreUpdate, (remove_groomed, spawn_grown).chain());
+    app.add_systems(HairFrame, (remove_groomed, spawn_grown).chain());
 }
 
 #[cfg(feature = "render")]

@@ -11,7 +11,8 @@ setting! {
     /// important hair, by [`HairLod::importance`](super::HairLod::importance) times its share of the
     /// view, takes coarser levels until all of it fits. The time is estimated from numbers of segments
     /// and substeps, not measured: the same game has the same hair on any machine and in any replay.
-    /// [`HairEstimate`] holds the result.
+    /// [`HairEstimate`] holds the result. A budget that the coarsest levels exceed is reported once as a
+    /// [`HairFault`](crate::HairFault).
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;

@@ -10,7 +10,8 @@ use crate::{
     parallel::{Nanos, for_each},
     setting::Settings,
     strand::{
-        Hair, HeldNodes, OnGpu, PerHair, Strand, StrandModel, StrandOf, StrandSleep, Strands,
+        Hair, HeldNodes, KinematicStrand, OnGpu, PerHair, Strand, StrandHistory, StrandModel,
+        StrandOf, StrandSleep, Strands,
     },
 };
 use bevy::{
@@ -43,7 +44,7 @@ pub struct Follower {
     guide: Option<u32>,
     #[reflect(ignore)]
     pub(super) ties: Ties,
-    /// Position of its root when last updated (m).
+    /// Position of its root when it last moved (m).
     pub(super) root: Vec3,
     /// Whether it was frozen and is simulated again from this tick on.
     #[reflect(ignore)]
@@ -138,8 +139,24 @@ struct GroupStrand<'a> {
     entity: Entity,
     sleep: Mut<'a, StrandSleep>,
     follower: Mut<'a, Follower>,
+    history: Mut<'a, StrandHistory>,
+    /// Whether it is among the strands that are not simulated.
+    is_kinematic: bool,
     /// Whether it may be a guide or a follower: a valid strand that nothing holds.
     free: bool,
+}
+
+/// At the start of a tick: where user code has written over what says that a strand is a follower, its hair
+/// is looked at again.
+pub(crate) fn note_overwritten(
+    written: Query<&StrandOf, (Changed<StrandSleep>, With<KinematicStrand>)>,
+    mut hairs: Query<&mut Guides>,
+) {
+    for of in &written {
+        if let Ok(mut guides) = hairs.get_mut(of.0) {
+            guides.bypass_change_detection().partition_key = None;
+        }
+    }
 }
 
 /// At the start of a tick: which strands are simulated, and which guides each other one follows.
@@ -157,9 +174,10 @@ pub(crate) fn choose_guides(
         &StrandOf,
         Ref<Strand>,
         &mut StrandSleep,
-        &mut Follower,
-        Option<&HeldNodes>,
+        (&mut Follower, &mut StrandHistory),
+        (Option<&HeldNodes>, Has<KinematicStrand>),
     )>,
+    mut commands: Commands,
 ) {
     // Strands of springs have no twist for a neighbour to follow.
     let share_of = |hair: Entity, present: &PresentLod| match models.of(hair) {
@@ -192,7 +210,7 @@ pub(crate) fn choose_guides(
         return;
     }
     let mut groups = PerHair::default();
-    for (entity, of, strand, sleep, follower, held) in &mut strands {
+    for (entity, of, strand, sleep, (follower, history), (held, is_kinematic)) in &mut strands {
         let index = groups.index(of.0, || {
             let (hair, _, present, guides) = hairs.get(of.0).ok()?;
             let (members, strands) = default();
@@ -220,7 +238,7 @@ pub(crate) fn choose_guides(
         let free = is_whole && !is_held;
         let group: &mut HairPartition<'_> = &mut groups.values[index];
         group.repairs |= !is_whole && strand.nodes() >= 2;
-        group.members.push(GroupStrand { entity, sleep, follower, free });
+        group.members.push(GroupStrand { entity, sleep, follower, history, is_kinematic, free });
         group.strands.push(strand);
     }
     let mut counts = EntityHashMap::<usize>::default();
@@ -229,6 +247,7 @@ pub(crate) fn choose_guides(
             let guides = guides.bypass_change_detection();
             counts.insert(group.hair, partition(group, guides));
             guides.partition_key = guides.partition_key.filter(|_| !group.repairs);
+            mark(group, &mut commands);
         }
     }
     for (hair, _, mut present, mut guides) in &mut hairs {
@@ -242,6 +261,20 @@ pub(crate) fn choose_guides(
         if !counts.contains_key(&hair) && !guides.strands.is_empty() {
             guides.bypass_change_detection().begin();
         }
+    }
+}
+
+/// Marks the strands that are followers now, and those that are no more.
+fn mark(group: &HairPartition<'_>, commands: &mut Commands) {
+    let changed = |m: &&GroupStrand<'_>| m.sleep.is_follower() != m.is_kinematic;
+    let (left, came): (Vec<_>, Vec<_>) =
+        group.members.iter().filter(changed).partition(|member| member.is_kinematic);
+    let came: Vec<_> = came.iter().map(|member| (member.entity, KinematicStrand)).collect();
+    if !came.is_empty() {
+        commands.try_insert_batch(came);
+    }
+    for member in left {
+        commands.entity(member.entity).try_remove::<KinematicStrand>();
     }
 }
 
@@ -264,7 +297,7 @@ fn partition(group: &mut HairPartition<'_>, guides: &mut Guides) -> usize {
     let mut same = guides.strands.len() == wanted && guides.level == *level;
     let mut count = 0;
     for (member, strand) in members.iter_mut().zip(strands.iter()) {
-        let GroupStrand { entity, sleep, follower, free } = member;
+        let GroupStrand { entity, sleep, follower, history, free, .. } = member;
         let (sleep, follower) =
             (sleep.bypass_change_detection(), follower.bypass_change_detection());
         let is_follower = *free && follower.rank.is_some_and(|rank| rank >= first_follower);
@@ -281,9 +314,12 @@ fn partition(group: &mut HairPartition<'_>, guides: &mut Guides) -> usize {
                 sleep.wake_up();
             }
             follower.ties = Ties::default();
+            // Followers' history is written as they move.
+            history.bypass_change_detection().remember(strand);
         }
         // A strand that was written to stays where it was put and follows from there.
-        if is_follower && (strand.is_changed() || !follower.ties.fit(strand.edges())) {
+        let is_new = !sleep.is_follower() || strand.is_changed();
+        if is_follower && (is_new || !follower.ties.fit(strand.edges())) {
             follower.ties = Ties::default();
         }
         follower.guide = guide;
@@ -361,8 +397,11 @@ fn tie(members: &mut [GroupStrand<'_>], strands: &[Ref<'_, Strand>], guides: &mu
     }
     if guides.strands.is_empty() {
         // Frozen hair has no guides.
-        for member in members.iter_mut().filter(|m| is_loose(m) && !m.sleep.is_follower()) {
-            member.sleep.bypass_change_detection().set_follower(true);
+        for (member, strand) in members.iter_mut().zip(strands) {
+            if is_loose(member) && !member.sleep.is_follower() {
+                member.sleep.bypass_change_detection().set_follower(true);
+                member.follower.bypass_change_detection().root = waypoints(strand)[0];
+            }
         }
         return;
     }
@@ -433,10 +472,11 @@ fn waypoints(strand: &Strand) -> [Vec3; 3] {
 /// A strand that leaves its hair or moves to another is simulated until a level is chosen there.
 pub(super) fn release_follower(
     left: On<Discard, StrandOf>,
-    mut strands: Query<(&mut StrandSleep, &mut Follower)>,
+    mut strands: Query<(Released, &mut Follower)>,
+    mut commands: Commands,
 ) {
-    if let Ok((mut sleep, mut follower)) = strands.get_mut(left.entity) {
-        release(&mut sleep);
+    if let Ok((strand, mut follower)) = strands.get_mut(left.entity) {
+        release(left.entity, strand, &mut commands);
         *follower = Follower::default();
     }
 }
@@ -444,16 +484,26 @@ pub(super) fn release_follower(
 /// A strand whose `Follower` was removed is simulated until it has guides again.
 pub(super) fn release_without_follower(
     left: On<Remove, Follower>,
-    mut strands: Query<&mut StrandSleep>,
+    mut strands: Query<Released>,
+    mut commands: Commands,
 ) {
-    if let Ok(mut sleep) = strands.get_mut(left.entity) {
-        release(&mut sleep);
+    if let Ok(strand) = strands.get_mut(left.entity) {
+        release(left.entity, strand, &mut commands);
     }
 }
 
-fn release(sleep: &mut StrandSleep) {
+/// What changes on a strand that is no follower any more.
+type Released = (&'static mut StrandSleep, &'static Strand, &'static mut StrandHistory);
+
+fn release(
+    entity: Entity,
+    (mut sleep, strand, mut history): (Mut<'_, StrandSleep>, &Strand, Mut<'_, StrandHistory>),
+    commands: &mut Commands,
+) {
     if sleep.is_follower() {
         sleep.set_follower(false);
         sleep.wake_up();
+        history.bypass_change_detection().remember(strand);
+        commands.entity(entity).try_remove::<KinematicStrand>();
     }
 }

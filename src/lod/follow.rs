@@ -5,6 +5,7 @@
 //! root stays on the scalp, and it is continuous when it is tied: rotations start at zero.
 //! Its angular velocity relative to the guides at that time decays and its displacement returns to zero.
 
+use crate::parallel::prefetch;
 use bevy::math::ops;
 use glam::{Quat, Vec3};
 
@@ -21,8 +22,6 @@ pub struct Ties {
     pub guides: Vec<(u32, f32)>,
     /// For each edge and guide, edge by edge.
     edges: Vec<Tie>,
-    /// Each segment in the frame of its edge (m).
-    segments: Vec<Vec3>,
     /// Angular velocity of each edge relative to its guides when it was tied (rad/s); empty once that
     /// has decayed.
     own: Vec<Vec3>,
@@ -35,6 +34,8 @@ pub struct Ties {
 struct Tie {
     /// The edge's frame in that of the guide.
     relative: Quat,
+    /// The segment in the frame of the edge, the same for each guide (m).
+    segment: Vec3,
     /// Edge of the guide, with the fraction toward the next.
     at: f32,
 }
@@ -76,16 +77,18 @@ impl Frame {
 
     /// The world velocity (m/s) of a point that rested in the moving frame for `seconds`.
     pub(super) fn velocity(&self, place: Vec3, seconds: f32) -> Vec3 {
-        let v = (place - self.taken(place, Quat::IDENTITY).0) / seconds;
+        let v = (place - self.place(place)) / seconds;
         if v.is_finite() { v } else { Vec3::ZERO }
     }
 
     #[inline]
-    fn taken(&self, place: Vec3, orientation: Quat) -> (Vec3, Quat) {
-        match self.0 {
-            None => (place, orientation),
-            Some((turn, way)) => (turn * place + way, turn * orientation),
-        }
+    fn place(&self, place: Vec3) -> Vec3 {
+        self.0.map_or(place, |(turn, way)| turn * place + way)
+    }
+
+    #[inline]
+    fn turned(&self, orientation: Quat) -> Quat {
+        self.0.map_or(orientation, |(turn, _)| turn * orientation)
     }
 }
 
@@ -94,6 +97,8 @@ impl Frame {
 pub struct StrandPose<'a> {
     /// Node positions (m).
     pub positions: &'a mut [Vec3],
+    /// Where the nodes were before they moved, to be written (m); as many, or none if not needed.
+    pub before: &'a mut [Vec3],
     /// Node velocities (m/s).
     pub velocities: &'a mut [Vec3],
     /// Orientations of the edges.
@@ -114,18 +119,18 @@ impl Ties {
         let mut distance = 0.0;
         for (i, (length, turn)) in strand.lengths.iter().zip(strand.turns).enumerate() {
             let mut spin = strand.spin(i);
+            let segment = strand.positions.get(i..i + 2).map_or(Vec3::ZERO, |p| p[1] - p[0]);
+            let segment = turn.conjugate() * segment;
             for (_, weight, guide) in &guides {
                 let at = edge_at(guide.lengths, distance + 0.5 * length);
                 let relative = between(guide.turns, at).conjugate() * *turn;
-                edges.push(Tie { relative, at });
+                edges.push(Tie { relative, segment, at });
                 spin -= guide.spin((at + 0.5) as usize) * *weight;
             }
             own.push(spin);
             distance += length;
         }
-        let segments = strand.positions.windows(2).zip(strand.turns);
         Self {
-            segments: segments.map(|(p, q)| q.conjugate() * (p[1] - p[0])).collect(),
             guides: guides.into_iter().map(|(index, weight, _)| (index, weight)).collect(),
             edges,
             own,
@@ -135,9 +140,7 @@ impl Ties {
 
     /// Whether they fit a strand with this number of edges.
     pub fn fit(&self, edges: usize) -> bool {
-        !self.guides.is_empty()
-            && self.segments.len() == edges
-            && self.edges.len() == edges * self.guides.len()
+        !self.guides.is_empty() && self.edges.len() == edges * self.guides.len()
     }
 
     /// Follows the guides, whose frames `turns` gives: `None` for an invalid one. Velocities are those of
@@ -173,22 +176,32 @@ impl Ties {
         if let Some(v) = pose.velocities.first_mut() {
             *v = Vec3::ZERO;
         }
-        let ties = self.edges.chunks_exact(self.guides.len());
-        for (i, (segment, ties)) in self.segments.iter().zip(ties).enumerate() {
-            let (place, before) = frame.taken(pose.positions[i + 1], pose.orientations[i]);
+        let (stays, has_spins) = (frame.0.is_none(), !pose.spins.is_empty());
+        let nodes = pose.positions.iter_mut().zip(pose.velocities.iter_mut()).skip(1);
+        let edges = self.edges.chunks_exact(self.guides.len()).zip(pose.orientations.iter_mut());
+        for (i, ((ties, orientation), (position, velocity))) in edges.zip(nodes).enumerate() {
             let mut turn = self.turn(ties, &frames);
             if let Some(own) = self.own.get(i) {
                 turn = Quat::from_scaled_axis(*own * own_motion) * turn;
             }
-            p += turn * *segment;
-            pose.orientations[i] = turn;
-            if let Some(spins) = pose.spins.get_mut(i) {
-                *spins = finite(spin(before, turn) * per_second);
+            p += turn * ties[0].segment;
+            let before = core::mem::replace(position, p);
+            if let Some(kept) = pose.before.get_mut(i + 1) {
+                *kept = before;
             }
-            pose.velocities[i + 1] = finite((p - place) * per_second);
-            pose.positions[i + 1] = p;
+            let place = if stays { before } else { frame.place(before) };
+            *velocity = finite((p - place) * per_second);
+            let before = core::mem::replace(orientation, turn);
+            if has_spins && let Some(spins) = pose.spins.get_mut(i) {
+                *spins = finite(spin(frame.turned(before), turn) * per_second);
+            }
         }
         true
+    }
+
+    pub(super) fn prefetch(&self) {
+        prefetch(&self.guides);
+        prefetch(&self.edges);
     }
 
     /// The frame of an edge that its guides give it.
@@ -310,6 +323,7 @@ mod tests {
             let (mut v, mut w) = (vec![Vec3::ZERO; 9], vec![Vec3::ZERO; 8]);
             let mut pose = StrandPose {
                 positions: &mut own.0,
+                before: &mut [],
                 velocities: &mut v,
                 orientations: &mut own.1,
                 spins: &mut w,
@@ -332,14 +346,18 @@ mod tests {
     fn moved(ties: &mut Ties, own: &mut Parts, guides: &[Option<&[Quat]>]) -> (bool, Vec<Vec3>) {
         let mut velocities = vec![Vec3::NAN; own.0.len()];
         let mut spins = vec![Vec3::NAN; own.1.len()];
+        let (was, mut before) = (own.0.clone(), own.0.clone());
+        before[1..].fill(Vec3::NAN);
         let mut pose = StrandPose {
             positions: &mut own.0,
+            before: &mut before,
             velocities: &mut velocities,
             orientations: &mut own.1,
             spins: &mut spins,
         };
         let went = ties.follow(&mut pose, |i| guides[i as usize], &Frame::default(), 0.1);
         assert!(velocities.iter().chain(&spins).all(|v| v.is_finite()));
+        assert!(!went || before == was, "where it was is kept");
         (went, velocities)
     }
 
@@ -436,6 +454,7 @@ mod tests {
         let (mut v, mut w) = (vec![Vec3::ONE; 9], vec![Vec3::ONE; 8]);
         let mut pose = StrandPose {
             positions: &mut own.0,
+            before: &mut [],
             velocities: &mut v,
             orientations: &mut own.1,
             spins: &mut w,

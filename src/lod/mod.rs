@@ -20,7 +20,8 @@
 //! | gravity, drag, wind, droplets' pull | act on its guides only |
 //! | bonds: treatments, drying, water | act on it; bonds that form remember its present shape |
 //! | colliders | do not act on it: it stays out of the head as its guides do |
-//! | contact with other strands | none; on wet hair its film acts on its simulated neighbours |
+//! | contact with other strands | none; on wet hair its film acts on its simulated neighbours. Where fewer than an eighth of the strands are simulated, dry ones do not collide: they are centimetres apart |
+//! | a root on a mesh | goes with it once a tick; where most strands are followers, once one of sixteen roots has moved by more than 0.05 mm |
 //! | sleep | while all its guides sleep |
 //! | [`HeldNodes`](crate::HeldNodes), wound on a rod | it is simulated, and is no guide |
 //! | game code that writes to its [`Strand`](crate::Strand) | it follows from there; velocities are lost |

@@ -3,11 +3,12 @@
 use super::{
     Follower, Guides, HairBudget, HairEstimate, HairLod, HairScreenShare, LodLevel, PresentLod,
     budget::{Candidate, costs, fit},
-    choose::{choose_guides, release_follower, release_without_follower},
+    choose::{choose_guides, note_overwritten, release_follower, release_without_follower},
     followers::{move_followers, sync_follower_sleep},
     model,
 };
 use crate::{
+    fault::{FaultKind, HairFault},
     schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
     setting::{self, Ranged},
     strand::{Hair, Strand, Strands, keep_required},
@@ -37,7 +38,7 @@ impl Plugin for LodPlugin {
             .add_systems(
                 HairTick,
                 (
-                    (choose, choose_guides)
+                    (choose, note_overwritten, choose_guides)
                         .chain()
                         .in_set(HairSystems::LevelOfDetail)
                         .run_if(first_substep),
@@ -64,6 +65,8 @@ fn choose(
         With<Hair>,
     >,
     strands: Query<&Strand>,
+    mut exceeded: Local<bool>,
+    mut faults: MessageWriter<HairFault>,
 ) {
     let budget = budget.clamped();
     let mut chosen: Vec<_> = hairs
@@ -90,10 +93,18 @@ fn choose(
         let costs = candidates.iter().enumerate().map(|(i, c)| c.costs[level(i)]);
         costs.sum::<f32>() * budget.slowness
     };
-    estimate.set_if_neq(HairEstimate {
-        unbudgeted: cost_of(&|i| candidates[i].wanted),
-        present: cost_of(&|i| levels[i]),
-    });
+    let present = cost_of(&|i| levels[i]);
+    estimate.set_if_neq(HairEstimate { unbudgeted: cost_of(&|i| candidates[i].wanted), present });
+    let exceeds = present > budget.milliseconds;
+    if exceeds && !core::mem::replace(&mut *exceeded, exceeds) {
+        let message = format!(
+            "the budget of {} ms is too small: at their coarsest levels all hairs take about {present} ms, \
+             which they will",
+            budget.milliseconds
+        );
+        faults.write(HairFault::new(FaultKind::Setting, message));
+    }
+    *exceeded = exceeds;
     for ((candidate, settings, present, limits), level) in chosen.iter_mut().zip(levels) {
         let settings = level.checked_sub(1).and_then(|i| settings.get(i));
         present.set_if_neq(PresentLod {

@@ -77,6 +77,11 @@ pub struct HairBeadSystems;
 const SINKING: f32 = 0.06;
 const SUNK: f32 = 0.6;
 
+/// Run condition: there is any droplet, or one is still shown.
+pub(super) fn are_any(beads: Res<HairBeads>, droplets: Query<(), With<Droplet>>) -> bool {
+    !droplets.is_empty() || !beads.is_empty()
+}
+
 /// Droplets interpolated between two ticks. Those that lie on something flatten to caps, and shrink
 /// as they run off.
 pub(super) fn show_droplets(
@@ -85,9 +90,6 @@ pub(super) fn show_droplets(
     (rules, gravity): (Option<Res<DropletRules>>, Option<Res<HairGravity>>),
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
 ) {
-    if droplets.is_empty() && beads.is_empty() {
-        return;
-    }
     let late = match time {
         Some(time) if interpolate.0 => {
             (1.0 - time.overstep_fraction().clamp(0.0, 1.0)) * time.timestep().as_secs_f32()

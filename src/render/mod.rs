@@ -133,11 +133,17 @@ impl Plugin for HairRenderPlugin {
             .register_type::<WetLook>()
             .add_systems(
                 PostUpdate,
-                beads::show_droplets.in_set(HairBeadSystems).before(HairRenderSystems),
+                beads::show_droplets
+                    .in_set(HairBeadSystems)
+                    .before(HairRenderSystems)
+                    .run_if(beads::are_any),
             );
         app.add_systems(
             PostUpdate,
-            screen_share::measure.after(TransformSystems::Propagate).after(HairRenderSystems),
+            screen_share::measure
+                .after(TransformSystems::Propagate)
+                .after(HairRenderSystems)
+                .run_if(any_with_component::<HairBuffers>),
         );
         // The drawn child inherits it. An error says that the user has required it already.
         let _ = app.try_register_required_components::<Hair, Visibility>();

@@ -17,8 +17,8 @@ use crate::{
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting::{self, Ranged, Settings},
     strand::{
-        AddedMass, Hair, HeldNodes, OnGpu, Pose, SleepPose, Sleepers, Strand, StrandModel,
-        StrandOf, StrandSleep, Strands, TickPose,
+        AddedMass, Hair, HeldNodes, KinematicStrand, OnGpu, Pose, SleepPose, Sleepers, Strand,
+        StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     },
     treatment::Treatments,
     water::Moisture,
@@ -240,7 +240,8 @@ fn update_sleep(
             (Ref<Bonds>, &BondChanges, &AddedMass),
             (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
         ),
-        Without<OnGpu>,
+        // Followers sleep when their guides do.
+        (Without<KinematicStrand>, Without<OnGpu>),
     >,
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
@@ -279,10 +280,6 @@ fn update_sleep(
     };
     let mut items: Vec<SleepCandidate<'_>> = Vec::with_capacity(strands.iter().len());
     for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
-        // Followers sleep when their guides do.
-        if sleep.is_follower() {
-            continue;
-        }
         let Some(hair) = hair_of(of.0) else { continue };
         let (treatments, water, held) = others;
         let restless = strand.is_changed()

@@ -23,7 +23,8 @@ use crate::{
     schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
     strand::{
-        AddedMass, Hair, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, StrandSleep, TickPose,
+        AddedMass, Hair, HeldNodes, KinematicStrand, OnGpu, Strand, StrandModel, StrandOf,
+        StrandSleep, TickPose,
     },
 };
 use bevy::{math::Isometry3d, prelude::*};
@@ -163,7 +164,7 @@ fn step_rods(
             &AddedMass,
             Option<&HeldNodes>,
         ),
-        Without<OnGpu>,
+        (Without<KinematicStrand>, Without<OnGpu>),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {

@@ -17,7 +17,10 @@ use crate::{
     rod::{block::BlockLanes, obstacle::Obstacle, step::weigh},
     schedule::{EffectiveSubsteps, HairSettle, HairSystems, HairTick},
     setting::{self, Ranged, Settings},
-    strand::{AddedMass, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, StrandSleep, TickPose},
+    strand::{
+        AddedMass, HeldNodes, KinematicStrand, OnGpu, Strand, StrandModel, StrandOf, StrandSleep,
+        TickPose,
+    },
 };
 use bevy::prelude::*;
 use fearless_simd::Level;
@@ -103,7 +106,7 @@ fn step_springs(
     hairs: Query<(Option<&Obstacles>, &TickPose)>,
     mut strands: Query<
         (Entity, &StrandOf, &StrandSleep, &mut Strand, &AddedMass, Option<&HeldNodes>),
-        Without<OnGpu>,
+        (Without<KinematicStrand>, Without<OnGpu>),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {

@@ -28,6 +28,7 @@ pub(crate) use on_gpu::bring_home;
 pub(crate) use on_gpu::{AskForStrands, BringHome, StrandsArrived};
 pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
+pub(crate) use strand_sleep::KinematicStrand;
 pub use strand_sleep::{SleepPose, Sleepers, StrandSleep};
 pub use systems::StrandPlugin;
 

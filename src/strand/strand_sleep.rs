@@ -66,6 +66,12 @@ impl StrandSleep {
     }
 }
 
+/// Marks a strand that follows guides or is frozen at its hair's level of detail. It puts such strands
+/// into tables of their own, which systems that act on simulated strands do not visit. Set and removed
+/// where [`StrandSleep::is_follower`] changes.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct KinematicStrand;
+
 /// Numbers of a hair's sleeping and awake strands; followers are not counted. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]

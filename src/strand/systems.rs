@@ -1,8 +1,9 @@
 //! Strands in the tick: poses of the scalp, and inertia of the nodes.
 
 use super::{
-    AddedMass, Hair, HeldNodes, HeldNodesState, OnGpu, PerHair, SleepPose, Sleepers, Strand,
-    StrandError, StrandHistory, StrandModel, StrandOf, StrandSleep, Strands, TickPose,
+    AddedMass, Hair, HeldNodes, HeldNodesState, KinematicStrand, OnGpu, PerHair, SleepPose,
+    Sleepers, Strand, StrandError, StrandHistory, StrandModel, StrandOf, StrandSleep, Strands,
+    TickPose,
     frame::{HairInertia, Pose},
     held::report_out_of_reach,
     keep_required,
@@ -10,10 +11,17 @@ use super::{
 use crate::{
     fault::{FaultKind, HairChecks, HairFault},
     parallel::{Nanos, for_each_part, tables},
-    schedule::{EffectiveSubsteps, HairStep, HairSystems, HairTick, MergedSubsteps, first_substep},
+    schedule::{
+        EffectiveSubsteps, HairFrame, HairStep, HairSystems, HairTick, MergedSubsteps,
+        first_substep,
+    },
     setting::{self, Settings},
 };
-use bevy::{ecs::entity_disabling::Disabled, math::Isometry3d, prelude::*};
+use bevy::{
+    ecs::{entity_disabling::Disabled, query::QueryFilter},
+    math::Isometry3d,
+    prelude::*,
+};
 
 /// Estimated time per strand (ns) of copying it, and of applying its hair's frame delta.
 const COPY: Nanos = Nanos(100);
@@ -49,11 +57,16 @@ impl Plugin for StrandPlugin {
             .register_type::<SleepPose>()
             .register_type::<OnGpu>()
             .add_systems(HairChecks, report_unusable)
-            .add_systems(PreUpdate, record_frame)
+            .add_systems(HairFrame, record_frame)
             .add_systems(
                 HairTick,
                 (
-                    (repair_strands, report_out_of_reach.run_if(first_substep), store_history)
+                    (
+                        repair_strands::<Without<KinematicStrand>>,
+                        repair_strands::<With<KinematicStrand>>.run_if(first_substep),
+                        report_out_of_reach.run_if(first_substep),
+                        store_history,
+                    )
                         .chain()
                         .in_set(HairSystems::StrandHistory),
                     (aim_poses.run_if(first_substep), advance_poses)
@@ -92,17 +105,20 @@ fn report_unusable(
 }
 
 /// Repairs private fields written by an inspector or a scene file. Our own writes bypass change
-/// detection. Runs in every substep, because systems of game code within the tick may write as
-/// well; without writes it only scans change ticks.
-fn repair_strands(
-    mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Without<OnGpu>, Allow<Disabled>)>,
+/// detection. Simulated strands are checked in every substep, because systems of game code within the
+/// tick may write as well; without writes it only scans change ticks.
+fn repair_strands<F: QueryFilter>(
+    mut strands: Query<
+        (Entity, &mut Strand),
+        (Changed<Strand>, Without<OnGpu>, Allow<Disabled>, F),
+    >,
     mut loads: Query<
         (Entity, &mut AddedMass),
-        (Changed<AddedMass>, Without<OnGpu>, Allow<Disabled>),
+        (Changed<AddedMass>, Without<OnGpu>, Allow<Disabled>, F),
     >,
     mut histories: Query<
         (Entity, &mut StrandHistory),
-        (Changed<StrandHistory>, Without<OnGpu>, Allow<Disabled>),
+        (Changed<StrandHistory>, Without<OnGpu>, Allow<Disabled>, F),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -118,10 +134,14 @@ fn repair_strands(
     }
 }
 
-/// Before the first substep of a tick: the present positions become history.
+/// Before the first substep of a tick: the present positions become history. Strands that are not
+/// simulated store theirs where they are moved.
 fn store_history(
     step: Res<HairStep>,
-    mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory), Without<OnGpu>>,
+    mut strands: Query<
+        (&Strand, &StrandSleep, &mut StrandHistory),
+        (Without<KinematicStrand>, Without<OnGpu>),
+    >,
 ) {
     if step.index > 0 {
         return;
@@ -225,7 +245,10 @@ fn advance_poses(
 fn apply_frame_inertia(
     substeps: EffectiveSubsteps,
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand), Without<OnGpu>>,
+    mut strands: Query<
+        (&StrandOf, &StrandSleep, &mut Strand),
+        (Without<KinematicStrand>, Without<OnGpu>),
+    >,
 ) {
     if !substeps.any() || hairs.iter().all(|hair| hair.frame_delta().is_none()) {
         return;

@@ -25,6 +25,7 @@ mod what;
 pub use error::WearError;
 pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair};
 
+use crate::schedule::HairFrame;
 use bevy::prelude::*;
 
 /// Puts hair on entities with [`WearHair`].
@@ -40,7 +41,7 @@ impl Plugin for WearPlugin {
             .register_type::<HairNotWorn>()
             .register_required_components::<WearHair, systems::Wearing>()
             .add_systems(
-                PreUpdate,
+                HairFrame,
                 (systems::take_off, systems::detect_changes, systems::find_heads, systems::put_on)
                     .chain(),
             );

@@ -98,10 +98,16 @@ fn a_budget_makes_the_least_important_hair_coarser_without_flicker() {
     app.insert_resource(HairBudget { slowness: 1e3, ..budget });
     app.update();
     assert_eq!(levels(&app), [3; 6]);
+    assert_eq!(faults(&mut app).len(), 1, "that is too little for the coarsest levels");
     app.insert_resource(HairBudget { milliseconds: f32::NAN, slowness: -1.0 });
     app.update();
     assert_eq!(levels(&app), [0; 6]);
     assert_eq!(faults(&mut app).len(), 2);
+    app.insert_resource(HairBudget { milliseconds: 0.0, ..default() });
+    (0..3).for_each(|_| app.update());
+    assert_eq!(levels(&app), [3; 6], "nothing at all is frozen, and goes on");
+    let told = faults(&mut app);
+    assert!(told.len() == 1 && told[0].to_string().contains("the budget of 0 ms"), "{told:?}");
 }
 
 #[test]

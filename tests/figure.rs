@@ -1,0 +1,191 @@
+//! Presets on the project's own figure, which stands and walks in the wind: how deep the simulated
+//! strands lie in its skin.
+#![cfg(feature = "groom")]
+
+#[path = "../examples/character/body.rs"]
+#[allow(dead_code, reason = "the example uses all of it")]
+mod body;
+mod common;
+#[path = "../examples/salon/mannequin.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod mannequin;
+#[path = "../examples/character/skeleton.rs"]
+#[allow(dead_code, reason = "the example uses all of it")]
+mod skeleton;
+
+/// What the mannequin takes from the scenes.
+mod scenes {
+    pub const HEAD_RADIUS: f32 = 0.1;
+}
+
+use bevy::{
+    mesh::{
+        VertexAttributeValues,
+        skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
+    },
+    prelude::*,
+};
+use bevy_keratin::{plant::HairPreset, prelude::*, strand::TickPose};
+use common::{app_with_meshes, faults};
+use std::{thread::sleep, time::Duration};
+
+/// What hair can reach of the figure is above this (m).
+const LOWEST: f32 = 1.0;
+
+/// Vertices of the skin at rest that hair may reach.
+struct Skin {
+    places: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    joints: Vec<[u16; 4]>,
+    weights: Vec<[f32; 4]>,
+}
+
+impl Skin {
+    fn of(mesh: &Mesh) -> Self {
+        let (
+            Some(VertexAttributeValues::Float32x3(places)),
+            Some(VertexAttributeValues::Float32x3(normals)),
+            Some(VertexAttributeValues::Uint16x4(joints)),
+            Some(VertexAttributeValues::Float32x4(weights)),
+        ) = (
+            mesh.attribute(Mesh::ATTRIBUTE_POSITION),
+            mesh.attribute(Mesh::ATTRIBUTE_NORMAL),
+            mesh.attribute(Mesh::ATTRIBUTE_JOINT_INDEX),
+            mesh.attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT),
+        )
+        else {
+            panic!("a skinned mesh");
+        };
+        let near: Vec<usize> = (0..places.len()).filter(|i| places[*i][1] > LOWEST).collect();
+        Self {
+            places: near.iter().map(|i| Vec3::from(places[*i])).collect(),
+            normals: near.iter().map(|i| Vec3::from(normals[*i])).collect(),
+            joints: near.iter().map(|i| joints[*i]).collect(),
+            weights: near.iter().map(|i| weights[*i]).collect(),
+        }
+    }
+
+    /// The vertices where the bones are now, with normals.
+    fn posed(&self, bones: &[Mat4]) -> Vec<(Vec3, Vec3)> {
+        (0..self.places.len())
+            .map(|i| {
+                let pulls = self.joints[i].iter().zip(self.weights[i]);
+                let (mut place, mut normal) = (Vec3::ZERO, Vec3::ZERO);
+                for (joint, weight) in pulls {
+                    let bone = &bones[usize::from(*joint)];
+                    place += bone.transform_point3(self.places[i]) * weight;
+                    normal += bone.transform_vector3(self.normals[i]) * weight;
+                }
+                (place, normal.normalize_or_zero())
+            })
+            .collect()
+    }
+}
+
+/// How deep a point is in the skin (m), by the plane of the vertex that is nearest.
+fn depth(skin: &[(Vec3, Vec3)], p: Vec3) -> f32 {
+    let nearest =
+        skin.iter().min_by(|a, b| a.0.distance_squared(p).total_cmp(&b.0.distance_squared(p)));
+    let (place, normal) = nearest.expect("a skin");
+    (*place - p).dot(*normal)
+}
+
+/// Shares of nodes that are deeper than 0.5 mm, standing and walking, and the deepest of each (m).
+fn depths(mesh: &Mesh, preset: HairPreset) -> [(f32, f32); 2] {
+    let mut app = app_with_meshes(60.0);
+    let world = app.world_mut();
+    let root = world.spawn((skeleton::path(0.0), Name::new("Figure"))).id();
+    let mut bones: Vec<Entity> = Vec::new();
+    for bone in 0..skeleton::COUNT {
+        let above = skeleton::parent(bone).map_or(root, |parent| bones[parent]);
+        let name = match bone {
+            skeleton::HEAD => Name::new("Head"),
+            _ => Name::new(format!("Bone {bone}")),
+        };
+        bones.push(world.spawn((name, skeleton::at_rest(bone), ChildOf(above))).id());
+    }
+    let inverse: Vec<Mat4> =
+        (0..skeleton::COUNT).map(|bone| Mat4::from_translation(-skeleton::joint(bone))).collect();
+    let skin = Skin::of(mesh);
+    let handle = world.resource_mut::<Assets<Mesh>>().add(mesh.clone());
+    let inverse_bindposes = world
+        .resource_mut::<Assets<SkinnedMeshInverseBindposes>>()
+        .add(SkinnedMeshInverseBindposes::from(inverse.clone()));
+    let skinned = SkinnedMesh { inverse_bindposes, joints: bones.clone() };
+    world.spawn((Mesh3d(handle), skinned, ChildOf(root)));
+    world.entity_mut(root).insert(WearHair::new(preset).facing(Dir3::Z));
+    let hair = (0..6000)
+        .find_map(|_| {
+            app.update();
+            sleep(Duration::from_millis(2));
+            let mut worn = app.world_mut().query_filtered::<Entity, With<WornHair>>();
+            worn.iter(app.world()).next()
+        })
+        .expect("hair is worn");
+    // It settles before it is drawn.
+    (0..90).for_each(|_| app.update());
+
+    let measure = |app: &mut App, seconds: &[f32]| {
+        let (mut nodes, mut deep, mut deepest) = (0u32, 0u32, f32::MIN);
+        for (tick, time) in seconds.iter().enumerate() {
+            let world = app.world_mut();
+            if *time > 0.0 {
+                *world.get_mut::<Transform>(root).unwrap() = skeleton::path(*time);
+                for (bone, place) in bones.iter().zip(skeleton::walk(*time)) {
+                    *world.get_mut::<Transform>(*bone).unwrap() = place;
+                }
+            }
+            app.update();
+            if tick % 10 != 9 {
+                continue;
+            }
+            let world = app.world();
+            let place = |bone: usize| {
+                let own = |bone: usize| world.get::<Transform>(bones[bone]).unwrap().to_matrix();
+                let (mut at, mut place) = (bone, own(bone));
+                while let Some(parent) = skeleton::parent(at) {
+                    (at, place) = (parent, own(parent) * place);
+                }
+                world.get::<Transform>(root).unwrap().to_matrix() * place
+            };
+            let matrices: Vec<Mat4> = (0..skeleton::COUNT).map(|b| place(b) * inverse[b]).collect();
+            let posed = skin.posed(&matrices);
+            let pose = *world.get::<TickPose>(hair).unwrap().now();
+            for strand in world.get::<Strands>(hair).unwrap().iter().step_by(2) {
+                for p in &world.get::<Strand>(strand).unwrap().positions()[1..] {
+                    let depth = depth(&posed, pose.point_out(*p));
+                    nodes += 1;
+                    deep += u32::from(depth > 0.5e-3);
+                    deepest = deepest.max(depth);
+                }
+            }
+        }
+        (deep as f32 / nodes as f32, deepest)
+    };
+    let standing = measure(&mut app, &[0.0; 20]);
+    app.insert_resource(HairWind { velocity: Vec3::new(4.0, 0.0, 2.0), gusts: 0.5, ..default() });
+    let seconds: Vec<f32> = (1..=150).map(|tick| tick as f32 / 60.0).collect();
+    let walking = measure(&mut app, &seconds);
+    assert_eq!(faults(&mut app), []);
+    [standing, walking]
+}
+
+/// The aim is 0.1 and 1 %. Straight hair is at 5.6 and 5.7 %, the deepest node at 21 and 29 mm: the capsules
+/// that are fitted to joints lie within the skin.
+#[test]
+#[ignore = "not reached"]
+fn presets_stay_out_of_the_skin_of_a_figure_that_stands_and_walks_in_the_wind() {
+    let mesh = body::mesh_of(0.009);
+    for preset in [HairPreset::Straight, HairPreset::Curly, HairPreset::Bob, HairPreset::Long] {
+        let [(standing, a), (walking, b)] = depths(&mesh, preset);
+        println!(
+            "{preset:?}: {:.3} % of nodes deeper than 0.5 mm, the deepest {:.1} mm; walking {:.3} %, {:.1} mm",
+            100.0 * standing,
+            1e3 * a,
+            100.0 * walking,
+            1e3 * b
+        );
+        assert!(standing < 1e-3, "{preset:?}: {standing} of nodes are in the skin at rest");
+        assert!(walking < 1e-2, "{preset:?}: {walking} of nodes are in the skin as it walks");
+    }
+}
