@@ -210,5 +210,5 @@ fn go_along(
     if let Some(root) = history.positions.first_mut() {
         *root = root_before;
     }
-    strand.stepped_well();
+    strand.step_succeeded();
 }
