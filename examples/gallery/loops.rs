@@ -89,7 +89,7 @@ fn both(left: Vec<Image>, right: Vec<Image>) -> Vec<Image> {
 
 pub fn bedhead(arguments: &Arguments) -> Result<Loop> {
     let size = arguments.scaled(340, 340);
-    let near = (0.82, Vec3::new(0.0, -0.02, 0.0));
+    let near = (0.86, Vec3::new(0.0, 0.03, 0.0));
     let play = |variant| {
         let bedhead = story(SceneKind::Bedhead, Some(variant))?;
         scene(arguments, bedhead, HairView::Natural, size, near, (48, 25))
@@ -99,7 +99,7 @@ pub fn bedhead(arguments: &Arguments) -> Result<Loop> {
 
 pub fn blow_dry(arguments: &Arguments) -> Result<Loop> {
     let size = arguments.scaled(340, 340);
-    let near = (0.82, Vec3::new(0.0, -0.02, 0.0));
+    let near = (0.86, Vec3::new(0.0, 0.03, 0.0));
     let play = |view| {
         let dried = story(SceneKind::BlowDry, None)?;
         scene(arguments, dried, view, size, near, (48, 25))

@@ -192,7 +192,7 @@ impl HairPreset {
         let [right, up, front] = scalp.axes();
         let crown = scalp.place(0.05, 0.9, -0.35);
         let drape =
-            Drape { toward: -up - front * 0.15, over: 0.035, clearance: 4e-3, layering: 0.05 };
+            Drape { toward: -up - front * 0.15, over: 0.035, clearance: 5e-3, layering: 0.07 };
         let parted = CombPattern::Parted { at: scalp.center, across: right, along: -front * 0.4 };
         let base = Planting {
             density: 0.35e4,
@@ -217,7 +217,7 @@ impl HairPreset {
                 nodes: 28,
                 curl: curl(6e-3, 60e-3, CurlPhase::PerClump),
                 clump: Some(Clump { spacing: 22e-3, strength: 0.35 }),
-                drape: Some(Drape { layering: 0.1, ..drape }),
+                drape: Some(Drape { layering: 0.12, ..drape }),
                 ..base
             },
             Self::Curly => Planting {
@@ -259,7 +259,7 @@ impl HairPreset {
                 length: 0.32,
                 length_variation: 0.04,
                 nodes: 18,
-                drape: Some(Drape { layering: 0.07, ..drape }),
+                drape: Some(Drape { layering: 0.09, ..drape }),
                 // Higher in front, where the way down is longer: it hangs in one line.
                 cut: Some(Cut {
                     at: scalp.place(0.0, -0.9, 0.0),
