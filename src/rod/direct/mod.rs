@@ -55,7 +55,9 @@
 //!
 //! Periods below 40 substeps come out longer, by 10 % at 11 substeps; faster modes are only damped.
 //! L_g is limited to six times the strand's length, and segments much shorter than 1 mm are softened:
-//! f32 is not precise enough for more.
+//! f32 is not precise enough for more. A strand with more twist than it can hold has an indefinite Hessian:
+//! there a joint's moment counts up to EI times 8.99/L or (3 μ / (EI h²))^¼, whichever is more; the force
+//! is whole.
 //!
 //! # For a compute port
 //! One strand needs nothing of another, so one GPU thread may take one strand. Numbers by segment (a node
@@ -137,6 +139,10 @@ const DEEP: f32 = 0.25;
 /// Largest L_g, in lengths of the strand. Such hair sags by less than a thousandth of its length; f32
 /// is not precise enough for much stiffer hair.
 const STIFFEST: f32 = 6.0;
+
+/// Twist that counts in the Hessian, as a moment over EI times the strand's length: with its ends clamped
+/// it buckles here.
+const BUCKLES: f32 = 8.99;
 
 /// Largest ratio of a node's elastic stiffness to its inertia in a substep, for a strand of one segment;
 /// 1/n² of that for n segments. f32 is not precise enough for more. Only segments much shorter than 1 mm
@@ -275,6 +281,7 @@ fn stage<W: Width<Cell = crate::lanes::Lane>>(
             w.lit(params.gravity.y.into()),
             w.lit(params.gravity.z.into()),
         ),
+        most_twist: w.get(&b.most_twist),
         damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
         second: false,
         again: w.lit(1.0),
@@ -424,6 +431,12 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32
     let bending = density * f32x16::splat(simd, 2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
     let axial = f32x16::splat(simd, REFERENCE_GRAVITY * edges / STRAIN);
     let firmest = f32x16::splat(simd, FIRMEST / (edges * edges * dt * dt));
+    // In a substep inertia alone holds all waves up to about this twist, (3 μ / (EI h²))^¼.
+    let edge = one / density;
+    let stiffest = Real::min(bending * half, firmest * edge * edge * edge);
+    let inertia = density * f32x16::splat(simd, 3.0 / (dt * dt));
+    let held = Real::sqrt(Real::sqrt(inertia / Real::max(stiffest, f32x16::splat(simd, 1e-30))));
+    Real::max(f32x16::splat(simd, BUCKLES) / sum, held).store_array(&mut b.most_twist);
     let mut before = zero;
     for (i, n) in b.nodes.iter_mut().enumerate() {
         let mut after = zero;
