@@ -47,14 +47,14 @@ fn for_each_strand(
         for strand in members {
             // User code may have listed one that does not exist.
             let Ok(mut entity) = world.get_entity_mut(strand) else { continue };
-            let Ok((mut parts, mut bonds, mut history)) =
+            let Ok((mut data, mut bonds, mut history)) =
                 entity.get_components_mut::<(&mut Strand, &mut Bonds, &mut StrandHistory)>()
             else {
                 continue;
             };
-            // No tick may have seen what user code wrote into it in this frame.
-            let repaired = parts.repair();
-            act(&mut parts, &mut bonds, &mut history);
+            // User code may have written to it since the last tick.
+            let repaired = data.repair();
+            act(&mut data, &mut bonds, &mut history);
             if let Some(repaired) = repaired {
                 world.write_message(HairFault::new(FaultKind::Strand, repaired).of(strand));
             }

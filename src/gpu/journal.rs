@@ -1,5 +1,4 @@
-//! What the tick does to a hair, substep by substep, as the kernel takes it. The tick stays where it is;
-//! what it says is written down.
+//! A record of each substep of the tick, as input of the kernel. The tick itself is unchanged.
 
 use super::record::{BlowerRecord, MOST_BLOWERS, MOST_OBSTACLES, SubstepRecord};
 use crate::{
@@ -20,7 +19,7 @@ use bevy::prelude::*;
 pub struct GpuJournal {
     /// The substeps.
     pub records: Vec<SubstepRecord>,
-    /// What acted on the hair that a record cannot hold, the last of it.
+    /// The last effect on the hair that a record cannot express.
     pub missing: Option<&'static str>,
 }
 

@@ -14,12 +14,12 @@ use bevy::render::{
 };
 use core::num::NonZeroU64;
 
-/// How strands fared in the substeps since the last report was read.
+/// Counts of faulty strands in the substeps since the last report was read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GpuReport {
-    /// Strands that were put back to where a substep began, because it left the finite numbers.
+    /// Strands that became non-finite in a substep and were put back to its start.
     pub put_back: u32,
-    /// Strands that were rebuilt from their bonds, because they began it so.
+    /// Strands that were non-finite at the start of a substep and were rebuilt from their bonds.
     pub rebuilt: u32,
     /// One of them.
     pub first: Option<usize>,
@@ -29,7 +29,7 @@ pub struct GpuReport {
 #[derive(Debug)]
 pub struct GpuStrands {
     layout: Layout,
-    /// In which of the two the present pose is.
+    /// The index of the buffer that holds the present pose.
     pub(super) present: usize,
     pub(super) blocks: Buffer,
     pub(super) poses: [Buffer; 2],
@@ -44,7 +44,7 @@ pub struct GpuStrands {
 }
 
 impl GpuStrands {
-    /// Hands strands over. Each must have two nodes or more, and a bond for each joint.
+    /// Uploads strands. Each must have two nodes or more, and a bond for each joint.
     pub fn new(device: &RenderDevice, kernels: &HairKernels, strands: &[StrandView<'_>]) -> Self {
         let nodes: Vec<usize> = strands.iter().map(|view| view.positions.len()).collect();
         let layout = Layout::of(&nodes);
@@ -103,7 +103,7 @@ impl GpuStrands {
         }
     }
 
-    /// Where strands lie.
+    /// The memory layout of the strands.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
@@ -167,8 +167,8 @@ impl GpuStrands {
         queue.submit([encoder.finish()]);
     }
 
-    /// Waits for the device and reads all strands back; `None` where it does not answer, as when it is
-    /// lost.
+    /// Waits for the device and reads all strands back; `None` if it does not answer, as after a
+    /// device loss.
     pub fn read(&self, device: &RenderDevice, queue: &RenderQueue) -> Option<Vec<StrandState>> {
         let layout = &self.layout;
         let pose = read_back(device, queue, &self.poses[self.present], layout.vectors(POSE))?;
@@ -179,7 +179,7 @@ impl GpuStrands {
         Some((0..layout.strands()).map(|strand| contents.get(layout, strand)).collect())
     }
 
-    /// Waits for the device and reads how strands fared since the last report.
+    /// Waits for the device, and reads and resets the report.
     pub fn take_report(&self, device: &RenderDevice, queue: &RenderQueue) -> Option<GpuReport> {
         let words = read_back(device, queue, &self.report, 1)?[0].map(f32::to_bits);
         queue.write_buffer(&self.report, 0, &[0; 16]);
@@ -210,7 +210,7 @@ fn read_back(
     queue.submit([encoder.finish()]);
     let (send, receive) = std::sync::mpsc::channel();
     device.map_buffer(&staging.slice(..), MapMode::Read, move |mapped| {
-        // Nobody listens any more if the device did not answer in time.
+        // The receiver is gone if the device did not answer in time.
         let _ = send.send(mapped.is_ok());
     });
     device.poll(PollType::wait_indefinitely()).ok()?;

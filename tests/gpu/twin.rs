@@ -70,8 +70,8 @@ pub struct Twin {
     l: Vec<f64>,
     k: Vec<f64>,
     axial: Vec<f64>,
-    /// The most twist that counts in the Hessian, as a moment over EI.
-    most_twist: f64,
+    /// Largest twist that counts in the Hessian, as a moment over EI.
+    max_twist: f64,
     rest: Vec<DQuat>,
     mass: Vec<f64>,
     support: Vec<DVec3>,
@@ -98,7 +98,7 @@ impl Twin {
             l: s.lengths.iter().map(|l| f64::from(*l)).collect(),
             k: vec![0.0; edges],
             axial: vec![0.0; edges],
-            most_twist: 0.0,
+            max_twist: 0.0,
             rest: vec![DQuat::IDENTITY; edges],
             mass: vec![0.0; edges + 1],
             support: vec![DVec3::ZERO; edges + 1],
@@ -221,7 +221,7 @@ impl Twin {
         let firmest = 2.5e10 / (count * count * f64::from(r.dt).powi(2));
         let stiffest = (0.5 * bending).min(firmest / density.powi(3));
         let held = (3.0 * density / (stiffest * f64::from(r.dt).powi(2))).powf(0.25);
-        self.most_twist = held.max(8.99 / sum);
+        self.max_twist = held.max(8.99 / sum);
         let mut before = 0.0;
         for i in 0..=self.edges() {
             let after = self.l.get(i).copied().unwrap_or(0.0);
@@ -370,7 +370,7 @@ impl Twin {
             if j > 0 {
                 h[j - 1] += bent(t_before, r_before);
                 pull[j - 1] -= couple.cross(t_before) * r_before;
-                let most = k * lever * self.most_twist;
+                let most = k * lever * self.max_twist;
                 let twist = elastic.dot(t).clamp(-most, most) * -0.25 * inverse * r_before;
                 coupled[j] = (outer(t_before, t) - DMat3::IDENTITY * t.dot(t_before))
                     * (stiff * inverse * r_before)

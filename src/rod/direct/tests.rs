@@ -92,7 +92,7 @@ struct Strands<C> {
     root_from: [C; 4],
     root_between: [C; 4],
     theta: C,
-    most_twist: C,
+    max_twist: C,
     twice: C,
 }
 
@@ -124,7 +124,7 @@ impl<C: Copy + Default> Strands<C> {
                 w.lit(step.gravity[1]),
                 w.lit(step.gravity[2]),
             ),
-            most_twist: w.get(&self.most_twist),
+            max_twist: w.get(&self.max_twist),
             damping: (w.lit(step.damping) - own).max(w.lit(0.0)),
             second: false,
             again: w.lit(1.0),
@@ -155,7 +155,7 @@ impl Strands<Lane> {
     /// Of a block that has been weighed, its nodes where they are to start from; what the whole step
     /// does before the first Newton step.
     fn of(block: &BlockLanes, theta: f32, dt: f32) -> Self {
-        let BlockLanes { mut nodes, edges, root, root_from, most_twist, twice, .. } = block.clone();
+        let BlockLanes { mut nodes, edges, root, root_from, max_twist, twice, .. } = block.clone();
         let mut root_between = root;
         for lane in 0..LANES {
             let (from, to) = (take4(&root_from, lane), take4(&root, lane));
@@ -169,7 +169,7 @@ impl Strands<Lane> {
             }
         }
         let theta = [theta; LANES];
-        Self { nodes, edges, root, root_from, root_between, theta, most_twist, twice }
+        Self { nodes, edges, root, root_from, root_between, theta, max_twist, twice }
     }
 
     fn alone(&self, lane: usize) -> Strands<f64> {
@@ -198,7 +198,7 @@ impl Strands<Lane> {
             root_from: self.root_from.each_ref().map(wide),
             root_between: self.root_between.each_ref().map(wide),
             theta: wide(&self.theta),
-            most_twist: wide(&self.most_twist),
+            max_twist: wide(&self.max_twist),
             twice: wide(&self.twice),
         }
     }
