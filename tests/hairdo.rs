@@ -649,6 +649,14 @@ fn the_salon_undoes_redoes_saves_and_loads() {
     treat(&mut app, HairTreatment::wet(hair));
     assert_eq!(order(&mut app, Order::Load(path.clone())), "loaded");
     assert_eq!(rate(&app), 1.0);
+    // What cannot be written to its end leaves the file that was there.
+    let unfinished = path.with_added_extension("part");
+    let whole = std::fs::read(&path).unwrap();
+    std::fs::create_dir(&unfinished).unwrap();
+    let reported = order(&mut app, Order::Save(path.clone()));
+    std::fs::remove_dir(&unfinished).unwrap();
+    assert!(!reported.starts_with("saved"), "{reported}");
+    assert_eq!(std::fs::read(&path).unwrap(), whole);
     assert_eq!(order(&mut app, Order::Undo), "");
     assert_eq!(rate(&app), 0.0);
     // a step of other hair waits until it fits

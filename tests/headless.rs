@@ -3,7 +3,8 @@
 use serde_json::Value;
 use std::{
     path::PathBuf,
-    process::{Command, Output},
+    process::{Command, Output, Stdio},
+    time::{Duration, Instant},
 };
 
 /// The example as `cargo test` has just built it.
@@ -175,6 +176,33 @@ fn a_table_that_cannot_be_written_is_named_and_no_frame_is_an_error() {
     for seconds in ["0.001", "0", "-1", "NaN", "1e9"] {
         let text = error(&[&format!("--seconds={seconds}")]);
         assert!(text.contains("--seconds is") && text.contains("expected 0.017"), "{text}");
+    }
+}
+
+#[test]
+fn a_run_that_is_interrupted_leaves_whole_lines() {
+    let table = std::env::temp_dir().join(format!("interrupted-{}.csv", std::process::id()));
+    let mut run = Command::new(example())
+        .args(["--scene", "bedhead", "--csv", table.to_str().unwrap()])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let written = || std::fs::read_to_string(&table).unwrap_or_default();
+    let begun = Instant::now();
+    while written().lines().count() < 5 && begun.elapsed().as_secs() < 60 {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    run.kill().unwrap();
+    let status = run.wait().unwrap();
+    let text = written();
+    std::fs::remove_file(&table).unwrap();
+    assert!(!status.success(), "it was not interrupted");
+    assert!(text.ends_with('\n') && text.lines().count() >= 5, "{text}");
+    let is_number = |field: &str| field.parse::<f32>().is_ok();
+    for line in text.lines().skip(1) {
+        let fields: Vec<&str> = line.split(',').collect();
+        assert!(fields.len() == 7 && fields.into_iter().all(is_number), "{line}");
     }
 }
 

@@ -171,7 +171,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     print(&report, arguments.json)
 }
 
-/// A file with a line a frame.
+/// A file with a line a frame, of which each is written whole: who interrupts keeps the frames until then.
 struct Table<'a> {
     path: &'a Path,
     file: File,
@@ -186,7 +186,8 @@ impl<'a> Table<'a> {
     }
 
     fn line(&mut self, line: &str) -> Result<(), String> {
-        writeln!(self.file, "{line}").map_err(|error| Self::unwritable(self.path, &error))
+        let line = format!("{line}\n");
+        self.file.write_all(line.as_bytes()).map_err(|error| Self::unwritable(self.path, &error))
     }
 
     fn unwritable(path: &Path, error: &io::Error) -> String {

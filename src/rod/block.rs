@@ -91,6 +91,8 @@ pub struct BlockLanes {
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
     pub root_from: [Lane; 4],
     pub(super) theta: Lane,
+    /// Largest twist that counts in the Hessian, as a moment over EI (1/m). Direct method only.
+    pub(super) max_twist: Lane,
     /// 1 for lanes that take two Newton steps, else 0.
     pub(super) twice: Lane,
     pub(super) root_between: [Lane; 4],

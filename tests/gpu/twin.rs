@@ -70,6 +70,8 @@ pub struct Twin {
     l: Vec<f64>,
     k: Vec<f64>,
     axial: Vec<f64>,
+    /// Largest twist that counts in the Hessian, as a moment over EI.
+    max_twist: f64,
     rest: Vec<DQuat>,
     mass: Vec<f64>,
     support: Vec<DVec3>,
@@ -96,6 +98,7 @@ impl Twin {
             l: s.lengths.iter().map(|l| f64::from(*l)).collect(),
             k: vec![0.0; edges],
             axial: vec![0.0; edges],
+            max_twist: 0.0,
             rest: vec![DQuat::IDENTITY; edges],
             mass: vec![0.0; edges + 1],
             support: vec![DVec3::ZERO; edges + 1],
@@ -216,6 +219,9 @@ impl Twin {
         let stiff = f64::from(r.bending_length).min(6.0 * sum);
         let bending = density * 2.0 * GRAVITY * stiff.powi(3);
         let firmest = 2.5e10 / (count * count * f64::from(r.dt).powi(2));
+        let stiffest = (0.5 * bending).min(firmest / density.powi(3));
+        let held = (3.0 * density / (stiffest * f64::from(r.dt).powi(2))).powf(0.25);
+        self.max_twist = held.max(8.99 / sum);
         let mut before = 0.0;
         for i in 0..=self.edges() {
             let after = self.l.get(i).copied().unwrap_or(0.0);
@@ -341,7 +347,8 @@ impl Twin {
             let crushed = length < 0.5 * l;
             let (carried, mut turn) = carry(self.q[j], e);
             let q = if crushed { self.q[j] } else { carried };
-            let inverse = 1.0 / length.max(0.2 * l);
+            let lever = length.max(0.2 * l);
+            let inverse = 1.0 / lever;
             let t = if crushed { tangent(q) } else { e * inverse };
             if second {
                 let e = self.from[j + 1] - self.from[j];
@@ -363,7 +370,8 @@ impl Twin {
             if j > 0 {
                 h[j - 1] += bent(t_before, r_before);
                 pull[j - 1] -= couple.cross(t_before) * r_before;
-                let twist = elastic.dot(t) * -0.25 * inverse * r_before;
+                let most = k * lever * self.max_twist;
+                let twist = elastic.dot(t).clamp(-most, most) * -0.25 * inverse * r_before;
                 coupled[j] = (outer(t_before, t) - DMat3::IDENTITY * t.dot(t_before))
                     * (stiff * inverse * r_before)
                     + cross_matrix((t + t_before) * twist);

@@ -8,6 +8,7 @@ const REPAIRS: u32 = 4u;
 const DEEP: f32 = 0.25;
 const STIFFEST: f32 = 6.0;
 const FIRMEST: f32 = 2.5e10;
+const BUCKLING_TWIST: f32 = 8.99;
 const HOLD: f32 = 100.0;
 const REFERENCE_GRAVITY: f32 = 9.8;
 
@@ -16,6 +17,8 @@ var<private> density: f32;
 var<private> bending: f32;
 var<private> axial_stiffness: f32;
 var<private> firmest: f32;
+// Largest twist that counts in the Hessian, as a moment over EI (1/m).
+var<private> max_twist: f32;
 // The scalp's frame as the substep began, and at θ of it.
 var<private> root_between: vec4<f32>;
 
@@ -30,6 +33,10 @@ fn weigh() {
     bending = density * (2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
     axial_stiffness = REFERENCE_GRAVITY * count / STRAIN;
     firmest = FIRMEST / (count * count * record.dt * record.dt);
+    let length = 1.0 / density;
+    let stiffest = min(bending * 0.5, firmest * length * length * length);
+    let inertia = density * (3.0 / (record.dt * record.dt));
+    max_twist = max(BUCKLING_TWIST / sum, sqrt(sqrt(inertia / max(stiffest, 1e-30))));
 }
 
 // Of a node between edges of lengths `before` and `after`.
@@ -139,7 +146,8 @@ fn newton_down(stage: Stage) {
             let kept = frame(j);
             let carried = carry(kept, e, length);
             let q = select(carried.q, kept, crushed);
-            let r = 1.0 / max(length, l * 0.2);
+            let lever = max(length, l * 0.2);
+            let r = 1.0 / lever;
             let t = select(e * r, tangent(q), crushed);
             var turn = carried.turn;
             if stage.second {
@@ -159,7 +167,8 @@ fn newton_down(stage: Stage) {
             couple = fma(rate, vec3(k * damped * taken), elastic);
             stiff = k * stiffer;
             // How the moment of twist turns with the edges; without, twisted strands flutter.
-            let twist = dot(elastic, t) * -0.25 * r * before.r;
+            let most = k * lever * max_twist;
+            let twist = clamp(dot(elastic, t), -most, most) * -0.25 * r * before.r;
             let coupling = coupling_of(before.t, t, dot(t, before.t), stiff * r * before.r);
             now = CarriedEdge(
                 q, t, r, turn, swing,

@@ -32,6 +32,8 @@ pub(crate) struct NewtonStage<R> {
     pub root_turn: V3<R>,
     /// Gravity (m/s²).
     pub gravity: V3<R>,
+    /// Largest twist that counts in the Hessian, as a moment over EI (1/m).
+    pub max_twist: R,
     /// Kelvin–Voigt time (s), less what the step itself damps.
     pub damping: R,
     /// Whether this is the second Newton step, where frames differ from the start of the substep.
@@ -150,7 +152,8 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             let (turned, turn) = parallel_transport(q, e, length);
             let stays = q;
             let q = choose(crushed, q, turned);
-            let r = w.lit(1.0) / length.max(l * w.lit(0.2));
+            let lever = length.max(l * w.lit(0.2));
+            let r = w.lit(1.0) / lever;
             let t = V3::select(crushed, q.tangent(), e.scale(r));
             let turn = if TWICE && stage.second {
                 turned_since(w, &nodes[j], &nodes[j + 1], t)
@@ -176,8 +179,11 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             couple = rate.scale_add(friction, elastic);
             stiff = k * stiffer;
             let dot = t.dot(before.t);
-            // Change of the twisting moment as edges rotate; without it twisted strands flutter.
-            let twist = elastic.dot(t) * w.lit(-0.25) * r * before.r;
+            // Change of the twisting moment as edges rotate; without it twisted strands flutter. Of more
+            // twist than a strand can hold the Hessian is indefinite: pivots vanish, and the fill-in
+            // exceeds all numbers.
+            let most = k * lever * stage.max_twist;
+            let twist = elastic.dot(t).min(most).max(-most) * w.lit(-0.25) * r * before.r;
             let coupling = Matrix::coupling(before.t, t, dot, stiff * r * before.r);
             now = EdgeState {
                 q,

@@ -57,7 +57,9 @@
 //!
 //! Periods below 40 substeps are too long, by 10 % at 11 substeps; faster modes are only damped.
 //! L_g is limited to six times the strand's length, and segments much shorter than 1 mm are softened:
-//! f32 is not precise enough for more.
+//! f32 is not precise enough for more. A strand with more twist than it can hold has an indefinite Hessian:
+//! there a joint's moment counts up to EI times 8.99/L or (3 μ / (EI h²))^¼, whichever is more; the force
+//! is whole.
 //!
 //! # For a compute port
 //! Strands are independent, so one GPU thread may take one strand. Floats per segment (a node and
@@ -141,6 +143,10 @@ const DEEP_SHARE: f32 = 0.25;
 /// Largest L_g, in lengths of the strand. Such hair sags by less than a thousandth of its length; f32
 /// is not precise enough for much stiffer hair.
 const MAX_BENDING_LENGTH: f32 = 6.0;
+
+/// Largest twist that counts in the Hessian, as a moment over EI times the strand's length: with its ends clamped
+/// it buckles here.
+const BUCKLING_TWIST: f32 = 8.99;
 
 /// Largest ratio of a node's elastic stiffness to its inertia in a substep, for a strand of one segment;
 /// 1/n² of that for n segments. f32 is not precise enough for more. Only segments much shorter than 1 mm
@@ -280,6 +286,7 @@ fn stage<W: Width<Cell = crate::lanes::Lane>>(
             w.lit(params.gravity.y.into()),
             w.lit(params.gravity.z.into()),
         ),
+        max_twist: w.get(&b.max_twist),
         damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
         second: false,
         again: w.lit(1.0),
@@ -438,6 +445,13 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32
     let bending = density * f32x16::splat(simd, 2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
     let axial = f32x16::splat(simd, REFERENCE_GRAVITY * edges / STRAIN);
     let stiffest = f32x16::splat(simd, MAX_STIFFNESS / (edges * edges * dt * dt));
+    // In a substep inertia alone resists all waves up to about this twist, (3 μ / (EI h²))^¼.
+    let edge = one / density;
+    let rigidity = Real::min(bending * half, stiffest * edge * edge * edge);
+    let inertia = density * f32x16::splat(simd, 3.0 / (dt * dt));
+    let rigidity = Real::max(rigidity, f32x16::splat(simd, 1e-30));
+    let resisted = Real::sqrt(Real::sqrt(inertia / rigidity));
+    Real::max(f32x16::splat(simd, BUCKLING_TWIST) / sum, resisted).store_array(&mut b.max_twist);
     let mut before = zero;
     for (i, n) in b.nodes.iter_mut().enumerate() {
         let mut after = zero;

@@ -92,6 +92,7 @@ struct Strands<C> {
     root_from: [C; 4],
     root_between: [C; 4],
     theta: C,
+    max_twist: C,
     twice: C,
 }
 
@@ -123,6 +124,7 @@ impl<C: Copy + Default> Strands<C> {
                 w.lit(step.gravity[1]),
                 w.lit(step.gravity[2]),
             ),
+            max_twist: w.get(&self.max_twist),
             damping: (w.lit(step.damping) - own).max(w.lit(0.0)),
             second: false,
             again: w.lit(1.0),
@@ -153,7 +155,7 @@ impl Strands<Lane> {
     /// Of a block that has been weighed, its nodes where they are to start from; what the whole step
     /// does before the first Newton step.
     fn of(block: &BlockLanes, theta: f32, dt: f32) -> Self {
-        let BlockLanes { mut nodes, edges, root, root_from, twice, .. } = block.clone();
+        let BlockLanes { mut nodes, edges, root, root_from, max_twist, twice, .. } = block.clone();
         let mut root_between = root;
         for lane in 0..LANES {
             let (from, to) = (take4(&root_from, lane), take4(&root, lane));
@@ -166,7 +168,8 @@ impl Strands<Lane> {
                 }
             }
         }
-        Self { nodes, edges, root, root_from, root_between, theta: [theta; LANES], twice }
+        let theta = [theta; LANES];
+        Self { nodes, edges, root, root_from, root_between, theta, max_twist, twice }
     }
 
     fn alone(&self, lane: usize) -> Strands<f64> {
@@ -195,6 +198,7 @@ impl Strands<Lane> {
             root_from: self.root_from.each_ref().map(wide),
             root_between: self.root_between.each_ref().map(wide),
             theta: wide(&self.theta),
+            max_twist: wide(&self.max_twist),
             twice: wide(&self.twice),
         }
     }
@@ -312,6 +316,39 @@ fn a_strand_does_not_depend_on_the_other_lanes() {
             substep(&mut alike, 0.1, &floor);
         }
         assert_eq!(bits(&mixed, lane), bits(&alike, 9), "lane {lane}");
+    }
+}
+
+/// Of more twist than a strand can hold the Hessian is indefinite; fine strands that touch something got
+/// infinite pivots from it.
+#[test]
+fn fine_strands_full_of_twist_stay_finite() {
+    let floor = Solid::HalfSpace { normal: Vec3::Y, point: Vec3::NEG_Y * 0.003 };
+    let floor = [Obstacle { solid: floor, motion: None, friction: 0.4 }];
+    for bent in [0.1, 1.5] {
+        let turn = |lane: usize, i: usize| {
+            let phase = (37 * lane + 11 * i) as f32;
+            let axis = Vec3::new(phase.sin(), (1.7 * phase).sin(), (2.3 * phase).sin());
+            Quat::from_scaled_axis(bent * axis)
+        };
+        let mut block = strands(119, |lane, i| {
+            let mut way = Vec3::X;
+            (0..i).fold(Vec3::ZERO, |place, k| {
+                way = turn(lane, k) * way;
+                place + way * 5e-4
+            })
+        });
+        for (i, edge) in block.edges.iter_mut().enumerate() {
+            (0..LANES).for_each(|lane| put4(&mut edge.rest, lane, turn(lane, i + 5)));
+        }
+        let mut fastest = 0.0_f32;
+        for _ in 0..40 {
+            substep(&mut block, 0.13, &floor);
+            assert_eq!(block.finite, [0.0; LANES], "bent by {bent}");
+            let speeds = block.nodes.iter().flat_map(|n| n.v).flatten().map(f32::abs);
+            fastest = speeds.fold(fastest, f32::max);
+        }
+        assert!(fastest < 30.0, "bent by {bent}: {fastest} m/s");
     }
 }
 

@@ -76,6 +76,7 @@ fn in_f64_a_substep_is_that_of_a_dense_solve() {
             root_from: c.root_from,
             root_between: between,
             theta,
+            max_twist: f64::INFINITY,
             twice: 0.0,
         };
         let step = Step { dt: c.dt as f32, damping: c.damping, gravity: c.gravity };
