@@ -1,6 +1,6 @@
-//! `cargo bench --bench convergence`: what a substep, an iteration and a Newton step of the limiter
-//! buy. Each row runs the same hair with another solver; time and error stand side by side, so that
-//! settings of equal cost can be compared.
+//! `cargo bench --bench convergence`: what accuracy a substep, an iteration and a Newton step of
+//! the limiter add. Each row runs the same hair with another solver; time and error stand side by
+//! side, so that settings of equal cost can be compared.
 //!
 //! Of the ways to solve a strand this compares: the direct solver at several substeps, Gauss–Seidel
 //! sweeps from root to tip in all three projections, the same time spent on more substeps with fewer
@@ -27,10 +27,10 @@
 //!                   split 12 × 5, 2 | 267        | 1.024; 1.116                      | 0.0000
 //! ```
 //!
-//! So the direct solver is right at any number of substeps, where sweeps are not at many times its cost:
-//! two or three carry rods as well as six. Sweeps need six. Their length limiter takes the strain away for
-//! less than what runs differ by; the coupled projection costs and errs as the split one, the printed one
-//! sags by half in coarse segments.
+//! So the direct solver is accurate at any number of substeps: two or three serve as well as six.
+//! Sweeps are less accurate at many times its cost and need six. Their length limiter removes the
+//! strain at a cost below the noise; the coupled projection has the cost and error of the split
+//! one, the printed one sags half as much as theory in coarse segments.
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{Cuticle, SolverMethod, StretchProjection, Sweeps, prelude::*};
@@ -109,7 +109,7 @@ fn line(direction: Vec3, length: f32, segments: usize) -> Strand {
     Strand::from_polyline(&points).expect("points are apart")
 }
 
-/// Seconds that a simulated second takes; the best of ten tenths, tenfold.
+/// Wall-clock seconds per simulated second: ten times the best of ten tenths.
 fn cost(mut app: App) -> f64 {
     let hair = app.world_mut().spawn(Hair).id();
     let strands = vec![(StrandOf(hair), line(Vec3::X, LENGTH, 15)); 1000];
@@ -124,7 +124,7 @@ fn cost(mut app: App) -> f64 {
     best * 10.0
 }
 
-/// The settled sag of a cantilever over beam theory's.
+/// The settled sag of a cantilever relative to beam theory's.
 fn sag(mut app: App, segments: usize) -> f32 {
     app.insert_resource(HairDefault(AirDrag { rate: 8.0 })).insert_resource(HairDefault(
         HairStiffness::from_bending_length(BENDING_LENGTH).expect("a length"),
@@ -137,7 +137,7 @@ fn sag(mut app: App, segments: usize) -> f32 {
     -tip.y / (LENGTH.powi(4) / (8.0 * BENDING_LENGTH.powi(3)))
 }
 
-/// The largest strain of a 48 cm strand whose root goes to and fro by 10 cm three times a second.
+/// The largest strain of a 48 cm strand whose root oscillates by ±10 cm at 3 Hz.
 fn shaken(mut app: App) -> f32 {
     let hair = app.world_mut().spawn(Hair).id();
     let strand = app.world_mut().spawn((StrandOf(hair), line(Vec3::NEG_Y, 0.48, 64))).id();

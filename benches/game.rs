@@ -1,8 +1,8 @@
 //! `cargo bench --bench game`: what hair costs a game, in milliseconds a tick of 1/60 s.
 //!
-//! Each preset on a head with shoulders, at rest and on somebody who walks and looks about, with and
-//! without contact between strands; then crowds. Medians of five runs of 20 ticks; nothing is drawn and
-//! nothing sleeps. `KERATIN_BENCH_ONLY=wavy,crowd` prints these rows alone.
+//! Each preset on a head with shoulders, at rest and on a character who walks and looks around,
+//! with and without contact between strands; then crowds. Medians of five runs of 20 ticks; nothing
+//! is drawn and nothing sleeps. `KERATIN_BENCH_ONLY=wavy,crowd` prints only these rows.
 
 mod common;
 #[path = "../examples/presets/head.rs"]
@@ -117,7 +117,7 @@ fn crowd_rows(threads: usize) {
     }
 }
 
-/// Medians of runs that are taken in turns, each made ready by `ready` (ms a tick).
+/// Medians of interleaved runs (ms per tick), each prepared by `ready`.
 fn in_turns<const N: usize>(app: &mut App, ready: impl Fn(&mut App, usize)) -> [f64; N] {
     let mut runs = [[0.0; RUNS]; N];
     for run in 0..RUNS {
@@ -151,7 +151,7 @@ fn plant(preset: HairPreset) -> Vec<Strand> {
     planted.groom.strands().map(|s| strand(s.points)).collect()
 }
 
-/// Somebody with hair and what it lies on, at a place.
+/// A character with hair and colliders at a position.
 fn person(app: &mut App, preset: HairPreset, strands: &[Strand], at: Vec3) -> Entity {
     let world = app.world_mut();
     let body = world.spawn((Transform::from_translation(at), Person { at })).id();
@@ -170,13 +170,13 @@ struct Person {
     at: Vec3,
 }
 
-/// On a hair: who wears it walks and looks about.
+/// On a hair: its wearer walks and looks around.
 #[derive(Component)]
 struct Walks {
     phase: f32,
 }
 
-/// Two steps a second that lift the head by 3 cm, looks 40° to both sides.
+/// Two steps per second that lift the head by 3 cm, and looks of 40° to both sides.
 fn walk(
     time: Res<Time>,
     walkers: Query<(&Walks, &ChildOf)>,

@@ -2,7 +2,7 @@
 //!
 //! Strands that fall and swing among solids, three substeps of 1/180 s a tick. The time is that of the
 //! device and of its queue: many ticks are submitted, then waited for. On a software device only the
-//! smallest sizes are run, for a processor that plays a graphics card says nothing about one.
+//! smallest sizes are run, since a software renderer says nothing about a graphics card.
 //!
 //! `-- --all` runs all sizes on any device.
 
@@ -142,10 +142,10 @@ mod gpu {
                 .map(|i| {
                     let place = [i % side, i / side].map(|k| 0.2 * k as f32 / side as f32 - 0.1);
                     let root = Vec3::new(place[0], 0.0, place[1]);
-                    let way = (root + Vec3::Y * 0.05).normalize_or(Vec3::Y);
+                    let direction = (root + Vec3::Y * 0.05).normalize_or(Vec3::Y);
                     let step = 0.25 / (nodes - 1) as f32;
                     let points: Vec<Vec3> =
-                        (0..nodes).map(|k| root + way * (step * k as f32)).collect();
+                        (0..nodes).map(|k| root + direction * (step * k as f32)).collect();
                     let strand = Strand::from_polyline(&points).expect("points are apart");
                     let bonds = Bonds::of(&strand);
                     (strand, bonds)
@@ -162,7 +162,7 @@ mod gpu {
         }
     }
 
-    /// What a substep of dry hair has to do, among balls as of a head and shoulders.
+    /// A substep of dry hair among spheres like those of a head and shoulders.
     fn record(solids: usize) -> SubstepRecord {
         let dt = 1.0 / 180.0;
         let ball = |i: usize| {

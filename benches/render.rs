@@ -21,7 +21,7 @@ const STRANDS: usize = 10_000;
 const NODES: usize = 16;
 const FRAMES: usize = 10;
 
-/// When a row began, and how long it has taken since in all.
+/// Start of the present measurement, and the total time measured.
 #[derive(Resource, Default)]
 struct Clock(Option<Instant>, Duration);
 
@@ -80,8 +80,8 @@ fn app() -> App {
     let hair = world.spawn((Hair, HairFollowers::none())).id();
     for i in 0..STRANDS {
         let root = Vec3::new((i % 100) as f32, 0.0, (i / 100) as f32) * 2e-3;
-        let way = Vec3::new(0.12, -1.0, 0.0).normalize() * 0.02;
-        let points: Vec<Vec3> = (0..NODES).map(|k| root + way * k as f32).collect();
+        let direction = Vec3::new(0.12, -1.0, 0.0).normalize() * 0.02;
+        let points: Vec<Vec3> = (0..NODES).map(|k| root + direction * k as f32).collect();
         let strand = Strand::from_polyline(&points).expect("points are apart");
         world.spawn((StrandOf(hair), strand));
     }
@@ -106,7 +106,7 @@ fn main() {
     }
 }
 
-/// Strands that pass through each other, which is what the tick costs least.
+/// Without strand contact, where the tick is cheapest.
 fn no_contact() -> LockContact {
     LockContact { radius: 0.0, ..default() }
 }

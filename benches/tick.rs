@@ -2,12 +2,12 @@
 //! with and without the length limiter, and how long a simulated second of the paper's first scene
 //! takes.
 //!
-//! `KERATIN_BENCH_ONLY=10000x16,sleep` prints these rows alone; `memory` and `hanging` are others.
+//! `KERATIN_BENCH_ONLY=10000x16,sleep` prints only these rows; others are `memory` and `hanging`.
 //!
-//! Read the ratios: all rows come from one run on one machine. What does not depend on who else is on
-//! it are instructions. The projection alone, gather and scatter left out, takes 43 to 46 of them per
-//! segment and iteration on AVX2 (29,318, 53,447 and 218,903 a substep of sixteen strands of 9, 16 and
-//! 64 nodes), counted by
+//! Read the ratios: all rows come from one run on one machine. Only instruction counts do not
+//! depend on the load of the machine. The projection alone, gather and scatter left out, takes 43
+//! to 46 of them per segment and iteration on AVX2 (29,318, 53,447 and 218,903 a substep of sixteen
+//! strands of 9, 16 and 64 nodes), counted by
 //!
 //! ```text
 //! valgrind --tool=callgrind --toggle-collect='*vectorize*' \
@@ -36,7 +36,7 @@ use fearless_simd::Level;
 use std::time::Duration;
 
 fn main() {
-    // Who names a row below wants that alone: `cargo bench --bench tick -- projection`.
+    // A bench named on the command line runs alone: `cargo bench --bench tick -- projection`.
     let named = std::env::args().skip(1).any(|arg| !arg.starts_with('-'));
     if named || table::print() {
         divan::main();

@@ -1,6 +1,6 @@
 //! `cargo bench --bench water`: the wet-hair paper's table, a frame of 10,000 strands of 6 nodes among
-//! droplets, in both strand models beside the paper's own times; and what it costs a node to ask who
-//! pulls at it.
+//! droplets, in both strand models beside the paper's own times; and what a node's search for
+//! droplets in reach costs.
 //!
 //! The scene is `wet` of the examples. First as the paper has it, droplets that only pull; then with the
 //! film that they leave, the water that soaks in and the bonds that it opens. All are run in turns, each
@@ -50,11 +50,11 @@ fn main() {
         let mut apps = [("rods", 0.0), ("springs", 0.0), ("rods", 20.0), ("springs", 20.0)]
             .map(|(variant, uptake)| wet(variant, count, uptake));
         let mut best = [f64::INFINITY; 4];
-        // Up to here; looking for it takes as long as several systems do.
+        // Peak strain up to here; measuring it costs as much as several systems.
         let peaks = apps.each_mut().map(|app| app.world_mut().remove_resource::<StrainPeak>());
         for _ in 0..20 {
             for (best, app) in best.iter_mut().zip(&mut apps) {
-                // The others have had the caches.
+                // Warms the caches, which the other apps have used.
                 app.update();
                 let start = Instant::now();
                 app.update();
@@ -95,16 +95,16 @@ fn wet(variant: &str, count: usize, uptake: f32) -> App {
     app
 }
 
-/// Seconds that a node takes to find the droplets that pull at it, as the tick has it: sixteen
-/// neighbours ask together. Strands stand 2.5 mm apart, as on a head; both they and droplets are equally
-/// dense, however many there are.
+/// Time per node to find the droplets in reach (s), as in the tick: sixteen neighbours share a
+/// query. Strands stand 2.5 mm apart, as on a head; strands and droplets have the same density for
+/// any count.
 fn query(count: usize) -> f64 {
-    const LONG: f32 = 0.24;
+    const LENGTH: f32 = 0.24;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
     let rows = ((10 * count) as f32).sqrt().ceil();
     let side = rows * 0.0025;
     let drops: Vec<Vec3> = (0..count)
-        .map(|_| Vec3::from_array([side, LONG, side].map(|side| random.random_range(0.0..side))))
+        .map(|_| Vec3::from_array([side, LENGTH, side].map(|side| random.random_range(0.0..side))))
         .collect();
     // Four by four strands, level by level.
     let locks = rows as usize / 4;
@@ -113,7 +113,7 @@ fn query(count: usize) -> f64 {
         .map(|(x, level, z)| {
             core::array::from_fn(|k| {
                 let [x, z] = [4 * x + k % 4, 4 * z + k / 4].map(|i| 0.0025 * i as f32);
-                Vec3::new(x, LONG * level as f32 / 5.0, z)
+                Vec3::new(x, LENGTH * level as f32 / 5.0, z)
             })
         })
         .collect();

@@ -43,10 +43,10 @@ struct Source(Option<Arc<dyn Error + Send + Sync>>);
 pub enum FaultKind {
     /// A setting or a tool's value outside its range: the nearest valid value is used.
     Setting,
-    /// A strand left the finite numbers and was put back to the state of the substep before.
+    /// A strand became non-finite and was put back to the state of the previous substep.
     PutBack,
-    /// A strand's stored state was not finite, was torn, or no step led on from it: its pose was rebuilt
-    /// from root, lengths and bonds.
+    /// A strand's stored state was not finite, had torn, or no step from it succeeded: its pose was
+    /// rebuilt from root, lengths and bonds.
     Rebuilt,
     /// A strand points to a hair that does not exist or carries no `Hair`: it is left out.
     NoHair,
@@ -119,8 +119,8 @@ impl Error for HairFault {
     }
 }
 
-/// Checks of what user code has written, once a frame in [`PreUpdate`]. One thread runs them: there are
-/// dozens, and each is done before another thread would have woken.
+/// Checks of what user code has written, once a frame in [`PreUpdate`]. On one thread: each of
+/// these dozens of checks takes less time than waking another thread.
 #[derive(ScheduleLabel, Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct HairChecks;
 

@@ -22,7 +22,7 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 
-/// Everything that makes hair move, and with the feature `render` be seen.
+/// All plugins that simulate hair and, with the feature `render`, draw it.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -44,7 +44,8 @@ impl HairPlugins {
     }
 }
 
-/// Advances an app by so many fixed ticks, one a frame, whatever the clock says: for a game's tests.
+/// Advances an app by `ticks` fixed ticks, one per frame, whatever the clock says: for a game's
+/// tests.
 ///
 /// ```
 /// use bevy::prelude::*;

@@ -2,7 +2,7 @@
 //!
 //! Each fixed tick runs the schedule [`HairTick`] once per substep, with the sets of
 //! [`HairSystems`] one after the other. It runs on a single thread and treats ambiguities as errors;
-//! systems go wide inside, over strands.
+//! systems run in parallel inside, over strands.
 
 use crate::{
     fault,
@@ -24,16 +24,17 @@ use bevy::{
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairTick;
 
-/// The schedule of a substep of hair that is simulated ahead: what moves strands, in the sets of
-/// [`HairSystems`], and nothing of bonds, water and treatments. See [`Settling`](crate::Settling).
+/// The schedule of a substep of hair that is simulated ahead: only the systems that move strands,
+/// in the sets of [`HairSystems`], without bonds, water and treatments. See
+/// [`Settling`](crate::Settling).
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairSettle;
 
-/// The tick in the schedule that it runs in.
+/// The set of the tick in the schedule that runs it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct HairTicks;
 
-/// The hair that is simulated ahead while all other waits; `None` in the tick itself.
+/// The hair that is simulated ahead while all other hair waits; `None` in the tick itself.
 #[derive(Resource, Clone, Debug, Default)]
 pub(crate) struct Ahead(pub(crate) Option<EntityHashSet>);
 
@@ -129,7 +130,7 @@ substep! {
     Last: "Empty, for users" {}
 }
 
-/// Into how many substeps a tick is divided.
+/// The number of substeps of a tick.
 ///
 /// Droplets, springs and the paper's projections need the paper's step. Dry hair that is solved directly
 /// is as accurate in longer ones and takes several as one: see
@@ -329,8 +330,9 @@ fn merged(index: u32, count: u32, together: u32) -> Option<u32> {
     }
 }
 
-/// How much faster wetting, drying and the bonds' chemistry ([`HairTreatment`](crate::HairTreatment)) go than in life.
-/// A resource, default 1, with the range [`RANGE`](Self::RANGE).
+/// How much faster than in life wetting, drying and the bonds' chemistry
+/// ([`HairTreatment`](crate::HairTreatment)) go. A resource, default 1, with the range
+/// [`RANGE`](Self::RANGE).
 ///
 /// Hair dries in minutes, players wait seconds. Mechanics are not affected.
 #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]

@@ -26,9 +26,9 @@ pub struct InvalidValue {
     pub what: &'static str,
     /// The value found.
     pub found: f32,
-    /// The least that is valid.
+    /// The smallest valid value.
     pub low: f32,
-    /// The most that is valid.
+    /// The largest valid value.
     pub high: f32,
     /// How to fix it.
     pub hint: &'static str,

@@ -222,6 +222,22 @@ fn an_unsupported_shape_is_reported_once_with_a_hint() {
 
 /// Avian's own physics moves the body through hanging hair.
 #[test]
+fn invalid_values_are_reported_once_and_clamped() {
+    let mut app = test_app(60.0);
+    let body = body(&mut app, Collider::sphere(0.1), Transform::default());
+    let wrong = AvianHairCollider { friction: -1.0, cells: 9_999 };
+    app.world_mut().entity_mut(body).insert(wrong);
+    run(&mut app, 0.1);
+    let reported = faults(&mut app);
+    assert!(
+        matches!(&reported[..], [f, c] if f.message.contains("friction is -1")
+            && c.message.contains("cells is 9999")),
+        "{reported:?}"
+    );
+    assert_eq!(hair_colliders(&mut app)[0].friction, 0.0);
+}
+
+#[test]
 fn a_body_that_avian_moves_pushes_hair_along() {
     let mut app = App::new();
     app.add_plugins((

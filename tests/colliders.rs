@@ -295,12 +295,10 @@ fn sizes_out_of_range_are_reported_and_held() {
     assert!(HairCollider::cuboid(Vec3::new(1.0, f32::NAN, 1.0)).is_err());
     assert!(HairCollider::rounded_cuboid(Vec3::ONE, -1.0).is_err());
     assert!(HairCollider::ellipsoid(Vec3::new(0.1, -0.1, 0.1)).is_err());
-    let ColliderShape::Cuboid { rounding, .. } =
-        HairCollider::rounded_cuboid(Vec3::ONE, 9.0).unwrap().shape
-    else {
-        panic!("a box")
-    };
-    assert_eq!(rounding, 0.5);
+    let wrong = HairCollider::rounded_cuboid(Vec3::ONE, 9.0).unwrap_err();
+    assert_eq!((wrong.found, wrong.high), (9.0, 0.5), "{wrong}");
+    let wrong = HairCollider::ellipsoid(Vec3::new(1.0, 1e-3, 1.0)).unwrap_err();
+    assert_eq!((wrong.found, wrong.low), (1e-3, 1e-2), "{wrong}");
     let mut app = test_app(60.0);
     let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
     let cuboid = Cuboid { half_size: Vec3::new(f32::NAN, -1.0, 0.1) };

@@ -7,7 +7,7 @@ use bevy::{
 };
 use core::time::Duration;
 
-/// One tick of 1/60 s an update, on so many threads; without hair's plugins.
+/// An app with one tick of 1/60 s per update on `threads` threads, without the hair plugins.
 pub fn app(threads: usize) -> App {
     // The thread that runs the app works too.
     let pools = TaskPoolOptions {

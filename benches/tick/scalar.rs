@@ -1,5 +1,5 @@
-//! The scalar twin of the projection: the same mathematics on one strand at a time, in its own best
-//! layout, so that nothing is gathered or scattered.
+//! A scalar version of the projection: the same mathematics on one strand at a time, in the layout
+//! that suits it best, without gather and scatter.
 
 use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
@@ -34,7 +34,7 @@ pub struct Twin {
     root: Quaternion<f32>,
     from: Vec<V3<f32>>,
     turned_from: Vec<Quaternion<f32>>,
-    /// What the iterations of a substep have in common.
+    /// Values that all iterations of a substep share.
     shares: Vec<(StretchShares<f32>, BendShares<f32>)>,
 }
 

@@ -1,9 +1,9 @@
 //! The table: what a tick of 1/60 s, 6 substeps, costs in a whole app. The direct solver takes two of
 //! them as one, sweeps all with 5 iterations.
 //!
-//! What is compared is run in turns, and of each the best is kept: others on the machine slow single
-//! turns down, not ratios. Bevy's thread pools are made once a process, so each number of threads
-//! gets a process of its own.
+//! What is compared runs interleaved, and the best of each is kept: load on the machine slows
+//! single runs down, not ratios. Bevy's thread pools are made once a process, so each number of
+//! threads gets a process of its own.
 
 use super::{common, scalar::Twin};
 use bevy::{prelude::*, tasks::ComputeTaskPool};
@@ -46,7 +46,7 @@ pub fn print() -> bool {
 fn rows(threads: usize) {
     let only = std::env::var(ONLY).ok();
     let wanted = |name: &str| only.as_ref().is_none_or(|only| only.split(',').any(|o| o == name));
-    // First, while the process has nothing that it could use again.
+    // First, before the process has freed memory to reuse.
     if threads == 1 && wanted("memory") {
         let [without, with] = memory();
         println!(
@@ -70,7 +70,7 @@ fn rows(threads: usize) {
     }
 }
 
-/// Frames without any hair: what Bevy takes for its own systems, then with ours that find nothing.
+/// Frames without any hair: Bevy's own systems alone, then with the hair systems.
 fn empty_row(threads: usize) {
     let bare = common::app(threads);
     let mut apps = [bare, app(threads, Kind::Tick, &[], None)];
@@ -83,7 +83,7 @@ fn empty_row(threads: usize) {
     println!("no strands | {threads} | {:.3} ms, Bevy alone {:.3}", best[1] * 1e3, best[0] * 1e3);
 }
 
-/// Contact between strands that hang equally dense, however many there are.
+/// Contact between strands that hang at the same density, for several counts.
 fn hanging_rows(threads: usize) {
     for strands in [1_000, 10_000, 100_000] {
         let mut app = app(threads, Kind::Tick, &patch(strands, 16), None);
@@ -105,7 +105,7 @@ fn sleep_row(threads: usize) {
     let hair = hair.expect("one hair");
     app.world_mut().entity_mut(hair).insert(HairLod::default());
     (0..240).for_each(|_| app.update());
-    // Whatever it does counts as lying still.
+    // With limits this wide any motion counts as rest.
     let sleepy = HairSleep { speed: 1.0, turning: 10.0, seconds: 0.2 };
     let (mut awake, mut asleep) = ([f64::INFINITY; 3], f64::INFINITY);
     for _ in 0..6 {
@@ -158,7 +158,7 @@ fn row(threads: usize, strands: usize, nodes: usize) {
     for _ in 0..turns {
         best_scalar = best_scalar.min(seconds(&mut scalar));
         for (best, app) in best.iter_mut().zip(&mut apps) {
-            // The others have had the caches; the twin's thousand strands stay there.
+            // Warms the caches, which the other apps have used; the scalar strands stay in them.
             app.update();
             *best = best.min(seconds(|| app.update()));
         }
@@ -193,8 +193,8 @@ fn row(threads: usize, strands: usize, nodes: usize) {
     );
 }
 
-/// What a strand of a whole head takes, in kB: its components and its place in blocks; then with
-/// contact's lists, too.
+/// Memory per strand of a whole head (kB): its components and its share of blocks; then with
+/// contact lists as well.
 fn memory() -> [f64; 2] {
     let strands = 100_000;
     let hair = head(strands, 16);
@@ -207,7 +207,7 @@ fn memory() -> [f64; 2] {
     })
 }
 
-/// The memory that the process holds (bytes), where the system tells.
+/// The resident memory of the process (bytes); NaN where the system does not report it.
 fn resident() -> f64 {
     let pages = std::fs::read_to_string("/proc/self/statm").ok();
     let pages = pages.and_then(|text| text.split(' ').nth(1)?.parse::<f64>().ok());
@@ -264,7 +264,7 @@ fn head_radius(strands: usize) -> f32 {
     0.09 * (strands as f32 / 10_000.0).sqrt()
 }
 
-/// Strands that hang from a ceiling, equally many on each area.
+/// Strands that hang from a ceiling at constant density.
 fn patch(strands: usize, nodes: usize) -> Vec<Strand> {
     let side = (strands as f32).sqrt().ceil() as usize;
     let uneven = |i: usize| (i as f32 * 0.618_034).fract() - 0.5;
@@ -318,7 +318,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
         Kind::NoBonds => app.add_plugins(plugins.disable::<BondPlugin>().disable::<SleepPlugin>()),
         Kind::Tick | Kind::BondsMoving | Kind::Sweeps => app.add_plugins(plugins),
     };
-    // What the plugins left out would have brought, and no contact between strands to begin with.
+    // Resources of the plugins left out; contact between strands is off at first.
     app.init_resource::<HairDefault<BondInfluence>>()
         .init_resource::<HairGravity>()
         .insert_resource(HairDefault(AirDrag { rate: 3.0 }))
@@ -356,7 +356,7 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
 /// Bonds break in one substep and form in the next.
 fn stir(step: Res<HairStep>, mut strands: Query<(&Strand, &mut BondChanges)>) {
     let change = if step.index.is_multiple_of(2) { -1e-3 } else { 9e-4 };
-    // On all threads, as those who ask in a game are.
+    // On all threads, like a system of a game.
     let mut strands: Vec<_> = strands.iter_mut().collect();
     ComputeTaskPool::get().scope(|scope| {
         for strands in strands.chunks_mut(1024) {

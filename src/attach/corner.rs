@@ -81,7 +81,7 @@ impl<'a> Corners<'a> {
     fn joints_of(&self, v: usize) -> Option<([u16; 4], [f32; 4])> {
         let (indices, weights) = self.skin?;
         let (indices, weights) = (*indices.get(v)?, *weights.get(v)?);
-        let there = indices.iter().all(|&j| usize::from(j) < self.joints);
-        (there && weights.iter().sum::<f32>() > 1e-6).then_some((indices, weights))
+        let valid = indices.iter().all(|&j| usize::from(j) < self.joints);
+        (valid && weights.iter().sum::<f32>() > 1e-6).then_some((indices, weights))
     }
 }

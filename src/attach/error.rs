@@ -42,7 +42,7 @@ pub enum RootsError {
         /// How many vertices there are.
         vertices: usize,
     },
-    /// A skin that moves nothing.
+    /// A skin without joints.
     #[error(
         "the SkinnedMesh of RootsOnMesh's mesh has {joints} joints and {poses} inverse bind poses, \
          expected one or more of each: give it the joints of its skeleton, or remove it"

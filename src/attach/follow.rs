@@ -46,7 +46,7 @@ pub(super) fn aim_roots(
     }
 }
 
-/// Moves roots by a substep's part of their way.
+/// Moves roots by one substep's part of their displacement.
 pub(super) fn move_roots(
     step: Res<HairStep>,
     hairs: Query<&TiedRoots, With<Hair>>,

@@ -30,6 +30,7 @@ pub struct RootsOnMesh {
 }
 
 /// Data read from the mesh when the strands were tied to it, so that its asset may be unloaded.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct TiedRoots {

@@ -49,10 +49,10 @@ pub struct BondChanges {
 }
 
 /// More joints than any strand has; requests beyond are ignored.
-const MOST_JOINTS: usize = 1 << 16;
+const MAX_JOINTS: usize = 1 << 16;
 
 /// More than any rate can change by.
-const MOST_CHANGE: f32 = 1e6;
+const MAX_CHANGE: f32 = 1e6;
 
 impl BondChanges {
     /// Requests a change of `kind` at `joint`. Requests beyond the strand's joints and non-finite
@@ -64,14 +64,14 @@ impl BondChanges {
         }
         if joint >= self.joints.len() {
             // The strand's number of joints is not known here; no strand has more than this.
-            if joint >= MOST_JOINTS {
+            if joint >= MAX_JOINTS {
                 return;
             }
             self.joints.resize(joint + 1, [0.0; BondKind::COUNT]);
         }
         let sum = &mut self.joints[joint][kind as usize];
         // The sum of two huge requests must stay finite.
-        *sum = (*sum + change).clamp(-MOST_CHANGE, MOST_CHANGE);
+        *sum = (*sum + change).clamp(-MAX_CHANGE, MAX_CHANGE);
         self.any = true;
     }
 
@@ -86,11 +86,11 @@ impl BondChanges {
     }
 
     /// The requested change of each joint, root first.
-    pub(super) fn asked(&self) -> &[[f32; BondKind::COUNT]] {
+    pub(super) fn requested(&self) -> &[[f32; BondKind::COUNT]] {
         &self.joints
     }
 
-    /// All of it is done. Memory for joints beyond the strand's `edges` is given back.
+    /// Clears all requests, and frees memory for joints beyond the strand's `edges`.
     pub(super) fn clear(&mut self, edges: usize) {
         self.any = false;
         if self.joints.len() > edges {

@@ -4,7 +4,7 @@ use super::{bonds::Bonds, kind::BondKind, settings::BondInfluence};
 use crate::{
     fault::{FaultKind, HairFault},
     setting::{HairDefault, Ranged},
-    strand::{Hair, Strand, StrandHistory, Strands, bring_home},
+    strand::{Hair, Strand, StrandHistory, Strands, return_to_cpu},
 };
 use bevy::prelude::*;
 
@@ -43,20 +43,20 @@ fn for_each_strand(
     mut act: impl FnMut(&mut Strand, &mut Bonds, &mut StrandHistory),
 ) {
     let id = hair.id();
-    hair.world_scope(|world| bring_home(world, id));
+    hair.world_scope(|world| return_to_cpu(world, id));
     let members: Vec<Entity> = hair.get::<Strands>().into_iter().flat_map(Strands::iter).collect();
     hair.world_scope(|world| {
         for strand in members {
             // User code may have listed one that does not exist.
             let Ok(mut entity) = world.get_entity_mut(strand) else { continue };
-            let Ok((mut parts, mut bonds, mut history)) =
+            let Ok((mut data, mut bonds, mut history)) =
                 entity.get_components_mut::<(&mut Strand, &mut Bonds, &mut StrandHistory)>()
             else {
                 continue;
             };
-            // No tick may have seen what user code wrote into it in this frame.
-            let repaired = parts.repair();
-            act(&mut parts, &mut bonds, &mut history);
+            // User code may have written to it since the last tick.
+            let repaired = data.repair();
+            act(&mut data, &mut bonds, &mut history);
             if let Some(repaired) = repaired {
                 world.write_message(HairFault::new(FaultKind::Strand, repaired).of(strand));
             }

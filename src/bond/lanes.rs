@@ -135,9 +135,9 @@ fn change_in<S: Simd>(
     for ((joints, orientations), changes) in eights {
         let omega = present(simd, &mut before, filled(orientations));
         let mut bonds = bonds(simd, filled(joints));
-        let asked = |k: usize| changes.get(k).copied().unwrap_or_default();
-        let low = transposed([asked(0), asked(1), asked(2), asked(3)]);
-        let high = transposed([asked(4), asked(5), asked(6), asked(7)]);
+        let requested = |k: usize| changes.get(k).copied().unwrap_or_default();
+        let low = transposed([requested(0), requested(1), requested(2), requested(3)]);
+        let high = transposed([requested(4), requested(5), requested(6), requested(7)]);
         for (j, bond) in bonds.iter_mut().enumerate() {
             *bond = changed(*bond, lanes(simd, low[j], high[j]), omega);
         }
@@ -161,7 +161,7 @@ fn change_in<S: Simd>(
     }
 }
 
-/// Up to eight items as eight: missing ones repeat the last.
+/// Pads to eight items by repeating the last.
 #[inline(always)]
 fn filled<T>(some: &[T]) -> [&T; 8] {
     let last = some.len() - 1;
@@ -225,7 +225,7 @@ fn bonds<S: Simd>(
     [kind(0), kind(1), kind(2), kind(3)]
 }
 
-/// The sixteen numbers of four joints, number by number, in fours.
+/// The sixteen numbers of four joints, transposed in groups of four.
 #[inline(always)]
 fn numbers([a, b, c, d]: [&JointBonds; 4]) -> [[[f32; 4]; 4]; 4] {
     // Four vectors are three groups of four contiguous numbers.

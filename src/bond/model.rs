@@ -73,6 +73,7 @@ impl JointBonds {
     }
 
     /// Whether every number is finite and every rate in \[0, 1\].
+    #[doc(hidden)]
     pub fn is_valid(&self) -> bool {
         self.shapes.iter().all(|s| s.is_finite())
             && self.rates.iter().all(|b| (0.0..=1.0).contains(b))
@@ -193,7 +194,7 @@ pub(super) fn changed<R: Real>(
 }
 
 /// Equation 19: the change of the hydrogen bonds' rate by a wind that changed the velocity by
-/// `wind` (m/s) in this substep. `per_speed` is 0.3 per m/s (print: 0.003 per cm/s).
+/// `wind` (m/s) in this substep. `per_speed` is 0.3 per m/s (the paper: 0.003 per cm/s).
 #[inline]
 pub fn drying(wind: f32, per_speed: f32) -> f32 {
     per_speed * wind

@@ -9,8 +9,8 @@ setting! {
     /// shares of their sum. Component of a [`Hair`](crate::Hair); where absent,
     /// [`HairDefault<BondInfluence>`](crate::HairDefault) holds.
     ///
-    /// The default is \[B\] table 1's scenes 1 and 2, hydrogen 33 %, the other 67 % spread as the perm
-    /// scene's ionic, disulfide and peptide bonds stand to each other.
+    /// The default is \[B\] table 1's scenes 1 and 2, hydrogen 33 %, the other 67 % in the
+    /// proportions of the perm scene's ionic, disulfide and peptide bonds.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct BondInfluence {
@@ -23,7 +23,7 @@ setting! {
         /// f of the peptide bonds.
         pub peptide: f32 = 0.17, in PEPTIDE: 0.0..=1e6, safe 0.0..=1.0, "a share such as 0.17";
     }
-    then Self::one_must_count
+    then Self::check_sum
 }
 
 impl BondInfluence {
@@ -41,13 +41,17 @@ impl BondInfluence {
     }
 
     /// The influences by [`BondKind`] as index.
+    #[doc(hidden)]
     pub fn as_array(&self) -> [f32; BondKind::COUNT] {
         [self.hydrogen, self.ionic, self.disulfide, self.peptide]
     }
 
-    fn one_must_count(&mut self, violations: &mut Violations) {
-        const SUM: ValueRange =
-            ValueRange::new("the sum of BondInfluence", 1e-6..=1e7, "at least one kind must count");
+    fn check_sum(&mut self, violations: &mut Violations) {
+        const SUM: ValueRange = ValueRange::new(
+            "the sum of BondInfluence",
+            1e-6..=1e7,
+            "give at least one kind a positive influence",
+        );
         if let Err(wrong) = SUM.check(self.as_array().iter().sum::<f32>()) {
             violations.push(wrong);
             *self = default();

@@ -1,4 +1,4 @@
-//! The bonds' two places in the tick: `RestShape` (equation 15) and `BondUpdate` (equation 16).
+//! The bonds' two steps in the tick: `RestShape` (equation 15) and `BondUpdate` (equation 16).
 
 use super::{
     bonds::{BondChanges, Bonds},
@@ -19,7 +19,7 @@ use crate::{
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use fearless_simd::Level;
 
-/// About what a strand takes (ns) on average; most need no update.
+/// Average cost per strand (ns); most need no update.
 const SHAPE: Nanos = Nanos(200);
 const CHANGE: Nanos = Nanos(200);
 
@@ -52,7 +52,7 @@ impl Plugin for BondPlugin {
 fn fit_bonds(
     mut strands: Query<
         (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
-        // What is written while a strand is disabled is no change any more when it is enabled.
+        // A write to a disabled strand would no longer count as a change once it is enabled.
         (
             Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>,
             Without<OnGpu>,
@@ -66,7 +66,7 @@ fn fit_bonds(
         if let Some(rest) = &mut rest {
             let rest = rest.bypass_change_detection();
             (rest.closed, rest.key) = (false, None);
-            // Strands that are not simulated keep theirs until they are.
+            // A strand that is not simulated would keep its non-finite values.
             if !rest.is_finite() {
                 *rest = RestShape::default();
             }
@@ -223,7 +223,7 @@ fn update_bonds(
         in_turn(items, AHEAD, ahead, |(strand, bonds, changes, rest, sleep)| {
             sleep.wake();
             rest.closed = false;
-            change(level, frames(strand), &mut bonds.joints, changes.asked());
+            change(level, frames(strand), &mut bonds.joints, changes.requested());
             changes.clear(strand.edges());
         });
         items.clear();

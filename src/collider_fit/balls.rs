@@ -28,28 +28,28 @@ pub(crate) struct BallRules {
     pub most: usize,
 }
 
-/// Balls inside the surface that is given by points with outward normals. All of these bound them;
-/// those for which `is_meant` holds are to be near one of them.
+/// Balls inside the surface that is given by points with outward normals. All points bound the
+/// balls; those for which `is_target` holds should be near one.
 pub(crate) fn inscribed_balls(
     points: &[(Vec3, Vec3)],
-    is_meant: impl Fn(usize) -> bool,
+    is_target: impl Fn(usize) -> bool,
     rules: &BallRules,
 ) -> Vec<BoundingSphere> {
     let tree = KdTree::new(points.iter().map(|p| p.0).zip(0u32..));
-    let meant: Vec<usize> = (0..points.len()).filter(|i| is_meant(*i)).collect();
+    let targets: Vec<usize> = (0..points.len()).filter(|i| is_target(*i)).collect();
     let balls: Vec<BoundingSphere> =
-        meant.iter().filter_map(|&i| largest_at(points, i, &tree, rules)).collect();
+        targets.iter().filter_map(|&i| largest_at(points, i, &tree, rules)).collect();
     let is_near = |ball: &BoundingSphere, p: Vec3| {
         let off = p.distance(ball.center.into()) - ball.radius();
         off.abs() <= rules.near + rules.within
     };
     // Bit set of the points near each ball.
-    let words = meant.len().div_ceil(64);
+    let words = targets.len().div_ceil(64);
     let near: Vec<Vec<u64>> = balls
         .iter()
         .map(|ball| {
             let mut bits = vec![0; words];
-            let each = meant.iter().enumerate().filter(|(_, i)| is_near(ball, points[**i].0));
+            let each = targets.iter().enumerate().filter(|(_, i)| is_near(ball, points[**i].0));
             each.for_each(|(k, _)| bits[k / 64] |= 1 << (k % 64));
             bits
         })
@@ -60,9 +60,10 @@ pub(crate) fn inscribed_balls(
         let gain = |ball: &Vec<u64>| -> u32 {
             ball.iter().zip(&left).map(|(near, left)| (near & left).count_ones()).sum()
         };
-        // Ties: the first.
+        // On ties, the first.
         let best = (0..balls.len()).rev().max_by_key(|k| gain(&near[*k]));
-        let Some(best) = best.filter(|k| gain(&near[*k]) as f32 > LEAST_GAIN * meant.len() as f32)
+        let Some(best) =
+            best.filter(|k| gain(&near[*k]) as f32 > LEAST_GAIN * targets.len() as f32)
         else {
             break;
         };

@@ -1,6 +1,6 @@
 //! Colliders from a character: the capsule for each joint of a skinned mesh.
 
-use super::linear::solve;
+use super::linear_system::solve;
 use crate::{contact::HairCollider, setting::InvalidValue};
 use bevy::{
     math::{DMat3, DVec3},
@@ -24,10 +24,10 @@ pub struct JointCapsule {
 }
 
 impl JointCapsule {
-    /// The collider and its place below the joint, to be spawned with `ChildOf(joint)`.
+    /// The collider and its transform in the joint's space, to be spawned with `ChildOf(joint)`.
     ///
     /// # Errors
-    /// When the radius is not valid for a collider, as in a capsule that was made by hand.
+    /// When the radius is not valid for a collider, as may be in a capsule made by hand.
     pub fn collider(&self) -> Result<(HairCollider, Transform), InvalidValue> {
         let way = self.to - self.from;
         let turn = Quat::from_rotation_arc(Vec3::Y, way.normalize_or(Vec3::Y));
@@ -49,7 +49,7 @@ pub enum FitError {
         /// Which.
         what: &'static str,
     },
-    /// An attribute that does not go with the vertices.
+    /// An attribute with another number of elements than there are vertices.
     #[error(
         "{what} has {found} elements, expected {expected}, one for each vertex: repair the mesh"
     )]
@@ -61,7 +61,7 @@ pub enum FitError {
         /// How many vertices there are.
         expected: usize,
     },
-    /// A vertex moved by a joint that is not there.
+    /// A vertex that refers to a joint that does not exist.
     #[error(
         "vertex {vertex} is moved by joint {joint}, expected one of {joints}: give the inverse bind \
          poses of this mesh's own skin"
@@ -74,7 +74,7 @@ pub enum FitError {
         /// How many joints there are.
         joints: usize,
     },
-    /// A triangle with a vertex that is not there.
+    /// A triangle that refers to a vertex that does not exist.
     #[error("a triangle names vertex {vertex}, expected less than {vertices}: repair the indices")]
     UnknownVertex {
         /// The vertex.
@@ -85,21 +85,21 @@ pub enum FitError {
     /// A number that is not finite.
     #[error("{what} {index} is not finite: repair the mesh or leave the part out")]
     NonFinite {
-        /// What it is of: a position, a joint weight, an inverse bind pose.
+        /// What is not finite: a position, a joint weight, an inverse bind pose.
         what: &'static str,
         /// Which vertex or joint.
         index: usize,
     },
 }
 
-/// Vertices that a joint must move for a capsule to be fitted.
-const LEAST_VERTICES: usize = 8;
+/// A capsule is fitted to a joint that moves at least this many vertices.
+const MIN_VERTICES: usize = 8;
 /// Steps toward the best capsule; a dozen are enough as a rule.
 const STEPS: usize = 40;
 
 /// For each joint of a skinned mesh the capsule that best fits the vertices which it moves more than
 /// any other joint does, by least squares over the skin's area. `None` for joints that move fewer
-/// than eight vertices, or none that curve.
+/// than eight vertices, or whose vertices are nearly in one plane.
 ///
 /// `inverse_bindposes` are those of the mesh's `SkinnedMesh`, in the order of its joints; capsules
 /// have the unit of the joints' space (usually m). The skin lies partly outside, partly inside, as
@@ -127,8 +127,8 @@ const STEPS: usize = 40;
 /// ```
 ///
 /// # Errors
-/// When the mesh has no positions, joint indices or joint weights in the main world, these do not go
-/// together or with the inverse bind poses, or something is not finite.
+/// When the mesh has no positions, joint indices or joint weights in the main world, these do not
+/// match each other or the inverse bind poses, or a value is not finite.
 pub fn fit_joint_capsules(
     mesh: &Mesh,
     inverse_bindposes: &[Mat4],
@@ -140,7 +140,7 @@ pub fn fit_joint_capsules(
     let areas = areas(mesh, skin.positions)?;
     let mut parts = vec![Vec::new(); inverse_bindposes.len()];
     for (vertex, (indices, weights)) in skin.joints.iter().zip(skin.weights).enumerate() {
-        // Ties: the first, so that the same mesh gives the same capsules.
+        // On ties, the first, so that the same mesh gives the same capsules.
         let most = (0..4).fold(0, |most, k| if weights[k] > weights[most] { k } else { most });
         if weights[most] <= 0.0 || areas[vertex] <= 0.0 {
             continue;
@@ -153,7 +153,7 @@ pub fn fit_joint_capsules(
     Ok(parts.iter().map(|part| fit(part)).collect())
 }
 
-/// A mesh's skin, its arrays known to fit together.
+/// A mesh's skin, with arrays of equal length.
 struct SkinArrays<'a> {
     positions: &'a [[f32; 3]],
     joints: &'a [[u16; 4]],
@@ -265,7 +265,7 @@ impl Capsule {
 
 /// The best of the capsules along the three axes of the points' spread.
 fn fit(points: &[(DVec3, f64)]) -> Option<JointCapsule> {
-    if points.len() < LEAST_VERTICES {
+    if points.len() < MIN_VERTICES {
         return None;
     }
     let total: f64 = points.iter().map(|p| p.1).sum();
@@ -298,7 +298,7 @@ fn fit(points: &[(DVec3, f64)]) -> Option<JointCapsule> {
     Some(JointCapsule { from, to, radius: best.radius as f32, deviation: deviation as f32 })
 }
 
-/// Where the search begins: a capsule around an axis, as long as the points.
+/// The initial guess: a capsule around an axis, as long as the points' extent.
 fn along(points: &[(DVec3, f64)], (middle, total): (DVec3, f64), axis: DVec3) -> Capsule {
     let off = |p: DVec3| (p - middle).reject_from_normalized(axis).length();
     let radius = points.iter().map(|(p, weight)| weight * off(*p)).sum::<f64>() / total;
@@ -310,7 +310,7 @@ fn along(points: &[(DVec3, f64)], (middle, total): (DVec3, f64), axis: DVec3) ->
     Capsule { ends: [centre - axis * half, centre + axis * half], radius }
 }
 
-/// Unit vectors along which points spread most, least and between, by Jacobi's rotations.
+/// Principal axes of the points, by Jacobi rotations.
 fn principal_axes(points: &[(DVec3, f64)], middle: DVec3) -> [DVec3; 3] {
     let mut spread = DMat3::ZERO;
     for (point, weight) in points {

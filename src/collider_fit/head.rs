@@ -1,12 +1,12 @@
 //! A head for a groom that comes without one.
 
-use super::linear::solve;
+use super::linear_system::solve;
 use crate::groom::Groom;
 use bevy::math::{DVec3, bounding::BoundingSphere};
 
 impl Groom {
-    /// The ball (m) that best fits the roots, by least squares: a collider for a groom without a head
-    /// mesh, and its place. It is shrunk until no root lies inside, because hair that grows inside a
+    /// The ball (m) that best fits the roots, by least squares: a collider for a groom without a
+    /// head mesh. It is shrunk until no root lies inside, because hair that grows inside a
     /// collider is pushed out of it.
     ///
     /// `None` where the fit is unreliable: fewer than four roots, nearly flat roots or roots that do not
@@ -15,9 +15,9 @@ impl Groom {
     ///
     /// ```
     /// # use bevy_keratin::groom::Groom; use bevy::prelude::*;
-    /// let ways = [Dir3::X, Dir3::Y, Dir3::Z, Dir3::NEG_X, Dir3::NEG_Z];
-    /// let strand = |way: Dir3| [Vec3::Y + way * 0.09, Vec3::Y + way * 0.2];
-    /// let head = Groom::from_polylines(ways.map(strand)).unwrap().fit_head().unwrap();
+    /// let directions = [Dir3::X, Dir3::Y, Dir3::Z, Dir3::NEG_X, Dir3::NEG_Z];
+    /// let strand = |d: Dir3| [Vec3::Y + d * 0.09, Vec3::Y + d * 0.2];
+    /// let head = Groom::from_polylines(directions.map(strand)).unwrap().fit_head().unwrap();
     /// assert!(head.center.distance(Vec3A::Y) < 1e-4 && (head.radius() - 0.09).abs() < 1e-4);
     /// # use bevy::math::Vec3A;
     /// ```

@@ -5,7 +5,7 @@ mod bake;
 mod balls;
 mod capsules;
 mod head;
-mod linear;
+mod linear_system;
 
 pub(crate) use balls::{BallRules, inscribed_balls};
 pub use capsules::{FitError, JointCapsule, fit_joint_capsules};

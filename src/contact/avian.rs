@@ -4,6 +4,7 @@ use super::{Bake, ColliderShape, ConvexHull, DistanceGrid, HairCollider, Opening
 use crate::{
     fault::{FaultKind, HairFault},
     schedule::{HairStep, HairSystems, HairTick},
+    setting::{self, Ranged, setting},
 };
 use avian3d::{
     parry::shape::{Cone, SharedShape, TriMesh, TypedShape},
@@ -12,37 +13,33 @@ use avian3d::{
 use bevy::{math::Isometry3d, prelude::*};
 use std::sync::Arc;
 
-/// Keeps hair out of the avian [`Collider`] of the same entity, with or without a rigid body.
-///
-/// Balls, capsules, cylinders, cones, half spaces, cuboids, convex hulls, triangle meshes and compounds of
-/// these become [`HairCollider`]s on children that follow the collider: its shape in the next tick when
-/// that changes, the body in every tick. A triangle mesh is baked in the tick that first sees it, which
-/// takes that long; one with large openings has no inside and is a fault.
-/// They are removed with the collider, its body or this component, and while the collider has
-/// [`ColliderDisabled`]. Unsupported shapes are reported once as
-/// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider a non-uniform scale
-/// counts as its mean. Hair does not push bodies.
-///
-/// ```
-/// # use avian3d::prelude::*; use bevy::prelude::*; use bevy_keratin::prelude::*;
-/// # fn setup(mut commands: Commands) {
-/// commands.spawn((RigidBody::Kinematic, Collider::capsule(0.2, 0.5), AvianHairCollider::default()));
-/// # }
-/// ```
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-#[require(Unknown)]
-pub struct AvianHairCollider {
-    /// Coulomb friction of hair on it, independent of the body's: [`HairCollider::friction`].
-    pub friction: f32,
-    /// Into how many cells the longest side of a triangle mesh is parted: what is thinner than two of
-    /// them is lost. Default 48; 4 to 200 are taken.
-    pub cells: u32,
-}
-
-impl Default for AvianHairCollider {
-    fn default() -> Self {
-        Self { friction: HairCollider::default().friction, cells: 48 }
+setting! {
+    /// Keeps hair out of the avian [`Collider`] of the same entity, with or without a rigid body.
+    ///
+    /// Balls, capsules, cylinders, cones, half spaces, cuboids, convex hulls, triangle meshes and compounds of
+    /// these become [`HairCollider`]s on children that follow the collider: its shape in the next tick when
+    /// that changes, the body in every tick. A triangle mesh is baked in the first tick that finds it,
+    /// which makes that tick slow; one with large openings has no inside and is a fault.
+    /// They are removed with the collider, its body or this component, and while the collider has
+    /// [`ColliderDisabled`]. Unsupported shapes are reported once as
+    /// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider a non-uniform scale
+    /// counts as its mean. Hair does not push bodies.
+    ///
+    /// ```
+    /// # use avian3d::prelude::*; use bevy::prelude::*; use bevy_keratin::prelude::*;
+    /// # fn setup(mut commands: Commands) {
+    /// commands.spawn((RigidBody::Kinematic, Collider::capsule(0.2, 0.5), AvianHairCollider::default()));
+    /// # }
+    /// ```
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(Unknown)]
+    pub struct AvianHairCollider {
+        /// Coulomb friction of hair on it, independent of the body's: [`HairCollider::friction`].
+        pub friction: f32 = 0.3, in FRICTION: 0.0..=100.0, safe 0.0..=2.0, "hair has 0.2 to 0.4";
+        /// Number of cells along the longest side of a triangle mesh: parts thinner than two cells
+        /// are lost.
+        pub cells: u32 = 48, in CELLS: 4.0..=200.0, "the memory grows with its cube";
     }
 }
 
@@ -66,7 +63,7 @@ pub struct AvianShapeError {
 #[require(Baked)]
 struct Unknown(Option<AvianShapeError>);
 
-/// What was made of hulls and triangle meshes of a collider, with so many cells.
+/// Shapes baked from a collider's hulls and triangle meshes, with this resolution.
 #[derive(Component, Reflect, Clone, Default)]
 #[reflect(Component, Default, Clone)]
 struct Baked {
@@ -79,12 +76,12 @@ struct Baked {
 struct BakedShape {
     of: SharedShape,
     made: Result<ColliderShape, String>,
-    /// Whether it was asked for in this tick.
+    /// Whether it was used in this tick.
     is_used: bool,
 }
 
 impl Baked {
-    /// What `make` makes of a shape, once.
+    /// The shape that `make` gives, from the cache if it was made before.
     fn get(
         &mut self,
         of: &SharedShape,
@@ -105,7 +102,7 @@ fn hull(points: &[Vec3]) -> Result<ColliderShape, String> {
     ConvexHull::new(points).map(ColliderShape::Hull).map_err(|error| error.to_string())
 }
 
-/// The inside of a mesh, its longest side parted into so many cells.
+/// The inside of a mesh as a grid with `cells` cells along its longest side.
 fn bake(mesh: &TriMesh, cells: f32) -> Result<ColliderShape, String> {
     let vertices = mesh.vertices();
     let bounds = |(low, high): (Vec3, Vec3), p: &Vec3| (low.min(*p), high.max(*p));
@@ -121,8 +118,8 @@ fn bake(mesh: &TriMesh, cells: f32) -> Result<ColliderShape, String> {
 struct AvianPart;
 
 pub(super) fn plugin(app: &mut App) {
-    app.register_type::<AvianHairCollider>()
-        .register_type::<Unknown>()
+    setting::component::<AvianHairCollider>(app);
+    app.register_type::<Unknown>()
         .register_type::<Baked>()
         .register_type::<AvianShapeError>()
         .register_type::<AvianPart>()
@@ -155,9 +152,8 @@ fn follow_colliders(
         }
     }
     for (body, collider, settings, mut unknown, mut baked, children) in &mut bodies {
-        let AvianHairCollider { friction, cells } = *settings;
+        let AvianHairCollider { friction, cells } = settings.clamped();
         let baked = baked.bypass_change_detection();
-        let cells = cells.clamp(4, 200);
         if baked.cells != cells {
             *baked = Baked { cells, ..default() };
         }
@@ -219,14 +215,14 @@ fn gather(
         }
         TypedShape::HalfSpace(half) => match Dir3::new(half.normal) {
             Ok(normal) => (ColliderShape::Plane(InfinitePlane3d { normal }), at),
-            Err(_) => return unknown("half space without normal", "give it the way out of it"),
+            Err(_) => return unknown("half space without normal", "give it its outward normal"),
         },
         TypedShape::Compound(compound) => {
             let parts = compound.shapes().iter().map(|(pose, shape)| {
                 let pose = Isometry3d::new(pose.translation, pose.rotation);
                 gather(shape, at * pose, baked, into)
             });
-            // All of them, whatever one of them is.
+            // Gathers all of them even if one is unsupported.
             return parts.fold(Ok(()), Result::and);
         }
         TypedShape::Cuboid(c) => {

@@ -13,7 +13,7 @@ const FINEST: f32 = 0.5;
 /// Strands with fewer nodes are not resampled.
 const FEW: usize = 32;
 
-/// How many nodes of a strand with these rest lengths (m) contact takes for one: 1 for all but very
+/// Contact samples every how many nodes of a strand with these rest lengths (m): 1 for all but very
 /// fine strands.
 pub(super) fn stride(lengths: &[f32], reach: f32) -> usize {
     if lengths.len() < FEW {
@@ -46,12 +46,12 @@ impl Coarse {
         (self.nodes, self.is_any) = (0, false);
     }
 
-    /// How many nodes there are, all counted.
+    /// The number of nodes, sampled or not.
     pub fn nodes(&self) -> usize {
         self.nodes
     }
 
-    /// Adds a strand. Gives the places that are looked at.
+    /// Adds a strand. Returns the positions that are sampled.
     pub fn add<'a>(&'a mut self, nodes: &'a [Vec3], stride: usize) -> &'a [Vec3] {
         let edges = nodes.len().saturating_sub(1);
         let seen = [nodes.len(), (edges / stride.max(1)).max(edges.min(1))];
@@ -73,7 +73,7 @@ impl Coarse {
         }
         let (mut first, mut picked) = (0, 0);
         for &seen in &self.strands {
-            // Never ahead of where it reads.
+            // Writes never overtake reads.
             for k in 0..seen[0].min(seen[1] + 1) {
                 rows[picked] = rows[first + node(k, seen)];
                 picked += 1;

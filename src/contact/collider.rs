@@ -30,8 +30,8 @@ setting! {
     }
 }
 
-/// The shapes of a [`HairCollider`]: Bevy's primitives and what is made of points and meshes. A grid costs
-/// most for nodes that are near it: it is looked up lane by lane.
+/// The shapes of a [`HairCollider`]: Bevy's primitives and what is made of points and meshes. A
+/// grid is the most expensive for nodes near it: it is sampled lane by lane.
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub enum ColliderShape {
@@ -43,7 +43,7 @@ pub enum ColliderShape {
     Plane(InfinitePlane3d),
     /// A solid cylinder along Y.
     Cylinder(Cylinder),
-    /// A box, with round edges if asked for.
+    /// A box, optionally with rounded edges.
     Cuboid {
         /// Its size, edges included.
         cuboid: Cuboid,
@@ -77,8 +77,8 @@ impl ColliderShape {
     /// The range of the radius of a box' edges.
     pub const ROUNDING: ValueRange =
         ValueRange::new("ColliderShape::rounding (m)", 0.0..=1e5, "0 makes edges sharp");
-    /// How many times as long as the shortest axis of an ellipsoid the longest may be.
-    const LONGEST: f32 = 100.0;
+    /// Largest ratio of an ellipsoid's longest to its shortest axis.
+    const MAX_RATIO: f32 = 100.0;
     /// The range of half the length between a capsule's centres, or half a cylinder's height.
     pub const HALF_LENGTH: ValueRange =
         ValueRange::new("ColliderShape::half_length (m)", 0.0..=1e5, "0 makes it a point");
@@ -101,15 +101,22 @@ impl Ranged for ColliderShape {
                 for side in cuboid.half_size.as_mut() {
                     Self::HALF_SIZE.clamp(side, || 0.1, violations);
                 }
-                Self::ROUNDING.clamp(rounding, || 0.0, violations);
-                *rounding = rounding.min(cuboid.half_size.min_element());
+                let inner = 0.0..=cuboid.half_size.min_element();
+                let hint = "at most half of the shortest side; 0 makes edges sharp";
+                let range = ValueRange::new(Self::ROUNDING.what, inner, hint);
+                range.clamp(rounding, || 0.0, violations);
                 return;
             }
             Self::Ellipsoid { radii } => {
                 for radius in radii.as_mut() {
                     Self::RADIUS.clamp(radius, || 0.09, violations);
                 }
-                *radii = radii.max(Vec3::splat(radii.max_element() / Self::LONGEST));
+                let within = radii.max_element() / Self::MAX_RATIO..=*Self::RADIUS.valid.end();
+                let hint = "the longest axis is at most 100 times the shortest";
+                let range = ValueRange::new(Self::RADIUS.what, within, hint);
+                for radius in radii.as_mut() {
+                    range.clamp(radius, || 0.09, violations);
+                }
                 return;
             }
         };
@@ -158,23 +165,22 @@ impl HairCollider {
         Self::rounded_cuboid(size, 0.0)
     }
 
-    /// A box of this size with edges of this radius (m); of at most half of its shortest side.
+    /// A box of this size with edges of this radius (m).
     ///
     /// # Errors
-    /// When a side is not positive, the radius negative, or something not finite.
+    /// When a side is not positive, the radius negative or more than half of the shortest side, or a
+    /// value not finite.
     pub fn rounded_cuboid(size: Vec3, rounding: f32) -> Result<Self, InvalidValue> {
         let cuboid = Cuboid { half_size: 0.5 * size };
-        let made = Self::from(ColliderShape::Cuboid { cuboid, rounding }).checked()?;
-        Ok(made.clamped())
+        Self::from(ColliderShape::Cuboid { cuboid, rounding }).checked()
     }
 
     /// An ellipsoid of these half axes (m).
     ///
     /// # Errors
-    /// When one is not positive and finite.
+    /// When one is not positive and finite, or the longest more than 100 times the shortest.
     pub fn ellipsoid(radii: Vec3) -> Result<Self, InvalidValue> {
-        let made = Self::from(ColliderShape::Ellipsoid { radii }).checked()?;
-        Ok(made.clamped())
+        Self::from(ColliderShape::Ellipsoid { radii }).checked()
     }
 
     /// The convex hull of points (m): [`ConvexHull::new`].
@@ -185,7 +191,7 @@ impl HairCollider {
         Ok(ColliderShape::Hull(ConvexHull::new(points)?).into())
     }
 
-    /// What was baked: [`DistanceGrid::bake`].
+    /// A baked grid: [`DistanceGrid::bake`].
     pub fn grid(grid: DistanceGrid) -> Self {
         ColliderShape::Grid(grid).into()
     }

@@ -39,7 +39,7 @@ pub(super) fn place(row: &NodeRow) -> Vec3 {
     Vec3::new(row[0], row[1], row[2])
 }
 
-/// Numbers to which masked lanes are appended without branches.
+/// A list to which masked lanes are appended without branches.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stack {
     items: Vec<u32>,
@@ -138,7 +138,8 @@ fn four<S: Simd>(simd: S, rows: [NodeRow; 4]) -> [f32x4<S>; 4] {
     simd.load_four_interleaved_f32x4(&flat)
 }
 
-/// The starts of eight edges, or with `after` 1 their ends, and their rows' last column.
+/// The start nodes of eight edges (with `after` = 1 their end nodes), and the last column of these
+/// rows.
 #[inline(always)]
 fn eight<S: Simd>(
     simd: S,

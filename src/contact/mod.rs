@@ -45,6 +45,7 @@ setting! {
 
 /// The colliders near one hair in this substep, in its frame. Written by `Interaction`, read by
 /// `Projection`.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct Obstacles {
@@ -57,15 +58,16 @@ pub struct Obstacles {
 }
 
 /// The pairs of strands of one hair that may touch.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct LockNeighbours {
     #[reflect(ignore)]
     lists: neighbours::Neighbours,
-    /// The strands that take part in this tick, and whether followers do.
+    /// The strands that take part in this tick, and whether followers are among them.
     #[reflect(ignore)]
     members: (Vec<Entity>, bool),
-    /// Whether too fine strands have been reported.
+    /// Whether strands with too many nodes have been reported.
     #[reflect(ignore)]
     is_reported: bool,
 }

@@ -32,11 +32,11 @@ const FAST_MARGIN: f32 = 0.5;
 /// faster than the margin allows are found one tick later.
 const FAST_LOOKUPS: u32 = 2;
 
-/// Groups out of reach tested per node since the last rebuild, at which a rebuild pays off.
+/// A rebuild pays off after this many groups per node were tested in vain since the last one.
 const IDLE_GROUPS: usize = 10;
 
 /// Half the length of the pieces in which edges are put into the grid, in units of reach and margin.
-/// Shorter ones are more to sort (0.5: scene 1 takes 5 % longer), longer ones filter less.
+/// Shorter ones take longer to sort (0.5: scene 1 takes 5 % longer), longer ones filter less.
 const HALF_PIECE: f32 = 0.8;
 
 /// Longest bridge of water, in units of the reach: the rest of the margin is how far nodes may move
@@ -47,17 +47,17 @@ pub(super) const LONGEST_BRIDGE: f32 = 0.6;
 /// few rows, and subdivided along the rows to keep these short.
 const SLICED: Vec3 = Vec3::new(4.0, 1.0, 1.0);
 
-/// Strands per piece of work.
+/// Strands per work chunk.
 const PART: usize = 16;
 
-/// About what a node takes (ns): its displacement, its neighbour search, its contacts, its bridges of
-/// water.
+/// Cost per node (ns): measuring its displacement, its neighbour search, its contacts, its bridges
+/// of water.
 const MEASURE: usize = 2;
 const SEARCH: usize = 250;
 const PUSH: usize = 40;
 const BRIDGE: usize = 60;
 
-/// The work of a part where a node takes so many `nanos`.
+/// The cost of a chunk at `nanos` per node.
 fn per_part(nanos: usize, rows: &[NodeRow], strands: usize) -> Nanos {
     Nanos(nanos * PART * rows.len() / strands.max(1))
 }
@@ -66,8 +66,8 @@ fn per_part(nanos: usize, rows: &[NodeRow], strands: usize) -> Nanos {
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     rows: Vec<NodeRow>,
-    /// Where the nodes are expected in the middle of the time that lists are used for; empty for the
-    /// present positions.
+    /// Expected positions of the nodes in the middle of the period that lists are used for; empty
+    /// for the present positions.
     expected: Vec<NodeRow>,
     /// The nodes of each strand.
     strands: Vec<Range<u32>>,
@@ -143,7 +143,7 @@ struct SearchScratch {
 }
 
 impl Neighbours {
-    /// Forgets the nodes, not the lists.
+    /// Removes the nodes, not the lists.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.expected.clear();
@@ -159,7 +159,7 @@ impl Neighbours {
         self.strands.push(start..self.rows.len() as u32);
     }
 
-    /// For how many lookups the next lists will probably be used.
+    /// For how many lookups the next lists will be used if motion stays the same.
     pub fn lookups(&self) -> u32 {
         if self.lists.margin == FAST_MARGIN { FAST_LOOKUPS } else { 1 }
     }

@@ -113,7 +113,7 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
 pub(crate) struct HairReach {
     center: Vec3,
     radius: f32,
-    /// Number of strands, and ticks since it was computed.
+    /// Number of strands when it was computed, and ticks since.
     members: usize,
     age: u32,
 }
@@ -198,7 +198,7 @@ impl Ball {
     }
 }
 
-/// All colliders with valid values, and their bounding balls.
+/// All colliders, clamped to valid values, with their bounding balls.
 pub(crate) fn with_balls<'a>(
     colliders: &'a Query<(&HairCollider, &TickPose)>,
 ) -> Vec<(Ball, HairCollider, &'a TickPose)> {
@@ -248,7 +248,7 @@ fn too_fine(strand: &Strand, radius: f32, stride: usize) -> HairFault {
     let segment = 1e3 * strand.length() / strand.edges() as f32;
     let message = format!(
         "segments of a strand are {segment:.3} mm long, expected at least its lock's radius of {} mm: \
-         contact looks at every {stride}th of its {} nodes, fewer nodes would do",
+         contact samples every {stride}th of its {} nodes; use fewer nodes",
         1e3 * radius,
         strand.nodes(),
     );
@@ -313,7 +313,10 @@ pub(crate) fn push_strands_apart(
             while let Some((mut strand, mut sleep, mut still)) = some.fetch_next() {
                 if sleep.is_asleep() {
                     let pushes = pushes.by_ref().take(strand.nodes());
-                    if still.bypass_change_detection().feels(pushes, strength / (2.0 * radius)) {
+                    if still
+                        .bypass_change_detection()
+                        .has_new_contact(pushes, strength / (2.0 * radius))
+                    {
                         sleep.bypass_change_detection().wake();
                     }
                     continue;

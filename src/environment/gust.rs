@@ -2,8 +2,8 @@
 
 use bevy::math::{DVec3, Vec3};
 
-/// Smooth noise at a place, each component between −1 and 1, of mean 0: numbers at the points of the
-/// cubic lattice of unit size, between which the quintic fade interpolates (Perlin 2002).
+/// Value noise: each component between −1 and 1 with mean 0, random at the points of the unit
+/// lattice and interpolated by the quintic fade (Perlin 2002).
 pub fn noise(seed: u32, at: DVec3) -> Vec3 {
     let cell = at.floor();
     let t = (at - cell).as_vec3();
@@ -17,16 +17,16 @@ pub fn noise(seed: u32, at: DVec3) -> Vec3 {
     face(0).lerp(face(1), fade.z)
 }
 
-/// Gusts of a length (m) at a place (m), after the wind has travelled by `come` (m): components of at
-/// most 1, with eddies of a seventh of the length.
+/// Gusts of a length (m) at a place (m), after the wind has travelled by `travelled` (m):
+/// components of at most 1, with eddies of a seventh of the length.
 ///
 /// Turbulence is advected as if frozen in the mean wind (Taylor 1938).
-pub fn gust(seed: u32, place: Vec3, come: DVec3, length: f32) -> Vec3 {
-    let at = (place.as_dvec3() - come) / f64::from(length);
+pub fn gust(seed: u32, place: Vec3, travelled: DVec3, length: f32) -> Vec3 {
+    let at = (place.as_dvec3() - travelled) / f64::from(length);
     0.75 * noise(seed, at) + 0.25 * noise(seed ^ 0x9e37_79b9, at * 7.0)
 }
 
-/// A number for each component of a lattice point, of 21 bits each.
+/// A random value for each component at a lattice point, of 21 bits each.
 fn lattice(seed: u32, point: [i64; 3]) -> Vec3 {
     // The finalizer of SplitMix64 (Steele, Lea & Flood 2014) over all coordinates.
     let mut hash = u64::from(seed);
@@ -65,11 +65,11 @@ mod tests {
 
     #[test]
     fn gusts_are_advected_by_the_wind() {
-        let come = DVec3::new(3.0, 0.0, 1.0);
+        let travelled = DVec3::new(3.0, 0.0, 1.0);
         let here = gust(1, Vec3::new(0.2, 1.0, 0.1), DVec3::ZERO, 4.0);
-        let there = gust(1, Vec3::new(3.2, 1.0, 1.1), come, 4.0);
+        let there = gust(1, Vec3::new(3.2, 1.0, 1.1), travelled, 4.0);
         assert!(here.distance(there) < 1e-5);
         let far = gust(1, Vec3::X * 1e6, DVec3::splat(1e12), 4.0);
-        assert!(far.is_finite() && gust(1, Vec3::MAX, -come, 1e-3).is_finite());
+        assert!(far.is_finite() && gust(1, Vec3::MAX, -travelled, 1e-3).is_finite());
     }
 }

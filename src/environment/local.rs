@@ -30,7 +30,7 @@ pub(crate) struct LocalWinds {
     pub(super) wind: Vec3,
     pub(super) settings: HairWind,
     /// How far it has travelled so far (m, in the world).
-    pub(super) come: DVec3,
+    pub(super) travelled: DVec3,
     pub(super) pose: Pose,
 }
 
@@ -86,7 +86,7 @@ impl Winds<'_, '_> {
             zones: zones.collect(),
             wind: pose.direction_in(settings.velocity),
             settings,
-            come: settings.velocity.as_dvec3() * seconds,
+            travelled: settings.velocity.as_dvec3() * seconds,
             pose: *pose,
         }
     }
@@ -103,21 +103,21 @@ impl LocalWinds {
         self.wind != Vec3::ZERO || !self.zones.is_empty()
     }
 
-    /// The wind of the place where it is the same everywhere and at all times (m/s).
+    /// The global wind if it is the same everywhere and at all times (m/s).
     #[cfg(feature = "gpu")]
     pub(crate) fn steady_wind(&self) -> Option<Vec3> {
         let is_steady = self.settings.gusts <= 0.0 || self.wind == Vec3::ZERO;
         (is_steady && self.zones.is_empty()).then_some(self.wind)
     }
 
-    /// The wind of the place with its gusts near a place: of a strand at its root, for gusts are longer
-    /// than hair (m/s).
+    /// The global wind with gusts at a point (m/s). A strand uses that at its root, since gusts are
+    /// longer than hair.
     pub(super) fn gusty_wind(&self, place: Vec3) -> Vec3 {
         let HairWind { gusts, gust_length, seed, .. } = self.settings;
         if gusts <= 0.0 || self.wind == Vec3::ZERO {
             return self.wind;
         }
-        let gust = gust(seed, self.pose.point_out(place), self.come, gust_length);
+        let gust = gust(seed, self.pose.point_out(place), self.travelled, gust_length);
         self.wind + self.pose.direction_in(gust) * (gusts * self.wind.length())
     }
 

@@ -69,9 +69,9 @@ setting! {
         /// α, the acceleration of an edge across the wind, on the axis. The paper gives no value.
         pub strength: f32 = 3.33, "m/s²" in STRENGTH: 0.0..=1e4, safe 0.0..=30.0,
             "3.33 is a hair dryer";
-        /// Rate of hydrogen bonds that form per velocity that the wind gives, equation 19 (print:
-        /// 0.003 s/cm); 0 blows without drying. On hair that carries water
-        /// ([`Moisture`](crate::Moisture)) it takes that share of it instead, and the bonds follow.
+        /// Rate of hydrogen bonds that form per velocity that the wind gives, equation 19 (the
+        /// paper: 0.003 s/cm); 0 blows without drying. On hair that carries water
+        /// ([`Moisture`](crate::Moisture)) it removes that share of it instead, and the bonds follow.
         pub drying: f32 = 0.3, "s/m" in DRYING: 0.0..=1e4, safe 0.0..=1.0, "the paper uses 0.3";
         /// Temperature of the air at the nozzle: it evaporates water. Falls along the axis as a jet
         /// does, [`jet`](crate::environment::vapour::jet): 105 gives 95 at 5 cm, 47 at 15 cm.

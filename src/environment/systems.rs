@@ -17,7 +17,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// About what a strand takes (ns) in still air, and in wind.
+/// Cost per strand (ns) in still air, and in wind.
 const STILL: usize = 150;
 const WINDY: usize = 2_000;
 
@@ -106,7 +106,7 @@ fn apply_air(
     };
     // Wind also dries followers.
     let dries = winds.dry();
-    let is_spared = |sleep: &StrandSleep| sleep.is_asleep() || (sleep.is_follower() && !dries);
+    let is_skipped = |sleep: &StrandSleep| sleep.is_asleep() || (sleep.is_follower() && !dries);
     let ahead = |(_, strand, ..): &InAir<'_>| {
         let (_, velocities, _, spins) = strand.parts();
         prefetch(velocities);
@@ -116,7 +116,7 @@ fn apply_air(
     for_each_part(each, tables(&mut strands), Vec::new, |items, rows| {
         let mut airs = PerHair::default();
         for (of, sleep, strand, added_mass, changes, blown, received) in rows {
-            if !is_spared(sleep)
+            if !is_skipped(sleep)
                 && let Some(air) = airs.index(of.0, || air_of(of.0))
             {
                 items.push((air, strand, added_mass, changes, blown, received));
@@ -164,7 +164,7 @@ fn blow(
     }
     let wind = winds.gusty_wind(positions[0]);
     let zones = winds.zones_near(positions[0], length);
-    let taken_along = 1.0 - air.keep;
+    let relaxation = 1.0 - air.keep;
     let edges = positions.len().saturating_sub(1);
     // Wet hair is heavier: the same wind moves it less.
     let response = |i: usize| 1.0 / (1.0 + added_mass.mass.get(i).copied().unwrap_or(0.0));
@@ -176,7 +176,7 @@ fn blow(
         let e = i.min(edges - 1);
         let edge = positions[e + 1] - positions[e];
         let blown = winds.at(wind, zones, positions[i], edge);
-        let wind = blown.acceleration * (air.dt * response(i)) + blown.flow * taken_along;
+        let wind = blown.acceleration * (air.dt * response(i)) + blown.flow * relaxation;
         *velocity += if under.is_empty() { wind } else { wind * open(i) };
         // On wet hair the wind dries the water, and the bonds follow that.
         if is_wet {

@@ -1,7 +1,7 @@
 //! How fast water leaves into the air: vapour, wet bulbs, transfer, and the jet of a hair dryer.
 //!
-//! Measured facts behind it: Magnus' formula for the pressure of vapour; Churchill and Bernstein's
-//! law for a cylinder in a cross flow; a hand dryer's air at 15, 10 and 5 cm has 47, 61 and 95 °C and
+//! Sources: Magnus' formula for the pressure of vapour; Churchill and Bernstein's law for a
+//! cylinder in a cross flow; a hand dryer's air at 15, 10 and 5 cm has 47, 61 and 95 °C and
 //! dries a tress in 60, 30 and 15 s (Lee 2011).
 
 use super::HairClimate;
@@ -16,8 +16,8 @@ pub const WATER: f64 = 1000.0;
 const DIFFUSIVITY: f32 = 2.6e-5;
 /// Kinematic viscosity of air (m²/s).
 const VISCOSITY: f32 = 1.5e-5;
-/// Heat that a kilogram of vapour takes, over the heat that a cubic metre of air carries per kelvin
-/// and Lewis' factor between transfer of heat and of mass (K m³/kg).
+/// Latent heat of a kilogram of vapour, over the heat capacity of a cubic metre of air and Lewis'
+/// factor between transfer of heat and of mass (K m³/kg).
 const WET_BULB: f32 = 2.45e6 / 1085.0;
 
 /// Density of saturated vapour (kg/m³) at a temperature (°C).
@@ -81,8 +81,8 @@ pub fn jet(along: f32) -> f32 {
     JET_CORE / along.max(JET_CORE)
 }
 
-/// Evaporation's drive over temperature as a table, because solving for the wet bulb at every node is
-/// too slow. The resource holds the air of the [`HairClimate`].
+/// A table of evaporation's drive over temperature: solving for the wet bulb at every node is too
+/// slow. The resource holds the air of the [`HairClimate`].
 #[derive(Resource, Clone, Debug)]
 #[doc(hidden)]
 pub struct DryingAir {

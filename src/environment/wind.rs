@@ -2,15 +2,15 @@
 
 use glam::Vec3;
 
-/// The distance in equation 17's d + 1, which print gives in cm (m).
+/// The distance in equation 17's d + 1, which the paper gives in cm (m).
 pub const REFERENCE_DISTANCE: f32 = 0.01;
 
 /// Wind of a blower on an edge, as an acceleration (m/s²): equation 17,
 /// a = α sinθ / (d / 1 cm + 1) ŵ.
 ///
 /// `aim` is the unit direction ŵ from the nozzle, `edge` the edge that starts at `p`, θ the angle
-/// between both, d the distance of `p` from the axis. An edge along the wind feels nothing, and
-/// nothing blows behind the nozzle.
+/// between both, d the distance of `p` from the axis. An edge along the wind gets none, and nothing
+/// blows behind the nozzle.
 #[inline]
 pub fn wind(strength: f32, nozzle: Vec3, aim: Vec3, p: Vec3, edge: Vec3) -> Vec3 {
     let to = p - nozzle;

@@ -44,14 +44,13 @@ pub enum ZoneShape {
     Ellipsoid,
     /// A box along the entity's axes.
     Box,
-    /// All that is below the entity, which Y points out of: a lake, the sea, the air of a valley. It
-    /// has no size.
+    /// Everything below the entity's XZ plane: a lake, the sea, the air of a valley. It has no
+    /// size.
     HalfSpace,
 }
 
 impl ZoneShape {
-    /// How far outside a place is, less than nothing inside (m), in the frame of a shape of half this
-    /// size.
+    /// Signed distance of a point from the surface, negative inside (m), in the frame of the shape.
     pub(crate) fn distance(self, half_size: Vec3, place: Vec3) -> f32 {
         match self {
             Self::Box => {
@@ -68,7 +67,7 @@ impl ZoneShape {
         }
     }
 
-    /// How far from its centre a shape of half this size reaches (m).
+    /// Radius around its centre that encloses the shape (m).
     pub(crate) fn reach(self, half_size: Vec3) -> f32 {
         match self {
             Self::HalfSpace => f32::INFINITY,
@@ -78,7 +77,7 @@ impl ZoneShape {
 }
 
 setting! {
-    /// Air of its own: a draught, a fan, a blast, a room without wind, a fire.
+    /// A region with air of its own: a draught, a fan, a blast, a room without wind, a fire.
     ///
     /// Full inside its shape, decreasing outside, zero beyond the falloff. Effects of zones add up;
     /// `shelter` reduces the global [`HairWind`], not other zones. A [`Blower`](super::Blower) is the
@@ -136,7 +135,7 @@ impl WindZone {
         Self { shape: ZoneShape::Box, shelter: 1.0, ..default() }
     }
 
-    /// A campfire: air that is warmer the nearer, for two metres round, and rises.
+    /// A campfire: within two metres air rises and is the warmer the nearer.
     pub fn fire() -> Self {
         Self {
             half_size: Vec3::splat(0.15),
@@ -162,7 +161,7 @@ impl WindZone {
         t * t * (3.0 - 2.0 * t)
     }
 
-    /// How far from its centre it acts (m).
+    /// Radius around its centre within which it acts (m).
     pub(super) fn reach(&self) -> f32 {
         self.shape.reach(self.half_size) + self.falloff
     }

@@ -1,5 +1,4 @@
-//! What the tick does to a hair, substep by substep, as the kernel takes it. The tick stays where it is;
-//! what it says is written down.
+//! A record of each substep of the tick, as input of the kernel. The tick itself is unchanged.
 
 use super::{
     hair::GpuHair,
@@ -39,7 +38,7 @@ pub(super) fn write_journals(
 ) {
     let gravity = gravity.clamped().0;
     for (hair, frame, obstacles, mut journal, treatments, on) in &mut hairs {
-        // On its way home it rests.
+        // On its way back to the CPU it rests.
         if on.is_some_and(GpuHair::is_returning) {
             continue;
         }

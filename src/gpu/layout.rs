@@ -1,4 +1,4 @@
-//! Where a strand's numbers lie on the GPU.
+//! Memory layout of strands on the GPU.
 //!
 //! Strands of equal node count form blocks of [`LANES`]; within a block the same vector of neighbouring
 //! strands lies side by side, so that neighbouring threads read neighbouring words. Part `m` of `M` vectors
@@ -10,20 +10,20 @@ use crate::{
 };
 use bevy::math::{Quat, Vec3};
 
-/// How many strands stand side by side.
+/// Strands per block.
 pub const LANES: usize = 32;
 
-/// Vectors a node of each buffer.
+/// Vectors per node in each buffer.
 pub(super) const POSE: usize = 2;
 pub(super) const MOTION: usize = 2;
 pub(super) const REST: usize = 2;
 pub(super) const BONDS: usize = 4;
 pub(super) const SCRATCH: usize = 8;
 
-/// Bytes a node of all buffers of a hair together.
+/// Bytes per node in all buffers of a hair together.
 pub const BYTES_PER_NODE: usize = 16 * (2 * POSE + MOTION + REST + BONDS + SCRATCH);
 
-/// Where one strand lies.
+/// The slots of one strand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Place {
     first: u32,
@@ -31,7 +31,7 @@ struct Place {
     nodes: u32,
 }
 
-/// Where the strands of a hair lie.
+/// The slots of a hair's strands.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
     /// Of each block first node slot, nodes of a strand, strands, number of its first strand.
@@ -43,7 +43,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// For strands of so many nodes each.
+    /// For strands with these node counts.
     pub fn of(nodes: &[usize]) -> Self {
         let mut order: Vec<u32> = (0..nodes.len() as u32).collect();
         let count = |strand: &u32| nodes[*strand as usize];
@@ -168,7 +168,7 @@ pub struct Contents {
 }
 
 impl Contents {
-    /// Nothing yet, with room for all.
+    /// Zeros for all slots.
     pub fn new(layout: &Layout) -> Self {
         let room = |parts| vec![[0.0; 4]; layout.vectors(parts)];
         Self { pose: room(POSE), motion: room(MOTION), rest: room(REST), bonds: room(BONDS) }

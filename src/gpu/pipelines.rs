@@ -14,7 +14,7 @@ use bevy::render::{
 };
 use core::num::NonZeroU64;
 
-/// The shader of a substep, its parts one after the other.
+/// The shader source of a substep, concatenated from its files.
 pub const SOURCE: &str = concat!(
     include_str!("wgsl/math.wgsl"),
     include_str!("wgsl/strand.wgsl"),

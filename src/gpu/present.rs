@@ -1,4 +1,4 @@
-//! A hair's nodes into the buffer that drawing reads, on the GPU.
+//! Packs a hair's nodes into the buffer that drawing reads, on the GPU.
 
 use super::{pipelines::HairKernels, strands::GpuStrands};
 use bevy::render::{
@@ -9,8 +9,8 @@ use bevy::render::{
     renderer::{RenderDevice, RenderQueue},
 };
 
-/// Where a hair's nodes are drawn from: the buffer
-/// [`HairBuffers::nodes`](crate::render::HairBuffers::nodes), or one laid out as that.
+/// Writes a hair's nodes to [`HairBuffers::nodes`](crate::render::HairBuffers::nodes), or to a
+/// buffer of the same layout.
 #[derive(Debug)]
 pub struct DrawnNodes {
     frame: Buffer,
@@ -18,7 +18,7 @@ pub struct DrawnNodes {
 }
 
 impl DrawnNodes {
-    /// Draws into `nodes`, each strand from the node on that `firsts` says, strand by strand.
+    /// Writes into `nodes`; `firsts` holds the index of the first node for each strand.
     pub fn new(
         device: &RenderDevice,
         kernels: &HairKernels,

@@ -10,10 +10,10 @@ use bevy::{
 };
 use core::ops::Range;
 
-/// Obstacles that a record holds at most.
+/// The maximum number of obstacles in a record.
 pub const MOST_OBSTACLES: usize = 64;
 
-/// Blowers that a record holds at most.
+/// The maximum number of blowers in a record.
 pub const MOST_BLOWERS: usize = 4;
 
 /// Treatments of some joints that a record holds at most.
@@ -65,18 +65,19 @@ pub struct SubstepRecord {
     pub dt: f32,
     /// Gravity in the hair's frame (m/s²).
     pub gravity: Vec3,
-    /// What the frame's motion does to what rests in the world.
+    /// How points at rest in the world move in the hair's frame during the substep; `None` if the
+    /// frame rests.
     pub carry: Option<Isometry3d>,
-    /// The wind of the place in the hair's frame (m/s).
+    /// The global wind in the hair's frame (m/s).
     pub wind: Vec3,
-    /// Share of its velocity over the air's that hair keeps.
+    /// Share of its velocity relative to the air that hair keeps.
     pub keep: f32,
     /// Influences f_j of the bonds.
     pub influence: [f32; 4],
-    /// Δb asked of every joint, by kind.
+    /// Requested Δb of every joint, by kind.
     pub change: [f32; 4],
-    /// The share of its rate that is taken off it besides: a treatment that takes rates the share s of
-    /// the way to b asks for a change of s b and a share of s.
+    /// The share of its rate that is subtracted as well: a treatment that moves rates toward b by a
+    /// share s requests a change of s b and a share of s.
     pub share: [f32; 4],
     /// The same of some joints, [`MOST_TREATMENTS`] at most.
     pub treatments: Vec<TreatmentRecord>,
@@ -94,11 +95,11 @@ pub struct SubstepRecord {
     pub blowers: Vec<BlowerRecord>,
     /// Obstacles in the hair's frame, [`MOST_OBSTACLES`] at most.
     pub obstacles: Vec<Obstacle>,
-    /// Whether it is the tick's first, which notes where nodes were.
+    /// Whether it is the tick's first, which records the nodes' positions.
     pub notes_before: bool,
-    /// Whether the hair comes to rest first, as where it is put elsewhere.
+    /// Whether velocities are zeroed first, as after a teleport.
     pub rests: bool,
-    /// Whether rest shapes are made of the bonds first.
+    /// Whether rest shapes are computed from the bonds first.
     pub shapes: bool,
 }
 
@@ -179,7 +180,7 @@ impl Words<'_> {
     }
 
     fn obstacle(&mut self, Obstacle { solid, motion, friction }: &Obstacle) {
-        // What the shaders lack is nowhere near any hair; the journal says so.
+        // Unsupported solids are placed out of reach; the journal reports them.
         const FAR: Vec3 = Vec3::splat(1e6);
         let (kind, a, b, radius, half_height) = match *solid {
             Solid::Placed(_) => (1, FAR, Vec3::ZERO, 0.0, 0.0),

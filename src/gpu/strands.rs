@@ -17,12 +17,12 @@ use core::num::NonZeroU64;
 /// Bytes of a report.
 pub(super) const REPORT_BYTES: usize = 64;
 
-/// How strands fared in the substeps since the last report was read.
+/// Counts of faulty strands in the substeps since the last report was read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GpuReport {
-    /// Strands that were put back to where a substep began, because it left the finite numbers.
+    /// Strands that became non-finite in a substep and were put back to its start.
     pub put_back: u32,
-    /// Strands that were rebuilt from their bonds, because they began it so.
+    /// Strands that were non-finite at the start of a substep and were rebuilt from their bonds.
     pub rebuilt: u32,
     /// One of them.
     pub first: Option<usize>,
@@ -32,7 +32,7 @@ pub struct GpuReport {
 #[derive(Debug)]
 pub struct GpuStrands {
     layout: Layout,
-    /// In which of the two the present pose is.
+    /// The index of the buffer that holds the present pose.
     pub(super) present: usize,
     pub(super) blocks: Buffer,
     pub(super) poses: [Buffer; 2],
@@ -48,7 +48,7 @@ pub struct GpuStrands {
 }
 
 impl GpuStrands {
-    /// Hands strands over. Each must have two nodes or more, and a bond for each joint.
+    /// Uploads strands. Each must have two nodes or more, and a bond for each joint.
     pub fn new(device: &RenderDevice, kernels: &HairKernels, strands: &[StrandView<'_>]) -> Self {
         let nodes: Vec<usize> = strands.iter().map(|view| view.positions.len()).collect();
         let layout = Layout::of(&nodes);
@@ -119,7 +119,7 @@ impl GpuStrands {
         }
     }
 
-    /// Where strands lie.
+    /// The memory layout of the strands.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
@@ -230,8 +230,8 @@ impl GpuStrands {
         queue.submit([encoder.finish()]);
     }
 
-    /// Waits for the device and reads all strands back; `None` where it does not answer, as when it is
-    /// lost.
+    /// Waits for the device and reads all strands back; `None` if it does not answer, as after a
+    /// device loss.
     pub fn read(&self, device: &RenderDevice, queue: &RenderQueue) -> Option<Vec<StrandState>> {
         let contents = self.read_contents(device, queue)?;
         Some((0..self.layout.strands()).map(|strand| contents.get(&self.layout, strand)).collect())
@@ -250,7 +250,7 @@ impl GpuStrands {
         Some(Contents { pose, motion, rest: Vec::new(), bonds })
     }
 
-    /// Waits for the device and reads how strands fared since the last report.
+    /// Waits for the device, and reads and resets the report.
     pub fn take_report(&self, device: &RenderDevice, queue: &RenderQueue) -> Option<GpuReport> {
         let words = read_back(device, queue, &self.report, 1)?[0].map(f32::to_bits);
         queue.write_buffer(&self.report, 0, &[0; 16]);
@@ -281,7 +281,7 @@ fn read_back(
     queue.submit([encoder.finish()]);
     let (send, receive) = std::sync::mpsc::channel();
     read_mapped(device, &staging, move |bytes| {
-        // Nobody listens any more if the device did not answer in time.
+        // The receiver is gone if the device did not answer in time.
         let _ = send.send(bytes);
     });
     device.poll(PollType::wait_indefinitely()).ok()?;

@@ -14,7 +14,7 @@ const NUMBERS: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14,
 #[derive(Clone, Debug, Default)]
 pub struct BallGrid {
     grid: UniformGrid,
-    /// As they came, each a centre and a radius.
+    /// In the order given, each a centre and a radius.
     balls: Vec<(Vec3, f32)>,
     widest: f32,
     /// In the grid's order, padded with balls at NaN.

@@ -13,6 +13,7 @@ use glam::Vec3;
 /// let two: Vec<_> = tree.nearest::<2>(Vec3::X * 2.9).map(|(i, _)| i).collect();
 /// assert_eq!(two, [3, 2]);
 /// ```
+#[doc(hidden)]
 #[derive(Clone, Debug, Default)]
 pub struct KdTree {
     /// A subtree's root in its middle, the two halves on either side.
@@ -56,15 +57,15 @@ impl KdTree {
         (found[0].1, found[0].0)
     }
 
-    /// The same among those that `is_meant` accepts by index and squared distance.
+    /// The same among those that `accepts` allows by index and squared distance.
     pub fn nearest_of<const N: usize, F: Fn(u32, f32) -> bool>(
         &self,
         point: Vec3,
-        is_meant: F,
+        accepts: F,
     ) -> impl Iterator<Item = (u32, f32)> + use<N, F> {
         let mut found = [(f32::INFINITY, u32::MAX); N];
         if point.is_finite() {
-            search(&self.nodes, point, &is_meant, &mut found);
+            search(&self.nodes, point, &accepts, &mut found);
         }
         found.into_iter().filter(|f| f.1 != u32::MAX).map(|(square, item)| (item, square))
     }
@@ -73,10 +74,10 @@ impl KdTree {
 fn search(
     nodes: &[Node],
     point: Vec3,
-    is_meant: &impl Fn(u32, f32) -> bool,
+    accepts: &impl Fn(u32, f32) -> bool,
     found: &mut [(f32, u32)],
 ) {
-    search_box(nodes, point, Vec3::ZERO, is_meant, found);
+    search_box(nodes, point, Vec3::ZERO, accepts, found);
 }
 
 /// Searches the points in a box that `point` is outside of by `off` along each axis.
@@ -84,25 +85,25 @@ fn search_box(
     nodes: &[Node],
     point: Vec3,
     off: Vec3,
-    is_meant: &impl Fn(u32, f32) -> bool,
+    accepts: &impl Fn(u32, f32) -> bool,
     found: &mut [(f32, u32)],
 ) {
     let middle = nodes.len() / 2;
     let Some(node) = nodes.get(middle) else { return };
     let square = node.place.distance_squared(point);
-    if is_meant(node.item, square) {
+    if accepts(node.item, square) {
         insert(found, (square, node.item));
     }
     let beyond = point[node.axis] - node.place[node.axis];
     let (near, far) = (&nodes[..middle], &nodes[middle + 1..]);
     let (near, far) = if beyond < 0.0 { (near, far) } else { (far, near) };
-    search_box(near, point, off, is_meant, found);
+    search_box(near, point, off, accepts, found);
     let mut off = off;
     off[node.axis] = beyond;
     // Rounding must not prune a point as far as the last one found.
     const SLACK: f32 = 1.0 - 1e-5;
     if found.last().is_some_and(|last| off.length_squared() * SLACK <= last.0) {
-        search_box(far, point, off, is_meant, found);
+        search_box(far, point, off, accepts, found);
     }
 }
 
@@ -117,11 +118,11 @@ fn build(nodes: &mut [Node]) {
     build(&mut after[1..]);
 }
 
-/// Puts one into a list that is sorted, and lets the last fall out.
+/// Inserts an item into a sorted list of fixed length; the last one is dropped.
 fn insert(found: &mut [(f32, u32)], one: (f32, u32)) {
     let is_before =
         |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).is_lt();
-    // Most are farther than all that have been found.
+    // Most are farther than all found so far.
     if found.last().is_some_and(|last| is_before(&one, last)) {
         let at = found.partition_point(|known| is_before(known, &one));
         found[at..].rotate_right(1);

@@ -26,9 +26,9 @@ use glam::{IVec3, Vec3};
 const FAR: Vec3 = Vec3::splat(1e9);
 
 /// The fewest buckets. With few buckets, queries in empty space would collide with items.
-const FEWEST: usize = 8192;
+const MIN_BUCKETS: usize = 8192;
 
-/// The most cells of a row that [`UniformGrid::rows_in_box`] looks at.
+/// The maximum number of cells in a row of [`UniformGrid::rows_in_box`].
 pub(crate) const WIDEST: usize = 8;
 
 /// Points sorted by cell: equations 4 and 5 of \[W\].
@@ -73,7 +73,7 @@ impl UniformGrid {
     }
 
     fn sort(&mut self) {
-        let buckets = self.unsorted.len().next_power_of_two().max(FEWEST);
+        let buckets = self.unsorted.len().next_power_of_two().max(MIN_BUCKETS);
         self.starts.clear();
         self.starts.resize(buckets + 1, 0);
         let mask = buckets - 1;
@@ -194,9 +194,9 @@ impl UniformGrid {
 /// A contiguous range of items in a grid's order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run {
-    /// The row of cells whose items are meant; `None` for all.
+    /// The row of cells that items have to be in; `None` for all.
     pub row: Option<[i32; 2]>,
-    /// The first place, and the one behind the last.
+    /// The first place, and one past the last.
     pub places: [u32; 2],
 }
 

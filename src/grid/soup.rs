@@ -1,11 +1,11 @@
-//! Triangles without order: which is nearest, and how often they go around a point.
+//! Triangle soups: nearest triangle and generalized winding number.
 
 use glam::Vec3;
 
 /// Triangles in a tree of boxes.
 pub(crate) struct TriangleSoup {
     triangles: Vec<[Vec3; 3]>,
-    /// Which of the caller's each of them is.
+    /// The caller's index of each triangle.
     numbers: Vec<u32>,
     nodes: Vec<Node>,
 }
@@ -13,11 +13,11 @@ pub(crate) struct TriangleSoup {
 struct Node {
     low: Vec3,
     high: Vec3,
-    /// Of a leaf its first triangle, else the second of its parts; the first comes next.
+    /// Of a leaf its first triangle, else its second child; the first child is the next node.
     first: u32,
-    /// Triangles of a leaf, else 0.
+    /// Number of triangles of a leaf, else 0.
     count: u32,
-    /// The sum of the triangles' areas along their normals, and their middle, weighted so.
+    /// The sum of the triangles' area vectors, and their area-weighted centre.
     area: Vec3,
     middle: Vec3,
     /// Around the middle.
@@ -25,7 +25,7 @@ struct Node {
 }
 
 const LEAF: usize = 4;
-/// From so many radii away triangles count as one.
+/// Beyond this many radii a node's triangles are approximated as one.
 const FAR: f32 = 2.0;
 
 impl TriangleSoup {
@@ -40,8 +40,8 @@ impl TriangleSoup {
         Self { triangles, numbers, nodes }
     }
 
-    /// The number of the triangle that is nearest to a point, and its squared distance; what is given
-    /// where none is nearer.
+    /// The index of the triangle nearest to a point, and its squared distance; `known` where none
+    /// is nearer.
     pub(crate) fn nearer_than(&self, p: Vec3, known: (u32, f32)) -> (u32, f32) {
         let mut best = known;
         let mut todo = [0u32; 64];
@@ -64,7 +64,7 @@ impl TriangleSoup {
             }
             let (a, b) = (at + 1, node.first);
             let nearer = self.nodes[a as usize].squared(p) <= self.nodes[b as usize].squared(p);
-            // The nearer part last, so that it is looked at first.
+            // The nearer child last, so that it is visited first.
             todo[count] = if nearer { b } else { a };
             todo[count + 1] = if nearer { a } else { b };
             count += 2;
@@ -72,9 +72,9 @@ impl TriangleSoup {
         best
     }
 
-    /// How often the triangles go around a point: 1 inside of a closed surface whose normals look out,
-    /// 0 outside of it, something between in a hole (Jacobson, Kavan, Sorkine-Hornung 2013); far
-    /// triangles together (Barill et al. 2018).
+    /// The generalized winding number of a point: 1 inside a closed surface with outward normals, 0
+    /// outside, between them in a hole (Jacobson, Kavan, Sorkine-Hornung 2013); far triangles are
+    /// approximated together (Barill et al. 2018).
     pub(crate) fn winding(&self, p: Vec3) -> f32 {
         let mut sum = 0.0;
         let mut todo = [0u32; 64];
@@ -83,10 +83,10 @@ impl TriangleSoup {
             count -= 1;
             let at = todo[count];
             let node = &self.nodes[at as usize];
-            let way = node.middle - p;
-            let squared = way.length_squared();
+            let offset = node.middle - p;
+            let squared = offset.length_squared();
             if squared > (FAR * node.radius).powi(2) {
-                sum += node.area.dot(way) / (squared * squared.sqrt());
+                sum += node.area.dot(offset) / (squared * squared.sqrt());
             } else if node.count > 0 {
                 let own = node.first as usize..(node.first + node.count) as usize;
                 sum += self.triangles[own].iter().map(|t| solid_angle(p, t)).sum::<f32>();
@@ -189,8 +189,8 @@ mod tests {
     fn ball(rounds: usize) -> Vec<[Vec3; 3]> {
         let mut all = Vec::new();
         for (x, y, z) in (0..8).map(|k| (k & 1 != 0, k & 2 != 0, k & 4 != 0)) {
-            let way = |positive: bool, axis: Vec3| if positive { axis } else { -axis };
-            let (a, b, c) = (way(x, Vec3::X), way(y, Vec3::Y), way(z, Vec3::Z));
+            let offset = |positive: bool, axis: Vec3| if positive { axis } else { -axis };
+            let (a, b, c) = (offset(x, Vec3::X), offset(y, Vec3::Y), offset(z, Vec3::Z));
             all.push(if a.cross(b).dot(c) > 0.0 { [a, b, c] } else { [b, a, c] });
         }
         for _ in 0..rounds {
@@ -226,10 +226,10 @@ mod tests {
         }
 
         #[test]
-        fn a_closed_surface_goes_around_what_is_inside_once(way in point(1.0), far in 0.0f32..2.0) {
+        fn a_closed_surface_goes_around_what_is_inside_once(offset in point(1.0), far in 0.0f32..2.0) {
             let soup = TriangleSoup::new(ball(4));
             let far = if (0.98..1.02).contains(&far) { 0.98 } else { far };
-            let p = way.normalize_or(Vec3::X) * far;
+            let p = offset.normalize_or(Vec3::X) * far;
             let expected = if far < 1.0 { 1.0 } else { 0.0 };
             prop_assert!((soup.winding(p) - expected).abs() < 0.05, "{} at {far}", soup.winding(p));
         }
@@ -243,8 +243,8 @@ mod tests {
         let cap: Vec<[Vec3; 3]> = ball(4).iter().map(lift).filter(|t| t[0].y > -1.8).collect();
         let soup = TriangleSoup::new(cap.iter().copied());
         for (i, far) in [0.5, 1.5, 3.0, 6.0, 20.0].into_iter().enumerate() {
-            let way = Vec3::new(0.3, [1.0, -1.0][i % 2], 0.4 * i as f32).normalize();
-            let p = Vec3::new(3.0, -2.0, 5.0) + way * far;
+            let offset = Vec3::new(0.3, [1.0, -1.0][i % 2], 0.4 * i as f32).normalize();
+            let p = Vec3::new(3.0, -2.0, 5.0) + offset * far;
             let each = cap.iter().map(|t| solid_angle(p, t)).sum::<f32>();
             let each = each / (4.0 * core::f32::consts::PI);
             let apart = (soup.winding(p) - each).abs();

@@ -42,7 +42,7 @@ pub enum GroomFileError {
     NonFinite {
         /// Where it is.
         offset: u64,
-        /// To what it belongs.
+        /// What it belongs to.
         what: &'static str,
         /// The number.
         found: f32,
@@ -131,7 +131,7 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// The same widths, if they can be diameters; they begin at `offset`.
+/// Checks that widths, which begin at `offset`, are not negative.
 pub(super) fn widths(offset: u64, widths: Vec<f32>) -> Result<Vec<f32>, GroomFileError> {
     match (0..).zip(&widths).find(|(_, width)| **width < 0.0) {
         Some((i, width)) => {

@@ -61,7 +61,7 @@ pub enum UpAxis {
     /// +Y, as Bevy has it.
     #[default]
     Y,
-    /// +Z, which becomes +Y; X stays. What faces −Y faces +Z then. Blender's axes.
+    /// +Z, which becomes +Y; X stays, and −Y becomes +Z. Blender's axes.
     Z,
     /// −X.
     NegX,

@@ -132,10 +132,10 @@ impl Groom {
         }
         let lengths: Vec<f32> = self.strands().map(|s| s.length()).collect();
         LONGEST.check(lengths.iter().copied().fold(0.0, f32::max))?;
-        let at_least = |least: f32| (0..self.len()).filter(|i| lengths[*i] >= least).collect();
-        let mut long: Vec<usize> = at_least(guides.segment);
+        let no_shorter = |least: f32| (0..self.len()).filter(|i| lengths[*i] >= least).collect();
+        let mut long: Vec<usize> = no_shorter(guides.segment);
         if long.is_empty() {
-            long = at_least(FINEST);
+            long = no_shorter(FINEST);
         }
         let chosen = self.guides_among(long, guides.count);
         let coarse = self.picked(chosen.iter().copied());
@@ -182,7 +182,7 @@ pub(crate) struct GrownStrands {
 /// The strands that a hair has from its groom.
 #[derive(Component, Debug, Default)]
 pub(super) struct Grown {
-    /// The groom that was used, or has failed.
+    /// The groom that was used, or failed.
     from: Option<GroomedHair>,
     strands: Vec<Entity>,
     gave_look: bool,

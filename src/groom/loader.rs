@@ -20,12 +20,12 @@ pub enum GroomLoadError {
     /// A buffer of a glTF file that is a file of its own.
     #[error("the buffer {uri} cannot be read: {source}; put it next to the .gltf")]
     Buffer {
-        /// As the glTF names it.
+        /// Its URI in the glTF.
         uri: String,
         /// Why not.
         source: Box<ReadAssetBytesError>,
     },
-    /// What it holds is none of the formats, or broken.
+    /// Its contents are in none of the formats, or broken.
     #[error(transparent)]
     File(#[from] GroomFileError),
 }
@@ -59,7 +59,7 @@ impl AssetLoader for GroomLoader {
             for uri in uris {
                 let failed =
                     |source| GroomLoadError::Buffer { uri: uri.clone(), source: Box::new(source) };
-                // Escapes that are no UTF-8 are taken literally.
+                // Escapes that are not UTF-8 are taken literally.
                 let name = percent_decode_str(&uri).decode_utf8().unwrap_or(uri.as_str().into());
                 let path = context.path().resolve_embed_str(&name);
                 let path = path.map_err(|_| {
@@ -90,8 +90,8 @@ impl AssetLoader for GroomLoader {
 }
 
 impl Groom {
-    /// A groom from the bytes of a `.hair`, `.tfx`, GLB or self-contained glTF file, in metres and Y
-    /// up as the settings say, and what was left out.
+    /// A groom from the bytes of a `.hair`, `.tfx`, GLB or self-contained glTF file, in metres and
+    /// Y up according to the settings, and what was left out.
     ///
     /// ```
     /// # use bevy_keratin::groom::*; use bevy::prelude::*;
@@ -153,7 +153,7 @@ impl Plugin for GroomPlugin {
         add_loader(app);
     }
 
-    /// Here again for an asset server that was added later.
+    /// Again, for an asset server that was added later.
     fn finish(&self, app: &mut App) {
         add_loader(app);
     }

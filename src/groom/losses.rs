@@ -16,7 +16,7 @@ pub struct GroomLosses {
     pub merged_nodes: usize,
     /// Nodes besides the root that the file marks as fixed; only roots are held.
     pub freed_nodes: usize,
-    /// Arrays of the file that a groom has no place for.
+    /// Arrays of the file that a groom cannot hold.
     pub unread_arrays: usize,
     /// Primitives of a glTF file that are no lines.
     pub skipped_primitives: usize,
@@ -30,7 +30,7 @@ impl GroomLosses {
     fn counts(&self) -> [(usize, &'static str); 8] {
         [
             (self.short_strands, "strands without length left out"),
-            (self.thinned_strands, "strands left out as the settings ask"),
+            (self.thinned_strands, "strands left out by the settings"),
             (self.merged_nodes, "nodes merged with the one before"),
             (self.freed_nodes, "fixed nodes besides roots set free"),
             (self.unread_arrays, "arrays not read"),

@@ -58,7 +58,7 @@ pub struct GroomStrand<'a> {
 #[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub enum GroomError {
-    /// A strand that is no line.
+    /// A strand with fewer than two nodes.
     #[error("strand {strand} has {found} nodes, expected 2 or more: leave it out")]
     TooFewNodes {
         /// Its index.
@@ -90,7 +90,7 @@ pub enum GroomError {
         /// The allowed values.
         expected: &'static str,
     },
-    /// An array whose length does not go with the nodes or strands.
+    /// An array whose length does not match the nodes or strands.
     #[error("{what} has {found} elements, expected {expected} or none")]
     Length {
         /// Which array.
@@ -116,11 +116,11 @@ pub enum GroomError {
     },
     /// No strand at all.
     #[error(
-        "the groom has no strands, expected 1 or more: see whether all were left out as \
+        "the groom has no strands, expected 1 or more: check whether all were left out as \
          short, or its scale is too small"
     )]
     Empty,
-    /// Strands that do not follow each other in the list of nodes.
+    /// Ends of strands that are not in ascending order.
     #[error("strand {strand} ends at node {found}, expected {expected}: make it by from_polylines")]
     Ends {
         /// Its index.

@@ -14,7 +14,7 @@ impl Groom {
     /// The groom `factor` times as large, widths included.
     ///
     /// # Errors
-    /// When the factor is not between 1e-9 and 1e9, or a node leaves the finite numbers.
+    /// When the factor is not between 1e-9 and 1e9, or a node becomes non-finite.
     pub fn scaled(mut self, factor: f32) -> Result<Self, GroomError> {
         SCALE.check(factor)?;
         self.points.iter_mut().for_each(|p| *p *= factor);
@@ -28,19 +28,19 @@ impl Groom {
         self
     }
 
-    /// The groom moved by `way` (m).
+    /// The groom moved by `offset` (m).
     ///
     /// # Errors
-    /// When a node leaves the finite numbers.
-    pub fn moved(mut self, way: Vec3) -> Result<Self, GroomError> {
-        self.points.iter_mut().for_each(|p| *p += way);
+    /// When a node becomes non-finite.
+    pub fn moved(mut self, offset: Vec3) -> Result<Self, GroomError> {
+        self.points.iter_mut().for_each(|p| *p += offset);
         self.checked()
     }
 
     /// The groom in another space; widths scale with it.
     ///
     /// # Errors
-    /// When a node leaves the finite numbers.
+    /// When a node becomes non-finite.
     pub(crate) fn mapped(mut self, space: &Affine3A) -> Result<Self, GroomError> {
         let scale = space.matrix3.determinant().abs().cbrt();
         self.points.iter_mut().for_each(|p| *p = space.transform_point3(*p));
@@ -48,18 +48,18 @@ impl Groom {
         self.checked()
     }
 
-    /// Every strand with `nodes` nodes at even distances along it (2…4096). Root and tip stay
+    /// Every strand with `nodes` nodes evenly spaced along it (2…4096). Root and tip stay
     /// exactly where they are; widths and colours are blended. Corners between nodes are cut, so
     /// strands get shorter the fewer nodes they have.
     ///
     /// # Errors
-    /// When `nodes` is out of range, or there would be more than 32 bits count.
+    /// When `nodes` is out of range, or there would be more nodes than 32 bits can count.
     pub fn resampled(&self, nodes: usize) -> Result<Self, GroomError> {
         NODES.check(nodes)?;
         self.resampled_by(|_| nodes)
     }
 
-    /// The same with a number of nodes for each strand, of its length (m).
+    /// The same with a number of nodes for each strand that depends on its length (m).
     pub(super) fn resampled_by(&self, nodes: impl Fn(f32) -> usize) -> Result<Self, GroomError> {
         let mut made = self.emptied();
         let mut along = Vec::new();
@@ -76,7 +76,7 @@ impl Groom {
     }
 
     /// Every strand without nodes nearer than `shortest` (m) to the one before; the tip stays.
-    /// Strands of which nothing is left are left out. Also counts what that was.
+    /// Strands without any segment left are removed. Also returns the counts.
     ///
     /// # Errors
     /// When `shortest` is negative or not finite.
@@ -165,7 +165,7 @@ impl Groom {
         start..self.ends[strand] as usize
     }
 
-    /// No strands, for as many again.
+    /// An empty groom with capacity for as many strands.
     fn emptied(&self) -> Self {
         Self { ends: Vec::with_capacity(self.len()), ..default() }
     }
@@ -204,7 +204,7 @@ fn arc_lengths(points: &[Vec3], along: &mut Vec<f64>) -> f64 {
     length
 }
 
-/// The segment, and the share of it, that is so far along.
+/// The segment at a distance along a strand, and the parameter within it.
 fn place(along: &[f64], distance: f64) -> (usize, f32) {
     let after = along.partition_point(|a| *a <= distance).clamp(1, along.len() - 1);
     let (from, to) = (along[after - 1], along[after]);

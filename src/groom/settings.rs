@@ -1,4 +1,4 @@
-//! How a file's groom becomes one in metres with Y up.
+//! Import settings: unit, axes and thinning.
 
 use super::{Groom, GroomError, GroomFormat, GroomLosses, UpAxis};
 use crate::setting::{Ranged, setting};
@@ -45,12 +45,12 @@ setting! {
         /// Segments shorter than this are merged and strands shorter than this left out. Strands of
         /// the simulation need more than 1e-6.
         pub shortest_segment: f32 = 1e-5, "m" in SHORTEST_SEGMENT: 0.0..=1e6, safe 2e-6..=1e-3,
-            "1e-5 takes away what has no length";
-        /// Resamples every strand to so many nodes, evenly along it; `None` is as in the file.
+            "1e-5 removes what has no length";
+        /// Resamples every strand to this many nodes, evenly spaced; `None` is as in the file.
         pub nodes: Option<usize> = None, in NODES: 2.0..=4096.0, "16 suit hair of a head";
         /// Keeps every n-th strand; 1 keeps all.
         pub keep_every: usize = 1, in KEEP_EVERY: 1.0..=1e9, "1 keeps all";
-        /// Keeps at most so many strands, taken evenly from their order; `None` keeps all.
+        /// Keeps at most this many strands, an evenly spaced subset; `None` keeps all.
         pub limit: Option<usize> = None, in LIMIT: 1.0..=1e9, "None keeps all";
     }
 }
@@ -60,7 +60,7 @@ impl GroomSettings {
     /// out: fewer strands first, then scale and axes, then merging, then resampling.
     ///
     /// # Errors
-    /// When a setting is out of range, scaled nodes leave the finite numbers, or no strand is left.
+    /// When a setting is out of range, scaled nodes become non-finite, or no strand is left.
     pub fn apply(
         &self,
         groom: Groom,

@@ -1,8 +1,8 @@
 //! TressFX files (`.tfx`), versions 3 and 4.
 //!
-//! A header, then arrays where its offsets say; 0 says that an array is absent. All strands have the
-//! same number of nodes. All little-endian. The versions differ in where the header keeps what, and
-//! in that version 4 has a fourth number with each position: 0 for a node that is fixed.
+//! A header, then arrays at the offsets given there; 0 means that an array is absent. All strands
+//! have the same number of nodes. All little-endian. The versions differ in the layout of the
+//! header, and version 4 has a fourth number with each position: 0 for a fixed node.
 //!
 //! | | version 3 | version 4 |
 //! |---|---|---|
@@ -61,7 +61,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
         v if (3.0..4.0).contains(&v) => V3,
         v if (4.0..5.0).contains(&v) => V4,
         _ => {
-            let hint = "see that this is a .tfx file, of TressFX 3 or 4";
+            let hint = "check that this is a .tfx file of TressFX 3 or 4";
             return value(0, "the version", version, "3.x or 4.x", hint);
         }
     };
@@ -118,7 +118,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
         Some(offset) => bytes.groups(offset, nodes, "a colour", colour)?,
         None => Vec::new(),
     };
-    // A groom has no place for these, but a file that is cut short among them is still broken.
+    // A groom cannot hold these, but a file that is truncated there is broken all the same.
     if let Some(offset) = array(layout.vertex_uvs)? {
         bytes.array(offset, nodes, 8, "UVs of nodes")?;
         losses.unread_arrays += 1;

@@ -1,9 +1,9 @@
 //! Cem Yuksel's HAIR files (`.hair`), read and written.
 //!
-//! A header of 128 bytes, then up to five arrays in a fixed order, present as the header's bits say:
-//! segments per strand (u16), points (3 × f32), thickness (f32), transparency (f32), colours
-//! (3 × f32). All little-endian, points root first. The format knows neither unit nor axes: see
-//! [`GroomSettings`](super::GroomSettings).
+//! A header of 128 bytes, then up to five arrays in a fixed order, present according to the
+//! header's bits: segments per strand (u16), points (3 × f32), thickness (f32), transparency (f32),
+//! colours (3 × f32). All little-endian, points root first. The format specifies neither unit nor
+//! axes: see [`GroomSettings`](super::GroomSettings).
 
 use super::{
     Groom, GroomError, GroomFileError, GroomLosses,
@@ -46,7 +46,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     let magic = bytes.array(0, 4, 1, "the mark HAIR")?;
     if magic != MAGIC {
         let found = magic.escape_ascii();
-        return value(0, "the mark", found, "HAIR", "see that this is a .hair file");
+        return value(0, "the mark", found, "HAIR", "check that this is a .hair file");
     }
     bytes.array(0, HEADER, 1, "header")?;
     let strands = u64::from(bytes.u32(4, "strand count")?);
@@ -131,14 +131,14 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
 
 const EXPORT_AGAIN: &str = "export the file again";
 
-/// The bytes of a `.hair` file of this groom, in metres. What is the same for all strands or nodes
-/// goes into the header; places on the scalp's texture have no room in the format.
+/// The bytes of a `.hair` file of this groom, in metres. Values equal for all strands or nodes go
+/// into the header; the format has no UVs.
 ///
 /// Reading what was written gives the same groom, and writing that the same bytes.
 ///
 /// # Errors
 /// When the groom is empty, a strand has more than 65,535 segments, there are more strands than 32
-/// bits count, or reflection has put numbers into it that [`read`] would refuse.
+/// bits count, or it holds numbers, set through reflection, that [`read`] would refuse.
 pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
     groom.check()?;
     if groom.is_empty() {

@@ -1,4 +1,4 @@
-//! A number of each lane in memory, and how lanes are read and written.
+//! Lanes in memory: reading and writing.
 
 use super::{
     algebra::{Quaternion, V3},

@@ -1,5 +1,5 @@
-//! Numbers side by side: the scalar type of all kernels, vectors and quaternions over it, and strands'
-//! arrays into lanes and back.
+//! SIMD lanes: the scalar type of all kernels, vectors and quaternions over it, and transposing
+//! strands' arrays into lanes and back.
 //!
 //! Mathematics is written once, generic over [`Real`], and runs on one `f64` as on sixteen lanes.
 

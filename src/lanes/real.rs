@@ -1,7 +1,7 @@
 //! One scalar type for every width: `f32`, `f64`, and eight or sixteen `f32` lanes.
 //!
 //! The constraint mathematics is written once, generic over [`Real`]. `f64` serves the golden
-//! vectors, `f32` is the scalar twin that benches compare against, and [`f32x16`] is what the
+//! vectors, `f32` is the scalar version that benches compare against, and [`f32x16`] is what the
 //! tick runs: sixteen strands side by side, on whichever instruction set the machine has. Contact
 //! between strands takes [`f32x8`], because its lists are short, and so do bonds, of which a strand's
 //! own joints lie side by side.
@@ -12,7 +12,7 @@ use fearless_simd::{Simd, f32x8, f32x16, mask32x8, mask32x16, prelude::*};
 /// How many strands one block solves side by side.
 pub const LANES: usize = 16;
 
-/// A number, or several side by side, that mathematics can be written in.
+/// A number, or several lanes of numbers.
 pub trait Real:
     Copy
     + Add<Output = Self>
@@ -39,11 +39,11 @@ pub trait Real:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// The largest integer that is not above.
     fn floor(self) -> Self;
-    /// Lane by lane the values of a table at `self`, an integer, and so many places after it. Zero where
-    /// the table has none.
+    /// Per lane, the values of a table at index `self` plus each offset in `after`. Zero out of
+    /// range.
     fn gather<const N: usize>(self, table: &[f32], after: [usize; N]) -> [Self; N];
-    /// Runs `work` in a function of its own, compiled for the instruction set of these lanes: what is
-    /// rarely needed does not crowd the registers of those who call it.
+    /// Runs `work` out of line, compiled for the instruction set of these lanes: rarely needed work
+    /// does not add register pressure to its caller.
     fn apart<T>(self, work: impl FnOnce() -> T) -> T;
 }
 

@@ -43,16 +43,16 @@ pub struct HairEstimate {
     pub present: f32,
 }
 
-/// Time of a simulated segment in a substep (ms). The presets, walking, with contact and a body to lie
-/// on, took 115 to 240 ns by `cargo bench --bench game`, the median of seven 170.
+/// Time of a simulated segment in a substep (ms). The presets, walking, with contact and a body,
+/// took 115 to 240 ns in `cargo bench --bench game`; the median of seven is 170.
 const SEGMENT: f32 = 170e-6;
 
-/// Time of a follower's segment, each tick (ms): the same bench's twenty hairs in the background, less
-/// what is simulated of them.
+/// Time of a follower's segment, each tick (ms): from the same bench's twenty hairs in the
+/// background, without their simulated part.
 const FOLLOWER_SEGMENT: f32 = 90e-6;
 
-/// Time of any segment, each tick, at whatever level (ms): the same bench's hundred hairs that are frozen
-/// took 13 ns, of which some is their [`HAIR`].
+/// Time of any segment, each tick, at every level (ms): the same bench's hundred frozen hairs took
+/// 13 ns, which includes their [`HAIR`].
 const KEPT_SEGMENT: f32 = 10e-6;
 
 /// Fixed time of a hair, each tick (ms).
@@ -60,7 +60,7 @@ const HAIR: f32 = 0.01;
 
 /// Factor by which importance grows with each level that the budget has made a hair coarser: about the
 /// ratio of successive levels' limits.
-const RELUCTANCE: f32 = 3.0;
+const COARSENESS_WEIGHT: f32 = 3.0;
 
 /// A hair's input to the budget.
 #[derive(Clone, Debug)]
@@ -73,7 +73,7 @@ pub(super) struct Candidate {
     pub costs: Vec<f32>,
 }
 
-/// Time of a hair of so many segments at each of its levels (ms a tick).
+/// Time of a hair of `segments` segments at each of its levels (ms per tick).
 pub(super) fn costs(levels: &[LodLevel], segments: usize, substeps: u32) -> Vec<f32> {
     let full = LodLevel { substeps: 2, strands: 1.0, ..default() };
     core::iter::once(&full)
@@ -93,11 +93,12 @@ pub(super) fn fit(hairs: &[Candidate], budget: f32) -> Vec<usize> {
     let mut levels: Vec<usize> = hairs.iter().map(|h| h.wanted).collect();
     let mut left: f32 = budget - hairs.iter().map(|h| h.costs[h.wanted]).sum::<f32>();
     while left < 0.0 {
-        let reluctance =
-            |i: usize| hairs[i].importance * RELUCTANCE.powi((levels[i] - hairs[i].wanted) as i32);
+        let weighted = |i: usize| {
+            hairs[i].importance * COARSENESS_WEIGHT.powi((levels[i] - hairs[i].wanted) as i32)
+        };
         let coarser = (0..hairs.len())
             .filter(|i| levels[*i] + 1 < hairs[*i].costs.len())
-            .min_by(|a, b| reluctance(*a).total_cmp(&reluctance(*b)));
+            .min_by(|a, b| weighted(*a).total_cmp(&weighted(*b)));
         let Some(i) = coarser else { break };
         left += hairs[i].costs[levels[i]] - hairs[i].costs[levels[i] + 1];
         levels[i] += 1;

@@ -25,13 +25,14 @@ use bevy::{
 const CANDIDATES: usize = 8;
 
 /// Below this simulated share of the strands each follower has one guide.
-const FEW: f32 = 0.125;
+const SINGLE_GUIDE_SHARE: f32 = 0.125;
 
 /// Distance from a guide below which its weight hardly grows (m).
 const ALIKE: f32 = 1e-3;
 
 /// How a strand that is not simulated at its hair's level follows its guides, see
 /// [`LodLevel::strands`](crate::LodLevel::strands). Kept by the tick.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct Follower {
@@ -52,6 +53,7 @@ pub struct Follower {
 }
 
 /// The strands of a [`Hair`] that others follow. Kept by the tick.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct Guides {
@@ -106,8 +108,8 @@ impl Guides {
         self.awake.push(true);
     }
 
-    /// Reads a guide's present pose.
-    pub(super) fn see(&mut self, i: usize, strand: Option<&Strand>) {
+    /// Updates a guide's pose.
+    pub(super) fn update_pose(&mut self, i: usize, strand: Option<&Strand>) {
         let (from, to) = (self.starts[i] as usize, self.starts[i + 1] as usize);
         let seen = strand.map_or(&[][..], Strand::orientations);
         self.usable[i] = seen.len() == to - from && is_usable(seen);
@@ -225,7 +227,7 @@ pub(crate) fn choose_guides(
     for group in &mut groups.values {
         if let Ok((.., mut guides)) = hairs.get_mut(group.hair) {
             let guides = guides.bypass_change_detection();
-            counts.insert(group.hair, part(group, guides));
+            counts.insert(group.hair, partition(group, guides));
             guides.partition_key = guides.partition_key.filter(|_| !group.repairs);
         }
     }
@@ -244,7 +246,7 @@ pub(crate) fn choose_guides(
 }
 
 /// Partitions a hair's strands into guides and followers; returns the number of followers.
-fn part(group: &mut HairPartition<'_>, guides: &mut Guides) -> usize {
+fn partition(group: &mut HairPartition<'_>, guides: &mut Guides) -> usize {
     let HairPartition { share, level, members, strands, .. } = group;
     let mut ranks = Vec::new();
     if *share < 1.0 {
@@ -293,7 +295,7 @@ fn part(group: &mut HairPartition<'_>, guides: &mut Guides) -> usize {
     if !same {
         let keep = guides.level == *level;
         guides.level = *level;
-        renew(members, strands, guides, first_follower, keep);
+        replace_guides(members, strands, guides, first_follower, keep);
     }
     tie(members, strands, guides);
     count
@@ -314,9 +316,9 @@ fn rank(members: &mut [GroupStrand<'_>], strands: &[Ref<'_, Strand>]) {
     }
 }
 
-/// Takes new guides. Followers whose guides stay keep them, unless the level has changed: then there may
-/// be nearer ones.
-fn renew(
+/// Replaces the guides. Followers whose guides all remain keep them, unless the level has changed:
+/// then there may be nearer ones.
+fn replace_guides(
     members: &mut [GroupStrand<'_>],
     strands: &[Ref<'_, Strand>],
     guides: &mut Guides,
@@ -371,10 +373,14 @@ fn tie(members: &mut [GroupStrand<'_>], strands: &[Ref<'_, Strand>], guides: &mu
         }
     }
     // Guides may have been written to since the last tick.
-    ahead.iter().enumerate().for_each(|(i, strand)| guides.see(i, *strand));
+    ahead.iter().enumerate().for_each(|(i, strand)| guides.update_pose(i, *strand));
     let guides = &*guides;
-    // With so few guides, neighbours that move alike are not noticeable.
-    let most = if (guides.strands.len() as f32) < FEW * members.len() as f32 { 1 } else { GUIDES };
+    // With so few guides it does not show that neighbours move alike.
+    let most = if (guides.strands.len() as f32) < SINGLE_GUIDE_SHARE * members.len() as f32 {
+        1
+    } else {
+        GUIDES
+    };
     let waypoints_of: Vec<[Vec3; 3]> =
         ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
     let nearest = KdTree::new(waypoints_of.iter().map(|c| c[0]).zip(0..));
@@ -435,8 +441,11 @@ pub(super) fn release_follower(
     }
 }
 
-/// A strand that does not know its guides any more is simulated until it has some again.
-pub(super) fn release_forgetful(left: On<Remove, Follower>, mut strands: Query<&mut StrandSleep>) {
+/// A strand whose `Follower` was removed is simulated until it has guides again.
+pub(super) fn release_without_follower(
+    left: On<Remove, Follower>,
+    mut strands: Query<&mut StrandSleep>,
+) {
     if let Ok(mut sleep) = strands.get_mut(left.entity) {
         release(&mut sleep);
     }

@@ -133,7 +133,7 @@ impl Ties {
         }
     }
 
-    /// Whether they are made for a strand of so many edges.
+    /// Whether they fit a strand with this number of edges.
     pub fn fit(&self, edges: usize) -> bool {
         !self.guides.is_empty()
             && self.segments.len() == edges
@@ -141,8 +141,8 @@ impl Ties {
     }
 
     /// Follows the guides, whose frames `turns` gives: `None` for an invalid one. Velocities are those of
-    /// the motion in `dt` (s), in which points at rest in the world moved by `frame`. Returns whether
-    /// there was any guide; without one the strand stays where it is, at rest.
+    /// the motion in `dt` (s), in which points at rest in the world moved by `frame`. Returns
+    /// whether there was a valid guide; without one the strand is left at rest.
     pub fn follow<'a>(
         &mut self,
         pose: &mut StrandPose<'_>,
@@ -274,7 +274,7 @@ mod tests {
         (positions, orientations, lengths)
     }
 
-    /// A curl of so many nodes.
+    /// A curl with this number of nodes.
     fn curl(nodes: u32, phase: f32) -> Parts {
         strand((0..nodes).map(|i| {
             let angle = 0.5 * i as f32 + phase;

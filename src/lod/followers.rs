@@ -91,7 +91,7 @@ pub(crate) fn move_followers(
         for i in 0..if is_last { guides.strands.len() } else { 0 } {
             if guides.awake[i] {
                 let strand = strands.get(guides.strands[i]).ok().map(|(_, strand, ..)| strand);
-                guides.see(i, strand);
+                guides.update_pose(i, strand);
             }
         }
     }
@@ -123,9 +123,9 @@ pub(crate) fn move_followers(
         let ties = &mut follower.ties;
         if !ties.follow(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds) {
             // Without guides it translates with its root.
-            let way = positions.first().map_or(Vec3::ZERO, |root| *root - follower.root);
-            if way.is_finite() {
-                positions.iter_mut().skip(1).for_each(|p| *p += way);
+            let translation = positions.first().map_or(Vec3::ZERO, |root| *root - follower.root);
+            if translation.is_finite() {
+                positions.iter_mut().skip(1).for_each(|p| *p += translation);
             }
         }
     });

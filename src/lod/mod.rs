@@ -20,7 +20,7 @@
 //! | gravity, drag, wind, droplets' pull | act on its guides only |
 //! | bonds: treatments, drying, water | act on it; bonds that form remember its present shape |
 //! | colliders | do not act on it: it stays out of the head as its guides do |
-//! | contact with other strands | none; on wet hair its simulated neighbours feel it |
+//! | contact with other strands | none; on wet hair its film acts on its simulated neighbours |
 //! | sleep | while all its guides sleep |
 //! | [`HeldNodes`](crate::HeldNodes), wound on a rod | it is simulated, and is no guide |
 //! | game code that writes to its [`Strand`](crate::Strand) | it follows from there; velocities are lost |

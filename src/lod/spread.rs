@@ -1,14 +1,14 @@
 //! Spread order: prefixes that sample roots evenly.
 //!
-//! Roots are split in two at the median across their widest direction, again and again. Halves hold
-//! equally many strands, so that a choice is dense where hair is.
+//! Roots are split recursively at the median of their widest axis. Halves hold equally many
+//! strands, so that a prefix is dense where hair is.
 
 use crate::grid::split_at_median;
 use glam::Vec3;
 
-/// The points' indices in an order of which any prefix is spread evenly: from each half of each split it
-/// holds the same share up to one strand. So strands chosen at a coarse level are chosen at all finer
-/// ones. Points have to be finite.
+/// Indices of the points in an order of which any prefix is an evenly spaced subset: it has equally
+/// many points of both halves of every split, up to one. So strands chosen at a coarse level are
+/// chosen at all finer ones. Points have to be finite.
 pub fn spread_order(places: &[Vec3]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..places.len() as u32).collect();
     let mut scratch = order.clone();

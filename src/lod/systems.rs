@@ -3,7 +3,7 @@
 use super::{
     Follower, Guides, HairBudget, HairEstimate, HairLod, HairScreenShare, LodLevel, PresentLod,
     budget::{Candidate, costs, fit},
-    choose::{choose_guides, release_follower, release_forgetful},
+    choose::{choose_guides, release_follower, release_without_follower},
     followers::{move_followers, sync_follower_sleep},
     model,
 };
@@ -31,9 +31,9 @@ impl Plugin for LodPlugin {
             .register_type::<Guides>()
             .register_required_components::<Strand, Follower>()
             .register_required_components::<HairLod, Guides>()
-            .add_observer(forget)
+            .add_observer(reset_level)
             .add_observer(release_follower)
-            .add_observer(release_forgetful)
+            .add_observer(release_without_follower)
             .add_systems(
                 HairTick,
                 (
@@ -48,8 +48,8 @@ impl Plugin for LodPlugin {
     }
 }
 
-/// Without levels hair is simulated in full.
-fn forget(left: On<Remove, HairLod>, mut hairs: Query<(&mut PresentLod, &mut SubstepLimits)>) {
+/// Hair without levels is simulated in full.
+fn reset_level(left: On<Remove, HairLod>, mut hairs: Query<(&mut PresentLod, &mut SubstepLimits)>) {
     if let Ok((mut present, mut limits)) = hairs.get_mut(left.entity) {
         (*present, *limits) = default();
     }

@@ -1,4 +1,4 @@
-//! All that a look consists of: pigments, sheen, thickness.
+//! The look of hair: pigments, sheen, thickness.
 
 use super::pigment::{HairColor, Melanin};
 use crate::setting::{Ranged, setting};
@@ -35,7 +35,7 @@ setting! {
         pub dye: HairColor = HairColor::WHITE => Ranged::clamp_values;
         /// How much the amount of pigment differs from strand to strand, a share.
         pub variation: f32 = 0.2, in VARIATION: 0.0..=1.0, safe 0.0..=0.5, "0.2 is natural";
-        /// Share of strands without pigment: what makes hair grey.
+        /// Share of strands without pigment, which makes hair grey.
         pub grey: f32 = 0.0, in GREY: 0.0..=1.0, "0.5 is salt and pepper";
         /// Share of the pigment that sun has bleached at the tips.
         pub tip_bleach: f32 = 0.25, in TIP_BLEACH: 0.0..=1.0, "0.25 is a summer";
@@ -110,7 +110,7 @@ impl HairLook {
         self.clone().numbers_mut().map(|number| *number)
     }
 
-    /// The same, to be written.
+    /// The same, mutable.
     #[cfg(feature = "save")]
     pub(crate) fn numbers_mut(&mut self) -> [&mut f32; 11] {
         [

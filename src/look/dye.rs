@@ -1,8 +1,8 @@
 //! Bleach and dye.
 //!
-//! Both act on what a fibre absorbs, where light meets colour: bleach takes a share of the absorption
-//! away, dye adds its own. So colours mix as they do in hair: dye on dark hair hardly shows, dye over dye
-//! darkens, and bleached hair can become anything.
+//! Both act on the fibre's absorption: bleach removes a share of it, dye adds its own. So colours
+//! mix as they do in hair: dye on dark hair hardly shows, dye over dye darkens, and bleached hair
+//! can become anything.
 
 use super::{pigment::HairColor, streaks::Streaks};
 use crate::setting::{Ranged, ValueRange, Violations, setting};
@@ -12,9 +12,9 @@ use bevy::prelude::*;
 pub const MOST_LAYERS: usize = 4;
 
 setting! {
-    /// What was done to the colour of a hair at the hairdresser's: layers of bleach and dye, one after
-    /// the other. Component of a [`Hair`](crate::Hair), may change at any time; it goes over the colour of
-    /// its [`HairLook`](super::HairLook), and travels with its hairdo.
+    /// Layers of bleach and dye on a hair, applied one after the other. Component of a
+    /// [`Hair`](crate::Hair), may change at any time; applied to the colour of its
+    /// [`HairLook`](super::HairLook), and saved with its hairdo.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -29,8 +29,8 @@ setting! {
     #[derive(Component, Reflect, Clone, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairDye {
-        /// The layers, the first that was done first. At most [`MOST_LAYERS`]; later ones count for
-        /// nothing.
+        /// The layers, in the order of application. At most [`MOST_LAYERS`]; further ones are
+        /// ignored.
         pub layers: Vec<DyeLayer> = Vec::new() => clamp_layers;
     }
 }
@@ -39,7 +39,7 @@ fn clamp_layers(layers: &mut Vec<DyeLayer>, violations: &mut Violations) {
     const COUNT: ValueRange = ValueRange::new(
         "HairDye::layers",
         0.0..=MOST_LAYERS as f32,
-        "put what is dyed alike into one layer",
+        "merge layers of the same dye",
     );
     if let Err(wrong) = COUNT.check(layers.len()) {
         violations.push(wrong);
@@ -57,14 +57,15 @@ setting! {
         pub bleach: f32 = 0.0, in BLEACH: 0.0..=1.0, "0.8 makes black hair blond, 1 white";
         /// The colour that white hair takes on from the dye; white is no dye.
         pub color: HairColor = HairColor::WHITE => Ranged::clamp_values;
-        /// How much dye there is, as a multiple of what gives white hair the colour. Less is paler:
-        /// absorption goes with it.
+        /// Amount of dye, as a multiple of what gives white hair the colour. Absorption is
+        /// proportional to it: less is paler.
         pub strength: f32 = 1.0, in STRENGTH: 0.0..=1e3, safe 0.0..=4.0, "1 gives the colour";
         /// Where along a strand it begins, a share of the length: 0 is the root.
         pub from: f32 = 0.0, in FROM: 0.0..=1.0, "0 is the root";
         /// Where it ends: 1 is the tip.
         pub to: f32 = 1.0, in TO: 0.0..=1.0, "1 is the tip";
-        /// Over what share of the length it fades at these ends; not at root and tip themselves.
+        /// Share of the length over which it fades at these ends; it does not fade at the root and
+        /// the tip themselves.
         pub fade: f32 = 0.1, in FADE: 0.0..=1.0, "0 is a hard edge, 0.5 a balayage";
         /// Which strands; `None` is all.
         pub streaks: Option<Streaks> = None => Ranged::clamp_values;
@@ -82,7 +83,7 @@ impl DyeLayer {
         Self { bleach: 1.0, ..Self::of(color) }
     }
 
-    /// Bleach alone: this share of the pigment is taken.
+    /// Bleach alone: removes this share of the pigment.
     pub fn bleach(share: f32) -> Self {
         Self { bleach: share, ..default() }
     }
@@ -92,12 +93,12 @@ impl DyeLayer {
         Self { from, to, ..self }
     }
 
-    /// The same on roots, so far up strands (a share of the length).
+    /// The same on the roots only, up to this share of the length.
     pub fn roots(self, share: f32) -> Self {
         self.between(0.0, share)
     }
 
-    /// The same on tips, the last share of the length.
+    /// The same on the tips only, this last share of the length.
     pub fn tips(self, share: f32) -> Self {
         self.between(1.0 - share, 1.0)
     }
@@ -108,12 +109,12 @@ impl DyeLayer {
         Self { streaks: Some(Streaks { share, ..streaks }), ..self }
     }
 
-    /// How much light the dye takes, without bleach.
+    /// Absorption of the dye, without bleach.
     pub fn absorption(&self) -> Vec3 {
         self.strength * self.color.absorption()
     }
 
-    /// The share of the layer that is there at a place along a strand, 0 root … 1 tip.
+    /// The layer's weight at a place along a strand, 0 root … 1 tip.
     pub fn cover(&self, along: f32) -> f32 {
         let half = 0.5 * self.fade;
         let begun =
@@ -122,7 +123,7 @@ impl DyeLayer {
         begun * (1.0 - ended)
     }
 
-    /// The same layer at `t` of the way to another.
+    /// Interpolates between this layer (0) and another (1).
     #[cfg(feature = "save")]
     fn lerp(self, other: Self, t: f32) -> Self {
         let streaks = match (self.streaks, other.streaks) {
@@ -142,13 +143,13 @@ impl DyeLayer {
         }
     }
 
-    /// So much of it.
+    /// Scales bleach and dye.
     #[cfg(feature = "save")]
     fn scaled(self, share: f32) -> Self {
         Self { bleach: self.bleach * share, strength: self.strength * share, ..self }
     }
 
-    /// Whether the same strands are dyed, but for their share.
+    /// Whether both choose the same strands, apart from their share.
     #[cfg(feature = "save")]
     fn is_on_same_strands(&self, other: &Self) -> bool {
         let which = |streaks: Option<Streaks>| streaks.map(|s| (s.seed, s.width.to_bits()));
@@ -189,9 +190,9 @@ impl HairDye {
         self.layers.is_empty()
     }
 
-    /// What a fibre absorbs at a place along a strand (0 root … 1 tip) that absorbs `natural` by itself;
-    /// `is_in_streak` tells of each layer that has streaks whether the strand is in one. Rust twin of
-    /// `dyed` in `shading.wgsl`.
+    /// Absorption of a fibre at a place along a strand (0 root … 1 tip) whose natural absorption is
+    /// `natural`; `is_in_streak` says for each layer with streaks whether the strand is in one. The
+    /// same as `dyed` in `shading.wgsl`.
     pub fn absorption(
         &self,
         natural: Vec3,
@@ -208,8 +209,9 @@ impl HairDye {
         absorption
     }
 
-    /// The dye between two: at `t` = 0 this, at 1 the other, each to the bit. Layers on the same strands
-    /// mix, by absorption; where streaks are others, the ones go before the others come.
+    /// Interpolates between two dyes: exactly this at `t` = 0, the other at 1. Layers on the same
+    /// strands mix by absorption; where the streaks differ, the first fade out before the second
+    /// fade in.
     #[cfg(feature = "save")]
     pub(crate) fn blend(&self, other: &Self, t: f32) -> Self {
         let none = DyeLayer::default;

@@ -1,14 +1,14 @@
-//! What hair looks like, as plain data: pigments, bleach and dye, and which preset it has grown from.
+//! The look of hair as plain data: pigments, bleach and dye, and the preset it was grown from.
 //!
-//! It is drawn by the room `render`, if there is one, and travels with a hairdo either way.
+//! The feature `render` draws it; it is saved with a hairdo either way.
 //!
 //! | file | what |
 //! |---|---|
 //! | `pigment` | melanin and colours, and what light they absorb |
 //! | `dye` | bleach and dye along strands and by strand |
 //! | `streaks` | which strands are in streaks |
-//! | `appearance` | all that a look consists of |
-//! | `origin` | where hair comes from |
+//! | `appearance` | the look: pigments, sheen, thickness |
+//! | `origin` | the preset that hair was grown from |
 
 mod appearance;
 mod dye;
@@ -25,7 +25,7 @@ pub use streaks::Streaks;
 use crate::setting;
 use bevy::prelude::*;
 
-/// Registers looks.
+/// Registers the settings of looks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LookPlugin;
 

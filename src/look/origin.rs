@@ -1,12 +1,12 @@
-//! Where hair comes from.
+//! The preset that hair was grown from.
 
 use crate::setting::setting;
 use bevy::prelude::*;
 
 setting! {
     /// The preset that a [`Hair`](crate::Hair) has grown from, so that the same hair can be grown again.
-    /// Component of the hair, which `WearHair` writes; insert it where a preset is planted by hand. It
-    /// travels with the hairdo, as what that was made on.
+    /// Component of the hair, which `WearHair` writes; insert it where a preset is planted by hand.
+    /// It is saved with the hairdo.
     #[derive(Component, Reflect, Clone, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct WornPreset {

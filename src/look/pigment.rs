@@ -4,9 +4,10 @@
 use crate::setting::setting;
 use bevy::prelude::*;
 
-/// Of the albedo with the root of absorption: Chiang et al. equation 9 at azimuthal roughness 0.3.
+/// Rate at which the albedo falls with the square root of absorption: Chiang et al. equation 9 at
+/// azimuthal roughness 0.3.
 const ALBEDO_FALL: f32 = 5.888;
-/// Darker than this no dye is: black takes all that black hair takes, and more.
+/// The darkest component of a dye's colour; it absorbs more than black hair does.
 const DARKEST: f32 = 1e-4;
 
 setting! {
@@ -48,8 +49,8 @@ impl Melanin {
         Self { eumelanin, pheomelanin }
     }
 
-    /// How much of red, green and blue light a fibre takes, by its radius: light straight through
-    /// loses e^(−2 times this).
+    /// Absorption of red, green and blue light per radius of a fibre: light straight through is
+    /// reduced to e^(−2 times this).
     pub fn absorption(&self) -> Vec3 {
         let absorption = Vec3::new(0.419, 0.697, 1.37) * self.eumelanin
             + Vec3::new(0.187, 0.4, 1.05) * self.pheomelanin;
@@ -62,7 +63,7 @@ impl Melanin {
         HairColor::of(self.absorption()).into()
     }
 
-    /// Between two, by absorption, which goes with the amount.
+    /// Between two, by absorption, which is proportional to the amount.
     #[cfg(feature = "save")]
     pub(crate) fn lerp(self, other: Self, t: f32) -> Self {
         Self {
@@ -90,11 +91,11 @@ setting! {
 impl HairColor {
     /// No colour.
     pub const WHITE: Self = Self::new(1.0, 1.0, 1.0);
-    /// All light is taken.
+    /// Black: absorbs all light.
     pub const BLACK: Self = Self::new(0.0, 0.0, 0.0);
     /// Candy pink.
     pub const PINK: Self = Self::new(0.85, 0.14, 0.36);
-    /// A red that no hair has of itself.
+    /// A red that natural hair does not have.
     pub const CRIMSON: Self = Self::new(0.5, 0.015, 0.03);
     /// Copper.
     pub const COPPER: Self = Self::new(0.5, 0.13, 0.035);
@@ -116,14 +117,14 @@ impl HairColor {
         Self { red, green, blue }
     }
 
-    /// How much of red, green and blue light a fibre takes on whose head shows this colour, as
+    /// Absorption of the fibres of a head of hair that shows this colour, as
     /// [`Melanin::absorption`]: (ln C / 5.888)², Chiang et al. equation 9.
     pub fn absorption(&self) -> Vec3 {
         let root = self.root_of_absorption();
         root * root
     }
 
-    /// Its square root. What is not a number is no colour.
+    /// Its square root. NaN counts as white.
     pub(super) fn root_of_absorption(&self) -> Vec3 {
         let color = Vec3::new(self.red, self.green, self.blue);
         let color = color.map(|c| if c.is_nan() { 1.0 } else { c.clamp(DARKEST, 1.0) });
@@ -143,7 +144,7 @@ impl HairColor {
 
 #[cfg(any(feature = "render", feature = "groom"))]
 impl From<LinearRgba> for HairColor {
-    /// What is brighter than white or darker than black counts as that.
+    /// Components are clamped to 0…1.
     fn from(LinearRgba { red, green, blue, .. }: LinearRgba) -> Self {
         let [red, green, blue] = [red, green, blue].map(|c| c.clamp(0.0, 1.0));
         Self { red, green, blue }

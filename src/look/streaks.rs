@@ -4,11 +4,11 @@ use crate::setting::setting;
 use bevy::{platform::collections::HashMap, prelude::*};
 
 setting! {
-    /// Dye on some strands only: streaks, or strand by strand as highlights are.
+    /// Dye on some strands only: streaks, or single strands as highlights.
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
     pub struct Streaks {
-        /// The share of strands that is dyed.
+        /// The share of strands that are dyed.
         pub share: f32 = 0.3, in SHARE: 0.0..=1.0, "0.3 are highlights";
         /// How wide a streak is at the scalp. At 0 each strand is dyed or not by itself.
         pub width: f32 = 8e-3, "m" in WIDTH: 0.0..=10.0, safe 0.0..=0.1, "0.008 is a foil's";
@@ -18,13 +18,14 @@ setting! {
 }
 
 /// Narrower streaks (m) are single strands.
-const NARROWEST: f32 = 1e-6;
+const MIN_WIDTH: f32 = 1e-6;
 
 impl Streaks {
     /// Which of the strands with roots at `places` (m) are in streaks.
     ///
-    /// The scalp is divided into cells about as wide as a streak. They are taken in an order drawn by
-    /// the seed, as many as come nearest to the share: a larger share has all strands of a smaller.
+    /// The scalp is divided into cells about as wide as a streak. Cells are chosen in a random
+    /// order given by the seed, until their strands come nearest to the share: a larger share
+    /// includes all strands of a smaller one.
     pub fn chosen(&self, places: &[Vec3]) -> Vec<bool> {
         let mut cells = HashMap::<IVec4, (u32, Vec<usize>)>::new();
         for (i, place) in places.iter().enumerate() {
@@ -33,8 +34,8 @@ impl Streaks {
             entry.1.push(i);
         }
         let mut order: Vec<_> =
-            cells.into_iter().map(|(cell, (lot, of))| (lot, cell.to_array(), of)).collect();
-        order.sort_by_key(|(lot, cell, _)| (*lot, *cell));
+            cells.into_iter().map(|(cell, (hash, of))| (hash, cell.to_array(), of)).collect();
+        order.sort_by_key(|(hash, cell, _)| (*hash, *cell));
         let wanted = f64::from(self.share) * places.len() as f64;
         let (mut chosen, mut count) = (vec![false; places.len()], 0.0);
         for (.., strands) in order {
@@ -48,10 +49,10 @@ impl Streaks {
         chosen
     }
 
-    /// The cell that a root is in: that of the nearest of points strewn a width apart. `None` where
-    /// there are no cells.
+    /// The Voronoi cell of a root, of jittered points a width apart. `None` where there are no
+    /// cells.
     fn cell_of(&self, place: Vec3) -> Option<IVec3> {
-        if self.width < NARROWEST || !place.is_finite() {
+        if self.width < MIN_WIDTH || !place.is_finite() {
             return None;
         }
         let at = place / self.width;
@@ -61,18 +62,18 @@ impl Streaks {
         let home = at.floor().as_ivec3();
         let near = (0..27).map(|k| home + IVec3::new(k % 3, k / 3 % 3, k / 9) - 1);
         let apart = |cell: &IVec3| {
-            let lot = |axis: u32| share_of(mixed(cell.extend(2), self.seed ^ axis));
-            at.distance_squared(cell.as_vec3() + Vec3::new(lot(11), lot(22), lot(33)))
+            let hash = |axis: u32| share_of(mixed(cell.extend(2), self.seed ^ axis));
+            at.distance_squared(cell.as_vec3() + Vec3::new(hash(11), hash(22), hash(33)))
         };
         near.min_by(|a, b| apart(a).total_cmp(&apart(b)))
     }
 }
 
-fn share_of(lot: u32) -> f32 {
-    (lot >> 8) as f32 / 16_777_216.0
+fn share_of(hash: u32) -> f32 {
+    (hash >> 8) as f32 / 16_777_216.0
 }
 
-/// A number drawn for a cell.
+/// A hash of a cell.
 fn mixed(cell: IVec4, seed: u32) -> u32 {
     let parts = cell.to_array().map(i32::cast_unsigned);
     parts.into_iter().fold(seed, |state, part| pcg(state ^ pcg(part)))

@@ -1,4 +1,4 @@
-//! [`LANES`] mass-spring strands, side by side, through one substep.
+//! A substep of [`LANES`] mass-spring strands side by side.
 //!
 //! The springs along a strand are stiff and the masses of its nodes may differ a hundredfold where one
 //! carries a droplet. Gauss–Seidel would take as many iterations; so they are solved together, a
@@ -55,7 +55,7 @@ pub(crate) struct SpringParams {
     pub clearance: f32,
 }
 
-/// Takes the block through one substep, on the instruction set that the machine has. Node 0 of every
+/// Steps the block by one substep, with the machine's best instruction set. Node 0 of every
 /// strand must be held.
 pub(crate) fn step(
     level: Level,
@@ -86,7 +86,7 @@ fn step_simd<S: Simd>(
     b.near_obstacles.fill(NearObstacles::ALL);
     predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.clearance, obstacles);
     b.touched = [0.0; LANES];
-    // Strands that something else moves may gain energy from it.
+    // Strands that are moved by held nodes may gain energy from them.
     let mut moved = zero;
     for n in &b.nodes {
         let v = load3(simd, &n.v);
@@ -109,7 +109,7 @@ fn step_simd<S: Simd>(
         in_touch |= b.touched != [0.0; LANES];
     }
     if in_touch {
-        bring_back(simd, b);
+        shorten_overstretched(simd, b);
     }
     keep_energy(simd, b, params, Real::lt(moved, one));
     turn_edges(simd, b);
@@ -124,18 +124,18 @@ fn span<S: Simd>(from: V3<f32x16<S>>, to: V3<f32x16<S>>) -> (V3<f32x16<S>>, f32x
     (d.scale(length.lit(1.0) / Real::max(length, length.lit(1e-12))), length)
 }
 
-/// Where a node is, and by how much it has moved in this step.
+/// A node's position, and its displacement in this step.
 #[inline(always)]
 fn place<S: Simd>(simd: S, n: &NodeLanes) -> (V3<f32x16<S>>, V3<f32x16<S>>) {
     let p = load3(simd, &n.p);
     (p, p - load3(simd, &n.from))
 }
 
-/// Shortens overstretched edges to [`TORN`] times their length, from the root on and without a change of
-/// speed. A node that was shaken to the far side of an obstacle is pressed on it by its springs, and
+/// Shortens overstretched edges to [`TORN`] times their length, from the root on and without
+/// changing velocities. Springs press a node on the far side of an obstacle against it, and
 /// friction would hold it there for ever.
 #[inline(never)]
-fn bring_back<S: Simd>(simd: S, b: &mut BlockLanes) {
+fn shorten_overstretched<S: Simd>(simd: S, b: &mut BlockLanes) {
     simd.vectorize(
         #[inline(always)]
         || {

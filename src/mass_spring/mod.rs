@@ -27,7 +27,7 @@ setting! {
         /// c/m of the dampers along the springs.
         pub damping: f32 = 10.0, "1/s" in DAMPING: 0.0..=1e6, safe 0.0..=1000.0,
             "10 calms within a second";
-        /// Iterations a substep: more bend more exactly.
+        /// Iterations per substep: more make bending more accurate.
         pub iterations: u32 = 2, in ITERATIONS: 1.0..=1000.0, safe 1.0..=50.0, "2 are usual";
     }
 }

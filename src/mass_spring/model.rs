@@ -1,9 +1,9 @@
 //! Mass-spring strands as pure functions: \[W\] equation 1, stable at any step.
 //!
-//! Print's damper, c |v_b − v_a|, has no sign and feeds energy in; a true one acts on how fast the
-//! spring gets longer. An explicit step of stiff springs blows up beyond √(2m/k), here 1 ms. So each
-//! spring is solved for the end of the step (`Xpbd`), on positions (compliant position based
-//! dynamics): the stiffer the spring, the nearer to its length.
+//! The damper in the paper, c |v_b − v_a|, has no sign and adds energy; a correct one acts on the
+//! rate of extension. An explicit step of stiff springs blows up beyond √(2m/k), here 1 ms. So each spring
+//! is solved implicitly, for the end of the step, on positions (extended position based dynamics,
+//! `Xpbd`): the stiffer the spring, the nearer to its rest length.
 
 use crate::lanes::Real;
 use glam::Vec3;
@@ -20,7 +20,7 @@ pub fn force(d: Vec3, rate: Vec3, length: f32, stiffness: f32, damping: f32) -> 
 
 /// Springs of one stiffness during one step: equation 1 at its end.
 ///
-/// Tensions here are forces times dt², per mass of a node (m): by so much they move a free one.
+/// Tensions here are forces times dt², per mass of a node (m): the displacement of a free node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Xpbd<R> {
     inverse_stiffness: R,

@@ -1,4 +1,4 @@
-//! The component columns of a table, iterated side by side and split into parts of some rows each.
+//! The component columns of a table, iterated side by side and split into chunks of rows.
 
 use bevy::ecs::change_detection::{ContiguousMut, ContiguousRef, Tick};
 use core::{

@@ -15,15 +15,15 @@ pub(crate) use prefetch::prefetch;
 #[cfg(feature = "parallel")]
 use {bevy::tasks::ComputeTaskPool, queue::Queue};
 
-/// The least work of a task, on one thread: to wake a thread for less takes longer than to do it.
+/// The minimum work of a task: waking a thread takes longer than doing less.
 pub(crate) const TASK: Nanos = Nanos(50_000);
 
-/// The least number of such tasks for which other threads are woken: waking one and being woken by it
-/// at the end takes about as long as two tasks.
+/// The minimum number of such tasks for which other threads are woken: waking one and being woken
+/// by it at the end takes about as long as two tasks.
 #[cfg(feature = "parallel")]
-const WORTH_WAKING: usize = 4;
+const MIN_TASKS: usize = 4;
 
-/// About how long one item takes (ns). Decides whether other threads are used, never the result.
+/// Estimated time of one item (ns). Decides whether other threads are used, never the result.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "parallel"), allow(dead_code, reason = "there is one thread"))]
 pub(crate) struct Nanos(pub(crate) usize);
@@ -31,11 +31,11 @@ pub(crate) struct Nanos(pub(crate) usize);
 /// Parts have a multiple of this many rows, so that blocks of lanes fill up.
 const GRAIN: usize = 16;
 
-/// The most parts that a table is cut into, unless they would be larger than [`MOST_ROWS`].
-const MOST_PARTS: usize = 32;
+/// The maximum number of parts of a table, unless they would be larger than [`MAX_ROWS`].
+const MAX_PARTS: usize = 32;
 
-/// The most rows of a part.
-const MOST_ROWS: usize = 512;
+/// The maximum number of rows of a part.
+const MAX_ROWS: usize = 512;
 
 /// How many strands ahead memory is prefetched: far enough to arrive in time, near enough not to be
 /// evicted again.
@@ -75,9 +75,9 @@ pub(crate) fn tables<'a, 's, D: ContiguousQueryData, F: ArchetypeFilter>(
     query.contiguous_iter_mut().expect("components of strands lie in tables")
 }
 
-/// Processes the rows of tables in parts: `work` gets some rows at a time, and scratch space that
-/// `init` makes once a thread. A row takes about `each`. Returns the result of each part, in the order
-/// of the rows. Parts do not depend on the number of threads.
+/// Processes the rows of tables in parts: `work` gets the rows of a part, and scratch space that
+/// `init` makes once per thread. A row takes about `each`. Returns the result of each part, in the
+/// order of the rows. Parts do not depend on the number of threads.
 pub(crate) fn for_each_part<C: Columns, S, O: Send>(
     each: Nanos,
     tables: impl Iterator<Item = C>,
@@ -106,8 +106,8 @@ pub(crate) fn for_each_part<C: Columns, S, O: Send>(
 /// cache.
 fn part_rows(rows: usize, each: Nanos) -> usize {
     let worth = TASK.0.div_ceil(each.0.max(1));
-    let most = rows.div_ceil(MOST_PARTS).max(worth).min(MOST_ROWS);
-    let parts = (rows / most).max(rows.div_ceil(MOST_ROWS)).max(1);
+    let most = rows.div_ceil(MAX_PARTS).max(worth).min(MAX_ROWS);
+    let parts = (rows / most).max(rows.div_ceil(MAX_ROWS)).max(1);
     rows.div_ceil(parts).next_multiple_of(GRAIN).max(GRAIN)
 }
 
@@ -123,7 +123,7 @@ fn for_each_init<T: Send, S>(
     if let Some(pool) = ComputeTaskPool::try_get() {
         let workers = pool.thread_num() + 1;
         let least = TASK.0.div_ceil(each.0.max(1));
-        if workers > 1 && items.len() >= WORTH_WAKING * least {
+        if workers > 1 && items.len() >= MIN_TASKS * least {
             // More chunks than threads, because some take longer than others.
             let chunk = items.len().div_ceil(workers * 8).max(least);
             let chunks = items.len().div_ceil(chunk);
@@ -167,9 +167,9 @@ pub(crate) fn in_turn<T>(
     }
 }
 
-/// Reuses the allocation of a vector for items of another lifetime. What is gathered for a substep
-/// takes up to megabytes: allocated anew each time, the operating system would map and clear its pages
-/// each time.
+/// Reuses the allocation of a vector for items of another lifetime. Data gathered for a substep
+/// takes up to megabytes: if it were allocated anew each time, the operating system would map and
+/// clear its pages each time.
 pub(crate) fn emptied<A, B>(mut items: Vec<A>) -> Vec<B> {
     items.clear();
     // `collect` reuses the allocation in place.
@@ -191,8 +191,8 @@ mod tests {
             let part = part_rows(rows, Nanos(nanos));
             let parts = rows.div_ceil(part);
             let last = rows - (parts - 1) * part;
-            assert!(part <= MOST_ROWS + GRAIN, "{rows} rows of {nanos} ns: {part}");
-            assert!(part == MOST_ROWS || part * nanos + GRAIN * nanos >= TASK.0, "{rows}: {part}");
+            assert!(part <= MAX_ROWS + GRAIN, "{rows} rows of {nanos} ns: {part}");
+            assert!(part == MAX_ROWS || part * nanos + GRAIN * nanos >= TASK.0, "{rows}: {part}");
             assert!(parts < 3 || last + parts * GRAIN > part, "{rows}: {parts} of {part}, {last}");
         }
     }

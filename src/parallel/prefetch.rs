@@ -1,9 +1,9 @@
 //! Prefetching of memory that will be read soon.
 //!
-//! Strands are scattered over the heap. The three hundred cache lines of a block of sixteen take about
-//! as long to load as the block takes to solve, and hardware prefetchers do not see that far ahead: with
-//! this the projection of ten thousand strands takes 20 to 30 % less time, the tick of a hundred
-//! thousand 12 %. Safe Rust has no prefetch, so this is the only unsafe code of the crate.
+//! Strands are scattered over the heap. The three hundred cache lines of a block of sixteen take
+//! about as long to load as the block takes to solve, and hardware prefetchers do not reach that
+//! far: with this the projection of ten thousand strands takes 20 to 30 % less time, the tick of a
+//! hundred thousand 12 %. Safe Rust has no prefetch, so this is the only unsafe code of the crate.
 #![allow(unsafe_code)]
 
 /// Prefetches `values` without waiting. Only a hint: results do not change.

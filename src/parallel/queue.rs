@@ -1,4 +1,4 @@
-//! Work that several threads take from, piece by piece.
+//! A queue of work chunks shared by several threads.
 
 use bevy::platform::time::Instant;
 use core::{
@@ -8,38 +8,38 @@ use core::{
 };
 use std::sync::{Mutex, PoisonError};
 
-/// How long the caller spins for the last pieces before it blocks. Blocking and being woken takes tens
-/// of microseconds, as long as a piece of work.
-const PATIENCE: Duration = Duration::from_micros(200);
+/// How long the caller spins for the last chunks before it blocks. Blocking and being woken takes
+/// tens of microseconds, as long as a chunk.
+const MAX_SPIN: Duration = Duration::from_micros(200);
 
-/// Pieces of work, each taken by the next free thread.
+/// Work chunks, each taken by the next free thread.
 pub(super) struct Queue<I> {
-    pieces: Mutex<I>,
-    /// How many threads have a piece.
+    chunks: Mutex<I>,
+    /// How many threads are working.
     busy: AtomicUsize,
 }
 
 impl<I: Iterator> Queue<I> {
-    pub(super) fn new(pieces: I) -> Self {
-        Self { pieces: Mutex::new(pieces), busy: AtomicUsize::new(0) }
+    pub(super) fn new(chunks: I) -> Self {
+        Self { chunks: Mutex::new(chunks), busy: AtomicUsize::new(0) }
     }
 
-    /// Calls `work` with one piece after the other, until there is none.
+    /// Calls `work` with one chunk after the other until none is left.
     pub(super) fn empty(&self, mut work: impl FnMut(I::Item)) {
         self.busy.fetch_add(1, Ordering::Relaxed);
         loop {
-            let piece = self.pieces.lock().unwrap_or_else(PoisonError::into_inner).next();
-            let Some(piece) = piece else { break };
-            work(piece);
+            let chunk = self.chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some(chunk) = chunk else { break };
+            work(chunk);
         }
         self.busy.fetch_sub(1, Ordering::Release);
     }
 
-    /// Spins for a while until other threads have finished their last pieces. Only saves time: the
+    /// Spins for a while until other threads have finished their last chunks. Only saves time: the
     /// caller still has to join the tasks.
     pub(super) fn wait(&self) {
         let start = Instant::now();
-        while self.busy.load(Ordering::Acquire) > 0 && start.elapsed() < PATIENCE {
+        while self.busy.load(Ordering::Acquire) > 0 && start.elapsed() < MAX_SPIN {
             spin_loop();
         }
     }
@@ -54,7 +54,7 @@ mod tests {
         let mut items = vec![0u32; 10_000];
         let queue = Queue::new(items.chunks_mut(7));
         std::thread::scope(|scope| {
-            let take = || queue.empty(|piece| piece.iter_mut().for_each(|item| *item += 1));
+            let take = || queue.empty(|chunk| chunk.iter_mut().for_each(|item| *item += 1));
             (0..4).for_each(|_| drop(scope.spawn(take)));
             take();
             queue.wait();
@@ -66,8 +66,8 @@ mod tests {
     fn waiting_ends() {
         let queue = Queue::new([1, 2].into_iter());
         let start = Instant::now();
-        // As if another thread had a long piece.
+        // As if another thread had a long chunk.
         queue.empty(|_| queue.wait());
-        assert!(start.elapsed() >= 2 * PATIENCE && queue.busy.load(Ordering::Relaxed) == 0);
+        assert!(start.elapsed() >= 2 * MAX_SPIN && queue.busy.load(Ordering::Relaxed) == 0);
     }
 }

@@ -45,7 +45,9 @@ pub enum PlantError {
         vertex: u32,
     },
     /// Triangles that are all points or lines.
-    #[error("the mesh's area is {found} m², expected more: all its triangles are degenerate")]
+    #[error(
+        "the mesh's area is {found} m², expected more than 0: all its triangles are degenerate"
+    )]
     NoArea {
         /// The area (m²).
         found: f32,
@@ -79,16 +81,16 @@ pub enum PlantError {
     /// More strands than [`MAX_ROOTS`].
     #[error(
         "the density gives {found:.0} strands, expected at most {MAX_ROOTS}: lower Planting::density \
-         or mask the mesh, and let followers fill up"
+         or mask the mesh, and fill up with followers"
     )]
     TooMany {
         /// How many it would be.
         found: f64,
     },
-    /// A mesh with room for no strand at all.
+    /// A mesh on which not a single strand grows.
     #[error(
-        "no strand grows on {area} m² at {density} per m² where the maps leave it: raise \
-         Planting::density or look at the maps"
+        "no strand grows on {area} m² at {density} per m² under these maps: raise \
+         Planting::density or check the maps"
     )]
     NoRoots {
         /// The mesh's area (m²).
@@ -96,7 +98,7 @@ pub enum PlantError {
         /// Strands per m².
         density: f32,
     },
-    /// A map whose values do not make up its rows and columns.
+    /// A map whose number of values does not match its rows and columns.
     #[error("the map has {found} values, expected {width} × {height}: give one for each pixel")]
     MapSize {
         /// How many values there are.
@@ -106,7 +108,7 @@ pub enum PlantError {
         /// Rows.
         height: u32,
     },
-    /// An image of which no pixel can be read.
+    /// An image whose pixels cannot be read.
     #[error("the image cannot be read: {reason}; use an uncompressed 2D image in the main world")]
     Image {
         /// Bevy's reason.

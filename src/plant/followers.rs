@@ -1,4 +1,4 @@
-//! Drawn strands at full count, planted by the scalp's mask: guides are too few to show a hairline or a
+//! Drawn strands at full count, planted by the scalp's mask: guides are too few for a hairline or a
 //! parting.
 
 use super::{
@@ -22,21 +22,21 @@ use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 const BELOW: f32 = 0.3e-3;
 /// Samples of the mesh for estimating the share that is scalp.
 const PROBES: usize = 40_000;
-/// The most samples.
+/// The maximum number of samples.
 const MOST: f64 = 2e7;
 /// Distance from a parting within which strands are drawn at full density (m), and the share elsewhere.
-const PARTED: f32 = 14e-3;
-const ELSEWHERE: f32 = 0.7;
+const PARTING_WIDTH: f32 = 14e-3;
+const DENSITY_ELSEWHERE: f32 = 0.7;
 /// How many of the nearest guides are candidates for a root.
 const NEAR: usize = 16;
 /// Deviation of a baby hair's direction from its neighbours' (rad, approximately).
 const BABY_TURN: f32 = 0.5;
 
 impl HairPreset {
-    /// Roots of the drawn strands of a planted preset: up to `count` strands by the scalp's mask, few,
-    /// short and fine ones at the hairline, with the lengths of the guides around. Put the result on the
-    /// [`Hair`](crate::Hair) entity with the preset's settings. `planted`, `mesh` and `scalp` are
-    /// those of [`plant`](Self::plant).
+    /// Roots of the drawn strands of a planted preset: up to `count` strands by the scalp's mask,
+    /// sparser, shorter and finer at the hairline, with lengths interpolated from the guides. Put
+    /// the result on the [`Hair`](crate::Hair) entity with the preset's settings. `planted`, `mesh`
+    /// and `scalp` are those of [`plant`](Self::plant).
     ///
     /// ```
     /// # use bevy_keratin::{prelude::*, plant::*}; use bevy::prelude::*;
@@ -101,7 +101,7 @@ impl FollowerPlanting {
         let tree = KdTree::new(guides.iter().map(|guide| guide.place).zip(0u32..));
         let mut random = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x0f01_10e5);
         let growth = |place: &RootPlace| {
-            // Where there is no hairline all is far behind it.
+            // Without a hairline every place is far behind it.
             let behind = match self.preset.is_everywhere() {
                 true => 1.0,
                 false => {
@@ -123,26 +123,27 @@ impl FollowerPlanting {
         if mean <= 0.0 || guides.is_empty() {
             return Ok(FollowerRoots::default());
         }
-        // Surplus roots are removed evenly at the end.
+        // Surplus roots are thinned out evenly at the end.
         let drawn = (1.02 * f64::from(self.count) / mean).ceil().min(MOST);
         let mut roots = Vec::with_capacity(self.count as usize + self.count as usize / 8);
-        let mut lots = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x4a1b_22c7);
+        let mut variation_random = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x4a1b_22c7);
         for root in surface.draw(drawn as usize, &mut random) {
-            let [lot, long, fine, turn_x, turn_y, turn_z] = lots.random::<[f32; 6]>();
+            let [chance, long, fine, turn_x, turn_y, turn_z] =
+                variation_random.random::<[f32; 6]>();
             let growth = growth(&root.place);
-            if lot >= growth.density + growth.baby {
+            if chance >= growth.density + growth.baby {
                 continue;
             }
             let Some((length, reach)) = self.around(&root.place, &guides, &tree) else { continue };
             let place = root.place.position - root.place.normal * BELOW;
-            let is_baby = lot >= growth.density;
+            let is_baby = chance >= growth.density;
             roots.push(if is_baby {
                 let turn = Vec3::new(turn_x, turn_y, turn_z) * 2.0 - 1.0;
                 let baby = self.hairline.baby_length * (0.2 + 0.8 * long * long);
                 let length = baby.min(length);
-                let way = reach.normalize_or_zero() + turn * BABY_TURN;
+                let direction = reach.normalize_or_zero() + turn * BABY_TURN;
                 let width = BABY_WIDTH * (0.8 + 0.4 * fine);
-                FollowerRoot { place, length, reach: way.normalize_or_zero() * length, width }
+                FollowerRoot { place, length, reach: direction.normalize_or_zero() * length, width }
             } else {
                 let variation = self.length_variation();
                 let own = growth.length * (1.0 - variation * long);
@@ -155,13 +156,13 @@ impl FollowerPlanting {
         Ok(FollowerRoots(kept))
     }
 
-    /// Density near a parting: higher, because no hair from farther up hides the scalp there.
+    /// Relative density, higher near a parting, where no hair from farther up hides the scalp.
     fn beside_parting(&self, place: Vec3) -> f32 {
         if !self.preset.is_parted() {
             return 1.0;
         }
-        let near = 1.0 - self.preset.aside(&self.scalp, place).abs() / PARTED;
-        ELSEWHERE + (1.0 - ELSEWHERE) * near.clamp(0.0, 1.0).sqrt()
+        let near = 1.0 - self.preset.aside(&self.scalp, place).abs() / PARTING_WIDTH;
+        DENSITY_ELSEWHERE + (1.0 - DENSITY_ELSEWHERE) * near.clamp(0.0, 1.0).sqrt()
     }
 
     fn length_variation(&self) -> f32 {
@@ -199,8 +200,8 @@ impl FollowerPlanting {
         tree: &KdTree,
     ) -> Option<(f32, Vec3)> {
         let comb = self.comb(place.position);
-        // Locks of guides may reach across a parting; what is drawn there does not. Most of the way is
-        // back and down on both sides, so the sideways part is compared on its own.
+        // Locks of guides may reach across a parting; drawn strands must not. Both sides go mostly
+        // back and down, so the sideways component is compared on its own.
         let [right, ..] = self.scalp.axes();
         let aside = comb.dot(right);
         let alike = |i: u32| {

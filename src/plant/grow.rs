@@ -40,12 +40,12 @@ pub(super) fn grow(
     roots: &[Root],
 ) -> Vec<Option<Vec<Vec3>>> {
     let leaders = leaders(planting, roots);
-    let draw_random = draw_random(planting, maps, surface, roots, &leaders);
+    let draws = draw_random(planting, maps, surface, roots, &leaders);
     let steps = steps(planting);
-    let reach = draw_random.iter().map(|lot| lot.clearance).fold(0.0, f32::max);
+    let reach = draws.iter().map(|drawn| drawn.clearance).fold(0.0, f32::max);
     let shell = planting.drape.map(|drape| Shell::of(surface, reach, 0.6 * drape.over));
     let axis_of = |i: usize, leader: Option<&[Vec3]>| {
-        axis(planting, &roots[i].place, &draw_random[i], shell.as_ref(), steps, leader)
+        axis(planting, &roots[i].place, &draws[i], shell.as_ref(), steps, leader)
     };
     // Leaders of locks first, because the others follow them.
     let is_leader = |i: usize| leaders[i] == i;
@@ -57,7 +57,7 @@ pub(super) fn grow(
             axes[i] = axis_of(i, Some(&axes[leaders[i]]));
         }
     }
-    (axes.iter().zip(&draw_random)).map(|(axis, lot)| finish(planting, axis, lot)).collect()
+    (axes.iter().zip(&draws)).map(|(axis, drawn)| finish(planting, axis, drawn)).collect()
 }
 
 /// For each root the leader of its lock: the nearest of a subset with the given spacing.
@@ -93,10 +93,10 @@ fn draw_random(
     let mut random = Xoshiro256PlusPlus::seed_from_u64(planting.seed ^ 0x60b0_d4a1);
     let up = planting.drape.map_or(Vec3::ZERO, |drape| -drape.toward.normalize_or_zero());
     let lowest = roots.iter().map(|r| r.place.position.dot(up)).fold(f32::MAX, f32::min);
-    let mut draw_random: Vec<StrandRandom> = Vec::with_capacity(roots.len());
+    let mut draws: Vec<StrandRandom> = Vec::with_capacity(roots.len());
     for root in roots {
         // The same number of draws for each strand, so that a setting does not reshuffle the rest.
-        let [short, tilt, around, phase, hand, wide, long, layer] =
+        let [short, tilt, around, phase, handedness, wide, long, layer] =
             [(); 8].map(|()| random.random::<f32>());
         let place = &root.place;
         let length =
@@ -110,7 +110,7 @@ fn draw_random(
             // A negative pitch turns the other way.
             pitch: curl.pitch
                 * vary(long, curl.variation)
-                * if hand < 0.5 && curl.phase != CurlPhase::Same { -1.0 } else { 1.0 },
+                * if handedness < 0.5 && curl.phase != CurlPhase::Same { -1.0 } else { 1.0 },
             ..curl
         });
         let phase = match planting.curl {
@@ -121,25 +121,18 @@ fn draw_random(
             let layers = drape.layering * (place.position.dot(up) - lowest);
             (drape.clearance + layers * (0.6 + 0.8 * layer)) + curl.map_or(0.0, |c| c.radius)
         });
-        draw_random.push(StrandRandom {
-            length,
-            way,
-            outward: way.dot(flat),
-            curl,
-            phase,
-            clearance,
-        });
+        draws.push(StrandRandom { length, way, outward: way.dot(flat), curl, phase, clearance });
     }
     if planting.curl.is_some_and(|curl| curl.phase == CurlPhase::PerClump) {
         for (i, &leader) in leaders.iter().enumerate() {
-            draw_random[i].phase = draw_random[leader].phase;
-            let pitch = draw_random[leader].curl.map_or(1.0, |curl| curl.pitch);
-            if let Some(curl) = &mut draw_random[i].curl {
+            draws[i].phase = draws[leader].phase;
+            let pitch = draws[leader].curl.map_or(1.0, |curl| curl.pitch);
+            if let Some(curl) = &mut draws[i].curl {
                 curl.pitch = curl.pitch.abs().copysign(pitch);
             }
         }
     }
-    draw_random
+    draws
 }
 
 /// The direction in which a strand leaves the surface.
@@ -205,14 +198,14 @@ fn axis_length(length: f32, curl: Option<&Curl>) -> f32 {
 fn axis(
     planting: &Planting,
     place: &RootPlace,
-    lot: &StrandRandom,
+    drawn: &StrandRandom,
     shell: Option<&Shell>,
     steps: usize,
     leader: Option<&[Vec3]>,
 ) -> Vec<Vec3> {
-    let step = axis_length(lot.length, lot.curl.as_ref()) / steps as f32;
+    let step = axis_length(drawn.length, drawn.curl.as_ref()) / steps as f32;
     let strength = planting.clump.map_or(0.0, |clump| clump.strength);
-    let mut way = lot.way;
+    let mut way = drawn.way;
     let mut points = Vec::with_capacity(steps + 1);
     points.push(place.position);
     let mut query = SurfaceQuery::default();
@@ -235,7 +228,7 @@ fn axis(
         let mut next = from + go * step;
         if let Some(shell) = shell {
             // The clearance grows gradually: hair lies flat at its roots.
-            let clearance = lot.clearance.min(0.4 * step * (i + 1) as f32);
+            let clearance = drawn.clearance.min(0.4 * step * (i + 1) as f32);
             if let Some((depth, off)) = shell.depth(next, clearance, &mut query) {
                 go = (next + off * depth - from).normalize_or(off);
                 next = from + go * step;
@@ -249,11 +242,11 @@ fn axis(
 }
 
 /// Curls, cuts and resamples an axis to the number of nodes.
-fn finish(planting: &Planting, axis: &[Vec3], lot: &StrandRandom) -> Option<Vec<Vec3>> {
+fn finish(planting: &Planting, axis: &[Vec3], drawn: &StrandRandom) -> Option<Vec<Vec3>> {
     let segments = (planting.nodes - 1) as usize;
-    let curled = lot.curl.map(|curl| curled(axis, &curl, lot));
+    let curled = drawn.curl.map(|curl| curled(axis, &curl, drawn));
     let line = curled.as_deref().unwrap_or(axis);
-    let mut length = lot.length;
+    let mut length = drawn.length;
     if let Some(cut) = planting.cut {
         let is_off = |p: &Vec3| (p - cut.at).dot(cut.normal) < 0.0;
         if let Some(i) = axis.iter().position(is_off) {
@@ -267,10 +260,10 @@ fn finish(planting: &Planting, axis: &[Vec3], lot: &StrandRandom) -> Option<Vec<
 }
 
 /// The helix around an axis.
-fn curled(axis: &[Vec3], curl: &Curl, lot: &StrandRandom) -> Vec<Vec3> {
+fn curled(axis: &[Vec3], curl: &Curl, drawn: &StrandRandom) -> Vec<Vec3> {
     let tangent = |i: usize| {
         let (a, b) = (axis[i.saturating_sub(1)], axis[(i + 1).min(axis.len() - 1)]);
-        (b - a).normalize_or(lot.way)
+        (b - a).normalize_or(drawn.way)
     };
     let step = axis[0].distance(axis[1]);
     let mut along = tangent(0);
@@ -283,11 +276,11 @@ fn curled(axis: &[Vec3], curl: &Curl, lot: &StrandRandom) -> Vec<Vec3> {
             across = across.reject_from_normalized(next).normalize_or(across);
             along = next;
             let passed = step * i as f32;
-            let angle = lot.phase + TAU * passed / curl.pitch;
+            let angle = drawn.phase + TAU * passed / curl.pitch;
             // The radius grows from the root on, no faster than the axis leaves the scalp.
             let grown = (passed / grown_over).min(1.0);
             let grown = sin(grown * FRAC_PI_2);
-            let radius = (curl.radius * grown * grown).min(0.7 * lot.outward * passed);
+            let radius = (curl.radius * grown * grown).min(0.7 * drawn.outward * passed);
             let side = along.cross(across);
             axis[i] + (across * cos(angle) + side * sin(angle)) * radius
         })

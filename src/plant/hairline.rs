@@ -8,8 +8,8 @@ use bevy::{math::ops::sin, prelude::*};
 use core::f32::consts::TAU;
 
 setting! {
-    /// How hair begins at the edge of the [`Scalp`]: few, short, fine hairs first, along a ragged line.
-    /// Applies to drawn strands; guides use [`Scalp::fade`].
+    /// Density, length and width of hair at the edge of the [`Scalp`]: sparse, short and fine at
+    /// first, along a ragged line. Applies to drawn strands; guides use [`Scalp::fade`].
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
     pub struct Hairline {
@@ -81,8 +81,8 @@ impl Hairline {
 }
 
 impl Scalp {
-    /// How far behind the hairline a place of the head is, along its surface (m, approximately);
-    /// negative in front of it.
+    /// Distance of a place on the head from the hairline along the surface (m, approximately),
+    /// positive behind the line, negative in front of it.
     pub fn behind_hairline(&self, place: Vec3) -> f32 {
         let (around, above) = self.beyond_hairline(place);
         // Where the line is steep its distance is less than the vertical one.
@@ -118,7 +118,8 @@ impl Scalp {
         let (hairline, cover) = (hairline.clamped(), cover.clamp(0.0, 1.0));
         for (color, place) in colors.iter_mut().zip(places) {
             let behind = self.behind_hairline(place);
-            // More than the roots there alone: hair that lies over the place shades the skin, too.
+            // Independent of the density of roots: hair that lies over the place shades the skin as
+            // well.
             let share = smooth(behind / hairline.density_over.max(1e-9)) * cover;
             let skin = Vec4::from(*color);
             *color = skin.truncate().lerp(half, share).extend(skin.w).to_array();

@@ -36,7 +36,7 @@ pub struct PlantingMaps<'a> {
 }
 
 impl<'a> PlantingMaps<'a> {
-    /// None: everywhere the same.
+    /// No maps: the same everywhere.
     pub fn new() -> Self {
         Self::default()
     }
@@ -54,8 +54,9 @@ impl<'a> PlantingMaps<'a> {
         self
     }
 
-    /// Which way strands are combed, in place of [`Planting::comb`](super::Planting::comb). Only the
-    /// part along the surface counts; where there is none, strands stand on it.
+    /// The direction in which strands are combed, in place of
+    /// [`Planting::comb`](super::Planting::comb). Only the component along the surface counts;
+    /// where that is zero, strands stand upright.
     pub fn direction(mut self, map: &'a dyn Fn(&RootPlace) -> Vec3) -> Self {
         self.direction = Some(map);
         self
@@ -94,13 +95,13 @@ pub enum MapChannel {
     Alpha,
 }
 
-/// A mask painted as vertex colours: that channel; nothing where the mesh has no colours.
+/// A mask painted as vertex colours: that channel; 0 where the mesh has no colours.
 pub fn vertex_color(channel: MapChannel) -> impl Fn(&RootPlace) -> f32 {
     move |place| place.color.map_or(0.0, |color| color[channel as usize])
 }
 
-/// A mask painted on the mesh's texture: values 0…1 in rows from the top, looked up at a place's UV
-/// and blended between pixels. UVs outside 0…1 repeat it.
+/// A mask painted on the mesh's texture: values 0…1 in rows from the top, sampled bilinearly at a
+/// place's UV. UVs outside 0…1 repeat it.
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct ImageMap {
@@ -121,7 +122,7 @@ impl ImageMap {
         Ok(Self { width, values })
     }
 
-    /// One channel of an image, as painted: grey of half brightness, 128 of 255, is a half.
+    /// One channel of an image in sRGB brightness: a value of 128 of 255 gives 0.5.
     ///
     /// # Errors
     /// When the image's pixels cannot be read: it is compressed, or not in the main world.
@@ -161,7 +162,7 @@ impl ImageMap {
         row(low.y) * (1.0 - part.y) + row(low.y + 1.0) * part.y
     }
 
-    /// The map as a function for [`PlantingMaps`]; nothing where the mesh has no UVs.
+    /// The map as a function for [`PlantingMaps`]; 0 where the mesh has no UVs.
     pub fn mask(&self) -> impl Fn(&RootPlace) -> f32 + '_ {
         |place| place.uv.map_or(0.0, |uv| self.at(uv))
     }

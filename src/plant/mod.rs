@@ -1,8 +1,8 @@
-//! Planting: hair for a mesh that has none, by rule.
+//! Planting: procedural hair for a mesh.
 //!
-//! [`Planting`] says how dense, how long, which way and how curly; [`PlantingMaps`] says where more
-//! or less of it; [`Planting::plant`] makes a [`Groom`](crate::groom::Groom) of it and says on which triangle each strand
-//! grows. The same settings, mesh and seed give the same bits.
+//! [`Planting`] holds density, length, direction and curl; [`PlantingMaps`] vary them over the
+//! mesh; [`Planting::plant`] makes a [`Groom`](crate::groom::Groom) and the triangle of each root.
+//! The same settings, mesh and seed give the same bits.
 //!
 //! ```
 //! # use bevy_keratin::plant::*; use bevy::prelude::*;

@@ -1,4 +1,4 @@
-//! Places on a mesh: where hair grows that comes from elsewhere, and points all over it.
+//! Points on a mesh: the nearest ones to given roots, and samples of the whole surface.
 
 use super::{error::PlantError, planting::RootOnMesh, surface::Surface};
 use crate::grid::KdTree;
@@ -6,14 +6,14 @@ use bevy::prelude::*;
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// How many triangles are tested for each place: those with the nearest centroids.
-const LOOKED_AT: usize = 24;
+const CANDIDATES: usize = 24;
 
 impl RootOnMesh {
-    /// The points of a mesh that are nearest to `places`, each with its distance (m): where the
-    /// strands of a groom grow that was made for this mesh. In the mesh's own space.
+    /// The points of a mesh that are nearest to `places`, each with its distance (m): the roots of
+    /// a groom that was made for this mesh. In the mesh's own space.
     ///
-    /// Nearest among the 24 triangles whose middles are nearest; where triangles of very different
-    /// sizes meet, another may be nearer.
+    /// Searched among the 24 triangles with the nearest centroids; where triangles differ a lot in
+    /// size, another may be nearer.
     ///
     /// ```
     /// # use bevy_keratin::plant::*; use bevy::prelude::*;
@@ -33,7 +33,7 @@ impl RootOnMesh {
         let tree = KdTree::new((0..surface.triangles.len()).map(middle).zip(0u32..));
         let nearest = |place: Vec3| {
             let mut best = (f32::INFINITY, Self::default());
-            for (i, _) in tree.nearest::<LOOKED_AT>(place) {
+            for (i, _) in tree.nearest::<CANDIDATES>(place) {
                 let corners = surface.corners(i as usize);
                 let weights = nearest_on(corners, place);
                 let at = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
@@ -92,7 +92,7 @@ pub(crate) struct SurfacePoint {
     pub red: f32,
 }
 
-/// `count` points all over a mesh, one in each of as many parts of equal area; always the same.
+/// `count` stratified samples of a mesh, the same each time.
 pub(crate) fn surface_points(mesh: &Mesh, count: usize) -> Result<Vec<SurfacePoint>, PlantError> {
     let surface = Surface::of(mesh)?;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0);

@@ -6,8 +6,8 @@ use super::{
 use crate::{groom::Groom, setting::Ranged};
 use bevy::prelude::*;
 
-/// Where on a mesh a strand grows, to find the place again when the mesh is skinned: the triangle's
-/// vertices with the root's share of each. Shares are ≥ 0 and sum to 1.
+/// A root on a mesh by its triangle and barycentric weights, so that it can follow when the mesh is
+/// skinned. Weights are ≥ 0 and sum to 1.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct RootOnMesh {
@@ -31,9 +31,9 @@ impl Planting {
     /// Plants hair all over `mesh`, whose triangles may be a list or a strip, indexed or not.
     /// Directions follow its normals, where it has some.
     ///
-    /// Spacing is even: density is met within a per cent, and no two roots are nearer than half the
-    /// mean spacing 1/√density. Where surfaces overlap within that distance, the minimum distance takes
-    /// precedence over density.
+    /// Spacing is even (Poisson disk): the density is exact to a per cent, and no two roots are
+    /// nearer than half the mean spacing 1/√density. Where surfaces overlap within that distance,
+    /// the minimum distance takes precedence over density.
     ///
     /// # Errors
     /// When a setting is out of its range, the mesh has no triangles with an area or vertices that
@@ -43,7 +43,7 @@ impl Planting {
         self.plant_with(mesh, &PlantingMaps::new())
     }
 
-    /// Plants hair with density, length or direction that differ from place to place.
+    /// Plants hair with density, length or direction that vary over the mesh.
     ///
     /// # Errors
     /// Those of [`plant`](Self::plant); also when the density map leaves no room for a single strand.

@@ -1,4 +1,4 @@
-//! Presets: hair that looks right untouched, from straight to coily and from short to long.
+//! Presets: complete recipes for hair from straight to coily and from short to long.
 
 use super::{
     error::PlantError,
@@ -16,7 +16,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// A head of hair: how it is planted, how stiff it is and how it looks.
+/// A preset of hair: planting, stiffness and look.
 ///
 /// Shapes follow measurements where there are some. The radius of a hair's bends is 57 ± 22 mm on
 /// tresses of straight hair and 22 ± 18 mm on curly ones (J. Cosmet. Sci. 64:26);
@@ -53,7 +53,7 @@ pub enum HairPreset {
     Bob,
     /// Straight down the back.
     Long,
-    /// Short fur of 15 mm, combed from front to back and down, that covers all of any mesh: it has no
+    /// Short fur of 15 mm, combed from front to back and down, that covers a whole mesh: it has no
     /// hairline. Cheap guides, 50 per dm², and twice as many drawn strands as on a head.
     Fur,
 }
@@ -107,8 +107,8 @@ impl HairPreset {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
     }
 
-    /// Plants it on a head's mesh, which may have neck and shoulders for hair to lie on. Settings are
-    /// in metres: the mesh is of life size.
+    /// Plants it on a head's mesh, which may have neck and shoulders for hair to lie on. Settings
+    /// are in metres: the mesh has to be life-size.
     ///
     /// # Errors
     /// When the mesh cannot be planted; see [`Planting::plant`].
@@ -139,7 +139,7 @@ impl HairPreset {
         self.plant_where(planting, mesh, scalp, &|_| 1.0)
     }
 
-    /// The same where `share` leaves it.
+    /// The same with the density multiplied by `share`.
     pub(crate) fn plant_where(
         self,
         planting: &Planting,
@@ -182,7 +182,7 @@ impl HairPreset {
         self == Self::Fur
     }
 
-    /// How hair begins at the hairline of its drawn strands.
+    /// The hairline of its drawn strands.
     pub fn hairline(self) -> Hairline {
         let base = Hairline::default();
         match self {
@@ -205,19 +205,20 @@ impl HairPreset {
         (off.dot(right) - parting) * scalp.height
     }
 
-    /// Away from the parting; in front to the back as well, so that the face is free.
+    /// Combing direction: away from the parting, in front to the back as well to keep the face
+    /// free.
     pub(super) fn direction(self, scalp: &Scalp, place: Vec3) -> Vec3 {
         let [right, _, front] = scalp.axes();
         let off = (place - scalp.center) / scalp.height;
         let forward = off.dot(front);
         let side = if self.aside(scalp, place) < 0.0 { -1.0 } else { 1.0 };
-        // Behind the crown there is no parting; before it, down would be into the face.
+        // Behind the crown there is no parting; in front of it, down would be into the face.
         let across = (0.6 + 2.0 * (forward + 0.2)).clamp(0.0, 1.0);
         let down = (0.5 - forward).clamp(0.0, 0.6);
         right * (side * across) - front * (0.35 + 1.4 * forward.max(0.0)) - *scalp.up * down
     }
 
-    /// Hair is cut shorter at the sides and the nape.
+    /// Share of the length: shorter at the sides and the nape.
     pub(super) fn length_share(self, scalp: &Scalp, place: Vec3) -> f32 {
         if self != Self::Short {
             return 1.0;
@@ -227,7 +228,7 @@ impl HairPreset {
         0.28 + 0.72 * height * height * (3.0 - 2.0 * height)
     }
 
-    /// How it is planted; to be changed before [`Planting::plant_with`].
+    /// Its planting settings, to be changed before [`Planting::plant_with`].
     pub fn planting(self, scalp: &Scalp) -> Planting {
         let [right, up, front] = scalp.axes();
         let crown = scalp.place(0.05, 0.9, -0.35);
@@ -300,7 +301,7 @@ impl HairPreset {
                 length_variation: 0.04,
                 nodes: 18,
                 drape: Some(Drape { layering: 0.09, ..drape }),
-                // Higher in front, where the way down is longer: it hangs in one line.
+                // Higher in front, where hair hangs lower, so that all ends in one line.
                 cut: Some(Cut {
                     at: scalp.place(0.0, -0.9, 0.0),
                     normal: up - front * 0.25,
@@ -327,7 +328,7 @@ impl HairPreset {
 
     /// The settings for the [`Hair`](crate::Hair) entity.
     pub fn settings(self) -> PresetSettings {
-        // A bare fibre has 0.045 m; hair holds together and stands better.
+        // A single fibre has 0.045 m; locks are stiffer.
         let bending_length = match self {
             Self::Straight | Self::Bob => 0.08,
             Self::Long => 0.075,
@@ -337,7 +338,7 @@ impl HairPreset {
             Self::Short => 0.12,
             Self::Fur => 0.05,
         };
-        // Tufts of fur are too short to reach across each other.
+        // Strands of fur are too short to cross each other.
         let contact = match self {
             Self::Fur => LockContact { strength: 0.0, ..default() },
             _ => LockContact::default(),

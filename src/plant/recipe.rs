@@ -1,4 +1,4 @@
-//! How hair is to be planted.
+//! Settings of planting.
 
 use crate::setting::{Ranged, ValueRange, Violations, setting};
 use bevy::prelude::*;
@@ -8,7 +8,7 @@ use core::f32::consts::TAU;
 /// 116431).
 pub const HUMAN_DENSITY: f32 = 223e4;
 
-/// The most strands that one planting gives.
+/// The maximum number of strands of one planting.
 pub const MAX_ROOTS: usize = 1_000_000;
 
 setting! {
@@ -34,7 +34,7 @@ setting! {
     pub struct Planting {
         /// Strands per area; 10,000 are one per cm² and suit guides, a human has [`HUMAN_DENSITY`].
         pub density: f32 = 1e4, "1/m²" in DENSITY: 1e-6..=1e12, safe 1.0..=3e6,
-            "guides have 10000, a human 2230000; give what is per cm² times 10000";
+            "guides have 10000, a human 2230000; multiply values per cm² by 10000";
         /// The same seed gives the same strands.
         pub seed: u64 = 0;
         /// Nodes of each strand, root and tip included, equally spaced along it; at least four for
@@ -48,8 +48,8 @@ setting! {
             "0.1 is natural";
         /// Which way strands are combed.
         pub comb: CombPattern = CombPattern::Out => Ranged::clamp_values;
-        /// How far strands lean from the surface's normal the way they are combed; never flat, so
-        /// that they leave the scalp. Hair on a head leans by about 1.
+        /// Angle by which strands lean from the surface's normal in the direction of the comb;
+        /// limited, so that they leave the scalp. Hair on a head leans by about 1.
         pub lean: f32 = 0.0, "rad" in LEAN: 0.0..=1.45, safe 0.0..=1.4,
             "0 stands on the surface; flatter than 1.45 strands would run into it";
         /// Random deviation of a strand's direction.
@@ -57,9 +57,9 @@ setting! {
             "0.08 is combed, 0.5 wild";
         /// Curls; `None` is straight.
         pub curl: Option<Curl> = None => Ranged::clamp_values;
-        /// Locks, whose tips draw together.
+        /// Locks, whose tips converge.
         pub clump: Option<Clump> = None => Ranged::clamp_values;
-        /// How strands turn and lie down over the mesh; with `None` each grows straight on.
+        /// How strands bend and lie down over the mesh; with `None` each grows straight.
         pub drape: Option<Drape> = None => Ranged::clamp_values;
         /// Where strands are cut.
         pub cut: Option<Cut> = None => Ranged::clamp_values;
@@ -67,18 +67,18 @@ setting! {
 }
 
 impl Planting {
-    /// How much lower a [`Cut`] is than before, as a share of what hair gets longer.
-    const CUT_GOES_ALONG: f32 = 0.5;
-    /// The fewest segments of a strand that is made shorter.
-    const FEWEST_SEGMENTS: f32 = 6.0;
+    /// How far a [`Cut`] moves down, as a share of the change of length.
+    const CUT_SHIFT: f32 = 0.5;
+    /// The minimum number of segments of a shortened strand.
+    const MIN_SEGMENTS: f32 = 6.0;
 
-    /// The same with strands so many times as long, in segments as long as before. A cut goes along by
-    /// half of what they get longer.
+    /// The same with strands `times` as long, in segments of the same length. A cut moves by half
+    /// of the change of length.
     #[must_use]
     pub fn lengthened(self, times: f32) -> Self {
         let segments = self.nodes.saturating_sub(1) as f32;
-        let fewest = segments.min(Self::FEWEST_SEGMENTS);
-        let longer = self.length * (times - 1.0) * Self::CUT_GOES_ALONG;
+        let fewest = segments.min(Self::MIN_SEGMENTS);
+        let longer = self.length * (times - 1.0) * Self::CUT_SHIFT;
         let cut = self.cut.map(|cut| Cut {
             at: cut.at - cut.normal.normalize_or_zero() * longer,
             least: cut.least * times,
@@ -89,29 +89,29 @@ impl Planting {
     }
 }
 
-/// Which way strands are combed: the direction in which they [lean](Planting::lean). A direction map
-/// ([`PlantingMaps::direction`](super::PlantingMaps::direction)) goes before it.
+/// Which way strands are combed: the direction in which they [lean](Planting::lean). A direction
+/// map ([`PlantingMaps::direction`](super::PlantingMaps::direction)) takes precedence.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum CombPattern {
     /// Not at all: straight out of the surface.
     #[default]
     Out,
-    /// All one way; only the part along the surface counts.
+    /// One direction everywhere; only the component along the surface counts.
     Along(Vec3),
     /// Around a crown.
     Whorl {
         /// Its centre (m).
         center: Vec3,
-        /// Angle (rad) between the way straight away from the centre, at 0, and the comb's, against
-        /// the clock as seen from outside: ±π/2 goes around, π towards it.
+        /// Angle (rad) from the direction straight away from the centre to the comb's,
+        /// counter-clockwise as seen from outside: ±π/2 goes around, π towards it.
         turn: f32,
     },
     /// Away from a plane through the hair, on both sides of it.
     Parted {
         /// A point of the plane (m).
         at: Vec3,
-        /// The plane's normal; its length weighs against `along`.
+        /// The plane's normal; its length is its weight relative to `along`.
         across: Vec3,
         /// A direction that is added on both sides, such as a little to the back.
         along: Vec3,
@@ -142,7 +142,7 @@ fn place(what: &'static str, at: &mut Vec3, violations: &mut Violations) {
     Cut::AT.named(what).clamp(at, || Vec3::ZERO, violations);
 }
 
-/// A direction needs a length.
+/// Checks that a direction is longer than 0.
 fn direction(what: &'static str, way: &mut Vec3, violations: &mut Violations) {
     let range = ValueRange::new(what, 1e-6..=1e6, "give a finite vector that is longer than 0");
     if let Err(wrong) = range.check(way.length()) {
@@ -152,11 +152,11 @@ fn direction(what: &'static str, way: &mut Vec3, violations: &mut Violations) {
 }
 
 setting! {
-    /// A helix around the way a strand grows.
+    /// A helix around the axis of a strand.
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
     pub struct Curl {
-        /// Radius of the helix. Near the root it grows from nothing.
+        /// Radius of the helix. It starts at 0 at the root.
         pub radius: f32 = 5e-3, "m" in RADIUS: 1e-6..=1e3, safe 0.5e-3..=0.05,
             "0.005 is a finger's curl";
         /// Length along the helix's axis of one turn. Together they bend the strand with a radius of
@@ -165,7 +165,7 @@ setting! {
             "0.025 is a finger's curl";
         /// By how much radius and pitch may differ from strand to strand, a share.
         pub variation: f32 = 0.1, in VARIATION: 0.0..=0.9, "0.1 is natural";
-        /// Which strands turn together.
+        /// Which strands share their phase.
         pub phase: CurlPhase = CurlPhase::PerClump;
     }
 }
@@ -204,25 +204,25 @@ setting! {
         /// How far apart the locks' middles are at the scalp.
         pub spacing: f32 = 12e-3, "m" in SPACING: 1e-5..=1e3, safe 1e-3..=0.1,
             "locks are 0.012 apart";
-        /// Share of the way to the lock's middle that tips go.
+        /// How far tips converge on the lock's middle, as a share of the distance.
         pub strength: f32 = 0.5, in STRENGTH: 0.0..=0.95, "0.5 shows locks";
     }
 }
 
 setting! {
-    /// How strands turn toward a direction as they grow, like heavy hair or hair combed down. Their rest
-    /// shape already keeps off the mesh.
+    /// How strands bend toward a direction as they grow, like heavy hair or hair combed down. Their
+    /// rest shape already avoids the mesh.
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
     pub struct Drape {
-        /// Where they turn.
+        /// The direction.
         pub toward: Vec3 = Vec3::NEG_Y => |way, violations| direction("Drape::toward", way, violations);
-        /// Length over which they turn there.
+        /// Length over which they bend there.
         pub over: f32 = 0.03, "m" in OVER: 1e-4..=1e6, safe 0.002..=10.0, "0.03 is soft hair";
         /// How far off the mesh they stay.
         pub clearance: f32 = 4e-3, "m" in CLEARANCE: 0.0..=1e3, safe 0.0..=0.1,
             "0.004 lies on the scalp";
-        /// How much farther off those stay that grow higher up, and so lie on top: m per m of height
+        /// Additional clearance of strands that grow higher up and so lie on top: m per m of height
         /// above the lowest root.
         pub layering: f32 = 0.06, in LAYERING: 0.0..=10.0, safe 0.0..=1.0, "0.06 is full hair";
     }
@@ -237,7 +237,7 @@ setting! {
         pub at: Vec3 = Vec3::ZERO, "m" in AT: -1e6..=1e6, "give a finite place";
         /// Toward the side where hair stays.
         pub normal: Vec3 = Vec3::Y => |way, violations| direction("Cut::normal", way, violations);
-        /// The least length that is left, also of strands that grow beyond the plane.
+        /// Minimum length that is left, also of strands that grow beyond the plane.
         pub least: f32 = 0.02, "m" in LEAST: 1e-5..=1e4, safe 1e-3..=1.0,
             "0.02 is a centimetre of stubble or two";
     }

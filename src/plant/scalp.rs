@@ -84,7 +84,7 @@ impl Scalp {
         (around, atan2(up, flat) - hairline(around) * PI / 180.0 - self.recede)
     }
 
-    /// How much the hairline rises for as much way around.
+    /// Slope of the hairline: elevation over the angle around the head.
     pub(super) fn hairline_slope(&self, around: f32) -> f32 {
         (hairline((around + 2.0).min(180.0)) - hairline((around - 2.0).max(0.0))) / 4.0
     }

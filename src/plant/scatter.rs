@@ -1,4 +1,4 @@
-//! Even spacing: many candidates, of which the most crowded go one by one.
+//! Evenly spaced roots by eliminating the most crowded of many candidates.
 //!
 //! Weighted sample elimination after Yuksel 2015 ("Sample Elimination for Generating Poisson Disk
 //! Sample Sets"), with distances that adapt to the density map.
@@ -17,12 +17,12 @@ use core::cmp::Ordering;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::collections::BinaryHeap;
 
-/// Candidates for each root that stays.
+/// Candidates per root.
 const CANDIDATES: f64 = 5.0;
-/// The most candidates that are looked at; the density map leaves few of them on most meshes.
+/// The maximum number of candidates drawn; the density map rejects most of them on most meshes.
 const MAX_DRAWN: f64 = 1e8;
-/// The least share of the density at which spacing still grows: below, candidates would have to look
-/// ever farther for their neighbours.
+/// Below this share of the density spacing does not grow any more: the radius of the neighbour
+/// search would grow without limit.
 const SPARSE: f32 = 0.25;
 
 /// Roots at `density` (1/m²) times the density map.

@@ -9,19 +9,19 @@ use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 /// Number of sample points of the mesh.
 const POINTS: usize = 40_000;
 
-/// Over how many points in a row normals are smoothed at most.
-const MOST_SMOOTH: f32 = 6.0;
+/// The maximum smoothing radius of normals, in units of the spacing of points.
+const MAX_SMOOTHING: f32 = 6.0;
 
-/// One of so many points is in the coarse search, which gives the start of the fine one.
+/// Every `COARSE`th point is in the coarse tree, which gives the start of the fine search.
 const COARSE: usize = 8;
 
-/// The most steps of a fine search; usually two.
-const MOST_STEPS: usize = 64;
+/// The maximum number of steps of a fine search; usually two.
+const MAX_STEPS: usize = 64;
 
 /// Points all over a surface with its normals.
 pub(super) struct Shell {
     points: Vec<(Vec3, Vec3)>,
-    /// How far apart they are (m).
+    /// Their mean spacing (m).
     spacing: f32,
     /// Distance beyond which the surface has no effect (m).
     reach: f32,
@@ -29,9 +29,9 @@ pub(super) struct Shell {
     coarse: KdTree,
     /// Finds a point's neighbours.
     fine: UniformGrid,
-    /// Finds the points over which a normal is a mean.
+    /// Finds the points over which a normal is averaged.
     around: UniformGrid,
-    /// How far these are away at most (m).
+    /// The radius of that average (m).
     smooth: f32,
     /// Cache of mean normals: strands come near only a small part of most meshes.
     means: Vec<Cell<Option<Vec3>>>,
@@ -56,7 +56,7 @@ impl Shell {
             .map(|root| (root.place.position, root.place.normal))
             .collect();
         let spacing = (surface.area() / POINTS as f64).sqrt() as f32;
-        let smooth = smooth.min(MOST_SMOOTH * spacing);
+        let smooth = smooth.min(MAX_SMOOTHING * spacing);
         let places = || points.iter().map(|p| p.0).zip(0u32..);
         let grid = |cell: f32| {
             let mut grid = UniformGrid::default();
@@ -110,7 +110,7 @@ impl Shell {
     fn walk(&self, to: Vec3, from: usize) -> usize {
         let square = |i: usize| to.distance_squared(self.points[i].0);
         let mut best = (square(from), from);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let before = best.1;
             self.fine.for_each_near(self.points[before].0, |i| {
                 let square = square(i as usize);

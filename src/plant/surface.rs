@@ -1,4 +1,4 @@
-//! A mesh as a surface on which points are drawn.
+//! A mesh as a surface for sampling points.
 
 use super::{error::PlantError, map::RootPlace};
 use bevy::{
@@ -10,7 +10,7 @@ use rand::{RngExt, rngs::Xoshiro256PlusPlus};
 /// The triangles of a mesh that have an area.
 pub(super) struct Surface {
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Area up to and with each triangle (m²).
+    /// Cumulative area up to and including each triangle (m²).
     areas: Vec<f64>,
     positions: Vec<Vec3>,
     normals: Option<Vec<Vec3>>,
@@ -44,7 +44,7 @@ impl Surface {
             }
             let [a, b, c] = triangle.map(|v| positions[v as usize].as_dvec3());
             let area = 0.5 * (b - a).cross(c - a).length();
-            // Slivers whose area is rounding have no normal either.
+            // Slivers whose area is only rounding error have no normal either.
             let longest = (b - a).length_squared().max((c - a).length_squared());
             if area > 1e-12 * longest {
                 total += area;
@@ -95,7 +95,7 @@ impl Surface {
         each.fold((0, 0.0), |most, v| if v.1 > most.1 { v } else { most })
     }
 
-    /// `count` points, one drawn from each of as many parts of equal area.
+    /// `count` stratified samples: one from each of `count` strata of equal area.
     pub(super) fn draw<'a>(
         &'a self,
         count: usize,
@@ -160,7 +160,7 @@ fn attribute(
 }
 
 fn triangles(mesh: &Mesh, vertices: usize) -> Result<Vec<[u32; 3]>, PlantError> {
-    // The highest number of its type begins a new strip.
+    // The largest value of the index type restarts a strip.
     let (indices, restart): (Vec<u32>, u32) =
         match mesh.try_indices_option().map_err(|_| PlantError::Extracted)? {
             Some(Indices::U16(i)) => (i.iter().map(|&i| u32::from(i)).collect(), 0xffff),

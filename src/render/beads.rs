@@ -31,7 +31,7 @@ use bevy::{
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct Bead {
-    /// Its middle, in the world (m).
+    /// Its centre, in the world (m).
     pub position: Vec3,
     /// Radius at rest (m). A drop of 1 mm³ has 0.62 mm; nothing is drawn at 0.
     pub radius: f32,
@@ -73,12 +73,12 @@ pub struct HairBeads(pub Vec<Bead>);
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairBeadSystems;
 
-/// How long a drop takes to sink into itself where it lies (s), and how far, as a share of its radius.
+/// How long a drop takes to flatten where it lies (s), and by how much, as a share of its radius.
 const SINKING: f32 = 0.06;
 const SUNK: f32 = 0.6;
 
-/// Droplets interpolated between two ticks. Lying ones are sunk into the surface as caps, and shrink as
-/// they run off.
+/// Droplets interpolated between two ticks. Those that lie on something flatten to caps, and shrink
+/// as they run off.
 pub(super) fn show_droplets(
     mut beads: ResMut<HairBeads>,
     droplets: Query<&Droplet>,
@@ -124,7 +124,7 @@ struct DrawnBeads {
 const CORNER: MeshVertexAttribute =
     MeshVertexAttribute::new("Bead_Corner", 0x6b65_7261_7469_6e02, VertexFormat::Uint32);
 const SHADER: &str = "embedded://bevy_keratin/render/beads.wgsl";
-const LEAST_ROOM: usize = 64;
+const MIN_CAPACITY: usize = 64;
 const MOST: usize = 1 << 20;
 
 #[derive(Asset, AsBindGroup, TypePath, Clone, Debug)]
@@ -197,7 +197,7 @@ fn pack(
         return;
     }
     let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
-    let room = count.max(LEAST_ROOM).next_power_of_two().max(drawn.packed.len());
+    let room = count.max(MIN_CAPACITY).next_power_of_two().max(drawn.packed.len());
     let grown = room != drawn.packed.len();
     let packed = beads.iter().take(count).map(|bead| {
         let packed = bead.packed();
@@ -241,7 +241,7 @@ fn upload(
         return;
     };
     let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
-    // Not in the frame in which a new device's queue is combined with buffers of a lost one.
+    // Skipped in the frame in which a new device's queue is combined with buffers of a lost one.
     if let Some(gpu) = buffers.get(&drawn.buffer)
         && !queue.is_changed()
         && gpu.buffer.size() == bytes.len() as u64

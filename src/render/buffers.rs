@@ -11,11 +11,11 @@ use half::{f16, slice::HalfFloatSliceExt};
 /// The buffers of a drawn [`Hair`](crate::Hair), on the same entity. Bind them in a material of your
 /// own to draw the hair another way; `#import bevy_keratin::strands` has the structures and the curve.
 ///
-/// All numbers are little-endian `f32` or `u32`, all places are in the hair's frame (m).
+/// All numbers are little-endian `f32` or `u32`, all positions are in the hair's frame (m).
 ///
 /// | buffer | stride | holds |
 /// |---|---|---|
-/// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain and moisture (2 × f16), length from the root at rest (m), motion since the frame before (3 × f16, in m/1024), 1 if the guide may be shown (f16) |
+/// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain and moisture (2 × f16), length from the root at rest (m), motion since the frame before (3 × f16, in m/1024), 1 if the guide is valid (f16) |
 /// | `guides` | 8 | first node and number of nodes of each guide |
 /// | `strands` | 128 | [`DrawnStrand`]: the guides first, then the followers |
 ///
@@ -50,8 +50,8 @@ fn usable(p: Vec3) -> bool {
 }
 
 /// Packs a guide's nodes into `out`, one each; `known` if `out` holds those of the previous frame.
-/// Invalid nodes take the place of the node before them; a guide without valid nodes is not shown.
-/// Returns the box around the packed nodes.
+/// Invalid nodes take the position of the node before them; a guide without valid nodes is not
+/// drawn. Returns the box around the packed nodes.
 pub(super) fn pack_guide(
     out: &mut [PackedNode],
     known: bool,

@@ -1,11 +1,11 @@
-//! Points on drawn strands: the Rust twin of `strands.wgsl`, for tools, tests and effects that
-//! need to know where a follower is.
+//! Points on drawn strands: the same mathematics as `strands.wgsl`, for tools, tests and effects
+//! that need the position of a follower.
 
 use super::{
     drawn_strand::{DrawnStrand, GuideRoot},
     follower_roots::FollowerRoots,
     followers::HairFollowers,
-    locks::lot,
+    locks::random_unit,
     scatter::scatter,
 };
 use bevy::prelude::*;
@@ -121,10 +121,10 @@ pub fn strand_point<'a>(
             guide_way.dot(near_way) / (guide_way.length() * near_way.length()).max(1e-12);
         let together = if t <= 0.0 { 1.0 } else { smoothstep(0.0, 0.6, together) };
         let parting = followers.parting;
-        let goes = (1.0 - smoothstep(parting, 1.5 * parting, apart)) * together;
-        sum += own * goes;
-        way += own * goes * guide_way;
-        slope += goes * (own * guide_slope + locks.rates[k] * guide_way);
+        let blending = (1.0 - smoothstep(parting, 1.5 * parting, apart)) * together;
+        sum += own * blending;
+        way += own * blending * guide_way;
+        slope += blending * (own * guide_slope + locks.rates[k] * guide_way);
     }
     let (gather, most) = match strand.is_guide {
         true => (Vec3::ZERO, 0.0),
@@ -180,13 +180,13 @@ struct Locks {
 
 /// Every level acts on the distance that the previous levels have left.
 fn locks_at(strand: &DrawnStrand, t: f32, followers: &HairFollowers) -> Locks {
-    let gone = t.max(1e-4).powf(followers.lock_shape);
-    let rising = followers.lock_shape * gone / t.max(1e-4);
+    let eased_distance = t.max(1e-4).powf(followers.lock_shape);
+    let rising = followers.lock_shape * eased_distance / t.max(1e-4);
     let mut locks =
         Locks { root: Vec3::ZERO, root_rate: Vec3::ZERO, weights: [0.0; 3], rates: [0.0; 3] };
     let mut left = Rising { value: 1.0, rate: 0.0 };
     for (level, to) in strand.locks.iter().enumerate() {
-        let pull = followers.locks[level] * gone;
+        let pull = followers.locks[level] * eased_distance;
         let pulling = followers.locks[level] * rising;
         let share = pull * left.value;
         let rate = pulling * left.value + pull * left.rate;
@@ -222,7 +222,7 @@ fn frizz_at(strand: &DrawnStrand, root: Vec3, t: f32, most: f32) -> CurvePoint {
     let rising = 1.3 * height / t.max(1e-4);
     let place = root + THROUGH * (strand.size * t);
     // Neighbours have nearly equal frizz.
-    let own = 0.2 * lot(strand.seed.wrapping_add(31));
+    let own = 0.2 * random_unit(strand.seed.wrapping_add(31));
     let mut sum = CurvePoint::default();
     for (length, share) in OCTAVES {
         for (along, lean, waves, begin) in WAVES {

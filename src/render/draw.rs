@@ -45,9 +45,9 @@ pub(super) struct Packed {
     margin: f32,
     ribbon: Ribbon,
     key: RibbonKey,
-    /// Where drawn strands grow at rest: what streaks go by.
+    /// Roots of drawn strands at rest, which determine their streaks.
     places: Vec<Vec3>,
-    /// The streaks that the GPU has.
+    /// The streaks last uploaded to the GPU.
     streaks: Vec<Option<Streaks>>,
 }
 
@@ -57,7 +57,7 @@ struct PackedGuide {
     strand: Entity,
     /// How many nodes it has.
     nodes: u32,
-    /// Where its root was when followers were laid out (m).
+    /// Position of its root when followers were laid out (m).
     root: Vec3,
 }
 
@@ -102,7 +102,7 @@ pub(super) fn pack(
         ),
         Without<Settling>,
     >,
-    mut shorn: RemovedComponents<FollowerRoots>,
+    mut roots_removed: RemovedComponents<FollowerRoots>,
     strands: Query<GuideParts>,
     mut drawn: Query<(&mut Aabb, &MeshMaterial3d<RibbonMaterial>)>,
     (looks, dyes, views): (Settings<HairLook>, Settings<HairDye>, Settings<HairView>),
@@ -118,23 +118,25 @@ pub(super) fn pack(
         _ => 1.0,
     };
     let new_device = device.is_some_and(|device| device.is_changed());
-    let shorn: Vec<Entity> = shorn.read().collect();
+    let roots_removed: Vec<Entity> = roots_removed.read().collect();
     for (hair, mut packed, buffers, members, follower_roots, place, elsewhere) in &mut hairs {
         let packed = packed.bypass_change_detection();
         let guides = || members.into_iter().flat_map(|m| m.iter());
         let settings = followers.of(hair);
-        // What is drawn elsewhere keeps its guides: hair whose strands change comes back first.
+        // The nodes of hair on the GPU are not here, and its guides stay the same: it returns before they
+        // change.
         let elsewhere = elsewhere.map(|mut drawn| {
             let drawn = drawn.bypass_change_detection();
             drawn.overstep = if drawn.rests { 1.0 } else { overstep };
             (drawn.low, drawn.high)
         });
         let elsewhere = elsewhere.filter(|_| buffers.is_some() && !packed.layout.is_empty());
-        let mut regroomed = packed.note_followers(&settings);
+        let mut has_new_layout = packed.update_followers(&settings);
         if elsewhere.is_none() {
-            regroomed |= packed.note_layout(guides(), &strands);
+            has_new_layout |= packed.update_layout(guides(), &strands);
         }
-        regroomed |= follower_roots.as_ref().map_or(shorn.contains(&hair), Ref::is_changed);
+        has_new_layout |=
+            follower_roots.as_ref().map_or(roots_removed.contains(&hair), Ref::is_changed);
 
         let (low, high) = match elsewhere {
             Some(corners) => {
@@ -142,7 +144,7 @@ pub(super) fn pack(
                 corners
             }
             None => {
-                let known = !regroomed && !core::mem::take(&mut packed.is_stale);
+                let known = !has_new_layout && !core::mem::take(&mut packed.is_stale);
                 packed.pack_nodes(&strands, overstep, known).unwrap_or_default()
             }
         };
@@ -159,7 +161,7 @@ pub(super) fn pack(
             }
             continue;
         }
-        if !regroomed && let Some(((mut bounds, material), buffers)) = known {
+        if !has_new_layout && let Some(((mut bounds, material), buffers)) = known {
             bounds.set_if_neq(around(packed.margin));
             // A new device after a loss gets all buffers again; these nodes are the present ones.
             if new_device && let Some(mut nodes) = shader_buffers.get_mut(&buffers.nodes) {
@@ -167,13 +169,13 @@ pub(super) fn pack(
             }
             let counts = (buffers.guide_count, buffers.strand_count);
             let ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
-            let is_streaked_anew = packed.note_streaks(&dye);
-            if is_streaked_anew || (packed.ribbon, packed.key) != (ribbon, key) {
+            let has_new_streaks = packed.update_streaks(&dye);
+            if has_new_streaks || (packed.ribbon, packed.key) != (ribbon, key) {
                 (packed.ribbon, packed.key) = (ribbon, key);
                 if let Some(mut material) = materials.get_mut(&material.0) {
                     material.key = key;
                     material.ribbon = ribbon;
-                    if is_streaked_anew {
+                    if has_new_streaks {
                         material.streaks = shader_buffers.add(buffer(&packed.pack_streaks()));
                     }
                 }
@@ -185,7 +187,7 @@ pub(super) fn pack(
         let counts = (packed.layout.len() as u32, strands.len() as u32);
         packed.ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
         packed.key = key;
-        packed.note_streaks(&dye);
+        packed.update_streaks(&dye);
         let mut first = 0;
         let ranges = packed.layout.iter().map(|guide| {
             first += guide.nodes;
@@ -229,14 +231,14 @@ pub(super) fn pack(
     }
 }
 
-/// Kept here as well, for the case that the device is lost and another takes its place.
+/// The data stay in the main world as well, for a new device after a device loss.
 fn buffer(bytes: &[u8]) -> ShaderBuffer {
     ShaderBuffer::new(bytes, RenderAssetUsages::default())
 }
 
 impl Packed {
-    /// Notes which strands are in streaks; says whether they are others than before.
-    fn note_streaks(&mut self, dye: &HairDye) -> bool {
+    /// Updates the streaks; returns whether they have changed.
+    fn update_streaks(&mut self, dye: &HairDye) -> bool {
         let streaks = || dye.layers.iter().map(|layer| layer.streaks);
         let has_changed = !self.streaks.iter().copied().eq(streaks());
         if has_changed {
@@ -246,8 +248,8 @@ impl Packed {
         has_changed
     }
 
-    /// The layers in whose streaks each drawn strand is; a word that is not looked at where no layer
-    /// has any.
+    /// For each drawn strand a bit mask of the layers whose streaks it is in; a single unused word
+    /// if no layer has streaks.
     fn pack_streaks(&self) -> Vec<u8> {
         let mut words = vec![0u32; 1];
         for (layer, streaks) in self.streaks.iter().enumerate() {
@@ -260,8 +262,8 @@ impl Packed {
         bytemuck::cast_slice(&words).to_vec()
     }
 
-    /// Notes which strands are guides; says whether that has changed.
-    fn note_layout(
+    /// Updates the list of guides; returns whether it has changed.
+    fn update_layout(
         &mut self,
         members: impl Iterator<Item = Entity>,
         strands: &Query<GuideParts>,
@@ -296,9 +298,9 @@ impl Packed {
         changed | core::mem::take(&mut self.roots_moved)
     }
 
-    /// Notes how guides are followed; says whether that has changed.
-    fn note_followers(&mut self, followers: &HairFollowers) -> bool {
-        // Settings that the shader reads from the uniform need no new strands.
+    /// Updates the settings of followers; returns whether the drawn strands depend on the change.
+    fn update_followers(&mut self, followers: &HairFollowers) -> bool {
+        // Settings that the shader reads from the uniform do not change the strands.
         let grown = |f: &HairFollowers| HairFollowers {
             clump: 0.0,
             parting: 0.0,
@@ -324,7 +326,7 @@ impl Packed {
         self.nodes.resize(count, default());
         let mut rest = &mut self.nodes[..];
         let mut bounds: Option<(Vec3, Vec3)> = None;
-        let (mut still, mut elsewhere) = (true, false);
+        let (mut still, mut displaced) = (true, false);
         for guide in &self.layout {
             let (own, others) = rest.split_at_mut(guide.nodes as usize);
             rest = others;
@@ -343,14 +345,14 @@ impl Packed {
             );
             let root = packed_place(&own[0]);
             still &= root.distance_squared(root_before) < 1e-12;
-            elsewhere |= root.distance(guide.root) > 0.25 * self.spacing;
+            displaced |= root.distance(guide.root) > 0.25 * self.spacing;
             bounds = match (bounds, around) {
                 (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
                 (a, b) => a.or(b),
             };
         }
         // Followers move with their roots; neighbours are chosen again once roots rest.
-        self.roots_moved = known && still && elsewhere;
+        self.roots_moved = known && still && displaced;
         bounds
     }
 
@@ -378,7 +380,7 @@ impl Packed {
             }));
         }
         let roots = core::mem::take(&mut self.roots);
-        self.note_roots();
+        self.record_roots();
         let drawn = scatter(&roots, follower_roots, followers);
         let reach = |strand: &DrawnStrand| {
             let own = roots[strand.guides[0] as usize].place;
@@ -414,7 +416,7 @@ impl Packed {
     }
 
     /// Records the present roots, now that followers are laid out.
-    fn note_roots(&mut self) {
+    fn record_roots(&mut self) {
         let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
         let mut first = 0;
         for guide in &mut self.layout {

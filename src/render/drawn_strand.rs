@@ -3,10 +3,10 @@
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// The offset from a strand to the one in the middle of its lock.
+/// The offset from a strand to the centre strand of its lock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LockOffset {
-    /// Between their roots (m); along the strand it has no part, which keeps its length.
+    /// Between their roots (m), perpendicular to the strand, which keeps its length.
     pub root: Vec3,
     /// Difference of the middle's guide weights, sum 0.
     pub weights: [f32; 3],
@@ -22,14 +22,14 @@ pub struct DrawnStrand {
     pub seed: u32,
     /// Shares of the guides, sum 1.
     pub weights: [f32; 3],
-    /// Where on the guides it ends, a share of their length. Above 1 it ends at their tips and is as
-    /// many times as large.
+    /// Where on the guides it ends, a share of their length. Above 1 it ends at their tips and is
+    /// scaled by this factor.
     pub length: f32,
-    /// The root's place besides the weighted roots of the guides (m).
+    /// Offset of the root from the weighted roots of the guides (m).
     pub root: Vec3,
-    /// Where on the guides it begins, a share of their length.
+    /// Where on the guides its curve begins, a share of their length.
     pub phase: f32,
-    /// By how much its tip leaves the lock (m).
+    /// Displacement of its tip from the lock (m).
     pub stray: Vec3,
     /// Whether it is a guide itself.
     pub is_guide: bool,
@@ -72,13 +72,14 @@ impl DrawnStrand {
         }
     }
 
-    /// Where it grows at rest between these guides (m).
+    /// Position of its root at rest between these guides (m).
     pub(super) fn place(&self, guides: &[GuideRoot]) -> Vec3 {
         let near = self.guides.iter().zip(self.weights).filter(|(_, w)| *w > 0.0);
         near.fold(self.root, |sum, (g, w)| sum + guides[*g as usize].place * w)
     }
 
     /// As the shader reads it.
+    #[doc(hidden)]
     pub fn packed(&self) -> [u32; 32] {
         let mut words = [0; 32];
         words[..3].copy_from_slice(&self.guides);
@@ -105,7 +106,7 @@ impl DrawnStrand {
     }
 }
 
-/// Where a guide grows.
+/// The root of a guide.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct GuideRoot {
     pub(super) place: Vec3,
@@ -116,7 +117,7 @@ pub(super) struct GuideRoot {
     pub(super) reach: Vec3,
 }
 
-/// Any direction, for a stray.
+/// A random direction.
 pub(super) fn direction(random: &mut Xoshiro256PlusPlus) -> Vec3 {
     let v: [f32; 3] = random.random();
     (Vec3::from_array(v) * 2.0 - 1.0).normalize_or(Vec3::X)

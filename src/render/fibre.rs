@@ -1,5 +1,5 @@
-//! Scattering by one fibre and by many: the Rust twin of `fibre.wgsl`, where the sources of the formulas
-//! are named.
+//! Scattering by one fibre and by many: the same mathematics as `fibre.wgsl`, which names the
+//! sources of the formulas.
 
 use bevy::prelude::*;
 use core::f32::consts::PI;
@@ -16,7 +16,7 @@ const TRT_SHARE: f32 = 0.757;
 /// Optical properties of a fibre at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Optics {
-    /// Absorption of its pigment, by the fibre's radius.
+    /// Absorption of its pigment, per radius of the fibre.
     pub absorption: Vec3,
     /// Variance of R's lobe along the fibre (rad²).
     pub variance: f32,
@@ -55,7 +55,7 @@ impl Optics {
         dry.lerp(0.0044 + 0.0182 * (-2.8 * self.absorption).exp(), self.wet)
     }
 
-    /// Light scattered to the eye, of light that has passed through `depth` fibres before.
+    /// The share of light that is scattered to the eye, after it has passed through `depth` fibres.
     pub fn lobes(&self, a: &Angles, depth: f32) -> Vec3 {
         let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
         let spread = 0.25 * self.variance * depth;
@@ -93,7 +93,8 @@ impl Optics {
         self.gloss * (surface + trt) + self.through * tt
     }
 
-    /// Multiple scattering: the reflected share of light that arrives by `p` in hair of `layers` layers.
+    /// Multiple scattering: the reflected share of light that arrives along `p` in hair of `layers`
+    /// layers.
     pub fn scattered(&self, a: &Angles, p: &Passage, layers: f32) -> Vec3 {
         let (a_f, a_b) = (self.forward_share(), self.backward_share());
         let bulk = Bulk::of(a_f, a_b, layers);
@@ -281,7 +282,7 @@ mod tests {
 
     #[test]
     fn infinitely_deep_hair_has_the_colour_of_its_melanin() {
-        // Chiang et al. 2016, equation 9, knows no surface: that adds its 0.034.
+        // Chiang et al. 2016, equation 9, has no surface reflection, which adds 0.034.
         for melanin in [Melanin::PLATINUM, Melanin::BLOND, Melanin::BROWN] {
             let fibre = Optics::new(melanin.absorption(), 0.5);
             let bulk = Bulk::of(fibre.forward_share(), fibre.backward_share(), 1e3);

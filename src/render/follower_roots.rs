@@ -12,8 +12,8 @@ use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// Roots of the followers of a hair. Component of a [`Hair`](crate::Hair); where absent they are
-/// scattered evenly between the guides. [`HairFollowers::count`] limits how many are drawn, taken
-/// evenly; its length variation is not used, because lengths are given.
+/// scattered evenly between the guides. [`HairFollowers::count`] limits how many are drawn, an
+/// evenly spaced subset; its length variation is not used, because lengths are given.
 ///
 /// A follower follows up to three guides near its root, weighted toward those of similar rest shape.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
@@ -21,8 +21,8 @@ use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 pub struct FollowerRoots(pub Vec<FollowerRoot>);
 
 setting! {
-   /// The root of one follower. Roots without a finite place or a length above 0 are left out; other
-   /// values out of their ranges are clamped.
+   /// The root of one follower. Roots without a finite position or a length above 0 are left out;
+   /// other values out of their ranges are clamped.
    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
    #[reflect(Default, Clone, PartialEq)]
    pub struct FollowerRoot {

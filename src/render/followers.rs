@@ -9,18 +9,18 @@ setting! {
     /// [`Hair`](crate::Hair), may change at any time; where absent,
     /// [`HairDefault<HairFollowers>`](crate::HairDefault) holds.
     ///
-    /// A follower grows between up to three near guides and takes their shape in shares. Guides that
-    /// move apart let go of it: it stays with its nearest. [`FollowerRoots`](super::FollowerRoots) says where followers grow if
-    /// that is known.
+    /// A follower grows between up to three near guides and blends their shapes. Where these guides
+    /// move apart it follows only the nearest. [`FollowerRoots`](super::FollowerRoots) says where
+    /// followers grow if that is known.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairFollowers {
         /// How many strands are drawn besides the guides, at most as many as [`FollowerRoots`](super::FollowerRoots) if the
         /// hair has them; 0 draws guides only. A real head carries 100,000.
-        // With more the mesh outgrows what a GPU buffer holds everywhere (256 MiB).
+        // With more the mesh could exceed the guaranteed size of a GPU buffer (256 MiB).
         pub count: u32 = 12_000, in COUNT: 0.0..=1e5, "20000 suit a head";
-        /// Straight pieces drawn for each strand, along a smooth curve; for curls at least as many as
-        /// the guides have edges.
+        /// Straight segments drawn for each strand, along a smooth curve; for curls at least as
+        /// many as the guides have edges.
         pub segments: u32 = 16, in SEGMENTS: 1.0..=64.0, safe 2.0..=64.0, "16 suit most hair";
         /// The same seed gives the same followers.
         pub seed: u32 = 0;
@@ -49,11 +49,11 @@ setting! {
         pub lock_length_variation: f32 = 0.06, in LOCK_LENGTH_VARIATION: 0.0..=0.9, safe 0.0..=0.5,
             "0.06 is natural";
         /// By how much a lock of the middle size may be shifted along its guides, as a share of the
-        /// length: what lets curls turn lock by lock.
+        /// length, so that curls turn lock by lock.
         pub lock_phase: f32 = 0.0, in LOCK_PHASE: 0.0..=0.5, safe 0.0..=0.3,
             "a turn's share of the length suits curls";
-        /// How far strands wave about their way toward the tip, over 12 mm and over 3 mm a quarter as
-        /// far.
+        /// Amplitude of irregular waves toward the tip, at wavelengths of 12 mm and, with a quarter
+        /// of it, 3 mm.
         pub frizz: f32 = 0.1e-3, "m" in FRIZZ: 0.0..=1.0, safe 0.0..=3e-3,
             "0.0002 is straight hair, 0.0012 frizzy";
         /// Share of strands that leave their locks and stand off; a fifth of them are broken.
@@ -61,13 +61,13 @@ setting! {
         /// How far flyaways stand off at most.
         pub flyaway_reach: f32 = 20e-3, "m" in FLYAWAY_REACH: 0.0..=10.0, safe 0.0..=0.1,
             "0.02 is natural";
-        /// How far water draws the strands of a lock to their guide where it soaks them, a share of
-        /// the way.
+        /// How far wet strands converge on the guide of their lock, as a share of the distance.
         pub wet_clump: f32 = 0.75, in WET_CLUMP: 0.0..=1.0, safe 0.0..=0.95, "0.75 is natural";
         /// How many times farther apart than at the scalp guides may be before they stop blending.
-        /// Guides that go ways more than 60° to 90° apart, as at a parting, stop in any case.
+        /// Guides whose directions differ by more than 60° to 90°, as at a parting, stop in any
+        /// case.
         pub parting: f32 = 4.0, in PARTING: 1.0..=1e6, safe 1.5..=100.0, "4 suits most hair";
-        /// How far around it followers grow where a guide stands alone.
+        /// Radius around an isolated guide within which its followers grow.
         pub lock_radius: f32 = 6e-3, "m" in LOCK_RADIUS: 0.0..=10.0, "locks have 0.006";
     }
 }
@@ -78,7 +78,7 @@ impl HairFollowers {
         Self { count: 0, ..default() }
     }
 
-    /// So many followers, the rest by default.
+    /// `count` followers, with other settings at their defaults.
     pub fn new(count: u32) -> Self {
         Self { count, ..default() }
     }

@@ -8,11 +8,12 @@ use crate::grid::KdTree;
 use bevy::{platform::collections::HashMap, prelude::*};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// Middles are at least this share of a spacing apart, which makes the mean about the spacing.
+/// Minimum distance of the centres, as a share of the spacing; the mean distance is then about the
+/// spacing.
 const CLOSEST: f32 = 0.8;
 /// By how much the convergence of locks varies, a share.
 const LOOSER: f32 = 0.3;
-/// Of flyaways, the share that is broken off.
+/// Share of flyaways that are broken off.
 const BROKEN: f32 = 0.2;
 /// Width of flyaways, a share.
 const FINE: f32 = 0.7;
@@ -33,22 +34,22 @@ pub(super) fn draw_together(
         let large = roots.nearest(&levels[0], middle);
         let mut locks = [LockOffset::default(); 3];
         for (lock, to) in locks.iter_mut().zip([large, middle, small]) {
-            *lock = roots.way(followers, guides, i, to);
+            *lock = roots.offset(followers, guides, i, to);
         }
-        let lot = |of: usize| lot(roots.seeds[of] ^ 0x51ed_270b);
+        let random_unit = |of: usize| random_unit(roots.seeds[of] ^ 0x51ed_270b);
         let strand = &mut followers[i];
         strand.locks = locks;
-        let shorter = 1.0 - settings.lock_length_variation * lot(large);
+        let shorter = 1.0 - settings.lock_length_variation * random_unit(large);
         strand.length *= shorter;
         strand.size *= shorter;
         let own = &mut Xoshiro256PlusPlus::seed_from_u64(u64::from(strand.seed) << 8);
         let leap = if own.random::<f32>() < LEAPS { own.random::<f32>() } else { 0.0 };
-        let phase = strand.phase + settings.lock_phase * (lot(middle) + leap);
+        let phase = strand.phase + settings.lock_phase * (random_unit(middle) + leap);
         strand.phase = phase.min(0.5 * strand.length.min(1.0));
         // Outward: the component of the root direction perpendicular to the reach.
         let GuideRoot { normal, reach, .. } = guides[strand.guides[0] as usize];
         let outward = normal.reject_from_normalized(reach.normalize_or_zero()).normalize_or_zero();
-        // Nothing strays into the skin.
+        // No strand strays into the skin.
         strand.stray -= 2.0 * outward * strand.stray.dot(outward).min(0.0);
         if own.random::<f32>() < settings.flyaways {
             stand_off(strand, outward, settings.flyaway_reach, own);
@@ -71,7 +72,7 @@ fn stand_off(strand: &mut DrawnStrand, outward: Vec3, most: f32, random: &mut Xo
     strand.stray = (outward + 0.8 * direction(random)).normalize_or_zero() * far;
 }
 
-/// Where followers grow.
+/// The roots of followers.
 struct Roots {
     places: Vec<Vec3>,
     /// Their directions at the scalp: locks do not reach across a parting.
@@ -89,11 +90,11 @@ impl Roots {
         }
     }
 
-    fn go_together(&self, a: usize, b: usize) -> bool {
+    fn same_side(&self, a: usize, b: usize) -> bool {
         self.leave[a].dot(self.leave[b]) > 0.0
     }
 
-    /// The strands in the middle of locks: some that are about a spacing apart.
+    /// The centre strands of locks: a subset that is about a spacing apart.
     fn middles(&self, spacing: f32) -> KdTree {
         let least = CLOSEST * spacing;
         let mut cells = HashMap::<IVec3, Vec<usize>>::new();
@@ -102,7 +103,7 @@ impl Roots {
             let cell = (place / least).floor().as_ivec3();
             let around = (0..27).map(|k| cell + IVec3::new(k % 3, k / 3 % 3, k / 9) - 1);
             let mut near = around.filter_map(|cell| cells.get(&cell)).flatten();
-            if near.any(|j| place.distance(self.places[*j]) < least && self.go_together(i, *j)) {
+            if near.any(|j| place.distance(self.places[*j]) < least && self.same_side(i, *j)) {
                 continue;
             }
             cells.entry(cell).or_default().push(i);
@@ -111,15 +112,15 @@ impl Roots {
         KdTree::new(found)
     }
 
-    /// The nearest middle; itself where there is none.
+    /// The nearest centre; the strand itself where there is none.
     fn nearest(&self, middles: &KdTree, i: usize) -> usize {
-        let is_meant = |j: u32, _| self.go_together(i, j as usize);
-        let mut near = middles.nearest_of::<1, _>(self.places[i], is_meant);
+        let accepts = |j: u32, _| self.same_side(i, j as usize);
+        let mut near = middles.nearest_of::<1, _>(self.places[i], accepts);
         near.next().map_or(i, |(j, _)| j as usize)
     }
 
-    /// From strand `i` to the one in the middle.
-    fn way(
+    /// The offset from strand `i` to centre `to`.
+    fn offset(
         &self,
         followers: &[DrawnStrand],
         guides: &[GuideRoot],
@@ -130,7 +131,7 @@ impl Roots {
             return default();
         }
         let (own, middle) = (&followers[i], &followers[to]);
-        let strength = 1.0 - LOOSER * lot(self.seeds[to]);
+        let strength = 1.0 - LOOSER * random_unit(self.seeds[to]);
         let apart = self.places[to] - self.places[i];
         let near = own.guides.iter().zip(own.weights).filter(|(_, w)| *w > 0.0);
         let along = near.fold(Vec3::ZERO, |sum, (g, w)| sum + guides[*g as usize].reach * w);
@@ -158,7 +159,7 @@ impl Roots {
 }
 
 /// A number in 0…1 from a seed: the hash of `strands.wgsl`.
-pub(super) fn lot(seed: u32) -> f32 {
+pub(super) fn random_unit(seed: u32) -> f32 {
     let state = seed.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     (((word >> 22) ^ word) >> 8) as f32 / 16_777_216.0
@@ -193,8 +194,8 @@ mod tests {
 
     #[test]
     fn the_hash_is_within_bounds_and_even() {
-        let mean = (0..1000).map(lot).sum::<f32>() / 1000.0;
-        assert!((0..1000).map(lot).all(|x| (0.0..1.0).contains(&x)));
+        let mean = (0..1000).map(random_unit).sum::<f32>() / 1000.0;
+        assert!((0..1000).map(random_unit).all(|x| (0.0..1.0).contains(&x)));
         assert!((mean - 0.5).abs() < 0.05, "{mean}");
     }
 

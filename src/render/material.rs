@@ -34,8 +34,8 @@ pub(super) struct RibbonMaterial {
     pub(super) guides: Handle<ShaderBuffer>,
     #[storage(3, read_only)]
     pub(super) strands: Handle<ShaderBuffer>,
-    /// Of each strand the layers of dye whose streaks it is in, a bit each. Read only where a layer has
-    /// streaks.
+    /// For each strand a bit mask of the layers of dye whose streaks it is in. Read only where a
+    /// layer has streaks.
     #[storage(4, read_only)]
     pub(super) streaks: Handle<ShaderBuffer>,
 }
@@ -126,7 +126,7 @@ impl Ribbon {
         strands: u32,
     ) -> Self {
         let (root_absorption, tip_absorption) = look.absorptions();
-        let taken = look.width * look.shadow_density;
+        let fibre_width = look.width * look.shadow_density;
         Self {
             root_absorption,
             variation: look.variation,
@@ -138,8 +138,8 @@ impl Ribbon {
             gloss: look.gloss,
             backlight: look.backlight,
             grey: look.grey,
-            density: thickness.density * taken,
-            layers: thickness.layers * taken,
+            density: thickness.density * fibre_width,
+            layers: thickness.layers * fibre_width,
             clump: followers.clump,
             parting: followers.parting,
             wet_clump: followers.wet_clump,

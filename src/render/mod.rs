@@ -1,9 +1,9 @@
 //! Draws the hair: simulated strands and many followers between them, from one buffer of nodes.
 //!
-//! Each [`Hair`] is one mesh and one draw call (one more for each shadow map). Once a
-//! frame its nodes are packed where the fixed clock's overstep puts them and written to the GPU; all
-//! else happens in the vertex shader: curves through the nodes, followers between guides, ribbons
-//! that face the camera. Places stay in the hair's frame up to there, so roots never lag behind the
+//! Each [`Hair`] is one mesh and one draw call (one more for each shadow map). Once a frame its
+//! nodes are packed, interpolated by the fixed clock's overstep, and written to the GPU; all else
+//! happens in the vertex shader: curves through the nodes, followers between guides, ribbons that
+//! face the camera. Positions stay in the hair's frame up to there, so roots never lag behind the
 //! head.
 //!
 //! Water is drawn as beads: see [`HairBeads`].
@@ -11,9 +11,9 @@
 //! How it looks is edited at run time through components of the hair: [`HairLook`], [`HairDye`],
 //! [`HairFollowers`], [`HairView`]. For a look of your own write a material around [`HairBuffers`].
 //!
-//! Vertex shaders read storage buffers, so WebGL2 cannot draw this; WebGPU and native can. Strands
-//! thinner than a pixel are drawn one pixel wide and light as many of its samples as they cover of it;
-//! without MSAA they light some pixels and others not, which temporal antialiasing smooths.
+//! Vertex shaders read storage buffers, so this needs WebGPU or native, not WebGL2. Strands thinner
+//! than a pixel are drawn one pixel wide and cover a share of its samples equal to their coverage;
+//! without MSAA they cover some pixels and others not, which temporal antialiasing smooths.
 
 #[doc(hidden)]
 pub mod curve;

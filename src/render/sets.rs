@@ -1,4 +1,4 @@
-//! When hair is drawn, and whether it can be.
+//! System sets of drawing, and its run condition.
 
 use bevy::{
     prelude::*,
@@ -28,7 +28,7 @@ pub(super) fn supported(
         let supported = flags.contains(DownlevelFlags::VERTEX_STORAGE);
         if !supported {
             tracing::warn!(
-                "hair is not drawn: the graphics device gives vertex shaders no storage buffers; \
+                "hair is not drawn: the graphics device has no storage buffers in vertex shaders; \
                  use Vulkan, Metal, Direct3D 12 or WebGPU"
             );
         }

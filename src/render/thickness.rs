@@ -10,7 +10,7 @@ use bevy::{platform::collections::HashMap, prelude::*};
 /// Density of strands, independent of their width.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Thickness {
-    /// Length of strands in a volume, seen from a strand (m/m³).
+    /// Length of strands per volume around a strand (m/m³).
     pub(super) density: f32,
     /// Strands that a line through the hair crosses, per metre of their width.
     pub(super) layers: f32,
@@ -18,17 +18,17 @@ pub(super) struct Thickness {
 
 /// Largest number of sample points, approximately.
 const POINTS: usize = 65_536;
-/// Least distance of sample points along a strand (m): about the penetration depth of light.
+/// Minimum distance of sample points along a strand (m): about the penetration depth of light.
 const STEP: f32 = 3e-3;
 /// Side of the cells for counting the hair's surface (m): large enough to hold several strands.
 const BLOCK: f32 = 12e-3;
-/// Points in a cell, in the mean over points, from which the count is a density.
+/// Mean number of points in a point's cell from which on their count estimates a density.
 const ENOUGH: f64 = 8.0;
 /// Mean ratio of the area of axis-aligned cell faces to the surface that they approximate.
 const STAIRS: f32 = 1.5;
 
 impl Thickness {
-    /// Of `drawn` strands; `guide` gives the nodes of each guide where they are now.
+    /// Of `drawn` strands; `guide` gives the present nodes of each guide.
     pub(super) fn of<'a>(
         drawn: &[DrawnStrand],
         guide: impl Fn(u32) -> &'a [Vec3] + Copy,

@@ -1,4 +1,4 @@
-//! What is shown of the hair: its look, or a quantity as a heat map.
+//! What is drawn of the hair: its look, or a quantity as a heat map.
 
 use crate::{bond::BondKind, setting::Ranged};
 use bevy::prelude::*;
@@ -6,8 +6,8 @@ use bevy::prelude::*;
 /// What is shown of a hair. Component of a [`Hair`](crate::Hair), may change at any time; where
 /// absent, [`HairDefault<HairView>`](crate::HairDefault) holds.
 ///
-/// Heat maps are neither lit nor tone-mapped by the material, so that colours can be read off:
-/// blue is 0, red is 1, as [`heat`] says.
+/// Heat maps are neither lit nor tone-mapped by the material, so that values can be read from
+/// colours: blue is 0, red is 1, see [`heat`].
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub enum HairView {
@@ -40,7 +40,7 @@ pub fn heat(value: f32) -> Color {
 }
 
 impl HairView {
-    /// The number by which the shader knows the view.
+    /// The view's number in the shader.
     pub(super) fn number(self) -> u32 {
         match self {
             Self::Natural => 0,

@@ -23,7 +23,7 @@ use glam::Vec3;
 pub struct NodeLanes<C = Lane> {
     /// Position (m).
     pub p: [C; 3],
-    /// Position at the start of the substep (m); for held nodes, where they come from.
+    /// Position at the start of the substep (m).
     pub from: [C; 3],
     /// Velocity (m/s).
     pub v: [C; 3],
@@ -75,8 +75,8 @@ pub struct BlockLanes {
     pub nodes: Vec<NodeLanes>,
     /// Edges, root first.
     pub edges: Vec<EdgeLanes>,
-    /// The share of gravity that each node falls with; empty where all fall with all of it. Water bears
-    /// hair up.
+    /// The share of gravity that acts on each node; empty where gravity acts in full. Buoyancy
+    /// reduces it.
     pub(crate) gravity: Vec<Lane>,
     /// The scalp's frame q_{−1} of each strand.
     pub root: [Lane; 4],
@@ -85,7 +85,7 @@ pub struct BlockLanes {
     /// 1 for lanes with a node that rests on an obstacle, else 0; written by the contact passes.
     pub(crate) touched: Lane,
     /// Whether any node moves so fast against an obstacle that it might pass through.
-    pub(super) sweeps: bool,
+    pub(super) has_fast_nodes: bool,
     /// Which obstacles each node may touch in this substep, in any lane.
     pub(crate) near_obstacles: Vec<NearObstacles>,
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
@@ -100,7 +100,7 @@ pub struct BlockLanes {
 }
 
 impl BlockLanes {
-    /// A block for strands of `nodes` nodes, reusing what is allocated.
+    /// Resizes to strands of `nodes` nodes, reusing allocations.
     pub fn resize(&mut self, nodes: usize) {
         self.nodes.resize(nodes, NodeLanes::default());
         self.edges.resize(nodes - 1, EdgeLanes::default());
@@ -143,7 +143,7 @@ impl BlockLanes {
     }
 }
 
-/// What gravity gives node `node`, of what it gives nodes in the air.
+/// Scales `gives`, gravity's effect in air, to that on node `node`.
 #[inline(always)]
 pub(crate) fn pulled<S: Simd>(
     simd: S,

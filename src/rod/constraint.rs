@@ -23,7 +23,7 @@ pub enum StretchProjection {
     Printed,
 }
 
-/// The inverse masses and the rest length that one stretch–shear constraint sees.
+/// The inverse masses and the rest length of one stretch–shear constraint.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeWeights<R> {
     /// Inverse mass of the edge's start node.
@@ -128,6 +128,7 @@ pub(super) struct Shares {
 }
 
 /// Corrections of one stretch–shear projection: of both nodes and, unnormalised, of the orientation.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct StretchCorrection<R> {
     /// Δp1.

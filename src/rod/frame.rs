@@ -2,12 +2,12 @@
 
 use glam::{Quat, Vec3};
 
-/// Orientations of the edges of a polyline, with as little twist as can be.
+/// Orientations of the edges of a polyline with minimal twist.
 ///
 /// `first` gives the frame before the first edge (the scalp's), or `None` for the shortest rotation
-/// from e3. Each further frame is the one before, turned the shortest way onto the next tangent, so
-/// a planar strand has no twist. Neighbours stay in one hemisphere. Edges without length repeat the
-/// frame before.
+/// from e3. Each further frame is the one before, rotated by the shortest rotation onto the next
+/// tangent, so a planar strand has no twist. Neighbours stay in one hemisphere. Edges without
+/// length repeat the frame before.
 pub fn parallel_transport(points: &[Vec3], first: Option<Quat>) -> Vec<Quat> {
     let mut frame = first.unwrap_or(Quat::IDENTITY);
     points

@@ -3,9 +3,9 @@
 //! Root-to-tip Gauss–Seidel carries length errors one edge an iteration, so long strands stretch.
 //! One Newton step on all lengths at once is a tridiagonal system J W Jᵀ λ = C with
 //! C_i = |p_{i+1} − p_i| − l_i, solved by the Thomas algorithm in one pass down and one up.
-//! Node masses alone enter: the rods' orientations are left as the iterations put them.
+//! Only node masses enter: orientations of rods are not changed.
 //!
-//! A node that rests on an obstacle cannot go into it, so there W = w (I − a n nᵀ): lengths are
+//! A node that rests on an obstacle cannot move into it, so there W = w (I − a n nᵀ): lengths are
 //! corrected along the surface instead of against it, which would end in compression. A node that
 //! tension pulls off the surface is released.
 
@@ -23,10 +23,10 @@ const FIRMNESS: f32 = 0.95;
 /// Strain at which the limiter stops.
 pub(super) const TOLERANCE: f32 = 5e-4;
 
-/// How much a pressed edge gives way in a [`GUARDED`](limit_strained) step, in shares of its strain. A
-/// strand that is pressed end to end while it is straight has to fold; how far, its lengths do not say in
-/// first order, and Newton's step would throw it as far as it is straight. With an eighth it folds by about
-/// as much as makes up for the strain, and steps go on converging as strain goes.
+/// Damping of a compressed edge in a [`GUARDED`](limit_strained) step, as a multiple of its strain.
+/// A straight strand that is compressed end to end has to fold; by how much is not determined by
+/// its lengths in first order, and Newton's step overshoots. With an eighth it folds by about as
+/// much as compensates the strain, and steps converge as the strain vanishes.
 const FOLDING: f32 = 0.125;
 
 /// One Newton step on the lengths of every strand in the block; with `touched_only` of those that
@@ -57,9 +57,9 @@ pub(super) fn limit_lengths<S: Simd>(simd: S, b: &mut BlockLanes, touched_only: 
     );
 }
 
-/// One guarded Newton step for strands of which an edge is off its length by more than the share
-/// `tolerance`, among the `lanes` that are not 0: strands that are pressed fold no farther than they have
-/// to, and what is pulled taut does not zigzag. Returns whether there were any.
+/// One damped Newton step for strands with an edge of strain above `tolerance`, in the `lanes` that
+/// are not 0: compressed strands fold no farther than necessary, and taut ones do not zigzag.
+/// Returns whether there were any.
 #[inline(never)]
 pub(super) fn limit_strained<S: Simd>(
     simd: S,
@@ -92,10 +92,10 @@ pub(super) fn limit_strained<S: Simd>(
     )
 }
 
-/// The fallback where Newton steps on the lengths have failed, as when a root moves farther than its
-/// strand is long: every edge off by more than the share `torn` is set to its length in its present
-/// direction, root to tip. Edges before a held node are left, because both ends are fixed. Returns
-/// whether there were any.
+/// The fallback where Newton steps on the lengths have failed, as when a root moves farther than
+/// its strand is long: every edge of strain above `torn` is set to its length in its present
+/// direction, root to tip. Edges before a held node are skipped, because both ends are fixed.
+/// Returns whether there were any.
 #[inline(never)]
 pub(super) fn clamp_lengths<S: Simd>(simd: S, b: &mut BlockLanes, torn: f32) -> bool {
     simd.vectorize(
@@ -128,8 +128,8 @@ pub(super) fn clamp_lengths<S: Simd>(simd: S, b: &mut BlockLanes, torn: f32) -> 
     )
 }
 
-// Closures would be compiled without the instruction set of their caller where the compiler does not
-// inline them, so the small parts are functions that it has to.
+// Closures that are not inlined would be compiled without the instruction set of their caller, so
+// these are functions that are always inlined.
 
 /// The direction from one node to the next and the distance between them.
 #[inline(always)]
@@ -199,8 +199,7 @@ fn eliminate<S: Simd, const TOUCHING: bool, const GUARDED: bool>(
         let strain = Real::max(off, -off) / l;
         worst = Real::max(worst, strain);
         if GUARDED {
-            // Levenberg–Marquardt, where there is something to be folded: hair within tolerance is at rest,
-            // and is to settle.
+            // Levenberg–Marquardt, only for strain above the tolerance: hair within it is at rest.
             let beyond = Real::max(zero, strain - f32x16::splat(simd, TOLERANCE));
             let pressed = Real::select(Real::lt(off, zero), beyond, zero);
             diagonal += f32x16::splat(simd, FOLDING) * pressed * diagonal;
@@ -223,12 +222,12 @@ fn eliminate<S: Simd, const TOUCHING: bool, const GUARDED: bool>(
     worst
 }
 
-/// Solves from the tip to the root and moves the nodes of all lanes, or with `SOME` of those that are
-/// not 0 in `moves`.
+/// Solves from the tip to the root and moves the nodes of all lanes, or with `SOME` of the lanes
+/// where `moves` is not 0.
 ///
-/// What pulls a node across the strand is the bend there times the tension λ. On fine strands that is much,
-/// and taken in full it throws a node over to the other side, from step to step farther: `GUARDED`, a node
-/// goes as far across as if λ bore on it where it comes to, 1/(1 + wλ/l) of the way.
+/// The force across the strand on a node is the bend there times the tension λ. On fine strands it
+/// overshoots to the other side, farther in each step; with `GUARDED` it is evaluated implicitly, a
+/// factor 1/(1 + wλ/l) of the displacement.
 #[inline(always)]
 fn solve<S: Simd, const TOUCHING: bool, const SOME: bool, const GUARDED: bool>(
     simd: S,

@@ -18,7 +18,8 @@
 //! | [`obstacle`] | colliders as half-space, capsule, cylinder or placed shape, with friction |
 //! | [`shape`] | boxes, ellipsoids, hulls and distance grids, each in its own frame |
 //!
-//! Strands of equal node count are solved [`LANES`](crate::lanes::LANES) side by side; see [`block`] for the layout.
+//! Strands of equal node count are solved [`LANES`](crate::lanes::LANES) side by side; see
+//! [`block`] for the layout.
 
 #[doc(hidden)]
 pub mod block;

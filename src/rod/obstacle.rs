@@ -1,4 +1,4 @@
-//! Colliders as rod mathematics sees them: half-spaces, capsules, cylinders and what is placed, in lanes.
+//! Obstacles of rods in lanes: half-spaces, capsules, cylinders and placed shapes.
 
 use super::shape::Placed;
 use crate::lanes::{LANES, Real, V3, splat};
@@ -42,7 +42,7 @@ pub enum Solid {
 /// A solid that nodes cannot enter.
 #[derive(Clone, Debug)]
 pub struct Obstacle {
-    /// What space it fills at the end of the substep.
+    /// The solid at the end of the substep.
     pub solid: Solid,
     /// How its surface moves during the substep: a point of it goes from x to `motion · x`.
     pub motion: Option<Affine3A>,
@@ -73,9 +73,9 @@ impl NearObstacles {
 }
 
 impl Obstacle {
-    /// Where a point of the surface goes during the substep.
+    /// A point after it has moved with the surface for the substep.
     #[inline(always)]
-    pub(crate) fn taken_along<R: Real>(&self, p: V3<R>) -> V3<R> {
+    pub(crate) fn moved_with<R: Real>(&self, p: V3<R>) -> V3<R> {
         let Some(m) = &self.motion else { return p };
         let moved = splat(p.x, m.translation.into());
         let moved = splat(p.x, m.matrix3.z_axis.into()).scale_add(p.z, moved);
@@ -99,33 +99,34 @@ impl Obstacle {
 }
 
 impl Solid {
-    /// Whether any point of the box `low…high`, grown by `margin`, may lie inside. Never wrongly denies.
+    /// Whether any point of the box `low…high`, grown by `margin`, may lie inside. Conservative:
+    /// true where in doubt.
     pub fn may_reach(&self, low: Vec3, high: Vec3, margin: f32) -> bool {
         let center = 0.5 * (low + high);
         let half = 0.5 * (high - low) + margin;
-        let meets =
+        let overlaps =
             |low: Vec3, high: Vec3| (low.cmple(center + half) & high.cmpge(center - half)).all();
         match *self {
             Solid::HalfSpace { normal, point } => {
                 (center - point).dot(normal) <= normal.abs().dot(half)
             }
-            Solid::Capsule { a, b, radius } => meets(a.min(b) - radius, a.max(b) + radius),
+            Solid::Capsule { a, b, radius } => overlaps(a.min(b) - radius, a.max(b) + radius),
             Solid::Cylinder { center: c, axis, radius, half_height } => {
                 let across = (Vec3::ONE - axis * axis).max(Vec3::ZERO);
                 let reach = axis.abs() * half_height
                     + radius * Vec3::new(across.x.sqrt(), across.y.sqrt(), across.z.sqrt());
-                meets(c - reach, c + reach)
+                overlaps(c - reach, c + reach)
             }
             Solid::Placed(ref placed) => {
                 let (c, reach) = placed.bounds();
-                meets(c - reach, c + reach)
+                overlaps(c - reach, c + reach)
             }
         }
     }
 }
 
-/// The direction and length of `v`. A point on a collider's axis has no unique shortest way out: the
-/// direction is `or`.
+/// The direction and length of `v`. For a point on a collider's axis, where the shortest way out is
+/// not unique, the direction is `or`.
 #[inline(always)]
 fn unit_or<R: Real>(v: V3<R>, or: Vec3) -> (V3<R>, R) {
     let tiny = v.x.lit(1e-12);
@@ -210,18 +211,18 @@ impl Solid {
 
 /// How a node is moved out of a solid.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Way {
-    /// The shortest way: for states.
+pub(super) enum PushOut {
+    /// Along the normal: for states.
     Shortest,
-    /// The shortest way, then back along the surface by friction: for steps.
+    /// Along the normal, then back along the surface by friction: for steps.
     WithFriction,
 }
 
-/// Moves `p` out of the solid where it is inside, and holds it back along the surface by Coulomb
-/// friction, measured from where the node was (`from`) and against the surface's own motion.
+/// Moves `p` out of the solid where it is inside, with Coulomb friction along the surface relative
+/// to the start position `from` moved with the surface.
 ///
-/// Returns the new place
-/// and the solid's normal there, or zero for lanes that are not inside; nothing where no lane is.
+/// Returns the new position and the solid's normal there, or zero for lanes that are not inside;
+/// `None` where no lane is.
 #[inline(always)]
 pub(super) fn push_out<S: Simd>(
     obstacle: &Obstacle,
@@ -229,7 +230,7 @@ pub(super) fn push_out<S: Simd>(
     from: V3<f32x16<S>>,
     friction: f32x16<S>,
     clearance: f32,
-    way: Way,
+    way: PushOut,
 ) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
     let simd = p.x.simd;
     let zero = f32x16::splat(simd, 0.0);
@@ -242,21 +243,21 @@ pub(super) fn push_out<S: Simd>(
     let touching = V3::select(inside, normal, V3::new(zero, zero, zero));
     let depth = Real::max(depth, zero);
     let out = normal.scale_add(depth, p);
-    if way == Way::Shortest {
+    if way == PushOut::Shortest {
         return Some((V3::select(inside, out, p), touching));
     }
-    let slip = out - obstacle.taken_along(from);
+    let slip = out - obstacle.moved_with(from);
     let tangential = slip - normal.scale(slip.dot(normal));
     let length = Real::sqrt(tangential.dot(tangential));
-    // Static where the grip suffices, sliding where not.
+    // Static where friction suffices, else sliding.
     let held = Real::min(one, friction * depth / Real::max(length, f32x16::splat(simd, 1e-12)));
     Some((V3::select(inside, tangential.scale_add(-held, out), p), touching))
 }
 
-/// Continuous collision: stops a node that would pass through a thin or fast solid within the substep.
-/// A node that was on one side of it (`start`, moved with the solid) and would be on the other stays
-/// before the tangent plane of the solid where it was nearest. Returns as [`push_out`] does; `None`
-/// where no lane moves fast enough against the solid to pass.
+/// Continuous collision: stops a node that would pass through a thin or fast solid within the
+/// substep. A node that was on one side of it (`start`, moved with the solid) and would be on the
+/// other is kept in front of the tangent plane at the surface point nearest to `start`. Returns as
+/// [`push_out`] does; `None` where no lane moves fast enough against the solid to pass.
 ///
 /// The path is sampled where it comes nearest to the solid's axis, in its middle and at its end: a
 /// node that moves by less than half the solid's thickness cannot pass.
@@ -278,7 +279,7 @@ pub(super) fn continuous_collision<S: Simd>(
         Solid::Placed(ref placed) => (placed.thickness(), placed.center, Vec3::Y),
     };
     let way = p - start;
-    // Slower ones are still on their side, where the nearest way out is the right one.
+    // Slower ones stay on their side, where the nearest way out is correct.
     let fast = Real::lt(lit(0.2 * thickness * thickness), way.dot(way));
     if fast.to_bitmask() == 0 {
         return None;
@@ -312,7 +313,7 @@ pub(super) fn continuous_collision<S: Simd>(
     Some((held, V3::select(passes, facing, none)))
 }
 
-/// Some direction across an axis; up for an axis without length.
+/// A direction perpendicular to an axis; up for an axis without length.
 fn across(axis: Vec3) -> Vec3 {
     axis.try_normalize().map_or(Vec3::Y, |u| u.any_orthonormal_vector())
 }

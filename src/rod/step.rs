@@ -36,7 +36,7 @@ pub struct SweepParams {
     pub clearance: f32,
 }
 
-/// Takes the block through one substep, on the instruction set that the machine has.
+/// Steps the block by one substep, with the machine's best instruction set.
 pub fn step(level: Level, block: &mut BlockLanes, params: &SweepParams, obstacles: &[Obstacle]) {
     dispatch!(level, simd => step_simd(simd, block, params, obstacles));
 }
@@ -48,7 +48,7 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams, obstacl
     b.near_obstacles.fill(NearObstacles::ALL);
     predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.clearance, obstacles);
     predict_edges(simd, b, params.dt);
-    // The projection is chosen outside the loops, so that each has straight code inside.
+    // The projection is chosen outside the loops, so that these have no branches.
     match params.projection {
         StretchProjection::Split => {
             project::<S, 0>(simd, b, params.iterations, params.clearance, obstacles);

@@ -1,4 +1,4 @@
-//! How stiff the hair is, as a property of the hair, and the solver's weights that follow.
+//! Stiffness as a property of the hair, and the solver's weights that follow from it.
 //!
 //! The paper gives no weights, yet they decide everything under gravity. Small-deflection theory of
 //! the projection gives the gravity-bending length L_g = (EI/(μ g))^{1/3}, with μ mass per length:
@@ -28,15 +28,16 @@ setting! {
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairStiffness {
         /// Gravity-bending length L_g, in the Hair's own length unit. A real dry hair of 70 µm has
-        /// 0.045; the paper's look wants 0.12…0.2.
+        /// 0.045; the paper's look needs 0.12…0.2.
         pub bending_length: f32 = 0.13, "m" in BENDING_LENGTH: 1e-3..=100.0, safe 0.02..=1.0,
             "0.13 is soft hair, 0.045 a bare fibre";
         /// Internal friction as a Kelvin–Voigt time c: the moment of a joint is K (κ + c dκ/dt), so a
         /// swing of angular frequency ω decays by c ω/2 of critical, at any segment count and step.
-        /// The step itself damps like 0.3 of its length, which is taken off: less than that is as that.
+        /// The step itself damps like 0.3 of its length, which is subtracted: smaller values have
+        /// no further effect.
         ///
-        /// We know of no measurement that gives it for locks. 0.01 loses as much in a swing of 2.5 Hz as a
-        /// loss tangent of 0.16 would, and locks that touch come to rest with it.
+        /// We know of no measurement of it for locks. 0.01 dissipates as much in a swing of 2.5 Hz
+        /// as a loss tangent of 0.16 would, and lets touching locks come to rest.
         pub damping: f32 = 0.01, "s" in DAMPING: 0.0..=10.0, safe 0.0..=0.02,
             "0.01 swings for a second, 0.03 is syrup";
     }
@@ -89,10 +90,10 @@ setting! {
     /// How the rods are solved. Component of a [`Hair`](crate::Hair); where absent,
     /// [`HairDefault<HairSolver>`](crate::HairDefault) holds.
     ///
-    /// Quality is how short the substeps are: [`HairSubsteps`](crate::HairSubsteps) divides the tick for all
-    /// hair, water and contact included, and `substep` here takes some of them together for a hair that needs
-    /// no better. What hair looks like does not depend on either; what they buy is how fast a motion it
-    /// follows and how well long, finely divided hair keeps its length meanwhile.
+    /// Shorter substeps are more accurate: [`HairSubsteps`](crate::HairSubsteps) divides the tick
+    /// for all hair, water and contact included, and `substep` here merges some of them for hair
+    /// that needs fewer. The shape of settled hair does not depend on either; fast motion and the
+    /// lengths of long, finely divided hair do.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairSolver {
@@ -121,8 +122,8 @@ setting! {
         pub iterations: u32 = 5, in ITERATIONS: 1.0..=1000.0, safe 1.0..=50.0, "5 is the paper's";
         /// How stretch–shear is projected.
         pub projection: StretchProjection = StretchProjection::Split;
-        /// k_o of equation 13: the share of a bend that one substep of 1/360 s would take back, as in
-        /// \[B\] table 1. Changes how the solver works, and through it how fast hair swings.
+        /// k_o of equation 13: the share of a bend that one substep of 1/360 s corrects, as in
+        /// \[B\] table 1. A parameter of the solver, which also affects how fast hair swings.
         pub bend: f32 = 0.05, in BEND: 0.0..=1.0, safe 0.005..=0.1, "the paper uses 0.05";
         /// χ = w_q l² at the paper's step, set directly as a reader of the paper might; replaces what
         /// [`HairStiffness::bending_length`] gives.
@@ -132,8 +133,8 @@ setting! {
         /// about ten times the strain.
         pub limiter_steps: u32 = 2, in LIMITER_STEPS: 0.0..=16.0, safe 0.0..=4.0,
             "2 hold long hair";
-        /// Damping of neighbouring edges' relative rotation: bending vibration dies away, falling and
-        /// swinging do not.
+        /// Damping of neighbouring edges' relative rotation: damps bending vibration, not falling
+        /// and swinging.
         pub internal_damping: f32 = 0.0, "1/s" in INTERNAL_DAMPING: 0.0..=1e4, safe 0.0..=100.0,
             "0 is off, 20 is syrup";
     }
@@ -159,6 +160,7 @@ impl Sweeps {
 
     /// k of one substep of `dt` (s), from K = k/(1−k) ∝ Δt², times a `factor` on the true
     /// stiffness: cuticle (equation 13), wetness, material.
+    #[doc(hidden)]
     pub fn per_substep(&self, dt: f32, factor: f32) -> f32 {
         let k = self.bend.min(0.999_999);
         let ratio = dt / REFERENCE_DT;

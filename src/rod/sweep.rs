@@ -15,7 +15,7 @@ use super::{
 use crate::lanes::{LANES, Quaternion, Real, V3, load, load4, store3, store4};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// The most sweeps in the pipeline.
+/// The maximum number of sweeps in the pipeline.
 const PIPELINE: usize = 8;
 
 /// How stretch–shear is projected, by the constant that the sweeps are compiled for.
@@ -65,7 +65,7 @@ fn compute_factors<S: Simd, const P: usize>(simd: S, b: &mut BlockLanes) {
     }
 }
 
-/// What a sweep keeps in registers from one edge to the next.
+/// State of a sweep that stays in registers from one edge to the next.
 #[derive(Clone, Copy)]
 struct SweepState<S: Simd> {
     /// The previous edge, which the next joint still corrects.
@@ -76,7 +76,7 @@ struct SweepState<S: Simd> {
 
 /// `abreast` Gauss–Seidel sweeps from root to tip: at each edge its bend–twist joint, then its
 /// stretch–shear, then the edge's start node against obstacles, which nothing else in this sweep
-/// moves. A sweep may follow two edges behind another: there it reads only final values of that.
+/// moves. A sweep may follow two edges behind another: there it only reads that one's final values.
 #[inline(never)]
 fn sweeps<S: Simd, const P: usize>(
     simd: S,
@@ -107,7 +107,16 @@ fn sweeps<S: Simd, const P: usize>(
                     if touching {
                         let near = b.near_obstacles[i];
                         let node = &mut b.nodes[i];
-                        touch(simd, node, near, b.sweeps, clearance, obstacles, Grip::WHOLE, all);
+                        touch(
+                            simd,
+                            node,
+                            near,
+                            b.has_fast_nodes,
+                            clearance,
+                            obstacles,
+                            Grip::WHOLE,
+                            all,
+                        );
                     }
                     if i + 1 == edges {
                         store4(&mut b.edges[i].q, state.before);
@@ -119,7 +128,7 @@ fn sweeps<S: Simd, const P: usize>(
                                 simd,
                                 tip,
                                 near,
-                                b.sweeps,
+                                b.has_fast_nodes,
                                 clearance,
                                 obstacles,
                                 Grip::WHOLE,

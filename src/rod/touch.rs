@@ -2,7 +2,7 @@
 
 use super::{
     block::{BlockLanes, NodeLanes},
-    obstacle::{NearObstacles, Obstacle, Way, continuous_collision, push_out},
+    obstacle::{NearObstacles, Obstacle, PushOut, continuous_collision, push_out},
 };
 use crate::lanes::{LANES, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -11,9 +11,9 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 /// because forces of the substep act too.
 const FASTER: f32 = 1.5;
 
-/// Chooses which obstacles each node may touch in a substep of `dt`, so that its passes skip the
-/// others: on a head of a dozen solids most nodes are near one or none. `from` of held nodes must be
-/// set.
+/// Finds the obstacles that each node may touch in a substep of `dt`, so that its passes skip the
+/// others: on a head of a dozen solids most nodes are near one or none. `from` of held nodes must
+/// be set.
 #[inline(never)]
 pub(crate) fn choose_near<S: Simd>(
     simd: S,
@@ -23,7 +23,7 @@ pub(crate) fn choose_near<S: Simd>(
     obstacles: &[Obstacle],
 ) {
     if obstacles.is_empty() {
-        // The block may have held others, which rested on something.
+        // The block may have held other strands before, which rested on something.
         b.nodes.iter_mut().for_each(|n| n.rests_on = Default::default());
         return;
     }
@@ -53,7 +53,7 @@ pub(crate) fn choose_near<S: Simd>(
                 for (i, o) in obstacles.iter().enumerate() {
                     let mut reach = reach;
                     if o.motion.is_some() {
-                        let moved = o.taken_along(p) - p;
+                        let moved = o.moved_with(p) - p;
                         reach += Real::sqrt(moved.dot(moved));
                     }
                     if o.solid.is_beyond(p, reach).any_false() {
@@ -79,7 +79,7 @@ pub(crate) fn predict_nodes<S: Simd>(
         #[inline(always)]
         || {
             let zero = f32x16::splat(simd, 0.0);
-            b.sweeps = false;
+            b.has_fast_nodes = false;
             for (n, near) in b.nodes.iter_mut().zip(&b.near_obstacles) {
                 let w = load(simd, &n.w);
                 let held = Real::lt(w, f32x16::splat(simd, 1e-12));
@@ -88,23 +88,23 @@ pub(crate) fn predict_nodes<S: Simd>(
                 // that the push-out adds no velocity. A moving obstacle does add its own.
                 let mut from = p;
                 for o in near.of(obstacles) {
-                    let start = o.taken_along(from);
+                    let start = o.moved_with(from);
                     if let Some((out, _)) =
-                        push_out(o, start, start, zero, clearance, Way::Shortest)
+                        push_out(o, start, start, zero, clearance, PushOut::Shortest)
                     {
                         from = V3::select(held, from, from + (out - start));
                     }
                 }
                 let v = load3(simd, &n.v);
                 // Held nodes have their start in `from` and their target in `p`.
-                let came_from = V3::select(held, load3(simd, &n.from), from);
-                store3(&mut n.from, came_from);
+                let start_position = V3::select(held, load3(simd, &n.from), from);
+                store3(&mut n.from, start_position);
                 let mut to = (v + gain).scale_add(dt, from);
                 for o in near.of(obstacles) {
                     if let Some((before, _)) =
-                        continuous_collision(o, o.taken_along(from), to, clearance)
+                        continuous_collision(o, o.moved_with(from), to, clearance)
                     {
-                        (to, b.sweeps) = (before, true);
+                        (to, b.has_fast_nodes) = (before, true);
                     }
                 }
                 store3(&mut n.p, V3::select(held, p, to));
@@ -159,7 +159,7 @@ pub(super) fn contacts_with<S: Simd>(
             for (n, near) in b.nodes.iter_mut().zip(&b.near_obstacles) {
                 if *near != NearObstacles::NONE {
                     let touches =
-                        touch(simd, n, *near, b.sweeps, clearance, obstacles, grip, lanes);
+                        touch(simd, n, *near, b.has_fast_nodes, clearance, obstacles, grip, lanes);
                     touched = Real::max(touched, touches);
                 }
             }
@@ -175,7 +175,7 @@ pub(super) fn touch<S: Simd>(
     simd: S,
     n: &mut NodeLanes,
     near: NearObstacles,
-    sweeps: bool,
+    has_fast_nodes: bool,
     clearance: f32,
     obstacles: &[Obstacle],
     grip: Grip,
@@ -198,9 +198,9 @@ pub(super) fn touch<S: Simd>(
             for o in near.of(obstacles) {
                 // Tunnelling has to be stopped in every pass: the shortest way out may be on the wrong
                 // side.
-                if sweeps
+                if has_fast_nodes
                     && let Some((before, normal)) =
-                        continuous_collision(o, o.taken_along(from), p, clearance)
+                        continuous_collision(o, o.moved_with(from), p, clearance)
                 {
                     p = V3::select(held, p, before);
                     let stopped = Real::lt(zero, normal.dot(normal) * lanes);
@@ -209,7 +209,7 @@ pub(super) fn touch<S: Simd>(
                 }
                 let friction = grip * f32x16::splat(simd, o.friction);
                 if let Some((out, normal)) =
-                    push_out(o, p, from, friction, clearance, Way::WithFriction)
+                    push_out(o, p, from, friction, clearance, PushOut::WithFriction)
                 {
                     p = V3::select(held, p, out);
                     let pushed = Real::lt(zero, normal.dot(normal) * lanes);

@@ -1,5 +1,5 @@
-//! Symmetric tridiagonal systems over a strand's edges, by the Thomas algorithm: the length limiter,
-//! springs and twist are such.
+//! Symmetric tridiagonal systems over a strand's edges, by the Thomas algorithm: for the length
+//! limiter, springs and twist.
 
 use crate::lanes::Real;
 
@@ -19,7 +19,8 @@ impl<R: Real> Elimination<R> {
     }
 
     /// Eliminates the row `coupling x_{i−1} + diagonal x_i + … = rhs`. Where its pivot is below `least`,
-    /// x_i will be 0: nothing there can move. Returns the share of x_i that [`back`] takes off x_{i−1}.
+    /// x_i will be 0: nothing there can move. Returns the share of x_i that [`back`] subtracts from
+    /// x_{i−1}.
     #[inline(always)]
     pub(crate) fn row(&mut self, coupling: R, diagonal: R, rhs: R, least: R) -> R {
         let upper = coupling * self.inverse;

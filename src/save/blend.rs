@@ -1,4 +1,4 @@
-//! Between two hairdos.
+//! Interpolation of two hairdos.
 
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::{
@@ -12,13 +12,13 @@ const SHARE: ValueRange =
     ValueRange::new("Hairdo::blend's t", 0.0..=1.0, "0 is the first hairdo, 1 the second");
 
 impl Hairdo {
-    /// The hairdo between two of the same groom: `a` at `t` = 0, `b` at 1, each to the bit.
+    /// Interpolates two hairdos of the same groom: exactly `a` at `t` = 0, `b` at 1.
     ///
-    /// Strands are blended by shape, joint by joint, and laid out from the root, so that hair swings
-    /// over and keeps its lengths, where blended positions would shrink it. Shapes that bonds remember
-    /// count by how many of them are closed. Pigments, bleach and dyes are blended by what they absorb,
-    /// [`HairLook::dye`](crate::look::HairLook::dye) in linear light. Where only one has a cuticle or a
-    /// look of its own, the nearer one's holds; so does its preset.
+    /// Strands are blended by shape, joint by joint, and laid out from the root, which keeps their
+    /// lengths, where blended positions would shrink them. Remembered shapes are weighted by the
+    /// rates of their bonds. Pigments, bleach and dyes are blended by absorption,
+    /// [`HairLook::dye`](crate::look::HairLook::dye) in linear light. Where only one has a cuticle
+    /// or a look of its own, that of the nearer hairdo is used, as is its preset.
     ///
     /// # Errors
     /// When the hairdos differ in strands or nodes, or `t` is outside 0…1.
@@ -79,15 +79,15 @@ impl StyledStrand {
         }
     }
 
-    /// Direction and length of an edge, as seen from its own frame: not quite that frame's e3 and the
-    /// rest length, for a solved rod gives a little.
+    /// Direction and length of an edge, as seen from its own frame: not exactly that frame's e3 and
+    /// the rest length, since a solved rod is slightly strained.
     fn edge(&self, i: usize) -> (Vec3, f32) {
         let edge = self.positions[i + 1] - self.positions[i];
         (self.orientations[i].inverse() * edge.normalize_or(Vec3::Z), edge.length())
     }
 }
 
-/// The shape between two, turned the short way.
+/// Interpolates two shapes by the shorter rotation.
 fn between(a: Vec3, b: Vec3, t: f32) -> Vec3 {
     if a == b {
         return a;

@@ -8,19 +8,20 @@
 //! | … | the numbers |
 //! | 4 | CRC-32 of all bytes before, as in zip files and PNGs |
 //!
-//! This frame stays, whatever the format. In format 1 the numbers are: strands; the cuticle's damage and
-//! softening as an option; then strand by strand its nodes, whether it is wet, the root's frame,
-//! positions, orientations, rest lengths, joints, and if wet film and bound water. Counts are
-//! varints. A joint is a byte that says which of its shapes and rates are not told because they can
-//! be known, then the others. Format 2 has looks behind that, as `looks` says; a hairdo without any is
-//! written in format 1.
+//! This frame is the same in all formats. In format 1 the numbers are: strands; the cuticle's
+//! damage and softening as an option; then strand by strand its nodes, whether it is wet, the
+//! root's frame, positions, orientations, rest lengths, joints, and if wet film and bound water.
+//! Counts are varints. A joint is a byte that marks which of its shapes and rates are omitted
+//! because they can be derived, then the others. Format 2 appends looks, see `looks`; a hairdo
+//! without any is written in format 1.
 
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::bond::{BondKind, Cuticle, JointBonds};
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// The newest format that can be read. What is written is the oldest that holds all that there is.
+/// The newest format that can be read. Hairdos are written in the oldest format that holds all
+/// their data.
 pub const NEWEST_FORMAT: u16 = 2;
 
 /// The first format that has looks.
@@ -30,16 +31,16 @@ const MAGIC: [u8; 8] = *b"\x8bhairdo\n";
 /// Magic, format and length.
 const HEAD: usize = 8 + 2 + 8;
 const CHECKSUM: usize = 4;
-/// The least that a node, an edge and its joint take.
+/// Minimum size of a node, and of an edge with its joint.
 const NODE: usize = 12;
 const EDGE: usize = 16 + 4 + 1;
-/// The least that a strand of two nodes takes.
+/// Minimum size of a strand of two nodes.
 const STRAND: usize = 1 + 1 + 16 + 2 * NODE + EDGE;
 
 impl Hairdo {
-    /// The hairdo as bytes, for a file or a save game: about 45 for each node of untreated hair,
-    /// up to 120 for wet hair with every bond a shape of its own. The same hairdo gives the same
-    /// bytes.
+    /// The hairdo as bytes, for a file or a save game: about 45 for each node of untreated hair, up
+    /// to 120 for wet hair where every kind of bond has its own shape. The same hairdo gives the
+    /// same bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Writer(Vec::with_capacity(HEAD + CHECKSUM + 48 * self.nodes()));
         out.0.extend(MAGIC);
@@ -62,8 +63,8 @@ impl Hairdo {
     /// The hairdo of these bytes.
     ///
     /// # Errors
-    /// When the bytes are no hairdo, one of a newer format, cut off, damaged, or hold numbers that
-    /// cannot be. Never needs more than a few times the memory of `bytes`.
+    /// When the bytes are no hairdo, of a newer format, truncated, damaged, or hold invalid
+    /// numbers. Never needs more than a few times the memory of `bytes`.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, HairdoError> {
         let seen = bytes.len().min(MAGIC.len());
         if bytes[..seen] != MAGIC[..seen] {
@@ -105,7 +106,7 @@ impl Hairdo {
     }
 }
 
-/// Format and length; `None` where there are not even these.
+/// Format and length; `None` if the header is truncated.
 fn head(bytes: &[u8]) -> Option<(u16, u64)> {
     let (format, rest) = bytes.get(MAGIC.len()..)?.split_first_chunk()?;
     let (length, _) = rest.split_first_chunk()?;
@@ -166,7 +167,7 @@ fn omitted(joint: &JointBonds) -> u8 {
 
 pub(super) struct Reader<'a> {
     rest: &'a [u8],
-    /// Where the rest ends, from the file's beginning.
+    /// Offset of the end of the rest in the file.
     end: usize,
 }
 

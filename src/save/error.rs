@@ -1,4 +1,4 @@
-//! Why a hairdo cannot be saved, loaded or worn.
+//! Errors of saving, loading and applying hairdos.
 
 use crate::setting::InvalidValue;
 use bevy::prelude::*;
@@ -15,15 +15,15 @@ pub enum HairdoError {
         /// What was named.
         entity: Entity,
     },
-    /// The hair is simulated on the graphics device.
+    /// The hair is simulated on the GPU.
     #[error(
-        "{entity} is simulated on the graphics device: ask by TakeHairdo, and HairdoTaken brings its hairdo"
+        "{entity} is simulated on the GPU: request its hairdo by TakeHairdo, answered by HairdoTaken"
     )]
     OnGpu {
         /// The hair.
         entity: Entity,
     },
-    /// The bytes begin like no hairdo.
+    /// The bytes do not begin with a hairdo's magic number.
     #[error("these bytes are not a hairdo: use bytes from Hairdo::to_bytes")]
     NotAHairdo,
     /// Written by a newer version of this crate.
@@ -47,12 +47,12 @@ pub enum HairdoError {
         "the hairdo's checksum is {found:08x}, expected {expected:08x}: it was damaged, copy it again"
     )]
     Checksum {
-        /// Of the bytes that are there.
+        /// The checksum of the bytes found.
         found: u32,
         /// The checksum in the file.
         expected: u32,
     },
-    /// The checksum fits, but the bytes make no sense: written by something else.
+    /// The checksum is right, but the content is not that of a hairdo: written by another program.
     #[error("byte {offset} of the hairdo: expected {expected}; write it with Hairdo::to_bytes")]
     Malformed {
         /// Where, from the file's beginning.
@@ -86,10 +86,10 @@ pub enum HairdoError {
     },
     /// A cuticle's wear that is not finite.
     #[error(
-        "damage or softening of the hair's Cuticle is not finite, expected 0.33 or so: correct it"
+        "damage or softening of the hair's Cuticle is not finite, expected about 0.33: correct it"
     )]
     Cuticle,
-    /// A strand that is no line.
+    /// A strand with fewer than two nodes.
     #[error("strand {strand} has {found} nodes, expected 2 or more: despawn it")]
     TooFewNodes {
         /// The strand's index.
@@ -124,10 +124,10 @@ pub enum HairdoError {
     /// A hairdo without strands.
     #[error("the hairdo has no strands, expected one at least: take it from hair that has grown")]
     Bald,
-    /// The hairdo does not know which preset it was made on.
+    /// The hairdo was made on no preset, or on an unknown one.
     #[error(
-        "the hairdo was made on no preset that is known here: wear the hair that it was made on, \
-         styled by it"
+        "the hairdo was made on no known preset: wear the hair that it was made on, and \
+         set WearHair::hairdo"
     )]
     NoPreset,
     /// A number given to a function, or of a look or dye.

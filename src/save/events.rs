@@ -1,11 +1,11 @@
-//! Hairdos for systems: requests, and what comes of them.
+//! Hairdos for systems: requests and answers by events.
 
-use super::{Hairdo, HairdoError, put_on::tell};
+use super::{Hairdo, HairdoError, put_on::report};
 #[cfg(feature = "gpu")]
 use crate::strand::{AskForStrands, OnGpu, StrandsArrived};
 use bevy::prelude::*;
 
-/// A request: what is the hairdo of this [`Hair`](crate::Hair)? Answered by [`HairdoTaken`] on the
+/// Requests the hairdo of a [`Hair`](crate::Hair). Answered by [`HairdoTaken`] on the
 /// same entity, or by [`HairdoRefused`].
 ///
 /// ```
@@ -39,11 +39,11 @@ pub struct TakeHairdo {
 pub struct HairdoTaken {
     /// The hair.
     pub entity: Entity,
-    /// Its hairdo at the moment of the request; of hair on the graphics device a few frames later.
+    /// Its hairdo at the moment of the request; of hair on the GPU a few frames later.
     pub hairdo: Hairdo,
 }
 
-/// A request: put this hairdo on this [`Hair`](crate::Hair), strand by strand where it has as many
+/// Requests that a hairdo is put on a [`Hair`](crate::Hair), strand by strand where it has as many
 /// strands and nodes ([`Hairdo::apply`]), else resampled ([`Hairdo::apply_resampled`]). Answered by
 /// [`HairdoPutOn`] on the same entity, or by [`HairdoRefused`].
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
@@ -51,7 +51,7 @@ pub struct HairdoTaken {
 pub struct PutOnHairdo {
     /// The hair.
     pub entity: Entity,
-    /// What it is to wear.
+    /// The hairdo to put on.
     pub hairdo: Hairdo,
 }
 
@@ -63,8 +63,8 @@ pub struct HairdoPutOn {
     pub entity: Entity,
 }
 
-/// Triggered on what a [`TakeHairdo`] or [`PutOnHairdo`] named when it cannot be; told as a
-/// [`HairFault`](crate::HairFault) too. The hair is as it was.
+/// Triggered on the entity of a [`TakeHairdo`] or [`PutOnHairdo`] that failed; also reported as a
+/// [`HairFault`](crate::HairFault). The hair is not changed.
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct HairdoRefused {
@@ -94,7 +94,7 @@ fn answer(world: &mut World, hair: Entity) {
     }
 }
 
-/// Somebody waits for the hairdo of hair that is on the graphics device.
+/// Somebody waits for the hairdo of hair that is on the GPU.
 #[cfg(feature = "gpu")]
 #[derive(Component)]
 pub(super) struct Awaited;
@@ -121,6 +121,6 @@ pub(super) fn put_on(request: On<PutOnHairdo>, mut commands: Commands) {
 }
 
 fn refuse(world: &mut World, hair: Entity, error: HairdoError) {
-    tell(world, hair, error.clone());
+    report(world, hair, error.clone());
     world.trigger(HairdoRefused { entity: hair, error });
 }

@@ -20,7 +20,7 @@ fn color(color: HairColor) -> [f32; 3] {
 }
 
 impl Hairdo {
-    /// Whether there is more than format 1 can tell.
+    /// Whether there is more than format 1 can hold.
     pub(super) fn has_looks(&self) -> bool {
         self.look.is_some() || !self.dye.is_none() || self.preset.is_some()
     }

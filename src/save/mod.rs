@@ -2,15 +2,15 @@
 //! another groom, blended and undone.
 //!
 //! A [`Hairdo`] holds everything that makes a style: where the nodes are, which shapes the bonds
-//! remember and how many of them are closed, the water, the cuticle's wear, its look with bleach and
-//! dye, and which preset it was made on. It does not hold what else a hair is: roots belong to the
-//! scalp, settings such as [`HairStiffness`](crate::HairStiffness) to the character, drops of water to the
-//! world.
+//! remember and how many of them are closed, the water, the cuticle's wear, its look with bleach
+//! and dye, and which preset it was made on. It does not hold the rest of a hair: roots belong to
+//! the scalp, settings such as [`HairStiffness`](crate::HairStiffness) to the character, drops of
+//! water to the world.
 //!
 //! [`Hairdo::of`] takes it from a hair, [`Hairdo::apply`] puts it on the same groom,
-//! [`Hairdo::apply_resampled`] on another. Systems ask for both by events: [`TakeHairdo`] and
-//! [`PutOnHairdo`]. [`Hairdo::to_bytes`] and [`Hairdo::from_bytes`] are its
-//! file: compact, with a checksum, and of a numbered format ([`NEWEST_FORMAT`]); files of older formats
+//! [`Hairdo::apply_resampled`] on another. Systems request both by events: [`TakeHairdo`] and
+//! [`PutOnHairdo`]. [`Hairdo::to_bytes`] and [`Hairdo::from_bytes`] convert it to a file's content:
+//! compact, with a checksum, and of a numbered format ([`NEWEST_FORMAT`]); files of older formats
 //! stay readable, newer ones are refused with an error. [`Hairdo::blend`] interpolates two hairdos.
 
 mod blend;
@@ -59,7 +59,8 @@ use bevy::prelude::*;
 /// # Ok(()) }
 /// ```
 ///
-/// Every hairdo is valid: all numbers are finite and in their ranges, all arrays fit together.
+/// Every hairdo is valid: all numbers are finite and in their ranges, all arrays have matching
+/// lengths.
 #[derive(Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(opaque)]
 #[reflect(Default, Clone, Debug, PartialEq)]
@@ -85,8 +86,8 @@ pub struct StyledStrand {
     bound: Vec<f64>,
 }
 
-/// The most water that a node may hold (m³).
-const MOST_WATER: f64 = 1.0;
+/// The maximum water of a node (m³).
+const MAX_WATER: f64 = 1.0;
 
 impl Hairdo {
     /// The strands in their order.
@@ -155,7 +156,7 @@ impl Hairdo {
         }
     }
 
-    /// Says how `self` differs from a groom of strands with as many nodes as these.
+    /// Checks that `self` fits a groom whose strands have these node counts.
     fn check_fit(&self, nodes: impl ExactSizeIterator<Item = usize>) -> Result<(), HairdoError> {
         if self.strands.len() != nodes.len() {
             let (found, expected) = (self.strands.len(), nodes.len());
@@ -254,6 +255,6 @@ impl StyledStrand {
         let rates = &mut self.joints.iter().flat_map(|j| j.rates).map(f64::from);
         within("rate (four of each joint)", "0 to 1", rates, 0.0, 1.0)?;
         let water = &mut self.film.iter().chain(&self.bound).copied();
-        within("water (m³; film, then bound) of node", "0 to 1", water, 0.0, MOST_WATER)
+        within("water (m³; film, then bound) of node", "0 to 1", water, 0.0, MAX_WATER)
     }
 }

@@ -7,7 +7,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     look::{HairDye, HairLook, WornPreset},
     setting::{HairDefault, HairSetting, Ranged},
-    strand::{AddedMass, Hair, HeldNodes, OnGpu, Strand, StrandHistory, Strands, bring_home},
+    strand::{AddedMass, Hair, HeldNodes, OnGpu, Strand, StrandHistory, Strands, return_to_cpu},
     treatment::{Treatments, WindingProgress, WoundOn},
     water::{HairWetting, Moisture, WaterLedger},
 };
@@ -17,8 +17,7 @@ impl Hairdo {
     /// The present hairdo of a [`Hair`], a snapshot of its pose even in motion.
     ///
     /// # Errors
-    /// When `hair` is no hair, is on the graphics device, or a strand has fewer than two nodes or numbers
-    /// that cannot be.
+    /// When `hair` is no hair, is on the GPU, or a strand has fewer than two nodes or invalid numbers.
     pub fn of(world: &World, hair: Entity) -> Result<Self, HairdoError> {
         if world.get::<OnGpu>(hair).is_some() {
             return Err(HairdoError::OnGpu { entity: hair });
@@ -47,17 +46,17 @@ impl Hairdo {
     /// none.
     ///
     /// Roots stay where they are; a strand whose root has moved since, as on a skinned mesh, is
-    /// moved with it. Treatments that were still acting end, winding on a rod starts again, nodes held
-    /// by [`HeldNodes`] otherwise stay held. Drops stay where they are in the world. Water that comes
-    /// with the hairdo, or goes with the old one, is booked in the [`WaterLedger`]. Look and dye are
-    /// put on too; without a [`look`](Self::look) of the hairdo's own the hair keeps its.
+    /// moved with it. Acting treatments end, winding on a rod starts again, nodes held by
+    /// [`HeldNodes`] otherwise stay held. Drops stay where they are in the world. Water that the
+    /// hairdo adds or the old one removes is entered in the [`WaterLedger`]. Look and dye are put
+    /// on too; without a [`look`](Self::look) of the hairdo's own the hair keeps its look.
     ///
-    /// In a system use [`Hairdo::put_on`], or [`PutOnHairdo`](super::PutOnHairdo) to be answered.
+    /// In a system use [`Hairdo::put_on`], or [`PutOnHairdo`](super::PutOnHairdo) to get an answer.
     ///
     /// # Errors
-    /// When `hair` is no hair, or has other strands than the hairdo.
+    /// When `hair` is no hair, or its strands do not match the hairdo's.
     pub fn apply(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
-        bring_home(world, hair);
+        return_to_cpu(world, hair);
         let mut members = members(world, hair)?;
         members.retain(|member| world.get::<Strand>(*member).is_some());
         let nodes = members.iter().map(|m| world.get::<Strand>(*m).map_or(0, Strand::nodes));
@@ -66,14 +65,14 @@ impl Hairdo {
             wetting: setting(world, hair),
             gravity: (world.get_resource::<HairGravity>()).map_or(0.0, |g| g.clamped().length()),
         };
-        let mut came = 0.0;
+        let mut added = 0.0;
         for (member, style) in members.into_iter().zip(&self.strands) {
-            came += style.put_on(world.entity_mut(member), &conditions);
+            added += style.put_on(world.entity_mut(member), &conditions);
         }
         if let Some(mut ledger) = world.get_resource_mut::<WaterLedger>()
-            && came != 0.0
+            && added != 0.0
         {
-            ledger.replace(came);
+            ledger.replace(added);
         }
         let mut hair = world.entity_mut(hair);
         match self.cuticle {
@@ -136,12 +135,12 @@ fn command(
         let entity = hair.id();
         let world = hair.into_world_mut();
         if let Err(wrong) = act(world, entity) {
-            tell(world, entity, wrong);
+            report(world, entity, wrong);
         }
     }
 }
 
-pub(super) fn tell(world: &mut World, hair: Entity, wrong: HairdoError) {
+pub(super) fn report(world: &mut World, hair: Entity, wrong: HairdoError) {
     let outcome = "the hair keeps the hairdo that it has";
     world.write_message(HairFault::caused(FaultKind::Hairdo, wrong, outcome).of(hair));
 }
@@ -166,7 +165,7 @@ struct WettingConditions {
 
 impl StyledStrand {
     fn of(strand: &Strand, bonds: Option<&Bonds>, water: Option<&Moisture>) -> Self {
-        // Bonds that do not fit would be replaced in the next tick.
+        // Bonds that do not match the strand would be replaced in the next tick.
         let bonds = bonds.filter(|bonds| bonds.joints.len() == strand.edges());
         let joints = bonds.map_or_else(|| Bonds::of(strand).joints, |bonds| bonds.joints.clone());
         let water = water.filter(|water| !water.is_untouched());
@@ -186,7 +185,7 @@ impl StyledStrand {
         }
     }
 
-    /// The same with its root elsewhere.
+    /// The same moved to another root.
     fn rooted(&self, place: Vec3, frame: Quat) -> Self {
         let mut moved = self.clone();
         if (place, frame) != (self.positions[0], self.root_frame)
@@ -218,20 +217,20 @@ impl StyledStrand {
             bonds.joints.clone_from(&self.joints);
         }
         // Running treatments belong to the replaced hairdo.
-        fn forget<T: Component<Mutability = bevy::ecs::component::Mutable> + Default>(
+        fn reset<T: Component<Mutability = bevy::ecs::component::Mutable> + Default>(
             entity: &mut EntityWorldMut<'_>,
         ) {
             if let Some(mut state) = entity.get_mut::<T>() {
                 *state = T::default();
             }
         }
-        forget::<BondChanges>(&mut entity);
-        forget::<RestShape>(&mut entity);
-        forget::<Treatments>(&mut entity);
-        forget::<AddedMass>(&mut entity);
+        reset::<BondChanges>(&mut entity);
+        reset::<RestShape>(&mut entity);
+        reset::<Treatments>(&mut entity);
+        reset::<AddedMass>(&mut entity);
         if entity.contains::<WoundOn>() {
-            forget::<WindingProgress>(&mut entity);
-            forget::<HeldNodes>(&mut entity);
+            reset::<WindingProgress>(&mut entity);
+            reset::<HeldNodes>(&mut entity);
         }
         entity.get_mut::<Moisture>().map_or(0.0, |mut water| {
             let WettingConditions { wetting, gravity } = around;

@@ -5,22 +5,22 @@ use crate::{
     bond::{BondKind, JointBonds},
     grid::KdTree,
     rod::frame::{darboux, full},
-    strand::bring_home,
+    strand::return_to_cpu,
     water::moisture::node_lengths,
 };
 use bevy::prelude::*;
 
-/// The sharpest bend of a resampled joint, sin(θ/2): 150°. Beyond 180° it would be a bend to the other
+/// The largest bend of a resampled joint, sin(θ/2): 150°. Beyond 180° it would bend to the other
 /// side.
-const SHARPEST: f32 = 0.966;
+const MAX_BEND: f32 = 0.966;
 
 impl Hairdo {
     /// Puts the hairdo on the hair of another groom, at rest; all strands, or in case of an error
-    /// none. As [`Hairdo::apply`], but strands may be others and have more or fewer nodes.
+    /// none. As [`Hairdo::apply`], but the hair may have other strands, with more or fewer nodes.
     ///
-    /// With as many strands, each takes the style of the one in its place; else of the one with the
-    /// nearest root. Along a strand everything is taken by the share of its length. Curvature is
-    /// kept, not the angles of joints: a curl has the same radius on fewer or more nodes, and on
+    /// With as many strands, each takes the style of the one with its index; else of the one with
+    /// the nearest root. Along a strand everything is mapped by the share of its length. Curvature
+    /// is kept, not the angles of joints: a curl has the same radius on fewer or more nodes, and on
     /// longer hair more turns. Water is kept per length. Lengths, roots and the scalp's frames are
     /// the new groom's.
     ///
@@ -32,9 +32,9 @@ impl Hairdo {
     /// to many, neighbours get the same.
     ///
     /// # Errors
-    /// When `hair` is no hair or has numbers that cannot be, or this hairdo has no strands at all.
+    /// When `hair` is no hair or has invalid numbers, or this hairdo has no strands.
     pub fn apply_resampled(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
-        bring_home(world, hair);
+        return_to_cpu(world, hair);
         self.resampled_for(&Self::of(world, hair)?)?.apply(world, hair)
     }
 
@@ -114,7 +114,7 @@ impl StyledStrand {
     }
 }
 
-/// Places along an old and a new strand, all measured along the old one.
+/// Arc lengths along an old and a new strand, both in the old one's lengths.
 struct Along {
     old_nodes: Vec<f32>,
     old_middles: Vec<f32>,
@@ -142,9 +142,10 @@ impl Along {
         Self { old_nodes, old_middles, new_nodes, new_middles, scale }
     }
 
-    /// Shapes of the new joints. Edge orientations are those at the edges' middles, so a joint turns
-    /// by the curvature between two of them. |Im Ω| = sin(θ/2) is half the edge over the radius of
-    /// the circle through the nodes: Ω per length, unlike the angle, keeps that radius exactly.
+    /// Shapes of the new joints. Edge orientations are those at the edges' middles, so a joint
+    /// bends by the curvature between two of them. |Im Ω| = sin(θ/2) is half the edge over the
+    /// radius of the circle through the nodes: Ω per length, unlike the angle, keeps that radius
+    /// exactly.
     fn resample_shapes(&self, old_root: Quat, shapes: &[Vec3], new_root: Quat) -> Vec<Vec3> {
         let first = shapes.first().copied().unwrap_or_default();
         let onward = self.turn(shapes, self.old_middles[0], self.new_middles[0]);
@@ -153,7 +154,7 @@ impl Along {
         core::iter::once(first).chain(others).collect()
     }
 
-    /// Ω integrated between two places; constant before the first joint and behind the last.
+    /// Ω integrated between two arc lengths; constant before the first joint and after the last.
     fn turn(&self, shapes: &[Vec3], from: f32, to: f32) -> Vec3 {
         if to < from {
             return -self.turn(shapes, to, from);
@@ -167,10 +168,10 @@ impl Along {
                 shapes[i + 1] * ((end - begin).max(0.0) / (m[1] - m[0]))
             })
             .sum();
-        (sum * self.scale).clamp_length_max(SHARPEST)
+        (sum * self.scale).clamp_length_max(MAX_BEND)
     }
 
-    /// Interpolates `values` of the old nodes at a new one; constant behind the last.
+    /// Interpolates `values` of the old nodes at a new one; constant after the last.
     fn at_node(&self, values: &[f64], new: usize) -> f64 {
         let place = self.new_nodes[new];
         let after = self.old_nodes.partition_point(|node| *node <= place);

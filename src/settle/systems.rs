@@ -38,10 +38,10 @@ impl Plugin for SettlePlugin {
     }
 }
 
-/// For how long all of it has to be still (s): a swing's turning point does not last so long.
-const OUTLASTS: f32 = 0.25;
+/// How long all of it has to be still (s): longer than the turning point of a swing.
+const STILL_SECONDS: f32 = 0.25;
 
-/// What settles in this tick of the game, and how.
+/// The hair that settles in this tick of the game, with its settings.
 type Settlers = Vec<(Entity, HairSettling)>;
 
 fn settlers(
@@ -49,7 +49,7 @@ fn settlers(
     settings: Settings<HairSettling>,
     strands: Query<(&Strand, &StrandHistory)>,
 ) -> Settlers {
-    // A tick of the game has to come first: it ties roots, fits bonds and sees what is around.
+    // A tick of the game has to come first: it ties roots, fits bonds and gathers colliders.
     let has_ticked = |members: &Strands| {
         let mut theirs = strands.iter_many(members.collection());
         theirs.all(|(strand, history)| history.positions.len() == strand.nodes())
@@ -58,14 +58,14 @@ fn settlers(
     ready.map(|(hair, _)| (hair, settings.of(hair))).collect()
 }
 
-/// Takes hair that settles through some ticks of its own, all of it together.
+/// Runs additional ticks of all hair that settles.
 fn settle(world: &mut World) {
     let mut hairs = world.run_system_cached(settlers).unwrap_or_default();
     let present = *world.resource::<HairStep>();
     if hairs.is_empty() || present.count == 0 {
         return;
     }
-    // Nothing moves meanwhile: neither the head nor what is around.
+    // Nothing else moves meanwhile: neither the head nor colliders.
     for mut pose in world.query::<&mut TickPose>().iter_mut(world) {
         pose.bypass_change_detection().hold();
     }
@@ -74,7 +74,7 @@ fn settle(world: &mut World) {
         hairs.retain(|(hair, settings)| {
             let settling = world.get::<Settling>(*hair);
             let goes_on = settling.is_some_and(|settling| {
-                settling.done < settings.ticks && settling.still < OUTLASTS
+                settling.done < settings.ticks && settling.still < STILL_SECONDS
             });
             if !goes_on {
                 end(world, *hair);
@@ -99,7 +99,7 @@ fn settle(world: &mut World) {
     *world.resource_mut::<HairStep>() = present;
 }
 
-/// What a hair that settles is slowed down by.
+/// Damps hair that settles, and measures its rest.
 #[derive(bevy::ecs::system::SystemParam)]
 struct Calm<'w, 's> {
     hairs: Query<'w, 's, (&'static mut Settling, &'static Strands)>,
@@ -107,14 +107,14 @@ struct Calm<'w, 's> {
 }
 
 impl Calm<'_, '_> {
-    /// After a tick ahead of so many seconds.
+    /// After an additional tick of this many seconds.
     fn slow_down(mut self, hair: Entity, settings: &HairSettling, seconds: f32) {
         let Ok((mut settling, members)) = self.hairs.get_mut(hair) else { return };
         let keep = bevy::math::ops::exp(-settings.damping * seconds);
         let mut fastest: f32 = 0.0;
         let mut members = self.strands.iter_many_mut(members.collection());
         while let Some((mut strand, mut changes)) = members.fetch_next() {
-            // A dryer that blows meanwhile has dried nothing.
+            // Discards the drying by blowers meanwhile.
             *changes.bypass_change_detection() = default();
             let (_, velocities, _, spins) = strand.bypass_change_detection().parts_mut();
             for v in velocities.iter_mut().chain(spins) {
@@ -128,7 +128,7 @@ impl Calm<'_, '_> {
     }
 }
 
-/// The hair is at rest and is drawn from now on.
+/// Ends settling: the hair is at rest and is drawn from now on.
 fn end(world: &mut World, hair: Entity) {
     let members = world.get::<Strands>(hair).map(|members| members.collection().to_vec());
     for strand in members.unwrap_or_default() {

@@ -1,15 +1,15 @@
 //! Sleep: strands at rest are not simulated until something disturbs them.
 //!
-//! Once a tick each strand is checked: has it been still for a while, and does nothing act that could
-//! move it or its bonds? Then it sleeps ([`StrandSleep`](crate::StrandSleep)): velocities are zero,
-//! and forces, contacts, rest shapes and projection skip it. It wakes when the head moves,
-//! gravity or a setting changes, a blower reaches it, a collider appears, disappears or moves near it,
-//! contact with a neighbour changes, its held nodes or its root move, bonds are treated,
-//! water or a droplet is on it, or game code writes to its [`Strand`](crate::Strand) or
+//! Once a tick each strand is checked: has it been still for a while, and is there nothing that
+//! could move it or its bonds? Then it sleeps ([`StrandSleep`](crate::StrandSleep)): velocities are
+//! zero, and forces, contacts, rest shapes and projection skip it. It wakes when the head moves,
+//! gravity or a setting changes, a blower reaches it, a collider appears, disappears or moves near
+//! it, contact with a neighbour changes, its held nodes or its root move, bonds are treated, water
+//! or a droplet is on it, or game code writes to its [`Strand`](crate::Strand) or
 //! [`Bonds`](crate::Bonds).
 //!
-//! Wet hair, hair in the wind and hair whose bonds are moving never sleeps: a style that is still
-//! forming would freeze. The equations are in [`model`].
+//! Wet hair, hair in the wind and hair whose bonds are changing never sleeps: a style that is still
+//! forming would be frozen. The equations are in [`model`].
 
 #[doc(hidden)]
 pub mod model;
@@ -42,7 +42,7 @@ setting! {
         /// Mean speed below which a node counts as still. 1e-4 is 0.05 mm in half a second; more puts
         /// slowly settling hair to sleep before it has settled.
         pub speed: f32 = 1e-4, "m/s" in SPEED: 0.0..=1.0, safe 1e-6..=1e-2,
-            "1e-4 is hardly to be seen";
+            "1e-4 is hardly visible";
         /// Mean angular velocity below which an edge counts as still.
         pub turning: f32 = 1e-2, "rad/s" in TURNING: 0.0..=10.0, safe 1e-4..=0.1,
             "0.01 is half a degree";

@@ -1,4 +1,4 @@
-//! Sleep as pure functions: what counts as the same place.
+//! Sleep as pure functions: what counts as unchanged.
 
 use crate::rod::obstacle::Solid;
 use glam::{Quat, Vec3};

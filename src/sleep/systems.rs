@@ -28,8 +28,8 @@ use bevy::{
     prelude::*,
 };
 
-/// Wind from which on no strand sleeps (m/s²): it bends hair by a thousandth of what gravity does, and
-/// dries it.
+/// Acceleration by wind above which no strand sleeps (m/s²): it bends hair by a thousandth of what
+/// gravity does, and dries it.
 const BREEZE: f32 = 0.01;
 
 /// Extra distance to a moving collider, beyond the contact radius, within which strands wake (m).
@@ -112,8 +112,8 @@ pub(super) struct SleepSnapshot {
 /// Changes of a hair as a whole since the previous tick.
 struct WakeEvents {
     sleep: HairSleep,
-    /// All its strands wake.
-    stirred: bool,
+    /// Whether all its strands wake.
+    all_wake: bool,
     /// Colliders that appeared, disappeared or moved: strands within reach of these wake (m).
     solids: Vec<(Solid, f32)>,
     winds: LocalWinds,
@@ -145,7 +145,7 @@ impl SleepSnapshot {
         let solids = self.compare_solids(seen, distance, clearance, substeps);
         WakeEvents {
             sleep: conditions.sleep,
-            stirred: !(rests && same),
+            all_wake: !(rests && same),
             solids,
             winds: LocalWinds::default(),
         }
@@ -177,9 +177,9 @@ impl SleepSnapshot {
         let unknown = |one: &&SeenCollider, others: &[SeenCollider]| {
             others.iter().all(|other| !within(other.moved(one), distance))
         };
-        let told = |s: &SeenCollider| (s.solid.clone(), clearance);
-        changed.extend(now.iter().filter(|s| unknown(s, &self.solids)).map(told));
-        changed.extend(self.solids.iter().filter(|s| unknown(s, &now)).map(told));
+        let with_clearance = |s: &SeenCollider| (s.solid.clone(), clearance);
+        changed.extend(now.iter().filter(|s| unknown(s, &self.solids)).map(with_clearance));
+        changed.extend(self.solids.iter().filter(|s| unknown(s, &now)).map(with_clearance));
         self.solids = now;
         changed
     }
@@ -205,7 +205,7 @@ impl SeenCollider {
 /// Length of a long strand (m), the lever for rotations of the head.
 const LONG_STRAND: f32 = 0.3;
 
-struct Item<'a> {
+struct SleepCandidate<'a> {
     hair: usize,
     strand: Mut<'a, Strand>,
     sleep: Mut<'a, StrandSleep>,
@@ -248,7 +248,7 @@ fn update_sleep(
     let colliders = with_balls(&colliders);
     for (hair, frame, mut snapshot, sleepers, members, reach) in &mut hairs {
         // A collider that comes within reach counts as new while it is still far from any strand.
-        // Without simulated strands there is none to wake.
+        // Hair without simulated strands has none to wake.
         let colliders = if *sleepers != Sleepers::default() { &colliders[..] } else { &[] };
         let near = colliders
             .iter()
@@ -277,7 +277,7 @@ fn update_sleep(
             index
         }
     };
-    let mut items: Vec<Item<'_>> = Vec::with_capacity(strands.iter().len());
+    let mut items: Vec<SleepCandidate<'_>> = Vec::with_capacity(strands.iter().len());
     for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
         // Followers sleep when their guides do.
         if sleep.is_follower() {
@@ -292,7 +292,7 @@ fn update_sleep(
             || !added_mass.mass.is_empty()
             || treatments.is_some_and(|t| !t.acting().is_empty())
             || water.is_some_and(|water| !water.is_untouched());
-        items.push(Item { hair, strand, sleep, still, held, restless });
+        items.push(SleepCandidate { hair, strand, sleep, still, held, restless });
     }
     let seconds = step.dt * step.count as f32;
     for_each(&mut items, Nanos(500), |item| decide(item, &wake_events[item.hair], seconds));
@@ -308,12 +308,12 @@ fn update_sleep(
 }
 
 /// Whether one strand sleeps from now on.
-fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
-    let Item { strand, sleep, still, held, restless, .. } = item;
+fn decide(item: &mut SleepCandidate<'_>, wake_events: &WakeEvents, seconds: f32) {
+    let SleepCandidate { strand, sleep, still, held, restless, .. } = item;
     let strand = strand.bypass_change_detection();
     let (distance, angle) = (wake_events.sleep.distance(), wake_events.sleep.angle());
     let targets = held.map_or(&[][..], |held| &held.targets);
-    let restless = *restless || wake_events.stirred || strand.nodes() < 2;
+    let restless = *restless || wake_events.all_wake || strand.nodes() < 2;
     if sleep.is_asleep() {
         if restless
             || was_pushed(strand)
@@ -353,14 +353,14 @@ fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
         );
         return;
     }
-    sleep.lie_still(seconds);
+    sleep.add_still_time(seconds);
     if sleep.still_for() >= wake_events.sleep.seconds {
         still.distance = distance;
         (still.low, still.high) = (strand.positions()[0], strand.positions()[0]);
         for p in strand.positions() {
             (still.low, still.high) = (still.low.min(*p), still.high.max(*p));
         }
-        // A collider that arrives in this tick would meet it asleep.
+        // Not while a collider arrives in this tick.
         if !comes_near(still, &wake_events.solids) {
             sleep.fall_asleep();
             strand.rest();
@@ -368,7 +368,7 @@ fn decide(item: &mut Item<'_>, wake_events: &WakeEvents, seconds: f32) {
     }
 }
 
-/// A sleeper's velocities are zero: any other was written from outside.
+/// A sleeping strand's velocities are zero unless written from outside.
 fn was_pushed(strand: &Strand) -> bool {
     strand.velocities().iter().any(|v| *v != Vec3::ZERO)
 }

@@ -16,7 +16,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// About what a node takes (ns).
+/// Estimated time per node (ns).
 const NODE: usize = 60;
 
 /// One block of strands of equal node count through one substep.
@@ -33,8 +33,8 @@ fn key<T: Batched>(item: &T) -> (Entity, usize) {
     (item.hair(), item.source().strand.nodes())
 }
 
-/// Solves all strands, of about `nodes` nodes each (for the cost estimate). `item` makes an item of a
-/// row to be solved; strands of hairs without `params_of` are skipped. Faults are in the same order on
+/// Solves all strands, of about `nodes` nodes each (for the cost estimate). `item` makes a work
+/// item of a row; strands of hairs without `params_of` are skipped. Faults are in the same order on
 /// any number of threads.
 pub(super) fn for_each_batch<C: Columns, T: Batched>(
     tables: impl Iterator<Item = C>,

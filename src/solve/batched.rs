@@ -15,7 +15,7 @@ pub(super) struct Source<'a> {
     pub(super) held: Option<&'a HeldNodes>,
 }
 
-/// Edge state that a method keeps from substep to substep, beside orientations.
+/// Edge state besides orientations that a method keeps between substeps.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kept {
     Nothing,
@@ -46,7 +46,7 @@ pub(super) trait Batched: Sized + Send {
     fn remembered(&self, _params: &Self::Params) -> Vec<Vec3> {
         Vec::new()
     }
-    /// Edge state that is written back, beside orientations.
+    /// Edge state besides orientations that is written back.
     fn kept(_params: &Self::Params) -> Kept {
         Kept::Nothing
     }

@@ -1,8 +1,9 @@
-//! Strands' arrays into lanes and back.
+//! Gathers strands' arrays into lanes and scatters them back.
 //!
-//! At ten thousand strands of sixteen nodes that takes about as long as three of five iterations: four
-//! strands by four numbers are transposed at a time, and their memory is prefetched while the block
-//! before is solved. Number by number and without prefetching it took longer than all five.
+//! Blocks of four strands by four numbers are transposed at a time, and memory is prefetched while
+//! the previous block is solved. At ten thousand strands of sixteen nodes that takes about as long
+//! as three of five iterations; number by number and without prefetching it took longer than all
+//! five.
 
 use super::batched::{Batched, Kept, Source};
 use crate::{
@@ -16,7 +17,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// One of each lane; lanes that no item uses repeat the first.
+/// A value for each lane; unused lanes repeat the first.
 pub(super) fn in_lanes<'a, T, U>(items: &'a [T], of: impl Fn(&'a T) -> U) -> [U; LANES] {
     core::array::from_fn(|lane| of(items.get(lane).unwrap_or(&items[0])))
 }
@@ -95,7 +96,7 @@ pub(super) fn scatter<T: Batched>(
 fn scatter_four(block: &BlockLanes, group: usize, strands: [&mut Strand; 4], kept: Kept) {
     let [a, b, c, d] = strands;
     for strand in [&mut *a, &mut *b, &mut *c, &mut *d] {
-        strand.stepped_well();
+        strand.step_succeeded();
     }
     if kept == Kept::Tensions {
         let tensions = [a.tensions_mut(), b.tensions_mut(), c.tensions_mut(), d.tensions_mut()];
@@ -111,7 +112,7 @@ fn scatter_four(block: &BlockLanes, group: usize, strands: [&mut Strand; 4], kep
 }
 
 fn scatter_one(block: &BlockLanes, lane: usize, strand: &mut Strand, kept: Kept) {
-    strand.stepped_well();
+    strand.step_succeeded();
     if kept == Kept::Tensions {
         for (edge, tension) in block.edges.iter().zip(strand.tensions_mut()) {
             *tension = edge.tension[lane];

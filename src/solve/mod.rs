@@ -1,14 +1,14 @@
 //! `Projection`: gathers strands from their tables into lanes, runs their kernel, and scatters back.
 //!
-//! The only room that knows both entities and lanes. Strands keep their own vectors, so that game code
-//! reads and writes them; those of a hair with equal node count are gathered into a block of
-//! [`LANES`](crate::lanes::LANES), stepped side by side and scattered back in each substep.
+//! The only module that handles both entities and lanes. Strands keep their own vectors, so that
+//! game code reads and writes them; those of a hair with equal node count are gathered into a block
+//! of [`LANES`](crate::lanes::LANES), stepped side by side and scattered back in each substep.
 //!
 //! | file | what |
 //! |---|---|
-//! | `batched` | what a kernel offers |
+//! | `batched` | the trait of kernels |
 //! | `batch` | which strands are solved side by side, on all threads |
-//! | `gather` | strands' arrays into lanes and back; strands that left the finite numbers |
+//! | `gather` | strands' arrays into lanes and back; strands that became non-finite |
 //! | `rods` | Cosserat rods ([`rod`](crate::rod)) |
 //! | `substeps` | how many of the tick's substeps a hair takes as one |
 //! | `springs` | masses and springs ([`mass_spring`](crate::mass_spring)) |

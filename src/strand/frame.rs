@@ -1,11 +1,11 @@
 //! Poses of entities within a tick, and inertia from the motion of the hair's frame.
 //!
-//! Transforms change once a tick or a frame; a substep wants them in between. [`TickPose`] takes
-//! hair, colliders, rods and blowers from where they were to where they are in equal parts.
+//! Transforms change once a tick or a frame; substeps need poses in between. [`TickPose`]
+//! interpolates hair, colliders, rods and blowers from their previous to their present pose.
 //!
-//! Strands live in the frame of their `Hair`, where roots do not move. In a frame that moves, things
-//! at rest in the world seem to move the other way: each substep the nodes are moved by the inverse
-//! of the frame's motion, which is exactly inertia.
+//! Strands live in the frame of their `Hair`, where roots do not move. Seen from a moving frame,
+//! points at rest in the world move the opposite way: each substep the nodes are moved by the
+//! inverse of the frame's motion, which is exactly inertia.
 
 use crate::setting::setting;
 use bevy::{
@@ -13,19 +13,20 @@ use bevy::{
     prelude::*,
 };
 
-/// Where an entity is within the tick, spread over its substeps. Written by `Roots` from the
-/// entity's global transform.
+/// The pose of an entity within the tick, interpolated over its substeps. Written by `Roots` from
+/// the entity's global transform.
 #[derive(Component, Reflect, Clone, Debug)]
 #[reflect(Component, Default, Clone)]
 pub struct TickPose {
     from: Option<Pose>,
     to: Pose,
     now: Pose,
-    /// Where the present substep began; for a hair that takes several as one, the first of those.
+    /// The pose at the start of the present substep; for a hair that merges several, of the first
+    /// of those.
     before: Pose,
-    /// The shares of the tick at which it is `now` and was `before`.
+    /// The shares of the tick at `before` and at `now`.
     shares: [f32; 2],
-    /// The shares of the frame's moving and turning that its hair is left behind by.
+    /// The shares of the frame's translation and rotation that act on its hair as inertia.
     inertia: Vec2,
     jumps: bool,
     /// Whether this tick is one of a teleport.
@@ -34,10 +35,11 @@ pub struct TickPose {
     frames: FramePoses,
 }
 
-/// Where an entity was in the last frames. Frames and ticks do not keep step: a head that turns evenly
-/// from frame to frame would be seen to turn by two frames' worth in one tick and by three in the next,
-/// and its hair would stutter. So ticks look at where it was one frame ago by their own clock, between
-/// the last two frames. An entity that a tick has moved is taken where it is.
+/// The poses of an entity in the last frames. Frames and ticks are not synchronous: a head that
+/// turns evenly from frame to frame would turn by two frames' worth in one tick and by three in the
+/// next, and its hair would stutter. So ticks use the pose one frame ago by their own clock,
+/// interpolated between the last two frames. An entity that was moved within a tick is used where
+/// it is.
 #[derive(Reflect, Clone, Debug, Default)]
 #[reflect(Default, Clone)]
 struct FramePoses {
@@ -101,8 +103,8 @@ setting! {
     /// How much the motion of the head acts on its hair. Component of a [`Hair`](crate::Hair), may change at
     /// any time; where absent, [`HairDefault<HairInertia>`](crate::HairDefault) holds.
     ///
-    /// Game characters accelerate and turn harder than any person; with less inertia their hair still
-    /// trails behind them, but by less.
+    /// Game characters accelerate and turn faster than any person; with less inertia their hair
+    /// trails behind them by less.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -123,10 +125,10 @@ setting! {
         /// in its present shape, at rest. In the hair's own scale; 0.5 is 30 m/s at 60 Hz.
         pub teleport_distance: f32 = 0.5, "m" in TELEPORT_DISTANCE: 0.0..=f32::INFINITY,
             safe 0.1..=f32::INFINITY, "0.5 suits games";
-        /// The same in lengths of its longest strand: long hair can be swept along by what short hair
-        /// cannot. Colliders, rods and blowers that move as some hair does jump when that does.
+        /// The same in lengths of its longest strand: long hair can follow motion that short hair
+        /// cannot. Colliders, rods and blowers that move like some hair teleport when that does.
         pub teleport_lengths: f32 = 3.0, in TELEPORT_LENGTHS: 0.0..=f32::INFINITY,
-            safe 1.0..=10.0, "3 whips a hair round once";
+            safe 1.0..=10.0, "3 is a fast whip of the head";
         /// The same for a head that turns by more than this. 1.6 is more than 5000° a second at
         /// 60 Hz; π and above never happen.
         pub teleport_angle: f32 = 1.6, "rad" in TELEPORT_ANGLE: 0.0..=f32::INFINITY,
@@ -146,7 +148,7 @@ impl HairInertia {
 /// A rigid pose with a scale.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Place in the world (m).
+    /// Position in the world (m).
     pub translation: Vec3,
     /// Orientation in the world.
     pub rotation: Quat,
@@ -161,8 +163,8 @@ impl Default for Pose {
 }
 
 impl Pose {
-    /// The pose of a global transform: of an uneven scale the mean. `None` when it is not finite or
-    /// flattens space.
+    /// The pose of a global transform, with the mean of a non-uniform scale. `None` when it is not
+    /// finite or not invertible.
     pub fn of(transform: &GlobalTransform) -> Option<Self> {
         let (scale, rotation, translation) = transform.to_scale_rotation_translation();
         let scale = scale.element_product().abs().cbrt();
@@ -223,15 +225,16 @@ impl TickPose {
         &self.now
     }
 
-    /// The pose at the end of the substep before; of a hair that takes several as one, before the first
-    /// of those.
+    /// The pose at the end of the previous substep; for a hair that merges several, before the
+    /// first of those.
     pub fn before(&self) -> &Pose {
         &self.before
     }
 
     /// How this pose moves during the substep of `hair`, in the hair's frame: the motion of a point
-    /// fixed to it; `None` if it rests. Nodes are already in the hair's frame as it is now, so with
-    /// full inertia what rests in the world has no motion here, whatever the frame did.
+    /// fixed to it; `None` if it rests. Nodes are already in the present frame of the hair, so with
+    /// full inertia an entity at rest in the world has no motion here, whatever the frame does.
+    #[doc(hidden)]
     pub fn motion_in(&self, hair: &TickPose) -> Option<Affine3A> {
         let began = self.at(hair.shares[0]);
         if hair.inertia == Vec2::ONE {
@@ -242,11 +245,11 @@ impl TickPose {
         }
         let seen = |own: &Pose, hair: &Pose| hair.affine().inverse() * own.affine();
         let (before, now) = (seen(&began, &hair.before), seen(&self.now, &hair.now));
-        let carried = hair.frame_delta().map_or(before, |carry| Affine3A::from(carry) * before);
-        (now != carried).then(|| now * carried.inverse())
+        let followed = hair.frame_delta().map_or(before, |delta| Affine3A::from(delta) * before);
+        (now != followed).then(|| now * followed.inverse())
     }
 
-    /// Rests where it is until the next tick: its motion in the last substep is over.
+    /// Ends its motion: it rests where it is until the next tick.
     pub(crate) fn hold(&mut self) {
         self.before = self.now;
         self.shares[0] = self.shares[1];
@@ -257,9 +260,9 @@ impl TickPose {
         self.jumps = true;
     }
 
-    /// Begins a tick in which the frame moves to `to` from where it was; from `to` itself the first time
-    /// and on a teleport, which depends on the `longest` strand (m). Returns whether it was a teleport,
-    /// and whether an invalid pose should be reported.
+    /// Begins a tick in which the frame moves from its previous pose to `to`; it starts at `to` the
+    /// first time and on a teleport, which depends on the `longest` strand (m). Returns whether it
+    /// was a teleport, and whether an invalid pose should be reported.
     pub(super) fn aim(
         &mut self,
         to: Option<Pose>,
@@ -276,8 +279,9 @@ impl TickPose {
         }
         self.inertia = Vec2::new(inertia.moving, inertia.turning);
         let first = self.from.is_none();
-        let asked = core::mem::take(&mut self.jumps);
-        let put = !first && to.is_some_and(|to| asked || inertia.is_jump(&self.to, &to, longest));
+        let requested = core::mem::take(&mut self.jumps);
+        let put =
+            !first && to.is_some_and(|to| requested || inertia.is_jump(&self.to, &to, longest));
         let to = to.map(|present| {
             if put {
                 self.frames = FramePoses::default();
@@ -302,19 +306,20 @@ impl TickPose {
     }
 
     /// The displacement of the entity in this tick (m).
-    pub(super) fn way_to(&self, to: &Pose) -> Vec3 {
+    pub(super) fn displacement_to(&self, to: &Pose) -> Vec3 {
         to.translation - self.to.translation
     }
 
-    /// Records where the entity is as a frame begins; `seconds` is the time of the previous frame.
+    /// Records the entity's pose at the start of a frame; `seconds` is the time of the previous
+    /// frame.
     pub(super) fn record(&mut self, seconds: f64, pose: Option<Pose>) {
         if let Some(pose) = pose {
             self.frames.record(seconds, pose);
         }
     }
 
-    /// Goes to the share `t` of the tick's motion, in the same substep as before where a hair `waits` to
-    /// take several as one.
+    /// Advances to the share `t` of the tick's motion; the substep continues while a hair `waits`
+    /// to merge several.
     pub(super) fn advance(&mut self, t: f32, waits: bool) {
         if !waits {
             self.before = self.now;
@@ -330,7 +335,8 @@ impl TickPose {
     }
 
     /// How a point at rest in the world moves in this frame during the substep; `None` if the frame
-    /// did not move. With less than full [`HairInertia`] the world seems to move by a share of it.
+    /// did not move. With less than full [`HairInertia`] it is only that share of the motion.
+    #[doc(hidden)]
     pub fn frame_delta(&self) -> Option<Isometry3d> {
         (self.before != self.now).then(|| {
             let rotation = (self.now.rotation.inverse() * self.before.rotation).normalize();

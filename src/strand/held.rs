@@ -1,10 +1,10 @@
-//! Nodes that something else holds, and how far they can be held from the root.
+//! Held nodes, and how far from the root they can be held.
 
 use super::Strand;
 use crate::fault::{FaultKind, HairFault};
 use bevy::prelude::*;
 
-/// Nodes that something else holds: a rod they are wound on, a hand, a clip. Held nodes have inverse
+/// Nodes held by something else: a rod they are wound on, a hand, a clip. Held nodes have inverse
 /// mass 0 and move to their targets as far as the strand reaches: no edge is stretched. A target out of
 /// reach is reported once as a fault of kind [`FaultKind::Strand`]. Add it to a strand entity.
 #[derive(Component, Reflect, Clone, Debug, Default)]
@@ -16,7 +16,7 @@ pub struct HeldNodes {
     pub targets: Vec<Option<Vec3>>,
 }
 
-/// Whether a strand's nodes are held farther away than it reaches. Kept by the tick.
+/// Whether targets of a strand's held nodes are out of reach. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct HeldNodesState {
@@ -24,12 +24,13 @@ pub struct HeldNodesState {
     pub out_of_reach: bool,
 }
 
-/// The most that hair between two held nodes is extended, as a share of its length. Fully straight
+/// Maximum extension of hair between two held nodes, as a share of its length. Fully straight
 /// hair has more length constraints than degrees of freedom, and its tensions are undetermined.
 const TAUT: f32 = 0.99;
 
-/// How far apart the ends of free hair of a `length` are held whose targets are `distance` apart (m).
-/// Hair that is nearly straight already stays so; farther targets are reduced more, down to [`TAUT`].
+/// Distance at which the ends of free hair of a `length` are held whose targets are `distance`
+/// apart (m). Nearly straight hair is held as it is; targets beyond reach are brought nearer the
+/// farther they are, down to [`TAUT`].
 pub(crate) fn drawn_out(distance: f32, length: f32) -> f32 {
     let excess = (distance - length).clamp(0.0, (1.0 - TAUT) * length.max(0.0));
     distance.min(length) - excess
@@ -62,8 +63,8 @@ impl HeldNodes {
                 return Some((node, last));
             };
             // Squares of user values may overflow f32.
-            let way = (target - last).as_dvec3();
-            let distance = way.length() as f32;
+            let direction = (target - last).as_dvec3();
+            let distance = direction.length() as f32;
             let apart = if is_drawn {
                 drawn_out(distance, length)
             } else if is_displaced {
@@ -74,8 +75,8 @@ impl HeldNodes {
             is_displaced &= !is_drawn;
             is_displaced |= distance > length * (1.0 + SLACK);
             let now = (strand.positions[edge + 1] - strand.positions[edge]).as_dvec3();
-            let way = way.normalize_or(now.normalize_or_zero()).as_vec3();
-            last = if apart == distance { target } else { last + way * apart };
+            let direction = direction.normalize_or(now.normalize_or_zero()).as_vec3();
+            last = if apart == distance { target } else { last + direction * apart };
             (length, is_drawn) = (0.0, false);
             Some((node, last))
         })
@@ -104,7 +105,7 @@ pub(super) fn report_out_of_reach(
         if let (Some((node, short)), false) = (found, reach.out_of_reach) {
             let message = format!(
                 "node {node} of the strand is held {short} m farther away than hair of {} m reaches; \
-                 it is held as near as it comes",
+                 it is held as near to its target as possible",
                 strand.length()
             );
             faults.write(HairFault::new(FaultKind::Strand, message).of(entity));

@@ -1,4 +1,4 @@
-//! Strands and the hair they make up: the entities that everything else works on.
+//! Strands and hair as entities.
 //!
 //! A [`Hair`] is the wearer's hair as one thing. Its strands are entities of their own, tied to it
 //! by [`StrandOf`] (despawning the hair despawns them). A strand holds arrays of nodes, because
@@ -23,9 +23,9 @@ pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
 pub use on_gpu::OnGpu;
-pub(crate) use on_gpu::bring_home;
+pub(crate) use on_gpu::return_to_cpu;
 #[cfg(feature = "gpu")]
-pub(crate) use on_gpu::{AskForStrands, BringHome, StrandsArrived};
+pub(crate) use on_gpu::{AskForStrands, ReturnToCpu, StrandsArrived};
 pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
 pub use strand_sleep::{SleepPose, Sleepers, StrandSleep};
@@ -127,20 +127,20 @@ pub struct Strand {
     fault_cooldown: u16,
 }
 
-/// Where a strand's nodes were at the end of the previous tick, in the hair's frame: drawing
-/// interpolates from there to the present by the overstep of the fixed clock.
+/// Positions of a strand's nodes at the end of the previous tick, in the hair's frame: drawing
+/// interpolates from these to the present ones by the overstep of the fixed clock.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct StrandHistory {
     /// Positions (m), root first; empty until the first tick.
     pub positions: Vec<Vec3>,
-    /// Where the root is drawn, if known better than from the ticks: on a skinned mesh, the root's
-    /// place on the drawn mesh (m). The whole strand is drawn with the same offset.
+    /// Position at which the root is drawn, if it differs from that of the ticks: on a skinned
+    /// mesh, its position on the drawn mesh (m). The whole strand is drawn with the same offset.
     pub root: Option<Vec3>,
 }
 
 impl StrandHistory {
-    /// Stores the present as history: the strand is drawn where it is, without motion.
+    /// Stores the present positions as history: the strand is drawn where it is, without motion.
     pub(crate) fn remember(&mut self, strand: &Strand) {
         self.positions.clone_from(&strand.positions);
     }
@@ -155,8 +155,8 @@ impl StrandHistory {
         }
     }
 
-    /// Where a node is drawn, in the hair's frame: interpolated between the previous tick and the
-    /// present by the overstep of the fixed clock (0…1).
+    /// Position at which a node is drawn, in the hair's frame: interpolated between the previous
+    /// tick and the present by the overstep of the fixed clock (0…1).
     pub fn drawn(&self, strand: &Strand, node: usize, overstep: f32) -> Vec3 {
         let place = self.between(strand, node, overstep);
         match self.root {
@@ -181,8 +181,8 @@ pub enum StrandModel {
 
 impl Ranged for StrandModel {}
 
-/// What makes a strand heavier and softer than in its dry state, such as water. Written by the tick;
-/// empty on dry hair.
+/// What makes a strand heavier and softer than in its dry state, such as water. Written by the
+/// tick; empty on dry hair.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct AddedMass {
@@ -194,22 +194,22 @@ pub struct AddedMass {
     pub softening: Vec<f32>,
     /// Whether hydrogen bonds follow the strand's water: then wind dries that water, not the bonds.
     pub moves_bonds: bool,
-    /// What water does to each node of a strand that is under it; empty where it is under none.
+    /// Effects of surrounding water on each node; empty out of the water.
     #[reflect(ignore)]
     pub(crate) in_water: Vec<InWater>,
 }
 
-/// What water does in a substep to a node that is under it, wholly or in part.
+/// Effects of surrounding water on a node in a substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct InWater {
     /// The share of the node that is under water.
     pub(crate) share: f32,
-    /// Its inertia over that which it has out of the water: with the water that goes along, and with
-    /// drag, whose implicit step is that of a heavier node.
+    /// Its inertia relative to that out of the water: with added mass of the water, and with drag,
+    /// whose implicit step acts like a heavier node.
     pub(crate) inertia: f32,
-    /// Its weight, less buoyancy, over that inertia: the share of gravity that it falls with.
+    /// Its weight less buoyancy over that inertia: the share of gravity that acts on it.
     pub(crate) gravity: f32,
-    /// The share of its velocity over the water's that drag leaves.
+    /// The share of its velocity relative to the water that is left after drag.
     pub(crate) keep: f32,
 }
 
@@ -261,8 +261,8 @@ impl Strand {
         })
     }
 
-    /// The same strand, leaving the scalp along `direction` whatever its first edge does: curly hair
-    /// whose polyline is bent at the root springs to it.
+    /// The same strand, leaving the scalp along `direction` instead of along its first edge: the
+    /// root joint is then bent at rest.
     pub fn leaving_along(mut self, direction: Dir3) -> Self {
         if let Some(&first) = self.orientations.first() {
             let turn = Quat::from_rotation_arc(first * Vec3::Z, *direction);
@@ -353,7 +353,7 @@ impl Strand {
             && self.orientations.iter().all(|q| q.is_finite() && q.length_squared() > 0.25)
     }
 
-    /// Whether an edge is a thousand times as long as it should be: no step leads back from there.
+    /// Whether an edge is a thousand times as long as at rest: no step recovers from that.
     fn is_torn(&self) -> bool {
         let mut edges = self.positions.windows(2).zip(&self.rest_lengths);
         !edges.all(|(p, rest)| p[0].distance_squared(p[1]) < (1e3 * rest).powi(2))
@@ -366,8 +366,8 @@ impl Strand {
         self.tensions.fill(0.0);
     }
 
-    /// Puts the strand into the shape given by a Darboux vector per joint, at rest, from its root
-    /// on. Joints not given are straight.
+    /// Sets the strand to the shape given by a Darboux vector per joint, at rest, from its root on.
+    /// Joints not given are straight.
     pub fn pose(&mut self, shape: impl IntoIterator<Item = Vec3>) {
         if !self.root_frame.is_finite() {
             self.root_frame = Quat::IDENTITY;
@@ -400,7 +400,7 @@ impl Strand {
         }
     }
 
-    /// Replaces its state by another of as many nodes, at rest.
+    /// Replaces its state by another with as many nodes, at rest.
     #[cfg(any(feature = "save", feature = "groom"))]
     pub(crate) fn replace(
         &mut self,
@@ -422,7 +422,7 @@ impl Strand {
         };
     }
 
-    /// Prefetches what moves: positions, velocities, orientations.
+    /// Prefetches positions, velocities and orientations.
     pub(crate) fn prefetch(&self) {
         prefetch(&self.positions);
         prefetch(&self.velocities);
@@ -439,7 +439,8 @@ impl Strand {
         &mut self.tensions
     }
 
-    /// Where in the hair's frame the root was at the end of the last substep, with the scalp's frame.
+    /// The root's position at the end of the last substep, in the hair's frame, and the scalp's
+    /// frame.
     pub(crate) fn root_before(&self) -> (Vec3, Quat) {
         self.root_before.unwrap_or((self.positions[0], self.root_frame))
     }
@@ -465,7 +466,7 @@ impl Strand {
     /// finite, torn, or where the last step failed, to the pose its bonds remember. Returns the fault,
     /// unless one was reported shortly before.
     pub(crate) fn put_back(&mut self, bonds: impl IntoIterator<Item = Vec3>) -> Option<HairFault> {
-        // A pose from which the last step failed, too, is none to return to again.
+        // Not to a pose from which the last step failed as well.
         let failed_again = self.fault_cooldown == FAULT_COOLDOWN;
         let how = if self.is_pose_finite() && !self.is_torn() && !failed_again {
             self.rest();
@@ -477,14 +478,14 @@ impl Strand {
             self.pose(bonds.into_iter().map(|o| if o.is_finite() { o } else { Vec3::ZERO }));
             HairFault::new(
                 FaultKind::Rebuilt,
-                "no step led on from the strand's state; its rest pose was rebuilt from root and bonds",
+                "no step from the strand's state succeeded; its rest pose was rebuilt from root and bonds",
             )
         };
         let again = core::mem::replace(&mut self.fault_cooldown, FAULT_COOLDOWN) > 0;
         (!again).then_some(how)
     }
 
-    pub(crate) fn stepped_well(&mut self) {
+    pub(crate) fn step_succeeded(&mut self) {
         self.fault_cooldown = self.fault_cooldown.saturating_sub(1);
         self.root_before = None;
     }

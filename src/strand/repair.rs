@@ -1,4 +1,4 @@
-//! Repair of strands written by reflection: inspectors and scene files reach private fields, too.
+//! Repair of strands written by reflection: inspectors and scene files can write private fields.
 
 use super::{AddedMass, MAX_SEGMENT, MIN_SEGMENT, Strand, StrandHistory};
 use crate::rod::frame::parallel_transport;
@@ -8,8 +8,8 @@ use bevy::prelude::*;
 const UNKNOWN_LENGTH: f32 = 0.01;
 
 impl Strand {
-    /// Makes the parts fit each other: all as long as there are nodes, lengths above zero, orientations
-    /// unit. Says what was found first.
+    /// Makes the arrays consistent: one element for each node or edge, lengths above zero, unit
+    /// orientations. Returns a description of the first error found.
     pub(crate) fn repair(&mut self) -> Option<String> {
         let nodes = self.positions.len();
         let edges = nodes.saturating_sub(1);
@@ -24,7 +24,7 @@ impl Strand {
             if values.len() != count {
                 let length = values.len();
                 found.get_or_insert_with(|| {
-                    format!("the strand has {length} {name}, expected {count}: cut or filled up")
+                    format!("the strand has {length} {name}, expected {count}: truncated or padded")
                 });
                 values.resize(count, with);
             }
@@ -43,12 +43,12 @@ impl Strand {
                 found.get_or_insert_with(|| {
                     format!(
                         "rest length {i} of the strand is {is} m, expected {MIN_SEGMENT} to {MAX_SEGMENT}: \
-                         {length} m is taken"
+                         {length} m is used"
                     )
                 });
             }
         }
-        // A strand that is not simulated would keep them.
+        // A strand that is not simulated would keep non-finite values.
         for (i, v) in self.velocities.iter_mut().enumerate() {
             if !v.is_finite() {
                 found.get_or_insert_with(|| {
@@ -67,11 +67,11 @@ impl Strand {
         }
         if self.root_before.take_if(|(p, q)| !(p.is_finite() && q.is_finite())).is_some() {
             found.get_or_insert_with(|| {
-                "the strand's root before this tick is not finite, expected finite numbers: forgotten"
+                "the strand's root before this tick is not finite, expected finite numbers: ignored"
                     .into()
             });
         }
-        // The direct solver keeps no angular velocities, so nothing else would notice.
+        // The direct solver has no angular velocities, so nothing else would detect them.
         for (i, spin) in self.angular_velocities.iter_mut().enumerate() {
             if !spin.is_finite() {
                 found.get_or_insert_with(|| {
@@ -108,7 +108,7 @@ impl AddedMass {
     /// The largest added mass of a node, in masses of the dry node.
     pub(crate) const MOST: f32 = 1e6;
 
-    /// Clamps loads and softening to their ranges. Returns what was found first.
+    /// Clamps masses and softening to their ranges. Returns a description of the first error found.
     pub(super) fn repair(&mut self) -> Option<String> {
         let lists =
             [("added mass", &mut self.mass, Self::MOST), ("softening", &mut self.softening, 1.0)];

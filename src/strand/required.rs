@@ -1,9 +1,9 @@
-//! Components without which a strand, a hair or a tool would be left out of the tick unnoticed.
+//! Components without which the tick would silently skip a strand, a hair or a tool.
 
 use crate::fault::{FaultKind, HairChecks, HairFault};
 use bevy::{prelude::*, utils::prelude::ShortName};
 
-/// Puts `Part` back on each `Owner` that user code took it off, and reports it.
+/// Restores `Part` on each `Owner` from which user code removed it, and reports it.
 pub(crate) fn keep_required<Owner: Component, Part: Component + Default>(app: &mut App) {
     app.add_systems(HairChecks, put_back::<Owner, Part>);
 }
@@ -17,8 +17,8 @@ fn put_back<Owner: Component, Part: Component + Default>(
         commands.entity(entity).try_insert(Part::default());
         let (part, owner) = (ShortName::of::<Part>(), ShortName::of::<Owner>());
         let message = format!(
-            "`{part}` was removed, which `{owner}` needs: its default is put back; to leave the entity out, \
-             insert `Disabled`"
+            "`{part}` was removed, which `{owner}` needs: its default is put back; to exclude the entity, \
+         insert `Disabled`"
         );
         faults.write(HairFault::new(FaultKind::Component, message).of(entity));
     }

@@ -1,5 +1,5 @@
-//! A strand's sleep state. Which strands fall asleep and wake is decided in [`sleep`](crate::sleep);
-//! here is only the state that other systems read.
+//! A strand's sleep state, which other systems read. [`sleep`](crate::sleep) decides which strands
+//! fall asleep and wake.
 
 use bevy::prelude::*;
 
@@ -9,7 +9,7 @@ use bevy::prelude::*;
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct StrandSleep {
-    /// How long the strand has stayed where it is (s).
+    /// How long the strand has been still (s).
     still: f32,
     asleep: bool,
     follower: bool,
@@ -36,7 +36,7 @@ impl StrandSleep {
         self.asleep
     }
 
-    /// How long it has stayed where it is (s).
+    /// How long it has been still (s).
     pub fn still_for(&self) -> f32 {
         self.still
     }
@@ -53,7 +53,7 @@ impl StrandSleep {
     }
 
     /// Adds `seconds` to the time it has been still.
-    pub(crate) fn lie_still(&mut self, seconds: f32) {
+    pub(crate) fn add_still_time(&mut self, seconds: f32) {
         self.still += seconds;
     }
 
@@ -66,7 +66,7 @@ impl StrandSleep {
     }
 }
 
-/// How many of a hair's strands sleep; followers are not counted. Kept by the tick.
+/// Numbers of a hair's sleeping and awake strands; followers are not counted. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Sleepers {
@@ -83,7 +83,8 @@ impl Sleepers {
     }
 }
 
-/// The pose in which a strand has stayed since it last moved, and the forces that hold it there.
+/// The pose in which a strand has been still, and the contact forces on it.
+#[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 pub struct SleepPose {
@@ -92,12 +93,12 @@ pub struct SleepPose {
     pub(crate) root_frame: Quat,
     /// Hash of which nodes were held.
     pub(crate) held: u64,
-    /// The corners of the box around a sleeper (m).
+    /// The bounding box of a sleeping strand (m).
     pub(crate) low: Vec3,
     pub(crate) high: Vec3,
-    /// How far a node may be from where it was (m).
+    /// How far a node may move while it counts as still (m).
     pub(crate) distance: f32,
-    /// Contact accelerations on a sleeper's nodes when first measured (m/s²).
+    /// Contact accelerations on a sleeping strand's nodes when first measured (m/s²).
     pushes: Vec<Vec3>,
 }
 
@@ -117,8 +118,12 @@ impl SleepPose {
     }
 
     /// Whether contact with other strands has changed by more than an approach by twice the still
-    /// distance would change it; `gradient` (1/s²) is how much contact grows with distance.
-    pub(crate) fn feels(&mut self, pushes: impl Iterator<Item = Vec3>, gradient: f32) -> bool {
+    /// distance would change it; `gradient` (1/s²) is that of the contact acceleration.
+    pub(crate) fn has_new_contact(
+        &mut self,
+        pushes: impl Iterator<Item = Vec3>,
+        gradient: f32,
+    ) -> bool {
         let most = 2.0 * self.distance * gradient;
         if self.pushes.is_empty() {
             self.pushes.extend(pushes);
@@ -128,7 +133,7 @@ impl SleepPose {
             Some(known) => known.distance_squared(*push) > most * most,
             None => true,
         };
-        // Consumes all items: the next strand's follow in the same iterator.
+        // Consumes all items: those of the next strand follow in the same iterator.
         pushes.enumerate().filter(is_new).count() > 0
     }
 }

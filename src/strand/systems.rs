@@ -15,11 +15,11 @@ use crate::{
 };
 use bevy::{ecs::entity_disabling::Disabled, math::Isometry3d, prelude::*};
 
-/// About what a strand takes (ns) to be copied, and to be moved by its hair's frame delta.
+/// Estimated time per strand (ns) of copying it, and of applying its hair's frame delta.
 const COPY: Nanos = Nanos(100);
 const FRAME_DELTA: Nanos = Nanos(250);
 
-/// Hair and strands as entities, and the frame they live in.
+/// Hair and strands as entities, and their frames.
 pub struct StrandPlugin;
 
 impl Plugin for StrandPlugin {
@@ -53,7 +53,7 @@ impl Plugin for StrandPlugin {
             .add_systems(
                 HairTick,
                 (
-                    (repair_strands, report_out_of_reach.run_if(first_substep), remember_drawn)
+                    (repair_strands, report_out_of_reach.run_if(first_substep), store_history)
                         .chain()
                         .in_set(HairSystems::StrandHistory),
                     (aim_poses.run_if(first_substep), advance_poses)
@@ -65,7 +65,7 @@ impl Plugin for StrandPlugin {
     }
 }
 
-/// Reports strands that cannot take part, once, when they are spawned or assigned to a hair.
+/// Reports strands that cannot be simulated, once, when they are spawned or assigned to a hair.
 fn report_unusable(
     strands: Query<
         (Entity, Ref<Strand>, Option<Ref<StrandOf>>),
@@ -79,11 +79,11 @@ fn report_unusable(
             let error = StrandError::TooFewNodes { found: strand.nodes() };
             faults.write(HairFault::caused(FaultKind::Strand, error, "it is left out").of(entity));
         }
-        let homeless = match of {
+        let has_no_hair = match of {
             Some(of) => of.is_added() && !hairs.contains(of.0),
             None => strand.is_added(),
         };
-        if homeless {
+        if has_no_hair {
             let message =
                 "the strand belongs to no hair: spawn it with StrandOf(hair), hair carrying Hair";
             faults.write(HairFault::new(FaultKind::NoHair, message).of(entity));
@@ -92,8 +92,8 @@ fn report_unusable(
 }
 
 /// Repairs private fields written by an inspector or a scene file. Our own writes bypass change
-/// detection. Runs in every substep, because game code may write in systems of its own within the tick;
-/// without writes it costs a scan of change ticks.
+/// detection. Runs in every substep, because systems of game code within the tick may write as
+/// well; without writes it only scans change ticks.
 fn repair_strands(
     mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Without<OnGpu>, Allow<Disabled>)>,
     mut loads: Query<
@@ -106,7 +106,7 @@ fn repair_strands(
     >,
     mut faults: MessageWriter<HairFault>,
 ) {
-    // Also sleepers: their history is not written again.
+    // Also of sleeping strands, whose history is not written again.
     let histories =
         histories.iter_mut().map(|(e, mut h)| (e, h.bypass_change_detection().repair()));
     let strands = strands.iter_mut().map(|(e, mut s)| (e, s.bypass_change_detection().repair()));
@@ -118,8 +118,8 @@ fn repair_strands(
     }
 }
 
-/// Before the first substep of a tick: the present becomes history.
-fn remember_drawn(
+/// Before the first substep of a tick: the present positions become history.
+fn store_history(
     step: Res<HairStep>,
     mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory), Without<OnGpu>>,
 ) {
@@ -132,7 +132,8 @@ fn remember_drawn(
         || (),
         |(), rows| {
             for (strand, sleep, history) in rows {
-                // A sleeper's history was stored as it fell asleep; only its root may have moved.
+                // A sleeping strand's history was stored when it fell asleep; only its root may
+                // have moved.
                 if sleep.is_asleep() && history.positions.first() == strand.positions.first() {
                     continue;
                 }
@@ -142,7 +143,7 @@ fn remember_drawn(
     );
 }
 
-/// As a frame begins: records the poses that the previous frame ended with.
+/// At the start of a frame: records the poses at the end of the previous frame.
 fn record_frame(
     time: Res<Time<Virtual>>,
     transforms: TransformHelper,
@@ -155,7 +156,7 @@ fn record_frame(
     }
 }
 
-/// As a tick begins: the target of each pose. Hair that teleports comes to rest.
+/// At the start of a tick: sets the target of each pose. Hair that teleports comes to rest.
 fn aim_poses(
     (time, frames): (Res<Time>, Res<Time<Virtual>>),
     transforms: TransformHelper,
@@ -166,8 +167,8 @@ fn aim_poses(
 ) {
     let seconds = time.elapsed_secs_f64() - frames.delta_secs_f64();
     // Displacement of each hair that moves, and whether it teleports. Colliders and tools that move
-    // the same way teleport with it.
-    let mut ways: Vec<(Vec3, bool)> = Vec::new();
+    // the same displacement teleport with it.
+    let mut displacements: Vec<(Vec3, bool)> = Vec::new();
     for others in [false, true] {
         for (entity, mut frame, members) in &mut poses {
             if members.is_none() != others {
@@ -176,14 +177,16 @@ fn aim_poses(
             // With MinimalPlugins nothing propagates transforms, so the helper computes them.
             let pose = transforms.compute_global_transform(entity).ok();
             let pose = pose.as_ref().and_then(Pose::of);
-            let way = pose.map_or(Vec3::ZERO, |pose| frame.way_to(&pose));
-            let alike = |with: &Vec3| way.distance(*with) < 0.1 * way.length();
+            let displacement = pose.map_or(Vec3::ZERO, |pose| frame.displacement_to(&pose));
+            let alike = |with: &Vec3| displacement.distance(*with) < 0.1 * displacement.length();
             let longest = || match members {
                 Some(members) => {
                     let theirs = strands.iter_many(members.collection());
                     theirs.map(|strand| strand.length()).fold(0.0, f32::max)
                 }
-                None if ways.iter().any(|(with, put)| !put && alike(with)) => f32::INFINITY,
+                None if displacements.iter().any(|(with, put)| !put && alike(with)) => {
+                    f32::INFINITY
+                }
                 None => 0.0,
             };
             let (put, report) = frame.aim(pose, seconds, &inertia.of(entity), longest);
@@ -193,8 +196,8 @@ fn aim_poses(
                 faults.write(HairFault::new(FaultKind::Transform, message).of(entity));
             }
             let Some(members) = members else { continue };
-            if way != Vec3::ZERO {
-                ways.push((way, put));
+            if displacement != Vec3::ZERO {
+                displacements.push((displacement, put));
             }
             if put {
                 let mut theirs = strands.iter_many_mut(members.collection());

@@ -34,9 +34,9 @@ impl Plugin for StylePlugin {
 }
 
 setting! {
-    /// The shape in which a hair's bonds hold it now is its style, to be watched. Component of a
-    /// [`Hair`]; insert it again when the hair has been styled anew. It looks at each joint once a
-    /// tick where there is a style.
+    /// Takes the shape in which a hair's bonds hold it now as its style, and measures from then on
+    /// how much of it is left. Component of a [`Hair`]; insert it again when the hair has been
+    /// restyled. Costs a pass over all joints once a tick.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -67,9 +67,9 @@ pub struct KeptStyle {
 }
 
 impl KeptStyle {
-    /// The share that is left: 1 when inserted, 0 when all of it is gone, negative when hair bends the
-    /// other way. `None` before the first tick, and for hair whose bonds hold it in its natural shape:
-    /// it has no style.
+    /// The share that is left: 1 when inserted, 0 when nothing is left, negative when hair bends
+    /// the other way. `None` before the first tick, and for hair without a style, whose bonds hold
+    /// it in its natural shape.
     pub fn kept(&self) -> Option<f32> {
         self.share
     }
@@ -110,7 +110,7 @@ fn measure_styles(
             continue;
         }
         let mut sum = KeptSum::default();
-        // In the order of the strands, so that the sum is always the same.
+        // In the order of the strands, for determinism.
         for id in members.iter() {
             let (Some(styles), Ok(bonds)) = (kept.styles.get(&id), bonds.get(id)) else { continue };
             for (style, joint) in styles.iter().zip(&bonds.joints) {

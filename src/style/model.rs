@@ -70,7 +70,7 @@ mod tests {
         assert!(styled(&joint, &influence).length() < 1e-7, "as it grew");
         joint.shapes[BondKind::Hydrogen as usize] = own + Vec3::Y;
         assert!(styled(&joint, &influence).distance(Vec3::Y * 0.3) < 1e-6);
-        // Wet: the style is gone.
+        // Wet: no style is left.
         joint.rates[BondKind::Hydrogen as usize] = 0.0;
         assert!(styled(&joint, &influence).length() < 1e-6);
     }

@@ -174,12 +174,13 @@ impl Treatments {
 }
 
 setting! {
-    /// A cylinder along Y that strands are wound round: see [`PermWinding`]. Despawn it to release them.
+    /// A cylinder along Y that strands are wound on: see [`PermWinding`]. Despawn it to release
+    /// them.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     #[require(Transform, TickPose)]
     pub struct PermRod {
-        /// Radius. A joint turns by 2 asin(l/2R): keep segments below 1.7 times the radius.
+        /// Radius. A joint bends by 2 asin(l/2R): keep segments below 1.7 times the radius.
         pub radius: f32 = 0.03, "m" in RADIUS: 1e-3..=10.0, safe 0.003..=0.1,
             "3 cm is the paper's size";
         /// Length.
@@ -214,9 +215,9 @@ pub struct WoundStrands(Vec<Entity>);
 setting! {
     /// How a strand is wound on its rod.
     ///
-    /// The nodes are held and guided from the strand's pose when winding begins, through helices whose
-    /// radius shrinks to the rod's, each of the strand's own length, so that nothing is stretched on the
-    /// way. Bonds may then set in that shape.
+    /// The nodes are held and guided from the strand's pose when winding begins, through helices
+    /// whose radius shrinks to the rod's, each of the strand's own length, so that no edge is
+    /// stretched. Bonds may then set in that shape.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct PermWinding {
@@ -238,7 +239,7 @@ pub struct WindingProgress {
     /// Where the strand was when winding began, in the hair's frame.
     #[reflect(ignore)]
     start: Vec<Vec3>,
-    /// Where its nodes are on the rod once they are wound, in the rod's frame.
+    /// Positions of its nodes once they are wound, in the rod's frame.
     #[reflect(ignore)]
     on_rod: Vec<Vec3>,
 }

@@ -21,8 +21,8 @@ pub(crate) struct LocalRod {
 /// The strand leaves its `start` for the rod's nearest point and curls along circles that touch it
 /// there, their radius falling from infinity to the rod's. Nodes are laid out from edge directions,
 /// so at every moment each edge has its rest length, on the rod as chords of a helix of the given
-/// `pitch` (m per turn). `start` is the whole strand, root first; a rod out of the root's reach is
-/// wound as near to it as the strand comes.
+/// `pitch` (m per turn). `start` is the whole strand, root first; if the rod is out of the root's
+/// reach, the strand is wound as near to it as it reaches.
 pub(crate) fn winding(
     rod: &LocalRod,
     start: &[Vec3],
@@ -51,7 +51,7 @@ pub(crate) fn winding(
     let u = progress.clamp(0.0, 1.0);
     let u = u.squared() * (3.0 - 2.0 * u);
     let radius = rod.radius / u.max(1e-4);
-    // In the first third the edges also turn from where they pointed.
+    // In the first third the edges also rotate from their initial directions.
     let joined = (3.0 * u).min(1.0);
     let mut p = origin.lerp(touch, joined);
     let mut angle = 0.0;

@@ -15,10 +15,10 @@ use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*, u32x16};
 /// Squared distance (m²) from a droplet's centre up to which there is no direction of pull.
 const SAME_PLACE: f32 = 1e-18;
 
-/// Steepest force gradient, in units of 1/dt², that a substep follows without overshooting. With more
-/// droplets at a node than give this (about thirteen of 3/15 mm at 30 m/s² and 1/360 s) the pull is
-/// scaled down.
-const STEEPEST: f32 = 1.0;
+/// Largest force gradient, in units of 1/dt², that a substep resolves without overshooting: that of
+/// about thirteen droplets of 3/15 mm at a node at 30 m/s² and 1/360 s. A larger pull is scaled
+/// down.
+const MAX_GRADIENT: f32 = 1.0;
 
 /// Largest upward acceleration by droplets, as a share of gravity.
 const LIFT: f32 = 0.2;
@@ -31,7 +31,7 @@ pub(super) struct DropletContacts {
     pub touches: Vec<Touch>,
     pub landings: Vec<Landing>,
     /// Water of removed nodes (m³).
-    pub gone: f64,
+    pub removed: f64,
     scratch: ContactScratch,
 }
 
@@ -40,9 +40,9 @@ pub(super) struct DropletContacts {
 pub(super) struct DropletSum {
     /// Impulse on it (kg m/s, in the hair's frame).
     pub impulse: Vec3,
-    /// How many of them touch it.
-    pub company: u32,
-    /// The most that they would absorb of it (m³).
+    /// Number of strands that touch it.
+    pub touch_count: u32,
+    /// Volume that they would absorb (m³).
     pub wanted: f64,
 }
 
@@ -51,7 +51,7 @@ struct ContactScratch {
     strand_block: StrandBlock,
     near: FoundBalls,
     hits: Vec<Hit>,
-    /// Mask of the lanes that touch each puller, and the pullers with any.
+    /// Mask of the lanes that touch each puller, and the pullers that are touched.
     at: Vec<u64>,
     touched: Vec<u32>,
 }
@@ -63,7 +63,7 @@ impl DropletContacts {
         self.sums.resize(drops, DropletSum::default());
         self.touches.clear();
         self.landings.clear();
-        self.gone = 0.0;
+        self.removed = 0.0;
     }
 }
 
@@ -81,7 +81,7 @@ struct Hit {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch {
     pub drop: u32,
-    /// The strand's index in the piece of work.
+    /// The strand's index in its work chunk.
     pub strand: u32,
     pub node: u32,
     /// The volume that it would absorb (m³).
@@ -105,11 +105,11 @@ pub(super) struct ContactParams<'a> {
     pub wetting: &'a HairWetting,
     pub field: &'a Field,
     pub dt: f32,
-    /// Share of the free room on a node that a droplet fills in this substep.
+    /// Share of a node's free film capacity that a droplet fills in this substep.
     pub uptake: f32,
-    /// The most film that a node holds (m³).
-    pub most_film: f64,
-    /// Gravity, in the hair's frame (m/s²): droplets lift hair by no more than it weighs.
+    /// Film capacity of a node (m³).
+    pub film_capacity: f64,
+    /// Gravity in the hair's frame (m/s²); limits how much droplets lift hair.
     pub gravity: Vec3,
 }
 
@@ -119,8 +119,8 @@ fn sum<S: Simd>(v: V3<f32x16<S>>) -> Vec3 {
 }
 
 impl ContactParams<'_> {
-    /// Applies droplets to the nodes of up to sixteen strands, the first with index `first` in its piece
-    /// of work, and sums the reactions on droplets.
+    /// Applies droplets to the nodes of up to sixteen strands and sums the reactions on droplets.
+    /// `first` is the index of the first strand in its work chunk.
     pub fn contact(
         &self,
         level: Level,
@@ -150,7 +150,8 @@ impl ContactParams<'_> {
         let DropletContacts { sums, scratch: ContactScratch { at, touched, .. }, .. } = out;
         for puller in touched.drain(..) {
             let lanes = core::mem::take(&mut at[puller as usize]);
-            sums[self.field.pullers[puller as usize].drop as usize].company += lanes.count_ones();
+            sums[self.field.pullers[puller as usize].drop as usize].touch_count +=
+                lanes.count_ones();
         }
         // Strands that carry a droplet have added mass.
         for (k, strand_lane) in strand_lanes.iter().enumerate().filter(|(_, m)| !m.load.is_empty())
@@ -163,7 +164,7 @@ impl ContactParams<'_> {
             self.field.falling(level, low, high, &mut out.scratch.near);
             for k in 0..out.scratch.near.balls.len() {
                 let falling = &self.field.fallers[out.scratch.near.balls[k] as usize];
-                let (lanes, when, along) = dispatch!(level, simd => caught(simd, ends, falling));
+                let (lanes, when, along) = dispatch!(level, simd => hit_edges(simd, ends, falling));
                 for lane in lanes_in(lanes) {
                     let (strand, at) = (strand_lanes[lane].strand, i as f32 + along[lane]);
                     let landing = Landing { drop: falling.drop, strand, at, when: when[lane] };
@@ -213,28 +214,28 @@ impl ContactParams<'_> {
                 out.scratch.hits.push(hit);
             }
         }
-        let bears = load(simd, &row.load) + 1.0;
-        let share = Real::min(bears * STEEPEST / steepness, f32x16::splat(simd, 1.0));
-        // What a droplet hangs on is hair, too, and no firmer. Hair that floated up to it would stand out.
+        let inertia = load(simd, &row.load) + 1.0;
+        let share = Real::min(inertia * MAX_GRADIENT / steepness, f32x16::splat(simd, 1.0));
+        // A droplet hangs on hair itself and cannot support other hair: the lift is limited.
         let up = splat3(simd, -self.gravity.normalize_or_zero());
-        let lift = change.dot(up) * share / bears;
+        let lift = change.dot(up) * share / inertia;
         let weight = f32x16::splat(simd, LIFT * self.gravity.length() * self.dt);
-        let lowered = weight / Real::max(lift, weight) - 1.0;
-        let lowered = Real::select(Real::lt(weight, lift), lowered, f32x16::splat(simd, 0.0));
-        let held = |change: V3<f32x16<S>>| up.scale_add(change.dot(up) * lowered, change);
-        let mut v = held(change).scale_add(share / bears, load3(simd, &row.v));
+        let excess = weight / Real::max(lift, weight) - 1.0;
+        let excess = Real::select(Real::lt(weight, lift), excess, f32x16::splat(simd, 0.0));
+        let limited = |change: V3<f32x16<S>>| up.scale_add(change.dot(up) * excess, change);
+        let mut v = limited(change).scale_add(share / inertia, load3(simd, &row.v));
         let mass = load(simd, &row.mass);
-        // Roots are held and exert no reaction on droplets.
-        let given = if place.node > 0 { share * mass } else { f32x16::splat(simd, 0.0) };
+        // Roots are fixed and exert no reaction on droplets.
+        let reacting = if place.node > 0 { share * mass } else { f32x16::splat(simd, 0.0) };
         for k in 0..out.scratch.hits.len() {
             let hit = out.scratch.hits[k];
             let puller = &self.field.pullers[hit.puller as usize];
-            let mut impulse = -held(load3(simd, &hit.change)).scale(given);
+            let mut impulse = -limited(load3(simd, &hit.change)).scale(reacting);
             if hit.touches != 0 {
                 let others = mask32x16::from_bitmask(simd, hit.touches)
                     & !own.simd_eq(u32x16::splat(simd, puller.rides));
                 if place.node > 0 {
-                    let (changed, got) = self.drag(simd, v, mass * bears, others, puller);
+                    let (changed, got) = self.drag(simd, v, mass * inertia, others, puller);
                     (v, impulse) = (changed, impulse + got);
                 }
                 self.absorb(others.to_bitmask(), puller.drop, &place, strand_lanes, out);
@@ -299,7 +300,7 @@ impl ContactParams<'_> {
         let drop = &self.field.drops[puller.drop as usize];
         // All strands that touch it together must not overshoot the common velocity.
         let rate = self.wetting.film_drag * self.dt * drop.strength;
-        let rate = rate / (1.0 + rate * drop.company);
+        let rate = rate / (1.0 + rate * drop.touch_count);
         let share = f32x16::splat(simd, drop.mass * rate) / (node + drop.mass);
         let share = Real::select(touching, share, zero);
         let change = (splat3(simd, drop.velocity) - v).scale(share);
@@ -324,7 +325,7 @@ impl ContactParams<'_> {
 
     /// Records a node with `film` (m³) that touches a droplet and would absorb up to its free capacity.
     fn want(&self, drop: u32, strand: usize, node: usize, film: &[f64], out: &mut DropletContacts) {
-        let room = self.most_film - film.get(node).copied().unwrap_or(0.0);
+        let room = self.film_capacity - film.get(node).copied().unwrap_or(0.0);
         let wants = room * f64::from(self.uptake);
         if wants > 0.0 {
             out.sums[drop as usize].wanted += wants;
@@ -355,7 +356,7 @@ impl ContactParams<'_> {
 #[derive(Clone, Copy)]
 struct Place<'a> {
     node: usize,
-    /// Index of the first lane's strand in its piece of work.
+    /// Index of the first lane's strand in its work chunk.
     first: usize,
     /// The index of each lane's strand.
     own: &'a [u32; LANES],
@@ -373,12 +374,12 @@ struct Adhesion<S: Simd> {
 /// The edges between two rows that a falling droplet has hit in this substep: the lanes, the time
 /// (0…1), and the position along them (0…1).
 #[inline(always)]
-fn caught<S: Simd>(simd: S, ends: &[NodeSlice], falling: &Falling) -> (u64, Lane, Lane) {
+fn hit_edges<S: Simd>(simd: S, ends: &[NodeSlice], falling: &Falling) -> (u64, Lane, Lane) {
     let start = load3(simd, &ends[0].p);
     let edge = load3(simd, &ends[1].p) - start;
-    let (from, way) = (splat3(simd, falling.from), splat3(simd, falling.way));
-    let (when, along) = model::closest(from, way, start, edge);
-    let apart = way.scale_add(when, from) - edge.scale_add(along, start);
+    let (from, displacement) = (splat3(simd, falling.from), splat3(simd, falling.displacement));
+    let (when, along) = model::closest(from, displacement, start, edge);
+    let apart = displacement.scale_add(when, from) - edge.scale_add(along, start);
     let near = f32x16::splat(simd, falling.near * falling.near);
     let mut places = (apart.dot(apart).simd_lt(near).to_bitmask(), [0.0; LANES], [0.0; LANES]);
     when.store_array(&mut places.1);
@@ -388,10 +389,10 @@ fn caught<S: Simd>(simd: S, ends: &[NodeSlice], falling: &Falling) -> (u64, Lane
 
 #[cfg(test)]
 mod tests {
-    use super::{super::field::SeenDrop, *};
+    use super::{super::field::LocalDrop, *};
 
-    fn drop(at: Vec3) -> SeenDrop {
-        SeenDrop {
+    fn drop(at: Vec3) -> LocalDrop {
+        LocalDrop {
             at,
             before: at,
             velocity: Vec3::ZERO,
@@ -400,7 +401,7 @@ mod tests {
             r_max: 0.015,
             strength: 1.0,
             mass: 1.1e-4,
-            company: 1.0,
+            touch_count: 1.0,
             ride: Some(Entity::PLACEHOLDER),
         }
     }
@@ -421,7 +422,7 @@ mod tests {
         field: &'a Field,
         dt: f32,
     ) -> ContactParams<'a> {
-        ContactParams { wetting, field, dt, uptake: 0.0, most_film: 0.0, gravity: Vec3::ZERO }
+        ContactParams { wetting, field, dt, uptake: 0.0, film_capacity: 0.0, gravity: Vec3::ZERO }
     }
 
     #[test]
@@ -443,7 +444,7 @@ mod tests {
             let at = Vec3::new(0.12 + next() * 0.3, next() * 0.05, next() * 0.05);
             // Some ride on one of the strands, and do not pull at it.
             let ride = Entity::from_raw_u32(if k % 7 == 0 { 8 } else { 1000 });
-            field.drops.push(SeenDrop { ride, ..drop(at) });
+            field.drops.push(LocalDrop { ride, ..drop(at) });
         }
         // and one exactly on a node
         field.drops.push(drop(strands[0][3]));
@@ -480,7 +481,7 @@ mod tests {
         assert!((given + got).length() < 1e-6 * given.length());
         for (k, d) in field.drops.iter().enumerate() {
             let at = |s: &&Vec<Vec3>| s.iter().any(|p| p.distance(d.at) < 0.004);
-            assert_eq!(out.sums[k].company as usize, strands.iter().filter(at).count(), "{k}");
+            assert_eq!(out.sums[k].touch_count as usize, strands.iter().filter(at).count(), "{k}");
         }
     }
 
@@ -490,7 +491,7 @@ mod tests {
         let mut velocities = [Vec3::ZERO, Vec3::Y, Vec3::Z];
         let wetting = HairWetting { adhesion: 0.0, film_drag: 30.0, ..default() };
         let mut field = Field::default();
-        field.drops.push(SeenDrop { company: 3.0, ..drop(positions[1]) });
+        field.drops.push(LocalDrop { touch_count: 3.0, ..drop(positions[1]) });
         field.sort(1e-3);
         let mut out = DropletContacts::default();
         out.clear(1);
@@ -509,8 +510,8 @@ mod tests {
         let positions = [Vec3::ZERO, Vec3::X * 0.03, Vec3::X * 0.06];
         let mut field = Field::default();
         let before = Vec3::new(0.04, 0.05, 0.0);
-        let falling = SeenDrop { before, ride: None, ..drop(Vec3::new(0.04, -0.05, 0.0)) };
-        let beside = SeenDrop {
+        let falling = LocalDrop { before, ride: None, ..drop(Vec3::new(0.04, -0.05, 0.0)) };
+        let beside = LocalDrop {
             before: before + Vec3::Z * 0.02,
             at: falling.at + Vec3::Z * 0.02,
             ..falling

@@ -13,7 +13,7 @@ use bevy::prelude::*;
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct IsWet(pub(crate) bool);
 
-/// Triggered on a wet [`Hair`] when it has lost the last of its water, down to the regain of a room.
+/// Triggered on a wet [`Hair`] when it has dried to the regain at room humidity.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;

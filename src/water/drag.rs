@@ -1,31 +1,31 @@
-//! What water does to hair that is under it, as mathematics: buoyancy, drag, the water that goes along.
+//! Forces on submerged hair as pure functions: buoyancy, drag and added mass.
 //!
-//! A strand stands for a lock of fibres with water between them: a long cylinder as thick as the lock,
-//! of one fibre the fibre itself. Where it is water goes along, and as much again is pushed aside when it
-//! moves across itself (added mass of a cylinder; along itself there would be none).
+//! A strand stands for a lock of fibres with water between them: a long cylinder as thick as the
+//! lock, or a single fibre. The water inside moves with it, and as much again is displaced when it
+//! moves across its axis (added mass of a cylinder; along the axis there would be none).
 
 use crate::strand::InWater;
 use bevy::{math::ops, prelude::*};
 
-/// Below this Reynolds number measurements end; the law is taken as if it were this one.
-const SLOWEST: f32 = 1e-4;
+/// Smallest Reynolds number that was measured; smaller ones are clamped to it.
+const MIN_REYNOLDS: f32 = 1e-4;
 
 /// Reynolds number times drag coefficient of a long cylinder across a flow.
 ///
-/// c_D = 6.8/Re^0.89 + 1.96/√Re + 1.18, which fits what was measured from Re = 10⁻⁴ to that of a turbulent
-/// wake (Sucker & Brauer, *Fluiddynamik bei quer angeströmten Zylindern*, 1975).
+/// c_D = 6.8/Re^0.89 + 1.96/√Re + 1.18, which fits measurements from Re = 10⁻⁴ to that of a
+/// turbulent wake (Sucker & Brauer, *Fluiddynamik bei quer angeströmten Zylindern*, 1975).
 pub fn drag_across(reynolds: f32) -> f32 {
-    let re = reynolds.max(SLOWEST);
+    let re = reynolds.max(MIN_REYNOLDS);
     6.8 * ops::powf(re, 0.11) + 1.96 * re.sqrt() + 1.18 * re
 }
 
-/// The same of a flow along it: half of what it is across at low Reynolds numbers, as for all slender
-/// bodies (Batchelor 1970); only friction at higher ones.
+/// The same for a flow along the cylinder: half of that across at low Reynolds numbers, as for all
+/// slender bodies (Batchelor 1970); only friction at higher ones.
 pub fn drag_along(reynolds: f32) -> f32 {
-    3.4 * ops::powf(reynolds.max(SLOWEST), 0.11)
+    3.4 * ops::powf(reynolds.max(MIN_REYNOLDS), 0.11)
 }
 
-/// Water, as hair under it feels it.
+/// The water around submerged hair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Water {
     /// Density (kg/m³).
@@ -36,12 +36,12 @@ pub struct Water {
     pub current: Vec3,
 }
 
-/// A metre of a lock.
+/// A lock, per metre of its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lock {
     /// Its diameter (m).
     pub diameter: f32,
-    /// What its fibres weigh dry (kg/m).
+    /// Dry mass of its fibres (kg/m).
     pub dry_mass: f32,
     /// Cross-section of its fibres (m²).
     pub fibres: f32,
@@ -52,31 +52,30 @@ impl Lock {
         0.25 * core::f32::consts::PI * self.diameter * self.diameter
     }
 
-    /// Its weight under water per unit of gravity (kg/m): less than nothing where it floats.
+    /// Its weight under water per unit of gravity (kg/m); negative if it floats.
     pub fn submerged_mass(&self, water: &Water) -> f32 {
         self.dry_mass - water.density * self.fibres
     }
 
-    /// Drag on a metre of it that moves through the water (m/s): force over speed (N s/m²), across and
-    /// along itself. Along is never more than across.
+    /// Drag on a metre of it that moves relative to the water by `through` (m/s): force over speed
+    /// (N s/m²), across and along its axis. Along is never more than across.
     pub fn drag(&self, through: Vec3, tangent: Vec3, water: &Water) -> [f32; 2] {
         let per_speed = water.density * self.diameter / water.viscosity;
         let along = through.dot(tangent);
         let across = (through - tangent * along).length();
         let friction = drag_along(through.length() * per_speed);
-        // What is pressed depends on the flow across alone, friction on all of it.
+        // Pressure drag depends on the flow across alone, friction on all of it.
         let pressed = drag_across(across * per_speed).max(2.0 * friction);
         [pressed, friction].map(|drag| 0.5 * water.viscosity * drag)
     }
 
-    /// Takes the velocity (m/s) of a node that is under water by a `share` through a substep of `dt` (s):
-    /// what drag leaves of it, without gravity, and how the node weighs meanwhile. `load` is what it bears
+    /// The velocity (m/s) after drag in a substep of `dt` (s), without gravity, of a node of which
+    /// a `share` is under water, and its effective inertia and weight. `load` is its added mass
     /// over its dry mass.
     ///
-    /// Drag is taken implicitly: a node that it holds back is one that is heavier by drag · dt, with all
-    /// that pulls it spread over that mass. What flows along the strand is held back by less, which goes
-    /// back into the velocity. So nodes sink at their terminal speeds and rest where their weight has them
-    /// rest, whatever the substep.
+    /// Drag is implicit: the node is heavier by drag · dt for all forces. Drag along the strand is
+    /// smaller, which is corrected in the velocity. So nodes sink at their terminal speed and come
+    /// to rest in equilibrium at any substep.
     pub(crate) fn immerse(
         &self,
         velocity: Vec3,
@@ -86,14 +85,14 @@ impl Lock {
         dt: f32,
     ) -> (Vec3, InWater) {
         let own = self.dry_mass * (1.0 + load);
-        // Between the fibres, and pushed aside.
-        let goes_along = water.density * (2.0 * self.section() - self.fibres);
-        let inert = own + share * goes_along;
+        // Water between the fibres and displaced water.
+        let displaced = water.density * (2.0 * self.section() - self.fibres);
+        let inert = own + share * displaced;
         let through = velocity - water.current;
         let [across, along] = self.drag(through, tangent, water).map(|d| share * d * dt / inert);
         let keep = 1.0 / (1.0 + across);
-        let given_back = tangent * (through.dot(tangent) * (across - along));
-        let slowed = (velocity + water.current * across + given_back) * keep;
+        let correction = tangent * (through.dot(tangent) * (across - along));
+        let slowed = (velocity + water.current * across + correction) * keep;
         let weight = own + share * (self.submerged_mass(water) - own);
         let in_water =
             InWater { share, inertia: inert / (keep * own), gravity: weight * keep / inert, keep };

@@ -46,14 +46,14 @@ setting! {
         /// How much of it the ledger has counted (m³).
         #[reflect(ignore)]
         pub(super) counted: Counted = Counted(0.0);
-        /// How many strands touch it.
-        pub(super) company: u32 = 1;
-        /// Whether it is a drip: the film of hair let it go.
+        /// Number of strands that touch it.
+        pub(super) touch_count: u32 = 1;
+        /// Whether it is a drip: it detached from a film on hair.
         pub(super) drip: bool = false;
-        /// For how long it has lain on a collider (s).
+        /// How long it has lain on a collider (s).
         pub(crate) lying: f32 = 0.0, "s" in LYING: 0.0..=1e9, "0 has just come to lie";
     }
-    then Self::pulls_from_beyond_its_core
+    then Self::check_radii
 }
 
 /// The strand that carries a drop.
@@ -102,7 +102,7 @@ impl Droplet {
         Self { velocity, ..self }.checked()
     }
 
-    /// `count` drops of `radius` (m) strewn evenly over a box, the same for the same seed.
+    /// `count` drops of `radius` (m) at random in a box; the same seed gives the same drops.
     ///
     /// # Errors
     /// When the box or the radius is not valid for a drop.
@@ -150,7 +150,7 @@ impl Droplet {
         }
     }
 
-    fn pulls_from_beyond_its_core(&mut self, violations: &mut Violations) {
+    fn check_radii(&mut self, violations: &mut Violations) {
         let ValueRange { what, valid, hint, .. } = Self::R_MAX;
         // A value that is out of the setting's own range has been reported already.
         let mut known = Violations::new();
@@ -175,12 +175,12 @@ impl Droplet {
     pub(super) fn repair(&mut self, violations: &mut Violations) {
         let Self { volume, position, velocity, .. } = *self;
         // An empty drop is despawned at the end of the substep.
-        let has_run_out = (0.0..1e-15).contains(&volume);
-        if has_run_out {
+        let is_empty = (0.0..1e-15).contains(&volume);
+        if is_empty {
             self.volume = 1e-15;
         }
         self.clamp_values(violations);
-        if has_run_out {
+        if is_empty {
             self.volume = volume;
         } else if self.volume != volume {
             self.volume = self.counted.0;
@@ -195,8 +195,8 @@ impl Droplet {
 }
 
 setting! {
-    /// A shower head, or with [`Shower::rain`] a cloud: makes drops and sends them along its transform's
-    /// forward direction (−Z). The same drops for the same seed.
+    /// A shower head, or with [`Shower::rain`] a cloud: emits drops along its transform's forward
+    /// direction (−Z). The same seed gives the same drops.
     #[derive(Component, Reflect, Clone, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     #[require(Transform, TickPose)]
@@ -219,18 +219,19 @@ setting! {
         pub influence: f32 = INFLUENCE, in INFLUENCE: 1.01..=100.0, safe 1.5..=10.0, "5 is usual";
         /// Seed of the drops' places and directions.
         pub seed: u64 = 1;
-        /// How many drops it has made.
+        /// Number of drops that it has emitted.
         pub made: u64 = 0;
-        /// The part of the next drop that is due.
-        pub owed: f32 = 0.0, "drops" in OWED: 0.0..=1.0, "less than one: what a tick makes is made";
-        /// Whether the last substep would have made more than [`Shower::MOST`]: reported as it begins.
+        /// Fraction of the next drop that is due.
+        pub owed: f32 = 0.0, "drops" in OWED: 0.0..=1.0, "less than one drop";
+        /// Whether the last substep would have emitted more than [`Shower::MOST`]; reported when
+        /// this begins.
         pub cut_short: bool = false;
     }
 }
 
 impl Shower {
-    /// The most drops of one substep: what the highest rate makes in 1/50 s. A longer substep makes no
-    /// more; the rest never exists, which is reported.
+    /// Largest number of drops per substep: that of the highest rate in 1/50 s. A longer substep
+    /// leaves the rest out, which is reported.
     pub const MOST: u64 = 2000;
 
     /// A shower head of `rate` drops per second, each of `drop_radius` (m).
@@ -271,7 +272,7 @@ impl Shower {
         (rain, from_above.looking_to(Dir3::NEG_Y, Dir3::X))
     }
 
-    /// The drops of the next `seconds`, seen from the head (drops leave along −Z), at most
+    /// The drops of the next `seconds` in the head's frame (drops leave along −Z), at most
     /// [`Shower::MOST`]. Settings must be valid.
     pub(super) fn make(&mut self, seconds: f32) -> impl Iterator<Item = Droplet> + use<> {
         let owed = self.owed + self.rate * seconds;
@@ -286,7 +287,7 @@ impl Shower {
             let mut random = Xoshiro256PlusPlus::seed_from_u64(
                 seed ^ number.wrapping_mul(0x9E37_79B9_7F4A_7C15),
             );
-            // Evenly over the disc, evenly over the cone.
+            // Uniform over the disc and over the cone.
             let mut in_disc = || {
                 let (sine, cosine) =
                     bevy::math::ops::sin_cos(random.random_range(0.0..core::f32::consts::TAU));

@@ -4,7 +4,7 @@ use super::{
     Droplet, HairWetting, Moisture, StrandPoint, WaterLedger,
     adhesion::{ContactParams, DropletContacts, Landing},
     exchange::on_strand,
-    field::{Field, SeenDrop},
+    field::{Field, LocalDrop},
     model::clinging,
     moisture::node_lengths,
     strand_block::{StrandBlocks, StrandLane},
@@ -23,39 +23,39 @@ use bevy::prelude::*;
 use core::slice::from_ref;
 use fearless_simd::Level;
 
-/// The most sums over pieces that are kept, for all droplets together.
-const SUMS: usize = 1 << 18;
+/// Largest number of sums, over all work chunks and droplets.
+const MAX_SUMS: usize = 1 << 18;
 
-/// How many droplets are summed for at a time.
-const PART: usize = 64;
+/// Droplets per task of the summation.
+const DROPS_PER_TASK: usize = 64;
 
-/// Strands per piece of work, a multiple of a block: the same on any number of threads, so that effects
-/// on droplets are summed in the same order. Every piece needs sums for all droplets, so with many
-/// droplets there are few pieces.
-fn piece(strands: usize, drops: usize) -> usize {
-    let pieces = (SUMS / drops.max(1)).clamp(4, 64);
-    // Hair whose strands have no edges has none here.
-    strands.div_ceil(pieces).max(1).next_multiple_of(LANES)
+/// Strands per work chunk, a multiple of a block: the same on any number of threads, so that
+/// effects on droplets are summed in the same order. Every chunk needs sums for all droplets, so
+/// with many droplets there are few chunks.
+fn chunk_size(strands: usize, drops: usize) -> usize {
+    let chunks = (MAX_SUMS / drops.max(1)).clamp(4, 64);
+    // There may be no strands: those without edges are left out.
+    strands.div_ceil(chunks).max(1).next_multiple_of(LANES)
 }
 
 /// Buffers of a substep, reused in the next.
 #[derive(Resource, Default)]
 pub(super) struct WaterField {
-    /// The droplets around each hair, and the results of its pieces of work.
+    /// The droplets around each hair, and the results of its work chunks.
     fields: Vec<(Field, Vec<DropletContacts>)>,
     /// Strands that carry a droplet's weight.
     loaded: Vec<Entity>,
     /// The nodes' input to bridges of water.
     pub(super) rows: Vec<WetRow>,
     outcomes: Vec<Outcome>,
-    rooms: Vec<Room>,
+    buffers: Vec<Buffers>,
 }
 
 /// Buffers for a hair's strands, unsorted and sorted.
-type Room = (Vec<Option<WetStrand<'static>>>, Vec<WetStrand<'static>>);
+type Buffers = (Vec<Option<WetStrand<'static>>>, Vec<WetStrand<'static>>);
 
 /// A hair and its strands among droplets.
-struct Head<'a> {
+struct WetHair<'a> {
     pose: Pose,
     wetting: HairWetting,
     strands: Vec<WetStrand<'a>>,
@@ -73,10 +73,10 @@ struct WetStrand<'a> {
 struct Outcome {
     /// Impulse from strands (kg m/s, in the world).
     impulse: Vec3,
-    /// How many strands touch it.
-    company: u32,
+    /// Number of strands that touch it.
+    touch_count: u32,
     landing: Option<Landing>,
-    /// The most that strands would absorb (m³).
+    /// Volume that strands would absorb (m³).
     wanted: f64,
 }
 
@@ -94,7 +94,7 @@ pub(super) fn wet_strands(
     mut droplets: Query<&mut Droplet>,
     mut ledger: ResMut<WaterLedger>,
 ) {
-    let WaterField { fields, loaded, outcomes, rooms, .. } = scratch.bypass_change_detection();
+    let WaterField { fields, loaded, outcomes, buffers, .. } = scratch.bypass_change_detection();
     // The exchange rewrites the added mass of wet hair; on dry hair only droplets add mass.
     for strand in loaded.drain(..) {
         if let Ok((.., mut added_mass, moisture)) = strands.get_mut(strand)
@@ -122,44 +122,46 @@ pub(super) fn wet_strands(
     let process = process.clamped().0;
     outcomes.clear();
     outcomes.resize(drops.len(), Outcome::default());
-    let mut heads = heads(&mut hairs, &wetting, &mut strands, step.index == 0, rooms);
-    fields.resize_with(heads.len(), default);
-    for (Head { pose, wetting, strands }, (field, pieces)) in heads.iter_mut().zip(&mut *fields) {
-        field.see(&drops, pose);
+    let mut wet_hairs = wet_hairs(&mut hairs, &wetting, &mut strands, step.index == 0, buffers);
+    fields.resize_with(wet_hairs.len(), default);
+    for (WetHair { pose, wetting, strands }, (field, chunks)) in
+        wet_hairs.iter_mut().zip(&mut *fields)
+    {
+        field.set_drops(&drops, pose);
         field.sort(wetting.lock_radius());
         let params = ContactParams {
             wetting,
             field,
             dt: step.dt,
             uptake: 1.0 - bevy::math::ops::exp(-wetting.uptake * process * step.dt),
-            most_film: clinging(wetting.bundle(1.0), gravity.length()),
+            film_capacity: clinging(wetting.bundle(1.0), gravity.length()),
             gravity: pose.direction_in(gravity),
         };
-        let piece = piece(strands.len(), drops.len());
-        pieces.resize_with(strands.len().div_ceil(piece), default);
-        contact_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &params);
-        sum_up(pieces, pose.rotation, outcomes);
+        let chunk = chunk_size(strands.len(), drops.len());
+        chunks.resize_with(strands.len().div_ceil(chunk), default);
+        contact_all(strands.chunks_mut(chunk).zip(&mut *chunks).collect(), &params);
+        sum_up(chunks, pose.rotation, outcomes);
     }
-    // Together they may want more than the droplet has.
+    // Together the strands may request more than the droplet holds.
     let shares: Vec<f64> = drops
         .iter()
         .zip(&*outcomes)
         .map(|(drop, o)| (drop.counted.0 / o.wanted).min(1.0))
         .collect();
-    for (Head { strands, .. }, (_, pieces)) in heads.iter_mut().zip(&mut *fields) {
-        let piece = piece(strands.len(), drops.len());
-        absorb_all(strands.chunks_mut(piece).zip(&mut *pieces).collect(), &shares);
-        ledger.water_out += pieces.iter().map(|out| out.gone).sum::<f64>();
+    for (WetHair { strands, .. }, (_, chunks)) in wet_hairs.iter_mut().zip(&mut *fields) {
+        let chunk = chunk_size(strands.len(), drops.len());
+        absorb_all(strands.chunks_mut(chunk).zip(&mut *chunks).collect(), &shares);
+        ledger.water_out += chunks.iter().map(|out| out.removed).sum::<f64>();
     }
-    for (head, room) in heads.into_iter().zip(rooms) {
-        room.1 = emptied(head.strands);
+    for (wet_hair, buffer) in wet_hairs.into_iter().zip(buffers) {
+        buffer.1 = emptied(wet_hair.strands);
     }
     for ((drop, outcome), share) in drops.iter_mut().zip(&*outcomes).zip(shares) {
         let drop = drop.bypass_change_detection();
         // Negative only by rounding.
         drop.volume = (drop.volume - share * outcome.wanted).max(0.0);
         drop.counted.0 = drop.volume;
-        drop.company = outcome.company.max(1);
+        drop.touch_count = outcome.touch_count.max(1);
         let lands = drop.ride.is_none() && outcome.landing.is_some();
         if let Some(landing) = outcome.landing.filter(|_| lands) {
             drop.ride = Some(StrandPoint { strand: landing.strand, at: landing.at });
@@ -186,54 +188,59 @@ pub(super) fn wet_strands(
 }
 
 /// All strands grouped by hair, neighbouring roots next to each other.
-fn heads<'a>(
+fn wet_hairs<'a>(
     hairs: &mut Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
     wetting: &Settings<HairWetting>,
     strands: &'a mut Query<
         (Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture),
         Without<OnGpu>,
     >,
-    anew: bool,
-    rooms: &mut Vec<Room>,
-) -> Vec<Head<'a>> {
-    let mut heads: PerHair<(Entity, Head<'a>, Vec<Option<WetStrand<'a>>>)> = default();
-    let mut unused = core::mem::take(rooms).into_iter();
+    resort: bool,
+    buffers: &mut Vec<Buffers>,
+) -> Vec<WetHair<'a>> {
+    let mut wet_hairs: PerHair<(Entity, WetHair<'a>, Vec<Option<WetStrand<'a>>>)> = default();
+    let mut unused = core::mem::take(buffers).into_iter();
     for (entity, of, strand, added_mass, moisture) in strands {
-        let index = heads.index(of.0, || {
+        let index = wet_hairs.index(of.0, || {
             let (pose, wetting) = (*hairs.get(of.0).ok()?.0.now(), wetting.of(of.0));
             let (unsorted, sorted) = unused.next().unwrap_or_default();
-            Some((of.0, Head { pose, wetting, strands: emptied(sorted) }, emptied(unsorted)))
+            Some((of.0, WetHair { pose, wetting, strands: emptied(sorted) }, emptied(unsorted)))
         });
         if let Some(index) = index
             && strand.nodes() >= 2
         {
             let added_mass = &*added_mass.into_inner();
-            heads.values[index].2.push(Some(WetStrand { entity, strand, added_mass, moisture }));
+            wet_hairs.values[index].2.push(Some(WetStrand {
+                entity,
+                strand,
+                added_mass,
+                moisture,
+            }));
         }
     }
-    let sorted = heads.values.into_iter().map(|(hair, mut head, mut unsorted)| {
+    let sorted = wet_hairs.values.into_iter().map(|(hair, mut wet_hair, mut unsorted)| {
         if let Ok((_, mut blocks)) = hairs.get_mut(hair) {
             let roots = unsorted.iter().flatten().map(|s| s.strand.positions()[0]);
-            let order = blocks.bypass_change_detection().order(anew, unsorted.len(), roots);
+            let order = blocks.bypass_change_detection().order(resort, unsorted.len(), roots);
             for (i, k) in order.iter().enumerate() {
-                // The order jumps in memory.
+                // The order is not sequential in memory.
                 let later = order.get(i + 16).and_then(|k| unsorted.get(*k as usize));
                 prefetch(later.map_or(&[], from_ref));
-                head.strands.extend(unsorted.get_mut(*k as usize).and_then(Option::take));
+                wet_hair.strands.extend(unsorted.get_mut(*k as usize).and_then(Option::take));
             }
         }
-        rooms.push((emptied(unsorted), Vec::new()));
-        head
+        buffers.push((emptied(unsorted), Vec::new()));
+        wet_hair
     });
     sorted.collect()
 }
 
 impl Field {
     /// Transforms the droplets into a hair's frame.
-    fn see(&mut self, drops: &[Mut<'_, Droplet>], pose: &Pose) {
+    fn set_drops(&mut self, drops: &[Mut<'_, Droplet>], pose: &Pose) {
         let scale = pose.scale.recip();
         self.drops.clear();
-        self.drops.extend(drops.iter().map(|d| SeenDrop {
+        self.drops.extend(drops.iter().map(|d| LocalDrop {
             at: pose.point_in(d.position),
             before: pose.point_in(d.before),
             velocity: pose.rotation.inverse() * d.velocity,
@@ -242,13 +249,13 @@ impl Field {
             r_max: d.r_max * scale,
             strength: d.strength(),
             mass: mass_of(d),
-            company: d.company as f32,
+            touch_count: d.touch_count as f32,
             ride: d.ride.map(|r| r.strand),
         }));
     }
 }
 
-/// Strands and their results, piece by piece.
+/// The strands and results of each work chunk.
 type Work<'w, 'a> = Vec<(&'w mut [WetStrand<'a>], &'w mut DropletContacts)>;
 
 fn contact_all(mut work: Work<'_, '_>, params: &ContactParams<'_>) {
@@ -276,7 +283,7 @@ fn contact_all(mut work: Work<'_, '_>, params: &ContactParams<'_>) {
     );
 }
 
-/// Gives every node its share of the volume that it wanted.
+/// Adds to every node its share of the volume that it requested.
 fn absorb_all(mut work: Work<'_, '_>, shares: &[f64]) {
     for_each_block(
         &mut work,
@@ -286,7 +293,7 @@ fn absorb_all(mut work: Work<'_, '_>, shares: &[f64]) {
             for touch in &out.touches {
                 let WetStrand { strand, moisture, .. } = &mut strands[touch.strand as usize];
                 let moisture = moisture.bypass_change_detection();
-                out.gone += moisture.fit(strand.nodes());
+                out.removed += moisture.fit(strand.nodes());
                 let takes = touch.wants * shares[touch.drop as usize];
                 moisture.add_film(touch.node as usize, takes);
             }
@@ -315,25 +322,27 @@ impl WetStrand<'_> {
     }
 }
 
-/// Sums the effects on droplets, and the strands that these hit, over all pieces in the strands' order.
-fn sum_up(pieces: &[DropletContacts], rotation: Quat, outcomes: &mut [Outcome]) {
+/// Sums the effects on droplets and finds where they land first, over all chunks in the strands'
+/// order.
+fn sum_up(chunks: &[DropletContacts], rotation: Quat, outcomes: &mut [Outcome]) {
     // Blocked over droplets: data written by other threads are slow to read.
-    let mut parts: Vec<_> = (0..).step_by(PART).zip(outcomes.chunks_mut(PART)).collect();
+    let mut parts: Vec<_> =
+        (0..).step_by(DROPS_PER_TASK).zip(outcomes.chunks_mut(DROPS_PER_TASK)).collect();
     for_each_block(
         &mut parts,
         Nanos(10_000),
         || (),
         |(), (first, outcomes)| {
-            for piece in pieces {
-                for (outcome, sum) in outcomes.iter_mut().zip(&piece.sums[*first..]) {
+            for chunk in chunks {
+                for (outcome, sum) in outcomes.iter_mut().zip(&chunk.sums[*first..]) {
                     outcome.impulse += rotation * sum.impulse;
-                    outcome.company += sum.company;
+                    outcome.touch_count += sum.touch_count;
                     outcome.wanted += sum.wanted;
                 }
             }
         },
     );
-    for landing in pieces.iter().flat_map(|piece| &piece.landings) {
+    for landing in chunks.iter().flat_map(|chunk| &chunk.landings) {
         let first = &mut outcomes[landing.drop as usize].landing;
         if first.is_none_or(|other| landing.when < other.when) {
             *first = Some(*landing);
@@ -345,7 +354,7 @@ fn mass_of(drop: &Droplet) -> f32 {
     (drop.volume * WATER) as f32
 }
 
-/// The edge that a point `at` segments from the root is on, and its ends' shares in it.
+/// The edge of the point `at` segments from the root, and the weights of the edge's ends.
 fn shares(strand: &Strand, at: f32) -> (usize, [f32; 2]) {
     let edge = (at as usize).min(strand.edges() - 1);
     let t = (at - edge as f32).clamp(0.0, 1.0);
@@ -358,13 +367,13 @@ fn weigh(strand: &Strand, added_mass: &mut AddedMass, wetting: &HairWetting, at:
     let (edge, share) = shares(strand, at);
     for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
         let added = share[i - edge] * mass / (wetting.dry_mass() * length);
-        // More drops than a short strand can carry are as heavy as the heaviest that it can.
+        // A short strand may carry more drops than the limit allows.
         added_mass.mass[i] = (added_mass.mass[i] + added).min(AddedMass::MOST);
     }
 }
 
-/// An impulse (kg m/s) without its upward part: strands that a droplet attracts from all sides are no
-/// support to push a strand up from.
+/// An impulse (kg m/s) without its upward part: the strands that a droplet attracts cannot support
+/// it against gravity.
 fn without_lift(impulse: Vec3, gravity: Vec3) -> Vec3 {
     let up = -gravity.normalize_or_zero();
     impulse - up * impulse.dot(up).max(0.0)
@@ -382,7 +391,7 @@ fn push(
     let mut mobility = [0.0; 2];
     for (i, length) in node_lengths(strand.rest_lengths()).enumerate().skip(edge).take(2) {
         let load = added_mass.mass.get(i).copied().unwrap_or(0.0);
-        // The root is the scalp's.
+        // The root is fixed to the scalp.
         mobility[i - edge] =
             if i == 0 { 0.0 } else { 1.0 / (wetting.dry_mass() * length * (1.0 + load)) };
     }
@@ -401,21 +410,21 @@ mod tests {
     fn sums_are_rotated_to_the_world_and_the_first_landing_counts() {
         let strand = |i| Entity::from_raw_u32(i).unwrap();
         let landing = |i, when| Landing { drop: 0, strand: strand(i), at: 1.0, when };
-        let piece = |landings: Vec<Landing>| {
-            let mut piece = DropletContacts::default();
-            piece.sums = vec![DropletSum { impulse: Vec3::X, company: 2, wanted: 3e-9 }];
-            piece.landings = landings;
-            piece
+        let chunk = |landings: Vec<Landing>| {
+            let mut chunk = DropletContacts::default();
+            chunk.sums = vec![DropletSum { impulse: Vec3::X, touch_count: 2, wanted: 3e-9 }];
+            chunk.landings = landings;
+            chunk
         };
-        let pieces = [
-            piece(vec![landing(7, 0.5), landing(8, 0.2)]),
-            piece(vec![landing(9, 0.3), landing(10, 0.2)]),
+        let chunks = [
+            chunk(vec![landing(7, 0.5), landing(8, 0.2)]),
+            chunk(vec![landing(9, 0.3), landing(10, 0.2)]),
         ];
         let mut outcomes = [Outcome::default()];
-        sum_up(&pieces, Quat::from_rotation_z(FRAC_PI_2), &mut outcomes);
-        let Outcome { impulse, company, landing, wanted } = outcomes[0];
+        sum_up(&chunks, Quat::from_rotation_z(FRAC_PI_2), &mut outcomes);
+        let Outcome { impulse, touch_count, landing, wanted } = outcomes[0];
         assert!(impulse.distance(Vec3::Y * 2.0) < 1e-6, "{impulse}");
-        assert_eq!((company, wanted), (4, 6e-9));
+        assert_eq!((touch_count, wanted), (4, 6e-9));
         // Of those at the same time the strands' order decides.
         assert_eq!(landing.map(|first| first.strand), Some(strand(8)));
     }

@@ -19,7 +19,7 @@ use crate::{
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
-/// About what a strand takes (ns), some wet and others dry.
+/// Approximate cost of a strand (ns), averaged over wet and dry ones.
 const EXCHANGE: Nanos = Nanos(500);
 
 /// Repairs moisture of new strands and moisture written from outside, for instance by an inspector. Our
@@ -37,7 +37,7 @@ pub(super) fn repair_moistures(
         if let Some(found) = moisture.repair() {
             faults.write(HairFault::new(FaultKind::Setting, found).of(entity));
         }
-        ledger.book(moisture.recount());
+        ledger.record(moisture.recount());
     }
 }
 
@@ -79,22 +79,22 @@ pub(super) fn run_showers(
 struct LocalWater<'a> {
     wetting: HairWetting,
     pose: Pose,
-    around: WaterConditions<'a>,
-    /// The share of the difference that hydrogen bonds follow in this substep.
+    conditions: WaterConditions<'a>,
+    /// Share of the difference by which hydrogen bonds approach the water's target in this substep.
     bonds_follow: f32,
 }
 
 struct Wet<'a> {
     strand: &'a Strand,
     bonds: &'a Bonds,
-    /// The air at each node; `None` while it is still.
+    /// The air at each node; empty while it is still.
     blown: &'a [Blown],
     moisture: &'a mut Moisture,
     added_mass: &'a mut AddedMass,
     changes: &'a mut BondChanges,
-    left: WaterLoss,
+    loss: WaterLoss,
     /// Water of removed nodes (m³).
-    gone: f64,
+    removed: f64,
 }
 
 impl Wet<'_> {
@@ -148,7 +148,7 @@ pub(super) fn exchange_water(
                 ledger.water_out += moisture.fit(strand.nodes());
                 let capacities = lengths.map(|l| capacity * f64::from(l));
                 let film = f64::from((share - 1.0).max(0.0)) * AFTER_DRIP * held(of.0);
-                ledger.book(moisture.soak(share.min(1.0), film, capacities));
+                ledger.record(moisture.soak(share.min(1.0), film, capacities));
             }
         }
     }
@@ -159,12 +159,12 @@ pub(super) fn exchange_water(
     let water_of = |hair: Entity| {
         let pose = *hairs.get(hair).ok()?.0.now();
         let wetting = wetting.of(hair);
-        let around =
+        let conditions =
             WaterConditions::new(wetting, pose.direction_in(gravity), &air, step.dt, process);
         let seconds = process * step.dt;
         Some(LocalWater {
             wetting,
-            around,
+            conditions,
             bonds_follow: 1.0 - bevy::math::ops::exp(-seconds / wetting.bond_time.max(1e-9)),
             pose,
         })
@@ -177,10 +177,10 @@ pub(super) fn exchange_water(
                 && strand.nodes() >= 2
                 && bonds.joints.len() == strand.edges()
             {
-                let left = WaterLoss::default();
+                let loss = WaterLoss::default();
                 let blown = if is_still { &[][..] } else { &air.nodes };
                 let wet =
-                    Wet { strand, bonds, blown, moisture, added_mass, changes, left, gone: 0.0 };
+                    Wet { strand, bonds, blown, moisture, added_mass, changes, loss, removed: 0.0 };
                 items.push((hair, wet));
             }
         }
@@ -189,20 +189,20 @@ pub(super) fn exchange_water(
             exchange(wet, &waters.values[*hair], &air, damp, step.dt);
         });
         for (hair, wet) in items.drain(..) {
-            done.evaporated += wet.left.evaporated;
-            done.merged += wet.left.merged;
-            done.gone += wet.gone;
+            done.evaporated += wet.loss.evaporated;
+            done.merged += wet.loss.merged;
+            done.removed += wet.removed;
             let LocalWater { pose, wetting, .. } = &waters.values[hair];
-            done.drips.extend(wet.left.drips.iter().map(|&(node, volume)| {
-                let_go(pose, wet.strand, node as f32, volume, wetting, gravity)
+            done.drips.extend(wet.loss.drips.iter().map(|&(node, volume)| {
+                detached_drop(pose, wet.strand, node as f32, volume, wetting, gravity)
             }));
         }
         done
     });
-    for Done { evaporated, merged, gone, drips } in done {
-        ledger.book(-evaporated);
-        ledger.book(-merged);
-        ledger.water_out += gone;
+    for Done { evaporated, merged, removed, drips } in done {
+        ledger.record(-evaporated);
+        ledger.record(-merged);
+        ledger.water_out += removed;
         if !drips.is_empty() {
             commands.spawn_batch(drips);
         }
@@ -214,18 +214,18 @@ pub(super) fn exchange_water(
 struct Done {
     /// Evaporated water (m³); negative where hair absorbed vapour.
     evaporated: f64,
-    /// Water that went into the water around it (m³); negative where hair soaked it up.
+    /// Water given to the surrounding water (m³); negative where hair absorbed it.
     merged: f64,
     /// Water of removed nodes (m³).
-    gone: f64,
+    removed: f64,
     drips: Vec<Droplet>,
 }
 
 /// One strand's water in one substep, with its effects on bonds and weight.
 fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bool, dt: f32) {
-    let LocalWater { wetting, around, bonds_follow, .. } = water;
+    let LocalWater { wetting, conditions, bonds_follow, .. } = water;
     let Wet { strand, bonds, blown, moisture, added_mass, changes, .. } = wet;
-    wet.gone += moisture.fit(strand.nodes());
+    wet.removed += moisture.fit(strand.nodes());
     let (positions, lengths, edges) = (strand.positions(), strand.rest_lengths(), strand.edges());
     let exposure = |i: usize| {
         if added_mass.in_water.get(i).is_some_and(InWater::is_under) {
@@ -240,8 +240,8 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
             submerged: false,
         })
     };
-    moisture.exchange(positions, lengths, around, exposure, &mut wet.left);
-    // All water that left is in `left`.
+    moisture.exchange(positions, lengths, conditions, exposure, &mut wet.loss);
+    // All lost water is in `loss`.
     moisture.recount();
     open_bonds(bonds, moisture.wetness(), *bonds_follow, changes);
     let capacity = wetting.capacity() * f64::from(strand.length());
@@ -250,7 +250,7 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
         && moisture.volume() < 1e-4 * capacity
         && bonds.rates(BondKind::Hydrogen).all(|rate| rate > 0.999)
     {
-        wet.gone += moisture.clear();
+        wet.removed += moisture.clear();
         **added_mass = default();
         return;
     }
@@ -265,7 +265,7 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
     added_mass.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
 }
 
-/// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close remember
+/// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close keep
 /// the present shape by equation 16.
 fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChanges) {
     for (i, (b, wet)) in bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate() {
@@ -273,8 +273,9 @@ fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChan
     }
 }
 
-/// A drop that leaves a strand, `at` segments from the root: just below it, with its velocity.
-pub(super) fn let_go(
+/// A drop that detaches from a strand `at` segments from the root: just below it, with its
+/// velocity.
+pub(super) fn detached_drop(
     pose: &Pose,
     strand: &Strand,
     at: f32,

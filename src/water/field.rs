@@ -6,7 +6,7 @@ use fearless_simd::Level;
 
 /// A droplet in the frame of one hair.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SeenDrop {
+pub(super) struct LocalDrop {
     pub at: Vec3,
     /// Where it was a substep ago, for drops that fall.
     pub before: Vec3,
@@ -17,12 +17,12 @@ pub(super) struct SeenDrop {
     pub strength: f32,
     /// kg.
     pub mass: f32,
-    /// How many strands touched it a substep ago.
-    pub company: f32,
+    /// Number of strands that touched it a substep ago.
+    pub touch_count: f32,
     pub ride: Option<Entity>,
 }
 
-impl SeenDrop {
+impl LocalDrop {
     /// Distance at which a lock of radius `clearance` touches it: its core repels strands within r_min.
     pub fn touch(&self, clearance: f32) -> f32 {
         self.radius.max(self.r_min) + clearance
@@ -57,17 +57,17 @@ pub(super) struct Falling {
     /// Where it was a substep ago.
     pub from: Vec3,
     /// Its displacement since.
-    pub way: Vec3,
+    pub displacement: Vec3,
     /// Distance from its path within which it hits an edge (m).
     pub near: f32,
     /// Which droplet it is.
     pub drop: u32,
 }
 
-/// The droplets around a hair, found by place.
+/// The droplets around a hair, indexed by position.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Field {
-    pub drops: Vec<SeenDrop>,
+    pub drops: Vec<LocalDrop>,
     /// Droplets that ride, by number.
     pub pullers: Vec<Puller>,
     riding: BallGrid,
@@ -87,35 +87,45 @@ impl Field {
         riders.extend(numbered().filter_map(|(k, drop)| Some((drop.ride?, k))));
         riders.sort_unstable();
         pullers.clear();
-        pullers.extend(numbered().filter_map(|(drop, seen)| {
-            let touch = seen.touch(clearance);
-            let reach = seen.r_max.max(touch);
-            let width = seen.r_max - seen.r_min;
+        pullers.extend(numbered().filter_map(|(drop, local)| {
+            let touch = local.touch(clearance);
+            let reach = local.r_max.max(touch);
+            let width = local.r_max - local.r_min;
             Some(Puller {
-                center: seen.at,
+                center: local.at,
                 reach: reach * reach,
                 touch: touch * touch,
-                pulls_within: seen.r_max * seen.r_max,
+                pulls_within: local.r_max * local.r_max,
                 steep: 2.0 / width,
-                middle: (seen.r_max + seen.r_min) / width,
-                strength: seen.strength,
+                middle: (local.r_max + local.r_min) / width,
+                strength: local.strength,
                 drop,
-                rides: seen.ride?.index_u32(),
+                rides: local.ride?.index_u32(),
             })
         }));
         riding.build(pullers.iter().map(|p| (p.center, p.reach.sqrt())));
         fallers.clear();
-        fallers.extend(numbered().filter(|(_, seen)| seen.ride.is_none()).map(|(drop, seen)| {
-            // A droplet that was moved from outside has not travelled the whole way.
-            let way = (seen.at - seen.before).clamp_length_max(0.2);
-            Falling { from: seen.at - way, way, near: seen.radius + clearance, drop }
-        }));
-        falling
-            .build(fallers.iter().map(|f| (f.from + 0.5 * f.way, f.near + 0.5 * f.way.length())));
+        fallers.extend(numbered().filter(|(_, local)| local.ride.is_none()).map(
+            |(drop, local)| {
+                // A droplet that was moved from outside did not travel its whole displacement.
+                let displacement = (local.at - local.before).clamp_length_max(0.2);
+                Falling {
+                    from: local.at - displacement,
+                    displacement,
+                    near: local.radius + clearance,
+                    drop,
+                }
+            },
+        ));
+        falling.build(
+            fallers
+                .iter()
+                .map(|f| (f.from + 0.5 * f.displacement, f.near + 0.5 * f.displacement.length())),
+        );
     }
 
     /// The droplets on a strand.
-    pub fn on(&self, strand: Entity) -> impl Iterator<Item = (u32, &SeenDrop)> {
+    pub fn on(&self, strand: Entity) -> impl Iterator<Item = (u32, &LocalDrop)> {
         let first = self.riders.partition_point(|(ridden, _)| *ridden < strand);
         let theirs = self.riders[first..].iter().take_while(move |(ridden, _)| *ridden == strand);
         theirs.map(|&(_, k)| (k, &self.drops[k as usize]))

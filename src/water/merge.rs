@@ -4,17 +4,17 @@ use super::{Droplet, DropletRules, model::ball_radius};
 use crate::schedule::HairStep;
 use bevy::{platform::collections::HashMap, prelude::*};
 
-/// Failed candidates after which a drop stops searching in a tick. Only drops that would be too large
-/// together can be so many in one place.
-const FRUITLESS: usize = 64;
+/// Failed candidates after which a drop stops searching in a tick. Only drops whose merged volume
+/// would be too large can be that dense.
+const MAX_FAILED: usize = 64;
 
 /// Smaller drops count as empty and are despawned elsewhere (m³).
-const LEAST: f64 = *Droplet::VOLUME.valid.start() as f64;
+const MIN_VOLUME: f64 = *Droplet::VOLUME.valid.start() as f64;
 
 /// Largest volume of a merged drop (m³).
-const MOST: f64 = *Droplet::VOLUME.valid.end() as f64;
+const MAX_VOLUME: f64 = *Droplet::VOLUME.valid.end() as f64;
 
-/// The farthest cell from the origin; beyond all share it.
+/// Largest cell coordinate; all drops beyond it share a cell.
 const FAR: Vec3 = Vec3::splat(1e9);
 
 /// Once a tick: droplets that touch merge at the position of the larger one.
@@ -46,7 +46,7 @@ pub(super) fn merge_droplets(
 /// however many are in one place.
 #[derive(Default)]
 pub(super) struct Merging {
-    /// Place, radius, and volume with what has come to it.
+    /// Position, radius, and volume including merged drops.
     drops: Vec<(Vec3, f32, f64)>,
     order: Vec<usize>,
     /// The radius of the largest drop of each level; in a level are drops of up to half of it.
@@ -56,52 +56,52 @@ pub(super) struct Merging {
     /// For each drop the previous one in its cell; itself for the first one.
     before: Vec<usize>,
     pairs: Vec<[usize; 2]>,
-    /// How many drops were looked at.
-    looked_at: usize,
+    /// Number of candidates tested.
+    tested: usize,
 }
 
 impl Merging {
-    /// Pairs of a drop and a smaller one that goes into it, of drops with place and volume (m³). Only
-    /// those that `go` are taken in by others.
+    /// Pairs of a drop and a smaller one that merges into it, of drops with position and volume
+    /// (m³). Only those that `may_merge` are absorbed by others.
     pub fn pairs(
         &mut self,
         drops: impl Iterator<Item = (Vec3, f64)>,
-        goes: impl Fn(usize) -> bool,
+        may_merge: impl Fn(usize) -> bool,
     ) -> &[[usize; 2]] {
         self.drops.clear();
         self.drops.extend(drops.map(|(place, volume)| (place, ball_radius(volume), volume)));
-        let Self { drops, order, levels, cells, before, pairs, looked_at } = self;
-        *looked_at = 0;
+        let Self { drops, order, levels, cells, before, pairs, tested } = self;
+        *tested = 0;
         levels.clear();
         cells.clear();
         pairs.clear();
         before.clear();
         before.extend(0..drops.len());
         order.clear();
-        let counts = |i: &usize| drops[*i].2 >= LEAST && drops[*i].0.is_finite();
+        let counts = |i: &usize| drops[*i].2 >= MIN_VOLUME && drops[*i].0.is_finite();
         order.extend((0..drops.len()).filter(counts));
-        // Equal ones in the order of their entities, which is the same everywhere.
+        // Equal ones in the order of their entities, which is deterministic.
         order.sort_unstable_by(|a, b| drops[*b].2.total_cmp(&drops[*a].2).then(a.cmp(b)));
         for &i in &*order {
             let (place, radius, volume) = drops[i];
-            let levels_of_takers = if goes(i) { &levels[..] } else { &[] };
-            let taker = levels_of_takers.iter().enumerate().find_map(|(level, &largest)| {
+            let levels_to_search = if may_merge(i) { &levels[..] } else { &[] };
+            let larger = levels_to_search.iter().enumerate().find_map(|(level, &largest)| {
                 let reach = radius + largest;
                 let [low, high] = [-reach, reach].map(|by| cell(place + by, largest));
-                let mut fruitless = 0;
+                let mut failed = 0;
                 for z in low.z..=high.z {
                     for y in low.y..=high.y {
                         for x in low.x..=high.x {
                             let mut next = cells.get(&(level, IVec3::new(x, y, z))).copied();
-                            while let Some(other) = next.filter(|_| fruitless < FRUITLESS) {
-                                *looked_at += 1;
+                            while let Some(other) = next.filter(|_| failed < MAX_FAILED) {
+                                *tested += 1;
                                 let (center, size, holds) = drops[other];
                                 let near = radius + size;
                                 let touches = center.distance_squared(place) < near * near;
-                                if touches && holds + volume <= MOST {
+                                if touches && holds + volume <= MAX_VOLUME {
                                     return Some(other);
                                 }
-                                fruitless += 1;
+                                failed += 1;
                                 next = Some(before[other]).filter(|b| *b != other);
                             }
                         }
@@ -109,9 +109,9 @@ impl Merging {
                 }
                 None
             });
-            if let Some(taker) = taker {
-                drops[taker].2 += volume;
-                pairs.push([taker, i]);
+            if let Some(larger) = larger {
+                drops[larger].2 += volume;
+                pairs.push([larger, i]);
                 continue;
             }
             if levels.last().is_none_or(|largest| radius < 0.5 * largest) {
@@ -126,7 +126,7 @@ impl Merging {
     }
 }
 
-/// The cell that a place is in, of a level with drops of up to this radius (m): two drops that touch
+/// The cell of a position in a level with drops of up to this radius (m): two drops that touch
 /// are at most one cell apart along each axis.
 fn cell(place: Vec3, largest: f32) -> IVec3 {
     (place / (4.0 * largest)).clamp(-FAR, FAR).floor().as_ivec3()
@@ -165,33 +165,33 @@ mod tests {
         (0..count).map(|_| drop()).collect()
     }
 
-    fn looked_at(drops: &[(Vec3, f64)]) -> (usize, usize) {
+    fn tested(drops: &[(Vec3, f64)]) -> (usize, usize) {
         let mut merging = Merging::default();
         let merged = merging.pairs(drops.iter().copied(), |_| true).len();
-        (merging.looked_at, merged)
+        (merging.tested, merged)
     }
 
     #[test]
     fn sixteen_thousand_drops_in_one_place_cost_no_more_than_spread_out() {
         const COUNT: usize = 16_000;
-        let (spread, few) = looked_at(&strewn(COUNT, 0.2));
-        let (in_one_place, merged) = looked_at(&strewn(COUNT, 0.0));
+        let (spread, few) = tested(&strewn(COUNT, 0.2));
+        let (in_one_place, merged) = tested(&strewn(COUNT, 0.0));
         println!("{spread} looked at ({few} merged), {in_one_place} in one place");
         assert!(few > 100 && merged == COUNT - 1);
         assert!(in_one_place <= 10 * spread && in_one_place <= 2 * COUNT);
         // Drops that are too large together stay, and are not all looked at by all.
         let full: Vec<_> = strewn(COUNT, 0.0).iter().map(|(at, _)| (*at, 0.9e-3)).collect();
-        let (fruitless, none) = looked_at(&full);
-        assert!(none == 0 && fruitless <= FRUITLESS * COUNT, "{fruitless}");
+        let (failed, none) = tested(&full);
+        assert!(none == 0 && failed <= MAX_FAILED * COUNT, "{failed}");
         // One as large as a melon does not have all others look at each other.
         let mut among = strewn(COUNT, 0.2);
         among.push((Vec3::splat(0.1), 0.9e-3));
-        assert!(looked_at(&among).0 < 2 * (spread + COUNT));
+        assert!(tested(&among).0 < 2 * (spread + COUNT));
     }
 
     #[test]
     fn no_drop_grows_beyond_the_bound() {
-        assert_eq!(looked_at(&[(Vec3::ZERO, 0.6e-3), (Vec3::ZERO, 0.6e-3)]).1, 0);
+        assert_eq!(tested(&[(Vec3::ZERO, 0.6e-3), (Vec3::ZERO, 0.6e-3)]).1, 0);
         let mut merging = Merging::default();
         let three = [(Vec3::ZERO, 0.3e-3), (Vec3::X * 0.01, 0.5e-3), (Vec3::ZERO, 0.3e-3)];
         assert_eq!(merging.pairs(three.into_iter(), |_| true), [[1, 0]]);
@@ -238,8 +238,8 @@ mod tests {
             let left: Vec<usize> = (0..drops.len()).filter(|i| !gone.contains(i)).collect();
             for (k, &i) in left.iter().enumerate() {
                 for &j in &left[..k] {
-                    let full = merging.drops[i].2 + drops[j].1 > MOST
-                        || merging.drops[j].2 + drops[i].1 > MOST;
+                    let full = merging.drops[i].2 + drops[j].1 > MAX_VOLUME
+                        || merging.drops[j].2 + drops[i].1 > MAX_VOLUME;
                     prop_assert!(!touch(i, j) || full, "{} and {}", i, j);
                 }
             }

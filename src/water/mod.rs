@@ -1,19 +1,20 @@
 //! Water: droplets that fall, land and clump hair, hair that gets wet and dries, and bonds that
 //! follow.
 //!
-//! The wet-hair paper's droplets as entities, then what both papers leave open: an unbroken loop. A
-//! [`Droplet`] lands on a strand, rides on it, pulls other strands together, spreads into a film and
-//! soaks in ([`Moisture`]). Where fibres are wet, hydrogen bonds open; the air, damp or dry, still
-//! or from a [`Blower`](crate::Blower), dries it again; the bonds close around the shape of that
-//! moment. Bond rates follow from the water alone.
+//! The wet-hair paper's droplets as entities, and the full cycle of wetting and drying, which both
+//! papers leave open. A [`Droplet`] lands on a strand, rides on it, pulls other strands together,
+//! spreads into a film and soaks in ([`Moisture`]). Where fibres are wet, hydrogen bonds open; the
+//! air, damp or dry, still or from a [`Blower`](crate::Blower), dries it again; the bonds close in
+//! the current shape. Bond rates follow from the water alone.
 //!
-//! Droplets find strands through the [uniform grid](crate::grid), without testing all pairs and without
-//! bounds. They are rows of one table and never change archetype: tens of thousands move in one pass.
+//! Droplets find strands through the unbounded [uniform grid](crate::grid), without testing all
+//! pairs. They never change archetype: tens of thousands move in one pass.
 //!
 //! Every drop of water is accounted for in [`WaterLedger`]: in = held + out.
 
 mod adhesion;
 mod bridge;
+#[doc(hidden)]
 pub mod drag;
 mod droplet;
 mod droplet_contact;
@@ -59,11 +60,11 @@ setting! {
         pub below: f32 = 5.0, "m" in BELOW: 0.0..=f32::INFINITY, safe 0.5..=100.0,
             "5 is below any floor that a character stands on";
     }
-    then Self::corners_in_order
+    then Self::check_corners
 }
 
 impl DropletRules {
-    fn corners_in_order(&mut self, violations: &mut Violations) {
+    fn check_corners(&mut self, violations: &mut Violations) {
         for (min, max) in self.min.to_array().into_iter().zip(self.max.as_mut()) {
             let ValueRange { what, valid, hint, .. } = Self::MAX;
             ValueRange::new(what, min..=*valid.end(), hint).clamp(max, || min, violations);
@@ -71,8 +72,8 @@ impl DropletRules {
     }
 }
 
-/// Sets the water of a hair or strand at once: a bucket of it, a towel. A message; the [`WaterLedger`]
-/// counts the difference.
+/// Sets the water of a hair or strand at once, like a bucket of water or a towel. A message; the
+/// [`WaterLedger`] counts the difference.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -87,8 +88,9 @@ impl DropletRules {
 pub struct SoakHair {
     /// The [`Hair`](crate::Hair) or strand.
     pub target: Entity,
-    /// Share of what hair can bind: 1 soaks through, 0 dries. Up to 1 the film is removed; the excess
-    /// over 1 is film, as a share of what stays on hair: 2 is dripping wet. Range [`WETNESS`](Self::WETNESS).
+    /// Share of what hair can bind: 1 soaks through, 0 dries. Up to 1 the film is removed; the
+    /// excess over 1 is film, as a share of the film that stays on hair: 2 is dripping wet. Range
+    /// [`WETNESS`](Self::WETNESS).
     pub wetness: f32,
 }
 
@@ -97,7 +99,7 @@ impl SoakHair {
     pub const WETNESS: ValueRange =
         ValueRange::new("SoakHair::wetness", 0.0..=2.0, "2 drips, 1 soaks through, 0 dries");
 
-    /// Soaked through, with as much water on it as stays there: heavy, soft and dark, in locks.
+    /// Soaked through and with all the film that stays on hair: heavy, soft and dark, in locks.
     pub fn dripping(target: Entity) -> Self {
         Self { target, wetness: 2.0 }
     }
@@ -145,15 +147,15 @@ pub struct WaterLedger {
 
 impl WaterLedger {
     /// Counts water that was added (m³), or removed if negative.
-    fn book(&mut self, came: f64) {
-        *(if came > 0.0 { &mut self.water_in } else { &mut self.water_out }) += came.abs();
+    fn record(&mut self, change: f64) {
+        *(if change > 0.0 { &mut self.water_in } else { &mut self.water_out }) += change.abs();
     }
 
-    /// Counts water that was put on or taken off hair at once (m³), also as held.
+    /// Counts water that was added to hair at once (m³), or removed if negative, also in `held`.
     #[cfg(feature = "save")]
-    pub(crate) fn replace(&mut self, came: f64) {
-        self.book(came);
-        self.held += came;
+    pub(crate) fn replace(&mut self, change: f64) {
+        self.record(change);
+        self.held += change;
     }
 
     /// |in − held − out| / in, the relative error of the balance; 0 if no water was added.

@@ -23,8 +23,8 @@ pub fn adhesion(distance: f32, r_min: f32, r_max: f32) -> f32 {
     1.0 - x * x
 }
 
-/// Equation 2 with the direction that print omits: along `offset`, from the node to the droplet. Zero
-/// at the droplet's centre.
+/// Equation 2 with the direction that the paper omits: along `offset`, from the node to the
+/// droplet. Zero at the droplet's centre.
 #[inline]
 pub fn pull(offset: Vec3, r_min: f32, r_max: f32) -> Vec3 {
     let squared = offset.length_squared();
@@ -36,12 +36,14 @@ pub fn pull(offset: Vec3, r_min: f32, r_max: f32) -> Vec3 {
 }
 
 /// Radius (m) of a ball of `volume` (m³).
+#[doc(hidden)]
 #[inline]
 pub fn ball_radius(volume: f64) -> f32 {
     bevy::math::ops::cbrt((volume.max(0.0) * (0.75 / core::f64::consts::PI)) as f32)
 }
 
 /// Volume (m³) of a ball of `radius` (m).
+#[doc(hidden)]
 #[inline]
 pub fn ball_volume(radius: f32) -> f64 {
     let r = f64::from(radius);
@@ -62,21 +64,21 @@ pub(crate) fn fall(velocity: Vec3, gravity: Vec3, wind: Vec3, radius: f32, dt: f
 /// square of the size.
 #[inline]
 pub(crate) fn slide(along: f32, radius: f32, mobility: f32) -> f32 {
-    const FASTEST: f32 = 0.3;
+    const MAX_SPEED: f32 = 0.3;
     let size = radius / 1e-3;
-    (along * mobility * size * size).clamp(-FASTEST, FASTEST)
+    (along * mobility * size * size).clamp(-MAX_SPEED, MAX_SPEED)
 }
 
-/// The most water (m³) that hangs on the tip of a bundle of radius `bundle` (m) against an
-/// acceleration: Tate's law with the share 0.6 that a real drop leaves by.
+/// Largest volume of water (m³) that hangs on the tip of a bundle of radius `bundle` (m) against an
+/// acceleration: Tate's law with the factor 0.6 of real drops.
 #[inline]
 pub(crate) fn hanging(bundle: f32, acceleration: f32) -> f64 {
     let weight = WATER_DENSITY * acceleration.abs().max(0.1);
     f64::from(0.6 * core::f32::consts::TAU * bundle * SURFACE_TENSION / weight)
 }
 
-/// The most water (m³) that a bundle of radius `bundle` (m) holds as one drop somewhere along it:
-/// Lorenceau, Clanet and Quéré's drop on a fibre, 4π b σ/(ρ a) k² with k = 0.5.
+/// Largest volume of water (m³) that a bundle of radius `bundle` (m) holds as one drop somewhere
+/// along it: Lorenceau, Clanet and Quéré's drop on a fibre, 4π b σ/(ρ a) k² with k = 0.5.
 #[inline]
 pub(crate) fn clinging(bundle: f32, acceleration: f32) -> f64 {
     let weight = WATER_DENSITY * acceleration.abs().max(0.1);

@@ -2,7 +2,7 @@
 
 use super::{
     Droplet, DropletRules, HairWetting, StrandPoint, WaterLedger,
-    exchange::{let_go, on_strand},
+    exchange::{detached_drop, on_strand},
     model::{clinging, fall, hanging, slide},
     volume::Volumes,
 };
@@ -31,7 +31,7 @@ struct Moving<'a> {
     /// Water not counted by the ledger (m³); negative for water removed from outside.
     new: f64,
     evaporated: f64,
-    ends: bool,
+    is_removed: bool,
 }
 
 pub(super) fn move_droplets(
@@ -79,13 +79,13 @@ pub(super) fn move_droplets(
             violations: Violations::new(),
             new: 0.0,
             evaporated: 0.0,
-            ends: false,
+            is_removed: false,
         })
         .collect();
     for_each(
         &mut items,
         Nanos(500),
-        |Moving { drop, violations, new, evaporated, ends, .. }| {
+        |Moving { drop, violations, new, evaporated, is_removed, .. }| {
             let drop = drop.bypass_change_detection();
             drop.repair(violations);
             *new = drop.volume - drop.counted.0;
@@ -108,20 +108,20 @@ pub(super) fn move_droplets(
             match carrier {
                 Some((ride, strand, pose, hair)) => {
                     let wetting = wetting.of(hair);
-                    let (at, holds) = slid(ride, strand, pose, drop, &wetting, gravity, dt);
+                    let (at, holds) = slide_along(ride, strand, pose, drop, &wetting, gravity, dt);
                     drop.ride = holds.then_some(StrandPoint { at, ..ride });
                     if !holds {
-                        let free = let_go(pose, strand, at, drop.volume, &wetting, gravity);
+                        let free = detached_drop(pose, strand, at, drop.volume, &wetting, gravity);
                         (drop.position, drop.velocity) = (free.position, free.velocity);
                         drop.before = drop.position;
                     }
                 }
                 None => {
                     drop.ride = None;
-                    drop.company = 1;
+                    drop.touch_count = 1;
                     drop.velocity = fall(drop.velocity, gravity, wind, radius, dt);
                     drop.position += drop.velocity * dt;
-                    // All of them: a drop may lie where two meet.
+                    // Tests all obstacles: a drop may lie between two.
                     let lies =
                         obstacles.iter().fold(false, |lies, o| rest_on(o, drop, radius) | lies);
                     drop.lying = if lies { drop.lying + dt } else { 0.0 };
@@ -131,17 +131,17 @@ pub(super) fn move_droplets(
             let inside = inside && (drop.ride.is_some() || drop.position.dot(down) <= lowest);
             let inside = inside && Droplet::POSITION.check(drop.position).is_ok();
             drop.keep_in_range();
-            *ends = !inside
+            *is_removed = !inside
                 || volumes.contain(drop.position)
                 || drop.lying > rules.lying
                 || drop.volume < 1e-15;
         },
     );
-    for Moving { entity, violations, new, evaporated, ends, .. } in items {
-        ledger.book(new);
-        ledger.book(-evaporated);
+    for Moving { entity, violations, new, evaporated, is_removed, .. } in items {
+        ledger.record(new);
+        ledger.record(-evaporated);
         report(Some(entity), violations, &mut faults);
-        if ends {
+        if is_removed {
             // Its remaining water is counted when it is despawned.
             commands.entity(entity).despawn();
         }
@@ -166,8 +166,8 @@ fn lowest_of(
 }
 
 /// Where on its strand a droplet has slid to, and whether it stays attached: at the tip it hangs,
-/// elsewhere it clings; the more strands touch it, the heavier it may be. Pinned drops always stay.
-fn slid(
+/// elsewhere it clings; it may be heavier the more strands touch it. Pinned drops always stay.
+fn slide_along(
     ride: StrandPoint,
     strand: &Strand,
     pose: &Pose,
@@ -183,7 +183,7 @@ fn slid(
     let along = direction.dot(pose.direction_in(gravity));
     let speed = slide(along, drop.radius(), wetting.sliding);
     let at = (ride.at + speed * dt / (lengths[edge] * pose.scale)).clamp(0.0, edges as f32);
-    let bundle = wetting.bundle(drop.company as f32);
+    let bundle = wetting.bundle(drop.touch_count as f32);
     let most = if at == edges as f32 {
         hanging(bundle, gravity.length())
     } else {

@@ -1,7 +1,7 @@
 //! Sixteen strands side by side, for contact with droplets.
 //!
-//! Neighbouring strands hang together, so a droplet near one node is near its fifteen neighbours: they
-//! query the grid once, and every droplet found is tested against all of them.
+//! Neighbouring strands are close together, so a droplet near one node is near its fifteen
+//! neighbours: they query the grid once, and every droplet found is tested against all of them.
 
 use super::HairWetting;
 use crate::{
@@ -68,9 +68,9 @@ impl NodeSlice {
         // Non-finite values are left out: zero times them is not zero.
         let zero = f32x16::splat(simd, 0.0);
         let none = p.scale(zero);
-        let is_somewhere = none.dot(none).simd_eq(zero);
-        let low = V3::select(is_somewhere, p, splat3(simd, Vec3::INFINITY));
-        let high = V3::select(is_somewhere, p, splat3(simd, Vec3::NEG_INFINITY));
+        let is_finite = none.dot(none).simd_eq(zero);
+        let low = V3::select(is_finite, p, splat3(simd, Vec3::INFINITY));
+        let high = V3::select(is_finite, p, splat3(simd, Vec3::NEG_INFINITY));
         (
             Vec3::new(low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()),
             Vec3::new(high.x.reduce_max(), high.y.reduce_max(), high.z.reduce_max()),
@@ -99,7 +99,7 @@ impl StrandBlock {
         }
         for (group, four) in strand_lanes.chunks(4).enumerate() {
             if let [a, b, c, d] = four
-                && is_of(longest, four)
+                && have_nodes(longest, four)
             {
                 let four = [a.positions, b.positions, c.positions, d.positions];
                 put_vectors(&mut self.rows, group, four, |row| &mut row.p);
@@ -122,7 +122,7 @@ impl StrandBlock {
     pub fn weigh(&mut self, strand_lanes: &[StrandLane<'_>], wetting: &HairWetting) {
         for (group, four) in strand_lanes.chunks(4).enumerate() {
             if let [a, b, c, d] = four
-                && is_of(self.rows.len(), four)
+                && have_nodes(self.rows.len(), four)
             {
                 let velocities = [&*a.velocities, b.velocities, c.velocities, d.velocities];
                 put_vectors(&mut self.rows, group, velocities, |row| &mut row.v);
@@ -159,7 +159,7 @@ impl StrandBlock {
     /// Writes velocities back.
     pub fn scatter(&self, strand_lanes: &mut [StrandLane<'_>]) {
         for (group, four) in strand_lanes.chunks_mut(4).enumerate() {
-            let is_whole = is_of(self.rows.len(), four);
+            let is_whole = have_nodes(self.rows.len(), four);
             if let [a, b, c, d] = &mut *four
                 && is_whole
             {
@@ -176,8 +176,8 @@ impl StrandBlock {
     }
 }
 
-/// Whether all strands have so many nodes.
-fn is_of(nodes: usize, strand_lanes: &[StrandLane<'_>]) -> bool {
+/// Whether all strands have this number of nodes.
+fn have_nodes(nodes: usize, strand_lanes: &[StrandLane<'_>]) -> bool {
     strand_lanes.iter().all(|strand_lane| strand_lane.positions.len() == nodes)
 }
 
@@ -189,10 +189,15 @@ pub(super) struct StrandBlocks {
 }
 
 impl StrandBlocks {
-    /// The indices of `count` strands with these `roots`, in order. Sorted again if `anew` or if their
+    /// The indices of `count` strands with these `roots`, in order. Sorted again if `resort` or if their
     /// number has changed; the grouping affects only speed.
-    pub fn order(&mut self, anew: bool, count: usize, roots: impl Iterator<Item = Vec3>) -> &[u32] {
-        if anew || self.order.len() != count {
+    pub fn order(
+        &mut self,
+        resort: bool,
+        count: usize,
+        roots: impl Iterator<Item = Vec3>,
+    ) -> &[u32] {
+        if resort || self.order.len() != count {
             let mut keys: Vec<(u64, u32)> = roots.map(place_on_curve).zip(0..).collect();
             keys.sort_unstable();
             self.order.clear();
@@ -202,7 +207,7 @@ impl StrandBlocks {
     }
 }
 
-/// How far along Morton's curve through cells of 2 mm a root is.
+/// The position of a root along a Morton curve through cells of 2 mm.
 fn place_on_curve(root: Vec3) -> u64 {
     let cell =
         (root * 500.0).as_ivec3().clamp(IVec3::splat(-(1 << 20)), IVec3::splat((1 << 20) - 1));
@@ -210,7 +215,7 @@ fn place_on_curve(root: Vec3) -> u64 {
     x | y << 1 | z << 2
 }
 
-/// The lowest 21 bits, with two bits of room after each.
+/// The lowest 21 bits, with two zero bits after each.
 fn spread(x: u64) -> u64 {
     let x = (x | x << 32) & 0x001f_0000_0000_ffff;
     let x = (x | x << 16) & 0x001f_0000_ff00_00ff;
@@ -245,7 +250,7 @@ mod tests {
         });
         let mean = widths.sum::<f32>() / 64.0;
         assert!(mean < 0.02, "sixteen strands fill 12 mm by 12 mm, here {mean} m");
-        // Kept while `anew` is false, but not for another number of strands.
+        // Kept while `resort` is false, but not for another number of strands.
         assert_eq!(blocks.order(false, 1024, [Vec3::NAN; 1024].into_iter()), order);
         assert_eq!(blocks.order(false, 3, roots[..3].iter().copied()).len(), 3);
     }

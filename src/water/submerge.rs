@@ -1,4 +1,5 @@
-//! `ExternalForces`: what hair meets in a [`WaterVolume`](super::WaterVolume), before the air acts on it.
+//! `ExternalForces`: effects of a [`WaterVolume`](super::WaterVolume) on hair, before those of the
+//! air.
 
 use super::{
     HairWetting, Moisture, WaterLedger,
@@ -16,26 +17,26 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// About what a strand takes (ns).
+/// Approximate cost of a strand (ns).
 const SUBMERGE: Nanos = Nanos(800);
 
-/// A node that is under water by more than this has no film.
+/// A node of which at least this share is under water has no film.
 const UNDER: f32 = 0.5;
 
 impl InWater {
-    /// Whether water is all around, rather than on it.
+    /// Whether the node is submerged.
     pub(super) fn is_under(&self) -> bool {
         self.share >= UNDER
     }
 }
 
-/// What all strands of a hair meet.
+/// The water volumes and settings of a hair.
 struct LocalWater {
     volumes: LocalVolumes,
     lock: Lock,
-    /// The film that a node has as it comes out (m³).
+    /// The film of a node that emerges (m³).
     film: f64,
-    /// How long the substep is that the hair takes now; `None` where it waits.
+    /// The hair's time step in this substep (s); `None` if it skips this substep.
     dt: Option<f32>,
 }
 
@@ -50,13 +51,13 @@ pub(super) fn submerge(
         Without<OnGpu>,
     >,
     mut ledger: ResMut<WaterLedger>,
-    mut were_any: Local<bool>,
+    mut had_volumes: Local<bool>,
 ) {
-    // Once more when the last one is gone: what was under it is out of it.
-    if volumes.are_none() && !core::mem::take(&mut *were_any) {
+    // Runs once more after the last volume was removed, so that hair emerges from it.
+    if volumes.are_none() && !core::mem::take(&mut *had_volumes) {
         return;
     }
-    *were_any = !volumes.are_none();
+    *had_volumes = !volumes.are_none();
     let gravity = gravity.clamped().0.length();
     let water_of = |hair: Entity| {
         let pose = hairs.get(hair).ok()?.now();
@@ -68,31 +69,32 @@ pub(super) fn submerge(
             dt: steps.of(hair).map(|step| step.dt),
         })
     };
-    let came = for_each_part(
+    let gained = for_each_part(
         SUBMERGE,
         tables(&mut strands),
         || (),
         |(), rows| {
-            let (mut waters, mut came) = (PerHair::default(), [0.0, 0.0]);
+            let (mut waters, mut gained) = (PerHair::default(), [0.0, 0.0]);
             for (of, sleep, strand, added, moisture) in rows {
                 if let Some(water) = waters.index(of.0, || water_of(of.0)) {
                     let dt = waters.values[water].dt.filter(|_| sleep.is_simulated());
                     let [film, lost] = immerse(&waters.values[water], dt, strand, added, moisture);
-                    came[0] += film;
-                    came[1] += lost;
+                    gained[0] += film;
+                    gained[1] += lost;
                 }
             }
-            came
+            gained
         },
     );
-    for [film, lost] in came {
+    for [film, lost] in gained {
         ledger.water_in += film;
         ledger.water_out += lost;
     }
 }
 
-/// Takes a strand into the water, or out of it: its nodes' velocities and weights and, where it comes
-/// out, their film. Returns how much that is (m³), and what was on nodes that are gone.
+/// Updates a strand for the water around it: velocities and effective masses of its nodes and,
+/// where they emerge, their film. Returns the volume of that film and the water of removed nodes
+/// (m³).
 fn immerse(
     water: &LocalWater,
     dt: Option<f32>,
@@ -106,10 +108,10 @@ fn immerse(
     if nodes < 2 || (!near && added.in_water.is_empty()) {
         return [0.0; 2];
     }
-    // Somebody may have given it fewer nodes.
+    // The number of nodes may have changed.
     added.in_water.resize(nodes, InWater::default());
     let lost = moisture.fit(nodes);
-    let mut came = 0.0;
+    let mut gained = 0.0;
     let mut any = false;
     for i in 0..nodes {
         let (positions, lengths) = (strand.positions(), strand.rest_lengths());
@@ -117,7 +119,7 @@ fn immerse(
         let segment = |i: Option<usize>| i.and_then(|i| lengths.get(i)).copied().unwrap_or(0.0);
         let own = 0.5 * (segment(i.checked_sub(1)) + segment(Some(i)));
         let depth = water.volumes.depth(place);
-        // As far as half the segments on either side reach.
+        // Over half the segments on either side.
         let share = depth.map_or(0.0, |(depth, _)| (0.5 + depth / own.max(1e-6)).clamp(0.0, 1.0));
         let before = added.in_water[i];
         added.in_water[i] = InWater { share, ..default() };
@@ -125,7 +127,7 @@ fn immerse(
             any = true;
             let (a, b) = (positions[i.saturating_sub(1)], positions[(i + 1).min(nodes - 1)]);
             let load = added.mass.get(i).copied().unwrap_or(0.0);
-            // While it waits for a longer substep, it is as it was.
+            // Unchanged while the hair skips substeps.
             added.in_water[i] = InWater { share, ..before };
             if let Some(dt) = dt {
                 let velocity = &mut strand.velocities_mut()[i];
@@ -138,11 +140,11 @@ fn immerse(
         if before.is_under() && share < UNDER {
             let film = (water.film - moisture.film()[i]).max(0.0);
             moisture.add_film(i, film);
-            came += film;
+            gained += film;
         }
     }
     if !any {
         added.in_water.clear();
     }
-    [came, lost]
+    [gained, lost]
 }

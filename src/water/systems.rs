@@ -18,7 +18,7 @@ use crate::{
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
-/// Droplets, showers, moisture and the air that dries.
+/// Droplets, showers, moisture and drying.
 pub struct WaterPlugin;
 
 impl Plugin for WaterPlugin {
@@ -64,7 +64,7 @@ impl Plugin for WaterPlugin {
             )
             .add_systems(
                 HairTick,
-                (follow_strands, close_books).chain().in_set(HairSystems::WaterLedger),
+                (follow_strands, sum_held_water).chain().in_set(HairSystems::WaterLedger),
             );
     }
 }
@@ -88,7 +88,7 @@ fn count_lost_moisture(
     mut ledger: ResMut<WaterLedger>,
 ) {
     if let Ok(mut moisture) = strands.get_mut(lost.entity) {
-        ledger.water_out += moisture.forget();
+        ledger.water_out += moisture.take_counted();
     }
 }
 
@@ -108,12 +108,12 @@ fn count_overwritten(
         let counted = droplets.iter().map(|d| d.counted.0).sum::<f64>()
             + strands.iter().map(|m| m.counted()).sum::<f64>();
         let lost = ledger.water_in - ledger.water_out - counted;
-        ledger.book(-lost);
+        ledger.record(-lost);
     }
 }
 
 /// At the end of a tick: the water present, summed in the order of the entities.
-fn close_books(
+fn sum_held_water(
     step: Res<HairStep>,
     droplets: Query<&Droplet, Allow<Disabled>>,
     strands: Query<&Moisture, Allow<Disabled>>,

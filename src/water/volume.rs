@@ -1,4 +1,4 @@
-//! Places that are full of water.
+//! Volumes of water in which hair can be submerged.
 
 use super::drag::Water;
 use crate::{
@@ -9,12 +9,12 @@ use crate::{
 use bevy::{ecs::system::SystemParam, prelude::*};
 
 setting! {
-    /// A place full of water: a lake, a pool, a drop as large as a head. Hair that is under it weighs what
-    /// buoyancy leaves, is slowed by the water and goes with its current; it soaks, has neither film nor
-    /// droplets, and locks come apart. What comes out of it is dripping wet. Droplets that fall in are
-    /// gone; the [`WaterLedger`](crate::WaterLedger) counts what goes in and comes out.
+    /// A volume of water: a lake, a pool, a floating ball. Buoyancy, drag and the water's current
+    /// act on hair in it; the hair soaks, has neither film nor droplets, and locks come apart. Hair
+    /// that emerges is dripping wet. Droplets that fall in are removed; the
+    /// [`WaterLedger`](crate::WaterLedger) counts what goes in and comes out.
     ///
-    /// Where volumes overlap a node is in that in which it is deepest.
+    /// Where volumes overlap, a node is in the one in which it is deepest.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -27,7 +27,7 @@ setting! {
     #[reflect(Component, Default, Clone, PartialEq)]
     #[require(Transform, TickPose)]
     pub struct WaterVolume {
-        /// What it looks like.
+        /// Its shape.
         pub shape: ZoneShape = ZoneShape::Box;
         /// Half its size along each of its axes, scaled with its transform; a
         /// [`HalfSpace`](ZoneShape::HalfSpace) has none.
@@ -46,7 +46,7 @@ setting! {
 }
 
 impl WaterVolume {
-    /// A box of so much to each side of its middle (m).
+    /// A box with this half size (m).
     ///
     /// # Errors
     /// When a side is not between 1 mm and 1000 km.
@@ -54,13 +54,13 @@ impl WaterVolume {
         Self { half_size, ..default() }.checked()
     }
 
-    /// All that is below the entity.
+    /// The half-space below the entity.
     pub fn lake() -> Self {
         Self { shape: ZoneShape::HalfSpace, ..default() }
     }
 }
 
-/// A volume as seen from a frame, its values valid.
+/// A volume as seen from a frame, with valid values.
 #[derive(Clone, Copy, Debug)]
 struct LocalVolume {
     shape: ZoneShape,
@@ -107,8 +107,8 @@ impl Volumes<'_, '_> {
 }
 
 impl LocalVolumes {
-    /// How deep a place is in the volume in which it is deepest (m), less than nothing outside, and that
-    /// volume's water. A place that is not finite is in none.
+    /// Depth of a position in the volume in which it is deepest (m), negative outside, and that
+    /// volume's water. A non-finite position is in none.
     pub fn depth(&self, place: Vec3) -> Option<(f32, &Water)> {
         let depths = self.0.iter().map(|volume| {
             let LocalVolume { shape, half_size, rotation, origin, scale, water } = volume;

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 pub enum WearError {
     /// Nothing below the wearer has a mesh, after ten seconds.
     #[error(
-        "WearHair's entity has no mesh, and none appeared below it within {PATIENCE} s: put it on a \
+        "WearHair's entity has no mesh, and none appeared below it within {SEARCH_TIME} s: put it on a \
          mesh, or on the root of a character"
     )]
     NoMesh,
@@ -23,7 +23,7 @@ pub enum WearError {
         there: String,
     },
     /// No name was given, and no bone is called head.
-    #[error("no bone is named head: say which by WearHair::on; there are {there}")]
+    #[error("no bone is named head: name it with WearHair::on; there are {there}")]
     NoHead {
         /// The names that are there.
         there: String,
@@ -66,13 +66,13 @@ pub enum WearError {
     /// A face that looks straight up or down, or nowhere.
     #[error("WearHair::facing is {found}, expected a direction that is not up or down")]
     Facing {
-        /// What it is.
+        /// Its value.
         found: Vec3,
     },
     /// A head of implausible size.
     #[error(
         "the head is {found} m from the middle between the ears to the crown, expected {} to {} m: \
-         scale the character, or say where its head is by WearHair::scalp",
+         scale the character, or set the position of its head with WearHair::scalp",
         HEAD_SIZES.start(), HEAD_SIZES.end()
     )]
     HeadSize {
@@ -88,15 +88,15 @@ pub enum WearError {
         /// The other wearer.
         by: Entity,
     },
-    /// A groom far from the character.
+    /// A groom too far from the character's mesh.
     #[error(
         "half of the groom's strands grow farther than {found} m from the mesh, expected less than \
-         {most} m: say where it lies by WearHair::place"
+         {most} m: set its origin with WearHair::place"
     )]
     Beside {
-        /// The median distance (m, of a head of life size).
+        /// The median distance (m, scaled to a life-size head).
         found: f32,
-        /// The most (m).
+        /// The limit (m).
         most: f32,
     },
     /// An error of planting.
@@ -113,8 +113,8 @@ pub enum WearError {
     Strand(#[from] StrandError),
 }
 
-/// How long a missing mesh is waited for before it is reported (s).
-pub(super) const PATIENCE: f32 = 10.0;
+/// How long to wait for a missing mesh before reporting it (s).
+pub(super) const SEARCH_TIME: f32 = 10.0;
 
 /// Heights of heads on which hair can be simulated (m).
 pub(super) const HEAD_SIZES: core::ops::RangeInclusive<f32> = 1e-3..=100.0;

@@ -19,8 +19,8 @@ pub(super) struct HeadPlace {
 /// The head whose skin these points are, with Y up and Z from front to back; neck and body below may
 /// be among them. `None` without points.
 ///
-/// The crown is the highest point. The depth is that of the part above the ears, so that neither nose
-/// nor chin nor chest count; how far down that is follows from the depth itself.
+/// The crown is the highest point. The depth is that of the part above the ears, so that neither
+/// nose nor chin nor chest count; its height follows from the depth itself.
 pub(super) fn find_head(points: &[Vec3]) -> Option<HeadPlace> {
     let crown = points.iter().map(|p| p.y).fold(f32::NEG_INFINITY, f32::max);
     let bounds = |height: f32| {

@@ -1,4 +1,5 @@
-//! Making hair for a head: planting or sowing, roots, colliders. Pure, and so for any thread.
+//! Making hair for a head: planting or converting a groom, roots, colliders. A pure function, for
+//! any thread.
 
 use super::{
     error::WearError,
@@ -26,17 +27,17 @@ use bevy::{math::Affine3A, platform::collections::HashMap, prelude::*};
 
 /// Surface points of head and body for fitting balls.
 const POINTS: usize = 2500;
-/// The most balls for a head.
-const MOST_BALLS: usize = 16;
-/// Beyond the hair's length, how far from the head something may touch it (m).
-const BESIDE: f32 = 0.15;
-/// Half of a groom's strands must grow nearer to the mesh than this (m).
-const MOST_BESIDE: f32 = 0.03;
-/// Least weight of the head joint at a vertex that counts as the head, not the neck.
-const OF_HEAD: f32 = 0.5;
+/// Largest number of balls for a head.
+const MAX_BALLS: usize = 16;
+/// Distance beyond the hair's length within which meshes are considered (m).
+const MARGIN: f32 = 0.15;
+/// Largest median distance of a groom's roots from the mesh (m).
+const MAX_ROOT_DISTANCE: f32 = 0.03;
+/// Smallest weight of the head joint at a vertex that counts as the head, not the neck.
+const HEAD_WEIGHT: f32 = 0.5;
 
 /// The input for making hair.
-pub(super) struct Order {
+pub(super) struct MakeInput {
     pub(super) wear: WearHair,
     pub(super) target: Target,
     /// The groom, where one is worn.
@@ -45,10 +46,10 @@ pub(super) struct Order {
 
 /// Finished hair, ready to be spawned.
 pub(super) struct Made {
-    /// The bone or mesh that it goes below, and its place there.
+    /// Its parent bone or mesh, and its transform there.
     pub(super) parent: Entity,
     pub(super) place: Transform,
-    /// The mesh that its roots are tied to, and from which space to the strands'.
+    /// The mesh that its roots are tied to, and the transform from its space to the strands'.
     pub(super) mesh: Entity,
     pub(super) from_mesh: Affine3A,
     pub(super) roots: Vec<RootOnMesh>,
@@ -66,7 +67,7 @@ pub(super) struct Made {
 }
 
 /// Makes the hair.
-pub(super) fn make(mut order: Order) -> Result<Made, WearError> {
+pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
     let fitting = fit(&mut order.target.parts, &order.wear)?;
     let grown = match (&order.wear.hair, &order.groom) {
         (HairSource::Groom { guides, .. }, Some(groom)) => {
@@ -85,7 +86,7 @@ pub(super) fn make(mut order: Order) -> Result<Made, WearError> {
         None => (part.entity, to_mesh),
     };
     let (balls, capsules) = if order.wear.colliders && !order.target.has_colliders {
-        let reach = grown.hair.strands.iter().map(Strand::length).fold(0.0, f32::max) + BESIDE;
+        let reach = grown.hair.strands.iter().map(Strand::length).fold(0.0, f32::max) + MARGIN;
         (balls(&fitting, reach)?, capsules(&order.target.parts, &fitting, reach))
     } else {
         default()
@@ -127,10 +128,10 @@ fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown
     let whole = preset.is_everywhere();
     let mesh = match whole {
         true => fitting.mesh.clone(),
-        false => cropped(&fitting.mesh, planting.length + BESIDE),
+        false => cropped(&fitting.mesh, planting.length + MARGIN),
     };
     let of_head = |place: &RootPlace| match place.color {
-        Some(color) if !whole && color.x <= OF_HEAD => 0.0,
+        Some(color) if !whole && color.x <= HEAD_WEIGHT => 0.0,
         _ => 1.0,
     };
     let planted = preset.plant_where(&planting, &mesh, &fitting.scalp, &of_head)?;
@@ -170,8 +171,8 @@ fn from_groom(
     let (roots, mut apart): (Vec<_>, Vec<_>) =
         RootOnMesh::nearest(&fitting.mesh, places.iter().copied())?.into_iter().unzip();
     let found = median(&mut apart).unwrap_or(0.0);
-    if found > MOST_BESIDE {
-        return Err(WearError::Beside { found, most: MOST_BESIDE });
+    if found > MAX_ROOT_DISTANCE {
+        return Err(WearError::Beside { found, most: MAX_ROOT_DISTANCE });
     }
     Ok(Grown {
         fibres: HUMAN_DENSITY * area_of_each(&places),
@@ -182,7 +183,7 @@ fn from_groom(
     })
 }
 
-/// About how much skin each root stands for (m²), from how far apart neighbours are.
+/// Approximate area of skin per root (m²), from the distances of neighbours.
 fn area_of_each(places: &[Vec3]) -> f32 {
     let tree = KdTree::new(places.iter().copied().zip(0u32..));
     let apart = |p: &Vec3| tree.nearest::<2>(*p).nth(1).map(|(_, square)| square);
@@ -199,15 +200,15 @@ fn median(values: &mut [f32]) -> Option<f32> {
 fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>, WearError> {
     let points = surface_points(&cropped(&fitting.mesh, reach), POINTS)?;
     let height = fitting.scalp.height;
-    let is_meant = |p: &SurfacePoint| p.red > OF_HEAD && p.at.length() < reach;
+    let is_on_head = |p: &SurfacePoint| p.red > HEAD_WEIGHT && p.at.length() < reach;
     let places: Vec<_> = points.iter().map(|p| (p.at, p.normal)).collect();
     let rules = BallRules {
         widest: 0.9 * height,
         within: 0.01 * height,
         near: 0.02 * height,
-        most: MOST_BALLS,
+        most: MAX_BALLS,
     };
-    let balls = inscribed_balls(&places, |i| is_meant(&points[i]), &rules);
+    let balls = inscribed_balls(&places, |i| is_on_head(&points[i]), &rules);
     let each = balls.into_iter().map(|ball| {
         let place = Transform::from_translation(ball.center.into());
         Ok((HairCollider::sphere(ball.radius())?, place))

@@ -1,11 +1,11 @@
 //! Wearing: hair on a character by one component.
 //!
-//! [`WearHair`] says what is worn, a preset or a groom, and where: on an entity's own mesh, or on the
-//! head of a character below it, found by the name of a bone. It waits for a scene that still loads,
-//! makes the hair on the async compute task pool, ties its roots, fits colliders to head and body,
-//! and spawns it as a [`Hair`](crate::Hair) of its own. [`HairWorn`] is triggered when it is there,
-//! [`HairNotWorn`] when it cannot be. Change the component and the hair is swapped, once the new one
-//! is ready; remove it and the hair is gone.
+//! [`WearHair`] sets what is worn, a preset or a groom, and where: on an entity's own mesh, or on
+//! the head of a character below it, found by the name of a bone. It waits for a scene that still
+//! loads, makes the hair on the async compute task pool, ties its roots, fits colliders to head and
+//! body, and spawns it as a [`Hair`](crate::Hair) of its own. [`HairWorn`] is triggered when it is
+//! there, [`HairNotWorn`] when it cannot be. Change the component and the hair is swapped, once the
+//! new one is ready; remove it and the hair is removed.
 //!
 //! | step | where |
 //! |---|---|
@@ -41,7 +41,7 @@ impl Plugin for WearPlugin {
             .register_required_components::<WearHair, systems::Wearing>()
             .add_systems(
                 PreUpdate,
-                (systems::take_off, systems::note_changes, systems::find_heads, systems::put_on)
+                (systems::take_off, systems::detect_changes, systems::find_heads, systems::put_on)
                     .chain(),
             );
     }

@@ -1,8 +1,8 @@
 //! Mesh and hair in one space.
 //!
-//! Hair is planted in a space where the face looks along −Z, the origin is the middle between the ears,
-//! and the head is of life size. So presets fit, a hairdo of one character fits another, and hair of
-//! dolls and giants swings as at life size.
+//! Hair is planted in a space where the face looks along −Z, the origin is the middle between the
+//! ears, and the head has life size. So presets fit, a hairdo of one character fits another, and
+//! hair of dolls and giants moves as at life size.
 
 use super::{
     error::{HEAD_SIZES, WearError},
@@ -20,8 +20,8 @@ use bevy::{
     prelude::*,
 };
 
-/// Heights of heads of life size (m).
-const LIFE: core::ops::RangeInclusive<f32> = 0.08..=0.16;
+/// Heights of life-size heads (m).
+const LIFE_SIZE: core::ops::RangeInclusive<f32> = 0.08..=0.16;
 
 /// The joints of a mesh.
 pub(super) struct MeshSkin {
@@ -64,17 +64,17 @@ pub(super) fn skin_of(mesh: &Mesh) -> Result<Mesh, WearError> {
     Ok(copy)
 }
 
-/// From a mesh as it is bound to the wearer, by one of its joints: where the joint is now, and its
-/// inverse bind pose.
+/// The transform from a mesh as it is bound to the wearer, by one of its joints: where the joint is
+/// now, and its inverse bind pose.
 ///
 /// The joint may be moved by an animation already, but meshes are bound along the axes of their
-/// character: of the joint's turn only quarter turns count.
+/// character: the joint's rotation is rounded to quarter turns.
 pub(super) fn bound_to(now: Affine3A, inverse_bind: Affine3A) -> Option<Affine3A> {
-    let way = now * inverse_bind;
-    let scale = way.matrix3.determinant().abs().cbrt();
-    let turn = quarter_turns(way.matrix3) * scale;
+    let skinned = now * inverse_bind;
+    let scale = skinned.matrix3.determinant().abs().cbrt();
+    let turn = quarter_turns(skinned.matrix3) * scale;
     let joint = inverse_bind.inverse().translation;
-    let moved = way.transform_point3a(joint) - turn * joint;
+    let moved = skinned.transform_point3a(joint) - turn * joint;
     let bound = Affine3A { matrix3: turn, translation: moved };
     (bound.is_finite() && scale > 0.0).then_some(bound)
 }
@@ -104,7 +104,7 @@ pub(super) struct Fitting {
     pub(super) to_hair: Affine3A,
     /// From the wearer to the hair.
     pub(super) from_wearer: Affine3A,
-    /// The mesh there; red is the share of the head in moving a vertex.
+    /// The mesh in that space; the red vertex colour is the head's skinning weight.
     pub(super) mesh: Mesh,
     pub(super) scalp: Scalp,
 }
@@ -141,7 +141,7 @@ pub(super) fn fit(parts: &mut [MeshPart], wear: &WearHair) -> Result<Fitting, We
     if has_area && !HEAD_SIZES.contains(&head.height) {
         return Err(WearError::HeadSize { found: head.height });
     }
-    let life = head.height.clamp(*LIFE.start(), *LIFE.end());
+    let life = head.height.clamp(*LIFE_SIZE.start(), *LIFE_SIZE.end());
     let size = if has_area { life / head.height } else { 1.0 };
     let size = Affine3A::from_scale(Vec3::splat(size));
     let from_wearer =
@@ -161,7 +161,7 @@ pub(super) fn fit(parts: &mut [MeshPart], wear: &WearHair) -> Result<Fitting, We
     Ok(Fitting { part: chosen, to_hair, from_wearer, mesh, scalp })
 }
 
-/// Turns the wearer's right, up and front to X, Y and −Z.
+/// The rotation of the wearer's right, up and front to X, Y and −Z.
 fn upright(scalp: Option<&Scalp>, facing: Dir3) -> Result<Mat3A, WearError> {
     let [right, up, front] = match scalp {
         Some(scalp) => scalp.axes(),
@@ -183,8 +183,8 @@ fn positions(mesh: &Mesh) -> &[[f32; 3]] {
     }
 }
 
-/// By how much the head moves each vertex: all of a mesh without a skin. Where no joint is known to
-/// be the head, it is the one that moves the highest vertex most.
+/// The head's skinning weight at each vertex; 1 for a mesh without a skin. Where no joint is known
+/// to be the head, it is the one with the largest weight at the highest vertex.
 fn head_shares(part: &mut MeshPart, turn: Mat3A) -> Result<Vec<f32>, WearError> {
     let places = positions(&part.mesh);
     let Some(skin) = &mut part.skin else { return Ok(vec![1.0; places.len()]) };
@@ -245,7 +245,7 @@ fn triangles(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> {
     starts.map(move |i| [indices[i], indices[i + 1], indices[i + 2]])
 }
 
-/// A mesh in another space, with shares as the red of its vertices.
+/// A mesh in another space, with shares as red vertex colour.
 fn in_space(mesh: &Mesh, space: &Affine3A, shares: &[f32]) -> Mesh {
     let mut moved = mesh.clone();
     if let Some(Values::Float32x3(places)) = moved.attribute_mut(Mesh::ATTRIBUTE_POSITION) {

@@ -1,8 +1,8 @@
 //! The systems: find heads, start tasks that make hair, spawn and despawn it.
 
 use super::{
-    error::{PATIENCE, WearError},
-    make::{Made, Order, make},
+    error::{SEARCH_TIME, WearError},
+    make::{Made, MakeInput, make},
     target::{Characters, Fitted, Search},
     what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair},
 };
@@ -49,7 +49,7 @@ enum WearStage {
 }
 
 enum Making {
-    Elsewhere(Task<Result<Made, WearError>>),
+    Running(Task<Result<Made, WearError>>),
     Ready(Option<Box<Result<Made, WearError>>>),
 }
 
@@ -80,9 +80,9 @@ pub(super) fn take_off(
     }
 }
 
-/// Begins anew where what is worn has changed, or is gone with the scene that it was on. What can be put
-/// on the hair that is worn is.
-pub(super) fn note_changes(
+/// Starts again where the source of the hair has changed or its hair was despawned with the scene.
+/// Changes that worn hair can take are applied to it.
+pub(super) fn detect_changes(
     mut commands: Commands,
     mut wearers: Query<(Ref<WearHair>, &mut Wearing)>,
     mut events: Option<MessageReader<AssetEvent<Groom>>>,
@@ -121,7 +121,7 @@ pub(super) fn note_changes(
     }
 }
 
-/// Puts look, dye and watch over the style on worn hair, where they are others than before.
+/// Applies changes of look, dye and [`HairStyle`] to worn hair.
 fn restyle(commands: &mut Commands, hair: Entity, before: &WearHair, wear: &WearHair) {
     let mut hair = commands.entity(hair);
     if before.look != wear.look
@@ -143,7 +143,7 @@ fn restyle(commands: &mut Commands, hair: Entity, before: &WearHair, wear: &Wear
     }
 }
 
-/// Looks for heads, and has hair made for those that are there.
+/// Searches for heads, and starts to make hair for those that are found.
 pub(super) fn find_heads(
     mut commands: Commands,
     time: Option<Res<Time<Real>>>,
@@ -167,7 +167,7 @@ pub(super) fn find_heads(
         };
         let mut failed = |error: WearError, reported: bool| {
             if !reported {
-                refuse(&mut commands, &mut faults, wearer, error);
+                report_failure(&mut commands, &mut faults, wearer, error);
             }
         };
         let groom = match &wear.hair {
@@ -190,7 +190,7 @@ pub(super) fn find_heads(
         wearing.stage = match characters.search(wearer, wear) {
             Search::Loading => WearStage::Searching { seconds, reported },
             Search::Nothing => {
-                let is_late = seconds > PATIENCE;
+                let is_late = seconds > SEARCH_TIME;
                 if is_late {
                     failed(WearError::NoMesh, reported);
                 }
@@ -213,8 +213,8 @@ pub(super) fn find_heads(
                             taken.insert(target.head, wearer);
                         }
                         wearing.head = Some(target.head);
-                        let order = Order { wear: wear.clone(), target, groom: groom.cloned() };
-                        WearStage::Making(begin(order))
+                        let input = MakeInput { wear: wear.clone(), target, groom: groom.cloned() };
+                        WearStage::Making(begin(input))
                     }
                 }
             }
@@ -223,14 +223,14 @@ pub(super) fn find_heads(
 }
 
 /// Makes hair on the async compute pool, or at once in an app without pools.
-fn begin(order: Order) -> Making {
+fn begin(input: MakeInput) -> Making {
     match AsyncComputeTaskPool::try_get() {
-        Some(pool) => Making::Elsewhere(pool.spawn(async move { make(order) })),
-        None => Making::Ready(Some(Box::new(make(order)))),
+        Some(pool) => Making::Running(pool.spawn(async move { make(input) })),
+        None => Making::Ready(Some(Box::new(make(input)))),
     }
 }
 
-fn refuse(
+fn report_failure(
     commands: &mut Commands,
     faults: &mut MessageWriter<HairFault>,
     wearer: Entity,
@@ -257,7 +257,7 @@ pub(super) fn put_on(
             continue;
         };
         let ready = match making {
-            Making::Elsewhere(task) => check_ready(task),
+            Making::Running(task) => check_ready(task),
             Making::Ready(made) => made.take().map(|made| *made),
         };
         let Some(ready) = ready else { continue };
@@ -276,7 +276,7 @@ pub(super) fn put_on(
             Ok(_) => wearing.stage = WearStage::Begun,
             Err(error) => {
                 wearing.head = None;
-                refuse(&mut commands, &mut faults, wearer, error);
+                report_failure(&mut commands, &mut faults, wearer, error);
             }
         }
     }
@@ -301,7 +301,7 @@ fn spawn_hair(
     if let Some(preset) = made.preset {
         hair.insert(preset);
     }
-    // A style is put on as it was saved.
+    // A saved style is put on as it is.
     #[cfg(feature = "save")]
     let is_styled = wear.hairdo.is_some();
     #[cfg(not(feature = "save"))]
@@ -335,7 +335,7 @@ fn spawn_hair(
     if let Some(hairdo) = wear.hairdo.clone() {
         commands.entity(hair).queue(hairdo.put_on_fitting());
     }
-    // Over the hairdo's.
+    // These override the hairdo's.
     let mut own = commands.entity(hair);
     if let Some(look) = wear.look.clone() {
         own.insert(look);

@@ -209,15 +209,15 @@ impl Characters<'_, '_> {
         poses: &[Mat4],
         bone: Option<(Entity, &HashSet<Entity>)>,
     ) -> MeshSkin {
-        let position = |is_meant: fn(&str) -> bool| {
-            skin.joints.iter().position(|j| self.name(*j).is_some_and(is_meant))
+        let position = |is_name: fn(&str) -> bool| {
+            skin.joints.iter().position(|j| self.name(*j).is_some_and(is_name))
         };
         let called = || position(is_head).or_else(|| position(is_head_of_rigify));
         let head = match bone {
             Some((head, _)) => skin.joints.iter().position(|joint| *joint == head),
             None => called(),
         };
-        // Eyes, jaw and the like are of the head.
+        // Eyes, jaw and the like belong to the head.
         let below: HashSet<Entity> = match (bone, head) {
             (Some((_, below)), _) => below.clone(),
             (None, Some(head)) => self.below(skin.joints[head], true).into_iter().collect(),
@@ -257,23 +257,24 @@ impl Characters<'_, '_> {
             }
             Some((at.is_some(), sum))
         };
-        let (is_below, way) = chain(entity)?;
+        let (is_below, transform) = chain(entity)?;
         if is_below {
-            return way.is_finite().then_some(way);
+            return transform.is_finite().then_some(transform);
         }
         // A skeleton that is not above its mesh: through world space.
         let (_, above) = parent(wearer).map_or(Some((false, Affine3A::IDENTITY)), chain)?;
-        let way = (above * own(wearer)?).inverse() * way;
-        way.is_finite().then_some(way)
+        let transform = (above * own(wearer)?).inverse() * transform;
+        transform.is_finite().then_some(transform)
     }
 
     /// The names of the joints, or of all where there are none: the first forty.
     fn names(&self, all: &[Entity], joints: &HashSet<Entity>) -> String {
-        const MOST: usize = 40;
-        let is_meant = |e: &&Entity| joints.is_empty() || joints.contains(*e);
-        let names: Vec<&str> = all.iter().filter(is_meant).filter_map(|e| self.name(*e)).collect();
-        let more = names.len().saturating_sub(MOST);
-        let shown = names.iter().take(MOST).map(|name| format!("{name:?}")).collect::<Vec<_>>();
+        const MAX_NAMES: usize = 40;
+        let is_listed = |e: &&Entity| joints.is_empty() || joints.contains(*e);
+        let names: Vec<&str> = all.iter().filter(is_listed).filter_map(|e| self.name(*e)).collect();
+        let more = names.len().saturating_sub(MAX_NAMES);
+        let shown =
+            names.iter().take(MAX_NAMES).map(|name| format!("{name:?}")).collect::<Vec<_>>();
         match (shown.is_empty(), more) {
             (true, _) => "no names at all".into(),
             (_, 0) => shown.join(", "),

@@ -28,10 +28,11 @@ use bevy::prelude::*;
 /// # }
 /// ```
 ///
-/// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there is none), with
-/// [`WornHair`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] tells which. It settles before it is first
-/// drawn ([`Settling`](crate::Settling)) unless it is styled. Its settings are the preset's, and a
-/// [`HairWetting`](crate::HairWetting) that counts as many fibres as grow there; to change them, wait for it:
+/// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there
+/// is none), with [`WornHair`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] has its entity.
+/// It settles before it is first drawn ([`Settling`](crate::Settling)) unless it is styled. Its
+/// settings are the preset's, and a [`HairWetting`](crate::HairWetting) with the number of fibres
+/// that grow there; to change them, wait for it:
 ///
 /// ```
 /// # use bevy_keratin::{plant::HairPreset, prelude::*}; use bevy::prelude::*;
@@ -45,15 +46,15 @@ use bevy::prelude::*;
 /// # }
 /// ```
 ///
-/// Hair is made off the main thread, in the frame's [`PreUpdate`] it is put on. Whenever this
-/// component changes the hair is made anew, and the old one stays until the new one is there; another
-/// [`look`](Self::look), [`dye`](Self::dye) or [`style`](Self::style) is put on the hair that is worn. What
-/// cannot be worn is told once, as a [`HairFault`](crate::HairFault) and by [`HairNotWorn`]; the
-/// wearer keeps the hair that it has.
+/// Hair is made off the main thread and put on in [`PreUpdate`]. Whenever this component changes
+/// the hair is made again, and the old one stays until the new one is ready; another
+/// [`look`](Self::look), [`dye`](Self::dye) or [`style`](Self::style) is applied to the worn hair.
+/// Hair that cannot be worn is reported once, as a [`HairFault`](crate::HairFault) and by
+/// [`HairNotWorn`]; the wearer keeps the hair that it has.
 ///
-/// The character may be of any size from that of a doll to that of a giant: presets are of life size
-/// on heads of life size, 8 to 16 cm from the middle between the ears to the crown, and as many times
-/// larger or smaller on others. The mesh is taken as it is bound to its skeleton, unmorphed.
+/// The character may be of any size from that of a doll to that of a giant: presets have life size
+/// on heads of life size, 8 to 16 cm from the middle between the ears to the crown, and are scaled
+/// in proportion on others. The mesh is taken as it is bound to its skeleton, unmorphed.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct WearHair {
@@ -61,11 +62,12 @@ pub struct WearHair {
     pub hair: HairSource,
     /// The name of the bone, or of the mesh, that it is worn on. Default `None`: the entity's own
     /// mesh, else the bone whose name ends with the word head (`Head`, `mixamorig:Head`,
-    /// `J_Bip_C_Head`) or is Rigify's (`DEF-spine.006`), else the only mesh there is: on the joint that
-    /// moves the highest of it.
+    /// `J_Bip_C_Head`) or is Rigify's (`DEF-spine.006`), else the only mesh there is: on the joint
+    /// that moves its highest vertex.
     pub on: Option<String>,
-    /// Where the face looks, in this entity's space; Y is up and the component along Y is ignored.
-    /// Default −Z, Bevy's forward; characters of glTF files look along +Z unless they are converted.
+    /// The direction in which the face looks, in this entity's space; Y is up and the component
+    /// along Y is ignored. Default −Z, Bevy's forward; characters of glTF files look along +Z
+    /// unless they are converted.
     pub facing: Dir3,
     /// Seed of the strands' places and variations: the same seed gives the same hair. Default 0.
     pub seed: u64,
@@ -77,8 +79,8 @@ pub struct WearHair {
     pub look: Option<HairLook>,
     /// Bleach and dye. Default `None`: as the hairdo has it, else none.
     pub dye: Option<HairDye>,
-    /// Whether and how its style is watched: see [`HairStyle`]. Default `Some(HairStyle::default())`; where
-    /// there is no style, as on a preset that nobody has styled, it costs nothing.
+    /// Whether and how its style is tracked: see [`HairStyle`]. Default
+    /// `Some(HairStyle::default())`; without a style, as on an unstyled preset, it costs nothing.
     pub style: Option<HairStyle>,
     /// Where a preset's hairline is, in this entity's space, with the character as it is bound to its
     /// skeleton. Its front overrides [`facing`](Self::facing). Default `None`: found from the head's
@@ -93,10 +95,10 @@ pub struct WearHair {
     /// that hair reaches. A character that has [`HairCollider`](crate::HairCollider)s of its own
     /// keeps to those. Default `true`.
     pub colliders: bool,
-    /// How the hair is styled: put on at once, or resampled where it is of other strands. What is
-    /// saved from hair that was worn fits the same [`hair`](Self::hair), [`seed`](Self::seed) and
-    /// [`length`](Self::length) on the same character strand by strand: `WearHair::try_from(hairdo)` has
-    /// them. Default `None`.
+    /// How the hair is styled: put on at once, or resampled where it is of other strands. A hairdo
+    /// saved from worn hair fits the same [`hair`](Self::hair), [`seed`](Self::seed) and
+    /// [`length`](Self::length) on the same character strand by strand:
+    /// `WearHair::try_from(hairdo)` sets them. Default `None`.
     #[cfg(feature = "save")]
     pub hairdo: Option<Hairdo>,
 }
@@ -134,13 +136,13 @@ impl WearHair {
         self
     }
 
-    /// The same on a face that looks this way.
-    pub fn facing(mut self, way: Dir3) -> Self {
-        self.facing = way;
+    /// The same on a face that looks in this direction.
+    pub fn facing(mut self, direction: Dir3) -> Self {
+        self.facing = direction;
         self
     }
 
-    /// The same so many times as long as the preset.
+    /// The same with a length of `times` the preset's.
     pub fn long(mut self, times: f32) -> Self {
         self.length = times;
         self
@@ -152,7 +154,7 @@ impl WearHair {
         self
     }
 
-    /// Whether all but what can be put on worn hair is the same.
+    /// Whether they differ only in what worn hair can take.
     pub(super) fn is_same_hair(&self, other: &Self) -> bool {
         let bare = |wear: &Self| Self { look: None, dye: None, style: None, ..wear.clone() };
         bare(self) == bare(other)
@@ -186,7 +188,7 @@ impl TryFrom<Hairdo> for WearHair {
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum HairSource {
-    /// Planted by rule.
+    /// Planted by a preset.
     Preset(HairPreset),
     /// A groom asset; waits until it is loaded, and follows reloads.
     Groom {
@@ -222,7 +224,7 @@ impl From<Handle<Groom>> for HairSource {
 pub struct WornHair {
     /// The entity with the [`WearHair`].
     pub wearer: Entity,
-    /// What it has grown from.
+    /// Its source.
     pub hair: HairSource,
 }
 

@@ -1,4 +1,4 @@
-//! What points and triangles cannot be baked, and why.
+//! Errors of baking points and triangles.
 
 use bevy::prelude::*;
 
@@ -6,22 +6,22 @@ use bevy::prelude::*;
 #[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub enum HullError {
-    /// A point that is no point.
+    /// A point that is not finite.
     #[error("point {point} is not finite: leave it out")]
     NonFinite {
         /// Which.
         point: usize,
     },
-    /// Points that enclose nothing.
+    /// Points that enclose no volume.
     #[error(
         "{found} points span no volume, expected at least four that are not in one plane: give the \
          hull a thickness, or use a cuboid"
     )]
     Flat {
-        /// How many different ones there are.
+        /// How many distinct points there are.
         found: usize,
     },
-    /// What is as small as dust or as large as a town.
+    /// Points whose extent is out of range.
     #[error("the points span {found} m, expected 1e-4 to 5e3: check their unit")]
     Size {
         /// How much.
@@ -33,44 +33,44 @@ pub enum HullError {
 #[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub enum BakeError {
-    /// A mesh of which there is nothing to bake.
+    /// A mesh without any triangle that has an area.
     #[error("there is no triangle with an area, expected a surface: give positions and triangles")]
     NoTriangles,
-    /// A mesh without what is needed.
+    /// A mesh without a needed attribute.
     #[error(
         "the mesh has no {what} in the main world, expected a triangle list or strip of three \
          floats a position: load it with RenderAssetUsages::MAIN_WORLD"
     )]
     NoAttribute {
-        /// What it lacks.
+        /// Which.
         what: &'static str,
     },
-    /// A vertex that is nowhere.
-    #[error("vertex {vertex} is not finite: mend the mesh")]
+    /// A vertex that is not finite.
+    #[error("vertex {vertex} is not finite: repair the mesh")]
     NonFinite {
         /// Which.
         vertex: usize,
     },
-    /// A triangle with a vertex that is not there.
-    #[error("a triangle names vertex {vertex}, expected less than {vertices}: mend the indices")]
+    /// A triangle that refers to a vertex that does not exist.
+    #[error("a triangle names vertex {vertex}, expected less than {vertices}: repair the indices")]
     UnknownVertex {
         /// The vertex.
         vertex: usize,
         /// How many there are.
         vertices: usize,
     },
-    /// What is as small as dust or as large as a town.
+    /// A mesh whose extent is out of range.
     #[error("the mesh spans {found} m, expected 1e-4 to 5e3: check its unit")]
     Size {
         /// How much.
         found: f32,
     },
-    /// A cell size or a thickness that is none.
+    /// A cell size or a thickness that is out of range.
     #[error("{what} is {found} m, expected more than 0 and less than the mesh's {size} m")]
     Length {
         /// Which.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         found: f32,
         /// The longest side of the mesh.
         size: f32,
@@ -81,11 +81,11 @@ pub enum BakeError {
          or bake a part of the mesh"
     )]
     TooManyPoints {
-        /// The cell size that was asked for.
+        /// The requested cell size.
         cell: f32,
         /// How many points it would take.
         found: u64,
-        /// How many there may be.
+        /// How many are allowed.
         most: u64,
         /// Cells that are large enough.
         enough: f32,
@@ -99,9 +99,9 @@ pub enum BakeError {
         /// How many.
         edges: usize,
     },
-    /// What falls through the grid.
+    /// A surface thinner than the grid resolves.
     #[error(
-        "no point of the grid is inside of the surface, expected it to be thicker than a cell of \
+        "no point of the grid is inside the surface, expected it to be thicker than a cell of \
          {cell} m: take smaller cells, or bake it with Openings::Shell"
     )]
     Thin {

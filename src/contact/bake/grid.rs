@@ -5,22 +5,22 @@ use crate::{grid::TriangleSoup, rod::shape::DistanceGrid};
 use bevy::{math::UVec3, platform::collections::HashMap, prelude::*};
 
 /// The most points of a grid: 32 MB.
-const MOST: u64 = 1 << 23;
-/// Points beside the surface, in cells.
-const BESIDE: f32 = 3.0;
-/// Exact distances are found at every so manieth point, and around the surface at all.
+const MAX_POINTS: u64 = 1 << 23;
+/// Margin of the grid around the surface, in cells.
+const MARGIN: f32 = 3.0;
+/// Away from the surface exact distances are computed only at every `COARSE`th point.
 const COARSE: usize = 3;
-/// So many cells from the surface distances are exact.
+/// Distances are exact within this many cells of the surface.
 const EXACT: f32 = 1.5;
 
 /// How a surface is baked.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct Bake {
-    /// How far apart the points of the grid are (m): half of what is thinnest, or less. What is finer
-    /// is lost. Default 0.004, for a head.
+    /// Spacing of the grid points (m): at most half of the thinnest part. Finer detail is lost.
+    /// Default 0.004, for a head.
     pub cell: f32,
-    /// What becomes of surfaces that are not closed. Default [`Openings::Refuse`].
+    /// Treatment of surfaces that are not closed. Default [`Openings::Refuse`].
     pub openings: Openings,
 }
 
@@ -30,16 +30,16 @@ impl Default for Bake {
     }
 }
 
-/// What becomes of surfaces that are not closed.
+/// Treatment of surfaces that are not closed.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum Openings {
     /// They are an error.
     #[default]
     Refuse,
-    /// The inside is where the surface goes around more than half: right where holes are small beside
-    /// what they are in, such as eyes and mouth of a character; surfaces that cross are united. Around
-    /// a hole something is taken away.
+    /// The inside is where the generalized winding number exceeds ½: right where holes are small
+    /// relative to the surface, such as eyes and mouth of a character; surfaces that cross are
+    /// united. Some volume around a hole is lost.
     Fill,
     /// A sheet of this thickness (m), whether it is closed or not; at least two cells, or hair falls
     /// through.
@@ -50,10 +50,10 @@ pub enum Openings {
 }
 
 impl DistanceGrid {
-    /// Bakes a closed surface: vertices (m), triangles by their vertices, in any order and turned
-    /// either way as long as it is the same for all. `cell` is how far apart points are (m).
+    /// Bakes a closed surface: vertices (m), triangles by their vertices, in any order, with the
+    /// same winding for all. `cell` is the spacing of the grid points (m).
     ///
-    /// A cube of 64 points takes 1 MB. It takes a while: bake on another thread, or once and clone.
+    /// A cube of 64 points takes 1 MB. Baking is slow: bake on another thread, or once and clone.
     ///
     /// # Errors
     /// When there are no triangles, something is not finite or not closed, the size is not between
@@ -77,7 +77,7 @@ impl DistanceGrid {
     /// The same for surfaces that are open.
     ///
     /// # Errors
-    /// As [`bake`](Self::bake), for openings as `how` says.
+    /// As [`bake`](Self::bake); openings are treated as `how` says.
     pub fn bake_as(
         vertices: &[Vec3],
         triangles: &[[u32; 3]],
@@ -148,7 +148,7 @@ impl DistanceGrid {
     }
 }
 
-/// Which triangles have the outside before them: what lies within another surface is no skin.
+/// The triangles that face the outside, not those within another surface.
 fn skin<'a>(
     triangles: &'a [[Vec3; 3]],
     soup: &'a TriangleSoup,
@@ -172,18 +172,23 @@ struct GridBox {
 impl GridBox {
     /// Points around a box.
     fn around(low: Vec3, high: Vec3, cell: f32) -> Result<Self, BakeError> {
-        let cells = ((high - low) / cell + 2.0 * BESIDE).ceil();
+        let cells = ((high - low) / cell + 2.0 * MARGIN).ceil();
         let points = cells + 1.0;
         let found = points.as_dvec3().element_product();
-        if found.is_nan() || found > MOST as f64 {
-            let enough = cell * (found / MOST as f64).cbrt() as f32 * 1.05;
-            return Err(BakeError::TooManyPoints { cell, found: found as u64, most: MOST, enough });
+        if found.is_nan() || found > MAX_POINTS as f64 {
+            let enough = cell * (found / MAX_POINTS as f64).cbrt() as f32 * 1.05;
+            return Err(BakeError::TooManyPoints {
+                cell,
+                found: found as u64,
+                most: MAX_POINTS,
+                enough,
+            });
         }
         let origin = 0.5 * (low + high) - 0.5 * cells * cell;
         Ok(Self { origin, cell, points: points.to_array().map(|n| n as usize) })
     }
 
-    /// The place of a point by its number.
+    /// The position of a point by its index.
     fn point(&self, k: usize) -> Vec3 {
         let [nx, ny, _] = self.points;
         self.at([k % nx, k / nx % ny, k / (nx * ny)])
@@ -197,8 +202,8 @@ impl GridBox {
         (z * self.points[1] + y) * self.points[0] + x
     }
 
-    /// Distances to the nearest triangle, negative where `is_inside` says so; exact so many cells around
-    /// it. `crossed` surfaces may have no triangle between inside and outside.
+    /// Distances to the nearest triangle, negative where `is_inside` holds; exact within
+    /// `exact_cells` cells. `crossed` surfaces may have no triangle between inside and outside.
     fn distances(
         &self,
         soup: &TriangleSoup,
@@ -207,7 +212,7 @@ impl GridBox {
         exact_cells: f32,
     ) -> Vec<f32> {
         let mut distances = vec![f32::NAN; self.points.iter().product()];
-        // From a point to the next the distance changes by no more than they are apart, and its sign
+        // Between two points the distance changes by no more than their separation, and its sign
         // only where a triangle is between.
         let mut last: Option<(Vec3, u32, f32)> = None;
         let mut exact = |place: [usize; 3], distances: &mut [f32]| {
@@ -230,7 +235,7 @@ impl GridBox {
         let ends = self.points.map(|n| n - 1);
         let starts = |end: usize| (0..end).step_by(COARSE);
         let next = |start: usize, end: usize| (start + COARSE).min(end);
-        // In blocks: only around the surface every point is looked at.
+        // In blocks: only near the surface is every point computed exactly.
         for z in starts(ends[2]) {
             for y in starts(ends[1]) {
                 for x in starts(ends[0]) {
@@ -283,7 +288,7 @@ impl GridBox {
     }
 
     /// Where no triangle is between inside and outside, as in a hole or where a surface is within
-    /// another, the inside gives way until distances nowhere change faster than places do.
+    /// another, the inside is shrunk until the gradient of the distance is at most 1.
     fn smooth(&self, distances: &mut [f32]) {
         let [nx, ny, nz] = self.points;
         let strides = [1, nx, nx * ny];
@@ -307,7 +312,7 @@ impl GridBox {
         }
     }
 
-    /// The grid, moved by so much; `None` where nothing is inside.
+    /// The grid, moved by `moved`; `None` where no point is inside.
     fn finish(&self, distances: Vec<f32>, moved: Vec3) -> Option<DistanceGrid> {
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (k, distance) in distances.iter().enumerate() {
@@ -326,7 +331,7 @@ impl GridBox {
     }
 }
 
-/// Between eight corners.
+/// Trilinear interpolation between eight corners.
 fn between(corners: &[f32; 8], x: f32, y: f32, z: f32) -> f32 {
     let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
     let row = |k: usize| mix(corners[k], corners[k + 1], x);
@@ -339,17 +344,17 @@ fn volume(triangles: &[[Vec3; 3]]) -> f64 {
     each.map(|[a, b, c]| a.dot(b.cross(c))).sum()
 }
 
-/// How many edges are not passed as often one way as the other. Vertices in about one place are one:
-/// meshes have several where texture coordinates or normals differ.
+/// The number of edges without a triangle on both sides. Coinciding vertices count as one: meshes
+/// have several where texture coordinates or normals differ.
 fn open_edges(triangles: &[[Vec3; 3]]) -> usize {
     let bounds = |(low, high): (Vec3, Vec3), p: &Vec3| (low.min(*p), high.max(*p));
     let all = triangles.iter().flatten();
     let (low, high) = all.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), bounds);
-    let fine = SAME / (high - low).max_element();
+    let resolution = SAME / (high - low).max_element();
     let mut places: HashMap<[i32; 3], u32> = default();
     let mut place = |p: Vec3| {
         let next = places.len() as u32;
-        let key = ((p - low) * fine).round().to_array().map(|x| x as i32);
+        let key = ((p - low) * resolution).round().to_array().map(|x| x as i32);
         *places.entry(key).or_insert(next)
     };
     let mut edges: HashMap<(u32, u32), i32> = default();
@@ -359,12 +364,12 @@ fn open_edges(triangles: &[[Vec3; 3]]) -> usize {
             continue;
         }
         for (p, q) in [(a, b), (b, c), (c, a)] {
-            let (edge, way) = if p < q { ((p, q), 1) } else { ((q, p), -1) };
-            *edges.entry(edge).or_default() += way;
+            let (edge, sign) = if p < q { ((p, q), 1) } else { ((q, p), -1) };
+            *edges.entry(edge).or_default() += sign;
         }
     }
     edges.values().filter(|sum| **sum != 0).count()
 }
 
-/// Into so many places the longest side is parted when vertices are compared.
+/// Resolution of the comparison of vertices, in steps along the longest side.
 const SAME: f32 = 2e5;

@@ -1,5 +1,4 @@
-//! The convex hull of points: one after the other is taken in, and the faces that it sees give way to
-//! new ones.
+//! The convex hull of points: incremental, each point replaces the faces that it sees by new ones.
 
 use super::error::HullError;
 use crate::rod::shape::ConvexHull;
@@ -10,9 +9,9 @@ use bevy::{
 };
 
 /// The most planes of a hull.
-const MOST_PLANES: usize = 64;
-/// Of more points than this only those are taken that are outermost in some direction.
-const MANY: usize = 1024;
+const MAX_PLANES: usize = 64;
+/// With more points than this, only those that are outermost in some direction are used.
+const MAX_POINTS: usize = 1024;
 const DIRECTIONS: usize = 768;
 /// Sizes of what can be baked (m).
 pub(super) const SIZES: core::ops::RangeInclusive<f32> = 1e-4..=5e3;
@@ -28,9 +27,9 @@ struct Face {
 impl ConvexHull {
     /// The convex hull of points (m), in their frame.
     ///
-    /// Of hulls with more than 64 faces 64 are kept, well spread: all points are inside, and corners
-    /// stick out by some percent of the size. A [`DistanceGrid`](crate::DistanceGrid) is better there.
-    /// Edges are sharp: a layer on the hull, such as a lock's radius, is mitred.
+    /// Hulls with more than 64 faces keep 64 evenly distributed ones: all points are inside, and
+    /// corners stick out by a few percent of the size. A [`DistanceGrid`](crate::DistanceGrid) is
+    /// better there. Edges are sharp: a layer on the hull, such as a lock's radius, is mitred.
     ///
     /// # Errors
     /// When points are not finite, span no volume, or less than 0.1 mm or more than 5 km.
@@ -52,8 +51,8 @@ impl ConvexHull {
         let size = f64::from(found);
         let faces = hull(&all, size).ok_or(HullError::Flat { found: all.len() })?;
         let mut normals = distinct(&all, &faces);
-        normals.truncate(MOST_PLANES);
-        // Each plane touches the outermost of all points, whatever it was made of.
+        normals.truncate(MAX_PLANES);
+        // Each plane is moved out to touch the outermost of all points.
         let plane = |normal: &DVec3| {
             let normal = normal.as_vec3().normalize();
             let most = points.iter().map(|p| normal.as_dvec3().dot(p.as_dvec3()));
@@ -65,12 +64,12 @@ impl ConvexHull {
     }
 }
 
-/// Different points around a centre; of many those that are outermost in a direction.
+/// Distinct points relative to a centre; of many only those that are outermost in some direction.
 fn outermost(points: &[Vec3], center: DVec3) -> Vec<DVec3> {
     let mut known = HashSet::new();
     let is_new = |p: &&Vec3| known.insert((**p + 0.0).to_array().map(f32::to_bits));
     let all: Vec<DVec3> = points.iter().filter(is_new).map(|p| p.as_dvec3() - center).collect();
-    if all.len() <= MANY {
+    if all.len() <= MAX_POINTS {
         return all;
     }
     let golden = core::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -123,15 +122,15 @@ fn hull(points: &[DVec3], size: f64) -> Option<Vec<Face>> {
             [(p, q), (q, r), (r, p)]
         };
         let all: HashSet<(usize, usize)> = seen.iter().flat_map(edges).collect();
-        // In the order of the faces, the same each time.
+        // In the order of the faces, for determinism.
         let rim = seen.iter().flat_map(edges).filter(|(p, q)| !all.contains(&(*q, *p)));
         faces.extend(rim.map(|(p, q)| face([p, q, k])));
     }
     Some(faces)
 }
 
-/// The normals of faces, those of one plane once, the largest planes first; after the largest each that
-/// is farthest from those before it, so that the first of many go around.
+/// The distinct normals of faces, largest faces first. If there are too many, farthest-point
+/// sampling: each next normal is the farthest from those chosen.
 fn distinct(points: &[DVec3], faces: &[Face]) -> Vec<DVec3> {
     let area = |face: &Face| {
         let [p, q, r] = face.corners.map(|k| points[k]);
@@ -146,13 +145,13 @@ fn distinct(points: &[DVec3], faces: &[Face]) -> Vec<DVec3> {
             normals.push(normal);
         }
     }
-    if normals.len() <= MOST_PLANES {
+    if normals.len() <= MAX_PLANES {
         return normals;
     }
     let mut apart: Vec<f64> = vec![f64::INFINITY; normals.len()];
-    let mut chosen = Vec::with_capacity(MOST_PLANES);
+    let mut chosen = Vec::with_capacity(MAX_PLANES);
     let mut next = 0;
-    while chosen.len() < MOST_PLANES {
+    while chosen.len() < MAX_PLANES {
         chosen.push(normals[next]);
         for (apart, normal) in apart.iter_mut().zip(&normals) {
             *apart = apart.min(normal.distance(normals[next]));
@@ -225,7 +224,7 @@ mod tests {
         };
         let points: Vec<Vec3> = (0..5000).map(around).collect();
         let ball = ConvexHull::new(&points).unwrap();
-        assert_eq!(ball.planes().len(), MOST_PLANES);
+        assert_eq!(ball.planes().len(), MAX_PLANES);
         let mut farthest = 0.0_f32;
         for p in &points {
             let reach = ball.planes().map(|(n, offset)| offset / n.dot(*p).max(1e-6));

@@ -1,4 +1,4 @@
-//! Numbers out of glTF's buffers, with everything that refers to something checked.
+//! Reads numbers from glTF's buffers, with all references checked.
 
 use super::super::GroomFileError;
 use super::error::{missing, wrong};
@@ -24,7 +24,12 @@ impl<'a> Buffers<'a> {
             let path = format!("buffers[{i}]");
             let data: Cow<'a, [u8]> = match buffer.uri.as_deref() {
                 None if i > 0 => {
-                    return wrong(&path, "no uri", "a uri, but for the first", EXPORT_AGAIN);
+                    return wrong(
+                        &path,
+                        "no uri",
+                        "a uri, optional only for the first",
+                        EXPORT_AGAIN,
+                    );
                 }
                 None => bin.unwrap_or_default().into(),
                 Some(uri) => match uri.strip_prefix(DATA) {
@@ -190,7 +195,8 @@ impl Elements<'_> {
     }
 }
 
-/// Elements as groups of N numbers, read one by one: many primitives may use few of the same ones.
+/// Elements as groups of N numbers, read on demand: many primitives may share an accessor and use
+/// few of its elements.
 pub struct Vectors<'a, const N: usize> {
     elements: &'a Elements<'a>,
     number: fn(&[u8]) -> f32,
@@ -219,7 +225,7 @@ impl<const N: usize> Vectors<'_, N> {
     }
 }
 
-/// The bytes of one number, which the chunk has by construction.
+/// The bytes of one number; the chunk is long enough by construction.
 fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
     bytes.first_chunk().copied().unwrap_or([0; N])
 }

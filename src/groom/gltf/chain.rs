@@ -35,7 +35,8 @@ impl Chains {
         }
     }
 
-    /// `count` nodes in pairs that share none: a pair goes on where the one before has ended.
+    /// `count` nodes in pairs without shared indices: a pair that begins where the one before ends
+    /// continues its chain.
     pub fn of_pairs<E>(count: u32, place: impl Fn(u32) -> Result<[f32; 3], E>) -> Result<Self, E> {
         let mut chains = Self::default();
         let mut last = None;
@@ -57,7 +58,7 @@ impl Chains {
     }
 
     /// Edges between nodes, two indices each, in any order. A chain begins at the end that has the
-    /// lower index; where three or more edges meet, chains end and others begin.
+    /// lower index; at nodes with three or more edges, chains end and others begin.
     pub fn of_edges(indices: &[u32]) -> Self {
         let mut chains = Self::default();
         let Some(mut edges) = Edges::new(indices, &mut chains.repeated) else {
@@ -83,7 +84,7 @@ impl Chains {
         chains
     }
 
-    /// One chain from `v` by `after`. Gives the branch that it ends at.
+    /// Adds one chain from `v` through `after`. Returns the branch that it ends at.
     fn walk(&mut self, edges: &mut Edges, v: usize, after: usize) -> Option<usize> {
         self.nodes.push(edges.index(v));
         let mut at = after;

@@ -12,13 +12,13 @@ const HEADER: u64 = 12;
 const CHUNK: u64 = 8;
 const EXPORT_AGAIN: &str = "export the file again as glTF 2.0";
 
-/// Whether text begins as a JSON object does.
+/// Whether a file begins like a JSON object.
 pub fn looks_like_json(file: &[u8]) -> bool {
     let text = file.strip_prefix(b"\xef\xbb\xbf").unwrap_or(file);
     text.trim_ascii_start().starts_with(b"{")
 }
 
-/// The JSON, and what GLB has besides.
+/// The JSON, and GLB's binary chunk if there is one.
 pub fn split(file: &[u8]) -> Result<(Root, Option<&[u8]>), GroomFileError> {
     if !file.starts_with(b"glTF") {
         let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
@@ -40,7 +40,7 @@ pub fn split(file: &[u8]) -> Result<(Root, Option<&[u8]>), GroomFileError> {
     }
     let root = parse(text, HEADER + CHUNK)?;
     let mut at = HEADER + CHUNK + text.len() as u64;
-    // Chunks of kinds that are not known are to be skipped.
+    // The specification says to skip chunks of unknown kinds.
     while at < whole.len() {
         let (kind, data) = chunk(whole, at)?;
         if kind == BIN {
@@ -69,7 +69,7 @@ fn parse(text: &[u8], start: u64) -> Result<Root, GroomFileError> {
     Ok(root)
 }
 
-/// Where a line and column, both from 1, are.
+/// The byte offset of a line and column, both from 1.
 fn offset_of(text: &[u8], line: usize, column: usize) -> u64 {
     let before = text.split_inclusive(|b| *b == b'\n').take(line.saturating_sub(1));
     (before.map(<[u8]>::len).sum::<usize>() + column.saturating_sub(1)).min(text.len()) as u64

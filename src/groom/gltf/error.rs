@@ -1,4 +1,4 @@
-//! What is wrong with a glTF file.
+//! Errors of glTF files.
 
 use crate::groom::GroomFileError;
 

@@ -63,8 +63,8 @@ impl<'a> GltfFile<'a> {
     /// out. `external` has the contents of the files that [`external`](Self::external) names.
     ///
     /// # Errors
-    /// When there are no lines, something refers to what is not there, a number is not finite, or
-    /// copies would take more memory than the file justifies.
+    /// When there are no lines, a reference is invalid, a number is not finite, or copies would
+    /// take more memory than the file justifies.
     pub fn read(
         &self,
         external: &HashMap<String, Vec<u8>>,
@@ -222,7 +222,7 @@ impl Reading<'_> {
         place: Mat4,
     ) -> Result<(), GroomFileError> {
         let groom = &mut self.groom;
-        // Primitives without colours or UVs stand next to such with.
+        // Some primitives may have colours or UVs while others have none.
         if colours.is_some() {
             groom.colors.resize(groom.points.len(), LinearRgba::WHITE);
         }

@@ -6,8 +6,8 @@ use crate::{
     rod::block::NodeLanes,
 };
 
-/// Turns `q` the shortest way so that its tangent is along `e`, of length `len`. Returns twice the
-/// vector part of the turn: the turn itself where it is small.
+/// Rotates `q` by the shortest rotation so that its tangent is along `e`, of length `len`. Returns
+/// twice the vector part of that rotation: the rotation vector where it is small.
 #[inline(always)]
 pub(super) fn parallel_transport<R: Real>(
     q: Quaternion<R>,
@@ -17,7 +17,7 @@ pub(super) fn parallel_transport<R: Real>(
     let d = q.tangent();
     let along = d.dot(e);
     let cosine = len + along;
-    // Turned back on itself: half a turn about the frame's first axis.
+    // Opposite directions: half a turn about the frame's first axis.
     let folded = cosine.lt(len * len.lit(1e-6));
     let one = len.lit(1.0);
     let scale = one / (len.lit(2.0) * len * cosine).max(len.lit(1e-30)).sqrt();
@@ -26,7 +26,7 @@ pub(super) fn parallel_transport<R: Real>(
     let turn =
         Quaternion::new(V3::select(folded, half.v, turn.v), R::select(folded, half.w, turn.w));
     let turned = turn.product(q);
-    // Off by round-off only, so that one step of Newton's does for a root.
+    // Off by round-off only, so that one Newton step replaces the square root.
     let length = len.lit(-0.5).mul_add(turned.dot(turned), len.lit(1.5));
     let turned = Quaternion::new(turned.v.scale(length), turned.w * length);
     (turned, turn.v + turn.v)
@@ -68,8 +68,8 @@ pub(super) fn first_axis<R: Real>(q: Quaternion<R>) -> V3<R> {
     )
 }
 
-/// How far the edge between two nodes has turned from where the substep began until it points along `t`,
-/// as [`parallel_transport`] says it.
+/// Rotation of the edge between two nodes from the start of the substep until it points along `t`,
+/// in the form that [`parallel_transport`] returns.
 #[inline(always)]
 pub(super) fn turned_since<W: Width>(
     w: W,

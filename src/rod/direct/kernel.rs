@@ -19,10 +19,10 @@ use crate::{
     },
 };
 
-/// Values that are the same for all nodes of a strand.
+/// Values that all nodes of a strand share.
 #[derive(Clone, Copy)]
 pub(crate) struct NewtonStage<R> {
-    /// Where in the substep the forces are taken.
+    /// Where in the substep forces are evaluated.
     pub theta: R,
     /// θ dt (s).
     pub ahead: R,
@@ -38,7 +38,7 @@ pub(crate) struct NewtonStage<R> {
     pub second: bool,
     /// 1 in lanes that take this Newton step, 0 in lanes that are done. Where nothing touches, all do.
     pub again: R,
-    /// 1 in lanes that take two Newton steps, else 0: others start where their inertia takes them.
+    /// 1 in lanes that take two Newton steps, else 0: others start from their inertial positions.
     pub twice: R,
 }
 
@@ -54,11 +54,11 @@ struct EdgeState<R> {
     t: V3<R>,
     /// 1/|e|.
     r: R,
-    /// How far it has turned since the substep began, twist and all.
+    /// Rotation since the start of the substep, twist included.
     turn: V3<R>,
-    /// The same without twist: across itself.
+    /// The same without twist: perpendicular to the edge.
     swing: V3<R>,
-    /// What holds its ends where they are across it, but for the joint at its end.
+    /// Stiffness of its ends perpendicular to it, without the joint at its end.
     across: R,
     axial: R,
     /// Gradient of the energy with respect to its vector.
@@ -67,7 +67,7 @@ struct EdgeState<R> {
     coupling: Matrix<R>,
 }
 
-/// What the elimination passes on to the next nodes.
+/// Fill-in that the elimination adds to the next nodes.
 #[derive(Clone, Copy)]
 struct FillIn<R> {
     /// Subtracted from the diagonal of the next node, and of the one after.
@@ -157,8 +157,8 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             } else {
                 turn
             };
-            // Twist is in balance at all times, so no joint's changes: what the edge before turns about
-            // this one's tangent takes it along.
+            // Twist is in equilibrium at all times, so it does not change at any joint: the
+            // rotation of the edge before about this one's tangent is passed on.
             let swing = V3::select(crushed, none, turn);
             let turn = t.scale_add(before.turn.dot(t), swing);
             w.put4(if TWICE { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
@@ -166,8 +166,9 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             let across = W::Real::select(crushed, axial, tension * r);
             let k = w.get(&edge.k);
             let elastic = moment(w, before.q, q, w.get4(&edge.rest), k);
-            // Where bends lie in many directions, twist gives way somewhere along the strand, and turns
-            // that are handed on from the root are not what edges do. Friction only ever takes energy.
+            // Where bends lie in many planes, twist relaxes somewhere along the strand, and
+            // rotations passed on from the root overestimate those of edges. Friction must only
+            // dissipate energy.
             let rate = turn - before.turn;
             let square = rate.dot(rate).max(w.lit(1e-30));
             let taken = rate.dot(swing - before.swing) / square;
@@ -289,7 +290,7 @@ fn eliminate<W: Width, const TWICE: bool>(
     }
 }
 
-/// Solves from the tip to the root and moves nodes, beyond the solution as the stage says.
+/// Solves from the tip to the root and moves nodes, extrapolated from θ to the end of the substep.
 #[inline(always)]
 pub(crate) fn up<W: Width, const TWICE: bool>(
     w: W,
@@ -317,7 +318,7 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
             let x1 = (-l.y).mul_add(from.z, (-l.x).mul_add(y1, from.x));
             solved = V3::new(x1, y1, from.z);
             if TWICE {
-                // Finished lanes and their tensions stay the same to the bit.
+                // Finished lanes and their tensions must not change.
                 solved = V3::select(w.lit(0.0).lt(stage.again), solved, none);
             }
             y = y + solved;
@@ -361,7 +362,7 @@ pub(crate) fn finish<W: Width>(
     let back = stage.beyond * (theta - one);
     let mut sum = zero;
     let mut x = w.zero3();
-    // A row of the tridiagonal system for the turns α about the tangents: of each joint K, its
+    // A row of the tridiagonal system for the rotations α about the tangents: of each joint K, its
     // moment along the tangents it joins, and −K t·t′ off the diagonal.
     let mut before = Twist { q: w.get4(root), t: w.zero3(), k: zero, moment: zero, coupling: zero };
     before.t = before.q.tangent();

@@ -4,8 +4,8 @@
 //! hair gets an unphysical rotary inertia, and the iterations needed grow like the square of the number
 //! of segments. Here nodes are the only unknowns: orientations follow the edges (their tangents are
 //! always the edges' directions, by parallel transport), and twist is in equilibrium at every step.
-//! What remains is a system of 3×3 blocks, each coupled with two nodes before and two behind, which
-//! a Cholesky factorisation solves in one pass down the strand and one up.
+//! What remains is a block-pentadiagonal system of 3×3 blocks (each node is coupled with two before
+//! and two behind), which a Cholesky factorisation solves in one pass down the strand and one up.
 //!
 //! | file | what |
 //! |---|---|
@@ -15,31 +15,33 @@
 //! | `width` | the same lines for lanes and for one strand of f64 |
 //!
 //! One substep of length h:
-//! 1. What begins deep inside an obstacle is taken out of it. Predict: nodes to x + θh v, where gravity
-//!    would take them out of obstacles.
-//! 2. One Newton step for the positions at θh: inertia, stretching, bending, how the moment of twist
-//!    turns with the edges, what obstacles bear. Strands that touch or are about to turn by more than
-//!    0.03 rad take a second.
-//! 3. On to the end of the substep, x + (x_θ − x)/θ. With θ = ½ nothing would be damped and nothing
-//!    be calmed; with θ = 1, implicit Euler, all swings would be damped like by a Kelvin–Voigt time of
-//!    h. θ = 0.65 damps like 0.3 h, which is taken off the material's damping, and stiff motion decays
-//!    to 7/13 in each substep. Strands that touch take θ = 1.
-//! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 %, guarded so that
-//!    what is pressed folds no farther than it must and what is taut does not zigzag.
-//! 5. Frames carried to the new directions; velocities; twist by a tridiagonal solve.
+//! 1. Strands deep inside an obstacle are moved out of it. Predict: nodes move to x + θh v and out
+//!    of obstacles.
+//! 2. One Newton step for the positions at θh: inertia, stretching, bending, the change of the
+//!    twisting moment as edges rotate, support by obstacles. Strands that touch or are about to
+//!    rotate by more than 0.03 rad take a second.
+//! 3. Extrapolate to the end of the substep, x + (x_θ − x)/θ. θ = ½ would damp nothing, stiff modes
+//!    included; θ = 1, implicit Euler, would damp all swings like a Kelvin–Voigt time of h. θ =
+//!    0.65 damps like 0.3 h, which is subtracted from the material's damping, and stiff motion
+//!    decays to 7/13 in each substep. Strands that touch take θ = 1.
+//! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 %, damped so that
+//!    compressed strands fold no farther than necessary and taut ones do not zigzag.
+//! 5. Frames are transported to the new directions; velocities; twist by a tridiagonal solve.
 //!
 //! # Why not BDF2
-//! Tried in a prototype (20 cm, L_g 13 cm, drag 0, no damping, 16 and 64 segments alike), of the energy of a
-//! swing of 0.4 s there is left after 1 s at 6; 3; 2 substeps of a tick at 60 Hz: θ = 0.65 80; 66; 54 %, BDF2
-//! 99.8; 99.2; 97.8 %, implicit Euler 51; 26; 14 %. But in a strand let go level BDF2 adds 0.14; 1.3 % of the
-//! swing's energy at 6; 3 substeps where the other two add none, and it keeps the last positions and velocities,
-//! 6 numbers a node beside the 10 that a substep writes, which have to begin anew at teleports, contacts and
-//! changes of the substep. With the default damping all of them decay as the hair does: θ stays.
+//! Tried in a prototype (20 cm, L_g 13 cm, drag 0, no damping, 16 and 64 segments alike). Share of
+//! the energy of a swing of 0.4 s left after 1 s at 6; 3; 2 substeps of a tick at 60 Hz: θ = 0.65
+//! 80; 66; 54 %, BDF2 99.8; 99.2; 97.8 %, implicit Euler 51; 26; 14 %. But for a strand released
+//! from level BDF2 adds 0.14; 1.3 % of the swing's energy at 6; 3 substeps where the other two add
+//! none, and it needs the last positions and velocities, 6 numbers a node besides the 10 that a
+//! substep writes, which have to be reset at teleports, contacts and changes of the substep. With
+//! the default damping all three decay like the hair does, so θ = 0.65 is kept.
 //!
 //! # Against theory and the sweeps
-//! Drag 0; strand 20 cm, L_g 13 cm unless said; theory is the elastica, and a beam under its own weight, hanging
-//! and about the elastica. The direct solver at the papers' 1/360 s and at the default 1/180 s
-//! (`tests/swing` prints these numbers), sweeps with their defaults at 1/360 s.
+//! Drag 0; strand 20 cm, L_g 13 cm unless noted; theory is the elastica, and the vibration of a
+//! beam under its own weight, hanging or about the elastica. The direct solver at the papers' 1/360
+//! s and at the default 1/180 s (`tests/swing` prints these numbers), sweeps with their defaults at
+//! 1/360 s.
 //!
 //! | | segments | theory | direct, 1/360 s | direct, 1/180 s | sweeps |
 //! |---|---|---|---|---|---|
@@ -49,17 +51,17 @@
 //! | the same, 5 cm, L_g 13 cm | 8, 16, 32, 64 | 0.0071 | 0.0072, 0.0071, 0.0071, 0.0071 | the same | 0.014, 0.041, 0.149, 0.47 |
 //! | period hanging (s) | 8, 16, 32, 64 | 0.403 | 0.408, 0.404, 0.403, 0.403 | 0.408, 0.405, 0.404, 0.403 | 0.61, 1.00, 1.86, not run |
 //! | period level (s) | 8, 16, 32, 64 | 0.442 | 0.447, 0.443, 0.442, 0.442 | 0.448, 0.444, 0.443, 0.442 | not run |
-//! | let go level, 24 cm, lowest after (s) | 8, 16, 32, 64 | 0.285 at 128 | 0.295, 0.288, 0.286, 0.286 | 0.294, 0.288, 0.286, 0.286 | 0.37, 0.58, 1.07, 1.35 (20 cm) |
+//! | released from level, 24 cm, time to the lowest point (s) | 8, 16, 32, 64 | 0.285 at 128 | 0.295, 0.288, 0.286, 0.286 | 0.294, 0.288, 0.286, 0.286 | 0.37, 0.58, 1.07, 1.35 (20 cm) |
 //! | height of a hanging curl (cm; 24 cm of hair, radius 1, pitch 2, L_g 6) | 18, 24, 36, 48, 64, 96 | 8.55 | 8.41, 8.47, 8.52, 8.53, 8.54, 8.55 | the same | not run |
-//! | twist that buckles, M L / EI | 32 | 8.99 | 9.37 | 9.14 | not run |
+//! | buckling by twist, M L / EI | 32 | 8.99 | 9.37 | 9.14 | not run |
 //!
-//! Periods below 40 substeps come out longer, by 10 % at 11 substeps; faster modes are only damped.
+//! Periods below 40 substeps are too long, by 10 % at 11 substeps; faster modes are only damped.
 //! L_g is limited to six times the strand's length, and segments much shorter than 1 mm are softened:
 //! f32 is not precise enough for more.
 //!
 //! # For a compute port
-//! One strand needs nothing of another, so one GPU thread may take one strand. Numbers by segment (a node
-//! and the edge before it):
+//! Strands are independent, so one GPU thread may take one strand. Floats per segment (a node and
+//! the edge before it):
 //!
 //! | pass | reads | writes | scratch | multiply–adds, divisions and roots |
 //! |---|---|---|---|---|
@@ -69,8 +71,9 @@
 //! | untwist | q (4) | q (4) | 2 read | about 15, 1 |
 //! | limiter, each Newton step | p, w (4), what it rests on (3), l (1) | p (3) | 5 written, 5 read | about 45, 4 |
 //!
-//! The operations of a Newton step are counted from the formulas, not measured. Of a strand's own state p, v,
-//! q and tension (11) come in and go out once a substep; rest, k, l and the water's mass (7) come in.
+//! The operations of a Newton step are counted from the formulas, not measured. Of a strand's
+//! state, p, v, q and tension (11) are read and written once a substep; rest, k, l and the water's
+//! mass (7) are read.
 //!
 //! After Deul, Kugelstadt, Weiler, Bender, *Direct Position-Based Solver for Stiff Rods* (2018) for the
 //! direct solve, Baraff & Witkin (1998) for the implicit step, Bergou et al. (2008) for frames and
@@ -128,22 +131,23 @@ const STRAIN: f32 = 1e-4;
 /// Strain beyond which Newton steps on the lengths have failed.
 const TORN: f32 = 0.01;
 
-/// Most repetitions of restoring the lengths of torn strands and the push-out that follows.
-const REPAIRS: u32 = 4;
+/// The maximum number of repetitions of restoring the lengths of torn strands and the push-out that
+/// follows.
+const MAX_REPAIRS: u32 = 4;
 
 /// Depth in an obstacle, in edge lengths, above which a strand is moved out of it before the step.
-const DEEP: f32 = 0.25;
+const DEEP_SHARE: f32 = 0.25;
 
 /// Largest L_g, in lengths of the strand. Such hair sags by less than a thousandth of its length; f32
 /// is not precise enough for much stiffer hair.
-const STIFFEST: f32 = 6.0;
+const MAX_BENDING_LENGTH: f32 = 6.0;
 
 /// Largest ratio of a node's elastic stiffness to its inertia in a substep, for a strand of one segment;
 /// 1/n² of that for n segments. f32 is not precise enough for more. Only segments much shorter than 1 mm
 /// reach it.
-const FIRMEST: f32 = 2.5e10;
+const MAX_STIFFNESS: f32 = 2.5e10;
 
-/// Takes the block through one substep, on the instruction set that the machine has.
+/// Steps the block by one substep, with the machine's best instruction set.
 #[doc(hidden)]
 pub fn step(level: Level, block: &mut BlockLanes, params: &DirectParams, obstacles: &[Obstacle]) {
     dispatch!(level, simd => step_simd(simd, block, params, obstacles));
@@ -170,7 +174,8 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
         contacts_with(simd, b, params.clearance, obstacles, Grip::NONE, twice);
         newton::<S, true>(simd, b, params, 1);
     }
-    // Share of the depth that is left at nodes which the solve has held by obstacles.
+    // The solve leaves only this fraction of the depth at supported nodes, which friction makes up
+    // for.
     let grip = Grip { resting: 1.0 + HOLD as f32, others: 1.0 };
     let all = f32x16::splat(simd, 1.0);
     contacts_with(simd, b, params.clearance, obstacles, grip, all);
@@ -181,7 +186,7 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
         contacts(simd, b, params.clearance, obstacles);
         if pass + 1 == params.limiter_steps {
             // Restored lengths may end in an obstacle, and the push-out may tear them again.
-            for _ in 0..REPAIRS {
+            for _ in 0..MAX_REPAIRS {
                 if !clamp_lengths(simd, b, TORN) {
                     break;
                 }
@@ -225,8 +230,8 @@ fn newton<S: Simd, const TWICE: bool>(
                     (stage.again, stage.second) = (stage.twice, true);
                 }
                 if TWICE && left == 2 {
-                    let on_the_way = w.lit(0.0).lt(stage.twice);
-                    stage.beyond = <_ as Real>::select(on_the_way, w.lit(1.0), stage.beyond);
+                    let is_first_of_two = w.lit(0.0).lt(stage.twice);
+                    stage.beyond = <_ as Real>::select(is_first_of_two, w.lit(1.0), stage.beyond);
                 }
                 let BlockLanes { nodes, edges, rows, gravity, root_between, .. } = &mut *b;
                 kernel::down::<_, TWICE>(w, nodes, edges, rows, gravity, root_between, &stage);
@@ -282,7 +287,7 @@ fn stage<W: Width<Cell = crate::lanes::Lane>>(
     }
 }
 
-/// Moves nodes to the first guess; those that would enter an obstacle are placed on its surface.
+/// Moves nodes to the initial guess; those that would enter an obstacle are placed on its surface.
 /// Returns θ of each lane.
 #[inline(always)]
 fn predict<S: Simd>(
@@ -302,7 +307,7 @@ fn predict<S: Simd>(
         store3(&mut n.v, v);
     }
     choose_near(simd, b, params.dt, params.clearance, obstacles);
-    surface(simd, b, params, obstacles);
+    leave_obstacles(simd, b, params, obstacles);
     fall(simd, b, dt * theta, gravity, params.clearance, obstacles);
     if b.touched != [0.0; LANES] {
         let touched = Real::lt(zero, load(simd, &b.touched));
@@ -320,14 +325,14 @@ fn predict<S: Simd>(
         let (held, p) = (Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12)), load3(simd, &n.p));
         let support = load3(simd, &n.rests_on);
         let rests = Real::lt(zero, support.dot(support));
-        // The first guess leaves gravity out: otherwise it would rotate settled hair in each step.
+        // The initial guess excludes gravity, which would rotate settled hair in each step.
         store3(&mut n.p, V3::select(held | rests, p, p - fallen));
     }
     theta
 }
 
-/// 1 in lanes of which an edge is about to rotate by more than [`FAST_TURN`], else 0. One Newton step does not
-/// converge there, and fast-swinging tips would gain energy.
+/// 1 in lanes where an edge is about to rotate by more than [`FAST_TURN`], else 0. One Newton step
+/// does not converge there, and fast-swinging tips would gain energy.
 #[inline(always)]
 fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
@@ -344,10 +349,15 @@ fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
 }
 
 /// Moves strands that begin deep inside an obstacle, as when spawned there, out of it before the step and
-/// restores their lengths, so that they gain no velocity. Shallow penetration, as by the push of other
-/// hair, is left to the step.
+/// restores their lengths, so that they gain no velocity. Shallow penetration, as from contact with
+/// other hair, is left to the step.
 #[inline(never)]
-fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacles: &[Obstacle]) {
+fn leave_obstacles<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    params: &DirectParams,
+    obstacles: &[Obstacle],
+) {
     simd.vectorize(
         #[inline(always)]
         || {
@@ -356,16 +366,17 @@ fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacle
                 for o in near.of(obstacles) {
                     let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
                     let (_, depth) =
-                        o.solid.depth(o.taken_along(load3(simd, &n.p)), params.clearance);
+                        o.solid.depth(o.moved_with(load3(simd, &n.p)), params.clearance);
                     deepest = Real::select(held, deepest, Real::max(deepest, depth));
                 }
             }
-            let deep = Real::lt(load(simd, &b.edges[0].l) * f32x16::splat(simd, DEEP), deepest);
+            let deep =
+                Real::lt(load(simd, &b.edges[0].l) * f32x16::splat(simd, DEEP_SHARE), deepest);
             if deep.to_bitmask() == 0 {
                 return;
             }
             let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
-            b.sweeps = false;
+            b.has_fast_nodes = false;
             // Infinitely deep: no way out.
             b.near_obstacles.fill(NearObstacles::ALL);
             for n in &mut b.nodes {
@@ -382,7 +393,7 @@ fn surface<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacle
     );
 }
 
-/// Moves nodes ballistically for `ahead` (s), and onto obstacles in the way.
+/// Moves nodes ballistically for `ahead` (s), stopped by obstacles.
 #[inline(never)]
 fn fall<S: Simd>(
     simd: S,
@@ -420,18 +431,21 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32
     let edges = b.edges.len() as f32;
     // Stiffness per mass, for a whole node's mass of 1.
     let density = f32x16::splat(simd, edges) / sum;
-    let stiff = Real::min(f32x16::splat(simd, bending_length), sum * f32x16::splat(simd, STIFFEST));
+    let stiff = Real::min(
+        f32x16::splat(simd, bending_length),
+        sum * f32x16::splat(simd, MAX_BENDING_LENGTH),
+    );
     let bending = density * f32x16::splat(simd, 2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
     let axial = f32x16::splat(simd, REFERENCE_GRAVITY * edges / STRAIN);
-    let firmest = f32x16::splat(simd, FIRMEST / (edges * edges * dt * dt));
+    let stiffest = f32x16::splat(simd, MAX_STIFFNESS / (edges * edges * dt * dt));
     let mut before = zero;
     for (i, n) in b.nodes.iter_mut().enumerate() {
         let mut after = zero;
         if let Some(e) = b.edges.get_mut(i) {
             after = load(simd, &e.l);
             let joint = load(simd, &e.k) * bending / (before + after);
-            Real::min(joint, firmest * after * after).store_array(&mut e.k);
-            Real::min(axial / after, firmest).store_array(&mut e.axial);
+            Real::min(joint, stiffest * after * after).store_array(&mut e.k);
+            Real::min(axial / after, stiffest).store_array(&mut e.axial);
         }
         // Half a cell on either side, so the tip carries half a mass.
         let dry_nodes = load(simd, &n.w);

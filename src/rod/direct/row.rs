@@ -1,6 +1,7 @@
 //! Scratch of the solve for each edge.
 
-/// What back substitution needs from the elimination: at index i of edge i and the node at its end.
+/// Results of the elimination for back substitution: index i belongs to edge i and the node at its
+/// end.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 pub(crate) struct DirectRow<C> {

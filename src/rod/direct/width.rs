@@ -1,4 +1,4 @@
-//! How numbers lie in memory and in registers, so that one kernel serves lanes and a scalar twin.
+//! The register and memory types of a kernel, so that one kernel serves lanes and a scalar version.
 
 use crate::lanes::{Lane, Quaternion, Real, V3};
 #[cfg(test)]

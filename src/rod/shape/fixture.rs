@@ -30,7 +30,7 @@ fn hull() -> ConvexHull {
 
 pub(crate) const CELL: f32 = 0.01;
 
-/// Two balls in one: exact distances outside of them.
+/// The union of two balls, with exact distances outside.
 pub(crate) fn pear() -> DistanceGrid {
     let points = UVec3::new(22, 26, 22);
     let origin = Vec3::new(-0.105, -0.105, -0.105);

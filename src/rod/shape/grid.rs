@@ -1,17 +1,17 @@
-//! Distances to a surface at the points of a grid, and between them.
+//! Signed distances to a surface at the points of a grid, interpolated between them.
 
 use crate::lanes::{Real, V3, splat};
 use bevy::reflect::Reflect;
 use glam::{UVec3, Vec3};
 use std::sync::Arc;
 
-/// Signed distances to a surface at the points of a grid: what a collider of any shape is made of.
-/// Cheap to clone, clones share it.
+/// Signed distances to a surface at the points of a grid: a collider of any shape. Cheap to clone:
+/// clones share the samples.
 ///
-/// Made by [`DistanceGrid::bake`] and worn by [`HairCollider::grid`](crate::HairCollider::grid).
-/// Between its points distances are interpolated: flat parts of a surface are exact, edges are rounded
-/// off by up to a third of a cell, and farther from the surface than a cell or two distances are known to
-/// three cells. Beyond the grid they go on from its border.
+/// Made by [`DistanceGrid::bake`], used by [`HairCollider::grid`](crate::HairCollider::grid).
+/// Distances are interpolated: flat parts of a surface are exact, edges are rounded off by up to a
+/// third of a cell, and farther from the surface than a cell or two distances are accurate to three
+/// cells. Beyond the grid they are extrapolated from its border.
 #[derive(Reflect, Clone, Debug)]
 #[reflect(opaque)]
 #[reflect(Clone, PartialEq, Debug)]
@@ -47,7 +47,7 @@ impl PartialEq for DistanceGrid {
 }
 
 impl DistanceGrid {
-    /// As many distances as `points`, at least two along each axis; the solid is within `low…high`.
+    /// A grid of `points` distances, at least two along each axis; the solid is within `low…high`.
     pub(crate) fn of_samples(
         origin: Vec3,
         cell: f32,
@@ -60,17 +60,17 @@ impl DistanceGrid {
         Self(Arc::new(Samples { origin, cell, points, distances, low, high, thickness }))
     }
 
-    /// How far apart its points are (m).
+    /// Spacing of its points (m).
     pub fn cell(&self) -> f32 {
         self.0.cell
     }
 
-    /// How many points it has along each axis.
+    /// Number of points along each axis.
     pub fn points(&self) -> UVec3 {
         self.0.points
     }
 
-    /// The distance of a place to the surface (m), negative inside.
+    /// The signed distance of a point to the surface (m), negative inside.
     pub fn distance(&self, place: Vec3) -> f32 {
         self.sample(V3::new(place.x, place.y, place.z)).1
     }
@@ -79,17 +79,18 @@ impl DistanceGrid {
         (0.5 * (self.0.low + self.0.high), 0.5 * (self.0.high - self.0.low))
     }
 
-    /// How far it reaches from the origin, at most.
+    /// An upper bound of its extent from the origin.
     pub(crate) fn reach(&self) -> f32 {
         self.0.low.abs().max(self.0.high.abs()).length()
     }
 
-    /// Half of the thickest part, or of four cells: thinner parts are looked after as well then.
+    /// Half of the thickest part, at most of four cells, so that continuous collision also covers
+    /// thinner parts.
     pub(super) fn thickness(&self) -> f32 {
         self.0.thickness.min(4.0 * self.0.cell)
     }
 
-    /// The unit direction in which the distance grows, and the distance.
+    /// The normalised gradient of the distance, and the distance.
     #[inline(always)]
     pub(super) fn sample<R: Real>(&self, p: V3<R>) -> (V3<R>, R) {
         let Samples { origin, cell, points, distances, .. } = &*self.0;
@@ -110,7 +111,7 @@ impl DistanceGrid {
         let f = held - corner;
         let row = points.x as usize;
         let layer = row * points.y as usize;
-        // Whole numbers below 2²⁴ are exact.
+        // Integers below 2²⁴ are exact.
         let index = corner.z.mul_add(lit(points.y as f32), corner.y);
         let index = index.mul_add(lit(points.x as f32), corner.x);
         let after = [0, 1, row, row + 1, layer, layer + 1, layer + row, layer + row + 1];
@@ -125,7 +126,7 @@ impl DistanceGrid {
             blend(b - a, d - c, f.z),
             far - near,
         );
-        // Beyond the grid the way to it is added.
+        // Beyond the grid the distance to it is added.
         let beyond = at - held;
         let apart = beyond.dot(beyond).sqrt();
         let slope = slope.scale(lit(1.0 / cell));

@@ -1,13 +1,14 @@
-//! A convex hull as the half-spaces that it is the common part of.
+//! A convex hull as an intersection of half-spaces.
 
 use crate::lanes::{Real, V3, splat};
 use bevy::reflect::Reflect;
 use glam::{Vec3, Vec4};
 use std::sync::Arc;
 
-/// The convex hull of points: what is behind all of its planes. Cheap to clone, clones share it.
+/// The convex hull of points: an intersection of half-spaces. Cheap to clone: clones share the
+/// planes.
 ///
-/// Made by [`ConvexHull::new`] and worn by [`HairCollider::hull`](crate::HairCollider::hull).
+/// Made by [`ConvexHull::new`], used by [`HairCollider::hull`](crate::HairCollider::hull).
 #[derive(Reflect, Clone, Debug)]
 #[reflect(opaque)]
 #[reflect(Clone, PartialEq, Debug)]
@@ -15,7 +16,7 @@ pub struct ConvexHull(Arc<Planes>);
 
 #[derive(Debug, PartialEq)]
 struct Planes {
-    /// Unit normals, out of the hull, and their distances from the origin.
+    /// Outward unit normals and their distances from the origin.
     planes: Vec<Vec4>,
     low: Vec3,
     high: Vec3,
@@ -29,14 +30,15 @@ impl PartialEq for ConvexHull {
 }
 
 impl ConvexHull {
-    /// What is behind all of these planes, within a box, around a point of its inside.
+    /// The intersection of the half-spaces behind these planes, with its bounding box and a point
+    /// inside.
     pub(crate) fn of_planes(planes: Vec<Vec4>, (low, high): (Vec3, Vec3), middle: Vec3) -> Self {
         let inside = |plane: &Vec4| plane.w - plane.truncate().dot(middle);
         let thickness = planes.iter().map(inside).fold(f32::INFINITY, f32::min);
         Self(Arc::new(Planes { planes, low, high, thickness }))
     }
 
-    /// Its planes: their unit normals, out of it, and their distances from the origin (m).
+    /// Its planes: outward unit normals and distances from the origin (m).
     pub fn planes(&self) -> impl ExactSizeIterator<Item = (Vec3, f32)> {
         self.0.planes.iter().map(|plane| (plane.truncate(), plane.w))
     }
@@ -45,7 +47,7 @@ impl ConvexHull {
         (0.5 * (self.0.low + self.0.high), 0.5 * (self.0.high - self.0.low))
     }
 
-    /// How far it reaches from the origin, at most.
+    /// An upper bound of its extent from the origin.
     pub(crate) fn reach(&self) -> f32 {
         self.0.low.abs().max(self.0.high.abs()).length()
     }
@@ -54,7 +56,7 @@ impl ConvexHull {
         self.0.thickness
     }
 
-    /// Exact within; outside, next to edges and corners, too small.
+    /// Exact inside; too small outside near edges and corners.
     #[inline(always)]
     pub(super) fn distance<R: Real>(&self, p: V3<R>) -> (V3<R>, R) {
         let mut most = p.x.lit(f64::from(f32::MIN));

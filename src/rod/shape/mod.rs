@@ -28,7 +28,7 @@ pub enum Shape {
     },
     /// A convex hull.
     Hull(ConvexHull),
-    /// What distances were baked of.
+    /// Baked distances.
     Grid(DistanceGrid),
 }
 
@@ -41,12 +41,12 @@ pub struct Placed {
     pub center: Vec3,
     /// The unit axes of its frame.
     pub axes: Mat3,
-    /// How long the unit of its frame is (m).
+    /// Length of the unit of its frame (m).
     pub scale: f32,
 }
 
 impl Shape {
-    /// The box around it: its middle and half its size.
+    /// Its bounding box: centre and half size.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         match self {
             Self::Cuboid { half, .. } => (Vec3::ZERO, *half),
@@ -56,7 +56,7 @@ impl Shape {
         }
     }
 
-    /// How far it reaches from the origin of its frame, at most.
+    /// An upper bound of its extent from the origin of its frame.
     pub fn reach(&self) -> f32 {
         match self {
             Self::Cuboid { half, .. } => half.length(),
@@ -66,7 +66,7 @@ impl Shape {
         }
     }
 
-    /// Half of how thick it is where it is thinnest, about.
+    /// About half of its smallest thickness.
     fn thickness(&self) -> f32 {
         match self {
             Self::Cuboid { half, .. } => half.min_element(),
@@ -76,7 +76,7 @@ impl Shape {
         }
     }
 
-    /// How far it has changed into another one, in its unit; infinite between different kinds.
+    /// The difference to another shape, in its unit; infinite between different kinds.
     pub(crate) fn change(&self, other: &Self) -> f32 {
         match (self, other) {
             (Self::Cuboid { half: a, rounding: r }, Self::Cuboid { half: b, rounding: s }) => {
@@ -88,7 +88,7 @@ impl Shape {
         }
     }
 
-    /// The unit normal of the surface nearest to a point, and how far outside of it that is.
+    /// The unit normal of the surface nearest to a point, and the signed distance.
     #[inline(always)]
     fn distance<R: Real>(&self, p: V3<R>) -> (V3<R>, R) {
         match self {
@@ -99,7 +99,8 @@ impl Shape {
         }
     }
 
-    /// The share of a way at which it is deepest within, or nearest; about so where it misses.
+    /// The parameter along a path at which it is deepest inside, or nearest; approximate where it
+    /// misses.
     #[inline(always)]
     fn deepest<R: Real>(&self, start: V3<R>, way: V3<R>) -> R {
         let lit = |value: f32| start.x.lit(value.into());
@@ -127,7 +128,7 @@ impl Shape {
                 t.max(zero).min(one)
             }
             Self::Grid(grid) => {
-                // As far as nothing can be in the way, again and again.
+                // Sphere tracing.
                 let whole = way.dot(way).sqrt().max(lit(1e-12));
                 let mut share = zero;
                 for _ in 0..MARCH {
@@ -140,11 +141,10 @@ impl Shape {
     }
 }
 
-/// Steps of a march through a grid.
+/// Steps of sphere tracing through a grid.
 const MARCH: usize = 6;
 
-/// The middle of the part of a way that is behind all planes, of unit normals and distances from the
-/// origin.
+/// The parameter in the middle of the part of a path that is behind all planes.
 #[inline(always)]
 fn middle_within<R: Real>(
     start: V3<R>,
@@ -158,9 +158,9 @@ fn middle_within<R: Real>(
         let (before, speed) = (start.dot(normal) - lit(offset), way.dot(normal));
         let tiny = lit(1e-12);
         let when = -before / R::select(speed.lt(lit(0.0)), speed.min(-tiny), speed.max(tiny));
-        let comes = speed.lt(lit(0.0));
-        enter = enter.max(R::select(comes, when, lit(0.0)));
-        exit = exit.min(R::select(comes, lit(1.0), when));
+        let enters = speed.lt(lit(0.0));
+        enter = enter.max(R::select(enters, when, lit(0.0)));
+        exit = exit.min(R::select(enters, lit(1.0), when));
     }
     (lit(0.5) * (enter + exit)).max(lit(0.0)).min(lit(1.0))
 }
@@ -203,21 +203,22 @@ fn cuboid<R: Real>(p: V3<R>, half: Vec3, rounding: f32) -> (V3<R>, R) {
     (signed(normal, p), length + most.min(zero) - lit(rounding))
 }
 
-/// Steps to the nearest point of an ellipsoid: by measurement enough for a millionth of its size where
-/// axes differ a hundredfold.
+/// Newton steps to the nearest point of an ellipsoid: measured to reach a millionth of its size for
+/// axes that differ a hundredfold.
 const STEPS: usize = 16;
 
-/// To the nearest point of an ellipsoid's surface, by a root.
+/// The nearest point of an ellipsoid's surface, by a root search.
 ///
 /// The nearest point of p is `r²p/(r² + t)`, where t makes `G(t) = Σ (r p/(r² + t))²` one. `1/√G` is
-/// concave, so that Newton's steps from below never go beyond the root. s is t above the first pole, which keeps digits deep inside.
+/// concave, so that Newton's steps from below never go beyond the root. s is t relative to the
+/// first pole, which is accurate deep inside.
 #[inline(always)]
 fn ellipsoid<R: Real>(p: V3<R>, radii: Vec3) -> (V3<R>, R) {
     let lit = |value: f32| p.x.lit(value.into());
     let size = radii.max_element();
     let r = radii / size;
     let least = r.min_element();
-    // In the middle of the shortest axis there are two ways out: one is taken.
+    // In the middle of the shortest axis there are two nearest points: one is taken.
     let floor = |axis: f32| if axis == least { 1e-6 * least } else { 0.0 };
     let unit = lit(1.0 / size);
     let y = V3::new(
@@ -250,11 +251,11 @@ impl Placed {
     /// A point in the frame of the shape.
     #[inline(always)]
     fn point_in<R: Real>(&self, p: V3<R>) -> V3<R> {
-        self.way_in(p - splat(p.x, self.center))
+        self.vector_in(p - splat(p.x, self.center))
     }
 
     #[inline(always)]
-    fn way_in<R: Real>(&self, v: V3<R>) -> V3<R> {
+    fn vector_in<R: Real>(&self, v: V3<R>) -> V3<R> {
         let inverse = v.x.lit((1.0 / self.scale).into());
         let along = |axis: Vec3| v.dot(splat(v.x, axis)) * inverse;
         V3::new(along(self.axes.x_axis), along(self.axes.y_axis), along(self.axes.z_axis))
@@ -295,7 +296,7 @@ impl Placed {
                         Real::lt(reach * reach, outside(p, Vec3::ZERO, inner))
                     }
                     Shape::Ellipsoid { radii } => {
-                        // To a ball it is as far or farther than to what is squeezed out of it.
+                        // Scaled to a ball distances do not shrink; also the bounding ball.
                         let inverse = radii.recip();
                         let (x, y, z) =
                             (p.x * lit(inverse.x), p.y * lit(inverse.y), p.z * lit(inverse.z));
@@ -312,7 +313,7 @@ impl Placed {
                         if far.all_true() {
                             return far;
                         }
-                        // Between its points a grid rises by no more than √3 a metre.
+                        // Interpolated distances have a gradient of at most √3.
                         let (_, free) = grid.sample(p);
                         far | Real::lt(distance * lit(1.733), free)
                     }
@@ -321,21 +322,21 @@ impl Placed {
         )
     }
 
-    /// For continuous collision: the share of a way at which it is deepest within.
+    /// For continuous collision: the parameter along a path at which it is deepest inside.
     #[inline(always)]
     pub(super) fn deepest<R: Real>(&self, start: V3<R>, way: V3<R>) -> R {
         start.x.apart(
             #[inline(always)]
-            || self.shape.deepest(self.point_in(start), self.way_in(way)),
+            || self.shape.deepest(self.point_in(start), self.vector_in(way)),
         )
     }
 
-    /// Half of how thick it is (m).
+    /// Half of its thickness (m).
     pub(super) fn thickness(&self) -> f32 {
         self.shape.thickness() * self.scale
     }
 
-    /// The box around it along the axes of the nodes: its middle and half its size (m).
+    /// The bounding box along the axes of the nodes: centre and half size (m).
     pub(super) fn bounds(&self) -> (Vec3, Vec3) {
         let (middle, half) = self.shape.bounds();
         let Mat3 { x_axis, y_axis, z_axis } = self.axes;
@@ -344,7 +345,7 @@ impl Placed {
     }
 }
 
-/// The square of how far points are from a box.
+/// Squared distance of points from a box.
 #[inline(always)]
 fn outside<R: Real>(p: V3<R>, middle: Vec3, half: Vec3) -> R {
     let (q, zero) = (p - splat(p.x, middle), p.x.lit(0.0));
@@ -363,7 +364,7 @@ mod tests {
         fixture::{CELL, all_shapes, pear, pear_distance},
         *,
     };
-    use crate::rod::obstacle::{Obstacle, Solid, Way, continuous_collision, push_out};
+    use crate::rod::obstacle::{Obstacle, PushOut, Solid, continuous_collision, push_out};
     use fearless_simd::{Level, dispatch};
     use glam::Quat;
     use proptest::prelude::*;
@@ -465,7 +466,7 @@ mod tests {
             let (out, beyond) = dispatch!(Level::new(), simd => {
                 let p = crate::lanes::splat3(simd, at);
                 let lit = |value: f32| f32x16::splat(simd, value);
-                let out = push_out(&obstacle, p, p, lit(0.0), 0.0, Way::Shortest).map(|(out, _)| {
+                let out = push_out(&obstacle, p, p, lit(0.0), 0.0, PushOut::Shortest).map(|(out, _)| {
                     let lane = |x: f32x16<_>| x[5];
                     Vec3::new(lane(out.x), lane(out.y), lane(out.z))
                 });

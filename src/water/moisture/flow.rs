@@ -1,4 +1,4 @@
-//! Transport of a strand's water in a substep: along it, into it, off it.
+//! Transport of a strand's water in a substep: flow along it, soaking, drying and drips.
 
 use super::super::{
     droplet::Droplet,
@@ -21,7 +21,7 @@ pub(crate) struct Exposure {
     pub warmth: f32,
     /// Share of the node's capacity that equation 19 dries away in this substep: Σ drying |Δv_w|.
     pub blown: f32,
-    /// Whether there is water all around it instead: it soaks, and has no film.
+    /// Whether it is submerged instead: it soaks, and has no film.
     pub submerged: bool,
 }
 
@@ -37,9 +37,9 @@ pub(crate) struct WaterConditions<'a> {
     diameter: f32,
     /// Capacity for bound water per metre of strand (m³/m).
     capacity: f64,
-    /// Share of the free capacity that soaks in this substep.
+    /// Share of the free capacity that soaking fills in this substep.
     soaked: f64,
-    /// The most film on a node, and on a tip (m³).
+    /// Film capacity of a node and of a tip (m³).
     held: f64,
     hung: f64,
     /// Evaporation into still room air per metre of strand (m³/m).
@@ -47,8 +47,8 @@ pub(crate) struct WaterConditions<'a> {
 }
 
 impl<'a> WaterConditions<'a> {
-    /// For a hair that wets as `wetting` says, under `gravity` in its frame (m/s²), in a room's `air`,
-    /// in a substep of `dt` (s) in which chemistry goes `process` times as fast as in life.
+    /// For a hair with this `wetting`, under `gravity` in its frame (m/s²), in a room's `air`, in a
+    /// substep of `dt` (s) in which chemistry is `process` times as fast as in reality.
     pub fn new(
         wetting: HairWetting,
         gravity: Vec3,
@@ -57,7 +57,7 @@ impl<'a> WaterConditions<'a> {
         process: f32,
     ) -> Self {
         let (bundle, g) = (wetting.bundle(1.0), gravity.length());
-        let mut around = Self {
+        let mut conditions = Self {
             gravity,
             air,
             process: process * dt,
@@ -70,8 +70,8 @@ impl<'a> WaterConditions<'a> {
             still: 0.0,
             wetting,
         };
-        around.still = around.drying(&Exposure::default());
-        around
+        conditions.still = conditions.drying(&Exposure::default());
+        conditions
     }
 
     /// Evaporation per metre of strand in this substep (m³/m).
@@ -83,12 +83,12 @@ impl<'a> WaterConditions<'a> {
     }
 }
 
-/// Water that left a strand in a substep.
+/// Water that a strand lost in a substep.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct WaterLoss {
     /// Evaporated (m³); negative in damp air.
     pub evaporated: f64,
-    /// Into water around it (m³); negative where hair soaked it up.
+    /// Given to the surrounding water (m³); negative where hair absorbed it.
     pub merged: f64,
     /// Node and volume (m³) of drops that detach.
     pub drips: Vec<(usize, f64)>,
@@ -96,26 +96,26 @@ pub(crate) struct WaterLoss {
 
 impl Moisture {
     /// One substep of the water of a strand with nodes at `positions` and segments of rest `lengths`
-    /// (m): the film flows and creeps, soaks in, dries and drips. `exposure` is `None` in still air. Needs
-    /// room for all nodes.
+    /// (m): the film flows and creeps, soaks in, dries and drips. `exposure` is `None` in still
+    /// air. The arrays must have an element for each node.
     pub(crate) fn exchange(
         &mut self,
         positions: &[Vec3],
         lengths: &[f32],
-        around: &WaterConditions<'_>,
+        conditions: &WaterConditions<'_>,
         exposure: impl Fn(usize) -> Option<Exposure>,
-        left: &mut WaterLoss,
+        loss: &mut WaterLoss,
     ) {
-        self.flow(positions, lengths, around);
+        self.flow(positions, lengths, conditions);
         let last = lengths.len();
-        let damp = around.air.equilibrium > 0.0;
+        let damp = conditions.air.equilibrium > 0.0;
         for (i, length) in node_lengths(lengths).enumerate() {
             let (film, bound) = (&mut self.film[i], &mut self.bound[i]);
             let exposed = exposure(i);
             if exposed.is_some_and(|e| e.submerged) {
-                let capacity = around.capacity * f64::from(length);
-                let soaks = (capacity - *bound) * around.soaked;
-                left.merged += *film - soaks;
+                let capacity = conditions.capacity * f64::from(length);
+                let soaks = (capacity - *bound) * conditions.soaked;
+                loss.merged += *film - soaks;
                 *film = 0.0;
                 *bound += soaks;
                 self.wetness[i] = ((*bound / capacity) as f32).clamp(0.0, 1.0);
@@ -127,52 +127,54 @@ impl Moisture {
                 continue;
             }
             let length = f64::from(length);
-            let capacity = around.capacity * length;
+            let capacity = conditions.capacity * length;
             let of_capacity = capacity.recip();
             // Exceeds capacity only after settings changed: the excess returns to the film.
-            let soaks =
-                ((capacity - *bound) * around.soaked).min(*film).max((capacity - *bound).min(0.0));
+            let soaks = ((capacity - *bound) * conditions.soaked)
+                .min(*film)
+                .max((capacity - *bound).min(0.0));
             *film -= soaks;
             *bound += soaks;
 
             let blown = exposed.map_or(0.0, |e| capacity * f64::from(e.blown));
-            let drying = length * exposed.map_or(around.still, |e| around.drying(&e));
+            let drying = length * exposed.map_or(conditions.still, |e| conditions.drying(&e));
             let from_film = (drying + blown).min(*film);
             *film -= from_film;
-            // Bound water is drier the less of it there is; in damp air it comes back.
+            // Bound water evaporates more slowly the less of it there is; in damp air hair absorbs
+            // vapour.
             let share = (*bound * of_capacity) as f32;
-            let equilibrium = around.air.equilibrium;
-            let thirst = f64::from((share - equilibrium) / (1.0 - equilibrium).max(1e-3));
+            let equilibrium = conditions.air.equilibrium;
+            let excess = f64::from((share - equilibrium) / (1.0 - equilibrium).max(1e-3));
             let rest = (drying + blown - from_film).max(0.0);
             let warm = if rest > 0.0 { drying.min(rest) } else { 0.0 };
-            let wanted = warm * thirst + (rest - warm);
+            let wanted = warm * excess + (rest - warm);
             let from_bound = wanted.min(*bound).max(*bound - capacity);
             *bound -= from_bound;
-            left.evaporated += from_film + from_bound;
+            loss.evaporated += from_film + from_bound;
             self.wetness[i] = ((*bound * of_capacity) as f32).clamp(0.0, 1.0);
 
-            let limit = if i == last { around.hung } else { around.held };
+            let limit = if i == last { conditions.hung } else { conditions.held };
             if *film > limit {
                 // A drop at the tip takes most of the film; elsewhere only the excess drips.
                 let drop = if i == last { 0.8 * *film } else { *film - AFTER_DRIP * limit };
                 // The rest of a film that no drop can hold follows in the next substeps.
                 let drop = drop.min(f64::from(*Droplet::VOLUME.valid.end()));
                 *film -= drop;
-                left.drips.push((i, drop));
+                loss.drips.push((i, drop));
             }
-            self.sheen[i] = sheen(*film, self.wetness[i], around.held);
+            self.sheen[i] = sheen(*film, self.wetness[i], conditions.held);
         }
     }
 
-    /// The film flows along each segment as gravity pulls, and creeps from full to empty.
-    fn flow(&mut self, positions: &[Vec3], lengths: &[f32], around: &WaterConditions<'_>) {
-        let WaterConditions { wetting, gravity, dt, process, diameter, .. } = around;
+    /// The film flows along each segment under gravity and spreads by wicking.
+    fn flow(&mut self, positions: &[Vec3], lengths: &[f32], conditions: &WaterConditions<'_>) {
+        let WaterConditions { wetting, gravity, dt, process, diameter, .. } = conditions;
         let girth = PI * diameter;
         let thinning = WATER as f32 / (3.0 * WATER_VISCOSITY);
-        let mut came = 0.0;
+        let mut inflow = 0.0;
         for (i, &length) in lengths.iter().enumerate() {
             let (above, below) = (self.film[i], self.film[i + 1]);
-            if above == 0.0 && below == 0.0 && came == 0.0 {
+            if above == 0.0 && below == 0.0 && inflow == 0.0 {
                 continue;
             }
             let along = (positions[i + 1] - positions[i]).normalize_or_zero().dot(*gravity);
@@ -185,11 +187,11 @@ impl Moisture {
             let crossing = flowing.copysign(f64::from(along)) + creeping;
             // Limits the flow so that no film becomes negative.
             let crossing = crossing.clamp(-0.5 * below, 0.5 * above);
-            self.film[i] += came - crossing;
-            came = crossing;
+            self.film[i] += inflow - crossing;
+            inflow = crossing;
         }
         if let Some(tip) = self.film.last_mut() {
-            *tip += came;
+            *tip += inflow;
         }
     }
 }
@@ -207,7 +209,7 @@ mod tests {
         ((0..=n).map(|i| Vec3::NEG_Y * 0.03 * i as f32).collect(), vec![0.03; n])
     }
 
-    fn around(wetting: HairWetting, air: &DryingAir, process: f32) -> WaterConditions<'_> {
+    fn conditions(wetting: HairWetting, air: &DryingAir, process: f32) -> WaterConditions<'_> {
         WaterConditions::new(wetting, Vec3::NEG_Y * 9.8, air, 1.0 / 360.0, process)
     }
 
@@ -215,30 +217,30 @@ mod tests {
     fn the_film_runs_down_and_drips() {
         let strand = hanging_strand(8);
         let (wetting, air) = (HairWetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
-        let around = around(wetting, &air, 1.0);
+        let conditions = conditions(wetting, &air, 1.0);
         let mut m = Moisture::default();
         m.fit(9);
         m.add_film(1, 15e-9);
-        let mut left = WaterLoss::default();
+        let mut loss = WaterLoss::default();
         // A film is the slower the thinner it is.
         let mut middle = 1.0;
         for seconds in [1, 4, 15] {
             for _ in 0..360 * seconds {
-                m.exchange(&strand.0, &strand.1, &around, |_| None, &mut left);
+                m.exchange(&strand.0, &strand.1, &conditions, |_| None, &mut loss);
             }
             let moment: f64 = m.film().iter().enumerate().map(|(i, f)| i as f64 * f).sum();
             let lower = moment / m.film().iter().sum::<f64>();
-            assert!(lower > middle + 0.1 && left.drips.is_empty(), "{lower}");
+            assert!(lower > middle + 0.1 && loss.drips.is_empty(), "{lower}");
             middle = lower;
         }
         for _ in 0..20 {
             (1..9).for_each(|node| m.add_film(node, 2e-9));
             for _ in 0..360 {
-                m.exchange(&strand.0, &strand.1, &around, |_| None, &mut left);
+                m.exchange(&strand.0, &strand.1, &conditions, |_| None, &mut loss);
             }
         }
-        assert!(left.drips.iter().any(|(node, _)| *node == 8), "{:?}", left.drips);
-        let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
+        assert!(loss.drips.iter().any(|(node, _)| *node == 8), "{:?}", loss.drips);
+        let dripped: f64 = loss.drips.iter().map(|d| d.1).sum();
         let total = m.volume() + dripped;
         assert!((total - 335e-9).abs() < 1e-18, "{total}");
     }
@@ -248,13 +250,13 @@ mod tests {
         // Soaked through, no drying but the wind's, no film: dw = −0.3 |Δv_w|.
         let strand = hanging_strand(4);
         let (wetting, air) = (HairWetting { evaporation: 0.0, ..default() }, still());
-        let around = around(wetting, &air, 1.0);
+        let conditions = conditions(wetting, &air, 1.0);
         let mut m = Moisture::default();
         m.fit(5);
         m.soak(1.0, 0.0, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
         for _ in 0..100 {
             let blown = |i: usize| Some(Exposure { blown: 0.3 * 0.004 * i as f32, ..default() });
-            m.exchange(&strand.0, &strand.1, &around, blown, &mut WaterLoss::default());
+            m.exchange(&strand.0, &strand.1, &conditions, blown, &mut WaterLoss::default());
         }
         for (i, wet) in m.wetness().iter().enumerate() {
             assert!((wet - (1.0 - 0.12 * i as f32)).abs() < 1e-5, "{i}: {wet}");
@@ -268,19 +270,19 @@ mod tests {
         let damp = DryingAir::new(22.0, 0.9, 0.1);
         let mut m = Moisture::default();
         m.fit(5);
-        let mut left = WaterLoss::default();
-        let run = |m: &mut Moisture, air: &DryingAir, left: &mut WaterLoss| {
-            let around = around(wetting, air, 3600.0);
+        let mut loss = WaterLoss::default();
+        let run = |m: &mut Moisture, air: &DryingAir, loss: &mut WaterLoss| {
+            let conditions = conditions(wetting, air, 3600.0);
             for _ in 0..3600 {
-                m.exchange(&strand.0, &strand.1, &around, |_| None, left);
+                m.exchange(&strand.0, &strand.1, &conditions, |_| None, loss);
             }
         };
-        run(&mut m, &damp, &mut left);
-        assert!(left.evaporated < 0.0);
+        run(&mut m, &damp, &mut loss);
+        assert!(loss.evaporated < 0.0);
         assert!((m.wetness()[2] - damp.equilibrium).abs() < 0.02, "{}", m.wetness()[2]);
-        run(&mut m, &still(), &mut left);
+        run(&mut m, &still(), &mut loss);
         assert!(m.wetness()[2] < 0.02);
-        assert!((m.volume() + left.evaporated).abs() < 1e-18);
+        assert!((m.volume() + loss.evaporated).abs() < 1e-18);
     }
 
     proptest! {
@@ -296,21 +298,21 @@ mod tests {
             let (wetting, air) = (HairWetting::default(), still());
             let positions: Vec<Vec3> =
                 points.iter().map(|(x, y)| Vec3::new(*x, *y, 0.0) * 0.1).collect();
-            let around = WaterConditions::new(wetting, Vec3::NEG_Y * 9.8, &air, dt, process);
+            let conditions = WaterConditions::new(wetting, Vec3::NEG_Y * 9.8, &air, dt, process);
             let mut m = Moisture::default();
             m.fit(9);
             m.soak(share, 0.0, node_lengths(&strand.1).map(|l| wetting.capacity() * f64::from(l)));
             film.iter().enumerate().for_each(|(i, f)| m.add_film(i, *f));
             let before = m.volume();
-            let mut left = WaterLoss::default();
+            let mut loss = WaterLoss::default();
             for _ in 0..50 {
                 let exposed = |_| Some(Exposure { speed: 3.0, warmth: 40.0, blown: 0.001, submerged: false });
-                m.exchange(&positions, &strand.1, &around, exposed, &mut left);
+                m.exchange(&positions, &strand.1, &conditions, exposed, &mut loss);
                 prop_assert!(m.film().iter().chain(m.bound()).all(|v| *v >= 0.0 && v.is_finite()));
                 prop_assert!(m.wetness().iter().all(|w| (0.0..=1.0).contains(w)));
             }
-            let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
-            let after = m.volume() + left.evaporated + dripped;
+            let dripped: f64 = loss.drips.iter().map(|d| d.1).sum();
+            let after = m.volume() + loss.evaporated + dripped;
             prop_assert!((after - before).abs() < 1e-12 * before.max(1e-12));
         }
     }
@@ -319,23 +321,23 @@ mod tests {
     fn a_film_that_no_drop_can_hold_leaves_in_several() {
         let strand = hanging_strand(4);
         let (wetting, air) = (HairWetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
-        let around = around(wetting, &air, 1.0);
+        let conditions = conditions(wetting, &air, 1.0);
         let mut m = Moisture::default();
         m.fit(5);
         m.add_film(2, 5e-3);
         m.add_film(4, 5e-3);
-        let mut left = WaterLoss::default();
-        (0..60).for_each(|_| m.exchange(&strand.0, &strand.1, &around, |_| None, &mut left));
-        assert!(left.drips.len() >= 10, "{:?}", left.drips);
-        assert!(left.drips.iter().all(|(_, volume)| Droplet::VOLUME.check(*volume).is_ok()));
-        let dripped: f64 = left.drips.iter().map(|d| d.1).sum();
+        let mut loss = WaterLoss::default();
+        (0..60).for_each(|_| m.exchange(&strand.0, &strand.1, &conditions, |_| None, &mut loss));
+        assert!(loss.drips.len() >= 10, "{:?}", loss.drips);
+        assert!(loss.drips.iter().all(|(_, volume)| Droplet::VOLUME.check(*volume).is_ok()));
+        let dripped: f64 = loss.drips.iter().map(|d| d.1).sum();
         assert!((dripped + m.volume() - 10e-3).abs() < 1e-15 && m.volume() < 1e-3, "{dripped}");
     }
 
     #[test]
     fn films_flow_the_same_way_whichever_end_is_the_root() {
         let (wetting, air) = (HairWetting { soaking: 0.0, evaporation: 0.0, ..default() }, still());
-        let around = around(wetting, &air, 1.0);
+        let conditions = conditions(wetting, &air, 1.0);
         let lengths: Vec<f32> = (0..8).map(|i| 0.02 + 0.003 * i as f32).collect();
         // Up and down, so that films run to and fro.
         let mut points = vec![Vec3::ZERO];
@@ -357,8 +359,8 @@ mod tests {
         };
         let before = energy(&forth);
         for _ in 0..90 {
-            forth.flow(&points, &lengths, &around);
-            reverse.flow(&turned, &back(&lengths), &around);
+            forth.flow(&points, &lengths, &conditions);
+            reverse.flow(&turned, &back(&lengths), &conditions);
         }
         for (i, (a, b)) in forth.film().iter().zip(reverse.film().iter().rev()).enumerate() {
             assert!((a - b).abs() < 1e-15, "node {i}: {a} and {b}");

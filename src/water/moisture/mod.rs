@@ -1,8 +1,8 @@
 //! Water on and in a strand: a film on its surface, bound water inside, and their transport.
 //!
-//! Two states a node (m³ in `f64`, so that nothing is lost by rounding): the **film** lies on the
-//! lock, flows down, creeps along and drips; the **bound** water has soaked into the fibres, where it
-//! opens hydrogen bonds. Air takes the film first, then what is bound.
+//! Two volumes per node (m³ in `f64`, so that nothing is lost by rounding): the **film** on the
+//! lock flows down, creeps along and drips; the **bound** water has soaked into the fibres, where
+//! it opens hydrogen bonds. The film dries first, then the bound water.
 
 mod flow;
 
@@ -18,7 +18,7 @@ use core::f32::consts::PI;
 const KERATIN: f32 = 1310.0;
 /// Share of a lock's cross-section that its fibres fill.
 const PACKING: f32 = 0.6;
-/// Bound water of soaked hair beyond a room's, as a share of the dry mass.
+/// Bound water of soaked hair beyond the regain at room humidity, as a share of the dry mass.
 const SATURATION: f32 = 0.31 - 0.0957;
 
 setting! {
@@ -27,15 +27,16 @@ setting! {
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairWetting {
-        /// How many fibres a simulated strand stands for: with the diameter its mass, its thickness
-        /// and what it holds. At 500 two hundred strands are a head of hair.
+        /// How many fibres a simulated strand stands for; with the diameter it gives the strand's
+        /// mass, thickness and water capacity. 200 strands of 500 are a head of hair.
         pub fibres: f32 = 500.0, in FIBRES: 1.0..=1e6, safe 1.0..=1e4,
             "500 on each of 200 strands";
         /// Diameter of a fibre.
         pub fibre_diameter: f32 = 70e-6, "m" in FIBRE_DIAMETER: 1e-6..=1e-3, safe 40e-6..=120e-6,
             "hair has 50e-6 to 100e-6";
-        /// Largest acceleration that a droplet gives a node, \[W\] equation 2; print has 1 without a
-        /// unit. Less for droplets smaller than their r_min, and for nodes that water has made heavy.
+        /// Largest acceleration that a droplet gives a node, \[W\] equation 2; the paper has 1
+        /// without a unit. Less for droplets smaller than their r_min, and for nodes that water has
+        /// made heavy.
         pub adhesion: f32 = 30.0, "m/s²" in ADHESION: 0.0..=1e3, safe 0.0..=100.0,
             "30 clumps soft hair";
         /// Largest acceleration with which the film between two strands draws them together; 0 for
@@ -46,9 +47,10 @@ setting! {
         /// 0 lets them slip.
         pub film_drag: f32 = 30.0, "1/s" in FILM_DRAG: 0.0..=1e6, safe 0.0..=1000.0,
             "30 holds locks";
-        /// Rate at which a droplet spreads into the film of what it touches; 0 leaves droplets whole.
+        /// Rate at which a droplet spreads into the film of strands that it touches; 0 leaves
+        /// droplets whole.
         pub uptake: f32 = 20.0, "1/s" in UPTAKE: 0.0..=1e4, safe 0.0..=100.0,
-            "20 takes a drop in at once";
+            "20 absorbs a drop at once";
         /// Rate at which film soaks into the fibres. 1/120 is virgin hair; bleached hair is two to
         /// four times as fast.
         pub soaking: f32 = 1.0 / 120.0, "1/s" in SOAKING: 0.0..=1e3, safe 0.0..=1.0,
@@ -56,11 +58,11 @@ setting! {
         /// Diffusivity of the film along the strand by capillary action.
         pub wicking: f32 = 1e-5, "m²/s" in WICKING: 0.0..=1.0, safe 0.0..=1e-3,
             "1e-5 creeps along";
-        /// Rate at which water leaves, times what physics gives for a lock in free air; less deep
-        /// inside dense hair, 0 never dries.
+        /// Rate of evaporation as a multiple of that of a lock in free air; less deep inside dense
+        /// hair, 0 never dries.
         pub evaporation: f32 = 1.0, in EVAPORATION: 0.0..=1e3, safe 0.0..=10.0,
             "1 is a lock in free air";
-        /// Time in which hydrogen bonds follow the water; 0 follows at once.
+        /// Time constant with which hydrogen bonds follow the water; 0 follows at once.
         pub bond_time: f32 = 1.0, "s" in BOND_TIME: 0.0..=1e4, safe 0.0..=60.0,
             "1 follows water closely";
         /// Share of its stiffness that soaked hair loses beyond its open hydrogen bonds. With the 0.67
@@ -89,20 +91,21 @@ impl HairWetting {
         self.fibres * KERATIN * PI * radius * radius
     }
 
-    /// A metre of strand as surrounding water acts on it.
+    /// The strand as a lock, on which surrounding water acts.
     pub(super) fn lock(&self) -> Lock {
         let dry_mass = self.dry_mass();
         Lock { diameter: 2.0 * self.lock_radius(), dry_mass, fibres: dry_mass / KERATIN }
     }
 
-    /// Capacity for bound water of a metre of strand, beyond the regain of a room (m³/m).
+    /// Capacity for bound water of a metre of strand, beyond the regain at room humidity (m³/m).
     pub fn capacity(&self) -> f64 {
         f64::from(self.dry_mass() * SATURATION) / WATER
     }
 }
 
-/// The water of a strand, node by node, root first. Empty on hair that no water has touched: such
-/// hair costs nothing, and its hydrogen bonds are left to [`HairTreatment`](crate::HairTreatment) and equation 19.
+/// The water of a strand, node by node, root first. Empty on hair that has had no water: such hair
+/// costs nothing, and its hydrogen bonds are left to [`HairTreatment`](crate::HairTreatment) and
+/// equation 19.
 ///
 /// Where there is water, hydrogen bonds follow it. The tick writes it; to wet hair from game code
 /// spawn a [`Droplet`](crate::Droplet) or send a [`SoakHair`](crate::SoakHair). A clone brings its water
@@ -119,10 +122,10 @@ pub struct Moisture {
     counted: Counted,
 }
 
-/// What a drop that falls off leaves of the film that a node can hold.
+/// Share of a node's film capacity that stays after a drop has detached.
 pub(super) const AFTER_DRIP: f64 = 0.7;
 
-/// Share of the film that a node can hold at which it looks wet all over.
+/// Share of a node's film capacity at which it looks fully wet.
 const SHINES_AT: f64 = 0.15;
 
 impl Moisture {
@@ -136,12 +139,12 @@ impl Moisture {
         &self.film
     }
 
-    /// The water bound at each node beyond what hair holds in a room (m³).
+    /// The water bound at each node beyond the regain at room humidity (m³).
     pub fn bound(&self) -> &[f64] {
         &self.bound
     }
 
-    /// The share of what it can bind that each node has bound: 0 dry, 1 soaked.
+    /// Bound water of each node as a share of its capacity: 0 dry, 1 soaked.
     pub fn wetness(&self) -> &[f32] {
         &self.wetness
     }
@@ -172,7 +175,7 @@ impl Moisture {
     }
 
     /// Repairs values written by reflection: arrays of equal length, volumes finite and not negative.
-    /// Returns what was found first.
+    /// Returns the first invalid value.
     pub(super) fn repair(&mut self) -> Option<String> {
         let nodes = self.film.len();
         let mut found = None;
@@ -180,16 +183,16 @@ impl Moisture {
             if volumes.len() != nodes {
                 let length = volumes.len();
                 found.get_or_insert_with(|| {
-                    format!("{name} of {length} nodes, expected {nodes}: cut or filled up")
+                    format!(
+                        "{name} of {length} nodes, expected {nodes}: truncated or padded with 0"
+                    )
                 });
                 volumes.resize(nodes, 0.0);
             }
             for (i, volume) in volumes.iter_mut().enumerate() {
                 if !(0.0..1.0).contains(volume) {
                     found.get_or_insert_with(|| {
-                        format!(
-                            "{name} of node {i} is {volume} m³, expected 0 to 1: there is none now"
-                        )
+                        format!("{name} of node {i} is {volume} m³, expected 0 to 1: set to 0")
                     });
                     *volume = 0.0;
                 }
@@ -200,7 +203,7 @@ impl Moisture {
             for (i, share) in shares.iter_mut().enumerate() {
                 if !(0.0..=1.0).contains(share) {
                     found.get_or_insert_with(|| {
-                        format!("{name} of node {i} is {share}, expected 0 to 1: it is 0 now")
+                        format!("{name} of node {i} is {share}, expected 0 to 1: set to 0")
                     });
                     *share = 0.0;
                 }
@@ -267,7 +270,7 @@ impl Moisture {
     }
 
     /// Marks its water as not counted and returns it (m³): a removed component may be inserted elsewhere.
-    pub(super) fn forget(&mut self) -> f64 {
+    pub(super) fn take_counted(&mut self) -> f64 {
         core::mem::take(&mut self.counted).0
     }
 
@@ -279,7 +282,7 @@ impl Moisture {
         prefetch(&self.sheen);
     }
 
-    /// Removes the last traces of water; returns them (m³).
+    /// Removes all water and returns its volume (m³).
     pub(super) fn clear(&mut self) -> f64 {
         let rest = self.volume();
         *self = Self::default();
