@@ -1,4 +1,4 @@
-//! `--gpu`: the same scene on the graphics device, without a window.
+//! `--gpu`: the same scene on the GPU, without a window.
 
 use bevy::{
     app::{TaskPoolOptions, TaskPoolPlugin},
@@ -78,9 +78,9 @@ impl Ticks {
         };
         match self.away {
             None if self.on_gpu > 0 => Ok(()),
-            None => Err(format!("--gpu: the hair never left the processor: {}", why(self.last))),
+            None => Err(format!("--gpu: the hair never left the CPU: {}", why(self.last))),
             Some(away) => Err(format!(
-                "--gpu: after {} ticks on the device the hair came home: {}",
+                "--gpu: after {} ticks on the device the hair returned to the CPU: {}",
                 self.on_gpu,
                 why(away)
             )),

@@ -1,4 +1,4 @@
-//! Hair on the graphics device: the switch, and where it is.
+//! Hair on the GPU: the switch, and where it is.
 
 use bevy::{ecs::system::SystemParam, prelude::*};
 use bevy_egui::egui::Ui;
@@ -29,7 +29,7 @@ impl Residence<'_, '_> {
             ui.small(match residence {
                 HairResidence::Gpu => "It is there.".into(),
                 HairResidence::Returning(why) => format!("It comes back: {why}."),
-                HairResidence::Cpu(why) => format!("It is on the processor: {why}."),
+                HairResidence::Cpu(why) => format!("It is on the CPU: {why}."),
             });
         }
     }

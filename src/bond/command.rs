@@ -4,7 +4,7 @@ use super::{bonds::Bonds, kind::BondKind, settings::BondInfluence};
 use crate::{
     fault::{FaultKind, HairFault},
     setting::{HairDefault, Ranged},
-    strand::{Hair, Strand, StrandHistory, Strands, bring_home},
+    strand::{Hair, Strand, StrandHistory, Strands, return_to_cpu},
 };
 use bevy::prelude::*;
 
@@ -43,7 +43,7 @@ fn for_each_strand(
     mut act: impl FnMut(&mut Strand, &mut Bonds, &mut StrandHistory),
 ) {
     let id = hair.id();
-    hair.world_scope(|world| bring_home(world, id));
+    hair.world_scope(|world| return_to_cpu(world, id));
     let members: Vec<Entity> = hair.get::<Strands>().into_iter().flat_map(Strands::iter).collect();
     hair.world_scope(|world| {
         for strand in members {

@@ -1,4 +1,4 @@
-//! A frame on the graphics device, in the render world: what the ticks have written down is run, before any
+//! A frame on the GPU, in the render world: what the ticks have written down is run, before any
 //! camera draws, and the nodes go into the buffers that drawing reads.
 
 use super::{compile::Compiled, hair::GpuHair, record::GpuJournal, shared::Link};

@@ -1,4 +1,4 @@
-//! Hair goes to the graphics device.
+//! Hair goes to the GPU.
 
 use super::{
     compile::Ready,
@@ -21,7 +21,7 @@ use bevy::{
     prelude::*,
 };
 
-/// A hair on the graphics device, on the hair's entity.
+/// A hair on the GPU, on the hair's entity.
 #[derive(Component)]
 pub(super) struct GpuHair {
     pub(super) link: Link,
@@ -33,7 +33,7 @@ pub(super) struct GpuHair {
     /// Number of the newest request for its state, and whether that is still to be passed on.
     newest: u64,
     is_new: bool,
-    /// Why it is to come home, and with which answer.
+    /// Why it is to return to the CPU, and with which answer.
     pub(super) returns: Option<(WhyCpu, u64)>,
     /// Somebody waits for the answer of this number.
     pub(super) awaited: Option<u64>,
@@ -44,7 +44,7 @@ pub(super) struct GpuHair {
     pub(super) ticks: u32,
     /// Ticks until a strand's fault is told of again.
     pub(super) told: u32,
-    /// Requests that came on the way home.
+    /// Requests that came on the way back.
     pub(super) soaked: Vec<SoakHair>,
     pub(super) treated: Vec<HairTreatment>,
 }
@@ -68,9 +68,9 @@ impl Print {
     }
 }
 
-/// Has just come home, and stays for so long (s).
+/// has just returned, and stays for so long (s).
 #[derive(Component, Debug)]
-pub(super) struct StaysHome(pub(super) f32);
+pub(super) struct StaysOnCpu(pub(super) f32);
 
 impl GpuHair {
     /// Asks for its state; returns the request's number.
@@ -85,7 +85,7 @@ impl GpuHair {
         core::mem::take(&mut self.is_new).then_some(self.newest)
     }
 
-    /// Whether it is on its way home.
+    /// Whether it is on its way back to the CPU.
     pub(super) fn is_returning(&self) -> bool {
         self.returns.is_some()
     }

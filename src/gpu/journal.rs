@@ -38,7 +38,7 @@ pub(super) fn write_journals(
 ) {
     let gravity = gravity.clamped().0;
     for (hair, frame, obstacles, mut journal, treatments, on) in &mut hairs {
-        // On its way home it rests.
+        // On its way back to the CPU it rests.
         if on.is_some_and(GpuHair::is_returning) {
             continue;
         }

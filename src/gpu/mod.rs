@@ -9,10 +9,10 @@
 //! | file | what |
 //! |---|---|
 //! | `residence` | where hair is, where it is asked to be, and why it is elsewhere |
-//! | `support` | what keeps it on the processor |
+//! | `support` | what keeps it on the CPU |
 //! | `compile` | the kernels of the app's device |
-//! | `hair` | hair goes there |
-//! | `home` | hair comes home, and what else comes from there |
+//! | `hair` | hair is handed over |
+//! | `hand_back` | hair returns to the CPU; reports and requested states |
 //! | `tick` | where each hair is from this tick on; what acts on it |
 //! | `journal` | a record of each substep of the tick |
 //! | `treatments` | the clocks of treatments |
@@ -38,7 +38,7 @@
 mod compile;
 mod frame;
 mod hair;
-mod home;
+mod hand_back;
 mod journal;
 mod layout;
 mod pipelines;
@@ -52,7 +52,7 @@ mod support;
 mod tick;
 mod treatments;
 
-pub use home::fetch_strands;
+pub use hand_back::fetch_strands;
 #[doc(hidden)]
 pub use layout::{BYTES_PER_NODE, Contents, LANES, Layout, StrandState, StrandView};
 #[doc(hidden)]

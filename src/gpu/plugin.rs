@@ -3,7 +3,7 @@
 use super::{
     compile, frame,
     hair::GpuHair,
-    home::{collect, home_now},
+    hand_back::{collect, return_now},
     journal::write_journals,
     residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
     tick::{ask, decide, follow, treat},
@@ -11,11 +11,11 @@ use super::{
 use crate::{
     schedule::{HairSystems, HairTick, first_substep},
     setting,
-    strand::{BringHome, Hair, keep_required},
+    strand::{Hair, ReturnToCpu, keep_required},
 };
 use bevy::prelude::*;
 
-/// Simulates hair on the graphics device where [`SimulateOn`] asks for it. Part of
+/// Simulates hair on the GPU where [`SimulateOn`] asks for it. Part of
 /// [`HairPlugins`](crate::HairPlugins) with the feature `gpu`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HairGpuPlugin;
@@ -25,8 +25,8 @@ impl Plugin for HairGpuPlugin {
         setting::plugin::<SimulateOn>(app);
         setting::resource::<HairGpu>(app);
         keep_required::<Hair, HairResidence>(app);
-        app.insert_resource(BringHome(|world, hair| {
-            home_now(world, hair, WhyCpu::Unsupported(Unsupported::Requested));
+        app.insert_resource(ReturnToCpu(|world, hair| {
+            return_now(world, hair, WhyCpu::Unsupported(Unsupported::Requested));
         }))
         .register_type::<HairResidence>()
         .register_type::<WhyCpu>()
@@ -36,7 +36,7 @@ impl Plugin for HairGpuPlugin {
         .add_observer(|left: On<Remove, Hair>, mut commands: Commands| {
             let hair = left.entity;
             commands.queue(move |world: &mut World| {
-                home_now(world, hair, WhyCpu::Unsupported(Unsupported::Strands));
+                return_now(world, hair, WhyCpu::Unsupported(Unsupported::Strands));
             });
         })
         .add_systems(PreUpdate, collect.run_if(any_with_component::<GpuHair>))

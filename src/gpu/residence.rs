@@ -7,7 +7,7 @@ use core::fmt;
 /// Where a hair is asked to be simulated. Component of a [`Hair`](crate::Hair); where absent,
 /// [`HairDefault<SimulateOn>`](crate::HairDefault) holds. [`HairResidence`] tells where it is.
 ///
-/// Hair is on the graphics device only while all that acts on it is supported there, and comes back by
+/// Hair is on the GPU only while all that acts on it is supported there, and comes back by
 /// itself where something else does.
 ///
 /// ```
@@ -20,10 +20,10 @@ use core::fmt;
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub enum SimulateOn {
-    /// On the processor.
+    /// On the CPU.
     #[default]
     Cpu,
-    /// By compute shaders on the graphics device, as far as that can.
+    /// By compute shaders on the GPU, as far as that can.
     Gpu,
 }
 
@@ -33,11 +33,11 @@ impl Ranged for SimulateOn {}
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub enum HairResidence {
-    /// On the graphics device.
+    /// On the GPU.
     Gpu,
     /// On its way back, at rest on its head for some frames.
     Returning(WhyCpu),
-    /// On the processor.
+    /// On the CPU.
     Cpu(WhyCpu),
 }
 
@@ -47,14 +47,14 @@ impl Default for HairResidence {
     }
 }
 
-/// Why hair is simulated on the processor.
+/// Why hair is simulated on the CPU.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Clone, PartialEq)]
 #[non_exhaustive]
 pub enum WhyCpu {
     /// [`SimulateOn`] asks for it.
     NotAsked,
-    /// The app has no graphics device, or no assets for its shaders.
+    /// The app has no GPU, or no assets for its shaders.
     NoRenderer,
     /// The device has no compute shaders with eight storage buffers.
     NoCompute,
@@ -64,7 +64,7 @@ pub enum WhyCpu {
     Compiling,
     /// The kernels cannot be compiled; the log says why.
     Broken,
-    /// The graphics device was lost. It goes there again when there is another.
+    /// The GPU was lost. It goes there again when there is another.
     DeviceLost,
     /// The device cannot hold that many strands in one buffer.
     TooLarge,
@@ -74,7 +74,7 @@ pub enum WhyCpu {
     Unsupported(Unsupported),
 }
 
-/// What keeps hair on the processor.
+/// What keeps hair on the CPU.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Clone, PartialEq)]
 #[non_exhaustive]
@@ -115,7 +115,7 @@ pub enum Unsupported {
     Regroomed,
     /// The game wrote to a strand or its bonds.
     Written,
-    /// A request that needs its strands on the processor.
+    /// A request that needs its strands on the CPU.
     Requested,
 }
 
@@ -123,15 +123,13 @@ impl fmt::Display for WhyCpu {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NotAsked => "it is not asked to be elsewhere",
-            Self::NoRenderer => "the app has no graphics device",
-            Self::NoCompute => "the graphics device lacks compute shaders with 8 storage buffers",
-            Self::Software => {
-                "the graphics device is software; HairGpu { software: true } takes it"
-            }
+            Self::NoRenderer => "the app has no GPU",
+            Self::NoCompute => "the GPU lacks compute shaders with 8 storage buffers",
+            Self::Software => "the GPU is software; HairGpu { software: true } takes it",
             Self::Compiling => "its kernels are being compiled",
             Self::Broken => "its kernels cannot be compiled on this device",
-            Self::DeviceLost => "the graphics device was lost",
-            Self::TooLarge => "it is too large for one buffer of the graphics device",
+            Self::DeviceLost => "the GPU was lost",
+            Self::TooLarge => "it is too large for one buffer of the GPU",
             Self::JustBack => "it has just come back",
             Self::Unsupported(what) => return what.fmt(f),
         })
@@ -167,11 +165,11 @@ impl fmt::Display for Unsupported {
 }
 
 setting! {
-    /// How the graphics device is used for hair.
+    /// How the GPU is used for hair.
     #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Resource, Default, Clone, PartialEq)]
     pub struct HairGpu {
-        /// Whether a software device counts. It is slower than the processor by itself; tests want it.
+        /// Whether a software device counts. It is slower than the CPU by itself; tests want it.
         pub software: bool = false;
         /// Whether the tick waits for hair that comes back, where it otherwise rests on its head for some
         /// frames. For tests and loading screens.

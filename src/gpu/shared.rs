@@ -1,4 +1,4 @@
-//! A hair on the graphics device as both worlds hold it: the main world, which ticks, and the render world,
+//! A hair on the GPU as both worlds hold it: the main world, which ticks, and the render world,
 //! which runs what was written down.
 
 use super::{

@@ -1,4 +1,4 @@
-//! What keeps a hair on the processor: everything that acts on it and is not in the kernels.
+//! What keeps a hair on the CPU: everything that acts on it and is not in the kernels.
 
 use super::{
     record::{MOST_BLOWERS, MOST_OBSTACLES},

@@ -1,9 +1,9 @@
-//! Hair on the graphics device in the tick: where each is from this tick on, and what acts on it there.
+//! Hair on the GPU in the tick: where each is from this tick on, and what acts on it there.
 
 use super::{
     compile::{AppDevice, Ready},
-    hair::{GpuHair, StaysHome, hand_over},
-    home::call_home,
+    hair::{GpuHair, StaysOnCpu, hand_over},
+    hand_back::request_return,
     residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
     support::Support,
     treatments::GpuTreatments,
@@ -22,9 +22,9 @@ use bevy::{ecs::entity::EntityHashSet, prelude::*};
 pub(super) enum Decision {
     /// It goes to the device.
     Goes(Ready),
-    /// It comes home.
+    /// It returns to the CPU.
     Returns(WhyCpu),
-    /// It stays where it is, on the processor.
+    /// It stays where it is, on the CPU.
     Stays(WhyCpu),
 }
 
@@ -40,7 +40,7 @@ pub(super) fn decide(
             Entity,
             &HairResidence,
             Option<&mut GpuHair>,
-            Option<&mut StaysHome>,
+            Option<&mut StaysOnCpu>,
             Option<Ref<Strands>>,
         ),
         With<Hair>,
@@ -55,7 +55,7 @@ pub(super) fn decide(
 ) -> Vec<(Entity, Decision)> {
     let hair_of = |target: Entity| of.get(target).map_or(target, |of| of.0);
     let mut soaked: Vec<_> = soaks.read().map(|soak| (hair_of(soak.target), *soak)).collect();
-    // Of a hair as a whole they are no reason to come home.
+    // Of a hair as a whole they are no reason to return to the CPU.
     let mut treated: Vec<_> = (treats.read().filter(|treat| of.contains(treat.target)))
         .map(|treat| (hair_of(treat.target), treat.clone()))
         .collect();
@@ -78,7 +78,7 @@ pub(super) fn decide(
             known.map(WhyCpu::Unsupported)
         };
         let Some(mut on) = on else {
-            // What is asked of it in this tick is asked of the processor.
+            // What is asked of it in this tick is asked of the CPU.
             let is_asked = |all: &[Entity]| all.contains(&hair);
             let why = if !wants {
                 Some(WhyCpu::NotAsked)
@@ -140,13 +140,13 @@ pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut Wor
         let why = match decision {
             Decision::Goes(ready) => match hand_over(world, hair, &ready) {
                 Ok(()) => {
-                    tracing::debug!("hair, entity {hair}: simulated on the graphics device");
+                    tracing::debug!("hair, entity {hair}: simulated on the GPU");
                     continue;
                 }
                 Err(why) => why,
             },
             Decision::Returns(why) => {
-                call_home(world, hair, why, is_blocking);
+                request_return(world, hair, why, is_blocking);
                 tell(hair, why);
                 continue;
             }
@@ -166,9 +166,9 @@ fn tell(hair: Entity, why: WhyCpu) {
     match why {
         WhyCpu::NotAsked | WhyCpu::Compiling => {}
         WhyCpu::Broken | WhyCpu::DeviceLost | WhyCpu::NoCompute | WhyCpu::TooLarge => {
-            tracing::warn!("hair, entity {hair}, is simulated on the processor: {why}");
+            tracing::warn!("hair, entity {hair}, is simulated on the CPU: {why}");
         }
-        _ => tracing::info!("hair, entity {hair}, is simulated on the processor: {why}"),
+        _ => tracing::info!("hair, entity {hair}, is simulated on the CPU: {why}"),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Treatments of hair on the graphics device: their clocks run here, their bonds are there.
+//! Treatments of hair on the GPU: their clocks run here, their bonds are there.
 
 use super::record::{MOST_TREATMENTS, SubstepRecord, TreatmentRecord};
 use crate::{bond::BondKind, treatment::HairTreatment};

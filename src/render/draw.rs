@@ -125,7 +125,8 @@ pub(super) fn pack(
         let packed = packed.bypass_change_detection();
         let guides = || members.into_iter().flat_map(|m| m.iter());
         let settings = followers.of(hair);
-        // What is drawn elsewhere keeps its guides: hair whose strands change comes back first.
+        // The nodes of hair on the GPU are not here, and its guides stay the same: it returns before they
+        // change.
         let elsewhere = elsewhere.map(|mut drawn| {
             let drawn = drawn.bypass_change_detection();
             drawn.overstep = if drawn.rests { 1.0 } else { overstep };
@@ -307,7 +308,7 @@ impl Packed {
         changed | core::mem::take(&mut self.roots_moved)
     }
 
-    /// Updates the settings of followers; returns whether they have changed.
+    /// Updates the settings of followers; returns whether the drawn strands depend on the change.
     fn update_followers(&mut self, followers: &HairFollowers) -> bool {
         // Settings that the shader reads from the uniform do not change the strands.
         let grown = |f: &HairFollowers| HairFollowers {

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 
 /// Says of a hair that somebody else writes its nodes into
-/// [`HairBuffers::nodes`](super::HairBuffers::nodes), on the graphics device.
+/// [`HairBuffers::nodes`](super::HairBuffers::nodes), on the GPU.
 #[derive(Component, Clone, Copy, Debug, Default)]
 #[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "nobody does"))]
 pub(crate) struct DrawnElsewhere {

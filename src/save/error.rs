@@ -15,9 +15,9 @@ pub enum HairdoError {
         /// What was named.
         entity: Entity,
     },
-    /// The hair is simulated on the graphics device.
+    /// The hair is simulated on the GPU.
     #[error(
-        "{entity} is simulated on the graphics device: request it by TakeHairdo, HairdoTaken answers"
+        "{entity} is simulated on the GPU: request its hairdo by TakeHairdo, answered by HairdoTaken"
     )]
     OnGpu {
         /// The hair.

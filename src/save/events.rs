@@ -39,7 +39,7 @@ pub struct TakeHairdo {
 pub struct HairdoTaken {
     /// The hair.
     pub entity: Entity,
-    /// Its hairdo at the moment of the request; of hair on the graphics device a few frames later.
+    /// Its hairdo at the moment of the request; of hair on the GPU a few frames later.
     pub hairdo: Hairdo,
 }
 
@@ -94,7 +94,7 @@ fn answer(world: &mut World, hair: Entity) {
     }
 }
 
-/// Somebody waits for the hairdo of hair that is on the graphics device.
+/// Somebody waits for the hairdo of hair that is on the GPU.
 #[cfg(feature = "gpu")]
 #[derive(Component)]
 pub(super) struct Awaited;

@@ -7,7 +7,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     look::{HairDye, HairLook, WornPreset},
     setting::{HairDefault, HairSetting, Ranged},
-    strand::{AddedMass, Hair, HeldNodes, OnGpu, Strand, StrandHistory, Strands, bring_home},
+    strand::{AddedMass, Hair, HeldNodes, OnGpu, Strand, StrandHistory, Strands, return_to_cpu},
     treatment::{Treatments, WindingProgress, WoundOn},
     water::{HairWetting, Moisture, WaterLedger},
 };
@@ -17,8 +17,7 @@ impl Hairdo {
     /// The present hairdo of a [`Hair`], a snapshot of its pose even in motion.
     ///
     /// # Errors
-    /// When `hair` is no hair, is on the graphics device, or a strand has fewer than two nodes or
-    /// invalid numbers.
+    /// When `hair` is no hair, is on the GPU, or a strand has fewer than two nodes or invalid numbers.
     pub fn of(world: &World, hair: Entity) -> Result<Self, HairdoError> {
         if world.get::<OnGpu>(hair).is_some() {
             return Err(HairdoError::OnGpu { entity: hair });
@@ -57,7 +56,7 @@ impl Hairdo {
     /// # Errors
     /// When `hair` is no hair, or its strands do not match the hairdo's.
     pub fn apply(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
-        bring_home(world, hair);
+        return_to_cpu(world, hair);
         let mut members = members(world, hair)?;
         members.retain(|member| world.get::<Strand>(*member).is_some());
         let nodes = members.iter().map(|m| world.get::<Strand>(*m).map_or(0, Strand::nodes));

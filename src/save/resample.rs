@@ -5,7 +5,7 @@ use crate::{
     bond::{BondKind, JointBonds},
     grid::KdTree,
     rod::frame::{darboux, full},
-    strand::bring_home,
+    strand::return_to_cpu,
     water::moisture::node_lengths,
 };
 use bevy::prelude::*;
@@ -34,7 +34,7 @@ impl Hairdo {
     /// # Errors
     /// When `hair` is no hair or has invalid numbers, or this hairdo has no strands.
     pub fn apply_resampled(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
-        bring_home(world, hair);
+        return_to_cpu(world, hair);
         self.resampled_for(&Self::of(world, hair)?)?.apply(world, hair)
     }
 

@@ -21,7 +21,7 @@ impl Hair {
     /// ```
     pub fn teleport(mut hair: EntityWorldMut<'_>) {
         let id = hair.id();
-        // On the graphics device they come to rest in the next tick.
+        // On the GPU they come to rest in the next tick.
         let members = hair.get::<Strands>().filter(|_| !hair.contains::<OnGpu>());
         let members: Vec<Entity> = members.into_iter().flat_map(Strands::iter).collect();
         hair.world_scope(|world| {

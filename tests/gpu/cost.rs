@@ -1,4 +1,4 @@
-//! What hair on the device costs the processor: to be read, on a machine of one's own.
+//! What hair on the device costs the CPU: to be read, on a machine of one's own.
 
 use crate::stage::Stage;
 use bevy::prelude::*;
@@ -41,7 +41,7 @@ fn what_hair_on_the_device_costs_the_processor() {
         assert!(stage.is_on_gpu());
         let there = many(&mut stage);
         println!(
-            "{count} strands: a tick at home {cpu:.2} ms, with the hand-over {handed:.2} ms, on the device \
+            "{count} strands: a tick on the CPU {cpu:.2} ms, with the hand-over {handed:.2} ms, on the device \
              {there:.3} ms, without any hair {empty:.3} ms"
         );
         drop(render);

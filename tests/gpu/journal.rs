@@ -105,7 +105,7 @@ fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
             "tick {start}: went {moved:.1e} m, dried {dried:.1e}; off by {places:.1e} m, {rates:.1e}"
         );
         assert!(moved > 5e-3 && dried > 1e-4, "{moved} {dried}");
-        // The shaders do not clip friction nor guard the limiter as the processor does yet: 0.11 mm.
+        // The shaders do not clip friction nor guard the limiter as the CPU does yet: 0.11 mm.
         assert!(places < 2e-4 && rates < 1e-3 * dried, "{places} m, {rates}");
         // The tick's beginning is known to drawing.
         for (state, before) in states.iter().zip(&before) {
@@ -117,7 +117,7 @@ fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
     }
 }
 
-/// An app without a graphics device says so once nothing else keeps hair from it.
+/// An app without a GPU says so once nothing else keeps hair from it.
 #[test]
 fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
     let reported = |change: fn(&mut App, Entity)| {

@@ -1,4 +1,4 @@
-//! Hair that is drawn from where it was simulated looks as it does when it is packed on the processor.
+//! Hair that is drawn from where it was simulated looks as it does when it is packed on the CPU.
 
 use crate::{
     offscreen::{Offscreen, Picture, has_adapter},
@@ -47,7 +47,7 @@ fn pictures_of_hair_on_the_device_and_at_home_are_the_same() {
         scene.app.insert_resource(HairDefault(view));
         pictures.push(scene.draw());
     }
-    // The same moment, at home.
+    // The same moment, on the CPU.
     assert!(Hairdo::default().apply(scene.app.world_mut(), hair).is_err());
     assert!(matches!(at(&scene), HairResidence::Cpu(_)));
     for (view, there) in views.into_iter().zip(pictures) {

@@ -1,4 +1,4 @@
-//! Hair goes to the device and comes home, whatever happens on the way.
+//! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
 use crate::stage::{Stage, apart, curls, free};
 use bevy::prelude::*;
@@ -54,7 +54,7 @@ fn hair_goes_to_the_device_and_comes_home() {
 }
 
 /// The hairdo of no hair fits nothing: it changes nothing but that the hair has to be home for it.
-fn call_home(world: &mut World, hair: Entity) {
+fn request_return(world: &mut World, hair: Entity) {
     assert!(Hairdo::default().apply(world, hair).is_err());
 }
 
@@ -70,7 +70,7 @@ fn hand_over_and_return_without_a_tick_change_no_bit(stage: &mut Stage) {
     let at_once = move |world: &mut World| {
         if world.get::<HairResidence>(hair) == Some(&HairResidence::Gpu) {
             world.resource_mut::<Seen>().0 = true;
-            call_home(world, hair);
+            request_return(world, hair);
             // As it is: nothing moves it in this tick.
             world.entity_mut(hair).insert((SimulateOn::Cpu, Disabled));
             let members: Vec<Entity> = world.get::<Strands>(hair).unwrap().iter().collect();
@@ -104,13 +104,13 @@ fn hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is(stage: &
         (before, stage.strands())
     });
     let [(cpu_before, cpu), (gpu_before, gpu)] = &mut both;
-    assert!(cpu_before.0 == gpu_before.0, "both on the processor");
+    assert!(cpu_before.0 == gpu_before.0, "both on the CPU");
     let went = apart(&cpu_before.1, cpu);
     let off = apart(gpu, cpu);
     println!("went {went} m, off by {off} m");
     assert!(went > 0.01 && off < 1e-3, "{off} m of {went} m");
     let there = stage.bits();
-    call_home(stage.app.world_mut(), stage.hair);
+    request_return(stage.app.world_mut(), stage.hair);
     assert!(stage.bits() == there);
     assert!(stage.faults().is_empty());
 }
@@ -118,12 +118,12 @@ fn hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is(stage: &
 fn ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits(stage: &mut Stage) {
     let mut first = None;
     for run in 0..10 {
-        grow(stage, SimulateOn::Gpu, curls(12, 6));
+        grow(stage, SimulateOn::Gpu, curls(8, 5));
         stage.run(1);
         assert!(stage.is_on_gpu());
         let at_once = [1, 2, 3, 4, 6, 12][run % 6];
         stage.at_once(at_once);
-        stage.run(24 / at_once as usize);
+        stage.run(12 / at_once as usize);
         let bits = stage.bits();
         assert!(*first.get_or_insert_with(|| bits.clone()) == bits, "run {run}");
     }
@@ -144,7 +144,7 @@ fn treatments_run_where_the_hair_is_and_cross_with_it(stage: &mut Stage) {
                 && left[2..] == vec![1.0; left.len() - 2]
         );
     }
-    // Half of a drying of a second there, the rest on the processor.
+    // Half of a drying of a second there, the rest on the CPU.
     stage.app.world_mut().write_message(HairTreatment::dry(hair).over(1.0));
     stage.run(30);
     let half = stage.bonds()[0].rates(BondKind::Hydrogen).next().unwrap();
@@ -152,7 +152,7 @@ fn treatments_run_where_the_hair_is_and_cross_with_it(stage: &mut Stage) {
     stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Cpu);
     stage.run(45);
     assert!(stage.bonds().iter().all(|b| b.rates(BondKind::Hydrogen).all(|rate| rate == 1.0)));
-    // Of one strand alone: it comes home for it.
+    // Of one strand alone: it returns to the CPU for it.
     on_gpu(stage, 6, 5);
     let strand = stage.members()[2];
     stage.app.world_mut().write_message(HairTreatment::wet(strand));
@@ -176,7 +176,7 @@ fn what_is_not_supported_brings_hair_home_and_is_done_there(stage: &mut Stage) {
     assert!(water(stage) > 0.0, "it is wet");
     stage.run(70);
     assert_eq!(stage.residence(), HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::Water)));
-    // The same without waiting: it is told when it is home.
+    // The same without waiting: it is told when it is back.
     on_gpu(stage, 6, 5);
     let hair = stage.hair;
     stage.app.world_mut().resource_mut::<HairGpu>().blocking = false;

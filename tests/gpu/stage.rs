@@ -49,7 +49,7 @@ impl Stage {
         })
     }
 
-    /// What the tests have of settings: a software device, waiting for what comes home, nothing of what
+    /// What the tests have of settings: a software device, waiting for what returns to the CPU, nothing of what
     /// is not supported.
     pub fn furnish(app: &mut App) {
         app.insert_resource(Time::<Fixed>::from_hz(60.0))

@@ -1,9 +1,9 @@
-//! Hair comes home from the graphics device, and what else comes from there: reports, states that were asked
+//! Hair returns to the CPU from the GPU, and what else comes from there: reports, states that were asked
 //! for.
 
 use super::{
     compile::Compiled,
-    hair::{GpuHair, Print, StaysHome},
+    hair::{GpuHair, Print, StaysOnCpu},
     layout::{Contents, StrandState},
     record::GpuJournal,
     residence::{HairResidence, WhyCpu},
@@ -24,16 +24,16 @@ use bevy::{
     render::{render_resource::PollType, renderer::RenderDevice},
 };
 
-/// Ticks for which a strand's fault is not told of again, as on the processor.
+/// Ticks for which a strand's fault is not told of again, as on the CPU.
 const TOLD_FOR: u32 = 60;
 
-/// Seconds for which hair that has come home stays.
-const STAYS: f32 = 1.0;
+/// Seconds for which hair that has returned stays.
+const STAYS_FOR: f32 = 1.0;
 
-/// Has a hair come home, as soon as its state is there.
-pub(super) fn call_home(world: &mut World, hair: Entity, why: WhyCpu, is_blocking: bool) {
+/// Returns a hair to the CPU as soon as its state is there.
+pub(super) fn request_return(world: &mut World, hair: Entity, why: WhyCpu, is_blocking: bool) {
     if is_blocking {
-        return home_now(world, hair, why);
+        return return_now(world, hair, why);
     }
     let Some(mut gpu) = world.get_mut::<GpuHair>(hair).filter(|gpu| !gpu.is_returning()) else {
         return;
@@ -47,8 +47,8 @@ pub(super) fn call_home(world: &mut World, hair: Entity, why: WhyCpu, is_blockin
     entity.insert(HairResidence::Returning(why));
 }
 
-/// Waits for the device and has a hair home.
-pub(super) fn home_now(world: &mut World, hair: Entity, why: WhyCpu) {
+/// Waits for the device and returns a hair to the CPU.
+pub(super) fn return_now(world: &mut World, hair: Entity, why: WhyCpu) {
     let Some(link) = world.get::<GpuHair>(hair).map(|gpu| gpu.link.clone()) else { return };
     let records = world.get_mut::<GpuJournal>(hair);
     let mut records = records.map_or_else(Vec::new, |mut all| core::mem::take(&mut all.records));
@@ -58,10 +58,10 @@ pub(super) fn home_now(world: &mut World, hair: Entity, why: WhyCpu) {
         shared.run_pending();
         shared.strands.read_contents(&shared.device, &shared.queue)
     };
-    home(world, hair, state, why);
+    hand_back(world, hair, state, why);
 }
 
-/// Waits for the graphics device and puts the present state of hair that is simulated there into its
+/// Waits for the GPU and puts the present state of hair that is simulated there into its
 /// [`Strand`]s and [`Bonds`], which are otherwise as they were handed over. The hair stays there. Returns
 /// whether it was there.
 ///
@@ -86,13 +86,13 @@ pub fn fetch_strands(world: &mut World, hair: Entity) -> bool {
     true
 }
 
-/// Takes a hair home in this state; without one in that of its last checkpoint.
-fn home(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyCpu) {
+/// Hands a hair back in this state; without one in that of its last checkpoint.
+fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyCpu) {
     let Ok(mut entity) = world.get_entity_mut(hair) else { return };
     let Some(mut gpu) = entity.take::<GpuHair>() else { return };
     let acting = entity.take::<GpuTreatments>().map(GpuTreatments::into_acting);
     entity.remove::<(GpuJournal, OnGpu, DrawnElsewhere)>();
-    entity.insert((HairResidence::Cpu(why), StaysHome(STAYS)));
+    entity.insert((HairResidence::Cpu(why), StaysOnCpu(STAYS_FOR)));
     if let Some(state) = state.or_else(|| gpu.checkpoint.take()) {
         write_back(world, &mut gpu, &state);
     }
@@ -211,16 +211,16 @@ pub(super) fn collect(world: &mut World) {
             heed(world, hair, &report, strand);
         }
         if is_lost {
-            home(world, hair, None, WhyCpu::DeviceLost);
+            hand_back(world, hair, None, WhyCpu::DeviceLost);
             continue;
         }
         let Some((number, state)) = state else { continue };
         let Some(mut gpu) = world.get_mut::<GpuHair>(hair) else { continue };
         match (gpu.returns, state) {
             (Some((why, least)), Ok(state)) if least <= number => {
-                home(world, hair, Some(state), why);
+                hand_back(world, hair, Some(state), why);
             }
-            (Some((why, _)), Err(())) => home(world, hair, None, why),
+            (Some((why, _)), Err(())) => hand_back(world, hair, None, why),
             (_, Err(())) => {}
             (_, Ok(state)) => {
                 let answers = gpu.awaited.is_some_and(|least| least <= number);
@@ -267,6 +267,6 @@ fn heed(world: &mut World, hair: Entity, report: &Measured, strand: Option<usize
         )
     };
     let others = count.saturating_sub(1);
-    let message = format!("a strand on the graphics device {what} (and {others} times more)");
+    let message = format!("a strand on the GPU {what} (and {others} times more)");
     world.write_message(HairFault::new(kind, message).of(named));
 }
