@@ -46,6 +46,7 @@ pub mod follow;
 mod followers;
 #[doc(hidden)]
 pub mod model;
+mod release;
 #[doc(hidden)]
 pub mod spread;
 mod systems;

@@ -3,9 +3,10 @@
 use super::{
     Follower, Guides, HairBudget, HairEstimate, HairLod, HairScreenShare, LodLevel, PresentLod,
     budget::{Candidate, costs, fit},
-    choose::{choose_guides, note_overwritten, release_follower, release_without_follower},
+    choose::{choose_guides, note_overwritten},
     followers::{move_followers, sync_follower_sleep},
     model,
+    release::{release_follower, release_without_follower},
 };
 use crate::{
     fault::{FaultKind, HairFault},
