@@ -50,6 +50,7 @@ mod followers;
 mod frame;
 mod locks;
 mod material;
+mod packed_frame;
 mod ribbon_mesh;
 mod scatter;
 mod screen_share;

@@ -1,6 +1,8 @@
 //! What a frame writes: packed nodes and the frame's own numbers into the existing GPU buffers.
 
-use super::{buffers::HairBuffers, draw::Packed, frame::DrawnFrame, sets::HairRenderSystems};
+use super::{
+    buffers::HairBuffers, draw::Packed, packed_frame::DrawnFrame, sets::HairRenderSystems,
+};
 use bevy::{
     prelude::*,
     render::{
