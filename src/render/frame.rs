@@ -5,58 +5,14 @@ use super::{
     buffers::HairBuffers,
     detail::{DrawnShare, HairDetail},
     draw::Packed,
+    packed_frame::{DrawnFrame, PackedFrame},
     ribbon_mesh::{RibbonLevel, RibbonMeshes},
     screen_share::pixel_in,
-    solids::{Ball, DrawnSolid, MOST_SOLIDS},
+    solids::{Ball, DrawnSolid},
     view::HairView,
 };
 use crate::{contact::HairCollider, look::HairLook, setting::Settings};
 use bevy::{camera::primitives::Aabb, prelude::*, render::storage::ShaderBuffer};
-
-/// `DrawnFrame` of `strands.wgsl`.
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(super) struct PackedFrame {
-    share: f32,
-    fade: f32,
-    wider: f32,
-    solid_count: u32,
-    solids: [DrawnSolid; MOST_SOLIDS],
-}
-
-impl Default for PackedFrame {
-    fn default() -> Self {
-        Self::new(DrawnShare::ALL)
-    }
-}
-
-impl PackedFrame {
-    fn new(drawn: DrawnShare) -> Self {
-        Self {
-            share: drawn.share,
-            fade: drawn.fade,
-            wider: drawn.wider(),
-            solid_count: 0,
-            solids: [DrawnSolid::default(); MOST_SOLIDS],
-        }
-    }
-
-    fn push(&mut self, solid: DrawnSolid) {
-        if let Some(free) = self.solids.get_mut(self.solid_count as usize) {
-            *free = solid;
-            self.solid_count += 1;
-        }
-    }
-}
-
-/// A hair's frame.
-#[derive(Component, Clone, Debug, Default)]
-pub(super) struct DrawnFrame {
-    pub(super) packed: PackedFrame,
-    /// Size of a pixel where a camera is nearest, in the hair's frame (m); unknown before the first view.
-    pixel: Option<f32>,
-    level: u32,
-}
 
 /// After strands have been packed: chooses how many are drawn, and gathers the solids near them.
 pub(super) fn prepare(

@@ -29,10 +29,12 @@ impl DrawOrder {
         if !(3..MOST).contains(&count) {
             return Self { count, step: 1 };
         }
-        // By the golden ratio, which leaves the smallest gaps (Weyl 1916).
+        // Near the golden ratio, which leaves the smallest gaps (Weyl 1916): of the steps there, the one
+        // whose continued fraction is the flattest.
         let golden = (f64::from(count) * 0.618_033_988_75) as u32;
-        let mut steps = (golden.max(1)..count).chain(1..golden.max(1));
-        Self { count, step: steps.find(|step| common_divisor(*step, count) == 1).unwrap_or(1) }
+        let steps = (golden.max(1)..count).take(CANDIDATES).chain([1]);
+        let step = steps.min_by_key(|step| largest_quotient(count, *step)).unwrap_or(1);
+        Self { count, step }
     }
 
     /// By which the shader finds a strand's rank.
@@ -53,11 +55,17 @@ impl DrawOrder {
     }
 }
 
-fn common_divisor(mut a: u32, mut b: u32) -> u32 {
+/// Steps that are looked at.
+const CANDIDATES: usize = 256;
+
+/// The largest quotient of Euclid's algorithm; the largest number if they have a common divisor.
+fn largest_quotient(mut a: u32, mut b: u32) -> u32 {
+    let mut largest = 0;
     while b > 0 {
+        largest = largest.max(a / b);
         (a, b) = (b, a % b);
     }
-    a
+    if a == 1 { largest } else { u32::MAX }
 }
 
 /// A part of a hair's strands that has a mesh: each level has half as many as the one before.

@@ -1,7 +1,7 @@
 //! What a frame writes: packed nodes and the frame's own numbers into the existing GPU buffers.
 
 use super::{
-    buffers::HairBuffers, draw::Packed, elsewhere::DrawnElsewhere, frame::DrawnFrame,
+    buffers::HairBuffers, draw::Packed, elsewhere::DrawnElsewhere, packed_frame::DrawnFrame,
     sets::HairRenderSystems,
 };
 use bevy::{
