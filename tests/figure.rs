@@ -175,7 +175,7 @@ fn depths(mesh: &Mesh, preset: HairPreset) -> [(f32, f32); 2] {
 #[test]
 #[ignore = "not reached"]
 fn presets_stay_out_of_the_skin_of_a_figure_that_stands_and_walks_in_the_wind() {
-    let mesh = body::mesh_of(0.009);
+    let mesh = body::mesh_of(0.009, 0.009);
     for preset in [HairPreset::Straight, HairPreset::Curly, HairPreset::Bob, HairPreset::Long] {
         let [(standing, a), (walking, b)] = depths(&mesh, preset);
         println!(

@@ -163,7 +163,7 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
     let layout = Layout::of(&nodes);
     let limits = ready.device.limits();
     let largest = 16 * layout.vectors(SCRATCH) as u64;
-    if largest > limits.max_storage_buffer_binding_size.into()
+    if largest > limits.max_storage_buffer_binding_size
         || largest > limits.max_buffer_size
         || layout.blocks().len() > limits.max_compute_workgroups_per_dimension as usize
     {

@@ -178,7 +178,7 @@ impl Contents {
     pub fn put(&mut self, layout: &Layout, strand: usize, view: &StrandView<'_>) {
         let edges = view.lengths.len();
         let before = if view.before.len() > edges { view.before } else { view.positions };
-        for node in 0..=edges {
+        for (node, before) in before.iter().enumerate().take(edges + 1) {
             let at = |part, parts| layout.index(strand, node, part, parts);
             let place = view.positions[node];
             let frame = view.orientations.get(node).copied().unwrap_or(view.root_frame);
@@ -186,7 +186,7 @@ impl Contents {
             self.pose[at(0, POSE)] = place.extend(0.0).to_array();
             self.pose[at(1, POSE)] = frame.to_array();
             self.motion[at(0, MOTION)] = view.velocities[node].extend(tension).to_array();
-            self.motion[at(1, MOTION)] = before[node].extend(0.0).to_array();
+            self.motion[at(1, MOTION)] = before.extend(0.0).to_array();
             let length = view.lengths.get(node).copied().unwrap_or(0.0);
             let weight = if node == 0 { 0.0 } else { 1.0 };
             self.rest[at(0, REST)] = Quat::IDENTITY.to_array();

@@ -158,11 +158,11 @@ mod tests {
             if substep % 3 == 0 {
                 let mut record = SubstepRecord::default();
                 on.write(&mut record);
-                for kind in 0..4 {
-                    let asked = record.change[kind] - rates[kind] * record.share[kind];
-                    rates[kind] = (rates[kind] + asked).clamp(0.0, 1.0);
+                for (kind, rate) in rates.iter_mut().enumerate() {
+                    let change = record.change[kind] - *rate * record.share[kind];
+                    *rate = (*rate + change).clamp(0.0, 1.0);
                     let expected = alone(0.9, treats.clone(), kind, dt, substep);
-                    assert!((rates[kind] - expected).abs() < 1e-5, "{substep}, {kind}");
+                    assert!((*rate - expected).abs() < 1e-5, "{substep}, {kind}");
                 }
             }
         }

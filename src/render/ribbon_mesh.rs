@@ -204,7 +204,8 @@ mod tests {
         let indices = meshes.get(&first).unwrap().indices().unwrap().len();
         assert_eq!(indices, 100 * 8 * 6);
         let few = RibbonLevel::holding(4096, 16, 0.02, 0);
-        let few = meshes.get(&known.get(few, &mut meshes)).unwrap().indices().unwrap().len();
+        let few = known.get(few, &mut meshes);
+        let few = meshes.get(&few).unwrap().indices().unwrap().len();
         assert_eq!(few, 128 * 4 * 6);
         let none = RibbonLevel::full(0, 1).mesh();
         assert_eq!(none.indices().unwrap().len(), 0);
