@@ -1,7 +1,7 @@
 //! Pigments, bleach and dye: what fibres absorb, and the colour that a head shows of it.
 
 use bevy::prelude::*;
-use bevy_keratin::{look::MOST_LAYERS, prelude::*, setting::Ranged};
+use bevy_keratin::{look::MAX_LAYERS, prelude::*, setting::Ranged};
 
 #[test]
 fn more_melanin_is_darker_and_pheomelanin_redder() {
@@ -95,7 +95,7 @@ fn layers_follow_each_other_and_streaks_are_asked_for() {
     assert!((of(false).red - HairColor::COBALT.red).abs() < 1e-5);
     let layers = vec![DyeLayer::default(); 6];
     let many = HairDye { layers };
-    assert_eq!((many.violations().len(), many.clamped().layers.len()), (1, MOST_LAYERS));
+    assert_eq!((many.violations().len(), many.clamped().layers.len()), (1, MAX_LAYERS));
 }
 
 /// Roots evenly over a dome of 10 cm radius.

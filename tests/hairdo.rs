@@ -6,6 +6,12 @@ mod common;
 #[path = "../examples/salon/wardrobe.rs"]
 mod wardrobe;
 
+/// What the salon's wardrobe takes from the scenes.
+mod scenes {
+    #[derive(bevy::prelude::Component)]
+    pub struct Treated;
+}
+
 use bevy::prelude::*;
 use bevy_keratin::{
     FaultKind, prelude::*, save::NEWEST_FORMAT, strand::StrandHistory, treatment::Treatments,
@@ -613,6 +619,7 @@ fn order(app: &mut App, order: Order) -> String {
 #[test]
 fn the_salon_undoes_redoes_saves_and_loads() {
     let (mut app, hair, _) = straight();
+    app.world_mut().entity_mut(hair).insert(scenes::Treated);
     WardrobePlugin.build(&mut app);
     let rate = |app: &App| of(app, hair).strands()[0].joints()[3].rates[0];
     let treat = |app: &mut App, treat| {

@@ -73,8 +73,8 @@ impl Sources {
 }
 
 pub(super) fn plugin(app: &mut App) {
-    let compiled = Compiled::default();
-    app.insert_resource(compiled.clone());
+    app.init_resource::<Compiled>();
+    let compiled = app.world().resource::<Compiled>().clone();
     let Some(sources) = Sources::add(app.world_mut()) else { return };
     app.insert_resource(sources.clone());
     if let Some(render) = app.get_sub_app_mut(RenderApp) {

@@ -2,7 +2,7 @@
 
 use super::{
     hair::GpuHair,
-    record::{BlowerRecord, GpuJournal, MOST_BLOWERS, MOST_OBSTACLES, SubstepRecord},
+    record::{BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SubstepRecord},
     treatments::GpuTreatments,
 };
 use crate::{
@@ -59,7 +59,7 @@ pub(super) fn write_journals(
             skin: contact.of(hair).radius,
             limiter_steps: solver.of(hair).limiter_steps,
             cuticle: cuticle.of(hair),
-            blowers: (air.blowers.iter().take(MOST_BLOWERS))
+            blowers: (air.blowers.iter().take(MAX_BLOWERS))
                 .map(|seen| BlowerRecord {
                     nozzle: seen.nozzle,
                     aim: seen.aim,
@@ -67,7 +67,7 @@ pub(super) fn write_journals(
                     drying: seen.blower.drying,
                 })
                 .collect(),
-            obstacles: solids.iter().take(MOST_OBSTACLES).cloned().collect(),
+            obstacles: solids.iter().take(MAX_OBSTACLES).cloned().collect(),
             notes_before: substep.is_first,
             rests: substep.is_first && frame.has_jumped(),
             shapes: true,

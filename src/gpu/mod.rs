@@ -62,7 +62,7 @@ pub use plugin::HairGpuPlugin;
 pub use present::DrawnNodes;
 #[doc(hidden)]
 pub use record::{
-    BlowerRecord, GpuJournal, MOST_BLOWERS, MOST_OBSTACLES, MOST_TREATMENTS, SubstepRecord,
+    BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, MOST_TREATMENTS, SubstepRecord,
     TreatmentRecord,
 };
 pub use residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu};

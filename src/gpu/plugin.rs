@@ -12,6 +12,8 @@ use crate::{
     schedule::{HairSystems, HairTick, first_substep},
     setting,
     strand::{Hair, ReturnToCpu, keep_required},
+    treatment::HairTreatment,
+    water::SoakHair,
 };
 use bevy::prelude::*;
 
@@ -25,6 +27,10 @@ impl Plugin for HairGpuPlugin {
         setting::plugin::<SimulateOn>(app);
         setting::resource::<HairGpu>(app);
         keep_required::<Hair, HairResidence>(app);
+        // Present also in an app that is never finished, or without the plugins that own the messages.
+        app.init_resource::<compile::Compiled>()
+            .add_message::<SoakHair>()
+            .add_message::<HairTreatment>();
         app.insert_resource(ReturnToCpu(|world, hair| {
             return_now(world, hair, WhyCpu::Unsupported(Unsupported::Requested));
         }))

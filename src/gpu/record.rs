@@ -11,20 +11,20 @@ use bevy::{
 use core::ops::Range;
 
 /// The maximum number of obstacles in a record.
-pub const MOST_OBSTACLES: usize = 64;
+pub const MAX_OBSTACLES: usize = 64;
 
 /// The maximum number of blowers in a record.
-pub const MOST_BLOWERS: usize = 4;
+pub const MAX_BLOWERS: usize = 4;
 
 /// Treatments of some joints that a record holds at most.
 pub const MOST_TREATMENTS: usize = 8;
 
 /// Words of a record. Uniform buffers are bound at multiples of 256 bytes.
-pub(super) const WORDS: usize = (HEADER + 32 * MOST_OBSTACLES).next_multiple_of(64);
+pub(super) const WORDS: usize = (HEADER + 32 * MAX_OBSTACLES).next_multiple_of(64);
 
 /// Words before the obstacles, and before the treatments.
 const HEADER: usize = BEFORE_TREATMENTS + 4 + 12 * MOST_TREATMENTS;
-const BEFORE_TREATMENTS: usize = 36 + 8 * MOST_BLOWERS;
+const BEFORE_TREATMENTS: usize = 36 + 8 * MAX_BLOWERS;
 
 /// A blower in the hair's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -91,9 +91,9 @@ pub struct SubstepRecord {
     pub limiter_steps: u32,
     /// Wear of the cuticle.
     pub cuticle: Cuticle,
-    /// Blowers, [`MOST_BLOWERS`] at most.
+    /// Blowers, [`MAX_BLOWERS`] at most.
     pub blowers: Vec<BlowerRecord>,
-    /// Obstacles in the hair's frame, [`MOST_OBSTACLES`] at most.
+    /// Obstacles in the hair's frame, [`MAX_OBSTACLES`] at most.
     pub obstacles: Vec<Obstacle>,
     /// Whether it is the tick's first, which records the nodes' positions.
     pub notes_before: bool,
@@ -114,8 +114,8 @@ impl SubstepRecord {
     pub fn write(&self, out: &mut Vec<u32>) {
         let start = out.len();
         let mut words = Words(out);
-        let blowers = &self.blowers[..self.blowers.len().min(MOST_BLOWERS)];
-        let obstacles = &self.obstacles[..self.obstacles.len().min(MOST_OBSTACLES)];
+        let blowers = &self.blowers[..self.blowers.len().min(MAX_BLOWERS)];
+        let obstacles = &self.obstacles[..self.obstacles.len().min(MAX_OBSTACLES)];
         let remembers = blowers.iter().any(|b| b.drying != 0.0)
             || self.change.iter().chain(&self.share).any(|c| *c != 0.0)
             || !self.treatments.is_empty();

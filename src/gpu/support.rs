@@ -1,7 +1,7 @@
 //! What keeps a hair on the CPU: everything that acts on it and is not in the kernels.
 
 use super::{
-    record::{MOST_BLOWERS, MOST_OBSTACLES},
+    record::{MAX_BLOWERS, MAX_OBSTACLES},
     residence::Unsupported,
     treatments::GpuTreatments,
 };
@@ -82,8 +82,8 @@ impl Support<'_, '_> {
             (contact.radius > 0.0 && contact.strength > 0.0, Unsupported::StrandContact),
             (wet.is_some_and(|wet| wet.0) || !self.water.is_empty(), Unsupported::Water),
             (air.steady_wind().is_none(), Unsupported::UnsteadyWind),
-            (air.blowers.len() > MOST_BLOWERS, Unsupported::Blowers),
-            (solids.len() > MOST_OBSTACLES, Unsupported::Colliders),
+            (air.blowers.len() > MAX_BLOWERS, Unsupported::Blowers),
+            (solids.len() > MAX_OBSTACLES, Unsupported::Colliders),
             (
                 solids.iter().any(|o| matches!(o.solid, Solid::Placed(_))),
                 Unsupported::ColliderShape,

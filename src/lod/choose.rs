@@ -3,6 +3,7 @@
 use super::{
     PresentLod,
     follow::{Frame, GUIDES, StrandState, Ties},
+    model::waypoints,
     spread::spread_order,
 };
 use crate::{
@@ -460,11 +461,4 @@ fn state_of(strand: &Strand) -> StrandState<'_> {
         turns: strand.orientations(),
         lengths: strand.rest_lengths(),
     }
-}
-
-/// Root, middle and tip of a strand.
-fn waypoints(strand: &Strand) -> [Vec3; 3] {
-    let p = strand.positions();
-    let last = p.len().saturating_sub(1);
-    [0, last / 2, last].map(|i| p.get(i).copied().unwrap_or_default())
 }

@@ -1,6 +1,8 @@
 //! Level of detail as pure functions: which level, and how large hair is on the screen.
 
 use super::LodLevel;
+use crate::strand::Strand;
+use bevy::math::Vec3;
 
 /// The level for hair that takes up `share` of the view's height and was at level `before`: 0 in full, n
 /// the n-th of `levels`. Coarser at a level's limit, finer again only `hysteresis` beyond it. A NaN
@@ -25,6 +27,13 @@ pub fn screen_share(radius: f32, distance: f32, scale: f32) -> f32 {
     // The outline is tangent to the lines of sight: sine, not tangent. From inside it fills the view.
     let apart = distance * distance - radius * radius;
     if apart > 0.0 { (scale * radius / apart.sqrt()).min(100.0) } else { 100.0 }
+}
+
+/// Root, middle and tip of a strand.
+pub(super) fn waypoints(strand: &Strand) -> [Vec3; 3] {
+    let p = strand.positions();
+    let last = p.len().saturating_sub(1);
+    [0, last / 2, last].map(|i| p.get(i).copied().unwrap_or_default())
 }
 
 #[cfg(test)]

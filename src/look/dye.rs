@@ -9,7 +9,7 @@ use crate::setting::{Ranged, ValueRange, Violations, setting};
 use bevy::prelude::*;
 
 /// The most layers of dye that hair can have.
-pub const MOST_LAYERS: usize = 4;
+pub const MAX_LAYERS: usize = 4;
 
 setting! {
     /// Layers of bleach and dye on a hair, applied one after the other. Component of a
@@ -29,21 +29,18 @@ setting! {
     #[derive(Component, Reflect, Clone, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
     pub struct HairDye {
-        /// The layers, in the order of application. At most [`MOST_LAYERS`]; further ones are
+        /// The layers, in the order of application. At most [`MAX_LAYERS`]; further ones are
         /// ignored.
         pub layers: Vec<DyeLayer> = Vec::new() => clamp_layers;
     }
 }
 
 fn clamp_layers(layers: &mut Vec<DyeLayer>, violations: &mut Violations) {
-    const COUNT: ValueRange = ValueRange::new(
-        "HairDye::layers",
-        0.0..=MOST_LAYERS as f32,
-        "merge layers of the same dye",
-    );
+    const COUNT: ValueRange =
+        ValueRange::new("HairDye::layers", 0.0..=MAX_LAYERS as f32, "merge layers of the same dye");
     if let Err(wrong) = COUNT.check(layers.len()) {
         violations.push(wrong);
-        layers.truncate(MOST_LAYERS);
+        layers.truncate(MAX_LAYERS);
     }
     layers.clamp_values(violations);
 }
@@ -200,7 +197,7 @@ impl HairDye {
         is_in_streak: impl Fn(usize) -> bool,
     ) -> Vec3 {
         let mut absorption = natural;
-        for (i, layer) in self.layers.iter().take(MOST_LAYERS).enumerate() {
+        for (i, layer) in self.layers.iter().take(MAX_LAYERS).enumerate() {
             if layer.streaks.is_none() || is_in_streak(i) {
                 let cover = layer.cover(along);
                 absorption = absorption * (1.0 - layer.bleach * cover) + layer.absorption() * cover;

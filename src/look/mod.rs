@@ -17,7 +17,7 @@ mod pigment;
 mod streaks;
 
 pub use appearance::{HairLook, HairShading};
-pub use dye::{DyeLayer, HairDye, MOST_LAYERS};
+pub use dye::{DyeLayer, HairDye, MAX_LAYERS};
 pub use origin::WornPreset;
 pub use pigment::{HairColor, Melanin};
 pub use streaks::Streaks;

@@ -5,7 +5,7 @@ use super::{
     ribbon_mesh::{CORNER, DrawOrder},
     thickness::Thickness,
 };
-use crate::look::{HairDye, HairLook, HairShading, MOST_LAYERS};
+use crate::look::{HairDye, HairLook, HairShading, MAX_LAYERS};
 use bevy::{
     material::OpaqueRendererMethod,
     mesh::MeshVertexBufferLayoutRef,
@@ -91,7 +91,7 @@ pub(super) struct Ribbon {
     root_fade: f32,
     dye_count: u32,
     rank_step: u32,
-    dyes: [Dye; MOST_LAYERS],
+    dyes: [Dye; MAX_LAYERS],
 }
 
 /// `Dye` of `strands.wgsl`: a layer of dye.
@@ -105,8 +105,8 @@ struct Dye {
     in_streaks: u32,
 }
 
-fn dyes(dye: &HairDye) -> [Dye; MOST_LAYERS] {
-    let mut dyes = [Dye::default(); MOST_LAYERS];
+fn dyes(dye: &HairDye) -> [Dye; MAX_LAYERS] {
+    let mut dyes = [Dye::default(); MAX_LAYERS];
     for (to, layer) in dyes.iter_mut().zip(&dye.layers) {
         *to = Dye {
             absorption: layer.absorption(),
@@ -155,7 +155,7 @@ impl Ribbon {
             locks: followers.locks,
             lock_shape: followers.lock_shape,
             root_fade: look.root_fade,
-            dye_count: dye.layers.len().min(MOST_LAYERS) as u32,
+            dye_count: dye.layers.len().min(MAX_LAYERS) as u32,
             rank_step: DrawOrder::new(strands).rank_step(),
             dyes: dyes(dye),
         }

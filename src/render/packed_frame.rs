@@ -2,7 +2,7 @@
 
 use super::{
     detail::DrawnShare,
-    solids::{DrawnSolid, MOST_SOLIDS},
+    solids::{DrawnSolid, MAX_SOLIDS},
 };
 use bevy::prelude::*;
 
@@ -14,7 +14,7 @@ pub(super) struct PackedFrame {
     fade: f32,
     wider: f32,
     solid_count: u32,
-    solids: [DrawnSolid; MOST_SOLIDS],
+    solids: [DrawnSolid; MAX_SOLIDS],
 }
 
 impl Default for PackedFrame {
@@ -30,7 +30,7 @@ impl PackedFrame {
             fade: drawn.fade,
             wider: drawn.wider(),
             solid_count: 0,
-            solids: [DrawnSolid::default(); MOST_SOLIDS],
+            solids: [DrawnSolid::default(); MAX_SOLIDS],
         }
     }
 

@@ -205,8 +205,9 @@ mod tests {
         assert_eq!(indices, 100 * 8 * 6);
         let few = RibbonLevel::holding(4096, 16, 0.02, 0);
         let few = known.get(few, &mut meshes);
-        let few = meshes.get(&few).unwrap().indices().unwrap().len();
-        assert_eq!(few, 128 * 4 * 6);
+        let indices = meshes.get(&few).unwrap().indices().unwrap().len();
+        assert_eq!(indices, 128 * 4 * 6);
+        drop(few);
         let none = RibbonLevel::full(0, 1).mesh();
         assert_eq!(none.indices().unwrap().len(), 0);
         drop(first);

@@ -5,7 +5,7 @@ use crate::contact::{ColliderShape, HairCollider};
 use bevy::{math::Affine3A, prelude::*};
 
 /// How many solids a hair's drawn strands are pushed out of at most.
-pub(super) const MOST_SOLIDS: usize = 16;
+pub(super) const MAX_SOLIDS: usize = 16;
 /// How far outside strands are drawn (m).
 const CLEARANCE: f32 = 0.5e-3;
 /// Length from the root over which pushing sets in (m): roots are in the skin.

@@ -9,7 +9,7 @@ use super::{
     bytes::{Reader, Writer},
 };
 use crate::look::{
-    DyeLayer, HairColor, HairDye, HairLook, HairShading, MOST_LAYERS, Melanin, Streaks, WornPreset,
+    DyeLayer, HairColor, HairDye, HairLook, HairShading, MAX_LAYERS, Melanin, Streaks, WornPreset,
 };
 
 /// The longest name of a preset (bytes).
@@ -48,7 +48,7 @@ impl Hairdo {
             self.look = Some(look(from)?);
         }
         let layers: u64 = from.take("a number of layers of dye")?;
-        if layers > MOST_LAYERS as u64 {
+        if layers > MAX_LAYERS as u64 {
             return Err(from.wrong("at most four layers of dye"));
         }
         let layers = (0..layers).map(|_| layer(from)).collect::<Result<_, _>>()?;

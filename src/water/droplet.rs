@@ -223,7 +223,7 @@ setting! {
         pub made: u64 = 0;
         /// Fraction of the next drop that is due.
         pub owed: f32 = 0.0, "drops" in OWED: 0.0..=1.0, "less than one drop";
-        /// Whether the last substep would have emitted more than [`Shower::MOST`]; reported when
+        /// Whether the last substep would have emitted more than [`Shower::MAX_DROPS`]; reported when
         /// this begins.
         pub cut_short: bool = false;
     }
@@ -232,7 +232,7 @@ setting! {
 impl Shower {
     /// Largest number of drops per substep: that of the highest rate in 1/50 s. A longer substep
     /// leaves the rest out, which is reported.
-    pub const MOST: u64 = 2000;
+    pub const MAX_DROPS: u64 = 2000;
 
     /// A shower head of `rate` drops per second, each of `drop_radius` (m).
     ///
@@ -273,12 +273,12 @@ impl Shower {
     }
 
     /// The drops of the next `seconds` in the head's frame (drops leave along −Z), at most
-    /// [`Shower::MOST`]. Settings must be valid.
+    /// [`Shower::MAX_DROPS`]. Settings must be valid.
     pub(super) fn make(&mut self, seconds: f32) -> impl Iterator<Item = Droplet> + use<> {
         let owed = self.owed + self.rate * seconds;
         self.owed = owed.fract();
-        self.cut_short = owed as u64 > Self::MOST;
-        let count = (owed as u64).min(Self::MOST);
+        self.cut_short = owed as u64 > Self::MAX_DROPS;
+        let count = (owed as u64).min(Self::MAX_DROPS);
         let first = self.made;
         self.made = first.wrapping_add(count);
         let Self { drop_radius, speed, spread, opening, influence, seed, .. } = *self;

@@ -63,7 +63,7 @@ pub(super) fn run_showers(
                 "the shower's rate of {} drops/s makes more than {} in a substep of {} s: the rest is left \
                  out; lower `Shower::rate` or take a shorter fixed timestep",
                 valid.rate,
-                Shower::MOST,
+                Shower::MAX_DROPS,
                 step.dt
             );
             faults.write(HairFault::new(FaultKind::Setting, message).of(entity));

@@ -3,7 +3,7 @@
 use crate::lab::{LabStrand, Random};
 use bevy::prelude::*;
 use bevy_keratin::{
-    gpu::{BlowerRecord, Contents, LANES, Layout, MOST_BLOWERS, MOST_OBSTACLES, SubstepRecord},
+    gpu::{BlowerRecord, Contents, LANES, Layout, MAX_BLOWERS, MAX_OBSTACLES, SubstepRecord},
     rod::obstacle::{Obstacle, Solid},
 };
 use proptest::prelude::*;
@@ -76,7 +76,7 @@ fn a_record_is_as_long_whatever_it_holds() {
     for (blowers, obstacles) in [(2, 5), (4, 64), (9, 99)] {
         let words = words(blowers, obstacles);
         assert_eq!(words.len(), empty);
-        let counts = [blowers.min(MOST_BLOWERS), obstacles.min(MOST_OBSTACLES)];
+        let counts = [blowers.min(MAX_BLOWERS), obstacles.min(MAX_OBSTACLES)];
         assert_eq!([words[35], words[36]].map(|count| count as usize), counts);
     }
 }

@@ -2,7 +2,7 @@
 // src/gpu/record.rs.
 
 const LANES: u32 = 32u;
-const MOST_OBSTACLES: u32 = 64u;
+const MAX_OBSTACLES: u32 = 64u;
 
 struct Obstacle {
     // Half-space: its normal. Capsule: one end. Cylinder: its centre.
@@ -74,7 +74,7 @@ struct Substep {
     unused_2: u32,
     unused_3: u32,
     treatment: array<Treatment, 8>,
-    obstacle: array<Obstacle, MOST_OBSTACLES>,
+    obstacle: array<Obstacle, MAX_OBSTACLES>,
 }
 
 // Bits of Substep::flags.
