@@ -72,7 +72,8 @@ fn black_hair_is_drawn_pink_and_roots_and_tips_apart() {
     assert!(pink.distance(wanted) < 2e-3, "black hair that is dyed is as pink as white hair");
     let expected = hue(Vec3::new(dye.red, dye.green, dye.blue));
     println!("hue {} for {expected}", hue(pink));
-    assert!(hue(pink).distance(expected) < 0.02, "as pink as was said");
+    // Light that comes through the hair from behind is of a deeper colour than what is reflected.
+    assert!(hue(pink).distance(expected) < 0.03, "as pink as was said");
     assert!(pink.x > 1.5 * pink.z && pink.z > 1.2 * pink.y, "pink");
 
     // Up to two fifths from the roots: black below, to the bit.
