@@ -14,6 +14,7 @@ impl HairPreset {
     }
 
     /// Whether it has a parting.
+    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only drawn strands ask"))]
     pub(super) fn is_parted(self) -> bool {
         self.is_combed() && !matches!(self, Self::Undercut | Self::Beard)
     }
