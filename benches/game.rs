@@ -3,7 +3,8 @@
 //! Each preset on a head with shoulders, at rest and on a character who walks and looks around,
 //! with and without contact between strands; then crowds. Medians of five runs of 20 ticks; nothing
 //! is drawn and nothing sleeps. On one thread only its own processor time counts, whatever else runs
-//! on the machine. `KERATIN_BENCH_ONLY=wavy,crowd` prints only these rows.
+//! on the machine. `KERATIN_BENCH_ONLY=wavy,crowd` prints only these rows. `KERATIN_BENCH_PARTS=1` prints
+//! after each crowd which parts of a substep take the time.
 
 mod common;
 #[path = "../examples/presets/head.rs"]
@@ -33,6 +34,9 @@ const THREADS: &str = "KERATIN_BENCH_THREADS";
 
 /// The rows to print, if not all: presets by name, `crowd`.
 const ONLY: &str = "KERATIN_BENCH_ONLY";
+
+/// Whether to print what each part of a substep takes.
+const PARTS: &str = "KERATIN_BENCH_PARTS";
 
 /// Ticks in a run, and runs of which the median is printed.
 const TICKS: u32 = 20;
@@ -96,6 +100,10 @@ fn crowd_rows(threads: usize) {
     let presets = HairPreset::ALL[..7].to_vec();
     let planted: Vec<_> = presets.iter().copied().map(plant).collect();
     let mut app = app(threads);
+    let parts = std::env::var_os(PARTS).is_some();
+    if parts {
+        time_parts(&mut app);
+    }
     let mut place = 0;
     let mut add = |app: &mut App, count: usize, share: f32| {
         for _ in 0..count {
@@ -117,6 +125,52 @@ fn crowd_rows(threads: usize) {
         settle(&mut app);
         let [all] = in_turns(&mut app, |_, _| ());
         println!("{name} | {threads} | on | {all:.2}");
+        if parts {
+            print_parts(&mut app);
+        }
+    }
+}
+
+/// The time that each part of a substep takes.
+#[derive(Resource)]
+struct PartTimes {
+    last: Instant,
+    parts: Vec<(HairSystems, Duration)>,
+}
+
+/// Adds a clock between each part of a substep and the next.
+fn time_parts(app: &mut App) {
+    let all: Vec<HairSystems> = HairSystems::ALL
+        .into_iter()
+        .flat_map(|set| if set.parts().is_empty() { vec![set] } else { set.parts().to_vec() })
+        .collect();
+    app.insert_resource(PartTimes {
+        last: Instant::now(),
+        parts: all.iter().map(|part| (*part, Duration::ZERO)).collect(),
+    });
+    for (i, part) in all.iter().copied().enumerate() {
+        let mark = move |mut times: ResMut<PartTimes>| {
+            let (now, times) = (Instant::now(), &mut *times);
+            times.parts[i].1 += now - times.last;
+            times.last = now;
+        };
+        match all.get(i + 1) {
+            Some(next) => app.add_systems(HairTick, mark.after(part).before(*next)),
+            None => app.add_systems(HairTick, mark.after(part)),
+        };
+    }
+}
+
+/// Prints the parts that take most, of the ticks of this crowd.
+fn print_parts(app: &mut App) {
+    let mut times = app.world_mut().resource_mut::<PartTimes>();
+    times.parts.iter_mut().for_each(|(_, time)| *time = Duration::ZERO);
+    (0..TICKS).for_each(|_| app.update());
+    let mut parts = app.world().resource::<PartTimes>().parts.clone();
+    // The first part counts what is between two substeps as well.
+    parts.sort_by_key(|(_, time)| std::cmp::Reverse(*time));
+    for (part, time) in parts.iter().filter(|(_, time)| time.as_micros() > 20 * u128::from(TICKS)) {
+        println!("    {:.2} {part:?}", time.as_secs_f64() * 1e3 / f64::from(TICKS));
     }
 }
 
