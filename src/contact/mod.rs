@@ -8,6 +8,7 @@ mod collider;
 mod lanes;
 pub mod model;
 mod neighbours;
+mod reach;
 mod systems;
 
 pub use crate::rod::shape::{ConvexHull, DistanceGrid};
@@ -19,7 +20,8 @@ pub use systems::ContactPlugin;
 pub(crate) use {
     lanes::WetRow,
     model::{Bridged, Film},
-    systems::{HairReach, seen_from, with_balls},
+    reach::{Colliders, HairReach},
+    systems::seen_from,
 };
 
 use crate::{rod::obstacle::Obstacle, setting::setting};

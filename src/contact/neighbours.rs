@@ -176,14 +176,9 @@ impl Neighbours {
         self.expected.extend(own.iter().zip(nodes).map(|(row, p)| [p.x, p.y, p.z, row[3]]));
     }
 
-    /// Equation 18 for every node (m/s²), in the order they were added. The order of summation does not
-    /// depend on threads.
-    pub fn pushes(
-        &mut self,
-        radius: f32,
-        strength: f32,
-        lookup: Lookup,
-    ) -> impl Iterator<Item = Vec3> {
+    /// Evaluates equation 18 for every node, for [`pushes`](Self::pushes) to return. The order of
+    /// summation does not depend on threads.
+    pub fn find_pushes(&mut self, radius: f32, strength: f32, lookup: Lookup) {
         // Lists are padded with an edge at NaN.
         self.rows.extend([[f32::NAN; 4]; 2]);
         let reach = 2.0 * radius;
@@ -192,7 +187,7 @@ impl Neighbours {
             self.look_up(level, reach);
             self.measure_displacement();
         }
-        let Self { rows, strands, coarse, lists, parts, .. } = self;
+        let Self { rows, strands, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let penalty = Penalty { reach, strength };
         for_each_block(
@@ -204,8 +199,12 @@ impl Neighbours {
             },
         );
         lists.idle += parts.iter().map(|part| part.idle).sum::<usize>();
-        let pushes = parts.iter().flat_map(|part| part.pushes.iter().copied());
-        coarse.spread(pushes, Vec3::lerp)
+    }
+
+    /// What [`find_pushes`](Self::find_pushes) found for every node (m/s²), in the order they were added.
+    pub fn pushes(&self) -> impl Iterator<Item = Vec3> {
+        let pushes = self.parts.iter().flat_map(|part| part.pushes.iter().copied());
+        self.coarse.spread(pushes, Vec3::lerp)
     }
 
     /// Builds the lists.
@@ -284,7 +283,7 @@ impl Neighbours {
         self.beyond > 0.0
     }
 
-    /// The bridges of water at every node, after [`pushes`](Self::pushes) of the same places. `wet` has
+    /// The bridges of water at every node, after [`find_pushes`](Self::find_pushes) of the same places. `wet` has
     /// a row for each node, in the order they were added.
     pub fn bridges(&mut self, wet: &mut Vec<WetRow>, film: Film) -> impl Iterator<Item = Bridged> {
         self.coarse.pick(wet);
@@ -506,7 +505,8 @@ mod tests {
     fn pushes(list: &mut Neighbours, strands: &[Vec<Vec3>], radius: f32) -> Vec<Vec3> {
         list.clear();
         strands.iter().for_each(|s| list.add(s, 1));
-        list.pushes(radius, 20.0, Lookup::Now).collect()
+        list.find_pushes(radius, 20.0, Lookup::Now);
+        list.pushes().collect()
     }
 
     proptest! {
@@ -649,7 +649,8 @@ mod tests {
             }
             let lookup = if step == 0 { Lookup::Now } else { Lookup::Later };
             let before = list.lists.rows.clone();
-            let found: Vec<Vec3> = list.pushes(1e-3, 20.0, lookup).collect();
+            list.find_pushes(1e-3, 20.0, lookup);
+            let found: Vec<Vec3> = list.pushes().collect();
             looked_up += usize::from(list.lists.rows[..1] != before[..before.len().min(1)]);
             for (k, a) in found.into_iter().enumerate().filter(|(k, _)| k % 6 > 0) {
                 let b = brute(&strands, k / 6, strands[k / 6][k % 6], 1e-3);
@@ -705,8 +706,10 @@ mod tests {
             coarse.add(&strand(151, 7e-4 * k as f32), 1);
             fine.add(&strand(1501, 7e-4 * k as f32), 10);
         }
-        let expected: Vec<Vec3> = coarse.pushes(1e-3, 20.0, Lookup::Now).collect();
-        let found: Vec<Vec3> = fine.pushes(1e-3, 20.0, Lookup::Now).collect();
+        let [expected, found] = [&mut coarse, &mut fine].map(|list| {
+            list.find_pushes(1e-3, 20.0, Lookup::Now);
+            list.pushes().collect::<Vec<Vec3>>()
+        });
         assert_eq!((fine.nodes(), found.len()), (8 * 1501, 8 * 1501));
         for (k, push) in expected.iter().enumerate() {
             let (s, i) = (k / 151, k % 151);

@@ -2,16 +2,21 @@
 
 use super::{
     Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError, LockContact,
-    LockNeighbours, Obstacles, Openings, coarse, neighbours::Lookup,
+    LockNeighbours, Obstacles, Openings, coarse,
+    neighbours::Lookup,
+    reach::{Colliders, HairReach},
 };
 use crate::{
     fault::{FaultKind, HairFault},
-    parallel::prefetch,
+    parallel::{Nanos, for_each, prefetch},
     rod::{
         obstacle::{Obstacle, Solid},
         shape::{Placed, Shape},
     },
-    schedule::{EffectiveSubsteps, HairSettle, HairStep, HairSystems, HairTick, first_substep},
+    schedule::{
+        EffectiveSubstep, EffectiveSubsteps, HairSettle, HairStep, HairSystems, HairTick,
+        first_substep,
+    },
     setting::{self, Ranged, Settings},
     strand::{
         Hair, OnGpu, SleepPose, Sleepers, Strand, StrandOf, StrandSleep, Strands, TickPose,
@@ -23,6 +28,9 @@ use bevy::{ecs::entity::EntityHashSet, prelude::*};
 /// Strands do not touch each other where more than so many are followers for each one that is not: the
 /// guides of background hair are centimetres apart.
 const SPARSE: usize = 8;
+
+/// Approximate time of contact per node (ns).
+const CONTACT: usize = 100;
 
 /// How many strands are prefetched at once.
 const TOGETHER: usize = 16;
@@ -112,44 +120,6 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
     Obstacle { solid, motion, friction: collider.friction }
 }
 
-/// A bounding ball of a hair in any pose, in its own frame.
-#[derive(Component, Clone, Copy, Debug)]
-pub(crate) struct HairReach {
-    center: Vec3,
-    radius: f32,
-    /// Number of strands when it was computed, and ticks since.
-    members: usize,
-    age: u32,
-}
-
-impl Default for HairReach {
-    fn default() -> Self {
-        Self { center: Vec3::ZERO, radius: f32::INFINITY, members: 0, age: 0 }
-    }
-}
-
-impl HairReach {
-    /// Around strands with these roots and lengths (m).
-    fn around(strands: impl Iterator<Item = (Vec3, f32)>) -> Self {
-        let (mut low, mut high, mut longest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
-        for (root, length) in strands {
-            (low, high, longest) = (low.min(root), high.max(root), longest.max(length));
-        }
-        let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high) + longest);
-        Self { center, radius, ..default() }
-    }
-
-    /// Whether hair in `frame` may touch the content of `ball` within a tick of `substeps`.
-    pub(crate) fn is_near(&self, frame: &TickPose, ball: &Ball, substeps: u32) -> bool {
-        let (before, now) = (frame.before(), frame.now());
-        let travel = before.translation.distance(now.translation) + ball.travel;
-        let apart = ROOM * self.radius * now.scale + ball.radius + travel * substeps as f32;
-        let squared = ball.center.distance_squared(now.point_out(self.center));
-        // NaN counts as near, so that it is reported where it is used.
-        squared <= apart * apart || squared.is_nan() || apart.is_nan()
-    }
-}
-
 /// Ticks between checks of strands without outside writes: roots move little on a head.
 const LOOK_AGAIN: u32 = 16;
 
@@ -168,49 +138,9 @@ fn find_reach(
         let of_strand = |strand: &Strand| {
             (strand.positions().first().copied().unwrap_or_default(), strand.length())
         };
-        let found = HairReach::around(strands.iter_many(members.collection()).map(of_strand));
-        *reach = HairReach { members: members.len(), ..found };
+        *reach = HairReach::around(strands.iter_many(members.collection()).map(of_strand));
+        reach.members = members.len();
     }
-}
-
-/// Safety factor on the reach, for motion within a substep and stretched strands.
-const ROOM: f32 = 1.25;
-
-/// A ball around a collider in the world, and how far it moves in a substep (m).
-pub(crate) struct Ball {
-    center: Vec3,
-    radius: f32,
-    travel: f32,
-}
-
-impl Ball {
-    pub(crate) fn around(collider: &HairCollider, pose: &TickPose) -> Self {
-        let (before, now) = (pose.before(), pose.now());
-        let radius = match &collider.shape {
-            ColliderShape::Sphere(s) => s.radius,
-            ColliderShape::Capsule(c) => c.radius + c.half_length,
-            ColliderShape::Cylinder(c) => c.radius.hypot(c.half_height),
-            ColliderShape::Plane(_) => f32::INFINITY,
-            ColliderShape::Cuboid { cuboid, .. } => cuboid.half_size.length(),
-            ColliderShape::Ellipsoid { radii } => radii.max_element(),
-            ColliderShape::Hull(hull) => hull.reach(),
-            ColliderShape::Grid(grid) => grid.reach(),
-        };
-        let travel = before.translation.distance(now.translation);
-        let radius = radius * now.scale.max(before.scale);
-        Self { center: now.translation, radius, travel }
-    }
-}
-
-/// All colliders, clamped to valid values, with their bounding balls.
-pub(crate) fn with_balls<'a>(
-    colliders: &'a Query<(&HairCollider, &TickPose)>,
-) -> Vec<(Ball, HairCollider, &'a TickPose)> {
-    let with_ball = |(collider, pose): (&HairCollider, &'a TickPose)| {
-        let collider = collider.clamped();
-        (Ball::around(&collider, pose), collider, pose)
-    };
-    colliders.iter().map(with_ball).collect()
 }
 
 /// At the start of a tick: which colliders a hair may touch in it; none for a hair without simulated
@@ -220,15 +150,13 @@ fn choose_colliders(
     colliders: Query<(Entity, &HairCollider, &TickPose)>,
     mut hairs: Query<(&TickPose, &HairReach, Option<&Sleepers>, &mut Obstacles), With<Hair>>,
 ) {
-    let balls: Vec<(Ball, Entity)> = colliders
-        .iter()
-        .map(|(entity, collider, pose)| (Ball::around(&collider.clamped(), pose), entity))
-        .collect();
+    let valid: Vec<_> = colliders.iter().map(|(id, c, pose)| (c.clamped(), pose, id)).collect();
+    let all = Colliders::new(step.count, valid.iter().map(|(c, pose, id)| (c, *pose, *id)));
+    let mut scratch = Vec::new();
     for (pose, reach, sleepers, mut obstacles) in &mut hairs {
         obstacles.near.clear();
         if sleepers.is_none_or(|sleepers| sleepers.awake > 0) {
-            let near = balls.iter().filter(|(ball, _)| reach.is_near(pose, ball, step.count));
-            obstacles.near.extend(near.map(|(_, entity)| *entity));
+            obstacles.near.extend(all.near(pose, Some(reach), &mut scratch));
         }
     }
 }
@@ -259,35 +187,34 @@ fn too_fine(strand: &Strand, radius: f32, stride: usize) -> HairFault {
     HairFault::new(FaultKind::Strand, message)
 }
 
-pub(crate) fn push_strands_apart(
-    steps: EffectiveSubsteps,
-    contact: Settings<LockContact>,
-    mut hairs: Query<
-        (Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>),
-        (With<Hair>, Without<OnGpu>),
-    >,
-    mut strands: Query<(&mut Strand, &mut StrandSleep, &mut SleepPose), With<StrandOf>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    for (hair, members, mut neighbours, sleepers) in &mut hairs {
-        let LockContact { radius, strength } = contact.of(hair);
+/// A hair whose strands may touch in this substep.
+struct Touching<'a> {
+    hair: Entity,
+    members: &'a Strands,
+    neighbours: Mut<'a, LockNeighbours>,
+    contact: LockContact,
+    step: EffectiveSubstep,
+    /// The first strand that has too many nodes for contact.
+    fault: Option<HairFault>,
+}
+
+impl Touching<'_> {
+    /// Looks up neighbours and their pushes.
+    fn find<'s, 'w: 's>(
+        &mut self,
+        strands: &'s Query<'w, '_, (&'static Strand, &'static StrandSleep), With<StrandOf>>,
+    ) {
+        let Self { hair, members, neighbours, contact, step, fault } = self;
+        let LockContact { radius, strength } = *contact;
         let LockNeighbours { lists: list, members: (present, had_followers), is_reported } =
             neighbours.bypass_change_detection();
         // Followers take no part in contact, but in bridges of water.
         let with_followers = list.has_extra_margin();
-        let all_rest = sleepers.is_some_and(|s| s.awake == 0 && (s.asleep > 0 || !with_followers));
-        // Of so few strands none is near another. Bridges of water are between all.
-        let simulated = sleepers.map_or(members.len(), |s| s.awake + s.asleep);
-        let is_sparse = !with_followers && simulated * SPARSE < members.len();
-        if radius <= 0.0 || strength <= 0.0 || all_rest || is_sparse {
-            continue;
-        }
-        let Some(step) = steps.of(hair) else { continue };
         let reach = 2.0 * radius;
         list.clear();
         if step.is_first || with_followers != *had_followers {
             let takes_part = |id: &&Entity| {
-                strands.get(**id).is_ok_and(|(_, sleep, _)| with_followers || !sleep.is_follower())
+                strands.get(**id).is_ok_and(|(_, sleep)| with_followers || !sleep.is_follower())
             };
             present.clear();
             present.extend(members.collection().iter().filter(takes_part));
@@ -309,11 +236,52 @@ pub(crate) fn push_strands_apart(
                     list.expect(moving.map(|(p, v)| *p + *v * seconds));
                 }
                 if stride > 1 && !core::mem::replace(is_reported, true) {
-                    faults.write(too_fine(strand, radius, stride).of(hair));
+                    *fault = Some(too_fine(strand, radius, stride).of(*hair));
                 }
             }
         }
-        let mut pushes = list.pushes(radius, strength, lookup);
+        list.find_pushes(radius, strength, lookup);
+    }
+}
+
+pub(crate) fn push_strands_apart(
+    steps: EffectiveSubsteps,
+    contact: Settings<LockContact>,
+    mut hairs: Query<
+        (Entity, &Strands, &mut LockNeighbours, Option<&Sleepers>),
+        (With<Hair>, Without<OnGpu>),
+    >,
+    mut strands: ParamSet<(
+        Query<(&Strand, &StrandSleep), With<StrandOf>>,
+        Query<(&mut Strand, &mut StrandSleep, &mut SleepPose), With<StrandOf>>,
+    )>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let touching = hairs.iter_mut().filter_map(|(hair, members, neighbours, sleepers)| {
+        let contact = contact.of(hair);
+        let with_followers = neighbours.lists.has_extra_margin();
+        let all_rest = sleepers.is_some_and(|s| s.awake == 0 && (s.asleep > 0 || !with_followers));
+        // Of so few strands none is near another. Bridges of water are between all.
+        let simulated = sleepers.map_or(members.len(), |s| s.awake + s.asleep);
+        let is_sparse = !with_followers && simulated * SPARSE < members.len();
+        if contact.radius <= 0.0 || contact.strength <= 0.0 || all_rest || is_sparse {
+            return None;
+        }
+        let step = steps.of(hair)?;
+        Some(Touching { hair, members, neighbours, contact, step, fault: None })
+    });
+    let mut touching: Vec<Touching> = touching.collect();
+    let nodes: usize = touching.iter().map(|hair| hair.neighbours.nodes()).sum();
+    let each = Nanos(CONTACT * nodes / touching.len().max(1));
+    let present = strands.p0();
+    for_each(&mut touching, each, |hair| hair.find(&present));
+    let mut strands = strands.p1();
+    for Touching { mut neighbours, contact, step, fault, .. } in touching {
+        faults.write_batch(fault);
+        let LockContact { radius, strength } = contact;
+        let LockNeighbours { lists, members: (present, _), .. } =
+            neighbours.bypass_change_detection();
+        let mut pushes = lists.pushes();
         for some in present.chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.velocities()));
             let mut some = strands.iter_many_mut(some);
@@ -332,29 +300,5 @@ pub(crate) fn push_strands_apart(
                 velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * step.dt);
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::strand::Pose;
-    use bevy::reflect::GetPath;
-
-    #[test]
-    fn a_hair_is_near_what_it_can_reach_in_a_tick() {
-        // On a frame of twice the size that moves 5 mm a substep, beside a ball that moves 10 mm.
-        let reach = HairReach { radius: 0.1, ..default() };
-        let mut frame = TickPose::default();
-        let now = Pose { scale: 2.0, ..default() };
-        *frame.path_mut("now").unwrap() = now;
-        *frame.path_mut("before").unwrap() = Pose { translation: Vec3::Y * 5e-3, ..now };
-        let is_near = |distance: f32| {
-            let ball = Ball { center: Vec3::X * distance, radius: 0.05, travel: 0.01 };
-            reach.is_near(&frame, &ball, 6)
-        };
-        let touches = ROOM * 0.1 * 2.0 + 0.05 + (5e-3 + 0.01) * 6.0;
-        assert!(is_near(touches - 1e-3) && !is_near(touches + 1e-3));
-        assert!(is_near(f32::NAN), "what is no number is seen where it is used");
     }
 }

@@ -196,13 +196,13 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
     let drawn =
         DrawnElsewhere { low: low - longest, high: high + longest, overstep: 1.0, rests: false };
     let sleepers = Sleepers { asleep: 0, awake: members.len() };
-    let parts = (gpu, treatments, GpuJournal::default(), drawn, OnGpu, sleepers);
+    let parts = (gpu, treatments, GpuJournal::default(), drawn, OnGpu::HANDED_OVER, sleepers);
     world.entity_mut(hair).insert((parts, HairResidence::Gpu));
     for member in &members {
         if let Some(mut treatments) = world.get_mut::<Treatments>(*member) {
             treatments.bypass_change_detection().acting_mut().clear();
         }
     }
-    world.insert_batch(members.into_iter().map(|member| (member, OnGpu)));
+    world.insert_batch(members.into_iter().map(|member| (member, OnGpu::HANDED_OVER)));
     Ok(())
 }

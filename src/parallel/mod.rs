@@ -18,7 +18,7 @@ use {bevy::tasks::ComputeTaskPool, queue::Queue};
 /// The minimum work of a task: waking a thread takes longer than doing less.
 pub(crate) const TASK: Nanos = Nanos(50_000);
 
-/// The minimum number of such tasks for which other threads are woken: waking one and being woken
+/// The minimum work, in such tasks, for which other threads are woken: waking one and being woken
 /// by it at the end takes about as long as two tasks.
 #[cfg(feature = "parallel")]
 const MIN_TASKS: usize = 4;
@@ -123,7 +123,8 @@ fn for_each_init<T: Send, S>(
     if let Some(pool) = ComputeTaskPool::try_get() {
         let workers = pool.thread_num() + 1;
         let least = TASK.0.div_ceil(each.0.max(1));
-        if workers > 1 && items.len() >= MIN_TASKS * least {
+        let is_worth_it = items.len().saturating_mul(each.0) >= MIN_TASKS * TASK.0;
+        if workers > 1 && items.len() > 1 && is_worth_it {
             // More chunks than threads, because some take longer than others.
             let chunk = items.len().div_ceil(workers * 8).max(least);
             let chunks = items.len().div_ceil(chunk);

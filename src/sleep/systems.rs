@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     bond::{BondChanges, BondInfluence, Bonds, Cuticle},
-    contact::{HairCollider, HairReach, LockContact, seen_from, with_balls},
+    contact::{Colliders, HairCollider, HairReach, LockContact, seen_from},
     environment::{AirDrag, HairGravity, LocalWinds, Winds},
     mass_spring::Springs,
     parallel::{Nanos, for_each},
@@ -117,6 +117,13 @@ struct WakeEvents {
     /// Colliders that appeared, disappeared or moved: strands within reach of these wake (m).
     solids: Vec<(Solid, f32)>,
     winds: LocalWinds,
+}
+
+impl WakeEvents {
+    /// All strands wake.
+    fn all(sleep: HairSleep) -> Self {
+        Self { sleep, all_wake: true, solids: Vec::new(), winds: LocalWinds::default() }
+    }
 }
 
 impl SleepSnapshot {
@@ -246,26 +253,30 @@ fn update_sleep(
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
-    let colliders = with_balls(&colliders);
+    let valid: Vec<_> = colliders.iter().map(|(c, pose)| (c.clamped(), pose)).collect();
+    let all = valid.iter().map(|item| (&item.0, item.1, item));
+    let (colliders, mut scratch) = (Colliders::new(step.count, all), Vec::new());
     for (hair, frame, mut snapshot, sleepers, members, reach) in &mut hairs {
+        index_of.insert(hair, wake_events.len());
+        let snapshot = snapshot.bypass_change_detection();
+        // Hair without simulated strands has none to wake; the first that it gets are awake.
+        if *sleepers == Sleepers::default() {
+            snapshot.conditions = None;
+            wake_events.push(WakeEvents::all(settings.sleep.of(hair)));
+            continue;
+        }
         // A collider that comes within reach counts as new while it is still far from any strand.
-        // Hair without simulated strands has none to wake.
-        let colliders = if *sleepers != Sleepers::default() { &colliders[..] } else { &[] };
-        let near = colliders
-            .iter()
-            .filter(|(ball, ..)| reach.is_none_or(|reach| reach.is_near(frame, ball, step.count)));
-        let seen = near.map(|(_, collider, pose)| {
+        let near = colliders.near(frame, reach, &mut scratch);
+        let seen = near.map(|(collider, pose)| {
             let Obstacle { solid, friction, .. } = seen_from(frame, collider, pose);
             let rotation = frame.now().rotation.inverse() * pose.now().rotation;
             SeenCollider { solid, friction, rotation }
         });
         let seen = seen.collect();
         let members = members.map_or(0, |members| members.len());
-        let snapshot = snapshot.bypass_change_detection();
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), members, seen, step.count);
         new.winds = winds.seen_from(frame.now());
-        index_of.insert(hair, wake_events.len());
         wake_events.push(new);
     }
     // Strands are mostly grouped by hair.

@@ -55,7 +55,7 @@ impl FramePoses {
     fn are_valid(&self) -> bool {
         let last = self.last.iter().flatten();
         last.clone().all(|(seconds, _)| seconds.is_finite())
-            && last.map(|(_, pose)| pose).chain(&self.seen).all(Pose::is_valid)
+            && last.map(|(_, pose)| pose).chain(&self.seen).all(Pose::is_rigid)
     }
 
     fn record(&mut self, seconds: f64, pose: Pose) {
@@ -181,6 +181,11 @@ impl Pose {
             && *scale > 1e-9
     }
 
+    /// Whether it is valid, with a rotation of unit length, as the tick keeps them.
+    fn is_rigid(&self) -> bool {
+        self.is_valid() && self.rotation.is_normalized()
+    }
+
     /// From `self` (0) to `to` (1).
     pub(crate) fn toward(&self, to: &Self, t: f32) -> Self {
         // At rest the pose has to stay the same to the last bit: far from the origin an ulp is a visible jump.
@@ -274,7 +279,7 @@ impl TickPose {
         self.was_invalid = to.is_none();
         // Written from outside, for instance by an inspector: start over.
         let known = [self.to, self.now, self.before, self.from.unwrap_or_default()];
-        if !known.iter().all(Pose::is_valid) || !self.frames.are_valid() {
+        if !known.iter().all(Pose::is_rigid) || !self.frames.are_valid() {
             *self = Self { jumps: self.jumps, was_invalid: self.was_invalid, ..default() };
         }
         self.inertia = Vec2::new(inertia.moving, inertia.turning);
@@ -437,7 +442,8 @@ mod tests {
     fn values_written_into_a_pose_are_replaced_in_the_next_tick() {
         let a = Pose { translation: Vec3::X, ..default() };
         let broken = Pose { scale: 0.0, ..a };
-        let spoils: [fn(&mut TickPose, Pose); 5] = [
+        let spoils: [fn(&mut TickPose, Pose); 6] = [
+            |pose, _| pose.to.rotation.x = 1e6,
             |pose, broken| pose.to = broken,
             |pose, broken| pose.now = broken,
             |pose, _| pose.before.rotation = Quat::from_array([0.0; 4]),

@@ -8,9 +8,18 @@ use bevy::prelude::*;
 ///
 /// A marked strand's [`Strand`](crate::Strand) and [`Bonds`](crate::Bonds) are as they were when it was
 /// handed over, or when somebody last asked for them. Whoever writes to them returns the hair to the CPU.
-#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct OnGpu;
+///
+/// Only the crate itself can make it, and neither clones, scenes nor inspectors copy it: nothing would
+/// simulate a strand that is marked and not there.
+#[derive(Component, Debug)]
+#[component(clone_behavior = Ignore)]
+pub struct OnGpu(());
+
+#[cfg(feature = "gpu")]
+impl OnGpu {
+    /// The mark of hair that has been handed over.
+    pub(crate) const HANDED_OVER: Self = Self(());
+}
 
 /// Brings a hair back at once. Set by the feature `gpu`.
 #[derive(Resource, Clone, Copy, Debug)]

@@ -12,6 +12,8 @@ pub struct StrandSleep {
     /// How long the strand has been still (s).
     still: f32,
     asleep: bool,
+    /// Follows from its guides, which nobody else knows of: not for inspectors to write.
+    #[reflect(ignore)]
     follower: bool,
     disturbed: bool,
 }

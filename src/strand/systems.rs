@@ -25,7 +25,7 @@ use bevy::{
 
 /// Estimated time per strand (ns) of copying it, and of applying its hair's frame delta.
 const COPY: Nanos = Nanos(100);
-const FRAME_DELTA: Nanos = Nanos(250);
+const FRAME_DELTA: Nanos = Nanos(600);
 
 /// Hair and strands as entities, and their frames.
 pub struct StrandPlugin;
@@ -55,7 +55,6 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandSleep>()
             .register_type::<Sleepers>()
             .register_type::<SleepPose>()
-            .register_type::<OnGpu>()
             .add_systems(HairChecks, report_unusable)
             .add_systems(HairFrame, record_frame)
             .add_systems(
@@ -275,11 +274,13 @@ fn apply_frame_inertia(
 }
 
 fn shift_by(strand: &mut Strand, frame_delta: &Isometry3d) {
-    let turn = frame_delta.rotation;
-    strand.positions.iter_mut().skip(1).for_each(|p| *p = *frame_delta * *p);
-    strand.velocities.iter_mut().for_each(|v| *v = turn * *v);
+    let (turn, way) = (frame_delta.rotation, Vec3::from(frame_delta.translation));
+    // For many points a matrix is cheaper than a quaternion.
+    let matrix = Mat3::from_quat(turn);
+    strand.positions.iter_mut().skip(1).for_each(|p| *p = matrix * *p + way);
+    strand.velocities.iter_mut().for_each(|v| *v = matrix * *v);
     strand.orientations.iter_mut().for_each(|q| *q = (turn * *q).normalize());
-    strand.angular_velocities.iter_mut().for_each(|v| *v = turn * *v);
+    strand.angular_velocities.iter_mut().for_each(|v| *v = matrix * *v);
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! `Interaction`: bridges of water pull wet strands together and damp their relative motion.
 
-use super::{HairWetting, Moisture, droplet_contact::WaterField, moisture::node_lengths};
+use super::{
+    HairWetting, Moisture, droplet_contact::WaterField, exchange::FoundWater,
+    moisture::node_lengths,
+};
 use crate::{
     contact::{Bridged, Film, LockContact, LockNeighbours},
     schedule::EffectiveSubsteps,
@@ -29,13 +32,14 @@ pub struct HairDried {
 }
 
 pub(super) fn update_is_wet(
+    found: Res<FoundWater>,
     mut hairs: Query<(Entity, &Strands, &mut IsWet), (With<Hair>, Without<OnGpu>)>,
     strands: Query<&Moisture>,
     mut commands: Commands,
 ) {
     for (entity, members, mut wet) in &mut hairs {
         let mut moistures = strands.iter_many(members.collection());
-        let is_wet = moistures.any(|moisture| !moisture.is_untouched());
+        let is_wet = found.0 && moistures.any(|moisture| !moisture.is_untouched());
         if wet.0 && !is_wet {
             commands.trigger(HairDried { entity });
         }

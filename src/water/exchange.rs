@@ -1,7 +1,7 @@
 //! `ExternalForces`: showers spawn drops, hair soaks and dries, and hydrogen bonds follow the water.
 
 use super::{
-    Counted, Droplet, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
+    Counted, Droplet, HairWetting, Moisture, Shower, SoakHair, WaterLedger, WaterVolume,
     model::{ball_radius, clinging},
     moisture::{AFTER_DRIP, Exposure, WaterConditions, WaterLoss, node_lengths},
 };
@@ -17,10 +17,31 @@ use crate::{
     setting::{Ranged, Settings, report},
     strand::{AddedMass, Hair, InWater, OnGpu, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
 };
-use bevy::{ecs::entity_disabling::Disabled, prelude::*};
+use bevy::{
+    ecs::{entity_disabling::Disabled, system::SystemParam},
+    prelude::*,
+};
 
 /// Approximate cost of a strand (ns), averaged over wet and dry ones.
 const EXCHANGE: Nanos = Nanos(500);
+
+/// Whether the last substep that looked found water in any hair: while there is none, the others need not
+/// look.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+pub(super) struct FoundWater(pub(super) bool);
+
+/// Whether there is something that wets hair: then every substep looks.
+#[derive(SystemParam)]
+pub(super) struct Wetting<'w, 's> {
+    droplets: Query<'w, 's, (), With<Droplet>>,
+    volumes: Query<'w, 's, (), With<WaterVolume>>,
+}
+
+impl Wetting<'_, '_> {
+    fn is_any(&self) -> bool {
+        !self.droplets.is_empty() || !self.volumes.is_empty()
+    }
+}
 
 /// Repairs moisture of new strands and moisture written from outside, for instance by an inspector. Our
 /// own writes bypass change detection.
@@ -30,6 +51,7 @@ pub(super) fn repair_moistures(
         (Changed<Moisture>, Without<OnGpu>, Allow<Disabled>),
     >,
     mut ledger: ResMut<WaterLedger>,
+    mut found: ResMut<FoundWater>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for (entity, mut moisture) in &mut moistures {
@@ -38,6 +60,7 @@ pub(super) fn repair_moistures(
             faults.write(HairFault::new(FaultKind::Setting, found).of(entity));
         }
         ledger.record(moisture.recount());
+        found.0 |= !moisture.is_untouched();
     }
 }
 
@@ -121,10 +144,14 @@ pub(super) fn exchange_water(
         Without<OnGpu>,
     >,
     on_gpu: Query<(), With<OnGpu>>,
-    mut soaks: MessageReader<SoakHair>,
-    mut ledger: ResMut<WaterLedger>,
+    (mut soaks, wets): (MessageReader<SoakHair>, Wetting),
+    (mut ledger, mut found): (ResMut<WaterLedger>, ResMut<FoundWater>),
     mut faults: MessageWriter<HairFault>,
 ) {
+    let damp = air.equilibrium > 0.0;
+    if step.index > 0 && !damp && !found.0 && soaks.is_empty() && !wets.is_any() {
+        return;
+    }
     let held = |hair: Entity| clinging(wetting.of(hair).bundle(1.0), gravity.clamped().0.length());
     for soak in soaks.read() {
         let members = match hairs.get(soak.target) {
@@ -152,7 +179,6 @@ pub(super) fn exchange_water(
             }
         }
     }
-    let damp = air.equilibrium > 0.0;
     let is_still = winds.are_still();
     let process = process.clamped().0;
     let gravity = gravity.clamped().0;
@@ -172,6 +198,7 @@ pub(super) fn exchange_water(
     let done = for_each_part(EXCHANGE, tables(&mut strands), Vec::new, |items, rows| {
         let (mut waters, mut done) = (PerHair::default(), Done::default());
         for (of, strand, bonds, air, moisture, added_mass, changes) in rows {
+            done.found |= damp || !moisture.is_untouched() || !added_mass.in_water.is_empty();
             if (damp || !moisture.is_untouched() || !added_mass.in_water.is_empty())
                 && let Some(hair) = waters.index(of.0, || water_of(of.0))
                 && strand.nodes() >= 2
@@ -199,7 +226,9 @@ pub(super) fn exchange_water(
         }
         done
     });
-    for Done { evaporated, merged, removed, drips } in done {
+    found.0 = false;
+    for Done { found: any, evaporated, merged, removed, drips } in done {
+        found.0 |= any;
         ledger.record(-evaporated);
         ledger.record(-merged);
         ledger.water_out += removed;
@@ -212,6 +241,8 @@ pub(super) fn exchange_water(
 /// Water balance of some strands.
 #[derive(Default)]
 struct Done {
+    /// Whether any of them has water.
+    found: bool,
     /// Evaporated water (m³); negative where hair absorbed vapour.
     evaporated: f64,
     /// Water given to the surrounding water (m³); negative where hair absorbed it.

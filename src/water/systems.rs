@@ -4,7 +4,7 @@ use super::{
     Droplet, DropletRules, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
     bridge::{HairDried, IsWet, join_wet_strands, update_is_wet},
     droplet_contact::{WaterField, wet_strands},
-    exchange::{exchange_water, repair_moistures, run_showers},
+    exchange::{FoundWater, exchange_water, repair_moistures, run_showers},
     merge::merge_droplets,
     motion::{follow_strands, move_droplets},
     strand_block,
@@ -31,6 +31,7 @@ impl Plugin for WaterPlugin {
         setting::component::<WaterVolume>(app);
         app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
+            .init_resource::<FoundWater>()
             .add_message::<SoakHair>()
             .register_type::<WaterLedger>()
             .register_type::<Droplet>()

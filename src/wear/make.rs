@@ -23,12 +23,19 @@ use crate::{
 };
 #[cfg(feature = "render")]
 use crate::{look::HairLook, plant::FollowerPlanting};
-use bevy::{math::Affine3A, platform::collections::HashMap, prelude::*};
+use bevy::{
+    math::Affine3A, mesh::VertexAttributeValues as Values, platform::collections::HashMap,
+    prelude::*,
+};
 
 /// Surface points of head and body for fitting balls.
 const POINTS: usize = 2500;
 /// Largest number of balls for a head.
 const MAX_BALLS: usize = 16;
+/// A capsule that is farther from the skin than this, as a root mean square (m), gives way to balls.
+const LOOSE: f32 = 4e-3;
+/// Largest number of balls for a joint.
+const MAX_JOINT_BALLS: usize = 10;
 /// Distance beyond the hair's length within which meshes are considered (m).
 const MARGIN: f32 = 0.15;
 /// Largest median distance of a groom's roots from the mesh (m).
@@ -216,13 +223,14 @@ fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>
     each.collect()
 }
 
-/// A capsule for each joint other than the head's that hair reaches; none where the fit fails.
+/// For each joint other than the head's that hair reaches the capsule that fits, or balls where it is of
+/// another shape; none where the fit fails.
 fn capsules(
     parts: &[MeshPart],
     fitting: &Fitting,
     reach: f32,
 ) -> Vec<(Entity, (HairCollider, Transform))> {
-    let mut best: HashMap<Entity, (f32, (HairCollider, Transform))> = default();
+    let mut best: HashMap<Entity, (f32, Vec<(HairCollider, Transform)>)> = default();
     let mut order = Vec::new();
     for part in parts {
         let Some(skin) = &part.skin else { continue };
@@ -245,10 +253,62 @@ fn capsules(
                     if known.is_none() {
                         order.push(joint);
                     }
-                    best.insert(joint, (radius, collider));
+                    let balls = match capsule.deviation * scale > LOOSE {
+                        true => joint_balls(&part.mesh, i, &(to_hair, there), reach),
+                        false => Vec::new(),
+                    };
+                    let solids = if balls.is_empty() { vec![collider] } else { balls };
+                    best.insert(joint, (radius, solids));
                 }
             }
         }
     }
-    order.into_iter().filter_map(|joint| Some((joint, best.remove(&joint)?.1))).collect()
+    let solids = order.into_iter().filter_map(|joint| Some((joint, best.remove(&joint)?.1)));
+    solids.flat_map(|(joint, all)| all.into_iter().map(move |solid| (joint, solid))).collect()
+}
+
+/// Balls inside what joint `i` moves more than any other, in the space of the joint, given the transforms
+/// to the hair's from the mesh's and from the joint's.
+fn joint_balls(
+    mesh: &Mesh,
+    i: usize,
+    (from_mesh, from_joint): &(Affine3A, Affine3A),
+    reach: f32,
+) -> Vec<(HairCollider, Transform)> {
+    let (
+        Some(Values::Float32x3(places)),
+        Some(Values::Float32x3(normals)),
+        Some(Values::Uint16x4(joints)),
+        Some(Values::Float32x4(weights)),
+    ) = (
+        mesh.attribute(Mesh::ATTRIBUTE_POSITION),
+        mesh.attribute(Mesh::ATTRIBUTE_NORMAL),
+        mesh.attribute(Mesh::ATTRIBUTE_JOINT_INDEX),
+        mesh.attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT),
+    )
+    else {
+        return Vec::new();
+    };
+    let near: Vec<(usize, Vec3)> = (places.iter().enumerate())
+        .map(|(v, at)| (v, from_mesh.transform_point3(Vec3::from(*at))))
+        .filter(|(_, at)| at.length() < reach)
+        .collect();
+    let some: Vec<(usize, Vec3)> =
+        near.iter().step_by(near.len().div_ceil(POINTS).max(1)).copied().collect();
+    let normal_of = |v: usize| from_mesh.transform_vector3(normals[v].into()).normalize_or_zero();
+    let points: Vec<(Vec3, Vec3)> = some.iter().map(|(v, at)| (*at, normal_of(*v))).collect();
+    let is_moved = |k: usize| {
+        let v = some[k].0;
+        let share = joints[v].iter().zip(weights[v]).filter(|(j, _)| usize::from(**j) == i);
+        share.map(|(_, weight)| weight).sum::<f32>() >= 0.5
+    };
+    let rules = BallRules { widest: 0.12, within: 1e-3, near: 4e-3, most: MAX_JOINT_BALLS };
+    let (to_joint, scale) = (from_joint.inverse(), from_joint.matrix3.determinant().abs().cbrt());
+    let balls = inscribed_balls(&points, is_moved, &rules);
+    let each = balls.into_iter().filter_map(|ball| {
+        let place = to_joint.transform_point3(ball.center.into());
+        let ball = HairCollider::sphere(ball.radius() / scale).ok()?;
+        Some((ball, Transform::from_translation(place)))
+    });
+    each.collect()
 }

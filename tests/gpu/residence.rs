@@ -6,6 +6,7 @@ use bevy_keratin::{
     FaultKind,
     gpu::{HairResidence, Unsupported, WhyCpu},
     prelude::*,
+    strand::OnGpu,
 };
 
 /// Other hair on the same device, after some ticks there: a software device takes seconds for the kernels.
@@ -206,6 +207,18 @@ fn what_is_not_supported_brings_hair_home_and_is_done_there(stage: &mut Stage) {
     stage.run(1);
     let regroomed = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::Regroomed));
     assert_eq!(stage.residence(), regroomed);
+    // A clone of one that is there: simulated as the others are.
+    on_gpu(stage, 6, 5);
+    let one = stage.members()[2];
+    let clone = stage.app.world_mut().entity_mut(one).clone_and_spawn();
+    stage.run(1);
+    assert_eq!(stage.residence(), regroomed);
+    let tip =
+        |stage: &Stage, e| *stage.app.world().get::<Strand>(e).unwrap().positions().last().unwrap();
+    let before = tip(stage, clone);
+    stage.run(3);
+    assert!(!stage.app.world().entity(clone).contains::<OnGpu>());
+    assert!(tip(stage, clone) != before, "it stands still");
 }
 
 fn what_the_game_writes_is_kept(stage: &mut Stage) {
