@@ -139,6 +139,12 @@ impl HairReach {
         Self { center, radius, ..default() }
     }
 
+    /// Roots have moved.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn look_again(&mut self) {
+        self.members = UNKNOWN;
+    }
+
     /// Whether hair in `frame` may touch the content of `ball` within a tick of `substeps`.
     pub(crate) fn is_near(&self, frame: &TickPose, ball: &Ball, substeps: u32) -> bool {
         let (before, now) = (frame.before(), frame.now());
@@ -150,17 +156,24 @@ impl HairReach {
     }
 }
 
+/// A number of strands that no hair has.
+const UNKNOWN: usize = usize::MAX;
+
 /// Ticks between checks of strands without outside writes: roots move little on a head.
 const LOOK_AGAIN: u32 = 16;
 
 fn find_reach(
-    mut hairs: Query<(Entity, &Strands, &mut HairReach), (With<Hair>, Without<OnGpu>)>,
+    mut hairs: Query<(Entity, &Strands, &mut HairReach, Has<OnGpu>), With<Hair>>,
     touched: Query<&StrandOf, (Changed<Strand>, Without<OnGpu>)>,
     strands: Query<&Strand>,
 ) {
     let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
-    for (hair, members, mut reach) in &mut hairs {
+    for (hair, members, mut reach, on_gpu) in &mut hairs {
         let reach = reach.bypass_change_detection();
+        // On the GPU roots stay, or somebody says that they have moved.
+        if on_gpu && reach.members != UNKNOWN {
+            continue;
+        }
         reach.age += 1;
         if reach.members == members.len() && reach.age < LOOK_AGAIN && !touched.contains(&hair) {
             continue;

@@ -9,6 +9,8 @@ use super::{
     strands::GpuStrands,
     treatments::GpuTreatments,
 };
+#[cfg(feature = "groom")]
+use crate::attach::TiedRoots;
 use crate::{
     bond::Bonds,
     render::DrawnElsewhere,
@@ -42,6 +44,8 @@ pub(super) struct GpuHair {
     /// Time since that was asked for (s), and ticks since the hair was handed over.
     pub(super) since_checkpoint: f32,
     pub(super) ticks: u32,
+    /// Whether its roots are tied to a mesh.
+    pub(super) is_tied: bool,
     /// Ticks until a strand's fault is told of again.
     pub(super) told: u32,
     /// Requests that came on the way back.
@@ -57,14 +61,16 @@ pub(super) struct Print {
 }
 
 impl Print {
-    pub(super) fn of(strand: &Strand) -> Self {
+    /// Without its root, where that is moved by the tick.
+    pub(super) fn of(strand: &Strand, is_tied: bool) -> Self {
         let of = |vectors: &[Vec3]| {
             let words = vectors.iter().flat_map(|v| v.to_array()).map(|x| u64::from(x.to_bits()));
             words.fold(0xcbf2_9ce4_8422_2325, |sum: u64, word| {
                 (sum ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
             })
         };
-        Self { places: of(strand.positions()), velocities: of(strand.velocities()) }
+        let places = strand.positions().get(usize::from(is_tied)..).unwrap_or_default();
+        Self { places: of(places), velocities: of(strand.velocities()) }
     }
 }
 
@@ -114,6 +120,10 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
     let Some(members) = world.get::<Strands>(hair).map(|all| all.collection().to_vec()) else {
         return refused(Unsupported::Strands);
     };
+    #[cfg(feature = "groom")]
+    let is_tied = world.get::<TiedRoots>(hair).is_some_and(TiedRoots::are_tied);
+    #[cfg(not(feature = "groom"))]
+    let is_tied = false;
     let mut views = Vec::with_capacity(members.len());
     let mut acting: Option<&[HairTreatment]> = None;
     for member in &members {
@@ -137,7 +147,9 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
             (strand.nodes() < 2 || bonds.joints.len() != strand.edges(), Unsupported::Strands),
             (entity.contains::<Disabled>(), Unsupported::Strands),
             (
-                history.root.is_some() || strand.root_before() != (root, strand.root_frame()),
+                !is_tied
+                    && (history.root.is_some()
+                        || strand.root_before() != (root, strand.root_frame())),
                 Unsupported::MovingRoots,
             ),
             (
@@ -179,7 +191,7 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
     let strands = members.iter().filter_map(|member| world.get::<Strand>(*member));
     let gpu = GpuHair {
         link: Link::new((ready.number, &ready.device, &ready.queue), ready.kernels.clone(), on),
-        prints: strands.map(Print::of).collect(),
+        prints: strands.map(|strand| Print::of(strand, is_tied)).collect(),
         at: world.read_change_tick(),
         newest: 0,
         is_new: false,
@@ -189,6 +201,7 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
         since_checkpoint: 0.0,
         ticks: 0,
         told: 0,
+        is_tied,
         soaked: Vec::new(),
         treated: Vec::new(),
         members: members.clone(),

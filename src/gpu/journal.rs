@@ -2,6 +2,7 @@
 
 use super::{
     hair::GpuHair,
+    led::Leading,
     record::{BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SubstepRecord},
     treatments::GpuTreatments,
 };
@@ -24,6 +25,7 @@ pub(super) fn write_journals(
     (solver, stiffness): (Settings<HairSolver>, Settings<HairStiffness>),
     (drag, contact): (Settings<AirDrag>, Settings<LockContact>),
     (influence, cuticle): (Settings<BondInfluence>, Settings<Cuticle>),
+    leading: Leading,
     mut hairs: Query<
         (
             Entity,
@@ -37,6 +39,7 @@ pub(super) fn write_journals(
     >,
 ) {
     let gravity = gravity.clamped().0;
+    let mut held = leading.held();
     for (hair, frame, obstacles, mut journal, treatments, on) in &mut hairs {
         // On its way back to the CPU it rests.
         if on.is_some_and(GpuHair::is_returning) {
@@ -71,6 +74,7 @@ pub(super) fn write_journals(
             notes_before: substep.is_first,
             rests: substep.is_first && frame.has_jumped(),
             shapes: true,
+            led: leading.of(hair, &mut held, &mut journal),
             ..default()
         };
         if let Some(mut treatments) = treatments {

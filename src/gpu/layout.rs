@@ -91,6 +91,11 @@ impl Layout {
         self.slots as usize * parts * LANES
     }
 
+    /// The number of a strand's node among all nodes on the GPU.
+    pub(super) fn slot(&self, strand: usize, node: usize) -> u32 {
+        self.index(strand, node, 0, 1) as u32
+    }
+
     /// Where part `part` of `parts` of a strand's node lies.
     pub fn index(&self, strand: usize, node: usize, part: usize, parts: usize) -> usize {
         let Place { first, lane, .. } = self.places[strand];

@@ -15,6 +15,7 @@
 //! | `hand_back` | hair returns to the CPU; reports and requested states |
 //! | `tick` | where each hair is from this tick on; what acts on it |
 //! | `journal` | a record of each substep of the tick |
+//! | `led` | roots on a mesh and held nodes in it |
 //! | `treatments` | the clocks of treatments |
 //! | `frame` | a frame in the render world |
 //! | `shared` | a hair as both worlds hold it |
@@ -41,6 +42,7 @@ mod hair;
 mod hand_back;
 mod journal;
 mod layout;
+mod led;
 mod pipelines;
 mod plugin;
 mod present;
@@ -59,10 +61,10 @@ pub use layout::{BYTES_PER_NODE, Contents, LANES, Layout, StrandState, StrandVie
 pub use pipelines::{HairKernels, SOURCE};
 pub use plugin::HairGpuPlugin;
 #[doc(hidden)]
-pub use present::DrawnNodes;
+pub use present::{DrawnMoment, DrawnNodes};
 #[doc(hidden)]
 pub use record::{
-    BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, MOST_TREATMENTS, SubstepRecord,
+    BlowerRecord, GpuJournal, LedNode, MAX_BLOWERS, MAX_OBSTACLES, MOST_TREATMENTS, SubstepRecord,
     TreatmentRecord,
 };
 pub use residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu};

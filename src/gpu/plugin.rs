@@ -57,7 +57,8 @@ impl Plugin for HairGpuPlugin {
                     // It is before all parts; systems of a game that are in none do not mind it.
                     .ambiguous_with_all(),
                 treat.in_set(HairSystems::Treatments),
-                write_journals.in_set(HairSystems::Rods),
+                // Before anything moves strands.
+                write_journals.in_set(HairSystems::RestShape),
             ),
         );
     }

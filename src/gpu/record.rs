@@ -1,12 +1,13 @@
 //! What acts on a hair in one substep, as the kernel reads it.
 
+use super::{led::HeldIndices, shared::MOST_LED};
 use crate::{
     bond::Cuticle,
     rod::obstacle::{Obstacle, Solid},
 };
 use bevy::{
     ecs::component::Component,
-    math::{Affine3A, Isometry3d, Vec3},
+    math::{Affine3A, Isometry3d, Quat, Vec3},
 };
 use core::ops::Range;
 
@@ -45,6 +46,16 @@ pub struct BlowerRecord {
 pub struct GpuJournal {
     /// The substeps.
     pub records: Vec<SubstepRecord>,
+    /// Which nodes the last of them held.
+    pub(super) held: HeldIndices,
+}
+
+impl GpuJournal {
+    /// Whether more than so many substeps wait, or more led nodes than are uploaded together.
+    pub(super) fn is_long(&self, most: usize) -> bool {
+        self.records.len() > most
+            || self.records.iter().map(|record| record.led.len()).sum::<usize>() > MOST_LED
+    }
 }
 
 /// A treatment of some joints of every strand.
@@ -56,6 +67,19 @@ pub struct TreatmentRecord {
     pub share: [f32; 4],
     /// The joints, from the root.
     pub joints: Range<u32>,
+}
+
+/// A node that something else moves: the root of a strand on a mesh, or a held node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LedNode {
+    /// Index of its strand.
+    pub strand: u32,
+    /// The node; 0 is the root.
+    pub node: u32,
+    /// Where it is at the end of the substep (m); `None` from which on it is free again.
+    pub place: Option<Vec3>,
+    /// The scalp's frame at the end of the substep; of roots alone.
+    pub frame: Quat,
 }
 
 /// What acts on a hair in one substep.
@@ -101,6 +125,8 @@ pub struct SubstepRecord {
     pub rests: bool,
     /// Whether rest shapes are computed from the bonds first.
     pub shapes: bool,
+    /// Nodes that are led in this substep, and those that no longer are. All roots or none.
+    pub led: Vec<LedNode>,
 }
 
 const CARRIES: u32 = 1;
@@ -108,10 +134,17 @@ const SHAPES: u32 = 2;
 const REMEMBERS: u32 = 4;
 const NOTES_BEFORE: u32 = 8;
 const RESTS: u32 = 16;
+const LEADS_ROOTS: u32 = 32;
+const HOLDS: u32 = 64;
 
 impl SubstepRecord {
     /// Appends the record's words.
     pub fn write(&self, out: &mut Vec<u32>) {
+        self.write_led(out, 0..self.led.len() as u32);
+    }
+
+    /// The same, where [`led`](Self::led) nodes are at these indices.
+    pub(super) fn write_led(&self, out: &mut Vec<u32>, led: Range<u32>) {
         let start = out.len();
         let mut words = Words(out);
         let blowers = &self.blowers[..self.blowers.len().min(MAX_BLOWERS)];
@@ -125,6 +158,8 @@ impl SubstepRecord {
             (remembers, REMEMBERS),
             (self.notes_before, NOTES_BEFORE),
             (self.rests, RESTS),
+            (self.led.iter().any(|led| led.node == 0), LEADS_ROOTS),
+            (self.led.iter().any(|led| led.node > 0 && led.place.is_some()), HOLDS),
         ];
         let flags = flags.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
         let carry = self.carry.unwrap_or_default();
@@ -147,6 +182,8 @@ impl SubstepRecord {
         words.0.resize(start + BEFORE_TREATMENTS, 0);
         let treatments = &self.treatments[..self.treatments.len().min(MOST_TREATMENTS)];
         words.word(treatments.len() as u32);
+        words.word(led.start);
+        words.word(led.end - led.start);
         words.0.resize(start + BEFORE_TREATMENTS + 4, 0);
         for treatment in treatments {
             words.numbers(treatment.change);

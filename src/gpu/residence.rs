@@ -95,9 +95,11 @@ pub enum Unsupported {
     Colliders,
     /// A collider near that is no ball, capsule, cylinder or half-space.
     ColliderShape,
-    /// Nodes that are held or wound on a rod.
-    HeldNodes,
-    /// Roots on a skinned or morphed mesh.
+    /// Roots that are held ([`HeldNodes`](crate::HeldNodes)).
+    HeldRoots,
+    /// Strands of which winding on a [`PermRod`](crate::PermRod) begins.
+    Winding,
+    /// Roots that are being tied to a mesh.
     MovingRoots,
     /// A level of detail at which not all strands are simulated.
     LevelOfDetail,
@@ -149,8 +151,9 @@ impl fmt::Display for Unsupported {
             Self::ColliderShape => {
                 "colliders other than balls, capsules, cylinders and half-spaces are not supported there"
             }
-            Self::HeldNodes => "held and wound hair is not supported there",
-            Self::MovingRoots => "roots on a mesh are not supported there",
+            Self::HeldRoots => "held roots are not supported there",
+            Self::Winding => "its strands begin to be wound on a rod",
+            Self::MovingRoots => "its roots are being tied to a mesh",
             Self::LevelOfDetail => "levels of detail with fewer strands are not supported there",
             Self::Settling => "it is still settling",
             Self::WatchedStyle => "its style is watched",

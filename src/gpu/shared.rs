@@ -4,19 +4,25 @@
 use super::{
     layout::Contents,
     pipelines::HairKernels,
-    present::DrawnNodes,
+    present::{DrawnMoment, DrawnNodes},
     record::SubstepRecord,
     strands::{GpuStrands, REPORT_BYTES, read_mapped},
 };
-use bevy::render::{
-    render_resource::{Buffer, BufferDescriptor, BufferId, BufferUsages, CommandEncoder},
-    renderer::{RenderDevice, RenderQueue},
+use bevy::{
+    math::Vec3,
+    render::{
+        render_resource::{Buffer, BufferDescriptor, BufferId, BufferUsages, CommandEncoder},
+        renderer::{RenderDevice, RenderQueue},
+    },
 };
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::{
     collections::VecDeque,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
+
+/// Led nodes of substeps that are uploaded together, at most: 64 MB.
+pub(super) const MOST_LED: usize = 1 << 21;
 
 /// One hair; whoever has it at hand may run its substeps, which are kept in order.
 #[derive(Clone)]
@@ -81,6 +87,7 @@ impl Shared {
 
     /// Hands the pending substeps to the device; returns how many there are.
     pub(super) fn upload(&mut self) -> usize {
+        self.run_excess();
         let Self { device, queue, kernels, strands, pending, .. } = self;
         strands.upload(device, queue, kernels, pending);
         let count = pending.len();
@@ -88,8 +95,27 @@ impl Shared {
         count
     }
 
+    /// Runs the first pending substeps by themselves where all together lead too many nodes for a buffer.
+    fn run_excess(&mut self) {
+        let Self { device, queue, kernels, strands, pending, .. } = self;
+        loop {
+            let mut led = 0;
+            let mut fits = |record: &SubstepRecord| {
+                led += record.led.len();
+                led <= MOST_LED
+            };
+            let fit = pending.iter().take_while(|record| fits(record)).count().max(1);
+            if fit >= pending.len() {
+                return;
+            }
+            strands.run(device, queue, kernels, &pending[..fit]);
+            pending.drain(..fit);
+        }
+    }
+
     /// Runs what is pending by itself.
     pub(super) fn run_pending(&mut self) {
+        self.run_excess();
         let Self { device, queue, kernels, strands, pending, .. } = self;
         if !pending.is_empty() {
             strands.run(device, queue, kernels, pending);
@@ -98,7 +124,14 @@ impl Shared {
     }
 
     /// The pose of the nodes into the buffer that drawing reads.
-    pub(super) fn draw(&mut self, nodes: &Buffer, encoder: &mut CommandEncoder, overstep: f32) {
+    /// Where `roots` are given, strands are drawn from there.
+    pub(super) fn draw(
+        &mut self,
+        nodes: &Buffer,
+        encoder: &mut CommandEncoder,
+        overstep: f32,
+        roots: &[Option<Vec3>],
+    ) {
         let Self { device, queue, kernels, strands, drawn, firsts, .. } = self;
         let count: usize = (0..strands.layout().strands()).map(|i| strands.layout().nodes(i)).sum();
         // Drawing knows other strands for as long as the hair takes to come back.
@@ -111,7 +144,8 @@ impl Shared {
             *drawn = Some((nodes.id(), new));
         }
         if let Some((_, drawn)) = drawn {
-            drawn.encode(queue, kernels, strands, encoder, overstep, known);
+            let moment = DrawnMoment { overstep, known, roots };
+            drawn.encode(queue, kernels, strands, encoder, &moment);
         }
     }
 

@@ -3,7 +3,7 @@
 use super::{
     layout::{BONDS, Contents, Layout, MOTION, POSE, SCRATCH, StrandState, StrandView},
     pipelines::HairKernels,
-    record::{SubstepRecord, WORDS},
+    record::{LedNode, SubstepRecord, WORDS},
 };
 use bevy::render::{
     render_resource::{
@@ -45,7 +45,26 @@ pub struct GpuStrands {
     groups: [BindGroup; 2],
     records: Option<(Buffer, BindGroup)>,
     words: Vec<u32>,
+    leads: Leads,
+    /// What leading binds beside `leads`.
+    scratch: Buffer,
 }
+
+/// The led nodes of the uploaded substeps.
+#[derive(Debug, Default)]
+struct Leads {
+    uploaded: Option<(Buffer, BindGroup)>,
+    words: Vec<[u32; 8]>,
+    /// How many each substep has.
+    counts: Vec<u32>,
+}
+
+// Bits beside a led node's slot, as lead.wgsl has them.
+const ROOT: u32 = 1 << 30;
+const FREE: u32 = 1 << 31;
+
+/// Threads of a workgroup that leads nodes.
+const LEAD_GROUP: u32 = 64;
 
 impl GpuStrands {
     /// Uploads strands. Each must have two nodes or more, and a bond for each joint.
@@ -116,6 +135,8 @@ impl GpuStrands {
             groups,
             records: None,
             words: Vec::new(),
+            leads: Leads::default(),
+            scratch,
         }
     }
 
@@ -152,9 +173,17 @@ impl GpuStrands {
             return;
         }
         self.words.clear();
+        self.leads.words.clear();
+        self.leads.counts.clear();
         for record in substeps {
-            record.write(&mut self.words);
+            let first = self.leads.words.len() as u32;
+            let led = record.led.iter().filter_map(|led| led_words(&self.layout, led));
+            self.leads.words.extend(led);
+            let end = self.leads.words.len() as u32;
+            record.write_led(&mut self.words, first..end);
+            self.leads.counts.push(end - first);
         }
+        self.upload_leads(device, queue, kernels);
         let bytes: &[u8] = bytemuck::cast_slice(&self.words);
         let size = bytes.len() as u64;
         if self.records.as_ref().is_none_or(|(buffer, _)| buffer.size() < size) {
@@ -178,6 +207,35 @@ impl GpuStrands {
         }
     }
 
+    fn upload_leads(&mut self, device: &RenderDevice, queue: &RenderQueue, kernels: &HairKernels) {
+        let bytes: &[u8] = bytemuck::cast_slice(&self.leads.words);
+        let size = bytes.len() as u64;
+        if size == 0 {
+            return;
+        }
+        let uploaded = self.leads.uploaded.take().filter(|(buffer, _)| buffer.size() >= size);
+        let (buffer, group) = uploaded.unwrap_or_else(|| {
+            let buffer = device.create_buffer(&BufferDescriptor {
+                label: Some("led hair"),
+                size: size.next_power_of_two(),
+                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            let group = device.create_bind_group(
+                "led hair",
+                &kernels.led,
+                &BindGroupEntries::sequential((
+                    buffer.as_entire_binding(),
+                    self.rest.as_entire_binding(),
+                    self.scratch.as_entire_binding(),
+                )),
+            );
+            (buffer, group)
+        });
+        queue.write_buffer(&buffer, 0, bytes);
+        self.leads.uploaded = Some((buffer, group));
+    }
+
     /// One of the uploaded substeps.
     pub(super) fn dispatch(
         &mut self,
@@ -188,9 +246,17 @@ impl GpuStrands {
         let Some((_, records)) = self.records.as_ref().filter(|_| self.layout.strands() > 0) else {
             return;
         };
+        let record = (4 * WORDS * index) as u32;
+        let led = self.leads.counts.get(index).copied().unwrap_or(0);
+        if let Some((_, leads)) = self.leads.uploaded.as_ref().filter(|_| led > 0) {
+            pass.set_pipeline(&kernels.lead);
+            pass.set_bind_group(0, leads, &[]);
+            pass.set_bind_group(1, records, &[record]);
+            pass.dispatch_workgroups(led.div_ceil(LEAD_GROUP), 1, 1);
+        }
         pass.set_pipeline(&kernels.substep);
         pass.set_bind_group(0, &self.groups[self.present], &[]);
-        pass.set_bind_group(1, records, &[(4 * WORDS * index) as u32]);
+        pass.set_bind_group(1, records, &[record]);
         pass.dispatch_workgroups(self.layout.blocks().len() as u32, 1, 1);
         self.present = 1 - self.present;
     }
@@ -257,6 +323,20 @@ impl GpuStrands {
         let first = (words[2] != 0).then(|| self.layout.strand_of(!words[2]));
         Some(GpuReport { put_back: words[0], rebuilt: words[1], first: first.flatten() })
     }
+}
+
+/// A led node as lead.wgsl reads it; `None` for one that does not exist.
+fn led_words(layout: &Layout, led: &LedNode) -> Option<[u32; 8]> {
+    let (strand, node) = (led.strand as usize, led.node as usize);
+    if strand >= layout.strands() || node >= layout.nodes(strand) {
+        return None;
+    }
+    let slot = layout.slot(strand, node);
+    let root = if led.node == 0 { ROOT } else { 0 };
+    let free = if led.place.is_none() { FREE } else { 0 };
+    let [x, y, z] = led.place.unwrap_or_default().to_array().map(f32::to_bits);
+    let [a, b, c, d] = led.frame.to_array().map(f32::to_bits);
+    Some([x, y, z, slot | root | free, a, b, c, d])
 }
 
 /// The first vectors of a buffer.

@@ -6,7 +6,7 @@ use super::{
     treatments::GpuTreatments,
 };
 #[cfg(feature = "groom")]
-use crate::attach::RootsOnMesh;
+use crate::attach::{RootsOnMesh, TiedRoots};
 use crate::{
     contact::{LockContact, Obstacles},
     environment::{WindReceived, Winds},
@@ -14,8 +14,9 @@ use crate::{
     rod::{HairSolver, SolverMethod, obstacle::Solid},
     setting::Settings,
     settle::Settling,
-    strand::{Hair, HeldNodes, OnGpu, StrandModel, StrandOf, Strands, TickPose},
+    strand::{Hair, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose},
     style::HairStyle,
+    treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
     water::{Droplet, IsWet, Shower, WaterVolume},
 };
 use bevy::{
@@ -46,18 +47,35 @@ pub(super) struct Support<'w, 's> {
         With<Hair>,
     >,
     held: Query<'w, 's, (&'static StrandOf, &'static HeldNodes)>,
+    wound: Query<
+        'w,
+        's,
+        (
+            &'static StrandOf,
+            &'static Strand,
+            &'static WoundOn,
+            &'static PermWinding,
+            &'static WindingProgress,
+        ),
+    >,
+    rods: Query<'w, 's, (), With<PermRod>>,
     counted: Query<'w, 's, &'static StrandOf, With<WindReceived>>,
     disabled: Query<'w, 's, &'static StrandOf, (With<OnGpu>, With<Disabled>)>,
     #[cfg(feature = "groom")]
-    on_mesh: Query<'w, 's, (), With<RootsOnMesh>>,
+    on_mesh: Query<'w, 's, (Ref<'static, RootsOnMesh>, &'static TiedRoots)>,
 }
 
 impl Support<'_, '_> {
     /// Reasons of single strands, by hair.
     pub(super) fn of_strands(&self) -> EntityHashMap<Unsupported> {
         let mut found = EntityHashMap::default();
-        let held = self.held.iter().filter(|(_, held)| held.targets.iter().any(Option::is_some));
-        found.extend(held.map(|(of, _)| (of.0, Unsupported::HeldNodes)));
+        let held =
+            self.held.iter().filter(|(_, held)| matches!(held.targets.first(), Some(Some(_))));
+        found.extend(held.map(|(of, _)| (of.0, Unsupported::HeldRoots)));
+        let begins = self.wound.iter().filter(|(_, strand, on, settings, wound)| {
+            self.rods.contains(on.0) && wound.waits(strand, settings)
+        });
+        found.extend(begins.map(|(of, ..)| (of.0, Unsupported::Winding)));
         found.extend(self.counted.iter().map(|of| (of.0, Unsupported::WindReceived)));
         found.extend(self.disabled.iter().map(|of| (of.0, Unsupported::Strands)));
         found
@@ -72,9 +90,10 @@ impl Support<'_, '_> {
         // Of the tick before: what is near is looked at before it touches.
         let solids = obstacles.map_or(&[][..], |all| &all.solids);
         #[cfg(feature = "groom")]
-        let on_mesh = self.on_mesh.contains(hair);
+        let is_being_tied = (self.on_mesh.get(hair))
+            .is_ok_and(|(roots, tied)| roots.is_changed() || roots.mesh.is_some() && tied.wait());
         #[cfg(not(feature = "groom"))]
-        let on_mesh = false;
+        let is_being_tied = false;
         let reasons = [
             (members.is_none_or(|members| members.is_empty()), Unsupported::Strands),
             (self.model.of(hair) == StrandModel::MassSpring, Unsupported::Springs),
@@ -88,7 +107,7 @@ impl Support<'_, '_> {
                 solids.iter().any(|o| matches!(o.solid, Solid::Placed(_))),
                 Unsupported::ColliderShape,
             ),
-            (on_mesh, Unsupported::MovingRoots),
+            (is_being_tied, Unsupported::MovingRoots),
             (lod.is_some_and(|lod| lod.simulated_share() < 1.0), Unsupported::LevelOfDetail),
             (settles, Unsupported::Settling),
             (is_watched, Unsupported::WatchedStyle),

@@ -3,17 +3,18 @@
 use super::{
     compile::{AppDevice, Ready},
     hair::{GpuHair, StaysOnCpu, hand_over},
-    hand_back::request_return,
+    hand_back::{fetch_strands, request_return},
     residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
     support::Support,
     treatments::GpuTreatments,
 };
 use crate::{
     bond::Bonds,
+    contact::HairReach,
     schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings},
     strand::{AskForStrands, Hair, OnGpu, Strand, StrandOf, Strands},
-    treatment::HairTreatment,
+    treatment::{HairTreatment, PermWinding, WindingProgress},
     water::{Moisture, SoakHair},
 };
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
@@ -22,11 +23,16 @@ use bevy::{ecs::entity::EntityHashSet, prelude::*};
 pub(super) enum Decision {
     /// It goes to the device.
     Goes(Ready),
+    /// Strands begin to be wound: where they are has to be known.
+    Winds,
     /// It returns to the CPU.
     Returns(WhyCpu),
     /// It stays where it is, on the CPU.
     Stays(WhyCpu),
 }
+
+/// Ticks between looks at how far roots on a mesh have come, as on the CPU.
+const ROOTS_MOVE: u32 = 16;
 
 /// Where each hair is from this tick on. Runs before anything acts on it.
 pub(super) fn decide(
@@ -42,6 +48,7 @@ pub(super) fn decide(
             Option<&mut GpuHair>,
             Option<&mut StaysOnCpu>,
             Option<Ref<Strands>>,
+            Option<&mut HairReach>,
         ),
         With<Hair>,
     >,
@@ -71,7 +78,7 @@ pub(super) fn decide(
     let written: EntityHashSet = written.iter().map(|of| of.0).collect();
     let seconds = step.dt * step.count as f32;
     let checkpoint = settings.clamped().checkpoint;
-    for (hair, _, on, stays, members) in &mut hairs {
+    for (hair, _, on, stays, members, reach) in &mut hairs {
         let wants = asked.of(hair) == SimulateOn::Gpu;
         let missing = || {
             let known = of_strands.get(&hair).copied().or_else(|| support.missing(hair));
@@ -105,6 +112,12 @@ pub(super) fn decide(
         on.ticks += 1;
         on.told = on.told.saturating_sub(1);
         on.since_checkpoint += seconds;
+        if on.is_tied
+            && on.ticks.is_multiple_of(ROOTS_MOVE)
+            && let Some(mut reach) = reach
+        {
+            reach.bypass_change_detection().look_again();
+        }
         if on.is_returning() || !settings.blocking {
             let own = soaked.extract_if(.., |(target, _)| *target == hair).map(|(_, soak)| soak);
             on.soaked.extend(own);
@@ -126,7 +139,8 @@ pub(super) fn decide(
         ];
         let reason = reasons.into_iter().find(|(is_there, _)| *is_there).map(|(_, why)| why);
         if let Some(why) = reason.or_else(missing) {
-            decisions.push((hair, Decision::Returns(why)));
+            let begins = settings.blocking && why == WhyCpu::Unsupported(Unsupported::Winding);
+            decisions.push((hair, if begins { Decision::Winds } else { Decision::Returns(why) }));
         } else if checkpoint > 0.0 && on.since_checkpoint >= checkpoint {
             on.note_checkpoint();
         }
@@ -145,6 +159,10 @@ pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut Wor
                 }
                 Err(why) => why,
             },
+            Decision::Winds => {
+                begin_winding(world, hair);
+                continue;
+            }
             Decision::Returns(why) => {
                 request_return(world, hair, why, is_blocking);
                 tell(hair, why);
@@ -157,6 +175,21 @@ pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut Wor
         if *residence != HairResidence::Cpu(why) && why != WhyCpu::JustBack {
             *residence = HairResidence::Cpu(why);
             tell(hair, why);
+        }
+    }
+}
+
+/// Waits for a hair's strands, and begins to wind those that are to be.
+fn begin_winding(world: &mut World, hair: Entity) {
+    fetch_strands(world, hair);
+    let members = world.get::<Strands>(hair).map(|all| all.collection().to_vec());
+    for member in members.unwrap_or_default() {
+        let Ok(mut entity) = world.get_entity_mut(member) else { continue };
+        let parts = entity.get_components_mut::<(&Strand, &PermWinding, &mut WindingProgress)>();
+        if let Ok((strand, settings, mut wound)) = parts
+            && wound.waits(strand, settings)
+        {
+            wound.begin(strand);
         }
     }
 }

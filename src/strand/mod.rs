@@ -401,6 +401,15 @@ impl Strand {
         }
     }
 
+    /// The root is where it is, and has not moved; the scalp's frame is this one.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn settle_root(&mut self, frame: Quat) {
+        self.root_before = None;
+        if frame.is_finite() {
+            self.root_frame = frame;
+        }
+    }
+
     /// Replaces its state by another with as many nodes, at rest.
     #[cfg(any(feature = "save", feature = "groom"))]
     pub(crate) fn replace(

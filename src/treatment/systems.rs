@@ -106,11 +106,16 @@ fn wind_strands(
         &PermWinding,
         &mut WindingProgress,
         &mut HeldNodes,
+        Has<OnGpu>,
     )>,
 ) {
     let mut items: Vec<_> = strands
         .iter_mut()
-        .filter_map(|(of, on, strand, settings, wound, held)| {
+        .filter_map(|(of, on, strand, settings, wound, held, on_gpu)| {
+            // Where a strand on the GPU is has to be known first.
+            if on_gpu && wound.waits(strand, settings) {
+                return None;
+            }
             let hair = hairs.get(of.0).ok()?.now();
             let (rod, pose) = rods.get(on.0).ok()?;
             let (rod, pose) = (rod.clamped(), pose.now());
@@ -129,8 +134,8 @@ fn wind_strands(
         if from >= strand.edges() {
             return;
         }
-        if wound.start.len() != strand.nodes() {
-            **wound = WindingProgress { start: strand.positions().to_vec(), ..default() };
+        if wound.waits(strand, settings) {
+            wound.begin(strand);
         }
         // Once wound, hair is fixed to its rod and moves and rotates with it.
         if wound.on_rod.is_empty() {

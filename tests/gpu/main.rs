@@ -13,6 +13,7 @@ mod closed_forms;
 mod cost;
 mod journal;
 mod layout;
+mod led;
 mod pictures;
 mod present;
 mod residence;
