@@ -67,6 +67,7 @@ fn extract(
         if let Some(number) = hair.bypass_change_detection().take_request() {
             shared.asked = Some(number);
         }
+        shared.ask_for(&hair.probed, hair.ticks);
         drop(shared);
         let nodes = buffers.zip(drawn).map(|(buffers, _)| buffers.nodes.id());
         if hair.is_tied {

@@ -13,6 +13,7 @@ use super::{
 use crate::{
     bond::Bonds,
     fault::{FaultKind, HairFault},
+    lod::{Follower, Guides},
     render::DrawnElsewhere,
     strand::{OnGpu, Strand, StrandHistory, StrandSleep, StrandsArrived},
     treatment::Treatments,
@@ -91,8 +92,17 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     let Ok(mut entity) = world.get_entity_mut(hair) else { return };
     let Some(mut gpu) = entity.take::<GpuHair>() else { return };
     let acting = entity.take::<GpuTreatments>().map(GpuTreatments::into_acting);
+    let followed = entity.get::<GpuJournal>().map_or(0.0, |journal| journal.followed);
     entity.remove::<(GpuJournal, OnGpu, DrawnElsewhere)>();
-    entity.insert((HairResidence::Cpu(why), StaysOnCpu(STAYS_FOR)));
+    // Where its level has changed it goes back as soon as strands are guides and followers anew.
+    let stays = match why {
+        WhyCpu::Unsupported(Unsupported::LevelOfDetail) => 0.0,
+        _ => STAYS_FOR,
+    };
+    entity.insert((HairResidence::Cpu(why), StaysOnCpu(stays)));
+    if let Some(mut guides) = entity.get_mut::<Guides>() {
+        guides.bypass_change_detection().look_again();
+    }
     if let Some(state) = state.or_else(|| gpu.checkpoint.take()) {
         write_back(world, &mut gpu, &state);
     }
@@ -103,6 +113,12 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
             && let Some(mut sleep) = strand.get_mut::<StrandSleep>()
         {
             sleep.bypass_change_detection().wake_up();
+        }
+        let root = strand.get::<Strand>().and_then(|strand| strand.positions().first().copied());
+        if strand.get::<StrandSleep>().is_some_and(StrandSleep::is_follower)
+            && let (Some(root), Some(mut follower)) = (root, strand.get_mut::<Follower>())
+        {
+            follower.bypass_change_detection().pass(followed, root);
         }
         if let Some(mut treatments) = strand.get_mut::<Treatments>()
             && let Some(acting) = &acting

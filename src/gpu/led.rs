@@ -13,15 +13,6 @@ use bevy::{
     prelude::*,
 };
 
-/// Which nodes of a hair were held in a substep, so that the next one frees those that no longer are.
-#[derive(Clone, Debug, Default)]
-pub(super) struct HeldIndices {
-    /// Strand and node, in their order.
-    nodes: Vec<(u32, u32)>,
-    /// The indices of strands, once they are needed.
-    of: EntityHashMap<u32>,
-}
-
 /// What leads nodes.
 #[derive(SystemParam)]
 pub(super) struct Leading<'w, 's> {

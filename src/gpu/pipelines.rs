@@ -14,7 +14,7 @@ use bevy::render::{
 };
 use core::num::NonZeroU64;
 
-/// The shader source of a substep, concatenated from its files.
+/// The shader source of a substep, of strands and of followers, concatenated from its files.
 pub const SOURCE: &str = concat!(
     include_str!("wgsl/math.wgsl"),
     include_str!("wgsl/strand.wgsl"),
@@ -24,10 +24,11 @@ pub const SOURCE: &str = concat!(
     include_str!("wgsl/bonds.wgsl"),
     include_str!("wgsl/air.wgsl"),
     include_str!("wgsl/substep.wgsl"),
+    include_str!("wgsl/follow.wgsl"),
 );
 
 /// How many kernels and groups there are.
-pub(super) const COUNT: usize = 4;
+pub(super) const COUNT: usize = 6;
 const GROUPS: usize = 5;
 
 /// Entry points with their sources and which of [`layouts`] they bind.
@@ -36,6 +37,8 @@ pub(super) const KERNELS: [(&str, &str, &[usize]); COUNT] = [
     ("present", include_str!("wgsl/present.wgsl"), &[2]),
     ("measure", include_str!("wgsl/measure.wgsl"), &[3]),
     ("lead", include_str!("wgsl/lead.wgsl"), &[4, 1]),
+    ("lead_followers", include_str!("wgsl/lead.wgsl"), &[4, 1]),
+    ("follow", SOURCE, &[0, 1]),
 ];
 
 /// The groups that kernels bind, with their labels: a hair, a record, what packing, measuring and leading
@@ -75,6 +78,9 @@ pub struct HairKernels {
     /// What leading nodes binds beside a record.
     pub(super) led: BindGroupLayout,
     pub(super) lead: ComputePipeline,
+    pub(super) lead_followers: ComputePipeline,
+    /// Binds what a substep does.
+    pub(super) follow: ComputePipeline,
 }
 
 impl HairKernels {
@@ -95,8 +101,20 @@ impl HairKernels {
         pipelines: [ComputePipeline; COUNT],
     ) -> Self {
         let [hair, record, drawn, measured, led] = layouts;
-        let [substep, present, measure, lead] = pipelines;
-        Self { hair, record, substep, drawn, present, measured, measure, led, lead }
+        let [substep, present, measure, lead, lead_followers, follow] = pipelines;
+        Self {
+            hair,
+            record,
+            substep,
+            drawn,
+            present,
+            measured,
+            measure,
+            led,
+            lead,
+            lead_followers,
+            follow,
+        }
     }
 }
 

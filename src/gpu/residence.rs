@@ -101,7 +101,7 @@ pub enum Unsupported {
     Winding,
     /// Roots that are being tied to a mesh.
     MovingRoots,
-    /// A level of detail at which not all strands are simulated.
+    /// A level of detail at which no strand is simulated, or a change of which strands are.
     LevelOfDetail,
     /// It is still [`Settling`](crate::Settling).
     Settling,
@@ -154,7 +154,7 @@ impl fmt::Display for Unsupported {
             Self::HeldRoots => "held roots are not supported there",
             Self::Winding => "its strands begin to be wound on a rod",
             Self::MovingRoots => "its roots are being tied to a mesh",
-            Self::LevelOfDetail => "levels of detail with fewer strands are not supported there",
+            Self::LevelOfDetail => "at its level of detail other strands are simulated, or none",
             Self::Settling => "it is still settling",
             Self::WatchedStyle => "its style is watched",
             Self::WindReceived => "the wind that it receives is counted",

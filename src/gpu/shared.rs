@@ -5,7 +5,7 @@ use super::{
     layout::Contents,
     pipelines::HairKernels,
     present::{DrawnMoment, DrawnNodes},
-    record::SubstepRecord,
+    record::{MOST_LED, SubstepRecord},
     strands::{GpuStrands, REPORT_BYTES, read_mapped},
 };
 use bevy::{
@@ -20,9 +20,6 @@ use std::{
     collections::VecDeque,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
-
-/// Led nodes of substeps that are uploaded together, at most: 64 MB.
-pub(super) const MOST_LED: usize = 1 << 21;
 
 /// One hair; whoever has it at hand may run its substeps, which are kept in order.
 #[derive(Clone)]
@@ -45,6 +42,16 @@ pub(super) struct Shared {
     pub(super) asked: Option<u64>,
     copy: Option<(u64, Crossing)>,
     reports: Reports,
+    /// Strands whose nodes are asked for, and the tick.
+    probe: (Vec<u32>, u32),
+    probed: Option<Probed>,
+}
+
+/// Nodes of some strands on their way from the device.
+struct Probed {
+    strands: Vec<u32>,
+    tick: u32,
+    crossing: Crossing,
 }
 
 impl Link {
@@ -71,6 +78,8 @@ impl Link {
             asked: None,
             copy: None,
             reports: Reports::default(),
+            probe: Default::default(),
+            probed: None,
         })))
     }
 
@@ -159,15 +168,63 @@ impl Shared {
             self.strands.copy_state(encoder, &crossing.buffer);
             self.copy = Some((number, crossing));
         }
+        self.copy_probed(encoder);
         if has_run {
             self.reports.copy(&self.device, &self.strands.report, encoder);
         }
+    }
+
+    /// Asks for the nodes of some strands in this tick.
+    pub(super) fn ask_for(&mut self, strands: &[u32], tick: u32) {
+        self.probe.0.clear();
+        self.probe.0.extend_from_slice(strands);
+        self.probe.1 = tick;
+    }
+
+    fn copy_probed(&mut self, encoder: &mut CommandEncoder) {
+        let (strands, tick) = &mut self.probe;
+        if self.probed.is_some() || strands.is_empty() {
+            return;
+        }
+        let layout = self.strands.layout();
+        strands.retain(|strand| (*strand as usize) < layout.strands());
+        let nodes = |strand: &u32| {
+            let strand = *strand;
+            (0..layout.nodes(strand as usize)).map(move |node| (strand, node))
+        };
+        let count = strands.iter().flat_map(nodes).count() as u64;
+        let crossing = Crossing::new(&self.device, 16 * count.max(1));
+        for ((strand, node), to) in strands.iter().flat_map(nodes).zip(0..) {
+            self.strands.copy_place((strand as usize, node), encoder, &crossing.buffer, 16 * to);
+        }
+        self.probed = Some(Probed { strands: core::mem::take(strands), tick: *tick, crossing });
+    }
+
+    /// The nodes of strands that were asked for, and of which tick they are.
+    pub(super) fn take_probed(&mut self) -> Option<(Vec<(u32, Vec<Vec3>)>, u32)> {
+        let bytes = self.probed.as_ref()?.crossing.take()?;
+        let Probed { strands, tick, .. } = self.probed.take()?;
+        let bytes = bytes?;
+        let mut places = bytes.chunks_exact(16).map(|place| {
+            let number =
+                |i: usize| f32::from_le_bytes([place[i], place[i + 1], place[i + 2], place[i + 3]]);
+            Vec3::new(number(0), number(4), number(8))
+        });
+        let layout = self.strands.layout();
+        let of = |strand: u32| {
+            let nodes = layout.nodes(strand as usize);
+            (strand, places.by_ref().take(nodes).collect())
+        };
+        Some((strands.into_iter().map(of).collect(), tick))
     }
 
     /// After the submission: has the copies mapped.
     pub(super) fn map(&self) {
         if let Some((_, crossing)) = &self.copy {
             crossing.map(&self.device);
+        }
+        if let Some(probed) = &self.probed {
+            probed.crossing.map(&self.device);
         }
         self.reports.0.iter().for_each(|crossing| crossing.map(&self.device));
     }

@@ -1,14 +1,16 @@
 //! A hair's strands on a device, and their substeps on a command encoder.
 
 use super::{
+    followers,
     layout::{BONDS, Contents, Layout, MOTION, POSE, SCRATCH, StrandState, StrandView},
+    leads::Leads,
     pipelines::HairKernels,
-    record::{LedNode, SubstepRecord, WORDS},
+    record::{SubstepRecord, WORDS},
 };
 use bevy::render::{
     render_resource::{
         BindGroup, BindGroupEntries, Buffer, BufferBinding, BufferDescriptor, BufferInitDescriptor,
-        BufferUsages, CommandEncoder, ComputePass, MapMode, PollType,
+        BufferUsages, CommandEncoder, ComputePass, ComputePipeline, MapMode, PollType,
     },
     renderer::{RenderDevice, RenderQueue},
 };
@@ -48,29 +50,21 @@ pub struct GpuStrands {
     leads: Leads,
     /// What leading binds beside `leads`.
     scratch: Buffer,
+    followers: Option<Followers>,
 }
 
-/// The led nodes of the uploaded substeps.
-#[derive(Debug, Default)]
-struct Leads {
-    uploaded: Option<(Buffer, BindGroup)>,
-    words: Vec<[u32; 8]>,
-    /// How many each substep has.
-    counts: Vec<u32>,
+/// What followers bind: their ties in place of scratch.
+#[derive(Debug)]
+struct Followers {
+    ties: Buffer,
+    groups: [BindGroup; 2],
 }
-
-// Bits beside a led node's slot, as lead.wgsl has them.
-const ROOT: u32 = 1 << 30;
-const FREE: u32 = 1 << 31;
-
-/// Threads of a workgroup that leads nodes.
-const LEAD_GROUP: u32 = 64;
 
 impl GpuStrands {
     /// Uploads strands. Each must have two nodes or more, and a bond for each joint.
     pub fn new(device: &RenderDevice, kernels: &HairKernels, strands: &[StrandView<'_>]) -> Self {
         let nodes: Vec<usize> = strands.iter().map(|view| view.positions.len()).collect();
-        let layout = Layout::of(&nodes);
+        let layout = Layout::with_followers(&nodes, |strand| strands[strand].follows.is_some());
         let mut contents = Contents::new(&layout);
         for (strand, view) in strands.iter().enumerate() {
             contents.put(&layout, strand, view);
@@ -93,7 +87,7 @@ impl GpuStrands {
             usage,
             mapped_at_creation: false,
         });
-        let group = |from: &Buffer, to: &Buffer| {
+        let group = |from: &Buffer, to: &Buffer, scratch: &Buffer| {
             device.create_bind_group(
                 "hair",
                 &kernels.hair,
@@ -109,7 +103,16 @@ impl GpuStrands {
                 )),
             )
         };
-        let groups = [group(&poses[0], &poses[1]), group(&poses[1], &poses[0])];
+        let groups = [group(&poses[0], &poses[1], &scratch), group(&poses[1], &poses[0], &scratch)];
+        let following: Vec<_> = strands.iter().map(|view| view.follows).enumerate().collect();
+        let following: Vec<_> =
+            following.into_iter().filter_map(|(strand, view)| Some((strand, view?))).collect();
+        let followers = (!following.is_empty()).then(|| {
+            let ties = followers::pack(&layout, &following);
+            let ties = with("hair ties", bytemuck::cast_slice(&ties));
+            let groups = [group(&poses[0], &poses[1], &ties), group(&poses[1], &poses[0], &ties)];
+            Followers { ties, groups }
+        });
         let measured = [&poses[0], &poses[1]].map(|pose| {
             device.create_bind_group(
                 "measured hair",
@@ -137,6 +140,7 @@ impl GpuStrands {
             words: Vec::new(),
             leads: Leads::default(),
             scratch,
+            followers,
         }
     }
 
@@ -173,17 +177,13 @@ impl GpuStrands {
             return;
         }
         self.words.clear();
-        self.leads.words.clear();
-        self.leads.counts.clear();
+        self.leads.clear();
         for record in substeps {
-            let first = self.leads.words.len() as u32;
-            let led = record.led.iter().filter_map(|led| led_words(&self.layout, led));
-            self.leads.words.extend(led);
-            let end = self.leads.words.len() as u32;
-            record.write_led(&mut self.words, first..end);
-            self.leads.counts.push(end - first);
+            let indices = self.leads.push(&self.layout, record);
+            record.write_of(&mut self.words, &indices);
         }
-        self.upload_leads(device, queue, kernels);
+        let followers = self.followers.as_ref().map(|followers| &followers.ties);
+        self.leads.upload(device, queue, kernels, &self.rest, [Some(&self.scratch), followers]);
         let bytes: &[u8] = bytemuck::cast_slice(&self.words);
         let size = bytes.len() as u64;
         if self.records.as_ref().is_none_or(|(buffer, _)| buffer.size() < size) {
@@ -207,35 +207,6 @@ impl GpuStrands {
         }
     }
 
-    fn upload_leads(&mut self, device: &RenderDevice, queue: &RenderQueue, kernels: &HairKernels) {
-        let bytes: &[u8] = bytemuck::cast_slice(&self.leads.words);
-        let size = bytes.len() as u64;
-        if size == 0 {
-            return;
-        }
-        let uploaded = self.leads.uploaded.take().filter(|(buffer, _)| buffer.size() >= size);
-        let (buffer, group) = uploaded.unwrap_or_else(|| {
-            let buffer = device.create_buffer(&BufferDescriptor {
-                label: Some("led hair"),
-                size: size.next_power_of_two(),
-                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            let group = device.create_bind_group(
-                "led hair",
-                &kernels.led,
-                &BindGroupEntries::sequential((
-                    buffer.as_entire_binding(),
-                    self.rest.as_entire_binding(),
-                    self.scratch.as_entire_binding(),
-                )),
-            );
-            (buffer, group)
-        });
-        queue.write_buffer(&buffer, 0, bytes);
-        self.leads.uploaded = Some((buffer, group));
-    }
-
     /// One of the uploaded substeps.
     pub(super) fn dispatch(
         &mut self,
@@ -247,17 +218,21 @@ impl GpuStrands {
             return;
         };
         let record = (4 * WORDS * index) as u32;
-        let led = self.leads.counts.get(index).copied().unwrap_or(0);
-        if let Some((_, leads)) = self.leads.uploaded.as_ref().filter(|_| led > 0) {
-            pass.set_pipeline(&kernels.lead);
-            pass.set_bind_group(0, leads, &[]);
+        let mut dispatch = |pipeline: &ComputePipeline, group: &BindGroup, count: usize| {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
             pass.set_bind_group(1, records, &[record]);
-            pass.dispatch_workgroups(led.div_ceil(LEAD_GROUP), 1, 1);
+            pass.dispatch_workgroups(count as u32, 1, 1);
+        };
+        for (pipeline, group, count) in self.leads.of(index, kernels) {
+            dispatch(pipeline, group, count);
         }
-        pass.set_pipeline(&kernels.substep);
-        pass.set_bind_group(0, &self.groups[self.present], &[]);
-        pass.set_bind_group(1, records, &[record]);
-        pass.dispatch_workgroups(self.layout.blocks().len() as u32, 1, 1);
+        let simulated = self.layout.simulated_blocks();
+        dispatch(&kernels.substep, &self.groups[self.present], simulated);
+        if let Some(followers) = &self.followers {
+            let others = self.layout.blocks().len() - simulated;
+            dispatch(&kernels.follow, &followers.groups[self.present], others);
+        }
         self.present = 1 - self.present;
     }
 
@@ -281,6 +256,18 @@ impl GpuStrands {
             encoder.copy_buffer_to_buffer(buffer, 0, to, at, size);
             at += size;
         }
+    }
+
+    /// Copies the place of a strand's node, 16 bytes.
+    pub(super) fn copy_place(
+        &self,
+        (strand, node): (usize, usize),
+        encoder: &mut CommandEncoder,
+        to: &Buffer,
+        at: u64,
+    ) {
+        let from = 16 * self.layout.index(strand, node, 0, POSE) as u64;
+        encoder.copy_buffer_to_buffer(&self.poses[self.present], from, to, at, 16);
     }
 
     /// Submits these substeps alone.
@@ -323,20 +310,6 @@ impl GpuStrands {
         let first = (words[2] != 0).then(|| self.layout.strand_of(!words[2]));
         Some(GpuReport { put_back: words[0], rebuilt: words[1], first: first.flatten() })
     }
-}
-
-/// A led node as lead.wgsl reads it; `None` for one that does not exist.
-fn led_words(layout: &Layout, led: &LedNode) -> Option<[u32; 8]> {
-    let (strand, node) = (led.strand as usize, led.node as usize);
-    if strand >= layout.strands() || node >= layout.nodes(strand) {
-        return None;
-    }
-    let slot = layout.slot(strand, node);
-    let root = if led.node == 0 { ROOT } else { 0 };
-    let free = if led.place.is_none() { FREE } else { 0 };
-    let [x, y, z] = led.place.unwrap_or_default().to_array().map(f32::to_bits);
-    let [a, b, c, d] = led.frame.to_array().map(f32::to_bits);
-    Some([x, y, z, slot | root | free, a, b, c, d])
 }
 
 /// The first vectors of a buffer.

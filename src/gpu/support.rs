@@ -10,7 +10,7 @@ use crate::attach::{RootsOnMesh, TiedRoots};
 use crate::{
     contact::{LockContact, Obstacles},
     environment::{WindReceived, Winds},
-    lod::PresentLod,
+    lod::{Guides, PresentLod},
     rod::{HairSolver, SolverMethod, obstacle::Solid},
     setting::Settings,
     settle::Settling,
@@ -38,7 +38,7 @@ pub(super) struct Support<'w, 's> {
             &'static TickPose,
             Option<&'static Obstacles>,
             Option<&'static IsWet>,
-            Option<&'static PresentLod>,
+            Option<(&'static PresentLod, &'static Guides)>,
             Has<Settling>,
             Has<HairStyle>,
             Option<&'static GpuTreatments>,
@@ -46,7 +46,7 @@ pub(super) struct Support<'w, 's> {
         ),
         With<Hair>,
     >,
-    held: Query<'w, 's, (&'static StrandOf, &'static HeldNodes)>,
+    held: Query<'w, 's, (Entity, &'static StrandOf, &'static HeldNodes)>,
     wound: Query<
         'w,
         's,
@@ -70,8 +70,8 @@ impl Support<'_, '_> {
     pub(super) fn of_strands(&self) -> EntityHashMap<Unsupported> {
         let mut found = EntityHashMap::default();
         let held =
-            self.held.iter().filter(|(_, held)| matches!(held.targets.first(), Some(Some(_))));
-        found.extend(held.map(|(of, _)| (of.0, Unsupported::HeldRoots)));
+            self.held.iter().filter(|(.., held)| matches!(held.targets.first(), Some(Some(_))));
+        found.extend(held.map(|(_, of, _)| (of.0, Unsupported::HeldRoots)));
         let begins = self.wound.iter().filter(|(_, strand, on, settings, wound)| {
             self.rods.contains(on.0) && wound.waits(strand, settings)
         });
@@ -79,6 +79,19 @@ impl Support<'_, '_> {
         found.extend(self.counted.iter().map(|of| (of.0, Unsupported::WindReceived)));
         found.extend(self.disabled.iter().map(|of| (of.0, Unsupported::Strands)));
         found
+    }
+
+    /// The strands of hair with followers that have held nodes, in order; `None` of hair without followers.
+    pub(super) fn held_strands(&self, hair: Entity) -> Option<Vec<Entity>> {
+        let (.., lod, _, _, _, _) = self.hairs.get(hair).ok()?;
+        lod.filter(|(lod, _)| lod.followers > 0)?;
+        let held = self
+            .held
+            .iter()
+            .filter(|(_, of, held)| of.0 == hair && held.targets.iter().any(Option::is_some));
+        let mut held: Vec<Entity> = held.map(|(strand, ..)| strand).collect();
+        held.sort_unstable();
+        Some(held)
     }
 
     /// The first reason of a hair.
@@ -108,7 +121,13 @@ impl Support<'_, '_> {
                 Unsupported::ColliderShape,
             ),
             (is_being_tied, Unsupported::MovingRoots),
-            (lod.is_some_and(|lod| lod.simulated_share() < 1.0), Unsupported::LevelOfDetail),
+            (
+                lod.is_some_and(|(lod, guides)| {
+                    let count = members.map_or(0, |members| members.len());
+                    lod.simulated_share() <= 0.0 || !guides.suit(lod, count)
+                }),
+                Unsupported::LevelOfDetail,
+            ),
             (settles, Unsupported::Settling),
             (is_watched, Unsupported::WatchedStyle),
             (treatments.is_some_and(GpuTreatments::are_too_many), Unsupported::Treatments),

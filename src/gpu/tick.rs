@@ -13,7 +13,7 @@ use crate::{
     contact::HairReach,
     schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings},
-    strand::{AskForStrands, Hair, OnGpu, Strand, StrandOf, Strands},
+    strand::{AskForStrands, Hair, MissedOnGpu, OnGpu, Strand, StrandOf, Strands},
     treatment::{HairTreatment, PermWinding, WindingProgress},
     water::{Moisture, SoakHair},
 };
@@ -57,8 +57,11 @@ pub(super) fn decide(
         (With<OnGpu>, Or<(Changed<Strand>, Changed<Bonds>, Changed<Moisture>)>),
     >,
     of: Query<&StrandOf>,
-    mut soaks: MessageReader<SoakHair>,
-    mut treats: MessageReader<HairTreatment>,
+    (mut soaks, mut treats): (MessageReader<SoakHair>, MessageReader<HairTreatment>),
+    (soaks_missed, treats_missed): (
+        Option<ResMut<MissedOnGpu<SoakHair>>>,
+        Option<ResMut<MissedOnGpu<HairTreatment>>>,
+    ),
 ) -> Vec<(Entity, Decision)> {
     let hair_of = |target: Entity| of.get(target).map_or(target, |of| of.0);
     let mut soaked: Vec<_> = soaks.read().map(|soak| (hair_of(soak.target), *soak)).collect();
@@ -66,6 +69,11 @@ pub(super) fn decide(
     let mut treated: Vec<_> = (treats.read().filter(|treat| of.contains(treat.target)))
         .map(|treat| (hair_of(treat.target), treat.clone()))
         .collect();
+    // Where the tick waits for hair that returns, the others are read by the CPU's systems after it has.
+    let mut soaks_missed =
+        soaks_missed.map_or_else(Vec::new, |mut all| core::mem::take(&mut all.0));
+    let mut treats_missed =
+        treats_missed.map_or_else(Vec::new, |mut all| core::mem::take(&mut all.0));
     let mut decisions = Vec::new();
     if hairs.iter().all(|(hair, _, on, ..)| on.is_none() && asked.of(hair) == SimulateOn::Cpu) {
         let left = hairs.iter().filter(|(_, at, ..)| **at != HairResidence::default());
@@ -118,11 +126,15 @@ pub(super) fn decide(
         {
             reach.bypass_change_detection().look_again();
         }
+        let own = |target: Entity| hair_of(target) == hair;
         if on.is_returning() || !settings.blocking {
-            let own = soaked.extract_if(.., |(target, _)| *target == hair).map(|(_, soak)| soak);
-            on.soaked.extend(own);
-            let own = treated.extract_if(.., |(target, _)| *target == hair).map(|(_, treat)| treat);
-            on.treated.extend(own);
+            let soaked = soaked.extract_if(.., |(target, _)| *target == hair);
+            on.soaked.extend(soaked.map(|(_, soak)| soak));
+            let treated = treated.extract_if(.., |(target, _)| *target == hair);
+            on.treated.extend(treated.map(|(_, treat)| treat));
+        } else {
+            on.soaked.extend(soaks_missed.extract_if(.., |soak| own(soak.target)));
+            on.treated.extend(treats_missed.extract_if(.., |treat| own(treat.target)));
         }
         if on.is_returning() {
             continue;
@@ -136,6 +148,10 @@ pub(super) fn decide(
             (written.contains(&hair), WhyCpu::Unsupported(Unsupported::Written)),
             (wetted.contains(&hair), WhyCpu::Unsupported(Unsupported::Water)),
             (singly.contains(&hair), WhyCpu::Unsupported(Unsupported::Treatments)),
+            (
+                support.held_strands(hair).is_some_and(|held| held != on.held),
+                WhyCpu::Unsupported(Unsupported::LevelOfDetail),
+            ),
         ];
         let reason = reasons.into_iter().find(|(is_there, _)| *is_there).map(|(_, why)| why);
         if let Some(why) = reason.or_else(missing) {

@@ -23,9 +23,9 @@ pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
 pub use on_gpu::OnGpu;
-pub(crate) use on_gpu::return_to_cpu;
 #[cfg(feature = "gpu")]
 pub(crate) use on_gpu::{AskForStrands, ReturnToCpu, StrandsArrived};
+pub(crate) use on_gpu::{MissedOnGpu, return_to_cpu};
 pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
 pub(crate) use strand_sleep::KinematicStrand;

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting,
-    strand::{Hair, Strand, TickPose, keep_required},
+    strand::{Hair, MissedOnGpu, Strand, TickPose, keep_required},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -31,6 +31,7 @@ impl Plugin for WaterPlugin {
         setting::component::<WaterVolume>(app);
         app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
+            .init_resource::<MissedOnGpu<SoakHair>>()
             .add_message::<SoakHair>()
             .register_type::<WaterLedger>()
             .register_type::<Droplet>()

@@ -18,7 +18,7 @@ use bevy_keratin::{
 };
 
 /// A triangle below all hair that roots are tied to.
-fn scalp(stage: &mut Stage) -> Entity {
+pub fn scalp(stage: &mut Stage) -> Entity {
     let corners = vec![[0.0f32, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, -0.1]];
     let mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, corners);
@@ -26,13 +26,13 @@ fn scalp(stage: &mut Stage) -> Entity {
     stage.app.world_mut().spawn((Mesh3d(handle), Transform::default())).id()
 }
 
-fn tied(mesh: Entity, strands: usize) -> RootsOnMesh {
+pub fn tied(mesh: Entity, strands: usize) -> RootsOnMesh {
     let root = RootOnMesh { vertices: [0, 1, 2], weights: Vec3::new(0.2, 0.4, 0.4) };
     RootsOnMesh { mesh: Some(mesh), roots: vec![root; strands], ..default() }
 }
 
 /// The scalp turns and goes about below hair that stays where it is.
-fn moved(stage: &mut Stage, mesh: Entity, tick: usize) {
+pub fn moved(stage: &mut Stage, mesh: Entity, tick: usize) {
     let t = tick as f32 / 60.0;
     let turn = Quat::from_rotation_y(0.5 * (5.0 * t).sin()) * Quat::from_rotation_x(0.3 * t);
     let place = Vec3::new(0.02 * (9.0 * t).sin(), 0.01 * t, 0.0);

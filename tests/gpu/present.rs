@@ -50,7 +50,7 @@ fn drawn_nodes_are_those_of_the_strands_between_the_last_two_ticks() {
     let after = device.run(&mut on, &[first, plain()]);
     let shown = show(&on, 0.25, true, &[]);
     // As on a skinned mesh, which is drawn elsewhere than it is simulated.
-    let aside = |i: usize| (i % 3 > 0).then_some(Vec3::new(0.3, 0.02 * i as f32, 0.0));
+    let aside = |i: usize| (!i.is_multiple_of(3)).then_some(Vec3::new(0.3, 0.02 * i as f32, 0.0));
     let roots: Vec<Option<Vec3>> = (0..strands.len()).map(aside).collect();
     let rooted = show(&on, 0.25, true, &roots);
     let place = |node: &[u32; 8]| Vec3::from([node[0], node[1], node[2]].map(f32::from_bits));

@@ -1,12 +1,12 @@
 //! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
 use crate::{
-    led,
+    led, lod, probe,
     stage::{Stage, apart, curls, free},
 };
 use bevy::prelude::*;
 use bevy_keratin::{
-    FaultKind,
+    FaultKind, HairStep,
     gpu::{HairResidence, Unsupported, WhyCpu},
     prelude::*,
 };
@@ -35,13 +35,15 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 fn hair_goes_to_the_device_and_comes_home() {
     let Some(mut stage) = Stage::new(SimulateOn::Cpu, Vec::new()) else { return };
     stage.compile();
-    let all: [fn(&mut Stage); 15] = [
+    let all: [fn(&mut Stage); 21] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
         treatments_run_where_the_hair_is_and_cross_with_it,
         what_is_not_supported_brings_hair_home_and_is_done_there,
+        what_is_asked_for_within_a_tick_is_done,
         what_the_game_writes_is_kept,
+        probe::probes_tell_where_strands_are,
         resets_and_restyles_work_as_on_the_processor,
         a_teleported_head_takes_its_hair_along_at_rest,
         hairdos_are_asked_for_and_arrive,
@@ -50,6 +52,10 @@ fn hair_goes_to_the_device_and_comes_home() {
         led::roots_on_a_mesh_go_with_it_there,
         led::held_nodes_are_led_there_and_let_go,
         led::strands_are_wound_there_and_keep_their_curl,
+        lod::followers_follow_there_as_on_the_processor,
+        lod::a_change_of_level_is_made_on_the_processor,
+        lod::a_budget_is_that_of_the_processor,
+        lod::roots_of_followers_go_with_their_mesh,
         hair_is_despawned_and_levels_change_on_the_way,
     ];
     for one in all {
@@ -212,6 +218,47 @@ fn what_is_not_supported_brings_hair_home_and_is_done_there(stage: &mut Stage) {
     stage.run(1);
     let regroomed = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::Regroomed));
     assert_eq!(stage.residence(), regroomed);
+}
+
+/// Requests that are written between the substeps of a tick, for the hair and for one strand.
+fn what_is_asked_for_within_a_tick_is_done(stage: &mut Stage) {
+    #[derive(Resource, Default)]
+    struct Request(Option<Entity>);
+    stage.app.init_resource::<Request>().add_systems(
+        HairTick,
+        (|mut request: ResMut<Request>,
+          step: Res<HairStep>,
+          of: Query<(), With<Hair>>,
+          mut soaks: MessageWriter<SoakHair>,
+          mut treats: MessageWriter<HairTreatment>| {
+            let Some(target) = request.0.take_if(|_| step.index == 2) else { return };
+            match of.contains(target) {
+                true => _ = soaks.write(SoakHair::dripping(target)),
+                false => _ = treats.write(HairTreatment::lotion(target)),
+            }
+        })
+        .in_set(HairSystems::Last),
+    );
+    for blocking in [true, false] {
+        on_gpu(stage, 6, 2);
+        stage.app.world_mut().resource_mut::<HairGpu>().blocking = blocking;
+        let (hair, strand) = (stage.hair, stage.members()[2]);
+        stage.app.world_mut().resource_mut::<Request>().0 = Some(hair);
+        (0..20).for_each(|_| stage.run(1));
+        let moisture = |e: Entity| stage.app.world().get::<Moisture>(e).unwrap().volume();
+        let (one, other) = (moisture(strand), moisture(stage.members()[3]));
+        assert!(one > 0.0 && other > 0.0, "{blocking}: {:?}", stage.residence());
+        on_gpu(stage, 6, 2);
+        stage.app.world_mut().resource_mut::<HairGpu>().blocking = blocking;
+        let strand = stage.members()[2];
+        stage.app.world_mut().resource_mut::<Request>().0 = Some(strand);
+        (0..20).for_each(|_| stage.run(1));
+        let rate = |stage: &mut Stage, i: usize| {
+            stage.bonds()[i].rates(BondKind::Disulfide).next().unwrap()
+        };
+        assert!((rate(stage, 2) - 0.8).abs() < 1e-6, "once: {}", rate(stage, 2));
+        assert_eq!(rate(stage, 3), 1.0);
+    }
 }
 
 fn what_the_game_writes_is_kept(stage: &mut Stage) {

@@ -18,10 +18,10 @@ fn wind_of(b: u32, p: vec3<f32>, e: vec3<f32>) -> f32 {
 
 // Where the air finds a node: held ones have not moved yet.
 fn air_place(i: u32) -> vec3<f32> {
-    if i == 0u {
-        return node(0u).xyz;
+    if 0u < i && is_held(edge(i).z) {
+        return start_of(i);
     }
-    return start_of(i);
+    return node(i).xyz;
 }
 
 // What the air does to velocities, and what it asks of hydrogen bonds (equation 19).

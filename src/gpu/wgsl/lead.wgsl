@@ -11,7 +11,8 @@ struct Substep {
     treatments: u32,
     first_led: u32,
     led: u32,
-    unused: u32,
+    first_follower_led: u32,
+    follower_led: u32,
 }
 
 // Two a node: place and slot; frame.
@@ -36,4 +37,16 @@ fn lead(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     scratch[(of_node * 8u) * LANES + lane] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
     scratch[(of_node * 8u + 1u) * LANES + lane] = bitcast<vec4<f32>>(frame);
+}
+
+// The root of a follower, into what ties it: `scratch` holds that, and the slot is that of its last node's.
+@compute @workgroup_size(64)
+fn lead_followers(@builtin(global_invocation_id) id: vec3<u32>) {
+    if record.follower_led <= id.x {
+        return;
+    }
+    let entry = leads[2u * (record.first_follower_led + id.x)];
+    let frame = leads[2u * (record.first_follower_led + id.x) + 1u];
+    scratch[entry.w] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
+    scratch[entry.w + LANES] = bitcast<vec4<f32>>(frame);
 }

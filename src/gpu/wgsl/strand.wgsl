@@ -70,9 +70,23 @@ struct Substep {
     obstacles: u32,
     blower: array<Blower, 4>,
     treatments: u32,
+    // Led nodes, and led roots of followers: first and number.
     first_led: u32,
     led: u32,
+    first_follower_led: u32,
+    follower_led: u32,
+    first_follower_block: u32,
+    first_follower_slot: u32,
     unused: u32,
+    // How the hair's frame has moved in the tick, and its length (s).
+    follow_turn: vec4<f32>,
+    follow_move: vec3<f32>,
+    follow_seconds: f32,
+    // Time since hand-over (s), what is left after it of a follower's own motion, its time constant (s).
+    follow_since: f32,
+    follow_decay: f32,
+    follow_lasts: f32,
+    unused_2: u32,
     treatment: array<Treatment, 8>,
     obstacle: array<Obstacle, MAX_OBSTACLES>,
 }
@@ -85,6 +99,7 @@ const NOTES_BEFORE: u32 = 8u;
 const RESTS: u32 = 16u;
 const LEADS_ROOTS: u32 = 32u;
 const HOLDS: u32 = 64u;
+const FOLLOWS: u32 = 128u;
 
 // Of each block of strands: first node slot, nodes of a strand, strands, number of its first strand.
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;
