@@ -52,7 +52,7 @@ pub use environment::{
 };
 pub use fault::{FaultKind, HairFault};
 #[cfg(feature = "gpu")]
-pub use gpu::{HairGpu, HairResidence, SimulateOn};
+pub use gpu::{HairGpu, HairProbe, HairProbed, HairResidence, SimulateOn};
 #[cfg(feature = "groom")]
 pub use groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
 pub use lod::{HairBudget, HairEstimate, HairLod, HairScreenShare, LodLevel, PresentLod};
@@ -88,7 +88,7 @@ pub mod prelude {
     pub use crate::contact::AvianHairCollider;
     #[cfg(feature = "gpu")]
     #[doc(hidden)]
-    pub use crate::gpu::{HairGpu, HairResidence, SimulateOn};
+    pub use crate::gpu::{HairGpu, HairProbe, HairProbed, HairResidence, SimulateOn};
     #[cfg(feature = "groom")]
     #[doc(hidden)]
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     lod::PresentLod,
     schedule::HairStep,
-    strand::{Hair, Pose, Sleepers, Strand, StrandHistory, StrandOf, StrandSleep},
+    strand::{Hair, OnGpu, Pose, Sleepers, Strand, StrandHistory, StrandOf, StrandSleep},
 };
 use bevy::{math::Isometry3d, prelude::*};
 
@@ -79,24 +79,24 @@ pub(super) fn aim_roots(
 pub(super) fn move_roots(
     step: Res<HairStep>,
     hairs: Query<&TiedRoots, With<Hair>>,
-    mut strands: Query<(&mut Strand, &mut StrandSleep), With<StrandOf>>,
+    mut strands: Query<(&mut Strand, &mut StrandSleep, Has<OnGpu>), With<StrandOf>>,
 ) {
     let t = (step.index + 1) as f32 / step.count as f32;
     for root in hairs.iter().filter(|tied| !tied.rest).flat_map(|tied| &tied.roots) {
-        let Ok((mut strand, mut sleep)) = strands.get_mut(root.strand) else { continue };
-        // Followers move once, at the end of a tick.
-        if sleep.is_follower() && t < 1.0 {
+        let Ok((mut strand, mut sleep, on_gpu)) = strands.get_mut(root.strand) else { continue };
+        // Followers move once, at the end of a tick; strands on the GPU are moved there.
+        if (sleep.is_follower() || on_gpu) && t < 1.0 {
             continue;
         }
-        let at = Vec3::from(root.from.translation.lerp(root.to.translation, t));
+        let now = root.at(t);
+        let at = Vec3::from(now.translation);
         if sleep.is_follower() && sleep.is_asleep() {
             if strand.positions().first().is_some_and(|root| at.distance(*root) < STAYS) {
                 continue;
             }
             sleep.bypass_change_detection().wake();
         }
-        let turn = root.from.rotation.slerp(root.to.rotation, t);
-        strand.bypass_change_detection().put_root(at, turn);
+        strand.bypass_change_detection().put_root(at, now.rotation);
     }
 }
 

@@ -44,6 +44,26 @@ pub struct TiedRoots {
     pub(super) rest: bool,
 }
 
+#[cfg(feature = "gpu")]
+impl TiedRoots {
+    /// Whether roots follow a mesh.
+    pub(crate) fn are_tied(&self) -> bool {
+        !self.roots.is_empty()
+    }
+
+    /// Whether they are yet to be tied.
+    pub(crate) fn wait(&self) -> bool {
+        self.roots.is_empty() && !self.failed
+    }
+
+    /// Each tied strand with place and frame of its root at the share `t` of this tick; none while they
+    /// stay.
+    pub(crate) fn at(&self, t: f32) -> impl Iterator<Item = (Entity, Isometry3d)> + '_ {
+        let moved = if self.rest { &[][..] } else { &self.roots };
+        moved.iter().map(move |root| (root.strand, root.at(t)))
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tied {
     pub(super) strand: Entity,
@@ -53,6 +73,15 @@ pub(super) struct Tied {
     pub(super) offset: Isometry3d,
     pub(super) from: Isometry3d,
     pub(super) to: Isometry3d,
+}
+
+impl Tied {
+    /// Place and frame of the root at the share `t` of the tick.
+    pub(super) fn at(&self, t: f32) -> Isometry3d {
+        let (from, to) = (&self.from, &self.to);
+        let turn = from.rotation.slerp(to.rotation, t).normalize();
+        Isometry3d::new(from.translation.lerp(to.translation, t), turn)
+    }
 }
 
 /// The frame of a triangle at a point of it; `None` where it has no area.

@@ -34,6 +34,12 @@ impl HairReach {
         Self { center, radius, ..default() }
     }
 
+    /// Roots have moved.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn look_again(&mut self) {
+        self.members = UNKNOWN;
+    }
+
     /// Whether hair in `frame` may touch the content of `ball` within a tick of `substeps`.
     fn is_near(&self, frame: &TickPose, ball: &Ball, substeps: u32) -> bool {
         let apart = self.room(frame, substeps) + ball.room(substeps);
@@ -49,6 +55,9 @@ impl HairReach {
         ROOM * self.radius * now.scale + travel * substeps as f32
     }
 }
+
+/// A number of strands that no hair has.
+pub(super) const UNKNOWN: usize = usize::MAX;
 
 /// A ball around a collider in the world, and how far it moves in a substep (m).
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,7 @@ use super::{
     Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError, LockContact,
     LockNeighbours, Obstacles, Openings, coarse,
     neighbours::Lookup,
-    reach::{Colliders, HairReach},
+    reach::{Colliders, HairReach, UNKNOWN},
 };
 use crate::{
     fault::{FaultKind, HairFault},
@@ -124,13 +124,17 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
 const LOOK_AGAIN: u32 = 16;
 
 fn find_reach(
-    mut hairs: Query<(Entity, &Strands, &mut HairReach), (With<Hair>, Without<OnGpu>)>,
+    mut hairs: Query<(Entity, &Strands, &mut HairReach, Has<OnGpu>), With<Hair>>,
     touched: Query<&StrandOf, (Changed<Strand>, Without<OnGpu>)>,
     strands: Query<&Strand>,
 ) {
     let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
-    for (hair, members, mut reach) in &mut hairs {
+    for (hair, members, mut reach, on_gpu) in &mut hairs {
         let reach = reach.bypass_change_detection();
+        // On the GPU roots stay, or somebody says that they have moved.
+        if on_gpu && reach.members != UNKNOWN {
+            continue;
+        }
         reach.age += 1;
         if reach.members == members.len() && reach.age < LOOK_AGAIN && !touched.contains(&hair) {
             continue;

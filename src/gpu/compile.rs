@@ -1,7 +1,7 @@
 //! The kernels of the app's device: asked for by the main world, compiled in the render world.
 
 use super::{
-    pipelines::{HairKernels, KERNELS, layouts},
+    pipelines::{COUNT, HairKernels, KERNELS, layouts},
     residence::{HairGpu, WhyCpu},
 };
 use bevy::{
@@ -57,7 +57,7 @@ impl Compiled {
 
 /// The kernels' sources as assets, which live as long as the app.
 #[derive(Resource, Clone)]
-pub(super) struct Sources([Handle<Shader>; 3]);
+pub(super) struct Sources([Handle<Shader>; COUNT]);
 
 impl Sources {
     /// `None` in an app without shaders.
@@ -88,7 +88,7 @@ pub(super) fn plugin(app: &mut App) {
 
 /// The pipelines in the cache of this device.
 #[derive(Resource, Default)]
-struct Queued(Option<[CachedComputePipelineId; 3]>);
+struct Queued(Option<[CachedComputePipelineId; COUNT]>);
 
 fn compile(
     compiled: Res<Compiled>,
@@ -125,11 +125,11 @@ fn compile(
             return;
         }
     }
-    let [Some(a), Some(b), Some(c)] = ids.map(|id| cache.get_compute_pipeline(id).cloned()) else {
-        return;
-    };
+    let pipelines: Option<Vec<_>> =
+        ids.iter().map(|id| cache.get_compute_pipeline(*id).cloned()).collect();
+    let Some(Ok(pipelines)) = pipelines.map(TryInto::try_into) else { return };
     let layouts = layouts.map(|layout| cache.get_bind_group_layout(&layout));
-    let kernels = Arc::new(HairKernels::of(layouts, [a, b, c]));
+    let kernels = Arc::new(HairKernels::of(layouts, pipelines));
     compiled.with(|state| *state = State::Ready(compiled.device(), kernels));
 }
 

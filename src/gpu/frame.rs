@@ -2,7 +2,10 @@
 //! camera draws, and the nodes go into the buffers that drawing reads.
 
 use super::{compile::Compiled, hair::GpuHair, record::GpuJournal, shared::Link};
-use crate::render::{DrawnElsewhere, HairBuffers};
+use crate::{
+    render::{DrawnElsewhere, HairBuffers},
+    strand::StrandHistory,
+};
 use bevy::{
     core_pipeline::schedule::camera_driver,
     ecs::entity_disabling::Disabled,
@@ -32,6 +35,8 @@ struct Frame {
     link: Link,
     nodes: Option<AssetId<ShaderBuffer>>,
     overstep: f32,
+    /// Where its roots are drawn, if they are on a mesh.
+    roots: Vec<Option<Vec3>>,
 }
 
 /// Substeps and requests are taken here, between two frames, so that none is run before its frame.
@@ -45,13 +50,15 @@ fn extract(
     if let Some(compiled) = compiled.filter(|_| device.is_changed()) {
         compiled.renew();
     }
+    let mut tied = Vec::new();
     let mut hairs = main.query_filtered::<(
+        Entity,
         &mut GpuHair,
         Option<&mut GpuJournal>,
         Option<&HairBuffers>,
         Option<&DrawnElsewhere>,
     ), Allow<Disabled>>();
-    for (mut hair, journal, buffers, drawn) in hairs.iter_mut(&mut main) {
+    for (entity, mut hair, journal, buffers, drawn) in hairs.iter_mut(&mut main) {
         let link = hair.link.clone();
         let mut shared = link.lock();
         if let Some(mut journal) = journal {
@@ -60,13 +67,19 @@ fn extract(
         if let Some(number) = hair.bypass_change_detection().take_request() {
             shared.asked = Some(number);
         }
+        shared.ask_for(&hair.probed, hair.ticks);
         drop(shared);
         let nodes = buffers.zip(drawn).map(|(buffers, _)| buffers.nodes.id());
-        extracted.0.push(Frame {
-            link,
-            nodes,
-            overstep: drawn.map_or(1.0, |drawn| drawn.overstep),
-        });
+        if hair.is_tied {
+            tied.push((entity, extracted.0.len()));
+        }
+        let overstep = drawn.map_or(1.0, |drawn| drawn.overstep);
+        extracted.0.push(Frame { link, nodes, overstep, roots: Vec::new() });
+    }
+    for (hair, index) in tied {
+        let Some(hair) = main.get::<GpuHair>(hair) else { continue };
+        let root = |strand: &Entity| main.get::<StrandHistory>(*strand)?.root;
+        extracted.0[index].roots.extend(hair.members.iter().map(root));
     }
 }
 
@@ -103,7 +116,7 @@ fn run(
     for ((shared, frame), count) in hairs.iter_mut().zip(&counts) {
         let nodes = frame.nodes.and_then(|id| buffers.as_ref()?.get(id));
         if let Some(nodes) = nodes {
-            shared.draw(&nodes.buffer, &mut encoder, frame.overstep);
+            shared.draw(&nodes.buffer, &mut encoder, frame.overstep, &frame.roots);
         }
         shared.copy(&mut encoder, *count > 0);
     }

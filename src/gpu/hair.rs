@@ -2,22 +2,25 @@
 
 use super::{
     compile::Ready,
-    layout::{Contents, Layout, SCRATCH, StrandView},
+    layout::{Contents, FollowerView, Layout, SCRATCH, StrandView},
     record::GpuJournal,
     residence::{HairResidence, Unsupported, WhyCpu},
     shared::Link,
     strands::GpuStrands,
     treatments::GpuTreatments,
 };
+#[cfg(feature = "groom")]
+use crate::attach::TiedRoots;
 use crate::{
     bond::Bonds,
+    lod::{Follower, Guides, follow::GUIDES},
     render::DrawnElsewhere,
-    strand::{AddedMass, OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, Strands},
+    strand::{AddedMass, HeldNodes, OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, Strands},
     treatment::{HairTreatment, Treatments},
     water::{Moisture, SoakHair},
 };
 use bevy::{
-    ecs::{change_detection::Tick, entity_disabling::Disabled},
+    ecs::{change_detection::Tick, entity::EntityHashMap, entity_disabling::Disabled},
     prelude::*,
 };
 
@@ -42,8 +45,16 @@ pub(super) struct GpuHair {
     /// Time since that was asked for (s), and ticks since the hair was handed over.
     pub(super) since_checkpoint: f32,
     pub(super) ticks: u32,
+    /// Whether its roots are tied to a mesh.
+    pub(super) is_tied: bool,
+    /// Which strands had held nodes, in order: those are neither guides nor followers.
+    pub(super) held: Vec<Entity>,
     /// Ticks until a strand's fault is told of again.
     pub(super) told: u32,
+    /// Strands that are asked about, by their indices; how many turns of that there have been; the indices.
+    pub(super) probed: Vec<u32>,
+    pub(super) probe_turn: usize,
+    pub(super) numbers: EntityHashMap<u32>,
     /// Requests that came on the way back.
     pub(super) soaked: Vec<SoakHair>,
     pub(super) treated: Vec<HairTreatment>,
@@ -57,14 +68,16 @@ pub(super) struct Print {
 }
 
 impl Print {
-    pub(super) fn of(strand: &Strand) -> Self {
+    /// Without its root, where that is moved by the tick.
+    pub(super) fn of(strand: &Strand, is_tied: bool) -> Self {
         let of = |vectors: &[Vec3]| {
             let words = vectors.iter().flat_map(|v| v.to_array()).map(|x| u64::from(x.to_bits()));
             words.fold(0xcbf2_9ce4_8422_2325, |sum: u64, word| {
                 (sum ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
             })
         };
-        Self { places: of(strand.positions()), velocities: of(strand.velocities()) }
+        let places = strand.positions().get(usize::from(is_tied)..).unwrap_or_default();
+        Self { places: of(places), velocities: of(strand.velocities()) }
     }
 }
 
@@ -108,14 +121,36 @@ impl GpuHair {
     }
 }
 
+/// What a follower follows; `None` where it has no guides. Those of the hair are given by their indices.
+fn follower_view<'a>(strand: &EntityRef<'a>, guides: &[Option<u32>]) -> Option<FollowerView<'a>> {
+    let ties = strand.get::<Follower>()?.ties();
+    let edges = strand.get::<Strand>()?.edges();
+    let mut own = [0; GUIDES];
+    for (own, (guide, _)) in own.iter_mut().zip(&ties.guides) {
+        *own = (*guides.get(*guide as usize)?)?;
+    }
+    ties.fit(edges).then_some(FollowerView { ties, guides: own })
+}
+
 /// Hands a hair over, if all its strands can be.
 pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Result<(), WhyCpu> {
     let refused = |what| Err(WhyCpu::Unsupported(what));
     let Some(members) = world.get::<Strands>(hair).map(|all| all.collection().to_vec()) else {
         return refused(Unsupported::Strands);
     };
+    #[cfg(feature = "groom")]
+    let is_tied = world.get::<TiedRoots>(hair).is_some_and(TiedRoots::are_tied);
+    #[cfg(not(feature = "groom"))]
+    let is_tied = false;
     let mut views = Vec::with_capacity(members.len());
     let mut acting: Option<&[HairTreatment]> = None;
+    let mut held = Vec::new();
+    let index: EntityHashMap<u32> = match world.get::<Guides>(hair) {
+        Some(guides) if !guides.entities().is_empty() => members.iter().copied().zip(0..).collect(),
+        _ => default(),
+    };
+    let guides = world.get::<Guides>(hair).map_or(&[][..], Guides::entities);
+    let guides: Vec<Option<u32>> = guides.iter().map(|guide| index.get(guide).copied()).collect();
     for member in &members {
         let Ok(entity) = world.get_entity(*member) else { return refused(Unsupported::Strands) };
         let parts = entity.get_components::<(
@@ -133,11 +168,17 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
         let Some(root) = strand.positions().first().copied() else {
             return refused(Unsupported::Strands);
         };
+        let follows = sleep.is_follower().then(|| follower_view(&entity, &guides)).flatten();
+        if entity.get::<HeldNodes>().is_some_and(|held| held.targets.iter().any(Option::is_some)) {
+            held.push(*member);
+        }
         let reasons = [
             (strand.nodes() < 2 || bonds.joints.len() != strand.edges(), Unsupported::Strands),
             (entity.contains::<Disabled>(), Unsupported::Strands),
             (
-                history.root.is_some() || strand.root_before() != (root, strand.root_frame()),
+                !is_tied
+                    && (history.root.is_some()
+                        || strand.root_before() != (root, strand.root_frame())),
                 Unsupported::MovingRoots,
             ),
             (
@@ -145,7 +186,7 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
                 Unsupported::Water,
             ),
             (!added.softening.is_empty(), Unsupported::Water),
-            (sleep.is_follower(), Unsupported::LevelOfDetail),
+            (sleep.is_follower() && follows.is_none(), Unsupported::LevelOfDetail),
             (
                 *acting.get_or_insert(treatments.acting()) != treatments.acting(),
                 Unsupported::Treatments,
@@ -154,13 +195,15 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
         if let Some((_, what)) = reasons.into_iter().find(|(is_there, _)| *is_there) {
             return refused(what);
         }
-        views.push(StrandView::of(strand, bonds, history));
+        views.push(StrandView { follows, ..StrandView::of(strand, bonds, history) });
     }
+    held.sort_unstable();
     if views.is_empty() {
         return refused(Unsupported::Strands);
     }
     let nodes: Vec<usize> = views.iter().map(|view| view.positions.len()).collect();
-    let layout = Layout::of(&nodes);
+    let followers = views.iter().filter(|view| view.follows.is_some()).count();
+    let layout = Layout::with_followers(&nodes, |strand| views[strand].follows.is_some());
     let limits = ready.device.limits();
     let largest = 16 * layout.vectors(SCRATCH) as u64;
     if largest > limits.max_storage_buffer_binding_size
@@ -179,7 +222,7 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
     let strands = members.iter().filter_map(|member| world.get::<Strand>(*member));
     let gpu = GpuHair {
         link: Link::new((ready.number, &ready.device, &ready.queue), ready.kernels.clone(), on),
-        prints: strands.map(Print::of).collect(),
+        prints: strands.map(|strand| Print::of(strand, is_tied)).collect(),
         at: world.read_change_tick(),
         newest: 0,
         is_new: false,
@@ -189,13 +232,18 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
         since_checkpoint: 0.0,
         ticks: 0,
         told: 0,
+        is_tied,
+        held,
+        probed: Vec::new(),
+        probe_turn: 0,
+        numbers: default(),
         soaked: Vec::new(),
         treated: Vec::new(),
         members: members.clone(),
     };
     let drawn =
         DrawnElsewhere { low: low - longest, high: high + longest, overstep: 1.0, rests: false };
-    let sleepers = Sleepers { asleep: 0, awake: members.len() };
+    let sleepers = Sleepers { asleep: 0, awake: members.len() - followers };
     let parts = (gpu, treatments, GpuJournal::default(), drawn, OnGpu::HANDED_OVER, sleepers);
     world.entity_mut(hair).insert((parts, HairResidence::Gpu));
     for member in &members {

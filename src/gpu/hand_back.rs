@@ -6,13 +6,14 @@ use super::{
     hair::{GpuHair, Print, StaysOnCpu},
     layout::{Contents, StrandState},
     record::GpuJournal,
-    residence::{HairResidence, WhyCpu},
+    residence::{HairResidence, Unsupported, WhyCpu},
     shared::{Link, Measured},
     treatments::GpuTreatments,
 };
 use crate::{
     bond::Bonds,
     fault::{FaultKind, HairFault},
+    lod::{Follower, Guides},
     render::DrawnElsewhere,
     strand::{OnGpu, Strand, StrandHistory, StrandSleep, StrandsArrived},
     treatment::Treatments,
@@ -91,8 +92,17 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     let Ok(mut entity) = world.get_entity_mut(hair) else { return };
     let Some(mut gpu) = entity.take::<GpuHair>() else { return };
     let acting = entity.take::<GpuTreatments>().map(GpuTreatments::into_acting);
+    let followed = entity.get::<GpuJournal>().map_or(0.0, |journal| journal.followed);
     entity.remove::<(GpuJournal, OnGpu, DrawnElsewhere)>();
-    entity.insert((HairResidence::Cpu(why), StaysOnCpu(STAYS_FOR)));
+    // Where its level has changed it goes back as soon as strands are guides and followers anew.
+    let stays = match why {
+        WhyCpu::Unsupported(Unsupported::LevelOfDetail) => 0.0,
+        _ => STAYS_FOR,
+    };
+    entity.insert((HairResidence::Cpu(why), StaysOnCpu(stays)));
+    if let Some(mut guides) = entity.get_mut::<Guides>() {
+        guides.bypass_change_detection().look_again();
+    }
     if let Some(state) = state.or_else(|| gpu.checkpoint.take()) {
         write_back(world, &mut gpu, &state);
     }
@@ -104,11 +114,24 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
         {
             sleep.bypass_change_detection().wake_up();
         }
+        let root = strand.get::<Strand>().and_then(|strand| strand.positions().first().copied());
+        if strand.get::<StrandSleep>().is_some_and(StrandSleep::is_follower)
+            && let (Some(root), Some(mut follower)) = (root, strand.get_mut::<Follower>())
+        {
+            follower.bypass_change_detection().pass(followed, root);
+        }
         if let Some(mut treatments) = strand.get_mut::<Treatments>()
             && let Some(acting) = &acting
         {
             treatments.bypass_change_detection().acting_mut().extend_from_slice(acting);
         }
+    }
+    // It has not been tied on the GPU.
+    #[cfg(feature = "groom")]
+    if why == WhyCpu::Unsupported(Unsupported::MovingRoots)
+        && let Some(mut roots) = world.get_mut::<crate::attach::RootsOnMesh>(hair)
+    {
+        roots.set_changed();
     }
     world.write_message_batch(gpu.soaked);
     world.write_message_batch(gpu.treated);
@@ -124,6 +147,7 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
     let shared = gpu.link.lock();
     let layout = shared.strands.layout();
     let now = world.change_tick();
+    let is_tied = gpu.is_tied;
     for (index, member) in gpu.members.iter().enumerate() {
         let Ok(mut entity) = world.get_entity_mut(*member) else { continue };
         let ticks = |ticks: Option<ComponentTicks>| {
@@ -143,10 +167,18 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
             continue;
         }
         let own = state.get(layout, index);
-        let print = Print::of(&strand);
+        let print = Print::of(&strand, is_tied);
         let has = |of: fn(&Print) -> u64| written && of(&print) != of(&gpu.prints[index]);
         let (poses, moves) = (has(|print| print.places), has(|print| print.velocities));
-        let StrandState { positions, velocities, orientations, tensions, joints, before, .. } = own;
+        let StrandState {
+            positions,
+            velocities,
+            orientations,
+            root_frame,
+            tensions,
+            joints,
+            before,
+        } = own;
         let to = strand.bypass_change_detection();
         if !poses {
             let (places, speeds, frames, _) = to.parts_mut();
@@ -156,12 +188,13 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
                 speeds.copy_from_slice(&velocities);
             }
             to.tensions_mut().copy_from_slice(&tensions);
+            to.settle_root(root_frame);
             history.bypass_change_detection().positions = before;
         }
         if !bonds_written && bonds.joints.len() == joints.len() {
             bonds.bypass_change_detection().joints.copy_from_slice(&joints);
         }
-        gpu.prints[index] = Print::of(to);
+        gpu.prints[index] = Print::of(to, is_tied);
         // The tick has not seen yet what was written meanwhile.
         if written {
             strand.set_changed();
@@ -194,7 +227,7 @@ pub(super) fn collect(world: &mut World) {
     }
     for (hair, link, _) in all {
         let waiting = world.get_mut::<GpuJournal>(hair);
-        let waiting = waiting.filter(|journal| journal.records.len() > MOST_WAITING);
+        let waiting = waiting.filter(|journal| journal.is_long(MOST_WAITING));
         let waiting = waiting.map(|mut journal| core::mem::take(&mut journal.records));
         let mut shared = link.lock();
         if let Some(mut waiting) = waiting {

@@ -1,7 +1,9 @@
 //! A record of each substep of the tick, as input of the kernel. The tick itself is unchanged.
 
 use super::{
+    followers::FollowRecord,
     hair::GpuHair,
+    led::Leading,
     record::{BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SubstepRecord},
     treatments::GpuTreatments,
 };
@@ -9,21 +11,43 @@ use crate::{
     bond::{BondInfluence, Cuticle},
     contact::{LockContact, Obstacles},
     environment::{AirDrag, HairGravity, Winds},
+    lod::follow::Frame,
     rod::{HairSolver, HairStiffness},
-    schedule::EffectiveSubsteps,
+    schedule::{EffectiveSubstep, EffectiveSubsteps, HairStep},
     setting::{Ranged, Settings},
     strand::{Hair, TickPose},
 };
 use bevy::prelude::*;
 
+/// How followers move, in the tick's last substep.
+fn follow_record(
+    journal: &mut GpuJournal,
+    pose: &TickPose,
+    substep: &EffectiveSubstep,
+    is_last: bool,
+) -> Option<FollowRecord> {
+    if substep.is_first {
+        journal.frame = Frame::default();
+    }
+    if let Some(delta) = pose.frame_delta() {
+        journal.frame.then(delta.rotation, delta.translation.into());
+    }
+    is_last.then(|| {
+        journal.followed += substep.tick;
+        let (seconds, since) = (substep.tick, journal.followed);
+        FollowRecord { seconds, frame: journal.frame.motion(), since }
+    })
+}
+
 /// Writes [`GpuJournal`]s.
 pub(super) fn write_journals(
-    substeps: EffectiveSubsteps,
+    (step, substeps): (Res<HairStep>, EffectiveSubsteps),
     gravity: Res<HairGravity>,
     winds: Winds,
     (solver, stiffness): (Settings<HairSolver>, Settings<HairStiffness>),
     (drag, contact): (Settings<AirDrag>, Settings<LockContact>),
     (influence, cuticle): (Settings<BondInfluence>, Settings<Cuticle>),
+    leading: Leading,
     mut hairs: Query<
         (
             Entity,
@@ -37,6 +61,7 @@ pub(super) fn write_journals(
     >,
 ) {
     let gravity = gravity.clamped().0;
+    let mut held = leading.held();
     for (hair, frame, obstacles, mut journal, treatments, on) in &mut hairs {
         // On its way back to the CPU it rests.
         if on.is_some_and(GpuHair::is_returning) {
@@ -71,6 +96,8 @@ pub(super) fn write_journals(
             notes_before: substep.is_first,
             rests: substep.is_first && frame.has_jumped(),
             shapes: true,
+            led: leading.of(hair, &mut held, &mut journal),
+            follows: follow_record(&mut journal, frame, &substep, step.index + 1 == step.count),
             ..default()
         };
         if let Some(mut treatments) = treatments {

@@ -6,6 +6,7 @@
 
 use crate::{
     bond::{Bonds, model::JointBonds},
+    lod::follow::{GUIDES, Ties},
     strand::{Strand, StrandHistory},
 };
 use bevy::math::{Quat, Vec3};
@@ -40,18 +41,26 @@ pub struct Layout {
     /// Strands in the order of their numbers on the GPU.
     order: Vec<u32>,
     slots: u32,
+    /// How many blocks and node slots the simulated strands have; followers come after them.
+    simulated: (usize, usize),
 }
 
 impl Layout {
     /// For strands with these node counts.
     pub fn of(nodes: &[usize]) -> Self {
+        Self::with_followers(nodes, |_| false)
+    }
+
+    /// The same, of which some are followers.
+    pub fn with_followers(nodes: &[usize], is_follower: impl Fn(usize) -> bool) -> Self {
         let mut order: Vec<u32> = (0..nodes.len() as u32).collect();
-        let count = |strand: &u32| nodes[*strand as usize];
+        let count = |strand: &u32| (is_follower(*strand as usize), nodes[*strand as usize]);
         order.sort_by_key(count);
         let mut layout = Self { places: vec![Place::default(); nodes.len()], ..Self::default() };
         let mut number = 0;
         for alike in order.chunk_by(|a, b| count(a) == count(b)) {
-            let nodes = count(&alike[0]) as u32;
+            let (is_follower, nodes) = count(&alike[0]);
+            let nodes = nodes as u32;
             for block in alike.chunks(LANES) {
                 let first = layout.slots;
                 layout.blocks.push([first, nodes, block.len() as u32, number]);
@@ -60,6 +69,9 @@ impl Layout {
                 }
                 layout.slots += nodes;
                 number += block.len() as u32;
+            }
+            if !is_follower {
+                layout.simulated = (layout.blocks.len(), layout.slots as usize);
             }
         }
         layout.order = order;
@@ -91,11 +103,45 @@ impl Layout {
         self.slots as usize * parts * LANES
     }
 
+    /// How many of the first blocks are simulated; the others are followers.
+    pub(super) fn simulated_blocks(&self) -> usize {
+        self.simulated.0
+    }
+
+    /// The number of the first node slot of followers.
+    pub(super) fn first_follower_slot(&self) -> usize {
+        self.simulated.1
+    }
+
+    /// How many vectors a buffer of `parts` vectors a follower's node has.
+    pub(super) fn follower_vectors(&self, parts: usize) -> usize {
+        (self.slots as usize - self.simulated.1) * parts * LANES
+    }
+
+    /// Whether a strand is a follower.
+    pub(super) fn is_follower(&self, strand: usize) -> bool {
+        self.places[strand].first as usize >= self.simulated.1
+    }
+
+    /// The number of a strand's node among all nodes on the GPU.
+    pub(super) fn slot(&self, strand: usize, node: usize) -> u32 {
+        self.index(strand, node, 0, 1) as u32
+    }
+
     /// Where part `part` of `parts` of a strand's node lies.
     pub fn index(&self, strand: usize, node: usize, part: usize, parts: usize) -> usize {
         let Place { first, lane, .. } = self.places[strand];
         ((first as usize + node) * parts + part) * LANES + lane as usize
     }
+}
+
+/// What a strand follows.
+#[derive(Clone, Copy, Debug)]
+pub struct FollowerView<'a> {
+    /// How.
+    pub ties: &'a Ties,
+    /// The indices of its guides among the hair's strands.
+    pub guides: [u32; GUIDES],
 }
 
 /// A strand as it is handed over.
@@ -117,6 +163,8 @@ pub struct StrandView<'a> {
     pub joints: &'a [JointBonds],
     /// Where the nodes were when the last tick began (m); where they are, if there are not as many.
     pub before: &'a [Vec3],
+    /// What it follows, where it is not simulated.
+    pub follows: Option<FollowerView<'a>>,
 }
 
 impl<'a> StrandView<'a> {
@@ -131,6 +179,7 @@ impl<'a> StrandView<'a> {
             tensions: strand.tensions(),
             joints: &bonds.joints,
             before: &history.positions,
+            follows: None,
         }
     }
 }

@@ -15,13 +15,17 @@
 //! | `hand_back` | hair returns to the CPU; reports and requested states |
 //! | `tick` | where each hair is from this tick on; what acts on it |
 //! | `journal` | a record of each substep of the tick |
+//! | `led` | roots on a mesh and held nodes in it |
+//! | `followers` | strands that follow others, at levels of detail |
 //! | `treatments` | the clocks of treatments |
 //! | `frame` | a frame in the render world |
 //! | `shared` | a hair as both worlds hold it |
 //! | `layout` | where a strand's numbers lie on the GPU |
 //! | `record` | what acts on a hair in one substep |
 //! | `pipelines` | the kernels on a device |
+//! | `leads` | led nodes on a device |
 //! | `strands` | a hair's strands there, substeps on a command encoder, reading back |
+//! | `probe` | where strands are, for game code |
 //! | `present` | nodes into the buffer that drawing reads |
 //! | `plugin` | all of it in an app |
 //! | `wgsl/` | the mathematics, file by file the twins of `rod::direct`, `rod`, `bond` and `environment` |
@@ -36,14 +40,18 @@
 //! and twist 300, check 51: about 2,300. A second Newton step, of strands that touch or are fast, adds 1,000.
 
 mod compile;
+mod followers;
 mod frame;
 mod hair;
 mod hand_back;
 mod journal;
 mod layout;
+mod leads;
+mod led;
 mod pipelines;
 mod plugin;
 mod present;
+mod probe;
 mod record;
 mod residence;
 mod shared;
@@ -52,17 +60,20 @@ mod support;
 mod tick;
 mod treatments;
 
+#[doc(hidden)]
+pub use followers::FollowRecord;
 pub use hand_back::fetch_strands;
 #[doc(hidden)]
-pub use layout::{BYTES_PER_NODE, Contents, LANES, Layout, StrandState, StrandView};
+pub use layout::{BYTES_PER_NODE, Contents, FollowerView, LANES, Layout, StrandState, StrandView};
 #[doc(hidden)]
 pub use pipelines::{HairKernels, SOURCE};
 pub use plugin::HairGpuPlugin;
 #[doc(hidden)]
-pub use present::DrawnNodes;
+pub use present::{DrawnMoment, DrawnNodes};
+pub use probe::{HairProbe, HairProbed};
 #[doc(hidden)]
 pub use record::{
-    BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, MOST_TREATMENTS, SubstepRecord,
+    BlowerRecord, GpuJournal, LedNode, MAX_BLOWERS, MAX_OBSTACLES, MOST_TREATMENTS, SubstepRecord,
     TreatmentRecord,
 };
 pub use residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu};

@@ -14,7 +14,7 @@ use bevy::render::{
 };
 use core::num::NonZeroU64;
 
-/// The shader source of a substep, concatenated from its files.
+/// The shader source of a substep, of strands and of followers, concatenated from its files.
 pub const SOURCE: &str = concat!(
     include_str!("wgsl/math.wgsl"),
     include_str!("wgsl/strand.wgsl"),
@@ -24,18 +24,26 @@ pub const SOURCE: &str = concat!(
     include_str!("wgsl/bonds.wgsl"),
     include_str!("wgsl/air.wgsl"),
     include_str!("wgsl/substep.wgsl"),
+    include_str!("wgsl/follow.wgsl"),
 );
 
+/// How many kernels and groups there are.
+pub(super) const COUNT: usize = 6;
+const GROUPS: usize = 5;
+
 /// Entry points with their sources and which of [`layouts`] they bind.
-pub(super) const KERNELS: [(&str, &str, &[usize]); 3] = [
+pub(super) const KERNELS: [(&str, &str, &[usize]); COUNT] = [
     ("substep", SOURCE, &[0, 1]),
     ("present", include_str!("wgsl/present.wgsl"), &[2]),
     ("measure", include_str!("wgsl/measure.wgsl"), &[3]),
+    ("lead", include_str!("wgsl/lead.wgsl"), &[4, 1]),
+    ("lead_followers", include_str!("wgsl/lead.wgsl"), &[4, 1]),
+    ("follow", SOURCE, &[0, 1]),
 ];
 
-/// The groups that kernels bind, with their labels: a hair, a record, what packing binds, what measuring
-/// binds.
-pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); 4] {
+/// The groups that kernels bind, with their labels: a hair, a record, what packing, measuring and leading
+/// bind.
+pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); GROUPS] {
     const STAGE: ShaderStages = ShaderStages::COMPUTE;
     let read = || storage_buffer_read_only_sized(false, None);
     let write = || storage_buffer_sized(false, None);
@@ -44,11 +52,13 @@ pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); 4] {
     let hair = (read(), read(), write(), write(), write(), write(), write(), write());
     let drawn = (read(), read(), read(), read(), read(), read(), write(), frame);
     let measured = (read(), read(), read(), write());
+    let led = (read(), write(), write());
     [
         ("hair", BindGroupLayoutEntries::sequential(STAGE, hair).to_vec()),
         ("hair substep", BindGroupLayoutEntries::single(STAGE, record).to_vec()),
         ("drawn hair", BindGroupLayoutEntries::sequential(STAGE, drawn).to_vec()),
         ("measured hair", BindGroupLayoutEntries::sequential(STAGE, measured).to_vec()),
+        ("led hair", BindGroupLayoutEntries::sequential(STAGE, led).to_vec()),
     ]
 }
 
@@ -65,6 +75,12 @@ pub struct HairKernels {
     /// What measuring binds.
     pub(super) measured: BindGroupLayout,
     pub(super) measure: ComputePipeline,
+    /// What leading nodes binds beside a record.
+    pub(super) led: BindGroupLayout,
+    pub(super) lead: ComputePipeline,
+    pub(super) lead_followers: ComputePipeline,
+    /// Binds what a substep does.
+    pub(super) follow: ComputePipeline,
 }
 
 impl HairKernels {
@@ -80,10 +96,25 @@ impl HairKernels {
     }
 
     /// Of what [`layouts`] and [`KERNELS`] list.
-    pub(super) fn of(layouts: [BindGroupLayout; 4], pipelines: [ComputePipeline; 3]) -> Self {
-        let [hair, record, drawn, measured] = layouts;
-        let [substep, present, measure] = pipelines;
-        Self { hair, record, substep, drawn, present, measured, measure }
+    pub(super) fn of(
+        layouts: [BindGroupLayout; GROUPS],
+        pipelines: [ComputePipeline; COUNT],
+    ) -> Self {
+        let [hair, record, drawn, measured, led] = layouts;
+        let [substep, present, measure, lead, lead_followers, follow] = pipelines;
+        Self {
+            hair,
+            record,
+            substep,
+            drawn,
+            present,
+            measured,
+            measure,
+            led,
+            lead,
+            lead_followers,
+            follow,
+        }
     }
 }
 

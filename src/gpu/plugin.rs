@@ -5,6 +5,7 @@ use super::{
     hair::GpuHair,
     hand_back::{collect, return_now},
     journal::write_journals,
+    probe::{HairProbe, HairProbed, probe},
     residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
     tick::{ask, decide, follow, treat},
 };
@@ -45,7 +46,16 @@ impl Plugin for HairGpuPlugin {
                 return_now(world, hair, WhyCpu::Unsupported(Unsupported::Strands));
             });
         })
-        .add_systems(PreUpdate, collect.run_if(any_with_component::<GpuHair>))
+        .register_type::<HairProbe>()
+        .register_type::<HairProbed>()
+        .add_systems(
+            PreUpdate,
+            (
+                collect.run_if(any_with_component::<GpuHair>),
+                probe.run_if(any_with_component::<HairProbe>),
+            )
+                .chain(),
+        )
         .add_systems(
             HairTick,
             (
@@ -57,7 +67,8 @@ impl Plugin for HairGpuPlugin {
                     // It is before all parts; systems of a game that are in none do not mind it.
                     .ambiguous_with_all(),
                 treat.in_set(HairSystems::Treatments),
-                write_journals.in_set(HairSystems::Rods),
+                // Before anything moves strands.
+                write_journals.in_set(HairSystems::RestShape),
             ),
         );
     }

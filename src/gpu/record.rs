@@ -1,14 +1,19 @@
 //! What acts on a hair in one substep, as the kernel reads it.
 
+use super::followers::FollowRecord;
 use crate::{
     bond::Cuticle,
+    lod::follow::Frame,
     rod::obstacle::{Obstacle, Solid},
 };
 use bevy::{
-    ecs::component::Component,
-    math::{Affine3A, Isometry3d, Vec3},
+    ecs::{component::Component, entity::EntityHashMap},
+    math::{Affine3A, Isometry3d, Quat, Vec3},
 };
 use core::ops::Range;
+
+/// Led nodes of substeps that are uploaded together, at most: 64 MB.
+pub(super) const MOST_LED: usize = 1 << 21;
 
 /// The maximum number of obstacles in a record.
 pub const MAX_OBSTACLES: usize = 64;
@@ -23,8 +28,11 @@ pub const MOST_TREATMENTS: usize = 8;
 pub(super) const WORDS: usize = (HEADER + 32 * MAX_OBSTACLES).next_multiple_of(64);
 
 /// Words before the obstacles, and before the treatments.
-const HEADER: usize = BEFORE_TREATMENTS + 4 + 12 * MOST_TREATMENTS;
+const HEADER: usize = BEFORE_TREATMENTS + COUNTS + 12 * MOST_TREATMENTS;
 const BEFORE_TREATMENTS: usize = 36 + 8 * MAX_BLOWERS;
+
+/// Words of counts and of how followers move.
+const COUNTS: usize = 20;
 
 /// A blower in the hair's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,6 +53,28 @@ pub struct BlowerRecord {
 pub struct GpuJournal {
     /// The substeps.
     pub records: Vec<SubstepRecord>,
+    /// Which nodes the last of them held.
+    pub(super) held: HeldIndices,
+    /// How the hair's frame has moved in this tick, and for how long followers have followed (s).
+    pub(super) frame: Frame,
+    pub(super) followed: f32,
+}
+
+impl GpuJournal {
+    /// Whether more than so many substeps wait, or more led nodes than are uploaded together.
+    pub(super) fn is_long(&self, most: usize) -> bool {
+        self.records.len() > most
+            || self.records.iter().map(|record| record.led.len()).sum::<usize>() > MOST_LED
+    }
+}
+
+/// Which nodes of a hair were held in a substep, so that the next one frees those that no longer are.
+#[derive(Clone, Debug, Default)]
+pub(super) struct HeldIndices {
+    /// Strand and node, in their order.
+    pub(super) nodes: Vec<(u32, u32)>,
+    /// The indices of strands, once they are needed.
+    pub(super) of: EntityHashMap<u32>,
 }
 
 /// A treatment of some joints of every strand.
@@ -56,6 +86,19 @@ pub struct TreatmentRecord {
     pub share: [f32; 4],
     /// The joints, from the root.
     pub joints: Range<u32>,
+}
+
+/// A node that something else moves: the root of a strand on a mesh, or a held node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LedNode {
+    /// Index of its strand.
+    pub strand: u32,
+    /// The node; 0 is the root.
+    pub node: u32,
+    /// Where it is at the end of the substep (m); `None` from which on it is free again.
+    pub place: Option<Vec3>,
+    /// The scalp's frame at the end of the substep; of roots alone.
+    pub frame: Quat,
 }
 
 /// What acts on a hair in one substep.
@@ -101,6 +144,10 @@ pub struct SubstepRecord {
     pub rests: bool,
     /// Whether rest shapes are computed from the bonds first.
     pub shapes: bool,
+    /// Nodes that are led in this substep, and those that no longer are. All roots or none.
+    pub led: Vec<LedNode>,
+    /// How followers move; in the tick's last substep.
+    pub follows: Option<FollowRecord>,
 }
 
 const CARRIES: u32 = 1;
@@ -108,10 +155,18 @@ const SHAPES: u32 = 2;
 const REMEMBERS: u32 = 4;
 const NOTES_BEFORE: u32 = 8;
 const RESTS: u32 = 16;
+const LEADS_ROOTS: u32 = 32;
+const HOLDS: u32 = 64;
+const FOLLOWS: u32 = 128;
 
 impl SubstepRecord {
     /// Appends the record's words.
     pub fn write(&self, out: &mut Vec<u32>) {
+        self.write_of(out, &Indices { led: 0..self.led.len() as u32, ..Indices::default() });
+    }
+
+    /// The same for these strands.
+    pub(super) fn write_of(&self, out: &mut Vec<u32>, indices: &Indices) {
         let start = out.len();
         let mut words = Words(out);
         let blowers = &self.blowers[..self.blowers.len().min(MAX_BLOWERS)];
@@ -125,6 +180,9 @@ impl SubstepRecord {
             (remembers, REMEMBERS),
             (self.notes_before, NOTES_BEFORE),
             (self.rests, RESTS),
+            (self.led.iter().any(|led| led.node == 0), LEADS_ROOTS),
+            (self.led.iter().any(|led| led.node > 0 && led.place.is_some()), HOLDS),
+            (self.follows.is_some(), FOLLOWS),
         ];
         let flags = flags.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
         let carry = self.carry.unwrap_or_default();
@@ -147,7 +205,14 @@ impl SubstepRecord {
         words.0.resize(start + BEFORE_TREATMENTS, 0);
         let treatments = &self.treatments[..self.treatments.len().min(MOST_TREATMENTS)];
         words.word(treatments.len() as u32);
-        words.0.resize(start + BEFORE_TREATMENTS + 4, 0);
+        for led in [&indices.led, &indices.followers_led] {
+            words.word(led.start);
+            words.word(led.end - led.start);
+        }
+        words.word(indices.first_follower_block);
+        words.word(indices.first_follower_slot);
+        words.word(0);
+        words.numbers(self.follows.unwrap_or_default().words());
         for treatment in treatments {
             words.numbers(treatment.change);
             words.numbers(treatment.share);
@@ -161,6 +226,16 @@ impl SubstepRecord {
         }
         out.resize(start + WORDS, 0);
     }
+}
+
+/// Where the kernels find what belongs to a record.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Indices {
+    /// The led nodes of simulated strands, and the led roots of followers.
+    pub(super) led: Range<u32>,
+    pub(super) followers_led: Range<u32>,
+    pub(super) first_follower_block: u32,
+    pub(super) first_follower_slot: u32,
 }
 
 struct Words<'a>(&'a mut Vec<u32>);

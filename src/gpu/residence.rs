@@ -95,11 +95,13 @@ pub enum Unsupported {
     Colliders,
     /// A collider near that is no ball, capsule, cylinder or half-space.
     ColliderShape,
-    /// Nodes that are held or wound on a rod.
-    HeldNodes,
-    /// Roots on a skinned or morphed mesh.
+    /// Roots that are held ([`HeldNodes`](crate::HeldNodes)).
+    HeldRoots,
+    /// Strands of which winding on a [`PermRod`](crate::PermRod) begins.
+    Winding,
+    /// Roots that are being tied to a mesh.
     MovingRoots,
-    /// A level of detail at which not all strands are simulated.
+    /// A level of detail at which no strand is simulated, or a change of which strands are.
     LevelOfDetail,
     /// It is still [`Settling`](crate::Settling).
     Settling,
@@ -149,9 +151,10 @@ impl fmt::Display for Unsupported {
             Self::ColliderShape => {
                 "colliders other than balls, capsules, cylinders and half-spaces are not supported there"
             }
-            Self::HeldNodes => "held and wound hair is not supported there",
-            Self::MovingRoots => "roots on a mesh are not supported there",
-            Self::LevelOfDetail => "levels of detail with fewer strands are not supported there",
+            Self::HeldRoots => "held roots are not supported there",
+            Self::Winding => "its strands begin to be wound on a rod",
+            Self::MovingRoots => "its roots are being tied to a mesh",
+            Self::LevelOfDetail => "at its level of detail other strands are simulated, or none",
             Self::Settling => "it is still settling",
             Self::WatchedStyle => "its style is watched",
             Self::WindReceived => "the wind that it receives is counted",

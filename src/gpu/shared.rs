@@ -4,13 +4,16 @@
 use super::{
     layout::Contents,
     pipelines::HairKernels,
-    present::DrawnNodes,
-    record::SubstepRecord,
+    present::{DrawnMoment, DrawnNodes},
+    record::{MOST_LED, SubstepRecord},
     strands::{GpuStrands, REPORT_BYTES, read_mapped},
 };
-use bevy::render::{
-    render_resource::{Buffer, BufferDescriptor, BufferId, BufferUsages, CommandEncoder},
-    renderer::{RenderDevice, RenderQueue},
+use bevy::{
+    math::Vec3,
+    render::{
+        render_resource::{Buffer, BufferDescriptor, BufferId, BufferUsages, CommandEncoder},
+        renderer::{RenderDevice, RenderQueue},
+    },
 };
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::{
@@ -39,6 +42,16 @@ pub(super) struct Shared {
     pub(super) asked: Option<u64>,
     copy: Option<(u64, Crossing)>,
     reports: Reports,
+    /// Strands whose nodes are asked for, and the tick.
+    probe: (Vec<u32>, u32),
+    probed: Option<Probed>,
+}
+
+/// Nodes of some strands on their way from the device.
+struct Probed {
+    strands: Vec<u32>,
+    tick: u32,
+    crossing: Crossing,
 }
 
 impl Link {
@@ -65,6 +78,8 @@ impl Link {
             asked: None,
             copy: None,
             reports: Reports::default(),
+            probe: Default::default(),
+            probed: None,
         })))
     }
 
@@ -81,6 +96,7 @@ impl Shared {
 
     /// Hands the pending substeps to the device; returns how many there are.
     pub(super) fn upload(&mut self) -> usize {
+        self.run_excess();
         let Self { device, queue, kernels, strands, pending, .. } = self;
         strands.upload(device, queue, kernels, pending);
         let count = pending.len();
@@ -88,8 +104,27 @@ impl Shared {
         count
     }
 
+    /// Runs the first pending substeps by themselves where all together lead too many nodes for a buffer.
+    fn run_excess(&mut self) {
+        let Self { device, queue, kernels, strands, pending, .. } = self;
+        loop {
+            let mut led = 0;
+            let mut fits = |record: &SubstepRecord| {
+                led += record.led.len();
+                led <= MOST_LED
+            };
+            let fit = pending.iter().take_while(|record| fits(record)).count().max(1);
+            if fit >= pending.len() {
+                return;
+            }
+            strands.run(device, queue, kernels, &pending[..fit]);
+            pending.drain(..fit);
+        }
+    }
+
     /// Runs what is pending by itself.
     pub(super) fn run_pending(&mut self) {
+        self.run_excess();
         let Self { device, queue, kernels, strands, pending, .. } = self;
         if !pending.is_empty() {
             strands.run(device, queue, kernels, pending);
@@ -98,7 +133,14 @@ impl Shared {
     }
 
     /// The pose of the nodes into the buffer that drawing reads.
-    pub(super) fn draw(&mut self, nodes: &Buffer, encoder: &mut CommandEncoder, overstep: f32) {
+    /// Where `roots` are given, strands are drawn from there.
+    pub(super) fn draw(
+        &mut self,
+        nodes: &Buffer,
+        encoder: &mut CommandEncoder,
+        overstep: f32,
+        roots: &[Option<Vec3>],
+    ) {
         let Self { device, queue, kernels, strands, drawn, firsts, .. } = self;
         let count: usize = (0..strands.layout().strands()).map(|i| strands.layout().nodes(i)).sum();
         // Drawing knows other strands for as long as the hair takes to come back.
@@ -111,7 +153,8 @@ impl Shared {
             *drawn = Some((nodes.id(), new));
         }
         if let Some((_, drawn)) = drawn {
-            drawn.encode(queue, kernels, strands, encoder, overstep, known);
+            let moment = DrawnMoment { overstep, known, roots };
+            drawn.encode(queue, kernels, strands, encoder, &moment);
         }
     }
 
@@ -125,15 +168,63 @@ impl Shared {
             self.strands.copy_state(encoder, &crossing.buffer);
             self.copy = Some((number, crossing));
         }
+        self.copy_probed(encoder);
         if has_run {
             self.reports.copy(&self.device, &self.strands.report, encoder);
         }
+    }
+
+    /// Asks for the nodes of some strands in this tick.
+    pub(super) fn ask_for(&mut self, strands: &[u32], tick: u32) {
+        self.probe.0.clear();
+        self.probe.0.extend_from_slice(strands);
+        self.probe.1 = tick;
+    }
+
+    fn copy_probed(&mut self, encoder: &mut CommandEncoder) {
+        let (strands, tick) = &mut self.probe;
+        if self.probed.is_some() || strands.is_empty() {
+            return;
+        }
+        let layout = self.strands.layout();
+        strands.retain(|strand| (*strand as usize) < layout.strands());
+        let nodes = |strand: &u32| {
+            let strand = *strand;
+            (0..layout.nodes(strand as usize)).map(move |node| (strand, node))
+        };
+        let count = strands.iter().flat_map(nodes).count() as u64;
+        let crossing = Crossing::new(&self.device, 16 * count.max(1));
+        for ((strand, node), to) in strands.iter().flat_map(nodes).zip(0..) {
+            self.strands.copy_place((strand as usize, node), encoder, &crossing.buffer, 16 * to);
+        }
+        self.probed = Some(Probed { strands: core::mem::take(strands), tick: *tick, crossing });
+    }
+
+    /// The nodes of strands that were asked for, and of which tick they are.
+    pub(super) fn take_probed(&mut self) -> Option<(Vec<(u32, Vec<Vec3>)>, u32)> {
+        let bytes = self.probed.as_ref()?.crossing.take()?;
+        let Probed { strands, tick, .. } = self.probed.take()?;
+        let bytes = bytes?;
+        let mut places = bytes.chunks_exact(16).map(|place| {
+            let number =
+                |i: usize| f32::from_le_bytes([place[i], place[i + 1], place[i + 2], place[i + 3]]);
+            Vec3::new(number(0), number(4), number(8))
+        });
+        let layout = self.strands.layout();
+        let of = |strand: u32| {
+            let nodes = layout.nodes(strand as usize);
+            (strand, places.by_ref().take(nodes).collect())
+        };
+        Some((strands.into_iter().map(of).collect(), tick))
     }
 
     /// After the submission: has the copies mapped.
     pub(super) fn map(&self) {
         if let Some((_, crossing)) = &self.copy {
             crossing.map(&self.device);
+        }
+        if let Some(probed) = &self.probed {
+            probed.crossing.map(&self.device);
         }
         self.reports.0.iter().for_each(|crossing| crossing.map(&self.device));
     }

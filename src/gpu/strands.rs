@@ -1,14 +1,16 @@
 //! A hair's strands on a device, and their substeps on a command encoder.
 
 use super::{
+    followers,
     layout::{BONDS, Contents, Layout, MOTION, POSE, SCRATCH, StrandState, StrandView},
+    leads::Leads,
     pipelines::HairKernels,
     record::{SubstepRecord, WORDS},
 };
 use bevy::render::{
     render_resource::{
         BindGroup, BindGroupEntries, Buffer, BufferBinding, BufferDescriptor, BufferInitDescriptor,
-        BufferUsages, CommandEncoder, ComputePass, MapMode, PollType,
+        BufferUsages, CommandEncoder, ComputePass, ComputePipeline, MapMode, PollType,
     },
     renderer::{RenderDevice, RenderQueue},
 };
@@ -45,13 +47,24 @@ pub struct GpuStrands {
     groups: [BindGroup; 2],
     records: Option<(Buffer, BindGroup)>,
     words: Vec<u32>,
+    leads: Leads,
+    /// What leading binds beside `leads`.
+    scratch: Buffer,
+    followers: Option<Followers>,
+}
+
+/// What followers bind: their ties in place of scratch.
+#[derive(Debug)]
+struct Followers {
+    ties: Buffer,
+    groups: [BindGroup; 2],
 }
 
 impl GpuStrands {
     /// Uploads strands. Each must have two nodes or more, and a bond for each joint.
     pub fn new(device: &RenderDevice, kernels: &HairKernels, strands: &[StrandView<'_>]) -> Self {
         let nodes: Vec<usize> = strands.iter().map(|view| view.positions.len()).collect();
-        let layout = Layout::of(&nodes);
+        let layout = Layout::with_followers(&nodes, |strand| strands[strand].follows.is_some());
         let mut contents = Contents::new(&layout);
         for (strand, view) in strands.iter().enumerate() {
             contents.put(&layout, strand, view);
@@ -74,7 +87,7 @@ impl GpuStrands {
             usage,
             mapped_at_creation: false,
         });
-        let group = |from: &Buffer, to: &Buffer| {
+        let group = |from: &Buffer, to: &Buffer, scratch: &Buffer| {
             device.create_bind_group(
                 "hair",
                 &kernels.hair,
@@ -90,7 +103,16 @@ impl GpuStrands {
                 )),
             )
         };
-        let groups = [group(&poses[0], &poses[1]), group(&poses[1], &poses[0])];
+        let groups = [group(&poses[0], &poses[1], &scratch), group(&poses[1], &poses[0], &scratch)];
+        let following: Vec<_> = strands.iter().map(|view| view.follows).enumerate().collect();
+        let following: Vec<_> =
+            following.into_iter().filter_map(|(strand, view)| Some((strand, view?))).collect();
+        let followers = (!following.is_empty()).then(|| {
+            let ties = followers::pack(&layout, &following);
+            let ties = with("hair ties", bytemuck::cast_slice(&ties));
+            let groups = [group(&poses[0], &poses[1], &ties), group(&poses[1], &poses[0], &ties)];
+            Followers { ties, groups }
+        });
         let measured = [&poses[0], &poses[1]].map(|pose| {
             device.create_bind_group(
                 "measured hair",
@@ -116,6 +138,9 @@ impl GpuStrands {
             groups,
             records: None,
             words: Vec::new(),
+            leads: Leads::default(),
+            scratch,
+            followers,
         }
     }
 
@@ -152,9 +177,13 @@ impl GpuStrands {
             return;
         }
         self.words.clear();
+        self.leads.clear();
         for record in substeps {
-            record.write(&mut self.words);
+            let indices = self.leads.push(&self.layout, record);
+            record.write_of(&mut self.words, &indices);
         }
+        let followers = self.followers.as_ref().map(|followers| &followers.ties);
+        self.leads.upload(device, queue, kernels, &self.rest, [Some(&self.scratch), followers]);
         let bytes: &[u8] = bytemuck::cast_slice(&self.words);
         let size = bytes.len() as u64;
         if self.records.as_ref().is_none_or(|(buffer, _)| buffer.size() < size) {
@@ -188,10 +217,22 @@ impl GpuStrands {
         let Some((_, records)) = self.records.as_ref().filter(|_| self.layout.strands() > 0) else {
             return;
         };
-        pass.set_pipeline(&kernels.substep);
-        pass.set_bind_group(0, &self.groups[self.present], &[]);
-        pass.set_bind_group(1, records, &[(4 * WORDS * index) as u32]);
-        pass.dispatch_workgroups(self.layout.blocks().len() as u32, 1, 1);
+        let record = (4 * WORDS * index) as u32;
+        let mut dispatch = |pipeline: &ComputePipeline, group: &BindGroup, count: usize| {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.set_bind_group(1, records, &[record]);
+            pass.dispatch_workgroups(count as u32, 1, 1);
+        };
+        for (pipeline, group, count) in self.leads.of(index, kernels) {
+            dispatch(pipeline, group, count);
+        }
+        let simulated = self.layout.simulated_blocks();
+        dispatch(&kernels.substep, &self.groups[self.present], simulated);
+        if let Some(followers) = &self.followers {
+            let others = self.layout.blocks().len() - simulated;
+            dispatch(&kernels.follow, &followers.groups[self.present], others);
+        }
         self.present = 1 - self.present;
     }
 
@@ -215,6 +256,18 @@ impl GpuStrands {
             encoder.copy_buffer_to_buffer(buffer, 0, to, at, size);
             at += size;
         }
+    }
+
+    /// Copies the place of a strand's node, 16 bytes.
+    pub(super) fn copy_place(
+        &self,
+        (strand, node): (usize, usize),
+        encoder: &mut CommandEncoder,
+        to: &Buffer,
+        at: u64,
+    ) {
+        let from = 16 * self.layout.index(strand, node, 0, POSE) as u64;
+        encoder.copy_buffer_to_buffer(&self.poses[self.present], from, to, at, 16);
     }
 
     /// Submits these substeps alone.

@@ -6,16 +6,17 @@ use super::{
     treatments::GpuTreatments,
 };
 #[cfg(feature = "groom")]
-use crate::attach::RootsOnMesh;
+use crate::attach::{RootsOnMesh, TiedRoots};
 use crate::{
     contact::{LockContact, Obstacles},
     environment::{WindReceived, Winds},
-    lod::PresentLod,
+    lod::{Guides, PresentLod},
     rod::{HairSolver, SolverMethod, obstacle::Solid},
     setting::Settings,
     settle::Settling,
-    strand::{Hair, HeldNodes, OnGpu, StrandModel, StrandOf, Strands, TickPose},
+    strand::{Hair, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose},
     style::HairStyle,
+    treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
     water::{Droplet, IsWet, Shower, WaterVolume},
 };
 use bevy::{
@@ -37,7 +38,7 @@ pub(super) struct Support<'w, 's> {
             &'static TickPose,
             Option<&'static Obstacles>,
             Option<&'static IsWet>,
-            Option<&'static PresentLod>,
+            Option<(&'static PresentLod, &'static Guides)>,
             Has<Settling>,
             Has<HairStyle>,
             Option<&'static GpuTreatments>,
@@ -45,22 +46,52 @@ pub(super) struct Support<'w, 's> {
         ),
         With<Hair>,
     >,
-    held: Query<'w, 's, (&'static StrandOf, &'static HeldNodes)>,
+    held: Query<'w, 's, (Entity, &'static StrandOf, &'static HeldNodes)>,
+    wound: Query<
+        'w,
+        's,
+        (
+            &'static StrandOf,
+            &'static Strand,
+            &'static WoundOn,
+            &'static PermWinding,
+            &'static WindingProgress,
+        ),
+    >,
+    rods: Query<'w, 's, (), With<PermRod>>,
     counted: Query<'w, 's, &'static StrandOf, With<WindReceived>>,
     disabled: Query<'w, 's, &'static StrandOf, (With<OnGpu>, With<Disabled>)>,
     #[cfg(feature = "groom")]
-    on_mesh: Query<'w, 's, (), With<RootsOnMesh>>,
+    on_mesh: Query<'w, 's, (Ref<'static, RootsOnMesh>, &'static TiedRoots)>,
 }
 
 impl Support<'_, '_> {
     /// Reasons of single strands, by hair.
     pub(super) fn of_strands(&self) -> EntityHashMap<Unsupported> {
         let mut found = EntityHashMap::default();
-        let held = self.held.iter().filter(|(_, held)| held.targets.iter().any(Option::is_some));
-        found.extend(held.map(|(of, _)| (of.0, Unsupported::HeldNodes)));
+        let held =
+            self.held.iter().filter(|(.., held)| matches!(held.targets.first(), Some(Some(_))));
+        found.extend(held.map(|(_, of, _)| (of.0, Unsupported::HeldRoots)));
+        let begins = self.wound.iter().filter(|(_, strand, on, settings, wound)| {
+            self.rods.contains(on.0) && wound.waits(strand, settings)
+        });
+        found.extend(begins.map(|(of, ..)| (of.0, Unsupported::Winding)));
         found.extend(self.counted.iter().map(|of| (of.0, Unsupported::WindReceived)));
         found.extend(self.disabled.iter().map(|of| (of.0, Unsupported::Strands)));
         found
+    }
+
+    /// The strands of hair with followers that have held nodes, in order; `None` of hair without followers.
+    pub(super) fn held_strands(&self, hair: Entity) -> Option<Vec<Entity>> {
+        let (.., lod, _, _, _, _) = self.hairs.get(hair).ok()?;
+        lod.filter(|(lod, _)| lod.followers > 0)?;
+        let held = self
+            .held
+            .iter()
+            .filter(|(_, of, held)| of.0 == hair && held.targets.iter().any(Option::is_some));
+        let mut held: Vec<Entity> = held.map(|(strand, ..)| strand).collect();
+        held.sort_unstable();
+        Some(held)
     }
 
     /// The first reason of a hair.
@@ -72,9 +103,10 @@ impl Support<'_, '_> {
         // Of the tick before: what is near is looked at before it touches.
         let solids = obstacles.map_or(&[][..], |all| &all.solids);
         #[cfg(feature = "groom")]
-        let on_mesh = self.on_mesh.contains(hair);
+        let is_being_tied = (self.on_mesh.get(hair))
+            .is_ok_and(|(roots, tied)| roots.is_changed() || roots.mesh.is_some() && tied.wait());
         #[cfg(not(feature = "groom"))]
-        let on_mesh = false;
+        let is_being_tied = false;
         let reasons = [
             (members.is_none_or(|members| members.is_empty()), Unsupported::Strands),
             (self.model.of(hair) == StrandModel::MassSpring, Unsupported::Springs),
@@ -88,8 +120,14 @@ impl Support<'_, '_> {
                 solids.iter().any(|o| matches!(o.solid, Solid::Placed(_))),
                 Unsupported::ColliderShape,
             ),
-            (on_mesh, Unsupported::MovingRoots),
-            (lod.is_some_and(|lod| lod.simulated_share() < 1.0), Unsupported::LevelOfDetail),
+            (is_being_tied, Unsupported::MovingRoots),
+            (
+                lod.is_some_and(|(lod, guides)| {
+                    let count = members.map_or(0, |members| members.len());
+                    lod.simulated_share() <= 0.0 || !guides.suit(lod, count)
+                }),
+                Unsupported::LevelOfDetail,
+            ),
             (settles, Unsupported::Settling),
             (is_watched, Unsupported::WatchedStyle),
             (treatments.is_some_and(GpuTreatments::are_too_many), Unsupported::Treatments),

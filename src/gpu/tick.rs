@@ -3,17 +3,18 @@
 use super::{
     compile::{AppDevice, Ready},
     hair::{GpuHair, StaysOnCpu, hand_over},
-    hand_back::request_return,
+    hand_back::{fetch_strands, request_return},
     residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
     support::Support,
     treatments::GpuTreatments,
 };
 use crate::{
     bond::Bonds,
+    contact::HairReach,
     schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings},
-    strand::{AskForStrands, Hair, OnGpu, Strand, StrandOf, Strands},
-    treatment::HairTreatment,
+    strand::{AskForStrands, Hair, MissedOnGpu, OnGpu, Strand, StrandOf, Strands},
+    treatment::{HairTreatment, PermWinding, WindingProgress},
     water::{Moisture, SoakHair},
 };
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
@@ -22,11 +23,16 @@ use bevy::{ecs::entity::EntityHashSet, prelude::*};
 pub(super) enum Decision {
     /// It goes to the device.
     Goes(Ready),
+    /// Strands begin to be wound: where they are has to be known.
+    Winds,
     /// It returns to the CPU.
     Returns(WhyCpu),
     /// It stays where it is, on the CPU.
     Stays(WhyCpu),
 }
+
+/// Ticks between looks at how far roots on a mesh have come, as on the CPU.
+const ROOTS_MOVE: u32 = 16;
 
 /// Where each hair is from this tick on. Runs before anything acts on it.
 pub(super) fn decide(
@@ -42,6 +48,7 @@ pub(super) fn decide(
             Option<&mut GpuHair>,
             Option<&mut StaysOnCpu>,
             Option<Ref<Strands>>,
+            Option<&mut HairReach>,
         ),
         With<Hair>,
     >,
@@ -50,8 +57,11 @@ pub(super) fn decide(
         (With<OnGpu>, Or<(Changed<Strand>, Changed<Bonds>, Changed<Moisture>)>),
     >,
     of: Query<&StrandOf>,
-    mut soaks: MessageReader<SoakHair>,
-    mut treats: MessageReader<HairTreatment>,
+    (mut soaks, mut treats): (MessageReader<SoakHair>, MessageReader<HairTreatment>),
+    (soaks_missed, treats_missed): (
+        Option<ResMut<MissedOnGpu<SoakHair>>>,
+        Option<ResMut<MissedOnGpu<HairTreatment>>>,
+    ),
 ) -> Vec<(Entity, Decision)> {
     let hair_of = |target: Entity| of.get(target).map_or(target, |of| of.0);
     let mut soaked: Vec<_> = soaks.read().map(|soak| (hair_of(soak.target), *soak)).collect();
@@ -59,6 +69,11 @@ pub(super) fn decide(
     let mut treated: Vec<_> = (treats.read().filter(|treat| of.contains(treat.target)))
         .map(|treat| (hair_of(treat.target), treat.clone()))
         .collect();
+    // Where the tick waits for hair that returns, the others are read by the CPU's systems after it has.
+    let mut soaks_missed =
+        soaks_missed.map_or_else(Vec::new, |mut all| core::mem::take(&mut all.0));
+    let mut treats_missed =
+        treats_missed.map_or_else(Vec::new, |mut all| core::mem::take(&mut all.0));
     let mut decisions = Vec::new();
     if hairs.iter().all(|(hair, _, on, ..)| on.is_none() && asked.of(hair) == SimulateOn::Cpu) {
         let left = hairs.iter().filter(|(_, at, ..)| **at != HairResidence::default());
@@ -71,7 +86,7 @@ pub(super) fn decide(
     let written: EntityHashSet = written.iter().map(|of| of.0).collect();
     let seconds = step.dt * step.count as f32;
     let checkpoint = settings.clamped().checkpoint;
-    for (hair, _, on, stays, members) in &mut hairs {
+    for (hair, _, on, stays, members, reach) in &mut hairs {
         let wants = asked.of(hair) == SimulateOn::Gpu;
         let missing = || {
             let known = of_strands.get(&hair).copied().or_else(|| support.missing(hair));
@@ -105,11 +120,21 @@ pub(super) fn decide(
         on.ticks += 1;
         on.told = on.told.saturating_sub(1);
         on.since_checkpoint += seconds;
+        if on.is_tied
+            && on.ticks.is_multiple_of(ROOTS_MOVE)
+            && let Some(mut reach) = reach
+        {
+            reach.bypass_change_detection().look_again();
+        }
+        let own = |target: Entity| hair_of(target) == hair;
         if on.is_returning() || !settings.blocking {
-            let own = soaked.extract_if(.., |(target, _)| *target == hair).map(|(_, soak)| soak);
-            on.soaked.extend(own);
-            let own = treated.extract_if(.., |(target, _)| *target == hair).map(|(_, treat)| treat);
-            on.treated.extend(own);
+            let soaked = soaked.extract_if(.., |(target, _)| *target == hair);
+            on.soaked.extend(soaked.map(|(_, soak)| soak));
+            let treated = treated.extract_if(.., |(target, _)| *target == hair);
+            on.treated.extend(treated.map(|(_, treat)| treat));
+        } else {
+            on.soaked.extend(soaks_missed.extract_if(.., |soak| own(soak.target)));
+            on.treated.extend(treats_missed.extract_if(.., |treat| own(treat.target)));
         }
         if on.is_returning() {
             continue;
@@ -123,10 +148,15 @@ pub(super) fn decide(
             (written.contains(&hair), WhyCpu::Unsupported(Unsupported::Written)),
             (wetted.contains(&hair), WhyCpu::Unsupported(Unsupported::Water)),
             (singly.contains(&hair), WhyCpu::Unsupported(Unsupported::Treatments)),
+            (
+                support.held_strands(hair).is_some_and(|held| held != on.held),
+                WhyCpu::Unsupported(Unsupported::LevelOfDetail),
+            ),
         ];
         let reason = reasons.into_iter().find(|(is_there, _)| *is_there).map(|(_, why)| why);
         if let Some(why) = reason.or_else(missing) {
-            decisions.push((hair, Decision::Returns(why)));
+            let begins = settings.blocking && why == WhyCpu::Unsupported(Unsupported::Winding);
+            decisions.push((hair, if begins { Decision::Winds } else { Decision::Returns(why) }));
         } else if checkpoint > 0.0 && on.since_checkpoint >= checkpoint {
             on.note_checkpoint();
         }
@@ -145,6 +175,10 @@ pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut Wor
                 }
                 Err(why) => why,
             },
+            Decision::Winds => {
+                begin_winding(world, hair);
+                continue;
+            }
             Decision::Returns(why) => {
                 request_return(world, hair, why, is_blocking);
                 tell(hair, why);
@@ -157,6 +191,21 @@ pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut Wor
         if *residence != HairResidence::Cpu(why) && why != WhyCpu::JustBack {
             *residence = HairResidence::Cpu(why);
             tell(hair, why);
+        }
+    }
+}
+
+/// Waits for a hair's strands, and begins to wind those that are to be.
+fn begin_winding(world: &mut World, hair: Entity) {
+    fetch_strands(world, hair);
+    let members = world.get::<Strands>(hair).map(|all| all.collection().to_vec());
+    for member in members.unwrap_or_default() {
+        let Ok(mut entity) = world.get_entity_mut(member) else { continue };
+        let parts = entity.get_components_mut::<(&Strand, &PermWinding, &mut WindingProgress)>();
+        if let Ok((strand, settings, mut wound)) = parts
+            && wound.waits(strand, settings)
+        {
+            wound.begin(strand);
         }
     }
 }

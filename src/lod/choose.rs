@@ -79,7 +79,7 @@ pub struct Guides {
     pub(super) thaws: bool,
     /// Key of the present partition: simulated share, level, number of strands.
     #[reflect(ignore)]
-    partition_key: Option<(f32, usize, usize)>,
+    pub(super) partition_key: Option<(f32, usize, usize)>,
     /// How the hair's own frame has moved in this tick.
     #[reflect(ignore)]
     pub(super) frame: Frame,
@@ -160,6 +160,9 @@ pub(crate) fn note_overwritten(
     }
 }
 
+/// Hair that is simulated by the tick itself.
+type HairHere = (With<Hair>, Without<OnGpu>);
+
 /// At the start of a tick: which strands are simulated, and which guides each other one follows.
 pub(crate) fn choose_guides(
     models: Settings<StrandModel>,
@@ -169,7 +172,7 @@ pub(crate) fn choose_guides(
     >,
     mut released: RemovedComponents<HeldNodes>,
     (mut enabled, mut forgotten): (RemovedComponents<Disabled>, RemovedComponents<Follower>),
-    mut hairs: Query<(Entity, &Strands, &mut PresentLod, &mut Guides), With<Hair>>,
+    mut hairs: Query<(Entity, &Strands, &mut PresentLod, &mut Guides), HairHere>,
     mut strands: Query<(
         Entity,
         &StrandOf,

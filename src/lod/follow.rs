@@ -75,6 +75,12 @@ impl Frame {
         self.0 = Some(((turn * turned).normalize(), turn * gone + way));
     }
 
+    /// Rotation and translation, if there was any.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn motion(&self) -> Option<(Quat, Vec3)> {
+        self.0
+    }
+
     /// The world velocity (m/s) of a point that rested in the moving frame for `seconds`.
     pub(super) fn velocity(&self, place: Vec3, seconds: f32) -> Vec3 {
         let v = (place - self.place(place)) / seconds;
@@ -105,6 +111,33 @@ pub struct StrandPose<'a> {
     pub orientations: &'a mut [Quat],
     /// Their angular velocities (rad/s); empty if not needed.
     pub spins: &'a mut [Vec3],
+}
+
+/// What somebody else needs who moves followers.
+#[cfg(feature = "gpu")]
+impl Ties {
+    /// Time constant with which a follower's relative motion decays (s).
+    pub(crate) const OWN_MOTION: f32 = OWN_MOTION;
+
+    /// Of each edge and guide, edge by edge: the edge's frame in that of the guide, its segment in its own
+    /// frame (m), and the guide's edge beside it, with the share toward the next.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = (Quat, Vec3, f32)> + '_ {
+        self.edges.iter().map(|tie| (tie.relative, tie.segment, tie.at))
+    }
+
+    /// Angular velocity of each edge relative to its guides when it was tied (rad/s), none once that has
+    /// decayed, and the time since (s).
+    pub(crate) fn own_motion(&self) -> (&[Vec3], f32) {
+        (&self.own, self.since)
+    }
+
+    /// It has followed for so long elsewhere (s).
+    pub(crate) fn pass(&mut self, seconds: f32) {
+        self.since += seconds;
+        if self.since > 10.0 * OWN_MOTION {
+            self.own.clear();
+        }
+    }
 }
 
 impl Ties {

@@ -11,7 +11,8 @@ use crate::{
     schedule::{EffectiveSubsteps, HairStep},
     setting::Settings,
     strand::{
-        Hair, KinematicStrand, PerHair, Strand, StrandHistory, StrandOf, StrandSleep, TickPose,
+        Hair, KinematicStrand, OnGpu, PerHair, Strand, StrandHistory, StrandOf, StrandSleep,
+        TickPose,
     },
 };
 use bevy::prelude::*;
@@ -41,14 +42,14 @@ impl Awake {
 /// them. Frozen hair has no guides.
 pub(crate) fn sync_follower_sleep(
     step: Res<HairStep>,
-    mut hairs: Query<(&PresentLod, &mut Guides), With<Hair>>,
+    mut hairs: Query<(&PresentLod, &mut Guides), (With<Hair>, Without<OnGpu>)>,
     mut simulated: Query<
         (&StrandOf, &mut Strand, &StrandSleep, &mut Follower),
-        Without<KinematicStrand>,
+        (Without<KinematicStrand>, Without<OnGpu>),
     >,
     mut followers: Query<
         (&StrandOf, &mut Strand, &mut StrandSleep, &mut Follower, &mut StrandHistory),
-        With<KinematicStrand>,
+        (With<KinematicStrand>, Without<OnGpu>),
     >,
 ) {
     let (mut any, mut thaw) = (false, false);
@@ -121,11 +122,11 @@ pub(crate) fn move_followers(
     step: Res<HairStep>,
     substeps: EffectiveSubsteps,
     solver: Settings<HairSolver>,
-    mut hairs: Query<(Entity, &TickPose, &PresentLod, &mut Guides), With<Hair>>,
-    simulated: Query<&Strand, Without<KinematicStrand>>,
+    mut hairs: Query<(Entity, &TickPose, &PresentLod, &mut Guides), (With<Hair>, Without<OnGpu>)>,
+    simulated: Query<&Strand, (Without<KinematicStrand>, Without<OnGpu>)>,
     mut followers: Query<
         (&StrandOf, &StrandSleep, &mut Strand, &mut StrandHistory, &mut Follower),
-        With<KinematicStrand>,
+        (With<KinematicStrand>, Without<OnGpu>),
     >,
 ) {
     let is_last = step.index + 1 == step.count;

@@ -41,6 +41,8 @@
 
 mod budget;
 mod choose;
+#[cfg(feature = "gpu")]
+mod elsewhere;
 #[doc(hidden)]
 pub mod follow;
 mod followers;

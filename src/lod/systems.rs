@@ -12,7 +12,7 @@ use crate::{
     fault::{FaultKind, HairFault},
     schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
     setting::{self, Ranged},
-    strand::{Hair, Strand, Strands, keep_required},
+    strand::{Hair, OnGpu, Strand, Strands, keep_required},
 };
 use bevy::prelude::*;
 
@@ -62,7 +62,7 @@ fn choose(
     budget: Res<HairBudget>,
     mut estimate: ResMut<HairEstimate>,
     mut hairs: Query<
-        (&HairLod, &HairScreenShare, &Strands, &mut PresentLod, &mut SubstepLimits),
+        (&HairLod, &HairScreenShare, &Strands, &mut PresentLod, &mut SubstepLimits, Has<OnGpu>),
         With<Hair>,
     >,
     strands: Query<&Strand>,
@@ -72,7 +72,7 @@ fn choose(
     let budget = budget.clamped();
     let mut chosen: Vec<_> = hairs
         .iter_mut()
-        .map(|(lod, share, members, mut present, limits)| {
+        .map(|(lod, share, members, mut present, limits, on_gpu)| {
             let lod = lod.clamped();
             let before = present.level.saturating_sub(present.budget_levels);
             let wanted = model::choose(&lod.levels, lod.hysteresis, before, share.0);
@@ -84,7 +84,11 @@ fn choose(
             // Hair already made coarser stays so until other hair is clearly less important.
             let held = if present.budget_levels > 0 { 1.0 + lod.hysteresis } else { 1.0 };
             let importance = share.0.max(0.0) * lod.importance / held;
-            let costs = costs(&lod.levels, segments, step.count);
+            // On the GPU it costs this processor nothing, so nothing is won by making it coarser.
+            let costs = match on_gpu {
+                true => vec![0.0; wanted + 1],
+                false => costs(&lod.levels, segments, step.count),
+            };
             (Candidate { importance, wanted, costs }, lod.levels.clone(), present, limits)
         })
         .collect();

@@ -47,8 +47,17 @@ impl HeldNodes {
         &'a self,
         strand: &'a Strand,
     ) -> impl Iterator<Item = (usize, Vec3)> + 'a {
-        let targets = self.targets.iter().take(strand.nodes()).enumerate();
         let root = strand.positions.first().copied().unwrap_or_default();
+        self.within_reach_of(root, strand)
+    }
+
+    /// The same for a strand whose root is here.
+    pub(crate) fn within_reach_of<'a>(
+        &'a self,
+        root: Vec3,
+        strand: &'a Strand,
+    ) -> impl Iterator<Item = (usize, Vec3)> + 'a {
+        let targets = self.targets.iter().take(strand.nodes()).enumerate();
         let (mut last, mut length) = (root, 0.0);
         let (mut is_drawn, mut is_displaced) = (false, false);
         targets.filter_map(move |(node, target)| {

@@ -23,9 +23,9 @@ pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
 pub use on_gpu::OnGpu;
-pub(crate) use on_gpu::return_to_cpu;
 #[cfg(feature = "gpu")]
 pub(crate) use on_gpu::{AskForStrands, ReturnToCpu, StrandsArrived};
+pub(crate) use on_gpu::{MissedOnGpu, return_to_cpu};
 pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
 pub(crate) use strand_sleep::KinematicStrand;
@@ -398,6 +398,15 @@ impl Strand {
             self.root_before.get_or_insert((*root, self.root_frame));
             *root = place;
             self.root_frame = frame.normalize();
+        }
+    }
+
+    /// The root is where it is, and has not moved; the scalp's frame is this one.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn settle_root(&mut self, frame: Quat) {
+        self.root_before = None;
+        if frame.is_finite() {
+            self.root_frame = frame;
         }
     }
 

@@ -21,6 +21,17 @@ impl OnGpu {
     pub(crate) const HANDED_OVER: Self = Self(());
 }
 
+/// Requests of a kind that the CPU's systems have read while their target was on the GPU: written within a
+/// tick, they come before anybody decides to have it back.
+#[derive(Resource, Debug)]
+pub(crate) struct MissedOnGpu<T: Send + Sync + 'static>(pub(crate) Vec<T>);
+
+impl<T: Send + Sync + 'static> Default for MissedOnGpu<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
 /// Brings a hair back at once. Set by the feature `gpu`.
 #[derive(Resource, Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "nobody goes"))]

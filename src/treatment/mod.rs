@@ -8,7 +8,7 @@ pub use systems::TreatmentPlugin;
 use crate::{
     bond::{BondKind, JointBonds},
     setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
-    strand::{HeldNodes, TickPose},
+    strand::{HeldNodes, Strand, TickPose},
 };
 use bevy::prelude::*;
 use core::ops::Range;
@@ -245,6 +245,16 @@ pub struct WindingProgress {
 }
 
 impl WindingProgress {
+    /// Whether winding of the strand on its rod has not begun.
+    pub(crate) fn waits(&self, strand: &Strand, settings: &PermWinding) -> bool {
+        settings.clamped().from_node < strand.edges() && self.start.len() != strand.nodes()
+    }
+
+    /// Begins winding from where the strand is.
+    pub(crate) fn begin(&mut self, strand: &Strand) {
+        *self = Self { start: strand.positions().to_vec(), ..default() };
+    }
+
     /// 0 has just begun, 1 is wound.
     pub fn progress(&self) -> f32 {
         self.progress

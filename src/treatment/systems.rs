@@ -10,7 +10,7 @@ use crate::{
     parallel::{Nanos, for_each},
     schedule::{HairProcessTime, HairStep, HairSystems, HairTick},
     setting::{self, Ranged, report},
-    strand::{HeldNodes, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required},
+    strand::{HeldNodes, MissedOnGpu, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required},
 };
 use bevy::prelude::*;
 
@@ -24,6 +24,7 @@ impl Plugin for TreatmentPlugin {
         keep_required::<Strand, Treatments>(app);
         keep_required::<PermRod, TickPose>(app);
         app.add_message::<HairTreatment>()
+            .init_resource::<MissedOnGpu<HairTreatment>>()
             .register_type::<HairTreatment>()
             .register_type::<Treatments>()
             .register_type::<WoundOn>()
@@ -43,10 +44,16 @@ fn begin_treatments(
     mut requests: MessageReader<HairTreatment>,
     hairs: Query<&Strands>,
     mut strands: Query<&mut Treatments, (With<StrandOf>, Without<OnGpu>)>,
-    on_gpu: Query<(), With<OnGpu>>,
+    on_gpu: Query<(), (With<OnGpu>, With<StrandOf>)>,
+    mut missed: ResMut<MissedOnGpu<HairTreatment>>,
     mut faults: MessageWriter<HairFault>,
 ) {
     for request in requests.read() {
+        // Of one strand: it is treated when it is back.
+        if on_gpu.contains(request.target) {
+            missed.0.push(request.clone());
+            continue;
+        }
         let (treat, entity) = (request.clamped(), request.target);
         report(Some(entity), request.violations(), &mut faults);
         if let Ok(members) = hairs.get(entity) {
@@ -56,7 +63,7 @@ fn begin_treatments(
             }
         } else if let Ok(mut treatments) = strands.get_mut(entity) {
             treatments.acting.push(treat);
-        } else if !on_gpu.contains(entity) {
+        } else {
             let message = "the treatment's target is neither a Hair nor a strand";
             faults.write(HairFault::new(FaultKind::NoTarget, message).of(entity));
         }
@@ -106,11 +113,16 @@ fn wind_strands(
         &PermWinding,
         &mut WindingProgress,
         &mut HeldNodes,
+        Has<OnGpu>,
     )>,
 ) {
     let mut items: Vec<_> = strands
         .iter_mut()
-        .filter_map(|(of, on, strand, settings, wound, held)| {
+        .filter_map(|(of, on, strand, settings, wound, held, on_gpu)| {
+            // Where a strand on the GPU is has to be known first.
+            if on_gpu && wound.waits(strand, settings) {
+                return None;
+            }
             let hair = hairs.get(of.0).ok()?.now();
             let (rod, pose) = rods.get(on.0).ok()?;
             let (rod, pose) = (rod.clamped(), pose.now());
@@ -129,8 +141,8 @@ fn wind_strands(
         if from >= strand.edges() {
             return;
         }
-        if wound.start.len() != strand.nodes() {
-            **wound = WindingProgress { start: strand.positions().to_vec(), ..default() };
+        if wound.waits(strand, settings) {
+            wound.begin(strand);
         }
         // Once wound, hair is fixed to its rod and moves and rotates with it.
         if wound.on_rod.is_empty() {

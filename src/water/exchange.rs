@@ -15,7 +15,10 @@ use crate::{
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
     schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings, report},
-    strand::{AddedMass, Hair, InWater, OnGpu, PerHair, Pose, Strand, StrandOf, Strands, TickPose},
+    strand::{
+        AddedMass, Hair, InWater, MissedOnGpu, OnGpu, PerHair, Pose, Strand, StrandOf, Strands,
+        TickPose,
+    },
 };
 use bevy::{
     ecs::{entity_disabling::Disabled, system::SystemParam},
@@ -145,6 +148,7 @@ pub(super) fn exchange_water(
     >,
     on_gpu: Query<(), With<OnGpu>>,
     (mut soaks, wets): (MessageReader<SoakHair>, Wetting),
+    mut missed: ResMut<MissedOnGpu<SoakHair>>,
     (mut ledger, mut found): (ResMut<WaterLedger>, ResMut<FoundWater>),
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -154,11 +158,14 @@ pub(super) fn exchange_water(
     }
     let held = |hair: Entity| clinging(wetting.of(hair).bundle(1.0), gravity.clamped().0.length());
     for soak in soaks.read() {
+        // It is soaked when it is back.
+        if on_gpu.contains(soak.target) {
+            missed.0.push(*soak);
+            continue;
+        }
         let members = match hairs.get(soak.target) {
             Ok((_, members)) => members.map(|m| m.collection().to_vec()).unwrap_or_default(),
             Err(_) if strands.contains(soak.target) => vec![soak.target],
-            // It is soaked when it is back.
-            Err(_) if on_gpu.contains(soak.target) => continue,
             Err(_) => {
                 let message = "the target of SoakHair is neither a Hair nor a strand";
                 faults.write(HairFault::new(FaultKind::NoTarget, message).of(soak.target));

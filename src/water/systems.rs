@@ -14,7 +14,7 @@ use super::{
 use crate::{
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting,
-    strand::{Hair, Strand, TickPose, keep_required},
+    strand::{Hair, MissedOnGpu, Strand, TickPose, keep_required},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -32,6 +32,7 @@ impl Plugin for WaterPlugin {
         app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
             .init_resource::<FoundWater>()
+            .init_resource::<MissedOnGpu<SoakHair>>()
             .add_message::<SoakHair>()
             .register_type::<WaterLedger>()
             .register_type::<Droplet>()

@@ -165,10 +165,10 @@ fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
     assert_eq!(water, Some(Unsupported::Water));
     let held = reported(|app, hair| {
         let strand = members(app, hair)[3];
-        let targets = vec![None, Some(Vec3::X)];
+        let targets = vec![Some(Vec3::X)];
         app.world_mut().entity_mut(strand).insert(HeldNodes { targets });
     });
-    assert_eq!(held, Some(Unsupported::HeldNodes));
+    assert_eq!(held, Some(Unsupported::HeldRoots));
     let settles = reported(|app, hair| {
         app.world_mut().entity_mut(hair).insert(Settling::default());
     });

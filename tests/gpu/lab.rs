@@ -114,6 +114,7 @@ impl LabStrand {
             tensions: &self.tensions,
             joints: &self.joints,
             before: &[],
+            follows: None,
         }
     }
 

@@ -4,11 +4,11 @@ use crate::{
     offscreen::{Offscreen, Picture, has_adapter},
     stage::{Stage, curls},
 };
-use bevy::prelude::*;
+use bevy::{light::NotShadowCaster, prelude::*};
 use bevy_keratin::{
     gpu::HairResidence,
     prelude::*,
-    render::{HairFollowers, HairView},
+    render::{HairBuffers, HairFollowers, HairView},
 };
 
 /// Pixels that differ by more than 2 of 255.
@@ -25,6 +25,11 @@ fn scene(on: SimulateOn) -> Option<(Offscreen, Entity)> {
     let world = scene.app.world_mut();
     let light = DirectionalLight { illuminance: 8000.0, shadow_maps_enabled: true, ..default() };
     world.spawn((light, Transform::from_xyz(1.0, 2.0, 2.0).looking_at(Vec3::ZERO, Vec3::Y)));
+    // What hair casts its shadow on.
+    let floor = world.resource_mut::<Assets<Mesh>>().add(Plane3d::new(Vec3::Y, Vec2::splat(0.4)));
+    let grey = StandardMaterial { perceptual_roughness: 1.0, ..Color::srgb(0.5, 0.5, 0.5).into() };
+    let grey = world.resource_mut::<Assets<StandardMaterial>>().add(grey);
+    world.spawn((Mesh3d(floor), MeshMaterial3d(grey), Transform::from_xyz(0.0, -0.11, 0.0)));
     let hair = Stage::spawn(&mut scene.app, on, curls(60, 9));
     scene.app.world_mut().entity_mut(hair).insert(HairFollowers::new(600));
     Some((scene, hair))
@@ -41,7 +46,7 @@ fn pictures_of_hair_on_the_device_and_at_home_are_the_same() {
     let at = |scene: &Offscreen| *scene.app.world().get::<HairResidence>(hair).unwrap();
     assert_eq!(at(&scene), HairResidence::Gpu);
     scene.ticking(0);
-    let views = [HairView::Natural, HairView::Bond(BondKind::Hydrogen)];
+    let views = [HairView::Natural, HairView::Bond(BondKind::Hydrogen), HairView::Strain];
     let mut pictures = Vec::new();
     for view in views {
         scene.app.insert_resource(HairDefault(view));
@@ -54,10 +59,18 @@ fn pictures_of_hair_on_the_device_and_at_home_are_the_same() {
         scene.app.insert_resource(HairDefault(view));
         let home = scene.draw();
         let covered = home.covered([0; 3]);
-        let different = different(&there, &home);
-        println!("{view:?}: {covered} pixels of hair, {different} differ");
-        assert!(covered > 1000 && different <= home.rgba.len() / 4 / 100, "{different}");
+        let off = different(&there, &home);
+        println!("{view:?}: {covered} pixels of hair and floor, {off} differ");
+        assert!(covered > 1000 && off <= home.rgba.len() / 4 / 100, "{off}");
     }
+    // There were shadows in them.
+    scene.app.insert_resource(HairDefault(HairView::Natural));
+    let drawn = scene.app.world().get::<HairBuffers>(hair).unwrap().drawn;
+    let shadowed = scene.draw();
+    scene.app.world_mut().entity_mut(drawn).insert(NotShadowCaster);
+    let shadows = different(&shadowed, &scene.draw());
+    println!("{shadows} pixels of shadow");
+    assert!(shadows > 300, "{shadows}");
     // And it is where it has come to, not where it was handed over.
     let grown = curls(60, 9);
     let members: Vec<Entity> = scene.app.world().get::<Strands>(hair).unwrap().iter().collect();

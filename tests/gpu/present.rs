@@ -5,7 +5,7 @@ use bevy::{
     prelude::*,
     render::render_resource::{BufferDescriptor, BufferUsages, MapMode, PollType},
 };
-use bevy_keratin::gpu::{DrawnNodes, GpuStrands};
+use bevy_keratin::gpu::{DrawnMoment, DrawnNodes, GpuStrands};
 use half::f16;
 
 fn half_of(word: u32, high: bool) -> f32 {
@@ -32,9 +32,10 @@ fn drawn_nodes_are_those_of_the_strands_between_the_last_two_ticks() {
     let mut first = plain();
     first.notes_before = true;
     let drawn = DrawnNodes::new(&device.device, &device.kernels, &on, &nodes, &firsts);
-    let show = |on: &GpuStrands, overstep: f32, known: bool| {
+    let show = |on: &GpuStrands, overstep: f32, known: bool, roots: &[Option<Vec3>]| {
+        let moment = DrawnMoment { overstep, known, roots };
         let mut encoder = device.device.create_command_encoder(&default());
-        drawn.encode(&device.queue, &device.kernels, on, &mut encoder, overstep, known);
+        drawn.encode(&device.queue, &device.kernels, on, &mut encoder, &moment);
         let back = buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
         encoder.copy_buffer_to_buffer(&nodes, 0, &back, 0, size);
         device.queue.submit([encoder.finish()]);
@@ -45,9 +46,13 @@ fn drawn_nodes_are_those_of_the_strands_between_the_last_two_ticks() {
             bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
         words.as_chunks::<8>().0.to_vec()
     };
-    let appeared = show(&on, 1.0, false);
+    let appeared = show(&on, 1.0, false, &[]);
     let after = device.run(&mut on, &[first, plain()]);
-    let shown = show(&on, 0.25, true);
+    let shown = show(&on, 0.25, true, &[]);
+    // As on a skinned mesh, which is drawn elsewhere than it is simulated.
+    let aside = |i: usize| (!i.is_multiple_of(3)).then_some(Vec3::new(0.3, 0.02 * i as f32, 0.0));
+    let roots: Vec<Option<Vec3>> = (0..strands.len()).map(aside).collect();
+    let rooted = show(&on, 0.25, true, &roots);
     let place = |node: &[u32; 8]| Vec3::from([node[0], node[1], node[2]].map(f32::from_bits));
     for (i, (strand, state)) in strands.iter().zip(&after).enumerate() {
         let mut rest = 0.0;
@@ -59,6 +64,9 @@ fn drawn_nodes_are_those_of_the_strands_between_the_last_two_ticks() {
             assert_eq!(state.before[node], strand.positions[node]);
             let between = strand.positions[node].lerp(state.positions[node], 0.25);
             assert!(place(new).distance(between) < 1e-6, "{i}, {node}");
+            let root = strand.positions[0].lerp(state.positions[0], 0.25);
+            let expected = between + roots[i].map_or(Vec3::ZERO, |drawn| drawn - root);
+            assert!(place(&rooted[at]).distance(expected) < 1e-6, "{i}, {node}");
             let moved = (between - strand.positions[node]) * 1024.0;
             let found =
                 Vec3::new(half_of(new[6], false), half_of(new[6], true), half_of(new[7], false));

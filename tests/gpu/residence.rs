@@ -1,23 +1,26 @@
 //! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
-use crate::stage::{Stage, apart, curls, free};
+use crate::{
+    led, lod, probe,
+    stage::{Stage, apart, curls, free},
+};
 use bevy::prelude::*;
 use bevy_keratin::{
-    FaultKind,
+    FaultKind, HairStep,
     gpu::{HairResidence, Unsupported, WhyCpu},
     prelude::*,
     strand::OnGpu,
 };
 
 /// Other hair on the same device, after some ticks there: a software device takes seconds for the kernels.
-fn on_gpu(stage: &mut Stage, count: usize, ticks: usize) {
+pub fn on_gpu(stage: &mut Stage, count: usize, ticks: usize) {
     grow(stage, SimulateOn::Gpu, curls(count, 7));
     stage.run(1 + ticks);
     assert_eq!(stage.residence(), HairResidence::Gpu);
 }
 
 /// Other hair in place of what was there, as it was planted but for its first tick.
-fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
+pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
     stage.app.world_mut().despawn(stage.hair);
     let world = stage.app.world_mut();
     let drops: Vec<Entity> = world.query_filtered::<Entity, With<Droplet>>().iter(world).collect();
@@ -33,18 +36,27 @@ fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 fn hair_goes_to_the_device_and_comes_home() {
     let Some(mut stage) = Stage::new(SimulateOn::Cpu, Vec::new()) else { return };
     stage.compile();
-    let all: [fn(&mut Stage); 12] = [
+    let all: [fn(&mut Stage); 21] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
         treatments_run_where_the_hair_is_and_cross_with_it,
         what_is_not_supported_brings_hair_home_and_is_done_there,
+        what_is_asked_for_within_a_tick_is_done,
         what_the_game_writes_is_kept,
+        probe::probes_tell_where_strands_are,
         resets_and_restyles_work_as_on_the_processor,
         a_teleported_head_takes_its_hair_along_at_rest,
         hairdos_are_asked_for_and_arrive,
         broken_strands_are_put_back_and_told_of_once,
         closed_forms_hold_through_the_app,
+        led::roots_on_a_mesh_go_with_it_there,
+        led::held_nodes_are_led_there_and_let_go,
+        led::strands_are_wound_there_and_keep_their_curl,
+        lod::followers_follow_there_as_on_the_processor,
+        lod::a_change_of_level_is_made_on_the_processor,
+        lod::a_budget_is_that_of_the_processor,
+        lod::roots_of_followers_go_with_their_mesh,
         hair_is_despawned_and_levels_change_on_the_way,
     ];
     for one in all {
@@ -221,6 +233,47 @@ fn what_is_not_supported_brings_hair_home_and_is_done_there(stage: &mut Stage) {
     assert!(tip(stage, clone) != before, "it stands still");
 }
 
+/// Requests that are written between the substeps of a tick, for the hair and for one strand.
+fn what_is_asked_for_within_a_tick_is_done(stage: &mut Stage) {
+    #[derive(Resource, Default)]
+    struct Request(Option<Entity>);
+    stage.app.init_resource::<Request>().add_systems(
+        HairTick,
+        (|mut request: ResMut<Request>,
+          step: Res<HairStep>,
+          of: Query<(), With<Hair>>,
+          mut soaks: MessageWriter<SoakHair>,
+          mut treats: MessageWriter<HairTreatment>| {
+            let Some(target) = request.0.take_if(|_| step.index == 2) else { return };
+            match of.contains(target) {
+                true => _ = soaks.write(SoakHair::dripping(target)),
+                false => _ = treats.write(HairTreatment::lotion(target)),
+            }
+        })
+        .in_set(HairSystems::Last),
+    );
+    for blocking in [true, false] {
+        on_gpu(stage, 6, 2);
+        stage.app.world_mut().resource_mut::<HairGpu>().blocking = blocking;
+        let (hair, strand) = (stage.hair, stage.members()[2]);
+        stage.app.world_mut().resource_mut::<Request>().0 = Some(hair);
+        (0..20).for_each(|_| stage.run(1));
+        let moisture = |e: Entity| stage.app.world().get::<Moisture>(e).unwrap().volume();
+        let (one, other) = (moisture(strand), moisture(stage.members()[3]));
+        assert!(one > 0.0 && other > 0.0, "{blocking}: {:?}", stage.residence());
+        on_gpu(stage, 6, 2);
+        stage.app.world_mut().resource_mut::<HairGpu>().blocking = blocking;
+        let strand = stage.members()[2];
+        stage.app.world_mut().resource_mut::<Request>().0 = Some(strand);
+        (0..20).for_each(|_| stage.run(1));
+        let rate = |stage: &mut Stage, i: usize| {
+            stage.bonds()[i].rates(BondKind::Disulfide).next().unwrap()
+        };
+        assert!((rate(stage, 2) - 0.8).abs() < 1e-6, "once: {}", rate(stage, 2));
+        assert_eq!(rate(stage, 3), 1.0);
+    }
+}
+
 fn what_the_game_writes_is_kept(stage: &mut Stage) {
     on_gpu(stage, 6, 20);
     let (pushed, posed) = (stage.members()[1], stage.members()[3]);
@@ -356,14 +409,15 @@ fn closed_forms_hold_through_the_app(stage: &mut Stage) {
         stage.app.world_mut().entity_mut(hair).insert((AirDrag { rate: 6.0 }, even));
         hair
     };
-    let hairs = [(); 4].map(|()| grow());
+    let hairs = [(); 5].map(|()| grow());
     stage.at_once(10);
     stage.run(2);
-    let [dried, half, permed, washed] = hairs;
+    let [dried, half, permed, washed, straightened] = hairs;
     let write = |stage: &mut Stage, all: Vec<T>| {
         all.into_iter().for_each(|one| _ = stage.app.world_mut().write_message(one));
     };
     write(stage, vec![T::wet(dried), T::wet(half), T::lotion(permed), T::shampoo(washed)]);
+    write(stage, vec![T::lotion(straightened)]);
     stage.run(18);
     let held = hairs.map(|hair| {
         stage.hair = hair;
@@ -371,22 +425,44 @@ fn closed_forms_hold_through_the_app(stage: &mut Stage) {
     });
     let to_half = T::set(half, BondKind::Hydrogen, 0.5).unwrap();
     write(stage, vec![T::dry(dried), to_half, T::neutraliser(permed), T::neutraliser(washed)]);
+    write(stage, vec![T::neutraliser(straightened)]);
     stage.at_once(1);
     stage.run(1);
-    write(stage, vec![T::dry(permed), T::dry(washed)]);
+    write(stage, vec![T::dry(permed), T::dry(washed), T::dry(straightened)]);
     stage.run(1);
     stage.at_once(10);
     stage.app.insert_resource(HairGravity(Vec3::ZERO));
     stage.run(18);
-    for ((hair, held), expected) in hairs.into_iter().zip(held).zip([0.33, 0.19760, 0.67, 0.63]) {
-        stage.hair = hair;
-        assert!(stage.is_on_gpu());
-        let now = stage.strands().remove(0);
+    let keeps = |stage: &mut Stage, which: usize, expected: f32| {
+        stage.hair = hairs[which];
+        assert!(stage.is_on_gpu(), "{:?}", stage.residence());
+        let (now, held) = (stage.strands().remove(0), &held[which]);
         let joints = || (0..now.edges()).map(|i| (now.darboux(i).xyz(), held.darboux(i).xyz()));
         let square: f32 = joints().map(|(_, held)| held.length_squared()).sum();
         let kept = joints().map(|(now, held)| now.dot(held)).sum::<f32>() / square;
         println!("kept {kept:.5}, expected {expected:.5}");
         assert!((kept - expected).abs() < 0.002, "kept {kept}, expected {expected}");
+    };
+    for (which, expected) in [0.33, 0.19760, 0.67, 0.63, 0.67].into_iter().enumerate() {
+        keeps(stage, which, expected);
     }
+    // A perm that is washed, and one that is held straight from washing to drying.
+    stage.hair = straightened;
+    let strand = stage.members()[0];
+    let targets: Vec<_> = straight.iter().map(|p| (p.x > 0.0).then_some(*p)).collect();
+    stage.app.world_mut().entity_mut(strand).insert(HeldNodes { targets });
+    stage.at_once(1);
+    stage.run(3);
+    write(stage, vec![T::shampoo(permed), T::shampoo(straightened)]);
+    stage.run(2);
+    write(stage, vec![T::neutraliser(straightened)]);
+    stage.run(1);
+    write(stage, vec![T::dry(straightened)]);
+    stage.run(1);
+    stage.app.world_mut().entity_mut(strand).remove::<HeldNodes>();
+    stage.at_once(10);
+    stage.run(18);
+    keeps(stage, 2, 0.04 / 0.37);
+    keeps(stage, 4, 0.04);
     hairs[..3].iter().for_each(|hair| _ = stage.app.world_mut().despawn(*hair));
 }

@@ -67,8 +67,28 @@ fn spread(mut errors: Vec<f64>, far: f64) -> ([f64; 2], usize) {
 ///
 /// Where a decision hangs on the last bit, as whether a node touches, a strand may go either way on each: of
 /// those there may be a few, in lanes as on the device. All others hold the bound strand by strand's rank.
-fn compare(scene: &str, seed: u32, speed: f32, record: impl Fn(&mut Random) -> SubstepRecord) {
+fn compare(
+    scene: &str,
+    seed: u32,
+    speed: f32,
+    record: impl Fn(&mut Random) -> SubstepRecord + Send,
+) {
     let Some(device) = Device::get() else { return };
+    // Without optimisation a substep in lanes takes more stack than a test's thread has.
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(1 << 26);
+        let compared = || compare_on(device, scene, seed, speed, record);
+        thread.spawn_scoped(scope, compared).unwrap().join().unwrap();
+    });
+}
+
+fn compare_on(
+    device: &Device,
+    scene: &str,
+    seed: u32,
+    speed: f32,
+    record: impl Fn(&mut Random) -> SubstepRecord,
+) {
     let mut random = Random(seed);
     for nodes in NODES {
         let record = record(&mut random);

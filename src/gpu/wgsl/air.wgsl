@@ -16,6 +16,14 @@ fn wind_of(b: u32, p: vec3<f32>, e: vec3<f32>) -> f32 {
     return record.blower[b].strength * sine / (sqrt(dot(off, off)) / REFERENCE_DISTANCE + 1.0);
 }
 
+// Where the air finds a node: held ones have not moved yet.
+fn air_place(i: u32) -> vec3<f32> {
+    if 0u < i && is_held(edge(i).z) {
+        return start_of(i);
+    }
+    return node(i).xyz;
+}
+
 // What the air does to velocities, and what it asks of hydrogen bonds (equation 19).
 fn blow() {
     let fallen = record.gravity * record.dt;
@@ -28,8 +36,8 @@ fn blow() {
         if record.blowers > 0u {
             // The tip has no edge of its own: it takes the last one's wind.
             let e = min(i, edges - 1u);
-            let along = node(e + 1u).xyz - node(e).xyz;
-            let p = node(i).xyz;
+            let along = air_place(e + 1u) - air_place(e);
+            let p = air_place(i);
             var acceleration = vec3(0.0);
             for (var b = 0u; b < record.blowers; b++) {
                 let wind = wind_of(b, p, along);
@@ -39,7 +47,13 @@ fn blow() {
             v += acceleration * (record.dt / max(weight, 1.0));
         }
         v += record.wind * taken_along;
-        set_moving(i, select(v, vec3(0.0), is_held(weight)), m.w);
+        if is_held(weight) {
+            v = vec3(0.0);
+            if 0u < i {
+                v = (node(i).xyz - start_of(i)) * (1.0 / record.dt);
+            }
+        }
+        set_moving(i, v, m.w);
         motion[slot(i, 1u, 2u)].w = drying * record.dt;
     }
 }

@@ -11,6 +11,9 @@ struct Frame {
     overstep: f32,
     // Whether the buffer holds the nodes of the frame before.
     known: u32,
+    // Whether roots are drawn elsewhere than they are simulated, and strands with them.
+    rooted: u32,
+    unused: u32,
 }
 
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;
@@ -18,8 +21,8 @@ struct Frame {
 @group(0) @binding(2) var<storage, read> motion: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> rest: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read> bonds: array<vec4<f32>>;
-// The first drawn node of each strand, by its number.
-@group(0) @binding(5) var<storage, read> firsts: array<u32>;
+// The first drawn node of each strand, by its number, and where its root is drawn.
+@group(0) @binding(5) var<storage, read> firsts: array<vec4<u32>>;
 @group(0) @binding(6) var<storage, read_write> drawn: array<vec4<u32>>;
 @group(0) @binding(7) var<uniform> shown_frame: Frame;
 
@@ -28,14 +31,17 @@ fn is_usable(p: vec3<f32>) -> bool {
     return all(bits != vec3(0x7f800000u)) && all(abs(p) < vec3(FAR));
 }
 
+// How far the strand is drawn from where it is simulated.
+var<private> aside: vec3<f32>;
+
 // Where a node is drawn: between the tick before and the present, if both are known.
 fn drawn_place(slot: u32) -> vec3<f32> {
     let now = pose[slot].xyz;
     let before = motion[slot + LANES].xyz;
     if !is_usable(before) {
-        return now;
+        return now + aside;
     }
-    return mix(before, now, shown_frame.overstep);
+    return mix(before, now, shown_frame.overstep) + aside;
 }
 
 fn halves(a: f32, b: f32) -> u32 {
@@ -56,7 +62,15 @@ fn present(
         return;
     }
     let nodes = block.y;
-    let first = firsts[block.w + lane];
+    let first = firsts[block.w + lane].x;
+    aside = vec3(0.0);
+    if shown_frame.rooted != 0u {
+        let root = bitcast<vec3<f32>>(firsts[block.w + lane].yzw);
+        let simulated = drawn_place(block.x * 2u * LANES + lane);
+        if is_usable(root) && is_usable(simulated) {
+            aside = root - simulated;
+        }
+    }
     // Of a strand without any usable node nothing is shown.
     var last = vec3(0.0);
     var shown = 0.0;

@@ -70,9 +70,23 @@ struct Substep {
     obstacles: u32,
     blower: array<Blower, 4>,
     treatments: u32,
-    unused_1: u32,
+    // Led nodes, and led roots of followers: first and number.
+    first_led: u32,
+    led: u32,
+    first_follower_led: u32,
+    follower_led: u32,
+    first_follower_block: u32,
+    first_follower_slot: u32,
+    unused: u32,
+    // How the hair's frame has moved in the tick, and its length (s).
+    follow_turn: vec4<f32>,
+    follow_move: vec3<f32>,
+    follow_seconds: f32,
+    // Time since hand-over (s), what is left after it of a follower's own motion, its time constant (s).
+    follow_since: f32,
+    follow_decay: f32,
+    follow_lasts: f32,
     unused_2: u32,
-    unused_3: u32,
     treatment: array<Treatment, 8>,
     obstacle: array<Obstacle, MAX_OBSTACLES>,
 }
@@ -83,6 +97,9 @@ const SHAPES: u32 = 2u;
 const REMEMBERS: u32 = 4u;
 const NOTES_BEFORE: u32 = 8u;
 const RESTS: u32 = 16u;
+const LEADS_ROOTS: u32 = 32u;
+const HOLDS: u32 = 64u;
+const FOLLOWS: u32 = 128u;
 
 // Of each block of strands: first node slot, nodes of a strand, strands, number of its first strand.
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;
@@ -96,7 +113,8 @@ const RESTS: u32 = 16u;
 @group(0) @binding(4) var<storage, read_write> rest: array<vec4<f32>>;
 // Four a node: remembered shape and rate of each kind.
 @group(0) @binding(5) var<storage, read_write> bonds: array<vec4<f32>>;
-// Eight a node, of no meaning between substeps.
+// Eight a node. Before a substep the first two hold where a led node comes to, and a led root's frame; of no
+// meaning otherwise between substeps.
 @group(0) @binding(6) var<storage, read_write> scratch: array<vec4<f32>>;
 // Strands put back, rebuilt, and of the first of them the number from the end.
 @group(0) @binding(7) var<storage, read_write> report: array<atomic<u32>, 4>;
@@ -129,9 +147,9 @@ fn set_frame(i: u32, q: vec4<f32>) {
     pose_out[slot(i, 1u, 2u)] = q;
 }
 
-// The scalp's frame.
+// The scalp's frame at the end of the substep.
 fn root_frame() -> vec4<f32> {
-    return pose_in[slot(edges, 1u, 2u)];
+    return frame(edges);
 }
 
 // Velocity and tension.

@@ -21,9 +21,14 @@ fn carried_frame(i: u32) -> vec4<f32> {
 fn load() {
     let carries = (record.flags & CARRIES) != 0u;
     let rests = (record.flags & RESTS) != 0u;
+    let holds = (record.flags & HOLDS) != 0u;
     for (var i = 0u; i <= edges; i++) {
         let p = carried_place(i);
-        set_node(i, p, 0.0);
+        var to = p;
+        if holds && 0u < i && is_held(edge(i).z) {
+            to = row(i, 0u).xyz;
+        }
+        set_node(i, to, 0.0);
         set_frame(i, carried_frame(i));
         set_start(i, p);
         var m = moving(i);
@@ -38,6 +43,10 @@ fn load() {
             motion[slot(i, 1u, 2u)] = vec4(pose_in[slot(i, 0u, 2u)].xyz, 0.0);
         }
     }
+    if (record.flags & LEADS_ROOTS) != 0u {
+        set_node(0u, row(0u, 0u).xyz, 0.0);
+        set_frame(edges, row(0u, 1u));
+    }
     if carries {
         set_start(0u, rotated(record.carry_turn, pose_in[slot(0u, 0u, 2u)].xyz) + record.carry_move);
     }
@@ -45,10 +54,11 @@ fn load() {
 
 // Where the scalp's frame was as the substep began.
 fn root_from() -> vec4<f32> {
+    let before = pose_in[slot(edges, 1u, 2u)];
     if (record.flags & CARRIES) == 0u {
-        return root_frame();
+        return before;
     }
-    return product(record.carry_turn, root_frame());
+    return product(record.carry_turn, before);
 }
 
 fn is_finite_strand() -> bool {
@@ -85,15 +95,17 @@ fn put_back() {
     atomicMax(&report[2], 0xffffffffu - number);
     if began_finite() {
         atomicAdd(&report[0], 1u);
-        for (var i = 0u; i <= edges; i++) {
-            set_node(i, carried_place(i), 0.0);
+        // The root is where its scalp is.
+        set_moving(0u, vec3(0.0), 0.0);
+        for (var i = 0u; i < edges; i++) {
+            set_node(i + 1u, carried_place(i + 1u), 0.0);
             set_frame(i, carried_frame(i));
-            set_moving(i, vec3(0.0), 0.0);
+            set_moving(i + 1u, vec3(0.0), 0.0);
         }
         return;
     }
     atomicAdd(&report[1], 1u);
-    var p = pose_in[slot(0u, 0u, 2u)].xyz;
+    var p = node(0u).xyz;
     if is_broken3(p) {
         p = vec3(0.0);
     }

@@ -1,0 +1,124 @@
+// A follower in a substep: its bonds, and in the tick's last one its pose, by the frames of its guides. Rust
+// twins: src/lod/{follow,followers}.rs. In place of scratch it binds its ties, six a node:
+// frame relative to each of three guides; segment in its own frame, edge of the first guide; angular velocity
+// of its own, edge of the second; edge of the third.
+// At the tip: guides' slots and their number; weights, and seconds since it was tied; guides' edges, and what
+// is left of its own motion; where a led root comes to; its frame.
+
+const GUIDES: u32 = 3u;
+const TIES: u32 = 6u;
+// In units of the time constant its own motion lasts that long.
+const OWN_LASTS: f32 = 10.0;
+
+fn tie(i: u32, part: u32) -> vec4<f32> {
+    return scratch[((first - record.first_follower_slot + i) * TIES + part) * LANES + lane];
+}
+
+// The frame between two edges of a guide.
+fn guide_frame(of_guide: u32, last: u32, at: f32) -> vec4<f32> {
+    let i = min(u32(at), last);
+    let share = at - f32(i);
+    let base = of_guide / LANES;
+    let own = of_guide % LANES;
+    let one = pose_out[((base + i) * 2u + 1u) * LANES + own];
+    if !(0.0 < share) || last <= i {
+        return one;
+    }
+    let next = pose_out[((base + i + 1u) * 2u + 1u) * LANES + own];
+    return normalized(one * (1.0 - share) + next * select(share, -share, dot(one, next) < 0.0));
+}
+
+fn turned_by(rotation: vec3<f32>) -> vec4<f32> {
+    let angle = sqrt(dot(rotation, rotation));
+    let axis = rotation * (1.0 / max(angle, 1e-12));
+    return vec4(axis * sin(0.5 * angle), cos(0.5 * angle));
+}
+
+fn go_along() {
+    let head = tie(edges, 0u);
+    let weights = tie(edges, 1u);
+    let ends = tie(edges, 2u);
+    let count = min(u32(head.w), GUIDES);
+    let since = weights.w + record.follow_since;
+    var own_motion = since * ends.w * record.follow_decay;
+    if since > OWN_LASTS * record.follow_lasts {
+        own_motion = 0.0;
+    }
+    if (record.flags & LEADS_ROOTS) != 0u {
+        set_node(0u, tie(edges, 3u).xyz, 0.0);
+        set_frame(edges, tie(edges, 4u));
+    }
+    set_moving(0u, vec3(0.0), moving(0u).w);
+    var p = node(0u).xyz;
+    for (var i = 0u; i < edges; i++) {
+        let segment = tie(i, 3u);
+        let spin = tie(i, 4u);
+        let at = vec3(segment.w, spin.w, tie(i, 5u).x);
+        var like = vec4(0.0, 0.0, 0.0, 1.0);
+        var sum = vec4(0.0);
+        for (var g = 0u; g < count; g++) {
+            let frame = guide_frame(u32(head[g]), u32(ends[g]), at[g]);
+            let one = product(frame, tie(i, g));
+            if g == 0u {
+                like = one;
+            }
+            sum += one * select(weights[g], -weights[g], dot(like, one) < 0.0);
+        }
+        let square = dot(sum, sum);
+        var turn = like;
+        if 1u < count && 1e-3 < square {
+            turn = sum * (1.0 / sqrt(square));
+        }
+        if own_motion != 0.0 {
+            turn = product(turned_by(spin.xyz * own_motion), turn);
+        }
+        let before = node(i + 1u).xyz;
+        let to = p + rotated(turn, segment.xyz);
+        if is_broken3(to) {
+            // It stays as it is.
+            p = before;
+            set_moving(i + 1u, vec3(0.0), 0.0);
+            continue;
+        }
+        p = to;
+        let still = rotated(record.follow_turn, before) + record.follow_move;
+        let v = (p - still) * (1.0 / record.follow_seconds);
+        set_moving(i + 1u, select(v, vec3(0.0), is_broken3(v)), moving(i + 1u).w);
+        set_node(i + 1u, p, 0.0);
+        set_frame(i, turn);
+    }
+}
+
+@compute @workgroup_size(32)
+fn follow(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) index: u32,
+) {
+    let block = blocks[group.x + record.first_follower_block];
+    if index >= block.z {
+        return;
+    }
+    first = block.x;
+    lane = index;
+    edges = block.y - 1u;
+    number = block.w + index;
+    let remembers = (record.flags & REMEMBERS) != 0u;
+    for (var i = 0u; i <= edges; i++) {
+        let p = pose_in[slot(i, 0u, 2u)].xyz;
+        set_node(i, p, 0.0);
+        set_frame(i, pose_in[slot(i, 1u, 2u)]);
+        if (record.flags & NOTES_BEFORE) != 0u {
+            motion[slot(i, 1u, 2u)] = vec4(p, 0.0);
+        }
+    }
+    // What dries it finds it where it was.
+    if remembers {
+        blow();
+    }
+    if (record.flags & FOLLOWS) != 0u {
+        go_along();
+    }
+    if remembers {
+        remember();
+    }
+}

@@ -1,0 +1,52 @@
+// Puts where led nodes come to, and whether they are led, where the substep finds it. One node a thread.
+
+const LANES: u32 = 32u;
+// Bits beside a node's slot.
+const ROOT: u32 = 0x40000000u;
+const FREE: u32 = 0x80000000u;
+
+struct Substep {
+    // As in strand.wgsl.
+    before: array<vec4<u32>, 17>,
+    treatments: u32,
+    first_led: u32,
+    led: u32,
+    first_follower_led: u32,
+    follower_led: u32,
+}
+
+// Two a node: place and slot; frame.
+@group(0) @binding(0) var<storage, read> leads: array<vec4<u32>>;
+@group(0) @binding(1) var<storage, read_write> rest: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read_write> scratch: array<vec4<f32>>;
+@group(1) @binding(0) var<uniform> record: Substep;
+
+@compute @workgroup_size(64)
+fn lead(@builtin(global_invocation_id) id: vec3<u32>) {
+    if record.led <= id.x {
+        return;
+    }
+    let entry = leads[2u * (record.first_led + id.x)];
+    let frame = leads[2u * (record.first_led + id.x) + 1u];
+    let bits = entry.w;
+    let slot = bits & ~(ROOT | FREE);
+    let of_node = slot / LANES;
+    let lane = slot % LANES;
+    if (bits & ROOT) == 0u {
+        rest[(of_node * 2u + 1u) * LANES + lane].z = select(0.0, 1.0, (bits & FREE) != 0u);
+    }
+    scratch[(of_node * 8u) * LANES + lane] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
+    scratch[(of_node * 8u + 1u) * LANES + lane] = bitcast<vec4<f32>>(frame);
+}
+
+// The root of a follower, into what ties it: `scratch` holds that, and the slot is that of its last node's.
+@compute @workgroup_size(64)
+fn lead_followers(@builtin(global_invocation_id) id: vec3<u32>) {
+    if record.follower_led <= id.x {
+        return;
+    }
+    let entry = leads[2u * (record.first_follower_led + id.x)];
+    let frame = leads[2u * (record.first_follower_led + id.x) + 1u];
+    scratch[entry.w] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
+    scratch[entry.w + LANES] = bitcast<vec4<f32>>(frame);
+}
