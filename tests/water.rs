@@ -526,6 +526,44 @@ fn a_drop_dries_as_fast_as_vapour_leaves_it() {
 }
 
 #[test]
+fn hair_dries_as_fast_as_vapour_leaves_it() {
+    let mut app = test_app(60.0);
+    no_gravity(&mut app);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    let wetting = HairWetting { soaking: 0.0, wicking: 0.0, ..default() };
+    app.insert_resource(HairDefault(wetting));
+    app.insert_resource(HairProcessTime(100.0));
+    let (air, diameter) =
+        (vapour::DryingAir::of(&HairClimate::default()), 2.0 * wetting.lock_radius());
+    let flux = vapour::transfer(air.draught, diameter) * air.drive(0.0);
+    let (rate, seconds) = (f64::from(flux * PI * diameter) / vapour::WATER, 100.0);
+    let water = |app: &App| {
+        let moisture = app.world().get::<Moisture>(id).unwrap();
+        let sum = |volumes: &[f64]| volumes.iter().sum::<f64>();
+        (sum(moisture.film()), sum(moisture.bound()))
+    };
+    // With film on it the fibres stay soaked; without it they dry the slower the less water they have.
+    for (wetness, film_dries) in [(2.0, true), (1.0, false)] {
+        app.world_mut().write_message(SoakHair { target: hair, wetness });
+        app.update();
+        let before = water(&app);
+        run(&mut app, 1.0);
+        let after = water(&app);
+        let soaked = 0.24 * wetting.capacity();
+        let (lost, expected) = if film_dries {
+            assert!((before.1 / soaked - 1.0).abs() < 1e-5 && after.1 == before.1);
+            (before.0 - after.0, rate * 0.24 * seconds)
+        } else {
+            assert_eq!(after.0, 0.0);
+            let share = (-rate * seconds / wetting.capacity()).exp();
+            (before.1 - after.1, before.1 * (1.0 - share))
+        };
+        assert!((lost / expected - 1.0).abs() < 0.01, "{lost} m³, expected {expected}");
+    }
+    assert!(ledger(&app).error() < 1e-9, "{:?}", ledger(&app));
+}
+
+#[test]
 fn the_first_treatment_shows() {
     let mut app = test_app(60.0);
     let (hair, entity) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
