@@ -5,7 +5,7 @@ mod common;
 mod locks;
 
 use bevy::prelude::*;
-use bevy_keratin::{DropletRules, FaultKind, Shower, environment::vapour, prelude::*};
+use bevy_keratin::{AddedMass, DropletRules, FaultKind, Shower, environment::vapour, prelude::*};
 use common::{faults, no_gravity, one_strand, run, strand, test_app};
 use core::f32::consts::PI;
 use locks::{clustered_share, tip_spacing};
@@ -505,6 +505,37 @@ fn a_drop_that_is_carried_weighs_on_its_strand() {
         let mass: f32 = (1..9).map(|i| added[i] * dry(i) * wetting.dry_mass()).sum();
         assert!((mass / 5e-6 - 1.0).abs() < 1e-3, "{mass} kg are carried, not 5 mg");
     }
+}
+
+#[test]
+fn a_drop_that_lands_gives_the_strand_its_momentum() {
+    let mut app = test_app(60.0);
+    no_gravity(&mut app);
+    let (_, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    let wetting = HairWetting { uptake: 0.0, sliding: 0.0, adhesion: 0.0, ..default() };
+    app.insert_resource(HairDefault(wetting));
+    app.insert_resource(HairProcessTime(0.0));
+    let velocity = Vec3::new(0.0, -0.5, 0.2);
+    let drop = Droplet::new(Vec3::new(0.18, 0.012, -0.005), 4e-9).unwrap();
+    let drop = app.world_mut().spawn(drop.with_velocity(velocity).unwrap()).id();
+    for _ in 0..6 {
+        app.update();
+        if app.world().get::<Droplet>(drop).unwrap().ride().is_some() {
+            break;
+        }
+    }
+    assert!(app.world().get::<Droplet>(drop).unwrap().ride().is_some(), "it landed");
+    let (strand, added) = (strand(&app, id), &app.world().get::<AddedMass>(id).unwrap().mass);
+    let lengths = strand.rest_lengths();
+    let momentum: Vec3 = (1..9)
+        .map(|i| {
+            let length = 0.5 * (lengths.get(i).unwrap_or(&0.0) + lengths[i - 1]);
+            strand.velocities()[i] * (wetting.dry_mass() * length * (1.0 + added[i]))
+        })
+        .sum();
+    // The root takes some of it by the end of the tick.
+    let share = momentum / 4e-6;
+    assert!(share.distance(velocity) < 0.3 * velocity.length(), "{share} of {velocity}");
 }
 
 #[test]

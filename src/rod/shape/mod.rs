@@ -612,6 +612,24 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_baked_octahedron_knows_where_it_is() {
+        let (center, size) = (Vec3::new(0.2, -0.1, 0.05), Vec3::new(0.12, 0.2, 0.09));
+        let tip = |k: usize| Vec3::AXES[k / 2] * size * if k % 2 == 0 { 1.0 } else { -1.0 };
+        let tips: Vec<Vec3> = (0..6).map(|k| center + tip(k)).collect();
+        let faces: Vec<[u32; 3]> = (0..8u32)
+            .map(|k| {
+                let [x, y, z] = [k & 1, 2 + (k >> 1 & 1), 4 + (k >> 2)];
+                if k.count_ones() % 2 == 0 { [x, y, z] } else { [x, z, y] }
+            })
+            .collect();
+        let grid = DistanceGrid::bake(&tips, &faces, CELL).unwrap();
+        let (middle, half) = Shape::Grid(grid).bounds();
+        assert!(middle.distance(center) < CELL, "{middle}");
+        let wider = half - size;
+        assert!(wider.min_element() > -CELL && wider.max_element() < 2.0 * CELL, "{wider}");
+    }
+
     /// Whether they share their data or not.
     #[test]
     fn shapes_are_compared_by_what_they_hold() {
