@@ -5,7 +5,7 @@ mod common;
 mod locks;
 
 use bevy::prelude::*;
-use bevy_keratin::{DropletRules, FaultKind, Shower, environment::vapour, prelude::*};
+use bevy_keratin::{AddedMass, DropletRules, FaultKind, Shower, environment::vapour, prelude::*};
 use common::{faults, no_gravity, one_strand, run, strand, test_app};
 use core::f32::consts::PI;
 use locks::{clustered_share, tip_spacing};
@@ -508,6 +508,37 @@ fn a_drop_that_is_carried_weighs_on_its_strand() {
 }
 
 #[test]
+fn a_drop_that_lands_gives_the_strand_its_momentum() {
+    let mut app = test_app(60.0);
+    no_gravity(&mut app);
+    let (_, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    let wetting = HairWetting { uptake: 0.0, sliding: 0.0, adhesion: 0.0, ..default() };
+    app.insert_resource(HairDefault(wetting));
+    app.insert_resource(HairProcessTime(0.0));
+    let velocity = Vec3::new(0.0, -0.5, 0.2);
+    let drop = Droplet::new(Vec3::new(0.18, 0.012, -0.005), 4e-9).unwrap();
+    let drop = app.world_mut().spawn(drop.with_velocity(velocity).unwrap()).id();
+    for _ in 0..6 {
+        app.update();
+        if app.world().get::<Droplet>(drop).unwrap().ride().is_some() {
+            break;
+        }
+    }
+    assert!(app.world().get::<Droplet>(drop).unwrap().ride().is_some(), "it landed");
+    let (strand, added) = (strand(&app, id), &app.world().get::<AddedMass>(id).unwrap().mass);
+    let lengths = strand.rest_lengths();
+    let momentum: Vec3 = (1..9)
+        .map(|i| {
+            let length = 0.5 * (lengths.get(i).unwrap_or(&0.0) + lengths[i - 1]);
+            strand.velocities()[i] * (wetting.dry_mass() * length * (1.0 + added[i]))
+        })
+        .sum();
+    // The root takes some of it by the end of the tick.
+    let share = momentum / 4e-6;
+    assert!(share.distance(velocity) < 0.3 * velocity.length(), "{share} of {velocity}");
+}
+
+#[test]
 fn a_drop_dries_as_fast_as_vapour_leaves_it() {
     let mut app = test_app(60.0);
     no_gravity(&mut app);
@@ -522,6 +553,44 @@ fn a_drop_dries_as_fast_as_vapour_leaves_it() {
     let expected = f64::from(flux * 4.0 * PI * radius * radius) * seconds / vapour::WATER;
     let lost = before - volume(&app);
     assert!((lost / expected - 1.0).abs() < 0.03, "{lost} m³, expected {expected}");
+    assert!(ledger(&app).error() < 1e-9, "{:?}", ledger(&app));
+}
+
+#[test]
+fn hair_dries_as_fast_as_vapour_leaves_it() {
+    let mut app = test_app(60.0);
+    no_gravity(&mut app);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    let wetting = HairWetting { soaking: 0.0, wicking: 0.0, ..default() };
+    app.insert_resource(HairDefault(wetting));
+    app.insert_resource(HairProcessTime(100.0));
+    let (air, diameter) =
+        (vapour::DryingAir::of(&HairClimate::default()), 2.0 * wetting.lock_radius());
+    let flux = vapour::transfer(air.draught, diameter) * air.drive(0.0);
+    let (rate, seconds) = (f64::from(flux * PI * diameter) / vapour::WATER, 100.0);
+    let water = |app: &App| {
+        let moisture = app.world().get::<Moisture>(id).unwrap();
+        let sum = |volumes: &[f64]| volumes.iter().sum::<f64>();
+        (sum(moisture.film()), sum(moisture.bound()))
+    };
+    // With film on it the fibres stay soaked; without it they dry the slower the less water they have.
+    for (wetness, film_dries) in [(2.0, true), (1.0, false)] {
+        app.world_mut().write_message(SoakHair { target: hair, wetness });
+        app.update();
+        let before = water(&app);
+        run(&mut app, 1.0);
+        let after = water(&app);
+        let soaked = 0.24 * wetting.capacity();
+        let (lost, expected) = if film_dries {
+            assert!((before.1 / soaked - 1.0).abs() < 1e-5 && after.1 == before.1);
+            (before.0 - after.0, rate * 0.24 * seconds)
+        } else {
+            assert_eq!(after.0, 0.0);
+            let share = (-rate * seconds / wetting.capacity()).exp();
+            (before.1 - after.1, before.1 * (1.0 - share))
+        };
+        assert!((lost / expected - 1.0).abs() < 0.01, "{lost} m³, expected {expected}");
+    }
     assert!(ledger(&app).error() < 1e-9, "{:?}", ledger(&app));
 }
 

@@ -213,6 +213,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_share_of_stiffness_left_is_that_of_closed_bonds() {
+        let joint = JointBonds { rates: [0.5, 1.0, 0.0, 1.0], ..Default::default() };
+        // Shares of the influences, whatever they add up to.
+        for scale in [1.0, 2.0, 0.1] {
+            let share = joint.closed_share(&F.map(|f| scale * f));
+            assert!((share - (0.5 * 0.3 + 0.33 + 0.17)).abs() < 1e-6, "{share}");
+        }
+    }
+
+    #[test]
     fn almost_no_bonds_remember_a_finite_shape() {
         for change in [1e-45_f32, 1e-40, 1e-30, 1e-20] {
             let mut joint = JointBonds { rates: [0.0; BondKind::COUNT], ..Default::default() };

@@ -608,6 +608,7 @@ mod tests {
                             let one = bridged(p, foot, velocity, both, film);
                             all.pull += one.pull;
                             all.drift += one.drift;
+                            all.steepness += one.steepness;
                             all.grip += one.grip;
                         }
                     }
@@ -620,6 +621,14 @@ mod tests {
                     .map(|d| brute(strands[own][n] + d))
                     .map(|b| b.pull.distance(expected.pull) + (b.grip - expected.grip).abs())
                     .sum();
+                // It has a step where a bridge breaks.
+                let breaks = Vec3::AXES
+                    .into_iter()
+                    .flat_map(|d| [d * 1e-5, d * -1e-5])
+                    .map(|d| (brute(strands[own][n] + d).steepness - expected.steepness).abs());
+                let most = 1e-3 * (1.0 + expected.steepness) + breaks.sum::<f32>();
+                let off = (found.steepness - expected.steepness).abs();
+                prop_assert!(off < most, "steepness {} of {}, not {}", k, found.steepness, expected.steepness);
                 prop_assert!(found.pull.distance(expected.pull) < 1e-3 + rounding, "pull {}", k);
                 prop_assert!((found.grip - expected.grip).abs() < 1e-3 + rounding, "grip {}", k);
                 let most = 1e-2 + 50.0 * rounding;

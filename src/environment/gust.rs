@@ -43,6 +43,7 @@ fn lattice(seed: u32, point: [i64; 3]) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy::math::Vec3Swizzles;
 
     #[test]
     fn gusts_are_smooth_unbiased_and_depend_on_the_seed() {
@@ -61,6 +62,82 @@ mod tests {
         let at = DVec3::new(0.3, 4.2, -1.7);
         assert_eq!(noise(7, at), noise(7, at));
         assert_ne!(noise(7, at), noise(8, at));
+    }
+
+    /// The published outputs of SplitMix64 from the state 0, which coordinates bring about that take the
+    /// hash back to the generator's next state.
+    #[test]
+    fn lattice_values_are_those_of_splitmix() {
+        const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
+        let outputs: [u64; 3] =
+            [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4, 0x06c4_5d18_8009_454f];
+        let back = |k: u64| GAMMA.wrapping_mul(k).wrapping_sub(outputs[k as usize - 1]) as i64;
+        let bits = |value: f32| ((value + 1.0) * 1_048_576.0) as u64;
+        let found = lattice(0, [0, back(1), back(2)]).to_array().map(bits);
+        assert_eq!(found, [0, 21, 42].map(|shift| outputs[2] >> shift & 0x1f_ffff));
+    }
+
+    #[test]
+    fn lattice_values_are_uniform_and_independent() {
+        let side = 40;
+        let at = |k: i64| [k % side - 20, k / side % side - 20, k / (side * side) - 20];
+        let count = side * side * side;
+        let (mut mean, mut square, mut mixed) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        let mut beside = [Vec3::ZERO; 4];
+        for point in (0..count).map(at) {
+            let here = lattice(7, point);
+            assert!(here.abs().max_element() <= 1.0);
+            mean += here;
+            square += here * here;
+            mixed += here * here.yzx();
+            for axis in 0..3 {
+                let mut next = point;
+                next[axis] += 1;
+                beside[axis] += here * lattice(7, next);
+            }
+            beside[3] += here * lattice(8, point);
+        }
+        // Five standard errors: of a uniform value 1/√3, of a square √(4/45), of a product 1/3.
+        let (n, close) = (count as f32, 5.0 / (count as f32).sqrt());
+        assert!((mean / n).abs().max_element() < 0.58 * close, "{}", mean / n);
+        assert!((square / n - 1.0 / 3.0).abs().max_element() < 0.3 * close, "{}", square / n);
+        for product in beside.into_iter().chain([mixed]) {
+            assert!((product / n).abs().max_element() < 0.34 * close, "{}", product / n);
+        }
+    }
+
+    #[test]
+    fn noise_has_the_lattices_values_at_its_points_and_no_kink_between() {
+        let at = DVec3::new(-3.0, 5.0, 2.0);
+        assert_eq!(noise(7, at), lattice(7, [-3, 5, 2]));
+        let middle = noise(7, at + DVec3::new(0.0, 0.5, 0.0));
+        let mean = 0.5 * (lattice(7, [-3, 5, 2]) + lattice(7, [-3, 6, 2]));
+        assert!(middle.distance(mean) < 1e-6, "{middle} {mean}");
+        // Quintic fade: slope and curvature are 0 at the points, from both sides.
+        for side in [-1e-2, 1e-2] {
+            let off = noise(7, at + DVec3::splat(side)).distance(noise(7, at));
+            assert!(off < 1e-4, "{off}");
+        }
+    }
+
+    /// Also of seeds that have no bit in common with the number by which the eddies' seed differs.
+    #[test]
+    fn eddies_are_small_and_have_a_seed_of_their_own() {
+        let place = Vec3::new(0.31, -2.2, 1.7);
+        let eddies = |seed: u32| {
+            4.0 * (gust(seed, place, DVec3::ZERO, 1.0) - 0.75 * noise(seed, place.as_dvec3()))
+        };
+        let seeds = [0, !0x9e37_79b9, 0x9e37_79b9, 1];
+        for (i, a) in seeds.into_iter().enumerate() {
+            assert!(eddies(a).distance(noise(a, place.as_dvec3() * 7.0)) > 0.02, "seed {a}");
+            for b in &seeds[..i] {
+                assert!(eddies(a).distance(eddies(*b)) > 0.02, "seeds {a} and {b}");
+            }
+        }
+        // A seventh of the length: after a whole lattice cell of theirs they have their lattice's values.
+        let at = DVec3::new(1.0, 2.0, -3.0) / 7.0;
+        let found = 4.0 * (gust(5, at.as_vec3(), DVec3::ZERO, 1.0) - 0.75 * noise(5, at));
+        assert!(found.distance(lattice(5 ^ 0x9e37_79b9, [1, 2, -3])) < 1e-4, "{found}");
     }
 
     #[test]

@@ -223,6 +223,20 @@ mod tests {
         found
     }
 
+    #[test]
+    fn cells_are_as_wide_as_asked_for() {
+        let mut grid = UniformGrid::default();
+        for cell in [0.004_f32, 0.25, 8.0] {
+            grid.build(cell, [(Vec3::ZERO, 0)].into_iter());
+            for place in [IVec3::ZERO, IVec3::new(3, -5, 17), IVec3::splat(-1)] {
+                let low = place.as_vec3();
+                for share in [0.01, 0.5, 0.99] {
+                    assert_eq!(grid.cell_of((low + share) * cell), place, "{share} of {cell}");
+                }
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn neighbour_sets_equal_brute_force(

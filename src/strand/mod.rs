@@ -520,6 +520,29 @@ mod tests {
     }
 
     #[test]
+    fn every_number_that_is_not_finite_is_seen() {
+        let points: Vec<Vec3> = (0..4).map(|i| Vec3::X * (0.01 * i as f32)).collect();
+        let whole = Strand::from_polyline(&points).unwrap();
+        assert!(whole.is_finite());
+        for (i, k, bad) in
+            (0..12).flat_map(|c| [f32::NAN, f32::INFINITY].map(|bad| (c / 3, c % 3, bad)))
+        {
+            let mut spoilt = vec![whole.clone(), whole.clone()];
+            spoilt[0].positions[i][k] = bad;
+            spoilt[1].velocities[i][k] = bad;
+            if i < whole.edges() {
+                spoilt.extend([whole.clone(), whole.clone(), whole.clone()]);
+                spoilt[2].angular_velocities[i][k] = bad;
+                spoilt[3].orientations[i] = Quat::from_vec4(Vec4::W.with_x(bad));
+                spoilt[4].orientations[i] = Quat::from_array([0.0; 4]);
+            }
+            for (what, strand) in spoilt.iter().enumerate() {
+                assert!(!strand.is_finite(), "{bad} in list {what}, element {i}, component {k}");
+            }
+        }
+    }
+
+    #[test]
     fn posing_a_strand_in_its_own_shape_changes_nothing() {
         let points: Vec<Vec3> = (0..10)
             .map(|i| i as f32)

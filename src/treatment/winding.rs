@@ -126,6 +126,31 @@ mod tests {
     }
 
     #[test]
+    fn a_coil_rises_by_its_pitch_each_turn() {
+        let (start, lengths) = straight(30);
+        // An edge as long as the radius goes a sixth of the way around.
+        let nodes = winding(&ROD, &start, &lengths, 2, 0.004, 1.0);
+        for (k, pair) in nodes.iter().zip(&nodes[6..]).enumerate() {
+            let rise = (*pair.1 - *pair.0).dot(ROD.axis);
+            assert!((rise - 0.004).abs() < 1e-5, "{rise} m in the turn from {k}");
+        }
+    }
+
+    #[test]
+    fn a_rod_out_of_reach_draws_hair_out_and_no_farther() {
+        let (start, lengths) = straight(16);
+        for x in [0.03, 0.1, 0.3] {
+            let rod = LocalRod { center: ROD.center.with_x(x), ..ROD };
+            let nodes = winding(&rod, &start, &lengths, 3, 0.004, 1.0);
+            let away = nodes[0].distance(start[0]);
+            assert!(away <= 0.09 + 1e-6, "{away} m from the root, with 0.09 m of hair");
+            // Within reach it is wound on the rod's surface.
+            let off = (nodes[0] - rod.center).reject_from_normalized(rod.axis).length();
+            assert!(x > 0.05 || (off - rod.radius).abs() < 1e-5, "{off}");
+        }
+    }
+
+    #[test]
     fn winding_begins_where_the_strand_is() {
         let (start, lengths) = straight(16);
         let nodes = winding(&ROD, &start, &lengths, 2, 0.004, 0.0);

@@ -129,6 +129,28 @@ mod tests {
         assert!(stopped.x >= 0.0 && stopped.x < 10.0);
     }
 
+    proptest! {
+        /// Drag acts on the motion relative to the air, and takes the share of it that is documented.
+        #[test]
+        fn drops_drift_with_the_air(
+            v in [-5.0f32..5.0, -5.0f32..5.0, -5.0f32..5.0],
+            wind in [-9.0f32..9.0, -9.0f32..9.0, -9.0f32..9.0],
+            radius in 1e-4f32..3e-3,
+            dt in 1e-3f32..0.02,
+        ) {
+            let (v, wind, gravity) = (Vec3::from(v), Vec3::from(wind), Vec3::NEG_Y * 9.8);
+            let still = fall(v, gravity, Vec3::ZERO, radius, dt);
+            let drifting = fall(v + wind, gravity, wind, radius, dt) - wind;
+            prop_assert!(still.distance(drifting) < 1e-4, "{still} {drifting}");
+            let with_the_air = fall(wind, Vec3::ZERO, wind, radius, dt);
+            prop_assert!(with_the_air.distance(wind) < 1e-5, "{with_the_air} in {wind}");
+            // Implicit: v (1 + k |v*| dt) = v* with 3/8 C_D ρ_air/ρ_water / r of a sphere.
+            let free = v + gravity * dt;
+            let slowed = 1.0 + 0.375 * 0.5 * 1.2e-3 / radius * free.length() * dt;
+            prop_assert!((still * slowed).distance(free) < 1e-4, "{still} of {free}");
+        }
+    }
+
     #[test]
     fn a_single_hair_holds_a_microlitre_at_its_tip() {
         // 35 µm: 0.97 µL; a lock of a hundred ten times as much; at 5 g a fifth.

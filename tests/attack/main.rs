@@ -10,7 +10,7 @@ mod operations;
 use bevy::{prelude::*, reflect::ReflectMut};
 use bevy_keratin::{
     BondChanges, DropletRules, FaultKind, HairSubsteps, InvalidValue, Shower, SoakHair,
-    bond::RestShape, prelude::*,
+    bond::RestShape, prelude::*, strand::TickPose,
 };
 use common::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
@@ -144,6 +144,30 @@ fn restyling_what_was_written_into_in_the_same_frame_is_whole() {
                 matches!(&reported[..], [f] if f.kind == FaultKind::Strand),
                 "{part}: {reported:?}"
             );
+        }
+    }
+}
+
+#[test]
+fn a_pose_that_was_written_into_moves_no_hair() {
+    for part in ["to", "now", "before"] {
+        for scale in [f32::NAN, 0.0, -1.0] {
+            let mut app = test_app(60.0);
+            let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
+            run(&mut app, 0.2);
+            let before = strand(&app, id).positions().to_vec();
+            {
+                let mut pose = app.world_mut().get_mut::<TickPose>(hair).unwrap();
+                let ReflectMut::Struct(parts) = pose.reflect_mut() else { panic!() };
+                let part = parts.field_mut(part).unwrap().reflect_mut();
+                let ReflectMut::Struct(pose) = part else { panic!() };
+                *pose.field_mut("scale").unwrap().try_downcast_mut::<f32>().unwrap() = scale;
+            }
+            run(&mut app, 0.2);
+            for (now, before) in strand(&app, id).positions().iter().zip(&before) {
+                assert!(now.distance(*before) < 1e-3, "{part} of {scale}: {now} from {before}");
+            }
+            assert!(strand(&app, id).is_finite());
         }
     }
 }

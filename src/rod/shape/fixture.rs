@@ -1,7 +1,7 @@
 //! Shapes for tests.
 
 use super::{ConvexHull, DistanceGrid, Shape};
-use glam::{UVec3, Vec3, Vec4};
+use glam::{UVec3, Vec2, Vec3, Vec4};
 
 /// A box and an ellipsoid, half a slanting box as a hull, a pear as a grid, each about 0.1 in size.
 pub(crate) fn all_shapes() -> [Shape; 4] {
@@ -30,7 +30,7 @@ fn hull() -> ConvexHull {
 
 pub(crate) const CELL: f32 = 0.01;
 
-/// The union of two balls, with exact distances outside.
+/// The union of two balls, with exact distances.
 pub(crate) fn pear() -> DistanceGrid {
     let points = UVec3::new(22, 26, 22);
     let origin = Vec3::new(-0.105, -0.105, -0.105);
@@ -44,6 +44,27 @@ pub(crate) fn pear() -> DistanceGrid {
     DistanceGrid::of_samples(origin, CELL, points, distances, bounds)
 }
 
+/// The distances to the surfaces of its two balls.
+pub(crate) fn pear_balls(p: Vec3) -> (f32, f32) {
+    (p.length() - 0.07, (p - Vec3::Y * 0.08).length() - 0.04)
+}
+
 pub(crate) fn pear_distance(p: Vec3) -> f32 {
-    (p.length() - 0.07).min((p - Vec3::Y * 0.08).length() - 0.04)
+    // Where the two balls meet: height and radius of the ring.
+    const RING: Vec2 = Vec2::new(0.035_002, 0.060_625);
+    let (low, high) = pear_balls(p);
+    if low.min(high) >= 0.0 {
+        return low.min(high);
+    }
+    // Inside, the nearest point of a ball's surface counts only where the other does not cover it.
+    let at = Vec2::new(p.x.hypot(p.z), p.y);
+    let over = at - Vec2::Y * 0.08;
+    let mut nearest = at.distance(RING);
+    if 0.07 * at.y <= RING.y * at.length() {
+        nearest = nearest.min(low.abs());
+    }
+    if 0.04 * over.y >= (RING.y - 0.08) * over.length() {
+        nearest = nearest.min(high.abs());
+    }
+    -nearest
 }
