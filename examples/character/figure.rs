@@ -103,7 +103,10 @@ fn build(
     let at = Transform::from_translation(SKULL - joint(HEAD)).with_rotation(upright);
     commands.entity(face).insert((at, ChildOf(bones[HEAD])));
 
-    // A head is no capsule: hair lies on its skull by several.
+    let (cranium, mut at) = head::cranium()?;
+    at.translation += SKULL - joint(HEAD);
+    commands.spawn((cranium, at, ChildOf(bones[HEAD])));
+    // The rest of a head is no capsule: hair lies on several.
     for (a, b, radius) in head::skull() {
         let [a, b] = [a, b].map(|end| end + SKULL - joint(HEAD));
         commands.spawn((head::limb(a, b, radius)?, Skull(a, b, radius), ChildOf(bones[HEAD])));

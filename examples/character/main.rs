@@ -105,7 +105,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if let Some(file) = &arguments.export {
-        let body = body::mesh_of(0.003, 0.009);
+        let body = body::mesh_of(0.0036, 0.0105);
         return export::write(&head::with_scalp(body, &figure::scalp(), default()), file);
     }
     // Before anything that takes long.

@@ -25,20 +25,40 @@ pub struct Loop {
     pub milliseconds: u32,
 }
 
-/// Draws a picture every `apart` ticks, `count` in all; before each tick the app may be changed, by the
-/// number of that tick.
-pub fn film(
+/// How many pictures a loop has, how many ticks they are apart, and for how long each is shown (ms).
+#[derive(Clone, Copy)]
+struct Reel {
+    count: u32,
+    apart: u32,
+    milliseconds: u32,
+}
+
+impl Reel {
+    /// The same story in at most so many pictures.
+    fn at_most(self, most: u32) -> Self {
+        if self.count <= most {
+            return self;
+        }
+        let ticks = (self.count - 1) * self.apart;
+        let apart = ticks.div_ceil(most.saturating_sub(1).max(1));
+        let count = most.min(ticks / apart + 1);
+        Self { count, apart, milliseconds: self.milliseconds * apart / self.apart }
+    }
+}
+
+/// Draws the pictures of a reel; before each tick the app may be changed, by the number of that tick.
+fn film(
     app: &mut App,
     pictures: &Pictures,
-    (count, apart): (u32, u32),
+    reel: Reel,
     mut before: impl FnMut(&mut App, u32) -> Result,
 ) -> Result<Vec<Image>> {
     let mut drawn = Vec::new();
-    for tick in 0..(count - 1) * apart + 1 {
+    for tick in 0..(reel.count - 1) * reel.apart + 1 {
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
         before(app, tick)?;
         app.update();
-        if tick % apart == 0 {
+        if tick % reel.apart == 0 {
             app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
             drawn.push(pictures.draw(app)?);
         }
@@ -53,12 +73,12 @@ fn scene(
     view: HairView,
     size: (u32, u32),
     (near, aside): (f32, Vec3),
-    (count, apart): (u32, u32),
+    reel: Reel,
 ) -> Result<Vec<Image>> {
     let mut app = renderer::app("", (0, 0), true, default());
     set::furnish(&mut app, scene, view);
     arguments.thin_out(&mut app);
-    let camera = orbit::bundle(scene.kind);
+    let camera = (orbit::bundle(scene.kind), DepthPrepass);
     let pictures = Pictures::new(&mut app, size, arguments.supersample, camera);
     let mut orbits = app.world_mut().query::<(&mut orbit::Orbit, &mut Transform)>();
     for (mut orbit, mut place) in orbits.iter_mut(app.world_mut()) {
@@ -66,7 +86,7 @@ fn scene(
         orbit.focus += aside;
         *place = orbit.pose();
     }
-    film(&mut app, &pictures, (count.min(arguments.most), apart), |_, _| Ok(()))
+    film(&mut app, &pictures, reel, |_, _| Ok(()))
 }
 
 fn story(kind: SceneKind, variant: Option<&str>) -> Result<Scene> {
@@ -77,8 +97,9 @@ pub fn perm(arguments: &Arguments) -> Result<Loop> {
     let size = arguments.scaled(440, 440);
     let perm = story(SceneKind::Perm, None)?;
     let near = (0.72, Vec3::new(0.03, 0.02, 0.0));
-    let pictures = scene(arguments, perm, HairView::Natural, size, near, (58, 15))?;
-    Ok(Loop { pictures, milliseconds: 90 })
+    let reel = Reel { count: 58, apart: 15, milliseconds: 90 }.at_most(arguments.most);
+    let pictures = scene(arguments, perm, HairView::Natural, size, near, reel)?;
+    Ok(Loop { pictures, milliseconds: reel.milliseconds })
 }
 
 /// Two loops beside each other.
@@ -90,22 +111,25 @@ fn both(left: Vec<Image>, right: Vec<Image>) -> Vec<Image> {
 pub fn bedhead(arguments: &Arguments) -> Result<Loop> {
     let size = arguments.scaled(340, 340);
     let near = (0.86, Vec3::new(0.0, 0.03, 0.0));
+    let reel = Reel { count: 48, apart: 25, milliseconds: 100 }.at_most(arguments.most);
     let play = |variant| {
         let bedhead = story(SceneKind::Bedhead, Some(variant))?;
-        scene(arguments, bedhead, HairView::Natural, size, near, (48, 25))
+        scene(arguments, bedhead, HairView::Natural, size, near, reel)
     };
-    Ok(Loop { pictures: both(play("treated")?, play("never-wet")?), milliseconds: 100 })
+    let pictures = both(play("treated")?, play("never-wet")?);
+    Ok(Loop { pictures, milliseconds: reel.milliseconds })
 }
 
 pub fn blow_dry(arguments: &Arguments) -> Result<Loop> {
     let size = arguments.scaled(340, 340);
     let near = (0.86, Vec3::new(0.0, 0.03, 0.0));
+    let reel = Reel { count: 48, apart: 25, milliseconds: 100 }.at_most(arguments.most);
     let play = |view| {
         let dried = story(SceneKind::BlowDry, None)?;
-        scene(arguments, dried, view, size, near, (48, 25))
+        scene(arguments, dried, view, size, near, reel)
     };
-    let bonds = play(HairView::Bond(BondKind::Hydrogen))?;
-    Ok(Loop { pictures: both(play(HairView::Natural)?, bonds), milliseconds: 100 })
+    let pictures = both(play(HairView::Natural)?, play(HairView::Bond(BondKind::Hydrogen))?);
+    Ok(Loop { pictures, milliseconds: reel.milliseconds })
 }
 
 /// A bust that has settled, and its camera.
@@ -114,7 +138,17 @@ pub fn settled(
     preset: HairPreset,
     size: (u32, u32),
 ) -> Result<(App, bust::Bust, Pictures)> {
-    let mut app = bust::app("", bust::ground(preset));
+    settled_before(bust::ground(preset), arguments, preset, size)
+}
+
+/// The same before another ground.
+pub fn settled_before(
+    ground: Color,
+    arguments: &Arguments,
+    preset: HairPreset,
+    size: (u32, u32),
+) -> Result<(App, bust::Bust, Pictures)> {
+    let mut app = bust::app("", ground);
     bust::light(&mut app);
     arguments.thin_out(&mut app);
     let bust = bust::wear(&mut app, preset)?;
@@ -131,16 +165,16 @@ pub fn settled(
 }
 
 /// From where busts are seen, and the middle of the picture (m).
-pub const FROM: Vec3 = Vec3::new(0.34, 0.06, 0.76);
-pub const MIDDLE: Vec3 = Vec3::new(0.0, -0.06, 0.0);
+pub const FROM: Vec3 = Vec3::new(0.27, 0.05, 0.61);
+pub const MIDDLE: Vec3 = Vec3::new(0.0, -0.05, 0.0);
 
 /// Rain begins, hair hangs in wet locks.
 pub fn rain(arguments: &Arguments) -> Result<Loop> {
     let size = arguments.scaled(400, 440);
     let (mut app, _, pictures) = settled(arguments, HairPreset::Wavy, size)?;
     app.insert_resource(HairProcessTime(40.0));
-    let count = 48.min(arguments.most);
-    let pictures = film(&mut app, &pictures, (count, 6), |app, tick| {
+    let reel = Reel { count: 48, apart: 6, milliseconds: 100 }.at_most(arguments.most);
+    let pictures = film(&mut app, &pictures, reel, |app, tick| {
         if tick == 12 {
             let (mut shower, place) = Shower::rain_on(Vec3::Y * 0.1);
             shower.rate *= 2.0;
@@ -153,7 +187,7 @@ pub fn rain(arguments: &Arguments) -> Result<Loop> {
         }
         Ok(())
     })?;
-    Ok(Loop { pictures, milliseconds: 100 })
+    Ok(Loop { pictures, milliseconds: reel.milliseconds })
 }
 
 /// A head is shaken, and comes to rest where it was.
@@ -161,8 +195,8 @@ pub fn shake(arguments: &Arguments) -> Result<Loop> {
     const SECONDS: f32 = 1.5;
     let size = arguments.scaled(440, 440);
     let (mut app, bust, pictures) = settled(arguments, HairPreset::Curly, size)?;
-    let count = 52.min(arguments.most);
-    let pictures = film(&mut app, &pictures, (count, 3), |app, tick| {
+    let reel = Reel { count: 52, apart: 3, milliseconds: 50 }.at_most(arguments.most);
+    let pictures = film(&mut app, &pictures, reel, |app, tick| {
         let share = (tick as f32 / 60.0 / SECONDS).min(1.0);
         let turn = 2.6 * share * (1.0 - share) * sin(TAU * 1.7 * SECONDS * share);
         let upright = bust::upright();
@@ -170,7 +204,7 @@ pub fn shake(arguments: &Arguments) -> Result<Loop> {
         app.world_mut().entity_mut(bust.hair).insert(turned);
         Ok(())
     })?;
-    Ok(Loop { pictures, milliseconds: 50 })
+    Ok(Loop { pictures, milliseconds: reel.milliseconds })
 }
 
 /// A figure walks in a circle, in wind; the camera goes along.
@@ -201,8 +235,8 @@ pub fn walk(arguments: &Arguments) -> Result<Loop> {
     let ahead = if arguments.most > 1 { 60 } else { 2 };
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     (0..ahead).for_each(|_| app.update());
-    let count = 48.min(arguments.most);
-    let pictures = film(&mut app, &pictures, (count, 4), |app, _| {
+    let reel = Reel { count: 48, apart: 4, milliseconds: 67 }.at_most(arguments.most);
+    let pictures = film(&mut app, &pictures, reel, |app, _| {
         let mut figures = app.world_mut().query_filtered::<&Transform, With<figure::Figure>>();
         let figure = *figures.single(app.world())?;
         let turn = figure.rotation * Quat::from_euler(EulerRot::YXZ, 0.62, -0.07, 0.0);
@@ -212,7 +246,7 @@ pub fn walk(arguments: &Arguments) -> Result<Loop> {
         cameras.iter_mut(app.world_mut()).for_each(|mut camera| *camera = place);
         Ok(())
     })?;
-    Ok(Loop { pictures, milliseconds: 67 })
+    Ok(Loop { pictures, milliseconds: reel.milliseconds })
 }
 
 fn daylight(mut commands: Commands, mut paint: Paint) {

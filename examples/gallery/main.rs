@@ -46,7 +46,7 @@ mod studio;
 mod loops;
 mod sheets;
 
-use bevy::prelude::*;
+use bevy::{light::DirectionalLightShadowMap, prelude::*};
 use bevy_keratin::{prelude::*, render::HairFollowers};
 use clap::{Parser, ValueEnum};
 use std::{
@@ -58,6 +58,8 @@ use std::{
 /// What there is to be seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Piece {
+    /// Three heads of hair beside each other.
+    Hero,
     /// A rod is wound, lotion, the rod is taken out.
     Perm,
     /// Slept on wet, beside hair that was dry.
@@ -93,20 +95,24 @@ pub struct Arguments {
     /// The folder of the loops' frames.
     #[arg(long, default_value = "target/gallery", value_name = "DIR")]
     frames: PathBuf,
-    /// The most frames of a loop.
+    /// The most frames of a loop: it shows the same in fewer, farther apart. With 1 everything is drawn
+    /// once and nothing waits for hair to settle.
     #[arg(long, default_value = "1000", value_parser = clap::value_parser!(u32).range(1..))]
     most: u32,
     /// Height of loops, of each picture of a sheet, and the width that goes with it, in pixels for a
     /// size of 1.
     #[arg(long, default_value = "1.0", value_parser = size)]
     size: f32,
-    /// The most drawn strands of a hair. Fewer than it has are drawn wider.
+    /// Drawn strands of a head of 40,000, of others in proportion. Fewer are drawn wider.
     #[arg(long, default_value = "40000", value_parser = clap::value_parser!(u32).range(100..))]
     strands: u32,
     /// How many times larger, along and across, pictures are drawn and averaged.
     #[arg(long, default_value = "2", value_parser = clap::value_parser!(u32).range(1..=4))]
     supersample: u32,
 }
+
+/// Hair of so few drawn strands is drawn whole.
+const FEW: u32 = 2000;
 
 fn size(text: &str) -> Result<f32, String> {
     let size = text.parse().ok().filter(|size| (0.1..=4.0).contains(size));
@@ -120,16 +126,24 @@ impl Arguments {
         (scaled(width), scaled(height))
     }
 
-    /// Draws no more strands than asked for, those wider.
+    /// Draws no more strands than asked for, those wider, and shadows no finer than the picture.
     fn thin_out(&self, app: &mut App) {
-        let most = self.strands;
-        let thin = move |followers: &mut HairFollowers, look: Option<&mut HairLook>| {
-            let times = followers.count as f32 / most as f32;
-            followers.count = followers.count.min(most);
-            if let Some(look) = look {
-                look.width *= times.max(1.0).sqrt();
+        let fine = (2048.0 * self.size * self.supersample as f32) as usize;
+        let size = fine.next_power_of_two().clamp(1024, 4096);
+        app.insert_resource(DirectionalLightShadowMap { size });
+        let share = (self.strands as f32 / 40_000.0).min(1.0);
+        // Brows and lashes stay.
+        let thin = move |count: u32| ((count as f32 * share) as u32).max(FEW).min(count);
+        let wider = |before: u32, now: u32| (before as f32 / now.max(1) as f32).sqrt();
+        let world = app.world_mut();
+        if let Some(mut followers) = world.get_resource_mut::<HairDefault<HairFollowers>>() {
+            let before = followers.count;
+            followers.count = thin(before);
+            let times = wider(before, followers.count);
+            if let Some(mut look) = world.get_resource_mut::<HairDefault<HairLook>>() {
+                look.width *= times;
             }
-        };
+        }
         app.add_systems(
             PreUpdate,
             move |mut hairs: Query<
@@ -137,7 +151,11 @@ impl Arguments {
                 Added<HairFollowers>,
             >| {
                 for (mut followers, look) in &mut hairs {
-                    thin(&mut followers, look.map(Mut::into_inner));
+                    let before = followers.count;
+                    followers.count = thin(before);
+                    if let Some(mut look) = look {
+                        look.width *= wider(before, followers.count);
+                    }
                 }
             },
         );
@@ -179,6 +197,7 @@ fn make(piece: Piece, arguments: &Arguments) -> Result {
         Piece::Rain => loops::rain(arguments)?,
         Piece::Shake => loops::shake(arguments)?,
         Piece::Walk => loops::walk(arguments)?,
+        Piece::Hero => return sheets::hero(arguments),
         Piece::Before => return sheets::before(arguments),
         Piece::Melanin => return sheets::melanin(arguments),
         Piece::Presets => return sheets::presets(arguments),

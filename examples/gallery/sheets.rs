@@ -2,14 +2,14 @@
 
 use crate::{
     Arguments, bust,
-    loops::{FROM, MIDDLE, settled},
+    loops::{FROM, MIDDLE, settled, settled_before},
     orbit,
     picture::{self, Pictures},
     renderer,
     scenes::{Scene, SceneKind},
     set,
 };
-use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy::{core_pipeline::prepass::DepthPrepass, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{plant::HairPreset, prelude::*, render::HairView};
 
 /// Lets time pass (ticks).
@@ -36,7 +36,7 @@ fn scene(arguments: &Arguments, scene: Scene, view: HairView, frame: u32) -> Res
     let mut app = renderer::app("", (0, 0), true, default());
     set::furnish(&mut app, scene, view);
     arguments.thin_out(&mut app);
-    let camera = orbit::bundle(scene.kind);
+    let camera = (orbit::bundle(scene.kind), DepthPrepass);
     let size = arguments.scaled(400, 400);
     let pictures = Pictures::new(&mut app, size, arguments.supersample, camera);
     let mut orbits = app.world_mut().query::<(&mut orbit::Orbit, &mut Transform)>();
@@ -48,6 +48,24 @@ fn scene(arguments: &Arguments, scene: Scene, view: HairView, frame: u32) -> Res
     }
     run(&mut app, frame);
     Ok(pictures.draw(&mut app)?)
+}
+
+/// Three heads of hair, turned to each other, before one ground.
+pub fn hero(arguments: &Arguments) -> Result {
+    let size = arguments.scaled(400, 520);
+    let ground = Color::srgb(0.13, 0.14, 0.16);
+    let heads = [
+        (HairPreset::Wavy, Vec3::new(0.34, 0.05, 0.61)),
+        (HairPreset::Long, Vec3::new(0.10, 0.05, 0.69)),
+        (HairPreset::Curly, Vec3::new(-0.34, 0.05, 0.61)),
+    ];
+    let mut drawn = Vec::new();
+    for (preset, from) in heads {
+        let (mut app, _, pictures) = settled_before(ground, arguments, preset, size)?;
+        bust::look(&mut app, from, MIDDLE);
+        drawn.push(pictures.draw(&mut app)?);
+    }
+    Ok(arguments.save(picture::beside(&drawn), "hero")?)
 }
 
 /// Dry and soaked; untreated and permed; as it looks and its hydrogen bonds: each in one picture.
@@ -88,7 +106,7 @@ pub fn melanin(arguments: &Arguments) -> Result {
     ];
     let size = arguments.scaled(180, 220);
     let (mut app, bust, pictures) = settled(arguments, HairPreset::Wavy, size)?;
-    bust::look(&mut app, Vec3::new(0.5, 0.08, 0.5), MIDDLE);
+    bust::look(&mut app, Vec3::new(0.44, 0.07, 0.46), MIDDLE);
     let few = if arguments.most > 1 { pigments.len() } else { 2 };
     let mut rows = Vec::new();
     for wetness in [0.0, 0.4, 1.0] {
@@ -159,7 +177,7 @@ pub fn quality(arguments: &Arguments) -> Result {
         arguments.thin_out(&mut app);
         bust::wear(&mut app, HairPreset::Curly)?;
         let camera = bust::camera(&mut app);
-        let pictures = Pictures::new(&mut app, size, times.min(2 * arguments.supersample), camera);
+        let pictures = Pictures::new(&mut app, size, times, camera);
         let mut cameras = app.world_mut().query_filtered::<&mut Msaa, With<Camera3d>>();
         cameras.iter_mut(app.world_mut()).for_each(|mut msaa| *msaa = edges);
         bust::look(&mut app, Vec3::new(0.26, 0.05, 0.46), Vec3::new(0.02, -0.02, 0.03));

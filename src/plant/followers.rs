@@ -24,11 +24,15 @@ const BELOW: f32 = 0.3e-3;
 const PROBES: usize = 40_000;
 /// The maximum number of samples.
 const MOST: f64 = 2e7;
-/// Distance from a parting within which strands are drawn at full density (m), and the share elsewhere.
-const PARTING_WIDTH: f32 = 14e-3;
-const DENSITY_ELSEWHERE: f32 = 0.7;
+/// Distance from a parting within which more strands are drawn (m), and the share of their density
+/// elsewhere: few drawn strands would leave a bald stripe there.
+const PARTING_WIDTH: f32 = 20e-3;
+const DENSITY_ELSEWHERE: f32 = 0.45;
 /// How many of the nearest guides are candidates for a root.
 const NEAR: usize = 16;
+/// A follower has no guides that are so many times longer or shorter than it by their place: a fringe
+/// is not blended with what is long beside it.
+const OTHER_LENGTH: f32 = 2.0;
 /// Deviation of a baby hair's direction from its neighbours' (rad, approximately).
 const BABY_TURN: f32 = 0.5;
 
@@ -82,6 +86,8 @@ pub(crate) struct FollowerPlanting {
 struct PlantedGuide {
     place: Vec3,
     length: f32,
+    /// Its place's share of that.
+    share: f32,
     /// From root to tip.
     reach: Vec3,
     /// Its combing direction.
@@ -175,10 +181,12 @@ impl FollowerPlanting {
         let guide = |points: &[Vec3]| {
             let (first, last) = (points.first()?, points.last()?);
             let length: f32 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+            let share = self.preset.length_share(&self.scalp, *first).max(1e-3);
             (length > 0.0).then(|| PlantedGuide {
                 place: *first,
                 // Without the length map, which is applied at every follower's root.
-                length: length / self.preset.length_share(&self.scalp, *first).max(1e-3),
+                length: length / share,
+                share,
                 reach: *last - *first,
                 comb: self.comb(*first),
             })
@@ -199,8 +207,12 @@ impl FollowerPlanting {
         // back and down, so the sideways component is compared on its own.
         let [right, ..] = self.scalp.axes();
         let aside = comb.dot(right);
+        let share = self.preset.length_share(&self.scalp, place.position);
         let alike = |i: u32| {
             let guide = &guides[i as usize];
+            if guide.share.max(share) > OTHER_LENGTH * guide.share.min(share) {
+                return false;
+            }
             comb == Vec3::ZERO
                 || (guide.comb.dot(comb) > 0.2
                     && guide.reach.dot(comb) > 0.0
@@ -216,7 +228,6 @@ impl FollowerPlanting {
             length += weight * guide.length;
             reach += weight * guide.reach;
         }
-        let share = self.preset.length_share(&self.scalp, place.position);
         let (length, reach) = (length / sum * share, reach / sum);
         // Without a combing direction only the distance counts.
         let reach = if comb == Vec3::ZERO { Vec3::ZERO } else { reach };
@@ -265,6 +276,21 @@ mod tests {
         }
         println!("{wrong} of {all} go to the other side");
         assert!(all > 50 && wrong * 50 < all, "{wrong} of {all}");
+    }
+
+    /// Nothing covers the scalp there but what grows there.
+    #[test]
+    fn strands_are_denser_along_a_parting() {
+        let (scalp, roots) = planted_followers(HairPreset::Straight, 20_000);
+        let [right, up, front] = scalp.axes();
+        let on_top = |p: Vec3| p.dot(up) > 0.07 && p.dot(front).abs() < 0.05;
+        let between = |from: f32, to: f32| {
+            let aside = |r: &&FollowerRoot| (from..to).contains(&r.place.dot(right).abs());
+            roots.0.iter().filter(|r| on_top(r.place)).filter(aside).count() as f32
+        };
+        let (near, far) = (between(0.0, 0.008), between(0.03, 0.038));
+        println!("{near} roots at the parting, {far} aside");
+        assert!(near > 1.6 * far && near < 2.6 * far, "{near} and {far}");
     }
 
     /// Density must rise gradually behind the line, and the line must be ragged.

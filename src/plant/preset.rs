@@ -37,7 +37,7 @@ use bevy::prelude::*;
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default, Clone, PartialEq, Hash)]
 pub enum HairPreset {
-    /// Shoulder-long, parted in the middle, nearly straight: bends of 54 mm radius.
+    /// Shoulder-long, parted in the middle, nearly straight: bends of 79 mm radius.
     #[default]
     Straight,
     /// Shoulder-long in loose waves: bends of 21 mm radius, as measured on curly tresses.
@@ -208,8 +208,9 @@ impl HairPreset {
         };
         let curl = |radius, pitch, phase| Some(Curl { radius, pitch, variation: 0.12, phase });
         match self {
+            // Each guide bends by itself: together they would shine in bands.
             Self::Straight => {
-                Planting { nodes: 24, curl: curl(1.4e-3, 54e-3, CurlPhase::PerClump), ..base }
+                Planting { nodes: 24, curl: curl(0.95e-3, 54e-3, CurlPhase::PerStrand), ..base }
             }
             Self::Wavy => Planting {
                 density: 0.33e4,
@@ -274,7 +275,6 @@ impl HairPreset {
                 length: 0.3,
                 length_variation: 0.05,
                 nodes: 22,
-                curl: curl(1.2e-3, 60e-3, CurlPhase::PerClump),
                 // Curved in at the chin.
                 cut: Some(Cut { at: scalp.place(0.0, -1.05, 0.0), normal: up, least: 0.03 }),
                 clump: Some(Clump { spacing: 25e-3, strength: 0.2 }),
@@ -288,7 +288,7 @@ impl HairPreset {
                 lean: 1.3,
                 jitter: 0.08,
                 clump: Some(Clump { spacing: 18e-3, strength: 0.35 }),
-                drape: Some(Drape { over: 0.04, clearance: 4e-3, layering: 0.03, ..drape }),
+                drape: Some(Drape { over: 0.03, clearance: 4e-3, layering: 0.03, ..drape }),
                 ..base
             },
             Self::Pixie => Planting {
@@ -299,7 +299,7 @@ impl HairPreset {
                 lean: 1.2,
                 jitter: 0.16,
                 clump: Some(Clump { spacing: 16e-3, strength: 0.4 }),
-                drape: Some(Drape { over: 0.05, clearance: 4e-3, layering: 0.05, ..drape }),
+                drape: Some(Drape { clearance: 4e-3, layering: 0.025, ..drape }),
                 ..base
             },
             Self::Locs => Planting {
@@ -350,8 +350,8 @@ impl HairPreset {
             Self::Wavy => 0.09,
             Self::Curly => 0.085,
             Self::Coily => 0.2,
-            Self::Short | Self::Undercut => 0.12,
-            Self::Pixie => 0.1,
+            Self::Short => 0.12,
+            Self::Undercut | Self::Pixie => 0.07,
             // Felted hair is stiff.
             Self::Locs => 0.11,
             Self::Beard => 0.06,

@@ -94,7 +94,7 @@ impl HairPreset {
         let (aside, forward, high) = (off.dot(right), off.dot(front), off.dot(up));
         match self {
             Self::Fringe if in_fringe(aside, forward) => {
-                return front + right * (0.5 * aside) - up * 0.2;
+                return front + right * (0.9 * aside) - up * 0.2;
             }
             Self::Undercut => {
                 // To the right on top, from its edge at the left on; down at the sides.
@@ -116,7 +116,14 @@ impl HairPreset {
         // Behind the crown there is no parting; before it, down would be into the face.
         let across = (0.6 + 2.0 * (forward + 0.2)).clamp(0.0, 1.0);
         let down = (0.5 - forward).clamp(0.0, 0.6);
-        right * (side * across) - front * (0.35 + 1.4 * forward.max(0.0)) - up * down
+        let back = right * (side * across) - front * (0.35 + 1.4 * forward.max(0.0)) - up * down;
+        if self != Self::Fringe {
+            return back;
+        }
+        // Beside the fringe down over the temples.
+        let before = smooth(forward / 0.4);
+        let beside = right * (0.5 * side) - front * 0.1 - up * 0.9;
+        back * (1.0 - before) + beside * before
     }
 
     /// Length at a place as a share of the preset's.
@@ -128,7 +135,7 @@ impl HairPreset {
             // Shorter at the sides and the nape.
             Self::Short => 0.28 + 0.72 * smooth(high / 0.85),
             Self::Undercut => 0.1 + 0.9 * on_top(aside, high),
-            Self::Pixie => 0.3 + 0.7 * smooth((high + 0.25) / 1.0),
+            Self::Pixie => 0.2 + 0.8 * smooth((high + 0.1) / 0.95),
             // Down to the brows, along the head.
             Self::Fringe if in_fringe(aside, forward) => {
                 let angle = atan2(high, forward) - BROW;
@@ -154,7 +161,7 @@ const FRINGE_LENGTH: f32 = 0.37;
 /// Whether hair at a place, in heights of the head, hangs over the forehead: a triangle that begins
 /// before the crown.
 fn in_fringe(aside: f32, forward: f32) -> bool {
-    forward > 0.22 && aside.abs() < 0.14 + 0.6 * (forward - 0.22)
+    forward > 0.22 && aside.abs() < 0.16 + 0.8 * (forward - 0.22)
 }
 
 /// The upper edge of a beard: elevation (°) over the angle from the face (°), both at the middle of the

@@ -74,14 +74,14 @@ impl HairPreset {
             // Blending neighbouring curls would straighten them: each follows its nearest guide.
             Self::Curly => HairFollowers {
                 segments: 64,
-                locks: Vec3::new(0.2, 0.75, 0.6),
-                lock_shape: 0.7,
+                locks: Vec3::new(0.2, 0.85, 0.6),
+                lock_shape: 0.5,
                 lock_phase: 0.12,
-                frizz: 0.5e-3,
-                flyaways: 0.025,
+                frizz: 0.4e-3,
+                flyaways: 0.02,
                 parting: 1.0,
-                phase_variation: 0.008,
-                stray: 0.02,
+                phase_variation: 0.005,
+                stray: 0.008,
                 ..base
             },
             Self::Coily => HairFollowers {
@@ -152,15 +152,15 @@ impl HairPreset {
             // Each lock of the first size is a loc, as thick along all of its way.
             Self::Locs => HairFollowers {
                 segments: 32,
-                locks: Vec3::new(0.68, 0.0, 0.0),
+                locks: Vec3::new(0.82, 0.0, 0.0),
                 lock_spacing: Vec3::new(0.016, 0.008, 0.004),
                 lock_shape: 0.25,
                 lock_length_variation: 0.25,
                 frizz: 0.7e-3,
-                flyaways: 0.02,
+                flyaways: 0.008,
                 flyaway_reach: 6e-3,
-                length_variation: 0.1,
-                stray: 0.004,
+                length_variation: 0.04,
+                stray: 0.002,
                 ..base
             },
             Self::Beard => HairFollowers {

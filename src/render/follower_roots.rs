@@ -44,6 +44,8 @@ const LONGEST: f32 = 4.0;
 const NEAR: usize = 8;
 /// Weight of a difference in shape relative to one in position.
 const SHAPE: f32 = 0.3;
+/// The same of what a guide is too short by: its shape would be scaled up.
+const SHORT: f32 = 0.5;
 
 /// The followers with given roots.
 pub(super) fn lay_followers(
@@ -80,7 +82,8 @@ fn follower(
             true => 0.0,
             false => SHAPE * SHAPE * differ.length_squared(),
         };
-        (square + differ, i)
+        let missing = SHORT * (own.length - guide.length).max(0.0);
+        (square + differ + missing * missing, i)
     };
     let mut best: Vec<(f32, u32)> = near.map(cost).collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -196,6 +199,20 @@ mod tests {
             assert_eq!(strand.guides[0], like);
             assert!(strand.weights[0] > 0.9, "{strand:?}");
         }
+    }
+
+    #[test]
+    fn long_strands_do_not_follow_a_fringe() {
+        // Three short guides to the front are nearer than three long ones that hang.
+        let short = (0..3).map(|i| guide(0.002 * i as f32, Vec3::Z * 0.06));
+        let long = (0..3).map(|i| guide(0.02 + 0.002 * i as f32, Vec3::NEG_Y * 0.25));
+        let guides: Vec<_> = short.chain(long).collect();
+        let place = Vec3::X * 0.009;
+        let own = FollowerRoot { place, length: 0.25, reach: Vec3::NEG_Y * 0.25, ..default() };
+        let strand = lay_followers(&[own], &guides, &plain(1))[0];
+        let followed = strand.guides.iter().zip(strand.weights).filter(|(_, w)| *w > 1e-6);
+        assert!(followed.clone().all(|(i, _)| *i >= 3), "{strand:?}");
+        assert!(followed.count() > 0);
     }
 
     #[test]
