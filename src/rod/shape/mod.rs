@@ -615,7 +615,8 @@ mod tests {
     #[test]
     fn a_baked_octahedron_knows_where_it_is() {
         let (center, size) = (Vec3::new(0.2, -0.1, 0.05), Vec3::new(0.12, 0.2, 0.09));
-        let tip = |k: usize| Vec3::AXES[k / 2] * size * if k % 2 == 0 { 1.0 } else { -1.0 };
+        let tip =
+            |k: usize| Vec3::AXES[k / 2] * size * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let tips: Vec<Vec3> = (0..6).map(|k| center + tip(k)).collect();
         let faces: Vec<[u32; 3]> = (0..8u32)
             .map(|k| {
