@@ -82,12 +82,12 @@ impl Skin {
     }
 }
 
-/// How deep a point is in the skin (m), by the plane of the vertex that is nearest.
-fn depth(skin: &[(Vec3, Vec3)], p: Vec3) -> f32 {
-    let nearest =
-        skin.iter().min_by(|a, b| a.0.distance_squared(p).total_cmp(&b.0.distance_squared(p)));
-    let (place, normal) = nearest.expect("a skin");
-    (*place - p).dot(*normal)
+/// The vertex that is nearest, and how deep a point is in the skin by its plane (m).
+fn depth(skin: &[(Vec3, Vec3)], p: Vec3) -> (usize, f32) {
+    let far = |of: &(Vec3, Vec3)| of.0.distance_squared(p);
+    let nearest = (0..).zip(skin).min_by(|a, b| far(a.1).total_cmp(&far(b.1)));
+    let (vertex, (place, normal)) = nearest.expect("a skin");
+    (vertex, (*place - p).dot(*normal))
 }
 
 /// Shares of nodes that are deeper than 0.5 mm, standing and walking, and the deepest of each (m).
@@ -127,6 +127,7 @@ fn depths(mesh: &Mesh, preset: HairPreset) -> [(f32, f32); 2] {
 
     let measure = |app: &mut App, seconds: &[f32]| {
         let (mut nodes, mut deep, mut deepest) = (0u32, 0u32, f32::MIN);
+        let mut by_joint = [0u32; skeleton::COUNT];
         for (tick, time) in seconds.iter().enumerate() {
             let world = app.world_mut();
             if *time > 0.0 {
@@ -153,13 +154,17 @@ fn depths(mesh: &Mesh, preset: HairPreset) -> [(f32, f32); 2] {
             let pose = *world.get::<TickPose>(hair).unwrap().now();
             for strand in world.get::<Strands>(hair).unwrap().iter().step_by(2) {
                 for p in &world.get::<Strand>(strand).unwrap().positions()[1..] {
-                    let depth = depth(&posed, pose.point_out(*p));
+                    let (vertex, depth) = depth(&posed, pose.point_out(*p));
                     nodes += 1;
+                    let weights = skin.joints[vertex].iter().zip(skin.weights[vertex]);
+                    let joint = weights.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap().0;
+                    by_joint[usize::from(*joint)] += u32::from(depth > 0.5e-3);
                     deep += u32::from(depth > 0.5e-3);
                     deepest = deepest.max(depth);
                 }
             }
         }
+        println!("of {nodes} nodes by joint {by_joint:?}; the head is {}", skeleton::HEAD);
         (deep as f32 / nodes as f32, deepest)
     };
     let standing = measure(&mut app, &[0.0; 20]);

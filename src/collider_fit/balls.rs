@@ -20,7 +20,7 @@ const LEAST_GAIN: f32 = 0.01;
 pub(crate) struct BallRules {
     /// The largest radius (m).
     pub widest: f32,
-    /// How far they stay within the surface (m).
+    /// How far they stay within the surface (m); negative where they may stand out of it.
     pub within: f32,
     /// How far a point may be off a ball that still counts as near it (m).
     pub near: f32,
@@ -41,7 +41,7 @@ pub(crate) fn inscribed_balls(
         targets.iter().filter_map(|&i| largest_at(points, i, &tree, rules)).collect();
     let is_near = |ball: &BoundingSphere, p: Vec3| {
         let off = p.distance(ball.center.into()) - ball.radius();
-        off.abs() <= rules.near + rules.within
+        off.abs() <= rules.near + rules.within.abs()
     };
     // Bit set of the points near each ball.
     let words = targets.len().div_ceil(64);

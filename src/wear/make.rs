@@ -35,7 +35,9 @@ const MAX_BALLS: usize = 16;
 /// A capsule that is farther from the skin than this, as a root mean square (m), gives way to balls.
 const LOOSE: f32 = 4e-3;
 /// Largest number of balls for a joint.
-const MAX_JOINT_BALLS: usize = 10;
+const MAX_JOINT_BALLS: usize = 16;
+/// How far these may stand out of the skin (m), so that they leave shallower creases between them.
+const OUT: f32 = 2e-3;
 /// Distance beyond the hair's length within which meshes are considered (m).
 const MARGIN: f32 = 0.15;
 /// Largest median distance of a groom's roots from the mesh (m).
@@ -211,7 +213,7 @@ fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>
     let places: Vec<_> = points.iter().map(|p| (p.at, p.normal)).collect();
     let rules = BallRules {
         widest: 0.9 * height,
-        within: 0.01 * height,
+        within: -0.01 * height,
         near: 0.02 * height,
         most: MAX_BALLS,
     };
@@ -302,7 +304,7 @@ fn joint_balls(
         let share = joints[v].iter().zip(weights[v]).filter(|(j, _)| usize::from(**j) == i);
         share.map(|(_, weight)| weight).sum::<f32>() >= 0.5
     };
-    let rules = BallRules { widest: 0.12, within: 1e-3, near: 4e-3, most: MAX_JOINT_BALLS };
+    let rules = BallRules { widest: 0.12, within: -OUT, near: 3e-3, most: MAX_JOINT_BALLS };
     let (to_joint, scale) = (from_joint.inverse(), from_joint.matrix3.determinant().abs().cbrt());
     let balls = inscribed_balls(&points, is_moved, &rules);
     let each = balls.into_iter().filter_map(|ball| {
