@@ -1,23 +1,18 @@
 //! Nodes that something else moves: roots on a mesh, held nodes.
 
 use super::record::{GpuJournal, LedNode};
+use crate::strand::{HeldNodes, PerHair, Strand, StrandOf, Strands};
 #[cfg(feature = "groom")]
-use crate::attach::TiedRoots;
-use crate::{
-    schedule::HairStep,
-    strand::{HeldNodes, PerHair, Strand, StrandOf, Strands},
-};
-use bevy::{
-    ecs::{entity::EntityHashMap, system::SystemParam},
-    math::Isometry3d,
-    prelude::*,
-};
+use crate::{attach::TiedRoots, schedule::HairStep};
+use bevy::{ecs::system::SystemParam, math::Isometry3d, prelude::*};
 
 /// What leads nodes.
 #[derive(SystemParam)]
 pub(super) struct Leading<'w, 's> {
+    #[cfg(feature = "groom")]
     step: Res<'w, HairStep>,
     members: Query<'w, 's, &'static Strands>,
+    #[cfg(feature = "groom")]
     strands: Query<'w, 's, &'static Strand>,
     held: Query<'w, 's, (Entity, &'static StrandOf, &'static Strand, &'static HeldNodes)>,
     #[cfg(feature = "groom")]
@@ -103,7 +98,7 @@ impl Leading<'_, '_> {
         if moved.peek().is_none() {
             return Vec::new();
         }
-        let moved: EntityHashMap<Isometry3d> = moved.collect();
+        let moved: bevy::ecs::entity::EntityHashMap<Isometry3d> = moved.collect();
         let root = |strand: Entity| {
             let own = || {
                 let strand = self.strands.get(strand).ok()?;
