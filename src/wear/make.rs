@@ -205,7 +205,8 @@ fn median(values: &mut [f32]) -> Option<f32> {
     values.get(values.len() / 2).copied()
 }
 
-/// Balls inside the head; for a mesh without joints, inside all of it that hair reaches.
+/// Balls that fill the head and stand a little out of it; for a mesh without joints, all of it that hair
+/// reaches.
 fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>, WearError> {
     let points = surface_points(&cropped(&fitting.mesh, reach), POINTS)?;
     let height = fitting.scalp.height;
@@ -269,7 +270,7 @@ fn capsules(
     solids.flat_map(|(joint, all)| all.into_iter().map(move |solid| (joint, solid))).collect()
 }
 
-/// Balls inside what joint `i` moves more than any other, in the space of the joint, given the transforms
+/// Balls that fill what joint `i` moves for the greater part, in the space of the joint, given the transforms
 /// to the hair's from the mesh's and from the joint's.
 fn joint_balls(
     mesh: &Mesh,
@@ -297,7 +298,11 @@ fn joint_balls(
         .collect();
     let some: Vec<(usize, Vec3)> =
         near.iter().step_by(near.len().div_ceil(POINTS).max(1)).copied().collect();
-    let normal_of = |v: usize| from_mesh.transform_vector3(normals[v].into()).normalize_or_zero();
+    // A mesh may have fewer normals than vertices.
+    let normal_of = |v: usize| {
+        let normal = normals.get(v).copied().unwrap_or_default();
+        from_mesh.transform_vector3(normal.into()).normalize_or_zero()
+    };
     let points: Vec<(Vec3, Vec3)> = some.iter().map(|(v, at)| (*at, normal_of(*v))).collect();
     let is_moved = |k: usize| {
         let v = some[k].0;

@@ -91,7 +91,7 @@ pub struct WearHair {
     /// Where a groom's origin is, and how it is turned and scaled, in this entity's space. Default
     /// the identity: it was made around the character as it stands there.
     pub place: Transform,
-    /// Whether colliders are fitted to head and body: balls within the head, capsules for the joints
+    /// Whether colliders are fitted to head and body: balls for the head, capsules or balls for the joints
     /// that hair reaches. A character that has [`HairCollider`](crate::HairCollider)s of its own
     /// keeps to those. Default `true`.
     pub colliders: bool,
