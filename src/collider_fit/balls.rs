@@ -81,6 +81,10 @@ fn largest_at(
     rules: &BallRules,
 ) -> Option<BoundingSphere> {
     let (p, normal) = points[i];
+    if !normal.is_normalized() {
+        // Which side is within is not known.
+        return None;
+    }
     let mut radius = rules.widest;
     for _ in 0..STEPS {
         let centre = p - normal * radius;
