@@ -4,7 +4,10 @@
 mod common;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{prelude::*, strand::StrandHistory};
+use bevy_keratin::{
+    prelude::*,
+    strand::{StrandHistory, TickPose},
+};
 use common::{app_with_meshes, one_strand, run, settle, strand, test_app};
 use core::{f32::consts::PI, time::Duration};
 
@@ -135,6 +138,31 @@ fn hair_goes_along_with_a_teleport_and_is_at_rest() {
             let tip = |s: &Strand| *s.positions().last().unwrap();
             assert!(tip(a).distance(tip(b)) < 2e-3, "no bounce: {announced}");
         }
+    }
+}
+
+#[test]
+fn a_collider_teleports_unless_it_moves_along_with_hair_that_does_not() {
+    // The hair moves by 20 cm and is too long for that to be a teleport.
+    for (with, teleports) in [(Vec3::X * 0.2, false), (Vec3::NEG_X * 0.2, true)] {
+        let mut app = test_app(60.0);
+        let inertia = HairInertia { teleport_distance: 0.1, teleport_lengths: 1.0, ..default() };
+        app.insert_resource(HairDefault(inertia));
+        let (hair, _) = one_strand(&mut app, 0.5, 8, Vec3::NEG_Y);
+        let ball = (HairCollider::sphere(0.05).unwrap(), Transform::from_xyz(0.0, 0.0, 3.0));
+        let ball = app.world_mut().spawn(ball).id();
+        run(&mut app, 0.1);
+        let moved = |app: &App, e: Entity| {
+            let frame = app.world().get::<TickPose>(e).unwrap();
+            frame.before() != frame.now()
+        };
+        assert!(!moved(&app, hair) && !moved(&app, ball));
+        for (entity, by) in [(hair, Vec3::X * 0.2), (ball, with)] {
+            app.world_mut().get_mut::<Transform>(entity).unwrap().translation += by;
+        }
+        app.update();
+        assert!(moved(&app, hair));
+        assert_eq!(!moved(&app, ball), teleports, "{with}");
     }
 }
 

@@ -116,6 +116,35 @@ fn strands_in_one_place_part_by_two_radii_only_with_contact() {
     assert!(apart(0.0) < 1e-3, "{}", apart(0.0));
 }
 
+#[test]
+fn strands_that_meet_do_not_pass_through_each_other() {
+    // Hanging strands that come towards each other, with all nodes at 10 cm/s.
+    let crossed = |strength: f32| {
+        let mut app = test_app(60.0);
+        no_gravity(&mut app);
+        app.insert_resource(HairDefault(LockContact { radius: 2e-3, strength }))
+            .insert_resource(HairDefault(AirDrag { rate: 0.0 }))
+            .insert_resource(HairDefault(HairStiffness::from_bending_length(0.02).unwrap()));
+        let hair = app.world_mut().spawn(Hair).id();
+        let ids = [-1.0_f32, 1.0].map(|side| {
+            let points: Vec<Vec3> =
+                (0..9).map(|k| Vec3::new(0.03 * k as f32, 0.0, side * 4e-3)).collect();
+            let mut strand = Strand::from_polyline(&points).unwrap();
+            strand.velocities_mut()[1..].fill(Vec3::NEG_Z * side * 0.1);
+            app.world_mut().spawn((StrandOf(hair), strand)).id()
+        });
+        let mut least = f32::INFINITY;
+        for _ in 0..30 {
+            app.update();
+            let tip = |e: Entity| strand(&app, e).positions()[8].z;
+            least = least.min(tip(ids[1]) - tip(ids[0]));
+        }
+        least
+    };
+    println!("{} {}", crossed(20.0), crossed(0.0));
+    assert!(crossed(20.0) > 0.0 && crossed(0.0) < -2e-3);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]

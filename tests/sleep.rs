@@ -163,6 +163,27 @@ fn gravity_wakes_it() {
 }
 
 #[test]
+fn each_strand_wakes_by_what_happens_to_its_own_hair() {
+    let mut app = test_app(60.0);
+    let hairs = [lock(&mut app, 3), lock(&mut app, 3), lock(&mut app, 3)];
+    for (i, (hair, _)) in hairs.iter().enumerate() {
+        go(&mut app, *hair, |place| place.translation.x = i as f32);
+    }
+    hairs.iter().for_each(|(hair, _)| _ = until_asleep(&mut app, *hair, 30.0));
+    for (hair, ids) in &hairs {
+        let asleep = |app: &App, e: &Entity| is_asleep(app, *e);
+        assert!(hairs.iter().flat_map(|(_, ids)| ids).all(|e| asleep(&app, e)));
+        let stiffer = HairStiffness::from_bending_length(0.2).unwrap();
+        app.world_mut().entity_mut(*hair).insert(stiffer);
+        run(&mut app, 3.0 / 60.0);
+        for e in hairs.iter().flat_map(|(_, ids)| ids) {
+            assert_eq!(asleep(&app, e), !ids.contains(e));
+        }
+        until_asleep(&mut app, *hair, 30.0);
+    }
+}
+
+#[test]
 fn a_blower_wakes_it_and_keeps_it_awake() {
     let aim = Transform::from_xyz(-0.3, -0.2, 0.0).looking_to(Vec3::X, Vec3::Y);
     let mut app = woken(|app, _, _| {

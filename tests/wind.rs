@@ -89,7 +89,12 @@ fn indoors_there_is_no_wind_and_outside_there_is() {
     let (_, inside) = one_strand(&mut app, 0.2, 16, Vec3::NEG_Y);
     let (hair, outside) = one_strand(&mut app, 0.2, 16, Vec3::NEG_Y);
     app.world_mut().get_mut::<Transform>(hair).unwrap().translation.x = 3.0;
+    // In a corner of the room: in the box, outside of an ellipsoid of its size.
+    let (hair, corner) = one_strand(&mut app, 0.2, 16, Vec3::NEG_Y);
+    let place = Quat::from_rotation_y(0.5) * Vec3::new(0.8, 0.9, 0.8);
+    app.world_mut().get_mut::<Transform>(hair).unwrap().translation = place;
     assert!(leans(&mut app, outside).x > 0.1);
+    assert!(leans(&mut app, corner).x.abs() < 1e-3);
     assert!(leans(&mut app, inside).x.abs() < 1e-3);
 }
 

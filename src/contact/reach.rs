@@ -189,6 +189,25 @@ mod tests {
         assert!(is_near(f32::NAN), "what is no number is seen where it is used");
     }
 
+    #[test]
+    fn a_ball_encloses_its_shape_and_no_more() {
+        let capsule = HairCollider::capsule(0.1, 0.3).unwrap();
+        let scaled = moving(Pose { scale: 2.0, ..default() }, Vec3::X * 0.01);
+        for (collider, farthest) in [
+            (HairCollider::sphere(0.1).unwrap(), 0.1),
+            (capsule, 0.1 + 0.15),
+            (HairCollider::cylinder(0.3, 0.8).unwrap(), 0.5),
+            (HairCollider::cuboid(Vec3::new(0.2, 0.4, 0.8)).unwrap(), 0.5 * 0.84f32.sqrt()),
+            (HairCollider::ellipsoid(Vec3::new(0.1, 0.4, 0.2)).unwrap(), 0.4),
+        ] {
+            let ball = Ball::around(&collider, &scaled);
+            assert!((ball.radius - 2.0 * farthest).abs() < 1e-6, "{collider:?}: {ball:?}");
+            assert!((ball.travel - 0.01).abs() < 1e-6 && ball.center == Vec3::ZERO);
+        }
+        let floor = Ball::around(&HairCollider::plane(Dir3::Y), &TickPose::default());
+        assert_eq!(floor.radius, f32::INFINITY);
+    }
+
     proptest! {
         #[test]
         fn sorted_balls_find_what_a_test_of_each_finds(

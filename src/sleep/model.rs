@@ -107,6 +107,11 @@ mod tests {
         let floor = |x: f32| Solid::HalfSpace { normal: Vec3::Y, point: Vec3::X * x };
         assert_eq!(displacement(&floor(0.0), &floor(-0.5)), 0.5, "a belt takes hair along");
         assert_eq!(displacement(&floor(0.0), &ball(0.0, 0.1)), f32::INFINITY);
+        let capsule = Solid::Capsule { a: Vec3::ZERO, b: Vec3::X * 0.4, radius: 0.03 };
+        assert!((lever(&capsule) - 0.23).abs() < 1e-7, "the end of a capsule of 0.46 m");
+        let (center, axis) = (Vec3::ZERO, Vec3::Y);
+        let drum = Solid::Cylinder { center, axis, radius: 0.3, half_height: 0.4 };
+        assert!(lever(&drum) >= 0.5, "to its edge");
     }
 
     #[test]

@@ -411,3 +411,22 @@ fn is_blown(strand: &Strand, winds: &LocalWinds) -> bool {
         !within(air.acceleration.length(), BREEZE) || winds.flows() && !air.is_calm()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_root_moves_by_its_place_or_by_its_frame_alone() {
+        let strand = Strand::from_polyline(&[Vec3::ZERO, Vec3::X * 0.01, Vec3::X * 0.02]).unwrap();
+        let moved = |by: Vec3, turn: Quat| {
+            let mut still = SleepPose::default();
+            let positions = strand.positions().iter().map(|p| *p + by).collect::<Vec<_>>();
+            still.begin(&positions, strand.orientations(), turn * strand.root_frame(), 0);
+            has_moved_root(&strand, &still, 1e-4, 1e-3)
+        };
+        assert!(!moved(Vec3::ZERO, Quat::IDENTITY));
+        assert!(moved(Vec3::ZERO, Quat::from_rotation_z(2e-3)));
+        assert!(moved(Vec3::Y * 2e-4, Quat::IDENTITY));
+    }
+}

@@ -35,3 +35,34 @@ fn choose_substeps(
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::setting::HairDefault;
+    use bevy::ecs::system::RunSystemOnce;
+
+    #[test]
+    fn only_dry_rods_of_the_direct_solver_take_longer_substeps() {
+        let mut world = World::new();
+        world.insert_resource(HairStep { dt: 1.0 / 360.0, index: 0, count: 6 });
+        world.init_resource::<HairDefault<HairSolver>>();
+        world.init_resource::<HairDefault<StrandModel>>();
+        let sweeps = HairSolver { method: SolverMethod::Sweeps, ..default() };
+        let fine = HairSolver { substep: 1.0 / 360.0, ..default() };
+        let hairs = [
+            (world.spawn(IsWet(false)).id(), 2),
+            (world.spawn(IsWet(true)).id(), 1),
+            (world.spawn(sweeps).id(), 1),
+            (world.spawn(StrandModel::MassSpring).id(), 1),
+            (world.spawn(fine).id(), 1),
+        ];
+        for (hair, _) in hairs {
+            world.entity_mut(hair).insert((Hair, MergedSubsteps(5)));
+        }
+        world.run_system_once(choose_substeps).unwrap();
+        for (hair, merged) in hairs {
+            assert_eq!(world.get(hair), Some(&MergedSubsteps(merged)));
+        }
+    }
+}

@@ -520,6 +520,16 @@ mod tests {
     }
 
     #[test]
+    fn an_edge_of_a_thousand_times_its_length_is_torn() {
+        let points: Vec<Vec3> = (0..4).map(|i| Vec3::X * (0.01 * i as f32)).collect();
+        let mut strand = Strand::from_polyline(&points).unwrap();
+        for (end, torn) in [(0.02 + 9.9, false), (0.02 + 10.1, true), (-1e30, true)] {
+            strand.positions[3].x = end;
+            assert_eq!(strand.is_torn(), torn, "its last edge ends at {end} m");
+        }
+    }
+
+    #[test]
     fn every_number_that_is_not_finite_is_seen() {
         let points: Vec<Vec3> = (0..4).map(|i| Vec3::X * (0.01 * i as f32)).collect();
         let whole = Strand::from_polyline(&points).unwrap();

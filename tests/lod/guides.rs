@@ -382,6 +382,17 @@ fn frozen_hair_keeps_its_shape_on_the_head_and_goes_on_from_it() {
         app.update();
     }
     assert_eq!(shape(&app), before, "to the bit");
+    // A hand that takes a strand moves it.
+    let targets: Vec<_> = strand(&app, ids[5]).positions().iter().map(|p| Some(*p)).collect();
+    let lifted = targets.iter().map(|p| p.map(|p| p + Vec3::Y * 1e-3)).collect();
+    app.world_mut().entity_mut(ids[5]).insert(HeldNodes { targets: lifted });
+    run(&mut app, 0.1);
+    assert!(!is_follower(&app, ids[5]));
+    let tip = strand(&app, ids[5]).positions()[8];
+    assert!((tip.y - targets[8].unwrap().y - 1e-3).abs() < 1e-5, "{tip}");
+    app.world_mut().entity_mut(ids[5]).remove::<HeldNodes>();
+    run(&mut app, 0.1);
+    assert!(is_follower(&app, ids[5]));
     // Near again it goes on from there; the head rests, so it does not stay behind.
     run(&mut app, 0.2);
     put(&mut app, hair, fewer(0.0), 1.0);
