@@ -235,6 +235,16 @@ pub(super) fn push_out<S: Simd>(
     let simd = p.x.simd;
     let zero = f32x16::splat(simd, 0.0);
     let one = f32x16::splat(simd, 1.0);
+    // Most nodes that may touch it in the substep do not in this pass. With room for rounding, so that
+    // no lane's result depends on the others.
+    if let Solid::Placed(placed) = &obstacle.solid
+        && placed.is_costly()
+        && placed
+            .is_beyond(p, f32x16::splat(simd, clearance + 1e-3 * placed.thickness()))
+            .all_true()
+    {
+        return None;
+    }
     let (normal, depth) = obstacle.solid.depth(p, clearance);
     let inside = Real::lt(zero, depth);
     if inside.to_bitmask() == 0 {

@@ -203,9 +203,12 @@ fn cuboid<R: Real>(p: V3<R>, half: Vec3, rounding: f32) -> (V3<R>, R) {
     (signed(normal, p), length + most.min(zero) - lit(rounding))
 }
 
-/// Newton steps to the nearest point of an ellipsoid: measured to reach a millionth of its size for
-/// axes that differ a hundredfold.
-const STEPS: usize = 16;
+/// Newton steps to the nearest point of an ellipsoid whose axes differ so many times: measured to reach
+/// a millionth of its size, for points on the evolute too, where they converge the slowest. A fixed
+/// number, so that a lane's result does not depend on the others.
+fn newton_steps(ratio: f32) -> u32 {
+    (7 + ratio.ceil() as u32).min(16)
+}
 
 /// The nearest point of an ellipsoid's surface, by a root search.
 ///
@@ -230,7 +233,7 @@ fn ellipsoid<R: Real>(p: V3<R>, radii: Vec3) -> (V3<R>, R) {
     let e = splat(p.x, above);
     let a = V3::new(y.x * lit(r.x), y.y * lit(r.y), y.z * lit(r.z));
     let mut s = (a.x - e.x).max(a.y - e.y).max(a.z - e.z);
-    for _ in 0..STEPS {
+    for _ in 0..newton_steps(1.0 / least) {
         let over = |a: R, e: R| {
             let inverse = a.lit(1.0) / (s + e);
             let share = a * inverse;
@@ -279,6 +282,11 @@ impl Placed {
                 (self.direction_out(normal), p.x.lit(clearance.into()) - distance * scale)
             },
         )
+    }
+
+    /// Whether it is worth a test by [`is_beyond`](Self::is_beyond) first to know that a point is outside.
+    pub(super) fn is_costly(&self) -> bool {
+        matches!(self.shape, Shape::Ellipsoid { .. })
     }
 
     /// As [`Solid::is_beyond`](super::obstacle::Solid::is_beyond).
