@@ -2,8 +2,8 @@
 //!
 //! For each of many points of the surface the largest ball that touches it there from within, by
 //! shrinking one until no other point lies in it (Ma, Bae, Choi 2012, "3D medial axis point
-//! approximation using nearest neighbors and the normal field"); of these the few whose surfaces
-//! together come near most points.
+//! approximation using nearest neighbors and the normal field"); of these the few that together
+//! cover most points.
 
 use crate::grid::KdTree;
 use bevy::{math::bounding::BoundingSphere, prelude::*};
@@ -13,23 +13,24 @@ const STEPS: usize = 24;
 /// Balls smaller than this share of the largest fill only creases.
 const SMALLEST: f32 = 0.2;
 /// The share of the points that a further ball must add.
-const LEAST_GAIN: f32 = 0.01;
+const LEAST_GAIN: f32 = 0.003;
 
 /// Parameters of the fit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BallRules {
     /// The largest radius (m).
     pub widest: f32,
-    /// How far they stay within the surface (m); negative where they may stand out of it.
-    pub within: f32,
-    /// How far a point may be off a ball that still counts as near it (m).
-    pub near: f32,
+    /// How far they stand out of the surface where they touch it (m); negative where they stay within it.
+    /// The more, the shallower are the creases between them, and the fewer are needed.
+    pub out: f32,
+    /// How far outside of a ball a point of the surface may be that it covers (m): the depth of creases.
+    pub crease: f32,
     /// How many there may be.
     pub most: usize,
 }
 
-/// Balls inside the surface that is given by points with outward normals. All points bound the
-/// balls; those for which `is_target` holds should be near one.
+/// Balls that fill the surface that is given by points with outward normals. All points bound the
+/// balls; those for which `is_target` holds should be covered by one.
 pub(crate) fn inscribed_balls(
     points: &[(Vec3, Vec3)],
     is_target: impl Fn(usize) -> bool,
@@ -39,17 +40,16 @@ pub(crate) fn inscribed_balls(
     let targets: Vec<usize> = (0..points.len()).filter(|i| is_target(*i)).collect();
     let balls: Vec<BoundingSphere> =
         targets.iter().filter_map(|&i| largest_at(points, i, &tree, rules)).collect();
-    let is_near = |ball: &BoundingSphere, p: Vec3| {
-        let off = p.distance(ball.center.into()) - ball.radius();
-        off.abs() <= rules.near + rules.within.abs()
+    let is_covered = |ball: &BoundingSphere, p: Vec3| {
+        p.distance(ball.center.into()) - ball.radius() <= rules.crease
     };
-    // Bit set of the points near each ball.
+    // Bit set of the points that each ball covers.
     let words = targets.len().div_ceil(64);
-    let near: Vec<Vec<u64>> = balls
+    let covered: Vec<Vec<u64>> = balls
         .iter()
         .map(|ball| {
             let mut bits = vec![0; words];
-            let each = targets.iter().enumerate().filter(|(_, i)| is_near(ball, points[**i].0));
+            let each = targets.iter().enumerate().filter(|(_, i)| is_covered(ball, points[**i].0));
             each.for_each(|(k, _)| bits[k / 64] |= 1 << (k % 64));
             bits
         })
@@ -58,16 +58,16 @@ pub(crate) fn inscribed_balls(
     let mut chosen = Vec::new();
     while chosen.len() < rules.most {
         let gain = |ball: &Vec<u64>| -> u32 {
-            ball.iter().zip(&left).map(|(near, left)| (near & left).count_ones()).sum()
+            ball.iter().zip(&left).map(|(covered, left)| (covered & left).count_ones()).sum()
         };
         // On ties, the first.
-        let best = (0..balls.len()).rev().max_by_key(|k| gain(&near[*k]));
+        let best = (0..balls.len()).rev().max_by_key(|k| gain(&covered[*k]));
         let Some(best) =
-            best.filter(|k| gain(&near[*k]) as f32 > LEAST_GAIN * targets.len() as f32)
+            best.filter(|k| gain(&covered[*k]) as f32 > LEAST_GAIN * targets.len() as f32)
         else {
             break;
         };
-        left.iter_mut().zip(&near[best]).for_each(|(left, near)| *left &= !near);
+        left.iter_mut().zip(&covered[best]).for_each(|(left, covered)| *left &= !covered);
         chosen.push(balls[best]);
     }
     chosen
@@ -97,7 +97,7 @@ fn largest_at(
         }
         radius = next;
     }
-    let own = radius - rules.within;
+    let own = radius + rules.out;
     let usable = own > SMALLEST * rules.widest && (p - normal * radius).is_finite();
     usable.then(|| BoundingSphere::new(p - normal * radius, own))
 }
@@ -123,7 +123,7 @@ mod tests {
     fn few_balls_fill_an_ellipsoid_from_within() {
         let half = Vec3::new(0.075, 0.09, 0.095);
         let points = ellipsoid(half, 1500);
-        let rules = BallRules { widest: 0.1, within: 1e-3, near: 2e-3, most: 14 };
+        let rules = BallRules { widest: 0.1, out: -1e-3, crease: 3e-3, most: 14 };
         let balls = inscribed_balls(&points, |_| true, &rules);
         assert!((4..=14).contains(&balls.len()), "{} balls", balls.len());
         let off = |p: Vec3| {
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn points_without_a_solid_give_no_balls() {
-        let rules = BallRules { widest: 0.1, within: 1e-3, near: 2e-3, most: 14 };
+        let rules = BallRules { widest: 0.1, out: -1e-3, crease: 3e-3, most: 14 };
         assert!(inscribed_balls(&[], |_| true, &rules).is_empty());
         let nowhere = [(Vec3::NAN, Vec3::NAN); 20];
         assert!(inscribed_balls(&nowhere, |_| true, &rules).is_empty());

@@ -28,6 +28,8 @@ pub(super) fn prepare(
     balls.clear();
     balls
         .extend(colliders.iter().filter_map(|(entity, of, place)| Ball::around(entity, of, place)));
+    // The largest first: they block light, and stay where there are too many.
+    balls.sort_by(|a, b| b.radius.total_cmp(&a.radius));
     for (hair, buffers, packed, place, mut frame) in &mut hairs {
         let frame = frame.bypass_change_detection();
         let Ok((mut mesh, around)) = drawn.get_mut(buffers.drawn) else { continue };

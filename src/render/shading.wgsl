@@ -191,7 +191,8 @@ fn past_solids(fibre: Fibre, l: vec3<f32>, away: f32) -> f32 {
     let square = max(dot(world[0].xyz, world[0].xyz), 1e-12);
     let place = (fibre.position - world[3].xyz) * linear / square;
     let toward = l * linear / square;
-    for (var i = 0u; i < frame.solid_count; i++) {
+    // The largest come first; the small ones fill creases between them.
+    for (var i = 0u; i < min(frame.solid_count, 16u); i++) {
         free = min(free, beside(frame.solids[i], vec4(place, 1.0), toward, away));
     }
     return free;

@@ -5,7 +5,7 @@ use crate::contact::{ColliderShape, HairCollider};
 use bevy::{math::Affine3A, prelude::*};
 
 /// How many solids a hair's drawn strands are pushed out of at most.
-pub(super) const MAX_SOLIDS: usize = 16;
+pub(super) const MAX_SOLIDS: usize = 64;
 /// How far outside strands are drawn (m).
 const CLEARANCE: f32 = 0.5e-3;
 /// Length from the root over which pushing sets in (m): roots are in the skin.
@@ -98,7 +98,7 @@ fn size(shape: &ColliderShape) -> Option<(Vec3, f32)> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
     center: Vec3,
-    radius: f32,
+    pub(super) radius: f32,
     pub(super) collider: Entity,
 }
 

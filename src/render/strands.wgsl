@@ -89,7 +89,7 @@ struct DrawnFrame {
     fade: f32,             // the part of it, from its end, in which they fade
     wider: f32,            // how many times wider they are
     solid_count: u32,
-    solids: array<DrawnSolid, 16>,
+    solids: array<DrawnSolid, 64>,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(0) var<uniform> ribbon: Ribbon;
