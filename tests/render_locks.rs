@@ -8,7 +8,7 @@ use bevy_keratin::{
     plant::{HairPreset, Planting, Scalp},
     render::{
         DrawnStrand, HairFollowers,
-        curve::{DrawnSolid, Guide, drawn_strands, strand_point},
+        curve::{DrawnSolid, Guide, drawn_strands, ring_share, strand_point},
     },
 };
 
@@ -63,7 +63,7 @@ fn drawn_strands_stay_out_of_the_skin() {
         for strand in worn.drawn().step_by(5) {
             assert!(strand.locks.iter().all(|lock| lock.root.is_finite()));
             for ring in 1..=worn.followers.segments {
-                let p = worn.at(strand, ring as f32 / worn.followers.segments as f32);
+                let p = worn.at(strand, ring_share(ring, worn.followers.segments));
                 assert!(p.is_finite());
                 let depth = RADIUS - p.length();
                 rings += 1;
@@ -75,6 +75,49 @@ fn drawn_strands_stay_out_of_the_skin() {
         println!("{preset:?}: {share} deeper than 0.5 mm, deepest {} mm", worst * 1e3);
         assert!(share < 1e-3 && worst < 2e-3, "{preset:?}: {share} {worst}");
     }
+}
+
+/// Nor are the straight segments between rings in it, which in long hair are long: a stripe along the
+/// parting was bald where all were equally long.
+#[test]
+fn segments_between_rings_stay_out_of_the_skin() {
+    // Half a metre that lies on the skin from its root on, drawn as preset and examples do.
+    let followers = HairPreset::Long.settings().followers;
+    let guide: Vec<Vec3> = (0..28)
+        .map(|i| {
+            let turn = Vec2::from_angle(0.5 / 27.0 * i as f32 / RADIUS);
+            let above = if i == 0 { -0.3e-3 } else { 0.2e-3 };
+            (turn * (RADIUS + above)).extend(0.0)
+        })
+        .collect();
+    let skin = [DrawnSolid::ball(Vec3::ZERO, RADIUS - 0.3e-3).unwrap()];
+    let strand = drawn_strands(&[&guide], None, &HairFollowers { count: 0, ..followers })[0];
+    let at = |t: f32| {
+        let guide = |_: u32| Guide { nodes: &guide, ..default() };
+        strand_point(&strand, guide, t, &followers, &skin).position
+    };
+    // The share that is in the skin from 3 to 60 mm of the length.
+    let inside = |place: &dyn Fn(u32) -> f32| {
+        let rings: Vec<Vec3> = (0..=6).map(|ring| at(place(ring))).collect();
+        let (mut inside, mut all, mut gone) = (0.0, 0.0, 0.0);
+        for pair in rings.windows(2) {
+            let length = pair[0].distance(pair[1]);
+            for step in 0..100 {
+                let share = (step as f32 + 0.5) / 100.0;
+                if (3e-3..60e-3).contains(&(gone + share * length)) {
+                    all += length;
+                    inside += length
+                        * f32::from(u8::from(pair[0].lerp(pair[1], share).length() < RADIUS));
+                }
+            }
+            gone += length;
+        }
+        inside / all
+    };
+    let drawn = inside(&|ring| ring_share(ring, followers.segments));
+    let equal = inside(&|ring| ring as f32 / followers.segments as f32);
+    println!("{drawn} of what is drawn near the root is in the skin; {equal} of equal segments");
+    assert!(drawn < 0.1 && equal > 0.25, "{drawn}, {equal}");
 }
 
 /// T14. Seen from above, 5 mm on each side of the parting.

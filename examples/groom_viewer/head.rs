@@ -1,6 +1,6 @@
-//! The groom on a ball for a head, its motion, and what is measured of it.
+//! The groom on a head, its motion, and what is measured of it.
 
-use crate::{Arguments, camera, solid::Paint, studio};
+use crate::{Arguments, camera, solid::Paint, stand_in, studio};
 use bevy::prelude::*;
 use bevy_keratin::{FaultKind, groom::*, prelude::*};
 use core::{f32::consts::TAU, fmt};
@@ -33,6 +33,10 @@ pub struct Shown {
 
 #[derive(Component)]
 struct Head;
+
+/// The half axes of the head's skull (m).
+#[derive(Component)]
+struct Skull(Vec3);
 
 /// What has been measured up to now.
 #[derive(Resource, Default)]
@@ -141,8 +145,8 @@ fn sized(groom: &Groom, kind: GroomFormat, asked: Option<f32>) -> Result<Groom> 
     Ok(groom)
 }
 
-/// Grows the groom on a ball that fits its roots, the ball's centre being the origin. Without such a
-/// ball, as for a tail or a fringe, the origin is the middle of the roots, and nothing is below.
+/// Grows the groom on a head that fits its roots, the middle of its skull being the origin. Where no head
+/// fits, as for a tail or a fringe, the origin is the middle of the roots, and nothing is below.
 fn put_on(
     mut commands: Commands,
     mut paint: Paint,
@@ -159,7 +163,12 @@ fn put_on(
     let centre = ball.map_or_else(roots, |ball| ball.center.into());
     let radius = ball.map_or(0.0, |ball| ball.radius());
     let groom = groom.moved(-centre)?;
-    let (low, high) = groom.extents().unwrap_or_default();
+    let skull = ball.map(|_| stand_in::skull(&groom, radius));
+    let (mut low, high) = groom.extents().unwrap_or_default();
+    if let Some(skull) = skull {
+        // Down to the chin.
+        low = low.min(Vec3::new(low.x, -1.8 * skull.y, low.z));
+    }
     let middle = 0.5 * (low + high);
     // Hair on the back of something large: turned around where it grows, and shown from aside.
     let aside = middle * Vec3::new(1.0, 0.0, 1.0);
@@ -171,25 +180,25 @@ fn put_on(
     let (middle, reach) = (pivot + middle * Vec3::Y, 0.5 * (high - low).length());
     let size = reach / 0.25;
     studio::light(&mut commands, middle, size);
-    studio::room(&mut commands, &mut paint, middle.y - 1.3 * reach, 1.6 * size);
     print!("{} strands, {} nodes, ", groom.len(), groom.points().len());
-    let mut head = commands.spawn((Head, Visibility::default(), place(pivot, rest)));
-    match ball {
-        Some(_) => {
+    let head = commands.spawn((Head, Visibility::default(), place(pivot, rest))).id();
+    let mut floor = middle.y - 1.3 * reach;
+    match skull {
+        Some(skull) => {
             println!("head of radius {radius:.3} m at {centre}");
-            head.insert((
-                Mesh3d(paint.meshes.add(Sphere::new(0.985 * radius).mesh().uv(96, 64))),
-                MeshMaterial3d(paint.matte(Color::srgb(0.62, 0.42, 0.32), 0.6)),
-                HairCollider::sphere(radius)?,
-            ));
+            let melanin = HairLook::default().melanin;
+            let end = stand_in::spawn(&mut commands, &mut paint, head, (&groom, skull), melanin)?;
+            floor = floor.min(-1.05 * end);
+            commands.entity(head).insert(Skull(skull));
         }
         None => println!("no head: the roots are too few of one to tell where it is"),
     }
+    studio::room(&mut commands, &mut paint, floor, 1.6 * size);
     let (count, nodes) = (arguments.guides as usize, arguments.nodes as usize);
     let guides = GroomGuides { count, nodes, ..default() };
     let hair = GroomedHair { groom: grooms.add(groom), guides };
     let stiffness = HairStiffness::from_bending_length(arguments.stiffness)?;
-    head.with_child((hair, stiffness, HairFollowers::new(100_000)));
+    commands.entity(head).with_child((hair, stiffness, HairFollowers::new(100_000)));
     commands.insert_resource(Shown { middle, reach, pivot, rest });
     Ok(())
 }
@@ -223,7 +232,7 @@ fn shake(
 fn measure(
     mut measure: ResMut<Measure>,
     strands: Query<&Strand>,
-    heads: Query<&HairCollider, With<Head>>,
+    heads: Query<&Skull>,
     drawn: Query<&bevy_keratin::render::HairBuffers>,
 ) {
     measure.strands = strands.iter().count();
@@ -235,15 +244,13 @@ fn measure(
         measure.peak_strain = measure.strain;
         measure.peak_at = measure.ticks as f32 / 60.0;
     }
-    let radius = heads.iter().find_map(|head| match &head.shape {
-        bevy_keratin::contact::ColliderShape::Sphere(ball) => Some(ball.radius),
-        _ => None,
-    });
-    let radius = radius.unwrap_or_default();
+    let skull = heads.iter().next().map_or(Vec3::ZERO, |skull| skull.0);
+    let radius = skull.min_element();
     // Roots are where the groom has them; the first free node may have to leave the head steeply.
     let depth = |strand: &Strand| {
         let free = strand.positions().iter().skip(1);
-        free.map(|p| radius - p.length()).fold(0.0, f32::max)
+        let within = |p: &Vec3| 1.0 - (*p / skull.max(Vec3::splat(1e-9))).length();
+        free.map(|p| radius * within(p)).fold(0.0, f32::max)
     };
     measure.deepest = strands.iter().map(depth).fold(0.0, f32::max);
 }

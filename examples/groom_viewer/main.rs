@@ -3,8 +3,14 @@
 //! `cargo run --release --example groom_viewer -- hair.tfx`
 //! `cargo run --release --example groom_viewer -- hair.tfx --offscreen pictures`
 
+#[path = "../salon/dressed.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod dressed;
 #[path = "../salon/failure.rs"]
 mod failure;
+#[path = "../salon/mannequin.rs"]
+#[allow(dead_code, reason = "the salon uses all of it")]
+mod mannequin;
 #[path = "../salon/picture.rs"]
 mod picture;
 #[path = "../salon/renderer.rs"]
@@ -15,8 +21,18 @@ mod solid;
 #[path = "../salon/studio.rs"]
 mod studio;
 
+#[path = "../presets/head.rs"]
+#[allow(dead_code, reason = "the presets use all of it")]
+mod trained;
+
 mod camera;
 mod head;
+mod stand_in;
+
+/// What the mannequin takes from the scenes.
+mod scenes {
+    pub const HEAD_RADIUS: f32 = 0.1;
+}
 
 use bevy::{asset::LoadState, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{groom::*, prelude::*};

@@ -73,8 +73,8 @@ pub fn light(app: &mut App) {
     let world = app.world_mut();
     world.spawn(light(Vec3::new(1.0, 1.1, 1.2), 8000.0, Color::srgb(1.0, 0.95, 0.88)));
     world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2000.0, Color::srgb(0.8, 0.88, 1.0)));
-    world.spawn(light(Vec3::new(1.0, 0.35, -1.4), 6000.0, Color::WHITE));
-    world.spawn(light(Vec3::new(-1.0, 0.35, -1.4), 6000.0, Color::WHITE));
+    world.spawn(light(Vec3::new(1.0, 0.35, -1.4), 4500.0, Color::WHITE));
+    world.spawn(light(Vec3::new(-1.0, 0.35, -1.4), 4500.0, Color::WHITE));
 }
 
 /// A head with hair.
@@ -85,24 +85,23 @@ pub struct Bust {
     pub guides: usize,
 }
 
-/// The head with the preset's hair.
+/// The head with the preset's hair; with a beard short hair of the same colour.
 pub fn wear(app: &mut App, preset: HairPreset) -> Result<Bust> {
     let scalp = dressed::scalp();
-    let mesh = mannequin::mesh();
-    let settings = preset.settings();
-    let planted = preset.plant(&mesh, &scalp)?;
-    let (line, count) = (preset.hairline(), settings.followers.count);
-    let roots = preset.follower_roots(&planted, &mesh, &scalp, &line, count, 0)?;
-    let face = dressed::face(Vec3::ONE, dressed::brows(settings.look.melanin))?;
+    let bare = mannequin::mesh();
+    let melanin = preset.settings().look.melanin;
+    let (hair, guides) = grow(app, preset, &bare, melanin)?;
+    let mut mesh = head::with_scalp(bare.clone(), &scalp, preset);
+    if preset == HairPreset::Beard {
+        let (above, _) = grow(app, HairPreset::Short, &bare, melanin)?;
+        app.world_mut().entity_mut(above).insert((Transform::default(), ChildOf(hair)));
+        mesh = head::with_scalp(mesh, &scalp, HairPreset::Short);
+    }
+    let face = dressed::face(Vec3::ONE, dressed::brows(melanin))?;
     let world = app.world_mut();
-    let mesh = head::with_scalp(mesh, &scalp, preset);
     let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh);
     let skin = StandardMaterial { perceptual_roughness: 0.46, ..default() };
     let skin = world.resource_mut::<Assets<StandardMaterial>>().add(skin);
-    let hair = world.spawn((Hair, upright(), Visibility::default(), settings, roots)).id();
-    for strand in planted.groom.strands() {
-        world.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
-    }
     world.spawn((Mesh3d(mesh), MeshMaterial3d(skin), ChildOf(hair)));
     let lying = Transform::from_rotation(upright().rotation.inverse());
     for (collider, place) in head::body()? {
@@ -111,5 +110,26 @@ pub fn wear(app: &mut App, preset: HairPreset) -> Result<Bust> {
     let face = face.spawn(&mut world.commands());
     world.flush();
     world.entity_mut(hair).add_child(face);
-    Ok(Bust { hair, guides: planted.groom.len() })
+    Ok(Bust { hair, guides })
+}
+
+/// The hair of a preset in that colour, upright, and how many of its strands are simulated.
+fn grow(
+    app: &mut App,
+    preset: HairPreset,
+    mesh: &Mesh,
+    melanin: Melanin,
+) -> Result<(Entity, usize)> {
+    let scalp = dressed::scalp();
+    let mut settings = preset.settings();
+    settings.look.melanin = melanin;
+    let planted = preset.plant(mesh, &scalp)?;
+    let (line, count) = (preset.hairline(), settings.followers.count);
+    let roots = preset.follower_roots(&planted, mesh, &scalp, &line, count, 0)?;
+    let world = app.world_mut();
+    let hair = world.spawn((Hair, upright(), Visibility::default(), settings, roots)).id();
+    for strand in planted.groom.strands() {
+        world.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
+    }
+    Ok((hair, planted.groom.len()))
 }

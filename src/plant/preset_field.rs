@@ -51,6 +51,10 @@ impl HairPreset {
             Self::Coily => {
                 Hairline { least_length: 0.15, density_over: 12e-3, baby_length: 12e-3, ..base }
             }
+            // Short pieces of curls would look chopped.
+            Self::Curly => {
+                Hairline { least_length: 0.7, baby_hair: 0.15, baby_length: 12e-3, ..base }
+            }
             Self::Bob | Self::Fringe => Hairline { least_length: 0.6, ..base },
             Self::Undercut | Self::Pixie => Hairline { baby_length: 12e-3, ..base },
             Self::Locs => Hairline { least_length: 0.8, density_over: 8e-3, ..base },

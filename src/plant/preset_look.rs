@@ -21,7 +21,8 @@ impl HairPreset {
             },
             // Dark blond.
             Self::Short => HairLook { melanin: Melanin::new(0.26, 0.07), gloss: 0.7, ..base },
-            Self::Bob => HairLook { melanin: Melanin::BLACK, roughness: 0.32, ..base },
+            // Deep black: in less pigment light from behind glows orange.
+            Self::Bob => HairLook { melanin: Melanin::new(6.0, 0.0), roughness: 0.32, ..base },
             // Honey blond.
             Self::Long => HairLook { melanin: Melanin::new(0.1, 0.1), variation: 0.25, ..base },
             Self::Fringe => HairLook { melanin: Melanin::RED, roughness: 0.34, ..base },

@@ -76,6 +76,24 @@ pub fn drawn_strands(
     scatter(&roots, follower_roots, followers)
 }
 
+/// How much nearer to the root the first rings are than if all were as far apart.
+const NEAR_ROOT: f32 = 0.75;
+
+/// Where ring `ring` of a drawn strand of so many segments is, 0 at the root and 1 at the tip: closer
+/// together at the root, where a strand comes out of the skin and lies along it.
+///
+/// ```
+/// # use bevy_keratin::render::curve::ring_share;
+/// let rings: Vec<f32> = (0..=24).map(|ring| ring_share(ring, 24)).collect();
+/// assert_eq!((rings[0], rings[24]), (0.0, 1.0));
+/// assert!(rings[1] < 0.4 / 24.0 && rings.is_sorted());
+/// ```
+pub fn ring_share(ring: u32, segments: u32) -> f32 {
+    let t = ring as f32 / segments.max(1) as f32;
+    let left = 1.0 - t;
+    t - NEAR_ROOT * t * left * left * left
+}
+
 /// The point at `t` (0 root, 1 tip) of a drawn strand, in the hair's frame; `guide` gives the guides
 /// by their index. Pushed out of `solids`.
 pub fn strand_point<'a>(

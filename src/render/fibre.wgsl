@@ -119,8 +119,9 @@ fn lobes(a: Angles, o: Optics, depth: f32) -> vec3<f32> {
         * along(a, 0.25 * sleek + spread, o.tilt + TILT) * (1.0 - f_tt) * (1.0 - f_tt)
         * exp(-2.0 * cos_tt / cos_inside * o.absorption);
 
-    // TRT: off the far wall inside, most of it at h = sqrt(3) / 2.
-    let f_trt = fresnel(f0, 0.5 * a.cos_d) * mix(1.0, WET_INSIDE, o.wet);
+    // TRT: off the far wall inside, most of it at h = sqrt(3) / 2. What is mirrored depends on the eye's
+    // inclination alone, as Chiang et al. have it: that skews this wide lobe.
+    let f_trt = fresnel(f0, 0.5 * a.cos_r) * mix(1.0, WET_INSIDE, o.wet);
     let cos_trt = sqrt(saturate(1.0 - 0.75 * ratio * ratio));
     let trt = TRT_SHARE * around(1.0 / (1.0 / TRT_FOCUS + turned), a.cos_phi)
         * along(a, 4.0 * sleek + spread, o.tilt + 4.0 * TILT)

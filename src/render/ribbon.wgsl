@@ -5,7 +5,8 @@
 #import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_keratin::strands::{
-    ribbon, strands, frame, strand_point, strand_alpha, strand_state, StrandState, DrawnStrand,
+    ribbon, strands, frame, strand_point, ring_share, strand_alpha, strand_state, StrandState,
+    DrawnStrand,
 }
 #ifdef MOTION_VECTOR_PREPASS
 #import bevy_keratin::strands::past_strand_position
@@ -70,7 +71,7 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     }
     let strand = strands[index];
     let in_strand = corner - index * per_strand;
-    out.along = f32(in_strand / 2u) / f32(ribbon.segments);
+    out.along = ring_share(in_strand / 2u);
     let side = f32(in_strand & 1u) - 0.5;
     let point = strand_point(strand, out.along);
     if all(point.weights == vec3(0.0)) {

@@ -6,8 +6,8 @@ use bevy::{math::Affine3A, prelude::*};
 
 /// How many solids a hair's drawn strands are pushed out of at most.
 pub(super) const MAX_SOLIDS: usize = 64;
-/// How far outside strands are drawn (m).
-const CLEARANCE: f32 = 0.5e-3;
+/// How far outside strands are drawn (m): between two rings they cut through what is round.
+const CLEARANCE: f32 = 0.8e-3;
 /// Length from the root over which pushing sets in (m): roots are in the skin.
 const ROOT: f32 = 5e-3;
 

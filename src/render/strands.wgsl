@@ -298,6 +298,17 @@ fn strand_alpha(index: u32) -> f32 {
     return saturate((frame.share - f32(rank) / f32(ribbon.strands)) / max(frame.fade, 1e-6));
 }
 
+// How much nearer to the root the first rings are than if all were as far apart.
+const NEAR_ROOT: f32 = 0.75;
+
+// Where a ring is on a strand. Rings are close together at the root: a strand that lies along the skin
+// comes out of it there, and a long straight segment would cut through a round head.
+fn ring_share(ring: u32) -> f32 {
+    let t = f32(ring) / f32(ribbon.segments);
+    let left = 1.0 - t;
+    return t - NEAR_ROOT * t * left * left * left;
+}
+
 fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     var out: StrandPoint;
     let follows = select(1.0, 0.0, strand.width < 0.0);
