@@ -1,9 +1,12 @@
 //! A frame on the GPU, in the render world: what the ticks have written down is run, before any
 //! camera draws, and the nodes go into the buffers that drawing reads.
 
-use super::{compile::Compiled, hair::GpuHair, record::GpuJournal, shared::Link};
+use super::{
+    compile::Compiled, hair::GpuHair, record::GpuJournal, residence::HairGpu, shared::Link,
+};
 use crate::{
     render::{DrawnElsewhere, HairBuffers},
+    setting::Ranged,
     strand::StrandHistory,
 };
 use bevy::{
@@ -29,7 +32,11 @@ pub(super) fn plugin(app: &mut App) {
 
 /// The hair of this frame.
 #[derive(Resource, Default)]
-struct Extracted(Vec<Frame>);
+struct Extracted {
+    hairs: Vec<Frame>,
+    /// Ticks that each of them runs at most.
+    ticks: usize,
+}
 
 struct Frame {
     link: Link,
@@ -37,6 +44,8 @@ struct Frame {
     overstep: f32,
     /// Where its roots are drawn, if they are on a mesh.
     roots: Vec<Option<Vec3>>,
+    /// Whether it sleeps.
+    rests: bool,
 }
 
 /// Substeps and requests are taken here, between two frames, so that none is run before its frame.
@@ -46,7 +55,9 @@ fn extract(
     compiled: Option<Res<Compiled>>,
     device: Res<RenderDevice>,
 ) {
-    extracted.0.clear();
+    extracted.hairs.clear();
+    let settings = main.get_resource::<HairGpu>().copied().unwrap_or_default().clamped();
+    extracted.ticks = settings.ticks_a_frame.max(1) as usize;
     if let Some(compiled) = compiled.filter(|_| device.is_changed()) {
         compiled.renew();
     }
@@ -61,7 +72,9 @@ fn extract(
     for (entity, mut hair, journal, buffers, drawn) in hairs.iter_mut(&mut main) {
         let link = hair.link.clone();
         let mut shared = link.lock();
+        let mut rests = false;
         if let Some(mut journal) = journal {
+            rests = journal.rest.is_asleep && !hair.is_tied;
             shared.pending.append(&mut journal.records);
         }
         if let Some(number) = hair.bypass_change_detection().take_request() {
@@ -71,15 +84,15 @@ fn extract(
         drop(shared);
         let nodes = buffers.zip(drawn).map(|(buffers, _)| buffers.nodes.id());
         if hair.is_tied {
-            tied.push((entity, extracted.0.len()));
+            tied.push((entity, extracted.hairs.len()));
         }
         let overstep = drawn.map_or(1.0, |drawn| drawn.overstep);
-        extracted.0.push(Frame { link, nodes, overstep, roots: Vec::new() });
+        extracted.hairs.push(Frame { link, nodes, overstep, roots: Vec::new(), rests });
     }
     for (hair, index) in tied {
         let Some(hair) = main.get::<GpuHair>(hair) else { continue };
         let root = |strand: &Entity| main.get::<StrandHistory>(*strand)?.root;
-        extracted.0[index].roots.extend(hair.members.iter().map(root));
+        extracted.hairs[index].roots.extend(hair.members.iter().map(root));
     }
 }
 
@@ -91,19 +104,20 @@ fn run(
     queue: Res<RenderQueue>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
 ) {
-    if extracted.0.is_empty() {
+    if extracted.hairs.is_empty() {
         return;
     }
-    let hairs = extracted.0.iter().map(|frame| (frame.link.lock(), frame));
+    let hairs = extracted.hairs.iter().map(|frame| (frame.link.lock(), frame));
     // What is left of a lost device belongs to nobody.
     let present = compiled.map_or(0, |compiled| compiled.device());
     let mut hairs: Vec<_> = hairs.filter(|(shared, _)| shared.is_on(present)).collect();
-    let counts: Vec<usize> = hairs.iter_mut().map(|(shared, _)| shared.upload()).collect();
+    let most = extracted.ticks;
+    let counts: Vec<usize> = hairs.iter_mut().map(|(shared, _)| shared.upload(most)).collect();
     let mut encoder = device.create_command_encoder(&default());
-    let most = counts.iter().copied().max().unwrap_or(0);
-    if most > 0 {
+    let longest = counts.iter().copied().max().unwrap_or(0);
+    if longest > 0 {
         let mut pass = encoder.begin_compute_pass(&default());
-        for index in 0..most {
+        for index in 0..longest {
             for ((shared, _), _) in hairs.iter_mut().zip(&counts).filter(|(_, n)| index < **n) {
                 let kernels = shared.kernels.clone();
                 shared.strands.dispatch(&kernels, &mut pass, index);
@@ -116,7 +130,7 @@ fn run(
     for ((shared, frame), count) in hairs.iter_mut().zip(&counts) {
         let nodes = frame.nodes.and_then(|id| buffers.as_ref()?.get(id));
         if let Some(nodes) = nodes {
-            shared.draw(&nodes.buffer, &mut encoder, frame.overstep, &frame.roots);
+            shared.draw(&nodes.buffer, &mut encoder, frame.overstep, (&frame.roots, frame.rests));
         }
         shared.copy(&mut encoder, *count > 0);
     }

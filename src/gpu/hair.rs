@@ -2,7 +2,8 @@
 
 use super::{
     compile::Ready,
-    layout::{Contents, FollowerView, Layout, SCRATCH, StrandView},
+    layout::{Contents, FollowerView, Layout, Reach, SCRATCH, StrandView},
+    print::Print,
     record::GpuJournal,
     residence::{HairResidence, Unsupported, WhyCpu},
     shared::Link,
@@ -15,6 +16,7 @@ use crate::{
     bond::Bonds,
     lod::{Follower, Guides, follow::GUIDES},
     render::DrawnElsewhere,
+    sleep::Disturbance,
     strand::{AddedMass, HeldNodes, OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, Strands},
     treatment::{HairTreatment, Treatments},
     water::{Moisture, SoakHair},
@@ -30,7 +32,8 @@ pub(super) struct GpuHair {
     pub(super) link: Link,
     /// Its strands in their order.
     pub(super) members: Vec<Entity>,
-    /// What the strands' arrays were when they were last written to by us, and when that was.
+    /// What the strands' arrays were when they were last written to by us, if that was after the hand-over, and
+    /// when that was.
     pub(super) prints: Vec<Print>,
     pub(super) at: Tick,
     /// Number of the newest request for its state, and whether that is still to be passed on.
@@ -47,6 +50,10 @@ pub(super) struct GpuHair {
     pub(super) ticks: u32,
     /// Whether its roots are tied to a mesh.
     pub(super) is_tied: bool,
+    /// Whether any of its strands follow others.
+    pub(super) has_followers: bool,
+    /// Whether the checkpoint is of its present sleep.
+    pub(super) is_kept: bool,
     /// Which strands had held nodes, in order: those are neither guides nor followers.
     pub(super) held: Vec<Entity>,
     /// Ticks until a strand's fault is told of again.
@@ -58,27 +65,6 @@ pub(super) struct GpuHair {
     /// Requests that came on the way back.
     pub(super) soaked: Vec<SoakHair>,
     pub(super) treated: Vec<HairTreatment>,
-}
-
-/// What tells whether arrays were written to, without keeping them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Print {
-    pub(super) places: u64,
-    pub(super) velocities: u64,
-}
-
-impl Print {
-    /// Without its root, where that is moved by the tick.
-    pub(super) fn of(strand: &Strand, is_tied: bool) -> Self {
-        let of = |vectors: &[Vec3]| {
-            let words = vectors.iter().flat_map(|v| v.to_array()).map(|x| u64::from(x.to_bits()));
-            words.fold(0xcbf2_9ce4_8422_2325, |sum: u64, word| {
-                (sum ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
-            })
-        };
-        let places = strand.positions().get(usize::from(is_tied)..).unwrap_or_default();
-        Self { places: of(places), velocities: of(strand.velocities()) }
-    }
 }
 
 /// has just returned, and stays for so long (s).
@@ -213,16 +199,12 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
         return Err(WhyCpu::TooLarge);
     }
     let on = GpuStrands::new(&ready.device, &ready.kernels, &views);
-    let (mut low, mut high, mut longest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
-    for view in &views {
-        (low, high) = (low.min(view.positions[0]), high.max(view.positions[0]));
-        longest = longest.max(view.lengths.iter().sum());
-    }
+    let Reach { low, high, longest } = on.reach();
+    let is_treated = acting.is_some_and(|acting| !acting.is_empty());
     let treatments = GpuTreatments::new(acting.unwrap_or_default().to_vec());
-    let strands = members.iter().filter_map(|member| world.get::<Strand>(*member));
     let gpu = GpuHair {
         link: Link::new((ready.number, &ready.device, &ready.queue), ready.kernels.clone(), on),
-        prints: strands.map(|strand| Print::of(strand, is_tied)).collect(),
+        prints: Vec::new(),
         at: world.read_change_tick(),
         newest: 0,
         is_new: false,
@@ -233,6 +215,8 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
         ticks: 0,
         told: 0,
         is_tied,
+        has_followers: followers > 0,
+        is_kept: false,
         held,
         probed: Vec::new(),
         probe_turn: 0,
@@ -244,9 +228,11 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
     let drawn =
         DrawnElsewhere { low: low - longest, high: high + longest, overstep: 1.0, rests: false };
     let sleepers = Sleepers { asleep: 0, awake: members.len() - followers };
-    let parts = (gpu, treatments, GpuJournal::default(), drawn, OnGpu::HANDED_OVER, sleepers);
+    let marks = (OnGpu::HANDED_OVER, Disturbance::default());
+    let parts = (gpu, treatments, GpuJournal::default(), drawn, marks, sleepers);
     world.entity_mut(hair).insert((parts, HairResidence::Gpu));
-    for member in &members {
+    let treated = if is_treated { &members[..] } else { &[] };
+    for member in treated {
         if let Some(mut treatments) = world.get_mut::<Treatments>(*member) {
             treatments.bypass_change_detection().acting_mut().clear();
         }

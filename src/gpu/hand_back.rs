@@ -3,8 +3,9 @@
 
 use super::{
     compile::Compiled,
-    hair::{GpuHair, Print, StaysOnCpu},
+    hair::{GpuHair, StaysOnCpu},
     layout::{Contents, StrandState},
+    print::Print,
     record::GpuJournal,
     residence::{HairResidence, Unsupported, WhyCpu},
     shared::{Link, Measured},
@@ -15,7 +16,8 @@ use crate::{
     fault::{FaultKind, HairFault},
     lod::{Follower, Guides},
     render::DrawnElsewhere,
-    strand::{OnGpu, Strand, StrandHistory, StrandSleep, StrandsArrived},
+    sleep::Disturbance,
+    strand::{OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, StrandsArrived},
     treatment::Treatments,
     water::Moisture,
 };
@@ -93,7 +95,7 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     let Some(mut gpu) = entity.take::<GpuHair>() else { return };
     let acting = entity.take::<GpuTreatments>().map(GpuTreatments::into_acting);
     let followed = entity.get::<GpuJournal>().map_or(0.0, |journal| journal.followed);
-    entity.remove::<(GpuJournal, OnGpu, DrawnElsewhere)>();
+    entity.remove::<(GpuJournal, OnGpu, Disturbance, DrawnElsewhere)>();
     // Where its level has changed it goes back as soon as strands are guides and followers anew.
     let stays = match why {
         WhyCpu::Unsupported(Unsupported::LevelOfDetail) => 0.0,
@@ -148,6 +150,9 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
     let layout = shared.strands.layout();
     let now = world.change_tick();
     let is_tied = gpu.is_tied;
+    if gpu.prints.is_empty() {
+        gpu.prints = shared.strands.take_prints();
+    }
     for (index, member) in gpu.members.iter().enumerate() {
         let Ok(mut entity) = world.get_entity_mut(*member) else { continue };
         let ticks = |ticks: Option<ComponentTicks>| {
@@ -167,9 +172,13 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
             continue;
         }
         let own = state.get(layout, index);
-        let print = Print::of(&strand, is_tied);
-        let has = |of: fn(&Print) -> u64| written && of(&print) != of(&gpu.prints[index]);
-        let (poses, moves) = (has(|print| print.places), has(|print| print.velocities));
+        let print = |strand: &Strand| {
+            let places = strand.positions().iter().copied();
+            Print::of(places, strand.velocities().iter().copied())
+        };
+        let known = gpu.prints.get(index).copied().unwrap_or_default();
+        let (poses, moves) =
+            if written { print(&strand).differs(&known, is_tied) } else { (false, false) };
         let StrandState {
             positions,
             velocities,
@@ -194,7 +203,9 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
         if !bonds_written && bonds.joints.len() == joints.len() {
             bonds.bypass_change_detection().joints.copy_from_slice(&joints);
         }
-        gpu.prints[index] = Print::of(to, is_tied);
+        if let Some(known) = gpu.prints.get_mut(index) {
+            *known = print(to);
+        }
         // The tick has not seen yet what was written meanwhile.
         if written {
             strand.set_changed();
@@ -283,6 +294,12 @@ fn heed(world: &mut World, hair: Entity, report: &Measured, strand: Option<usize
         if low.is_finite() && high.is_finite() && low.cmple(high).all() {
             (drawn.low, drawn.high) = (low - margin, high + margin);
         }
+    }
+    if let Some(mut journal) = entity.get_mut::<GpuJournal>()
+        && journal.bypass_change_detection().rest.slept_in(report.slept)
+        && let Some(mut sleepers) = entity.get_mut::<Sleepers>()
+    {
+        *sleepers = Sleepers { asleep: sleepers.asleep + sleepers.awake, awake: 0 };
     }
     let count = report.put_back + report.rebuilt;
     let Some(mut gpu) = entity.get_mut::<GpuHair>().filter(|_| count > 0) else { return };

@@ -4,18 +4,20 @@ use super::{
     followers::FollowRecord,
     hair::GpuHair,
     led::Leading,
-    record::{BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SubstepRecord},
+    record::{BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SleepRecord, SubstepRecord},
     treatments::GpuTreatments,
 };
 use crate::{
     bond::{BondInfluence, Cuticle},
     contact::{LockContact, Obstacles},
     environment::{AirDrag, HairGravity, Winds},
-    lod::follow::Frame,
+    lod::follow::{Frame, Ties},
+    render::DrawnElsewhere,
     rod::{HairSolver, HairStiffness},
     schedule::{EffectiveSubstep, EffectiveSubsteps, HairStep},
     setting::{Ranged, Settings},
-    strand::{Hair, TickPose},
+    sleep::{Disturbance, HairSleep},
+    strand::{Hair, Sleepers, TickPose},
 };
 use bevy::prelude::*;
 
@@ -56,18 +58,66 @@ pub(super) fn write_journals(
             &mut GpuJournal,
             Option<&mut GpuTreatments>,
             Option<&GpuHair>,
+            (Option<&Disturbance>, Option<&DrawnElsewhere>, Option<&mut Sleepers>),
         ),
         With<Hair>,
     >,
 ) {
     let gravity = gravity.clamped().0;
     let mut held = leading.held();
-    for (hair, frame, obstacles, mut journal, treatments, on) in &mut hairs {
+    for (hair, frame, obstacles, mut journal, treatments, on, rest) in &mut hairs {
         // On its way back to the CPU it rests.
         if on.is_some_and(GpuHair::is_returning) {
             continue;
         }
         let Some(substep) = substeps.of(hair) else { continue };
+        let is_last = step.index + 1 == step.count;
+        let follows = follow_record(&mut journal, frame, &substep, is_last);
+        let led = leading.of(hair, &mut held, &mut journal);
+        let (disturbance, drawn, sleepers) = rest;
+        let sleep = disturbance.map(|disturbance| disturbance.sleep);
+        let sleep = sleep.filter(|sleep| sleep.seconds.is_finite()).unwrap_or(HairSleep::never());
+        let followed = journal.followed;
+        let rest = &mut journal.rest;
+        if substep.is_first {
+            (rest.wakes, rest.has_begun) = (false, false);
+            let (low, high) = drawn.map_or((-Vec3::INFINITY, Vec3::INFINITY), |d| (d.low, d.high));
+            // Followers move on their own for a while.
+            let follow = on.is_some_and(|on| on.has_followers) && !Ties::are_settled(followed);
+            if follow
+                || frame.has_jumped()
+                || disturbance.is_none_or(|disturbance| disturbance.acts_within(low, high))
+            {
+                rest.wake();
+            }
+        }
+        if rest.leads(&led, sleep.distance(), sleep.angle())
+            || treatments.as_ref().is_some_and(|treatments| treatments.act())
+        {
+            rest.wake();
+        }
+        if rest.is_asleep {
+            continue;
+        }
+        if let Some(mut sleepers) = sleepers
+            && sleepers.asleep > 0
+        {
+            *sleepers = Sleepers { asleep: 0, awake: sleepers.asleep + sleepers.awake };
+        }
+        let is_first = !core::mem::replace(&mut rest.has_begun, true);
+        rest.ticks += u32::from(is_first);
+        if rest.wakes {
+            rest.disturbed = rest.ticks;
+        }
+        let sleep = sleep.seconds.is_finite().then_some(SleepRecord {
+            tick: rest.ticks,
+            wakes: rest.wakes,
+            ends: is_last,
+            distance: sleep.distance(),
+            angle: sleep.angle(),
+            seconds: sleep.seconds,
+            dt: substep.tick,
+        });
         let pose = frame.now();
         let air = winds.seen_from(pose);
         let solids = obstacles.map_or(&[][..], |all| &all.solids);
@@ -93,11 +143,12 @@ pub(super) fn write_journals(
                 })
                 .collect(),
             obstacles: solids.iter().take(MAX_OBSTACLES).cloned().collect(),
-            notes_before: substep.is_first,
-            rests: substep.is_first && frame.has_jumped(),
+            notes_before: is_first,
+            rests: is_first && frame.has_jumped(),
             shapes: true,
-            led: leading.of(hair, &mut held, &mut journal),
-            follows: follow_record(&mut journal, frame, &substep, step.index + 1 == step.count),
+            led,
+            follows,
+            sleep,
             ..default()
         };
         if let Some(mut treatments) = treatments {

@@ -4,9 +4,11 @@
 //! strands lies side by side, so that neighbouring threads read neighbouring words. Part `m` of `M` vectors
 //! of node `i` is at `((first + i) · M + m) · LANES + lane`, counted in vectors of four numbers.
 
+use super::print::Print;
 use crate::{
     bond::{Bonds, model::JointBonds},
     lod::follow::{GUIDES, Ties},
+    parallel::{Nanos, for_each},
     strand::{Strand, StrandHistory},
 };
 use bevy::math::{Quat, Vec3};
@@ -20,9 +22,10 @@ pub(super) const MOTION: usize = 2;
 pub(super) const REST: usize = 2;
 pub(super) const BONDS: usize = 4;
 pub(super) const SCRATCH: usize = 8;
+pub(super) const STILL: usize = 2;
 
-/// Bytes per node in all buffers of a hair together.
-pub const BYTES_PER_NODE: usize = 16 * (2 * POSE + MOTION + REST + BONDS + SCRATCH);
+/// Bytes per node in all buffers of a hair that may sleep together.
+pub const BYTES_PER_NODE: usize = 16 * (2 * POSE + MOTION + REST + BONDS + SCRATCH + STILL);
 
 /// The slots of one strand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -216,19 +219,49 @@ pub struct Contents {
     pub bonds: Vec<[f32; 4]>,
 }
 
-impl Contents {
-    /// Zeros for all slots.
-    pub fn new(layout: &Layout) -> Self {
-        let room = |parts| vec![[0.0; 4]; layout.vectors(parts)];
-        Self { pose: room(POSE), motion: room(MOTION), rest: room(REST), bonds: room(BONDS) }
-    }
+/// Estimated time of packing a block (ns).
+const PACK: Nanos = Nanos(10_000);
 
-    /// Puts a strand into its slots.
-    pub fn put(&mut self, layout: &Layout, strand: usize, view: &StrandView<'_>) {
+/// The part of [`Contents`] that a block of strands has.
+struct Slots<'a> {
+    pose: &'a mut [[f32; 4]],
+    motion: &'a mut [[f32; 4]],
+    rest: &'a mut [[f32; 4]],
+    bonds: &'a mut [[f32; 4]],
+    reach: Reach,
+}
+
+/// The box around the roots of strands, and the length of the longest (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reach {
+    pub(super) low: Vec3,
+    pub(super) high: Vec3,
+    pub(super) longest: f32,
+}
+
+impl Default for Reach {
+    fn default() -> Self {
+        Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, longest: 0.0 }
+    }
+}
+
+impl Reach {
+    fn with(&self, other: &Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+            longest: self.longest.max(other.longest),
+        }
+    }
+}
+
+impl Slots<'_> {
+    /// Puts a strand into its lane.
+    fn put(&mut self, lane: usize, view: &StrandView<'_>) {
         let edges = view.lengths.len();
         let before = if view.before.len() > edges { view.before } else { view.positions };
         for (node, before) in before.iter().enumerate().take(edges + 1) {
-            let at = |part, parts| layout.index(strand, node, part, parts);
+            let at = |part, parts| (node * parts + part) * LANES + lane;
             let place = view.positions[node];
             let frame = view.orientations.get(node).copied().unwrap_or(view.root_frame);
             let tension = view.tensions.get(node).copied().unwrap_or(0.0);
@@ -245,6 +278,67 @@ impl Contents {
                 self.bonds[at(kind, BONDS)] = shape.extend(rate).to_array();
             }
         }
+    }
+}
+
+impl Contents {
+    /// Zeros for all slots.
+    pub fn new(layout: &Layout) -> Self {
+        let room = |parts| vec![[0.0; 4]; layout.vectors(parts)];
+        Self { pose: room(POSE), motion: room(MOTION), rest: room(REST), bonds: room(BONDS) }
+    }
+
+    /// Of these strands.
+    pub fn of(layout: &Layout, strands: &[StrandView<'_>]) -> Self {
+        Self::with_reach(layout, strands).0
+    }
+
+    /// The same, and how far they reach: in one go, since each look at all strands takes a millisecond.
+    pub(super) fn with_reach(layout: &Layout, strands: &[StrandView<'_>]) -> (Self, Reach) {
+        let mut contents = Self::new(layout);
+        let Self { pose, motion, rest, bonds } = &mut contents;
+        let mut parts = [&mut pose[..], &mut motion[..], &mut rest[..], &mut bonds[..]];
+        let mut blocks: Vec<_> = (layout.blocks.iter())
+            .map(|[_, nodes, count, number]| {
+                let sizes = [POSE, MOTION, REST, BONDS].map(|each| *nodes as usize * each * LANES);
+                let mut own = parts.iter_mut().zip(sizes).map(|(part, size)| {
+                    let (own, others) = core::mem::take(part).split_at_mut(size);
+                    *part = others;
+                    own
+                });
+                let mut next = || own.next().unwrap_or_default();
+                let own = Slots {
+                    pose: next(),
+                    motion: next(),
+                    rest: next(),
+                    bonds: next(),
+                    reach: Reach::default(),
+                };
+                (own, &layout.order[*number as usize..][..*count as usize])
+            })
+            .collect();
+        for_each(&mut blocks, PACK, |(slots, numbers)| {
+            for (lane, strand) in numbers.iter().enumerate() {
+                let view = &strands[*strand as usize];
+                slots.put(lane, view);
+                let (root, length) = (view.positions[0], view.lengths.iter().sum());
+                slots.reach = slots.reach.with(&Reach { low: root, high: root, longest: length });
+            }
+        });
+        let reach = blocks.iter().fold(Reach::default(), |all, (own, _)| all.with(&own.reach));
+        (contents, reach)
+    }
+
+    /// A strand's prints.
+    pub(super) fn print(&self, layout: &Layout, strand: usize) -> Print {
+        let vectors = |from: &'_ [[f32; 4]], parts| {
+            let of = move |node| layout.index(strand, node, 0, parts);
+            let all: Vec<Vec3> =
+                (0..layout.nodes(strand)).map(|node| Vec3::from_slice(&from[of(node)])).collect();
+            all
+        };
+        let (places, speeds) = (vectors(&self.pose, POSE), vectors(&self.motion, MOTION));
+        Print::of(places.iter().copied(), speeds.iter().copied())
     }
 
     /// What a copy of pose, motion and bonds, one after the other, holds.

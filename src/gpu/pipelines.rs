@@ -28,8 +28,8 @@ pub const SOURCE: &str = concat!(
 );
 
 /// How many kernels and groups there are.
-pub(super) const COUNT: usize = 6;
-const GROUPS: usize = 5;
+pub(super) const COUNT: usize = 7;
+const GROUPS: usize = 6;
 
 /// Entry points with their sources and which of [`layouts`] they bind.
 pub(super) const KERNELS: [(&str, &str, &[usize]); COUNT] = [
@@ -39,10 +39,11 @@ pub(super) const KERNELS: [(&str, &str, &[usize]); COUNT] = [
     ("lead", include_str!("wgsl/lead.wgsl"), &[4, 1]),
     ("lead_followers", include_str!("wgsl/lead.wgsl"), &[4, 1]),
     ("follow", SOURCE, &[0, 1]),
+    ("sleep", include_str!("wgsl/sleep.wgsl"), &[5, 1]),
 ];
 
-/// The groups that kernels bind, with their labels: a hair, a record, what packing, measuring and leading
-/// bind.
+/// The groups that kernels bind, with their labels: a hair, a record, what packing, measuring, leading
+/// and sleep bind.
 pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); GROUPS] {
     const STAGE: ShaderStages = ShaderStages::COMPUTE;
     let read = || storage_buffer_read_only_sized(false, None);
@@ -53,12 +54,14 @@ pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); GROUPS] {
     let drawn = (read(), read(), read(), read(), read(), read(), write(), frame);
     let measured = (read(), read(), read(), write());
     let led = (read(), write(), write());
+    let still = (read(), read(), write(), write());
     [
         ("hair", BindGroupLayoutEntries::sequential(STAGE, hair).to_vec()),
         ("hair substep", BindGroupLayoutEntries::single(STAGE, record).to_vec()),
         ("drawn hair", BindGroupLayoutEntries::sequential(STAGE, drawn).to_vec()),
         ("measured hair", BindGroupLayoutEntries::sequential(STAGE, measured).to_vec()),
         ("led hair", BindGroupLayoutEntries::sequential(STAGE, led).to_vec()),
+        ("still hair", BindGroupLayoutEntries::sequential(STAGE, still).to_vec()),
     ]
 }
 
@@ -81,6 +84,9 @@ pub struct HairKernels {
     pub(super) lead_followers: ComputePipeline,
     /// Binds what a substep does.
     pub(super) follow: ComputePipeline,
+    /// What sleep binds beside a record.
+    pub(super) still: BindGroupLayout,
+    pub(super) sleep: ComputePipeline,
 }
 
 impl HairKernels {
@@ -100,8 +106,8 @@ impl HairKernels {
         layouts: [BindGroupLayout; GROUPS],
         pipelines: [ComputePipeline; COUNT],
     ) -> Self {
-        let [hair, record, drawn, measured, led] = layouts;
-        let [substep, present, measure, lead, lead_followers, follow] = pipelines;
+        let [hair, record, drawn, measured, led, still] = layouts;
+        let [substep, present, measure, lead, lead_followers, follow, sleep] = pipelines;
         Self {
             hair,
             record,
@@ -114,6 +120,8 @@ impl HairKernels {
             lead,
             lead_followers,
             follow,
+            still,
+            sleep,
         }
     }
 }

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     schedule::{HairSystems, HairTick, first_substep},
-    setting,
+    setting, sleep,
     strand::{Hair, ReturnToCpu, keep_required},
     treatment::HairTreatment,
     water::SoakHair,
@@ -26,6 +26,7 @@ pub struct HairGpuPlugin;
 impl Plugin for HairGpuPlugin {
     fn build(&self, app: &mut App) {
         setting::plugin::<SimulateOn>(app);
+        sleep::watch_on_gpu(app);
         setting::resource::<HairGpu>(app);
         keep_required::<Hair, HairResidence>(app);
         // Present also in an app that is never finished, or without the plugins that own the messages.

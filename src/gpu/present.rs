@@ -90,6 +90,7 @@ impl DrawnNodes {
         encoder: &mut CommandEncoder,
         moment: &DrawnMoment<'_>,
     ) {
+        strands.settle(queue);
         let layout = strands.layout();
         let rooted = !moment.roots.is_empty();
         if rooted {

@@ -5,6 +5,7 @@ use crate::{
     bond::Cuticle,
     lod::follow::Frame,
     rod::obstacle::{Obstacle, Solid},
+    sleep::model::{turn, within},
 };
 use bevy::{
     ecs::{component::Component, entity::EntityHashMap},
@@ -31,8 +32,8 @@ pub(super) const WORDS: usize = (HEADER + 32 * MAX_OBSTACLES).next_multiple_of(6
 const HEADER: usize = BEFORE_TREATMENTS + COUNTS + 12 * MOST_TREATMENTS;
 const BEFORE_TREATMENTS: usize = 36 + 8 * MAX_BLOWERS;
 
-/// Words of counts and of how followers move.
-const COUNTS: usize = 20;
+/// Words of counts, of how followers move and of sleep.
+const COUNTS: usize = 28;
 
 /// A blower in the hair's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,6 +59,54 @@ pub struct GpuJournal {
     /// How the hair's frame has moved in this tick, and for how long followers have followed (s).
     pub(super) frame: Frame,
     pub(super) followed: f32,
+    /// Sleep of the hair.
+    pub(super) rest: Rest,
+}
+
+/// Whether a hair sleeps, as far as that is known.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rest {
+    /// Whether it does: then no substep is written down.
+    pub(super) is_asleep: bool,
+    /// Whether something disturbs it in this tick.
+    pub(super) wakes: bool,
+    /// How many ticks it was given, and up to which of them something disturbed it.
+    pub(super) ticks: u32,
+    pub(super) disturbed: u32,
+    /// Whether a substep of this tick has been written down.
+    pub(super) has_begun: bool,
+    /// The nodes that were led when led nodes last moved.
+    pub(super) led: Vec<LedNode>,
+}
+
+impl Rest {
+    /// Something disturbs it.
+    pub(super) fn wake(&mut self) {
+        (self.is_asleep, self.wakes) = (false, true);
+    }
+
+    /// Whether nodes are led elsewhere than when this last was so.
+    pub(super) fn leads(&mut self, led: &[LedNode], distance: f32, angle: f32) -> bool {
+        let alike = |a: &LedNode, b: &LedNode| {
+            let apart = a.place.unwrap_or_default().distance(b.place.unwrap_or_default());
+            (a.strand, a.node, a.place.is_some()) == (b.strand, b.node, b.place.is_some())
+                && within(apart, distance)
+                && within(turn(a.frame, b.frame), angle)
+        };
+        let same =
+            led.len() == self.led.len() && led.iter().zip(&self.led).all(|(a, b)| alike(a, b));
+        if !same {
+            led.clone_into(&mut self.led);
+        }
+        !same
+    }
+
+    /// The device tells that it slept in this tick.
+    pub(super) fn slept_in(&mut self, tick: u32) -> bool {
+        let falls = !self.is_asleep && self.disturbed < tick && tick <= self.ticks;
+        self.is_asleep |= falls;
+        falls
+    }
 }
 
 impl GpuJournal {
@@ -148,6 +197,41 @@ pub struct SubstepRecord {
     pub led: Vec<LedNode>,
     /// How followers move; in the tick's last substep.
     pub follows: Option<FollowRecord>,
+    /// Whether the hair may sleep; `None` of hair that never does.
+    pub sleep: Option<SleepRecord>,
+}
+
+/// Sleep of a hair as a whole in a tick. Rust twin: [`HairSleep`](crate::HairSleep), of all its strands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SleepRecord {
+    /// The tick, of those that the hair was given: from 1 on.
+    pub tick: u32,
+    /// Whether something disturbs it, so that it does not sleep in this tick.
+    pub wakes: bool,
+    /// Whether this is the tick's last substep.
+    pub ends: bool,
+    /// How far a node may move (m) and an edge may turn (rad), and for how long (s).
+    pub distance: f32,
+    pub angle: f32,
+    pub seconds: f32,
+    /// Length of the tick (s).
+    pub dt: f32,
+}
+
+/// The words of the report that hold whether a strand was not still at the end of a tick, of three ticks in
+/// turn; and how many words it has with them.
+pub(super) const RESTLESS: usize = 16;
+pub(super) const REPORT_WORDS: usize = RESTLESS + 4;
+
+impl SleepRecord {
+    fn write(&self, words: &mut Words<'_>) {
+        words.numbers([self.distance, self.angle, self.seconds, self.dt]);
+        words.word(self.tick);
+        // Of this tick, of the one before and of the next.
+        for later in [0, 2, 1] {
+            words.word(RESTLESS as u32 + (self.tick % 3 + later) % 3);
+        }
+    }
 }
 
 const CARRIES: u32 = 1;
@@ -158,6 +242,7 @@ const RESTS: u32 = 16;
 const LEADS_ROOTS: u32 = 32;
 const HOLDS: u32 = 64;
 const FOLLOWS: u32 = 128;
+const WAKES: u32 = 256;
 
 impl SubstepRecord {
     /// Appends the record's words.
@@ -183,6 +268,7 @@ impl SubstepRecord {
             (self.led.iter().any(|led| led.node == 0), LEADS_ROOTS),
             (self.led.iter().any(|led| led.node > 0 && led.place.is_some()), HOLDS),
             (self.follows.is_some(), FOLLOWS),
+            (self.sleep.is_none_or(|sleep| sleep.wakes), WAKES),
         ];
         let flags = flags.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
         let carry = self.carry.unwrap_or_default();
@@ -213,6 +299,7 @@ impl SubstepRecord {
         words.word(indices.first_follower_slot);
         words.word(0);
         words.numbers(self.follows.unwrap_or_default().words());
+        self.sleep.unwrap_or_default().write(&mut words);
         for treatment in treatments {
             words.numbers(treatment.change);
             words.numbers(treatment.share);

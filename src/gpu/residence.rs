@@ -8,7 +8,11 @@ use core::fmt;
 /// [`HairDefault<SimulateOn>`](crate::HairDefault) holds. [`HairResidence`] tells where it is.
 ///
 /// Hair is on the GPU only while all that acts on it is supported there, and comes back by
-/// itself where something else does.
+/// itself where something else does. There it sleeps ([`HairSleep`](crate::HairSleep)) as a whole, once all its
+/// strands would.
+///
+/// Where game code writes to strands on the GPU, the hair comes back with what was written. That is noticed in
+/// the next tick, of more than 16,384 strands on the GPU after as many ticks as there are times that number.
 ///
 /// ```
 /// # use bevy_keratin::{gpu::SimulateOn, prelude::*}; use bevy::prelude::*;
@@ -177,6 +181,10 @@ setting! {
         /// Whether the tick waits for hair that comes back, where it otherwise rests on its head for some
         /// frames. For tests and loading screens.
         pub blocking: bool = false;
+        /// Ticks of a hair that a frame runs at most; more wait for the next frames, in their order, so that a
+        /// pause of the game does not make the next one. After a pause Bevy's clock owes 15. Hair that is asked
+        /// for, or more than 60 ticks late, is run up to the present at once. The result is the same.
+        pub ticks_a_frame: u32 = 8, in TICKS: 1.0..=1000.0, "8 catches up in two frames";
         /// How often the state of hair is kept for the case that the device is lost; 0 never, then such
         /// hair goes on from where it was handed over. A copy takes 128 bytes a node over the bus.
         pub checkpoint: f32 = 1.0, "s" in CHECKPOINT: 0.0..=1e6, "1 loses a second";

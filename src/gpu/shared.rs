@@ -21,6 +21,9 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
+/// Ticks that wait for later frames at most: what is more is run at once, with a pause.
+const MOST_LATE: usize = 60;
+
 /// One hair; whoever has it at hand may run its substeps, which are kept in order.
 #[derive(Clone)]
 pub(super) struct Link(Arc<Mutex<Shared>>);
@@ -45,6 +48,9 @@ pub(super) struct Shared {
     /// Strands whose nodes are asked for, and the tick.
     probe: (Vec<u32>, u32),
     probed: Option<Probed>,
+    /// Frames in a row without a substep; whether it has been told that substeps are late.
+    idle: u32,
+    is_late: bool,
 }
 
 /// Nodes of some strands on their way from the device.
@@ -80,6 +86,8 @@ impl Link {
             reports: Reports::default(),
             probe: Default::default(),
             probed: None,
+            idle: 0,
+            is_late: false,
         })))
     }
 
@@ -94,60 +102,93 @@ impl Shared {
         self.number == device
     }
 
-    /// Hands the pending substeps to the device; returns how many there are.
-    pub(super) fn upload(&mut self) -> usize {
+    /// Hands pending substeps to the device, of so many ticks at most; returns how many there are. What is left
+    /// waits for the next frame, unless the state is asked for or that much waits that it has to be run first.
+    pub(super) fn upload(&mut self, ticks: usize) -> usize {
+        let waiting = self.waiting_ticks();
+        if waiting > ticks + MOST_LATE {
+            if !core::mem::replace(&mut self.is_late, true) {
+                tracing::warn!(
+                    "hair on the GPU is {waiting} ticks late: frames owe more than the {ticks} that \
+                     HairGpu::ticks_a_frame lets each run"
+                );
+            }
+            while self.waiting_ticks() > ticks {
+                let some = self.first_of(ticks);
+                self.run_first(some);
+            }
+        }
         self.run_excess();
+        let count = if self.asked.is_some() { self.pending.len() } else { self.first_of(ticks) };
         let Self { device, queue, kernels, strands, pending, .. } = self;
-        strands.upload(device, queue, kernels, pending);
-        let count = pending.len();
-        pending.clear();
+        strands.upload(device, queue, kernels, &pending[..count]);
+        pending.drain(..count);
+        self.idle = if count > 0 { 0 } else { self.idle.saturating_add(1) };
         count
+    }
+
+    /// How many ticks are pending.
+    fn waiting_ticks(&self) -> usize {
+        self.pending.iter().filter(|record| record.notes_before).count()
+    }
+
+    /// How many records the first ticks of those that are pending have.
+    fn first_of(&self, ticks: usize) -> usize {
+        let firsts = self.pending.iter().enumerate().filter(|(_, record)| record.notes_before);
+        firsts.map(|(index, _)| index).nth(ticks).unwrap_or(self.pending.len())
+    }
+
+    /// Runs the first pending substeps by themselves.
+    fn run_first(&mut self, count: usize) {
+        let Self { device, queue, kernels, strands, pending, .. } = self;
+        strands.run(device, queue, kernels, &pending[..count]);
+        pending.drain(..count);
     }
 
     /// Runs the first pending substeps by themselves where all together lead too many nodes for a buffer.
     fn run_excess(&mut self) {
-        let Self { device, queue, kernels, strands, pending, .. } = self;
         loop {
             let mut led = 0;
             let mut fits = |record: &SubstepRecord| {
                 led += record.led.len();
                 led <= MOST_LED
             };
-            let fit = pending.iter().take_while(|record| fits(record)).count().max(1);
-            if fit >= pending.len() {
+            let fit = self.pending.iter().take_while(|record| fits(record)).count().max(1);
+            if fit >= self.pending.len() {
                 return;
             }
-            strands.run(device, queue, kernels, &pending[..fit]);
-            pending.drain(..fit);
+            self.run_first(fit);
         }
     }
 
     /// Runs what is pending by itself.
     pub(super) fn run_pending(&mut self) {
         self.run_excess();
-        let Self { device, queue, kernels, strands, pending, .. } = self;
-        if !pending.is_empty() {
-            strands.run(device, queue, kernels, pending);
-            pending.clear();
+        if !self.pending.is_empty() {
+            self.run_first(self.pending.len());
         }
     }
 
-    /// The pose of the nodes into the buffer that drawing reads.
+    /// The pose of the nodes into the buffer that drawing reads, unless that has it because the hair sleeps.
     /// Where `roots` are given, strands are drawn from there.
     pub(super) fn draw(
         &mut self,
         nodes: &Buffer,
         encoder: &mut CommandEncoder,
         overstep: f32,
-        roots: &[Option<Vec3>],
+        (roots, rests): (&[Option<Vec3>], bool),
     ) {
-        let Self { device, queue, kernels, strands, drawn, firsts, .. } = self;
+        let Self { device, queue, kernels, strands, drawn, firsts, idle, .. } = self;
         let count: usize = (0..strands.layout().strands()).map(|i| strands.layout().nodes(i)).sum();
         // Drawing knows other strands for as long as the hair takes to come back.
         if nodes.size() != 32 * count as u64 {
             return;
         }
         let known = drawn.as_ref().is_some_and(|(id, _)| *id == nodes.id());
+        // Once for where it is, and once more for the motion since.
+        if known && rests && *idle > 2 {
+            return;
+        }
         if !known {
             let new = DrawnNodes::new(device, kernels, strands, nodes, firsts);
             *drawn = Some((nodes.id(), new));
@@ -182,6 +223,7 @@ impl Shared {
     }
 
     fn copy_probed(&mut self, encoder: &mut CommandEncoder) {
+        let late = self.waiting_ticks();
         let (strands, tick) = &mut self.probe;
         if self.probed.is_some() || strands.is_empty() {
             return;
@@ -197,7 +239,8 @@ impl Shared {
         for ((strand, node), to) in strands.iter().flat_map(nodes).zip(0..) {
             self.strands.copy_place((strand as usize, node), encoder, &crossing.buffer, 16 * to);
         }
-        self.probed = Some(Probed { strands: core::mem::take(strands), tick: *tick, crossing });
+        let tick = tick.saturating_sub(late as u32);
+        self.probed = Some(Probed { strands: core::mem::take(strands), tick, crossing });
     }
 
     /// The nodes of strands that were asked for, and of which tick they are.
@@ -300,7 +343,7 @@ impl Reports {
         let size = REPORT_BYTES as u64;
         let crossing = self.1.pop().unwrap_or_else(|| Crossing::new(device, size));
         encoder.copy_buffer_to_buffer(report, 0, &crossing.buffer, 0, size);
-        encoder.clear_buffer(report, 0, None);
+        encoder.clear_buffer(report, 0, Some(size));
         self.0.push_back(crossing);
     }
 }
@@ -317,6 +360,8 @@ pub(super) struct Measured {
     pub(super) low: [f32; 3],
     pub(super) high: [f32; 3],
     pub(super) speed: f32,
+    /// The last tick in which the hair slept.
+    pub(super) slept: u32,
 }
 
 impl Measured {
@@ -333,6 +378,7 @@ impl Measured {
             high: [4, 5, 6].map(|i| number(words[i])),
             low: [7, 8, 9].map(|i| number(!words[i])),
             speed: f32::from_bits(words[10]).sqrt(),
+            slept: words[11],
         }
     }
 }
@@ -355,8 +401,10 @@ mod tests {
             words[7 + axis] = !ordered(low[axis]);
         }
         words[10] = 4.0f32.to_bits();
+        words[11] = 77;
         let read = Measured::of(bytemuck::cast_slice(&words));
-        let expected = Measured { put_back: 3, rebuilt: 1, first: Some(17), low, high, speed: 2.0 };
+        let expected =
+            Measured { put_back: 3, rebuilt: 1, first: Some(17), low, high, speed: 2.0, slept: 77 };
         assert_eq!(read, expected);
         assert!(ordered(-1.0) < ordered(-0.5) && ordered(-0.5) < ordered(0.25), "in order");
     }

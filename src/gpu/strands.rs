@@ -2,10 +2,13 @@
 
 use super::{
     followers,
-    layout::{BONDS, Contents, Layout, MOTION, POSE, SCRATCH, StrandState, StrandView},
+    layout::{
+        BONDS, Contents, Layout, MOTION, POSE, REST, Reach, SCRATCH, STILL, StrandState, StrandView,
+    },
     leads::Leads,
     pipelines::HairKernels,
-    record::{SubstepRecord, WORDS},
+    print::Print,
+    record::{REPORT_WORDS, RESTLESS, SubstepRecord, WORDS},
 };
 use bevy::render::{
     render_resource::{
@@ -15,9 +18,17 @@ use bevy::render::{
     renderer::{RenderDevice, RenderQueue},
 };
 use core::num::NonZeroU64;
+use std::sync::{Mutex, PoisonError};
 
-/// Bytes of a report.
-pub(super) const REPORT_BYTES: usize = 64;
+/// Bytes of a report; behind them stands what the next tick has to know.
+pub(super) const REPORT_BYTES: usize = 4 * RESTLESS;
+
+/// Of hair that is not known to be still.
+const NEW_REPORT: [u32; REPORT_WORDS] = {
+    let mut words = [0; REPORT_WORDS];
+    (words[RESTLESS], words[RESTLESS + 1], words[RESTLESS + 2]) = (1, 1, 1);
+    words
+};
 
 /// Counts of faulty strands in the substeps since the last report was read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,6 +62,15 @@ pub struct GpuStrands {
     /// What leading binds beside `leads`.
     scratch: Buffer,
     followers: Option<Followers>,
+    /// Where simulated strands have been still, once that is asked for; which uploaded substeps end a tick
+    /// after which that is to be looked at.
+    still: Option<(Buffer, [BindGroup; 2])>,
+    rests: Vec<bool>,
+    /// The strands, until the device has them.
+    waiting: Mutex<Option<Contents>>,
+    reach: Reach,
+    /// What the strands were when they were handed over.
+    prints: Mutex<Vec<Print>>,
 }
 
 /// What followers bind: their ties in place of scratch.
@@ -65,28 +85,27 @@ impl GpuStrands {
     pub fn new(device: &RenderDevice, kernels: &HairKernels, strands: &[StrandView<'_>]) -> Self {
         let nodes: Vec<usize> = strands.iter().map(|view| view.positions.len()).collect();
         let layout = Layout::with_followers(&nodes, |strand| strands[strand].follows.is_some());
-        let mut contents = Contents::new(&layout);
-        for (strand, view) in strands.iter().enumerate() {
-            contents.put(&layout, strand, view);
-        }
+        let (contents, reach) = Contents::with_reach(&layout, strands);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let with = |label, contents: &[u8]| {
             let label = Some(label);
             device.create_buffer_with_data(&BufferInitDescriptor { label, contents, usage })
         };
+        let room = |label, parts| {
+            device.create_buffer(&BufferDescriptor {
+                label: Some(label),
+                size: 16 * layout.vectors(parts) as u64,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
         let blocks = with("hair blocks", bytemuck::cast_slice(layout.blocks()));
-        let pose = bytemuck::cast_slice(&contents.pose);
-        let poses = [with("hair pose", pose), with("hair pose", pose)];
-        let motion = with("hair motion", bytemuck::cast_slice(&contents.motion));
-        let rest = with("hair rest shapes", bytemuck::cast_slice(&contents.rest));
-        let bonds = with("hair bonds", bytemuck::cast_slice(&contents.bonds));
-        let report = with("hair report", &[0; REPORT_BYTES]);
-        let scratch = device.create_buffer(&BufferDescriptor {
-            label: Some("hair scratch"),
-            size: 16 * layout.vectors(SCRATCH) as u64,
-            usage,
-            mapped_at_creation: false,
-        });
+        let poses = [room("hair pose", POSE), room("hair pose", POSE)];
+        let motion = room("hair motion", MOTION);
+        let rest = room("hair rest shapes", REST);
+        let bonds = room("hair bonds", BONDS);
+        let report = with("hair report", bytemuck::cast_slice(&NEW_REPORT));
+        let scratch = room("hair scratch", SCRATCH);
         let group = |from: &Buffer, to: &Buffer, scratch: &Buffer| {
             device.create_bind_group(
                 "hair",
@@ -141,7 +160,37 @@ impl GpuStrands {
             leads: Leads::default(),
             scratch,
             followers,
+            still: None,
+            rests: Vec::new(),
+            waiting: Mutex::new(Some(contents)),
+            reach,
+            prints: Mutex::default(),
         }
+    }
+
+    /// Has the device take the strands, if it has not: here and not with their hand-over, which is in the
+    /// middle of a tick.
+    pub(super) fn settle(&self, queue: &RenderQueue) {
+        let waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let Some(waiting) = waiting else { return };
+        let prints = (0..self.layout.strands()).map(|strand| waiting.print(&self.layout, strand));
+        *self.prints.lock().unwrap_or_else(PoisonError::into_inner) = prints.collect();
+        let Contents { pose, motion, rest, bonds } = waiting;
+        let [one, other] = &self.poses;
+        let all = [(one, &pose), (other, &pose), (&self.motion, &motion), (&self.rest, &rest)];
+        for (buffer, contents) in all.into_iter().chain([(&self.bonds, &bonds)]) {
+            queue.write_buffer(buffer, 0, bytemuck::cast_slice(contents));
+        }
+    }
+
+    /// How far the strands reach as they are handed over.
+    pub(super) fn reach(&self) -> Reach {
+        self.reach
+    }
+
+    /// What the strands were when they were handed over, once the device has them.
+    pub(super) fn take_prints(&self) -> Vec<Print> {
+        core::mem::take(&mut *self.prints.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// The memory layout of the strands.
@@ -173,11 +222,18 @@ impl GpuStrands {
         kernels: &HairKernels,
         substeps: &[SubstepRecord],
     ) {
+        self.settle(queue);
         if substeps.is_empty() {
             return;
         }
         self.words.clear();
         self.leads.clear();
+        self.rests.clear();
+        self.rests
+            .extend(substeps.iter().map(|record| record.sleep.is_some_and(|sleep| sleep.ends)));
+        if self.rests.contains(&true) {
+            self.watch_rest(device, kernels);
+        }
         for record in substeps {
             let indices = self.leads.push(&self.layout, record);
             record.write_of(&mut self.words, &indices);
@@ -234,6 +290,37 @@ impl GpuStrands {
             dispatch(&kernels.follow, &followers.groups[self.present], others);
         }
         self.present = 1 - self.present;
+        if let Some((_, groups)) = &self.still
+            && self.rests.get(index) == Some(&true)
+        {
+            pass.set_pipeline(&kernels.sleep);
+            pass.set_bind_group(0, &groups[self.present], &[]);
+            pass.set_bind_group(1, records, &[record]);
+            pass.dispatch_workgroups(simulated as u32, 1, 1);
+        }
+    }
+
+    /// Room for where strands are still.
+    fn watch_rest(&mut self, device: &RenderDevice, kernels: &HairKernels) {
+        self.still.get_or_insert_with(|| {
+            let still = device.create_buffer(&BufferDescriptor {
+                label: Some("still hair"),
+                size: 16 * self.layout.vectors(STILL) as u64,
+                usage: BufferUsages::STORAGE,
+                mapped_at_creation: false,
+            });
+            let group = |pose: &Buffer| {
+                let entries = BindGroupEntries::sequential((
+                    self.blocks.as_entire_binding(),
+                    pose.as_entire_binding(),
+                    still.as_entire_binding(),
+                    self.report.as_entire_binding(),
+                ));
+                device.create_bind_group("still hair", &kernels.still, &entries)
+            };
+            let groups = [group(&self.poses[0]), group(&self.poses[1])];
+            (still, groups)
+        });
     }
 
     /// Measures the present state; what the report held of
@@ -296,6 +383,7 @@ impl GpuStrands {
         device: &RenderDevice,
         queue: &RenderQueue,
     ) -> Option<Contents> {
+        self.settle(queue);
         let layout = &self.layout;
         let pose = read_back(device, queue, &self.poses[self.present], layout.vectors(POSE))?;
         let motion = read_back(device, queue, &self.motion, layout.vectors(MOTION))?;

@@ -4,20 +4,24 @@ use super::{
     compile::{AppDevice, Ready},
     hair::{GpuHair, StaysOnCpu, hand_over},
     hand_back::{fetch_strands, request_return},
+    record::GpuJournal,
     residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
     support::Support,
     treatments::GpuTreatments,
+    watch::WrittenStrands,
 };
 use crate::{
-    bond::Bonds,
     contact::HairReach,
     schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings},
-    strand::{AskForStrands, Hair, MissedOnGpu, OnGpu, Strand, StrandOf, Strands},
+    strand::{AskForStrands, Hair, MissedOnGpu, Strand, StrandOf, Strands},
     treatment::{HairTreatment, PermWinding, WindingProgress},
-    water::{Moisture, SoakHair},
+    water::SoakHair,
 };
-use bevy::{ecs::entity::EntityHashSet, prelude::*};
+use bevy::{
+    ecs::{change_detection::Tick, entity::EntityHashMap, system::SystemChangeTick},
+    prelude::*,
+};
 
 /// What becomes of a hair in this tick.
 pub(super) enum Decision {
@@ -49,14 +53,12 @@ pub(super) fn decide(
             Option<&mut StaysOnCpu>,
             Option<Ref<Strands>>,
             Option<&mut HairReach>,
+            Option<&GpuJournal>,
         ),
         With<Hair>,
     >,
-    written: Query<
-        &StrandOf,
-        (With<OnGpu>, Or<(Changed<Strand>, Changed<Bonds>, Changed<Moisture>)>),
-    >,
-    of: Query<&StrandOf>,
+    mut written: WrittenStrands,
+    (of, now): (Query<&StrandOf>, SystemChangeTick),
     (mut soaks, mut treats): (MessageReader<SoakHair>, MessageReader<HairTreatment>),
     (soaks_missed, treats_missed): (
         Option<ResMut<MissedOnGpu<SoakHair>>>,
@@ -83,10 +85,19 @@ pub(super) fn decide(
     let wetted: Vec<Entity> = soaked.iter().map(|(hair, _)| *hair).collect();
     let singly: Vec<Entity> = treated.iter().map(|(hair, _)| *hair).collect();
     let of_strands = support.of_strands();
-    let written: EntityHashSet = written.iter().map(|of| of.0).collect();
+    let present = hairs.iter().filter_map(|(hair, _, on, ..)| Some((hair, on?.at)));
+    let present: EntityHashMap<Tick> = present.collect();
+    let oldest = present
+        .values()
+        .copied()
+        .reduce(|a, b| if a.is_newer_than(b, now.this_run()) { b } else { a });
+    let (written, unwritten) = match oldest {
+        Some(oldest) => written.find(oldest, |hair| present.get(&hair).copied()),
+        None => default(),
+    };
     let seconds = step.dt * step.count as f32;
     let checkpoint = settings.clamped().checkpoint;
-    for (hair, _, on, stays, members, reach) in &mut hairs {
+    for (hair, _, on, stays, members, reach, journal) in &mut hairs {
         let wants = asked.of(hair) == SimulateOn::Gpu;
         let missing = || {
             let known = of_strands.get(&hair).copied().or_else(|| support.missing(hair));
@@ -117,6 +128,12 @@ pub(super) fn decide(
             continue;
         };
         let on = &mut *on;
+        if let Some(unwritten) = unwritten
+            && unwritten.is_newer_than(on.at, now.this_run())
+            && !written.contains(&hair)
+        {
+            on.at = unwritten;
+        }
         on.ticks += 1;
         on.told = on.told.saturating_sub(1);
         on.since_checkpoint += seconds;
@@ -158,7 +175,12 @@ pub(super) fn decide(
             let begins = settings.blocking && why == WhyCpu::Unsupported(Unsupported::Winding);
             decisions.push((hair, if begins { Decision::Winds } else { Decision::Returns(why) }));
         } else if checkpoint > 0.0 && on.since_checkpoint >= checkpoint {
-            on.note_checkpoint();
+            // What sleeps stays as it is.
+            let is_asleep = journal.is_some_and(|journal| journal.rest.is_asleep);
+            if !(is_asleep && on.is_kept) {
+                on.note_checkpoint();
+            }
+            on.is_kept = is_asleep;
         }
     }
     decisions

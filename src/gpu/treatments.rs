@@ -54,6 +54,11 @@ impl GpuTreatments {
         self.acting
     }
 
+    /// Whether any acts.
+    pub(super) fn act(&self) -> bool {
+        !self.acting.is_empty() || self.whole != Affine::default() || !self.ranges.is_empty()
+    }
+
     /// Whether there are more ranges of joints than a record holds.
     pub(super) fn are_too_many(&self) -> bool {
         self.acting.iter().filter(|treat| treat.joints.is_some()).count() > MOST_TREATMENTS

@@ -150,7 +150,7 @@ struct GroupStrand<'a> {
 /// At the start of a tick: where user code has written over what says that a strand is a follower, its hair
 /// is looked at again.
 pub(crate) fn note_overwritten(
-    written: Query<&StrandOf, (Changed<StrandSleep>, With<KinematicStrand>)>,
+    written: Query<&StrandOf, (Changed<StrandSleep>, With<KinematicStrand>, Without<OnGpu>)>,
     mut hairs: Query<&mut Guides>,
 ) {
     for of in &written {

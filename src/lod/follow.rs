@@ -119,6 +119,12 @@ impl Ties {
     /// Time constant with which a follower's relative motion decays (s).
     pub(crate) const OWN_MOTION: f32 = OWN_MOTION;
 
+    /// Whether nothing is left of a motion of its own after so long (s).
+    #[cfg(feature = "gpu")]
+    pub(crate) fn are_settled(since: f32) -> bool {
+        since > 10.0 * OWN_MOTION
+    }
+
     /// Of each edge and guide, edge by edge: the edge's frame in that of the guide, its segment in its own
     /// frame (m), and the guide's edge beside it, with the share toward the next.
     pub(crate) fn edges(&self) -> impl Iterator<Item = (Quat, Vec3, f32)> + '_ {

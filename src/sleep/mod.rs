@@ -13,8 +13,12 @@
 
 #[doc(hidden)]
 pub mod model;
+#[cfg(feature = "gpu")]
+mod on_gpu;
 mod systems;
 
+#[cfg(feature = "gpu")]
+pub(crate) use on_gpu::{Disturbance, watch_on_gpu};
 pub use systems::SleepPlugin;
 
 use crate::setting::setting;

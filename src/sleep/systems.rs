@@ -50,7 +50,7 @@ impl Plugin for SleepPlugin {
 
 /// All settings on which the equilibrium of hair depends.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-struct Conditions {
+pub(super) struct Conditions {
     gravity: Vec3,
     sleep: HairSleep,
     stiffness: HairStiffness,
@@ -65,7 +65,7 @@ struct Conditions {
 }
 
 #[derive(SystemParam)]
-struct RestSettings<'w, 's> {
+pub(super) struct RestSettings<'w, 's> {
     gravity: Res<'w, HairGravity>,
     sleep: Settings<'w, 's, HairSleep>,
     stiffness: Settings<'w, 's, HairStiffness>,
@@ -80,7 +80,7 @@ struct RestSettings<'w, 's> {
 }
 
 impl RestSettings<'_, '_> {
-    fn of(&self, hair: Entity) -> Conditions {
+    pub(super) fn of(&self, hair: Entity) -> Conditions {
         Conditions {
             gravity: self.gravity.clamped().0,
             sleep: self.sleep.of(hair),
@@ -110,12 +110,12 @@ pub(super) struct SleepSnapshot {
 }
 
 /// Changes of a hair as a whole since the previous tick.
-struct WakeEvents {
-    sleep: HairSleep,
+pub(super) struct WakeEvents {
+    pub(super) sleep: HairSleep,
     /// Whether all its strands wake.
-    all_wake: bool,
+    pub(super) all_wake: bool,
     /// Colliders that appeared, disappeared or moved: strands within reach of these wake (m).
-    solids: Vec<(Solid, f32)>,
+    pub(super) solids: Vec<(Solid, f32)>,
     winds: LocalWinds,
 }
 
@@ -128,7 +128,7 @@ impl WakeEvents {
 
 impl SleepSnapshot {
     /// Stores the present conditions and returns which strands the changes wake.
-    fn wake_events(
+    pub(super) fn wake_events(
         &mut self,
         conditions: Conditions,
         pose: &Pose,
@@ -194,13 +194,19 @@ impl SleepSnapshot {
 
 /// A collider in the frame of a hair.
 #[derive(Clone, Debug)]
-struct SeenCollider {
+pub(super) struct SeenCollider {
     solid: Solid,
     friction: f32,
     rotation: Quat,
 }
 
 impl SeenCollider {
+    pub(super) fn of(frame: &TickPose, collider: &HairCollider, pose: &TickPose) -> Self {
+        let Obstacle { solid, friction, .. } = seen_from(frame, collider, pose);
+        let rotation = frame.now().rotation.inverse() * pose.now().rotation;
+        Self { solid, friction, rotation }
+    }
+
     /// How far its surface has moved (m): a rotating ball drags hair, too.
     fn moved(&self, now: &Self) -> f32 {
         let friction = if self.friction == now.friction { 0.0 } else { f32::INFINITY };
@@ -267,12 +273,7 @@ fn update_sleep(
         }
         // A collider that comes within reach counts as new while it is still far from any strand.
         let near = colliders.near(frame, reach, &mut scratch);
-        let seen = near.map(|(collider, pose)| {
-            let Obstacle { solid, friction, .. } = seen_from(frame, collider, pose);
-            let rotation = frame.now().rotation.inverse() * pose.now().rotation;
-            SeenCollider { solid, friction, rotation }
-        });
-        let seen = seen.collect();
+        let seen = near.map(|(collider, pose)| SeenCollider::of(frame, collider, pose)).collect();
         let members = members.map_or(0, |members| members.len());
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), members, seen, step.count);

@@ -81,7 +81,8 @@ impl Plugin for StrandPlugin {
 fn report_unusable(
     strands: Query<
         (Entity, Ref<Strand>, Option<Ref<StrandOf>>),
-        Or<(Added<Strand>, Added<StrandOf>)>,
+        // A strand on the GPU has a hair, and would not be there with fewer nodes.
+        (Or<(Added<Strand>, Added<StrandOf>)>, Without<OnGpu>),
     >,
     hairs: Query<(), With<Hair>>,
     mut faults: MessageWriter<HairFault>,

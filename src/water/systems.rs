@@ -14,7 +14,7 @@ use super::{
 use crate::{
     schedule::{HairStep, HairSystems, HairTick, first_substep},
     setting,
-    strand::{Hair, MissedOnGpu, Strand, TickPose, keep_required},
+    strand::{Hair, MissedOnGpu, OnGpu, Strand, TickPose, keep_required},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -99,7 +99,8 @@ fn count_lost_moisture(
 fn count_overwritten(
     step: Res<HairStep>,
     droplets: Query<Ref<Droplet>, Allow<Disabled>>,
-    strands: Query<Ref<Moisture>, Allow<Disabled>>,
+    // What is written to hair on the GPU is found once it is back.
+    strands: Query<Ref<Moisture>, (Allow<Disabled>, Without<OnGpu>)>,
     mut ledger: ResMut<WaterLedger>,
 ) {
     let written = || {

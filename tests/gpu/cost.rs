@@ -1,64 +1,91 @@
-//! What hair on the device costs the CPU: to be read, on a machine of one's own.
+//! What hair on the device costs the CPU beside recording and submission.
 
 use crate::stage::Stage;
 use bevy::prelude::*;
-use bevy_keratin::prelude::*;
+use bevy_keratin::{gpu::GpuJournal, prelude::*};
 use std::time::Instant;
 
-const TICKS: usize = 200;
-
-/// What this process has had of the processors (ms), where the system tells.
-fn processor() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after_name = stat.rsplit(')').next().unwrap_or_default();
-    let jiffies = after_name.split_whitespace().skip(11).take(2);
-    jiffies.filter_map(|n| n.parse::<f64>().ok()).sum::<f64>() * 10.0
+/// Straight strands, root by root a millimetre apart.
+fn straight(count: usize, nodes: usize) -> Vec<Strand> {
+    let strand = |i: usize| {
+        let root = Vec3::new((i % 300) as f32, 0.0, (i / 300) as f32) * 1e-3;
+        let points: Vec<Vec3> = (0..nodes).map(|k| root + Vec3::Y * (0.01 * k as f32)).collect();
+        Strand::from_polyline(&points).unwrap()
+    };
+    (0..count).map(strand).collect()
 }
 
-/// `cargo test --release --features gpu --test gpu -- --ignored --nocapture costs_the_processor`
+/// An app with these strands, and nothing that runs what they are given to do on the device: software would take
+/// minutes.
+fn prepared(on: SimulateOn, strands: Vec<Strand>) -> Option<Stage> {
+    let mut stage = Stage::new(SimulateOn::Cpu, Vec::new())?;
+    stage.compile();
+    stage.app.world_mut().resource_mut::<HairGpu>().checkpoint = 0.0;
+    stage.app.remove_sub_app(bevy::render::RenderApp);
+    if !strands.is_empty() {
+        stage.hair = Stage::spawn(&mut stage.app, on, strands);
+    }
+    stage.run(2);
+    Some(stage)
+}
+
+/// How long a tick takes (ms).
+fn tick(stage: &mut Stage) -> f64 {
+    let start = Instant::now();
+    stage.run(1);
+    1e3 * start.elapsed().as_secs_f64()
+}
+
+/// What a tick takes that nothing else on the machine disturbs.
+fn undisturbed(times: &[f64]) -> f64 {
+    times.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn a_hundred_thousand_strands_cost_a_tenth_of_a_millisecond() {
+    // A device that plays one binds 128 MiB, which 100,000 strands of 16 nodes exceed.
+    let Some(mut full) = prepared(SimulateOn::Gpu, straight(100_000, 9)) else { return };
+    let Some(mut empty) = prepared(SimulateOn::Cpu, Vec::new()) else { return };
+    assert!(full.is_on_gpu());
+    let hair = full.hair;
+    let (mut with, mut without) = (Vec::new(), Vec::new());
+    // In turn, so that whatever else the machine does disturbs both.
+    for _ in 0..300 {
+        with.push(tick(&mut full));
+        without.push(tick(&mut empty));
+        full.app.world_mut().get_mut::<GpuJournal>(hair).unwrap().records.clear();
+    }
+    let (with, without) = (undisturbed(&with), undisturbed(&without));
+    println!("a tick of 100,000 strands on the device {with:.3} ms, of none {without:.3} ms");
+    let most = if cfg!(debug_assertions) { 0.3 } else { 0.1 };
+    assert!(with - without < most, "{} ms", with - without);
+    // And still a write to any of them is found, if not in the same tick. Nobody brings the hair back here.
+    full.app.world_mut().resource_mut::<HairGpu>().blocking = false;
+    let strand = full.members()[77_777];
+    full.app.world_mut().get_mut::<Strand>(strand).unwrap().velocities_mut()[3] = Vec3::X;
+    let found = (1..=7).find(|_| {
+        full.run(1);
+        !full.is_on_gpu()
+    });
+    assert!(found.is_some(), "100,000 strands in seven times 16,384");
+}
+
+/// To be read; the machine at hand decides.
 #[test]
 #[ignore = "a measurement, to be read"]
-fn what_hair_on_the_device_costs_the_processor() {
-    // A device that plays one binds 128 MiB, which 100,000 strands of 16 nodes exceed.
-    for (count, nodes) in [(10_000, 16), (100_000, 9)] {
-        let strand = |i: usize| {
-            let root = Vec3::new((i % 300) as f32, 0.0, (i / 300) as f32) * 1e-3;
-            let points: Vec<Vec3> =
-                (0..nodes).map(|k| root + Vec3::Y * (0.01 * k as f32)).collect();
-            Strand::from_polyline(&points).unwrap()
-        };
-        let strands: Vec<Strand> = (0..count).map(strand).collect();
-        let Some(mut stage) = Stage::new(SimulateOn::Cpu, Vec::new()) else { return };
-        stage.compile();
-        stage.app.world_mut().resource_mut::<HairGpu>().checkpoint = 0.0;
-        // Nothing is run on the device: software would take minutes.
-        let render = stage.app.remove_sub_app(bevy::render::RenderApp);
-        let tick = |stage: &mut Stage| {
-            let start = Instant::now();
-            stage.run(1);
-            1e3 * start.elapsed().as_secs_f64()
-        };
-        // The middle one, and the processor's time of all of them.
-        let many = |stage: &mut Stage| {
-            let before = processor();
-            let mut times: Vec<f64> = (0..TICKS).map(|_| tick(stage)).collect();
-            times.sort_by(f64::total_cmp);
-            (times[TICKS / 2], (processor() - before) / TICKS as f64)
-        };
-        let empty = many(&mut stage);
-        stage.hair = Stage::spawn(&mut stage.app, SimulateOn::Cpu, strands);
-        (0..3).for_each(|_| stage.run(1));
-        let hair = stage.hair;
-        let cpu = tick(&mut stage);
-        stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);
-        let handed = tick(&mut stage);
-        assert!(stage.is_on_gpu());
-        let there = many(&mut stage);
-        println!(
-            "{count} strands of {nodes} nodes: a tick on the CPU {cpu:.2} ms, with the hand-over {handed:.2} ms; \
-             on the device {:.3} ms, {:.3} of all threads; without any hair {:.3} ms, {:.3}",
-            there.0, there.1, empty.0, empty.1,
-        );
-        drop(render);
+fn how_long_a_hand_over_takes() {
+    for count in [10_000, 50_000] {
+        let times = (0..5).map(|_| {
+            let mut stage = prepared(SimulateOn::Cpu, straight(count, 16))?;
+            let hair = stage.hair;
+            stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);
+            let handed = tick(&mut stage);
+            assert!(stage.is_on_gpu());
+            Some(handed - tick(&mut stage))
+        });
+        let times: Option<Vec<f64>> = times.collect();
+        let Some(times) = times else { return };
+        let best = times.iter().copied().fold(f64::INFINITY, f64::min);
+        println!("{count} strands of 16 nodes: {best:.1} ms at best, {times:.1?}");
     }
 }

@@ -41,10 +41,8 @@ proptest! {
         let layout = Layout::of(&nodes);
         let strands: Vec<LabStrand> =
             nodes.iter().map(|nodes| LabStrand::random(&mut random, *nodes, 1.0)).collect();
-        let mut contents = Contents::new(&layout);
-        for (i, strand) in strands.iter().enumerate() {
-            contents.put(&layout, i, &strand.view());
-        }
+        let views: Vec<_> = strands.iter().map(LabStrand::view).collect();
+        let contents = Contents::of(&layout, &views);
         for (i, strand) in strands.iter().enumerate() {
             let got = contents.get(&layout, i);
             prop_assert_eq!(&got.positions, &strand.positions);

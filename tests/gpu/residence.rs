@@ -1,7 +1,7 @@
 //! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
 use crate::{
-    led, lod, probe,
+    crossing, led, lod, probe, shapes, sleep,
     stage::{Stage, apart, curls, free},
 };
 use bevy::prelude::*;
@@ -36,7 +36,7 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 fn hair_goes_to_the_device_and_comes_home() {
     let Some(mut stage) = Stage::new(SimulateOn::Cpu, Vec::new()) else { return };
     stage.compile();
-    let all: [fn(&mut Stage); 21] = [
+    let all: [fn(&mut Stage); 29] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
@@ -58,6 +58,14 @@ fn hair_goes_to_the_device_and_comes_home() {
         lod::a_budget_is_that_of_the_processor,
         lod::roots_of_followers_go_with_their_mesh,
         hair_is_despawned_and_levels_change_on_the_way,
+        crossing::whatever_happens_on_the_way_is_done,
+        shapes::a_cantilever_sags_as_on_the_processor,
+        sleep::it_sleeps_when_the_last_strand_would,
+        sleep::asleep_it_has_no_substeps,
+        sleep::whatever_disturbs_it_wakes_it_in_the_same_tick,
+        sleep::sleep_is_the_same_however_many_ticks_a_frame,
+        sleep::hair_with_followers_sleeps_as_well,
+        sleep::a_pause_is_caught_up_with_in_some_frames,
     ];
     for one in all {
         let start = std::time::Instant::now();

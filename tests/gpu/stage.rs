@@ -61,7 +61,10 @@ impl Stage {
     }
 
     pub fn spawn(app: &mut App, on: SimulateOn, strands: Vec<Strand>) -> Entity {
-        let world = app.world_mut();
+        Self::spawn_in(app.world_mut(), on, strands)
+    }
+
+    pub fn spawn_in(world: &mut World, on: SimulateOn, strands: Vec<Strand>) -> Entity {
         let hair = world.spawn((Hair, on, Transform::default())).id();
         world.spawn_batch(strands.into_iter().map(move |strand| (StrandOf(hair), strand)));
         hair

@@ -15,7 +15,7 @@ use bevy_keratin::{
 use fearless_simd::Level;
 
 /// Node counts, so that blocks are full, partly filled, and of one strand.
-const NODES: [usize; 9] = [2, 3, 4, 7, 12, 16, 33, 48, 64];
+const NODES: [usize; 10] = [2, 3, 4, 7, 12, 16, 33, 48, 64, 128];
 
 /// Strands of each: a full block and a part of one.
 const COUNT: usize = 60;
@@ -92,6 +92,11 @@ fn compare_on(
     let mut random = Random(seed);
     for nodes in NODES {
         let record = record(&mut random);
+        // Along so many nodes what hangs on the last bit of a contact adds up: lanes themselves are off by
+        // millimetres.
+        if nodes > 64 && !record.obstacles.is_empty() {
+            continue;
+        }
         let strands: Vec<LabStrand> =
             (0..COUNT).map(|_| LabStrand::random(&mut random, nodes, speed)).collect();
         let twins: Vec<Twin> = strands

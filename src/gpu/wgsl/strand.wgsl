@@ -87,6 +87,13 @@ struct Substep {
     follow_decay: f32,
     follow_lasts: f32,
     unused_2: u32,
+    // Sleep of the whole hair: sleep.wgsl has what the first four are. The tick; where the report holds whether
+    // a strand was not still at the end of this tick, of the one before and of the next.
+    sleep: vec4<f32>,
+    tick: u32,
+    restless: u32,
+    restless_before: u32,
+    restless_next: u32,
     treatment: array<Treatment, 8>,
     obstacle: array<Obstacle, MAX_OBSTACLES>,
 }
@@ -100,6 +107,7 @@ const RESTS: u32 = 16u;
 const LEADS_ROOTS: u32 = 32u;
 const HOLDS: u32 = 64u;
 const FOLLOWS: u32 = 128u;
+const WAKES: u32 = 256u;
 
 // Of each block of strands: first node slot, nodes of a strand, strands, number of its first strand.
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;
@@ -116,8 +124,9 @@ const FOLLOWS: u32 = 128u;
 // Eight a node. Before a substep the first two hold where a led node comes to, and a led root's frame; of no
 // meaning otherwise between substeps.
 @group(0) @binding(6) var<storage, read_write> scratch: array<vec4<f32>>;
-// Strands put back, rebuilt, and of the first of them the number from the end.
-@group(0) @binding(7) var<storage, read_write> report: array<atomic<u32>, 4>;
+// Strands put back, rebuilt, and of the first of them the number from the end; from the 16th on whether a strand
+// was not still.
+@group(0) @binding(7) var<storage, read_write> report: array<atomic<u32>, 20>;
 @group(1) @binding(0) var<uniform> record: Substep;
 
 // The strand of this thread.

@@ -137,6 +137,22 @@ fn put_back() {
     set_moving(edges, vec3(0.0), 0.0);
 }
 
+// Whether the whole hair sleeps.
+fn sleeps() -> bool {
+    return (record.flags & WAKES) == 0u && atomicLoad(&report[record.restless_before]) == 0u;
+}
+
+// Asleep: where it is, at rest. As often as this is done it is the same.
+fn lie_still() {
+    for (var i = 0u; i <= edges; i++) {
+        let p = pose_in[slot(i, 0u, 2u)];
+        pose_out[slot(i, 0u, 2u)] = p;
+        set_frame(i, pose_in[slot(i, 1u, 2u)]);
+        set_moving(i, vec3(0.0), 0.0);
+        motion[slot(i, 1u, 2u)] = vec4(p.xyz, 0.0);
+    }
+}
+
 @compute @workgroup_size(32)
 fn substep(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -150,6 +166,10 @@ fn substep(
     lane = index;
     edges = block.y - 1u;
     number = block.w + index;
+    if sleeps() {
+        lie_still();
+        return;
+    }
     load();
     blow();
     if (record.flags & SHAPES) != 0u {
