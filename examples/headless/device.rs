@@ -37,7 +37,7 @@ pub fn plugins(app: &mut App, pools: TaskPoolOptions) {
         .disable::<WinitPlugin>()
         .disable::<PipelinedRenderingPlugin>();
     app.add_plugins((bevy, HairPlugins::default().build().disable::<HairRenderPlugin>()))
-        .insert_resource(HairGpu { software: true, blocking: true, checkpoint: 0.0 })
+        .insert_resource(HairGpu { software: true, blocking: true, checkpoint: 0.0, ..default() })
         .insert_resource(HairDefault(SimulateOn::Gpu))
         .init_resource::<Ticks>()
         .add_systems(PostStartup, leave_uncounted)
