@@ -4,7 +4,10 @@ use super::followers::FollowRecord;
 use crate::{
     bond::Cuticle,
     lod::follow::Frame,
-    rod::obstacle::{Obstacle, Solid},
+    rod::{
+        obstacle::{Obstacle, Solid},
+        shape::{Placed, Shape},
+    },
     sleep::model::{turn, within},
 };
 use bevy::{
@@ -17,7 +20,7 @@ use core::ops::Range;
 pub(super) const MOST_LED: usize = 1 << 21;
 
 /// The maximum number of obstacles in a record.
-pub const MAX_OBSTACLES: usize = 64;
+pub const MAX_OBSTACLES: usize = 128;
 
 /// The maximum number of blowers in a record.
 pub const MAX_BLOWERS: usize = 4;
@@ -344,8 +347,17 @@ impl Words<'_> {
     fn obstacle(&mut self, Obstacle { solid, motion, friction }: &Obstacle) {
         // Unsupported solids are placed out of reach; the journal reports them.
         const FAR: Vec3 = Vec3::splat(1e6);
+        let ellipsoid = match solid {
+            Solid::Placed(placed @ Placed { shape: Shape::Ellipsoid { radii }, .. }) => {
+                Some((placed.axes, *radii * placed.scale))
+            }
+            _ => None,
+        };
         let (kind, a, b, radius, half_height) = match *solid {
-            Solid::Placed(_) => (1, FAR, Vec3::ZERO, 0.0, 0.0),
+            Solid::Placed(ref placed) => match ellipsoid {
+                Some((axes, half)) => (3, placed.center, axes.x_axis, half.x, half.y),
+                None => (1, FAR, Vec3::ZERO, 0.0, 0.0),
+            },
             Solid::HalfSpace { normal, point } => (0, normal, point, 0.0, 0.0),
             Solid::Capsule { a, b, radius } => (1, a, b - a, radius, 0.0),
             Solid::Cylinder { center, axis, radius, half_height } => {
@@ -358,6 +370,11 @@ impl Words<'_> {
             _ => (b, radius.min(half_height)),
         };
         let across = b.try_normalize().map_or(Vec3::Y, |u| u.any_orthonormal_vector());
+        let inverse = 1.0 / b.length_squared().max(1e-20);
+        let (across, axis, inverse, thickness) = match ellipsoid {
+            Some((axes, half)) => (axes.y_axis, axes.z_axis, half.z, half.min_element()),
+            None => (across, axis, inverse, thickness),
+        };
         let moved = motion.unwrap_or(Affine3A::IDENTITY);
         let rows = moved.matrix3.transpose();
         let row = |axis: Vec3, offset: f32| axis.extend(offset).to_array();
@@ -368,7 +385,7 @@ impl Words<'_> {
         self.numbers(row(rows.x_axis.into(), moved.translation.x));
         self.numbers(row(rows.y_axis.into(), moved.translation.y));
         self.numbers(row(rows.z_axis.into(), moved.translation.z));
-        self.numbers([1.0 / b.length_squared().max(1e-20), thickness]);
+        self.numbers([inverse, thickness]);
         self.word(motion.is_some().into());
         self.word(0);
     }

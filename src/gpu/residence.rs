@@ -95,9 +95,9 @@ pub enum Unsupported {
     UnsteadyWind,
     /// More than four blowers.
     Blowers,
-    /// More than 64 colliders near.
+    /// More than 128 colliders near.
     Colliders,
-    /// A collider near that is no ball, capsule, cylinder or half-space.
+    /// A collider near that is no ball, ellipsoid, capsule, cylinder or half-space.
     ColliderShape,
     /// Roots that are held ([`HeldNodes`](crate::HeldNodes)).
     HeldRoots,
@@ -151,9 +151,9 @@ impl fmt::Display for Unsupported {
             Self::Sweeps => "the paper's projections are not supported there",
             Self::UnsteadyWind => "gusts and wind zones are not supported there",
             Self::Blowers => "more than four blowers are not supported there",
-            Self::Colliders => "more than 64 colliders are not supported there",
+            Self::Colliders => "more than 128 colliders are not supported there",
             Self::ColliderShape => {
-                "colliders other than balls, capsules, cylinders and half-spaces are not supported there"
+                "colliders other than balls, ellipsoids, capsules, cylinders and half-spaces are not supported there"
             }
             Self::HeldRoots => "held roots are not supported there",
             Self::Winding => "its strands begin to be wound on a rod",

@@ -11,7 +11,7 @@ use crate::{
     contact::{LockContact, Obstacles},
     environment::{WindReceived, Winds},
     lod::{Guides, PresentLod},
-    rod::{HairSolver, SolverMethod, obstacle::Solid},
+    rod::{HairSolver, SolverMethod, obstacle::Solid, shape::Shape},
     setting::Settings,
     settle::Settling,
     strand::{Hair, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose},
@@ -117,7 +117,10 @@ impl Support<'_, '_> {
             (air.blowers.len() > MAX_BLOWERS, Unsupported::Blowers),
             (solids.len() > MAX_OBSTACLES, Unsupported::Colliders),
             (
-                solids.iter().any(|o| matches!(o.solid, Solid::Placed(_))),
+                solids.iter().any(|o| match &o.solid {
+                    Solid::Placed(placed) => !matches!(placed.shape, Shape::Ellipsoid { .. }),
+                    _ => false,
+                }),
                 Unsupported::ColliderShape,
             ),
             (is_being_tied, Unsupported::MovingRoots),

@@ -10,7 +10,10 @@ use bevy::{
 };
 use bevy_keratin::{
     gpu::{BlowerRecord, StrandState, SubstepRecord},
-    rod::obstacle::{Obstacle, Solid},
+    rod::{
+        obstacle::{Obstacle, Solid},
+        shape::{Placed, Shape},
+    },
 };
 use fearless_simd::Level;
 
@@ -23,12 +26,18 @@ const COUNT: usize = 60;
 fn random_obstacle(random: &mut Random, kind: u32, moves: bool) -> Obstacle {
     let (a, b) = (random.vector() * 0.3, random.vector() * 0.3);
     let radius = random.between(0.01, 0.06);
-    let solid = match kind % 3 {
+    let solid = match kind % 4 {
         0 => {
             let normal = b.normalize_or(Vec3::Y);
             Solid::HalfSpace { normal, point: normal * -random.between(0.02, 0.2) }
         }
         1 => Solid::Capsule { a, b: if kind > 4 { a } else { b }, radius },
+        2 => Solid::Placed(Placed {
+            shape: Shape::Ellipsoid { radii: Vec3::new(1.0, 1.3, 0.8) },
+            center: a,
+            axes: Mat3::from_quat(Quat::from_scaled_axis(b * 5.0)),
+            scale: radius,
+        }),
         _ => Solid::Cylinder {
             center: a,
             axis: b.normalize_or(Vec3::Y),

@@ -6,7 +6,10 @@ use bevy::math::{DAffine3, DMat3, DQuat, DVec3, Isometry3d, Quat, Vec3};
 use bevy_keratin::{
     bond::model::cuticle_factor,
     gpu::SubstepRecord,
-    rod::obstacle::{Obstacle, Solid},
+    rod::{
+        obstacle::{Obstacle, Solid},
+        shape::{Placed, Shape},
+    },
 };
 
 const THETA: f64 = 0.65;
@@ -554,10 +557,37 @@ fn along(o: &Obstacle, p: DVec3) -> DVec3 {
     })
 }
 
+/// Half axes (m) and axes of an ellipsoid.
+fn ellipsoid(placed: &Placed) -> (DVec3, DMat3) {
+    let Shape::Ellipsoid { radii } = placed.shape else {
+        unreachable!("the shaders have no other shapes")
+    };
+    (d(radii) * f64::from(placed.scale), placed.axes.as_dmat3())
+}
+
+/// Normal and distance of an ellipsoid's surface nearest to a point in its frame: the point is
+/// r²p/(r² + t), where t is found by bisection.
+fn off_ellipsoid(r: DVec3, p: DVec3) -> (DVec3, f64) {
+    let on = |t: f64| r * r * p / (r * r + t);
+    let is_out = |t: f64| (on(t) / r).length_squared() > 1.0;
+    let (mut low, mut high) = (-r.min_element().powi(2), p.length() * r.max_element() + 1.0);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        (low, high) = if is_out(middle) { (middle, high) } else { (low, middle) };
+    }
+    let place = on(0.5 * (low + high));
+    let normal = (place / (r * r)).normalize();
+    (normal, (p - place).dot(normal))
+}
+
 fn depth(solid: &Solid, p: DVec3, skin: f32) -> (DVec3, f64) {
     let skin = f64::from(skin);
     match *solid {
-        Solid::Placed(_) => unreachable!("the shaders have no other shapes"),
+        Solid::Placed(ref placed) => {
+            let (half, axes) = ellipsoid(placed);
+            let (normal, distance) = off_ellipsoid(half, axes.transpose() * (p - d(placed.center)));
+            (axes * normal, skin - distance)
+        }
         Solid::HalfSpace { normal, point } => (d(normal), skin - (p - d(point)).dot(d(normal))),
         Solid::Capsule { a, b, radius } => {
             let (axis, rel) = (d(b) - d(a), p - d(a));
@@ -604,7 +634,10 @@ fn push_out(
 /// Where a node gets to, whether it might pass through, and the normal of what stops it.
 fn swept(o: &Obstacle, start: DVec3, p: DVec3, skin: f32) -> (DVec3, bool, DVec3) {
     let (thickness, center, axis) = match o.solid {
-        Solid::HalfSpace { .. } | Solid::Placed(_) => return (p, false, DVec3::ZERO),
+        Solid::HalfSpace { .. } => return (p, false, DVec3::ZERO),
+        Solid::Placed(ref placed) => {
+            (ellipsoid(placed).0.min_element() as f32, placed.center, Vec3::Y)
+        }
         Solid::Capsule { a, b, radius } => (radius, a, (b - a).normalize_or_zero()),
         Solid::Cylinder { center, axis, radius, half_height } => {
             (radius.min(half_height), center, axis)
@@ -617,6 +650,13 @@ fn swept(o: &Obstacle, start: DVec3, p: DVec3, skin: f32) -> (DVec3, bool, DVec3
     let (facing, outside) = depth(&o.solid, start, skin);
     let across = |v: DVec3| v - axis * v.dot(axis);
     let (from, flat) = (across(start - d(center)), across(way));
+    let (from, flat) = match &o.solid {
+        Solid::Placed(placed) => {
+            let (half, axes) = ellipsoid(placed);
+            [start - d(center), way].map(|v| axes.transpose() * v / half).into()
+        }
+        _ => (from, flat),
+    };
     let nearest = (-from.dot(flat) / flat.length_squared().max(1e-20)).clamp(0.0, 1.0);
     let looks = [nearest, 0.5, 1.0].map(|share| depth(&o.solid, start + way * share, skin));
     let deepest = looks.iter().map(|look| look.1).fold(f64::NEG_INFINITY, f64::max);

@@ -390,7 +390,7 @@ fn surface() {
         return;
     }
     sweeps = false;
-    near = vec2(0xffffffffu);
+    near = vec4(0xffffffffu);
     for (var i = 0u; i <= edges; i++) {
         set_support(i, vec3(0.0));
     }

@@ -3,13 +3,14 @@
 const HALF_SPACE: u32 = 0u;
 const CAPSULE: u32 = 1u;
 const CYLINDER: u32 = 2u;
+const ELLIPSOID: u32 = 3u;
 
 // How far a node may go in a substep, in ways that its velocity alone would take it.
 const FASTER: f32 = 1.5;
 
 // Obstacles that this strand may touch in this substep; whether a node moves so fast against one that it
 // might pass through; whether a node rests on one.
-var<private> near: vec2<u32>;
+var<private> near: vec4<u32>;
 var<private> sweeps: bool;
 var<private> touched: bool;
 
@@ -36,6 +37,53 @@ fn unit_or(v: vec3<f32>, other: vec3<f32>) -> vec4<f32> {
     return vec4(select(v * (1.0 / max(length, 1e-12)), other, length < 1e-12), length);
 }
 
+fn half_axes(o: u32) -> vec3<f32> {
+    return vec3(
+        record.obstacle[o].radius,
+        record.obstacle[o].half_height,
+        record.obstacle[o].inverse,
+    );
+}
+
+// A vector along the axes of an ellipsoid.
+fn vector_in(o: u32, v: vec3<f32>) -> vec3<f32> {
+    return vec3(
+        dot(v, record.obstacle[o].b),
+        dot(v, record.obstacle[o].across),
+        dot(v, record.obstacle[o].axis),
+    );
+}
+
+// Normal of an ellipsoid's surface nearest to p, and the distance from it. Rust twin: src/rod/shape.
+fn off_ellipsoid(o: u32, p: vec3<f32>) -> vec4<f32> {
+    let half = half_axes(o);
+    let size = max(max(half.x, half.y), half.z);
+    let r = half / size;
+    let least = min(min(r.x, r.y), r.z);
+    let own = vector_in(o, p - record.obstacle[o].a);
+    // In the middle of the shortest axis there are two nearest points: one is taken.
+    let y = max(abs(own) / size, select(vec3(0.0), vec3(1e-6 * least), r == vec3(least)));
+    let e = (r - least) * (r + least);
+    let a = y * r;
+    let poles = a - e;
+    var s = max(max(poles.x, poles.y), poles.z);
+    let steps = min(7u + u32(ceil(1.0 / least)), 16u);
+    for (var k = 0u; k < steps; k++) {
+        let inverse = 1.0 / (s + e);
+        let share = a * inverse;
+        let g = dot(share, share);
+        s += (g * sqrt(g) - g) / dot(share * share, inverse);
+    }
+    let way = y / (s + e);
+    let normal = way * (1.0 / sqrt(dot(way, way)));
+    let distance = dot(y - way * r * r, normal) * size;
+    let facing = select(normal, -normal, own < vec3(0.0));
+    let out = record.obstacle[o].b * facing.x
+        + record.obstacle[o].across * facing.y
+        + record.obstacle[o].axis * facing.z;
+    return vec4(out, distance);
+}
+
 // Normal of the surface nearest to p, and how deep p is below a layer of skin on it.
 fn depth_in(o: u32, p: vec3<f32>) -> vec4<f32> {
     let kind = record.obstacle[o].kind;
@@ -49,6 +97,10 @@ fn depth_in(o: u32, p: vec3<f32>) -> vec4<f32> {
         let t = clamp(dot(rel, b * record.obstacle[o].inverse), 0.0, 1.0);
         let off = unit_or(rel - b * t, record.obstacle[o].across);
         return vec4(off.xyz, record.obstacle[o].radius + record.skin - off.w);
+    }
+    if kind == ELLIPSOID {
+        let off = off_ellipsoid(o, p);
+        return vec4(off.xyz, record.skin - off.w);
     }
     let along = dot(rel, b);
     let off = unit_or(rel - b * along, record.obstacle[o].across);
@@ -69,6 +121,14 @@ fn is_beyond(o: u32, p: vec3<f32>, distance: f32) -> bool {
         return distance < dot(p - b, a);
     }
     let rel = p - a;
+    if kind == ELLIPSOID {
+        // Scaled to a ball distances do not shrink; also the bounding ball.
+        let half = half_axes(o);
+        let squeezed = vector_in(o, rel) / half;
+        let close = 1.0 + distance / record.obstacle[o].thickness;
+        let far = max(max(half.x, half.y), half.z) + distance;
+        return close * close < dot(squeezed, squeezed) || far * far < dot(rel, rel);
+    }
     let reach = record.obstacle[o].radius + distance;
     if kind == CAPSULE {
         let off = rel - b * clamp(dot(rel, b * record.obstacle[o].inverse), 0.0, 1.0);
@@ -89,6 +149,10 @@ struct Met {
 
 // Out of the solid the shortest way, then back along the surface by Coulomb friction.
 fn push_out(o: u32, p: vec3<f32>, start: vec3<f32>, friction: f32, slides: bool) -> Met {
+    // Most nodes that may touch it in the substep do not in this pass.
+    if record.obstacle[o].kind == ELLIPSOID && is_beyond(o, p, record.skin) {
+        return Met(p, false, vec3(0.0));
+    }
     let found = depth_in(o, p);
     let normal = found.xyz;
     let depth = found.w;
@@ -128,7 +192,13 @@ fn continuous_collision(o: u32, start: vec3<f32>, p: vec3<f32>) -> Swept {
     let apart = start - record.obstacle[o].a;
     let across_from = fma(axis, vec3(-dot(apart, axis)), apart);
     let along = fma(axis, vec3(-dot(way, axis)), way);
-    let nearest = clamp(-dot(across_from, along) / max(dot(along, along), 1e-20), 0.0, 1.0);
+    var nearest = clamp(-dot(across_from, along) / max(dot(along, along), 1e-20), 0.0, 1.0);
+    if record.obstacle[o].kind == ELLIPSOID {
+        let half = half_axes(o);
+        let squeezed_from = vector_in(o, apart) / half;
+        let squeezed = vector_in(o, way) / half;
+        nearest = clamp(-dot(squeezed_from, squeezed) / max(dot(squeezed, squeezed), 1e-20), 0.0, 1.0);
+    }
     let at_nearest = depth_in(o, fma(way, vec3(nearest), start));
     let at_middle = depth_in(o, fma(way, vec3(0.5), start));
     let at_end = depth_in(o, fma(way, vec3(1.0), start));
@@ -145,7 +215,7 @@ fn continuous_collision(o: u32, start: vec3<f32>, p: vec3<f32>) -> Swept {
 
 // Chooses the obstacles of this strand. Held nodes must know where they come from.
 fn choose_near() {
-    near = vec2(0u);
+    near = vec4(0u);
     if record.obstacles == 0u {
         return;
     }
@@ -214,7 +284,7 @@ fn predict_nodes(dt: f32, gain: vec3<f32>) {
 // rested in the pass before, else `others`.
 fn contacts(resting: f32, others: f32) {
     touched = false;
-    if near.x == 0u && near.y == 0u {
+    if all(near == vec4(0u)) {
         return;
     }
     for (var i = 0u; i <= edges; i++) {

@@ -2,13 +2,14 @@
 // src/gpu/record.rs.
 
 const LANES: u32 = 32u;
-const MAX_OBSTACLES: u32 = 64u;
+const MAX_OBSTACLES: u32 = 128u;
 
 struct Obstacle {
-    // Half-space: its normal. Capsule: one end. Cylinder: its centre.
+    // Half-space: its normal. Capsule: one end. Cylinder, ellipsoid: its centre.
     a: vec3<f32>,
     kind: u32,
-    // Half-space: a point. Capsule: from one end to the other. Cylinder: the axis.
+    // Half-space: a point. Capsule: from one end to the other. Cylinder: the axis. Ellipsoid: its first
+    // axis; the others are `across` and `axis`, its half axes `radius`, `half_height` and `inverse`.
     b: vec3<f32>,
     radius: f32,
     // Some direction across the axis.
