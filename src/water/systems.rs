@@ -99,13 +99,14 @@ fn count_lost_moisture(
 fn count_overwritten(
     step: Res<HairStep>,
     droplets: Query<Ref<Droplet>, Allow<Disabled>>,
+    strands: Query<&Moisture, Allow<Disabled>>,
     // What is written to hair on the GPU is found once it is back.
-    strands: Query<Ref<Moisture>, (Allow<Disabled>, Without<OnGpu>)>,
+    watched: Query<Ref<Moisture>, (Allow<Disabled>, Without<OnGpu>)>,
     mut ledger: ResMut<WaterLedger>,
 ) {
     let written = || {
         droplets.iter().any(|d| d.is_changed() && !d.is_added())
-            || strands.iter().any(|m| m.is_changed() && !m.is_added())
+            || watched.iter().any(|m| m.is_changed() && !m.is_added())
     };
     if step.index == 0 && ledger.water_in > 0.0 && written() {
         let counted = droplets.iter().map(|d| d.counted.0).sum::<f64>()
