@@ -272,7 +272,7 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         DrawnSolid::ball(Vec3::new(0.02, -0.03, 0.01), 0.04).unwrap(),
         DrawnSolid::new(&capsule, &place).unwrap(),
     ];
-    let mut frame = [0u32; 4 + 16 * 16];
+    let mut frame = [0u32; 4 + 16 * 64];
     frame[3] = solids.len() as u32;
     for (k, solid) in solids.iter().enumerate() {
         frame[4 + 16 * k..][..16].copy_from_slice(&solid.packed());

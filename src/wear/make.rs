@@ -34,9 +34,11 @@ const POINTS: usize = 2500;
 const MAX_BALLS: usize = 48;
 /// A capsule that is farther from the skin than this, as a root mean square (m), gives way to balls.
 const LOOSE: f32 = 4e-3;
-/// How far balls stand out of the skin (m), for a head of [`HEAD`]: with 16 balls of a joint in place of 48
-/// 2 % of straight hair's nodes would lie in the creases between them.
-const OUT: f32 = 2e-3;
+/// How far balls stand out of the skin (m), and how far outside of one a point is that it covers (m; negative
+/// within it): with 16 balls of a joint in place of 48, 2 % of straight hair's nodes would lie in the creases
+/// between them.
+const OUT: f32 = 3e-3;
+const CREASE: f32 = -3e-4;
 /// Height of a head, as [`Scalp`](crate::plant::Scalp) measures it (m).
 const HEAD: f32 = 0.133;
 /// Distance beyond the hair's length within which meshes are considered (m).
@@ -213,8 +215,12 @@ fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>
     let height = fitting.scalp.height;
     let is_on_head = |p: &SurfacePoint| p.red > HEAD_WEIGHT && p.at.length() < reach;
     let places: Vec<_> = points.iter().map(|p| (p.at, p.normal)).collect();
-    let rules =
-        BallRules { widest: 0.9 * height, out: OUT * height / HEAD, crease: 0.0, most: MAX_BALLS };
+    let rules = BallRules {
+        widest: 0.9 * height,
+        out: OUT * height / HEAD,
+        crease: CREASE,
+        most: MAX_BALLS,
+    };
     let balls = inscribed_balls(&places, |i| is_on_head(&points[i]), &rules);
     let each = balls.into_iter().map(|ball| {
         let place = Transform::from_translation(ball.center.into());
@@ -306,7 +312,7 @@ fn joint_balls(
         let share = joints[v].iter().zip(weights[v]).filter(|(j, _)| usize::from(**j) == i);
         share.map(|(_, weight)| weight).sum::<f32>() >= 0.5
     };
-    let rules = BallRules { widest: 0.12, out: OUT, crease: 0.0, most: MAX_BALLS };
+    let rules = BallRules { widest: 0.12, out: OUT, crease: CREASE, most: MAX_BALLS };
     let (to_joint, scale) = (from_joint.inverse(), from_joint.matrix3.determinant().abs().cbrt());
     let balls = inscribed_balls(&points, is_moved, &rules);
     let each = balls.into_iter().filter_map(|ball| {
