@@ -207,7 +207,7 @@ fn cuboid<R: Real>(p: V3<R>, half: Vec3, rounding: f32) -> (V3<R>, R) {
 /// a millionth of its size, for points on the evolute too, where they converge the slowest. A fixed
 /// number, so that a lane's result does not depend on the others.
 fn newton_steps(ratio: f32) -> u32 {
-    (7 + ratio.ceil() as u32).min(16)
+    7 + ratio.ceil().min(9.0) as u32
 }
 
 /// The nearest point of an ellipsoid's surface, by a root search.
