@@ -2,13 +2,11 @@
 
 use super::{
     PresentLod,
-    follow::{Frame, GUIDES, StrandState, Ties},
-    model::waypoints,
+    follow::{Frame, Ties},
     spread::spread_order,
+    tie::tie,
 };
 use crate::{
-    grid::KdTree,
-    parallel::{Nanos, for_each},
     setting::Settings,
     strand::{
         Hair, HeldNodes, KinematicStrand, OnGpu, PerHair, Strand, StrandHistory, StrandModel,
@@ -23,15 +21,6 @@ use bevy::{
     prelude::*,
 };
 
-/// How many of the nearest guides are candidates; the most similar ones are taken.
-const CANDIDATES: usize = 8;
-
-/// Below this simulated share of the strands each follower has one guide.
-const SINGLE_GUIDE_SHARE: f32 = 0.125;
-
-/// Distance from a guide below which its weight hardly grows (m).
-const ALIKE: f32 = 1e-3;
-
 /// How a strand that is not simulated at its hair's level follows its guides, see
 /// [`LodLevel::strands`](crate::LodLevel::strands). Kept by the tick.
 #[doc(hidden)]
@@ -42,7 +31,7 @@ pub struct Follower {
     rank: Option<u32>,
     /// Its index among the hair's guides.
     #[reflect(ignore)]
-    guide: Option<u32>,
+    pub(super) guide: Option<u32>,
     #[reflect(ignore)]
     pub(super) ties: Ties,
     /// Position of its root when it last moved (m).
@@ -136,15 +125,15 @@ struct HairPartition<'a> {
     strands: Vec<Ref<'a, Strand>>,
 }
 
-struct GroupStrand<'a> {
+pub(super) struct GroupStrand<'a> {
     entity: Entity,
-    sleep: Mut<'a, StrandSleep>,
-    follower: Mut<'a, Follower>,
+    pub(super) sleep: Mut<'a, StrandSleep>,
+    pub(super) follower: Mut<'a, Follower>,
     history: Mut<'a, StrandHistory>,
     /// Whether it is among the strands that are not simulated.
     is_kinematic: bool,
     /// Whether it may be a guide or a follower: a valid strand that nothing holds.
-    free: bool,
+    pub(super) free: bool,
 }
 
 /// At the start of a tick: where user code has written over what says that a strand is a follower, its hair
@@ -172,6 +161,10 @@ pub(crate) fn choose_guides(
     >,
     mut released: RemovedComponents<HeldNodes>,
     (mut enabled, mut forgotten): (RemovedComponents<Disabled>, RemovedComponents<Follower>),
+    (kinematic, came): (
+        Query<&StrandOf, (With<KinematicStrand>, Without<OnGpu>)>,
+        Query<&StrandOf, (Added<KinematicStrand>, Without<OnGpu>)>,
+    ),
     mut hairs: Query<(Entity, &Strands, &mut PresentLod, &mut Guides), HairHere>,
     mut strands: Query<(
         Entity,
@@ -188,22 +181,30 @@ pub(crate) fn choose_guides(
         StrandModel::Rod => present.simulated_share(),
         StrandModel::MassSpring => 1.0,
     };
-    let concerns = |present: &PresentLod, guides: &Guides| {
+    // Clones of followers, and followers that were disabled while the level ended, may be in hair without any.
+    let enabled: Vec<Entity> = enabled.read().collect();
+    let again = enabled.iter().filter_map(|entity| kinematic.get(*entity).ok());
+    let strayed: EntityHashSet = again.chain(&came).map(|of| of.0).collect();
+    let has_level = |present: &PresentLod, guides: &Guides| {
         present.simulated_share() < 1.0 || present.followers > 0 || !guides.strands.is_empty()
+    };
+    let concerns = |hair: Entity, present: &PresentLod, guides: &Guides| {
+        has_level(present, guides) || strayed.contains(&hair)
     };
     // Hair without outside writes keeps its partition.
     let mut unchanged = EntityHashSet::default();
-    let any_released =
-        released.read().count() + enabled.read().count() + forgotten.read().count() > 0;
+    let any_released = released.read().count() + enabled.len() + forgotten.read().count() > 0;
     let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
     let mut any = false;
     for (hair, members, present, mut guides) in &mut hairs {
-        if !concerns(&present, &guides) {
+        if !concerns(hair, &present, &guides) {
             continue;
         }
+        let is_strayed = !has_level(&present, &guides);
         let partition_key = Some((share_of(hair, &present), present.level, members.len()));
         let guides = guides.bypass_change_detection();
-        if guides.partition_key == partition_key && !any_released && !touched.contains(&hair) {
+        let is_touched = is_strayed || touched.contains(&hair);
+        if guides.partition_key == partition_key && !any_released && !is_touched {
             unchanged.insert(hair);
         } else {
             any = true;
@@ -219,14 +220,8 @@ pub(crate) fn choose_guides(
             let (hair, _, present, guides) = hairs.get(of.0).ok()?;
             let (members, strands) = default();
             let (share, level) = (share_of(hair, present), present.level);
-            (concerns(present, guides) && !unchanged.contains(&hair)).then_some(HairPartition {
-                hair,
-                share,
-                level,
-                repairs: false,
-                members,
-                strands,
-            })
+            (concerns(hair, present, guides) && !unchanged.contains(&hair))
+                .then_some(HairPartition { hair, share, level, repairs: false, members, strands })
         });
         let Some(index) = index else { continue };
         let is_held = held.is_some_and(|held| held.targets.iter().any(Option::is_some));
@@ -388,80 +383,5 @@ fn replace_guides(
         if !keep || !ties.guides.iter_mut().all(stays) {
             *ties = Ties::default();
         }
-    }
-}
-
-/// Ties followers without guides to guides that are near and similar.
-fn tie(members: &mut [GroupStrand<'_>], strands: &[Ref<'_, Strand>], guides: &mut Guides) {
-    let is_loose = |m: &GroupStrand<'_>| {
-        m.free && m.follower.guide.is_none() && m.follower.ties.guides.is_empty()
-    };
-    if !members.iter().any(is_loose) {
-        return;
-    }
-    if guides.strands.is_empty() {
-        // Frozen hair has no guides.
-        for (member, strand) in members.iter_mut().zip(strands) {
-            if is_loose(member) && !member.sleep.is_follower() {
-                member.sleep.bypass_change_detection().set_follower(true);
-                member.follower.bypass_change_detection().root = waypoints(strand)[0];
-            }
-        }
-        return;
-    }
-    let mut ahead: Vec<Option<&Strand>> = vec![None; guides.strands.len()];
-    for (member, strand) in members.iter().zip(strands) {
-        if let Some(place) = member.follower.guide.and_then(|i| ahead.get_mut(i as usize)) {
-            *place = Some(strand);
-        }
-    }
-    // Guides may have been written to since the last tick.
-    ahead.iter().enumerate().for_each(|(i, strand)| guides.update_pose(i, *strand));
-    let guides = &*guides;
-    // With so few guides it does not show that neighbours move alike.
-    let most = if (guides.strands.len() as f32) < SINGLE_GUIDE_SHARE * members.len() as f32 {
-        1
-    } else {
-        GUIDES
-    };
-    let waypoints_of: Vec<[Vec3; 3]> =
-        ahead.iter().map(|s| s.map_or([Vec3::ZERO; 3], waypoints)).collect();
-    let nearest = KdTree::new(waypoints_of.iter().map(|c| c[0]).zip(0..));
-    let mut loose: Vec<_> = (members.iter_mut())
-        .zip(strands)
-        .filter(|(m, _)| is_loose(m))
-        .map(|(m, strand)| {
-            m.sleep.bypass_change_detection().set_follower(true);
-            (m.follower.bypass_change_detection(), &**strand)
-        })
-        .collect();
-    for_each(&mut loose, Nanos(5_000), |(follower, strand)| {
-        let own = waypoints(strand);
-        let mut found: Vec<(f32, u32, StrandState<'_>)> = nearest
-            .nearest::<CANDIDATES>(own[0])
-            .filter_map(|(index, _)| {
-                let i = index as usize;
-                let guide = ahead[i]?;
-                let apart = waypoints_of[i].iter().zip(own).map(|(a, b)| a.distance_squared(b));
-                let turns = guides.turns(index)?;
-                Some((apart.sum::<f32>() / 3.0, index, StrandState { turns, ..state_of(guide) }))
-            })
-            .collect();
-        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        found.truncate(most);
-        let weight = |apart: f32| 1.0 / (apart + ALIKE * ALIKE);
-        let sum: f32 = found.iter().map(|f| weight(f.0)).sum();
-        let guides = found.into_iter().map(|(apart, i, guide)| (i, weight(apart) / sum, guide));
-        follower.ties = Ties::new(state_of(strand), guides);
-        follower.root = own[0];
-    });
-}
-
-fn state_of(strand: &Strand) -> StrandState<'_> {
-    StrandState {
-        positions: strand.positions(),
-        velocities: strand.velocities(),
-        turns: strand.orientations(),
-        lengths: strand.rest_lengths(),
     }
 }

@@ -52,6 +52,7 @@ mod release;
 #[doc(hidden)]
 pub mod spread;
 mod systems;
+mod tie;
 
 pub use budget::{HairBudget, HairEstimate};
 pub use choose::{Follower, Guides};

@@ -340,6 +340,32 @@ fn what_is_spoiled_while_disabled_is_repaired_once_enabled() {
 }
 
 #[test]
+fn what_was_disabled_while_the_level_ended_is_simulated_once_enabled() {
+    let (mut app, hair, ids) = group();
+    let away = carried(&app, &ids)[7];
+    app.world_mut().entity_mut(away).insert(Disabled);
+    zoom(&mut app, hair, 1.0);
+    run(&mut app, 0.1);
+    let present: Vec<Entity> = ids.iter().copied().filter(|e| *e != away).collect();
+    assert_eq!(carried(&app, &present), []);
+    app.world_mut().entity_mut(away).remove::<Disabled>();
+    app.update();
+    assert!(!is_follower(&app, away));
+    let before = strand(&app, away).positions()[8];
+    turn(&mut app, hair, 0.5);
+    run(&mut app, 0.2);
+    assert!(strand(&app, away).positions()[8].distance(before) > 1e-3);
+    // A clone of a follower in hair that has none is simulated, too.
+    put(&mut app, hair, fewer(0.25), 0.1);
+    let follower = carried(&app, &ids)[3];
+    let clone = app.world_mut().entity_mut(follower).clone_and_spawn();
+    zoom(&mut app, hair, 1.0);
+    run(&mut app, 0.1);
+    assert!(!is_follower(&app, clone));
+    assert_eq!(faults(&mut app), []);
+}
+
+#[test]
 fn a_follower_that_forgets_its_guides_gets_some_again() {
     let mut app = test_app(60.0);
     let (hair, ids) = head(&mut app, 60, 9, 0.24);
