@@ -2,8 +2,8 @@
 
 use super::{
     PresentLod,
-    choose::{Follower, Guides},
     follow::{Frame, StrandPose},
+    guides::{Follower, Guides},
 };
 use crate::{
     parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},

@@ -46,6 +46,7 @@ mod elsewhere;
 #[doc(hidden)]
 pub mod follow;
 mod followers;
+mod guides;
 #[doc(hidden)]
 pub mod model;
 mod release;
@@ -55,7 +56,7 @@ mod systems;
 mod tie;
 
 pub use budget::{HairBudget, HairEstimate};
-pub use choose::{Follower, Guides};
+pub use guides::{Follower, Guides};
 pub use systems::LodPlugin;
 
 use crate::{

@@ -1,6 +1,6 @@
 //! Strands that are no followers any more for other reasons than their hair's level.
 
-use super::choose::Follower;
+use super::guides::Follower;
 use crate::strand::{KinematicStrand, Strand, StrandHistory, StrandOf, StrandSleep};
 use bevy::prelude::*;
 

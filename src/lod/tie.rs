@@ -1,8 +1,8 @@
 //! Ties of followers to the guides that they follow.
 
 use super::{
-    choose::{GroupStrand, Guides},
     follow::{GUIDES, StrandState, Ties},
+    guides::{GroupStrand, Guides},
     model::waypoints,
 };
 use crate::{
