@@ -1,11 +1,15 @@
 //! `cargo bench --bench game`: what hair costs a game, in milliseconds a tick of 1/60 s.
 //!
 //! Each preset on a head with shoulders, at rest and on a character who walks and looks around,
-//! with and without contact between strands; then crowds. Medians of five runs of 20 ticks; nothing
+//! with and without contact between strands; some as a skinned figure wears them, among the balls that fit
+//! its skin; then crowds. Medians of five runs of 20 ticks; nothing
 //! is drawn and nothing sleeps. On one thread only its own processor time counts, whatever else runs
 //! on the machine. `KERATIN_BENCH_ONLY=wavy,crowd` prints only these rows. `KERATIN_BENCH_PARTS=1` prints
 //! after each crowd which parts of a substep take the time.
 
+#[path = "../examples/character/body.rs"]
+#[allow(dead_code, reason = "the example uses all of it")]
+mod body;
 mod common;
 #[path = "../examples/presets/head.rs"]
 #[allow(dead_code, reason = "the pictures use all of it")]
@@ -13,6 +17,11 @@ mod head;
 #[path = "../examples/salon/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
+#[path = "../examples/character/skeleton.rs"]
+#[allow(dead_code, reason = "the example uses all of it")]
+mod skeleton;
+#[path = "game/worn.rs"]
+mod worn;
 
 /// What the mannequin takes from the scenes.
 mod scenes {
@@ -32,7 +41,7 @@ use std::{
 
 const THREADS: &str = "KERATIN_BENCH_THREADS";
 
-/// The rows to print, if not all: presets by name, `crowd`.
+/// The rows to print, if not all: presets by name, `worn`, `crowd`.
 const ONLY: &str = "KERATIN_BENCH_ONLY";
 
 /// Whether to print what each part of a substep takes.
@@ -64,6 +73,9 @@ fn rows(threads: usize) {
         if wanted(&name) {
             preset_rows(&name, preset, threads);
         }
+    }
+    if wanted("worn") {
+        worn::rows(threads);
     }
     if wanted("crowd") {
         crowd_rows(threads);

@@ -232,7 +232,7 @@ fn a_grid_knows_its_box() {
 fn openings_are_refused_filled_or_made_a_sheet() {
     let open = &FACES[..11];
     let bake = |openings: Openings| {
-        DistanceGrid::bake_as(&corners(HALF), open, &Bake { cell: CELL, openings })
+        DistanceGrid::bake_with(&corners(HALF), open, &Bake { cell: CELL, openings })
     };
     let refused = bake(Openings::Refuse).unwrap_err();
     assert_eq!(refused, BakeError::Open { edges: 3 });
@@ -248,7 +248,7 @@ fn openings_are_refused_filled_or_made_a_sheet() {
     let both: Vec<Vec3> = corners(HALF).into_iter().chain(moved).collect();
     let faces: Vec<_> = FACES.into_iter().chain(FACES.map(|t| t.map(|v| v + 8))).collect();
     let how = Bake { cell: CELL, openings: Openings::Fill };
-    let united = DistanceGrid::bake_as(&both, &faces, &how).unwrap();
+    let united = DistanceGrid::bake_with(&both, &faces, &how).unwrap();
     for x in [0.0, 0.05, 0.1] {
         let depth = -united.distance(Vec3::X * x);
         assert!((depth - 0.08).abs() < 2.0 * CELL, "{depth} m deep at {x}");

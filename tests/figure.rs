@@ -94,18 +94,9 @@ fn depth(skin: &[(Vec3, Vec3)], p: Vec3) -> (usize, f32) {
 fn depths(mesh: &Mesh, preset: HairPreset) -> [(f32, f32); 2] {
     let mut app = app_with_meshes(60.0);
     let world = app.world_mut();
-    let root = world.spawn((skeleton::path(0.0), Name::new("Figure"))).id();
-    let mut bones: Vec<Entity> = Vec::new();
-    for bone in 0..skeleton::COUNT {
-        let above = skeleton::parent(bone).map_or(root, |parent| bones[parent]);
-        let name = match bone {
-            skeleton::HEAD => Name::new("Head"),
-            _ => Name::new(format!("Bone {bone}")),
-        };
-        bones.push(world.spawn((name, skeleton::at_rest(bone), ChildOf(above))).id());
-    }
-    let inverse: Vec<Mat4> =
-        (0..skeleton::COUNT).map(|bone| Mat4::from_translation(-skeleton::joint(bone))).collect();
+    let (root, bones) = skeleton::spawn(&mut world.commands());
+    world.flush();
+    let inverse = skeleton::inverse_poses();
     let skin = Skin::of(mesh);
     let handle = world.resource_mut::<Assets<Mesh>>().add(mesh.clone());
     let inverse_bindposes = world

@@ -288,7 +288,7 @@ fn holding_and_letting_go_wakes_it() {
 #[test]
 fn bonds_that_change_wake_it_and_keep_it_awake() {
     wakes(|app, _, e| {
-        app.world_mut().get_mut::<bevy_keratin::BondChanges>(e).unwrap().ask(
+        app.world_mut().get_mut::<bevy_keratin::BondChanges>(e).unwrap().request(
             3,
             BondKind::Hydrogen,
             -0.5,

@@ -230,7 +230,7 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
     app.world_mut().spawn(PermRod { radius: 0.0, length: 0.1 });
     app.world_mut().spawn(PermWinding { from_node: 0, pitch: f32::NAN, seconds: -1.0 });
     app.insert_resource(HairSubsteps::Fixed(0)).insert_resource(HairGravity(Vec3::NAN));
-    app.insert_resource(DropletRules { min: Vec3::NAN, lying: -2.0, ..default() });
+    app.insert_resource(DropletRules { min: Vec3::NAN, resting_time: -2.0, ..default() });
     app.update();
     let reported = faults(&mut app);
     let mut names: Vec<_> =
@@ -242,8 +242,8 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
             "AirDrag::rate (1/s)",
             "Blower::strength (m/s²)",
             "ColliderShape::radius (m)",
-            "DropletRules::lying (s)",
             "DropletRules::min (m)",
+            "DropletRules::resting_time (s)",
             "HairCollider::friction",
             "HairGravity (m/s²)",
             "HairSolver::limiter_steps",

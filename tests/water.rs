@@ -650,7 +650,7 @@ fn drops_that_have_fallen_below_all_hair_are_gone() {
 #[test]
 fn a_drop_that_lies_on_a_solid_is_gone_after_its_time() {
     let mut app = test_app(60.0);
-    app.insert_resource(DropletRules { lying: 0.5, ..default() });
+    app.insert_resource(DropletRules { resting_time: 0.5, ..default() });
     app.insert_resource(HairProcessTime(0.0));
     app.world_mut().spawn(HairCollider::plane(Dir3::Y));
     let above = Vec3::Y * 5e-4;

@@ -362,7 +362,8 @@ fn stir(step: Res<HairStep>, mut strands: Query<(&Strand, &mut BondChanges)>) {
         for strands in strands.chunks_mut(1024) {
             scope.spawn(async move {
                 for (strand, changes) in strands {
-                    (0..strand.edges()).for_each(|i| changes.ask(i, BondKind::Hydrogen, change));
+                    (0..strand.edges())
+                        .for_each(|i| changes.request(i, BondKind::Hydrogen, change));
                 }
             });
         }

@@ -56,15 +56,12 @@ fn build(
     mut poses: ResMut<Assets<SkinnedMeshInverseBindposes>>,
     wears: Res<Wears>,
 ) -> Result {
-    let figure = commands.spawn((Figure::default(), path(0.0), Visibility::default())).id();
-    let mut bones: Vec<Entity> = Vec::new();
-    for bone in 0..skeleton::COUNT {
-        let above = skeleton::parent(bone).map_or(figure, |parent| bones[parent]);
-        let bone = (Bone(bone), at_rest(bone), Visibility::default(), ChildOf(above));
-        bones.push(commands.spawn(bone).id());
+    let (figure, bones) = skeleton::spawn(&mut commands);
+    commands.entity(figure).insert((Figure::default(), Visibility::default()));
+    for (number, bone) in bones.iter().enumerate() {
+        commands.entity(*bone).insert((Bone(number), Visibility::default()));
     }
-    let inverse: Vec<Mat4> =
-        (0..skeleton::COUNT).map(|bone| Mat4::from_translation(-joint(bone))).collect();
+    let inverse = skeleton::inverse_poses();
     let scalp = scalp();
     let skin = body::mesh();
     let preset = wears.0;

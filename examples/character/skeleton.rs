@@ -57,6 +57,26 @@ pub fn at_rest(bone: usize) -> Transform {
     Transform::from_translation(joint(bone) - parent(bone).map_or(Vec3::ZERO, joint))
 }
 
+/// From the space of the skin to each bone's, at rest.
+pub fn inverse_poses() -> Vec<Mat4> {
+    (0..COUNT).map(|bone| Mat4::from_translation(-joint(bone))).collect()
+}
+
+/// Spawns a figure and its bones, at rest.
+pub fn spawn(commands: &mut Commands) -> (Entity, Vec<Entity>) {
+    let figure = commands.spawn((path(0.0), Name::new("Figure"))).id();
+    let mut bones: Vec<Entity> = Vec::new();
+    for bone in 0..COUNT {
+        let above = parent(bone).map_or(figure, |parent| bones[parent]);
+        let name = match bone {
+            HEAD => Name::new("Head"),
+            _ => Name::new(format!("Bone {bone}")),
+        };
+        bones.push(commands.spawn((name, at_rest(bone), ChildOf(above))).id());
+    }
+    (figure, bones)
+}
+
 /// How fast it walks (m/s), and how many double steps it takes in a second.
 pub const SPEED: f32 = 1.2;
 const PACE: f32 = 0.92;

@@ -58,7 +58,7 @@ impl BondChanges {
     /// Requests a change of `kind` at `joint`. Requests beyond the strand's joints and non-finite
     /// ones are ignored; peptide bonds are never cut.
     #[inline]
-    pub fn ask(&mut self, joint: usize, kind: BondKind, change: f32) {
+    pub fn request(&mut self, joint: usize, kind: BondKind, change: f32) {
         if change == 0.0 || !change.is_finite() || (kind == BondKind::Peptide && change < 0.0) {
             return;
         }

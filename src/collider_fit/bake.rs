@@ -7,7 +7,7 @@ use bevy::{
 };
 
 impl DistanceGrid {
-    /// Bakes a mesh, in its own space: [`DistanceGrid::bake_as`]. On the mesh's entity, or on a child of
+    /// Bakes a mesh, in its own space: [`DistanceGrid::bake_with`]. On the mesh's entity, or on a child of
     /// it, the grid's collider lies where the mesh is drawn, unless that is skinned or morphed.
     ///
     /// ```
@@ -23,7 +23,7 @@ impl DistanceGrid {
     /// ```
     ///
     /// # Errors
-    /// As [`bake_as`](Self::bake_as), and when the mesh has no positions or triangles in the main world.
+    /// As [`bake_with`](Self::bake_with), and when the mesh has no positions or triangles in the main world.
     pub fn of_mesh(mesh: &Mesh, how: &Bake) -> Result<Self, BakeError> {
         let missing = |what| BakeError::NoAttribute { what };
         let places = mesh.try_attribute_option(Mesh::ATTRIBUTE_POSITION).ok().flatten();
@@ -43,7 +43,7 @@ impl DistanceGrid {
             }
             _ => return Err(missing("triangles")),
         };
-        Self::bake_as(&places, &triangles, how)
+        Self::bake_with(&places, &triangles, how)
     }
 }
 

@@ -108,7 +108,7 @@ fn bake(mesh: &TriMesh, cells: f32) -> Result<ColliderShape, String> {
     let bounds = |(low, high): (Vec3, Vec3), p: &Vec3| (low.min(*p), high.max(*p));
     let (low, high) = vertices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), bounds);
     let how = Bake { cell: (high - low).max_element() / cells, openings: Openings::Fill };
-    let grid = DistanceGrid::bake_as(vertices, mesh.indices(), &how);
+    let grid = DistanceGrid::bake_with(vertices, mesh.indices(), &how);
     grid.map(ColliderShape::Grid).map_err(|error| error.to_string())
 }
 

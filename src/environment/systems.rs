@@ -184,7 +184,7 @@ fn blow(
         if is_wet {
             at_nodes.push(blown);
         } else if i < edges {
-            changes.ask(i, BondKind::Hydrogen, blown.drying * air.dt);
+            changes.request(i, BondKind::Hydrogen, blown.drying * air.dt);
         }
         if let Some(received) = received.as_deref_mut().filter(|_| i < edges) {
             received.total.resize(edges, 0.0);

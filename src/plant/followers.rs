@@ -28,8 +28,11 @@ const MOST: f64 = 2e7;
 /// elsewhere: few drawn strands would leave a bald stripe there.
 const PARTING_WIDTH: f32 = 20e-3;
 const DENSITY_ELSEWHERE: f32 = 0.45;
-/// How many of the nearest guides are candidates for a root.
+/// How many of the nearest guides are candidates for a root, and among how many it is looked first.
 const NEAR: usize = 16;
+const NEAREST: usize = 6;
+/// Guides of which a follower is a mean.
+const GUIDES: usize = 3;
 /// A follower has no guides that are so many times longer or shorter than it by their place: a fringe
 /// is not blended with what is long beside it.
 const OTHER_LENGTH: f32 = 2.0;
@@ -107,9 +110,10 @@ impl FollowerPlanting {
         let tree = KdTree::new(guides.iter().map(|guide| guide.place).zip(0u32..));
         let mut random = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x0f01_10e5);
         let growth = |place: &RootPlace| {
-            let at = place.position;
-            let ragged = if self.preset.is_everywhere() { 0.0 } else { self.hairline.break_at(at) };
-            let behind = self.preset.behind_line(&self.scalp, at) + ragged;
+            let mut behind = self.preset.behind_line(&self.scalp, place.position);
+            if !self.preset.is_everywhere() && self.hairline.is_ragged_at(behind) {
+                behind += self.hairline.break_at(place.position);
+            }
             let mut growth = self.hairline.growth(behind);
             let share = share(place).clamp(0.0, 1.0) * self.beside_parting(place.position);
             growth.density *= share;
@@ -218,12 +222,19 @@ impl FollowerPlanting {
                     && guide.reach.dot(comb) > 0.0
                     && (aside.abs() < 0.3 || guide.reach.dot(right) * aside > 0.0))
         };
-        let near: Vec<(u32, f32)> = tree.nearest::<NEAR>(place.position).collect();
-        let chosen: Vec<&(u32, f32)> = near.iter().filter(|(i, _)| alike(*i)).take(3).collect();
-        let chosen = if chosen.is_empty() { near.iter().take(1).collect() } else { chosen };
+        let all_alike = |near: &mut dyn Iterator<Item = (u32, f32)>| -> Vec<(u32, f32)> {
+            near.filter(|(i, _)| alike(*i)).take(GUIDES).collect()
+        };
+        let mut chosen = all_alike(&mut tree.nearest::<NEAREST>(place.position));
+        if chosen.len() < GUIDES {
+            chosen = all_alike(&mut tree.nearest::<NEAR>(place.position));
+        }
+        if chosen.is_empty() {
+            chosen.extend(tree.nearest::<1>(place.position));
+        }
         let (mut sum, mut length, mut reach) = (0.0, 0.0, Vec3::ZERO);
         for (i, square) in chosen {
-            let (guide, weight) = (&guides[*i as usize], 1.0 / (square + 1e-6));
+            let (guide, weight) = (&guides[i as usize], 1.0 / (square + 1e-6));
             sum += weight;
             length += weight * guide.length;
             reach += weight * guide.reach;

@@ -66,6 +66,15 @@ impl Hairline {
         }
     }
 
+    /// Whether [`break_at`](Self::break_at) may change the growth at a distance `behind` the even line (m):
+    /// it does not far before and far behind it.
+    pub(super) fn is_ragged_at(&self, behind: f32) -> bool {
+        // The waves' sum is at most four halves of the amplitude.
+        let most = 2.0 * self.ragged;
+        let whole = self.density_over.max(self.length_over).max(BABY_BAND.1);
+        behind > BABY_BAND.0.min(0.0) - most && behind < whole + most
+    }
+
     /// Offset of the ragged line at a place (m).
     pub(super) fn break_at(&self, place: Vec3) -> f32 {
         // Several incommensurable waves of some millimetres.
@@ -157,6 +166,23 @@ pub(super) fn smooth(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_ragged_line_changes_growth_only_near_itself() {
+        let line = Hairline { ragged: 5e-3, ..default() };
+        let (mut near, mut changed) = (0, 0);
+        for step in 0..4000 {
+            let behind = -0.05 + 25e-6 * step as f32;
+            let place = Vec3::new(0.013, -0.007, 0.011) * step as f32;
+            let ragged = line.growth(behind + line.break_at(place));
+            near += u32::from(line.is_ragged_at(behind));
+            if ragged != line.growth(behind) {
+                changed += 1;
+                assert!(line.is_ragged_at(behind), "{behind}");
+            }
+        }
+        assert!(changed > 800 && near < 2000, "{changed} changed, {near} near");
+    }
 
     #[test]
     fn hair_grows_denser_longer_and_wider_behind_the_line() {

@@ -96,7 +96,7 @@ pub(super) fn show_droplets(
         }
         _ => 0.0,
     };
-    let longest = rules.map(|rules| rules.clamped()).unwrap_or_default().lying.max(SINKING);
+    let longest = rules.map(|rules| rules.clamped()).unwrap_or_default().resting_time.max(SINKING);
     let down = gravity.map_or(Vec3::NEG_Y, |gravity| gravity.normalize_or_zero());
     beads.clear();
     beads.extend(droplets.iter().map(|drop| {

@@ -11,6 +11,7 @@
 use super::{
     constraint::Shares,
     direct::row::DirectRow,
+    near::ObstacleBalls,
     obstacle::{NearObstacles, Obstacle},
 };
 use crate::lanes::{LANES, Lane, V3, load, load3, store3};
@@ -88,6 +89,7 @@ pub struct BlockLanes {
     pub(super) has_fast_nodes: bool,
     /// Which obstacles each node may touch in this substep, in any lane.
     pub(crate) near_obstacles: Vec<NearObstacles>,
+    pub(super) obstacle_balls: Vec<ObstacleBalls>,
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
     pub root_from: [Lane; 4],
     pub(super) theta: Lane,

@@ -15,6 +15,7 @@
 //! | `sweep` | the iterations, root to tip, several at once |
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
 //! | `tridiagonal` | the Thomas algorithm |
+//! | `near` | which obstacles a node may touch in a substep |
 //! | [`obstacle`] | colliders as half-space, capsule, cylinder or placed shape, with friction |
 //! | [`shape`] | boxes, ellipsoids, hulls and distance grids, each in its own frame |
 //!
@@ -28,6 +29,7 @@ pub mod direct;
 #[doc(hidden)]
 pub mod frame;
 pub(crate) mod limiter;
+mod near;
 #[doc(hidden)]
 pub mod obstacle;
 #[doc(hidden)]

@@ -50,25 +50,40 @@ pub struct Obstacle {
     pub friction: f32,
 }
 
-/// A subset of a block's obstacles as bits. With more than 64, several obstacles share a bit.
+/// A subset of a block's obstacles as bits. With more than 128, several obstacles share a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct NearObstacles(u64);
+pub(crate) struct NearObstacles(u128);
 
 impl NearObstacles {
     pub(crate) const NONE: Self = Self(0);
-    pub(crate) const ALL: Self = Self(u64::MAX);
+    pub(crate) const ALL: Self = Self(u128::MAX);
+    const BITS: usize = u128::BITS as usize;
 
     /// Adds the obstacle of this index.
     #[inline(always)]
     pub(crate) fn add(&mut self, index: usize) {
-        self.0 |= 1 << (index % 64);
+        self.0 |= 1 << (index % Self::BITS);
     }
 
-    /// Those of `obstacles` that are chosen.
+    /// Those of `obstacles` that are chosen, in their order.
     #[inline(always)]
     pub(crate) fn of(self, obstacles: &[Obstacle]) -> impl Iterator<Item = &Obstacle> {
-        let chosen = move |(i, _): &(usize, _)| self.0 >> (i % 64) & 1 != 0;
-        obstacles.iter().enumerate().filter(chosen).map(|(_, obstacle)| obstacle)
+        let (mut first, mut bits) = (0, self.0);
+        core::iter::from_fn(move || {
+            while self.0 != 0 && first < obstacles.len() {
+                if bits != 0 {
+                    let index = first + bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    if let Some(obstacle) = obstacles.get(index) {
+                        return Some(obstacle);
+                    }
+                }
+                if bits == 0 {
+                    (first, bits) = (first + Self::BITS, self.0);
+                }
+            }
+            None
+        })
     }
 }
 
@@ -99,6 +114,18 @@ impl Obstacle {
 }
 
 impl Solid {
+    /// A bounding ball: endless for half-spaces.
+    pub(super) fn ball(&self) -> (Vec3, f32) {
+        match *self {
+            Solid::HalfSpace { point, .. } => (point, f32::INFINITY),
+            Solid::Capsule { a, b, radius } => (0.5 * (a + b), radius + 0.5 * a.distance(b)),
+            Solid::Cylinder { center, radius, half_height, .. } => {
+                (center, radius.hypot(half_height))
+            }
+            Solid::Placed(ref placed) => placed.ball(),
+        }
+    }
+
     /// Whether any point of the box `low…high`, grown by `margin`, may lie inside. Conservative:
     /// true where in doubt.
     pub fn may_reach(&self, low: Vec3, high: Vec3, margin: f32) -> bool {
@@ -178,6 +205,18 @@ impl Solid {
 }
 
 impl Solid {
+    /// About half its thickness (m), for solids of which [`is_beyond`](Self::is_beyond) costs a fraction of
+    /// [`depth`](Self::depth).
+    #[inline(always)]
+    fn quick_thickness(&self) -> Option<f32> {
+        match *self {
+            Solid::Capsule { radius, .. } => Some(radius),
+            Solid::Cylinder { radius, half_height, .. } => Some(radius.min(half_height)),
+            Solid::Placed(ref placed) if placed.is_costly() => Some(placed.thickness()),
+            _ => None,
+        }
+    }
+
     /// Whether `p` is farther than `distance` (m) outside. Conservative: false near corners and for NaN;
     /// cheaper than [`depth`](Self::depth), which computes the normal as well.
     #[inline(always)]
@@ -188,12 +227,14 @@ impl Solid {
                 Real::lt(distance, (p - splat(p.x, point)).dot(splat(p.x, normal)))
             }
             Solid::Capsule { a, b, radius } => {
-                let axis = b - a;
-                let inverse = 1.0 / axis.length_squared().max(1e-20);
-                let rel = p - splat(p.x, a);
-                let t = rel.dot(splat(p.x, axis * inverse));
-                let t = Real::min(Real::max(t, lit(0.0)), lit(1.0));
-                let off = splat(p.x, axis).scale_add(-t, rel);
+                let mut off = p - splat(p.x, a);
+                if a != b {
+                    let axis = b - a;
+                    let inverse = 1.0 / axis.length_squared().max(1e-20);
+                    let t = off.dot(splat(p.x, axis * inverse));
+                    let t = Real::min(Real::max(t, lit(0.0)), lit(1.0));
+                    off = splat(p.x, axis).scale_add(-t, off);
+                }
                 let reach = lit(radius) + distance;
                 Real::lt(reach * reach, off.dot(off))
             }
@@ -237,11 +278,8 @@ pub(super) fn push_out<S: Simd>(
     let one = f32x16::splat(simd, 1.0);
     // Most nodes that may touch it in the substep do not in this pass. With room for rounding, so that
     // no lane's result depends on the others.
-    if let Solid::Placed(placed) = &obstacle.solid
-        && placed.is_costly()
-        && placed
-            .is_beyond(p, f32x16::splat(simd, clearance + 1e-3 * placed.thickness()))
-            .all_true()
+    if let Some(thickness) = obstacle.solid.quick_thickness()
+        && obstacle.solid.is_beyond(p, f32x16::splat(simd, clearance + 1e-3 * thickness)).all_true()
     {
         return None;
     }
@@ -290,8 +328,14 @@ pub(super) fn continuous_collision<S: Simd>(
     };
     let way = p - start;
     // Slower ones stay on their side, where the nearest way out is correct.
-    let fast = Real::lt(lit(0.2 * thickness * thickness), way.dot(way));
+    let way_squared = way.dot(way);
+    let fast = Real::lt(lit(0.2 * thickness * thickness), way_squared);
     if fast.to_bitmask() == 0 {
+        return None;
+    }
+    // Nor do those that begin farther from it than they go.
+    let reach = Real::sqrt(way_squared) + lit(clearance + 1e-3 * thickness);
+    if obstacle.solid.is_beyond(start, reach).all_true() {
         return None;
     }
     let (facing, depth) = obstacle.solid.depth(start, clearance);

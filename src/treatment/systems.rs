@@ -91,7 +91,7 @@ fn apply_treatments(
             for (i, joint) in bonds.joints.iter().enumerate().filter(|(i, _)| range.contains(i)) {
                 for kind in BondKind::ALL {
                     if let Some(to) = treat.rates[kind as usize] {
-                        changes.ask(i, kind, (to - joint.rates[kind as usize]) * share);
+                        changes.request(i, kind, (to - joint.rates[kind as usize]) * share);
                     }
                 }
             }

@@ -220,12 +220,12 @@ setting! {
         /// Seed of the drops' places and directions.
         pub seed: u64 = 1;
         /// Number of drops that it has emitted.
-        pub made: u64 = 0;
+        pub emitted: u64 = 0;
         /// Fraction of the next drop that is due.
-        pub owed: f32 = 0.0, "drops" in OWED: 0.0..=1.0, "less than one drop";
+        pub due: f32 = 0.0, "drops" in DUE: 0.0..=1.0, "less than one drop";
         /// Whether the last substep would have emitted more than [`Shower::MAX_DROPS`]; reported when
         /// this begins.
-        pub cut_short: bool = false;
+        pub is_limited: bool = false;
     }
 }
 
@@ -275,12 +275,12 @@ impl Shower {
     /// The drops of the next `seconds` in the head's frame (drops leave along −Z), at most
     /// [`Shower::MAX_DROPS`]. Settings must be valid.
     pub(super) fn make(&mut self, seconds: f32) -> impl Iterator<Item = Droplet> + use<> {
-        let owed = self.owed + self.rate * seconds;
-        self.owed = owed.fract();
-        self.cut_short = owed as u64 > Self::MAX_DROPS;
-        let count = (owed as u64).min(Self::MAX_DROPS);
-        let first = self.made;
-        self.made = first.wrapping_add(count);
+        let due = self.due + self.rate * seconds;
+        self.due = due.fract();
+        self.is_limited = due as u64 > Self::MAX_DROPS;
+        let count = (due as u64).min(Self::MAX_DROPS);
+        let first = self.emitted;
+        self.emitted = first.wrapping_add(count);
         let Self { drop_radius, speed, spread, opening, influence, seed, .. } = *self;
         (0..count).map(move |i| {
             let number = first.wrapping_add(i);

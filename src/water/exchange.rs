@@ -84,7 +84,7 @@ pub(super) fn run_showers(
                 Droplet { position, velocity, before: position, ..drop }
             })
             .collect();
-        if valid.cut_short && !shower.cut_short {
+        if valid.is_limited && !shower.is_limited {
             let message = format!(
                 "the shower's rate of {} drops/s makes more than {} in a substep of {} s: the rest is left \
                  out; lower `Shower::rate` or take a shorter fixed timestep",
@@ -94,7 +94,8 @@ pub(super) fn run_showers(
             );
             faults.write(HairFault::new(FaultKind::Setting, message).of(entity));
         }
-        (shower.made, shower.owed, shower.cut_short) = (valid.made, valid.owed, valid.cut_short);
+        (shower.emitted, shower.due, shower.is_limited) =
+            (valid.emitted, valid.due, valid.is_limited);
         if !drops.is_empty() {
             commands.spawn_batch(drops);
         }
@@ -307,7 +308,7 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
 /// the present shape by equation 16.
 fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChanges) {
     for (i, (b, wet)) in bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate() {
-        changes.ask(i, BondKind::Hydrogen, (1.0 - wet - b) * share);
+        changes.request(i, BondKind::Hydrogen, (1.0 - wet - b) * share);
     }
 }
 

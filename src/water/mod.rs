@@ -51,13 +51,13 @@ setting! {
         pub max: Vec3 = Vec3::splat(100.0), "m" in MAX: f32::NEG_INFINITY..=f32::INFINITY,
             "100 is far above; at least the lower corner";
         /// How long a drop lies on a collider before it is removed as run off.
-        pub lying: f32 = 2.0, "s" in LYING: 0.0..=f32::INFINITY, safe 0.0..=60.0,
+        pub resting_time: f32 = 2.0, "s" in RESTING_TIME: 0.0..=f32::INFINITY, safe 0.0..=60.0,
             "2 lets it run off";
         /// Whether drops that touch merge; in \[W\] they do not. Drips, which hair sheds, merge with what
         /// they touch in any case.
         pub merging: bool = true;
         /// Depth below all hair at which a falling drop is removed.
-        pub below: f32 = 5.0, "m" in BELOW: 0.0..=f32::INFINITY, safe 0.5..=100.0,
+        pub removal_depth: f32 = 5.0, "m" in REMOVAL_DEPTH: 0.0..=f32::INFINITY, safe 0.5..=100.0,
             "5 is below any floor that a character stands on";
     }
     then Self::check_corners

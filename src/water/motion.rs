@@ -64,7 +64,7 @@ pub(super) fn move_droplets(
     if step.index == 0 || lowest.is_none() {
         *lowest = lowest_of(&hairs, &strands, down);
     }
-    let lowest = lowest.map_or(f32::INFINITY, |lowest| lowest + rules.below);
+    let lowest = lowest.map_or(f32::INFINITY, |lowest| lowest + rules.removal_depth);
     let process = process.clamped().0;
     let world = TickPose::default();
     let obstacles: Vec<Obstacle> =
@@ -133,7 +133,7 @@ pub(super) fn move_droplets(
             drop.keep_in_range();
             *is_removed = !inside
                 || volumes.contain(drop.position)
-                || drop.lying > rules.lying
+                || drop.lying > rules.resting_time
                 || drop.volume < 1e-15;
         },
     );

@@ -45,10 +45,10 @@ fn a_haircut_by_another_strand_keeps_the_bonds_of_what_is_left() {
 #[test]
 fn requests_for_joints_that_no_strand_has_do_nothing() {
     let mut changes = BondChanges::default();
-    changes.ask(usize::MAX, BondKind::Hydrogen, -1.0);
-    changes.ask(100_000_000, BondKind::Hydrogen, -1.0);
+    changes.request(usize::MAX, BondKind::Hydrogen, -1.0);
+    changes.request(100_000_000, BondKind::Hydrogen, -1.0);
     assert!(changes.is_empty());
-    changes.ask(3, BondKind::Hydrogen, -1.0);
+    changes.request(3, BondKind::Hydrogen, -1.0);
     assert!(!changes.is_empty());
 }
 
@@ -59,7 +59,7 @@ fn requests_without_end_leave_bonds_finite() {
     run(&mut app, 0.1);
     for change in [f32::MAX, f32::MIN] {
         let mut changes = app.world_mut().get_mut::<BondChanges>(id).unwrap();
-        (0..3).for_each(|_| changes.ask(3, BondKind::Hydrogen, change));
+        (0..3).for_each(|_| changes.request(3, BondKind::Hydrogen, change));
         run(&mut app, 0.1);
         let bonds = app.world().get::<Bonds>(id).unwrap();
         assert!(bonds.joints.iter().all(|joint| joint.is_valid()), "{:?}", bonds.joints[3]);
@@ -68,15 +68,15 @@ fn requests_without_end_leave_bonds_finite() {
 
 #[test]
 fn a_shower_that_owes_too_much_is_reported_and_goes_on() {
-    for owed in [f32::NAN, 1e12, -1e12] {
+    for due in [f32::NAN, 1e12, -1e12] {
         let mut app = test_app(60.0);
-        let shower = Shower { owed, ..Shower::new(120.0, 1.5e-3).unwrap() };
+        let shower = Shower { due, ..Shower::new(120.0, 1.5e-3).unwrap() };
         app.world_mut().spawn((shower, Transform::from_xyz(0.0, 1.0, 0.0)));
         run(&mut app, 0.1);
         let drops = app.world_mut().query::<&Droplet>().iter(app.world()).count();
-        assert!((10..16).contains(&drops), "{drops} drops from {owed}");
+        assert!((10..16).contains(&drops), "{drops} drops from {due}");
         let reported = faults(&mut app);
-        assert!(matches!(&reported[..], [f] if f.message.contains("owed")), "{reported:?}");
+        assert!(matches!(&reported[..], [f] if f.message.contains("due")), "{reported:?}");
     }
 }
 
@@ -101,7 +101,7 @@ fn a_request_for_a_joint_beyond_the_tip_keeps_no_memory() {
     let (_, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
     run(&mut app, 0.1);
     let asked = |app: &App| format!("{:?}", app.world().get::<BondChanges>(id).unwrap()).len();
-    app.world_mut().get_mut::<BondChanges>(id).unwrap().ask(65_535, BondKind::Hydrogen, -1.0);
+    app.world_mut().get_mut::<BondChanges>(id).unwrap().request(65_535, BondKind::Hydrogen, -1.0);
     let before = asked(&app);
     run(&mut app, 0.1);
     assert!(asked(&app) < before / 1000, "{} after {before}", asked(&app));

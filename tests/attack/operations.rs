@@ -469,7 +469,7 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             if let Some(mut changes) = world.get_mut::<BondChanges>(strand) {
                 let far = [0, 3, 100, 65_535, 100_000_000, usize::MAX];
                 let joint = far[random.random_range(0..far.len())];
-                changes.ask(joint, BondKind::Hydrogen, wrong);
+                changes.request(joint, BondKind::Hydrogen, wrong);
             }
             format!("bonds by {wrong}")
         }
@@ -567,7 +567,7 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
         }
         (47, ..) => {
             let mut showers = world.query::<&mut Shower>();
-            showers.iter_mut(world).for_each(|mut shower| shower.owed = wrong);
+            showers.iter_mut(world).for_each(|mut shower| shower.due = wrong);
             format!("showers that owe {wrong}")
         }
         (48, _, _, Some(entity)) => insert_any(world, entity, random),

@@ -71,14 +71,14 @@ impl DistanceGrid {
     /// # }
     /// ```
     pub fn bake(vertices: &[Vec3], triangles: &[[u32; 3]], cell: f32) -> Result<Self, BakeError> {
-        Self::bake_as(vertices, triangles, &Bake { cell, openings: Openings::Refuse })
+        Self::bake_with(vertices, triangles, &Bake { cell, openings: Openings::Refuse })
     }
 
     /// The same for surfaces that are open.
     ///
     /// # Errors
     /// As [`bake`](Self::bake); openings are treated as `how` says.
-    pub fn bake_as(
+    pub fn bake_with(
         vertices: &[Vec3],
         triangles: &[[u32; 3]],
         how: &Bake,

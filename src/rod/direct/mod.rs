@@ -92,9 +92,10 @@ mod width;
 use super::{
     block::{BlockLanes, pulled},
     limiter::{TOLERANCE, clamp_lengths, limit_strained},
+    near::choose_near,
     obstacle::{NearObstacles, Obstacle},
     stiffness::REFERENCE_GRAVITY,
-    touch::{Grip, choose_near, contacts, contacts_with, predict_nodes},
+    touch::{Grip, contacts, contacts_with, predict_nodes},
 };
 use crate::lanes::{
     LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,

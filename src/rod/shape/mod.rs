@@ -344,6 +344,12 @@ impl Placed {
         self.shape.thickness() * self.scale
     }
 
+    /// A bounding ball (m).
+    pub(super) fn ball(&self) -> (Vec3, f32) {
+        let (middle, half) = self.shape.bounds();
+        (self.center + self.axes * middle * self.scale, half.length() * self.scale)
+    }
+
     /// The bounding box along the axes of the nodes: centre and half size (m).
     pub(super) fn bounds(&self) -> (Vec3, Vec3) {
         let (middle, half) = self.shape.bounds();

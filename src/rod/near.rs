@@ -1,0 +1,228 @@
+//! Which obstacles a node may touch in a substep.
+
+use super::{
+    block::BlockLanes,
+    obstacle::{NearObstacles, Obstacle},
+};
+use crate::lanes::{LANES, Lane, Real, V3, lanes_in, load, load3, put3, splat3};
+use fearless_simd::{Simd, f32x16, prelude::*};
+use glam::{Mat3A, Vec3};
+
+/// How far a node may move in a substep, as a multiple of the path by its velocity alone. More than 1,
+/// because forces of the substep act too.
+const FASTER: f32 = 1.5;
+
+/// The bits of all lanes.
+const ALL: u64 = (1 << LANES) - 1;
+
+/// Safety factor on distances of balls, for rounding.
+const ROOM: f32 = 1.0001;
+
+/// Bounding balls of sixteen obstacles, grown by how far a node of the block may move with each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ObstacleBalls {
+    center: [Lane; 3],
+    radius: Lane,
+}
+
+impl ObstacleBalls {
+    /// Balls around `obstacles` for nodes in the ball around `center`.
+    fn collect(all: &mut Vec<Self>, obstacles: &[Obstacle], (center, radius): (Vec3, f32)) {
+        all.clear();
+        for obstacles in obstacles.chunks(LANES) {
+            let mut balls = Self::default();
+            for (lane, o) in obstacles.iter().enumerate() {
+                let (at, reach) = o.solid.ball();
+                // An affine displacement grows at most by its matrix' norm from the center on.
+                let moved = o.motion.map_or(0.0, |motion| {
+                    let [x, y, z] = (motion.matrix3 - Mat3A::IDENTITY).to_cols_array_2d();
+                    let norm = [x, y, z].as_flattened().iter().map(|m| m * m).sum::<f32>().sqrt();
+                    motion.transform_point3(center).distance(center) + norm * radius
+                });
+                put3(&mut balls.center, lane, at);
+                balls.radius[lane] = reach + moved;
+            }
+            all.push(balls);
+        }
+    }
+
+    /// Bits of those that may be within `reach` of `center`: all in doubt.
+    #[inline(always)]
+    fn near<S: Simd>(&self, center: V3<f32x16<S>>, reach: f32x16<S>) -> u64 {
+        let off = load3(reach.simd, &self.center) - center;
+        let limit = (load(reach.simd, &self.radius) + reach) * f32x16::splat(reach.simd, ROOM);
+        !Real::lt(limit * limit, off.dot(off)).to_bitmask() & ALL
+    }
+}
+
+/// Finds the obstacles that each node may touch in a substep of `dt`, so that its passes skip the
+/// others: on a head of dozens of solids most nodes are near one or none. `from` of held nodes must
+/// be set.
+#[inline(never)]
+pub(crate) fn choose_near<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    dt: f32,
+    clearance: f32,
+    obstacles: &[Obstacle],
+) {
+    if obstacles.is_empty() {
+        // The block may have held other strands before, which rested on something.
+        b.nodes.iter_mut().for_each(|n| n.rests_on = Default::default());
+        return;
+    }
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let zero = f32x16::splat(simd, 0.0);
+            // Held nodes drag others beyond their ballistic path; forces move nodes by at most about
+            // an edge.
+            let mut pull = zero;
+            for n in &b.nodes {
+                let led = load3(simd, &n.p) - load3(simd, &n.from);
+                let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+                pull = Real::max(pull, Real::select(held, led.dot(led), zero));
+            }
+            let mut edge = zero;
+            for e in &b.edges {
+                edge = Real::max(edge, load(simd, &e.l));
+            }
+            let margin = Real::sqrt(pull) + edge + f32x16::splat(simd, clearance);
+            let ahead = f32x16::splat(simd, FASTER * dt);
+            let whole = ball_around(simd, b);
+            ObstacleBalls::collect(&mut b.obstacle_balls, obstacles, whole);
+            for (n, near) in b.nodes.iter_mut().zip(&mut b.near_obstacles) {
+                n.rests_on = Default::default();
+                let (p, v) = (load3(simd, &n.p), load3(simd, &n.v));
+                let reach = Real::mul_add(Real::sqrt(v.dot(v)), ahead, margin);
+                *near = NearObstacles::NONE;
+                // A ball around the node in all lanes excludes most.
+                let center = middle(p);
+                let off = p - splat3(simd, center);
+                let radius = off.dot(off).reduce_max().sqrt() + reach.reduce_max();
+                let (center, radius) = (splat3(simd, center), f32x16::splat(simd, radius));
+                for (balls, first) in b.obstacle_balls.iter().zip((0..).step_by(LANES)) {
+                    for lane in lanes_in(balls.near(center, radius)) {
+                        let Some(o) = obstacles.get(first + lane) else { break };
+                        let mut reach = reach;
+                        if o.motion.is_some() {
+                            let moved = o.moved_with(p) - p;
+                            reach += Real::sqrt(moved.dot(moved));
+                        }
+                        if o.solid.is_beyond(p, reach).any_false() {
+                            near.add(first + lane);
+                        }
+                    }
+                }
+            }
+        },
+    );
+}
+
+/// The mean over all lanes: not finite if one of them is not.
+#[inline(always)]
+fn middle<S: Simd>(p: V3<f32x16<S>>) -> Vec3 {
+    Vec3::new(p.x.reduce_sum(), p.y.reduce_sum(), p.z.reduce_sum()) / LANES as f32
+}
+
+/// A ball around all nodes of a block.
+#[inline(always)]
+fn ball_around<S: Simd>(simd: S, b: &BlockLanes) -> (Vec3, f32) {
+    let center = b.nodes.get(b.nodes.len() / 2).map_or(Vec3::ZERO, |n| middle(load3(simd, &n.p)));
+    let endless = f32x16::splat(simd, f32::INFINITY);
+    let mut farthest = f32x16::splat(simd, 0.0);
+    for n in &b.nodes {
+        let off = load3(simd, &n.p) - splat3(simd, center);
+        let squared = off.dot(off);
+        // Without an end where a node is not finite: that excludes nothing.
+        let squared = Real::select(Real::lt(squared, endless), squared, endless);
+        farthest = Real::max(farthest, squared);
+    }
+    (center, farthest.reduce_max().sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::{
+        obstacle::Solid,
+        shape::{Placed, fixture::all_shapes},
+    };
+    use fearless_simd::{Level, dispatch};
+    use glam::{Affine3A, Mat3, Quat, Vec3};
+    use proptest::prelude::*;
+
+    fn vector(size: f32) -> impl Strategy<Value = Vec3> {
+        [-size..size, -size..size, -size..size].prop_map(Vec3::from)
+    }
+
+    fn obstacle() -> impl Strategy<Value = Obstacle> {
+        let shape = (0usize..7, vector(0.2), vector(0.2), 0.002f32..0.1);
+        let motion = proptest::option::of((vector(0.02), vector(0.1)));
+        (shape, motion).prop_map(|((which, a, b, radius), motion)| {
+            let solid = match which {
+                0 => Solid::HalfSpace { normal: b.normalize_or(Vec3::Y), point: a },
+                1 => Solid::Capsule { a, b, radius },
+                2 => Solid::Cylinder {
+                    center: a,
+                    axis: b.normalize_or(Vec3::Y),
+                    radius,
+                    half_height: 2.0 * radius,
+                },
+                other => Solid::Placed(Placed {
+                    shape: all_shapes()[other - 3].clone(),
+                    center: a,
+                    axes: Mat3::from_quat(Quat::from_scaled_axis(20.0 * b)),
+                    scale: 10.0 * radius,
+                }),
+            };
+            let turned = |v: Vec3| Affine3A::from_quat(Quat::from_scaled_axis(v));
+            let motion = motion.map(|(way, turn)| Affine3A::from_translation(way) * turned(turn));
+            Obstacle { solid, motion, friction: 0.3 }
+        })
+    }
+
+    proptest! {
+        /// No node can reach an obstacle that was left out.
+        #[test]
+        fn no_obstacle_within_reach_is_left_out(
+            obstacles in proptest::collection::vec(obstacle(), 1..80),
+            nodes in proptest::collection::vec((vector(0.2), vector(3.0)), 2..6),
+            ways in proptest::collection::vec(vector(1.0), 8),
+            led in vector(0.05),
+        ) {
+            let (dt, clearance, length) = (1.0 / 180.0, 1e-3, 0.01);
+            let mut b = BlockLanes::default();
+            b.resize(nodes.len());
+            for (n, (p, v)) in b.nodes.iter_mut().zip(&nodes) {
+                n.p = p.to_array().map(|x| [x; LANES]);
+                n.v = v.to_array().map(|x| [x; LANES]);
+                n.w = [1.0; LANES];
+            }
+            b.edges.iter_mut().for_each(|e| e.l = [length; LANES]);
+            // The root is held; one lane lies elsewhere.
+            b.nodes[0].w = [0.0; LANES];
+            b.nodes[0].from = (nodes[0].0 - led).to_array().map(|x| [x; LANES]);
+            b.nodes[1].p[1][7] += 0.1;
+            dispatch!(Level::new(), simd => choose_near(simd, &mut b, dt, clearance, &obstacles));
+            for (n, near) in b.nodes.iter().zip(&b.near_obstacles) {
+                for lane in [0, 7] {
+                    let at = |c: &[[f32; LANES]; 3]| Vec3::from_array(c.map(|c| c[lane]));
+                    let (p, v) = (at(&n.p), at(&n.v));
+                    let reach = v.length() * dt + length + led.length();
+                    for o in obstacles.iter().filter(|o| near.of(&obstacles).all(|n| !core::ptr::eq(n, *o))) {
+                        // Also when the node moves with the obstacle.
+                        let starts = [p, o.motion.map_or(p, |m| m.transform_point3(p))];
+                        for start in starts {
+                            for way in &ways {
+                                let to = start + way.normalize_or_zero() * reach;
+                                let depth = o.solid.depth(V3::new(to.x, to.y, to.z), clearance).1;
+                                prop_assert!(depth < 1e-6, "{o:?}: {depth} m deep at {to}");
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
