@@ -182,6 +182,20 @@ mod tests {
         })
     }
 
+    #[test]
+    fn chosen_obstacles_come_in_their_order_and_those_128_apart_share_a_bit() {
+        let solid = |i: usize| Solid::Capsule { a: Vec3::X * i as f32, b: Vec3::ZERO, radius: 1.0 };
+        let obstacles: Vec<_> =
+            (0..300).map(|i| Obstacle { solid: solid(i), motion: None, friction: 0.0 }).collect();
+        let mut near = NearObstacles::NONE;
+        [130, 1, 127, 299].into_iter().for_each(|i| near.add(i));
+        let chosen: Vec<_> = near.of(&obstacles).map(|o| o.solid.clone()).collect();
+        let expected = [1, 2, 43, 127, 129, 130, 171, 255, 257, 258, 299];
+        assert_eq!(chosen, expected.map(solid));
+        assert_eq!(NearObstacles::NONE.of(&obstacles).count(), 0);
+        assert_eq!(NearObstacles::ALL.of(&obstacles).count(), 300);
+    }
+
     proptest! {
         /// No node can reach an obstacle that was left out.
         #[test]

@@ -333,6 +333,15 @@ pub(super) fn continuous_collision<S: Simd>(
     if fast.to_bitmask() == 0 {
         return None;
     }
+    // A node that stays on its side of a ball's centre has not passed it.
+    if let Solid::Capsule { a, b, .. } = obstacle.solid
+        && a == b
+    {
+        let center = splat(p.x, a);
+        if Real::lt(lit(0.0), (p - center).dot(start - center)).all_true() {
+            return None;
+        }
+    }
     // Nor do those that begin farther from it than they go.
     let reach = Real::sqrt(way_squared) + lit(clearance + 1e-3 * thickness);
     if obstacle.solid.is_beyond(start, reach).all_true() {
