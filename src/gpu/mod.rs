@@ -32,7 +32,24 @@
 //! | `wgsl/` | the mathematics, file by file the twins of `rod::direct`, `rod`, `bond` and `environment` |
 //!
 //! A thread takes its strand from root to tip in the CPU's order, without barriers and without atomics of
-//! floats: the same device gives the same bits every time. Its scratch is in memory, 128 bytes a node.
+//! floats: the same device gives the same bits every time.
+//!
+//! # Where scratch lies
+//!
+//! In memory, 128 bytes a node, of which an elimination fills 96 on the way down and reads them once on the way
+//! up. A variant with scratch in workgroup memory is not there, because it does not fit: 32 strands of 16 nodes
+//! need 64 KiB, of 9 nodes 36, and devices guarantee 16 and have 32 to 64. Four strands of 32 nodes would fill
+//! the 16, which leaves 28 of 32 threads idle. Where 64 KiB are there, as on RDNA 2 with 128 for four SIMDs, two
+//! groups would fill them: half a wave a SIMD in place of the eight that hide the latency of memory now. Nothing
+//! of it is read twice before it is written again, so that workgroup memory would save no more than a cache does.
+//!
+//! # Levels of detail
+//!
+//! Which strands follow which guides is decided on the CPU, by where strands are. So hair whose level changes
+//! returns for a tick, two where the game does not wait for it ([`HairGpu::blocking`]), and goes back with its new
+//! guides; a [`HairBudget`](crate::HairBudget) does not count it meanwhile. Levels that change no more than
+//! substeps change on the GPU. Hair at a level without simulated strands stays on the CPU, where it costs next to
+//! nothing.
 //!
 //! # What it costs
 //!
