@@ -178,8 +178,8 @@ setting! {
     #[reflect(Resource, Default, Clone, PartialEq)]
     pub struct HairGpu {
         /// Whether a software device counts. It is slower than the CPU by itself; tests want it. Mesa's ends all
-        /// loops of eight strands after 65,535 passes together: strands of some hundred nodes that begin deep in a
-        /// collider are not finished there, which no graphics card does to them.
+        /// loops of eight strands after 65,535 passes together: a substep of long strands that begin deep in
+        /// colliders is not finished there, which no graphics card does to them.
         pub software: bool = false;
         /// Whether the tick waits for hair that comes back, where it otherwise rests on its head for some
         /// frames. For tests and loading screens.
