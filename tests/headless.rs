@@ -111,6 +111,26 @@ fn the_papers_projections_keep_the_same_shares() {
     near(&dried, "relaxed_error", 0.0, 1e-3);
 }
 
+/// What it comes to there tests/gpu compares, with fewer strands.
+#[cfg(feature = "gpu")]
+#[test]
+fn a_scene_runs_on_a_graphics_device_and_says_so() {
+    let out = headless(&["--scene", "perm", "--seconds", "1", "--gpu", "--json"]);
+    let text = String::from_utf8_lossy(&out.stderr);
+    if text.contains("Unable to find a GPU") {
+        println!("skipped: no graphics driver");
+        return;
+    }
+    assert!(out.status.success(), "{text}");
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(report["residence"], "gpu");
+    assert_eq!(report["finite"], true);
+    // Of 60, less those in which its kernels were compiled.
+    let (ticks, frames) = (number(&report, "gpu_ticks"), number(&report, "frames"));
+    assert!(ticks > 30.0 && ticks <= frames, "{ticks} of {frames}");
+    assert!(!report["adapter"].as_str().unwrap().is_empty());
+}
+
 fn swing(from: &str, segments: &str, more: &[&str]) -> Value {
     let strand = ["--scene", "swing", "--length", "0.2", "--bending-length", "0.13", "--json"];
     let out = headless(&[&strand, &["--from", from, "--segments", segments][..], more].concat());

@@ -237,6 +237,7 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
             treatments.bypass_change_detection().acting_mut().clear();
         }
     }
-    world.insert_batch(members.into_iter().map(|member| (member, OnGpu::HANDED_OVER)));
+    // From the last one on: rows of a table are taken out at its end, so that no other row moves.
+    world.insert_batch(members.into_iter().rev().map(|member| (member, OnGpu::HANDED_OVER)));
     Ok(())
 }

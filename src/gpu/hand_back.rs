@@ -14,7 +14,7 @@ use super::{
 use crate::{
     bond::Bonds,
     fault::{FaultKind, HairFault},
-    lod::{Follower, Guides},
+    lod::{Follower, Guides, PresentLod},
     render::DrawnElsewhere,
     sleep::Disturbance,
     strand::{OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, StrandsArrived},
@@ -31,7 +31,7 @@ use bevy::{
 const TOLD_FOR: u32 = 60;
 
 /// Seconds for which hair that has returned stays.
-const STAYS_FOR: f32 = 1.0;
+pub(super) const STAYS_FOR: f32 = 1.0;
 
 /// Returns a hair to the CPU as soon as its state is there.
 pub(super) fn request_return(world: &mut World, hair: Entity, why: WhyCpu, is_blocking: bool) {
@@ -97,11 +97,12 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     let followed = entity.get::<GpuJournal>().map_or(0.0, |journal| journal.followed);
     entity.remove::<(GpuJournal, OnGpu, Disturbance, DrawnElsewhere)>();
     // Where its level has changed it goes back as soon as strands are guides and followers anew.
-    let stays = match why {
-        WhyCpu::Unsupported(Unsupported::LevelOfDetail) => 0.0,
-        _ => STAYS_FOR,
-    };
+    let goes_back = why == WhyCpu::Unsupported(Unsupported::LevelOfDetail);
+    let stays = if goes_back { 0.0 } else { STAYS_FOR };
     entity.insert((HairResidence::Cpu(why), StaysOnCpu(stays)));
+    if let Some(mut lod) = entity.get_mut::<PresentLod>() {
+        lod.bypass_change_detection().set_leaving(goes_back);
+    }
     if let Some(mut guides) = entity.get_mut::<Guides>() {
         guides.bypass_change_detection().look_again();
     }

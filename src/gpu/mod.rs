@@ -32,7 +32,24 @@
 //! | `wgsl/` | the mathematics, file by file the twins of `rod::direct`, `rod`, `bond` and `environment` |
 //!
 //! A thread takes its strand from root to tip in the CPU's order, without barriers and without atomics of
-//! floats: the same device gives the same bits every time. Its scratch is in memory, 128 bytes a node.
+//! floats: the same device gives the same bits every time.
+//!
+//! # Where scratch lies
+//!
+//! In memory, 128 bytes a node, of which an elimination fills 96 on the way down and reads them once on the way
+//! up. A variant with scratch in workgroup memory is not there, because it does not fit: 32 strands of 16 nodes
+//! need 64 KiB, of 9 nodes 36, and devices guarantee 16 and have 32 to 64. Four strands of 32 nodes would fill
+//! the 16, which leaves 28 of 32 threads idle. Where 64 KiB are there, as on RDNA 2 with 128 for four SIMDs, two
+//! groups would fill them: half a wave a SIMD in place of the eight that hide the latency of memory now. The rows
+//! of the elimination are read once before they are written again, so that there is little to be saved.
+//!
+//! # Levels of detail
+//!
+//! Which strands follow which guides is decided on the CPU, by where strands are. So hair whose level changes
+//! returns for a tick, or for the frames that its state takes where the game does not wait for it
+//! ([`HairGpu::blocking`]), and goes back with its new guides; a [`HairBudget`](crate::HairBudget) does not count
+//! it meanwhile. Levels that change no more than substeps change on the GPU. Hair at a level without simulated
+//! strands stays on the CPU, where it costs next to nothing.
 //!
 //! # What it costs
 //!
@@ -40,7 +57,7 @@
 //!
 //! | kernel | runs | instructions | vector registers | waves a SIMD |
 //! |---|---|---|---|---|
-//! | `substep` | a substep | 10,956 | 128 | 8 |
+//! | `substep` | a substep | 18,180 | 128 | 8 |
 //! | `follow` | a substep, of followers | 992 | 56 | 18 |
 //! | `lead` | a substep, of led nodes | 45 | 16 | 32 |
 //! | `lead_followers` | a tick, of led roots | 28 | 16 | 32 |
@@ -48,11 +65,12 @@
 //! | `measure` | a frame | 275 | 24 | 32 |
 //! | `present` | a frame | 380 | 32 | 32 |
 //!
-//! None spills. Per segment and substep, of hair that touches nothing, each loop counted whole: load 158, air 151,
-//! rest shape 173, masses 53, prediction 126, search for whips 37, Newton step down 677 and up 135, limiter 181,
-//! frames and twist 265, check 49: about 2,000. A second Newton step, of strands that touch or are fast, adds 830. In
-//! these loops 1,030 bytes of a node are read and 480 written; its state is 160 of the one and 80 of the other, the
-//! rest is scratch and places read again, which a cache may hold.
+//! None spills. About 7,000 of `substep` are ellipsoids, wherever a node may touch a collider. Per segment and
+//! substep, of hair that touches nothing, each loop counted whole: load 158, air 151, rest shape 173, masses 53,
+//! prediction 126, search for whips 37, Newton step down 677 and up 135, limiter 181, frames and twist 265, check
+//! 49: about 2,000. A second Newton step, of strands that touch or are fast, adds 830. In these loops 1,030 bytes
+//! of a node are read and 480 written; its state is 160 of the one and 80 of the other, the rest is scratch and
+//! places read again, which a cache may hold.
 //!
 //! Of the others per node: `present` 182 instructions, 68 bytes read and 32 written; `measure` 97, 36 read; `sleep` 73,
 //! 56 read, and 23 more with 32 written of a strand that is not still; `follow` 29 a substep with 28 read and 48

@@ -101,6 +101,13 @@ impl HairKernels {
         Self::of(layouts, pipelines)
     }
 
+    /// The same with another substep, for tests of what it is made of: source with the bindings and entry
+    /// points of [`SOURCE`].
+    pub fn with_substep(self, device: &RenderDevice, source: &str) -> Self {
+        let substep = pipeline(device, "substep", source, &[&self.hair, &self.record]);
+        Self { substep, ..self }
+    }
+
     /// Of what [`layouts`] and [`KERNELS`] list.
     pub(super) fn of(
         layouts: [BindGroupLayout; GROUPS],

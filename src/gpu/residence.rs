@@ -105,7 +105,8 @@ pub enum Unsupported {
     Winding,
     /// Roots that are being tied to a mesh.
     MovingRoots,
-    /// A level of detail at which no strand is simulated, or a change of which strands are.
+    /// A level of detail at which no strand is simulated, or a change of which strands are. A level that a
+    /// [`HairBudget`](crate::HairBudget) gives it does not keep it: it goes at that of its size on the screen.
     LevelOfDetail,
     /// It is still [`Settling`](crate::Settling).
     Settling,
@@ -176,7 +177,9 @@ setting! {
     #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Resource, Default, Clone, PartialEq)]
     pub struct HairGpu {
-        /// Whether a software device counts. It is slower than the CPU by itself; tests want it.
+        /// Whether a software device counts. It is slower than the CPU by itself; tests want it. Mesa's ends all
+        /// loops of eight strands after 65,535 passes together: a substep of long strands that begin deep in
+        /// colliders is not finished there, which no graphics card does to them.
         pub software: bool = false;
         /// Whether the tick waits for hair that comes back, where it otherwise rests on its head for some
         /// frames. For tests and loading screens.

@@ -94,6 +94,13 @@ impl Support<'_, '_> {
         Some(held)
     }
 
+    /// Whether a hair that only its level of detail keeps would go without the
+    /// [`HairBudget`](crate::HairBudget).
+    pub(super) fn wants_simulation(&self, hair: Entity) -> bool {
+        let Ok((.., lod, _, _, _, _)) = self.hairs.get(hair) else { return false };
+        lod.is_some_and(|(lod, _)| lod.wants_simulation())
+    }
+
     /// The first reason of a hair.
     pub(super) fn missing(&self, hair: Entity) -> Option<Unsupported> {
         let (frame, obstacles, wet, lod, settles, is_watched, treatments, members) =
@@ -124,16 +131,19 @@ impl Support<'_, '_> {
                 Unsupported::ColliderShape,
             ),
             (is_being_tied, Unsupported::MovingRoots),
-            (
-                lod.is_some_and(|(lod, guides)| {
-                    let count = members.map_or(0, |members| members.len());
-                    lod.simulated_share() <= 0.0 || !guides.suit(lod, count)
-                }),
-                Unsupported::LevelOfDetail,
-            ),
             (settles, Unsupported::Settling),
             (is_watched, Unsupported::WatchedStyle),
             (treatments.is_some_and(GpuTreatments::are_too_many), Unsupported::Treatments),
+            // The last: where nothing else is missing the budget lets go of it.
+            (
+                lod.is_some_and(|(lod, guides)| {
+                    let count = members.map_or(0, |members| members.len());
+                    lod.simulated_share() <= 0.0
+                        || lod.budget_levels > 0
+                        || !guides.suit(lod, count)
+                }),
+                Unsupported::LevelOfDetail,
+            ),
         ];
         reasons.into_iter().find(|(is_there, _)| *is_there).map(|(_, what)| what)
     }

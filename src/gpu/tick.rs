@@ -3,7 +3,7 @@
 use super::{
     compile::{AppDevice, Ready},
     hair::{GpuHair, StaysOnCpu, hand_over},
-    hand_back::{fetch_strands, request_return},
+    hand_back::{STAYS_FOR, fetch_strands, request_return},
     record::GpuJournal,
     residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu},
     support::Support,
@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     contact::HairReach,
+    lod::PresentLod,
     schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings},
     strand::{AskForStrands, Hair, MissedOnGpu, Strand, StrandOf, Strands},
@@ -27,6 +28,8 @@ use bevy::{
 pub(super) enum Decision {
     /// It goes to the device.
     Goes(Ready),
+    /// It goes as soon as its level of detail is that which it has without the budget.
+    Waits,
     /// Strands begin to be wound: where they are has to be known.
     Winds,
     /// It returns to the CPU.
@@ -97,7 +100,7 @@ pub(super) fn decide(
     };
     let seconds = step.dt * step.count as f32;
     let checkpoint = settings.clamped().checkpoint;
-    for (hair, _, on, stays, members, reach, journal) in &mut hairs {
+    for (hair, residence, on, stays, members, reach, journal) in &mut hairs {
         let wants = asked.of(hair) == SimulateOn::Gpu;
         let missing = || {
             let known = of_strands.get(&hair).copied().or_else(|| support.missing(hair));
@@ -120,8 +123,12 @@ pub(super) fn decide(
             } else {
                 missing()
             };
+            let waits = why == Some(WhyCpu::Unsupported(Unsupported::LevelOfDetail))
+                && *residence != HairResidence::Cpu(WhyCpu::TooLarge)
+                && support.wants_simulation(hair);
             let decision = match why.map_or_else(|| device.ready(), Err) {
                 Ok(ready) => Decision::Goes(ready),
+                Err(_) if waits && device.ready().is_ok() => Decision::Waits,
                 Err(why) => Decision::Stays(why),
             };
             decisions.push((hair, decision));
@@ -189,14 +196,24 @@ pub(super) fn decide(
 pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut World) {
     let is_blocking = world.resource::<HairGpu>().blocking;
     for (hair, decision) in decisions {
+        let lod = world.get_mut::<PresentLod>(hair);
+        let waits = matches!(decision, Decision::Waits);
+        let waited = lod.is_some_and(|mut lod| lod.bypass_change_detection().set_leaving(waits));
         let why = match decision {
             Decision::Goes(ready) => match hand_over(world, hair, &ready) {
                 Ok(()) => {
                     tracing::debug!("hair, entity {hair}: simulated on the GPU");
                     continue;
                 }
-                Err(why) => why,
+                Err(why) => {
+                    // Else the budget would take and let go of it in turn.
+                    if waited {
+                        world.entity_mut(hair).insert(StaysOnCpu(STAYS_FOR));
+                    }
+                    why
+                }
             },
+            Decision::Waits => WhyCpu::Unsupported(Unsupported::LevelOfDetail),
             Decision::Winds => {
                 begin_winding(world, hair);
                 continue;

@@ -36,6 +36,7 @@
 //! # A budget
 //!
 //! A [`HairBudget`] limits the time of all hair: beyond it the least important hair takes coarser levels.
+//! Hair on the GPU does not count; hair that goes there has the level of its size on the screen first.
 //!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
@@ -140,6 +141,10 @@ pub struct PresentLod {
     /// How many levels coarser it is because of the [`HairBudget`].
     pub budget_levels: usize,
     strands: Option<f32>,
+    /// The same at the level that it would have without a budget.
+    wanted_strands: Option<f32>,
+    /// Whether it is about to be simulated elsewhere: the budget does not count it.
+    is_leaving: bool,
     /// Segments of all its strands, and the number of strands when they were counted.
     segments: (usize, usize),
 }

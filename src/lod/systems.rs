@@ -85,7 +85,7 @@ fn choose(
             let held = if present.budget_levels > 0 { 1.0 + lod.hysteresis } else { 1.0 };
             let importance = share.0.max(0.0) * lod.importance / held;
             // On the GPU it costs this processor nothing, so nothing is won by making it coarser.
-            let costs = match on_gpu {
+            let costs = match on_gpu || present.is_leaving {
                 true => vec![0.0; wanted + 1],
                 false => costs(&lod.levels, segments, step.count),
             };
@@ -111,11 +111,14 @@ fn choose(
     }
     *exceeded = exceeds;
     for ((candidate, settings, present, limits), level) in chosen.iter_mut().zip(levels) {
-        let settings = level.checked_sub(1).and_then(|i| settings.get(i));
+        let settings_of = |level: usize| level.checked_sub(1).and_then(|i| settings.get(i));
+        let wanted_strands = settings_of(candidate.wanted).map(|l| l.strands);
+        let settings = settings_of(level);
         present.set_if_neq(PresentLod {
             level,
             budget_levels: level - candidate.wanted,
             strands: settings.map(|l| l.strands),
+            wanted_strands,
             ..**present
         });
         let limits_of =

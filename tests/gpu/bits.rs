@@ -4,7 +4,7 @@ use crate::lab::{Device, LabStrand, Random, plain};
 use bevy::{math::Isometry3d, prelude::*};
 use bevy_keratin::{
     bond::model::JointBonds,
-    gpu::{StrandState, SubstepRecord},
+    gpu::{MAX_OBSTACLES, StrandState, SubstepRecord},
     rod::obstacle::{Obstacle, Solid},
 };
 
@@ -110,6 +110,103 @@ fn what_is_no_number_stays_with_its_strand_and_is_counted_once() {
             assert_eq!(b.positions[0], sound[i].positions[0], "strand {i} keeps its root");
         } else {
             assert_eq!(bits(a), bits(b), "strand {i}");
+        }
+    }
+}
+
+#[test]
+fn obstacles_out_of_reach_change_no_bit_however_many() {
+    let Some(device) = Device::get() else { return };
+    // Above a floor and beside a wall, which they meet within a few substeps.
+    let mut random = Random(6);
+    let strand = |i: usize| {
+        let root = Vec3::new(0.004, 0.004, 0.01 * i as f32);
+        let way = Vec3::new(random.between(-0.2, 1.0), random.between(-0.1, 0.3), 1.0).normalize();
+        let point = |k: usize| (root + way * (0.012 * k as f32)).max(Vec3::new(0.002, 0.002, 0.0));
+        LabStrand::along(&(0..2 + i % 23).map(point).collect::<Vec<_>>())
+    };
+    let sound: Vec<LabStrand> = (0..70).map(strand).collect();
+    let walls = [Vec3::Y, Vec3::X].map(|normal| Obstacle {
+        solid: Solid::HalfSpace { normal, point: Vec3::ZERO },
+        motion: None,
+        friction: 0.4,
+    });
+    let far = Obstacle {
+        solid: Solid::Capsule { a: Vec3::X * 50.0, b: Vec3::X * 51.0, radius: 0.1 },
+        motion: None,
+        friction: 0.1,
+    };
+    let after = |obstacles: Vec<Obstacle>| {
+        let gravity = Vec3::new(-4.0, -9.8, 0.0);
+        let record = SubstepRecord { obstacles, gravity, ..plain() };
+        let states = device.run(&mut device.hand_over(&sound), &vec![record; 9]);
+        states.iter().map(bits).collect::<Vec<_>>()
+    };
+    let few = after(walls.to_vec());
+    for (count, at) in [(3, [0, 2]), (33, [31, 32]), (128, [0, 64]), (128, [45, 127])] {
+        let mut all = vec![far.clone(); count];
+        walls.iter().zip(at).for_each(|(wall, at)| all[at] = wall.clone());
+        assert!(after(all) == few, "{count}, {at:?}");
+    }
+    assert_eq!(MAX_OBSTACLES, 128);
+    // Each of the walls is met.
+    let [floor, wall] = walls;
+    assert!(after(vec![floor]) != few && after(vec![wall]) != few);
+}
+
+/// The tick makes no such record. Whatever a kernel makes of it: a substep later strands are whole.
+#[test]
+fn records_of_no_numbers_leave_strands_whole() {
+    type Spoil = fn(&mut SubstepRecord);
+    const NAN: f32 = f32::NAN;
+    let all: [(&str, Spoil); 14] = [
+        ("gravity", |r| r.gravity.y = NAN),
+        ("an infinite gravity", |r| r.gravity.y = f32::INFINITY),
+        ("dt", |r| r.dt = NAN),
+        ("wind", |r| r.wind.x = NAN),
+        ("keep", |r| r.keep = NAN),
+        ("carry", |r| r.carry = Some(Isometry3d::from_translation(Vec3::NAN))),
+        ("turn", |r| {
+            r.carry = Some(Isometry3d::from_rotation(Quat::from_xyzw(NAN, 0.0, 0.0, 1.0)))
+        }),
+        ("influence", |r| r.influence[0] = NAN),
+        ("change", |r| r.change = [NAN; 4]),
+        ("bending length", |r| r.bending_length = NAN),
+        ("damping", |r| r.damping = NAN),
+        ("skin", |r| r.skin = NAN),
+        ("an obstacle's place", |r| {
+            r.obstacles[1].solid = Solid::Capsule { a: Vec3::NAN, b: Vec3::NAN, radius: 0.06 };
+        }),
+        ("friction", |r| r.obstacles[0].friction = NAN),
+    ];
+    let Some(device) = Device::get() else { return };
+    let sound = strands(70);
+    let reach = |state: &StrandState| {
+        let far = state.positions.iter().map(|p| p.distance(state.positions[0]));
+        far.fold(0.0, f32::max)
+    };
+    let expected = device.run(&mut device.hand_over(&sound), &records(6));
+    for (what, spoil) in all {
+        let mut records = records(6);
+        spoil(&mut records[3]);
+        let mut on = device.hand_over(&sound);
+        let found = device.run(&mut on, &records);
+        let report = on.take_report(&device.device, &device.queue).unwrap();
+        println!("{what}: {} put back, {} rebuilt", report.put_back, report.rebuilt);
+        // Each once at most; to where the substep began, unless not even that is known.
+        assert!(report.put_back + report.rebuilt <= 70, "{what}: {report:?}");
+        let is_kept = report.rebuilt == 0;
+        assert!(is_kept || ["carry", "turn"].contains(&what), "{what}: {report:?}");
+        for (i, state) in found.iter().enumerate() {
+            let mut numbers = bits(state).into_iter().map(f32::from_bits);
+            assert!(numbers.all(f32::is_finite), "{what}: strand {i}");
+            let rates = state.joints.iter().flat_map(|joint| joint.rates);
+            assert!(rates.into_iter().all(|rate| (0.0..=1.0).contains(&rate)), "{what}");
+            assert_eq!(state.positions[0], sound[i].positions[0], "{what}: strand {i}");
+            // A root in a solid tears its strand, and so it does there.
+            let most = reach(&expected[i]).max(sound[i].lengths.iter().sum());
+            let reach = reach(state);
+            assert!(reach < 1.05 * most + 0.01, "{what}: strand {i} reaches {reach} m of {most}");
         }
     }
 }

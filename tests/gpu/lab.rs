@@ -4,7 +4,7 @@ use crate::offscreen::{has_adapter, windowless};
 use bevy::{
     math::Isometry3d,
     prelude::*,
-    render::renderer::{RenderDevice, RenderQueue},
+    render::renderer::{RenderAdapterInfo, RenderDevice, RenderQueue},
 };
 use bevy_keratin::{
     bond::model::{JointBonds, cuticle_factor},
@@ -241,6 +241,8 @@ pub struct Device {
     pub device: RenderDevice,
     pub queue: RenderQueue,
     pub kernels: HairKernels,
+    /// Whether it is a processor that plays one.
+    pub is_software: bool,
 }
 
 impl Device {
@@ -256,7 +258,9 @@ impl Device {
                 let device = app.world().resource::<RenderDevice>().clone();
                 let queue = app.world().resource::<RenderQueue>().clone();
                 let kernels = HairKernels::new(&device);
-                Device { device, queue, kernels }
+                let info = app.world().resource::<RenderAdapterInfo>();
+                let is_software = format!("{:?}", info.device_type) == "Cpu";
+                Device { device, queue, kernels, is_software }
             })
         });
         device.as_ref()

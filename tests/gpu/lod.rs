@@ -7,7 +7,7 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_keratin::{
-    HairEstimate, LodLevel,
+    HairEstimate, LodLevel, PresentLod,
     gpu::{HairResidence, Unsupported, WhyCpu},
     prelude::*,
     strand::StrandSleep,
@@ -141,7 +141,43 @@ pub fn a_budget_is_that_of_the_processor(stage: &mut Stage) {
     (0..4).for_each(|tick| turn_head(stage, tick));
     assert!(stage.is_on_gpu() && followers(stage) == 24, "{:?}", stage.residence());
     assert_eq!(*stage.app.world().resource::<HairEstimate>(), HairEstimate::default());
-    stage.app.insert_resource(HairBudget::default());
+    // Frozen by the budget, or only made coarser, it goes as soon as it may, at the level of its size, and stays.
+    for (milliseconds, coarse) in [(1e-6, 48), (0.1, 24)] {
+        let budget = HairBudget { milliseconds, ..default() };
+        stage.app.insert_resource(HairBudget::default());
+        grow(stage, SimulateOn::Cpu, curls(48, 7));
+        let hair = stage.hair;
+        stage.app.world_mut().entity_mut(hair).insert((levels(), HairScreenShare(1.0)));
+        stage.app.insert_resource(budget);
+        (0..4).for_each(|tick| turn_head(stage, tick));
+        let lod = |stage: &Stage| *stage.app.world().get::<PresentLod>(hair).unwrap();
+        assert!(lod(stage).budget_levels > 0 && followers(stage) == coarse, "{:?}", lod(stage));
+        let estimate = |stage: &Stage| *stage.app.world().resource::<HairEstimate>();
+        assert!(estimate(stage).present > 0.0);
+        stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);
+        let mut away = 0;
+        for tick in 4..30 {
+            // Smaller on the way, which costs another visit to the CPU.
+            let share = if tick < 14 { 1.0 } else { 0.4 };
+            stage.app.world_mut().entity_mut(hair).insert(HairScreenShare(share));
+            turn_head(stage, tick);
+            away += usize::from(!stage.is_on_gpu());
+        }
+        println!("{milliseconds} ms: {away} of 26 ticks on the CPU");
+        assert!(away <= 4 && stage.is_on_gpu(), "{away}: {:?}", stage.residence());
+        assert_eq!((lod(stage).budget_levels, followers(stage)), (0, 24));
+        assert_eq!(estimate(stage), HairEstimate::default());
+        // What cannot go for another reason has what the budget leaves it.
+        let parts = (LockContact::default(), HairScreenShare(1.0));
+        stage.app.world_mut().entity_mut(hair).insert(parts);
+        (30..36).for_each(|tick| turn_head(stage, tick));
+        let contact = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::StrandContact));
+        assert_eq!(stage.residence(), contact);
+        assert!(estimate(stage).present > 0.0 && lod(stage).budget_levels > 0);
+        stage.app.insert_resource(HairBudget::default());
+        (36..38).for_each(|tick| turn_head(stage, tick));
+        assert_eq!(lod(stage).budget_levels, 0);
+    }
 }
 
 pub fn roots_of_followers_go_with_their_mesh(stage: &mut Stage) {

@@ -6,16 +6,21 @@ mod common;
 mod lab;
 #[path = "../common/offscreen.rs"]
 mod offscreen;
+#[path = "../../examples/scenes/mod.rs"]
+mod scenes;
 mod twin;
 
+mod bad;
 mod bits;
 mod closed_forms;
 mod cost;
 mod crossing;
+mod golden;
 mod journal;
 mod layout;
 mod led;
 mod lod;
+mod papers;
 mod pictures;
 mod present;
 mod probe;

@@ -1,7 +1,7 @@
 //! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
 use crate::{
-    crossing, led, lod, probe, shapes, sleep,
+    bad, crossing, led, lod, papers, probe, shapes, sleep,
     stage::{Stage, apart, curls, free},
 };
 use bevy::prelude::*;
@@ -36,7 +36,7 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 fn hair_goes_to_the_device_and_comes_home() {
     let Some(mut stage) = Stage::new(SimulateOn::Cpu, Vec::new()) else { return };
     stage.compile();
-    let all: [fn(&mut Stage); 29] = [
+    let all: [fn(&mut Stage); 34] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
@@ -49,6 +49,9 @@ fn hair_goes_to_the_device_and_comes_home() {
         a_teleported_head_takes_its_hair_along_at_rest,
         hairdos_are_asked_for_and_arrive,
         broken_strands_are_put_back_and_told_of_once,
+        bad::what_is_no_number_counts_as_on_the_processor_and_is_told_of_once,
+        bad::what_a_game_spoils_is_mended_and_goes_back,
+        bad::a_target_that_is_no_number_leads_nothing,
         closed_forms_hold_through_the_app,
         led::roots_on_a_mesh_go_with_it_there,
         led::held_nodes_are_led_there_and_let_go,
@@ -62,10 +65,12 @@ fn hair_goes_to_the_device_and_comes_home() {
         shapes::a_cantilever_sags_as_on_the_processor,
         sleep::it_sleeps_when_the_last_strand_would,
         sleep::asleep_it_has_no_substeps,
+        sleep::asleep_its_nodes_are_not_drawn_anew,
         sleep::whatever_disturbs_it_wakes_it_in_the_same_tick,
         sleep::sleep_is_the_same_however_many_ticks_a_frame,
         sleep::hair_with_followers_sleeps_as_well,
         sleep::a_pause_is_caught_up_with_in_some_frames,
+        papers::the_papers_scenes_keep_there_what_they_keep_on_the_processor,
     ];
     for one in all {
         let start = std::time::Instant::now();

@@ -4,11 +4,22 @@ use crate::{
     residence::grow,
     stage::{Stage, apart, curls},
 };
-use bevy::{ecs::system::RunSystemOnce, prelude::*};
+use bevy::{
+    ecs::system::RunSystemOnce,
+    prelude::*,
+    render::{
+        RenderApp,
+        render_asset::RenderAssets,
+        render_resource::{Buffer, BufferDescriptor, BufferUsages, MapMode, PollType},
+        renderer::{RenderDevice, RenderQueue},
+        storage::GpuShaderBuffer,
+    },
+};
 use bevy_keratin::{
     LodLevel, Sleepers,
     gpu::{GpuJournal, HairResidence},
     prelude::*,
+    render::HairBuffers,
 };
 
 /// Curls that come to rest soon.
@@ -87,6 +98,71 @@ pub fn asleep_it_has_no_substeps(stage: &mut Stage) {
     stage.app.insert_sub_app(bevy::render::RenderApp, render);
     stage.run(2);
     assert!(stage.is_on_gpu());
+}
+
+/// The buffer that drawing reads, as it is on the device.
+fn drawn(stage: &Stage) -> Buffer {
+    let nodes = stage.app.world().get::<HairBuffers>(stage.hair).unwrap().nodes.id();
+    let render = stage.app.sub_app(RenderApp).world();
+    let drawn = render.resource::<RenderAssets<GpuShaderBuffer>>().get(nodes).unwrap();
+    drawn.buffer.clone()
+}
+
+/// Its words, eight a node.
+fn words(stage: &Stage, nodes: &Buffer) -> Vec<[u32; 8]> {
+    let device = stage.app.world().resource::<RenderDevice>();
+    let back = device.create_buffer(&BufferDescriptor {
+        label: None,
+        size: nodes.size(),
+        usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&default());
+    encoder.copy_buffer_to_buffer(nodes, 0, &back, 0, nodes.size());
+    stage.app.world().resource::<RenderQueue>().submit([encoder.finish()]);
+    device.map_buffer(&back.slice(..), MapMode::Read, |mapped| mapped.unwrap());
+    device.poll(PollType::wait_indefinitely()).unwrap();
+    let bytes = back.slice(..).get_mapped_range().to_vec();
+    let words: Vec<u32> =
+        bytes.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
+    words.as_chunks::<8>().0.to_vec()
+}
+
+/// What is drawn stays as it was written when it fell asleep: whatever stands there in its place is left alone
+/// until it wakes.
+pub fn asleep_its_nodes_are_not_drawn_anew(stage: &mut Stage) {
+    resting(stage, SimulateOn::Gpu);
+    until_asleep(stage, 4);
+    stage.run(6);
+    assert!(sleepers(stage).all());
+    let nodes = drawn(stage);
+    let written = words(stage, &nodes);
+    let place = |node: &[u32; 8]| Vec3::from([node[0], node[1], node[2]].map(f32::from_bits));
+    let strands = stage.strands();
+    let places = strands.iter().flat_map(|strand| strand.positions());
+    assert_eq!(places.clone().count(), written.len());
+    for (node, expected) in written.iter().zip(places) {
+        assert!(place(node).distance(*expected) < 1e-6, "where it sleeps");
+        assert_eq!((node[6], node[7] & 0xffff), (0, 0), "it does not move");
+    }
+    let mark = |stage: &Stage| {
+        let marks = vec![0x3f; nodes.size() as usize];
+        stage.app.world().resource::<RenderQueue>().write_buffer(&nodes, 0, &marks);
+    };
+    mark(stage);
+    stage.run(3);
+    assert!(sleepers(stage).all());
+    assert!(words(stage, &nodes).iter().flatten().all(|word| *word == 0x3f3f_3f3f));
+    // So it is with hair that is awake.
+    stage.app.insert_resource(HairGravity(Vec3::NEG_Y * 5.0));
+    stage.run(2);
+    let awake = words(stage, &nodes);
+    for (node, before) in awake.iter().zip(&written) {
+        assert!(place(node).distance(place(before)) < 0.01, "{}", place(node));
+    }
+    mark(stage);
+    stage.run(1);
+    assert!(words(stage, &nodes).iter().flatten().all(|word| *word != 0x3f3f_3f3f));
 }
 
 pub fn whatever_disturbs_it_wakes_it_in_the_same_tick(stage: &mut Stage) {

@@ -15,6 +15,10 @@ use bevy_keratin::{
 const THETA: f64 = 0.65;
 const HOLD: f64 = 100.0;
 const FIRMNESS: f64 = 0.95;
+const FOLDING: f64 = 0.125;
+const TOLERANCE: f64 = 5e-4;
+const TORN: f64 = 0.01;
+const REPAIRS: u32 = 4;
 const GRAVITY: f64 = 9.8_f32 as f64;
 
 fn d(v: Vec3) -> DVec3 {
@@ -81,6 +85,8 @@ pub struct Twin {
     drying: Vec<f64>,
     touched: bool,
     sweeps: bool,
+    /// Rounds in which it got out of what it was deep in.
+    pub rounds: usize,
 }
 
 impl Twin {
@@ -108,6 +114,7 @@ impl Twin {
             drying: vec![0.0; edges],
             touched: false,
             sweeps: false,
+            rounds: 0,
         }
     }
 
@@ -152,11 +159,15 @@ impl Twin {
         }
         self.contacts(r, 1.0 + HOLD, 1.0);
         for pass in 0..r.limiter_steps {
-            if !self.limit(if pass == 0 { -1.0 } else { 5e-4 }) {
+            if !self.limit(if pass == 0 { -1.0 } else { TOLERANCE }) {
                 break;
             }
             self.contacts(r, 1.0, 1.0);
-            if pass + 1 == r.limiter_steps && self.clamp_lengths(0.01) {
+            let repairs = if pass + 1 == r.limiter_steps { REPAIRS } else { 0 };
+            for _ in 0..repairs {
+                if !self.clamp_lengths(TORN) {
+                    break;
+                }
                 self.contacts(r, 1.0, 1.0);
             }
         }
@@ -290,8 +301,9 @@ impl Twin {
         if self.l[0] * 0.25 < deepest {
             self.sweeps = false;
             for _ in 0..2 * self.edges() {
+                self.rounds += 1;
                 self.contacts(r, 0.0, 0.0);
-                if !self.limit(0.01) {
+                if !self.limit(TORN) {
                     return;
                 }
             }
@@ -342,8 +354,9 @@ impl Twin {
         let mut h = vec![DMat3::ZERO; edges];
         let mut coupled = vec![DMat3::ZERO; edges];
         let mut pull = vec![DVec3::ZERO; edges];
-        let (mut q_before, mut t_before, mut turn_before, mut r_before) =
-            (between, tangent(between), root_turn, 0.0);
+        let (mut q_before, mut t_before, mut r_before) = (between, tangent(between), 0.0);
+        // With twist, and without.
+        let (mut turn_before, mut swing_before) = (root_turn, root_turn);
         for j in 0..edges {
             let e = at[j + 1] - at[j];
             let (l, length, axial) = (self.l[j], e.length(), self.axial[j]);
@@ -358,12 +371,15 @@ impl Twin {
                 let cosine = e.length() + e.dot(t);
                 turn = e.cross(t) * (2.0 / (2.0 * e.length() * cosine).sqrt());
             }
-            let turn = if crushed { DVec3::ZERO } else { turn } + t * turn_before.dot(t);
+            let swing = if crushed { DVec3::ZERO } else { turn };
+            let turn = swing + t * turn_before.dot(t);
             self.q[j] = q;
             let tension = (axial * (length - l)).max(self.tension[j]).max(0.0);
             let k = self.k[j];
             let elastic = moment(q_before, q, self.rest[j], k);
-            let couple = elastic + (turn - turn_before) * (k * damped);
+            let rate = turn - turn_before;
+            let taken = rate.dot(swing - swing_before) / rate.length_squared().max(1e-30);
+            let couple = elastic + rate * (k * damped * taken.clamp(0.0, 1.0));
             let stiff = k * (1.0 + damped);
             let bent = |t: DVec3, r: f64| (DMat3::IDENTITY - outer(t, t)) * (stiff * r * r);
             let across = if crushed { axial } else { tension * inverse };
@@ -379,7 +395,8 @@ impl Twin {
                     * (stiff * inverse * r_before)
                     + cross_matrix((t + t_before) * twist);
             }
-            (q_before, t_before, turn_before, r_before) = (q, t, turn, inverse);
+            (q_before, t_before, r_before) = (q, t, inverse);
+            (turn_before, swing_before) = (turn, swing);
         }
         // Nodes 1 to n; the root is held.
         let size = 3 * edges;
@@ -447,6 +464,9 @@ impl Twin {
         let mut a = vec![vec![0.0; edges]; edges];
         for i in 0..edges {
             a[i][i] = mobile(i, t[i], t[i]) + mobile(i + 1, t[i], t[i]);
+            if off[i] < 0.0 {
+                a[i][i] *= 1.0 + FOLDING * (-off[i] / self.l[i] - TOLERANCE).max(0.0);
+            }
             if i > 0 {
                 let coupling = -mobile(i, t[i - 1], t[i]);
                 (a[i][i - 1], a[i - 1][i]) = (coupling, coupling);
@@ -455,7 +475,12 @@ impl Twin {
         let lambda = solve(a, off);
         for i in 0..edges {
             let next = if i + 1 < edges { t[i + 1] * lambda[i + 1] } else { DVec3::ZERO };
-            let force = next - t[i] * lambda[i];
+            let mut force = next - t[i] * lambda[i];
+            if i + 1 < edges {
+                let taut = (0.5 * (lambda[i] + lambda[i + 1])).max(0.0);
+                let stiff = taut * self.w(i + 1) / self.l[i];
+                force -= (t[i + 1] - t[i]) * (taut * stiff / (1.0 + stiff));
+            }
             let n = self.support[i + 1];
             let lift = force.dot(n);
             let force = if lift > 0.0 {

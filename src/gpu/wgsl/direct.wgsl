@@ -380,10 +380,8 @@ fn surface() {
         if is_held(n.w) {
             continue;
         }
-        for (var o = 0u; o < record.obstacles; o++) {
-            if is_near(o) {
-                deepest = max(deepest, depth_in(o, taken_along(o, n.xyz)).w);
-            }
+        for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
+            deepest = max(deepest, depth_in(o, taken_along(o, n.xyz)).w);
         }
     }
     if !(edge(0u).x * DEEP < deepest) {

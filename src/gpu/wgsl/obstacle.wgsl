@@ -18,6 +18,17 @@ fn is_near(o: u32) -> bool {
     return ((near[o >> 5u] >> (o & 31u)) & 1u) != 0u;
 }
 
+// The first of them from this one on; beyond all where there is none. Of many obstacles few are near.
+fn next_near(start: u32) -> u32 {
+    let word = vec4(0u, 1u, 2u, 3u);
+    let first = vec4(start >> 5u);
+    let from_it = near & select(vec4(0xffffffffu), vec4(0xffffffffu << (start & 31u)), word == first);
+    let left = select(from_it, vec4(0u), word < first);
+    let at = firstTrailingBit(left) + 32u * word;
+    let found = select(at, vec4(MAX_OBSTACLES), left == vec4(0u));
+    return min(min(found.x, found.y), min(found.z, found.w));
+}
+
 // Where a point of the surface goes during the substep.
 fn taken_along(o: u32, p: vec3<f32>) -> vec3<f32> {
     if record.obstacle[o].moves == 0u {
@@ -258,23 +269,19 @@ fn predict_nodes(dt: f32, gain: vec3<f32>) {
         }
         // What begins inside is set on the surface before the step, which gives it no velocity.
         var start = n.xyz;
-        for (var o = 0u; o < record.obstacles; o++) {
-            if is_near(o) {
-                let along = taken_along(o, start);
-                let out = push_out(o, along, along, 0.0, false);
-                if out.meets {
-                    start += out.place - along;
-                }
+        for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
+            let along = taken_along(o, start);
+            let out = push_out(o, along, along, 0.0, false);
+            if out.meets {
+                start += out.place - along;
             }
         }
         set_start(i, start);
         var to = fma(moving(i).xyz + gain, vec3(dt), start);
-        for (var o = 0u; o < record.obstacles; o++) {
-            if is_near(o) {
-                let swept = continuous_collision(o, taken_along(o, start), to);
-                to = swept.place;
-                sweeps = sweeps || swept.fast;
-            }
+        for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
+            let swept = continuous_collision(o, taken_along(o, start), to);
+            to = swept.place;
+            sweeps = sweeps || swept.fast;
         }
         set_node(i, to, n.w);
     }
@@ -295,10 +302,7 @@ fn contacts(resting: f32, others: f32) {
         let grip = select(others, resting, dot(rested, rested) > 0.0);
         var p = n.xyz;
         var rests_on = vec3(0.0);
-        for (var o = 0u; o < record.obstacles; o++) {
-            if !is_near(o) {
-                continue;
-            }
+        for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
             if sweeps {
                 let swept = continuous_collision(o, taken_along(o, start), p);
                 if swept.passes {
