@@ -189,7 +189,7 @@ pub fn rain(arguments: &Arguments, show: Shown) -> Result<u32> {
 pub fn shake(arguments: &Arguments, show: Shown) -> Result<u32> {
     const SECONDS: f32 = 1.5;
     let size = arguments.scaled(440, 440);
-    let (mut app, bust, pictures) = settled(arguments, HairPreset::Curly, size)?;
+    let (app, bust, pictures) = settled(arguments, HairPreset::Curly, size)?;
     let reel = Reel { count: 52, apart: 3, milliseconds: 50 }.at_most(arguments.most);
     film(&mut [(app, pictures)], reel, show, |app, tick| {
         let share = (tick as f32 / 60.0 / SECONDS).min(1.0);
