@@ -146,11 +146,10 @@ fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-fn compare(what: &str, ours: Vec3, theirs: [f32; 3]) -> f32 {
+fn compare(what: &str, ours: Vec3, theirs: [f32; 3]) {
     let theirs = Vec3::from(theirs);
     let ratio = ours / theirs;
     println!("{what}: {ours:.4} for {theirs:.4}, {ratio:.2}");
-    (ratio - 1.0).abs().max_element()
 }
 
 const TRESS: (u32, u32, f32) = (96, 288, 0.8e-3);
@@ -220,15 +219,15 @@ fn compare_tress(wanted: &[&str]) {
             let name = format!("{case} {name}");
             let drawn = bench.draw(&name, to_light, eumelanin, more * gain);
             let ours = mean(&drawn, TRESS.2, middle) / card;
-            let error = compare(&name, ours, reference);
-            match case {
-                "side" => {
-                    let apart = (ours - Vec3::from(reference)).abs();
-                    assert!((apart - 0.15 * Vec3::from(reference)).max_element() < 0.01);
-                }
-                "front" => assert!(error < 0.5),
-                // The tails of lobes after many bounces: what comes through is right in order only.
-                _ => assert!((ours - Vec3::from(reference)).abs().max_element() < 0.13),
+            compare(&name, ours, reference);
+            let apart = (ours - Vec3::from(reference)).abs();
+            if case == "back" {
+                // The aim is 25 % and 0.005: the tails of lobes after many bounces.
+                let bound = if eumelanin == 0.0 { 0.12 } else { 0.025 };
+                assert!(apart.max_element() < bound, "{name}: {ours}");
+            } else {
+                let off = apart - 0.15 * Vec3::from(reference);
+                assert!(off.max_element() < 0.01, "{name}: {ours}");
             }
         }
     }
