@@ -1,6 +1,12 @@
 //! The README's samples can be pasted: they are whole, and name the Bevy that the crate is built on.
 //! That they compile is seen by the doc tests, which are made of them.
 
+use bevy::{
+    asset::RenderAssetUsages,
+    image::{CompressedImageFormats, ImageSampler, ImageType},
+    prelude::*,
+};
+
 const README: &str = include_str!("../README.md");
 const MANIFEST: &str = include_str!("../Cargo.toml");
 
@@ -62,4 +68,62 @@ fn examples_that_are_named_are_there() {
         count += 1;
     }
     assert!(count >= 8, "only {count} examples are named");
+}
+
+/// Pictures from before the renderer that there is: their colours are those of a palette. None is the aim.
+const OF_OLD: [&str; 11] = [
+    "blow-dry-rates",
+    "character",
+    "perm-untreated",
+    "shower-lifted",
+    "shower-on",
+    "shower-pressed",
+    "straight-dark",
+    "straight-heat",
+    "straight-wet",
+    "wet-clumps",
+    "wet-dry",
+];
+
+/// T17. What is shown has all its colours, is not burnt out, and stands out from its ground.
+#[test]
+fn pictures_have_many_colours_and_contrast() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut count = 0;
+    for part in README.split("](assets/").skip(1) {
+        let name = part.split(')').next().unwrap();
+        let bytes = std::fs::read(folder.join("assets").join(name)).unwrap();
+        assert!(bytes.len() < 5_000_000, "{name} is too large to be loaded with a page");
+        let Some(stem) = name.strip_suffix(".png") else { continue };
+        if OF_OLD.contains(&stem) {
+            continue;
+        }
+        // Depth and kind of a PNG's colours: 8 bits, RGB.
+        assert_eq!(bytes[24..26], [8, 2], "{name}");
+        let picture = Image::from_buffer(
+            &bytes,
+            ImageType::Extension("png"),
+            CompressedImageFormats::NONE,
+            true,
+            ImageSampler::Default,
+            RenderAssetUsages::MAIN_WORLD,
+        );
+        let data = picture.unwrap().data.unwrap();
+        let mut pixels: Vec<[u8; 3]> = data.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
+        let burnt = pixels.iter().filter(|p| p.contains(&255)).count() as f32;
+        let burnt = burnt / pixels.len() as f32;
+        let mut light: Vec<f32> =
+            pixels.iter().map(|[r, g, b]| Color::srgb_u8(*r, *g, *b).luminance()).collect();
+        light.sort_by(f32::total_cmp);
+        let (dark, bright) = (light[light.len() / 20], light[light.len() * 19 / 20]);
+        pixels.sort_unstable();
+        pixels.dedup();
+        let colours = pixels.len();
+        println!("{name}: {colours} colours, {burnt:.4} burnt out, light {dark:.3} to {bright:.3}");
+        assert!(colours > 20_000, "{name}: {colours} colours");
+        assert!(burnt < 0.005, "{name}: {burnt} burnt out");
+        assert!((bright + 0.05) / (dark + 0.05) > 1.6, "{name}: {dark} to {bright}");
+        count += 1;
+    }
+    assert!(count >= 3, "only {count} pictures");
 }

@@ -8,7 +8,7 @@ mod linear;
 mod offscreen;
 
 use bevy::{
-    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap},
+    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, EnvironmentMapLight},
     prelude::*,
 };
 use bevy_keratin::prelude::*;
@@ -98,6 +98,20 @@ impl Bench {
 
     /// With `gain` times as much light, which measurements divide out.
     fn draw(&mut self, name: &str, to_light: Vec3, eumelanin: f32, gain: f32) -> (Picture, f32) {
+        self.wear(eumelanin);
+        let world = self.scene.app.world_mut();
+        let place = Transform::from_translation(to_light).looking_at(Vec3::ZERO, Vec3::Y);
+        world.entity_mut(self.sun).insert(place);
+        world.get_mut::<DirectionalLight>(self.sun).unwrap().illuminance = PI * gain;
+        let picture = self.scene.draw_once();
+        assert_eq!(self.scene.unready_pipelines(), Vec::<String>::new());
+        if let Ok(folder) = std::env::var("REFERENCE") {
+            picture.save(&format!("{folder}/{name}.png"));
+        }
+        (picture, gain)
+    }
+
+    fn wear(&mut self, eumelanin: f32) {
         let look = HairLook {
             melanin: Melanin::new(eumelanin, 0.0),
             variation: 0.0,
@@ -109,17 +123,7 @@ impl Bench {
             root_shade: 0.0,
             ..default()
         };
-        let world = self.scene.app.world_mut();
-        world.entity_mut(self.hair).insert(look);
-        let place = Transform::from_translation(to_light).looking_at(Vec3::ZERO, Vec3::Y);
-        world.entity_mut(self.sun).insert(place);
-        world.get_mut::<DirectionalLight>(self.sun).unwrap().illuminance = PI * gain;
-        let picture = self.scene.draw();
-        assert_eq!(self.scene.unready_pipelines(), Vec::<String>::new());
-        if let Ok(folder) = std::env::var("REFERENCE") {
-            picture.save(&format!("{folder}/{name}.png"));
-        }
-        (picture, gain)
+        self.scene.app.world_mut().entity_mut(self.hair).insert(look);
     }
 }
 
@@ -142,11 +146,10 @@ fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-fn compare(what: &str, ours: Vec3, theirs: [f32; 3]) -> f32 {
+fn compare(what: &str, ours: Vec3, theirs: [f32; 3]) {
     let theirs = Vec3::from(theirs);
     let ratio = ours / theirs;
     println!("{what}: {ours:.4} for {theirs:.4}, {ratio:.2}");
-    (ratio - 1.0).abs().max_element()
 }
 
 const TRESS: (u32, u32, f32) = (96, 288, 0.8e-3);
@@ -196,7 +199,7 @@ fn compare_tress(wanted: &[&str]) {
             "back",
             Vec3::new(0.0, 0.5, -0.8660),
             0.8660,
-            2.0,
+            0.5,
             [
                 [0.2447; 3],
                 [0.1137, 0.0757, 0.0326],
@@ -216,46 +219,126 @@ fn compare_tress(wanted: &[&str]) {
             let name = format!("{case} {name}");
             let drawn = bench.draw(&name, to_light, eumelanin, more * gain);
             let ours = mean(&drawn, TRESS.2, middle) / card;
-            let error = compare(&name, ours, reference);
-            match case {
-                // White hair needs more than one width for light of many bounces.
-                "side" if eumelanin == 0.0 => assert!(error < 0.4),
-                "side" => {
-                    let apart = (ours - Vec3::from(reference)).abs();
-                    assert!((apart - 0.15 * Vec3::from(reference)).max_element() < 0.01);
-                }
-                "front" => assert!(error < 0.5),
-                // The tails of lobes after many bounces: what comes through is right in order only.
-                _ => assert!((ours - Vec3::from(reference)).abs().max_element() < 0.13),
+            compare(&name, ours, reference);
+            let apart = (ours - Vec3::from(reference)).abs();
+            if case == "back" {
+                // The aim is 25 % and 0.005: the tails of lobes after many bounces.
+                let bound = if eumelanin == 0.0 { 0.12 } else { 0.025 };
+                assert!(apart.max_element() < bound, "{name}: {ours}");
+            } else {
+                let off = apart - 0.15 * Vec3::from(reference);
+                assert!(off.max_element() < 0.01, "{name}: {ours}");
             }
         }
     }
 }
 
+/// The mean luminance over x, in bins of 20 mm from −120 to 120, of what is within 50 mm of the middle's height.
+fn profile(drawn: &(Picture, f32)) -> [f32; 13] {
+    core::array::from_fn(|i| {
+        let middle = 20.0 * (i as f32 - 6.0);
+        luminance(mean(drawn, BALL.2, |x, y| (x - middle).abs() < 10.0 && y.abs() < 50.0))
+    })
+}
+
+fn from_middle(x: f32, y: f32) -> f32 {
+    (x * x + y * y).sqrt()
+}
+
+/// The ball under one sun from behind, 30° up: light of the ring's and of the middle's.
+fn rim(bench: &mut Bench, name: &str, eumelanin: f32, gain: f32) -> (Vec3, Vec3) {
+    let behind = Vec3::new(0.0, 0.5, -0.866);
+    let drawn = bench.draw(&format!("rim {name}"), behind, eumelanin, gain);
+    let ring = mean(&drawn, BALL.2, |x, y| (75.0..95.0).contains(&from_middle(x, y)));
+    (ring, mean(&drawn, BALL.2, |x, y| from_middle(x, y) < 30.0))
+}
+
+const RINGS: [[f32; 3]; 4] =
+    [[0.3890; 3], [0.3323, 0.3040, 0.2487], [0.2071, 0.1458, 0.0689], [0.0424, 0.0193, 0.0130]];
+const RIMS: [f32; 4] = [5.62, 5.25, 3.76, 0.71];
+const KEYS: [[f32; 3]; 4] =
+    [[0.1026; 3], [0.0612, 0.0462, 0.0256], [0.0156, 0.0069, 0.0023], [0.0016, 0.0012, 0.0011]];
+/// Luminance over x, sun 60° to the right.
+const PROFILES: [[f32; 13]; 4] = [
+    [
+        0.0017, 0.0199, 0.0477, 0.0688, 0.0905, 0.0870, 0.0897, 0.1044, 0.1350, 0.1345, 0.0988,
+        0.0566, 0.0078,
+    ],
+    [
+        0.0012, 0.0163, 0.0312, 0.0374, 0.0406, 0.0415, 0.0433, 0.0483, 0.0639, 0.0718, 0.0573,
+        0.0346, 0.0056,
+    ],
+    [
+        0.0005, 0.0059, 0.0103, 0.0101, 0.0081, 0.0074, 0.0067, 0.0080, 0.0108, 0.0151, 0.0163,
+        0.0118, 0.0018,
+    ],
+    [
+        0.0002, 0.0030, 0.0046, 0.0027, 0.0015, 0.0009, 0.0008, 0.0010, 0.0015, 0.0029, 0.0049,
+        0.0041, 0.0004,
+    ],
+];
+
+/// T9 and the profile from lit to dark. The ring's light is within 25 % for every melanin. Its ratio to the
+/// middle's is not, for that gets two and a half times its light: the aim is 25 %, a third is reached. The
+/// profile's aim is 15 % of its maximum, 41 % is reached: light that has gone through many fibres still has
+/// the direction of one, so the lit side gets half of it and the far side too much.
 #[test]
 #[ignore = "takes minutes in software"]
 fn a_ball_glows_at_its_rim_as_path_tracing_has_it() {
     let strands = ball();
-    let rims = [5.62, 5.25, 3.76, 0.71];
-    let rings =
-        [[0.3890; 3], [0.3323, 0.3040, 0.2487], [0.2071, 0.1458, 0.0689], [0.0424, 0.0193, 0.0130]];
-    let keys =
-        [[0.1026; 3], [0.0612, 0.0462, 0.0256], [0.0156, 0.0069, 0.0023], [0.0016, 0.0012, 0.0011]];
-    let from_middle = |x: f32, y: f32| (x * x + y * y).sqrt();
     let Some(mut bench) = Bench::new(&strands, BALL, 0.16, true) else {
         return;
     };
     for (i, (name, eumelanin, gain)) in MELANIN.into_iter().enumerate() {
-        let behind = Vec3::new(0.0, 0.5, -0.866);
-        let rim = bench.draw(&format!("rim {name}"), behind, eumelanin, gain.min(3.0));
+        // So little light that no pixel of a single fibre is brighter than a picture can be.
+        let (ring, centre) = rim(&mut bench, name, eumelanin, 0.1 * gain.min(4.0));
         let key = Vec3::new(0.866, 0.0, 0.5);
-        let key = bench.draw(&format!("key {name}"), key, eumelanin, 3.0 * gain);
-        let ring = mean(&rim, BALL.2, |x, y| (75.0..95.0).contains(&from_middle(x, y)));
-        let centre = mean(&rim, BALL.2, |x, y| from_middle(x, y) < 30.0);
-        compare(&format!("rim {name}, ring"), ring, rings[i]);
+        let key = bench.draw(&format!("key {name}"), key, eumelanin, 0.4 * gain);
+        let off = (ring - Vec3::from(RINGS[i])).abs() - 0.25 * Vec3::from(RINGS[i]);
+        compare(&format!("rim {name}, ring"), ring, RINGS[i]);
+        assert!(off.max_element() < 0.005, "{name}: {ring}");
         let ratio = luminance(ring) / luminance(centre);
-        println!("rim {name}, ring : centre {ratio:.2} for {}", rims[i]);
+        println!("rim {name}, centre {centre:.4}, ring : centre {ratio:.2} for {}", RIMS[i]);
+        assert!(ratio > 0.33 * RIMS[i], "{name}: {ratio}");
         let disc = mean(&key, BALL.2, |x, y| from_middle(x, y) < 60.0);
-        compare(&format!("key {name}"), disc, keys[i]);
+        compare(&format!("key {name}"), disc, KEYS[i]);
+        let (ours, theirs) = (profile(&key), PROFILES[i]);
+        let square = ours.iter().zip(theirs).map(|(a, b)| (a - b) * (a - b)).sum::<f32>() / 13.0;
+        let most = theirs.into_iter().fold(0.0, f32::max);
+        let off = square.sqrt() / most;
+        println!("{ours:.4?} for\n{theirs:.4?}: {off:.3} of the maximum off");
+        assert!(off < 0.45, "{name}: {off}");
+    }
+}
+
+/// The white furnace: the sky's light in a disc of 60 mm, as a share of the background's. The aim is 10 % and
+/// 0.02; pale hair lets too much through where a line crosses two walls of it, and 35 % is reached.
+#[test]
+#[ignore = "takes a minute in software"]
+fn a_ball_in_a_furnace_returns_what_path_tracing_returns() {
+    const FURNACE: [[f32; 3]; 4] =
+        [[1.0; 3], [0.6696, 0.5421, 0.3617], [0.2689, 0.1784, 0.1127], [0.0985, 0.0886, 0.0864]];
+    let Some(mut bench) = Bench::new(&ball(), BALL, 0.16, false) else {
+        return;
+    };
+    let (camera, sun) = (bench.scene.camera, bench.sun);
+    let world = bench.scene.app.world_mut();
+    world.entity_mut(sun).despawn();
+    let mut images = world.resource_mut::<Assets<Image>>();
+    // Half as bright as a screen can show.
+    let sky = EnvironmentMapLight {
+        intensity: 0.5,
+        ..EnvironmentMapLight::solid_color(&mut images, Color::WHITE)
+    };
+    world.entity_mut(camera).insert(sky);
+    world.insert_resource(ClearColor(Color::linear_rgb(0.5, 0.5, 0.5)));
+    for ((name, eumelanin, _), reference) in MELANIN.into_iter().zip(FURNACE) {
+        bench.wear(eumelanin);
+        let drawn = (bench.scene.draw_once(), 0.5);
+        let ours = mean(&drawn, BALL.2, |x, y| from_middle(x, y) < 60.0);
+        compare(&format!("furnace {name}"), ours, reference);
+        let reference = Vec3::from(reference);
+        let off = (ours - reference).abs() - 0.35 * reference;
+        assert!(off.max_element() < 0.02, "{name}: {ours}");
     }
 }

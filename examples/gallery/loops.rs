@@ -19,11 +19,8 @@ use bevy::{
 use bevy_keratin::{Shower, plant::HairPreset, prelude::*, render::HairView};
 use core::f32::consts::TAU;
 
-/// A loop, and for how long each picture is shown (ms).
-pub struct Loop {
-    pub pictures: Vec<Image>,
-    pub milliseconds: u32,
-}
+/// Takes the pictures of a loop as they are drawn.
+pub type Shown<'a> = &'a mut dyn FnMut(Image) -> Result;
 
 /// How many pictures a loop has, how many ticks they are apart, and for how long each is shown (ms).
 #[derive(Clone, Copy)]
@@ -46,35 +43,43 @@ impl Reel {
     }
 }
 
-/// Draws the pictures of a reel; before each tick the app may be changed, by the number of that tick.
+/// An app and its camera.
+type Stage = (App, Pictures);
+
+/// Draws the pictures of a reel, those of several stages beside each other; before each tick an app may be
+/// changed, by the number of that tick. Gives for how long each picture is shown (ms).
 fn film(
-    app: &mut App,
-    pictures: &Pictures,
+    stages: &mut [Stage],
     reel: Reel,
+    show: Shown,
     mut before: impl FnMut(&mut App, u32) -> Result,
-) -> Result<Vec<Image>> {
-    let mut drawn = Vec::new();
+) -> Result<u32> {
     for tick in 0..(reel.count - 1) * reel.apart + 1 {
-        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
-        before(app, tick)?;
-        app.update();
-        if tick % reel.apart == 0 {
-            app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-            drawn.push(pictures.draw(app)?);
+        let mut drawn = Vec::with_capacity(stages.len());
+        for (app, pictures) in &mut *stages {
+            app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+            before(app, tick)?;
+            app.update();
+            if tick % reel.apart == 0 {
+                app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+                drawn.push(pictures.draw(app)?);
+            }
+        }
+        if !drawn.is_empty() {
+            show(picture::beside(&drawn))?;
         }
     }
-    Ok(drawn)
+    Ok(reel.milliseconds)
 }
 
-/// A variant of a scene, seen from `yaw` and `near` as far as usual.
+/// A variant of a scene, `near` as far as usual and looked at from `aside`.
 fn scene(
     arguments: &Arguments,
     scene: Scene,
     view: HairView,
     size: (u32, u32),
     (near, aside): (f32, Vec3),
-    reel: Reel,
-) -> Result<Vec<Image>> {
+) -> Stage {
     let mut app = renderer::app("", (0, 0), true, default());
     set::furnish(&mut app, scene, view);
     arguments.thin_out(&mut app);
@@ -86,50 +91,41 @@ fn scene(
         orbit.focus += aside;
         *place = orbit.pose();
     }
-    film(&mut app, &pictures, reel, |_, _| Ok(()))
+    (app, pictures)
 }
 
 fn story(kind: SceneKind, variant: Option<&str>) -> Result<Scene> {
     Ok(Scene::new(kind, variant)?)
 }
 
-pub fn perm(arguments: &Arguments) -> Result<Loop> {
+pub fn perm(arguments: &Arguments, show: Shown) -> Result<u32> {
     let size = arguments.scaled(440, 440);
     let perm = story(SceneKind::Perm, None)?;
     let near = (0.72, Vec3::new(0.03, 0.02, 0.0));
     let reel = Reel { count: 58, apart: 15, milliseconds: 90 }.at_most(arguments.most);
-    let pictures = scene(arguments, perm, HairView::Natural, size, near, reel)?;
-    Ok(Loop { pictures, milliseconds: reel.milliseconds })
+    let mut stages = [scene(arguments, perm, HairView::Natural, size, near)];
+    film(&mut stages, reel, show, |_, _| Ok(()))
 }
 
-/// Two loops beside each other.
-fn both(left: Vec<Image>, right: Vec<Image>) -> Vec<Image> {
-    let pairs = left.into_iter().zip(right);
-    pairs.map(|(left, right)| picture::beside(&[left, right])).collect()
-}
-
-pub fn bedhead(arguments: &Arguments) -> Result<Loop> {
+/// Two scenes beside each other.
+fn both(arguments: &Arguments, scenes: [(Scene, HairView); 2], show: Shown) -> Result<u32> {
     let size = arguments.scaled(340, 340);
     let near = (0.86, Vec3::new(0.0, 0.03, 0.0));
     let reel = Reel { count: 48, apart: 25, milliseconds: 100 }.at_most(arguments.most);
-    let play = |variant| {
-        let bedhead = story(SceneKind::Bedhead, Some(variant))?;
-        scene(arguments, bedhead, HairView::Natural, size, near, reel)
-    };
-    let pictures = both(play("treated")?, play("never-wet")?);
-    Ok(Loop { pictures, milliseconds: reel.milliseconds })
+    let mut stages = scenes.map(|(played, view)| scene(arguments, played, view, size, near));
+    film(&mut stages, reel, show, |_, _| Ok(()))
 }
 
-pub fn blow_dry(arguments: &Arguments) -> Result<Loop> {
-    let size = arguments.scaled(340, 340);
-    let near = (0.86, Vec3::new(0.0, 0.03, 0.0));
-    let reel = Reel { count: 48, apart: 25, milliseconds: 100 }.at_most(arguments.most);
-    let play = |view| {
-        let dried = story(SceneKind::BlowDry, None)?;
-        scene(arguments, dried, view, size, near, reel)
-    };
-    let pictures = both(play(HairView::Natural)?, play(HairView::Bond(BondKind::Hydrogen))?);
-    Ok(Loop { pictures, milliseconds: reel.milliseconds })
+pub fn bedhead(arguments: &Arguments, show: Shown) -> Result<u32> {
+    let treated = story(SceneKind::Bedhead, Some("treated"))?;
+    let dry = story(SceneKind::Bedhead, Some("never-wet"))?;
+    both(arguments, [(treated, HairView::Natural), (dry, HairView::Natural)], show)
+}
+
+pub fn blow_dry(arguments: &Arguments, show: Shown) -> Result<u32> {
+    let dried = story(SceneKind::BlowDry, None)?;
+    let bonds = HairView::Bond(BondKind::Hydrogen);
+    both(arguments, [(dried, HairView::Natural), (dried, bonds)], show)
 }
 
 /// A bust that has settled, and its camera.
@@ -169,12 +165,12 @@ pub const FROM: Vec3 = Vec3::new(0.27, 0.05, 0.61);
 pub const MIDDLE: Vec3 = Vec3::new(0.0, -0.05, 0.0);
 
 /// Rain begins, hair hangs in wet locks.
-pub fn rain(arguments: &Arguments) -> Result<Loop> {
+pub fn rain(arguments: &Arguments, show: Shown) -> Result<u32> {
     let size = arguments.scaled(400, 440);
     let (mut app, _, pictures) = settled(arguments, HairPreset::Wavy, size)?;
     app.insert_resource(HairProcessTime(40.0));
     let reel = Reel { count: 48, apart: 6, milliseconds: 100 }.at_most(arguments.most);
-    let pictures = film(&mut app, &pictures, reel, |app, tick| {
+    film(&mut [(app, pictures)], reel, show, |app, tick| {
         if tick == 12 {
             let (mut shower, place) = Shower::rain_on(Vec3::Y * 0.1);
             shower.rate *= 2.0;
@@ -186,29 +182,27 @@ pub fn rain(arguments: &Arguments) -> Result<Loop> {
             showers.into_iter().for_each(|shower| _ = app.world_mut().despawn(shower));
         }
         Ok(())
-    })?;
-    Ok(Loop { pictures, milliseconds: reel.milliseconds })
+    })
 }
 
 /// A head is shaken, and comes to rest where it was.
-pub fn shake(arguments: &Arguments) -> Result<Loop> {
+pub fn shake(arguments: &Arguments, show: Shown) -> Result<u32> {
     const SECONDS: f32 = 1.5;
     let size = arguments.scaled(440, 440);
-    let (mut app, bust, pictures) = settled(arguments, HairPreset::Curly, size)?;
+    let (app, bust, pictures) = settled(arguments, HairPreset::Curly, size)?;
     let reel = Reel { count: 52, apart: 3, milliseconds: 50 }.at_most(arguments.most);
-    let pictures = film(&mut app, &pictures, reel, |app, tick| {
+    film(&mut [(app, pictures)], reel, show, |app, tick| {
         let share = (tick as f32 / 60.0 / SECONDS).min(1.0);
         let turn = 2.6 * share * (1.0 - share) * sin(TAU * 1.7 * SECONDS * share);
         let upright = bust::upright();
         let turned = upright.with_rotation(Quat::from_rotation_y(turn) * upright.rotation);
         app.world_mut().entity_mut(bust.hair).insert(turned);
         Ok(())
-    })?;
-    Ok(Loop { pictures, milliseconds: reel.milliseconds })
+    })
 }
 
 /// A figure walks in a circle, in wind; the camera goes along.
-pub fn walk(arguments: &Arguments) -> Result<Loop> {
+pub fn walk(arguments: &Arguments, show: Shown) -> Result<u32> {
     let size = arguments.scaled(400, 440);
     let mut app = renderer::app("", (0, 0), true, default());
     app.insert_resource(Time::<Fixed>::from_hz(60.0))
@@ -236,7 +230,7 @@ pub fn walk(arguments: &Arguments) -> Result<Loop> {
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     (0..ahead).for_each(|_| app.update());
     let reel = Reel { count: 48, apart: 4, milliseconds: 67 }.at_most(arguments.most);
-    let pictures = film(&mut app, &pictures, reel, |app, _| {
+    film(&mut [(app, pictures)], reel, show, |app, _| {
         let mut figures = app.world_mut().query_filtered::<&Transform, With<figure::Figure>>();
         let figure = *figures.single(app.world())?;
         let turn = figure.rotation * Quat::from_euler(EulerRot::YXZ, 0.62, -0.07, 0.0);
@@ -245,8 +239,7 @@ pub fn walk(arguments: &Arguments) -> Result<Loop> {
         let mut cameras = app.world_mut().query_filtered::<&mut Transform, With<Camera>>();
         cameras.iter_mut(app.world_mut()).for_each(|mut camera| *camera = place);
         Ok(())
-    })?;
-    Ok(Loop { pictures, milliseconds: reel.milliseconds })
+    })
 }
 
 fn daylight(mut commands: Commands, mut paint: Paint) {

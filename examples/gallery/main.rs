@@ -190,13 +190,13 @@ fn make(piece: Piece, arguments: &Arguments) -> Result {
         Some(value) => value.get_name().to_owned(),
         None => return Ok(()),
     };
-    let frames = match piece {
-        Piece::Perm => loops::perm(arguments)?,
-        Piece::Bedhead => loops::bedhead(arguments)?,
-        Piece::BlowDry => loops::blow_dry(arguments)?,
-        Piece::Rain => loops::rain(arguments)?,
-        Piece::Shake => loops::shake(arguments)?,
-        Piece::Walk => loops::walk(arguments)?,
+    let film: fn(&Arguments, loops::Shown) -> Result<u32> = match piece {
+        Piece::Perm => loops::perm,
+        Piece::Bedhead => loops::bedhead,
+        Piece::BlowDry => loops::blow_dry,
+        Piece::Rain => loops::rain,
+        Piece::Shake => loops::shake,
+        Piece::Walk => loops::walk,
         Piece::Hero => return sheets::hero(arguments),
         Piece::Before => return sheets::before(arguments),
         Piece::Melanin => return sheets::melanin(arguments),
@@ -205,14 +205,15 @@ fn make(piece: Piece, arguments: &Arguments) -> Result {
     };
     let folder = arguments.frames.join(&name);
     picture::folder(&folder)?;
-    let count = frames.pictures.len();
-    let mut paths = Vec::with_capacity(count);
-    for (i, picture) in frames.pictures.into_iter().enumerate() {
-        let path = folder.join(format!("{i:04}.png"));
+    let mut paths = Vec::new();
+    // Each as it is drawn: whoever stops it keeps what there is.
+    let milliseconds = film(arguments, &mut |picture| {
+        let path = folder.join(format!("{:04}.png", paths.len()));
         picture::save(picture, &path)?;
         paths.push(path);
-    }
-    assemble(&paths, frames.milliseconds, &arguments.out.join(format!("{name}.webp")))?;
+        Ok(())
+    })?;
+    assemble(&paths, milliseconds, &arguments.out.join(format!("{name}.webp")))?;
     Ok(())
 }
 

@@ -146,9 +146,13 @@ pub fn presets(arguments: &Arguments) -> Result {
         front.push(from(FROM)?);
         back.push(from(FROM * Vec3::new(1.0, 1.8, -1.0))?);
     }
+    // What is left of a row is ground.
     let blank = {
         let mut blank = front[0].clone();
-        blank.data.iter_mut().for_each(|data| data.fill(255));
+        if let Some(data) = blank.data.as_mut() {
+            let ground: Vec<u8> = data[..4].to_vec();
+            data.chunks_exact_mut(4).for_each(|pixel| pixel.copy_from_slice(&ground));
+        }
         blank
     };
     let row = |pictures: &[Image]| {

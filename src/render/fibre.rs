@@ -15,6 +15,7 @@ const TT_FOCUS: f32 = 3.65;
 const TRT_FOCUS: f32 = 17.0;
 const TT_SHARE: f32 = 0.96;
 const TRT_SHARE: f32 = 0.757;
+const DIFFUSE: f32 = 2.2;
 
 /// Optical properties of a fibre at one point.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +106,7 @@ impl Optics {
     /// layers.
     pub fn scattered(&self, a: &Angles, p: &Passage, layers: f32) -> Vec3 {
         let (a_f, a_b) = (self.forward_share(), self.backward_share());
-        let bulk = Bulk::of(a_f, a_b, layers);
+        let bulk = Bulk::of(a_f, a_b, DIFFUSE * layers);
         let onward = (1.0 - p.lit) * a_f * (-(1.0 - a_f) * p.behind).exp();
         let wide = self.variance * (1.0 + 0.25 * (bulk.bounces + p.depth));
         let body = (bulk.reflectance - a_b) * matt(a.cos_phi) * a.along(wide, 0.0);
@@ -313,6 +314,21 @@ mod tests {
             let bulk = of(layers);
             let sum = bulk.reflectance.x + bulk.transmittance.x;
             assert!((0.97..=1.001).contains(&sum), "{sum}: without pigment nothing is lost");
+        }
+    }
+
+    #[test]
+    fn layers_without_pigment_return_what_diffusion_returns() {
+        let white = Optics::new(Vec3::ZERO, 0.5);
+        // The mean cosine of a fibre's lobes around it, 1 straight on.
+        let cosine = over_all_light(0.0, |a| white.lobes(a, 0.0) * -a.cos_phi).x;
+        println!("mean cosine {cosine:.3}");
+        let (a_f, a_b) = (white.forward_share(), white.backward_share());
+        for layers in [2.0, 4.8, 20.0] {
+            let ours = Bulk::of(a_f, a_b, DIFFUSE * layers).reflectance.x;
+            let truth = layers / (layers + 0.5 * PI / (1.0 - cosine));
+            println!("{layers} layers: {ours:.3} for {truth:.3}");
+            assert!((ours - truth).abs() < 0.03, "{ours} for {truth}");
         }
     }
 

@@ -3,7 +3,7 @@
 use super::{
     HairFollowers, HairView,
     ribbon_mesh::{CORNER, DrawOrder},
-    thickness::Thickness,
+    thickness::{PIECES, Thickness},
 };
 use crate::look::{HairDye, HairLook, HairShading, MAX_LAYERS};
 use bevy::{
@@ -76,7 +76,6 @@ pub(super) struct Ribbon {
     gloss: f32,
     backlight: f32,
     grey: f32,
-    density: f32,
     layers: f32,
     clump: f32,
     parting: f32,
@@ -91,6 +90,7 @@ pub(super) struct Ribbon {
     root_fade: f32,
     dye_count: u32,
     rank_step: u32,
+    densities: [Vec4; PIECES / 4],
     dyes: [Dye; MAX_LAYERS],
 }
 
@@ -142,7 +142,6 @@ impl Ribbon {
             gloss: look.gloss,
             backlight: look.backlight,
             grey: look.grey,
-            density: thickness.density * fibre_width,
             layers: thickness.layers * fibre_width,
             clump: followers.clump,
             parting: followers.parting,
@@ -157,6 +156,9 @@ impl Ribbon {
             root_fade: look.root_fade,
             dye_count: dye.layers.len().min(MAX_LAYERS) as u32,
             rank_step: DrawOrder::new(strands).rank_step(),
+            densities: core::array::from_fn(|i| {
+                Vec4::from_slice(&thickness.densities[4 * i..]) * fibre_width
+            }),
             dyes: dyes(dye),
         }
     }

@@ -5,7 +5,7 @@
 #import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
 #import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
 #import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, facing_normal, safe_normalize}
-#import bevy_keratin::strands::{ribbon, streaks}
+#import bevy_keratin::strands::{ribbon, streaks, density_at}
 #import bevy_keratin::coverage::covered_samples
 #import bevy_keratin::shading::{Fibre, lit_hair}
 
@@ -57,7 +57,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
         case 7u: { value = vertex.state.moisture; }
         default: {}
     }
-    out.along = vec4(vertex.along, value, vertex.state.moisture, ribbon.density / max(vertex.scale, 1e-6));
+    out.along = vec4(vertex.along, value, vertex.state.moisture, density_at(vertex.along) / max(vertex.scale, 1e-6));
     return out;
 }
 

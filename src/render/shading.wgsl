@@ -14,7 +14,7 @@
 #import bevy_pbr::mesh_functions
 #import bevy_keratin::strands::{ribbon, frame, hash, DrawnSolid}
 #import bevy_keratin::fibre::{
-    Optics, Passage, angles_of, scattered, forward_share, backward_share, bulk_of,
+    DIFFUSE, Optics, Passage, angles_of, scattered, forward_share, backward_share, bulk_of,
 }
 #import bevy_keratin::passage::{Way, slab_passage, sun_passage, spot_passage, point_passage}
 
@@ -94,7 +94,7 @@ fn surface_of(fibre: Fibre) -> Surface {
     let tilt = 0.026 * apart * along_noise(fibre.seed, fibre.along);
     surface.optics = Optics(absorption, rough * rough * rough * rough, ribbon.gloss,
         ribbon.backlight, fibre.moisture, tilt, 0.0);
-    let bulk = bulk_of(forward_share(surface.optics), backward_share(surface.optics), ribbon.layers);
+    let bulk = bulk_of(forward_share(surface.optics), backward_share(surface.optics), DIFFUSE * ribbon.layers);
     surface.reflectance = bulk.reflectance;
     surface.transmittance = bulk.transmittance;
     return surface;

@@ -55,7 +55,6 @@ struct Ribbon {
     gloss: f32,
     backlight: f32,
     grey: f32,
-    density: f32,          // of strands, seen from beside (1/m)
     layers: f32,           // of strands, one behind the other
     clump: f32,
     parting: f32,
@@ -70,6 +69,7 @@ struct Ribbon {
     root_fade: f32,
     dye_count: u32,
     rank_step: u32,        // strand * rank_step modulo their number is the strand's rank
+    densities: array<vec4<f32>, 2>, // of strands, seen from beside (1/m), along their length
     dyes: array<Dye, 4>,
 }
 
@@ -105,6 +105,15 @@ struct DrawnFrame {
 // 1 computes points as they were in the frame before, 0 as they are.
 var<private> past: f32 = 0.0;
 #endif
+
+// Of strands around one, at a share of its length (1/m).
+fn density_at(share: f32) -> f32 {
+    let place = clamp(8.0 * share - 0.5, 0.0, 7.0);
+    let piece = min(u32(place), 6u);
+    let here = ribbon.densities[piece / 4u][piece % 4u];
+    let next = ribbon.densities[(piece + 1u) / 4u][(piece + 1u) % 4u];
+    return mix(here, next, place - f32(piece));
+}
 
 fn node_place(index: u32) -> vec3<f32> {
 #ifdef MOTION_VECTOR_PREPASS

@@ -10,12 +10,15 @@ use bevy::{platform::collections::HashMap, prelude::*};
 /// Density of strands, independent of their width.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Thickness {
-    /// Length of strands per volume around a strand (m/m³).
-    pub(super) density: f32,
+    /// Length of strands per volume around a strand (m/m³), by the share of its length from the root: the
+    /// mean over equal pieces. Strands that fan out are far apart at their tips.
+    pub(super) densities: [f32; PIECES],
     /// Strands that a line through the hair crosses, per metre of their width.
     pub(super) layers: f32,
 }
 
+/// Pieces of the length with a density of their own; four in a vector of the shader's.
+pub(super) const PIECES: usize = 8;
 /// Largest number of sample points, approximately.
 const POINTS: usize = 65_536;
 /// Minimum distance of sample points along a strand (m): about the penetration depth of light.
@@ -45,22 +48,25 @@ impl Thickness {
         let every = (total / (STEP * POINTS as f32)).ceil().max(1.0) as usize;
         let dry = |k: u32| Guide { nodes: guide(k), moisture: &[] };
         let mut points = Vec::new();
-        for strand in drawn.iter().step_by(every) {
+        for (i, strand) in (0u32..).zip(drawn.iter().step_by(every)) {
             let pieces = (length(strand) / STEP).round().clamp(1.0, 256.0) as u32;
             // A random offset by strand avoids patterns.
             let offset = (strand.seed >> 8) as f32 / (1 << 24) as f32;
             let places = (0..pieces).map(|i| (i as f32 + offset) / pieces as f32).map(|t| {
-                match strand.is_guide {
+                let place = match strand.is_guide {
                     true => guide_point(guide(strand.guides[0]), t).position,
                     false => strand_point(strand, dry, t, followers, &[]).position,
-                }
+                };
+                Point { place, share: t, strand: i }
             });
-            points.extend(places.filter(|p| p.is_finite() && p.abs().max_element() < 1e3));
+            points.extend(
+                places.filter(|p| p.place.is_finite() && p.place.abs().max_element() < 1e3),
+            );
         }
         if points.is_empty() {
             return Self::default();
         }
-        let (blocks, mut neighbours) = count(&points, BLOCK);
+        let (blocks, _) = count(&points, BLOCK);
         let faces = blocks.keys().flat_map(|cell| {
             [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|d| [*cell + d, *cell - d])
         });
@@ -68,29 +74,56 @@ impl Thickness {
         let surface = faces as f32 * BLOCK * BLOCK / STAIRS;
         // The finest cells with enough points resolve locks and layers.
         let mut cell = BLOCK;
-        while cell > STEP {
-            let (_, finer) = count(&points, 0.5 * cell);
-            if finer < ENOUGH {
-                break;
-            }
-            (cell, neighbours) = (0.5 * cell, finer);
+        while cell > STEP && count(&points, 0.5 * cell).1 >= ENOUGH {
+            cell *= 0.5;
         }
-        let each = total / points.len() as f32;
+        let each = total / points.len() as f32 / (cell * cell * cell);
         Self {
-            density: neighbours as f32 * each / (cell * cell * cell),
+            densities: neighbours(&points, cell).map(|near| near * each),
             layers: 2.0 * total / surface.max(BLOCK * BLOCK),
         }
     }
 }
 
+/// A point on a strand, and its share of the length from the root.
+struct Point {
+    place: Vec3,
+    share: f32,
+    strand: u32,
+}
+
+fn cell_of(place: Vec3, cell: f32) -> IVec3 {
+    (place / cell).floor().as_ivec3()
+}
+
 /// Points per cell, and their mean over points.
-fn count(points: &[Vec3], cell: f32) -> (HashMap<IVec3, u32>, f64) {
+fn count(points: &[Point], cell: f32) -> (HashMap<IVec3, u32>, f64) {
     let mut cells = HashMap::<IVec3, u32>::new();
     for point in points {
-        *cells.entry((point / cell).floor().as_ivec3()).or_default() += 1;
+        *cells.entry(cell_of(point.place, cell)).or_default() += 1;
     }
     let squares: f64 = cells.values().map(|n| f64::from(*n).powi(2)).sum();
     (cells, squares / points.len() as f64)
+}
+
+/// The mean number of points of other strands in the cell of a point, by pieces of the length; of all where a
+/// piece has no points. One strand of a sample stands for many, but not for more around itself.
+fn neighbours(points: &[Point], cell: f32) -> [f32; PIECES] {
+    let (cells, _) = count(points, cell);
+    let place_of = |point: &Point| (point.strand, cell_of(point.place, cell));
+    let mut sums = [(0.0f64, 0.0f64); PIECES];
+    for own in points.chunk_by(|a, b| place_of(a) == place_of(b)) {
+        let all = cells.get(&cell_of(own[0].place, cell)).copied().unwrap_or(0);
+        let others = f64::from(all.saturating_sub(own.len() as u32));
+        for point in own {
+            let piece = (point.share * PIECES as f32).clamp(0.0, PIECES as f32 - 1.0) as usize;
+            sums[piece].0 += others;
+            sums[piece].1 += 1.0;
+        }
+    }
+    let (sum, number) = sums.iter().fold((0.0, 0.0), |all, (sum, n)| (all.0 + sum, all.1 + n));
+    let mean = if number > 0.0 { sum / number } else { 0.0 };
+    sums.map(|(sum, number)| if number > 0.0 { sum / number } else { mean } as f32)
 }
 
 #[cfg(test)]
@@ -115,9 +148,36 @@ mod tests {
             let thickness = of(count, side);
             let (density, layers) = (count as f32 / (side * side), count as f32 / side);
             println!("{count} strands on {side} m: {thickness:?} for {density} 1/m², {layers} 1/m");
-            assert!((thickness.density / density - 1.0).abs() < 0.2);
+            let mean = thickness.densities.iter().sum::<f32>() / PIECES as f32;
+            assert!((mean / density - 1.0).abs() < 0.2);
+            // Cells are cut by the block's ends.
+            for inner in &thickness.densities[1..PIECES - 1] {
+                assert!((inner / density - 1.0).abs() < 0.25, "{inner}");
+            }
             // A square post is as thick as half its side twice: its four faces see two pairs.
             assert!((0.35..1.5).contains(&(thickness.layers / layers)));
+        }
+    }
+
+    #[test]
+    fn strands_that_fan_out_are_farther_apart_at_their_tips() {
+        let golden = 2.399_963_2;
+        let nodes: Vec<[Vec3; 2]> = (0..10_000)
+            .map(|i| {
+                let y = 1.0 - 2.0 * (i as f32 + 0.5) / 10_000.0;
+                let (sin, cos) = (golden * i as f32).sin_cos();
+                let flat = (1.0 - y * y).sqrt();
+                let out = Vec3::new(flat * cos, y, flat * sin);
+                [0.05 * out, 0.15 * out]
+            })
+            .collect();
+        let drawn: Vec<_> = (0..10_000).map(DrawnStrand::guide).collect();
+        let thickness = Thickness::of(&drawn, |k| &nodes[k as usize], &HairFollowers::default());
+        for (i, density) in thickness.densities.iter().enumerate() {
+            let radius = 0.05 + 0.1 * (i as f32 + 0.5) / PIECES as f32;
+            let truth = 10_000.0 / (4.0 * core::f32::consts::PI * radius * radius);
+            println!("{radius:.3} m from the middle: {density:.0} 1/m² for {truth:.0}");
+            assert!((density / truth - 1.0).abs() < 0.4, "{density} for {truth}");
         }
     }
 
@@ -128,6 +188,6 @@ mod tests {
         let broken = [Vec3::NAN; 4];
         let strand = DrawnStrand::guide(0);
         let thickness = Thickness::of(&[strand], |_| &broken, &HairFollowers::default());
-        assert!(thickness.density.is_finite() && thickness.layers.is_finite());
+        assert!(thickness.densities.iter().all(|d| d.is_finite()) && thickness.layers.is_finite());
     }
 }
