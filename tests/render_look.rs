@@ -57,7 +57,7 @@ fn white_hair_vanishes_in_a_white_sky() {
         ("black", Melanin::BLACK),
     ] {
         let look =
-            HairLook { melanin, variation: 0.0, root_shade: 0.0, width: 0.8e-3, ..default() };
+            HairLook { melanin, variation: 0.0, root_shade: 0.0, width: 2.5e-3, ..default() };
         scene.app.world_mut().entity_mut(hair).insert(look);
         let picture = scene.draw();
         if let Ok(folder) = std::env::var("REFERENCE") {
