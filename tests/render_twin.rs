@@ -259,11 +259,11 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         nodes.extend(guide.packed());
     }
     // Of the size of the shader's uniform: no dye, so only its head counts.
-    let mut ribbon = [0.0f32; 64];
-    ribbon[23] = followers.frizz;
+    let mut ribbon = [0.0f32; 72];
+    ribbon[22] = followers.frizz;
     ribbon[24..27].copy_from_slice(&followers.locks.to_array());
     ribbon[27] = followers.lock_shape;
-    (ribbon[16], ribbon[17], ribbon[18]) =
+    (ribbon[15], ribbon[16], ribbon[17]) =
         (followers.clump, followers.parting, followers.wet_clump);
     // Two solids among the strands, one of them turned.
     let place = Affine3A::from_rotation_translation(Quat::from_rotation_z(0.7), Vec3::Y * -0.1);

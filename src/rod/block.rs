@@ -9,9 +9,9 @@
 //! gathers them into lanes and scatters them back in each substep.
 
 use super::{
+    balls::ObstacleBalls,
     constraint::Shares,
     direct::row::DirectRow,
-    near::ObstacleBalls,
     obstacle::{NearObstacles, Obstacle},
 };
 use crate::lanes::{LANES, Lane, V3, load, load3, store3};

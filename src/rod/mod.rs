@@ -15,6 +15,7 @@
 //! | `sweep` | the iterations, root to tip, several at once |
 //! | `limiter` | direct tridiagonal solve of a strand's lengths |
 //! | `tridiagonal` | the Thomas algorithm |
+//! | `balls` | bounding balls of obstacles |
 //! | `near` | which obstacles a node may touch in a substep |
 //! | [`obstacle`] | colliders as half-space, capsule, cylinder or placed shape, with friction |
 //! | [`shape`] | boxes, ellipsoids, hulls and distance grids, each in its own frame |
@@ -22,6 +23,7 @@
 //! Strands of equal node count are solved [`LANES`](crate::lanes::LANES) side by side; see
 //! [`block`] for the layout.
 
+mod balls;
 #[doc(hidden)]
 pub mod block;
 pub mod constraint;

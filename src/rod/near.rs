@@ -1,59 +1,17 @@
 //! Which obstacles a node may touch in a substep.
 
 use super::{
+    balls::ObstacleBalls,
     block::BlockLanes,
     obstacle::{NearObstacles, Obstacle},
 };
-use crate::lanes::{LANES, Lane, Real, V3, lanes_in, load, load3, put3, splat3};
+use crate::lanes::{LANES, Real, V3, lanes_in, load, load3, splat3};
 use fearless_simd::{Simd, f32x16, prelude::*};
-use glam::{Mat3A, Vec3};
+use glam::Vec3;
 
 /// How far a node may move in a substep, as a multiple of the path by its velocity alone. More than 1,
 /// because forces of the substep act too.
 const FASTER: f32 = 1.5;
-
-/// The bits of all lanes.
-const ALL: u64 = (1 << LANES) - 1;
-
-/// Safety factor on distances of balls, for rounding.
-const ROOM: f32 = 1.0001;
-
-/// Bounding balls of sixteen obstacles, grown by how far a node of the block may move with each.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct ObstacleBalls {
-    center: [Lane; 3],
-    radius: Lane,
-}
-
-impl ObstacleBalls {
-    /// Balls around `obstacles` for nodes in the ball around `center`.
-    fn collect(all: &mut Vec<Self>, obstacles: &[Obstacle], (center, radius): (Vec3, f32)) {
-        all.clear();
-        for obstacles in obstacles.chunks(LANES) {
-            let mut balls = Self::default();
-            for (lane, o) in obstacles.iter().enumerate() {
-                let (at, reach) = o.solid.ball();
-                // An affine displacement grows at most by its matrix' norm from the center on.
-                let moved = o.motion.map_or(0.0, |motion| {
-                    let [x, y, z] = (motion.matrix3 - Mat3A::IDENTITY).to_cols_array_2d();
-                    let norm = [x, y, z].as_flattened().iter().map(|m| m * m).sum::<f32>().sqrt();
-                    motion.transform_point3(center).distance(center) + norm * radius
-                });
-                put3(&mut balls.center, lane, at);
-                balls.radius[lane] = reach + moved;
-            }
-            all.push(balls);
-        }
-    }
-
-    /// Bits of those that may be within `reach` of `center`: all in doubt.
-    #[inline(always)]
-    fn near<S: Simd>(&self, center: V3<f32x16<S>>, reach: f32x16<S>) -> u64 {
-        let off = load3(reach.simd, &self.center) - center;
-        let limit = (load(reach.simd, &self.radius) + reach) * f32x16::splat(reach.simd, ROOM);
-        !Real::lt(limit * limit, off.dot(off)).to_bitmask() & ALL
-    }
-}
 
 /// Finds the obstacles that each node may touch in a substep of `dt`, so that its passes skip the
 /// others: on a head of dozens of solids most nodes are near one or none. `from` of held nodes must
