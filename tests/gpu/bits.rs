@@ -167,7 +167,7 @@ fn records_of_no_numbers_leave_strands_whole() {
         ("keep", |r| r.keep = NAN),
         ("carry", |r| r.carry = Some(Isometry3d::from_translation(Vec3::NAN))),
         ("turn", |r| {
-            r.carry = Some(Isometry3d::from_rotation(Quat::from_xyzw(NAN, 0.0, 0.0, 1.0)))
+            r.carry = Some(Isometry3d::from_rotation(Quat::from_xyzw(NAN, 0.0, 0.0, 1.0)));
         }),
         ("influence", |r| r.influence[0] = NAN),
         ("change", |r| r.change = [NAN; 4]),
