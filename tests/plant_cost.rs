@@ -1,5 +1,8 @@
-//! What planting costs.
+//! What planting costs, and where roots are on the examples' head.
 
+#[path = "../examples/presets/head.rs"]
+#[allow(dead_code, reason = "the presets use all of it")]
+mod head;
 #[path = "../examples/salon/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
@@ -10,7 +13,7 @@ mod scenes {
 }
 
 use bevy::prelude::*;
-use bevy_keratin::plant::*;
+use bevy_keratin::{contact::ColliderShape, plant::*};
 use std::time::{Duration, Instant};
 
 /// A clock that runs while this thread does, so that others on the machine do not count; a usual one
@@ -54,5 +57,39 @@ fn presets_are_planted_in_a_moment() {
             all - guides
         );
         assert!(all.as_secs_f32() < 3.0, "{preset:?} took {all:?}");
+    }
+}
+
+/// A root inside a solid stretches its strand: the first node is pushed out of it, the root stays.
+#[test]
+fn no_root_is_inside_the_solids_of_the_training_head() {
+    let mesh = mannequin::mesh();
+    let scalp = Scalp { up: Dir3::X, front: Dir3::Y, height: 0.118, ..default() };
+    let solids = head::body().unwrap();
+    // The mesh lies, its crown at +X and its face at +Y.
+    let upright = |p: Vec3| Vec3::new(p.z, p.x, p.y);
+    // How far outside (m), approximately for ellipsoids.
+    let outside = |p: Vec3| {
+        let all = solids.iter().map(|(collider, place)| {
+            let p = place.compute_affine().inverse().transform_point3(p);
+            match &collider.shape {
+                ColliderShape::Capsule(c) => {
+                    (p - Vec3::Y * p.y.clamp(-c.half_length, c.half_length)).length() - c.radius
+                }
+                ColliderShape::Ellipsoid { radii } => {
+                    ((p / *radii).length() - 1.0) * radii.min_element()
+                }
+                other => panic!("{other:?}"),
+            }
+        });
+        all.fold(f32::INFINITY, f32::min)
+    };
+    // Fur grows on the cut below the shoulders as well, which solids reach through.
+    for preset in HairPreset::ALL.into_iter().filter(|p| *p != HairPreset::Fur) {
+        let planted = preset.plant(&mesh, &scalp).unwrap();
+        let roots = planted.groom.strands().map(|s| outside(upright(s.points[0])));
+        let least = roots.fold(f32::INFINITY, f32::min);
+        println!("{preset:?}: roots are {:.2} mm outside at least", 1e3 * least);
+        assert!(least > -0.1e-3, "{preset:?}: a root is {} mm inside", -1e3 * least);
     }
 }

@@ -24,7 +24,7 @@ pub const CRANIUM: (Vec3, Vec3) = (Vec3::new(0.0, 0.018, 0.0), Vec3::new(0.0767,
 /// The rest of it: its sides, its flat back, face and jaw. The ends and the radius of each capsule.
 ///
 /// Fitted to the training head's distance function: the scalp is 0.5 to 5.5 mm outside them, 2 mm as a
-/// rule.
+/// rule, and no root of a preset is inside.
 pub fn skull() -> Vec<(Vec3, Vec3, f32)> {
     let middle = |from: [f32; 2], to: [f32; 2], radius| {
         (Vec3::new(0.0, from[0], from[1]), Vec3::new(0.0, to[0], to[1]), radius)
@@ -34,8 +34,9 @@ pub fn skull() -> Vec<(Vec3, Vec3, f32)> {
     };
     vec![
         middle([-0.003, -0.029], [0.024, -0.025], 0.0761),
-        middle([0.030, 0.002], [-0.029, 0.012], 0.0746),
-        middle([0.041, 0.019], [-0.042, 0.060], 0.0657),
+        middle([0.030, 0.002], [-0.023, 0.011], 0.0746),
+        // Cheeks and lips lie behind the temples' line: a beard's roots must be outside.
+        middle([0.041, 0.019], [-0.015, 0.0467], 0.0657),
         across(0.022, 0.015, -0.059, 0.0533),
         across(0.027, -0.010, -0.065, 0.0450),
         middle([0.02, 0.040], [-0.055, 0.043], 0.053),
