@@ -168,3 +168,18 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn strands_by_the_thousand_in_one_place_are_bounded_and_reported_once() {
+    let mut app = test_app(60.0);
+    let contact = LockContact { radius: 1e-3, ..default() };
+    let hair = app.world_mut().spawn((Hair, contact, HairSleep::never())).id();
+    for i in 0..2200 {
+        let aside = Vec3::new((i % 47) as f32, 0.0, (i / 47) as f32) * 2e-5;
+        let points = [aside, aside - Vec3::Y * 0.02, aside - Vec3::Y * 0.04];
+        app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    (0..3).for_each(|_| app.update());
+    let told = faults(&mut app);
+    assert!(matches!(&told[..], [f] if f.message.contains("more than 4096 segments")), "{told:?}");
+}

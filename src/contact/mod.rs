@@ -69,9 +69,9 @@ pub struct LockNeighbours {
     /// The strands that take part in this tick, and whether followers are among them.
     #[reflect(ignore)]
     members: (Vec<Entity>, bool),
-    /// Whether strands with too many nodes have been reported.
+    /// Whether strands with too many nodes, and too many of them in one place, have been reported.
     #[reflect(ignore)]
-    is_reported: bool,
+    reported: (bool, bool),
 }
 
 impl Film {

@@ -39,6 +39,10 @@ const IDLE_GROUPS: usize = 10;
 /// Shorter ones take longer to sort (0.5: scene 1 takes 5 % longer), longer ones filter less.
 const HALF_PIECE: f32 = 0.8;
 
+/// The most edges that a node's list holds, the nearest: more only where strands by the thousand lie in one
+/// place, and would cost the square of their number.
+pub(super) const MOST_EDGES: usize = 4096;
+
 /// Longest bridge of water, in units of the reach: the rest of the margin is how far nodes may move
 /// before lists are rebuilt.
 pub(super) const LONGEST_BRIDGE: f32 = 0.6;
@@ -122,6 +126,8 @@ struct PartLists {
     idle: usize,
     pushes: Vec<Vec3>,
     bridged: Vec<Bridged>,
+    /// Whether a node had more edges near than its list holds.
+    is_crowded: bool,
 }
 
 /// Eight edges near a node, by their start node.
@@ -304,6 +310,11 @@ impl Neighbours {
         coarse.spread(bridged, Bridged::lerp)
     }
 
+    /// Whether a node had more edges near than [`MOST_EDGES`]: the farther ones are left out.
+    pub fn is_crowded(&self) -> bool {
+        self.parts.iter().any(|part| part.is_crowded)
+    }
+
     /// How many pairs of node and edge are kept, rounded up to groups of eight for each node.
     pub fn pairs(&self) -> usize {
         self.parts.iter().map(|part| part.groups.len() * WIDTH).sum()
@@ -385,6 +396,7 @@ impl PartLists {
         self.starts.push(0);
         self.slacks.clear();
         self.groups.clear();
+        self.is_crowded = false;
         for own in strands {
             for i in own.clone() {
                 let p = lanes::place(&rows[i as usize]);
@@ -409,6 +421,8 @@ impl PartLists {
                 found.extend(pairs.map(|(d, e)| u64::from(*d) << 32 | u64::from(*e)));
                 found.sort_unstable();
                 found.dedup();
+                self.is_crowded |= found.len() > MOST_EDGES;
+                found.truncate(MOST_EDGES);
                 for found in found.chunks(WIDTH) {
                     let mut edges = [nowhere; WIDTH];
                     edges.iter_mut().zip(found).for_each(|(e, f)| *e = *f as u32);

@@ -3,7 +3,7 @@
 use super::{
     Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError, LockContact,
     LockNeighbours, Obstacles, Openings, coarse,
-    neighbours::Lookup,
+    neighbours::{Lookup, MOST_EDGES},
     reach::{Colliders, HairReach, UNKNOWN},
 };
 use crate::{
@@ -191,6 +191,15 @@ fn too_fine(strand: &Strand, radius: f32, stride: usize) -> HairFault {
     HairFault::new(FaultKind::Strand, message)
 }
 
+fn too_crowded(radius: f32) -> HairFault {
+    let message = format!(
+        "more than {MOST_EDGES} segments lie around a node, expected fewer within a few times the lock's radius of \
+         {} mm: the nearest push it; use fewer strands, or a smaller LockContact::radius",
+        1e3 * radius,
+    );
+    HairFault::new(FaultKind::Strand, message)
+}
+
 /// A hair whose strands may touch in this substep.
 struct Touching<'a> {
     hair: Entity,
@@ -198,7 +207,7 @@ struct Touching<'a> {
     neighbours: Mut<'a, LockNeighbours>,
     contact: LockContact,
     step: EffectiveSubstep,
-    /// The first strand that has too many nodes for contact.
+    /// The first strand that has too many nodes for contact, or that there are too many in one place.
     fault: Option<HairFault>,
 }
 
@@ -210,7 +219,7 @@ impl Touching<'_> {
     ) {
         let Self { hair, members, neighbours, contact, step, fault } = self;
         let LockContact { radius, strength } = *contact;
-        let LockNeighbours { lists: list, members: (present, had_followers), is_reported } =
+        let LockNeighbours { lists: list, members: (present, had_followers), reported } =
             neighbours.bypass_change_detection();
         // Followers take no part in contact, but in bridges of water.
         let with_followers = list.has_extra_margin();
@@ -239,12 +248,15 @@ impl Touching<'_> {
                     let moving = strand.positions().iter().zip(strand.velocities());
                     list.expect(moving.map(|(p, v)| *p + *v * seconds));
                 }
-                if stride > 1 && !core::mem::replace(is_reported, true) {
+                if stride > 1 && !core::mem::replace(&mut reported.0, true) {
                     *fault = Some(too_fine(strand, radius, stride).of(*hair));
                 }
             }
         }
         list.find_pushes(radius, strength, lookup);
+        if list.is_crowded() && !core::mem::replace(&mut reported.1, true) {
+            *fault = Some(too_crowded(radius).of(*hair));
+        }
     }
 }
 
