@@ -1,6 +1,6 @@
 //! Rows of presets that a skinned figure wears by one component.
 
-use crate::{body, common, in_turns, skeleton};
+use crate::{PARTS, body, common, in_turns, print_parts, skeleton, time_parts};
 use bevy::{
     mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     prelude::*,
@@ -21,6 +21,10 @@ pub fn rows(threads: usize) {
     for preset in [HairPreset::Wavy, HairPreset::Straight, HairPreset::Coily, HairPreset::Long] {
         let name = format!("{preset:?}").to_lowercase();
         let (mut app, hair) = figure(threads, &skin, preset);
+        let parts = std::env::var_os(PARTS).is_some();
+        if parts {
+            time_parts(&mut app);
+        }
         let contact = preset.settings().contact;
         let without = LockContact { strength: 0.0, ..contact };
         (0..90).for_each(|_| app.update());
@@ -30,8 +34,13 @@ pub fn rows(threads: usize) {
         });
         println!("{name} worn by a figure that walks | {threads} | on | {on:.2}");
         println!("{name} worn by a figure that walks | {threads} | off | {off:.2}");
+        if parts {
+            app.world_mut().entity_mut(hair).insert(contact);
+            print_parts(&mut app);
+        }
+        let guides = app.world().get::<Strands>(hair).map_or(0, |strands| strands.len());
         let colliders = app.world_mut().query::<&HairCollider>().iter(app.world()).count();
-        println!("{name} worn: {colliders} colliders");
+        println!("{name} worn: {guides} guides, {colliders} colliders");
     }
 }
 

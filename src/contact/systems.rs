@@ -254,7 +254,7 @@ impl Touching<'_> {
             }
         }
         list.find_pushes(radius, strength, lookup);
-        if list.is_crowded() && !core::mem::replace(&mut reported.1, true) {
+        if fault.is_none() && list.is_crowded() && !core::mem::replace(&mut reported.1, true) {
             *fault = Some(too_crowded(radius).of(*hair));
         }
     }

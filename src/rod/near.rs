@@ -57,7 +57,7 @@ pub(crate) fn choose_near<S: Simd>(
                 // A ball around the node in all lanes excludes most.
                 let center = middle(p);
                 let off = p - splat3(simd, center);
-                let radius = off.dot(off).reduce_max().sqrt() + reach.reduce_max();
+                let radius = off.dot(off).reduce_max().sqrt() + or_endless(reach).reduce_max();
                 let (center, radius) = (splat3(simd, center), f32x16::splat(simd, radius));
                 for (balls, first) in b.obstacle_balls.iter().zip((0..).step_by(LANES)) {
                     for lane in lanes_in(balls.near(center, radius)) {
@@ -87,16 +87,19 @@ fn middle<S: Simd>(p: V3<f32x16<S>>) -> Vec3 {
 #[inline(always)]
 fn ball_around<S: Simd>(simd: S, b: &BlockLanes) -> (Vec3, f32) {
     let center = b.nodes.get(b.nodes.len() / 2).map_or(Vec3::ZERO, |n| middle(load3(simd, &n.p)));
-    let endless = f32x16::splat(simd, f32::INFINITY);
     let mut farthest = f32x16::splat(simd, 0.0);
     for n in &b.nodes {
         let off = load3(simd, &n.p) - splat3(simd, center);
-        let squared = off.dot(off);
-        // Without an end where a node is not finite: that excludes nothing.
-        let squared = Real::select(Real::lt(squared, endless), squared, endless);
-        farthest = Real::max(farthest, squared);
+        farthest = Real::max(farthest, or_endless(off.dot(off)));
     }
     (center, farthest.reduce_max().sqrt())
+}
+
+/// Without an end where it is not finite: a maximum with NaN may be any other number.
+#[inline(always)]
+fn or_endless<S: Simd>(x: f32x16<S>) -> f32x16<S> {
+    let endless = f32x16::splat(x.simd, f32::INFINITY);
+    Real::select(Real::lt(x, endless), x, endless)
 }
 
 #[cfg(test)]
@@ -162,6 +165,7 @@ mod tests {
             nodes in proptest::collection::vec((vector(0.2), vector(3.0)), 2..6),
             ways in proptest::collection::vec(vector(1.0), 8),
             led in vector(0.05),
+            broken in 0usize..4,
         ) {
             let (dt, clearance, length) = (1.0 / 180.0, 1e-3, 0.01);
             let mut b = BlockLanes::default();
@@ -176,6 +180,13 @@ mod tests {
             b.nodes[0].w = [0.0; LANES];
             b.nodes[0].from = (nodes[0].0 - led).to_array().map(|x| [x; LANES]);
             b.nodes[1].p[1][7] += 0.1;
+            // A strand that is not finite hides no obstacle from others.
+            match broken {
+                0 => b.nodes[1].p[2][11] = f32::NAN,
+                1 => b.nodes[0].v[0][11] = f32::NAN,
+                2 => b.nodes[1].v[0][11] = f32::INFINITY,
+                _ => {}
+            }
             dispatch!(Level::new(), simd => choose_near(simd, &mut b, dt, clearance, &obstacles));
             for (n, near) in b.nodes.iter().zip(&b.near_obstacles) {
                 for lane in [0, 7] {
