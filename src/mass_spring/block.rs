@@ -16,7 +16,7 @@ use crate::{
     rod::{
         block::{BlockLanes, NodeLanes, pulled},
         limiter::{along_support, mobility},
-        obstacle::{NearObstacles, Obstacle},
+        obstacle::Obstacle,
         touch::{contacts, predict_nodes},
         tridiagonal::{Elimination, back},
     },
@@ -83,7 +83,7 @@ fn step_simd<S: Simd>(
     let over = Xpbd::new(zero, bend, damping, params.dt);
     let zero = f32x16::splat(simd, 0.0);
     let none = V3::new(zero, zero, zero);
-    b.near_obstacles.fill(NearObstacles::ALL);
+    b.consider_all_obstacles();
     predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.clearance, obstacles);
     b.touched = [0.0; LANES];
     // Strands that are moved by held nodes may gain energy from them.

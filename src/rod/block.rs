@@ -12,7 +12,7 @@ use super::{
     balls::ObstacleBalls,
     constraint::Shares,
     direct::row::DirectRow,
-    obstacle::{NearObstacles, Obstacle},
+    obstacle::{CloseObstacles, NearObstacles, Obstacle},
 };
 use crate::lanes::{LANES, Lane, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16};
@@ -89,6 +89,8 @@ pub struct BlockLanes {
     pub(super) has_fast_nodes: bool,
     /// Which obstacles each node may touch in this substep, in any lane.
     pub(crate) near_obstacles: Vec<NearObstacles>,
+    /// Of these the ones that a node touches first, if any.
+    pub(super) close_obstacles: Vec<CloseObstacles>,
     pub(super) obstacle_balls: Vec<ObstacleBalls>,
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
     pub root_from: [Lane; 4],
@@ -112,6 +114,13 @@ impl BlockLanes {
         self.shares.resize(nodes - 1, Shares::default());
         self.rows.resize(nodes - 1, DirectRow::default());
         self.near_obstacles.resize(nodes, NearObstacles::ALL);
+        self.close_obstacles.resize(nodes, CloseObstacles::UNKNOWN);
+    }
+
+    /// Any node may touch any obstacle.
+    pub(crate) fn consider_all_obstacles(&mut self) {
+        self.near_obstacles.fill(NearObstacles::ALL);
+        self.close_obstacles.fill(CloseObstacles::UNKNOWN);
     }
 
     /// The obstacles that any lane may touch in a step of `dt`.

@@ -1,7 +1,7 @@
 //! Obstacles of rods in lanes: half-spaces, capsules, cylinders and placed shapes.
 
 use super::shape::Placed;
-use crate::lanes::{LANES, Real, V3, splat};
+use crate::lanes::{LANES, Lane, Real, V3, load, load3, splat};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 use glam::{Affine3A, BVec3, Vec3};
 
@@ -84,6 +84,28 @@ impl NearObstacles {
             }
             None
         })
+    }
+}
+
+/// The obstacles that a node can touch while it is near a place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CloseObstacles {
+    pub(super) obstacles: NearObstacles,
+    /// The place (m), and the square of the distance from it (m²): below 0 where nothing is known.
+    pub(super) place: [Lane; 3],
+    pub(super) within: Lane,
+}
+
+impl CloseObstacles {
+    pub(super) const UNKNOWN: Self =
+        Self { obstacles: NearObstacles::ALL, place: [[0.0; LANES]; 3], within: [-1.0; LANES] };
+
+    /// Those that a node at `p` can touch, of `near`.
+    #[inline(always)]
+    pub(super) fn at<S: Simd>(&self, p: V3<f32x16<S>>, near: NearObstacles) -> NearObstacles {
+        let off = p - load3(p.x.simd, &self.place);
+        let is_close = Real::lt(off.dot(off), load(p.x.simd, &self.within)).all_true();
+        if is_close { self.obstacles } else { near }
     }
 }
 
@@ -205,16 +227,17 @@ impl Solid {
 }
 
 impl Solid {
-    /// About half its thickness (m), for solids of which [`is_beyond`](Self::is_beyond) costs a fraction of
-    /// [`depth`](Self::depth).
+    /// Whether `p` is outside of a layer of `clearance` (m) on it in all lanes, where that is cheaper to know
+    /// than the [`depth`](Self::depth). With room for rounding, so that no lane's result depends on the others.
     #[inline(always)]
-    fn quick_thickness(&self) -> Option<f32> {
-        match *self {
-            Solid::Capsule { radius, .. } => Some(radius),
-            Solid::Cylinder { radius, half_height, .. } => Some(radius.min(half_height)),
-            Solid::Placed(ref placed) if placed.is_costly() => Some(placed.thickness()),
-            _ => None,
-        }
+    pub(super) fn is_clear<S: Simd>(&self, p: V3<f32x16<S>>, clearance: f32) -> bool {
+        let thickness = match *self {
+            Solid::Capsule { radius, .. } => radius,
+            Solid::Cylinder { radius, half_height, .. } => radius.min(half_height),
+            Solid::Placed(ref placed) if placed.is_costly() => placed.thickness(),
+            _ => return false,
+        };
+        self.is_beyond(p, f32x16::splat(p.x.simd, clearance + 1e-3 * thickness)).all_true()
     }
 
     /// Whether `p` is farther than `distance` (m) outside. Conservative: false near corners and for NaN;
@@ -276,11 +299,8 @@ pub(super) fn push_out<S: Simd>(
     let simd = p.x.simd;
     let zero = f32x16::splat(simd, 0.0);
     let one = f32x16::splat(simd, 1.0);
-    // Most nodes that may touch it in the substep do not in this pass. With room for rounding, so that
-    // no lane's result depends on the others.
-    if let Some(thickness) = obstacle.solid.quick_thickness()
-        && obstacle.solid.is_beyond(p, f32x16::splat(simd, clearance + 1e-3 * thickness)).all_true()
-    {
+    // Most nodes that may touch it in the substep do not in this pass.
+    if obstacle.solid.is_clear(p, clearance) {
         return None;
     }
     let (normal, depth) = obstacle.solid.depth(p, clearance);

@@ -8,7 +8,7 @@ use super::{
     block::BlockLanes,
     constraint::StretchProjection,
     limiter::limit_lengths,
-    obstacle::{NearObstacles, Obstacle},
+    obstacle::Obstacle,
     stiffness::Sweeps,
     sweep::project,
     touch::{contacts, predict_nodes},
@@ -45,7 +45,7 @@ pub fn step(level: Level, block: &mut BlockLanes, params: &SweepParams, obstacle
 fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams, obstacles: &[Obstacle]) {
     let zero = f32x16::splat(simd, 0.0);
     let none = V3::new(zero, zero, zero);
-    b.near_obstacles.fill(NearObstacles::ALL);
+    b.consider_all_obstacles();
     predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.clearance, obstacles);
     predict_edges(simd, b, params.dt);
     // The projection is chosen outside the loops, so that these have no branches.

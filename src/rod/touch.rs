@@ -98,12 +98,23 @@ pub(super) fn contacts_with<S: Simd>(
                 return;
             }
             let mut touched = f32x16::splat(simd, 0.0);
-            for (n, near) in b.nodes.iter_mut().zip(&b.near_obstacles) {
-                if *near != NearObstacles::NONE {
-                    let touches =
-                        touch(simd, n, *near, b.has_fast_nodes, clearance, obstacles, grip, lanes);
-                    touched = Real::max(touched, touches);
+            let near = b.near_obstacles.iter().zip(&b.close_obstacles);
+            for (n, (near, close)) in b.nodes.iter_mut().zip(near) {
+                if *near == NearObstacles::NONE {
+                    continue;
                 }
+                // What is passed on the way may be farther off.
+                let near = match b.has_fast_nodes {
+                    true => *near,
+                    false => close.at(load3(simd, &n.p), *near),
+                };
+                if near == NearObstacles::NONE {
+                    n.rests_on = Default::default();
+                    continue;
+                }
+                let touches =
+                    touch(simd, n, near, b.has_fast_nodes, clearance, obstacles, grip, lanes);
+                touched = Real::max(touched, touches);
             }
             touched.store_array(&mut b.touched);
         },

@@ -93,7 +93,7 @@ use super::{
     block::{BlockLanes, pulled},
     limiter::{TOLERANCE, clamp_lengths, limit_strained},
     near::choose_near,
-    obstacle::{NearObstacles, Obstacle},
+    obstacle::Obstacle,
     stiffness::REFERENCE_GRAVITY,
     touch::{Grip, contacts, contacts_with, predict_nodes},
 };
@@ -372,9 +372,13 @@ fn leave_obstacles<S: Simd>(
             let mut deepest = f32x16::splat(simd, f32::NEG_INFINITY);
             for (n, near) in b.nodes.iter().zip(&b.near_obstacles).skip(1) {
                 for o in near.of(obstacles) {
+                    let start = o.moved_with(load3(simd, &n.p));
+                    // Most nodes are outside of most.
+                    if o.solid.is_clear(start, params.clearance) {
+                        continue;
+                    }
                     let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
-                    let (_, depth) =
-                        o.solid.depth(o.moved_with(load3(simd, &n.p)), params.clearance);
+                    let (_, depth) = o.solid.depth(start, params.clearance);
                     deepest = Real::select(held, deepest, Real::max(deepest, depth));
                 }
             }
@@ -386,7 +390,7 @@ fn leave_obstacles<S: Simd>(
             let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
             b.has_fast_nodes = false;
             // Infinitely deep: no way out.
-            b.near_obstacles.fill(NearObstacles::ALL);
+            b.consider_all_obstacles();
             for n in &mut b.nodes {
                 n.rests_on = Default::default();
             }
