@@ -26,7 +26,7 @@ use bevy_keratin::{
     contact::ColliderShape,
     render::{
         DrawnStrand, HairFollowers, LockOffset,
-        curve::{CurvePoint, DrawnSolid, Guide, strand_point},
+        curve::{CurvePoint, DrawnSolid, Guide, arrange, packed_frame, strand_point},
         fibre::{Angles, Optics, Passage},
     },
 };
@@ -265,18 +265,16 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     ribbon[27] = followers.lock_shape;
     (ribbon[15], ribbon[16], ribbon[17]) =
         (followers.clump, followers.parting, followers.wet_clump);
-    // Two solids among the strands, one of them turned.
+    // Two solids among the strands, one of them turned, and many small ones that overlap.
     let place = Affine3A::from_rotation_translation(Quat::from_rotation_z(0.7), Vec3::Y * -0.1);
     let capsule = ColliderShape::Capsule(Capsule3d::new(0.03, 0.05));
-    let solids = [
+    let mut solids = vec![
         DrawnSolid::ball(Vec3::new(0.02, -0.03, 0.01), 0.04).unwrap(),
         DrawnSolid::new(&capsule, &place).unwrap(),
     ];
-    let mut frame = [0u32; 4 + 16 * 64];
-    frame[3] = solids.len() as u32;
-    for (k, solid) in solids.iter().enumerate() {
-        frame[4 + 16 * k..][..16].copy_from_slice(&solid.packed());
-    }
+    solids.extend((0..60).map(|_| DrawnSolid::ball(0.08 * random.vector(), 0.012).unwrap()));
+    arrange(&mut solids);
+    let frame = packed_frame(&solids);
     let packed: Vec<[u32; 32]> = strands.iter().map(DrawnStrand::packed).collect();
 
     let defs =
@@ -287,7 +285,7 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         ranges.as_flattened(),
         packed.as_flattened(),
         &[0][..],
-        &frame[..],
+        &frame,
     ];
     let groups = [strands.len() as u32, SAMPLES as u32];
     let out = compute(&mut scene, SHADER, defs, inputs, groups, strands.len() * SAMPLES * 12);

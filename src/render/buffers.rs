@@ -18,7 +18,7 @@ use half::{f16, slice::HalfFloatSliceExt};
 /// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain and moisture (2 × f16), length from the root at rest (m), motion since the frame before (3 × f16, in m/1024), 1 if the guide is valid (f16) |
 /// | `guides` | 8 | first node and number of nodes of each guide |
 /// | `strands` | 128 | [`DrawnStrand`]: the guides first, then the followers |
-/// | `frame` | 1040 | share of the strands that is drawn, share over which they fade, how many times wider they are (3 × f32), number of solids (u32), then 16 solids of 64 bytes that strands are pushed out of |
+/// | `frame` | 12,688 | share of the strands that is drawn, share over which they fade, how many times wider they are (3 × f32), number of solids (u32), 24 bounding balls of eight solids each (middle and radius, 4 × f32), then up to 192 solids of 64 bytes that strands are pushed out of |
 ///
 /// `nodes` and `frame` are written once a frame into the same GPU buffers. When the groom changes the
 /// handles change too.

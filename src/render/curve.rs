@@ -7,10 +7,14 @@ use super::{
     followers::HairFollowers,
     locks::random_unit,
     scatter::scatter,
+    solids::push_out,
 };
 use bevy::prelude::*;
 
-pub use super::solids::DrawnSolid;
+pub use super::{
+    packed_frame::packed_frame,
+    solids::{DrawnSolid, arrange},
+};
 
 /// A point on a curve and the derivative by the share of the length.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -170,9 +174,7 @@ pub fn strand_point<'a>(
     let inward = near_point.position - loose;
     let mut position = loose + inward * tight;
     let mut slope = loose_slope.lerp(near_point.slope * pace, tight) + inward * tighter;
-    for solid in solids {
-        solid.push(t * strand.size, &mut position, &mut slope);
-    }
+    push_out(solids, t * strand.size, &mut position, &mut slope);
     CurvePoint { position, slope }
 }
 

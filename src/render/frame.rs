@@ -8,7 +8,7 @@ use super::{
     packed_frame::{DrawnFrame, PackedFrame},
     ribbon_mesh::{RibbonLevel, RibbonMeshes},
     screen_share::pixel_in,
-    solids::{Ball, DrawnSolid},
+    solids::{Ball, DrawnSolid, arrange},
     view::HairView,
 };
 use crate::{contact::HairCollider, look::HairLook, setting::Settings};
@@ -23,7 +23,7 @@ pub(super) fn prepare(
     cameras: Query<(&Camera, &GlobalTransform)>,
     (mut known, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
     mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
-    mut balls: Local<Vec<Ball>>,
+    (mut balls, mut solids): (Local<Vec<Ball>>, Local<Vec<DrawnSolid>>),
 ) {
     balls.clear();
     balls
@@ -55,12 +55,14 @@ pub(super) fn prepare(
 
         frame.packed = PackedFrame::new(share);
         let from_world = hair_place.inverse();
-        for ball in balls.iter().filter(|ball| ball.is_near(inside, &hair_place)) {
-            let Ok((_, of, at)) = colliders.get(ball.collider) else { continue };
-            if let Some(solid) = DrawnSolid::new(&of.shape, &(from_world * at.affine())) {
-                frame.packed.push(solid);
-            }
-        }
+        solids.clear();
+        let near = balls.iter().filter(|ball| ball.is_near(inside, &hair_place));
+        solids.extend(near.filter_map(|ball| {
+            let (_, of, at) = colliders.get(ball.collider).ok()?;
+            DrawnSolid::new(&of.shape, &(from_world * at.affine()))
+        }));
+        arrange(&mut solids);
+        frame.packed.set_solids(&solids);
         // New buffers are uploaded with their contents.
         if buffers.is_changed()
             && let Some(mut buffer) = shader_buffers.get_mut(&buffers.frame)

@@ -2,7 +2,7 @@
 
 use super::{
     detail::DrawnShare,
-    solids::{DrawnSolid, MAX_SOLIDS},
+    solids::{DrawnSolid, GROUP, MAX_SOLIDS, bounds},
 };
 use bevy::prelude::*;
 
@@ -14,6 +14,8 @@ pub(super) struct PackedFrame {
     fade: f32,
     wider: f32,
     solid_count: u32,
+    /// Balls around groups of solids.
+    groups: [Vec4; MAX_SOLIDS / GROUP],
     solids: [DrawnSolid; MAX_SOLIDS],
 }
 
@@ -30,16 +32,35 @@ impl PackedFrame {
             fade: drawn.fade,
             wider: drawn.wider(),
             solid_count: 0,
+            groups: [Vec4::ZERO; MAX_SOLIDS / GROUP],
             solids: [DrawnSolid::default(); MAX_SOLIDS],
         }
     }
 
-    pub(super) fn push(&mut self, solid: DrawnSolid) {
-        if let Some(free) = self.solids.get_mut(self.solid_count as usize) {
-            *free = solid;
-            self.solid_count += 1;
+    /// What strands are pushed out of, arranged.
+    pub(super) fn set_solids(&mut self, solids: &[DrawnSolid]) {
+        for (free, solid) in self.solids.iter_mut().zip(solids) {
+            *free = *solid;
         }
+        for (free, group) in self.groups.iter_mut().zip(solids.chunks(GROUP)) {
+            *free = bounds(group);
+        }
+        self.solid_count = solids.len().min(MAX_SOLIDS) as u32;
     }
+
+    /// The part that is read, from the beginning.
+    pub(super) fn bytes(&self) -> &[u8] {
+        let unread = (MAX_SOLIDS - self.solid_count as usize) * size_of::<DrawnSolid>();
+        let all = bytemuck::bytes_of(self);
+        &all[..all.len() - unread]
+    }
+}
+
+/// A frame that draws all strands, pushed out of these solids, as the shader reads it.
+pub fn packed_frame(solids: &[DrawnSolid]) -> Vec<u32> {
+    let mut frame = PackedFrame::default();
+    frame.set_solids(solids);
+    bytemuck::pod_collect_to_vec(&[frame])
 }
 
 /// A hair's frame.

@@ -5,7 +5,14 @@ use crate::contact::{ColliderShape, HairCollider};
 use bevy::{math::Affine3A, prelude::*};
 
 /// How many solids a hair's drawn strands are pushed out of at most.
-pub(super) const MAX_SOLIDS: usize = 64;
+pub(super) const MAX_SOLIDS: usize = 192;
+/// How many solids share a bounding ball, by which points that are outside of it skip all of them.
+pub(super) const GROUP: usize = 8;
+/// How many, the largest, block light.
+const BLOCKERS: usize = 16;
+/// How many times a point goes through all solids, at most: what one pushes out may come to lie in an
+/// earlier one.
+const SWEEPS: usize = 3;
 /// How far outside strands are drawn (m): between two rings they cut through what is round.
 const CLEARANCE: f32 = 0.8e-3;
 /// Length from the root over which pushing sets in (m): roots are in the skin.
@@ -22,7 +29,9 @@ pub struct DrawnSolid {
     half: f32,
     /// The clearance.
     room: f32,
-    unused: [f32; 2],
+    /// Radius of a ball around the middle that holds the solid with its clearance (m).
+    reach: f32,
+    unused: f32,
 }
 
 impl DrawnSolid {
@@ -44,13 +53,14 @@ impl DrawnSolid {
         ];
         let scale = place.matrix3.determinant().abs().cbrt();
         let (half, room) = (half_length / radii.y, CLEARANCE / (radii.min_element() * scale));
-        let is_usable = axes.iter().all(|row| row.is_finite() && row.truncate() != Vec3::ZERO);
-        (is_usable && half.is_finite() && room.is_finite()).then_some(Self {
-            axes,
-            half,
-            room,
-            unused: [0.0; 2],
-        })
+        let m = place.matrix3;
+        let longest = [m.x_axis, m.y_axis, m.z_axis].map(|axis| axis.length()).into_iter();
+        let longest = longest.fold(0.0, f32::max);
+        // The clearance is a share of the radii.
+        let reach = (radii.max_element() + half_length) * longest * (1.0 + room.max(0.0));
+        let is_usable = axes.iter().all(|row| row.is_finite() && row.truncate() != Vec3::ZERO)
+            && [half, room, reach].into_iter().all(f32::is_finite);
+        is_usable.then_some(Self { axes, half, room, reach, unused: 0.0 })
     }
 
     /// A ball (m), for tests and tools.
@@ -59,29 +69,83 @@ impl DrawnSolid {
         Self::new(&ball, &Affine3A::from_translation(center))
     }
 
-    /// As the shader reads it.
-    pub fn packed(&self) -> [u32; 16] {
-        bytemuck::cast(*self)
+    /// Its middle, in the hair's frame.
+    fn center(&self) -> Vec3 {
+        let begin = Vec3::from(self.axes.map(|row| row.w));
+        Mat3::from_cols_array_2d(&self.axes.map(|row| row.truncate().to_array()))
+            .transpose()
+            .inverse()
+            .mul_vec3(-begin)
     }
 
-    /// Moves a point of a strand out, `length` (m) from its root, and turns its slope along the surface.
-    pub(super) fn push(&self, length: f32, position: &mut Vec3, slope: &mut Vec3) {
-        let grown = (length / ROOT).clamp(0.0, 1.0);
+    /// Moves a point of a strand out if it is inside, and turns its slope along the surface.
+    fn push(&self, position: &mut Vec3, slope: &mut Vec3) -> bool {
         let own = Vec3::from(self.axes.map(|row| row.truncate().dot(*position) + row.w));
         let own = own - Vec3::Y * own.y.clamp(-self.half, self.half);
         let apart = own.length();
         let missing = 1.0 + self.room - apart;
         if missing <= 0.0 {
-            return;
+            return false;
         }
         let out = own / apart.max(1e-6);
         let rows = self.axes.map(Vec4::truncate);
         let way = |row: Vec3| row / row.length_squared();
-        *position += (way(rows[0]) * out.x + way(rows[1]) * out.y + way(rows[2]) * out.z)
-            * (grown * missing);
+        *position += (way(rows[0]) * out.x + way(rows[1]) * out.y + way(rows[2]) * out.z) * missing;
         let normal = (rows[0] * out.x + rows[1] * out.y + rows[2] * out.z).normalize_or_zero();
-        *slope -= normal * (grown * normal.dot(*slope));
+        *slope -= normal * normal.dot(*slope);
+        true
     }
+}
+
+/// Moves a point of a strand out of all solids, `length` (m) from its root, and turns its slope along
+/// the surfaces.
+pub(super) fn push_out(solids: &[DrawnSolid], length: f32, position: &mut Vec3, slope: &mut Vec3) {
+    let (mut outside, mut along) = (*position, *slope);
+    for _ in 0..SWEEPS {
+        let pushed = solids.iter().filter(|solid| solid.push(&mut outside, &mut along)).count();
+        if pushed < 2 {
+            break;
+        }
+    }
+    let grown = (length / ROOT).clamp(0.0, 1.0);
+    *position = position.lerp(outside, grown);
+    *slope = slope.lerp(along, grown);
+}
+
+/// Orders solids, of which the largest come first, as the shader goes through them: those that block
+/// light, then such that are near each other in groups. As many as it takes.
+pub fn arrange(solids: &mut Vec<DrawnSolid>) {
+    solids.truncate(MAX_SOLIDS);
+    let small = solids.split_off(solids.len().min(BLOCKERS));
+    let mut small: Vec<_> = small.into_iter().map(|solid| (solid.center(), solid)).collect();
+    bring_together(&mut small);
+    solids.extend(small.into_iter().map(|(_, solid)| solid));
+}
+
+/// Halves at the median of the longest side, down to groups.
+fn bring_together(solids: &mut [(Vec3, DrawnSolid)]) {
+    if solids.len() <= GROUP {
+        return;
+    }
+    let centers = || solids.iter().map(|(center, _)| *center);
+    let low = centers().fold(Vec3::MAX, Vec3::min);
+    let high = centers().fold(Vec3::MIN, Vec3::max);
+    let axis = (high - low).max_position();
+    let half = (solids.len() / 2).next_multiple_of(GROUP);
+    solids.select_nth_unstable_by(half - 1, |a, b| a.0[axis].total_cmp(&b.0[axis]));
+    let (left, right) = solids.split_at_mut(half);
+    bring_together(left);
+    bring_together(right);
+}
+
+/// A ball around some solids: its middle and radius.
+pub(super) fn bounds(solids: &[DrawnSolid]) -> Vec4 {
+    let centers = || solids.iter().map(DrawnSolid::center);
+    let low = centers().fold(Vec3::MAX, Vec3::min);
+    let high = centers().fold(Vec3::MIN, Vec3::max);
+    let center = low.midpoint(high);
+    let reaches = solids.iter().map(|solid| solid.center().distance(center) + solid.reach);
+    center.extend(reaches.fold(0.0, f32::max))
 }
 
 /// Radii and half the length of a solid that the shader knows.
@@ -129,7 +193,7 @@ mod tests {
 
     fn pushed(solid: &DrawnSolid, length: f32, mut p: Vec3) -> Vec3 {
         let mut slope = Vec3::X;
-        solid.push(length, &mut p, &mut slope);
+        push_out(&[*solid], length, &mut p, &mut slope);
         p
     }
 

@@ -80,7 +80,8 @@ struct DrawnSolid {
     z: vec4<f32>,
     half: f32,             // of the segment's length
     room: f32,             // how far outside strands stay
-    unused: vec2<f32>,
+    reach: f32,            // of a ball around it, with that room (m)
+    unused: f32,
 }
 
 // What differs from frame to frame besides nodes.
@@ -89,7 +90,8 @@ struct DrawnFrame {
     fade: f32,             // the part of it, from its end, in which they fade
     wider: f32,            // how many times wider they are
     solid_count: u32,
-    solids: array<DrawnSolid, 64>,
+    groups: array<vec4<f32>, 24>, // balls around eight solids each
+    solids: array<DrawnSolid, 192>,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(0) var<uniform> ribbon: Ribbon;
@@ -279,24 +281,56 @@ fn way_along(guide: vec2<u32>, root: vec3<f32>, point: CurvePoint, phase: f32, e
 // Length from the root over which pushing sets in (m): roots are in the skin.
 const ROOT: f32 = 5e-3;
 
-// Moves a point of a strand out of a solid, and turns its slope along the surface.
-fn push_out(solid: DrawnSolid, grown: f32, point: ptr<function, StrandPoint>) {
+// Solids of a group.
+const GROUP: u32 = 8u;
+// How many times a point goes through all solids, at most: what one pushes out may come to lie in an
+// earlier one.
+const SWEEPS: u32 = 3u;
+
+// Moves a point of a strand out of a solid if it is inside, and turns its slope along the surface.
+fn push_out(solid: DrawnSolid, point: ptr<function, StrandPoint>) -> u32 {
     let place = vec4((*point).position, 1.0);
     var own = vec3(dot(solid.x, place), dot(solid.y, place), dot(solid.z, place));
     own.y -= clamp(own.y, -solid.half, solid.half);
     let apart = length(own);
     let missing = 1.0 + solid.room - apart;
     if missing <= 0.0 {
-        return;
+        return 0u;
     }
     let out = own / max(apart, 1e-6);
     let x = solid.x.xyz;
     let y = solid.y.xyz;
     let z = solid.z.xyz;
-    (*point).position += grown * missing
+    (*point).position += missing
         * (x * (out.x / dot(x, x)) + y * (out.y / dot(y, y)) + z * (out.z / dot(z, z)));
     let normal = x * out.x + y * out.y + z * out.z;
-    (*point).slope -= grown * normal * (dot(normal, (*point).slope) / max(dot(normal, normal), 1e-12));
+    (*point).slope -= normal * (dot(normal, (*point).slope) / max(dot(normal, normal), 1e-12));
+    return 1u;
+}
+
+// Out of all solids, at a place so far along the strand (m).
+fn push_out_of_all(length: f32, point: ptr<function, StrandPoint>) {
+    let inside = (*point).position;
+    let slope = (*point).slope;
+    for (var sweep = 0u; sweep < SWEEPS; sweep++) {
+        var pushed = 0u;
+        for (var first = 0u; first < frame.solid_count; first += GROUP) {
+            let bounds = frame.groups[first / GROUP];
+            let off = (*point).position - bounds.xyz;
+            if dot(off, off) > bounds.w * bounds.w {
+                continue;
+            }
+            for (var i = first; i < min(first + GROUP, frame.solid_count); i++) {
+                pushed += push_out(frame.solids[i], point);
+            }
+        }
+        if pushed < 2u {
+            break;
+        }
+    }
+    let grown = saturate(length / ROOT);
+    (*point).position = mix(inside, (*point).position, grown);
+    (*point).slope = mix(slope, (*point).slope, grown);
 }
 
 // How much of a strand of so many is drawn in this frame: 1 all, 0 nothing.
@@ -387,10 +421,7 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     out.position = loose + inward * tight;
     out.outward = inward * (tight - 1.0);
     out.slope = mix(loose_slope, near_point.slope * pace, tight) + inward * tighter;
-    let grown = saturate(t * strand.size / ROOT);
-    for (var i = 0u; i < frame.solid_count; i++) {
-        push_out(frame.solids[i], grown, &out);
-    }
+    push_out_of_all(t * strand.size, &out);
     return out;
 }
 

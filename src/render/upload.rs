@@ -34,11 +34,11 @@ fn upload(
     }
     for (hair, packed, frame, is_drawn_elsewhere) in &hairs {
         let nodes: &[u8] = bytemuck::cast_slice(&packed.nodes);
-        let frame = bytemuck::bytes_of(&frame.packed);
-        let nodes = (!is_drawn_elsewhere).then_some((&hair.nodes, nodes));
-        for (buffer, bytes) in nodes.into_iter().chain([(&hair.frame, frame)]) {
+        let nodes = (!is_drawn_elsewhere).then_some((&hair.nodes, nodes, nodes.len()));
+        let frame = (&hair.frame, frame.packed.bytes(), size_of_val(&frame.packed));
+        for (buffer, bytes, size) in nodes.into_iter().chain([frame]) {
             if let Some(gpu) = buffers.get(buffer)
-                && gpu.buffer.size() == bytes.len() as u64
+                && gpu.buffer.size() == size as u64
             {
                 queue.write_buffer(&gpu.buffer, 0, bytes);
             }
