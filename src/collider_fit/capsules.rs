@@ -311,7 +311,7 @@ fn along(points: &[(DVec3, f64)], (middle, total): (DVec3, f64), axis: DVec3) ->
 }
 
 /// Principal axes of the points, by Jacobi rotations.
-fn principal_axes(points: &[(DVec3, f64)], middle: DVec3) -> [DVec3; 3] {
+pub(super) fn principal_axes(points: &[(DVec3, f64)], middle: DVec3) -> [DVec3; 3] {
     let mut spread = DMat3::ZERO;
     for (point, weight) in points {
         let p = *point - middle;

@@ -6,9 +6,11 @@ mod balls;
 mod capsules;
 mod head;
 mod linear_system;
+mod protrusions;
 
 pub(crate) use balls::{BallRules, inscribed_balls};
 pub use capsules::{FitError, JointCapsule, fit_joint_capsules};
+pub(crate) use protrusions::{ProtrusionRules, protrusions};
 
 use bevy::prelude::*;
 

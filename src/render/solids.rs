@@ -1,7 +1,10 @@
 //! Solids that drawn strands are pushed out of: guides stay out of a head, followers between them may
 //! not.
 
-use crate::contact::{ColliderShape, HairCollider};
+use crate::{
+    contact::{ColliderShape, HairCollider},
+    grid::compact_groups,
+};
 use bevy::{math::Affine3A, prelude::*};
 
 /// How many solids a hair's drawn strands are pushed out of at most.
@@ -117,25 +120,8 @@ pub(super) fn push_out(solids: &[DrawnSolid], length: f32, position: &mut Vec3, 
 pub fn arrange(solids: &mut Vec<DrawnSolid>) {
     solids.truncate(MAX_SOLIDS);
     let small = solids.split_off(solids.len().min(BLOCKERS));
-    let mut small: Vec<_> = small.into_iter().map(|solid| (solid.center(), solid)).collect();
-    bring_together(&mut small);
-    solids.extend(small.into_iter().map(|(_, solid)| solid));
-}
-
-/// Halves at the median of the longest side, down to groups.
-fn bring_together(solids: &mut [(Vec3, DrawnSolid)]) {
-    if solids.len() <= GROUP {
-        return;
-    }
-    let centers = || solids.iter().map(|(center, _)| *center);
-    let low = centers().fold(Vec3::MAX, Vec3::min);
-    let high = centers().fold(Vec3::MIN, Vec3::max);
-    let axis = (high - low).max_position();
-    let half = (solids.len() / 2).next_multiple_of(GROUP);
-    solids.select_nth_unstable_by(half - 1, |a, b| a.0[axis].total_cmp(&b.0[axis]));
-    let (left, right) = solids.split_at_mut(half);
-    bring_together(left);
-    bring_together(right);
+    let centers: Vec<Vec3> = small.iter().map(DrawnSolid::center).collect();
+    solids.extend(compact_groups(&centers, GROUP).into_iter().map(|i| small[i as usize]));
 }
 
 /// A ball around some solids: its middle and radius.

@@ -8,7 +8,7 @@ use super::{
     what::{HairSource, WearHair},
 };
 use crate::{
-    collider_fit::{BallRules, fit_joint_capsules, inscribed_balls},
+    collider_fit::{BallRules, ProtrusionRules, fit_joint_capsules, inscribed_balls, protrusions},
     contact::HairCollider,
     grid::KdTree,
     groom::{Groom, GroomGuides, GrownStrands},
@@ -39,6 +39,10 @@ const LOOSE: f32 = 4e-3;
 /// between them.
 const OUT: f32 = 3e-3;
 const CREASE: f32 = -3e-4;
+/// What balls of a head leave out, by so many points of the surface: ears are thinner than any ball.
+const EARS: ProtrusionRules =
+    ProtrusionRules { apart: -5e-4, link: 0.018, longest: 0.06, out: 1.5e-3 };
+const FINE_POINTS: usize = 15_000;
 /// Height of a head, as [`Scalp`](crate::plant::Scalp) measures it (m).
 const HEAD: f32 = 0.133;
 /// Distance beyond the hair's length within which meshes are considered (m).
@@ -208,10 +212,11 @@ fn median(values: &mut [f32]) -> Option<f32> {
     values.get(values.len() / 2).copied()
 }
 
-/// Balls that fill the head and stand a little out of it; for a mesh without joints, all of it that hair
-/// reaches.
+/// Balls that fill the head and stand a little out of it, and ellipsoids around its ears; for a mesh without
+/// joints, all of it that hair reaches.
 fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>, WearError> {
-    let points = surface_points(&cropped(&fitting.mesh, reach), POINTS)?;
+    let cropped = cropped(&fitting.mesh, reach);
+    let points = surface_points(&cropped, POINTS)?;
     let height = fitting.scalp.height;
     let is_on_head = |p: &SurfacePoint| p.red > HEAD_WEIGHT && p.at.length() < reach;
     let places: Vec<_> = points.iter().map(|p| (p.at, p.normal)).collect();
@@ -222,11 +227,15 @@ fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>
         most: MAX_BALLS,
     };
     let balls = inscribed_balls(&places, |i| is_on_head(&points[i]), &rules);
-    let each = balls.into_iter().map(|ball| {
+    let skin = surface_points(&cropped, FINE_POINTS)?;
+    let skin = skin.iter().filter(|p| is_on_head(p)).map(|p| p.at);
+    let ears = protrusions(skin, &balls, &EARS);
+    let balls = balls.into_iter().map(|ball| {
         let place = Transform::from_translation(ball.center.into());
         Ok((HairCollider::sphere(ball.radius())?, place))
     });
-    each.collect()
+    let ears = ears.into_iter().map(|ear| Ok((HairCollider::ellipsoid(ear.radii)?, ear.place)));
+    balls.chain(ears).collect()
 }
 
 /// For each joint other than the head's that hair reaches the capsule that fits, or balls where it is of
