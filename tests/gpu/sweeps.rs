@@ -3,6 +3,7 @@
 use crate::{
     lab::{Device, LabStrand, Random, swept},
     residence::grow,
+    sleep::{calm, until_asleep},
     stage::{Stage, apart, curls},
 };
 use bevy::{math::Isometry3d, prelude::*};
@@ -410,4 +411,46 @@ pub fn swept_followers_follow_there(stage: &mut Stage) {
     let (off, spun, spins) = (apart(cpu, gpu), spins_apart(&rest, cpu), spins_apart(cpu, gpu));
     println!("off by {off} m; {spins} of {spun} rad/s");
     assert!(off < 1e-3 && spun > 0.3 && spins < 0.05 * spun, "{off} m, {spins} of {spun} rad/s");
+}
+
+pub fn swept_nodes_are_held_there(stage: &mut Stage) {
+    let both = [SimulateOn::Cpu, SimulateOn::Gpu].map(|on| {
+        grow_swept(stage, on, curls(8, 7));
+        stage.run(1);
+        let strand = stage.members()[3];
+        let start = stage.strands()[3].positions()[4];
+        for tick in 0..20 {
+            let place = start + Vec3::new(0.0, 1.0, 0.5) * (0.02 * (0.3 * tick as f32).sin());
+            let targets = vec![None, None, None, None, Some(place)];
+            stage.app.world_mut().entity_mut(strand).insert(HeldNodes { targets });
+            turn_head(stage, tick);
+        }
+        let held = stage.strands();
+        stage.app.world_mut().entity_mut(strand).remove::<HeldNodes>();
+        stage.run(10);
+        assert_eq!(stage.is_on_gpu(), on == SimulateOn::Gpu, "{:?}", stage.residence());
+        (start, held, stage.strands())
+    });
+    let [(start, held, let_go), (_, gpu_held, gpu_let_go)] = &both;
+    let led = held[3].positions()[4].distance(*start);
+    let off = [apart(held, gpu_held), apart(let_go, gpu_let_go)];
+    println!("led by {led} m; off by {off:?} m");
+    assert!(led > 1e-3 && off.iter().all(|off| *off < 1e-3), "{led} m, {off:?} m");
+}
+
+pub fn swept_hair_sleeps_there(stage: &mut Stage) {
+    grow_swept(stage, SimulateOn::Gpu, curls(8, 5));
+    stage.app.world_mut().entity_mut(stage.hair).insert(calm());
+    let ticks = until_asleep(stage, 1);
+    assert!(stage.is_on_gpu(), "{:?}", stage.residence());
+    let bits = stage.bits();
+    for strand in stage.strands() {
+        let moves = strand.velocities().iter().chain(strand.angular_velocities());
+        assert!(moves.into_iter().all(|v| *v == Vec3::ZERO), "asleep after {ticks} ticks");
+    }
+    stage.run(20);
+    assert!(stage.bits() == bits);
+    // Whoever wakes it finds it where it was.
+    turn_head(stage, 3);
+    assert!(stage.bits() != bits);
 }
