@@ -188,7 +188,7 @@ fn records(count: usize) -> Vec<SubstepRecord> {
     let record = |i: usize| SubstepRecord {
         obstacles: obstacles.to_vec(),
         carry: (i % 4 < 2).then_some(turn),
-        change: [if i % 2 == 0 { -0.01 } else { 0.01 }, 0.0, 0.0, 0.0],
+        change: [if i.is_multiple_of(2) { -0.01 } else { 0.01 }, 0.0, 0.0, 0.0],
         ..swept(Split)
     };
     (0..count).map(record).collect()
