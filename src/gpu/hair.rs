@@ -16,6 +16,7 @@ use crate::{
     bond::Bonds,
     lod::{Follower, Guides, follow::GUIDES},
     render::DrawnElsewhere,
+    rod::SolverMethod,
     sleep::Disturbance,
     strand::{AddedMass, HeldNodes, OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, Strands},
     treatment::{HairTreatment, Treatments},
@@ -50,6 +51,8 @@ pub(super) struct GpuHair {
     pub(super) ticks: u32,
     /// Whether its roots are tied to a mesh.
     pub(super) is_tied: bool,
+    /// What solves its rods.
+    pub(super) method: SolverMethod,
     /// Whether any of its strands follow others.
     pub(super) has_followers: bool,
     /// Whether the checkpoint is of its present sleep.
@@ -119,7 +122,12 @@ fn follower_view<'a>(strand: &EntityRef<'a>, guides: &[Option<u32>]) -> Option<F
 }
 
 /// Hands a hair over, if all its strands can be.
-pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Result<(), WhyCpu> {
+pub(super) fn hand_over(
+    world: &mut World,
+    hair: Entity,
+    ready: &Ready,
+    method: SolverMethod,
+) -> Result<(), WhyCpu> {
     let refused = |what| Err(WhyCpu::Unsupported(what));
     let Some(members) = world.get::<Strands>(hair).map(|all| all.collection().to_vec()) else {
         return refused(Unsupported::Strands);
@@ -181,7 +189,8 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
         if let Some((_, what)) = reasons.into_iter().find(|(is_there, _)| *is_there) {
             return refused(what);
         }
-        views.push(StrandView { follows, ..StrandView::of(strand, bonds, history) });
+        let spins = (method == SolverMethod::Sweeps).then(|| strand.angular_velocities());
+        views.push(StrandView { follows, spins, ..StrandView::of(strand, bonds, history) });
     }
     held.sort_unstable();
     if views.is_empty() {
@@ -215,6 +224,7 @@ pub(super) fn hand_over(world: &mut World, hair: Entity, ready: &Ready) -> Resul
         ticks: 0,
         told: 0,
         is_tied,
+        method,
         has_followers: followers > 0,
         is_kept: false,
         held,

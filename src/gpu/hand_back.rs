@@ -9,6 +9,7 @@ use super::{
     record::GpuJournal,
     residence::{HairResidence, Unsupported, WhyCpu},
     shared::{Link, Measured},
+    sweeps::UnusedSpins,
     treatments::GpuTreatments,
 };
 use crate::{
@@ -83,7 +84,8 @@ pub fn fetch_strands(world: &mut World, hair: Entity) -> bool {
         shared.strands.read_contents(&shared.device, &shared.queue)
     };
     if let Some(state) = state {
-        write_back(world, &mut gpu, &state);
+        let unused = take_unused(world, hair);
+        write_back(world, &mut gpu, &state, unused);
     }
     world.entity_mut(hair).insert(gpu);
     true
@@ -94,11 +96,14 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     let Ok(mut entity) = world.get_entity_mut(hair) else { return };
     let Some(mut gpu) = entity.take::<GpuHair>() else { return };
     let acting = entity.take::<GpuTreatments>().map(GpuTreatments::into_acting);
-    let followed = entity.get::<GpuJournal>().map_or(0.0, |journal| journal.followed);
+    let (followed, unused) = entity
+        .get::<GpuJournal>()
+        .map_or_else(Default::default, |journal| (journal.followed, journal.unused_spins));
     entity.remove::<(GpuJournal, OnGpu, Disturbance, DrawnElsewhere)>();
     // Where its level has changed it goes back as soon as strands are guides and followers anew.
     let goes_back = why == WhyCpu::Unsupported(Unsupported::LevelOfDetail);
-    let stays = if goes_back { 0.0 } else { STAYS_FOR };
+    let stays_not = goes_back || why == WhyCpu::Unsupported(Unsupported::OtherSolver);
+    let stays = if stays_not { 0.0 } else { STAYS_FOR };
     entity.insert((HairResidence::Cpu(why), StaysOnCpu(stays)));
     if let Some(mut lod) = entity.get_mut::<PresentLod>() {
         lod.bypass_change_detection().set_leaving(goes_back);
@@ -107,7 +112,7 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
         guides.bypass_change_detection().look_again();
     }
     if let Some(state) = state.or_else(|| gpu.checkpoint.take()) {
-        write_back(world, &mut gpu, &state);
+        write_back(world, &mut gpu, &state, unused);
     }
     for member in &gpu.members {
         let Ok(mut strand) = world.get_entity_mut(*member) else { continue };
@@ -144,9 +149,15 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     }
 }
 
+/// What has become of angular velocities since the strands last had a state.
+fn take_unused(world: &mut World, hair: Entity) -> UnusedSpins {
+    let journal = world.get_mut::<GpuJournal>(hair);
+    journal.map_or_else(default, |mut journal| core::mem::take(&mut journal.unused_spins))
+}
+
 /// Puts a state into the strands. What the game has written stays: a pose whole, with its velocities;
 /// velocities alone; bonds.
-fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
+fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents, unused: UnusedSpins) {
     let shared = gpu.link.lock();
     let layout = shared.strands.layout();
     let now = world.change_tick();
@@ -186,14 +197,19 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents) {
             orientations,
             root_frame,
             tensions,
+            spins,
             joints,
             before,
         } = own;
         let to = strand.bypass_change_detection();
         if !poses {
-            let (places, speeds, frames, _) = to.parts_mut();
+            let (places, speeds, frames, turns) = to.parts_mut();
             places.copy_from_slice(&positions);
             frames.copy_from_slice(&orientations);
+            match spins.len() == turns.len() {
+                true => turns.copy_from_slice(&spins),
+                false => unused.apply(turns),
+            }
             if !moves {
                 speeds.copy_from_slice(&velocities);
             }
@@ -272,7 +288,8 @@ pub(super) fn collect(world: &mut World) {
                 if answers {
                     gpu.awaited = None;
                     let Some(mut gpu) = world.entity_mut(hair).take::<GpuHair>() else { continue };
-                    write_back(world, &mut gpu, &state);
+                    let unused = take_unused(world, hair);
+                    write_back(world, &mut gpu, &state, unused);
                     gpu.checkpoint = Some(state);
                     world.entity_mut(hair).insert(gpu);
                     world.trigger(StrandsArrived { entity: hair });
@@ -297,7 +314,7 @@ fn heed(world: &mut World, hair: Entity, report: &Measured, strand: Option<usize
         }
     }
     if let Some(mut journal) = entity.get_mut::<GpuJournal>()
-        && journal.bypass_change_detection().rest.slept_in(report.slept)
+        && journal.bypass_change_detection().slept_in(report.slept)
         && let Some(mut sleepers) = entity.get_mut::<Sleepers>()
     {
         *sleepers = Sleepers { asleep: sleepers.asleep + sleepers.awake, awake: 0 };

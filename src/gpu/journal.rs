@@ -5,6 +5,7 @@ use super::{
     hair::GpuHair,
     led::Leading,
     record::{BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SleepRecord, SubstepRecord},
+    sweeps::SweepRecord,
     treatments::GpuTreatments,
 };
 use crate::{
@@ -13,7 +14,7 @@ use crate::{
     environment::{AirDrag, HairGravity, Winds},
     lod::follow::{Frame, Ties},
     render::DrawnElsewhere,
-    rod::{HairSolver, HairStiffness},
+    rod::{HairSolver, HairStiffness, SolverMethod, Sweeps},
     schedule::{EffectiveSubstep, EffectiveSubsteps, HairStep},
     setting::{Ranged, Settings},
     sleep::{Disturbance, HairSleep},
@@ -46,7 +47,7 @@ pub(super) fn write_journals(
     (step, substeps): (Res<HairStep>, EffectiveSubsteps),
     gravity: Res<HairGravity>,
     winds: Winds,
-    (solver, stiffness): (Settings<HairSolver>, Settings<HairStiffness>),
+    (solver, sweeps, stiffness): (Settings<HairSolver>, Settings<Sweeps>, Settings<HairStiffness>),
     (drag, contact): (Settings<AirDrag>, Settings<LockContact>),
     (influence, cuticle): (Settings<BondInfluence>, Settings<Cuticle>),
     leading: Leading,
@@ -121,7 +122,14 @@ pub(super) fn write_journals(
         let pose = frame.now();
         let air = winds.seen_from(pose);
         let solids = obstacles.map_or(&[][..], |all| &all.solids);
-        let stiffness = stiffness.of(hair);
+        let (solver, stiffness) = (solver.of(hair), stiffness.of(hair));
+        // A method that is set in the middle of a tick counts from the next one on.
+        let method = on.map_or(solver.method, |on| on.method);
+        let sweeps = (method == SolverMethod::Sweeps).then(|| {
+            let full = sweeps.of(hair);
+            let iterations = substep.iterations(full.iterations);
+            SweepRecord { settings: Sweeps { iterations, ..full } }
+        });
         let mut record = SubstepRecord {
             dt: substep.dt,
             gravity: pose.direction_in(gravity),
@@ -132,7 +140,8 @@ pub(super) fn write_journals(
             bending_length: stiffness.bending_length,
             damping: stiffness.damping,
             skin: contact.of(hair).radius,
-            limiter_steps: solver.of(hair).limiter_steps,
+            limiter_steps: sweeps.map_or(solver.limiter_steps, |s| s.settings.limiter_steps),
+            sweeps,
             cuticle: cuticle.of(hair),
             blowers: (air.blowers.iter().take(MAX_BLOWERS))
                 .map(|seen| BlowerRecord {
@@ -154,6 +163,10 @@ pub(super) fn write_journals(
         if let Some(mut treatments) = treatments {
             treatments.write(&mut record);
         }
+        if record.rests {
+            journal.unused_spins.rest();
+        }
+        journal.unused_spins.pass(record.keep, record.carry.map(|carry| carry.rotation));
         journal.records.push(record);
     }
 }

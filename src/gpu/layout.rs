@@ -24,7 +24,7 @@ pub(super) const BONDS: usize = 4;
 pub(super) const SCRATCH: usize = 8;
 pub(super) const STILL: usize = 2;
 
-/// Bytes per node in all buffers of a hair that may sleep together.
+/// Bytes per node in all buffers of a hair that may sleep together; 16 more where edges have angular velocities.
 pub const BYTES_PER_NODE: usize = 16 * (2 * POSE + MOTION + REST + BONDS + SCRATCH + STILL);
 
 /// The slots of one strand.
@@ -46,6 +46,8 @@ pub struct Layout {
     slots: u32,
     /// How many blocks and node slots the simulated strands have; followers come after them.
     simulated: (usize, usize),
+    /// Whether edges have angular velocities.
+    has_spins: bool,
 }
 
 impl Layout {
@@ -79,6 +81,32 @@ impl Layout {
         }
         layout.order = order;
         layout
+    }
+
+    /// With angular velocities of the edges, or without.
+    pub fn with_spins(self, has_spins: bool) -> Self {
+        Self { has_spins, ..self }
+    }
+
+    /// Whether edges have angular velocities: strands that the paper's projections solve.
+    pub fn has_spins(&self) -> bool {
+        self.has_spins
+    }
+
+    /// How many vectors the buffer of the motion has.
+    pub(super) fn motion_vectors(&self) -> usize {
+        self.vectors(if self.has_spins { MOTION + 1 } else { MOTION })
+    }
+
+    /// How many vectors pose, motion and bonds have.
+    pub(super) fn state(&self) -> [usize; 3] {
+        [self.vectors(POSE), self.motion_vectors(), self.vectors(BONDS)]
+    }
+
+    /// Where the angular velocity of a strand's edge lies in the buffer of the motion: behind what all strands
+    /// have.
+    fn spin_index(&self, strand: usize, edge: usize) -> usize {
+        self.vectors(MOTION) + self.index(strand, edge, 0, 1)
     }
 
     /// How many strands there are.
@@ -162,6 +190,8 @@ pub struct StrandView<'a> {
     pub lengths: &'a [f32],
     /// Tensions that the last substep left (N, for hair of which a whole node weighs 1 kg).
     pub tensions: &'a [f32],
+    /// Angular velocities of the edges (rad/s); of strands that the paper's projections solve.
+    pub spins: Option<&'a [Vec3]>,
     /// Bonds of the joints.
     pub joints: &'a [JointBonds],
     /// Where the nodes were when the last tick began (m); where they are, if there are not as many.
@@ -180,6 +210,7 @@ impl<'a> StrandView<'a> {
             root_frame: strand.root_frame(),
             lengths: strand.rest_lengths(),
             tensions: strand.tensions(),
+            spins: None,
             joints: &bonds.joints,
             before: &history.positions,
             follows: None,
@@ -200,6 +231,8 @@ pub struct StrandState {
     pub root_frame: Quat,
     /// Tensions of the edges.
     pub tensions: Vec<f32>,
+    /// Angular velocities of the edges (rad/s); none of strands that have none.
+    pub spins: Vec<Vec3>,
     /// Bonds of the joints.
     pub joints: Vec<JointBonds>,
     /// Places of the nodes when the tick began (m).
@@ -211,7 +244,8 @@ pub struct StrandState {
 pub struct Contents {
     /// Place; frame, at the tip the scalp's.
     pub pose: Vec<[f32; 4]>,
-    /// Velocity and tension; place at the tick's start.
+    /// Velocity and tension; place at the tick's start. Behind all these the edges' angular velocities, of strands
+    /// that have them.
     pub motion: Vec<[f32; 4]>,
     /// Rest shape; length, share of stiffness, weight in dry nodes, share softened.
     pub rest: Vec<[f32; 4]>,
@@ -226,6 +260,7 @@ const PACK: Nanos = Nanos(10_000);
 struct Slots<'a> {
     pose: &'a mut [[f32; 4]],
     motion: &'a mut [[f32; 4]],
+    spins: &'a mut [[f32; 4]],
     rest: &'a mut [[f32; 4]],
     bonds: &'a mut [[f32; 4]],
     reach: Reach,
@@ -269,6 +304,10 @@ impl Slots<'_> {
             self.pose[at(1, POSE)] = frame.to_array();
             self.motion[at(0, MOTION)] = view.velocities[node].extend(tension).to_array();
             self.motion[at(1, MOTION)] = before.extend(0.0).to_array();
+            if let Some(to) = self.spins.get_mut(at(0, 1)) {
+                let spin = view.spins.and_then(|spins| spins.get(node)).copied();
+                *to = spin.unwrap_or_default().extend(0.0).to_array();
+            }
             let length = view.lengths.get(node).copied().unwrap_or(0.0);
             let weight = if node == 0 { 0.0 } else { 1.0 };
             self.rest[at(0, REST)] = Quat::IDENTITY.to_array();
@@ -285,7 +324,8 @@ impl Contents {
     /// Zeros for all slots.
     pub fn new(layout: &Layout) -> Self {
         let room = |parts| vec![[0.0; 4]; layout.vectors(parts)];
-        Self { pose: room(POSE), motion: room(MOTION), rest: room(REST), bonds: room(BONDS) }
+        let motion = vec![[0.0; 4]; layout.motion_vectors()];
+        Self { pose: room(POSE), motion, rest: room(REST), bonds: room(BONDS) }
     }
 
     /// Of these strands.
@@ -297,10 +337,12 @@ impl Contents {
     pub(super) fn with_reach(layout: &Layout, strands: &[StrandView<'_>]) -> (Self, Reach) {
         let mut contents = Self::new(layout);
         let Self { pose, motion, rest, bonds } = &mut contents;
-        let mut parts = [&mut pose[..], &mut motion[..], &mut rest[..], &mut bonds[..]];
+        let (motion, spins) = motion.split_at_mut(layout.vectors(MOTION));
+        let mut parts = [&mut pose[..], motion, spins, &mut rest[..], &mut bonds[..]];
+        let each = [POSE, MOTION, usize::from(layout.has_spins), REST, BONDS];
         let mut blocks: Vec<_> = (layout.blocks.iter())
             .map(|[_, nodes, count, number]| {
-                let sizes = [POSE, MOTION, REST, BONDS].map(|each| *nodes as usize * each * LANES);
+                let sizes = each.map(|each| *nodes as usize * each * LANES);
                 let mut own = parts.iter_mut().zip(sizes).map(|(part, size)| {
                     let (own, others) = core::mem::take(part).split_at_mut(size);
                     *part = others;
@@ -310,6 +352,7 @@ impl Contents {
                 let own = Slots {
                     pose: next(),
                     motion: next(),
+                    spins: next(),
                     rest: next(),
                     bonds: next(),
                     reach: Reach::default(),
@@ -344,21 +387,21 @@ impl Contents {
     /// What a copy of pose, motion and bonds, one after the other, holds.
     pub(super) fn of_bytes(layout: &Layout, bytes: &[u8]) -> Self {
         let mut rest = bytes;
-        let mut part = |parts| {
-            let mut vectors = vec![[0.0; 4]; layout.vectors(parts)];
+        let mut part = |count| {
+            let mut vectors = vec![[0.0; 4]; count];
             let (own, others) = rest.split_at((16 * vectors.len()).min(rest.len()));
             bytemuck::cast_slice_mut::<[f32; 4], u8>(&mut vectors)[..own.len()]
                 .copy_from_slice(own);
             rest = others;
             vectors
         };
-        let (pose, motion, bonds) = (part(POSE), part(MOTION), part(BONDS));
+        let [pose, motion, bonds] = layout.state().map(&mut part);
         Self { pose, motion, rest: Vec::new(), bonds }
     }
 
     /// Bytes of such a copy.
     pub(super) fn bytes(layout: &Layout) -> u64 {
-        16 * layout.vectors(POSE + MOTION + BONDS) as u64
+        16 * layout.state().iter().sum::<usize>() as u64
     }
 
     /// Reads a strand from its slots.
@@ -379,6 +422,9 @@ impl Contents {
             }
             state.orientations.push(frame);
             state.tensions.push(moving[3]);
+            if layout.has_spins {
+                state.spins.push(vector(self.motion[layout.spin_index(strand, node)]));
+            }
             let kinds: [[f32; 4]; 4] = core::array::from_fn(|kind| self.bonds[at(kind, BONDS)]);
             state.joints.push(JointBonds { shapes: kinds.map(vector), rates: kinds.map(|k| k[3]) });
         }

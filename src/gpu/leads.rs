@@ -59,6 +59,7 @@ impl Leads {
             followers_led,
             first_follower_block: layout.simulated_blocks() as u32,
             first_follower_slot: layout.first_follower_slot() as u32,
+            has_spins: layout.has_spins(),
         }
     }
 

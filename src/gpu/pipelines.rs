@@ -21,6 +21,7 @@ pub const SOURCE: &str = concat!(
     include_str!("wgsl/obstacle.wgsl"),
     include_str!("wgsl/limiter.wgsl"),
     include_str!("wgsl/direct.wgsl"),
+    include_str!("wgsl/sweep.wgsl"),
     include_str!("wgsl/bonds.wgsl"),
     include_str!("wgsl/air.wgsl"),
     include_str!("wgsl/substep.wgsl"),
@@ -28,7 +29,7 @@ pub const SOURCE: &str = concat!(
 );
 
 /// How many kernels and groups there are.
-pub(super) const COUNT: usize = 7;
+pub(super) const COUNT: usize = 8;
 const GROUPS: usize = 6;
 
 /// Entry points with their sources and which of [`layouts`] they bind.
@@ -40,6 +41,7 @@ pub(super) const KERNELS: [(&str, &str, &[usize]); COUNT] = [
     ("lead_followers", include_str!("wgsl/lead.wgsl"), &[4, 1]),
     ("follow", SOURCE, &[0, 1]),
     ("sleep", include_str!("wgsl/sleep.wgsl"), &[5, 1]),
+    ("sweep", SOURCE, &[0, 1]),
 ];
 
 /// The groups that kernels bind, with their labels: a hair, a record, what packing, measuring, leading
@@ -72,6 +74,8 @@ pub struct HairKernels {
     pub(super) hair: BindGroupLayout,
     pub(super) record: BindGroupLayout,
     pub(super) substep: ComputePipeline,
+    /// The same of strands that the paper's projections solve.
+    pub(super) sweep: ComputePipeline,
     /// What packing binds.
     pub(super) drawn: BindGroupLayout,
     pub(super) present: ComputePipeline,
@@ -114,11 +118,12 @@ impl HairKernels {
         pipelines: [ComputePipeline; COUNT],
     ) -> Self {
         let [hair, record, drawn, measured, led, still] = layouts;
-        let [substep, present, measure, lead, lead_followers, follow, sleep] = pipelines;
+        let [substep, present, measure, lead, lead_followers, follow, sleep, sweep] = pipelines;
         Self {
             hair,
             record,
             substep,
+            sweep,
             drawn,
             present,
             measured,

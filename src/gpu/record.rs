@@ -1,6 +1,9 @@
 //! What acts on a hair in one substep, as the kernel reads it.
 
-use super::followers::FollowRecord;
+use super::{
+    followers::FollowRecord,
+    sweeps::{self, SweepRecord, UnusedSpins},
+};
 use crate::{
     bond::Cuticle,
     lod::follow::Frame,
@@ -35,8 +38,8 @@ pub(super) const WORDS: usize = (HEADER + 32 * MAX_OBSTACLES).next_multiple_of(6
 const HEADER: usize = BEFORE_TREATMENTS + COUNTS + 12 * MOST_TREATMENTS;
 const BEFORE_TREATMENTS: usize = 36 + 8 * MAX_BLOWERS;
 
-/// Words of counts, of how followers move and of sleep.
-const COUNTS: usize = 28;
+/// Words of counts, of how followers move, of sleep and of the projections.
+const COUNTS: usize = 28 + sweeps::WORDS;
 
 /// A blower in the hair's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,6 +67,8 @@ pub struct GpuJournal {
     pub(super) followed: f32,
     /// Sleep of the hair.
     pub(super) rest: Rest,
+    /// What has become of the angular velocities that the direct method does not have.
+    pub(super) unused_spins: UnusedSpins,
 }
 
 /// Whether a hair sleeps, as far as that is known.
@@ -113,6 +118,15 @@ impl Rest {
 }
 
 impl GpuJournal {
+    /// The device tells that the hair slept in this tick.
+    pub(super) fn slept_in(&mut self, tick: u32) -> bool {
+        let falls = self.rest.slept_in(tick);
+        if falls {
+            self.unused_spins.rest();
+        }
+        falls
+    }
+
     /// Whether more than so many substeps wait, or more led nodes than are uploaded together.
     pub(super) fn is_long(&self, most: usize) -> bool {
         self.records.len() > most
@@ -184,6 +198,8 @@ pub struct SubstepRecord {
     pub skin: f32,
     /// Newton steps of the length limiter, at most.
     pub limiter_steps: u32,
+    /// The paper's projections; `None` of hair that the direct method solves.
+    pub sweeps: Option<SweepRecord>,
     /// Wear of the cuticle.
     pub cuticle: Cuticle,
     /// Blowers, [`MAX_BLOWERS`] at most.
@@ -246,6 +262,7 @@ const LEADS_ROOTS: u32 = 32;
 const HOLDS: u32 = 64;
 const FOLLOWS: u32 = 128;
 const WAKES: u32 = 256;
+const SWEEPS: u32 = 512;
 
 impl SubstepRecord {
     /// Appends the record's words.
@@ -272,6 +289,7 @@ impl SubstepRecord {
             (self.led.iter().any(|led| led.node > 0 && led.place.is_some()), HOLDS),
             (self.follows.is_some(), FOLLOWS),
             (self.sleep.is_none_or(|sleep| sleep.wakes), WAKES),
+            (indices.has_spins, SWEEPS),
         ];
         let flags = flags.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
         let carry = self.carry.unwrap_or_default();
@@ -303,6 +321,8 @@ impl SubstepRecord {
         words.word(0);
         words.numbers(self.follows.unwrap_or_default().words());
         self.sleep.unwrap_or_default().write(&mut words);
+        let sweeps = SweepRecord::words(self.sweeps.as_ref(), self.dt, self.bending_length);
+        sweeps.into_iter().for_each(|word| words.word(word));
         for treatment in treatments {
             words.numbers(treatment.change);
             words.numbers(treatment.share);
@@ -326,6 +346,8 @@ pub(super) struct Indices {
     pub(super) followers_led: Range<u32>,
     pub(super) first_follower_block: u32,
     pub(super) first_follower_slot: u32,
+    /// Whether the strands have angular velocities, which the paper's projections need.
+    pub(super) has_spins: bool,
 }
 
 struct Words<'a>(&'a mut Vec<u32>);

@@ -89,8 +89,6 @@ pub enum Unsupported {
     Water,
     /// Hair made of [`Springs`](crate::Springs).
     Springs,
-    /// The paper's projections ([`Sweeps`](crate::Sweeps)).
-    Sweeps,
     /// Gusts of wind, or a [`WindZone`](crate::WindZone).
     UnsteadyWind,
     /// More than four blowers.
@@ -120,6 +118,8 @@ pub enum Unsupported {
     Strands,
     /// Strands have come or gone.
     Regroomed,
+    /// Its [`HairSolver::method`](crate::HairSolver::method) has changed. It goes there again in the next tick.
+    OtherSolver,
     /// The game wrote to a strand or its bonds.
     Written,
     /// A request that needs its strands on the CPU.
@@ -149,7 +149,6 @@ impl fmt::Display for Unsupported {
             Self::StrandContact => "contact between strands is not supported there",
             Self::Water => "water is not supported there",
             Self::Springs => "springs are not supported there",
-            Self::Sweeps => "the paper's projections are not supported there",
             Self::UnsteadyWind => "gusts and wind zones are not supported there",
             Self::Blowers => "more than four blowers are not supported there",
             Self::Colliders => "more than 128 colliders are not supported there",
@@ -166,6 +165,7 @@ impl fmt::Display for Unsupported {
             Self::Treatments => "treatments of single strands are not supported there",
             Self::Strands => "it has no strands that can be simulated",
             Self::Regroomed => "strands have come or gone",
+            Self::OtherSolver => "another method solves it from now on",
             Self::Written => "the game wrote to its strands",
             Self::Requested => "its strands were asked for",
         })
@@ -189,7 +189,8 @@ setting! {
         /// for, or more than 60 ticks late, is run up to the present at once. The result is the same.
         pub ticks_a_frame: u32 = 8, in TICKS: 1.0..=1000.0, "8 catches up in two frames";
         /// How often the state of hair is kept for the case that the device is lost; 0 never, then such
-        /// hair goes on from where it was handed over. A copy takes 128 bytes a node over the bus.
+        /// hair goes on from where it was handed over. A copy takes 128 bytes a node over the bus, by the
+        /// paper's projections 144.
         pub checkpoint: f32 = 1.0, "s" in CHECKPOINT: 0.0..=1e6, "1 loses a second";
     }
 }

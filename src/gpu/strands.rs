@@ -2,9 +2,7 @@
 
 use super::{
     followers,
-    layout::{
-        BONDS, Contents, Layout, MOTION, POSE, REST, Reach, SCRATCH, STILL, StrandState, StrandView,
-    },
+    layout::{BONDS, Contents, Layout, POSE, REST, Reach, SCRATCH, STILL, StrandState, StrandView},
     leads::Leads,
     pipelines::HairKernels,
     print::Print,
@@ -84,24 +82,26 @@ impl GpuStrands {
     /// Uploads strands. Each must have two nodes or more, and a bond for each joint.
     pub fn new(device: &RenderDevice, kernels: &HairKernels, strands: &[StrandView<'_>]) -> Self {
         let nodes: Vec<usize> = strands.iter().map(|view| view.positions.len()).collect();
-        let layout = Layout::with_followers(&nodes, |strand| strands[strand].follows.is_some());
+        let layout = Layout::with_followers(&nodes, |strand| strands[strand].follows.is_some())
+            .with_spins(strands.iter().any(|view| view.spins.is_some()));
         let (contents, reach) = Contents::with_reach(&layout, strands);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let with = |label, contents: &[u8]| {
             let label = Some(label);
             device.create_buffer_with_data(&BufferInitDescriptor { label, contents, usage })
         };
-        let room = |label, parts| {
+        let of_size = |label, vectors: usize| {
             device.create_buffer(&BufferDescriptor {
                 label: Some(label),
-                size: 16 * layout.vectors(parts) as u64,
+                size: 16 * vectors as u64,
                 usage,
                 mapped_at_creation: false,
             })
         };
+        let room = |label, parts| of_size(label, layout.vectors(parts));
         let blocks = with("hair blocks", bytemuck::cast_slice(layout.blocks()));
         let poses = [room("hair pose", POSE), room("hair pose", POSE)];
-        let motion = room("hair motion", MOTION);
+        let motion = of_size("hair motion", layout.motion_vectors());
         let rest = room("hair rest shapes", REST);
         let bonds = room("hair bonds", BONDS);
         let report = with("hair report", bytemuck::cast_slice(&NEW_REPORT));
@@ -284,7 +284,8 @@ impl GpuStrands {
             dispatch(pipeline, group, count);
         }
         let simulated = self.layout.simulated_blocks();
-        dispatch(&kernels.substep, &self.groups[self.present], simulated);
+        let solve = if self.layout.has_spins() { &kernels.sweep } else { &kernels.substep };
+        dispatch(solve, &self.groups[self.present], simulated);
         if let Some(followers) = &self.followers {
             let others = self.layout.blocks().len() - simulated;
             dispatch(&kernels.follow, &followers.groups[self.present], others);
@@ -336,10 +337,9 @@ impl GpuStrands {
     /// Copies the present state: pose, motion and bonds, one after the other.
     pub(super) fn copy_state(&self, encoder: &mut CommandEncoder, to: &Buffer) {
         let mut at = 0;
-        let parts =
-            [(&self.poses[self.present], POSE), (&self.motion, MOTION), (&self.bonds, BONDS)];
-        for (buffer, parts) in parts {
-            let size = 16 * self.layout.vectors(parts) as u64;
+        let buffers = [&self.poses[self.present], &self.motion, &self.bonds];
+        for (buffer, vectors) in buffers.into_iter().zip(self.layout.state()) {
+            let size = 16 * vectors as u64;
             encoder.copy_buffer_to_buffer(buffer, 0, to, at, size);
             at += size;
         }
@@ -384,10 +384,10 @@ impl GpuStrands {
         queue: &RenderQueue,
     ) -> Option<Contents> {
         self.settle(queue);
-        let layout = &self.layout;
-        let pose = read_back(device, queue, &self.poses[self.present], layout.vectors(POSE))?;
-        let motion = read_back(device, queue, &self.motion, layout.vectors(MOTION))?;
-        let bonds = read_back(device, queue, &self.bonds, layout.vectors(BONDS))?;
+        let [poses, motions, joints] = self.layout.state();
+        let pose = read_back(device, queue, &self.poses[self.present], poses)?;
+        let motion = read_back(device, queue, &self.motion, motions)?;
+        let bonds = read_back(device, queue, &self.bonds, joints)?;
         Some(Contents { pose, motion, rest: Vec::new(), bonds })
     }
 

@@ -101,11 +101,16 @@ impl Support<'_, '_> {
         lod.is_some_and(|(lod, _)| lod.wants_simulation())
     }
 
+    /// What solves a hair's rods.
+    pub(super) fn method(&self, hair: Entity) -> SolverMethod {
+        self.solver.of(hair).method
+    }
+
     /// The first reason of a hair.
     pub(super) fn missing(&self, hair: Entity) -> Option<Unsupported> {
         let (frame, obstacles, wet, lod, settles, is_watched, treatments, members) =
             self.hairs.get(hair).ok()?;
-        let (contact, solver) = (self.contact.of(hair), self.solver.of(hair));
+        let contact = self.contact.of(hair);
         let air = self.winds.seen_from(frame.now());
         // Of the tick before: what is near is looked at before it touches.
         let solids = obstacles.map_or(&[][..], |all| &all.solids);
@@ -117,7 +122,6 @@ impl Support<'_, '_> {
         let reasons = [
             (members.is_none_or(|members| members.is_empty()), Unsupported::Strands),
             (self.model.of(hair) == StrandModel::MassSpring, Unsupported::Springs),
-            (solver.method == SolverMethod::Sweeps, Unsupported::Sweeps),
             (contact.radius > 0.0 && contact.strength > 0.0, Unsupported::StrandContact),
             (wet.is_some_and(|wet| wet.0) || !self.water.is_empty(), Unsupported::Water),
             (air.steady_wind().is_none(), Unsupported::UnsteadyWind),

@@ -13,6 +13,7 @@ use super::{
 use crate::{
     contact::HairReach,
     lod::PresentLod,
+    rod::SolverMethod,
     schedule::{HairProcessTime, HairStep},
     setting::{Ranged, Settings},
     strand::{AskForStrands, Hair, MissedOnGpu, Strand, StrandOf, Strands},
@@ -27,7 +28,7 @@ use bevy::{
 /// What becomes of a hair in this tick.
 pub(super) enum Decision {
     /// It goes to the device.
-    Goes(Ready),
+    Goes(Ready, SolverMethod),
     /// It goes as soon as its level of detail is that which it has without the budget.
     Waits,
     /// Strands begin to be wound: where they are has to be known.
@@ -127,7 +128,7 @@ pub(super) fn decide(
                 && *residence != HairResidence::Cpu(WhyCpu::TooLarge)
                 && support.wants_simulation(hair);
             let decision = match why.map_or_else(|| device.ready(), Err) {
-                Ok(ready) => Decision::Goes(ready),
+                Ok(ready) => Decision::Goes(ready, support.method(hair)),
                 Err(_) if waits && device.ready().is_ok() => Decision::Waits,
                 Err(why) => Decision::Stays(why),
             };
@@ -170,6 +171,7 @@ pub(super) fn decide(
             (!wants, WhyCpu::NotAsked),
             (regroomed, WhyCpu::Unsupported(Unsupported::Regroomed)),
             (written.contains(&hair), WhyCpu::Unsupported(Unsupported::Written)),
+            (support.method(hair) != on.method, WhyCpu::Unsupported(Unsupported::OtherSolver)),
             (wetted.contains(&hair), WhyCpu::Unsupported(Unsupported::Water)),
             (singly.contains(&hair), WhyCpu::Unsupported(Unsupported::Treatments)),
             (
@@ -200,7 +202,7 @@ pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut Wor
         let waits = matches!(decision, Decision::Waits);
         let waited = lod.is_some_and(|mut lod| lod.bypass_change_detection().set_leaving(waits));
         let why = match decision {
-            Decision::Goes(ready) => match hand_over(world, hair, &ready) {
+            Decision::Goes(ready, method) => match hand_over(world, hair, &ready, method) {
                 Ok(()) => {
                     tracing::debug!("hair, entity {hair}: simulated on the GPU");
                     continue;

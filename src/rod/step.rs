@@ -76,7 +76,7 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams, obstacl
 
 /// Converts gathered masses (in dry nodes) to inverse masses and, with the sweeps' settings and the
 /// gravity-bending length, computes the inverse rotational masses of the edges.
-pub(crate) fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<(&Sweeps, f32)>) {
+pub fn weigh(level: Level, block: &mut BlockLanes, stiffness: Option<(&Sweeps, f32)>) {
     dispatch!(level, simd => weigh_simd(simd, block, stiffness));
 }
 
@@ -104,6 +104,12 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, stiffness: Option<(&Sweeps, 
         Real::select(held, zero, w).store_array(&mut n.w);
         before = after;
     }
+}
+
+/// The share of their relative angular velocity that neighbouring edges exchange in a substep of `dt` (s),
+/// by the damping (1/s).
+pub(crate) fn spin_exchange(internal_damping: f32, dt: f32) -> f32 {
+    0.5 * (1.0 - bevy::math::ops::exp(-internal_damping * dt))
 }
 
 /// Predicts orientations from angular velocities: without, a strand is overdamped and never settles.
@@ -140,8 +146,7 @@ fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams) {
         sum += omega.dot(omega);
     }
     if params.internal_damping > 0.0 {
-        let exchange = 0.5 * (1.0 - bevy::math::ops::exp(-params.internal_damping * params.dt));
-        let exchange = f32x16::splat(simd, exchange);
+        let exchange = f32x16::splat(simd, spin_exchange(params.internal_damping, params.dt));
         for i in 1..b.edges.len() {
             let (a, c) = (load3(simd, &b.edges[i - 1].omega), load3(simd, &b.edges[i].omega));
             let d = (c - a).scale(exchange);

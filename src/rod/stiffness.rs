@@ -148,24 +148,31 @@ impl Sweeps {
     pub fn rotational_weight<R: Real>(&self, bending_length: f32, l: R, mean: R) -> R {
         match self.orientation_weight {
             Some(chi) => l.lit(chi.into()) / (l * mean),
-            None => {
-                let lg3 = bending_length * bending_length * bending_length;
-                let stiff = self.bend.clamp(1e-6, 0.999_999);
-                let inertia = stiff
-                    / (8.0 * (1.0 - stiff) * lg3 * REFERENCE_DT * REFERENCE_DT * REFERENCE_GRAVITY);
-                l.lit(inertia.into()) * mean * l
-            }
+            None => l.lit(self.spin_weight(bending_length).into()) * mean * l,
         }
+    }
+
+    /// What makes w_q of lengths, by the gravity-bending length (m): k/(8 (1−k) L_g³ Δt₀² g).
+    #[inline(always)]
+    pub(crate) fn spin_weight(&self, bending_length: f32) -> f32 {
+        let lg3 = bending_length * bending_length * bending_length;
+        let stiff = self.bend.clamp(1e-6, 0.999_999);
+        stiff / (8.0 * (1.0 - stiff) * lg3 * REFERENCE_DT * REFERENCE_DT * REFERENCE_GRAVITY)
     }
 
     /// k of one substep of `dt` (s), from K = k/(1−k) ∝ Δt², times a `factor` on the true
     /// stiffness: cuticle (equation 13), wetness, material.
     #[doc(hidden)]
     pub fn per_substep(&self, dt: f32, factor: f32) -> f32 {
+        let ratio = self.ratio(dt) * factor;
+        ratio / (1.0 + ratio)
+    }
+
+    /// K = k/(1−k) of one substep of `dt` (s).
+    pub(crate) fn ratio(&self, dt: f32) -> f32 {
         let k = self.bend.min(0.999_999);
-        let ratio = dt / REFERENCE_DT;
-        let compliant = k / (1.0 - k) * ratio * ratio * factor;
-        compliant / (1.0 + compliant)
+        let longer = dt / REFERENCE_DT;
+        k / (1.0 - k) * longer * longer
     }
 }
 

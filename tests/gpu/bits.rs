@@ -37,6 +37,7 @@ fn bits(strand: &StrandState) -> Vec<u32> {
         vectors.iter().flat_map(|v| v.iter().flat_map(|v| v.to_array())).collect();
     numbers.extend(strand.orientations.iter().flat_map(|q| q.to_array()));
     numbers.extend(&strand.tensions);
+    numbers.extend(strand.spins.iter().flat_map(|omega| omega.to_array()));
     for JointBonds { shapes, rates } in &strand.joints {
         numbers.extend(shapes.iter().flat_map(|s| s.to_array()).chain(*rates));
     }
@@ -55,6 +56,7 @@ fn hand_over_and_return_without_a_substep_change_no_bit() {
             orientations: strand.orientations.clone(),
             root_frame: strand.root_frame,
             tensions: strand.tensions.clone(),
+            spins: strand.spins.clone(),
             joints: strand.joints.clone(),
             before: strand.positions.clone(),
         };

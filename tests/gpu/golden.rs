@@ -1,5 +1,5 @@
-//! Golden vectors of the direct solver through the shader: a dense solve in another language. The paper's
-//! projections, of which there are others, are not among the kernels.
+//! Golden vectors of the direct solver through the shader: a dense solve in another language. Those of the
+//! paper's projections are in `sweeps`.
 
 use crate::lab::{Device, LabStrand, plain};
 use bevy::prelude::*;
@@ -72,6 +72,7 @@ impl Case {
             root_frame: Quat::from_array(self.root_from),
             lengths: self.l.clone(),
             tensions: self.tension.clone(),
+            spins: Vec::new(),
             joints: self.rest.iter().map(joint).collect(),
         }
     }

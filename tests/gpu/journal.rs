@@ -141,7 +141,7 @@ fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
         let sweeps = HairSolver { method: SolverMethod::Sweeps, ..default() };
         app.world_mut().entity_mut(hair).insert(sweeps);
     });
-    assert_eq!(sweeps, Some(Unsupported::Sweeps));
+    assert_eq!(sweeps, None);
     let springs = reported(|app, hair| {
         app.world_mut().entity_mut(hair).insert(StrandModel::MassSpring);
     });

@@ -7,14 +7,17 @@ use bevy::{
     render::renderer::{RenderAdapterInfo, RenderDevice, RenderQueue},
 };
 use bevy_keratin::{
+    StretchProjection, Sweeps,
     bond::model::{JointBonds, cuticle_factor},
     environment::wind::wind,
-    gpu::{GpuStrands, HairKernels, StrandState, StrandView, SubstepRecord},
+    gpu::{GpuStrands, HairKernels, StrandState, StrandView, SubstepRecord, SweepRecord},
     lanes::{LANES, put3, put4, take3, take4},
     rod::{
         block::BlockLanes,
+        constraint::stiffness_per_iteration,
         direct::{self, DirectParams},
         frame::{darboux, full, parallel_transport},
+        step::{self, SweepParams},
     },
 };
 use fearless_simd::Level;
@@ -47,6 +50,8 @@ pub struct LabStrand {
     pub root_frame: Quat,
     pub lengths: Vec<f32>,
     pub tensions: Vec<f32>,
+    /// Angular velocities of the edges, where the paper's projections solve; else none.
+    pub spins: Vec<Vec3>,
     pub joints: Vec<JointBonds>,
 }
 
@@ -60,6 +65,7 @@ impl LabStrand {
             root_frame: orientations[0],
             lengths: points.windows(2).map(|p| p[0].distance(p[1])).collect(),
             tensions: vec![0.0; orientations.len()],
+            spins: Vec::new(),
             joints: Vec::new(),
             orientations,
         };
@@ -97,6 +103,12 @@ impl LabStrand {
         strand
     }
 
+    /// The same for the paper's projections, with edges that turn by up to so much (rad/s).
+    pub fn spinning(mut self, random: &mut Random, speed: f32) -> Self {
+        self.spins = self.lengths.iter().map(|_| random.vector() * speed).collect();
+        self
+    }
+
     pub fn omega(&self, i: usize) -> Quat {
         darboux(
             if i == 0 { self.root_frame } else { self.orientations[i - 1] },
@@ -112,6 +124,7 @@ impl LabStrand {
             root_frame: self.root_frame,
             lengths: &self.lengths,
             tensions: &self.tensions,
+            spins: (!self.spins.is_empty()).then_some(&self.spins),
             joints: &self.joints,
             before: &[],
             follows: None,
@@ -124,6 +137,7 @@ impl LabStrand {
         self.velocities.clone_from(&state.velocities);
         self.orientations.clone_from(&state.orientations);
         self.tensions.clone_from(&state.tensions);
+        self.spins.clone_from(&state.spins);
         self.joints.clone_from(&state.joints);
     }
 
@@ -146,7 +160,9 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
             s.positions.iter_mut().skip(1).for_each(|p| *p = carry * *p);
             s.velocities.iter_mut().for_each(|v| *v = rotation * *v);
             s.orientations.iter_mut().for_each(|q| *q = (rotation * *q).normalize());
+            s.spins.iter_mut().for_each(|omega| *omega = rotation * *omega);
         }
+        s.spins.iter_mut().for_each(|omega| *omega *= keep);
         let mut drying = vec![0.0; edges + 1];
         for (i, drying) in drying.iter_mut().enumerate() {
             let e = i.min(edges - 1);
@@ -163,15 +179,27 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
         let mut distance = 0.0;
         for i in 0..edges {
             let joint = &s.joints[i];
-            let share = joint.closed_share(&record.influence);
-            let few = share < 1e-3;
-            let rest = if few { s.omega(i) } else { full(joint.relaxed(&record.influence)) };
             let cuticle = record.cuticle;
+            let factor = cuticle_factor(distance, cuticle.damage, cuticle.softening);
+            let (rest, k) = match record.sweeps {
+                Some(SweepRecord { settings }) => {
+                    let k = settings.per_substep(dt, factor);
+                    let rest = joint.rest_shape(s.omega(i), &record.influence);
+                    (rest, stiffness_per_iteration(k, settings.iterations))
+                }
+                None => {
+                    let share = joint.closed_share(&record.influence);
+                    let few = share < 1e-3;
+                    let rest =
+                        if few { s.omega(i) } else { full(joint.relaxed(&record.influence)) };
+                    (rest, share.max(1e-3) * factor)
+                }
+            };
             let edge = &mut block.edges[i];
             put4(&mut edge.rest, lane, rest);
             put4(&mut edge.q, lane, s.orientations[i]);
-            edge.k[lane] =
-                share.max(1e-3) * cuticle_factor(distance, cuticle.damage, cuticle.softening);
+            put3(&mut edge.omega, lane, s.spins.get(i).copied().unwrap_or_default());
+            edge.k[lane] = k;
             (edge.l[lane], edge.tension[lane]) = (s.lengths[i], s.tensions[i]);
             distance += s.lengths[i];
         }
@@ -180,7 +208,8 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
             put3(&mut node.v, lane, if i == 0 { Vec3::ZERO } else { s.velocities[i] });
             node.w[lane] = if i == 0 { 0.0 } else { 1.0 };
         }
-        put3(&mut block.nodes[0].from, lane, root_from);
+        let from = if record.sweeps.is_some() { s.positions[0] } else { root_from };
+        put3(&mut block.nodes[0].from, lane, from);
         put4(&mut block.root, lane, s.root_frame);
         put4(&mut block.root_from, lane, carry.rotation * s.root_frame);
     }
@@ -196,8 +225,24 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
     for lane in strands.len()..LANES {
         repeat_first(&mut block, lane);
     }
-    direct::weigh(level, &mut block, record.bending_length, dt);
-    direct::step(level, &mut block, &params, &record.obstacles);
+    match &record.sweeps {
+        Some(SweepRecord { settings }) => {
+            let params = SweepParams {
+                dt,
+                iterations: settings.iterations,
+                projection: settings.projection,
+                limiter_steps: record.limiter_steps,
+                internal_damping: settings.internal_damping,
+                clearance: record.skin,
+            };
+            step::weigh(level, &mut block, Some((settings, record.bending_length)));
+            step::step(level, &mut block, &params, &record.obstacles);
+        }
+        None => {
+            direct::weigh(level, &mut block, record.bending_length, dt);
+            direct::step(level, &mut block, &params, &record.obstacles);
+        }
+    }
     for (lane, s) in strands.iter_mut().enumerate() {
         for (i, node) in block.nodes.iter().enumerate() {
             s.positions[i] = take3(&node.p, lane);
@@ -206,6 +251,9 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
         for (i, edge) in block.edges.iter().enumerate() {
             s.orientations[i] = take4(&edge.q, lane);
             s.tensions[i] = edge.tension[lane];
+            if let Some(omega) = s.spins.get_mut(i) {
+                *omega = take3(&edge.omega, lane);
+            }
         }
         for (i, asked) in asked[lane].iter().enumerate().take(s.lengths.len()) {
             let omega = s.omega(i);
@@ -228,6 +276,7 @@ fn repeat_first(block: &mut BlockLanes, lane: usize) {
         for cells in [&mut e.q, &mut e.rest] {
             cells.iter_mut().for_each(|cell| cell[lane] = cell[0]);
         }
+        e.omega.iter_mut().for_each(|cell| cell[lane] = cell[0]);
         for cell in [&mut e.l, &mut e.k, &mut e.tension] {
             cell[lane] = cell[0];
         }
@@ -292,5 +341,18 @@ pub fn plain() -> SubstepRecord {
         cuticle: default(),
         shapes: true,
         ..default()
+    }
+}
+
+/// A substep of the paper's 1/360 s by its projections, with the default settings.
+pub fn swept(projection: StretchProjection) -> SubstepRecord {
+    let settings = Sweeps { projection, internal_damping: 4.0, ..default() };
+    let dt = 1.0 / 360.0;
+    SubstepRecord {
+        dt,
+        keep: (-2.0 * dt).exp(),
+        limiter_steps: settings.limiter_steps,
+        sweeps: Some(SweepRecord { settings }),
+        ..plain()
     }
 }

@@ -29,3 +29,4 @@ mod shapes;
 mod sleep;
 mod stage;
 mod substep;
+mod sweeps;

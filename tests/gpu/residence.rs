@@ -3,6 +3,7 @@
 use crate::{
     bad, crossing, led, lod, papers, probe, shapes, sleep,
     stage::{Stage, apart, curls, free},
+    sweeps,
 };
 use bevy::prelude::*;
 use bevy_keratin::{
@@ -36,7 +37,7 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 fn hair_goes_to_the_device_and_comes_home() {
     let Some(mut stage) = Stage::new(SimulateOn::Cpu, Vec::new()) else { return };
     stage.compile();
-    let all: [fn(&mut Stage); 34] = [
+    let all: [fn(&mut Stage); 39] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
@@ -62,6 +63,11 @@ fn hair_goes_to_the_device_and_comes_home() {
         lod::roots_of_followers_go_with_their_mesh,
         hair_is_despawned_and_levels_change_on_the_way,
         crossing::whatever_happens_on_the_way_is_done,
+        sweeps::swept_hair_moves_there_as_on_the_processor,
+        sweeps::another_solver_takes_over_what_the_one_left,
+        sweeps::swept_followers_follow_there,
+        sweeps::swept_nodes_are_held_there,
+        sweeps::swept_hair_sleeps_there,
         shapes::a_cantilever_sags_as_on_the_processor,
         sleep::it_sleeps_when_the_last_strand_would,
         sleep::asleep_it_has_no_substeps,

@@ -23,7 +23,7 @@ use bevy_keratin::{
 };
 
 /// Curls that come to rest soon.
-fn calm() -> (HairSleep, AirDrag) {
+pub fn calm() -> (HairSleep, AirDrag) {
     (HairSleep::default(), AirDrag { rate: 20.0 })
 }
 
@@ -40,7 +40,7 @@ fn sleepers(stage: &Stage) -> Sleepers {
 }
 
 /// Ticks until all of it sleeps, so many a frame.
-fn until_asleep(stage: &mut Stage, at_once: u32) -> usize {
+pub fn until_asleep(stage: &mut Stage, at_once: u32) -> usize {
     stage.at_once(at_once);
     let frames = (1..600 / at_once).find(|_| {
         stage.run(1);

@@ -124,7 +124,8 @@ impl Stage {
     pub fn bits(&mut self) -> Vec<u32> {
         let (strands, bonds) = (self.strands(), self.bonds());
         let strands = strands.iter().flat_map(|strand| {
-            let vectors = strand.positions().iter().chain(strand.velocities());
+            let spins = strand.angular_velocities();
+            let vectors = strand.positions().iter().chain(strand.velocities()).chain(spins);
             let vectors = vectors.flat_map(|v| v.to_array());
             let turns = strand.orientations().iter().flat_map(|q| q.to_array());
             vectors.chain(turns).collect::<Vec<f32>>()

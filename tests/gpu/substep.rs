@@ -1,7 +1,7 @@
 //! One substep against lanes and against f64.
 
 use crate::{
-    lab::{Device, LabStrand, Random, in_lanes, plain},
+    lab::{Device, LabStrand, Random, in_lanes, plain, swept},
     twin::Twin,
 };
 use bevy::{
@@ -9,6 +9,7 @@ use bevy::{
     prelude::*,
 };
 use bevy_keratin::{
+    StretchProjection::{Coupled, Printed, Split},
     bond::model::JointBonds,
     gpu::{BlowerRecord, StrandState, SubstepRecord},
     rod::{
@@ -166,8 +167,15 @@ fn compare_on(
     let mut all = Errors::default();
     for nodes in NODES {
         let record = record(&mut random);
-        let strands: Vec<LabStrand> =
-            (0..COUNT).map(|_| LabStrand::random(&mut random, nodes, speed)).collect();
+        let strands: Vec<LabStrand> = (0..COUNT)
+            .map(|_| {
+                let strand = LabStrand::random(&mut random, nodes, speed);
+                match record.sweeps {
+                    Some(_) => strand.spinning(&mut random, 4.0),
+                    None => strand,
+                }
+            })
+            .collect();
         let twins: Vec<Twin> = strands
             .iter()
             .map(|strand| {
@@ -268,4 +276,31 @@ fn strands_in_wind_that_dries() {
             .collect(),
         ..plain()
     });
+}
+
+#[test]
+fn strands_by_the_papers_projections() {
+    for projection in [Split, Coupled, Printed] {
+        compare(&format!("{projection:?}"), 21, 0.2, |_| swept(projection));
+    }
+    compare("swept", 24, 0.2, |random| SubstepRecord {
+        carry: Some(Isometry3d::new(
+            random.vector() * 0.01,
+            Quat::from_scaled_axis(random.vector() * 0.1),
+        )),
+        change: [0.01, -0.01, 0.0, 0.0],
+        ..swept(Split)
+    });
+}
+
+#[test]
+fn strands_among_obstacles_by_the_papers_projections() {
+    for (scene, kind) in [("half-space", 0), ("capsule", 1), ("cylinder", 2), ("ball", 7)] {
+        for moves in [false, true] {
+            compare(scene, 31 + kind, 0.5, |random| SubstepRecord {
+                obstacles: vec![random_obstacle(random, kind, moves)],
+                ..swept(Split)
+            });
+        }
+    }
 }

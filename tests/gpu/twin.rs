@@ -1,6 +1,8 @@
 //! A substep of one strand in f64, written for itself: dense matrices, no lanes. What the lanes and the
 //! shader are both measured against.
 
+mod sweep;
+
 use crate::lab::LabStrand;
 use bevy::math::{DAffine3, DMat3, DQuat, DVec3, Isometry3d, Quat, Vec3};
 use bevy_keratin::{
@@ -70,6 +72,8 @@ pub struct Twin {
     pub v: Vec<DVec3>,
     pub q: Vec<DQuat>,
     pub tension: Vec<f64>,
+    /// Angular velocities of the edges, where the paper's projections solve.
+    pub spins: Vec<DVec3>,
     /// Remembered shape and rate of each joint's kinds.
     pub bonds: Vec<[(DVec3, f64); 4]>,
     from: Vec<DVec3>,
@@ -101,6 +105,7 @@ impl Twin {
             v: s.velocities.iter().map(|v| d(*v)).collect(),
             q: s.orientations.iter().map(|q| dq(*q)).collect(),
             tension: s.tensions.iter().map(|t| f64::from(*t)).collect(),
+            spins: s.spins.iter().map(|omega| d(*omega)).collect(),
             bonds: (0..edges).map(kinds).collect(),
             from: vec![DVec3::ZERO; edges + 1],
             root: dq(s.root_frame),
@@ -137,6 +142,9 @@ impl Twin {
             self.v.iter_mut().for_each(|v| *v = turn * *v);
             self.q.iter_mut().for_each(|q| *q = (turn * *q).normalize());
             root_from = turn * self.root;
+        }
+        if r.sweeps.is_some() {
+            return self.sweep(r);
         }
         self.blow(r);
         self.shape(r);
@@ -318,23 +326,27 @@ impl Twin {
     fn contacts(&mut self, r: &SubstepRecord, resting: f64, others: f64) {
         self.touched = false;
         for i in 0..=self.edges() {
-            let grip = if self.support[i] == DVec3::ZERO { others } else { resting };
-            let (mut p, mut support) = (self.p[i], DVec3::ZERO);
-            for o in &r.obstacles {
-                if self.sweeps {
-                    let (place, _, normal) = swept(o, along(o, self.from[i]), p, r.skin);
-                    if normal != DVec3::ZERO {
-                        (p, support) = (if i == 0 { p } else { place }, normal);
-                    }
-                }
-                let friction = grip * f64::from(o.friction);
-                if let Some((out, normal)) = push_out(o, p, self.from[i], friction, r.skin, true) {
-                    (p, support) = (if i == 0 { p } else { out }, normal);
+            self.touch(r, i, resting, others);
+        }
+    }
+
+    fn touch(&mut self, r: &SubstepRecord, i: usize, resting: f64, others: f64) {
+        let grip = if self.support[i] == DVec3::ZERO { others } else { resting };
+        let (mut p, mut support) = (self.p[i], DVec3::ZERO);
+        for o in &r.obstacles {
+            if self.sweeps {
+                let (place, _, normal) = swept(o, along(o, self.from[i]), p, r.skin);
+                if normal != DVec3::ZERO {
+                    (p, support) = (if i == 0 { p } else { place }, normal);
                 }
             }
-            (self.p[i], self.support[i]) = (p, support);
-            self.touched |= support != DVec3::ZERO;
+            let friction = grip * f64::from(o.friction);
+            if let Some((out, normal)) = push_out(o, p, self.from[i], friction, r.skin, true) {
+                (p, support) = (if i == 0 { p } else { out }, normal);
+            }
         }
+        (self.p[i], self.support[i]) = (p, support);
+        self.touched |= support != DVec3::ZERO;
     }
 
     /// One Newton step, all at once.

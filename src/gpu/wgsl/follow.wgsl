@@ -73,11 +73,15 @@ fn go_along() {
             turn = product(turned_by(spin.xyz * own_motion), turn);
         }
         let before = node(i + 1u).xyz;
+        let turned = product(turn, conjugate(product(record.follow_turn, frame(i))));
         let to = p + rotated(turn, segment.xyz);
         if is_broken3(to) {
             // It stays as it is.
             p = before;
             set_moving(i + 1u, vec3(0.0), 0.0);
+            if spins() {
+                set_spin(i, vec3(0.0));
+            }
             continue;
         }
         p = to;
@@ -86,6 +90,10 @@ fn go_along() {
         set_moving(i + 1u, select(v, vec3(0.0), is_broken3(v)), moving(i + 1u).w);
         set_node(i + 1u, p, 0.0);
         set_frame(i, turn);
+        if spins() {
+            let omega = turned.xyz * (select(2.0, -2.0, turned.w < 0.0) / record.follow_seconds);
+            set_spin(i, select(omega, vec3(0.0), is_broken3(omega)));
+        }
     }
 }
 

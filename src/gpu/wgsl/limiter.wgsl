@@ -26,28 +26,43 @@ fn span(start: vec3<f32>, to: vec3<f32>) -> vec4<f32> {
 }
 
 // x · W y of a node.
-fn mobility(w: f32, support: vec3<f32>, x: vec3<f32>, y: vec3<f32>) -> f32 {
+fn mobility(w: f32, support: vec3<f32>, x: vec3<f32>, y: vec3<f32>, touching: bool) -> f32 {
+    if !touching {
+        return w * dot(x, y);
+    }
     return w * (dot(x, y) - FIRMNESS * dot(x, support) * dot(y, support));
 }
 
-// One Newton step on the lengths where one is off by more than the share `tolerance`; whether there was.
+// One damped Newton step on the lengths where one is off by more than the share `tolerance`; whether there was.
 fn limit_strained(tolerance: f32) -> bool {
+    return limit(tolerance, true, true);
+}
+
+// One Newton step on all lengths; by `guarded` compressed strands fold no farther than necessary and taut ones do
+// not zigzag.
+fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
     var worst = 0.0;
     var start = node(0u);
-    var start_support = support_of(0u);
+    var start_support = vec3(0.0);
+    if touching {
+        start_support = support_of(0u);
+    }
     var end = node(1u);
     var d = span(start.xyz, end.xyz);
     var coupling = 0.0;
     var rows = Elimination(0.0, 0.0, 0.0);
     for (var i = 0u; i < edges; i++) {
-        let end_support = support_of(i + 1u);
-        var diagonal = mobility(start.w, start_support, d.xyz, d.xyz)
-            + mobility(end.w, end_support, d.xyz, d.xyz);
+        var end_support = vec3(0.0);
+        if touching {
+            end_support = support_of(i + 1u);
+        }
+        var diagonal = mobility(start.w, start_support, d.xyz, d.xyz, touching)
+            + mobility(end.w, end_support, d.xyz, d.xyz, touching);
         let l = edge(i).x;
         let off = d.w - l;
         let strain = abs(off) / l;
         worst = max(worst, strain);
-        if off < 0.0 {
+        if guarded && off < 0.0 {
             // Levenberg-Marquardt, where there is something to be folded.
             diagonal = fma(FOLDING * max(strain - TOLERANCE, 0.0), diagonal, diagonal);
         }
@@ -60,14 +75,14 @@ fn limit_strained(tolerance: f32) -> bool {
         if i + 1u < edges {
             let next = node(i + 2u);
             let ahead = span(end.xyz, next.xyz);
-            coupling = -mobility(end.w, end_support, d.xyz, ahead.xyz);
+            coupling = -mobility(end.w, end_support, d.xyz, ahead.xyz, touching);
             d = ahead;
             start = end;
             start_support = end_support;
             end = next;
         }
     }
-    if !(tolerance < worst) {
+    if guarded && !(tolerance < worst) {
         return false;
     }
     var lambda = 0.0;
@@ -81,20 +96,22 @@ fn limit_strained(tolerance: f32) -> bool {
         let tension = direction.xyz * lambda;
         let n = node(i + 1u);
         var force = pull - tension;
-        if 0u < k {
+        if guarded && 0u < k {
             // What pulls a node across a taut strand bears on it where it comes to.
             let taut = max(0.5 * (lambda + after.w), 0.0);
             let stiff = taut * n.w / edge(i).x;
             force -= (after.xyz - direction.xyz) * (taut * stiff / (1.0 + stiff));
         }
         after = vec4(direction.xyz, lambda);
-        let support = support_of(i + 1u);
-        let off = dot(force, support);
-        if 0.0 < off {
-            // The strand pulls it off the surface: it is let go.
-            set_support(i + 1u, vec3(0.0));
-        } else {
-            force = fma(support, vec3(-(FIRMNESS * off)), force);
+        if touching {
+            let support = support_of(i + 1u);
+            let off = dot(force, support);
+            if 0.0 < off {
+                // The strand pulls it off the surface: it is let go.
+                set_support(i + 1u, vec3(0.0));
+            } else {
+                force = fma(support, vec3(-(FIRMNESS * off)), force);
+            }
         }
         set_node(i + 1u, fma(force, vec3(n.w), n.xyz), n.w);
         pull = tension;

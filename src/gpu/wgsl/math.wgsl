@@ -5,6 +5,11 @@ fn normalized(q: vec4<f32>) -> vec4<f32> {
     return q * (1.0 / sqrt(dot(q, q)));
 }
 
+// A step toward the unit quaternion, without a root.
+fn renormalized(q: vec4<f32>) -> vec4<f32> {
+    return q * (2.0 / (1.0 + dot(q, q)));
+}
+
 fn conjugate(q: vec4<f32>) -> vec4<f32> {
     return vec4(-q.xyz, q.w);
 }
@@ -12,6 +17,16 @@ fn conjugate(q: vec4<f32>) -> vec4<f32> {
 fn product(a: vec4<f32>, b: vec4<f32>) -> vec4<f32> {
     let v = fma(b.xyz, vec3(a.w), fma(a.xyz, vec3(b.w), cross(a.xyz, b.xyz)));
     return vec4(v, fma(a.w, b.w, -dot(a.xyz, b.xyz)));
+}
+
+// q (0, v).
+fn times_vector(q: vec4<f32>, v: vec3<f32>) -> vec4<f32> {
+    return vec4(fma(v, vec3(q.w), cross(q.xyz, v)), -dot(q.xyz, v));
+}
+
+// (0, v) q.
+fn after_vector(q: vec4<f32>, v: vec3<f32>) -> vec4<f32> {
+    return vec4(fma(v, vec3(q.w), cross(v, q.xyz)), -dot(v, q.xyz));
 }
 
 // R(q) v.

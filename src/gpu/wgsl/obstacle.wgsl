@@ -295,30 +295,35 @@ fn contacts(resting: f32, others: f32) {
         return;
     }
     for (var i = 0u; i <= edges; i++) {
-        let n = node(i);
-        let held = is_held(n.w);
-        let start = start_of(i);
-        let rested = support_of(i);
-        let grip = select(others, resting, dot(rested, rested) > 0.0);
-        var p = n.xyz;
-        var rests_on = vec3(0.0);
-        for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
-            if sweeps {
-                let swept = continuous_collision(o, taken_along(o, start), p);
-                if swept.passes {
-                    p = select(swept.place, p, held);
-                    rests_on = swept.normal;
-                    touched = true;
-                }
-            }
-            let out = push_out(o, p, start, grip * record.obstacle[o].friction, true);
-            if out.meets {
-                p = select(out.place, p, held);
-                rests_on = out.normal;
+        touch(i, resting, others);
+    }
+}
+
+// The same of one node.
+fn touch(i: u32, resting: f32, others: f32) {
+    let n = node(i);
+    let held = is_held(n.w);
+    let start = start_of(i);
+    let rested = support_of(i);
+    let grip = select(others, resting, dot(rested, rested) > 0.0);
+    var p = n.xyz;
+    var rests_on = vec3(0.0);
+    for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
+        if sweeps {
+            let swept = continuous_collision(o, taken_along(o, start), p);
+            if swept.passes {
+                p = select(swept.place, p, held);
+                rests_on = swept.normal;
                 touched = true;
             }
         }
-        set_node(i, p, n.w);
-        set_support(i, rests_on);
+        let out = push_out(o, p, start, grip * record.obstacle[o].friction, true);
+        if out.meets {
+            p = select(out.place, p, held);
+            rests_on = out.normal;
+            touched = true;
+        }
     }
+    set_node(i, p, n.w);
+    set_support(i, rests_on);
 }

@@ -95,6 +95,15 @@ struct Substep {
     restless: u32,
     restless_before: u32,
     restless_next: u32,
+    // Of hair that sweeps solve: k/(1 − k) of a joint in a substep; what makes w_q of lengths, and χ that is
+    // given in its place, else 0; the share of their relative spin that neighbouring edges exchange.
+    bend: f32,
+    spin_weight: f32,
+    chi: f32,
+    exchange: f32,
+    iterations: u32,
+    projection: u32,
+    unused_3: vec2<u32>,
     treatment: array<Treatment, 8>,
     obstacle: array<Obstacle, MAX_OBSTACLES>,
 }
@@ -109,6 +118,7 @@ const LEADS_ROOTS: u32 = 32u;
 const HOLDS: u32 = 64u;
 const FOLLOWS: u32 = 128u;
 const WAKES: u32 = 256u;
+const SWEEPS: u32 = 512u;
 
 // Of each block of strands: first node slot, nodes of a strand, strands, number of its first strand.
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;
@@ -116,7 +126,8 @@ const WAKES: u32 = 256u;
 @group(0) @binding(1) var<storage, read> pose_in: array<vec4<f32>>;
 // The same; beside the place stands the inverse mass.
 @group(0) @binding(2) var<storage, read_write> pose_out: array<vec4<f32>>;
-// Two a node: velocity and tension; place at the tick's start and drying.
+// Two a node: velocity and tension; place at the tick's start and drying. Of hair that sweeps solve there is one
+// more behind those of all nodes: the edge's angular velocity.
 @group(0) @binding(3) var<storage, read_write> motion: array<vec4<f32>>;
 // Two a node: rest shape; length, share of stiffness, weight in dry nodes (0 held), share softened.
 @group(0) @binding(4) var<storage, read_write> rest: array<vec4<f32>>;
@@ -169,6 +180,23 @@ fn moving(i: u32) -> vec4<f32> {
 
 fn set_moving(i: u32, v: vec3<f32>, tension: f32) {
     motion[slot(i, 0u, 2u)] = vec4(v, tension);
+}
+
+fn spins() -> bool {
+    return (record.flags & SWEEPS) != 0u;
+}
+
+fn spin_slot(i: u32) -> u32 {
+    return arrayLength(&motion) / 3u * 2u + slot(i, 0u, 1u);
+}
+
+// Angular velocity of an edge, of hair that has them.
+fn spin(i: u32) -> vec3<f32> {
+    return motion[spin_slot(i)].xyz;
+}
+
+fn set_spin(i: u32, omega: vec3<f32>) {
+    motion[spin_slot(i)] = vec4(omega, 0.0);
 }
 
 // Length, share of stiffness, weight, share softened.

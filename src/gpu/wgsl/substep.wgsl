@@ -184,3 +184,41 @@ fn substep(
         remember();
     }
 }
+
+// The same by sweeps, in a kernel of its own: together they would need more registers.
+@compute @workgroup_size(32)
+fn sweep(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) index: u32,
+) {
+    let block = blocks[group.x];
+    if index >= block.z {
+        return;
+    }
+    first = block.x;
+    lane = index;
+    edges = block.y - 1u;
+    number = block.w + index;
+    if sleeps() {
+        lie_still();
+        rest_spins();
+        return;
+    }
+    load();
+    load_spins();
+    blow();
+    if (record.flags & SHAPES) != 0u {
+        shape_swept_joints();
+    }
+    sweep_step();
+    if !is_finite_strand() || !are_finite_spins() {
+        // No projection moves it, but by what is no number it is written to.
+        set_node(0u, start_of(0u), 0.0);
+        put_back();
+        rest_spins();
+        return;
+    }
+    if (record.flags & REMEMBERS) != 0u {
+        remember();
+    }
+}
