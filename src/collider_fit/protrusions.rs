@@ -32,6 +32,14 @@ pub(crate) struct ProtrusionRules {
     pub out: f32,
 }
 
+impl ProtrusionRules {
+    /// For what is so many times as large.
+    pub fn scaled(self, size: f32) -> Self {
+        let Self { apart, link, longest, out } = self;
+        Self { apart: apart * size, link: link * size, longest: longest * size, out: out * size }
+    }
+}
+
 /// Ellipsoids of least volume around those of `points` that are outside of `balls`, one for each group of
 /// neighbours.
 pub(crate) fn protrusions(

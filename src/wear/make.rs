@@ -43,6 +43,8 @@ const CREASE: f32 = -3e-4;
 const EARS: ProtrusionRules =
     ProtrusionRules { apart: -5e-4, link: 0.018, longest: 0.06, out: 1.5e-3 };
 const FINE_POINTS: usize = 15_000;
+/// How far from hair's roots they stay (m): what grows in a solid is pushed out of it.
+const BARE: f32 = 8e-3;
 /// Height of a head, as [`Scalp`](crate::plant::Scalp) measures it (m).
 const HEAD: f32 = 0.133;
 /// Distance beyond the hair's length within which meshes are considered (m).
@@ -103,7 +105,10 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
     };
     let (balls, capsules) = if order.wear.colliders && !order.target.has_colliders {
         let reach = grown.hair.strands.iter().map(Strand::length).fold(0.0, f32::max) + MARGIN;
-        (balls(&fitting, reach)?, capsules(&order.target.parts, &fitting, reach))
+        (
+            balls(&fitting, &grown.hair.strands, reach)?,
+            capsules(&order.target.parts, &fitting, reach),
+        )
     } else {
         default()
     };
@@ -214,7 +219,11 @@ fn median(values: &mut [f32]) -> Option<f32> {
 
 /// Balls that fill the head and stand a little out of it, and ellipsoids around its ears; for a mesh without
 /// joints, all of it that hair reaches.
-fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>, WearError> {
+fn balls(
+    fitting: &Fitting,
+    strands: &[Strand],
+    reach: f32,
+) -> Result<Vec<(HairCollider, Transform)>, WearError> {
     let cropped = cropped(&fitting.mesh, reach);
     let points = surface_points(&cropped, POINTS)?;
     let height = fitting.scalp.height;
@@ -228,8 +237,13 @@ fn balls(fitting: &Fitting, reach: f32) -> Result<Vec<(HairCollider, Transform)>
     };
     let balls = inscribed_balls(&places, |i| is_on_head(&points[i]), &rules);
     let skin = surface_points(&cropped, FINE_POINTS)?;
-    let skin = skin.iter().filter(|p| is_on_head(p)).map(|p| p.at);
-    let ears = protrusions(skin, &balls, &EARS);
+    let size = height / HEAD;
+    let roots = strands.iter().filter_map(|strand| strand.positions().first().copied());
+    let roots = KdTree::new(roots.zip(0u32..));
+    let clear = (0, (BARE * size).powi(2));
+    let is_bare = |p: &SurfacePoint| roots.nearer_than(p.at, clear) == clear;
+    let bare = skin.iter().filter(|p| is_on_head(p) && is_bare(p)).map(|p| p.at);
+    let ears = protrusions(bare, &balls, &EARS.scaled(size));
     let balls = balls.into_iter().map(|ball| {
         let place = Transform::from_translation(ball.center.into());
         Ok((HairCollider::sphere(ball.radius())?, place))
