@@ -363,7 +363,7 @@ pub fn shake(arguments: &Arguments, show: Shown) -> Result<Reel> {
     let posed = Posed { stands: true, turn: 0.0, yaw: 0.4, away: 1.55, height: 1.52 };
     let (mut app, pictures) = outdoors(arguments, HairPreset::Long, posed, size);
     settle(arguments, &mut app);
-    let reel = Reel { count: 30, apart: 6, milliseconds: 100, last: REST }.at_most(arguments.most);
+    let reel = Reel { count: 25, apart: 7, milliseconds: 117, last: REST }.at_most(arguments.most);
     film(&mut [(app, pictures)], reel, show, |app, tick| {
         let share = ((tick as f32 / 60.0 - SHAKEN.0) / SHAKEN.1).clamp(0.0, 1.0);
         // At once, and to a stop at once.

@@ -228,7 +228,7 @@ fn assemble(frames: &[PathBuf], reel: loops::Reel, to: &Path) -> io::Result<()> 
     command.args(["-loop", "0", "-min_size"]);
     for (i, frame) in frames.iter().enumerate() {
         let shown = if i + 1 == frames.len() { &rest } else { &each };
-        command.args(["-lossy", "-q", "78", "-m", "6", "-d", shown]).arg(frame);
+        command.args(["-lossy", "-q", "88", "-m", "6", "-d", shown]).arg(frame);
     }
     match command.arg("-o").arg(to).output() {
         Ok(output) if output.status.success() => println!("{}", to.display()),
