@@ -71,9 +71,8 @@ fn examples_that_are_named_are_there() {
 }
 
 /// Pictures from before the renderer that there is: their colours are those of a palette. None is the aim.
-const OF_OLD: [&str; 11] = [
+const OF_OLD: [&str; 10] = [
     "blow-dry-rates",
-    "character",
     "perm-untreated",
     "shower-lifted",
     "shower-on",

@@ -7,6 +7,7 @@ use crate::{
 };
 use bevy::{
     camera::visibility::NoFrustumCulling,
+    math::Affine3A,
     mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     prelude::*,
 };
@@ -68,7 +69,11 @@ fn build(
     let planted = preset.plant(&skin, &scalp)?;
     let count = preset.settings().followers.count;
     let line = preset.hairline();
-    let followers = preset.follower_roots(&planted, &skin, &scalp, &line, count, 0)?;
+    let mut followers = preset.follower_roots(&planted, &skin, &scalp, &line, count, 0)?;
+    // Planted in the skin's space, worn in the head bone's: drawn strands, which are laid out once hair
+    // has settled, need both in one.
+    let to_bone = -joint(HEAD);
+    followers.0.iter_mut().for_each(|root| root.place += to_bone);
     let capsules = fit_joint_capsules(&skin, &inverse)?;
 
     let body = commands
@@ -85,13 +90,14 @@ fn build(
 
     let hair = commands.spawn((Hair, preset.settings(), followers, ChildOf(bones[HEAD]))).id();
     for strand in planted.groom.strands() {
-        commands.spawn((StrandOf(hair), Strand::from_polyline(strand.points)?));
+        let points: Vec<Vec3> = strand.points.iter().map(|point| *point + to_bone).collect();
+        commands.spawn((StrandOf(hair), Strand::from_polyline(&points)?));
     }
     println!("{preset:?}: {} guides", planted.groom.len());
     commands.entity(hair).insert(RootsOnMesh {
         mesh: Some(body),
         roots: planted.roots,
-        ..default()
+        strands_from_mesh: Affine3A::from_translation(to_bone),
     });
 
     let brows = dressed::brows(preset.settings().look.melanin);

@@ -126,19 +126,22 @@ impl Arguments {
         (scaled(width), scaled(height))
     }
 
-    /// Draws no more strands than asked for, those wider, and shadows no finer than the picture.
+    /// Draws no more strands than asked for, those wider and of fewer segments, and shadows no finer than the picture.
     fn thin_out(&self, app: &mut App) {
-        let fine = (2048.0 * self.size * self.supersample as f32) as usize;
+        let fine = (1024.0 * self.size * self.supersample as f32) as usize;
         let size = fine.next_power_of_two().clamp(1024, 4096);
         app.insert_resource(DirectionalLightShadowMap { size });
         let share = (self.strands as f32 / 40_000.0).min(1.0);
         // Brows and lashes stay.
         let thin = move |count: u32| ((count as f32 * share) as u32).max(FEW).min(count);
+        let coarse =
+            move |segments: u32| ((segments as f32 * share.sqrt()) as u32).max(12).min(segments);
         let wider = |before: u32, now: u32| (before as f32 / now.max(1) as f32).sqrt();
         let world = app.world_mut();
         if let Some(mut followers) = world.get_resource_mut::<HairDefault<HairFollowers>>() {
             let before = followers.count;
             followers.count = thin(before);
+            followers.segments = coarse(followers.segments);
             let times = wider(before, followers.count);
             if let Some(mut look) = world.get_resource_mut::<HairDefault<HairLook>>() {
                 look.width *= times;
@@ -153,6 +156,7 @@ impl Arguments {
                 for (mut followers, look) in &mut hairs {
                     let before = followers.count;
                     followers.count = thin(before);
+                    followers.segments = coarse(followers.segments);
                     if let Some(mut look) = look {
                         look.width *= wider(before, followers.count);
                     }
@@ -190,7 +194,7 @@ fn make(piece: Piece, arguments: &Arguments) -> Result {
         Some(value) => value.get_name().to_owned(),
         None => return Ok(()),
     };
-    let film: fn(&Arguments, loops::Shown) -> Result<u32> = match piece {
+    let film: fn(&Arguments, loops::Shown) -> Result<loops::Reel> = match piece {
         Piece::Perm => loops::perm,
         Piece::Bedhead => loops::bedhead,
         Piece::BlowDry => loops::blow_dry,
@@ -207,25 +211,24 @@ fn make(piece: Piece, arguments: &Arguments) -> Result {
     picture::folder(&folder)?;
     let mut paths = Vec::new();
     // Each as it is drawn: whoever stops it keeps what there is.
-    let milliseconds = film(arguments, &mut |picture| {
+    let reel = film(arguments, &mut |picture| {
         let path = folder.join(format!("{:04}.png", paths.len()));
         picture::save(picture, &path)?;
         paths.push(path);
         Ok(())
     })?;
-    assemble(&paths, milliseconds, &arguments.out.join(format!("{name}.webp")))?;
+    assemble(&paths, reel, &arguments.out.join(format!("{name}.webp")))?;
     Ok(())
 }
 
 /// One animated WebP of the frames, if there is a program for it.
-fn assemble(frames: &[PathBuf], milliseconds: u32, to: &Path) -> io::Result<()> {
-    let each = milliseconds.to_string();
+fn assemble(frames: &[PathBuf], reel: loops::Reel, to: &Path) -> io::Result<()> {
+    let (each, rest) = (reel.milliseconds.to_string(), reel.last.to_string());
     let mut command = Command::new("img2webp");
     command.args(["-loop", "0", "-min_size"]);
     for (i, frame) in frames.iter().enumerate() {
-        // The last one stays a while.
-        let last = if i + 1 == frames.len() { "900" } else { each.as_str() };
-        command.args(["-lossy", "-q", "78", "-m", "6", "-d", last]).arg(frame);
+        let shown = if i + 1 == frames.len() { &rest } else { &each };
+        command.args(["-lossy", "-q", "88", "-m", "6", "-d", shown]).arg(frame);
     }
     match command.arg("-o").arg(to).output() {
         Ok(output) if output.status.success() => println!("{}", to.display()),

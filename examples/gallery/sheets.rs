@@ -109,7 +109,7 @@ pub fn melanin(arguments: &Arguments) -> Result {
     bust::look(&mut app, Vec3::new(0.44, 0.07, 0.46), MIDDLE);
     let few = if arguments.most > 1 { pigments.len() } else { 2 };
     let mut rows = Vec::new();
-    for wetness in [0.0, 0.4, 1.0] {
+    for wetness in [0.0, 0.5, 2.0] {
         if wetness > 0.0 {
             app.world_mut().write_message(SoakHair { target: bust.hair, wetness });
             run(&mut app, if arguments.most > 1 { 30 } else { 2 });
