@@ -56,7 +56,8 @@ pub enum FaultKind {
     Transform,
     /// A physics collider of a shape that is not supported: hair passes through it.
     Collider,
-    /// Roots that cannot be tied to their mesh: the strands stay as they are.
+    /// Roots that cannot be tied to their mesh: the strands stay as they are. Roots of drawn strands that are far
+    /// from the guides that they follow.
     Roots,
     /// A groom that could not be loaded, or that no strands can be grown from.
     Groom,

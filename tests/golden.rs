@@ -1,8 +1,8 @@
 //! Golden vectors: of a published reference implementation against the coupled projection, and of a dense
 //! solve in another language against the direct solver.
-//!
-//! `data/cosserat.json` and `data/direct.json` tell their conventions in `meta`; of the first here are its
-//! cases with full stiffness.
+
+#[path = "common/golden.rs"]
+mod golden;
 
 use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
@@ -17,47 +17,6 @@ use bevy_keratin::{
     },
 };
 use fearless_simd::Level;
-use serde::Deserialize;
-
-#[derive(Deserialize)]
-struct Golden {
-    stretch_shear: Vec<Stretch>,
-    bend_twist: Vec<Bend>,
-}
-
-#[derive(Deserialize)]
-struct Stretch {
-    p0: [f64; 3],
-    w0: f64,
-    p1: [f64; 3],
-    w1: f64,
-    q: [f64; 4],
-    wq: f64,
-    l: f64,
-    corr0: [f64; 3],
-    corr1: [f64; 3],
-    corrq: [f64; 4],
-    q_after: [f64; 4],
-}
-
-#[derive(Deserialize)]
-struct Bend {
-    q0: [f64; 4],
-    w0: f64,
-    q1: [f64; 4],
-    w1: f64,
-    rest_darboux: [f64; 4],
-    corrq0: [f64; 4],
-    corrq1: [f64; 4],
-    q0_after: [f64; 4],
-    q1_after: [f64; 4],
-}
-
-fn golden() -> Golden {
-    let golden: Golden = serde_json::from_str(include_str!("data/cosserat.json")).unwrap();
-    assert_eq!((golden.stretch_shear.len(), golden.bend_twist.len()), (48, 48));
-    golden
-}
 
 /// Unit roundoff of f32.
 const EPS32: f64 = 1.0 / 16_777_216.0;
@@ -114,7 +73,7 @@ fn same(what: &str, case: usize, found: &[f64], expected: &[f64], relative: f64,
 }
 
 fn check<R: Number>(relative: f64, rounding: f64) {
-    let golden = golden();
+    let golden = golden::projections();
     for (i, c) in golden.stretch_shear.iter().enumerate() {
         let quat = q::<R>(c.q);
         let e = EdgeWeights { w1: R::of(c.w0), w2: R::of(c.w1), wq: R::of(c.wq), l: R::of(c.l) };
@@ -175,46 +134,10 @@ fn coupled_projection_in_f32() {
     check::<f32>(1e-5, EPS32);
 }
 
-#[derive(Deserialize)]
-struct Substeps {
-    cases: Vec<Substep>,
-}
-
-#[derive(Deserialize)]
-struct Substep {
-    name: String,
-    dt: f32,
-    damping: f32,
-    gravity: [f32; 3],
-    held: Vec<bool>,
-    from: Vec<[f32; 3]>,
-    p: Vec<[f32; 3]>,
-    v: Vec<[f32; 3]>,
-    mass: Vec<f32>,
-    q: Vec<[f32; 4]>,
-    rest: Vec<[f32; 4]>,
-    l: Vec<f32>,
-    k: Vec<f32>,
-    axial: Vec<f32>,
-    tension: Vec<f32>,
-    root: [f32; 4],
-    root_from: [f32; 4],
-    after: After,
-}
-
-#[derive(Deserialize)]
-struct After {
-    p: Vec<[f32; 3]>,
-    v: Vec<[f32; 3]>,
-    q: Vec<[f32; 4]>,
-}
-
 #[test]
 fn a_substep_of_the_direct_solver_in_f32() {
-    let golden: Substeps = serde_json::from_str(include_str!("data/direct.json")).unwrap();
-    assert_eq!(golden.cases.len(), 7);
     let all = |value: f32| -> Lane { [value; LANES] };
-    for c in golden.cases {
+    for c in golden::substeps() {
         let mut block = BlockLanes::default();
         block.resize(c.p.len());
         // As for hair that holds any twist: the dense solve has no limit to it.

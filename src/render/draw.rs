@@ -5,7 +5,7 @@ use super::{
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     drawn_strand::{DrawnStrand, GuideRoot},
     elsewhere::DrawnElsewhere,
-    follower_roots::FollowerRoots,
+    follower_roots::{FollowerRoots, misplaced},
     material::{Ribbon, RibbonKey, RibbonMaterial},
     packed_frame::{DrawnFrame, PackedFrame},
     ribbon_mesh::{RibbonLevel, RibbonMeshes},
@@ -16,6 +16,7 @@ use super::{
 use crate::{
     Moisture,
     bond::Bonds,
+    fault::{FaultKind, HairFault},
     look::{HairDye, HairLook, Streaks},
     setting::Settings,
     settle::Settling,
@@ -114,6 +115,7 @@ pub(super) fn pack(
     (mut known_meshes, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
     mut materials: ResMut<Assets<RibbonMaterial>>,
     mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
+    mut faults: MessageWriter<HairFault>,
 ) {
     let overstep = match time {
         Some(time) if interpolate.0 => time.overstep_fraction().clamp(0.0, 1.0),
@@ -186,6 +188,15 @@ pub(super) fn pack(
         }
 
         let strands = packed.scatter(&strands, follower_roots.as_deref(), &settings);
+        if follower_roots.is_some()
+            && let Some(off) = misplaced(&strands)
+        {
+            let message = format!(
+                "followers are {off} m from the guides that they follow, more than their length: give \
+                 FollowerRoots in the hair's frame, as the guides are"
+            );
+            faults.write(HairFault::new(FaultKind::Roots, message).of(hair));
+        }
         let counts = (packed.layout.len() as u32, strands.len() as u32);
         packed.ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
         packed.key = key;

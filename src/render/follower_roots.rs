@@ -26,7 +26,9 @@ setting! {
    #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
    #[reflect(Default, Clone, PartialEq)]
    pub struct FollowerRoot {
-       /// The root's place at rest, in the hair's frame (m).
+       /// The root's place at rest, in the hair's frame (m), as the guides' are. Roots that are planted with
+       /// guides in a mesh's space are moved with them: see
+       /// [`RootsOnMesh::strands_from_mesh`](crate::RootsOnMesh::strands_from_mesh).
        pub place: Vec3 = Vec3::ZERO;
        /// The strand's length, up to four times that of its guides.
        pub length: f32 = 0.0, "m" in LENGTH: 0.0..=f32::INFINITY, safe 0.0..=2.0,
@@ -46,6 +48,21 @@ const NEAR: usize = 8;
 const SHAPE: f32 = 0.3;
 /// The same of what a guide is too short by: its shape would be scaled up.
 const SHORT: f32 = 0.5;
+
+/// The median distance of followers from the guides that they follow (m), where that is more than their own
+/// length: roots and guides are not in one frame.
+pub(super) fn misplaced(strands: &[DrawnStrand]) -> Option<f32> {
+    let followers = strands.iter().filter(|strand| !strand.is_guide);
+    let mut off: Vec<(f32, f32)> =
+        followers.map(|strand| (strand.root.length(), strand.size)).collect();
+    let half = off.len() / 2;
+    if off.is_empty() {
+        return None;
+    }
+    let (_, (distance, length), _) =
+        off.select_nth_unstable_by(half, |a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    (*distance > *length).then_some(*distance)
+}
 
 /// The followers with given roots.
 pub(super) fn lay_followers(
@@ -225,5 +242,20 @@ mod tests {
         assert_eq!(grown.len(), 1);
         assert_eq!(grown[0].guides, [0; 3]);
         assert!(lay_followers(&[good], &[], &plain(9)).is_empty());
+    }
+
+    #[test]
+    fn roots_in_another_frame_than_the_guides_are_noticed() {
+        let guides: Vec<_> = (0..9).map(|i| guide(0.01 * i as f32, Vec3::Y * 0.2)).collect();
+        let roots = |off: Vec3| -> Vec<FollowerRoot> {
+            let each = guides.iter().map(|guide| guide.place + off + Vec3::Z * 3e-3);
+            each.map(|place| FollowerRoot { place, length: 0.2, ..default() }).collect()
+        };
+        let laid = |off| lay_followers(&roots(off), &guides, &plain(100));
+        assert_eq!(misplaced(&laid(Vec3::ZERO)), None);
+        let off = misplaced(&laid(Vec3::Y * 1.6)).expect("as high as a head");
+        assert!((off - 1.6).abs() < 0.05, "{off}");
+        assert_eq!(misplaced(&[]), None);
+        assert_eq!(misplaced(&[DrawnStrand::guide(0)]), None);
     }
 }

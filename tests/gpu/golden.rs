@@ -1,46 +1,15 @@
 //! Golden vectors of the direct solver through the shader: a dense solve in another language. Those of the
 //! paper's projections are in `sweeps`.
 
-use crate::lab::{Device, LabStrand, plain};
+use crate::{
+    lab::{Device, LabStrand, plain},
+    vectors::{Substep, substeps},
+};
 use bevy::prelude::*;
 use bevy_keratin::{
     bond::model::JointBonds,
     gpu::{GpuStrands, LedNode, SOURCE, SubstepRecord, TreatmentRecord},
 };
-use serde::Deserialize;
-
-#[derive(Deserialize)]
-struct Golden {
-    cases: Vec<Case>,
-}
-
-#[derive(Deserialize)]
-struct Case {
-    name: String,
-    dt: f32,
-    damping: f32,
-    gravity: [f32; 3],
-    from: Vec<[f32; 3]>,
-    p: Vec<[f32; 3]>,
-    v: Vec<[f32; 3]>,
-    mass: Vec<f32>,
-    q: Vec<[f32; 4]>,
-    rest: Vec<[f32; 4]>,
-    l: Vec<f32>,
-    k: Vec<f32>,
-    axial: Vec<f32>,
-    tension: Vec<f32>,
-    root: [f32; 4],
-    root_from: [f32; 4],
-    after: After,
-}
-
-#[derive(Deserialize)]
-struct After {
-    p: Vec<[f32; 3]>,
-    v: Vec<[f32; 3]>,
-    q: Vec<[f32; 4]>,
-}
 
 /// Masses and stiffnesses as the vectors have them, in place of what hair makes of its lengths. They stand where
 /// treatments of no joint do, and where a wind is that takes nothing along.
@@ -60,7 +29,7 @@ fn weigh() {
 }
 ";
 
-impl Case {
+impl Substep {
     fn strand(&self) -> LabStrand {
         let turns = |all: &[[f32; 4]]| all.iter().map(|q| Quat::from_array(*q)).collect();
         let places = |all: &[[f32; 3]]| all.iter().map(|p| Vec3::from(*p)).collect();
@@ -117,13 +86,11 @@ impl Case {
 #[test]
 fn a_substep_of_the_direct_solver() {
     let Some(device) = Device::get() else { return };
-    let golden: Golden = serde_json::from_str(include_str!("../data/direct.json")).unwrap();
-    assert_eq!(golden.cases.len(), 7);
     let usual = "fn weigh() {";
     assert_eq!(SOURCE.matches(usual).count(), 1);
     let source = SOURCE.replace(usual, "fn weigh_as_usual() {") + WEIGH;
     let kernels = device.kernels.clone().with_substep(&device.device, &source);
-    for c in golden.cases {
+    for c in substeps() {
         let strand = c.strand();
         let mut on = GpuStrands::new(&device.device, &kernels, &[strand.view()]);
         on.run(&device.device, &device.queue, &kernels, &[c.record()]);

@@ -9,6 +9,8 @@ mod offscreen;
 #[path = "../../examples/scenes/mod.rs"]
 mod scenes;
 mod twin;
+#[path = "../common/golden.rs"]
+mod vectors;
 
 mod bad;
 mod bits;

@@ -5,6 +5,7 @@ use crate::{
     residence::grow,
     sleep::{calm, until_asleep},
     stage::{Stage, apart, curls},
+    vectors::projections,
 };
 use bevy::{math::Isometry3d, prelude::*};
 use bevy_keratin::{
@@ -20,41 +21,6 @@ use bevy_keratin::{
     },
     strand::StrandSleep,
 };
-use serde::Deserialize;
-
-#[derive(Deserialize)]
-struct Golden {
-    stretch_shear: Vec<Stretch>,
-    bend_twist: Vec<Bend>,
-}
-
-#[derive(Deserialize)]
-struct Stretch {
-    p0: [f64; 3],
-    w0: f64,
-    p1: [f64; 3],
-    w1: f64,
-    q: [f64; 4],
-    wq: f64,
-    l: f64,
-    corr0: [f64; 3],
-    corr1: [f64; 3],
-    corrq: [f64; 4],
-    q_after: [f64; 4],
-}
-
-#[derive(Deserialize)]
-struct Bend {
-    q0: [f64; 4],
-    w0: f64,
-    q1: [f64; 4],
-    w1: f64,
-    rest_darboux: [f64; 4],
-    corrq0: [f64; 4],
-    corrq1: [f64; 4],
-    q0_after: [f64; 4],
-    q1_after: [f64; 4],
-}
 
 /// One projection in place of a substep. Inverse masses stand where the root's velocity does, and whether it is an
 /// edge's where its tension does.
@@ -119,8 +85,7 @@ fn same(what: &str, case: usize, found: &[f32], expected: &[f64], absolute: f64)
 fn golden_vectors_of_the_papers_projections() {
     const EPS: f64 = 1.0 / 16_777_216.0;
     let Some(device) = Device::get() else { return };
-    let golden: Golden = serde_json::from_str(include_str!("../data/cosserat.json")).unwrap();
-    assert_eq!((golden.stretch_shear.len(), golden.bend_twist.len()), (48, 48));
+    let golden = projections();
     let usual = "fn substep(";
     assert_eq!(SOURCE.matches(usual).count(), 1);
     let source = SOURCE.replace(usual, "fn usual_substep(") + ONE_PROJECTION;
