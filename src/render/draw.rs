@@ -16,7 +16,7 @@ use super::{
 use crate::{
     Moisture,
     bond::Bonds,
-    fault::{FaultKind, HairFault},
+    fault::HairFault,
     look::{HairDye, HairLook, Streaks},
     setting::Settings,
     settle::Settling,
@@ -188,15 +188,7 @@ pub(super) fn pack(
         }
 
         let strands = packed.scatter(&strands, follower_roots.as_deref(), &settings);
-        if follower_roots.is_some()
-            && let Some(off) = misplaced(&strands)
-        {
-            let message = format!(
-                "followers are {off} m from the guides that they follow, more than their length: give \
-                 FollowerRoots in the hair's frame, as the guides are"
-            );
-            faults.write(HairFault::new(FaultKind::Roots, message).of(hair));
-        }
+        faults.write_batch(misplaced(&strands).map(|fault| fault.of(hair)));
         let counts = (packed.layout.len() as u32, strands.len() as u32);
         packed.ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
         packed.key = key;

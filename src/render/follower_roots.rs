@@ -5,6 +5,7 @@ use super::{
     followers::HairFollowers,
 };
 use crate::{
+    fault::{FaultKind, HairFault},
     grid::KdTree,
     setting::{Ranged, setting},
 };
@@ -49,9 +50,9 @@ const SHAPE: f32 = 0.3;
 /// The same of what a guide is too short by: its shape would be scaled up.
 const SHORT: f32 = 0.5;
 
-/// The median distance of followers from the guides that they follow (m), where that is more than their own
-/// length: roots and guides are not in one frame.
-pub(super) fn misplaced(strands: &[DrawnStrand]) -> Option<f32> {
+/// A fault where followers are farther from the guides that they follow than they are long, by the median: roots
+/// and guides are not in one frame.
+pub(super) fn misplaced(strands: &[DrawnStrand]) -> Option<HairFault> {
     let followers = strands.iter().filter(|strand| !strand.is_guide);
     let mut off: Vec<(f32, f32)> =
         followers.map(|strand| (strand.root.length(), strand.size)).collect();
@@ -61,7 +62,13 @@ pub(super) fn misplaced(strands: &[DrawnStrand]) -> Option<f32> {
     }
     let (_, (distance, length), _) =
         off.select_nth_unstable_by(half, |a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    (*distance > *length).then_some(*distance)
+    (*distance > *length).then(|| {
+        let message = format!(
+            "followers are {distance:.3} m from the guides that they follow, more than their length: give \
+             FollowerRoots in the hair's frame, as the guides are"
+        );
+        HairFault::new(FaultKind::Roots, message)
+    })
 }
 
 /// The followers with given roots.
@@ -253,8 +260,9 @@ mod tests {
         };
         let laid = |off| lay_followers(&roots(off), &guides, &plain(100));
         assert_eq!(misplaced(&laid(Vec3::ZERO)), None);
-        let off = misplaced(&laid(Vec3::Y * 1.6)).expect("as high as a head");
-        assert!((off - 1.6).abs() < 0.05, "{off}");
+        let fault = misplaced(&laid(Vec3::Y * 1.6)).expect("as high as a head");
+        assert_eq!(fault.kind, FaultKind::Roots);
+        assert!(fault.message.contains("are 1.600 m from"), "{}", fault.message);
         assert_eq!(misplaced(&[]), None);
         assert_eq!(misplaced(&[DrawnStrand::guide(0)]), None);
     }
