@@ -89,7 +89,7 @@ fn around(points: &[Vec3], out: f32) -> Option<Protrusion> {
         let inverse = each.fold(DMat4::ZERO, |sum, one| sum + one).inverse();
         let (farthest, far) = (raised.iter().map(|q| q.dot(inverse * *q)).enumerate())
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        if !(far > 4.0 + 1e-3) {
+        if far.is_nan() || far <= 4.0 + 1e-3 {
             break;
         }
         let step = (far - 4.0) / (4.0 * (far - 1.0));
