@@ -29,7 +29,7 @@ setting! {
    pub struct FollowerRoot {
        /// The root's place at rest, in the hair's frame (m), as the guides' are. Roots that are planted with
        /// guides in a mesh's space are moved with them: see
-       /// [`RootsOnMesh::strands_from_mesh`](crate::RootsOnMesh::strands_from_mesh).
+       /// [`RootsOnMesh::strands_from_mesh`](crate::attach::RootsOnMesh::strands_from_mesh).
        pub place: Vec3 = Vec3::ZERO;
        /// The strand's length, up to four times that of its guides.
        pub length: f32 = 0.0, "m" in LENGTH: 0.0..=f32::INFINITY, safe 0.0..=2.0,
