@@ -8,7 +8,7 @@
 
 mod balls;
 mod kd_tree;
-#[cfg(feature = "groom")]
+#[cfg(any(feature = "groom", feature = "render"))]
 mod order;
 mod soup;
 
@@ -16,7 +16,7 @@ mod soup;
 pub use balls::{BallGrid, FoundBalls};
 pub use kd_tree::KdTree;
 pub(crate) use kd_tree::split_at_median;
-#[cfg(feature = "groom")]
+#[cfg(any(feature = "groom", feature = "render"))]
 pub(crate) use order::compact_groups;
 pub(crate) use soup::TriangleSoup;
 
