@@ -69,23 +69,3 @@ fn a_hundred_thousand_strands_cost_a_tenth_of_a_millisecond() {
     });
     assert!(found.is_some(), "100,000 strands in seven times 16,384");
 }
-
-/// To be read; the machine at hand decides.
-#[test]
-#[ignore = "a measurement, to be read"]
-fn how_long_a_hand_over_takes() {
-    for count in [10_000, 50_000] {
-        let times = (0..5).map(|_| {
-            let mut stage = prepared(SimulateOn::Cpu, straight(count, 16))?;
-            let hair = stage.hair;
-            stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);
-            let handed = tick(&mut stage);
-            assert!(stage.is_on_gpu());
-            Some(handed - tick(&mut stage))
-        });
-        let times: Option<Vec<f64>> = times.collect();
-        let Some(times) = times else { return };
-        let best = times.iter().copied().fold(f64::INFINITY, f64::min);
-        println!("{count} strands of 16 nodes: {best:.1} ms at best, {times:.1?}");
-    }
-}
