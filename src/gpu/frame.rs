@@ -5,7 +5,7 @@ use super::{
     compile::Compiled, hair::GpuHair, record::GpuJournal, residence::HairGpu, shared::Link,
 };
 use crate::{
-    render::{DrawnElsewhere, HairBuffers},
+    render::{DrawnElsewhere, HairBuffers, WritesNodes},
     setting::Ranged,
     strand::StrandHistory,
 };
@@ -23,10 +23,10 @@ use bevy::{
 
 pub(super) fn plugin(app: &mut App) {
     if let Some(render) = app.get_sub_app_mut(RenderApp) {
-        render
-            .init_resource::<Extracted>()
-            .add_systems(ExtractSchedule, extract)
-            .add_systems(RenderGraph, run.in_set(RenderGraphSystems::Render).before(camera_driver));
+        render.init_resource::<Extracted>().add_systems(ExtractSchedule, extract).add_systems(
+            RenderGraph,
+            run.in_set(RenderGraphSystems::Render).in_set(WritesNodes).before(camera_driver),
+        );
     }
 }
 

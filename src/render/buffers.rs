@@ -20,6 +20,8 @@ use half::{f16, slice::HalfFloatSliceExt};
 /// | `strands` | 128 | [`DrawnStrand`]: the guides first, then the followers |
 /// | `frame` | 12,688 | share of the strands that is drawn, share over which they fade, how many times wider they are (3 × f32), number of solids (u32), 24 bounding balls of eight solids each (middle and radius, 4 × f32), then up to 192 solids of 64 bytes that strands are pushed out of |
 ///
+/// | `rings` | 32 | of each drawn strand, root to tip, the places between its straight segments: position (3 × f32), tangent (octahedral, 2 × snorm16), what it is from the middle of a lock that water draws together (3 × f16, m), moisture (f16), bond rates (4 × unorm8), strain and 1 if it is drawn (2 × f16) |
+///
 /// `nodes` and `frame` are written once a frame into the same GPU buffers. When the groom changes the
 /// handles change too.
 #[derive(Component, Reflect, Clone, Debug)]
@@ -33,6 +35,9 @@ pub struct HairBuffers {
     pub strands: Handle<ShaderBuffer>,
     /// How many of them are drawn in this frame, and what they are pushed out of.
     pub frame: Handle<ShaderBuffer>,
+    /// Computed from these on the GPU, once a frame in which the hair is seen; `None` where the device cannot.
+    /// `#import bevy_keratin::rings` has the structure.
+    pub rings: Option<Handle<ShaderBuffer>>,
     /// How many guides there are.
     pub guide_count: u32,
     /// How many strands are drawn, guides included.

@@ -5,6 +5,7 @@ use super::{
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     drawn_strand::{DrawnStrand, GuideRoot},
     elsewhere::DrawnElsewhere,
+    expand::size_of_rings,
     follower_roots::{FollowerRoots, misplaced},
     material::{Ribbon, RibbonKey, RibbonMaterial},
     packed_frame::{DrawnFrame, PackedFrame},
@@ -26,7 +27,10 @@ use bevy::{
     asset::RenderAssetUsages,
     camera::{primitives::Aabb, visibility::NoAutoAabb},
     prelude::*,
-    render::{renderer::RenderDevice, storage::ShaderBuffer},
+    render::{
+        renderer::{RenderAdapter, RenderDevice},
+        storage::ShaderBuffer,
+    },
 };
 
 /// Packed data of a hair, kept to reuse the allocations.
@@ -46,7 +50,7 @@ pub(super) struct Packed {
     spacing: f32,
     /// How far followers reach beyond the guides (m).
     margin: f32,
-    ribbon: Ribbon,
+    pub(super) ribbon: Ribbon,
     key: RibbonKey,
     /// Roots of drawn strands at rest, which determine their streaks.
     places: Vec<Vec3>,
@@ -111,7 +115,7 @@ pub(super) fn pack(
     (looks, dyes, views): (Settings<HairLook>, Settings<HairDye>, Settings<HairView>),
     followers: Settings<HairFollowers>,
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
-    device: Option<Res<RenderDevice>>,
+    (device, adapter): (Option<Res<RenderDevice>>, Option<Res<RenderAdapter>>),
     (mut known_meshes, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
     mut materials: ResMut<Assets<RibbonMaterial>>,
     mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
@@ -121,7 +125,7 @@ pub(super) fn pack(
         Some(time) if interpolate.0 => time.overstep_fraction().clamp(0.0, 1.0),
         _ => 1.0,
     };
-    let new_device = device.is_some_and(|device| device.is_changed());
+    let new_device = device.as_ref().is_some_and(|device| device.is_changed());
     let roots_removed: Vec<Entity> = roots_removed.read().collect();
     for (hair, mut packed, buffers, members, follower_roots, place, elsewhere) in &mut hairs {
         let packed = packed.bypass_change_detection();
@@ -155,7 +159,7 @@ pub(super) fn pack(
         let around = |margin: f32| Aabb::from_min_max(low - margin, high + margin);
         let (look, dye) = (looks.of(hair), dyes.of(hair));
         let view = views.of(hair);
-        let key = RibbonKey::new(&look, view);
+        let key = |rings: bool| RibbonKey::new(&look, view, rings);
 
         let known = buffers.and_then(|b| drawn.get_mut(b.drawn).ok().zip(Some(b)));
         if packed.layout.is_empty() {
@@ -172,6 +176,7 @@ pub(super) fn pack(
                 nodes.data = Some(bytemuck::cast_slice(&packed.nodes).to_vec());
             }
             let counts = (buffers.guide_count, buffers.strand_count);
+            let key = key(buffers.rings.is_some());
             let ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
             let has_new_streaks = packed.update_streaks(&dye);
             if has_new_streaks || (packed.ribbon, packed.key) != (ribbon, key) {
@@ -191,6 +196,12 @@ pub(super) fn pack(
         faults.write_batch(misplaced(&strands).map(|fault| fault.of(hair)));
         let counts = (packed.layout.len() as u32, strands.len() as u32);
         packed.ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
+        let rings =
+            size_of_rings(adapter.as_deref(), device.as_deref(), counts.1, settings.segments);
+        let rings = rings.map(|size| {
+            shader_buffers.add(ShaderBuffer::with_size(size, RenderAssetUsages::default()))
+        });
+        let key = key(rings.is_some());
         packed.key = key;
         packed.update_streaks(&dye);
         let mut first = 0;
@@ -200,10 +211,13 @@ pub(super) fn pack(
         });
         let ranges: Vec<[u32; 2]> = ranges.collect();
         let mut add = |bytes: &[u8]| shader_buffers.add(buffer(bytes));
+        let nodes = add(bytemuck::cast_slice(&packed.nodes));
         let material = RibbonMaterial {
             key,
             ribbon: packed.ribbon,
-            nodes: add(bytemuck::cast_slice(&packed.nodes)),
+            // Any buffer stands for rings that nobody reads.
+            rings: rings.clone().unwrap_or_else(|| nodes.clone()),
+            nodes,
             guides: add(bytemuck::cast_slice(&ranges)),
             strands: add(&pack_strands(&strands)),
             streaks: add(&packed.pack_streaks()),
@@ -232,6 +246,7 @@ pub(super) fn pack(
             guides,
             strands,
             frame,
+            rings,
             guide_count: counts.0,
             strand_count: counts.1,
             drawn,

@@ -41,6 +41,9 @@ pub(super) struct RibbonMaterial {
     /// What differs from frame to frame besides nodes.
     #[storage(5, read_only, visibility(vertex, fragment))]
     pub(super) frame: Handle<ShaderBuffer>,
+    /// Computed once a frame from these; read only where the key says so.
+    #[storage(6, read_only, visibility(vertex))]
+    pub(super) rings: Handle<ShaderBuffer>,
 }
 
 /// Specialisation key of the shader.
@@ -48,12 +51,14 @@ pub(super) struct RibbonMaterial {
 pub(super) struct RibbonKey {
     heat: bool,
     kajiya_kay: bool,
+    /// Whether rings are computed once a frame.
+    expanded: bool,
 }
 
 impl RibbonKey {
-    pub(super) fn new(look: &HairLook, view: HairView) -> Self {
+    pub(super) fn new(look: &HairLook, view: HairView, expanded: bool) -> Self {
         let heat = !matches!(view, HairView::Natural | HairView::Guides);
-        Self { heat, kajiya_kay: !heat && look.shading == HairShading::KajiyaKay }
+        Self { heat, kajiya_kay: !heat && look.shading == HairShading::KajiyaKay, expanded }
     }
 }
 
@@ -203,9 +208,10 @@ impl Material for RibbonMaterial {
         descriptor.vertex.buffers = vec![layout.0.get_layout(&[CORNER.at_shader_location(0)])?];
         descriptor.primitive.cull_mode = None;
         let samples = ShaderDefVal::UInt("HAIR_SAMPLES".into(), descriptor.multisample.count);
+        let RibbonKey { heat, kajiya_kay, expanded } = key.bind_group_data;
         descriptor.vertex.shader_defs.push(samples.clone());
+        descriptor.vertex.shader_defs.extend(expanded.then(|| "HAIR_EXPANDED".into()));
         if let Some(fragment) = &mut descriptor.fragment {
-            let RibbonKey { heat, kajiya_kay } = key.bind_group_data;
             let defs = &mut fragment.shader_defs;
             defs.push(samples);
             defs.extend(heat.then(|| "HAIR_HEAT".into()));

@@ -53,6 +53,7 @@ mod detail;
 mod draw;
 mod drawn_strand;
 mod elsewhere;
+mod expand;
 mod follower_roots;
 mod followers;
 mod frame;
@@ -78,6 +79,8 @@ pub(crate) use elsewhere::DrawnElsewhere;
 pub use follower_roots::{FollowerRoot, FollowerRoots};
 pub use followers::HairFollowers;
 pub use sets::HairRenderSystems;
+#[cfg(feature = "gpu")]
+pub(crate) use sets::WritesNodes;
 pub use view::{HairView, STRAIN_FULL, heat};
 pub use wet_look::WetLook;
 
@@ -172,6 +175,7 @@ impl Plugin for HairRenderPlugin {
             tracing::warn!("hair is simulated but not drawn: the app has no graphics device");
         }
         load_shader_library!(app, "strands.wgsl");
+        load_shader_library!(app, "rings.wgsl");
         load_shader_library!(app, "ribbon.wgsl");
         load_shader_library!(app, "coverage.wgsl");
         load_shader_library!(app, "fibre.wgsl");
@@ -179,6 +183,7 @@ impl Plugin for HairRenderPlugin {
         load_shader_library!(app, "shading.wgsl");
         embedded_asset!(app, "ribbon_forward.wgsl");
         embedded_asset!(app, "ribbon_prepass.wgsl");
+        embedded_asset!(app, "expand.wgsl");
         app.add_plugins(MaterialPlugin::<RibbonMaterial>::default());
         // Bevy does not call `finish` of plugins added in `finish`.
         ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial>>::default().finish(app);
@@ -192,6 +197,7 @@ impl Plugin for HairRenderPlugin {
                 .before(AssetEventSystems),
         );
         upload::plugin(app);
+        expand::plugin(app);
         beads::finish(app);
     }
 }

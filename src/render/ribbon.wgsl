@@ -5,11 +5,27 @@
 #import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_keratin::strands::{
-    ribbon, strands, frame, strand_point, ring_share, strand_alpha, strand_state, StrandState,
-    DrawnStrand,
+    ribbon, strands, frame, ring_share, strand_alpha, StrandState, DrawnStrand,
 }
+#ifdef HAIR_EXPANDED
+#import bevy_keratin::rings::{PackedRing, Ring, unpacked}
+#else
+#import bevy_keratin::rings::{Ring, ring_of}
+#endif
 #ifdef MOTION_VECTOR_PREPASS
 #import bevy_keratin::strands::past_strand_position
+#endif
+
+#ifdef HAIR_EXPANDED
+@group(#{MATERIAL_BIND_GROUP}) @binding(6) var<storage, read> rings: array<PackedRing>;
+
+fn ring_at(index: u32, ring: u32) -> Ring {
+    return unpacked(rings[index * (ribbon.segments + 1u) + ring]);
+}
+#else
+fn ring_at(index: u32, ring: u32) -> Ring {
+    return ring_of(strands[index], ring_share(ring));
+}
 #endif
 
 const VIEW_GUIDES: u32 = 6u;
@@ -73,22 +89,22 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     let in_strand = corner - index * per_strand;
     out.along = ring_share(in_strand / 2u);
     let side = f32(in_strand & 1u) - 0.5;
-    let point = strand_point(strand, out.along);
-    if all(point.weights == vec3(0.0)) {
+    let ring = ring_at(index, in_strand / 2u);
+    if !ring.shown {
         return out;
     }
     out.shown = true;
     out.seed = strand.seed;
-    out.state = strand_state(strand, point);
+    out.state = ring.state;
 
     let world = mesh_functions::get_world_from_local(instance);
     let linear = mat3x3(world[0].xyz, world[1].xyz, world[2].xyz);
     let scale = pow(abs(determinant(linear)), 1.0 / 3.0);
     out.scale = scale;
-    let center = (world * vec4(point.position, 1.0)).xyz;
+    let center = (world * vec4(ring.position, 1.0)).xyz;
     out.center = center;
-    out.tangent = safe_normalize(linear * point.slope, vec3(0.0, 1.0, 0.0));
-    out.outward = linear * point.outward;
+    out.tangent = safe_normalize(linear * ring.tangent, vec3(0.0, 1.0, 0.0));
+    out.outward = linear * ring.outward;
     let eye = toward_eye(center);
 
     let own_width = select(strand.width, 1.0, strand.width < 0.0);

@@ -10,6 +10,10 @@ use bevy::{
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HairRenderSystems;
 
+/// In the render world's graph: what writes nodes on the GPU does so before strands are expanded.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct WritesNodes;
+
 /// Whether drawing goes between ticks by the overstep of the fixed clock.
 #[derive(Resource, Clone, Copy, Debug)]
 pub(super) struct Interpolate(pub(super) bool);

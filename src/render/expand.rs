@@ -1,0 +1,204 @@
+//! Expands strands once a frame on the GPU: every ring of every strand that is drawn, into a buffer that
+//! all passes read.
+
+use super::{
+    buffers::HairBuffers,
+    draw::Packed,
+    material::Ribbon,
+    sets::{HairRenderSystems, WritesNodes},
+};
+use bevy::{
+    asset::load_embedded_asset,
+    camera::visibility::ViewVisibility,
+    core_pipeline::schedule::camera_driver,
+    platform::collections::HashMap,
+    prelude::*,
+    render::{
+        Extract, ExtractSchedule, RenderApp, RenderStartup,
+        render_asset::RenderAssets,
+        render_resource::{
+            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
+            BufferId, CachedComputePipelineId, ComputePassDescriptor, ComputePipelineDescriptor,
+            DownlevelFlags, DynamicUniformBuffer, PipelineCache, ShaderStages,
+            binding_types::{storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer},
+        },
+        renderer::{
+            RenderAdapter, RenderContext, RenderDevice, RenderGraph, RenderGraphSystems,
+            RenderQueue,
+        },
+        storage::{GpuShaderBuffer, ShaderBuffer},
+    },
+    shader::ShaderDefVal,
+};
+
+/// Bytes of `PackedRing` of `rings.wgsl`.
+const RING: u64 = 32;
+/// `@workgroup_size` of `expand.wgsl`.
+const LANES: u32 = 64;
+
+pub(super) fn plugin(app: &mut App) {
+    let Some(render) = app.get_sub_app_mut(RenderApp) else { return };
+    render
+        .init_resource::<Expansions>()
+        .add_systems(RenderStartup, compile)
+        .add_systems(ExtractSchedule, extract.in_set(HairRenderSystems))
+        .add_systems(
+            RenderGraph,
+            expand.in_set(RenderGraphSystems::Render).after(WritesNodes).before(camera_driver),
+        );
+}
+
+/// Number of rings of drawn hair.
+fn rings(strands: u32, segments: u32) -> u64 {
+    u64::from(strands) * (u64::from(segments) + 1)
+}
+
+/// Size of the buffer of rings (bytes), if the device can fill and read one. Vertices compute their rings by
+/// themselves if not.
+pub(super) fn size_of_rings(
+    adapter: Option<&RenderAdapter>,
+    device: Option<&RenderDevice>,
+    strands: u32,
+    segments: u32,
+) -> Option<usize> {
+    let flags = adapter?.get_downlevel_capabilities().flags;
+    let limits = device?.limits();
+    let size = RING * rings(strands, segments);
+    let fits = size <= limits.max_storage_buffer_binding_size
+        && size <= limits.max_buffer_size
+        && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS;
+    let can = flags.contains(DownlevelFlags::COMPUTE_SHADERS) && fits;
+    can.then_some(size.max(RING) as usize)
+}
+
+/// What a vertex shader binds: six of ours, and Bevy's meshes.
+const STORAGE_BUFFERS: u32 = 8;
+
+/// The kernel.
+#[derive(Resource)]
+struct Expander {
+    layout: BindGroupLayoutDescriptor,
+    pipeline: CachedComputePipelineId,
+}
+
+fn compile(mut commands: Commands, assets: Res<AssetServer>, pipelines: Res<PipelineCache>) {
+    let read = || storage_buffer_read_only_sized(false, None);
+    let layout = BindGroupLayoutDescriptor::new(
+        "hair rings",
+        &BindGroupLayoutEntries::with_indices(
+            ShaderStages::COMPUTE,
+            (
+                (0, uniform_buffer::<Ribbon>(true)),
+                (1, read()),
+                (2, read()),
+                (3, read()),
+                (5, read()),
+                (6, storage_buffer_sized(false, None)),
+            ),
+        ),
+    );
+    let pipeline = pipelines.queue_compute_pipeline(ComputePipelineDescriptor {
+        label: Some("hair rings".into()),
+        layout: vec![layout.clone()],
+        shader: load_embedded_asset!(&*assets, "expand.wgsl"),
+        shader_defs: vec![ShaderDefVal::UInt("MATERIAL_BIND_GROUP".into(), 0)],
+        ..default()
+    });
+    commands.insert_resource(Expander { layout, pipeline });
+}
+
+/// The hair that is seen in this frame.
+#[derive(Resource, Default)]
+struct Expansions {
+    hairs: Vec<Expansion>,
+    ribbons: DynamicUniformBuffer<Ribbon>,
+    groups: HashMap<Bound, Group>,
+}
+
+/// Of each bind group the buffers that it binds.
+type Bound = [BufferId; 6];
+
+struct Group {
+    group: BindGroup,
+    is_used: bool,
+}
+
+struct Expansion {
+    /// Nodes, guides, strands, frame, rings.
+    buffers: [AssetId<ShaderBuffer>; 5],
+    ribbon: Ribbon,
+    rings: u64,
+}
+
+fn extract(
+    hairs: Extract<Query<(&HairBuffers, &Packed)>>,
+    drawn: Extract<Query<&ViewVisibility>>,
+    mut expansions: ResMut<Expansions>,
+) {
+    expansions.hairs.clear();
+    let seen =
+        hairs.iter().filter(|(hair, _)| drawn.get(hair.drawn).is_ok_and(|drawn| drawn.get()));
+    expansions.hairs.extend(seen.filter_map(|(hair, packed)| {
+        let HairBuffers { nodes, guides, strands, frame, rings: ring, .. } = hair;
+        Some(Expansion {
+            buffers: [nodes.id(), guides.id(), strands.id(), frame.id(), ring.as_ref()?.id()],
+            ribbon: packed.ribbon,
+            rings: rings(hair.strand_count, packed.segments()),
+        })
+    }));
+}
+
+fn expand(
+    mut expansions: ResMut<Expansions>,
+    expander: Option<Res<Expander>>,
+    pipelines: Res<PipelineCache>,
+    buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
+    (device, queue): (Res<RenderDevice>, Res<RenderQueue>),
+    mut context: RenderContext,
+) {
+    let Expansions { hairs, ribbons, groups } = &mut *expansions;
+    let (Some(expander), Some(buffers)) = (expander, buffers) else { return };
+    let Some(pipeline) = pipelines.get_compute_pipeline(expander.pipeline) else { return };
+    if device.is_changed() {
+        // What a lost device held is gone.
+        (*ribbons, *groups) = default();
+    }
+    groups.retain(|_, group| core::mem::take(&mut group.is_used));
+    if hairs.is_empty() {
+        return;
+    }
+    ribbons.clear();
+    let offsets: Vec<u32> = hairs.iter().map(|hair| ribbons.push(&hair.ribbon)).collect();
+    ribbons.write_buffer(&device, &queue);
+    let Some(uniform) = ribbons.buffer() else { return };
+    let most = device.limits().max_compute_workgroups_per_dimension;
+    let mut pass = context
+        .command_encoder()
+        .begin_compute_pass(&ComputePassDescriptor { label: Some("hair rings"), ..default() });
+    pass.set_pipeline(pipeline);
+    for (hair, offset) in hairs.iter().zip(offsets) {
+        let gpu = hair.buffers.map(|id| buffers.get(id).map(|gpu| &gpu.buffer));
+        let [Some(nodes), Some(guides), Some(strands), Some(frame), Some(rings)] = gpu else {
+            continue;
+        };
+        let bound = [uniform, nodes, guides, strands, frame, rings];
+        let group = groups.entry(bound.map(Buffer::id)).or_insert_with(|| {
+            let layout = pipelines.get_bind_group_layout(&expander.layout);
+            let Some(ribbon) = ribbons.binding() else { unreachable!() };
+            let entries = BindGroupEntries::with_indices((
+                (0, ribbon),
+                (1, nodes.as_entire_binding()),
+                (2, guides.as_entire_binding()),
+                (3, strands.as_entire_binding()),
+                (5, frame.as_entire_binding()),
+                (6, rings.as_entire_binding()),
+            ));
+            let group = device.create_bind_group("hair rings", &layout, &entries);
+            Group { group, is_used: true }
+        });
+        group.is_used = true;
+        pass.set_bind_group(0, &group.group, &[offset]);
+        let count = hair.rings.div_ceil(u64::from(LANES)).min(u64::from(u32::MAX)) as u32;
+        pass.dispatch_workgroups(count.min(most), count.div_ceil(most), 1);
+    }
+}
