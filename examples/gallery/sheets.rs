@@ -19,18 +19,6 @@ fn run(app: &mut App, ticks: u32) {
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
 }
 
-/// The left half of one picture and the right half of another of the same size, a pale line between.
-fn wiped(left: &Image, right: &Image) -> Image {
-    let mut wiped = left.clone();
-    let (width, half) = (left.width() as usize, left.width() as usize / 2);
-    let (Some(to), Some(from)) = (wiped.data.as_mut(), right.data.as_ref()) else { return wiped };
-    for (to, from) in to.chunks_mut(4 * width).zip(from.chunks(4 * width)) {
-        to[4 * half..].copy_from_slice(&from[4 * half..]);
-        to[4 * (half - 1)..4 * (half + 1)].fill(235);
-    }
-    wiped
-}
-
 /// A scene at one of its frames.
 fn scene(arguments: &Arguments, scene: Scene, view: HairView, frame: u32) -> Result<Image> {
     let mut app = renderer::app("", (0, 0), true, default());
@@ -68,7 +56,7 @@ pub fn hero(arguments: &Arguments) -> Result {
     Ok(arguments.save(picture::beside(&drawn), "hero")?)
 }
 
-/// Dry and soaked; untreated and permed; as it looks and its hydrogen bonds: each in one picture.
+/// Dry and, below, soaked; untreated and permed; as it looks and its hydrogen bonds: by the same camera and light.
 pub fn before(arguments: &Arguments) -> Result {
     let size = arguments.scaled(400, 400);
     let (mut app, bust, pictures) = settled(arguments, HairPreset::Long, size)?;
@@ -79,7 +67,7 @@ pub fn before(arguments: &Arguments) -> Result {
     run(&mut app, if arguments.most > 1 { 60 } else { 2 });
     let wet = pictures.draw(&mut app)?;
     if arguments.most == 1 {
-        return Ok(arguments.save(wiped(&dry, &wet), "before-after")?);
+        return Ok(arguments.save(picture::below(&[dry, wet]), "before-after")?);
     }
     let perm = |variant| {
         let scene_of = Scene::new(SceneKind::Perm, Some(variant))?;
@@ -88,9 +76,9 @@ pub fn before(arguments: &Arguments) -> Result {
     let dried = Scene::new(SceneKind::BlowDry, None)?;
     let natural = scene(arguments, dried, HairView::Natural, 1170)?;
     let bonds = scene(arguments, dried, HairView::Bond(BondKind::Hydrogen), 1170)?;
-    let pairs =
-        [wiped(&dry, &wet), wiped(&perm("untreated")?, &perm("treated")?), wiped(&natural, &bonds)];
-    Ok(arguments.save(picture::beside(&pairs), "before-after")?)
+    let before = picture::beside(&[dry, perm("untreated")?, natural]);
+    let after = picture::beside(&[wet, perm("treated")?, bonds]);
+    Ok(arguments.save(picture::below(&[before, after]), "before-after")?)
 }
 
 /// Seven pigments across; dry, damp and soaked down.

@@ -9,6 +9,7 @@ const DRY_SURFACE: f32 = 0.0465;
 const WET_SURFACE: f32 = 0.0058;
 const FILM_SURFACE: f32 = 0.02;
 const FILM_VARIANCE: f32 = 0.0064;
+const LOCK_FIBRES: f32 = 3.0;
 const WET_INSIDE: f32 = 0.7;
 const WET_SLEEK: f32 = 0.24;
 const TT_FOCUS: f32 = 3.65;
@@ -34,6 +35,8 @@ pub struct Optics {
     pub tilt: f32,
     /// Strength of what the film of water reflects.
     pub film: f32,
+    /// 0 by itself … 1 among the fibres of a wet lock, whose neighbours its light goes through as well.
+    pub lock: f32,
 }
 
 impl Optics {
@@ -47,6 +50,7 @@ impl Optics {
             wet: 0.0,
             tilt: 0.0,
             film: 0.0,
+            lock: 0.0,
         }
     }
 
@@ -87,6 +91,7 @@ impl Optics {
         let tt = TT_SHARE
             * around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi)
             * a.along(0.25 * sleek + spread, self.tilt + TILT)
+            * (-(1.0 - self.forward_share()) * LOCK_FIBRES * self.lock).exp()
             * (1.0 - f_tt).powi(2)
             * (-2.0 * cos_tt / cos_inside * self.absorption).exp();
 
@@ -220,6 +225,30 @@ pub struct Passage {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_wet_lock_is_darker_than_dry_hair_wherever_light_comes_from() {
+        // Brown: what comes to a place in the open, and behind some fibres, from all around.
+        let absorption = Vec3::new(0.46, 0.77, 1.51);
+        let [open, behind] = [(1.0, 0.0), (0.0, 3.0)].map(|(lit, behind)| Passage {
+            lit,
+            depth: 4.0 * (1.0 - lit),
+            behind,
+        });
+        for passage in [open, behind] {
+            for degrees in (0..=180).step_by(30) {
+                let (sine, cosine) = (degrees as f32).to_radians().sin_cos();
+                let angles = Angles::of(Vec3::X, Vec3::new(0.0, sine, cosine), Vec3::Z);
+                let [dry, single, lock] =
+                    [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)].map(|(wet, lock)| {
+                        let fibre = Optics { wet, lock, ..Optics::new(absorption, 0.3) };
+                        fibre.scattered(&angles, &passage, 20.0).element_sum()
+                    });
+                assert!(lock < 0.75 * dry, "{passage:?}, {degrees}°: {lock} of {dry}");
+                assert!(lock <= single, "{passage:?}, {degrees}°: {lock} of {single}");
+            }
+        }
+    }
     use crate::render::Melanin;
 
     const ALONG: u32 = 4000;

@@ -21,6 +21,9 @@ const WET_INSIDE: f32 = 0.7;
 const WET_SLEEK: f32 = 0.24;
 // Variance of the film's lobe (rad^2): it lies over the scales, smooth as the lock is straight.
 const FILM_VARIANCE: f32 = 0.0064;
+// Neighbours that light goes through with a fibre of a wet lock: they touch, closer than a shadow map tells
+// apart. What they scatter aside is in the light that many fibres send back.
+const LOCK_FIBRES: f32 = 3.0;
 // Concentrations of TT and TRT around the fibre (1/rad^2) and the light in them, after Karis.
 const TT_FOCUS: f32 = 3.65;
 const TRT_FOCUS: f32 = 17.0;
@@ -36,6 +39,7 @@ struct Optics {
     wet: f32,               // 0 dry ... 1 in water
     tilt: f32,              // of this fibre's piece against the others' (rad)
     film: f32,              // strength of what the film of water reflects
+    lock: f32,              // 0 by itself ... 1 among the fibres of a wet lock
 }
 
 // How light comes to a fibre and goes to the eye.
@@ -116,7 +120,7 @@ fn lobes(a: Angles, o: Optics, depth: f32) -> vec3<f32> {
     let f_tt = fresnel(f0, 0.78 * a.cos_d);
     let cos_tt = sqrt(saturate(1.0 - h * h * ratio * ratio));
     let tt = TT_SHARE * around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi)
-        * along(a, 0.25 * sleek + spread, o.tilt + TILT) * (1.0 - f_tt) * (1.0 - f_tt)
+        * along(a, 0.25 * sleek + spread, o.tilt + TILT) * exp(-(1.0 - forward_share(o)) * LOCK_FIBRES * o.lock) * (1.0 - f_tt) * (1.0 - f_tt)
         * exp(-2.0 * cos_tt / cos_inside * o.absorption);
 
     // TRT: off the far wall inside, most of it at h = sqrt(3) / 2. What is mirrored depends on the eye's

@@ -93,7 +93,7 @@ fn surface_of(fibre: Fibre) -> Surface {
     let rough = clamp(ribbon.roughness * uneven, 0.05, 1.0);
     let tilt = 0.026 * apart * along_noise(fibre.seed, fibre.along);
     surface.optics = Optics(absorption, rough * rough * rough * rough, ribbon.gloss,
-        ribbon.backlight, fibre.moisture, tilt, 0.0);
+        ribbon.backlight, fibre.moisture, tilt, 0.0, fibre.moisture);
     let bulk = bulk_of(forward_share(surface.optics), backward_share(surface.optics), DIFFUSE * ribbon.layers);
     surface.reflectance = bulk.reflectance;
     surface.transmittance = bulk.transmittance;
