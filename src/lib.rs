@@ -1,4 +1,6 @@
-#![doc = include_str!("../README.md")]
+// Only where it is shown or tried: an edit of it builds nothing else again.
+#![cfg_attr(any(doc, doctest), doc = include_str!("../README.md"))]
+#![cfg_attr(not(any(doc, doctest)), doc = "Hair for the Bevy game engine that remembers.")]
 #![doc = include_str!("guide/substep.md")]
 #![doc = include_str!("guide/glossary.md")]
 #![cfg_attr(docsrs, feature(doc_cfg))]

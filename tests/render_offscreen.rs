@@ -100,6 +100,53 @@ fn hair_is_where_the_guides_are_and_shows_their_rates() {
 }
 
 #[test]
+fn rings_of_a_frame_draw_what_each_vertex_would_compute() {
+    let Some(mut scene) = Offscreen::new(160, 160) else {
+        return;
+    };
+    scene.look(Vec3::new(0.1, 0.1, 0.6), Vec3::ZERO);
+    sun(&mut scene, Vec3::new(0.3, 0.5, 1.0), true);
+    let parts = (wide(1e-3), HairFollowers::new(400));
+    let hair = hair(&mut scene, &curtain(12, 0.3), parts);
+    for strand in strands_of(&scene, hair) {
+        scene.app.world_mut().entity_mut(strand).insert(WetLook(vec![0.5; 9]));
+    }
+    let of_rings = scene.draw();
+    // A game may take them away; a device that cannot compute them has none.
+    let mut buffers = scene.app.world_mut().get_mut::<HairBuffers>(hair).unwrap();
+    assert!(buffers.rings.take().is_some(), "this device can");
+    let of_vertices = scene.draw();
+    let pairs = of_rings.rgba.iter().zip(&of_vertices.rgba);
+    let differ = pairs.filter(|(a, b)| a.abs_diff(**b) > 2).count();
+    let covered = of_rings.covered(BLACK);
+    println!("{differ} channels of {covered} pixels differ");
+    assert!(covered > 2000 && of_rings != of_vertices, "they must come by different ways");
+    assert!(differ * 100 < 3 * covered, "{differ} of {covered}");
+
+    // Fewer rings, a second hair with numbers of its own, and far away another level's.
+    set(&mut scene, hair, HairFollowers { segments: 7, ..HairFollowers::new(3000) });
+    let red = HairLook { melanin: Melanin::RED, ..wide(1e-3) };
+    let place = Transform::from_xyz(0.0, 0.0, -0.2);
+    let other = self::hair(&mut scene, &curtain(5, 0.4), (red, HairFollowers::new(2000), place));
+    for away in [1.0, 8.0] {
+        scene.look(Vec3::new(0.1, 0.1, 0.6) * away, Vec3::ZERO);
+        let of_rings = scene.draw();
+        let taken = [hair, other].map(|hair| {
+            let mut buffers = scene.app.world_mut().get_mut::<HairBuffers>(hair).unwrap();
+            buffers.rings.take().is_some()
+        });
+        let of_vertices = scene.draw();
+        let pairs = of_rings.rgba.iter().zip(&of_vertices.rgba);
+        let differ = pairs.filter(|(a, b)| a.abs_diff(**b) > 2).count();
+        let covered = of_rings.covered(BLACK);
+        println!("{away} times as far: {differ} channels of {covered} pixels differ, {taken:?}");
+        // What has been taken stays so at the same level.
+        assert!(taken[0] && covered > 50, "{covered} pixels, {taken:?}");
+        assert!(differ * 100 < 3 * covered, "{differ} of {covered}");
+    }
+}
+
+#[test]
 fn followers_cover_more_frames_repeat_and_wet_is_darker() {
     let Some(mut scene) = Offscreen::with_hair_first(160, 160) else {
         return;

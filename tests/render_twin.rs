@@ -34,16 +34,22 @@ use offscreen::Offscreen;
 
 const SAMPLES: usize = 24;
 const SHADER: &str = "
-#import bevy_keratin::strands::{strands, strand_point, past_strand_position}
+#import bevy_keratin::strands::{strands, strand_point, strand_state, past_strand_position}
+#import bevy_keratin::rings::{ring_of, packed, unpacked}
 @group(0) @binding(6) var<storage, read_write> out: array<vec4<f32>>;
 @compute @workgroup_size(1)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let t = f32(id.y) / f32(SAMPLES - 1u);
     let point = strand_point(strands[id.x], t);
-    let at = 3u * (id.x * SAMPLES + id.y);
+    let at = 6u * (id.x * SAMPLES + id.y);
     out[at] = vec4(point.position, 1.0);
     out[at + 1u] = vec4(point.slope, 1.0);
     out[at + 2u] = vec4(past_strand_position(strands[id.x], t), 1.0);
+    let state = strand_state(strands[id.x], point);
+    let ring = unpacked(packed(ring_of(strands[id.x], t)));
+    out[at + 3u] = vec4(ring.position, f32(ring.shown));
+    out[at + 4u] = vec4(ring.tangent, ring.state.moisture - state.moisture);
+    out[at + 5u] = vec4(ring.outward - point.outward, ring.state.strain - state.strain);
 }
 const SAMPLES: u32 = 24u;
 ";
@@ -259,7 +265,7 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         nodes.extend(guide.packed());
     }
     // Of the size of the shader's uniform: no dye, so only its head counts.
-    let mut ribbon = [0.0f32; 72];
+    let mut ribbon = [0.0f32; 76];
     ribbon[22] = followers.frizz;
     ribbon[24..27].copy_from_slice(&followers.locks.to_array());
     ribbon[27] = followers.lock_shape;
@@ -288,7 +294,7 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         &frame,
     ];
     let groups = [strands.len() as u32, SAMPLES as u32];
-    let out = compute(&mut scene, SHADER, defs, inputs, groups, strands.len() * SAMPLES * 12);
+    let out = compute(&mut scene, SHADER, defs, inputs, groups, strands.len() * SAMPLES * 24);
     let vector = |i: usize| Vec3::new(out[4 * i], out[4 * i + 1], out[4 * i + 2]);
 
     let past: Vec<Vec<Vec3>> = guides.iter().map(RandomGuide::past).collect();
@@ -299,15 +305,21 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
     let before = |k: u32| Guide { nodes: &past[k as usize], ..now(k) };
     let dry = |k: u32| Guide { moisture: &[], ..now(k) };
     let parted = HairFollowers { parting: 1e6, ..followers };
-    let [mut worst, mut worst_past] = [0.0f32; 2];
+    let [mut worst, mut worst_past, mut worst_ring] = [0.0f32; 3];
     let [mut parts, mut drawn_in, mut pushed] = [0; 3];
     for (k, strand) in strands.iter().enumerate() {
         for i in 0..SAMPLES {
             let t = i as f32 / (SAMPLES - 1) as f32;
             let twin = strand_point(strand, now, t, &followers, &solids);
-            let at = 3 * (k * SAMPLES + i);
+            let at = 6 * (k * SAMPLES + i);
             worst = worst.max(vector(at).distance(twin.position));
             worst = worst.max(vector(at + 1).distance(twin.slope) * 0.01);
+            // A ring is as exact as its halves and sixteen bits of an octahedron are.
+            assert!(vector(at + 3) == vector(at) && out[4 * at + 15] == 1.0);
+            worst_ring =
+                worst_ring.max(vector(at + 4).distance(vector(at + 1).normalize_or(Vec3::Y)));
+            worst_ring = worst_ring.max(out[4 * at + 19].abs().max(out[4 * at + 23].abs()));
+            worst_ring = worst_ring.max(vector(at + 5).length() * 10.0);
             let past = strand_point(strand, before, t, &followers, &solids).position;
             worst_past = worst_past.max(vector(at + 2).distance(past));
             let differs = |other: CurvePoint| other.position.distance(twin.position) > 1e-4;
@@ -317,8 +329,10 @@ fn the_shader_puts_strands_where_its_rust_twin_does() {
         }
     }
     println!("largest difference {worst} m, in the frame before {worst_past} m");
+    println!("rings lose {worst_ring}");
     println!("{parts} points of parted guides, {drawn_in} drawn in by water, {pushed} pushed out");
     assert!(worst < 1e-5 && worst_past < 1e-5, "shader and twin differ by {worst}, {worst_past} m");
+    assert!((1e-6..1e-3).contains(&worst_ring), "packing a ring loses {worst_ring}");
     assert!(parts > 100 && drawn_in > 100 && pushed > 100, "the data must contain all kinds");
 }
 

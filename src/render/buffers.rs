@@ -9,7 +9,8 @@ use bevy::{prelude::*, render::storage::ShaderBuffer};
 use half::{f16, slice::HalfFloatSliceExt};
 
 /// The buffers of a drawn [`Hair`](crate::Hair), on the same entity. Bind them in a material of your
-/// own to draw the hair another way; `#import bevy_keratin::strands` has the structures and the curve.
+/// own to draw the hair another way; `#import bevy_keratin::strands` has the structures and the curve,
+/// `bevy_keratin::rings` that of rings.
 ///
 /// All numbers are little-endian `f32` or `u32`, all positions are in the hair's frame (m).
 ///
@@ -19,8 +20,7 @@ use half::{f16, slice::HalfFloatSliceExt};
 /// | `guides` | 8 | first node and number of nodes of each guide |
 /// | `strands` | 128 | [`DrawnStrand`]: the guides first, then the followers |
 /// | `frame` | 12,688 | share of the strands that is drawn, share over which they fade, how many times wider they are (3 × f32), number of solids (u32), 24 bounding balls of eight solids each (middle and radius, 4 × f32), then up to 192 solids of 64 bytes that strands are pushed out of |
-///
-/// | `rings` | 32 | of each drawn strand, root to tip, the places between its straight segments: position (3 × f32), tangent (octahedral, 2 × snorm16), what it is from the middle of a lock that water draws together (3 × f16, m), moisture (f16), bond rates (4 × unorm8), strain and 1 if it is drawn (2 × f16) |
+/// | `rings` | 32 | of each strand that is drawn at the present distance, by its rank and root to tip, the places between its straight segments: position (3 × f32), tangent (octahedral, 2 × snorm16), what it is from the middle of a lock that water draws together (3 × f16, m), moisture (f16), bond rates (4 × unorm8), strain and 1 if it is drawn (2 × f16) |
 ///
 /// `nodes` and `frame` are written once a frame into the same GPU buffers. When the groom changes the
 /// handles change too.
@@ -35,8 +35,8 @@ pub struct HairBuffers {
     pub strands: Handle<ShaderBuffer>,
     /// How many of them are drawn in this frame, and what they are pushed out of.
     pub frame: Handle<ShaderBuffer>,
-    /// Computed from these on the GPU, once a frame in which the hair is seen; `None` where the device cannot.
-    /// `#import bevy_keratin::rings` has the structure.
+    /// Computed from these on the GPU in each frame in which [`drawn`](Self::drawn) is seen; `None` where the device
+    /// cannot, and each vertex computes its own.
     pub rings: Option<Handle<ShaderBuffer>>,
     /// How many guides there are.
     pub guide_count: u32,

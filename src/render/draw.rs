@@ -5,7 +5,7 @@ use super::{
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     drawn_strand::{DrawnStrand, GuideRoot},
     elsewhere::DrawnElsewhere,
-    expand::size_of_rings,
+    expand::Rings,
     follower_roots::{FollowerRoots, misplaced},
     material::{Ribbon, RibbonKey, RibbonMaterial},
     packed_frame::{DrawnFrame, PackedFrame},
@@ -27,10 +27,7 @@ use bevy::{
     asset::RenderAssetUsages,
     camera::{primitives::Aabb, visibility::NoAutoAabb},
     prelude::*,
-    render::{
-        renderer::{RenderAdapter, RenderDevice},
-        storage::ShaderBuffer,
-    },
+    render::{renderer::RenderDevice, storage::ShaderBuffer},
 };
 
 /// Packed data of a hair, kept to reuse the allocations.
@@ -51,7 +48,9 @@ pub(super) struct Packed {
     /// How far followers reach beyond the guides (m).
     margin: f32,
     pub(super) ribbon: Ribbon,
-    key: RibbonKey,
+    pub(super) key: RibbonKey,
+    /// For which rings there is room; none before the first frame.
+    pub(super) rings: Rings,
     /// Roots of drawn strands at rest, which determine their streaks.
     places: Vec<Vec3>,
     /// The streaks last uploaded to the GPU.
@@ -115,7 +114,7 @@ pub(super) fn pack(
     (looks, dyes, views): (Settings<HairLook>, Settings<HairDye>, Settings<HairView>),
     followers: Settings<HairFollowers>,
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
-    (device, adapter): (Option<Res<RenderDevice>>, Option<Res<RenderAdapter>>),
+    device: Option<Res<RenderDevice>>,
     (mut known_meshes, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
     mut materials: ResMut<Assets<RibbonMaterial>>,
     mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
@@ -125,7 +124,7 @@ pub(super) fn pack(
         Some(time) if interpolate.0 => time.overstep_fraction().clamp(0.0, 1.0),
         _ => 1.0,
     };
-    let new_device = device.as_ref().is_some_and(|device| device.is_changed());
+    let new_device = device.is_some_and(|device| device.is_changed());
     let roots_removed: Vec<Entity> = roots_removed.read().collect();
     for (hair, mut packed, buffers, members, follower_roots, place, elsewhere) in &mut hairs {
         let packed = packed.bypass_change_detection();
@@ -195,13 +194,9 @@ pub(super) fn pack(
         let strands = packed.scatter(&strands, follower_roots.as_deref(), &settings);
         faults.write_batch(misplaced(&strands).map(|fault| fault.of(hair)));
         let counts = (packed.layout.len() as u32, strands.len() as u32);
+        packed.rings = Rings::default();
         packed.ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
-        let rings =
-            size_of_rings(adapter.as_deref(), device.as_deref(), counts.1, settings.segments);
-        let rings = rings.map(|size| {
-            shader_buffers.add(ShaderBuffer::with_size(size, RenderAssetUsages::default()))
-        });
-        let key = key(rings.is_some());
+        let key = key(false);
         packed.key = key;
         packed.update_streaks(&dye);
         let mut first = 0;
@@ -216,7 +211,7 @@ pub(super) fn pack(
             key,
             ribbon: packed.ribbon,
             // Any buffer stands for rings that nobody reads.
-            rings: rings.clone().unwrap_or_else(|| nodes.clone()),
+            rings: nodes.clone(),
             nodes,
             guides: add(bytemuck::cast_slice(&ranges)),
             strands: add(&pack_strands(&strands)),
@@ -246,7 +241,7 @@ pub(super) fn pack(
             guides,
             strands,
             frame,
-            rings,
+            rings: None,
             guide_count: counts.0,
             strand_count: counts.1,
             drawn,
@@ -465,6 +460,6 @@ impl Packed {
         view: HairView,
         (guides, strands): (u32, u32),
     ) -> Ribbon {
-        Ribbon::new(look, followers, view, self.thickness, guides, strands)
+        Ribbon::new(look, followers, view, self.thickness, guides, strands, self.rings)
     }
 }

@@ -5,12 +5,14 @@ use super::{
     buffers::HairBuffers,
     draw::Packed,
     material::Ribbon,
+    ribbon_mesh::RibbonLevel,
     sets::{HairRenderSystems, WritesNodes},
 };
 use bevy::{
     asset::load_embedded_asset,
     camera::visibility::ViewVisibility,
     core_pipeline::schedule::camera_driver,
+    ecs::system::SystemParam,
     platform::collections::HashMap,
     prelude::*,
     render::{
@@ -18,8 +20,9 @@ use bevy::{
         render_asset::RenderAssets,
         render_resource::{
             BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
-            BufferId, CachedComputePipelineId, ComputePassDescriptor, ComputePipelineDescriptor,
-            DownlevelFlags, DynamicUniformBuffer, PipelineCache, ShaderStages,
+            BufferId, CachedComputePipelineId, CachedPipelineState, ComputePassDescriptor,
+            ComputePipelineDescriptor, DownlevelFlags, DynamicUniformBuffer, PipelineCache,
+            ShaderStages,
             binding_types::{storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer},
         },
         renderer::{
@@ -28,8 +31,10 @@ use bevy::{
         },
         storage::{GpuShaderBuffer, ShaderBuffer},
     },
-    shader::ShaderDefVal,
+    shader::{ShaderCacheError, ShaderDefVal},
 };
+use core::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
 
 /// Bytes of `PackedRing` of `rings.wgsl`.
 const RING: u64 = 32;
@@ -37,8 +42,11 @@ const RING: u64 = 32;
 const LANES: u32 = 64;
 
 pub(super) fn plugin(app: &mut App) {
+    let broken = Broken::default();
+    app.insert_resource(broken.clone());
     let Some(render) = app.get_sub_app_mut(RenderApp) else { return };
     render
+        .insert_resource(broken)
         .init_resource::<Expansions>()
         .add_systems(RenderStartup, compile)
         .add_systems(ExtractSchedule, extract.in_set(HairRenderSystems))
@@ -48,31 +56,64 @@ pub(super) fn plugin(app: &mut App) {
         );
 }
 
-/// Number of rings of drawn hair.
-fn rings(strands: u32, segments: u32) -> u64 {
-    u64::from(strands) * (u64::from(segments) + 1)
+/// The rings of a hair that there is room for, rank by rank of its strands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Rings {
+    /// How many strands have any; 0 where each vertex computes its own.
+    pub(super) ranks: u32,
+    /// Of how many rings one is there.
+    pub(super) every: u32,
+    /// How many of a strand are there.
+    of_strand: u32,
 }
 
-/// Size of the buffer of rings (bytes), if the device can fill and read one. Vertices compute their rings by
-/// themselves if not.
-pub(super) fn size_of_rings(
-    adapter: Option<&RenderAdapter>,
-    device: Option<&RenderDevice>,
-    strands: u32,
-    segments: u32,
-) -> Option<usize> {
-    let flags = adapter?.get_downlevel_capabilities().flags;
-    let limits = device?.limits();
-    let size = RING * rings(strands, segments);
-    let fits = size <= limits.max_storage_buffer_binding_size
-        && size <= limits.max_buffer_size
-        && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS;
-    let can = flags.contains(DownlevelFlags::COMPUTE_SHADERS) && fits;
-    can.then_some(size.max(RING) as usize)
+impl Default for Rings {
+    fn default() -> Self {
+        Self { ranks: 0, every: 1, of_strand: 0 }
+    }
 }
 
-/// What a vertex shader binds: six of ours, and Bevy's meshes.
-const STORAGE_BUFFERS: u32 = 8;
+impl Rings {
+    fn count(self) -> u64 {
+        u64::from(self.ranks) * u64::from(self.of_strand)
+    }
+
+    /// Size of their buffer (bytes), if there is any.
+    pub(super) fn size(self) -> Option<usize> {
+        (self.ranks > 0).then_some((RING * self.count()) as usize)
+    }
+}
+
+/// Tells whether the device can compute rings and hold them.
+#[derive(SystemParam)]
+pub(super) struct RoomForRings<'w> {
+    adapter: Option<Res<'w, RenderAdapter>>,
+    device: Option<Res<'w, RenderDevice>>,
+    broken: Option<Res<'w, Broken>>,
+}
+
+impl RoomForRings<'_> {
+    /// The rings of the strands of a level; none if they are too many.
+    pub(super) fn of(&self, level: RibbonLevel) -> Rings {
+        let rings = Rings { ranks: level.ranks(), every: level.every(), of_strand: level.rings() };
+        let size = RING * rings.count();
+        let fits = self.device.as_ref().is_some_and(|device| {
+            let limits = device.limits();
+            size <= limits.max_storage_buffer_binding_size && size <= limits.max_buffer_size
+        });
+        let can = self.adapter.as_deref().is_some_and(has_compute);
+        let is_broken = self.broken.as_ref().is_some_and(|broken| broken.0.load(Ordering::Relaxed));
+        if can && fits && !is_broken { rings } else { Rings::default() }
+    }
+}
+
+fn has_compute(adapter: &RenderAdapter) -> bool {
+    adapter.get_downlevel_capabilities().flags.contains(DownlevelFlags::COMPUTE_SHADERS)
+}
+
+/// Whether the kernel cannot be compiled, as both worlds know.
+#[derive(Resource, Clone, Default)]
+struct Broken(Arc<AtomicBool>);
 
 /// The kernel.
 #[derive(Resource)]
@@ -81,7 +122,15 @@ struct Expander {
     pipeline: CachedComputePipelineId,
 }
 
-fn compile(mut commands: Commands, assets: Res<AssetServer>, pipelines: Res<PipelineCache>) {
+fn compile(
+    mut commands: Commands,
+    assets: Res<AssetServer>,
+    pipelines: Res<PipelineCache>,
+    adapter: Res<RenderAdapter>,
+) {
+    if !has_compute(&adapter) {
+        return;
+    }
     let read = || storage_buffer_read_only_sized(false, None);
     let layout = BindGroupLayoutDescriptor::new(
         "hair rings",
@@ -127,6 +176,7 @@ struct Expansion {
     /// Nodes, guides, strands, frame, rings.
     buffers: [AssetId<ShaderBuffer>; 5],
     ribbon: Ribbon,
+    /// How many.
     rings: u64,
 }
 
@@ -143,26 +193,43 @@ fn extract(
         Some(Expansion {
             buffers: [nodes.id(), guides.id(), strands.id(), frame.id(), ring.as_ref()?.id()],
             ribbon: packed.ribbon,
-            rings: rings(hair.strand_count, packed.segments()),
+            rings: packed.rings.count(),
         })
     }));
 }
 
+/// Whether a shader is only not there yet.
+fn is_waited_for(error: &ShaderCacheError) -> bool {
+    matches!(
+        error,
+        ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable
+    )
+}
+
 fn expand(
     mut expansions: ResMut<Expansions>,
-    expander: Option<Res<Expander>>,
+    (expander, broken): (Option<Res<Expander>>, Res<Broken>),
     pipelines: Res<PipelineCache>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
     (device, queue): (Res<RenderDevice>, Res<RenderQueue>),
     mut context: RenderContext,
 ) {
     let Expansions { hairs, ribbons, groups } = &mut *expansions;
-    let (Some(expander), Some(buffers)) = (expander, buffers) else { return };
-    let Some(pipeline) = pipelines.get_compute_pipeline(expander.pipeline) else { return };
     if device.is_changed() {
         // What a lost device held is gone.
         (*ribbons, *groups) = default();
     }
+    let (Some(expander), Some(buffers)) = (expander, buffers) else { return };
+    let Some(pipeline) = pipelines.get_compute_pipeline(expander.pipeline) else {
+        let state = pipelines.get_compute_pipeline_state(expander.pipeline);
+        if let CachedPipelineState::Err(error) = state
+            && !is_waited_for(error)
+            && !broken.0.swap(true, Ordering::Relaxed)
+        {
+            tracing::error!("strands of hair are expanded vertex by vertex: {error}");
+        }
+        return;
+    };
     groups.retain(|_, group| core::mem::take(&mut group.is_used));
     if hairs.is_empty() {
         return;
@@ -170,7 +237,7 @@ fn expand(
     ribbons.clear();
     let offsets: Vec<u32> = hairs.iter().map(|hair| ribbons.push(&hair.ribbon)).collect();
     ribbons.write_buffer(&device, &queue);
-    let Some(uniform) = ribbons.buffer() else { return };
+    let Some((uniform, ribbon)) = ribbons.buffer().zip(ribbons.binding()) else { return };
     let most = device.limits().max_compute_workgroups_per_dimension;
     let mut pass = context
         .command_encoder()
@@ -184,9 +251,8 @@ fn expand(
         let bound = [uniform, nodes, guides, strands, frame, rings];
         let group = groups.entry(bound.map(Buffer::id)).or_insert_with(|| {
             let layout = pipelines.get_bind_group_layout(&expander.layout);
-            let Some(ribbon) = ribbons.binding() else { unreachable!() };
             let entries = BindGroupEntries::with_indices((
-                (0, ribbon),
+                (0, ribbon.clone()),
                 (1, nodes.as_entire_binding()),
                 (2, guides.as_entire_binding()),
                 (3, strands.as_entire_binding()),

@@ -225,6 +225,27 @@ pub struct Passage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Melanin;
+
+    const ALONG: u32 = 4000;
+    const AROUND: u32 = 180;
+
+    /// The mean over all directions of light, evenly in sin θ and φ, times the sphere's 4π; the eye
+    /// at `theta` from the fibre's normal plane. `y` is the fibre.
+    fn over_all_light(theta: f32, f: impl Fn(&Angles) -> Vec3) -> Vec3 {
+        let eye = Vec3::new(theta.cos(), theta.sin(), 0.0);
+        let mut sum = bevy::math::DVec3::ZERO;
+        for i in 0..ALONG {
+            let y = 2.0 * (i as f32 + 0.5) / ALONG as f32 - 1.0;
+            let flat = (1.0 - y * y).sqrt();
+            for j in 0..AROUND {
+                let (sin, cos) = (PI * (j as f32 + 0.5) / AROUND as f32).sin_cos();
+                let light = Vec3::new(flat * cos, y, flat * sin);
+                sum += f(&Angles::of(Vec3::Y, light, eye)).as_dvec3();
+            }
+        }
+        sum.as_vec3() * (4.0 * PI / (ALONG * AROUND) as f32)
+    }
 
     #[test]
     fn a_wet_lock_is_darker_than_dry_hair_wherever_light_comes_from() {
@@ -248,27 +269,6 @@ mod tests {
                 assert!(lock <= single, "{passage:?}, {degrees}°: {lock} of {single}");
             }
         }
-    }
-    use crate::render::Melanin;
-
-    const ALONG: u32 = 4000;
-    const AROUND: u32 = 180;
-
-    /// The mean over all directions of light, evenly in sin θ and φ, times the sphere's 4π; the eye
-    /// at `theta` from the fibre's normal plane. `y` is the fibre.
-    fn over_all_light(theta: f32, f: impl Fn(&Angles) -> Vec3) -> Vec3 {
-        let eye = Vec3::new(theta.cos(), theta.sin(), 0.0);
-        let mut sum = bevy::math::DVec3::ZERO;
-        for i in 0..ALONG {
-            let y = 2.0 * (i as f32 + 0.5) / ALONG as f32 - 1.0;
-            let flat = (1.0 - y * y).sqrt();
-            for j in 0..AROUND {
-                let (sin, cos) = (PI * (j as f32 + 0.5) / AROUND as f32).sin_cos();
-                let light = Vec3::new(flat * cos, y, flat * sin);
-                sum += f(&Angles::of(Vec3::Y, light, eye)).as_dvec3();
-            }
-        }
-        sum.as_vec3() * (4.0 * PI / (ALONG * AROUND) as f32)
     }
 
     #[test]

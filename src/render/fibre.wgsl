@@ -22,7 +22,7 @@ const WET_SLEEK: f32 = 0.24;
 // Variance of the film's lobe (rad^2): it lies over the scales, smooth as the lock is straight.
 const FILM_VARIANCE: f32 = 0.0064;
 // Neighbours that light goes through with a fibre of a wet lock: they touch, closer than a shadow map tells
-// apart. What they scatter aside is in the light that many fibres send back.
+// apart. What does not go on there, their pigment takes but for a hundredth.
 const LOCK_FIBRES: f32 = 3.0;
 // Concentrations of TT and TRT around the fibre (1/rad^2) and the light in them, after Karis.
 const TT_FOCUS: f32 = 3.65;
@@ -98,8 +98,8 @@ fn fresnel(f0: f32, cosine: f32) -> f32 {
     return f0 + (1.0 - f0) * x * x * x * x * x;
 }
 
-// What a fibre sends to the eye of light that has gone through `depth` fibres before.
-fn lobes(a: Angles, o: Optics, depth: f32) -> vec3<f32> {
+// What a fibre, whose forward share is `a_f`, sends to the eye of light that has gone through `depth` fibres before.
+fn lobes(a: Angles, o: Optics, a_f: vec3<f32>, depth: f32) -> vec3<f32> {
     let spread = 0.25 * o.variance * depth;
     let turned = depth / TT_FOCUS;
     let f0 = mix(DRY_SURFACE, WET_SURFACE, o.wet);
@@ -120,7 +120,7 @@ fn lobes(a: Angles, o: Optics, depth: f32) -> vec3<f32> {
     let f_tt = fresnel(f0, 0.78 * a.cos_d);
     let cos_tt = sqrt(saturate(1.0 - h * h * ratio * ratio));
     let tt = TT_SHARE * around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi)
-        * along(a, 0.25 * sleek + spread, o.tilt + TILT) * exp(-(1.0 - forward_share(o)) * LOCK_FIBRES * o.lock) * (1.0 - f_tt) * (1.0 - f_tt)
+        * along(a, 0.25 * sleek + spread, o.tilt + TILT) * exp(-(1.0 - a_f) * LOCK_FIBRES * o.lock) * (1.0 - f_tt) * (1.0 - f_tt)
         * exp(-2.0 * cos_tt / cos_inside * o.absorption);
 
     // TRT: off the far wall inside, most of it at h = sqrt(3) / 2. What is mirrored depends on the eye's
@@ -196,6 +196,6 @@ fn scattered(a: Angles, o: Optics, p: Passage, layers: f32) -> vec3<f32> {
     let onward = (1.0 - p.lit) * a_f * exp(-(1.0 - a_f) * p.behind);
     let body = (bulk.reflectance - a_b) * matt(a.cos_phi)
         * along(a, o.variance * (1.0 + 0.25 * (bulk.bounces + p.depth)), 0.0);
-    return p.lit * lobes(a, o, 0.0) + onward * lobes(a, o, p.depth)
+    return p.lit * lobes(a, o, a_f, 0.0) + onward * lobes(a, o, a_f, p.depth)
         + (p.lit + onward) * max(body, vec3(0.0));
 }

@@ -1,5 +1,5 @@
 //! Followers: the strands between the simulated ones. Their roots and guides are chosen once for a
-//! groom; their shape is computed in the vertex shader (and in [`curve`](super::curve)).
+//! groom; their shape is computed in the shader (and in [`curve`](super::curve)).
 
 use crate::setting::setting;
 use bevy::prelude::*;

@@ -5,6 +5,8 @@ use super::{
     buffers::HairBuffers,
     detail::{DrawnShare, HairDetail},
     draw::Packed,
+    expand::RoomForRings,
+    material::RibbonMaterial,
     packed_frame::{DrawnFrame, PackedFrame},
     ribbon_mesh::{RibbonLevel, RibbonMeshes},
     screen_share::pixel_in,
@@ -12,17 +14,23 @@ use super::{
     view::HairView,
 };
 use crate::{contact::HairCollider, look::HairLook, setting::Settings};
-use bevy::{camera::primitives::Aabb, prelude::*, render::storage::ShaderBuffer};
+use bevy::{
+    asset::RenderAssetUsages, camera::primitives::Aabb, prelude::*, render::storage::ShaderBuffer,
+};
 
 /// After strands have been packed: chooses how many are drawn, and gathers the solids near them.
 pub(super) fn prepare(
-    mut hairs: Query<(Entity, Ref<HairBuffers>, &Packed, &GlobalTransform, &mut DrawnFrame)>,
-    mut drawn: Query<(&mut Mesh3d, &Aabb)>,
+    mut hairs: Query<(Entity, &mut HairBuffers, &mut Packed, &GlobalTransform, &mut DrawnFrame)>,
+    mut drawn: Query<(&mut Mesh3d, &Aabb, &MeshMaterial3d<RibbonMaterial>)>,
     colliders: Query<(Entity, &HairCollider, &GlobalTransform)>,
     (looks, views, details): (Settings<HairLook>, Settings<HairView>, Settings<HairDetail>),
     cameras: Query<(&Camera, &GlobalTransform)>,
     (mut known, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
-    mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
+    (mut shader_buffers, mut materials): (
+        ResMut<Assets<ShaderBuffer>>,
+        ResMut<Assets<RibbonMaterial>>,
+    ),
+    room: RoomForRings,
     (mut balls, mut solids): (Local<Vec<Ball>>, Local<Vec<DrawnSolid>>),
 ) {
     balls.clear();
@@ -30,9 +38,10 @@ pub(super) fn prepare(
         .extend(colliders.iter().filter_map(|(entity, of, place)| Ball::around(entity, of, place)));
     // The largest first: they block light, and stay where there are too many.
     balls.sort_by(|a, b| b.radius.total_cmp(&a.radius));
-    for (hair, buffers, packed, place, mut frame) in &mut hairs {
+    for (hair, mut buffers, mut packed, place, mut frame) in &mut hairs {
         let frame = frame.bypass_change_detection();
-        let Ok((mut mesh, around)) = drawn.get_mut(buffers.drawn) else { continue };
+        let packed = packed.bypass_change_detection();
+        let Ok((mut mesh, around, material)) = drawn.get_mut(buffers.drawn) else { continue };
         let hair_place = place.affine();
         let inside = (Vec3::from(around.center), Vec3::from(around.half_extents));
         let scale = hair_place.matrix3.determinant().abs().cbrt();
@@ -51,6 +60,21 @@ pub(super) fn prepare(
         let wanted = known.get(level, &mut meshes);
         if mesh.0 != wanted {
             mesh.0 = wanted;
+        }
+        // Numbers and buffer change in one material, so that no frame has those of different levels.
+        let rings = room.of(level);
+        if packed.rings != rings {
+            packed.rings = rings;
+            packed.ribbon = packed.ribbon.with_rings(rings);
+            let made = rings.size().map(|size| {
+                shader_buffers.add(ShaderBuffer::with_size(size, RenderAssetUsages::default()))
+            });
+            packed.key.expanded = made.is_some();
+            if let Some(mut material) = materials.get_mut(&material.0) {
+                (material.key, material.ribbon) = (packed.key, packed.ribbon);
+                material.rings = made.clone().unwrap_or_else(|| buffers.nodes.clone());
+            }
+            buffers.rings = made;
         }
 
         frame.packed = PackedFrame::new(share);

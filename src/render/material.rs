@@ -2,6 +2,7 @@
 
 use super::{
     HairFollowers, HairView,
+    expand::Rings,
     ribbon_mesh::{CORNER, DrawOrder},
     thickness::{PIECES, Thickness},
 };
@@ -52,7 +53,7 @@ pub(super) struct RibbonKey {
     heat: bool,
     kajiya_kay: bool,
     /// Whether rings are computed once a frame.
-    expanded: bool,
+    pub(super) expanded: bool,
 }
 
 impl RibbonKey {
@@ -95,6 +96,9 @@ pub(super) struct Ribbon {
     root_fade: f32,
     dye_count: u32,
     rank_step: u32,
+    order_step: u32,
+    ring_ranks: u32,
+    ring_every: u32,
     densities: [Vec4; PIECES / 4],
     dyes: [Dye; MAX_LAYERS],
 }
@@ -126,6 +130,11 @@ fn dyes(dye: &HairDye) -> [Dye; MAX_LAYERS] {
 }
 
 impl Ribbon {
+    /// With room for these rings.
+    pub(super) fn with_rings(self, rings: Rings) -> Self {
+        Self { ring_ranks: rings.ranks, ring_every: rings.every, ..self }
+    }
+
     pub(super) fn new(
         (look, dye): (&HairLook, &HairDye),
         followers: &HairFollowers,
@@ -133,7 +142,9 @@ impl Ribbon {
         thickness: Thickness,
         guides: u32,
         strands: u32,
+        rings: Rings,
     ) -> Self {
+        let order = DrawOrder::new(strands);
         let (root_absorption, tip_absorption) = look.absorptions();
         let fibre_width = look.width * look.shadow_density;
         Self {
@@ -160,7 +171,10 @@ impl Ribbon {
             lock_shape: followers.lock_shape,
             root_fade: look.root_fade,
             dye_count: dye.layers.len().min(MAX_LAYERS) as u32,
-            rank_step: DrawOrder::new(strands).rank_step(),
+            rank_step: order.rank_step(),
+            order_step: order.step(),
+            ring_ranks: rings.ranks,
+            ring_every: rings.every,
             densities: core::array::from_fn(|i| {
                 Vec4::from_slice(&thickness.densities[4 * i..]) * fibre_width
             }),

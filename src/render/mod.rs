@@ -2,12 +2,13 @@
 //!
 //! Each [`Hair`] is one draw call (one more for each shadow map), of a mesh that all hair with as many
 //! strands shares. Once a frame its nodes are packed, interpolated by the fixed clock's overstep, and
-//! written to the GPU; all else happens in the vertex shader: curves through the nodes, followers
-//! between guides, ribbons that face the camera. Followers are pushed out of the balls, capsules and
-//! ellipsoids among the [`HairCollider`](crate::HairCollider)s near them, at most sixteen; these also
-//! shade the hair behind them, for lights without shadow maps as well. Positions stay in the hair's
-//! frame up to there, so roots never lag behind the
-//! head.
+//! written to the GPU; all else happens there. A compute shader expands them once a frame in which the hair
+//! is seen: curves through the nodes, followers between guides, rings along each strand. All passes read
+//! these, and make ribbons of them that face the camera or the light; where the device has no compute
+//! shaders, or the rings exceed its largest buffer, each vertex computes its own. Followers are pushed out
+//! of the balls, capsules and ellipsoids among the [`HairCollider`](crate::HairCollider)s near them, at
+//! most 192; the sixteen largest also shade the hair behind them, for lights without shadow maps as well.
+//! Positions stay in the hair's frame up to there, so roots never lag behind the head.
 //!
 //! Water is drawn as beads: see [`HairBeads`].
 //!

@@ -5,10 +5,11 @@
 #import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_keratin::strands::{
-    ribbon, strands, frame, ring_share, strand_alpha, StrandState, DrawnStrand,
+    ribbon, strands, frame, ring_share, strand_alpha, StrandState, DrawnStrand, VIEW_GUIDES,
 }
 #ifdef HAIR_EXPANDED
-#import bevy_keratin::rings::{PackedRing, Ring, unpacked}
+#import bevy_keratin::strands::rank_of
+#import bevy_keratin::rings::{PackedRing, Ring, unpacked, rings_of_strand}
 #else
 #import bevy_keratin::rings::{Ring, ring_of}
 #endif
@@ -20,7 +21,8 @@
 @group(#{MATERIAL_BIND_GROUP}) @binding(6) var<storage, read> rings: array<PackedRing>;
 
 fn ring_at(index: u32, ring: u32) -> Ring {
-    return unpacked(rings[index * (ribbon.segments + 1u) + ring]);
+    let in_strand = (ring + ribbon.ring_every - 1u) / ribbon.ring_every;
+    return unpacked(rings[rank_of(index) * rings_of_strand() + in_strand]);
 }
 #else
 fn ring_at(index: u32, ring: u32) -> Ring {
@@ -28,7 +30,6 @@ fn ring_at(index: u32, ring: u32) -> Ring {
 }
 #endif
 
-const VIEW_GUIDES: u32 = 6u;
 // Up to where cut hair keeps its width.
 const BLUNT: f32 = 0.9;
 

@@ -50,6 +50,11 @@ impl DrawOrder {
         of_b.rem_euclid(i64::from(self.count.max(1))) as u32
     }
 
+    /// By which the shader finds the strand of a rank.
+    pub(super) fn step(self) -> u32 {
+        self.step
+    }
+
     fn strand(self, rank: u32) -> u32 {
         (u64::from(rank) * u64::from(self.step) % u64::from(self.count.max(1))) as u32
     }
@@ -106,15 +111,29 @@ impl RibbonLevel {
         self.level
     }
 
+    /// Number of strands, those of the first ranks.
+    pub(super) fn ranks(self) -> u32 {
+        (self.strands >> self.level).max(1).min(self.strands)
+    }
+
+    /// Of how many rings one is drawn; the tip's is the last.
+    pub(super) fn every(self) -> u32 {
+        let few = FEW_RINGS.into_iter().find(|(level, _)| self.level >= *level);
+        few.map_or(1, |(_, every)| every)
+    }
+
+    /// Number of rings of a strand.
+    pub(super) fn rings(self) -> u32 {
+        self.segments.div_ceil(self.every()) + 1
+    }
+
     /// Two corners for each ring of each strand.
     fn mesh(self) -> Mesh {
         let order = DrawOrder::new(self.strands);
-        let few = FEW_RINGS.into_iter().find(|(level, _)| self.level >= *level);
-        let every = few.map_or(1, |(_, every)| every);
-        let mut rings: Vec<u32> = (0..self.segments).step_by(every as usize).collect();
+        let mut rings: Vec<u32> = (0..self.segments).step_by(self.every() as usize).collect();
         rings.push(self.segments);
         let per_strand = 2 * (self.segments + 1);
-        let strands = (self.strands >> self.level).max(1).min(self.strands);
+        let strands = self.ranks();
         let drawn = 2 * rings.len() as u32;
         let mut corners = Vec::with_capacity((strands * drawn) as usize);
         let mut indices = Vec::with_capacity((strands * 3 * (drawn - 2)) as usize);

@@ -2,7 +2,7 @@
 // frame into a buffer, or by each vertex where the device cannot.
 #define_import_path bevy_keratin::rings
 
-#import bevy_keratin::strands::{DrawnStrand, StrandState, strand_point, strand_state}
+#import bevy_keratin::strands::{ribbon, DrawnStrand, StrandState, strand_point, strand_state}
 
 struct Ring {
     position: vec3<f32>,   // in the hair's frame (m)
@@ -21,6 +21,11 @@ struct PackedRing {
     outward_moisture: vec2<u32>,
     rates: u32,            // unorm8
     strain_shown: u32,
+}
+
+// Those that are drawn of each strand; the tip's is the last.
+fn rings_of_strand() -> u32 {
+    return (ribbon.segments + ribbon.ring_every - 1u) / ribbon.ring_every + 1u;
 }
 
 // At a share of a strand's length.

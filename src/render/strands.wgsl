@@ -3,6 +3,9 @@
 // A material of your own may import this and bind the buffers of `HairBuffers` at the same places.
 #define_import_path bevy_keratin::strands
 
+// The view that shows guides alone.
+const VIEW_GUIDES: u32 = 6u;
+
 struct HairNode {
     position: vec3<f32>,   // in the hair's frame (m)
     rates: u32,            // hydrogen, ionic, disulfide, peptide as unorm8, lowest byte first
@@ -69,6 +72,9 @@ struct Ribbon {
     root_fade: f32,
     dye_count: u32,
     rank_step: u32,        // strand * rank_step modulo their number is the strand's rank
+    order_step: u32,       // and rank * order_step the strand of a rank
+    ring_ranks: u32,       // strands that have rings, from the first rank on
+    ring_every: u32,       // of how many rings one is drawn
     densities: array<vec4<f32>, 2>, // of strands, seen from beside (1/m), along their length
     dyes: array<Dye, 4>,
 }
@@ -335,9 +341,24 @@ fn push_out_of_all(length: f32, point: ptr<function, StrandPoint>) {
 
 // How much of a strand of so many is drawn in this frame: 1 all, 0 nothing.
 fn strand_alpha(index: u32) -> f32 {
-    // The product, in parts of 32 bits.
-    let high = (index * (ribbon.rank_step >> 8u)) % ribbon.strands;
-    let rank = (high * 256u + index * (ribbon.rank_step & 255u)) % ribbon.strands;
+    return alpha_of_rank(rank_of(index));
+}
+
+// A product modulo the number of strands, in parts of 32 bits.
+fn times(number: u32, step: u32) -> u32 {
+    let high = (number * (step >> 8u)) % ribbon.strands;
+    return (high * 256u + number * (step & 255u)) % ribbon.strands;
+}
+
+fn rank_of(index: u32) -> u32 {
+    return times(index, ribbon.rank_step);
+}
+
+fn strand_of_rank(rank: u32) -> u32 {
+    return times(rank, ribbon.order_step);
+}
+
+fn alpha_of_rank(rank: u32) -> f32 {
     return saturate((frame.share - f32(rank) / f32(ribbon.strands)) / max(frame.fade, 1e-6));
 }
 
