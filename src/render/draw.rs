@@ -5,20 +5,21 @@ use super::{
     buffers::{HairBuffers, PackedNode, pack_guide, pack_strands, packed_place},
     drawn_strand::{DrawnStrand, GuideRoot},
     elsewhere::DrawnElsewhere,
-    expand::Rings,
     follower_roots::{FollowerRoots, misplaced},
     material::{Ribbon, RibbonKey, RibbonMaterial},
     packed_frame::{DrawnFrame, PackedFrame},
     ribbon_mesh::{RibbonLevel, RibbonMeshes},
+    rings::Rings,
     scatter::scatter,
     sets::Interpolate,
+    streaks::DrawnStreaks,
     thickness::Thickness,
 };
 use crate::{
     Moisture,
     bond::Bonds,
     fault::HairFault,
-    look::{HairDye, HairLook, Streaks},
+    look::{HairDye, HairLook},
     setting::Settings,
     settle::Settling,
     strand::{Hair, Strand, StrandHistory, Strands},
@@ -54,7 +55,7 @@ pub(super) struct Packed {
     /// Roots of drawn strands at rest, which determine their streaks.
     places: Vec<Vec3>,
     /// The streaks last uploaded to the GPU.
-    streaks: Vec<Option<Streaks>>,
+    streaks: DrawnStreaks,
 }
 
 /// A strand that is a guide.
@@ -177,14 +178,15 @@ pub(super) fn pack(
             let counts = (buffers.guide_count, buffers.strand_count);
             let key = key(buffers.rings.is_some());
             let ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
-            let has_new_streaks = packed.update_streaks(&dye);
+            let has_new_streaks = packed.streaks.update(&dye);
             if has_new_streaks || (packed.ribbon, packed.key) != (ribbon, key) {
                 (packed.ribbon, packed.key) = (ribbon, key);
                 if let Some(mut material) = materials.get_mut(&material.0) {
                     material.key = key;
                     material.ribbon = ribbon;
                     if has_new_streaks {
-                        material.streaks = shader_buffers.add(buffer(&packed.pack_streaks()));
+                        material.streaks =
+                            shader_buffers.add(buffer(&packed.streaks.pack(&packed.places)));
                     }
                 }
             }
@@ -198,7 +200,7 @@ pub(super) fn pack(
         packed.ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
         let key = key(false);
         packed.key = key;
-        packed.update_streaks(&dye);
+        packed.streaks.update(&dye);
         let mut first = 0;
         let ranges = packed.layout.iter().map(|guide| {
             first += guide.nodes;
@@ -215,7 +217,7 @@ pub(super) fn pack(
             nodes,
             guides: add(bytemuck::cast_slice(&ranges)),
             strands: add(&pack_strands(&strands)),
-            streaks: add(&packed.pack_streaks()),
+            streaks: add(&packed.streaks.pack(&packed.places)),
             frame: add(bytemuck::bytes_of(&PackedFrame::default())),
         };
         let (nodes, guides) = (material.nodes.clone(), material.guides.clone());
@@ -258,31 +260,6 @@ impl Packed {
     /// Straight segments of each drawn strand.
     pub(super) fn segments(&self) -> u32 {
         self.followers.map_or(1, |followers| followers.segments)
-    }
-
-    /// Updates the streaks; returns whether they have changed.
-    fn update_streaks(&mut self, dye: &HairDye) -> bool {
-        let streaks = || dye.layers.iter().map(|layer| layer.streaks);
-        let has_changed = !self.streaks.iter().copied().eq(streaks());
-        if has_changed {
-            self.streaks.clear();
-            self.streaks.extend(streaks());
-        }
-        has_changed
-    }
-
-    /// For each drawn strand a bit mask of the layers whose streaks it is in; a single unused word
-    /// if no layer has streaks.
-    fn pack_streaks(&self) -> Vec<u8> {
-        let mut words = vec![0u32; 1];
-        for (layer, streaks) in self.streaks.iter().enumerate() {
-            let Some(streaks) = streaks else { continue };
-            words.resize(self.places.len().max(1), 0);
-            for (word, is_chosen) in words.iter_mut().zip(streaks.chosen(&self.places)) {
-                *word |= u32::from(is_chosen) << layer;
-            }
-        }
-        bytemuck::cast_slice(&words).to_vec()
     }
 
     /// Updates the list of guides; returns whether it has changed.

@@ -5,14 +5,13 @@ use super::{
     buffers::HairBuffers,
     draw::Packed,
     material::Ribbon,
-    ribbon_mesh::RibbonLevel,
+    rings::{Broken, has_compute},
     sets::{HairRenderSystems, WritesNodes},
 };
 use bevy::{
     asset::load_embedded_asset,
     camera::visibility::ViewVisibility,
     core_pipeline::schedule::camera_driver,
-    ecs::system::SystemParam,
     platform::collections::HashMap,
     prelude::*,
     render::{
@@ -21,8 +20,7 @@ use bevy::{
         render_resource::{
             BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
             BufferId, CachedComputePipelineId, CachedPipelineState, ComputePassDescriptor,
-            ComputePipelineDescriptor, DownlevelFlags, DynamicUniformBuffer, PipelineCache,
-            ShaderStages,
+            ComputePipelineDescriptor, DynamicUniformBuffer, PipelineCache, ShaderStages,
             binding_types::{storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer},
         },
         renderer::{
@@ -33,11 +31,8 @@ use bevy::{
     },
     shader::{ShaderCacheError, ShaderDefVal},
 };
-use core::sync::atomic::{AtomicBool, Ordering};
-use std::sync::Arc;
+use core::sync::atomic::Ordering;
 
-/// Bytes of `PackedRing` of `rings.wgsl`.
-const RING: u64 = 32;
 /// `@workgroup_size` of `expand.wgsl`.
 const LANES: u32 = 64;
 
@@ -55,65 +50,6 @@ pub(super) fn plugin(app: &mut App) {
             expand.in_set(RenderGraphSystems::Render).after(WritesNodes).before(camera_driver),
         );
 }
-
-/// The rings of a hair that there is room for, rank by rank of its strands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rings {
-    /// How many strands have any; 0 where each vertex computes its own.
-    pub(super) ranks: u32,
-    /// Of how many rings one is there.
-    pub(super) every: u32,
-    /// How many of a strand are there.
-    of_strand: u32,
-}
-
-impl Default for Rings {
-    fn default() -> Self {
-        Self { ranks: 0, every: 1, of_strand: 0 }
-    }
-}
-
-impl Rings {
-    fn count(self) -> u64 {
-        u64::from(self.ranks) * u64::from(self.of_strand)
-    }
-
-    /// Size of their buffer (bytes), if there is any.
-    pub(super) fn size(self) -> Option<usize> {
-        (self.ranks > 0).then_some((RING * self.count()) as usize)
-    }
-}
-
-/// Tells whether the device can compute rings and hold them.
-#[derive(SystemParam)]
-pub(super) struct RoomForRings<'w> {
-    adapter: Option<Res<'w, RenderAdapter>>,
-    device: Option<Res<'w, RenderDevice>>,
-    broken: Option<Res<'w, Broken>>,
-}
-
-impl RoomForRings<'_> {
-    /// The rings of the strands of a level; none if they are too many.
-    pub(super) fn of(&self, level: RibbonLevel) -> Rings {
-        let rings = Rings { ranks: level.ranks(), every: level.every(), of_strand: level.rings() };
-        let size = RING * rings.count();
-        let fits = self.device.as_ref().is_some_and(|device| {
-            let limits = device.limits();
-            size <= limits.max_storage_buffer_binding_size && size <= limits.max_buffer_size
-        });
-        let can = self.adapter.as_deref().is_some_and(has_compute);
-        let is_broken = self.broken.as_ref().is_some_and(|broken| broken.0.load(Ordering::Relaxed));
-        if can && fits && !is_broken { rings } else { Rings::default() }
-    }
-}
-
-fn has_compute(adapter: &RenderAdapter) -> bool {
-    adapter.get_downlevel_capabilities().flags.contains(DownlevelFlags::COMPUTE_SHADERS)
-}
-
-/// Whether the kernel cannot be compiled, as both worlds know.
-#[derive(Resource, Clone, Default)]
-struct Broken(Arc<AtomicBool>);
 
 /// The kernel.
 #[derive(Resource)]

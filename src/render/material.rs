@@ -2,8 +2,8 @@
 
 use super::{
     HairFollowers, HairView,
-    expand::Rings,
     ribbon_mesh::{CORNER, DrawOrder},
+    rings::Rings,
     thickness::{PIECES, Thickness},
 };
 use crate::look::{HairDye, HairLook, HairShading, MAX_LAYERS};
