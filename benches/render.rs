@@ -2,7 +2,7 @@
 //!
 //! All rows come from one run on one machine: read the share. The rows of drawing are our own
 //! systems, packing in the app and the one write in the render world; Bevy's own rendering, the
-//! graphics device and the vertex shader are not in it.
+//! graphics device with all shaders, and what hands them their work, are not in it.
 
 use bevy::{
     prelude::*,

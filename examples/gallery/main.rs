@@ -64,7 +64,7 @@ enum Piece {
     Perm,
     /// Slept on wet, beside hair that was dry.
     Bedhead,
-    /// A blower dries hair in the shape it has there, beside its hydrogen bonds.
+    /// A blower dries hair in the shape it has there, beside the same head wet.
     BlowDry,
     /// Rain on long hair.
     Rain,

@@ -4,18 +4,17 @@ use super::{
     pipelines::{COUNT, HairKernels, KERNELS, layouts},
     residence::{HairGpu, WhyCpu},
 };
+use crate::render::why_broken;
 use bevy::{
     ecs::system::SystemParam,
     material::descriptor::{BindGroupLayoutDescriptor, ComputePipelineDescriptor},
     prelude::*,
     render::{
         GpuResourceAppExt, Render, RenderApp, RenderSystems,
-        render_resource::{
-            CachedComputePipelineId, CachedPipelineState, DownlevelFlags, PipelineCache,
-        },
+        render_resource::{CachedComputePipelineId, DownlevelFlags, PipelineCache},
         renderer::{RenderAdapter, RenderAdapterInfo, RenderDevice, RenderQueue},
     },
-    shader::{Shader, ShaderCacheError, ValidateShader},
+    shader::{Shader, ValidateShader},
 };
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -113,13 +112,7 @@ fn compile(
         })
     });
     for id in ids {
-        if let CachedPipelineState::Err(error) = cache.get_compute_pipeline_state(id)
-            && !matches!(
-                error,
-                ShaderCacheError::ShaderNotLoaded(_)
-                    | ShaderCacheError::ShaderImportNotYetAvailable
-            )
-        {
+        if let Some(error) = why_broken(&cache, id) {
             tracing::error!("hair's kernels cannot be compiled: {error}");
             compiled.with(|state| *state = State::Broken);
             return;

@@ -5,7 +5,7 @@ use super::{
     buffers::HairBuffers,
     draw::Packed,
     material::Ribbon,
-    rings::{Broken, has_compute},
+    rings::{Broken, has_compute, why_broken},
     sets::{HairRenderSystems, WritesNodes},
 };
 use bevy::{
@@ -19,8 +19,8 @@ use bevy::{
         render_asset::RenderAssets,
         render_resource::{
             BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
-            BufferId, CachedComputePipelineId, CachedPipelineState, ComputePassDescriptor,
-            ComputePipelineDescriptor, DynamicUniformBuffer, PipelineCache, ShaderStages,
+            BufferId, CachedComputePipelineId, ComputePassDescriptor, ComputePipelineDescriptor,
+            DynamicUniformBuffer, PipelineCache, ShaderStages,
             binding_types::{storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer},
         },
         renderer::{
@@ -29,7 +29,7 @@ use bevy::{
         },
         storage::{GpuShaderBuffer, ShaderBuffer},
     },
-    shader::{ShaderCacheError, ShaderDefVal},
+    shader::ShaderDefVal,
 };
 use core::sync::atomic::Ordering;
 
@@ -112,6 +112,8 @@ struct Expansion {
     /// Nodes, guides, strands, frame, rings.
     buffers: [AssetId<ShaderBuffer>; 5],
     ribbon: Ribbon,
+    /// Where that lies among those of the frame (bytes).
+    offset: u32,
     /// How many.
     rings: u64,
 }
@@ -129,17 +131,10 @@ fn extract(
         Some(Expansion {
             buffers: [nodes.id(), guides.id(), strands.id(), frame.id(), ring.as_ref()?.id()],
             ribbon: packed.ribbon,
+            offset: 0,
             rings: packed.rings.count(),
         })
     }));
-}
-
-/// Whether a shader is only not there yet.
-fn is_waited_for(error: &ShaderCacheError) -> bool {
-    matches!(
-        error,
-        ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable
-    )
 }
 
 fn expand(
@@ -157,9 +152,7 @@ fn expand(
     }
     let (Some(expander), Some(buffers)) = (expander, buffers) else { return };
     let Some(pipeline) = pipelines.get_compute_pipeline(expander.pipeline) else {
-        let state = pipelines.get_compute_pipeline_state(expander.pipeline);
-        if let CachedPipelineState::Err(error) = state
-            && !is_waited_for(error)
+        if let Some(error) = why_broken(&pipelines, expander.pipeline)
             && !broken.0.swap(true, Ordering::Relaxed)
         {
             tracing::error!("strands of hair are expanded vertex by vertex: {error}");
@@ -171,7 +164,9 @@ fn expand(
         return;
     }
     ribbons.clear();
-    let offsets: Vec<u32> = hairs.iter().map(|hair| ribbons.push(&hair.ribbon)).collect();
+    for hair in hairs.iter_mut() {
+        hair.offset = ribbons.push(&hair.ribbon);
+    }
     ribbons.write_buffer(&device, &queue);
     let Some((uniform, ribbon)) = ribbons.buffer().zip(ribbons.binding()) else { return };
     let most = device.limits().max_compute_workgroups_per_dimension;
@@ -179,7 +174,7 @@ fn expand(
         .command_encoder()
         .begin_compute_pass(&ComputePassDescriptor { label: Some("hair rings"), ..default() });
     pass.set_pipeline(pipeline);
-    for (hair, offset) in hairs.iter().zip(offsets) {
+    for hair in hairs.iter() {
         let gpu = hair.buffers.map(|id| buffers.get(id).map(|gpu| &gpu.buffer));
         let [Some(nodes), Some(guides), Some(strands), Some(frame), Some(rings)] = gpu else {
             continue;
@@ -199,7 +194,7 @@ fn expand(
             Group { group, is_used: true }
         });
         group.is_used = true;
-        pass.set_bind_group(0, &group.group, &[offset]);
+        pass.set_bind_group(0, &group.group, &[hair.offset]);
         let count = hair.rings.div_ceil(u64::from(LANES)).min(u64::from(u32::MAX)) as u32;
         pass.dispatch_workgroups(count.min(most), count.div_ceil(most), 1);
     }

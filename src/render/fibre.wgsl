@@ -23,7 +23,7 @@ const WET_SLEEK: f32 = 0.24;
 const FILM_VARIANCE: f32 = 0.0064;
 // Neighbours that light goes through with a fibre of a wet lock: they touch, closer than a shadow map tells
 // apart. What does not go on there, their pigment takes but for a hundredth.
-const LOCK_FIBRES: f32 = 3.0;
+const LOCK_FIBRES: f32 = 3.0; // by eye, no measurement is known
 // Concentrations of TT and TRT around the fibre (1/rad^2) and the light in them, after Karis.
 const TT_FOCUS: f32 = 3.65;
 const TRT_FOCUS: f32 = 17.0;
@@ -98,7 +98,7 @@ fn fresnel(f0: f32, cosine: f32) -> f32 {
     return f0 + (1.0 - f0) * x * x * x * x * x;
 }
 
-// What a fibre, whose forward share is `a_f`, sends to the eye of light that has gone through `depth` fibres before.
+// What a fibre of forward share `a_f` sends to the eye of light that has gone through `depth` fibres.
 fn lobes(a: Angles, o: Optics, a_f: vec3<f32>, depth: f32) -> vec3<f32> {
     let spread = 0.25 * o.variance * depth;
     let turned = depth / TT_FOCUS;
@@ -120,8 +120,8 @@ fn lobes(a: Angles, o: Optics, a_f: vec3<f32>, depth: f32) -> vec3<f32> {
     let f_tt = fresnel(f0, 0.78 * a.cos_d);
     let cos_tt = sqrt(saturate(1.0 - h * h * ratio * ratio));
     let tt = TT_SHARE * around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi)
-        * along(a, 0.25 * sleek + spread, o.tilt + TILT) * exp(-(1.0 - a_f) * LOCK_FIBRES * o.lock) * (1.0 - f_tt) * (1.0 - f_tt)
-        * exp(-2.0 * cos_tt / cos_inside * o.absorption);
+        * along(a, 0.25 * sleek + spread, o.tilt + TILT) * (1.0 - f_tt) * (1.0 - f_tt)
+        * exp(-2.0 * cos_tt / cos_inside * o.absorption - (1.0 - a_f) * LOCK_FIBRES * o.lock);
 
     // TRT: off the far wall inside, most of it at h = sqrt(3) / 2. What is mirrored depends on the eye's
     // inclination alone, as Chiang et al. have it: that skews this wide lobe.

@@ -4,7 +4,8 @@
 //! strands shares. Once a frame its nodes are packed, interpolated by the fixed clock's overstep, and
 //! written to the GPU; all else happens there. A compute shader expands them once a frame in which the hair
 //! is seen: curves through the nodes, followers between guides, rings along each strand. All passes read
-//! these, and make ribbons of them that face the camera or the light; where the device has no compute
+//! these, and make ribbons of them that face the camera or the light (where they were in the frame before,
+//! for motion vectors, vertices compute); where the device has no compute
 //! shaders, or the rings exceed its largest buffer, each vertex computes its own. Followers are pushed out
 //! of the balls, capsules and ellipsoids among the [`HairCollider`](crate::HairCollider)s near them, at
 //! most 192; the sixteen largest also shade the hair behind them, for lights without shadow maps as well.
@@ -82,10 +83,10 @@ pub(crate) use elsewhere::DrawnElsewhere;
 pub use follower_roots::{FollowerRoot, FollowerRoots};
 pub use followers::HairFollowers;
 pub use sets::HairRenderSystems;
-#[cfg(feature = "gpu")]
-pub(crate) use sets::WritesNodes;
 pub use view::{HairView, STRAIN_FULL, heat};
 pub use wet_look::WetLook;
+#[cfg(feature = "gpu")]
+pub(crate) use {rings::why_broken, sets::WritesNodes};
 
 /// What is drawn by it; see [`look`](crate::look).
 #[doc(no_inline)]

@@ -21,8 +21,13 @@
 @group(#{MATERIAL_BIND_GROUP}) @binding(6) var<storage, read> rings: array<PackedRing>;
 
 fn ring_at(index: u32, ring: u32) -> Ring {
+    let rank = rank_of(index);
+    if rank >= ribbon.ring_ranks {
+        // The mesh of another level, for the frame until its buffer is here.
+        return Ring();
+    }
     let in_strand = (ring + ribbon.ring_every - 1u) / ribbon.ring_every;
-    return unpacked(rings[rank_of(index) * rings_of_strand() + in_strand]);
+    return unpacked(rings[rank * rings_of_strand() + in_strand]);
 }
 #else
 fn ring_at(index: u32, ring: u32) -> Ring {

@@ -5,9 +5,12 @@ use bevy::{
     ecs::system::SystemParam,
     prelude::*,
     render::{
-        render_resource::DownlevelFlags,
+        render_resource::{
+            CachedComputePipelineId, CachedPipelineState, DownlevelFlags, PipelineCache,
+        },
         renderer::{RenderAdapter, RenderDevice},
     },
+    shader::ShaderCacheError,
 };
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
@@ -73,3 +76,17 @@ pub(super) fn has_compute(adapter: &RenderAdapter) -> bool {
 /// Whether the kernel cannot be compiled, as both worlds know.
 #[derive(Resource, Clone, Default)]
 pub(super) struct Broken(pub(super) Arc<AtomicBool>);
+
+/// Why a kernel cannot be compiled; `None` too of one whose shaders are only not there yet.
+pub(crate) fn why_broken(
+    pipelines: &PipelineCache,
+    pipeline: CachedComputePipelineId,
+) -> Option<&ShaderCacheError> {
+    match pipelines.get_compute_pipeline_state(pipeline) {
+        CachedPipelineState::Err(
+            ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable,
+        ) => None,
+        CachedPipelineState::Err(error) => Some(error),
+        _ => None,
+    }
+}
