@@ -47,7 +47,7 @@ fn wear(scene: &mut Offscreen, guides: &[Vec<Vec3>], parts: impl Bundle) -> Enti
 }
 
 /// A sun with a shadow map of what is within 0.2 m of the origin.
-fn sun(scene: &mut Offscreen, to_light: Vec3, lux: f32) {
+fn sun(scene: &mut Offscreen, to_light: Vec3, lux: f32) -> Entity {
     scene.app.insert_resource(DirectionalLightShadowMap { size: 2048 });
     let cascades = CascadeShadowConfigBuilder {
         num_cascades: 1,
@@ -62,7 +62,7 @@ fn sun(scene: &mut Offscreen, to_light: Vec3, lux: f32) {
         ..default()
     };
     let place = Transform::from_translation(to_light).looking_at(Vec3::ZERO, Vec3::Y);
-    scene.app.world_mut().spawn((light, cascades.build(), place));
+    scene.app.world_mut().spawn((light, cascades.build(), place)).id()
 }
 
 /// The mean light in a rectangle of places (m).
@@ -126,18 +126,43 @@ fn what_comes_through_strands_falls_with_their_number() {
 /// through, whose surface alone mirrors.
 #[test]
 fn light_falls_off_bit_by_bit_on_its_way_into_hair() {
+    let Some(shares) = shares_by_depth(true) else { return };
+    for (i, (share, truth)) in shares.iter().enumerate() {
+        println!("  {share:.3} for {truth:.3}");
+        assert!((share - truth).abs() < 0.1 * truth + 0.06, "{i}: {share} for {truth}");
+    }
+    for pair in shares.windows(2) {
+        let fall = pair[0].0 - pair[1].0;
+        assert!((-0.05..0.25).contains(&fall), "{shares:?}");
+    }
+}
+
+/// The same without a shadow map, by the fibres that a grid counts. In the first cells hair is taken for a plane
+/// layer.
+#[test]
+fn a_light_without_a_shadow_map_falls_off_as_well() {
+    let Some(shares) = shares_by_depth(false) else { return };
+    for (share, truth) in &shares {
+        println!("  {share:.3} for {truth:.3}");
+        assert!((share - truth).abs() < 0.1 * truth + 0.1, "{share} for {truth}");
+    }
+    assert!(shares.windows(2).all(|pair| pair[1].0 < pair[0].0 + 0.05), "{shares:?}");
+}
+
+/// What is left of a sun's light at sixteen depths of a slab, and what should be.
+fn shares_by_depth(shadow_maps: bool) -> Option<Vec<(f32, f32)>> {
     const DEEP: f32 = 0.032;
     const BROAD: f32 = 0.02;
     const COUNT: u32 = 800;
     const WIDTH: f32 = 0.1e-3;
-    let Some(mut scene) = Offscreen::new(128, 128) else {
-        return;
-    };
+    let mut scene = Offscreen::new(128, 128)?;
     let pixel = 0.06 / 128.0;
     measure(&mut scene, 0.06, 0.06);
     // From the right: what is seen of the slab's front is lit along x.
     // No brighter than a screen shows.
-    sun(&mut scene, Vec3::X, 8.0 * PI);
+    let sun = sun(&mut scene, Vec3::X, 8.0 * PI);
+    let world = scene.app.world_mut();
+    world.get_mut::<DirectionalLight>(sun).unwrap().shadow_maps_enabled = shadow_maps;
     let look = HairLook {
         melanin: Melanin::new(100.0, 0.0),
         variation: 0.0,
@@ -160,15 +185,7 @@ fn light_falls_off_bit_by_bit_on_its_way_into_hair() {
     let left = |i: usize| (-(i as f32 + 0.5) * each).exp();
     // Of the sun, by all sixteen.
     let whole = light.iter().sum::<f32>() / (0..16).map(left).sum::<f32>();
-    let shares: Vec<f32> = light.iter().map(|l| l / whole).collect();
-    println!("left by depth: {shares:.3?}");
-    for (i, share) in shares.iter().enumerate() {
-        println!("  {share:.3} for {:.3}", left(i));
-        assert!((share - left(i)).abs() < 0.1 * left(i) + 0.06, "{share} for {}", left(i));
-    }
-    for pair in shares.windows(2) {
-        assert!(pair[1] - pair[0] < 0.05 && pair[0] - pair[1] < 0.25, "{shares:?}");
-    }
+    Some(light.iter().enumerate().map(|(i, light)| (light / whole, left(i))).collect())
 }
 
 /// What endless hair returns of light from all around (Stokes 1862), of shares that one dry fibre sends on
@@ -268,4 +285,45 @@ fn hair_does_not_flicker_as_the_camera_creeps() {
     }
     println!("flicker {:.3} of the mean of {count} pixels", flicker / light);
     assert!(count > 100.0 && flicker / light < 0.15);
+}
+
+/// Hair that lies around a place takes light of the sky from it: the inside of an open pipe of dark hair is
+/// darker than its outside.
+#[test]
+fn a_hollow_is_darker_under_a_sky_than_what_stands_out() {
+    let Some(mut scene) = Offscreen::new(64, 64) else {
+        return;
+    };
+    measure(&mut scene, 0.1, 0.1);
+    let mut chance = Chance(11);
+    let mut strand = || {
+        // Open over a quarter.
+        let (sine, cosine) = (1.5 * PI * chance.next() - 0.25 * PI).sin_cos();
+        let radius = 0.026 + 0.015 * chance.next();
+        (0..3).map(|n| Vec3::new(radius * cosine, 0.1 - 0.1 * n as f32, radius * sine)).collect()
+    };
+    let guides: Vec<Vec<Vec3>> = (0..6000).map(|_| strand()).collect();
+    let look = HairLook {
+        melanin: Melanin::BLACK,
+        variation: 0.0,
+        root_shade: 0.0,
+        tip_bleach: 0.0,
+        width: 0.2e-3,
+        ..default()
+    };
+    let followers = HairFollowers { segments: 8, ..HairFollowers::none() };
+    let hair = wear(&mut scene, &guides, (look, followers));
+    let camera = scene.camera;
+    let mut images = scene.app.world_mut().resource_mut::<Assets<Image>>();
+    let sky = EnvironmentMapLight::solid_color(&mut images, Color::WHITE);
+    scene.app.world_mut().entity_mut(camera).insert(sky);
+    let mut light = |turned: f32| {
+        let place = Transform::from_rotation(Quat::from_rotation_y(turned));
+        scene.app.world_mut().entity_mut(hair).insert(place);
+        let picture = scene.draw();
+        mean(&picture, 0.1 / 64.0, (-0.01, 0.01), (-0.03, 0.03)).y
+    };
+    let (outside, inside) = (light(0.0), light(PI));
+    println!("outside {outside:.4}, inside {inside:.4}");
+    assert!((0.3..0.85).contains(&(inside / outside)), "{inside} of {outside}");
 }

@@ -155,6 +155,17 @@ fn compare(what: &str, ours: Vec3, theirs: [f32; 3]) {
 const TRESS: (u32, u32, f32) = (96, 288, 0.8e-3);
 const BALL: (u32, u32, f32) = (200, 200, 1.3e-3);
 
+/// Asserts; with a folder for pictures in `REFERENCE`, only tells.
+macro_rules! expect {
+    ($is:expr, $($what:tt)*) => {
+        if std::env::var_os("REFERENCE").is_none() {
+            assert!($is, $($what)*);
+        } else if !$is {
+            println!("  missed: {}", format_args!($($what)*));
+        }
+    };
+}
+
 #[test]
 fn a_tress_has_the_colour_that_path_tracing_gives_it() {
     compare_tress(&["side"]);
@@ -222,12 +233,14 @@ fn compare_tress(wanted: &[&str]) {
             compare(&name, ours, reference);
             let apart = (ours - Vec3::from(reference)).abs();
             if case == "back" {
-                // The aim is 25 % and 0.005: the tails of lobes after many bounces.
-                let bound = if eumelanin == 0.0 { 0.12 } else { 0.025 };
-                assert!(apart.max_element() < bound, "{name}: {ours}");
+                // Of white hair half comes through: after many fibres light leaves the cone of the first, and
+                // more so than by the lobe that goes straight through.
+                let share = if eumelanin == 0.0 { 0.55 } else { 0.25 };
+                let off = apart - share * Vec3::from(reference);
+                expect!(off.max_element() < 0.005, "{name}: {ours}");
             } else {
                 let off = apart - 0.15 * Vec3::from(reference);
-                assert!(off.max_element() < 0.01, "{name}: {ours}");
+                expect!(off.max_element() < 0.01, "{name}: {ours}");
             }
         }
     }
@@ -279,8 +292,8 @@ const PROFILES: [[f32; 13]; 4] = [
 ];
 
 /// T9 and the profile from lit to dark. The ring's light is within 25 % for every melanin. Its ratio to the
-/// middle's is not, for that gets two and a half times its light: the aim is 25 %, a third is reached. The
-/// profile's aim is 15 % of its maximum, 41 % is reached: light that has gone through many fibres still has
+/// middle's is not but for black, for that gets up to twice its light: the aim is 25 %, 56 to 79 % is reached. The
+/// profile's aim is 15 % of its maximum, 39 % is reached: light that has gone through many fibres still has
 /// the direction of one, so the lit side gets half of it and the far side too much.
 #[test]
 #[ignore = "takes minutes in software"]
@@ -296,10 +309,10 @@ fn a_ball_glows_at_its_rim_as_path_tracing_has_it() {
         let key = bench.draw(&format!("key {name}"), key, eumelanin, 0.4 * gain);
         let off = (ring - Vec3::from(RINGS[i])).abs() - 0.25 * Vec3::from(RINGS[i]);
         compare(&format!("rim {name}, ring"), ring, RINGS[i]);
-        assert!(off.max_element() < 0.005, "{name}: {ring}");
+        expect!(off.max_element() < 0.005, "{name}: {ring}");
         let ratio = luminance(ring) / luminance(centre);
         println!("rim {name}, centre {centre:.4}, ring : centre {ratio:.2} for {}", RIMS[i]);
-        assert!(ratio > 0.33 * RIMS[i], "{name}: {ratio}");
+        expect!(ratio > 0.5 * RIMS[i], "{name}: {ratio}");
         let disc = mean(&key, BALL.2, |x, y| from_middle(x, y) < 60.0);
         compare(&format!("key {name}"), disc, KEYS[i]);
         let (ours, theirs) = (profile(&key), PROFILES[i]);
@@ -307,12 +320,11 @@ fn a_ball_glows_at_its_rim_as_path_tracing_has_it() {
         let most = theirs.into_iter().fold(0.0, f32::max);
         let off = square.sqrt() / most;
         println!("{ours:.4?} for\n{theirs:.4?}: {off:.3} of the maximum off");
-        assert!(off < 0.45, "{name}: {off}");
+        expect!(off < 0.42, "{name}: {off}");
     }
 }
 
-/// The white furnace: the sky's light in a disc of 60 mm, as a share of the background's. The aim is 10 % and
-/// 0.02; pale hair lets too much through where a line crosses two walls of it, and 35 % is reached.
+/// The white furnace: the sky's light in a disc of 60 mm, as a share of the background's.
 #[test]
 #[ignore = "takes a minute in software"]
 fn a_ball_in_a_furnace_returns_what_path_tracing_returns() {
@@ -338,7 +350,7 @@ fn a_ball_in_a_furnace_returns_what_path_tracing_returns() {
         let ours = mean(&drawn, BALL.2, |x, y| from_middle(x, y) < 60.0);
         compare(&format!("furnace {name}"), ours, reference);
         let reference = Vec3::from(reference);
-        let off = (ours - reference).abs() - 0.35 * reference;
-        assert!(off.max_element() < 0.02, "{name}: {ours}");
+        let off = (ours - reference).abs() - 0.1 * reference;
+        expect!(off.max_element() < 0.02, "{name}: {ours}");
     }
 }

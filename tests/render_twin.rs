@@ -349,7 +349,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let a = angles_of(tangent.xyz, f[2].xyz, f[3].xyz);
     let o = Optics(f[0].xyz, f[0].w, 0.8, 1.2, f[1].x, f[2].w, 1.5 * f[1].x, 0.7 * f[1].x);
     let keep = (unused[0].x + unused_too[0].x) * 0.0;
-    out[id.x] = vec4(scattered(a, o, Passage(f[1].y, f[1].z, f[1].w), f[3].w) + keep, 1.0);
+    out[id.x] = vec4(scattered(a, o, Passage(f[1].y, f[1].z, f[1].w), f[3].w, 1.5 * f[3].w) + keep, 1.0);
 }
 ";
 
@@ -393,7 +393,7 @@ fn the_shader_lights_fibres_as_its_rust_twin_does() {
         };
         let angles = Angles::of(tangent, f[2].truncate(), f[3].truncate());
         let passage = Passage { lit: f[1].y, depth: f[1].z, behind: f[1].w };
-        let twin = fibre.scattered(&angles, &passage, f[3].w);
+        let twin = fibre.scattered(&angles, &passage, f[3].w, 1.5 * f[3].w);
         let sent = Vec3::new(sent[0], sent[1], sent[2]);
         worst = worst.max(((sent - twin).abs() / (twin.abs() + 1e-3)).max_element());
         sum += twin.element_sum();

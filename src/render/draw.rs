@@ -52,6 +52,8 @@ pub(super) struct Packed {
     pub(super) key: RibbonKey,
     /// For which rings there is room; none before the first frame.
     pub(super) rings: Rings,
+    /// In which fibres on the way of light are counted, and the number of cells along its side.
+    pub(super) volume: Option<(Handle<Image>, u32)>,
     /// Roots of drawn strands at rest, which determine their streaks.
     places: Vec<Vec3>,
     /// The streaks last uploaded to the GPU.
@@ -196,7 +198,7 @@ pub(super) fn pack(
         let strands = packed.scatter(&strands, follower_roots.as_deref(), &settings);
         faults.write_batch(misplaced(&strands).map(|fault| fault.of(hair)));
         let counts = (packed.layout.len() as u32, strands.len() as u32);
-        packed.rings = Rings::default();
+        (packed.rings, packed.volume) = default();
         packed.ribbon = packed.ribbon((&look, &dye), &settings, view, counts);
         let key = key(false);
         packed.key = key;
@@ -214,6 +216,7 @@ pub(super) fn pack(
             ribbon: packed.ribbon,
             // Any buffer stands for rings that nobody reads.
             rings: nodes.clone(),
+            volume: None,
             nodes,
             guides: add(bytemuck::cast_slice(&ranges)),
             strands: add(&pack_strands(&strands)),

@@ -5,7 +5,8 @@ use super::{
     buffers::HairBuffers,
     draw::Packed,
     material::Ribbon,
-    rings::{Broken, has_compute, why_broken},
+    packed_frame::DrawnFrame,
+    rings::{Broken, Rings, has_compute, why_broken},
     sets::{HairRenderSystems, WritesNodes},
 };
 use bevy::{
@@ -18,9 +19,9 @@ use bevy::{
         Extract, ExtractSchedule, RenderApp, RenderStartup,
         render_asset::RenderAssets,
         render_resource::{
-            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
-            BufferId, CachedComputePipelineId, ComputePassDescriptor, ComputePipelineDescriptor,
-            DynamicUniformBuffer, PipelineCache, ShaderStages,
+            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries,
+            BindingResource, Buffer, BufferId, CachedComputePipelineId, ComputePassDescriptor,
+            ComputePipelineDescriptor, DynamicUniformBuffer, PipelineCache, ShaderStages,
             binding_types::{storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer},
         },
         renderer::{
@@ -53,7 +54,7 @@ pub(super) fn plugin(app: &mut App) {
 
 /// The kernel.
 #[derive(Resource)]
-struct Expander {
+pub(super) struct Expander {
     layout: BindGroupLayoutDescriptor,
     pipeline: CachedComputePipelineId,
 }
@@ -94,7 +95,7 @@ fn compile(
 
 /// The hair that is seen in this frame.
 #[derive(Resource, Default)]
-struct Expansions {
+pub(super) struct Expansions {
     hairs: Vec<Expansion>,
     ribbons: DynamicUniformBuffer<Ribbon>,
     groups: HashMap<Bound, Group>,
@@ -108,36 +109,49 @@ struct Group {
     is_used: bool,
 }
 
-struct Expansion {
+pub(super) struct Expansion {
     /// Nodes, guides, strands, frame, rings.
-    buffers: [AssetId<ShaderBuffer>; 5],
+    pub(super) buffers: [AssetId<ShaderBuffer>; 5],
     ribbon: Ribbon,
     /// Where that lies among those of the frame (bytes).
-    offset: u32,
-    /// How many.
-    rings: u64,
+    pub(super) offset: u32,
+    pub(super) rings: Rings,
+    /// Its grid, and the number of cells along a side.
+    pub(super) volume: Option<(AssetId<Image>, u32)>,
+}
+
+impl Expansions {
+    pub(super) fn hairs(&self) -> &[Expansion] {
+        &self.hairs
+    }
+
+    /// The ribbons of the frame, once they have been written.
+    pub(super) fn ribbons(&self) -> Option<(&Buffer, BindingResource<'_>)> {
+        self.ribbons.buffer().zip(self.ribbons.binding())
+    }
 }
 
 fn extract(
-    hairs: Extract<Query<(&HairBuffers, &Packed)>>,
+    hairs: Extract<Query<(&HairBuffers, &Packed, &DrawnFrame)>>,
     drawn: Extract<Query<&ViewVisibility>>,
     mut expansions: ResMut<Expansions>,
 ) {
     expansions.hairs.clear();
     let seen =
-        hairs.iter().filter(|(hair, _)| drawn.get(hair.drawn).is_ok_and(|drawn| drawn.get()));
-    expansions.hairs.extend(seen.filter_map(|(hair, packed)| {
+        hairs.iter().filter(|(hair, ..)| drawn.get(hair.drawn).is_ok_and(|drawn| drawn.get()));
+    expansions.hairs.extend(seen.filter_map(|(hair, packed, drawn)| {
         let HairBuffers { nodes, guides, strands, frame, rings: ring, .. } = hair;
         Some(Expansion {
             buffers: [nodes.id(), guides.id(), strands.id(), frame.id(), ring.as_ref()?.id()],
             ribbon: packed.ribbon,
             offset: 0,
-            rings: packed.rings.count(),
+            rings: packed.rings,
+            volume: packed.volume.as_ref().map(|(image, _)| (image.id(), drawn.volume.side)),
         })
     }));
 }
 
-fn expand(
+pub(super) fn expand(
     mut expansions: ResMut<Expansions>,
     (expander, broken): (Option<Res<Expander>>, Res<Broken>),
     pipelines: Res<PipelineCache>,
@@ -195,7 +209,7 @@ fn expand(
         });
         group.is_used = true;
         pass.set_bind_group(0, &group.group, &[hair.offset]);
-        let count = hair.rings.div_ceil(u64::from(LANES)).min(u64::from(u32::MAX)) as u32;
+        let count = hair.rings.count().div_ceil(u64::from(LANES)).min(u64::from(u32::MAX)) as u32;
         pass.dispatch_workgroups(count.min(most), count.div_ceil(most), 1);
     }
 }

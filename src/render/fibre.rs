@@ -17,6 +17,7 @@ const TRT_FOCUS: f32 = 17.0;
 const TT_SHARE: f32 = 0.96;
 const TRT_SHARE: f32 = 0.757;
 const DIFFUSE: f32 = 2.2;
+const RETURNING: f32 = 0.56;
 
 /// Optical properties of a fibre at one point.
 #[derive(Clone, Copy, Debug)]
@@ -108,16 +109,20 @@ impl Optics {
     }
 
     /// Multiple scattering: the reflected share of light that arrives along `p` in hair of `layers`
-    /// layers.
-    pub fn scattered(&self, a: &Angles, p: &Passage, layers: f32) -> Vec3 {
+    /// layers, where light of this direction meets `whole` fibres on its way through.
+    pub fn scattered(&self, a: &Angles, p: &Passage, layers: f32, whole: f32) -> Vec3 {
         let (a_f, a_b) = (self.forward_share(), self.backward_share());
         let bulk = Bulk::of(a_f, a_b, DIFFUSE * layers);
-        let onward = (1.0 - p.lit) * a_f * (-(1.0 - a_f) * p.behind).exp();
-        let wide = self.variance * (1.0 + 0.25 * (bulk.bounces + p.depth));
-        let body = (bulk.reflectance - a_b) * matt(a.cos_phi) * a.along(wide, 0.0);
+        let within = (1.0 + p.behind) / whole.max(1.0 + p.behind);
+        let flow = bulk.flow(DIFFUSE * within * layers, DIFFUSE * layers);
+        let straight = a_f * (-(1.0 - a_f) * p.behind).exp();
+        let onward = (1.0 - p.lit) * (straight * flow.on).map(f32::sqrt);
+        let back = p.lit * bulk.reflectance + (1.0 - p.lit) * flow.back;
+        let own = (1.0 - a_b / bulk.reflectance.max(a_b)).max(Vec3::ZERO);
+        let wide = self.variance * (1.0 + 0.25 * bulk.bounces);
         p.lit * self.lobes(a, 0.0)
             + onward * self.lobes(a, p.depth)
-            + (p.lit + onward) * body.max(Vec3::ZERO)
+            + back * own * matt(a.cos_phi) * a.along(wide, 0.0)
     }
 }
 
@@ -189,6 +194,19 @@ pub struct Bulk {
     pub transmittance: Vec3,
     /// Mean number of fibres on the way back out.
     pub bounces: f32,
+    /// Reflectance of endless layers.
+    endless: Vec3,
+    /// What one of endless layers lets through.
+    one: Vec3,
+}
+
+/// What flows through many layers at a place in them: a share of what comes in, on and back.
+#[derive(Clone, Copy, Debug)]
+pub struct Flow {
+    /// As light came in.
+    pub on: Vec3,
+    /// The other way.
+    pub back: Vec3,
 }
 
 impl Bulk {
@@ -206,7 +224,20 @@ impl Bulk {
         Self {
             reflectance: endless * (1.0 - left) / inner,
             transmittance: through * (1.0 - endless * endless) / inner,
-            bounces: 1.0 / (3.0 / bounces + 1.0 / layers.max(1.0)),
+            bounces: 1.0 / (3.0 / bounces + 1.0 / (RETURNING * layers).max(1.0)),
+            endless,
+            one,
+        }
+    }
+
+    /// After `depth` of `layers`, of which there are more (Stokes 1862).
+    pub fn flow(&self, depth: f32, layers: f32) -> Flow {
+        let [here, returned] = [depth, 2.0 * layers - depth].map(|n| self.one.powf(n));
+        let square = self.endless * self.endless;
+        let inner = (1.0 - square * returned * here).max(Vec3::splat(1e-6));
+        Flow {
+            on: (here - square * returned) / inner,
+            back: self.endless * (here - returned).max(Vec3::ZERO) / inner,
         }
     }
 }
@@ -263,10 +294,32 @@ mod tests {
                 let [dry, single, lock] =
                     [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)].map(|(wet, lock)| {
                         let fibre = Optics { wet, lock, ..Optics::new(absorption, 0.3) };
-                        fibre.scattered(&angles, &passage, 20.0).element_sum()
+                        fibre.scattered(&angles, &passage, 20.0, 30.0).element_sum()
                     });
                 assert!(lock < 0.75 * dry, "{passage:?}, {degrees}°: {lock} of {dry}");
                 assert!(lock <= single, "{passage:?}, {degrees}°: {lock} of {single}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_flows_through_layers_begins_as_all_and_ends_as_what_comes_through() {
+        for absorption in [0.0, 0.05, 0.4, 2.0] {
+            let fibre = Optics::new(Vec3::splat(absorption), 0.3);
+            let bulk = Bulk::of(fibre.forward_share(), fibre.backward_share(), 8.0);
+            let near = |a: Vec3, b: Vec3| assert!(a.abs_diff_eq(b, 2e-3), "{absorption}: {a} {b}");
+            near(bulk.flow(0.0, 8.0).on, Vec3::ONE);
+            near(bulk.flow(0.0, 8.0).back, bulk.reflectance);
+            near(bulk.flow(8.0, 8.0).on, bulk.transmittance);
+            near(bulk.flow(8.0, 8.0).back, Vec3::ZERO);
+            // What goes in more than comes out is absorbed on the way, without pigment nothing is.
+            let net = |depth: f32| bulk.flow(depth, 8.0).on - bulk.flow(depth, 8.0).back;
+            let lost = (0..8).map(|i| net(i as f32) - net(i as f32 + 1.0));
+            let lost: Vec<f32> = lost.map(|lost| lost.x).collect();
+            let least = if absorption > 0.0 { 0.0 } else { -1e-3 };
+            assert!(lost.iter().all(|lost| *lost > least), "{absorption}: {lost:?}");
+            if absorption == 0.0 {
+                assert!(lost.iter().all(|lost| *lost < 5e-3), "{lost:?}");
             }
         }
     }
@@ -423,7 +476,8 @@ mod tests {
                             [(1.0, 0.0, 0.0), (0.0, 1e6, 1e6), (0.5, 2.0, 1.0)]
                         {
                             let passage = Passage { lit, depth, behind };
-                            let sent = fibre.scattered(&Angles::of(Vec3::Y, l, v), &passage, 20.0);
+                            let sent =
+                                fibre.scattered(&Angles::of(Vec3::Y, l, v), &passage, 20.0, 30.0);
                             assert!(sent.is_finite() && sent.min_element() >= 0.0, "{sent}");
                         }
                     }

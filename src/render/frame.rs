@@ -12,6 +12,7 @@ use super::{
     screen_share::pixel_in,
     solids::{Ball, DrawnSolid, arrange},
     view::HairView,
+    volume::{self, BrightLights, HairVolume},
 };
 use crate::{contact::HairCollider, look::HairLook, setting::Settings};
 use bevy::{
@@ -26,11 +27,13 @@ pub(super) fn prepare(
     (looks, views, details): (Settings<HairLook>, Settings<HairView>, Settings<HairDetail>),
     cameras: Query<(&Camera, &GlobalTransform)>,
     (mut known, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
-    (mut shader_buffers, mut materials): (
+    (mut shader_buffers, mut images, mut materials): (
         ResMut<Assets<ShaderBuffer>>,
+        ResMut<Assets<Image>>,
         ResMut<Assets<RibbonMaterial>>,
     ),
     room: RoomForRings,
+    lights: BrightLights,
     (mut balls, mut solids): (Local<Vec<Ball>>, Local<Vec<DrawnSolid>>),
 ) {
     balls.clear();
@@ -63,22 +66,31 @@ pub(super) fn prepare(
         }
         // Numbers and buffer change in one material, so that no frame has those of different levels.
         let rings = room.of(level);
-        if packed.rings != rings {
+        let side = if rings.ranks > 0 { HairVolume::side(frame.level) } else { 0 };
+        let known_side = packed.volume.as_ref().map_or(0, |(_, side)| *side);
+        if packed.rings != rings || known_side != side {
             packed.rings = rings;
             packed.ribbon = packed.ribbon.with_rings(rings);
             let made = rings.size().map(|size| {
                 shader_buffers.add(ShaderBuffer::with_size(size, RenderAssetUsages::default()))
             });
             packed.key.expanded = made.is_some();
+            if known_side != side {
+                packed.volume = (side > 0).then(|| (images.add(volume::image(side)), side));
+            }
             if let Some(mut material) = materials.get_mut(&material.0) {
                 (material.key, material.ribbon) = (packed.key, packed.ribbon);
                 material.rings = made.clone().unwrap_or_else(|| buffers.nodes.clone());
+                material.volume = packed.volume.as_ref().map(|(image, _)| image.clone());
             }
             buffers.rings = made;
         }
 
         frame.packed = PackedFrame::new(share);
         let from_world = hair_place.inverse();
+        frame.volume = HairVolume::around(inside.0, inside.1, side, frame.volume);
+        let nearest = lights.at(center, inside.1.length() * scale);
+        frame.packed.set_volume(frame.volume, nearest, &from_world);
         solids.clear();
         let near = balls.iter().filter(|ball| ball.is_near(inside, &hair_place));
         solids.extend(near.filter_map(|ball| {

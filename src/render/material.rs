@@ -45,6 +45,10 @@ pub(super) struct RibbonMaterial {
     /// Computed once a frame from these; read only where the key says so.
     #[storage(6, read_only, visibility(vertex))]
     pub(super) rings: Handle<ShaderBuffer>,
+    /// How many fibres light meets.
+    #[texture(7, dimension = "3d", visibility(fragment))]
+    #[sampler(8, visibility(fragment))]
+    pub(super) volume: Option<Handle<Image>>,
 }
 
 /// Specialisation key of the shader.

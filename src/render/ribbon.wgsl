@@ -42,6 +42,8 @@ struct RibbonVertex {
     world_position: vec3<f32>,
     // The point of the strand beside which this is.
     center: vec3<f32>,
+    // And that in the hair's frame.
+    local: vec3<f32>,
     tangent: vec3<f32>,
     // From the middle of the lock that water draws together.
     outward: vec3<f32>,
@@ -109,6 +111,7 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     out.scale = scale;
     let center = (world * vec4(ring.position, 1.0)).xyz;
     out.center = center;
+    out.local = ring.position;
     out.tangent = safe_normalize(linear * ring.tangent, vec3(0.0, 1.0, 0.0));
     out.outward = linear * ring.outward;
     let eye = toward_eye(center);

@@ -1,6 +1,7 @@
 // Hair as the camera sees it.
 
 #import bevy_pbr::view_transformations::position_world_to_clip
+#import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
 #import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
@@ -27,6 +28,8 @@ struct ForwardVertex {
     @location(5) outward: vec3<f32>,
     // Of the hair's frame.
     @location(6) @interpolate(flat) instance: u32,
+    // Of the middle of the strand, in the hair's frame.
+    @location(7) local: vec3<f32>,
 }
 
 struct Fragment {
@@ -47,6 +50,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
     out.tangent = vertex.tangent;
     out.outward = vertex.outward;
     out.instance = instance;
+    out.local = vertex.local;
     let strand = min(corner / (2u * (ribbon.segments + 1u)), arrayLength(&streaks) - 1u);
     out.seed = vec2(vertex.seed, streaks[strand]);
     out.share = vec2(vertex.share, vertex.grown);
@@ -91,7 +95,12 @@ fn fragment(in: ForwardVertex) -> Fragment {
     fibre.density = in.along.w;
     fibre.outward = in.outward;
     fibre.share = in.share.x;
-    fibre.instance = in.instance;
+    let world = mesh_functions::get_world_from_local(in.instance);
+    let linear = mat3x3(world[0].xyz, world[1].xyz, world[2].xyz);
+    // It turns and scales alike all ways.
+    fibre.scale = max(length(world[0].xyz), 1e-6);
+    fibre.turn = linear * (1.0 / fibre.scale);
+    fibre.local = in.local;
     let lit = lit_hair(fibre);
 
     var pbr = pbr_input_new();

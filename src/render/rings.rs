@@ -40,6 +40,11 @@ impl Rings {
         u64::from(self.ranks) * u64::from(self.of_strand)
     }
 
+    /// Straight segments of a strand.
+    pub(super) fn segments(self) -> u32 {
+        self.of_strand.saturating_sub(1)
+    }
+
     /// Size of their buffer (bytes), if there is any.
     pub(super) fn size(self) -> Option<usize> {
         (self.ranks > 0).then_some((RING * self.count()) as usize)

@@ -11,12 +11,12 @@
 #import bevy_pbr::environment_map
 #endif
 #import bevy_render::maths::PI
-#import bevy_pbr::mesh_functions
 #import bevy_keratin::strands::{ribbon, frame, hash, DrawnSolid}
 #import bevy_keratin::fibre::{
     DIFFUSE, Optics, Passage, angles_of, scattered, forward_share, backward_share, bulk_of,
 }
 #import bevy_keratin::passage::{Way, slab_passage, sun_passage, spot_passage, point_passage}
+#import bevy_keratin::volume::{volume_place, light_in_volume, fibres_toward, openness, thickness}
 
 struct Fibre {
     position: vec3<f32>,
@@ -36,13 +36,17 @@ struct Fibre {
     outward: vec3<f32>,
     // Of what is drawn, that the strand covers: the rest of a pixel belongs to others.
     share: f32,
-    // Of the hair's frame.
-    instance: u32,
+    // In the hair's frame (m), and that frame's axes and scale in the world.
+    local: vec3<f32>,
+    turn: mat3x3<f32>,
+    scale: f32,
 }
 
 // What a fibre is made of at one place.
 struct Surface {
     optics: Optics,
+    // Of strands around, one behind the other.
+    layers: f32,
     // Of all the hair, under light from all around.
     reflectance: vec3<f32>,
     transmittance: vec3<f32>,
@@ -94,7 +98,11 @@ fn surface_of(fibre: Fibre) -> Surface {
     let tilt = 0.026 * apart * along_noise(fibre.seed, fibre.along);
     surface.optics = Optics(absorption, rough * rough * rough * rough, ribbon.gloss,
         ribbon.backlight, fibre.moisture, tilt, 0.0, fibre.moisture);
-    let bulk = bulk_of(forward_share(surface.optics), backward_share(surface.optics), DIFFUSE * ribbon.layers);
+    surface.layers = ribbon.layers;
+    if frame.volume_side > 0u {
+        surface.layers = thickness(volume_place(fibre.local));
+    }
+    let bulk = bulk_of(forward_share(surface.optics), backward_share(surface.optics), DIFFUSE * surface.layers);
     surface.reflectance = bulk.reflectance;
     surface.transmittance = bulk.transmittance;
     return surface;
@@ -129,8 +137,16 @@ fn kajiya_kay(t: vec3<f32>, l: vec3<f32>, v: vec3<f32>, exponent: f32) -> vec2<f
     return vec2(sin_l, pow(max(sin_l * sin_v - lt * vt, 0.0), exponent));
 }
 
-// Reflected share of light from `l` that came by `p`. Not yet weighted by the light.
-fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, p: Passage) -> vec3<f32> {
+// How light has come to a fibre.
+struct Arrival {
+    passage: Passage,
+    // On the light's whole way through the hair.
+    whole: f32,
+}
+
+// Reflected share of light from `l`. Not yet weighted by the light.
+fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, arrival: Arrival) -> vec3<f32> {
+    let p = arrival.passage;
 #ifdef HAIR_KAJIYA_KAY
     // Two lobes, shifted to tip and root; the second went through the fibre and is tinted.
     let t = fibre.tangent;
@@ -147,7 +163,7 @@ fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, p: Passage) -> vec3<f
 #else
     var optics = surface.optics;
     optics.film = film_of(fibre, l);
-    return scattered(angles_of(fibre.tangent, l, fibre.eye), optics, p, ribbon.layers);
+    return scattered(angles_of(fibre.tangent, l, fibre.eye), optics, p, surface.layers, arrival.whole);
 #endif
 }
 
@@ -156,6 +172,40 @@ fn way_of(fibre: Fibre, l: vec3<f32>) -> Way {
     let lt = dot(l, fibre.tangent);
     let sine = sqrt(max(1.0 - lt * lt, 0.0));
     return Way(fibre.position, fibre.density * sine, min(abs(lt) / max(sine, 0.1), 3.0));
+}
+
+// What a shadow map says of a light's way, with the number of fibres from the grid: the map knows how far away
+// the first fibre is, the grid how many there are.
+fn counted(p: Passage, fibre: Fibre, way: Way, l: vec3<f32>, light: vec4<f32>) -> Arrival {
+    let slot = light_in_volume(light);
+    if slot < 0 {
+        return Arrival(p, ribbon.layers);
+    }
+    let fibres = fibres_toward(volume_place(fibre.local), slot, l * fibre.turn);
+    let near = fibres.near * fibre.scale;
+    let density = max(way.density, 1e-3);
+    let far = smoothstep(near, 2.0 * near, p.behind / density);
+    let behind = min(p.behind, near * density) + fibres.ahead * far;
+    return Arrival(Passage(p.lit, (1.0 - p.lit) * (1.0 + behind), behind), fibres.whole);
+}
+
+// The way of a light without a shadow map: hair is taken for a plane layer as far as the grid does not know of
+// more.
+fn uncounted(fibre: Fibre, l: vec3<f32>, light: vec4<f32>) -> Arrival {
+    let slot = light_in_volume(light);
+    if slot < 0 {
+        return Arrival(slab_passage(dot(fibre.normal, l), ribbon.layers), ribbon.layers);
+    }
+    let place = volume_place(fibre.local);
+    let fibres = fibres_toward(place, slot, l * fibre.turn);
+    let out = fibre.turn * openness(place).xyz;
+    let c = dot(out, l) * inverseSqrt(max(dot(out, out), 1e-12));
+    // Before the surface the eye sees the first fibres, behind it as many more as the grid has left out.
+    let front = slab_passage(max(c, 0.05), thickness(place));
+    let near = fibre.density * fibres.near * fibre.scale;
+    let behind = mix(near, front.behind, smoothstep(-0.3, 0.3, c)) + fibres.ahead;
+    let lit = mix(exp(-near), front.lit, smoothstep(-0.3, 0.3, c)) * exp(-fibres.ahead);
+    return Arrival(Passage(lit, behind, behind), fibres.whole);
 }
 
 // How far away the sun is (m).
@@ -175,7 +225,7 @@ fn beside(solid: DrawnSolid, place: vec4<f32>, l: vec3<f32>, away: f32) -> f32 {
     }
     let off = begin + t * way - vec3(0.0, nearest, 0.0);
     // What lies on the surface is lit until light grazes it.
-    return select(smoothstep(0.8, 1.0, dot(off, off)), 1.0, t <= 0.0);
+    return select(smoothstep(0.96, 1.0, dot(off, off)), 1.0, t <= 0.0);
 }
 
 // How much of a light that shines from `l`, `away` metres from here, is let by solids that strands are
@@ -185,15 +235,10 @@ fn past_solids(fibre: Fibre, l: vec3<f32>, away: f32) -> f32 {
     if frame.solid_count == 0u {
         return free;
     }
-    let world = mesh_functions::get_world_from_local(fibre.instance);
-    // Its inverse, for it turns and scales alike all ways.
-    let linear = mat3x3(world[0].xyz, world[1].xyz, world[2].xyz);
-    let square = max(dot(world[0].xyz, world[0].xyz), 1e-12);
-    let place = (fibre.position - world[3].xyz) * linear / square;
-    let toward = l * linear / square;
+    let toward = l * fibre.turn / fibre.scale;
     // The largest come first; the small ones fill creases between them.
     for (var i = 0u; i < min(frame.solid_count, 16u); i++) {
-        free = min(free, beside(frame.solids[i], vec4(place, 1.0), toward, away));
+        free = min(free, beside(frame.solids[i], vec4(fibre.local, 1.0), toward, away));
     }
     return free;
 }
@@ -216,17 +261,22 @@ fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32>
     if strength <= 0.0 {
         return vec3(0.0);
     }
-    var p: Passage;
+    var p: Arrival;
+    let known = vec4((*light).position_radius.xyz, 1.0);
+    let hair = way_of(fibre, l);
     if ((*light).flags & mesh_view_types::POINT_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
-        p = slab_passage(dot(fibre.normal, l), ribbon.layers);
+        p = uncounted(fibre, l, known);
     } else if spot {
-        p = spot_passage(id, way_of(fibre, l));
+        p = counted(spot_passage(id, hair), fibre, hair, l, known);
     } else {
-        p = point_passage(id, way_of(fibre, l), fibre.frag_coord.xy);
+        p = counted(point_passage(id, hair, fibre.frag_coord.xy), fibre, hair, l, known);
     }
     strength *= past_solids(fibre, l, sqrt(square));
     return reflected(fibre, surface, l, p) * (*light).color_inverse_square_range.rgb * strength;
 }
+
+// How open the grid says it is where the eye sees a plane layer.
+const OPEN_PLANE: f32 = 0.36;
 
 fn lit_hair(fibre: Fibre) -> vec3<f32> {
     let surface = surface_of(fibre);
@@ -245,11 +295,12 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
     for (var i = 0u; i < lights.n_directional_lights; i++) {
         let sun = &view_bindings::lights.directional_lights[i];
         let l = (*sun).direction_to_light;
-        var p: Passage;
+        var p: Arrival;
+        let hair = way_of(fibre, l);
         if ((*sun).flags & mesh_view_types::DIRECTIONAL_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
-            p = slab_passage(dot(fibre.normal, l), ribbon.layers);
+            p = uncounted(fibre, l, vec4(l, 0.0));
         } else {
-            p = sun_passage(i, way_of(fibre, l), view_z);
+            p = counted(sun_passage(i, hair, view_z), fibre, hair, l, vec4(l, 0.0));
         }
         light += reflected(fibre, surface, l, p) * (*sun).color.rgb * past_solids(fibre, l, FAR);
     }
@@ -262,13 +313,22 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         let front = saturate(dot(cross((*panel).up, (*panel).right), -l));
         let area = (*panel).width * (*panel).height;
         let falloff = lighting::getRangeFalloff(square, 1.0 / max((*panel).range * (*panel).range, 1e-4));
-        let p = slab_passage(dot(fibre.normal, l), ribbon.layers);
+        let p = uncounted(fibre, l, vec4((*panel).position, 1.0));
         light += reflected(fibre, surface, l, p) * (*panel).color.rgb
             * (front * area / (square + area) * falloff * past_solids(fibre, l, sqrt(square)));
     }
 
-    // What comes from everywhere reaches roots least.
-    let open = 1.0 - ribbon.root_shade * (1.0 - smoothstep(0.0, 0.35, fibre.along));
+    // What comes from everywhere reaches roots least, and what hair lies around: without a grid a share says
+    // so.
+    var open = vec3(1.0 - ribbon.root_shade * (1.0 - smoothstep(0.0, 0.35, fibre.along)));
+    var normal = fibre.normal;
+    if frame.volume_side > 0u {
+        let around = openness(volume_place(fibre.local));
+        open = pow(vec3(clamp(around.w / OPEN_PLANE, 1e-3, 1.0)), 1.0 - forward_share(surface.optics));
+        let out = fibre.turn * around.xyz;
+        let across = out - fibre.tangent * dot(out, fibre.tangent);
+        normal = normalize(fibre.normal + 10.0 * across);
+    }
     var indirect = lights.ambient_color.rgb * (surface.reflectance + surface.transmittance);
 #ifdef ENVIRONMENT_MAP
     // The cuticle mirrors about the normal, stretched along the fibre; the rest comes out as from
@@ -276,7 +336,7 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
     let mirrored = min(backward_share(surface.optics), surface.reflectance).b;
     var input: lighting::LightingInput;
     input.layers[0].NdotV = max(dot(fibre.normal, fibre.eye), 0.05);
-    input.layers[0].N = fibre.normal;
+    input.layers[0].N = normal;
     input.layers[0].R = reflect(-fibre.eye, fibre.normal);
     input.layers[0].perceptual_roughness = pow(surface.optics.variance, 0.125);
     input.layers[0].roughness = pow(surface.optics.variance, 0.25);
@@ -289,7 +349,7 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
     let surround = environment_map::environment_map_light(&input, &ranges, false);
     indirect += surround.diffuse + surround.specular;
     // And what shines through from behind.
-    input.layers[0].N = -fibre.normal;
+    input.layers[0].N = -normal;
     input.layers[0].R = -fibre.eye;
     input.diffuse_color = surface.transmittance;
     input.F0_dielectric = vec3(0.0);

@@ -96,6 +96,16 @@ struct DrawnFrame {
     fade: f32,             // the part of it, from its end, in which they fade
     wider: f32,            // how many times wider they are
     solid_count: u32,
+    // The grid in which fibres are counted: its lowest corner and size of a cell (m), and cells along a side, 0
+    // for none.
+    volume_begin: vec3<f32>,
+    volume_side: u32,
+    volume_cell: vec3<f32>,
+    unused: u32,
+    // Lights towards which they are: places in the world and 1, or the way there and 0; the same in the hair's
+    // frame.
+    lights: array<vec4<f32>, 4>,
+    local_lights: array<vec4<f32>, 4>,
     groups: array<vec4<f32>, 24>, // balls around eight solids each
     solids: array<DrawnSolid, 192>,
 }

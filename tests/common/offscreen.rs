@@ -113,9 +113,13 @@ pub fn has_adapter() -> bool {
 /// the crate again.
 fn read_shaders(app: &mut App) {
     let Some(folder) = std::env::var_os("SHADERS") else { return };
-    let files = std::fs::read_dir(&folder).unwrap().map(|file| file.unwrap().path());
+    let folder = std::path::PathBuf::from(folder);
+    let inner = folder.join("volume");
+    let files = [&folder, &inner].map(|of| std::fs::read_dir(of).unwrap());
+    let files = files.into_iter().flatten().map(|file| file.unwrap().path());
     for file in files.filter(|file| file.extension().is_some_and(|end| end == "wgsl")) {
-        let path = std::path::Path::new("bevy_keratin/render").join(file.file_name().unwrap());
+        let inside = file.strip_prefix(&folder).unwrap();
+        let path = std::path::Path::new("bevy_keratin/render").join(inside);
         let source = std::fs::read(&file).unwrap();
         let known = app.world().resource::<EmbeddedAssetRegistry>();
         known.insert_asset(file, &path, source);
