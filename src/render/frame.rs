@@ -66,7 +66,8 @@ pub(super) fn prepare(
         }
         // Numbers and buffer change in one material, so that no frame has those of different levels.
         let rings = room.of(level);
-        let side = if rings.ranks > 0 { HairVolume::side(frame.level) } else { 0 };
+        let counts = rings.ranks > 0 && packed.key.is_lit();
+        let side = if counts { HairVolume::side(frame.level) } else { 0 };
         let known_side = packed.volume.as_ref().map_or(0, |(_, side)| *side);
         if packed.rings != rings || known_side != side {
             packed.rings = rings;

@@ -65,6 +65,10 @@ impl RibbonKey {
         let heat = !matches!(view, HairView::Natural | HairView::Guides);
         Self { heat, kajiya_kay: !heat && look.shading == HairShading::KajiyaKay, expanded }
     }
+
+    pub(super) fn is_lit(self) -> bool {
+        !self.heat
+    }
 }
 
 impl From<&RibbonMaterial> for RibbonKey {
@@ -103,6 +107,7 @@ pub(super) struct Ribbon {
     order_step: u32,
     ring_ranks: u32,
     ring_every: u32,
+    shadow_density: f32,
     densities: [Vec4; PIECES / 4],
     dyes: [Dye; MAX_LAYERS],
 }
@@ -179,6 +184,7 @@ impl Ribbon {
             order_step: order.step(),
             ring_ranks: rings.ranks,
             ring_every: rings.every,
+            shadow_density: look.shadow_density,
             densities: core::array::from_fn(|i| {
                 Vec4::from_slice(&thickness.densities[4 * i..]) * fibre_width
             }),

@@ -9,6 +9,7 @@
 #import bevy_keratin::strands::{ribbon, streaks, density_at}
 #import bevy_keratin::coverage::covered_samples
 #import bevy_keratin::shading::{Fibre, lit_hair}
+#import bevy_keratin::volume::volume_place
 
 // The strain that is drawn red.
 const STRAIN_FULL: f32 = 0.05;
@@ -101,6 +102,7 @@ fn fragment(in: ForwardVertex) -> Fragment {
     fibre.scale = max(length(world[0].xyz), 1e-6);
     fibre.turn = linear * (1.0 / fibre.scale);
     fibre.local = in.local;
+    fibre.place = volume_place(in.local);
     let lit = lit_hair(fibre);
 
     var pbr = pbr_input_new();

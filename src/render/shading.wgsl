@@ -16,7 +16,7 @@
     DIFFUSE, Optics, Passage, angles_of, scattered, forward_share, backward_share, bulk_of,
 }
 #import bevy_keratin::passage::{Way, slab_passage, sun_passage, spot_passage, point_passage}
-#import bevy_keratin::volume::{volume_place, light_in_volume, fibres_toward, openness, thickness}
+#import bevy_keratin::volume::{VolumePlace, light_in_volume, fibres_toward, openness}
 
 struct Fibre {
     position: vec3<f32>,
@@ -40,6 +40,7 @@ struct Fibre {
     local: vec3<f32>,
     turn: mat3x3<f32>,
     scale: f32,
+    place: VolumePlace,
 }
 
 // What a fibre is made of at one place.
@@ -98,10 +99,7 @@ fn surface_of(fibre: Fibre) -> Surface {
     let tilt = 0.026 * apart * along_noise(fibre.seed, fibre.along);
     surface.optics = Optics(absorption, rough * rough * rough * rough, ribbon.gloss,
         ribbon.backlight, fibre.moisture, tilt, 0.0, fibre.moisture);
-    surface.layers = ribbon.layers;
-    if frame.volume_side > 0u {
-        surface.layers = thickness(volume_place(fibre.local));
-    }
+    surface.layers = select(ribbon.layers, fibre.place.thickness, fibre.place.is_known);
     let bulk = bulk_of(forward_share(surface.optics), backward_share(surface.optics), DIFFUSE * surface.layers);
     surface.reflectance = bulk.reflectance;
     surface.transmittance = bulk.transmittance;
@@ -177,11 +175,11 @@ fn way_of(fibre: Fibre, l: vec3<f32>) -> Way {
 // What a shadow map says of a light's way, with the number of fibres from the grid: the map knows how far away
 // the first fibre is, the grid how many there are.
 fn counted(p: Passage, fibre: Fibre, way: Way, l: vec3<f32>, light: vec4<f32>) -> Arrival {
-    let slot = light_in_volume(light);
+    let slot = light_in_volume(fibre.place, light);
     if slot < 0 {
         return Arrival(p, ribbon.layers);
     }
-    let fibres = fibres_toward(volume_place(fibre.local), slot, l * fibre.turn);
+    let fibres = fibres_toward(fibre.place, slot, l * fibre.turn);
     let near = fibres.near * fibre.scale;
     let density = max(way.density, 1e-3);
     let far = smoothstep(near, 2.0 * near, p.behind / density);
@@ -192,16 +190,15 @@ fn counted(p: Passage, fibre: Fibre, way: Way, l: vec3<f32>, light: vec4<f32>) -
 // The way of a light without a shadow map: hair is taken for a plane layer as far as the grid does not know of
 // more.
 fn uncounted(fibre: Fibre, l: vec3<f32>, light: vec4<f32>) -> Arrival {
-    let slot = light_in_volume(light);
+    let slot = light_in_volume(fibre.place, light);
     if slot < 0 {
         return Arrival(slab_passage(dot(fibre.normal, l), ribbon.layers), ribbon.layers);
     }
-    let place = volume_place(fibre.local);
-    let fibres = fibres_toward(place, slot, l * fibre.turn);
-    let out = fibre.turn * openness(place).xyz;
+    let fibres = fibres_toward(fibre.place, slot, l * fibre.turn);
+    let out = fibre.turn * openness(fibre.place).xyz;
     let c = dot(out, l) * inverseSqrt(max(dot(out, out), 1e-12));
     // Before the surface the eye sees the first fibres, behind it as many more as the grid has left out.
-    let front = slab_passage(max(c, 0.05), thickness(place));
+    let front = slab_passage(max(c, 0.05), fibre.place.thickness);
     let near = fibre.density * fibres.near * fibre.scale;
     let behind = mix(near, front.behind, smoothstep(-0.3, 0.3, c)) + fibres.ahead;
     let lit = mix(exp(-near), front.lit, smoothstep(-0.3, 0.3, c)) * exp(-fibres.ahead);
@@ -318,16 +315,17 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
             * (front * area / (square + area) * falloff * past_solids(fibre, l, sqrt(square)));
     }
 
-    // What comes from everywhere reaches roots least, and what hair lies around: without a grid a share says
-    // so.
+    // What comes from everywhere reaches roots least, and places that hair lies around.
     var open = vec3(1.0 - ribbon.root_shade * (1.0 - smoothstep(0.0, 0.35, fibre.along)));
     var normal = fibre.normal;
-    if frame.volume_side > 0u {
-        let around = openness(volume_place(fibre.local));
-        open = pow(vec3(clamp(around.w / OPEN_PLANE, 1e-3, 1.0)), 1.0 - forward_share(surface.optics));
+    if fibre.place.is_known {
+        let around = openness(fibre.place);
+        open *= pow(vec3(clamp(around.w / OPEN_PLANE, 1e-3, 1.0)), 1.0 - forward_share(surface.optics));
         let out = fibre.turn * around.xyz;
         let across = out - fibre.tangent * dot(out, fibre.tangent);
-        normal = normalize(fibre.normal + 10.0 * across);
+        // Away from the hair, and to the eye where it does not say.
+        let mean = fibre.normal + 10.0 * across;
+        normal = mean * inverseSqrt(max(dot(mean, mean), 1e-12));
     }
     var indirect = lights.ambient_color.rgb * (surface.reflectance + surface.transmittance);
 #ifdef ENVIRONMENT_MAP

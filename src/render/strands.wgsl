@@ -75,6 +75,7 @@ struct Ribbon {
     order_step: u32,       // and rank * order_step the strand of a rank
     ring_ranks: u32,       // strands that have rings, from the first rank on
     ring_every: u32,       // of how many rings one is drawn
+    shadow_density: f32,
     densities: array<vec4<f32>, 2>, // of strands, seen from beside (1/m), along their length
     dyes: array<Dye, 4>,
 }

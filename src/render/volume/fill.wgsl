@@ -46,7 +46,7 @@ fn fill(
     let way = high.position - low.position;
     let length = length(way);
     let own_width = select(strands[strand].width, 1.0, strands[strand].width < 0.0);
-    let width = ribbon.width * frame.wider * own_width * alpha_of_rank(rank);
+    let width = ribbon.width * ribbon.shadow_density * frame.wider * own_width * alpha_of_rank(rank);
     let size = frame.volume_cell;
     // As fibres one behind the other in a cell as deep as it is on average.
     let deep = pow(size.x * size.y * size.z, 1.0 / 3.0);

@@ -5,7 +5,7 @@
 @group(0) @binding(8) var density: texture_3d<f32>;
 @group(0) @binding(9) var linear: sampler;
 // Four grids one above the other: fibres on the way to each light, those on the whole way of its light
-// through the hair, how open it is around, and how thick the hair is.
+// through the hair, how open it is around, and how thick the hair is, with 1 where all of that is known.
 @group(0) @binding(10) var volume: texture_storage_3d<rgba16float, write>;
 
 // The cells next to a place are left out, half of the second one too.
@@ -99,7 +99,7 @@ fn march(@builtin(global_invocation_id) cell: vec3<u32>) {
         textureStore(volume, at, vec4(0.0));
         textureStore(volume, at + next, vec4(0.0));
         textureStore(volume, at + 2 * next, vec4(0.0, 0.0, 0.0, 1.0));
-        textureStore(volume, at + 3 * next, vec4(0.0));
+        textureStore(volume, at + 3 * next, vec4(0.0, 1.0, 0.0, 0.0));
         return;
     }
     let here = frame.volume_begin + place * f32(side) * frame.volume_cell;
@@ -132,9 +132,9 @@ fn march(@builtin(global_invocation_id) cell: vec3<u32>) {
         let one = count(place, d);
         let other = count(place, -d);
         open += vec4(d, 1.0) * open_share(one) + vec4(-d, 1.0) * open_share(other);
-        thin += 1.0 / max(one.beside + other.beside, 1e-2);
+        thin += 1.0 / clamp(one.beside + other.beside, 1e-2, ENDLESS);
     }
     textureStore(volume, at + 2 * next, open / 14.0);
     // A line goes through 1 / cosine of a plane layer: half of that is the mean of its inverse.
-    textureStore(volume, at + 3 * next, vec4(0.5 * 7.0 / thin, 0.0, 0.0, 0.0));
+    textureStore(volume, at + 3 * next, vec4(min(0.5 * 7.0 / thin, ENDLESS), 1.0, 0.0, 0.0));
 }
