@@ -18,7 +18,7 @@ const FILM_SURFACE: f32 = 0.02;
 const WET_INSIDE: f32 = 0.7;
 // By how much water narrows a fibre's own lobes: it fills the scales' edges, and bends light less. Light of
 // many fibres keeps its spread, which is their disarray.
-const WET_SLEEK: f32 = 0.24;
+const WET_SLEEK: f32 = 0.17;
 // Variance of the film's lobe (rad^2): it lies over the scales, smooth as the lock is straight.
 const FILM_VARIANCE: f32 = 0.0064;
 // Neighbours that light goes through with a fibre of a wet lock: they touch, closer than a shadow map tells

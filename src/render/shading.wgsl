@@ -173,7 +173,8 @@ fn way_of(fibre: Fibre, l: vec3<f32>) -> Way {
 }
 
 // What a shadow map says of a light's way, with the number of fibres from the grid: the map knows how far away
-// the first fibre is, the grid how many there are.
+// the first fibre is, the grid how many there are. Where they are less than so dense as here, it may be no fibre
+// that is in the way.
 fn counted(p: Passage, fibre: Fibre, way: Way, l: vec3<f32>, light: vec4<f32>) -> Arrival {
     let slot = light_in_volume(fibre.place, light);
     if slot < 0 {
@@ -183,7 +184,7 @@ fn counted(p: Passage, fibre: Fibre, way: Way, l: vec3<f32>, light: vec4<f32>) -
     let near = fibres.near * fibre.scale;
     let density = max(way.density, 1e-3);
     let far = smoothstep(near, 2.0 * near, p.behind / density);
-    let behind = min(p.behind, near * density) + fibres.ahead * far;
+    let behind = max(p.behind, near * density + fibres.ahead) * far + p.behind * (1.0 - far);
     return Arrival(Passage(p.lit, (1.0 - p.lit) * (1.0 + behind), behind), fibres.whole);
 }
 
