@@ -21,7 +21,7 @@ fn curtain(look: HairLook) -> Option<(Offscreen, Entity)> {
     world.insert_resource(GlobalAmbientLight { brightness: 300.0, ..default() });
     let sun = DirectionalLight { illuminance: 800.0, ..default() };
     world.spawn((sun, Transform::from_xyz(0.2, 0.2, 1.0).looking_at(Vec3::ZERO, Vec3::Y)));
-    let hair = world.spawn((Hair, look, HairFollowers::new(12_000))).id();
+    let hair = world.spawn((Hair, look, HairFollowers::new(700))).id();
     for k in 0..40 {
         let x = 0.5 * (k as f32 / 39.0 - 0.5);
         let nodes: Vec<Vec3> = (0..9).map(|i| Vec3::new(x, 0.2 - 0.05 * i as f32, 0.0)).collect();
@@ -31,9 +31,9 @@ fn curtain(look: HairLook) -> Option<(Offscreen, Entity)> {
 }
 
 fn look(melanin: Melanin) -> HairLook {
-    // As much hair as on a head, without the highlights, which have the light's colour.
+    // Nine layers, as on a head, without the highlights, which have the light's colour.
     let plain = HairLook { gloss: 0.0, variation: 0.0, tip_bleach: 0.0, ..default() };
-    HairLook { melanin, width: 1.2e-3, taper: 1.0, ..plain }
+    HairLook { melanin, width: 1.2e-3, taper: 1.0, shadow_density: 5.0, ..plain }
 }
 
 fn drawn(scene: &mut Offscreen, hair: Entity, dye: HairDye) -> Picture {
