@@ -293,7 +293,7 @@ const PROFILES: [[f32; 13]; 4] = [
 ];
 
 /// T9 and the profile from lit to dark. The ring's light is within 25 % for every melanin. Its ratio to the
-/// middle's is not but for black, for that gets up to twice its light: the aim is 25 %, 56 to 79 % is reached. The
+/// middle's is not but for black, for that gets up to twice its light: the aim is 25 %, 55 to 79 % is reached. The
 /// profile's aim is 15 % of its maximum, 39 % is reached: light that has gone through many fibres still has
 /// the direction of one, so the lit side gets half of it and the far side too much.
 #[test]
