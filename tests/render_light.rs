@@ -325,5 +325,6 @@ fn a_hollow_is_darker_under_a_sky_than_what_stands_out() {
     };
     let (outside, inside) = (light(0.0), light(PI));
     println!("outside {outside:.4}, inside {inside:.4}");
-    assert!((0.3..0.85).contains(&(inside / outside)), "{inside} of {outside}");
+    // Measured 0.64; without the grid both are alike.
+    assert!((0.5..0.8).contains(&(inside / outside)), "{inside} of {outside}");
 }
