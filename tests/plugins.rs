@@ -6,8 +6,8 @@ mod offscreen;
 
 use bevy::{app::PluginGroupBuilder, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
-    contact::ContactPlugin, lod::LodPlugin, prelude::*, sleep::SleepPlugin, solve::SpringPlugin,
-    treatment::TreatmentPlugin, water::WaterPlugin,
+    contact::ContactPlugin, lod::LodPlugin, prelude::*, render::HairFollowers, sleep::SleepPlugin,
+    solve::SpringPlugin, treatment::TreatmentPlugin, water::WaterPlugin,
 };
 use offscreen::Offscreen;
 
@@ -57,7 +57,7 @@ fn all_parts_switch_off_together() {
 /// A head of hair, drawn with these plugins.
 fn is_drawn(what: &str, plugins: PluginGroupBuilder) {
     let Some(mut scene) = Offscreen::with_plugins(160, 120, plugins) else { return };
-    let hair = scene.app.world_mut().spawn((Hair, Transform::default())).id();
+    let hair = scene.app.world_mut().spawn((Hair, HairFollowers::new(300))).id();
     scene.app.world_mut().spawn((DirectionalLight::default(), Transform::default()));
     for line in offscreen::head_of_guides(60, 0.1, 0.1, 6) {
         scene.app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&line).unwrap()));

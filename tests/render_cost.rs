@@ -101,8 +101,7 @@ fn frames_a_second() {
             for _ in 0..FRAMES {
                 scene.draw_now();
             }
-            // A picture comes back with the second frame.
-            let frame = start.elapsed() / (2 * FRAMES);
+            let frame = start.elapsed() / FRAMES;
             let rate = 1.0 / frame.as_secs_f32();
             println!("{width}x{height}, {count} followers: {frame:?} a frame, {rate:.1} a second");
         }

@@ -122,7 +122,7 @@ fn studio_pictures() {
         scene.app.update();
         let start = std::time::Instant::now();
         let picture = scene.draw_now();
-        println!("{name}: {:?} for two frames", start.elapsed());
+        println!("{name}: {:?}", start.elapsed());
         for pipeline in scene.unready_pipelines() {
             println!("{pipeline}");
         }

@@ -234,10 +234,7 @@ fn compare_tress(wanted: &[&str]) {
             compare(&name, ours, reference);
             let apart = (ours - Vec3::from(reference)).abs();
             if case == "back" {
-                // Of white hair half comes through: after many fibres light leaves the cone of the first, and
-                // more so than by the lobe that goes straight through.
-                let share = if eumelanin == 0.0 { 0.55 } else { 0.25 };
-                let off = apart - share * Vec3::from(reference);
+                let off = apart - 0.25 * Vec3::from(reference);
                 expect!(off.max_element() < 0.005, "{name}: {ours}");
             } else {
                 let off = apart - 0.15 * Vec3::from(reference);
@@ -293,9 +290,8 @@ const PROFILES: [[f32; 13]; 4] = [
 ];
 
 /// T9 and the profile from lit to dark. The ring's light is within 25 % for every melanin. Its ratio to the
-/// middle's is not but for black, for that gets up to twice its light: the aim is 25 %, 55 to 79 % is reached. The
-/// profile's aim is 15 % of its maximum, 39 % is reached: light that has gone through many fibres still has
-/// the direction of one, so the lit side gets half of it and the far side too much.
+/// middle's is to be within 25 %, 74 to 80 % is reached. The profile's aim is 15 % of its maximum, 35 % is reached:
+/// light that has turned more than once lacks, half of it on the lit side.
 #[test]
 #[ignore = "takes minutes in software"]
 fn a_ball_glows_at_its_rim_as_path_tracing_has_it() {
@@ -313,7 +309,7 @@ fn a_ball_glows_at_its_rim_as_path_tracing_has_it() {
         expect!(off.max_element() < 0.005, "{name}: {ring}");
         let ratio = luminance(ring) / luminance(centre);
         println!("rim {name}, centre {centre:.4}, ring : centre {ratio:.2} for {}", RIMS[i]);
-        expect!(ratio > 0.5 * RIMS[i], "{name}: {ratio}");
+        expect!(ratio > 0.7 * RIMS[i], "{name}: {ratio}");
         let disc = mean(&key, BALL.2, |x, y| from_middle(x, y) < 60.0);
         compare(&format!("key {name}"), disc, KEYS[i]);
         let (ours, theirs) = (profile(&key), PROFILES[i]);
@@ -321,7 +317,7 @@ fn a_ball_glows_at_its_rim_as_path_tracing_has_it() {
         let most = theirs.into_iter().fold(0.0, f32::max);
         let off = square.sqrt() / most;
         println!("{ours:.4?} for\n{theirs:.4?}: {off:.3} of the maximum off");
-        expect!(off < 0.42, "{name}: {off}");
+        expect!(off < 0.37, "{name}: {off}");
     }
 }
 

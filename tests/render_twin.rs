@@ -347,7 +347,7 @@ const FIBRE: &str = "
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let f = fibres[id.x];
     let a = angles_of(tangent.xyz, f[2].xyz, f[3].xyz);
-    let o = Optics(f[0].xyz, f[0].w, 0.8, 1.2, f[1].x, f[2].w, 1.5 * f[1].x, 0.7 * f[1].x);
+    let o = Optics(f[0].xyz, f[0].w, 0.8, 1.2, f[1].x, f[2].w, 1.5 * f[1].x, 0.7 * f[1].x, 0.2 * f[1].y);
     let keep = (unused[0].x + unused_too[0].x) * 0.0;
     out[id.x] = vec4(scattered(a, o, Passage(f[1].y, f[1].z, f[1].w), f[3].w, 1.5 * f[3].w) + keep, 1.0);
 }
@@ -390,6 +390,7 @@ fn the_shader_lights_fibres_as_its_rust_twin_does() {
             tilt: f[2].w,
             film: 1.5 * f[1].x,
             lock: 0.7 * f[1].x,
+            disarray: 0.2 * f[1].y,
         };
         let angles = Angles::of(tangent, f[2].truncate(), f[3].truncate());
         let passage = Passage { lit: f[1].y, depth: f[1].z, behind: f[1].w };

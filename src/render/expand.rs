@@ -4,24 +4,24 @@
 use super::{
     buffers::HairBuffers,
     draw::Packed,
+    kernel::{Groups, Kernel, has_compute},
     material::Ribbon,
     packed_frame::DrawnFrame,
-    rings::{Broken, Rings, has_compute, why_broken},
+    rings::{Broken, Rings},
     sets::{HairRenderSystems, WritesNodes},
 };
 use bevy::{
     asset::load_embedded_asset,
     camera::visibility::ViewVisibility,
     core_pipeline::schedule::camera_driver,
-    platform::collections::HashMap,
     prelude::*,
     render::{
         Extract, ExtractSchedule, RenderApp, RenderStartup,
         render_asset::RenderAssets,
         render_resource::{
             BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries,
-            BindingResource, Buffer, BufferId, CachedComputePipelineId, ComputePassDescriptor,
-            ComputePipelineDescriptor, DynamicUniformBuffer, PipelineCache, ShaderStages,
+            BindingResource, Buffer, BufferId, ComputePassDescriptor, DynamicUniformBuffer,
+            PipelineCache, ShaderStages,
             binding_types::{storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer},
         },
         renderer::{
@@ -30,7 +30,6 @@ use bevy::{
         },
         storage::{GpuShaderBuffer, ShaderBuffer},
     },
-    shader::ShaderDefVal,
 };
 use core::sync::atomic::Ordering;
 
@@ -52,12 +51,8 @@ pub(super) fn plugin(app: &mut App) {
         );
 }
 
-/// The kernel.
 #[derive(Resource)]
-pub(super) struct Expander {
-    layout: BindGroupLayoutDescriptor,
-    pipeline: CachedComputePipelineId,
-}
+pub(super) struct Expander(Kernel);
 
 fn compile(
     mut commands: Commands,
@@ -83,14 +78,14 @@ fn compile(
             ),
         ),
     );
-    let pipeline = pipelines.queue_compute_pipeline(ComputePipelineDescriptor {
-        label: Some("hair rings".into()),
-        layout: vec![layout.clone()],
-        shader: load_embedded_asset!(&*assets, "expand.wgsl"),
-        shader_defs: vec![ShaderDefVal::UInt("MATERIAL_BIND_GROUP".into(), 0)],
-        ..default()
-    });
-    commands.insert_resource(Expander { layout, pipeline });
+    let shader = load_embedded_asset!(&*assets, "expand.wgsl");
+    commands.insert_resource(Expander(Kernel::queue(
+        &pipelines,
+        shader,
+        "expand",
+        layout,
+        Vec::new(),
+    )));
 }
 
 /// The hair that is seen in this frame.
@@ -98,15 +93,8 @@ fn compile(
 pub(super) struct Expansions {
     hairs: Vec<Expansion>,
     ribbons: DynamicUniformBuffer<Ribbon>,
-    groups: HashMap<Bound, Group>,
-}
-
-/// Of each bind group the buffers that it binds.
-type Bound = [BufferId; 6];
-
-struct Group {
-    group: BindGroup,
-    is_used: bool,
+    /// By the buffers that each binds.
+    groups: Groups<[BufferId; 6], BindGroup>,
 }
 
 pub(super) struct Expansion {
@@ -165,15 +153,15 @@ pub(super) fn expand(
         (*ribbons, *groups) = default();
     }
     let (Some(expander), Some(buffers)) = (expander, buffers) else { return };
-    let Some(pipeline) = pipelines.get_compute_pipeline(expander.pipeline) else {
-        if let Some(error) = why_broken(&pipelines, expander.pipeline)
+    let Some(pipeline) = expander.0.ready(&pipelines) else {
+        if let Some(error) = expander.0.why_broken(&pipelines)
             && !broken.0.swap(true, Ordering::Relaxed)
         {
             tracing::error!("strands of hair are expanded vertex by vertex: {error}");
         }
         return;
     };
-    groups.retain(|_, group| core::mem::take(&mut group.is_used));
+    groups.begin_frame();
     if hairs.is_empty() {
         return;
     }
@@ -194,8 +182,7 @@ pub(super) fn expand(
             continue;
         };
         let bound = [uniform, nodes, guides, strands, frame, rings];
-        let group = groups.entry(bound.map(Buffer::id)).or_insert_with(|| {
-            let layout = pipelines.get_bind_group_layout(&expander.layout);
+        let group = groups.get(bound.map(Buffer::id), || {
             let entries = BindGroupEntries::with_indices((
                 (0, ribbon.clone()),
                 (1, nodes.as_entire_binding()),
@@ -204,11 +191,9 @@ pub(super) fn expand(
                 (5, frame.as_entire_binding()),
                 (6, rings.as_entire_binding()),
             ));
-            let group = device.create_bind_group("hair rings", &layout, &entries);
-            Group { group, is_used: true }
+            expander.0.group(&device, &pipelines, &entries)
         });
-        group.is_used = true;
-        pass.set_bind_group(0, &group.group, &[hair.offset]);
+        pass.set_bind_group(0, group, &[hair.offset]);
         let count = hair.rings.count().div_ceil(u64::from(LANES)).min(u64::from(u32::MAX)) as u32;
         pass.dispatch_workgroups(count.min(most), count.div_ceil(most), 1);
     }

@@ -12,6 +12,9 @@ const FILM_VARIANCE: f32 = 0.0064;
 const LOCK_FIBRES: f32 = 3.0;
 const WET_INSIDE: f32 = 0.7;
 const WET_SLEEK: f32 = 0.17;
+const ASTRAY: f32 = 0.8;
+const MIRRORED: f32 = 4.0;
+const SENT_ON: f32 = 2.0;
 const TT_FOCUS: f32 = 3.65;
 const TRT_FOCUS: f32 = 17.0;
 const TT_SHARE: f32 = 0.96;
@@ -38,6 +41,8 @@ pub struct Optics {
     pub film: f32,
     /// 0 by itself … 1 among the fibres of a wet lock, whose neighbours its light goes through as well.
     pub lock: f32,
+    /// Mean square of the sine between the fibres around and their mean direction.
+    pub disarray: f32,
 }
 
 impl Optics {
@@ -52,6 +57,7 @@ impl Optics {
             tilt: 0.0,
             film: 0.0,
             lock: 0.0,
+            disarray: 0.0,
         }
     }
 
@@ -67,10 +73,13 @@ impl Optics {
         dry.lerp(0.0044 + 0.0182 * (-2.8 * self.absorption).exp(), self.wet)
     }
 
-    /// The share of light that is scattered to the eye, after it has passed through `depth` fibres.
-    pub fn lobes(&self, a: &Angles, depth: f32) -> Vec3 {
+    /// The share of light that is scattered to the eye, after it has passed through `depth` fibres; a share
+    /// `astray` of it comes from all around its first way.
+    pub fn lobes(&self, a: &Angles, depth: f32, astray: Vec3) -> Vec3 {
         let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
-        let spread = 0.25 * self.variance * depth;
+        let lost = astray.element_sum() / 3.0;
+        let spread =
+            depth * (0.25 * self.variance * (1.0 + ASTRAY * lost) + SENT_ON * self.disarray);
         let turned = depth / TT_FOCUS;
         let f0 = lerp(DRY_SURFACE, WET_SURFACE, self.wet);
         let ratio = 1.0 / (1.19 / a.cos_d + 0.36 * a.cos_d);
@@ -89,8 +98,10 @@ impl Optics {
         let h = (0.5 + 0.5 * own).clamp(0.0, 1.0).sqrt() * (1.0 + ratio * (0.6 - 0.8 * own));
         let f_tt = fresnel(f0, 0.78 * a.cos_d);
         let cos_tt = (1.0 - h * h * ratio * ratio).clamp(0.0, 1.0).sqrt();
+        let onward = Vec3::splat(around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi));
+        let astray = astray * (1.0 - (-turned).exp());
         let tt = TT_SHARE
-            * around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi)
+            * (onward * (1.0 - astray) + matt(-a.cos_phi) * astray)
             * a.along(0.25 * sleek + spread, self.tilt + TILT)
             * (-(1.0 - self.forward_share()) * LOCK_FIBRES * self.lock).exp()
             * (1.0 - f_tt).powi(2)
@@ -119,9 +130,11 @@ impl Optics {
         let onward = (1.0 - p.lit) * (straight * flow.on).map(f32::sqrt);
         let back = p.lit * bulk.reflectance + (1.0 - p.lit) * flow.back;
         let own = (1.0 - a_b / bulk.reflectance.max(a_b)).max(Vec3::ZERO);
-        let wide = self.variance * (1.0 + 0.25 * bulk.bounces);
-        p.lit * self.lobes(a, 0.0)
-            + onward * self.lobes(a, p.depth)
+        let astray = (flow.on / straight.max(flow.on).max(Vec3::splat(1e-9))).map(f32::sqrt);
+        let wide = self.variance * (1.0 + 0.25 * bulk.bounces)
+            + MIRRORED * self.disarray * (bulk.bounces - 1.0).max(0.0);
+        p.lit * self.lobes(a, 0.0, Vec3::ZERO)
+            + onward * self.lobes(a, p.depth, astray)
             + back * own * matt(a.cos_phi) * a.along(wide, 0.0)
     }
 }
@@ -331,7 +344,7 @@ mod tests {
                 let theta = degrees.to_radians();
                 let sent = |absorption: Vec3| {
                     let fibre = Optics::new(absorption, roughness);
-                    over_all_light(theta, |a| fibre.lobes(a, 0.0))
+                    over_all_light(theta, |a| fibre.lobes(a, 0.0, Vec3::ZERO))
                 };
                 let white = sent(Vec3::ZERO).x;
                 println!("roughness {roughness}, {degrees}°: {white:.3}");
@@ -353,7 +366,11 @@ mod tests {
             let fibre = Optics::new(melanin.absorption(), 0.5);
             let half = |sign: f32| {
                 over_all_light(0.0, |a| {
-                    if a.cos_phi * sign > 0.0 { fibre.lobes(a, 0.0) } else { Vec3::ZERO }
+                    if a.cos_phi * sign > 0.0 {
+                        fibre.lobes(a, 0.0, Vec3::ZERO)
+                    } else {
+                        Vec3::ZERO
+                    }
                 })
             };
             let (on, back) = (half(-1.0), half(1.0));
@@ -370,9 +387,26 @@ mod tests {
     #[test]
     fn light_that_went_through_others_is_spread_not_added() {
         let fibre = Optics::new(Vec3::ZERO, 0.38);
+        let among = Optics { disarray: 0.1, ..fibre };
         for depth in [0.5, 2.0, 10.0] {
-            let sent = over_all_light(0.3, |a| fibre.lobes(a, depth)).x;
-            assert!((0.9..=1.1).contains(&sent), "{sent} after {depth} fibres");
+            for (fibre, astray) in [(fibre, 0.0), (fibre, 1.0), (among, 0.5)] {
+                let sent = over_all_light(0.3, |a| fibre.lobes(a, depth, Vec3::splat(astray))).x;
+                assert!((0.9..=1.1).contains(&sent), "{sent} after {depth} fibres, {astray}");
+            }
+        }
+    }
+
+    #[test]
+    fn among_fibres_that_point_elsewhere_light_leaves_its_cone() {
+        // Light 50° from where parallel fibres mirror it to the eye, in the open and behind some.
+        let angles = Angles::of(Vec3::Y, Vec3::new(0.0, 0.766, 0.643), Vec3::Z);
+        for (lit, behind) in [(1.0, 0.0), (0.0, 4.0)] {
+            let passage = Passage { lit, depth: (1.0 - lit) * (1.0 + behind), behind };
+            let sent = |disarray: f32| {
+                let fibre = Optics { disarray, ..Optics::new(Vec3::ZERO, 0.4) };
+                fibre.scattered(&angles, &passage, 8.0, 8.0).x
+            };
+            assert!(sent(0.05) > 1.5 * sent(0.0), "{} of {}", sent(0.05), sent(0.0));
         }
     }
 
@@ -403,7 +437,7 @@ mod tests {
     fn layers_without_pigment_return_what_diffusion_returns() {
         let white = Optics::new(Vec3::ZERO, 0.5);
         // The mean cosine of a fibre's lobes around it, 1 straight on.
-        let cosine = over_all_light(0.0, |a| white.lobes(a, 0.0) * -a.cos_phi).x;
+        let cosine = over_all_light(0.0, |a| white.lobes(a, 0.0, Vec3::ZERO) * -a.cos_phi).x;
         println!("mean cosine {cosine:.3}");
         let (a_f, a_b) = (white.forward_share(), white.backward_share());
         for layers in [2.0, 4.8, 20.0] {
@@ -431,8 +465,10 @@ mod tests {
         // Cycles' roughness 0.3 and offset 2°, light 40° above, one bounce.
         let of = |absorption| Optics { variance: 0.0846, ..Optics::new(absorption, 0.5) };
         let (clear, blond) = (of(Vec3::splat(50.0)), of(Melanin::new(0.127, 0.0).absorption()));
-        let first = place_of_peak(40.0, |a| clear.lobes(a, 0.0).y);
-        let second = place_of_peak(40.0, |a| (blond.lobes(a, 0.0) - clear.lobes(a, 0.0)).y);
+        let first = place_of_peak(40.0, |a| clear.lobes(a, 0.0, Vec3::ZERO).y);
+        let second = place_of_peak(40.0, |a| {
+            (blond.lobes(a, 0.0, Vec3::ZERO) - clear.lobes(a, 0.0, Vec3::ZERO)).y
+        });
         println!("R at {first:.1}° for 18.0°, coloured light at {second:.1}° for 29.5°");
         assert!((first - 18.0).abs() < 2.0, "{first}");
         assert!((second - 29.5).abs() < 2.0, "{second}");
@@ -452,13 +488,14 @@ mod tests {
     fn the_clear_highlight_leans_to_the_root_and_the_coloured_one_to_the_tip() {
         // The path-traced references: the half vector leans by the tilt of 2°, TRT by twice that.
         let black = Optics::new(Vec3::splat(50.0), 0.3);
-        let clear = peak(|a| black.lobes(a, 0.0).y);
+        let clear = peak(|a| black.lobes(a, 0.0, Vec3::ZERO).y);
         let blond = Optics::new(Melanin::BLOND.absorption(), 0.3);
-        let coloured = peak(|a| (blond.lobes(a, 0.0) - black.lobes(a, 0.0)).y);
+        let coloured =
+            peak(|a| (blond.lobes(a, 0.0, Vec3::ZERO) - black.lobes(a, 0.0, Vec3::ZERO)).y);
         println!("R {clear}°, TRT {coloured}°");
         assert!((clear + 2.0).abs() < 1.0 && (coloured - 4.0).abs() < 1.5);
         let back = Angles::of(Vec3::Y, Vec3::X, Vec3::X);
-        let (r, all) = (black.lobes(&back, 0.0), blond.lobes(&back, 0.0));
+        let (r, all) = (black.lobes(&back, 0.0, Vec3::ZERO), blond.lobes(&back, 0.0, Vec3::ZERO));
         assert!((r.x - r.z).abs() < 1e-6, "R has no colour");
         assert!((all - r).x > 1.5 * (all - r).z, "TRT has the pigment's");
     }
@@ -470,7 +507,7 @@ mod tests {
             for roughness in [0.05, 0.4, 1.0] {
                 for wet in [0.0, 1.0] {
                     let dry = Optics::new(Vec3::splat(absorption), roughness);
-                    let fibre = Optics { wet, film: wet, ..dry };
+                    let fibre = Optics { wet, film: wet, disarray: 0.3 * wet, ..dry };
                     for (l, v) in ways.iter().flat_map(|l| ways.map(|v| (*l, v))) {
                         for (lit, depth, behind) in
                             [(1.0, 0.0, 0.0), (0.0, 1e6, 1e6), (0.5, 2.0, 1.0)]

@@ -1,16 +1,10 @@
 //! How many rings a hair has room for on the device: the places between the straight segments of its strands.
 
-use super::ribbon_mesh::RibbonLevel;
+use super::{kernel::has_compute, ribbon_mesh::RibbonLevel};
 use bevy::{
     ecs::system::SystemParam,
     prelude::*,
-    render::{
-        render_resource::{
-            CachedComputePipelineId, CachedPipelineState, DownlevelFlags, PipelineCache,
-        },
-        renderer::{RenderAdapter, RenderDevice},
-    },
-    shader::ShaderCacheError,
+    render::renderer::{RenderAdapter, RenderDevice},
 };
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
@@ -74,24 +68,6 @@ impl RoomForRings<'_> {
     }
 }
 
-pub(super) fn has_compute(adapter: &RenderAdapter) -> bool {
-    adapter.get_downlevel_capabilities().flags.contains(DownlevelFlags::COMPUTE_SHADERS)
-}
-
 /// Whether the kernel cannot be compiled, as both worlds know.
 #[derive(Resource, Clone, Default)]
 pub(super) struct Broken(pub(super) Arc<AtomicBool>);
-
-/// Why a kernel cannot be compiled; `None` too of one whose shaders are only not there yet.
-pub(crate) fn why_broken(
-    pipelines: &PipelineCache,
-    pipeline: CachedComputePipelineId,
-) -> Option<&ShaderCacheError> {
-    match pipelines.get_compute_pipeline_state(pipeline) {
-        CachedPipelineState::Err(
-            ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable,
-        ) => None,
-        CachedPipelineState::Err(error) => Some(error),
-        _ => None,
-    }
-}

@@ -16,7 +16,7 @@
     DIFFUSE, Optics, Passage, angles_of, scattered, forward_share, backward_share, bulk_of,
 }
 #import bevy_keratin::passage::{Way, slab_passage, sun_passage, spot_passage, point_passage}
-#import bevy_keratin::volume::{VolumePlace, light_in_volume, fibres_toward, openness}
+#import bevy_keratin::volume::{VolumePlace, light_in_volume, fibres_toward}
 
 struct Fibre {
     position: vec3<f32>,
@@ -98,7 +98,7 @@ fn surface_of(fibre: Fibre) -> Surface {
     let rough = clamp(ribbon.roughness * uneven, 0.05, 1.0);
     let tilt = 0.026 * apart * along_noise(fibre.seed, fibre.along);
     surface.optics = Optics(absorption, rough * rough * rough * rough, ribbon.gloss,
-        ribbon.backlight, fibre.moisture, tilt, 0.0, fibre.moisture);
+        ribbon.backlight, fibre.moisture, tilt, 0.0, fibre.moisture, fibre.place.disarray);
     surface.layers = select(ribbon.layers, fibre.place.thickness, fibre.place.is_known);
     let bulk = bulk_of(forward_share(surface.optics), backward_share(surface.optics), DIFFUSE * surface.layers);
     surface.reflectance = bulk.reflectance;
@@ -173,8 +173,8 @@ fn way_of(fibre: Fibre, l: vec3<f32>) -> Way {
 }
 
 // What a shadow map says of a light's way, with the number of fibres from the grid: the map knows how far away
-// the first fibre is, the grid how many there are. Where they are less than so dense as here, it may be no fibre
-// that is in the way.
+// the first fibre is, the grid how many there are, but not of the nearest ones. Where they are less than so dense as
+// here, it may be no fibre that is in the way.
 fn counted(p: Passage, fibre: Fibre, way: Way, l: vec3<f32>, light: vec4<f32>) -> Arrival {
     let slot = light_in_volume(fibre.place, light);
     if slot < 0 {
@@ -183,7 +183,8 @@ fn counted(p: Passage, fibre: Fibre, way: Way, l: vec3<f32>, light: vec4<f32>) -
     let fibres = fibres_toward(fibre.place, slot, l * fibre.turn);
     let near = fibres.near * fibre.scale;
     let density = max(way.density, 1e-3);
-    let far = smoothstep(near, 2.0 * near, p.behind / density);
+    // Thin hair is no thicker than a texel of the map; fibres farther off say that there are nearer ones, too.
+    let far = max(smoothstep(near, 2.0 * near, p.behind / density), smoothstep(0.5, 1.0, fibres.ahead));
     let behind = max(p.behind, near * density + fibres.ahead) * far + p.behind * (1.0 - far);
     return Arrival(Passage(p.lit, (1.0 - p.lit) * (1.0 + behind), behind), fibres.whole);
 }
@@ -196,7 +197,7 @@ fn uncounted(fibre: Fibre, l: vec3<f32>, light: vec4<f32>) -> Arrival {
         return Arrival(slab_passage(dot(fibre.normal, l), ribbon.layers), ribbon.layers);
     }
     let fibres = fibres_toward(fibre.place, slot, l * fibre.turn);
-    let out = fibre.turn * openness(fibre.place).xyz;
+    let out = fibre.turn * fibre.place.open.xyz;
     let c = dot(out, l) * inverseSqrt(max(dot(out, out), 1e-12));
     // Before the surface the eye sees the first fibres, behind it as many more as the grid has left out.
     let front = slab_passage(max(c, 0.05), fibre.place.thickness);
@@ -320,7 +321,7 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
     var open = vec3(1.0 - ribbon.root_shade * (1.0 - smoothstep(0.0, 0.35, fibre.along)));
     var normal = fibre.normal;
     if fibre.place.is_known {
-        let around = openness(fibre.place);
+        let around = fibre.place.open;
         open *= pow(vec3(clamp(around.w / OPEN_PLANE, 1e-3, 1.0)), 1.0 - forward_share(surface.optics));
         let out = fibre.turn * around.xyz;
         let across = out - fibre.tangent * dot(out, fibre.tangent);

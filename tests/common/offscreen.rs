@@ -200,7 +200,7 @@ impl Offscreen {
         self.activate(false);
         (0..3).for_each(|_| self.app.update());
         self.activate(true);
-        self.catch(|scene| scene.activate(false))
+        self.draw_now()
     }
 
     fn activate(&mut self, on: bool) {
@@ -211,11 +211,6 @@ impl Offscreen {
 
     /// Draws without frames in advance.
     pub fn draw_now(&mut self) -> Picture {
-        self.catch(|_| ())
-    }
-
-    /// Catches the next frame, and calls `after` when it has been drawn.
-    fn catch(&mut self, after: impl Fn(&mut Self)) -> Picture {
         self.app.world_mut().resource_mut::<Caught>().0 = None;
         self.app.world_mut().spawn(Screenshot::image(self.target.clone())).observe(
             |shot: On<ScreenshotCaptured>, mut caught: ResMut<Caught>| {
@@ -229,8 +224,10 @@ impl Offscreen {
         );
         for _ in 0..20 {
             self.app.update();
-            after(self);
+            // It comes back in the next frame, in which nothing need be drawn.
+            self.activate(false);
             if let Some(picture) = self.app.world_mut().resource_mut::<Caught>().0.take() {
+                self.activate(true);
                 return picture;
             }
         }

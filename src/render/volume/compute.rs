@@ -1,9 +1,10 @@
 //! Counts fibres on the GPU, after strands have been expanded.
 
+use super::{AROUND, image_size};
 use crate::render::{
     expand::{Expansion, Expansions, expand},
+    kernel::{Groups, Kernel, has_compute},
     material::Ribbon,
-    rings::{has_compute, why_broken},
     sets::WritesNodes,
 };
 use bevy::{
@@ -16,11 +17,10 @@ use bevy::{
         render_asset::RenderAssets,
         render_resource::{
             BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
-            BufferDescriptor, BufferId, BufferUsages, CachedComputePipelineId,
-            ComputePassDescriptor, ComputePipelineDescriptor, Extent3d, PipelineCache,
-            SamplerBindingType, ShaderStages, StorageTextureAccess, TextureDescriptor,
-            TextureDimension, TextureFormat, TextureSampleType, TextureUsages, TextureView,
-            TextureViewId,
+            BufferDescriptor, BufferId, BufferUsages, ComputePassDescriptor, Extent3d,
+            PipelineCache, SamplerBindingType, ShaderStages, StorageTextureAccess,
+            TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType, TextureUsages,
+            TextureView, TextureViewId,
             binding_types::{
                 sampler, storage_buffer_read_only_sized, storage_buffer_sized, texture_3d,
                 texture_storage_3d, uniform_buffer,
@@ -36,8 +36,8 @@ use bevy::{
 /// `@workgroup_size` of `fill.wgsl`, and along a side of the others.
 const LANES: u32 = 64;
 const BLOCK: u32 = 4;
-/// `ENOUGH` of `fill.wgsl`: so many strands are counted.
-const STRANDS: u32 = 8192;
+/// So many strands are counted and stand for all.
+const ENOUGH: u32 = 8192;
 
 pub(in crate::render) fn plugin(app: &mut App) {
     let Some(render) = app.get_sub_app_mut(RenderApp) else { return };
@@ -51,13 +51,9 @@ pub(in crate::render) fn plugin(app: &mut App) {
     );
 }
 
-/// The kernels.
+/// Fill, settle, march towards lights, march all around.
 #[derive(Resource)]
-struct Counter {
-    layouts: [BindGroupLayoutDescriptor; 3],
-    /// Fill, settle, march.
-    pipelines: [CachedComputePipelineId; 3],
-}
+struct Counter([Kernel; 4]);
 
 fn compile(
     mut commands: Commands,
@@ -71,64 +67,56 @@ fn compile(
     let read = || storage_buffer_read_only_sized(false, None);
     let store = || texture_storage_3d(TextureFormat::Rgba16Float, StorageTextureAccess::WriteOnly);
     let stage = ShaderStages::COMPUTE;
-    let layouts = [
-        BindGroupLayoutDescriptor::new(
-            "hair volume, fill",
-            &BindGroupLayoutEntries::with_indices(
-                stage,
-                (
-                    (0, uniform_buffer::<Ribbon>(true)),
-                    (3, read()),
-                    (5, read()),
-                    (6, read()),
-                    (7, storage_buffer_sized(false, None)),
-                ),
+    let fill = BindGroupLayoutDescriptor::new(
+        "hair volume, fill",
+        &BindGroupLayoutEntries::with_indices(
+            stage,
+            (
+                (0, uniform_buffer::<Ribbon>(true)),
+                (3, read()),
+                (5, read()),
+                (6, read()),
+                (7, storage_buffer_sized(false, None)),
             ),
         ),
-        BindGroupLayoutDescriptor::new(
-            "hair volume, settle",
-            &BindGroupLayoutEntries::with_indices(
-                stage,
-                ((5, read()), (7, storage_buffer_sized(false, None)), (8, store())),
+    );
+    let settle = BindGroupLayoutDescriptor::new(
+        "hair volume, settle",
+        &BindGroupLayoutEntries::with_indices(
+            stage,
+            ((5, read()), (7, storage_buffer_sized(false, None)), (8, store())),
+        ),
+    );
+    let march = BindGroupLayoutDescriptor::new(
+        "hair volume, march",
+        &BindGroupLayoutEntries::with_indices(
+            stage,
+            (
+                (5, read()),
+                (8, texture_3d(TextureSampleType::Float { filterable: true })),
+                (9, sampler(SamplerBindingType::Filtering)),
+                (10, store()),
             ),
         ),
-        BindGroupLayoutDescriptor::new(
-            "hair volume, march",
-            &BindGroupLayoutEntries::with_indices(
-                stage,
-                (
-                    (5, read()),
-                    (8, texture_3d(TextureSampleType::Float { filterable: true })),
-                    (9, sampler(SamplerBindingType::Filtering)),
-                    (10, store()),
-                ),
-            ),
-        ),
-    ];
-    let shaders = [
-        load_embedded_asset!(&*assets, "fill.wgsl"),
-        load_embedded_asset!(&*assets, "settle.wgsl"),
-        load_embedded_asset!(&*assets, "march.wgsl"),
-    ];
-    let [fill, settle, march] = shaders;
-    let queue = |of: usize, shader: Handle<Shader>| {
-        pipelines.queue_compute_pipeline(ComputePipelineDescriptor {
-            label: Some(layouts[of].label.clone()),
-            layout: vec![layouts[of].clone()],
-            shader,
-            shader_defs: vec![ShaderDefVal::UInt("MATERIAL_BIND_GROUP".into(), 0)],
-            ..default()
-        })
+    );
+    let marching = load_embedded_asset!(&*assets, "march.wgsl");
+    let enough = ShaderDefVal::UInt("ENOUGH".into(), ENOUGH);
+    let queue = |shader, entry, layout: &BindGroupLayoutDescriptor, constants| {
+        Kernel::queue(&pipelines, shader, entry, layout.clone(), constants)
     };
-    let all = [queue(0, fill), queue(1, settle), queue(2, march)];
-    commands.insert_resource(Counter { layouts, pipelines: all });
+    commands.insert_resource(Counter([
+        queue(load_embedded_asset!(&*assets, "fill.wgsl"), "fill", &fill, vec![enough]),
+        queue(load_embedded_asset!(&*assets, "settle.wgsl"), "settle", &settle, vec![]),
+        queue(marching.clone(), "march", &march, vec![]),
+        queue(marching, "march_around", &march, vec![]),
+    ]));
 }
 
 /// What hair after hair is counted in, for each number of cells along a side, and the bind groups.
 #[derive(Resource, Default)]
 struct Scratch {
     grids: HashMap<u32, Grid>,
-    groups: HashMap<Bound, Groups>,
+    groups: Groups<Bound, [BindGroup; 3]>,
     is_broken: bool,
 }
 
@@ -139,11 +127,6 @@ struct Grid {
 
 /// The ribbons, strands, frame and rings of a hair, and its image.
 type Bound = ([BufferId; 4], TextureViewId);
-
-struct Groups {
-    groups: [BindGroup; 3],
-    is_used: bool,
-}
 
 impl Grid {
     fn new(device: &RenderDevice, side: u32) -> Self {
@@ -182,9 +165,10 @@ fn count(
         (*grids, *groups) = default();
     }
     let (Some(counter), Some(buffers)) = (counter, buffers) else { return };
-    let ready = counter.pipelines.map(|id| pipelines.get_compute_pipeline(id));
-    let [Some(fill), Some(settle), Some(march)] = ready else {
-        let error = counter.pipelines.into_iter().find_map(|id| why_broken(&pipelines, id));
+    let kernels = &counter.0;
+    let ready = kernels.each_ref().map(|kernel| kernel.ready(&pipelines));
+    let [Some(fill), Some(settle), Some(march), Some(march_around)] = ready else {
+        let error = kernels.iter().find_map(|kernel| kernel.why_broken(&pipelines));
         if let Some(error) = error
             && !core::mem::replace(is_broken, true)
         {
@@ -192,7 +176,7 @@ fn count(
         }
         return;
     };
-    groups.retain(|_, groups| core::mem::take(&mut groups.is_used));
+    groups.begin_frame();
     let Some((uniform, ribbon)) = expansions.ribbons() else { return };
     let most = device.limits().max_compute_workgroups_per_dimension;
     let mut pass = context
@@ -207,57 +191,50 @@ fn count(
         else {
             continue;
         };
-        if image.texture_descriptor.size.width != side {
+        if image.texture_descriptor.size != image_size(side) {
             continue;
         }
         let grid = grids.entry(side).or_insert_with(|| Grid::new(&device, side));
         let bound = [uniform, strands, frame, rings].map(Buffer::id);
-        let groups = groups.entry((bound, image.texture_view.id())).or_insert_with(|| {
-            let [fill, settle, march] =
-                counter.layouts.each_ref().map(|of| pipelines.get_bind_group_layout(of));
-            let fill = device.create_bind_group(
-                "hair volume, fill",
-                &fill,
-                &BindGroupEntries::with_indices((
-                    (0, ribbon.clone()),
-                    (3, strands.as_entire_binding()),
-                    (5, frame.as_entire_binding()),
-                    (6, rings.as_entire_binding()),
-                    (7, grid.cells.as_entire_binding()),
-                )),
-            );
-            let settle = device.create_bind_group(
-                "hair volume, settle",
-                &settle,
-                &BindGroupEntries::with_indices((
-                    (5, frame.as_entire_binding()),
-                    (7, grid.cells.as_entire_binding()),
-                    (8, &grid.density),
-                )),
-            );
-            let march = device.create_bind_group(
-                "hair volume, march",
-                &march,
-                &BindGroupEntries::with_indices((
-                    (5, frame.as_entire_binding()),
-                    (8, &grid.density),
-                    (9, &image.sampler),
-                    (10, &image.texture_view),
-                )),
-            );
-            Groups { groups: [fill, settle, march], is_used: true }
+        let groups = groups.get((bound, image.texture_view.id()), || {
+            let fill = BindGroupEntries::with_indices((
+                (0, ribbon.clone()),
+                (3, strands.as_entire_binding()),
+                (5, frame.as_entire_binding()),
+                (6, rings.as_entire_binding()),
+                (7, grid.cells.as_entire_binding()),
+            ));
+            let settle = BindGroupEntries::with_indices((
+                (5, frame.as_entire_binding()),
+                (7, grid.cells.as_entire_binding()),
+                (8, &grid.density),
+            ));
+            let march = BindGroupEntries::with_indices((
+                (5, frame.as_entire_binding()),
+                (8, &grid.density),
+                (9, &image.sampler),
+                (10, &image.texture_view),
+            ));
+            [
+                kernels[0].group(&device, &pipelines, &fill),
+                kernels[1].group(&device, &pipelines, &settle),
+                kernels[2].group(&device, &pipelines, &march),
+            ]
         });
-        groups.is_used = true;
-        let [to_fill, to_settle, to_march] = &groups.groups;
+        let [to_fill, to_settle, to_march] = groups;
         pass.set_pipeline(fill);
         pass.set_bind_group(0, to_fill, &[*offset]);
-        let lanes = u64::from(rings_of.ranks.min(STRANDS)) * u64::from(rings_of.segments());
+        let lanes = u64::from(rings_of.ranks.min(ENOUGH)) * u64::from(rings_of.segments());
         let count = lanes.div_ceil(u64::from(LANES)) as u32;
         pass.dispatch_workgroups(count.min(most), count.div_ceil(most), 1);
-        let blocks = side.div_ceil(BLOCK);
-        for (pipeline, group) in [(settle, to_settle), (march, to_march)] {
+        for (pipeline, group, side) in [
+            (settle, to_settle, side),
+            (march, to_march, side),
+            (march_around, to_march, side / AROUND),
+        ] {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, group, &[]);
+            let blocks = side.div_ceil(BLOCK);
             pass.dispatch_workgroups(blocks, blocks, blocks);
         }
     }

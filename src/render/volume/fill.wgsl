@@ -1,7 +1,7 @@
 // Adds the strands up in the cells of a grid: the area that they block, by their direction.
 
 #import bevy_keratin::strands::{ribbon, strands, frame, alpha_of_rank, strand_of_rank, hash, VIEW_GUIDES}
-#import bevy_keratin::rings::{PackedRing, Ring, unpacked, rings_of_strand}
+#import bevy_keratin::rings::{PackedRing, unpacked, rings_of_strand}
 #import bevy_keratin::counts::UNIT
 
 @group(0) @binding(6) var<storage, read> rings: array<PackedRing>;
@@ -9,7 +9,7 @@
 @group(0) @binding(7) var<storage, read_write> cells: array<atomic<i32>>;
 
 // So many strands stand for all: any part from the first rank on is spread evenly over the hair.
-const ENOUGH: u32 = 8192u;
+const ENOUGH: u32 = #{ENOUGH}u;
 // Pieces of a segment at most, each as long as a cell.
 const PIECES: f32 = 8.0;
 // Of what one piece adds: as many fibres one behind the other.

@@ -67,12 +67,16 @@ impl HairVolume {
     }
 }
 
-/// What light meets, by places: four grids one above the other. `rgba16float`.
+/// What light meets, by places: towards lights, and above that, of cells [`AROUND`] times as large, beside each
+/// other its whole way through the hair, how open it is around, and how thick the hair. `rgba16float`.
 pub(super) fn image(side: u32) -> Image {
-    let size = Extent3d { width: side, height: side, depth_or_array_layers: GRIDS * side };
     let format = TextureFormat::Rgba16Float;
-    let mut image =
-        Image::new_uninit(size, TextureDimension::D3, format, RenderAssetUsages::default());
+    let mut image = Image::new_uninit(
+        image_size(side),
+        TextureDimension::D3,
+        format,
+        RenderAssetUsages::default(),
+    );
     image.texture_descriptor.label = Some("hair volume");
     image.texture_descriptor.usage =
         TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING;
@@ -80,8 +84,12 @@ pub(super) fn image(side: u32) -> Image {
     image
 }
 
-/// Towards lights, on their whole way through the hair, all around, and the hair's thickness.
-const GRIDS: u32 = 4;
+/// How much larger cells are of what differs little from one to the next.
+const AROUND: u32 = 2;
+
+fn image_size(side: u32) -> Extent3d {
+    Extent3d { width: side, height: side, depth_or_array_layers: side + side / AROUND }
+}
 
 #[cfg(test)]
 mod tests {

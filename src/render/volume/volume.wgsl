@@ -2,36 +2,52 @@
 #define_import_path bevy_keratin::volume
 
 #import bevy_keratin::strands::frame
+#import bevy_keratin::counts::LEFT_OUT
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(7) var volume: texture_3d<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(8) var volume_sampler: sampler;
 
-// Cells that are left out next to a place: `LEFT_OUT` of march.wgsl.
-const LEFT_OUT: f32 = 1.5;
-
-// A place in the grid.
+// What is known of a place, read once for all lights.
 struct VolumePlace {
-    at: vec3<f32>,          // 0 ... 1
+    toward: vec4<f32>,      // fibres on the way to each light, without the cells next to the place
+    whole: vec4<f32>,       // on the whole way of its light through the hair
+    open: vec4<f32>,        // mean direction in which it is open around, in the hair's frame, and their share
     thickness: f32,         // of the hair around, as of a plane layer (fibres)
+    disarray: f32,          // of strands within about a fibre from there: mean square of the sine to their mean direction
     // Not before the kernels have been compiled.
     is_known: bool,
 }
 
 // Of a place in the hair's frame.
 fn volume_place(position: vec3<f32>) -> VolumePlace {
+    var out: VolumePlace;
     if frame.volume_side == 0u {
-        return VolumePlace(vec3(0.5), 0.0, false);
+        return out;
     }
     let size = frame.volume_cell * f32(frame.volume_side);
     let at = saturate((position - frame.volume_begin) / max(size, vec3(1e-9)));
-    let hair = volume_at(at, 3.0);
-    return VolumePlace(at, hair.x, hair.y > 0.5);
+    let hair = around_at(at, vec2(0.0, 1.0));
+    out.thickness = hair.x;
+    out.disarray = hair.z;
+    out.is_known = hair.y > 0.5;
+    out.toward = toward_at(at);
+    out.whole = around_at(at, vec2(0.0));
+    out.open = around_at(at, vec2(1.0, 0.0));
+    return out;
 }
 
-fn volume_at(place: vec3<f32>, grid: f32) -> vec4<f32> {
-    let side = f32(max(frame.volume_side, 1u));
-    let z = clamp(place.z, 0.5 / side, 1.0 - 0.5 / side);
-    return textureSampleLevel(volume, volume_sampler, vec3(place.xy, (z + grid) / 4.0), 0.0);
+// Fibres towards the lights.
+fn toward_at(place: vec3<f32>) -> vec4<f32> {
+    let edge = 0.5 / f32(max(frame.volume_side, 1u));
+    let z = clamp(place.z, edge, 1.0 - edge);
+    return textureSampleLevel(volume, volume_sampler, vec3(place.xy, z / 1.5), 0.0);
+}
+
+// Of the grids of cells twice as large, the one at `begin`.
+fn around_at(place: vec3<f32>, begin: vec2<f32>) -> vec4<f32> {
+    let edge = 1.0 / f32(max(frame.volume_side, 1u));
+    let at = clamp(place, vec3(edge), vec3(1.0 - edge));
+    return textureSampleLevel(volume, volume_sampler, vec3(0.5 * (at.xy + begin), (1.0 + 0.5 * at.z) / 1.5), 0.0);
 }
 
 // Which of the lights in the grid this is: its place in the world and 1, or the way to it and 0. -1 for none.
@@ -56,10 +72,5 @@ struct Fibres {
 fn fibres_toward(place: VolumePlace, light: i32, l: vec3<f32>) -> Fibres {
     let cells = abs(l) / max(frame.volume_cell, vec3(1e-9));
     let near = LEFT_OUT / max(max(cells.x, max(cells.y, cells.z)), 1e-9);
-    return Fibres(volume_at(place.at, 0.0)[light], volume_at(place.at, 1.0)[light], near);
-}
-
-// The mean direction in which it is open around, in the hair's frame, and the share of directions.
-fn openness(place: VolumePlace) -> vec4<f32> {
-    return volume_at(place.at, 2.0);
+    return Fibres(place.toward[light], place.whole[light], near);
 }
