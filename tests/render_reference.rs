@@ -290,7 +290,7 @@ const PROFILES: [[f32; 13]; 4] = [
 ];
 
 /// T9 and the profile from lit to dark. The ring's light is within 25 % for every melanin. Its ratio to the
-/// middle's is to be within 25 %, 74 to 80 % is reached. The profile's aim is 15 % of its maximum, 35 % is reached:
+/// middle's is to be within 25 %, 73 to 80 % is reached. The profile's aim is 15 % of its maximum, 35 % is reached:
 /// light that has turned more than once lacks, half of it on the lit side.
 #[test]
 #[ignore = "takes minutes in software"]

@@ -10,6 +10,8 @@
 // where that is known, and the strands' disarray.
 @group(0) @binding(10) var volume: texture_storage_3d<rgba16float, write>;
 
+// Disarray that parallel strands seem to have where they bend within a cell.
+const BENT: f32 = 0.02;
 // More fibres than any light goes through.
 const ENDLESS: f32 = 1000.0;
 
@@ -45,6 +47,8 @@ struct Count {
     // Those by direction, the more the nearer.
     squares: vec3<f32>,
     products: vec3<f32>,
+    // And times their number on a metre.
+    held: f32,
     is_blocked: bool,
 }
 
@@ -69,6 +73,7 @@ fn count(place: vec3<f32>, way: vec3<f32>) -> Count {
         let share = exp(-out.beside) * length;
         out.squares += share * met.squares;
         out.products += share * met.products;
+        out.held += share * met.beside * met.beside;
         out.all += fibres;
         out.beside += met.beside * length;
         out.far += fibres * saturate(f32(i) + 1.0 - LEFT_OUT);
@@ -156,6 +161,7 @@ fn march_around(@builtin(global_invocation_id) cell: vec3<u32>) {
         var thin = 0.0;
         var squares = vec3(0.0);
         var products = vec3(0.0);
+        var held = 0.0;
         for (var i = 0u; i < 7u; i++) {
             var d = vec3(1.0, f32(i & 1u) * 2.0 - 1.0, f32(i & 2u) - 1.0);
             if i >= 4u {
@@ -167,11 +173,16 @@ fn march_around(@builtin(global_invocation_id) cell: vec3<u32>) {
             open += vec4(d, 1.0) * open_share(one) + vec4(-d, 1.0) * open_share(other);
             squares += one.squares + other.squares;
             products += one.products + other.products;
+            held += one.held + other.held;
             thin += 1.0 / clamp(one.beside + other.beside, 1e-2, ENDLESS);
         }
         // A line goes through 1 / cosine of a plane layer: half of that is the mean of its inverse.
         thickness = min(0.5 * 7.0 / thin, ENDLESS);
-        disarray = disarray_of(squares, products);
+        // Where a cell holds many fibres, light meets only those next to each other, which differ less than all of the
+        // cell do: by the square of how far they are apart.
+        let size = frame.volume_cell;
+        held *= pow(size.x * size.y * size.z, 1.0 / 3.0) / max(squares.x + squares.y + squares.z, 1e-6);
+        disarray = max(disarray_of(squares, products) - BENT, 0.0) / (1.0 + held * held);
     }
     let at = vec3<i32>(cell) + vec3(0, 0, i32(frame.volume_side));
     let next = i32(half_side);
