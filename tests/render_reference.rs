@@ -173,7 +173,6 @@ fn a_tress_has_the_colour_that_path_tracing_gives_it() {
 }
 
 #[test]
-#[ignore = "takes minutes in software"]
 fn a_tress_lit_from_above_and_behind_is_near_path_tracing() {
     compare_tress(&["front", "back"]);
 }
@@ -293,7 +292,6 @@ const PROFILES: [[f32; 13]; 4] = [
 /// middle's is to be within 25 %, 73 to 80 % is reached. The profile's aim is 15 % of its maximum, 35 % is reached:
 /// light that has turned more than once lacks, half of it on the lit side.
 #[test]
-#[ignore = "takes minutes in software"]
 fn a_ball_glows_at_its_rim_as_path_tracing_has_it() {
     let strands = ball();
     let Some(mut bench) = Bench::new(&strands, BALL, 0.16, true) else {
@@ -323,7 +321,6 @@ fn a_ball_glows_at_its_rim_as_path_tracing_has_it() {
 
 /// The white furnace: the sky's light in a disc of 60 mm, as a share of the background's.
 #[test]
-#[ignore = "takes a minute in software"]
 fn a_ball_in_a_furnace_returns_what_path_tracing_returns() {
     const FURNACE: [[f32; 3]; 4] =
         [[1.0; 3], [0.6696, 0.5421, 0.3617], [0.2689, 0.1784, 0.1127], [0.0985, 0.0886, 0.0864]];
