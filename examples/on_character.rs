@@ -8,7 +8,7 @@
 mod show;
 
 use bevy::prelude::{KeyCode::*, *};
-use bevy_keratin::{HairSource, plant::HairPreset, prelude::*};
+use bevy_keratin::{HairSource, prelude::*};
 
 fn main() -> std::process::ExitCode {
     let script: [show::Step; 3] = [(&[], "curly"), (&[KeyS, Digit6], "bob"), (&[KeyL], "saved")];

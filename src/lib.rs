@@ -94,6 +94,9 @@ pub mod prelude {
     #[cfg(feature = "groom")]
     #[doc(hidden)]
     pub use crate::groom::{Groom, GroomGuides, GroomSettings, GroomedHair};
+    #[cfg(feature = "groom")]
+    #[doc(hidden)]
+    pub use crate::plant::HairPreset;
     #[cfg(feature = "render")]
     #[doc(hidden)]
     pub use crate::render::{HairDetail, HairFollowers, HairView};
@@ -113,7 +116,7 @@ pub mod prelude {
         HairProcessTime, HairScreenShare, HairSettling, HairShading, HairSleep, HairSolver,
         HairStiffness, HairStyle, HairSubsteps, HairSystems, HairTick, HairTreatment, HairWetting,
         HairWind, HeldNodes, KeptStyle, LockContact, Melanin, Moisture, PermRod, PermWinding,
-        Settling, SoakHair, Strand, StrandModel, StrandOf, StrandSleep, Strands, Streaks,
-        StyleFaded, WaterLedger, WaterVolume, WornPreset, WoundOn,
+        Settling, Shower, SoakHair, Strand, StrandModel, StrandOf, StrandSleep, Strands, Streaks,
+        StyleFaded, WaterLedger, WaterVolume, WindZone, WornPreset, WoundOn,
     };
 }

@@ -215,6 +215,7 @@ fn wet_hair_triggers_an_event_when_it_is_dry() {
     };
     run(&mut app, 0.1);
     assert_eq!(wetness(&mut app), (0.0, 0.0));
+    assert!(wetness(&mut app).1.is_sign_positive(), "−0 is printed with its sign");
     app.world_mut().write_message(SoakHair { target: hair, wetness: 1.0 });
     run(&mut app, 0.05);
     let (wet, water) = wetness(&mut app);

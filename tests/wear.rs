@@ -567,12 +567,68 @@ fn the_same_seed_wears_the_same_hair_and_another_other() {
     assert!(a == b && a != c);
 }
 
-#[test]
-fn own_colliders_are_kept_to() {
+/// A collider of the game's own.
+#[derive(Component)]
+struct Own;
+
+/// How many colliders are fitted to each of the bones, where `add` adds some of the game's own.
+fn fitted(add: impl Fn(&mut World, &[Entity])) -> Vec<usize> {
     let mut app = app();
     let root = app.world_mut().spawn((Transform::default(), WearHair::new(HairPreset::Bob))).id();
-    let (head, _) = character(&mut app, root, 1.0);
-    app.world_mut().spawn((HairCollider::sphere(0.08).unwrap(), ChildOf(head)));
+    let (_, body) = character(&mut app, root, 1.0);
+    let bones = app.world().get::<SkinnedMesh>(body).unwrap().joints.clone();
+    add(app.world_mut(), &bones);
+    let hair = worn(&mut app);
+    let world = app.world_mut();
+    let mut all = world.query_filtered::<&ChildOf, (With<HairCollider>, Without<Own>)>();
+    let parents: Vec<Entity> = all.iter(world).map(ChildOf::parent).collect();
+    let on = |bone: &Entity| parents.iter().filter(|parent| *parent == bone).count();
+    // The head's are below its hair.
+    bones[..3].iter().map(on).chain([on(&hair)]).collect()
+}
+
+#[test]
+fn own_colliders_replace_the_fitted_ones_of_their_bone_only() {
+    let solid = || (Own, HairCollider::sphere(0.08).unwrap());
+    let all = fitted(|_, _| {});
+    println!("colliders of {:?}: {all:?}", BONES.map(|bone| bone.0));
+    assert!(all[1..].iter().all(|count| *count > 0), "{all:?}");
+    let without = |bone: usize| {
+        let mut left = all.clone();
+        left[bone] = 0;
+        left
+    };
+    for bone in [1, 3] {
+        let on = fitted(|world, bones| {
+            world.entity_mut(bones[bone]).insert(solid());
+        });
+        assert_eq!(on, without(bone), "on {}", BONES[bone].0);
+    }
+    for bone in [2, 3] {
+        let below = fitted(|world, bones| {
+            let held = world.spawn((Transform::default(), ChildOf(bones[bone]))).id();
+            world.spawn((solid(), ChildOf(held)));
+        });
+        assert_eq!(below, without(bone), "below {}", BONES[bone].0);
+    }
+    // What is on the character or beside it is on no bone.
+    let beside = fitted(|world, bones| {
+        let armature = world.get::<ChildOf>(bones[0]).unwrap().parent();
+        world.spawn((solid(), ChildOf(armature)));
+        let root = world.get::<ChildOf>(armature).unwrap().parent();
+        world.entity_mut(root).insert(solid());
+        world.spawn(solid());
+    });
+    assert_eq!(beside, all);
+}
+
+#[test]
+fn a_mesh_with_a_collider_of_its_own_keeps_to_it() {
+    let mut app = app();
+    let head = app.world_mut().resource_mut::<Assets<Mesh>>().add(ball(0.1));
+    let wear = WearHair::new(HairPreset::Bob);
+    let solid = HairCollider::sphere(0.1).unwrap();
+    app.world_mut().spawn((Mesh3d(head), Transform::default(), wear, solid));
     worn(&mut app);
     let colliders = app.world_mut().query::<&HairCollider>().iter(app.world()).count();
     assert_eq!(colliders, 1);
@@ -622,7 +678,10 @@ fn hair_is_worn_longer_and_remembers_what_it_is() {
     assert_eq!((is.preset(), is.seed, is.length), (Some(HairPreset::Curly), 5, 0.5));
     app.world_mut().entity_mut(root).insert(wear.long(f32::NAN));
     let reported = wait(&mut app);
-    assert!(matches!(&reported.refused[..], [(by, WearError::Setting(_))] if *by == root));
+    let [(by, WearError::Setting(wrong))] = &reported.refused[..] else {
+        panic!("{:?}", reported.refused)
+    };
+    assert_eq!((*by, wrong.what), (root, "WearHair::length"));
     assert_eq!(wearers(&mut app), 1, "it keeps the hair that it has");
 }
 

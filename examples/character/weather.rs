@@ -2,7 +2,7 @@
 
 use crate::{Arguments, figure::Figure};
 use bevy::prelude::*;
-use bevy_keratin::{Shower, prelude::*};
+use bevy_keratin::prelude::*;
 
 /// What of the weather is on.
 #[derive(Resource, Default)]

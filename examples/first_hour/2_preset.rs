@@ -6,7 +6,7 @@
 mod show;
 
 use bevy::prelude::*;
-use bevy_keratin::{plant::HairPreset, prelude::*};
+use bevy_keratin::prelude::*;
 
 fn main() -> std::process::ExitCode {
     // Adds Bevy's plugins and the hair's, a camera before a head at 1.6 m, and light.

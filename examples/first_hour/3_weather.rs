@@ -6,7 +6,7 @@
 mod show;
 
 use bevy::prelude::{KeyCode::*, *};
-use bevy_keratin::{Shower, plant::HairPreset, prelude::*};
+use bevy_keratin::prelude::*;
 
 fn main() -> std::process::ExitCode {
     show::run("first_3_weather", &[(&[], "wind"), (&[KeyR], "rain")], |app| {
@@ -27,12 +27,11 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) {
     commands.spawn((ball, skin, place, WearHair::new(HairPreset::Bob).facing(Dir3::Z)));
 }
 
-/// R: a cloud of 15 cm radius, a metre above, and a room that dries hair in seconds instead of hours.
+/// R: a cloud of 15 cm radius, a metre above.
 fn rain(mut commands: Commands, keys: Res<ButtonInput<KeyCode>>) -> Result {
     if keys.just_pressed(KeyR) {
         let down = Transform::from_xyz(0.0, 2.6, 0.0).looking_to(Vec3::NEG_Y, Vec3::X);
         commands.spawn((Shower::rain(300.0, 0.15)?, down));
-        commands.insert_resource(HairProcessTime(60.0));
     }
     Ok(())
 }

@@ -7,7 +7,7 @@
 mod show;
 
 use bevy::prelude::{KeyCode::*, *};
-use bevy_keratin::{plant::HairPreset, prelude::*};
+use bevy_keratin::prelude::*;
 
 fn main() -> std::process::ExitCode {
     let script: [show::Step; 3] =

@@ -8,7 +8,7 @@
 mod show;
 
 use bevy::prelude::{KeyCode::*, *};
-use bevy_keratin::{plant::HairPreset, prelude::*};
+use bevy_keratin::prelude::*;
 
 fn main() -> std::process::ExitCode {
     show::run("first_5_character", &[(&[], "auburn"), (&[KeyL], "streaks")], |app| {

@@ -104,7 +104,7 @@ pub fn wear(app: &mut App, preset: HairPreset) -> Result<Bust> {
     let skin = world.resource_mut::<Assets<StandardMaterial>>().add(skin);
     world.spawn((Mesh3d(mesh), MeshMaterial3d(skin), ChildOf(hair)));
     let lying = Transform::from_rotation(upright().rotation.inverse());
-    for (collider, place) in head::body()? {
+    for (collider, place) in head::close_fit()? {
         world.spawn((collider, lying * place, ChildOf(hair)));
     }
     let face = face.spawn(&mut world.commands());

@@ -34,7 +34,7 @@ pub fn skull() -> Vec<(Vec3, Vec3, f32)> {
     };
     vec![
         middle([-0.003, -0.029], [0.024, -0.025], 0.0761),
-        middle([0.030, 0.002], [-0.023, 0.011], 0.0746),
+        middle([0.030, 0.002], [-0.023, 0.011], 0.0744),
         // Cheeks and lips lie behind the temples' line: a beard's roots must be outside.
         middle([0.041, 0.019], [-0.015, 0.0467], 0.0657),
         across(0.022, 0.015, -0.059, 0.0533),
@@ -63,11 +63,40 @@ pub fn body() -> Result<Vec<(HairCollider, Transform)>> {
         (Vec3::new(0.019, -0.163, -0.041), Vec3::new(0.136, -0.229, -0.047), 0.0408),
         (Vec3::new(0.037, -0.076, -0.001), Vec3::new(0.007, -0.291, 0.004), 0.0223),
     ];
-    let mirrored = |p: Vec3| p * Vec3::new(-1.0, 1.0, 1.0);
-    let others = half.map(|(a, b, radius)| (mirrored(a), mirrored(b), radius));
-    let parts = skull().into_iter().chain(middle).chain(half).chain(others);
+    let parts = skull().into_iter().chain(middle).chain(half.into_iter().flat_map(both));
     let limbs = parts.map(|(a, b, radius)| limb(a, b, radius));
     core::iter::once(cranium()).chain(limbs).collect()
+}
+
+/// A capsule on both sides.
+fn both((a, b, radius): (Vec3, Vec3, f32)) -> [(Vec3, Vec3, f32); 2] {
+    let mirrored = |p: Vec3| p * Vec3::new(-1.0, 1.0, 1.0);
+    [(a, b, radius), (mirrored(a), mirrored(b), radius)]
+}
+
+/// [`body`] for pictures from near: what it leaves free below the skin is filled, 1.2 mm within it. Otherwise hair
+/// beside the face sinks into cheeks and shoulders by up to 18 mm, and skin shows through it.
+pub fn close_fit() -> Result<Vec<(HairCollider, Transform)>> {
+    let half = [
+        // Jaw and chin, cheeks and temples, the head behind the ears.
+        (Vec3::new(0.0082, -0.0541, 0.0091), Vec3::new(0.0108, -0.0491, 0.0009), 0.0586),
+        (Vec3::new(0.0231, -0.0800, 0.0444), Vec3::new(0.0039, -0.0919, 0.0671), 0.0238),
+        (Vec3::new(0.0229, -0.0258, -0.0260), Vec3::new(0.0253, -0.0163, 0.0326), 0.0485),
+        (Vec3::new(0.0002, -0.0531, 0.0239), Vec3::new(-0.0063, -0.0492, -0.0029), 0.0628),
+        (Vec3::new(0.0009, -0.0681, 0.0000), Vec3::new(0.0262, -0.0144, -0.0471), 0.0467),
+        (Vec3::new(0.0197, -0.0288, 0.0361), Vec3::new(0.0117, -0.0767, 0.0013), 0.0485),
+        // Neck, shoulders, chest.
+        (Vec3::new(0.0190, -0.2193, -0.0461), Vec3::new(0.0190, -0.1480, -0.0372), 0.0450),
+        (Vec3::new(0.1139, -0.2803, -0.0305), Vec3::new(0.0587, -0.3076, -0.0157), 0.0556),
+        (Vec3::new(0.0652, -0.3110, -0.0234), Vec3::new(0.0007, -0.3081, -0.0156), 0.0625),
+        (Vec3::new(0.0119, -0.2908, -0.0476), Vec3::new(0.0983, -0.2774, -0.0464), 0.0467),
+        (Vec3::new(0.1143, -0.3007, -0.0267), Vec3::new(0.1293, -0.2781, -0.0389), 0.0476),
+        (Vec3::new(0.1368, -0.2707, -0.0181), Vec3::new(0.1409, -0.2589, -0.0557), 0.0359),
+        (Vec3::new(0.1052, -0.3096, -0.0406), Vec3::new(0.0105, -0.3287, -0.0523), 0.0368),
+        (Vec3::new(0.1006, -0.2731, -0.0075), Vec3::new(0.0292, -0.3033, 0.0106), 0.0364),
+    ];
+    let finer = half.into_iter().flat_map(both).map(|(a, b, radius)| limb(a, b, radius));
+    body()?.into_iter().map(Ok).chain(finer).collect()
 }
 
 /// The share of the skin that hair hides where it is dense.

@@ -18,7 +18,7 @@ pub use sculpt::*;
 const FINE: f32 = 0.0014;
 const COARSE: f32 = 0.0042;
 /// The box that holds all of the head.
-const LOW: Vec3 = Vec3::new(-0.31, -0.13, -0.20);
+const LOW: Vec3 = Vec3::new(-0.40, -0.13, -0.20);
 const HIGH: Vec3 = Vec3::new(0.14, 0.15, 0.20);
 /// Which part of each axis is fine; of the last, on both sides of the middle: the face and the ears.
 const FINE_X: [(f32, f32); 1] = [(-0.105, 0.028)];

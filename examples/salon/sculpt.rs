@@ -6,9 +6,7 @@ use crate::scenes::HEAD_RADIUS;
 use bevy::math::Vec3;
 
 /// Where the bust is cut off (m).
-pub const BUST_END: f32 = -0.285;
-/// How far aside the arms are cut off (m).
-const ARM_END: f32 = 0.178;
+pub const BUST_END: f32 = -0.375;
 
 /// Blends two distances over a width of `k`.
 pub fn join(a: f32, b: f32, k: f32) -> f32 {
@@ -75,8 +73,7 @@ pub fn head(p: Vec3) -> f32 {
     if p.x < 0.02 {
         d = join(d, bust(p), 0.03);
     }
-    d = carve(d, p.x - BUST_END, 0.004);
-    carve(d, ARM_END - p.z, 0.004)
+    carve(d, p.x - BUST_END, 0.004)
 }
 
 /// The same with a rounded fold in the middle, so that what is wide does not meet itself in an edge.

@@ -133,7 +133,7 @@ pub fn put_on(world: &mut World, preset: HairPreset) -> Result {
     let face = face.spawn(&mut commands);
     commands.entity(hair).add_children(&[body, face]);
     let lying = place(0.0).rotation.inverse();
-    for (collider, at) in head::body()? {
+    for (collider, at) in head::close_fit()? {
         let at = Transform::from_rotation(lying) * at;
         commands.spawn((collider, at, ChildOf(hair)));
     }

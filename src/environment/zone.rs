@@ -84,7 +84,7 @@ setting! {
     /// counterpart with a jet's shape, equation 17 of \[B\].
     ///
     /// ```
-    /// # use bevy_keratin::{WindZone, prelude::*}; use bevy::prelude::*;
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
     /// # let mut world = World::new();
     /// // indoors
     /// let indoors = WindZone { half_size: Vec3::new(3.0, 1.5, 4.0), ..WindZone::shelter() };

@@ -14,11 +14,20 @@ setting! {
     /// [`HairEstimate`] holds the result. A budget that the coarsest levels exceed is reported once as a
     /// [`HairFault`](crate::HairFault).
     ///
+    /// The coarsest of the default levels is frozen, and a small budget takes hair there however near it
+    /// is: it goes with its head and does not move otherwise. A hero's
+    /// [`importance`](super::HairLod::importance) makes it the last to be frozen; without
+    /// [`LodLevel::FROZEN`] among its levels it never is, nor when it is far. Hair without a
+    /// [`HairLod`](super::HairLod) is always simulated in full, and not counted.
+    ///
     /// ```
-    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// # use bevy_keratin::{LodLevel, prelude::*}; use bevy::prelude::*;
     /// # let mut app = App::new();
     /// // 6 ms of one thread, on machines of half the speed of the one that the estimates are from
     /// app.insert_resource(HairBudget { milliseconds: 6.0, slowness: 2.0 });
+    /// // last to be made coarser, and never frozen
+    /// let levels = vec![LodLevel::NEAR, LodLevel::BACKGROUND];
+    /// app.world_mut().spawn((Hair, HairLod { levels, importance: 10.0, ..default() }));
     /// ```
     #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Resource, Default, Clone, PartialEq)]

@@ -130,8 +130,24 @@ impl HairPreset {
         back * (1.0 - before) + beside * before
     }
 
+    /// Length of a sideburn as a share of the preset's.
+    fn sideburn(self) -> f32 {
+        match self {
+            Self::Short | Self::Undercut | Self::Pixie | Self::Beard | Self::Fur => 1.0,
+            Self::Coily => 0.35,
+            _ => 0.25,
+        }
+    }
+
     /// Length at a place as a share of the preset's.
     pub(super) fn length_share(self, scalp: &Scalp, place: Vec3) -> f32 {
+        let least = self.sideburn();
+        let before_ear = least + (1.0 - least) * scalp.above_sideburn(place);
+        before_ear * self.length_by_cut(scalp, place)
+    }
+
+    /// The same without sideburns.
+    fn length_by_cut(self, scalp: &Scalp, place: Vec3) -> f32 {
         let [right, up, front] = scalp.axes();
         let off = (place - scalp.center) / scalp.height;
         let (aside, forward, high) = (off.dot(right), off.dot(front), off.dot(up));
@@ -176,9 +192,9 @@ const CHEEK_LINE: [(f32, f32); 8] = [
     (24.0, -31.0),
     (40.0, -26.0),
     (54.0, -15.0),
-    (64.0, 0.0),
-    (74.0, 19.0),
-    (180.0, 19.0),
+    (64.0, -4.0),
+    (70.0, 2.0),
+    (180.0, 2.0),
 ];
 /// The lower edge, under the chin and the jaw.
 const NECK_LINE: [(f32, f32); 4] = [(0.0, -66.0), (35.0, -64.0), (65.0, -57.0), (180.0, -45.0)];

@@ -1,6 +1,6 @@
 //! The scalp: where hair grows on a head.
 
-use super::map::RootPlace;
+use super::{hairline::smooth, map::RootPlace};
 use crate::setting::setting;
 use bevy::{math::ops::atan2, prelude::*};
 use core::f32::consts::PI;
@@ -35,15 +35,22 @@ setting! {
     }
 }
 
-/// The hairline of an adult: elevation (°) over the angle from the face (°), both at the centre.
-const HAIRLINE: [(f32, f32); 13] = [
-    (0.0, 47.0),
-    (25.0, 47.0),
-    (42.0, 45.0),
-    (56.0, 39.0),
-    (66.0, 29.0),
-    (75.0, 19.0),
-    (84.0, 17.0),
+/// The hairline of an adult: elevation (°) over the angle from the face (°), both at the centre. In front it
+/// begins 3° below where the face's thirds have it: the eye sees it where half of the density is reached. Before
+/// the ear it goes down to the sideburn.
+const HAIRLINE: [(f32, f32); 18] = [
+    (0.0, 44.0),
+    (25.0, 44.0),
+    (42.0, 42.0),
+    (52.0, 36.0),
+    (58.0, 28.0),
+    (62.0, 18.0),
+    (66.0, 8.0),
+    (70.0, 1.0),
+    (74.0, -2.0),
+    (79.0, -2.0),
+    (83.0, 4.0),
+    (87.0, 14.0),
     (92.0, 18.0),
     (100.0, 13.0),
     (112.0, -12.0),
@@ -51,6 +58,10 @@ const HAIRLINE: [(f32, f32); 13] = [
     (150.0, -34.0),
     (180.0, -36.0),
 ];
+
+/// A sideburn's lower end and height (°), and the angle from the face at which it ends (°).
+const SIDEBURN: (f32, f32) = (-3.0, 8.0);
+const BEHIND_SIDEBURN: f32 = 92.0;
 
 impl Scalp {
     /// Right, up and front as unit vectors at right angles.
@@ -94,6 +105,12 @@ impl Scalp {
         (hairline((around + 2.0).min(180.0)) - hairline((around - 2.0).max(0.0))) / 4.0
     }
 
+    /// How far up from a sideburn's lower end to where it is the head's hair a place is, 0…1.
+    pub(super) fn above_sideburn(&self, place: Vec3) -> f32 {
+        let (around, elevation) = self.angles(place);
+        if around > BEHIND_SIDEBURN { 1.0 } else { smooth((elevation - SIDEBURN.0) / SIDEBURN.1) }
+    }
+
     /// The scalp as a density map.
     pub fn mask(&self) -> impl Fn(&RootPlace) -> f32 + use<> {
         let scalp = *self;
@@ -103,7 +120,7 @@ impl Scalp {
 
 fn hairline(around: f32) -> f32 {
     let piece = HAIRLINE.windows(2).find(|w| around <= w[1].0);
-    piece.map_or(HAIRLINE[12].1, |w| {
+    piece.map_or(HAIRLINE[HAIRLINE.len() - 1].1, |w| {
         let share = (around - w[0].0) / (w[1].0 - w[0].0);
         w[0].1 + (w[1].1 - w[0].1) * share
     })

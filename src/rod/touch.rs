@@ -1,11 +1,41 @@
 //! Nodes against obstacles: prediction, and push-out with friction.
 
 use super::{
-    block::{BlockLanes, NodeLanes},
+    block::{BlockLanes, EdgeLanes, NodeLanes},
     obstacle::{NearObstacles, Obstacle, PushOut, continuous_collision, push_out},
 };
-use crate::lanes::{LANES, Real, V3, load, load3, store3};
+use crate::lanes::{LANES, Lane, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
+
+/// Which nodes can get out of obstacles that their strand's root lies in: 1, else 0. Those nearer to the root than
+/// it is deep would only be torn off it.
+pub(super) struct Free<S: Simd> {
+    sunk: f32x16<S>,
+    any: bool,
+    along: f32x16<S>,
+}
+
+impl<S: Simd> Free<S> {
+    #[inline(always)]
+    pub(super) fn new(simd: S, sunk: &Lane) -> Self {
+        Self { sunk: load(simd, sunk), any: *sunk != [0.0; LANES], along: f32x16::splat(simd, 0.0) }
+    }
+
+    /// Of node `i`; to be asked node after node.
+    #[inline(always)]
+    pub(super) fn at(&mut self, edges: &[EdgeLanes], i: usize) -> f32x16<S> {
+        let simd = self.sunk.simd;
+        let one = f32x16::splat(simd, 1.0);
+        if !self.any {
+            return one;
+        }
+        let is_sunk = Real::lt(self.along, self.sunk);
+        if let Some(edge) = edges.get(i) {
+            self.along += load(simd, &edge.l);
+        }
+        Real::select(is_sunk, f32x16::splat(simd, 0.0), one)
+    }
+}
 
 /// Predicts p* = p + v dt; v already contains the forces, apart from `gain`.
 #[inline(never)]
@@ -22,9 +52,10 @@ pub(crate) fn predict_nodes<S: Simd>(
         || {
             let zero = f32x16::splat(simd, 0.0);
             b.has_fast_nodes = false;
-            for (n, near) in b.nodes.iter_mut().zip(&b.near_obstacles) {
+            let mut free = Free::new(simd, &b.sunk);
+            for (i, (n, near)) in b.nodes.iter_mut().zip(&b.near_obstacles).enumerate() {
                 let w = load(simd, &n.w);
-                let held = Real::lt(w, f32x16::splat(simd, 1e-12));
+                let held = Real::lt(w * free.at(&b.edges, i), f32x16::splat(simd, 1e-12));
                 let p = load3(simd, &n.p);
                 // Nodes that begin inside an obstacle are placed on its surface before the step, so
                 // that the push-out adds no velocity. A moving obstacle does add its own.
@@ -39,17 +70,18 @@ pub(crate) fn predict_nodes<S: Simd>(
                 }
                 let v = load3(simd, &n.v);
                 // Held nodes have their start in `from` and their target in `p`.
-                let start_position = V3::select(held, load3(simd, &n.from), from);
+                let led = Real::lt(w, f32x16::splat(simd, 1e-12));
+                let start_position = V3::select(led, load3(simd, &n.from), from);
                 store3(&mut n.from, start_position);
                 let mut to = (v + gain).scale_add(dt, from);
                 for o in near.of(obstacles) {
                     if let Some((before, _)) =
                         continuous_collision(o, o.moved_with(from), to, clearance)
                     {
-                        (to, b.has_fast_nodes) = (before, true);
+                        (to, b.has_fast_nodes) = (V3::select(held, to, before), true);
                     }
                 }
-                store3(&mut n.p, V3::select(held, p, to));
+                store3(&mut n.p, V3::select(led, p, to));
             }
         },
     );
@@ -99,7 +131,9 @@ pub(super) fn contacts_with<S: Simd>(
             }
             let mut touched = f32x16::splat(simd, 0.0);
             let near = b.near_obstacles.iter().zip(&b.close_obstacles);
-            for (n, (near, close)) in b.nodes.iter_mut().zip(near) {
+            let mut free = Free::new(simd, &b.sunk);
+            for (i, (n, (near, close))) in b.nodes.iter_mut().zip(near).enumerate() {
+                let lanes = lanes * free.at(&b.edges, i);
                 if *near == NearObstacles::NONE {
                     continue;
                 }

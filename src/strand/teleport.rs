@@ -5,8 +5,10 @@ use bevy::prelude::*;
 
 impl Hair {
     /// Call before a character is teleported: its hair moves with it in its present shape, at rest,
-    /// and so do colliders, rods and blowers of the same character. Long jumps are detected without
-    /// this, see [`HairInertia`](crate::HairInertia).
+    /// and so do colliders, rods and blowers of the same character. Use it for spawn points and cut
+    /// scenes: without it only jumps within a tick are detected that are longer than 0.5 m and than three
+    /// times its longest strand, or turn the head by more than 1.6 rad
+    /// ([`HairInertia`](crate::HairInertia)).
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;

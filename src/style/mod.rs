@@ -36,7 +36,9 @@ impl Plugin for StylePlugin {
 setting! {
     /// Takes the shape in which a hair's bonds hold it now as its style, and measures from then on
     /// how much of it is left. Component of a [`Hair`]; insert it again when the hair has been
-    /// restyled. Costs a pass over all joints once a tick.
+    /// restyled: soaked ([`SoakHair`](crate::SoakHair)) and dried in shape
+    /// ([`HairDried`](crate::HairDried)). On wet hair, whose hydrogen bonds are open, it cannot see what
+    /// they will hold. Costs a pass over all joints once a tick.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -68,8 +70,8 @@ pub struct KeptStyle {
 
 impl KeptStyle {
     /// The share that is left: 1 when inserted, 0 when nothing is left, negative when hair bends
-    /// the other way. `None` before the first tick, and for hair without a style, whose bonds hold
-    /// it in its natural shape.
+    /// the other way. `None` before the first tick, and where bonds held hair in its natural shape
+    /// when [`HairStyle`] was inserted: style the hair, then insert it again.
     pub fn kept(&self) -> Option<f32> {
         self.share
     }
@@ -169,7 +171,9 @@ impl HairCondition<'_, '_> {
         let Ok(members) = self.hairs.get(hair) else { return 0.0 };
         let of =
             |moisture: &Moisture| -> f64 { moisture.film().iter().chain(moisture.bound()).sum() };
-        members.iter().filter_map(|id| self.moistures.get(id).ok()).map(of).sum::<f64>() * WATER
+        let all = members.iter().filter_map(|id| self.moistures.get(id).ok()).map(of);
+        // An empty `sum` is −0.
+        all.fold(0.0_f64, |sum, volume| sum + volume) * WATER
     }
 
     /// How much of its style a hair has kept; see [`KeptStyle::kept`].

@@ -79,10 +79,11 @@ pub enum WearError {
         /// The height (m).
         found: f32,
     },
-    /// Another entity's preset is worn on this head.
+    /// Another entity's preset is worn on this bone or mesh.
     #[error(
-        "the head wears a preset of {by} already, expected one: remove that WearHair first, or \
-         give a beard as a groom"
+        "the head's bone or mesh wears a preset of {by} already, expected one: remove that WearHair, or \
+         give this one as a groom; on a skinned character, a beard beside hair goes on the entity of the \
+         head's mesh"
     )]
     Taken {
         /// The other wearer.

@@ -17,14 +17,15 @@ use crate::{
         HUMAN_DENSITY, HairPreset, Planting, PresetSettings, RootOnMesh, RootPlace, SurfacePoint,
         surface_points,
     },
-    setting::Ranged,
     strand::Strand,
     water::HairWetting,
 };
 #[cfg(feature = "render")]
-use crate::{look::HairLook, plant::FollowerPlanting};
+use crate::{look::HairLook, plant::FollowerPlanting, setting::Ranged};
 use bevy::{
-    math::Affine3A, mesh::VertexAttributeValues as Values, platform::collections::HashMap,
+    math::Affine3A,
+    mesh::VertexAttributeValues as Values,
+    platform::collections::{HashMap, HashSet},
     prelude::*,
 };
 
@@ -106,12 +107,15 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
         }
         None => (part.entity, to_mesh),
     };
-    let (balls, capsules) = if order.wear.colliders && !order.target.has_colliders {
+    let own = &order.target.own;
+    let (balls, capsules) = if order.wear.colliders {
+        let head = if part.skin.is_some() { parent } else { order.target.head };
         let reach = grown.hair.strands.iter().map(Strand::length).fold(0.0, f32::max) + MARGIN;
-        (
-            balls(&fitting, &grown.hair.strands, reach)?,
-            capsules(&order.target.parts, &fitting, reach),
-        )
+        let balls = match own.above.contains(&head) {
+            true => Vec::new(),
+            false => balls(&fitting, &grown.hair.strands, reach)?,
+        };
+        (balls, capsules(&order.target.parts, &own.joints, &fitting, reach))
     } else {
         default()
     };
@@ -143,8 +147,8 @@ struct Grown {
 }
 
 fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown, WearError> {
-    let worn = WornPreset { seed: wear.seed, length: wear.length, ..WornPreset::of(preset) };
-    let worn = worn.checked()?;
+    let length = WornPreset::LENGTH.named("WearHair::length").check(wear.length)?;
+    let worn = WornPreset { seed: wear.seed, length, ..WornPreset::of(preset) };
     let mut planting = Planting { seed: wear.seed, ..preset.planting(&fitting.scalp) };
     if worn.length != 1.0 {
         planting = planting.lengthened(worn.length);
@@ -255,10 +259,11 @@ fn balls(
     balls.chain(ears).collect()
 }
 
-/// For each joint other than the head's that hair reaches the capsule that fits, or balls where it is of
-/// another shape; none where the fit fails.
+/// For each joint that hair reaches the capsule that fits, or balls where it is of another shape; none for the
+/// head's, for those `with_own` colliders, and where the fit fails.
 fn capsules(
     parts: &[MeshPart],
+    with_own: &HashSet<Entity>,
     fitting: &Fitting,
     reach: f32,
 ) -> Vec<(Entity, (HairCollider, Transform))> {
@@ -270,7 +275,8 @@ fn capsules(
         let to_hair = fitting.from_wearer * part.to_wearer;
         let Ok(fitted) = fit_joint_capsules(&part.mesh, &poses) else { continue };
         for (i, capsule) in fitted.into_iter().enumerate() {
-            let Some(capsule) = capsule.filter(|_| !skin.of_head[i]) else { continue };
+            let is_fitted = || !skin.of_head[i] && !with_own.contains(&skin.joints[i]);
+            let Some(capsule) = capsule.filter(|_| is_fitted()) else { continue };
             let there = to_hair * skin.poses[i].inverse();
             let scale = there.matrix3.determinant().abs().cbrt();
             let [a, b] = [capsule.from, capsule.to].map(|end| there.transform_point3(end));

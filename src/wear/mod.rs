@@ -3,9 +3,9 @@
 //! [`WearHair`] sets what is worn, a preset or a groom, and where: on an entity's own mesh, or on
 //! the head of a character below it, found by the name of a bone. It waits for a scene that still
 //! loads, makes the hair on the async compute task pool, ties its roots, fits colliders to head and
-//! body, and spawns it as a [`Hair`](crate::Hair) of its own. [`HairWorn`] is triggered when it is
-//! there, [`HairNotWorn`] when it cannot be. Change the component and the hair is swapped, once the
-//! new one is ready; remove it and the hair is removed.
+//! body, bones with colliders of their own left out, and spawns it as a [`Hair`](crate::Hair) of its
+//! own. [`HairWorn`] is triggered when it is there, [`HairNotWorn`] when it cannot be. Change the
+//! component and the hair is swapped, once the new one is ready; remove it and the hair is removed.
 //!
 //! | step | where |
 //! |---|---|

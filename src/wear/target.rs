@@ -20,17 +20,26 @@ use bevy::{
 };
 use std::collections::VecDeque;
 
-/// A collider that was fitted for worn hair.
-#[derive(Component, Clone, Copy, Debug, Default)]
-pub(super) struct Fitted;
+/// A collider that was fitted for the hair of this wearer.
+#[derive(Component, Clone, Copy, Debug)]
+pub(super) struct Fitted(pub(super) Entity);
 
 /// Where hair is to grow.
 pub(super) struct Target {
     /// The bone or mesh that it is worn on.
     pub(super) head: Entity,
     pub(super) parts: Vec<MeshPart>,
-    /// Whether the character has colliders that were not fitted for worn hair.
-    pub(super) has_colliders: bool,
+    pub(super) own: OwnColliders,
+}
+
+/// Where a character has colliders that were not fitted for the wearer's hair: the game's own, and those for other
+/// hair on the same head, as a beard's. Hair does not need two sets.
+#[derive(Default)]
+pub(super) struct OwnColliders {
+    /// Entities that are or are above one.
+    pub(super) above: HashSet<Entity>,
+    /// The joints that they are on: the first at or above each.
+    pub(super) joints: HashSet<Entity>,
 }
 
 /// Result of the search for a head.
@@ -59,7 +68,7 @@ pub(super) struct Characters<'w, 's> {
     skins: Query<'w, 's, (&'static Mesh3d, Option<&'static SkinnedMesh>)>,
     hairs: Query<'w, 's, (), With<Hair>>,
     wearers: Query<'w, 's, (), With<WearHair>>,
-    colliders: Query<'w, 's, (), (With<HairCollider>, Without<Fitted>)>,
+    colliders: Query<'w, 's, (Entity, Option<&'static Fitted>), With<HairCollider>>,
     places: Query<'w, 's, (Option<&'static Transform>, Option<&'static ChildOf>)>,
 }
 
@@ -199,7 +208,37 @@ impl Characters<'_, '_> {
         Ok(Target {
             head,
             parts: chosen.iter().map(part).collect::<Result<_, WearError>>()?,
-            has_colliders: all.iter().any(|e| self.colliders.contains(*e)),
+            own: self.own_colliders(wearer, &joints),
+        })
+    }
+
+    /// Where the character's own colliders are. Those of other wearers, and what games put on hair, are not its own.
+    fn own_colliders(&self, wearer: Entity, joints: &HashSet<Entity>) -> OwnColliders {
+        let mut own = OwnColliders::default();
+        for (collider, fitted) in &self.colliders {
+            if fitted.is_some_and(|fitted| fitted.0 == wearer) {
+                continue;
+            }
+            let mut is_on_joint = false;
+            for entity in self.upward(collider) {
+                own.above.insert(entity);
+                if !is_on_joint && joints.contains(&entity) {
+                    is_on_joint = true;
+                    own.joints.insert(entity);
+                }
+                let is_other = entity != wearer && self.wearers.contains(entity);
+                if is_other || fitted.is_none() && self.hairs.contains(entity) {
+                    break;
+                }
+            }
+        }
+        own
+    }
+
+    /// An entity and all above it.
+    fn upward(&self, entity: Entity) -> impl Iterator<Item = Entity> + '_ {
+        core::iter::successors(Some(entity), move |e| {
+            self.places.get(*e).ok()?.1.map(ChildOf::parent)
         })
     }
 
@@ -230,13 +269,8 @@ impl Characters<'_, '_> {
 
     /// From a skinned mesh, as it is bound, to the wearer, by the joint that is nearest to the root.
     fn bound(&self, skin: &MeshSkin, wearer: Entity) -> Result<Affine3A, WearError> {
-        let above = |entity: Entity| {
-            core::iter::successors(Some(entity), |e| {
-                self.places.get(*e).ok()?.1.map(ChildOf::parent)
-            })
-        };
         let (joints, poses) = (skin.joints.len(), skin.poses.len());
-        let root = (0..joints.min(poses)).min_by_key(|i| above(skin.joints[*i]).count());
+        let root = (0..joints.min(poses)).min_by_key(|i| self.upward(skin.joints[*i]).count());
         let root = root.ok_or(WearError::Joints { joints, poses, found: 0 })?;
         let now = self.relative(skin.joints[root], wearer).ok_or(WearError::Pose)?;
         bound_to(now, skin.poses[root]).ok_or(WearError::Pose)

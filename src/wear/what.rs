@@ -15,7 +15,7 @@ use bevy::prelude::*;
 /// below it, such as the root of a glTF scene; the scene may still be loading.
 ///
 /// ```
-/// # use bevy_keratin::{plant::HairPreset, prelude::*}; use bevy::prelude::*;
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
 /// # fn wear(mut commands: Commands, character: Entity, groom: Handle<Groom>) {
 /// // On the head, found by its bone's name:
 /// commands.entity(character).insert(WearHair::new(HairPreset::Curly));
@@ -35,7 +35,7 @@ use bevy::prelude::*;
 /// that grow there; to change them, wait for it:
 ///
 /// ```
-/// # use bevy_keratin::{plant::HairPreset, prelude::*}; use bevy::prelude::*;
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
 /// # fn wear(commands: &mut Commands, character: Entity) {
 /// commands
 ///     .entity(character)
@@ -92,8 +92,10 @@ pub struct WearHair {
     /// the identity: it was made around the character as it stands there.
     pub place: Transform,
     /// Whether colliders are fitted to head and body: balls for the head, capsules or balls for the joints
-    /// that hair reaches. A character that has [`HairCollider`](crate::HairCollider)s of its own
-    /// keeps to those. Default `true`.
+    /// that hair reaches. [`HairCollider`](crate::HairCollider)s of the game's own replace those of the bone
+    /// that they are on or below: one on a hand the hand's, one on the head, its jaw or its hat all of the
+    /// head's; on a mesh without a skin, those of the mesh. One on the character's root replaces none. Where
+    /// other worn hair has brought some, as under a beard, these are enough. Default `true`.
     pub colliders: bool,
     /// How the hair is styled: put on at once, or resampled where it is of other strands. A hairdo
     /// saved from worn hair fits the same [`hair`](Self::hair), [`seed`](Self::seed) and

@@ -375,9 +375,12 @@ fn surface() {
         return;
     }
     var deepest = -3.0e38;
-    for (var i = 1u; i <= edges; i++) {
+    var along = 0.0;
+    for (var i = 0u; i <= edges; i++) {
         let n = node(i);
-        if is_held(n.w) {
+        let is_sunk = along < sunk;
+        along = farther(along, i);
+        if is_sunk || is_held(n.w) {
             continue;
         }
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {

@@ -7,12 +7,16 @@ const ELLIPSOID: u32 = 3u;
 
 // How far a node may go in a substep, in ways that its velocity alone would take it.
 const FASTER: f32 = 1.5;
+// Length from a sunk root on that nothing pushes out, in depths of the root.
+const ROOM: f32 = 1.5;
 
 // Obstacles that this strand may touch in this substep; whether a node moves so fast against one that it
 // might pass through; whether a node rests on one.
 var<private> near: vec4<u32>;
 var<private> sweeps: bool;
 var<private> touched: bool;
+// Length from the root on that cannot get out of what the root lies in, 0 where it lies in nothing.
+var<private> sunk: f32;
 
 fn is_near(o: u32) -> bool {
     return ((near[o >> 5u] >> (o & 31u)) & 1u) != 0u;
@@ -227,6 +231,7 @@ fn continuous_collision(o: u32, start: vec3<f32>, p: vec3<f32>) -> Swept {
 // Chooses the obstacles of this strand. Held nodes must know where they come from.
 fn choose_near() {
     near = vec4(0u);
+    sunk = 0.0;
     if record.obstacles == 0u {
         return;
     }
@@ -257,23 +262,40 @@ fn choose_near() {
             }
         }
     }
+    let root = node(0u).xyz;
+    for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
+        sunk = max(sunk, ROOM * depth_in(o, root).w);
+    }
+}
+
+// How far from the root node i + 1 is, from that of node i.
+fn farther(along: f32, i: u32) -> f32 {
+    return along + select(edge(i).x, 0.0, i == edges);
 }
 
 // p* = p + (v + gain) dt, or on what is in the way.
 fn predict_nodes(dt: f32, gain: vec3<f32>) {
     sweeps = false;
+    var along = 0.0;
     for (var i = 0u; i <= edges; i++) {
         let n = node(i);
+        let is_sunk = along < sunk;
+        along = farther(along, i);
         if is_held(n.w) {
             continue;
         }
         // What begins inside is set on the surface before the step, which gives it no velocity.
         var start = n.xyz;
+        if is_sunk {
+            set_start(i, start);
+            set_node(i, fma(moving(i).xyz + gain, vec3(dt), start), n.w);
+            continue;
+        }
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
-            let along = taken_along(o, start);
-            let out = push_out(o, along, along, 0.0, false);
+            let taken = taken_along(o, start);
+            let out = push_out(o, taken, taken, 0.0, false);
             if out.meets {
-                start += out.place - along;
+                start += out.place - taken;
             }
         }
         set_start(i, start);
@@ -294,8 +316,14 @@ fn contacts(resting: f32, others: f32) {
     if all(near == vec4(0u)) {
         return;
     }
+    var along = 0.0;
     for (var i = 0u; i <= edges; i++) {
-        touch(i, resting, others);
+        if along < sunk {
+            set_support(i, vec3(0.0));
+        } else {
+            touch(i, resting, others);
+        }
+        along = farther(along, i);
     }
 }
 

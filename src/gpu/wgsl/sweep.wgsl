@@ -242,6 +242,8 @@ fn sweep_step() {
     // A root has no velocity, wherever it is led.
     set_start(0u, node(0u).xyz);
     choose_near();
+    // Sweeps push all nodes.
+    sunk = 0.0;
     predict_nodes(record.dt, vec3(0.0));
     predict_frames();
     for (var done = 0u; done < record.iterations; done++) {
