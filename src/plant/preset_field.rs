@@ -203,7 +203,17 @@ const EAR: f32 = 84.0;
 /// The lips: how high they are (°), and half of their height and width (°).
 const LIPS: (f32, f32, f32) = (-36.5, 5.0, 15.0);
 
+/// A sideburn's lower end and height (°), and the angle from the face at which it ends (°).
+const SIDEBURN: (f32, f32) = (-3.0, 8.0);
+const BEHIND_SIDEBURN: f32 = 92.0;
+
 impl Scalp {
+    /// How far up from a sideburn's lower end to where it is the head's hair a place is, 0…1.
+    fn above_sideburn(&self, place: Vec3) -> f32 {
+        let (around, elevation) = self.angles(place);
+        if around > BEHIND_SIDEBURN { 1.0 } else { smooth((elevation - SIDEBURN.0) / SIDEBURN.1) }
+    }
+
     /// How far within the edge of a beard a place is (m, approximately); negative outside.
     pub(super) fn behind_beard_line(&self, place: Vec3) -> f32 {
         let (around, elevation) = self.angles(place);

@@ -1,6 +1,6 @@
 //! The scalp: where hair grows on a head.
 
-use super::{hairline::smooth, map::RootPlace};
+use super::map::RootPlace;
 use crate::setting::setting;
 use bevy::{math::ops::atan2, prelude::*};
 use core::f32::consts::PI;
@@ -59,10 +59,6 @@ const HAIRLINE: [(f32, f32); 18] = [
     (180.0, -36.0),
 ];
 
-/// A sideburn's lower end and height (°), and the angle from the face at which it ends (°).
-const SIDEBURN: (f32, f32) = (-3.0, 8.0);
-const BEHIND_SIDEBURN: f32 = 92.0;
-
 impl Scalp {
     /// Right, up and front as unit vectors at right angles.
     pub fn axes(&self) -> [Vec3; 3] {
@@ -103,12 +99,6 @@ impl Scalp {
     /// Slope of the hairline: elevation over the angle around the head.
     pub(super) fn hairline_slope(&self, around: f32) -> f32 {
         (hairline((around + 2.0).min(180.0)) - hairline((around - 2.0).max(0.0))) / 4.0
-    }
-
-    /// How far up from a sideburn's lower end to where it is the head's hair a place is, 0…1.
-    pub(super) fn above_sideburn(&self, place: Vec3) -> f32 {
-        let (around, elevation) = self.angles(place);
-        if around > BEHIND_SIDEBURN { 1.0 } else { smooth((elevation - SIDEBURN.0) / SIDEBURN.1) }
     }
 
     /// The scalp as a density map.
