@@ -206,10 +206,6 @@ fn a_beard_and_short_hair_are_worn_together_without_a_fault() {
     }
     assert!(ticks > 60, "both are worn");
     assert_eq!(faults(&mut app), []);
-    let world = app.world_mut();
-    let mut strands = world.query::<&Strand>();
-    let strain = strands.iter(world).map(Strand::peak_strain).fold(0.0, f32::max);
-    println!("strained by {strain} at most");
 }
 
 /// Of simulated and of drawn strands, standing and walking.

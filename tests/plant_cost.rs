@@ -94,29 +94,31 @@ fn no_root_is_inside_the_solids_of_the_training_head() {
     }
 }
 
-/// Hair would float over the skin. Not so in the face, where no hair lies: one is as high as the
-/// nose. On the throat one lies outside by 5 mm.
+/// Hair would float over the skin. What [`head::close_fit`] adds lies within its
+/// vertices; of the others one is as high as the
+/// nose, in the face where no hair lies, and one outside of the throat by 5 mm.
 #[test]
 fn the_solids_of_the_training_head_lie_within_its_skin() {
-    let solids = head::close_fit().unwrap();
+    let (solids, coarse) = (head::close_fit().unwrap(), head::body().unwrap().len());
     let ball = Sphere::new(1.0).mesh().ico(6).unwrap();
     let ways = ball.attribute(Mesh::ATTRIBUTE_POSITION).and_then(|p| p.as_float3()).unwrap();
-    let mut most = f32::NEG_INFINITY;
-    for (collider, place) in &solids {
+    let mut most = [f32::NEG_INFINITY; 2];
+    for (i, (collider, place)) in solids.iter().enumerate() {
         let ColliderShape::Capsule(c) = &collider.shape else { continue };
         for way in ways {
             for end in [-c.half_length, 0.0, c.half_length] {
                 let p = place.transform_point(Vec3::Y * end + Vec3::from(*way) * c.radius);
                 // Those of the chest reach through the cut below it.
                 let lying = Vec3::new(p.y, p.z, p.x);
-                let is_skin = lying.x > mannequin::BUST_END + 0.01;
-                if is_skin && (lying.y < 0.06 || lying.x < -0.12) {
-                    let off = mannequin::head(lying);
-                    assert!(off < 5.5e-3, "{:.1} mm outside at {p}", 1e3 * off);
-                    most = most.max(off);
+                let is_free = lying.x > mannequin::BUST_END + 0.01
+                    && (coarse <= i || lying.y < 0.06 || lying.x < -0.12);
+                if is_free {
+                    let most = &mut most[usize::from(coarse <= i)];
+                    *most = most.max(mannequin::head(lying));
                 }
             }
         }
     }
-    println!("{:.2} mm outside at most", 1e3 * most);
+    println!("{:.1} mm outside at most, of the closer ones {:.1}", 1e3 * most[0], 1e3 * most[1]);
+    assert!(most[0] < 5.5e-3 && most[1] < 1.5e-3, "{most:?}");
 }

@@ -198,12 +198,9 @@ setting! {
     /// A shower head, or with [`Shower::rain`] a cloud: emits drops along its transform's forward
     /// direction (−Z). The same seed gives the same drops.
     ///
-    /// Wetting takes time: 100,000 hairs of 20 cm bind 22 ml, and a drop of 1 mm radius has 4.2 µl. Half of
-    /// 22 ml, a [wetness](crate::HairCondition::wetness) of 0.5, takes
-    /// 11 ml / (rate · 4.2 µl · share of the drops that stay on the hair). Of drops spread over a disc, those
-    /// meet the hair that fall on its own 0.045 m² or so (a disc of 12 cm), and a third to all of these
-    /// stay. Film then soaks in with a time constant of 2 minutes ([`HairWetting::soaking`]); it makes hair
-    /// look wet before.
+    /// Wetting takes time: of 300 drops a second over 15 cm, a bob holds 20 g after a minute and 29 g after two; film
+    /// soaks in with a time constant of 2 minutes ([`HairWetting::soaking`]), to a
+    /// [wetness](crate::HairCondition::wetness) of 0.2 and 0.4 by then, and makes hair look wet before.
     /// [`HairProcessTime`](crate::HairProcessTime) makes soaking and drying faster, not the shower: far above
     /// 1, hair dries while it rains. Wind carries drops away. For hair that is wet at once send
     /// [`SoakHair`](crate::SoakHair).
@@ -256,9 +253,7 @@ impl Shower {
 
     /// Rain of `rate` drops per second over a disc of `radius` (m), falling at its terminal speed.
     ///
-    /// 300 drops a second over 15 cm are 1.3 ml/s, of which 0.8 ml/s fall on a head of hair: in 13 s the
-    /// 11 ml for a wetness of 0.5, three times that where a third stays, and two minutes to soak in. See
-    /// [`Shower`].
+    /// 300 drops a second over 15 cm are 1.3 ml/s. See [`Shower`] for how soon hair is wet.
     ///
     /// # Errors
     /// When one of them is negative or not finite.
@@ -269,9 +264,8 @@ impl Shower {
 
     /// Rain on a head at `center` (m): 1,000 drops a second over a disc of 0.3 m, from 1 m above it.
     ///
-    /// That is a cloudburst of 53 mm an hour, 0.67 ml/s on a head of hair: in 16 s the 11 ml for a wetness of
-    /// 0.5, three times that where a third stays, and two minutes to soak in. A wind of 8 m/s carries the
-    /// drops 20 cm aside. See [`Shower`]; [`SoakHair`](crate::SoakHair) is at once.
+    /// That is a cloudburst of 53 mm an hour. See [`Shower`] for how soon hair is wet;
+    /// [`SoakHair`](crate::SoakHair) is at once.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;

@@ -325,11 +325,11 @@ fn spawn_hair(
         commands.spawn((StrandOf(hair), strand));
     }
     for ball in made.balls {
-        commands.spawn((ball, Fitted(wearer), ChildOf(hair)));
+        commands.spawn((ball, Fitted, ChildOf(hair)));
     }
     let capsules = made.capsules.into_iter();
     let colliders =
-        capsules.map(|(joint, it)| commands.spawn((it, Fitted(wearer), ChildOf(joint))).id());
+        capsules.map(|(joint, capsule)| commands.spawn((capsule, Fitted, ChildOf(joint))).id());
     let colliders = colliders.collect();
     #[cfg(feature = "save")]
     if let Some(hairdo) = wear.hairdo.clone() {

@@ -20,9 +20,9 @@ use bevy::{
 };
 use std::collections::VecDeque;
 
-/// A collider that was fitted for the hair of this wearer.
-#[derive(Component, Clone, Copy, Debug)]
-pub(super) struct Fitted(pub(super) Entity);
+/// A collider that was fitted for worn hair.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub(super) struct Fitted;
 
 /// Where hair is to grow.
 pub(super) struct Target {
@@ -32,8 +32,7 @@ pub(super) struct Target {
     pub(super) own: OwnColliders,
 }
 
-/// Where a character has colliders that were not fitted for the wearer's hair: the game's own, and those for other
-/// hair on the same head, as a beard's. Hair does not need two sets.
+/// Where a character has colliders that were not fitted for worn hair.
 #[derive(Default)]
 pub(super) struct OwnColliders {
     /// Entities that are or are above one.
@@ -68,7 +67,7 @@ pub(super) struct Characters<'w, 's> {
     skins: Query<'w, 's, (&'static Mesh3d, Option<&'static SkinnedMesh>)>,
     hairs: Query<'w, 's, (), With<Hair>>,
     wearers: Query<'w, 's, (), With<WearHair>>,
-    colliders: Query<'w, 's, (Entity, Option<&'static Fitted>), With<HairCollider>>,
+    colliders: Query<'w, 's, Entity, (With<HairCollider>, Without<Fitted>)>,
     places: Query<'w, 's, (Option<&'static Transform>, Option<&'static ChildOf>)>,
 }
 
@@ -215,10 +214,7 @@ impl Characters<'_, '_> {
     /// Where the character's own colliders are. Those of other wearers, and what games put on hair, are not its own.
     fn own_colliders(&self, wearer: Entity, joints: &HashSet<Entity>) -> OwnColliders {
         let mut own = OwnColliders::default();
-        for (collider, fitted) in &self.colliders {
-            if fitted.is_some_and(|fitted| fitted.0 == wearer) {
-                continue;
-            }
+        for collider in &self.colliders {
             let mut is_on_joint = false;
             for entity in self.upward(collider) {
                 own.above.insert(entity);
@@ -227,7 +223,7 @@ impl Characters<'_, '_> {
                     own.joints.insert(entity);
                 }
                 let is_other = entity != wearer && self.wearers.contains(entity);
-                if is_other || fitted.is_none() && self.hairs.contains(entity) {
+                if is_other || self.hairs.contains(entity) {
                     break;
                 }
             }

@@ -94,8 +94,8 @@ pub struct WearHair {
     /// Whether colliders are fitted to head and body: balls for the head, capsules or balls for the joints
     /// that hair reaches. [`HairCollider`](crate::HairCollider)s of the game's own replace those of the bone
     /// that they are on or below: one on a hand the hand's, one on the head, its jaw or its hat all of the
-    /// head's; on a mesh without a skin, those of the mesh. One on the character's root replaces none. Where
-    /// other worn hair has brought some, as under a beard, these are enough. Default `true`.
+    /// head's; on a mesh without a skin, those of the mesh. One on the character's root replaces none. Each
+    /// worn hair brings its own, also a beard beside hair. Default `true`.
     pub colliders: bool,
     /// How the hair is styled: put on at once, or resampled where it is of other strands. A hairdo
     /// saved from worn hair fits the same [`hair`](Self::hair), [`seed`](Self::seed) and

@@ -34,7 +34,7 @@ const THREADS: usize = 8;
 /// Passes of a thread's loops in a substep at most, about: each round moves nodes out and restores lengths, and the
 /// rest of the substep looks at an obstacle so many times.
 fn passes(nodes: usize, obstacles: usize, rounds: usize) -> usize {
-    (rounds * (obstacles + 4) + 130 * (obstacles + 1)) * nodes
+    (rounds * (obstacles + 4) + 200 * (obstacles + 1)) * nodes
 }
 
 fn random_obstacle(random: &mut Random, kind: u32, moves: bool) -> Obstacle {
@@ -258,6 +258,21 @@ fn strands_among_obstacles() {
                 ..plain()
             });
         }
+    }
+}
+
+/// Half of the roots and more lie in the ground, by up to as much as strands are long: what cannot get out is left
+/// there.
+#[test]
+fn strands_whose_roots_lie_in_an_obstacle() {
+    for moves in [false, true] {
+        compare("sunk", 41, 0.3, |random| {
+            let ground = random_obstacle(random, 0, moves);
+            let normal = random.vector().normalize_or(Vec3::Y);
+            let point = normal * random.between(0.0, 0.08);
+            let solid = Solid::HalfSpace { normal, point };
+            SubstepRecord { obstacles: vec![Obstacle { solid, ..ground }], ..plain() }
+        });
     }
 }
 

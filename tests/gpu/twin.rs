@@ -89,6 +89,8 @@ pub struct Twin {
     drying: Vec<f64>,
     touched: bool,
     sweeps: bool,
+    /// Length from the root on that cannot get out of what the root lies in.
+    sunk: f64,
     /// Rounds in which it got out of what it was deep in.
     pub rounds: usize,
 }
@@ -119,6 +121,7 @@ impl Twin {
             drying: vec![0.0; edges],
             touched: false,
             sweeps: false,
+            sunk: 0.0,
             rounds: 0,
         }
     }
@@ -260,6 +263,8 @@ impl Twin {
         let (dt, gravity) = (f64::from(r.dt), d(r.gravity));
         self.v.iter_mut().for_each(|v| *v -= gravity * dt);
         self.support.fill(DVec3::ZERO);
+        let depths = r.obstacles.iter().map(|o| depth(&o.solid, self.p[0], r.skin).1);
+        self.sunk = 1.5 * depths.fold(0.0, f64::max);
         self.surface(r);
         let mut theta = THETA;
         self.fall(r, dt * theta);
@@ -277,11 +282,16 @@ impl Twin {
         theta
     }
 
+    fn is_sunk(&self, i: usize) -> bool {
+        self.l[..i].iter().sum::<f64>() < self.sunk
+    }
+
     fn fall(&mut self, r: &SubstepRecord, ahead: f64) {
         self.sweeps = false;
         for i in 1..=self.edges() {
             let mut from = self.p[i];
-            for o in &r.obstacles {
+            let obstacles = if self.is_sunk(i) { &[][..] } else { &r.obstacles[..] };
+            for o in obstacles {
                 let start = along(o, from);
                 if let Some((out, _)) = push_out(o, start, start, 0.0, r.skin, false) {
                     from += out - start;
@@ -289,7 +299,7 @@ impl Twin {
             }
             self.from[i] = from;
             let mut to = from + (self.v[i] + d(r.gravity) * ahead) * ahead;
-            for o in &r.obstacles {
+            for o in obstacles {
                 let (place, fast, _) = swept(o, along(o, from), to, r.skin);
                 to = place;
                 self.sweeps |= fast;
@@ -301,7 +311,7 @@ impl Twin {
 
     fn surface(&mut self, r: &SubstepRecord) {
         let mut deepest = f64::NEG_INFINITY;
-        for p in &self.p[1..] {
+        for (_, p) in self.p.iter().enumerate().skip(1).filter(|(i, _)| !self.is_sunk(*i)) {
             for o in &r.obstacles {
                 deepest = deepest.max(depth(&o.solid, along(o, *p), r.skin).1);
             }
@@ -326,7 +336,11 @@ impl Twin {
     fn contacts(&mut self, r: &SubstepRecord, resting: f64, others: f64) {
         self.touched = false;
         for i in 0..=self.edges() {
-            self.touch(r, i, resting, others);
+            if self.is_sunk(i) {
+                self.support[i] = DVec3::ZERO;
+            } else {
+                self.touch(r, i, resting, others);
+            }
         }
     }
 
