@@ -94,9 +94,8 @@ fn no_root_is_inside_the_solids_of_the_training_head() {
     }
 }
 
-/// Hair would float over the skin. What [`head::close_fit`] adds lies within its
-/// vertices; of the others one is as high as the
-/// nose, in the face where no hair lies, and one outside of the throat by 5 mm.
+/// Hair would float over the skin. What [`head::close_fit`] adds lies within its vertices; of the others
+/// one is as high as the nose, in the face where no hair lies, and one outside of the throat by 5 mm.
 #[test]
 fn the_solids_of_the_training_head_lie_within_its_skin() {
     let (solids, coarse) = (head::close_fit().unwrap(), head::body().unwrap().len());
