@@ -174,7 +174,7 @@ pub fn strand_point<'a>(
     let inward = near_point.position - loose;
     let mut position = loose + inward * tight;
     let mut slope = loose_slope.lerp(near_point.slope * pace, tight) + inward * tighter;
-    push_out(solids, t * strand.size, &mut position, &mut slope);
+    push_out(solids, t, strand.size, &mut position, &mut slope);
     CurvePoint { position, slope }
 }
 

@@ -18,7 +18,8 @@ const BLOCKERS: usize = 16;
 const SWEEPS: usize = 3;
 /// How far outside strands are drawn (m): between two rings they cut through what is round.
 const CLEARANCE: f32 = 0.8e-3;
-/// Length from the root over which pushing sets in (m): roots are in the skin.
+/// Length from the root over which pushing sets in (m), or half of a strand that is shorter than twice
+/// that: roots are in the skin.
 const ROOT: f32 = 5e-3;
 
 /// A ball, a capsule or an ellipsoid in a hair's frame, as the shader reads it: in its own frame all
@@ -100,9 +101,15 @@ impl DrawnSolid {
     }
 }
 
-/// Moves a point of a strand out of all solids, `length` (m) from its root, and turns its slope along
-/// the surfaces.
-pub(super) fn push_out(solids: &[DrawnSolid], length: f32, position: &mut Vec3, slope: &mut Vec3) {
+/// Moves the point at `t` (0 root, 1 tip) of a strand so long (m) out of all solids, and turns its slope
+/// along the surfaces.
+pub(super) fn push_out(
+    solids: &[DrawnSolid],
+    t: f32,
+    length: f32,
+    position: &mut Vec3,
+    slope: &mut Vec3,
+) {
     let (mut outside, mut along) = (*position, *slope);
     for _ in 0..SWEEPS {
         let pushed = solids.iter().filter(|solid| solid.push(&mut outside, &mut along)).count();
@@ -110,7 +117,7 @@ pub(super) fn push_out(solids: &[DrawnSolid], length: f32, position: &mut Vec3, 
             break;
         }
     }
-    let grown = (length / ROOT).clamp(0.0, 1.0);
+    let grown = (t * length / ROOT.min(0.5 * length).max(1e-6)).clamp(0.0, 1.0);
     *position = position.lerp(outside, grown);
     *slope = slope.lerp(along, grown);
 }
@@ -179,7 +186,7 @@ mod tests {
 
     fn pushed(solid: &DrawnSolid, length: f32, mut p: Vec3) -> Vec3 {
         let mut slope = Vec3::X;
-        push_out(&[*solid], length, &mut p, &mut slope);
+        push_out(&[*solid], 1.0, length, &mut p, &mut slope);
         p
     }
 
@@ -192,6 +199,11 @@ mod tests {
         assert_eq!(pushed(&ball, 0.1, free), free);
         let root = Vec3::new(1.0, 0.0995, 0.0);
         assert_eq!(pushed(&ball, 0.0, root), root, "roots are in the skin");
+        let stub = pushed(&ball, 2e-3, root);
+        assert!(
+            stub.distance(Vec3::new(1.0, 0.1 + CLEARANCE, 0.0)) < 1e-6,
+            "short hair shows: {stub}"
+        );
     }
 
     #[test]

@@ -295,7 +295,8 @@ fn way_along(guide: vec2<u32>, root: vec3<f32>, point: CurvePoint, phase: f32, e
     return out;
 }
 
-// Length from the root over which pushing sets in (m): roots are in the skin.
+// Length from the root over which pushing sets in (m), or half of a strand that is shorter than twice
+// that: roots are in the skin.
 const ROOT: f32 = 5e-3;
 
 // Solids of a group.
@@ -325,8 +326,8 @@ fn push_out(solid: DrawnSolid, point: ptr<function, StrandPoint>) -> u32 {
     return 1u;
 }
 
-// Out of all solids, at a place so far along the strand (m).
-fn push_out_of_all(length: f32, point: ptr<function, StrandPoint>) {
+// The point at `t` of a strand so long (m) out of all solids.
+fn push_out_of_all(t: f32, length: f32, point: ptr<function, StrandPoint>) {
     let inside = (*point).position;
     let slope = (*point).slope;
     for (var sweep = 0u; sweep < SWEEPS; sweep++) {
@@ -345,7 +346,7 @@ fn push_out_of_all(length: f32, point: ptr<function, StrandPoint>) {
             break;
         }
     }
-    let grown = saturate(length / ROOT);
+    let grown = saturate(t * length / max(min(ROOT, 0.5 * length), 1e-6));
     (*point).position = mix(inside, (*point).position, grown);
     (*point).slope = mix(slope, (*point).slope, grown);
 }
@@ -453,7 +454,7 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     out.position = loose + inward * tight;
     out.outward = inward * (tight - 1.0);
     out.slope = mix(loose_slope, near_point.slope * pace, tight) + inward * tighter;
-    push_out_of_all(t * strand.size, &out);
+    push_out_of_all(t, strand.size, &out);
     return out;
 }
 
