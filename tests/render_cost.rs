@@ -85,13 +85,14 @@ fn a_hair_is_one_draw_call_in_every_view() {
 #[ignore = "a timing, to be read"]
 fn frames_a_second() {
     for (width, height) in [(1280, 720), (1920, 1080)] {
-        for count in [1500, 12_000] {
+        for (count, share) in [(1500, 1.0), (12_000, 1.0), (12_000, 0.5), (12_000, 0.25)] {
             let Some(mut scene) = Offscreen::new(width, height) else {
                 return;
             };
             scene.look(Vec3::new(0.22, 0.08, 0.5), Vec3::new(0.0, -0.05, 0.0));
             let world = scene.app.world_mut();
-            let hair = world.spawn((Hair, HairFollowers::new(count))).id();
+            let detail = HairDetail { strands: share, ..default() };
+            let hair = world.spawn((Hair, HairFollowers::new(count), detail)).id();
             for points in head_of_guides(220, 0.09, 0.26, 16) {
                 world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
             }
@@ -105,7 +106,9 @@ fn frames_a_second() {
             }
             let frame = start.elapsed() / FRAMES;
             let rate = 1.0 / frame.as_secs_f32();
-            println!("{width}x{height}, {count} followers: {frame:?} a frame, {rate:.1} a second");
+            println!(
+                "{width}x{height}, {share} of {count} followers: {frame:?}, {rate:.1} a second"
+            );
         }
     }
 }

@@ -217,7 +217,8 @@ impl HairPreset {
                 length: 0.33,
                 nodes: 28,
                 curl: curl(6e-3, 60e-3, CurlPhase::PerClump),
-                clump: Some(Clump { spacing: 22e-3, strength: 0.35 }),
+                // Waves that several guides share: one guide's would look like spots.
+                clump: Some(Clump { spacing: 45e-3, strength: 0.2 }),
                 drape: Some(Drape { layering: 0.12, ..drape }),
                 ..base
             },

@@ -154,7 +154,10 @@ impl HairPreset {
         match self {
             // Shorter at the sides and the nape.
             Self::Short => 0.28 + 0.72 * smooth(high / 0.85),
-            Self::Undercut => 0.1 + 0.9 * on_top(aside, high),
+            // Behind the crown shorter, or it would hang over the clipped back.
+            Self::Undercut => {
+                0.1 + 0.9 * on_top(aside, high) * (0.35 + 0.65 * smooth((forward + 0.6) / 0.5))
+            }
             Self::Pixie => 0.2 + 0.8 * smooth((high + 0.1) / 0.95),
             // Down to the brows, along the head.
             Self::Fringe if in_fringe(aside, forward) => {
