@@ -47,7 +47,6 @@ mod loops;
 mod sheets;
 
 use bevy::{light::DirectionalLightShadowMap, prelude::*};
-use bevy_keratin::{prelude::*, render::HairFollowers};
 use clap::{Parser, ValueEnum};
 use std::{
     io,
@@ -111,9 +110,6 @@ pub struct Arguments {
     supersample: u32,
 }
 
-/// Hair of so few drawn strands is drawn whole.
-const FEW: u32 = 2000;
-
 fn size(text: &str) -> Result<f32, String> {
     let size = text.parse().ok().filter(|size| (0.1..=4.0).contains(size));
     size.ok_or_else(|| "expected a number from 0.1 to 4".into())
@@ -126,43 +122,12 @@ impl Arguments {
         (scaled(width), scaled(height))
     }
 
-    /// Draws no more strands than asked for, those wider and of fewer segments, and shadows no finer than the picture.
+    /// Draws no more strands than asked for, and shadows no finer than the picture.
     fn thin_out(&self, app: &mut App) {
         let fine = (1024.0 * self.size * self.supersample as f32) as usize;
         let size = fine.next_power_of_two().clamp(1024, 4096);
         app.insert_resource(DirectionalLightShadowMap { size });
-        let share = (self.strands as f32 / 40_000.0).min(1.0);
-        // Brows and lashes stay.
-        let thin = move |count: u32| ((count as f32 * share) as u32).max(FEW).min(count);
-        let coarse =
-            move |segments: u32| ((segments as f32 * share.sqrt()) as u32).max(12).min(segments);
-        let wider = |before: u32, now: u32| (before as f32 / now.max(1) as f32).sqrt();
-        let world = app.world_mut();
-        if let Some(mut followers) = world.get_resource_mut::<HairDefault<HairFollowers>>() {
-            let before = followers.count;
-            followers.count = thin(before);
-            followers.segments = coarse(followers.segments);
-            let times = wider(before, followers.count);
-            if let Some(mut look) = world.get_resource_mut::<HairDefault<HairLook>>() {
-                look.width *= times;
-            }
-        }
-        app.add_systems(
-            PreUpdate,
-            move |mut hairs: Query<
-                (&mut HairFollowers, Option<&mut HairLook>),
-                Added<HairFollowers>,
-            >| {
-                for (mut followers, look) in &mut hairs {
-                    let before = followers.count;
-                    followers.count = thin(before);
-                    followers.segments = coarse(followers.segments);
-                    if let Some(mut look) = look {
-                        look.width *= wider(before, followers.count);
-                    }
-                }
-            },
-        );
+        bust::thin_out(app, self.strands);
     }
 
     /// Writes a still.

@@ -6,7 +6,7 @@ use bevy::{
     light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap},
     prelude::*,
 };
-use bevy_keratin::{plant::HairPreset, prelude::*};
+use bevy_keratin::{plant::HairPreset, prelude::*, render::HairFollowers};
 
 /// Seconds until hair has settled.
 pub const SETTLING: f32 = 2.0;
@@ -75,6 +75,46 @@ pub fn light(app: &mut App) {
     world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2000.0, Color::srgb(0.8, 0.88, 1.0)));
     world.spawn(light(Vec3::new(1.0, 0.35, -1.4), 2500.0, Color::WHITE));
     world.spawn(light(Vec3::new(-1.0, 0.35, -1.4), 2500.0, Color::WHITE));
+}
+
+/// Hair of so few drawn strands is drawn whole.
+const FEW: u32 = 2000;
+
+/// Draws no more than so many strands of a head of 40,000, of others in proportion: those wider and of
+/// fewer segments.
+pub fn thin_out(app: &mut App, strands: u32) {
+    let share = (strands as f32 / 40_000.0).min(1.0);
+    // Brows and lashes stay.
+    let thin = move |count: u32| ((count as f32 * share) as u32).max(FEW).min(count);
+    let coarse =
+        move |segments: u32| ((segments as f32 * share.sqrt()) as u32).max(12).min(segments);
+    let wider = |before: u32, now: u32| (before as f32 / now.max(1) as f32).sqrt();
+    let world = app.world_mut();
+    if let Some(mut followers) = world.get_resource_mut::<HairDefault<HairFollowers>>() {
+        let before = followers.count;
+        followers.count = thin(before);
+        followers.segments = coarse(followers.segments);
+        let times = wider(before, followers.count);
+        if let Some(mut look) = world.get_resource_mut::<HairDefault<HairLook>>() {
+            look.width *= times;
+        }
+    }
+    app.add_systems(
+        PreUpdate,
+        move |mut hairs: Query<
+            (&mut HairFollowers, Option<&mut HairLook>),
+            Added<HairFollowers>,
+        >| {
+            for (mut followers, look) in &mut hairs {
+                let before = followers.count;
+                followers.count = thin(before);
+                followers.segments = coarse(followers.segments);
+                if let Some(mut look) = look {
+                    look.width *= wider(before, followers.count);
+                }
+            }
+        },
+    );
 }
 
 /// A head with hair.

@@ -60,6 +60,9 @@ struct Arguments {
     /// How many times larger, along and across, pictures are drawn and averaged.
     #[arg(long, default_value = "3", value_parser = clap::value_parser!(u32).range(1..=4))]
     supersample: u32,
+    /// Drawn strands of a head of 40,000, of others in proportion. Fewer are drawn wider.
+    #[arg(long, default_value = "40000", value_parser = clap::value_parser!(u32).range(100..))]
+    strands: u32,
 }
 
 fn name(preset: HairPreset) -> String {
@@ -108,6 +111,7 @@ fn draw(preset: HairPreset, arguments: &Arguments) -> Result<Vec<Image>> {
     let start = Instant::now();
     let mut app = bust::app("presets", bust::ground(preset));
     bust::light(&mut app);
+    bust::thin_out(&mut app, arguments.strands);
     let bust = bust::wear(&mut app, preset)?;
     let took = start.elapsed();
     let camera = bust::camera(&mut app);

@@ -156,7 +156,7 @@ impl HairPreset {
             Self::Short => 0.28 + 0.72 * smooth(high / 0.85),
             // Behind the crown shorter, or it would hang over the clipped back.
             Self::Undercut => {
-                0.1 + 0.9 * on_top(aside, high) * (0.35 + 0.65 * smooth((forward + 0.6) / 0.5))
+                0.06 + 0.94 * on_top(aside, high) * (0.35 + 0.65 * smooth((forward + 0.6) / 0.5))
             }
             Self::Pixie => 0.2 + 0.8 * smooth((high + 0.1) / 0.95),
             // Down to the brows, along the head.
