@@ -76,6 +76,7 @@ fn no_root_is_inside_the_solids_of_the_training_head() {
                 ColliderShape::Capsule(c) => {
                     (p - Vec3::Y * p.y.clamp(-c.half_length, c.half_length)).length() - c.radius
                 }
+                ColliderShape::Sphere(s) => p.length() - s.radius,
                 ColliderShape::Ellipsoid { radii } => {
                     ((p / *radii).length() - 1.0) * radii.min_element()
                 }
@@ -103,10 +104,14 @@ fn the_solids_of_the_training_head_lie_within_its_skin() {
     let ways = ball.attribute(Mesh::ATTRIBUTE_POSITION).and_then(|p| p.as_float3()).unwrap();
     let mut most = [f32::NEG_INFINITY; 2];
     for (i, (collider, place)) in solids.iter().enumerate() {
-        let ColliderShape::Capsule(c) = &collider.shape else { continue };
+        let (half_length, radius) = match &collider.shape {
+            ColliderShape::Capsule(c) => (c.half_length, c.radius),
+            ColliderShape::Sphere(s) => (0.0, s.radius),
+            _ => continue,
+        };
         for way in ways {
-            for end in [-c.half_length, 0.0, c.half_length] {
-                let p = place.transform_point(Vec3::Y * end + Vec3::from(*way) * c.radius);
+            for end in [-half_length, 0.0, half_length] {
+                let p = place.transform_point(Vec3::Y * end + Vec3::from(*way) * radius);
                 // Those of the chest reach through the cut below it.
                 let lying = Vec3::new(p.y, p.z, p.x);
                 let is_free = lying.x > mannequin::BUST_END + 0.01

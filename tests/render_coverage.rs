@@ -84,6 +84,9 @@ fn strands_cover_as_much_from_near_and_far_and_at_their_tips() {
     }
 }
 
+/// T6. Its aims, 6 % in the mean and 25 % at worst, are out of reach where four samples hold strands a tenth of
+/// a pixel wide. Ribbons that were a pixel wide and covered all of it had 0.205 and 1.03 of their own finer
+/// picture, of which nine tenths of the tips were missing.
 #[test]
 fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
     let head = |size: u32| {
@@ -119,7 +122,7 @@ fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
     let error = errors.iter().sum::<f32>() / errors.len() as f32 / mean;
     let worst = errors[errors.len() * 99 / 100] / mean;
     println!("error of one pixel {error:.3}, of the worst in a hundred {worst:.3} of the mean");
-    assert!(error < 0.4 && worst < 2.2);
+    assert!(error < 0.3 && worst < 2.1);
 }
 
 /// A tuft of 3,000 strands at random, unlit and red, that a camera sees from `from` metres in some steps to

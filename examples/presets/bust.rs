@@ -49,8 +49,8 @@ pub fn look(app: &mut App, from: Vec3, to: Vec3) {
     cameras.iter_mut(app.world_mut()).for_each(|mut camera| *camera = place);
 }
 
-/// Key and fill from the front, two kickers at the hair's height from behind. All cast shadows, or
-/// light from one side would shine through the head.
+/// Key and fill from the front, two kickers so far behind that they draw an edge and do not light the hair
+/// before the ears. All cast shadows, or light from one side would shine through the head.
 pub fn light(app: &mut App) {
     let light = |at: Vec3, lux: f32, color: Color| {
         let light = DirectionalLight {
@@ -73,8 +73,8 @@ pub fn light(app: &mut App) {
     let world = app.world_mut();
     world.spawn(light(Vec3::new(1.0, 1.1, 1.2), 8000.0, Color::srgb(1.0, 0.95, 0.88)));
     world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2000.0, Color::srgb(0.8, 0.88, 1.0)));
-    world.spawn(light(Vec3::new(1.0, 0.35, -1.4), 2500.0, Color::WHITE));
-    world.spawn(light(Vec3::new(-1.0, 0.35, -1.4), 2500.0, Color::WHITE));
+    world.spawn(light(Vec3::new(0.62, 0.5, -1.5), 3000.0, Color::WHITE));
+    world.spawn(light(Vec3::new(-0.62, 0.5, -1.5), 3000.0, Color::WHITE));
 }
 
 /// Hair of so few drawn strands is drawn whole.

@@ -97,8 +97,31 @@ pub fn close_fit() -> Result<Vec<(HairCollider, Transform)>> {
         (Vec3::new(0.1006, -0.2731, -0.0075), Vec3::new(0.0292, -0.3033, 0.0106), 0.0364),
     ];
     let finer = half.into_iter().flat_map(both).map(|(a, b, radius)| limb(a, b, radius));
-    body()?.into_iter().map(Ok).chain(finer).collect()
+    let balls = BALLS.into_iter().flat_map(|(middle, radius)| {
+        let both = [middle, middle * Vec3::new(-1.0, 1.0, 1.0)];
+        both.map(|at| Ok((HairCollider::sphere(radius)?, Transform::from_translation(at))))
+    });
+    body()?.into_iter().map(Ok).chain(finer).chain(balls).collect()
 }
+
+/// On both sides balls that touch the skin from within, 0.4 to 1 mm below it: before the ears, where hair hangs
+/// over bare skin, then all around.
+const BALLS: [(Vec3, f32); 14] = [
+    (Vec3::new(0.0042, -0.0096, 0.0115), 0.0745),
+    (Vec3::new(0.0035, 0.0108, -0.0393), 0.0751),
+    (Vec3::new(0.0201, -0.0179, 0.0329), 0.0539),
+    (Vec3::new(0.0326, 0.0165, 0.0557), 0.0298),
+    (Vec3::new(0.0222, -0.0309, 0.0480), 0.0427),
+    (Vec3::new(0.0007, -0.0469, 0.0037), 0.0698),
+    (Vec3::new(0.0097, 0.0189, -0.0387), 0.0686),
+    (Vec3::new(0.0067, 0.0013, -0.0433), 0.0705),
+    (Vec3::new(0.0128, 0.0097, 0.0264), 0.0595),
+    (Vec3::new(0.0298, 0.0165, -0.0686), 0.0430),
+    (Vec3::new(0.0220, -0.0137, 0.0243), 0.0552),
+    (Vec3::new(0.0286, -0.0110, -0.0673), 0.0432),
+    (Vec3::new(0.0286, -0.0111, 0.0140), 0.0514),
+    (Vec3::new(0.0290, -0.0243, 0.0485), 0.0390),
+];
 
 /// The share of the skin that hair hides where it is dense.
 pub const COVER: f32 = 0.85;
