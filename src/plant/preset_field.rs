@@ -98,7 +98,7 @@ impl HairPreset {
         let (aside, forward, high) = (off.dot(right), off.dot(front), off.dot(up));
         match self {
             Self::Fringe if in_fringe(aside, forward) => {
-                return front + right * (0.9 * aside) - up * 0.2;
+                return front + right * (1.6 * aside) - up * 0.2;
             }
             Self::Undercut => {
                 // To the right on top, from its edge at the left on; down at the sides.
@@ -126,7 +126,7 @@ impl HairPreset {
         }
         // Beside the fringe down over the temples.
         let before = smooth(forward / 0.4);
-        let beside = right * (0.5 * side) - front * 0.1 - up * 0.9;
+        let beside = right * (0.5 * side) + front * 0.1 - up * 0.9;
         back * (1.0 - before) + beside * before
     }
 
@@ -184,7 +184,7 @@ const FRINGE_LENGTH: f32 = 0.37;
 /// Whether hair at a place, in heights of the head, hangs over the forehead: a triangle that begins
 /// before the crown.
 fn in_fringe(aside: f32, forward: f32) -> bool {
-    forward > 0.22 && aside.abs() < 0.16 + 0.8 * (forward - 0.22)
+    forward > 0.22 && aside.abs() < 0.24 + 1.1 * (forward - 0.22)
 }
 
 /// The upper edge of a beard: elevation (°) over the angle from the face (°), both at the middle of the
