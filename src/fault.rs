@@ -43,10 +43,12 @@ struct Source(Option<Arc<dyn Error + Send + Sync>>);
 pub enum FaultKind {
     /// A setting or a tool's value outside its range: the nearest valid value is used.
     Setting,
-    /// A strand became non-finite and was put back to the state of the previous substep.
+    /// A strand became non-finite and was put back to the state of the previous substep. What moves it is out
+    /// of proportion: look for forces and settings outside their safe range, and for roots or colliders that
+    /// jump without [`Hair::teleport`](crate::Hair::teleport).
     PutBack,
     /// A strand's stored state was not finite, had torn, or no step from it succeeded: its pose was
-    /// rebuilt from root, lengths and bonds.
+    /// rebuilt from root, lengths and bonds. Causes are those of [`PutBack`](Self::PutBack).
     Rebuilt,
     /// A strand points to a hair that does not exist or carries no `Hair`: it is left out.
     NoHair,

@@ -335,6 +335,8 @@ fn heed(world: &mut World, hair: Entity, report: &Measured, strand: Option<usize
         )
     };
     let others = count.saturating_sub(1);
-    let message = format!("a strand on the GPU {what} (and {others} times more)");
+    let message = format!(
+        "a strand on the GPU {what} (and {others} times more): check forces, and roots and colliders that jump"
+    );
     world.write_message(HairFault::new(kind, message).of(named));
 }

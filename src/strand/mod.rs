@@ -482,13 +482,15 @@ impl Strand {
             self.rest();
             HairFault::new(
                 FaultKind::PutBack,
-                "the strand became non-finite and was put back to its last finite state, at rest",
+                "the strand became non-finite and was put back to its last finite state, at rest: \
+                 check forces, and roots and colliders that jump",
             )
         } else {
             self.pose(bonds.into_iter().map(|o| if o.is_finite() { o } else { Vec3::ZERO }));
             HairFault::new(
                 FaultKind::Rebuilt,
-                "no step from the strand's state succeeded; its rest pose was rebuilt from root and bonds",
+                "no step from the strand's state succeeded; its rest pose was rebuilt from root and bonds: \
+                 check forces, and roots and colliders that jump",
             )
         };
         let again = core::mem::replace(&mut self.fault_cooldown, FAULT_COOLDOWN) > 0;
