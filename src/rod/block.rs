@@ -92,8 +92,8 @@ pub struct BlockLanes {
     /// Of these the ones that a node touches first, if any.
     pub(super) close_obstacles: Vec<CloseObstacles>,
     pub(super) obstacle_balls: Vec<ObstacleBalls>,
-    /// Of a strand whose root lies in an obstacle, the length from the root on that nothing pushes out: it is too
-    /// short to get out (m). Written by `choose_near`, for the direct method only.
+    /// Of a strand whose root lies in an obstacle, the length from the root on that may be inside: it is too short
+    /// to get out (m). Written by `choose_near`, for the direct method only.
     pub(crate) sunk: Lane,
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
     pub root_from: [Lane; 4],

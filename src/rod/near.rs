@@ -17,9 +17,9 @@ const FASTER: f32 = 1.5;
 /// velocity: most nodes go less far in a substep.
 const CLOSE: f32 = 0.25;
 
-/// Length from a sunk root on that nothing pushes out, as a multiple of the root's depth: what is longer gets out
-/// up to 48° aslant.
-const ROOM: f32 = 1.5;
+/// Length from a sunk root on within which a strand may be inside, as a multiple of the root's depth: it gets out
+/// up to 60° aslant.
+pub(super) const ROOM: f32 = 2.0;
 
 /// Finds the obstacles that each node may touch in a substep of `dt`, so that its passes skip the
 /// others: on a head of dozens of solids most nodes are near one or none. Also how far each strand is sunk

@@ -282,7 +282,7 @@ pub(super) enum PushOut {
     WithFriction,
 }
 
-/// Moves `p` out of the solid where it is inside, with Coulomb friction along the surface relative
+/// Moves `p` out of the solid where it is deeper inside than `allowed` (m), with Coulomb friction along the surface relative
 /// to the start position `from` moved with the surface.
 ///
 /// Returns the new position and the solid's normal there, or zero for lanes that are not inside;
@@ -294,6 +294,7 @@ pub(super) fn push_out<S: Simd>(
     from: V3<f32x16<S>>,
     friction: f32x16<S>,
     clearance: f32,
+    allowed: f32x16<S>,
     way: PushOut,
 ) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
     let simd = p.x.simd;
@@ -304,6 +305,7 @@ pub(super) fn push_out<S: Simd>(
         return None;
     }
     let (normal, depth) = obstacle.solid.depth(p, clearance);
+    let depth = depth - allowed;
     let inside = Real::lt(zero, depth);
     if inside.to_bitmask() == 0 {
         return None;

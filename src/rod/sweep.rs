@@ -116,6 +116,7 @@ fn sweeps<S: Simd, const P: usize>(
                             obstacles,
                             Grip::WHOLE,
                             all,
+                            None,
                         );
                     }
                     if i + 1 == edges {
@@ -133,6 +134,7 @@ fn sweeps<S: Simd, const P: usize>(
                                 obstacles,
                                 Grip::WHOLE,
                                 all,
+                                None,
                             );
                         }
                     }

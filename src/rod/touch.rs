@@ -2,38 +2,72 @@
 
 use super::{
     block::{BlockLanes, EdgeLanes, NodeLanes},
+    near::ROOM,
     obstacle::{NearObstacles, Obstacle, PushOut, continuous_collision, push_out},
 };
-use crate::lanes::{LANES, Lane, Real, V3, load, load3, store3};
+use crate::lanes::{LANES, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// Which nodes can get out of obstacles that their strand's root lies in: 1, else 0. Those nearer to the root than
-/// it is deep would only be torn off it.
-pub(super) struct Free<S: Simd> {
+/// Goes along strands and tells of each node how deep it may be in an obstacle that its root lies in: nearer to the
+/// root than that is deep, it cannot get out without being torn off.
+pub(super) struct Sinking<S: Simd> {
+    root: V3<f32x16<S>>,
     sunk: f32x16<S>,
     any: bool,
     along: f32x16<S>,
 }
 
-impl<S: Simd> Free<S> {
+impl<S: Simd> Sinking<S> {
     #[inline(always)]
-    pub(super) fn new(simd: S, sunk: &Lane) -> Self {
-        Self { sunk: load(simd, sunk), any: *sunk != [0.0; LANES], along: f32x16::splat(simd, 0.0) }
+    pub(super) fn new(simd: S, b: &BlockLanes) -> Self {
+        let root = b.nodes.first().map(|n| load3(simd, &n.p));
+        let zero = f32x16::splat(simd, 0.0);
+        Self {
+            root: root.unwrap_or(V3::new(zero, zero, zero)),
+            sunk: load(simd, &b.sunk),
+            any: b.sunk != [0.0; LANES],
+            along: zero,
+        }
     }
 
-    /// Of node `i`; to be asked node after node.
+    /// Of node `i`, to be asked node after node; `None` where it may be nowhere inside.
     #[inline(always)]
-    pub(super) fn at(&mut self, edges: &[EdgeLanes], i: usize) -> f32x16<S> {
-        let simd = self.sunk.simd;
-        let one = f32x16::splat(simd, 1.0);
+    pub(super) fn at(&mut self, edges: &[EdgeLanes], i: usize) -> Option<Sunk<S>> {
         if !self.any {
-            return one;
+            return None;
         }
+        let simd = self.sunk.simd;
         let is_sunk = Real::lt(self.along, self.sunk);
+        let along = self.along;
         if let Some(edge) = edges.get(i) {
             self.along += load(simd, &edge.l);
         }
-        Real::select(is_sunk, f32x16::splat(simd, 0.0), one)
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        let sunk = Sunk { root: self.root, along, lanes: Real::select(is_sunk, one, zero) };
+        is_sunk.any_true().then_some(sunk)
+    }
+}
+
+/// A node near a sunk root.
+pub(super) struct Sunk<S: Simd> {
+    root: V3<f32x16<S>>,
+    along: f32x16<S>,
+    lanes: f32x16<S>,
+}
+
+impl<S: Simd> Sunk<S> {
+    /// How deep it may be in this obstacle.
+    #[inline(always)]
+    pub(super) fn allowed(&self, obstacle: &Obstacle, clearance: f32) -> f32x16<S> {
+        let zero = f32x16::splat(self.along.simd, 0.0);
+        if obstacle.solid.is_clear(self.root, clearance) {
+            return zero;
+        }
+        let depth = obstacle.solid.depth(self.root, clearance).1;
+        // Less and less, at last by as much as it gets out straight on: so it may first go along another one.
+        let along = self.along * f32x16::splat(zero.simd, 1.0 / ROOM);
+        let left = self.lanes * (depth - along * along / depth);
+        Real::select(Real::lt(zero, depth) & Real::lt(zero, left), left, zero)
     }
 }
 
@@ -52,36 +86,38 @@ pub(crate) fn predict_nodes<S: Simd>(
         || {
             let zero = f32x16::splat(simd, 0.0);
             b.has_fast_nodes = false;
-            let mut free = Free::new(simd, &b.sunk);
+            let mut sinking = Sinking::new(simd, b);
             for (i, (n, near)) in b.nodes.iter_mut().zip(&b.near_obstacles).enumerate() {
-                let w = load(simd, &n.w);
-                let held = Real::lt(w * free.at(&b.edges, i), f32x16::splat(simd, 1e-12));
+                let sunk = sinking.at(&b.edges, i);
+                let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
                 let p = load3(simd, &n.p);
                 // Nodes that begin inside an obstacle are placed on its surface before the step, so
                 // that the push-out adds no velocity. A moving obstacle does add its own.
                 let mut from = p;
                 for o in near.of(obstacles) {
                     let start = o.moved_with(from);
+                    let allowed = sunk.as_ref().map_or(zero, |s| s.allowed(o, clearance));
                     if let Some((out, _)) =
-                        push_out(o, start, start, zero, clearance, PushOut::Shortest)
+                        push_out(o, start, start, zero, clearance, allowed, PushOut::Shortest)
                     {
                         from = V3::select(held, from, from + (out - start));
                     }
                 }
                 let v = load3(simd, &n.v);
                 // Held nodes have their start in `from` and their target in `p`.
-                let led = Real::lt(w, f32x16::splat(simd, 1e-12));
-                let start_position = V3::select(led, load3(simd, &n.from), from);
+                let start_position = V3::select(held, load3(simd, &n.from), from);
                 store3(&mut n.from, start_position);
                 let mut to = (v + gain).scale_add(dt, from);
                 for o in near.of(obstacles) {
                     if let Some((before, _)) =
                         continuous_collision(o, o.moved_with(from), to, clearance)
                     {
-                        (to, b.has_fast_nodes) = (V3::select(held, to, before), true);
+                        let allowed = sunk.as_ref().map_or(zero, |s| s.allowed(o, clearance));
+                        let stays = held | Real::lt(zero, allowed);
+                        (to, b.has_fast_nodes) = (V3::select(stays, to, before), true);
                     }
                 }
-                store3(&mut n.p, V3::select(led, p, to));
+                store3(&mut n.p, V3::select(held, p, to));
             }
         },
     );
@@ -131,9 +167,9 @@ pub(super) fn contacts_with<S: Simd>(
             }
             let mut touched = f32x16::splat(simd, 0.0);
             let near = b.near_obstacles.iter().zip(&b.close_obstacles);
-            let mut free = Free::new(simd, &b.sunk);
+            let mut sinking = Sinking::new(simd, b);
             for (i, (n, (near, close))) in b.nodes.iter_mut().zip(near).enumerate() {
-                let lanes = lanes * free.at(&b.edges, i);
+                let sunk = sinking.at(&b.edges, i);
                 if *near == NearObstacles::NONE {
                     continue;
                 }
@@ -146,8 +182,8 @@ pub(super) fn contacts_with<S: Simd>(
                     n.rests_on = Default::default();
                     continue;
                 }
-                let touches =
-                    touch(simd, n, near, b.has_fast_nodes, clearance, obstacles, grip, lanes);
+                let fast = b.has_fast_nodes;
+                let touches = touch(simd, n, near, fast, clearance, obstacles, grip, lanes, sunk);
                 touched = Real::max(touched, touches);
             }
             touched.store_array(&mut b.touched);
@@ -167,6 +203,7 @@ pub(super) fn touch<S: Simd>(
     obstacles: &[Obstacle],
     grip: Grip,
     lanes: f32x16<S>,
+    sunk: Option<Sunk<S>>,
 ) -> f32x16<S> {
     simd.vectorize(
         #[inline(always)]
@@ -183,20 +220,23 @@ pub(super) fn touch<S: Simd>(
             );
             let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
             for o in near.of(obstacles) {
+                let allowed = sunk.as_ref().map_or(zero, |s| s.allowed(o, clearance));
                 // Tunnelling has to be stopped in every pass: the shortest way out may be on the wrong
                 // side.
                 if has_fast_nodes
                     && let Some((before, normal)) =
                         continuous_collision(o, o.moved_with(from), p, clearance)
                 {
-                    p = V3::select(held, p, before);
+                    let may_be = Real::lt(zero, allowed);
+                    p = V3::select(held | may_be, p, before);
                     let stopped = Real::lt(zero, normal.dot(normal) * lanes);
+                    let stopped = stopped & !may_be;
                     rests_on = V3::select(stopped, normal, rests_on);
                     touched = Real::select(stopped, one, touched);
                 }
                 let friction = grip * f32x16::splat(simd, o.friction);
                 if let Some((out, normal)) =
-                    push_out(o, p, from, friction, clearance, PushOut::WithFriction)
+                    push_out(o, p, from, friction, clearance, allowed, PushOut::WithFriction)
                 {
                     p = V3::select(held, p, out);
                     let pushed = Real::lt(zero, normal.dot(normal) * lanes);

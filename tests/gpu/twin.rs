@@ -264,7 +264,7 @@ impl Twin {
         self.v.iter_mut().for_each(|v| *v -= gravity * dt);
         self.support.fill(DVec3::ZERO);
         let depths = r.obstacles.iter().map(|o| depth(&o.solid, self.p[0], r.skin).1);
-        self.sunk = 1.5 * depths.fold(0.0, f64::max);
+        self.sunk = 2.0 * depths.fold(0.0, f64::max);
         self.surface(r);
         let mut theta = THETA;
         self.fall(r, dt * theta);
@@ -282,26 +282,31 @@ impl Twin {
         theta
     }
 
-    fn is_sunk(&self, i: usize) -> bool {
-        self.l[..i].iter().sum::<f64>() < self.sunk
+    /// How deep node `i` may be in an obstacle that the root lies in.
+    fn allowed(&self, o: &Obstacle, i: usize, skin: f32) -> f64 {
+        let along = self.l[..i].iter().sum::<f64>();
+        if along >= self.sunk {
+            return 0.0;
+        }
+        let deep = depth(&o.solid, self.p[0], skin).1;
+        if deep > 0.0 { (deep - (along / 2.0).powi(2) / deep).max(0.0) } else { 0.0 }
     }
 
     fn fall(&mut self, r: &SubstepRecord, ahead: f64) {
         self.sweeps = false;
         for i in 1..=self.edges() {
             let mut from = self.p[i];
-            let obstacles = if self.is_sunk(i) { &[][..] } else { &r.obstacles[..] };
-            for o in obstacles {
-                let start = along(o, from);
-                if let Some((out, _)) = push_out(o, start, start, 0.0, r.skin, false) {
+            for o in &r.obstacles {
+                let (start, may_be) = (along(o, from), self.allowed(o, i, r.skin));
+                if let Some((out, _)) = push_out(o, start, start, 0.0, (r.skin, may_be), false) {
                     from += out - start;
                 }
             }
             self.from[i] = from;
             let mut to = from + (self.v[i] + d(r.gravity) * ahead) * ahead;
-            for o in obstacles {
+            for o in &r.obstacles {
                 let (place, fast, _) = swept(o, along(o, from), to, r.skin);
-                to = place;
+                to = if self.allowed(o, i, r.skin) > 0.0 { to } else { place };
                 self.sweeps |= fast;
             }
             self.p[i] = to;
@@ -311,9 +316,10 @@ impl Twin {
 
     fn surface(&mut self, r: &SubstepRecord) {
         let mut deepest = f64::NEG_INFINITY;
-        for (_, p) in self.p.iter().enumerate().skip(1).filter(|(i, _)| !self.is_sunk(*i)) {
+        for (i, p) in self.p.iter().enumerate().skip(1) {
             for o in &r.obstacles {
-                deepest = deepest.max(depth(&o.solid, along(o, *p), r.skin).1);
+                let deep = depth(&o.solid, along(o, *p), r.skin).1 - self.allowed(o, i, r.skin);
+                deepest = deepest.max(deep);
             }
         }
         if self.l[0] * 0.25 < deepest {
@@ -336,11 +342,7 @@ impl Twin {
     fn contacts(&mut self, r: &SubstepRecord, resting: f64, others: f64) {
         self.touched = false;
         for i in 0..=self.edges() {
-            if self.is_sunk(i) {
-                self.support[i] = DVec3::ZERO;
-            } else {
-                self.touch(r, i, resting, others);
-            }
+            self.touch(r, i, resting, others);
         }
     }
 
@@ -348,14 +350,16 @@ impl Twin {
         let grip = if self.support[i] == DVec3::ZERO { others } else { resting };
         let (mut p, mut support) = (self.p[i], DVec3::ZERO);
         for o in &r.obstacles {
+            let may_be = self.allowed(o, i, r.skin);
             if self.sweeps {
                 let (place, _, normal) = swept(o, along(o, self.from[i]), p, r.skin);
-                if normal != DVec3::ZERO {
+                if normal != DVec3::ZERO && may_be <= 0.0 {
                     (p, support) = (if i == 0 { p } else { place }, normal);
                 }
             }
             let friction = grip * f64::from(o.friction);
-            if let Some((out, normal)) = push_out(o, p, self.from[i], friction, r.skin, true) {
+            let layer = (r.skin, may_be);
+            if let Some((out, normal)) = push_out(o, p, self.from[i], friction, layer, true) {
                 (p, support) = (if i == 0 { p } else { out }, normal);
             }
         }
@@ -660,15 +664,17 @@ fn depth(solid: &Solid, p: DVec3, skin: f32) -> (DVec3, f64) {
     }
 }
 
+/// Out of a solid with a skin, where it is deeper than it may be.
 fn push_out(
     o: &Obstacle,
     p: DVec3,
     from: DVec3,
     friction: f64,
-    skin: f32,
+    (skin, may_be): (f32, f64),
     slides: bool,
 ) -> Option<(DVec3, DVec3)> {
     let (normal, depth) = depth(&o.solid, p, skin);
+    let depth = depth - may_be;
     if depth <= 0.0 {
         return None;
     }

@@ -375,16 +375,16 @@ fn surface() {
         return;
     }
     var deepest = -3.0e38;
-    var along = 0.0;
+    var next = 0.0;
     for (var i = 0u; i <= edges; i++) {
         let n = node(i);
-        let is_sunk = along < sunk;
-        along = farther(along, i);
-        if is_sunk || is_held(n.w) {
+        let along = next;
+        next = farther(along, i);
+        if is_held(n.w) {
             continue;
         }
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
-            deepest = max(deepest, depth_in(o, taken_along(o, n.xyz)).w);
+            deepest = max(deepest, depth_in(o, taken_along(o, n.xyz)).w - allowed(o, along));
         }
     }
     if !(edge(0u).x * DEEP < deepest) {

@@ -7,15 +7,15 @@ const ELLIPSOID: u32 = 3u;
 
 // How far a node may go in a substep, in ways that its velocity alone would take it.
 const FASTER: f32 = 1.5;
-// Length from a sunk root on that nothing pushes out, in depths of the root.
-const ROOM: f32 = 1.5;
+// Length from a sunk root on within which a strand may be inside, in depths of the root.
+const ROOM: f32 = 2.0;
 
 // Obstacles that this strand may touch in this substep; whether a node moves so fast against one that it
 // might pass through; whether a node rests on one.
 var<private> near: vec4<u32>;
 var<private> sweeps: bool;
 var<private> touched: bool;
-// Length from the root on that cannot get out of what the root lies in, 0 where it lies in nothing.
+// Length from the root on that may be in what the root lies in, 0 where it lies in nothing.
 var<private> sunk: f32;
 
 fn is_near(o: u32) -> bool {
@@ -162,15 +162,33 @@ struct Met {
     normal: vec3<f32>,
 }
 
-// Out of the solid the shortest way, then back along the surface by Coulomb friction.
-fn push_out(o: u32, p: vec3<f32>, start: vec3<f32>, friction: f32, slides: bool) -> Met {
+// How deep a node so far from the root may be in an obstacle that the root lies in.
+fn allowed(o: u32, along: f32) -> f32 {
+    if !(along < sunk) {
+        return 0.0;
+    }
+    let root = node(0u).xyz;
+    if is_beyond(o, root, record.skin) {
+        return 0.0;
+    }
+    let depth = depth_in(o, root).w;
+    if !(depth > 0.0) {
+        return 0.0;
+    }
+    let way = along * (1.0 / ROOM);
+    return max(depth - way * way / depth, 0.0);
+}
+
+// Out of the solid the shortest way where it is deeper than `may_be`, then back along the surface by Coulomb
+// friction.
+fn push_out(o: u32, p: vec3<f32>, start: vec3<f32>, friction: f32, may_be: f32, slides: bool) -> Met {
     // Most nodes that may touch it in the substep do not in this pass.
     if record.obstacle[o].kind == ELLIPSOID && is_beyond(o, p, record.skin) {
         return Met(p, false, vec3(0.0));
     }
     let found = depth_in(o, p);
     let normal = found.xyz;
-    let depth = found.w;
+    let depth = found.w - may_be;
     if !(depth > 0.0) {
         return Met(p, false, vec3(0.0));
     }
@@ -264,7 +282,9 @@ fn choose_near() {
     }
     let root = node(0u).xyz;
     for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
-        sunk = max(sunk, ROOM * depth_in(o, root).w);
+        if !is_beyond(o, root, record.skin) {
+            sunk = max(sunk, ROOM * depth_in(o, root).w);
+        }
     }
 }
 
@@ -276,24 +296,19 @@ fn farther(along: f32, i: u32) -> f32 {
 // p* = p + (v + gain) dt, or on what is in the way.
 fn predict_nodes(dt: f32, gain: vec3<f32>) {
     sweeps = false;
-    var along = 0.0;
+    var next = 0.0;
     for (var i = 0u; i <= edges; i++) {
         let n = node(i);
-        let is_sunk = along < sunk;
-        along = farther(along, i);
+        let along = next;
+        next = farther(along, i);
         if is_held(n.w) {
             continue;
         }
         // What begins inside is set on the surface before the step, which gives it no velocity.
         var start = n.xyz;
-        if is_sunk {
-            set_start(i, start);
-            set_node(i, fma(moving(i).xyz + gain, vec3(dt), start), n.w);
-            continue;
-        }
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
             let taken = taken_along(o, start);
-            let out = push_out(o, taken, taken, 0.0, false);
+            let out = push_out(o, taken, taken, 0.0, allowed(o, along), false);
             if out.meets {
                 start += out.place - taken;
             }
@@ -302,7 +317,7 @@ fn predict_nodes(dt: f32, gain: vec3<f32>) {
         var to = fma(moving(i).xyz + gain, vec3(dt), start);
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
             let swept = continuous_collision(o, taken_along(o, start), to);
-            to = swept.place;
+            to = select(swept.place, to, allowed(o, along) > 0.0);
             sweeps = sweeps || swept.fast;
         }
         set_node(i, to, n.w);
@@ -318,17 +333,13 @@ fn contacts(resting: f32, others: f32) {
     }
     var along = 0.0;
     for (var i = 0u; i <= edges; i++) {
-        if along < sunk {
-            set_support(i, vec3(0.0));
-        } else {
-            touch(i, resting, others);
-        }
+        touch(i, along, resting, others);
         along = farther(along, i);
     }
 }
 
-// The same of one node.
-fn touch(i: u32, resting: f32, others: f32) {
+// The same of one node, so far from the root.
+fn touch(i: u32, along: f32, resting: f32, others: f32) {
     let n = node(i);
     let held = is_held(n.w);
     let start = start_of(i);
@@ -337,15 +348,16 @@ fn touch(i: u32, resting: f32, others: f32) {
     var p = n.xyz;
     var rests_on = vec3(0.0);
     for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
+        let may_be = allowed(o, along);
         if sweeps {
             let swept = continuous_collision(o, taken_along(o, start), p);
-            if swept.passes {
+            if swept.passes && !(may_be > 0.0) {
                 p = select(swept.place, p, held);
                 rests_on = swept.normal;
                 touched = true;
             }
         }
-        let out = push_out(o, p, start, grip * record.obstacle[o].friction, true);
+        let out = push_out(o, p, start, grip * record.obstacle[o].friction, may_be, true);
         if out.meets {
             p = select(out.place, p, held);
             rests_on = out.normal;

@@ -193,7 +193,7 @@ fn sweep_over() {
         }
         set_node(i, n1.xyz + c.p1, n1.w);
         if touching {
-            touch(i, 1.0, 1.0);
+            touch(i, 0.0, 1.0, 1.0);
         }
         before = renormalized(q + c.q);
         n1 = vec4(n2.xyz + c.p2, n2.w);
@@ -201,7 +201,7 @@ fn sweep_over() {
     set_frame(edges - 1u, before);
     set_node(edges, n1.xyz, n1.w);
     if touching {
-        touch(edges, 1.0, 1.0);
+        touch(edges, 0.0, 1.0, 1.0);
     }
 }
 

@@ -95,7 +95,7 @@ use super::{
     near::choose_near,
     obstacle::Obstacle,
     stiffness::REFERENCE_GRAVITY,
-    touch::{Free, Grip, contacts, contacts_with, predict_nodes},
+    touch::{Grip, Sinking, contacts, contacts_with, predict_nodes},
 };
 use crate::lanes::{
     LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,
@@ -370,18 +370,20 @@ fn leave_obstacles<S: Simd>(
         #[inline(always)]
         || {
             let mut deepest = f32x16::splat(simd, f32::NEG_INFINITY);
-            let mut free = Free::new(simd, &b.sunk);
+            let mut sinking = Sinking::new(simd, b);
             for (i, (n, near)) in b.nodes.iter().zip(&b.near_obstacles).enumerate() {
-                let free = free.at(&b.edges, i);
+                let sunk = sinking.at(&b.edges, i);
                 for o in near.of(obstacles) {
                     let start = o.moved_with(load3(simd, &n.p));
                     // Most nodes are outside of most.
                     if o.solid.is_clear(start, params.clearance) {
                         continue;
                     }
-                    let w = load(simd, &n.w) * free;
-                    let held = Real::lt(w, f32x16::splat(simd, 1e-12));
-                    let (_, depth) = o.solid.depth(start, params.clearance);
+                    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+                    let (_, mut depth) = o.solid.depth(start, params.clearance);
+                    if let Some(sunk) = &sunk {
+                        depth -= sunk.allowed(o, params.clearance);
+                    }
                     deepest = Real::select(held, deepest, Real::max(deepest, depth));
                 }
             }

@@ -481,7 +481,7 @@ mod tests {
             let (out, beyond) = dispatch!(Level::new(), simd => {
                 let p = crate::lanes::splat3(simd, at);
                 let lit = |value: f32| f32x16::splat(simd, value);
-                let out = push_out(&obstacle, p, p, lit(0.0), 0.0, PushOut::Shortest).map(|(out, _)| {
+                let out = push_out(&obstacle, p, p, lit(0.0), 0.0, lit(0.0), PushOut::Shortest).map(|(out, _)| {
                     let lane = |x: f32x16<_>| x[5];
                     Vec3::new(lane(out.x), lane(out.y), lane(out.z))
                 });

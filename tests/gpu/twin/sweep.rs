@@ -117,7 +117,7 @@ impl Twin {
             let mut from = self.p[i];
             for o in &r.obstacles {
                 let start = along(o, from);
-                if let Some((out, _)) = push_out(o, start, start, 0.0, r.skin, false) {
+                if let Some((out, _)) = push_out(o, start, start, 0.0, (r.skin, 0.0), false) {
                     from += out - start;
                 }
             }
