@@ -206,6 +206,63 @@ fn a_beard_and_short_hair_are_worn_together_without_a_fault() {
     }
     assert!(ticks > 60, "both are worn");
     assert_eq!(faults(&mut app), []);
+    let mut strands = app.world_mut().query::<&Strand>();
+    let strains = strands.iter(app.world()).map(Strand::peak_strain);
+    let (count, most) =
+        strains.fold((0, 0.0), |(n, most), s| (n + i32::from(s > 0.05), s.max(most)));
+    println!("strained by {most} at most, {count} by more than a twentieth");
+}
+
+/// Where the head's mesh wears a beard, hair that is swapped is worn on the head all the same, and not on an eye. Hair and colliders go with the mesh that wears them.
+#[test]
+fn hair_beside_a_beard_is_swapped_and_a_beard_goes_with_its_mesh() {
+    let mut app = app_with_meshes(60.0);
+    let (root, _, skin) = figure(&mut app, &body::mesh_of(0.012, 0.012));
+    let world = app.world_mut();
+    let skeleton = world.get::<SkinnedMesh>(skin).unwrap().clone();
+    let eye = Sphere::new(0.012).mesh().ico(3).unwrap();
+    let mut eye = eye.translated_by(skeleton::SKULL + Vec3::new(0.03, 0.0, 0.09));
+    let count = eye.count_vertices();
+    let head = u16::try_from(skeleton::HEAD).unwrap();
+    let joints = vec![[head, 0, 0, 0]; count];
+    eye.insert_attribute(Mesh::ATTRIBUTE_JOINT_INDEX, VertexAttributeValues::Uint16x4(joints));
+    eye.insert_attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT, vec![[1.0f32, 0.0, 0.0, 0.0]; count]);
+    let eye = world.resource_mut::<Assets<Mesh>>().add(eye);
+    world.spawn((Mesh3d(eye), skeleton, ChildOf(root)));
+    let wear = |app: &mut App, on: Entity, preset: HairPreset| {
+        app.world_mut().entity_mut(on).insert(WearHair::new(preset).facing(Dir3::Z));
+        let mut found = None;
+        for _ in 0..6000 {
+            app.update();
+            let mut worn = app.world_mut().query::<(Entity, &WornHair)>();
+            let of = worn
+                .iter(app.world())
+                .find(|(_, worn)| worn.wearer == on && worn.preset() == Some(preset));
+            found = of.map(|(hair, _)| hair);
+            if found.is_some() {
+                break;
+            }
+            sleep(Duration::from_millis(2));
+        }
+        found.expect("hair is worn")
+    };
+    let _ = wear(&mut app, root, HairPreset::Short);
+    let beard = wear(&mut app, skin, HairPreset::Beard);
+    let bob = wear(&mut app, root, HairPreset::Bob);
+    let world = app.world();
+    let members = || world.get::<Strands>(bob).unwrap().iter();
+    let roots = || members().map(|s| world.get::<Strand>(s).unwrap().positions()[0]);
+    let high = roots().map(|p| p.y).fold(f32::MIN, f32::max);
+    let low = roots().map(|p| p.y).fold(f32::MAX, f32::min);
+    assert!(high - low > 0.1, "on an eye: {low} to {high} m");
+    let colliders =
+        |app: &mut App| app.world_mut().query::<&HairCollider>().iter(app.world()).count();
+    let before = colliders(&mut app);
+    app.world_mut().despawn(skin);
+    (0..3).for_each(|_| app.update());
+    assert!(app.world().get_entity(beard).is_err());
+    assert!(colliders(&mut app) < before);
+    assert_eq!(faults(&mut app), []);
 }
 
 /// Of simulated and of drawn strands, standing and walking.

@@ -43,14 +43,22 @@ impl<S: Simd> Sinking<S> {
             self.along += load(simd, &edge.l);
         }
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        let sunk = Sunk { root: self.root, along, lanes: Real::select(is_sunk, one, zero) };
+        let deepest = self.sunk * f32x16::splat(simd, 1.0 / ROOM);
+        let lanes = Real::select(is_sunk, one, zero);
+        let sunk = Sunk { root: self.root, deepest, along, lanes };
         is_sunk.any_true().then_some(sunk)
     }
 }
 
+/// Where a root lies in several obstacles, as in balls that together are a head, it has to get out of the deepest:
+/// those in which it is at least half as deep allow as much.
+const SHARE: f32 = 2.0;
+
 /// A node near a sunk root.
 pub(super) struct Sunk<S: Simd> {
     root: V3<f32x16<S>>,
+    /// The root's depth in what it is deepest in.
+    deepest: f32x16<S>,
     along: f32x16<S>,
     lanes: f32x16<S>,
 }
@@ -64,10 +72,12 @@ impl<S: Simd> Sunk<S> {
             return zero;
         }
         let depth = obstacle.solid.depth(self.root, clearance).1;
+        let share = depth * f32x16::splat(zero.simd, SHARE) / self.deepest;
+        let share = Real::min(share, f32x16::splat(zero.simd, 1.0));
         // Less and less, at last by as much as it gets out straight on: so it may first go along another one.
         let along = self.along * f32x16::splat(zero.simd, 1.0 / ROOM);
-        let left = self.lanes * (depth - along * along / depth);
-        Real::select(Real::lt(zero, depth) & Real::lt(zero, left), left, zero)
+        let left = self.lanes * (self.deepest - along * along / self.deepest) * share;
+        Real::select(Real::lt(zero, left), left, zero)
     }
 }
 

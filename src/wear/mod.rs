@@ -40,6 +40,7 @@ impl Plugin for WearPlugin {
             .register_type::<HairWorn>()
             .register_type::<HairNotWorn>()
             .register_required_components::<WearHair, systems::Wearing>()
+            .add_observer(systems::leave)
             .add_systems(
                 HairFrame,
                 (systems::take_off, systems::detect_changes, systems::find_heads, systems::put_on)

@@ -67,6 +67,19 @@ impl Worn {
     }
 }
 
+/// Removes the hair of a wearer that is despawned: a beard hangs on a bone, which stays when the mesh that wears it
+/// goes.
+pub(super) fn leave(
+    gone: On<Remove, Wearing>,
+    mut commands: Commands,
+    mut wearers: Query<&mut Wearing>,
+) {
+    let wearing = wearers.get_mut(gone.entity).ok();
+    if let Some(worn) = wearing.and_then(|mut wearing| wearing.worn.take()) {
+        worn.take_off(&mut commands);
+    }
+}
+
 /// Removes the hair of entities without [`WearHair`].
 pub(super) fn take_off(
     mut commands: Commands,

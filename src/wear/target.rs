@@ -130,11 +130,13 @@ impl Characters<'_, '_> {
     }
 
     /// An entity and all its descendants, level by level, without hair and, unless `with_wearers`,
-    /// without descendants of other wearers.
+    /// without descendants of other wearers. A mesh on this one's skeleton is no other, whatever it wears itself.
     fn below(&self, top: Entity, with_wearers: bool) -> Vec<Entity> {
         let (mut found, mut todo) = (Vec::new(), VecDeque::from([top]));
         while let Some(entity) = todo.pop_front() {
-            let is_other = !with_wearers && self.wearers.contains(entity);
+            let is_other = !with_wearers
+                && self.wearers.contains(entity)
+                && !self.is_on_skeleton_of(entity, top);
             if entity != top && (is_other || self.hairs.contains(entity)) {
                 continue;
             }
@@ -143,6 +145,16 @@ impl Characters<'_, '_> {
             todo.extend(children.into_iter().flatten());
         }
         found
+    }
+
+    /// Whether an entity is a mesh that moves with bones which are below `top` and not below itself.
+    fn is_on_skeleton_of(&self, mesh: Entity, top: Entity) -> bool {
+        let Ok((_, Some(skin))) = self.skins.get(mesh) else { return false };
+        let is_below = |of: Entity, top: Entity| {
+            let parent = |of: &Entity| self.places.get(*of).ok()?.1.map(ChildOf::parent);
+            core::iter::successors(Some(of), parent).any(|at| at == top)
+        };
+        skin.joints.first().is_some_and(|bone| is_below(*bone, top) && !is_below(*bone, mesh))
     }
 
     fn name(&self, entity: Entity) -> Option<&str> {

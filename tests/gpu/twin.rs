@@ -288,8 +288,9 @@ impl Twin {
         if along >= self.sunk {
             return 0.0;
         }
-        let deep = depth(&o.solid, self.p[0], skin).1;
-        if deep > 0.0 { (deep - (along / 2.0).powi(2) / deep).max(0.0) } else { 0.0 }
+        let deepest = self.sunk / 2.0;
+        let share = (2.0 * depth(&o.solid, self.p[0], skin).1 / deepest).clamp(0.0, 1.0);
+        (deepest - (along / 2.0).powi(2) / deepest).max(0.0) * share
     }
 
     fn fall(&mut self, r: &SubstepRecord, ahead: f64) {

@@ -9,6 +9,8 @@ const ELLIPSOID: u32 = 3u;
 const FASTER: f32 = 1.5;
 // Length from a sunk root on within which a strand may be inside, in depths of the root.
 const ROOM: f32 = 2.0;
+// Of several obstacles that a root lies in those in which it is at least half as deep as in the deepest allow as much.
+const SHARE: f32 = 2.0;
 
 // Obstacles that this strand may touch in this substep; whether a node moves so fast against one that it
 // might pass through; whether a node rests on one.
@@ -171,12 +173,10 @@ fn allowed(o: u32, along: f32) -> f32 {
     if is_beyond(o, root, record.skin) {
         return 0.0;
     }
-    let depth = depth_in(o, root).w;
-    if !(depth > 0.0) {
-        return 0.0;
-    }
+    let deepest = sunk * (1.0 / ROOM);
+    let share = min(depth_in(o, root).w * SHARE / deepest, 1.0);
     let way = along * (1.0 / ROOM);
-    return max(depth - way * way / depth, 0.0);
+    return max((deepest - way * way / deepest) * share, 0.0);
 }
 
 // Out of the solid the shortest way where it is deeper than `may_be`, then back along the surface by Coulomb
