@@ -34,7 +34,7 @@ const THREADS: usize = 8;
 /// Passes of a thread's loops in a substep at most, about: each round moves nodes out and restores lengths, and the
 /// rest of the substep looks at an obstacle so many times.
 fn passes(nodes: usize, obstacles: usize, rounds: usize) -> usize {
-    (rounds * (obstacles + 4) + 200 * (obstacles + 1)) * nodes
+    (rounds * (2 * obstacles + 4) + 225 * (obstacles + 1)) * nodes
 }
 
 fn random_obstacle(random: &mut Random, kind: u32, moves: bool) -> Obstacle {
