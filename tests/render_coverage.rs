@@ -84,8 +84,8 @@ fn strands_cover_as_much_from_near_and_far_and_at_their_tips() {
     }
 }
 
-/// T6. Its aims, 6 % in the mean and 25 % at worst, are out of reach where four samples hold strands a tenth of
-/// a pixel wide. Ribbons that were a pixel wide and covered all of it had 0.205 and 1.03 of their own finer
+/// T6. Its aims, 6 % in the mean and 25 % at worst, are missed: four samples hold strands a tenth of a pixel wide.
+/// Ribbons that were a pixel wide and covered all of it had 0.205 and 1.03 of their own finer
 /// picture, of which nine tenths of the tips were missing.
 #[test]
 fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {

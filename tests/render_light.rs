@@ -240,8 +240,8 @@ fn hair_under_a_sky_has_its_melanins_colour() {
     }
 }
 
-/// T7, without temporal antialiasing; its aim is 4 % with four samples, and opaque ribbons had 0.114. As the camera moves by sixteenths of a
-/// pixel, a picture differs from the finer one of the same view by about as much each time: it does not flicker.
+/// T7, without temporal antialiasing; its aim is 4 % with four samples, and opaque ribbons had 11.4 %. As the
+/// camera moves by sixteenths of a pixel, a picture differs from the finer one of the same view by about as much each time: it does not flicker.
 #[test]
 fn hair_does_not_flicker_as_the_camera_creeps() {
     const SIZE: u32 = 48;

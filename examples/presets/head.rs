@@ -74,8 +74,7 @@ fn both((a, b, radius): (Vec3, Vec3, f32)) -> [(Vec3, Vec3, f32); 2] {
     [(a, b, radius), (mirrored(a), mirrored(b), radius)]
 }
 
-/// [`body`] for pictures from near: what it leaves free below the skin is filled, to 1.2 mm below its
-/// vertices. Otherwise hair
+/// [`body`] for pictures from near: what it leaves free below the skin is filled. Otherwise hair
 /// beside the face sinks into cheeks and shoulders by up to 18 mm, and skin shows through it.
 pub fn close_fit() -> Result<Vec<(HairCollider, Transform)>> {
     let half = [

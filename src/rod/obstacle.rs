@@ -282,8 +282,8 @@ pub(super) enum PushOut {
     WithFriction,
 }
 
-/// Moves `p` out of the solid where it is deeper inside than `allowed` (m), with Coulomb friction along the surface relative
-/// to the start position `from` moved with the surface.
+/// Moves `p` out of the solid where it is deeper inside than `allowed` (m), with Coulomb friction along the
+/// surface relative to the start position `from` moved with the surface.
 ///
 /// Returns the new position and the solid's normal there, or zero for lanes that are not inside;
 /// `None` where no lane is.

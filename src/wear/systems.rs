@@ -67,8 +67,8 @@ impl Worn {
     }
 }
 
-/// Removes the hair of a wearer that is despawned: a beard hangs on a bone, which stays when the mesh that wears it
-/// goes.
+/// Removes the hair of what no longer wears any, or is despawned: a beard hangs on a bone, which stays when the mesh
+/// that wears it goes.
 pub(super) fn leave(
     gone: On<Remove, Wearing>,
     mut commands: Commands,
@@ -80,15 +80,12 @@ pub(super) fn leave(
     }
 }
 
-/// Removes the hair of entities without [`WearHair`].
+/// Ends the wearing of entities without [`WearHair`].
 pub(super) fn take_off(
     mut commands: Commands,
-    mut bald: Query<(Entity, &mut Wearing), Without<WearHair>>,
+    bald: Query<Entity, (With<Wearing>, Without<WearHair>)>,
 ) {
-    for (entity, mut wearing) in &mut bald {
-        if let Some(worn) = wearing.worn.take() {
-            worn.take_off(&mut commands);
-        }
+    for entity in &bald {
         commands.entity(entity).remove::<Wearing>();
     }
 }

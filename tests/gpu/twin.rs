@@ -89,7 +89,7 @@ pub struct Twin {
     drying: Vec<f64>,
     touched: bool,
     sweeps: bool,
-    /// Length from the root on that cannot get out of what the root lies in.
+    /// Length from the root on that may be in what the root lies in.
     sunk: f64,
     /// Rounds in which it got out of what it was deep in.
     pub rounds: usize,
