@@ -106,6 +106,13 @@ fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
     let (Some(plain), Some(fine)) = (head(256), head(1024)) else {
         return;
     };
+    if let Some(folder) = std::env::var_os("REFERENCE") {
+        let save = |picture: &offscreen::Picture, name: &str| {
+            picture.save(std::path::Path::new(&folder).join(name).to_str().unwrap());
+        };
+        save(&plain, "plain.png");
+        save(&fine, "fine.png");
+    }
     let (mut errors, mut sum) = (Vec::new(), 0.0);
     for y in 0..256 {
         for x in 0..256 {

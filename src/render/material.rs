@@ -4,6 +4,7 @@ use super::{
     HairFollowers, HairView,
     ribbon_mesh::{CORNER, DrawOrder},
     rings::Rings,
+    smoothing::Marks,
     thickness::{PIECES, Thickness},
 };
 use crate::look::{HairDye, HairLook, HairShading, MAX_LAYERS};
@@ -58,12 +59,20 @@ pub(super) struct RibbonKey {
     kajiya_kay: bool,
     /// Whether rings are computed once a frame.
     pub(super) expanded: bool,
+    /// Whether lit hair marks its pixels, see `HairSmoothing`.
+    marked: bool,
 }
 
 impl RibbonKey {
-    pub(super) fn new(look: &HairLook, view: HairView, expanded: bool) -> Self {
+    pub(super) fn new(
+        look: &HairLook,
+        view: HairView,
+        expanded: bool,
+        Marks(marked): Marks,
+    ) -> Self {
         let heat = !matches!(view, HairView::Natural | HairView::Guides);
-        Self { heat, kajiya_kay: !heat && look.shading == HairShading::KajiyaKay, expanded }
+        let kajiya_kay = !heat && look.shading == HairShading::KajiyaKay;
+        Self { heat, kajiya_kay, expanded, marked: marked && !heat }
     }
 
     pub(super) fn is_lit(self) -> bool {
@@ -232,7 +241,7 @@ impl Material for RibbonMaterial {
         descriptor.vertex.buffers = vec![layout.0.get_layout(&[CORNER.at_shader_location(0)])?];
         descriptor.primitive.cull_mode = None;
         let samples = ShaderDefVal::UInt("HAIR_SAMPLES".into(), descriptor.multisample.count);
-        let RibbonKey { heat, kajiya_kay, expanded } = key.bind_group_data;
+        let RibbonKey { heat, kajiya_kay, expanded, marked } = key.bind_group_data;
         descriptor.vertex.shader_defs.push(samples.clone());
         descriptor.vertex.shader_defs.extend(expanded.then(|| "HAIR_EXPANDED".into()));
         if let Some(fragment) = &mut descriptor.fragment {
@@ -240,6 +249,7 @@ impl Material for RibbonMaterial {
             defs.push(samples);
             defs.extend(heat.then(|| "HAIR_HEAT".into()));
             defs.extend(kajiya_kay.then(|| "HAIR_KAJIYA_KAY".into()));
+            defs.extend(marked.then(|| "HAIR_MARKED".into()));
         }
         Ok(())
     }

@@ -23,8 +23,9 @@
 //! smoothly; [`HairDetail::strands`] is the switch for slow graphics devices. For a look of your own write a material around [`HairBuffers`].
 //!
 //! Vertex shaders read storage buffers, so this needs WebGPU or native, not WebGL2. Strands thinner
-//! than a pixel are drawn one pixel wide and cover a share of its samples equal to their coverage;
-//! without MSAA they cover some pixels and others not, which temporal antialiasing smooths.
+//! than a pixel are drawn one pixel wide and cover a share of its samples equal to their coverage; without
+//! MSAA they cover some pixels and others not. Pictures are averaged along the strands afterwards, so that
+//! this is not seen as grain: see [`HairSmoothing`].
 //!
 //! # Against path tracing
 //!
@@ -73,6 +74,7 @@ mod rings;
 mod scatter;
 mod screen_share;
 mod sets;
+mod smoothing;
 mod solids;
 mod streaks;
 mod thickness;
@@ -90,6 +92,7 @@ pub(crate) use elsewhere::DrawnElsewhere;
 pub use follower_roots::{FollowerRoot, FollowerRoots};
 pub use followers::HairFollowers;
 pub use sets::HairRenderSystems;
+pub use smoothing::HairSmoothing;
 pub use view::{HairView, STRAIN_FULL, heat};
 pub use wet_look::WetLook;
 #[cfg(feature = "gpu")]
@@ -169,6 +172,7 @@ impl Plugin for HairRenderPlugin {
         );
         // The drawn child inherits it. An error says that the user has required it already.
         let _ = app.try_register_required_components::<Hair, Visibility>();
+        let _ = app.try_register_required_components::<Camera3d, HairSmoothing>();
     }
 
     /// In `finish`, because all render plugins have been added by then, in any order.
@@ -189,6 +193,7 @@ impl Plugin for HairRenderPlugin {
         load_shader_library!(app, "rings.wgsl");
         load_shader_library!(app, "ribbon.wgsl");
         load_shader_library!(app, "coverage.wgsl");
+        load_shader_library!(app, "marks.wgsl");
         load_shader_library!(app, "fibre.wgsl");
         load_shader_library!(app, "passage.wgsl");
         load_shader_library!(app, "volume/counts.wgsl");
@@ -212,6 +217,7 @@ impl Plugin for HairRenderPlugin {
                 .before(VisibilitySystems::VisibilityPropagate)
                 .before(AssetEventSystems),
         );
+        smoothing::plugin(app);
         upload::plugin(app);
         expand::plugin(app);
         volume::plugin(app);

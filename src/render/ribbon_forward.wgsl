@@ -7,7 +7,10 @@
 #import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
 #import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, facing_normal, safe_normalize}
 #import bevy_keratin::strands::{ribbon, streaks, density_at}
-#import bevy_keratin::coverage::covered_samples
+#import bevy_keratin::coverage::{covered_samples, SAMPLES}
+#ifdef HAIR_MARKED
+#import bevy_keratin::marks::marked
+#endif
 #import bevy_keratin::shading::{Fibre, lit_hair}
 #import bevy_keratin::volume::volume_place
 
@@ -73,6 +76,15 @@ fn heat(value: f32) -> vec3<f32> {
     return select(pow((srgb + 0.055) / 1.055, vec3(2.4)), srgb / 12.92, srgb <= vec3(0.04045));
 }
 
+#ifdef HAIR_MARKED
+// The direction of a strand on the screen, whose y goes down.
+fn way_on_screen(fibre: Fibre) -> vec2<f32> {
+    let place = position_world_to_clip(fibre.position);
+    let along = view.clip_from_world * vec4(fibre.tangent, 0.0);
+    return (along.xy * place.w - place.xy * along.w) * view.viewport.zw * vec2(1.0, -1.0);
+}
+#endif
+
 @fragment
 fn fragment(in: ForwardVertex) -> Fragment {
     var out: Fragment;
@@ -110,6 +122,9 @@ fn fragment(in: ForwardVertex) -> Fragment {
     pbr.world_position = vec4(in.world_position, 1.0);
     pbr.material.flags |= STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT;
     out.color = main_pass_post_lighting_processing(pbr, vec4(lit, 1.0));
+#ifdef HAIR_MARKED
+    out.color.a = marked(way_on_screen(fibre), vec2<i32>(in.position.xy), f32(SAMPLES));
+#endif
 #endif
     return out;
 }

@@ -1,0 +1,91 @@
+// Hair averaged along its strands (Cabral & Leedom 1993, "Imaging vector fields using line integral convolution").
+
+#import bevy_core_pipeline::fullscreen_vertex_shader::FullscreenVertexOutput
+#import bevy_keratin::marks::{Mark, mark_of}
+
+// Of `smoothing.rs`.
+struct Smooth {
+    reach: f32,
+    across: f32,
+    samples: f32,
+}
+
+@group(0) @binding(0) var screen: texture_2d<f32>;
+@group(0) @binding(2) var<uniform> told: Smooth;
+
+fn inside(pixel: vec2<i32>) -> vec2<i32> {
+    return clamp(pixel, vec2(0), vec2<i32>(textureDimensions(screen)) - 1);
+}
+
+// Of a pixel and the eight around it: hair may have lit no sample of one, and means tell its way better.
+fn mark_around(pixel: vec2<i32>) -> Mark {
+    var sum = Mark(0.0, vec2(0.0));
+    for (var i = 0; i < 9; i++) {
+        let at = inside(pixel + vec2(i % 3 - 1, i / 3 - 1));
+        let mark = mark_of(textureLoad(screen, at, 0).a, at, told.samples);
+        sum.share += mark.share;
+        sum.twice += mark.twice;
+    }
+    return sum;
+}
+
+struct Sum {
+    color: vec3<f32>,
+    // Of it, that is hair.
+    share: f32,
+    // The color of pixels without hair, and how much of the weight they have.
+    bare: vec4<f32>,
+    weight: f32,
+}
+
+fn joined(a: Sum, b: Sum) -> Sum {
+    return Sum(a.color + b.color, a.share + b.share, a.bare + b.bare, a.weight + b.weight);
+}
+
+// A pixel, and a little of those beside it.
+fn line(pixel: vec2<i32>, across: vec2<i32>) -> Sum {
+    var sum = Sum(vec3(0.0), 0.0, vec4(0.0), 0.0);
+    for (var side = -1; side <= 1; side++) {
+        let at = inside(pixel + side * across);
+        let color = textureLoad(screen, at, 0);
+        let share = mark_of(color.a, at, told.samples).share;
+        let weight = select(told.across, 1.0, side == 0);
+        let bare = select(vec4(0.0), weight * vec4(color.rgb, 1.0), share == 0.0);
+        sum = joined(sum, Sum(weight * color.rgb, weight * share, bare, weight));
+    }
+    return sum;
+}
+
+@fragment
+fn fragment(in: FullscreenVertexOutput) -> @location(0) vec4<f32> {
+    let pixel = vec2<i32>(in.position.xy);
+    let own = textureLoad(screen, pixel, 0);
+    let here = mark_around(pixel);
+    if here.share == 0.0 {
+        return own;
+    }
+    // One pixel along the longer axis.
+    let angle = select(0.5 * atan2(here.twice.y, here.twice.x), 0.0, dot(here.twice, here.twice) <= 1e-12);
+    let way = vec2(cos(angle), sin(angle));
+    let step = way / max(abs(way.x), abs(way.y));
+    let across = select(vec2(1, 0), vec2(0, 1), abs(way.x) > abs(way.y));
+    var sum = line(pixel, across);
+    var was_bare = false;
+    // As far one way as the other, or hair would grow past its edges; thin hair has gaps of a pixel.
+    for (var i = 1; i <= i32(told.reach); i++) {
+        let ahead = line(vec2<i32>(floor(in.position.xy + f32(i) * step)), across);
+        let back = line(vec2<i32>(floor(in.position.xy - f32(i) * step)), across);
+        let is_bare = min(ahead.share, back.share) == 0.0;
+        if is_bare && was_bare {
+            break;
+        }
+        was_bare = is_bare;
+        sum = joined(sum, joined(ahead, back));
+    }
+    var color = sum.color / sum.weight;
+    // Where no strand is, the ground of this place is seen, not of those along the line.
+    if mark_of(own.a, pixel, told.samples).share == 0.0 {
+        color += (1.0 - sum.share / sum.weight) * (own.rgb - sum.bare.rgb / max(sum.bare.w, 1e-6));
+    }
+    return vec4(color, 1.0);
+}
