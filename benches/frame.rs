@@ -10,6 +10,7 @@
 mod offscreen;
 
 use bevy::{
+    core_pipeline::prepass::DepthPrepass,
     diagnostic::DiagnosticsStore,
     prelude::*,
     render::{
@@ -18,7 +19,7 @@ use bevy::{
         renderer::{RenderAdapterInfo, RenderDevice},
     },
 };
-use bevy_keratin::{prelude::*, render::HairSmoothing};
+use bevy_keratin::prelude::*;
 use offscreen::{Offscreen, head_of_guides};
 use std::time::Instant;
 
@@ -28,6 +29,7 @@ struct Row {
     followers: u32,
     strands: f32,
     smoothing: f32,
+    prepass: bool,
 }
 
 fn main() {
@@ -40,23 +42,25 @@ fn main() {
         device.name, device.device_type, device.backend, device.driver_info
     );
     let is_software = format!("{:?}", device.device_type) == "Cpu";
-    let near = |followers| Row { heads: 1, followers, strands: 1.0, smoothing: 3.0 };
+    let near =
+        |followers| Row { heads: 1, followers, strands: 1.0, smoothing: 3.0, prepass: false };
     let rows = match is_software {
         true => vec![Row { heads: 0, ..near(0) }, near(1500)],
         false => vec![
             Row { heads: 0, ..near(0) },
             near(12_000),
             near(40_000),
-            near(100_000),
-            Row { strands: 0.25, ..near(100_000) },
+            Row { prepass: true, ..near(40_000) },
             Row { smoothing: 0.0, ..near(40_000) },
+            Row { strands: 0.25, ..near(40_000) },
+            near(100_000),
             Row { heads: 10, ..near(12_000) },
             Row { heads: 100, ..near(12_000) },
         ],
     };
-    println!("heads  followers  drawn  smoothing  ms a frame");
+    println!("heads  followers  drawn  smoothing  prepass  ms a frame");
     for row in rows {
-        time(&row, if is_software { (320, 180, 2) } else { (1920, 1080, 60) });
+        time(&row, if is_software { (320, 180, 2) } else { (1920, 1080, 20) });
     }
 }
 
@@ -73,6 +77,9 @@ fn time(row: &Row, (width, height, frames): (u32, u32, u32)) {
     let camera = scene.camera;
     let world = scene.app.world_mut();
     world.entity_mut(camera).insert(HairSmoothing { reach: row.smoothing, ..default() });
+    if row.prepass {
+        world.entity_mut(camera).insert(DepthPrepass);
+    }
     for head in 0..row.heads {
         let (x, z) = (head as f32 % side, (head as f32 / side).floor());
         let place = Transform::from_xyz(0.35 * (x - 0.5 * (side - 1.0)), 0.0, -0.35 * z);
@@ -97,8 +104,8 @@ fn time(row: &Row, (width, height, frames): (u32, u32, u32)) {
     let start = Instant::now();
     (0..frames).for_each(|_| frame(&mut scene));
     let each = start.elapsed().as_secs_f64() * 1e3 / f64::from(frames);
-    let Row { heads, followers, strands, smoothing } = row;
-    println!("{heads:5}  {followers:9}  {strands:5}  {smoothing:9}  {each:10.2}");
+    let Row { heads, followers, strands, smoothing, prepass } = row;
+    println!("{heads:5}  {followers:9}  {strands:5}  {smoothing:9}  {prepass:7}  {each:10.2}");
     let store = scene.app.world().resource::<DiagnosticsStore>();
     let mut passes: Vec<(String, f64)> = store
         .iter()

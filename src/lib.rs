@@ -99,7 +99,7 @@ pub mod prelude {
     pub use crate::plant::HairPreset;
     #[cfg(feature = "render")]
     #[doc(hidden)]
-    pub use crate::render::{HairDetail, HairFollowers, HairView};
+    pub use crate::render::{HairDetail, HairFollowers, HairSmoothing, HairView};
     #[cfg(feature = "save")]
     #[doc(hidden)]
     pub use crate::save::{

@@ -6,7 +6,7 @@ mod offscreen;
 
 use bevy::{
     core_pipeline::{
-        core_3d::AlphaMask3d,
+        core_3d::{AlphaMask3d, Opaque3d},
         prepass::{AlphaMask3dPrepass, DepthPrepass, MotionVectorPrepass, NormalPrepass},
     },
     light::CascadeShadowConfigBuilder,
@@ -38,7 +38,7 @@ fn draws<I: BinnedPhaseItem>(scene: &Offscreen, drawn: Entity) -> (usize, usize)
 }
 
 #[test]
-fn a_hair_is_one_draw_call_in_every_view() {
+fn a_hair_is_one_draw_call_in_every_view_and_one_of_depth_before_it_in_pictures() {
     let Some(mut scene) = Offscreen::new(64, 64) else {
         return;
     };
@@ -67,7 +67,12 @@ fn a_hair_is_one_draw_call_in_every_view() {
     scene.app.update();
     assert_eq!(scene.unready_pipelines(), Vec::<String>::new());
     for hair in hairs {
-        let drawn = scene.app.world().get::<HairBuffers>(hair).unwrap().drawn;
+        let world = scene.app.world();
+        let drawn = world.get::<HairBuffers>(hair).unwrap().drawn;
+        let depth = world.get::<Children>(drawn).unwrap()[0];
+        // What is seen is found out first, then lit.
+        assert_eq!(draws::<Opaque3d>(&scene, depth), (1, 1));
+        assert_eq!(draws::<Shadow>(&scene, depth), (0, 0));
         let camera = draws::<AlphaMask3d>(&scene, drawn);
         let prepass = draws::<AlphaMask3dPrepass>(&scene, drawn);
         let (shadow, views) = draws::<Shadow>(&scene, drawn);

@@ -73,8 +73,8 @@ pub fn light(app: &mut App) {
     let world = app.world_mut();
     world.spawn(light(Vec3::new(1.0, 1.1, 1.2), 8000.0, Color::srgb(1.0, 0.95, 0.88)));
     world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2000.0, Color::srgb(0.8, 0.88, 1.0)));
-    world.spawn(light(Vec3::new(0.62, 0.5, -1.5), 3000.0, Color::WHITE));
-    world.spawn(light(Vec3::new(-0.62, 0.5, -1.5), 3000.0, Color::WHITE));
+    world.spawn(light(Vec3::new(0.62, 0.5, -1.5), 2000.0, Color::WHITE));
+    world.spawn(light(Vec3::new(-0.62, 0.5, -1.5), 2000.0, Color::WHITE));
 }
 
 /// Hair of so few drawn strands is drawn whole.

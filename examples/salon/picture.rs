@@ -11,14 +11,18 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use core::fmt::Display;
-use std::{io, path::Path};
+use std::{
+    io,
+    path::Path,
+    time::{Duration, Instant},
+};
 
 /// The picture that came back.
 #[derive(Resource, Default)]
 struct Captured(Option<Image>);
 
-/// How often the app may update until a picture comes back.
-const PATIENCE: u32 = 100;
+/// How long a picture may take: a software device draws it slowly, a graphics card answers late.
+const PATIENCE: Duration = Duration::from_secs(120);
 /// Drawn updates until meshes, textures and pipelines are on the device.
 const WARM_UP: u32 = 2;
 
@@ -75,7 +79,8 @@ impl Pictures {
                 captured.0 = Some(shot.image.clone());
             },
         );
-        for _ in 0..PATIENCE {
+        let start = Instant::now();
+        while start.elapsed() < PATIENCE {
             app.update();
             // Once is enough; the rest is waiting.
             activate(app, self.camera, false);

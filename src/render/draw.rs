@@ -31,6 +31,7 @@ use bevy::{
     prelude::*,
     render::{renderer::RenderDevice, storage::ShaderBuffer},
 };
+use core::marker::PhantomData;
 
 /// Packed data of a hair, kept to reuse the allocations.
 #[derive(Component, Clone, Debug, Default)]
@@ -213,6 +214,7 @@ pub(super) fn pack(
         let mut add = |bytes: &[u8]| shader_buffers.add(buffer(bytes));
         let nodes = add(bytemuck::cast_slice(&packed.nodes));
         let material = RibbonMaterial {
+            draw: PhantomData,
             key,
             ribbon: packed.ribbon,
             // Any buffer stands for rings that nobody reads.

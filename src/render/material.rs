@@ -15,18 +15,43 @@ use bevy::{
     prelude::*,
     render::{
         render_resource::{
-            AsBindGroup, RenderPipelineDescriptor, ShaderType, SpecializedMeshPipelineError,
+            AsBindGroup, CompareFunction, RenderPipelineDescriptor, ShaderType,
+            SpecializedMeshPipelineError,
         },
         storage::ShaderBuffer,
     },
     shader::{ShaderDefVal, ShaderRef},
 };
+use core::marker::PhantomData;
+
+/// Which of a camera's two draws of hair a material is for.
+pub(super) trait Draw: TypePath + Clone + core::fmt::Debug + Send + Sync + 'static {
+    /// Whether it is the one that finds out which strands are seen.
+    const DEPTH: bool;
+}
+
+/// Lit hair, in all passes. In a camera's picture it shades no more than what is seen.
+#[derive(TypePath, Clone, Debug)]
+pub(super) struct Lit;
+
+/// Depth before it, in the picture alone: shading strands that others hide would cost several times as much.
+#[derive(TypePath, Clone, Debug)]
+pub(super) struct Depth;
+
+impl Draw for Lit {
+    const DEPTH: bool = false;
+}
+
+impl Draw for Depth {
+    const DEPTH: bool = true;
+}
 
 /// The material of drawn hair; made and kept up to date from [`HairLook`], [`HairFollowers`] and
 /// [`HairView`], which a game edits instead.
 #[derive(Asset, AsBindGroup, TypePath, Clone, Debug)]
 #[bind_group_data(RibbonKey)]
-pub(super) struct RibbonMaterial {
+pub(super) struct RibbonMaterial<D: Draw = Lit> {
+    pub(super) draw: PhantomData<D>,
     pub(super) key: RibbonKey,
     #[uniform(0)]
     pub(super) ribbon: Ribbon,
@@ -80,9 +105,18 @@ impl RibbonKey {
     }
 }
 
-impl From<&RibbonMaterial> for RibbonKey {
-    fn from(material: &RibbonMaterial) -> Self {
+impl<D: Draw> From<&RibbonMaterial<D>> for RibbonKey {
+    fn from(material: &RibbonMaterial<D>) -> Self {
         material.key
+    }
+}
+
+impl RibbonMaterial {
+    /// That of the draw before.
+    pub(super) fn depth(&self) -> RibbonMaterial<Depth> {
+        let Self { key, ribbon, nodes, guides, strands, streaks, frame, rings, .. } = self.clone();
+        let (draw, volume) = (PhantomData, None);
+        RibbonMaterial { draw, key, ribbon, nodes, guides, strands, streaks, frame, rings, volume }
     }
 }
 
@@ -205,7 +239,17 @@ impl Ribbon {
 const FORWARD: &str = "embedded://bevy_keratin/render/ribbon_forward.wgsl";
 const PREPASS: &str = "embedded://bevy_keratin/render/ribbon_prepass.wgsl";
 
-impl Material for RibbonMaterial {
+impl RibbonMaterial<Depth> {
+    /// Whether it is what `lit` makes.
+    pub(super) fn draws(&self, lit: &RibbonMaterial) -> bool {
+        let Self { key, ribbon, nodes, guides, strands, streaks, frame, rings, .. } = self;
+        (key, ribbon) == (&lit.key, &lit.ribbon)
+            && [nodes, guides, strands] == [&lit.nodes, &lit.guides, &lit.strands]
+            && [streaks, frame, rings] == [&lit.streaks, &lit.frame, &lit.rings]
+    }
+}
+
+impl<D: Draw> Material for RibbonMaterial<D> {
     fn vertex_shader() -> ShaderRef {
         FORWARD.into()
     }
@@ -223,9 +267,17 @@ impl Material for RibbonMaterial {
     }
 
     /// Makes Bevy run the fragment stage in the prepasses and shadow maps too, where strands cover
-    /// their share of the samples. No alpha test is done.
+    /// their share of the samples. No alpha test is done. Opaque things are drawn before those with a mask.
     fn alpha_mode(&self) -> AlphaMode {
-        AlphaMode::Mask(0.5)
+        if D::DEPTH { AlphaMode::Opaque } else { AlphaMode::Mask(0.5) }
+    }
+
+    fn enable_prepass() -> bool {
+        !D::DEPTH
+    }
+
+    fn enable_shadows() -> bool {
+        !D::DEPTH
     }
 
     fn opaque_render_method(&self) -> OpaqueRendererMethod {
@@ -242,6 +294,12 @@ impl Material for RibbonMaterial {
         descriptor.primitive.cull_mode = None;
         let samples = ShaderDefVal::UInt("HAIR_SAMPLES".into(), descriptor.multisample.count);
         let RibbonKey { heat, kajiya_kay, expanded, marked } = key.bind_group_data;
+        let in_picture = descriptor.label.as_deref() != Some("prepass_pipeline");
+        let depth_known = in_picture && !D::DEPTH;
+        if let Some(depth) = descriptor.depth_stencil.as_mut().filter(|_| depth_known) {
+            depth.depth_compare = Some(CompareFunction::Equal);
+            depth.depth_write_enabled = Some(false);
+        }
         descriptor.vertex.shader_defs.push(samples.clone());
         descriptor.vertex.shader_defs.extend(expanded.then(|| "HAIR_EXPANDED".into()));
         if let Some(fragment) = &mut descriptor.fragment {
@@ -250,6 +308,7 @@ impl Material for RibbonMaterial {
             defs.extend(heat.then(|| "HAIR_HEAT".into()));
             defs.extend(kajiya_kay.then(|| "HAIR_KAJIYA_KAY".into()));
             defs.extend(marked.then(|| "HAIR_MARKED".into()));
+            defs.extend(D::DEPTH.then(|| "HAIR_DEPTH".into()));
         }
         Ok(())
     }

@@ -1,7 +1,8 @@
 //! Draws the hair: simulated strands and many followers between them, from one buffer of nodes.
 //!
-//! Each [`Hair`] is one draw call (one more for each shadow map), of a mesh that all hair with as many
-//! strands shares. Once a frame its nodes are packed, interpolated by the fixed clock's overstep, and
+//! Each [`Hair`] is two draw calls in a camera's picture (one more for each prepass and shadow map), of a mesh that
+//! all hair with as many strands shares: the first finds out which strands are in front, the second lights those
+//! alone. Once a frame its nodes are packed, interpolated by the fixed clock's overstep, and
 //! written to the GPU; all else happens there. A compute shader expands them once a frame in which the hair
 //! is seen: curves through the nodes, followers between guides, rings along each strand. All passes read
 //! these, and make ribbons of them that face the camera or the light (where they were in the frame before,
@@ -57,6 +58,7 @@ pub mod fibre;
 
 mod beads;
 mod buffers;
+mod depth;
 mod detail;
 mod draw;
 mod drawn_strand;
@@ -112,7 +114,7 @@ use bevy::{
     render::{RenderApp, erased_render_asset::ErasedRenderAssetPlugin, storage::ShaderBuffer},
     shader::load_shader_library,
 };
-use material::RibbonMaterial;
+use material::{Depth, Lit, RibbonMaterial};
 use sets::{Interpolate, supported};
 
 /// Draws the hair. Part of [`HairPlugins`](crate::HairPlugins), which may be added before or after
@@ -205,10 +207,15 @@ impl Plugin for HairRenderPlugin {
         embedded_asset!(app, "volume/fill.wgsl");
         embedded_asset!(app, "volume/settle.wgsl");
         embedded_asset!(app, "volume/march.wgsl");
-        app.add_plugins(MaterialPlugin::<RibbonMaterial>::default());
+        app.add_plugins((
+            MaterialPlugin::<RibbonMaterial<Lit>>::default(),
+            MaterialPlugin::<RibbonMaterial<Depth>>::default(),
+        ));
         // Bevy does not call `finish` of plugins added in `finish`.
-        ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial>>::default().finish(app);
-        let draw = (draw::appear, draw::pack, frame::prepare).chain().run_if(supported);
+        ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial<Lit>>>::default().finish(app);
+        ErasedRenderAssetPlugin::<MeshMaterial3d<RibbonMaterial<Depth>>>::default().finish(app);
+        let draw =
+            (draw::appear, draw::pack, frame::prepare, depth::follow).chain().run_if(supported);
         app.init_resource::<ribbon_mesh::RibbonMeshes>();
         app.add_systems(PostUpdate, draw.in_set(HairRenderSystems)).configure_sets(
             PostUpdate,

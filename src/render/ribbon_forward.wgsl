@@ -1,4 +1,4 @@
-// Hair as the camera sees it.
+// Hair as the camera sees it, in two draws: depth, by lots, and light on what of it is in front.
 
 #import bevy_pbr::view_transformations::position_world_to_clip
 #import bevy_pbr::mesh_functions
@@ -38,7 +38,9 @@ struct ForwardVertex {
 
 struct Fragment {
     @location(0) color: vec4<f32>,
+#ifdef HAIR_DEPTH
     @builtin(sample_mask) samples: u32,
+#endif
 }
 
 @vertex
@@ -88,11 +90,14 @@ fn way_on_screen(fibre: Fibre) -> vec2<f32> {
 @fragment
 fn fragment(in: ForwardVertex) -> Fragment {
     var out: Fragment;
+#ifdef HAIR_DEPTH
     out.samples = covered_samples(in.share.x * saturate(in.share.y), in.seed.x, in.position.xy);
     if out.samples == 0u {
         discard;
     }
-#ifdef HAIR_HEAT
+    // Seen for the frames until the other draw's shader is compiled.
+    out.color = vec4(0.05 * exp(-ribbon.root_absorption), 1.0);
+#else ifdef HAIR_HEAT
     out.color = vec4(heat(in.along.y), 1.0);
 #else
     var fibre: Fibre;

@@ -29,13 +29,13 @@ pub struct HairSmoothing {
     /// How many pixels to either side, 0 to 8; 0 is off. The cost is in proportion. Default 3.
     pub reach: f32,
     /// How much pixels beside these count, across the strands, 0 to 1: 0 keeps every line of them crisp, 1 is as soft
-    /// as it is smooth. Default 0.3.
+    /// as it is smooth. Default 0.4.
     pub across: f32,
 }
 
 impl Default for HairSmoothing {
     fn default() -> Self {
-        Self { reach: 3.0, across: 0.3 }
+        Self { reach: 3.0, across: 0.4 }
     }
 }
 

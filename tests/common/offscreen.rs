@@ -186,6 +186,12 @@ impl Offscreen {
         camera.insert(Transform::from_translation(from).looking_at(at, Vec3::Y));
     }
 
+    /// From now on pictures are not averaged along strands.
+    pub fn leave_grain(&mut self) {
+        let smoothing = HairSmoothing { reach: 0.0, ..default() };
+        self.app.world_mut().entity_mut(self.camera).insert(smoothing);
+    }
+
     /// Draws the world as it is now.
     pub fn draw(&mut self) -> Picture {
         // Assets arrive over the first frames; then one frame is caught.
