@@ -85,8 +85,8 @@ fn strands_cover_as_much_from_near_and_far_and_at_their_tips() {
 }
 
 /// T6. Its aims, 6 % in the mean and 25 % at worst, are missed: four samples hold strands a tenth of a pixel wide.
-/// Ribbons that were a pixel wide and covered all of it had 0.205 and 1.03 of their own finer
-/// picture, of which nine tenths of the tips were missing.
+/// Ribbons that were a pixel wide and covered all of it had 0.205 and 1.03 of their own finer picture, of which nine
+/// tenths of the tips were missing; twice as good would be 0.10 and 0.51. Without `HairSmoothing` it is 0.244 and 1.91.
 #[test]
 fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
     let head = |size: u32| {
@@ -129,7 +129,72 @@ fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
     let error = errors.iter().sum::<f32>() / errors.len() as f32 / mean;
     let worst = errors[errors.len() * 99 / 100] / mean;
     println!("error of one pixel {error:.3}, of the worst in a hundred {worst:.3} of the mean");
-    assert!(error < 0.3 && worst < 2.1);
+    assert!(error < 0.125 && worst < 1.1);
+}
+
+/// Marks of hair in the alpha channel are gone afterwards, and nothing but hair is averaged.
+#[test]
+fn smoothing_changes_hair_alone_and_leaves_no_mark() {
+    const SIZE: u32 = 128;
+    let Some(mut scene) = Offscreen::new(SIZE, SIZE) else {
+        return;
+    };
+    scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
+    let camera = scene.camera;
+    let world = scene.app.world_mut();
+    let ball = world.resource_mut::<Assets<Mesh>>().add(Sphere::new(0.06));
+    let skin = world.resource_mut::<Assets<StandardMaterial>>().add(Color::srgb(0.8, 0.3, 0.2));
+    for i in 0..8 {
+        let at = Vec3::new(0.06 * i as f32 - 0.2, if i % 2 == 0 { 0.1 } else { -0.1 }, -0.1);
+        let parts = (Mesh3d(ball.clone()), MeshMaterial3d(skin.clone()));
+        world.spawn((parts, Transform::from_translation(at)));
+    }
+    world.spawn((DirectionalLight::default(), Transform::default().looking_to(-Vec3::Z, Vec3::Y)));
+    let draw = |scene: &mut Offscreen, reach: f32| {
+        let smoothing = HairSmoothing { reach, ..default() };
+        scene.app.world_mut().entity_mut(camera).insert(smoothing);
+        scene.draw()
+    };
+    let bare = draw(&mut scene, 3.0);
+    let look = HairLook { width: 0.1e-3, ..default() };
+    let world = scene.app.world_mut();
+    let hair = world.spawn((Hair, look, HairFollowers::new(1500))).id();
+    for i in 0..8 {
+        let root = Vec3::new(-0.15 + 0.02 * i as f32, 0.12, 0.0);
+        let points = (0..8).map(|k| root + Vec3::new(0.01, -0.03, 0.0) * k as f32);
+        let points: Vec<Vec3> = points.collect();
+        world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    let smooth = draw(&mut scene, 3.0);
+    let grain = draw(&mut scene, 0.0);
+    assert!(grain == draw(&mut scene, f32::NAN), "what is no number is off");
+    assert!(smooth == draw(&mut scene, 3.0), "it is switched on again");
+    for picture in [&bare, &smooth, &grain] {
+        assert!(picture.rgba.chunks_exact(4).all(|p| p[3] == 255), "marks are left");
+    }
+    let is_hair = |x: u32, y: u32| bare.at(x, y) != grain.at(x, y);
+    let (mut near, mut changed) = (0, 0);
+    for (x, y) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y))) {
+        let around = |i: u32| {
+            (x.saturating_add(i % 3).clamp(1, SIZE), y.saturating_add(i / 3).clamp(1, SIZE))
+        };
+        let beside = (0..9).map(around).any(|(x, y)| is_hair(x - 1, y - 1));
+        let differs = smooth.at(x, y) != grain.at(x, y);
+        assert!(beside || !differs, "{x}, {y} is no hair");
+        near += u32::from(beside);
+        changed += u32::from(differs);
+    }
+    println!("{changed} of {near} pixels of hair and beside it are averaged");
+    assert!(2 * changed > near && near > 500);
+
+    // Where alpha says what is seen through, it is left alone.
+    let mut seen = scene.app.world_mut().get_mut::<Camera>(camera).unwrap();
+    seen.clear_color = ClearColorConfig::Custom(Color::NONE);
+    let through = draw(&mut scene, 3.0);
+    assert!(through == draw(&mut scene, 0.0));
+    let alphas = |most: u8| through.rgba.chunks_exact(4).filter(|p| p[3] <= most).count();
+    println!("{} pixels are seen through, {} in part", alphas(0), alphas(254) - alphas(0));
+    assert!(alphas(0) > 1000 && alphas(254) > alphas(0));
 }
 
 /// A tuft of 3,000 strands at random, unlit and red, that a camera sees from `from` metres in some steps to

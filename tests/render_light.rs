@@ -240,8 +240,8 @@ fn hair_under_a_sky_has_its_melanins_colour() {
     }
 }
 
-/// T7, without temporal antialiasing; its aim is 4 % with four samples, and opaque ribbons had 11.4 %. As the
-/// camera moves by sixteenths of a pixel, a picture differs from the finer one of the same view by about as much each time: it does not flicker.
+/// T7, without temporal antialiasing: opaque ribbons had 11.4 %, of which half or less is asked for. As the camera moves
+/// by sixteenths of a pixel, a picture differs from the finer one of the same view by about as much each time.
 #[test]
 fn hair_does_not_flicker_as_the_camera_creeps() {
     const SIZE: u32 = 48;
@@ -284,7 +284,7 @@ fn hair_does_not_flicker_as_the_camera_creeps() {
         count += 1.0;
     }
     println!("flicker {:.3} of the mean of {count} pixels", flicker / light);
-    assert!(count > 100.0 && flicker / light < 0.15);
+    assert!(count > 100.0 && flicker / light < 0.065);
 }
 
 /// Hair that lies around a place takes light of the sky from it: the inside of an open pipe of dark hair is

@@ -159,8 +159,8 @@ fn hair_covers_the_scalp_beside_the_parting() {
     assert!(share >= 0.5, "{share}");
 }
 
-/// T16. The share of hair along a line across a curtain at mid-length, and what it has in common with
-/// itself aside.
+/// T16. The share of hair along a line across a curtain at mid-length, and what it has in common with itself aside.
+/// Followers without locks had 0.97 of the loose ones' departures, and 0.14 in common beyond 40 mm.
 #[test]
 fn locks_have_sizes_and_no_period() {
     const WIDTH: f32 = 0.4;

@@ -304,7 +304,8 @@ mod tests {
         assert!(near > 1.6 * far && near < 2.6 * far, "{near} and {far}");
     }
 
-    /// Density must rise gradually behind the line, and the line must be ragged.
+    /// T13. Density must rise gradually behind the line, and the line must be ragged. Followers between guides went
+    /// from 10 to 90 % in 4 mm, and their foremost ones stood in a straight line for 10 mm.
     #[test]
     fn the_hairline_is_a_ramp_independent_of_the_guides() {
         let (scalp, roots) = planted_followers(HairPreset::Straight, 40_000);

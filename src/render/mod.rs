@@ -156,6 +156,7 @@ impl Plugin for HairRenderPlugin {
             .init_resource::<HairBeads>()
             .register_type::<HairBeads>()
             .register_type::<HairBuffers>()
+            .register_type::<HairSmoothing>()
             .register_type::<FollowerRoots>()
             .register_type::<WetLook>()
             .add_systems(

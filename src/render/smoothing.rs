@@ -99,8 +99,7 @@ fn tell(
         active.all(|(_, camera, asked, ..)| reach(asked) > 0.0 && opaque(camera)),
     ));
     for (camera, _, asked, msaa, told) in &cameras {
-        let samples = msaa.copied().unwrap_or_default().samples();
-        let samples = samples as f32;
+        let samples = msaa.copied().unwrap_or_default().samples() as f32;
         let now = Smooth { reach: reach(asked), across: across(asked), samples };
         match (marks.0, told) {
             (true, told) if told != Some(&now) => {
@@ -116,7 +115,7 @@ fn tell(
 
 /// After Bevy's render plugins.
 pub(super) fn plugin(app: &mut App) {
-    app.init_resource::<Marks>().register_type::<HairSmoothing>();
+    app.init_resource::<Marks>();
     let draws = app.get_sub_app(RenderApp);
     if !draws.is_some_and(|draws| draws.world().contains_resource::<FullscreenShader>()) {
         return;

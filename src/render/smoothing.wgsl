@@ -42,6 +42,10 @@ fn joined(a: Sum, b: Sum) -> Sum {
     return Sum(a.color + b.color, a.share + b.share, a.bare + b.bare, a.weight + b.weight);
 }
 
+fn scaled(a: Sum, by: f32) -> Sum {
+    return Sum(by * a.color, by * a.share, by * a.bare, by * a.weight);
+}
+
 // A pixel, and a little of those beside it.
 fn line(pixel: vec2<i32>, across: vec2<i32>) -> Sum {
     var sum = Sum(vec3(0.0), 0.0, vec4(0.0), 0.0);
@@ -70,6 +74,8 @@ fn fragment(in: FullscreenVertexOutput) -> @location(0) vec4<f32> {
     let step = way / max(abs(way.x), abs(way.y));
     let across = select(vec2(1, 0), vec2(0, 1), abs(way.x) > abs(way.y));
     var sum = line(pixel, across);
+    // Where strands curl and cross within pixels there is no line to go along: 1 if all go one way, 0 if any.
+    let ordered = length(here.twice) / here.share;
     var was_bare = false;
     // As far one way as the other, or hair would grow past its edges; thin hair has gaps of a pixel.
     for (var i = 1; i <= i32(told.reach); i++) {
@@ -80,7 +86,7 @@ fn fragment(in: FullscreenVertexOutput) -> @location(0) vec4<f32> {
             break;
         }
         was_bare = is_bare;
-        sum = joined(sum, joined(ahead, back));
+        sum = joined(sum, scaled(joined(ahead, back), ordered));
     }
     var color = sum.color / sum.weight;
     // Where no strand is, the ground of this place is seen, not of those along the line.
