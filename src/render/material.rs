@@ -100,6 +100,11 @@ impl RibbonKey {
         Self { heat, kajiya_kay, expanded, marked: marked && !heat }
     }
 
+    /// Depth is the same whatever colour is seen.
+    fn of_depth(self) -> Self {
+        Self { expanded: self.expanded, ..default() }
+    }
+
     pub(super) fn is_lit(self) -> bool {
         !self.heat
     }
@@ -116,6 +121,7 @@ impl RibbonMaterial {
     pub(super) fn depth(&self) -> RibbonMaterial<Depth> {
         let Self { key, ribbon, nodes, guides, strands, streaks, frame, rings, .. } = self.clone();
         let (draw, volume) = (PhantomData, None);
+        let key = key.of_depth();
         RibbonMaterial { draw, key, ribbon, nodes, guides, strands, streaks, frame, rings, volume }
     }
 }
@@ -243,7 +249,7 @@ impl RibbonMaterial<Depth> {
     /// Whether it is what `lit` makes.
     pub(super) fn draws(&self, lit: &RibbonMaterial) -> bool {
         let Self { key, ribbon, nodes, guides, strands, streaks, frame, rings, .. } = self;
-        (key, ribbon) == (&lit.key, &lit.ribbon)
+        (*key, ribbon) == (lit.key.of_depth(), &lit.ribbon)
             && [nodes, guides, strands] == [&lit.nodes, &lit.guides, &lit.strands]
             && [streaks, frame, rings] == [&lit.streaks, &lit.frame, &lit.rings]
     }

@@ -16,9 +16,9 @@ use bevy::{
 /// How far hair is averaged along its strands in a camera's picture: against grain, stipple and flicker of strands
 /// thinner than a pixel, of which four samples a pixel light a few by lot. All [`Camera3d`]s have it.
 ///
-/// Each pixel of hair gets the mean of those before and behind it along the strands there, as far as these go the same
-/// way. A strand that crosses others keeps its own way; what shows through between strands is kept where no
-/// strand is. Edges of other things across the strands soften by a pixel.
+/// Each pixel of hair gets the mean of those before and behind it in a line along the strands there, which count less
+/// the more strands cross or curl within three pixels. What shows through is kept where no strand is. Edges of
+/// other things across the strands soften by a pixel.
 ///
 /// While it works, hair marks its pixels in the alpha channel, which is 1 again afterwards. Where any active
 /// `Camera3d` lacks this component, has a reach below 1, or clears to a colour that is not opaque, hair is drawn
