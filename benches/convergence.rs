@@ -98,7 +98,7 @@ fn app(solver: HairSolver, sweeps: Sweeps, substeps: u32) -> App {
         .insert_resource(HairDefault(solver))
         .insert_resource(HairDefault(sweeps))
         .insert_resource(HairDefault(Cuticle { damage: 0.0, ..default() }))
-        .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
+        .insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app
 }

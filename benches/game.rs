@@ -31,7 +31,7 @@ mod scenes {
 use bevy::{prelude::*, tasks::ComputeTaskPool};
 use bevy_keratin::{
     HairScreenShare,
-    plant::{HairPreset, Scalp},
+    authoring::plant::{HairPreset, Scalp},
     prelude::*,
 };
 use std::{
@@ -87,7 +87,7 @@ fn preset_rows(name: &str, preset: HairPreset, threads: usize) {
     let mut app = app(threads);
     let hair = person(&mut app, preset, &strands, Vec3::ZERO);
     let contact = preset.settings().contact;
-    let without = LockContact { strength: 0.0, ..contact };
+    let without = StrandContact { strength: 0.0, ..contact };
     settle(&mut app);
     for moving in [false, true] {
         if moving {
@@ -286,7 +286,7 @@ fn walk(
 fn app(threads: usize) -> App {
     let mut app = common::app(threads);
     app.add_plugins(HairPlugins::default())
-        .insert_resource(HairDefault(HairSleep::never()))
+        .insert_resource(HairDefault(SleepSettings::never()))
         .add_systems(FixedUpdate, walk);
     app
 }

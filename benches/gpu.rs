@@ -33,10 +33,10 @@ mod gpu {
             BYTES_PER_NODE, GpuStrands, HairGpu, HairKernels, HairResidence, SimulateOn,
             StrandView, SubstepRecord,
         },
+        hair::strand::StrandHistory,
         prelude::*,
         render::HairRenderPlugin,
-        rod::obstacle::{Obstacle, Solid},
-        strand::StrandHistory,
+        solver::rod::obstacle::{Obstacle, Solid},
     };
     use std::{path::Path, time::Instant};
 
@@ -115,7 +115,7 @@ mod gpu {
         app.insert_resource(HairGpu { software: true, ..default() });
         app.finish();
         app.cleanup();
-        let free = LockContact { strength: 0.0, ..default() };
+        let free = StrandContact { strength: 0.0, ..default() };
         let made = |app: &mut App, count: usize, on: SimulateOn| {
             let hair = app.world_mut().spawn((Hair, on, free)).id();
             let strands = polylines(count, 16).map(|strand| (strand, StrandOf(hair)));
@@ -240,11 +240,11 @@ mod gpu {
         SubstepRecord {
             dt,
             gravity: Vec3::NEG_Y * 9.8,
-            keep: (-2.0 * dt).exp(),
+            retained: (-2.0 * dt).exp(),
             influence: BondInfluence::default().as_array(),
             bending_length: HairStiffness::default().bending_length,
             damping: HairStiffness::default().damping,
-            skin: LockContact::default().radius,
+            skin: StrandContact::default().radius,
             limiter_steps: HairSolver::default().limiter_steps,
             cuticle: default(),
             obstacles: (0..solids).map(ball).collect(),

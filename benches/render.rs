@@ -63,7 +63,7 @@ fn app() -> App {
         HairPlugins::default(),
     ))
     .insert_resource(Time::<Fixed>::from_hz(60.0))
-    .insert_resource(HairDefault(HairSleep::never()))
+    .insert_resource(HairDefault(SleepSettings::never()))
     .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
     .init_resource::<Clock>()
     .init_resource::<TickClock>()
@@ -101,17 +101,17 @@ fn main() {
     println!(
         "{STRANDS} strands of {NODES} nodes, {FRAMES} frames of one tick at 60 Hz, ms a frame"
     );
-    for (contact, what) in [(LockContact::default(), "with"), (no_contact(), "without")] {
+    for (contact, what) in [(StrandContact::default(), "with"), (no_contact(), "without")] {
         row(contact, what);
     }
 }
 
 /// Without strand contact, where the tick is cheapest.
-fn no_contact() -> LockContact {
-    LockContact { radius: 0.0, ..default() }
+fn no_contact() -> StrandContact {
+    StrandContact { radius: 0.0, ..default() }
 }
 
-fn row(contact: LockContact, what: &str) {
+fn row(contact: StrandContact, what: &str) {
     let mut app = app();
     app.insert_resource(HairDefault(contact));
     for _ in 0..5 {

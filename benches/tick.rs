@@ -23,9 +23,9 @@ mod table;
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
     StretchProjection, Sweeps, WindReceived,
-    lanes::{LANES, put4},
+    math::lanes::{LANES, put4},
     prelude::*,
-    rod::{
+    solver::rod::{
         block::BlockLanes,
         direct::{self, DirectParams},
         step::{SweepParams, step},
@@ -143,7 +143,7 @@ fn scene_1_second(bencher: Bencher<'_, '_>) {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, HairPlugins::default()))
         .insert_resource(Time::<Fixed>::from_hz(60.0))
-        .insert_resource(HairDefault(HairSleep::never()))
+        .insert_resource(HairDefault(SleepSettings::never()))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.world_mut().spawn((HairCollider::plane(Dir3::Y), Transform::from_xyz(0.0, -0.15, 0.0)));

@@ -11,7 +11,7 @@ mod scenes;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
-    grid::{BallGrid, FoundBalls},
+    math::grid::{BallGrid, FoundBalls},
     prelude::*,
 };
 use fearless_simd::Level;
@@ -81,7 +81,7 @@ fn wet(variant: &str, count: usize, uptake: f32) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, HairPlugins::default(), ScenePlugin(scene)))
         .insert_resource(Strewn { count, ..default() })
-        .insert_resource(HairDefault(HairSleep::never()))
+        .insert_resource(HairDefault(SleepSettings::never()))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
         // After the scene has set its own.
         .add_systems(PostStartup, move |mut wetting: ResMut<HairDefault<HairWetting>>| {

@@ -1,18 +1,17 @@
 //! The plugin group.
 
 use crate::{
-    bond::BondPlugin,
-    contact::ContactPlugin,
-    environment::EnvironmentPlugin,
-    lod::LodPlugin,
-    look::LookPlugin,
-    schedule::TickPlugin,
-    settle::SettlePlugin,
-    sleep::SleepPlugin,
-    solve::{RodPlugin, SpringPlugin},
-    strand::StrandPlugin,
-    style::StylePlugin,
-    treatment::TreatmentPlugin,
+    base::schedule::TickPlugin,
+    forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
+    hair::{look::LookPlugin, strand::StrandPlugin},
+    hairdo::style::StylePlugin,
+    keratin::{bond::BondPlugin, treatment::TreatmentPlugin},
+    simulation::{
+        lod::LodPlugin,
+        settle::SettlePlugin,
+        sleep::SleepPlugin,
+        solve::{RodPlugin, SpringPlugin},
+    },
     water::WaterPlugin,
 };
 use bevy::{
@@ -95,14 +94,14 @@ impl PluginGroup for HairPlugins {
         #[cfg(feature = "gpu")]
         let group = group.add(crate::gpu::HairGpuPlugin);
         #[cfg(feature = "save")]
-        let group = group.add(crate::save::SavePlugin);
+        let group = group.add(crate::hairdo::save::SavePlugin);
         #[cfg(feature = "groom")]
         let group = group
-            .add(crate::groom::GroomPlugin)
-            .add(crate::plant::PlantPlugin)
-            .add(crate::collider_fit::ColliderFitPlugin)
-            .add(crate::attach::AttachPlugin)
-            .add(crate::wear::WearPlugin);
+            .add(crate::authoring::groom::GroomPlugin)
+            .add(crate::authoring::plant::PlantPlugin)
+            .add(crate::authoring::collider_fit::ColliderFitPlugin)
+            .add(crate::authoring::attach::AttachPlugin)
+            .add(crate::authoring::wear::WearPlugin);
         group
     }
 }

@@ -11,37 +11,20 @@ use std::{
 };
 
 /// Rooms from the ground up: each may import those before it, none after it.
-const FLOORS: [&str; 32] = [
-    "fault",
-    "setting",
-    "look",
-    "parallel",
-    "lanes",
-    "schedule",
-    "grid",
-    "rod",
-    "mass_spring",
-    "strand",
-    "bond",
-    "environment",
-    "contact",
-    "treatment",
+const FLOORS: [&str; 15] = [
+    "base",
+    "math",
+    "solver",
+    "hair",
+    "keratin",
+    "forces",
     "water",
-    "lod",
-    "sleep",
-    "solve",
-    "settle",
-    "style",
-    "save",
+    "simulation",
+    "hairdo",
     "render",
-    "groom",
-    "plant",
-    "attach",
-    "collider_fit",
-    "wear",
+    "authoring",
     "gpu",
     "plugins",
-    "prelude",
     "lib",
     "",
 ];
@@ -97,7 +80,7 @@ impl Crate {
     fn home(&self, path: &[String]) -> Vec<String> {
         let mut at: Vec<String> = Vec::new();
         let mut path = path.to_vec();
-        // A circle of re-exports would not compile; a glob may lead astray, so it ends.
+        // A circle of re-exports would not compile; a glob may lead scattered, so it ends.
         for _ in 0..32 {
             let Some(next) = path.first().cloned() else { return at };
             at.push(next.clone());

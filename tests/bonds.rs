@@ -52,7 +52,7 @@ fn release(app: &mut App, entity: Entity) {
 }
 
 fn treat(app: &mut App, treat: HairTreatment) {
-    app.world_mut().write_message(treat);
+    app.world_mut().trigger(treat);
     run(app, 0.1);
 }
 

@@ -5,8 +5,8 @@ mod common;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
+    hair::strand::{StrandHistory, TickPose},
     prelude::*,
-    strand::{StrandHistory, TickPose},
 };
 use common::{app_with_meshes, one_strand, run, settle, strand, test_app};
 use core::{f32::consts::PI, time::Duration};
@@ -311,7 +311,7 @@ mod skinned {
             skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
         },
     };
-    use bevy_keratin::{attach::RootsOnMesh, plant::RootOnMesh};
+    use bevy_keratin::authoring::{attach::RootsOnMesh, plant::RootOnMesh};
 
     const ROWS: u32 = 9;
 

@@ -5,7 +5,7 @@ mod common;
 use bevy::{prelude::*, reflect::ReflectMut};
 use bevy_keratin::{
     ColliderShape,
-    contact::{Bake, BakeError, DistanceGrid, HullError, Openings},
+    forces::contact::{Bake, BakeError, DistanceGrid, HullError, Openings},
     prelude::*,
 };
 use common::*;
@@ -182,7 +182,7 @@ fn drops_lie_on_every_shape() {
 fn sleeping_hair_wakes_for_a_shape_that_comes() {
     for (name, collider, ..) in shapes() {
         let mut app = test_app(60.0);
-        app.insert_resource(HairDefault(HairSleep { seconds: 0.2, ..default() }));
+        app.insert_resource(HairDefault(SleepSettings { seconds: 0.2, ..default() }));
         let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
         let far = Transform::from_xyz(0.4, -0.2, 0.0);
         let box_ = app.world_mut().spawn((collider, far)).id();

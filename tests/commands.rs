@@ -1,7 +1,7 @@
 //! What examples say to command lines and machines that they cannot serve.
 
 use bevy::prelude::*;
-use bevy_keratin::groom::{Groom, yuksel};
+use bevy_keratin::authoring::groom::{Groom, yuksel};
 use std::{
     path::PathBuf,
     process::{Command, Output},

@@ -101,7 +101,7 @@ fn strands_in_one_place_part_by_two_radii_only_with_contact() {
     let apart = |strength: f32| {
         let mut app = test_app(60.0);
         no_gravity(&mut app);
-        app.insert_resource(HairDefault(LockContact { radius: 2e-3, strength }))
+        app.insert_resource(HairDefault(StrandContact { radius: 2e-3, strength }))
             .insert_resource(HairDefault(HairStiffness::from_bending_length(0.02).unwrap()));
         let hair = app.world_mut().spawn(Hair).id();
         let ids = [-1e-4_f32, 1e-4].map(|z| {
@@ -122,7 +122,7 @@ fn strands_that_meet_do_not_pass_through_each_other() {
     let crossed = |strength: f32| {
         let mut app = test_app(60.0);
         no_gravity(&mut app);
-        app.insert_resource(HairDefault(LockContact { radius: 2e-3, strength }))
+        app.insert_resource(HairDefault(StrandContact { radius: 2e-3, strength }))
             .insert_resource(HairDefault(AirDrag { rate: 0.0 }))
             .insert_resource(HairDefault(HairStiffness::from_bending_length(0.02).unwrap()));
         let hair = app.world_mut().spawn(Hair).id();
@@ -172,8 +172,8 @@ proptest! {
 #[test]
 fn strands_by_the_thousand_in_one_place_are_bounded_and_reported_once() {
     let mut app = test_app(60.0);
-    let contact = LockContact { radius: 1e-3, ..default() };
-    let hair = app.world_mut().spawn((Hair, contact, HairSleep::never())).id();
+    let contact = StrandContact { radius: 1e-3, ..default() };
+    let hair = app.world_mut().spawn((Hair, contact, SleepSettings::never())).id();
     for i in 0..2200 {
         let aside = Vec3::new((i % 47) as f32, 0.0, (i / 47) as f32) * 2e-5;
         let points = [aside, aside - Vec3::Y * 0.02, aside - Vec3::Y * 0.04];

@@ -1,7 +1,7 @@
 //! Pigments, bleach and dye: what fibres absorb, and the colour that a head shows of it.
 
 use bevy::prelude::*;
-use bevy_keratin::{look::MAX_LAYERS, prelude::*, setting::Ranged};
+use bevy_keratin::{base::setting::Ranged, hair::look::MAX_LAYERS, prelude::*};
 
 #[test]
 fn more_melanin_is_darker_and_pheomelanin_redder() {

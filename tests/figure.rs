@@ -26,14 +26,14 @@ use bevy::{
     prelude::*,
 };
 use bevy_keratin::{
-    contact::ColliderShape,
-    plant::HairPreset,
+    authoring::plant::HairPreset,
+    forces::contact::ColliderShape,
+    hair::strand::TickPose,
     prelude::*,
     render::{
         DrawnStrand, FollowerRoots, HairFollowers,
         curve::{DrawnSolid, Guide, arrange, drawn_strands, ring_share, strand_point},
     },
-    strand::TickPose,
 };
 use common::{app_with_meshes, faults};
 use std::{thread::sleep, time::Duration};

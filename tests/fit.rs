@@ -8,7 +8,7 @@ use bevy::{
 };
 use bevy_keratin::{
     ColliderShape,
-    collider_fit::{FitError, JointCapsule, fit_joint_capsules},
+    authoring::collider_fit::{FitError, JointCapsule, fit_joint_capsules},
 };
 
 /// Gives all vertices of a mesh to joints by a rule.

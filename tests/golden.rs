@@ -6,8 +6,8 @@ mod golden;
 
 use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
-    lanes::{LANES, Lane, Quaternion, Real, V3, put3, put4, take3, take4},
-    rod::{
+    math::lanes::{LANES, Lane, Quaternion, Real, V3, put3, put4, take3, take4},
+    solver::rod::{
         block::BlockLanes,
         constraint::{
             BendShares, EPSILON, EdgeWeights, StretchProjection, StretchShares, bend_twist,

@@ -14,7 +14,8 @@ mod scenes {
 
 use bevy::prelude::*;
 use bevy_keratin::{
-    FaultKind, prelude::*, save::NEWEST_FORMAT, strand::StrandHistory, treatment::Treatments,
+    FaultKind, hair::strand::StrandHistory, hairdo::save::NEWEST_FORMAT,
+    keratin::treatment::Treatments, prelude::*,
 };
 use common::*;
 use core::f32::consts::PI;
@@ -312,7 +313,7 @@ fn another_groom_is_reported_and_the_hair_is_left_alone() {
         assert!(error.to_string().contains("apply_resampled"), "{error}");
         assert!(bits(&app, hair) == before, "{error}");
         assert_eq!(Hairdo::blend(&of(&app, hair), &hairdo, 0.5).unwrap_err(), expected);
-        queue(&mut app, hair, hairdo.put_on());
+        queue(&mut app, hair, hairdo.into_command());
         assert!(bits(&app, hair) == before);
         app.update();
         let reported = faults(&mut app);
@@ -334,9 +335,9 @@ fn another_groom_is_reported_and_the_hair_is_left_alone() {
     let error = Hairdo::default().apply_resampled(app.world_mut(), hair).unwrap_err();
     assert_eq!(error, HairdoError::Bald);
     assert!(bits(&app, hair) == before);
-    queue(&mut app, hair, own.clone().put_on());
+    queue(&mut app, hair, own.clone().into_command());
     assert_eq!(of(&app, hair), own);
-    queue(&mut app, hair, own.clone().put_on_resampled());
+    queue(&mut app, hair, own.clone().into_resampled_command());
     assert_eq!(of(&app, hair), own, "on the same groom nothing is resampled");
 }
 
@@ -797,7 +798,7 @@ fn looks_travel_with_the_hairdo() {
     // Onto other hair, that keeps what it has grown from.
     let other = curls(&mut app, 3, 9);
     app.world_mut().entity_mut(other).insert(HairDye::from_color(HairColor::COBALT));
-    queue(&mut app, other, read.clone().put_on_resampled());
+    queue(&mut app, other, read.clone().into_resampled_command());
     let world = app.world();
     assert_eq!(
         (world.get::<HairLook>(other), world.get::<HairDye>(other)),
@@ -916,20 +917,20 @@ fn systems_take_and_put_on_by_events() {
     let twin = curls(&mut app, 2, 5);
     let other = curls(&mut app, 4, 9);
     app.init_resource::<Answers>()
-        .add_observer(|of: On<HairdoTaken>, mut reported: ResMut<Answers>| {
+        .add_observer(|of: On<HairdoCaptured>, mut reported: ResMut<Answers>| {
             reported.taken.push((of.entity, of.hairdo.clone()));
         })
-        .add_observer(|of: On<HairdoPutOn>, mut reported: ResMut<Answers>| {
+        .add_observer(|of: On<HairdoApplied>, mut reported: ResMut<Answers>| {
             reported.put_on.push(of.entity);
         })
-        .add_observer(|of: On<HairdoRefused>, mut reported: ResMut<Answers>| {
+        .add_observer(|of: On<HairdoRejected>, mut reported: ResMut<Answers>| {
             reported.refused.push((of.entity, of.error.clone()));
         });
     app.add_systems(
         Update,
         (move |mut commands: Commands, mut done: Local<bool>| {
             if !core::mem::replace(&mut *done, true) {
-                commands.trigger(TakeHairdo { entity: hair });
+                commands.trigger(CaptureHairdo { entity: hair });
             }
         },),
     );
@@ -941,11 +942,11 @@ fn systems_take_and_put_on_by_events() {
     assert_eq!((from, &hairdo), (hair, &of(&app, hair)));
     let strand = members(&app, hair)[0];
     for entity in [twin, other, strand] {
-        let request = PutOnHairdo { entity, hairdo: hairdo.clone() };
+        let request = ApplyHairdo { entity, hairdo: hairdo.clone() };
         app.world_mut().commands().trigger(request);
     }
     app.world_mut().flush();
-    app.world_mut().commands().trigger(TakeHairdo { entity: strand });
+    app.world_mut().commands().trigger(CaptureHairdo { entity: strand });
     app.world_mut().flush();
     let reported = app.world().resource::<Answers>();
     assert_eq!(reported.put_on, [twin, other]);
@@ -967,7 +968,7 @@ fn a_hairdo_is_known_to_reflection() {
     let dye = <HairDye as FromReflect>::from_reflect(dye().to_dynamic().as_ref()).unwrap();
     assert_eq!(dye, self::dye());
     let registry = app.world().resource::<AppTypeRegistry>().read();
-    for name in ["Hairdo", "HairDye", "DyeLayer", "HairLook", "WornPreset", "PutOnHairdo"] {
+    for name in ["Hairdo", "HairDye", "DyeLayer", "HairLook", "WornPreset", "ApplyHairdo"] {
         assert!(registry.get_with_short_type_path(name).is_some(), "{name}");
     }
 }

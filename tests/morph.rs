@@ -13,10 +13,12 @@ use bevy::{
 };
 use bevy_keratin::{
     FaultKind,
-    attach::{RootsError, RootsOnMesh},
-    plant::RootOnMesh,
+    authoring::{
+        attach::{RootsError, RootsOnMesh},
+        plant::RootOnMesh,
+    },
+    hair::strand::StrandHistory,
     prelude::*,
-    strand::StrandHistory,
 };
 use common::{app_with_meshes, faults, no_gravity, run, strand};
 

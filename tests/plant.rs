@@ -9,7 +9,7 @@ use bevy::{
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
-use bevy_keratin::{plant::*, prelude::*};
+use bevy_keratin::{authoring::plant::*, prelude::*};
 use core::f32::consts::{PI, TAU};
 use proptest::prelude::*;
 

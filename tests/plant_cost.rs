@@ -13,7 +13,7 @@ mod scenes {
 }
 
 use bevy::prelude::*;
-use bevy_keratin::{contact::ColliderShape, plant::*};
+use bevy_keratin::{authoring::plant::*, forces::contact::ColliderShape};
 use std::time::{Duration, Instant};
 
 /// A clock that runs while this thread does, so that others on the machine do not count; a usual one

@@ -6,8 +6,12 @@ mod offscreen;
 
 use bevy::{app::PluginGroupBuilder, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
-    contact::ContactPlugin, lod::LodPlugin, prelude::*, render::HairFollowers, sleep::SleepPlugin,
-    solve::SpringPlugin, treatment::TreatmentPlugin, water::WaterPlugin,
+    forces::contact::ContactPlugin,
+    keratin::treatment::TreatmentPlugin,
+    prelude::*,
+    render::HairFollowers,
+    simulation::{lod::LodPlugin, sleep::SleepPlugin, solve::SpringPlugin},
+    water::WaterPlugin,
 };
 use offscreen::Offscreen;
 

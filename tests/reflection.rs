@@ -1,18 +1,69 @@
 //! Every public type that can be reflected is registered: inspectors and scene files know it.
 
 use bevy::{
-    asset::AssetPlugin, ecs::reflect::AppTypeRegistry, prelude::*, render::storage::ShaderBuffer,
+    asset::AssetPlugin,
+    ecs::reflect::AppTypeRegistry,
+    prelude::*,
+    reflect::{TypeInfo, enums::VariantInfo},
+    render::storage::ShaderBuffer,
 };
 use bevy_keratin::prelude::*;
-use std::{fs, path::Path};
+use std::{collections::BTreeSet, fs, path::Path};
 
-#[test]
-fn every_public_reflected_type_is_registered() {
+fn app() -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), HairPlugins::default()))
         .init_asset::<Mesh>()
         .init_asset::<ShaderBuffer>();
     app.finish();
+    app
+}
+
+#[test]
+fn the_prelude_has_every_type_that_a_field_of_its_types_needs() {
+    let words = |text: &str| -> BTreeSet<String> {
+        let words = text.split(|c: char| !c.is_alphanumeric());
+        words.filter(|word| word.starts_with(char::is_uppercase)).map(str::to_owned).collect()
+    };
+    let mut prelude = BTreeSet::new();
+    for room in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).unwrap() {
+        let Ok(text) = fs::read_to_string(room.unwrap().path().join("mod.rs")) else { continue };
+        let list = text.split_once("pub mod prelude {").map_or("", |(_, rest)| rest);
+        prelude.extend(words(list.split("\n}").next().unwrap()));
+    }
+    let app = app();
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let mut missing = BTreeSet::new();
+    for info in registry.iter().map(|registration| registration.type_info()) {
+        let table = info.type_path_table();
+        let own = table.crate_name() == Some("bevy_keratin");
+        if !own || !table.ident().is_some_and(|ident| prelude.contains(ident)) {
+            continue;
+        }
+        let mut fields: Vec<&str> = Vec::new();
+        match info {
+            TypeInfo::Struct(s) => fields.extend(s.iter().map(|field| field.type_path())),
+            TypeInfo::TupleStruct(s) => fields.extend(s.iter().map(|field| field.type_path())),
+            TypeInfo::Enum(e) => e.iter().for_each(|variant| match variant {
+                VariantInfo::Struct(v) => fields.extend(v.iter().map(|f| f.type_path())),
+                VariantInfo::Tuple(v) => fields.extend(v.iter().map(|f| f.type_path())),
+                VariantInfo::Unit(_) => {}
+            }),
+            _ => {}
+        }
+        let needed = fields.into_iter().filter(|path| path.contains("bevy_keratin::"));
+        for path in needed {
+            let last = path.rsplit("bevy_keratin::").next().unwrap();
+            let needs = words(last.rsplit("::").next().unwrap());
+            missing.extend(needs.difference(&prelude).map(|needs| format!("{needs} of {path}")));
+        }
+    }
+    assert!(missing.is_empty(), "not in the prelude: {missing:#?}");
+}
+
+#[test]
+fn every_public_reflected_type_is_registered() {
+    let app = app();
     let registry = app.world().resource::<AppTypeRegistry>().read();
     let mut missing = Vec::new();
     let mut known = 0;

@@ -5,7 +5,7 @@
 
 use bevy::prelude::*;
 use bevy_keratin::{
-    plant::{HairPreset, Planting, Scalp},
+    authoring::plant::{HairPreset, Planting, Scalp},
     render::{
         DrawnStrand, HairFollowers,
         curve::{DrawnSolid, Guide, drawn_strands, ring_share, strand_point},

@@ -23,7 +23,7 @@ use bevy::{
     shader::ShaderDefVal,
 };
 use bevy_keratin::{
-    contact::ColliderShape,
+    forces::contact::ColliderShape,
     render::{
         DrawnStrand, HairFollowers, LockOffset,
         curve::{CurvePoint, DrawnSolid, Guide, arrange, packed_frame, strand_point},

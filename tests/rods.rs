@@ -3,7 +3,8 @@
 mod common;
 use bevy::prelude::*;
 use bevy_keratin::{
-    Cuticle, SolverMethod, StretchProjection, Sweeps, prelude::*, rod::stiffness::REFERENCE_GRAVITY,
+    Cuticle, SolverMethod, StretchProjection, Sweeps, prelude::*,
+    solver::rod::stiffness::REFERENCE_GRAVITY,
 };
 use common::*;
 
@@ -233,8 +234,8 @@ fn scale_changes_nothing_in_the_hairs_own_units() {
 #[test]
 fn a_block_keeps_nothing_of_the_strands_before() {
     use bevy_keratin::{
-        lanes::LANES,
-        rod::{
+        math::lanes::LANES,
+        solver::rod::{
             block::BlockLanes,
             direct::{DirectParams, step, weigh},
         },

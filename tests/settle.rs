@@ -126,14 +126,14 @@ fn what_settles_is_all_that_moves_and_no_clock_goes_on() {
 #[test]
 fn hair_that_is_to_fall_does() {
     let mut app = test_app(60.0);
-    app.insert_resource(HairDefault(HairSettling { ticks: 0, ..default() }));
+    app.insert_resource(HairDefault(SettleSettings { ticks: 0, ..default() }));
     let (hair, strands) = spawn(&mut app, true);
     assert_eq!(until_drawn(&mut app, hair), 1);
     run(&mut app, 0.1);
     assert!(fastest(&app, &strands) > 0.3);
     // And one tick at once is never more than that.
     let mut app = test_app(60.0);
-    let few = HairSettling { ticks: 30, at_once: 1, speed: 0.0, ..default() };
+    let few = SettleSettings { ticks: 30, at_once: 1, speed: 0.0, ..default() };
     app.insert_resource(HairDefault(few));
     let (hair, _) = spawn(&mut app, true);
     assert_eq!(until_drawn(&mut app, hair), 30);
@@ -143,7 +143,7 @@ fn hair_that_is_to_fall_does() {
 fn settling_is_the_same_to_the_last_bit() {
     let settled = |at_once: u32| {
         let mut app = test_app(60.0);
-        let few = HairSettling { at_once, ..default() };
+        let few = SettleSettings { at_once, ..default() };
         app.insert_resource(HairDefault(few));
         let (hair, strands) = spawn(&mut app, true);
         until_drawn(&mut app, hair);
@@ -161,7 +161,7 @@ fn frames(seconds: f64) -> TimeUpdateStrategy {
 fn at_rest() -> (App, [Entity; 2]) {
     let mut app = test_app(60.0);
     app.insert_resource(frames(1.0 / 60.0));
-    let hair = app.world_mut().spawn((Hair, HairSleep::never())).id();
+    let hair = app.world_mut().spawn((Hair, SleepSettings::never())).id();
     let bent = |t: f32| Vec3::new((9.0 * t).sin(), -(9.0 * t).cos(), 4.0 * t) * 0.02;
     let strands = [|t: f32| Vec3::NEG_Y * t, bent].map(|path| {
         let points: Vec<Vec3> = (0..12).map(|i| path(0.02 * i as f32)).collect();

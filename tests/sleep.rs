@@ -2,7 +2,7 @@
 
 mod common;
 use bevy::prelude::*;
-use bevy_keratin::{Sleepers, SolverMethod, StrandError, Sweeps, prelude::*};
+use bevy_keratin::{SleepCounts, SolverMethod, StrandError, Sweeps, prelude::*};
 use common::*;
 use std::time::Instant;
 
@@ -43,10 +43,10 @@ fn lock(app: &mut App, strands: usize) -> (Entity, Vec<Entity>) {
 /// Runs until all of a hair sleeps; says how long that took.
 fn until_asleep(app: &mut App, hair: Entity, limit: f64) -> f64 {
     let mut seconds = 0.0;
-    while !app.world().get::<Sleepers>(hair).unwrap().all() {
+    while !app.world().get::<SleepCounts>(hair).unwrap().all() {
         run(app, 0.1);
         seconds += 0.1;
-        assert!(seconds < limit, "{:?}", app.world().get::<Sleepers>(hair));
+        assert!(seconds < limit, "{:?}", app.world().get::<SleepCounts>(hair));
     }
     seconds
 }
@@ -83,13 +83,16 @@ fn hair_at_rest_falls_asleep_and_then_stays_to_the_last_bit() {
         .spawn((HairCollider::sphere(0.05).unwrap(), Transform::from_xyz(0.1, -0.06, 0.0)));
     let (hair, ids) = lock(&mut app, 60);
     run(&mut app, 0.2);
-    assert_eq!(*app.world().get::<Sleepers>(hair).unwrap(), Sleepers { asleep: 0, awake: 60 });
+    assert_eq!(
+        *app.world().get::<SleepCounts>(hair).unwrap(),
+        SleepCounts { asleep: 0, awake: 60 }
+    );
     let seconds = until_asleep(&mut app, hair, 30.0);
     assert!(seconds > 1.0, "it has swung before");
     let rest: Vec<_> = ids.iter().map(|e| bits(strand(&app, *e))).collect();
     for _ in 0..120 {
         app.update();
-        assert!(app.world().get::<Sleepers>(hair).unwrap().all());
+        assert!(app.world().get::<SleepCounts>(hair).unwrap().all());
     }
     for (e, rest) in ids.iter().zip(rest) {
         assert_eq!(bits(strand(&app, *e)), rest);
@@ -99,15 +102,15 @@ fn hair_at_rest_falls_asleep_and_then_stays_to_the_last_bit() {
 
 #[test]
 fn sleep_changes_the_settled_shape_by_no_more_than_can_be_seen() {
-    let settled = |sleep: HairSleep| {
+    let settled = |sleep: SleepSettings| {
         let mut app = test_app(60.0);
         app.insert_resource(HairDefault(sleep));
         let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
         run(&mut app, 20.0);
         (strand(&app, e).positions()[8], is_asleep(&app, e))
     };
-    let (with, asleep) = settled(HairSleep::default());
-    let (without, awake) = settled(HairSleep::never());
+    let (with, asleep) = settled(SleepSettings::default());
+    let (without, awake) = settled(SleepSettings::never());
     assert!(asleep && !awake);
     assert!(with.distance(without) < 3e-4, "{} m apart", with.distance(without));
 }
@@ -255,7 +258,7 @@ fn a_neighbour_that_touches_it_wakes_it() {
         app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap())).id()
     });
     run(&mut app, 1.0);
-    assert!(app.world().get::<Sleepers>(hair).unwrap().all());
+    assert!(app.world().get::<SleepCounts>(hair).unwrap().all());
     let mut strand = app.world_mut().get_mut::<Strand>(a).unwrap();
     strand.velocities_mut()[4..].fill(Vec3::X * 0.5);
     run(&mut app, 0.3);
@@ -350,10 +353,10 @@ fn settings_wake_it() {
     wakes(set(Sweeps { iterations: 7, ..default() }));
     wakes(set(BondInfluence { hydrogen: 0.4, ..default() }));
     wakes(set(Cuticle { damage: 0.5, ..default() }));
-    wakes(set(LockContact { radius: 2e-3, ..default() }));
+    wakes(set(StrandContact { radius: 2e-3, ..default() }));
     wakes(set(AirDrag { rate: 5.0 }));
     wakes(set(StrandModel::MassSpring));
-    wakes(set(HairSleep::never()));
+    wakes(set(SleepSettings::never()));
     wakes(|app, _, _| {
         app.insert_resource(HairDefault(AirDrag { rate: 1.0 }));
     });
@@ -404,7 +407,7 @@ fn a_sleeper_is_drawn_where_it_lies_and_does_not_jump_there() {
     let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::new(1.0, -1.0, 0.0).normalize());
     let drawn = |app: &App, overstep: f32| {
         let world = app.world();
-        let history = world.get::<bevy_keratin::strand::StrandHistory>(e).unwrap();
+        let history = world.get::<bevy_keratin::hair::strand::StrandHistory>(e).unwrap();
         history.drawn(strand(app, e), 8, overstep)
     };
     let (mut last, mut asleep) = (drawn(&app, 0.5), 0);
@@ -414,7 +417,7 @@ fn a_sleeper_is_drawn_where_it_lies_and_does_not_jump_there() {
         if is_asleep(&app, e) {
             asleep += 1;
             let step = now.distance(last);
-            assert!(step <= if asleep == 1 { HairSleep::default().distance() } else { 0.0 });
+            assert!(step <= if asleep == 1 { SleepSettings::default().distance() } else { 0.0 });
             assert_eq!(drawn(&app, 0.0), strand(&app, e).positions()[8]);
         }
         last = now;
@@ -425,7 +428,7 @@ fn a_sleeper_is_drawn_where_it_lies_and_does_not_jump_there() {
 #[test]
 fn sleep_loses_nothing_that_bonds_remember() {
     // Wet hair dried as gravity bends it, and let go by gravity.
-    let bedhead = |sleep: HairSleep| {
+    let bedhead = |sleep: SleepSettings| {
         let mut app = test_app(60.0);
         app.insert_resource(HairDefault(sleep));
         let (hair, ids) = lock(&mut app, 20);
@@ -433,14 +436,14 @@ fn sleep_loses_nothing_that_bonds_remember() {
         run(&mut app, 8.0);
         app.world_mut().write_message(HairTreatment::dry(hair).over(1.0));
         run(&mut app, 6.0);
-        let slept = app.world().get::<Sleepers>(hair).unwrap().asleep;
+        let slept = app.world().get::<SleepCounts>(hair).unwrap().asleep;
         no_gravity(&mut app);
         run(&mut app, 10.0);
         let tips: Vec<Vec3> = ids.iter().map(|e| strand(&app, *e).positions()[8]).collect();
         (tips, slept)
     };
-    let (with, slept) = bedhead(HairSleep::default());
-    let (without, none) = bedhead(HairSleep::never());
+    let (with, slept) = bedhead(SleepSettings::default());
+    let (without, none) = bedhead(SleepSettings::never());
     assert!(slept > 10 && none == 0, "{slept} of 20 slept");
     let apart = with.iter().zip(&without).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
     assert!(apart < 2e-3, "{apart} m apart");
@@ -490,7 +493,7 @@ fn sleep_does_not_depend_on_threads() {
 #[ignore = "measures time: run it alone on an idle machine"]
 fn hair_that_sleeps_costs_next_to_nothing() {
     let mut app = test_app(60.0);
-    app.insert_resource(HairDefault(HairSleep::never()));
+    app.insert_resource(HairDefault(SleepSettings::never()));
     let hair = app.world_mut().spawn(Hair).id();
     for i in 0..4000 {
         let root = Vec3::new((i % 50) as f32, 0.0, (i / 50) as f32) * 2.5e-3;
@@ -508,9 +511,9 @@ fn hair_that_sleeps_costs_next_to_nothing() {
         (0..10).map(one).fold(f64::INFINITY, f64::min)
     };
     let awake = tick(&mut app);
-    app.insert_resource(HairDefault(HairSleep { speed: 1.0, turning: 10.0, seconds: 0.2 }));
+    app.insert_resource(HairDefault(SleepSettings { speed: 1.0, turning: 10.0, seconds: 0.2 }));
     run(&mut app, 0.4);
-    assert!(app.world().get::<Sleepers>(hair).unwrap().all());
+    assert!(app.world().get::<SleepCounts>(hair).unwrap().all());
     let asleep = tick(&mut app);
     println!("awake {} ms, asleep {} ms: 1 in {}", awake * 1e3, asleep * 1e3, awake / asleep);
     // Much less where the engine is built with optimisation.

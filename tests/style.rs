@@ -2,7 +2,7 @@
 
 mod common;
 use bevy::prelude::*;
-use bevy_keratin::{Shower, WindReceived, prelude::*, treatment::WindingProgress};
+use bevy_keratin::{Shower, WindReceived, keratin::treatment::WindingProgress, prelude::*};
 use common::*;
 
 fn wind_on(at: Vec3, aim: Vec3, direction: Vec3) -> f32 {
@@ -196,7 +196,13 @@ fn a_perm_is_set_by_one_call() {
     assert!(rates(&app)[0] < 0.05 && rates(&app)[1] > 0.9, "neutraliser: {:?}", rates(&app));
     run(&mut app, 0.6);
     assert!(rates(&app).iter().all(|rate| *rate > 0.99), "dry: {:?}", rates(&app));
-    assert!(app.world().get::<bevy_keratin::treatment::Treatments>(e).unwrap().acting().is_empty());
+    assert!(
+        app.world()
+            .get::<bevy_keratin::keratin::treatment::Treatments>(e)
+            .unwrap()
+            .acting()
+            .is_empty()
+    );
 }
 
 #[test]

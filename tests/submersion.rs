@@ -4,7 +4,7 @@ mod common;
 
 use bevy::prelude::*;
 use bevy_keratin::{
-    AddedMass, FaultKind, Sleepers, SolverMethod, ZoneShape,
+    AddedMass, FaultKind, SleepCounts, SolverMethod, ZoneShape,
     prelude::*,
     water::drag::{Lock, Water},
 };
@@ -189,11 +189,11 @@ fn hair_that_sleeps_wakes_when_water_comes() {
     let mut app = test_app(60.0);
     let (hair, entity) = one_strand(&mut app, 0.2, 8, Vec3::NEG_Y);
     run(&mut app, 20.0);
-    assert!(app.world().get::<Sleepers>(hair).unwrap().all());
+    assert!(app.world().get::<SleepCounts>(hair).unwrap().all());
     let stream = WaterVolume { current: Vec3::X * 0.3, ..WaterVolume::lake() };
     app.world_mut().spawn((stream, Transform::from_xyz(0.0, 5.0, 0.0)));
     run(&mut app, 2.0);
-    assert!(!app.world().get::<Sleepers>(hair).unwrap().all());
+    assert!(!app.world().get::<SleepCounts>(hair).unwrap().all());
     assert!(tip(&app, entity).x > 0.01, "{}", tip(&app, entity));
 }
 

@@ -3,8 +3,8 @@
 mod common;
 use bevy::{prelude::*, reflect::ReflectMut};
 use bevy_keratin::{
-    DropletRules, FaultKind, HairStep, InvalidValue, SolverMethod, Sweeps, bond::RestShape,
-    prelude::*,
+    DropletRules, FaultKind, HairStep, InvalidValue, SolverMethod, Sweeps,
+    keratin::bond::RestShape, prelude::*,
 };
 use common::*;
 
@@ -219,7 +219,7 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
         BondInfluence { hydrogen: 0.0, ionic: 0.0, disulfide: 0.0, peptide: 0.0 },
         HairSolver { limiter_steps: 99, ..default() },
         Sweeps { iterations: 0, bend: 7.0, ..default() },
-        LockContact { radius: f32::INFINITY, strength: -3.0 },
+        StrandContact { radius: f32::INFINITY, strength: -3.0 },
     ));
     app.world_mut().spawn((HairCollider::default(), Transform::from_xyz(0.0, -2.0, 0.0)));
     app.world_mut().spawn(HairCollider {
@@ -250,8 +250,8 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
             "HairStiffness::bending_length (m)",
             "HairStiffness::damping (s)",
             "HairSubsteps",
-            "LockContact::radius (m)",
-            "LockContact::strength (m/s²)",
+            "StrandContact::radius (m)",
+            "StrandContact::strength (m/s²)",
             "PermRod::radius (m)",
             "PermWinding::from_node",
             "PermWinding::pitch (m)",

@@ -5,7 +5,9 @@ mod common;
 mod locks;
 
 use bevy::prelude::*;
-use bevy_keratin::{AddedMass, DropletRules, FaultKind, Shower, environment::vapour, prelude::*};
+use bevy_keratin::{
+    AddedMass, DropletRules, FaultKind, Shower, forces::environment::vapour, prelude::*,
+};
 use common::{faults, no_gravity, one_strand, run, strand, test_app};
 use core::f32::consts::PI;
 use locks::{clustered_share, tip_spacing};
@@ -17,7 +19,7 @@ const HEAD: f32 = 0.09;
 fn head_of_hair(count: usize, bending_length: f32, model: StrandModel) -> App {
     let mut app = test_app(60.0);
     // Equation 18 is off, as in the experiment.
-    app.insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
+    app.insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }));
     app.insert_resource(HairDefault(AirDrag { rate: 3.0 }));
     app.world_mut().spawn(HairCollider::sphere(HEAD).unwrap());
     let stiffness = HairStiffness::from_bending_length(bending_length).unwrap();
@@ -121,7 +123,7 @@ fn locks_move_together() {
         let mut app = head_of_hair(300, 0.06, StrandModel::Rod);
         let pinned = HairWetting { sliding: 0.0, evaporation: 0.0, ..wetting };
         app.insert_resource(HairDefault(pinned));
-        app.insert_resource(HairDefault(LockContact::default()));
+        app.insert_resource(HairDefault(StrandContact::default()));
         clump(&mut app, drops, 3.0);
         app
     };
@@ -721,7 +723,7 @@ fn no_droplet_lifts_hair_by_more_than_it_weighs() {
 /// over minutes.
 #[test]
 fn rain_wets_a_preset_in_the_time_that_it_takes_in_life() {
-    use bevy_keratin::plant::{HairPreset, Scalp};
+    use bevy_keratin::authoring::plant::{HairPreset, Scalp};
     let mut app = test_app(60.0);
     let head = Sphere::new(0.1).mesh().ico(20).unwrap();
     let preset = HairPreset::Bob;

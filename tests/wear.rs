@@ -11,7 +11,11 @@ use bevy::{
     },
     prelude::*,
 };
-use bevy_keratin::{FaultKind, HairSource, WearError, groom::Groom, plant::*, prelude::*};
+use bevy_keratin::{
+    FaultKind, HairSource, WearError,
+    authoring::{groom::Groom, plant::*},
+    prelude::*,
+};
 use common::{app_with_meshes, faults};
 use std::{thread::sleep, time::Duration};
 

@@ -120,7 +120,7 @@ fn a_fan_and_a_blast_move_hair_in_their_place() {
 #[test]
 fn wind_wakes_hair_that_sleeps_and_calm_lets_it_sleep_again() {
     let mut app = test_app(60.0);
-    app.insert_resource(HairDefault(HairSleep::default()));
+    app.insert_resource(HairDefault(SleepSettings::default()));
     let (_, e) = one_strand(&mut app, 0.1, 8, Vec3::NEG_Y);
     let asleep = |app: &App| app.world().get::<StrandSleep>(e).unwrap().is_asleep();
     run(&mut app, 8.0);

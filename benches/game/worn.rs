@@ -5,7 +5,7 @@ use bevy::{
     mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     prelude::*,
 };
-use bevy_keratin::{plant::HairPreset, prelude::*};
+use bevy_keratin::{authoring::plant::HairPreset, prelude::*};
 use std::{thread::sleep, time::Duration};
 
 /// The bones of the figure that walks.
@@ -26,7 +26,7 @@ pub fn rows(threads: usize) {
             time_parts(&mut app);
         }
         let contact = preset.settings().contact;
-        let without = LockContact { strength: 0.0, ..contact };
+        let without = StrandContact { strength: 0.0, ..contact };
         (0..90).for_each(|_| app.update());
         let [on, off] = in_turns(&mut app, |app, turn| {
             let contact = if turn == 0 { contact } else { without };
@@ -51,7 +51,7 @@ fn figure(threads: usize, skin: &Mesh, preset: HairPreset) -> (App, Entity) {
         .init_asset::<Mesh>()
         .init_asset::<SkinnedMeshInverseBindposes>()
         .add_plugins(HairPlugins::default())
-        .insert_resource(HairDefault(HairSleep::never()))
+        .insert_resource(HairDefault(SleepSettings::never()))
         .add_systems(FixedUpdate, walk);
     app.finish();
     app.cleanup();

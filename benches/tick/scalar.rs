@@ -4,9 +4,9 @@
 use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
     StretchProjection, Sweeps,
-    lanes::{Quaternion, V3},
+    math::lanes::{Quaternion, V3},
     prelude::*,
-    rod::constraint::{BendShares, EdgeWeights, StretchShares, bend_twist, stretch_shear},
+    solver::rod::constraint::{BendShares, EdgeWeights, StretchShares, bend_twist, stretch_shear},
 };
 
 #[derive(Clone)]

@@ -8,14 +8,17 @@
 use super::{common, scalar::Twin};
 use bevy::{prelude::*, tasks::ComputeTaskPool};
 use bevy_keratin::{
-    BondChanges, DropletRules, HairStep, Sleepers, SolverMethod,
-    bond::{BondPlugin, RestShape},
-    contact::{ContactPlugin, Obstacles},
-    environment::EnvironmentPlugin,
+    BondChanges, DropletRules, HairStep, SleepCounts, SolverMethod,
+    forces::{
+        contact::{ContactPlugin, Obstacles},
+        environment::EnvironmentPlugin,
+    },
+    keratin::{
+        bond::{BondPlugin, RestShape},
+        treatment::TreatmentPlugin,
+    },
     prelude::*,
-    sleep::SleepPlugin,
-    solve::SpringPlugin,
-    treatment::TreatmentPlugin,
+    simulation::{sleep::SleepPlugin, solve::SpringPlugin},
     water::WaterPlugin,
 };
 use std::{process::Command, time::Instant};
@@ -100,16 +103,16 @@ fn hanging_rows(threads: usize) {
 /// The same head awake, asleep, and on the two levels of detail.
 fn sleep_row(threads: usize) {
     let mut app = app(threads, Kind::Tick, &head(10_000, 16), Some(head_radius(10_000)));
-    app.insert_resource(HairDefault(LockContact::default()));
+    app.insert_resource(HairDefault(StrandContact::default()));
     let hair = app.world_mut().query_filtered::<Entity, With<Hair>>().single(app.world());
     let hair = hair.expect("one hair");
     app.world_mut().entity_mut(hair).insert(HairLod::default());
     (0..240).for_each(|_| app.update());
     // With limits this wide any motion counts as rest.
-    let sleepy = HairSleep { speed: 1.0, turning: 10.0, seconds: 0.2 };
+    let sleepy = SleepSettings { speed: 1.0, turning: 10.0, seconds: 0.2 };
     let (mut awake, mut asleep) = ([f64::INFINITY; 3], f64::INFINITY);
     for _ in 0..6 {
-        app.insert_resource(HairDefault(HairSleep::never()));
+        app.insert_resource(HairDefault(SleepSettings::never()));
         for (best, share) in awake.iter_mut().zip([0.05, 0.2, 1.0]) {
             app.world_mut().entity_mut(hair).insert(HairScreenShare(share));
             app.update();
@@ -118,8 +121,8 @@ fn sleep_row(threads: usize) {
         app.insert_resource(HairDefault(sleepy));
         (0..16).for_each(|_| app.update());
         asleep = asleep.min(seconds(|| app.update()));
-        let sleepers = app.world().get::<Sleepers>(hair);
-        assert!(sleepers.is_some_and(Sleepers::all), "{sleepers:?}");
+        let sleepers = app.world().get::<SleepCounts>(hair);
+        assert!(sleepers.is_some_and(SleepCounts::all), "{sleepers:?}");
     }
     println!(
         "10000 × 16 with contacts | {threads} | awake {:.2} ms, asleep {:.2} ms, 1 in {:.0} | levels \
@@ -171,10 +174,10 @@ fn row(threads: usize, strands: usize, nodes: usize) {
         ["-".into(), "-".into()]
     } else {
         let app = &mut apps[2];
-        app.insert_resource(HairDefault(LockContact::default()));
+        app.insert_resource(HairDefault(StrandContact::default()));
         (0..240).for_each(|_| app.update());
         let [without, with] = contacts_off_and_on(app, turns);
-        app.insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
+        app.insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }));
         scatter_droplets(app, 1000);
         (0..30).for_each(|_| app.update());
         let wet = (0..turns).map(|_| seconds(|| app.update())).fold(f64::INFINITY, f64::min);
@@ -200,8 +203,8 @@ fn memory() -> [f64; 2] {
     let hair = head(strands, 16);
     let before = resident();
     let mut app = app(1, Kind::Tick, &hair, Some(head_radius(strands)));
-    [0.0, LockContact::default().strength].map(|strength| {
-        app.insert_resource(HairDefault(LockContact { strength, ..default() }));
+    [0.0, StrandContact::default().strength].map(|strength| {
+        app.insert_resource(HairDefault(StrandContact { strength, ..default() }));
         (0..3).for_each(|_| app.update());
         (resident() - before) / strands as f64 / 1e3
     })
@@ -238,8 +241,8 @@ fn seconds(work: impl FnOnce()) -> f64 {
 fn contacts_off_and_on(app: &mut App, turns: usize) -> [f64; 2] {
     let mut best = [f64::INFINITY; 2];
     for _ in 0..turns {
-        for (best, strength) in best.iter_mut().zip([0.0, LockContact::default().strength]) {
-            app.insert_resource(HairDefault(LockContact { strength, ..default() }));
+        for (best, strength) in best.iter_mut().zip([0.0, StrandContact::default().strength]) {
+            app.insert_resource(HairDefault(StrandContact { strength, ..default() }));
             app.update();
             *best = best.min(seconds(|| app.update()));
         }
@@ -322,8 +325,8 @@ fn app(threads: usize, kind: Kind, hair: &[Strand], head: Option<f32>) -> App {
     app.init_resource::<HairDefault<BondInfluence>>()
         .init_resource::<HairGravity>()
         .insert_resource(HairDefault(AirDrag { rate: 3.0 }))
-        .insert_resource(HairDefault(HairSleep::never()))
-        .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
+        .insert_resource(HairDefault(SleepSettings::never()))
+        .insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }));
     // The projection alone is counted by the substep: it takes all six.
     let solver = match kind {
         Kind::Sweeps | Kind::SweepsAlone => {

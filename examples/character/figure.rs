@@ -11,7 +11,10 @@ use bevy::{
     mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     prelude::*,
 };
-use bevy_keratin::{attach::*, collider_fit::*, plant::*, prelude::*};
+use bevy_keratin::{
+    authoring::{attach::*, collider_fit::*, plant::*},
+    prelude::*,
+};
 
 /// The whole of it: moves as it walks.
 #[derive(Component, Default)]

@@ -41,7 +41,7 @@ mod scenes {
 }
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::plant::HairPreset;
+use bevy_keratin::authoring::plant::HairPreset;
 use clap::Parser;
 use stage::Follow;
 use std::{

@@ -8,7 +8,7 @@ use bevy::{
     },
     prelude::*,
 };
-use bevy_keratin::{attach::RootsOnMesh, prelude::*, strand::StrandHistory};
+use bevy_keratin::{authoring::attach::RootsOnMesh, hair::strand::StrandHistory, prelude::*};
 use core::fmt;
 
 /// What has been measured up to now.

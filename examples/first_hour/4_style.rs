@@ -14,7 +14,7 @@ fn main() -> std::process::ExitCode {
         [(&[KeyD, KeyS], "dyed"), (&[KeyW], "washed"), (&[KeyL], "again")];
     show::run("first_4_style", &script, |app| {
         app.add_systems(Startup, setup).add_systems(Update, ask).add_observer(
-            |taken: On<HairdoTaken>, mut commands: Commands| {
+            |taken: On<HairdoCaptured>, mut commands: Commands| {
                 commands.insert_resource(Saved(taken.hairdo.to_bytes()));
             },
         );
@@ -44,14 +44,14 @@ fn ask(
         commands.entity(hair).insert(HairDye::of(DyeLayer { fade: 0.4, ..tips }));
     }
     if keys.just_pressed(KeyS) {
-        commands.trigger(TakeHairdo { entity: hair });
+        commands.trigger(CaptureHairdo { entity: hair });
     }
     if keys.just_pressed(KeyW) {
         treat.write(HairTreatment::wet(hair));
         commands.entity(hair).remove::<HairDye>();
     }
     if let Some(saved) = saved.filter(|_| keys.just_pressed(KeyL)) {
-        commands.trigger(PutOnHairdo { entity: hair, hairdo: Hairdo::from_bytes(&saved.0)? });
+        commands.trigger(ApplyHairdo { entity: hair, hairdo: Hairdo::from_bytes(&saved.0)? });
     }
     Ok(())
 }

@@ -24,9 +24,9 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) {
     commands
         .spawn((WorldAssetRoot(figure), WearHair::new(HairPreset::Wavy).facing(Dir3::Z)))
         .observe(|worn: On<HairWorn>, mut commands: Commands| {
-            commands.trigger(TakeHairdo { entity: worn.hair });
+            commands.trigger(CaptureHairdo { entity: worn.hair });
         });
-    commands.add_observer(|taken: On<HairdoTaken>, mut commands: Commands| {
+    commands.add_observer(|taken: On<HairdoCaptured>, mut commands: Commands| {
         commands.insert_resource(Saved(taken.hairdo.clone()));
     });
 }

@@ -16,7 +16,7 @@ use bevy::{
     prelude::*,
     time::TimeUpdateStrategy,
 };
-use bevy_keratin::{Shower, plant::HairPreset, prelude::*, render::HairView};
+use bevy_keratin::{Shower, authoring::plant::HairPreset, prelude::*, render::HairView};
 use core::f32::consts::{FRAC_PI_2, TAU};
 
 /// Takes the pictures of a loop as they are drawn.
@@ -269,7 +269,7 @@ fn outdoors(arguments: &Arguments, preset: HairPreset, pose: Posed, size: (u32, 
         .insert_resource(pose)
         .add_plugins(figure::FigurePlugin)
         .add_systems(Startup, daylight)
-        .add_systems(PostUpdate, (hold, go_along).chain().before(TransformSystems::Propagate));
+        .add_systems(PostUpdate, (hold, follow_guides).chain().before(TransformSystems::Propagate));
     arguments.thin_out(&mut app);
     let surroundings =
         environment::studio(&mut app.world_mut().resource_mut::<Assets<Image>>(), 450.0);
@@ -331,7 +331,7 @@ fn hold(
 struct Along(Transform);
 
 /// Camera, light and wind stay where they are, seen from the figure.
-fn go_along(
+fn follow_guides(
     posed: Res<Posed>,
     figures: Query<&Transform, (With<figure::Figure>, Without<Along>, Without<Camera>)>,
     mut cameras: Query<&mut Transform, (With<Camera>, Without<Along>)>,

@@ -10,7 +10,7 @@ use crate::{
     set,
 };
 use bevy::{core_pipeline::prepass::DepthPrepass, prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{plant::HairPreset, prelude::*, render::HairView};
+use bevy_keratin::{authoring::plant::HairPreset, prelude::*, render::HairView};
 
 /// Lets time pass (ticks).
 fn run(app: &mut App, ticks: u32) {

@@ -2,7 +2,7 @@
 
 use crate::{Arguments, camera, solid::Paint, stand_in, studio};
 use bevy::prelude::*;
-use bevy_keratin::{FaultKind, groom::*, prelude::*};
+use bevy_keratin::{FaultKind, authoring::groom::*, prelude::*};
 use core::{f32::consts::TAU, fmt};
 
 /// How far the head turns to either side (rad), once a second.

@@ -35,7 +35,7 @@ mod scenes {
 }
 
 use bevy::{asset::LoadState, prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{groom::*, prelude::*};
+use bevy_keratin::{authoring::groom::*, prelude::*};
 use clap::Parser;
 use head::{Measure, Shown};
 use std::{

@@ -2,7 +2,11 @@
 
 use crate::{dressed, mannequin, solid::Paint, trained};
 use bevy::prelude::*;
-use bevy_keratin::{contact::ColliderShape, groom::Groom, plant::Hairline, prelude::*};
+use bevy_keratin::{
+    authoring::{groom::Groom, plant::Hairline},
+    forces::contact::ColliderShape,
+    prelude::*,
+};
 
 /// By how much its proportions may differ from the training head's.
 const ODD: f32 = 1.3;

@@ -131,7 +131,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let mut csv = arguments.csv.as_deref().map(Table::create).transpose()?;
     let mut app = headless_app(scene, arguments, Strewn { count: arguments.droplets, ..default() });
     if arguments.gpu || arguments.no_contact {
-        app.world_mut().resource_mut::<HairDefault<LockContact>>().strength = 0.0;
+        app.world_mut().resource_mut::<HairDefault<StrandContact>>().strength = 0.0;
     }
     if let Some(method) = arguments.solver {
         app.world_mut().resource_mut::<HairDefault<HairSolver>>().method = method;

@@ -168,8 +168,8 @@ fn bare_app(substeps: HairSubsteps) -> App {
         .insert_resource(HairGravity(DOWN))
         .insert_resource(HairDefault(AirDrag { rate: 0.0 }))
         .insert_resource(HairDefault(Cuticle { damage: 0.0, ..default() }))
-        .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }))
-        .insert_resource(HairDefault(HairSleep::never()))
+        .insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }))
+        .insert_resource(HairDefault(SleepSettings::never()))
         .insert_resource(Watch { positions: Vec::new(), strain_peak: 0.0, finite: true })
         .add_systems(HairTick, watch.in_set(HairSystems::Last));
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);

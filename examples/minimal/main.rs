@@ -6,7 +6,7 @@
 mod failure;
 
 use bevy::prelude::*;
-use bevy_keratin::{plant::*, prelude::*};
+use bevy_keratin::{authoring::plant::*, prelude::*};
 
 fn main() {
     // One sentence instead of a panic where there is no display.

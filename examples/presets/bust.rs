@@ -6,7 +6,7 @@ use bevy::{
     light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap},
     prelude::*,
 };
-use bevy_keratin::{plant::HairPreset, prelude::*, render::HairFollowers};
+use bevy_keratin::{authoring::plant::HairPreset, prelude::*, render::HairFollowers};
 
 /// Seconds until hair has settled.
 pub const SETTLING: f32 = 2.0;

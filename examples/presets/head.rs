@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_keratin::{
-    plant::{HairPreset, Scalp},
+    authoring::plant::{HairPreset, Scalp},
     prelude::*,
 };
 

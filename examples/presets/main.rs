@@ -26,7 +26,7 @@ mod scenes {
 }
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{plant::HairPreset, prelude::*};
+use bevy_keratin::{authoring::plant::HairPreset, prelude::*};
 use clap::Parser;
 use picture::Pictures;
 use std::{path::PathBuf, process::ExitCode, time::Instant};

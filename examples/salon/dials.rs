@@ -11,9 +11,9 @@ use bevy::{ecs::system::SystemParam, prelude::*};
 use bevy_egui::egui::{self, Color32, Slider, Ui};
 use bevy_keratin::{
     Shower, SolverMethod,
+    base::setting::{HairSetting, ValueRange},
     prelude::*,
     render::{HairFollowers, HairLook, HairShading, HairView, Melanin, heat},
-    setting::{HairSetting, ValueRange},
 };
 use core::ops::RangeInclusive;
 
@@ -23,7 +23,7 @@ pub struct Settings<'w, 's> {
     stiffness: ResMut<'w, HairDefault<HairStiffness>>,
     influence: ResMut<'w, HairDefault<BondInfluence>>,
     cuticle: ResMut<'w, HairDefault<Cuticle>>,
-    contact: ResMut<'w, HairDefault<LockContact>>,
+    contact: ResMut<'w, HairDefault<StrandContact>>,
     drag: ResMut<'w, HairDefault<AirDrag>>,
     solver: ResMut<'w, HairDefault<HairSolver>>,
     gravity: ResMut<'w, HairGravity>,
@@ -209,8 +209,8 @@ impl Settings<'_, '_> {
         edited!(self.cuticle, |c: &mut Cuticle| {
             slide(ui, &mut c.damage, Cuticle::DAMAGE, "cuticle lost (1/m)");
         });
-        edited!(self.contact, |c: &mut LockContact| {
-            slide_mm(ui, &mut c.radius, LockContact::RADIUS, "lock radius (mm)");
+        edited!(self.contact, |c: &mut StrandContact| {
+            slide_mm(ui, &mut c.radius, StrandContact::RADIUS, "lock radius (mm)");
         });
     }
 

@@ -4,11 +4,13 @@
 use crate::mannequin::{EYE, LID, gradient, head, lash_line};
 use bevy::{math::ops::sin_cos, prelude::*};
 use bevy_keratin::{
-    groom::Groom,
-    lod::LodLevel,
-    plant::{HairPreset, Hairline, Planted, Scalp},
+    authoring::{
+        groom::Groom,
+        plant::{HairPreset, Hairline, Planted, Scalp},
+    },
     prelude::*,
     render::{FollowerRoot, FollowerRoots, HairFollowers, HairView, Melanin},
+    simulation::lod::LodLevel,
 };
 use core::f32::consts::{PI, TAU};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};

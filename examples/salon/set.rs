@@ -1,6 +1,10 @@
 //! What every showing of a scene shares: the scene, the hair, the studio.
 
-use crate::{environment, scenes, scenes::Scene, scenes::ScenePlugin, stage};
+use crate::{
+    environment,
+    scenes::{self, Scene, ScenePlugin},
+    stage,
+};
 use bevy::prelude::*;
 use bevy_keratin::{
     prelude::*,

@@ -8,7 +8,7 @@ use crate::{
     studio,
 };
 use bevy::prelude::*;
-use bevy_keratin::{plant::Hairline, render::Melanin};
+use bevy_keratin::{authoring::plant::Hairline, render::Melanin};
 use core::f32::consts::{FRAC_PI_2, PI};
 
 /// The skull is slimmer than the ball that the hair of a bust feels by that much.

@@ -10,10 +10,10 @@ use crate::{
 use bevy::{ecs::system::SystemState, math::ops::sin, prelude::*};
 use bevy_keratin::{
     Settling,
-    plant::HairPreset,
+    authoring::plant::HairPreset,
+    base::setting::HairSetting,
     prelude::*,
     render::{HairFollowers, HairLook},
-    setting::HairSetting,
 };
 
 /// Those that can be picked.
@@ -46,7 +46,7 @@ struct Tinted(Handle<Mesh>);
 struct Before {
     stiffness: HairStiffness,
     wetting: HairWetting,
-    contact: LockContact,
+    contact: StrandContact,
     solver: HairSolver,
     look: HairLook,
     followers: HairFollowers,

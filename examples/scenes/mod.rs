@@ -200,7 +200,7 @@ pub struct Surroundings<'w> {
     gravity: ResMut<'w, HairGravity>,
     drag: ResMut<'w, HairDefault<AirDrag>>,
     wetting: ResMut<'w, HairDefault<HairWetting>>,
-    contact: ResMut<'w, HairDefault<LockContact>>,
+    contact: ResMut<'w, HairDefault<StrandContact>>,
     substeps: ResMut<'w, HairSubsteps>,
     solver: ResMut<'w, HairDefault<HairSolver>>,
     climate: ResMut<'w, HairClimate>,

@@ -2,7 +2,7 @@
 //! written and read again.
 #![no_main]
 
-use bevy_keratin::groom::{Groom, GroomSettings, yuksel};
+use bevy_keratin::authoring::groom::{Groom, GroomSettings, yuksel};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|file: &[u8]| {

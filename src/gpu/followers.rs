@@ -1,13 +1,13 @@
 //! Strands that follow others, at levels of detail with fewer strands.
 
-use super::layout::{FollowerView, LANES, Layout};
-use crate::lod::follow::{GUIDES, Ties};
+use super::layout::{FollowerView, GROUP_SIZE, Layout};
+use crate::simulation::lod::follow::{GUIDES, GuideOffsets};
 use bevy::math::{Quat, Vec3, ops};
 
 /// Vectors per node of what ties a follower.
 pub(super) const TIES: usize = 6;
 
-/// Where a led root of a follower is, in the ties of its last node.
+/// Where a targets root of a follower is, in the ties of its last node.
 pub(super) const ROOT_PART: usize = 3;
 
 /// How followers move in a substep.
@@ -27,9 +27,9 @@ impl FollowRecord {
     pub(super) fn words(&self) -> [f32; 12] {
         let (turn, way) = self.frame.unwrap_or((Quat::IDENTITY, Vec3::ZERO));
         let [a, b, c, d] = turn.to_array();
-        let decay = ops::exp(-self.since / Ties::OWN_MOTION);
+        let decay = ops::exp(-self.since / GuideOffsets::OWN_MOTION);
         let seconds = if self.seconds > 0.0 { self.seconds } else { 1.0 };
-        [a, b, c, d, way.x, way.y, way.z, seconds, self.since, decay, Ties::OWN_MOTION, 0.0]
+        [a, b, c, d, way.x, way.y, way.z, seconds, self.since, decay, GuideOffsets::OWN_MOTION, 0.0]
     }
 }
 
@@ -69,7 +69,7 @@ pub(super) fn pack(layout: &Layout, followers: &[(usize, FollowerView<'_>)]) -> 
             weights[guide] = *weight;
         }
         head[3] = guides as f32;
-        ends[3] = ops::exp(-since / Ties::OWN_MOTION);
+        ends[3] = ops::exp(-since / GuideOffsets::OWN_MOTION);
         packed[at(edges, 0)] = head;
         packed[at(edges, 1)] = weights;
         packed[at(edges, 2)] = ends;
@@ -79,5 +79,5 @@ pub(super) fn pack(layout: &Layout, followers: &[(usize, FollowerView<'_>)]) -> 
 
 /// Where part `part` of a follower's node lies among the ties.
 pub(super) fn tie_index(layout: &Layout, strand: usize, node: usize, part: usize) -> usize {
-    layout.index(strand, node, part, TIES) - layout.first_follower_slot() * TIES * LANES
+    layout.index(strand, node, part, TIES) - layout.first_follower_slot() * TIES * GROUP_SIZE
 }

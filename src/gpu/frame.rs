@@ -5,9 +5,9 @@ use super::{
     compile::Compiled, hair::GpuHair, record::GpuJournal, residence::HairGpu, shared::Link,
 };
 use crate::{
+    base::setting::Ranged,
+    hair::strand::StrandHistory,
     render::{DrawnElsewhere, HairBuffers, WritesNodes},
-    setting::Ranged,
-    strand::StrandHistory,
 };
 use bevy::{
     core_pipeline::schedule::camera_driver,

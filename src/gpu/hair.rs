@@ -2,8 +2,8 @@
 
 use super::{
     compile::Ready,
+    fingerprint::Fingerprint,
     layout::{Contents, FollowerView, Layout, Reach, SCRATCH, StrandView},
-    print::Print,
     record::GpuJournal,
     residence::{HairResidence, Unsupported, WhyCpu},
     shared::Link,
@@ -11,15 +11,21 @@ use super::{
     treatments::GpuTreatments,
 };
 #[cfg(feature = "groom")]
-use crate::attach::TiedRoots;
+use crate::authoring::attach::TiedRoots;
 use crate::{
-    bond::Bonds,
-    lod::{Follower, Guides, follow::GUIDES},
+    hair::strand::{
+        AddedMass, HeldNodes, OnGpu, SleepCounts, Strand, StrandHistory, StrandSleep, Strands,
+    },
+    keratin::{
+        bond::Bonds,
+        treatment::{HairTreatment, Treatments},
+    },
     render::DrawnElsewhere,
-    rod::SolverMethod,
-    sleep::Disturbance,
-    strand::{AddedMass, HeldNodes, OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, Strands},
-    treatment::{HairTreatment, Treatments},
+    simulation::{
+        lod::{Follower, Guides, follow::GUIDES},
+        sleep::Disturbance,
+    },
+    solver::rod::SolverMethod,
     water::{Moisture, SoakHair},
 };
 use bevy::{
@@ -35,7 +41,7 @@ pub(super) struct GpuHair {
     pub(super) members: Vec<Entity>,
     /// What the strands' arrays were when they were last written to by us, if that was after the hand-over, and
     /// when that was.
-    pub(super) prints: Vec<Print>,
+    pub(super) fingerprints: Vec<Fingerprint>,
     pub(super) at: Tick,
     /// Number of the newest request for its state, and whether that is still to be passed on.
     newest: u64,
@@ -213,7 +219,7 @@ pub(super) fn hand_over(
     let treatments = GpuTreatments::new(acting.unwrap_or_default().to_vec());
     let gpu = GpuHair {
         link: Link::new((ready.number, &ready.device, &ready.queue), ready.kernels.clone(), on),
-        prints: Vec::new(),
+        fingerprints: Vec::new(),
         at: world.read_change_tick(),
         newest: 0,
         is_new: false,
@@ -237,7 +243,7 @@ pub(super) fn hand_over(
     };
     let drawn =
         DrawnElsewhere { low: low - longest, high: high + longest, overstep: 1.0, rests: false };
-    let sleepers = Sleepers { asleep: 0, awake: members.len() - followers };
+    let sleepers = SleepCounts { asleep: 0, awake: members.len() - followers };
     let marks = (OnGpu::HANDED_OVER, Disturbance::default());
     let parts = (gpu, treatments, GpuJournal::default(), drawn, marks, sleepers);
     world.entity_mut(hair).insert((parts, HairResidence::Gpu));

@@ -3,9 +3,9 @@
 
 use super::{
     compile::Compiled,
+    fingerprint::Fingerprint,
     hair::{GpuHair, StaysOnCpu},
     layout::{Contents, StrandState},
-    print::Print,
     record::GpuJournal,
     residence::{HairResidence, Unsupported, WhyCpu},
     shared::{Link, Measured},
@@ -13,13 +13,14 @@ use super::{
     treatments::GpuTreatments,
 };
 use crate::{
-    bond::Bonds,
-    fault::{FaultKind, HairFault},
-    lod::{Follower, Guides, PresentLod},
+    base::fault::{FaultKind, HairFault},
+    hair::strand::{OnGpu, SleepCounts, Strand, StrandHistory, StrandSleep, StrandsArrived},
+    keratin::{bond::Bonds, treatment::Treatments},
     render::DrawnElsewhere,
-    sleep::Disturbance,
-    strand::{OnGpu, Sleepers, Strand, StrandHistory, StrandSleep, StrandsArrived},
-    treatment::Treatments,
+    simulation::{
+        lod::{Follower, Guides, PresentLod},
+        sleep::Disturbance,
+    },
     water::Moisture,
 };
 use bevy::{
@@ -69,7 +70,7 @@ pub(super) fn return_now(world: &mut World, hair: Entity, why: WhyCpu) {
 /// [`Strand`]s and [`Bonds`], which are otherwise as they were handed over. The hair stays there. Returns
 /// whether it was there.
 ///
-/// For tests and tools: a game asks by [`TakeHairdo`](crate::TakeHairdo), which waits for nothing.
+/// For tests and tools: a game asks by [`CaptureHairdo`](crate::CaptureHairdo), which waits for nothing.
 pub fn fetch_strands(world: &mut World, hair: Entity) -> bool {
     let records = world.get_mut::<GpuJournal>(hair);
     let mut records = records.map_or_else(Vec::new, |mut all| core::mem::take(&mut all.records));
@@ -137,7 +138,7 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     // It has not been tied on the GPU.
     #[cfg(feature = "groom")]
     if why == WhyCpu::Unsupported(Unsupported::MovingRoots)
-        && let Some(mut roots) = world.get_mut::<crate::attach::RootsOnMesh>(hair)
+        && let Some(mut roots) = world.get_mut::<crate::authoring::attach::RootsOnMesh>(hair)
     {
         roots.set_changed();
     }
@@ -162,8 +163,8 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents, unused: Un
     let layout = shared.strands.layout();
     let now = world.change_tick();
     let is_tied = gpu.is_tied;
-    if gpu.prints.is_empty() {
-        gpu.prints = shared.strands.take_prints();
+    if gpu.fingerprints.is_empty() {
+        gpu.fingerprints = shared.strands.take_fingerprints();
     }
     for (index, member) in gpu.members.iter().enumerate() {
         let Ok(mut entity) = world.get_entity_mut(*member) else { continue };
@@ -184,13 +185,13 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents, unused: Un
             continue;
         }
         let own = state.get(layout, index);
-        let print = |strand: &Strand| {
+        let fingerprint = |strand: &Strand| {
             let places = strand.positions().iter().copied();
-            Print::of(places, strand.velocities().iter().copied())
+            Fingerprint::of(places, strand.velocities().iter().copied())
         };
-        let known = gpu.prints.get(index).copied().unwrap_or_default();
+        let known = gpu.fingerprints.get(index).copied().unwrap_or_default();
         let (poses, moves) =
-            if written { print(&strand).differs(&known, is_tied) } else { (false, false) };
+            if written { fingerprint(&strand).differs(&known, is_tied) } else { (false, false) };
         let StrandState {
             positions,
             velocities,
@@ -220,8 +221,8 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents, unused: Un
         if !bonds_written && bonds.joints.len() == joints.len() {
             bonds.bypass_change_detection().joints.copy_from_slice(&joints);
         }
-        if let Some(known) = gpu.prints.get_mut(index) {
-            *known = print(to);
+        if let Some(known) = gpu.fingerprints.get_mut(index) {
+            *known = fingerprint(to);
         }
         // The tick has not seen yet what was written meanwhile.
         if written {
@@ -269,7 +270,7 @@ pub(super) fn collect(world: &mut World) {
         let reports: Vec<_> = reports.iter().map(|report| (*report, named(report))).collect();
         drop(shared);
         for (report, strand) in reports {
-            heed(world, hair, &report, strand);
+            apply_report(world, hair, &report, strand);
         }
         if is_lost {
             hand_back(world, hair, None, WhyCpu::DeviceLost);
@@ -303,7 +304,7 @@ pub(super) fn collect(world: &mut World) {
 }
 
 /// Box and faults of a report.
-fn heed(world: &mut World, hair: Entity, report: &Measured, strand: Option<usize>) {
+fn apply_report(world: &mut World, hair: Entity, report: &Measured, strand: Option<usize>) {
     let Ok(mut entity) = world.get_entity_mut(hair) else { return };
     if let Some(mut drawn) = entity.get_mut::<DrawnElsewhere>() {
         let (low, high) = (Vec3::from(report.low), Vec3::from(report.high));
@@ -315,9 +316,9 @@ fn heed(world: &mut World, hair: Entity, report: &Measured, strand: Option<usize
     }
     if let Some(mut journal) = entity.get_mut::<GpuJournal>()
         && journal.bypass_change_detection().slept_in(report.slept)
-        && let Some(mut sleepers) = entity.get_mut::<Sleepers>()
+        && let Some(mut sleepers) = entity.get_mut::<SleepCounts>()
     {
-        *sleepers = Sleepers { asleep: sleepers.asleep + sleepers.awake, awake: 0 };
+        *sleepers = SleepCounts { asleep: sleepers.asleep + sleepers.awake, awake: 0 };
     }
     let count = report.put_back + report.rebuilt;
     let Some(mut gpu) = entity.get_mut::<GpuHair>().filter(|_| count > 0) else { return };

@@ -3,22 +3,28 @@
 use super::{
     followers::FollowRecord,
     hair::GpuHair,
-    led::Leading,
     record::{BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SleepRecord, SubstepRecord},
     sweeps::SweepRecord,
+    targets::Leading,
     treatments::GpuTreatments,
 };
 use crate::{
-    bond::{BondInfluence, Cuticle},
-    contact::{LockContact, Obstacles},
-    environment::{AirDrag, HairGravity, Winds},
-    lod::follow::{Frame, Ties},
+    base::{
+        schedule::{EffectiveSubstep, EffectiveSubsteps, HairStep},
+        setting::{Ranged, Settings},
+    },
+    forces::{
+        contact::{Obstacles, StrandContact},
+        environment::{AirDrag, HairGravity, Winds},
+    },
+    hair::strand::{Hair, SleepCounts, TickPose},
+    keratin::bond::{BondInfluence, Cuticle},
     render::DrawnElsewhere,
-    rod::{HairSolver, HairStiffness, SolverMethod, Sweeps},
-    schedule::{EffectiveSubstep, EffectiveSubsteps, HairStep},
-    setting::{Ranged, Settings},
-    sleep::{Disturbance, HairSleep},
-    strand::{Hair, Sleepers, TickPose},
+    simulation::{
+        lod::follow::{Frame, GuideOffsets},
+        sleep::{Disturbance, SleepSettings},
+    },
+    solver::rod::{HairSolver, HairStiffness, SolverMethod, Sweeps},
 };
 use bevy::prelude::*;
 
@@ -48,7 +54,7 @@ pub(super) fn write_journals(
     gravity: Res<HairGravity>,
     winds: Winds,
     (solver, sweeps, stiffness): (Settings<HairSolver>, Settings<Sweeps>, Settings<HairStiffness>),
-    (drag, contact): (Settings<AirDrag>, Settings<LockContact>),
+    (drag, contact): (Settings<AirDrag>, Settings<StrandContact>),
     (influence, cuticle): (Settings<BondInfluence>, Settings<Cuticle>),
     leading: Leading,
     mut hairs: Query<
@@ -59,7 +65,7 @@ pub(super) fn write_journals(
             &mut GpuJournal,
             Option<&mut GpuTreatments>,
             Option<&GpuHair>,
-            (Option<&Disturbance>, Option<&DrawnElsewhere>, Option<&mut Sleepers>),
+            (Option<&Disturbance>, Option<&DrawnElsewhere>, Option<&mut SleepCounts>),
         ),
         With<Hair>,
     >,
@@ -74,17 +80,19 @@ pub(super) fn write_journals(
         let Some(substep) = substeps.of(hair) else { continue };
         let is_last = step.index + 1 == step.count;
         let follows = follow_record(&mut journal, frame, &substep, is_last);
-        let led = leading.of(hair, &mut held, &mut journal);
+        let targets = leading.of(hair, &mut held, &mut journal);
         let (disturbance, drawn, sleepers) = rest;
         let sleep = disturbance.map(|disturbance| disturbance.sleep);
-        let sleep = sleep.filter(|sleep| sleep.seconds.is_finite()).unwrap_or(HairSleep::never());
+        let sleep =
+            sleep.filter(|sleep| sleep.seconds.is_finite()).unwrap_or(SleepSettings::never());
         let followed = journal.followed;
         let rest = &mut journal.rest;
         if substep.is_first {
             (rest.wakes, rest.has_begun) = (false, false);
             let (low, high) = drawn.map_or((-Vec3::INFINITY, Vec3::INFINITY), |d| (d.low, d.high));
             // Followers move on their own for a while.
-            let follow = on.is_some_and(|on| on.has_followers) && !Ties::are_settled(followed);
+            let follow =
+                on.is_some_and(|on| on.has_followers) && !GuideOffsets::are_settled(followed);
             if follow
                 || frame.has_jumped()
                 || disturbance.is_none_or(|disturbance| disturbance.acts_within(low, high))
@@ -92,7 +100,7 @@ pub(super) fn write_journals(
                 rest.wake();
             }
         }
-        if rest.leads(&led, sleep.distance(), sleep.angle())
+        if rest.add_targets(&targets, sleep.distance(), sleep.angle())
             || treatments.as_ref().is_some_and(|treatments| treatments.act())
         {
             rest.wake();
@@ -103,7 +111,7 @@ pub(super) fn write_journals(
         if let Some(mut sleepers) = sleepers
             && sleepers.asleep > 0
         {
-            *sleepers = Sleepers { asleep: 0, awake: sleepers.asleep + sleepers.awake };
+            *sleepers = SleepCounts { asleep: 0, awake: sleepers.asleep + sleepers.awake };
         }
         let is_first = !core::mem::replace(&mut rest.has_begun, true);
         rest.ticks += u32::from(is_first);
@@ -133,9 +141,9 @@ pub(super) fn write_journals(
         let mut record = SubstepRecord {
             dt: substep.dt,
             gravity: pose.direction_in(gravity),
-            carry: frame.frame_delta(),
+            frame_motion: frame.frame_delta(),
             wind: air.steady_wind().unwrap_or_default(),
-            keep: bevy::math::ops::exp(-drag.of(hair).rate * substep.dt),
+            retained: bevy::math::ops::exp(-drag.of(hair).rate * substep.dt),
             influence: influence.of(hair).as_array(),
             bending_length: stiffness.bending_length,
             damping: stiffness.damping,
@@ -155,7 +163,7 @@ pub(super) fn write_journals(
             notes_before: is_first,
             rests: is_first && frame.has_jumped(),
             shapes: true,
-            led,
+            targets,
             follows,
             sleep,
             ..default()
@@ -166,7 +174,9 @@ pub(super) fn write_journals(
         if record.rests {
             journal.unused_spins.rest();
         }
-        journal.unused_spins.pass(record.keep, record.carry.map(|carry| carry.rotation));
+        journal
+            .unused_spins
+            .pass(record.retained, record.frame_motion.map(|frame_motion| frame_motion.rotation));
         journal.records.push(record);
     }
 }

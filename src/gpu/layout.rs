@@ -1,20 +1,20 @@
 //! Memory layout of strands on the GPU.
 //!
-//! Strands of equal node count form blocks of [`LANES`]; within a block the same vector of neighbouring
+//! Strands of equal node count form blocks of [`GROUP_SIZE`]; within a block the same vector of neighbouring
 //! strands lies side by side, so that neighbouring threads read neighbouring words. Part `m` of `M` vectors
-//! of node `i` is at `((first + i) · M + m) · LANES + lane`, counted in vectors of four numbers.
+//! of node `i` is at `((first + i) · M + m) · GROUP_SIZE + lane`, counted in vectors of four numbers.
 
-use super::print::Print;
+use super::fingerprint::Fingerprint;
 use crate::{
-    bond::{Bonds, model::JointBonds},
-    lod::follow::{GUIDES, Ties},
-    parallel::{Nanos, for_each},
-    strand::{Strand, StrandHistory},
+    base::parallel::{Nanos, for_each},
+    hair::strand::{Strand, StrandHistory},
+    keratin::bond::{Bonds, model::JointBonds},
+    simulation::lod::follow::{GUIDES, GuideOffsets},
 };
 use bevy::math::{Quat, Vec3};
 
 /// Strands per block.
-pub const LANES: usize = 32;
+pub const GROUP_SIZE: usize = 32;
 
 /// Vectors per node in each buffer.
 pub(super) const POSE: usize = 2;
@@ -66,7 +66,7 @@ impl Layout {
         for alike in order.chunk_by(|a, b| count(a) == count(b)) {
             let (is_follower, nodes) = count(&alike[0]);
             let nodes = nodes as u32;
-            for block in alike.chunks(LANES) {
+            for block in alike.chunks(GROUP_SIZE) {
                 let first = layout.slots;
                 layout.blocks.push([first, nodes, block.len() as u32, number]);
                 for (lane, strand) in block.iter().enumerate() {
@@ -131,7 +131,7 @@ impl Layout {
 
     /// How many vectors a buffer of `parts` vectors a node has.
     pub fn vectors(&self, parts: usize) -> usize {
-        self.slots as usize * parts * LANES
+        self.slots as usize * parts * GROUP_SIZE
     }
 
     /// How many of the first blocks are simulated; the others are followers.
@@ -146,7 +146,7 @@ impl Layout {
 
     /// How many vectors a buffer of `parts` vectors a follower's node has.
     pub(super) fn follower_vectors(&self, parts: usize) -> usize {
-        (self.slots as usize - self.simulated.1) * parts * LANES
+        (self.slots as usize - self.simulated.1) * parts * GROUP_SIZE
     }
 
     /// Whether a strand is a follower.
@@ -162,7 +162,7 @@ impl Layout {
     /// Where part `part` of `parts` of a strand's node lies.
     pub fn index(&self, strand: usize, node: usize, part: usize, parts: usize) -> usize {
         let Place { first, lane, .. } = self.places[strand];
-        ((first as usize + node) * parts + part) * LANES + lane as usize
+        ((first as usize + node) * parts + part) * GROUP_SIZE + lane as usize
     }
 }
 
@@ -170,7 +170,7 @@ impl Layout {
 #[derive(Clone, Copy, Debug)]
 pub struct FollowerView<'a> {
     /// How.
-    pub ties: &'a Ties,
+    pub ties: &'a GuideOffsets,
     /// The indices of its guides among the hair's strands.
     pub guides: [u32; GUIDES],
 }
@@ -296,7 +296,7 @@ impl Slots<'_> {
         let edges = view.lengths.len();
         let before = if view.before.len() > edges { view.before } else { view.positions };
         for (node, before) in before.iter().enumerate().take(edges + 1) {
-            let at = |part, parts| (node * parts + part) * LANES + lane;
+            let at = |part, parts| (node * parts + part) * GROUP_SIZE + lane;
             let place = view.positions[node];
             let frame = view.orientations.get(node).copied().unwrap_or(view.root_frame);
             let tension = view.tensions.get(node).copied().unwrap_or(0.0);
@@ -342,7 +342,7 @@ impl Contents {
         let each = [POSE, MOTION, usize::from(layout.has_spins), REST, BONDS];
         let mut blocks: Vec<_> = (layout.blocks.iter())
             .map(|[_, nodes, count, number]| {
-                let sizes = each.map(|each| *nodes as usize * each * LANES);
+                let sizes = each.map(|each| *nodes as usize * each * GROUP_SIZE);
                 let mut own = parts.iter_mut().zip(sizes).map(|(part, size)| {
                     let (own, others) = core::mem::take(part).split_at_mut(size);
                     *part = others;
@@ -372,8 +372,8 @@ impl Contents {
         (contents, reach)
     }
 
-    /// A strand's prints.
-    pub(super) fn print(&self, layout: &Layout, strand: usize) -> Print {
+    /// A strand's fingerprints.
+    pub(super) fn fingerprint(&self, layout: &Layout, strand: usize) -> Fingerprint {
         let vectors = |from: &'_ [[f32; 4]], parts| {
             let of = move |node| layout.index(strand, node, 0, parts);
             let all: Vec<Vec3> =
@@ -381,7 +381,7 @@ impl Contents {
             all
         };
         let (places, speeds) = (vectors(&self.pose, POSE), vectors(&self.motion, MOTION));
-        Print::of(places.iter().copied(), speeds.iter().copied())
+        Fingerprint::of(places.iter().copied(), speeds.iter().copied())
     }
 
     /// What a copy of pose, motion and bonds, one after the other, holds.

@@ -15,7 +15,7 @@
 //! | `hand_back` | hair returns to the CPU; reports and requested states |
 //! | `tick` | where each hair is from this tick on; what acts on it |
 //! | `journal` | a record of each substep of the tick |
-//! | `led` | roots on a mesh and held nodes in it |
+//! | `targets` | roots on a mesh and held nodes in it |
 //! | `followers` | strands that follow others, at levels of detail |
 //! | `treatments` | the clocks of treatments |
 //! | `frame` | a frame in the render world |
@@ -23,11 +23,11 @@
 //! | `layout` | where a strand's numbers lie on the GPU |
 //! | `record`, `sweeps` | what acts on a hair in one substep |
 //! | `pipelines` | the kernels on a device |
-//! | `leads` | led nodes on a device |
+//! | `add_targets` | targets nodes on a device |
 //! | `strands` | a hair's strands there, substeps on a command encoder, reading back |
 //! | `probe` | where strands are, for game code |
 //! | `present` | nodes into the buffer that drawing reads |
-//! | `watch`, `print` | whether a game has written to strands there, and what |
+//! | `watch`, `fingerprint` | whether a game has written to strands there, and what |
 //! | `plugin` | all of it in an app |
 //! | `wgsl/` | the mathematics, file by file the twins of `rod`, `rod::direct`, `bond` and `environment` |
 //!
@@ -67,8 +67,8 @@
 //! | `substep` | a substep | 18,180 | 128 | 8 |
 //! | `sweep` | a substep by the paper's projections | 10,960 | 96 | 10 |
 //! | `follow` | a substep, of followers | 1,080 | 56 | 18 |
-//! | `lead` | a substep, of led nodes | 45 | 16 | 32 |
-//! | `lead_followers` | a tick, of led roots | 28 | 16 | 32 |
+//! | `lead` | a substep, of targets nodes | 45 | 16 | 32 |
+//! | `lead_followers` | a tick, of targets roots | 28 | 16 | 32 |
 //! | `sleep` | a tick, of hair that may sleep | 192 | 16 | 32 |
 //! | `measure` | a frame | 275 | 24 | 32 |
 //! | `present` | a frame | 380 | 32 | 32 |
@@ -90,18 +90,16 @@
 //! written, and with three guides 573 in the tick's last one, with 208 read and 64 written.
 
 mod compile;
+mod fingerprint;
 mod followers;
 mod frame;
 mod hair;
 mod hand_back;
 mod journal;
 mod layout;
-mod leads;
-mod led;
 mod pipelines;
 mod plugin;
 mod present;
-mod print;
 mod probe;
 mod record;
 mod residence;
@@ -109,6 +107,8 @@ mod shared;
 mod strands;
 mod support;
 mod sweeps;
+mod target_buffer;
+mod targets;
 mod tick;
 mod treatments;
 mod watch;
@@ -117,7 +117,9 @@ mod watch;
 pub use followers::FollowRecord;
 pub use hand_back::fetch_strands;
 #[doc(hidden)]
-pub use layout::{BYTES_PER_NODE, Contents, FollowerView, LANES, Layout, StrandState, StrandView};
+pub use layout::{
+    BYTES_PER_NODE, Contents, FollowerView, GROUP_SIZE, Layout, StrandState, StrandView,
+};
 #[doc(hidden)]
 pub use pipelines::{HairKernels, SOURCE};
 pub use plugin::HairGpuPlugin;
@@ -126,11 +128,16 @@ pub use present::{DrawnMoment, DrawnNodes};
 pub use probe::{HairProbe, HairProbed};
 #[doc(hidden)]
 pub use record::{
-    BlowerRecord, GpuJournal, LedNode, MAX_BLOWERS, MAX_OBSTACLES, MOST_TREATMENTS, SubstepRecord,
-    TreatmentRecord,
+    BlowerRecord, GpuJournal, KinematicTarget, MAX_BLOWERS, MAX_OBSTACLES, MOST_TREATMENTS,
+    SubstepRecord, TreatmentRecord,
 };
 pub use residence::{HairGpu, HairResidence, SimulateOn, Unsupported, WhyCpu};
 #[doc(hidden)]
 pub use strands::{GpuReport, GpuStrands};
 #[doc(hidden)]
 pub use sweeps::SweepRecord;
+
+/// The room's share of [the prelude](crate::prelude).
+pub mod prelude {
+    pub use crate::gpu::{HairGpu, HairProbe, HairProbed, HairResidence, SimulateOn};
+}

@@ -55,14 +55,14 @@ pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); GROUPS] {
     let hair = (read(), read(), write(), write(), write(), write(), write(), write());
     let drawn = (read(), read(), read(), read(), read(), read(), write(), frame);
     let measured = (read(), read(), read(), write());
-    let led = (read(), write(), write());
+    let targets = (read(), write(), write());
     let still = (read(), read(), write(), write());
     [
         ("hair", BindGroupLayoutEntries::sequential(STAGE, hair).to_vec()),
         ("hair substep", BindGroupLayoutEntries::single(STAGE, record).to_vec()),
         ("drawn hair", BindGroupLayoutEntries::sequential(STAGE, drawn).to_vec()),
         ("measured hair", BindGroupLayoutEntries::sequential(STAGE, measured).to_vec()),
-        ("led hair", BindGroupLayoutEntries::sequential(STAGE, led).to_vec()),
+        ("targets hair", BindGroupLayoutEntries::sequential(STAGE, targets).to_vec()),
         ("still hair", BindGroupLayoutEntries::sequential(STAGE, still).to_vec()),
     ]
 }
@@ -83,7 +83,7 @@ pub struct HairKernels {
     pub(super) measured: BindGroupLayout,
     pub(super) measure: ComputePipeline,
     /// What leading nodes binds beside a record.
-    pub(super) led: BindGroupLayout,
+    pub(super) targets: BindGroupLayout,
     pub(super) lead: ComputePipeline,
     pub(super) lead_followers: ComputePipeline,
     /// Binds what a substep does.
@@ -117,7 +117,7 @@ impl HairKernels {
         layouts: [BindGroupLayout; GROUPS],
         pipelines: [ComputePipeline; COUNT],
     ) -> Self {
-        let [hair, record, drawn, measured, led, still] = layouts;
+        let [hair, record, drawn, measured, targets, still] = layouts;
         let [substep, present, measure, lead, lead_followers, follow, sleep, sweep] = pipelines;
         Self {
             hair,
@@ -128,7 +128,7 @@ impl HairKernels {
             present,
             measured,
             measure,
-            led,
+            targets,
             lead,
             lead_followers,
             follow,

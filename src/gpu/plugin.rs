@@ -10,10 +10,13 @@ use super::{
     tick::{ask, decide, follow, treat},
 };
 use crate::{
-    schedule::{HairSystems, HairTick, first_substep},
-    setting, sleep,
-    strand::{Hair, ReturnToCpu, keep_required},
-    treatment::HairTreatment,
+    base::{
+        schedule::{HairSystems, HairTick, first_substep},
+        setting,
+    },
+    hair::strand::{Hair, ReturnToCpu, keep_required},
+    keratin::treatment::HairTreatment,
+    simulation::sleep,
     water::SoakHair,
 };
 use bevy::prelude::*;

@@ -1,7 +1,7 @@
 //! Where strands are, for game code, wherever they are simulated.
 
 use super::hair::GpuHair;
-use crate::strand::{OnGpu, Strand, StrandOf};
+use crate::hair::strand::{OnGpu, Strand, StrandOf};
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
 /// Asks where a strand is. Add it to a strand: [`HairProbed`] is triggered on it once a frame, wherever its

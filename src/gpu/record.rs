@@ -5,13 +5,15 @@ use super::{
     sweeps::{self, SweepRecord, UnusedSpins},
 };
 use crate::{
-    bond::Cuticle,
-    lod::follow::Frame,
-    rod::{
+    keratin::bond::Cuticle,
+    simulation::{
+        lod::follow::Frame,
+        sleep::model::{turn, within},
+    },
+    solver::rod::{
         obstacle::{Obstacle, Solid},
         shape::{Placed, Shape},
     },
-    sleep::model::{turn, within},
 };
 use bevy::{
     ecs::{component::Component, entity::EntityHashMap},
@@ -20,7 +22,7 @@ use bevy::{
 use core::ops::Range;
 
 /// Led nodes of substeps that are uploaded together, at most: 64 MB.
-pub(super) const MOST_LED: usize = 1 << 21;
+pub(super) const MAX_TARGETS: usize = 1 << 21;
 
 /// The maximum number of obstacles in a record.
 pub const MAX_OBSTACLES: usize = 128;
@@ -83,8 +85,8 @@ pub(super) struct Rest {
     pub(super) disturbed: u32,
     /// Whether a substep of this tick has been written down.
     pub(super) has_begun: bool,
-    /// The nodes that were led when led nodes last moved.
-    pub(super) led: Vec<LedNode>,
+    /// The nodes that were targets when targets nodes last moved.
+    pub(super) targets: Vec<KinematicTarget>,
 }
 
 impl Rest {
@@ -93,18 +95,23 @@ impl Rest {
         (self.is_asleep, self.wakes) = (false, true);
     }
 
-    /// Whether nodes are led elsewhere than when this last was so.
-    pub(super) fn leads(&mut self, led: &[LedNode], distance: f32, angle: f32) -> bool {
-        let alike = |a: &LedNode, b: &LedNode| {
+    /// Whether nodes are targets elsewhere than when this last was so.
+    pub(super) fn add_targets(
+        &mut self,
+        targets: &[KinematicTarget],
+        distance: f32,
+        angle: f32,
+    ) -> bool {
+        let alike = |a: &KinematicTarget, b: &KinematicTarget| {
             let apart = a.place.unwrap_or_default().distance(b.place.unwrap_or_default());
             (a.strand, a.node, a.place.is_some()) == (b.strand, b.node, b.place.is_some())
                 && within(apart, distance)
                 && within(turn(a.frame, b.frame), angle)
         };
-        let same =
-            led.len() == self.led.len() && led.iter().zip(&self.led).all(|(a, b)| alike(a, b));
+        let same = targets.len() == self.targets.len()
+            && targets.iter().zip(&self.targets).all(|(a, b)| alike(a, b));
         if !same {
-            led.clone_into(&mut self.led);
+            targets.clone_into(&mut self.targets);
         }
         !same
     }
@@ -127,10 +134,10 @@ impl GpuJournal {
         falls
     }
 
-    /// Whether more than so many substeps wait, or more led nodes than are uploaded together.
+    /// Whether more than so many substeps wait, or more targets nodes than are uploaded together.
     pub(super) fn is_long(&self, most: usize) -> bool {
         self.records.len() > most
-            || self.records.iter().map(|record| record.led.len()).sum::<usize>() > MOST_LED
+            || self.records.iter().map(|record| record.targets.len()).sum::<usize>() > MAX_TARGETS
     }
 }
 
@@ -156,7 +163,7 @@ pub struct TreatmentRecord {
 
 /// A node that something else moves: the root of a strand on a mesh, or a held node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LedNode {
+pub struct KinematicTarget {
     /// Index of its strand.
     pub strand: u32,
     /// The node; 0 is the root.
@@ -176,11 +183,11 @@ pub struct SubstepRecord {
     pub gravity: Vec3,
     /// How points at rest in the world move in the hair's frame during the substep; `None` if the
     /// frame rests.
-    pub carry: Option<Isometry3d>,
+    pub frame_motion: Option<Isometry3d>,
     /// The global wind in the hair's frame (m/s).
     pub wind: Vec3,
     /// Share of its velocity relative to the air that hair keeps.
-    pub keep: f32,
+    pub retained: f32,
     /// Influences f_j of the bonds.
     pub influence: [f32; 4],
     /// Requested Δb of every joint, by kind.
@@ -194,7 +201,7 @@ pub struct SubstepRecord {
     pub bending_length: f32,
     /// Kelvin–Voigt time (s).
     pub damping: f32,
-    /// Distance that nodes keep from obstacles (m).
+    /// Distance that nodes retained from obstacles (m).
     pub skin: f32,
     /// Newton steps of the length limiter, at most.
     pub limiter_steps: u32,
@@ -212,15 +219,15 @@ pub struct SubstepRecord {
     pub rests: bool,
     /// Whether rest shapes are computed from the bonds first.
     pub shapes: bool,
-    /// Nodes that are led in this substep, and those that no longer are. All roots or none.
-    pub led: Vec<LedNode>,
+    /// Nodes that are targets in this substep, and those that no longer are. All roots or none.
+    pub targets: Vec<KinematicTarget>,
     /// How followers move; in the tick's last substep.
     pub follows: Option<FollowRecord>,
     /// Whether the hair may sleep; `None` of hair that never does.
     pub sleep: Option<SleepRecord>,
 }
 
-/// Sleep of a hair as a whole in a tick. Rust twin: [`HairSleep`](crate::HairSleep), of all its strands.
+/// Sleep of a hair as a whole in a tick. Rust twin: [`SleepSettings`](crate::SleepSettings), of all its strands.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SleepRecord {
     /// The tick, of those that the hair was given: from 1 on.
@@ -258,7 +265,7 @@ const SHAPES: u32 = 2;
 const REMEMBERS: u32 = 4;
 const NOTES_BEFORE: u32 = 8;
 const RESTS: u32 = 16;
-const LEADS_ROOTS: u32 = 32;
+const TARGETS_ROOTS: u32 = 32;
 const HOLDS: u32 = 64;
 const FOLLOWS: u32 = 128;
 const WAKES: u32 = 256;
@@ -267,7 +274,10 @@ const SWEEPS: u32 = 512;
 impl SubstepRecord {
     /// Appends the record's words.
     pub fn write(&self, out: &mut Vec<u32>) {
-        self.write_of(out, &Indices { led: 0..self.led.len() as u32, ..Indices::default() });
+        self.write_of(
+            out,
+            &Indices { targets: 0..self.targets.len() as u32, ..Indices::default() },
+        );
     }
 
     /// The same for these strands.
@@ -280,23 +290,23 @@ impl SubstepRecord {
             || self.change.iter().chain(&self.share).any(|c| *c != 0.0)
             || !self.treatments.is_empty();
         let flags = [
-            (self.carry.is_some(), CARRIES),
+            (self.frame_motion.is_some(), CARRIES),
             (self.shapes, SHAPES),
             (remembers, REMEMBERS),
             (self.notes_before, NOTES_BEFORE),
             (self.rests, RESTS),
-            (self.led.iter().any(|led| led.node == 0), LEADS_ROOTS),
-            (self.led.iter().any(|led| led.node > 0 && led.place.is_some()), HOLDS),
+            (self.targets.iter().any(|targets| targets.node == 0), TARGETS_ROOTS),
+            (self.targets.iter().any(|targets| targets.node > 0 && targets.place.is_some()), HOLDS),
             (self.follows.is_some(), FOLLOWS),
             (self.sleep.is_none_or(|sleep| sleep.wakes), WAKES),
             (indices.has_spins, SWEEPS),
         ];
         let flags = flags.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
-        let carry = self.carry.unwrap_or_default();
+        let frame_motion = self.frame_motion.unwrap_or_default();
         words.vector(self.gravity, self.dt.to_bits());
-        words.numbers(carry.rotation.to_array());
-        words.vector(carry.translation.into(), flags);
-        words.vector(self.wind, self.keep.to_bits());
+        words.numbers(frame_motion.rotation.to_array());
+        words.vector(frame_motion.translation.into(), flags);
+        words.vector(self.wind, self.retained.to_bits());
         words.numbers(self.influence);
         words.numbers(self.change);
         words.numbers(self.share);
@@ -312,9 +322,9 @@ impl SubstepRecord {
         words.0.resize(start + BEFORE_TREATMENTS, 0);
         let treatments = &self.treatments[..self.treatments.len().min(MOST_TREATMENTS)];
         words.word(treatments.len() as u32);
-        for led in [&indices.led, &indices.followers_led] {
-            words.word(led.start);
-            words.word(led.end - led.start);
+        for targets in [&indices.targets, &indices.followers_led] {
+            words.word(targets.start);
+            words.word(targets.end - targets.start);
         }
         words.word(indices.first_follower_block);
         words.word(indices.first_follower_slot);
@@ -341,8 +351,8 @@ impl SubstepRecord {
 /// Where the kernels find what belongs to a record.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Indices {
-    /// The led nodes of simulated strands, and the led roots of followers.
-    pub(super) led: Range<u32>,
+    /// The targets nodes of simulated strands, and the targets roots of followers.
+    pub(super) targets: Range<u32>,
     pub(super) followers_led: Range<u32>,
     pub(super) first_follower_block: u32,
     pub(super) first_follower_slot: u32,

@@ -1,6 +1,6 @@
 //! Where hair is simulated, where it is asked to be, and why it is elsewhere.
 
-use crate::setting::{Ranged, setting};
+use crate::base::setting::{Ranged, setting};
 use bevy::prelude::*;
 use core::fmt;
 
@@ -8,7 +8,7 @@ use core::fmt;
 /// [`HairDefault<SimulateOn>`](crate::HairDefault) holds. [`HairResidence`] tells where it is.
 ///
 /// Hair is on the GPU only while all that acts on it is supported there, and comes back by
-/// itself where something else does. There it sleeps ([`HairSleep`](crate::HairSleep)) as a whole, once all its
+/// itself where something else does. There it sleeps ([`SleepSettings`](crate::SleepSettings)) as a whole, once all its
 /// strands would.
 ///
 /// Where game code writes to strands on the GPU, the hair comes back with what was written. That is noticed in
@@ -17,7 +17,7 @@ use core::fmt;
 /// ```
 /// # use bevy_keratin::{gpu::SimulateOn, prelude::*}; use bevy::prelude::*;
 /// fn crowd(mut commands: Commands) {
-///     let free = LockContact { strength: 0.0, ..default() };
+///     let free = StrandContact { strength: 0.0, ..default() };
 ///     commands.spawn((Hair, SimulateOn::Gpu, free));
 /// }
 /// ```
@@ -83,7 +83,7 @@ pub enum WhyCpu {
 #[reflect(Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Unsupported {
-    /// Strands push each other ([`LockContact`](crate::LockContact)); a radius or strength of 0 has them not.
+    /// Strands push each other ([`StrandContact`](crate::StrandContact)); a radius or strength of 0 has them not.
     StrandContact,
     /// Water on the hair, droplets, showers or volumes of water anywhere.
     Water,
@@ -104,7 +104,7 @@ pub enum Unsupported {
     /// Roots that are being tied to a mesh.
     MovingRoots,
     /// A level of detail at which no strand is simulated, or a change of which strands are. A level that a
-    /// [`HairBudget`](crate::HairBudget) gives it does not keep it: it goes at that of its size on the screen.
+    /// [`HairBudget`](crate::HairBudget) gives it does not retained it: it goes at that of its size on the screen.
     LevelOfDetail,
     /// It is still [`Settling`](crate::Settling).
     Settling,

@@ -5,7 +5,7 @@ use super::{
     layout::Contents,
     pipelines::HairKernels,
     present::{DrawnMoment, DrawnNodes},
-    record::{MOST_LED, SubstepRecord},
+    record::{MAX_TARGETS, SubstepRecord},
     strands::{GpuStrands, REPORT_BYTES, read_mapped},
 };
 use bevy::{
@@ -43,7 +43,7 @@ pub(super) struct Shared {
     pub(super) firsts: Vec<u32>,
     /// The number of the request for the state, if there is one.
     pub(super) asked: Option<u64>,
-    copy: Option<(u64, Crossing)>,
+    copy: Option<(u64, PendingReadback)>,
     reports: Reports,
     /// Strands whose nodes are asked for, and the tick.
     probe: (Vec<u32>, u32),
@@ -57,7 +57,7 @@ pub(super) struct Shared {
 struct Probed {
     strands: Vec<u32>,
     tick: u32,
-    crossing: Crossing,
+    crossing: PendingReadback,
 }
 
 impl Link {
@@ -148,10 +148,10 @@ impl Shared {
     /// Runs the first pending substeps by themselves where all together lead too many nodes for a buffer.
     fn run_excess(&mut self) {
         loop {
-            let mut led = 0;
+            let mut targets = 0;
             let mut fits = |record: &SubstepRecord| {
-                led += record.led.len();
-                led <= MOST_LED
+                targets += record.targets.len();
+                targets <= MAX_TARGETS
             };
             let fit = self.pending.iter().take_while(|record| fits(record)).count().max(1);
             if fit >= self.pending.len() {
@@ -205,7 +205,7 @@ impl Shared {
             && let Some(number) = self.asked.take()
         {
             let size = Contents::bytes(self.strands.layout());
-            let crossing = Crossing::new(&self.device, size);
+            let crossing = PendingReadback::new(&self.device, size);
             self.strands.copy_state(encoder, &crossing.buffer);
             self.copy = Some((number, crossing));
         }
@@ -235,7 +235,7 @@ impl Shared {
             (0..layout.nodes(strand as usize)).map(move |node| (strand, node))
         };
         let count = strands.iter().flat_map(nodes).count() as u64;
-        let crossing = Crossing::new(&self.device, 16 * count.max(1));
+        let crossing = PendingReadback::new(&self.device, 16 * count.max(1));
         for ((strand, node), to) in strands.iter().flat_map(nodes).zip(0..) {
             self.strands.copy_place((strand as usize, node), encoder, &crossing.buffer, 16 * to);
         }
@@ -292,7 +292,7 @@ impl Shared {
 }
 
 /// A buffer on its way from the device.
-struct Crossing {
+struct PendingReadback {
     buffer: Buffer,
     is_mapped: AtomicBool,
     arrived: Arc<Mutex<Option<Arrived>>>,
@@ -301,7 +301,7 @@ struct Crossing {
 /// What it held; `None` where the device failed.
 type Arrived = Option<Vec<u8>>;
 
-impl Crossing {
+impl PendingReadback {
     fn new(device: &RenderDevice, size: u64) -> Self {
         let buffer = device.create_buffer(&BufferDescriptor {
             label: Some("hair read back"),
@@ -330,7 +330,7 @@ impl Crossing {
 
 /// Reports under way, oldest first, and buffers for more.
 #[derive(Default)]
-struct Reports(VecDeque<Crossing>, Vec<Crossing>);
+struct Reports(VecDeque<PendingReadback>, Vec<PendingReadback>);
 
 /// How many reports may be under way; later frames' counts are added to the next one's.
 const REPORTS: usize = 3;
@@ -341,7 +341,7 @@ impl Reports {
             return;
         }
         let size = REPORT_BYTES as u64;
-        let crossing = self.1.pop().unwrap_or_else(|| Crossing::new(device, size));
+        let crossing = self.1.pop().unwrap_or_else(|| PendingReadback::new(device, size));
         encoder.copy_buffer_to_buffer(report, 0, &crossing.buffer, 0, size);
         encoder.clear_buffer(report, 0, Some(size));
         self.0.push_back(crossing);

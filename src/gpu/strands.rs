@@ -1,12 +1,12 @@
 //! A hair's strands on a device, and their substeps on a command encoder.
 
 use super::{
+    fingerprint::Fingerprint,
     followers,
     layout::{BONDS, Contents, Layout, POSE, REST, Reach, SCRATCH, STILL, StrandState, StrandView},
-    leads::Leads,
     pipelines::HairKernels,
-    print::Print,
     record::{REPORT_WORDS, RESTLESS, SubstepRecord, WORDS},
+    target_buffer::KinematicTargets,
 };
 use bevy::render::{
     render_resource::{
@@ -56,8 +56,8 @@ pub struct GpuStrands {
     groups: [BindGroup; 2],
     records: Option<(Buffer, BindGroup)>,
     words: Vec<u32>,
-    leads: Leads,
-    /// What leading binds beside `leads`.
+    add_targets: KinematicTargets,
+    /// What leading binds beside `add_targets`.
     scratch: Buffer,
     followers: Option<Followers>,
     /// Where simulated strands have been still, once that is asked for; which uploaded substeps end a tick
@@ -68,7 +68,7 @@ pub struct GpuStrands {
     waiting: Mutex<Option<Contents>>,
     reach: Reach,
     /// What the strands were when they were handed over.
-    prints: Mutex<Vec<Print>>,
+    fingerprints: Mutex<Vec<Fingerprint>>,
 }
 
 /// What followers bind: their ties in place of scratch.
@@ -157,14 +157,14 @@ impl GpuStrands {
             groups,
             records: None,
             words: Vec::new(),
-            leads: Leads::default(),
+            add_targets: KinematicTargets::default(),
             scratch,
             followers,
             still: None,
             rests: Vec::new(),
             waiting: Mutex::new(Some(contents)),
             reach,
-            prints: Mutex::default(),
+            fingerprints: Mutex::default(),
         }
     }
 
@@ -173,8 +173,9 @@ impl GpuStrands {
     pub(super) fn settle(&self, queue: &RenderQueue) {
         let waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(waiting) = waiting else { return };
-        let prints = (0..self.layout.strands()).map(|strand| waiting.print(&self.layout, strand));
-        *self.prints.lock().unwrap_or_else(PoisonError::into_inner) = prints.collect();
+        let fingerprints =
+            (0..self.layout.strands()).map(|strand| waiting.fingerprint(&self.layout, strand));
+        *self.fingerprints.lock().unwrap_or_else(PoisonError::into_inner) = fingerprints.collect();
         let Contents { pose, motion, rest, bonds } = waiting;
         let [one, other] = &self.poses;
         let all = [(one, &pose), (other, &pose), (&self.motion, &motion), (&self.rest, &rest)];
@@ -189,8 +190,8 @@ impl GpuStrands {
     }
 
     /// What the strands were when they were handed over, once the device has them.
-    pub(super) fn take_prints(&self) -> Vec<Print> {
-        core::mem::take(&mut *self.prints.lock().unwrap_or_else(PoisonError::into_inner))
+    pub(super) fn take_fingerprints(&self) -> Vec<Fingerprint> {
+        core::mem::take(&mut *self.fingerprints.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// The memory layout of the strands.
@@ -227,7 +228,7 @@ impl GpuStrands {
             return;
         }
         self.words.clear();
-        self.leads.clear();
+        self.add_targets.clear();
         self.rests.clear();
         self.rests
             .extend(substeps.iter().map(|record| record.sleep.is_some_and(|sleep| sleep.ends)));
@@ -235,11 +236,17 @@ impl GpuStrands {
             self.watch_rest(device, kernels);
         }
         for record in substeps {
-            let indices = self.leads.push(&self.layout, record);
+            let indices = self.add_targets.push(&self.layout, record);
             record.write_of(&mut self.words, &indices);
         }
         let followers = self.followers.as_ref().map(|followers| &followers.ties);
-        self.leads.upload(device, queue, kernels, &self.rest, [Some(&self.scratch), followers]);
+        self.add_targets.upload(
+            device,
+            queue,
+            kernels,
+            &self.rest,
+            [Some(&self.scratch), followers],
+        );
         let bytes: &[u8] = bytemuck::cast_slice(&self.words);
         let size = bytes.len() as u64;
         if self.records.as_ref().is_none_or(|(buffer, _)| buffer.size() < size) {
@@ -280,7 +287,7 @@ impl GpuStrands {
             pass.set_bind_group(1, records, &[record]);
             pass.dispatch_workgroups(count as u32, 1, 1);
         };
-        for (pipeline, group, count) in self.leads.of(index, kernels) {
+        for (pipeline, group, count) in self.add_targets.of(index, kernels) {
             dispatch(pipeline, group, count);
         }
         let simulated = self.layout.simulated_blocks();

@@ -6,17 +6,21 @@ use super::{
     treatments::GpuTreatments,
 };
 #[cfg(feature = "groom")]
-use crate::attach::{RootsOnMesh, TiedRoots};
+use crate::authoring::attach::{RootsOnMesh, TiedRoots};
 use crate::{
-    contact::{LockContact, Obstacles},
-    environment::{WindReceived, Winds},
-    lod::{Guides, PresentLod},
-    rod::{HairSolver, SolverMethod, obstacle::Solid, shape::Shape},
-    setting::Settings,
-    settle::Settling,
-    strand::{Hair, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose},
-    style::HairStyle,
-    treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
+    base::setting::Settings,
+    forces::{
+        contact::{Obstacles, StrandContact},
+        environment::{WindReceived, Winds},
+    },
+    hair::strand::{Hair, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose},
+    hairdo::style::HairStyle,
+    keratin::treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
+    simulation::{
+        lod::{Guides, PresentLod},
+        settle::Settling,
+    },
+    solver::rod::{HairSolver, SolverMethod, obstacle::Solid, shape::Shape},
     water::{Droplet, IsWet, Shower, WaterVolume},
 };
 use bevy::{
@@ -28,7 +32,7 @@ use bevy::{
 pub(super) struct Support<'w, 's> {
     model: Settings<'w, 's, StrandModel>,
     solver: Settings<'w, 's, HairSolver>,
-    contact: Settings<'w, 's, LockContact>,
+    contact: Settings<'w, 's, StrandContact>,
     winds: Winds<'w, 's>,
     water: Query<'w, 's, (), Or<(With<WaterVolume>, With<Droplet>, With<Shower>)>>,
     hairs: Query<

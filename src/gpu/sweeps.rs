@@ -1,6 +1,6 @@
 //! What a record holds of hair that the paper's projections solve.
 
-use crate::rod::{StretchProjection, Sweeps, step::spin_exchange};
+use crate::solver::rod::{StretchProjection, Sweeps, step::spin_exchange};
 use bevy::math::{Quat, Vec3};
 
 /// The projections in a substep.
@@ -37,20 +37,20 @@ impl SweepRecord {
 /// method solves: on the CPU air and the hair's frame act on them all the same.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct UnusedSpins {
-    keep: f32,
+    retained: f32,
     turn: Quat,
 }
 
 impl Default for UnusedSpins {
     fn default() -> Self {
-        Self { keep: 1.0, turn: Quat::IDENTITY }
+        Self { retained: 1.0, turn: Quat::IDENTITY }
     }
 }
 
 impl UnusedSpins {
     /// A substep in which air leaves this share of them and points at rest in the world turn like this.
-    pub(super) fn pass(&mut self, keep: f32, turn: Option<Quat>) {
-        self.keep *= keep;
+    pub(super) fn pass(&mut self, retained: f32, turn: Option<Quat>) {
+        self.retained *= retained;
         if let Some(turn) = turn {
             self.turn = (turn * self.turn).normalize();
         }
@@ -58,12 +58,12 @@ impl UnusedSpins {
 
     /// The hair is at rest: it sleeps, or its head has jumped.
     pub(super) fn rest(&mut self) {
-        self.keep = 0.0;
+        self.retained = 0.0;
     }
 
     pub(super) fn apply(&self, spins: &mut [Vec3]) {
-        if self.keep != 1.0 || self.turn != Quat::IDENTITY {
-            spins.iter_mut().for_each(|omega| *omega = self.turn * *omega * self.keep);
+        if self.retained != 1.0 || self.turn != Quat::IDENTITY {
+            spins.iter_mut().for_each(|omega| *omega = self.turn * *omega * self.retained);
         }
     }
 }

@@ -11,13 +11,15 @@ use super::{
     watch::WrittenStrands,
 };
 use crate::{
-    contact::HairReach,
-    lod::PresentLod,
-    rod::SolverMethod,
-    schedule::{HairProcessTime, HairStep},
-    setting::{Ranged, Settings},
-    strand::{AskForStrands, Hair, MissedOnGpu, Strand, StrandOf, Strands},
-    treatment::{HairTreatment, PermWinding, WindingProgress},
+    base::{
+        schedule::{HairProcessTime, HairStep},
+        setting::{Ranged, Settings},
+    },
+    forces::contact::HairReach,
+    hair::strand::{AskForStrands, Hair, MissedOnGpu, Strand, StrandOf, Strands},
+    keratin::treatment::{HairTreatment, PermWinding, WindingProgress},
+    simulation::lod::PresentLod,
+    solver::rod::SolverMethod,
     water::SoakHair,
 };
 use bevy::{
@@ -222,7 +224,7 @@ pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut Wor
             }
             Decision::Returns(why) => {
                 request_return(world, hair, why, is_blocking);
-                tell(hair, why);
+                report_reason(hair, why);
                 continue;
             }
             Decision::Stays(why) => why,
@@ -231,7 +233,7 @@ pub(super) fn follow(In(decisions): In<Vec<(Entity, Decision)>>, world: &mut Wor
         // What is said while it waits says less than why it came.
         if *residence != HairResidence::Cpu(why) && why != WhyCpu::JustBack {
             *residence = HairResidence::Cpu(why);
-            tell(hair, why);
+            report_reason(hair, why);
         }
     }
 }
@@ -252,7 +254,7 @@ fn begin_winding(world: &mut World, hair: Entity) {
 }
 
 /// Says once why a hair that is to be on the device is not.
-fn tell(hair: Entity, why: WhyCpu) {
+fn report_reason(hair: Entity, why: WhyCpu) {
     match why {
         WhyCpu::NotAsked | WhyCpu::Compiling => {}
         WhyCpu::Broken | WhyCpu::DeviceLost | WhyCpu::NoCompute | WhyCpu::TooLarge => {

@@ -1,7 +1,7 @@
 //! Treatments of hair on the GPU: their clocks run here, their bonds are there.
 
 use super::record::{MOST_TREATMENTS, SubstepRecord, TreatmentRecord};
-use crate::{bond::BondKind, treatment::HairTreatment};
+use crate::keratin::{bond::BondKind, treatment::HairTreatment};
 use bevy::prelude::*;
 
 /// The treatments that act on a hair as a whole, on the hair's entity.
@@ -13,16 +13,16 @@ pub(super) struct GpuTreatments {
     ranges: Vec<(core::ops::Range<u32>, Affine)>,
 }
 
-/// Rates b become keep · b + add, kind by kind.
+/// Rates b become retained · b + add, kind by kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Affine {
-    keep: [f32; BondKind::COUNT],
+    retained: [f32; BondKind::COUNT],
     add: [f32; BondKind::COUNT],
 }
 
 impl Default for Affine {
     fn default() -> Self {
-        Self { keep: [1.0; BondKind::COUNT], add: [0.0; BondKind::COUNT] }
+        Self { retained: [1.0; BondKind::COUNT], add: [0.0; BondKind::COUNT] }
     }
 }
 
@@ -31,13 +31,13 @@ impl Affine {
     fn then(&mut self, shares: [f32; BondKind::COUNT], adds: [f32; BondKind::COUNT]) {
         for kind in 0..BondKind::COUNT {
             let left = 1.0 - shares[kind];
-            self.keep[kind] *= left;
+            self.retained[kind] *= left;
             self.add[kind] = self.add[kind] * left + adds[kind];
         }
     }
 
     fn share(&self) -> [f32; BondKind::COUNT] {
-        self.keep.map(|keep| 1.0 - keep)
+        self.retained.map(|retained| 1.0 - retained)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Whether a game has written to strands on the GPU.
 
 use crate::{
-    bond::Bonds,
-    strand::{OnGpu, Strand, StrandOf},
+    hair::strand::{OnGpu, Strand, StrandOf},
+    keratin::bond::Bonds,
     water::Moisture,
 };
 use bevy::{

@@ -5,7 +5,11 @@
 //! squares are pulled from one buffer by vertex index, as ribbons are.
 
 use super::sets::{HairRenderSystems, Interpolate, supported};
-use crate::{Droplet, DropletRules, HairGravity, setting::Ranged, water::model::ball_radius};
+use crate::{
+    base::setting::Ranged,
+    forces::environment::HairGravity,
+    water::{Droplet, DropletRules, model::ball_radius},
+};
 use bevy::{
     asset::{RenderAssetUsages, embedded_asset},
     camera::{primitives::Aabb, visibility::NoAutoAabb},

@@ -2,8 +2,8 @@
 
 use super::drawn_strand::DrawnStrand;
 use crate::{
-    bond::Bonds,
-    strand::{Strand, StrandHistory},
+    hair::strand::{Strand, StrandHistory},
+    keratin::bond::Bonds,
 };
 use bevy::{prelude::*, render::storage::ShaderBuffer};
 use half::{f16, slice::HalfFloatSliceExt};

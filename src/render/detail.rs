@@ -1,6 +1,6 @@
 //! How many strands are drawn, by their size on the screen.
 
-use crate::setting::setting;
+use crate::base::setting::setting;
 use bevy::prelude::*;
 
 setting! {

@@ -17,13 +17,14 @@ use super::{
     thickness::Thickness,
 };
 use crate::{
-    Moisture,
-    bond::Bonds,
-    fault::HairFault,
-    look::{HairDye, HairLook},
-    setting::Settings,
-    settle::Settling,
-    strand::{Hair, Strand, StrandHistory, Strands},
+    base::{fault::HairFault, setting::Settings},
+    hair::{
+        look::{HairDye, HairLook},
+        strand::{Hair, Strand, StrandHistory, Strands},
+    },
+    keratin::bond::Bonds,
+    simulation::settle::Settling,
+    water::Moisture,
 };
 use bevy::{
     asset::RenderAssetUsages,

@@ -34,7 +34,7 @@ use bevy::{
 use core::sync::atomic::Ordering;
 
 /// `@workgroup_size` of `expand.wgsl`.
-const LANES: u32 = 64;
+const WORKGROUP_SIZE: u32 = 64;
 
 pub(super) fn plugin(app: &mut App) {
     let broken = Broken::default();
@@ -194,7 +194,8 @@ pub(super) fn expand(
             expander.0.group(&device, &pipelines, &entries)
         });
         pass.set_bind_group(0, group, &[hair.offset]);
-        let count = hair.rings.count().div_ceil(u64::from(LANES)).min(u64::from(u32::MAX)) as u32;
+        let count =
+            hair.rings.count().div_ceil(u64::from(WORKGROUP_SIZE)).min(u64::from(u32::MAX)) as u32;
         pass.dispatch_workgroups(count.min(most), count.div_ceil(most), 1);
     }
 }

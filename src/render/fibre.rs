@@ -12,9 +12,9 @@ const FILM_VARIANCE: f32 = 0.0064;
 const LOCK_FIBRES: f32 = 3.0;
 const WET_INSIDE: f32 = 0.7;
 const WET_SLEEK: f32 = 0.17;
-const ASTRAY: f32 = 0.8;
+const SCATTERED_SPREAD: f32 = 0.8;
 const MIRRORED: f32 = 4.0;
-const SENT_ON: f32 = 2.0;
+const DISARRAY_SPREAD: f32 = 2.0;
 const TT_FOCUS: f32 = 3.65;
 const TRT_FOCUS: f32 = 17.0;
 const TT_SHARE: f32 = 0.96;
@@ -74,12 +74,13 @@ impl Optics {
     }
 
     /// The share of light that is scattered to the eye, after it has passed through `depth` fibres; a share
-    /// `astray` of it comes from all around its first way.
-    pub fn lobes(&self, a: &Angles, depth: f32, astray: Vec3) -> Vec3 {
+    /// `scattered` of it comes from all around its first way.
+    pub fn lobes(&self, a: &Angles, depth: f32, scattered: Vec3) -> Vec3 {
         let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
-        let lost = astray.element_sum() / 3.0;
-        let spread =
-            depth * (0.25 * self.variance * (1.0 + ASTRAY * lost) + SENT_ON * self.disarray);
+        let lost = scattered.element_sum() / 3.0;
+        let spread = depth
+            * (0.25 * self.variance * (1.0 + SCATTERED_SPREAD * lost)
+                + DISARRAY_SPREAD * self.disarray);
         let turned = depth / TT_FOCUS;
         let f0 = lerp(DRY_SURFACE, WET_SURFACE, self.wet);
         let ratio = 1.0 / (1.19 / a.cos_d + 0.36 * a.cos_d);
@@ -99,9 +100,9 @@ impl Optics {
         let f_tt = fresnel(f0, 0.78 * a.cos_d);
         let cos_tt = (1.0 - h * h * ratio * ratio).clamp(0.0, 1.0).sqrt();
         let onward = Vec3::splat(around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi));
-        let astray = astray * (1.0 - (-turned).exp());
+        let scattered = scattered * (1.0 - (-turned).exp());
         let tt = TT_SHARE
-            * (onward * (1.0 - astray) + matt(-a.cos_phi) * astray)
+            * (onward * (1.0 - scattered) + matt(-a.cos_phi) * scattered)
             * a.along(0.25 * sleek + spread, self.tilt + TILT)
             * (-(1.0 - self.forward_share()) * LOCK_FIBRES * self.lock).exp()
             * (1.0 - f_tt).powi(2)
@@ -130,11 +131,11 @@ impl Optics {
         let onward = (1.0 - p.lit) * (straight * flow.on).map(f32::sqrt);
         let back = p.lit * bulk.reflectance + (1.0 - p.lit) * flow.back;
         let own = (1.0 - a_b / bulk.reflectance.max(a_b)).max(Vec3::ZERO);
-        let astray = (flow.on / straight.max(flow.on).max(Vec3::splat(1e-9))).map(f32::sqrt);
+        let scattered = (flow.on / straight.max(flow.on).max(Vec3::splat(1e-9))).map(f32::sqrt);
         let wide = self.variance * (1.0 + 0.25 * bulk.bounces)
             + MIRRORED * self.disarray * (bulk.bounces - 1.0).max(0.0);
         p.lit * self.lobes(a, 0.0, Vec3::ZERO)
-            + onward * self.lobes(a, p.depth, astray)
+            + onward * self.lobes(a, p.depth, scattered)
             + back * own * matt(a.cos_phi) * a.along(wide, 0.0)
     }
 }
@@ -389,9 +390,9 @@ mod tests {
         let fibre = Optics::new(Vec3::ZERO, 0.38);
         let among = Optics { disarray: 0.1, ..fibre };
         for depth in [0.5, 2.0, 10.0] {
-            for (fibre, astray) in [(fibre, 0.0), (fibre, 1.0), (among, 0.5)] {
-                let sent = over_all_light(0.3, |a| fibre.lobes(a, depth, Vec3::splat(astray))).x;
-                assert!((0.9..=1.1).contains(&sent), "{sent} after {depth} fibres, {astray}");
+            for (fibre, scattered) in [(fibre, 0.0), (fibre, 1.0), (among, 0.5)] {
+                let sent = over_all_light(0.3, |a| fibre.lobes(a, depth, Vec3::splat(scattered))).x;
+                assert!((0.9..=1.1).contains(&sent), "{sent} after {depth} fibres, {scattered}");
             }
         }
     }

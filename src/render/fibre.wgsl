@@ -26,12 +26,12 @@ const FILM_VARIANCE: f32 = 0.0064;
 const LOCK_FIBRES: f32 = 3.0; // by eye, no measurement is known
 // By how much more light spreads along the fibres for each that it goes through, where it has lost its way: it meets
 // more of them. From tresses lit from behind.
-const ASTRAY: f32 = 0.8;
+const SCATTERED_SPREAD: f32 = 0.8;
 // Variance along a fibre of light that others have sent it, by their disarray. Between two fibres that is twice as
 // much. What is mirrored turns by twice the angle, of which half lies along the fibre: four times. What has gone on
 // through, into any direction around, has turned by half of that.
 const MIRRORED: f32 = 4.0;
-const SENT_ON: f32 = 2.0;
+const DISARRAY_SPREAD: f32 = 2.0;
 // Concentrations of TT and TRT around the fibre (1/rad^2) and the light in them, after Karis.
 const TT_FOCUS: f32 = 3.65;
 const TRT_FOCUS: f32 = 17.0;
@@ -108,10 +108,10 @@ fn fresnel(f0: f32, cosine: f32) -> f32 {
 }
 
 // What a fibre of forward share `a_f` sends to the eye of light that has gone through `depth` fibres, a share
-// `astray` of which comes from all around its first way.
-fn lobes(a: Angles, o: Optics, a_f: vec3<f32>, depth: f32, astray: vec3<f32>) -> vec3<f32> {
-    let lost = (astray.x + astray.y + astray.z) / 3.0;
-    let spread = depth * (0.25 * o.variance * (1.0 + ASTRAY * lost) + SENT_ON * o.disarray);
+// `scattered` of which comes from all around its first way.
+fn lobes(a: Angles, o: Optics, a_f: vec3<f32>, depth: f32, scattered: vec3<f32>) -> vec3<f32> {
+    let lost = (scattered.x + scattered.y + scattered.z) / 3.0;
+    let spread = depth * (0.25 * o.variance * (1.0 + SCATTERED_SPREAD * lost) + DISARRAY_SPREAD * o.disarray);
     let turned = depth / TT_FOCUS;
     let f0 = mix(DRY_SURFACE, WET_SURFACE, o.wet);
     let ratio = 1.0 / (1.19 / a.cos_d + 0.36 * a.cos_d);
@@ -125,14 +125,14 @@ fn lobes(a: Angles, o: Optics, a_f: vec3<f32>, depth: f32, astray: vec3<f32>) ->
             + o.film * fresnel(FILM_SURFACE, grazing) * along(a, FILM_VARIANCE + spread, o.tilt));
 
     // TT: straight through. Of the angle, this fibre's share is its own; what the surface reflects
-    // away is the mean over the width, which keeps the energy at all angles. What is astray leaves as from a matt
+    // away is the mean over the width, which keeps the energy at all angles. What is scattered leaves as from a matt
     // cylinder that is lit from there.
     let own = (1.0 + a.cos_phi) / (1.0 + depth) - 1.0;
     let h = sqrt(saturate(0.5 + 0.5 * own)) * (1.0 + ratio * (0.6 - 0.8 * own));
     let f_tt = fresnel(f0, 0.78 * a.cos_d);
     let cos_tt = sqrt(saturate(1.0 - h * h * ratio * ratio));
     let onward = around(1.0 / (1.0 / TT_FOCUS + turned), -a.cos_phi);
-    let tt = TT_SHARE * mix(vec3(onward), vec3(matt(-a.cos_phi)), astray * (1.0 - exp(-turned)))
+    let tt = TT_SHARE * mix(vec3(onward), vec3(matt(-a.cos_phi)), scattered * (1.0 - exp(-turned)))
         * along(a, 0.25 * sleek + spread, o.tilt + TILT) * (1.0 - f_tt) * (1.0 - f_tt)
         * exp(-2.0 * cos_tt / cos_inside * o.absorption - (1.0 - a_f) * LOCK_FIBRES * o.lock);
 
@@ -236,10 +236,10 @@ fn scattered(a: Angles, o: Optics, p: Passage, layers: f32, whole: f32) -> vec3<
     let flow = flow_in(bulk, DIFFUSE * within * layers, DIFFUSE * layers);
     let straight = a_f * exp(-(1.0 - a_f) * p.behind);
     let onward = (1.0 - p.lit) * sqrt(straight * flow.on);
-    let astray = sqrt(flow.on / max(max(straight, flow.on), vec3(1e-9)));
+    let scattered = sqrt(flow.on / max(max(straight, flow.on), vec3(1e-9)));
     let back = p.lit * bulk.reflectance + (1.0 - p.lit) * flow.back;
     let own = max(1.0 - a_b / max(bulk.reflectance, a_b), vec3(0.0));
     let wide = o.variance * (1.0 + 0.25 * bulk.bounces) + MIRRORED * o.disarray * max(bulk.bounces - 1.0, 0.0);
     let body = back * own * matt(a.cos_phi) * along(a, wide, 0.0);
-    return p.lit * lobes(a, o, a_f, 0.0, vec3(0.0)) + onward * lobes(a, o, a_f, p.depth, astray) + body;
+    return p.lit * lobes(a, o, a_f, 0.0, vec3(0.0)) + onward * lobes(a, o, a_f, p.depth, scattered) + body;
 }

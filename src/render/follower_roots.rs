@@ -5,9 +5,11 @@ use super::{
     followers::HairFollowers,
 };
 use crate::{
-    fault::{FaultKind, HairFault},
-    grid::KdTree,
-    setting::{Ranged, setting},
+    base::{
+        fault::{FaultKind, HairFault},
+        setting::{Ranged, setting},
+    },
+    math::grid::KdTree,
 };
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
@@ -29,7 +31,7 @@ setting! {
    pub struct FollowerRoot {
        /// The root's place at rest, in the hair's frame (m), as the guides' are. Roots that are planted with
        /// guides in a mesh's space are moved with them: see
-       /// [`RootsOnMesh::strands_from_mesh`](crate::attach::RootsOnMesh::strands_from_mesh).
+       /// [`RootsOnMesh::strands_from_mesh`](crate::authoring::attach::RootsOnMesh::strands_from_mesh).
        pub place: Vec3 = Vec3::ZERO;
        /// The strand's length, up to four times that of its guides.
        pub length: f32 = 0.0, "m" in LENGTH: 0.0..=f32::INFINITY, safe 0.0..=2.0,

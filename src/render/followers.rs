@@ -1,7 +1,7 @@
 //! Followers: the strands between the simulated ones. Their roots and guides are chosen once for a
 //! groom; their shape is computed in the shader (and in [`curve`](super::curve)).
 
-use crate::setting::setting;
+use crate::base::setting::setting;
 use bevy::prelude::*;
 
 setting! {

@@ -14,7 +14,7 @@ use super::{
     view::HairView,
     volume::{self, BrightLights, HairVolume},
 };
-use crate::{contact::HairCollider, look::HairLook, setting::Settings};
+use crate::{base::setting::Settings, forces::contact::HairCollider, hair::look::HairLook};
 use bevy::{
     asset::RenderAssetUsages, camera::primitives::Aabb, prelude::*, render::storage::ShaderBuffer,
 };

@@ -7,7 +7,7 @@ use super::{
     smoothing::Marks,
     thickness::{PIECES, Thickness},
 };
-use crate::look::{HairDye, HairLook, HairShading, MAX_LAYERS};
+use crate::hair::look::{HairDye, HairLook, HairShading, MAX_LAYERS};
 use bevy::{
     material::OpaqueRendererMethod,
     mesh::MeshVertexBufferLayoutRef,

@@ -100,11 +100,11 @@ pub use wet_look::WetLook;
 #[cfg(feature = "gpu")]
 pub(crate) use {kernel::why_broken, sets::WritesNodes};
 
-/// What is drawn by it; see [`look`](crate::look).
+/// What is drawn by it; see [`look`](crate::hair::look).
 #[doc(no_inline)]
-pub use crate::look::{HairDye, HairLook, HairShading, Melanin};
+pub use crate::hair::look::{HairDye, HairLook, HairShading, Melanin};
 
-use crate::{setting, strand::Hair};
+use crate::{base::setting, hair::strand::Hair};
 use bevy::{
     app::FixedMain,
     asset::{AssetEventSystems, embedded_asset, io::embedded::EmbeddedAssetRegistry},
@@ -231,4 +231,9 @@ impl Plugin for HairRenderPlugin {
         volume::plugin(app);
         beads::finish(app);
     }
+}
+
+/// The room's share of [the prelude](crate::prelude).
+pub mod prelude {
+    pub use crate::render::{HairDetail, HairFollowers, HairSmoothing, HairView};
 }

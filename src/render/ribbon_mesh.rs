@@ -85,7 +85,7 @@ pub(super) struct RibbonLevel {
 const FEW_RINGS: [(u32, u32); 2] = [(5, 4), (4, 2)];
 const MOST_LEVELS: u32 = 10;
 /// Share by which the next level has room, so that a camera that trembles does not change meshes.
-const ROOM: f32 = 0.95;
+const HYSTERESIS: f32 = 0.95;
 
 impl RibbonLevel {
     /// All strands.
@@ -98,7 +98,7 @@ impl RibbonLevel {
         let holds =
             |level: u32, room: f32| share * strands as f32 <= room * (strands >> level) as f32;
         let mut level = before.min(MOST_LEVELS);
-        while level < MOST_LEVELS && holds(level + 1, ROOM) {
+        while level < MOST_LEVELS && holds(level + 1, HYSTERESIS) {
             level += 1;
         }
         while level > 0 && !holds(level, 1.0) {

@@ -1,7 +1,7 @@
 //! How large hair is on the screen, for its levels of detail.
 
 use super::HairBuffers;
-use crate::lod::{HairScreenShare, model::screen_share};
+use crate::simulation::lod::{HairScreenShare, model::screen_share};
 use bevy::{
     camera::{Camera, primitives::Aabb},
     prelude::*,

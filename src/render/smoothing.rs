@@ -74,7 +74,7 @@ type Smoothed = (
 );
 
 /// Tells passes what their cameras ask for, and hair whether to mark its pixels.
-fn tell(
+fn request_passes(
     mut commands: Commands,
     cameras: Query<Smoothed, With<Camera3d>>,
     clear: Option<Res<ClearColor>>,
@@ -122,5 +122,5 @@ pub(super) fn plugin(app: &mut App) {
     }
     bevy::asset::embedded_asset!(app, "smoothing.wgsl");
     app.add_plugins(FullscreenMaterialPlugin::<Smooth>::default());
-    app.add_systems(PostUpdate, tell.before(HairRenderSystems));
+    app.add_systems(PostUpdate, request_passes.before(HairRenderSystems));
 }

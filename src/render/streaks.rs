@@ -1,6 +1,6 @@
 //! Which drawn strands are in the streaks of layers of dye.
 
-use crate::look::{HairDye, Streaks};
+use crate::hair::look::{HairDye, Streaks};
 use bevy::prelude::*;
 
 /// The streaks of each layer, of layers that have any.

@@ -1,6 +1,6 @@
 //! What is drawn of the hair: its look, or a quantity as a heat map.
 
-use crate::{bond::BondKind, setting::Ranged};
+use crate::{base::setting::Ranged, keratin::bond::BondKind};
 use bevy::prelude::*;
 
 /// What is shown of a hair. Component of a [`Hair`](crate::Hair), may change at any time; where

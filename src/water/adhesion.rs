@@ -7,8 +7,8 @@ use super::{
     moisture::node_lengths,
     strand_block::{NodeSlice, StrandBlock, StrandLane},
 };
-use crate::grid::FoundBalls;
-use crate::lanes::{LANES, Lane, Real, V3, dispatch, lanes_in, load, load3, splat3, store3};
+use crate::math::grid::FoundBalls;
+use crate::math::lanes::{LANES, Lane, Real, V3, dispatch, lanes_in, load, load3, splat3, store3};
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -255,7 +255,6 @@ impl ContactParams<'_> {
         puller: &Puller,
     ) -> Adhesion<S> {
         let zero = f32x16::splat(simd, 0.0);
-        let one = f32x16::splat(simd, 1.0);
         let offset = splat3(simd, puller.center) - p;
         let squared = offset.dot(offset);
         let inside = squared.simd_lt(f32x16::splat(simd, puller.reach));
@@ -271,8 +270,9 @@ impl ContactParams<'_> {
         }
         let distance = Real::sqrt(squared);
         let most = puller.strength * self.wetting.adhesion * self.dt;
-        let x = distance * puller.steep - puller.middle;
-        let pull = (one - x * x) * most / distance;
+        let lit = |value: f32| f32x16::splat(simd, value);
+        let pull =
+            model::adhesion(distance, lit(puller.steep), lit(puller.middle)) * most / distance;
         Adhesion {
             touches,
             pulls: lanes,
@@ -467,7 +467,16 @@ mod tests {
             for (i, p) in strand_lane.positions.iter().enumerate() {
                 let others = field.drops.iter().filter(|d| d.ride != Some(strand_lane.strand));
                 let expected: Vec3 = others
-                    .map(|d| model::pull(d.at - *p, d.r_min, d.r_max) * (30.0 / 3600.0))
+                    .map(|d| {
+                        let (offset, width) = (d.at - *p, d.r_max - d.r_min);
+                        let distance = offset.length();
+                        if distance < 1e-9 || distance > d.r_max {
+                            return Vec3::ZERO;
+                        }
+                        let middle = (d.r_max + d.r_min) / width;
+                        let f = model::adhesion(distance, 2.0 / width, middle);
+                        offset / distance * f * (30.0 / 3600.0)
+                    })
                     .sum();
                 let expected = if i == 0 { Vec3::ZERO } else { expected };
                 assert!(strand_lane.velocities[i].distance(expected) < 1e-5, "{s} {i}");

@@ -5,10 +5,9 @@ use super::{
     moisture::node_lengths,
 };
 use crate::{
-    contact::{Bridged, Film, LockContact, LockNeighbours},
-    schedule::EffectiveSubsteps,
-    setting::Settings,
-    strand::{AddedMass, Hair, OnGpu, Sleepers, Strand, StrandOf, StrandSleep, Strands},
+    base::{schedule::EffectiveSubsteps, setting::Settings},
+    forces::contact::{Bridged, Film, LockNeighbours, StrandContact},
+    hair::strand::{AddedMass, Hair, OnGpu, SleepCounts, Strand, StrandOf, StrandSleep, Strands},
 };
 use bevy::prelude::*;
 
@@ -50,22 +49,22 @@ pub(super) fn update_is_wet(
 /// Bridges of water between the wet strands of each hair, found by its contact lists.
 pub(super) fn join_wet_strands(
     steps: EffectiveSubsteps,
-    contact: Settings<LockContact>,
+    contact: Settings<StrandContact>,
     wetting: Settings<HairWetting>,
     mut scratch: ResMut<WaterField>,
     mut hairs: Query<
-        (Entity, &Strands, &IsWet, &mut LockNeighbours, Option<&Sleepers>),
+        (Entity, &Strands, &IsWet, &mut LockNeighbours, Option<&SleepCounts>),
         With<Hair>,
     >,
     mut strands: Query<(&mut Strand, &Moisture, &AddedMass, &StrandSleep), With<StrandOf>>,
 ) {
     let rows = &mut scratch.bypass_change_detection().rows;
     for (hair, members, wet, mut neighbours, sleepers) in &mut hairs {
-        if sleepers.is_some_and(Sleepers::all) {
+        if sleepers.is_some_and(SleepCounts::all) {
             continue;
         }
         let Some(substep) = steps.of(hair) else { continue };
-        let LockContact { radius, strength } = contact.of(hair);
+        let StrandContact { radius, strength } = contact.of(hair);
         let wetting = wetting.of(hair);
         let joins = radius > 0.0
             && strength > 0.0

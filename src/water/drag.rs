@@ -4,7 +4,7 @@
 //! lock, or a single fibre. The water inside moves with it, and as much again is displaced when it
 //! moves across its axis (added mass of a cylinder; along the axis there would be none).
 
-use crate::strand::InWater;
+use crate::hair::strand::InWater;
 use bevy::{math::ops, prelude::*};
 
 /// Smallest Reynolds number that was measured; smaller ones are clamped to it.
@@ -90,12 +90,16 @@ impl Lock {
         let inert = own + share * displaced;
         let through = velocity - water.current;
         let [across, along] = self.drag(through, tangent, water).map(|d| share * d * dt / inert);
-        let keep = 1.0 / (1.0 + across);
+        let retained = 1.0 / (1.0 + across);
         let correction = tangent * (through.dot(tangent) * (across - along));
-        let slowed = (velocity + water.current * across + correction) * keep;
+        let slowed = (velocity + water.current * across + correction) * retained;
         let weight = own + share * (self.submerged_mass(water) - own);
-        let in_water =
-            InWater { share, inertia: inert / (keep * own), gravity: weight * keep / inert, keep };
+        let in_water = InWater {
+            share,
+            inertia: inert / (retained * own),
+            gravity: weight * retained / inert,
+            retained,
+        };
         (slowed, in_water)
     }
 }
@@ -205,7 +209,7 @@ mod tests {
             prop_assert!(left.length() <= through.length() * 1.001 + 1e-3, "{} of {}", left, through);
             prop_assert!(left.dot(through) >= -1e-3 * (1.0 + through.length_squared()));
             prop_assert!(in_water.inertia.is_finite() && in_water.inertia >= 1.0 - 1e-5);
-            prop_assert!((0.0..=1.0).contains(&in_water.keep) && in_water.gravity <= 1.0);
+            prop_assert!((0.0..=1.0).contains(&in_water.retained) && in_water.gravity <= 1.0);
         }
     }
 }

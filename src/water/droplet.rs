@@ -5,8 +5,8 @@ use super::{
     model::{ball_radius, ball_volume},
 };
 use crate::{
-    setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
-    strand::TickPose,
+    base::setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+    hair::strand::TickPose,
 };
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};

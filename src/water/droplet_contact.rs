@@ -9,16 +9,17 @@ use super::{
     moisture::node_lengths,
     strand_block::{StrandBlocks, StrandLane},
 };
+use crate::{base::schedule::HairProcessTime, forces::environment::vapour::WATER};
 use crate::{
-    contact::WetRow,
-    environment::HairGravity,
-    lanes::LANES,
-    parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
-    schedule::HairStep,
-    setting::{Ranged, Settings},
-    strand::{AddedMass, Hair, OnGpu, PerHair, Pose, Strand, StrandOf, TickPose},
+    base::{
+        parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
+        schedule::HairStep,
+        setting::{Ranged, Settings},
+    },
+    forces::{contact::WetRow, environment::HairGravity},
+    hair::strand::{AddedMass, Hair, OnGpu, PerHair, Pose, Strand, StrandOf, TickPose},
+    math::lanes::LANES,
 };
-use crate::{environment::vapour::WATER, schedule::HairProcessTime};
 use bevy::prelude::*;
 use core::slice::from_ref;
 use fearless_simd::Level;

@@ -6,19 +6,21 @@ use super::{
     moisture::{AFTER_DRIP, Exposure, WaterConditions, WaterLoss, node_lengths},
 };
 use crate::{
-    bond::{BondChanges, BondKind, Bonds},
-    environment::{
+    base::{
+        fault::{FaultKind, HairFault},
+        parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
+        schedule::{HairProcessTime, HairStep},
+        setting::{Ranged, Settings, report},
+    },
+    forces::environment::{
         Blown, BlownAir, HairGravity, Winds,
         vapour::{DryingAir, WATER},
     },
-    fault::{FaultKind, HairFault},
-    parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
-    schedule::{HairProcessTime, HairStep},
-    setting::{Ranged, Settings, report},
-    strand::{
+    hair::strand::{
         AddedMass, Hair, InWater, MissedOnGpu, OnGpu, PerHair, Pose, Strand, StrandOf, Strands,
         TickPose,
     },
+    keratin::bond::{BondChanges, BondKind, Bonds},
 };
 use bevy::{
     ecs::{entity_disabling::Disabled, system::SystemParam},
@@ -304,7 +306,7 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
     added_mass.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
 }
 
-/// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close keep
+/// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close retained
 /// the present shape by equation 16.
 fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChanges) {
     for (i, (b, wet)) in bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate() {

@@ -1,7 +1,7 @@
 //! `Interaction`: droplets that touch merge.
 
 use super::{Droplet, DropletRules, model::ball_radius};
-use crate::schedule::HairStep;
+use crate::base::schedule::HairStep;
 use bevy::{platform::collections::HashMap, prelude::*};
 
 /// Failed candidates after which a drop stops searching in a tick. Only drops whose merged volume

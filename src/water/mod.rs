@@ -7,7 +7,7 @@
 //! air, damp or dry, still or from a [`Blower`](crate::Blower), dries it again; the bonds close in
 //! the current shape. Bond rates follow from the water alone.
 //!
-//! Droplets find strands through the unbounded [uniform grid](crate::grid), without testing all
+//! Droplets find strands through the unbounded [uniform grid](crate::math::grid), without testing all
 //! pairs. They never change archetype: tens of thousands move in one pass.
 //!
 //! Every drop of water is accounted for in [`WaterLedger`]: in = held + out.
@@ -36,7 +36,7 @@ pub use moisture::{HairWetting, Moisture};
 pub use systems::WaterPlugin;
 pub use volume::WaterVolume;
 
-use crate::setting::{Ranged, ValueRange, Violations, setting};
+use crate::base::setting::{Ranged, ValueRange, Violations, setting};
 use bevy::prelude::*;
 
 setting! {
@@ -72,21 +72,22 @@ impl DropletRules {
     }
 }
 
-/// Sets the water of a hair or strand at once, like a bucket of water or a towel. A message; the
-/// [`WaterLedger`] counts the difference.
+/// Sets the water of a hair or strand at once, like a bucket of water or a towel: an event on its entity, or a
+/// message where many are sent. Acts in the next tick; the [`WaterLedger`] counts the difference.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// fn bath(hair: Single<Entity, With<Hair>>, mut soak: MessageWriter<SoakHair>) {
-///     soak.write(SoakHair::dripping(*hair));
+/// fn bath(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
+///     commands.trigger(SoakHair::dripping(*hair));
 ///     // and to dry it off at once
-///     soak.write(SoakHair { target: *hair, wetness: 0.0 });
+///     commands.trigger(SoakHair { target: *hair, wetness: 0.0 });
 /// }
 /// ```
-#[derive(Message, Reflect, Clone, Copy, Debug, PartialEq)]
+#[derive(EntityEvent, Message, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct SoakHair {
     /// The [`Hair`](crate::Hair) or strand.
+    #[event_target]
     pub target: Entity,
     /// Share of what hair can bind: 1 soaks through, 0 dries. Up to 1 the film is removed; the
     /// excess over 1 is film, as a share of the film that stays on hair: 2 is dripping wet. Range
@@ -166,4 +167,12 @@ impl WaterLedger {
             0.0
         }
     }
+}
+
+/// The room's share of [the prelude](crate::prelude).
+pub mod prelude {
+    pub use crate::water::{
+        Droplet, DropletRules, HairDried, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
+        WaterVolume,
+    };
 }

@@ -1,6 +1,6 @@
 //! Droplets as pure functions: the wet-hair paper's equation 2, falling, sliding, hanging.
 
-use crate::lanes::{Real, V3};
+use crate::math::lanes::{Real, V3};
 use glam::Vec3;
 
 /// Surface tension of water (N/m).
@@ -10,29 +10,16 @@ pub(crate) const WATER_VISCOSITY: f32 = 1e-3;
 /// 3/8 of the drag coefficient of a sphere (0.5) times the density of air over that of water.
 const SPHERE_DRAG: f32 = 0.375 * 0.5 * 0.0012;
 
-/// \[W\] equation 2: strength of a droplet's pull at a `distance` (m) from its centre,
-/// f = 1 − ((2d − r_min − r_max)/(r_min − r_max))² within r_max, else 0.
+/// \[W\] equation 2: strength of a droplet's pull at a `distance` d (m) from its centre,
+/// f = 1 − ((2d − r_min − r_max)/(r_min − r_max))², for d up to r_max.
 ///
-/// It is 1 midway, 0 at both radii and negative inside r_min, where it repels.
-#[inline]
-pub fn adhesion(distance: f32, r_min: f32, r_max: f32) -> f32 {
-    if distance > r_max {
-        return 0.0;
-    }
-    let x = (2.0 * distance - r_min - r_max) / (r_min - r_max);
-    1.0 - x * x
-}
-
-/// Equation 2 with the direction that the paper omits: along `offset`, from the node to the
-/// droplet. Zero at the droplet's centre.
-#[inline]
-pub fn pull(offset: Vec3, r_min: f32, r_max: f32) -> Vec3 {
-    let squared = offset.length_squared();
-    if squared > r_max * r_max || squared < 1e-18 {
-        return Vec3::ZERO;
-    }
-    let distance = squared.sqrt();
-    offset * (adhesion(distance, r_min, r_max) / distance)
+/// It is 1 midway, 0 at both radii and negative inside r_min, where it repels. `steepness` is 2/(r_max − r_min)
+/// (1/m), `middle` (r_max + r_min)/(r_max − r_min). The direction, which the paper omits, is that from the node to
+/// the droplet.
+#[inline(always)]
+pub fn adhesion<R: Real>(distance: R, steepness: R, middle: R) -> R {
+    let x = distance * steepness - middle;
+    x.lit(1.0) - x * x
 }
 
 /// Radius (m) of a ball of `volume` (m³).
@@ -109,12 +96,10 @@ mod tests {
 
     #[test]
     fn adhesion_is_equation_2() {
-        let f = |d| adhesion(d, 0.003, 0.015);
+        let f = |d: f32| adhesion(d, 2.0 / 0.012, 0.018 / 0.012);
         assert!((f(0.009) - 1.0).abs() < 1e-6);
         assert!(f(0.003).abs() < 1e-6 && f(0.015).abs() < 1e-5);
-        assert!(f(0.001) < 0.0 && f(0.016) == 0.0);
-        assert_eq!(pull(Vec3::ZERO, 0.003, 0.015), Vec3::ZERO);
-        assert!(pull(Vec3::X * 0.009, 0.003, 0.015).distance(Vec3::X) < 1e-6);
+        assert!(f(0.001) < 0.0);
     }
 
     #[test]

@@ -7,19 +7,22 @@ use super::{
     volume::Volumes,
 };
 use crate::{
-    HairCollider,
-    contact::seen_from,
-    environment::{
-        HairGravity, Winds,
-        vapour::{DryingAir, WATER, transfer},
+    base::{
+        fault::HairFault,
+        parallel::{Nanos, for_each},
+        schedule::{HairProcessTime, HairStep},
+        setting::{Ranged, Settings, Violations, report},
     },
-    fault::HairFault,
-    lanes::V3,
-    parallel::{Nanos, for_each},
-    rod::obstacle::Obstacle,
-    schedule::{HairProcessTime, HairStep},
-    setting::{Ranged, Settings, Violations, report},
-    strand::{Hair, PerHair, Pose, Strand, StrandOf, TickPose},
+    forces::{
+        contact::{HairCollider, seen_from},
+        environment::{
+            HairGravity, Winds,
+            vapour::{DryingAir, WATER, transfer},
+        },
+    },
+    hair::strand::{Hair, PerHair, Pose, Strand, StrandOf, TickPose},
+    math::lanes::V3,
+    solver::rod::obstacle::Obstacle,
 };
 use bevy::prelude::*;
 

@@ -9,11 +9,15 @@ use super::{
     volume::{LocalVolumes, Volumes},
 };
 use crate::{
-    environment::HairGravity,
-    parallel::{Nanos, for_each_part, tables},
-    schedule::EffectiveSubsteps,
-    setting::{Ranged, Settings},
-    strand::{AddedMass, Hair, InWater, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose},
+    base::{
+        parallel::{Nanos, for_each_part, tables},
+        schedule::EffectiveSubsteps,
+        setting::{Ranged, Settings},
+    },
+    forces::environment::HairGravity,
+    hair::strand::{
+        AddedMass, Hair, InWater, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose,
+    },
 };
 use bevy::prelude::*;
 

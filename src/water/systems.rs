@@ -12,9 +12,11 @@ use super::{
     volume::WaterVolume,
 };
 use crate::{
-    schedule::{HairStep, HairSystems, HairTick, first_substep},
-    setting,
-    strand::{Hair, MissedOnGpu, OnGpu, Strand, TickPose, keep_required},
+    base::{
+        schedule::{HairStep, HairSystems, HairTick, first_substep},
+        setting,
+    },
+    hair::strand::{Hair, MissedOnGpu, OnGpu, Strand, TickPose, keep_required},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -41,6 +43,9 @@ impl Plugin for WaterPlugin {
             .register_type::<SoakHair>()
             .register_required_components::<Strand, Moisture>()
             .register_required_components::<Hair, IsWet>()
+            .add_observer(|soak: On<SoakHair>, mut messages: MessageWriter<SoakHair>| {
+                messages.write(*soak.event());
+            })
             .add_observer(count_lost_droplet)
             .add_observer(count_lost_moisture)
             .add_systems(HairTick, submerge.in_set(HairSystems::Submersion))

@@ -2,9 +2,9 @@
 
 use super::drag::Water;
 use crate::{
-    environment::ZoneShape,
-    setting::{InvalidValue, Ranged, setting},
-    strand::{Pose, TickPose},
+    base::setting::{InvalidValue, Ranged, setting},
+    forces::environment::ZoneShape,
+    hair::strand::{Pose, TickPose},
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
 

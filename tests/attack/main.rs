@@ -10,7 +10,7 @@ mod operations;
 use bevy::{prelude::*, reflect::ReflectMut};
 use bevy_keratin::{
     BondChanges, DropletRules, FaultKind, HairSubsteps, InvalidValue, Shower, SoakHair,
-    bond::RestShape, prelude::*, strand::TickPose,
+    hair::strand::TickPose, keratin::bond::RestShape, prelude::*,
 };
 use common::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
@@ -201,13 +201,13 @@ fn a_rest_shape_that_was_written_into_is_made_again() {
 #[test]
 fn what_a_strand_cannot_do_without_is_put_back() {
     let removals: [(&str, fn(&mut EntityWorldMut<'_>)); 7] = [
-        ("Follower", |e| _ = e.remove::<bevy_keratin::lod::Follower>()),
+        ("Follower", |e| _ = e.remove::<bevy_keratin::simulation::lod::Follower>()),
         ("AddedMass", |e| _ = e.remove::<bevy_keratin::AddedMass>()),
         ("Bonds", |e| _ = e.remove::<Bonds>()),
         ("BondChanges", |e| _ = e.remove::<BondChanges>()),
         ("RestShape", |e| _ = e.remove::<RestShape>()),
-        ("StrandHistory", |e| _ = e.remove::<bevy_keratin::strand::StrandHistory>()),
-        ("StrandSleep", |e| _ = e.remove::<bevy_keratin::strand::StrandSleep>()),
+        ("StrandHistory", |e| _ = e.remove::<bevy_keratin::hair::strand::StrandHistory>()),
+        ("StrandSleep", |e| _ = e.remove::<bevy_keratin::hair::strand::StrandSleep>()),
     ];
     for (name, remove) in removals {
         let mut app = test_app(60.0);

@@ -11,10 +11,10 @@ use bevy::{
     reflect::{PartialReflect, ReflectMut, ReflectRef, std_traits::ReflectDefault},
 };
 use bevy_keratin::{
-    AddedMass, BondChanges, HairLod, HairSleep, HairSubsteps, Shower, SoakHair, SolverMethod,
+    AddedMass, BondChanges, HairLod, HairSubsteps, Shower, SleepSettings, SoakHair, SolverMethod,
     WindReceived, WindZone,
+    hair::strand::{StrandSleep, TickPose},
     prelude::*,
-    strand::{StrandSleep, TickPose},
 };
 use rand::{RngExt, rngs::Xoshiro256PlusPlus, seq::IndexedRandom};
 
@@ -478,7 +478,7 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             "far away".into()
         }
         (31, Some(hair), ..) => {
-            world.entity_mut(hair).insert(HairSleep::default());
+            world.entity_mut(hair).insert(SleepSettings::default());
             "may sleep".into()
         }
         (32, _, Some(strand), _) => {

@@ -3,9 +3,9 @@
 use crate::lab::{Device, LabStrand, Random, plain};
 use bevy::{math::Isometry3d, prelude::*};
 use bevy_keratin::{
-    bond::model::JointBonds,
     gpu::{MAX_OBSTACLES, StrandState, SubstepRecord},
-    rod::obstacle::{Obstacle, Solid},
+    keratin::bond::model::JointBonds,
+    solver::rod::obstacle::{Obstacle, Solid},
 };
 
 /// Strands of mixed lengths that fall onto a ball and a floor.
@@ -24,7 +24,7 @@ fn records(count: usize) -> Vec<SubstepRecord> {
     (0..count)
         .map(|i| SubstepRecord {
             obstacles: obstacles.to_vec(),
-            carry: (i % 4 < 2).then_some(turn),
+            frame_motion: (i % 4 < 2).then_some(turn),
             change: [if i % 2 == 0 { -0.01 } else { 0.01 }, 0.0, 0.0, 0.0],
             ..plain()
         })
@@ -166,10 +166,10 @@ fn records_of_no_numbers_leave_strands_whole() {
         ("an infinite gravity", |r| r.gravity.y = f32::INFINITY),
         ("dt", |r| r.dt = NAN),
         ("wind", |r| r.wind.x = NAN),
-        ("keep", |r| r.keep = NAN),
-        ("carry", |r| r.carry = Some(Isometry3d::from_translation(Vec3::NAN))),
+        ("retained", |r| r.retained = NAN),
+        ("frame_motion", |r| r.frame_motion = Some(Isometry3d::from_translation(Vec3::NAN))),
         ("turn", |r| {
-            r.carry = Some(Isometry3d::from_rotation(Quat::from_xyzw(NAN, 0.0, 0.0, 1.0)));
+            r.frame_motion = Some(Isometry3d::from_rotation(Quat::from_xyzw(NAN, 0.0, 0.0, 1.0)));
         }),
         ("influence", |r| r.influence[0] = NAN),
         ("change", |r| r.change = [NAN; 4]),
@@ -198,7 +198,7 @@ fn records_of_no_numbers_leave_strands_whole() {
         // Each once at most; to where the substep began, unless not even that is known.
         assert!(report.put_back + report.rebuilt <= 70, "{what}: {report:?}");
         let is_kept = report.rebuilt == 0;
-        assert!(is_kept || ["carry", "turn"].contains(&what), "{what}: {report:?}");
+        assert!(is_kept || ["frame_motion", "turn"].contains(&what), "{what}: {report:?}");
         for (i, state) in found.iter().enumerate() {
             let mut numbers = bits(state).into_iter().map(f32::from_bits);
             assert!(numbers.all(f32::is_finite), "{what}: strand {i}");
@@ -222,9 +222,9 @@ fn a_shaken_strand_of_64_segments_holds_its_length() {
     let place = |i: usize| 0.1 * (core::f32::consts::TAU * 3.0 * dt * i as f32).sin();
     let substep = |i: usize| SubstepRecord {
         dt,
-        keep: (-2.0 * dt).exp(),
+        retained: (-2.0 * dt).exp(),
         // In the frame of the root, which is shaken.
-        carry: Some(Isometry3d::from_translation(Vec3::X * (place(i) - place(i + 1)))),
+        frame_motion: Some(Isometry3d::from_translation(Vec3::X * (place(i) - place(i + 1)))),
         ..plain()
     };
     let records: Vec<SubstepRecord> = (0..720).map(substep).collect();

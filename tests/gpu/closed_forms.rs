@@ -3,7 +3,7 @@
 
 use crate::lab::{Device, LabStrand, plain};
 use bevy::prelude::*;
-use bevy_keratin::{bond::model::JointBonds, gpu::SubstepRecord};
+use bevy_keratin::{gpu::SubstepRecord, keratin::bond::model::JointBonds};
 
 const EDGES: usize = 8;
 
@@ -55,7 +55,10 @@ fn held(device: &Device, strand: &mut LabStrand, changes: &[Change]) {
 fn free(device: &Device, strand: &mut LabStrand, changes: &[Change]) {
     let dt: f32 = 1.0 / 180.0;
     let mut records =
-        vec![SubstepRecord { gravity: Vec3::ZERO, keep: (-6.0 * dt).exp(), dt, ..plain() }; 720];
+        vec![
+            SubstepRecord { gravity: Vec3::ZERO, retained: (-6.0 * dt).exp(), dt, ..plain() };
+            720
+        ];
     for (record, change) in records.iter_mut().zip(changes) {
         record.change = *change;
     }

@@ -31,10 +31,12 @@ fn events() -> [Event; 8] {
             "a hairdo is asked for",
             |world, hair| {
                 world.init_resource::<Taken>();
-                world.entity_mut(hair).observe(|taken: On<HairdoTaken>, mut all: ResMut<Taken>| {
-                    all.0 = Some(taken.hairdo.clone());
-                });
-                world.trigger(TakeHairdo { entity: hair });
+                world.entity_mut(hair).observe(
+                    |taken: On<HairdoCaptured>, mut all: ResMut<Taken>| {
+                        all.0 = Some(taken.hairdo.clone());
+                    },
+                );
+                world.trigger(CaptureHairdo { entity: hair });
                 world.flush();
             },
             |stage| {

@@ -7,8 +7,8 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_keratin::{
-    bond::model::JointBonds,
-    gpu::{GpuStrands, LedNode, SOURCE, SubstepRecord, TreatmentRecord},
+    gpu::{GpuStrands, KinematicTarget, SOURCE, SubstepRecord, TreatmentRecord},
+    keratin::bond::model::JointBonds,
 };
 
 /// Masses and stiffnesses as the vectors have them, in place of what hair makes of its lengths. They stand where
@@ -63,7 +63,7 @@ impl Substep {
             share: four(some, 1),
             joints: 0..0,
         });
-        let root = LedNode {
+        let root = KinematicTarget {
             strand: 0,
             node: 0,
             place: Some(self.p[0].into()),
@@ -73,11 +73,11 @@ impl Substep {
             dt: self.dt,
             gravity: self.gravity.into(),
             damping: self.damping,
-            keep: 1.0,
+            retained: 1.0,
             wind: Vec3::X * (self.axial[0] * self.l[0]),
             limiter_steps: 0,
             treatments: treatments.collect(),
-            led: vec![root],
+            targets: vec![root],
             ..plain()
         }
     }

@@ -5,15 +5,15 @@ use bevy::prelude::*;
 use bevy_keratin::{
     SolverMethod,
     gpu::{GpuJournal, GpuStrands, HairResidence, StrandState, StrandView, Unsupported, WhyCpu},
+    hair::strand::StrandHistory,
     prelude::*,
-    strand::StrandHistory,
 };
 
 /// Strands on a ball, over a floor, in wind and before a blower; a second ball goes by.
 fn scene() -> (App, Entity, Entity) {
     let mut app = test_app(60.0);
-    app.insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }))
-        .insert_resource(HairDefault(HairSleep::never()))
+    app.insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }))
+        .insert_resource(HairDefault(SleepSettings::never()))
         .insert_resource(HairWind { velocity: Vec3::new(0.6, 0.0, 0.2), gusts: 0.0, ..default() });
     let world = app.world_mut();
     let hair = world.spawn((Hair, GpuJournal::default(), Transform::default())).id();
@@ -97,7 +97,7 @@ fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
         tick(&mut app, hair, passing, start);
         let journal = app.world().get::<GpuJournal>(hair).unwrap();
         assert_eq!(journal.records.len(), 3);
-        assert!(journal.records.iter().all(|r| r.carry.is_some() && !r.blowers.is_empty()));
+        assert!(journal.records.iter().all(|r| r.frame_motion.is_some() && !r.blowers.is_empty()));
         let states = device.run(&mut on, &journal.records);
         let (moved, dried) = apart(&app, &members, &before);
         let (places, rates) = apart(&app, &members, &states);
@@ -134,7 +134,7 @@ fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
     };
     assert_eq!(reported(|_, _| ()), None);
     let contact = reported(|app, hair| {
-        app.world_mut().entity_mut(hair).insert(LockContact::default());
+        app.world_mut().entity_mut(hair).insert(StrandContact::default());
     });
     assert_eq!(contact, Some(Unsupported::StrandContact));
     let sweeps = reported(|app, hair| {

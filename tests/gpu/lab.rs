@@ -8,11 +8,11 @@ use bevy::{
 };
 use bevy_keratin::{
     StretchProjection, Sweeps,
-    bond::model::{JointBonds, cuticle_factor},
-    environment::wind::wind,
+    forces::environment::wind::wind,
     gpu::{GpuStrands, HairKernels, StrandState, StrandView, SubstepRecord, SweepRecord},
-    lanes::{LANES, put3, put4, take3, take4},
-    rod::{
+    keratin::bond::model::{JointBonds, cuticle_factor},
+    math::lanes::{LANES, put3, put4, take3, take4},
+    solver::rod::{
         block::BlockLanes,
         constraint::stiffness_per_iteration,
         direct::{self, DirectParams},
@@ -151,12 +151,12 @@ impl LabStrand {
 pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord) {
     let mut block = BlockLanes::default();
     block.resize(strands[0].positions.len());
-    let SubstepRecord { dt, keep, .. } = *record;
-    let carry = record.carry.unwrap_or_default();
+    let SubstepRecord { dt, retained: keep, .. } = *record;
+    let carry = record.frame_motion.unwrap_or_default();
     let mut asked = Vec::new();
     for (lane, s) in strands.iter_mut().enumerate() {
         let (root_from, edges) = (carry * s.positions[0], s.lengths.len());
-        if let Some(Isometry3d { rotation, .. }) = record.carry {
+        if let Some(Isometry3d { rotation, .. }) = record.frame_motion {
             s.positions.iter_mut().skip(1).for_each(|p| *p = carry * *p);
             s.velocities.iter_mut().for_each(|v| *v = rotation * *v);
             s.orientations.iter_mut().for_each(|q| *q = (rotation * *q).normalize());
@@ -332,7 +332,7 @@ pub fn plain() -> SubstepRecord {
     SubstepRecord {
         dt: 1.0 / 180.0,
         gravity: Vec3::NEG_Y * 9.8,
-        keep: (-2.0f32 / 180.0).exp(),
+        retained: (-2.0f32 / 180.0).exp(),
         influence: [0.33, 0.30, 0.20, 0.17],
         bending_length: 0.13,
         damping: 0.01,
@@ -350,7 +350,7 @@ pub fn swept(projection: StretchProjection) -> SubstepRecord {
     let dt = 1.0 / 360.0;
     SubstepRecord {
         dt,
-        keep: (-2.0 * dt).exp(),
+        retained: (-2.0 * dt).exp(),
         limiter_steps: settings.limiter_steps,
         sweeps: Some(SweepRecord { settings }),
         ..plain()

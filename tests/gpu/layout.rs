@@ -3,8 +3,8 @@
 use crate::lab::{LabStrand, Random};
 use bevy::prelude::*;
 use bevy_keratin::{
-    gpu::{BlowerRecord, Contents, LANES, Layout, MAX_BLOWERS, MAX_OBSTACLES, SubstepRecord},
-    rod::obstacle::{Obstacle, Solid},
+    gpu::{BlowerRecord, Contents, GROUP_SIZE, Layout, MAX_BLOWERS, MAX_OBSTACLES, SubstepRecord},
+    solver::rod::obstacle::{Obstacle, Solid},
 };
 use proptest::prelude::*;
 
@@ -29,7 +29,7 @@ proptest! {
             for lane in 0..*strands {
                 let strand = layout.strand_of(number + lane).unwrap();
                 let index = layout.index(strand, 0, 0, 1);
-                prop_assert_eq!(index, *first as usize * LANES + lane as usize);
+                prop_assert_eq!(index, *first as usize * GROUP_SIZE + lane as usize);
             }
         }
         prop_assert_eq!(layout.strand_of(strands), None);

@@ -10,11 +10,10 @@ use bevy::{
     prelude::*,
 };
 use bevy_keratin::{
-    attach::RootsOnMesh,
+    authoring::{attach::RootsOnMesh, plant::RootOnMesh},
     gpu::{HairResidence, Unsupported, WhyCpu},
-    plant::RootOnMesh,
+    keratin::treatment::WindingProgress,
     prelude::*,
-    treatment::WindingProgress,
 };
 
 /// A triangle below all hair that roots are tied to.

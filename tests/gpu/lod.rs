@@ -9,8 +9,8 @@ use bevy::prelude::*;
 use bevy_keratin::{
     HairEstimate, LodLevel, PresentLod,
     gpu::{HairResidence, Unsupported, WhyCpu},
+    hair::strand::StrandSleep,
     prelude::*,
-    strand::StrandSleep,
 };
 
 /// Half of the strands, an eighth, none.
@@ -168,7 +168,7 @@ pub fn a_budget_is_that_of_the_processor(stage: &mut Stage) {
         assert_eq!((lod(stage).budget_levels, followers(stage)), (0, 24));
         assert_eq!(estimate(stage), HairEstimate::default());
         // What cannot go for another reason has what the budget leaves it.
-        let parts = (LockContact::default(), HairScreenShare(1.0));
+        let parts = (StrandContact::default(), HairScreenShare(1.0));
         stage.app.world_mut().entity_mut(hair).insert(parts);
         (30..36).for_each(|tick| turn_head(stage, tick));
         let contact = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::StrandContact));

@@ -9,8 +9,8 @@ use bevy::prelude::*;
 use bevy_keratin::{
     FaultKind, HairStep,
     gpu::{HairResidence, Unsupported, WhyCpu},
+    hair::strand::OnGpu,
     prelude::*,
-    strand::OnGpu,
 };
 
 /// Other hair on the same device, after some ticks there: a software device takes seconds for the kernels.
@@ -225,7 +225,7 @@ fn what_is_not_supported_brings_hair_home_and_is_done_there(stage: &mut Stage) {
     // Contact, as another setting; and back once that is gone.
     on_gpu(stage, 6, 5);
     let hair = stage.hair;
-    stage.app.world_mut().entity_mut(hair).insert(LockContact::default());
+    stage.app.world_mut().entity_mut(hair).insert(StrandContact::default());
     stage.run(1);
     let contact = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::StrandContact));
     assert_eq!(stage.residence(), contact);
@@ -353,11 +353,11 @@ fn hairdos_are_asked_for_and_arrive(stage: &mut Stage) {
     struct Taken(Option<Hairdo>);
     stage.app.init_resource::<Taken>();
     stage.app.world_mut().entity_mut(hair).observe(
-        |taken: On<HairdoTaken>, mut all: ResMut<Taken>| all.0 = Some(taken.hairdo.clone()),
+        |taken: On<HairdoCaptured>, mut all: ResMut<Taken>| all.0 = Some(taken.hairdo.clone()),
     );
     let refused = Hairdo::of(stage.app.world(), hair).unwrap_err();
-    assert!(refused.to_string().contains("TakeHairdo"), "{refused}");
-    stage.app.world_mut().trigger(TakeHairdo { entity: hair });
+    assert!(refused.to_string().contains("CaptureHairdo"), "{refused}");
+    stage.app.world_mut().trigger(CaptureHairdo { entity: hair });
     stage.app.world_mut().flush();
     for _ in 0..20 {
         stage.run(1);

@@ -16,15 +16,15 @@ use bevy::{
     },
 };
 use bevy_keratin::{
-    LodLevel, Sleepers,
+    LodLevel, SleepCounts,
     gpu::{GpuJournal, HairResidence},
     prelude::*,
     render::HairBuffers,
 };
 
 /// Curls that come to rest soon.
-pub fn calm() -> (HairSleep, AirDrag) {
-    (HairSleep::default(), AirDrag { rate: 20.0 })
+pub fn calm() -> (SleepSettings, AirDrag) {
+    (SleepSettings::default(), AirDrag { rate: 20.0 })
 }
 
 fn resting(stage: &mut Stage, on: SimulateOn) {
@@ -35,8 +35,8 @@ fn resting(stage: &mut Stage, on: SimulateOn) {
     assert_eq!(stage.is_on_gpu(), on == SimulateOn::Gpu);
 }
 
-fn sleepers(stage: &Stage) -> Sleepers {
-    *stage.app.world().get::<Sleepers>(stage.hair).unwrap()
+fn sleepers(stage: &Stage) -> SleepCounts {
+    *stage.app.world().get::<SleepCounts>(stage.hair).unwrap()
 }
 
 /// Ticks until all of it sleeps, so many a frame.
@@ -73,12 +73,12 @@ pub fn it_sleeps_when_the_last_strand_would(stage: &mut Stage) {
     assert!(sleepers(stage).all() && stage.is_on_gpu() && stage.bits() == bits);
     // The same hair that never slept has gone no farther than counts as still.
     let hair = stage.hair;
-    stage.app.world_mut().entity_mut(hair).insert(HairSleep::never());
+    stage.app.world_mut().entity_mut(hair).insert(SleepSettings::never());
     stage.run(1);
     assert_eq!(sleepers(stage).asleep, 0);
     stage.run(60);
     let awake = stage.strands();
-    let most = 2.0 * HairSleep::default().distance();
+    let most = 2.0 * SleepSettings::default().distance();
     assert!(apart(&slept, &awake) < most, "{} m", apart(&slept, &awake));
 }
 
@@ -200,7 +200,7 @@ pub fn whatever_disturbs_it_wakes_it_in_the_same_tick(stage: &mut Stage) {
             world.entity_mut(strand).insert(held);
         }),
         ("its sleep", |world, hair| {
-            world.entity_mut(hair).insert(HairSleep::never());
+            world.entity_mut(hair).insert(SleepSettings::never());
         }),
     ];
     for (name, disturb) in all {

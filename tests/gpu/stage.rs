@@ -14,8 +14,8 @@ pub struct Stage {
 }
 
 /// No contact between strands, which is not supported on the device.
-pub fn free() -> LockContact {
-    LockContact { strength: 0.0, ..default() }
+pub fn free() -> StrandContact {
+    StrandContact { strength: 0.0, ..default() }
 }
 
 /// Curls on a ball that hang over its sides.
@@ -56,7 +56,7 @@ impl Stage {
             .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
             .insert_resource(HairGpu { software: true, blocking: true, ..default() })
             .insert_resource(HairDefault(free()))
-            .insert_resource(HairDefault(HairSleep::never()));
+            .insert_resource(HairDefault(SleepSettings::never()));
         app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     }
 

@@ -10,9 +10,9 @@ use bevy::{
 };
 use bevy_keratin::{
     StretchProjection::{Coupled, Printed, Split},
-    bond::model::JointBonds,
     gpu::{BlowerRecord, StrandState, SubstepRecord},
-    rod::{
+    keratin::bond::model::JointBonds,
+    solver::rod::{
         obstacle::{Obstacle, Solid},
         shape::{Placed, Shape},
     },
@@ -241,7 +241,7 @@ fn free_strands() {
 #[test]
 fn strands_in_a_frame_that_moves() {
     compare("carried", 3, 0.2, |random| SubstepRecord {
-        carry: Some(Isometry3d::new(
+        frame_motion: Some(Isometry3d::new(
             random.vector() * 0.01,
             Quat::from_scaled_axis(random.vector() * 0.1),
         )),
@@ -299,7 +299,7 @@ fn strands_by_the_papers_projections() {
         compare(&format!("{projection:?}"), 21, 0.2, |_| swept(projection));
     }
     compare("swept", 24, 0.2, |random| SubstepRecord {
-        carry: Some(Isometry3d::new(
+        frame_motion: Some(Isometry3d::new(
             random.vector() * 0.01,
             Quat::from_scaled_axis(random.vector() * 0.1),
         )),

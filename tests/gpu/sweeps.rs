@@ -12,14 +12,14 @@ use bevy_keratin::{
     LodLevel, SolverMethod,
     StretchProjection::{Coupled, Split},
     Sweeps,
-    bond::model::JointBonds,
     gpu::{GpuStrands, HairResidence, SOURCE, StrandState, SubstepRecord, Unsupported, WhyCpu},
+    hair::strand::StrandSleep,
+    keratin::bond::model::JointBonds,
     prelude::*,
-    rod::{
+    solver::rod::{
         constraint::EPSILON,
         obstacle::{Obstacle, Solid},
     },
-    strand::StrandSleep,
 };
 
 /// One projection in place of a substep. Inverse masses stand where the root's velocity does, and whether it is an
@@ -152,7 +152,7 @@ fn records(count: usize) -> Vec<SubstepRecord> {
     let turn = Isometry3d::from_rotation(Quat::from_rotation_y(0.01));
     let record = |i: usize| SubstepRecord {
         obstacles: obstacles.to_vec(),
-        carry: (i % 4 < 2).then_some(turn),
+        frame_motion: (i % 4 < 2).then_some(turn),
         change: [if i.is_multiple_of(2) { -0.01 } else { 0.01 }, 0.0, 0.0, 0.0],
         ..swept(Split)
     };
@@ -253,7 +253,7 @@ fn kept(device: &Device, changes: &[[f32; 4]]) -> f32 {
     let mut on = device.hand_over(std::slice::from_ref(&strand));
     strand.joints = device.run(&mut on, &held).remove(0).joints;
     let free = swept(Split);
-    let free = SubstepRecord { gravity: Vec3::ZERO, keep: (-6.0 * free.dt).exp(), ..free };
+    let free = SubstepRecord { gravity: Vec3::ZERO, retained: (-6.0 * free.dt).exp(), ..free };
     let mut on = device.hand_over(std::slice::from_ref(&strand));
     strand.take(&device.run(&mut on, &vec![free; 1440]).remove(0));
     assert_eq!(on.take_report(&device.device, &device.queue), Some(default()));

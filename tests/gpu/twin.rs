@@ -6,9 +6,9 @@ mod sweep;
 use crate::lab::LabStrand;
 use bevy::math::{DAffine3, DMat3, DQuat, DVec3, Isometry3d, Quat, Vec3};
 use bevy_keratin::{
-    bond::model::cuticle_factor,
     gpu::SubstepRecord,
-    rod::{
+    keratin::bond::model::cuticle_factor,
+    solver::rod::{
         obstacle::{Obstacle, Solid},
         shape::{Placed, Shape},
     },
@@ -138,7 +138,7 @@ impl Twin {
         let dt = f64::from(r.dt);
         let mut root_from = self.root;
         let mut root_place = self.p[0];
-        if let Some(Isometry3d { rotation, translation }) = r.carry {
+        if let Some(Isometry3d { rotation, translation }) = r.frame_motion {
             let (turn, way) = (dq(rotation), d(translation.into()));
             root_place = turn * self.p[0] + way;
             self.p.iter_mut().skip(1).for_each(|p| *p = turn * *p + way);
@@ -187,7 +187,7 @@ impl Twin {
     }
 
     fn blow(&mut self, r: &SubstepRecord) {
-        let (dt, keep) = (f64::from(r.dt), f64::from(r.keep));
+        let (dt, keep) = (f64::from(r.dt), f64::from(r.retained));
         let edges = self.edges();
         for i in 0..=edges {
             let e = i.min(edges - 1);
@@ -568,7 +568,7 @@ impl Twin {
             rows[i][0] -= share * rows[i][1];
             rows[i][2] -= share * rows[i - 1][2];
         }
-        // An edge that would turn too far is stopped, and those before it heed that.
+        // An edge that would turn too far is stopped, and those before it apply_report that.
         let (mut turn, mut coupling) = (0.0, 0.0);
         for (q, [diagonal, before, rhs]) in self.q.iter_mut().zip(rows).rev() {
             turn = ((rhs - coupling * turn) / diagonal).clamp(-1.5_f64, 1.5);

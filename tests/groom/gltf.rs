@@ -3,7 +3,7 @@
 use crate::files::{glb, gltf_bytes, gltf_json, primitive, small_glb};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use bevy::{platform::collections::HashMap, prelude::*};
-use bevy_keratin::groom::{Groom, GroomFileError, gltf};
+use bevy_keratin::authoring::groom::{Groom, GroomFileError, gltf};
 
 /// Where node `i` is once both transforms are applied.
 fn at(i: usize) -> Vec3 {

@@ -1,7 +1,7 @@
 //! Files cut short, with extreme numbers, and of random bytes: always an error, never a panic.
 
 use crate::files::{Arrays, glb, gltf_bytes, gltf_json, hair, primitive, put, small_glb, tfx};
-use bevy_keratin::groom::{Groom, GroomSettings};
+use bevy_keratin::authoring::groom::{Groom, GroomSettings};
 use proptest::prelude::*;
 
 fn read(file: &[u8]) -> Result<Groom, String> {

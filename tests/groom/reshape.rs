@@ -2,7 +2,7 @@
 
 use crate::files::{Arrays, hair, tfx};
 use bevy::prelude::*;
-use bevy_keratin::groom::{Groom, GroomError, GroomSettings, UpAxis, yuksel};
+use bevy_keratin::authoring::groom::{Groom, GroomError, GroomSettings, UpAxis, yuksel};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::time::Instant;
 

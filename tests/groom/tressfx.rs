@@ -2,7 +2,7 @@
 
 use crate::files::{Arrays, points, put, tfx};
 use bevy::prelude::*;
-use bevy_keratin::groom::{GroomFileError, tressfx};
+use bevy_keratin::authoring::groom::{GroomFileError, tressfx};
 
 #[test]
 fn every_array_of_both_versions_is_read() {

@@ -14,7 +14,7 @@ use bevy::{
 };
 use bevy_keratin::{
     FaultKind,
-    groom::*,
+    authoring::groom::*,
     prelude::*,
     render::{FollowerRoots, HairLook},
 };

@@ -2,7 +2,7 @@
 
 use crate::files::{hair, points, put};
 use bevy::prelude::*;
-use bevy_keratin::groom::{Groom, GroomError, GroomFileError, yuksel};
+use bevy_keratin::authoring::groom::{Groom, GroomError, GroomFileError, yuksel};
 
 #[test]
 fn every_array_is_read_whatever_others_there_are() {

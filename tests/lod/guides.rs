@@ -7,7 +7,8 @@ use super::{
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use bevy_keratin::{
-    FaultKind, LodLevel, PresentLod, Sleepers, lod::Follower, prelude::*, strand::TickPose,
+    FaultKind, LodLevel, PresentLod, SleepCounts, hair::strand::TickPose, prelude::*,
+    simulation::lod::Follower,
 };
 
 fn simulated(app: &App, ids: &[Entity]) -> Vec<Entity> {
@@ -179,7 +180,7 @@ fn followers_sleep_and_wake_with_their_guides() {
     let mut app = test_app(60.0);
     let (hair, ids) = head(&mut app, 60, 9, 0.24);
     put(&mut app, hair, fewer(0.25), 0.1);
-    let sleepers = |app: &App| *app.world().get::<Sleepers>(hair).unwrap();
+    let sleepers = |app: &App| *app.world().get::<SleepCounts>(hair).unwrap();
     let mut seconds = 0.0;
     while !sleepers(&app).all() {
         run(&mut app, 0.5);
@@ -305,7 +306,7 @@ fn hair_that_sleeps_sleeps_on_when_fewer_strands_are_simulated_and_when_all_are_
     put(&mut app, hair, fewer(0.25), 1.0);
     run(&mut app, 0.1);
     // Whatever it does counts as lying still.
-    app.insert_resource(HairDefault(HairSleep { speed: 1.0, turning: 10.0, seconds: 0.2 }));
+    app.insert_resource(HairDefault(SleepSettings { speed: 1.0, turning: 10.0, seconds: 0.2 }));
     run(&mut app, 1.0);
     let asleep = |app: &App| {
         ids.iter().filter(|e| app.world().get::<StrandSleep>(**e).unwrap().is_asleep()).count()

@@ -56,7 +56,7 @@ fn mean_and_most(all: &[f32]) -> (f32, f32) {
 fn heads(strands: f32, bending_length: Option<f32>) -> [(App, Entity, Vec<Entity>); 2] {
     [(); 2].map(|()| {
         let mut app = test_app(60.0);
-        app.insert_resource(HairDefault(HairSleep::never()));
+        app.insert_resource(HairDefault(SleepSettings::never()));
         if let Some(length) = bending_length {
             app.insert_resource(HairDefault(HairStiffness::from_bending_length(length).unwrap()));
         }
@@ -143,12 +143,12 @@ fn soft_hair_that_lies_on_the_head_hardly_enters_it() {
 #[ignore = "measures time: run it alone on an idle machine"]
 fn strands_that_are_carried_cost_little() {
     let mut app = test_app(60.0);
-    app.insert_resource(HairDefault(HairSleep::never()));
+    app.insert_resource(HairDefault(SleepSettings::never()));
     let (hair, _) = head(&mut app, 2000, 16, 0.24);
     app.world_mut().entity_mut(hair).insert(fewer(0.25));
     run(&mut app, 0.5);
     for strength in [0.0, 20.0] {
-        app.insert_resource(HairDefault(LockContact { strength, ..default() }));
+        app.insert_resource(HairDefault(StrandContact { strength, ..default() }));
         // In turns, the best of each: others on the machine slow single turns down.
         let (mut best, mut first) = ([f64::INFINITY; 2], [f64::INFINITY; 2]);
         for _ in 0..5 {

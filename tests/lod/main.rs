@@ -8,7 +8,7 @@ mod treated;
 
 use bevy::prelude::*;
 use bevy_keratin::{
-    FaultKind, HairEstimate, LodLevel, PresentLod, prelude::*, strand::StrandHistory,
+    FaultKind, HairEstimate, LodLevel, PresentLod, hair::strand::StrandHistory, prelude::*,
 };
 use common::*;
 use std::time::Instant;
@@ -153,7 +153,7 @@ fn longer_substeps_take_the_same_time() {
 fn shape_and_bonds_stay_when_levels_switch_and_nothing_pops() {
     for model in [StrandModel::Rod, StrandModel::MassSpring] {
         let mut app = test_app(60.0);
-        app.insert_resource(HairDefault(HairSleep::never()));
+        app.insert_resource(HairDefault(SleepSettings::never()));
         let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
         app.world_mut().entity_mut(hair).insert((HairLod::default(), model));
         run(&mut app, 12.0);
@@ -224,8 +224,8 @@ fn a_moving_floor_takes_hair_along_at_every_level() {
 #[ignore = "measures time: run it alone on an idle machine"]
 fn a_coarser_level_costs_less() {
     let mut app = test_app(60.0);
-    app.insert_resource(HairDefault(HairSleep::never()))
-        .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }));
+    app.insert_resource(HairDefault(SleepSettings::never()))
+        .insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }));
     let hair = app.world_mut().spawn((Hair, HairLod::default())).id();
     for i in 0..3000 {
         let root = Vec3::new((i % 50) as f32, 0.0, (i / 50) as f32) * 5e-3;

@@ -45,8 +45,8 @@ impl Lab {
             .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
             .insert_resource(HairSubsteps::Fixed(substeps))
             .insert_resource(HairDefault(Cuticle { damage: 0.0, ..default() }))
-            .insert_resource(HairDefault(LockContact { strength: 0.0, ..default() }))
-            .insert_resource(HairDefault(HairSleep::never()))
+            .insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }))
+            .insert_resource(HairDefault(SleepSettings::never()))
             .insert_resource(HairDefault(HairSolver { substep: 1e-6, ..default() }))
             .init_resource::<Recording>()
             .add_systems(HairTick, record.in_set(HairSystems::Last));

@@ -54,7 +54,7 @@ fn lead(
              strained by {peak:.4}; late {late_depth:.2e} m, {late:.5}"
         );
         // Nodes keep a lock's radius away.
-        let inside = deepest.max(late_depth) + LockContact::default().radius;
+        let inside = deepest.max(late_depth) + StrandContact::default().radius;
         assert!(inside < 1e-5, "{name}: {deepest} m inside, late {late_depth}");
         assert!(late < 5e-4, "{name}: strain {late} late");
         assert!(off < most, "{name} at {substep}: an edge is off by {off} m");
@@ -162,7 +162,7 @@ fn faults(lab: &mut Lab) -> Vec<Entity> {
 #[test]
 fn strands_that_push_each_other_keep_their_length() {
     for (substep, mut lab) in Lab::both() {
-        lab.app.insert_resource(HairDefault(LockContact::default()));
+        lab.app.insert_resource(HairDefault(StrandContact::default()));
         lab.drag(2.0);
         // Three rows that fall through one another: crosswise, end-on and side by side.
         let strands: Vec<Entity> = (0..48)

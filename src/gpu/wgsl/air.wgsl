@@ -1,4 +1,4 @@
-// Gravity, drag and wind. Rust twins: src/environment/{systems,wind,blown}.rs.
+// Gravity, drag and wind. Rust twins: src/forces/environment/{systems,wind,blown}.rs.
 
 // The distance in equation 17's d + 1 (m).
 const REFERENCE_DISTANCE: f32 = 0.01;
@@ -27,11 +27,11 @@ fn air_place(i: u32) -> vec3<f32> {
 // What the air does to velocities, and what it asks of hydrogen bonds (equation 19).
 fn blow() {
     let fallen = record.gravity * record.dt;
-    let taken_along = 1.0 - record.keep;
+    let taken_along = 1.0 - record.retained;
     for (var i = 0u; i <= edges; i++) {
         let m = moving(i);
         let weight = edge(i).z;
-        var v = m.xyz * record.keep + fallen;
+        var v = m.xyz * record.retained + fallen;
         var drying = 0.0;
         if record.blowers > 0u {
             // The tip has no edge of its own: it takes the last one's wind.

@@ -1,7 +1,7 @@
-// Bonds of a strand's joints. Rust twin: src/bond/model.rs.
+// Bonds of a strand's joints. Rust twin: src/keratin/bond/model.rs.
 
 // Below this share of closed bonds a joint has no shape of its own.
-const FEW: f32 = 1e-3;
+const MIN_CLOSED_SHARE: f32 = 1e-3;
 
 // Remembered shape and rate of a joint's bonds of one kind.
 fn bond(i: u32, kind: u32) -> vec4<f32> {
@@ -46,9 +46,9 @@ fn shape_joints() {
             total += f;
         }
         let share = closed / total;
-        var v = sum * (1.0 / max(closed, FEW * total));
+        var v = sum * (1.0 / max(closed, MIN_CLOSED_SHARE * total));
         var w = sqrt(max(1.0 - dot(v, v), 0.0));
-        if share < FEW {
+        if share < MIN_CLOSED_SHARE {
             let omega = present_shape(i);
             v = omega.xyz;
             w = omega.w;
@@ -56,7 +56,7 @@ fn shape_joints() {
         rest[slot(i, 0u, 2u)] = vec4(v, w);
         let e = edge(i);
         let factor = cuticle_factor(distance) * (1.0 - e.w);
-        rest[slot(i, 1u, 2u)] = vec4(e.x, max(share, FEW) * factor, e.z, e.w);
+        rest[slot(i, 1u, 2u)] = vec4(e.x, max(share, MIN_CLOSED_SHARE) * factor, e.z, e.w);
         distance += e.x;
     }
 }

@@ -1,4 +1,4 @@
-// One direct implicit step of a strand. Rust twins: src/rod/direct/{mod,kernel}.rs.
+// One direct implicit step of a strand. Rust twins: src/solver/rod/direct/{mod,kernel}.rs.
 
 const THETA: f32 = 0.65;
 const WHIP: f32 = 0.03;
@@ -144,7 +144,7 @@ fn newton_down(stage: Stage) {
             let length = sqrt(max(dot(e, e), 1e-30));
             let crushed = length < l * 0.5;
             let kept = frame(j);
-            let carried = carry(kept, e, length);
+            let carried = parallel_transport(kept, e, length);
             let q = select(carried.q, kept, crushed);
             let lever = max(length, l * 0.2);
             let r = 1.0 / lever;
@@ -328,7 +328,7 @@ fn finish(stage: Stage) {
         let length = sqrt(max(dot(e, e), 1e-30));
         var q = frame(i - 1u);
         if !(length < props.x * 0.5) {
-            q = carry(q, e, length).q;
+            q = parallel_transport(q, e, length).q;
         }
         set_frame(i - 1u, q);
         let t = tangent(q);

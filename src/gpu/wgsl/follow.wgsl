@@ -1,5 +1,5 @@
 // A follower in a substep: its bonds, and in the tick's last one its pose, by the frames of its guides. Rust
-// twins: src/lod/{follow,followers}.rs. In place of scratch it binds its ties, six a node:
+// twins: src/simulation/lod/{follow,followers}.rs. In place of scratch it binds its ties, six a node:
 // frame relative to each of three guides; segment in its own frame, edge of the first guide; angular velocity
 // of its own, edge of the second; edge of the third.
 // At the tip: guides' slots and their number; weights, and seconds since it was tied; guides' edges, and what
@@ -11,20 +11,20 @@ const TIES: u32 = 6u;
 const OWN_LASTS: f32 = 10.0;
 
 fn tie(i: u32, part: u32) -> vec4<f32> {
-    return scratch[((first - record.first_follower_slot + i) * TIES + part) * LANES + lane];
+    return scratch[((first - record.first_follower_slot + i) * TIES + part) * GROUP_SIZE + lane];
 }
 
 // The frame between two edges of a guide.
 fn guide_frame(of_guide: u32, last: u32, at: f32) -> vec4<f32> {
     let i = min(u32(at), last);
     let share = at - f32(i);
-    let base = of_guide / LANES;
-    let own = of_guide % LANES;
-    let one = pose_out[((base + i) * 2u + 1u) * LANES + own];
+    let base = of_guide / GROUP_SIZE;
+    let own = of_guide % GROUP_SIZE;
+    let one = pose_out[((base + i) * 2u + 1u) * GROUP_SIZE + own];
     if !(0.0 < share) || last <= i {
         return one;
     }
-    let next = pose_out[((base + i + 1u) * 2u + 1u) * LANES + own];
+    let next = pose_out[((base + i + 1u) * 2u + 1u) * GROUP_SIZE + own];
     return normalized(one * (1.0 - share) + next * select(share, -share, dot(one, next) < 0.0));
 }
 
@@ -34,7 +34,7 @@ fn turned_by(rotation: vec3<f32>) -> vec4<f32> {
     return vec4(axis * sin(0.5 * angle), cos(0.5 * angle));
 }
 
-fn go_along() {
+fn follow_guides() {
     let head = tie(edges, 0u);
     let weights = tie(edges, 1u);
     let ends = tie(edges, 2u);
@@ -44,7 +44,7 @@ fn go_along() {
     if since > OWN_LASTS * record.follow_lasts {
         own_motion = 0.0;
     }
-    if (record.flags & LEADS_ROOTS) != 0u {
+    if (record.flags & TARGETS_ROOTS) != 0u {
         set_node(0u, tie(edges, 3u).xyz, 0.0);
         set_frame(edges, tie(edges, 4u));
     }
@@ -124,7 +124,7 @@ fn follow(
         blow();
     }
     if (record.flags & FOLLOWS) != 0u {
-        go_along();
+        follow_guides();
     }
     if remembers {
         remember();

@@ -1,6 +1,6 @@
 // Puts where led nodes come to, and whether they are led, where the substep finds it. One node a thread.
 
-const LANES: u32 = 32u;
+const GROUP_SIZE: u32 = 32u;
 // Bits beside a node's slot.
 const ROOT: u32 = 0x40000000u;
 const FREE: u32 = 0x80000000u;
@@ -30,13 +30,13 @@ fn lead(@builtin(global_invocation_id) id: vec3<u32>) {
     let frame = leads[2u * (record.first_led + id.x) + 1u];
     let bits = entry.w;
     let slot = bits & ~(ROOT | FREE);
-    let of_node = slot / LANES;
-    let lane = slot % LANES;
+    let of_node = slot / GROUP_SIZE;
+    let lane = slot % GROUP_SIZE;
     if (bits & ROOT) == 0u {
-        rest[(of_node * 2u + 1u) * LANES + lane].z = select(0.0, 1.0, (bits & FREE) != 0u);
+        rest[(of_node * 2u + 1u) * GROUP_SIZE + lane].z = select(0.0, 1.0, (bits & FREE) != 0u);
     }
-    scratch[(of_node * 8u) * LANES + lane] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
-    scratch[(of_node * 8u + 1u) * LANES + lane] = bitcast<vec4<f32>>(frame);
+    scratch[(of_node * 8u) * GROUP_SIZE + lane] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
+    scratch[(of_node * 8u + 1u) * GROUP_SIZE + lane] = bitcast<vec4<f32>>(frame);
 }
 
 // The root of a follower, into what ties it: `scratch` holds that, and the slot is that of its last node's.
@@ -48,5 +48,5 @@ fn lead_followers(@builtin(global_invocation_id) id: vec3<u32>) {
     let entry = leads[2u * (record.first_follower_led + id.x)];
     let frame = leads[2u * (record.first_follower_led + id.x) + 1u];
     scratch[entry.w] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
-    scratch[entry.w + LANES] = bitcast<vec4<f32>>(frame);
+    scratch[entry.w + GROUP_SIZE] = bitcast<vec4<f32>>(frame);
 }

@@ -1,4 +1,4 @@
-// Lengths of a whole strand at once. Rust twin: src/rod/limiter.rs.
+// Lengths of a whole strand at once. Rust twin: src/solver/rod/limiter.rs.
 
 const FIRMNESS: f32 = 0.95;
 const FOLDING: f32 = 0.125;

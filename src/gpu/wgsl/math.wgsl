@@ -1,5 +1,5 @@
-// Vectors, quaternions (Hamilton's, x y z w) and 3x3 blocks. Rust twins: src/lanes/algebra.rs,
-// src/rod/direct/{frames,matrix}.rs. Names and order are the same there.
+// Vectors, quaternions (Hamilton's, x y z w) and 3x3 blocks. Rust twins: src/math/lanes/algebra.rs,
+// src/solver/rod/direct/{frames,matrix}.rs. Names and order are the same there.
 
 fn normalized(q: vec4<f32>) -> vec4<f32> {
     return q * (1.0 / sqrt(dot(q, q)));
@@ -53,14 +53,14 @@ fn first_axis(q: vec4<f32>) -> vec3<f32> {
     );
 }
 
-struct CarriedFrame {
+struct TransportedFrame {
     q: vec4<f32>,
     turn: vec3<f32>,
 }
 
 // Turns q the shortest way so that its tangent is along e, of length len; and twice the vector part of
 // the turn.
-fn carry(q: vec4<f32>, e: vec3<f32>, len: f32) -> CarriedFrame {
+fn parallel_transport(q: vec4<f32>, e: vec3<f32>, len: f32) -> TransportedFrame {
     let d = tangent(q);
     let cosine = len + dot(d, e);
     let scale = 1.0 / sqrt(max(2.0 * len * cosine, 1e-30));
@@ -70,7 +70,7 @@ fn carry(q: vec4<f32>, e: vec3<f32>, len: f32) -> CarriedFrame {
     }
     let turned = product(turn, q);
     let length = fma(-0.5, dot(turned, turned), 1.5);
-    return CarriedFrame(turned * length, turn.xyz + turn.xyz);
+    return TransportedFrame(turned * length, turn.xyz + turn.xyz);
 }
 
 // The moment of a joint on the edge behind it: 2K s Im(q (before Q0)‾).

@@ -1,7 +1,7 @@
 // The box around a hair's nodes and their highest speed, once a frame. The largest of whole numbers is the
 // same in any order.
 
-const LANES: u32 = 32u;
+const GROUP_SIZE: u32 = 32u;
 // Hair farther from its own origin than this (m) is not drawn.
 const FAR: f32 = 1e6;
 
@@ -35,9 +35,9 @@ fn measure(
     var high = vec3(-FAR);
     var speed = 0.0;
     for (var i = 0u; i < block.y; i++) {
-        let slot = (block.x + i) * 2u * LANES + lane;
+        let slot = (block.x + i) * 2u * GROUP_SIZE + lane;
         let now = pose[slot].xyz;
-        let before = motion[slot + LANES].xyz;
+        let before = motion[slot + GROUP_SIZE].xyz;
         let v = motion[slot].xyz;
         if is_usable(now) {
             low = min(low, now);

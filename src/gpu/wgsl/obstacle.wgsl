@@ -1,4 +1,4 @@
-// Obstacles and nodes. Rust twins: src/rod/obstacle.rs, src/rod/touch.rs.
+// Obstacles and nodes. Rust twins: src/solver/rod/obstacle.rs, src/solver/rod/touch.rs.
 
 const HALF_SPACE: u32 = 0u;
 const CAPSULE: u32 = 1u;
@@ -8,9 +8,9 @@ const ELLIPSOID: u32 = 3u;
 // How far a node may go in a substep, in ways that its velocity alone would take it.
 const FASTER: f32 = 1.5;
 // Length from a sunk root on within which a strand may be inside, in depths of the root.
-const ROOM: f32 = 2.0;
+const ESCAPE_RATIO: f32 = 2.0;
 // Of several obstacles that a root lies in those in which it is at least half as deep as in the deepest allow as much.
-const SHARE: f32 = 2.0;
+const DEPTH_RATIO: f32 = 2.0;
 
 // Obstacles that this strand may touch in this substep; whether a node moves so fast against one that it
 // might pass through; whether a node rests on one.
@@ -71,7 +71,7 @@ fn vector_in(o: u32, v: vec3<f32>) -> vec3<f32> {
     );
 }
 
-// Normal of an ellipsoid's surface nearest to p, and the distance from it. Rust twin: src/rod/shape.
+// Normal of an ellipsoid's surface nearest to p, and the distance from it. Rust twin: src/solver/rod/shape.
 fn off_ellipsoid(o: u32, p: vec3<f32>) -> vec4<f32> {
     let half = half_axes(o);
     let size = max(max(half.x, half.y), half.z);
@@ -173,9 +173,9 @@ fn allowed(o: u32, along: f32) -> f32 {
     if is_beyond(o, root, record.skin) {
         return 0.0;
     }
-    let deepest = sunk * (1.0 / ROOM);
-    let share = min(depth_in(o, root).w * SHARE / deepest, 1.0);
-    let way = along * (1.0 / ROOM);
+    let deepest = sunk * (1.0 / ESCAPE_RATIO);
+    let share = min(depth_in(o, root).w * DEPTH_RATIO / deepest, 1.0);
+    let way = along * (1.0 / ESCAPE_RATIO);
     return max((deepest - way * way / deepest) * share, 0.0);
 }
 
@@ -283,7 +283,7 @@ fn choose_near() {
     let root = node(0u).xyz;
     for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
         if !is_beyond(o, root, record.skin) {
-            sunk = max(sunk, ROOM * depth_in(o, root).w);
+            sunk = max(sunk, ESCAPE_RATIO * depth_in(o, root).w);
         }
     }
 }

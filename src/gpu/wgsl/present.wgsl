@@ -1,6 +1,6 @@
 // Packs nodes into the buffer that drawing reads. Rust twin: src/render/buffers.rs, pack_guide.
 
-const LANES: u32 = 32u;
+const GROUP_SIZE: u32 = 32u;
 // Motion is packed in these units per m.
 const MOTION_UNITS: f32 = 1024.0;
 // Hair farther from its own origin than this (m) is as broken as hair that is no number.
@@ -37,7 +37,7 @@ var<private> aside: vec3<f32>;
 // Where a node is drawn: between the tick before and the present, if both are known.
 fn drawn_place(slot: u32) -> vec3<f32> {
     let now = pose[slot].xyz;
-    let before = motion[slot + LANES].xyz;
+    let before = motion[slot + GROUP_SIZE].xyz;
     if !is_usable(before) {
         return now + aside;
     }
@@ -66,7 +66,7 @@ fn present(
     aside = vec3(0.0);
     if shown_frame.rooted != 0u {
         let root = bitcast<vec3<f32>>(firsts[block.w + lane].yzw);
-        let simulated = drawn_place(block.x * 2u * LANES + lane);
+        let simulated = drawn_place(block.x * 2u * GROUP_SIZE + lane);
         if is_usable(root) && is_usable(simulated) {
             aside = root - simulated;
         }
@@ -75,7 +75,7 @@ fn present(
     var last = vec3(0.0);
     var shown = 0.0;
     for (var i = 0u; i < nodes && shown == 0.0; i++) {
-        let slot = (block.x + i) * 2u * LANES + lane;
+        let slot = (block.x + i) * 2u * GROUP_SIZE + lane;
         let p = drawn_place(slot);
         if is_usable(p) {
             last = p;
@@ -85,16 +85,16 @@ fn present(
     var along = 0.0;
     var strain_below = -1.0;
     for (var i = 0u; i < nodes; i++) {
-        let slot = (block.x + i) * 2u * LANES + lane;
+        let slot = (block.x + i) * 2u * GROUP_SIZE + lane;
         let now = pose[slot].xyz;
         let p = drawn_place(slot);
         if is_usable(p) {
             last = p;
         }
-        let length = rest[slot + LANES].x;
+        let length = rest[slot + GROUP_SIZE].x;
         var strain_above = -1.0;
         if i + 1u < nodes {
-            strain_above = abs(distance(pose[slot + 2u * LANES].xyz, now) / length - 1.0);
+            strain_above = abs(distance(pose[slot + 2u * GROUP_SIZE].xyz, now) / length - 1.0);
         }
         var strain = max(strain_below, strain_above);
         if strain_below >= 0.0 && strain_above >= 0.0 {
@@ -102,11 +102,11 @@ fn present(
         }
         strain_below = strain_above;
         // The tip has no joint: it shows the last one's.
-        let joint = ((block.x + min(i, nodes - 2u)) * 4u) * LANES + lane;
+        let joint = ((block.x + min(i, nodes - 2u)) * 4u) * GROUP_SIZE + lane;
         let rates = byte(bonds[joint].w)
-            | byte(bonds[joint + LANES].w) << 8u
-            | byte(bonds[joint + 2u * LANES].w) << 16u
-            | byte(bonds[joint + 3u * LANES].w) << 24u;
+            | byte(bonds[joint + GROUP_SIZE].w) << 8u
+            | byte(bonds[joint + 2u * GROUP_SIZE].w) << 16u
+            | byte(bonds[joint + 3u * GROUP_SIZE].w) << 24u;
         let at = 2u * (first + i);
         var moved = vec3(0.0);
         if shown_frame.known != 0u && shown != 0.0 {

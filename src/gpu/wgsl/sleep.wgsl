@@ -1,7 +1,7 @@
 // Whether a hair sleeps from the next tick on: all its simulated strands have been still for so long. Once a tick,
-// after its substeps. Rust twin: `decide` in src/sleep/systems.rs, for one strand.
+// after its substeps. Rust twin: `decide` in src/simulation/sleep/systems.rs, for one strand.
 
-const LANES: u32 = 32u;
+const GROUP_SIZE: u32 = 32u;
 const WAKES: u32 = 256u;
 // The word of the report that holds the last tick in which the hair slept.
 const SLEPT: u32 = 11u;
@@ -52,13 +52,13 @@ fn sleep(
             atomicMax(&report[SLEPT], record.tick);
         }
     }
-    let root = block.x * 2u * LANES + lane;
+    let root = block.x * 2u * GROUP_SIZE + lane;
     var is_still = !wakes;
     for (var i = 0u; i < block.y && is_still; i++) {
-        let at = root + i * 2u * LANES;
+        let at = root + i * 2u * GROUP_SIZE;
         let apart = pose[at].xyz - still[at].xyz;
         is_still = dot(apart, apart) <= record.sleep.x * record.sleep.x
-            && turn(pose[at + LANES], still[at + LANES]) <= record.sleep.y;
+            && turn(pose[at + GROUP_SIZE], still[at + GROUP_SIZE]) <= record.sleep.y;
     }
     var seconds = 0.0;
     if is_still {
@@ -66,9 +66,9 @@ fn sleep(
         still[root].w = seconds;
     } else {
         for (var i = 0u; i < block.y; i++) {
-            let at = root + i * 2u * LANES;
+            let at = root + i * 2u * GROUP_SIZE;
             still[at] = vec4(pose[at].xyz, 0.0);
-            still[at + LANES] = pose[at + LANES];
+            still[at + GROUP_SIZE] = pose[at + GROUP_SIZE];
         }
     }
     if !(record.sleep.z <= seconds) {

@@ -1,7 +1,7 @@
 // A strand in memory and what acts on it in a substep. Layout: src/gpu/layout.rs; the record:
 // src/gpu/record.rs.
 
-const LANES: u32 = 32u;
+const GROUP_SIZE: u32 = 32u;
 const MAX_OBSTACLES: u32 = 128u;
 
 struct Obstacle {
@@ -56,7 +56,7 @@ struct Substep {
     flags: u32,
     // The wind of the place (m/s), share of its velocity that hair keeps against the air.
     wind: vec3<f32>,
-    keep: f32,
+    retained: f32,
     influence: vec4<f32>,
     // Δb asked of every joint, by kind, and the share of its rate that is taken off it.
     change: vec4<f32>,
@@ -114,7 +114,7 @@ const SHAPES: u32 = 2u;
 const REMEMBERS: u32 = 4u;
 const NOTES_BEFORE: u32 = 8u;
 const RESTS: u32 = 16u;
-const LEADS_ROOTS: u32 = 32u;
+const TARGETS_ROOTS: u32 = 32u;
 const HOLDS: u32 = 64u;
 const FOLLOWS: u32 = 128u;
 const WAKES: u32 = 256u;
@@ -148,7 +148,7 @@ var<private> edges: u32;
 var<private> number: u32;
 
 fn slot(i: u32, part: u32, parts: u32) -> u32 {
-    return ((first + i) * parts + part) * LANES + lane;
+    return ((first + i) * parts + part) * GROUP_SIZE + lane;
 }
 
 // Place and inverse mass.

@@ -1,5 +1,5 @@
-// The paper's projections: sweeps over a strand from root to tip. Rust twins: src/rod/{constraint,stiffness,step,
-// sweep}.rs; of rest shapes src/bond/{model,systems}.rs.
+// The paper's projections: sweeps over a strand from root to tip. Rust twins: src/solver/rod/{constraint,stiffness,step,
+// sweep}.rs; of rest shapes src/keratin/bond/{model,systems}.rs.
 
 const EPSILON: f32 = 1e-6;
 const PASSES_IN_TOUCH: u32 = 3u;
@@ -140,7 +140,7 @@ fn weigh_swept() {
 // Angular velocities as the substep finds them after the frame's motion, and what the air takes of them.
 fn load_spins() {
     for (var i = 0u; i < edges; i++) {
-        var omega = spin(i) * record.keep;
+        var omega = spin(i) * record.retained;
         if (record.flags & CARRIES) != 0u {
             omega = rotated(record.carry_turn, omega);
         }

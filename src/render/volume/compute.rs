@@ -34,7 +34,7 @@ use bevy::{
 };
 
 /// `@workgroup_size` of `fill.wgsl`, and along a side of the others.
-const LANES: u32 = 64;
+const WORKGROUP_SIZE: u32 = 64;
 const BLOCK: u32 = 4;
 /// So many strands are counted and stand for all.
 const ENOUGH: u32 = 8192;
@@ -225,7 +225,7 @@ fn count(
         pass.set_pipeline(fill);
         pass.set_bind_group(0, to_fill, &[*offset]);
         let lanes = u64::from(rings_of.ranks.min(ENOUGH)) * u64::from(rings_of.segments());
-        let count = lanes.div_ceil(u64::from(LANES)) as u32;
+        let count = lanes.div_ceil(u64::from(WORKGROUP_SIZE)) as u32;
         pass.dispatch_workgroups(count.min(most), count.div_ceil(most), 1);
         for (pipeline, group, side) in [
             (settle, to_settle, side),

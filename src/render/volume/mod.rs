@@ -26,7 +26,7 @@ const FAR_LEVEL: u32 = 3;
 const FREE: f32 = 4.0;
 /// By how much larger a new grid is than it has to be, and than that how much larger an old one may be, so that
 /// cells stay the same while hair moves.
-const ROOM: f32 = 1.15;
+const GRID_MARGIN: f32 = 1.15;
 const SPARE: f32 = 1.6;
 /// Least size of a cell (m).
 const LEAST: f32 = 20e-6;
@@ -58,7 +58,7 @@ impl HairVolume {
         let fits = |i: usize| (least[i]..=SPARE * least[i]).contains(&before.cell[i]);
         let cell: [f32; 3] = core::array::from_fn(|i| match known && fits(i) {
             true => before.cell[i],
-            false => ROOM * least[i],
+            false => GRID_MARGIN * least[i],
         });
         let cell = Vec3::from(cell);
         // In whole cells: strands do not change cells with the box.

@@ -5,7 +5,7 @@ use super::super::{
     model::{WATER_VISCOSITY, clinging, hanging},
 };
 use super::{AFTER_DRIP, HairWetting, Moisture, node_lengths, sheen};
-use crate::environment::vapour::{DryingAir, WATER, transfer};
+use crate::forces::environment::vapour::{DryingAir, WATER, transfer};
 use bevy::prelude::*;
 use core::f32::consts::PI;
 

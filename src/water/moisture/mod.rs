@@ -9,8 +9,8 @@ mod flow;
 pub(crate) use flow::{Exposure, WaterConditions, WaterLoss};
 
 use super::{Counted, drag::Lock};
-use crate::environment::vapour::WATER;
-use crate::{parallel::prefetch, setting::setting};
+use crate::base::{parallel::prefetch, setting::setting};
+use crate::forces::environment::vapour::WATER;
 use bevy::prelude::*;
 use core::f32::consts::PI;
 

@@ -2,7 +2,7 @@
 
 use super::{FIRMNESS, GRAVITY, Twin, along, dq, push_out, solve, swept};
 use bevy::math::{DQuat, DVec3, DVec4};
-use bevy_keratin::{StretchProjection, bond::model::cuticle_factor, gpu::SubstepRecord};
+use bevy_keratin::{StretchProjection, gpu::SubstepRecord, keratin::bond::model::cuticle_factor};
 
 const DT: f64 = 1.0 / 360.0;
 const EPSILON: f64 = 1e-6;
@@ -22,11 +22,11 @@ fn times(q: DQuat, s: f64) -> DQuat {
 impl Twin {
     pub(super) fn sweep(&mut self, r: &SubstepRecord) {
         let dt = f64::from(r.dt);
-        if let Some(carry) = r.carry {
+        if let Some(carry) = r.frame_motion {
             let turn = dq(carry.rotation);
             self.spins.iter_mut().for_each(|omega| *omega = turn * *omega);
         }
-        let keep = f64::from(r.keep);
+        let keep = f64::from(r.retained);
         self.spins.iter_mut().for_each(|omega| *omega *= keep);
         self.blow(r);
         let wq = self.weigh_swept(r);

@@ -1,0 +1,46 @@
+//! Roots that follow the triangles of a skinned or morphed mesh.
+//!
+//! Hair on a head that only turns needs no more than a [`Hair`](crate::Hair) on the head's bone. Where
+//! the scalp itself stretches (a neck, a beard, fur) every root has to follow its own triangle.
+//! [`RootsOnMesh`] morphs and skins those few triangles on the CPU: once a tick for the simulation,
+//! which moves roots there in equal parts over its substeps, and once a frame from the pose that is
+//! drawn, so that roots are always drawn on their scalp.
+
+mod corner;
+mod error;
+mod follow;
+mod morph;
+mod pose;
+mod roots;
+mod tie;
+
+pub use error::RootsError;
+pub use roots::{RootsOnMesh, TiedRoots};
+
+use crate::base::schedule::{HairSystems, HairTick};
+use bevy::prelude::*;
+
+/// Roots on meshes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AttachPlugin;
+
+impl Plugin for AttachPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<RootsOnMesh>()
+            .register_type::<TiedRoots>()
+            .register_type::<RootsError>()
+            .register_required_components::<RootsOnMesh, TiedRoots>()
+            .add_systems(
+                HairTick,
+                (tie::tie, follow::aim_roots, follow::move_roots)
+                    .chain()
+                    .in_set(HairSystems::MeshRoots),
+            )
+            .add_systems(
+                PostUpdate,
+                follow::draw_roots
+                    .after(TransformSystems::Propagate)
+                    .run_if(any_with_component::<TiedRoots>),
+            );
+    }
+}

@@ -1,0 +1,95 @@
+//! The roots that are tied to a mesh.
+
+use super::{corner::Corner, pose::Movers};
+use crate::authoring::plant::RootOnMesh;
+use bevy::{
+    math::{Affine3A, Isometry3d, Mat3A},
+    prelude::*,
+};
+
+/// GuideOffsets the strands of a [`Hair`](crate::Hair) to triangles of a mesh, static, skinned or morphed.
+/// Component of the hair, which best sits on the bone that moves most of it.
+///
+/// Strands are in the mesh's own space, before any skinning, as planting gives them, or in the space
+/// set by [`strands_from_mesh`](Self::strands_from_mesh). In the first tick in which mesh and joints
+/// exist every strand is moved to its place on the posed mesh; lengths are scaled as the mesh is. From
+/// then on roots move and rotate with their triangles: by the joints of a `SkinnedMesh`, and by the
+/// mesh's morph targets with the weights of `MeshMorphWeights`. Invalid data are reported once as
+/// [`FaultKind::Roots`](crate::FaultKind::Roots).
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct RootsOnMesh {
+    /// The entity that carries the `Mesh3d`, and if there are any `SkinnedMesh` and
+    /// `MeshMorphWeights`.
+    pub mesh: Option<Entity>,
+    /// One for each strand, in the order of the hair's [`Strands`](crate::Strands).
+    pub roots: Vec<RootOnMesh>,
+    /// Transform from the mesh's own space to that of the strands; the identity by default. With the
+    /// hair's frame at rest as that space, strands are in place before they are tied.
+    pub strands_from_mesh: Affine3A,
+}
+
+/// Data read from the mesh when the strands were tied to it, so that its asset may be unloaded.
+#[doc(hidden)]
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct TiedRoots {
+    #[reflect(ignore)]
+    pub(super) roots: Vec<Tied>,
+    #[reflect(ignore)]
+    pub(super) movers: Movers,
+    pub(super) failed: bool,
+    /// Whether the roots stay where they are in this tick.
+    #[reflect(ignore)]
+    pub(super) rest: bool,
+}
+
+#[cfg(feature = "gpu")]
+impl TiedRoots {
+    /// Whether roots follow a mesh.
+    pub(crate) fn are_tied(&self) -> bool {
+        !self.roots.is_empty()
+    }
+
+    /// Whether they are yet to be tied.
+    pub(crate) fn wait(&self) -> bool {
+        self.roots.is_empty() && !self.failed
+    }
+
+    /// Each tied strand with place and frame of its root at the share `t` of this tick; none while they
+    /// stay.
+    pub(crate) fn at(&self, t: f32) -> impl Iterator<Item = (Entity, Isometry3d)> + '_ {
+        let moved = if self.rest { &[][..] } else { &self.roots };
+        moved.iter().map(move |root| (root.strand, root.at(t)))
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tied {
+    pub(super) strand: Entity,
+    pub(super) weights: Vec3,
+    pub(super) corners: [Corner; 3],
+    /// The root's frame relative to its triangle's.
+    pub(super) offset: Isometry3d,
+    pub(super) from: Isometry3d,
+    pub(super) to: Isometry3d,
+}
+
+impl Tied {
+    /// Place and frame of the root at the share `t` of the tick.
+    pub(super) fn at(&self, t: f32) -> Isometry3d {
+        let (from, to) = (&self.from, &self.to);
+        let turn = from.rotation.slerp(to.rotation, t).normalize();
+        Isometry3d::new(from.translation.lerp(to.translation, t), turn)
+    }
+}
+
+/// The frame of a triangle at a point of it; `None` where it has no area.
+pub(super) fn triangle(corners: [Vec3; 3], weights: Vec3) -> Option<Isometry3d> {
+    let [a, b, c] = corners;
+    let along = (b - a).try_normalize()?;
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    let turn = Mat3A::from_cols(along.into(), normal.cross(along).into(), normal.into());
+    let at = a * weights.x + b * weights.y + c * weights.z;
+    at.is_finite().then(|| Isometry3d::new(at, Quat::from_mat3a(&turn)))
+}

@@ -1,0 +1,168 @@
+//! Grooms as assets.
+
+use super::{
+    Groom, GroomError, GroomFileError, GroomFormat, GroomLosses, GroomSettings, OddSize, gltf,
+    grown_hair, tressfx, yuksel,
+};
+use bevy::{
+    asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
+    platform::collections::HashMap,
+    prelude::*,
+};
+use percent_encoding::percent_decode_str;
+
+/// Why loading a groom failed.
+#[derive(thiserror::Error, Debug)]
+pub enum GroomLoadError {
+    /// The file could not be read from its source.
+    #[error("the file cannot be read: {0}")]
+    Io(#[from] std::io::Error),
+    /// A buffer of a glTF file that is a file of its own.
+    #[error("the buffer {uri} cannot be read: {source}; put it next to the .gltf")]
+    Buffer {
+        /// Its URI in the glTF.
+        uri: String,
+        /// Why not.
+        source: Box<ReadAssetBytesError>,
+    },
+    /// Its contents are in none of the formats, or broken.
+    #[error(transparent)]
+    File(#[from] GroomFileError),
+}
+
+/// Loads a [`Groom`] from `.hair`, `.tfx`, `.gltf` and `.glb`, detected by their contents.
+///
+/// It registers the first two extensions only, so as not to replace Bevy's own glTF loader: name the
+/// type, as in `assets.load::<Groom>("hair.glb")`. The unit and the axis used, and what is left out of a
+/// file, are logged once.
+#[derive(TypePath, Clone, Copy, Debug, Default)]
+pub struct GroomLoader;
+
+impl AssetLoader for GroomLoader {
+    type Asset = Groom;
+    type Settings = GroomSettings;
+    type Error = GroomLoadError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        settings: &GroomSettings,
+        context: &mut LoadContext<'_>,
+    ) -> Result<Groom, GroomLoadError> {
+        let mut file = Vec::new();
+        reader.read_to_end(&mut file).await?;
+        let mut external = HashMap::default();
+        let format = GroomFormat::of(&file);
+        if format == Some(GroomFormat::Gltf) {
+            let uris: Vec<String> =
+                gltf::GltfFile::parse(&file)?.external().map(str::to_owned).collect();
+            for uri in uris {
+                let failed =
+                    |source| GroomLoadError::Buffer { uri: uri.clone(), source: Box::new(source) };
+                // Escapes that are not UTF-8 are taken literally.
+                let name = percent_decode_str(&uri).decode_utf8().unwrap_or(uri.as_str().into());
+                let path = context.path().resolve_embed_str(&name);
+                let path = path.map_err(|_| {
+                    let offset = 0;
+                    let message = format!("{uri:?} is no path");
+                    GroomFileError::Json { offset, message }
+                })?;
+                let bytes = context.read_asset_bytes(path).await.map_err(failed)?;
+                external.insert(uri, bytes);
+            }
+        }
+        let (groom, losses) = Groom::from_file_with(&file, settings, &external)?;
+        if let Some(format) = format {
+            let (scale, up) = (settings.scale_of(format), settings.up_of(format));
+            let (path, count) = (context.path(), groom.len());
+            tracing::info!("groom {path}: {count} strands, {scale} m a unit, {up:?} up; {losses}");
+            // No warning if the user has set a scale.
+            if let (None, Some(odd)) = (settings.scale, groom.odd_size(scale)) {
+                tracing::warn!("groom {path}: {odd}: set GroomSettings::scale to {}", odd.scale);
+            }
+        }
+        Ok(groom)
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["hair", "tfx"]
+    }
+}
+
+impl Groom {
+    /// A groom from the bytes of a `.hair`, `.tfx`, GLB or self-contained glTF file, in metres and
+    /// Y up according to the settings, and what was left out.
+    ///
+    /// ```
+    /// # use bevy_keratin::authoring::groom::*; use bevy::prelude::*;
+    /// let lock = Groom::from_polylines([[Vec3::ZERO, Vec3::Z * 0.1]]).unwrap();
+    /// let file = yuksel::write(&lock).unwrap();
+    ///
+    /// let settings = GroomSettings { scale: Some(2.0), nodes: Some(9), ..default() };
+    /// let (groom, losses) = Groom::from_file(&file, &settings).unwrap();
+    /// assert_eq!(groom.points()[8], Vec3::Y * 0.2); // .hair files have Z up
+    /// assert!(losses.is_empty());
+    /// ```
+    ///
+    /// # Errors
+    /// When the bytes are none of these or broken, or the settings out of range.
+    pub fn from_file(
+        file: &[u8],
+        settings: &GroomSettings,
+    ) -> Result<(Self, GroomLosses), GroomFileError> {
+        Self::from_file_with(file, settings, &HashMap::default())
+    }
+
+    fn from_file_with(
+        file: &[u8],
+        settings: &GroomSettings,
+        external: &HashMap<String, Vec<u8>>,
+    ) -> Result<(Self, GroomLosses), GroomFileError> {
+        let format = GroomFormat::of(file).ok_or_else(|| GroomFileError::Value {
+            offset: 0,
+            what: "the beginning",
+            found: file[..file.len().min(4)].escape_ascii().to_string(),
+            expected: "HAIR, glTF, JSON or a TressFX version of 3 or 4".to_owned(),
+            hint: "convert the file to .hair, .tfx, .gltf or .glb",
+        })?;
+        let (groom, mut losses) = match format {
+            GroomFormat::Yuksel => yuksel::read(file)?,
+            GroomFormat::TressFx3 | GroomFormat::TressFx4 => tressfx::read(file)?,
+            GroomFormat::Gltf => gltf::GltfFile::parse(file)?.read(external)?,
+        };
+        let (groom, left_out) = settings.apply(groom, format)?;
+        losses += left_out;
+        Ok((groom, losses))
+    }
+}
+
+/// Grooms: as assets where there is an [`AssetServer`], and worn by hair. Part of
+/// [`HairPlugins`](crate::HairPlugins), which may be added before or after `DefaultPlugins`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GroomPlugin;
+
+impl Plugin for GroomPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Groom>()
+            .register_type::<GroomSettings>()
+            .register_type::<GroomFormat>()
+            .register_type::<GroomLosses>()
+            .register_type::<GroomError>()
+            .register_type::<OddSize>();
+        grown_hair::build(app);
+        add_loader(app);
+    }
+
+    /// Again, for an asset server that was added later.
+    fn finish(&self, app: &mut App) {
+        add_loader(app);
+    }
+}
+
+fn add_loader(app: &mut App) {
+    let world = app.world();
+    if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<Groom>>() {
+        app.init_asset::<Groom>().register_asset_loader(GroomLoader);
+        grown_hair::with_assets(app);
+    }
+}

@@ -1,0 +1,286 @@
+//! Grooms: hair as an artist made it, before it is simulated.
+//!
+//! A [`Groom`] holds strands as polylines, root first, in metres. It comes from a file, from game
+//! code ([`Groom::from_polylines`]) or is planted on a mesh.
+
+mod bytes;
+mod format;
+pub mod gltf;
+mod grown_hair;
+mod guides;
+mod loader;
+mod losses;
+mod reshape;
+mod settings;
+mod size;
+pub mod tressfx;
+pub mod yuksel;
+
+pub use bytes::GroomFileError;
+pub use format::{GroomFormat, UpAxis};
+pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
+pub use losses::GroomLosses;
+
+pub(crate) use grown_hair::GrownStrands;
+pub use grown_hair::{GroomGuides, GroomedHair};
+pub use settings::GroomSettings;
+pub use size::OddSize;
+
+use crate::base::setting::InvalidValue;
+use bevy::prelude::*;
+
+/// Many strands as polylines, root first (m), optionally with widths, colours and UVs of the roots. An
+/// asset; immutable, so that its arrays are always consistent.
+#[derive(Asset, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct Groom {
+    points: Vec<Vec3>,
+    ends: Vec<u32>,
+    widths: Vec<f32>,
+    colors: Vec<LinearRgba>,
+    uvs: Vec<Vec2>,
+}
+
+/// One strand of a [`Groom`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroomStrand<'a> {
+    /// Its nodes (m), root first.
+    pub points: &'a [Vec3],
+    /// Diameter at each node (m), if given.
+    pub widths: Option<&'a [f32]>,
+    /// Colour at each node, if given.
+    pub colors: Option<&'a [LinearRgba]>,
+    /// Where the root is on the scalp's texture, if given.
+    pub uv: Option<Vec2>,
+}
+
+/// Why data cannot be a [`Groom`].
+#[derive(thiserror::Error, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub enum GroomError {
+    /// A strand with fewer than two nodes.
+    #[error("strand {strand} has {found} nodes, expected 2 or more: leave it out")]
+    TooFewNodes {
+        /// Its index.
+        strand: usize,
+        /// How many nodes it has.
+        found: usize,
+    },
+    /// A node that is not finite.
+    #[error("node {node} of strand {strand} is not finite: remove it or repair the source")]
+    NonFinite {
+        /// The strand's index.
+        strand: usize,
+        /// The node's index from the root.
+        node: usize,
+    },
+    /// An invalid width, colour or UV.
+    #[error(
+        "{what} {at} of strand {strand} is {found}, expected {expected}: repair or leave it out"
+    )]
+    OutOfRange {
+        /// Which number, with its unit.
+        what: &'static str,
+        /// The strand's index.
+        strand: usize,
+        /// The node's index from the root; 0 for values of the whole strand.
+        at: usize,
+        /// What was found.
+        found: f32,
+        /// The allowed values.
+        expected: &'static str,
+    },
+    /// An array whose length does not match the nodes or strands.
+    #[error("{what} has {found} elements, expected {expected} or none")]
+    Length {
+        /// Which array.
+        what: &'static str,
+        /// How many it has.
+        found: usize,
+        /// How many it should have.
+        expected: usize,
+    },
+    /// More nodes than an index of 32 bits can count.
+    #[error("the groom has {found} nodes, expected at most {}: thin it first", u32::MAX)]
+    TooMany {
+        /// How many there are.
+        found: usize,
+    },
+    /// A strand longer than a file format can hold.
+    #[error("strand {strand} has {found} nodes, expected at most 65536: resample it first")]
+    TooManyNodes {
+        /// Its index.
+        strand: usize,
+        /// How many nodes it has.
+        found: usize,
+    },
+    /// No strand at all.
+    #[error(
+        "the groom has no strands, expected 1 or more: check whether all were left out as \
+         short, or its scale is too small"
+    )]
+    Empty,
+    /// Ends of strands that are not in ascending order.
+    #[error("strand {strand} ends at node {found}, expected {expected}: make it by from_polylines")]
+    Ends {
+        /// Its index.
+        strand: usize,
+        /// Where it ends.
+        found: usize,
+        /// Where it may end.
+        expected: &'static str,
+    },
+    /// A number that a method of [`Groom`] refuses.
+    #[error(transparent)]
+    Value(#[from] InvalidValue),
+}
+
+impl Groom {
+    /// A groom of these polylines (m), root first.
+    ///
+    /// ```
+    /// # use bevy_keratin::authoring::groom::Groom; use bevy::prelude::*;
+    /// let lines = (0..10).map(|i| Vec3::X * i as f32 * 0.01).map(|root| [root, root + Vec3::Y * 0.1]);
+    /// assert_eq!(Groom::from_polylines(lines).unwrap().len(), 10);
+    /// ```
+    ///
+    /// # Errors
+    /// When a strand has fewer than two nodes or a node that is not finite.
+    pub fn from_polylines<L: IntoIterator<Item = Vec3>>(
+        strands: impl IntoIterator<Item = L>,
+    ) -> Result<Self, GroomError> {
+        let mut groom = Self::default();
+        for line in strands {
+            groom.points.extend(line);
+            let found = groom.points.len();
+            groom.ends.push(u32::try_from(found).map_err(|_| GroomError::TooMany { found })?);
+        }
+        groom.checked()
+    }
+
+    /// The groom with a diameter (m) for each node, strand after strand.
+    ///
+    /// # Errors
+    /// When there are not as many as nodes, or one is negative or not finite.
+    pub fn with_widths(mut self, widths: Vec<f32>) -> Result<Self, GroomError> {
+        self.widths = widths;
+        self.checked()
+    }
+
+    /// The groom with a colour for each node, strand after strand.
+    ///
+    /// # Errors
+    /// When there are not as many as nodes, or one is not finite.
+    pub fn with_colors(mut self, colors: Vec<LinearRgba>) -> Result<Self, GroomError> {
+        self.colors = colors;
+        self.checked()
+    }
+
+    /// The groom with a place on the scalp's texture for each strand.
+    ///
+    /// # Errors
+    /// When there are not as many as strands, or one is not finite.
+    pub fn with_uvs(mut self, uvs: Vec<Vec2>) -> Result<Self, GroomError> {
+        self.uvs = uvs;
+        self.checked()
+    }
+
+    fn checked(self) -> Result<Self, GroomError> {
+        self.check().map(|()| self)
+    }
+
+    /// Validates it: grooms also come from files and through reflection.
+    fn check(&self) -> Result<(), GroomError> {
+        self.check_ends()?;
+        let fits = |what, found: usize, expected: usize| {
+            let fits = found == 0 || found == expected;
+            fits.then_some(()).ok_or(GroomError::Length { what, found, expected })
+        };
+        fits("widths", self.widths.len(), self.points.len())?;
+        fits("colors", self.colors.len(), self.points.len())?;
+        fits("uvs", self.uvs.len(), self.len())?;
+        self.strands().enumerate().try_for_each(|(i, strand)| strand.check(i))
+    }
+
+    /// Every strand begins where the one before ends, and the last ends with the nodes.
+    fn check_ends(&self) -> Result<(), GroomError> {
+        let (mut start, all) = (0, self.points.len());
+        for (strand, &end) in self.ends.iter().enumerate() {
+            let found = end as usize;
+            if found < start || found > all {
+                let expected = "behind the one before, and within the nodes";
+                return Err(GroomError::Ends { strand, found, expected });
+            }
+            start = found;
+        }
+        let fits = start == all;
+        let expected = self.ends.last().map_or(0, |end| *end as usize);
+        fits.then_some(()).ok_or(GroomError::Length { what: "nodes", found: all, expected })
+    }
+
+    /// How many strands there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The nodes of all strands (m), one strand after the other.
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// The strands in their order.
+    pub fn strands(&self) -> impl ExactSizeIterator<Item = GroomStrand<'_>> {
+        (0..self.len()).map(|i| self.strand_at(i))
+    }
+
+    fn strand_at(&self, i: usize) -> GroomStrand<'_> {
+        let nodes = self.nodes_of(i);
+        GroomStrand {
+            points: &self.points[nodes.clone()],
+            widths: self.widths.get(nodes.clone()).filter(|_| !self.widths.is_empty()),
+            colors: self.colors.get(nodes).filter(|_| !self.colors.is_empty()),
+            uv: self.uvs.get(i).copied(),
+        }
+    }
+}
+
+impl GroomStrand<'_> {
+    /// Length along its nodes (m).
+    pub fn length(&self) -> f32 {
+        self.points.windows(2).map(|p| p[0].distance(p[1])).sum()
+    }
+
+    fn check(&self, strand: usize) -> Result<(), GroomError> {
+        let found = self.points.len();
+        if found < 2 {
+            return Err(GroomError::TooFewNodes { strand, found });
+        }
+        if let Some(node) = self.points.iter().position(|p| !p.is_finite()) {
+            return Err(GroomError::NonFinite { strand, node });
+        }
+        let wrong = |what, at, found, expected| {
+            Err(GroomError::OutOfRange { what, strand, at, found, expected })
+        };
+        let width = |w: &f32| w.is_finite() && *w >= 0.0;
+        let widths = self.widths.unwrap_or_default();
+        if let Some(at) = widths.iter().position(|w| !width(w)) {
+            return wrong("width (m)", at, widths[at], "a finite diameter, 0 or more");
+        }
+        let parts = self.colors.unwrap_or_default().iter().map(|c| c.to_f32_array());
+        for (at, parts) in parts.enumerate() {
+            if let Some(part) = parts.into_iter().find(|part| !part.is_finite()) {
+                return wrong("colour", at, part, "finite numbers");
+            }
+        }
+        let uv = self.uv.unwrap_or_default().to_array();
+        match uv.into_iter().find(|part| !part.is_finite()) {
+            Some(part) => wrong("UV", 0, part, "finite numbers"),
+            None => Ok(()),
+        }
+    }
+}

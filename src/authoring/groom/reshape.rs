@@ -1,0 +1,213 @@
+//! Grooms made of other grooms: scaled, turned upright, cleaned, resampled, thinned.
+
+use super::{Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis};
+use crate::base::setting::ValueRange;
+use bevy::{math::Affine3A, prelude::*};
+use core::ops::Range;
+
+const SCALE: ValueRange = GroomSettings::SCALE.named("a groom's scale");
+const NODES: ValueRange = GroomSettings::NODES.named("nodes to resample to");
+const SHORTEST: ValueRange = GroomSettings::SHORTEST_SEGMENT.named("the shortest segment (m)");
+const EVERY: ValueRange = GroomSettings::KEEP_EVERY.named("keep every k-th strand, k");
+
+impl Groom {
+    /// The groom `factor` times as large, widths included.
+    ///
+    /// # Errors
+    /// When the factor is not between 1e-9 and 1e9, or a node becomes non-finite.
+    pub fn scaled(mut self, factor: f32) -> Result<Self, GroomError> {
+        SCALE.check(factor)?;
+        self.points.iter_mut().for_each(|p| *p *= factor);
+        self.widths.iter_mut().for_each(|w| *w *= factor);
+        self.checked()
+    }
+
+    /// The groom turned so that what was `up` is +Y.
+    pub fn with_up(mut self, up: UpAxis) -> Self {
+        self.points.iter_mut().for_each(|p| *p = up.to_y_up(*p));
+        self
+    }
+
+    /// The groom moved by `offset` (m).
+    ///
+    /// # Errors
+    /// When a node becomes non-finite.
+    pub fn moved(mut self, offset: Vec3) -> Result<Self, GroomError> {
+        self.points.iter_mut().for_each(|p| *p += offset);
+        self.checked()
+    }
+
+    /// The groom in another space; widths scale with it.
+    ///
+    /// # Errors
+    /// When a node becomes non-finite.
+    pub(crate) fn mapped(mut self, space: &Affine3A) -> Result<Self, GroomError> {
+        let scale = space.matrix3.determinant().abs().cbrt();
+        self.points.iter_mut().for_each(|p| *p = space.transform_point3(*p));
+        self.widths.iter_mut().for_each(|w| *w *= scale);
+        self.checked()
+    }
+
+    /// Every strand with `nodes` nodes evenly spaced along it (2…4096). Root and tip stay
+    /// exactly where they are; widths and colours are blended. Corners between nodes are cut, so
+    /// strands get shorter the fewer nodes they have.
+    ///
+    /// # Errors
+    /// When `nodes` is out of range, or there would be more nodes than 32 bits can count.
+    pub fn resampled(&self, nodes: usize) -> Result<Self, GroomError> {
+        NODES.check(nodes)?;
+        self.resampled_by(|_| nodes)
+    }
+
+    /// The same with a number of nodes for each strand that depends on its length (m).
+    pub(super) fn resampled_by(&self, nodes: impl Fn(f32) -> usize) -> Result<Self, GroomError> {
+        let mut made = self.emptied();
+        let mut along = Vec::new();
+        for strand in self.strands() {
+            let length = arc_lengths(strand.points, &mut along);
+            let count = nodes(length as f32).max(2);
+            for k in 0..count {
+                let at = place(&along, length * k as f64 / (count - 1) as f64);
+                made.push_blend(&strand, if k + 1 == count { (along.len() - 2, 1.0) } else { at });
+            }
+            made.end_strand(strand.uv)?;
+        }
+        Ok(made)
+    }
+
+    /// Every strand without nodes nearer than `shortest` (m) to the one before; the tip stays.
+    /// Strands without any segment left are removed. Also returns the counts.
+    ///
+    /// # Errors
+    /// When `shortest` is negative or not finite.
+    pub fn merged(&self, shortest: f32) -> Result<(Self, GroomLosses), GroomError> {
+        SHORTEST.check(shortest)?;
+        let mut losses = GroomLosses::default();
+        let mut made = self.emptied();
+        let mut kept: Vec<usize> = Vec::new();
+        for strand in self.strands() {
+            let points = strand.points;
+            let far = |a: usize, b: usize| {
+                let apart = points[a].distance(points[b]);
+                apart >= shortest && apart > 0.0
+            };
+            let tip = points.len() - 1;
+            kept.clear();
+            kept.push(0);
+            for i in 1..tip {
+                if far(i, kept[kept.len() - 1]) {
+                    kept.push(i);
+                }
+            }
+            while kept.len() > 1 && !far(tip, kept[kept.len() - 1]) {
+                kept.pop();
+            }
+            if !far(tip, kept[kept.len() - 1]) {
+                losses.short_strands += 1;
+                continue;
+            }
+            kept.push(tip);
+            losses.merged_nodes += points.len() - kept.len();
+            kept.iter().for_each(|i| made.push_node(&strand, *i));
+            made.end_strand(strand.uv)?;
+        }
+        Ok((made, losses))
+    }
+
+    /// Every `k`-th strand, the first one included.
+    ///
+    /// # Errors
+    /// When `k` is 0.
+    pub fn thinned(&self, k: usize) -> Result<Self, GroomError> {
+        EVERY.check(k)?;
+        Ok(self.picked((0..self.len()).step_by(k)))
+    }
+
+    /// At most `count` strands, taken evenly from their order.
+    pub fn limited(&self, count: usize) -> Self {
+        let kept = count.min(self.len());
+        self.picked((0..kept).map(|i| (i as u128 * self.len() as u128 / kept as u128) as usize))
+    }
+
+    /// The strands of these indices; those that are not there are left out.
+    pub fn picked(&self, strands: impl IntoIterator<Item = usize>) -> Self {
+        let mut made = self.emptied();
+        for i in strands {
+            let Some(strand) = self.strand(i) else {
+                continue;
+            };
+            (0..strand.points.len()).for_each(|k| made.push_node(&strand, k));
+            // A subset cannot have too many nodes, unless strands are repeated.
+            if made.end_strand(strand.uv).is_err() {
+                break;
+            }
+        }
+        made
+    }
+
+    /// Without strands of one node, and how many those were.
+    pub(super) fn without_lone_nodes(self) -> (Self, usize) {
+        let lone = (0..self.len()).filter(|i| self.nodes_of(*i).len() < 2).count();
+        if lone == 0 {
+            return (self, 0);
+        }
+        let good = (0..self.len()).filter(|i| self.nodes_of(*i).len() >= 2);
+        (self.picked(good), lone)
+    }
+
+    /// One strand.
+    pub fn strand(&self, index: usize) -> Option<GroomStrand<'_>> {
+        (index < self.len()).then(|| self.strand_at(index))
+    }
+
+    pub(super) fn nodes_of(&self, strand: usize) -> Range<usize> {
+        let start = strand.checked_sub(1).map_or(0, |before| self.ends[before] as usize);
+        start..self.ends[strand] as usize
+    }
+
+    /// An empty groom with capacity for as many strands.
+    fn emptied(&self) -> Self {
+        Self { ends: Vec::with_capacity(self.len()), ..default() }
+    }
+
+    fn push_node(&mut self, of: &GroomStrand<'_>, i: usize) {
+        self.points.push(of.points[i]);
+        self.widths.extend(of.widths.map(|w| w[i]));
+        self.colors.extend(of.colors.map(|c| c[i]));
+    }
+
+    /// A node at the share `t` of segment `i`.
+    fn push_blend(&mut self, of: &GroomStrand<'_>, (i, t): (usize, f32)) {
+        let blend = |a: Vec3, b: Vec3| if t >= 1.0 { b } else { a.lerp(b, t) };
+        self.points.push(blend(of.points[i], of.points[i + 1]));
+        self.widths.extend(of.widths.map(|w| w[i] + (w[i + 1] - w[i]) * t));
+        self.colors.extend(of.colors.map(|c| c[i] * (1.0 - t) + c[i + 1] * t));
+    }
+
+    fn end_strand(&mut self, uv: Option<Vec2>) -> Result<(), GroomError> {
+        let found = self.points.len();
+        self.ends.push(u32::try_from(found).map_err(|_| GroomError::TooMany { found })?);
+        self.uvs.extend(uv);
+        Ok(())
+    }
+}
+
+/// Lengths from the root up to each node, and up to the tip.
+fn arc_lengths(points: &[Vec3], along: &mut Vec<f64>) -> f64 {
+    let mut length = 0.0;
+    along.clear();
+    along.push(0.0);
+    along.extend(points.windows(2).map(|p| {
+        length += p[0].as_dvec3().distance(p[1].as_dvec3());
+        length
+    }));
+    length
+}
+
+/// The segment at a distance along a strand, and the parameter within it.
+fn place(along: &[f64], distance: f64) -> (usize, f32) {
+    let after = along.partition_point(|a| *a <= distance).clamp(1, along.len() - 1);
+    let (from, to) = (along[after - 1], along[after]);
+    let share = if to > from { ((distance - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
+    (after - 1, share as f32)
+}

@@ -1,0 +1,101 @@
+//! Import settings: unit, axes and thinning.
+
+use super::{Groom, GroomError, GroomFormat, GroomLosses, UpAxis};
+use crate::base::setting::{Ranged, setting};
+use bevy::prelude::*;
+
+setting! {
+    /// How a groom is taken from a file: unit, axes, and how much of it. Settings of the
+    /// [`GroomLoader`](super::GroomLoader), also in `.meta` files; or apply them in game code.
+    ///
+    /// ```no_run
+    /// # use bevy_keratin::authoring::groom::*; use bevy::prelude::*;
+    /// fn load(assets: Res<AssetServer>) -> Handle<Groom> {
+    ///     assets
+    ///         .load_builder()
+    ///         .with_settings(|s: &mut GroomSettings| {
+    ///             s.scale = Some(0.01); // the file is in centimetres
+    ///             s.up = Some(UpAxis::Z);
+    ///         })
+    ///         .load("hair/bob.hair")
+    /// }
+    /// ```
+    ///
+    /// Files other than glTF do not specify their unit; the defaults are those of the formats' own
+    /// samples. The unit used is logged, with a warning and a better scale if the size is implausible for
+    /// hair: see [`Groom::odd_size`].
+    ///
+    /// | file | metres per unit | up |
+    /// |---|---|---|
+    /// | `.hair` | 0.00254 (tenths of an inch) | Z |
+    /// | `.tfx`, version 3 | 0.01 (centimetres) | Y |
+    /// | `.tfx`, version 4 | 1 | Y |
+    /// | glTF | 1 | Y |
+    #[derive(Reflect, Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+    #[serde(default)]
+    #[reflect(Default, Clone, PartialEq)]
+    pub struct GroomSettings {
+        /// Metres per unit of the file; `None` is what the table says.
+        pub scale: Option<f32> = None, in SCALE: 1e-9..=1e9, "0.01 takes centimetres to metres";
+        /// The file's axis that points up; `None` is what the table says.
+        pub up: Option<UpAxis> = None;
+        /// The place that becomes the groom's origin, such as the head's centre: in metres, Y up.
+        /// Zero is the file's own.
+        pub origin: Vec3 = Vec3::ZERO;
+        /// Segments shorter than this are merged and strands shorter than this left out. Strands of
+        /// the simulation need more than 1e-6.
+        pub shortest_segment: f32 = 1e-5, "m" in SHORTEST_SEGMENT: 0.0..=1e6, safe 2e-6..=1e-3,
+            "1e-5 removes what has no length";
+        /// Resamples every strand to this many nodes, evenly spaced; `None` is as in the file.
+        pub nodes: Option<usize> = None, in NODES: 2.0..=4096.0, "16 suit hair of a head";
+        /// Keeps every n-th strand; 1 keeps all.
+        pub keep_every: usize = 1, in KEEP_EVERY: 1.0..=1e9, "1 keeps all";
+        /// Keeps at most this many strands, an evenly spaced subset; `None` keeps all.
+        pub limit: Option<usize> = None, in LIMIT: 1.0..=1e9, "None keeps all";
+    }
+}
+
+impl GroomSettings {
+    /// Applies these settings to a groom as read from a file of this format, and counts what is left
+    /// out: fewer strands first, then scale and axes, then merging, then resampling.
+    ///
+    /// # Errors
+    /// When a setting is out of range, scaled nodes become non-finite, or no strand is left.
+    pub fn apply(
+        &self,
+        groom: Groom,
+        format: GroomFormat,
+    ) -> Result<(Groom, GroomLosses), GroomError> {
+        self.clone().checked()?;
+        let mut groom = groom;
+        let before = groom.len();
+        if self.keep_every != 1 {
+            groom = groom.thinned(self.keep_every)?;
+        }
+        if let Some(limit) = self.limit {
+            groom = groom.limited(limit);
+        }
+        let thinned_strands = before - groom.len();
+        let groom =
+            groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?.moved(-self.origin)?;
+        let (mut groom, mut losses) = groom.merged(self.shortest_segment)?;
+        losses.thinned_strands = thinned_strands;
+        if groom.is_empty() {
+            return Err(GroomError::Empty);
+        }
+        if let Some(nodes) = self.nodes {
+            groom = groom.resampled(nodes)?;
+        }
+        Ok((groom, losses))
+    }
+
+    /// Metres per unit of a file of this format.
+    pub fn scale_of(&self, format: GroomFormat) -> f32 {
+        self.scale.unwrap_or(format.scale())
+    }
+
+    /// The axis that is up in a file of this format.
+    pub fn up_of(&self, format: GroomFormat) -> UpAxis {
+        self.up.unwrap_or(format.up())
+    }
+}

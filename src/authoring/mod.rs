@@ -1,0 +1,17 @@
+//! Where hair comes from: [`groom`]s from files, presets that are [`plant`]ed on a mesh, roots that
+//! [`attach`] to it, colliders fitted to it ([`collider_fit`]), and [`wear`], all of it in one component.
+
+pub mod attach;
+pub mod collider_fit;
+pub mod groom;
+pub mod plant;
+pub mod wear;
+
+/// The room's share of [the prelude](crate::prelude).
+pub mod prelude {
+    pub use crate::authoring::groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
+    pub use crate::authoring::plant::HairPreset;
+    pub use crate::authoring::wear::{
+        HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair,
+    };
+}

@@ -1,0 +1,125 @@
+//! Why hair cannot be worn.
+
+use crate::{
+    authoring::{groom::GroomError, plant::PlantError},
+    base::setting::InvalidValue,
+    hair::strand::StrandError,
+};
+use bevy::prelude::*;
+
+/// Why a [`WearHair`](super::WearHair) puts no hair on its entity: what was found, what was expected
+/// and how to fix it. Reported as [`FaultKind::Wear`](crate::FaultKind::Wear).
+#[derive(thiserror::Error, Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum WearError {
+    /// Nothing below the wearer has a mesh, after ten seconds.
+    #[error(
+        "WearHair's entity has no mesh, and none appeared below it within {SEARCH_TIME} s: put it on a \
+         mesh, or on the root of a character"
+    )]
+    NoMesh,
+    /// No bone or mesh of the given name.
+    #[error("nothing is named {name:?} below WearHair's entity; there are {there}")]
+    NoBone {
+        /// The name.
+        name: String,
+        /// The names that are there.
+        there: String,
+    },
+    /// No name was given, and no bone is called head.
+    #[error("no bone is named head: name it with WearHair::on; there are {there}")]
+    NoHead {
+        /// The names that are there.
+        there: String,
+    },
+    /// A bone that neither moves skin nor has a mesh below it.
+    #[error(
+        "{name:?} moves no skin and has no mesh below it: name the bone that moves the head's skin"
+    )]
+    NoSkin {
+        /// Its name.
+        name: String,
+    },
+    /// An asset that could not be loaded.
+    #[error("the {what} was not loaded: {reason}")]
+    NotLoaded {
+        /// Which.
+        what: &'static str,
+        /// What the asset server says.
+        reason: String,
+    },
+    /// A skin whose joints are not those of its vertices.
+    #[error(
+        "the skin has {joints} joints, {poses} inverse bind poses and a vertex of joint {found}: \
+         give it the joints and poses of its own skeleton"
+    )]
+    Joints {
+        /// How many joints there are.
+        joints: usize,
+        /// How many inverse bind poses.
+        poses: usize,
+        /// The highest joint that a vertex names.
+        found: usize,
+    },
+    /// Places of bones or meshes that are not finite, or have no size.
+    #[error(
+        "the transforms between WearHair's entity and its mesh are not finite or have no size: \
+         give them a scale other than 0"
+    )]
+    Pose,
+    /// A face that looks straight up or down, or nowhere.
+    #[error("WearHair::facing is {found}, expected a direction that is not up or down")]
+    Facing {
+        /// Its value.
+        found: Vec3,
+    },
+    /// A head of implausible size.
+    #[error(
+        "the head is {found} m from the middle between the ears to the crown, expected {} to {} m: \
+         scale the character, or set the position of its head with WearHair::scalp",
+        HEAD_SIZES.start(), HEAD_SIZES.end()
+    )]
+    HeadSize {
+        /// The height (m).
+        found: f32,
+    },
+    /// Another entity's preset is worn on this bone or mesh.
+    #[error(
+        "the head's bone or mesh wears a preset of {by} already, expected one: remove that WearHair, or \
+         give this one as a groom; on a skinned character, a beard beside hair goes on the entity of the \
+         head's mesh"
+    )]
+    Taken {
+        /// The other wearer.
+        by: Entity,
+    },
+    /// A groom too far from the character's mesh.
+    #[error(
+        "half of the groom's strands grow farther than {found} m from the mesh, expected less than \
+         {most} m: set its origin with WearHair::place"
+    )]
+    Beside {
+        /// The median distance (m, scaled to a life-size head).
+        found: f32,
+        /// The limit (m).
+        most: f32,
+    },
+    /// An error of planting.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// An error of the groom.
+    #[error(transparent)]
+    Groom(#[from] GroomError),
+    /// A setting out of its range.
+    #[error(transparent)]
+    Setting(#[from] InvalidValue),
+    /// An invalid strand.
+    #[error(transparent)]
+    Strand(#[from] StrandError),
+}
+
+/// How long to wait for a missing mesh before reporting it (s).
+pub(super) const SEARCH_TIME: f32 = 10.0;
+
+/// Heights of heads on which hair can be simulated (m).
+pub(super) const HEAD_SIZES: core::ops::RangeInclusive<f32> = 1e-3..=100.0;

@@ -1,0 +1,360 @@
+//! Making hair for a head: planting or converting a groom, roots, colliders. A pure function, for
+//! any thread.
+
+use super::{
+    error::WearError,
+    space::{Fitting, MeshPart, cropped, fit},
+    target::Target,
+    what::{HairSource, WearHair},
+};
+#[cfg(feature = "render")]
+use crate::{authoring::plant::FollowerPlanting, base::setting::Ranged, hair::look::HairLook};
+use crate::{
+    authoring::{
+        collider_fit::{
+            BallRules, ProtrusionRules, fit_joint_capsules, inscribed_balls, protrusions,
+        },
+        groom::{Groom, GroomGuides, GrownStrands},
+        plant::{
+            HUMAN_DENSITY, HairPreset, Planting, PresetSettings, RootOnMesh, RootPlace,
+            SurfacePoint, surface_points,
+        },
+    },
+    forces::contact::HairCollider,
+    hair::{look::WornPreset, strand::Strand},
+    math::grid::KdTree,
+    water::HairWetting,
+};
+use bevy::{
+    math::Affine3A,
+    mesh::VertexAttributeValues as Values,
+    platform::collections::{HashMap, HashSet},
+    prelude::*,
+};
+
+/// Surface points of head and body for fitting balls.
+const POINTS: usize = 2500;
+/// Largest number of balls for a head, and for a joint.
+const MAX_BALLS: usize = 48;
+const MAX_JOINT_BALLS: usize = 32;
+/// A capsule that is farther from the skin than this, as a root mean square (m), gives way to balls.
+const LOOSE: f32 = 4e-3;
+/// How far balls stand out of a head's skin and of a joint's (m), and how far outside of one a point is that it
+/// covers (m; negative within it). Of a figure's nodes and drawn strands less than 0.1 % are in the skin then; with
+/// 24 balls of a joint, or 3 mm out, it would be up to 0.6 %, in the creases between them.
+const OUT: f32 = 3e-3;
+const CREASE: f32 = -3e-4;
+const JOINT_OUT: f32 = 5e-3;
+const JOINT_CREASE: f32 = 5e-4;
+/// What balls of a head leave out, by so many points of the surface: ears are thinner than any ball.
+const EARS: ProtrusionRules =
+    ProtrusionRules { apart: -5e-4, link: 0.018, longest: 0.06, out: 1.5e-3 };
+const FINE_POINTS: usize = 15_000;
+/// How far from hair's roots they stay (m): what grows in a solid is pushed out of it.
+const BARE: f32 = 8e-3;
+/// Height of a head, as [`Scalp`](crate::authoring::plant::Scalp) measures it (m).
+const HEAD: f32 = 0.133;
+/// Distance beyond the hair's length within which meshes are considered (m).
+const MARGIN: f32 = 0.15;
+/// Largest median distance of a groom's roots from the mesh (m).
+const MAX_ROOT_DISTANCE: f32 = 0.03;
+/// Smallest weight of the head joint at a vertex that counts as the head, not the neck.
+const HEAD_WEIGHT: f32 = 0.5;
+
+/// The input for making hair.
+pub(super) struct MakeInput {
+    pub(super) wear: WearHair,
+    pub(super) target: Target,
+    /// The groom, where one is worn.
+    pub(super) groom: Option<Groom>,
+}
+
+/// Finished hair, ready to be spawned.
+pub(super) struct Made {
+    /// Its parent bone or mesh, and its transform there.
+    pub(super) parent: Entity,
+    pub(super) place: Transform,
+    /// The mesh that its roots are tied to, and the transform from its space to the strands'.
+    pub(super) mesh: Entity,
+    pub(super) from_mesh: Affine3A,
+    pub(super) roots: Vec<RootOnMesh>,
+    pub(super) hair: GrownStrands,
+    pub(super) settings: Option<PresetSettings>,
+    pub(super) preset: Option<WornPreset>,
+    #[cfg(feature = "render")]
+    pub(super) look: Option<HairLook>,
+    /// Fibres for each strand.
+    pub(super) fibres: f32,
+    /// Colliders in the hair's space.
+    pub(super) balls: Vec<(HairCollider, Transform)>,
+    /// Colliders of joints.
+    pub(super) capsules: Vec<(Entity, (HairCollider, Transform))>,
+}
+
+/// Makes the hair.
+pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
+    let fitting = fit(&mut order.target.parts, &order.wear)?;
+    let grown = match (&order.wear.hair, &order.groom) {
+        (HairSource::Groom { guides, .. }, Some(groom)) => {
+            from_groom(groom, guides, &fitting, &order.wear.place)?
+        }
+        (HairSource::Groom { .. }, None) => return Err(WearError::NoMesh),
+        (HairSource::Preset(preset), _) => plant(*preset, &order.wear, &fitting)?,
+    };
+    let part = &order.target.parts[fitting.part];
+    let to_mesh = fitting.to_hair.inverse();
+    let (parent, place) = match &part.skin {
+        Some(skin) => {
+            let head = skin.head.unwrap_or(0);
+            (skin.joints[head], skin.poses[head] * to_mesh)
+        }
+        None => (part.entity, to_mesh),
+    };
+    let own = &order.target.own;
+    let (balls, capsules) = if order.wear.colliders {
+        let head = if part.skin.is_some() { parent } else { order.target.head };
+        let reach = grown.hair.strands.iter().map(Strand::length).fold(0.0, f32::max) + MARGIN;
+        let balls = match own.above.contains(&head) {
+            true => Vec::new(),
+            false => balls(&fitting, &grown.hair.strands, reach)?,
+        };
+        (balls, capsules(&order.target.parts, &own.joints, &fitting, reach))
+    } else {
+        default()
+    };
+    let fibres = HairWetting::FIBRES.safe;
+    Ok(Made {
+        parent,
+        place: Transform::from_matrix(place.into()),
+        mesh: part.entity,
+        from_mesh: fitting.to_hair,
+        roots: grown.roots,
+        hair: grown.hair,
+        settings: grown.settings,
+        preset: grown.preset,
+        #[cfg(feature = "render")]
+        look: order.groom.as_ref().and_then(Groom::look),
+        fibres: grown.fibres.clamp(*fibres.start(), *fibres.end()),
+        balls,
+        capsules,
+    })
+}
+
+/// Hair on a mesh.
+struct Grown {
+    hair: GrownStrands,
+    roots: Vec<RootOnMesh>,
+    settings: Option<PresetSettings>,
+    preset: Option<WornPreset>,
+    fibres: f32,
+}
+
+fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown, WearError> {
+    let length = WornPreset::LENGTH.named("WearHair::length").check(wear.length)?;
+    let worn = WornPreset { seed: wear.seed, length, ..WornPreset::of(preset) };
+    let mut planting = Planting { seed: wear.seed, ..preset.planting(&fitting.scalp) };
+    if worn.length != 1.0 {
+        planting = planting.lengthened(worn.length);
+    }
+    let whole = preset.is_everywhere();
+    let mesh = match whole {
+        true => fitting.mesh.clone(),
+        false => cropped(&fitting.mesh, planting.length + MARGIN),
+    };
+    let of_head = |place: &RootPlace| match place.color {
+        Some(color) if !whole && color.x <= HEAD_WEIGHT => 0.0,
+        _ => 1.0,
+    };
+    let planted = preset.plant_where(&planting, &mesh, &fitting.scalp, &of_head)?;
+    let strands = planted.groom.strands().map(|s| Strand::from_polyline(s.points));
+    let hair = GrownStrands {
+        strands: strands.collect::<Result<_, _>>()?,
+        #[cfg(feature = "render")]
+        followers: FollowerPlanting {
+            preset,
+            scalp: fitting.scalp,
+            hairline: (wear.hairline.map(Ranged::checked).transpose()?)
+                .unwrap_or_else(|| preset.hairline()),
+            count: preset.settings().followers.count,
+            seed: wear.seed,
+        }
+        .plant(&planted, &mesh, &of_head)?,
+        ..default()
+    };
+    Ok(Grown {
+        hair,
+        roots: planted.roots,
+        settings: Some(preset.settings()),
+        preset: Some(worn),
+        fibres: HUMAN_DENSITY / planting.density,
+    })
+}
+
+fn from_groom(
+    groom: &Groom,
+    guides: &GroomGuides,
+    fitting: &Fitting,
+    place: &Transform,
+) -> Result<Grown, WearError> {
+    let groom = groom.clone().mapped(&(fitting.from_wearer * place.compute_affine()))?;
+    let hair = groom.grown_strands(guides)?;
+    let places: Vec<Vec3> = hair.strands.iter().map(|s| s.positions()[0]).collect();
+    let (roots, mut apart): (Vec<_>, Vec<_>) =
+        RootOnMesh::nearest(&fitting.mesh, places.iter().copied())?.into_iter().unzip();
+    let found = median(&mut apart).unwrap_or(0.0);
+    if found > MAX_ROOT_DISTANCE {
+        return Err(WearError::Beside { found, most: MAX_ROOT_DISTANCE });
+    }
+    Ok(Grown {
+        fibres: HUMAN_DENSITY * area_of_each(&places),
+        hair,
+        roots,
+        settings: None,
+        preset: None,
+    })
+}
+
+/// Approximate area of skin per root (m²), from the distances of neighbours.
+fn area_of_each(places: &[Vec3]) -> f32 {
+    let tree = KdTree::new(places.iter().copied().zip(0u32..));
+    let apart = |p: &Vec3| tree.nearest::<2>(*p).nth(1).map(|(_, square)| square);
+    let mut squares: Vec<f32> = places.iter().filter_map(apart).collect();
+    median(&mut squares).unwrap_or(0.0)
+}
+
+fn median(values: &mut [f32]) -> Option<f32> {
+    values.sort_by(f32::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Balls that fill the head and stand a little out of it, and ellipsoids around its ears; for a mesh without
+/// joints, all of it that hair reaches.
+fn balls(
+    fitting: &Fitting,
+    strands: &[Strand],
+    reach: f32,
+) -> Result<Vec<(HairCollider, Transform)>, WearError> {
+    let cropped = cropped(&fitting.mesh, reach);
+    let points = surface_points(&cropped, POINTS)?;
+    let height = fitting.scalp.height;
+    let is_on_head = |p: &SurfacePoint| p.red > HEAD_WEIGHT && p.at.length() < reach;
+    let places: Vec<_> = points.iter().map(|p| (p.at, p.normal)).collect();
+    let rules = BallRules {
+        widest: 0.9 * height,
+        out: OUT * height / HEAD,
+        crease: CREASE,
+        most: MAX_BALLS,
+    };
+    let balls = inscribed_balls(&places, |i| is_on_head(&points[i]), &rules);
+    let skin = surface_points(&cropped, FINE_POINTS)?;
+    let size = height / HEAD;
+    let roots = strands.iter().filter_map(|strand| strand.positions().first().copied());
+    let roots = KdTree::new(roots.zip(0u32..));
+    let clear = (0, (BARE * size).powi(2));
+    let is_bare = |p: &SurfacePoint| roots.nearer_than(p.at, clear) == clear;
+    let bare = skin.iter().filter(|p| is_on_head(p) && is_bare(p)).map(|p| p.at);
+    let ears = protrusions(bare, &balls, &EARS.scaled(size));
+    let balls = balls.into_iter().map(|ball| {
+        let place = Transform::from_translation(ball.center.into());
+        Ok((HairCollider::sphere(ball.radius())?, place))
+    });
+    let ears = ears.into_iter().map(|ear| Ok((HairCollider::ellipsoid(ear.radii)?, ear.place)));
+    balls.chain(ears).collect()
+}
+
+/// For each joint that hair reaches the capsule that fits, or balls where it is of another shape; none for the
+/// head's, for those `with_own` colliders, and where the fit fails.
+fn capsules(
+    parts: &[MeshPart],
+    with_own: &HashSet<Entity>,
+    fitting: &Fitting,
+    reach: f32,
+) -> Vec<(Entity, (HairCollider, Transform))> {
+    let mut best: HashMap<Entity, (f32, Vec<(HairCollider, Transform)>)> = default();
+    let mut order = Vec::new();
+    for part in parts {
+        let Some(skin) = &part.skin else { continue };
+        let poses: Vec<Mat4> = skin.poses.iter().map(|pose| (*pose).into()).collect();
+        let to_hair = fitting.from_wearer * part.to_wearer;
+        let Ok(fitted) = fit_joint_capsules(&part.mesh, &poses) else { continue };
+        for (i, capsule) in fitted.into_iter().enumerate() {
+            let is_fitted = || !skin.of_head[i] && !with_own.contains(&skin.joints[i]);
+            let Some(capsule) = capsule.filter(|_| is_fitted()) else { continue };
+            let there = to_hair * skin.poses[i].inverse();
+            let scale = there.matrix3.determinant().abs().cbrt();
+            let [a, b] = [capsule.from, capsule.to].map(|end| there.transform_point3(end));
+            let radius = capsule.radius * scale;
+            let nearest = Segment3d::new(a, b).closest_point(Vec3::ZERO).length() - radius;
+            let is_near = nearest < reach;
+            let Some(collider) = capsule.collider().ok().filter(|_| is_near) else { continue };
+            let joint = skin.joints[i];
+            match best.get(&joint) {
+                Some(known) if known.0 >= radius => {}
+                known => {
+                    if known.is_none() {
+                        order.push(joint);
+                    }
+                    let balls = match capsule.deviation * scale > LOOSE {
+                        true => joint_balls(&part.mesh, i, &(to_hair, there), reach),
+                        false => Vec::new(),
+                    };
+                    let solids = if balls.is_empty() { vec![collider] } else { balls };
+                    best.insert(joint, (radius, solids));
+                }
+            }
+        }
+    }
+    let solids = order.into_iter().filter_map(|joint| Some((joint, best.remove(&joint)?.1)));
+    solids.flat_map(|(joint, all)| all.into_iter().map(move |solid| (joint, solid))).collect()
+}
+
+/// Balls that fill what joint `i` moves for the greater part, in the space of the joint, given the transforms
+/// to the hair's from the mesh's and from the joint's.
+fn joint_balls(
+    mesh: &Mesh,
+    i: usize,
+    (from_mesh, from_joint): &(Affine3A, Affine3A),
+    reach: f32,
+) -> Vec<(HairCollider, Transform)> {
+    let (
+        Some(Values::Float32x3(places)),
+        Some(Values::Float32x3(normals)),
+        Some(Values::Uint16x4(joints)),
+        Some(Values::Float32x4(weights)),
+    ) = (
+        mesh.attribute(Mesh::ATTRIBUTE_POSITION),
+        mesh.attribute(Mesh::ATTRIBUTE_NORMAL),
+        mesh.attribute(Mesh::ATTRIBUTE_JOINT_INDEX),
+        mesh.attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT),
+    )
+    else {
+        return Vec::new();
+    };
+    let near: Vec<(usize, Vec3)> = (places.iter().enumerate())
+        .map(|(v, at)| (v, from_mesh.transform_point3(Vec3::from(*at))))
+        .filter(|(_, at)| at.length() < reach)
+        .collect();
+    let some: Vec<(usize, Vec3)> =
+        near.iter().step_by(near.len().div_ceil(POINTS).max(1)).copied().collect();
+    // A mesh may have fewer normals than vertices.
+    let normal_of = |v: usize| {
+        let normal = normals.get(v).copied().unwrap_or_default();
+        from_mesh.transform_vector3(normal.into()).normalize_or_zero()
+    };
+    let points: Vec<(Vec3, Vec3)> = some.iter().map(|(v, at)| (*at, normal_of(*v))).collect();
+    let is_moved = |k: usize| {
+        let v = some[k].0;
+        let share = joints[v].iter().zip(weights[v]).filter(|(j, _)| usize::from(**j) == i);
+        share.map(|(_, weight)| weight).sum::<f32>() >= 0.5
+    };
+    let rules =
+        BallRules { widest: 0.12, out: JOINT_OUT, crease: JOINT_CREASE, most: MAX_JOINT_BALLS };
+    let (to_joint, scale) = (from_joint.inverse(), from_joint.matrix3.determinant().abs().cbrt());
+    let balls = inscribed_balls(&points, is_moved, &rules);
+    let each = balls.into_iter().filter_map(|ball| {
+        let place = to_joint.transform_point3(ball.center.into());
+        let ball = HairCollider::sphere(ball.radius() / scale).ok()?;
+        Some((ball, Transform::from_translation(place)))
+    });
+    each.collect()
+}

@@ -1,0 +1,50 @@
+//! Wearing: hair on a character by one component.
+//!
+//! [`WearHair`] sets what is worn, a preset or a groom, and where: on an entity's own mesh, or on
+//! the head of a character below it, found by the name of a bone. It waits for a scene that still
+//! loads, makes the hair on the async compute task pool, ties its roots, fits colliders to head and
+//! body, bones with colliders of their own left out, and spawns it as a [`Hair`](crate::Hair) of its
+//! own. [`HairWorn`] is triggered when it is there, [`HairNotWorn`] when it cannot be. Change the
+//! component and the hair is swapped, once the new one is ready; remove it and the hair is removed.
+//!
+//! | step | where |
+//! |---|---|
+//! | finding bone and mesh | `target` |
+//! | where the head is, and how large | `head` |
+//! | mesh and hair in one space: the face toward −Z, the head's middle at the origin, life size | `space` |
+//! | planting, roots, colliders: a pure function | `make` |
+
+mod error;
+mod head;
+mod make;
+mod space;
+mod systems;
+mod target;
+mod what;
+
+pub use error::WearError;
+pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair};
+
+use crate::base::schedule::HairFrame;
+use bevy::prelude::*;
+
+/// Puts hair on entities with [`WearHair`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WearPlugin;
+
+impl Plugin for WearPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<WearHair>()
+            .register_type::<HairSource>()
+            .register_type::<WornHair>()
+            .register_type::<HairWorn>()
+            .register_type::<HairNotWorn>()
+            .register_required_components::<WearHair, systems::Wearing>()
+            .add_observer(systems::leave)
+            .add_systems(
+                HairFrame,
+                (systems::take_off, systems::detect_changes, systems::find_heads, systems::put_on)
+                    .chain(),
+            );
+    }
+}

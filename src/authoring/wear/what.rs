@@ -1,0 +1,265 @@
+//! The components and events of worn hair.
+
+use super::error::WearError;
+#[cfg(feature = "save")]
+use crate::hairdo::save::{Hairdo, HairdoError};
+use crate::{
+    authoring::{
+        groom::{Groom, GroomGuides},
+        plant::{HairPreset, Hairline, Scalp},
+    },
+    hair::look::{HairDye, HairLook},
+    hairdo::style::HairStyle,
+};
+use bevy::prelude::*;
+
+/// Puts hair on a character. Component of any entity with a mesh, or of one that has a character
+/// below it, such as the root of a glTF scene; the scene may still be loading.
+///
+/// ```
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+/// # fn wear(mut commands: Commands, character: Entity, groom: Handle<Groom>) {
+/// // On the head, found by its bone's name:
+/// commands.entity(character).insert(WearHair::new(HairPreset::Curly));
+/// // Another bone, and a character that looks along +Z, as glTF's do:
+/// commands.entity(character).insert(WearHair::new(HairPreset::Bob).on("skull").facing(Dir3::Z));
+/// // What an artist made for this character:
+/// commands.entity(character).insert(WearHair::new(groom));
+/// // Bald again:
+/// commands.entity(character).remove::<WearHair>();
+/// # }
+/// ```
+///
+/// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there
+/// is none), with [`WornHair`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] has its entity.
+/// It settles before it is first drawn ([`Settling`](crate::Settling)) unless it is styled. Its
+/// settings are the preset's, and a [`HairWetting`](crate::HairWetting) with the number of fibres
+/// that grow there; to change them, wait for it:
+///
+/// ```
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+/// # fn wear(commands: &mut Commands, character: Entity) {
+/// commands
+///     .entity(character)
+///     .insert(WearHair::new(HairPreset::Wavy))
+///     .observe(|worn: On<HairWorn>, mut commands: Commands| {
+///         commands.entity(worn.hair).insert(AirDrag { rate: 5.0 });
+///     });
+/// # }
+/// ```
+///
+/// Hair is made off the main thread and put on in [`PreUpdate`]. Whenever this component changes
+/// the hair is made again, and the old one stays until the new one is ready; another
+/// [`look`](Self::look), [`dye`](Self::dye) or [`style`](Self::style) is applied to the worn hair.
+/// Hair that cannot be worn is reported once, as a [`HairFault`](crate::HairFault) and by
+/// [`HairNotWorn`]; the wearer keeps the hair that it has.
+///
+/// The character may be of any size from that of a doll to that of a giant: presets have life size
+/// on heads of life size, 8 to 16 cm from the middle between the ears to the crown, and are scaled
+/// in proportion on others. The mesh is taken as it is bound to its skeleton, unmorphed.
+#[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct WearHair {
+    /// What is worn.
+    pub hair: HairSource,
+    /// The name of the bone, or of the mesh, that it is worn on. Default `None`: the entity's own
+    /// mesh, else the bone whose name ends with the word head (`Head`, `mixamorig:Head`,
+    /// `J_Bip_C_Head`) or is Rigify's (`DEF-spine.006`), else the only mesh there is: on the joint
+    /// that moves its highest vertex.
+    pub on: Option<String>,
+    /// The direction in which the face looks, in this entity's space; Y is up and the component
+    /// along Y is ignored. Default −Z, Bevy's forward; characters of glTF files look along +Z
+    /// unless they are converted.
+    pub facing: Dir3,
+    /// Seed of the strands' places and variations: the same seed gives the same hair. Default 0.
+    pub seed: u64,
+    /// How long a preset's hair is, as a multiple of its own length. Default 1, range that of
+    /// [`WornPreset::LENGTH`](crate::WornPreset::LENGTH).
+    pub length: f32,
+    /// How it looks. Default `None`: as the hairdo, the preset or the groom has it; on hair that is worn
+    /// already, as it looks now.
+    pub look: Option<HairLook>,
+    /// Bleach and dye. Default `None`: as the hairdo has it, else none.
+    pub dye: Option<HairDye>,
+    /// Whether and how its style is tracked: see [`HairStyle`]. Default
+    /// `Some(HairStyle::default())`; without a style, as on an unstyled preset, it costs nothing.
+    pub style: Option<HairStyle>,
+    /// Where a preset's hairline is, in this entity's space, with the character as it is bound to its
+    /// skeleton. Its front overrides [`facing`](Self::facing). Default `None`: found from the head's
+    /// shape.
+    pub scalp: Option<Scalp>,
+    /// How a preset's hair begins at the hairline. Default `None`: [`HairPreset::hairline`].
+    pub hairline: Option<Hairline>,
+    /// Where a groom's origin is, and how it is turned and scaled, in this entity's space. Default
+    /// the identity: it was made around the character as it stands there.
+    pub place: Transform,
+    /// Whether colliders are fitted to head and body: balls for the head, capsules or balls for the joints
+    /// that hair reaches. [`HairCollider`](crate::HairCollider)s of the game's own replace those of the bone
+    /// that they are on or below: one on a hand the hand's, one on the head, its jaw or its hat all of the
+    /// head's; on a mesh without a skin, those of the mesh. One on the character's root replaces none. Each
+    /// worn hair brings its own, also a beard beside hair. Default `true`.
+    pub colliders: bool,
+    /// How the hair is styled: put on at once, or resampled where it is of other strands. A hairdo
+    /// saved from worn hair fits the same [`hair`](Self::hair), [`seed`](Self::seed) and
+    /// [`length`](Self::length) on the same character strand by strand:
+    /// `WearHair::try_from(hairdo)` sets them. Default `None`.
+    #[cfg(feature = "save")]
+    pub hairdo: Option<Hairdo>,
+}
+
+impl Default for WearHair {
+    fn default() -> Self {
+        Self {
+            hair: HairSource::default(),
+            on: None,
+            facing: Dir3::NEG_Z,
+            seed: 0,
+            length: 1.0,
+            look: None,
+            dye: None,
+            style: Some(HairStyle::default()),
+            scalp: None,
+            hairline: None,
+            place: Transform::IDENTITY,
+            colliders: true,
+            #[cfg(feature = "save")]
+            hairdo: None,
+        }
+    }
+}
+
+impl WearHair {
+    /// Hair of a preset or a groom, on the head.
+    pub fn new(hair: impl Into<HairSource>) -> Self {
+        Self { hair: hair.into(), ..default() }
+    }
+
+    /// The same on the bone or mesh of this name.
+    pub fn on(mut self, name: impl Into<String>) -> Self {
+        self.on = Some(name.into());
+        self
+    }
+
+    /// The same on a face that looks in this direction.
+    pub fn facing(mut self, direction: Dir3) -> Self {
+        self.facing = direction;
+        self
+    }
+
+    /// The same with a length of `times` the preset's.
+    pub fn long(mut self, times: f32) -> Self {
+        self.length = times;
+        self
+    }
+
+    /// The same bleached and dyed.
+    pub fn dyed(mut self, dye: HairDye) -> Self {
+        self.dye = Some(dye);
+        self
+    }
+
+    /// Whether they differ only in what worn hair can take.
+    pub(super) fn is_same_hair(&self, other: &Self) -> bool {
+        let bare = |wear: &Self| Self { look: None, dye: None, style: None, ..wear.clone() };
+        bare(self) == bare(other)
+    }
+
+    /// The same styled like this.
+    #[cfg(feature = "save")]
+    pub fn styled(mut self, hairdo: Hairdo) -> Self {
+        self.hairdo = Some(hairdo);
+        self
+    }
+}
+
+/// A hairdo as it was saved: the preset that it was made on, with seed and length, styled by it.
+///
+/// # Errors
+/// [`HairdoError::NoPreset`] when it was made on something else, or on a preset that is not known.
+#[cfg(feature = "save")]
+impl TryFrom<Hairdo> for WearHair {
+    type Error = HairdoError;
+
+    fn try_from(hairdo: Hairdo) -> Result<Self, HairdoError> {
+        let of = hairdo.preset().ok_or(HairdoError::NoPreset)?;
+        let preset = of.preset().ok_or(HairdoError::NoPreset)?;
+        let (seed, length) = (of.seed, of.length);
+        Ok(Self { seed, length, ..Self::new(preset) }.styled(hairdo))
+    }
+}
+
+/// Hair that can be worn.
+#[derive(Reflect, Clone, Debug, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+pub enum HairSource {
+    /// Planted by a preset.
+    Preset(HairPreset),
+    /// A groom asset; waits until it is loaded, and follows reloads.
+    Groom {
+        /// The groom.
+        groom: Handle<Groom>,
+        /// Which of its strands are simulated, and how finely.
+        guides: GroomGuides,
+    },
+}
+
+impl Default for HairSource {
+    fn default() -> Self {
+        Self::Preset(HairPreset::default())
+    }
+}
+
+impl From<HairPreset> for HairSource {
+    fn from(preset: HairPreset) -> Self {
+        Self::Preset(preset)
+    }
+}
+
+impl From<Handle<Groom>> for HairSource {
+    fn from(groom: Handle<Groom>) -> Self {
+        Self::Groom { groom, guides: GroomGuides::default() }
+    }
+}
+
+/// The source and the wearer of a worn [`Hair`](crate::Hair). Component of the hair, written when it is
+/// spawned.
+#[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Component, Clone, PartialEq)]
+pub struct WornHair {
+    /// The entity with the [`WearHair`].
+    pub wearer: Entity,
+    /// Its source.
+    pub hair: HairSource,
+}
+
+impl WornHair {
+    /// Which preset it is; `None` for a groom.
+    pub fn preset(&self) -> Option<HairPreset> {
+        match self.hair {
+            HairSource::Preset(preset) => Some(preset),
+            HairSource::Groom { .. } => None,
+        }
+    }
+}
+
+/// Triggered on an entity with [`WearHair`] once its hair is spawned, at first and after each change.
+#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct HairWorn {
+    /// The wearer.
+    pub entity: Entity,
+    /// The hair.
+    pub hair: Entity,
+}
+
+/// Triggered on an entity with [`WearHair`] whose hair cannot be made; also reported as a
+/// [`HairFault`](crate::HairFault).
+#[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq, from_reflect = false)]
+pub struct HairNotWorn {
+    /// The wearer, with the hair that it had.
+    pub entity: Entity,
+    /// Why.
+    #[reflect(ignore)]
+    pub error: WearError,
+}

@@ -1,0 +1,15 @@
+//! What all rooms stand on: faults, settings with ranges, the schedule of a tick, work on threads.
+
+pub mod fault;
+pub(crate) mod parallel;
+pub mod schedule;
+pub mod setting;
+
+/// The room's share of [the prelude](crate::prelude).
+pub mod prelude {
+    pub use crate::base::fault::{FaultKind, HairFault};
+    pub use crate::base::schedule::{
+        HairProcessTime, HairStep, HairSubsteps, HairSystems, HairTick, SettleTick,
+    };
+    pub use crate::base::setting::{HairDefault, InvalidValue, ValueRange};
+}

@@ -1,0 +1,505 @@
+//! The tick: figure 1 of \[B\], read from top to bottom. The only file that defines the order.
+//!
+//! Each fixed tick runs the schedule [`HairTick`] once per substep, with the sets of
+//! [`HairSystems`] one after the other. It runs on a single thread and treats ambiguities as errors;
+//! systems run in parallel inside, over strands.
+
+use crate::base::{
+    fault,
+    setting::{self, InvalidValue, Ranged, ValueRange, Violations},
+};
+use bevy::{
+    ecs::{
+        entity::EntityHashSet,
+        schedule::{
+            InternedScheduleLabel, LogLevel, ScheduleBuildSettings, ScheduleLabel,
+            SingleThreadedExecutor,
+        },
+        system::SystemParam,
+    },
+    prelude::*,
+};
+
+/// The schedule of one substep. Add systems to it in one of [`HairSystems`], `First` and `Last` best.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct HairTick;
+
+/// The schedule of a substep of hair that is simulated ahead: only the systems that move strands,
+/// in the sets of [`HairSystems`], without bonds, water and treatments. See
+/// [`Settling`](crate::Settling).
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SettleTick;
+
+/// What is done once a frame, in [`PreUpdate`], before the ticks. On a single thread: each of its
+/// systems is done before another thread would have woken.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct HairFrame;
+
+/// The set of the tick in the schedule that runs it.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct HairTicks;
+
+/// The hair that is simulated ahead while all other hair waits; `None` in the tick itself.
+#[derive(Resource, Clone, Debug, Default)]
+pub(crate) struct Ahead(pub(crate) Option<EntityHashSet>);
+
+/// States the order of a substep once: sets, their parts, and what each does. The enum, the order of
+/// the schedule and the table in the docs are made from it.
+macro_rules! substep {
+    ($($set:ident: $does:literal { $($part:ident: $part_does:literal,)* })*) => {
+        /// The parts of a substep, in the order they run.
+        ///
+        /// Each of the eight sets of \[B\]'s figure 1 is made of parts, which are sets too. All run one
+        /// after the other, so that a system may be ordered against any of them.
+        ///
+        /// | set | part | what it does |
+        /// |---|---|---|
+        $(
+            #[doc = concat!("| [`", stringify!($set), "`](Self::", stringify!($set), ") | | ", $does, " |")]
+            $(#[doc = concat!(
+                "| | [`", stringify!($part), "`](Self::", stringify!($part), ") | ", $part_does, " |"
+            )])*
+        )*
+        #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum HairSystems {
+            $(
+                #[doc = concat!($does, ".")]
+                $set,
+                $(
+                    #[doc = concat!($part_does, ". Part of [`", stringify!($set), "`](Self::", stringify!($set), ").")]
+                    $part,
+                )*
+            )*
+        }
+
+        impl HairSystems {
+            /// The sets of the paper's figure in their order.
+            pub const ALL: [Self; 8] = [$(Self::$set),*];
+
+            /// The parts of a set in their order; none for a part.
+            pub fn parts(self) -> &'static [Self] {
+                match self {
+                    $(Self::$set => &[$(Self::$part),*],)*
+                    _ => &[],
+                }
+            }
+
+            /// What it does, in one line.
+            pub fn description(self) -> &'static str {
+                match self {
+                    $(Self::$set => $does, $(Self::$part => $part_does,)*)*
+                }
+            }
+        }
+    };
+}
+
+substep! {
+    First: "Empty, for users" {}
+    Roots: "Where the scalp is now" {
+        StrandHistory: "The present positions become the previous ones, for drawing between ticks",
+        Poses: "Frames of hair, colliders, rods and blowers move by a substep",
+        LevelOfDetail: "Levels and guides are chosen, once a tick",
+        SubstepLength: "How many substeps each hair takes as one, once a tick",
+        Sleep: "Strands at rest fall asleep, disturbed ones wake, once a tick",
+        FollowerSleep: "Followers sleep while all their guides do, once a tick",
+        FrameInertia: "Inertia of free nodes when the hair's frame moves",
+        MeshRoots: "Roots follow the triangles that they grow on",
+        BondFit: "New and changed strands get bonds for each joint",
+    }
+    ExternalForces: "Forces from outside, and requests for changes of bonds" {
+        Submersion: "Buoyancy, drag and wetting of hair under water",
+        Air: "Gravity, wind (equation 17) and drag; drying (19) of hair without water",
+        Treatments: "Lotions, heat and other treatments of bonds",
+        WaterExchange: "Showers spawn drops; hair soaks, films flow, water dries and hydrogen bonds follow",
+    }
+    Interaction: "Contacts" {
+        Obstacles: "Colliders are transformed into the frame of each hair",
+        StrandContact: "Strands push each other apart (equation 18)",
+        Droplets: "Droplets move, land and merge",
+        DropletContact: "Droplets pull the strands they touch (\\[W\\] 2 to 5)",
+        Bridges: "Films between wet strands pull them together",
+        RodWinding: "Perm rods guide the strands wound on them",
+    }
+    RestShape: "Stiffness from the cuticle (13, 14), rest shapes from the bonds (15)" {}
+    Projection: "Positions and velocities" {
+        Rods: "Cosserat rods: predict, project, limit lengths, velocities (1 to 12)",
+        Springs: "Mass-spring strands (\\[W\\] 1)",
+        Followers: "Strands that are not simulated follow their guides, once a tick",
+    }
+    BondUpdate: "Bonds that re-formed remember the present shape (16)" {
+        BondRates: "Rates move, memories follow (16)",
+        WaterLedger: "Droplets follow their strands; the water balance is summed",
+        Styles: "How much is left of styles, once a tick",
+    }
+    Last: "Empty, for users" {}
+}
+
+/// The number of substeps of a tick.
+///
+/// Droplets, springs and the paper's projections need the paper's step. Dry hair that is solved directly
+/// is as accurate in longer ones and takes several as one: see
+/// [`HairSolver::substep`](crate::HairSolver::substep).
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub enum HairSubsteps {
+    /// As many as bring the substep to the paper's 1/360 s or just below, whatever the app's rate:
+    /// 6 at 60 Hz, 3 at 120 Hz.
+    #[default]
+    Auto,
+    /// This many; values outside [`RANGE`](Self::RANGE) are clamped.
+    Fixed(u32),
+}
+
+impl HairSubsteps {
+    /// The range of the number of substeps.
+    pub const RANGE: ValueRange =
+        ValueRange::new("HairSubsteps", 1.0..=1000.0, "6 suit a tick of 1/60 s")
+            .with_safe(1.0..=24.0);
+
+    /// A fixed number of substeps.
+    ///
+    /// # Errors
+    /// When it is outside [`RANGE`](Self::RANGE).
+    pub fn fixed(count: u32) -> Result<Self, InvalidValue> {
+        Self::Fixed(count).checked()
+    }
+
+    /// The number of substeps for a tick of `seconds`.
+    pub fn count(&self, seconds: f32) -> u32 {
+        let mut count = match *self {
+            // Clocks round to nanoseconds: 1/60 s is not exactly six times 1/360 s.
+            Self::Auto => (seconds * 360.0 - 1e-3).ceil() as u32,
+            Self::Fixed(count) => count,
+        };
+        Self::RANGE.clamp(&mut count, || 1, &mut Violations::new());
+        count
+    }
+}
+
+impl Ranged for HairSubsteps {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        if let Self::Fixed(count) = self {
+            Self::RANGE.clamp(count, || 1, violations);
+        }
+    }
+}
+
+/// The substep that is running.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct HairStep {
+    /// Its length (s).
+    pub dt: f32,
+    /// Its number within the tick, from 0.
+    pub index: u32,
+    /// How many the tick has.
+    pub count: u32,
+}
+
+/// Run condition: in the first substep of a tick.
+pub(crate) fn first_substep(step: Res<HairStep>) -> bool {
+    step.index == 0
+}
+
+/// Run condition: in the last substep of a tick.
+pub(crate) fn last_substep(step: Res<HairStep>) -> bool {
+    step.index + 1 == step.count
+}
+
+/// How many of the tick's substeps a hair takes as one, and with how many iterations at most. A
+/// component of a [`Hair`](crate::Hair), written by its level of detail; without it every substep is
+/// taken.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct SubstepLimits {
+    /// How many substeps are taken as one; 0 counts as 1.
+    pub substeps: u32,
+    /// The most iterations in each.
+    pub iterations: u32,
+}
+
+impl Default for SubstepLimits {
+    fn default() -> Self {
+        Self { substeps: 1, iterations: u32::MAX }
+    }
+}
+
+/// How many of the tick's substeps the solver of a hair takes as one, unless its level of detail takes
+/// more. Chosen once a tick.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MergedSubsteps(pub(crate) u32);
+
+impl Default for MergedSubsteps {
+    fn default() -> Self {
+        Self(1)
+    }
+}
+
+impl MergedSubsteps {
+    /// As many as fit into `longest` (s) and divide the tick evenly.
+    pub(crate) fn within(longest: f32, step: &HairStep) -> Self {
+        let fit = ((longest / step.dt + 1e-3) as u32).clamp(1, step.count.max(1));
+        let divides = |together: &u32| step.count.is_multiple_of(*together);
+        Self((1..=fit).rev().find(divides).unwrap_or(1))
+    }
+}
+
+/// The effective substep of each hair.
+#[derive(SystemParam)]
+pub(crate) struct EffectiveSubsteps<'w, 's> {
+    step: Res<'w, HairStep>,
+    ahead: Res<'w, Ahead>,
+    hairs: Query<
+        'w,
+        's,
+        (Option<&'static SubstepLimits>, Option<&'static MergedSubsteps>),
+        With<MergedSubsteps>,
+    >,
+}
+
+/// One hair's substep.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EffectiveSubstep {
+    /// How long it is (s).
+    pub(crate) dt: f32,
+    /// Whether it is the hair's first in this tick.
+    pub(crate) is_first: bool,
+    /// How long the tick is (s).
+    pub(crate) tick: f32,
+    most_iterations: u32,
+}
+
+impl EffectiveSubsteps<'_, '_> {
+    fn together(&self, hair: Entity) -> (u32, SubstepLimits) {
+        let (limits, own) = self.hairs.get(hair).unwrap_or_default();
+        (Self::longer(limits, own), limits.copied().unwrap_or_default())
+    }
+
+    /// Whether the substep that `hair` takes next began before the one that is running.
+    pub(crate) fn began_before(&self, hair: Entity) -> bool {
+        let HairStep { index, count, .. } = *self.step;
+        index > 0 && merged(index - 1, count, self.together(hair).0).is_none()
+    }
+
+    /// Whether any hair takes a substep now; others wait until several are merged.
+    pub(crate) fn any(&self) -> bool {
+        if let Some(ahead) = &self.ahead.0 {
+            return ahead.iter().any(|hair| self.of(*hair).is_some());
+        }
+        let HairStep { index, count, .. } = *self.step;
+        let takes = |(limits, own): (Option<&SubstepLimits>, Option<&MergedSubsteps>)| {
+            merged(index, count, Self::longer(limits, own)).is_some()
+        };
+        self.hairs.iter().any(takes)
+    }
+
+    fn longer(limits: Option<&SubstepLimits>, own: Option<&MergedSubsteps>) -> u32 {
+        let limits = limits.copied().unwrap_or_default();
+        limits.substeps.max(own.copied().unwrap_or_default().0)
+    }
+
+    /// The substep that `hair` takes now, or `None` while it waits for a longer one.
+    pub(crate) fn of(&self, hair: Entity) -> Option<EffectiveSubstep> {
+        if self.ahead.0.as_ref().is_some_and(|ahead| !ahead.contains(&hair)) {
+            return None;
+        }
+        let HairStep { dt, index, count } = *self.step;
+        let (together, limits) = self.together(hair);
+        let substeps = merged(index, count, together)?;
+        Some(EffectiveSubstep {
+            dt: dt * substeps as f32,
+            is_first: index + 1 == substeps,
+            tick: dt * count as f32,
+            most_iterations: limits.iterations,
+        })
+    }
+}
+
+impl EffectiveSubstep {
+    /// `full` iterations, limited by the level of detail.
+    pub(crate) fn iterations(&self, full: u32) -> u32 {
+        self.most_iterations.min(full)
+    }
+}
+
+/// How many substeps the hair takes as one at the end of substep `index` of `count`, if `together`
+/// are merged; `None` while it waits. A remainder at the tick's end is taken then.
+fn merged(index: u32, count: u32, together: u32) -> Option<u32> {
+    let together = together.max(1);
+    let done = (index + 1) % together;
+    match done {
+        0 => Some(together),
+        rest if index + 1 == count => Some(rest),
+        _ => None,
+    }
+}
+
+/// How much faster than in life wetting, drying and the bonds' chemistry
+/// ([`HairTreatment`](crate::HairTreatment)) go. A resource, default 1, with the range
+/// [`RANGE`](Self::RANGE).
+///
+/// Hair dries in minutes, players wait seconds. Mechanics are not affected.
+#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct HairProcessTime(pub f32);
+
+impl Default for HairProcessTime {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
+impl HairProcessTime {
+    /// Its range.
+    pub const RANGE: ValueRange =
+        ValueRange::new("HairProcessTime", 0.0..=1e6, "60 makes minutes of seconds")
+            .with_safe(1.0..=1000.0);
+}
+
+impl Ranged for HairProcessTime {
+    fn clamp_values(&mut self, violations: &mut Violations) {
+        Self::RANGE.clamp(&mut self.0, || 1.0, violations);
+    }
+}
+
+/// Runs [`HairTick`] in a schedule, [`FixedPostUpdate`] by default.
+#[derive(Clone, Debug)]
+pub struct TickPlugin {
+    schedule: InternedScheduleLabel,
+}
+
+impl TickPlugin {
+    /// Ticks in `schedule`, with the time that passes there.
+    pub fn new(schedule: impl ScheduleLabel) -> Self {
+        Self { schedule: schedule.intern() }
+    }
+}
+
+impl Default for TickPlugin {
+    fn default() -> Self {
+        Self::new(FixedPostUpdate)
+    }
+}
+
+impl Plugin for TickPlugin {
+    fn build(&self, app: &mut App) {
+        fault::plugin(app);
+        setting::resource::<HairSubsteps>(app);
+        setting::resource::<HairProcessTime>(app);
+        let ordered = |schedule: &mut Schedule| {
+            schedule.set_executor(SingleThreadedExecutor::new()).set_build_settings(
+                ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() },
+            );
+            for pair in HairSystems::ALL.windows(2) {
+                schedule.configure_sets(pair[0].before(pair[1]));
+            }
+            for set in HairSystems::ALL {
+                for part in set.parts() {
+                    schedule.configure_sets(part.in_set(set));
+                }
+                for pair in set.parts().windows(2) {
+                    schedule.configure_sets(pair[0].before(pair[1]));
+                }
+            }
+        };
+        app.init_resource::<HairStep>()
+            .init_resource::<Ahead>()
+            .register_type::<HairStep>()
+            .register_type::<SubstepLimits>()
+            .register_type::<InvalidValue>()
+            .edit_schedule(HairFrame, |schedule| {
+                schedule.set_executor(SingleThreadedExecutor::new());
+            })
+            .add_systems(PreUpdate, |world: &mut World| world.run_schedule(HairFrame))
+            .edit_schedule(HairTick, ordered)
+            .edit_schedule(SettleTick, ordered)
+            .add_systems(self.schedule, {
+                let tick = run_hair_tick.in_set(HairTicks).into_configs();
+                // In the same schedule, hair reads the bodies' poses after the physics step.
+                #[cfg(feature = "avian")]
+                let tick = tick.after(avian3d::prelude::PhysicsSystems::Writeback);
+                tick
+            });
+    }
+}
+
+/// One tick: as many substeps as [`HairSubsteps`] gives; none if no time has passed.
+fn run_hair_tick(world: &mut World) {
+    let seconds = world.resource::<Time>().delta_secs();
+    if seconds <= 0.0 {
+        return;
+    }
+    let count = world.resource::<HairSubsteps>().count(seconds);
+    let dt = seconds / count as f32;
+    for index in 0..count {
+        *world.resource_mut::<HairStep>() = HairStep { dt, index, count };
+        world.run_schedule(HairTick);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `KERATIN_WRITE_DOCS=1 cargo test --lib docs_show` rewrites the table.
+    #[test]
+    fn docs_show_the_substep_as_it_runs() {
+        let mut table = String::from(
+            "\n# A substep\n\nEach fixed tick runs these sets of [`HairSystems`] once per substep, one after \
+             the other.\n\n| set | part | what it does |\n|---|---|---|\n",
+        );
+        let link = |set: HairSystems| format!("[`{set:?}`](HairSystems::{set:?})");
+        for set in HairSystems::ALL {
+            table += &format!("| {} | | {} |\n", link(set), set.description());
+            for part in set.parts() {
+                table += &format!("| | {} | {} |\n", link(*part), part.description());
+            }
+        }
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/src/base/guide/substep.md");
+        if std::env::var_os("KERATIN_WRITE_DOCS").is_some() {
+            std::fs::write(file, &table).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(file).unwrap(), table);
+    }
+
+    #[test]
+    fn auto_substeps_come_near_the_papers_step() {
+        for (rate, count) in [(60.0, 6), (120.0, 3), (240.0, 2), (30.0, 12), (64.0, 6), (360.0, 1)]
+        {
+            assert_eq!(HairSubsteps::Auto.count(1.0 / rate), count, "{rate} Hz");
+        }
+        assert_eq!(HairSubsteps::Fixed(0).count(0.1), 1);
+        assert!(HairSubsteps::fixed(0).is_err());
+    }
+
+    #[test]
+    fn as_many_substeps_are_merged_as_fit_and_divide_the_tick() {
+        let merged = |longest, rate: f32, count| {
+            let step = HairStep { dt: 1.0 / (rate * count as f32), index: 0, count };
+            MergedSubsteps::within(longest, &step).0
+        };
+        let longest = 1.0 / 180.0;
+        for (rate, count, expected) in
+            [(60.0, 6, 2), (120.0, 3, 1), (240.0, 2, 2), (30.0, 12, 2), (64.0, 6, 2), (20.0, 1, 1)]
+        {
+            assert_eq!(merged(longest, rate, count), expected, "{rate} Hz, {count} substeps");
+        }
+        assert_eq!(merged(1.0 / 90.0, 60.0, 6), 3, "four do not divide six");
+        assert_eq!([merged(1e-9, 60.0, 6), merged(9.0, 60.0, 6)], [1, 6]);
+    }
+
+    #[test]
+    fn merged_substeps_sum_to_the_tick() {
+        for count in 1..20 {
+            for together in 0..8 {
+                let all: Vec<_> = (0..count).map(|i| merged(i, count, together)).collect();
+                assert_eq!(all.iter().flatten().sum::<u32>(), count);
+                assert!(all[count as usize - 1].is_some(), "nothing waits beyond the tick");
+                assert!(all.iter().flatten().all(|n| *n <= together.max(1)));
+            }
+        }
+        let six: Vec<_> = (0..6).map(|i| merged(i, 6, 2)).collect();
+        assert_eq!(six, [None, Some(2), None, Some(2), None, Some(2)]);
+    }
+}

@@ -1,0 +1,310 @@
+//! Equation 18 for eight edges side by side, against one node.
+//!
+//! The same as [`model`](super::model), which the tests compare it with. Branches (does the foot belong
+//! to this edge, does it touch) are unpredictable in dense hair, and mispredictions cost more than the
+//! arithmetic, so lanes are masked instead. Collecting eight edges costs little, because an edge is two
+//! neighbouring [`NodeRow`]s, each one load.
+
+use super::model::{BREAKS_AT, Bridged, Film, SAME_PLACE, THIN, penalty};
+use crate::math::lanes::{Real, V3};
+use core::ops::Range;
+use fearless_simd::{Simd, f32x4, f32x8, f32x16, mask32x8, prelude::*, u32x8, u32x16};
+use glam::Vec3;
+
+/// How many edges are tested side by side.
+pub(super) const WIDTH: usize = 8;
+
+/// A node with data of the edge that starts at it: x, y, z (m), and the parameter along the edge above
+/// which a foot belongs to the next edge: 1, ∞ for the last edge, −∞ for the tip, which starts none.
+pub(super) type NodeRow = [f32; 4];
+
+/// A node's input to bridges of water: its velocity (m/s), and the cross-section of the film on it (m²).
+pub type WetRow = [f32; 4];
+
+/// The nodes of one strand as rows.
+pub(super) fn rows(nodes: &[Vec3]) -> impl Iterator<Item = NodeRow> {
+    nodes.iter().enumerate().map(|(i, p)| {
+        let end = match nodes.len() - i {
+            1 => f32::NEG_INFINITY,
+            2 => f32::INFINITY,
+            _ => 1.0,
+        };
+        [p.x, p.y, p.z, end]
+    })
+}
+
+/// The node of a row.
+#[inline(always)]
+pub(super) fn place(row: &NodeRow) -> Vec3 {
+    Vec3::new(row[0], row[1], row[2])
+}
+
+/// A list to which masked lanes are appended without branches.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stack {
+    items: Vec<u32>,
+    len: usize,
+}
+
+impl Stack {
+    /// Empties it and reserves `most` numbers. A call that may reallocate in the loop would spill the
+    /// lanes' registers each time.
+    pub fn clear(&mut self, most: usize) {
+        self.len = 0;
+        if self.items.len() < most + 16 {
+            self.items.resize(2 * most + 16, 0);
+        }
+    }
+
+    pub fn items(&self) -> &[u32] {
+        &self.items[..self.len]
+    }
+
+    /// The items in eights, filled up with `filler`.
+    pub fn eights(&mut self, filler: u32) -> &[[u32; 8]] {
+        let end = self.len.next_multiple_of(8);
+        self.items[self.len..end].fill(filler);
+        self.items[..end].as_chunks().0
+    }
+
+    /// Appends the lanes for which the mask holds.
+    #[inline(always)]
+    fn push<S: Simd, L: SimdInt<S, Element = u32>>(&mut self, lanes: L, mask: L::Mask) {
+        lanes.compress(mask).store_slice(&mut self.items[self.len..self.len + L::LEN]);
+        self.len += mask.to_bitmask().count_ones() as usize;
+    }
+}
+
+/// Sixteen pieces of edges, by their middles.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Pieces {
+    middles: [[f32; 16]; 3],
+    edges: [u32; 16],
+}
+
+impl Pieces {
+    const NOWHERE: Self = Self { middles: [[f32::NAN; 16]; 3], edges: [0; 16] };
+
+    /// Writes `pieces`, each a middle and an edge, to `all`, in their order.
+    pub fn collect(pieces: impl Iterator<Item = (Vec3, u32)>, all: &mut Vec<Self>) {
+        all.clear();
+        for (k, (middle, edge)) in pieces.enumerate() {
+            if k % 16 == 0 {
+                all.push(Self::NOWHERE);
+            }
+            let Some(last) = all.last_mut() else { return };
+            last.edges[k % 16] = edge;
+            for axis in 0..3 {
+                last.middles[axis][k % 16] = middle[axis];
+            }
+        }
+    }
+
+    /// Appends to `edges` those whose piece's middle is within √`limit` of `p`.
+    #[inline(always)]
+    pub fn close<S: Simd>(&self, simd: S, p: Vec3, limit: f32, edges: &mut Stack) {
+        let mut squared = f32x16::splat(simd, 0.0);
+        for axis in 0..3 {
+            let off = f32x16::load_array_ref(simd, &self.middles[axis]) - p[axis];
+            squared = Real::mul_add(off, off, squared);
+        }
+        let close = Real::lt(squared, f32x16::splat(simd, limit));
+        edges.push(u32x16::load_array_ref(simd, &self.edges), close);
+    }
+}
+
+/// A strength of equation 18 with its reach 2r.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Penalty {
+    pub reach: f32,
+    pub strength: f32,
+}
+
+/// The offset from the nearest point of each edge to one node, the parameter along the edge (0…1), and
+/// the mask of edges that the foot belongs to.
+struct Off<S: Simd> {
+    off: V3<f32x8<S>>,
+    squared: f32x8<S>,
+    at: f32x8<S>,
+    own: mask32x8<S>,
+}
+
+/// Four rows, by column.
+#[inline(always)]
+fn four<S: Simd>(simd: S, rows: [NodeRow; 4]) -> [f32x4<S>; 4] {
+    let mut flat = [0.0; 16];
+    flat.copy_from_slice(rows.as_flattened());
+    simd.load_four_interleaved_f32x4(&flat)
+}
+
+/// The start nodes of eight edges (with `after` = 1 their end nodes), and the last column of these
+/// rows.
+#[inline(always)]
+fn eight<S: Simd>(
+    simd: S,
+    rows: &[NodeRow],
+    edges: &[u32; WIDTH],
+    after: usize,
+) -> (V3<f32x8<S>>, f32x8<S>) {
+    let row = |k: usize| rows[edges[k] as usize + after];
+    let a = four(simd, [row(0), row(1), row(2), row(3)]);
+    let b = four(simd, [row(4), row(5), row(6), row(7)]);
+    let p = V3::new(
+        simd.combine_f32x4(a[0], b[0]),
+        simd.combine_f32x4(a[1], b[1]),
+        simd.combine_f32x4(a[2], b[2]),
+    );
+    (p, simd.combine_f32x4(a[3], b[3]))
+}
+
+#[inline(always)]
+fn off<S: Simd>(simd: S, rows: &[NodeRow], edges: &[u32; WIDTH], p: V3<f32x8<S>>) -> Off<S> {
+    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+    let (start, end_share) = eight(simd, rows, edges, 0);
+    let (end, _) = eight(simd, rows, edges, 1);
+    let along = end - start;
+    let from_start = p - start;
+    let length_squared = Real::max(along.dot(along), f32x8::splat(simd, 1e-20));
+    let share = from_start.dot(along) / length_squared;
+    let clamped = Real::min(Real::max(share, zero), one);
+    let off = from_start - along.scale(clamped);
+    Off { off, squared: off.dot(off), at: clamped, own: Real::lt(share, end_share) }
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, p: Vec3) -> V3<f32x8<S>> {
+    V3::new(f32x8::splat(simd, p.x), f32x8::splat(simd, p.y), f32x8::splat(simd, p.z))
+}
+
+/// Appends those of eight edges that are within √`limit` of `p` and not of its `own` strand, and
+/// their squared distances as bits, which are in the order of the distances.
+#[inline(always)]
+pub(super) fn near<S: Simd>(
+    simd: S,
+    rows: &[NodeRow],
+    eight: &[u32; WIDTH],
+    (p, own): (Vec3, &Range<u32>),
+    limit: f32,
+    edges: &mut Stack,
+    distances: &mut Stack,
+) {
+    let squared = off(simd, rows, eight, splat(simd, p)).squared;
+    let numbers = u32x8::load_array_ref(simd, eight);
+    let others = numbers.simd_lt(own.start) | numbers.simd_ge(own.end);
+    let near = Real::lt(squared, f32x8::splat(simd, limit)) & others;
+    edges.push(numbers, near);
+    distances.push(squared.bitcast::<u32x8<S>>(), near);
+}
+
+/// Equation 18 of groups of eight edges on a node, lane by lane: see [`total`](Self::total).
+pub(super) struct PenaltySum<S: Simd> {
+    p: V3<f32x8<S>>,
+    sum: V3<f32x8<S>>,
+    penalty: Penalty,
+}
+
+impl<S: Simd> PenaltySum<S> {
+    /// A zero sum for a node at `p`.
+    #[inline(always)]
+    pub fn new(simd: S, p: Vec3, penalty: Penalty) -> Self {
+        Self { p: splat(simd, p), sum: splat(simd, Vec3::ZERO), penalty }
+    }
+
+    /// Adds the contributions of eight edges. NaN fails every comparison and adds nothing.
+    #[inline(always)]
+    pub fn add(&mut self, simd: S, rows: &[NodeRow], edges: &[u32; WIDTH]) {
+        let Off { off, squared, own, .. } = off(simd, rows, edges, self.p);
+        let reach = f32x8::splat(simd, self.penalty.reach);
+        let touching = own
+            & Real::lt(squared, reach * reach)
+            & Real::lt(f32x8::splat(simd, SAME_PLACE), squared);
+        let distance = Real::sqrt(squared);
+        let strength = f32x8::splat(simd, self.penalty.strength);
+        let pushed = off.scale_add(penalty(distance, reach, strength), self.sum);
+        self.sum = V3::select(touching, pushed, self.sum);
+    }
+
+    /// The sum over all lanes (m/s²).
+    #[inline(always)]
+    pub fn total(self) -> Vec3 {
+        Vec3::new(self.sum.x.reduce_sum(), self.sum.y.reduce_sum(), self.sum.z.reduce_sum())
+    }
+}
+
+/// Water's bridges from groups of eight edges to one node, lane by lane: see [`bridged`].
+///
+/// [`bridged`]: super::model::bridged
+pub(super) struct Bridges<S: Simd> {
+    p: V3<f32x8<S>>,
+    area: f32x8<S>,
+    film: Film,
+    pull: V3<f32x8<S>>,
+    steepness: f32x8<S>,
+    drift: V3<f32x8<S>>,
+    grip: f32x8<S>,
+}
+
+impl<S: Simd> Bridges<S> {
+    /// A zero sum for a node at `p` with a film of `area` (m²).
+    #[inline(always)]
+    pub fn new(simd: S, p: Vec3, area: f32, film: Film) -> Self {
+        let zero = f32x8::splat(simd, 0.0);
+        Self {
+            p: splat(simd, p),
+            area: f32x8::splat(simd, area),
+            film,
+            pull: splat(simd, Vec3::ZERO),
+            steepness: zero,
+            drift: splat(simd, Vec3::ZERO),
+            grip: zero,
+        }
+    }
+
+    /// Adds the bridges to eight edges. NaN fails every comparison and adds nothing.
+    #[inline(always)]
+    pub fn add(&mut self, simd: S, rows: &[NodeRow], wet: &[WetRow], edges: &[u32; WIDTH]) {
+        let lit = |value: f32| f32x8::splat(simd, value);
+        let (zero, one) = (lit(0.0), lit(1.0));
+        let Film { reach, longest } = self.film;
+        let Off { off, squared, at, own } = off(simd, rows, edges, self.p);
+        let near = own
+            & Real::lt(squared, lit((reach + longest) * (reach + longest)))
+            & Real::lt(lit(SAME_PLACE), squared);
+        if near.to_bitmask() == 0 {
+            return;
+        }
+        let (start, start_area) = eight(simd, wet, edges, 0);
+        let (end, end_area) = eight(simd, wet, edges, 1);
+        let area = self.area + start_area + (end_area - start_area) * at;
+        let velocity = start + (end - start).scale(at);
+
+        let distance = Real::sqrt(squared);
+        let longest = Real::min(Real::sqrt(area) * lit(BREAKS_AT), lit(longest));
+        let amount = Real::min(area * lit(1.0 / (THIN * reach * reach)), one);
+        let apart = Real::max(lit(reach), distance) - lit(reach);
+        let left = Real::max(one - apart / Real::max(longest, lit(1e-9)), zero) * amount;
+        let pressed = Real::min(distance * lit(1.0 / reach), one);
+        let joined = near & Real::lt(zero, left);
+
+        let pull = left * pressed * pressed;
+        let pulled = off.scale_add(-(pull / distance), self.pull);
+        self.pull = V3::select(joined, pulled, self.pull);
+        let steep = amount / Real::min(Real::max(longest, lit(1e-9)), lit(0.5 * reach));
+        self.steepness += Real::select(joined, steep, zero);
+        self.drift = V3::select(joined, velocity.scale_add(left, self.drift), self.drift);
+        self.grip += Real::select(joined, left, zero);
+    }
+
+    /// The sums over all lanes.
+    #[inline(always)]
+    pub fn total(self) -> Bridged {
+        let sum = |v: V3<f32x8<S>>| Vec3::new(v.x.reduce_sum(), v.y.reduce_sum(), v.z.reduce_sum());
+        Bridged {
+            pull: sum(self.pull),
+            steepness: self.steepness.reduce_sum(),
+            drift: sum(self.drift),
+            grip: self.grip.reduce_sum(),
+        }
+    }
+}

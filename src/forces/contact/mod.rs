@@ -1,0 +1,110 @@
+//! Contact of hair with colliders and between strands.
+
+#[cfg(feature = "avian")]
+mod avian;
+mod bake;
+mod coarse;
+mod collider;
+mod lanes;
+pub mod model;
+mod neighbours;
+mod reach;
+mod systems;
+
+pub use crate::solver::rod::shape::{ConvexHull, DistanceGrid};
+#[cfg(feature = "avian")]
+pub use avian::{AvianHairCollider, AvianShapeError};
+pub use bake::{Bake, BakeError, HullError, Openings};
+pub use collider::{ColliderShape, HairCollider};
+pub use systems::ContactPlugin;
+pub(crate) use {
+    lanes::WetRow,
+    model::{Bridged, Film},
+    reach::{Colliders, HairReach},
+    systems::seen_from,
+};
+
+use crate::{base::setting::setting, solver::rod::obstacle::Obstacle};
+use bevy::prelude::*;
+
+setting! {
+    /// How strands keep apart: equation 18 of \[B\]. Component of a [`Hair`](crate::Hair); where absent,
+    /// [`HairDefault<StrandContact>`](crate::HairDefault) holds.
+    ///
+    /// A simulated strand stands for a lock of hair, so the radius is the lock's.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct StrandContact {
+        /// r, the radius of a strand; also the distance kept from colliders. 0 turns contact between
+        /// strands off.
+        pub radius: f32 = 1e-3, "m" in RADIUS: 0.0..=1.0, safe 0.0..=0.01, "1e-3 is a thin lock";
+        /// α, the acceleration of strands whose axes coincide. Stable up to about 8 r/Δt²; 0 turns
+        /// contact between strands off.
+        pub strength: f32 = 20.0, "m/s²" in STRENGTH: 0.0..=1e6, safe 0.0..=1e3,
+            "20 parts locks gently";
+    }
+}
+
+/// The colliders near one hair in this substep, in its frame. Written by `Interaction`, read by
+/// `Projection`.
+#[doc(hidden)]
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct Obstacles {
+    /// The solids.
+    #[reflect(ignore)]
+    pub solids: Vec<Obstacle>,
+    /// The colliders that it may touch in this tick.
+    #[reflect(ignore)]
+    near: Vec<Entity>,
+}
+
+/// The pairs of strands of one hair that may touch.
+#[doc(hidden)]
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct LockNeighbours {
+    #[reflect(ignore)]
+    lists: neighbours::Neighbours,
+    /// The strands that take part in this tick, and whether followers are among them.
+    #[reflect(ignore)]
+    members: (Vec<Entity>, bool),
+    /// Whether strands with too many nodes, and too many of them in one place, have been reported.
+    #[reflect(ignore)]
+    reported: (bool, bool),
+}
+
+impl Film {
+    /// Parameters of the bridges between strands that touch at a distance of axes of `reach` (m),
+    /// limited to the length that the neighbour lists cover.
+    pub(crate) fn between(reach: f32) -> Self {
+        Self { reach, longest: neighbours::LONGEST_BRIDGE * reach }
+    }
+}
+
+impl LockNeighbours {
+    /// The number of nodes of the lists.
+    pub(crate) fn nodes(&self) -> usize {
+        self.lists.nodes()
+    }
+
+    /// From their next rebuild on, lists cover bridges of water this long (m).
+    pub(crate) fn set_extra_margin(&mut self, longest: f32) {
+        self.lists.set_extra_margin(longest);
+    }
+
+    /// The bridges of water at every node, at the positions of the last contact search. `wet` has a row
+    /// for each node, in the order of the hair's strands.
+    pub(crate) fn bridges(
+        &mut self,
+        wet: &mut Vec<WetRow>,
+        film: Film,
+    ) -> impl Iterator<Item = Bridged> {
+        self.lists.bridges(wet, film)
+    }
+
+    /// How many pairs of node and edge are in the lists, rounded up to groups of eight for each node.
+    pub fn pairs(&self) -> usize {
+        self.lists.pairs()
+    }
+}

@@ -1,0 +1,242 @@
+//! Which colliders a hair may touch within a tick, by bounding balls sorted along an axis.
+
+use super::{ColliderShape, HairCollider};
+use crate::hair::strand::TickPose;
+use bevy::prelude::*;
+
+/// A bounding ball of a hair in any pose, in its own frame.
+#[derive(Component, Clone, Copy, Debug)]
+pub(crate) struct HairReach {
+    center: Vec3,
+    radius: f32,
+    /// Number of strands when it was computed, and ticks since.
+    pub(super) members: usize,
+    pub(super) age: u32,
+}
+
+impl Default for HairReach {
+    fn default() -> Self {
+        Self { center: Vec3::ZERO, radius: f32::INFINITY, members: 0, age: 0 }
+    }
+}
+
+/// Safety factor on the reach, for motion within a substep and stretched strands.
+const REACH_MARGIN: f32 = 1.25;
+
+impl HairReach {
+    /// Around strands with these roots and lengths (m).
+    pub(super) fn around(strands: impl Iterator<Item = (Vec3, f32)>) -> Self {
+        let (mut low, mut high, mut longest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);
+        for (root, length) in strands {
+            (low, high, longest) = (low.min(root), high.max(root), longest.max(length));
+        }
+        let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high) + longest);
+        Self { center, radius, ..default() }
+    }
+
+    /// Roots have moved.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn look_again(&mut self) {
+        self.members = UNKNOWN;
+    }
+
+    /// Whether hair in `frame` may touch the content of `ball` within a tick of `substeps`.
+    fn is_near(&self, frame: &TickPose, ball: &Ball, substeps: u32) -> bool {
+        let apart = self.room(frame, substeps) + ball.room(substeps);
+        let squared = ball.center.distance_squared(frame.now().point_out(self.center));
+        // NaN counts as near, so that it is reported where it is used.
+        squared <= apart * apart || squared.is_nan() || apart.is_nan()
+    }
+
+    /// How far from its center it may be within a tick (m).
+    fn room(&self, frame: &TickPose, substeps: u32) -> f32 {
+        let (before, now) = (frame.before(), frame.now());
+        let travel = before.translation.distance(now.translation);
+        REACH_MARGIN * self.radius * now.scale + travel * substeps as f32
+    }
+}
+
+/// A number of strands that no hair has.
+pub(super) const UNKNOWN: usize = usize::MAX;
+
+/// A ball around a collider in the world, and how far it moves in a substep (m).
+#[derive(Clone, Copy, Debug)]
+struct Ball {
+    center: Vec3,
+    radius: f32,
+    travel: f32,
+}
+
+impl Ball {
+    fn around(collider: &HairCollider, pose: &TickPose) -> Self {
+        let (before, now) = (pose.before(), pose.now());
+        let radius = match &collider.shape {
+            ColliderShape::Sphere(s) => s.radius,
+            ColliderShape::Capsule(c) => c.radius + c.half_length,
+            ColliderShape::Cylinder(c) => c.radius.hypot(c.half_height),
+            ColliderShape::Plane(_) => f32::INFINITY,
+            ColliderShape::Cuboid { cuboid, .. } => cuboid.half_size.length(),
+            ColliderShape::Ellipsoid { radii } => radii.max_element(),
+            ColliderShape::Hull(hull) => hull.reach(),
+            ColliderShape::Grid(grid) => grid.reach(),
+        };
+        let travel = before.translation.distance(now.translation);
+        let radius = radius * now.scale.max(before.scale);
+        Self { center: now.translation, radius, travel }
+    }
+
+    /// How far from its center it may be within a tick (m).
+    fn room(&self, substeps: u32) -> f32 {
+        self.radius + self.travel * substeps as f32
+    }
+}
+
+/// All colliders in a tick of so many substeps, found by hair: in a crowd a hair is near few of them.
+pub(crate) struct Colliders<T> {
+    substeps: u32,
+    all: Vec<(Ball, T)>,
+    /// Where the balls' centers are along x, in this order, with their indices.
+    along_x: Vec<(f32, u32)>,
+    /// The room of the largest of these (m).
+    largest: f32,
+    /// The indices of the others, which have no end or are not finite.
+    anywhere: Vec<u32>,
+}
+
+impl<T> Colliders<T> {
+    /// From colliders with valid values.
+    pub(crate) fn new<'a>(
+        substeps: u32,
+        colliders: impl Iterator<Item = (&'a HairCollider, &'a TickPose, T)>,
+    ) -> Self {
+        let all = colliders.map(|(collider, pose, item)| (Ball::around(collider, pose), item));
+        Self::of_balls(substeps, all.collect())
+    }
+
+    fn of_balls(substeps: u32, all: Vec<(Ball, T)>) -> Self {
+        let (mut along_x, mut anywhere, mut largest) = (Vec::new(), Vec::new(), 0.0f32);
+        for ((ball, _), i) in all.iter().zip(0..) {
+            let room = ball.room(substeps);
+            if room.is_finite() && ball.center.is_finite() {
+                along_x.push((ball.center.x, i));
+                largest = largest.max(room);
+            } else {
+                anywhere.push(i);
+            }
+        }
+        along_x.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        Self { substeps, all, along_x, largest, anywhere }
+    }
+
+    /// Those that hair in `frame` may touch within the tick, in the order they were given; all for a hair of
+    /// unknown reach. `found` is scratch space.
+    pub(crate) fn near<'a>(
+        &'a self,
+        frame: &TickPose,
+        reach: Option<&HairReach>,
+        found: &'a mut Vec<u32>,
+    ) -> impl Iterator<Item = &'a T> {
+        found.clear();
+        match reach {
+            None => found.extend((0..).take(self.all.len())),
+            Some(reach) => {
+                let x = frame.now().point_out(reach.center).x;
+                // A little more, for rounding. Without an end, or NaN, it holds all.
+                let far = 1.0001 * (reach.room(frame, self.substeps) + self.largest);
+                let beyond = |at: f32| at - x > far;
+                let short = |at: f32| x - at > far;
+                let first = self.along_x.partition_point(|(at, _)| short(*at));
+                let rest = self.along_x[first..].iter().take_while(|(at, _)| !beyond(*at));
+                let candidates = rest.map(|(_, i)| i).chain(&self.anywhere);
+                let is_near =
+                    |i: &&u32| reach.is_near(frame, &self.all[**i as usize].0, self.substeps);
+                found.extend(candidates.filter(is_near));
+                found.sort_unstable();
+            }
+        }
+        found.iter().map(|i| &self.all[*i as usize].1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hair::strand::Pose;
+    use bevy::reflect::GetPath;
+    use proptest::prelude::*;
+
+    fn moving(now: Pose, by: Vec3) -> TickPose {
+        let mut frame = TickPose::default();
+        *frame.path_mut("now").unwrap() = now;
+        *frame.path_mut("before").unwrap() = Pose { translation: now.translation + by, ..now };
+        frame
+    }
+
+    #[test]
+    fn a_hair_is_near_what_it_can_reach_in_a_tick() {
+        // On a frame of twice the size that moves 5 mm a substep, beside a ball that moves 10 mm.
+        let reach = HairReach { radius: 0.1, ..default() };
+        let frame = moving(Pose { scale: 2.0, ..default() }, Vec3::Y * 5e-3);
+        let is_near = |distance: f32| {
+            let ball = Ball { center: Vec3::X * distance, radius: 0.05, travel: 0.01 };
+            let all = Colliders::of_balls(6, vec![(ball, ())]);
+            let found = all.near(&frame, Some(&reach), &mut Vec::new()).count() == 1;
+            assert_eq!(found, reach.is_near(&frame, &ball, 6));
+            found
+        };
+        let touches = REACH_MARGIN * 0.1 * 2.0 + 0.05 + (5e-3 + 0.01) * 6.0;
+        assert!(is_near(touches - 1e-3) && !is_near(touches + 1e-3));
+        assert!(is_near(f32::NAN), "what is no number is seen where it is used");
+    }
+
+    #[test]
+    fn a_ball_encloses_its_shape_and_no_more() {
+        let capsule = HairCollider::capsule(0.1, 0.3).unwrap();
+        let scaled = moving(Pose { scale: 2.0, ..default() }, Vec3::X * 0.01);
+        for (collider, farthest) in [
+            (HairCollider::sphere(0.1).unwrap(), 0.1),
+            (capsule, 0.1 + 0.15),
+            (HairCollider::cylinder(0.3, 0.8).unwrap(), 0.5),
+            (HairCollider::cuboid(Vec3::new(0.2, 0.4, 0.8)).unwrap(), 0.5 * 0.84f32.sqrt()),
+            (HairCollider::ellipsoid(Vec3::new(0.1, 0.4, 0.2)).unwrap(), 0.4),
+        ] {
+            let ball = Ball::around(&collider, &scaled);
+            assert!((ball.radius - 2.0 * farthest).abs() < 1e-6, "{collider:?}: {ball:?}");
+            assert!((ball.travel - 0.01).abs() < 1e-6 && ball.center == Vec3::ZERO);
+        }
+        let floor = Ball::around(&HairCollider::plane(Dir3::Y), &TickPose::default());
+        assert_eq!(floor.radius, f32::INFINITY);
+    }
+
+    proptest! {
+        #[test]
+        fn sorted_balls_find_what_a_test_of_each_finds(
+            balls in prop::collection::vec(
+                (prop::array::uniform3(-2.0f32..2.0), prop_oneof![
+                    8 => 0.0f32..0.4, 1 => Just(f32::INFINITY), 1 => Just(f32::NAN),
+                ], 0.0f32..0.05),
+                0..60,
+            ),
+            at in prop::array::uniform3(-2.0f32..2.0),
+            radius in prop_oneof![8 => 0.0f32..0.8, 1 => Just(f32::INFINITY), 1 => Just(f32::NAN)],
+            substeps in 1u32..8,
+        ) {
+            let balls: Vec<_> = (balls.into_iter().zip(0..))
+                .map(|((center, radius, travel), i)| {
+                    (Ball { center: center.into(), radius, travel }, i)
+                })
+                .collect();
+            let reach = HairReach { radius, center: Vec3::X * 0.1, ..default() };
+            let frame = moving(Pose { translation: at.into(), ..default() }, Vec3::Z * 0.01);
+            let one_by_one: Vec<i32> = balls.iter()
+                .filter(|(ball, _)| reach.is_near(&frame, ball, substeps))
+                .map(|(_, i)| *i)
+                .collect();
+            let all = Colliders::of_balls(substeps, balls);
+            let mut scratch = Vec::new();
+            let found: Vec<i32> = all.near(&frame, Some(&reach), &mut scratch).copied().collect();
+            prop_assert_eq!(found, one_by_one);
+            prop_assert_eq!(all.near(&frame, None, &mut scratch).count(), all.all.len());
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! `Interaction`: contact between strands, and colliders in each hair's frame.
+
+use super::{
+    Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError,
+    LockNeighbours, Obstacles, Openings, StrandContact, coarse,
+    neighbours::{Lookup, MOST_EDGES},
+    reach::{Colliders, HairReach, UNKNOWN},
+};
+use crate::{
+    base::{
+        fault::{FaultKind, HairFault},
+        parallel::{Nanos, for_each, prefetch},
+        schedule::{
+            EffectiveSubstep, EffectiveSubsteps, HairStep, HairSystems, HairTick, SettleTick,
+            first_substep,
+        },
+        setting::{self, Ranged, Settings},
+    },
+    hair::strand::{
+        Hair, OnGpu, SleepCounts, SleepPose, Strand, StrandOf, StrandSleep, Strands, TickPose,
+        keep_required,
+    },
+    solver::rod::{
+        obstacle::{Obstacle, Solid},
+        shape::{Placed, Shape},
+    },
+};
+use bevy::{ecs::entity::EntityHashSet, prelude::*};
+
+/// Strands do not touch each other where more than so many are followers for each one that is not: the
+/// guides of background hair are centimetres apart.
+const SPARSE: usize = 8;
+
+/// Approximate time of contact per node (ns).
+const CONTACT: usize = 100;
+
+/// How many strands are prefetched at once.
+const TOGETHER: usize = 16;
+
+/// Colliders and contact between strands.
+pub struct ContactPlugin;
+
+impl Plugin for ContactPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<StrandContact>(app);
+        #[cfg(feature = "avian")]
+        super::avian::plugin(app);
+        setting::component::<HairCollider>(app);
+        keep_required::<HairCollider, TickPose>(app);
+        keep_required::<Hair, Obstacles>(app);
+        keep_required::<Hair, LockNeighbours>(app);
+        keep_required::<Hair, HairReach>(app);
+        app.register_type::<ColliderShape>()
+            .register_type::<ConvexHull>()
+            .register_type::<DistanceGrid>()
+            .register_type::<HullError>()
+            .register_type::<BakeError>()
+            .register_type::<Bake>()
+            .register_type::<Openings>()
+            .register_type::<Obstacles>()
+            .register_type::<LockNeighbours>()
+            .register_required_components::<Hair, Obstacles>()
+            .register_required_components::<Hair, LockNeighbours>()
+            .register_required_components::<Hair, HairReach>()
+            .add_systems(
+                HairTick,
+                (
+                    (
+                        (find_reach, choose_colliders).chain().run_if(first_substep),
+                        gather_obstacles,
+                    )
+                        .chain()
+                        .in_set(HairSystems::Obstacles),
+                    push_strands_apart.in_set(HairSystems::StrandContact),
+                ),
+            )
+            .add_systems(
+                SettleTick,
+                (
+                    gather_obstacles.in_set(HairSystems::Obstacles),
+                    push_strands_apart.in_set(HairSystems::StrandContact),
+                ),
+            );
+    }
+}
+
+/// A collider in a hair's frame, with the motion of its surface during the substep.
+pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obstacle {
+    let (now, own) = (hair.now(), pose.now());
+    let scale = own.scale / now.scale;
+    let at = now.point_in(own.translation);
+    let turned = |d: Vec3| now.direction_in(own.rotation * d);
+    let placed = |shape: Shape| {
+        Solid::Placed(Placed {
+            shape,
+            center: at,
+            axes: Mat3::from_cols(turned(Vec3::X), turned(Vec3::Y), turned(Vec3::Z)),
+            scale,
+        })
+    };
+    let solid = match &collider.shape {
+        ColliderShape::Sphere(s) => Solid::Capsule { a: at, b: at, radius: s.radius * scale },
+        ColliderShape::Capsule(c) => {
+            let half = turned(Vec3::Y) * (c.half_length * scale);
+            Solid::Capsule { a: at - half, b: at + half, radius: c.radius * scale }
+        }
+        ColliderShape::Plane(p) => Solid::HalfSpace { normal: turned(*p.normal), point: at },
+        ColliderShape::Cylinder(c) => Solid::Cylinder {
+            center: at,
+            axis: turned(Vec3::Y),
+            radius: c.radius * scale,
+            half_height: c.half_height * scale,
+        },
+        ColliderShape::Cuboid { cuboid, rounding } => {
+            placed(Shape::Cuboid { half: cuboid.half_size, rounding: *rounding })
+        }
+        ColliderShape::Ellipsoid { radii } => placed(Shape::Ellipsoid { radii: *radii }),
+        ColliderShape::Hull(hull) => placed(Shape::Hull(hull.clone())),
+        ColliderShape::Grid(grid) => placed(Shape::Grid(grid.clone())),
+    };
+    let motion = pose.motion_in(hair);
+    Obstacle { solid, motion, friction: collider.friction }
+}
+
+/// Ticks between checks of strands without outside writes: roots move little on a head.
+const LOOK_AGAIN: u32 = 16;
+
+fn find_reach(
+    mut hairs: Query<(Entity, &Strands, &mut HairReach, Has<OnGpu>), With<Hair>>,
+    touched: Query<&StrandOf, (Changed<Strand>, Without<OnGpu>)>,
+    strands: Query<&Strand>,
+) {
+    let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
+    for (hair, members, mut reach, on_gpu) in &mut hairs {
+        let reach = reach.bypass_change_detection();
+        // On the GPU roots stay, or somebody says that they have moved.
+        if on_gpu && reach.members != UNKNOWN {
+            continue;
+        }
+        reach.age += 1;
+        if reach.members == members.len() && reach.age < LOOK_AGAIN && !touched.contains(&hair) {
+            continue;
+        }
+        let of_strand = |strand: &Strand| {
+            (strand.positions().first().copied().unwrap_or_default(), strand.length())
+        };
+        *reach = HairReach::around(strands.iter_many(members.collection()).map(of_strand));
+        reach.members = members.len();
+    }
+}
+
+/// At the start of a tick: which colliders a hair may touch in it; none for a hair without simulated
+/// strands.
+fn choose_colliders(
+    step: Res<HairStep>,
+    colliders: Query<(Entity, &HairCollider, &TickPose)>,
+    mut hairs: Query<(&TickPose, &HairReach, Option<&SleepCounts>, &mut Obstacles), With<Hair>>,
+) {
+    let valid: Vec<_> = colliders.iter().map(|(id, c, pose)| (c.clamped(), pose, id)).collect();
+    let all = Colliders::new(step.count, valid.iter().map(|(c, pose, id)| (c, *pose, *id)));
+    let mut scratch = Vec::new();
+    for (pose, reach, sleepers, mut obstacles) in &mut hairs {
+        obstacles.near.clear();
+        if sleepers.is_none_or(|sleepers| sleepers.awake > 0) {
+            obstacles.near.extend(all.near(pose, Some(reach), &mut scratch));
+        }
+    }
+}
+
+fn gather_obstacles(
+    steps: EffectiveSubsteps,
+    colliders: Query<(&HairCollider, &TickPose)>,
+    mut hairs: Query<(Entity, &TickPose, &mut Obstacles), With<Hair>>,
+) {
+    for (hair, pose, mut obstacles) in &mut hairs {
+        let Obstacles { solids, near } = &mut *obstacles;
+        solids.clear();
+        if steps.of(hair).is_some() {
+            let near = colliders.iter_many(near);
+            solids.extend(near.map(|(collider, at)| seen_from(pose, &collider.clamped(), at)));
+        }
+    }
+}
+
+fn too_fine(strand: &Strand, radius: f32, stride: usize) -> HairFault {
+    let segment = 1e3 * strand.length() / strand.edges() as f32;
+    let message = format!(
+        "segments of a strand are {segment:.3} mm long, expected at least its lock's radius of {} mm: \
+         contact samples every {stride}th of its {} nodes; use fewer nodes",
+        1e3 * radius,
+        strand.nodes(),
+    );
+    HairFault::new(FaultKind::Strand, message)
+}
+
+fn too_crowded(radius: f32) -> HairFault {
+    let message = format!(
+        "more than {MOST_EDGES} segments lie around a node, expected fewer within a few times the lock's radius of \
+         {} mm: the nearest push it; use fewer strands, or a smaller StrandContact::radius",
+        1e3 * radius,
+    );
+    HairFault::new(FaultKind::Strand, message)
+}
+
+/// A hair whose strands may touch in this substep.
+struct Touching<'a> {
+    hair: Entity,
+    members: &'a Strands,
+    neighbours: Mut<'a, LockNeighbours>,
+    contact: StrandContact,
+    step: EffectiveSubstep,
+    /// The first strand that has too many nodes for contact, or that there are too many in one place.
+    fault: Option<HairFault>,
+}
+
+impl Touching<'_> {
+    /// Looks up neighbours and their pushes.
+    fn find<'s, 'w: 's>(
+        &mut self,
+        strands: &'s Query<'w, '_, (&'static Strand, &'static StrandSleep), With<StrandOf>>,
+    ) {
+        let Self { hair, members, neighbours, contact, step, fault } = self;
+        let StrandContact { radius, strength } = *contact;
+        let LockNeighbours { lists: list, members: (present, had_followers), reported } =
+            neighbours.bypass_change_detection();
+        // Followers take no part in contact, but in bridges of water.
+        let with_followers = list.has_extra_margin();
+        let reach = 2.0 * radius;
+        list.clear();
+        if step.is_first || with_followers != *had_followers {
+            let takes_part = |id: &&Entity| {
+                strands.get(**id).is_ok_and(|(_, sleep)| with_followers || !sleep.is_follower())
+            };
+            present.clear();
+            present.extend(members.collection().iter().filter(takes_part));
+            *had_followers = with_followers;
+        }
+        // Bridges of water need complete lists. Dry strands are searched once a tick at most, at their
+        // expected positions in the middle of the time until the next search: most move with their
+        // neighbours.
+        let lookup = if step.is_first || with_followers { Lookup::Now } else { Lookup::Later };
+        let until = list.lookups() as f32 * step.tick - step.dt;
+        let ahead = (step.is_first && !with_followers).then_some(0.5 * until);
+        for some in present.chunks(TOGETHER) {
+            strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
+            for (strand, ..) in strands.iter_many(some) {
+                let stride = coarse::stride(strand.rest_lengths(), reach);
+                list.add(strand.positions(), stride);
+                if let Some(seconds) = ahead {
+                    let moving = strand.positions().iter().zip(strand.velocities());
+                    list.expect(moving.map(|(p, v)| *p + *v * seconds));
+                }
+                if stride > 1 && !core::mem::replace(&mut reported.0, true) {
+                    *fault = Some(too_fine(strand, radius, stride).of(*hair));
+                }
+            }
+        }
+        list.find_pushes(radius, strength, lookup);
+        if fault.is_none() && list.is_crowded() && !core::mem::replace(&mut reported.1, true) {
+            *fault = Some(too_crowded(radius).of(*hair));
+        }
+    }
+}
+
+pub(crate) fn push_strands_apart(
+    steps: EffectiveSubsteps,
+    contact: Settings<StrandContact>,
+    mut hairs: Query<
+        (Entity, &Strands, &mut LockNeighbours, Option<&SleepCounts>),
+        (With<Hair>, Without<OnGpu>),
+    >,
+    mut strands: ParamSet<(
+        Query<(&Strand, &StrandSleep), With<StrandOf>>,
+        Query<(&mut Strand, &mut StrandSleep, &mut SleepPose), With<StrandOf>>,
+    )>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let touching = hairs.iter_mut().filter_map(|(hair, members, neighbours, sleepers)| {
+        let contact = contact.of(hair);
+        let with_followers = neighbours.lists.has_extra_margin();
+        let all_rest = sleepers.is_some_and(|s| s.awake == 0 && (s.asleep > 0 || !with_followers));
+        // Of so few strands none is near another. Bridges of water are between all.
+        let simulated = sleepers.map_or(members.len(), |s| s.awake + s.asleep);
+        let is_sparse = !with_followers && simulated * SPARSE < members.len();
+        if contact.radius <= 0.0 || contact.strength <= 0.0 || all_rest || is_sparse {
+            return None;
+        }
+        let step = steps.of(hair)?;
+        Some(Touching { hair, members, neighbours, contact, step, fault: None })
+    });
+    let mut touching: Vec<Touching> = touching.collect();
+    let nodes: usize = touching.iter().map(|hair| hair.neighbours.nodes()).sum();
+    let each = Nanos(CONTACT * nodes / touching.len().max(1));
+    let present = strands.p0();
+    for_each(&mut touching, each, |hair| hair.find(&present));
+    let mut strands = strands.p1();
+    for Touching { mut neighbours, contact, step, fault, .. } in touching {
+        faults.write_batch(fault);
+        let StrandContact { radius, strength } = contact;
+        let LockNeighbours { lists, members: (present, _), .. } =
+            neighbours.bypass_change_detection();
+        let mut pushes = lists.pushes();
+        for some in present.chunks(TOGETHER) {
+            strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.velocities()));
+            let mut some = strands.iter_many_mut(some);
+            while let Some((mut strand, mut sleep, mut still)) = some.fetch_next() {
+                if sleep.is_asleep() {
+                    let pushes = pushes.by_ref().take(strand.nodes());
+                    if still
+                        .bypass_change_detection()
+                        .has_new_contact(pushes, strength / (2.0 * radius))
+                    {
+                        sleep.bypass_change_detection().wake();
+                    }
+                    continue;
+                }
+                let (_, velocities, ..) = strand.bypass_change_detection().parts_mut();
+                velocities.iter_mut().zip(&mut pushes).for_each(|(v, push)| *v += push * step.dt);
+            }
+        }
+    }
+}

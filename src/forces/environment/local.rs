@@ -1,0 +1,172 @@
+//! The air in the frame of a hair: blowers, global wind, zones.
+
+use super::{
+    Blower, HairWind, WindZone,
+    blown::{Blown, LocalBlower},
+    gust::gust,
+};
+use crate::{
+    base::{schedule::HairStep, setting::Ranged},
+    hair::strand::{Pose, TickPose},
+};
+use bevy::{ecs::system::SystemParam, math::DVec3, prelude::*};
+
+/// A zone in a hair's frame, with valid values.
+pub(super) struct LocalZone {
+    zone: WindZone,
+    /// Transform from the frame to the zone's, in the zone's metres.
+    rotation: Quat,
+    origin: Vec3,
+    scale: f32,
+}
+
+/// All sources of wind in a hair's frame.
+#[derive(Default)]
+pub(crate) struct LocalWinds {
+    pub blowers: Vec<LocalBlower>,
+    pub(super) zones: Vec<LocalZone>,
+    /// The global wind (m/s).
+    pub(super) wind: Vec3,
+    pub(super) settings: HairWind,
+    /// How far it has travelled so far (m, in the world).
+    pub(super) travelled: DVec3,
+    pub(super) pose: Pose,
+}
+
+/// All sources of wind.
+#[derive(SystemParam)]
+pub(crate) struct Winds<'w, 's> {
+    wind: Option<Res<'w, HairWind>>,
+    blowers: Query<'w, 's, (&'static Blower, &'static TickPose)>,
+    zones: Query<'w, 's, (&'static WindZone, &'static TickPose)>,
+    time: Res<'w, Time>,
+    step: Res<'w, HairStep>,
+}
+
+impl Winds<'_, '_> {
+    fn wind(&self) -> HairWind {
+        self.wind.as_ref().map_or_else(HairWind::default, |wind| wind.clamped())
+    }
+
+    /// Whether the air is at rest and equally warm everywhere.
+    pub(crate) fn are_still(&self) -> bool {
+        self.blowers.is_empty() && self.zones.is_empty() && self.wind().velocity == Vec3::ZERO
+    }
+
+    /// Whether any source sets the bonds of dry hair.
+    pub(crate) fn dry(&self) -> bool {
+        !self.blowers.is_empty() || self.zones.iter().any(|(zone, _)| zone.drying > 0.0)
+    }
+
+    /// Transformed into the frame of `pose`.
+    pub(crate) fn seen_from(&self, pose: &Pose) -> LocalWinds {
+        let blowers = (self.blowers.iter())
+            .map(|(blower, at)| (blower.clamped(), at.now()))
+            .filter(|(blower, _)| blower.strength > 0.0)
+            .map(|(blower, at)| LocalBlower {
+                nozzle: pose.point_in(at.translation),
+                aim: pose.direction_in(at.rotation * Vec3::NEG_Z),
+                blower,
+            });
+        let zones = self.zones.iter().map(|(zone, at)| {
+            let at = at.now();
+            LocalZone {
+                zone: zone.clamped(),
+                rotation: at.rotation.inverse() * pose.rotation,
+                origin: pose.point_in(at.translation),
+                scale: pose.scale / at.scale,
+            }
+        });
+        let settings = self.wind();
+        let seconds =
+            self.time.elapsed_secs_f64() + f64::from(self.step.dt) * f64::from(self.step.index);
+        LocalWinds {
+            blowers: blowers.collect(),
+            zones: zones.collect(),
+            wind: pose.direction_in(settings.velocity),
+            settings,
+            travelled: settings.velocity.as_dvec3() * seconds,
+            pose: *pose,
+        }
+    }
+}
+
+impl LocalWinds {
+    /// Whether the air is at rest and equally warm.
+    pub(crate) fn are_still(&self) -> bool {
+        self.blowers.is_empty() && !self.flows()
+    }
+
+    /// Whether there are sources other than blowers.
+    pub(crate) fn flows(&self) -> bool {
+        self.wind != Vec3::ZERO || !self.zones.is_empty()
+    }
+
+    /// The global wind if it is the same everywhere and at all times (m/s).
+    #[cfg(feature = "gpu")]
+    pub(crate) fn steady_wind(&self) -> Option<Vec3> {
+        let is_steady = self.settings.gusts <= 0.0 || self.wind == Vec3::ZERO;
+        (is_steady && self.zones.is_empty()).then_some(self.wind)
+    }
+
+    /// The global wind with gusts at a point (m/s). A strand uses that at its root, since gusts are
+    /// longer than hair.
+    pub(super) fn gusty_wind(&self, place: Vec3) -> Vec3 {
+        let HairWind { gusts, gust_length, seed, .. } = self.settings;
+        if gusts <= 0.0 || self.wind == Vec3::ZERO {
+            return self.wind;
+        }
+        let gust = gust(seed, self.pose.point_out(place), self.travelled, gust_length);
+        self.wind + self.pose.direction_in(gust) * (gusts * self.wind.length())
+    }
+
+    /// Whether any zone may act within a distance of a point.
+    pub(super) fn zones_near(&self, place: Vec3, distance: f32) -> bool {
+        self.zones.iter().any(|seen| {
+            let apart = place.distance(seen.origin) - distance;
+            apart * seen.scale <= seen.zone.reach()
+        })
+    }
+
+    /// Adds the zones' air at a point and the part of the global `wind` that they let through.
+    fn add_flow(&self, air: &mut Blown, wind: Vec3, p: Vec3) {
+        let (mut open, mut flow) = (1.0, Vec3::ZERO);
+        for LocalZone { zone, rotation, origin, scale } in &self.zones {
+            let place = *rotation * (p - *origin) * *scale;
+            let share = zone.weight(place);
+            if share <= 0.0 {
+                continue;
+            }
+            open *= 1.0 - zone.shelter * share;
+            let own = zone.velocity + place.normalize_or_zero() * zone.outward;
+            flow += rotation.inverse() * own * share;
+            air.add_warmth(zone.warmth * share);
+            air.drying += zone.drying * share;
+        }
+        air.flow = wind * open + flow;
+        air.velocity += air.flow;
+    }
+
+    /// The air at a point of an `edge`; `wind` is the global wind with gusts there, `zones` whether any
+    /// zone is near.
+    pub(super) fn at(&self, wind: Vec3, zones: bool, p: Vec3, edge: Vec3) -> Blown {
+        let mut air = Blown::at(&self.blowers, self.pose.scale, p, edge);
+        if zones {
+            self.add_flow(&mut air, wind, p);
+        } else {
+            air.flow = wind;
+            air.velocity += wind;
+        }
+        air
+    }
+
+    /// The air at a point (m), for small objects such as droplets.
+    pub(crate) fn around(&self, p: Vec3) -> Blown {
+        self.around_edge(p, Vec3::ZERO)
+    }
+
+    /// The air at the start `p` (m) of an `edge`, for single queries.
+    pub(crate) fn around_edge(&self, p: Vec3, edge: Vec3) -> Blown {
+        self.at(self.gusty_wind(p), !self.zones.is_empty(), p, edge)
+    }
+}

@@ -1,0 +1,237 @@
+//! `ExternalForces`: air and gravity act on velocities, and wind on bonds.
+
+use super::{
+    AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindZone, ZoneShape,
+    blown::BlownAir,
+    local::{LocalWinds, Winds},
+    vapour::DryingAir,
+};
+use crate::{
+    base::{
+        parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
+        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick},
+        setting::{self, Ranged, Settings},
+    },
+    hair::strand::{
+        AddedMass, Hair, KinematicStrand, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose,
+        keep_required,
+    },
+    keratin::bond::{BondChanges, BondKind},
+};
+use bevy::prelude::*;
+
+/// Cost per strand (ns) in still air, and in wind.
+const STILL: usize = 150;
+const WINDY: usize = 2_000;
+
+/// Gravity, wind and drag.
+pub struct EnvironmentPlugin;
+
+impl Plugin for EnvironmentPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<AirDrag>(app);
+        setting::component::<Blower>(app);
+        setting::component::<WindZone>(app);
+        setting::resource::<HairWind>(app);
+        setting::resource::<HairGravity>(app);
+        setting::resource::<HairClimate>(app);
+        keep_required::<Strand, BlownAir>(app);
+        keep_required::<Blower, TickPose>(app);
+        keep_required::<WindZone, TickPose>(app);
+        app.register_type::<WindReceived>()
+            .register_type::<ZoneShape>()
+            .register_type::<BlownAir>()
+            .register_required_components::<Strand, BlownAir>()
+            .init_resource::<DryingAir>()
+            .add_systems(
+                HairTick,
+                update_drying_air.in_set(HairSystems::Air).run_if(resource_changed::<HairClimate>),
+            )
+            .add_systems(HairTick, apply_air.in_set(HairSystems::Air))
+            .add_systems(SettleTick, apply_air.in_set(HairSystems::Air));
+    }
+}
+
+fn update_drying_air(climate: Res<HairClimate>, mut air: ResMut<DryingAir>) {
+    *air = DryingAir::of(&climate.clamped());
+}
+
+/// A hair's air in its own frame.
+struct LocalAir {
+    gravity: Vec3,
+    retained: f32,
+    dt: f32,
+    winds: LocalWinds,
+}
+
+/// A strand that air acts on, with the index of its hair's air.
+type InAir<'a> = (
+    usize,
+    &'a mut Strand,
+    &'a AddedMass,
+    &'a mut BondChanges,
+    &'a mut BlownAir,
+    Option<&'a mut WindReceived>,
+);
+
+/// A strand in the air, as a query reads it.
+type AirStrand = (
+    &'static StrandOf,
+    &'static StrandSleep,
+    &'static mut Strand,
+    &'static AddedMass,
+    &'static mut BondChanges,
+    &'static mut BlownAir,
+    Option<&'static mut WindReceived>,
+);
+
+fn apply_air(
+    steps: EffectiveSubsteps,
+    gravity: Res<HairGravity>,
+    drag: Settings<AirDrag>,
+    hairs: Query<&TickPose, With<Hair>>,
+    winds: Winds,
+    mut simulated: Query<AirStrand, (Without<KinematicStrand>, Without<OnGpu>)>,
+    mut followers: Query<AirStrand, (With<KinematicStrand>, Without<OnGpu>)>,
+) {
+    if !steps.any() {
+        return;
+    }
+    let gravity = gravity.clamped().0;
+    let air_of = |hair: Entity| {
+        let pose = hairs.get(hair).ok()?.now();
+        let dt = steps.of(hair)?.dt;
+        Some(LocalAir {
+            gravity: pose.direction_in(gravity) * dt,
+            retained: bevy::math::ops::exp(-drag.of(hair).rate * dt),
+            dt,
+            winds: winds.seen_from(pose),
+        })
+    };
+    // Wind also dries followers.
+    let dries = winds.dry();
+    let ahead = |(_, strand, ..): &InAir<'_>| {
+        let (_, velocities, _, spins) = strand.parts();
+        prefetch(velocities);
+        prefetch(spins);
+    };
+    let each = Nanos(if winds.are_still() { STILL } else { WINDY });
+    let followers = dries.then(|| tables(&mut followers)).into_iter().flatten();
+    for_each_part(each, tables(&mut simulated).chain(followers), Vec::new, |items, rows| {
+        let mut airs = PerHair::default();
+        for (of, sleep, strand, added_mass, changes, blown, received) in rows {
+            if !sleep.is_asleep()
+                && let Some(air) = airs.index(of.0, || air_of(of.0))
+            {
+                items.push((air, strand, added_mass, changes, blown, received));
+            }
+        }
+        in_turn(items, AHEAD, ahead, |(air, strand, added_mass, changes, blown, received)| {
+            let air = &airs.values[*air];
+            blow(air, strand, added_mass, changes, blown, received.as_deref_mut());
+        });
+        items.clear();
+    });
+}
+
+/// Applies a hair's air to one strand in a substep.
+fn blow(
+    air: &LocalAir,
+    strand: &mut Strand,
+    added_mass: &AddedMass,
+    changes: &mut BondChanges,
+    BlownAir { nodes: at_nodes }: &mut BlownAir,
+    mut received: Option<&mut WindReceived>,
+) {
+    at_nodes.clear();
+    let (length, winds) = (strand.length(), &air.winds);
+    let (positions, velocities, _, spins) = strand.parts_mut();
+    let under = &added_mass.in_water;
+    if under.is_empty() {
+        for v in velocities.iter_mut() {
+            *v = *v * air.retained + air.gravity;
+        }
+    } else {
+        for (i, v) in velocities.iter_mut().enumerate() {
+            let water = under.get(i).copied().unwrap_or_default();
+            let retained = 1.0 - (1.0 - air.retained) * (1.0 - water.share);
+            *v = *v * retained + air.gravity * water.gravity;
+        }
+    }
+    // Edges have rotary inertia of their own, large on fine stiff strands: drag on the nodes alone
+    // would leave them ringing. The same holds under water.
+    for (i, spin) in spins.iter_mut().enumerate() {
+        *spin *= under.get(i).map_or(air.retained, |water| air.retained * water.retained);
+    }
+    if winds.are_still() || positions.is_empty() {
+        return;
+    }
+    let wind = winds.gusty_wind(positions[0]);
+    let zones = winds.zones_near(positions[0], length);
+    let relaxation = 1.0 - air.retained;
+    let edges = positions.len().saturating_sub(1);
+    // Wet hair is heavier: the same wind moves it less.
+    let response = |i: usize| 1.0 / (1.0 + added_mass.mass.get(i).copied().unwrap_or(0.0));
+    // No wind blows under water.
+    let open = |i: usize| under.get(i).map_or(1.0, |water| 1.0 - water.share);
+    let is_wet = added_mass.moves_bonds;
+    for (i, velocity) in velocities.iter_mut().enumerate().take(edges + 1).filter(|_| edges > 0) {
+        // The tip has no edge of its own: it uses the last one's wind.
+        let e = i.min(edges - 1);
+        let edge = positions[e + 1] - positions[e];
+        let blown = winds.at(wind, zones, positions[i], edge);
+        let wind = blown.acceleration * (air.dt * response(i)) + blown.flow * relaxation;
+        *velocity += if under.is_empty() { wind } else { wind * open(i) };
+        // On wet hair the wind dries the water, and the bonds follow that.
+        if is_wet {
+            at_nodes.push(blown);
+        } else if i < edges {
+            changes.request(i, BondKind::Hydrogen, blown.drying * air.dt);
+        }
+        if let Some(received) = received.as_deref_mut().filter(|_| i < edges) {
+            received.total.resize(edges, 0.0);
+            let total = &mut received.total[i];
+            let before = if total.is_finite() { *total } else { 0.0 };
+            *total = before + blown.acceleration.length() * air.dt;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::blown::{Blown, LocalBlower},
+        *,
+    };
+
+    #[test]
+    fn wind_acts_on_every_node_once() {
+        let points: Vec<Vec3> = (0..4).map(|i| Vec3::new(0.0, 0.01 * i as f32, 0.2)).collect();
+        let mut strand = Strand::from_polyline(&points).unwrap();
+        let blower = Blower { drying: 0.5, ..default() };
+        let blowers = vec![LocalBlower { nozzle: Vec3::ZERO, aim: Vec3::Z, blower }];
+        let blown: Vec<Blown> =
+            (0..4).map(|i| Blown::at(&blowers, 1.0, points[i], Vec3::Y * 0.01)).collect();
+        let winds = LocalWinds { blowers, ..default() };
+        let air = LocalAir { gravity: Vec3::ZERO, retained: 1.0, dt: 0.01, winds };
+        let (mut changes, mut at_nodes) = (BondChanges::default(), BlownAir::default());
+        let mut received = WindReceived::default();
+        let mut wet = AddedMass { mass: vec![1.0; 4], ..default() };
+        blow(&air, &mut strand, &wet, &mut changes, &mut at_nodes, Some(&mut received));
+        for (i, blown) in blown.iter().enumerate() {
+            let expected = blown.acceleration * (0.01 / 2.0);
+            assert!(expected.length() > 1e-4);
+            assert!(strand.velocities()[i].distance(expected) < 1e-6, "node {i}");
+        }
+        assert_eq!(received.total.len(), 3, "edges receive wind");
+        for (i, total) in received.total.iter().enumerate() {
+            assert!((total - 0.01 * blown[i].acceleration.length()).abs() < 1e-6, "edge {i}");
+        }
+        assert!(at_nodes.nodes.is_empty() && !changes.is_empty());
+        // On wet hair the wind dries the water at every node.
+        wet.moves_bonds = true;
+        let mut changes = BondChanges::default();
+        blow(&air, &mut strand, &wet, &mut changes, &mut at_nodes, None);
+        assert!(at_nodes.nodes.len() == 4 && changes.is_empty());
+    }
+}

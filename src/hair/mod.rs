@@ -1,0 +1,15 @@
+//! What hair is: [`strand`], its entities and their state, and [`look`], its colour and gloss.
+
+pub mod look;
+pub mod strand;
+
+/// The room's share of [the prelude](crate::prelude).
+pub mod prelude {
+    pub use crate::hair::look::{
+        DyeLayer, HairColor, HairDye, HairLook, HairShading, Melanin, Streaks, WornPreset,
+    };
+    pub use crate::hair::strand::{
+        AddedMass, Hair, HairInertia, HeldNodes, HeldNodesState, OnGpu, SleepCounts, Strand,
+        StrandError, StrandModel, StrandOf, StrandSleep, Strands,
+    };
+}

@@ -1,0 +1,312 @@
+//! Strands in the tick: poses of the scalp, and inertia of the nodes.
+
+use super::{
+    AddedMass, Hair, HeldNodes, HeldNodesState, KinematicStrand, OnGpu, PerHair, SleepCounts,
+    SleepPose, Strand, StrandError, StrandHistory, StrandModel, StrandOf, StrandSleep, Strands,
+    TickPose,
+    frame::{HairInertia, Pose},
+    held::report_out_of_reach,
+    keep_required,
+};
+use crate::base::{
+    fault::{FaultKind, HairChecks, HairFault},
+    parallel::{Nanos, for_each_part, tables},
+    schedule::{
+        EffectiveSubsteps, HairFrame, HairStep, HairSystems, HairTick, MergedSubsteps,
+        first_substep,
+    },
+    setting::{self, Settings},
+};
+use bevy::{
+    ecs::{entity_disabling::Disabled, query::QueryFilter},
+    math::Isometry3d,
+    prelude::*,
+};
+
+/// Estimated time per strand (ns) of copying it, and of applying its hair's frame delta.
+const COPY: Nanos = Nanos(100);
+const FRAME_DELTA: Nanos = Nanos(600);
+
+/// Hair and strands as entities, and their frames.
+pub struct StrandPlugin;
+
+impl Plugin for StrandPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<StrandModel>(app);
+        setting::plugin::<HairInertia>(app);
+        keep_required::<Hair, Transform>(app);
+        keep_required::<Hair, TickPose>(app);
+        keep_required::<Hair, MergedSubsteps>(app);
+        keep_required::<Strand, StrandHistory>(app);
+        keep_required::<Strand, AddedMass>(app);
+        keep_required::<Strand, StrandSleep>(app);
+        keep_required::<Strand, SleepPose>(app);
+        keep_required::<HeldNodes, HeldNodesState>(app);
+        app.register_type::<Hair>()
+            .register_type::<TickPose>()
+            .register_type::<Strand>()
+            .register_type::<StrandOf>()
+            .register_type::<Strands>()
+            .register_type::<StrandHistory>()
+            .register_type::<StrandError>()
+            .register_type::<HeldNodes>()
+            .register_type::<HeldNodesState>()
+            .register_type::<AddedMass>()
+            .register_type::<StrandSleep>()
+            .register_type::<SleepCounts>()
+            .register_type::<SleepPose>()
+            .add_systems(HairChecks, report_unusable)
+            .add_systems(HairFrame, record_frame)
+            .add_systems(
+                HairTick,
+                (
+                    (
+                        repair_strands::<Without<KinematicStrand>>,
+                        repair_strands::<With<KinematicStrand>>.run_if(first_substep),
+                        report_out_of_reach.run_if(first_substep),
+                        store_history,
+                    )
+                        .chain()
+                        .in_set(HairSystems::StrandHistory),
+                    (aim_poses.run_if(first_substep), advance_poses)
+                        .chain()
+                        .in_set(HairSystems::Poses),
+                    apply_frame_inertia.in_set(HairSystems::FrameInertia),
+                ),
+            );
+    }
+}
+
+/// Reports strands that cannot be simulated, once, when they are spawned or assigned to a hair.
+fn report_unusable(
+    strands: Query<
+        (Entity, Ref<Strand>, Option<Ref<StrandOf>>),
+        // A strand on the GPU has a hair, and would not be there with fewer nodes.
+        (Or<(Added<Strand>, Added<StrandOf>)>, Without<OnGpu>),
+    >,
+    hairs: Query<(), With<Hair>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, strand, of) in &strands {
+        if strand.is_added() && strand.nodes() < 2 {
+            let error = StrandError::TooFewNodes { found: strand.nodes() };
+            faults.write(HairFault::caused(FaultKind::Strand, error, "it is left out").of(entity));
+        }
+        let has_no_hair = match of {
+            Some(of) => of.is_added() && !hairs.contains(of.0),
+            None => strand.is_added(),
+        };
+        if has_no_hair {
+            let message =
+                "the strand belongs to no hair: spawn it with StrandOf(hair), hair carrying Hair";
+            faults.write(HairFault::new(FaultKind::NoHair, message).of(entity));
+        }
+    }
+}
+
+/// Repairs private fields written by an inspector or a scene file. Our own writes bypass change
+/// detection. Simulated strands are checked in every substep, because systems of game code within the
+/// tick may write as well; without writes it only scans change ticks.
+fn repair_strands<F: QueryFilter>(
+    mut strands: Query<
+        (Entity, &mut Strand),
+        (Changed<Strand>, Without<OnGpu>, Allow<Disabled>, F),
+    >,
+    mut loads: Query<
+        (Entity, &mut AddedMass),
+        (Changed<AddedMass>, Without<OnGpu>, Allow<Disabled>, F),
+    >,
+    mut histories: Query<
+        (Entity, &mut StrandHistory),
+        (Changed<StrandHistory>, Without<OnGpu>, Allow<Disabled>, F),
+    >,
+    mut faults: MessageWriter<HairFault>,
+) {
+    // Also of sleeping strands, whose history is not written again.
+    let histories =
+        histories.iter_mut().map(|(e, mut h)| (e, h.bypass_change_detection().repair()));
+    let strands = strands.iter_mut().map(|(e, mut s)| (e, s.bypass_change_detection().repair()));
+    let loads = loads.iter_mut().map(|(e, mut l)| (e, l.bypass_change_detection().repair()));
+    for (entity, found) in strands.chain(loads).chain(histories) {
+        if let Some(found) = found {
+            faults.write(HairFault::new(FaultKind::Strand, found).of(entity));
+        }
+    }
+}
+
+/// Before the first substep of a tick: the present positions become history. Strands that are not
+/// simulated store theirs where they are moved.
+fn store_history(
+    step: Res<HairStep>,
+    mut strands: Query<
+        (&Strand, &StrandSleep, &mut StrandHistory),
+        (Without<KinematicStrand>, Without<OnGpu>),
+    >,
+) {
+    if step.index > 0 {
+        return;
+    }
+    for_each_part(
+        COPY,
+        tables(&mut strands),
+        || (),
+        |(), rows| {
+            for (strand, sleep, history) in rows {
+                // A sleeping strand's history was stored when it fell asleep; only its root may
+                // have moved.
+                if sleep.is_asleep() && history.positions.first() == strand.positions.first() {
+                    continue;
+                }
+                history.positions.clone_from(&strand.positions);
+            }
+        },
+    );
+}
+
+/// At the start of a frame: records the poses at the end of the previous frame.
+fn record_frame(
+    time: Res<Time<Virtual>>,
+    transforms: TransformHelper,
+    mut poses: Query<(Entity, &mut TickPose)>,
+) {
+    let seconds = time.elapsed_secs_f64() - time.delta_secs_f64();
+    for (entity, mut frame) in &mut poses {
+        let pose = transforms.compute_global_transform(entity).ok();
+        frame.bypass_change_detection().record(seconds, pose.as_ref().and_then(Pose::of));
+    }
+}
+
+/// At the start of a tick: sets the target of each pose. Hair that teleports comes to rest.
+fn aim_poses(
+    (time, frames): (Res<Time>, Res<Time<Virtual>>),
+    transforms: TransformHelper,
+    inertia: Settings<HairInertia>,
+    mut poses: Query<(Entity, &mut TickPose, Option<&Strands>)>,
+    mut strands: Query<&mut Strand>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let seconds = time.elapsed_secs_f64() - frames.delta_secs_f64();
+    // Displacement of each hair that moves, and whether it teleports. Colliders and tools that move
+    // the same displacement teleport with it.
+    let mut displacements: Vec<(Vec3, bool)> = Vec::new();
+    for others in [false, true] {
+        for (entity, mut frame, members) in &mut poses {
+            if members.is_none() != others {
+                continue;
+            }
+            // With MinimalPlugins nothing propagates transforms, so the helper computes them.
+            let pose = transforms.compute_global_transform(entity).ok();
+            let pose = pose.as_ref().and_then(Pose::of);
+            let displacement = pose.map_or(Vec3::ZERO, |pose| frame.displacement_to(&pose));
+            let alike = |with: &Vec3| displacement.distance(*with) < 0.1 * displacement.length();
+            let longest = || match members {
+                Some(members) => {
+                    let theirs = strands.iter_many(members.collection());
+                    theirs.map(|strand| strand.length()).fold(0.0, f32::max)
+                }
+                None if displacements.iter().any(|(with, put)| !put && alike(with)) => {
+                    f32::INFINITY
+                }
+                None => 0.0,
+            };
+            let (put, report) = frame.aim(pose, seconds, &inertia.of(entity), longest);
+            if report {
+                let message =
+                    "the transform is not finite or has no inverse: the last valid pose is used";
+                faults.write(HairFault::new(FaultKind::Transform, message).of(entity));
+            }
+            let Some(members) = members else { continue };
+            if displacement != Vec3::ZERO {
+                displacements.push((displacement, put));
+            }
+            if put {
+                let mut theirs = strands.iter_many_mut(members.collection());
+                while let Some(mut strand) = theirs.fetch_next() {
+                    strand.bypass_change_detection().rest();
+                }
+            }
+        }
+    }
+}
+
+/// Advances poses by a substep.
+fn advance_poses(
+    step: Res<HairStep>,
+    substeps: EffectiveSubsteps,
+    mut poses: Query<(Entity, &mut TickPose, Has<Strands>)>,
+) {
+    for (entity, mut frame, is_hair) in &mut poses {
+        let waits = is_hair && substeps.began_before(entity);
+        frame.advance((step.index + 1) as f32 / step.count as f32, waits);
+    }
+}
+
+/// Inertia: free nodes are moved by the inverse of the frame's motion; the root stays.
+fn apply_frame_inertia(
+    substeps: EffectiveSubsteps,
+    hairs: Query<&TickPose, With<Hair>>,
+    mut strands: Query<
+        (&StrandOf, &StrandSleep, &mut Strand),
+        (Without<KinematicStrand>, Without<OnGpu>),
+    >,
+) {
+    if !substeps.any() || hairs.iter().all(|hair| hair.frame_delta().is_none()) {
+        return;
+    }
+    for_each_part(
+        FRAME_DELTA,
+        tables(&mut strands),
+        || (),
+        |(), rows| {
+            let mut frame_deltas = PerHair::default();
+            for (of, sleep, strand) in rows {
+                let frame_delta = || {
+                    substeps.of(of.0)?;
+                    hairs.get(of.0).ok()?.frame_delta()
+                };
+                if sleep.is_simulated()
+                    && let Some(index) = frame_deltas.index(of.0, frame_delta)
+                {
+                    shift_by(strand, &frame_deltas.values[index]);
+                }
+            }
+        },
+    );
+}
+
+fn shift_by(strand: &mut Strand, frame_delta: &Isometry3d) {
+    let (turn, way) = (frame_delta.rotation, Vec3::from(frame_delta.translation));
+    // For many points a matrix is cheaper than a quaternion.
+    let matrix = Mat3::from_quat(turn);
+    strand.positions.iter_mut().skip(1).for_each(|p| *p = matrix * *p + way);
+    strand.velocities.iter_mut().for_each(|v| *v = matrix * *v);
+    strand.orientations.iter_mut().for_each(|q| *q = (turn * *q).normalize());
+    strand.angular_velocities.iter_mut().for_each(|v| *v = matrix * *v);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f32::consts::FRAC_PI_2;
+
+    #[test]
+    fn all_moving_state_is_shifted_and_the_root_stays() {
+        let points: Vec<Vec3> = (0..4).map(|i| Vec3::X * (0.03 * i as f32)).collect();
+        let mut strand = Strand::from_polyline(&points).unwrap();
+        strand.velocities_mut().copy_from_slice(&[Vec3::X, Vec3::X, Vec3::Y, Vec3::Z]);
+        strand.angular_velocities.copy_from_slice(&[Vec3::X, Vec3::Y, Vec3::Z]);
+        let turn = Quat::from_rotation_z(FRAC_PI_2);
+        let frame_delta = Isometry3d::new(Vec3::new(0.1, 0.2, 0.3), turn);
+        shift_by(&mut strand, &frame_delta);
+        assert_eq!(strand.positions()[0], Vec3::ZERO);
+        for (p, q) in strand.positions()[1..].iter().zip(&points[1..]) {
+            assert!(p.distance(turn * *q + Vec3::new(0.1, 0.2, 0.3)) < 1e-6);
+        }
+        let near = |found: &[Vec3], expected: &[Vec3]| {
+            found.iter().zip(expected).all(|(a, b)| a.distance(*b) < 1e-6)
+        };
+        assert!(near(strand.velocities(), &[Vec3::Y, Vec3::Y, Vec3::NEG_X, Vec3::Z]));
+        assert!(near(strand.angular_velocities(), &[Vec3::Y, Vec3::NEG_X, Vec3::Z]));
+        assert!(strand.orientations().iter().all(|q| (*q * Vec3::Z).distance(Vec3::Y) < 1e-6));
+    }
+}

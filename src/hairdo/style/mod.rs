@@ -1,0 +1,185 @@
+//! Styles: how much of a styled shape is left, and queries of hair's state for games.
+//!
+//! Put [`HairStyle`] on a [`Hair`] once it is styled. From then on [`KeptStyle`] holds how much of that
+//! style is left, as defined in `model.rs`, and [`StyleFaded`] is triggered when too much is lost, be it
+//! by washing, rain, sleep or steam.
+
+mod model;
+
+use crate::{
+    base::{
+        schedule::{HairSystems, HairTick, last_substep},
+        setting::{self, Ranged, Settings, setting},
+    },
+    forces::environment::vapour::WATER,
+    hair::strand::{Hair, Strands},
+    keratin::bond::{BondInfluence, Bonds},
+    water::Moisture,
+};
+use bevy::{
+    ecs::{entity::EntityHashMap, system::SystemParam},
+    prelude::*,
+};
+use model::{KeptSum, styled};
+
+/// Measures styles.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StylePlugin;
+
+impl Plugin for StylePlugin {
+    fn build(&self, app: &mut App) {
+        setting::component::<HairStyle>(app);
+        app.register_type::<KeptStyle>()
+            .register_type::<StyleFaded>()
+            .add_systems(HairTick, measure_styles.in_set(HairSystems::Styles).run_if(last_substep));
+    }
+}
+
+setting! {
+    /// Takes the shape in which a hair's bonds hold it now as its style, and measures from then on
+    /// how much of it is left. Component of a [`Hair`]; insert it again when the hair has been
+    /// restyled: soaked ([`SoakHair`](crate::SoakHair)) and dried in shape
+    /// ([`HairDried`](crate::HairDried)). On wet hair, whose hydrogen bonds are open, it cannot see what
+    /// they will hold. Costs a pass over all joints once a tick.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// fn styled(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
+    ///     commands.entity(*hair).insert(HairStyle::default()).observe(|faded: On<StyleFaded>| {
+    ///         info!("only {:.0} % of the curls are left", 100.0 * faded.kept);
+    ///     });
+    /// }
+    /// ```
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    #[require(KeptStyle)]
+    pub struct HairStyle {
+        /// [`StyleFaded`] is triggered when less than this share of the style is left.
+        pub fades_below: f32 = 0.5, in FADES_BELOW: 0.0..=1.0, safe 0.1..=0.9, "half of it is 0.5";
+    }
+}
+
+/// How much of its [`HairStyle`] a hair has kept. Written by the tick.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub struct KeptStyle {
+    share: Option<f32>,
+    faded: bool,
+    /// The style of each strand's joints.
+    #[reflect(ignore)]
+    styles: EntityHashMap<Vec<Vec3>>,
+}
+
+impl KeptStyle {
+    /// The share that is left: 1 when inserted, 0 when nothing is left, negative when hair bends
+    /// the other way. `None` before the first tick, and where bonds held hair in its natural shape
+    /// when [`HairStyle`] was inserted: style the hair, then insert it again.
+    pub fn kept(&self) -> Option<f32> {
+        self.share
+    }
+}
+
+/// Triggered on a [`Hair`] when less of its [`HairStyle`] is left than
+/// [`fades_below`](HairStyle::fades_below): once, and again after restyling or recovery.
+#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct StyleFaded {
+    /// The hair.
+    pub entity: Entity,
+    /// The share of the style that is left.
+    pub kept: f32,
+}
+
+/// How far above its limit a style has to recover before it can fade again.
+const BACK_BY: f32 = 0.05;
+
+fn measure_styles(
+    influence: Settings<BondInfluence>,
+    mut hairs: Query<(Entity, Ref<HairStyle>, &Strands, &mut KeptStyle), With<Hair>>,
+    bonds: Query<&Bonds>,
+    mut commands: Commands,
+) {
+    for (hair, style, members, mut kept) in &mut hairs {
+        let influence = influence.of(hair).as_array();
+        let kept = kept.bypass_change_detection();
+        let joints = |bonds: &Bonds| -> Vec<Vec3> {
+            bonds.joints.iter().map(|joint| styled(joint, &influence)).collect()
+        };
+        if style.is_changed() {
+            (kept.faded, kept.share) = (false, None);
+            let strands = members.iter().filter_map(|id| Some((id, joints(bonds.get(id).ok()?))));
+            kept.styles = strands.collect();
+        }
+        if kept.styles.is_empty() {
+            continue;
+        }
+        let mut sum = KeptSum::default();
+        // In the order of the strands, for determinism.
+        for id in members.iter() {
+            let (Some(styles), Ok(bonds)) = (kept.styles.get(&id), bonds.get(id)) else { continue };
+            for (style, joint) in styles.iter().zip(&bonds.joints) {
+                sum.add(*style, styled(joint, &influence));
+            }
+        }
+        kept.share = sum.kept();
+        if kept.share.is_none() {
+            // Hair without a style costs nothing more.
+            kept.styles.clear();
+        }
+        let limit = style.clamped().fades_below;
+        match kept.share {
+            Some(share) if share < limit && !kept.faded => {
+                kept.faded = true;
+                commands.trigger(StyleFaded { entity: hair, kept: share });
+            }
+            Some(share) if share >= limit + BACK_BY => kept.faded = false,
+            _ => {}
+        }
+    }
+}
+
+/// System parameter with queries of a hair's state.
+///
+/// ```
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+/// fn towel_needed(hair: Single<Entity, With<Hair>>, condition: HairCondition) -> bool {
+///     condition.wetness(*hair) > 0.3
+/// }
+/// ```
+#[derive(SystemParam)]
+pub struct HairCondition<'w, 's> {
+    hairs: Query<'w, 's, &'static Strands>,
+    moistures: Query<'w, 's, &'static Moisture>,
+    kept: Query<'w, 's, &'static KeptStyle>,
+}
+
+impl HairCondition<'_, '_> {
+    /// Mean wetness inside a hair over all nodes: 0 as in a room, 1 as under water. 0 for an entity that
+    /// is not a hair.
+    pub fn wetness(&self, hair: Entity) -> f32 {
+        let Ok(members) = self.hairs.get(hair) else { return 0.0 };
+        let (mut sum, mut strands) = (0.0, 0);
+        for id in members.iter() {
+            strands += 1;
+            let Ok(moisture) = self.moistures.get(id) else { continue };
+            let nodes = moisture.wetness();
+            sum += nodes.iter().map(|w| f64::from(*w)).sum::<f64>() / nodes.len().max(1) as f64;
+        }
+        (sum / f64::from(strands.max(1))) as f32
+    }
+
+    /// The water on and in a hair, beyond the regain of a room (kg).
+    pub fn water(&self, hair: Entity) -> f64 {
+        let Ok(members) = self.hairs.get(hair) else { return 0.0 };
+        let of =
+            |moisture: &Moisture| -> f64 { moisture.film().iter().chain(moisture.bound()).sum() };
+        let all = members.iter().filter_map(|id| self.moistures.get(id).ok()).map(of);
+        // An empty `sum` is −0.
+        all.fold(0.0_f64, |sum, volume| sum + volume) * WATER
+    }
+
+    /// How much of its style a hair has kept; see [`KeptStyle::kept`].
+    pub fn kept_style(&self, hair: Entity) -> Option<f32> {
+        self.kept.get(hair).ok()?.kept()
+    }
+}

@@ -1,0 +1,130 @@
+//! Levels are chosen at the start of a tick; the systems that move hair read them.
+
+use super::{
+    Follower, Guides, HairBudget, HairEstimate, HairLod, HairScreenShare, LodLevel, PresentLod,
+    budget::{Candidate, costs, fit},
+    choose::{choose_guides, note_overwritten},
+    followers::{move_followers, sync_follower_sleep},
+    model,
+    release::{release_follower, release_without_follower},
+};
+use crate::{
+    base::{
+        fault::{FaultKind, HairFault},
+        schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
+        setting::{self, Ranged},
+    },
+    hair::strand::{Hair, OnGpu, Strand, Strands, keep_required},
+};
+use bevy::prelude::*;
+
+/// Levels of detail of the simulation.
+pub struct LodPlugin;
+
+impl Plugin for LodPlugin {
+    fn build(&self, app: &mut App) {
+        setting::component::<HairLod>(app);
+        setting::resource::<HairBudget>(app);
+        keep_required::<Strand, Follower>(app);
+        app.init_resource::<HairEstimate>()
+            .register_type::<HairEstimate>()
+            .register_type::<LodLevel>()
+            .register_type::<HairScreenShare>()
+            .register_type::<PresentLod>()
+            .register_type::<Follower>()
+            .register_type::<Guides>()
+            .register_required_components::<Strand, Follower>()
+            .register_required_components::<HairLod, Guides>()
+            .add_observer(reset_level)
+            .add_observer(release_follower)
+            .add_observer(release_without_follower)
+            .add_systems(
+                HairTick,
+                (
+                    (choose, note_overwritten, choose_guides)
+                        .chain()
+                        .in_set(HairSystems::LevelOfDetail)
+                        .run_if(first_substep),
+                    sync_follower_sleep.in_set(HairSystems::FollowerSleep).run_if(first_substep),
+                    move_followers.in_set(HairSystems::Followers),
+                ),
+            );
+    }
+}
+
+/// Hair without levels is simulated in full.
+fn reset_level(left: On<Remove, HairLod>, mut hairs: Query<(&mut PresentLod, &mut SubstepLimits)>) {
+    if let Ok((mut present, mut limits)) = hairs.get_mut(left.entity) {
+        (*present, *limits) = default();
+    }
+}
+
+fn choose(
+    step: Res<HairStep>,
+    budget: Res<HairBudget>,
+    mut estimate: ResMut<HairEstimate>,
+    mut hairs: Query<
+        (&HairLod, &HairScreenShare, &Strands, &mut PresentLod, &mut SubstepLimits, Has<OnGpu>),
+        With<Hair>,
+    >,
+    strands: Query<&Strand>,
+    mut exceeded: Local<bool>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let budget = budget.clamped();
+    let mut chosen: Vec<_> = hairs
+        .iter_mut()
+        .map(|(lod, share, members, mut present, limits, on_gpu)| {
+            let lod = lod.clamped();
+            let before = present.level.saturating_sub(present.budget_levels);
+            let wanted = model::choose(&lod.levels, lod.hysteresis, before, share.0);
+            let segments = match present.segments {
+                (segments, counted) if counted == members.len() => segments,
+                _ => strands.iter_many(members.collection()).map(Strand::edges).sum(),
+            };
+            present.bypass_change_detection().segments = (segments, members.len());
+            // Hair already made coarser stays so until other hair is clearly less important.
+            let held = if present.budget_levels > 0 { 1.0 + lod.hysteresis } else { 1.0 };
+            let importance = share.0.max(0.0) * lod.importance / held;
+            // On the GPU it costs this processor nothing, so nothing is won by making it coarser.
+            let costs = match on_gpu || present.is_leaving {
+                true => vec![0.0; wanted + 1],
+                false => costs(&lod.levels, segments, step.count),
+            };
+            (Candidate { importance, wanted, costs }, lod.levels.clone(), present, limits)
+        })
+        .collect();
+    let candidates: Vec<Candidate> = chosen.iter().map(|c| c.0.clone()).collect();
+    let levels = fit(&candidates, budget.milliseconds / budget.slowness);
+    let cost_of = |level: &dyn Fn(usize) -> usize| -> f32 {
+        let costs = candidates.iter().enumerate().map(|(i, c)| c.costs[level(i)]);
+        costs.sum::<f32>() * budget.slowness
+    };
+    let present = cost_of(&|i| levels[i]);
+    estimate.set_if_neq(HairEstimate { unbudgeted: cost_of(&|i| candidates[i].wanted), present });
+    let exceeds = present > budget.milliseconds;
+    if exceeds && !core::mem::replace(&mut *exceeded, exceeds) {
+        let message = format!(
+            "the budget of {} ms is too small: at their coarsest levels all hairs take about {present} ms, \
+             which they will",
+            budget.milliseconds
+        );
+        faults.write(HairFault::new(FaultKind::Setting, message));
+    }
+    *exceeded = exceeds;
+    for ((candidate, settings, present, limits), level) in chosen.iter_mut().zip(levels) {
+        let settings_of = |level: usize| level.checked_sub(1).and_then(|i| settings.get(i));
+        let wanted_strands = settings_of(candidate.wanted).map(|l| l.strands);
+        let settings = settings_of(level);
+        present.set_if_neq(PresentLod {
+            level,
+            budget_levels: level - candidate.wanted,
+            strands: settings.map(|l| l.strands),
+            wanted_strands,
+            ..**present
+        });
+        let limits_of =
+            |l: &LodLevel| SubstepLimits { substeps: l.substeps, iterations: l.iterations };
+        limits.set_if_neq(settings.map_or_else(SubstepLimits::default, limits_of));
+    }
+}

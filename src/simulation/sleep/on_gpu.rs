@@ -1,0 +1,83 @@
+//! What would wake hair on the GPU, where it sleeps as a whole.
+
+use super::{
+    SleepSettings,
+    systems::{RestSettings, SeenCollider, SleepSnapshot, WakeEvents},
+};
+use crate::{
+    base::{
+        schedule::{HairStep, HairSystems, HairTick, first_substep},
+        setting::Ranged,
+    },
+    forces::{
+        contact::{Colliders, HairCollider, HairReach},
+        environment::Winds,
+    },
+    hair::strand::{Hair, OnGpu, Strands, TickPose},
+    solver::rod::obstacle::Solid,
+};
+use bevy::prelude::*;
+
+/// What disturbs a hair on the GPU in this tick.
+#[derive(Component, Clone, Debug, Default)]
+pub(crate) struct Disturbance {
+    pub(crate) sleep: SleepSettings,
+    is_disturbed: bool,
+    /// Colliders that appeared, disappeared or moved, with the distance within which they may act (m).
+    solids: Vec<(Solid, f32)>,
+}
+
+impl Disturbance {
+    /// Whether it disturbs hair in the box with these corners.
+    pub(crate) fn acts_within(&self, low: Vec3, high: Vec3) -> bool {
+        let acts = |(solid, reach): &(Solid, f32)| {
+            !reach.is_finite() || solid.may_reach(low, high, *reach)
+        };
+        self.is_disturbed || self.solids.iter().any(acts)
+    }
+}
+
+/// Part of the feature `gpu`.
+pub(crate) fn watch_on_gpu(app: &mut App) {
+    app.add_systems(HairTick, watch.in_set(HairSystems::Sleep).run_if(first_substep));
+}
+
+/// Once a tick.
+fn watch(
+    step: Res<HairStep>,
+    settings: RestSettings,
+    colliders: Query<(&HairCollider, &TickPose)>,
+    winds: Winds,
+    mut hairs: Query<
+        (
+            Entity,
+            &TickPose,
+            &mut SleepSnapshot,
+            &mut Disturbance,
+            Option<&Strands>,
+            Option<&HairReach>,
+        ),
+        (With<Hair>, With<OnGpu>),
+    >,
+) {
+    if hairs.is_empty() {
+        return;
+    }
+    let valid: Vec<_> = colliders.iter().map(|(c, pose)| (c.clamped(), pose)).collect();
+    let all = valid.iter().map(|item| (&item.0, item.1, item));
+    let (colliders, mut scratch) = (Colliders::new(step.count, all), Vec::new());
+    for (hair, frame, mut snapshot, mut disturbance, members, reach) in &mut hairs {
+        let near = colliders.near(frame, reach, &mut scratch);
+        let seen = near.map(|(collider, pose)| SeenCollider::of(frame, collider, pose)).collect();
+        let members = members.map_or(0, |members| members.len());
+        let WakeEvents { sleep, all_wake, solids, .. } = snapshot
+            .bypass_change_detection()
+            .wake_events(settings.of(hair), frame.now(), members, seen, step.count);
+        // Wind that reaches none of its strands keeps it awake as well.
+        let air = winds.seen_from(frame.now());
+        let is_blown = air.steady_wind() != Some(Vec3::ZERO)
+            || air.blowers.iter().any(|seen| seen.blower.strength != 0.0);
+        *disturbance.bypass_change_detection() =
+            Disturbance { sleep, is_disturbed: all_wake || is_blown, solids };
+    }
+}

@@ -1,0 +1,64 @@
+//! The trait of kernels that solve strands in batches.
+
+use crate::{
+    hair::strand::{AddedMass, HeldNodes, Strand},
+    math::lanes::LANES,
+    solver::rod::block::BlockLanes,
+};
+use bevy::prelude::*;
+
+/// The data that a lane is filled from.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'a> {
+    pub(super) strand: &'a Strand,
+    pub(super) added: &'a AddedMass,
+    pub(super) held: Option<&'a HeldNodes>,
+}
+
+/// Edge state besides orientations that a method keeps between substeps.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kept {
+    Nothing,
+    AngularVelocities,
+    Tensions,
+}
+
+/// A strand taken from its table for one kind of kernel: rods or springs.
+pub(super) trait Batched: Sized + Send {
+    /// Parameters of a hair's strands in a substep.
+    type Params;
+    /// A block with the additional state of the kernel.
+    type Lanes: Default;
+
+    /// The strand.
+    fn entity(&self) -> Entity;
+    /// Its hair.
+    fn hair(&self) -> Entity;
+    /// The data that its lane is filled from.
+    fn source(&self) -> Source<'_>;
+    /// Its state, for writing.
+    fn strand_mut(&mut self) -> &mut Strand;
+    /// Prefetches it.
+    fn prefetch(&self) {
+        self.source().strand.prefetch();
+    }
+    /// The shape it is rebuilt in when its state is lost: a Darboux vector for each joint.
+    fn remembered(&self, _params: &Self::Params) -> Vec<Vec3> {
+        Vec::new()
+    }
+    /// Edge state besides orientations that is written back.
+    fn kept(_params: &Self::Params) -> Kept {
+        Kept::Nothing
+    }
+    /// How long the substep is (s).
+    fn dt(params: &Self::Params) -> f32;
+    /// The block's nodes and edges.
+    fn block(lanes: &mut Self::Lanes) -> &mut BlockLanes;
+    /// Advances a block with gathered nodes by a substep.
+    fn step(
+        lanes: &mut Self::Lanes,
+        sources: &[Source<'_>; LANES],
+        items: &[Self],
+        params: &Self::Params,
+    );
+}

@@ -1,0 +1,275 @@
+//! Cosserat rods in the tick.
+
+use super::{
+    batch::for_each_batch,
+    batched::{Batched, Kept, Source},
+    gather::in_lanes,
+    substeps,
+};
+use crate::{
+    base::{
+        fault::HairFault,
+        parallel::{prefetch, tables},
+        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick},
+        setting::{self, Ranged, Settings},
+    },
+    forces::{
+        contact::{Obstacles, StrandContact},
+        environment::HairGravity,
+    },
+    hair::strand::{
+        AddedMass, Hair, HeldNodes, KinematicStrand, OnGpu, Strand, StrandModel, StrandOf,
+        StrandSleep, TickPose,
+    },
+    keratin::bond::{BondInfluence, Bonds, RestShape},
+    math::lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4},
+    solver::rod::{
+        HairSolver, HairStiffness, SolverMethod, Sweeps,
+        block::BlockLanes,
+        direct::{self, DirectParams},
+        obstacle::Obstacle,
+        step::{self, SweepParams},
+    },
+};
+use bevy::{math::Isometry3d, prelude::*};
+use fearless_simd::Level;
+
+/// Cosserat rods: the elastic projection.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RodPlugin;
+
+impl Plugin for RodPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<HairStiffness>(app);
+        setting::plugin::<HairSolver>(app);
+        setting::plugin::<Sweeps>(app);
+        substeps::plugin(app);
+        app.add_systems(HairTick, step_rods.in_set(HairSystems::Rods))
+            .add_systems(SettleTick, step_rods.in_set(HairSystems::Rods));
+    }
+}
+
+/// Parameters of a hair for the projection, resolved once a substep.
+struct HairParams {
+    level: Level,
+    method: Method,
+    dt: f32,
+    clearance: f32,
+    bending_length: f32,
+    influence: [f32; 4],
+    obstacles: Vec<Obstacle>,
+}
+
+enum Method {
+    Direct {
+        params: DirectParams,
+        /// How points at rest in the world moved in the hair's frame.
+        frame_delta: Option<Isometry3d>,
+    },
+    Sweeps(SweepParams, Sweeps),
+}
+
+struct RodStrand<'a> {
+    entity: Entity,
+    hair: Entity,
+    strand: &'a mut Strand,
+    rest: &'a RestShape,
+    bonds: &'a Bonds,
+    added: &'a AddedMass,
+    held: Option<&'a HeldNodes>,
+}
+
+impl Batched for RodStrand<'_> {
+    type Params = HairParams;
+    type Lanes = BlockLanes;
+
+    fn entity(&self) -> Entity {
+        self.entity
+    }
+
+    fn hair(&self) -> Entity {
+        self.hair
+    }
+
+    fn source(&self) -> Source<'_> {
+        Source { strand: self.strand, added: self.added, held: self.held }
+    }
+
+    fn strand_mut(&mut self) -> &mut Strand {
+        self.strand
+    }
+
+    fn prefetch(&self) {
+        self.strand.prefetch();
+        prefetch(self.strand.rest_lengths());
+        prefetch(self.strand.tensions());
+        prefetch(&self.rest.darboux);
+        prefetch(&self.rest.stiffness);
+    }
+
+    fn remembered(&self, params: &HairParams) -> Vec<Vec3> {
+        self.bonds.joints.iter().map(|joint| joint.relaxed(&params.influence)).collect()
+    }
+
+    fn kept(params: &HairParams) -> Kept {
+        match params.method {
+            Method::Direct { .. } => Kept::Tensions,
+            Method::Sweeps(..) => Kept::AngularVelocities,
+        }
+    }
+
+    fn dt(params: &HairParams) -> f32 {
+        params.dt
+    }
+
+    fn block(lanes: &mut BlockLanes) -> &mut BlockLanes {
+        lanes
+    }
+
+    fn step(
+        block: &mut BlockLanes,
+        sources: &[Source<'_>; LANES],
+        items: &[Self],
+        params: &HairParams,
+    ) {
+        gather_frames(block, sources, items);
+        let near = block.near(&params.obstacles, params.dt, params.clearance);
+        match &params.method {
+            Method::Direct { params: direct, frame_delta } => {
+                gather_tensions(block, sources);
+                gather_roots(block, sources, frame_delta.unwrap_or_default());
+                direct::weigh(params.level, block, params.bending_length, params.dt);
+                direct::step(params.level, block, direct, &near);
+            }
+            Method::Sweeps(sweeps, settings) => {
+                gather_spins(block, sources);
+                step::weigh(params.level, block, Some((settings, params.bending_length)));
+                step::step(params.level, block, sweeps, &near);
+            }
+        }
+    }
+}
+
+fn step_rods(
+    substeps: EffectiveSubsteps,
+    model: Settings<StrandModel>,
+    (solver, sweeps): (Settings<HairSolver>, Settings<Sweeps>),
+    gravity: Res<HairGravity>,
+    stiffness: Settings<HairStiffness>,
+    influence: Settings<BondInfluence>,
+    contact: Settings<StrandContact>,
+    hairs: Query<(Option<&Obstacles>, &TickPose), With<Hair>>,
+    mut strands: Query<
+        (
+            (Entity, &StrandOf, &StrandSleep),
+            &mut Strand,
+            &RestShape,
+            &Bonds,
+            &AddedMass,
+            Option<&HeldNodes>,
+        ),
+        (Without<KinematicStrand>, Without<OnGpu>),
+    >,
+    mut faults: MessageWriter<HairFault>,
+) {
+    if !substeps.any() {
+        return;
+    }
+    let level = Level::new();
+    let gravity = gravity.clamped().0;
+    let params_of = |hair: Entity| {
+        let (obstacles, pose) =
+            hairs.get(hair).ok().filter(|_| model.of(hair) == StrandModel::Rod)?;
+        let substep = substeps.of(hair)?;
+        let (dt, clearance, stiffness) = (substep.dt, contact.of(hair).radius, stiffness.of(hair));
+        let solver = solver.of(hair);
+        let method = match solver.method {
+            SolverMethod::Direct => Method::Direct {
+                params: DirectParams {
+                    dt,
+                    gravity: pose.now().direction_in(gravity),
+                    damping: stiffness.damping,
+                    limiter_steps: solver.limiter_steps,
+                    clearance,
+                },
+                frame_delta: pose.frame_delta(),
+            },
+            SolverMethod::Sweeps => {
+                let sweeps = sweeps.of(hair);
+                let params = SweepParams {
+                    dt,
+                    iterations: substep.iterations(sweeps.iterations),
+                    projection: sweeps.projection,
+                    limiter_steps: sweeps.limiter_steps,
+                    internal_damping: sweeps.internal_damping,
+                    clearance,
+                };
+                Method::Sweeps(params, sweeps)
+            }
+        };
+        Some(HairParams {
+            level,
+            method,
+            dt,
+            clearance,
+            bending_length: stiffness.bending_length,
+            influence: influence.of(hair).as_array(),
+            obstacles: obstacles.map_or_else(Vec::new, |all| all.solids.clone()),
+        })
+    };
+    let nodes = strands.iter().next().map_or(0, |(_, strand, ..)| strand.nodes());
+    let lost = for_each_batch(
+        tables(&mut strands),
+        nodes,
+        params_of,
+        |((entity, of, sleep), strand, rest, bonds, added, held)| {
+            let is_stepped = sleep.is_simulated()
+                && strand.nodes() >= 2
+                && rest.darboux.len() == strand.edges()
+                && rest.stiffness.len() == strand.edges();
+            let (entity, hair) = (*entity, of.0);
+            is_stepped.then_some(RodStrand { entity, hair, strand, rest, bonds, added, held })
+        },
+    );
+    faults.write_batch(lost);
+}
+
+/// Orientations, rest shapes and stiffness.
+fn gather_frames(block: &mut BlockLanes, from: &[Source<'_>; LANES], items: &[RodStrand<'_>]) {
+    let rest = in_lanes(items, |item| item.rest);
+    let edges = &mut block.edges;
+    for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
+        let orientations = four.map(|source| source.strand.orientations());
+        put_quaternions(edges, group, orientations, |e| &mut e.q);
+    }
+    for (group, four) in rest.as_chunks::<4>().0.iter().enumerate() {
+        put_quaternions(edges, group, four.map(|rest| &rest.darboux[..]), |e| &mut e.rest);
+        put_numbers(edges, group, four.map(|rest| &rest.stiffness[..]), |e| &mut e.k);
+    }
+    for (lane, source) in from.iter().enumerate() {
+        put4(&mut block.root, lane, source.strand.root_frame());
+    }
+}
+
+fn gather_tensions(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
+    for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
+        let tensions = four.map(|source| source.strand.tensions());
+        put_numbers(&mut block.edges, group, tensions, |e| &mut e.tension);
+    }
+}
+
+/// Start positions and frames of the roots.
+fn gather_roots(block: &mut BlockLanes, from: &[Source<'_>; LANES], frame_delta: Isometry3d) {
+    for (lane, source) in from.iter().enumerate() {
+        let (place, frame) = source.strand.root_before();
+        put3(&mut block.nodes[0].from, lane, frame_delta * place);
+        put4(&mut block.root_from, lane, frame_delta.rotation * frame);
+    }
+}
+
+fn gather_spins(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
+    for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
+        let spins = four.map(|source| source.strand.angular_velocities());
+        put_vectors(&mut block.edges, group, spins, |e| &mut e.omega);
+    }
+}

@@ -1,0 +1,149 @@
+//! Mass-spring strands in the tick.
+
+use super::{
+    batch::for_each_batch,
+    batched::{Batched, Source},
+};
+use crate::{
+    base::{
+        fault::HairFault,
+        parallel::tables,
+        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick},
+        setting::{self, Ranged, Settings},
+    },
+    forces::{
+        contact::{Obstacles, StrandContact},
+        environment::HairGravity,
+    },
+    hair::strand::{
+        AddedMass, HeldNodes, KinematicStrand, OnGpu, Strand, StrandModel, StrandOf, StrandSleep,
+        TickPose,
+    },
+    math::lanes::{LANES, put_quaternions},
+    solver::{
+        mass_spring::{
+            Springs,
+            block::{SpringLanes, SpringParams, step},
+        },
+        rod::{block::BlockLanes, obstacle::Obstacle, step::weigh},
+    },
+};
+use bevy::prelude::*;
+use fearless_simd::Level;
+
+/// Mass-spring strands.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SpringPlugin;
+
+impl Plugin for SpringPlugin {
+    fn build(&self, app: &mut App) {
+        setting::plugin::<Springs>(app);
+        app.add_systems(HairTick, step_springs.in_set(HairSystems::Springs))
+            .add_systems(SettleTick, step_springs.in_set(HairSystems::Springs));
+    }
+}
+
+/// Parameters of a hair's strands in a substep.
+struct HairParams {
+    level: Level,
+    step: SpringParams,
+    obstacles: Vec<Obstacle>,
+}
+
+struct SpringStrand<'a> {
+    entity: Entity,
+    hair: Entity,
+    strand: &'a mut Strand,
+    added: &'a AddedMass,
+    held: Option<&'a HeldNodes>,
+}
+
+impl Batched for SpringStrand<'_> {
+    type Params = HairParams;
+    type Lanes = SpringLanes;
+
+    fn entity(&self) -> Entity {
+        self.entity
+    }
+
+    fn hair(&self) -> Entity {
+        self.hair
+    }
+
+    fn source(&self) -> Source<'_> {
+        Source { strand: self.strand, added: self.added, held: self.held }
+    }
+
+    fn strand_mut(&mut self) -> &mut Strand {
+        self.strand
+    }
+
+    fn dt(params: &HairParams) -> f32 {
+        params.step.dt
+    }
+
+    fn block(lanes: &mut SpringLanes) -> &mut BlockLanes {
+        &mut lanes.strands
+    }
+
+    fn step(
+        lanes: &mut SpringLanes,
+        sources: &[Source<'_>; LANES],
+        _: &[Self],
+        HairParams { level, step: params, obstacles }: &HairParams,
+    ) {
+        let strands = &mut lanes.strands;
+        for (group, four) in sources.as_chunks::<4>().0.iter().enumerate() {
+            let orientations = four.map(|source| source.strand.orientations());
+            put_quaternions(&mut strands.edges, group, orientations, |e| &mut e.q);
+        }
+        weigh(*level, strands, None);
+        let near = strands.near(obstacles, params.dt, params.clearance);
+        step(*level, lanes, params, &near);
+    }
+}
+
+fn step_springs(
+    substeps: EffectiveSubsteps,
+    model: Settings<StrandModel>,
+    springs: Settings<Springs>,
+    contact: Settings<StrandContact>,
+    gravity: Res<HairGravity>,
+    hairs: Query<(Option<&Obstacles>, &TickPose)>,
+    mut strands: Query<
+        (Entity, &StrandOf, &StrandSleep, &mut Strand, &AddedMass, Option<&HeldNodes>),
+        (Without<KinematicStrand>, Without<OnGpu>),
+    >,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let gravity = gravity.clamped().0;
+    let level = Level::new();
+    let params_of = |hair: Entity| {
+        let (obstacles, pose) = hairs.get(hair).ok()?;
+        let substep = substeps.of(hair)?;
+        (model.of(hair) == StrandModel::MassSpring).then(|| {
+            let full = springs.of(hair);
+            let iterations = substep.iterations(full.iterations);
+            let step = SpringParams {
+                dt: substep.dt,
+                springs: Springs { iterations, ..full },
+                gravity: pose.now().direction_in(gravity),
+                clearance: contact.of(hair).radius,
+            };
+            let obstacles = obstacles.map_or_else(Vec::new, |all| all.solids.clone());
+            HairParams { level, step, obstacles }
+        })
+    };
+    let nodes = strands.iter().next().map_or(0, |(_, _, _, strand, ..)| strand.nodes());
+    let lost = for_each_batch(
+        tables(&mut strands),
+        nodes,
+        params_of,
+        |(entity, of, sleep, strand, added, held)| {
+            let is_stepped = sleep.is_simulated() && strand.nodes() >= 2;
+            let (entity, hair) = (*entity, of.0);
+            is_stepped.then_some(SpringStrand { entity, hair, strand, added, held })
+        },
+    );
+    faults.write_batch(lost);
+}

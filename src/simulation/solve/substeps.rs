@@ -1,0 +1,70 @@
+//! How many of the tick's substeps each hair takes as one.
+
+use crate::{
+    base::{
+        schedule::{HairStep, HairSystems, HairTick, MergedSubsteps, first_substep},
+        setting::Settings,
+    },
+    hair::strand::{Hair, StrandModel},
+    solver::rod::{HairSolver, SolverMethod},
+    water::IsWet,
+};
+use bevy::prelude::*;
+
+pub(super) fn plugin(app: &mut App) {
+    app.add_systems(
+        HairTick,
+        choose_substeps.in_set(HairSystems::SubstepLength).run_if(first_substep),
+    );
+}
+
+/// Directly solved rods without water take longer substeps.
+fn choose_substeps(
+    step: Res<HairStep>,
+    solver: Settings<HairSolver>,
+    model: Settings<StrandModel>,
+    mut hairs: Query<(Entity, Option<&IsWet>, &mut MergedSubsteps), With<Hair>>,
+) {
+    for (hair, wet, mut merged) in &mut hairs {
+        let solver = solver.of(hair);
+        let takes_longer = solver.method == SolverMethod::Direct
+            && model.of(hair) == StrandModel::Rod
+            && wet.is_none_or(|wet| !wet.0);
+        merged.set_if_neq(if takes_longer {
+            MergedSubsteps::within(solver.substep, &step)
+        } else {
+            MergedSubsteps::default()
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::setting::HairDefault;
+    use bevy::ecs::system::RunSystemOnce;
+
+    #[test]
+    fn only_dry_rods_of_the_direct_solver_take_longer_substeps() {
+        let mut world = World::new();
+        world.insert_resource(HairStep { dt: 1.0 / 360.0, index: 0, count: 6 });
+        world.init_resource::<HairDefault<HairSolver>>();
+        world.init_resource::<HairDefault<StrandModel>>();
+        let sweeps = HairSolver { method: SolverMethod::Sweeps, ..default() };
+        let fine = HairSolver { substep: 1.0 / 360.0, ..default() };
+        let hairs = [
+            (world.spawn(IsWet(false)).id(), 2),
+            (world.spawn(IsWet(true)).id(), 1),
+            (world.spawn(sweeps).id(), 1),
+            (world.spawn(StrandModel::MassSpring).id(), 1),
+            (world.spawn(fine).id(), 1),
+        ];
+        for (hair, _) in hairs {
+            world.entity_mut(hair).insert((Hair, MergedSubsteps(5)));
+        }
+        world.run_system_once(choose_substeps).unwrap();
+        for (hair, merged) in hairs {
+            assert_eq!(world.get(hair), Some(&MergedSubsteps(merged)));
+        }
+    }
+}

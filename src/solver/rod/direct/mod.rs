@@ -1,0 +1,489 @@
+//! The direct solver: one direct implicit step of a whole strand per substep.
+//!
+//! Projections joint by joint express stiffness through the inverse inertia of orientations, so stiff
+//! hair gets an unphysical rotary inertia, and the iterations needed grow like the square of the number
+//! of segments. Here nodes are the only unknowns: orientations follow the edges (their tangents are
+//! always the edges' directions, by parallel transport), and twist is in equilibrium at every step.
+//! What remains is a block-pentadiagonal system of 3×3 blocks (each node is coupled with two before
+//! and two behind), which a Cholesky factorisation solves in one pass down the strand and one up.
+//!
+//! | file | what |
+//! |---|---|
+//! | `kernel` | a Newton step: assembly and elimination in one pass, solution, frames, twist |
+//! | `matrix` | the blocks |
+//! | `frames` | edges' frames: parallel transport, moments, rotation vectors |
+//! | `width` | the same lines for lanes and for one strand of f64 |
+//!
+//! One substep of length h:
+//! 1. Strands deep inside an obstacle are moved out of it. Predict: nodes move to x + θh v and out
+//!    of obstacles.
+//! 2. One Newton step for the positions at θh: inertia, stretching, bending, the change of the
+//!    twisting moment as edges rotate, support by obstacles. Strands that touch or are about to
+//!    rotate by more than 0.03 rad take a second.
+//! 3. Extrapolate to the end of the substep, x + (x_θ − x)/θ. θ = ½ would damp nothing, stiff modes
+//!    included; θ = 1, implicit Euler, would damp all swings like a Kelvin–Voigt time of h. θ =
+//!    0.65 damps like 0.3 h, which is subtracted from the material's damping, and stiff motion
+//!    decays to 7/13 in each substep. Strands that touch take θ = 1.
+//! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 %, damped so that
+//!    compressed strands fold no farther than necessary and taut ones do not zigzag.
+//! 5. Frames are transported to the new directions; velocities; twist by a tridiagonal solve.
+//!
+//! # Why not BDF2
+//! Tried in a prototype (20 cm, L_g 13 cm, drag 0, no damping, 16 and 64 segments alike). Share of
+//! the energy of a swing of 0.4 s left after 1 s at 6; 3; 2 substeps of a tick at 60 Hz: θ = 0.65
+//! 80; 66; 54 %, BDF2 99.8; 99.2; 97.8 %, implicit Euler 51; 26; 14 %. But for a strand released
+//! from level BDF2 adds 0.14; 1.3 % of the swing's energy at 6; 3 substeps where the other two add
+//! none, and it needs the last positions and velocities, 6 numbers a node besides the 10 that a
+//! substep writes, which have to be reset at teleports, contacts and changes of the substep. With
+//! the default damping all three decay like the hair does, so θ = 0.65 is kept.
+//!
+//! # Against theory and the sweeps
+//! Drag 0; strand 20 cm, L_g 13 cm unless noted; theory is the elastica, and the vibration of a
+//! beam under its own weight, hanging or about the elastica. The direct solver at the papers' 1/360
+//! s and at the default 1/180 s (`tests/swing` prints these numbers), sweeps with their defaults at
+//! 1/360 s.
+//!
+//! | | segments | theory | direct, 1/360 s | direct, 1/180 s | sweeps |
+//! |---|---|---|---|---|---|
+//! | settled sag / length, root level | 8, 16, 32, 64 | 0.3963 | 0.4019, 0.3977, 0.3966, 0.3964 | the same | not run |
+//! | the same, L_g 6 cm | 8, 16, 32, 64 | 0.8894 | 0.9037, 0.8932, 0.8905, 0.8898 | 0.9037, 0.8932, 0.8904, 0.8897 | not run |
+//! | the same, L_g 30 cm | 8, 16, 32, 64 | 0.0370 | 0.0376, 0.0371, 0.0370, 0.0370 | the same | not run |
+//! | the same, 5 cm, L_g 13 cm | 8, 16, 32, 64 | 0.0071 | 0.0072, 0.0071, 0.0071, 0.0071 | the same | 0.014, 0.041, 0.149, 0.47 |
+//! | period hanging (s) | 8, 16, 32, 64 | 0.403 | 0.408, 0.404, 0.403, 0.403 | 0.408, 0.405, 0.404, 0.403 | 0.61, 1.00, 1.86, not run |
+//! | period level (s) | 8, 16, 32, 64 | 0.442 | 0.447, 0.443, 0.442, 0.442 | 0.448, 0.444, 0.443, 0.442 | not run |
+//! | released from level, 24 cm, time to the lowest point (s) | 8, 16, 32, 64 | 0.285 at 128 | 0.295, 0.288, 0.286, 0.286 | 0.294, 0.288, 0.286, 0.286 | 0.37, 0.58, 1.07, 1.35 (20 cm) |
+//! | height of a hanging curl (cm; 24 cm of hair, radius 1, pitch 2, L_g 6) | 18, 24, 36, 48, 64, 96 | 8.55 | 8.41, 8.47, 8.52, 8.53, 8.54, 8.55 | the same | not run |
+//! | buckling by twist, M L / EI | 32 | 8.99 | 9.37 | 9.14 | not run |
+//!
+//! Periods below 40 substeps are too long, by 10 % at 11 substeps; faster modes are only damped.
+//! L_g is limited to six times the strand's length, and segments much shorter than 1 mm are softened:
+//! f32 is not precise enough for more. A strand with more twist than it can hold has an indefinite Hessian:
+//! there a joint's moment counts up to EI times 8.99/L or (3 μ / (EI h²))^¼, whichever is more; the force
+//! is whole.
+//!
+//! # For a compute port
+//! Strands are independent, so one GPU thread may take one strand. Floats per segment (a node and
+//! the edge before it):
+//!
+//! | pass | reads | writes | scratch | multiply–adds, divisions and roots |
+//! |---|---|---|---|---|
+//! | down: assemble and eliminate | p, from, v, mass, w, what it rests on (14); q, rest, l, k, axial, tension (12) | q (4) | 24 written | about 420, 6 |
+//! | up: solve | p, from, w (7); q, l, axial (6) | p (3), tension (1) | 24 read | about 60, 0 |
+//! | finish: frames, velocities, twist | p, from, v, w (10); q, rest, l, k (10) | v (3), q (4) | 2 written | about 130, 5 |
+//! | untwist | q (4) | q (4) | 2 read | about 15, 1 |
+//! | limiter, each Newton step | p, w (4), what it rests on (3), l (1) | p (3) | 5 written, 5 read | about 45, 4 |
+//!
+//! The operations of a Newton step are counted from the formulas, not measured. Of a strand's
+//! state, p, v, q and tension (11) are read and written once a substep; rest, k, l and the water's
+//! mass (7) are read.
+//!
+//! After Deul, Kugelstadt, Weiler, Bender, *Direct Position-Based Solver for Stiff Rods* (2018) for the
+//! direct solve, Baraff & Witkin (1998) for the implicit step, Bergou et al. (2008) for frames and
+//! quasi-static twist.
+
+mod frames;
+mod kernel;
+mod matrix;
+pub(super) mod row;
+#[cfg(test)]
+mod tests;
+mod width;
+
+use super::{
+    block::{BlockLanes, pulled},
+    limiter::{TOLERANCE, clamp_lengths, limit_strained},
+    near::choose_near,
+    obstacle::Obstacle,
+    stiffness::REFERENCE_GRAVITY,
+    touch::{FrictionShare, RootPenetration, contacts, contacts_with, predict_nodes},
+};
+use crate::math::lanes::{
+    LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,
+};
+use fearless_simd::{Level, Simd, f32x16, prelude::*};
+use glam::Vec3;
+use kernel::{HOLD, NewtonStage};
+use width::{Half, Whole, Width};
+
+/// Parameters of a substep.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct DirectParams {
+    /// Substep (s).
+    pub dt: f32,
+    /// Gravity, in the frame of the positions (m/s²). Velocities already contain it for this substep.
+    pub gravity: Vec3,
+    /// Kelvin–Voigt time of the material (s).
+    pub damping: f32,
+    /// Newton steps of the length limiter, at most.
+    pub limiter_steps: u32,
+    /// Distance that nodes keep from obstacles (m).
+    pub clearance: f32,
+}
+
+/// θ: where in the substep forces are evaluated; see the [module](self).
+const THETA: f32 = 0.65;
+
+/// Rotation of an edge in a substep (rad) above which a strand takes two Newton steps.
+const FAST_TURN: f32 = 0.03;
+
+/// Strain at the root of a straight hanging strand, which sets the stretching stiffness. Stiffer
+/// exceeds the precision of f32; softer leaves more to the length limiter, which bends hair.
+const STRAIN: f32 = 1e-4;
+
+/// Strain beyond which Newton steps on the lengths have failed.
+const TORN: f32 = 0.01;
+
+/// The maximum number of repetitions of restoring the lengths of torn strands and the push-out that
+/// follows.
+const MAX_REPAIRS: u32 = 4;
+
+/// Depth in an obstacle, in edge lengths, above which a strand is moved out of it before the step.
+const DEEP_SHARE: f32 = 0.25;
+
+/// Largest L_g, in lengths of the strand. Such hair sags by less than a thousandth of its length; f32
+/// is not precise enough for much stiffer hair.
+const MAX_BENDING_LENGTH: f32 = 6.0;
+
+/// Largest twist that counts in the Hessian, as a moment over EI times the strand's length: with its ends clamped
+/// it buckles here.
+const BUCKLING_TWIST: f32 = 8.99;
+
+/// Largest ratio of a node's elastic stiffness to its inertia in a substep, for a strand of one segment;
+/// 1/n² of that for n segments. f32 is not precise enough for more. Only segments much shorter than 1 mm
+/// reach it.
+const MAX_STIFFNESS: f32 = 2.5e10;
+
+/// Steps the block by one substep, with the machine's best instruction set.
+#[doc(hidden)]
+pub fn step(level: Level, block: &mut BlockLanes, params: &DirectParams, obstacles: &[Obstacle]) {
+    dispatch!(level, simd => step_simd(simd, block, params, obstacles));
+}
+
+#[inline(always)]
+fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstacles: &[Obstacle]) {
+    let theta = predict(simd, b, params, obstacles);
+    let one = f32x16::splat(simd, 1.0);
+    theta.store_array(&mut b.theta);
+    let turns_fast = turns_fast(simd, b, params.dt);
+    Real::max(load(simd, &b.touched), turns_fast).store_array(&mut b.twice);
+    let (from, to) = (load4(simd, &b.root_from), load4(simd, &b.root));
+    let backwards = Real::lt(from.dot(to), f32x16::splat(simd, 0.0));
+    let share = Real::select(backwards, -theta, theta);
+    let between = Quaternion::new(from.v.scale(one - theta), from.w * (one - theta));
+    store4(&mut b.root_between, between.add_scaled(to, share).normalize());
+    if b.twice == [0.0; LANES] {
+        newton::<S, false>(simd, b, params, 1);
+    } else {
+        newton::<S, true>(simd, b, params, 2);
+        // The first step shows which nodes rest on an obstacle.
+        let twice = load(simd, &b.twice);
+        contacts_with(simd, b, params.clearance, obstacles, FrictionShare::NONE, twice);
+        newton::<S, true>(simd, b, params, 1);
+    }
+    // The solve leaves only this fraction of the depth at supported nodes, which friction makes up
+    // for.
+    let grip = FrictionShare { resting: 1.0 + HOLD as f32, others: 1.0 };
+    let all = f32x16::splat(simd, 1.0);
+    contacts_with(simd, b, params.clearance, obstacles, grip, all);
+    for pass in 0..params.limiter_steps {
+        if !limit_strained(simd, b, if pass == 0 { -1.0 } else { TOLERANCE }, all) {
+            break;
+        }
+        contacts(simd, b, params.clearance, obstacles);
+        if pass + 1 == params.limiter_steps {
+            // Restored lengths may end in an obstacle, and the push-out may tear them again.
+            for _ in 0..MAX_REPAIRS {
+                if !clamp_lengths(simd, b, TORN) {
+                    break;
+                }
+                contacts(simd, b, params.clearance, obstacles);
+            }
+        }
+    }
+    finish(simd, b, params);
+}
+
+/// The kernel's widths: all lanes at once where registers hold sixteen, else two halves, because
+/// wider values would spill.
+macro_rules! in_lanes {
+    ($simd:expr, $w:ident => $work:expr) => {
+        if <S::f32s as SimdBase<S>>::LEN >= LANES {
+            let $w = Whole($simd);
+            $work;
+        } else {
+            for index in 0..2 {
+                let $w = Half { simd: $simd, index };
+                $work;
+            }
+        }
+    };
+}
+
+/// One Newton step; `left` counts this one and those that follow.
+#[inline(never)]
+fn newton<S: Simd, const TWICE: bool>(
+    simd: S,
+    b: &mut BlockLanes,
+    params: &DirectParams,
+    left: u32,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            in_lanes!(simd, w => {
+                let mut stage = stage(w, b, params);
+                if TWICE && left == 1 {
+                    (stage.again, stage.second) = (stage.twice, true);
+                }
+                if TWICE && left == 2 {
+                    let is_first_of_two = w.lit(0.0).lt(stage.twice);
+                    stage.beyond = <_ as Real>::select(is_first_of_two, w.lit(1.0), stage.beyond);
+                }
+                let BlockLanes { nodes, edges, rows, gravity, root_between, .. } = &mut *b;
+                kernel::down::<_, TWICE>(w, nodes, edges, rows, gravity, root_between, &stage);
+                kernel::up::<_, TWICE>(w, nodes, edges, rows, &stage);
+            });
+        },
+    );
+}
+
+/// Frames, velocities, twist.
+#[inline(never)]
+fn finish<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            in_lanes!(simd, w => {
+                let stage = stage(w, b, params);
+                let BlockLanes { nodes, edges, rows, root, finite, .. } = &mut *b;
+                let sum = kernel::finish(w, nodes, edges, rows, root, params.dt, &stage);
+                kernel::untwist(w, edges, rows);
+                w.put(sum, finite);
+            });
+        },
+    );
+}
+
+#[inline(always)]
+fn stage<W: Width<Cell = crate::math::lanes::Lane>>(
+    w: W,
+    b: &BlockLanes,
+    params: &DirectParams,
+) -> NewtonStage<W::Real> {
+    let (theta, dt) = (w.get(&b.theta), w.lit(params.dt.into()));
+    let own = (w.lit(2.0) * theta - w.lit(1.0)) * dt;
+    let (from, to) = (w.get4(&b.root_from), w.get4(&b.root_between));
+    let turn = to.product(from.conjugate());
+    let two = w.lit(2.0);
+    let two = <_ as Real>::select(turn.w.lt(w.lit(0.0)), -two, two);
+    NewtonStage {
+        theta,
+        ahead: theta * dt,
+        beyond: w.lit(1.0) / theta,
+        root_turn: turn.v.scale(two),
+        gravity: V3::new(
+            w.lit(params.gravity.x.into()),
+            w.lit(params.gravity.y.into()),
+            w.lit(params.gravity.z.into()),
+        ),
+        max_twist: w.get(&b.max_twist),
+        damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
+        second: false,
+        again: w.lit(1.0),
+        twice: w.get(&b.twice),
+    }
+}
+
+/// Moves nodes to the initial guess; those that would enter an obstacle are placed on its surface.
+/// Returns θ of each lane.
+#[inline(always)]
+fn predict<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    params: &DirectParams,
+    obstacles: &[Obstacle],
+) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let dt = f32x16::splat(simd, params.dt);
+    let gravity = splat3(simd, params.gravity);
+    let mut theta = f32x16::splat(simd, THETA);
+    // Velocities already contain gravity for the whole substep.
+    let gain = gravity.scale(dt);
+    for (i, n) in b.nodes.iter_mut().enumerate() {
+        let v = load3(simd, &n.v) - pulled(simd, &b.gravity, i, gain);
+        store3(&mut n.v, v);
+    }
+    choose_near(simd, b, params.dt, params.clearance, obstacles);
+    leave_obstacles(simd, b, params, obstacles);
+    fall(simd, b, dt * theta, gravity, params.clearance, obstacles);
+    if b.touched != [0.0; LANES] {
+        let touched = Real::lt(zero, load(simd, &b.touched));
+        theta = Real::select(touched, one, theta);
+        for n in &mut b.nodes {
+            let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+            let back = V3::select(held, load3(simd, &n.p), load3(simd, &n.from));
+            store3(&mut n.p, back);
+        }
+        fall(simd, b, dt * theta, gravity, params.clearance, obstacles);
+    }
+    let ahead = dt * theta;
+    let fallen = gravity.scale(ahead * ahead);
+    for n in &mut b.nodes {
+        let (held, p) = (Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12)), load3(simd, &n.p));
+        let support = load3(simd, &n.rests_on);
+        let rests = Real::lt(zero, support.dot(support));
+        // The initial guess excludes gravity, which would rotate settled hair in each step.
+        store3(&mut n.p, V3::select(held | rests, p, p - fallen));
+    }
+    theta
+}
+
+/// 1 in lanes where an edge is about to rotate by more than [`FAST_TURN`], else 0. One Newton step
+/// does not converge there, and fast-swinging tips would gain energy.
+#[inline(always)]
+fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let mut before = load3(simd, &b.nodes[0].v);
+    let mut fastest = zero;
+    for (n, e) in b.nodes[1..].iter().zip(&b.edges) {
+        let v = load3(simd, &n.v);
+        let (l, apart) = (load(simd, &e.l), v - before);
+        fastest = Real::max(fastest, apart.dot(apart) / (l * l));
+        before = v;
+    }
+    let limit = f32x16::splat(simd, (FAST_TURN / dt) * (FAST_TURN / dt));
+    Real::select(Real::lt(limit, fastest), one, zero)
+}
+
+/// Moves strands that begin deep inside an obstacle, as when spawned there, out of it before the step and
+/// restores their lengths, so that they gain no velocity. Shallow penetration, as from contact with
+/// other hair, is left to the step.
+#[inline(never)]
+fn leave_obstacles<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    params: &DirectParams,
+    obstacles: &[Obstacle],
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut deepest = f32x16::splat(simd, f32::NEG_INFINITY);
+            let mut sinking = RootPenetration::new(simd, b);
+            for (i, (n, near)) in b.nodes.iter().zip(&b.near_obstacles).enumerate() {
+                let sunk = sinking.at(&b.edges, i);
+                for o in near.of(obstacles) {
+                    let start = o.moved_with(load3(simd, &n.p));
+                    // Most nodes are outside of most.
+                    if o.solid.is_clear(start, params.clearance) {
+                        continue;
+                    }
+                    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+                    let (_, mut depth) = o.solid.depth(start, params.clearance);
+                    if let Some(sunk) = &sunk {
+                        depth -= sunk.allowed(o, params.clearance);
+                    }
+                    deepest = Real::select(held, deepest, Real::max(deepest, depth));
+                }
+            }
+            let deep =
+                Real::lt(load(simd, &b.edges[0].l) * f32x16::splat(simd, DEEP_SHARE), deepest);
+            if deep.to_bitmask() == 0 {
+                return;
+            }
+            let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+            b.has_fast_nodes = false;
+            // Infinitely deep: no way out.
+            b.consider_all_obstacles();
+            for n in &mut b.nodes {
+                n.rests_on = Default::default();
+            }
+            // A correction travels about one edge per round.
+            for _ in 0..2 * b.edges.len() {
+                contacts_with(simd, b, params.clearance, obstacles, FrictionShare::NONE, deep);
+                if !limit_strained(simd, b, TORN, deep) {
+                    return;
+                }
+            }
+        },
+    );
+}
+
+/// Moves nodes ballistically for `ahead` (s), stopped by obstacles.
+#[inline(never)]
+fn fall<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    ahead: f32x16<S>,
+    gravity: V3<f32x16<S>>,
+    clearance: f32,
+    obstacles: &[Obstacle],
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            predict_nodes(simd, b, ahead, gravity.scale(ahead), clearance, obstacles);
+            contacts_with(
+                simd,
+                b,
+                clearance,
+                obstacles,
+                FrictionShare::NONE,
+                f32x16::splat(simd, 1.0),
+            );
+        },
+    );
+}
+
+/// Converts gathered values to masses and stiffnesses: a node's `w` is its mass in dry nodes, a joint's
+/// `k` the share of the stiffness of hair with this gravity-bending length (m), limited by what a
+/// substep of `dt` (s) can resolve.
+#[doc(hidden)]
+pub fn weigh(level: Level, block: &mut BlockLanes, bending_length: f32, dt: f32) {
+    dispatch!(level, simd => weigh_simd(simd, block, bending_length, dt));
+}
+
+#[inline(always)]
+fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32) {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let half = f32x16::splat(simd, 0.5);
+    let mut sum = zero;
+    for e in &b.edges {
+        sum += load(simd, &e.l);
+    }
+    let edges = b.edges.len() as f32;
+    // Stiffness per mass, for a whole node's mass of 1.
+    let density = f32x16::splat(simd, edges) / sum;
+    let stiff = Real::min(
+        f32x16::splat(simd, bending_length),
+        sum * f32x16::splat(simd, MAX_BENDING_LENGTH),
+    );
+    let bending = density * f32x16::splat(simd, 2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
+    let axial = f32x16::splat(simd, REFERENCE_GRAVITY * edges / STRAIN);
+    let stiffest = f32x16::splat(simd, MAX_STIFFNESS / (edges * edges * dt * dt));
+    // In a substep inertia alone resists all waves up to about this twist, (3 μ / (EI h²))^¼.
+    let edge = one / density;
+    let rigidity = Real::min(bending * half, stiffest * edge * edge * edge);
+    let inertia = density * f32x16::splat(simd, 3.0 / (dt * dt));
+    let rigidity = Real::max(rigidity, f32x16::splat(simd, 1e-30));
+    let resisted = Real::sqrt(Real::sqrt(inertia / rigidity));
+    Real::max(f32x16::splat(simd, BUCKLING_TWIST) / sum, resisted).store_array(&mut b.max_twist);
+    let mut before = zero;
+    for (i, n) in b.nodes.iter_mut().enumerate() {
+        let mut after = zero;
+        if let Some(e) = b.edges.get_mut(i) {
+            after = load(simd, &e.l);
+            let joint = load(simd, &e.k) * bending / (before + after);
+            Real::min(joint, stiffest * after * after).store_array(&mut e.k);
+            Real::min(axial / after, stiffest).store_array(&mut e.axial);
+        }
+        // Half a cell on either side, so the tip carries half a mass.
+        let dry_nodes = load(simd, &n.w);
+        let held = Real::lt(dry_nodes, f32x16::splat(simd, 1e-12));
+        let mass = (before + after) * dry_nodes * density * half;
+        mass.store_array(&mut n.mass);
+        Real::select(held, zero, one / mass).store_array(&mut n.w);
+        before = after;
+    }
+}

@@ -1,0 +1,379 @@
+use super::{kernel, kernel::NewtonStage, row::DirectRow, width::Single, *};
+use crate::{
+    math::lanes::{Lane, put3, put4, take3, take4},
+    solver::rod::{
+        block::{EdgeLanes, NodeLanes},
+        frame::parallel_transport,
+        obstacle::Solid,
+    },
+};
+use glam::{DQuat, DVec3, Quat};
+
+mod any_hair;
+mod closed_forms;
+mod golden;
+
+const DT: f32 = 1.0 / 360.0;
+
+fn params() -> DirectParams {
+    DirectParams {
+        dt: DT,
+        gravity: Vec3::NEG_Y * 9.8,
+        damping: 0.003,
+        limiter_steps: 6,
+        clearance: 0.0,
+    }
+}
+
+/// A strand of `edges` edges in each lane, as `place` says, at rest there.
+fn strands(edges: usize, place: impl Fn(usize, usize) -> Vec3) -> BlockLanes {
+    let mut block = BlockLanes::default();
+    block.resize(edges + 1);
+    for lane in 0..LANES {
+        let points: Vec<Vec3> = (0..=edges).map(|i| place(lane, i)).collect();
+        let frames = parallel_transport(&points, None);
+        for (node, point) in block.nodes.iter_mut().zip(&points) {
+            put3(&mut node.p, lane, *point);
+        }
+        for (i, (edge, frame)) in block.edges.iter_mut().zip(&frames).enumerate() {
+            put4(&mut edge.q, lane, *frame);
+            edge.l[lane] = points[i].distance(points[i + 1]);
+            let before = if i == 0 { frames[0] } else { frames[i - 1] };
+            put4(&mut edge.rest, lane, before.conjugate() * *frame);
+        }
+        put4(&mut block.root, lane, frames[0]);
+    }
+    block
+}
+
+/// One substep, including the preparation that the tick does.
+fn substep(block: &mut BlockLanes, bending_length: f32, obstacles: &[Obstacle]) {
+    prepare(block, bending_length);
+    step(Level::new(), block, &params(), obstacles);
+}
+
+fn prepare(block: &mut BlockLanes, bending_length: f32) {
+    let params = params();
+    for (i, node) in block.nodes.iter_mut().enumerate() {
+        node.w = [if i == 0 { 0.0 } else { 1.0 }; LANES];
+        node.v[1] = node.v[1].map(|v| v + params.gravity.y * params.dt);
+    }
+    block.nodes[0].from = block.nodes[0].p;
+    block.root_from = block.root;
+    block.edges.iter_mut().for_each(|edge| edge.k = [1.0; LANES]);
+    weigh(Level::new(), block, bending_length, DT);
+}
+
+fn wavy(lane: usize, i: usize) -> Vec3 {
+    let (s, phase) = (i as f32 * 0.012, lane as f32 * 0.4);
+    Vec3::new(s, 0.01 * (60.0 * s + phase).sin(), 0.01 * (60.0 * s + 2.0 * phase).cos())
+}
+
+fn bits(block: &BlockLanes, lane: usize) -> Vec<[u32; 3]> {
+    block.nodes.iter().map(|n| take3(&n.p, lane).to_array().map(f32::to_bits)).collect()
+}
+
+#[test]
+fn small_sag_is_that_of_a_beam() {
+    for edges in [8, 32] {
+        let mut block = strands(edges, |_, i| Vec3::X * (0.1 * i as f32 / edges as f32));
+        for _ in 0..1500 {
+            substep(&mut block, 0.3, &[]);
+            block.nodes.iter_mut().for_each(|n| n.v = n.v.map(|v| v.map(|v| 0.97 * v)));
+        }
+        // δ = L⁴ / (8 L_g³)
+        let theory = 0.1_f32.powi(4) / (8.0 * 0.3_f32.powi(3));
+        let sag = -take3(&block.nodes[edges].p, 5).y;
+        assert!((sag / theory - 1.0).abs() < 0.02, "{edges}: {sag}, theory {theory}");
+    }
+}
+
+/// What the kernel is given: a block's strands, or one alone in f64.
+#[derive(Clone)]
+struct Strands<C> {
+    nodes: Vec<NodeLanes<C>>,
+    edges: Vec<EdgeLanes<C>>,
+    root: [C; 4],
+    root_from: [C; 4],
+    root_between: [C; 4],
+    theta: C,
+    max_twist: C,
+    twice: C,
+}
+
+#[derive(Clone, Copy)]
+struct Step {
+    dt: f32,
+    damping: f64,
+    gravity: [f64; 3],
+}
+
+impl<C: Copy + Default> Strands<C> {
+    /// A substep but for contacts and lengths: with `TWICE` as where something touches or whips.
+    /// Returns zero where all is finite.
+    fn solve<W: Width<Cell = C>, const TWICE: bool>(&mut self, w: W, step: &Step) -> W::Real {
+        let dt = f64::from(step.dt);
+        let theta = w.get(&self.theta);
+        let own = (theta + theta - w.lit(1.0)) * w.lit(dt);
+        let (from, to) = (w.get4(&self.root_from), w.get4(&self.root_between));
+        let turn = to.product(from.conjugate());
+        let minus = w.lit(-2.0);
+        let two = <_ as Real>::select(turn.w.lt(w.lit(0.0)), minus, w.lit(2.0));
+        let mut stage = NewtonStage {
+            theta,
+            ahead: theta * w.lit(dt),
+            beyond: w.lit(1.0) / theta,
+            root_turn: turn.v.scale(two),
+            gravity: V3::new(
+                w.lit(step.gravity[0]),
+                w.lit(step.gravity[1]),
+                w.lit(step.gravity[2]),
+            ),
+            max_twist: w.get(&self.max_twist),
+            damping: (w.lit(step.damping) - own).max(w.lit(0.0)),
+            second: false,
+            again: w.lit(1.0),
+            twice: w.get(&self.twice),
+        };
+        let finish = stage;
+        let mut rows = vec![DirectRow::default(); self.edges.len()];
+        let Self { nodes, edges, root, root_between, .. } = self;
+        if TWICE {
+            let on_the_way = w.lit(0.0).lt(stage.twice);
+            stage.beyond = <_ as Real>::select(on_the_way, w.lit(1.0), stage.beyond);
+        }
+        kernel::down::<_, TWICE>(w, nodes, edges, &mut rows, &[], root_between, &stage);
+        kernel::up::<_, TWICE>(w, nodes, edges, &rows, &stage);
+        if TWICE {
+            let again = stage.twice;
+            stage = NewtonStage { second: true, again, ..finish };
+            kernel::down::<_, TWICE>(w, nodes, edges, &mut rows, &[], root_between, &stage);
+            kernel::up::<_, TWICE>(w, nodes, edges, &rows, &stage);
+        }
+        let sum = kernel::finish(w, nodes, edges, &mut rows, root, step.dt, &finish);
+        kernel::untwist(w, edges, &rows);
+        sum
+    }
+}
+
+impl Strands<Lane> {
+    /// Of a block that has been weighed, its nodes where they are to start from; what the whole step
+    /// does before the first Newton step.
+    fn of(block: &BlockLanes, theta: f32, dt: f32) -> Self {
+        let BlockLanes { mut nodes, edges, root, root_from, max_twist, twice, .. } = block.clone();
+        let mut root_between = root;
+        for lane in 0..LANES {
+            let (from, to) = (take4(&root_from, lane), take4(&root, lane));
+            put4(&mut root_between, lane, from.lerp(to, theta));
+            for node in &mut nodes {
+                if node.w[lane] > 0.0 {
+                    let from = take3(&node.p, lane);
+                    put3(&mut node.from, lane, from);
+                    put3(&mut node.p, lane, from + theta * dt * take3(&node.v, lane));
+                }
+            }
+        }
+        let theta = [theta; LANES];
+        Self { nodes, edges, root, root_from, root_between, theta, max_twist, twice }
+    }
+
+    fn alone(&self, lane: usize) -> Strands<f64> {
+        let wide = |cell: &Lane| f64::from(cell[lane]);
+        let node = |n: &NodeLanes| NodeLanes {
+            p: n.p.each_ref().map(wide),
+            from: n.from.each_ref().map(wide),
+            v: n.v.each_ref().map(wide),
+            w: wide(&n.w),
+            mass: wide(&n.mass),
+            rests_on: n.rests_on.each_ref().map(wide),
+        };
+        let edge = |e: &EdgeLanes| EdgeLanes {
+            q: e.q.each_ref().map(wide),
+            rest: e.rest.each_ref().map(wide),
+            l: wide(&e.l),
+            k: wide(&e.k),
+            axial: wide(&e.axial),
+            tension: wide(&e.tension),
+            ..Default::default()
+        };
+        Strands {
+            nodes: self.nodes.iter().map(node).collect(),
+            edges: self.edges.iter().map(edge).collect(),
+            root: self.root.each_ref().map(wide),
+            root_from: self.root_from.each_ref().map(wide),
+            root_between: self.root_between.each_ref().map(wide),
+            theta: wide(&self.theta),
+            max_twist: wide(&self.max_twist),
+            twice: wide(&self.twice),
+        }
+    }
+
+    /// Solves all lanes, at the width that the machine has or by halves.
+    fn solve_lanes(&mut self, twice: bool, halves: bool, step: &Step) -> Lane {
+        let mut finite = [0.0; LANES];
+        dispatch!(Level::new(), simd => {
+            if halves {
+                for index in 0..2 {
+                    let w = Half { simd, index };
+                    let sum = if twice {
+                        self.solve::<_, true>(w, step)
+                    } else {
+                        self.solve::<_, false>(w, step)
+                    };
+                    w.put(sum, &mut finite);
+                }
+            } else {
+                let w = Whole(simd);
+                let sum = if twice {
+                    self.solve::<_, true>(w, step)
+                } else {
+                    self.solve::<_, false>(w, step)
+                };
+                w.put(sum, &mut finite);
+            }
+        });
+        finite
+    }
+
+    fn bits(&self) -> Vec<Lane> {
+        let nodes = self.nodes.iter().flat_map(|n| n.p.into_iter().chain(n.v));
+        nodes.chain(self.edges.iter().flat_map(|e| e.q.into_iter().chain([e.tension]))).collect()
+    }
+}
+
+impl Strands<f64> {
+    /// The same strand, turned as a whole.
+    fn turned(&self, turn: DQuat) -> Self {
+        let vector = |v: [f64; 3]| (turn * DVec3::from_array(v)).to_array();
+        let frame = |q: [f64; 4]| (turn * DQuat::from_array(q)).to_array();
+        let mut turned = self.clone();
+        for n in &mut turned.nodes {
+            let NodeLanes { p, from, v, rests_on, .. } = n;
+            [p, from, v, rests_on].into_iter().for_each(|v3| *v3 = vector(*v3));
+        }
+        turned.edges.iter_mut().for_each(|e| e.q = frame(e.q));
+        let Self { root, root_from, root_between, .. } = &mut turned;
+        [root, root_from, root_between].into_iter().for_each(|q| *q = frame(*q));
+        turned
+    }
+
+    /// How far the nodes of two are apart at most (m), and their edges' frames (rad).
+    fn apart(&self, other: &Self) -> (f64, f64) {
+        let nodes = self.nodes.iter().zip(&other.nodes);
+        let nodes = nodes.map(|(a, b)| DVec3::from(a.p).distance(b.p.into()));
+        let edges = self.edges.iter().zip(&other.edges);
+        let edges = edges.map(|(a, b)| {
+            let [a, b] = [a.q, b.q].map(|q| DQuat::from_array(q).normalize());
+            a.angle_between(b)
+        });
+        (nodes.fold(0.0, f64::max), edges.fold(0.0, f64::max))
+    }
+
+    /// How far nodes have come at most (m).
+    fn moved(&self) -> f64 {
+        let ways = self.nodes.iter().map(|n| DVec3::from(n.p).distance(n.from.into()));
+        ways.fold(0.0, f64::max)
+    }
+}
+
+#[test]
+fn half_blocks_do_to_the_bit_what_whole_blocks_do() {
+    let start = strands(9, wavy);
+    let mut whole = start.clone();
+    substep(&mut whole, 0.1, &[]);
+    let mut halves = whole.clone();
+    dispatch!(Level::new(), simd => {
+        let w = Whole(simd);
+        let stage = stage(w, &whole, &params());
+        let BlockLanes { nodes, edges, rows, root, .. } = &mut whole;
+        kernel::down::<_, true>(w, nodes, edges, rows, &[], root, &stage);
+        kernel::up::<_, true>(w, nodes, edges, rows, &stage);
+        kernel::finish(w, nodes, edges, rows, root, DT, &stage);
+    });
+    dispatch!(Level::new(), simd => {
+        for index in 0..2 {
+            let w = Half { simd, index };
+            let stage = stage(w, &halves, &params());
+            let BlockLanes { nodes, edges, rows, root, .. } = &mut halves;
+            kernel::down::<_, true>(w, nodes, edges, rows, &[], root, &stage);
+            kernel::up::<_, true>(w, nodes, edges, rows, &stage);
+            kernel::finish(w, nodes, edges, rows, root, DT, &stage);
+        }
+    });
+    for lane in 0..LANES {
+        assert_ne!(bits(&whole, lane), bits(&start, lane));
+        assert_eq!(bits(&whole, lane), bits(&halves, lane), "lane {lane}");
+    }
+}
+
+#[test]
+fn a_strand_does_not_depend_on_the_other_lanes() {
+    let floor = Solid::HalfSpace { normal: Vec3::Y, point: Vec3::NEG_Y * 0.012 };
+    let floor = [Obstacle { solid: floor, motion: None, friction: 0.4 }];
+    let high = |lane: usize, i: usize| wavy(lane, i) + Vec3::Y * 0.01 * (lane % 3) as f32;
+    let mut mixed = strands(12, high);
+    for _ in 0..60 {
+        substep(&mut mixed, 0.1, &floor);
+    }
+    for lane in [0, 1, 2, 7] {
+        let mut alike = strands(12, |_, i| high(lane, i));
+        for _ in 0..60 {
+            substep(&mut alike, 0.1, &floor);
+        }
+        assert_eq!(bits(&mixed, lane), bits(&alike, 9), "lane {lane}");
+    }
+}
+
+/// Of more twist than a strand can hold the Hessian is indefinite; fine strands that touch something got
+/// infinite pivots from it.
+#[test]
+fn fine_strands_full_of_twist_stay_finite() {
+    let floor = Solid::HalfSpace { normal: Vec3::Y, point: Vec3::NEG_Y * 0.003 };
+    let floor = [Obstacle { solid: floor, motion: None, friction: 0.4 }];
+    for bent in [0.1, 1.5] {
+        let turn = |lane: usize, i: usize| {
+            let phase = (37 * lane + 11 * i) as f32;
+            let axis = Vec3::new(phase.sin(), (1.7 * phase).sin(), (2.3 * phase).sin());
+            Quat::from_scaled_axis(bent * axis)
+        };
+        let mut block = strands(119, |lane, i| {
+            let mut way = Vec3::X;
+            (0..i).fold(Vec3::ZERO, |place, k| {
+                way = turn(lane, k) * way;
+                place + way * 5e-4
+            })
+        });
+        for (i, edge) in block.edges.iter_mut().enumerate() {
+            (0..LANES).for_each(|lane| put4(&mut edge.rest, lane, turn(lane, i + 5)));
+        }
+        let mut fastest = 0.0_f32;
+        for _ in 0..40 {
+            substep(&mut block, 0.13, &floor);
+            assert_eq!(block.finite, [0.0; LANES], "bent by {bent}");
+            let speeds = block.nodes.iter().flat_map(|n| n.v).flatten().map(f32::abs);
+            fastest = speeds.fold(fastest, f32::max);
+        }
+        assert!(fastest < 30.0, "bent by {bent}: {fastest} m/s");
+    }
+}
+
+#[test]
+fn hair_on_the_floor_lies_still_and_holds_its_length() {
+    let floor = Solid::HalfSpace { normal: Vec3::Y, point: Vec3::NEG_Y * 0.15 };
+    let floor = [Obstacle { solid: floor, motion: None, friction: 0.5 }];
+    for edges in [16, 48] {
+        let mut block = strands(edges, |_, i| Vec3::X * (0.3 * i as f32 / edges as f32));
+        let mut peak = 0.0_f32;
+        for _ in 0..1080 {
+            substep(&mut block, 0.13, &floor);
+            block.nodes.iter_mut().for_each(|n| n.v = n.v.map(|v| v.map(|v| 0.99 * v)));
+            for (i, edge) in block.edges.iter().enumerate() {
+                let [a, b] = [i, i + 1].map(|i| take3(&block.nodes[i].p, 0));
+                peak = peak.max((a.distance(b) / edge.l[0] - 1.0).abs());
+                assert!(b.y > -0.15 - 1e-6, "{b}");
+            }
+        }
+        let fastest = block.nodes.iter().map(|n| take3(&n.v, 0).length()).fold(0.0, f32::max);
+        assert!(peak < 2e-3 && fastest < 2e-3, "{edges}: strain {peak}, speed {fastest}");
+    }
+}

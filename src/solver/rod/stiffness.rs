@@ -1,0 +1,210 @@
+//! Stiffness as a property of the hair, and the solver's weights that follow from it.
+//!
+//! The paper gives no weights, yet they decide everything under gravity. Small-deflection theory of
+//! the projection gives the gravity-bending length L_g = (EI/(μ g))^{1/3}, with μ mass per length:
+//! L_g³ = k l⁴ / (8 χ (1−k) Δt² g), χ = w_q l². Solved for χ at the paper's step and k_o it makes
+//! the look independent of segment count, and k/(1−k) ∝ Δt² makes it independent of substeps.
+
+use super::constraint::StretchProjection;
+use crate::{
+    base::setting::{InvalidValue, Ranged, ValueRange, setting},
+    math::lanes::Real,
+};
+use bevy::prelude::*;
+
+/// The paper's step Δt₀ (s), at which [`Sweeps::bend`] is what the paper calls k_o.
+pub const REFERENCE_DT: f32 = 1.0 / 360.0;
+
+/// The gravity (m/s²) in the definition of the gravity-bending length, as in the paper's table 1.
+pub const REFERENCE_GRAVITY: f32 = 9.8;
+
+setting! {
+    /// How strongly the hair resists bending. Component of a [`Hair`](crate::Hair); where absent,
+    /// [`HairDefault<HairStiffness>`](crate::HairDefault) holds.
+    ///
+    /// Strands much shorter than `bending_length` stand, much longer ones hang. Hair resists twist as much as
+    /// bending: G J = E I.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct HairStiffness {
+        /// Gravity-bending length L_g, in the Hair's own length unit. A real dry hair of 70 µm has
+        /// 0.045; the paper's look needs 0.12…0.2.
+        pub bending_length: f32 = 0.13, "m" in BENDING_LENGTH: 1e-3..=100.0, safe 0.02..=1.0,
+            "0.13 is soft hair, 0.045 a bare fibre";
+        /// Internal friction as a Kelvin–Voigt time c: the moment of a joint is K (κ + c dκ/dt), so a
+        /// swing of angular frequency ω decays by c ω/2 of critical, at any segment count and step.
+        /// The step itself damps like 0.3 of its length, which is subtracted: smaller values have
+        /// no further effect.
+        ///
+        /// We know of no measurement of it for locks. 0.01 dissipates as much in a swing of 2.5 Hz
+        /// as a loss tangent of 0.16 would, and lets touching locks come to rest.
+        pub damping: f32 = 0.01, "s" in DAMPING: 0.0..=10.0, safe 0.0..=0.02,
+            "0.01 swings for a second, 0.03 is syrup";
+    }
+}
+
+impl HairStiffness {
+    /// Stiffness from the gravity-bending length (m).
+    ///
+    /// # Errors
+    /// When it is outside [`BENDING_LENGTH`](Self::BENDING_LENGTH).
+    pub fn from_bending_length(metres: f32) -> Result<Self, InvalidValue> {
+        Self { bending_length: metres, ..default() }.checked()
+    }
+
+    /// Stiffness of a bare round fibre: Young's modulus (Pa), diameter (m), density (kg/m³).
+    /// EI/μ = E d²/(16 ρ). Dry hair: 3.9e9, 70e-6, 1310.
+    ///
+    /// # Errors
+    /// When a value is not positive, or the fibre's L_g is outside
+    /// [`BENDING_LENGTH`](Self::BENDING_LENGTH).
+    pub fn from_fibre(young: f32, diameter: f32, density: f32) -> Result<Self, InvalidValue> {
+        const YOUNG: ValueRange =
+            ValueRange::new("Young's modulus (Pa)", 1.0..=1e12, "dry hair has 3.9e9");
+        const DIAMETER: ValueRange =
+            ValueRange::new("fibre diameter (m)", 1e-7..=1e-2, "hair has 50e-6 to 100e-6");
+        const DENSITY: ValueRange =
+            ValueRange::new("fibre density (kg/m³)", 1.0..=1e5, "hair has 1310");
+        YOUNG.check(young)?;
+        DIAMETER.check(diameter)?;
+        DENSITY.check(density)?;
+        let ei_over_mu = young * diameter * diameter / (16.0 * density);
+        Self::from_bending_length(bevy::math::ops::cbrt(ei_over_mu / REFERENCE_GRAVITY))
+    }
+}
+
+/// Which method solves the rods.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Default, Clone, PartialEq)]
+pub enum SolverMethod {
+    /// One direct implicit step of a whole strand per substep ([`direct`](super::direct)): stiffness,
+    /// periods, decay and sag are the hair's own at any segment count and step.
+    #[default]
+    Direct,
+    /// The paper's Gauss–Seidel projections, as [`Sweeps`] say: to compare with \[B\]. Stiff or finely
+    /// divided hair swings too slowly and sags too far.
+    Sweeps,
+}
+
+setting! {
+    /// How the rods are solved. Component of a [`Hair`](crate::Hair); where absent,
+    /// [`HairDefault<HairSolver>`](crate::HairDefault) holds.
+    ///
+    /// Shorter substeps are more accurate: [`HairSubsteps`](crate::HairSubsteps) divides the tick
+    /// for all hair, water and contact included, and `substep` here merges some of them for hair
+    /// that needs fewer. The shape of settled hair does not depend on either; fast motion and the
+    /// lengths of long, finely divided hair do.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct HairSolver {
+        /// Which method is used.
+        pub method: SolverMethod = SolverMethod::Direct;
+        /// Newton steps of the length limiter of the direct method, at most: it stops where lengths
+        /// are right within 0.05 %. 0 turns it off.
+        pub limiter_steps: u32 = 6, in LIMITER_STEPS: 0.0..=16.0, safe 1.0..=8.0,
+            "6 hold any hair";
+        /// The longest substep of the direct method: as many of the tick's substeps are taken as one as
+        /// fit into it, everything that moves the hair included. Dry hair settles to the same shape and
+        /// swings with the same period from the default to the paper's 1/360 s, for half the time. Hair
+        /// that carries water, hair of springs and [`SolverMethod::Sweeps`] take every substep.
+        pub substep: f32 = 1.0 / 180.0, "s" in SUBSTEP: 1e-6..=1.0, safe 1e-3..=0.01,
+            "1/180 is three of a tick at 60 Hz";
+    }
+}
+
+setting! {
+    /// The paper's projections, where [`SolverMethod::Sweeps`] is chosen. Component of a
+    /// [`Hair`](crate::Hair); where absent, [`HairDefault<Sweeps>`](crate::HairDefault) holds.
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct Sweeps {
+        /// Gauss–Seidel iterations a substep, as in \[B\] table 1.
+        pub iterations: u32 = 5, in ITERATIONS: 1.0..=1000.0, safe 1.0..=50.0, "5 is the paper's";
+        /// How stretch–shear is projected.
+        pub projection: StretchProjection = StretchProjection::Split;
+        /// k_o of equation 13: the share of a bend that one substep of 1/360 s corrects, as in
+        /// \[B\] table 1. A parameter of the solver, which also affects how fast hair swings.
+        pub bend: f32 = 0.05, in BEND: 0.0..=1.0, safe 0.005..=0.1, "the paper uses 0.05";
+        /// χ = w_q l² at the paper's step, set directly as a reader of the paper might; replaces what
+        /// [`HairStiffness::bending_length`] gives.
+        pub orientation_weight: Option<f32> = None, in ORIENTATION_WEIGHT: 1e-9..=1e3,
+            "0.03 is 13 cm at 3 cm edges";
+        /// Newton steps of the direct length limiter after the iterations. 0 turns it off; 1 leaves
+        /// about ten times the strain.
+        pub limiter_steps: u32 = 2, in LIMITER_STEPS: 0.0..=16.0, safe 0.0..=4.0,
+            "2 hold long hair";
+        /// Damping of neighbouring edges' relative rotation: damps bending vibration, not falling
+        /// and swinging.
+        pub internal_damping: f32 = 0.0, "1/s" in INTERNAL_DAMPING: 0.0..=1e4, safe 0.0..=100.0,
+            "0 is off, 20 is syrup";
+    }
+}
+
+impl Sweeps {
+    /// Inverse rotational mass w_q (1/m²) of an edge of length `l` on a strand whose edges average
+    /// `mean`. With equal edges it is χ/l²; otherwise it keeps EI the same in every joint.
+    #[inline(always)]
+    #[doc(hidden)]
+    pub fn rotational_weight<R: Real>(&self, bending_length: f32, l: R, mean: R) -> R {
+        match self.orientation_weight {
+            Some(chi) => l.lit(chi.into()) / (l * mean),
+            None => l.lit(self.spin_weight(bending_length).into()) * mean * l,
+        }
+    }
+
+    /// What makes w_q of lengths, by the gravity-bending length (m): k/(8 (1−k) L_g³ Δt₀² g).
+    #[inline(always)]
+    pub(crate) fn spin_weight(&self, bending_length: f32) -> f32 {
+        let lg3 = bending_length * bending_length * bending_length;
+        let stiff = self.bend.clamp(1e-6, 0.999_999);
+        stiff / (8.0 * (1.0 - stiff) * lg3 * REFERENCE_DT * REFERENCE_DT * REFERENCE_GRAVITY)
+    }
+
+    /// k of one substep of `dt` (s), from K = k/(1−k) ∝ Δt², times a `factor` on the true
+    /// stiffness: cuticle (equation 13), wetness, material.
+    #[doc(hidden)]
+    pub fn per_substep(&self, dt: f32, factor: f32) -> f32 {
+        let ratio = self.ratio(dt) * factor;
+        ratio / (1.0 + ratio)
+    }
+
+    /// K = k/(1−k) of one substep of `dt` (s).
+    pub(crate) fn ratio(&self, dt: f32) -> f32 {
+        let k = self.bend.min(0.999_999);
+        let longer = dt / REFERENCE_DT;
+        k / (1.0 - k) * longer * longer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_satisfy_the_bending_length_formula() {
+        for (lg, l) in [(0.13_f32, 0.03_f32), (0.045, 0.01), (0.2, 0.0075)] {
+            let s = Sweeps::default();
+            let chi = s.rotational_weight(lg, l, l) * l * l;
+            let k = s.bend;
+            let dt2 = REFERENCE_DT * REFERENCE_DT;
+            let back = k * l.powi(4) / (8.0 * chi * (1.0 - k) * dt2 * REFERENCE_GRAVITY);
+            assert!((back.cbrt() / lg - 1.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn stiffness_scales_with_the_square_of_the_substep() {
+        let s = Sweeps::default();
+        let big = |k: f32| k / (1.0 - k);
+        let (a, b) = (s.per_substep(REFERENCE_DT, 1.0), s.per_substep(REFERENCE_DT * 2.0, 1.0));
+        assert!((a - 0.05).abs() < 1e-6);
+        assert!((big(b) / big(a) - 4.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_real_fibre_bends_over_four_and_a_half_centimetres() {
+        let s = HairStiffness::from_fibre(3.9e9, 70e-6, 1310.0).unwrap();
+        assert!((s.bending_length - 0.0453).abs() < 1e-4);
+        assert!(HairStiffness::from_fibre(-1.0, 70e-6, 1310.0).is_err());
+    }
+}
