@@ -1,0 +1,63 @@
+//! Apps without a device that draws, as on a server.
+
+#[path = "../../examples/character/body.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod body;
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../../examples/scenes/locks.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod locks;
+#[path = "../../examples/salon/mannequin.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod mannequin;
+#[path = "../../examples/character/skeleton.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod skeleton;
+#[path = "../../examples/headless/trace.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod trace;
+#[path = "../common/golden.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod vectors;
+#[path = "../../examples/salon/wardrobe.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod wardrobe;
+
+/// What the modules of examples expect of their app.
+mod scenes {
+    pub const HEAD_RADIUS: f32 = 0.1;
+    #[derive(bevy::prelude::Component)]
+    pub struct Treated;
+}
+
+mod attack;
+mod avian;
+mod bonds;
+mod character;
+mod colliders;
+mod commands;
+mod contact;
+mod drawn_locks;
+mod dye;
+mod figure;
+mod fit;
+mod golden;
+mod groom;
+mod hairdo;
+mod lod;
+mod morph;
+mod papers_scenes;
+mod plant;
+mod reflection;
+mod rods;
+mod settle;
+mod sleep;
+mod style;
+mod submersion;
+mod swing;
+mod tick;
+mod water;
+mod wear;
+mod wind;
+mod without_a_device;

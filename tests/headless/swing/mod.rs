@@ -1,0 +1,15 @@
+//! Hair sags, swings, curls and twists as rods do, at any segment count and step: through an app,
+//! against theory that shares nothing with the crate.
+
+mod fast;
+mod hard;
+mod lab;
+mod obstacles;
+mod settled;
+mod swings;
+mod theory;
+use crate::trace;
+mod twisted;
+
+/// G J / E I of the crate's hair.
+const TORSION: f64 = 1.0;
