@@ -46,3 +46,20 @@ pub mod prelude {
         water::prelude::*,
     };
 }
+
+/// The book's samples, as doc tests.
+#[cfg(all(doctest, feature = "groom", feature = "render", feature = "save", feature = "gpu"))]
+mod book {
+    macro_rules! chapters {
+        ($($name:ident: $file:literal,)*) => {$(#[doc = include_str!(concat!("../docs/src/", $file))] struct $name;)*};
+    }
+    chapters! {
+        Character: "character.md",
+        Colliders: "colliders.md",
+        FirstHour: "first-hour.md",
+        Saving: "saving.md",
+        Styling: "styling.md",
+        Water: "water.md",
+        Weather: "weather.md",
+    }
+}
