@@ -5,12 +5,16 @@
 //! The scene is `wet` of the examples. First as the paper has it, droplets that only pull; then with the
 //! film that they leave, the water that soaks in and the bonds that it opens. All are run in turns, each
 //! timed frame after an untimed one of the same app, and of each the best is kept.
+//!
+//! Then what water costs where there is none: thirty hairs with a shower over one of them, and hair at rest in
+//! damp air.
 
 #[path = "../examples/scenes/mod.rs"]
 mod scenes;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
+    SleepCounts,
     math::grid::{BallGrid, FoundBalls},
     prelude::*,
 };
@@ -69,6 +73,13 @@ fn main() {
     if !named.is_empty() {
         return;
     }
+    println!("\n30 hairs of 100 strands, ms | with a shower over one of them, ms | ratio");
+    let [dry, rain] = shower_over_one();
+    println!("{dry:.2} | {rain:.2} | {:.2}", rain / dry);
+    println!("\n400 strands of 12 nodes at rest, in air of a humidity | ms | asleep");
+    for (humidity, ms, asleep) in at_rest([0.5, 0.51, 0.9]) {
+        println!("{humidity} | {ms:.2} | {asleep}");
+    }
     println!("\ndroplets, ten strands each | a node's query, ns");
     for count in [1_000, 10_000, 100_000] {
         println!("{count} | {:.1}", query(count) * 1e9);
@@ -93,6 +104,81 @@ fn wet(variant: &str, count: usize, uptake: f32) -> App {
     let frames = ((Moment::STREWN + 0.5) * 60.0) as usize;
     (0..frames).for_each(|_| app.update());
     app
+}
+
+/// An app of `hairs` heads 1 m apart, each with `strands` strands of twelve nodes.
+fn heads(hairs: usize, strands: usize) -> App {
+    const RADIUS: f32 = 0.09;
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, HairPlugins::default()))
+        .insert_resource(Time::<Fixed>::from_hz(60.0))
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    app.finish();
+    app.cleanup();
+    let golden = core::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
+    for head in 0..hairs {
+        let at = Transform::from_xyz(head as f32, 0.0, 0.0);
+        let hair = app.world_mut().spawn((Hair, at)).id();
+        app.world_mut().spawn((HairCollider::sphere(RADIUS).expect("a radius"), at));
+        for i in 0..strands {
+            let y = (i as f32 + 0.5) / strands as f32;
+            let (sine, cosine) = (golden * i as f32).sin_cos();
+            let across = (1.0 - y * y).sqrt();
+            let normal = Vec3::new(across * cosine, y, across * sine);
+            let points: Vec<Vec3> =
+                (0..12).map(|k| normal * (RADIUS + 0.002 + 0.015 * k as f32)).collect();
+            let strand = Strand::from_polyline(&points).expect("a strand");
+            app.world_mut().spawn((StrandOf(hair), strand));
+        }
+    }
+    app
+}
+
+/// Ticks of apps in turns: the medians (ms).
+fn medians<const N: usize>(apps: &mut [App; N], ticks: usize) -> [f64; N] {
+    let mut times = [const { Vec::new() }; N];
+    for _ in 0..ticks {
+        for (app, times) in apps.iter_mut().zip(&mut times) {
+            let start = Instant::now();
+            app.update();
+            times.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    times.map(|mut times| {
+        times.sort_unstable_by(f64::total_cmp);
+        times[times.len() / 2]
+    })
+}
+
+/// A tick of thirty hairs without and with a shower over one of them (ms).
+fn shower_over_one() -> [f64; 2] {
+    let mut apps = [false, true].map(|rains| {
+        let mut app = heads(30, 100);
+        app.insert_resource(HairDefault(SleepSettings::never()));
+        if rains {
+            app.world_mut().spawn(Shower::rain_on(Vec3::ZERO));
+        }
+        (0..120).for_each(|_| app.update());
+        app
+    });
+    medians(&mut apps, 120)
+}
+
+/// A tick of hair at rest in air of these humidities (ms), and how many strands sleep.
+fn at_rest<const N: usize>(humidities: [f32; N]) -> [(f32, f64, usize); N] {
+    let mut apps = humidities.map(|humidity| {
+        let mut app = heads(1, 400);
+        app.insert_resource(HairClimate { humidity, ..default() });
+        (0..900).for_each(|_| app.update());
+        app
+    });
+    let ms = medians(&mut apps, 120);
+    core::array::from_fn(|i| {
+        let mut sleepers = apps[i].world_mut().query::<&SleepCounts>();
+        let asleep = sleepers.iter(apps[i].world()).map(|sleepers| sleepers.asleep).sum();
+        (humidities[i], ms[i], asleep)
+    })
 }
 
 /// Time per node to find the droplets in reach (s), as in the tick: sixteen neighbours share a

@@ -11,9 +11,13 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// Whether any strand of a hair is wet. Updated once a tick.
+/// Whether any strand of a hair is wet: has a film or is under water. Updated once a tick.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct IsWet(pub(crate) bool);
+
+/// Whether any strand of a hair holds water beyond the regain at room humidity. Updated once a tick.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct HoldsWater(bool);
 
 /// Triggered on a wet [`Hair`] when it has dried to the regain at room humidity.
 ///
@@ -32,17 +36,43 @@ pub struct HairDried {
 
 pub(super) fn update_is_wet(
     found: Res<FoundWater>,
-    mut hairs: Query<(Entity, &Strands, &mut IsWet), (With<Hair>, Without<OnGpu>)>,
-    strands: Query<&Moisture>,
+    mut hairs: Query<(Entity, &Strands, &mut IsWet, &mut HoldsWater), (With<Hair>, Without<OnGpu>)>,
+    strands: Query<(&Moisture, &AddedMass)>,
     mut commands: Commands,
 ) {
-    for (entity, members, mut wet) in &mut hairs {
-        let mut moistures = strands.iter_many(members.collection());
-        let is_wet = found.0 && moistures.any(|moisture| !moisture.is_untouched());
-        if wet.0 && !is_wet {
+    for (entity, members, mut is_wet, mut holds) in &mut hairs {
+        let members = || strands.iter_many(members.collection());
+        let holds_water = found.any && members().any(|(moisture, _)| !moisture.is_untouched());
+        if holds.0 && !holds_water {
             commands.trigger(HairDried { entity });
         }
-        wet.set_if_neq(IsWet(is_wet));
+        holds.set_if_neq(HoldsWater(holds_water));
+        let wet = |(moisture, added): (&Moisture, &AddedMass)| {
+            moisture.has_film() || !added.in_water.is_empty()
+        };
+        is_wet.set_if_neq(IsWet(found.busy && members().any(wet)));
+    }
+}
+
+/// How long bridges of water between the strands of a hair may get; `None` where there are none.
+fn bridges_of(contact: StrandContact, wetting: &HairWetting, wet: &IsWet) -> Option<Film> {
+    let joins = contact.radius > 0.0
+        && contact.strength > 0.0
+        && (wetting.cohesion > 0.0 || wetting.film_drag > 0.0)
+        && wet.0;
+    joins.then(|| Film::between(2.0 * contact.radius))
+}
+
+/// Once a tick, before contact: the lists of wet hair hold all that bridges of water may join.
+pub(super) fn widen_contact(
+    contact: Settings<StrandContact>,
+    wetting: Settings<HairWetting>,
+    mut hairs: Query<(Entity, &IsWet, &mut LockNeighbours), With<Hair>>,
+) {
+    for (hair, wet, mut neighbours) in &mut hairs {
+        let film = bridges_of(contact.of(hair), &wetting.of(hair), wet);
+        let longest = film.map_or(0.0, |film| film.longest);
+        neighbours.bypass_change_detection().set_extra_margin(longest);
     }
 }
 
@@ -60,22 +90,13 @@ pub(super) fn join_wet_strands(
 ) {
     let rows = &mut scratch.bypass_change_detection().rows;
     for (hair, members, wet, mut neighbours, sleepers) in &mut hairs {
+        let wetting = wetting.of(hair);
+        let Some(film) = bridges_of(contact.of(hair), &wetting, wet) else { continue };
         if sleepers.is_some_and(SleepCounts::all) {
             continue;
         }
         let Some(substep) = steps.of(hair) else { continue };
-        let StrandContact { radius, strength } = contact.of(hair);
-        let wetting = wetting.of(hair);
-        let joins = radius > 0.0
-            && strength > 0.0
-            && (wetting.cohesion > 0.0 || wetting.film_drag > 0.0)
-            && wet.0;
         let list = neighbours.bypass_change_detection();
-        let film = Film::between(2.0 * radius);
-        list.set_extra_margin(if joins { film.longest } else { 0.0 });
-        if !joins {
-            continue;
-        }
         rows.clear();
         for (strand, moisture, ..) in strands.iter_many(members.collection()) {
             let film = |i: usize| moisture.film().get(i).copied().unwrap_or(0.0);

@@ -3,7 +3,7 @@
 use super::{
     Droplet, HairWetting, Moisture, StrandPoint, WaterLedger,
     adhesion::{ContactParams, DropletContacts, Landing},
-    exchange::on_strand,
+    exchange::{bear_water, on_strand},
     field::{Field, LocalDrop},
     model::clinging,
     moisture::node_lengths,
@@ -16,8 +16,13 @@ use crate::{
         schedule::HairStep,
         setting::{Ranged, Settings},
     },
-    forces::{contact::WetRow, environment::HairGravity},
-    hair::strand::{AddedMass, Hair, OnGpu, PerHair, Pose, Strand, StrandOf, TickPose},
+    forces::{
+        contact::{Colliders, HairReach, WetRow},
+        environment::HairGravity,
+    },
+    hair::strand::{
+        AddedMass, Hair, OnGpu, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose,
+    },
     math::lanes::LANES,
 };
 use bevy::prelude::*;
@@ -49,6 +54,8 @@ pub(super) struct WaterField {
     /// The nodes' input to bridges of water.
     pub(super) rows: Vec<WetRow>,
     outcomes: Vec<Outcome>,
+    /// Those of the droplets around one hair.
+    local: Vec<Outcome>,
     buffers: Vec<Buffers>,
 }
 
@@ -59,6 +66,8 @@ type Buffers = (Vec<Option<WetStrand<'static>>>, Vec<WetStrand<'static>>);
 struct WetHair<'a> {
     pose: Pose,
     wetting: HairWetting,
+    /// The droplets that may reach it in this substep, by their numbers.
+    drops: Vec<u32>,
     strands: Vec<WetStrand<'a>>,
 }
 
@@ -81,27 +90,43 @@ struct Outcome {
     wanted: f64,
 }
 
+/// What droplets act on, as a query reads it.
+type AmongDroplets = (
+    Entity,
+    &'static StrandOf,
+    &'static mut Strand,
+    &'static mut AddedMass,
+    &'static mut Moisture,
+    &'static mut StrandSleep,
+);
+
+/// Hair among droplets, as a query reads it.
+type RainedOn = (Entity, &'static TickPose, &'static mut StrandBlocks, Option<&'static HairReach>);
+
 pub(super) fn wet_strands(
     step: Res<HairStep>,
     gravity: Res<HairGravity>,
     process: Res<HairProcessTime>,
     wetting: Settings<HairWetting>,
     mut scratch: ResMut<WaterField>,
-    mut hairs: Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
-    mut strands: Query<
-        (Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture),
-        Without<OnGpu>,
-    >,
+    mut hairs: Query<RainedOn, With<Hair>>,
+    mut strands: Query<AmongDroplets, Without<OnGpu>>,
     mut droplets: Query<&mut Droplet>,
     mut ledger: ResMut<WaterLedger>,
 ) {
-    let WaterField { fields, loaded, outcomes, buffers, .. } = scratch.bypass_change_detection();
-    // The exchange rewrites the added mass of wet hair; on dry hair only droplets add mass.
+    let WaterField { fields, loaded, outcomes, local, buffers, .. } =
+        scratch.bypass_change_detection();
+    // The exchange has rewritten the added mass of wet hair; on other hair droplets have added to it.
     for strand in loaded.drain(..) {
-        if let Ok((.., mut added_mass, moisture)) = strands.get_mut(strand)
-            && moisture.is_untouched()
+        if let Ok((_, of, strand, mut added_mass, moisture, _)) = strands.get_mut(strand)
+            && !moisture.has_film()
         {
-            *added_mass.bypass_change_detection() = default();
+            let added_mass = added_mass.bypass_change_detection();
+            if moisture.is_untouched() {
+                *added_mass = default();
+            } else {
+                bear_water(added_mass, &moisture, strand.rest_lengths(), &wetting.of(of.0));
+            }
         }
     }
     let mut drops: Vec<Mut<'_, Droplet>> = droplets.iter_mut().collect();
@@ -112,23 +137,25 @@ pub(super) fn wet_strands(
     // A drop adds its mass to the strand that carries it.
     for drop in &drops {
         if let Some(ride) = drop.ride
-            && let Ok((_, of, strand, mut added_mass, _)) = strands.get_mut(ride.strand)
+            && let Ok((_, of, strand, mut added_mass, _, mut sleep)) = strands.get_mut(ride.strand)
             && strand.nodes() >= 2
         {
             let added_mass = added_mass.bypass_change_detection();
             weigh(&strand, added_mass, &wetting.of(of.0), ride.at, mass_of(drop));
+            sleep.bypass_change_detection().wake();
             loaded.push(ride.strand);
         }
     }
     let process = process.clamped().0;
     outcomes.clear();
     outcomes.resize(drops.len(), Outcome::default());
-    let mut wet_hairs = wet_hairs(&mut hairs, &wetting, &mut strands, step.index == 0, buffers);
-    fields.resize_with(wet_hairs.len(), default);
-    for (WetHair { pose, wetting, strands }, (field, chunks)) in
+    let mut wet_hairs =
+        wet_hairs(&mut hairs, &wetting, &mut strands, step.index == 0, &drops, buffers);
+    fields.resize_with(fields.len().max(wet_hairs.len()), default);
+    for (WetHair { pose, wetting, drops: near, strands }, (field, chunks)) in
         wet_hairs.iter_mut().zip(&mut *fields)
     {
-        field.set_drops(&drops, pose);
+        field.set_drops(near.iter().map(|k| &*drops[*k as usize]), pose);
         field.sort(wetting.lock_radius());
         let params = ContactParams {
             wetting,
@@ -141,16 +168,19 @@ pub(super) fn wet_strands(
         let chunk = chunk_size(strands.len(), drops.len());
         chunks.resize_with(strands.len().div_ceil(chunk), default);
         contact_all(strands.chunks_mut(chunk).zip(&mut *chunks).collect(), &params);
-        sum_up(chunks, pose.rotation, outcomes);
+        local.clear();
+        local.extend(near.iter().map(|k| outcomes[*k as usize]));
+        sum_up(chunks, pose.rotation, local);
+        near.iter().zip(&*local).for_each(|(k, sum)| outcomes[*k as usize] = *sum);
     }
     // Together the strands may request more than the droplet holds.
-    let shares: Vec<f64> = drops
-        .iter()
-        .zip(&*outcomes)
-        .map(|(drop, o)| (drop.counted.0 / o.wanted).min(1.0))
-        .collect();
-    for (WetHair { strands, .. }, (_, chunks)) in wet_hairs.iter_mut().zip(&mut *fields) {
+    let share = |k: usize| (drops[k].counted.0 / outcomes[k].wanted).min(1.0);
+    let shares: Vec<f64> = (0..drops.len()).map(share).collect();
+    for (WetHair { drops: near, strands, .. }, (_, chunks)) in
+        wet_hairs.iter_mut().zip(&mut *fields)
+    {
         let chunk = chunk_size(strands.len(), drops.len());
+        let shares: Vec<f64> = near.iter().map(|k| shares[*k as usize]).collect();
         absorb_all(strands.chunks_mut(chunk).zip(&mut *chunks).collect(), &shares);
         ledger.water_out += chunks.iter().map(|out| out.removed).sum::<f64>();
     }
@@ -169,8 +199,8 @@ pub(super) fn wet_strands(
             drop.lying = 0.0;
         }
         if let Some(ride) = drop.ride
-            && let Ok((_, of, mut strand, mut added_mass, _)) = strands.get_mut(ride.strand)
-            && let Ok((pose, _)) = hairs.get(of.0)
+            && let Ok((_, of, mut strand, mut added_mass, ..)) = strands.get_mut(ride.strand)
+            && let Ok((_, pose, ..)) = hairs.get(of.0)
         {
             let (pose, wetting) = (pose.now(), wetting.of(of.0));
             let (strand, added_mass) =
@@ -188,24 +218,40 @@ pub(super) fn wet_strands(
     }
 }
 
-/// All strands grouped by hair, neighbouring roots next to each other.
+/// A ball (m) around all that a droplet acts on in a substep, of locks of a radius of up to `clearance`.
+fn ball_of(drop: &Droplet, clearance: f32) -> (Vec3, f32) {
+    let reach = drop.r_max.max(drop.radius().max(drop.r_min) + clearance);
+    let path = drop.position - drop.before;
+    (drop.position - 0.5 * path, 0.5 * path.length() + reach)
+}
+
+/// The strands that droplets may reach, grouped by hair, neighbouring roots next to each other.
 fn wet_hairs<'a>(
-    hairs: &mut Query<(&TickPose, &mut StrandBlocks), With<Hair>>,
+    hairs: &mut Query<RainedOn, With<Hair>>,
     wetting: &Settings<HairWetting>,
-    strands: &'a mut Query<
-        (Entity, &StrandOf, &mut Strand, &mut AddedMass, &mut Moisture),
-        Without<OnGpu>,
-    >,
+    strands: &'a mut Query<AmongDroplets, Without<OnGpu>>,
     resort: bool,
+    drops: &[Mut<'_, Droplet>],
     buffers: &mut Vec<Buffers>,
 ) -> Vec<WetHair<'a>> {
     let mut wet_hairs: PerHair<(Entity, WetHair<'a>, Vec<Option<WetStrand<'a>>>)> = default();
     let mut unused = core::mem::take(buffers).into_iter();
-    for (entity, of, strand, added_mass, moisture) in strands {
+    let locks =
+        hairs.iter().map(|(hair, frame, ..)| wetting.of(hair).lock_radius() * frame.now().scale);
+    let widest = locks.fold(0.0, f32::max);
+    let balls = Colliders::of_balls((0..).zip(drops).map(|(k, drop)| (ball_of(drop, widest), k)));
+    let mut scratch = Vec::new();
+    for (entity, of, strand, added_mass, moisture, _) in strands {
         let index = wet_hairs.index(of.0, || {
-            let (pose, wetting) = (*hairs.get(of.0).ok()?.0.now(), wetting.of(of.0));
+            let (_, frame, _, reach) = hairs.get(of.0).ok()?;
+            let drops: Vec<u32> = balls.near(frame, reach, &mut scratch).copied().collect();
+            if drops.is_empty() {
+                return None;
+            }
+            let (pose, wetting) = (*frame.now(), wetting.of(of.0));
             let (unsorted, sorted) = unused.next().unwrap_or_default();
-            Some((of.0, WetHair { pose, wetting, strands: emptied(sorted) }, emptied(unsorted)))
+            let wet_hair = WetHair { pose, wetting, drops, strands: emptied(sorted) };
+            Some((of.0, wet_hair, emptied(unsorted)))
         });
         if let Some(index) = index
             && strand.nodes() >= 2
@@ -220,7 +266,7 @@ fn wet_hairs<'a>(
         }
     }
     let sorted = wet_hairs.values.into_iter().map(|(hair, mut wet_hair, mut unsorted)| {
-        if let Ok((_, mut blocks)) = hairs.get_mut(hair) {
+        if let Ok((_, _, mut blocks, _)) = hairs.get_mut(hair) {
             let roots = unsorted.iter().flatten().map(|s| s.strand.positions()[0]);
             let order = blocks.bypass_change_detection().order(resort, unsorted.len(), roots);
             for (i, k) in order.iter().enumerate() {
@@ -238,10 +284,10 @@ fn wet_hairs<'a>(
 
 impl Field {
     /// Transforms the droplets into a hair's frame.
-    fn set_drops(&mut self, drops: &[Mut<'_, Droplet>], pose: &Pose) {
+    fn set_drops<'a>(&mut self, drops: impl Iterator<Item = &'a Droplet>, pose: &Pose) {
         let scale = pose.scale.recip();
         self.drops.clear();
-        self.drops.extend(drops.iter().map(|d| LocalDrop {
+        self.drops.extend(drops.map(|d| LocalDrop {
             at: pose.point_in(d.position),
             before: pose.point_in(d.before),
             velocity: pose.rotation.inverse() * d.velocity,
@@ -405,6 +451,8 @@ fn push(
 #[cfg(test)]
 mod tests {
     use super::{super::adhesion::DropletSum, *};
+    use crate::HairPlugins;
+    use bevy::time::TimeUpdateStrategy;
     use core::f32::consts::FRAC_PI_2;
 
     #[test]
@@ -428,6 +476,39 @@ mod tests {
         assert_eq!((touch_count, wanted), (4, 6e-9));
         // Of those at the same time the strands' order decides.
         assert_eq!(landing.map(|first| first.strand), Some(strand(8)));
+    }
+
+    #[test]
+    fn a_droplet_costs_only_the_hair_that_it_may_reach() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, HairPlugins::default()))
+            .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+        app.finish();
+        app.cleanup();
+        let points: Vec<Vec3> = (0..5).map(|i| Vec3::NEG_Y * (0.02 * i as f32)).collect();
+        for x in 0..30 {
+            let hair = app.world_mut().spawn((Hair, Transform::from_xyz(x as f32, 0.0, 0.0))).id();
+            app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+        }
+        // One falls past a strand, one far from all.
+        for place in [Vec3::new(7.05, 0.0, 0.0), Vec3::new(7.5, 0.0, 0.0)] {
+            app.world_mut().spawn(Droplet::new(place, 4e-9).unwrap());
+        }
+        (0..3).for_each(|_| app.update());
+        let mut drops = app.world_mut().query::<&Droplet>();
+        assert_eq!(drops.iter(app.world()).count(), 2);
+        let fields = &app.world().resource::<WaterField>().fields;
+        assert_eq!(fields.iter().map(|(field, _)| field.drops.len()).collect::<Vec<_>>(), [1]);
+    }
+
+    #[test]
+    fn a_ball_holds_all_that_a_droplet_touches_on_its_way() {
+        let mut drop = Droplet::new(Vec3::Y, 4e-9).unwrap().with_influence(1e-3, 2e-3).unwrap();
+        drop.before = Vec3::Y * 1.5;
+        let (center, radius) = ball_of(&drop, 5e-3);
+        assert_eq!(center, Vec3::Y * 1.25);
+        assert!((radius - (0.25 + 6e-3)).abs() < 1e-6, "{radius}");
+        assert!((ball_of(&drop, 0.0).1 - (0.25 + 2e-3)).abs() < 1e-6);
     }
 
     #[test]

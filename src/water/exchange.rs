@@ -17,8 +17,8 @@ use crate::{
         vapour::{DryingAir, WATER},
     },
     hair::strand::{
-        AddedMass, Hair, InWater, MissedOnGpu, OnGpu, PerHair, Pose, Strand, StrandOf, Strands,
-        TickPose,
+        AddedMass, Hair, InWater, MissedOnGpu, OnGpu, PerHair, Pose, Strand, StrandOf, StrandSleep,
+        Strands, TickPose,
     },
     keratin::bond::{BondChanges, BondKind, Bonds},
 };
@@ -30,10 +30,23 @@ use bevy::{
 /// Approximate cost of a strand (ns), averaged over wet and dry ones.
 const EXCHANGE: Nanos = Nanos(500);
 
-/// Whether the last substep that looked found water in any hair: while there is none, the others need not
-/// look.
+/// How often bound water goes toward the air's equilibrium, which takes an hour (s of
+/// [`HairProcessTime`]); at most once a tick.
+const PERIOD: f32 = 1.0;
+
+/// Drying by moving air (1/s) below which bound water is in no hurry.
+const HARDLY_DRIES: f32 = 1e-6;
+
+/// What the last substep that looked found in any hair: while none is busy, the others need not look.
 #[derive(Resource, Clone, Copy, Debug, Default)]
-pub(super) struct FoundWater(pub(super) bool);
+pub(super) struct FoundWater {
+    /// Whether there is water.
+    pub(super) any: bool,
+    /// Whether some of it changes in every substep, such as a film.
+    pub(super) busy: bool,
+    /// Process time since bound water last moved (s).
+    waited: f32,
+}
 
 /// Whether there is something that wets hair: then every substep looks.
 #[derive(SystemParam)]
@@ -65,7 +78,8 @@ pub(super) fn repair_moistures(
             faults.write(HairFault::new(FaultKind::Setting, found).of(entity));
         }
         ledger.record(moisture.recount());
-        found.0 |= !moisture.is_untouched();
+        found.any |= !moisture.is_untouched();
+        found.busy |= moisture.is_busy();
     }
 }
 
@@ -108,8 +122,16 @@ pub(super) fn run_showers(
 struct LocalWater<'a> {
     wetting: HairWetting,
     pose: Pose,
+    /// Of a substep, and of the time since bound water last moved.
+    steps: [Passing<'a>; 2],
+    /// Share of the difference by which bonds would approach it until bound water moves again.
+    to_come: f32,
+}
+
+/// What happens to water in some time.
+struct Passing<'a> {
     conditions: WaterConditions<'a>,
-    /// Share of the difference by which hydrogen bonds approach the water's target in this substep.
+    /// Share of the difference by which hydrogen bonds approach the water's target.
     bonds_follow: f32,
 }
 
@@ -121,6 +143,9 @@ struct Wet<'a> {
     moisture: &'a mut Moisture,
     added_mass: &'a mut AddedMass,
     changes: &'a mut BondChanges,
+    sleep: &'a mut StrandSleep,
+    /// Whether it changes in every substep.
+    is_busy: bool,
     loss: WaterLoss,
     /// Water of removed nodes (m³).
     removed: f64,
@@ -146,7 +171,16 @@ pub(super) fn exchange_water(
     hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
     winds: Winds,
     mut strands: Query<
-        (&StrandOf, &Strand, &Bonds, &BlownAir, &mut Moisture, &mut AddedMass, &mut BondChanges),
+        (
+            &StrandOf,
+            &Strand,
+            &Bonds,
+            &BlownAir,
+            &mut Moisture,
+            &mut AddedMass,
+            &mut BondChanges,
+            &mut StrandSleep,
+        ),
         Without<OnGpu>,
     >,
     on_gpu: Query<(), With<OnGpu>>,
@@ -155,10 +189,15 @@ pub(super) fn exchange_water(
     (mut ledger, mut found): (ResMut<WaterLedger>, ResMut<FoundWater>),
     mut faults: MessageWriter<HairFault>,
 ) {
-    let damp = air.equilibrium > 0.0;
-    if step.index > 0 && !damp && !found.0 && soaks.is_empty() && !wets.is_any() {
+    let process = process.clamped().0;
+    if step.index == 0 {
+        found.waited += process * step.dt * step.count as f32;
+    } else if !found.busy && soaks.is_empty() && !wets.is_any() && !(found.any && winds.dry()) {
         return;
     }
+    let is_due = step.index == 0 && found.waited >= PERIOD;
+    let waited = if is_due { core::mem::take(&mut found.waited) } else { 0.0 };
+    let damp = air.equilibrium > 0.0;
     let held = |hair: Entity| clinging(wetting.of(hair).bundle(1.0), gravity.clamped().0.length());
     for soak in soaks.read() {
         // It is soaked when it is back.
@@ -190,34 +229,47 @@ pub(super) fn exchange_water(
         }
     }
     let is_still = winds.are_still();
-    let process = process.clamped().0;
     let gravity = gravity.clamped().0;
     let water_of = |hair: Entity| {
         let pose = *hairs.get(hair).ok()?.0.now();
         let wetting = wetting.of(hair);
-        let conditions =
-            WaterConditions::new(wetting, pose.direction_in(gravity), &air, step.dt, process);
-        let seconds = process * step.dt;
-        Some(LocalWater {
-            wetting,
-            conditions,
-            bonds_follow: 1.0 - bevy::math::ops::exp(-seconds / wetting.bond_time.max(1e-9)),
-            pose,
-        })
+        let steps = [(step.dt, process), (1.0, waited)].map(|(dt, process)| {
+            let gravity = pose.direction_in(gravity);
+            let conditions = WaterConditions::new(wetting, gravity, &air, dt, process);
+            Passing { conditions, bonds_follow: wetting.bonds_follow(process * dt) }
+        });
+        Some(LocalWater { wetting, pose, steps, to_come: wetting.bonds_follow(PERIOD) })
     };
     let done = for_each_part(EXCHANGE, tables(&mut strands), Vec::new, |items, rows| {
         let (mut waters, mut done) = (PerHair::default(), Done::default());
-        for (of, strand, bonds, air, moisture, added_mass, changes) in rows {
-            done.found |= damp || !moisture.is_untouched() || !added_mass.in_water.is_empty();
-            if (damp || !moisture.is_untouched() || !added_mass.in_water.is_empty())
+        for (of, strand, bonds, air, moisture, added_mass, changes, sleep) in rows {
+            let is_under = !added_mass.in_water.is_empty();
+            let has_water = is_under || !moisture.is_untouched();
+            let is_busy = is_under || moisture.is_busy();
+            done.any |= has_water;
+            done.busy |= is_busy;
+            // What the air was around it when it fell asleep no longer counts.
+            let is_calm = is_still || sleep.is_asleep();
+            let blown = if is_calm { &[][..] } else { &air.nodes };
+            let is_dried = || blown.iter().any(|air| air.drying > HARDLY_DRIES);
+            let is_busy = is_busy || has_water && is_dried();
+            if (is_busy || is_due && (damp || has_water))
                 && let Some(hair) = waters.index(of.0, || water_of(of.0))
                 && strand.nodes() >= 2
                 && bonds.joints.len() == strand.edges()
             {
-                let loss = WaterLoss::default();
-                let blown = if is_still { &[][..] } else { &air.nodes };
-                let wet =
-                    Wet { strand, bonds, blown, moisture, added_mass, changes, loss, removed: 0.0 };
+                let wet = Wet {
+                    strand,
+                    bonds,
+                    blown,
+                    moisture,
+                    added_mass,
+                    changes,
+                    sleep,
+                    is_busy,
+                    loss: WaterLoss::default(),
+                    removed: 0.0,
+                };
                 items.push((hair, wet));
             }
         }
@@ -236,9 +288,10 @@ pub(super) fn exchange_water(
         }
         done
     });
-    found.0 = false;
-    for Done { found: any, evaporated, merged, removed, drips } in done {
-        found.0 |= any;
+    (found.any, found.busy) = (false, false);
+    for Done { any, busy, evaporated, merged, removed, drips } in done {
+        found.any |= any;
+        found.busy |= busy;
         ledger.record(-evaporated);
         ledger.record(-merged);
         ledger.water_out += removed;
@@ -251,8 +304,9 @@ pub(super) fn exchange_water(
 /// Water balance of some strands.
 #[derive(Default)]
 struct Done {
-    /// Whether any of them has water.
-    found: bool,
+    /// Whether any of them has water, and whether one is busy.
+    any: bool,
+    busy: bool,
     /// Evaporated water (m³); negative where hair absorbed vapour.
     evaporated: f64,
     /// Water given to the surrounding water (m³); negative where hair absorbed it.
@@ -262,10 +316,11 @@ struct Done {
     drips: Vec<Droplet>,
 }
 
-/// One strand's water in one substep, with its effects on bonds and weight.
+/// One strand's water in one step, with its effects on bonds and weight.
 fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bool, dt: f32) {
-    let LocalWater { wetting, conditions, bonds_follow, .. } = water;
-    let Wet { strand, bonds, blown, moisture, added_mass, changes, .. } = wet;
+    let LocalWater { wetting, steps, to_come, .. } = water;
+    let Wet { strand, bonds, blown, moisture, added_mass, changes, sleep, is_busy, .. } = wet;
+    let Passing { conditions, bonds_follow } = &steps[usize::from(!*is_busy)];
     wet.removed += moisture.fit(strand.nodes());
     let (positions, lengths, edges) = (strand.positions(), strand.rest_lengths(), strand.edges());
     let exposure = |i: usize| {
@@ -281,10 +336,18 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
             submerged: false,
         })
     };
-    moisture.exchange(positions, lengths, conditions, exposure, &mut wet.loss);
+    let moved = if *is_busy {
+        moisture.exchange(positions, lengths, conditions, exposure, &mut wet.loss);
+        0.0
+    } else {
+        moisture.equilibrate(lengths, conditions, exposure, &mut wet.loss)
+    };
     // All lost water is in `loss`.
     moisture.recount();
-    open_bonds(bonds, moisture.wetness(), *bonds_follow, changes);
+    let behind = open_bonds(bonds, moisture.wetness(), *bonds_follow, changes);
+    if moisture.note_change(moved.max(behind * bonds_follow), behind * to_come) {
+        sleep.wake();
+    }
     let capacity = wetting.capacity() * f64::from(strand.length());
     if !damp
         && added_mass.in_water.is_empty()
@@ -295,6 +358,16 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
         **added_mass = default();
         return;
     }
+    bear_water(added_mass, moisture, lengths, wetting);
+}
+
+/// Sets the added mass and the softening of a strand to those of its water.
+pub(super) fn bear_water(
+    added_mass: &mut AddedMass,
+    moisture: &Moisture,
+    lengths: &[f32],
+    wetting: &HairWetting,
+) {
     let dry = f64::from(wetting.dry_mass());
     let water = moisture.film().iter().zip(moisture.bound()).map(|(film, bound)| film + bound);
     added_mass.mass.clear();
@@ -303,15 +376,19 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
     );
     added_mass.moves_bonds = true;
     added_mass.softening.clear();
-    added_mass.softening.extend(moisture.wetness()[..edges].iter().map(|w| w * wetting.softening));
+    let wetness = moisture.wetness().iter().take(lengths.len());
+    added_mass.softening.extend(wetness.map(|w| w * wetting.softening));
 }
 
 /// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close retained
-/// the present shape by equation 16.
-fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChanges) {
-    for (i, (b, wet)) in bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate() {
-        changes.request(i, BondKind::Hydrogen, (1.0 - wet - b) * share);
-    }
+/// the present shape by equation 16. Returns the largest difference.
+fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChanges) -> f32 {
+    let joints = bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate();
+    joints.fold(0.0, |most, (i, (b, wet))| {
+        let behind = 1.0 - wet - b;
+        changes.request_quietly(i, BondKind::Hydrogen, behind * share);
+        most.max(behind.abs())
+    })
 }
 
 /// A drop that detaches from a strand `at` segments from the root: just below it, with its

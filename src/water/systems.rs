@@ -2,7 +2,7 @@
 
 use super::{
     Droplet, DropletRules, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
-    bridge::{HairDried, IsWet, join_wet_strands, update_is_wet},
+    bridge::{HairDried, HoldsWater, IsWet, join_wet_strands, update_is_wet, widen_contact},
     droplet_contact::{WaterField, wet_strands},
     exchange::{FoundWater, exchange_water, repair_moistures, run_showers},
     merge::merge_droplets,
@@ -43,6 +43,7 @@ impl Plugin for WaterPlugin {
             .register_type::<SoakHair>()
             .register_required_components::<Strand, Moisture>()
             .register_required_components::<Hair, IsWet>()
+            .register_required_components::<Hair, HoldsWater>()
             .add_observer(|soak: On<SoakHair>, mut messages: MessageWriter<SoakHair>| {
                 messages.write(*soak.event());
             })
@@ -56,7 +57,7 @@ impl Plugin for WaterPlugin {
                     count_overwritten,
                     run_showers,
                     exchange_water,
-                    update_is_wet.run_if(first_substep),
+                    (update_is_wet, widen_contact).chain().run_if(first_substep),
                 )
                     .chain()
                     .in_set(HairSystems::WaterExchange),

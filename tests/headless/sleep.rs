@@ -319,17 +319,28 @@ fn bonds_that_change_wake_it_and_keep_it_awake() {
 fn water_wakes_it_and_wet_hair_does_not_sleep() {
     let mut app = woken(|app, hair, _| {
         app.insert_resource(HairProcessTime(100.0));
-        app.world_mut().write_message(SoakHair { target: hair, wetness: 1.0 });
+        app.world_mut().write_message(SoakHair::dripping(hair));
     });
     let e = app.world_mut().query_filtered::<Entity, With<Strand>>().single(app.world()).unwrap();
-    let wet = |app: &App| !app.world().get::<Moisture>(e).unwrap().is_untouched();
+    let water = |app: &App| app.world().get::<Moisture>(e).unwrap().clone();
     let mut ticks = 0;
-    while wet(&app) {
+    while water(&app).has_film() {
         assert!(!is_asleep(&app, e) && ticks < 18_000);
         app.update();
         ticks += 1;
     }
-    assert!(ticks > 120);
+    assert!(ticks > 60, "{ticks}");
+    // Then it dries through, and wakes whenever that has changed it.
+    let (mut before, mut asleep) = (water(&app).wetness()[0], 0.0);
+    while !water(&app).is_untouched() {
+        assert!(ticks < 18_000);
+        app.update();
+        ticks += 1;
+        let now = water(&app).wetness().first().copied().unwrap_or(0.0);
+        asleep = if is_asleep(&app, e) { asleep + (before - now) } else { 0.0 };
+        assert!(asleep < 0.013, "{asleep} of its water has gone in its sleep");
+        before = now;
+    }
     run(&mut app, 3.0);
     assert!(is_asleep(&app, e), "dry again");
     // A droplet that falls on it

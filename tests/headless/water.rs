@@ -4,7 +4,8 @@ use crate::common::{faults, no_gravity, one_strand, run, strand, test_app};
 use crate::locks::{clustered_share, tip_spacing};
 use bevy::prelude::*;
 use bevy_keratin::{
-    AddedMass, DropletRules, FaultKind, Shower, forces::environment::vapour, prelude::*,
+    AddedMass, DropletRules, FaultKind, HairStep, Shower, SleepCounts, forces::environment::vapour,
+    prelude::*,
 };
 use core::f32::consts::PI;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
@@ -756,4 +757,201 @@ fn rain_wets_a_preset_in_the_time_that_it_takes_in_life() {
     // At that rate it is soaked through after some minutes.
     let minutes = capacity / wetness * 12.0 / 60.0;
     assert!((0.5..15.0).contains(&minutes), "{minutes} minutes");
+}
+
+/// `count` strands of twelve nodes that hang 4 mm apart from a plane, in air of a `humidity`.
+fn curtain(count: usize, humidity: f32) -> (App, Entity) {
+    let mut app = test_app(60.0);
+    app.insert_resource(HairClimate { humidity, ..default() });
+    let hair = app.world_mut().spawn(Hair).id();
+    let side = (count as f32).sqrt().ceil() as usize;
+    for i in 0..count {
+        let root = Vec3::new((i % side) as f32, 0.0, (i / side) as f32) * 4e-3;
+        let points: Vec<Vec3> = (0..12).map(|k| root - Vec3::Y * (0.015 * k as f32)).collect();
+        app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    (app, hair)
+}
+
+fn wetness(app: &mut App) -> f32 {
+    let mut moistures = app.world_mut().query::<&Moisture>();
+    let least = |m: &Moisture| m.wetness().iter().copied().fold(f32::MAX, f32::min);
+    moistures.iter(app.world()).map(least).fold(f32::MAX, f32::min)
+}
+
+/// Hydrogen bonds of all joints are open by what the hair is wet, within `most`.
+fn bonds_follow(app: &mut App, most: f32) -> bool {
+    let mut strands = app.world_mut().query::<(&Moisture, &Bonds)>();
+    strands.iter(app.world()).all(|(moisture, bonds)| {
+        let rates = bonds.rates(BondKind::Hydrogen).zip(moisture.wetness());
+        rates.into_iter().all(|(rate, wet)| (1.0 - wet - rate).abs() < most)
+    })
+}
+
+#[test]
+fn hair_in_damp_air_sleeps_while_it_takes_up_vapour() {
+    let (mut app, hair) = curtain(4, 0.9);
+    run(&mut app, 3.0);
+    let (mut awake, mut before) = (0, wetness(&mut app));
+    assert!(before > 0.0, "vapour is taken up");
+    for _ in 0..20 {
+        run(&mut app, 1.0);
+        awake += app.world().get::<SleepCounts>(hair).unwrap().awake;
+        let now = wetness(&mut app);
+        assert!(now > before, "{now} after {before}: also in its sleep");
+        before = now;
+    }
+    assert!(awake <= 8, "{awake} of 80 are awake");
+    assert!(bonds_follow(&mut app, 5e-3));
+    // At its end it is in equilibrium, whatever a tick is long.
+    app.insert_resource(HairProcessTime(1e5));
+    run(&mut app, 3.0);
+    let (damp, regain) = (wetness(&mut app), vapour::regain);
+    let equilibrium = (regain(0.9) - regain(0.5)) / (regain(1.0) - regain(0.5));
+    assert!((damp - equilibrium).abs() < 1e-3, "{damp}, expected {equilibrium}");
+    assert!(bonds_follow(&mut app, 1e-3) && app.world().get::<SleepCounts>(hair).unwrap().all());
+    assert!(ledger(&app).error() < 1e-9, "{:?}", ledger(&app));
+    // In the air of a room it dries without a film, wakes for that, and then is as it was.
+    app.insert_resource(HairClimate::default()).insert_resource(HairProcessTime(1e3));
+    run(&mut app, 0.2);
+    assert!(!app.world().get::<SleepCounts>(hair).unwrap().all(), "its shape changes");
+    run(&mut app, 120.0);
+    let mut moistures = app.world_mut().query::<&Moisture>();
+    assert!(moistures.iter(app.world()).all(Moisture::is_untouched));
+    assert!(ledger(&app).error() < 1e-9, "{:?}", ledger(&app));
+}
+
+#[test]
+#[ignore = "measures time: run it alone on an idle machine"]
+fn damp_air_costs_what_dry_air_costs() {
+    let mut apps = [0.5, 0.51, 0.9].map(|humidity| (curtain(400, humidity), Vec::new()));
+    for ((app, _), _) in &mut apps {
+        run(app, 4.0);
+    }
+    for _ in 0..120 {
+        for ((app, _), times) in &mut apps {
+            let start = std::time::Instant::now();
+            app.update();
+            times.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    let median = apps.map(|((app, hair), mut times)| {
+        times.sort_unstable_by(f64::total_cmp);
+        let mean = times.iter().sum::<f64>() / times.len() as f64;
+        let sleepers = app.world().get::<SleepCounts>(hair).unwrap();
+        println!("{:.2} ms, mean {mean:.2}, {} of 400 asleep", times[60], sleepers.asleep);
+        times[60]
+    });
+    assert!(median[1] < 1.3 * median[0] && median[2] < 1.3 * median[0], "{median:?}");
+}
+
+/// `heads` hairs of `strands` strands, 1 m apart, that never sleep.
+fn heads(heads: usize, strands: usize) -> (App, Vec<Entity>) {
+    let mut app = test_app(60.0);
+    app.insert_resource(HairDefault(SleepSettings::never()));
+    let golden = PI * (3.0 - 5.0_f32.sqrt());
+    let head = |x| {
+        let at = Transform::from_xyz(x as f32, 0.0, 0.0);
+        let hair = app.world_mut().spawn((Hair, at)).id();
+        app.world_mut().spawn((HairCollider::sphere(HEAD).unwrap(), at));
+        for i in 0..strands {
+            let y = (i as f32 + 0.5) / strands as f32;
+            let (sine, cosine) = (golden * i as f32).sin_cos();
+            let across = (1.0 - y * y).sqrt();
+            let normal = Vec3::new(across * cosine, y, across * sine);
+            let points: Vec<Vec3> =
+                (0..12).map(|k| normal * (HEAD + 0.002 + 0.015 * k as f32)).collect();
+            app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+        }
+        hair
+    };
+    let hairs = (0..heads).map(head).collect();
+    (app, hairs)
+}
+
+#[test]
+fn rain_on_one_hair_changes_no_bit_of_another() {
+    let places = |app: &App, hair: Entity| -> Vec<Vec3> {
+        let members = app.world().get::<Strands>(hair).unwrap().collection().to_vec();
+        members.iter().flat_map(|e| strand(app, *e).positions().to_vec()).collect()
+    };
+    let rains = |count: usize, shower: bool| {
+        let (mut app, hairs) = heads(count, 20);
+        if shower {
+            let rain = Shower { opening: 0.1, ..Shower::rain_on(Vec3::ZERO).0 };
+            app.world_mut().spawn((rain, Shower::rain_on(Vec3::ZERO).1));
+        }
+        run(&mut app, 0.8);
+        hairs.into_iter().map(|hair| places(&app, hair)).collect::<Vec<_>>()
+    };
+    let (alone, among, dry) = (rains(1, true), rains(3, true), rains(3, false));
+    assert_eq!(alone[0], among[0], "other hairs change nothing");
+    assert_ne!(alone[0], dry[0], "it rains on this one");
+    assert_eq!(among[1..], dry[1..], "and on no other");
+}
+
+#[test]
+#[ignore = "measures time: run it alone on an idle machine"]
+fn rain_on_one_of_thirty_hairs_costs_little() {
+    let mut apps = [false, true].map(|shower| {
+        let (mut app, _) = heads(30, 100);
+        if shower {
+            app.world_mut().spawn(Shower::rain_on(Vec3::ZERO));
+        }
+        run(&mut app, 2.0);
+        (app, Vec::new())
+    });
+    for _ in 0..60 {
+        for (app, times) in &mut apps {
+            let start = std::time::Instant::now();
+            app.update();
+            times.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    let [dry, rain] = apps.map(|(_, mut times)| {
+        times.sort_unstable_by(f64::total_cmp);
+        times[times.len() / 2]
+    });
+    println!("{dry:.2} ms without, {rain:.2} ms with: {:.2}", rain / dry);
+    assert!(rain < 1.3 * dry, "{dry} ms, with rain {rain} ms");
+}
+
+/// How fast two strands approach each other after the first substep of a tick (m/s).
+#[derive(Resource, Default)]
+struct FirstApproach(f32);
+
+fn watch_approach(step: Res<HairStep>, strands: Query<&Strand>, mut seen: ResMut<FirstApproach>) {
+    if step.index == 0 {
+        let ends = strands.iter().map(|s| s.velocities()[8].x);
+        seen.0 = ends.reduce(|a, b| a - b).unwrap_or_default();
+    }
+}
+
+#[test]
+fn bridges_of_water_act_from_the_first_substep_on() {
+    let approach = [0.0, 10.0].map(|cohesion| {
+        let mut app = test_app(60.0);
+        no_gravity(&mut app);
+        app.insert_resource(HairSubsteps::Fixed(2))
+            .init_resource::<FirstApproach>()
+            .add_systems(HairTick, watch_approach.in_set(HairSystems::Last));
+        let wetting = HairWetting { cohesion, film_drag: 0.0, evaporation: 0.0, ..default() };
+        app.insert_resource(HairDefault(wetting));
+        let hair = app.world_mut().spawn(Hair).id();
+        // As far apart as a bridge of water just joins them, farther than lists of fast dry strands reach.
+        let pair = [0.0, 3.1e-3].map(|x| {
+            let points: Vec<Vec3> = (0..9).map(|k| Vec3::new(x, -0.01 * k as f32, 0.0)).collect();
+            app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap())).id()
+        });
+        run(&mut app, 0.2);
+        app.insert_resource(HairGravity(Vec3::NEG_Y * 9.8));
+        for strand in pair {
+            let mut strand = app.world_mut().get_mut::<Strand>(strand).unwrap();
+            strand.velocities_mut()[1..].iter_mut().for_each(|v| *v = Vec3::Z);
+        }
+        app.world_mut().write_message(SoakHair::dripping(hair));
+        app.update();
+        app.world().resource::<FirstApproach>().0
+    });
+    assert!(approach[1] > approach[0] + 0.01, "drawn together: {approach:?}");
 }

@@ -40,14 +40,6 @@ impl HairReach {
         self.members = UNKNOWN;
     }
 
-    /// Whether hair in `frame` may touch the content of `ball` within a tick of `substeps`.
-    fn is_near(&self, frame: &TickPose, ball: &Ball, substeps: u32) -> bool {
-        let apart = self.room(frame, substeps) + ball.room(substeps);
-        let squared = ball.center.distance_squared(frame.now().point_out(self.center));
-        // NaN counts as near, so that it is reported where it is used.
-        squared <= apart * apart || squared.is_nan() || apart.is_nan()
-    }
-
     /// How far from its center it may be within a tick (m).
     fn room(&self, frame: &TickPose, substeps: u32) -> f32 {
         let (before, now) = (frame.before(), frame.now());
@@ -89,9 +81,18 @@ impl Ball {
     fn room(&self, substeps: u32) -> f32 {
         self.radius + self.travel * substeps as f32
     }
+
+    /// Whether its content may come within `room` (m) of a point within a tick of `substeps`.
+    fn is_near(&self, center: Vec3, room: f32, substeps: u32) -> bool {
+        let apart = room + self.room(substeps);
+        let squared = self.center.distance_squared(center);
+        // NaN counts as near, so that it is reported where it is used.
+        squared <= apart * apart || squared.is_nan() || apart.is_nan()
+    }
 }
 
-/// All colliders in a tick of so many substeps, found by hair: in a crowd a hair is near few of them.
+/// All colliders in a tick of so many substeps, or all droplets in a substep, found by place: in a crowd a hair
+/// is near few of them.
 pub(crate) struct Colliders<T> {
     substeps: u32,
     all: Vec<(Ball, T)>,
@@ -110,10 +111,16 @@ impl<T> Colliders<T> {
         colliders: impl Iterator<Item = (&'a HairCollider, &'a TickPose, T)>,
     ) -> Self {
         let all = colliders.map(|(collider, pose, item)| (Ball::around(collider, pose), item));
-        Self::of_balls(substeps, all.collect())
+        Self::of_moving(substeps, all.collect())
     }
 
-    fn of_balls(substeps: u32, all: Vec<(Ball, T)>) -> Self {
+    /// From balls that do not move for a substep, each a center in the world and a radius (m).
+    pub(crate) fn of_balls(balls: impl Iterator<Item = ((Vec3, f32), T)>) -> Self {
+        let still = |((center, radius), item)| (Ball { center, radius, travel: 0.0 }, item);
+        Self::of_moving(1, balls.map(still).collect())
+    }
+
+    fn of_moving(substeps: u32, all: Vec<(Ball, T)>) -> Self {
         let (mut along_x, mut anywhere, mut largest) = (Vec::new(), Vec::new(), 0.0f32);
         for ((ball, _), i) in all.iter().zip(0..) {
             let room = ball.room(substeps);
@@ -136,25 +143,36 @@ impl<T> Colliders<T> {
         reach: Option<&HairReach>,
         found: &'a mut Vec<u32>,
     ) -> impl Iterator<Item = &'a T> {
+        let center = reach.map_or(Vec3::ZERO, |reach| frame.now().point_out(reach.center));
+        let room = reach.map_or(f32::INFINITY, |reach| reach.room(frame, self.substeps));
+        self.around(center, room, found)
+    }
+
+    /// Those that may come within `room` (m) of a point within the tick, in the order they were given.
+    /// `found` is scratch space.
+    pub(crate) fn around<'a>(
+        &'a self,
+        center: Vec3,
+        room: f32,
+        found: &'a mut Vec<u32>,
+    ) -> impl Iterator<Item = &'a T> + use<'a, T> {
         found.clear();
-        match reach {
-            None => found.extend((0..).take(self.all.len())),
-            Some(reach) => {
-                let x = frame.now().point_out(reach.center).x;
-                // A little more, for rounding. Without an end, or NaN, it holds all.
-                let far = 1.0001 * (reach.room(frame, self.substeps) + self.largest);
-                let beyond = |at: f32| at - x > far;
-                let short = |at: f32| x - at > far;
-                let first = self.along_x.partition_point(|(at, _)| short(*at));
-                let rest = self.along_x[first..].iter().take_while(|(at, _)| !beyond(*at));
-                let candidates = rest.map(|(_, i)| i).chain(&self.anywhere);
-                let is_near =
-                    |i: &&u32| reach.is_near(frame, &self.all[**i as usize].0, self.substeps);
-                found.extend(candidates.filter(is_near));
-                found.sort_unstable();
-            }
-        }
+        // A little more, for rounding. Without an end, or NaN, it holds all.
+        let far = 1.0001 * (room + self.largest);
+        let beyond = |at: f32| at - center.x > far;
+        let short = |at: f32| center.x - at > far;
+        let first = self.along_x.partition_point(|(at, _)| short(*at));
+        let rest = self.along_x[first..].iter().take_while(|(at, _)| !beyond(*at));
+        let candidates = rest.map(|(_, i)| i).chain(&self.anywhere);
+        let is_near = |i: &&u32| self.all[**i as usize].0.is_near(center, room, self.substeps);
+        found.extend(candidates.filter(is_near));
+        found.sort_unstable();
         found.iter().map(|i| &self.all[*i as usize].1)
+    }
+
+    /// All of them.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &T> {
+        self.all.iter().map(|(_, item)| item)
     }
 }
 
@@ -179,9 +197,10 @@ mod tests {
         let frame = moving(Pose { scale: 2.0, ..default() }, Vec3::Y * 5e-3);
         let is_near = |distance: f32| {
             let ball = Ball { center: Vec3::X * distance, radius: 0.05, travel: 0.01 };
-            let all = Colliders::of_balls(6, vec![(ball, ())]);
+            let all = Colliders::of_moving(6, vec![(ball, ())]);
             let found = all.near(&frame, Some(&reach), &mut Vec::new()).count() == 1;
-            assert_eq!(found, reach.is_near(&frame, &ball, 6));
+            let center = frame.now().point_out(reach.center);
+            assert_eq!(found, ball.is_near(center, reach.room(&frame, 6), 6));
             found
         };
         let touches = REACH_MARGIN * 0.1 * 2.0 + 0.05 + (5e-3 + 0.01) * 6.0;
@@ -228,11 +247,12 @@ mod tests {
                 .collect();
             let reach = HairReach { radius, center: Vec3::X * 0.1, ..default() };
             let frame = moving(Pose { translation: at.into(), ..default() }, Vec3::Z * 0.01);
+            let center = frame.now().point_out(reach.center);
             let one_by_one: Vec<i32> = balls.iter()
-                .filter(|(ball, _)| reach.is_near(&frame, ball, substeps))
+                .filter(|(ball, _)| ball.is_near(center, reach.room(&frame, substeps), substeps))
                 .map(|(_, i)| *i)
                 .collect();
-            let all = Colliders::of_balls(substeps, balls);
+            let all = Colliders::of_moving(substeps, balls);
             let mut scratch = Vec::new();
             let found: Vec<i32> = all.near(&frame, Some(&reach), &mut scratch).copied().collect();
             prop_assert_eq!(found, one_by_one);

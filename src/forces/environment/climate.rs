@@ -10,7 +10,8 @@ setting! {
     pub struct HairClimate {
         /// Temperature.
         pub celsius: f32 = 22.0, "°C" in CELSIUS: -60.0..=100.0, safe -20.0..=50.0, "a room has 22";
-        /// Relative humidity. At 0.5 hair is dry; damper air wets it.
+        /// Relative humidity. At 0.5 hair is dry; from damper air it takes up vapour, in an hour or so, which
+        /// opens hydrogen bonds.
         pub humidity: f32 = 0.5, in HUMIDITY: 0.0..=1.0, "a room has 0.5";
         /// Speed of the draught.
         pub draught: f32 = 0.1, "m/s" in DRAUGHT: 0.0..=100.0, safe 0.0..=10.0, "a room has 0.1";

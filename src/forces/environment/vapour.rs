@@ -64,6 +64,10 @@ pub fn regain(humidity: f32) -> f32 {
 /// The humidity of a room, at which hair counts as dry.
 pub(crate) const ROOM_HUMIDITY: f32 = 0.5;
 
+/// The relative humidity of air that counts as saturated: in air without any drive hair would not take up
+/// vapour either.
+const SATURATED: f32 = 0.995;
+
 /// The wetness that hair takes on in air of a relative humidity: 0 in a room and in drier air, 1 in
 /// saturated air.
 pub(crate) fn equilibrium(humidity: f32) -> f32 {
@@ -107,6 +111,7 @@ impl DryingAir {
 
     /// The air of a room; temperature in °C, relative humidity 0…1, draught in m/s.
     pub fn new(celsius: f32, humidity: f32, draught: f32) -> Self {
+        let humidity = humidity.min(SATURATED);
         let vapour = humidity * saturated(celsius);
         let drives = core::array::from_fn(|i| drive(celsius + i as f32 * Self::STEP, vapour));
         Self { celsius, draught, equilibrium: equilibrium(humidity), drives }
@@ -161,8 +166,21 @@ mod tests {
         for (rh, percent) in [(0.3, 6.0), (0.5, 9.8), (0.65, 12.8), (0.8, 17.5), (0.9, 23.0)] {
             assert!((100.0 * regain(rh) - percent).abs() < 0.7, "{rh}");
         }
-        assert_eq!(equilibrium(0.5), 0.0);
-        assert!((equilibrium(1.0) - 1.0).abs() < 1e-6);
+    }
+
+    /// Of what hair binds beyond the regain in a room, by the same table; 31 % in saturated air.
+    #[test]
+    fn wetness_in_damp_air_is_that_of_the_table() {
+        for (rh, percent) in [(0.3, 6.0), (0.5, 9.8), (0.65, 12.8), (0.8, 17.5), (0.9, 23.0)] {
+            let wetness = (percent - 9.8) / (31.0 - 9.8_f32);
+            assert!((equilibrium(rh) - wetness.max(0.0)).abs() < 0.02, "{rh}: {}", equilibrium(rh));
+        }
+        for rh in [0.9, 0.97, 1.0] {
+            let air = DryingAir::new(22.0, rh, 0.1);
+            // How fast hair takes up vapour: the drive over what is missing to saturation.
+            let uptake = air.drive(0.0) / (1.0 - air.equilibrium);
+            assert!((1e-3..1.6e-3).contains(&uptake), "{rh}: {uptake}");
+        }
     }
 
     #[test]

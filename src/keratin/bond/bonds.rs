@@ -46,6 +46,9 @@ pub struct BondChanges {
     joints: Vec<[f32; BondKind::COUNT]>,
     #[reflect(ignore)]
     any: bool,
+    /// Whether they wake a strand that sleeps.
+    #[reflect(ignore)]
+    wake: bool,
 }
 
 /// More joints than any strand has; requests beyond are ignored.
@@ -59,13 +62,19 @@ impl BondChanges {
     /// ones are ignored; peptide bonds are never cut.
     #[inline]
     pub fn request(&mut self, joint: usize, kind: BondKind, change: f32) {
+        self.wake |= self.request_quietly(joint, kind, change);
+    }
+
+    /// The same of a change too small to wake a strand that sleeps. Returns whether it is not ignored.
+    #[inline]
+    pub(crate) fn request_quietly(&mut self, joint: usize, kind: BondKind, change: f32) -> bool {
         if change == 0.0 || !change.is_finite() || (kind == BondKind::Peptide && change < 0.0) {
-            return;
+            return false;
         }
         if joint >= self.joints.len() {
             // The strand's number of joints is not known here; no strand has more than this.
             if joint >= MAX_JOINTS {
-                return;
+                return false;
             }
             self.joints.resize(joint + 1, [0.0; BondKind::COUNT]);
         }
@@ -73,11 +82,17 @@ impl BondChanges {
         // The sum of two huge requests must stay finite.
         *sum = (*sum + change).clamp(-MAX_CHANGE, MAX_CHANGE);
         self.any = true;
+        true
     }
 
     /// Whether nothing was requested.
     pub fn is_empty(&self) -> bool {
         !self.any
+    }
+
+    /// Whether what was requested wakes a strand that sleeps.
+    pub(super) fn wake(&self) -> bool {
+        self.wake
     }
 
     /// Prefetches the requests.
@@ -92,7 +107,7 @@ impl BondChanges {
 
     /// Clears all requests, and frees memory for joints beyond the strand's `edges`.
     pub(super) fn clear(&mut self, edges: usize) {
-        self.any = false;
+        (self.any, self.wake) = (false, false);
         if self.joints.len() > edges {
             self.joints.truncate(edges);
             self.joints.shrink_to_fit();

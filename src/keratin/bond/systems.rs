@@ -240,7 +240,9 @@ fn update_bonds(
     for_each_part(CHANGE, tables(&mut strands), Vec::new, |items: &mut Vec<Changing<'_>>, rows| {
         items.extend(rows.filter(|(_, _, changes, ..)| !changes.is_empty()));
         in_turn(items, AHEAD, ahead, |(strand, bonds, changes, rest, sleep)| {
-            sleep.wake();
+            if changes.wake() {
+                sleep.wake();
+            }
             rest.closed = false;
             change(level, frames(strand), &mut bonds.joints, changes.requested());
             changes.clear(strand.edges());

@@ -306,9 +306,10 @@ fn update_sleep(
             || bonds.is_changed()
             || sleep.bypass_change_detection().take_disturbed()
             || !changes.is_empty()
-            || !added_mass.mass.is_empty()
+            || !added_mass.in_water.is_empty()
+            || !added_mass.mass.is_empty() && water.is_none_or(Moisture::is_untouched)
             || treatments.is_some_and(|t| !t.acting().is_empty())
-            || water.is_some_and(|water| !water.is_untouched());
+            || water.is_some_and(Moisture::has_film);
         items.push(SleepCandidate { hair, strand, sleep, still, held, restless });
     }
     let seconds = step.dt * step.count as f32;

@@ -6,7 +6,7 @@ use super::super::{
 };
 use super::{AFTER_DRIP, HairWetting, Moisture, node_lengths, sheen};
 use crate::forces::environment::vapour::{DryingAir, WATER, transfer};
-use bevy::prelude::*;
+use bevy::{math::ops::exp_m1, prelude::*};
 use core::f32::consts::PI;
 
 /// Courant number of the film's flow: how far it moves in one step, as a share of a segment.
@@ -164,6 +164,32 @@ impl Moisture {
             }
             self.sheen[i] = sheen(*film, self.wetness[i], conditions.held);
         }
+    }
+
+    /// A step of hair without a film: bound water goes toward the air's equilibrium, exactly in a step of
+    /// any length. Returns the largest change of wetness. The arrays must have an element for each node.
+    pub(crate) fn equilibrate(
+        &mut self,
+        lengths: &[f32],
+        conditions: &WaterConditions<'_>,
+        exposure: impl Fn(usize) -> Option<Exposure>,
+        loss: &mut WaterLoss,
+    ) -> f32 {
+        let equilibrium = conditions.air.equilibrium;
+        let per_drying = conditions.capacity * f64::from((1.0 - equilibrium).max(1e-3));
+        let share = |drying: f64| f64::from(-exp_m1(-(drying / per_drying) as f32));
+        let (still, mut moved) = (share(conditions.still), 0.0_f32);
+        for (i, length) in node_lengths(lengths).enumerate() {
+            let capacity = conditions.capacity * f64::from(length);
+            let share = exposure(i).map_or(still, |exposed| share(conditions.drying(&exposed)));
+            let lost = (self.bound[i] - capacity * f64::from(equilibrium)) * share;
+            self.bound[i] -= lost;
+            loss.evaporated += lost;
+            let wetness = ((self.bound[i] / capacity) as f32).clamp(0.0, 1.0);
+            moved = moved.max((wetness - self.wetness[i]).abs());
+            (self.wetness[i], self.sheen[i]) = (wetness, wetness);
+        }
+        moved
     }
 
     /// The film flows along each segment under gravity and spreads by wicking.
@@ -329,6 +355,40 @@ mod tests {
         let expected = (-rate * seconds / capacity).exp() as f32;
         assert!(expected < 0.95, "{expected}");
         assert!(m.wetness().iter().all(|wet| (wet - expected).abs() < 1e-3), "{:?}", m.wetness());
+    }
+
+    /// One long step is as many short ones, and those are what the exchange does without a film.
+    #[test]
+    fn a_step_to_equilibrium_is_exact_however_long() {
+        let (points, lengths) = hanging_strand(4);
+        let (wetting, air) = (HairWetting::default(), DryingAir::new(22.0, 0.8, 0.1));
+        let soaked = |share: f32| {
+            let mut m = Moisture::default();
+            m.fit(5);
+            m.soak(share, 0.0, node_lengths(&lengths).map(|l| wetting.capacity() * f64::from(l)));
+            m
+        };
+        let step = |seconds| WaterConditions::new(wetting, Vec3::ZERO, &air, 1.0, seconds);
+        for share in [0.0, 1.0] {
+            let [mut long, mut short, mut fine] = [0; 3].map(|_| soaked(share));
+            let [mut long_loss, mut loss] = [0; 2].map(|_| WaterLoss::default());
+            let moved = long.equilibrate(&lengths, &step(1000.0), |_| None, &mut long_loss);
+            for _ in 0..1000 {
+                short.equilibrate(&lengths, &step(1.0), |_| None, &mut loss);
+                fine.exchange(&points, &lengths, &step(1.0), |_| None, &mut default());
+            }
+            let w = [&long, &short, &fine].map(|m| m.wetness()[2]);
+            assert!((w[0] - w[1]).abs() < 1e-4 && (w[0] - w[2]).abs() < 2e-3, "{w:?}");
+            assert!((moved - (w[0] - share).abs()).abs() < 1e-6 && moved > 0.02, "{moved}");
+            assert!((long.volume() + long_loss.evaporated - soaked(share).volume()).abs() < 1e-18);
+            long.equilibrate(&lengths, &step(1e9), |_| None, &mut long_loss);
+            assert!((long.wetness()[0] - air.equilibrium).abs() < 1e-6);
+        }
+        // In saturated air as well.
+        let (fog, mut m) = (DryingAir::new(22.0, 1.0, 0.1), soaked(0.0));
+        let step = WaterConditions::new(wetting, Vec3::ZERO, &fog, 1.0, 1e5);
+        m.equilibrate(&lengths, &step, |_| None, &mut default());
+        assert!(m.wetness()[2] > 0.95, "{}", m.wetness()[2]);
     }
 
     #[test]

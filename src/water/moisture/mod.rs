@@ -97,6 +97,11 @@ impl HairWetting {
         Lock { diameter: 2.0 * self.lock_radius(), dry_mass, fibres: dry_mass / KERATIN }
     }
 
+    /// The share of the difference by which hydrogen bonds follow the water in some seconds.
+    pub(super) fn bonds_follow(&self, seconds: f32) -> f32 {
+        1.0 - bevy::math::ops::exp(-seconds / self.bond_time.max(1e-9))
+    }
+
     /// Capacity for bound water of a metre of strand, beyond the regain at room humidity (m³/m).
     pub fn capacity(&self) -> f64 {
         f64::from(self.dry_mass() * SATURATION) / WATER
@@ -117,6 +122,12 @@ pub struct Moisture {
     bound: Vec<f64>,
     wetness: Vec<f32>,
     sheen: Vec<f32>,
+    /// How far the wetness or the bonds of hair without a film have moved since that last woke it.
+    #[reflect(ignore)]
+    drift: f32,
+    /// Whether it was set at once and bonds have yet to follow.
+    #[reflect(ignore)]
+    hurries: bool,
     /// How much of it the ledger has counted (m³).
     #[reflect(ignore)]
     counted: Counted,
@@ -128,10 +139,18 @@ pub(super) const AFTER_DRIP: f64 = 0.7;
 /// Share of a node's film capacity at which it looks fully wet.
 const SHINES_AT: f64 = 0.15;
 
+/// Change of wetness or of bonds that moves nodes by less than can be seen.
+const SMALL: f32 = 0.01;
+
 impl Moisture {
     /// Whether the strand has had no water since it was last dry.
     pub fn is_untouched(&self) -> bool {
         self.film.is_empty()
+    }
+
+    /// Whether there is a film on it: then it is wet. Hair whose water is all bound is damp.
+    pub fn has_film(&self) -> bool {
+        self.film.iter().any(|film| *film > 0.0)
     }
 
     /// The film on each node (m³).
@@ -178,6 +197,7 @@ impl Moisture {
     /// Returns the first invalid value.
     pub(super) fn repair(&mut self) -> Option<String> {
         let nodes = self.film.len();
+        self.hurries = nodes > 0;
         let mut found = None;
         for (name, volumes) in [("film", &mut self.film), ("bound water", &mut self.bound)] {
             if volumes.len() != nodes {
@@ -225,6 +245,7 @@ impl Moisture {
         film: f64,
         capacities: impl Iterator<Item = f64>,
     ) -> f64 {
+        self.hurries = true;
         self.film.fill(film);
         for ((bound, wetness), capacity) in
             self.bound.iter_mut().zip(&mut self.wetness).zip(capacities)
@@ -248,7 +269,13 @@ impl Moisture {
     ) -> f64 {
         let counted = core::mem::take(&mut self.counted);
         let held = super::model::clinging(wetting.bundle(1.0), gravity);
-        *self = Self { film: film.to_vec(), bound: bound.to_vec(), counted, ..default() };
+        *self = Self {
+            film: film.to_vec(),
+            bound: bound.to_vec(),
+            counted,
+            hurries: true,
+            ..default()
+        };
         for ((film, bound), length) in film.iter().zip(bound).zip(node_lengths(lengths)) {
             let capacity = wetting.capacity() * f64::from(length);
             let wetness = ((bound / capacity) as f32).clamp(0.0, 1.0);
@@ -272,6 +299,23 @@ impl Moisture {
     /// Marks its water as not counted and returns it (m³): a removed component may be inserted elsewhere.
     pub(super) fn take_counted(&mut self) -> f64 {
         core::mem::take(&mut self.counted).0
+    }
+
+    /// Whether it changes so fast that every substep counts: there is a film, or bonds have yet to follow.
+    pub(super) fn is_busy(&self) -> bool {
+        self.hurries || self.has_film()
+    }
+
+    /// Notes by how much wetness or bonds have changed, and how far bonds would go in the next second.
+    /// Returns whether the sum of the changes has to wake the strand.
+    pub(super) fn note_change(&mut self, by: f32, to_come: f32) -> bool {
+        self.drift += by;
+        self.hurries = to_come > SMALL;
+        let wakes = self.drift > SMALL;
+        if wakes {
+            self.drift = 0.0;
+        }
+        wakes
     }
 
     /// Prefetches it.
