@@ -1,6 +1,7 @@
 //! The kernels of the app's device: asked for by the main world, compiled in the render world.
 
 use super::{
+    constants::source,
     pipelines::{COUNT, HairKernels, KERNELS, layouts},
     residence::{HairGpu, WhyCpu},
 };
@@ -62,8 +63,9 @@ impl Sources {
     /// `None` in an app without shaders.
     pub(super) fn add(world: &mut World) -> Option<Self> {
         let mut shaders = world.get_resource_mut::<Assets<Shader>>()?;
-        Some(Self(KERNELS.map(|(name, source, _)| {
-            let mut shader = Shader::from_wgsl(source, format!("bevy_keratin/gpu/{name}.wgsl"));
+        Some(Self(KERNELS.map(|(name, files, _)| {
+            let mut shader =
+                Shader::from_wgsl(source(files), format!("bevy_keratin/gpu/{name}.wgsl"));
             // An index out of range must stay without effect, whatever it would cost to find it.
             shader.validate_shader = ValidateShader::Enabled;
             shaders.add(shader)

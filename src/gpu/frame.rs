@@ -107,10 +107,10 @@ fn run(
     if extracted.hairs.is_empty() {
         return;
     }
-    let hairs = extracted.hairs.iter().map(|frame| (frame.link.lock(), frame));
     // What is left of a lost device belongs to nobody.
     let present = compiled.map_or(0, |compiled| compiled.device());
-    let mut hairs: Vec<_> = hairs.filter(|(shared, _)| shared.is_on(present)).collect();
+    let hairs = extracted.hairs.iter().filter(|frame| frame.link.is_on(present));
+    let mut hairs: Vec<_> = hairs.map(|frame| (frame.link.lock(), frame)).collect();
     let most = extracted.ticks;
     let counts: Vec<usize> = hairs.iter_mut().map(|(shared, _)| shared.upload(most)).collect();
     let mut encoder = device.create_command_encoder(&default());

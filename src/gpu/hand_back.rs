@@ -159,12 +159,12 @@ fn take_unused(world: &mut World, hair: Entity) -> UnusedSpins {
 /// Puts a state into the strands. What the game has written stays: a pose whole, with its velocities;
 /// velocities alone; bonds.
 fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents, unused: UnusedSpins) {
-    let shared = gpu.link.lock();
-    let layout = shared.strands.layout();
+    let link = gpu.link.clone();
+    let layout = &*link.layout;
     let now = world.change_tick();
     let is_tied = gpu.is_tied;
     if gpu.fingerprints.is_empty() {
-        gpu.fingerprints = shared.strands.take_fingerprints();
+        gpu.fingerprints = link.lock().strands.take_fingerprints();
     }
     for (index, member) in gpu.members.iter().enumerate() {
         let Ok(mut entity) = world.get_entity_mut(*member) else { continue };
@@ -235,7 +235,6 @@ fn write_back(world: &mut World, gpu: &mut GpuHair, state: &Contents, unused: Un
             moisture.set_changed();
         }
     }
-    drop(shared);
 }
 
 /// Substeps that wait at most for a frame: after ten seconds without one they are run all the same.
@@ -258,17 +257,16 @@ pub(super) fn collect(world: &mut World) {
         let waiting = world.get_mut::<GpuJournal>(hair);
         let waiting = waiting.filter(|journal| journal.is_long(MOST_WAITING));
         let waiting = waiting.map(|mut journal| core::mem::take(&mut journal.records));
-        let mut shared = link.lock();
         if let Some(mut waiting) = waiting {
+            let mut shared = link.lock();
             shared.pending.append(&mut waiting);
             shared.run_pending();
         }
-        let is_lost = !shared.is_on(present);
-        let state = shared.take_state();
-        let reports: Vec<Measured> = core::iter::from_fn(|| shared.take_report()).collect();
-        let named = |report: &Measured| shared.strands.layout().strand_of(report.first?);
+        let is_lost = !link.is_on(present);
+        let state = link.take_state();
+        let reports: Vec<Measured> = core::iter::from_fn(|| link.take_report()).collect();
+        let named = |report: &Measured| link.layout.strand_of(report.first?);
         let reports: Vec<_> = reports.iter().map(|report| (*report, named(report))).collect();
-        drop(shared);
         for (report, strand) in reports {
             apply_report(world, hair, &report, strand);
         }

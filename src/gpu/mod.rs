@@ -90,6 +90,7 @@
 //! written, and with three guides 573 in the tick's last one, with 208 read and 64 written.
 
 mod compile;
+mod constants;
 mod fingerprint;
 mod followers;
 mod frame;

@@ -1,6 +1,6 @@
 //! The kernels on a device.
 
-use super::record::WORDS;
+use super::{constants::source, record::WORDS};
 use bevy::render::{
     render_resource::{
         BindGroupLayout, BindGroupLayoutEntries, BindGroupLayoutEntry, ComputePipeline,
@@ -13,9 +13,13 @@ use bevy::render::{
     renderer::RenderDevice,
 };
 use core::num::NonZeroU64;
+use std::sync::LazyLock;
 
-/// The shader source of a substep, of strands and of followers, concatenated from its files.
-pub const SOURCE: &str = concat!(
+/// The shader source of a substep, of strands and of followers.
+pub static SOURCE: LazyLock<String> = LazyLock::new(|| source(SUBSTEP));
+
+/// Its files.
+const SUBSTEP: &str = concat!(
     include_str!("wgsl/math.wgsl"),
     include_str!("wgsl/strand.wgsl"),
     include_str!("wgsl/obstacle.wgsl"),
@@ -32,16 +36,16 @@ pub const SOURCE: &str = concat!(
 pub(super) const COUNT: usize = 8;
 const GROUPS: usize = 6;
 
-/// Entry points with their sources and which of [`layouts`] they bind.
+/// Entry points with their files and which of [`layouts`] they bind.
 pub(super) const KERNELS: [(&str, &str, &[usize]); COUNT] = [
-    ("substep", SOURCE, &[0, 1]),
+    ("substep", SUBSTEP, &[0, 1]),
     ("present", include_str!("wgsl/present.wgsl"), &[2]),
     ("measure", include_str!("wgsl/measure.wgsl"), &[3]),
     ("lead", include_str!("wgsl/lead.wgsl"), &[4, 1]),
     ("lead_followers", include_str!("wgsl/lead.wgsl"), &[4, 1]),
-    ("follow", SOURCE, &[0, 1]),
+    ("follow", SUBSTEP, &[0, 1]),
     ("sleep", include_str!("wgsl/sleep.wgsl"), &[5, 1]),
-    ("sweep", SOURCE, &[0, 1]),
+    ("sweep", SUBSTEP, &[0, 1]),
 ];
 
 /// The groups that kernels bind, with their labels: a hair, a record, what packing, measuring, leading
@@ -98,9 +102,9 @@ impl HairKernels {
     pub fn new(device: &RenderDevice) -> Self {
         let layouts =
             layouts().map(|(label, entries)| device.create_bind_group_layout(label, &entries[..]));
-        let pipelines = KERNELS.map(|(name, source, groups)| {
+        let pipelines = KERNELS.map(|(name, files, groups)| {
             let groups: Vec<_> = groups.iter().map(|group| &layouts[*group]).collect();
-            pipeline(device, name, source, &groups)
+            pipeline(device, name, &source(files), &groups)
         });
         Self::of(layouts, pipelines)
     }

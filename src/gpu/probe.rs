@@ -52,7 +52,7 @@ pub(super) fn probe(world: &mut World) {
     let mut hairs = world.query::<(Entity, &mut GpuHair)>();
     for (hair, mut gpu) in hairs.iter_mut(world) {
         let gpu = gpu.bypass_change_detection();
-        let answer = gpu.link.lock().take_probed();
+        let answer = gpu.link.take_probed();
         if let Some((strands, tick)) = answer {
             gpu.probe_turn += AT_ONCE;
             let age = gpu.ticks.saturating_sub(tick);

@@ -244,6 +244,9 @@ pub struct SleepRecord {
     pub dt: f32,
 }
 
+/// The word of the report that holds the last tick in which the hair slept.
+pub(super) const SLEPT: usize = 11;
+
 /// The words of the report that hold whether a strand was not still at the end of a tick, of three ticks in
 /// turn; and how many words it has with them.
 pub(super) const RESTLESS: usize = 16;
@@ -260,16 +263,23 @@ impl SleepRecord {
     }
 }
 
-const CARRIES: u32 = 1;
-const SHAPES: u32 = 2;
-const REMEMBERS: u32 = 4;
-const NOTES_BEFORE: u32 = 8;
-const RESTS: u32 = 16;
-const TARGETS_ROOTS: u32 = 32;
-const HOLDS: u32 = 64;
-const FOLLOWS: u32 = 128;
-const WAKES: u32 = 256;
-const SWEEPS: u32 = 512;
+// Flags of a record.
+pub(super) const CARRIES: u32 = 1;
+pub(super) const SHAPES: u32 = 2;
+pub(super) const REMEMBERS: u32 = 4;
+pub(super) const NOTES_BEFORE: u32 = 8;
+pub(super) const RESTS: u32 = 16;
+pub(super) const TARGETS_ROOTS: u32 = 32;
+pub(super) const HOLDS: u32 = 64;
+pub(super) const FOLLOWS: u32 = 128;
+pub(super) const WAKES: u32 = 256;
+pub(super) const SWEEPS: u32 = 512;
+
+// Kinds of obstacles.
+pub(super) const HALF_SPACE: u32 = 0;
+pub(super) const CAPSULE: u32 = 1;
+pub(super) const CYLINDER: u32 = 2;
+pub(super) const ELLIPSOID: u32 = 3;
 
 impl SubstepRecord {
     /// Appends the record's words.
@@ -387,18 +397,18 @@ impl Words<'_> {
         };
         let (kind, a, b, radius, half_height) = match *solid {
             Solid::Placed(ref placed) => match ellipsoid {
-                Some((axes, half)) => (3, placed.center, axes.x_axis, half.x, half.y),
-                None => (1, FAR, Vec3::ZERO, 0.0, 0.0),
+                Some((axes, half)) => (ELLIPSOID, placed.center, axes.x_axis, half.x, half.y),
+                None => (CAPSULE, FAR, Vec3::ZERO, 0.0, 0.0),
             },
-            Solid::HalfSpace { normal, point } => (0, normal, point, 0.0, 0.0),
-            Solid::Capsule { a, b, radius } => (1, a, b - a, radius, 0.0),
+            Solid::HalfSpace { normal, point } => (HALF_SPACE, normal, point, 0.0, 0.0),
+            Solid::Capsule { a, b, radius } => (CAPSULE, a, b - a, radius, 0.0),
             Solid::Cylinder { center, axis, radius, half_height } => {
-                (2, center, axis, radius, half_height)
+                (CYLINDER, center, axis, radius, half_height)
             }
         };
         let (axis, thickness) = match kind {
-            0 => (Vec3::ZERO, 0.0),
-            1 => (b.normalize_or_zero(), radius),
+            HALF_SPACE => (Vec3::ZERO, 0.0),
+            CAPSULE => (b.normalize_or_zero(), radius),
             _ => (b, radius.min(half_height)),
         };
         let across = b.try_normalize().map_or(Vec3::Y, |u| u.any_orthonormal_vector());

@@ -2,10 +2,10 @@
 //! which runs what was written down.
 
 use super::{
-    layout::Contents,
+    layout::{Contents, Layout},
     pipelines::HairKernels,
     present::{DrawnMoment, DrawnNodes},
-    record::{MAX_TARGETS, SubstepRecord},
+    record::{MAX_TARGETS, SLEPT, SubstepRecord},
     strands::{GpuStrands, REPORT_BYTES, read_mapped},
 };
 use bevy::{
@@ -26,11 +26,16 @@ const MOST_LATE: usize = 60;
 
 /// One hair; whoever has it at hand may run its substeps, which are kept in order.
 #[derive(Clone)]
-pub(super) struct Link(Arc<Mutex<Shared>>);
-
-pub(super) struct Shared {
+pub(super) struct Link {
+    shared: Arc<Mutex<Shared>>,
+    replies: Arc<Mutex<Replies>>,
+    pub(super) layout: Arc<Layout>,
     /// The number of its device.
     number: u64,
+}
+
+/// Locked by the render world while it encodes a frame.
+pub(super) struct Shared {
     pub(super) device: RenderDevice,
     pub(super) queue: RenderQueue,
     pub(super) kernels: Arc<HairKernels>,
@@ -43,14 +48,20 @@ pub(super) struct Shared {
     pub(super) firsts: Vec<u32>,
     /// The number of the request for the state, if there is one.
     pub(super) asked: Option<u64>,
-    copy: Option<(u64, PendingReadback)>,
-    reports: Reports,
+    replies: Arc<Mutex<Replies>>,
     /// Strands whose nodes are asked for, and the tick.
     probe: (Vec<u32>, u32),
-    probed: Option<Probed>,
     /// Frames in a row without a substep; whether it has been told that substeps are late.
     idle: u32,
     is_late: bool,
+}
+
+/// What is on its way from the device. Locked for a moment only: the main world looks for it in every frame.
+#[derive(Default)]
+pub(super) struct Replies {
+    copy: Option<(u64, PendingReadback)>,
+    reports: Reports,
+    probed: Option<Probed>,
 }
 
 /// Nodes of some strands on their way from the device.
@@ -66,14 +77,13 @@ impl Link {
         kernels: Arc<HairKernels>,
         strands: GpuStrands,
     ) -> Self {
-        let layout = strands.layout();
+        let (layout, replies) = (strands.layout().clone(), Arc::default());
         let mut next = 0;
         let firsts = (0..layout.strands()).map(|strand| {
             next += layout.nodes(strand) as u32;
             next - layout.nodes(strand) as u32
         });
-        Self(Arc::new(Mutex::new(Shared {
-            number,
+        let shared = Shared {
             device: device.clone(),
             queue: queue.clone(),
             kernels,
@@ -82,26 +92,68 @@ impl Link {
             pending: Vec::new(),
             drawn: None,
             asked: None,
-            copy: None,
-            reports: Reports::default(),
+            replies: Arc::clone(&replies),
             probe: Default::default(),
-            probed: None,
             idle: 0,
             is_late: false,
-        })))
+        };
+        Self { shared: Arc::new(Mutex::new(shared)), replies, layout, number }
     }
 
+    /// May wait until the render world has encoded a frame.
     pub(super) fn lock(&self) -> MutexGuard<'_, Shared> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
 
-impl Shared {
+    fn replies(&self) -> MutexGuard<'_, Replies> {
+        self.replies.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Whether it is on the device of this number.
     pub(super) fn is_on(&self, device: u64) -> bool {
         self.number == device
     }
 
+    /// The nodes of strands that were asked for, and of which tick they are.
+    pub(super) fn take_probed(&self) -> Option<(Vec<(u32, Vec<Vec3>)>, u32)> {
+        let Probed { strands, tick, crossing } = {
+            let probed = &mut self.replies().probed;
+            probed.take_if(|probed| probed.crossing.has_arrived())?
+        };
+        let bytes = crossing.take()??;
+        let mut places = bytes.chunks_exact(16).map(|place| {
+            let number =
+                |i: usize| f32::from_le_bytes([place[i], place[i + 1], place[i + 2], place[i + 3]]);
+            Vec3::new(number(0), number(4), number(8))
+        });
+        let of = |strand: u32| {
+            let nodes = self.layout.nodes(strand as usize);
+            (strand, places.by_ref().take(nodes).collect())
+        };
+        Some((strands.into_iter().map(of).collect(), tick))
+    }
+
+    /// The state that has arrived, with the number of its request; `Err` where the device failed.
+    pub(super) fn take_state(&self) -> Option<(u64, Result<Contents, ()>)> {
+        let arrived = |(_, crossing): &mut (u64, PendingReadback)| crossing.has_arrived();
+        let (number, crossing) = self.replies().copy.take_if(arrived)?;
+        let read = |bytes: Vec<u8>| Contents::of_bytes(&self.layout, &bytes);
+        Some((number, crossing.take()?.map(read).ok_or(())))
+    }
+
+    /// A report that has arrived.
+    pub(super) fn take_report(&self) -> Option<Measured> {
+        let reports = &mut self.replies().reports;
+        let bytes = reports.0.front()?.take()?;
+        let crossing = reports.0.pop_front()?;
+        let report = Measured::of(&bytes?);
+        crossing.is_mapped.store(false, Ordering::Release);
+        reports.1.push(crossing);
+        Some(report)
+    }
+}
+
+impl Shared {
     /// Hands pending substeps to the device, of so many ticks at most; returns how many there are. What is left
     /// waits for the next frame, unless the state is asked for or that much waits that it has to be run first.
     pub(super) fn upload(&mut self, ticks: usize) -> usize {
@@ -201,17 +253,19 @@ impl Shared {
 
     /// Copies what was asked for, and the report.
     pub(super) fn copy(&mut self, encoder: &mut CommandEncoder, has_run: bool) {
-        if self.copy.is_none()
+        let replies = self.replies.clone();
+        let mut replies = replies.lock().unwrap_or_else(PoisonError::into_inner);
+        if replies.copy.is_none()
             && let Some(number) = self.asked.take()
         {
             let size = Contents::bytes(self.strands.layout());
             let crossing = PendingReadback::new(&self.device, size);
             self.strands.copy_state(encoder, &crossing.buffer);
-            self.copy = Some((number, crossing));
+            replies.copy = Some((number, crossing));
         }
-        self.copy_probed(encoder);
+        self.copy_probed(&mut replies, encoder);
         if has_run {
-            self.reports.copy(&self.device, &self.strands.report, encoder);
+            replies.reports.copy(&self.device, &self.strands.report, encoder);
         }
     }
 
@@ -222,10 +276,10 @@ impl Shared {
         self.probe.1 = tick;
     }
 
-    fn copy_probed(&mut self, encoder: &mut CommandEncoder) {
+    fn copy_probed(&mut self, replies: &mut Replies, encoder: &mut CommandEncoder) {
         let late = self.waiting_ticks();
         let (strands, tick) = &mut self.probe;
-        if self.probed.is_some() || strands.is_empty() {
+        if replies.probed.is_some() || strands.is_empty() {
             return;
         }
         let layout = self.strands.layout();
@@ -240,54 +294,19 @@ impl Shared {
             self.strands.copy_place((strand as usize, node), encoder, &crossing.buffer, 16 * to);
         }
         let tick = tick.saturating_sub(late as u32);
-        self.probed = Some(Probed { strands: core::mem::take(strands), tick, crossing });
-    }
-
-    /// The nodes of strands that were asked for, and of which tick they are.
-    pub(super) fn take_probed(&mut self) -> Option<(Vec<(u32, Vec<Vec3>)>, u32)> {
-        let bytes = self.probed.as_ref()?.crossing.take()?;
-        let Probed { strands, tick, .. } = self.probed.take()?;
-        let bytes = bytes?;
-        let mut places = bytes.chunks_exact(16).map(|place| {
-            let number =
-                |i: usize| f32::from_le_bytes([place[i], place[i + 1], place[i + 2], place[i + 3]]);
-            Vec3::new(number(0), number(4), number(8))
-        });
-        let layout = self.strands.layout();
-        let of = |strand: u32| {
-            let nodes = layout.nodes(strand as usize);
-            (strand, places.by_ref().take(nodes).collect())
-        };
-        Some((strands.into_iter().map(of).collect(), tick))
+        replies.probed = Some(Probed { strands: core::mem::take(strands), tick, crossing });
     }
 
     /// After the submission: has the copies mapped.
     pub(super) fn map(&self) {
-        if let Some((_, crossing)) = &self.copy {
+        let replies = self.replies.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, crossing)) = &replies.copy {
             crossing.map(&self.device);
         }
-        if let Some(probed) = &self.probed {
+        if let Some(probed) = &replies.probed {
             probed.crossing.map(&self.device);
         }
-        self.reports.0.iter().for_each(|crossing| crossing.map(&self.device));
-    }
-
-    /// The state that has arrived, with the number of its request; `Err` where the device failed.
-    pub(super) fn take_state(&mut self) -> Option<(u64, Result<Contents, ()>)> {
-        let bytes = self.copy.as_ref()?.1.take()?;
-        let (number, _) = self.copy.take()?;
-        let read = |bytes: Vec<u8>| Contents::of_bytes(self.strands.layout(), &bytes);
-        Some((number, bytes.map(read).ok_or(())))
-    }
-
-    /// A report that has arrived.
-    pub(super) fn take_report(&mut self) -> Option<Measured> {
-        let bytes = self.reports.0.front()?.take()?;
-        let crossing = self.reports.0.pop_front()?;
-        let report = Measured::of(&bytes?);
-        crossing.is_mapped.store(false, Ordering::Release);
-        self.reports.1.push(crossing);
-        Some(report)
+        replies.reports.0.iter().for_each(|crossing| crossing.map(&self.device));
     }
 }
 
@@ -320,6 +339,11 @@ impl PendingReadback {
                 *arrived.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes);
             });
         }
+    }
+
+    /// Whether that is known.
+    fn has_arrived(&self) -> bool {
+        self.arrived.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
     /// What it held, once that is known.
@@ -378,7 +402,7 @@ impl Measured {
             high: [4, 5, 6].map(|i| number(words[i])),
             low: [7, 8, 9].map(|i| number(!words[i])),
             speed: f32::from_bits(words[10]).sqrt(),
-            slept: words[11],
+            slept: words[SLEPT],
         }
     }
 }
@@ -401,7 +425,7 @@ mod tests {
             words[7 + axis] = !ordered(low[axis]);
         }
         words[10] = 4.0f32.to_bits();
-        words[11] = 77;
+        words[SLEPT] = 77;
         let read = Measured::of(bytemuck::cast_slice(&words));
         let expected =
             Measured { put_back: 3, rebuilt: 1, first: Some(17), low, high, speed: 2.0, slept: 77 };

@@ -16,7 +16,7 @@ use bevy::render::{
     renderer::{RenderDevice, RenderQueue},
 };
 use core::num::NonZeroU64;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Bytes of a report; behind them stands what the next tick has to know.
 pub(super) const REPORT_BYTES: usize = 4 * RESTLESS;
@@ -42,7 +42,7 @@ pub struct GpuReport {
 /// A hair's strands on a device.
 #[derive(Debug)]
 pub struct GpuStrands {
-    layout: Layout,
+    layout: Arc<Layout>,
     /// The index of the buffer that holds the present pose.
     pub(super) present: usize,
     pub(super) blocks: Buffer,
@@ -84,6 +84,7 @@ impl GpuStrands {
         let nodes: Vec<usize> = strands.iter().map(|view| view.positions.len()).collect();
         let layout = Layout::with_followers(&nodes, |strand| strands[strand].follows.is_some())
             .with_spins(strands.iter().any(|view| view.spins.is_some()));
+        let layout = Arc::new(layout);
         let (contents, reach) = Contents::with_reach(&layout, strands);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let with = |label, contents: &[u8]| {
@@ -195,7 +196,7 @@ impl GpuStrands {
     }
 
     /// The memory layout of the strands.
-    pub fn layout(&self) -> &Layout {
+    pub fn layout(&self) -> &Arc<Layout> {
         &self.layout
     }
 

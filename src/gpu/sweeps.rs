@@ -10,6 +10,10 @@ pub struct SweepRecord {
     pub settings: Sweeps,
 }
 
+// Projections in a record.
+pub(super) const SPLIT: u32 = StretchProjection::Split as u32;
+pub(super) const PRINTED: u32 = StretchProjection::Printed as u32;
+
 /// Words of it in a record.
 pub(super) const WORDS: usize = 8;
 
@@ -17,11 +21,6 @@ impl SweepRecord {
     /// Of a substep of `dt` (s) and hair of this gravity-bending length (m).
     pub(super) fn words(record: Option<&Self>, dt: f32, bending_length: f32) -> [u32; WORDS] {
         let Some(Self { settings }) = record else { return [0; WORDS] };
-        let projection = match settings.projection {
-            StretchProjection::Split => 0,
-            StretchProjection::Coupled => 1,
-            StretchProjection::Printed => 2,
-        };
         let numbers = [
             settings.ratio(dt),
             settings.spin_weight(bending_length),
@@ -29,7 +28,7 @@ impl SweepRecord {
             spin_exchange(settings.internal_damping, dt),
         ];
         let [bend, weight, chi, exchange] = numbers.map(f32::to_bits);
-        [bend, weight, chi, exchange, settings.iterations, projection, 0, 0]
+        [bend, weight, chi, exchange, settings.iterations, settings.projection as u32, 0, 0]
     }
 }
 

@@ -13,9 +13,9 @@ use bevy::render::{
     renderer::{RenderDevice, RenderQueue},
 };
 
-// Bits beside a targets node's slot, as lead.wgsl has them.
-const ROOT: u32 = 1 << 30;
-const FREE: u32 = 1 << 31;
+// Bits beside a targets node's slot.
+pub(super) const ROOT: u32 = 1 << 30;
+pub(super) const FREE: u32 = 1 << 31;
 
 /// Threads of a workgroup that add_targets nodes.
 const GROUP: u32 = 64;

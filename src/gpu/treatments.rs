@@ -110,16 +110,17 @@ impl GpuTreatments {
         self.acting.retain(|treat| treat.delay > 0.0 || treat.seconds > 0.0);
     }
 
-    /// What they did, into a record.
+    /// What they did, into a record. Ranges beyond what that holds stay for the next one.
     pub(super) fn write(&mut self, record: &mut SubstepRecord) {
         let whole = core::mem::take(&mut self.whole);
         (record.change, record.share) = (whole.add, whole.share());
-        let ranges = self.ranges.drain(..).map(|(joints, affine)| TreatmentRecord {
+        let count = self.ranges.len().min(MOST_TREATMENTS);
+        let ranges = self.ranges.drain(..count).map(|(joints, affine)| TreatmentRecord {
             change: affine.add,
             share: affine.share(),
             joints,
         });
-        record.treatments.extend(ranges.take(MOST_TREATMENTS));
+        record.treatments.extend(ranges);
     }
 }
 
@@ -172,5 +173,27 @@ mod tests {
             }
         }
         assert!(on.into_acting().is_empty() && rates[0] > 0.99 && (rates[2] - 0.8).abs() < 1e-6);
+    }
+
+    #[test]
+    fn ranges_beyond_what_a_record_holds_are_in_the_next_one() {
+        let mut on = GpuTreatments::default();
+        // One after the other, so that never more than one acts.
+        for joint in 0..MOST_TREATMENTS + 3 {
+            on.push(HairTreatment {
+                joints: Some(joint..joint + 1),
+                ..HairTreatment::dry(Entity::PLACEHOLDER)
+            });
+            on.step(1e9);
+            assert!(!on.are_too_many());
+        }
+        let mut treated = Vec::new();
+        while on.act() {
+            let mut record = SubstepRecord::default();
+            on.write(&mut record);
+            assert!(record.treatments.len() <= MOST_TREATMENTS);
+            treated.extend(record.treatments.iter().map(|treat| treat.joints.start as usize));
+        }
+        assert_eq!(treated, Vec::from_iter(0..MOST_TREATMENTS + 3));
     }
 }

@@ -204,8 +204,8 @@ fn pack(
         return;
     }
     let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
-    let room = count.max(MIN_CAPACITY).next_power_of_two().max(drawn.packed.len());
-    let grown = room != drawn.packed.len();
+    let room = capacity(count, drawn.packed.len());
+    let is_new = room != drawn.packed.len();
     let packed = beads.iter().take(count).map(|bead| {
         let packed = bead.packed();
         let reach = 4.0 * packed[3];
@@ -218,7 +218,7 @@ fn pack(
     drawn.packed.extend(packed);
     drawn.packed.resize(room, [0.0; 8]);
     let around = if low.x <= high.x { Aabb::from_min_max(low, high) } else { Aabb::default() };
-    if !grown && let Some(Ok(mut bounds)) = drawn.entity.map(|entity| bounds.get_mut(entity)) {
+    if !is_new && let Some(Ok(mut bounds)) = drawn.entity.map(|entity| bounds.get_mut(entity)) {
         bounds.set_if_neq(around);
         return;
     }
@@ -236,6 +236,13 @@ fn pack(
         commands.entity(old).try_despawn();
     }
     drawn.entity = Some(commands.spawn(parts).id());
+}
+
+/// Room for `count` beads where there is room for `present`: made smaller where it is much too large, because all
+/// of it is written in every frame.
+fn capacity(count: usize, present: usize) -> usize {
+    let fits = count.max(MIN_CAPACITY).next_power_of_two();
+    if (fits..4 * fits).contains(&present) { present } else { fits }
 }
 
 /// Writes the beads to the GPU. A buffer created in this frame is uploaded with its contents instead.
@@ -268,6 +275,17 @@ fn quads(count: u32) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn room_for_beads_follows_their_number_and_changes_rarely() {
+        let counts = [0, 40, 3000, 2100, 1500, 4000, 900, 100, 0, 0];
+        let mut room = 0;
+        let rooms = counts.map(|count| {
+            room = capacity(count, room);
+            room
+        });
+        assert_eq!(rooms, [64, 64, 4096, 4096, 4096, 4096, 1024, 128, 128, 128]);
+    }
 
     #[test]
     fn a_bead_has_its_volume_and_a_non_finite_one_is_not_drawn() {

@@ -2,6 +2,7 @@
 
 use super::drawn_strand::DrawnStrand;
 use crate::{
+    base::parallel::prefetch,
     hair::strand::{Strand, StrandHistory},
     keratin::bond::Bonds,
 };
@@ -51,81 +52,104 @@ pub struct HairBuffers {
 pub(super) type PackedNode = [u32; 8];
 
 /// Nodes farther from the hair's origin than this (m) count as invalid, like NaN.
-const FAR: f32 = 1e6;
+pub(crate) const FAR: f32 = 1e6;
 
+#[inline(always)]
 fn usable(p: Vec3) -> bool {
     p.is_finite() && p.abs().max_element() < FAR
 }
 
-/// Packs a guide's nodes into `out`, one each; `known` if `out` holds those of the previous frame.
-/// Invalid nodes take the position of the node before them; a guide without valid nodes is not
-/// drawn. Returns the box around the packed nodes.
-pub(super) fn pack_guide(
-    out: &mut [PackedNode],
-    known: bool,
-    strand: &Strand,
-    history: &StrandHistory,
-    bonds: &Bonds,
-    wet: &[f32],
-    overstep: f32,
-) -> Option<(Vec3, Vec3)> {
-    let place = |i| history.drawn(strand, i, overstep);
-    let first = (0..strand.nodes()).map(place).find(|p| usable(*p));
-    let shown = f32::from(u8::from(first.is_some()));
-    let mut last = first.unwrap_or_default();
-    let (mut low, mut high) = (last, last);
-    let mut rest = 0.0_f32;
-    let mut strain_below = None;
-    for (i, node) in out.iter_mut().enumerate().take(strand.nodes()) {
-        let p = place(i);
-        if usable(p) {
-            last = p;
-        }
-        (low, high) = (low.min(last), high.max(last));
-        // User code may have shortened a list of the strand since the last tick.
-        let ends = strand.positions().get(i).zip(strand.positions().get(i + 1));
-        let strain_above = (strand.rest_lengths().get(i).zip(ends))
-            .map(|(length, (a, b))| (a.distance(*b) / length - 1.0).abs());
-        let strain = match (strain_below, strain_above) {
-            (Some(a), Some(b)) => 0.5 * (a + b),
-            (a, b) => a.or(b).unwrap_or(0.0),
-        };
-        strain_below = strain_above;
-        // The tip has no joint: it shows the last one's. Before the first tick all bonds are closed.
-        let joint = bonds.joints.get(i).or(bonds.joints.last());
-        let rates = joint.map_or([1.0; 4], |j| j.rates);
-        let moisture = wet.get(i).copied().unwrap_or(0.0);
-        let motion = match known && first.is_some() {
-            true => (last - packed_place(node)) * MOTION_UNITS,
-            false => Vec3::ZERO,
-        };
-        let [x, y, z] = last.to_array().map(f32::to_bits);
-        let halves =
-            halves([strain, moisture.clamp(0.0, 1.0), motion.x, motion.y, motion.z, shown]);
-        *node = [
-            x,
-            y,
-            z,
-            unorm8(rates),
-            halves[0],
-            if rest.is_finite() { rest.to_bits() } else { 0 },
-            halves[1],
-            halves[2],
-        ];
-        rest += strand.rest_lengths().get(i).copied().unwrap_or(0.0);
+/// What the packed nodes of a guide are made from.
+pub(super) struct DrawnNodes<'a> {
+    pub(super) strand: &'a Strand,
+    pub(super) history: &'a StrandHistory,
+    pub(super) bonds: &'a Bonds,
+    /// How wet each node looks; dry where absent.
+    pub(super) wet: &'a [f32],
+}
+
+impl DrawnNodes<'_> {
+    /// Prefetches the lists.
+    #[inline(always)]
+    pub(super) fn prefetch(&self) {
+        prefetch(self.strand.positions());
+        prefetch(self.strand.rest_lengths());
+        prefetch(&self.history.positions);
+        prefetch(&self.bonds.joints);
+        prefetch(self.wet);
     }
-    first.map(|_| (low, high))
+
+    /// Packs the nodes into `out`, one each; `known` if `out` holds those of the previous frame. Invalid
+    /// nodes take the position of the node before them; a guide without valid nodes is not drawn. Returns
+    /// the box around the packed nodes.
+    #[inline(always)]
+    pub(super) fn pack(
+        &self,
+        out: &mut [PackedNode],
+        known: bool,
+        overstep: f32,
+    ) -> Option<(Vec3, Vec3)> {
+        let Self { strand, history, bonds, wet } = self;
+        let place = |i| history.drawn(strand, i, overstep);
+        let first = (0..strand.nodes()).map(place).find(|p| usable(*p));
+        let shown = f32::from(u8::from(first.is_some()));
+        let mut last = first.unwrap_or_default();
+        let (mut low, mut high) = (last, last);
+        let mut rest = 0.0_f32;
+        let mut strain_below = None;
+        for (i, node) in out.iter_mut().enumerate().take(strand.nodes()) {
+            let p = place(i);
+            if usable(p) {
+                last = p;
+            }
+            (low, high) = (low.min(last), high.max(last));
+            // User code may have shortened a list of the strand since the last tick.
+            let ends = strand.positions().get(i).zip(strand.positions().get(i + 1));
+            let strain_above = (strand.rest_lengths().get(i).zip(ends))
+                .map(|(length, (a, b))| (a.distance(*b) / length - 1.0).abs());
+            let strain = match (strain_below, strain_above) {
+                (Some(a), Some(b)) => 0.5 * (a + b),
+                (a, b) => a.or(b).unwrap_or(0.0),
+            };
+            strain_below = strain_above;
+            // The tip has no joint: it shows the last one's. Before the first tick all bonds are closed.
+            let joint = bonds.joints.get(i).or(bonds.joints.last());
+            let rates = joint.map_or([1.0; 4], |j| j.rates);
+            let moisture = wet.get(i).copied().unwrap_or(0.0);
+            let motion = match known && first.is_some() {
+                true => (last - packed_place(node)) * MOTION_UNITS,
+                false => Vec3::ZERO,
+            };
+            let [x, y, z] = last.to_array().map(f32::to_bits);
+            let halves =
+                halves([strain, moisture.clamp(0.0, 1.0), motion.x, motion.y, motion.z, shown]);
+            *node = [
+                x,
+                y,
+                z,
+                unorm8(rates),
+                halves[0],
+                if rest.is_finite() { rest.to_bits() } else { 0 },
+                halves[1],
+                halves[2],
+            ];
+            rest += strand.rest_lengths().get(i).copied().unwrap_or(0.0);
+        }
+        first.map(|_| (low, high))
+    }
 }
 
 /// Units per m of packed motion, so that the motion of a frame is well within the range of f16.
-const MOTION_UNITS: f32 = 1024.0;
+pub(crate) const MOTION_UNITS: f32 = 1024.0;
 
 /// The position of a packed node.
+#[inline(always)]
 pub(super) fn packed_place(node: &PackedNode) -> Vec3 {
     Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
 }
 
 /// The nearest f16s, two in a word. NaN becomes 0; too large values become the largest.
+#[inline(always)]
 fn halves(x: [f32; 6]) -> [u32; 3] {
     let most = f16::MAX.to_f32_const();
     // Eight at a time, for which some targets have an instruction.
@@ -139,6 +163,7 @@ fn halves(x: [f32; 6]) -> [u32; 3] {
     [0, 2, 4].map(|i| bits(i) | bits(i + 1) << 16)
 }
 
+#[inline(always)]
 fn unorm8(rates: [f32; 4]) -> u32 {
     // `as` saturates and takes NaN as 0.
     u32::from_le_bytes(rates.map(|r| (r * 255.0 + 0.5) as u8))
@@ -158,7 +183,8 @@ mod tests {
         let mut out = vec![[0; 8]; strand.nodes()];
         let history = StrandHistory { positions: history.to_vec(), ..default() };
         let bonds = Bonds::default();
-        pack_guide(&mut out, false, strand, &history, &bonds, &[], overstep);
+        DrawnNodes { strand: &strand, history: &history, bonds: &bonds, wet: &[] }
+            .pack(&mut out, false, overstep);
         out
     }
 
@@ -190,7 +216,8 @@ mod tests {
         assert_eq!(nodes[1][6], 0, "hair that appears has not moved");
         strand.positions_mut()[1] = Vec3::new(1.5, -0.25, 0.0);
         let (history, bonds) = (StrandHistory::default(), Bonds::default());
-        pack_guide(&mut nodes, true, &strand, &history, &bonds, &[], 1.0);
+        DrawnNodes { strand: &strand, history: &history, bonds: &bonds, wet: &[] }
+            .pack(&mut nodes, true, 1.0);
         assert_eq!(nodes[1][6], half(512.0) | half(-256.0) << 16);
         assert_eq!((nodes[0][6], nodes[1][7]), (0, half(1.0) << 16));
     }
@@ -213,23 +240,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "a timing, to be read"]
-    fn what_packing_costs() {
-        let points: Vec<Vec3> = (0..16).map(|i| Vec3::Y * (0.02 * i as f32)).collect();
-        let strand = Strand::from_polyline(&points).unwrap();
-        let strands = vec![(strand.clone(), Bonds::of(&strand)); 10_000];
-        let history = StrandHistory { positions: points, ..default() };
-        let mut out = vec![[0; 8]; 160_000];
-        for _ in 0..3 {
-            let start = std::time::Instant::now();
-            for ((strand, bonds), out) in strands.iter().zip(out.chunks_mut(16)) {
-                pack_guide(out, true, strand, &history, bonds, &[], 0.5);
-            }
-            println!("10,000 guides of 16 nodes: {:?}", start.elapsed());
-        }
-    }
-
-    #[test]
     fn every_node_shows_the_bonds_of_its_own_joint_and_the_tip_those_of_the_last() {
         let points: Vec<Vec3> = (0..4).map(|i| Vec3::X * i as f32).collect();
         let strand = Strand::from_polyline(&points).unwrap();
@@ -239,7 +249,13 @@ mod tests {
         }
         let mut out = vec![[0; 8]; 4];
         let history = StrandHistory::default();
-        pack_guide(&mut out, false, &strand, &history, &bonds, &[0.0, 0.25, 0.5, 1.0], 1.0);
+        DrawnNodes {
+            strand: &strand,
+            history: &history,
+            bonds: &bonds,
+            wet: &[0.0, 0.25, 0.5, 1.0],
+        }
+        .pack(&mut out, false, 1.0);
         for (i, node) in out.iter().enumerate() {
             let joint = i.min(2) as f32;
             assert_eq!(node[3], unorm8([0.1 * joint, 0.5, 0.2 * joint, 1.0]), "node {i}");

@@ -98,7 +98,11 @@ pub use smoothing::HairSmoothing;
 pub use view::{HairView, STRAIN_FULL, heat};
 pub use wet_look::WetLook;
 #[cfg(feature = "gpu")]
-pub(crate) use {kernel::why_broken, sets::WritesNodes};
+pub(crate) use {
+    buffers::{FAR, MOTION_UNITS},
+    kernel::why_broken,
+    sets::WritesNodes,
+};
 
 /// What is drawn by it; see [`look`](crate::hair::look).
 #[doc(no_inline)]

@@ -23,11 +23,10 @@ use crate::{
     hair::strand::{
         AddedMass, Hair, OnGpu, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose,
     },
-    math::lanes::LANES,
+    math::lanes::{LANES, simd_level},
 };
 use bevy::prelude::*;
 use core::slice::from_ref;
-use fearless_simd::Level;
 
 /// Largest number of sums, over all work chunks and droplets.
 const MAX_SUMS: usize = 1 << 18;
@@ -306,7 +305,7 @@ impl Field {
 type Work<'w, 'a> = Vec<(&'w mut [WetStrand<'a>], &'w mut DropletContacts)>;
 
 fn contact_all(mut work: Work<'_, '_>, params: &ContactParams<'_>) {
-    let level = Level::new();
+    let level = simd_level();
     for_each_block(
         &mut work,
         TASK,

@@ -14,7 +14,7 @@ use crate::{
         setting::{Ranged, Settings, Violations, report},
     },
     forces::{
-        contact::{Colliders, seen_from},
+        contact::{Colliders, HairCollider, seen_from},
         environment::{
             HairGravity, Winds,
             vapour::{DryingAir, WATER, transfer},

@@ -93,6 +93,11 @@ pub fn windowless() -> PluginGroupBuilder {
         .disable::<bevy::render::pipelined_rendering::PipelinedRenderingPlugin>()
 }
 
+/// The same with the render world in a thread of its own, as games have it.
+pub fn pipelined() -> PluginGroupBuilder {
+    windowless().enable::<bevy::render::pipelined_rendering::PipelinedRenderingPlugin>()
+}
+
 /// Whether there is anything that can draw; says so on the test's output if not. Asked of the
 /// drivers' descriptions, because Bevy panics without an adapter.
 pub fn has_adapter() -> bool {
@@ -138,23 +143,34 @@ impl Offscreen {
 
     /// The same with the hair's plugins added before Bevy's.
     pub fn with_hair_first(width: u32, height: u32) -> Option<Self> {
-        Self::of(width, height, HairPlugins::default().build(), true)
+        Self::of(width, height, HairPlugins::default().build(), windowless(), true)
     }
 
     /// The same with these of the hair's plugins.
     pub fn with_plugins(width: u32, height: u32, hair: PluginGroupBuilder) -> Option<Self> {
-        Self::of(width, height, hair, false)
+        Self::of(width, height, hair, windowless(), false)
     }
 
-    fn of(width: u32, height: u32, hair: PluginGroupBuilder, hair_first: bool) -> Option<Self> {
+    /// The same with the render world in a thread of its own.
+    pub fn pipelined(width: u32, height: u32) -> Option<Self> {
+        Self::of(width, height, HairPlugins::default().build(), pipelined(), false)
+    }
+
+    fn of(
+        width: u32,
+        height: u32,
+        hair: PluginGroupBuilder,
+        others: PluginGroupBuilder,
+        hair_first: bool,
+    ) -> Option<Self> {
         if !has_adapter() {
             return None;
         }
         let mut app = App::new();
         if hair_first {
-            app.add_plugins((hair, windowless()));
+            app.add_plugins((hair, others));
         } else {
-            app.add_plugins((windowless(), hair));
+            app.add_plugins((others, hair));
         }
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0))
             .insert_resource(ClearColor(Color::BLACK))

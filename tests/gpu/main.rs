@@ -24,6 +24,7 @@ mod led;
 mod lod;
 mod papers;
 mod pictures;
+mod pipelined;
 mod present;
 mod probe;
 mod residence;

@@ -1,7 +1,7 @@
 //! An app with hair on a software device.
 
 use crate::offscreen::{has_adapter, windowless};
-use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy::{app::PluginGroupBuilder, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
     gpu::{HairResidence, fetch_strands},
     prelude::*,
@@ -37,9 +37,18 @@ impl Stage {
     /// Hair of these strands, asked to be on `on`; `None`, with the reason printed, where there is no
     /// driver. A tick a frame.
     pub fn new(on: SimulateOn, strands: Vec<Strand>) -> Option<Self> {
+        Self::with_plugins(windowless, on, strands)
+    }
+
+    /// The same with these of Bevy's plugins.
+    pub fn with_plugins(
+        plugins: fn() -> PluginGroupBuilder,
+        on: SimulateOn,
+        strands: Vec<Strand>,
+    ) -> Option<Self> {
         has_adapter().then(|| {
             let mut app = App::new();
-            app.add_plugins((windowless(), HairPlugins::default()));
+            app.add_plugins((plugins(), HairPlugins::default()));
             Self::furnish(&mut app);
             app.finish();
             app.cleanup();

@@ -10,7 +10,9 @@ use bevy::{
     prelude::*,
 };
 pub(crate) use columns::Columns;
+use core::ops::{Deref, DerefMut};
 pub(crate) use prefetch::prefetch;
+use std::sync::{Mutex, PoisonError};
 
 #[cfg(feature = "parallel")]
 use {bevy::tasks::ComputeTaskPool, queue::Queue};
@@ -168,6 +170,46 @@ pub(crate) fn in_turn<T>(
     }
 }
 
+/// Scratch space of threads, kept from one call to the next: allocated anew it would take megabytes of pages
+/// that the operating system has to map and clear.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch<T>(Mutex<Vec<T>>);
+
+impl<T: Default> Scratch<T> {
+    /// One that nobody uses, as it was left.
+    pub(crate) fn borrow(&self) -> Borrowed<'_, T> {
+        let mut free = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        Borrowed { one: free.pop().unwrap_or_default(), owner: self }
+    }
+}
+
+/// Scratch space of one thread, given back when dropped.
+pub(crate) struct Borrowed<'a, T: Default> {
+    one: T,
+    owner: &'a Scratch<T>,
+}
+
+impl<T: Default> Deref for Borrowed<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.one
+    }
+}
+
+impl<T: Default> DerefMut for Borrowed<'_, T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.one
+    }
+}
+
+impl<T: Default> Drop for Borrowed<'_, T> {
+    fn drop(&mut self) {
+        let mut free = self.owner.0.lock().unwrap_or_else(PoisonError::into_inner);
+        free.push(core::mem::take(&mut self.one));
+    }
+}
+
 /// Reuses the allocation of a vector for items of another lifetime. Data gathered for a substep
 /// takes up to megabytes: if it were allocated anew each time, the operating system would map and
 /// clear its pages each time.
@@ -205,6 +247,17 @@ mod tests {
         items.push(&number);
         let others: Vec<&f64> = emptied(items);
         assert!(others.is_empty() && others.capacity() == 1000, "{}", others.capacity());
+    }
+
+    #[test]
+    fn scratch_space_is_kept_and_never_shared() {
+        let scratch = Scratch::<Vec<u8>>::default();
+        let (mut a, b) = (scratch.borrow(), scratch.borrow());
+        a.reserve(1000);
+        drop((b, a));
+        assert!(scratch.borrow().capacity() >= 1000);
+        let [a, b] = [scratch.borrow(), scratch.borrow()];
+        assert!((a.capacity() >= 1000) != (b.capacity() >= 1000));
     }
 
     #[test]

@@ -15,9 +15,15 @@ use super::{
 };
 use crate::{
     base::parallel::{Nanos, for_each_block},
-    math::{grid::UniformGrid, lanes::dispatch},
+    math::{
+        grid::UniformGrid,
+        lanes::{dispatch, simd_level},
+    },
 };
-use core::ops::Range;
+use core::{
+    ops::Range,
+    sync::atomic::{AtomicUsize, Ordering},
+};
 use fearless_simd::{Level, Simd};
 use glam::Vec3;
 
@@ -40,7 +46,12 @@ const HALF_PIECE: f32 = 0.8;
 
 /// The most edges that a node's list holds, the nearest: more only where strands by the thousand lie in one
 /// place, and would cost the square of their number.
-pub(super) const MOST_EDGES: usize = 4096;
+const MOST_EDGES: usize = 4096;
+
+/// The most memory of a hair's lists, and more for each node (bytes). Where that is too little, each node's
+/// list holds an equal share.
+const MOST_BYTES: usize = 256 << 20;
+const MOST_BYTES_A_NODE: usize = 1 << 10;
 
 /// Longest bridge of water, in units of the reach: the rest of the margin is how far nodes may move
 /// before lists are rebuilt.
@@ -137,6 +148,21 @@ struct EdgeGroup {
     slack: f32,
 }
 
+/// How long lists may become.
+struct Limit<'a> {
+    /// Those of a node.
+    most_edges: usize,
+    /// All together; what is found beyond is of no use.
+    most_groups: usize,
+    groups: &'a AtomicUsize,
+}
+
+impl Limit<'_> {
+    fn has_room_for(&self, more: usize) -> bool {
+        self.groups.fetch_add(more, Ordering::Relaxed) + more <= self.most_groups
+    }
+}
+
 /// Scratch space of the search for one node.
 #[derive(Default)]
 struct SearchScratch {
@@ -185,11 +211,14 @@ impl Neighbours {
     /// summation does not depend on threads.
     pub fn find_pushes(&mut self, radius: f32, strength: f32, lookup: Lookup) {
         // Lists are padded with an edge at NaN.
+        let nodes = self.strands.last().map_or(0, |strand| strand.end as usize);
+        self.rows.truncate(nodes);
         self.rows.extend([[f32::NAN; 4]; 2]);
+        self.expected.truncate(nodes);
         let reach = 2.0 * radius;
-        let level = Level::new();
+        let level = simd_level();
         if self.are_stale(reach, lookup) {
-            self.look_up(level, reach);
+            self.look_up(level, reach, MOST_BYTES + MOST_BYTES_A_NODE * nodes);
             self.measure_displacement();
         }
         let Self { rows, strands, lists, parts, .. } = self;
@@ -212,8 +241,8 @@ impl Neighbours {
         self.coarse.spread(pushes, Vec3::lerp)
     }
 
-    /// Builds the lists.
-    fn look_up(&mut self, level: Level, reach: f32) {
+    /// Builds the lists, of about `most_bytes` at most.
+    fn look_up(&mut self, level: Level, reach: f32, most_bytes: usize) {
         let Self { rows, expected, strands, lists, parts, beyond, .. } = self;
         let (mut places, mut fast) = (&*rows, false);
         if expected.len() + 2 == rows.len() {
@@ -226,16 +255,26 @@ impl Neighbours {
         lists.begin(places, strands, reach, if fast { FAST_MARGIN } else { MARGIN });
         lists.good_for = if fast { FAST_LOOKUPS - 1 } else { 0 };
         parts.resize_with(strands.len().div_ceil(PART), PartLists::default);
-        let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
+        let most_groups = most_bytes / size_of::<EdgeGroup>();
         let each = per_part(SEARCH, places, strands.len());
-        for_each_block(
-            &mut work,
-            each,
-            Default::default,
-            |scratch: &mut SearchScratch, (part, strands)| {
-                dispatch!(level, simd => part.search(simd, places, strands, lists, scratch));
-            },
-        );
+        let mut search = |most_edges: usize| {
+            // Whether the sum is too large does not depend on the order.
+            let groups = AtomicUsize::new(0);
+            let limit = Limit { most_edges, most_groups, groups: &groups };
+            let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
+            for_each_block(
+                &mut work,
+                each,
+                Default::default,
+                |scratch: &mut SearchScratch, (part, strands)| {
+                    dispatch!(level, simd => part.search(simd, places, strands, lists, &limit, scratch));
+                },
+            );
+            groups.into_inner() <= most_groups
+        };
+        if !search(MOST_EDGES) {
+            search(most_groups / places.len() * WIDTH);
+        }
     }
 
     /// Whether the lists have to be rebuilt for the present nodes.
@@ -293,7 +332,7 @@ impl Neighbours {
     pub fn bridges(&mut self, wet: &mut Vec<WetRow>, film: Film) -> impl Iterator<Item = Bridged> {
         self.coarse.pick(wet);
         wet.resize(self.rows.len(), [f32::NAN; 4]);
-        let level = Level::new();
+        let level = simd_level();
         let Self { rows, strands, coarse, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let reaches = film.longest + 2.0 * lists.moved;
@@ -309,7 +348,7 @@ impl Neighbours {
         coarse.spread(bridged, Bridged::lerp)
     }
 
-    /// Whether a node had more edges near than [`MOST_EDGES`]: the farther ones are left out.
+    /// Whether a node had more edges near than its list may hold: the farther ones are left out.
     pub fn is_crowded(&self) -> bool {
         self.parts.iter().any(|part| part.is_crowded)
     }
@@ -387,6 +426,7 @@ impl PartLists {
         rows: &[NodeRow],
         strands: &[Range<u32>],
         lists: &Lists,
+        limit: &Limit,
         SearchScratch { close_by, edges, distances, found }: &mut SearchScratch,
     ) {
         let (within, close) = (lists.within() * lists.within(), lists.close() * lists.close());
@@ -397,6 +437,7 @@ impl PartLists {
         self.groups.clear();
         self.is_crowded = false;
         for own in strands {
+            let before = self.groups.len();
             for i in own.clone() {
                 let p = lanes::place(&rows[i as usize]);
                 // The root is held: pushes have no effect.
@@ -420,8 +461,8 @@ impl PartLists {
                 found.extend(pairs.map(|(d, e)| u64::from(*d) << 32 | u64::from(*e)));
                 found.sort_unstable();
                 found.dedup();
-                self.is_crowded |= found.len() > MOST_EDGES;
-                found.truncate(MOST_EDGES);
+                self.is_crowded |= found.len() > limit.most_edges;
+                found.truncate(limit.most_edges);
                 for found in found.chunks(WIDTH) {
                     let mut edges = [nowhere; WIDTH];
                     edges.iter_mut().zip(found).for_each(|(e, f)| *e = *f as u32);
@@ -432,6 +473,10 @@ impl PartLists {
                 let nearest = self.groups[first..].first().map_or(f32::INFINITY, |g| g.slack);
                 self.slacks.push(nearest);
                 self.starts.push(self.groups.len() as u32);
+            }
+            if !limit.has_room_for(self.groups.len() - before) {
+                self.groups = Vec::new();
+                return;
             }
         }
     }
@@ -499,6 +544,9 @@ impl PartLists {
         }
     }
 }
+
+#[cfg(test)]
+mod limits;
 
 #[cfg(test)]
 mod tests {

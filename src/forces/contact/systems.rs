@@ -3,7 +3,7 @@
 use super::{
     Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError,
     LockNeighbours, Obstacles, Openings, StrandContact, coarse,
-    neighbours::{Lookup, MOST_EDGES},
+    neighbours::Lookup,
     reach::{Colliders, HairReach, UNKNOWN},
 };
 use crate::{
@@ -195,8 +195,8 @@ fn too_fine(strand: &Strand, radius: f32, stride: usize) -> HairFault {
 
 fn too_crowded(radius: f32) -> HairFault {
     let message = format!(
-        "more than {MOST_EDGES} segments lie around a node, expected fewer within a few times the lock's radius of \
-         {} mm: the nearest push it; use fewer strands, or a smaller StrandContact::radius",
+        "too many segments lie around a node, expected fewer within a few times the lock's radius of {} mm: \
+         the nearest push it; use fewer strands, or a smaller StrandContact::radius",
         1e3 * radius,
     );
     HairFault::new(FaultKind::Strand, message)

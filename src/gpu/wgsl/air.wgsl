@@ -1,8 +1,5 @@
 // Gravity, drag and wind. Rust twins: src/forces/environment/{systems,wind,blown}.rs.
 
-// The distance in equation 17's d + 1 (m).
-const REFERENCE_DISTANCE: f32 = 0.01;
-
 // Equation 17: wind of a blower on an edge, as an acceleration along its aim (m/s²).
 fn wind_of(b: u32, p: vec3<f32>, e: vec3<f32>) -> f32 {
     let aim = record.blower[b].aim;

@@ -1,8 +1,5 @@
 // Bonds of a strand's joints. Rust twin: src/keratin/bond/model.rs.
 
-// Below this share of closed bonds a joint has no shape of its own.
-const MIN_CLOSED_SHARE: f32 = 1e-3;
-
 // Remembered shape and rate of a joint's bonds of one kind.
 fn bond(i: u32, kind: u32) -> vec4<f32> {
     return bonds[slot(i, kind, 4u)];

@@ -1,17 +1,5 @@
 // One direct implicit step of a strand. Rust twins: src/solver/rod/direct/{mod,kernel}.rs.
 
-const THETA: f32 = 0.65;
-const WHIP: f32 = 0.03;
-const STRAIN: f32 = 1e-4;
-const TORN: f32 = 0.01;
-const REPAIRS: u32 = 4u;
-const DEEP: f32 = 0.25;
-const STIFFEST: f32 = 6.0;
-const FIRMEST: f32 = 2.5e10;
-const BUCKLING_TWIST: f32 = 8.99;
-const HOLD: f32 = 100.0;
-const REFERENCE_GRAVITY: f32 = 9.8;
-
 // What makes masses and stiffnesses of a strand.
 var<private> density: f32;
 var<private> bending: f32;
@@ -29,10 +17,10 @@ fn weigh() {
     }
     let count = f32(edges);
     density = count / sum;
-    let stiff = min(record.bending_length, sum * STIFFEST);
+    let stiff = min(record.bending_length, sum * MAX_BENDING_LENGTH);
     bending = density * (2.0 * REFERENCE_GRAVITY) * stiff * stiff * stiff;
     axial_stiffness = REFERENCE_GRAVITY * count / STRAIN;
-    firmest = FIRMEST / (count * count * record.dt * record.dt);
+    firmest = MAX_STIFFNESS / (count * count * record.dt * record.dt);
     let length = 1.0 / density;
     let stiffest = min(bending * 0.5, firmest * length * length * length);
     let inertia = density * (3.0 / (record.dt * record.dt));
@@ -387,7 +375,7 @@ fn surface() {
             deepest = max(deepest, depth_in(o, taken_along(o, n.xyz)).w - allowed(o, along));
         }
     }
-    if !(edge(0u).x * DEEP < deepest) {
+    if !(edge(0u).x * DEEP_SHARE < deepest) {
         return;
     }
     sweeps = false;
@@ -395,7 +383,7 @@ fn surface() {
     for (var i = 0u; i <= edges; i++) {
         set_support(i, vec3(0.0));
     }
-    for (var round = 0u; round < 2u * edges; round++) {
+    for (var round = 0u; round < min(2u * edges, MAX_LEAVING_ROUNDS); round++) {
         contacts(0.0, 0.0);
         if !limit_strained(TORN) {
             return;
@@ -453,7 +441,7 @@ fn whips() -> bool {
         fastest = max(fastest, dot(apart, apart) / (l * l));
         before = v;
     }
-    return (WHIP / record.dt) * (WHIP / record.dt) < fastest;
+    return (FAST_TURN / record.dt) * (FAST_TURN / record.dt) < fastest;
 }
 
 // One substep; the scalp's frame was `root_from` when it began.
@@ -493,7 +481,7 @@ fn direct_step(root_from: vec4<f32>) {
             break;
         }
         contacts(1.0, 1.0);
-        for (var k = 0u; done + 1u == record.limiter_steps && k < REPAIRS; k++) {
+        for (var k = 0u; done + 1u == record.limiter_steps && k < MAX_REPAIRS; k++) {
             if !clamp_lengths(TORN) {
                 break;
             }

@@ -5,11 +5,6 @@
 // At the tip: guides' slots and their number; weights, and seconds since it was tied; guides' edges, and what
 // is left of its own motion; where a led root comes to; its frame.
 
-const GUIDES: u32 = 3u;
-const TIES: u32 = 6u;
-// In units of the time constant its own motion lasts that long.
-const OWN_LASTS: f32 = 10.0;
-
 fn tie(i: u32, part: u32) -> vec4<f32> {
     return scratch[((first - record.first_follower_slot + i) * TIES + part) * GROUP_SIZE + lane];
 }

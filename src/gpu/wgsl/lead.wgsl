@@ -1,10 +1,5 @@
 // Puts where led nodes come to, and whether they are led, where the substep finds it. One node a thread.
 
-const GROUP_SIZE: u32 = 32u;
-// Bits beside a node's slot.
-const ROOT: u32 = 0x40000000u;
-const FREE: u32 = 0x80000000u;
-
 struct Substep {
     // As in strand.wgsl.
     before: array<vec4<u32>, 17>,

@@ -1,9 +1,5 @@
 // Lengths of a whole strand at once. Rust twin: src/solver/rod/limiter.rs.
 
-const FIRMNESS: f32 = 0.95;
-const FOLDING: f32 = 0.125;
-const TOLERANCE: f32 = 5e-4;
-
 struct Elimination {
     inverse: f32,
     rhs: f32,

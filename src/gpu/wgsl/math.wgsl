@@ -1,5 +1,5 @@
 // Vectors, quaternions (Hamilton's, x y z w) and 3x3 blocks. Rust twins: src/math/lanes/algebra.rs,
-// src/solver/rod/direct/{frames,matrix}.rs. Names and order are the same there.
+// src/solver/rod/direct/{frames,matrix}.rs.
 
 fn normalized(q: vec4<f32>) -> vec4<f32> {
     return q * (1.0 / sqrt(dot(q, q)));

@@ -1,10 +1,6 @@
 // The box around a hair's nodes and their highest speed, once a frame. The largest of whole numbers is the
 // same in any order.
 
-const GROUP_SIZE: u32 = 32u;
-// Hair farther from its own origin than this (m) is not drawn.
-const FAR: f32 = 1e6;
-
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;
 @group(0) @binding(1) var<storage, read> pose: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> motion: array<vec4<f32>>;

@@ -1,17 +1,5 @@
 // Obstacles and nodes. Rust twins: src/solver/rod/obstacle.rs, src/solver/rod/touch.rs.
 
-const HALF_SPACE: u32 = 0u;
-const CAPSULE: u32 = 1u;
-const CYLINDER: u32 = 2u;
-const ELLIPSOID: u32 = 3u;
-
-// How far a node may go in a substep, in ways that its velocity alone would take it.
-const FASTER: f32 = 1.5;
-// Length from a sunk root on within which a strand may be inside, in depths of the root.
-const ESCAPE_RATIO: f32 = 2.0;
-// Of several obstacles that a root lies in those in which it is at least half as deep as in the deepest allow as much.
-const DEPTH_RATIO: f32 = 2.0;
-
 // Obstacles that this strand may touch in this substep; whether a node moves so fast against one that it
 // might pass through; whether a node rests on one.
 var<private> near: vec4<u32>;

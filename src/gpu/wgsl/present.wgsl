@@ -1,10 +1,4 @@
-// Packs nodes into the buffer that drawing reads. Rust twin: src/render/buffers.rs, pack_guide.
-
-const GROUP_SIZE: u32 = 32u;
-// Motion is packed in these units per m.
-const MOTION_UNITS: f32 = 1024.0;
-// Hair farther from its own origin than this (m) is as broken as hair that is no number.
-const FAR: f32 = 1e6;
+// Packs nodes into the buffer that drawing reads. Rust twin: src/render/buffers.rs, DrawnNodes::pack.
 
 struct Frame {
     // How far drawing is from the tick before to the present one.

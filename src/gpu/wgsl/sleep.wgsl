@@ -1,11 +1,6 @@
 // Whether a hair sleeps from the next tick on: all its simulated strands have been still for so long. Once a tick,
 // after its substeps. Rust twin: `decide` in src/simulation/sleep/systems.rs, for one strand.
 
-const GROUP_SIZE: u32 = 32u;
-const WAKES: u32 = 256u;
-// The word of the report that holds the last tick in which the hair slept.
-const SLEPT: u32 = 11u;
-
 struct Substep {
     // As in strand.wgsl.
     gravity: vec4<f32>,

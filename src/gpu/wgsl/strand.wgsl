@@ -1,8 +1,5 @@
 // A strand in memory and what acts on it in a substep. Layout: src/gpu/layout.rs; the record:
-// src/gpu/record.rs.
-
-const GROUP_SIZE: u32 = 32u;
-const MAX_OBSTACLES: u32 = 128u;
+// src/gpu/record.rs. Constants of all kernels: src/gpu/constants.rs.
 
 struct Obstacle {
     // Half-space: its normal. Capsule: one end. Cylinder, ellipsoid: its centre.
@@ -69,7 +66,7 @@ struct Substep {
     cuticle_softening: f32,
     blowers: u32,
     obstacles: u32,
-    blower: array<Blower, 4>,
+    blower: array<Blower, MAX_BLOWERS>,
     treatments: u32,
     // Led nodes, and led roots of followers: first and number.
     first_led: u32,
@@ -104,21 +101,9 @@ struct Substep {
     iterations: u32,
     projection: u32,
     unused_3: vec2<u32>,
-    treatment: array<Treatment, 8>,
+    treatment: array<Treatment, MOST_TREATMENTS>,
     obstacle: array<Obstacle, MAX_OBSTACLES>,
 }
-
-// Bits of Substep::flags.
-const CARRIES: u32 = 1u;
-const SHAPES: u32 = 2u;
-const REMEMBERS: u32 = 4u;
-const NOTES_BEFORE: u32 = 8u;
-const RESTS: u32 = 16u;
-const TARGETS_ROOTS: u32 = 32u;
-const HOLDS: u32 = 64u;
-const FOLLOWS: u32 = 128u;
-const WAKES: u32 = 256u;
-const SWEEPS: u32 = 512u;
 
 // Of each block of strands: first node slot, nodes of a strand, strands, number of its first strand.
 @group(0) @binding(0) var<storage, read> blocks: array<vec4<u32>>;

@@ -1,13 +1,6 @@
 // The paper's projections: sweeps over a strand from root to tip. Rust twins: src/solver/rod/{constraint,stiffness,step,
 // sweep}.rs; of rest shapes src/keratin/bond/{model,systems}.rs.
 
-const EPSILON: f32 = 1e-6;
-const PASSES_IN_TOUCH: u32 = 3u;
-
-// As record.projection has them.
-const SPLIT: u32 = 0u;
-const PRINTED: u32 = 2u;
-
 // The factors of a stretch–shear projection.
 struct StretchShares {
     inverse_length: f32,

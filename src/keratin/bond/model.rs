@@ -147,7 +147,7 @@ pub fn rest_shape<R: Real>(
 }
 
 /// Below this share of closed bonds a joint has no remembered shape.
-pub(super) const MIN_CLOSED_SHARE: f32 = 1e-3;
+pub(crate) const MIN_CLOSED_SHARE: f32 = 1e-3;
 
 /// The equivalent of equation 15 that does not follow the present shape, for a solver in which that
 /// would act as inertia: Ω* = M/B = Σ f b Ω_j / Σ f b with the remaining share of the stiffness,

@@ -32,7 +32,7 @@ impl RestShape {
     }
 }
 
-/// Settings that rest shapes depend on, resolved once a substep.
+/// Settings that rest shapes depend on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
 pub(super) struct Key {
     pub(super) influence: [f32; BondKind::COUNT],

@@ -20,6 +20,7 @@ use crate::{
     hair::strand::{
         AddedMass, KinematicStrand, OnGpu, PerHair, Strand, StrandOf, StrandSleep, keep_required,
     },
+    math::lanes::simd_level,
     solver::rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
 };
 use bevy::{
@@ -138,7 +139,7 @@ fn generate_rest_shapes(
         prefetch(strand.orientations());
         prefetch(&rest.darboux);
     };
-    let level = Level::new();
+    let level = simd_level();
     for_each_part(SHAPE, tables(&mut strands), Vec::new, |items, rows| {
         let mut keys = PerHair::default();
         for (of, sleep, strand, (bonds, is_changed), added_mass, rest) in rows {
@@ -236,7 +237,7 @@ fn update_bonds(
         prefetch(strand.orientations());
         changes.prefetch();
     };
-    let level = Level::new();
+    let level = simd_level();
     for_each_part(CHANGE, tables(&mut strands), Vec::new, |items: &mut Vec<Changing<'_>>, rows| {
         items.extend(rows.filter(|(_, _, changes, ..)| !changes.is_empty()));
         in_turn(items, AHEAD, ahead, |(strand, bonds, changes, rest, sleep)| {
@@ -271,7 +272,7 @@ mod tests {
         for key in [None, Some((sweeps, REFERENCE_DT))] {
             let key = Key { influence, cuticle, sweeps: key };
             let mut rest = RestShape::default();
-            shape(Level::new(), &key, &strand, &bonds, &added, &mut rest);
+            shape(simd_level(), &key, &strand, &bonds, &added, &mut rest);
             for i in 0..4 {
                 let factor = cuticle_factor(places[i], 4.0, 0.5) * (1.0 - softening[i]);
                 let expected = match key.sweeps {

@@ -15,6 +15,9 @@ pub const GUIDES: usize = 3;
 /// Time constant with which a follower's relative motion decays (s).
 const OWN_MOTION: f32 = 0.15;
 
+/// How long that lasts, in such times.
+pub(crate) const OWN_LASTS: f32 = 10.0;
+
 /// A follower's guides and its pose relative to them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GuideOffsets {
@@ -122,7 +125,7 @@ impl GuideOffsets {
     /// Whether nothing is left of a motion of its own after so long (s).
     #[cfg(feature = "gpu")]
     pub(crate) fn are_settled(since: f32) -> bool {
-        since > 10.0 * OWN_MOTION
+        since > OWN_LASTS * OWN_MOTION
     }
 
     /// Of each edge and guide, edge by edge: the edge's frame in that of the guide, its segment in its own
@@ -140,7 +143,7 @@ impl GuideOffsets {
     /// It has followed for so long elsewhere (s).
     pub(crate) fn pass(&mut self, seconds: f32) {
         self.since += seconds;
-        if self.since > 10.0 * OWN_MOTION {
+        if self.since > OWN_LASTS * OWN_MOTION {
             self.own.clear();
         }
     }
@@ -204,7 +207,7 @@ impl GuideOffsets {
             return false;
         }
         self.since += dt;
-        if self.since > 10.0 * OWN_MOTION {
+        if self.since > OWN_LASTS * OWN_MOTION {
             self.own.clear();
         }
         // Starts with the initial relative velocity and returns to zero displacement.

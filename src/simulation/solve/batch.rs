@@ -11,7 +11,7 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
-        parallel::{Columns, Nanos, for_each_block_ahead, for_each_part},
+        parallel::{Columns, Nanos, Scratch, for_each_block_ahead, for_each_part},
     },
     hair::strand::PerHair,
     math::lanes::LANES,
@@ -41,6 +41,7 @@ fn key<T: Batched>(item: &T) -> (Entity, usize) {
 pub(super) fn for_each_batch<C: Columns, T: Batched>(
     tables: impl Iterator<Item = C>,
     nodes: usize,
+    lanes: &Scratch<T::Lanes>,
     params_of: impl Fn(Entity) -> Option<T::Params> + Send + Sync,
     item: impl Fn(<C::Part as Iterator>::Item) -> Option<T> + Send + Sync,
 ) -> Vec<HairFault> {
@@ -50,7 +51,7 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
         index.map_or_else(Vec::new, |index| solve(lanes, block, &params.values[index]))
     };
     let each = nodes * NODE;
-    let scratch = || (T::Lanes::default(), PerHair::default(), Vec::new());
+    let scratch = || (lanes.borrow(), PerHair::default(), Vec::new());
     let parts = for_each_part(Nanos(each), tables, scratch, |(lanes, params, strands), rows| {
         strands.extend(rows.filter_map(&item).filter(|strand: &T| {
             let hair = strand.hair();
@@ -70,7 +71,7 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
     for_each_block_ahead(
         &mut blocks,
         Nanos(LANES * each),
-        || (T::Lanes::default(), PerHair::default()),
+        || (lanes.borrow(), PerHair::default()),
         |(strands, _)| strands.iter().for_each(T::prefetch),
         |(lanes, params), (strands, faults)| *faults = solve(lanes, params, strands),
     );
@@ -78,8 +79,8 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
     faults.into_iter().flatten().collect()
 }
 
-/// Calls `work` with full blocks of strands of equal node count, and returns the remainder. Lanes are
-/// independent, so the grouping changes no bit of the result.
+/// Calls `work` with full blocks of strands of equal node count, and returns the remainder. Which strands
+/// share a block depends on the rows of a part alone, not on threads.
 fn full_blocks<T: Batched>(strands: &mut Vec<T>, mut work: impl FnMut(&mut [T])) -> Vec<T> {
     if !strands.is_sorted_by_key(key) {
         strands.sort_by_key(key);
@@ -176,6 +177,7 @@ mod tests {
             let faults = for_each_batch(
                 tables(&mut strands),
                 100,
+                &Scratch::default(),
                 |of| (of == hair).then_some(7),
                 |(of, strand, added)| Some(Item { hair: of.0, strand, added }),
             );

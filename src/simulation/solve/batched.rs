@@ -28,7 +28,7 @@ pub(super) trait Batched: Sized + Send {
     /// Parameters of a hair's strands in a substep.
     type Params;
     /// A block with the additional state of the kernel.
-    type Lanes: Default;
+    type Lanes: Default + Send;
 
     /// The strand.
     fn entity(&self) -> Entity;

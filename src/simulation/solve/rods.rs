@@ -9,7 +9,7 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
-        parallel::{prefetch, tables},
+        parallel::{Scratch, prefetch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick},
         setting::{self, Ranged, Settings},
     },
@@ -22,7 +22,7 @@ use crate::{
         StrandSleep, TickPose,
     },
     keratin::bond::{BondInfluence, Bonds, RestShape},
-    math::lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4},
+    math::lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level},
     solver::rod::{
         HairSolver, HairStiffness, SolverMethod, Sweeps,
         block::BlockLanes,
@@ -49,15 +49,15 @@ impl Plugin for RodPlugin {
     }
 }
 
-/// Parameters of a hair for the projection, resolved once a substep.
-struct HairParams {
+/// Parameters of a hair for the projection in a substep.
+struct HairParams<'a> {
     level: Level,
     method: Method,
     dt: f32,
     clearance: f32,
     bending_length: f32,
     influence: [f32; 4],
-    obstacles: Vec<Obstacle>,
+    obstacles: &'a [Obstacle],
 }
 
 enum Method {
@@ -79,9 +79,10 @@ struct RodStrand<'a> {
     held: Option<&'a HeldNodes>,
 }
 
-impl Batched for RodStrand<'_> {
-    type Params = HairParams;
-    type Lanes = BlockLanes;
+impl<'a> Batched for RodStrand<'a> {
+    type Params = HairParams<'a>;
+    /// And the obstacles near a block.
+    type Lanes = (BlockLanes, Vec<Obstacle>);
 
     fn entity(&self) -> Entity {
         self.entity
@@ -107,44 +108,44 @@ impl Batched for RodStrand<'_> {
         prefetch(&self.rest.stiffness);
     }
 
-    fn remembered(&self, params: &HairParams) -> Vec<Vec3> {
+    fn remembered(&self, params: &HairParams<'_>) -> Vec<Vec3> {
         self.bonds.joints.iter().map(|joint| joint.relaxed(&params.influence)).collect()
     }
 
-    fn kept(params: &HairParams) -> Kept {
+    fn kept(params: &HairParams<'_>) -> Kept {
         match params.method {
             Method::Direct { .. } => Kept::Tensions,
             Method::Sweeps(..) => Kept::AngularVelocities,
         }
     }
 
-    fn dt(params: &HairParams) -> f32 {
+    fn dt(params: &HairParams<'_>) -> f32 {
         params.dt
     }
 
-    fn block(lanes: &mut BlockLanes) -> &mut BlockLanes {
-        lanes
+    fn block((block, _): &mut Self::Lanes) -> &mut BlockLanes {
+        block
     }
 
     fn step(
-        block: &mut BlockLanes,
+        (block, near): &mut Self::Lanes,
         sources: &[Source<'_>; LANES],
         items: &[Self],
-        params: &HairParams,
+        params: &HairParams<'_>,
     ) {
         gather_frames(block, sources, items);
-        let near = block.near(&params.obstacles, params.dt, params.clearance);
+        block.near(params.obstacles, params.dt, params.clearance, near);
         match &params.method {
             Method::Direct { params: direct, frame_delta } => {
                 gather_tensions(block, sources);
                 gather_roots(block, sources, frame_delta.unwrap_or_default());
                 direct::weigh(params.level, block, params.bending_length, params.dt);
-                direct::step(params.level, block, direct, &near);
+                direct::step(params.level, block, direct, near);
             }
             Method::Sweeps(sweeps, settings) => {
                 gather_spins(block, sources);
                 step::weigh(params.level, block, Some((settings, params.bending_length)));
-                step::step(params.level, block, sweeps, &near);
+                step::step(params.level, block, sweeps, near);
             }
         }
     }
@@ -171,11 +172,12 @@ fn step_rods(
         (Without<KinematicStrand>, Without<OnGpu>),
     >,
     mut faults: MessageWriter<HairFault>,
+    scratch: Local<Scratch<(BlockLanes, Vec<Obstacle>)>>,
 ) {
     if !substeps.any() {
         return;
     }
-    let level = Level::new();
+    let level = simd_level();
     let gravity = gravity.clamped().0;
     let params_of = |hair: Entity| {
         let (obstacles, pose) =
@@ -214,13 +216,14 @@ fn step_rods(
             clearance,
             bending_length: stiffness.bending_length,
             influence: influence.of(hair).as_array(),
-            obstacles: obstacles.map_or_else(Vec::new, |all| all.solids.clone()),
+            obstacles: obstacles.map_or(&[], |all| &all.solids),
         })
     };
     let nodes = strands.iter().next().map_or(0, |(_, strand, ..)| strand.nodes());
     let lost = for_each_batch(
         tables(&mut strands),
         nodes,
+        &scratch,
         params_of,
         |((entity, of, sleep), strand, rest, bonds, added, held)| {
             let is_stepped = sleep.is_simulated()

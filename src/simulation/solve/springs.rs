@@ -7,7 +7,7 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
-        parallel::tables,
+        parallel::{Scratch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick},
         setting::{self, Ranged, Settings},
     },
@@ -19,7 +19,7 @@ use crate::{
         AddedMass, HeldNodes, KinematicStrand, OnGpu, Strand, StrandModel, StrandOf, StrandSleep,
         TickPose,
     },
-    math::lanes::{LANES, put_quaternions},
+    math::lanes::{LANES, put_quaternions, simd_level},
     solver::{
         mass_spring::{
             Springs,
@@ -44,10 +44,10 @@ impl Plugin for SpringPlugin {
 }
 
 /// Parameters of a hair's strands in a substep.
-struct HairParams {
+struct HairParams<'a> {
     level: Level,
     step: SpringParams,
-    obstacles: Vec<Obstacle>,
+    obstacles: &'a [Obstacle],
 }
 
 struct SpringStrand<'a> {
@@ -58,9 +58,10 @@ struct SpringStrand<'a> {
     held: Option<&'a HeldNodes>,
 }
 
-impl Batched for SpringStrand<'_> {
-    type Params = HairParams;
-    type Lanes = SpringLanes;
+impl<'a> Batched for SpringStrand<'a> {
+    type Params = HairParams<'a>;
+    /// And the obstacles near a block.
+    type Lanes = (SpringLanes, Vec<Obstacle>);
 
     fn entity(&self) -> Entity {
         self.entity
@@ -78,19 +79,19 @@ impl Batched for SpringStrand<'_> {
         self.strand
     }
 
-    fn dt(params: &HairParams) -> f32 {
+    fn dt(params: &HairParams<'_>) -> f32 {
         params.step.dt
     }
 
-    fn block(lanes: &mut SpringLanes) -> &mut BlockLanes {
+    fn block((lanes, _): &mut Self::Lanes) -> &mut BlockLanes {
         &mut lanes.strands
     }
 
     fn step(
-        lanes: &mut SpringLanes,
+        (lanes, near): &mut Self::Lanes,
         sources: &[Source<'_>; LANES],
         _: &[Self],
-        HairParams { level, step: params, obstacles }: &HairParams,
+        HairParams { level, step: params, obstacles }: &HairParams<'_>,
     ) {
         let strands = &mut lanes.strands;
         for (group, four) in sources.as_chunks::<4>().0.iter().enumerate() {
@@ -98,8 +99,8 @@ impl Batched for SpringStrand<'_> {
             put_quaternions(&mut strands.edges, group, orientations, |e| &mut e.q);
         }
         weigh(*level, strands, None);
-        let near = strands.near(obstacles, params.dt, params.clearance);
-        step(*level, lanes, params, &near);
+        strands.near(obstacles, params.dt, params.clearance, near);
+        step(*level, lanes, params, near);
     }
 }
 
@@ -115,9 +116,10 @@ fn step_springs(
         (Without<KinematicStrand>, Without<OnGpu>),
     >,
     mut faults: MessageWriter<HairFault>,
+    scratch: Local<Scratch<(SpringLanes, Vec<Obstacle>)>>,
 ) {
     let gravity = gravity.clamped().0;
-    let level = Level::new();
+    let level = simd_level();
     let params_of = |hair: Entity| {
         let (obstacles, pose) = hairs.get(hair).ok()?;
         let substep = substeps.of(hair)?;
@@ -130,7 +132,7 @@ fn step_springs(
                 gravity: pose.now().direction_in(gravity),
                 clearance: contact.of(hair).radius,
             };
-            let obstacles = obstacles.map_or_else(Vec::new, |all| all.solids.clone());
+            let obstacles = obstacles.map_or(&[][..], |all| &all.solids);
             HairParams { level, step, obstacles }
         })
     };
@@ -138,6 +140,7 @@ fn step_springs(
     let lost = for_each_batch(
         tables(&mut strands),
         nodes,
+        &scratch,
         params_of,
         |(entity, of, sleep, strand, added, held)| {
             let is_stepped = sleep.is_simulated() && strand.nodes() >= 2;

@@ -126,15 +126,22 @@ impl BlockLanes {
         self.close_obstacles.fill(CloseObstacles::UNKNOWN);
     }
 
-    /// The obstacles that any lane may touch in a step of `dt`.
-    pub(crate) fn near(&self, obstacles: &[Obstacle], dt: f32, clearance: f32) -> Vec<Obstacle> {
+    /// Sets `near` to the obstacles that any lane may touch in a step of `dt`.
+    pub(crate) fn near(
+        &self,
+        obstacles: &[Obstacle],
+        dt: f32,
+        clearance: f32,
+        near: &mut Vec<Obstacle>,
+    ) {
+        near.clear();
         if obstacles.is_empty() {
-            return Vec::new();
+            return;
         }
         let (low, high) = self.bounds(dt);
         // Nodes may move beyond their prediction, by at most an edge length in a substep.
         let margin = clearance + self.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
-        obstacles.iter().filter(|o| o.may_touch(low, high, margin)).cloned().collect()
+        near.extend(obstacles.iter().filter(|o| o.may_touch(low, high, margin)).cloned());
     }
 
     /// The box that holds every node of every lane, before and after prediction with `dt`.

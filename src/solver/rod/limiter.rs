@@ -18,16 +18,16 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// a: the share of a node's mobility that an obstacle removes along its normal. Below 1, so that a
 /// strand pressed straight down need not fold within one substep.
-const FIRMNESS: f32 = 0.95;
+pub(crate) const FIRMNESS: f32 = 0.95;
 
 /// Strain at which the limiter stops.
-pub(super) const TOLERANCE: f32 = 5e-4;
+pub(crate) const TOLERANCE: f32 = 5e-4;
 
 /// Damping of a compressed edge in a [`GUARDED`](limit_strained) step, as a multiple of its strain.
 /// A straight strand that is compressed end to end has to fold; by how much is not determined by
 /// its lengths in first order, and Newton's step overshoots. With an eighth it folds by about as
 /// much as compensates the strain, and steps converge as the strain vanishes.
-const FOLDING: f32 = 0.125;
+pub(crate) const FOLDING: f32 = 0.125;
 
 /// One Newton step on the lengths of every strand in the block; with `touched_only` of those that
 /// touch an obstacle. Strands of a block are independent.

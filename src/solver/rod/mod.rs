@@ -31,7 +31,7 @@ pub mod direct;
 #[doc(hidden)]
 pub mod frame;
 pub(crate) mod limiter;
-mod near;
+pub(crate) mod near;
 #[doc(hidden)]
 pub mod obstacle;
 #[doc(hidden)]

@@ -11,7 +11,7 @@ use glam::Vec3;
 
 /// How far a node may move in a substep, as a multiple of the path by its velocity alone. More than 1,
 /// because forces of the substep act too.
-const FASTER: f32 = 1.5;
+pub(crate) const FASTER: f32 = 1.5;
 
 /// How far a node moves before more obstacles than the closest count, in edge lengths, beside its path by its
 /// velocity: most nodes go less far in a substep.
@@ -19,7 +19,7 @@ const CLOSE: f32 = 0.25;
 
 /// Length from a sunk root on within which a strand may be inside, as a multiple of the root's depth: it gets out
 /// up to 60° aslant.
-pub(super) const ESCAPE_RATIO: f32 = 2.0;
+pub(crate) const ESCAPE_RATIO: f32 = 2.0;
 
 /// Finds the obstacles that each node may touch in a substep of `dt`, so that its passes skip the
 /// others: on a head of dozens of solids most nodes are near one or none. Also how far each strand is sunk

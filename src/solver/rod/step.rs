@@ -17,7 +17,7 @@ use crate::math::lanes::{LANES, Real, V3, dispatch, load, load3, load4, store3, 
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 
 /// Passes that a limiter step takes for strands that touch something.
-const PASSES_IN_TOUCH: u32 = 3;
+pub(crate) const PASSES_IN_TOUCH: u32 = 3;
 
 /// Parameters of a substep.
 #[derive(Clone, Copy, Debug)]

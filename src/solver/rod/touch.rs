@@ -52,7 +52,7 @@ impl<S: Simd> RootPenetration<S> {
 
 /// Where a root lies in several obstacles, as in balls that together are a head, it has to get out of the deepest:
 /// those in which it is at least half as deep allow as much.
-const DEPTH_RATIO: f32 = 2.0;
+pub(crate) const DEPTH_RATIO: f32 = 2.0;
 
 /// A node near a sunk root.
 pub(super) struct AllowedPenetration<S: Simd> {

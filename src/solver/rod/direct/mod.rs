@@ -102,7 +102,8 @@ use crate::math::lanes::{
 };
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use glam::Vec3;
-use kernel::{HOLD, NewtonStage};
+pub(crate) use kernel::HOLD;
+use kernel::NewtonStage;
 use width::{Half, Whole, Width};
 
 /// Parameters of a substep.
@@ -122,37 +123,41 @@ pub struct DirectParams {
 }
 
 /// θ: where in the substep forces are evaluated; see the [module](self).
-const THETA: f32 = 0.65;
+pub(crate) const THETA: f32 = 0.65;
 
 /// Rotation of an edge in a substep (rad) above which a strand takes two Newton steps.
-const FAST_TURN: f32 = 0.03;
+pub(crate) const FAST_TURN: f32 = 0.03;
 
 /// Strain at the root of a straight hanging strand, which sets the stretching stiffness. Stiffer
 /// exceeds the precision of f32; softer leaves more to the length limiter, which bends hair.
-const STRAIN: f32 = 1e-4;
+pub(crate) const STRAIN: f32 = 1e-4;
 
 /// Strain beyond which Newton steps on the lengths have failed.
-const TORN: f32 = 0.01;
+pub(crate) const TORN: f32 = 0.01;
 
 /// The maximum number of repetitions of restoring the lengths of torn strands and the push-out that
 /// follows.
-const MAX_REPAIRS: u32 = 4;
+pub(crate) const MAX_REPAIRS: u32 = 4;
+
+/// The maximum number of rounds of pushing a strand out of obstacles and restoring its lengths before a step.
+/// What is left of a long strand follows in the next steps.
+pub(crate) const MAX_LEAVING_ROUNDS: u32 = 64;
 
 /// Depth in an obstacle, in edge lengths, above which a strand is moved out of it before the step.
-const DEEP_SHARE: f32 = 0.25;
+pub(crate) const DEEP_SHARE: f32 = 0.25;
 
 /// Largest L_g, in lengths of the strand. Such hair sags by less than a thousandth of its length; f32
 /// is not precise enough for much stiffer hair.
-const MAX_BENDING_LENGTH: f32 = 6.0;
+pub(crate) const MAX_BENDING_LENGTH: f32 = 6.0;
 
 /// Largest twist that counts in the Hessian, as a moment over EI times the strand's length: with its ends clamped
 /// it buckles here.
-const BUCKLING_TWIST: f32 = 8.99;
+pub(crate) const BUCKLING_TWIST: f32 = 8.99;
 
 /// Largest ratio of a node's elastic stiffness to its inertia in a substep, for a strand of one segment;
 /// 1/n² of that for n segments. f32 is not precise enough for more. Only segments much shorter than 1 mm
 /// reach it.
-const MAX_STIFFNESS: f32 = 2.5e10;
+pub(crate) const MAX_STIFFNESS: f32 = 2.5e10;
 
 /// Steps the block by one substep, with the machine's best instruction set.
 #[doc(hidden)]
@@ -358,14 +363,14 @@ fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
 
 /// Moves strands that begin deep inside an obstacle, as when spawned there, out of it before the step and
 /// restores their lengths, so that they gain no velocity. Shallow penetration, as from contact with
-/// other hair, is left to the step.
+/// other hair, is left to the step. Returns in how many rounds.
 #[inline(never)]
 fn leave_obstacles<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     params: &DirectParams,
     obstacles: &[Obstacle],
-) {
+) -> u32 {
     simd.vectorize(
         #[inline(always)]
         || {
@@ -390,7 +395,7 @@ fn leave_obstacles<S: Simd>(
             let deep =
                 Real::lt(load(simd, &b.edges[0].l) * f32x16::splat(simd, DEEP_SHARE), deepest);
             if deep.to_bitmask() == 0 {
-                return;
+                return 0;
             }
             let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
             b.has_fast_nodes = false;
@@ -400,14 +405,16 @@ fn leave_obstacles<S: Simd>(
                 n.rests_on = Default::default();
             }
             // A correction travels about one edge per round.
-            for _ in 0..2 * b.edges.len() {
+            let rounds = MAX_LEAVING_ROUNDS.min(2 * b.edges.len() as u32);
+            for round in 1..=rounds {
                 contacts_with(simd, b, params.clearance, obstacles, FrictionShare::NONE, deep);
                 if !limit_strained(simd, b, TORN, deep) {
-                    return;
+                    return round;
                 }
             }
+            rounds
         },
-    );
+    )
 }
 
 /// Moves nodes ballistically for `ahead` (s), stopped by obstacles.

@@ -1,6 +1,6 @@
 use super::{kernel, kernel::NewtonStage, row::DirectRow, width::Single, *};
 use crate::{
-    math::lanes::{Lane, put3, put4, take3, take4},
+    math::lanes::{Lane, put3, put4, simd_levels, take3, take4},
     solver::rod::{
         block::{EdgeLanes, NodeLanes},
         frame::parallel_transport,
@@ -376,4 +376,60 @@ fn hair_on_the_floor_lies_still_and_holds_its_length() {
         let fastest = block.nodes.iter().map(|n| take3(&n.v, 0).length()).fold(0.0, f32::max);
         assert!(peak < 2e-3 && fastest < 2e-3, "{edges}: strain {peak}, speed {fastest}");
     }
+}
+
+/// AVX2 and AVX-512 agree bit for bit; SSE2 rounds a product before it is added, which they do not.
+#[test]
+fn instruction_sets_agree() {
+    let wall = Solid::HalfSpace { normal: Vec3::X, point: Vec3::X * -0.01 };
+    let ball = Solid::Capsule { a: Vec3::ZERO, b: Vec3::Z * 0.02, radius: 0.012 };
+    let obstacles = [wall, ball].map(|solid| Obstacle { solid, motion: None, friction: 0.3 });
+    let runs = simd_levels().map(|(name, level)| {
+        let mut block = strands(9, |lane, i| {
+            let turn = 0.2 * lane as f32 + 0.1 * i as f32;
+            Vec3::new(0.01 * i as f32, 0.01 + 0.004 * turn.sin(), 0.004 * turn.cos())
+        });
+        for _ in 0..40 {
+            prepare(&mut block, 0.02);
+            step(level, &mut block, &params(), &obstacles);
+        }
+        (name, block)
+    });
+    let runs: Vec<_> = runs.collect();
+    let (best, first) = &runs[0];
+    let numbers = |block: &BlockLanes| -> Vec<f32> {
+        let nodes = block.nodes.iter().flat_map(|n| n.p.into_iter().chain(n.v));
+        nodes.chain(block.edges.iter().flat_map(|e| e.q)).flatten().collect()
+    };
+    let first = numbers(first);
+    for (name, block) in &runs[1..] {
+        let apart = first.iter().zip(numbers(block)).map(|(a, b)| (a - b).abs());
+        let most = apart.fold(0.0, f32::max);
+        println!("{name} is up to {most:e} from {best}");
+        assert!(if *name == "sse2" { most < 1e-2 } else { most == 0.0 }, "{name}: {most}");
+    }
+}
+
+#[test]
+fn a_long_strand_gets_out_of_a_solid_in_a_bounded_number_of_rounds_a_step() {
+    let ball = Solid::Capsule { a: Vec3::X, b: Vec3::X * 9.0, radius: 0.3 };
+    let solid = [Obstacle { solid: ball, motion: None, friction: 0.0 }];
+    let mut block =
+        strands(500, |lane, i| Vec3::new(0.6 + 0.01 * i as f32, 0.02 + 1e-3 * lane as f32, 0.0));
+    prepare(&mut block, 0.1);
+    let leave = |block: &mut BlockLanes| {
+        block.consider_all_obstacles();
+        dispatch!(Level::new(), simd => leave_obstacles(simd, block, &params(), &solid))
+    };
+    let rounds: Vec<u32> = (0..40).map(|_| leave(&mut block)).collect();
+    println!("{rounds:?}");
+    assert!(rounds.iter().all(|rounds| *rounds <= 64), "{rounds:?}");
+    assert_eq!(rounds.last(), Some(&0), "it never gets out");
+    let strained = block
+        .nodes
+        .windows(2)
+        .zip(&block.edges)
+        .map(|(n, e)| (take3(&n[1].p, 3).distance(take3(&n[0].p, 3)) / e.l[3] - 1.0).abs());
+    let strained = strained.fold(0.0, f32::max);
+    assert!(strained < TORN, "{strained}");
 }

@@ -1,0 +1,71 @@
+//! Constants that kernels share with the code that they follow, written out in WGSL under the same names.
+
+use super::{
+    followers::TIES,
+    layout::GROUP_SIZE,
+    record::*,
+    sweeps::{PRINTED, SPLIT},
+    target_buffer::{FREE, ROOT},
+};
+use crate::{
+    forces::environment::wind::REFERENCE_DISTANCE,
+    keratin::bond::model::MIN_CLOSED_SHARE,
+    render::{FAR, MOTION_UNITS},
+    simulation::lod::follow::{GUIDES, OWN_LASTS},
+    solver::rod::{
+        constraint::EPSILON,
+        direct::*,
+        limiter::{FIRMNESS, FOLDING, TOLERANCE},
+        near::{ESCAPE_RATIO, FASTER},
+        step::PASSES_IN_TOUCH,
+        stiffness::REFERENCE_GRAVITY,
+        touch::DEPTH_RATIO,
+    },
+};
+use std::sync::LazyLock;
+
+macro_rules! wgsl {
+    ($($type:ident { $($name:ident)* })*) => {
+        [$($(format!("const {}: {} = {:?};\n", stringify!($name), stringify!($type), $name as $type)),*),*]
+    };
+}
+
+static CONSTANTS: LazyLock<String> = LazyLock::new(|| {
+    let all = wgsl! {
+        u32 {
+            GROUP_SIZE MAX_OBSTACLES MAX_BLOWERS MOST_TREATMENTS
+            CARRIES SHAPES REMEMBERS NOTES_BEFORE RESTS TARGETS_ROOTS HOLDS FOLLOWS WAKES SWEEPS
+            HALF_SPACE CAPSULE CYLINDER ELLIPSOID
+            SLEPT ROOT FREE GUIDES TIES SPLIT PRINTED
+            PASSES_IN_TOUCH MAX_REPAIRS MAX_LEAVING_ROUNDS
+        }
+        f32 {
+            THETA FAST_TURN STRAIN TORN DEEP_SHARE MAX_BENDING_LENGTH MAX_STIFFNESS BUCKLING_TWIST HOLD
+            REFERENCE_GRAVITY FIRMNESS FOLDING TOLERANCE EPSILON FASTER ESCAPE_RATIO DEPTH_RATIO MIN_CLOSED_SHARE REFERENCE_DISTANCE
+            OWN_LASTS FAR MOTION_UNITS
+        }
+    };
+    all.concat()
+});
+
+/// The source of kernels, after the constants that they use.
+pub(super) fn source(kernels: &str) -> String {
+    CONSTANTS.clone() + kernels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::pipelines::KERNELS, *};
+
+    #[test]
+    fn no_kernel_has_a_constant_of_its_own_that_the_code_has_too() {
+        for (name, text, _) in KERNELS {
+            let own = text.lines().filter_map(|line| line.strip_prefix("const "));
+            for own in own.map(|line| line.split([':', ' ']).next().unwrap_or_default()) {
+                assert!(own.starts_with("NO_"), "{own} of {name} is not in constants.rs");
+            }
+        }
+        let bits = |name: &str| CONSTANTS.contains(name);
+        assert!(bits("const HOLD: f32 = 100.0;\n") && bits("const WAKES: u32 = 256;\n"));
+    }
+}
