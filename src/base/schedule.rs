@@ -17,8 +17,11 @@ use bevy::{
         },
         system::SystemParam,
     },
+    platform::collections::HashSet,
     prelude::*,
+    utils::prelude::ShortName,
 };
+use core::any::TypeId;
 
 /// The schedule of one substep. Add systems to it in one of [`HairSystems`], `First` and `Last` best.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -422,6 +425,23 @@ impl Plugin for TickPlugin {
                 tick
             });
     }
+}
+
+/// The plugins that are known to be missing.
+#[derive(Resource, Default)]
+struct MissingPlugins(HashSet<TypeId>);
+
+/// Whether `Needed` is missing, on which `Own` builds: disabled, or added later. Logged once.
+pub(crate) fn lacks<Needed: Plugin, Own: Plugin>(app: &mut App) -> bool {
+    let is_missing = !app.is_plugin_added::<Needed>();
+    let known = app.world_mut().get_resource_or_init::<MissingPlugins>();
+    if is_missing && known.into_inner().0.insert(TypeId::of::<Needed>()) {
+        let (needed, own) = (ShortName::of::<Needed>(), ShortName::of::<Own>());
+        tracing::warn!(
+            "hair: {own} and other plugins do nothing without {needed}: enable it, and add it before them"
+        );
+    }
+    is_missing
 }
 
 /// One tick: as many substeps as [`HairSubsteps`] gives; none if no time has passed.

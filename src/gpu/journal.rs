@@ -11,11 +11,11 @@ use super::{
 use crate::{
     base::{
         schedule::{EffectiveSubstep, EffectiveSubsteps, HairStep},
-        setting::{Ranged, Settings},
+        setting::Settings,
     },
     forces::{
         contact::{Obstacles, StrandContact},
-        environment::{AirDrag, HairGravity, Winds},
+        environment::{AirDrag, Gravity, Winds},
     },
     hair::strand::{Hair, SleepCounts, TickPose},
     keratin::bond::{BondInfluence, Cuticle},
@@ -51,7 +51,7 @@ fn follow_record(
 /// Writes [`GpuJournal`]s.
 pub(super) fn write_journals(
     (step, substeps): (Res<HairStep>, EffectiveSubsteps),
-    gravity: Res<HairGravity>,
+    gravity: Gravity,
     winds: Winds,
     (solver, sweeps, stiffness): (Settings<HairSolver>, Settings<Sweeps>, Settings<HairStiffness>),
     (drag, contact): (Settings<AirDrag>, Settings<StrandContact>),

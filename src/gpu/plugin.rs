@@ -14,7 +14,7 @@ use crate::{
         schedule::{HairSystems, HairTick, first_substep},
         setting,
     },
-    hair::strand::{Hair, ReturnToCpu, keep_required},
+    hair::strand::{Hair, ReturnToCpu, keep_required, lacks_strands},
     keratin::treatment::HairTreatment,
     simulation::sleep,
     water::SoakHair,
@@ -28,6 +28,9 @@ pub struct HairGpuPlugin;
 
 impl Plugin for HairGpuPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         setting::plugin::<SimulateOn>(app);
         sleep::watch_on_gpu(app);
         setting::resource::<HairGpu>(app);
@@ -79,6 +82,9 @@ impl Plugin for HairGpuPlugin {
 
     /// In `finish`, because all render plugins have been added by then, in any order.
     fn finish(&self, app: &mut App) {
+        if !app.world().contains_resource::<compile::Compiled>() {
+            return;
+        }
         compile::plugin(app);
         frame::plugin(app);
     }

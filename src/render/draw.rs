@@ -103,6 +103,13 @@ pub(super) fn appear(
     }
 }
 
+/// Hair that nothing settles is drawn as it is.
+pub(super) fn end_settling(mut commands: Commands, hairs: Query<Entity, With<Settling>>) {
+    for hair in &hairs {
+        commands.entity(hair).try_remove::<Settling>();
+    }
+}
+
 /// Packs all nodes at their drawn positions; when the groom has changed, everything that depends on it is
 /// rebuilt.
 pub(super) fn pack(

@@ -108,7 +108,11 @@ pub(crate) use {
 #[doc(no_inline)]
 pub use crate::hair::look::{HairDye, HairLook, HairShading, Melanin};
 
-use crate::{base::setting, hair::strand::Hair};
+use crate::{
+    base::setting,
+    hair::strand::{Hair, lacks_strands},
+    simulation::settle::{SettlePlugin, Settling},
+};
 use bevy::{
     app::FixedMain,
     asset::{AssetEventSystems, embedded_asset, io::embedded::EmbeddedAssetRegistry},
@@ -153,6 +157,9 @@ impl HairRenderPlugin {
 
 impl Plugin for HairRenderPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         setting::plugin::<HairFollowers>(app);
         setting::plugin::<HairView>(app);
         setting::plugin::<HairDetail>(app);
@@ -184,6 +191,16 @@ impl Plugin for HairRenderPlugin {
 
     /// In `finish`, because all render plugins have been added by then, in any order.
     fn finish(&self, app: &mut App) {
+        let world = app.world();
+        if !world.contains_resource::<Interpolate>() {
+            return;
+        }
+        if !app.is_plugin_added::<SettlePlugin>() {
+            app.add_systems(
+                PostUpdate,
+                draw::end_settling.before(HairRenderSystems).run_if(any_with_component::<Settling>),
+            );
+        }
         let world = app.world();
         let can_draw = world.contains_resource::<EmbeddedAssetRegistry>()
             && world.contains_resource::<Assets<Shader>>()

@@ -18,7 +18,7 @@ use crate::{
     },
     forces::{
         contact::{Colliders, HairReach, WetRow},
-        environment::HairGravity,
+        environment::Gravity,
     },
     hair::strand::{
         AddedMass, Hair, OnGpu, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose,
@@ -104,7 +104,7 @@ type RainedOn = (Entity, &'static TickPose, &'static mut StrandBlocks, Option<&'
 
 pub(super) fn wet_strands(
     step: Res<HairStep>,
-    gravity: Res<HairGravity>,
+    gravity: Gravity,
     process: Res<HairProcessTime>,
     wetting: Settings<HairWetting>,
     mut scratch: ResMut<WaterField>,
@@ -169,7 +169,7 @@ pub(super) fn wet_strands(
         contact_all(strands.chunks_mut(chunk).zip(&mut *chunks).collect(), &params);
         local.clear();
         local.extend(near.iter().map(|k| outcomes[*k as usize]));
-        sum_up(chunks, pose.rotation, local);
+        sum_up(chunks, pose, local);
         near.iter().zip(&*local).for_each(|(k, sum)| outcomes[*k as usize] = *sum);
     }
     // Together the strands may request more than the droplet holds.
@@ -209,7 +209,7 @@ pub(super) fn wet_strands(
             if lands {
                 weigh(strand, added_mass, &wetting, ride.at, mass_of(drop));
                 loaded.push(ride.strand);
-                let lands_at = pose.rotation * on_strand(strand, ride.at).1;
+                let lands_at = pose.direction_out(on_strand(strand, ride.at).1);
                 impulse += pose.direction_in(drop.velocity - lands_at) * mass_of(drop);
             }
             push(strand, added_mass, &wetting, ride.at, impulse);
@@ -289,7 +289,7 @@ impl Field {
         self.drops.extend(drops.map(|d| LocalDrop {
             at: pose.point_in(d.position),
             before: pose.point_in(d.before),
-            velocity: pose.rotation.inverse() * d.velocity,
+            velocity: pose.direction_in(d.velocity),
             radius: d.radius() * scale,
             r_min: d.r_min * scale,
             r_max: d.r_max * scale,
@@ -370,7 +370,7 @@ impl WetStrand<'_> {
 
 /// Sums the effects on droplets and finds where they land first, over all chunks in the strands'
 /// order.
-fn sum_up(chunks: &[DropletContacts], rotation: Quat, outcomes: &mut [Outcome]) {
+fn sum_up(chunks: &[DropletContacts], pose: &Pose, outcomes: &mut [Outcome]) {
     // Blocked over droplets: data written by other threads are slow to read.
     let mut parts: Vec<_> =
         (0..).step_by(DROPS_PER_TASK).zip(outcomes.chunks_mut(DROPS_PER_TASK)).collect();
@@ -381,7 +381,7 @@ fn sum_up(chunks: &[DropletContacts], rotation: Quat, outcomes: &mut [Outcome]) 
         |(), (first, outcomes)| {
             for chunk in chunks {
                 for (outcome, sum) in outcomes.iter_mut().zip(&chunk.sums[*first..]) {
-                    outcome.impulse += rotation * sum.impulse;
+                    outcome.impulse += pose.direction_out(sum.impulse);
                     outcome.touch_count += sum.touch_count;
                     outcome.wanted += sum.wanted;
                 }
@@ -469,7 +469,8 @@ mod tests {
             chunk(vec![landing(9, 0.3), landing(10, 0.2)]),
         ];
         let mut outcomes = [Outcome::default()];
-        sum_up(&chunks, Quat::from_rotation_z(FRAC_PI_2), &mut outcomes);
+        let pose = Pose { rotation: Quat::from_rotation_z(FRAC_PI_2), ..default() };
+        sum_up(&chunks, &pose, &mut outcomes);
         let Outcome { impulse, touch_count, landing, wanted } = outcomes[0];
         assert!(impulse.distance(Vec3::Y * 2.0) < 1e-6, "{impulse}");
         assert_eq!((touch_count, wanted), (4, 6e-9));

@@ -13,7 +13,7 @@ use crate::{
         setting::{Ranged, Settings, report},
     },
     forces::environment::{
-        Blown, BlownAir, HairGravity, Winds,
+        Blown, BlownAir, Gravity, Winds,
         vapour::{DryingAir, WATER},
     },
     hair::strand::{
@@ -96,7 +96,7 @@ pub(super) fn run_showers(
         let drops: Vec<Droplet> = (valid.make(step.dt))
             .map(|drop| {
                 let position = pose.point_out(drop.position);
-                let velocity = pose.rotation * drop.velocity;
+                let velocity = pose.direction_out(drop.velocity);
                 Droplet { position, velocity, before: position, ..drop }
             })
             .collect();
@@ -166,7 +166,7 @@ impl Wet<'_> {
 pub(super) fn exchange_water(
     mut commands: Commands,
     step: Res<HairStep>,
-    (air, process, gravity): (Res<DryingAir>, Res<HairProcessTime>, Res<HairGravity>),
+    (air, process, gravity): (Res<DryingAir>, Res<HairProcessTime>, Gravity),
     wetting: Settings<HairWetting>,
     hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
     winds: Winds,
@@ -405,7 +405,7 @@ pub(super) fn detached_drop(
     let radius = ball_radius(volume);
     let below = gravity.normalize_or_zero() * (1.01 * (radius + wetting.lock_radius()) + 1e-5);
     let mut drop = Droplet::ball(pose.point_out(place) + below, radius);
-    drop.velocity = pose.rotation * velocity;
+    drop.velocity = pose.direction_out(velocity);
     drop.drip = true;
     // The ledger has counted this water already.
     (drop.volume, drop.counted) = (volume, Counted(volume));

@@ -16,7 +16,7 @@ use crate::{
     forces::{
         contact::{Colliders, HairCollider, seen_from},
         environment::{
-            HairGravity, Winds,
+            Gravity, Winds,
             vapour::{DryingAir, WATER, transfer},
         },
     },
@@ -43,7 +43,7 @@ pub(super) fn move_droplets(
     (air, process, gravity, rules): (
         Res<DryingAir>,
         Res<HairProcessTime>,
-        Res<HairGravity>,
+        Gravity,
         Res<DropletRules>,
     ),
     wetting: Settings<HairWetting>,
@@ -247,7 +247,7 @@ pub(super) fn follow_strands(
             let (place, velocity) = on_strand(strand, ride.at);
             let drop = drop.bypass_change_detection();
             drop.position = pose.now().point_out(place);
-            drop.velocity = pose.now().rotation * velocity;
+            drop.velocity = pose.now().direction_out(velocity);
             drop.keep_in_range();
         }
     }

@@ -12,9 +12,9 @@ use crate::{
     base::{
         parallel::{Nanos, for_each_part, tables},
         schedule::EffectiveSubsteps,
-        setting::{Ranged, Settings},
+        setting::Settings,
     },
-    forces::environment::HairGravity,
+    forces::environment::Gravity,
     hair::strand::{
         AddedMass, Hair, InWater, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose,
     },
@@ -46,7 +46,7 @@ struct LocalWater {
 
 pub(super) fn submerge(
     steps: EffectiveSubsteps,
-    gravity: Res<HairGravity>,
+    gravity: Gravity,
     wetting: Settings<HairWetting>,
     volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,

@@ -16,7 +16,8 @@ use crate::{
         schedule::{HairStep, HairSystems, HairTick, first_substep},
         setting,
     },
-    hair::strand::{Hair, MissedOnGpu, OnGpu, Strand, TickPose, keep_required},
+    forces::environment::vapour::DryingAir,
+    hair::strand::{Hair, MissedOnGpu, OnGpu, Strand, TickPose, keep_required, lacks_strands},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -25,6 +26,9 @@ pub struct WaterPlugin;
 
 impl Plugin for WaterPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         setting::plugin::<HairWetting>(app);
         strand_block::plugin(app);
         setting::resource::<DropletRules>(app);
@@ -34,6 +38,7 @@ impl Plugin for WaterPlugin {
         app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
             .init_resource::<FoundWater>()
+            .init_resource::<DryingAir>()
             .init_resource::<MissedOnGpu<SoakHair>>()
             .add_message::<SoakHair>()
             .register_type::<WaterLedger>()

@@ -92,7 +92,7 @@ impl Volumes<'_, '_> {
         let seen = self.volumes.iter().map(|(volume, at)| {
             let (volume, at) = (volume.clamped(), at.now());
             let WaterVolume { shape, half_size, density, viscosity, current } = volume;
-            let current = pose.direction_in(at.rotation * current);
+            let current = pose.direction_in(at.direction_out(current));
             LocalVolume {
                 shape,
                 half_size,
@@ -113,7 +113,7 @@ impl LocalVolumes {
         let depths = self.0.iter().map(|volume| {
             let LocalVolume { shape, half_size, rotation, origin, scale, water } = volume;
             let place = *rotation * (place - *origin) * *scale;
-            (-shape.distance(*half_size, place) / scale, water)
+            (-shape.distance(*half_size, place) / scale.abs(), water)
         });
         depths.filter(|(depth, _)| depth.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0))
     }

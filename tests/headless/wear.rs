@@ -378,6 +378,44 @@ fn a_second_preset_on_one_head_is_refused() {
 }
 
 #[test]
+fn a_head_is_free_again_when_its_wearer_is_gone() {
+    let mut app = app();
+    let root = app.world_mut().spawn((Transform::default(), WearHair::new(HairPreset::Bob))).id();
+    character(&mut app, root, 1.0);
+    worn(&mut app);
+    let wear = WearHair::new(HairPreset::Curly);
+    let other = app.world_mut().spawn((Transform::default(), wear)).id();
+    app.world_mut().entity_mut(root).insert(ChildOf(other));
+    assert_eq!(wait(&mut app).refused, [(other, WearError::Taken { by: root })]);
+    (0..150).for_each(|_| app.update());
+    assert_eq!(faults(&mut app).len(), 1, "reported once");
+    app.world_mut().entity_mut(root).remove::<WearHair>();
+    let hair = worn(&mut app);
+    assert_eq!(app.world().get::<WornHair>(hair).unwrap().wearer, other);
+    assert_eq!(wearers(&mut app), 1);
+}
+
+#[test]
+fn a_mirrored_character_wears_mirrored_hair() {
+    let shape = |scale: Vec3| {
+        let mut app = app();
+        let place = Transform::from_scale(scale);
+        let root = app.world_mut().spawn((place, WearHair::new(HairPreset::Bob))).id();
+        character(&mut app, root, 1.0);
+        let hair = worn(&mut app);
+        (0..20).for_each(|_| app.update());
+        strands(&mut app, hair)
+    };
+    let (one, mirrored) = (shape(Vec3::ONE), shape(Vec3::new(-1.0, 1.0, 1.0)));
+    assert_eq!(one.len(), mirrored.len());
+    // In the wearer's own space, where both are the same.
+    let apart =
+        one.iter().zip(&mirrored).flat_map(|(a, b)| a.positions().iter().zip(b.positions()));
+    let worst = apart.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+    assert!(worst < 2e-3, "{worst} m apart");
+}
+
+#[test]
 fn dolls_and_giants_wear_the_same_hair() {
     let shape = |size: f32, units: f32| {
         let mut app = app();

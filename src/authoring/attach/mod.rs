@@ -17,7 +17,10 @@ mod tie;
 pub use error::RootsError;
 pub use roots::{RootsOnMesh, TiedRoots};
 
-use crate::base::schedule::{HairSystems, HairTick};
+use crate::{
+    base::schedule::{HairSystems, HairTick},
+    hair::strand::lacks_strands,
+};
 use bevy::prelude::*;
 
 /// Roots on meshes.
@@ -26,6 +29,9 @@ pub struct AttachPlugin;
 
 impl Plugin for AttachPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         app.register_type::<RootsOnMesh>()
             .register_type::<TiedRoots>()
             .register_type::<RootsError>()

@@ -25,7 +25,7 @@ mod what;
 pub use error::WearError;
 pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair};
 
-use crate::base::schedule::HairFrame;
+use crate::{base::schedule::HairFrame, hair::strand::lacks_strands};
 use bevy::prelude::*;
 
 /// Puts hair on entities with [`WearHair`].
@@ -34,6 +34,9 @@ pub struct WearPlugin;
 
 impl Plugin for WearPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         app.register_type::<WearHair>()
             .register_type::<HairSource>()
             .register_type::<WornHair>()

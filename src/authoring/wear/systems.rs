@@ -43,7 +43,7 @@ enum WearStage {
     /// Searching for the head.
     #[default]
     Begun,
-    /// The same, for `seconds`; `reported` once a failure has been reported.
+    /// The same, for `seconds`; once a failure has been `reported`, from [`SEARCH_TIME`] to a second later.
     Searching { seconds: f32, reported: bool },
     /// Its hair is being made.
     Making(Making),
@@ -175,13 +175,23 @@ pub(super) fn find_heads(
     for (wearer, wear, mut wearing) in &mut wearers {
         let (seconds, reported) = match wearing.stage {
             WearStage::Begun => (0.0, false),
-            WearStage::Searching { seconds, reported } => (seconds + step, reported),
+            WearStage::Searching { seconds, reported } => {
+                let seconds = seconds + step;
+                if reported && seconds < SEARCH_TIME + 1.0 {
+                    wearing.bypass_change_detection().stage =
+                        WearStage::Searching { seconds, reported };
+                    continue;
+                }
+                (seconds, reported)
+            }
             WearStage::Making(_) | WearStage::Done => continue,
         };
-        let mut failed = |error: WearError, reported: bool| {
+        // The scene may change: it is searched again.
+        let mut failed = |error: WearError| {
             if !reported {
                 report_failure(&mut commands, &mut faults, wearer, error);
             }
+            WearStage::Searching { seconds: SEARCH_TIME, reported: true }
         };
         let groom = match &wear.hair {
             HairSource::Preset(_) => None,
@@ -189,12 +199,10 @@ pub(super) fn find_heads(
                 match grooms.as_ref().and_then(|grooms| grooms.get(groom)) {
                     Some(groom) => Some(groom),
                     None => {
-                        if let Some(reason) = characters.failure(groom.id().untyped()) {
-                            failed(WearError::NotLoaded { what: "groom", reason }, reported);
-                            wearing.stage = WearStage::Done;
-                        } else {
-                            wearing.stage = WearStage::Searching { seconds, reported };
-                        }
+                        wearing.stage = match characters.failure(groom.id().untyped()) {
+                            Some(reason) => failed(WearError::NotLoaded { what: "groom", reason }),
+                            None => WearStage::Searching { seconds, reported },
+                        };
                         continue;
                     }
                 }
@@ -202,25 +210,13 @@ pub(super) fn find_heads(
         };
         wearing.stage = match characters.search(wearer, wear) {
             Search::Loading => WearStage::Searching { seconds, reported },
-            Search::Nothing => {
-                let is_late = seconds > SEARCH_TIME;
-                if is_late {
-                    failed(WearError::NoMesh, reported);
-                }
-                WearStage::Searching { seconds, reported: reported || is_late }
-            }
-            // Missing parts may still load.
-            Search::Failed(error) => {
-                failed(error, reported);
-                WearStage::Searching { seconds, reported: true }
-            }
+            Search::Nothing if seconds > SEARCH_TIME => failed(WearError::NoMesh),
+            Search::Nothing => WearStage::Searching { seconds, reported },
+            Search::Failed(error) => failed(error),
             Search::Found(target) => {
                 let is_preset = matches!(wear.hair, HairSource::Preset(_));
                 match taken.get(&target.head).filter(|by| is_preset && **by != wearer) {
-                    Some(&by) => {
-                        failed(WearError::Taken { by }, false);
-                        WearStage::Done
-                    }
+                    Some(&by) => failed(WearError::Taken { by }),
                     None => {
                         if is_preset {
                             taken.insert(target.head, wearer);

@@ -44,7 +44,7 @@ impl HairReach {
     fn room(&self, frame: &TickPose, substeps: u32) -> f32 {
         let (before, now) = (frame.before(), frame.now());
         let travel = before.translation.distance(now.translation);
-        REACH_MARGIN * self.radius * now.scale + travel * substeps as f32
+        REACH_MARGIN * self.radius * now.size() + travel * substeps as f32
     }
 }
 
@@ -73,7 +73,7 @@ impl Ball {
             ColliderShape::Grid(grid) => grid.reach(),
         };
         let travel = before.translation.distance(now.translation);
-        let radius = radius * now.scale.max(before.scale);
+        let radius = radius * now.size().max(before.size());
         Self { center: now.translation, radius, travel }
     }
 

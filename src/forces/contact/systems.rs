@@ -18,7 +18,7 @@ use crate::{
     },
     hair::strand::{
         Hair, OnGpu, SleepCounts, SleepPose, Strand, StrandOf, StrandSleep, Strands, TickPose,
-        keep_required,
+        keep_required, lacks_strands,
     },
     solver::rod::{
         obstacle::{Obstacle, Solid},
@@ -42,6 +42,9 @@ pub struct ContactPlugin;
 
 impl Plugin for ContactPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         setting::plugin::<StrandContact>(app);
         #[cfg(feature = "avian")]
         super::avian::plugin(app);
@@ -87,9 +90,9 @@ impl Plugin for ContactPlugin {
 /// A collider in a hair's frame, with the motion of its surface during the substep.
 pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obstacle {
     let (now, own) = (hair.now(), pose.now());
-    let scale = own.scale / now.scale;
+    let scale = own.size() / now.size();
     let at = now.point_in(own.translation);
-    let turned = |d: Vec3| now.direction_in(own.rotation * d);
+    let turned = |d: Vec3| now.direction_in(own.direction_out(d));
     let placed = |shape: Shape| {
         Solid::Placed(Placed {
             shape,

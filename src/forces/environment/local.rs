@@ -65,7 +65,7 @@ impl Winds<'_, '_> {
             .filter(|(blower, _)| blower.strength > 0.0)
             .map(|(blower, at)| LocalBlower {
                 nozzle: pose.point_in(at.translation),
-                aim: pose.direction_in(at.rotation * Vec3::NEG_Z),
+                aim: pose.direction_in(at.direction_out(Vec3::NEG_Z)),
                 blower,
             });
         let zones = self.zones.iter().map(|(zone, at)| {
@@ -124,7 +124,7 @@ impl LocalWinds {
     pub(super) fn zones_near(&self, place: Vec3, distance: f32) -> bool {
         self.zones.iter().any(|seen| {
             let apart = place.distance(seen.origin) - distance;
-            apart * seen.scale <= seen.zone.reach()
+            apart * seen.scale.abs() <= seen.zone.reach()
         })
     }
 
@@ -139,7 +139,7 @@ impl LocalWinds {
             }
             open *= 1.0 - zone.shelter * share;
             let own = zone.velocity + place.normalize_or_zero() * zone.outward;
-            flow += rotation.inverse() * own * share;
+            flow += rotation.inverse() * own * (share * scale.signum());
             air.add_warmth(zone.warmth * share);
             air.drying += zone.drying * share;
         }
@@ -150,7 +150,7 @@ impl LocalWinds {
     /// The air at a point of an `edge`; `wind` is the global wind with gusts there, `zones` whether any
     /// zone is near.
     pub(super) fn at(&self, wind: Vec3, zones: bool, p: Vec3, edge: Vec3) -> Blown {
-        let mut air = Blown::at(&self.blowers, self.pose.scale, p, edge);
+        let mut air = Blown::at(&self.blowers, self.pose.size(), p, edge);
         if zones {
             self.add_flow(&mut air, wind, p);
         } else {

@@ -21,7 +21,7 @@ use crate::{
     base::setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
     hair::strand::TickPose,
 };
-use bevy::prelude::*;
+use bevy::{ecs::system::SystemParam, prelude::*};
 
 /// Gravity of all hair (m/s², in the world). Default (0, −9.80, 0), as in \[B\] table 1. Not scaled
 /// with a character. Range of each component: [`RANGE`](Self::RANGE).
@@ -39,6 +39,16 @@ impl HairGravity {
     /// The range of each of its components.
     pub const RANGE: ValueRange =
         ValueRange::new("HairGravity (m/s²)", -1e4..=1e4, "9.8 down is the Earth's");
+}
+
+/// [`HairGravity`], none without the plugin that provides it.
+#[derive(SystemParam)]
+pub(crate) struct Gravity<'w>(Option<Res<'w, HairGravity>>);
+
+impl Gravity<'_> {
+    pub(crate) fn clamped(&self) -> HairGravity {
+        self.0.as_ref().map_or(HairGravity(Vec3::ZERO), |gravity| gravity.clamped())
+    }
 }
 
 impl Ranged for HairGravity {

@@ -1,7 +1,8 @@
 //! `ExternalForces`: air and gravity act on velocities, and wind on bonds.
 
 use super::{
-    AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindZone, ZoneShape,
+    AirDrag, Blower, Gravity, HairClimate, HairGravity, HairWind, WindReceived, WindZone,
+    ZoneShape,
     blown::BlownAir,
     local::{LocalWinds, Winds},
     vapour::DryingAir,
@@ -14,7 +15,7 @@ use crate::{
     },
     hair::strand::{
         AddedMass, Hair, KinematicStrand, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose,
-        keep_required,
+        keep_required, lacks_strands,
     },
     keratin::bond::{BondChanges, BondKind},
 };
@@ -29,6 +30,9 @@ pub struct EnvironmentPlugin;
 
 impl Plugin for EnvironmentPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         setting::plugin::<AirDrag>(app);
         setting::component::<Blower>(app);
         setting::component::<WindZone>(app);
@@ -87,7 +91,7 @@ type AirStrand = (
 
 fn apply_air(
     steps: EffectiveSubsteps,
-    gravity: Res<HairGravity>,
+    gravity: Gravity,
     drag: Settings<AirDrag>,
     hairs: Query<&TickPose, With<Hair>>,
     winds: Winds,

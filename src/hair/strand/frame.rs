@@ -139,22 +139,26 @@ setting! {
 impl HairInertia {
     /// Whether a change from one pose to another within a tick counts as a teleport.
     fn is_jump(&self, from: &Pose, to: &Pose, longest: impl FnOnce() -> f32) -> bool {
-        let distance = to.translation.distance(from.translation) / to.scale.max(from.scale);
-        distance > self.teleport_distance && distance > self.teleport_lengths * longest()
+        let distance = to.translation.distance(from.translation) / to.size().max(from.size());
+        to.scale * from.scale < 0.0
+            || distance > self.teleport_distance && distance > self.teleport_lengths * longest()
             || to.rotation.angle_between(from.rotation) > self.teleport_angle
     }
 }
 
-/// A rigid pose with a scale.
+/// A rigid pose with a scale. A mirror image is a point reflection: its scale is negative.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Position in the world (m).
     pub translation: Vec3,
     /// Orientation in the world.
     pub rotation: Quat,
-    /// World units per unit of the hair.
+    /// World units per unit of the hair; negative where the hair is mirrored.
     pub scale: f32,
 }
+
+/// About X.
+const HALF_TURN: Quat = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
 
 impl Default for Pose {
     fn default() -> Self {
@@ -163,11 +167,15 @@ impl Default for Pose {
 }
 
 impl Pose {
-    /// The pose of a global transform, with the mean of a non-uniform scale. `None` when it is not
-    /// finite or not invertible.
+    /// The pose of a global transform, with the mean of a non-uniform scale, which is negative for a
+    /// transform that mirrors. `None` when it is not finite or not invertible.
     pub fn of(transform: &GlobalTransform) -> Option<Self> {
         let (scale, rotation, translation) = transform.to_scale_rotation_translation();
-        let scale = scale.element_product().abs().cbrt();
+        // The decomposition mirrors along X: that is a point reflection and half a turn about X.
+        let (rotation, scale) = match scale.element_product().cbrt() {
+            mirrored if mirrored < 0.0 => (rotation * HALF_TURN, mirrored),
+            scale => (rotation, scale),
+        };
         let pose = Self { translation, rotation, scale };
         pose.is_valid().then(|| Self { rotation: rotation.normalize(), ..pose })
     }
@@ -178,7 +186,7 @@ impl Pose {
             && rotation.is_finite()
             && rotation.length_squared() > 0.5
             && scale.is_finite()
-            && *scale > 1e-9
+            && scale.abs() > 1e-9
     }
 
     /// Whether it is valid, with a rotation of unit length, as the tick keeps them.
@@ -199,9 +207,19 @@ impl Pose {
         }
     }
 
+    /// World units per unit of the hair, mirrored or not.
+    pub fn size(&self) -> f32 {
+        self.scale.abs()
+    }
+
     /// A direction of the world, seen from the hair.
     pub fn direction_in(&self, direction: Vec3) -> Vec3 {
-        self.rotation.inverse() * direction
+        self.rotation.inverse() * direction * self.scale.signum()
+    }
+
+    /// A direction of the hair, in the world.
+    pub fn direction_out(&self, direction: Vec3) -> Vec3 {
+        self.rotation * direction * self.scale.signum()
     }
 
     /// A point of the world, in the hair's units.

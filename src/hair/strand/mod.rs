@@ -31,6 +31,7 @@ pub(crate) use required::keep_required;
 pub(crate) use strand_sleep::KinematicStrand;
 pub use strand_sleep::{SleepCounts, SleepPose, StrandSleep};
 pub use systems::StrandPlugin;
+pub(crate) use systems::lacks_strands;
 
 use crate::{
     base::{

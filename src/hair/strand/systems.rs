@@ -12,8 +12,8 @@ use crate::base::{
     fault::{FaultKind, HairChecks, HairFault},
     parallel::{Nanos, for_each_part, tables},
     schedule::{
-        EffectiveSubsteps, HairFrame, HairStep, HairSystems, HairTick, MergedSubsteps,
-        first_substep,
+        EffectiveSubsteps, HairFrame, HairStep, HairSystems, HairTick, MergedSubsteps, TickPlugin,
+        first_substep, lacks,
     },
     setting::{self, Settings},
 };
@@ -32,6 +32,9 @@ pub struct StrandPlugin;
 
 impl Plugin for StrandPlugin {
     fn build(&self, app: &mut App) {
+        if lacks::<TickPlugin, Self>(app) {
+            return;
+        }
         setting::plugin::<StrandModel>(app);
         setting::plugin::<HairInertia>(app);
         keep_required::<Hair, Transform>(app);
@@ -75,6 +78,11 @@ impl Plugin for StrandPlugin {
                 ),
             );
     }
+}
+
+/// Whether the tick or strands are missing, without which `Own` does nothing.
+pub(crate) fn lacks_strands<Own: Plugin>(app: &mut App) -> bool {
+    lacks::<TickPlugin, Own>(app) || lacks::<StrandPlugin, Own>(app)
 }
 
 /// Reports strands that cannot be simulated, once, when they are spawned or assigned to a hair.

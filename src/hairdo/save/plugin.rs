@@ -1,6 +1,7 @@
 //! The plugin.
 
 use super::{Hairdo, HairdoError, StyledStrand, events};
+use crate::{base::schedule::lacks, hair::strand::lacks_strands, keratin::bond::BondPlugin};
 use bevy::prelude::*;
 
 /// Registers hairdos for reflection, and serves requests for them.
@@ -9,6 +10,10 @@ pub struct SavePlugin;
 
 impl Plugin for SavePlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
+        lacks::<BondPlugin, Self>(app);
         app.register_type::<Hairdo>()
             .register_type::<StyledStrand>()
             .register_type::<HairdoError>()

@@ -8,12 +8,12 @@ mod model;
 
 use crate::{
     base::{
-        schedule::{HairSystems, HairTick, last_substep},
+        schedule::{HairSystems, HairTick, lacks, last_substep},
         setting::{self, Ranged, Settings, setting},
     },
     forces::environment::vapour::WATER,
-    hair::strand::{Hair, Strands},
-    keratin::bond::{BondInfluence, Bonds},
+    hair::strand::{Hair, Strands, lacks_strands},
+    keratin::bond::{BondInfluence, BondPlugin, Bonds},
     water::Moisture,
 };
 use bevy::{
@@ -28,6 +28,10 @@ pub struct StylePlugin;
 
 impl Plugin for StylePlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
+        lacks::<BondPlugin, Self>(app);
         setting::component::<HairStyle>(app);
         app.register_type::<KeptStyle>()
             .register_type::<StyleFaded>()

@@ -19,6 +19,7 @@ use crate::{
     },
     hair::strand::{
         AddedMass, KinematicStrand, OnGpu, PerHair, Strand, StrandOf, StrandSleep, keep_required,
+        lacks_strands,
     },
     math::lanes::simd_level,
     solver::rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
@@ -38,6 +39,9 @@ pub struct BondPlugin;
 
 impl Plugin for BondPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         setting::plugin::<BondInfluence>(app);
         setting::plugin::<Cuticle>(app);
         keep_required::<Strand, Bonds>(app);

@@ -8,13 +8,14 @@ use crate::{
     base::{
         fault::{FaultKind, HairFault},
         parallel::{Nanos, for_each},
-        schedule::{HairProcessTime, HairStep, HairSystems, HairTick},
+        schedule::{HairProcessTime, HairStep, HairSystems, HairTick, lacks},
         setting::{self, Ranged, report},
     },
     hair::strand::{
         HeldNodes, MissedOnGpu, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required,
+        lacks_strands,
     },
-    keratin::bond::{BondChanges, BondKind, Bonds},
+    keratin::bond::{BondChanges, BondKind, BondPlugin, Bonds},
 };
 use bevy::prelude::*;
 
@@ -23,6 +24,10 @@ pub struct TreatmentPlugin;
 
 impl Plugin for TreatmentPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
+        lacks::<BondPlugin, Self>(app);
         setting::component::<PermRod>(app);
         setting::component::<PermWinding>(app);
         keep_required::<Strand, Treatments>(app);
@@ -133,10 +138,10 @@ fn wind_strands(
             let hair = hairs.get(of.0).ok()?.now();
             let (rod, pose) = rods.get(on.0).ok()?;
             let (rod, pose) = (rod.clamped(), pose.now());
-            let scale = pose.scale / hair.scale;
+            let scale = pose.size() / hair.size();
             let rod = LocalRod {
                 center: hair.point_in(pose.translation),
-                axis: hair.direction_in(pose.rotation * Vec3::Y),
+                axis: hair.direction_in(pose.direction_out(Vec3::Y)),
                 radius: rod.radius * scale,
                 half_length: 0.5 * rod.length * scale,
             };

@@ -14,7 +14,7 @@ use crate::{
         schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
         setting::{self, Ranged},
     },
-    hair::strand::{Hair, OnGpu, Strand, Strands, keep_required},
+    hair::strand::{Hair, OnGpu, Strand, Strands, keep_required, lacks_strands},
 };
 use bevy::prelude::*;
 
@@ -23,6 +23,9 @@ pub struct LodPlugin;
 
 impl Plugin for LodPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
         setting::component::<HairLod>(app);
         setting::resource::<HairBudget>(app);
         keep_required::<Strand, Follower>(app);

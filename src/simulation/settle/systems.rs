@@ -3,11 +3,11 @@
 use super::{SettleSettings, Settling};
 use crate::{
     base::{
-        schedule::{Ahead, HairStep, HairTicks, SettleTick},
+        schedule::{Ahead, HairStep, HairTicks, SettleTick, lacks},
         setting::{self, Settings},
     },
-    hair::strand::{Hair, Strand, StrandHistory, Strands, TickPose},
-    keratin::bond::BondChanges,
+    hair::strand::{Hair, Strand, StrandHistory, Strands, TickPose, lacks_strands},
+    keratin::bond::{BondChanges, BondPlugin},
 };
 use bevy::{
     ecs::{
@@ -32,6 +32,10 @@ impl SettlePlugin {
 
 impl Plugin for SettlePlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
+        lacks::<BondPlugin, Self>(app);
         setting::plugin::<SettleSettings>(app);
         app.register_type::<Settling>().add_systems(
             self.schedule,

@@ -7,19 +7,19 @@ use super::{
 use crate::{
     base::{
         parallel::{Nanos, for_each},
-        schedule::{HairStep, HairSystems, HairTick, first_substep},
+        schedule::{HairStep, HairSystems, HairTick, first_substep, lacks},
         setting::{self, Ranged, Settings},
     },
     forces::{
         contact::{Colliders, HairCollider, HairReach, StrandContact, seen_from},
-        environment::{AirDrag, HairGravity, LocalWinds, Winds},
+        environment::{AirDrag, Gravity, LocalWinds, Winds},
     },
     hair::strand::{
         AddedMass, Hair, HeldNodes, KinematicStrand, OnGpu, Pose, SleepCounts, SleepPose, Strand,
-        StrandModel, StrandOf, StrandSleep, Strands, TickPose,
+        StrandModel, StrandOf, StrandSleep, Strands, TickPose, lacks_strands,
     },
     keratin::{
-        bond::{BondChanges, BondInfluence, Bonds, Cuticle},
+        bond::{BondChanges, BondInfluence, BondPlugin, Bonds, Cuticle},
         treatment::Treatments,
     },
     solver::{
@@ -48,6 +48,10 @@ pub struct SleepPlugin;
 
 impl Plugin for SleepPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
+        lacks::<BondPlugin, Self>(app);
         setting::plugin::<SleepSettings>(app);
         app.register_type::<SleepSnapshot>()
             .register_required_components::<Hair, SleepSnapshot>()
@@ -74,7 +78,7 @@ pub(super) struct Conditions {
 
 #[derive(SystemParam)]
 pub(super) struct RestSettings<'w, 's> {
-    gravity: Res<'w, HairGravity>,
+    gravity: Gravity<'w>,
     sleep: Settings<'w, 's, SleepSettings>,
     stiffness: Settings<'w, 's, HairStiffness>,
     solver: Settings<'w, 's, HairSolver>,
@@ -145,7 +149,7 @@ impl SleepSnapshot {
         substeps: u32,
     ) -> WakeEvents {
         let distance = conditions.sleep.distance();
-        let apart = pose.translation.distance(self.pose.translation) / pose.scale;
+        let apart = pose.translation.distance(self.pose.translation) / pose.size();
         // Rotation counts as the displacement of the tip of a long strand.
         let turned = turn(self.pose.rotation, pose.rotation) * LONG_STRAND;
         let scaled = (pose.scale / self.pose.scale - 1.0).abs() * LONG_STRAND;

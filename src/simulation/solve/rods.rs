@@ -10,18 +10,18 @@ use crate::{
     base::{
         fault::HairFault,
         parallel::{Scratch, prefetch, tables},
-        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick},
-        setting::{self, Ranged, Settings},
+        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, lacks},
+        setting::{self, Settings},
     },
     forces::{
         contact::{Obstacles, StrandContact},
-        environment::HairGravity,
+        environment::Gravity,
     },
     hair::strand::{
         AddedMass, Hair, HeldNodes, KinematicStrand, OnGpu, Strand, StrandModel, StrandOf,
-        StrandSleep, TickPose,
+        StrandSleep, TickPose, lacks_strands,
     },
-    keratin::bond::{BondInfluence, Bonds, RestShape},
+    keratin::bond::{BondInfluence, BondPlugin, Bonds, RestShape},
     math::lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level},
     solver::rod::{
         HairSolver, HairStiffness, SolverMethod, Sweeps,
@@ -40,6 +40,10 @@ pub struct RodPlugin;
 
 impl Plugin for RodPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
+        lacks::<BondPlugin, Self>(app);
         setting::plugin::<HairStiffness>(app);
         setting::plugin::<HairSolver>(app);
         setting::plugin::<Sweeps>(app);
@@ -155,7 +159,7 @@ fn step_rods(
     substeps: EffectiveSubsteps,
     model: Settings<StrandModel>,
     (solver, sweeps): (Settings<HairSolver>, Settings<Sweeps>),
-    gravity: Res<HairGravity>,
+    gravity: Gravity,
     stiffness: Settings<HairStiffness>,
     influence: Settings<BondInfluence>,
     contact: Settings<StrandContact>,

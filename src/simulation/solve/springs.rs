@@ -8,17 +8,18 @@ use crate::{
     base::{
         fault::HairFault,
         parallel::{Scratch, tables},
-        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick},
-        setting::{self, Ranged, Settings},
+        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, lacks},
+        setting::{self, Settings},
     },
     forces::{
         contact::{Obstacles, StrandContact},
-        environment::HairGravity,
+        environment::Gravity,
     },
     hair::strand::{
         AddedMass, HeldNodes, KinematicStrand, OnGpu, Strand, StrandModel, StrandOf, StrandSleep,
-        TickPose,
+        TickPose, lacks_strands,
     },
+    keratin::bond::BondPlugin,
     math::lanes::{LANES, put_quaternions, simd_level},
     solver::{
         mass_spring::{
@@ -37,6 +38,10 @@ pub struct SpringPlugin;
 
 impl Plugin for SpringPlugin {
     fn build(&self, app: &mut App) {
+        if lacks_strands::<Self>(app) {
+            return;
+        }
+        lacks::<BondPlugin, Self>(app);
         setting::plugin::<Springs>(app);
         app.add_systems(HairTick, step_springs.in_set(HairSystems::Springs))
             .add_systems(SettleTick, step_springs.in_set(HairSystems::Springs));
@@ -109,7 +114,7 @@ fn step_springs(
     model: Settings<StrandModel>,
     springs: Settings<Springs>,
     contact: Settings<StrandContact>,
-    gravity: Res<HairGravity>,
+    gravity: Gravity,
     hairs: Query<(Option<&Obstacles>, &TickPose)>,
     mut strands: Query<
         (Entity, &StrandOf, &StrandSleep, &mut Strand, &AddedMass, Option<&HeldNodes>),
