@@ -7,17 +7,17 @@
 //! on the machine. `KERATIN_BENCH_ONLY=wavy,crowd` prints only these rows. `KERATIN_BENCH_PARTS=1` prints
 //! after each crowd which parts of a substep take the time.
 
-#[path = "../examples/character/body.rs"]
+#[path = "../examples/shared/body.rs"]
 #[allow(dead_code, reason = "the example uses all of it")]
 mod body;
 mod common;
-#[path = "../examples/presets/head.rs"]
+#[path = "../examples/shared/head.rs"]
 #[allow(dead_code, reason = "the pictures use all of it")]
 mod head;
-#[path = "../examples/salon/mannequin.rs"]
+#[path = "../examples/shared/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
-#[path = "../examples/character/skeleton.rs"]
+#[path = "../examples/shared/skeleton.rs"]
 #[allow(dead_code, reason = "the example uses all of it")]
 mod skeleton;
 #[path = "game/worn.rs"]

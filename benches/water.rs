@@ -9,7 +9,7 @@
 //! Then what water costs where there is none: thirty hairs with a shower over one of them, and hair at rest in
 //! damp air.
 
-#[path = "../examples/scenes/mod.rs"]
+#[path = "../examples/shared/scenes/mod.rs"]
 mod scenes;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};

@@ -1,9 +1,9 @@
 //! What planting costs, and where roots are on the examples' head.
 
-#[path = "../examples/presets/head.rs"]
+#[path = "../examples/shared/head.rs"]
 #[allow(dead_code, reason = "the presets use all of it")]
 mod head;
-#[path = "../examples/salon/mannequin.rs"]
+#[path = "../examples/shared/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
 

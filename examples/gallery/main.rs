@@ -3,46 +3,47 @@
 //! `cargo run --release --example gallery` makes all of them in `assets/`. Loops are assembled by
 //! `img2webp` of libwebp (Debian's `webp`); without it their frames stay where they were drawn.
 
-#[path = "../character/body.rs"]
+#[path = "../shared/body.rs"]
 mod body;
-#[path = "../presets/bust.rs"]
+#[path = "../shared/bust.rs"]
 #[allow(dead_code, reason = "the presets use all of it")]
 mod bust;
-#[path = "../salon/dressed.rs"]
+#[path = "../shared/dressed.rs"]
 mod dressed;
-#[path = "../salon/environment.rs"]
+#[path = "../shared/environment.rs"]
 mod environment;
-#[path = "../salon/failure.rs"]
+#[path = "../shared/failure.rs"]
 mod failure;
-#[path = "../character/figure.rs"]
+#[path = "../shared/figure.rs"]
 #[allow(dead_code, reason = "the character uses all of it")]
 mod figure;
-#[path = "../presets/head.rs"]
+#[path = "../shared/head.rs"]
 mod head;
-#[path = "../salon/mannequin.rs"]
+#[path = "../shared/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
-#[path = "../salon/orbit.rs"]
+#[path = "../shared/orbit.rs"]
 mod orbit;
-#[path = "../salon/picture.rs"]
+#[path = "../shared/picture.rs"]
 mod picture;
-#[path = "../salon/renderer.rs"]
+#[path = "../shared/renderer.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod renderer;
-#[path = "../scenes/mod.rs"]
+#[path = "../shared/scenes/mod.rs"]
 mod scenes;
-#[path = "../salon/set.rs"]
+#[path = "../shared/set.rs"]
 mod set;
-#[path = "../character/skeleton.rs"]
+#[path = "../shared/skeleton.rs"]
 mod skeleton;
-#[path = "../salon/solid.rs"]
+#[path = "../shared/solid.rs"]
 mod solid;
-#[path = "../salon/stage.rs"]
+#[path = "../shared/stage.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod stage;
-#[path = "../salon/studio.rs"]
+#[path = "../shared/studio.rs"]
 mod studio;
 
+mod export;
 mod loops;
 mod sheets;
 
@@ -79,6 +80,8 @@ enum Piece {
     Presets,
     /// One picture with fewer and more samples.
     Quality,
+    /// The figure without hair, as binary glTF: `figure.glb`.
+    Figure,
 }
 
 /// Draws the README's pictures.
@@ -171,6 +174,10 @@ fn make(piece: Piece, arguments: &Arguments) -> Result {
         Piece::Melanin => return sheets::melanin(arguments),
         Piece::Presets => return sheets::presets(arguments),
         Piece::Quality => return sheets::quality(arguments),
+        Piece::Figure => {
+            let mesh = head::with_scalp(body::mesh_of(0.0036, 0.0105), &figure::scalp(), default());
+            return export::write(&mesh, &arguments.out.join("figure.glb"));
+        }
     };
     let folder = arguments.frames.join(&name);
     picture::folder(&folder)?;

@@ -3,25 +3,25 @@
 //! `cargo run --release --example groom_viewer -- hair.tfx`
 //! `cargo run --release --example groom_viewer -- hair.tfx --offscreen pictures`
 
-#[path = "../salon/dressed.rs"]
+#[path = "../shared/dressed.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod dressed;
-#[path = "../salon/failure.rs"]
+#[path = "../shared/failure.rs"]
 mod failure;
-#[path = "../salon/mannequin.rs"]
+#[path = "../shared/mannequin.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod mannequin;
-#[path = "../salon/picture.rs"]
+#[path = "../shared/picture.rs"]
 mod picture;
-#[path = "../salon/renderer.rs"]
+#[path = "../shared/renderer.rs"]
 mod renderer;
-#[path = "../salon/solid.rs"]
+#[path = "../shared/solid.rs"]
 #[allow(dead_code, reason = "the salon uses all of it")]
 mod solid;
-#[path = "../salon/studio.rs"]
+#[path = "../shared/studio.rs"]
 mod studio;
 
-#[path = "../presets/head.rs"]
+#[path = "../shared/head.rs"]
 #[allow(dead_code, reason = "the presets use all of it")]
 mod trained;
 

@@ -5,7 +5,7 @@
 //! `swing` is no scene of a paper: a single strand is let go, to be held against the theory of rods.
 //! `-- --scene swing --length 0.2 --bending-length 0.13 --segments 16 --from level --json`
 
-#[path = "../scenes/mod.rs"]
+#[path = "../shared/scenes/mod.rs"]
 mod scenes;
 
 #[cfg(feature = "gpu")]

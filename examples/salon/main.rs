@@ -4,31 +4,42 @@
 //! `cargo run --release --example salon`
 //! `cargo run --release --example salon -- --scene perm --offscreen pictures`
 
-#[path = "../presets/head.rs"]
+#[path = "../shared/head.rs"]
 mod head;
-#[path = "../scenes/mod.rs"]
+#[path = "../shared/scenes/mod.rs"]
 mod scenes;
 
 mod camera;
 #[cfg(feature = "gpu")]
 mod device;
 mod dials;
+#[path = "../shared/dressed.rs"]
 mod dressed;
+#[path = "../shared/environment.rs"]
 mod environment;
+#[path = "../shared/failure.rs"]
 mod failure;
+#[path = "../shared/mannequin.rs"]
 mod mannequin;
 mod offscreen;
+#[path = "../shared/orbit.rs"]
 mod orbit;
 mod overlay;
 mod panel;
+#[path = "../shared/picture.rs"]
 mod picture;
 mod plots;
+#[path = "../shared/renderer.rs"]
 mod renderer;
+#[path = "../shared/set.rs"]
 mod set;
+#[path = "../shared/solid.rs"]
 mod solid;
 mod spare;
+#[path = "../shared/stage.rs"]
 mod stage;
 mod story;
+#[path = "../shared/studio.rs"]
 mod studio;
 mod tools;
 mod wardrobe;

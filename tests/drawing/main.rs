@@ -4,7 +4,7 @@
 mod common;
 #[path = "../common/linear.rs"]
 mod linear;
-#[path = "../../examples/salon/mannequin.rs"]
+#[path = "../../examples/shared/mannequin.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod mannequin;
 #[path = "../common/offscreen.rs"]

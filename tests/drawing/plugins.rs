@@ -28,7 +28,6 @@ use bevy_keratin::{
         solve::{RodPlugin, SpringPlugin},
     },
     water::WaterPlugin,
-    *,
 };
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::sync::{Arc, Mutex};

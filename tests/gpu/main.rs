@@ -6,7 +6,7 @@ mod common;
 mod lab;
 #[path = "../common/offscreen.rs"]
 mod offscreen;
-#[path = "../../examples/scenes/mod.rs"]
+#[path = "../../examples/shared/scenes/mod.rs"]
 mod scenes;
 mod twin;
 #[path = "../common/golden.rs"]

@@ -47,11 +47,10 @@ fn hair_file(name: &str) -> (PathBuf, String) {
 fn a_folder_that_cannot_be_made_is_blamed_itself() {
     let (folder, file) = hair_file("folder");
     let salon = ["--offscreen", NO_FOLDER];
-    let commands: [(&str, &[&str]); 4] = [
+    let commands: [(&str, &[&str]); 3] = [
         ("groom_viewer", &[&file, "--offscreen", NO_FOLDER]),
-        ("character", &salon),
         ("salon", &salon),
-        ("presets", &[NO_FOLDER]),
+        ("gallery", &["figure", "--out", NO_FOLDER]),
     ];
     for (name, arguments) in commands {
         let text = error(name, arguments);
@@ -81,24 +80,24 @@ fn numbers_out_of_range_are_refused() {
 }
 
 #[test]
-fn presets_explains_itself_and_makes_no_folder_of_flags() {
+fn the_gallery_explains_itself_and_makes_no_folder_of_flags() {
     let folder = std::env::temp_dir().join(format!("bevy_keratin-help-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
-    let out = example("presets").arg("--help").current_dir(&folder).output().unwrap();
+    let out = example("gallery").arg("--help").current_dir(&folder).output().unwrap();
     assert!(out.status.success() && String::from_utf8_lossy(&out.stdout).contains("Usage"));
-    let out = example("presets").arg("--wavy").current_dir(&folder).output().unwrap();
+    let out = example("gallery").arg("--wavy").current_dir(&folder).output().unwrap();
     assert_eq!(out.status.code(), Some(2));
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
     std::fs::remove_dir_all(folder).unwrap();
-    let text = error("presets", &[NO_FOLDER, "mohawk"]);
-    assert!(text.contains("expected one of straight, wavy"), "{text}");
+    let text = error("gallery", &["mohawk"]);
+    assert!(text.contains("mohawk") && text.contains("bedhead"), "{text}");
 }
 
 #[test]
 #[cfg(target_os = "linux")]
 fn without_a_display_there_is_a_sentence_and_no_panic() {
     let (folder, file) = hair_file("display");
-    for (name, arguments) in [("minimal", vec![]), ("groom_viewer", vec![file])] {
+    for (name, arguments) in [("salon", vec![]), ("groom_viewer", vec![file])] {
         let mut command = example(name);
         let command = command.args(arguments).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
         let out = command.env_remove("WAYLAND_SOCKET").output().unwrap();

@@ -1,17 +1,17 @@
 //! Apps without a device that draws, as on a server.
 
-#[path = "../../examples/character/body.rs"]
+#[path = "../../examples/shared/body.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod body;
 #[path = "../common/mod.rs"]
 mod common;
-#[path = "../../examples/scenes/locks.rs"]
+#[path = "../../examples/shared/scenes/locks.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod locks;
-#[path = "../../examples/salon/mannequin.rs"]
+#[path = "../../examples/shared/mannequin.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod mannequin;
-#[path = "../../examples/character/skeleton.rs"]
+#[path = "../../examples/shared/skeleton.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod skeleton;
 #[path = "../../examples/headless/trace.rs"]

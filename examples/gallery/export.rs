@@ -1,9 +1,9 @@
-//! The figure as a binary glTF file: skin, bones and colours, for `on_character`.
+//! The figure as a binary glTF file: skin, bones and colours, for the example `preset_on_gltf`.
 
 use crate::skeleton;
 use bevy::{mesh::VertexAttributeValues as Values, prelude::*};
 use serde_json::{Value, json};
-use std::{error::Error, fs, path::Path};
+use std::{fs, path::Path};
 
 /// Names of the bones in the middle, of the left side and of the right.
 const NAMES: [&str; skeleton::COUNT] = [
@@ -66,7 +66,7 @@ fn weight_bytes(weights: &[f32; 4]) -> [u8; 4] {
 }
 
 /// Writes it.
-pub fn write(mesh: &Mesh, path: &Path) -> Result<(), Box<dyn Error>> {
+pub fn write(mesh: &Mesh, path: &Path) -> Result {
     let attribute = |id| mesh.attribute(id);
     let (
         Some(Values::Float32x3(places)),
@@ -129,7 +129,7 @@ pub fn write(mesh: &Mesh, path: &Path) -> Result<(), Box<dyn Error>> {
     nodes.push(json!({"name": "Body", "mesh": 0, "skin": 0}));
     let joints: Vec<usize> = (1..=skeleton::COUNT).collect();
     let document = json!({
-        "asset": {"version": "2.0", "generator": "bevy_keratin, example character"},
+        "asset": {"version": "2.0", "generator": "bevy_keratin, example gallery"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": nodes,
