@@ -9,8 +9,10 @@ pub mod wear;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
-    pub use crate::authoring::groom::{Groom, GroomError, GroomGuides, GroomSettings, GroomedHair};
-    pub use crate::authoring::plant::HairPreset;
+    pub use crate::authoring::groom::{
+        Groom, GroomError, GroomGuides, GroomSettings, GroomedHair, UpAxis,
+    };
+    pub use crate::authoring::plant::{HairPreset, Hairline, Scalp};
     pub use crate::authoring::wear::{
         HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair,
     };

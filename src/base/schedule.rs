@@ -106,6 +106,7 @@ substep! {
         SubstepLength: "How many substeps each hair takes as one, once a tick",
         Sleep: "Strands at rest fall asleep, disturbed ones wake, once a tick",
         FollowerSleep: "Followers sleep while all their guides do, once a tick",
+        Owners: "Who moves each hair from now on, once a tick",
         FrameInertia: "Inertia of free nodes when the hair's frame moves",
         MeshRoots: "Roots follow the triangles that they grow on",
         BondFit: "New and changed strands get bonds for each joint",

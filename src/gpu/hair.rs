@@ -14,7 +14,8 @@ use super::{
 use crate::authoring::attach::TiedRoots;
 use crate::{
     hair::strand::{
-        AddedMass, HeldNodes, OnGpu, SleepCounts, Strand, StrandHistory, StrandSleep, Strands,
+        AddedMass, HeldNodes, MotionOwner, OnGpu, SleepCounts, Strand, StrandHistory, StrandSleep,
+        Strands,
     },
     keratin::{
         bond::Bonds,
@@ -48,6 +49,8 @@ pub(super) struct GpuHair {
     is_new: bool,
     /// Why it is to return to the CPU, and with which answer.
     pub(super) returns: Option<(WhyCpu, u64)>,
+    /// What came near in this tick that no record can hold: it rests, and returns in the next.
+    pub(super) unsupported: Option<Unsupported>,
     /// Somebody waits for the answer of this number.
     pub(super) awaited: Option<u64>,
     /// The last state that was read back.
@@ -224,6 +227,7 @@ pub(super) fn hand_over(
         newest: 0,
         is_new: false,
         returns: None,
+        unsupported: None,
         awaited: None,
         checkpoint: None,
         since_checkpoint: 0.0,
@@ -244,7 +248,7 @@ pub(super) fn hand_over(
     let drawn =
         DrawnElsewhere { low: low - longest, high: high + longest, overstep: 1.0, rests: false };
     let sleepers = SleepCounts { asleep: 0, awake: members.len() - followers };
-    let marks = (OnGpu::HANDED_OVER, Disturbance::default());
+    let marks = (OnGpu::HANDED_OVER, MotionOwner::Gpu, Disturbance::default());
     let parts = (gpu, treatments, GpuJournal::default(), drawn, marks, sleepers);
     world.entity_mut(hair).insert((parts, HairResidence::Gpu));
     let treated = if is_treated { &members[..] } else { &[] };

@@ -14,7 +14,10 @@ use super::{
 };
 use crate::{
     base::fault::{FaultKind, HairFault},
-    hair::strand::{OnGpu, SleepCounts, Strand, StrandHistory, StrandSleep, StrandsArrived},
+    hair::strand::{
+        MotionOwner, OnGpu, Settling, SleepCounts, Strand, StrandHistory, StrandSleep,
+        StrandsArrived,
+    },
     keratin::{bond::Bonds, treatment::Treatments},
     render::DrawnElsewhere,
     simulation::{
@@ -105,7 +108,11 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     let goes_back = why == WhyCpu::Unsupported(Unsupported::LevelOfDetail);
     let stays_not = goes_back || why == WhyCpu::Unsupported(Unsupported::OtherSolver);
     let stays = if stays_not { 0.0 } else { STAYS_FOR };
-    entity.insert((HairResidence::Cpu(why), StaysOnCpu(stays)));
+    let owner = match entity.contains::<Settling>() {
+        true => MotionOwner::Settling,
+        false => MotionOwner::Simulated,
+    };
+    entity.insert((HairResidence::Cpu(why), StaysOnCpu(stays), owner));
     if let Some(mut lod) = entity.get_mut::<PresentLod>() {
         lod.bypass_change_detection().set_leaving(goes_back);
     }

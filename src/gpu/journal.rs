@@ -3,7 +3,10 @@
 use super::{
     followers::FollowRecord,
     hair::GpuHair,
-    record::{BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SleepRecord, SubstepRecord},
+    record::{
+        BlowerRecord, GpuJournal, MAX_BLOWERS, MAX_OBSTACLES, SleepRecord, SubstepRecord,
+        unsupported,
+    },
     sweeps::SweepRecord,
     targets::Leading,
     treatments::GpuTreatments,
@@ -64,7 +67,7 @@ pub(super) fn write_journals(
             Option<&Obstacles>,
             &mut GpuJournal,
             Option<&mut GpuTreatments>,
-            Option<&GpuHair>,
+            Option<&mut GpuHair>,
             (Option<&Disturbance>, Option<&DrawnElsewhere>, Option<&mut SleepCounts>),
         ),
         With<Hair>,
@@ -73,11 +76,17 @@ pub(super) fn write_journals(
     let gravity = gravity.clamped().0;
     let mut held = leading.held();
     for (hair, frame, obstacles, mut journal, treatments, on, rest) in &mut hairs {
+        let Some(substep) = substeps.of(hair) else { continue };
+        let solids = obstacles.map_or(&[][..], |all| &all.solids);
+        let on = on.map(|on| {
+            let on = on.into_inner();
+            on.unsupported = on.unsupported.or_else(|| unsupported(solids));
+            &*on
+        });
         // On its way back to the CPU it rests.
-        if on.is_some_and(GpuHair::is_returning) {
+        if on.is_some_and(|on| on.is_returning() || on.unsupported.is_some()) {
             continue;
         }
-        let Some(substep) = substeps.of(hair) else { continue };
         let is_last = step.index + 1 == step.count;
         let follows = follow_record(&mut journal, frame, &substep, is_last);
         let targets = leading.of(hair, &mut held, &mut journal);
@@ -129,7 +138,6 @@ pub(super) fn write_journals(
         });
         let pose = frame.now();
         let air = winds.seen_from(pose);
-        let solids = obstacles.map_or(&[][..], |all| &all.solids);
         let (solver, stiffness) = (solver.of(hair), stiffness.of(hair));
         // A method that is set in the middle of a tick counts from the next one on.
         let method = on.map_or(solver.method, |on| on.method);

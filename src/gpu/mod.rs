@@ -23,7 +23,7 @@
 //! | `layout` | where a strand's numbers lie on the GPU |
 //! | `record`, `sweeps` | what acts on a hair in one substep |
 //! | `pipelines` | the kernels on a device |
-//! | `add_targets` | targets nodes on a device |
+//! | `target_buffer` | kinematic targets on a device |
 //! | `strands` | a hair's strands there, substeps on a command encoder, reading back |
 //! | `probe` | where strands are, for game code |
 //! | `present` | nodes into the buffer that drawing reads |
@@ -140,5 +140,7 @@ pub use sweeps::SweepRecord;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
-    pub use crate::gpu::{HairGpu, HairProbe, HairProbed, HairResidence, SimulateOn};
+    pub use crate::gpu::{
+        HairGpu, HairProbe, HairProbed, HairResidence, SimulateOn, Unsupported, WhyCpu,
+    };
 }

@@ -2,6 +2,7 @@
 
 use super::{
     followers::FollowRecord,
+    residence::Unsupported,
     sweeps::{self, SweepRecord, UnusedSpins},
 };
 use crate::{
@@ -295,7 +296,8 @@ impl SubstepRecord {
         let start = out.len();
         let mut words = Words(out);
         let blowers = &self.blowers[..self.blowers.len().min(MAX_BLOWERS)];
-        let obstacles = &self.obstacles[..self.obstacles.len().min(MAX_OBSTACLES)];
+        let obstacles = self.obstacles.iter().filter(|obstacle| is_supported(&obstacle.solid));
+        let obstacles: Vec<_> = obstacles.take(MAX_OBSTACLES).collect();
         let remembers = blowers.iter().any(|b| b.drying != 0.0)
             || self.change.iter().chain(&self.share).any(|c| *c != 0.0)
             || !self.treatments.is_empty();
@@ -358,6 +360,18 @@ impl SubstepRecord {
     }
 }
 
+/// Why no record can hold these: hair that they are near to is simulated on the CPU.
+pub(super) fn unsupported(solids: &[Obstacle]) -> Option<Unsupported> {
+    let is_supported = solids.iter().all(|obstacle| is_supported(&obstacle.solid));
+    let is_too_long = solids.len() > MAX_OBSTACLES;
+    (is_too_long.then_some(Unsupported::Colliders))
+        .or((!is_supported).then_some(Unsupported::ColliderShape))
+}
+
+fn is_supported(solid: &Solid) -> bool {
+    !matches!(solid, Solid::Placed(placed) if !matches!(placed.shape, Shape::Ellipsoid { .. }))
+}
+
 /// Where the kernels find what belongs to a record.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Indices {
@@ -387,8 +401,6 @@ impl Words<'_> {
     }
 
     fn obstacle(&mut self, Obstacle { solid, motion, friction }: &Obstacle) {
-        // Unsupported solids are placed out of reach; the journal reports them.
-        const FAR: Vec3 = Vec3::splat(1e6);
         let ellipsoid = match solid {
             Solid::Placed(placed @ Placed { shape: Shape::Ellipsoid { radii }, .. }) => {
                 Some((placed.axes, *radii * placed.scale))
@@ -396,10 +408,10 @@ impl Words<'_> {
             _ => None,
         };
         let (kind, a, b, radius, half_height) = match *solid {
-            Solid::Placed(ref placed) => match ellipsoid {
-                Some((axes, half)) => (ELLIPSOID, placed.center, axes.x_axis, half.x, half.y),
-                None => (CAPSULE, FAR, Vec3::ZERO, 0.0, 0.0),
-            },
+            Solid::Placed(ref placed) => {
+                let (axes, half) = ellipsoid.unwrap_or_default();
+                (ELLIPSOID, placed.center, axes.x_axis, half.x, half.y)
+            }
             Solid::HalfSpace { normal, point } => (HALF_SPACE, normal, point, 0.0, 0.0),
             Solid::Capsule { a, b, radius } => (CAPSULE, a, b - a, radius, 0.0),
             Solid::Cylinder { center, axis, radius, half_height } => {

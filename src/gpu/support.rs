@@ -1,7 +1,7 @@
 //! What keeps a hair on the CPU: everything that acts on it and is not in the kernels.
 
 use super::{
-    record::{MAX_BLOWERS, MAX_OBSTACLES},
+    record::{self, MAX_BLOWERS},
     residence::Unsupported,
     treatments::GpuTreatments,
 };
@@ -20,7 +20,7 @@ use crate::{
         lod::{Guides, PresentLod},
         settle::Settling,
     },
-    solver::rod::{HairSolver, SolverMethod, obstacle::Solid, shape::Shape},
+    solver::rod::{HairSolver, SolverMethod},
     water::{Droplet, IsWet, Shower, WaterVolume},
 };
 use bevy::{
@@ -117,7 +117,7 @@ impl Support<'_, '_> {
         let contact = self.contact.of(hair);
         let air = self.winds.seen_from(frame.now());
         // Of the tick before: what is near is looked at before it touches.
-        let solids = obstacles.map_or(&[][..], |all| &all.solids);
+        let unplaced = obstacles.and_then(|all| record::unsupported(&all.solids));
         #[cfg(feature = "groom")]
         let is_being_tied = (self.on_mesh.get(hair))
             .is_ok_and(|(roots, tied)| roots.is_changed() || roots.mesh.is_some() && tied.wait());
@@ -130,14 +130,8 @@ impl Support<'_, '_> {
             (wet.is_some_and(|wet| wet.0) || !self.water.is_empty(), Unsupported::Water),
             (air.steady_wind().is_none(), Unsupported::UnsteadyWind),
             (air.blowers.len() > MAX_BLOWERS, Unsupported::Blowers),
-            (solids.len() > MAX_OBSTACLES, Unsupported::Colliders),
-            (
-                solids.iter().any(|o| match &o.solid {
-                    Solid::Placed(placed) => !matches!(placed.shape, Shape::Ellipsoid { .. }),
-                    _ => false,
-                }),
-                Unsupported::ColliderShape,
-            ),
+            (unplaced == Some(Unsupported::Colliders), Unsupported::Colliders),
+            (unplaced.is_some(), Unsupported::ColliderShape),
             (is_being_tied, Unsupported::MovingRoots),
             (settles, Unsupported::Settling),
             (is_watched, Unsupported::WatchedStyle),

@@ -182,6 +182,7 @@ pub(super) fn decide(
             ),
         ];
         let reason = reasons.into_iter().find(|(is_there, _)| *is_there).map(|(_, why)| why);
+        let reason = reason.or(on.unsupported.map(WhyCpu::Unsupported));
         if let Some(why) = reason.or_else(missing) {
             let begins = settings.blocking && why == WhyCpu::Unsupported(Unsupported::Winding);
             decisions.push((hair, if begins { Decision::Winds } else { Decision::Returns(why) }));

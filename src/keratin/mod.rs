@@ -5,7 +5,9 @@ pub mod treatment;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
-    pub use crate::keratin::bond::{BondChanges, BondInfluence, BondKind, Bonds, Cuticle};
+    pub use crate::keratin::bond::{
+        BondChanges, BondInfluence, BondKind, Bonds, Cuticle, JointBonds,
+    };
     pub use crate::keratin::treatment::{
         HairTreatment, PermRod, PermWinding, WoundOn, WoundStrands,
     };

@@ -24,7 +24,7 @@ use crate::{
     },
     hair::{
         look::{HairDye, HairLook},
-        strand::{Hair, Strand, StrandHistory, Strands},
+        strand::{Hair, MotionOwner, Strand, StrandHistory, Strands},
     },
     keratin::bond::Bonds,
     math::lanes::{dispatch, simd_level},
@@ -114,18 +114,15 @@ pub(super) fn end_settling(mut commands: Commands, hairs: Query<Entity, With<Set
 /// rebuilt.
 pub(super) fn pack(
     mut commands: Commands,
-    mut hairs: Query<
-        (
-            Entity,
-            &mut Packed,
-            Option<&HairBuffers>,
-            Option<&Strands>,
-            Option<Ref<FollowerRoots>>,
-            &GlobalTransform,
-            Option<&mut DrawnElsewhere>,
-        ),
-        Without<Settling>,
-    >,
+    mut hairs: Query<(
+        (Entity, &MotionOwner),
+        &mut Packed,
+        Option<&HairBuffers>,
+        Option<&Strands>,
+        Option<Ref<FollowerRoots>>,
+        &GlobalTransform,
+        Option<&mut DrawnElsewhere>,
+    )>,
     mut roots_removed: RemovedComponents<FollowerRoots>,
     strands: Query<GuideParts>,
     mut drawn: Query<(&mut Aabb, &MeshMaterial3d<RibbonMaterial>)>,
@@ -145,7 +142,12 @@ pub(super) fn pack(
     };
     let new_device = device.is_some_and(|device| device.is_changed());
     let roots_removed: Vec<Entity> = roots_removed.read().collect();
-    for (hair, mut packed, buffers, members, follower_roots, place, elsewhere) in &mut hairs {
+    for ((hair, owner), mut packed, buffers, members, follower_roots, place, elsewhere) in
+        &mut hairs
+    {
+        if *owner == MotionOwner::Settling {
+            continue;
+        }
         let packed = packed.bypass_change_detection();
         let guides = || members.into_iter().flat_map(|m| m.iter());
         let settings = followers.of(hair);

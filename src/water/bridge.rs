@@ -7,7 +7,9 @@ use super::{
 use crate::{
     base::{schedule::EffectiveSubsteps, setting::Settings},
     forces::contact::{Bridged, Film, LockNeighbours, StrandContact},
-    hair::strand::{AddedMass, Hair, OnGpu, SleepCounts, Strand, StrandOf, StrandSleep, Strands},
+    hair::strand::{
+        AddedMass, Hair, HairHere, MotionOwner, Strand, StrandOf, StrandSleep, Strands,
+    },
 };
 use bevy::prelude::*;
 
@@ -36,7 +38,7 @@ pub struct HairDried {
 
 pub(super) fn update_is_wet(
     found: Res<FoundWater>,
-    mut hairs: Query<(Entity, &Strands, &mut IsWet, &mut HoldsWater), (With<Hair>, Without<OnGpu>)>,
+    mut hairs: Query<(Entity, &Strands, &mut IsWet, &mut HoldsWater), HairHere>,
     strands: Query<(&Moisture, &AddedMass)>,
     mut commands: Commands,
 ) {
@@ -82,17 +84,14 @@ pub(super) fn join_wet_strands(
     contact: Settings<StrandContact>,
     wetting: Settings<HairWetting>,
     mut scratch: ResMut<WaterField>,
-    mut hairs: Query<
-        (Entity, &Strands, &IsWet, &mut LockNeighbours, Option<&SleepCounts>),
-        With<Hair>,
-    >,
+    mut hairs: Query<(Entity, &Strands, &IsWet, &mut LockNeighbours, &MotionOwner), With<Hair>>,
     mut strands: Query<(&mut Strand, &Moisture, &AddedMass, &StrandSleep), With<StrandOf>>,
 ) {
     let rows = &mut scratch.bypass_change_detection().rows;
-    for (hair, members, wet, mut neighbours, sleepers) in &mut hairs {
+    for (hair, members, wet, mut neighbours, owner) in &mut hairs {
         let wetting = wetting.of(hair);
         let Some(film) = bridges_of(contact.of(hair), &wetting, wet) else { continue };
-        if sleepers.is_some_and(SleepCounts::all) {
+        if owner.sleeps() {
             continue;
         }
         let Some(substep) = steps.of(hair) else { continue };

@@ -20,9 +20,7 @@ use crate::{
         contact::{Colliders, HairReach, WetRow},
         environment::Gravity,
     },
-    hair::strand::{
-        AddedMass, Hair, OnGpu, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose,
-    },
+    hair::strand::{AddedMass, Hair, Here, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose},
     math::lanes::{LANES, simd_level},
 };
 use bevy::prelude::*;
@@ -109,7 +107,7 @@ pub(super) fn wet_strands(
     wetting: Settings<HairWetting>,
     mut scratch: ResMut<WaterField>,
     mut hairs: Query<RainedOn, With<Hair>>,
-    mut strands: Query<AmongDroplets, Without<OnGpu>>,
+    mut strands: Query<AmongDroplets, Here>,
     mut droplets: Query<&mut Droplet>,
     mut ledger: ResMut<WaterLedger>,
 ) {
@@ -228,7 +226,7 @@ fn ball_of(drop: &Droplet, clearance: f32) -> (Vec3, f32) {
 fn wet_hairs<'a>(
     hairs: &mut Query<RainedOn, With<Hair>>,
     wetting: &Settings<HairWetting>,
-    strands: &'a mut Query<AmongDroplets, Without<OnGpu>>,
+    strands: &'a mut Query<AmongDroplets, Here>,
     resort: bool,
     drops: &[Mut<'_, Droplet>],
     buffers: &mut Vec<Buffers>,

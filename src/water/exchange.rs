@@ -17,8 +17,8 @@ use crate::{
         vapour::{DryingAir, WATER},
     },
     hair::strand::{
-        AddedMass, Hair, InWater, MissedOnGpu, OnGpu, PerHair, Pose, Strand, StrandOf, StrandSleep,
-        Strands, TickPose,
+        AddedMass, Hair, Here, InWater, MissedOnGpu, OnGpu, PerHair, Pose, Strand, StrandOf,
+        StrandSleep, Strands, TickPose,
     },
     keratin::bond::{BondChanges, BondKind, Bonds},
 };
@@ -64,10 +64,7 @@ impl Wetting<'_, '_> {
 /// Repairs moisture of new strands and moisture written from outside, for instance by an inspector. Our
 /// own writes bypass change detection.
 pub(super) fn repair_moistures(
-    mut moistures: Query<
-        (Entity, &mut Moisture),
-        (Changed<Moisture>, Without<OnGpu>, Allow<Disabled>),
-    >,
+    mut moistures: Query<(Entity, &mut Moisture), (Changed<Moisture>, Here, Allow<Disabled>)>,
     mut ledger: ResMut<WaterLedger>,
     mut found: ResMut<FoundWater>,
     mut faults: MessageWriter<HairFault>,
@@ -181,7 +178,7 @@ pub(super) fn exchange_water(
             &mut BondChanges,
             &mut StrandSleep,
         ),
-        Without<OnGpu>,
+        Here,
     >,
     on_gpu: Query<(), With<OnGpu>>,
     (mut soaks, wets): (MessageReader<SoakHair>, Wetting),

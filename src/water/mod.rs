@@ -172,7 +172,7 @@ impl WaterLedger {
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
     pub use crate::water::{
-        Droplet, DropletRules, HairDried, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
-        WaterVolume,
+        Droplet, DropletRules, HairDried, HairWetting, Moisture, Shower, SoakHair, StrandPoint,
+        WaterLedger, WaterVolume,
     };
 }

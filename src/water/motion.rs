@@ -208,9 +208,12 @@ fn rest_on_solids(
     found: &mut Vec<u32>,
 ) -> bool {
     let (position, velocity) = (drop.position, drop.velocity);
-    let near = solids.around(position, radius + SHORT_PUSH, found);
-    let lies = near.fold(false, |lies, solid| rest_on(solid, drop, radius) | lies);
-    if drop.position.distance(position) <= SHORT_PUSH {
+    let (mut lies, mut is_near) = (false, true);
+    for solid in solids.around(position, radius + SHORT_PUSH, found) {
+        lies |= rest_on(solid, drop, radius);
+        is_near &= drop.position.distance(position) <= SHORT_PUSH;
+    }
+    if is_near {
         return lies;
     }
     // Pushed that far it may have come to others.

@@ -16,7 +16,7 @@ use crate::{
     },
     forces::environment::Gravity,
     hair::strand::{
-        AddedMass, Hair, InWater, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose,
+        AddedMass, Hair, Here, InWater, PerHair, Strand, StrandOf, StrandSleep, TickPose,
     },
 };
 use bevy::prelude::*;
@@ -50,10 +50,7 @@ pub(super) fn submerge(
     wetting: Settings<HairWetting>,
     volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<
-        (&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture),
-        Without<OnGpu>,
-    >,
+    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture), Here>,
     mut ledger: ResMut<WaterLedger>,
     mut had_volumes: Local<bool>,
 ) {

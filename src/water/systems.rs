@@ -17,7 +17,7 @@ use crate::{
         setting,
     },
     forces::environment::vapour::DryingAir,
-    hair::strand::{Hair, MissedOnGpu, OnGpu, Strand, TickPose, keep_required, lacks_strands},
+    hair::strand::{Hair, Here, MissedOnGpu, Strand, TickPose, keep_required, lacks_strands},
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -112,7 +112,7 @@ fn count_overwritten(
     droplets: Query<Ref<Droplet>, Allow<Disabled>>,
     strands: Query<&Moisture, Allow<Disabled>>,
     // What is written to hair on the GPU is found once it is back.
-    watched: Query<Ref<Moisture>, (Allow<Disabled>, Without<OnGpu>)>,
+    watched: Query<Ref<Moisture>, (Allow<Disabled>, Here)>,
     mut ledger: ResMut<WaterLedger>,
 ) {
     let written = || {

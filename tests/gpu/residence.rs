@@ -37,12 +37,13 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 fn hair_goes_to_the_device_and_comes_home() {
     let Some(mut stage) = Stage::new(SimulateOn::Cpu, Vec::new()) else { return };
     stage.compile();
-    let all: [fn(&mut Stage); 39] = [
+    let all: [fn(&mut Stage); 40] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
         treatments_run_where_the_hair_is_and_cross_with_it,
         what_is_not_supported_brings_hair_home_and_is_done_there,
+        a_box_brings_hair_home_before_it_passes_through,
         what_is_asked_for_within_a_tick_is_done,
         what_the_game_writes_is_kept,
         probe::probes_tell_where_strands_are,
@@ -250,6 +251,25 @@ fn what_is_not_supported_brings_hair_home_and_is_done_there(stage: &mut Stage) {
     stage.run(3);
     assert!(!stage.app.world().entity(clone).contains::<OnGpu>());
     assert!(tip(stage, clone) != before, "it stands still");
+}
+
+/// No kernel knows of boxes. Other hair settles all the while.
+fn a_box_brings_hair_home_before_it_passes_through(stage: &mut Stage) {
+    on_gpu(stage, 6, 5);
+    let other = Stage::spawn(&mut stage.app, SimulateOn::Cpu, curls(1, 5));
+    let settling = SettleSettings { speed: 0.0, ticks: 10_000, ..default() };
+    let settling = (Settling::default(), settling, Transform::from_xyz(9.0, 0.0, 0.0));
+    stage.app.world_mut().entity_mut(other).insert(settling);
+    stage.run(2);
+    let before = stage.strands();
+    let cuboid = HairCollider::cuboid(Vec3::splat(0.1)).unwrap();
+    let cuboid = stage.app.world_mut().spawn((cuboid, Transform::default())).id();
+    stage.run(1);
+    assert!(stage.is_on_gpu() && apart(&before, &stage.strands()) == 0.0, "it moves unhindered");
+    stage.run(1);
+    let shape = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::ColliderShape));
+    assert_eq!(stage.residence(), shape);
+    [other, cuboid].map(|entity| stage.app.world_mut().despawn(entity));
 }
 
 /// Requests that are written between the substeps of a tick, for the hair and for one strand.

@@ -2,7 +2,7 @@
 
 use crate::common::{run, strand, test_app};
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::prelude::*;
+use bevy_keratin::{MotionOwner, prelude::*};
 use std::time::Duration;
 
 /// Strands that stand level or up on a head, some of them bent.
@@ -204,4 +204,25 @@ fn in_slow_motion_hair_comes_to_rest_in_the_same_shape() {
     };
     let (fast, slow) = (settled(1.0, 20.0), settled(0.1, 20.0));
     assert!(farthest(&fast, &slow) < 1e-4, "{} m", farthest(&fast, &slow));
+}
+
+#[test]
+fn hair_that_is_out_of_sight_settles_all_the_same() {
+    let mut app = test_app(60.0);
+    let (hair, strands) = spawn(&mut app, true);
+    app.world_mut().entity_mut(hair).insert((HairLod::default(), HairScreenShare(0.0)));
+    // A budget freezes it as little.
+    app.insert_resource(HairBudget { milliseconds: 0.0, ..default() });
+    until_drawn(&mut app, hair);
+    app.insert_resource(HairBudget::default());
+    run(&mut app, 0.1);
+    let owner = |app: &App| *app.world().get::<MotionOwner>(hair).unwrap();
+    assert_eq!(owner(&app), MotionOwner::Frozen, "it has settled");
+    app.world_mut().entity_mut(hair).insert(HairScreenShare(1.0));
+    app.update();
+    assert_eq!(owner(&app), MotionOwner::Simulated);
+    let first = nodes(&app, &strands);
+    run(&mut app, 2.0);
+    let seen = farthest(&first, &nodes(&app, &strands));
+    assert!(seen < 3e-3, "it falls by {seen} m in view");
 }

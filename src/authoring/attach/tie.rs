@@ -13,7 +13,7 @@ use crate::{
         fault::{FaultKind, HairFault},
         schedule::HairStep,
     },
-    hair::strand::{Hair, MIN_SEGMENT, OnGpu, Strand, StrandHistory, Strands, TickPose},
+    hair::strand::{HairHere, MIN_SEGMENT, Strand, StrandHistory, Strands, TickPose},
 };
 use bevy::{
     math::Isometry3d,
@@ -32,10 +32,7 @@ pub(super) fn tie(
     transforms: TransformHelper,
     skins: Query<(&Mesh3d, Option<&SkinnedMesh>)>,
     morphs: Morphs,
-    mut hairs: Query<
-        (Entity, Ref<RootsOnMesh>, &mut TiedRoots, &Strands, &TickPose),
-        (With<Hair>, Without<OnGpu>),
-    >,
+    mut hairs: Query<(Entity, Ref<RootsOnMesh>, &mut TiedRoots, &Strands, &TickPose), HairHere>,
     mut strands: Query<(&mut Strand, &mut StrandHistory)>,
     mut faults: MessageWriter<HairFault>,
 ) {

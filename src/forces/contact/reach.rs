@@ -9,14 +9,13 @@ use bevy::prelude::*;
 pub(crate) struct HairReach {
     center: Vec3,
     radius: f32,
-    /// Number of strands when it was computed, and ticks since.
-    pub(super) members: usize,
+    /// Ticks since it was computed.
     pub(super) age: u32,
 }
 
 impl Default for HairReach {
     fn default() -> Self {
-        Self { center: Vec3::ZERO, radius: f32::INFINITY, members: 0, age: 0 }
+        Self { center: Vec3::ZERO, radius: f32::INFINITY, age: LOOK_AGAIN }
     }
 }
 
@@ -31,13 +30,13 @@ impl HairReach {
             (low, high, longest) = (low.min(root), high.max(root), longest.max(length));
         }
         let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high) + longest);
-        Self { center, radius, ..default() }
+        Self { center, radius, age: 0 }
     }
 
     /// Roots have moved.
     #[cfg(feature = "gpu")]
     pub(crate) fn look_again(&mut self) {
-        self.members = UNKNOWN;
+        self.age = LOOK_AGAIN;
     }
 
     /// How far from its center it may be within a tick (m).
@@ -48,8 +47,8 @@ impl HairReach {
     }
 }
 
-/// A number of strands that no hair has.
-pub(super) const UNKNOWN: usize = usize::MAX;
+/// Ticks between checks of strands without outside writes: roots move little on a head.
+pub(super) const LOOK_AGAIN: u32 = 16;
 
 /// A ball around a collider in the world, and how far it moves in a substep (m).
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,7 @@ use super::{
     Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError,
     LockNeighbours, Obstacles, Openings, StrandContact, coarse,
     neighbours::Lookup,
-    reach::{Colliders, HairReach, UNKNOWN},
+    reach::{Colliders, HairReach, LOOK_AGAIN},
 };
 use crate::{
     base::{
@@ -17,15 +17,15 @@ use crate::{
         setting::{self, Ranged, Settings},
     },
     hair::strand::{
-        Hair, OnGpu, SleepCounts, SleepPose, Strand, StrandOf, StrandSleep, Strands, TickPose,
-        keep_required, lacks_strands,
+        Hair, HairHere, MotionOwner, Regroomed, SleepCounts, SleepPose, Strand, StrandOf,
+        StrandSleep, Strands, TickPose, keep_required, lacks_strands,
     },
     solver::rod::{
         obstacle::{Obstacle, Solid},
         shape::{Placed, Shape},
     },
 };
-use bevy::{ecs::entity::EntityHashSet, prelude::*};
+use bevy::prelude::*;
 
 /// Strands do not touch each other where more than so many are followers for each one that is not: the
 /// guides of background hair are centimetres apart.
@@ -125,30 +125,21 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
     Obstacle { solid, motion, friction: collider.friction }
 }
 
-/// Ticks between checks of strands without outside writes: roots move little on a head.
-const LOOK_AGAIN: u32 = 16;
-
 fn find_reach(
-    mut hairs: Query<(Entity, &Strands, &mut HairReach, Has<OnGpu>), With<Hair>>,
-    touched: Query<&StrandOf, (Changed<Strand>, Without<OnGpu>)>,
+    mut hairs: Query<(&Strands, &mut HairReach, Ref<Regroomed>, &MotionOwner), With<Hair>>,
     strands: Query<&Strand>,
 ) {
-    let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
-    for (hair, members, mut reach, on_gpu) in &mut hairs {
+    for (members, mut reach, regroomed, owner) in &mut hairs {
         let reach = reach.bypass_change_detection();
         // On the GPU roots stay, or somebody says that they have moved.
-        if on_gpu && reach.members != UNKNOWN {
-            continue;
-        }
-        reach.age += 1;
-        if reach.members == members.len() && reach.age < LOOK_AGAIN && !touched.contains(&hair) {
+        reach.age += u32::from(!owner.is_on_gpu());
+        if reach.age < LOOK_AGAIN && (owner.is_on_gpu() || !regroomed.is_changed()) {
             continue;
         }
         let of_strand = |strand: &Strand| {
             (strand.positions().first().copied().unwrap_or_default(), strand.length())
         };
         *reach = HairReach::around(strands.iter_many(members.collection()).map(of_strand));
-        reach.members = members.len();
     }
 }
 
@@ -157,14 +148,14 @@ fn find_reach(
 fn choose_colliders(
     step: Res<HairStep>,
     colliders: Query<(Entity, &HairCollider, &TickPose)>,
-    mut hairs: Query<(&TickPose, &HairReach, Option<&SleepCounts>, &mut Obstacles), With<Hair>>,
+    mut hairs: Query<(&TickPose, &HairReach, &MotionOwner, &mut Obstacles), With<Hair>>,
 ) {
     let valid: Vec<_> = colliders.iter().map(|(id, c, pose)| (c.clamped(), pose, id)).collect();
     let all = Colliders::new(step.count, valid.iter().map(|(c, pose, id)| (c, *pose, *id)));
     let mut scratch = Vec::new();
-    for (pose, reach, sleepers, mut obstacles) in &mut hairs {
+    for (pose, reach, owner, mut obstacles) in &mut hairs {
         obstacles.near.clear();
-        if sleepers.is_none_or(|sleepers| sleepers.awake > 0) {
+        if owner.moves() {
             obstacles.near.extend(all.near(pose, Some(reach), &mut scratch));
         }
     }
@@ -176,10 +167,11 @@ fn gather_obstacles(
     mut hairs: Query<(Entity, &TickPose, &mut Obstacles), With<Hair>>,
 ) {
     for (hair, pose, mut obstacles) in &mut hairs {
-        let Obstacles { solids, near } = &mut *obstacles;
-        solids.clear();
+        // Hair that takes no substep now keeps them: it may be asked what is near.
         if steps.of(hair).is_some() {
+            let Obstacles { solids, near } = &mut *obstacles;
             let near = colliders.iter_many(near);
+            solids.clear();
             solids.extend(near.map(|(collider, at)| seen_from(pose, &collider.clamped(), at)));
         }
     }
@@ -268,10 +260,7 @@ impl Touching<'_> {
 pub(crate) fn push_strands_apart(
     steps: EffectiveSubsteps,
     contact: Settings<StrandContact>,
-    mut hairs: Query<
-        (Entity, &Strands, &mut LockNeighbours, Option<&SleepCounts>),
-        (With<Hair>, Without<OnGpu>),
-    >,
+    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&SleepCounts>), HairHere>,
     mut strands: ParamSet<(
         Query<(&Strand, &StrandSleep), With<StrandOf>>,
         Query<(&mut Strand, &mut StrandSleep, &mut SleepPose), With<StrandOf>>,

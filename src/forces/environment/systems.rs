@@ -14,8 +14,8 @@ use crate::{
         setting::{self, Ranged, Settings},
     },
     hair::strand::{
-        AddedMass, Hair, KinematicStrand, OnGpu, PerHair, Strand, StrandOf, StrandSleep, TickPose,
-        keep_required, lacks_strands,
+        AddedMass, FollowsHere, Hair, PerHair, SimulatedHere, Strand, StrandOf, StrandSleep,
+        TickPose, keep_required, lacks_strands,
     },
     keratin::bond::{BondChanges, BondKind},
 };
@@ -95,8 +95,8 @@ fn apply_air(
     drag: Settings<AirDrag>,
     hairs: Query<&TickPose, With<Hair>>,
     winds: Winds,
-    mut simulated: Query<AirStrand, (Without<KinematicStrand>, Without<OnGpu>)>,
-    mut followers: Query<AirStrand, (With<KinematicStrand>, Without<OnGpu>)>,
+    mut simulated: Query<AirStrand, SimulatedHere>,
+    mut followers: Query<AirStrand, FollowsHere>,
 ) {
     if !steps.any() {
         return;

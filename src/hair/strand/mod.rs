@@ -12,6 +12,8 @@
 pub mod frame;
 mod held;
 mod on_gpu;
+mod owner;
+mod owner_systems;
 mod per_hair;
 mod repair;
 mod required;
@@ -26,6 +28,10 @@ pub use on_gpu::OnGpu;
 #[cfg(feature = "gpu")]
 pub(crate) use on_gpu::{AskForStrands, ReturnToCpu, StrandsArrived};
 pub(crate) use on_gpu::{MissedOnGpu, return_to_cpu};
+pub use owner::{MotionOwner, Settling};
+#[cfg(feature = "gpu")]
+pub(crate) use owner_systems::HairOnGpu;
+pub(crate) use owner_systems::{FollowsHere, HairHere, Here, SimulatedHere, is_on_gpu};
 pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
 pub(crate) use strand_sleep::KinematicStrand;
@@ -50,8 +56,14 @@ use bevy::prelude::*;
 /// [`Cuticle`](crate::Cuticle), [`StrandContact`](crate::StrandContact)) may be added as components.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
-#[require(Transform, TickPose, MergedSubsteps)]
+#[require(Transform, TickPose, MergedSubsteps, MotionOwner, Regroomed)]
 pub struct Hair;
+
+/// Counts as changed where strands of a hair have come, gone or been enabled, or where game code has written
+/// to one: noted once a tick, before anything is derived from the strands. The only detector of that; it
+/// leaves out strands on the GPU.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub(crate) struct Regroomed;
 
 /// Makes an entity a strand of a [`Hair`].
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,12 +1,13 @@
 //! Strands in the tick: poses of the scalp, and inertia of the nodes.
 
 use super::{
-    AddedMass, Hair, HeldNodes, HeldNodesState, KinematicStrand, OnGpu, PerHair, SleepCounts,
-    SleepPose, Strand, StrandError, StrandHistory, StrandModel, StrandOf, StrandSleep, Strands,
-    TickPose,
+    AddedMass, Hair, HeldNodes, HeldNodesState, Here, KinematicStrand, MotionOwner, PerHair,
+    Regroomed, Settling, SimulatedHere, SleepCounts, SleepPose, Strand, StrandError, StrandHistory,
+    StrandModel, StrandOf, StrandSleep, Strands, TickPose,
     frame::{HairInertia, Pose},
     held::report_out_of_reach,
     keep_required,
+    owner_systems::{begin_settling, end_settling, update_owners},
 };
 use crate::base::{
     fault::{FaultKind, HairChecks, HairFault},
@@ -40,6 +41,8 @@ impl Plugin for StrandPlugin {
         keep_required::<Hair, Transform>(app);
         keep_required::<Hair, TickPose>(app);
         keep_required::<Hair, MergedSubsteps>(app);
+        keep_required::<Hair, MotionOwner>(app);
+        keep_required::<Hair, Regroomed>(app);
         keep_required::<Strand, StrandHistory>(app);
         keep_required::<Strand, AddedMass>(app);
         keep_required::<Strand, StrandSleep>(app);
@@ -58,6 +61,10 @@ impl Plugin for StrandPlugin {
             .register_type::<StrandSleep>()
             .register_type::<SleepCounts>()
             .register_type::<SleepPose>()
+            .register_type::<MotionOwner>()
+            .register_type::<Settling>()
+            .add_observer(begin_settling)
+            .add_observer(end_settling)
             .add_systems(HairChecks, report_unusable)
             .add_systems(HairFrame, record_frame)
             .add_systems(
@@ -66,7 +73,7 @@ impl Plugin for StrandPlugin {
                     (
                         repair_strands::<Without<KinematicStrand>>,
                         repair_strands::<With<KinematicStrand>>.run_if(first_substep),
-                        report_out_of_reach.run_if(first_substep),
+                        (note_regrooming, report_out_of_reach).chain().run_if(first_substep),
                         store_history,
                     )
                         .chain()
@@ -74,6 +81,7 @@ impl Plugin for StrandPlugin {
                     (aim_poses.run_if(first_substep), advance_poses)
                         .chain()
                         .in_set(HairSystems::Poses),
+                    update_owners.in_set(HairSystems::Owners).run_if(first_substep),
                     apply_frame_inertia.in_set(HairSystems::FrameInertia),
                 ),
             );
@@ -90,7 +98,7 @@ fn report_unusable(
     strands: Query<
         (Entity, Ref<Strand>, Option<Ref<StrandOf>>),
         // A strand on the GPU has a hair, and would not be there with fewer nodes.
-        (Or<(Added<Strand>, Added<StrandOf>)>, Without<OnGpu>),
+        (Or<(Added<Strand>, Added<StrandOf>)>, Here),
     >,
     hairs: Query<(), With<Hair>>,
     mut faults: MessageWriter<HairFault>,
@@ -116,17 +124,11 @@ fn report_unusable(
 /// detection. Simulated strands are checked in every substep, because systems of game code within the
 /// tick may write as well; without writes it only scans change ticks.
 fn repair_strands<F: QueryFilter>(
-    mut strands: Query<
-        (Entity, &mut Strand),
-        (Changed<Strand>, Without<OnGpu>, Allow<Disabled>, F),
-    >,
-    mut loads: Query<
-        (Entity, &mut AddedMass),
-        (Changed<AddedMass>, Without<OnGpu>, Allow<Disabled>, F),
-    >,
+    mut strands: Query<(Entity, &mut Strand), (Changed<Strand>, Here, Allow<Disabled>, F)>,
+    mut loads: Query<(Entity, &mut AddedMass), (Changed<AddedMass>, Here, Allow<Disabled>, F)>,
     mut histories: Query<
         (Entity, &mut StrandHistory),
-        (Changed<StrandHistory>, Without<OnGpu>, Allow<Disabled>, F),
+        (Changed<StrandHistory>, Here, Allow<Disabled>, F),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -142,14 +144,31 @@ fn repair_strands<F: QueryFilter>(
     }
 }
 
+/// At the start of a tick: which hair has other strands than before, or strands that were written to.
+fn note_regrooming(
+    written: Query<&StrandOf, (Or<(Changed<Strand>, Changed<StrandOf>)>, Here)>,
+    mut enabled: RemovedComponents<Disabled>,
+    of: Query<&StrandOf>,
+    mut hairs: Query<(Ref<Strands>, &mut Regroomed)>,
+) {
+    let enabled = enabled.read().filter_map(|strand| of.get(strand).ok());
+    for of in written.iter().chain(enabled) {
+        if let Ok((_, mut regroomed)) = hairs.get_mut(of.0) {
+            regroomed.set_changed();
+        }
+    }
+    for (members, mut regroomed) in &mut hairs {
+        if members.is_changed() {
+            regroomed.set_changed();
+        }
+    }
+}
+
 /// Before the first substep of a tick: the present positions become history. Strands that are not
 /// simulated store theirs where they are moved.
 fn store_history(
     step: Res<HairStep>,
-    mut strands: Query<
-        (&Strand, &StrandSleep, &mut StrandHistory),
-        (Without<KinematicStrand>, Without<OnGpu>),
-    >,
+    mut strands: Query<(&Strand, &StrandSleep, &mut StrandHistory), SimulatedHere>,
 ) {
     if step.index > 0 {
         return;
@@ -253,10 +272,7 @@ fn advance_poses(
 fn apply_frame_inertia(
     substeps: EffectiveSubsteps,
     hairs: Query<&TickPose, With<Hair>>,
-    mut strands: Query<
-        (&StrandOf, &StrandSleep, &mut Strand),
-        (Without<KinematicStrand>, Without<OnGpu>),
-    >,
+    mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand), SimulatedHere>,
 ) {
     if !substeps.any() || hairs.iter().all(|hair| hair.frame_delta().is_none()) {
         return;

@@ -1,6 +1,6 @@
 //! Teleporting a character with its hair.
 
-use super::{Hair, OnGpu, Strand, StrandHistory, Strands, TickPose};
+use super::{Hair, Strand, StrandHistory, Strands, TickPose, is_on_gpu};
 use bevy::prelude::*;
 
 impl Hair {
@@ -24,7 +24,7 @@ impl Hair {
     pub fn teleport(mut hair: EntityWorldMut<'_>) {
         let id = hair.id();
         // On the GPU they come to rest in the next tick.
-        let members = hair.get::<Strands>().filter(|_| !hair.contains::<OnGpu>());
+        let members = hair.get::<Strands>().filter(|_| !is_on_gpu(hair.world(), id));
         let members: Vec<Entity> = members.into_iter().flat_map(Strands::iter).collect();
         hair.world_scope(|world| {
             for strand in members {

@@ -10,7 +10,7 @@ use crate::{
     hair::{
         look::{HairDye, HairLook, WornPreset},
         strand::{
-            AddedMass, Hair, HeldNodes, OnGpu, Strand, StrandHistory, Strands, return_to_cpu,
+            AddedMass, Hair, HeldNodes, Strand, StrandHistory, Strands, is_on_gpu, return_to_cpu,
         },
     },
     keratin::{
@@ -27,7 +27,7 @@ impl Hairdo {
     /// # Errors
     /// When `hair` is no hair, is on the GPU, or a strand has fewer than two nodes or invalid numbers.
     pub fn of(world: &World, hair: Entity) -> Result<Self, HairdoError> {
-        if world.get::<OnGpu>(hair).is_some() {
+        if is_on_gpu(world, hair) {
             return Err(HairdoError::OnGpu { entity: hair });
         }
         Self::of_strands(world, hair)

@@ -2,7 +2,7 @@
 
 use super::{Hairdo, HairdoError, apply::report};
 #[cfg(feature = "gpu")]
-use crate::hair::strand::{AskForStrands, OnGpu, StrandsArrived};
+use crate::hair::strand::{AskForStrands, StrandsArrived, is_on_gpu};
 use bevy::prelude::*;
 
 /// Requests the hairdo of a [`Hair`](crate::Hair). Answered by [`HairdoCaptured`] on the
@@ -78,7 +78,7 @@ pub(super) fn take(request: On<CaptureHairdo>, mut commands: Commands) {
     let hair = request.entity;
     commands.queue(move |world: &mut World| {
         #[cfg(feature = "gpu")]
-        if world.get::<OnGpu>(hair).is_some() {
+        if is_on_gpu(world, hair) {
             world.entity_mut(hair).insert(Awaited);
             world.trigger(AskForStrands { entity: hair });
             return;

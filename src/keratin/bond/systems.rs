@@ -18,8 +18,8 @@ use crate::{
         setting::{self, Ranged, Settings, Violations, report},
     },
     hair::strand::{
-        AddedMass, KinematicStrand, OnGpu, PerHair, Strand, StrandOf, StrandSleep, keep_required,
-        lacks_strands,
+        AddedMass, Here, KinematicStrand, PerHair, SimulatedHere, Strand, StrandOf, StrandSleep,
+        keep_required, lacks_strands,
     },
     math::lanes::simd_level,
     solver::rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
@@ -76,12 +76,7 @@ fn fit_bonds<F: QueryFilter>(
     mut strands: Query<
         (Entity, &Strand, &mut Bonds, Option<&mut RestShape>),
         // A write to a disabled strand would no longer count as a change once it is enabled.
-        (
-            Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>,
-            Without<OnGpu>,
-            Allow<Disabled>,
-            F,
-        ),
+        (Or<(Changed<Bonds>, Changed<Strand>, Changed<RestShape>)>, Here, Allow<Disabled>, F),
     >,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -121,7 +116,7 @@ fn generate_rest_shapes(
     solver: Settings<HairSolver>,
     mut strands: Query<
         (&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape),
-        (Without<KinematicStrand>, Without<OnGpu>),
+        SimulatedHere,
     >,
 ) {
     if !steps.any() {
@@ -233,7 +228,7 @@ type Changing<'a> =
 fn update_bonds(
     mut strands: Query<
         (&Strand, &mut Bonds, &mut BondChanges, &mut RestShape, &mut StrandSleep),
-        Without<OnGpu>,
+        Here,
     >,
 ) {
     let ahead = |(strand, bonds, changes, ..): &Changing<'_>| {

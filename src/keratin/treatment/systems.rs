@@ -12,7 +12,7 @@ use crate::{
         setting::{self, Ranged, report},
     },
     hair::strand::{
-        HeldNodes, MissedOnGpu, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required,
+        HeldNodes, Here, MissedOnGpu, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required,
         lacks_strands,
     },
     keratin::bond::{BondChanges, BondKind, BondPlugin, Bonds},
@@ -55,7 +55,7 @@ impl Plugin for TreatmentPlugin {
 fn begin_treatments(
     mut requests: MessageReader<HairTreatment>,
     hairs: Query<&Strands>,
-    mut strands: Query<&mut Treatments, (With<StrandOf>, Without<OnGpu>)>,
+    mut strands: Query<&mut Treatments, (With<StrandOf>, Here)>,
     on_gpu: Query<(), (With<OnGpu>, With<StrandOf>)>,
     mut missed: ResMut<MissedOnGpu<HairTreatment>>,
     mut faults: MessageWriter<HairFault>,
@@ -86,7 +86,7 @@ fn begin_treatments(
 fn apply_treatments(
     step: Res<HairStep>,
     process: Res<HairProcessTime>,
-    mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments), Without<OnGpu>>,
+    mut strands: Query<(&Bonds, &mut BondChanges, &mut Treatments), Here>,
 ) {
     let dt = step.dt * process.clamped().0;
     let mut items: Vec<_> = strands.iter_mut().filter(|(.., t)| !t.acting.is_empty()).collect();

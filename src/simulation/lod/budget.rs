@@ -3,6 +3,8 @@
 use super::LodLevel;
 use crate::base::setting::setting;
 use bevy::prelude::*;
+use core::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
 
 setting! {
     /// How long a tick may take for all hair that has a [`HairLod`](super::HairLod). A resource.
@@ -102,19 +104,47 @@ pub(super) fn costs(levels: &[LodLevel], segments: usize, substeps: u32) -> Vec<
 pub(super) fn fit(hairs: &[Candidate], budget: f32) -> Vec<usize> {
     let mut levels: Vec<usize> = hairs.iter().map(|h| h.wanted).collect();
     let mut left: f32 = budget - hairs.iter().map(|h| h.costs[h.wanted]).sum::<f32>();
-    while left < 0.0 {
-        let weighted = |i: usize| {
-            hairs[i].importance * COARSENESS_WEIGHT.powi((levels[i] - hairs[i].wanted) as i32)
-        };
-        let coarser = (0..hairs.len())
-            .filter(|i| levels[*i] + 1 < hairs[*i].costs.len())
-            .min_by(|a, b| weighted(*a).total_cmp(&weighted(*b)));
-        let Some(i) = coarser else { break };
+    if left >= 0.0 {
+        return levels;
+    }
+    let next = |i: usize, level: usize| {
+        let hair = &hairs[i];
+        let weight = COARSENESS_WEIGHT.powi((level - hair.wanted) as i32);
+        (level + 1 < hair.costs.len()).then_some(Reverse(Next(hair.importance * weight, i)))
+    };
+    let mut coarser: BinaryHeap<_> = (0..hairs.len()).filter_map(|i| next(i, levels[i])).collect();
+    while left < 0.0
+        && let Some(Reverse(Next(_, i))) = coarser.pop()
+    {
         left += hairs[i].costs[levels[i]] - hairs[i].costs[levels[i] + 1];
         levels[i] += 1;
+        coarser.extend(next(i, levels[i]));
     }
     levels
 }
+
+/// A hair that may become coarser, by its weighted importance; of equal ones the first.
+struct Next(f32, usize);
+
+impl Ord for Next {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.0.total_cmp(&other.0).then(self.1.cmp(&other.1))
+    }
+}
+
+impl PartialOrd for Next {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Next {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Next {}
 
 #[cfg(test)]
 mod tests {
@@ -135,6 +165,20 @@ mod tests {
         assert_eq!(fit(&hairs, 5.5), [0, 2, 2]);
         assert_eq!(fit(&hairs, 0.0), [3, 3, 3], "as little as there is");
         assert_eq!(fit(&[], 0.0), [] as [usize; 0]);
+    }
+
+    #[test]
+    fn a_city_of_hairs_is_fitted_in_a_frame() {
+        let hairs: Vec<_> = (0..30_000).map(|i| hair(1.0 + (i * 7919 % 30_000) as f32)).collect();
+        let start = std::time::Instant::now();
+        let levels = fit(&hairs, 0.2 * 30_000.0);
+        let seconds = start.elapsed().as_secs_f32();
+        let of = |importance: f32| {
+            levels[hairs.iter().position(|h| h.importance == importance).unwrap()]
+        };
+        assert_eq!((of(1.0), of(30_000.0)), (3, 2));
+        // Hundredths of a second; of the order of the square it would be tens of seconds.
+        assert!(seconds < 3.0, "{seconds} s");
     }
 
     #[test]

@@ -10,8 +10,8 @@ use super::{
 use crate::{
     base::setting::Settings,
     hair::strand::{
-        Hair, HeldNodes, KinematicStrand, OnGpu, PerHair, Strand, StrandHistory, StrandModel,
-        StrandOf, StrandSleep, Strands,
+        FollowsHere, HairHere, HeldNodes, Here, KinematicStrand, PerHair, Regroomed, Strand,
+        StrandHistory, StrandModel, StrandOf, StrandSleep, Strands,
     },
 };
 use bevy::{
@@ -36,7 +36,7 @@ struct HairPartition<'a> {
 /// At the start of a tick: where user code has written over what says that a strand is a follower, its hair
 /// is looked at again.
 pub(crate) fn note_overwritten(
-    written: Query<&StrandOf, (Changed<StrandSleep>, With<KinematicStrand>, Without<OnGpu>)>,
+    written: Query<&StrandOf, (Changed<StrandSleep>, With<KinematicStrand>, Here)>,
     mut hairs: Query<&mut Guides>,
 ) {
     for of in &written {
@@ -46,23 +46,18 @@ pub(crate) fn note_overwritten(
     }
 }
 
-/// Hair that is simulated by the tick itself.
-type HairHere = (With<Hair>, Without<OnGpu>);
-
 /// At the start of a tick: which strands are simulated, and which guides each other one follows.
 pub(crate) fn choose_guides(
     models: Settings<StrandModel>,
-    touched: Query<
-        &StrandOf,
-        (Or<(Changed<Strand>, Changed<HeldNodes>, Changed<StrandOf>)>, Without<OnGpu>),
-    >,
+    held: Query<&StrandOf, (Changed<HeldNodes>, Here)>,
     mut released: RemovedComponents<HeldNodes>,
     (mut enabled, mut forgotten): (RemovedComponents<Disabled>, RemovedComponents<Follower>),
-    (kinematic, came): (
-        Query<&StrandOf, (With<KinematicStrand>, Without<OnGpu>)>,
-        Query<&StrandOf, (Added<KinematicStrand>, Without<OnGpu>)>,
+    (of, kinematic, came): (
+        Query<&StrandOf>,
+        Query<&StrandOf, FollowsHere>,
+        Query<&StrandOf, (Added<KinematicStrand>, Here)>,
     ),
-    mut hairs: Query<(Entity, &Strands, &mut PresentLod, &mut Guides), HairHere>,
+    mut hairs: Query<(Entity, &Strands, &mut PresentLod, &mut Guides, Ref<Regroomed>), HairHere>,
     mut strands: Query<(
         Entity,
         &StrandOf,
@@ -78,9 +73,11 @@ pub(crate) fn choose_guides(
         StrandModel::Rod => present.simulated_share(),
         StrandModel::MassSpring => 1.0,
     };
+    // Strands that are held, and those that no longer are.
+    let let_go = released.read().chain(forgotten.read()).filter_map(|strand| of.get(strand).ok());
+    let touched: EntityHashSet = held.iter().chain(let_go).map(|of| of.0).collect();
     // Clones of followers, and followers that were disabled while the level ended, may be in hair without any.
-    let enabled: Vec<Entity> = enabled.read().collect();
-    let again = enabled.iter().filter_map(|entity| kinematic.get(*entity).ok());
+    let again = enabled.read().filter_map(|entity| kinematic.get(entity).ok());
     let strayed: EntityHashSet = again.chain(&came).map(|of| of.0).collect();
     let has_level = |present: &PresentLod, guides: &Guides| {
         present.simulated_share() < 1.0 || present.followers > 0 || !guides.strands.is_empty()
@@ -90,18 +87,16 @@ pub(crate) fn choose_guides(
     };
     // Hair without outside writes keeps its partition.
     let mut unchanged = EntityHashSet::default();
-    let any_released = released.read().count() + enabled.len() + forgotten.read().count() > 0;
-    let touched: EntityHashSet = touched.iter().map(|of| of.0).collect();
     let mut any = false;
-    for (hair, members, present, mut guides) in &mut hairs {
+    for (hair, members, present, mut guides, regroomed) in &mut hairs {
         if !concerns(hair, &present, &guides) {
             continue;
         }
         let is_strayed = !has_level(&present, &guides);
         let partition_key = Some((share_of(hair, &present), present.level, members.len()));
         let guides = guides.bypass_change_detection();
-        let is_touched = is_strayed || touched.contains(&hair);
-        if guides.partition_key == partition_key && !any_released && !is_touched {
+        let is_touched = is_strayed || regroomed.is_changed() || touched.contains(&hair);
+        if guides.partition_key == partition_key && !is_touched {
             unchanged.insert(hair);
         } else {
             any = true;
@@ -114,7 +109,7 @@ pub(crate) fn choose_guides(
     let mut groups = PerHair::default();
     for (entity, of, strand, sleep, (follower, history), (held, is_kinematic)) in &mut strands {
         let index = groups.index(of.0, || {
-            let (hair, _, present, guides) = hairs.get(of.0).ok()?;
+            let (hair, _, present, guides, _) = hairs.get(of.0).ok()?;
             let (members, strands) = default();
             let (share, level) = (share_of(hair, present), present.level);
             (concerns(hair, present, guides) && !unchanged.contains(&hair))
@@ -139,14 +134,14 @@ pub(crate) fn choose_guides(
     }
     let mut counts = EntityHashMap::<usize>::default();
     for group in &mut groups.values {
-        if let Ok((.., mut guides)) = hairs.get_mut(group.hair) {
+        if let Ok((.., mut guides, _)) = hairs.get_mut(group.hair) {
             let guides = guides.bypass_change_detection();
             counts.insert(group.hair, partition(group, guides));
             guides.partition_key = guides.partition_key.filter(|_| !group.repairs);
             mark(group, &mut commands);
         }
     }
-    for (hair, _, mut present, mut guides) in &mut hairs {
+    for (hair, _, mut present, mut guides, _) in &mut hairs {
         if unchanged.contains(&hair) {
             continue;
         }
@@ -280,5 +275,48 @@ fn replace_guides(
         if !keep || !ties.guides.iter_mut().all(stays) {
             *ties = GuideOffsets::default();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        hair::strand::Hair,
+        plugins::HairPlugins,
+        simulation::lod::{HairLod, HairScreenShare, LodLevel},
+    };
+    use bevy::time::TimeUpdateStrategy;
+
+    #[test]
+    fn a_strand_that_is_let_go_changes_its_own_hair_only() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, HairPlugins::default()))
+            .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+        app.update();
+        let levels = vec![LodLevel { below: 0.5, strands: 0.25, ..default() }];
+        let [own, other] = [0, 1].map(|_| {
+            let lod = HairLod { levels: levels.clone(), ..default() };
+            let hair = app.world_mut().spawn((Hair, lod, HairScreenShare(0.1))).id();
+            let strands = [0.0, 0.01, 0.02, 0.03].map(|x| {
+                let points = [0.0, -0.02, -0.04].map(|y| Vec3::new(x, y, 0.0));
+                let strand = Strand::from_polyline(&points).unwrap();
+                app.world_mut().spawn((StrandOf(hair), strand)).id()
+            });
+            (hair, strands)
+        });
+        app.world_mut()
+            .entity_mut(own.1[2])
+            .insert(HeldNodes { targets: vec![None, None, Some(Vec3::Y)] });
+        app.update();
+        app.update();
+        // What nobody would write but a new partition.
+        for hair in [own.0, other.0] {
+            app.world_mut().get_mut::<Guides>(hair).unwrap().level = 99;
+        }
+        app.world_mut().entity_mut(own.1[2]).remove::<HeldNodes>();
+        app.update();
+        let level = |hair| app.world().get::<Guides>(hair).unwrap().level;
+        assert_eq!((level(own.0), level(other.0)), (1, 99));
     }
 }

@@ -12,8 +12,8 @@ use crate::{
         setting::Settings,
     },
     hair::strand::{
-        Hair, KinematicStrand, OnGpu, PerHair, Strand, StrandHistory, StrandOf, StrandSleep,
-        TickPose,
+        FollowsHere, HairHere, PerHair, SimulatedHere, Strand, StrandHistory, StrandOf,
+        StrandSleep, TickPose,
     },
     solver::rod::{HairSolver, SolverMethod},
 };
@@ -44,14 +44,11 @@ impl Awake {
 /// them. Frozen hair has no guides.
 pub(crate) fn sync_follower_sleep(
     step: Res<HairStep>,
-    mut hairs: Query<(&PresentLod, &mut Guides), (With<Hair>, Without<OnGpu>)>,
-    mut simulated: Query<
-        (&StrandOf, &mut Strand, &StrandSleep, &mut Follower),
-        (Without<KinematicStrand>, Without<OnGpu>),
-    >,
+    mut hairs: Query<(&PresentLod, &mut Guides), HairHere>,
+    mut simulated: Query<(&StrandOf, &mut Strand, &StrandSleep, &mut Follower), SimulatedHere>,
     mut followers: Query<
         (&StrandOf, &mut Strand, &mut StrandSleep, &mut Follower, &mut StrandHistory),
-        (With<KinematicStrand>, Without<OnGpu>),
+        FollowsHere,
     >,
 ) {
     let (mut any, mut thaw) = (false, false);
@@ -124,11 +121,11 @@ pub(crate) fn move_followers(
     step: Res<HairStep>,
     substeps: EffectiveSubsteps,
     solver: Settings<HairSolver>,
-    mut hairs: Query<(Entity, &TickPose, &PresentLod, &mut Guides), (With<Hair>, Without<OnGpu>)>,
-    simulated: Query<&Strand, (Without<KinematicStrand>, Without<OnGpu>)>,
+    mut hairs: Query<(Entity, &TickPose, &PresentLod, &mut Guides), HairHere>,
+    simulated: Query<&Strand, SimulatedHere>,
     mut followers: Query<
         (&StrandOf, &StrandSleep, &mut Strand, &mut StrandHistory, &mut Follower),
-        (With<KinematicStrand>, Without<OnGpu>),
+        FollowsHere,
     >,
 ) {
     let is_last = step.index + 1 == step.count;

@@ -145,8 +145,8 @@ pub struct PresentLod {
     wanted_strands: Option<f32>,
     /// Whether it is about to be simulated elsewhere: the budget does not count it.
     is_leaving: bool,
-    /// Segments of all its strands, and the number of strands when they were counted.
-    segments: (usize, usize),
+    /// Segments of all its strands; 0 until they are counted.
+    segments: usize,
 }
 
 impl PresentLod {

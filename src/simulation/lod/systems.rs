@@ -14,7 +14,7 @@ use crate::{
         schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
         setting::{self, Ranged},
     },
-    hair::strand::{Hair, OnGpu, Strand, Strands, keep_required, lacks_strands},
+    hair::strand::{Hair, MotionOwner, Strand, Strands, keep_required, lacks_strands},
 };
 use bevy::prelude::*;
 
@@ -67,7 +67,14 @@ fn choose(
     budget: Res<HairBudget>,
     mut estimate: ResMut<HairEstimate>,
     mut hairs: Query<
-        (&HairLod, &HairScreenShare, &Strands, &mut PresentLod, &mut SubstepLimits, Has<OnGpu>),
+        (
+            &HairLod,
+            &HairScreenShare,
+            Ref<Strands>,
+            &mut PresentLod,
+            &mut SubstepLimits,
+            &MotionOwner,
+        ),
         With<Hair>,
     >,
     strands: Query<&Strand>,
@@ -77,20 +84,24 @@ fn choose(
     let budget = budget.clamped();
     let mut chosen: Vec<_> = hairs
         .iter_mut()
-        .map(|(lod, share, members, mut present, limits, on_gpu)| {
-            let lod = lod.clamped();
+        .map(|(lod, share, members, mut present, limits, owner)| {
+            let mut lod = lod.clamped();
+            if *owner == MotionOwner::Settling {
+                // Frozen strands and followers would not come to rest, but hang as they were planted.
+                lod.levels.iter_mut().for_each(|level| level.strands = 1.0);
+            }
             let before = present.level.saturating_sub(present.budget_levels);
             let wanted = model::choose(&lod.levels, lod.hysteresis, before, share.0);
-            let segments = match present.segments {
-                (segments, counted) if counted == members.len() => segments,
-                _ => strands.iter_many(members.collection()).map(Strand::edges).sum(),
-            };
-            present.bypass_change_detection().segments = (segments, members.len());
+            if present.segments == 0 || members.is_changed() {
+                present.bypass_change_detection().segments =
+                    strands.iter_many(members.collection()).map(Strand::edges).sum();
+            }
+            let segments = present.segments;
             // Hair already made coarser stays so until other hair is clearly less important.
             let held = if present.budget_levels > 0 { 1.0 + lod.hysteresis } else { 1.0 };
             let importance = share.0.max(0.0) * lod.importance / held;
             // On the GPU it costs this processor nothing, so nothing is won by making it coarser.
-            let costs = match on_gpu || present.is_leaving {
+            let costs = match owner.is_on_gpu() || present.is_leaving {
                 true => vec![0.0; wanted + 1],
                 false => costs(&lod.levels, segments, step.count),
             };

@@ -12,6 +12,7 @@
 
 mod systems;
 
+pub use crate::hair::strand::Settling;
 pub use systems::SettlePlugin;
 
 use crate::base::setting::setting;
@@ -42,26 +43,4 @@ setting! {
         /// rest does not depend on it.
         pub damping: f32 = 6.0, "1/s" in DAMPING: 0.0..=1e3, safe 0.0..=30.0, "6 hardly swings";
     }
-}
-
-/// Makes a [`Hair`](crate::Hair) settle before it is first drawn, as [`SettleSettings`] says; removed by the
-/// tick once it has. Presets' settings and worn hair include it; insert it on hair made by hand.
-///
-/// Nothing settles while time is paused: such hair stays hidden.
-///
-/// ```
-/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// fn grow(mut commands: Commands) {
-///     let hair = commands.spawn((Hair, Settling::default())).id();
-///     let level = Strand::from_polyline(&[Vec3::ZERO, Vec3::X * 0.05, Vec3::X * 0.1]).unwrap();
-///     commands.spawn((StrandOf(hair), level));
-/// }
-/// ```
-#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct Settling {
-    /// How many ticks it has been simulated ahead.
-    pub done: u32,
-    /// For how long it has been still (s).
-    pub still: f32,
 }

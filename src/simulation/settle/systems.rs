@@ -37,10 +37,8 @@ impl Plugin for SettlePlugin {
         }
         lacks::<BondPlugin, Self>(app);
         setting::plugin::<SettleSettings>(app);
-        app.register_type::<Settling>().add_systems(
-            self.schedule,
-            settle.after(HairTicks).run_if(any_with_component::<Settling>),
-        );
+        let settle = settle.after(HairTicks).run_if(any_with_component::<Settling>);
+        app.add_systems(self.schedule, settle);
     }
 }
 

@@ -13,7 +13,7 @@ use crate::{
         contact::{Colliders, HairCollider, HairReach},
         environment::Winds,
     },
-    hair::strand::{Hair, OnGpu, Strands, TickPose},
+    hair::strand::{HairOnGpu, Strands, TickPose},
     solver::rod::obstacle::Solid,
 };
 use bevy::prelude::*;
@@ -54,10 +54,10 @@ fn watch(
             &TickPose,
             &mut SleepSnapshot,
             &mut Disturbance,
-            Option<&Strands>,
+            Option<Ref<Strands>>,
             Option<&HairReach>,
         ),
-        (With<Hair>, With<OnGpu>),
+        HairOnGpu,
     >,
 ) {
     if hairs.is_empty() {
@@ -69,10 +69,10 @@ fn watch(
     for (hair, frame, mut snapshot, mut disturbance, members, reach) in &mut hairs {
         let near = colliders.near(frame, reach, &mut scratch);
         let seen = near.map(|(collider, pose)| SeenCollider::of(frame, collider, pose)).collect();
-        let members = members.map_or(0, |members| members.len());
+        let is_regroomed = members.is_some_and(|members| members.is_changed());
         let WakeEvents { sleep, all_wake, solids, .. } = snapshot
             .bypass_change_detection()
-            .wake_events(settings.of(hair), frame.now(), members, seen, step.count);
+            .wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);
         // Wind that reaches none of its strands keeps it awake as well.
         let air = winds.seen_from(frame.now());
         let is_blown = air.steady_wind() != Some(Vec3::ZERO)

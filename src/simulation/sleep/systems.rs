@@ -15,7 +15,7 @@ use crate::{
         environment::{AirDrag, Gravity, LocalWinds, Winds},
     },
     hair::strand::{
-        AddedMass, Hair, HeldNodes, KinematicStrand, OnGpu, Pose, SleepCounts, SleepPose, Strand,
+        AddedMass, Hair, HairHere, HeldNodes, Pose, SimulatedHere, SleepCounts, SleepPose, Strand,
         StrandModel, StrandOf, StrandSleep, Strands, TickPose, lacks_strands,
     },
     keratin::{
@@ -115,7 +115,6 @@ impl RestSettings<'_, '_> {
 pub(super) struct SleepSnapshot {
     conditions: Option<Conditions>,
     pose: Pose,
-    members: usize,
     /// The colliders in its frame.
     #[reflect(ignore)]
     solids: Vec<SeenCollider>,
@@ -144,7 +143,7 @@ impl SleepSnapshot {
         &mut self,
         conditions: Conditions,
         pose: &Pose,
-        members: usize,
+        is_regroomed: bool,
         seen: Vec<SeenCollider>,
         substeps: u32,
     ) -> WakeEvents {
@@ -154,12 +153,11 @@ impl SleepSnapshot {
         let turned = turn(self.pose.rotation, pose.rotation) * LONG_STRAND;
         let scaled = (pose.scale / self.pose.scale - 1.0).abs() * LONG_STRAND;
         let rests = apart <= distance && turned <= distance && scaled <= distance;
-        let same = self.conditions == Some(conditions) && self.members == members;
+        let same = self.conditions == Some(conditions) && !is_regroomed;
         if !rests {
             self.pose = *pose;
         }
         self.conditions = Some(conditions);
-        self.members = members;
         let clearance = conditions.contact.radius + CLEARANCE;
         let solids = self.compare_solids(seen, distance, clearance, substeps);
         WakeEvents {
@@ -251,10 +249,10 @@ fn update_sleep(
             &TickPose,
             &mut SleepSnapshot,
             &mut SleepCounts,
-            Option<&Strands>,
+            Option<Ref<Strands>>,
             Option<&HairReach>,
         ),
-        (With<Hair>, Without<OnGpu>),
+        HairHere,
     >,
     mut strands: Query<
         (
@@ -266,7 +264,7 @@ fn update_sleep(
             (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
         ),
         // Followers sleep when their guides do.
-        (Without<KinematicStrand>, Without<OnGpu>),
+        SimulatedHere,
     >,
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
@@ -286,9 +284,9 @@ fn update_sleep(
         // A collider that comes within reach counts as new while it is still far from any strand.
         let near = colliders.near(frame, reach, &mut scratch);
         let seen = near.map(|(collider, pose)| SeenCollider::of(frame, collider, pose)).collect();
-        let members = members.map_or(0, |members| members.len());
+        let is_regroomed = members.is_some_and(|members| members.is_changed());
         let mut new =
-            snapshot.wake_events(settings.of(hair), frame.now(), members, seen, step.count);
+            snapshot.wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);
         new.winds = winds.seen_from(frame.now());
         wake_events.push(new);
     }

@@ -16,8 +16,8 @@ use crate::{
         environment::Gravity,
     },
     hair::strand::{
-        AddedMass, HeldNodes, KinematicStrand, OnGpu, Strand, StrandModel, StrandOf, StrandSleep,
-        TickPose, lacks_strands,
+        AddedMass, HeldNodes, SimulatedHere, Strand, StrandModel, StrandOf, StrandSleep, TickPose,
+        lacks_strands,
     },
     keratin::bond::BondPlugin,
     math::lanes::{LANES, put_quaternions, simd_level},
@@ -118,7 +118,7 @@ fn step_springs(
     hairs: Query<(Option<&Obstacles>, &TickPose)>,
     mut strands: Query<
         (Entity, &StrandOf, &StrandSleep, &mut Strand, &AddedMass, Option<&HeldNodes>),
-        (Without<KinematicStrand>, Without<OnGpu>),
+        SimulatedHere,
     >,
     mut faults: MessageWriter<HairFault>,
     scratch: Local<Scratch<(SpringLanes, Vec<Obstacle>)>>,
