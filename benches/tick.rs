@@ -23,7 +23,7 @@ mod table;
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
     StretchProjection, Sweeps, WindReceived,
-    math::lanes::{LANES, put4},
+    base::lanes::{LANES, put4},
     prelude::*,
     solver::rod::{
         block::BlockLanes,

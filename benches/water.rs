@@ -15,7 +15,7 @@ mod scenes;
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
     SleepCounts,
-    math::grid::{BallGrid, FoundBalls},
+    base::grid::{BallGrid, FoundBalls},
     prelude::*,
 };
 use fearless_simd::Level;

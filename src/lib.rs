@@ -9,13 +9,13 @@
 #[cfg(feature = "groom")]
 pub mod authoring;
 pub mod base;
+pub mod debug;
 pub mod forces;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod hair;
 pub mod hairdo;
 pub mod keratin;
-pub mod math;
 pub mod plugins;
 #[cfg(feature = "render")]
 pub mod render;
@@ -36,6 +36,7 @@ pub mod prelude {
     pub use crate::render::prelude::*;
     pub use crate::{
         base::prelude::*,
+        debug::prelude::*,
         forces::prelude::*,
         hair::prelude::*,
         hairdo::prelude::*,

@@ -4,7 +4,7 @@
 use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
     StretchProjection, Sweeps,
-    math::lanes::{Quaternion, V3},
+    base::lanes::{Quaternion, V3},
     prelude::*,
     solver::rod::constraint::{BendShares, EdgeWeights, StretchShares, bend_twist, stretch_shear},
 };

@@ -1,6 +1,9 @@
-//! What all rooms stand on: faults, settings with ranges, the schedule of a tick, work on threads.
+//! What all rooms stand on: faults, settings with ranges, the schedule of a tick, work on threads, SIMD lanes, grids.
 
 pub mod fault;
+pub mod grid;
+#[doc(hidden)]
+pub mod lanes;
 pub(crate) mod parallel;
 pub mod schedule;
 pub mod setting;

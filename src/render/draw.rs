@@ -19,6 +19,7 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
+        lanes::{dispatch, simd_level},
         parallel::{Nanos, emptied, for_each},
         setting::Settings,
     },
@@ -27,7 +28,6 @@ use crate::{
         strand::{Hair, MotionOwner, Strand, StrandHistory, Strands},
     },
     keratin::bond::Bonds,
-    math::lanes::{dispatch, simd_level},
     simulation::settle::Settling,
     water::Moisture,
 };

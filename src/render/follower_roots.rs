@@ -4,12 +4,10 @@ use super::{
     drawn_strand::{DrawnStrand, GuideRoot, direction},
     followers::HairFollowers,
 };
-use crate::{
-    base::{
-        fault::{FaultKind, HairFault},
-        setting::{Ranged, setting},
-    },
-    math::grid::KdTree,
+use crate::base::{
+    fault::{FaultKind, HairFault},
+    grid::KdTree,
+    setting::{Ranged, setting},
 };
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};

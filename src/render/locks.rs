@@ -4,7 +4,7 @@ use super::{
     drawn_strand::{DrawnStrand, GuideRoot, LockOffset, direction},
     followers::HairFollowers,
 };
-use crate::math::grid::KdTree;
+use crate::base::grid::KdTree;
 use bevy::{platform::collections::HashMap, prelude::*};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 

@@ -6,7 +6,7 @@ use super::{
     followers::HairFollowers,
     locks::draw_together,
 };
-use crate::math::grid::KdTree;
+use crate::base::grid::KdTree;
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 

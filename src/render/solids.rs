@@ -2,8 +2,8 @@
 //! not.
 
 use crate::{
+    base::grid::compact_groups,
     forces::contact::{ColliderShape, HairCollider},
-    math::grid::compact_groups,
 };
 use bevy::{math::Affine3A, prelude::*};
 

@@ -7,8 +7,8 @@ use super::{
     moisture::node_lengths,
     strand_block::{NodeSlice, StrandBlock, StrandLane},
 };
-use crate::math::grid::FoundBalls;
-use crate::math::lanes::{LANES, Lane, Real, V3, dispatch, lanes_in, load, load3, splat3, store3};
+use crate::base::grid::FoundBalls;
+use crate::base::lanes::{LANES, Lane, Real, V3, dispatch, lanes_in, load, load3, splat3, store3};
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*, u32x16};
 

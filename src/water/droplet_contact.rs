@@ -12,6 +12,7 @@ use super::{
 use crate::{base::schedule::HairProcessTime, forces::environment::vapour::WATER};
 use crate::{
     base::{
+        lanes::{LANES, simd_level},
         parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
         schedule::HairStep,
         setting::{Ranged, Settings},
@@ -21,7 +22,6 @@ use crate::{
         environment::Gravity,
     },
     hair::strand::{AddedMass, Hair, Here, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose},
-    math::lanes::{LANES, simd_level},
 };
 use bevy::prelude::*;
 use core::slice::from_ref;

@@ -1,6 +1,6 @@
 //! The droplets around one hair in a spatial index, in the grid's order.
 
-use crate::math::grid::{BallGrid, FoundBalls};
+use crate::base::grid::{BallGrid, FoundBalls};
 use bevy::prelude::*;
 use fearless_simd::Level;
 

@@ -7,7 +7,7 @@
 //! air, damp or dry, still or from a [`Blower`](crate::Blower), dries it again; the bonds close in
 //! the current shape. Bond rates follow from the water alone.
 //!
-//! Droplets find strands through the unbounded [uniform grid](crate::math::grid), without testing all
+//! Droplets find strands through the unbounded [uniform grid](crate::base::grid), without testing all
 //! pairs. They never change archetype: tens of thousands move in one pass.
 //!
 //! Every drop of water is accounted for in [`WaterLedger`]: in = held + out.

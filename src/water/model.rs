@@ -1,6 +1,6 @@
 //! Droplets as pure functions: the wet-hair paper's equation 2, falling, sliding, hanging.
 
-use crate::math::lanes::{Real, V3};
+use crate::base::lanes::{Real, V3};
 use glam::Vec3;
 
 /// Surface tension of water (N/m).

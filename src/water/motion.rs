@@ -7,6 +7,7 @@ use super::{
     volume::Volumes,
 };
 use crate::{
+    base::lanes::V3,
     base::{
         fault::HairFault,
         parallel::{Nanos, for_each_block},
@@ -21,7 +22,6 @@ use crate::{
         },
     },
     hair::strand::{Hair, PerHair, Pose, Strand, StrandOf, TickPose},
-    math::lanes::V3,
     solver::rod::obstacle::Obstacle,
 };
 use bevy::prelude::*;

@@ -5,11 +5,11 @@
 
 use super::HairWetting;
 use crate::{
-    hair::strand::Hair,
-    math::lanes::{
+    base::lanes::{
         LANES, Lane, V3, dispatch, load3, put_numbers, put_vectors, put3, splat3, take_vectors,
         take3,
     },
+    hair::strand::Hair,
 };
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};

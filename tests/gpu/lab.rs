@@ -8,10 +8,10 @@ use bevy::{
 };
 use bevy_keratin::{
     StretchProjection, Sweeps,
+    base::lanes::{LANES, put3, put4, take3, take4},
     forces::environment::wind::wind,
     gpu::{GpuStrands, HairKernels, StrandState, StrandView, SubstepRecord, SweepRecord},
     keratin::bond::model::{JointBonds, cuticle_factor},
-    math::lanes::{LANES, put3, put4, take3, take4},
     solver::rod::{
         block::BlockLanes,
         constraint::stiffness_per_iteration,

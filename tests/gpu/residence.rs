@@ -269,7 +269,9 @@ fn a_box_brings_hair_home_before_it_passes_through(stage: &mut Stage) {
     stage.run(1);
     let shape = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::ColliderShape));
     assert_eq!(stage.residence(), shape);
-    [other, cuboid].map(|entity| stage.app.world_mut().despawn(entity));
+    for entity in [other, cuboid] {
+        stage.app.world_mut().despawn(entity);
+    }
 }
 
 /// Requests that are written between the substeps of a tick, for the hair and for one strand.

@@ -3,7 +3,7 @@
 
 use bevy::math::{Quat, Vec3};
 use bevy_keratin::{
-    math::lanes::{LANES, Lane, Quaternion, Real, V3, put3, put4, take3, take4},
+    base::lanes::{LANES, Lane, Quaternion, Real, V3, put3, put4, take3, take4},
     solver::rod::{
         block::BlockLanes,
         constraint::{

@@ -233,7 +233,7 @@ fn scale_changes_nothing_in_the_hairs_own_units() {
 #[test]
 fn a_block_keeps_nothing_of_the_strands_before() {
     use bevy_keratin::{
-        math::lanes::LANES,
+        base::lanes::LANES,
         solver::rod::{
             block::BlockLanes,
             direct::{DirectParams, step, weigh},

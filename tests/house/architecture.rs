@@ -13,7 +13,6 @@ use std::{
 /// Rooms from the ground up: each may import those before it, none after it.
 const FLOORS: [&str; 15] = [
     "base",
-    "math",
     "solver",
     "hair",
     "keratin",
@@ -24,6 +23,7 @@ const FLOORS: [&str; 15] = [
     "render",
     "authoring",
     "gpu",
+    "debug",
     "plugins",
     "lib",
     "",

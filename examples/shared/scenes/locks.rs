@@ -1,7 +1,7 @@
 //! How hair gathers in locks, in numbers: over the tips of its strands.
 
 use bevy::prelude::*;
-use bevy_keratin::math::grid::UniformGrid;
+use bevy_keratin::base::grid::UniformGrid;
 
 /// The mean distance from each tip to the nearest other one (m).
 pub fn tip_spacing(tips: &[Vec3]) -> f64 {

@@ -5,7 +5,7 @@
 //! approximation using nearest neighbors and the normal field"); of these the few that together
 //! cover most points.
 
-use crate::math::grid::KdTree;
+use crate::base::grid::KdTree;
 use bevy::{math::bounding::BoundingSphere, prelude::*};
 
 /// Steps in which a ball shrinks; few need more than five.

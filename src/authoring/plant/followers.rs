@@ -11,8 +11,7 @@ use super::{
     surface::Surface,
 };
 use crate::{
-    base::setting::Ranged,
-    math::grid::KdTree,
+    base::{grid::KdTree, setting::Ranged},
     render::{FollowerRoot, FollowerRoots},
 };
 use bevy::prelude::*;

@@ -7,8 +7,8 @@ use super::{
     surface::{Root, Surface},
 };
 use crate::{
+    base::grid::{KdTree, UniformGrid},
     hair::strand::MIN_SEGMENT,
-    math::grid::{KdTree, UniformGrid},
 };
 use bevy::{
     math::ops::{cos, sin, sin_cos, tan},

@@ -1,7 +1,7 @@
 //! Points on a mesh: the nearest ones to given roots, and samples of the whole surface.
 
 use super::{error::PlantError, planting::RootOnMesh, surface::Surface};
-use crate::math::grid::KdTree;
+use crate::base::grid::KdTree;
 use bevy::prelude::*;
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 

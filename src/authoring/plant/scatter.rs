@@ -9,7 +9,7 @@ use super::{
     recipe::MAX_ROOTS,
     surface::{Root, Surface},
 };
-use crate::math::{
+use crate::base::{
     grid::{UniformGrid, compact_groups},
     lanes::LANES,
 };

@@ -1,7 +1,7 @@
 //! Distance to a mesh near its surface, for strands that lie on it.
 
 use super::surface::Surface;
-use crate::math::grid::{KdTree, UniformGrid};
+use crate::base::grid::{KdTree, UniformGrid};
 use bevy::prelude::*;
 use core::cell::Cell;
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};

@@ -20,9 +20,9 @@ use crate::{
             SurfacePoint, surface_points,
         },
     },
+    base::grid::KdTree,
     forces::contact::HairCollider,
     hair::{look::WornPreset, strand::Strand},
-    math::grid::KdTree,
     water::HairWetting,
 };
 use bevy::{

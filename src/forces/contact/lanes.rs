@@ -6,7 +6,7 @@
 //! neighbouring [`NodeRow`]s, each one load.
 
 use super::model::{BREAKS_AT, Bridged, Film, SAME_PLACE, THIN, penalty};
-use crate::math::lanes::{Real, V3};
+use crate::base::lanes::{Real, V3};
 use core::ops::Range;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16, mask32x8, prelude::*, u32x8, u32x16};
 use glam::Vec3;

@@ -103,6 +103,13 @@ impl LockNeighbours {
         self.lists.bridges(wet, film)
     }
 
+    /// Nodes and the nearest points of edges of other strands that they touch (m), at the last contact
+    /// search.
+    #[cfg(feature = "debug")]
+    pub(crate) fn touching(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        self.lists.touching()
+    }
+
     /// How many pairs of node and edge are in the lists, rounded up to groups of eight for each node.
     pub fn pairs(&self) -> usize {
         self.lists.pairs()

@@ -1,7 +1,7 @@
 //! Contact between strands as pure functions: equation 18 of \[B\], and bridges of water between one node and
 //! one edge, the reference of `lanes.rs`.
 
-use crate::math::lanes::Real;
+use crate::base::lanes::Real;
 use glam::Vec3;
 
 /// Squared distance (m²) up to which points coincide: there is no direction to push.

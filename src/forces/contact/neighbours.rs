@@ -13,12 +13,10 @@ use super::{
     lanes::{self, Bridges, NodeRow, Penalty, PenaltySum, Pieces, Stack, WIDTH, WetRow},
     model::{Bridged, Film},
 };
-use crate::{
-    base::parallel::{Nanos, for_each_block},
-    math::{
-        grid::UniformGrid,
-        lanes::{dispatch, simd_level},
-    },
+use crate::base::{
+    grid::UniformGrid,
+    lanes::{dispatch, simd_level},
+    parallel::{Nanos, for_each_block},
 };
 use core::{
     ops::Range,
@@ -351,6 +349,28 @@ impl Neighbours {
     /// Whether a node had more edges near than its list may hold: the farther ones are left out.
     pub fn is_crowded(&self) -> bool {
         self.parts.iter().any(|part| part.is_crowded)
+    }
+
+    /// Nodes and the nearest points of edges within reach (m), for drawing them.
+    #[cfg(feature = "debug")]
+    pub fn touching(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        let place = |i: u32| self.rows.get(i as usize).map(lanes::place);
+        let of_node = move |node: u32, groups: &[EdgeGroup]| {
+            let p = place(node)?;
+            let edges = groups.iter().flat_map(|group| group.edges);
+            let nearest = edges.filter_map(move |edge| {
+                let (a, b) = (place(edge)?, place(edge + 1)?);
+                let along = (p - a).dot(b - a) / a.distance_squared(b);
+                Some(a.lerp(b, along.clamp(0.0, 1.0)))
+            });
+            let near = nearest.filter(|q| p.distance(*q) < self.lists.reach);
+            Some(near.map(move |q| (p, q)).collect::<Vec<_>>())
+        };
+        self.parts.iter().zip(self.lists.strands.chunks(PART)).flat_map(move |(part, strands)| {
+            let first = strands.first().map_or(0, |strand| strand.start);
+            let groups = part.starts.windows(2).map(|w| &part.groups[w[0] as usize..w[1] as usize]);
+            (first..).zip(groups).filter_map(move |(node, groups)| of_node(node, groups)).flatten()
+        })
     }
 
     /// How many pairs of node and edge are kept, rounded up to groups of eight for each node.

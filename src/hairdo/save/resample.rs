@@ -2,9 +2,9 @@
 
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::{
+    base::grid::KdTree,
     hair::strand::return_to_cpu,
     keratin::bond::{BondKind, JointBonds},
-    math::grid::KdTree,
     solver::rod::frame::{darboux, full},
     water::moisture::node_lengths,
 };

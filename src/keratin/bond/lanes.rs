@@ -7,7 +7,7 @@ use super::{
     kind::BondKind,
     model::{JointBonds, MIN_CLOSED_SHARE, Remembered, changed, remembered, rest_shape},
 };
-use crate::math::lanes::{Quaternion, Real, V3, dispatch, transposed};
+use crate::base::lanes::{Quaternion, Real, V3, dispatch, transposed};
 use fearless_simd::{Level, Simd, f32x4, f32x8, prelude::*};
 use glam::Quat;
 

@@ -1,9 +1,9 @@
 //! Side-chain bonds as pure functions: equations 13–16 and 19 of \[B\], on one joint at a time.
 
 use super::kind::BondKind;
-use crate::{
-    base::setting::{Ranged, ValueRange, Violations},
-    math::lanes::{Quaternion, Real, V3},
+use crate::base::{
+    lanes::{Quaternion, Real, V3},
+    setting::{Ranged, ValueRange, Violations},
 };
 use bevy::reflect::Reflect;
 use glam::{Quat, Vec3};

@@ -11,6 +11,7 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
+        lanes::simd_level,
         parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
         schedule::{
             EffectiveSubsteps, HairSystems, HairTick, SettleTick, first_substep, last_substep,
@@ -21,7 +22,6 @@ use crate::{
         AddedMass, Here, KinematicStrand, PerHair, SimulatedHere, Strand, StrandOf, StrandSleep,
         keep_required, lacks_strands,
     },
-    math::lanes::simd_level,
     solver::rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
 };
 use bevy::{

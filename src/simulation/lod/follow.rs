@@ -116,6 +116,14 @@ pub struct StrandPose<'a> {
     pub spins: &'a mut [Vec3],
 }
 
+#[cfg(feature = "debug")]
+impl GuideOffsets {
+    /// The indices of its guides.
+    pub(super) fn guides(&self) -> impl Iterator<Item = u32> {
+        self.guides.iter().map(|(guide, _)| *guide)
+    }
+}
+
 /// What somebody else needs who moves followers.
 #[cfg(feature = "gpu")]
 impl GuideOffsets {

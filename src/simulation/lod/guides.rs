@@ -58,6 +58,12 @@ pub struct Guides {
 }
 
 impl Guides {
+    /// The guides of a follower.
+    #[cfg(feature = "debug")]
+    pub(crate) fn of(&self, follower: &Follower) -> impl Iterator<Item = Entity> {
+        follower.ties.guides().filter_map(|i| self.strands.get(i as usize).copied())
+    }
+
     pub(super) fn turns(&self, guide: u32) -> Option<&[Quat]> {
         let i = guide as usize;
         let (from, to) = (*self.starts.get(i)?, *self.starts.get(i + 1)?);

@@ -3,7 +3,7 @@
 //! Roots are split recursively at the median of their widest axis. Halves hold equally many
 //! strands, so that a prefix is dense where hair is.
 
-use crate::math::grid::split_at_median;
+use crate::base::grid::split_at_median;
 use glam::Vec3;
 
 /// Indices of the points in an order of which any prefix is an evenly spaced subset: it has equally

@@ -6,9 +6,11 @@ use super::{
     model::waypoints,
 };
 use crate::{
-    base::parallel::{Nanos, for_each},
+    base::{
+        grid::KdTree,
+        parallel::{Nanos, for_each},
+    },
     hair::strand::Strand,
-    math::grid::KdTree,
 };
 use bevy::prelude::*;
 

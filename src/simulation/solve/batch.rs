@@ -11,10 +11,10 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
+        lanes::LANES,
         parallel::{Columns, Nanos, Scratch, for_each_block_ahead, for_each_part},
     },
     hair::strand::PerHair,
-    math::lanes::LANES,
 };
 use bevy::prelude::*;
 

@@ -1,8 +1,8 @@
 //! The trait of kernels that solve strands in batches.
 
 use crate::{
+    base::lanes::LANES,
     hair::strand::{AddedMass, HeldNodes, Strand},
-    math::lanes::LANES,
     solver::rod::block::BlockLanes,
 };
 use bevy::prelude::*;

@@ -7,12 +7,14 @@
 
 use super::batched::{Batched, Kept, Source};
 use crate::{
-    base::fault::HairFault,
-    hair::strand::Strand,
-    math::lanes::{
-        LANES, put_numbers, put_vectors, put3, take_numbers, take_quaternions, take_vectors, take3,
-        take4,
+    base::{
+        fault::HairFault,
+        lanes::{
+            LANES, put_numbers, put_vectors, put3, take_numbers, take_quaternions, take_vectors,
+            take3, take4,
+        },
     },
+    hair::strand::Strand,
     solver::rod::block::{BlockLanes, NodeLanes},
 };
 use bevy::prelude::*;

@@ -2,7 +2,7 @@
 //!
 //! The only module that handles both entities and lanes. Strands keep their own vectors, so that
 //! game code reads and writes them; those of a hair with equal node count are gathered into a block
-//! of [`LANES`](crate::math::lanes::LANES), stepped side by side and scattered back in each substep.
+//! of [`LANES`](crate::base::lanes::LANES), stepped side by side and scattered back in each substep.
 //!
 //! | file | what |
 //! |---|---|

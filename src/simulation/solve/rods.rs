@@ -9,6 +9,7 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
+        lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level},
         parallel::{Scratch, prefetch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, lacks},
         setting::{self, Settings},
@@ -22,7 +23,6 @@ use crate::{
         TickPose, lacks_strands,
     },
     keratin::bond::{BondInfluence, BondPlugin, Bonds, RestShape},
-    math::lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level},
     solver::rod::{
         HairSolver, HairStiffness, SolverMethod, Sweeps,
         block::BlockLanes,

@@ -5,6 +5,7 @@ use super::{
     batched::{Batched, Source},
 };
 use crate::{
+    base::lanes::{LANES, put_quaternions, simd_level},
     base::{
         fault::HairFault,
         parallel::{Scratch, tables},
@@ -20,7 +21,6 @@ use crate::{
         lacks_strands,
     },
     keratin::bond::BondPlugin,
-    math::lanes::{LANES, put_quaternions, simd_level},
     solver::{
         mass_spring::{
             Springs,

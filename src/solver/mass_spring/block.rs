@@ -10,7 +10,7 @@
 
 use super::{Springs, model::Xpbd};
 use crate::{
-    math::lanes::{
+    base::lanes::{
         LANES, Lane, Quaternion, Real, V3, dispatch, load, load3, load4, splat, store3, store4,
     },
     solver::rod::{
@@ -387,7 +387,7 @@ fn select<R: Real>(mask: R::Mask, yes: Quaternion<R>, no: Quaternion<R>) -> Quat
 mod tests {
     use super::*;
     use crate::{
-        math::lanes::{put3, put4, take3},
+        base::lanes::{put3, put4, take3},
         solver::rod::obstacle::Solid,
     };
     use glam::Quat;
@@ -569,7 +569,7 @@ mod tests {
         });
         step(Level::new(), &mut block, &params(Springs::default(), Vec3::ZERO, 240.0), &[]);
         for lane in 0..LANES {
-            let q = crate::math::lanes::take4(&block.strands.edges[1].q, lane);
+            let q = crate::base::lanes::take4(&block.strands.edges[1].q, lane);
             let to = [Vec3::X, Vec3::Z, Vec3::NEG_Z][lane % 3];
             assert!((q * Vec3::Z).distance(to) < 1e-5 && q.is_normalized(), "{lane}: {q}");
         }

@@ -5,7 +5,7 @@
 //! is solved implicitly, for the end of the step, on positions (extended position based dynamics,
 //! `Xpbd`): the stiffer the spring, the nearer to its rest length.
 
-use crate::math::lanes::Real;
+use crate::base::lanes::Real;
 
 /// Springs of one stiffness during one step: equation 1, f = −k(|d| − l) u − c (ḋ·u) u on node b and the
 /// opposite on a, with d = u |d| from a to b, at the end of the step.

@@ -1,7 +1,7 @@
 //! Bounding balls of obstacles, sixteen side by side.
 
 use super::obstacle::Obstacle;
-use crate::math::lanes::{LANES, Lane, Real, V3, load, load3, put3};
+use crate::base::lanes::{LANES, Lane, Real, V3, load, load3, put3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 use glam::{Mat3A, Vec3};
 

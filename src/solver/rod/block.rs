@@ -14,7 +14,7 @@ use super::{
     direct::row::DirectRow,
     obstacle::{CloseObstacles, NearObstacles, Obstacle},
 };
-use crate::math::lanes::{LANES, Lane, V3, load, load3, store3};
+use crate::base::lanes::{LANES, Lane, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16};
 use glam::Vec3;
 

@@ -4,7 +4,7 @@
 //! `Ω` Darboux vectors as full quaternions `q̄1 q2`. All functions are generic over [`Real`], so
 //! the same lines run on one `f64` and on sixteen lanes.
 
-use crate::math::lanes::{Lane, Quaternion, Real, V3};
+use crate::base::lanes::{Lane, Quaternion, Real, V3};
 
 /// Keeps the denominators away from zero where everything at a constraint is fixed. The published
 /// reference implementation adds the same value, so golden vectors hold to the last digits.

@@ -13,7 +13,7 @@ use super::{
     block::{BlockLanes, NodeLanes},
     tridiagonal::{Elimination, back},
 };
-use crate::math::lanes::{LANES, Real, V3, load};
+use crate::base::lanes::{LANES, Real, V3, load};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// a: the share of a node's mobility that an obstacle removes along its normal. Below 1, so that a

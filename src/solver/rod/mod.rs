@@ -20,7 +20,7 @@
 //! | [`obstacle`] | colliders as half-space, capsule, cylinder or placed shape, with friction |
 //! | [`shape`] | boxes, ellipsoids, hulls and distance grids, each in its own frame |
 //!
-//! Strands of equal node count are solved [`LANES`](crate::math::lanes::LANES) side by side; see
+//! Strands of equal node count are solved [`LANES`](crate::base::lanes::LANES) side by side; see
 //! [`block`] for the layout.
 
 mod balls;

@@ -5,7 +5,7 @@ use super::{
     block::BlockLanes,
     obstacle::{NearObstacles, Obstacle},
 };
-use crate::math::lanes::{LANES, Real, V3, lanes_in, load, load3, splat3, store3};
+use crate::base::lanes::{LANES, Real, V3, lanes_in, load, load3, splat3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 use glam::Vec3;
 

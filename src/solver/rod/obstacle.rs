@@ -1,7 +1,7 @@
 //! Obstacles of rods in lanes: half-spaces, capsules, cylinders and placed shapes.
 
 use super::shape::Placed;
-use crate::math::lanes::{LANES, Lane, Real, V3, load, load3, splat};
+use crate::base::lanes::{LANES, Lane, Real, V3, load, load3, splat};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 use glam::{Affine3A, BVec3, Vec3};
 

@@ -13,7 +13,7 @@ use super::{
     sweep::project,
     touch::{contacts, predict_nodes},
 };
-use crate::math::lanes::{LANES, Real, V3, dispatch, load, load3, load4, store3, store4};
+use crate::base::lanes::{LANES, Real, V3, dispatch, load, load3, load4, store3, store4};
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 
 /// Passes that a limiter step takes for strands that touch something.
@@ -160,7 +160,7 @@ fn velocities<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::{LANES, put4, take3};
+    use crate::base::lanes::{LANES, put4, take3};
     use glam::{Quat, Vec3};
 
     #[test]

@@ -6,9 +6,9 @@
 //! the look independent of segment count, and k/(1−k) ∝ Δt² makes it independent of substeps.
 
 use super::constraint::StretchProjection;
-use crate::{
-    base::setting::{InvalidValue, Ranged, ValueRange, setting},
-    math::lanes::Real,
+use crate::base::{
+    lanes::Real,
+    setting::{InvalidValue, Ranged, ValueRange, setting},
 };
 use bevy::prelude::*;
 

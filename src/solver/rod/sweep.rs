@@ -12,7 +12,7 @@ use super::{
     obstacle::Obstacle,
     touch::{FrictionShare, touch},
 };
-use crate::math::lanes::{LANES, Quaternion, Real, V3, load, load4, store3, store4};
+use crate::base::lanes::{LANES, Quaternion, Real, V3, load, load4, store3, store4};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// The maximum number of sweeps in the pipeline.
@@ -173,8 +173,8 @@ fn pass_edge<S: Simd, const P: usize>(
 mod tests {
     use super::super::obstacle::Solid;
     use super::*;
-    use crate::math::lanes::dispatch;
-    use crate::math::lanes::{V3, put3, put4};
+    use crate::base::lanes::dispatch;
+    use crate::base::lanes::{V3, put3, put4};
     use fearless_simd::Level;
     use glam::{Quat, Vec3};
 

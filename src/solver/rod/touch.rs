@@ -5,7 +5,7 @@ use super::{
     near::ESCAPE_RATIO,
     obstacle::{NearObstacles, Obstacle, PushOut, continuous_collision, push_out},
 };
-use crate::math::lanes::{LANES, Real, V3, load, load3, store3};
+use crate::base::lanes::{LANES, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// Goes along strands and tells of each node how deep it may be in an obstacle that its root lies in: nearer to the

@@ -1,7 +1,7 @@
 //! Symmetric tridiagonal systems over a strand's edges, by the Thomas algorithm: for the length
 //! limiter, springs and twist.
 
-use crate::math::lanes::Real;
+use crate::base::lanes::Real;
 
 /// State of the elimination, row after row from the root on.
 #[derive(Clone, Copy)]

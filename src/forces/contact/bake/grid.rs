@@ -1,7 +1,7 @@
 //! Signed distances of triangles at the points of a grid.
 
 use super::{error::BakeError, hull::SIZES};
-use crate::{math::grid::TriangleSoup, solver::rod::shape::DistanceGrid};
+use crate::{base::grid::TriangleSoup, solver::rod::shape::DistanceGrid};
 use bevy::{math::UVec3, platform::collections::HashMap, prelude::*};
 
 /// The most points of a grid: 32 MB.

@@ -2,7 +2,7 @@
 
 use super::width::Width;
 use crate::{
-    math::lanes::{Quaternion, Real, V3},
+    base::lanes::{Quaternion, Real, V3},
     solver::rod::block::NodeLanes,
 };
 

@@ -12,7 +12,7 @@ use super::{
     width::Width,
 };
 use crate::{
-    math::lanes::{Quaternion, Real, V3},
+    base::lanes::{Quaternion, Real, V3},
     solver::rod::{
         block::{EdgeLanes, NodeLanes},
         tridiagonal::{Elimination, back},

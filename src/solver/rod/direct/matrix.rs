@@ -1,6 +1,6 @@
 //! Blocks of three by three.
 
-use crate::math::lanes::{Real, V3};
+use crate::base::lanes::{Real, V3};
 
 /// A symmetric matrix by its lower triangle.
 #[derive(Clone, Copy)]

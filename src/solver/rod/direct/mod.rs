@@ -97,7 +97,7 @@ use super::{
     stiffness::REFERENCE_GRAVITY,
     touch::{FrictionShare, RootPenetration, contacts, contacts_with, predict_nodes},
 };
-use crate::math::lanes::{
+use crate::base::lanes::{
     LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,
 };
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
@@ -271,7 +271,7 @@ fn finish<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams) {
 }
 
 #[inline(always)]
-fn stage<W: Width<Cell = crate::math::lanes::Lane>>(
+fn stage<W: Width<Cell = crate::base::lanes::Lane>>(
     w: W,
     b: &BlockLanes,
     params: &DirectParams,

@@ -1,6 +1,6 @@
 use super::{kernel, kernel::NewtonStage, row::DirectRow, width::Single, *};
 use crate::{
-    math::lanes::{Lane, put3, put4, simd_levels, take3, take4},
+    base::lanes::{Lane, put3, put4, simd_levels, take3, take4},
     solver::rod::{
         block::{EdgeLanes, NodeLanes},
         frame::parallel_transport,

@@ -1,6 +1,6 @@
 //! The register and memory types of a kernel, so that one kernel serves lanes and a scalar version.
 
-use crate::math::lanes::{Lane, Quaternion, Real, V3};
+use crate::base::lanes::{Lane, Quaternion, Real, V3};
 #[cfg(test)]
 use core::marker::PhantomData;
 use fearless_simd::{Simd, f32x8, f32x16, prelude::*};

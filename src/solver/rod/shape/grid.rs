@@ -1,6 +1,6 @@
 //! Signed distances to a surface at the points of a grid, interpolated between them.
 
-use crate::math::lanes::{Real, V3, splat};
+use crate::base::lanes::{Real, V3, splat};
 use bevy::reflect::Reflect;
 use glam::{UVec3, Vec3};
 use std::sync::Arc;

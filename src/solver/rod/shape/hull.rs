@@ -1,6 +1,6 @@
 //! A convex hull as an intersection of half-spaces.
 
-use crate::math::lanes::{Real, V3, splat};
+use crate::base::lanes::{Real, V3, splat};
 use bevy::reflect::Reflect;
 use glam::{Vec3, Vec4};
 use std::sync::Arc;

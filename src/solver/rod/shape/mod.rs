@@ -7,7 +7,7 @@ mod hull;
 
 pub use {grid::DistanceGrid, hull::ConvexHull};
 
-use crate::math::lanes::{Real, V3, splat};
+use crate::base::lanes::{Real, V3, splat};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 use glam::{Mat3, Vec3};
 
@@ -378,7 +378,7 @@ mod tests {
         fixture::{CELL, all_shapes, pear, pear_balls, pear_distance},
         *,
     };
-    use crate::math::lanes::{Lane, load, load3};
+    use crate::base::lanes::{Lane, load, load3};
     use crate::solver::rod::obstacle::{Obstacle, PushOut, Solid, continuous_collision, push_out};
     use fearless_simd::{Level, dispatch};
     use glam::{Quat, UVec3};
@@ -479,7 +479,7 @@ mod tests {
             prop_assert!((scalar.1 + scale * distance(&own, p).1).abs() < 4e-6 * (1.0 + scale));
             let obstacle = Obstacle { solid: solid.clone(), motion: None, friction: 0.0 };
             let (out, beyond) = dispatch!(Level::new(), simd => {
-                let p = crate::math::lanes::splat3(simd, at);
+                let p = crate::base::lanes::splat3(simd, at);
                 let lit = |value: f32| f32x16::splat(simd, value);
                 let out = push_out(&obstacle, p, p, lit(0.0), 0.0, lit(0.0), PushOut::Shortest).map(|(out, _)| {
                     let lane = |x: f32x16<_>| x[5];
@@ -487,7 +487,7 @@ mod tests {
                 });
                 // As far as it is, less a little, it is not beyond; far away it is.
                 let depth = solid.depth(p, 0.0).1;
-                let far = crate::math::lanes::splat3(simd, at + 10.0 * scale);
+                let far = crate::base::lanes::splat3(simd, at + 10.0 * scale);
                 (out, (
                     solid.is_beyond(p, lit(1e-5 * scale) - depth).any_true(),
                     solid.is_beyond(far, lit(scale)).all_true(),
@@ -523,7 +523,7 @@ mod tests {
             let way = way.normalize_or(Vec3::X) * 0.3;
             let [from, to] = [way, -way].map(|p| center + turn * (p * scale));
             let held = dispatch!(Level::new(), simd => {
-                let [from, to] = [from, to].map(|p| crate::math::lanes::splat3(simd, p));
+                let [from, to] = [from, to].map(|p| crate::base::lanes::splat3(simd, p));
                 continuous_collision(&obstacle, from, to, 0.0).map(|(held, _)| {
                     Vec3::new(held.x[3], held.y[3], held.z[3])
                 })
@@ -538,7 +538,7 @@ mod tests {
     /// Whether lanes find that points are farther than `off` outside.
     fn is_beyond(placed: &Placed, p: Vec3, off: f32) -> bool {
         dispatch!(Level::new(), simd => {
-            let all = placed.is_beyond(crate::math::lanes::splat3(simd, p), f32x16::splat(simd, off));
+            let all = placed.is_beyond(crate::base::lanes::splat3(simd, p), f32x16::splat(simd, off));
             assert_eq!(all.any_true(), all.all_true());
             all.all_true()
         })
@@ -688,7 +688,7 @@ mod tests {
             for (from, is_held) in [(inside, false), (Vec3::X * 0.15, true)] {
                 let held = dispatch!(Level::new(), simd => {
                     let [from, to] =
-                        [from, Vec3::X * -0.3].map(|p| crate::math::lanes::splat3(simd, p));
+                        [from, Vec3::X * -0.3].map(|p| crate::base::lanes::splat3(simd, p));
                     continuous_collision(&obstacle, from, to, 0.0).map(|(held, _)| held.x[3])
                 });
                 assert_eq!(held.is_some_and(|x| x > -0.29), is_held, "{held:?} from {from}");

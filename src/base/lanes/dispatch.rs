@@ -14,11 +14,11 @@ macro_rules! dispatch {
         #[cfg(target_arch = "x86_64")]
         {
             if let Some(token) = level.as_avx512() {
-                $crate::math::lanes::with_token!(token, $simd => $work)
+                $crate::base::lanes::with_token!(token, $simd => $work)
             } else if let Some(token) = level.as_avx2() {
-                $crate::math::lanes::with_token!(token, $simd => $work)
+                $crate::base::lanes::with_token!(token, $simd => $work)
             } else if let Some(token) = level.as_sse2() {
-                $crate::math::lanes::with_token!(token, $simd => $work)
+                $crate::base::lanes::with_token!(token, $simd => $work)
             } else {
                 unreachable!("every x86-64 has SSE2")
             }

@@ -8,7 +8,7 @@ use glam::Vec3;
 /// A k-d tree of points, each with an index of the caller's.
 ///
 /// ```
-/// # use bevy_keratin::math::grid::KdTree; use bevy::math::Vec3;
+/// # use bevy_keratin::base::grid::KdTree; use bevy::math::Vec3;
 /// let tree = KdTree::new((0..5).map(|i| (Vec3::X * i as f32, i)));
 /// let two: Vec<_> = tree.nearest::<2>(Vec3::X * 2.9).map(|(i, _)| i).collect();
 /// assert_eq!(two, [3, 2]);

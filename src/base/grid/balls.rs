@@ -1,7 +1,7 @@
 //! Box queries on balls.
 
 use super::{Run, UniformGrid};
-use crate::math::lanes::{Real, V3, dispatch, lanes_in, splat3};
+use crate::base::lanes::{Real, V3, dispatch, lanes_in, splat3};
 use fearless_simd::{Level, Simd, f32x16, prelude::*, u32x16};
 use glam::Vec3;
 
