@@ -2,15 +2,48 @@
 //!
 //! `cargo run --release --example preset_on_gltf`
 
-use bevy::{prelude::KeyCode::*, prelude::*};
+use bevy::{
+    camera::{
+        primitives::Aabb,
+        visibility::{DynamicSkinnedMeshBounds, NoFrustumCulling, VisibilityClass},
+    },
+    gltf::{GltfMaterialName, GltfMeshName, GltfSceneName},
+    mesh::skinning::SkinnedMesh,
+    prelude::{KeyCode::*, *},
+    transform::components::TransformTreeChanged,
+};
 use bevy_keratin::prelude::*;
 
 fn main() {
-    App::new()
-        .add_plugins((DefaultPlugins, HairPlugins::default()))
+    let mut app = App::new();
+    app.add_plugins((DefaultPlugins, HairPlugins::default()))
         .add_systems(Startup, setup)
-        .add_systems(Update, (turn, change))
-        .run();
+        .add_systems(Update, (turn, change));
+    register(&mut app);
+    app.run();
+}
+
+/// What glTF scenes are made of. Leave it out where Bevy has its default features: `reflect_auto_register` does this.
+fn register(app: &mut App) {
+    app.register_type::<Transform>()
+        .register_type::<GlobalTransform>()
+        .register_type::<TransformTreeChanged>()
+        .register_type::<Visibility>()
+        .register_type::<InheritedVisibility>()
+        .register_type::<ViewVisibility>()
+        .register_type::<VisibilityClass>()
+        .register_type::<DynamicSkinnedMeshBounds>()
+        .register_type::<NoFrustumCulling>()
+        .register_type::<Aabb>()
+        .register_type::<Name>()
+        .register_type::<Children>()
+        .register_type::<ChildOf>()
+        .register_type::<Mesh3d>()
+        .register_type::<MeshMaterial3d<StandardMaterial>>()
+        .register_type::<SkinnedMesh>()
+        .register_type::<GltfSceneName>()
+        .register_type::<GltfMaterialName>()
+        .register_type::<GltfMeshName>();
 }
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>) {

@@ -14,6 +14,8 @@
 //! ));
 //! ```
 
+#[cfg(feature = "debug")]
+mod config;
 mod diagnostics;
 #[cfg(feature = "debug")]
 mod gizmos;
@@ -22,7 +24,7 @@ mod shapes;
 
 pub use diagnostics::HairDiagnosticsPlugin;
 #[cfg(feature = "debug")]
-pub use gizmos::{HairDebugPlugin, HairGizmos};
+pub use {config::HairGizmos, gizmos::HairDebugPlugin};
 
 use crate::{
     hair::strand::{Hair, OnGpu, StrandOf, StrandSleep},

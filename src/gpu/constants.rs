@@ -5,7 +5,6 @@ use super::{
     layout::GROUP_SIZE,
     record::*,
     sweeps::{PRINTED, SPLIT},
-    target_buffer::{FREE, ROOT},
 };
 use crate::{
     forces::environment::wind::REFERENCE_DISTANCE,
@@ -37,7 +36,7 @@ static CONSTANTS: LazyLock<String> = LazyLock::new(|| {
             CARRIES SHAPES REMEMBERS NOTES_BEFORE RESTS TARGETS_ROOTS HOLDS FOLLOWS WAKES SWEEPS
             HALF_SPACE CAPSULE CYLINDER ELLIPSOID
             SLEPT ROOT FREE GUIDES TIES SPLIT PRINTED
-            PASSES_IN_TOUCH MAX_REPAIRS MAX_LEAVING_ROUNDS
+            PASSES_IN_TOUCH MAX_REPAIRS
         }
         f32 {
             THETA FAST_TURN STRAIN TORN DEEP_SHARE MAX_BENDING_LENGTH MAX_STIFFNESS BUCKLING_TWIST HOLD

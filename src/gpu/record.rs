@@ -264,6 +264,10 @@ impl SleepRecord {
     }
 }
 
+/// Bits beside the slot of a kinematic target: it is the root; it is let go.
+pub(super) const ROOT: u32 = 1 << 30;
+pub(super) const FREE: u32 = 1 << 31;
+
 // Flags of a record.
 pub(super) const CARRIES: u32 = 1;
 pub(super) const SHAPES: u32 = 2;

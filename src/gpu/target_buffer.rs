@@ -4,7 +4,7 @@ use super::{
     followers,
     layout::Layout,
     pipelines::HairKernels,
-    record::{Indices, KinematicTarget, SubstepRecord},
+    record::{FREE, Indices, KinematicTarget, ROOT, SubstepRecord},
 };
 use bevy::render::{
     render_resource::{
@@ -13,11 +13,7 @@ use bevy::render::{
     renderer::{RenderDevice, RenderQueue},
 };
 
-// Bits beside a targets node's slot.
-pub(super) const ROOT: u32 = 1 << 30;
-pub(super) const FREE: u32 = 1 << 31;
-
-/// Threads of a workgroup that add_targets nodes.
+/// Threads of a workgroup that writes targets.
 const GROUP: u32 = 64;
 
 /// The targets nodes of the uploaded substeps.

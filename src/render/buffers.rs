@@ -183,7 +183,7 @@ mod tests {
         let mut out = vec![[0; 8]; strand.nodes()];
         let history = StrandHistory { positions: history.to_vec(), ..default() };
         let bonds = Bonds::default();
-        DrawnNodes { strand: &strand, history: &history, bonds: &bonds, wet: &[] }
+        DrawnNodes { strand, history: &history, bonds: &bonds, wet: &[] }
             .pack(&mut out, false, overstep);
         out
     }

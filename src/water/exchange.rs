@@ -189,7 +189,7 @@ pub(super) fn exchange_water(
     let process = process.clamped().0;
     if step.index == 0 {
         found.waited += process * step.dt * step.count as f32;
-    } else if !found.busy && soaks.is_empty() && !wets.is_any() && !(found.any && winds.dry()) {
+    } else if !(found.busy || !soaks.is_empty() || wets.is_any() || found.any && winds.dry()) {
         return;
     }
     let is_due = step.index == 0 && found.waited >= PERIOD;

@@ -18,7 +18,6 @@ mod skeleton;
 #[allow(dead_code, reason = "each program uses its part")]
 mod trace;
 #[path = "../common/golden.rs"]
-#[allow(dead_code, reason = "each program uses its part")]
 mod vectors;
 #[path = "../../examples/salon/wardrobe.rs"]
 #[allow(dead_code, reason = "each program uses its part")]

@@ -15,6 +15,8 @@ fn app() -> App {
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), HairPlugins::default()))
         .init_asset::<Mesh>()
         .init_asset::<ShaderBuffer>();
+    #[cfg(feature = "debug")]
+    app.add_plugins(HairDebugPlugin);
     app.finish();
     app
 }

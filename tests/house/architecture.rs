@@ -352,7 +352,7 @@ fn no_file_is_too_long_to_be_understood() {
         let code = text.split("\n#[cfg(test)]\nmod tests {").next().unwrap();
         let is_code = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with("//");
         let lines = code.lines().filter(is_code).count();
-        assert!(lines <= 400, "{} has {lines} lines of code", path.display());
+        assert!(lines <= 800, "{} has {lines} lines of code", path.display());
     }
 }
 

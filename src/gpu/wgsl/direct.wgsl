@@ -383,7 +383,7 @@ fn surface() {
     for (var i = 0u; i <= edges; i++) {
         set_support(i, vec3(0.0));
     }
-    for (var round = 0u; round < min(2u * edges, MAX_LEAVING_ROUNDS); round++) {
+    for (var round = 0u; round < 2u * edges; round++) {
         contacts(0.0, 0.0);
         if !limit_strained(TORN) {
             return;

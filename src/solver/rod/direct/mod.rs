@@ -139,10 +139,6 @@ pub(crate) const TORN: f32 = 0.01;
 /// follows.
 pub(crate) const MAX_REPAIRS: u32 = 4;
 
-/// The maximum number of rounds of pushing a strand out of obstacles and restoring its lengths before a step.
-/// What is left of a long strand follows in the next steps.
-pub(crate) const MAX_LEAVING_ROUNDS: u32 = 64;
-
 /// Depth in an obstacle, in edge lengths, above which a strand is moved out of it before the step.
 pub(crate) const DEEP_SHARE: f32 = 0.25;
 
@@ -363,14 +359,14 @@ fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
 
 /// Moves strands that begin deep inside an obstacle, as when spawned there, out of it before the step and
 /// restores their lengths, so that they gain no velocity. Shallow penetration, as from contact with
-/// other hair, is left to the step. Returns in how many rounds.
+/// other hair, is left to the step.
 #[inline(never)]
 fn leave_obstacles<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     params: &DirectParams,
     obstacles: &[Obstacle],
-) -> u32 {
+) {
     simd.vectorize(
         #[inline(always)]
         || {
@@ -395,7 +391,7 @@ fn leave_obstacles<S: Simd>(
             let deep =
                 Real::lt(load(simd, &b.edges[0].l) * f32x16::splat(simd, DEEP_SHARE), deepest);
             if deep.to_bitmask() == 0 {
-                return 0;
+                return;
             }
             let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
             b.has_fast_nodes = false;
@@ -405,16 +401,14 @@ fn leave_obstacles<S: Simd>(
                 n.rests_on = Default::default();
             }
             // A correction travels about one edge per round.
-            let rounds = MAX_LEAVING_ROUNDS.min(2 * b.edges.len() as u32);
-            for round in 1..=rounds {
+            for _ in 0..2 * b.edges.len() {
                 contacts_with(simd, b, params.clearance, obstacles, FrictionShare::NONE, deep);
                 if !limit_strained(simd, b, TORN, deep) {
-                    return round;
+                    return;
                 }
             }
-            rounds
         },
-    )
+    );
 }
 
 /// Moves nodes ballistically for `ahead` (s), stopped by obstacles.

@@ -409,27 +409,3 @@ fn instruction_sets_agree() {
         assert!(if *name == "sse2" { most < 1e-2 } else { most == 0.0 }, "{name}: {most}");
     }
 }
-
-#[test]
-fn a_long_strand_gets_out_of_a_solid_in_a_bounded_number_of_rounds_a_step() {
-    let ball = Solid::Capsule { a: Vec3::X, b: Vec3::X * 9.0, radius: 0.3 };
-    let solid = [Obstacle { solid: ball, motion: None, friction: 0.0 }];
-    let mut block =
-        strands(500, |lane, i| Vec3::new(0.6 + 0.01 * i as f32, 0.02 + 1e-3 * lane as f32, 0.0));
-    prepare(&mut block, 0.1);
-    let leave = |block: &mut BlockLanes| {
-        block.consider_all_obstacles();
-        dispatch!(Level::new(), simd => leave_obstacles(simd, block, &params(), &solid))
-    };
-    let rounds: Vec<u32> = (0..40).map(|_| leave(&mut block)).collect();
-    println!("{rounds:?}");
-    assert!(rounds.iter().all(|rounds| *rounds <= 64), "{rounds:?}");
-    assert_eq!(rounds.last(), Some(&0), "it never gets out");
-    let strained = block
-        .nodes
-        .windows(2)
-        .zip(&block.edges)
-        .map(|(n, e)| (take3(&n[1].p, 3).distance(take3(&n[0].p, 3)) / e.l[3] - 1.0).abs());
-    let strained = strained.fold(0.0, f32::max);
-    assert!(strained < TORN, "{strained}");
-}
