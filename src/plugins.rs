@@ -1,7 +1,7 @@
 //! The plugin group.
 
 use crate::{
-    base::schedule::TickPlugin,
+    base::schedule::{TickPlugin, is_fixed},
     forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
     hair::{look::LookPlugin, strand::StrandPlugin},
     hairdo::style::StylePlugin,
@@ -28,18 +28,20 @@ use bevy::{
 /// use bevy_keratin::prelude::*;
 ///
 /// App::new().add_plugins((MinimalPlugins, HairPlugins::default()));
-/// // in the schedule of your choice:
+/// // at once in a schedule of your choice, for instance that of a rollback:
 /// App::new().add_plugins((MinimalPlugins, HairPlugins::new(FixedUpdate)));
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct HairPlugins {
-    schedule: InternedScheduleLabel,
+    schedule: Option<InternedScheduleLabel>,
 }
 
 impl HairPlugins {
-    /// Hair that ticks in `schedule`, with the time that passes there.
+    /// Hair that ticks at once in `schedule`, with the time that passes there; see
+    /// [`TickPlugin::new`](crate::base::schedule::TickPlugin::new). By default the fixed ticks of a frame
+    /// run when its animations are done.
     pub fn new(schedule: impl ScheduleLabel) -> Self {
-        Self { schedule: schedule.intern() }
+        Self { schedule: Some(schedule.intern()) }
     }
 }
 
@@ -65,17 +67,10 @@ pub fn run_ticks(app: &mut App, ticks: u32) {
     app.insert_resource(clock.unwrap_or_default());
 }
 
-impl Default for HairPlugins {
-    /// Ticks in [`FixedPostUpdate`].
-    fn default() -> Self {
-        Self::new(FixedPostUpdate)
-    }
-}
-
 impl PluginGroup for HairPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>()
-            .add(TickPlugin::new(self.schedule))
+            .add(self.schedule.map_or_else(TickPlugin::default, TickPlugin::new))
             .add(StrandPlugin)
             .add(BondPlugin)
             .add(EnvironmentPlugin)
@@ -84,13 +79,15 @@ impl PluginGroup for HairPlugins {
             .add(WaterPlugin)
             .add(RodPlugin)
             .add(SpringPlugin)
-            .add(SettlePlugin::for_schedule(self.schedule))
+            .add(SettlePlugin)
             .add(SleepPlugin)
             .add(LodPlugin)
             .add(StylePlugin)
             .add(LookPlugin);
         #[cfg(feature = "render")]
-        let group = group.add(crate::render::HairRenderPlugin::for_schedule(self.schedule));
+        let group = group.add(crate::render::HairRenderPlugin {
+            interpolate: self.schedule.is_none_or(is_fixed),
+        });
         #[cfg(feature = "gpu")]
         let group = group.add(crate::gpu::HairGpuPlugin);
         #[cfg(feature = "save")]

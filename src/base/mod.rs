@@ -4,6 +4,7 @@ pub mod fault;
 pub mod grid;
 #[doc(hidden)]
 pub mod lanes;
+pub(crate) mod motion;
 pub(crate) mod parallel;
 pub mod schedule;
 pub mod setting;
@@ -12,7 +13,7 @@ pub mod setting;
 pub mod prelude {
     pub use crate::base::fault::{FaultKind, HairFault};
     pub use crate::base::schedule::{
-        HairProcessTime, HairStep, HairSubsteps, HairSystems, HairTick, SettleTick,
+        HairProcessTime, HairStep, HairSubsteps, HairSystems, HairTick, HairTicks, SettleTick,
     };
     pub use crate::base::setting::{HairDefault, InvalidValue, ValueRange};
 }

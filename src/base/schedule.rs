@@ -6,19 +6,22 @@
 
 use crate::base::{
     fault,
+    motion::{TickMoment, WorldMotion, close_frame, note_tick, see_frame},
     setting::{self, InvalidValue, Ranged, ValueRange, Violations},
 };
 use bevy::{
+    app::{AnimationSystems, FixedMain, RunFixedMainLoopSystems},
     ecs::{
         entity::EntityHashSet,
         schedule::{
-            InternedScheduleLabel, LogLevel, ScheduleBuildSettings, ScheduleLabel,
-            SingleThreadedExecutor,
+            InternedScheduleLabel, IntoScheduleConfigs, LogLevel, ScheduleBuildSettings,
+            ScheduleConfigs, ScheduleLabel, SingleThreadedExecutor,
         },
-        system::SystemParam,
+        system::{ScheduleSystem, SystemParam},
     },
     platform::collections::HashSet,
     prelude::*,
+    time::run_fixed_main_schedule,
     utils::prelude::ShortName,
 };
 use core::any::TypeId;
@@ -38,9 +41,14 @@ pub struct SettleTick;
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct HairFrame;
 
-/// The set of the tick in the schedule that runs it.
+/// The set of the ticks in the schedule that runs them: [`PostUpdate`] by default. What moves a head there,
+/// for instance inverse kinematics, runs before it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct HairTicks;
+pub struct HairTicks;
+
+/// What is done after each tick.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct HairTicked;
 
 /// The hair that is simulated ahead while all other hair waits; `None` in the tick itself.
 #[derive(Resource, Clone, Debug, Default)]
@@ -241,6 +249,9 @@ impl Default for MergedSubsteps {
 }
 
 impl MergedSubsteps {
+    /// The hair takes no substep.
+    pub(crate) const WAITS: Self = Self(u32::MAX);
+
     /// As many as fit into `longest` (s) and divide the tick evenly.
     pub(crate) fn within(longest: f32, step: &HairStep) -> Self {
         let fit = ((longest / step.dt + 1e-3) as u32).clamp(1, step.count.max(1));
@@ -310,6 +321,9 @@ impl EffectiveSubsteps<'_, '_> {
         }
         let HairStep { dt, index, count } = *self.step;
         let (together, limits) = self.together(hair);
+        if together == MergedSubsteps::WAITS.0 {
+            return None;
+        }
         let substeps = merged(index, count, together)?;
         Some(EffectiveSubstep {
             dt: dt * substeps as f32,
@@ -367,23 +381,35 @@ impl Ranged for HairProcessTime {
     }
 }
 
-/// Runs [`HairTick`] in a schedule, [`FixedPostUpdate`] by default.
-#[derive(Clone, Debug)]
+/// Runs [`HairTick`] once for each fixed tick.
+///
+/// By default a tick is noted in [`FixedPostUpdate`], and all that a frame has are run in
+/// [`PostUpdate`], after animations and before transforms are propagated: only then is known how heads
+/// have moved that are animated from frame to frame.
+#[derive(Clone, Debug, Default)]
 pub struct TickPlugin {
-    schedule: InternedScheduleLabel,
+    schedule: Option<InternedScheduleLabel>,
 }
 
 impl TickPlugin {
-    /// Ticks in `schedule`, with the time that passes there.
+    /// Ticks at once in `schedule`, with the time that passes there. In a fixed schedule heads that are
+    /// animated from frame to frame are then seen a frame late, and unevenly where frames are uneven.
     pub fn new(schedule: impl ScheduleLabel) -> Self {
-        Self { schedule: schedule.intern() }
+        Self { schedule: Some(schedule.intern()) }
     }
 }
 
-impl Default for TickPlugin {
-    fn default() -> Self {
-        Self::new(FixedPostUpdate)
-    }
+/// Whether a schedule is run by the fixed clock.
+pub(crate) fn is_fixed(schedule: InternedScheduleLabel) -> bool {
+    [
+        FixedMain.intern(),
+        FixedFirst.intern(),
+        FixedPreUpdate.intern(),
+        FixedUpdate.intern(),
+        FixedPostUpdate.intern(),
+        FixedLast.intern(),
+    ]
+    .contains(&schedule)
 }
 
 impl Plugin for TickPlugin {
@@ -409,6 +435,9 @@ impl Plugin for TickPlugin {
         };
         app.init_resource::<HairStep>()
             .init_resource::<Ahead>()
+            .init_resource::<WorldMotion>()
+            .init_resource::<NotedTicks>()
+            .init_schedule(HairTicked)
             .register_type::<HairStep>()
             .register_type::<SubstepLimits>()
             .register_type::<InvalidValue>()
@@ -418,13 +447,47 @@ impl Plugin for TickPlugin {
             .add_systems(PreUpdate, |world: &mut World| world.run_schedule(HairFrame))
             .edit_schedule(HairTick, ordered)
             .edit_schedule(SettleTick, ordered)
-            .add_systems(self.schedule, {
-                let tick = run_hair_tick.in_set(HairTicks).into_configs();
-                // In the same schedule, hair reads the bodies' poses after the physics step.
-                #[cfg(feature = "avian")]
-                let tick = tick.after(avian3d::prelude::PhysicsSystems::Writeback);
-                tick
-            });
+            .add_systems(
+                RunFixedMainLoop,
+                see_frame
+                    .in_set(RunFixedMainLoopSystems::FixedMainLoop)
+                    .before(run_fixed_main_schedule),
+            );
+        // In the same schedule, hair reads the bodies' poses after the physics step.
+        let after_physics = |tick: ScheduleConfigs<ScheduleSystem>| {
+            #[cfg(feature = "avian")]
+            let tick = tick.after(avian3d::prelude::PhysicsSystems::Writeback);
+            tick
+        };
+        match self.schedule {
+            Some(schedule) => {
+                let alone = !is_fixed(schedule);
+                let tick = move |world: &mut World| {
+                    note(world, alone);
+                    run_noted(world);
+                };
+                app.add_systems(schedule, after_physics(tick.in_set(HairTicks).into_configs()));
+                app.add_systems(HairFrame, |world: &mut World| {
+                    let _ = world.run_system_cached_with(close_frame, true);
+                    world.resource_mut::<WorldMotion>().end_ticks();
+                });
+            }
+            None => {
+                let note = |world: &mut World| note(world, false);
+                let run = |world: &mut World| {
+                    let _ = world.run_system_cached_with(close_frame, false);
+                    run_noted(world);
+                    world.resource_mut::<WorldMotion>().end_ticks();
+                };
+                app.add_systems(FixedPostUpdate, after_physics(note.into_configs()));
+                app.add_systems(
+                    PostUpdate,
+                    run.in_set(HairTicks)
+                        .after(AnimationSystems)
+                        .before(TransformSystems::Propagate),
+                );
+            }
+        }
     }
 }
 
@@ -445,18 +508,42 @@ pub(crate) fn lacks<Needed: Plugin, Own: Plugin>(app: &mut App) -> bool {
     is_missing
 }
 
-/// One tick: as many substeps as [`HairSubsteps`] gives; none if no time has passed.
-fn run_hair_tick(world: &mut World) {
-    let seconds = world.resource::<Time>().delta_secs();
-    if seconds <= 0.0 {
+/// Ticks that are to run, with the clocks that they run by.
+#[derive(Resource, Default)]
+struct NotedTicks(Vec<(Time, TickMoment)>);
+
+/// Notes a tick, unless no time passes.
+fn note(world: &mut World, alone: bool) {
+    let clock = *world.resource::<Time>();
+    if clock.delta_secs() <= 0.0 {
         return;
     }
-    let count = world.resource::<HairSubsteps>().count(seconds);
-    let dt = seconds / count as f32;
-    for index in 0..count {
-        *world.resource_mut::<HairStep>() = HairStep { dt, index, count };
-        world.run_schedule(HairTick);
+    let _ = world.run_system_cached_with(note_tick, alone);
+    let frame = world.get_resource::<Time<Virtual>>();
+    let frame = frame.map_or_else(default, |time| [time.delta(), time.elapsed()]);
+    let fixed = world.get_resource::<Time<Fixed>>().filter(|_| !alone);
+    let rest = fixed.map(Time::<Fixed>::overstep);
+    let moment = world.resource_mut::<WorldMotion>().next_tick(clock.delta(), frame, rest);
+    world.resource_mut::<NotedTicks>().0.push((clock, moment));
+}
+
+/// Runs the noted ticks: as many substeps each as [`HairSubsteps`] gives.
+fn run_noted(world: &mut World) {
+    let noted = core::mem::take(&mut world.resource_mut::<NotedTicks>().0);
+    let frame = *world.resource::<Time>();
+    for (clock, moment) in noted {
+        *world.resource_mut::<Time>() = clock;
+        world.resource_mut::<WorldMotion>().begin(moment);
+        let seconds = clock.delta_secs();
+        let count = world.resource::<HairSubsteps>().count(seconds);
+        let dt = seconds / count as f32;
+        for index in 0..count {
+            *world.resource_mut::<HairStep>() = HairStep { dt, index, count };
+            world.run_schedule(HairTick);
+        }
+        world.run_schedule(HairTicked);
     }
+    *world.resource_mut::<Time>() = frame;
 }
 
 #[cfg(test)]

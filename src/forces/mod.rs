@@ -12,6 +12,7 @@ pub mod prelude {
         BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, StrandContact,
     };
     pub use crate::forces::environment::{
-        AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindZone, ZoneShape,
+        AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindTravel, WindZone,
+        ZoneShape,
     };
 }

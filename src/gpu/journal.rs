@@ -103,7 +103,7 @@ pub(super) fn write_journals(
             let follow =
                 on.is_some_and(|on| on.has_followers) && !GuideOffsets::are_settled(followed);
             if follow
-                || frame.has_jumped()
+                || frame.settles()
                 || disturbance.is_none_or(|disturbance| disturbance.acts_within(low, high))
             {
                 rest.wake();
@@ -137,7 +137,7 @@ pub(super) fn write_journals(
             dt: substep.tick,
         });
         let pose = frame.now();
-        let air = winds.seen_from(pose);
+        let air = winds.seen_from(frame);
         let (solver, stiffness) = (solver.of(hair), stiffness.of(hair));
         // A method that is set in the middle of a tick counts from the next one on.
         let method = on.map_or(solver.method, |on| on.method);
@@ -150,7 +150,7 @@ pub(super) fn write_journals(
             dt: substep.dt,
             gravity: pose.direction_in(gravity),
             frame_motion: frame.frame_delta(),
-            wind: air.steady_wind().unwrap_or_default(),
+            wind: air.steady_wind().unwrap_or_default() + air.headwind,
             retained: bevy::math::ops::exp(-drag.of(hair).rate * substep.dt),
             influence: influence.of(hair).as_array(),
             bending_length: stiffness.bending_length,
@@ -169,7 +169,7 @@ pub(super) fn write_journals(
                 .collect(),
             obstacles: solids.iter().take(MAX_OBSTACLES).cloned().collect(),
             notes_before: is_first,
-            rests: is_first && frame.has_jumped(),
+            rests: is_first && frame.settles(),
             shapes: true,
             targets,
             follows,

@@ -216,7 +216,7 @@ pub struct SubstepRecord {
     pub obstacles: Vec<Obstacle>,
     /// Whether it is the tick's first, which records the nodes' positions.
     pub notes_before: bool,
-    /// Whether velocities are zeroed first, as after a teleport.
+    /// Whether velocities are zeroed first: the hair has come back to the world.
     pub rests: bool,
     /// Whether rest shapes are computed from the bonds first.
     pub shapes: bool,

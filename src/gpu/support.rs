@@ -115,7 +115,7 @@ impl Support<'_, '_> {
         let (frame, obstacles, wet, lod, settles, is_watched, treatments, members) =
             self.hairs.get(hair).ok()?;
         let contact = self.contact.of(hair);
-        let air = self.winds.seen_from(frame.now());
+        let air = self.winds.seen_from(frame);
         // Of the tick before: what is near is looked at before it touches.
         let unplaced = obstacles.and_then(|all| record::unsupported(&all.solids));
         #[cfg(feature = "groom")]

@@ -55,7 +55,7 @@ impl UnusedSpins {
         }
     }
 
-    /// The hair is at rest: it sleeps, or its head has jumped.
+    /// The hair is at rest: it sleeps, or has come back to the world.
     pub(super) fn rest(&mut self) {
         self.retained = 0.0;
     }

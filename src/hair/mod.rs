@@ -9,7 +9,7 @@ pub mod prelude {
         DyeLayer, HairColor, HairDye, HairLook, HairShading, Melanin, Streaks, WornPreset,
     };
     pub use crate::hair::strand::{
-        AddedMass, Hair, HairInertia, HeldNodes, HeldNodesState, MotionOwner, OnGpu, SleepCounts,
-        Strand, StrandError, StrandModel, StrandOf, StrandSleep, Strands,
+        AddedMass, Hair, HairInertia, HeldNodes, HeldNodesState, MotionOwner, OnGpu, ShiftWorld,
+        SleepCounts, Strand, StrandError, StrandModel, StrandOf, StrandSleep, Strands,
     };
 }

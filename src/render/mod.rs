@@ -109,15 +109,13 @@ pub(crate) use {
 pub use crate::hair::look::{HairDye, HairLook, HairShading, Melanin};
 
 use crate::{
-    base::setting,
+    base::{schedule::HairTicks, setting},
     hair::strand::{Hair, lacks_strands},
     simulation::settle::{SettlePlugin, Settling},
 };
 use bevy::{
-    app::FixedMain,
     asset::{AssetEventSystems, embedded_asset, io::embedded::EmbeddedAssetRegistry},
     camera::visibility::VisibilitySystems,
-    ecs::schedule::{InternedScheduleLabel, ScheduleLabel},
     prelude::*,
     render::{RenderApp, erased_render_asset::ErasedRenderAssetPlugin, storage::ShaderBuffer},
     shader::load_shader_library,
@@ -140,21 +138,6 @@ impl Default for HairRenderPlugin {
     }
 }
 
-impl HairRenderPlugin {
-    /// For hair that ticks in `schedule`.
-    pub fn for_schedule(schedule: InternedScheduleLabel) -> Self {
-        let fixed = [
-            FixedMain.intern(),
-            FixedFirst.intern(),
-            FixedPreUpdate.intern(),
-            FixedUpdate.intern(),
-            FixedPostUpdate.intern(),
-            FixedLast.intern(),
-        ];
-        Self { interpolate: fixed.contains(&schedule) }
-    }
-}
-
 impl Plugin for HairRenderPlugin {
     fn build(&self, app: &mut App) {
         if lacks_strands::<Self>(app) {
@@ -174,6 +157,7 @@ impl Plugin for HairRenderPlugin {
                 PostUpdate,
                 beads::show_droplets
                     .in_set(HairBeadSystems)
+                    .after(HairTicks)
                     .before(HairRenderSystems)
                     .run_if(beads::are_any),
             );

@@ -73,7 +73,7 @@ pub(super) fn move_droplets(
     let valid: Vec<_> = colliders.iter().map(|(c, pose)| (c.clamped(), pose)).collect();
     let solids =
         Colliders::new(1, valid.iter().map(|(c, pose)| (c, *pose, seen_from(&world, c, pose))));
-    let winds = winds.seen_from(world.now());
+    let winds = winds.seen_from(&world);
     let volumes = volumes.seen_from(world.now());
     let mut items: Vec<Moving<'_>> = droplets
         .iter_mut()

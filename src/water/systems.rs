@@ -17,7 +17,9 @@ use crate::{
         setting,
     },
     forces::environment::vapour::DryingAir,
-    hair::strand::{Hair, Here, MissedOnGpu, Strand, TickPose, keep_required, lacks_strands},
+    hair::strand::{
+        Hair, Here, MissedOnGpu, ShiftWorld, Strand, TickPose, keep_required, lacks_strands,
+    },
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
@@ -52,6 +54,7 @@ impl Plugin for WaterPlugin {
             .add_observer(|soak: On<SoakHair>, mut messages: MessageWriter<SoakHair>| {
                 messages.write(*soak.event());
             })
+            .add_observer(shift_droplets)
             .add_observer(count_lost_droplet)
             .add_observer(count_lost_moisture)
             .add_systems(HairTick, submerge.in_set(HairSystems::Submersion))
@@ -79,6 +82,14 @@ impl Plugin for WaterPlugin {
                 HairTick,
                 (follow_strands, sum_held_water).chain().in_set(HairSystems::WaterLedger),
             );
+    }
+}
+
+/// Drops go along with a shifted world.
+fn shift_droplets(shift: On<ShiftWorld>, mut drops: Query<&mut Droplet>) {
+    for mut drop in &mut drops {
+        drop.position += shift.by;
+        drop.before += shift.by;
     }
 }
 

@@ -381,13 +381,25 @@ fn game_code_wakes_it() {
     wakes(|app, _, e| app.world_mut().get_mut::<Strand>(e).unwrap().velocities_mut()[5].x = 0.1);
     wakes(|app, _, e| app.world_mut().get_mut::<Strand>(e).unwrap().positions_mut()[8].x = 0.01);
     wakes(|app, _, e| app.world_mut().get_mut::<StrandSleep>(e).unwrap().wake());
-    for act in [Hair::teleport, Hair::reset, Hair::restyle] {
+    for act in [Hair::reset, Hair::restyle] {
         wakes(|app, hair, _| act(app.world_mut().entity_mut(hair)));
     }
     wakes(|app, hair, _| {
         let points = [Vec3::Z, Vec3::Z + Vec3::X * 0.1];
         app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
     });
+}
+
+#[test]
+fn a_teleport_wakes_it_only_if_gravity_comes_from_elsewhere() {
+    for (turn, wakes) in [(Quat::from_rotation_y(1.0), false), (Quat::from_rotation_x(1.0), true)] {
+        let (mut app, hair, e) = sleeper();
+        Hair::teleport(app.world_mut().entity_mut(hair));
+        let place = Transform::from_xyz(0.4, 0.0, 0.0).with_rotation(turn);
+        app.world_mut().entity_mut(hair).insert(place);
+        run(&mut app, 0.1);
+        assert_eq!(is_asleep(&app, e), !wakes, "turned by {turn}");
+    }
 }
 
 #[cfg(feature = "save")]

@@ -6,7 +6,7 @@ use super::{
     roots::{Tied, TiedRoots, triangle},
 };
 use crate::{
-    base::schedule::HairStep,
+    base::{motion::TickTransforms, schedule::HairStep},
     hair::strand::{Hair, OnGpu, Pose, SleepCounts, Strand, StrandHistory, StrandOf, StrandSleep},
     simulation::lod::PresentLod,
 };
@@ -50,7 +50,7 @@ fn is_coarse(present: Option<&PresentLod>, sleepers: Option<&SleepCounts>) -> bo
 /// At the start of a tick: targets of the roots at its end.
 pub(super) fn aim_roots(
     step: Res<HairStep>,
-    transforms: TransformHelper,
+    mut transforms: TickTransforms,
     morphs: Morphs,
     mut hairs: Query<
         (Entity, &mut TiedRoots, Option<&PresentLod>, Option<&SleepCounts>),
@@ -60,12 +60,12 @@ pub(super) fn aim_roots(
     if step.index != 0 {
         return;
     }
-    let place = |entity| transforms.compute_global_transform(entity).ok();
+    let mut place = |entity| transforms.end(entity);
     for (hair, mut tied, present, sleepers) in &mut hairs {
         // The pose at the end of the tick, where the mesh will be too.
         let Some(pose) = place(hair).as_ref().and_then(Pose::of) else { continue };
         let TiedRoots { roots, movers, rest, .. } = tied.bypass_change_detection();
-        let Some(mesh) = movers.pose(place, &morphs) else { continue };
+        let Some(mesh) = movers.pose(&mut place, &morphs) else { continue };
         let aimed = |root: &Tied| Some(root.to.translation.into());
         *rest = is_coarse(present, sleepers) && stay(roots, &mesh, &pose, aimed);
         if *rest {

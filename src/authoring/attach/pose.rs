@@ -55,7 +55,7 @@ impl Movers {
     /// The present pose; `None` while a joint has no transform.
     pub fn pose<'a>(
         &'a self,
-        place: impl Fn(Entity) -> Option<GlobalTransform>,
+        mut place: impl FnMut(Entity) -> Option<GlobalTransform>,
         morphs: &'a Morphs,
     ) -> Option<MeshPose<'a>> {
         let joints = self.joints.iter().map(|j| Some(place(j.entity)?.affine() * j.inverse_bind));

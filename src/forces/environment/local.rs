@@ -14,6 +14,9 @@ use bevy::{ecs::system::SystemParam, math::DVec3, prelude::*};
 /// A zone in a hair's frame, with valid values.
 pub(super) struct LocalZone {
     zone: WindZone,
+    /// How it moves itself, and turns (m/s, rad/s): its air moves with it.
+    velocity: Vec3,
+    spin: Vec3,
     /// Transform from the frame to the zone's, in the zone's metres.
     rotation: Quat,
     origin: Vec3,
@@ -31,7 +34,16 @@ pub(crate) struct LocalWinds {
     /// How far it has travelled so far (m, in the world).
     pub(super) travelled: DVec3,
     pub(super) pose: Pose,
+    /// What is added to the air's velocity so that a headwind counts in metres a second at any scale of
+    /// the hair, as wind does; zero at scale 1.
+    pub(crate) headwind: Vec3,
 }
+
+/// How far the wind has travelled (m, in the world), which is where its gusts are. A resource, advanced
+/// by each tick; to be saved and restored with the world's time.
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Resource, Default, Clone, PartialEq)]
+pub struct WindTravel(pub DVec3);
 
 /// All sources of wind.
 #[derive(SystemParam)]
@@ -39,8 +51,15 @@ pub(crate) struct Winds<'w, 's> {
     wind: Option<Res<'w, HairWind>>,
     blowers: Query<'w, 's, (&'static Blower, &'static TickPose)>,
     zones: Query<'w, 's, (&'static WindZone, &'static TickPose)>,
-    time: Res<'w, Time>,
+    travel: Option<Res<'w, WindTravel>>,
     step: Res<'w, HairStep>,
+}
+
+/// Once a tick: the wind passes.
+pub(super) fn travel(wind: Res<HairWind>, time: Res<Time>, mut travel: ResMut<WindTravel>) {
+    let seconds = time.delta_secs_f64();
+    let way = wind.clamped().velocity.as_dvec3() * seconds;
+    travel.0 = if travel.0.is_finite() { travel.0 + way } else { way };
 }
 
 impl Winds<'_, '_> {
@@ -58,8 +77,10 @@ impl Winds<'_, '_> {
         !self.blowers.is_empty() || self.zones.iter().any(|(zone, _)| zone.drying > 0.0)
     }
 
-    /// Transformed into the frame of `pose`.
-    pub(crate) fn seen_from(&self, pose: &Pose) -> LocalWinds {
+    /// Seen from a frame.
+    pub(crate) fn seen_from(&self, frame: &TickPose) -> LocalWinds {
+        let pose = frame.now();
+        let [moving, turning] = frame.inertia().to_array();
         let blowers = (self.blowers.iter())
             .map(|(blower, at)| (blower.clamped(), at.now()))
             .filter(|(blower, _)| blower.strength > 0.0)
@@ -68,25 +89,28 @@ impl Winds<'_, '_> {
                 aim: pose.direction_in(at.direction_out(Vec3::NEG_Z)),
                 blower,
             });
-        let zones = self.zones.iter().map(|(zone, at)| {
-            let at = at.now();
+        let zones = self.zones.iter().map(|(zone, frame)| {
+            let at = frame.now();
             LocalZone {
                 zone: zone.clamped(),
+                velocity: pose.direction_in(frame.velocity() * moving),
+                spin: pose.rotation.inverse() * frame.spin() * (turning * pose.size()),
                 rotation: at.rotation.inverse() * pose.rotation,
                 origin: pose.point_in(at.translation),
                 scale: pose.scale / at.scale,
             }
         });
         let settings = self.wind();
-        let seconds =
-            self.time.elapsed_secs_f64() + f64::from(self.step.dt) * f64::from(self.step.index);
+        let travelled = self.travel.as_ref().map_or(DVec3::ZERO, |travel| travel.0);
+        let seconds = f64::from(self.step.dt) * f64::from(self.step.index);
         LocalWinds {
             blowers: blowers.collect(),
             zones: zones.collect(),
             wind: pose.direction_in(settings.velocity),
             settings,
-            travelled: settings.velocity.as_dvec3() * seconds,
+            travelled: travelled + settings.velocity.as_dvec3() * seconds,
             pose: *pose,
+            headwind: pose.direction_in(frame.velocity() * moving) * (pose.size().recip() - 1.0),
         }
     }
 }
@@ -131,19 +155,29 @@ impl LocalWinds {
     /// Adds the zones' air at a point and the part of the global `wind` that they let through.
     fn add_flow(&self, air: &mut Blown, wind: Vec3, p: Vec3) {
         let (mut open, mut flow) = (1.0, Vec3::ZERO);
-        for LocalZone { zone, rotation, origin, scale } in &self.zones {
+        // The air of shelters that move, by how much each shelters.
+        let (mut carried, mut shelters) = (Vec3::ZERO, 0.0);
+        let (mut own_motion, mut unsheltered) = (Vec3::ZERO, 0.0);
+        for LocalZone { zone, velocity, spin, rotation, origin, scale } in &self.zones {
             let place = *rotation * (p - *origin) * *scale;
             let share = zone.weight(place);
             if share <= 0.0 {
                 continue;
             }
-            open *= 1.0 - zone.shelter * share;
+            let motion = *velocity + spin.cross(p - *origin);
+            let shelter = zone.shelter * share;
+            open *= 1.0 - shelter;
+            (carried, shelters) = (carried + motion * shelter, shelters + shelter);
+            own_motion += motion * (share - shelter);
             let own = zone.velocity + place.normalize_or_zero() * zone.outward;
             flow += rotation.inverse() * own * (share * scale.signum());
+            unsheltered += share - shelter;
             air.add_warmth(zone.warmth * share);
             air.drying += zone.drying * share;
         }
-        air.flow = wind * open + flow;
+        let carried = carried * ((1.0 - open) / shelters.max(f32::MIN_POSITIVE));
+        // A fan in a car moves with the car's air.
+        air.flow = wind * open + flow + carried + (own_motion - carried * unsheltered);
         air.velocity += air.flow;
     }
 

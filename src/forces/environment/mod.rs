@@ -13,6 +13,7 @@ mod zone;
 pub(crate) use blown::Blown;
 pub use blown::BlownAir;
 pub use climate::HairClimate;
+pub use local::WindTravel;
 pub(crate) use local::{LocalWinds, Winds};
 pub use systems::EnvironmentPlugin;
 pub use zone::{HairWind, WindZone, ZoneShape};

@@ -4,18 +4,18 @@ use super::{
     AirDrag, Blower, Gravity, HairClimate, HairGravity, HairWind, WindReceived, WindZone,
     ZoneShape,
     blown::BlownAir,
-    local::{LocalWinds, Winds},
+    local::{LocalWinds, WindTravel, Winds, travel},
     vapour::DryingAir,
 };
 use crate::{
     base::{
         parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
-        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick},
+        schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, first_substep},
         setting::{self, Ranged, Settings},
     },
     hair::strand::{
-        AddedMass, FollowsHere, Hair, PerHair, SimulatedHere, Strand, StrandOf, StrandSleep,
-        TickPose, keep_required, lacks_strands,
+        AddedMass, FollowsHere, Hair, PerHair, ShiftWorld, SimulatedHere, Strand, StrandOf,
+        StrandSleep, TickPose, keep_required, lacks_strands,
     },
     keratin::bond::{BondChanges, BondKind},
 };
@@ -50,6 +50,18 @@ impl Plugin for EnvironmentPlugin {
             .add_systems(
                 HairTick,
                 update_drying_air.in_set(HairSystems::Air).run_if(resource_changed::<HairClimate>),
+            )
+            .init_resource::<WindTravel>()
+            .register_type::<WindTravel>()
+            .add_observer(|shift: On<ShiftWorld>, mut travel: ResMut<WindTravel>| {
+                travel.0 += shift.by.as_dvec3();
+            })
+            .add_systems(
+                HairTick,
+                travel
+                    .in_set(HairSystems::Roots)
+                    .before(HairSystems::StrandHistory)
+                    .run_if(first_substep),
             )
             .add_systems(HairTick, apply_air.in_set(HairSystems::Air))
             .add_systems(SettleTick, apply_air.in_set(HairSystems::Air));
@@ -103,13 +115,13 @@ fn apply_air(
     }
     let gravity = gravity.clamped().0;
     let air_of = |hair: Entity| {
-        let pose = hairs.get(hair).ok()?.now();
+        let frame = hairs.get(hair).ok()?;
         let dt = steps.of(hair)?.dt;
         Some(LocalAir {
-            gravity: pose.direction_in(gravity) * dt,
+            gravity: frame.now().direction_in(gravity) * dt,
             retained: bevy::math::ops::exp(-drag.of(hair).rate * dt),
             dt,
-            winds: winds.seen_from(pose),
+            winds: winds.seen_from(frame),
         })
     };
     // Wind also dries followers.
@@ -151,15 +163,17 @@ fn blow(
     let (length, winds) = (strand.length(), &air.winds);
     let (positions, velocities, _, spins) = strand.parts_mut();
     let under = &added_mass.in_water;
+    let headwind = winds.headwind * (1.0 - air.retained);
     if under.is_empty() {
         for v in velocities.iter_mut() {
-            *v = *v * air.retained + air.gravity;
+            *v = *v * air.retained + air.gravity + headwind;
         }
     } else {
         for (i, v) in velocities.iter_mut().enumerate() {
             let water = under.get(i).copied().unwrap_or_default();
-            let retained = 1.0 - (1.0 - air.retained) * (1.0 - water.share);
-            *v = *v * retained + air.gravity * water.gravity;
+            let open = 1.0 - water.share;
+            let retained = 1.0 - (1.0 - air.retained) * open;
+            *v = *v * retained + air.gravity * water.gravity + headwind * open;
         }
     }
     // Edges have rotary inertia of their own, large on fine stiff strands: drag on the nodes alone
@@ -183,7 +197,9 @@ fn blow(
         // The tip has no edge of its own: it uses the last one's wind.
         let e = i.min(edges - 1);
         let edge = positions[e + 1] - positions[e];
-        let blown = winds.at(wind, zones, positions[i], edge);
+        let mut blown = winds.at(wind, zones, positions[i], edge);
+        // What dries is the air that passes over the hair.
+        blown.velocity += winds.headwind - *velocity;
         let wind = blown.acceleration * (air.dt * response(i)) + blown.flow * relaxation;
         *velocity += if under.is_empty() { wind } else { wind * open(i) };
         // On wet hair the wind dries the water, and the bonds follow that.

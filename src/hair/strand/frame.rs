@@ -7,14 +7,14 @@
 //! points at rest in the world move the opposite way: each substep the nodes are moved by the
 //! inverse of the frame's motion, which is exactly inertia.
 
-use crate::base::setting::setting;
+use crate::base::{motion::TickMoment, setting::setting};
 use bevy::{
     math::{Affine3A, Isometry3d},
     prelude::*,
 };
 
 /// The pose of an entity within the tick, interpolated over its substeps. Written by `Roots` from
-/// the entity's global transform.
+/// where the entity is at the end of the tick.
 #[derive(Component, Reflect, Clone, Debug)]
 #[reflect(Component, Default, Clone)]
 pub struct TickPose {
@@ -29,55 +29,67 @@ pub struct TickPose {
     /// The shares of the frame's translation and rotation that act on its hair as inertia.
     inertia: Vec2,
     jumps: bool,
-    /// Whether this tick is one of a teleport.
-    jumped: bool,
     was_invalid: bool,
-    frames: FramePoses,
+    /// How long the tick is (s).
+    seconds: f32,
+    /// Its motion in the last tick, jumps left out, and as the transforms had it.
+    motion: [PoseMotion; 2],
+    /// The last tick that it was in.
+    tick: u64,
+    /// The frame in which it jumped last.
+    jump_frame: u64,
+    /// Whether its strands rest on the head in this tick, whatever they did before.
+    settles: bool,
+    /// Whether its motion is known only in the next tick: it has just come back.
+    came_back: bool,
+    /// Whether its hair waits: it is scaled down to be hidden.
+    waits: bool,
+    /// Its largest size so far.
+    full_size: f32,
 }
 
-/// The poses of an entity in the last frames. Frames and ticks are not synchronous: a head that
-/// turns evenly from frame to frame would turn by two frames' worth in one tick and by three in the
-/// next, and its hair would stutter. So ticks use the pose one frame ago by their own clock,
-/// interpolated between the last two frames. An entity that was moved within a tick is used where
-/// it is.
-#[derive(Reflect, Clone, Debug, Default)]
-#[reflect(Default, Clone)]
-struct FramePoses {
-    /// The last two frames' poses with their times (s), the newer one second.
-    last: [Option<(f64, Pose)>; 2],
-    /// The pose used by the last tick.
-    seen: Option<Pose>,
-    /// Whether the last change came from within the ticks.
-    moved_by_ticks: bool,
+/// How a pose moves: velocity (m/s) and spin (rad/s), in the world and along its own axes.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+struct PoseMotion {
+    velocity: [Vec3; 2],
+    spin: [Vec3; 2],
 }
 
-impl FramePoses {
-    fn are_valid(&self) -> bool {
-        let last = self.last.iter().flatten();
-        last.clone().all(|(seconds, _)| seconds.is_finite())
-            && last.map(|(_, pose)| pose).chain(&self.seen).all(Pose::is_rigid)
+impl PoseMotion {
+    fn between(from: &Pose, to: &Pose, seconds: f32) -> Self {
+        if from == to || seconds <= 0.0 {
+            return Self::default();
+        }
+        let turn = to.rotation * from.rotation.inverse();
+        let turn = if turn.w < 0.0 { -turn } else { turn };
+        let velocity = (to.translation - from.translation) / seconds;
+        let spin = turn.to_scaled_axis() / seconds;
+        let own = to.rotation.inverse();
+        Self { velocity: [velocity, own * velocity], spin: [spin, own * spin] }
     }
 
-    fn record(&mut self, seconds: f64, pose: Pose) {
-        if self.seen.is_some_and(|seen| seen != pose) {
-            self.moved_by_ticks = false;
-        }
-        self.seen = Some(pose);
-        self.last = [self.last[1], Some((seconds, pose))];
+    /// Whether this motion explains another: it goes on in the world, or turned with the pose.
+    fn explains(&self, other: &Self, size: f32, limits: &HairInertia) -> bool {
+        let near = |a: &[Vec3; 2], b: &[Vec3; 2], most: f32| {
+            a.iter().zip(b).any(|(a, b)| a.distance(*b) <= most)
+        };
+        near(&self.velocity, &other.velocity, limits.teleport_speed * size)
+            && near(&self.spin, &other.spin, limits.teleport_spin)
     }
 
-    fn at(&mut self, seconds: f64, present: Pose) -> Pose {
-        self.moved_by_ticks |= self.seen.is_some_and(|seen| seen != present);
-        self.seen = Some(present);
-        match self.last {
-            // At rest the pose has to stay the same to the last bit.
-            [Some((t0, before)), Some((t1, after))]
-                if t0 < t1 && before != after && !self.moved_by_ticks =>
-            {
-                before.toward(&after, ((seconds - t0) / (t1 - t0)).clamp(0.0, 1.0) as f32)
-            }
-            _ => present,
+    /// Where a pose that moves like this, along its own axes, was some seconds ago.
+    fn carried_back(&self, to: &Pose, seconds: f32) -> Pose {
+        let [velocity, spin] = [self.velocity[1], self.spin[1]].map(|own| to.rotation * own);
+        Pose {
+            translation: to.translation - velocity * seconds,
+            rotation: (Quat::from_scaled_axis(-spin * seconds) * to.rotation).normalize(),
+            scale: to.scale,
         }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.velocity.iter().chain(&self.spin).all(|v| v.is_finite())
     }
 }
 
@@ -92,11 +104,47 @@ impl Default for TickPose {
             shares: [0.0; 2],
             inertia: Vec2::ONE,
             jumps: false,
-            jumped: false,
             was_invalid: false,
-            frames: FramePoses::default(),
+            seconds: 0.0,
+            motion: [PoseMotion::default(); 2],
+            tick: 0,
+            jump_frame: 0,
+            settles: false,
+            came_back: false,
+            waits: false,
+            full_size: 0.0,
         }
     }
+}
+
+/// Where a pose is in a tick.
+pub(super) struct Aim<'a> {
+    pub(super) tick: TickMoment,
+    /// Where it is at the end of the tick; `None` where its transform is not valid.
+    pub(super) end: Option<Pose>,
+    /// Whether it was moved while time stood still.
+    pub(super) was_put: bool,
+    pub(super) limits: HairInertia,
+    /// Whether what moves like it jumps.
+    pub(super) along: Option<bool>,
+    /// Where it was at the tick's beginning, by its motion in the frame.
+    pub(super) begin: &'a mut dyn FnMut() -> Option<Pose>,
+    /// Where it is at the end of the frame; `None` if ticks move it.
+    pub(super) frame_end: &'a mut dyn FnMut() -> Option<Pose>,
+}
+
+/// What a tick's motion means for the hair of a pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Aimed {
+    /// Whether an invalid pose should be reported.
+    pub(super) report: bool,
+    /// Whether it jumps.
+    pub(super) jumps: bool,
+    /// Its strands come to rest on the head.
+    pub(super) settles: bool,
+    /// What is added to the velocities of its strands, so that they stay what they are seen from the
+    /// head: a velocity and a spin in the hair's frame.
+    pub(super) change: Option<[Vec3; 2]>,
 }
 
 setting! {
@@ -120,29 +168,18 @@ setting! {
         pub moving: f32 = 1.0, in MOVING: 0.0..=1.0, "1 is as in nature";
         /// The same for the head's rotation.
         pub turning: f32 = 1.0, in TURNING: 0.0..=1.0, "1 is as in nature";
-        /// A head that moves farther than this within one tick, and farther than
-        /// [`teleport_lengths`](Self::teleport_lengths), counts as teleported: its hair moves with it
-        /// in its present shape, at rest. In the hair's own scale; 0.5 is 30 m/s at 60 Hz.
-        pub teleport_distance: f32 = 0.5, "m" in TELEPORT_DISTANCE: 0.0..=f32::INFINITY,
-            safe 0.1..=f32::INFINITY, "0.5 suits games";
-        /// The same in lengths of its longest strand: long hair can follow motion that short hair
-        /// cannot. Colliders, rods and blowers that move like some hair teleport when that does.
-        pub teleport_lengths: f32 = 3.0, in TELEPORT_LENGTHS: 0.0..=f32::INFINITY,
-            safe 1.0..=10.0, "3 is a fast whip of the head";
-        /// The same for a head that turns by more than this. 1.6 is more than 5000° a second at
-        /// 60 Hz; π and above never happen.
-        pub teleport_angle: f32 = 1.6, "rad" in TELEPORT_ANGLE: 0.0..=f32::INFINITY,
-            "1.6 suits games";
-    }
-}
-
-impl HairInertia {
-    /// Whether a change from one pose to another within a tick counts as a teleport.
-    fn is_jump(&self, from: &Pose, to: &Pose, longest: impl FnOnce() -> f32) -> bool {
-        let distance = to.translation.distance(from.translation) / to.size().max(from.size());
-        to.scale * from.scale < 0.0
-            || distance > self.teleport_distance && distance > self.teleport_lengths * longest()
-            || to.rotation.angle_between(from.rotation) > self.teleport_angle
+        /// A head whose velocity changes by more than this within a tick, or a frame that moves it, has
+        /// jumped: a portal, a respawn. Its hair keeps its shape and its motion as seen from the head.
+        /// In the hair's own scale, at any tick rate.
+        pub teleport_speed: f32 = 25.0, "m/s" in TELEPORT_SPEED: 0.0..=f32::INFINITY,
+            safe 5.0..=f32::INFINITY, "25 is more than a character turns about by at a run";
+        /// The same for its angular velocity.
+        pub teleport_spin: f32 = 40.0, "rad/s" in TELEPORT_SPIN: 0.0..=f32::INFINITY,
+            safe 10.0..=f32::INFINITY, "40 is a pirouette that turns about";
+        /// A head that is scaled to less than this share of its largest scale is hidden, as games hide it
+        /// in first person: its hair waits, costs nothing, and comes back at rest in the shape it had. 0
+        /// never waits.
+        pub hidden_scale: f32 = 0.15, in HIDDEN_SCALE: 0.0..=1.0, "0.15 hides heads of a tenth";
     }
 }
 
@@ -283,49 +320,96 @@ impl TickPose {
         self.jumps = true;
     }
 
-    /// Begins a tick in which the frame moves from its previous pose to `to`; it starts at `to` the
-    /// first time and on a teleport, which depends on the `longest` strand (m). Returns whether it
-    /// was a teleport, and whether an invalid pose should be reported.
-    pub(super) fn aim(
-        &mut self,
-        to: Option<Pose>,
-        seconds: f64,
-        inertia: &HairInertia,
-        longest: impl FnOnce() -> f32,
-    ) -> (bool, bool) {
-        let report = to.is_none() && !self.was_invalid;
-        self.was_invalid = to.is_none();
+    /// Begins a tick: from where it was to where it is at its end, with what it carries along.
+    pub(super) fn aim(&mut self, aim: Aim<'_>) -> Aimed {
+        let Aim { tick, end, was_put, limits, along, begin, frame_end } = aim;
+        let report = end.is_none() && !self.was_invalid;
+        self.was_invalid = end.is_none();
         // Written from outside, for instance by an inspector: start over.
         let known = [self.to, self.now, self.before, self.from.unwrap_or_default()];
-        if !known.iter().all(Pose::is_rigid) || !self.frames.are_valid() {
+        if !known.iter().all(Pose::is_rigid) || !self.motion.iter().all(PoseMotion::is_finite) {
             *self = Self { jumps: self.jumps, was_invalid: self.was_invalid, ..default() };
         }
-        self.inertia = Vec2::new(inertia.moving, inertia.turning);
-        let first = self.from.is_none();
+        self.inertia = Vec2::new(limits.moving, limits.turning);
+        (self.seconds, self.shares, self.settles) = (tick.seconds, [0.0; 2], false);
+        let was_away = core::mem::replace(&mut self.tick, tick.number) + 1 != tick.number
+            || core::mem::take(&mut self.waits);
         let requested = core::mem::take(&mut self.jumps);
-        let put =
-            !first && to.is_some_and(|to| requested || inertia.is_jump(&self.to, &to, longest));
-        let to = to.map(|present| {
-            if put {
-                self.frames = FramePoses::default();
-            }
-            self.frames.at(seconds, present)
-        });
-        let from = if first || put { to } else { Some(self.to) };
-        self.to = to.unwrap_or(self.to);
-        if first || put {
-            self.now = self.to;
+        let Some(mut to) = end else {
+            self.from = self.from.map(|_| self.to);
+            return Aimed { report, ..default() };
+        };
+        self.full_size = self.full_size.max(to.size());
+        self.waits = to.size() < limits.hidden_scale * self.full_size;
+        if self.from.is_none() || self.waits {
+            (self.from, self.to, self.now, self.before) = (Some(to), to, to, to);
+            return Aimed { report, ..default() };
         }
-        self.from = from;
-        self.shares[1] = 0.0;
-        self.jumped = put;
-        (put, report)
+        let (mut from, [kept, seen]) = (self.to, self.motion);
+        if was_away || was_put || !tick.continues {
+            from = Pose { scale: to.scale, ..begin().unwrap_or(to) };
+        }
+        let mut motion = PoseMotion::between(&from, &to, tick.seconds);
+        let size = to.size().max(from.size());
+        let is_explained = kept.explains(&motion, size, &limits);
+        // As from a gun: it has moved like this in the tick before.
+        let is_launched = !is_explained && seen.explains(&motion, size, &limits);
+        self.motion[1] = motion;
+        let has_jumped = self.jump_frame == tick.frame && tick.frame > 0;
+        let jumps = !was_away
+            && (has_jumped
+                || requested
+                || to.scale * from.scale < 0.0
+                || along.unwrap_or(!is_explained && !is_launched));
+        if jumps {
+            // It moves on as before, to where it is now.
+            let frame_end = frame_end();
+            if let Some(end) = frame_end {
+                self.jump_frame = tick.frame;
+                to = kept.carried_back(&end, tick.rest);
+            }
+            if !has_jumped || frame_end.is_none() {
+                from = kept.carried_back(&to, tick.seconds);
+            }
+            motion = kept;
+        }
+        let came_back = core::mem::take(&mut self.came_back);
+        // What has come back is not seen to move before the next tick.
+        self.came_back = was_away && motion == PoseMotion::default();
+        self.settles = was_away;
+        // The tick itself turns velocities from its beginning to its end.
+        let own = |v: Vec3| from.rotation.inverse() * v;
+        let velocities = if came_back || was_away || !jumps && (was_put || is_launched) {
+            let before = if was_away { PoseMotion::default() } else { kept };
+            Some([
+                (own(motion.velocity[0]), before.velocity[1]),
+                (own(motion.spin[0]), before.spin[1]),
+            ])
+        } else {
+            // Time is missing in which the head has turned: it is felt to speed up, not to turn.
+            (!tick.continues && !jumps).then(|| {
+                let turned = |[world, before]: [Vec3; 2]| (own(world), before);
+                [turned(kept.velocity), turned(kept.spin)]
+            })
+        };
+        let change = velocities.map(|[(velocity, before), (spin, spun)]| {
+            [(velocity - before) * self.inertia.x / to.scale, (spin - spun) * self.inertia.y]
+        });
+        let change = change.filter(|change| *change != [Vec3::ZERO; 2]);
+        (self.from, self.to, self.motion[0]) = (Some(from), to, motion);
+        self.now = from;
+        Aimed { report, jumps, settles: was_away, change }
     }
 
-    /// Whether it was teleported at the beginning of this tick.
+    /// Whether its hair waits for it to be shown again.
+    pub(crate) fn waits(&self) -> bool {
+        self.waits
+    }
+
+    /// Whether its strands were put to rest at the beginning of this tick.
     #[cfg(feature = "gpu")]
-    pub(crate) fn has_jumped(&self) -> bool {
-        self.jumped
+    pub(crate) fn settles(&self) -> bool {
+        self.settles
     }
 
     /// The displacement of the entity in this tick (m).
@@ -333,12 +417,37 @@ impl TickPose {
         to.translation - self.to.translation
     }
 
-    /// Records the entity's pose at the start of a frame; `seconds` is the time of the previous
-    /// frame.
-    pub(super) fn record(&mut self, seconds: f64, pose: Option<Pose>) {
-        if let Some(pose) = pose {
-            self.frames.record(seconds, pose);
+    /// Shifts it with the world.
+    pub(crate) fn shift(&mut self, by: Vec3) {
+        let poses = [&mut self.to, &mut self.now, &mut self.before];
+        for pose in poses.into_iter().chain(&mut self.from) {
+            pose.translation += by;
         }
+    }
+
+    fn motion(&self) -> PoseMotion {
+        PoseMotion::between(&self.from.unwrap_or(self.to), &self.to, self.seconds)
+    }
+
+    /// Its velocity in this tick, in the world (m/s); jumps left out.
+    pub fn velocity(&self) -> Vec3 {
+        self.motion().velocity[0]
+    }
+
+    /// Its angular velocity in this tick, in the world (rad/s); jumps left out.
+    pub fn spin(&self) -> Vec3 {
+        self.motion().spin[0]
+    }
+
+    /// The velocity of a point of the world that moves along with it (m/s).
+    pub fn velocity_at(&self, place: Vec3) -> Vec3 {
+        let PoseMotion { velocity, spin } = self.motion();
+        velocity[0] + spin[0].cross(place - self.now.translation)
+    }
+
+    /// The shares of its translation and rotation that act on its hair.
+    pub(crate) fn inertia(&self) -> Vec2 {
+        self.inertia
     }
 
     /// Advances to the share `t` of the tick's motion; the substep continues while a hair `waits`
@@ -380,26 +489,19 @@ impl TickPose {
 mod tests {
     use super::*;
 
-    #[test]
-    fn ticks_interpolate_frames_and_take_their_own_writes_as_they_are() {
-        let at = |x: f32| Pose { translation: Vec3::X * x, ..default() };
-        let mut frames = FramePoses::default();
-        assert_eq!(frames.at(0.0, at(1.0)), at(1.0), "nothing is known yet");
-        frames.record(1.0, at(1.0));
-        frames.record(2.0, at(2.0));
-        assert_eq!(frames.at(1.25, at(2.0)), at(1.25));
-        assert_eq!(frames.at(9.0, at(2.0)), at(2.0), "no extrapolation");
-        // A tick moves it: it is where the tick put it, also after it stopped there.
-        assert_eq!(frames.at(2.5, at(2.5)), at(2.5));
-        frames.record(3.0, at(2.5));
-        assert_eq!(frames.at(2.5, at(2.5)), at(2.5));
-        // A frame moves it again.
-        frames.record(4.0, at(4.0));
-        assert_eq!(frames.at(3.5, at(4.0)), at(3.25));
-        let turned = Pose { rotation: Quat::from_rotation_y(0.3), ..at(4.0) };
-        frames.record(5.0, turned);
-        frames.record(6.0, turned);
-        assert_eq!(frames.at(5.3, turned), turned, "bit for bit");
+    /// Aims at a pose in the next tick, of 1/60 s, as something that ticks move.
+    fn aim(frame: &mut TickPose, end: Option<Pose>, limits: HairInertia) -> Aimed {
+        let tick =
+            TickMoment { number: frame.tick + 1, seconds: 1.0 / 60.0, ..TickMoment::default() };
+        frame.aim(Aim {
+            tick,
+            end,
+            was_put: false,
+            limits,
+            along: None,
+            begin: &mut || end,
+            frame_end: &mut || None,
+        })
     }
 
     #[test]
@@ -415,11 +517,15 @@ mod tests {
             scale: 2.0,
         };
         let mut frame = TickPose::default();
-        let inertia = HairInertia { teleport_distance: 10.0, ..default() };
-        assert_eq!(frame.aim(Some(a), 0.0, &inertia, || 0.0), (false, false));
+        let inertia = HairInertia {
+            teleport_speed: f32::INFINITY,
+            teleport_spin: f32::INFINITY,
+            ..default()
+        };
+        assert_eq!(aim(&mut frame, Some(a), inertia), Aimed::default());
         frame.advance(1.0, false);
         assert!(frame.frame_delta().is_none(), "the first tick begins where the frame is");
-        frame.aim(Some(b), 0.0, &inertia, || 0.0);
+        aim(&mut frame, Some(b), inertia);
         let world = Vec3::new(0.2, 0.4, -0.3);
         let mut local = a.point_in(world);
         for i in 1..=6 {
@@ -429,13 +535,9 @@ mod tests {
         assert!(b.point_out(local).distance(world) < 1e-5);
         // Back again, two substeps as one; what moves along is seen to move as far.
         let mut beside = frame.clone();
-        frame.aim(Some(a), 0.0, &inertia, || 0.0);
-        beside.aim(
-            Some(Pose { translation: b.translation + Vec3::X * 0.6, ..b }),
-            0.0,
-            &inertia,
-            || 0.0,
-        );
+        aim(&mut frame, Some(a), inertia);
+        let pushed = Pose { translation: b.translation + Vec3::X * 0.6, ..b };
+        aim(&mut beside, Some(pushed), inertia);
         for i in 1..=6 {
             frame.advance(i as f32 / 6.0, i % 2 == 0);
             beside.advance(i as f32 / 6.0, false);
@@ -448,12 +550,49 @@ mod tests {
             }
         }
         assert!(a.point_out(local).distance(world) < 1e-5);
-        frame.aim(Some(b), 0.0, &inertia, || 0.0);
+        aim(&mut frame, Some(b), inertia);
         frame.advance(1.0, false);
-        let mut reports = || frame.aim(None, 0.0, &inertia, || 0.0).1;
+        let mut reports = || aim(&mut frame, None, inertia).report;
         assert!(reports() && !reports(), "reported once");
         frame.advance(1.0, false);
         assert_eq!(*frame.now(), b);
+    }
+
+    #[test]
+    fn a_change_of_speed_that_nothing_explains_is_a_jump_at_any_rate_of_ticks() {
+        let at = |x: f32| Some(Pose { translation: Vec3::X * x, ..default() });
+        let limits = HairInertia::default();
+        for hertz in [10.0, 60.0, 240.0] {
+            // Starts at `speed`, keeps it, and is put 64 m away on the way.
+            for (speed, starts_with_a_jump) in [(20.0, false), (30.0, true)] {
+                let mut frame = TickPose::default();
+                let (mut x, mut jumps) = (0.0, Vec::new());
+                for tick in 0..6 {
+                    x += if tick > 0 { speed / hertz } else { 0.0 };
+                    x += if tick == 4 { 64.0 } else { 0.0 };
+                    let moment = TickMoment {
+                        number: frame.tick + 1,
+                        seconds: 1.0 / hertz,
+                        ..TickMoment::default()
+                    };
+                    let aimed = frame.aim(Aim {
+                        tick: moment,
+                        end: at(x),
+                        was_put: false,
+                        limits,
+                        along: None,
+                        begin: &mut || at(x),
+                        frame_end: &mut || None,
+                    });
+                    jumps.push(aimed.jumps);
+                    frame.advance(1.0, false);
+                }
+                let expected = [false, starts_with_a_jump, false, false, true, false];
+                assert_eq!(jumps, expected, "{hertz} Hz, {speed} m/s");
+                let moved = frame.frame_delta().unwrap().translation.x * hertz;
+                assert!((moved + speed).abs() < 0.05, "{hertz} Hz: goes on at {moved} m/s");
+            }
+        }
     }
 
     #[test]
@@ -466,14 +605,14 @@ mod tests {
             |pose, broken| pose.now = broken,
             |pose, _| pose.before.rotation = Quat::from_array([0.0; 4]),
             |pose, broken| pose.from = Some(Pose { translation: Vec3::NAN, ..broken }),
-            |pose, broken| pose.frames.last = [Some((f64::NAN, broken)), Some((1.0, broken))],
+            |pose, _| pose.motion[0].velocity[1].x = f32::NAN,
         ];
         for spoil in spoils {
             let mut pose = TickPose::default();
-            pose.aim(Some(a), 0.0, &HairInertia::default(), || 0.0);
+            aim(&mut pose, Some(a), HairInertia::default());
             pose.advance(1.0, false);
             spoil(&mut pose, broken);
-            pose.aim(Some(a), 0.0, &HairInertia::default(), || 0.0);
+            aim(&mut pose, Some(a), HairInertia::default());
             pose.advance(1.0, false);
             assert_eq!((pose.now, pose.before), (a, a));
         }
@@ -486,7 +625,7 @@ mod tests {
             let at = Pose { translation: Vec3::new(far, -far, 0.3 * far), rotation, scale: 1.1 };
             let mut pose = TickPose::default();
             for _ in 0..3 {
-                pose.aim(Some(at), 0.0, &HairInertia::default(), || 0.0);
+                aim(&mut pose, Some(at), HairInertia::default());
                 for i in 1..=7 {
                     pose.advance(i as f32 / 7.0, false);
                     assert!(pose.frame_delta().is_none(), "{far}");

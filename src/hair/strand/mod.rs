@@ -38,6 +38,7 @@ pub(crate) use strand_sleep::KinematicStrand;
 pub use strand_sleep::{SleepCounts, SleepPose, StrandSleep};
 pub use systems::StrandPlugin;
 pub(crate) use systems::lacks_strands;
+pub use teleport::ShiftWorld;
 
 use crate::{
     base::{
@@ -380,6 +381,14 @@ impl Strand {
         self.velocities.fill(Vec3::ZERO);
         self.angular_velocities.fill(Vec3::ZERO);
         self.tensions.fill(0.0);
+    }
+
+    /// Adds a rigid motion: a velocity (m/s) at the origin, and a spin (rad/s).
+    pub(crate) fn add_motion(&mut self, velocity: Vec3, spin: Vec3) {
+        for (v, p) in self.velocities.iter_mut().zip(&self.positions) {
+            *v += velocity + spin.cross(*p);
+        }
+        self.angular_velocities.iter_mut().for_each(|v| *v += spin);
     }
 
     /// Sets the strand to the shape given by a Darboux vector per joint, at rest, from its root on.

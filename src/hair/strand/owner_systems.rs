@@ -1,6 +1,6 @@
 //! Who moves a hair is written down here alone, and asked for by these filters.
 
-use super::{Hair, KinematicStrand, MotionOwner, OnGpu, Settling, SleepCounts, Strands};
+use super::{Hair, KinematicStrand, MotionOwner, OnGpu, Settling, SleepCounts, Strands, TickPose};
 use bevy::prelude::*;
 
 /// Filters of hair whose state is here, and of hair whose state is on the GPU.
@@ -29,12 +29,13 @@ type Facts = (
     Has<Settling>,
     Option<&'static SleepCounts>,
     Option<&'static Strands>,
+    &'static TickPose,
 );
 
 /// Once a tick, after sleep has been decided.
 pub(super) fn update_owners(mut hairs: Query<Facts, With<Hair>>) {
-    for (mut owner, on_gpu, settles, sleepers, members) in &mut hairs {
-        let rests = sleepers.is_some_and(|s| s.awake == 0 && members.is_some());
+    for (mut owner, on_gpu, settles, sleepers, members, pose) in &mut hairs {
+        let rests = pose.waits() || sleepers.is_some_and(|s| s.awake == 0 && members.is_some());
         let sleeps = sleepers.is_some_and(SleepCounts::all);
         owner.set_if_neq(match (on_gpu, settles) {
             (true, _) if sleeps => MotionOwner::AsleepOnGpu,

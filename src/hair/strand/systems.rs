@@ -4,16 +4,18 @@ use super::{
     AddedMass, Hair, HeldNodes, HeldNodesState, Here, KinematicStrand, MotionOwner, PerHair,
     Regroomed, Settling, SimulatedHere, SleepCounts, SleepPose, Strand, StrandError, StrandHistory,
     StrandModel, StrandOf, StrandSleep, Strands, TickPose,
-    frame::{HairInertia, Pose},
+    frame::{Aim, HairInertia, Pose},
     held::report_out_of_reach,
     keep_required,
     owner_systems::{begin_settling, end_settling, update_owners},
+    teleport::shift_poses,
 };
 use crate::base::{
     fault::{FaultKind, HairChecks, HairFault},
+    motion::TickTransforms,
     parallel::{Nanos, for_each_part, tables},
     schedule::{
-        EffectiveSubsteps, HairFrame, HairStep, HairSystems, HairTick, MergedSubsteps, TickPlugin,
+        EffectiveSubsteps, HairStep, HairSystems, HairTick, MergedSubsteps, TickPlugin,
         first_substep, lacks,
     },
     setting::{self, Settings},
@@ -63,10 +65,10 @@ impl Plugin for StrandPlugin {
             .register_type::<SleepPose>()
             .register_type::<MotionOwner>()
             .register_type::<Settling>()
+            .add_observer(shift_poses)
             .add_observer(begin_settling)
             .add_observer(end_settling)
             .add_systems(HairChecks, report_unusable)
-            .add_systems(HairFrame, record_frame)
             .add_systems(
                 HairTick,
                 (
@@ -190,66 +192,59 @@ fn store_history(
     );
 }
 
-/// At the start of a frame: records the poses at the end of the previous frame.
-fn record_frame(
-    time: Res<Time<Virtual>>,
-    transforms: TransformHelper,
-    mut poses: Query<(Entity, &mut TickPose)>,
-) {
-    let seconds = time.elapsed_secs_f64() - time.delta_secs_f64();
-    for (entity, mut frame) in &mut poses {
-        let pose = transforms.compute_global_transform(entity).ok();
-        frame.bypass_change_detection().record(seconds, pose.as_ref().and_then(Pose::of));
-    }
-}
-
-/// At the start of a tick: sets the target of each pose. Hair that teleports comes to rest.
+/// At the start of a tick: sets the target of each pose. Hair that has come back rests on its head.
 fn aim_poses(
-    (time, frames): (Res<Time>, Res<Time<Virtual>>),
-    transforms: TransformHelper,
+    mut transforms: TickTransforms,
     inertia: Settings<HairInertia>,
     mut poses: Query<(Entity, &mut TickPose, Option<&Strands>)>,
-    mut strands: Query<&mut Strand>,
+    mut strands: Query<&mut Strand, Here>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    let seconds = time.elapsed_secs_f64() - frames.delta_secs_f64();
-    // Displacement of each hair that moves, and whether it teleports. Colliders and tools that move
-    // the same displacement teleport with it.
+    let tick = transforms.tick();
+    let pose_of = |place: Option<GlobalTransform>| place.as_ref().and_then(Pose::of);
+    // Displacement of each hair that moves, and whether it jumps. Colliders and tools that move
+    // the same displacement jump with it.
     let mut displacements: Vec<(Vec3, bool)> = Vec::new();
     for others in [false, true] {
         for (entity, mut frame, members) in &mut poses {
             if members.is_none() != others {
                 continue;
             }
-            // With MinimalPlugins nothing propagates transforms, so the helper computes them.
-            let pose = transforms.compute_global_transform(entity).ok();
-            let pose = pose.as_ref().and_then(Pose::of);
-            let displacement = pose.map_or(Vec3::ZERO, |pose| frame.displacement_to(&pose));
-            let alike = |with: &Vec3| displacement.distance(*with) < 0.1 * displacement.length();
-            let longest = || match members {
-                Some(members) => {
-                    let theirs = strands.iter_many(members.collection());
-                    theirs.map(|strand| strand.length()).fold(0.0, f32::max)
-                }
-                None if displacements.iter().any(|(with, put)| !put && alike(with)) => {
-                    f32::INFINITY
-                }
-                None => 0.0,
-            };
-            let (put, report) = frame.aim(pose, seconds, &inertia.of(entity), longest);
-            if report {
+            let end = pose_of(transforms.end(entity));
+            let displacement = end.map_or(Vec3::ZERO, |end| frame.displacement_to(&end));
+            let alike = |with: Vec3| displacement.distance(with) < 0.1 * displacement.length();
+            let mut like = displacements.iter().filter(|(with, _)| others && alike(*with));
+            let along = like.next().map(|first| first.1 && like.all(|(_, jumps)| *jumps));
+            let was_put = transforms.was_put(entity);
+            let transforms = core::cell::RefCell::new(&mut transforms);
+            let aimed = frame.aim(Aim {
+                tick,
+                end,
+                was_put,
+                limits: inertia.of(entity),
+                along,
+                begin: &mut || pose_of(transforms.borrow_mut().begin(entity)),
+                frame_end: &mut || pose_of(transforms.borrow_mut().frame_end(entity)),
+            });
+            if aimed.report {
                 let message =
                     "the transform is not finite or has no inverse: the last valid pose is used";
                 faults.write(HairFault::new(FaultKind::Transform, message).of(entity));
             }
             let Some(members) = members else { continue };
             if displacement != Vec3::ZERO {
-                displacements.push((displacement, put));
+                displacements.push((displacement, aimed.jumps));
             }
-            if put {
+            if aimed.settles || aimed.change.is_some() {
                 let mut theirs = strands.iter_many_mut(members.collection());
                 while let Some(mut strand) = theirs.fetch_next() {
-                    strand.bypass_change_detection().rest();
+                    let strand = strand.bypass_change_detection();
+                    if aimed.settles {
+                        strand.rest();
+                    }
+                    if let Some([velocity, spin]) = aimed.change {
+                        strand.add_motion(velocity, spin);
+                    }
                 }
             }
         }

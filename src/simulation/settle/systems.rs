@@ -3,32 +3,17 @@
 use super::{SettleSettings, Settling};
 use crate::{
     base::{
-        schedule::{Ahead, HairStep, HairTicks, SettleTick, lacks},
+        schedule::{Ahead, HairStep, HairTicked, SettleTick, lacks},
         setting::{self, Settings},
     },
     hair::strand::{Hair, Strand, StrandHistory, Strands, TickPose, lacks_strands},
     keratin::bond::{BondChanges, BondPlugin},
 };
-use bevy::{
-    ecs::{
-        schedule::{InternedScheduleLabel, ScheduleLabel},
-        system::SystemState,
-    },
-    prelude::*,
-};
+use bevy::{ecs::system::SystemState, prelude::*};
 
 /// Hair settles before it is drawn.
-#[derive(Clone, Debug)]
-pub struct SettlePlugin {
-    schedule: InternedScheduleLabel,
-}
-
-impl SettlePlugin {
-    /// For hair that ticks in `schedule`.
-    pub fn for_schedule(schedule: impl ScheduleLabel) -> Self {
-        Self { schedule: schedule.intern() }
-    }
-}
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SettlePlugin;
 
 impl Plugin for SettlePlugin {
     fn build(&self, app: &mut App) {
@@ -37,8 +22,7 @@ impl Plugin for SettlePlugin {
         }
         lacks::<BondPlugin, Self>(app);
         setting::plugin::<SettleSettings>(app);
-        let settle = settle.after(HairTicks).run_if(any_with_component::<Settling>);
-        app.add_systems(self.schedule, settle);
+        app.add_systems(HairTicked, settle.run_if(any_with_component::<Settling>));
     }
 }
 

@@ -74,7 +74,7 @@ fn watch(
             .bypass_change_detection()
             .wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);
         // Wind that reaches none of its strands keeps it awake as well.
-        let air = winds.seen_from(frame.now());
+        let air = winds.seen_from(frame);
         let is_blown = air.steady_wind() != Some(Vec3::ZERO)
             || air.blowers.iter().any(|seen| seen.blower.strength != 0.0);
         *disturbance.bypass_change_detection() =

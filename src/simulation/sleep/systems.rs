@@ -287,7 +287,7 @@ fn update_sleep(
         let is_regroomed = members.is_some_and(|members| members.is_changed());
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);
-        new.winds = winds.seen_from(frame.now());
+        new.winds = winds.seen_from(frame);
         wake_events.push(new);
     }
     // Strands are mostly grouped by hair.

@@ -5,7 +5,7 @@ use crate::{
         schedule::{HairStep, HairSystems, HairTick, MergedSubsteps, first_substep},
         setting::Settings,
     },
-    hair::strand::{Hair, StrandModel},
+    hair::strand::{Hair, StrandModel, TickPose},
     solver::rod::{HairSolver, SolverMethod},
     water::IsWet,
 };
@@ -23,9 +23,13 @@ fn choose_substeps(
     step: Res<HairStep>,
     solver: Settings<HairSolver>,
     model: Settings<StrandModel>,
-    mut hairs: Query<(Entity, Option<&IsWet>, &mut MergedSubsteps), With<Hair>>,
+    mut hairs: Query<(Entity, &TickPose, Option<&IsWet>, &mut MergedSubsteps), With<Hair>>,
 ) {
-    for (hair, wet, mut merged) in &mut hairs {
+    for (hair, pose, wet, mut merged) in &mut hairs {
+        if pose.waits() {
+            merged.set_if_neq(MergedSubsteps::WAITS);
+            continue;
+        }
         let solver = solver.of(hair);
         let takes_longer = solver.method == SolverMethod::Direct
             && model.of(hair) == StrandModel::Rod

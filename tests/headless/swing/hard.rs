@@ -132,7 +132,8 @@ const ABUSED: f32 = 0.24;
 
 fn abuse(substep: &str, mut lab: Lab, bending_lengths: &[f32]) {
     lab.app.insert_resource(HairDefault(HairInertia {
-        teleport_distance: f32::INFINITY,
+        teleport_speed: f32::INFINITY,
+        teleport_spin: f32::INFINITY,
         ..default()
     }));
     lab.drag(2.0);
