@@ -5,8 +5,12 @@
 //! `swing` is no scene of a paper: a single strand is let go, to be held against the theory of rods.
 //! `-- --scene swing --length 0.2 --bending-length 0.13 --segments 16 --from level --json`
 
+#[path = "../shared/rows.rs"]
+mod rows;
 #[path = "../shared/scenes/mod.rs"]
 mod scenes;
+#[path = "../shared/worlds.rs"]
+mod worlds;
 
 #[cfg(feature = "gpu")]
 mod device;
@@ -39,6 +43,7 @@ use std::{
 enum Show {
     Scene(SceneKind),
     Swing,
+    Worlds,
 }
 
 impl FromStr for Show {
@@ -46,7 +51,11 @@ impl FromStr for Show {
     fn from_str(name: &str) -> Result<Self, String> {
         match name {
             "swing" => Ok(Self::Swing),
-            _ => name.parse().map(Self::Scene).map_err(|e: UnknownName| format!("{e}, swing")),
+            "worlds" => Ok(Self::Worlds),
+            _ => name
+                .parse()
+                .map(Self::Scene)
+                .map_err(|e: UnknownName| format!("{e}, swing, worlds")),
         }
     }
 }
@@ -55,7 +64,8 @@ impl FromStr for Show {
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// Which scene: bedhead, blow-dry, perm, wet, shower; or swing, a single strand.
+    /// Which scene: bedhead, blow-dry, perm, wet, shower; swing, a single strand; or worlds, what games
+    /// do to a world, as figures against what they should be.
     #[arg(long)]
     scene: Show,
     /// Which variant of it; the full treatment if left out.
@@ -108,9 +118,28 @@ fn main() -> ExitCode {
     }
 }
 
+/// Prints how hair fares in worlds that move.
+fn worlds(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let table = rows::Rows { rows: worlds::rows() };
+    if arguments.json {
+        println!("{}", serde_json::to_string(&table)?);
+    } else {
+        for rows::Row { test, expected, got, tolerance, within } in &table.rows {
+            let mark = if *within { "" } else { "  <- outside" };
+            println!("{test}: {got:.4} for {expected:.4} ± {tolerance:.4}{mark}");
+        }
+    }
+    match table.rows.iter().filter(|row| !row.within).count() {
+        0 => Ok(()),
+        some => Err(format!("{some} figures are outside of their tolerance").into()),
+    }
+}
+
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let Show::Scene(kind) = arguments.scene else {
-        return swing(arguments);
+    let kind = match arguments.scene {
+        Show::Scene(kind) => kind,
+        Show::Swing => return swing(arguments),
+        Show::Worlds => return worlds(arguments),
     };
     if arguments.swing.any() {
         return Err(

@@ -918,7 +918,7 @@ fn systems_take_and_put_on_by_events() {
             reported.refused.push((of.entity, of.error.clone()));
         });
     app.add_systems(
-        Update,
+        Last,
         (move |mut commands: Commands, mut done: Local<bool>| {
             if !core::mem::replace(&mut *done, true) {
                 commands.trigger(CaptureHairdo { entity: hair });

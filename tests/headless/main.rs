@@ -11,6 +11,9 @@ mod locks;
 #[path = "../../examples/shared/mannequin.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod mannequin;
+#[path = "../../examples/shared/rows.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod rows;
 #[path = "../../examples/shared/skeleton.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod skeleton;
@@ -22,6 +25,9 @@ mod vectors;
 #[path = "../../examples/salon/wardrobe.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod wardrobe;
+#[path = "../../examples/shared/worlds.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+mod worlds_measured;
 
 /// What the modules of examples expect of their app.
 mod scenes {

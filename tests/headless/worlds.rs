@@ -1,455 +1,50 @@
-//! Worlds that move: what games do to a world rather than to hair.
+//! Worlds that move: each figure that `headless --scene worlds` prints is within its tolerance.
 
-use crate::{
-    character::{all, head, move_head},
-    common::{one_strand, settle, strand, test_app},
-};
-use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{hair::strand::TickPose, prelude::*};
-use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
-use std::time::Duration;
+use crate::{rows::Row, worlds_measured as measured};
 
-/// How a head moves: at a speed, turning on its way.
-#[derive(Resource, Clone, Copy)]
-struct Path {
-    speed: f32,
-    spin: f32,
+fn check(rows: Vec<Row>) {
+    assert!(!rows.is_empty());
+    rows.iter().for_each(|row| println!("{row:?}"));
+    let outside: Vec<_> = rows.iter().filter(|row| !row.within).collect();
+    assert!(outside.is_empty(), "{outside:#?}");
 }
 
-impl Path {
-    fn at(&self, seconds: f64) -> Transform {
-        let along = (f64::from(self.speed) * seconds) as f32;
-        let turn = (f64::from(self.spin) * seconds).rem_euclid(core::f64::consts::TAU) as f32;
-        Transform::from_xyz(along, 0.0, 0.0).with_rotation(Quat::from_rotation_y(turn))
-    }
-}
-
-/// Frames of a game (s).
-struct Frames {
-    name: &'static str,
-    frame: fn(&mut Xoshiro256PlusPlus, usize) -> f64,
-}
-
-const EVEN: Frames = Frames { name: "even", frame: |_, _| 1.0 / 60.0 };
-
-const UNEVEN: [Frames; 3] = [
-    Frames { name: "alternating", frame: |_, i| [1.0 / 60.0, 1.0 / 30.0][i % 2] },
-    Frames {
-        name: "hitches",
-        frame: |random, i| match i % 40 {
-            39 => random.random_range(0.05..0.25),
-            _ => 1.0 / 60.0,
-        },
-    },
-    Frames { name: "any", frame: |random, _| random.random_range(0.004..0.25) },
-];
-
-/// What hair of a moving head does.
-#[derive(Clone, Copy, Debug, Default)]
-struct Ride {
-    /// The largest error of the head's speed in a tick, as a share.
-    speed_error: f32,
-    /// The lean of the hair (°), least and most.
-    lean: [f32; 2],
-    /// The largest acceleration of a tip seen from the head (m/s²).
-    acceleration: f32,
-}
-
-/// Rides along a path by these frames. In `Update` or in `FixedUpdate`; every 50th frame discards its
-/// overstep if `discards`.
-fn ride(path: Path, frames: &Frames, in_update: bool, discards: bool, seconds: f64) -> Ride {
-    #[derive(Resource, Default)]
-    struct Seen(Vec<(f32, f32, Vec3)>);
-    let mut app = test_app(64.0);
-    let (hair, id) = one_strand(&mut app, 0.3, 12, Vec3::NEG_Y);
-    app.insert_resource(path).init_resource::<Seen>();
-    let walk =
-        move |time: Res<Time>, path: Res<Path>, mut heads: Query<&mut Transform, With<Hair>>| {
-            heads.iter_mut().for_each(|mut head| *head = path.at(time.elapsed_secs_f64()));
-        };
-    match in_update {
-        true => app.add_systems(Update, walk),
-        false => app.add_systems(FixedUpdate, walk),
-    };
-    let watch = move |step: Res<HairStep>,
-                      poses: Query<&TickPose>,
-                      strands: Query<&Strand>,
-                      mut before: Local<Option<Vec3>>,
-                      mut seen: ResMut<Seen>| {
-        let (Ok(pose), Ok(strand)) = (poses.get(hair), strands.get(id)) else { return };
-        if step.index == 0 {
-            *before = Some(pose.before().translation);
-        }
-        if let Some(from) = before.filter(|_| step.index + 1 == step.count) {
-            let speed = (pose.now().translation - from).length() / (step.dt * step.count as f32);
-            let tip = *strand.positions().last().unwrap();
-            seen.0.push((speed, lean(strand), tip));
-        }
-    };
-    app.add_systems(HairTick, watch.in_set(HairSystems::Last));
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(38);
-    let (mut passed, mut counted) = (0.0, 0);
-    for i in 0.. {
-        let frame = (frames.frame)(&mut random, i);
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(frame)));
-        app.update();
-        if discards && i % 50 == 49 {
-            app.world_mut().resource_mut::<Time<Fixed>>().discard_overstep(Duration::MAX);
-        }
-        passed += frame;
-        // It starts from rest.
-        if passed < 3.0 {
-            counted = app.world().resource::<Seen>().0.len();
-        }
-        if passed > 3.0 + seconds {
-            break;
-        }
-    }
-    let seen = &app.world().resource::<Seen>().0[counted..];
-    let tick = 1.0 / 64.0;
-    let mut ride = Ride { lean: [f32::INFINITY, 0.0], ..default() };
-    for (speed, lean, _) in seen {
-        if path.speed > 0.0 {
-            ride.speed_error = ride.speed_error.max((speed / path.speed - 1.0).abs());
-        }
-        ride.lean = [ride.lean[0].min(*lean), ride.lean[1].max(*lean)];
-    }
-    for tips in seen.windows(3) {
-        let [a, b, c] = [tips[0].2, tips[1].2, tips[2].2];
-        ride.acceleration = ride.acceleration.max((a - 2.0 * b + c).length() / (tick * tick));
-    }
-    ride
-}
-
-/// The angle of a strand's chord to straight down (°).
-fn lean(strand: &Strand) -> f32 {
-    let p = strand.positions();
-    (p[p.len() - 1] - p[0]).angle_between(Vec3::NEG_Y).to_degrees()
-}
-
-/// Line 1 and 2: hair of a head that moves evenly hangs as by even frames, whatever the frames are.
 #[test]
 fn uneven_frames_do_not_move_hair() {
-    for path in [
-        Path { speed: 3.0, spin: 0.0 },
-        Path { speed: 12.0, spin: 0.0 },
-        Path { speed: 3.0, spin: 8.0 },
-    ] {
-        let control = ride(path, &EVEN, false, false, 5.0);
-        for in_update in [true, false] {
-            for frames in &UNEVEN {
-                for discards in [false, true] {
-                    let got = ride(path, frames, in_update, discards, 5.0);
-                    let Frames { name, .. } = frames;
-                    let what = format!(
-                        "{} m/s, {} rad/s, {name} frames, update {in_update}, discards {discards}: {got:?} for {control:?}",
-                        path.speed, path.spin
-                    );
-                    println!("{what}");
-                    assert!(got.speed_error < 0.1, "{what}");
-                    assert!(got.lean[0] > control.lean[0] - 3.0, "{what}");
-                    assert!(got.lean[1] < control.lean[1] + 3.0, "{what}");
-                    assert!(got.acceleration < 2.0 * control.acceleration + 0.5, "{what}");
-                }
-            }
-        }
-    }
+    check(measured::frames());
 }
 
-/// Line 3: no speed is a jump that lasts, and the lean is the same at any rate.
 #[test]
 fn riders_lean_the_same_at_any_rate_of_ticks() {
-    let lean_at = |hertz: f64, speed: f32| {
-        let mut app = test_app(hertz);
-        let (hair, id) = one_strand(&mut app, 0.3, 12, Vec3::NEG_Y);
-        let mut x = 0.0;
-        for tick in 0..(4.0 * hertz) as usize {
-            x += f64::from(speed) / hertz * (tick as f64 / hertz).min(1.0);
-            app.world_mut().get_mut::<Transform>(hair).unwrap().translation.x = x as f32;
-            app.update();
-        }
-        lean(strand(&app, id))
-    };
-    for speed in [2.0, 12.0, 60.0] {
-        let control = lean_at(60.0, speed);
-        for hertz in [10.0, 30.0, 144.0, 240.0] {
-            let got = lean_at(hertz, speed);
-            println!("{speed} m/s at {hertz} Hz: {got}°, {control}° at 60 Hz");
-            assert!(
-                (got / control - 1.0).abs() < 0.01,
-                "{speed} m/s at {hertz} Hz: {got}° for {control}°"
-            );
-        }
-    }
+    check(measured::riders());
 }
 
-/// The fastest node and the farthest move of one, seen from the head, in half a second from now on.
-fn disturbance(app: &mut App, ids: &[Entity]) -> (f32, f32) {
-    let places = |app: &App| -> Vec<Vec3> {
-        ids.iter().flat_map(|id| strand(app, *id).positions().to_vec()).collect()
-    };
-    let began = places(app);
-    let (mut before, mut fastest, mut farthest) = (began.clone(), 0.0f32, 0.0f32);
-    for _ in 0..30 {
-        app.update();
-        let now = places(app);
-        for ((now, before), began) in now.iter().zip(&before).zip(&began) {
-            fastest = fastest.max(now.distance(*before) * 60.0);
-            farthest = farthest.max(now.distance(*began));
-        }
-        before = now;
-    }
-    (fastest, farthest)
-}
-
-/// Line 4: what was not simulated comes back at rest where it is.
 #[test]
 fn hair_that_was_away_comes_back_at_rest() {
-    use bevy::ecs::entity_disabling::Disabled;
-    for paused in [false, true] {
-        let mut app = test_app(60.0);
-        let (hair, id) = one_strand(&mut app, 0.3, 12, Vec3::NEG_Y);
-        settle(&mut app, id, 20.0);
-        let away = |app: &mut App, away: bool| {
-            let world = app.world_mut();
-            match (paused, away) {
-                (true, true) => world.resource_mut::<Time<Virtual>>().pause(),
-                (true, false) => world.resource_mut::<Time<Virtual>>().unpause(),
-                (false, true) => {
-                    world.entity_mut(hair).insert_recursive::<Strands>(Disabled);
-                }
-                (false, false) => {
-                    world.entity_mut(hair).remove_recursive::<Strands, Disabled>();
-                }
-            }
-        };
-        away(&mut app, true);
-        for _ in 0..10 {
-            let mut place = app.world_mut().get_mut::<Transform>(hair).unwrap();
-            place.translation.x += 0.12;
-            place.rotate_y(0.15);
-            app.update();
-        }
-        away(&mut app, false);
-        let (fastest, farthest) = disturbance(&mut app, &[id]);
-        println!("paused {paused}: {fastest} m/s, {farthest} m");
-        assert!(fastest < 0.05 && farthest < 1e-3, "paused {paused}: {fastest} m/s, {farthest} m");
-    }
+    check(measured::returns());
 }
 
-/// Line 6: hair that runs through a portal, or in a world whose origin is shifted, hangs as without.
 #[test]
 fn a_runner_is_put_elsewhere_and_its_hair_goes_on() {
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    enum Put {
-        Nowhere,
-        Found,
-        Announced(f32),
-        Shifted,
-    }
-    let run = |speed: f32, put: Put, in_update: bool| -> Vec<Strand> {
-        let mut app = test_app(60.0);
-        let head = head(&mut app, 6, 1.0);
-        let hair =
-            app.world_mut().query_filtered::<Entity, With<Hair>>().single(app.world()).unwrap();
-        let mut states = Vec::new();
-        let mut world = Transform::IDENTITY;
-        for tick in 0..150 {
-            let jumps = tick == 120;
-            if jumps {
-                match put {
-                    Put::Nowhere => {}
-                    Put::Found => {
-                        world = Transform::from_xyz(64.0, 3.0, -40.0)
-                            .with_rotation(Quat::from_rotation_y(1.2));
-                    }
-                    Put::Announced(far) => {
-                        world = Transform::from_xyz(far, 0.0, 0.0);
-                        app.world_mut().commands().entity(hair).queue(Hair::teleport);
-                    }
-                    Put::Shifted => {
-                        world = Transform::from_xyz(-512.0, 0.0, 256.0);
-                        app.world_mut().commands().trigger(ShiftWorld { by: world.translation });
-                    }
-                }
-                app.world_mut().flush();
-            }
-            let eased = (tick as f32 / 60.0).min(1.0);
-            let along = Transform::from_xyz(speed * eased * tick as f32 / 60.0, 0.0, 0.0);
-            let target = world * along;
-            if in_update {
-                move_head(&mut app, head, |place| *place = target);
-            } else {
-                #[derive(Component)]
-                struct Target(Transform);
-                if tick == 0 {
-                    app.add_systems(FixedUpdate, |mut all: Query<(&Target, &mut Transform)>| {
-                        all.iter_mut().for_each(|(target, mut place)| *place = target.0);
-                    });
-                }
-                app.world_mut().entity_mut(head).insert(Target(target));
-            }
-            app.update();
-            if tick >= 120 {
-                states.extend(all(&mut app));
-            }
-        }
-        states
-    };
-    for in_update in [true, false] {
-        for speed in [0.0, 1.5, 8.0, 40.0] {
-            let control = run(speed, Put::Nowhere, in_update);
-            for put in [Put::Found, Put::Announced(0.3), Put::Announced(64.0), Put::Shifted] {
-                let got = run(speed, put, in_update);
-                let (mut off, mut faster) = (0.0f32, 0.0f32);
-                for (a, b) in got.iter().zip(&control) {
-                    for (p, q) in a.positions().iter().zip(b.positions()) {
-                        off = off.max(p.distance(*q));
-                    }
-                    for (v, w) in a.velocities().iter().zip(b.velocities()) {
-                        // Against the world, which is turned.
-                        faster = faster.max((v.length() - w.length()).abs());
-                    }
-                }
-                println!("{speed} m/s, {put:?}, update {in_update}: {off} m, {faster} m/s");
-                assert!(off < 1e-3 && faster < 0.05, "{speed} m/s, {put:?}: {off} m, {faster} m/s");
-            }
-        }
-    }
+    check(measured::portals());
 }
 
-/// Where a head is in a vehicle that turns (m).
-const SEAT: Vec3 = Vec3::new(0.0, 0.0, 0.8);
-
-/// Moves a head and what belongs to its vehicle evenly along X, turning about Y, for some seconds; the
-/// lean of its hair seen from the vehicle (°).
-fn lean_in_a_vehicle(speed: f32, spin: f32, air: Option<WindZone>) -> f32 {
-    let seat = if spin > 0.0 { SEAT } else { Vec3::ZERO };
-    let mut app = test_app(60.0);
-    let (hair, id) = one_strand(&mut app, 0.3, 12, Vec3::NEG_Y);
-    let car = app.world_mut().spawn(Transform::default()).id();
-    app.world_mut().entity_mut(hair).insert((ChildOf(car), Transform::from_translation(seat)));
-    if let Some(zone) = air {
-        app.world_mut().spawn((zone, Transform::default(), ChildOf(car)));
-    }
-    let mut way = 0.0;
-    for tick in 0..360 {
-        // Gathers speed in two seconds.
-        let share = (tick as f32 / 120.0).min(1.0);
-        way += share / 60.0;
-        *app.world_mut().get_mut::<Transform>(car).unwrap() =
-            Path { speed, spin }.at(f64::from(way));
-        app.update();
-    }
-    lean(strand(&app, id))
-}
-
-/// Line 7: in a closed cabin hair hangs straight, and a fan that rides along blows as one at rest.
 #[test]
 fn the_air_of_a_vehicle_moves_with_it() {
-    let cabin = WindZone { half_size: Vec3::splat(2.0), ..WindZone::shelter() };
-    let open = lean_in_a_vehicle(20.0, 0.0, None);
-    assert!(open > 45.0, "control, in the open: {open}°");
-    for (speed, spin) in [(20.0, 0.0), (20.0, 0.5), (0.0, 2.0)] {
-        let closed = lean_in_a_vehicle(speed, spin, Some(cabin));
-        println!("{speed} m/s, {spin} rad/s: {closed}° in a cabin");
-        // Where it turns it is pushed outward.
-        let expected = (spin * spin * (SEAT.z + 0.05) / 9.81).atan().to_degrees();
-        assert!((closed - expected).abs() < 1.5, "{closed}° for {expected}°");
-    }
-    let fan = WindZone { velocity: Vec3::X * 3.0, ..cabin };
-    let rests = lean_in_a_vehicle(0.0, 0.0, Some(fan));
-    let rides = lean_in_a_vehicle(20.0, 0.0, Some(fan));
-    println!("fan: {rests}° at rest, {rides}° at 20 m/s");
-    assert!(rests > 10.0 && (rides - rests).abs() < 0.5, "fan: {rides}° for {rests}°");
+    check(measured::vehicles());
 }
 
-/// Line 8: wind and a headwind of the same speed lean hair alike at any scale, and cancel.
 #[test]
 fn wind_and_headwind_are_in_the_same_units_at_any_scale() {
-    let lean_at = |scale: f32, speed: f32, wind: f32| {
-        let mut app = test_app(60.0);
-        app.insert_resource(HairWind { velocity: Vec3::X * wind, gusts: 0.0, ..default() });
-        let (hair, id) = one_strand(&mut app, 0.3, 12, Vec3::NEG_Y);
-        for tick in 0..300 {
-            let mut place = app.world_mut().get_mut::<Transform>(hair).unwrap();
-            place.scale = Vec3::splat(scale);
-            place.translation.x += speed / 60.0 * (tick as f32 / 120.0).min(1.0);
-            app.update();
-        }
-        lean(strand(&app, id))
-    };
-    let control = lean_at(1.0, 0.0, 5.0);
-    assert!(control > 15.0);
-    for scale in [0.1, 1.0, 10.0] {
-        let [windy, running, along] =
-            [(0.0, 5.0), (5.0, 0.0), (5.0, 5.0)].map(|(speed, wind)| lean_at(scale, speed, wind));
-        println!("scale {scale}: {windy}° in wind, {running}° running, {along}° with the wind");
-        assert!((windy / control - 1.0).abs() < 0.01, "scale {scale}: {windy}° for {control}°");
-        assert!((running / control - 1.0).abs() < 0.01, "scale {scale}: {running}° for {control}°");
-        assert!(along < 0.5, "scale {scale}: {along}° with the wind");
-    }
+    check(measured::scales());
 }
 
-/// Line 8: a head that is scaled away in first person, while it walks and turns, comes back as it was.
 #[test]
 fn hair_of_a_hidden_head_waits() {
-    for scale in [0.1, 0.01, 0.0001] {
-        let mut app = test_app(60.0);
-        let head = head(&mut app, 10, 1.0);
-        let before = all(&mut app);
-        let mut solved = 0;
-        for tick in 0..120 {
-            move_head(&mut app, head, |place| {
-                place.scale = Vec3::splat(if (10..110).contains(&tick) { scale } else { 1.0 });
-                if (10..105).contains(&tick) {
-                    place.translation.x += 0.05;
-                    place.rotate_y(0.05);
-                }
-            });
-            app.update();
-            let owner = app.world_mut().query::<&MotionOwner>().single(app.world()).unwrap();
-            solved += usize::from(owner.moves() && (12..108).contains(&tick));
-        }
-        let after = all(&mut app);
-        let mut off = 0.0f32;
-        for (a, b) in after.iter().zip(&before) {
-            for (p, q) in a.positions().iter().zip(b.positions()) {
-                off = off.max(p.distance(*q));
-            }
-        }
-        println!("scale {scale}: {} mm off, {solved} ticks solved", off * 1e3);
-        assert!(off < 2e-3 && solved == 0, "scale {scale}: {off} m off, {solved} ticks solved");
-    }
+    check(measured::hidden());
 }
 
-/// Line 9: gusts depend on the way of the wind, not on how long a game has run.
 #[test]
 fn gusts_of_a_long_game_are_those_of_a_young_one() {
-    let worst = |hours: f64| {
-        let mut app = test_app(60.0);
-        let mut wind = HairWind { velocity: Vec3::X * 6.49, ..default() };
-        app.insert_resource(wind);
-        app.insert_resource(WindTravel(wind.velocity.as_dvec3() * (hours * 3600.0)));
-        // The clock of a game that has run for so long.
-        let elapsed = Duration::from_secs_f64(hours * 3600.0);
-        app.world_mut().resource_mut::<Time<Fixed>>().advance_by(elapsed);
-        let (_, id) = one_strand(&mut app, 0.3, 12, Vec3::NEG_Y);
-        let (mut tips, mut worst) = ([Vec3::ZERO; 3], 0.0f32);
-        for tick in 0..480 {
-            wind.velocity.x += 0.02 / 480.0;
-            let turn = Quat::from_rotation_y(3.0f32.to_radians() / 60.0);
-            wind.velocity = turn * wind.velocity;
-            app.insert_resource(wind);
-            app.update();
-            tips = [tips[1], tips[2], *strand(&app, id).positions().last().unwrap()];
-            if tick > 180 {
-                worst = worst.max((tips[0] - 2.0 * tips[1] + tips[2]).length() * 3600.0);
-            }
-        }
-        worst
-    };
-    let [young, old] = [0.0, 10.0].map(worst);
-    println!("tips at {young} m/s² after a minute, {old} after ten hours");
-    assert!(old < 1.6 * young, "tips at {old} m/s² after ten hours, {young} at first");
+    check(measured::gusts());
 }
