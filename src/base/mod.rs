@@ -7,6 +7,7 @@ pub mod lanes;
 pub(crate) mod parallel;
 pub mod schedule;
 pub mod setting;
+pub(crate) mod stretch;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {

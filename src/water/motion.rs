@@ -15,7 +15,7 @@ use crate::{
         setting::{Ranged, Settings, Violations, report},
     },
     forces::{
-        contact::{Colliders, HairCollider, seen_from},
+        contact::{Colliders, PlacedCollider, seen_from},
         environment::{
             Gravity, Winds,
             vapour::{DryingAir, WATER, transfer},
@@ -47,7 +47,7 @@ pub(super) fn move_droplets(
         Res<DropletRules>,
     ),
     wetting: Settings<HairWetting>,
-    colliders: Query<(&HairCollider, &TickPose)>,
+    colliders: Query<PlacedCollider>,
     winds: Winds,
     volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,
@@ -70,7 +70,7 @@ pub(super) fn move_droplets(
     let lowest = lowest.map_or(f32::INFINITY, |lowest| lowest + rules.removal_depth);
     let process = process.clamped().0;
     let world = TickPose::default();
-    let valid: Vec<_> = colliders.iter().map(|(c, pose)| (c.clamped(), pose)).collect();
+    let valid: Vec<_> = colliders.iter().map(|placed| (placed.collider(), placed.pose)).collect();
     let solids =
         Colliders::new(1, valid.iter().map(|(c, pose)| (c, *pose, seen_from(&world, c, pose))));
     let winds = winds.seen_from(world.now());

@@ -2,7 +2,10 @@
 
 use super::drag::Water;
 use crate::{
-    base::setting::{InvalidValue, Ranged, setting},
+    base::{
+        setting::{InvalidValue, Ranged, setting},
+        stretch::{Stretch, Stretched},
+    },
     forces::environment::ZoneShape,
     hair::strand::{Pose, TickPose},
 };
@@ -25,12 +28,13 @@ setting! {
     /// ```
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    #[require(Transform, TickPose)]
+    #[require(Transform, TickPose, Stretch<Self>)]
     pub struct WaterVolume {
         /// Its shape.
         pub shape: ZoneShape = ZoneShape::Box;
-        /// Half its size along each of its axes, scaled with its transform; a
-        /// [`HalfSpace`](ZoneShape::HalfSpace) has none.
+        /// Half its size along each of its axes, scaled with its transform, unevenly too; a
+        /// [`HalfSpace`](ZoneShape::HalfSpace) has none. A sheared one acts at right angles and is
+        /// reported.
         pub half_size: Vec3 = Vec3::ONE, "m" in HALF_SIZE: 1e-3..=1e6, safe 0.1..=1000.0,
             "1 is a tub";
         /// Density. Hair has 1310 and floats on what is denser.
@@ -60,6 +64,16 @@ impl WaterVolume {
     }
 }
 
+impl Stretched for WaterVolume {
+    fn suitable(&self, factors: Vec3) -> Vec3 {
+        factors
+    }
+
+    fn stretched(self, by: Vec3) -> Self {
+        Self { half_size: self.half_size * by, ..self }
+    }
+}
+
 /// A volume as seen from a frame, with valid values.
 #[derive(Clone, Copy, Debug)]
 struct LocalVolume {
@@ -79,7 +93,8 @@ pub(super) struct LocalVolumes(Vec<LocalVolume>);
 /// All volumes.
 #[derive(SystemParam)]
 pub(super) struct Volumes<'w, 's> {
-    volumes: Query<'w, 's, (&'static WaterVolume, &'static TickPose)>,
+    volumes:
+        Query<'w, 's, (&'static WaterVolume, &'static Stretch<WaterVolume>, &'static TickPose)>,
 }
 
 impl Volumes<'_, '_> {
@@ -89,9 +104,9 @@ impl Volumes<'_, '_> {
 
     /// Seen in the frame of `pose`.
     pub fn seen_from(&self, pose: &Pose) -> LocalVolumes {
-        let seen = self.volumes.iter().map(|(volume, at)| {
-            let (volume, at) = (volume.clamped(), at.now());
-            let WaterVolume { shape, half_size, density, viscosity, current } = volume;
+        let seen = self.volumes.iter().map(|(volume, stretch, at)| {
+            let at = at.now();
+            let WaterVolume { shape, half_size, density, viscosity, current } = stretch.of(volume);
             let current = pose.direction_in(at.direction_out(current));
             LocalVolume {
                 shape,

@@ -6,7 +6,7 @@ use super::{
     gust::gust,
 };
 use crate::{
-    base::{schedule::HairStep, setting::Ranged},
+    base::{schedule::HairStep, setting::Ranged, stretch::Stretch},
     hair::strand::{Pose, TickPose},
 };
 use bevy::{ecs::system::SystemParam, math::DVec3, prelude::*};
@@ -38,7 +38,7 @@ pub(crate) struct LocalWinds {
 pub(crate) struct Winds<'w, 's> {
     wind: Option<Res<'w, HairWind>>,
     blowers: Query<'w, 's, (&'static Blower, &'static TickPose)>,
-    zones: Query<'w, 's, (&'static WindZone, &'static TickPose)>,
+    zones: Query<'w, 's, (&'static WindZone, &'static Stretch<WindZone>, &'static TickPose)>,
     time: Res<'w, Time>,
     step: Res<'w, HairStep>,
 }
@@ -55,7 +55,7 @@ impl Winds<'_, '_> {
 
     /// Whether any source sets the bonds of dry hair.
     pub(crate) fn dry(&self) -> bool {
-        !self.blowers.is_empty() || self.zones.iter().any(|(zone, _)| zone.drying > 0.0)
+        !self.blowers.is_empty() || self.zones.iter().any(|(zone, ..)| zone.drying > 0.0)
     }
 
     /// Transformed into the frame of `pose`.
@@ -68,10 +68,10 @@ impl Winds<'_, '_> {
                 aim: pose.direction_in(at.direction_out(Vec3::NEG_Z)),
                 blower,
             });
-        let zones = self.zones.iter().map(|(zone, at)| {
+        let zones = self.zones.iter().map(|(zone, stretch, at)| {
             let at = at.now();
             LocalZone {
-                zone: zone.clamped(),
+                zone: stretch.of(zone),
                 rotation: at.rotation.inverse() * pose.rotation,
                 origin: pose.point_in(at.translation),
                 scale: pose.scale / at.scale,
