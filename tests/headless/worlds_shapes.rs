@@ -1,8 +1,8 @@
-//! Any tick rate, non-uniform scale.
+//! Any tick rate, non-uniform scale, rain far from the origin.
 
 use crate::common::*;
 use bevy::prelude::*;
-use bevy_keratin::{FaultKind, prelude::*};
+use bevy_keratin::{DropletRules, FaultKind, prelude::*};
 
 /// In how many substeps the strands have moved.
 #[derive(Resource, Default)]
@@ -326,4 +326,48 @@ fn zones_and_water_are_as_large_as_their_transform_scales_them() {
         assert!(alike[0] > 0.03 && alike[1] < 1e-3, "{name} {alike:?}");
         assert!(mean[0] < 1e-3 && mean[1] > 0.03, "{name} {mean:?}");
     }
+}
+
+/// Water in and on hair after two seconds of rain (m³), and how many drops there are.
+fn rained_on(place: Vec3, rules: DropletRules) -> (f64, usize) {
+    let mut app = test_app(60.0);
+    app.insert_resource(rules);
+    let hair = app.world_mut().spawn((Hair, Transform::from_translation(place))).id();
+    for i in 0..36 {
+        let root = Vec3::new(0.01 * (i % 6) as f32 - 0.025, 0.0, 0.01 * (i / 6) as f32 - 0.025);
+        let points: Vec<Vec3> =
+            (0..6).map(|k| root + Vec3::new(0.02, -0.01, 0.0) * k as f32).collect();
+        app.world_mut().spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    let above = Transform::from_translation(place + Vec3::Y).looking_to(Dir3::NEG_Y, Dir3::X);
+    app.world_mut().spawn((Shower::rain(400.0, 0.08).unwrap(), above));
+    run(&mut app, 2.0);
+    assert_eq!(faults(&mut app), []);
+    assert!(app.world().resource::<WaterLedger>().error() < 1e-9);
+    let held = app.world_mut().query::<&Moisture>().iter(app.world()).map(Moisture::volume).sum();
+    (held, app.world_mut().query::<&Droplet>().iter(app.world()).count())
+}
+
+#[test]
+fn rain_wets_as_much_far_from_the_origin() {
+    let (near, drops) = rained_on(Vec3::ZERO, default());
+    assert!(near > 1e-8, "{near}");
+    for (place, off) in [
+        (Vec3::new(150.0, 0.0, 0.0), 0.03),
+        (Vec3::new(0.0, -150.0, 120.0), 0.03),
+        (Vec3::new(3000.0, 100.0, -4000.0), 0.15),
+    ] {
+        let (far, there) = rained_on(place, default());
+        println!("{place}: {far} m³ and {there} drops, {near} m³ and {drops} at the origin");
+        assert!((far / near - 1.0).abs() < off, "{place}: {far} of {near}");
+        assert!(
+            (there as f64 / drops as f64 - 1.0).abs() < 0.1,
+            "{place}: {there} of {drops} drops"
+        );
+    }
+    // Bounds of one's own in the world still hold.
+    let rules = DropletRules { max: Vec3::splat(100.0), ..default() };
+    assert_eq!(rained_on(Vec3::X * 150.0, rules), (0.0, 0));
+    let rules = DropletRules { removal_distance: 0.5, ..default() };
+    assert_eq!(rained_on(Vec3::ZERO, rules), (0.0, 0), "the cloud is too high");
 }
