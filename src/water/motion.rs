@@ -74,7 +74,7 @@ pub(super) fn move_droplets(
     let solids =
         Colliders::new(1, valid.iter().map(|(c, pose)| (c, *pose, seen_from(&world, c, pose))));
     let winds = winds.seen_from(world.now());
-    let volumes = volumes.seen_from(world.now());
+    let volumes = volumes.seen_from(&world, None);
     let mut items: Vec<Moving<'_>> = droplets
         .iter_mut()
         .map(|(entity, drop)| Moving {

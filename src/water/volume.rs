@@ -7,9 +7,9 @@ use crate::{
         stretch::{Stretch, Stretched},
     },
     forces::environment::ZoneShape,
-    hair::strand::{Pose, TickPose},
+    hair::strand::TickPose,
 };
-use bevy::{ecs::system::SystemParam, prelude::*};
+use bevy::{ecs::system::SystemParam, math::Affine3A, prelude::*};
 
 setting! {
     /// A volume of water: a lake, a pool, a floating ball. Buoyancy, drag and the water's current
@@ -17,7 +17,8 @@ setting! {
     /// that emerges is dripping wet. Droplets that fall in are removed; the
     /// [`WaterLedger`](crate::WaterLedger) counts what goes in and comes out.
     ///
-    /// Where volumes overlap, a node is in the one in which it is deepest.
+    /// Where volumes overlap, a node is in the one in which it is deepest. A volume that moves or turns takes
+    /// its water along, as a bath on a ship does.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -43,7 +44,7 @@ setting! {
         /// Dynamic viscosity.
         pub viscosity: f32 = 1e-3, "Pa s" in VISCOSITY: 1e-6..=1e3, safe 1e-4..=10.0,
             "water has 1e-3, oil 0.1";
-        /// Velocity of the water, along the volume's axes.
+        /// Velocity of the water in the volume, along its axes.
         pub current: Vec3 = Vec3::ZERO, "m/s" in CURRENT: -100.0..=100.0, safe -5.0..=5.0,
             "a stream has 1 m/s";
     }
@@ -83,7 +84,26 @@ struct LocalVolume {
     rotation: Quat,
     origin: Vec3,
     scale: f32,
+    /// Its current in the frame.
     water: Water,
+    carried: Option<Carried>,
+}
+
+/// How a volume moves in the frame: back to where a point of it was, and how long ago (s).
+#[derive(Clone, Copy, Debug)]
+struct Carried {
+    back: Affine3A,
+    dt: f32,
+}
+
+impl LocalVolume {
+    /// Its water at a place, which moves as the volume does.
+    fn water_at(&self, place: Vec3) -> Water {
+        let own = self
+            .carried
+            .map_or(Vec3::ZERO, |Carried { back, dt }| (place - back.transform_point3(place)) / dt);
+        Water { current: self.water.current + own, ..self.water }
+    }
 }
 
 /// All volumes as seen from a frame.
@@ -102,10 +122,12 @@ impl Volumes<'_, '_> {
         self.volumes.is_empty()
     }
 
-    /// Seen in the frame of `pose`.
-    pub fn seen_from(&self, pose: &Pose) -> LocalVolumes {
-        let seen = self.volumes.iter().map(|(volume, stretch, at)| {
-            let at = at.now();
+    /// Seen in a frame, with their motion during a substep of `dt` (s) if that is given.
+    pub fn seen_from(&self, frame: &TickPose, dt: Option<f32>) -> LocalVolumes {
+        let pose = frame.now();
+        let seen = self.volumes.iter().map(|(volume, stretch, pose_of)| {
+            let at = pose_of.now();
+            let moves = dt.and_then(|dt| Some((pose_of.motion_in(frame)?, dt)));
             let WaterVolume { shape, half_size, density, viscosity, current } = stretch.of(volume);
             let current = pose.direction_in(at.direction_out(current));
             LocalVolume {
@@ -115,6 +137,7 @@ impl Volumes<'_, '_> {
                 origin: pose.point_in(at.translation),
                 scale: pose.scale / at.scale,
                 water: Water { density, viscosity, current },
+                carried: moves.map(|(motion, dt)| Carried { back: motion.inverse(), dt }),
             }
         });
         LocalVolumes(seen.collect())
@@ -122,20 +145,29 @@ impl Volumes<'_, '_> {
 }
 
 impl LocalVolumes {
-    /// Depth of a position in the volume in which it is deepest (m), negative outside, and that
-    /// volume's water. A non-finite position is in none.
-    pub fn depth(&self, place: Vec3) -> Option<(f32, &Water)> {
+    /// Depth of a position in the volume in which it is deepest (m), negative outside. A non-finite
+    /// position is in none.
+    pub fn depth(&self, place: Vec3) -> Option<f32> {
+        self.deepest(place).map(|(depth, _)| depth)
+    }
+
+    /// The same with the water there.
+    pub fn water(&self, place: Vec3) -> Option<(f32, Water)> {
+        self.deepest(place).map(|(depth, volume)| (depth, volume.water_at(place)))
+    }
+
+    fn deepest(&self, place: Vec3) -> Option<(f32, &LocalVolume)> {
         let depths = self.0.iter().map(|volume| {
-            let LocalVolume { shape, half_size, rotation, origin, scale, water } = volume;
+            let LocalVolume { shape, half_size, rotation, origin, scale, .. } = volume;
             let place = *rotation * (place - *origin) * *scale;
-            (-shape.distance(*half_size, place) / scale.abs(), water)
+            (-shape.distance(*half_size, place) / scale.abs(), volume)
         });
         depths.filter(|(depth, _)| depth.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// Whether a place is in any.
     pub fn contain(&self, place: Vec3) -> bool {
-        self.depth(place).is_some_and(|(depth, _)| depth > 0.0)
+        self.depth(place).is_some_and(|depth| depth > 0.0)
     }
 }
 
@@ -153,13 +185,14 @@ mod tests {
             origin: at,
             scale,
             water: Water { density, viscosity: 1e-3, current: Vec3::ZERO },
+            carried: None,
         };
         let quarter = Quat::from_rotation_z(FRAC_PI_2);
         let pool = local(ZoneShape::Box, Vec3::X, quarter, 2.0, 1.0);
         let lake = local(ZoneShape::HalfSpace, Vec3::NEG_Y, Quat::IDENTITY, 1.0, 2.0);
         let both = LocalVolumes(vec![pool, lake]);
         // The box lies on its side, and is half as large to the hair: 0.25 m along X, 0.5 along Y.
-        let at = |x: f32, y: f32| both.depth(Vec3::new(x, y, 0.0)).unwrap();
+        let at = |x: f32, y: f32| both.water(Vec3::new(x, y, 0.0)).unwrap();
         assert!((at(1.1, 0.0).0 - 0.15).abs() < 1e-6 && at(1.1, 0.0).1.density == 1.0);
         assert!((at(1.0, 0.7).0 + 0.2).abs() < 1e-6);
         assert!((at(1.0, -3.0).0 - 2.0).abs() < 1e-6 && at(1.0, -3.0).1.density == 2.0);

@@ -1,4 +1,4 @@
-//! Any tick rate, non-uniform scale, rain far from the origin.
+//! Any tick rate, non-uniform scale, rain far from the origin, water that moves.
 
 use crate::common::*;
 use bevy::prelude::*;
@@ -370,4 +370,65 @@ fn rain_wets_as_much_far_from_the_origin() {
     assert_eq!(rained_on(Vec3::X * 150.0, rules), (0.0, 0));
     let rules = DropletRules { removal_distance: 0.5, ..default() };
     assert_eq!(rained_on(Vec3::ZERO, rules), (0.0, 0), "the cloud is too high");
+}
+
+/// A head in a bath of 2 m that move together, and how far its hair leans there (degrees).
+fn in_bath(
+    velocity: Vec3,
+    turning: f32,
+    offset: Vec3,
+    bath: WaterVolume,
+    inertia: HairInertia,
+) -> f32 {
+    let mut app = test_app(60.0);
+    app.insert_resource(HairDefault(HairWetting { fibres: 100.0, soaking: 0.0, ..default() }));
+    let ship = app.world_mut().spawn(Transform::default()).id();
+    app.world_mut().spawn((bath, Transform::default(), ChildOf(ship)));
+    let (hair, e) = one_strand(&mut app, 0.2, 8, Vec3::NEG_Y);
+    app.world_mut().entity_mut(hair).insert((
+        Transform::from_translation(offset),
+        ChildOf(ship),
+        inertia,
+    ));
+    for tick in 1..=300 {
+        let seconds = tick as f32 / 60.0;
+        let mut place = app.world_mut().get_mut::<Transform>(ship).unwrap();
+        place.translation = velocity * seconds;
+        place.rotation = Quat::from_rotation_y(turning * seconds);
+        app.update();
+    }
+    let p = strand(&app, e).positions();
+    aside(&app, e).atan2(-(p[p.len() - 1] - p[0]).y).to_degrees()
+}
+
+#[test]
+fn water_goes_with_what_carries_it() {
+    let pool = WaterVolume::pool(Vec3::ONE).unwrap();
+    let stream = WaterVolume { current: Vec3::Z * 0.1, ..pool };
+    let (fast, half) = (Vec3::X * 2.0, HairInertia { moving: 0.4, turning: 0.4, ..default() });
+    for bath in [pool, stream] {
+        let rests = in_bath(Vec3::ZERO, 0.0, Vec3::ZERO, bath, default());
+        for inertia in [HairInertia::default(), half] {
+            let moves = in_bath(fast, 0.0, Vec3::ZERO, bath, inertia);
+            println!("{moves}° at 2 m/s, {rests}° at rest, current {}", bath.current);
+            assert!((moves - rests).abs() < 1.0, "{moves}° at 2 m/s, {rests}° at rest");
+        }
+    }
+    let turns = in_bath(Vec3::ZERO, 0.5, Vec3::X * 0.5, pool, default());
+    println!("{turns}° where it turns");
+    assert!(turns < 8.0, "{turns}");
+    // Through water that rests it is dragged.
+    let lake = WaterVolume { half_size: Vec3::splat(1e3), ..pool };
+    let mut app = test_app(60.0);
+    app.insert_resource(HairDefault(HairWetting { fibres: 100.0, soaking: 0.0, ..default() }));
+    app.world_mut().spawn(lake);
+    let (hair, e) = one_strand(&mut app, 0.2, 8, Vec3::NEG_Y);
+    for tick in 1..=300 {
+        app.world_mut().get_mut::<Transform>(hair).unwrap().translation =
+            fast * (tick as f32 / 60.0);
+        app.update();
+    }
+    let p = strand(&app, e).positions();
+    let dragged = aside(&app, e).atan2(-(p[8] - p[0]).y).to_degrees();
+    assert!(dragged > 60.0, "{dragged}");
 }
