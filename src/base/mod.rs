@@ -8,6 +8,7 @@ pub(crate) mod motion;
 pub(crate) mod parallel;
 pub mod schedule;
 pub mod setting;
+pub(crate) mod stretch;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {

@@ -252,11 +252,9 @@ impl MergedSubsteps {
     /// The hair takes no substep.
     pub(crate) const WAITS: Self = Self(u32::MAX);
 
-    /// As many as fit into `longest` (s) and divide the tick evenly.
+    /// At most as many as fit into `longest` (s).
     pub(crate) fn within(longest: f32, step: &HairStep) -> Self {
-        let fit = ((longest / step.dt + 1e-3) as u32).clamp(1, step.count.max(1));
-        let divides = |together: &u32| step.count.is_multiple_of(*together);
-        Self((1..=fit).rev().find(divides).unwrap_or(1))
+        Self(((longest / step.dt + 1e-3) as u32).clamp(1, step.count.max(1)))
     }
 }
 
@@ -341,16 +339,16 @@ impl EffectiveSubstep {
     }
 }
 
-/// How many substeps the hair takes as one at the end of substep `index` of `count`, if `together`
-/// are merged; `None` while it waits. A remainder at the tick's end is taken then.
-fn merged(index: u32, count: u32, together: u32) -> Option<u32> {
-    let together = together.max(1);
-    let done = (index + 1) % together;
-    match done {
-        0 => Some(together),
-        rest if index + 1 == count => Some(rest),
-        _ => None,
-    }
+/// How many substeps the hair takes as one at the end of substep `index` of `count`, if at most `most`
+/// are merged; `None` while it waits. The tick has as few groups as that allows, none longer by more than
+/// one substep than another, and none waits beyond it.
+fn merged(index: u32, count: u32, most: u32) -> Option<u32> {
+    let (done, count) = (u64::from(index) + 1, u64::from(count.max(1)));
+    let groups = count.div_ceil(most.max(1).into());
+    // Groups end after ⌈k · count / groups⌉ substeps.
+    let group = done * groups / count;
+    let end = |group: u64| (group * count).div_ceil(groups);
+    (end(group) == done).then(|| (done - end(group.saturating_sub(1))) as u32)
 }
 
 /// How much faster than in life wetting, drying and the bonds' chemistry
@@ -581,33 +579,65 @@ mod tests {
         assert!(HairSubsteps::fixed(0).is_err());
     }
 
+    /// The lengths of the groups of a tick (substeps).
+    fn groups(count: u32, most: u32) -> Vec<u32> {
+        (0..count).filter_map(|i| merged(i, count, most)).collect()
+    }
+
     #[test]
-    fn as_many_substeps_are_merged_as_fit_and_divide_the_tick() {
-        let merged = |longest, rate: f32, count| {
+    fn as_many_substeps_are_merged_as_fit() {
+        let most = |longest, rate: f32, count| {
             let step = HairStep { dt: 1.0 / (rate * count as f32), index: 0, count };
             MergedSubsteps::within(longest, &step).0
         };
         let longest = 1.0 / 180.0;
         for (rate, count, expected) in
-            [(60.0, 6, 2), (120.0, 3, 1), (240.0, 2, 2), (30.0, 12, 2), (64.0, 6, 2), (20.0, 1, 1)]
+            [(60.0, 6, 2), (120.0, 3, 2), (240.0, 2, 2), (30.0, 12, 2), (64.0, 6, 2), (20.0, 1, 1)]
         {
-            assert_eq!(merged(longest, rate, count), expected, "{rate} Hz, {count} substeps");
+            assert_eq!(most(longest, rate, count), expected, "{rate} Hz, {count} substeps");
         }
-        assert_eq!(merged(1.0 / 90.0, 60.0, 6), 3, "four do not divide six");
-        assert_eq!([merged(1e-9, 60.0, 6), merged(9.0, 60.0, 6)], [1, 6]);
+        assert_eq!([most(1e-9, 60.0, 6), most(1.0 / 90.0, 60.0, 6), most(9.0, 60.0, 6)], [1, 4, 6]);
+    }
+
+    /// At any rate a tick has as many solves as steps of 1/180 s need, which is never more than at a
+    /// lower rate: a tick has a whole number of them, so a second has at most one a tick more than 180.
+    #[test]
+    fn no_tick_has_more_solves_than_one_of_a_lower_rate() {
+        let longest = 1.0 / 180.0;
+        let mut before = u32::MAX;
+        for rate in 10..=240 {
+            let seconds = 1.0 / rate as f32;
+            let count = HairSubsteps::Auto.count(seconds);
+            let step = HairStep { dt: seconds / count as f32, index: 0, count };
+            let all = groups(count, MergedSubsteps::within(longest, &step).0);
+            let solves = all.len() as u32;
+            assert_eq!(solves, 180u32.div_ceil(rate), "{rate} Hz");
+            assert!(solves <= before, "{rate} Hz: {solves}, {before} at a lower rate");
+            assert!((180..180 + rate).contains(&(solves * rate)), "{rate} Hz: {solves}");
+            let longest_taken = *all.iter().max().unwrap() as f32 * step.dt;
+            assert!(longest_taken < longest * 1.001, "{rate} Hz: {longest_taken} s");
+            before = solves;
+        }
     }
 
     #[test]
-    fn merged_substeps_sum_to_the_tick() {
-        for count in 1..20 {
-            for together in 0..8 {
-                let all: Vec<_> = (0..count).map(|i| merged(i, count, together)).collect();
-                assert_eq!(all.iter().flatten().sum::<u32>(), count);
-                assert!(all[count as usize - 1].is_some(), "nothing waits beyond the tick");
-                assert!(all.iter().flatten().all(|n| *n <= together.max(1)));
+    fn merged_substeps_are_few_and_alike_and_sum_to_the_tick() {
+        for count in 1..40 {
+            for most in 0..9 {
+                let all = groups(count, most);
+                assert_eq!(all.iter().sum::<u32>(), count);
+                assert_eq!(all.len() as u32, count.div_ceil(most.max(1)));
+                let (least, longest) = (all.iter().min().unwrap(), all.iter().max().unwrap());
+                assert!(longest - least <= 1 && *longest <= most.max(1), "{all:?}");
+                assert!(merged(count - 1, count, most).is_some(), "nothing waits beyond the tick");
             }
         }
         let six: Vec<_> = (0..6).map(|i| merged(i, 6, 2)).collect();
         assert_eq!(six, [None, Some(2), None, Some(2), None, Some(2)]);
+        assert_eq!(
+            [groups(5, 2), groups(6, 4), groups(3, 2)],
+            [vec![2, 2, 1], vec![3, 3], vec![2, 1]]
+        );
+        assert_eq!(merged(u32::MAX - 1, u32::MAX, u32::MAX), Some(u32::MAX));
     }
 }

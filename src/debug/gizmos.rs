@@ -2,7 +2,10 @@
 
 use super::{HairGizmos, Owner, Owners, shapes};
 use crate::{
-    base::setting::Ranged,
+    base::{
+        setting::Ranged,
+        stretch::{Stretched, acting},
+    },
     forces::{
         contact::{HairCollider, LockNeighbours},
         environment::{Blower, WindZone, ZoneShape},
@@ -135,10 +138,10 @@ fn draw_surroundings(
     mut gizmos: Gizmos<HairGizmos>,
 ) {
     let with = gizmos.config_ext.clone();
-    for (color, pose, collider) in placed(with.colliders, &colliders) {
+    for (color, pose, collider) in stretched(with.colliders, &colliders) {
         shapes::collider(&mut gizmos, &pose, &collider, color);
     }
-    for (color, pose, zone) in placed(with.wind_zones, &zones) {
+    for (color, pose, zone) in stretched(with.wind_zones, &zones) {
         shapes::zone(&mut gizmos, &pose, zone.shape, zone.half_size, color);
         let (end, faint) = (zone.half_size + zone.falloff / pose.scale, color.with_alpha(0.3));
         if zone.falloff > 0.0 && zone.shape != ZoneShape::HalfSpace {
@@ -164,7 +167,7 @@ fn draw_surroundings(
     for (color, pose, rod) in placed(with.perm_rods, &rods) {
         shapes::cylinder(&mut gizmos, &pose, rod.radius, rod.length, color);
     }
-    for (color, pose, water) in placed(with.water_volumes, &volumes) {
+    for (color, pose, water) in stretched(with.water_volumes, &volumes) {
         shapes::zone(&mut gizmos, &pose, water.shape, water.half_size, color);
     }
 }
@@ -174,10 +177,25 @@ fn placed<'a, T: Component + Ranged + Clone>(
     color: Option<Color>,
     all: &'a Query<(&GlobalTransform, &T)>,
 ) -> impl Iterator<Item = (Color, Pose, T)> + 'a {
+    placed_as(color, all, |what, _| what.clamped())
+}
+
+/// The same as they act.
+fn stretched<'a, T: Stretched>(
+    color: Option<Color>,
+    all: &'a Query<(&GlobalTransform, &T)>,
+) -> impl Iterator<Item = (Color, Pose, T)> + 'a {
+    placed_as(color, all, acting)
+}
+
+fn placed_as<'a, T: Component>(
+    color: Option<Color>,
+    all: &'a Query<(&GlobalTransform, &T)>,
+    valid: impl Fn(&T, &GlobalTransform) -> T + 'a,
+) -> impl Iterator<Item = (Color, Pose, T)> + 'a {
     let all = color.map(|color| all.iter().map(move |(at, what)| (color, at, what)));
-    all.into_iter()
-        .flatten()
-        .filter_map(|(color, at, what)| Some((color, Pose::of(at)?, what.clamped())))
+    let all = all.into_iter().flatten();
+    all.filter_map(move |(color, at, what)| Some((color, Pose::of(at)?, valid(what, at))))
 }
 
 #[cfg(test)]

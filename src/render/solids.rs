@@ -167,8 +167,9 @@ impl Ball {
         place: &GlobalTransform,
     ) -> Option<Self> {
         let (radii, half_length) = size(&of.shape)?;
-        let scale = place.affine().matrix3.determinant().abs().cbrt();
-        let radius = (radii.max_element() + half_length) * scale;
+        let m = place.affine().matrix3;
+        let longest = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+        let radius = (radii.max_element() + half_length) * longest;
         Some(Self { center: place.translation(), radius, collider: entity })
     }
 

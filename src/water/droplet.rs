@@ -14,8 +14,8 @@ use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 setting! {
     /// A drop of water: falls, lands on strands, slides along one and pulls others to it (\[W\]
     /// equation 2), soaks in, merges, drips off. Spawn it to wet hair; its water is accounted for until it
-    /// has evaporated or left the box of [`DropletRules`](crate::water::DropletRules). A clone adds its
-    /// water to the world.
+    /// has evaporated or is far from all hair, by [`DropletRules`](crate::water::DropletRules). A clone adds
+    /// its water to the world.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;

@@ -44,21 +44,27 @@ setting! {
     #[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Resource, Default, Clone, PartialEq)]
     pub struct DropletRules {
-        /// Lower corner of the box that droplets may be in. A floor drains at its height.
-        pub min: Vec3 = Vec3::splat(-100.0), "m" in MIN: f32::NEG_INFINITY..=f32::INFINITY,
-            "-100 is far below";
+        /// Lower corner of the box in the world that droplets may be in, endless by default. A floor
+        /// drains at its height.
+        pub min: Vec3 = Vec3::NEG_INFINITY, "m" in MIN: f32::NEG_INFINITY..=f32::INFINITY,
+            "0 drains at the ground";
         /// Upper corner.
-        pub max: Vec3 = Vec3::splat(100.0), "m" in MAX: f32::NEG_INFINITY..=f32::INFINITY,
-            "100 is far above; at least the lower corner";
+        pub max: Vec3 = Vec3::INFINITY, "m" in MAX: f32::NEG_INFINITY..=f32::INFINITY,
+            "at least the lower corner";
         /// How long a drop lies on a collider before it is removed as run off.
         pub resting_time: f32 = 2.0, "s" in RESTING_TIME: 0.0..=f32::INFINITY, safe 0.0..=60.0,
             "2 lets it run off";
         /// Whether drops that touch merge; in \[W\] they do not. Drips, which hair sheds, merge with what
         /// they touch in any case.
         pub merging: bool = true;
-        /// Depth below all hair at which a falling drop is removed.
+        /// Depth below hair at which a falling drop is removed, unless it is within
+        /// [`removal_distance`](Self::removal_distance) of other hair that is lower.
         pub removal_depth: f32 = 5.0, "m" in REMOVAL_DEPTH: 0.0..=f32::INFINITY, safe 0.5..=100.0,
             "5 is below any floor that a character stands on";
+        /// Distance from all hair, along the world's axes, beyond which a drop is removed; from the origin
+        /// while there is no hair.
+        pub removal_distance: f32 = 100.0, "m" in REMOVAL_DISTANCE: 0.0..=f32::INFINITY,
+            safe 2.0..=1000.0, "100 is above any shower";
     }
     then Self::check_corners
 }

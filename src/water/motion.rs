@@ -15,7 +15,7 @@ use crate::{
         setting::{Ranged, Settings, Violations, report},
     },
     forces::{
-        contact::{Colliders, HairCollider, seen_from},
+        contact::{Colliders, PlacedCollider, seen_from},
         environment::{
             Gravity, Winds,
             vapour::{DryingAir, WATER, transfer},
@@ -47,7 +47,7 @@ pub(super) fn move_droplets(
         Res<DropletRules>,
     ),
     wetting: Settings<HairWetting>,
-    colliders: Query<(&HairCollider, &TickPose)>,
+    colliders: Query<PlacedCollider>,
     winds: Winds,
     volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,
@@ -55,26 +55,26 @@ pub(super) fn move_droplets(
     mut droplets: Query<(Entity, &mut Droplet)>,
     mut ledger: ResMut<WaterLedger>,
     mut faults: MessageWriter<HairFault>,
-    mut lowest: Local<Option<f32>>,
+    mut bounds: Local<Vec<HairBounds>>,
 ) {
     if droplets.is_empty() {
-        *lowest = None;
+        bounds.clear();
         return;
     }
     let (dt, rules) = (step.dt, rules.clamped());
     let gravity = gravity.clamped().0;
     let down = gravity.normalize_or_zero();
-    if step.index == 0 || lowest.is_none() {
-        *lowest = lowest_of(&hairs, &strands, down);
+    if step.index == 0 || bounds.is_empty() {
+        *bounds = HairBounds::of(&hairs, &strands, down);
     }
-    let lowest = lowest.map_or(f32::INFINITY, |lowest| lowest + rules.removal_depth);
+    let bounds = &*bounds;
     let process = process.clamped().0;
     let world = TickPose::default();
-    let valid: Vec<_> = colliders.iter().map(|(c, pose)| (c.clamped(), pose)).collect();
+    let valid: Vec<_> = colliders.iter().map(|placed| (placed.collider(), placed.pose)).collect();
     let solids =
         Colliders::new(1, valid.iter().map(|(c, pose)| (c, *pose, seen_from(&world, c, pose))));
     let winds = winds.seen_from(&world);
-    let volumes = volumes.seen_from(world.now());
+    let volumes = volumes.seen_from(&world);
     let mut items: Vec<Moving<'_>> = droplets
         .iter_mut()
         .map(|(entity, drop)| Moving {
@@ -89,8 +89,8 @@ pub(super) fn move_droplets(
     for_each_block(
         &mut items,
         Nanos(500),
-        Vec::new,
-        |found, Moving { drop, violations, new, evaporated, is_removed, .. }| {
+        || (Vec::new(), 0),
+        |(found, last), Moving { drop, violations, new, evaporated, is_removed, .. }| {
             let drop = drop.bypass_change_detection();
             drop.repair(violations);
             *new = drop.volume - drop.counted.0;
@@ -131,7 +131,8 @@ pub(super) fn move_droplets(
                 }
             }
             let inside = (drop.position.cmpge(rules.min) & drop.position.cmple(rules.max)).all();
-            let inside = inside && (drop.ride.is_some() || drop.position.dot(down) <= lowest);
+            let inside =
+                inside && (drop.ride.is_some() || near_any(bounds, last, drop, down, &rules));
             let inside = inside && Droplet::POSITION.check(drop.position).is_ok();
             drop.keep_in_range();
             *is_removed = !inside
@@ -151,21 +152,68 @@ pub(super) fn move_droplets(
     }
 }
 
-/// How far down the lowest hair reaches (m in the world, along `down`), by roots, middles and tips.
-fn lowest_of(
-    hairs: &Query<&TickPose, With<Hair>>,
-    strands: &Query<(&StrandOf, &Strand)>,
+/// Where a hair is in the world (m), by roots, middles and tips.
+#[derive(Clone, Copy)]
+pub(super) struct HairBounds {
+    low: Vec3,
+    high: Vec3,
+    /// How far down it reaches.
+    lowest: f32,
+}
+
+impl HairBounds {
+    /// Of all hair; of a point at the origin that reaches down without end while there is none.
+    fn of(
+        hairs: &Query<&TickPose, With<Hair>>,
+        strands: &Query<(&StrandOf, &Strand)>,
+        down: Vec3,
+    ) -> Vec<Self> {
+        let mut all = PerHair::default();
+        let nowhere = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, lowest: f32::MIN };
+        for (of, strand) in strands {
+            let begin = || hairs.get(of.0).ok().map(|pose| (*pose.now(), nowhere));
+            let p = strand.positions();
+            if let Some(index) = all.index(of.0, begin)
+                && let [Some(root), Some(middle), Some(tip)] =
+                    [p.first(), p.get(p.len() / 2), p.last()]
+            {
+                let (pose, bounds): &mut (Pose, Self) = &mut all.values[index];
+                for place in [root, middle, tip].map(|p| pose.point_out(*p)) {
+                    bounds.low = bounds.low.min(place);
+                    bounds.high = bounds.high.max(place);
+                    bounds.lowest = bounds.lowest.max(place.dot(down));
+                }
+            }
+        }
+        let mut all: Vec<Self> = all.values.into_iter().map(|(_, bounds)| bounds).collect();
+        if all.is_empty() {
+            all.push(Self { low: Vec3::ZERO, high: Vec3::ZERO, lowest: f32::INFINITY });
+        }
+        all
+    }
+
+    fn is_near(&self, place: Vec3, down: Vec3, rules: &DropletRules) -> bool {
+        let apart = (self.low - place).max(place - self.high).max_element();
+        apart <= rules.removal_distance && place.dot(down) <= self.lowest + rules.removal_depth
+    }
+}
+
+/// Whether a falling drop may still come to any hair. `last` is the hair that one was near to: drops that
+/// are near each other mostly are near the same.
+fn near_any(
+    bounds: &[HairBounds],
+    last: &mut usize,
+    drop: &Droplet,
     down: Vec3,
-) -> Option<f32> {
-    let mut poses = PerHair::default();
-    let depths = strands.iter().filter_map(|(of, strand)| {
-        let pose = poses.index(of.0, || hairs.get(of.0).ok().map(|pose| *pose.now()))?;
-        let p = strand.positions();
-        let places = [p.first()?, p.get(p.len() / 2)?, p.last()?];
-        let pose: &Pose = &poses.values[pose];
-        Some(places.map(|p| pose.point_out(*p).dot(down)).into_iter().fold(f32::MIN, f32::max))
-    });
-    depths.reduce(f32::max)
+    rules: &DropletRules,
+) -> bool {
+    let is_near = |of: &HairBounds| of.is_near(drop.position, down, rules);
+    if bounds.get(*last).is_some_and(is_near) {
+        return true;
+    }
+    let found = bounds.iter().position(is_near);
+    *last = found.unwrap_or(*last);
+    found.is_some()
 }
 
 /// Where on its strand a droplet has slid to, and whether it stays attached: at the tip it hangs,
@@ -261,6 +309,30 @@ mod tests {
     use super::*;
     use crate::solver::rod::obstacle::Solid;
     use proptest::prelude::*;
+
+    #[test]
+    fn drops_are_kept_near_any_hair_above_its_own_depth() {
+        let at = |place: Vec3| HairBounds { low: place, high: place + 1.0, lowest: -place.y };
+        let bounds = [at(Vec3::ZERO), at(Vec3::new(5000.0, 800.0, 0.0))];
+        let (rules, mut last) = (DropletRules::default(), 0);
+        let mut is_kept = |place| {
+            let drop = Droplet::ball(place, 1e-3);
+            near_any(&bounds, &mut last, &drop, Vec3::NEG_Y, &rules)
+        };
+        for (place, kept) in [
+            (Vec3::Y * -4.0, true),
+            (Vec3::Y * -6.0, false),
+            (Vec3::new(5000.0, 900.0, 99.0), true),
+            (Vec3::new(5000.0, 900.0, 102.0), false),
+            // Far below the hair on the mountain, though above that in the valley.
+            (Vec3::new(5000.0, 794.0, 0.0), false),
+            (Vec3::new(2500.0, 10.0, 0.0), false),
+            (Vec3::Y * 100.0, true),
+            (Vec3::NAN, false),
+        ] {
+            assert_eq!(is_kept(place), kept, "{place}");
+        }
+    }
 
     proptest! {
         /// Solids far from a drop are left out, also where one pushes it far.

@@ -61,13 +61,13 @@ pub(super) fn submerge(
     *had_volumes = !volumes.are_none();
     let gravity = gravity.clamped().0.length();
     let water_of = |hair: Entity| {
-        let pose = hairs.get(hair).ok()?.now();
+        let (frame, dt) = (hairs.get(hair).ok()?, steps.of(hair).map(|step| step.dt));
         let wetting = wetting.of(hair);
         Some(LocalWater {
-            volumes: volumes.seen_from(pose),
+            volumes: volumes.seen_from(frame),
             lock: wetting.lock(),
             film: AFTER_DRIP * clinging(wetting.bundle(1.0), gravity),
-            dt: steps.of(hair).map(|step| step.dt),
+            dt,
         })
     };
     let gained = for_each_part(
@@ -105,7 +105,7 @@ fn immerse(
 ) -> [f64; 2] {
     let nodes = strand.nodes();
     let root = strand.positions().first().copied().unwrap_or(Vec3::NAN);
-    let near = water.volumes.depth(root).is_some_and(|(depth, _)| depth > -strand.length());
+    let near = water.volumes.depth(root).is_some_and(|depth| depth > -strand.length());
     if nodes < 2 || (!near && added.in_water.is_empty()) {
         return [0.0; 2];
     }
@@ -119,7 +119,7 @@ fn immerse(
         let place = positions[i];
         let segment = |i: Option<usize>| i.and_then(|i| lengths.get(i)).copied().unwrap_or(0.0);
         let own = 0.5 * (segment(i.checked_sub(1)) + segment(Some(i)));
-        let depth = water.volumes.depth(place);
+        let depth = water.volumes.water(place);
         // Over half the segments on either side.
         let share = depth.map_or(0.0, |(depth, _)| (0.5 + depth / own.max(1e-6)).clamp(0.0, 1.0));
         let before = added.in_water[i];
@@ -134,7 +134,7 @@ fn immerse(
                 let velocity = &mut strand.velocities_mut()[i];
                 let tangent = (b - a).normalize_or(Vec3::Y);
                 let (slowed, in_water) =
-                    water.lock.immerse(*velocity, tangent, load, (share, medium), dt);
+                    water.lock.immerse(*velocity, tangent, load, (share, &medium), dt);
                 (*velocity, added.in_water[i]) = (slowed, in_water);
             }
         }

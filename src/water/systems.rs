@@ -15,6 +15,7 @@ use crate::{
     base::{
         schedule::{HairStep, HairSystems, HairTick, first_substep},
         setting,
+        stretch::{self, Stretch},
     },
     forces::environment::vapour::DryingAir,
     hair::strand::{
@@ -37,6 +38,8 @@ impl Plugin for WaterPlugin {
         setting::component::<Shower>(app);
         keep_required::<Shower, TickPose>(app);
         setting::component::<WaterVolume>(app);
+        keep_required::<WaterVolume, Stretch<WaterVolume>>(app);
+        stretch::plugin::<WaterVolume>(app);
         app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
             .init_resource::<FoundWater>()

@@ -67,3 +67,4 @@ mod wear;
 mod wind;
 mod without_a_device;
 mod worlds;
+mod worlds_shapes;

@@ -22,8 +22,8 @@ setting! {
     /// which makes that tick slow; one with large openings has no inside and is a fault.
     /// They are removed with the collider, its body or this component, and while the collider has
     /// [`ColliderDisabled`]. Unsupported shapes are reported once as
-    /// [`FaultKind::Collider`](crate::FaultKind::Collider). As for any hair collider a non-uniform scale
-    /// counts as its mean. Hair does not push bodies.
+    /// [`FaultKind::Collider`](crate::FaultKind::Collider). A non-uniform scale acts as
+    /// on any hair collider. Hair does not push bodies.
     ///
     /// ```
     /// # use avian3d::prelude::*; use bevy::prelude::*; use bevy_keratin::prelude::*;

@@ -2,7 +2,10 @@
 
 use super::{ConvexHull, DistanceGrid, bake::HullError};
 use crate::{
-    base::setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+    base::{
+        setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+        stretch::{Stretch, Stretched},
+    },
     hair::strand::TickPose,
 };
 use bevy::prelude::*;
@@ -12,6 +15,11 @@ setting! {
     /// may move, turn and scale it; axes of capsule and cylinder are along Y, a plane's solid side is
     /// against its normal.
     ///
+    /// Scaled unevenly a ball is an ellipsoid, a capsule is longer or shorter with ends as round as before,
+    /// and the edges of a box are as round as the smallest scale makes them; distances to a grid are to first
+    /// order. What cannot be as drawn, a capsule or cylinder squashed across or anything sheared, is
+    /// reported with the scale that it has instead.
+    ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
     /// # fn setup(mut commands: Commands) {
@@ -20,7 +28,7 @@ setting! {
     /// ```
     #[derive(Component, Reflect, Clone, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    #[require(Transform, TickPose)]
+    #[require(Transform, TickPose, Stretch<Self>)]
     pub struct HairCollider {
         /// Its shape, in the units of its transform.
         pub shape: ColliderShape = ColliderShape::Sphere(Sphere { radius: 0.09 })
@@ -208,5 +216,57 @@ impl HairCollider {
 impl From<ColliderShape> for HairCollider {
     fn from(shape: ColliderShape) -> Self {
         Self { shape, ..default() }
+    }
+}
+
+impl Stretched for HairCollider {
+    fn suitable(&self, factors: Vec3) -> Vec3 {
+        let across = (factors.x * factors.z).sqrt();
+        let of_radii = |radii: Vec3| {
+            let scaled = radii * factors;
+            scaled.max(Vec3::splat(scaled.max_element() / ColliderShape::MAX_RATIO)) / radii
+        };
+        match &self.shape {
+            ColliderShape::Sphere(s) => of_radii(Vec3::splat(s.radius)),
+            ColliderShape::Ellipsoid { radii } => of_radii(*radii),
+            // At least as long as it is thick.
+            ColliderShape::Capsule(Capsule3d { radius, half_length }) => {
+                let along = factors.y.max(across * radius / (radius + half_length));
+                Vec3::new(across, along, across)
+            }
+            ColliderShape::Cylinder(_) => Vec3::new(across, factors.y, across),
+            ColliderShape::Plane(_)
+            | ColliderShape::Cuboid { .. }
+            | ColliderShape::Hull(_)
+            | ColliderShape::Grid(_) => factors,
+        }
+    }
+
+    fn stretched(self, by: Vec3) -> Self {
+        let shape = match self.shape {
+            ColliderShape::Sphere(s) => ColliderShape::Ellipsoid { radii: s.radius * by },
+            ColliderShape::Ellipsoid { radii } => ColliderShape::Ellipsoid { radii: radii * by },
+            ColliderShape::Capsule(Capsule3d { radius, half_length }) => {
+                let end = (radius + half_length) * by.y;
+                let radius = radius * by.x;
+                let half_length = (end - radius).max(0.0);
+                ColliderShape::Capsule(Capsule3d { radius, half_length })
+            }
+            ColliderShape::Cylinder(Cylinder { radius, half_height }) => {
+                let (radius, half_height) = (radius * by.x, half_height * by.y);
+                ColliderShape::Cylinder(Cylinder { radius, half_height })
+            }
+            ColliderShape::Plane(InfinitePlane3d { normal }) => {
+                let normal = Dir3::new(*normal / by).unwrap_or(normal);
+                ColliderShape::Plane(InfinitePlane3d { normal })
+            }
+            ColliderShape::Cuboid { cuboid, rounding } => ColliderShape::Cuboid {
+                cuboid: Cuboid { half_size: cuboid.half_size * by },
+                rounding: rounding * by.min_element(),
+            },
+            ColliderShape::Hull(hull) => ColliderShape::Hull(hull.stretched(by)),
+            ColliderShape::Grid(grid) => ColliderShape::Grid(grid.stretched(by)),
+        };
+        Self { shape, ..self }
     }
 }

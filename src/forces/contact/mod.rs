@@ -21,7 +21,7 @@ pub(crate) use {
     lanes::WetRow,
     model::{Bridged, Film},
     reach::{Colliders, HairReach},
-    systems::seen_from,
+    systems::{PlacedCollider, seen_from},
 };
 
 use crate::{base::setting::setting, solver::rod::obstacle::Obstacle};

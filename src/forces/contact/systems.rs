@@ -14,7 +14,8 @@ use crate::{
             EffectiveSubstep, EffectiveSubsteps, HairStep, HairSystems, HairTick, SettleTick,
             first_substep,
         },
-        setting::{self, Ranged, Settings},
+        setting::{self, Settings},
+        stretch::{self, Stretch},
     },
     hair::strand::{
         Hair, HairHere, MotionOwner, Regroomed, SleepCounts, SleepPose, Strand, StrandOf,
@@ -25,7 +26,7 @@ use crate::{
         shape::{Placed, Shape},
     },
 };
-use bevy::prelude::*;
+use bevy::{ecs::query::QueryData, prelude::*};
 
 /// Strands do not touch each other where more than so many are followers for each one that is not: the
 /// guides of background hair are centimetres apart.
@@ -50,6 +51,8 @@ impl Plugin for ContactPlugin {
         super::avian::plugin(app);
         setting::component::<HairCollider>(app);
         keep_required::<HairCollider, TickPose>(app);
+        keep_required::<HairCollider, Stretch<HairCollider>>(app);
+        stretch::plugin::<HairCollider>(app);
         keep_required::<Hair, Obstacles>(app);
         keep_required::<Hair, LockNeighbours>(app);
         keep_required::<Hair, HairReach>(app);
@@ -84,6 +87,21 @@ impl Plugin for ContactPlugin {
                     push_strands_apart.in_set(HairSystems::StrandContact),
                 ),
             );
+    }
+}
+
+/// A collider where it is.
+#[derive(QueryData)]
+pub(crate) struct PlacedCollider {
+    collider: &'static HairCollider,
+    stretch: &'static Stretch<HairCollider>,
+    pub(crate) pose: &'static TickPose,
+}
+
+impl PlacedColliderItem<'_, '_> {
+    /// With valid values, as it acts where its pose has the mean scale.
+    pub(crate) fn collider(&self) -> HairCollider {
+        self.stretch.of(self.collider)
     }
 }
 
@@ -147,10 +165,11 @@ fn find_reach(
 /// strands.
 fn choose_colliders(
     step: Res<HairStep>,
-    colliders: Query<(Entity, &HairCollider, &TickPose)>,
+    colliders: Query<(Entity, PlacedCollider)>,
     mut hairs: Query<(&TickPose, &HairReach, &MotionOwner, &mut Obstacles), With<Hair>>,
 ) {
-    let valid: Vec<_> = colliders.iter().map(|(id, c, pose)| (c.clamped(), pose, id)).collect();
+    let valid: Vec<_> =
+        colliders.iter().map(|(id, placed)| (placed.collider(), placed.pose, id)).collect();
     let all = Colliders::new(step.count, valid.iter().map(|(c, pose, id)| (c, *pose, *id)));
     let mut scratch = Vec::new();
     for (pose, reach, owner, mut obstacles) in &mut hairs {
@@ -163,7 +182,7 @@ fn choose_colliders(
 
 fn gather_obstacles(
     steps: EffectiveSubsteps,
-    colliders: Query<(&HairCollider, &TickPose)>,
+    colliders: Query<PlacedCollider>,
     mut hairs: Query<(Entity, &TickPose, &mut Obstacles), With<Hair>>,
 ) {
     for (hair, pose, mut obstacles) in &mut hairs {
@@ -172,7 +191,7 @@ fn gather_obstacles(
             let Obstacles { solids, near } = &mut *obstacles;
             let near = colliders.iter_many(near);
             solids.clear();
-            solids.extend(near.map(|(collider, at)| seen_from(pose, &collider.clamped(), at)));
+            solids.extend(near.map(|placed| seen_from(pose, &placed.collider(), placed.pose)));
         }
     }
 }

@@ -6,7 +6,7 @@ use super::{
     gust::gust,
 };
 use crate::{
-    base::{schedule::HairStep, setting::Ranged},
+    base::{schedule::HairStep, setting::Ranged, stretch::Stretch},
     hair::strand::{Pose, TickPose},
 };
 use bevy::{ecs::system::SystemParam, math::DVec3, prelude::*};
@@ -50,7 +50,7 @@ pub struct WindTravel(pub DVec3);
 pub(crate) struct Winds<'w, 's> {
     wind: Option<Res<'w, HairWind>>,
     blowers: Query<'w, 's, (&'static Blower, &'static TickPose)>,
-    zones: Query<'w, 's, (&'static WindZone, &'static TickPose)>,
+    zones: Query<'w, 's, (&'static WindZone, &'static Stretch<WindZone>, &'static TickPose)>,
     travel: Option<Res<'w, WindTravel>>,
     step: Res<'w, HairStep>,
 }
@@ -74,13 +74,12 @@ impl Winds<'_, '_> {
 
     /// Whether any source sets the bonds of dry hair.
     pub(crate) fn dry(&self) -> bool {
-        !self.blowers.is_empty() || self.zones.iter().any(|(zone, _)| zone.drying > 0.0)
+        !self.blowers.is_empty() || self.zones.iter().any(|(zone, ..)| zone.drying > 0.0)
     }
 
     /// Seen from a frame.
     pub(crate) fn seen_from(&self, frame: &TickPose) -> LocalWinds {
         let pose = frame.now();
-        let [moving, turning] = frame.inertia().to_array();
         let blowers = (self.blowers.iter())
             .map(|(blower, at)| (blower.clamped(), at.now()))
             .filter(|(blower, _)| blower.strength > 0.0)
@@ -89,12 +88,12 @@ impl Winds<'_, '_> {
                 aim: pose.direction_in(at.direction_out(Vec3::NEG_Z)),
                 blower,
             });
-        let zones = self.zones.iter().map(|(zone, frame)| {
-            let at = frame.now();
+        let zones = self.zones.iter().map(|(zone, stretch, moved)| {
+            let (at, [velocity, spin]) = (moved.now(), frame.carried_by(moved));
             LocalZone {
-                zone: zone.clamped(),
-                velocity: pose.direction_in(frame.velocity() * moving),
-                spin: pose.rotation.inverse() * frame.spin() * (turning * pose.size()),
+                zone: stretch.of(zone),
+                velocity,
+                spin,
                 rotation: at.rotation.inverse() * pose.rotation,
                 origin: pose.point_in(at.translation),
                 scale: pose.scale / at.scale,
@@ -110,7 +109,7 @@ impl Winds<'_, '_> {
             settings,
             travelled: travelled + settings.velocity.as_dvec3() * seconds,
             pose: *pose,
-            headwind: pose.direction_in(frame.velocity() * moving) * (pose.size().recip() - 1.0),
+            headwind: frame.headwind(),
         }
     }
 }

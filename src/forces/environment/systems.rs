@@ -12,6 +12,7 @@ use crate::{
         parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, first_substep},
         setting::{self, Ranged, Settings},
+        stretch::{self, Stretch},
     },
     hair::strand::{
         AddedMass, FollowsHere, Hair, PerHair, ShiftWorld, SimulatedHere, Strand, StrandOf,
@@ -42,6 +43,8 @@ impl Plugin for EnvironmentPlugin {
         keep_required::<Strand, BlownAir>(app);
         keep_required::<Blower, TickPose>(app);
         keep_required::<WindZone, TickPose>(app);
+        keep_required::<WindZone, Stretch<WindZone>>(app);
+        stretch::plugin::<WindZone>(app);
         app.register_type::<WindReceived>()
             .register_type::<ZoneShape>()
             .register_type::<BlownAir>()

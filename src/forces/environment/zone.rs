@@ -1,7 +1,10 @@
 //! Global wind, and zones with air of their own.
 
 use crate::{
-    base::setting::{InvalidValue, Ranged, setting},
+    base::{
+        setting::{InvalidValue, Ranged, setting},
+        stretch::{Stretch, Stretched},
+    },
     hair::strand::TickPose,
 };
 use bevy::prelude::*;
@@ -93,14 +96,15 @@ setting! {
     /// ```
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    #[require(Transform, TickPose)]
+    #[require(Transform, TickPose, Stretch<Self>)]
     pub struct WindZone {
         /// Its shape.
         pub shape: ZoneShape = ZoneShape::default();
-        /// Half its size along each of its axes, scaled with its transform.
+        /// Half its size along each of its axes, scaled with its transform, unevenly too; a sheared one
+        /// acts at right angles and is reported.
         pub half_size: Vec3 = Vec3::ONE, "m" in HALF_SIZE: 1e-3..=1e6, safe 0.1..=100.0,
             "1 is as large as a person";
-        /// Distance outside the shape over which it fades out.
+        /// Distance outside the shape over which it fades out, scaled with the mean of its transform.
         pub falloff: f32 = 0.5, "m" in FALLOFF: 0.0..=1e6, safe 0.0..=10.0, "0.5 is soft";
         /// Velocity of its air along its axes, added to the global wind.
         pub velocity: Vec3 = Vec3::ZERO, "m/s" in VELOCITY: -300.0..=300.0, safe -20.0..=20.0,
@@ -164,6 +168,16 @@ impl WindZone {
     /// Radius around its centre within which it acts (m).
     pub(super) fn reach(&self) -> f32 {
         self.shape.reach(self.half_size) + self.falloff
+    }
+}
+
+impl Stretched for WindZone {
+    fn suitable(&self, factors: Vec3) -> Vec3 {
+        factors
+    }
+
+    fn stretched(self, by: Vec3) -> Self {
+        Self { half_size: self.half_size * by, ..self }
     }
 }
 

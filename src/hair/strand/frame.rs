@@ -445,9 +445,22 @@ impl TickPose {
         velocity[0] + spin[0].cross(place - self.now.translation)
     }
 
-    /// The shares of its translation and rotation that act on its hair.
-    pub(crate) fn inertia(&self) -> Vec2 {
-        self.inertia
+    /// How air or water moves here that another pose carries, by the shares of motion that act on
+    /// hair: its velocity at that pose (m/s), and its spin, which times a distance here is one.
+    pub(crate) fn carried_by(&self, other: &Self) -> [Vec3; 2] {
+        let PoseMotion { velocity, spin } = other.motion();
+        let spin = self.now.rotation.inverse() * spin[0];
+        [
+            self.now.direction_in(velocity[0] * self.inertia.x),
+            spin * (self.inertia.y * self.now.size()),
+        ]
+    }
+
+    /// What is added here to the velocity of air and water, so that a headwind counts in metres a second
+    /// at any scale of the hair, as wind and currents do; zero at scale 1.
+    pub(crate) fn headwind(&self) -> Vec3 {
+        let motion = self.now.direction_in(self.velocity() * self.inertia.x);
+        motion * (self.now.size().recip() - 1.0)
     }
 
     /// Advances to the share `t` of the tick's motion; the substep continues while a hair `waits`

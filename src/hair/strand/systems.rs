@@ -8,7 +8,7 @@ use super::{
     held::report_out_of_reach,
     keep_required,
     owner_systems::{begin_settling, end_settling, update_owners},
-    teleport::shift_poses,
+    teleport::{ShiftWorld, shift_poses},
 };
 use crate::base::{
     fault::{FaultKind, HairChecks, HairFault},
@@ -52,6 +52,7 @@ impl Plugin for StrandPlugin {
         keep_required::<HeldNodes, HeldNodesState>(app);
         app.register_type::<Hair>()
             .register_type::<TickPose>()
+            .register_type::<ShiftWorld>()
             .register_type::<Strand>()
             .register_type::<StrandOf>()
             .register_type::<Strands>()

@@ -6,7 +6,10 @@ mod winding;
 pub use systems::TreatmentPlugin;
 
 use crate::{
-    base::setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+    base::{
+        setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+        stretch::{Stretch, Stretched},
+    },
     hair::strand::{HeldNodes, Strand, TickPose},
     keratin::bond::{BondKind, JointBonds},
 };
@@ -176,10 +179,11 @@ impl Treatments {
 
 setting! {
     /// A cylinder along Y that strands are wound on: see [`PermWinding`]. Despawn it to release
-    /// them.
+    /// them. It is as round as it is told: an uneven scale of its transform counts by its mean, which is
+    /// reported.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    #[require(Transform, TickPose)]
+    #[require(Transform, TickPose, Stretch<Self>)]
     pub struct PermRod {
         /// Radius. A joint bends by 2 asin(l/2R): keep segments below 1.7 times the radius.
         pub radius: f32 = 0.03, "m" in RADIUS: 1e-3..=10.0, safe 0.003..=0.1,
@@ -197,6 +201,16 @@ impl PermRod {
     /// When one is outside [`RADIUS`](Self::RADIUS) or [`LENGTH`](Self::LENGTH).
     pub fn new(radius: f32, length: f32) -> Result<Self, InvalidValue> {
         Self { radius, length }.checked()
+    }
+}
+
+impl Stretched for PermRod {
+    fn suitable(&self, _: Vec3) -> Vec3 {
+        Vec3::ONE
+    }
+
+    fn stretched(self, _: Vec3) -> Self {
+        self
     }
 }
 

@@ -10,6 +10,7 @@ use crate::{
         parallel::{Nanos, for_each},
         schedule::{HairProcessTime, HairStep, HairSystems, HairTick, lacks},
         setting::{self, Ranged, report},
+        stretch::{self, Stretch},
     },
     hair::strand::{
         HeldNodes, Here, MissedOnGpu, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required,
@@ -32,6 +33,8 @@ impl Plugin for TreatmentPlugin {
         setting::component::<PermWinding>(app);
         keep_required::<Strand, Treatments>(app);
         keep_required::<PermRod, TickPose>(app);
+        keep_required::<PermRod, Stretch<PermRod>>(app);
+        stretch::plugin::<PermRod>(app);
         app.add_message::<HairTreatment>()
             .init_resource::<MissedOnGpu<HairTreatment>>()
             .register_type::<HairTreatment>()

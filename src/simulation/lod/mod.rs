@@ -105,9 +105,9 @@ setting! {
         /// tip by 0.5 mm.
         pub iterations: u32 = 2, in ITERATIONS: 1.0..=1000.0, safe 2.0..=5.0,
             "2 are enough from afar";
-        /// How many substeps are taken as one, if that is more than
-        /// [`HairSolver::substep`](crate::HairSolver::substep) takes anyway. The last of a tick may be
-        /// shorter. Rods that are solved directly settle to the same shape in longer ones; by
+        /// How many substeps are taken as one at most, if that is more than
+        /// [`HairSolver::substep`](crate::HairSolver::substep) takes anyway: a tick is divided into as few
+        /// as that allows, as alike as can be. Rods that are solved directly settle to the same shape in longer ones; by
         /// [`Sweeps`](crate::Sweeps) hair sags more, the same tip by 8 mm at 2, 2 cm at 3.
         pub substeps: u32 = 2, in SUBSTEPS: 1.0..=1000.0, safe 1.0..=3.0, "2 makes three of six";
         /// Share of the hair's strands that are simulated, rounded up; the others follow those, see the

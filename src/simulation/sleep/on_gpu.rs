@@ -5,12 +5,9 @@ use super::{
     systems::{RestSettings, SeenCollider, SleepSnapshot, WakeEvents},
 };
 use crate::{
-    base::{
-        schedule::{HairStep, HairSystems, HairTick, first_substep},
-        setting::Ranged,
-    },
+    base::schedule::{HairStep, HairSystems, HairTick, first_substep},
     forces::{
-        contact::{Colliders, HairCollider, HairReach},
+        contact::{Colliders, HairReach, PlacedCollider},
         environment::Winds,
     },
     hair::strand::{HairOnGpu, Strands, TickPose},
@@ -46,7 +43,7 @@ pub(crate) fn watch_on_gpu(app: &mut App) {
 fn watch(
     step: Res<HairStep>,
     settings: RestSettings,
-    colliders: Query<(&HairCollider, &TickPose)>,
+    colliders: Query<PlacedCollider>,
     winds: Winds,
     mut hairs: Query<
         (
@@ -63,7 +60,7 @@ fn watch(
     if hairs.is_empty() {
         return;
     }
-    let valid: Vec<_> = colliders.iter().map(|(c, pose)| (c.clamped(), pose)).collect();
+    let valid: Vec<_> = colliders.iter().map(|placed| (placed.collider(), placed.pose)).collect();
     let all = valid.iter().map(|item| (&item.0, item.1, item));
     let (colliders, mut scratch) = (Colliders::new(step.count, all), Vec::new());
     for (hair, frame, mut snapshot, mut disturbance, members, reach) in &mut hairs {

@@ -8,10 +8,10 @@ use crate::{
     base::{
         parallel::{Nanos, for_each},
         schedule::{HairStep, HairSystems, HairTick, first_substep, lacks},
-        setting::{self, Ranged, Settings},
+        setting::{self, Settings},
     },
     forces::{
-        contact::{Colliders, HairCollider, HairReach, StrandContact, seen_from},
+        contact::{Colliders, HairCollider, HairReach, PlacedCollider, StrandContact, seen_from},
         environment::{AirDrag, Gravity, LocalWinds, Winds},
     },
     hair::strand::{
@@ -241,7 +241,7 @@ struct SleepCandidate<'a> {
 fn update_sleep(
     step: Res<HairStep>,
     settings: RestSettings,
-    colliders: Query<(&HairCollider, &TickPose)>,
+    colliders: Query<PlacedCollider>,
     winds: Winds,
     mut hairs: Query<
         (
@@ -269,7 +269,7 @@ fn update_sleep(
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
-    let valid: Vec<_> = colliders.iter().map(|(c, pose)| (c.clamped(), pose)).collect();
+    let valid: Vec<_> = colliders.iter().map(|placed| (placed.collider(), placed.pose)).collect();
     let all = valid.iter().map(|item| (&item.0, item.1, item));
     let (colliders, mut scratch) = (Colliders::new(step.count, all), Vec::new());
     for (hair, frame, mut snapshot, sleepers, members, reach) in &mut hairs {

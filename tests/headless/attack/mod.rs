@@ -397,8 +397,8 @@ fn what_goes_on_is_reported_once() {
 
     // Drops that fall for ever without bounds.
     let mut app = test_app(60.0);
-    let [min, max] = [Vec3::NEG_INFINITY, Vec3::INFINITY];
-    app.insert_resource(DropletRules { min, max, ..default() });
+    let removal_distance = f32::INFINITY;
+    app.insert_resource(DropletRules { removal_distance, ..default() });
     app.insert_resource(HairGravity(Vec3::Y * -1e6));
     app.world_mut().spawn(Droplet::new(Vec3::ZERO, 1e-3).unwrap());
     app.world_mut().spawn(Droplet::new(Vec3::Y * -999_999.0, 1e-3).unwrap());
@@ -409,7 +409,7 @@ fn what_goes_on_is_reported_once() {
     // Hair at the end of the world, dry and wet.
     let mut app = test_app(60.0);
     let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
-    app.insert_resource(DropletRules { min, max, ..default() });
+    app.insert_resource(DropletRules { removal_distance, ..default() });
     app.world_mut().spawn(Droplet::new(Vec3::X * 0.1, 4e-9).unwrap());
     app.world_mut().write_message(SoakHair { target: hair, wetness: 0.5 });
     run(&mut app, 0.1);

@@ -15,7 +15,11 @@ use std::sync::Arc;
 #[derive(Reflect, Clone, Debug)]
 #[reflect(opaque)]
 #[reflect(Clone, PartialEq, Debug)]
-pub struct DistanceGrid(Arc<Samples>);
+pub struct DistanceGrid {
+    samples: Arc<Samples>,
+    /// How much larger the surface is than the samples' along the axes.
+    stretch: Vec3,
+}
 
 #[derive(PartialEq)]
 struct Samples {
@@ -42,7 +46,8 @@ impl core::fmt::Debug for Samples {
 
 impl PartialEq for DistanceGrid {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0) || self.0 == other.0
+        self.stretch == other.stretch
+            && (Arc::ptr_eq(&self.samples, &other.samples) || self.samples == other.samples)
     }
 }
 
@@ -57,17 +62,24 @@ impl DistanceGrid {
     ) -> Self {
         debug_assert_eq!(distances.len(), points.element_product() as usize);
         let thickness = -distances.iter().copied().fold(-cell, f32::min);
-        Self(Arc::new(Samples { origin, cell, points, distances, low, high, thickness }))
+        let samples = Samples { origin, cell, points, distances, low, high, thickness };
+        Self { samples: Arc::new(samples), stretch: Vec3::ONE }
+    }
+
+    /// Larger by these factors along the axes. Distances are then of first order: those of the samples
+    /// over the length of their gradient.
+    pub(crate) fn stretched(&self, by: Vec3) -> Self {
+        Self { stretch: self.stretch * by, ..self.clone() }
     }
 
     /// Spacing of its points (m).
     pub fn cell(&self) -> f32 {
-        self.0.cell
+        self.samples.cell * self.stretch.min_element()
     }
 
     /// Number of points along each axis.
     pub fn points(&self) -> UVec3 {
-        self.0.points
+        self.samples.points
     }
 
     /// The signed distance of a point to the surface (m), negative inside.
@@ -76,24 +88,54 @@ impl DistanceGrid {
     }
 
     pub(super) fn bounds(&self) -> (Vec3, Vec3) {
-        (0.5 * (self.0.low + self.0.high), 0.5 * (self.0.high - self.0.low))
+        let Samples { low, high, .. } = *self.samples;
+        (0.5 * (low + high) * self.stretch, 0.5 * (high - low) * self.stretch)
     }
 
     /// An upper bound of its extent from the origin.
     pub(crate) fn reach(&self) -> f32 {
-        self.0.low.abs().max(self.0.high.abs()).length()
+        (self.samples.low.abs().max(self.samples.high.abs()) * self.stretch).length()
     }
 
     /// Half of the thickest part, at most of four cells, so that continuous collision also covers
     /// thinner parts.
     pub(super) fn thickness(&self) -> f32 {
-        self.0.thickness.min(4.0 * self.0.cell)
+        self.samples.thickness.min(4.0 * self.samples.cell) * self.stretch.min_element()
     }
 
     /// The normalised gradient of the distance, and the distance.
     #[inline(always)]
     pub(super) fn sample<R: Real>(&self, p: V3<R>) -> (V3<R>, R) {
-        let Samples { origin, cell, points, distances, .. } = &*self.0;
+        if self.stretch == Vec3::ONE {
+            return self.samples.at(p);
+        }
+        let (normal, distance) = self.samples.at(self.squeezed(p));
+        let slope = self.squeezed(normal);
+        let shorter = p.x.lit(1.0) / slope.dot(slope).sqrt();
+        (slope.scale(shorter), distance * shorter)
+    }
+
+    /// A distance within which the surface is not, but for the interpolation: negative inside.
+    #[inline(always)]
+    pub(super) fn free<R: Real>(&self, p: V3<R>) -> R {
+        if self.stretch == Vec3::ONE {
+            return self.samples.at(p).1;
+        }
+        self.samples.at(self.squeezed(p)).1 * p.x.lit(self.stretch.min_element().into())
+    }
+
+    #[inline(always)]
+    fn squeezed<R: Real>(&self, v: V3<R>) -> V3<R> {
+        let by = splat(v.x, self.stretch.recip());
+        V3::new(v.x * by.x, v.y * by.y, v.z * by.z)
+    }
+}
+
+impl Samples {
+    /// As [`DistanceGrid::sample`], without a stretch.
+    #[inline(always)]
+    fn at<R: Real>(&self, p: V3<R>) -> (V3<R>, R) {
+        let Self { origin, cell, points, distances, .. } = self;
         let lit = |value: f32| p.x.lit(value.into());
         let (zero, one) = (lit(0.0), lit(1.0));
         let at = (p - splat(p.x, *origin)).scale(lit(1.0 / cell));

@@ -43,6 +43,21 @@ impl ConvexHull {
         self.0.planes.iter().map(|plane| (plane.truncate(), plane.w))
     }
 
+    /// Larger by these factors along the axes.
+    pub(crate) fn stretched(&self, by: Vec3) -> Self {
+        let Planes { planes, low, high, thickness } = &*self.0;
+        let stretched = |plane: &Vec4| {
+            let normal = plane.truncate() / by;
+            normal.extend(plane.w) / normal.length()
+        };
+        Self(Arc::new(Planes {
+            planes: planes.iter().map(stretched).collect(),
+            low: *low * by,
+            high: *high * by,
+            thickness: thickness * by.min_element(),
+        }))
+    }
+
     pub(super) fn bounds(&self) -> (Vec3, Vec3) {
         (0.5 * (self.0.low + self.0.high), 0.5 * (self.0.high - self.0.low))
     }

@@ -132,7 +132,7 @@ impl Shape {
                 let whole = way.dot(way).sqrt().max(lit(1e-12));
                 let mut share = zero;
                 for _ in 0..MARCH {
-                    let (_, free) = grid.sample(way.scale_add(share, start));
+                    let free = grid.free(way.scale_add(share, start));
                     share = (share + free.max(lit(0.25 * grid.cell())) / whole).min(one);
                 }
                 share
@@ -322,7 +322,7 @@ impl Placed {
                             return far;
                         }
                         // Interpolated distances have a gradient of at most √3.
-                        let (_, free) = grid.sample(p);
+                        let free = grid.free(p);
                         far | Real::lt(distance * lit(1.733), free)
                     }
                 }
@@ -736,6 +736,45 @@ mod tests {
         let flat = Shape::Ellipsoid { radii: Vec3::new(1.0, 1e-3, 0.5) };
         assert!((distance(&flat, Vec3::new(0.0, 2e-3, 0.0)).1 - 1e-3).abs() < 1e-6);
         assert!((distance(&flat, Vec3::ZERO).1 + 1e-3).abs() < 1e-6);
+    }
+
+    /// Whether stretched shapes are those of stretched surfaces.
+    #[test]
+    fn stretched_shapes_have_stretched_surfaces() {
+        let by = Vec3::new(2.0, 0.4, 1.25);
+        let points: Vec<Vec3> = (0..40)
+            .map(|k| {
+                let share = |n: usize| (k as f32 * [0.754_877, 0.569_84, 0.346_1][n]).fract();
+                Vec3::new(share(0), share(1), share(2)) * 0.2 - 0.07
+            })
+            .collect();
+        let stretched: Vec<Vec3> = points.iter().map(|p| *p * by).collect();
+        let [a, b] = [points, stretched].map(|points| ConvexHull::new(&points).unwrap());
+        let (a, b) = (Shape::Hull(a.stretched(by)), Shape::Hull(b));
+        let grid = pear().stretched(by);
+        let (middle, half) = Shape::Grid(pear()).bounds();
+        assert_eq!(Shape::Grid(grid.clone()).bounds(), (middle * by, half * by));
+        assert!(grid != pear() && grid == pear().stretched(by));
+        let mut deepest = 0.0_f32;
+        for k in 0..2000 {
+            let share = |n: usize| (k as f32 * [0.754_877, 0.569_84, 0.346_1][n]).fract();
+            let p = Vec3::new(share(0), share(1), share(2)) * 0.3 - 0.15;
+            assert!((distance(&a, p * by).1 - distance(&b, p * by).1).abs() < 1e-5, "{p}");
+            // From up to a cell or two within, a few passes lead onto the surface.
+            let mut at = p * by;
+            let free = grid.free(V3::new(at.x, at.y, at.z));
+            assert!(free <= distance(&Shape::Grid(grid.clone()), at).1.max(0.0) + 1e-6);
+            if pear_distance(p) > 0.0 || pear_distance(p) < -2.0 * CELL {
+                continue;
+            }
+            for _ in 0..4 {
+                let (normal, off) = distance(&Shape::Grid(grid.clone()), at);
+                assert!((normal.length() - 1.0).abs() < 1e-4);
+                at -= normal * off.min(0.0);
+            }
+            deepest = deepest.min(pear_distance(at / by));
+        }
+        assert!(deepest > -0.35 * CELL, "{} cells", deepest / CELL);
     }
 
     /// Beside its points a grid knows distances to a fifth of its cell.
