@@ -67,7 +67,8 @@ fn place_mut(app: &mut App, id: Entity, change: impl FnOnce(&mut Transform)) {
 
 /// All rows.
 pub fn rows() -> Vec<Row> {
-    [frames(), riders(), returns(), portals(), vehicles(), scales(), hidden(), gusts()].concat()
+    [frames(), riders(), returns(), portals(), vehicles(), scales(), squashed(), hidden(), gusts()]
+        .concat()
 }
 
 /// How a head moves: at a speed, turning on its way.
@@ -534,4 +535,41 @@ pub fn gusts() -> Vec<Row> {
     };
     let [young, old] = [0.0, 10.0].map(worst);
     vec![Row::at_most("gusts that turn, after ten hours: tips (m/s²)", old, 1.6 * young)]
+}
+
+/// Line 8: on a head that is squashed and sheared, roots are where the skin is drawn, and strands keep
+/// their lengths in the world.
+pub fn squashed() -> Vec<Row> {
+    let mut app = app(60.0);
+    app.add_plugins(TransformPlugin);
+    let head = head(&mut app, 10);
+    let own: Vec<Vec3> = all(&mut app).iter().map(|strand| strand.positions()[0]).collect();
+    // A parent that turns between two scales shears.
+    let neck = app.world_mut().spawn(Transform::from_scale(Vec3::new(1.0, 1.3, 1.0))).id();
+    app.world_mut().entity_mut(head).insert(ChildOf(neck));
+    for tick in 0..90 {
+        let share = (tick as f32 / 60.0).min(1.0);
+        place_mut(&mut app, head, |place| {
+            place.scale = Vec3::new(1.0 + 0.2 * share, 1.0 - 0.3 * share, 1.0);
+            place.rotation = Quat::from_rotation_z(0.3);
+        });
+        app.update();
+    }
+    let global = |app: &App, id: Entity| app.world().get::<GlobalTransform>(id).copied();
+    let skin = global(&app, head).unwrap_or_default();
+    let hair = app.world_mut().query_filtered::<Entity, With<Hair>>().single(app.world());
+    let drawn = hair.ok().and_then(|hair| global(&app, hair)).unwrap_or_default();
+    let (mut off, mut strain) = (0.0f32, 0.0f32);
+    for (strand, own) in all(&mut app).iter().zip(&own) {
+        let root = drawn.transform_point(strand.positions()[0]);
+        off = off.max(root.distance(skin.transform_point(*own)));
+        strain = strain.max(strand.peak_strain());
+    }
+    let scales = drawn.compute_transform().scale;
+    let uneven = scales.max_element() / scales.min_element() - 1.0;
+    vec![
+        Row::at_most("squashed head: roots off the drawn skin (m)", off, 1e-4),
+        Row::at_most("squashed head: strands drawn longer along one axis", uneven, 1e-3),
+        Row::at_most("squashed head: strain", strain, 0.02),
+    ]
 }

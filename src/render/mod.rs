@@ -110,7 +110,7 @@ pub use crate::hair::look::{HairDye, HairLook, HairShading, Melanin};
 
 use crate::{
     base::{schedule::HairTicks, setting},
-    hair::strand::{Hair, lacks_strands},
+    hair::strand::{DrawnFrames, Hair, lacks_strands},
     simulation::settle::{SettlePlugin, Settling},
 };
 use bevy::{
@@ -226,6 +226,7 @@ impl Plugin for HairRenderPlugin {
         app.add_systems(PostUpdate, draw.in_set(HairRenderSystems)).configure_sets(
             PostUpdate,
             HairRenderSystems
+                .after(DrawnFrames)
                 .after(TransformSystems::Propagate)
                 .before(VisibilitySystems::VisibilityPropagate)
                 .before(AssetEventSystems),

@@ -40,6 +40,11 @@ fn wind_and_headwind_are_in_the_same_units_at_any_scale() {
 }
 
 #[test]
+fn a_squashed_head_is_drawn_as_it_is_simulated() {
+    check(measured::squashed());
+}
+
+#[test]
 fn hair_of_a_hidden_head_waits() {
     check(measured::hidden());
 }

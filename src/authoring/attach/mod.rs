@@ -19,7 +19,7 @@ pub use roots::{RootsOnMesh, TiedRoots};
 
 use crate::{
     base::schedule::{HairSystems, HairTick},
-    hair::strand::lacks_strands,
+    hair::strand::{DrawnFrames, lacks_strands},
 };
 use bevy::prelude::*;
 
@@ -44,9 +44,7 @@ impl Plugin for AttachPlugin {
             )
             .add_systems(
                 PostUpdate,
-                follow::draw_roots
-                    .after(TransformSystems::Propagate)
-                    .run_if(any_with_component::<TiedRoots>),
+                follow::draw_roots.after(DrawnFrames).run_if(any_with_component::<TiedRoots>),
             );
     }
 }

@@ -7,9 +7,10 @@
 //! points at rest in the world move the opposite way: each substep the nodes are moved by the
 //! inverse of the frame's motion, which is exactly inertia.
 
+use super::Hair;
 use crate::base::{motion::TickMoment, setting::setting};
 use bevy::{
-    math::{Affine3A, Isometry3d},
+    math::{Affine3A, Isometry3d, Mat3A},
     prelude::*,
 };
 
@@ -46,6 +47,8 @@ pub struct TickPose {
     waits: bool,
     /// Its largest size so far.
     full_size: f32,
+    /// How its transform is squashed and sheared beside the pose.
+    stretch: Mat3,
 }
 
 /// How a pose moves: velocity (m/s) and spin (rad/s), in the world and along its own axes.
@@ -113,6 +116,7 @@ impl Default for TickPose {
             came_back: false,
             waits: false,
             full_size: 0.0,
+            stretch: Mat3::IDENTITY,
         }
     }
 }
@@ -200,6 +204,40 @@ const HALF_TURN: Quat = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
 impl Default for Pose {
     fn default() -> Self {
         Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: 1.0 }
+    }
+}
+
+/// Axes count as alike and perpendicular up to this.
+const ALIKE: f32 = 1e-4;
+
+/// When the frames are known in which hair is drawn.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct DrawnFrames;
+
+/// After transforms have been propagated: hair on a head that is squashed or sheared is drawn in the frame
+/// that it is simulated in.
+pub(super) fn draw_as_simulated(
+    hairs: Query<Entity, (With<Hair>, Changed<GlobalTransform>)>,
+    mut places: Query<(&mut GlobalTransform, &Transform)>,
+    children: Query<&Children>,
+) {
+    for hair in &hairs {
+        let Ok((mut place, _)) = places.get_mut(hair) else { continue };
+        let Some(pose) = Pose::of(&place) else { continue };
+        let even = pose.affine();
+        if place.affine().matrix3.abs_diff_eq(even.matrix3, ALIKE * pose.size()) {
+            continue;
+        }
+        *place = even.into();
+        let mut todo = vec![(hair, *place)];
+        while let Some((parent, at)) = todo.pop() {
+            for child in children.get(parent).into_iter().flatten() {
+                if let Ok((mut place, own)) = places.get_mut(*child) {
+                    *place = at.mul_transform(*own);
+                    todo.push((*child, *place));
+                }
+            }
+        }
     }
 }
 
@@ -399,6 +437,17 @@ impl TickPose {
         (self.from, self.to, self.motion[0]) = (Some(from), to, motion);
         self.now = from;
         Aimed { report, jumps, settles: was_away, change }
+    }
+
+    /// Takes up how `place` is squashed and sheared beside its pose; what moves a point that is fixed to
+    /// it, if that has changed.
+    pub(super) fn stretch_to(&mut self, place: &GlobalTransform, pose: &Pose) -> Option<Mat3> {
+        let own = pose.affine().matrix3.inverse() * place.affine().matrix3;
+        let is_even = own.abs_diff_eq(Mat3A::IDENTITY, ALIKE);
+        let own = if is_even { Mat3::IDENTITY } else { Mat3::from(own) };
+        let before = core::mem::replace(&mut self.stretch, own);
+        let change = own * before.inverse();
+        (own != before && change.is_finite()).then_some(change)
     }
 
     /// Whether its hair waits for it to be shown again.

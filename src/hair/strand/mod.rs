@@ -21,6 +21,7 @@ mod strand_sleep;
 mod systems;
 mod teleport;
 
+pub(crate) use frame::DrawnFrames;
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
@@ -413,7 +414,6 @@ impl Strand {
     }
 
     /// Moves the root, with the scalp's frame.
-    #[cfg(feature = "groom")]
     pub(crate) fn put_root(&mut self, place: Vec3, frame: Quat) {
         if let Some(root) = self.positions.first_mut()
             && place.is_finite()

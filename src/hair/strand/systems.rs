@@ -4,7 +4,7 @@ use super::{
     AddedMass, Hair, HeldNodes, HeldNodesState, Here, KinematicStrand, MotionOwner, PerHair,
     Regroomed, Settling, SimulatedHere, SleepCounts, SleepPose, Strand, StrandError, StrandHistory,
     StrandModel, StrandOf, StrandSleep, Strands, TickPose,
-    frame::{Aim, HairInertia, Pose},
+    frame::{Aim, DrawnFrames, HairInertia, Pose, draw_as_simulated},
     held::report_out_of_reach,
     keep_required,
     owner_systems::{begin_settling, end_settling, update_owners},
@@ -70,6 +70,10 @@ impl Plugin for StrandPlugin {
             .add_observer(begin_settling)
             .add_observer(end_settling)
             .add_systems(HairChecks, report_unusable)
+            .add_systems(
+                PostUpdate,
+                draw_as_simulated.after(TransformSystems::Propagate).in_set(DrawnFrames),
+            )
             .add_systems(
                 HairTick,
                 (
@@ -211,7 +215,8 @@ fn aim_poses(
             if members.is_none() != others {
                 continue;
             }
-            let end = pose_of(transforms.end(entity));
+            let place = transforms.end(entity);
+            let end = pose_of(place);
             let displacement = end.map_or(Vec3::ZERO, |end| frame.displacement_to(&end));
             let alike = |with: Vec3| displacement.distance(with) < 0.1 * displacement.length();
             let mut like = displacements.iter().filter(|(with, _)| others && alike(*with));
@@ -235,6 +240,16 @@ fn aim_poses(
             let Some(members) = members else { continue };
             if displacement != Vec3::ZERO {
                 displacements.push((displacement, aimed.jumps));
+            }
+            let stretch = place.zip(end).and_then(|(place, end)| frame.stretch_to(&place, &end));
+            if let Some(change) = stretch {
+                let mut theirs = strands.iter_many_mut(members.collection());
+                while let Some(mut strand) = theirs.fetch_next() {
+                    if let Some(root) = strand.positions().first().copied() {
+                        let frame = strand.root_frame();
+                        strand.bypass_change_detection().put_root(change * root, frame);
+                    }
+                }
             }
             if aimed.settles || aimed.change.is_some() {
                 let mut theirs = strands.iter_many_mut(members.collection());
