@@ -217,25 +217,27 @@ pub(crate) struct DrawnFrames;
 /// After transforms have been propagated: hair on a head that is squashed or sheared is drawn in the frame
 /// that it is simulated in.
 pub(super) fn draw_as_simulated(
-    hairs: Query<Entity, (With<Hair>, Changed<GlobalTransform>)>,
-    mut places: Query<(&mut GlobalTransform, &Transform)>,
+    mut places: ParamSet<(
+        Query<(Entity, &GlobalTransform), (With<Hair>, Changed<GlobalTransform>)>,
+        Query<(&mut GlobalTransform, &Transform)>,
+    )>,
     children: Query<&Children>,
+    mut todo: Local<Vec<(Entity, GlobalTransform)>>,
 ) {
-    for hair in &hairs {
-        let Ok((mut place, _)) = places.get_mut(hair) else { continue };
-        let Some(pose) = Pose::of(&place) else { continue };
+    for (hair, place) in &places.p0() {
+        let Some(pose) = Pose::of(place) else { continue };
         let even = pose.affine();
-        if place.affine().matrix3.abs_diff_eq(even.matrix3, ALIKE * pose.size()) {
-            continue;
+        if !place.affine().matrix3.abs_diff_eq(even.matrix3, ALIKE * pose.size()) {
+            todo.push((hair, even.into()));
         }
-        *place = even.into();
-        let mut todo = vec![(hair, *place)];
-        while let Some((parent, at)) = todo.pop() {
-            for child in children.get(parent).into_iter().flatten() {
-                if let Ok((mut place, own)) = places.get_mut(*child) {
-                    *place = at.mul_transform(*own);
-                    todo.push((*child, *place));
-                }
+    }
+    let mut places = places.p1();
+    while let Some((entity, place)) = todo.pop() {
+        let Ok((mut own, _)) = places.get_mut(entity) else { continue };
+        *own = place;
+        for child in children.get(entity).into_iter().flatten() {
+            if let Ok((_, local)) = places.get(*child) {
+                todo.push((*child, place.mul_transform(*local)));
             }
         }
     }
