@@ -20,6 +20,7 @@ mod scenes {
 mod cost;
 mod coverage;
 mod dye;
+mod fibre;
 mod frames;
 mod groom;
 mod light;
@@ -46,6 +47,19 @@ device::tests! {
     dye {
         device: black_hair_is_drawn_pink_and_roots_and_tips_apart,
             streaks_are_the_share_of_strands_that_was_asked_for;
+    }
+    fibre {
+        anywhere: a_wet_lock_is_darker_than_dry_hair_wherever_light_comes_from,
+            what_flows_through_layers_begins_as_all_and_ends_as_what_comes_through,
+            a_fibre_conserves_energy_and_pigment_only_absorbs,
+            shares_of_one_fibre_are_those_of_its_lobes,
+            light_that_went_through_others_is_spread_not_added,
+            among_fibres_that_point_elsewhere_light_leaves_its_cone,
+            infinitely_deep_hair_has_the_colour_of_its_melanin,
+            layers_without_pigment_return_what_diffusion_returns,
+            highlights_on_a_cylinder_lie_where_path_tracing_has_them,
+            the_clear_highlight_leans_to_the_root_and_the_coloured_one_to_the_tip,
+            all_results_are_finite_for_any_fibre_and_light;
     }
     frames {
         device: hair_is_where_the_guides_are_and_shows_their_rates,

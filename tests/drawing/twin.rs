@@ -1,7 +1,10 @@
 //! The shader's curve and follower maths against its Rust twin, on random data: dry and wet strands,
 //! in this frame and in the one before.
 
-use crate::offscreen::Offscreen;
+use crate::{
+    fibre::{Angles, Optics, Passage},
+    offscreen::Offscreen,
+};
 use bevy::{
     math::Affine3A,
     prelude::*,
@@ -24,7 +27,6 @@ use bevy_keratin::{
     render::{
         DrawnStrand, HairFollowers, LockOffset,
         curve::{CurvePoint, DrawnSolid, Guide, arrange, packed_frame, strand_point},
-        fibre::{Angles, Optics, Passage},
     },
 };
 
