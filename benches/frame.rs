@@ -36,7 +36,7 @@ fn main() {
     if !offscreen::has_adapter() {
         return;
     }
-    let Some(device) = Offscreen::new(16, 16).map(|scene| info(&scene)) else { return };
+    let device = info(&Offscreen::new(16, 16));
     println!(
         "{} ({:?}, {:?}), {}",
         device.name, device.device_type, device.backend, device.driver_info
@@ -70,7 +70,7 @@ fn info(scene: &Offscreen) -> RenderAdapterInfo {
 
 fn time(row: &Row, (width, height, frames): (u32, u32, u32)) {
     let plugins = HairPlugins::default().build().add(RenderDiagnosticsPlugin);
-    let Some(mut scene) = Offscreen::with_plugins(width, height, plugins) else { return };
+    let mut scene = Offscreen::with_plugins(width, height, plugins);
     let side = (row.heads as f32).sqrt().ceil().max(1.0);
     let back = if row.heads > 1 { 0.35 * side } else { 0.5 };
     scene.look(Vec3::new(0.3 * back, 0.1, back), Vec3::new(0.0, -0.05, 0.0));

@@ -2,7 +2,7 @@
 
 use bevy::math::Vec3;
 
-/// What tells whether a strand's arrays were written to, without keeping them.
+/// Detects writes to a strand's arrays, without keeping them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Fingerprint {
     /// Of the root, which the tick moves where it is tied to a mesh.

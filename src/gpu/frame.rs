@@ -107,7 +107,7 @@ fn run(
     if extracted.hairs.is_empty() {
         return;
     }
-    // What is left of a lost device belongs to nobody.
+    // Hair on a lost device is skipped.
     let present = compiled.map_or(0, |compiled| compiled.device());
     let hairs = extracted.hairs.iter().filter(|frame| frame.link.is_on(present));
     let mut hairs: Vec<_> = hairs.map(|frame| (frame.link.lock(), frame)).collect();

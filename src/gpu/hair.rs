@@ -68,8 +68,8 @@ pub(super) struct GpuHair {
     pub(super) is_kept: bool,
     /// Which strands had held nodes, in order: those are neither guides nor followers.
     pub(super) held: Vec<Entity>,
-    /// Ticks until a strand's fault is told of again.
-    pub(super) told: u32,
+    /// Ticks until a strand's fault is reported again.
+    pub(super) quiet: u32,
     /// Strands that are asked about, by their indices; how many turns of that there have been; the indices.
     pub(super) probed: Vec<u32>,
     pub(super) probe_turn: usize,
@@ -232,7 +232,7 @@ pub(super) fn hand_over(
         checkpoint: None,
         since_checkpoint: 0.0,
         ticks: 0,
-        told: 0,
+        quiet: 0,
         is_tied,
         method,
         has_followers: followers > 0,

@@ -32,8 +32,8 @@ use bevy::{
     render::{render_resource::PollType, renderer::RenderDevice},
 };
 
-/// Ticks for which a strand's fault is not told of again, as on the CPU.
-const TOLD_FOR: u32 = 60;
+/// Ticks for which a strand's fault is not reported again, as on the CPU.
+const REPORT_COOLDOWN: u32 = 60;
 
 /// Seconds for which hair that has returned stays.
 pub(super) const STAYS_FOR: f32 = 1.0;
@@ -327,8 +327,8 @@ fn apply_report(world: &mut World, hair: Entity, report: &Measured, strand: Opti
     }
     let count = report.put_back + report.rebuilt;
     let Some(mut gpu) = entity.get_mut::<GpuHair>().filter(|_| count > 0) else { return };
-    let is_told = core::mem::replace(&mut gpu.told, TOLD_FOR) > 0;
-    if is_told {
+    let is_known = core::mem::replace(&mut gpu.quiet, REPORT_COOLDOWN) > 0;
+    if is_known {
         return;
     }
     let named = strand.and_then(|strand| gpu.members.get(strand).copied()).unwrap_or(hair);

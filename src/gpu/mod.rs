@@ -1,7 +1,7 @@
 //! Hair by compute shaders: the direct solver or the paper's projections, obstacles, bonds, air and treatments,
 //! one strand a thread.
 //!
-//! [`SimulateOn::Gpu`] on a hair asks for it, [`HairResidence`] tells where the hair is and why. The tick
+//! [`SimulateOn::Gpu`] on a hair asks for it, [`HairResidence`] says where the hair is and why. The tick
 //! goes on as always and writes down what acts on the hair; once a frame, before any camera, the graphics
 //! device runs what was written down and puts the nodes into the buffer that drawing reads. No node crosses
 //! the bus for that.

@@ -117,7 +117,7 @@ impl Rest {
         !same
     }
 
-    /// The device tells that it slept in this tick.
+    /// The device reports that it slept in this tick.
     pub(super) fn slept_in(&mut self, tick: u32) -> bool {
         let falls = !self.is_asleep && self.disturbed < tick && tick <= self.ticks;
         self.is_asleep |= falls;
@@ -126,7 +126,7 @@ impl Rest {
 }
 
 impl GpuJournal {
-    /// The device tells that the hair slept in this tick.
+    /// The device reports that the hair slept in this tick.
     pub(super) fn slept_in(&mut self, tick: u32) -> bool {
         let falls = self.rest.slept_in(tick);
         if falls {

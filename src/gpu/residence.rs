@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use core::fmt;
 
 /// Where a hair is asked to be simulated. Component of a [`Hair`](crate::Hair); where absent,
-/// [`HairDefault<SimulateOn>`](crate::HairDefault) holds. [`HairResidence`] tells where it is.
+/// [`HairDefault<SimulateOn>`](crate::HairDefault) holds. [`HairResidence`] says where it is.
 ///
 /// Hair is on the GPU only while all that acts on it is supported there, and comes back by
 /// itself where something else does. There it sleeps ([`SleepSettings`](crate::SleepSettings)) as a whole, once all its

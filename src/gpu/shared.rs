@@ -51,7 +51,7 @@ pub(super) struct Shared {
     replies: Arc<Mutex<Replies>>,
     /// Strands whose nodes are asked for, and the tick.
     probe: (Vec<u32>, u32),
-    /// Frames in a row without a substep; whether it has been told that substeps are late.
+    /// Frames in a row without a substep; whether late substeps have been reported.
     idle: u32,
     is_late: bool,
 }

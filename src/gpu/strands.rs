@@ -302,10 +302,7 @@ impl GpuStrands {
         if let Some((_, groups)) = &self.still
             && self.rests.get(index) == Some(&true)
         {
-            pass.set_pipeline(&kernels.sleep);
-            pass.set_bind_group(0, &groups[self.present], &[]);
-            pass.set_bind_group(1, records, &[record]);
-            pass.dispatch_workgroups(simulated as u32, 1, 1);
+            dispatch(&kernels.sleep, &groups[self.present], simulated);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Led nodes of substeps on a device.
+//! Kinematic targets of substeps on a device.
 
 use super::{
     followers,
@@ -16,7 +16,7 @@ use bevy::render::{
 /// Threads of a workgroup that writes targets.
 const GROUP: u32 = 64;
 
-/// The targets nodes of the uploaded substeps.
+/// The kinematic targets of the uploaded substeps.
 #[derive(Debug, Default)]
 pub(super) struct KinematicTargets {
     uploaded: Option<Uploaded>,
@@ -97,7 +97,7 @@ impl KinematicTargets {
         self.uploaded = Some(uploaded);
     }
 
-    /// What add_targets the nodes of an uploaded substep: pipelines, groups and numbers of workgroups.
+    /// What moves the kinematic nodes of an uploaded substep: pipelines, groups and numbers of workgroups.
     pub(super) fn of<'a>(
         &'a self,
         substep: usize,

@@ -145,7 +145,7 @@ pub(super) fn decide(
             on.at = unwritten;
         }
         on.ticks += 1;
-        on.told = on.told.saturating_sub(1);
+        on.quiet = on.quiet.saturating_sub(1);
         on.since_checkpoint += seconds;
         if on.is_tied
             && on.ticks.is_multiple_of(ROOTS_MOVE)

@@ -233,7 +233,7 @@ pub(super) fn pack(
             draw: PhantomData,
             key,
             ribbon: packed.ribbon,
-            // Any buffer stands for rings that nobody reads.
+            // A placeholder: rings are not read before they are expanded.
             rings: nodes.clone(),
             volume: None,
             nodes,

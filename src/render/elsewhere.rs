@@ -2,10 +2,10 @@
 
 use bevy::prelude::*;
 
-/// Says of a hair that somebody else writes its nodes into
+/// Marks a hair whose nodes another system writes into
 /// [`HairBuffers::nodes`](super::HairBuffers::nodes), on the GPU.
 #[derive(Component, Clone, Copy, Debug, Default)]
-#[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "nobody does"))]
+#[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "only the GPU does"))]
 pub(crate) struct DrawnElsewhere {
     /// The corners of the box around them, in the hair's frame (m).
     pub(crate) low: Vec3,

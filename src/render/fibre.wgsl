@@ -1,4 +1,4 @@
-// Light on one fibre, and what many fibres make of it. Rust twin: fibre.rs. Keep both alike.
+// Light on one fibre, and what many fibres make of it. Twin in Rust: tests/drawing/fibre.rs. Keep both alike.
 //
 // Lobes R, TT, TRT: longitudinal from d'Eon et al. 2011, azimuthal in the real-time form of Karis
 // 2016, attenuation by melanin as in Chiang et al. 2016. Among fibres: dual scattering (Zinke et al.

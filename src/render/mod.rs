@@ -48,13 +48,11 @@
 //! All are within their aims (ring to centre of blond and brown hair lack one and two hundredths) but the ball with the
 //! sun aside: its strands point outward from a black core, so that all light from one to the eye has turned more than once, and
 //! ours turns too little: half of it lacks. On a cylinder both
-//! highlights lie within 2° of the reference (a unit test).
-//! Under a sky of one colour white hair has 0.93 of its light (`tests/render_look.rs`).
+//! highlights lie within 2° of the reference (`tests/drawing/fibre.rs`).
+//! Under a sky of one colour white hair has 0.93 of its light (`tests/drawing/look.rs`).
 
 #[doc(hidden)]
 pub mod curve;
-#[doc(hidden)]
-pub mod fibre;
 
 mod beads;
 mod buffers;

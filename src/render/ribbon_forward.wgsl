@@ -1,4 +1,4 @@
-// Hair as the camera sees it, in two draws: depth, by lots, and light on what of it is in front.
+// Hair as the camera sees it, in two draws: depth with stochastic coverage, then light on what is in front.
 
 #import bevy_pbr::view_transformations::position_world_to_clip
 #import bevy_pbr::mesh_functions

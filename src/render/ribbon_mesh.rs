@@ -232,6 +232,6 @@ mod tests {
         drop(first);
         assert_eq!(known.0.len(), 2);
         known.get(RibbonLevel::full(7, 1), &mut meshes);
-        assert_eq!(known.0.len(), 1, "what nobody draws is let go");
+        assert_eq!(known.0.len(), 1, "a mesh that is not drawn is dropped");
     }
 }

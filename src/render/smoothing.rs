@@ -46,7 +46,7 @@ const FARTHEST: f32 = 8.0;
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Marks(pub(super) bool);
 
-/// What the pass of a camera is told.
+/// The uniform of a camera's pass.
 #[derive(Component, ExtractComponent, ShaderType, Clone, Copy, Debug, Default, PartialEq)]
 struct Smooth {
     reach: f32,
@@ -98,11 +98,11 @@ fn request_passes(
     marks.set_if_neq(Marks(
         active.all(|(_, camera, asked, ..)| reach(asked) > 0.0 && opaque(camera)),
     ));
-    for (camera, _, asked, msaa, told) in &cameras {
+    for (camera, _, asked, msaa, known) in &cameras {
         let samples = msaa.copied().unwrap_or_default().samples() as f32;
         let now = Smooth { reach: reach(asked), across: across(asked), samples };
-        match (marks.0, told) {
-            (true, told) if told != Some(&now) => {
+        match (marks.0, known) {
+            (true, known) if known != Some(&now) => {
                 commands.entity(camera).try_insert(now);
             }
             (false, Some(_)) => {

@@ -11,18 +11,18 @@ struct Smooth {
 }
 
 @group(0) @binding(0) var screen: texture_2d<f32>;
-@group(0) @binding(2) var<uniform> told: Smooth;
+@group(0) @binding(2) var<uniform> smooth_by: Smooth;
 
 fn inside(pixel: vec2<i32>) -> vec2<i32> {
     return clamp(pixel, vec2(0), vec2<i32>(textureDimensions(screen)) - 1);
 }
 
-// Of a pixel and the eight around it: hair may have lit no sample of one, and means tell its way better.
+// Of a pixel and the eight around it: hair may have lit no sample of one, and means show its direction better.
 fn mark_around(pixel: vec2<i32>) -> Mark {
     var sum = Mark(0.0, vec2(0.0));
     for (var i = 0; i < 9; i++) {
         let at = inside(pixel + vec2(i % 3 - 1, i / 3 - 1));
-        let mark = mark_of(textureLoad(screen, at, 0).a, at, told.samples);
+        let mark = mark_of(textureLoad(screen, at, 0).a, at, smooth_by.samples);
         sum.share += mark.share;
         sum.twice += mark.twice;
     }
@@ -52,8 +52,8 @@ fn line(pixel: vec2<i32>, across: vec2<i32>) -> Sum {
     for (var side = -1; side <= 1; side++) {
         let at = inside(pixel + side * across);
         let color = textureLoad(screen, at, 0);
-        let share = mark_of(color.a, at, told.samples).share;
-        let weight = select(told.across, 1.0, side == 0);
+        let share = mark_of(color.a, at, smooth_by.samples).share;
+        let weight = select(smooth_by.across, 1.0, side == 0);
         let bare = select(vec4(0.0), weight * vec4(color.rgb, 1.0), share == 0.0);
         sum = joined(sum, Sum(weight * color.rgb, weight * share, bare, weight));
     }
@@ -78,7 +78,7 @@ fn fragment(in: FullscreenVertexOutput) -> @location(0) vec4<f32> {
     let ordered = length(here.twice) / here.share;
     var was_bare = false;
     // As far one way as the other, or hair would grow past its edges; thin hair has gaps of a pixel.
-    for (var i = 1; i <= i32(told.reach); i++) {
+    for (var i = 1; i <= i32(smooth_by.reach); i++) {
         let ahead = line(vec2<i32>(floor(in.position.xy + f32(i) * step)), across);
         let back = line(vec2<i32>(floor(in.position.xy - f32(i) * step)), across);
         let is_bare = min(ahead.share, back.share) == 0.0;
@@ -90,7 +90,7 @@ fn fragment(in: FullscreenVertexOutput) -> @location(0) vec4<f32> {
     }
     var color = sum.color / sum.weight;
     // Where no strand is, the ground of this place is seen, not of those along the line.
-    if mark_of(own.a, pixel, told.samples).share == 0.0 {
+    if mark_of(own.a, pixel, smooth_by.samples).share == 0.0 {
         color += (1.0 - sum.share / sum.weight) * (own.rgb - sum.bare.rgb / max(sum.bare.w, 1e-6));
     }
     return vec4(color, 1.0);

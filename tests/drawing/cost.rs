@@ -33,11 +33,8 @@ fn draws<I: BinnedPhaseItem>(scene: &Offscreen, drawn: Entity) -> (usize, usize)
     (calls.iter().sum(), calls.len())
 }
 
-#[test]
-fn a_hair_is_one_draw_call_in_every_view_and_one_of_depth_before_it_in_pictures() {
-    let Some(mut scene) = Offscreen::new(64, 64) else {
-        return;
-    };
+pub fn a_hair_is_one_draw_call_in_every_view_and_one_of_depth_before_it_in_pictures() {
+    let mut scene = Offscreen::new(64, 64);
     scene.look(Vec3::new(0.3, 0.1, 0.8), Vec3::ZERO);
     let camera = scene.camera;
     let world = scene.app.world_mut();
@@ -82,14 +79,10 @@ fn a_hair_is_one_draw_call_in_every_view_and_one_of_depth_before_it_in_pictures(
     }
 }
 
-#[test]
-#[ignore = "a timing, to be read"]
-fn frames_a_second() {
+pub fn frames_a_second() {
     for (width, height) in [(1280, 720), (1920, 1080)] {
         for (count, share) in [(1500, 1.0), (12_000, 1.0), (12_000, 0.5), (12_000, 0.25)] {
-            let Some(mut scene) = Offscreen::new(width, height) else {
-                return;
-            };
+            let mut scene = Offscreen::new(width, height);
             scene.look(Vec3::new(0.22, 0.08, 0.5), Vec3::new(0.0, -0.05, 0.0));
             let world = scene.app.world_mut();
             let detail = HairDetail { strands: share, ..default() };
@@ -115,11 +108,8 @@ fn frames_a_second() {
 }
 
 /// Far heads draw few strands, from meshes that all share.
-#[test]
-fn a_hundred_heads_share_a_mesh_of_few_strands() {
-    let Some(mut scene) = Offscreen::new(128, 96) else {
-        return;
-    };
+pub fn a_hundred_heads_share_a_mesh_of_few_strands() {
+    let mut scene = Offscreen::new(128, 96);
     scene.look(Vec3::new(0.0, 2.0, 9.0), Vec3::ZERO);
     let guides = head_of_guides(20, 0.09, 0.2, 5);
     let world = scene.app.world_mut();
@@ -158,12 +148,8 @@ fn a_hundred_heads_share_a_mesh_of_few_strands() {
 }
 
 /// A head that fills the picture: what each stage costs, and what the quality switches save.
-#[test]
-#[ignore = "a timing, to be read"]
-fn what_each_stage_costs() {
-    let Some(mut scene) = Offscreen::new(480, 360) else {
-        return;
-    };
+pub fn what_each_stage_costs() {
+    let mut scene = Offscreen::new(480, 360);
     scene.look(Vec3::new(0.22, 0.08, 0.5), Vec3::new(0.0, -0.05, 0.0));
     let camera = scene.camera;
     let world = scene.app.world_mut();

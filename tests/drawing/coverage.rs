@@ -38,11 +38,8 @@ fn area(scene: &mut Offscreen, height: f32, bands: &[(f32, f32)]) -> Vec<f32> {
     areas
 }
 
-#[test]
-fn strands_cover_as_much_from_near_and_far_and_at_their_tips() {
-    let Some(mut scene) = Offscreen::new(256, 256) else {
-        return;
-    };
+pub fn strands_cover_as_much_from_near_and_far_and_at_their_tips() {
+    let mut scene = Offscreen::new(256, 256);
     let world = scene.app.world_mut();
     // Unlit and red: what a pixel holds is how much of it is covered.
     let look = HairLook { width: 0.1e-3, taper: 1.0, ..default() };
@@ -81,10 +78,9 @@ fn strands_cover_as_much_from_near_and_far_and_at_their_tips() {
 /// T6. Its aims, 6 % in the mean and 25 % at worst, are missed: four samples hold strands a tenth of a pixel wide.
 /// Ribbons that were a pixel wide and covered all of it had 0.205 and 1.03 of their own finer picture, of which nine
 /// tenths of the tips were missing; twice as good would be 0.10 and 0.51. Without `HairSmoothing` it is 0.244 and 1.91.
-#[test]
-fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
+pub fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
     let head = |size: u32| {
-        let mut scene = Offscreen::new(size, size)?;
+        let mut scene = Offscreen::new(size, size);
         scene.look(Vec3::new(0.1, 0.05, 0.45), Vec3::new(0.0, -0.02, 0.0));
         let world = scene.app.world_mut();
         let look = HairLook { melanin: Melanin::BLOND, width: 0.15e-3, ..default() };
@@ -95,11 +91,9 @@ fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
         let sun = DirectionalLight { illuminance: 6000.0, ..default() };
         let place = Transform::from_xyz(0.4, 0.7, 1.0).looking_at(Vec3::ZERO, Vec3::Y);
         world.spawn((sun, place));
-        Some(scene.draw())
+        scene.draw()
     };
-    let (Some(plain), Some(fine)) = (head(256), head(1024)) else {
-        return;
-    };
+    let (plain, fine) = (head(256), head(1024));
     if let Some(folder) = std::env::var_os("REFERENCE") {
         let save = |picture: &crate::offscreen::Picture, name: &str| {
             picture.save(std::path::Path::new(&folder).join(name).to_str().unwrap());
@@ -127,12 +121,9 @@ fn edges_are_those_of_a_picture_with_sixteen_times_the_pixels() {
 }
 
 /// Marks of hair in the alpha channel are gone afterwards, and nothing but hair is averaged.
-#[test]
-fn smoothing_changes_hair_alone_and_leaves_no_mark() {
+pub fn smoothing_changes_hair_alone_and_leaves_no_mark() {
     const SIZE: u32 = 128;
-    let Some(mut scene) = Offscreen::new(SIZE, SIZE) else {
-        return;
-    };
+    let mut scene = Offscreen::new(SIZE, SIZE);
     scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
     let camera = scene.camera;
     let world = scene.app.world_mut();
@@ -194,9 +185,9 @@ fn smoothing_changes_hair_alone_and_leaves_no_mark() {
 /// A tuft of 3,000 strands at random, unlit and red, that a camera sees from `from` metres in some steps to
 /// `to` metres, with as many pixels for an angle as a screen of 1,080 lines: the area (m²) that it covers in
 /// each picture, and by how much each picture differs from the one before, a share of its light.
-fn flight(detail: HairDetail, (from, to): (f32, f32)) -> Option<(Vec<f32>, Vec<f32>)> {
+fn flight(detail: HairDetail, (from, to): (f32, f32)) -> (Vec<f32>, Vec<f32>) {
     const SIZE: u32 = 96;
-    let mut scene = Offscreen::new(SIZE, SIZE)?;
+    let mut scene = Offscreen::new(SIZE, SIZE);
     let half = 22.5f32.to_radians().tan() * SIZE as f32 / 1080.0;
     let camera = scene.camera;
     let world = scene.app.world_mut();
@@ -229,19 +220,15 @@ fn flight(detail: HairDetail, (from, to): (f32, f32)) -> Option<(Vec<f32>, Vec<f
             steps.push(apart.map(|(a, b)| (red(a) - red(b)).abs()).sum::<f32>() / light);
         }
     }
-    Some((areas, steps))
+    (areas, steps)
 }
 
-#[test]
-fn nothing_pops_as_a_camera_flies_away() {
+pub fn nothing_pops_as_a_camera_flies_away() {
     let all = HairDetail { least_width: 0.0, ..default() };
     let few = HairDetail { least_strands: 100, ..default() };
     // Near, where not all is in sight, and far.
     for path in [(0.5, 4.0), (4.0, 20.0)] {
-        let (Some((_, whole)), Some((areas, steps))) = (flight(all, path), flight(few, path))
-        else {
-            return;
-        };
+        let ((_, whole), (areas, steps)) = (flight(all, path), flight(few, path));
         let most = |steps: &[f32]| steps.iter().copied().fold(0.0, f32::max);
         let mean = |steps: &[f32]| steps.iter().sum::<f32>() / steps.len() as f32;
         println!(

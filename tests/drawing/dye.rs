@@ -8,8 +8,8 @@ const SIZE: u32 = 100;
 
 /// A curtain of hanging hair before the camera, as wide and high as the picture, under light from the
 /// camera's side and from all around.
-fn curtain(look: HairLook) -> Option<(Offscreen, Entity)> {
-    let mut scene = Offscreen::new(SIZE, SIZE)?;
+fn curtain(look: HairLook) -> (Offscreen, Entity) {
+    let mut scene = Offscreen::new(SIZE, SIZE);
     scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
     let camera = scene.camera;
     let world = scene.app.world_mut();
@@ -24,7 +24,7 @@ fn curtain(look: HairLook) -> Option<(Offscreen, Entity)> {
         let nodes: Vec<Vec3> = (0..9).map(|i| Vec3::new(x, 0.2 - 0.05 * i as f32, 0.0)).collect();
         world.spawn((StrandOf(hair), Strand::from_polyline(&nodes).unwrap()));
     }
-    Some((scene, hair))
+    (scene, hair)
 }
 
 fn look(melanin: Melanin) -> HairLook {
@@ -54,9 +54,8 @@ fn hue(color: Vec3) -> Vec3 {
     color / color.element_sum()
 }
 
-#[test]
-fn black_hair_is_drawn_pink_and_roots_and_tips_apart() {
-    let Some((mut scene, hair)) = curtain(look(Melanin::BLACK)) else { return };
+pub fn black_hair_is_drawn_pink_and_roots_and_tips_apart() {
+    let (mut scene, hair) = curtain(look(Melanin::BLACK));
     let black = mean(&drawn(&mut scene, hair, HairDye::default()), 30..70);
     let pink = mean(&drawn(&mut scene, hair, HairDye::pink()), 30..70);
     // White hair with the same colour as its look: the dye of an artist's choice.
@@ -84,10 +83,9 @@ fn black_hair_is_drawn_pink_and_roots_and_tips_apart() {
     assert!(below < 1e-4, "tips differ by {below}");
 }
 
-#[test]
-fn streaks_are_the_share_of_strands_that_was_asked_for() {
+pub fn streaks_are_the_share_of_strands_that_was_asked_for() {
     // What light lobes do to one strand is not what they do to the next: the flat look of white on black.
-    let Some((mut scene, hair)) = curtain(look(Melanin::BLACK)) else { return };
+    let (mut scene, hair) = curtain(look(Melanin::BLACK));
     let luma = |picture: &Picture| mean(picture, 10..90).element_sum();
     let black = luma(&drawn(&mut scene, hair, HairDye::default()));
     let white = luma(&drawn(&mut scene, hair, HairDye::of(DyeLayer::bleach(1.0))));

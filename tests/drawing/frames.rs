@@ -53,11 +53,8 @@ fn sun(scene: &mut Offscreen, from: Vec3, shadows: bool) -> Entity {
     world.spawn((light, cascades.build(), place)).id()
 }
 
-#[test]
-fn hair_is_where_the_guides_are_and_shows_their_rates() {
-    let Some(mut scene) = Offscreen::new(200, 200) else {
-        return;
-    };
+pub fn hair_is_where_the_guides_are_and_shows_their_rates() {
+    let mut scene = Offscreen::new(200, 200);
     scene.look(Vec3::new(0.1, 0.1, 0.7), Vec3::ZERO);
     let wave = |x: f32, i: usize| {
         let s = i as f32 / 11.0;
@@ -105,11 +102,8 @@ fn agree(one: &Picture, other: &Picture) -> usize {
     covered
 }
 
-#[test]
-fn rings_of_a_frame_draw_what_each_vertex_would_compute() {
-    let Some(mut scene) = Offscreen::new(160, 160) else {
-        return;
-    };
+pub fn rings_of_a_frame_draw_what_each_vertex_would_compute() {
+    let mut scene = Offscreen::new(160, 160);
     // A sample that differs would spread.
     scene.leave_grain();
     scene.look(Vec3::new(0.1, 0.1, 0.6), Vec3::ZERO);
@@ -146,11 +140,8 @@ fn rings_of_a_frame_draw_what_each_vertex_would_compute() {
     }
 }
 
-#[test]
-fn followers_cover_more_frames_repeat_and_wet_is_darker() {
-    let Some(mut scene) = Offscreen::with_hair_first(160, 160) else {
-        return;
-    };
+pub fn followers_cover_more_frames_repeat_and_wet_is_darker() {
+    let mut scene = Offscreen::with_hair_first(160, 160);
     scene.leave_grain();
     scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
     sun(&mut scene, Vec3::new(0.3, 0.5, 1.0), false);
@@ -184,11 +175,8 @@ fn rows(picture: &Picture) -> Vec<f32> {
     (0..picture.height).map(row).collect()
 }
 
-#[test]
-fn the_highlight_lies_across_and_moves_with_the_light() {
-    let Some(mut scene) = Offscreen::new(120, 160) else {
-        return;
-    };
+pub fn the_highlight_lies_across_and_moves_with_the_light() {
+    let mut scene = Offscreen::new(120, 160);
     scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
     for shading in [HairShading::Fibre, HairShading::KajiyaKay] {
         let look = HairLook {
@@ -220,11 +208,8 @@ fn the_highlight_lies_across_and_moves_with_the_light() {
     }
 }
 
-#[test]
-fn hair_receives_and_casts_shadow() {
-    let Some(mut scene) = Offscreen::new(160, 120) else {
-        return;
-    };
+pub fn hair_receives_and_casts_shadow() {
+    let mut scene = Offscreen::new(160, 120);
     let world = scene.app.world_mut();
     let mesh = world.resource_mut::<Assets<Mesh>>().add(Rectangle::new(3.0, 3.0));
     let white = StandardMaterial {
@@ -270,11 +255,8 @@ fn hair_receives_and_casts_shadow() {
     scene.app.world_mut().despawn(hair);
 }
 
-#[test]
-fn bad_hair_neither_panics_nor_leaves_a_stale_picture() {
-    let Some(mut scene) = Offscreen::new(100, 100) else {
-        return;
-    };
+pub fn bad_hair_neither_panics_nor_leaves_a_stale_picture() {
+    let mut scene = Offscreen::new(100, 100);
     scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
     let view = HairView::Bond(BondKind::Hydrogen);
     let parts = || (wide(4e-3), HairFollowers::new(40), view);
@@ -329,12 +311,9 @@ fn bad_hair_neither_panics_nor_leaves_a_stale_picture() {
     assert_eq!(scene.draw().covered(BLACK), 0, "despawned hair is gone at once");
 }
 
-#[test]
-fn every_kind_of_light_lights_hair_through_every_kind_of_camera() {
+pub fn every_kind_of_light_lights_hair_through_every_kind_of_camera() {
     use bevy::{camera::Hdr, core_pipeline::prepass::DepthPrepass, light::EnvironmentMapLight};
-    let Some(mut scene) = Offscreen::new(60, 60) else {
-        return;
-    };
+    let mut scene = Offscreen::new(60, 60);
     scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
     let look = HairLook { melanin: Melanin::BLOND, ..wide(3e-3) };
     hair(&mut scene, &curtain(12, 0.3), (look, HairFollowers::new(60)));
@@ -420,12 +399,9 @@ fn every_kind_of_light_lights_hair_through_every_kind_of_camera() {
 
 /// The forward pass draws what is as near as the prepass found: ribbons that differed in a bit would
 /// be holes. Without samples, so that every pixel is one depth.
-#[test]
-fn prepasses_leave_no_holes_and_motion_moves_nothing() {
+pub fn prepasses_leave_no_holes_and_motion_moves_nothing() {
     use bevy::core_pipeline::prepass::{DepthPrepass, MotionVectorPrepass, NormalPrepass};
-    let Some(mut scene) = Offscreen::new(160, 160) else {
-        return;
-    };
+    let mut scene = Offscreen::new(160, 160);
     scene.look(Vec3::new(0.1, 0.05, 0.5), Vec3::ZERO);
     sun(&mut scene, Vec3::new(0.3, 0.5, 1.0), true);
     let hair = hair(&mut scene, &curtain(12, 0.3), (wide(1e-3), HairFollowers::new(200)));
@@ -454,11 +430,8 @@ fn prepasses_leave_no_holes_and_motion_moves_nothing() {
     }
 }
 
-#[test]
-fn followers_are_laid_out_again_when_roots_are_edited_and_rest() {
-    let Some(mut scene) = Offscreen::new(120, 120) else {
-        return;
-    };
+pub fn followers_are_laid_out_again_when_roots_are_edited_and_rest() {
+    let mut scene = Offscreen::new(120, 120);
     scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
     let hair = hair(&mut scene, &curtain(6, 0.2), (wide(2e-3), HairFollowers::new(60)));
     scene.draw();
@@ -488,11 +461,8 @@ fn followers_are_laid_out_again_when_roots_are_edited_and_rest() {
     assert_eq!(buffers(&scene).strands, second.strands, "a nudge changes no neighbours");
 }
 
-#[test]
-fn wet_locks_are_tighter() {
-    let Some(mut scene) = Offscreen::new(160, 160) else {
-        return;
-    };
+pub fn wet_locks_are_tighter() {
+    let mut scene = Offscreen::new(160, 160);
     scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
     let followers = HairFollowers { stray: 0.1, ..HairFollowers::new(400) };
     let parts = (wide(0.5e-3), followers, HairView::Strain);
@@ -506,11 +476,8 @@ fn wet_locks_are_tighter() {
     assert!((wet as f32) < 0.75 * dry as f32 && wet > 500);
 }
 
-#[test]
-fn coincident_guides_and_nodes_are_drawn() {
-    let Some(mut scene) = Offscreen::new(100, 100) else {
-        return;
-    };
+pub fn coincident_guides_and_nodes_are_drawn() {
+    let mut scene = Offscreen::new(100, 100);
     scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
     let same = vec![curtain(1, 0.2)[0].clone(); 4];
     let view = HairView::Bond(BondKind::Hydrogen);
@@ -526,11 +493,8 @@ fn coincident_guides_and_nodes_are_drawn() {
     assert!(scene.draw().covered(BLACK) < 2000, "followers stay with their roots");
 }
 
-#[test]
-fn water_is_drawn_as_beads_as_long_as_there_is_any() {
-    let Some(mut scene) = Offscreen::new(160, 160) else {
-        return;
-    };
+pub fn water_is_drawn_as_beads_as_long_as_there_is_any() {
+    let mut scene = Offscreen::new(160, 160);
     scene.look(Vec3::new(0.0, 0.0, 0.3), Vec3::ZERO);
     sun(&mut scene, Vec3::new(0.5, 0.8, 1.0), false);
     let bead = |x: f32, y: f32, velocity: Vec3| Bead {
@@ -579,11 +543,8 @@ fn water_is_drawn_as_beads_as_long_as_there_is_any() {
     assert_eq!(draw(vec![]).covered(BLACK), 0, "no water, no beads");
 }
 
-#[test]
-fn soaked_hair_is_darker_and_droplets_are_seen() {
-    let Some(mut scene) = Offscreen::new(160, 160) else {
-        return;
-    };
+pub fn soaked_hair_is_darker_and_droplets_are_seen() {
+    let mut scene = Offscreen::new(160, 160);
     scene.look(Vec3::new(0.0, 0.0, 0.7), Vec3::ZERO);
     sun(&mut scene, Vec3::new(0.3, 0.5, 1.0), false);
     // Locks do not draw together, so that the same pixels are compared.
@@ -634,16 +595,13 @@ fn soaked_hair_is_darker_and_droplets_are_seen() {
 }
 
 /// A second view of another format beside it, and one that has no pixels.
-#[test]
-fn views_do_not_disturb_each_other_nor_does_a_minimised_window() {
+pub fn views_do_not_disturb_each_other_nor_does_a_minimised_window() {
     use bevy::{
         camera::{Hdr, RenderTarget},
         render::render_resource::TextureFormat,
         window::{WindowRef, WindowResolution},
     };
-    let Some(mut scene) = Offscreen::new(80, 80) else {
-        return;
-    };
+    let mut scene = Offscreen::new(80, 80);
     scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
     sun(&mut scene, Vec3::new(1.0, 2.0, 2.0), true);
     let view = HairView::Bond(BondKind::Hydrogen);
@@ -669,8 +627,7 @@ fn views_do_not_disturb_each_other_nor_does_a_minimised_window() {
 }
 
 /// Bevy quits when the device is lost, unless the app says how to go on.
-#[test]
-fn hair_and_water_outlive_a_lost_device() {
+pub fn hair_and_water_outlive_a_lost_device() {
     use bevy::light::cluster::GlobalClusterSettings;
     use bevy::render::{
         error_handler::{RenderErrorHandler, RenderErrorPolicy},
@@ -678,9 +635,7 @@ fn hair_and_water_outlive_a_lost_device() {
         renderer::RenderDevice,
         settings::WgpuSettings,
     };
-    let Some(mut scene) = Offscreen::new(120, 120) else {
-        return;
-    };
+    let mut scene = Offscreen::new(120, 120);
     scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
     let view = HairView::Bond(BondKind::Hydrogen);
     let parts = (wide(2e-3), HairFollowers::new(100), view);

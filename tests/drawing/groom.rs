@@ -16,11 +16,8 @@ fn seen(scene: &mut Offscreen, picture: &Picture, point: Vec3) -> usize {
     (0..81).map(near).filter(|p| picture.at(p.x, p.y) != BLACK).count()
 }
 
-#[test]
-fn followers_are_drawn_where_they_are_given_and_no_more_than_asked_for() {
-    let Some(mut scene) = Offscreen::new(200, 160) else {
-        return;
-    };
+pub fn followers_are_drawn_where_they_are_given_and_no_more_than_asked_for() {
+    let mut scene = Offscreen::new(200, 160);
     scene.look(Vec3::new(0.0, 0.0, 0.6), Vec3::ZERO);
     let down: Vec<Vec3> = (0..9).map(|i| Vec3::new(-0.1, 0.1 - 0.025 * i as f32, 0.0)).collect();
     let root = |x: f32| FollowerRoot {

@@ -76,13 +76,10 @@ fn mean(picture: &Picture, pixel: f32, x: (f32, f32), y: (f32, f32)) -> Vec3 {
 }
 
 /// T4. Of strands at random, e^-τ of the light comes through to what is behind.
-#[test]
-fn what_comes_through_strands_falls_with_their_number() {
+pub fn what_comes_through_strands_falls_with_their_number() {
     const COUNT: u32 = 700;
     const WIDE: f32 = 0.05;
-    let Some(mut scene) = Offscreen::new(128, 64) else {
-        return;
-    };
+    let mut scene = Offscreen::new(128, 64);
     let pixel = 0.32 / 128.0;
     measure(&mut scene, 0.32, 0.16);
     sun(&mut scene, Vec3::new(FRAC_1_SQRT_2, 0.0, FRAC_1_SQRT_2), PI);
@@ -118,9 +115,8 @@ fn what_comes_through_strands_falls_with_their_number() {
 
 /// T5. Along the way of light into a slab, seen from beside, e^-τ of it is left: of hair that lets nothing
 /// through, whose surface alone mirrors.
-#[test]
-fn light_falls_off_bit_by_bit_on_its_way_into_hair() {
-    let Some(shares) = shares_by_depth(true) else { return };
+pub fn light_falls_off_bit_by_bit_on_its_way_into_hair() {
+    let shares = shares_by_depth(true);
     for (i, (share, truth)) in shares.iter().enumerate() {
         println!("  {share:.3} for {truth:.3}");
         assert!((share - truth).abs() < 0.1 * truth + 0.06, "{i}: {share} for {truth}");
@@ -133,9 +129,8 @@ fn light_falls_off_bit_by_bit_on_its_way_into_hair() {
 
 /// The same without a shadow map, by the fibres that a grid counts. In the first cells hair is taken for a plane
 /// layer.
-#[test]
-fn a_light_without_a_shadow_map_falls_off_as_well() {
-    let Some(shares) = shares_by_depth(false) else { return };
+pub fn a_light_without_a_shadow_map_falls_off_as_well() {
+    let shares = shares_by_depth(false);
     for (share, truth) in &shares {
         println!("  {share:.3} for {truth:.3}");
         assert!((share - truth).abs() < 0.1 * truth + 0.1, "{share} for {truth}");
@@ -144,12 +139,12 @@ fn a_light_without_a_shadow_map_falls_off_as_well() {
 }
 
 /// What is left of a sun's light at sixteen depths of a slab, and what should be.
-fn shares_by_depth(shadow_maps: bool) -> Option<Vec<(f32, f32)>> {
+fn shares_by_depth(shadow_maps: bool) -> Vec<(f32, f32)> {
     const DEEP: f32 = 0.032;
     const BROAD: f32 = 0.02;
     const COUNT: u32 = 800;
     const WIDTH: f32 = 0.1e-3;
-    let mut scene = Offscreen::new(128, 128)?;
+    let mut scene = Offscreen::new(128, 128);
     let pixel = 0.06 / 128.0;
     measure(&mut scene, 0.06, 0.06);
     // From the right: what is seen of the slab's front is lit along x.
@@ -179,7 +174,7 @@ fn shares_by_depth(shadow_maps: bool) -> Option<Vec<(f32, f32)>> {
     let left = |i: usize| (-(i as f32 + 0.5) * each).exp();
     // Of the sun, by all sixteen.
     let whole = light.iter().sum::<f32>() / (0..16).map(left).sum::<f32>();
-    Some(light.iter().enumerate().map(|(i, light)| (light / whole, left(i))).collect())
+    light.iter().enumerate().map(|(i, light)| (light / whole, left(i))).collect()
 }
 
 /// What endless hair returns of light from all around (Stokes 1862), of shares that one dry fibre sends on
@@ -195,11 +190,8 @@ fn endless(absorption: Vec3) -> Vec3 {
 }
 
 /// T3. Under a white sky hair has the colour that its melanin gives endless hair.
-#[test]
-fn hair_under_a_sky_has_its_melanins_colour() {
-    let Some(mut scene) = Offscreen::new(48, 48) else {
-        return;
-    };
+pub fn hair_under_a_sky_has_its_melanins_colour() {
+    let mut scene = Offscreen::new(48, 48);
     measure(&mut scene, 0.4, 0.4);
     let followers = HairFollowers { segments: 12, ..HairFollowers::new(3000) };
     let hair = wear(&mut scene, &head_of_guides(200, 0.09, 0.2, 12), followers);
@@ -236,12 +228,11 @@ fn hair_under_a_sky_has_its_melanins_colour() {
 
 /// T7, without temporal antialiasing: opaque ribbons had 11.4 %, of which half or less is asked for. As the camera moves
 /// by sixteenths of a pixel, a picture differs from the finer one of the same view by about as much each time.
-#[test]
-fn hair_does_not_flicker_as_the_camera_creeps() {
+pub fn hair_does_not_flicker_as_the_camera_creeps() {
     const SIZE: u32 = 48;
     const FRAMES: usize = 6;
     let film = |size: u32| {
-        let mut scene = Offscreen::new(size, size)?;
+        let mut scene = Offscreen::new(size, size);
         measure(&mut scene, 0.3, 0.3);
         let look = HairLook { melanin: Melanin::BLOND, width: 0.5e-3, ..default() };
         let followers = HairFollowers { segments: 8, ..HairFollowers::new(1500) };
@@ -254,11 +245,9 @@ fn hair_does_not_flicker_as_the_camera_creeps() {
             scene.look(Vec3::new(0.0, 0.0, 0.5) + aside, aside);
             if i == 0 { scene.draw() } else { scene.draw_now() }
         };
-        Some((0..FRAMES).map(frame).collect::<Vec<Picture>>())
+        (0..FRAMES).map(frame).collect::<Vec<Picture>>()
     };
-    let (Some(plain), Some(fine)) = (film(SIZE), film(4 * SIZE)) else {
-        return;
-    };
+    let (plain, fine) = (film(SIZE), film(4 * SIZE));
     let (mut flicker, mut light, mut count) = (0.0, 0.0, 0.0);
     for (x, y) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y))) {
         let truth = |picture: &Picture| {
@@ -283,11 +272,8 @@ fn hair_does_not_flicker_as_the_camera_creeps() {
 
 /// Hair that lies around a place takes light of the sky from it: the inside of an open pipe of dark hair is
 /// darker than its outside.
-#[test]
-fn a_hollow_is_darker_under_a_sky_than_what_stands_out() {
-    let Some(mut scene) = Offscreen::new(64, 64) else {
-        return;
-    };
+pub fn a_hollow_is_darker_under_a_sky_than_what_stands_out() {
+    let mut scene = Offscreen::new(64, 64);
     measure(&mut scene, 0.1, 0.1);
     let mut chance = Chance(11);
     let mut strand = || {

@@ -2,6 +2,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/device.rs"]
+mod device;
 #[path = "../common/linear.rs"]
 mod linear;
 #[path = "../../examples/shared/mannequin.rs"]
@@ -18,6 +20,7 @@ mod scenes {
 mod cost;
 mod coverage;
 mod dye;
+mod fibre;
 mod frames;
 mod groom;
 mod light;
@@ -27,3 +30,94 @@ mod plugins;
 mod reference;
 mod twin;
 mod wet;
+
+device::tests! {
+    cost {
+        device: a_hair_is_one_draw_call_in_every_view_and_one_of_depth_before_it_in_pictures,
+            a_hundred_heads_share_a_mesh_of_few_strands;
+        on_request: frames_a_second,
+            what_each_stage_costs;
+    }
+    coverage {
+        device: strands_cover_as_much_from_near_and_far_and_at_their_tips,
+            edges_are_those_of_a_picture_with_sixteen_times_the_pixels,
+            smoothing_changes_hair_alone_and_leaves_no_mark,
+            nothing_pops_as_a_camera_flies_away;
+    }
+    dye {
+        device: black_hair_is_drawn_pink_and_roots_and_tips_apart,
+            streaks_are_the_share_of_strands_that_was_asked_for;
+    }
+    fibre {
+        anywhere: a_wet_lock_is_darker_than_dry_hair_wherever_light_comes_from,
+            what_flows_through_layers_begins_as_all_and_ends_as_what_comes_through,
+            a_fibre_conserves_energy_and_pigment_only_absorbs,
+            shares_of_one_fibre_are_those_of_its_lobes,
+            light_that_went_through_others_is_spread_not_added,
+            among_fibres_that_point_elsewhere_light_leaves_its_cone,
+            infinitely_deep_hair_has_the_colour_of_its_melanin,
+            layers_without_pigment_return_what_diffusion_returns,
+            highlights_on_a_cylinder_lie_where_path_tracing_has_them,
+            the_clear_highlight_leans_to_the_root_and_the_coloured_one_to_the_tip,
+            all_results_are_finite_for_any_fibre_and_light;
+    }
+    frames {
+        device: hair_is_where_the_guides_are_and_shows_their_rates,
+            rings_of_a_frame_draw_what_each_vertex_would_compute,
+            followers_cover_more_frames_repeat_and_wet_is_darker,
+            the_highlight_lies_across_and_moves_with_the_light,
+            hair_receives_and_casts_shadow,
+            bad_hair_neither_panics_nor_leaves_a_stale_picture,
+            every_kind_of_light_lights_hair_through_every_kind_of_camera,
+            prepasses_leave_no_holes_and_motion_moves_nothing,
+            followers_are_laid_out_again_when_roots_are_edited_and_rest,
+            wet_locks_are_tighter,
+            coincident_guides_and_nodes_are_drawn,
+            water_is_drawn_as_beads_as_long_as_there_is_any,
+            soaked_hair_is_darker_and_droplets_are_seen,
+            views_do_not_disturb_each_other_nor_does_a_minimised_window,
+            hair_and_water_outlive_a_lost_device;
+    }
+    groom {
+        device: followers_are_drawn_where_they_are_given_and_no_more_than_asked_for;
+    }
+    light {
+        device: what_comes_through_strands_falls_with_their_number,
+            light_falls_off_bit_by_bit_on_its_way_into_hair,
+            a_light_without_a_shadow_map_falls_off_as_well,
+            hair_under_a_sky_has_its_melanins_colour,
+            hair_does_not_flicker_as_the_camera_creeps,
+            a_hollow_is_darker_under_a_sky_than_what_stands_out;
+    }
+    look {
+        device: white_hair_vanishes_in_a_white_sky,
+            light_from_the_other_side_makes_the_mirror_image,
+            no_look_however_absurd_leaves_a_pixel_without_a_number;
+    }
+    pictures {
+        on_request: studio_pictures,
+            portraits;
+    }
+    plugins {
+        device: each_part_switches_off_alone,
+            all_parts_switch_off_together,
+            hair_is_drawn_without_any_one_of_them,
+            hair_is_drawn_without_all_of_them;
+        anywhere: any_plugin_may_be_left_out_and_what_misses_it_says_so_once,
+            any_set_of_plugins_may_be_left_out,
+            nothing_falls_without_the_environment_and_nothing_hides_without_settling;
+    }
+    reference {
+        device: a_tress_has_the_colour_that_path_tracing_gives_it,
+            a_tress_lit_from_above_and_behind_is_near_path_tracing,
+            a_ball_glows_at_its_rim_as_path_tracing_has_it,
+            a_ball_in_a_furnace_returns_what_path_tracing_returns;
+    }
+    twin {
+        device: the_shader_puts_strands_where_its_rust_twin_does,
+            the_shader_lights_fibres_as_its_rust_twin_does;
+    }
+    wet {
+        device: wet_hair_is_darker_deeper_in_colour_and_sleeker;
+    }
+}

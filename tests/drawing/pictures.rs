@@ -61,13 +61,9 @@ fn setting<T: std::str::FromStr>(name: &str, otherwise: T) -> T {
     given.unwrap_or(otherwise)
 }
 
-#[test]
-#[ignore = "writes pictures"]
-fn studio_pictures() {
+pub fn studio_pictures() {
     let size = setting("SIZE", 400);
-    let Some(mut scene) = Offscreen::new(size, size) else {
-        return;
-    };
+    let mut scene = Offscreen::new(size, size);
     let fine = bevy::light::DirectionalLightShadowMap { size: 2048 };
     scene.app.insert_resource(fine);
     studio(&mut scene);
@@ -206,13 +202,9 @@ fn with_scalp(mut mesh: Mesh) -> Mesh {
 
 /// `cargo test --test render_pictures portraits -- --ignored --nocapture`: a whole head of long hair in
 /// four looks. `WIDTH`, `HEIGHT`, `FOLLOWERS`, `ONLY` choose.
-#[test]
-#[ignore = "writes pictures"]
-fn portraits() {
+pub fn portraits() {
     let (width, height) = (setting("WIDTH", 1920), setting("HEIGHT", 1080));
-    let Some(mut scene) = Offscreen::new(width, height) else {
-        return;
-    };
+    let mut scene = Offscreen::new(width, height);
     let fine = bevy::light::DirectionalLightShadowMap { size: 2048 };
     scene.app.insert_resource(fine);
     let only: String = setting("ONLY", String::new());

@@ -62,22 +62,20 @@ fn falls(what: &str, plugins: PluginGroupBuilder) {
     assert!(strand.is_finite() && tip.y < -0.05, "without {what} the tip is at {tip}");
 }
 
-#[test]
-fn each_part_switches_off_alone() {
+pub fn each_part_switches_off_alone() {
     for (what, switch) in OPTIONAL {
         falls(what, switch(HairPlugins::default().build()));
     }
 }
 
-#[test]
-fn all_parts_switch_off_together() {
+pub fn all_parts_switch_off_together() {
     let none = OPTIONAL.iter().fold(HairPlugins::default().build(), |group, (_, off)| off(group));
     falls("all of them", none);
 }
 
 /// A head of hair, drawn with these plugins.
 fn is_drawn(what: &str, plugins: PluginGroupBuilder) {
-    let Some(mut scene) = Offscreen::with_plugins(160, 120, plugins) else { return };
+    let mut scene = Offscreen::with_plugins(160, 120, plugins);
     let hair = scene.app.world_mut().spawn((Hair, HairFollowers::new(300))).id();
     scene.app.world_mut().spawn((DirectionalLight::default(), Transform::default()));
     for line in crate::offscreen::head_of_guides(60, 0.1, 0.1, 6) {
@@ -89,15 +87,13 @@ fn is_drawn(what: &str, plugins: PluginGroupBuilder) {
     assert!(covered > 300, "without {what}: {covered} pixels of hair");
 }
 
-#[test]
-fn hair_is_drawn_without_any_one_of_them() {
+pub fn hair_is_drawn_without_any_one_of_them() {
     for (what, switch) in OPTIONAL {
         is_drawn(what, switch(HairPlugins::default().build()));
     }
 }
 
-#[test]
-fn hair_is_drawn_without_all_of_them() {
+pub fn hair_is_drawn_without_all_of_them() {
     let none = OPTIONAL.iter().fold(HairPlugins::default().build(), |group, (_, off)| off(group));
     is_drawn("all of them", none);
 }
@@ -218,8 +214,7 @@ impl tracing::Subscriber for Warnings {
     fn exit(&self, _: &tracing::span::Id) {}
 }
 
-#[test]
-fn any_plugin_may_be_left_out_and_what_misses_it_says_so_once() {
+pub fn any_plugin_may_be_left_out_and_what_misses_it_says_so_once() {
     for (what, off) in ALL {
         let warnings = Warnings::default();
         let (app, strands) = tracing::subscriber::with_default(warnings.clone(), || used(&[off]));
@@ -237,8 +232,7 @@ fn any_plugin_may_be_left_out_and_what_misses_it_says_so_once() {
     }
 }
 
-#[test]
-fn any_set_of_plugins_may_be_left_out() {
+pub fn any_set_of_plugins_may_be_left_out() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(37);
     for _ in 0..20 {
         let share = random.random_range(0.05..0.7);
@@ -250,8 +244,7 @@ fn any_set_of_plugins_may_be_left_out() {
     }
 }
 
-#[test]
-fn nothing_falls_without_the_environment_and_nothing_hides_without_settling() {
+pub fn nothing_falls_without_the_environment_and_nothing_hides_without_settling() {
     let mut app = App::new();
     let plugins = HairPlugins::default().build().disable::<EnvironmentPlugin>();
     app.add_plugins((MinimalPlugins, plugins.disable::<SettlePlugin>()));

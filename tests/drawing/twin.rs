@@ -1,7 +1,10 @@
 //! The shader's curve and follower maths against its Rust twin, on random data: dry and wet strands,
 //! in this frame and in the one before.
 
-use crate::offscreen::Offscreen;
+use crate::{
+    fibre::{Angles, Optics, Passage},
+    offscreen::Offscreen,
+};
 use bevy::{
     math::Affine3A,
     prelude::*,
@@ -24,7 +27,6 @@ use bevy_keratin::{
     render::{
         DrawnStrand, HairFollowers, LockOffset,
         curve::{CurvePoint, DrawnSolid, Guide, arrange, packed_frame, strand_point},
-        fibre::{Angles, Optics, Passage},
     },
 };
 
@@ -236,11 +238,8 @@ fn compute(
     bytes.chunks_exact(4).map(|word| f32::from_le_bytes(word.try_into().unwrap())).collect()
 }
 
-#[test]
-fn the_shader_puts_strands_where_its_rust_twin_does() {
-    let Some(mut scene) = Offscreen::new(16, 16) else {
-        return;
-    };
+pub fn the_shader_puts_strands_where_its_rust_twin_does() {
+    let mut scene = Offscreen::new(16, 16);
     let followers = HairFollowers {
         clump: 0.3,
         parting: 2.0,
@@ -349,11 +348,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 ";
 
-#[test]
-fn the_shader_lights_fibres_as_its_rust_twin_does() {
-    let Some(mut scene) = Offscreen::new(16, 16) else {
-        return;
-    };
+pub fn the_shader_lights_fibres_as_its_rust_twin_does() {
+    let mut scene = Offscreen::new(16, 16);
     const COUNT: usize = 400;
     let mut random = Random(11);
     let fibres: Vec<[Vec4; 4]> = (0..COUNT)

@@ -52,11 +52,8 @@ fn width(rows: &[Vec3]) -> f32 {
 }
 
 /// T15. Ratios as they follow from the shares of a fibre in water (a relative index of 1.165).
-#[test]
-fn wet_hair_is_darker_deeper_in_colour_and_sleeker() {
-    let Some(mut scene) = Offscreen::new(96, 264) else {
-        return;
-    };
+pub fn wet_hair_is_darker_deeper_in_colour_and_sleeker() {
+    let mut scene = Offscreen::new(96, 264);
     measure(&mut scene, 96.0 * PIXEL, 264.0 * PIXEL);
     // Rows are means already, and their highlight must not reach into those beside it.
     scene.leave_grain();

@@ -44,9 +44,8 @@ fn bits(strand: &StrandState) -> Vec<u32> {
     numbers.iter().map(|x| x.to_bits()).collect()
 }
 
-#[test]
-fn hand_over_and_return_without_a_substep_change_no_bit() {
-    let Some(device) = Device::get() else { return };
+pub fn hand_over_and_return_without_a_substep_change_no_bit() {
+    let device = Device::get();
     let strands = strands(70);
     let on = device.hand_over(&strands);
     for (strand, back) in strands.iter().zip(on.read(&device.device, &device.queue).unwrap()) {
@@ -65,9 +64,8 @@ fn hand_over_and_return_without_a_substep_change_no_bit() {
     }
 }
 
-#[test]
-fn ten_runs_are_equal_to_the_bit_whatever_stands_beside_and_however_they_are_submitted() {
-    let Some(device) = Device::get() else { return };
+pub fn ten_runs_are_equal_to_the_bit_whatever_stands_beside_and_however_they_are_submitted() {
+    let device = Device::get();
     let (strands, records) = (strands(70), records(12));
     let all = device.run(&mut device.hand_over(&strands), &records);
     for run in 1..10 {
@@ -87,9 +85,8 @@ fn ten_runs_are_equal_to_the_bit_whatever_stands_beside_and_however_they_are_sub
     }
 }
 
-#[test]
-fn what_is_no_number_stays_with_its_strand_and_is_counted_once() {
-    let Some(device) = Device::get() else { return };
+pub fn what_is_no_number_stays_with_its_strand_and_is_counted_once() {
+    let device = Device::get();
     let (sound, records) = (strands(70), records(6));
     let expected = device.run(&mut device.hand_over(&sound), &records);
     let mut broken = sound.clone();
@@ -116,9 +113,8 @@ fn what_is_no_number_stays_with_its_strand_and_is_counted_once() {
     }
 }
 
-#[test]
-fn obstacles_out_of_reach_change_no_bit_however_many() {
-    let Some(device) = Device::get() else { return };
+pub fn obstacles_out_of_reach_change_no_bit_however_many() {
+    let device = Device::get();
     // Above a floor and beside a wall, which they meet within a few substeps.
     let mut random = Random(6);
     let strand = |i: usize| {
@@ -157,8 +153,7 @@ fn obstacles_out_of_reach_change_no_bit_however_many() {
 }
 
 /// The tick makes no such record. Whatever a kernel makes of it: a substep later strands are whole.
-#[test]
-fn records_of_no_numbers_leave_strands_whole() {
+pub fn records_of_no_numbers_leave_strands_whole() {
     type Spoil = fn(&mut SubstepRecord);
     const NAN: f32 = f32::NAN;
     let all: [(&str, Spoil); 14] = [
@@ -181,7 +176,7 @@ fn records_of_no_numbers_leave_strands_whole() {
         }),
         ("friction", |r| r.obstacles[0].friction = NAN),
     ];
-    let Some(device) = Device::get() else { return };
+    let device = Device::get();
     let sound = strands(70);
     let reach = |state: &StrandState| {
         let far = state.positions.iter().map(|p| p.distance(state.positions[0]));
@@ -213,9 +208,8 @@ fn records_of_no_numbers_leave_strands_whole() {
     }
 }
 
-#[test]
-fn a_shaken_strand_of_64_segments_holds_its_length() {
-    let Some(device) = Device::get() else { return };
+pub fn a_shaken_strand_of_64_segments_holds_its_length() {
+    let device = Device::get();
     let points: Vec<Vec3> = (0..65).map(|i| Vec3::NEG_Y * (0.24 / 64.0 * i as f32)).collect();
     let mut strand = LabStrand::along(&points);
     let dt: f32 = 1.0 / 360.0;

@@ -80,9 +80,8 @@ fn near(found: f32, expected: f32) {
     assert!((found - expected).abs() < 0.002, "kept {found}, expected {expected}");
 }
 
-#[test]
-fn sets_keep_the_share_of_the_bonds_that_formed() {
-    let Some(device) = Device::get() else { return };
+pub fn sets_keep_the_share_of_the_bonds_that_formed() {
+    let device = Device::get();
     let half: Change = [0.5, 0.0, 0.0, 0.0];
     let sets: [(&[Change], f32); 5] = [
         (&[WET, DRY], 0.33),
@@ -99,9 +98,8 @@ fn sets_keep_the_share_of_the_bonds_that_formed() {
     }
 }
 
-#[test]
-fn a_perm_keeps_two_thirds_and_survives_washing_in_part() {
-    let Some(device) = Device::get() else { return };
+pub fn a_perm_keeps_two_thirds_and_survives_washing_in_part() {
+    let device = Device::get();
     let mut strand = arc(0.6, None);
     held(device, &mut strand, &[LOTION, FIX, DRY]);
     free(device, &mut strand, &[]);
@@ -119,9 +117,8 @@ fn a_perm_keeps_two_thirds_and_survives_washing_in_part() {
     near(kept(&straight, 0.6), 0.04);
 }
 
-#[test]
-fn a_treatment_takes_rates_the_asked_share_of_the_way_and_never_cuts_the_backbone() {
-    let Some(device) = Device::get() else { return };
+pub fn a_treatment_takes_rates_the_asked_share_of_the_way_and_never_cuts_the_backbone() {
+    let device = Device::get();
     let strand = arc(0.3, None);
     // A tenth of the way to 0.4 in each substep.
     let record = SubstepRecord {

@@ -79,9 +79,8 @@ fn apart(app: &App, members: &[Entity], states: &[StrandState]) -> (f32, f32) {
     (places, rates)
 }
 
-#[test]
-fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
-    let Some(device) = Device::get() else { return };
+pub fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
+    let device = Device::get();
     let (mut app, hair, passing) = scene();
     let members = members(&app, hair);
     // Bonds that wind can close again.
@@ -118,8 +117,7 @@ fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
 }
 
 /// An app without a GPU says so once nothing else keeps hair from it.
-#[test]
-fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
+pub fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
     let reported = |change: fn(&mut App, Entity)| {
         let (mut app, hair, passing) = scene();
         app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);

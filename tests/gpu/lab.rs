@@ -1,6 +1,6 @@
 //! Random strands, the same substep in lanes, and a device to run it on.
 
-use crate::offscreen::{has_adapter, windowless};
+use crate::offscreen::windowless;
 use bevy::{
     math::Isometry3d,
     prelude::*,
@@ -295,24 +295,21 @@ pub struct Device {
 }
 
 impl Device {
-    /// The one that all tests share; `None`, with the reason printed, where there is no driver.
-    pub fn get() -> Option<&'static Self> {
-        static DEVICE: OnceLock<Option<Device>> = OnceLock::new();
-        let device = DEVICE.get_or_init(|| {
-            has_adapter().then(|| {
-                let mut app = App::new();
-                app.add_plugins(windowless());
-                app.finish();
-                app.cleanup();
-                let device = app.world().resource::<RenderDevice>().clone();
-                let queue = app.world().resource::<RenderQueue>().clone();
-                let kernels = HairKernels::new(&device);
-                let info = app.world().resource::<RenderAdapterInfo>();
-                let is_software = format!("{:?}", info.device_type) == "Cpu";
-                Device { device, queue, kernels, is_software }
-            })
-        });
-        device.as_ref()
+    /// The one that all tests share.
+    pub fn get() -> &'static Self {
+        static DEVICE: OnceLock<Device> = OnceLock::new();
+        DEVICE.get_or_init(|| {
+            let mut app = App::new();
+            app.add_plugins(windowless());
+            app.finish();
+            app.cleanup();
+            let device = app.world().resource::<RenderDevice>().clone();
+            let queue = app.world().resource::<RenderQueue>().clone();
+            let kernels = HairKernels::new(&device);
+            let info = app.world().resource::<RenderAdapterInfo>();
+            let is_software = format!("{:?}", info.device_type) == "Cpu";
+            Device { device, queue, kernels, is_software }
+        })
     }
 
     pub fn hand_over(&self, strands: &[LabStrand]) -> GpuStrands {

@@ -8,9 +8,8 @@ use bevy_keratin::{
 };
 use proptest::prelude::*;
 
-proptest! {
-    #[test]
-    fn slots_never_overlap_and_lie_within(nodes in proptest::collection::vec(2usize..70, 0..150)) {
+pub fn slots_never_overlap_and_lie_within() {
+    proptest!(|(nodes in proptest::collection::vec(2usize..70, 0..150))| {
         let layout = Layout::of(&nodes);
         let mut taken = vec![false; layout.vectors(3)];
         for (strand, count) in nodes.iter().enumerate() {
@@ -33,10 +32,11 @@ proptest! {
             }
         }
         prop_assert_eq!(layout.strand_of(strands), None);
-    }
+    });
+}
 
-    #[test]
-    fn what_is_put_is_what_is_got(nodes in proptest::collection::vec(2usize..20, 1..80)) {
+pub fn what_is_put_is_what_is_got() {
+    proptest!(|(nodes in proptest::collection::vec(2usize..20, 1..80))| {
         let mut random = Random(9);
         let layout = Layout::of(&nodes);
         let strands: Vec<LabStrand> =
@@ -52,11 +52,10 @@ proptest! {
             prop_assert_eq!(&got.joints, &strand.joints);
             prop_assert_eq!(got.root_frame, strand.root_frame);
         }
-    }
+    });
 }
 
-#[test]
-fn a_record_is_as_long_whatever_it_holds() {
+pub fn a_record_is_as_long_whatever_it_holds() {
     let ball = Solid::Capsule { a: Vec3::ZERO, b: Vec3::ZERO, radius: 0.1 };
     let obstacle = Obstacle { solid: ball, motion: None, friction: 0.3 };
     let words = |blowers, obstacles| {

@@ -33,9 +33,8 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
     stage.run(1);
 }
 
-#[test]
-fn hair_goes_to_the_device_and_comes_home() {
-    let Some(mut stage) = Stage::new(SimulateOn::Cpu, Vec::new()) else { return };
+pub fn hair_goes_to_the_device_and_comes_home() {
+    let mut stage = Stage::new(SimulateOn::Cpu, Vec::new());
     stage.compile();
     let all: [fn(&mut Stage); 40] = [
         hand_over_and_return_without_a_tick_change_no_bit,

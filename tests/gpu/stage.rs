@@ -1,6 +1,6 @@
 //! An app with hair on a software device.
 
-use crate::offscreen::{has_adapter, windowless};
+use crate::offscreen::windowless;
 use bevy::{app::PluginGroupBuilder, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
     gpu::{HairResidence, fetch_strands},
@@ -34,9 +34,8 @@ pub fn curls(count: usize, nodes: usize) -> Vec<Strand> {
 }
 
 impl Stage {
-    /// Hair of these strands, asked to be on `on`; `None`, with the reason printed, where there is no
-    /// driver. A tick a frame.
-    pub fn new(on: SimulateOn, strands: Vec<Strand>) -> Option<Self> {
+    /// Hair of these strands, asked to be on `on`. A tick a frame.
+    pub fn new(on: SimulateOn, strands: Vec<Strand>) -> Self {
         Self::with_plugins(windowless, on, strands)
     }
 
@@ -45,17 +44,15 @@ impl Stage {
         plugins: fn() -> PluginGroupBuilder,
         on: SimulateOn,
         strands: Vec<Strand>,
-    ) -> Option<Self> {
-        has_adapter().then(|| {
-            let mut app = App::new();
-            app.add_plugins((plugins(), HairPlugins::default()));
-            Self::furnish(&mut app);
-            app.finish();
-            app.cleanup();
-            app.update();
-            let hair = Self::spawn(&mut app, on, strands);
-            Self { app, hair }
-        })
+    ) -> Self {
+        let mut app = App::new();
+        app.add_plugins((plugins(), HairPlugins::default()));
+        Self::furnish(&mut app);
+        app.finish();
+        app.cleanup();
+        app.update();
+        let hair = Self::spawn(&mut app, on, strands);
+        Self { app, hair }
     }
 
     /// What the tests have of settings: a software device, waiting for what returns to the CPU, nothing of what

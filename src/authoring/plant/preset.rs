@@ -190,159 +190,70 @@ impl WornPreset {
     }
 }
 
+/// How guides of each preset are planted: density (1/m²), length (m), its variation, lean and jitter (rad); nodes; a
+/// curl's radius and pitch (m); a clump's spacing (m) and strength; a drape's length and clearance (m), and layering. No
+/// curl, clump or drape where all are 0.
+type Guides = ([f32; 5], u32, [f32; 2], [f32; 2], [f32; 3]);
+const GUIDES: [Guides; 13] = [
+    // Each guide bends by itself: together they would shine in bands.
+    ([0.35e4, 0.3, 0.1, 1.2, 0.06], 24, [0.95e-3, 54e-3], [25e-3, 0.25], [0.035, 5e-3, 0.07]), // Straight
+    // Waves that several guides share: one guide's would look like spots.
+    ([0.33e4, 0.33, 0.1, 1.2, 0.06], 28, [6e-3, 60e-3], [45e-3, 0.2], [0.035, 5e-3, 0.12]), // Wavy
+    ([0.21e4, 0.34, 0.1, 0.9, 0.06], 48, [7e-3, 26e-3], [0.0, 0.0], [0.05, 5e-3, 0.2]),     // Curly
+    ([0.58e4, 0.17, 0.15, 0.0, 0.25], 36, [3.5e-3, 9e-3], [0.0, 0.0], [0.0, 0.0, 0.0]),     // Coily
+    ([0.8e4, 0.065, 0.2, 1.2, 0.12], 10, [0.0, 0.0], [14e-3, 0.25], [0.09, 4e-3, 0.03]),    // Short
+    ([0.35e4, 0.32, 0.04, 1.2, 0.06], 18, [0.0, 0.0], [25e-3, 0.15], [0.035, 5e-3, 0.09]),  // Bob
+    ([0.3e4, 0.5, 0.1, 1.2, 0.06], 28, [0.0, 0.0], [25e-3, 0.25], [0.035, 5e-3, 0.07]),     // Long
+    ([0.35e4, 0.3, 0.05, 1.2, 0.06], 22, [0.0, 0.0], [25e-3, 0.2], [0.035, 5e-3, 0.07]), // Fringe
+    ([0.6e4, 0.14, 0.15, 1.3, 0.08], 12, [0.0, 0.0], [18e-3, 0.35], [0.03, 4e-3, 0.03]), // Undercut
+    ([0.65e4, 0.11, 0.3, 1.2, 0.16], 11, [0.0, 0.0], [16e-3, 0.4], [0.035, 4e-3, 0.025]), // Pixie
+    ([0.3e4, 0.3, 0.2, 1.0, 0.2], 20, [2.5e-3, 70e-3], [0.0, 0.0], [0.035, 7e-3, 0.14]), // Locs
+    ([0.9e4, 0.03, 0.25, 0.9, 0.2], 6, [1.5e-3, 24e-3], [9e-3, 0.35], [0.03, 3e-3, 0.0]), // Beard
+    ([0.5e4, 0.015, 0.25, 0.95, 0.15], 4, [0.0, 0.0], [12e-3, 0.3], [0.0, 0.0, 0.0]),    // Fur
+];
+
 impl HairPreset {
     /// How it is planted; to be changed before [`Planting::plant_with`].
     pub fn planting(self, scalp: &Scalp) -> Planting {
         let [right, up, front] = scalp.axes();
-        let crown = scalp.place(0.05, 0.9, -0.35);
-        let drape =
-            Drape { toward: -up - front * 0.15, over: 0.035, clearance: 5e-3, layering: 0.07 };
-        let parted = CombPattern::Parted { at: scalp.center, across: right, along: -front * 0.4 };
-        let base = Planting {
-            density: 0.35e4,
-            nodes: 20,
-            length: 0.3,
-            length_variation: 0.1,
-            comb: parted,
-            lean: 1.2,
-            jitter: 0.06,
-            clump: Some(Clump { spacing: 25e-3, strength: 0.25 }),
-            drape: Some(drape),
-            ..default()
+        let (guide, nodes, [radius, pitch], [spacing, strength], drape) = GUIDES[self as usize];
+        let [density, length, length_variation, lean, jitter] = guide;
+        let [over, clearance, layering] = drape;
+        let phase = match self {
+            Self::Wavy => CurlPhase::PerClump,
+            _ => CurlPhase::PerStrand,
         };
-        let curl = |radius, pitch, phase| Some(Curl { radius, pitch, variation: 0.12, phase });
-        match self {
-            // Each guide bends by itself: together they would shine in bands.
-            Self::Straight => {
-                Planting { nodes: 24, curl: curl(0.95e-3, 54e-3, CurlPhase::PerStrand), ..base }
-            }
-            Self::Wavy => Planting {
-                density: 0.33e4,
-                length: 0.33,
-                nodes: 28,
-                curl: curl(6e-3, 60e-3, CurlPhase::PerClump),
-                // Waves that several guides share: one guide's would look like spots.
-                clump: Some(Clump { spacing: 45e-3, strength: 0.2 }),
-                drape: Some(Drape { layering: 0.12, ..drape }),
-                ..base
-            },
-            Self::Curly => Planting {
-                density: 0.21e4,
-                length: 0.34,
-                nodes: 48,
-                lean: 0.9,
-                curl: curl(7e-3, 26e-3, CurlPhase::PerStrand),
-                clump: None,
-                drape: Some(Drape { over: 0.05, layering: 0.2, ..drape }),
-                ..base
-            },
-            Self::Coily => Planting {
-                density: 0.58e4,
-                length: 0.17,
-                length_variation: 0.15,
-                nodes: 36,
-                comb: CombPattern::Out,
-                lean: 0.0,
-                jitter: 0.25,
-                curl: curl(3.5e-3, 9e-3, CurlPhase::PerStrand),
-                clump: None,
-                drape: None,
-                ..base
-            },
-            Self::Short => Planting {
-                density: 0.8e4,
-                length: 0.065,
-                length_variation: 0.2,
-                nodes: 10,
-                comb: CombPattern::Whorl { center: crown, turn: 0.5 },
-                lean: 1.2,
-                jitter: 0.12,
-                clump: Some(Clump { spacing: 14e-3, strength: 0.25 }),
-                drape: Some(Drape { over: 0.09, clearance: 4e-3, layering: 0.03, ..drape }),
-                ..base
-            },
-            Self::Bob => Planting {
-                length: 0.32,
-                length_variation: 0.04,
-                nodes: 18,
-                drape: Some(Drape { layering: 0.09, ..drape }),
+        let comb = match self {
+            Self::Coily => CombPattern::Out,
+            Self::Short => CombPattern::Whorl { center: scalp.place(0.05, 0.9, -0.35), turn: 0.5 },
+            Self::Fur => CombPattern::Along(-front - up * 0.5),
+            _ => CombPattern::Parted { at: scalp.center, across: right, along: -front * 0.4 },
+        };
+        let cut = |high, normal| Cut { at: scalp.place(0.0, high, 0.0), normal, least: 0.03 };
+        Planting {
+            density,
+            nodes,
+            length,
+            length_variation,
+            comb,
+            lean,
+            jitter,
+            curl: (radius > 0.0).then_some(Curl { radius, pitch, variation: 0.12, phase }),
+            clump: (spacing > 0.0).then_some(Clump { spacing, strength }),
+            drape: (over > 0.0).then_some(Drape {
+                toward: -up - front * 0.15,
+                over,
+                clearance,
+                layering,
+            }),
+            cut: match self {
                 // Higher in front, where the way down is longer: it hangs in one line.
-                cut: Some(Cut {
-                    at: scalp.place(0.0, -0.9, 0.0),
-                    normal: up - front * 0.25,
-                    least: 0.03,
-                }),
-                clump: Some(Clump { spacing: 25e-3, strength: 0.15 }),
-                ..base
-            },
-            Self::Long => Planting { density: 0.3e4, length: 0.5, nodes: 28, ..base },
-            Self::Fringe => Planting {
-                length: 0.3,
-                length_variation: 0.05,
-                nodes: 22,
+                Self::Bob => Some(cut(-0.9, up - front * 0.25)),
                 // Curved in at the chin.
-                cut: Some(Cut { at: scalp.place(0.0, -1.05, 0.0), normal: up, least: 0.03 }),
-                clump: Some(Clump { spacing: 25e-3, strength: 0.2 }),
-                ..base
+                Self::Fringe => Some(cut(-1.05, up)),
+                _ => None,
             },
-            Self::Undercut => Planting {
-                density: 0.6e4,
-                length: 0.14,
-                length_variation: 0.15,
-                nodes: 12,
-                lean: 1.3,
-                jitter: 0.08,
-                clump: Some(Clump { spacing: 18e-3, strength: 0.35 }),
-                drape: Some(Drape { over: 0.03, clearance: 4e-3, layering: 0.03, ..drape }),
-                ..base
-            },
-            Self::Pixie => Planting {
-                density: 0.65e4,
-                length: 0.11,
-                length_variation: 0.3,
-                nodes: 11,
-                lean: 1.2,
-                jitter: 0.16,
-                clump: Some(Clump { spacing: 16e-3, strength: 0.4 }),
-                drape: Some(Drape { clearance: 4e-3, layering: 0.025, ..drape }),
-                ..base
-            },
-            Self::Locs => Planting {
-                density: 0.3e4,
-                length: 0.3,
-                length_variation: 0.2,
-                nodes: 20,
-                lean: 1.0,
-                jitter: 0.2,
-                curl: curl(2.5e-3, 70e-3, CurlPhase::PerStrand),
-                clump: None,
-                drape: Some(Drape { clearance: 7e-3, layering: 0.14, ..drape }),
-                ..base
-            },
-            Self::Beard => Planting {
-                density: 0.9e4,
-                length: 0.03,
-                length_variation: 0.25,
-                nodes: 6,
-                lean: 0.9,
-                jitter: 0.2,
-                curl: curl(1.5e-3, 24e-3, CurlPhase::PerStrand),
-                clump: Some(Clump { spacing: 9e-3, strength: 0.35 }),
-                drape: Some(Drape { over: 0.03, clearance: 3e-3, layering: 0.0, ..drape }),
-                ..base
-            },
-            Self::Fur => Planting {
-                density: 0.5e4,
-                length: 0.015,
-                length_variation: 0.25,
-                nodes: 4,
-                comb: CombPattern::Along(-front - up * 0.5),
-                lean: 0.95,
-                jitter: 0.15,
-                clump: Some(Clump { spacing: 12e-3, strength: 0.3 }),
-                drape: None,
-                ..base
-            },
+            ..default()
         }
     }
 

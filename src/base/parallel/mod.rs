@@ -176,7 +176,7 @@ pub(crate) fn in_turn<T>(
 pub(crate) struct Scratch<T>(Mutex<Vec<T>>);
 
 impl<T: Default> Scratch<T> {
-    /// One that nobody uses, as it was left.
+    /// One that is not borrowed, with its contents as they were left.
     pub(crate) fn borrow(&self) -> Borrowed<'_, T> {
         let mut free = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         Borrowed { one: free.pop().unwrap_or_default(), owner: self }

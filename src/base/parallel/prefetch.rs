@@ -21,20 +21,3 @@ pub(crate) fn prefetch<T>(values: &[T]) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = values;
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn any_slice_may_be_prefetched_and_stays_unchanged() {
-        prefetch::<u64>(&[]);
-        prefetch(&[(); 3]);
-        for length in 0..200 {
-            let bytes: Vec<u8> = (0..length).collect();
-            prefetch(&bytes);
-            prefetch(&bytes[length as usize / 2..]);
-            assert!(bytes.iter().copied().eq(0..length));
-        }
-    }
-}

@@ -232,9 +232,11 @@ impl<S: Simd> PenaltySum<S> {
     }
 }
 
-/// Water's bridges from groups of eight edges to one node, lane by lane: see [`bridged`].
+/// Bridges of water from groups of eight edges to one node, lane by lane.
 ///
-/// [`bridged`]: super::model::bridged
+/// Between two fibres the pull of a capillary bridge hardly depends on its volume, but its reach does: it breaks at
+/// (1 + θ/2) √A (Fei et al. 2017). Taken to fall linearly to there, and to fade where strands are pressed together,
+/// since the film gains no surface there.
 pub(super) struct Bridges<S: Simd> {
     p: V3<f32x8<S>>,
     area: f32x8<S>,

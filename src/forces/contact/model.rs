@@ -63,13 +63,9 @@ impl Bridged {
 }
 
 /// A bridge of water from a node at `p` to the foot `f` of its perpendicular on a strand that moves
-/// with `velocity`, both films together of cross-section `area` (m²).
-///
-/// Between two fibres the pull of a capillary bridge hardly depends on its volume, but its reach
-/// does: it breaks at (1 + θ/2) √A (Fei et al. 2017). Taken to fall linearly to there, and to fade
-/// where strands are pressed together, since the film gains no surface there.
-#[doc(hidden)]
-pub fn bridged(p: Vec3, foot: Vec3, velocity: Vec3, area: f32, film: Film) -> Bridged {
+/// with `velocity`, both films together of cross-section `area` (m²): what `lanes.rs` is compared with.
+#[cfg(test)]
+pub(super) fn bridged(p: Vec3, foot: Vec3, velocity: Vec3, area: f32, film: Film) -> Bridged {
     let off = p - foot;
     let distance = off.length();
     let touch = SAME_PLACE < distance * distance && distance < film.reach + film.longest;
@@ -89,19 +85,20 @@ pub fn bridged(p: Vec3, foot: Vec3, velocity: Vec3, area: f32, film: Film) -> Br
 }
 
 /// An edge of a strand, prepared for projecting points on it.
+#[cfg(test)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[doc(hidden)]
-pub struct Edge {
+pub(super) struct Edge {
     start: Vec3,
     along: Vec3,
     inverse_squared: f32,
     is_last: bool,
 }
 
+#[cfg(test)]
 impl Edge {
     /// The edge from `a` to `b`; `is_last` for the one at the tip.
     #[inline]
-    pub fn new(a: Vec3, b: Vec3, is_last: bool) -> Self {
+    pub(super) fn new(a: Vec3, b: Vec3, is_last: bool) -> Self {
         let along = b - a;
         let inverse_squared = 1.0 / along.length_squared().max(1e-20);
         Self { start: a, along, inverse_squared, is_last }
@@ -110,7 +107,7 @@ impl Edge {
     /// The foot of the perpendicular from `p`, clamped to the edge, or `None` where it belongs to
     /// another edge of the strand: a foot on a shared node belongs to the second edge.
     #[inline]
-    pub fn foot(&self, p: Vec3) -> Option<Vec3> {
+    pub(super) fn foot(&self, p: Vec3) -> Option<Vec3> {
         let t = (p - self.start).dot(self.along) * self.inverse_squared;
         if t >= 1.0 {
             return self.is_last.then_some(self.start + self.along);

@@ -204,22 +204,40 @@ mod tests {
         };
         let touches = REACH_MARGIN * 0.1 * 2.0 + 0.05 + (5e-3 + 0.01) * 6.0;
         assert!(is_near(touches - 1e-3) && !is_near(touches + 1e-3));
-        assert!(is_near(f32::NAN), "what is no number is seen where it is used");
+        assert!(is_near(f32::NAN), "NaN is reported where it is used");
     }
 
     #[test]
     fn a_ball_encloses_its_shape_and_no_more() {
-        let capsule = HairCollider::capsule(0.1, 0.3).unwrap();
+        // The farthest of the shape's points along many rays from its center, which lies in all of them.
+        let farthest = |inside: fn(Vec3) -> bool| {
+            let along = |i: u16| {
+                let (up, turn) = (1.0 - (f32::from(i) + 0.5) / 2500.0, f32::from(i) * 2.399_963);
+                let way = Vec3::new(turn.cos(), 0.0, turn.sin()) * (1.0 - up * up).sqrt();
+                let way = way + up * Vec3::Y;
+                (0..1000).map(|k| 1e-3 * k as f32).take_while(|r| inside(*r * way)).last()
+            };
+            (0..5000).filter_map(along).fold(0.0, f32::max)
+        };
         let scaled = moving(Pose { scale: 2.0, ..default() }, Vec3::X * 0.01);
-        for (collider, farthest) in [
-            (HairCollider::sphere(0.1).unwrap(), 0.1),
-            (capsule, 0.1 + 0.15),
-            (HairCollider::cylinder(0.3, 0.8).unwrap(), 0.5),
-            (HairCollider::cuboid(Vec3::new(0.2, 0.4, 0.8)).unwrap(), 0.5 * 0.84f32.sqrt()),
-            (HairCollider::ellipsoid(Vec3::new(0.1, 0.4, 0.2)).unwrap(), 0.4),
-        ] {
-            let ball = Ball::around(&collider, &scaled);
-            assert!((ball.radius - 2.0 * farthest).abs() < 1e-6, "{collider:?}: {ball:?}");
+        let shapes: [(_, fn(Vec3) -> bool); 5] = [
+            (HairCollider::sphere(0.1), |p| p.length() <= 0.1),
+            (HairCollider::capsule(0.1, 0.3), |p| {
+                p.distance(Vec3::Y * p.y.clamp(-0.15, 0.15)) <= 0.1
+            }),
+            (HairCollider::cylinder(0.3, 0.8), |p| p.x.hypot(p.z) <= 0.3 && p.y.abs() <= 0.4),
+            (HairCollider::cuboid(Vec3::new(0.2, 0.4, 0.8)), |p| {
+                p.abs().cmple(Vec3::new(0.1, 0.2, 0.4)).all()
+            }),
+            (HairCollider::ellipsoid(Vec3::new(0.1, 0.4, 0.2)), |p| {
+                (p / Vec3::new(0.1, 0.4, 0.2)).length() <= 1.0
+            }),
+        ];
+        for (collider, inside) in shapes {
+            let ball = Ball::around(&collider.unwrap(), &scaled);
+            let farthest = 2.0 * farthest(inside);
+            let most = 1.03 * farthest + 2e-3;
+            assert!((farthest..most).contains(&ball.radius), "{farthest} m: {ball:?}");
             assert!((ball.travel - 0.01).abs() < 1e-6 && ball.center == Vec3::ZERO);
         }
         let floor = Ball::around(&HairCollider::plane(Dir3::Y), &TickPose::default());

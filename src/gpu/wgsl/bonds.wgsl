@@ -83,7 +83,7 @@ fn remember() {
         asked.x += drying;
         // Peptide bonds are never cut.
         asked.w = max(asked.w, 0.0);
-        // What is no number changes nothing.
+        // NaN changes nothing.
         if all(asked == vec4(0.0)) || is_broken4(asked) {
             continue;
         }

@@ -312,7 +312,7 @@ fn predict_nodes(dt: f32, gain: vec3<f32>) {
     }
 }
 
-// Takes nodes out of obstacles, and notes what touches. Friction heeds `resting` of the depth where a node
+// Moves nodes out of obstacles and records contacts. Friction takes `resting` of the depth into account where a node
 // rested in the pass before, else `others`.
 fn contacts(resting: f32, others: f32) {
     touched = false;

@@ -212,7 +212,7 @@ fn sweep(
     }
     sweep_step();
     if !is_finite_strand() || !are_finite_spins() {
-        // No projection moves it, but by what is no number it is written to.
+        // No projection moves it, but NaN overwrites it.
         set_node(0u, start_of(0u), 0.0);
         put_back();
         rest_spins();

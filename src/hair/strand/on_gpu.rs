@@ -7,7 +7,7 @@ use bevy::prelude::*;
 /// `gpu`). Systems of the tick leave them alone.
 ///
 /// A marked strand's [`Strand`](crate::Strand) and [`Bonds`](crate::Bonds) are as they were when it was
-/// handed over, or when somebody last asked for them. Whoever writes to them returns the hair to the CPU.
+/// handed over, or when they were last requested. A write to them returns the hair to the CPU.
 ///
 /// Only the crate itself can make it, and neither clones, scenes nor inspectors copy it: nothing would
 /// simulate a strand that is marked and not there.
@@ -34,7 +34,7 @@ impl<T: Send + Sync + 'static> Default for MissedOnGpu<T> {
 
 /// Brings a hair back at once. Set by the feature `gpu`.
 #[derive(Resource, Clone, Copy, Debug)]
-#[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "nobody goes"))]
+#[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "only the GPU returns hair"))]
 pub(crate) struct ReturnToCpu(pub(crate) fn(&mut World, Entity));
 
 /// Has a hair on the CPU, with its present state in its strands, before something reads or writes

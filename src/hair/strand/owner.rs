@@ -9,12 +9,12 @@ use bevy::prelude::*;
 /// |---|---|---|---|---|
 /// | [`Simulated`](Self::Simulated) | by the tick, here | by default | | everything |
 /// | [`Settling`](Self::Settling) | by the tick, and by more ticks ahead ([`SettleTick`](crate::SettleTick)) | [`Settling`] is inserted | it is at rest, and [`Settling`] is removed | everything in the tick; ahead of it no bonds, water and treatments. It is not drawn, and at each level of detail all its strands are simulated |
-/// | [`Frozen`](Self::Frozen) | by nobody: they keep their shape on the head | a level without simulated strands ([`LodLevel::strands`](crate::LodLevel::strands)) | another level | bonds, water and treatments |
-/// | [`Asleep`](Self::Asleep) | by nobody: all its strands sleep ([`SleepSettings`](crate::SleepSettings)) | the last of them falls asleep | one wakes | what wakes it; treatments and water |
+/// | [`Frozen`](Self::Frozen) | not at all: they keep their shape on the head | a level without simulated strands ([`LodLevel::strands`](crate::LodLevel::strands)) | another level | bonds, water and treatments |
+/// | [`Asleep`](Self::Asleep) | not at all: all its strands sleep ([`SleepSettings`](crate::SleepSettings)) | the last of them falls asleep | one wakes | what wakes it; treatments and water |
 /// | [`Gpu`](Self::Gpu) | by compute shaders | it is handed over | it has come back | what a shader knows of; no system here touches its strands |
-/// | [`AsleepOnGpu`](Self::AsleepOnGpu) | by nobody, there | the GPU reports that all are still | something disturbs it | what wakes it |
+/// | [`AsleepOnGpu`](Self::AsleepOnGpu) | not at all, on the GPU | the GPU reports that all are still | something disturbs it | what wakes it |
 ///
-/// Single strands of hair that is simulated or settles may sleep, or follow guides: [`StrandSleep`](crate::StrandSleep) tells.
+/// Single strands of hair that is simulated or settles may sleep, or follow guides: see [`StrandSleep`](crate::StrandSleep).
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub enum MotionOwner {

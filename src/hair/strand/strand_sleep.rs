@@ -12,7 +12,7 @@ pub struct StrandSleep {
     /// How long the strand has been still (s).
     still: f32,
     asleep: bool,
-    /// Follows from its guides, which nobody else knows of: not for inspectors to write.
+    /// Derived from its guides: not for inspectors to write.
     #[reflect(ignore)]
     follower: bool,
     disturbed: bool,

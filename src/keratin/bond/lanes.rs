@@ -62,13 +62,7 @@ fn rest_shapes_in<S: Simd>(
     influence: &[f32; BondKind::COUNT],
     darboux: &mut [Quat],
 ) {
-    let [a, b, c, d] = *influence;
-    let influence = [
-        f32x8::splat(simd, a),
-        f32x8::splat(simd, b),
-        f32x8::splat(simd, c),
-        f32x8::splat(simd, d),
-    ];
+    let influence = splats(simd, influence);
     let mut before = frames.root;
     let eights = joints.chunks(8).zip(frames.orientations.chunks(8)).zip(darboux.chunks_mut(8));
     for ((joints, orientations), darboux) in eights {
@@ -94,13 +88,7 @@ fn remembered_in<S: Simd>(
     darboux: &mut [Quat],
     closed: &mut [f32],
 ) -> bool {
-    let [a, b, c, d] = *influence;
-    let influence = [
-        f32x8::splat(simd, a),
-        f32x8::splat(simd, b),
-        f32x8::splat(simd, c),
-        f32x8::splat(simd, d),
-    ];
+    let influence = splats(simd, influence);
     let mut before = frames.root;
     let mut follows = false;
     let eights = joints.chunks(8).zip(frames.orientations.chunks(8));
@@ -167,6 +155,12 @@ fn filled<T>(some: &[T]) -> [&T; 8] {
     let last = some.len() - 1;
     let at = |i: usize| &some[last.min(i)];
     [at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)]
+}
+
+#[inline(always)]
+fn splats<S: Simd>(simd: S, [a, b, c, d]: &[f32; 4]) -> [f32x8<S>; 4] {
+    let splat = |x: &f32| f32x8::splat(simd, *x);
+    [splat(a), splat(b), splat(c), splat(d)]
 }
 
 #[inline(always)]

@@ -58,7 +58,7 @@ impl Plugin for BondPlugin {
                 HairTick,
                 (
                     fit_bonds::<Without<KinematicStrand>>,
-                    // Also in the last one, lest a strand that is simulated from the next tick on is missed.
+                    // Also in the last one, so that no strand that is simulated from the next tick on is missed.
                     fit_bonds::<With<KinematicStrand>>.run_if(first_substep.or_else(last_substep)),
                 )
                     .chain()

@@ -310,7 +310,7 @@ mod tests {
             .insert(HeldNodes { targets: vec![None, None, Some(Vec3::Y)] });
         app.update();
         app.update();
-        // What nobody would write but a new partition.
+        // A value that only a new partition overwrites.
         for hair in [own.0, other.0] {
             app.world_mut().get_mut::<Guides>(hair).unwrap().level = 99;
         }

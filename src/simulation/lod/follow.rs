@@ -124,7 +124,7 @@ impl GuideOffsets {
     }
 }
 
-/// What somebody else needs who moves followers.
+/// Access for compute shaders, which move followers as well.
 #[cfg(feature = "gpu")]
 impl GuideOffsets {
     /// Time constant with which a follower's relative motion decays (s).

@@ -120,7 +120,7 @@ fn choose(
     if exceeds && !core::mem::replace(&mut *exceeded, exceeds) {
         let message = format!(
             "the budget of {} ms is too small: at their coarsest levels all hairs take about {present} ms, \
-             which they will",
+             and are simulated at those all the same",
             budget.milliseconds
         );
         faults.write(HairFault::new(FaultKind::Setting, message));

@@ -5,7 +5,7 @@
 //! The remainders are combined in a second round, so that lanes are full however node counts vary.
 
 use super::{
-    batched::Batched,
+    batched::{Batched, Member},
     gather::{gather_nodes, in_lanes, scatter},
 };
 use crate::{
@@ -22,8 +22,12 @@ use bevy::prelude::*;
 const NODE: usize = 60;
 
 /// One block of strands of equal node count through one substep.
-fn solve<T: Batched>(lanes: &mut T::Lanes, items: &mut [T], params: &T::Params) -> Vec<HairFault> {
-    let sources = in_lanes(items, T::source);
+fn solve<T: Batched>(
+    lanes: &mut T::Lanes,
+    items: &mut [Member<'_, T>],
+    params: &T::Params,
+) -> Vec<HairFault> {
+    let sources = in_lanes(items, Member::source);
     let block = T::block(lanes);
     block.resize(sources[0].strand.nodes());
     gather_nodes(block, &sources, T::dt(params));
@@ -31,30 +35,31 @@ fn solve<T: Batched>(lanes: &mut T::Lanes, items: &mut [T], params: &T::Params) 
     scatter(T::block(lanes), items, params)
 }
 
-fn key<T: Batched>(item: &T) -> (Entity, usize) {
-    (item.hair(), item.source().strand.nodes())
+fn key<T>(item: &Member<'_, T>) -> (Entity, usize) {
+    (item.hair, item.strand.nodes())
 }
 
 /// Solves all strands, of about `nodes` nodes each (for the cost estimate). `item` makes a work
 /// item of a row; strands of hairs without `params_of` are skipped. Faults are in the same order on
 /// any number of threads.
-pub(super) fn for_each_batch<C: Columns, T: Batched>(
+pub(super) fn for_each_batch<'a, C: Columns, T: Batched>(
     tables: impl Iterator<Item = C>,
     nodes: usize,
     lanes: &Scratch<T::Lanes>,
     params_of: impl Fn(Entity) -> Option<T::Params> + Send + Sync,
-    item: impl Fn(<C::Part as Iterator>::Item) -> Option<T> + Send + Sync,
+    item: impl Fn(<C::Part as Iterator>::Item) -> Option<Member<'a, T>> + Send + Sync,
 ) -> Vec<HairFault> {
-    let solve = |lanes: &mut T::Lanes, params: &mut PerHair<T::Params>, block: &mut [T]| {
-        let hair = block[0].hair();
-        let index = params.index(hair, || params_of(hair));
-        index.map_or_else(Vec::new, |index| solve(lanes, block, &params.values[index]))
-    };
+    let solve =
+        |lanes: &mut T::Lanes, params: &mut PerHair<T::Params>, block: &mut [Member<'a, T>]| {
+            let hair = block[0].hair;
+            let index = params.index(hair, || params_of(hair));
+            index.map_or_else(Vec::new, |index| solve(lanes, block, &params.values[index]))
+        };
     let each = nodes * NODE;
     let scratch = || (lanes.borrow(), PerHair::default(), Vec::new());
     let parts = for_each_part(Nanos(each), tables, scratch, |(lanes, params, strands), rows| {
-        strands.extend(rows.filter_map(&item).filter(|strand: &T| {
-            let hair = strand.hair();
+        strands.extend(rows.filter_map(&item).filter(|strand: &Member<'a, T>| {
+            let hair = strand.hair;
             params.index(hair, || params_of(hair)).is_some()
         }));
         let mut faults = Vec::new();
@@ -63,7 +68,7 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
         (left, faults)
     });
     let (left, mut faults): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
-    let mut left: Vec<T> = left.into_iter().flatten().collect();
+    let mut left: Vec<Member<'a, T>> = left.into_iter().flatten().collect();
     left.sort_by_key(key);
     let blocks = left.chunk_by_mut(|a, b| key(a) == key(b));
     let blocks = blocks.flat_map(|alike| alike.chunks_mut(LANES));
@@ -81,7 +86,10 @@ pub(super) fn for_each_batch<C: Columns, T: Batched>(
 
 /// Calls `work` with full blocks of strands of equal node count, and returns the remainder. Which strands
 /// share a block depends on the rows of a part alone, not on threads.
-fn full_blocks<T: Batched>(strands: &mut Vec<T>, mut work: impl FnMut(&mut [T])) -> Vec<T> {
+fn full_blocks<'a, T: Batched>(
+    strands: &mut Vec<Member<'a, T>>,
+    mut work: impl FnMut(&mut [Member<'a, T>]),
+) -> Vec<Member<'a, T>> {
     if !strands.is_sorted_by_key(key) {
         strands.sort_by_key(key);
     }
@@ -117,28 +125,12 @@ mod tests {
     #[derive(Component)]
     struct OtherTable;
 
-    struct Item<'a> {
-        hair: Entity,
-        strand: &'a mut Strand,
-        added: &'a AddedMass,
-    }
+    struct NoColumns;
 
-    impl Batched for Item<'_> {
+    impl Batched for NoColumns {
         type Params = u32;
         type Lanes = BlockLanes;
 
-        fn entity(&self) -> Entity {
-            self.hair
-        }
-        fn hair(&self) -> Entity {
-            self.hair
-        }
-        fn source(&self) -> Source<'_> {
-            Source { strand: self.strand, added: self.added, held: None }
-        }
-        fn strand_mut(&mut self) -> &mut Strand {
-            self.strand
-        }
         fn dt(_: &u32) -> f32 {
             1.0
         }
@@ -146,7 +138,12 @@ mod tests {
             lanes
         }
         /// Leaves in the velocity of node 1 how many strands were in the block and how often.
-        fn step(block: &mut BlockLanes, _: &[Source<'_>; LANES], items: &[Self], params: &u32) {
+        fn step(
+            block: &mut BlockLanes,
+            _: &[Source<'_>; LANES],
+            items: &[Member<'_, Self>],
+            params: &u32,
+        ) {
             assert!(items.len() <= LANES && *params == 7);
             assert!(items.iter().all(|item| key(item) == key(&items[0])));
             for lane in 0..items.len() {
@@ -179,7 +176,10 @@ mod tests {
                 100,
                 &Scratch::default(),
                 |of| (of == hair).then_some(7),
-                |(of, strand, added)| Some(Item { hair: of.0, strand, added }),
+                |(of, strand, added)| {
+                    let (entity, hair) = (of.0, of.0);
+                    Some(Member { entity, hair, strand, added, held: None, own: NoColumns })
+                },
             );
             assert!(faults.is_empty());
             let mut blocks = 0.0;

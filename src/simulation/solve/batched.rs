@@ -23,24 +23,32 @@ pub(super) enum Kept {
     Tensions,
 }
 
-/// A strand taken from its table for one kind of kernel: rods or springs.
+/// A strand taken from its table for one kind of kernel, with the kernel's own columns.
+pub(super) struct Member<'a, K> {
+    pub(super) entity: Entity,
+    pub(super) hair: Entity,
+    pub(super) strand: &'a mut Strand,
+    pub(super) added: &'a AddedMass,
+    pub(super) held: Option<&'a HeldNodes>,
+    pub(super) own: K,
+}
+
+impl<K> Member<'_, K> {
+    pub(super) fn source(&self) -> Source<'_> {
+        Source { strand: self.strand, added: self.added, held: self.held }
+    }
+}
+
+/// The columns of a kernel: rods or springs.
 pub(super) trait Batched: Sized + Send {
     /// Parameters of a hair's strands in a substep.
     type Params;
     /// A block with the additional state of the kernel.
     type Lanes: Default + Send;
 
-    /// The strand.
-    fn entity(&self) -> Entity;
-    /// Its hair.
-    fn hair(&self) -> Entity;
-    /// The data that its lane is filled from.
-    fn source(&self) -> Source<'_>;
-    /// Its state, for writing.
-    fn strand_mut(&mut self) -> &mut Strand;
-    /// Prefetches it.
-    fn prefetch(&self) {
-        self.source().strand.prefetch();
+    /// Prefetches a strand.
+    fn prefetch(member: &Member<'_, Self>) {
+        member.strand.prefetch();
     }
     /// The shape it is rebuilt in when its state is lost: a Darboux vector for each joint.
     fn remembered(&self, _params: &Self::Params) -> Vec<Vec3> {
@@ -58,7 +66,7 @@ pub(super) trait Batched: Sized + Send {
     fn step(
         lanes: &mut Self::Lanes,
         sources: &[Source<'_>; LANES],
-        items: &[Self],
+        items: &[Member<'_, Self>],
         params: &Self::Params,
     );
 }

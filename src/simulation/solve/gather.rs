@@ -5,7 +5,7 @@
 //! as three of five iterations; number by number and without prefetching it took longer than all
 //! five.
 
-use super::batched::{Batched, Kept, Source};
+use super::batched::{Batched, Kept, Member, Source};
 use crate::{
     base::{
         fault::HairFault,
@@ -69,7 +69,7 @@ pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], d
 /// its previous one; returns faults for those not reported before.
 pub(super) fn scatter<T: Batched>(
     block: &BlockLanes,
-    items: &mut [T],
+    items: &mut [Member<'_, T>],
     params: &T::Params,
 ) -> Vec<HairFault> {
     let mut faults = Vec::new();
@@ -78,16 +78,15 @@ pub(super) fn scatter<T: Batched>(
         let lanes = 4 * group..4 * group + four.len();
         match four {
             [a, b, c, d] if block.finite[lanes.clone()] == [0.0; 4] => {
-                scatter_four(block, group, [a, b, c, d].map(|item| item.strand_mut()), kept);
+                scatter_four(block, group, [a, b, c, d].map(|item| &mut *item.strand), kept);
             }
             four => {
                 for (lane, item) in lanes.zip(four) {
                     if block.finite[lane] == 0.0 {
-                        scatter_one(block, lane, item.strand_mut(), kept);
+                        scatter_one(block, lane, item.strand, kept);
                     } else {
-                        let shape = item.remembered(params);
-                        let fault = item.strand_mut().put_back(shape);
-                        faults.extend(fault.map(|fault| fault.of(item.entity())));
+                        let fault = item.strand.put_back(item.own.remembered(params));
+                        faults.extend(fault.map(|fault| fault.of(item.entity)));
                     }
                 }
             }

@@ -2,7 +2,7 @@
 
 use super::{
     batch::for_each_batch,
-    batched::{Batched, Kept, Source},
+    batched::{Batched, Kept, Member, Source},
     gather::in_lanes,
     substeps,
 };
@@ -73,43 +73,22 @@ enum Method {
     Sweeps(SweepParams, Sweeps),
 }
 
-struct RodStrand<'a> {
-    entity: Entity,
-    hair: Entity,
-    strand: &'a mut Strand,
+struct RodColumns<'a> {
     rest: &'a RestShape,
     bonds: &'a Bonds,
-    added: &'a AddedMass,
-    held: Option<&'a HeldNodes>,
 }
 
-impl<'a> Batched for RodStrand<'a> {
+impl<'a> Batched for RodColumns<'a> {
     type Params = HairParams<'a>;
     /// And the obstacles near a block.
     type Lanes = (BlockLanes, Vec<Obstacle>);
 
-    fn entity(&self) -> Entity {
-        self.entity
-    }
-
-    fn hair(&self) -> Entity {
-        self.hair
-    }
-
-    fn source(&self) -> Source<'_> {
-        Source { strand: self.strand, added: self.added, held: self.held }
-    }
-
-    fn strand_mut(&mut self) -> &mut Strand {
-        self.strand
-    }
-
-    fn prefetch(&self) {
-        self.strand.prefetch();
-        prefetch(self.strand.rest_lengths());
-        prefetch(self.strand.tensions());
-        prefetch(&self.rest.darboux);
-        prefetch(&self.rest.stiffness);
+    fn prefetch(Member { strand, own, .. }: &Member<'_, Self>) {
+        strand.prefetch();
+        prefetch(strand.rest_lengths());
+        prefetch(strand.tensions());
+        prefetch(&own.rest.darboux);
+        prefetch(&own.rest.stiffness);
     }
 
     fn remembered(&self, params: &HairParams<'_>) -> Vec<Vec3> {
@@ -134,7 +113,7 @@ impl<'a> Batched for RodStrand<'a> {
     fn step(
         (block, near): &mut Self::Lanes,
         sources: &[Source<'_>; LANES],
-        items: &[Self],
+        items: &[Member<'_, Self>],
         params: &HairParams<'_>,
     ) {
         gather_frames(block, sources, items);
@@ -235,15 +214,20 @@ fn step_rods(
                 && rest.darboux.len() == strand.edges()
                 && rest.stiffness.len() == strand.edges();
             let (entity, hair) = (*entity, of.0);
-            is_stepped.then_some(RodStrand { entity, hair, strand, rest, bonds, added, held })
+            let own = RodColumns { rest, bonds };
+            is_stepped.then_some(Member { entity, hair, strand, added, held, own })
         },
     );
     faults.write_batch(lost);
 }
 
 /// Orientations, rest shapes and stiffness.
-fn gather_frames(block: &mut BlockLanes, from: &[Source<'_>; LANES], items: &[RodStrand<'_>]) {
-    let rest = in_lanes(items, |item| item.rest);
+fn gather_frames(
+    block: &mut BlockLanes,
+    from: &[Source<'_>; LANES],
+    items: &[Member<'_, RodColumns<'_>>],
+) {
+    let rest = in_lanes(items, |item| item.own.rest);
     let edges = &mut block.edges;
     for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
         let orientations = four.map(|source| source.strand.orientations());

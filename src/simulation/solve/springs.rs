@@ -2,7 +2,7 @@
 
 use super::{
     batch::for_each_batch,
-    batched::{Batched, Source},
+    batched::{Batched, Member, Source},
 };
 use crate::{
     base::lanes::{LANES, put_quaternions, simd_level},
@@ -30,6 +30,7 @@ use crate::{
     },
 };
 use bevy::prelude::*;
+use core::marker::PhantomData;
 use fearless_simd::Level;
 
 /// Mass-spring strands.
@@ -55,34 +56,13 @@ struct HairParams<'a> {
     obstacles: &'a [Obstacle],
 }
 
-struct SpringStrand<'a> {
-    entity: Entity,
-    hair: Entity,
-    strand: &'a mut Strand,
-    added: &'a AddedMass,
-    held: Option<&'a HeldNodes>,
-}
+/// Springs need no more of a strand than all kernels do.
+struct SpringColumns<'a>(PhantomData<&'a ()>);
 
-impl<'a> Batched for SpringStrand<'a> {
+impl<'a> Batched for SpringColumns<'a> {
     type Params = HairParams<'a>;
     /// And the obstacles near a block.
     type Lanes = (SpringLanes, Vec<Obstacle>);
-
-    fn entity(&self) -> Entity {
-        self.entity
-    }
-
-    fn hair(&self) -> Entity {
-        self.hair
-    }
-
-    fn source(&self) -> Source<'_> {
-        Source { strand: self.strand, added: self.added, held: self.held }
-    }
-
-    fn strand_mut(&mut self) -> &mut Strand {
-        self.strand
-    }
 
     fn dt(params: &HairParams<'_>) -> f32 {
         params.step.dt
@@ -95,7 +75,7 @@ impl<'a> Batched for SpringStrand<'a> {
     fn step(
         (lanes, near): &mut Self::Lanes,
         sources: &[Source<'_>; LANES],
-        _: &[Self],
+        _: &[Member<'_, Self>],
         HairParams { level, step: params, obstacles }: &HairParams<'_>,
     ) {
         let strands = &mut lanes.strands;
@@ -150,7 +130,14 @@ fn step_springs(
         |(entity, of, sleep, strand, added, held)| {
             let is_stepped = sleep.is_simulated() && strand.nodes() >= 2;
             let (entity, hair) = (*entity, of.0);
-            is_stepped.then_some(SpringStrand { entity, hair, strand, added, held })
+            is_stepped.then_some(Member {
+                entity,
+                hair,
+                strand,
+                added,
+                held,
+                own: SpringColumns(PhantomData),
+            })
         },
     );
     faults.write_batch(lost);

@@ -8,7 +8,7 @@ use super::{
 use crate::base::lanes::{LANES, Real, V3, load, load3, store3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// Goes along strands and tells of each node how deep it may be in an obstacle that its root lies in: nearer to the
+/// Computes for each node how deep it may be in an obstacle that its root lies in: nearer to the
 /// root than that is deep, it cannot get out without being torn off.
 pub(super) struct RootPenetration<S: Simd> {
     root: V3<f32x16<S>>,
