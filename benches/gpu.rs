@@ -110,7 +110,8 @@ mod gpu {
     /// time it asks the system for memory.
     fn hand_over_in_a_game(strands: usize) {
         let mut app = App::new();
-        let hair = HairPlugins::default().build().disable::<HairRenderPlugin>();
+        // Each run of the schedule is a tick.
+        let hair = HairPlugins::new(FixedPostUpdate).build().disable::<HairRenderPlugin>();
         app.add_plugins((windowless(), hair));
         app.insert_resource(HairGpu { software: true, ..default() });
         app.finish();

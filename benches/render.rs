@@ -68,8 +68,8 @@ fn app() -> App {
     .init_resource::<Clock>()
     .init_resource::<TickClock>()
     .add_systems(PostUpdate, (begin.before(HairRenderSystems), end.after(HairRenderSystems)))
-    .add_systems(FixedPreUpdate, begin_tick)
-    .add_systems(FixedLast, end_tick);
+    .add_systems(PostUpdate, begin_tick.before(HairTicks))
+    .add_systems(PostUpdate, end_tick.after(HairTicks));
     if let Some(render) = app.get_sub_app_mut(RenderApp) {
         render.init_resource::<Clock>().add_systems(
             ExtractSchedule,

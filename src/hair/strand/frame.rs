@@ -7,7 +7,6 @@
 //! points at rest in the world move the opposite way: each substep the nodes are moved by the
 //! inverse of the frame's motion, which is exactly inertia.
 
-use super::Hair;
 use crate::base::{motion::TickMoment, setting::setting};
 use bevy::{
     math::{Affine3A, Isometry3d, Mat3A},
@@ -208,40 +207,7 @@ impl Default for Pose {
 }
 
 /// Axes count as alike and perpendicular up to this.
-const ALIKE: f32 = 1e-4;
-
-/// When the frames are known in which hair is drawn.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct DrawnFrames;
-
-/// After transforms have been propagated: hair on a head that is squashed or sheared is drawn in the frame
-/// that it is simulated in.
-pub(super) fn draw_as_simulated(
-    mut places: ParamSet<(
-        Query<(Entity, &GlobalTransform), (With<Hair>, Changed<GlobalTransform>)>,
-        Query<(&mut GlobalTransform, &Transform)>,
-    )>,
-    children: Query<&Children>,
-    mut todo: Local<Vec<(Entity, GlobalTransform)>>,
-) {
-    for (hair, place) in &places.p0() {
-        let Some(pose) = Pose::of(place) else { continue };
-        let even = pose.affine();
-        if !place.affine().matrix3.abs_diff_eq(even.matrix3, ALIKE * pose.size()) {
-            todo.push((hair, even.into()));
-        }
-    }
-    let mut places = places.p1();
-    while let Some((entity, place)) = todo.pop() {
-        let Ok((mut own, _)) = places.get_mut(entity) else { continue };
-        *own = place;
-        for child in children.get(entity).into_iter().flatten() {
-            if let Ok((_, local)) = places.get(*child) {
-                todo.push((*child, place.mul_transform(*local)));
-            }
-        }
-    }
-}
+pub(super) const ALIKE: f32 = 1e-4;
 
 impl Pose {
     /// The pose of a global transform, with the mean of a non-uniform scale, which is negative for a

@@ -21,7 +21,6 @@ mod strand_sleep;
 mod systems;
 mod teleport;
 
-pub(crate) use frame::DrawnFrames;
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
@@ -37,6 +36,7 @@ pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
 pub(crate) use strand_sleep::KinematicStrand;
 pub use strand_sleep::{SleepCounts, SleepPose, StrandSleep};
+pub(crate) use systems::DrawnFrames;
 pub use systems::StrandPlugin;
 pub(crate) use systems::lacks_strands;
 pub use teleport::ShiftWorld;

@@ -4,7 +4,7 @@ use super::{
     AddedMass, Hair, HeldNodes, HeldNodesState, Here, KinematicStrand, MotionOwner, PerHair,
     Regroomed, Settling, SimulatedHere, SleepCounts, SleepPose, Strand, StrandError, StrandHistory,
     StrandModel, StrandOf, StrandSleep, Strands, TickPose,
-    frame::{Aim, DrawnFrames, HairInertia, Pose, draw_as_simulated},
+    frame::{ALIKE, Aim, HairInertia, Pose},
     held::report_out_of_reach,
     keep_required,
     owner_systems::{begin_settling, end_settling, update_owners},
@@ -262,6 +262,39 @@ fn aim_poses(
                         strand.add_motion(velocity, spin);
                     }
                 }
+            }
+        }
+    }
+}
+
+/// When the frames are known in which hair is drawn.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct DrawnFrames;
+
+/// After transforms have been propagated: hair on a head that is squashed or sheared is drawn in the frame
+/// that it is simulated in.
+fn draw_as_simulated(
+    mut places: ParamSet<(
+        Query<(Entity, &GlobalTransform), (With<Hair>, Changed<GlobalTransform>)>,
+        Query<(&mut GlobalTransform, &Transform)>,
+    )>,
+    children: Query<&Children>,
+    mut todo: Local<Vec<(Entity, GlobalTransform)>>,
+) {
+    for (hair, place) in &places.p0() {
+        let Some(pose) = Pose::of(place) else { continue };
+        let even = pose.affine();
+        if !place.affine().matrix3.abs_diff_eq(even.matrix3, ALIKE * pose.size()) {
+            todo.push((hair, even.into()));
+        }
+    }
+    let mut places = places.p1();
+    while let Some((entity, place)) = todo.pop() {
+        let Ok((mut own, _)) = places.get_mut(entity) else { continue };
+        *own = place;
+        for child in children.get(entity).into_iter().flatten() {
+            if let Ok((_, local)) = places.get(*child) {
+                todo.push((*child, place.mul_transform(*local)));
             }
         }
     }
