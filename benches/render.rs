@@ -67,7 +67,10 @@ fn app() -> App {
     .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
     .init_resource::<Clock>()
     .init_resource::<TickClock>()
-    .add_systems(PostUpdate, (begin.before(HairRenderSystems), end.after(HairRenderSystems)))
+    .add_systems(
+        PostUpdate,
+        (begin.after(HairTicks).before(HairRenderSystems), end.after(HairRenderSystems)),
+    )
     .add_systems(PostUpdate, begin_tick.before(HairTicks))
     .add_systems(PostUpdate, end_tick.after(HairTicks));
     if let Some(render) = app.get_sub_app_mut(RenderApp) {

@@ -269,7 +269,7 @@ fn outdoors(arguments: &Arguments, preset: HairPreset, pose: Posed, size: (u32, 
         .insert_resource(pose)
         .add_plugins(figure::FigurePlugin)
         .add_systems(Startup, daylight)
-        .add_systems(PostUpdate, (hold, follow_guides).chain().before(TransformSystems::Propagate));
+        .add_systems(PostUpdate, (hold, follow_guides).chain().before(HairTicks));
     arguments.thin_out(&mut app);
     let surroundings =
         environment::studio(&mut app.world_mut().resource_mut::<Assets<Image>>(), 450.0);
