@@ -118,22 +118,43 @@ struct Ride {
     acceleration: f32,
 }
 
-/// Rides along a path by these frames. In `Update` or in `FixedUpdate`; every 50th frame discards its
-/// overstep if `discards`.
-fn ride(path: Path, frames: &Frames, in_update: bool, discards: bool, seconds: f64) -> Ride {
+/// What moves a head.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Moved {
+    Update,
+    FixedUpdate,
+    /// By frames, on a vehicle that ticks move, each half of the way.
+    Both,
+}
+
+/// What carries a head in its own half of the way.
+#[derive(Component)]
+struct Vehicle;
+
+/// Rides along a path by these frames; every 50th frame discards its overstep if `discards`.
+fn ride(path: Path, frames: &Frames, moved: Moved, discards: bool, seconds: f64) -> Ride {
     #[derive(Resource, Default)]
     struct Seen(Vec<(f32, f32, Vec3)>);
     let mut app = app(64.0);
     let (hair, id) = one_strand(&mut app);
     app.insert_resource(path).init_resource::<Seen>();
-    let walk =
-        move |time: Res<Time>, path: Res<Path>, mut heads: Query<&mut Transform, With<Hair>>| {
-            heads.iter_mut().for_each(|mut head| *head = path.at(time.elapsed_secs_f64()));
-        };
-    match in_update {
-        true => app.add_systems(Update, walk),
-        false => app.add_systems(FixedUpdate, walk),
+    let half = Path { speed: 0.5 * path.speed, spin: 0.0 };
+    let own = if moved == Moved::Both { Path { spin: path.spin, ..half } } else { path };
+    let walk = move |time: Res<Time>, mut heads: Query<&mut Transform, With<Hair>>| {
+        heads.iter_mut().for_each(|mut head| *head = own.at(time.elapsed_secs_f64()));
     };
+    match moved {
+        Moved::FixedUpdate => app.add_systems(FixedUpdate, walk),
+        Moved::Update | Moved::Both => app.add_systems(Update, walk),
+    };
+    if moved == Moved::Both {
+        let vehicle = app.world_mut().spawn((Vehicle, Transform::default())).id();
+        app.world_mut().entity_mut(hair).insert(ChildOf(vehicle));
+        let drive = move |time: Res<Time>, mut all: Query<&mut Transform, With<Vehicle>>| {
+            all.iter_mut().for_each(|mut place| *place = half.at(time.elapsed_secs_f64()));
+        };
+        app.add_systems(FixedUpdate, drive);
+    }
     let watch = move |step: Res<HairStep>,
                       poses: Query<&TickPose>,
                       strands: Query<&Strand>,
@@ -195,15 +216,18 @@ pub fn frames() -> Vec<Row> {
     let mut rows = Vec::new();
     for (speed, spin) in [(3.0, 0.0), (12.0, 0.0), (3.0, 8.0)] {
         let path = Path { speed, spin };
-        let control = ride(path, &EVEN, false, false, 5.0);
-        for in_update in [true, false] {
+        let control = ride(path, &EVEN, Moved::FixedUpdate, false, 5.0);
+        for moved in [Moved::Update, Moved::FixedUpdate, Moved::Both] {
             for frames in &UNEVEN {
                 for discards in [false, true] {
-                    let got = ride(path, frames, in_update, discards, 5.0);
-                    let moved = if in_update { "Update" } else { "FixedUpdate" };
+                    // Where ticks are discarded, what ticks move stands still and what frames move does not.
+                    if discards && moved == Moved::Both {
+                        continue;
+                    }
+                    let got = ride(path, frames, moved, discards, 5.0);
                     let discards = if discards { ", overstep discarded" } else { "" };
                     let what = format!(
-                        "{speed} m/s, {spin} rad/s, {} frames, {moved}{discards}",
+                        "{speed} m/s, {spin} rad/s, {} frames, {moved:?}{discards}",
                         frames.name
                     );
                     let [[least, most], [low, high]] = [control.lean, got.lean];

@@ -316,3 +316,44 @@ pub(crate) fn close_frame(
         track.used + 64 > tick.number
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_frames_move_is_on_its_way_and_what_ticks_move_is_where_they_put_it() {
+        let at = |x: f32| Transform::from_xyz(x, 0.0, 0.0);
+        let tick = |index, begins: f32, ends: f32| TickMoment {
+            index,
+            shares: [begins, ends],
+            ..TickMoment::default()
+        };
+        let mut track = Track::new(at(0.0), None);
+        track.frames = [at(1.0), at(2.0)];
+        assert_eq!(track.at(&tick(0, 0.25, 0.75), true), at(1.75));
+        // Carried back where the frame began later.
+        assert_eq!(track.at(&tick(0, -0.5, 0.5), false), at(0.5));
+        track.by_ticks = true;
+        (track.last_tick, track.ticks) = (at(3.0), vec![at(4.0), at(6.0)]);
+        let both = |index| [false, true].map(|ends| track.at(&tick(index, 0.0, 0.5), ends));
+        assert_eq!([both(0), both(1)], [[at(3.0), at(4.0)], [at(4.0), at(6.0)]]);
+    }
+
+    #[test]
+    fn ticks_go_on_from_each_other_unless_time_is_missing() {
+        let mut motion = WorldMotion::default();
+        let [tick, frame] = [10, 30].map(Duration::from_millis);
+        let mut next = |now: u64, rest: u64| {
+            let now = Duration::from_millis(now);
+            motion.next_tick(tick, [frame, now], Some(Duration::from_millis(rest)))
+        };
+        let first = next(30, 15);
+        assert!(first.continues && (first.shares[0] - 5.0 / 30.0).abs() < 1e-6);
+        assert!((first.shares[1] - 0.5).abs() < 1e-6 && (first.rest - 0.015).abs() < 1e-6);
+        assert!(next(30, 5).continues);
+        // The overstep of 5 ms was discarded.
+        assert!(!next(60, 20).continues);
+        assert!(next(60, 10).continues);
+    }
+}
