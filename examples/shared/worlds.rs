@@ -379,7 +379,7 @@ fn run_and_put(speed: f32, put: Put, in_update: bool) -> Vec<Strand> {
         let target = world * Transform::from_xyz(speed * eased * tick as f32 / 60.0, 0.0, 0.0);
         match in_update {
             true => place_mut(&mut app, head, |place| *place = target),
-            false => drop(app.world_mut().entity_mut(head).insert(Target(target)).id()),
+            false => _ = app.world_mut().entity_mut(head).insert(Target(target)).id(),
         }
         app.update();
         if tick >= 120 {

@@ -307,15 +307,15 @@ fn zones_and_water_are_as_large_as_their_transform_scales_them() {
     for (name, stretched, alike, mean) in [
         (
             "wind",
-            found(&|app| drop(app.world_mut().spawn((zone(Vec3::ONE), scaled)))),
-            found(&|app| drop(app.world_mut().spawn(zone(scale)))),
-            found(&|app| drop(app.world_mut().spawn(zone(Vec3::splat(1.587))))),
+            found(&|app| _ = app.world_mut().spawn((zone(Vec3::ONE), scaled))),
+            found(&|app| _ = app.world_mut().spawn(zone(scale))),
+            found(&|app| _ = app.world_mut().spawn(zone(Vec3::splat(1.587)))),
         ),
         (
             "water",
-            found(&|app| drop(app.world_mut().spawn((stream(Vec3::ONE), scaled)))),
-            found(&|app| drop(app.world_mut().spawn(stream(scale)))),
-            found(&|app| drop(app.world_mut().spawn(stream(Vec3::splat(1.587))))),
+            found(&|app| _ = app.world_mut().spawn((stream(Vec3::ONE), scaled))),
+            found(&|app| _ = app.world_mut().spawn(stream(scale))),
+            found(&|app| _ = app.world_mut().spawn(stream(Vec3::splat(1.587)))),
         ),
     ] {
         println!("{name}: {stretched:?}, {alike:?} without a scale, {mean:?} of a cube");
