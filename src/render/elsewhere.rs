@@ -5,6 +5,7 @@ use bevy::prelude::*;
 /// Says of a hair that somebody else writes its nodes into
 /// [`HairBuffers::nodes`](super::HairBuffers::nodes), on the GPU.
 #[derive(Component, Clone, Copy, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "nobody does"))]
 pub(crate) struct DrawnElsewhere {
     /// The corners of the box around them, in the hair's frame (m).
