@@ -62,5 +62,6 @@ mod book {
         Styling: "styling.md",
         Water: "water.md",
         Weather: "weather.md",
+        Worlds: "worlds.md",
     }
 }

@@ -60,3 +60,4 @@ mod water;
 mod wear;
 mod wind;
 mod without_a_device;
+mod worlds_copies;
