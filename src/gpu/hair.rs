@@ -36,6 +36,7 @@ use bevy::{
 
 /// A hair on the GPU, on the hair's entity.
 #[derive(Component)]
+#[component(clone_behavior = Ignore)]
 pub(super) struct GpuHair {
     pub(super) link: Link,
     /// Its strands in their order.
@@ -81,6 +82,7 @@ pub(super) struct GpuHair {
 
 /// has just returned, and stays for so long (s).
 #[derive(Component, Debug)]
+#[component(clone_behavior = Ignore)]
 pub(super) struct StaysOnCpu(pub(super) f32);
 
 impl GpuHair {

@@ -60,6 +60,7 @@ pub struct BlowerRecord {
 /// The substeps of a hair, in their order. Component of a [`Hair`](crate::Hair); filled by the tick, emptied
 /// by whoever runs them.
 #[derive(Component, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 pub struct GpuJournal {
     /// The substeps.
     pub records: Vec<SubstepRecord>,

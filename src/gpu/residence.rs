@@ -35,6 +35,7 @@ impl Ranged for SimulateOn {}
 
 /// Where a [`Hair`](crate::Hair) is simulated, and why. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub enum HairResidence {
     /// On the GPU.

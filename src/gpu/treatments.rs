@@ -6,6 +6,7 @@ use bevy::prelude::*;
 
 /// The treatments that act on a hair as a whole, on the hair's entity.
 #[derive(Component, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 pub(super) struct GpuTreatments {
     acting: Vec<HairTreatment>,
     /// What they did since the last record: of all joints, and range by range.

@@ -26,6 +26,7 @@ use half::{f16, slice::HalfFloatSliceExt};
 /// `nodes` and `frame` are written once a frame into the same GPU buffers. When the groom changes the
 /// handles change too.
 #[derive(Component, Reflect, Clone, Debug)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Clone)]
 pub struct HairBuffers {
     /// The nodes of all guides, one guide after the other.

@@ -11,6 +11,7 @@ use bevy::{
 
 /// On drawn hair: the child that draws its depth.
 #[derive(Component, Clone, Copy, Debug)]
+#[component(clone_behavior = Ignore)]
 pub(super) struct DepthDraw(Entity);
 
 type Lit = (

@@ -41,6 +41,7 @@ use core::marker::PhantomData;
 
 /// Packed data of a hair, kept to reuse the allocations.
 #[derive(Component, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 pub(super) struct Packed {
     pub(super) nodes: Vec<PackedNode>,
     layout: Vec<PackedGuide>,
@@ -68,6 +69,11 @@ pub(super) struct Packed {
     streaks: DrawnStreaks,
 }
 
+/// Marks the child that carries mesh and material of a hair.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default)]
+#[reflect(Component, Default, Clone)]
+pub(super) struct DrawnHair;
+
 /// A strand that is a guide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PackedGuide {
@@ -91,7 +97,15 @@ pub(super) fn appear(
     mut commands: Commands,
     hairs: Query<Entity, (With<Hair>, Without<Packed>)>,
     bald: Query<(Entity, Option<&HairBuffers>), (With<Packed>, Without<Hair>)>,
+    drawn: Query<(Entity, &ChildOf), Added<DrawnHair>>,
+    buffers: Query<&HairBuffers>,
 ) {
+    // What draws a hair is copied with it, and saved.
+    for (entity, of) in &drawn {
+        if !buffers.get(of.parent()).is_ok_and(|buffers| buffers.drawn == entity) {
+            commands.entity(entity).try_despawn();
+        }
+    }
     for hair in &hairs {
         commands.entity(hair).insert((Packed::default(), DrawnFrame::default()));
     }
@@ -257,7 +271,7 @@ pub(super) fn pack(
             // Transforms have been propagated already in this frame.
             None => {
                 let name = Name::new("drawn hair");
-                commands.spawn((name, parts, *place, ChildOf(hair))).id()
+                commands.spawn((DrawnHair, name, parts, *place, ChildOf(hair))).id()
             }
         };
         commands.entity(hair).insert(HairBuffers {

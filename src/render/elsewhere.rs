@@ -5,6 +5,7 @@ use bevy::prelude::*;
 /// Marks a hair whose nodes another system writes into
 /// [`HairBuffers::nodes`](super::HairBuffers::nodes), on the GPU.
 #[derive(Component, Clone, Copy, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "only the GPU does"))]
 pub(crate) struct DrawnElsewhere {
     /// The corners of the box around them, in the hair's frame (m).

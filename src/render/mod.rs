@@ -147,6 +147,7 @@ impl Plugin for HairRenderPlugin {
         app.insert_resource(Interpolate(self.interpolate))
             .init_resource::<HairBeads>()
             .register_type::<HairBeads>()
+            .register_type::<draw::DrawnHair>()
             .register_type::<HairBuffers>()
             .register_type::<HairSmoothing>()
             .register_type::<FollowerRoots>()

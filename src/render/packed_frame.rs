@@ -94,6 +94,7 @@ pub fn packed_frame(solids: &[DrawnSolid]) -> Vec<u32> {
 
 /// A hair's frame.
 #[derive(Component, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 pub(super) struct DrawnFrame {
     pub(super) packed: PackedFrame,
     /// Size of a pixel where a camera is nearest, in the hair's frame (m); unknown before the first view.

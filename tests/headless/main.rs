@@ -67,4 +67,5 @@ mod wear;
 mod wind;
 mod without_a_device;
 mod worlds;
+mod worlds_copies;
 mod worlds_shapes;

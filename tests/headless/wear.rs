@@ -18,8 +18,8 @@ use bevy_keratin::{
 use std::{thread::sleep, time::Duration};
 
 /// The head's middle, and its half axes (m).
-const MIDDLE: Vec3 = Vec3::new(0.0, 1.6, 0.0);
-const HALF: Vec3 = Vec3::new(0.077, 0.118, 0.098);
+pub(super) const MIDDLE: Vec3 = Vec3::new(0.0, 1.6, 0.0);
+pub(super) const HALF: Vec3 = Vec3::new(0.077, 0.118, 0.098);
 /// Name and joint (m) of each bone, below the one before.
 const BONES: [(&str, Vec3); 4] = [
     ("Hips", Vec3::new(0.0, 0.95, 0.0)),
@@ -34,7 +34,7 @@ struct Reported {
     refused: Vec<(Entity, WearError)>,
 }
 
-fn app() -> App {
+pub(super) fn app() -> App {
     let mut app = app_with_meshes(60.0);
     app.init_resource::<Reported>()
         .add_observer(|worn: On<HairWorn>, mut reported: ResMut<Reported>| {
@@ -63,7 +63,7 @@ fn wait(app: &mut App) -> Reported {
     panic!("nothing was reported of wearing");
 }
 
-fn worn(app: &mut App) -> Entity {
+pub(super) fn worn(app: &mut App) -> Entity {
     let reported = wait(app);
     assert_eq!(reported.refused, [], "refused");
     reported.worn[0].hair
@@ -97,7 +97,7 @@ fn skin(scale: f32) -> Mesh {
 }
 
 /// A character without hair, its skin in units of `1 / scale` m.
-fn character(app: &mut App, root: Entity, scale: f32) -> (Entity, Entity) {
+pub(super) fn character(app: &mut App, root: Entity, scale: f32) -> (Entity, Entity) {
     let world = app.world_mut();
     let armature = Transform::from_scale(Vec3::splat(1.0 / scale));
     let mut above = world.spawn((Name::new("Armature"), armature, ChildOf(root))).id();
@@ -255,7 +255,7 @@ fn nothing_to_wear_hair_on_is_reported_after_a_while() {
     assert_eq!((reported[0].kind, reported[0].entity), (FaultKind::Wear, Some(id)));
 }
 
-fn ball(radius: f32) -> Mesh {
+pub(super) fn ball(radius: f32) -> Mesh {
     Sphere::new(radius).mesh().uv(48, 32)
 }
 
@@ -552,7 +552,7 @@ fn a_groom_is_worn_where_it_was_made() {
     app.world_mut().resource_mut::<Assets<Groom>>().insert(&handle, groom()).unwrap();
     let hair = worn(&mut app);
     let is = app.world().get::<WornHair>(hair).unwrap();
-    assert!(matches!(&is.hair, HairSource::Groom { groom, .. } if *groom == handle));
+    assert!(matches!(&is.wear.hair, HairSource::Groom { groom, .. } if *groom == handle));
     assert_eq!(is.preset(), None);
     // Each stands for the skin around it: the upper 0.4 of 0.12 m² at 223 a cm², 300 strands.
     let fibres = app.world().get::<HairWetting>(hair).unwrap().fibres;

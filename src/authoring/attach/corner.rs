@@ -3,7 +3,7 @@
 use super::{error::RootsError, morph::Shift};
 use crate::authoring::plant::RootOnMesh;
 use bevy::{
-    mesh::{Mesh, MeshAccessError, VertexAttributeValues, morph::MorphAttributes},
+    mesh::{Indices, Mesh, MeshAccessError, VertexAttributeValues, morph::MorphAttributes},
     prelude::*,
 };
 use core::ops::Range;
@@ -26,8 +26,29 @@ impl Corner {
     }
 }
 
+/// Which triangles a mesh has: vertices may move, but roots are on these.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Triangles {
+    pub(super) vertices: usize,
+    hash: u64,
+}
+
+impl Triangles {
+    fn of(mesh: &Mesh, vertices: usize) -> Self {
+        // FNV-1a, a word at a time.
+        let mix = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3);
+        let hash = match mesh.try_indices_option() {
+            Ok(Some(Indices::U16(all))) => all.iter().fold(0, |hash, v| mix(hash, u64::from(*v))),
+            Ok(Some(Indices::U32(all))) => all.iter().fold(0, |hash, v| mix(hash, u64::from(*v))),
+            _ => 0,
+        };
+        Self { vertices, hash }
+    }
+}
+
 /// Reads corners from a mesh.
 pub(super) struct Corners<'a> {
+    mesh: &'a Mesh,
     positions: &'a [[f32; 3]],
     skin: Option<(&'a [[u16; 4]], &'a [[f32; 4]])>,
     joints: usize,
@@ -53,7 +74,12 @@ impl<'a> Corners<'a> {
             _ => None,
         };
         let morphs = mesh.try_morph_targets().map_or(&[][..], |targets| targets);
-        Ok(Self { positions, skin, joints, morphs })
+        Ok(Self { mesh, positions, skin, joints, morphs })
+    }
+
+    /// Which triangles the mesh has.
+    pub fn triangles(&self) -> Triangles {
+        Triangles::of(self.mesh, self.positions.len())
     }
 
     /// The corners of a root's triangle; what morph targets do to them goes into `shifts`.

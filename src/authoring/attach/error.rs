@@ -42,6 +42,17 @@ pub enum RootsError {
         /// How many vertices there are.
         vertices: usize,
     },
+    /// A mesh of other triangles than those that roots were planted on.
+    #[error(
+        "RootsOnMesh's mesh has {found} vertices and other triangles than the one with {expected} that its \
+         roots were planted on: insert RootsOnMesh with RootOnMesh::nearest on this mesh, or plant again"
+    )]
+    Triangles {
+        /// How many vertices it has.
+        found: usize,
+        /// How many the other had.
+        expected: usize,
+    },
     /// A skin without joints.
     #[error(
         "the SkinnedMesh of RootsOnMesh's mesh has {joints} joints and {poses} inverse bind poses, \

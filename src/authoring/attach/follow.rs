@@ -22,7 +22,7 @@ const PROBES: usize = 16;
 /// The pose of a tied root on the posed mesh, in a hair's frame.
 fn place_of(root: &Tied, mesh: &MeshPose, hair: &Pose) -> Option<Isometry3d> {
     let corners = root.corners.map(|c| hair.point_in(mesh.corner(&c)));
-    triangle(corners, root.weights).map(|now| now * root.offset)
+    triangle(corners, root.root.weights).map(|now| now * root.offset)
 }
 
 /// Whether the roots of a hair stay where they were, by a few of them. Most heads are rigid, and hair

@@ -15,13 +15,14 @@ mod roots;
 mod tie;
 
 pub use error::RootsError;
-pub use roots::{RootsOnMesh, TiedRoots};
+pub(crate) use roots::MadeAgain;
+pub use roots::{PlantedRoot, RootsOnMesh, TiedRoots};
 
 use crate::{
     base::schedule::{HairSystems, HairTick},
     hair::strand::{DrawnFrames, lacks_strands},
 };
-use bevy::prelude::*;
+use bevy::{asset::AssetEventSystems, prelude::*};
 
 /// Roots on meshes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,6 +34,7 @@ impl Plugin for AttachPlugin {
             return;
         }
         app.register_type::<RootsOnMesh>()
+            .register_type::<PlantedRoot>()
             .register_type::<TiedRoots>()
             .register_type::<RootsError>()
             .register_required_components::<RootsOnMesh, TiedRoots>()
@@ -44,7 +46,11 @@ impl Plugin for AttachPlugin {
             )
             .add_systems(
                 PostUpdate,
-                follow::draw_roots.after(DrawnFrames).run_if(any_with_component::<TiedRoots>),
+                tie::follow_edits.after(AssetEventSystems).run_if(any_with_component::<TiedRoots>),
             );
+        let draw = follow::draw_roots.after(DrawnFrames).run_if(any_with_component::<TiedRoots>);
+        #[cfg(feature = "render")]
+        let draw = draw.before(crate::render::HairRenderSystems);
+        app.add_systems(PostUpdate, draw);
     }
 }

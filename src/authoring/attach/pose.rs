@@ -47,6 +47,11 @@ impl Movers {
         }
     }
 
+    /// The mesh that they move; `None` before there is one.
+    pub fn mesh(&self) -> Option<Entity> {
+        self.mesh
+    }
+
     /// How many joints there are, one at least.
     pub fn joints(&self) -> usize {
         self.joints.len()

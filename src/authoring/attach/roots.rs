@@ -1,13 +1,16 @@
 //! The roots that are tied to a mesh.
 
-use super::{corner::Corner, pose::Movers};
+use super::{
+    corner::{Corner, Triangles},
+    pose::Movers,
+};
 use crate::authoring::plant::RootOnMesh;
 use bevy::{
     math::{Affine3A, Isometry3d, Mat3A},
     prelude::*,
 };
 
-/// GuideOffsets the strands of a [`Hair`](crate::Hair) to triangles of a mesh, static, skinned or morphed.
+/// Ties the strands of a [`Hair`](crate::Hair) to triangles of a mesh, static, skinned or morphed.
 /// Component of the hair, which best sits on the bone that moves most of it.
 ///
 /// Strands are in the mesh's own space, before any skinning, as planting gives them, or in the space
@@ -16,11 +19,18 @@ use bevy::{
 /// then on roots move and rotate with their triangles: by the joints of a `SkinnedMesh`, and by the
 /// mesh's morph targets with the weights of `MeshMorphWeights`. Invalid data are reported once as
 /// [`FaultKind::Roots`](crate::FaultKind::Roots).
+///
+/// Each strand is planted once and remembers its root: writing to this component again moves nothing, and
+/// after strands were despawned the others keep their roots. Another [`mesh`](Self::mesh), or another root,
+/// moves the strand there in its present shape. When the vertices of the mesh are edited roots follow from
+/// that frame on and lengths stay; a mesh of other triangles is refused by
+/// [`RootsError::Triangles`](super::RootsError::Triangles).
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct RootsOnMesh {
     /// The entity that carries the `Mesh3d`, and if there are any `SkinnedMesh` and
     /// `MeshMorphWeights`.
+    #[entities]
     pub mesh: Option<Entity>,
     /// One for each strand, in the order of the hair's [`Strands`](crate::Strands).
     pub roots: Vec<RootOnMesh>,
@@ -29,19 +39,65 @@ pub struct RootsOnMesh {
     pub strands_from_mesh: Affine3A,
 }
 
-/// Data read from the mesh when the strands were tied to it, so that its asset may be unloaded.
+/// How a strand was planted on its mesh, from which its root's place on the posed mesh follows. State of the
+/// strand: it goes into clones and scenes.
+#[doc(hidden)]
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[component(storage = "SparseSet")]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct PlantedRoot {
+    pub(super) root: RootOnMesh,
+    /// Place and frame relative to the posed triangle.
+    pub(super) place: Vec3,
+    pub(super) frame: Quat,
+    /// The frame of that triangle in the strands' space.
+    pub(super) bind: Quat,
+    /// The factor by which its lengths were multiplied on the mesh.
+    pub(super) scale: f32,
+}
+
+impl PlantedRoot {
+    pub(super) fn offset(&self) -> Isometry3d {
+        Isometry3d::new(self.place, self.frame)
+    }
+}
+
+/// Data read from the mesh when the strands were tied to it, so that its asset may be unloaded. Derived from
+/// [`RootsOnMesh`] and [`PlantedRoot`].
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone)]
 pub struct TiedRoots {
     #[reflect(ignore)]
     pub(super) roots: Vec<Tied>,
     #[reflect(ignore)]
     pub(super) movers: Movers,
-    pub(super) failed: bool,
+    /// The triangles that the roots are on.
+    #[reflect(ignore)]
+    pub(super) triangles: Option<Triangles>,
+    /// Whether the roots are those of [`RootsOnMesh`], or never will be.
+    pub(super) done: bool,
+    /// Whether the mesh has changed and is to be read again.
+    #[reflect(ignore)]
+    pub(super) stale: bool,
+    /// Whether it could not be read again: it has other triangles.
+    #[reflect(ignore)]
+    pub(super) lost: bool,
     /// Whether the roots stay where they are in this tick.
     #[reflect(ignore)]
     pub(super) rest: bool,
+}
+
+/// Marks hair that is made again when its mesh has other triangles.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub(crate) struct MadeAgain;
+
+impl TiedRoots {
+    /// Whether the mesh no longer fits, since the last call of this.
+    pub(crate) fn take_lost(&mut self) -> bool {
+        core::mem::take(&mut self.lost)
+    }
 }
 
 #[cfg(feature = "gpu")]
@@ -53,7 +109,7 @@ impl TiedRoots {
 
     /// Whether they are yet to be tied.
     pub(crate) fn wait(&self) -> bool {
-        self.roots.is_empty() && !self.failed
+        !self.done
     }
 
     /// Each tied strand with place and frame of its root at the share `t` of this tick; none while they
@@ -67,7 +123,7 @@ impl TiedRoots {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tied {
     pub(super) strand: Entity,
-    pub(super) weights: Vec3,
+    pub(super) root: RootOnMesh,
     pub(super) corners: [Corner; 3],
     /// The root's frame relative to its triangle's.
     pub(super) offset: Isometry3d,

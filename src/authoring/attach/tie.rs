@@ -1,11 +1,14 @@
-//! Tying strands to their mesh, once it is loaded.
+//! Tying strands to their mesh once it is loaded, and again whenever mesh or roots change.
+//!
+//! A strand is planted once: taken from its bound triangle to the posed one. Its [`PlantedRoot`] stays, and
+//! everything else is derived from that, however often.
 
 use super::{
-    corner::{Corner, Corners},
+    corner::{Corner, Corners, Triangles},
     error::RootsError,
     morph::Morphs,
     pose::Movers,
-    roots::{RootsOnMesh, Tied, TiedRoots, triangle},
+    roots::{MadeAgain, PlantedRoot, RootsOnMesh, Tied, TiedRoots, triangle},
 };
 use crate::{
     authoring::plant::RootOnMesh,
@@ -16,53 +19,113 @@ use crate::{
     hair::strand::{HairHere, MIN_SEGMENT, Strand, StrandHistory, Strands, TickPose},
 };
 use bevy::{
+    ecs::{entity::EntityHashMap, system::SystemParam},
     math::Isometry3d,
     mesh::{
         Mesh, Mesh3d,
         skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     },
+    platform::collections::{HashMap, HashSet},
     prelude::*,
 };
+use core::mem::replace;
 
-/// GuideOffsets the strands of new [`RootsOnMesh`].
+/// How far (m) and by how much (rad) a root that was planted may be from its place on the mesh, and its strand
+/// stays as it is.
+const STAYS: f32 = 5e-5;
+const STAYS_TURNED: f32 = 1e-3;
+
+/// Meshes with their skins.
+#[derive(SystemParam)]
+pub(super) struct Skins<'w, 's> {
+    meshes: Option<Res<'w, Assets<Mesh>>>,
+    bindposes: Option<Res<'w, Assets<SkinnedMeshInverseBindposes>>>,
+    skins: Query<'w, 's, (&'static Mesh3d, Option<&'static SkinnedMesh>)>,
+}
+
+type Skin<'a> = Option<(&'a SkinnedMesh, &'a SkinnedMeshInverseBindposes)>;
+
+impl Skins<'_, '_> {
+    /// A mesh with its skin; `None` while an asset is missing.
+    fn get(&self, entity: Entity) -> Option<(&Mesh, Skin<'_>)> {
+        let (mesh, skin) = self.skins.get(entity).ok()?;
+        let mesh = self.meshes.as_ref()?.get(&mesh.0)?;
+        let Some(skin) = skin else { return Some((mesh, None)) };
+        Some((mesh, Some((skin, self.bindposes.as_ref()?.get(&skin.inverse_bindposes)?))))
+    }
+}
+
+/// What moves the corners of some roots, the corners, and the triangles of their mesh.
+type Read = (Movers, Vec<[Corner; 3]>, Triangles);
+
+fn read<'a>(
+    entity: Entity,
+    (mesh, skin): (&Mesh, Skin<'_>),
+    roots: impl Iterator<Item = &'a RootOnMesh>,
+    known: Option<Triangles>,
+) -> Result<Read, RootsError> {
+    let mut movers = Movers::of(entity, skin)?;
+    let corners = Corners::of(mesh, skin.is_some(), movers.joints())?;
+    let triangles = corners.triangles();
+    if let Some(known) = known.filter(|known| *known != triangles) {
+        let (found, expected) = (triangles.vertices, known.vertices);
+        return Err(RootsError::Triangles { found, expected });
+    }
+    let read = roots.map(|root| corners.around(root, &mut movers.shifts));
+    let read = read.collect::<Result<_, _>>()?;
+    Ok((movers, read, triangles))
+}
+
+/// Ties the strands of new or changed [`RootsOnMesh`].
 pub(super) fn tie(
     step: Res<HairStep>,
-    meshes: Option<Res<Assets<Mesh>>>,
-    bindposes: Option<Res<Assets<SkinnedMeshInverseBindposes>>>,
+    mut commands: Commands,
+    skins: Skins,
     transforms: TransformHelper,
-    skins: Query<(&Mesh3d, Option<&SkinnedMesh>)>,
     morphs: Morphs,
     mut hairs: Query<(Entity, Ref<RootsOnMesh>, &mut TiedRoots, &Strands, &TickPose), HairHere>,
-    mut strands: Query<(&mut Strand, &mut StrandHistory)>,
+    mut strands: Query<(&mut Strand, &mut StrandHistory, Option<&PlantedRoot>)>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    let Some(meshes) = meshes.filter(|_| step.index == 0) else { return };
+    if step.index != 0 {
+        return;
+    }
     for (hair, roots, mut tied, members, pose) in &mut hairs {
         if roots.is_changed() {
-            *tied = default();
+            tied.done = false;
         }
-        if tied.failed || !tied.roots.is_empty() {
+        if tied.done {
             continue;
         }
-        let Some(entity) = roots.mesh else { continue };
-        let Ok((mesh, skin)) = skins.get(entity) else { continue };
-        let Some(mesh) = meshes.get(&mesh.0) else { continue };
-        let poses = skin.and_then(|s| bindposes.as_ref()?.get(&s.inverse_bindposes));
-        if skin.is_some() && poses.is_none() {
+        let Some(entity) = roots.mesh else {
+            tied.roots.clear();
             continue;
-        }
+        };
+        let Some(mesh) = skins.get(entity) else { continue };
         let mut report = |why| {
             faults.write(
                 HairFault::caused(FaultKind::Roots, why, "those strands do not follow the mesh")
                     .of(hair),
             )
         };
-        let read = Movers::of(entity, skin.zip(poses))
-            .and_then(|movers| read(&roots, mesh, skin.is_some(), movers, members.iter().len()));
-        let (movers, corners) = match read {
+        let planted = members.iter().map(|id| strands.get(id).ok().and_then(|s| s.2).copied());
+        let planted: Vec<Option<PlantedRoot>> = planted.collect();
+        // Other roots may be on other triangles.
+        let is_known = tied.movers.mesh() == Some(entity);
+        let chosen = assigned(&planted, &roots.roots);
+        let is_same = |(root, planted): (&RootOnMesh, &Option<PlantedRoot>)| {
+            planted.as_ref().is_some_and(|planted| planted.root == *root)
+        };
+        let read = chosen.and_then(|chosen| {
+            let same = is_known && chosen.iter().zip(&planted).all(is_same);
+            let known = tied.triangles.filter(|_| same);
+            let (movers, corners, triangles) = read(entity, mesh, chosen.iter(), known)?;
+            Ok((chosen, movers, corners, triangles))
+        });
+        let (chosen, movers, corners, triangles) = match read {
             Ok(read) => read,
             Err(why) => {
-                tied.failed = true;
+                tied.done = true;
                 report(why);
                 continue;
             }
@@ -70,85 +133,253 @@ pub(super) fn tie(
         let place = |entity| transforms.compute_global_transform(entity).ok();
         let Some(posed) = movers.pose(place, &morphs) else { continue };
         let mut flat = 0;
-        let made = members.iter().zip(&roots.roots).zip(corners).filter_map(
-            |((member, root), corners)| {
-                let seen = |at| pose.now().point_in(at);
-                let now = corners.map(|c| seen(posed.corner(&c)));
-                let unmorphed = corners.map(|c| seen(posed.unmorphed(&c)));
-                let strand = strands.get_mut(member).ok()?;
-                let bind = corners.map(|c| roots.strands_from_mesh.transform_point3(c.at));
-                let tied = tie_strand(member, root, corners, bind, now, unmorphed, strand);
-                flat += usize::from(tied.is_none());
-                tied
-            },
-        );
-        tied.roots = made.collect();
-        tied.failed = tied.roots.is_empty();
-        tied.movers = movers;
+        let mut made = Vec::with_capacity(chosen.len());
+        let from_mesh = &roots.strands_from_mesh;
+        let was_on = tied.movers.mesh();
+        let aims: EntityHashMap<Isometry3d> =
+            tied.roots.iter().map(|root| (root.strand, root.to)).collect();
+        for (((member, root), corners), planted) in
+            members.iter().zip(chosen).zip(corners).zip(planted)
+        {
+            let Ok((mut strand, mut history, _)) = strands.get_mut(member) else { continue };
+            let seen = |at| pose.now().point_in(at);
+            let place = Place {
+                root,
+                bind: corners.map(|c| from_mesh.transform_point3(c.at)),
+                posed: corners.map(|c| seen(posed.corner(&c))),
+                unmorphed: corners.map(|c| seen(posed.unmorphed(&c))),
+            };
+            let found = match planted {
+                None => plant(&place, &mut strand, &mut history),
+                Some(planted) => {
+                    let is_new_mesh = was_on.is_some() && !is_known;
+                    let aim = aims.get(&member).filter(|_| is_known && planted.root == root);
+                    put(&place, planted, is_new_mesh, aim, &mut strand, &mut history)
+                }
+            };
+            let Some((is, at)) = found else {
+                flat += 1;
+                continue;
+            };
+            if planted != Some(is) {
+                commands.entity(member).try_insert(is);
+            }
+            let offset = is.offset();
+            made.push(Tied { strand: member, root, corners, offset, from: at, to: at });
+        }
+        *tied =
+            TiedRoots { roots: made, movers, triangles: Some(triangles), done: true, ..default() };
         if flat > 0 {
             report(RootsError::Flat { found: flat });
         }
     }
 }
 
-/// Reads the corners of every root, before any strand is touched.
-fn read(
-    roots: &RootsOnMesh,
-    mesh: &Mesh,
-    skinned: bool,
-    mut movers: Movers,
-    strands: usize,
-) -> Result<(Movers, Vec<[Corner; 3]>), RootsError> {
-    let found = roots.roots.len();
-    if found != strands {
-        return Err(RootsError::Count { found, expected: strands });
+/// The root of each strand. Those that were planted keep theirs if it is among the `roots`; the others get what
+/// is left, in order.
+fn assigned(
+    planted: &[Option<PlantedRoot>],
+    roots: &[RootOnMesh],
+) -> Result<Vec<RootOnMesh>, RootsError> {
+    type Key = ([u32; 3], [u32; 3]);
+    let key =
+        |root: &RootOnMesh| -> Key { (root.vertices, root.weights.to_array().map(f32::to_bits)) };
+    let mut left: HashMap<Key, usize> = default();
+    roots.iter().for_each(|root| *left.entry(key(root)).or_default() += 1);
+    let kept: Vec<Option<RootOnMesh>> = planted
+        .iter()
+        .map(|planted| {
+            let root = planted.as_ref()?.root;
+            let left = left.get_mut(&key(&root)).filter(|left| **left > 0)?;
+            *left -= 1;
+            Some(root)
+        })
+        .collect();
+    let mut others = roots.iter().filter(|root| {
+        let Some(left) = left.get_mut(&key(root)).filter(|left| **left > 0) else { return false };
+        *left -= 1;
+        true
+    });
+    let count = RootsError::Count { found: roots.len(), expected: planted.len() };
+    // New strands have a root each, and no root is without one.
+    if planted.iter().all(Option::is_none) && planted.len() != roots.len() {
+        return Err(count);
     }
-    let corners = Corners::of(mesh, skinned, movers.joints())?;
-    let read = roots.roots.iter().map(|root| corners.around(root, &mut movers.shifts));
-    let read = read.collect::<Result<_, _>>()?;
-    Ok((movers, read))
+    let all = kept.into_iter().map(|kept| kept.or_else(|| others.next().copied()));
+    all.collect::<Option<_>>().ok_or(count)
 }
 
-/// Moves a strand from its triangle in the `bind` pose to the triangle as `posed`, in the hair's frame.
-/// Morph targets move and rotate it, but do not scale it: lengths are those of the `unmorphed` mesh,
-/// whatever the face's expression when the strand is tied.
-///
-/// It is moved, rotated and scaled as a whole: its shape and the shapes that its bonds remember stay
-/// the same.
-fn tie_strand(
-    member: Entity,
-    root: &RootOnMesh,
-    corners: [Corner; 3],
+/// Where a root is: its triangle in the strands' space, and as posed in the hair's frame, morphed and not.
+struct Place {
+    root: RootOnMesh,
     bind: [Vec3; 3],
     posed: [Vec3; 3],
     unmorphed: [Vec3; 3],
-    (mut strand, mut history): (Mut<'_, Strand>, Mut<'_, StrandHistory>),
-) -> Option<Tied> {
-    let size = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).length().sqrt();
-    let scale = size(unmorphed) / size(bind);
-    let bind = triangle(bind, root.weights)?;
-    let now = triangle(posed, root.weights)?;
-    let turn = now.rotation * bind.rotation.inverse();
-    let place = |p: &Vec3| now * ((bind.inverse() * *p) * scale);
+}
+
+impl Place {
+    /// The frames of both triangles; `None` where one has no area.
+    fn frames(&self) -> Option<[Isometry3d; 2]> {
+        let frame = |corners| triangle(corners, self.root.weights);
+        Some([frame(self.bind)?, frame(self.posed)?])
+    }
+
+    /// The factor on lengths. Morph targets move and rotate a strand, but do not scale it: lengths are those of
+    /// the unmorphed mesh, whatever the face's expression.
+    fn scale(&self) -> f32 {
+        let size = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).length().sqrt();
+        size(self.unmorphed) / size(self.bind)
+    }
+}
+
+/// Moves a strand from its triangle as bound to that as posed.
+fn plant(
+    place: &Place,
+    strand: &mut Mut<'_, Strand>,
+    history: &mut Mut<'_, StrandHistory>,
+) -> Option<(PlantedRoot, Isometry3d)> {
+    let [bind, now] = place.frames()?;
+    let scale = place.scale();
+    let at = carry(strand, history, &bind, &now, scale)?;
+    let offset = now.inverse() * at;
+    let planted = PlantedRoot {
+        root: place.root,
+        place: offset.translation.into(),
+        frame: offset.rotation,
+        bind: bind.rotation,
+        scale,
+    };
+    Some((planted, at))
+}
+
+/// Puts a strand that was planted in its place; one whose root already has this mesh as its `aim` stays.
+fn put(
+    place: &Place,
+    mut planted: PlantedRoot,
+    is_new_mesh: bool,
+    aim: Option<&Isometry3d>,
+    strand: &mut Mut<'_, Strand>,
+    history: &mut Mut<'_, StrandHistory>,
+) -> Option<(PlantedRoot, Isometry3d)> {
+    let [bind, now] = place.frames()?;
+    if planted.root != place.root {
+        // The same direction in the strands' space.
+        planted.frame = (bind.rotation.inverse() * (planted.bind * planted.frame)).normalize();
+        (planted.root, planted.bind) = (place.root, bind.rotation);
+    }
+    let mut larger = 1.0;
+    if is_new_mesh {
+        larger = place.scale() / planted.scale;
+        planted.scale *= larger;
+        planted.place *= larger;
+    }
+    let root = Isometry3d::new(strand.positions()[0], strand.root_frame());
+    let at = now * planted.offset();
+    let is_there = Vec3::from(root.translation).distance(at.translation.into()) < STAYS
+        && root.rotation.angle_between(at.rotation) < STAYS_TURNED
+        && larger == 1.0;
+    if aim.is_some() || is_there {
+        return Some((planted, *aim.unwrap_or(&root)));
+    }
+    Some((planted, carry(strand, history, &root, &at, larger)?))
+}
+
+/// Moves, rotates and scales a strand as a whole: its shape and the shapes that its bonds remember stay the
+/// same. Returns place and frame of its root; `None` where it cannot be.
+fn carry(
+    strand: &mut Mut<'_, Strand>,
+    history: &mut Mut<'_, StrandHistory>,
+    from: &Isometry3d,
+    to: &Isometry3d,
+    scale: f32,
+) -> Option<Isometry3d> {
+    let turn = to.rotation * from.rotation.inverse();
     let turned = |q: &Quat| (turn * *q).normalize();
-    let points: Vec<Vec3> = strand.positions().iter().map(place).collect();
+    let (positions, velocities, orientations, spins) = strand.parts();
+    let place = |p: &Vec3| *to * ((from.inverse() * *p) * scale);
+    let positions: Vec<Vec3> = positions.iter().map(place).collect();
     let lengths: Vec<f32> = strand.rest_lengths().iter().map(|l| l * scale).collect();
-    let usable = points.len() >= 2
-        && points.iter().all(|p| p.is_finite())
+    let usable = positions.len() >= 2
+        && positions.iter().all(|p| p.is_finite())
         && lengths.iter().all(|l| *l >= MIN_SEGMENT);
     if !usable {
         return None;
     }
-    let at = Isometry3d::new(points[0], turned(&strand.root_frame()));
-    let orientations = strand.orientations().iter().map(turned).collect();
-    strand.replace(points, orientations, lengths, at.rotation);
-    history.positions.clear();
-    Some(Tied {
-        strand: member,
-        weights: root.weights,
-        corners,
-        offset: now.inverse() * at,
-        from: at,
-        to: at,
-    })
+    let orientations = orientations.iter().map(turned).collect();
+    let moving = |all: &[Vec3]| all.iter().map(|v| turn * *v).collect::<Vec<_>>();
+    let (velocities, spins) = (moving(velocities), moving(spins));
+    let at = Isometry3d::new(positions[0], turned(&strand.root_frame()));
+    strand.replace(positions, orientations, lengths, at.rotation);
+    let (_, own, _, own_spins) = strand.parts_mut();
+    own.copy_from_slice(&velocities);
+    own_spins.copy_from_slice(&spins);
+    **history = default();
+    Some(at)
+}
+
+/// Once a frame: reads the vertices of meshes that were edited or replaced again.
+pub(super) fn follow_edits(
+    skins: Skins,
+    mut edits: Option<MessageReader<AssetEvent<Mesh>>>,
+    replaced: Query<Entity, Or<(Changed<Mesh3d>, Changed<SkinnedMesh>)>>,
+    drawn: Query<&Mesh3d>,
+    mut hairs: Query<(Entity, &mut TiedRoots, Has<MadeAgain>)>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let edits = edits.iter_mut().flat_map(|edits| edits.read());
+    let edited: HashSet<AssetId<Mesh>> = edits
+        .filter_map(|event| match event {
+            AssetEvent::Modified { id } => Some(*id),
+            _ => None,
+        })
+        .collect();
+    for (hair, mut tied, is_made_again) in &mut hairs {
+        let Some(entity) = tied.movers.mesh() else { continue };
+        let is_edited =
+            !edited.is_empty() && drawn.get(entity).is_ok_and(|mesh| edited.contains(&mesh.id()));
+        let tied = tied.bypass_change_detection();
+        tied.stale |= is_edited || replaced.contains(entity);
+        if !tied.stale {
+            continue;
+        }
+        let Some(mesh) = skins.get(entity) else { continue };
+        tied.stale = false;
+        let roots = tied.roots.iter().map(|tied| &tied.root);
+        match read(entity, mesh, roots, tied.triangles) {
+            Ok((movers, corners, triangles)) => {
+                (tied.movers, tied.triangles, tied.lost) = (movers, Some(triangles), false);
+                tied.roots.iter_mut().zip(corners).for_each(|(tied, now)| tied.corners = now);
+            }
+            // Told of once, until it fits again.
+            Err(why) => {
+                let is_new = !replace(&mut tied.lost, true);
+                if is_new && !is_made_again {
+                    let outcome = "the strands follow the mesh as it was";
+                    faults.write(HairFault::caused(FaultKind::Roots, why, outcome).of(hair));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planted_strands_keep_their_roots_and_new_ones_get_what_is_left() {
+        let root = |v: u32| RootOnMesh { vertices: [v, v + 1, v + 2], weights: Vec3::X };
+        let is = |v: u32| Some(PlantedRoot { root: root(v), ..default() });
+        let all = [0, 1, 2, 3].map(root);
+        let of = |planted: &[Option<PlantedRoot>]| {
+            let found = assigned(planted, &all).ok()?;
+            Some(found.iter().map(|root| root.vertices[0]).collect::<Vec<_>>())
+        };
+        assert_eq!(of(&[None; 4]), Some(vec![0, 1, 2, 3]));
+        assert_eq!(of(&[None; 3]), None, "new strands have a root each");
+        assert_eq!(of(&[is(1), is(3)]), Some(vec![1, 3]), "shaved");
+        assert_eq!(of(&[is(1), is(3), None, None]), Some(vec![1, 3, 0, 2]), "and grown again");
+        assert_eq!(of(&[is(1), is(3), None, None, None]), None);
+        assert_eq!(of(&[is(7), is(8), is(9), is(10)]), Some(vec![0, 1, 2, 3]), "other roots");
+    }
 }

@@ -9,7 +9,7 @@ use crate::{
         schedule::HairFrame,
         setting::{Ranged, ValueRange, setting},
     },
-    hair::strand::{Hair, Strand, StrandOf},
+    hair::strand::{Hair, Strand, StrandOf, Strands},
 };
 use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 
@@ -182,17 +182,26 @@ pub(crate) struct GrownStrands {
     pub short: usize,
 }
 
-/// The strands that a hair has from its groom.
-#[derive(Component, Debug, Default)]
+/// What a hair has from its groom, beside its strands.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[reflect(Component, Default, Clone)]
 pub(super) struct Grown {
     /// The groom that was used, or failed.
     from: Option<GroomedHair>,
-    strands: Vec<Entity>,
     gave_look: bool,
 }
 
+/// Marks a strand that its hair has from its groom.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default)]
+#[component(storage = "SparseSet")]
+#[reflect(Component, Default, Clone)]
+pub(super) struct GrownStrand;
+
 pub(super) fn build(app: &mut App) {
-    app.register_type::<GroomedHair>().register_type::<GroomGuides>();
+    app.register_type::<GroomedHair>()
+        .register_type::<GroomGuides>()
+        .register_type::<Grown>()
+        .register_type::<GrownStrand>();
 }
 
 /// Needs grooms to be assets.
@@ -207,7 +216,8 @@ type Look = Hair;
 
 fn spawn_grown(
     mut commands: Commands,
-    mut hairs: Query<(Entity, &GroomedHair, Option<&mut Grown>, Has<Look>)>,
+    mut hairs: Query<(Entity, &GroomedHair, Option<&mut Grown>, Option<&Strands>, Has<Look>)>,
+    own: Query<Entity, With<GrownStrand>>,
     mut events: MessageReader<AssetEvent<Groom>>,
     (grooms, assets): (Res<Assets<Groom>>, Res<AssetServer>),
     mut faults: MessageWriter<HairFault>,
@@ -219,12 +229,15 @@ fn spawn_grown(
             _ => None,
         })
         .collect();
-    for (hair, wanted, grown, has_look) in &mut hairs {
+    for (hair, wanted, grown, members, has_look) in &mut hairs {
         let Some(mut grown) = grown else {
             commands.entity(hair).insert(Grown::default());
             continue;
         };
-        if grown.from.as_ref() == Some(wanted) && !changed.contains(&wanted.groom.id()) {
+        // Hair may be copied without its strands.
+        let is_bald = grown.is_added() && members.is_none();
+        let is_same = grown.from.as_ref() == Some(wanted) && !is_bald;
+        if is_same && !changed.contains(&wanted.groom.id()) {
             continue;
         }
         let Some(groom) = grooms.get(&wanted.groom) else {
@@ -234,16 +247,19 @@ fn spawn_grown(
                 let error = error.lines().next().unwrap_or_default().to_owned();
                 let message = format!("the hair's groom was not loaded: {error}");
                 faults.write(HairFault::new(FaultKind::Groom, message).of(hair));
-                grown.take_off(&mut commands, hair);
+                grown.take_off(&mut commands, hair, members, &own);
                 grown.from = Some(wanted.clone());
             }
             continue;
         };
         let has_look = has_look && !grown.gave_look;
-        grown.take_off(&mut commands, hair);
+        grown.take_off(&mut commands, hair, members, &own);
         grown.from = Some(wanted.clone());
         match groom.spawn(&mut commands, hair, &wanted.guides) {
-            Ok(strands) => grown.strands = strands,
+            Ok(strands) => {
+                let marked = strands.into_iter().map(|strand| (strand, GrownStrand));
+                commands.insert_batch(marked.collect::<Vec<_>>());
+            }
             Err(error) => {
                 let outcome = "nothing is grown from this groom";
                 faults.write(HairFault::caused(FaultKind::Groom, error, outcome).of(hair));
@@ -261,9 +277,16 @@ fn spawn_grown(
 
 impl Grown {
     /// Despawns the strands.
-    fn take_off(&mut self, commands: &mut Commands, hair: Entity) {
+    fn take_off(
+        &mut self,
+        commands: &mut Commands,
+        hair: Entity,
+        members: Option<&Strands>,
+        own: &Query<Entity, With<GrownStrand>>,
+    ) {
         // From the back, where `Strands` searches for a removed strand first.
-        while let Some(strand) = self.strands.pop() {
+        let members = members.map_or(&[][..], |members| members.collection());
+        for strand in own.iter_many(members.iter().rev()) {
             commands.entity(strand).try_despawn();
         }
         #[cfg(feature = "render")]
@@ -280,10 +303,11 @@ impl Grown {
 /// Removes the strands of hair whose [`GroomedHair`] was removed.
 fn remove_groomed(
     mut commands: Commands,
-    mut hairs: Query<(Entity, &mut Grown), Without<GroomedHair>>,
+    mut hairs: Query<(Entity, &mut Grown, Option<&Strands>), Without<GroomedHair>>,
+    own: Query<Entity, With<GrownStrand>>,
 ) {
-    for (hair, mut grown) in &mut hairs {
-        grown.take_off(&mut commands, hair);
+    for (hair, mut grown, members) in &mut hairs {
+        grown.take_off(&mut commands, hair, members, &own);
         commands.entity(hair).remove::<Grown>();
     }
 }

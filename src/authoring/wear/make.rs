@@ -85,10 +85,71 @@ pub(super) struct Made {
     pub(super) look: Option<HairLook>,
     /// Fibres for each strand.
     pub(super) fibres: f32,
-    /// Colliders in the hair's space.
+    /// The meshes that it was fitted to, and the colliders.
+    pub(super) parts: Vec<Entity>,
+    pub(super) solids: Solids,
+}
+
+/// Colliders that fit a head and its body.
+#[derive(Default)]
+pub(super) struct Solids {
+    /// In the hair's space.
     pub(super) balls: Vec<(HairCollider, Transform)>,
-    /// Colliders of joints.
+    /// Of joints.
     pub(super) capsules: Vec<(Entity, (HairCollider, Transform))>,
+}
+
+/// The input for fitting colliders to meshes that have changed below hair that is worn.
+pub(super) struct RefitInput {
+    pub(super) wear: WearHair,
+    pub(super) target: Target,
+    /// The mesh of its roots, and the transform from its space to the strands'.
+    pub(super) mesh: Entity,
+    pub(super) from_mesh: Affine3A,
+    pub(super) roots: Vec<RootOnMesh>,
+    /// The length of the longest strand (m).
+    pub(super) longest: f32,
+}
+
+/// Fits colliders again. The hair stays in the space that it was made in.
+pub(super) fn refit(mut order: RefitInput) -> Result<Solids, WearError> {
+    let fitting = fit(&mut order.target.parts, &order.wear)?;
+    let part = order.target.parts.iter().find(|part| part.entity == order.mesh);
+    let part = part.ok_or(WearError::NoMesh)?;
+    let to_hair = fitting.from_wearer * part.to_wearer;
+    let places = part.mesh.attribute(Mesh::ATTRIBUTE_POSITION);
+    let Some(Values::Float32x3(places)) = places else { return Err(WearError::NoMesh) };
+    let roots = order.roots.iter().filter_map(|root| {
+        let corner = |i: usize| places.get(root.vertices[i] as usize).map(|p| Vec3::from(*p));
+        let [a, b, c] = [corner(0)?, corner(1)?, corner(2)?];
+        let [u, v, w] = root.weights.to_array();
+        Some(to_hair.transform_point3(a * u + b * v + c * w))
+    });
+    let mut solids = fit_solids(&fitting, &order.target, roots.collect(), order.longest)?;
+    let back = Mat4::from(order.from_mesh * to_hair.inverse());
+    for (_, place) in &mut solids.balls {
+        *place = Transform::from_matrix(back * place.to_matrix());
+    }
+    Ok(solids)
+}
+
+/// The colliders for hair with these `roots` in its space, whose `longest` strand is so long (m).
+fn fit_solids(
+    fitting: &Fitting,
+    target: &Target,
+    roots: Vec<Vec3>,
+    longest: f32,
+) -> Result<Solids, WearError> {
+    let head = match &target.parts[fitting.part].skin {
+        Some(skin) => skin.joints[skin.head.unwrap_or(0)],
+        None => target.head,
+    };
+    let reach = longest + MARGIN;
+    let balls = match target.own.above.contains(&head) {
+        true => Vec::new(),
+        false => balls(fitting, roots, reach)?,
+    };
+    Ok(Solids { balls, capsules: capsules(&target.parts, &target.own.joints, fitting, reach) })
 }
 
 /// Makes the hair.
@@ -110,15 +171,11 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
         }
         None => (part.entity, to_mesh),
     };
-    let own = &order.target.own;
-    let (balls, capsules) = if order.wear.colliders {
-        let head = if part.skin.is_some() { parent } else { order.target.head };
-        let reach = grown.hair.strands.iter().map(Strand::length).fold(0.0, f32::max) + MARGIN;
-        let balls = match own.above.contains(&head) {
-            true => Vec::new(),
-            false => balls(&fitting, &grown.hair.strands, reach)?,
-        };
-        (balls, capsules(&order.target.parts, &own.joints, &fitting, reach))
+    let solids = if order.wear.colliders {
+        let strands = &grown.hair.strands;
+        let roots = strands.iter().filter_map(|strand| strand.positions().first().copied());
+        let longest = strands.iter().map(Strand::length).fold(0.0, f32::max);
+        fit_solids(&fitting, &order.target, roots.collect(), longest)?
     } else {
         default()
     };
@@ -135,8 +192,8 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
         #[cfg(feature = "render")]
         look: order.groom.as_ref().and_then(Groom::look),
         fibres: grown.fibres.clamp(*fibres.start(), *fibres.end()),
-        balls,
-        capsules,
+        parts: order.target.parts.iter().map(|part| part.entity).collect(),
+        solids,
     })
 }
 
@@ -231,7 +288,7 @@ fn median(values: &mut [f32]) -> Option<f32> {
 /// joints, all of it that hair reaches.
 fn balls(
     fitting: &Fitting,
-    strands: &[Strand],
+    roots: Vec<Vec3>,
     reach: f32,
 ) -> Result<Vec<(HairCollider, Transform)>, WearError> {
     let cropped = cropped(&fitting.mesh, reach);
@@ -248,8 +305,7 @@ fn balls(
     let balls = inscribed_balls(&places, |i| is_on_head(&points[i]), &rules);
     let skin = surface_points(&cropped, FINE_POINTS)?;
     let size = height / HEAD;
-    let roots = strands.iter().filter_map(|strand| strand.positions().first().copied());
-    let roots = KdTree::new(roots.zip(0u32..));
+    let roots = KdTree::new(roots.into_iter().zip(0u32..));
     let clear = (0, (BARE * size).powi(2));
     let is_bare = |p: &SurfacePoint| roots.nearer_than(p.at, clear) == clear;
     let bare = skin.iter().filter(|p| is_on_head(p) && is_bare(p)).map(|p| p.at);

@@ -25,7 +25,7 @@ mod what;
 pub use error::WearError;
 pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair};
 
-use crate::{base::schedule::HairFrame, hair::strand::lacks_strands};
+use crate::{authoring::attach::MadeAgain, base::schedule::HairFrame, hair::strand::lacks_strands};
 use bevy::prelude::*;
 
 /// Puts hair on entities with [`WearHair`].
@@ -40,13 +40,22 @@ impl Plugin for WearPlugin {
         app.register_type::<WearHair>()
             .register_type::<HairSource>()
             .register_type::<WornHair>()
+            .register_type::<target::Fitted>()
             .register_type::<HairWorn>()
             .register_type::<HairNotWorn>()
             .register_required_components::<WearHair, systems::Wearing>()
+            .register_required_components::<WornHair, MadeAgain>()
             .add_observer(systems::leave)
             .add_systems(
                 HairFrame,
-                (systems::take_off, systems::detect_changes, systems::find_heads, systems::put_on)
+                (
+                    systems::take_off,
+                    systems::find_worn,
+                    systems::detect_changes,
+                    systems::find_heads,
+                    systems::put_on,
+                    systems::fit_again,
+                )
                     .chain(),
             );
     }

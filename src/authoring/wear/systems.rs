@@ -2,25 +2,29 @@
 
 use super::{
     error::{SEARCH_TIME, WearError},
-    make::{Made, MakeInput, make},
+    make::{Made, MakeInput, RefitInput, Solids, make, refit},
     target::{Characters, Fitted, Search},
     what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair},
 };
 use crate::{
-    authoring::{attach::RootsOnMesh, groom::Groom},
+    authoring::{
+        attach::{RootsOnMesh, TiedRoots},
+        groom::Groom,
+    },
     base::{
         fault::{FaultKind, HairFault},
         setting::HairDefault,
     },
     hair::{
         look::HairDye,
-        strand::{Hair, StrandOf},
+        strand::{Hair, Strand, StrandOf, Strands},
     },
     hairdo::style::{HairStyle, KeptStyle},
     simulation::settle::Settling,
     water::HairWetting,
 };
 use bevy::{
+    mesh::Mesh3d,
     platform::collections::{HashMap, HashSet},
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
@@ -34,8 +38,11 @@ pub(super) struct Wearing {
     stage: WearStage,
     /// The bone or mesh that it is worn on.
     head: Option<Entity>,
-    /// The entities of the worn hair.
-    worn: Option<Worn>,
+    /// The worn hair.
+    worn: Option<Entity>,
+    /// Whether its meshes have changed since its colliders were fitted, and the fit that runs.
+    has_changed: bool,
+    refit: Option<Task<Result<Solids, WearError>>>,
 }
 
 #[derive(Default)]
@@ -56,17 +63,16 @@ enum Making {
     Ready(Option<Box<Result<Made, WearError>>>),
 }
 
-struct Worn {
+/// Despawns worn hair with the colliders that were fitted for it.
+fn despawn_worn(
+    commands: &mut Commands,
+    wearer: Entity,
     hair: Entity,
-    colliders: Vec<Entity>,
-}
-
-impl Worn {
-    fn take_off(self, commands: &mut Commands) {
-        commands.entity(self.hair).try_despawn();
-        for collider in self.colliders {
-            commands.entity(collider).try_despawn();
-        }
+    fitted: &Query<(Entity, &Fitted)>,
+) {
+    commands.entity(hair).try_despawn();
+    for (collider, _) in fitted.iter().filter(|(_, fitted)| fitted.wearer == wearer) {
+        commands.entity(collider).try_despawn();
     }
 }
 
@@ -75,11 +81,35 @@ impl Worn {
 pub(super) fn leave(
     gone: On<Remove, Wearing>,
     mut commands: Commands,
-    mut wearers: Query<&mut Wearing>,
+    wearers: Query<&Wearing>,
+    worn: Query<(Entity, &WornHair)>,
+    fitted: Query<(Entity, &Fitted)>,
 ) {
-    let wearing = wearers.get_mut(gone.entity).ok();
-    if let Some(worn) = wearing.and_then(|mut wearing| wearing.worn.take()) {
-        worn.take_off(&mut commands);
+    let wearer = gone.entity;
+    // One that has just been copied has not found its hair yet.
+    let hair = wearers.get(wearer).ok().and_then(|wearing| wearing.worn);
+    let hair = hair.or_else(|| worn.iter().find(|(_, worn)| worn.wearer == wearer).map(|w| w.0));
+    if let Some(hair) = hair {
+        despawn_worn(&mut commands, wearer, hair, &fitted);
+    }
+}
+
+/// Wearers that are new find the hair that names them: copies and loaded scenes.
+pub(super) fn find_worn(
+    mut wearers: Query<(Entity, &mut Wearing), Added<Wearing>>,
+    worn: Query<(Entity, &WornHair, Option<&ChildOf>)>,
+) {
+    for (wearer, mut wearing) in &mut wearers {
+        let found = worn.iter().find(|(_, worn, _)| worn.wearer == wearer);
+        if let Some((hair, worn, on)) = found {
+            *wearing = Wearing {
+                wanted: Some(worn.wear.clone()),
+                stage: WearStage::Done,
+                head: on.map(ChildOf::parent),
+                worn: Some(hair),
+                ..default()
+            };
+        }
     }
 }
 
@@ -99,7 +129,7 @@ pub(super) fn detect_changes(
     mut commands: Commands,
     mut wearers: Query<(Ref<WearHair>, &mut Wearing)>,
     mut events: Option<MessageReader<AssetEvent<Groom>>>,
-    hairs: Query<(), With<Hair>>,
+    mut hairs: Query<(&mut WornHair, &mut TiedRoots), With<Hair>>,
 ) {
     let changed: HashSet<_> = events
         .iter_mut()
@@ -112,12 +142,15 @@ pub(super) fn detect_changes(
     for (wear, mut wearing) in &mut wearers {
         let mut is_other = wear.is_changed() && wearing.wanted.as_ref() != Some(&*wear);
         if is_other
-            && let Some(worn) = &wearing.worn
+            && let Some(hair) = &wearing.worn
             && matches!(wearing.stage, WearStage::Done)
             && let Some(before) =
                 wearing.wanted.as_ref().filter(|before| before.is_same_hair(&wear))
         {
-            restyle(&mut commands, worn.hair, before, &wear);
+            restyle(&mut commands, *hair, before, &wear);
+            if let Ok((mut worn, _)) = hairs.get_mut(*hair) {
+                worn.wear = WearHair::clone(&wear);
+            }
             wearing.wanted = Some(WearHair::clone(&wear));
             is_other = false;
         }
@@ -125,8 +158,15 @@ pub(super) fn detect_changes(
             HairSource::Groom { groom, .. } => changed.contains(&groom.id()),
             HairSource::Preset(_) => false,
         };
-        let is_gone = wearing.worn.as_ref().is_some_and(|worn| !hairs.contains(worn.hair));
-        if is_other || is_reloaded || (is_gone && matches!(wearing.stage, WearStage::Done)) {
+        let is_gone = wearing.worn.as_ref().is_some_and(|hair| !hairs.contains(*hair));
+        let is_done = matches!(wearing.stage, WearStage::Done);
+        let has_lost_roots = is_done
+            && wearing.worn.is_some_and(|hair| {
+                hairs
+                    .get_mut(hair)
+                    .is_ok_and(|(_, mut tied)| tied.bypass_change_detection().take_lost())
+            });
+        if is_other || is_reloaded || has_lost_roots || (is_gone && is_done) {
             wearing.wanted = Some(WearHair::clone(&wear));
             wearing.stage = WearStage::Begun;
             wearing.head = None;
@@ -255,6 +295,7 @@ pub(super) fn put_on(
     mut commands: Commands,
     mut wearers: Query<(Entity, &WearHair, &mut Wearing)>,
     entities: Query<()>,
+    fitted: Query<(Entity, &Fitted)>,
     wetting: Option<Res<HairDefault<HairWetting>>>,
     mut faults: MessageWriter<HairFault>,
 ) {
@@ -274,12 +315,12 @@ pub(super) fn put_on(
         match ready {
             Ok(made) if entities.contains(made.parent) && entities.contains(made.mesh) => {
                 if let Some(old) = wearing.worn.take() {
-                    old.take_off(&mut commands);
+                    despawn_worn(&mut commands, wearer, old, &fitted);
                 }
                 let wetting = wetting.as_ref().map(|default| default.0).unwrap_or_default();
-                let worn = spawn_hair(&mut commands, wearer, wear, made, wetting);
-                commands.trigger(HairWorn { entity: wearer, hair: worn.hair });
-                wearing.worn = Some(worn);
+                let hair = spawn_hair(&mut commands, wearer, wear, made, wetting);
+                commands.trigger(HairWorn { entity: wearer, hair });
+                wearing.worn = Some(hair);
             }
             // The scene was despawned while the hair was made.
             Ok(_) => wearing.stage = WearStage::Begun,
@@ -297,10 +338,10 @@ fn spawn_hair(
     wear: &WearHair,
     made: Made,
     wetting: HairWetting,
-) -> Worn {
+) -> Entity {
     let roots =
         RootsOnMesh { mesh: Some(made.mesh), roots: made.roots, strands_from_mesh: made.from_mesh };
-    let is = WornHair { wearer, hair: wear.hair.clone() };
+    let is = WornHair { wearer, wear: wear.clone(), parts: made.parts };
     let wetting = HairWetting { fibres: made.fibres, ..wetting };
     let mut hair = commands.spawn((Hair, made.place, ChildOf(made.parent), is, wetting, roots));
     if let Some(mut settings) = made.settings {
@@ -333,13 +374,7 @@ fn spawn_hair(
     for strand in made.hair.strands {
         commands.spawn((StrandOf(hair), strand));
     }
-    for ball in made.balls {
-        commands.spawn((ball, Fitted, ChildOf(hair)));
-    }
-    let capsules = made.capsules.into_iter();
-    let colliders =
-        capsules.map(|(joint, capsule)| commands.spawn((capsule, Fitted, ChildOf(joint))).id());
-    let colliders = colliders.collect();
+    spawn_solids(commands, wearer, hair, made.solids);
     #[cfg(feature = "save")]
     if let Some(hairdo) = wear.hairdo.clone() {
         commands.entity(hair).queue(hairdo.into_fitting_command());
@@ -355,5 +390,86 @@ fn spawn_hair(
     if let Some(style) = wear.style {
         own.insert(style);
     }
-    Worn { hair, colliders }
+    hair
+}
+
+fn spawn_solids(commands: &mut Commands, wearer: Entity, hair: Entity, solids: Solids) {
+    let is = Fitted { wearer };
+    for ball in solids.balls {
+        commands.spawn((ball, is, ChildOf(hair)));
+    }
+    for (joint, capsule) in solids.capsules {
+        commands.spawn((capsule, is, ChildOf(joint)));
+    }
+}
+
+/// Fits the colliders of worn hair again when its meshes have changed; one fit at a time.
+pub(super) fn fit_again(
+    mut commands: Commands,
+    characters: Characters,
+    mut edits: Option<MessageReader<AssetEvent<Mesh>>>,
+    replaced: Query<(), Changed<Mesh3d>>,
+    meshes: Query<&Mesh3d>,
+    mut wearers: Query<(Entity, &WearHair, &mut Wearing)>,
+    hairs: Query<(&WornHair, &RootsOnMesh, &Strands)>,
+    strands: Query<&Strand>,
+    fitted: Query<(Entity, &Fitted)>,
+    joints: Query<()>,
+) {
+    let edits = edits.iter_mut().flat_map(|edits| edits.read());
+    let edited: HashSet<AssetId<Mesh>> = edits
+        .filter_map(|event| match event {
+            AssetEvent::Modified { id } => Some(*id),
+            _ => None,
+        })
+        .collect();
+    let has_changed = |part: &Entity| {
+        replaced.contains(*part) || meshes.get(*part).is_ok_and(|mesh| edited.contains(&mesh.id()))
+    };
+    for (wearer, wear, mut wearing) in &mut wearers {
+        let wearing = wearing.bypass_change_detection();
+        let Some(hair) = wearing.worn.filter(|_| matches!(wearing.stage, WearStage::Done)) else {
+            (wearing.has_changed, wearing.refit) = default();
+            continue;
+        };
+        let Ok((worn, roots, members)) = hairs.get(hair) else { continue };
+        wearing.has_changed |= worn.parts.iter().any(has_changed);
+        let ready = wearing.refit.as_mut().and_then(check_ready);
+        let is_ready = ready.is_some();
+        if let Some(Ok(mut solids)) = ready {
+            for (collider, _) in fitted.iter().filter(|(_, fitted)| fitted.wearer == wearer) {
+                commands.entity(collider).try_despawn();
+            }
+            solids.capsules.retain(|(joint, _)| joints.contains(*joint));
+            spawn_solids(&mut commands, wearer, hair, solids);
+        }
+        if is_ready {
+            wearing.refit = None;
+        }
+        if !wearing.has_changed || wearing.refit.is_some() || !wear.colliders {
+            continue;
+        }
+        let (Some(mesh), Some(pool)) = (roots.mesh, AsyncComputeTaskPool::try_get()) else {
+            continue;
+        };
+        let target = match characters.search(wearer, wear) {
+            Search::Found(target) => target,
+            Search::Loading => continue,
+            Search::Nothing | Search::Failed(_) => {
+                wearing.has_changed = false;
+                continue;
+            }
+        };
+        let lengths = strands.iter_many(members.collection()).map(Strand::length);
+        let order = RefitInput {
+            wear: wear.clone(),
+            target,
+            mesh,
+            from_mesh: roots.strands_from_mesh,
+            roots: roots.roots.clone(),
+            longest: lengths.fold(0.0, f32::max),
+        };
+        wearing.has_changed = false;
+        wearing.refit = Some(pool.spawn(async move { refit(order) }));
+    }
 }

@@ -21,8 +21,12 @@ use bevy::{
 use std::collections::VecDeque;
 
 /// A collider that was fitted for worn hair.
-#[derive(Component, Clone, Copy, Debug, Default)]
-pub(super) struct Fitted;
+#[derive(Component, Reflect, Clone, Copy, Debug)]
+#[reflect(Component, Clone)]
+pub(super) struct Fitted {
+    #[entities]
+    pub(super) wearer: Entity,
+}
 
 /// Where hair is to grow.
 pub(super) struct Target {

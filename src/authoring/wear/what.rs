@@ -57,6 +57,9 @@ use bevy::prelude::*;
 /// The character may be of any size from that of a doll to that of a giant: presets have life size
 /// on heads of life size, 8 to 16 cm from the middle between the ears to the crown, and are scaled
 /// in proportion on others. The mesh is taken as it is bound to its skeleton, unmorphed.
+///
+/// When its meshes are edited, by a character creator or skinning on the CPU, roots follow in the same frame, and
+/// colliders are fitted again off the main thread. On a mesh of other triangles the hair is made again.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct WearHair {
@@ -221,21 +224,26 @@ impl From<Handle<Groom>> for HairSource {
     }
 }
 
-/// The source and the wearer of a worn [`Hair`](crate::Hair). Component of the hair, written when it is
-/// spawned.
+/// What a worn [`Hair`](crate::Hair) was made from, and for whom. Component of the hair, written when it is
+/// spawned. A wearer that has none yet but that such hair names wears it: one that was cloned with its
+/// character, or loaded from a scene.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Clone, PartialEq)]
 pub struct WornHair {
     /// The entity with the [`WearHair`].
+    #[entities]
     pub wearer: Entity,
-    /// Its source.
-    pub hair: HairSource,
+    /// The component that it was made from.
+    pub wear: WearHair,
+    /// The meshes that its colliders were fitted to.
+    #[entities]
+    pub(super) parts: Vec<Entity>,
 }
 
 impl WornHair {
     /// Which preset it is; `None` for a groom.
     pub fn preset(&self) -> Option<HairPreset> {
-        match self.hair {
+        match self.wear.hair {
             HairSource::Preset(preset) => Some(preset),
             HairSource::Groom { .. } => None,
         }

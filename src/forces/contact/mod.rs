@@ -49,6 +49,7 @@ setting! {
 /// `Projection`.
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone)]
 pub struct Obstacles {
     /// The solids.
@@ -62,6 +63,7 @@ pub struct Obstacles {
 /// The pairs of strands of one hair that may touch.
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone)]
 pub struct LockNeighbours {
     #[reflect(ignore)]

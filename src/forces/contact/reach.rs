@@ -6,6 +6,7 @@ use bevy::prelude::*;
 
 /// A bounding ball of a hair in any pose, in its own frame.
 #[derive(Component, Clone, Copy, Debug)]
+#[component(clone_behavior = Ignore)]
 pub(crate) struct HairReach {
     center: Vec3,
     radius: f32,

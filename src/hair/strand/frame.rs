@@ -16,6 +16,7 @@ use bevy::{
 /// The pose of an entity within the tick, interpolated over its substeps. Written by `Roots` from
 /// where the entity is at the end of the tick.
 #[derive(Component, Reflect, Clone, Debug)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone)]
 pub struct TickPose {
     from: Option<Pose>,

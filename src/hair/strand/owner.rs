@@ -16,6 +16,7 @@ use bevy::prelude::*;
 ///
 /// Single strands of hair that is simulated or settles may sleep, or follow guides: see [`StrandSleep`](crate::StrandSleep).
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub enum MotionOwner {
     /// The tick, on the processor.

@@ -7,6 +7,7 @@ use bevy::prelude::*;
 /// systems that move hair, see [`SleepSettings`](crate::SleepSettings); a follower moves with its guides, see
 /// [`LodLevel::strands`](crate::LodLevel::strands). Changes only at the start of a tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct StrandSleep {
     /// How long the strand has been still (s).
@@ -72,10 +73,12 @@ impl StrandSleep {
 /// into tables of their own, which systems that act on simulated strands do not visit. Set and removed
 /// where [`StrandSleep::is_follower`] changes.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
+#[component(clone_behavior = Ignore)]
 pub(crate) struct KinematicStrand;
 
 /// Numbers of a hair's sleeping and awake strands; followers are not counted. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct SleepCounts {
     /// Strands that sleep in this tick.
@@ -94,6 +97,7 @@ impl SleepCounts {
 /// The pose in which a strand has been still, and the contact forces on it.
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone)]
 pub struct SleepPose {
     pub(crate) positions: Vec<Vec3>,

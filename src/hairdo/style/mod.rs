@@ -16,10 +16,7 @@ use crate::{
     keratin::bond::{BondInfluence, BondPlugin, Bonds},
     water::Moisture,
 };
-use bevy::{
-    ecs::{entity::EntityHashMap, system::SystemParam},
-    prelude::*,
-};
+use bevy::{ecs::system::SystemParam, prelude::*};
 use model::{KeptSum, styled};
 
 /// Measures styles.
@@ -34,6 +31,7 @@ impl Plugin for StylePlugin {
         lacks::<BondPlugin, Self>(app);
         setting::component::<HairStyle>(app);
         app.register_type::<KeptStyle>()
+            .register_type::<StyledJoints>()
             .register_type::<StyleFaded>()
             .add_systems(HairTick, measure_styles.in_set(HairSystems::Styles).run_if(last_substep));
     }
@@ -69,10 +67,13 @@ setting! {
 pub struct KeptStyle {
     share: Option<f32>,
     faded: bool,
-    /// The style of each strand's joints.
-    #[reflect(ignore)]
-    styles: EntityHashMap<Vec<Vec3>>,
 }
+
+/// The style of a strand's joints.
+#[derive(Component, Reflect, Clone, Debug, Default)]
+#[component(storage = "SparseSet")]
+#[reflect(Component, Default, Clone)]
+struct StyledJoints(Vec<Vec3>);
 
 impl KeptStyle {
     /// The share that is left: 1 when inserted, 0 when nothing is left, negative when hair bends
@@ -100,35 +101,44 @@ const BACK_BY: f32 = 0.05;
 fn measure_styles(
     influence: Settings<BondInfluence>,
     mut hairs: Query<(Entity, Ref<HairStyle>, &Strands, &mut KeptStyle), With<Hair>>,
-    bonds: Query<&Bonds>,
+    strands: Query<(Entity, &Bonds, Option<&StyledJoints>)>,
     mut commands: Commands,
 ) {
     for (hair, style, members, mut kept) in &mut hairs {
         let influence = influence.of(hair).as_array();
+        // A copy, and what a scene brings, keeps what it was styled to.
+        let is_copy = kept.is_added() && kept.share.is_some();
         let kept = kept.bypass_change_detection();
         let joints = |bonds: &Bonds| -> Vec<Vec3> {
             bonds.joints.iter().map(|joint| styled(joint, &influence)).collect()
         };
-        if style.is_changed() {
-            (kept.faded, kept.share) = (false, None);
-            let strands = members.iter().filter_map(|id| Some((id, joints(bonds.get(id).ok()?))));
-            kept.styles = strands.collect();
-        }
-        if kept.styles.is_empty() {
-            continue;
-        }
         let mut sum = KeptSum::default();
         // In the order of the strands, for determinism.
-        for id in members.iter() {
-            let (Some(styles), Ok(bonds)) = (kept.styles.get(&id), bonds.get(id)) else { continue };
-            for (style, joint) in styles.iter().zip(&bonds.joints) {
-                sum.add(*style, styled(joint, &influence));
+        let all = strands.iter_many(members.iter());
+        if style.is_changed() && !is_copy {
+            kept.faded = false;
+            let styles: Vec<_> = all.map(|(id, bonds, _)| (id, joints(bonds))).collect();
+            styles.iter().flat_map(|(_, joints)| joints).for_each(|joint| sum.add(*joint, *joint));
+            kept.share = sum.kept();
+            for (id, joints) in styles {
+                let mut strand = commands.entity(id);
+                if kept.share.is_some() {
+                    strand.try_insert(StyledJoints(joints));
+                } else if strands.get(id).is_ok_and(|strand| strand.2.is_some()) {
+                    strand.try_remove::<StyledJoints>();
+                }
             }
-        }
-        kept.share = sum.kept();
-        if kept.share.is_none() {
+        } else if kept.share.is_some() {
+            for (_, bonds, styles) in all {
+                let Some(StyledJoints(styles)) = styles else { continue };
+                for (style, joint) in styles.iter().zip(&bonds.joints) {
+                    sum.add(*style, styled(joint, &influence));
+                }
+            }
+            kept.share = sum.kept();
+        } else {
             // Hair without a style costs nothing more.
-            kept.styles.clear();
+            continue;
         }
         let limit = style.clamped().fades_below;
         match kept.share {

@@ -8,6 +8,7 @@ use bevy::prelude::*;
 /// [`LodLevel::strands`](crate::LodLevel::strands). Kept by the tick.
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone)]
 pub struct Follower {
     /// Its place in the hair's spread order, once computed.
@@ -29,6 +30,7 @@ pub struct Follower {
 /// The strands of a [`Hair`] that others follow. Kept by the tick.
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone)]
 pub struct Guides {
     /// In spread order.

@@ -132,6 +132,7 @@ impl Default for HairScreenShare {
 
 /// The level at which a hair is simulated in this tick. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct PresentLod {
     /// 0 in full, n the n-th of [`HairLod::levels`].

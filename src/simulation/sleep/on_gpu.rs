@@ -17,6 +17,7 @@ use bevy::prelude::*;
 
 /// What disturbs a hair on the GPU in this tick.
 #[derive(Component, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 pub(crate) struct Disturbance {
     pub(crate) sleep: SleepSettings,
     is_disturbed: bool,

@@ -111,6 +111,7 @@ impl RestSettings<'_, '_> {
 
 /// The conditions of a hair when they last changed.
 #[derive(Component, Reflect, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
 #[reflect(Component, Default, Clone)]
 pub(super) struct SleepSnapshot {
     conditions: Option<Conditions>,
