@@ -162,7 +162,7 @@ pub(super) struct HairBounds {
 }
 
 impl HairBounds {
-    /// Of all hair; of a point at the origin that reaches down without end while there is none.
+    /// Of all hair with nodes; of a point at the origin that reaches down without end while there is none.
     fn of(
         hairs: &Query<&TickPose, With<Hair>>,
         strands: &Query<(&StrandOf, &Strand)>,
@@ -185,7 +185,8 @@ impl HairBounds {
                 }
             }
         }
-        let mut all: Vec<Self> = all.values.into_iter().map(|(_, bounds)| bounds).collect();
+        let all = all.values.into_iter().map(|(_, bounds)| bounds);
+        let mut all: Vec<Self> = all.filter(|bounds| bounds.low.is_finite()).collect();
         if all.is_empty() {
             all.push(Self { low: Vec3::ZERO, high: Vec3::ZERO, lowest: f32::INFINITY });
         }

@@ -46,7 +46,10 @@ impl Plugin for AttachPlugin {
             )
             .add_systems(
                 PostUpdate,
-                tie::follow_edits.after(AssetEventSystems).run_if(any_with_component::<TiedRoots>),
+                tie::follow_edits
+                    .after(AssetEventSystems)
+                    .after(follow::draw_roots)
+                    .run_if(any_with_component::<TiedRoots>),
             );
         let draw = follow::draw_roots.after(DrawnFrames).run_if(any_with_component::<TiedRoots>);
         #[cfg(feature = "render")]

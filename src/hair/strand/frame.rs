@@ -334,7 +334,11 @@ impl TickPose {
         self.was_invalid = end.is_none();
         // Written from outside, for instance by an inspector: start over.
         let known = [self.to, self.now, self.before, self.from.unwrap_or_default()];
-        if !known.iter().all(Pose::is_rigid) || !self.motion.iter().all(PoseMotion::is_finite) {
+        let is_valid = known.iter().all(Pose::is_rigid)
+            && self.motion.iter().all(PoseMotion::is_finite)
+            && self.stretch.inverse().is_finite()
+            && self.full_size.is_finite();
+        if !is_valid {
             *self = Self { jumps: self.jumps, was_invalid: self.was_invalid, ..default() };
         }
         self.inertia = Vec2::new(limits.moving, limits.turning);
@@ -412,7 +416,7 @@ impl TickPose {
     /// it, if that has changed.
     pub(super) fn stretch_to(&mut self, place: &GlobalTransform, pose: &Pose) -> Option<Mat3> {
         let own = pose.affine().matrix3.inverse() * place.affine().matrix3;
-        let is_even = own.abs_diff_eq(Mat3A::IDENTITY, ALIKE);
+        let is_even = own.abs_diff_eq(Mat3A::IDENTITY, ALIKE) || !own.inverse().is_finite();
         let own = if is_even { Mat3::IDENTITY } else { Mat3::from(own) };
         let before = core::mem::replace(&mut self.stretch, own);
         let change = own * before.inverse();

@@ -760,7 +760,8 @@ mod tests {
             let share = |n: usize| (k as f32 * [0.754_877, 0.569_84, 0.346_1][n]).fract();
             let p = Vec3::new(share(0), share(1), share(2)) * 0.3 - 0.15;
             assert!((distance(&a, p * by).1 - distance(&b, p * by).1).abs() < 1e-5, "{p}");
-            // From up to a cell or two within, a few passes lead onto the surface.
+            // From up to a cell or two within, a few passes lead onto the surface, as a grid of the first
+            // order knows it.
             let mut at = p * by;
             let free = grid.free(V3::new(at.x, at.y, at.z));
             assert!(free <= distance(&Shape::Grid(grid.clone()), at).1.max(0.0) + 1e-6);
@@ -774,7 +775,7 @@ mod tests {
             }
             deepest = deepest.min(pear_distance(at / by));
         }
-        assert!(deepest > -0.35 * CELL, "{} cells", deepest / CELL);
+        assert!(deepest > -0.6 * CELL, "{} cells", deepest / CELL);
     }
 
     /// Beside its points a grid knows distances to a fifth of its cell.
