@@ -1,7 +1,7 @@
 //! The plugin group.
 
 use crate::{
-    base::schedule::{TickPlugin, is_fixed},
+    base::schedule::TickPlugin,
     forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
     hair::{look::LookPlugin, strand::StrandPlugin},
     hairdo::style::StylePlugin,
@@ -86,7 +86,7 @@ impl PluginGroup for HairPlugins {
             .add(LookPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin {
-            interpolate: self.schedule.is_none_or(is_fixed),
+            interpolate: self.schedule.is_none_or(crate::base::schedule::is_fixed),
         });
         #[cfg(feature = "gpu")]
         let group = group.add(crate::gpu::HairGpuPlugin);

@@ -31,11 +31,14 @@ pub(crate) use on_gpu::{MissedOnGpu, return_to_cpu};
 pub use owner::{MotionOwner, Settling};
 #[cfg(feature = "gpu")]
 pub(crate) use owner_systems::HairOnGpu;
-pub(crate) use owner_systems::{FollowsHere, HairHere, Here, SimulatedHere, is_on_gpu};
+#[cfg(feature = "save")]
+pub(crate) use owner_systems::is_on_gpu;
+pub(crate) use owner_systems::{FollowsHere, HairHere, Here, SimulatedHere};
 pub(crate) use per_hair::PerHair;
 pub(crate) use required::keep_required;
 pub(crate) use strand_sleep::KinematicStrand;
 pub use strand_sleep::{SleepCounts, SleepPose, StrandSleep};
+#[cfg(any(feature = "render", feature = "groom"))]
 pub(crate) use systems::DrawnFrames;
 pub use systems::StrandPlugin;
 pub(crate) use systems::lacks_strands;

@@ -18,6 +18,7 @@ pub(crate) type SimulatedHere = (Without<KinematicStrand>, Here);
 pub(crate) type FollowsHere = (With<KinematicStrand>, Here);
 
 /// Whether the present state of a hair is on the GPU.
+#[cfg(feature = "save")]
 pub(crate) fn is_on_gpu(world: &World, hair: Entity) -> bool {
     world.get::<MotionOwner>(hair).is_some_and(|owner| owner.is_on_gpu())
 }
