@@ -155,12 +155,8 @@ impl WorldMotion {
             frame if frame > 0.0 => (1.0 - before.as_secs_f64() / frame) as f32,
             _ => 1.0,
         };
-        let mut moment = TickMoment {
-            number: self.tick.number + 1,
-            index: self.noted,
-            seconds: seconds.as_secs_f32(),
-            ..default()
-        };
+        let mut moment =
+            TickMoment { index: self.noted, seconds: seconds.as_secs_f32(), ..default() };
         if let Some(rest) = rest {
             let ends = now.saturating_sub(rest);
             let ended = self.ended.replace(ends);

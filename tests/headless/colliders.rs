@@ -8,7 +8,7 @@ use bevy_keratin::{
     prelude::*,
 };
 
-const FACES: [[u32; 3]; 12] = [
+pub const FACES: [[u32; 3]; 12] = [
     [0, 2, 1],
     [1, 2, 3],
     [4, 5, 6],
@@ -23,7 +23,7 @@ const FACES: [[u32; 3]; 12] = [
     [3, 7, 5],
 ];
 
-fn corners(half: Vec3) -> [Vec3; 8] {
+pub fn corners(half: Vec3) -> [Vec3; 8] {
     core::array::from_fn(|k| {
         let way = |bit: usize| if k & bit != 0 { 1.0 } else { -1.0 };
         half * Vec3::new(way(1), way(2), way(4))

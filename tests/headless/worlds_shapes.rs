@@ -1,6 +1,9 @@
 //! Any tick rate, non-uniform scale, rain far from the origin, water that moves.
 
-use crate::common::*;
+use crate::{
+    colliders::{FACES, corners},
+    common::*,
+};
 use bevy::prelude::*;
 use bevy_keratin::{DropletRules, FaultKind, prelude::*};
 
@@ -86,28 +89,6 @@ fn apart(a: &[Vec3], b: &[Vec3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
 }
 
-const CUBE: [[u32; 3]; 12] = [
-    [0, 2, 1],
-    [1, 2, 3],
-    [4, 5, 6],
-    [5, 7, 6],
-    [0, 1, 4],
-    [1, 5, 4],
-    [2, 6, 3],
-    [3, 6, 7],
-    [0, 4, 2],
-    [2, 4, 6],
-    [1, 3, 5],
-    [3, 7, 5],
-];
-
-fn corners(half: Vec3) -> [Vec3; 8] {
-    core::array::from_fn(|k| {
-        let way = |bit: usize| if k & bit != 0 { 1.0 } else { -1.0 };
-        half * Vec3::new(way(1), way(2), way(4))
-    })
-}
-
 /// Each scaled shape acts as one of that size does.
 #[test]
 fn solids_act_as_their_transform_scales_them() {
@@ -115,7 +96,7 @@ fn solids_act_as_their_transform_scales_them() {
     let round = Vec3::new(1.5, 0.4, 1.5);
     let half = Vec3::new(0.06, 0.1, 0.1);
     let baked = |half: Vec3, cell| {
-        HairCollider::grid(DistanceGrid::bake(&corners(half), &CUBE, cell).unwrap())
+        HairCollider::grid(DistanceGrid::bake(&corners(half), &FACES, cell).unwrap())
     };
     let hull = |half| HairCollider::hull(&corners(half)).unwrap();
     let tilted = |normal: Vec3| HairCollider::plane(Dir3::new(normal).unwrap());

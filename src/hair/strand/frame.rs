@@ -181,7 +181,7 @@ setting! {
         pub teleport_spin: f32 = 40.0, "rad/s" in TELEPORT_SPIN: 0.0..=f32::INFINITY,
             safe 10.0..=f32::INFINITY, "40 is a pirouette that turns about";
         /// A head that is scaled to less than this share of its largest scale is hidden, as games hide it
-        /// in first person: its hair waits, costs nothing, and comes back at rest in the shape it had. 0
+        /// in first person: its hair waits unsolved, and comes back at rest in the shape it had. 0
         /// never waits.
         pub hidden_scale: f32 = 0.15, in HIDDEN_SCALE: 0.0..=1.0, "0.15 hides heads of a tenth";
     }
