@@ -9,7 +9,7 @@
 mod rows;
 #[path = "../shared/scenes/mod.rs"]
 mod scenes;
-#[path = "../shared/worlds.rs"]
+#[path = "../shared/worlds/mod.rs"]
 mod worlds;
 
 #[cfg(feature = "gpu")]

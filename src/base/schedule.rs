@@ -5,7 +5,7 @@
 //! systems run in parallel inside, over strands.
 
 use crate::base::{
-    fault,
+    fault::{self, FaultKind, HairFault},
     motion::{TickMoment, WorldMotion, close_frame, note_tick, see_frame},
     setting::{self, InvalidValue, Ranged, ValueRange, Violations},
 };
@@ -471,16 +471,18 @@ impl Plugin for TickPlugin {
                 });
             }
             None => {
-                let note = |world: &mut World| note(world, false);
-                let run = |world: &mut World| {
-                    let _ = world.run_system_cached_with(close_frame, false);
-                    run_noted(world);
-                    world.resource_mut::<WorldMotion>().end_ticks();
+                let note = |world: &mut World| {
+                    note(world, false);
+                    if world.resource::<NotedTicks>().waiting.len() >= MOST_TICKS {
+                        report_waiting(world);
+                        run_frame(world);
+                    }
                 };
                 app.add_systems(FixedPostUpdate, after_physics(note.into_configs()));
                 app.add_systems(
                     PostUpdate,
-                    run.in_set(HairTicks)
+                    run_frame
+                        .in_set(HairTicks)
                         .after(AnimationSystems)
                         .before(TransformSystems::Propagate),
                 );
@@ -506,9 +508,26 @@ pub(crate) fn lacks<Needed: Plugin, Own: Plugin>(app: &mut App) -> bool {
     is_missing
 }
 
+/// How many ticks may wait to be run.
+const MOST_TICKS: usize = 1024;
+
 /// Ticks that are to run, with the clocks that they run by.
 #[derive(Resource, Default)]
-struct NotedTicks(Vec<(Time, TickMoment)>);
+struct NotedTicks {
+    waiting: Vec<(Time, TickMoment)>,
+    reported: bool,
+}
+
+/// Says once that nothing runs the ticks that wait.
+fn report_waiting(world: &mut World) {
+    if !core::mem::replace(&mut world.resource_mut::<NotedTicks>().reported, true) {
+        let message = format!(
+            "{MOST_TICKS} fixed ticks ran without PostUpdate, in which hair moves: they were run now; \
+             HairPlugins::new(FixedPostUpdate) runs each at once"
+        );
+        world.write_message(HairFault::new(FaultKind::Setting, message));
+    }
+}
 
 /// Notes a tick, unless no time passes.
 fn note(world: &mut World, alone: bool) {
@@ -522,12 +541,19 @@ fn note(world: &mut World, alone: bool) {
     let fixed = world.get_resource::<Time<Fixed>>().filter(|_| !alone);
     let rest = fixed.map(Time::<Fixed>::overstep);
     let moment = world.resource_mut::<WorldMotion>().next_tick(clock.delta(), frame, rest);
-    world.resource_mut::<NotedTicks>().0.push((clock, moment));
+    world.resource_mut::<NotedTicks>().waiting.push((clock, moment));
+}
+
+/// Runs the ticks of a frame, in which all has moved by now.
+fn run_frame(world: &mut World) {
+    let _ = world.run_system_cached_with(close_frame, false);
+    run_noted(world);
+    world.resource_mut::<WorldMotion>().end_ticks();
 }
 
 /// Runs the noted ticks: as many substeps each as [`HairSubsteps`] gives.
 fn run_noted(world: &mut World) {
-    let noted = core::mem::take(&mut world.resource_mut::<NotedTicks>().0);
+    let noted = core::mem::take(&mut world.resource_mut::<NotedTicks>().waiting);
     let frame = *world.resource::<Time>();
     for (clock, moment) in noted {
         *world.resource_mut::<Time>() = clock;

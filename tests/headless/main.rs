@@ -25,7 +25,7 @@ mod vectors;
 #[path = "../../examples/salon/wardrobe.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod wardrobe;
-#[path = "../../examples/shared/worlds.rs"]
+#[path = "../../examples/shared/worlds/mod.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod worlds_measured;
 
@@ -67,5 +67,4 @@ mod wear;
 mod wind;
 mod without_a_device;
 mod worlds;
-mod worlds_copies;
 mod worlds_shapes;

@@ -396,3 +396,26 @@ fn the_same_input_gives_the_same_bits() {
     };
     assert_eq!(run_once(), run_once());
 }
+
+/// A game that runs fixed ticks by hand, and no `PostUpdate`: they do not wait for ever.
+#[test]
+fn ticks_that_are_run_by_hand_do_not_pile_up() {
+    let mut app = test_app(60.0);
+    let (_, e) = one_strand(&mut app, 0.2, 4, Vec3::X);
+    app.update();
+    let before = strand(&app, e).positions().to_vec();
+    let by_hand = |app: &mut App, ticks: usize| {
+        for _ in 0..ticks {
+            let mut time = app.world_mut().resource_mut::<Time>();
+            time.advance_by(std::time::Duration::from_secs_f64(1.0 / 60.0));
+            app.world_mut().run_schedule(FixedPostUpdate);
+        }
+    };
+    by_hand(&mut app, 500);
+    assert_eq!(strand(&app, e).positions(), before, "the control: they wait for the frame's end");
+    by_hand(&mut app, 600);
+    let tip = *strand(&app, e).positions().last().unwrap();
+    assert!(tip.y < -0.06, "{tip}");
+    app.update();
+    assert_eq!(fault_kinds(&mut app), [FaultKind::Setting]);
+}

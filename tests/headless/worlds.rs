@@ -15,6 +15,11 @@ fn uneven_frames_do_not_move_hair() {
 }
 
 #[test]
+fn any_rate_of_ticks_costs_what_it_needs() {
+    check(measured::rates());
+}
+
+#[test]
 fn riders_lean_the_same_at_any_rate_of_ticks() {
     check(measured::riders());
 }
@@ -27,6 +32,11 @@ fn hair_that_was_away_comes_back_at_rest() {
 #[test]
 fn a_runner_is_put_elsewhere_and_its_hair_goes_on() {
     check(measured::portals());
+}
+
+#[test]
+fn water_on_hair_goes_along() {
+    check(measured::wet_jumps());
 }
 
 #[test]
@@ -52,4 +62,32 @@ fn hair_of_a_hidden_head_waits() {
 #[test]
 fn gusts_of_a_long_game_are_those_of_a_young_one() {
     check(measured::gusts());
+}
+
+#[test]
+fn solids_winds_and_water_are_as_large_as_they_are_drawn() {
+    check(measured::solids());
+}
+
+#[test]
+fn rain_wets_as_much_far_from_the_origin() {
+    check(measured::far_rain());
+}
+
+#[cfg(all(feature = "groom", feature = "save"))]
+#[test]
+fn roots_that_are_touched_again_move_nothing() {
+    check(measured::roots());
+}
+
+#[cfg(all(feature = "groom", feature = "save"))]
+#[test]
+fn a_copy_of_a_character_has_one_hair_on_its_own_head() {
+    check(measured::copies());
+}
+
+#[cfg(all(feature = "groom", feature = "save"))]
+#[test]
+fn hair_follows_meshes_that_change() {
+    check(measured::edits());
 }

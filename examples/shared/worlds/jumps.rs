@@ -1,0 +1,279 @@
+//! Jumps: what was away, portals, worlds that are shifted, with water too.
+
+use super::{Row, all, app, head, one_strand, place_mut, strand};
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
+use bevy_keratin::{LodLevel, prelude::*};
+
+/// The fastest node and the farthest move of one, seen from the head, in half a second from now on.
+fn disturbance(app: &mut App, ids: &[Entity]) -> (f32, f32) {
+    let places = |app: &App| -> Vec<Vec3> {
+        ids.iter().flat_map(|id| strand(app, *id).positions().to_vec()).collect()
+    };
+    let began = places(app);
+    let (mut before, mut fastest, mut farthest) = (began.clone(), 0.0f32, 0.0f32);
+    for _ in 0..30 {
+        app.update();
+        let now = places(app);
+        for ((now, before), began) in now.iter().zip(&before).zip(&began) {
+            fastest = fastest.max(now.distance(*before) * 60.0);
+            farthest = farthest.max(now.distance(*began));
+        }
+        before = now;
+    }
+    (fastest, farthest)
+}
+
+/// Why hair is not simulated for some time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Away {
+    Pooled,
+    Paused,
+    /// Beyond the last level of detail.
+    Frozen,
+    /// Scaled down, as in first person.
+    Hidden,
+}
+
+impl Away {
+    fn set(self, app: &mut App, hair: Entity, away: bool) {
+        let world = app.world_mut();
+        match (self, away) {
+            (Self::Paused, true) => world.resource_mut::<Time<Virtual>>().pause(),
+            (Self::Paused, false) => world.resource_mut::<Time<Virtual>>().unpause(),
+            (Self::Pooled, true) => {
+                world.entity_mut(hair).insert_recursive::<Strands>(Disabled);
+            }
+            (Self::Pooled, false) => {
+                world.entity_mut(hair).remove_recursive::<Strands, Disabled>();
+            }
+            (Self::Frozen, _) => {
+                let share = HairScreenShare(if away { 1e-6 } else { 1.0 });
+                let levels = vec![LodLevel::FROZEN];
+                world.entity_mut(hair).insert((HairLod { levels, ..default() }, share));
+            }
+            (Self::Hidden, _) => place_mut(app, hair, |place| {
+                place.scale = Vec3::splat(if away { 0.001 } else { 1.0 });
+            }),
+        }
+    }
+}
+
+/// Line 4: what was not simulated comes back at rest where it is.
+pub fn returns() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for away in [Away::Pooled, Away::Paused, Away::Frozen, Away::Hidden] {
+        let mut app = app(60.0);
+        let (hair, id) = one_strand(&mut app);
+        for _ in 0..600 {
+            app.update();
+        }
+        away.set(&mut app, hair, true);
+        for _ in 0..10 {
+            place_mut(&mut app, hair, |place| {
+                place.translation.x += 0.12;
+                place.rotate_y(0.15);
+            });
+            app.update();
+        }
+        // Frozen hair that its head carries about is seen: it comes back while the head rests.
+        if away == Away::Frozen {
+            app.update();
+        }
+        away.set(&mut app, hair, false);
+        let (fastest, farthest) = disturbance(&mut app, &[id]);
+        rows.extend([
+            Row::at_most(format!("{away:?}: speed on return (m/s)"), fastest, 0.05),
+            Row::at_most(format!("{away:?}: off on return (m)"), farthest, 1e-3),
+        ]);
+    }
+    rows
+}
+
+/// How a runner is put elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Put {
+    Nowhere,
+    /// Through a portal that nobody announces, turned.
+    Found,
+    /// By so many metres, announced.
+    Announced(f32),
+    /// With the world.
+    Shifted,
+}
+
+/// Where ticks put a head.
+#[derive(Component)]
+struct Target(Transform);
+
+/// The states of hair after a runner was put elsewhere.
+fn run_and_put(speed: f32, put: Put, in_update: bool) -> Vec<Strand> {
+    let mut app = app(60.0);
+    let head = head(&mut app, 6);
+    app.add_systems(FixedUpdate, |mut all: Query<(&Target, &mut Transform)>| {
+        all.iter_mut().for_each(|(target, mut place)| *place = target.0);
+    });
+    let hair = app.world_mut().query_filtered::<Entity, With<Hair>>().single(app.world());
+    let mut states = Vec::new();
+    let mut world = Transform::IDENTITY;
+    for tick in 0..150 {
+        match put {
+            _ if tick != 120 => {}
+            Put::Nowhere => {}
+            Put::Found => {
+                let turn = Quat::from_rotation_y(1.2);
+                world = Transform::from_xyz(64.0, 3.0, -40.0).with_rotation(turn);
+            }
+            Put::Announced(far) => {
+                world = Transform::from_xyz(far, 0.0, 0.0);
+                if let Ok(hair) = hair {
+                    app.world_mut().commands().entity(hair).queue(Hair::teleport);
+                }
+            }
+            Put::Shifted => {
+                world = Transform::from_xyz(-512.0, 0.0, 256.0);
+                app.world_mut().commands().trigger(ShiftWorld { by: world.translation });
+            }
+        }
+        app.world_mut().flush();
+        let eased = (tick as f32 / 60.0).min(1.0);
+        let target = world * Transform::from_xyz(speed * eased * tick as f32 / 60.0, 0.0, 0.0);
+        match in_update {
+            true => place_mut(&mut app, head, |place| *place = target),
+            false => _ = app.world_mut().entity_mut(head).insert(Target(target)).id(),
+        }
+        app.update();
+        if tick >= 120 {
+            states.extend(all(&mut app));
+        }
+    }
+    states
+}
+
+/// Line 6: hair that runs through a portal, or in a world whose origin is shifted, goes on as without.
+pub fn portals() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for in_update in [true, false] {
+        for speed in [0.0, 1.5, 8.0, 40.0] {
+            let control = run_and_put(speed, Put::Nowhere, in_update);
+            for put in [Put::Found, Put::Announced(0.3), Put::Announced(64.0), Put::Shifted] {
+                let (mut off, mut faster) = (0.0f32, 0.0f32);
+                for (a, b) in run_and_put(speed, put, in_update).iter().zip(&control) {
+                    for (p, q) in a.positions().iter().zip(b.positions()) {
+                        off = off.max(p.distance(*q));
+                    }
+                    for (v, w) in a.velocities().iter().zip(b.velocities()) {
+                        faster = faster.max((v.length() - w.length()).abs());
+                    }
+                }
+                let moved = if in_update { "Update" } else { "FixedUpdate" };
+                let what = format!("{speed} m/s, {moved}, {put:?}");
+                rows.extend([
+                    Row::at_most(format!("{what}: off (m)"), off, 1e-3),
+                    Row::at_most(format!("{what}: speed (m/s)"), faster, 0.05),
+                ]);
+            }
+        }
+    }
+    rows
+}
+
+/// The water of a runner.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wet {
+    /// In and on hair, and in droplets within 0.3 m of the head (m³).
+    near: f64,
+    /// In all droplets (m³).
+    droplets: f64,
+    /// The farthest droplet from the head (m).
+    farthest: f32,
+    /// The ledger's error.
+    error: f64,
+}
+
+impl Wet {
+    fn of(app: &mut App, head: Entity) -> Self {
+        let world = app.world_mut();
+        let head = world.get::<Transform>(head).map_or(Vec3::ZERO, |place| place.translation);
+        let held: f64 = world.query::<&Moisture>().iter(world).map(Moisture::volume).sum();
+        let error = world.resource::<WaterLedger>().error();
+        let mut wet = Self { near: held, error, ..default() };
+        for droplet in world.query::<&Droplet>().iter(world) {
+            let off = droplet.position.distance(head);
+            wet.droplets += droplet.volume;
+            wet.near += if off < 0.3 { droplet.volume } else { 0.0 };
+            wet.farthest = wet.farthest.max(off);
+        }
+        wet
+    }
+}
+
+/// A runner that was sprinkled and is put elsewhere, by these droplets that still fall: before, and two ticks after.
+fn wet_runner(speed: f32, put: Put, falling: u32) -> [Wet; 2] {
+    let mut app = app(60.0);
+    let head = head(&mut app, 30);
+    let mut wet = [Wet::default(); 2];
+    for tick in 0..78 {
+        let eased = (tick as f32 / 60.0).min(1.0);
+        let step = Vec3::X * (speed * eased / 60.0);
+        place_mut(&mut app, head, |place| place.translation += step);
+        if tick == 60 {
+            let at = app.world().get::<Transform>(head).map_or(Vec3::ZERO, |it| it.translation);
+            for i in 0..60 + falling {
+                let (sine, cosine) = (2.4 * i as f32).sin_cos();
+                let high = if i < 60 { 0.05 } else { 0.6 };
+                let place = at + Vec3::new(0.1 * cosine, high, 0.1 * sine);
+                let droplet =
+                    Droplet::new(place, 5e-9).and_then(|it| it.with_velocity(60.0 * step));
+                app.world_mut().spawn(droplet.unwrap_or_default());
+            }
+        }
+        if tick == 75 {
+            wet[0] = Wet::of(&mut app, head);
+            let by = Vec3::new(-512.0, 0.0, 256.0);
+            if put == Put::Shifted {
+                app.world_mut().commands().trigger(ShiftWorld { by });
+                app.world_mut().flush();
+            }
+            if put != Put::Nowhere {
+                place_mut(&mut app, head, |place| place.translation += by);
+            }
+        }
+        app.update();
+    }
+    wet[1] = Wet::of(&mut app, head);
+    wet
+}
+
+/// Line 6: water in and on hair goes along through a portal, and all droplets with a world that is shifted.
+pub fn wet_jumps() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for speed in [0.0, 8.0] {
+        let [control, found] = [Put::Nowhere, Put::Found].map(|put| {
+            let [before, after] = wet_runner(speed, put, 0);
+            ((after.near / before.near) as f32, after.error as f32)
+        });
+        let what = format!("wet, {speed} m/s, Found");
+        rows.extend([
+            Row::new(format!("{what}: share of the water on it"), control.0, found.0, 0.01),
+            Row::at_most(format!("{what}: error of the ledger"), found.1, 1e-9),
+        ]);
+        let [control, shifted] =
+            [Put::Nowhere, Put::Shifted].map(|put| wet_runner(speed, put, 60)[1]);
+        let what = format!("in rain, {speed} m/s, Shifted");
+        let share = |got: f64, control: f64| (got / control) as f32;
+        let (near, droplets) =
+            (share(shifted.near, control.near), share(shifted.droplets, control.droplets));
+        rows.extend([
+            Row::new(format!("{what}: water on hair, of the control's"), 1.0, near, 0.01),
+            Row::new(format!("{what}: water in droplets, of the control's"), 1.0, droplets, 0.01),
+            Row::new(
+                format!("{what}: farthest droplet from the head (m)"),
+                control.farthest,
+                shifted.farthest,
+                1e-3,
+            ),
+            Row::at_most(format!("{what}: error of the ledger"), shifted.error as f32, 1e-9),
+        ]);
+    }
+    rows
+}
