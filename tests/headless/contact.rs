@@ -100,7 +100,7 @@ fn strands_in_one_place_part_by_two_radii_only_with_contact() {
     let apart = |strength: f32| {
         let mut app = test_app(60.0);
         no_gravity(&mut app);
-        app.insert_resource(HairDefault(StrandContact { radius: 2e-3, strength }))
+        app.insert_resource(HairDefault(StrandContact { radius: 2e-3, strength, ..default() }))
             .insert_resource(HairDefault(HairStiffness::from_bending_length(0.02).unwrap()));
         let hair = app.world_mut().spawn(Hair).id();
         let ids = [-1e-4_f32, 1e-4].map(|z| {
@@ -121,7 +121,7 @@ fn strands_that_meet_do_not_pass_through_each_other() {
     let crossed = |strength: f32| {
         let mut app = test_app(60.0);
         no_gravity(&mut app);
-        app.insert_resource(HairDefault(StrandContact { radius: 2e-3, strength }))
+        app.insert_resource(HairDefault(StrandContact { radius: 2e-3, strength, ..default() }))
             .insert_resource(HairDefault(AirDrag { rate: 0.0 }))
             .insert_resource(HairDefault(HairStiffness::from_bending_length(0.02).unwrap()));
         let hair = app.world_mut().spawn(Hair).id();

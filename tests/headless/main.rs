@@ -55,6 +55,7 @@ mod morph;
 mod papers_scenes;
 mod plant;
 mod reflection;
+mod rest;
 mod rods;
 mod settle;
 mod sleep;

@@ -218,7 +218,7 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
         BondInfluence { hydrogen: 0.0, ionic: 0.0, disulfide: 0.0, peptide: 0.0 },
         HairSolver { limiter_steps: 99, ..default() },
         Sweeps { iterations: 0, bend: 7.0, ..default() },
-        StrandContact { radius: f32::INFINITY, strength: -3.0 },
+        StrandContact { radius: f32::INFINITY, strength: -3.0, ..default() },
     ));
     app.world_mut().spawn((HairCollider::default(), Transform::from_xyz(0.0, -2.0, 0.0)));
     app.world_mut().spawn(HairCollider {

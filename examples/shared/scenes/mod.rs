@@ -213,7 +213,8 @@ impl Surroundings<'_> {
         *self.gravity = default();
         **self.drag = default();
         **self.wetting = default();
-        **self.contact = default();
+        // As [B] prints it.
+        **self.contact = StrandContact::PRINTED;
         *self.substeps = default();
         // The papers' scenes are computed at the papers' step.
         self.solver.substep = 1.0 / 360.0;

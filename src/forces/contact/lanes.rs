@@ -114,11 +114,23 @@ impl Pieces {
     }
 }
 
-/// A strength of equation 18 with its reach 2r.
+/// A strength of equation 18 with its reach 2r, and whether edges that push are pushed back.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Penalty {
     pub reach: f32,
     pub strength: f32,
+    pub mutual: bool,
+}
+
+/// What the edge that pushes a node gets back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reaction {
+    /// Its start node.
+    pub edge: u32,
+    /// Where it was touched (0…1).
+    pub at: f32,
+    /// The acceleration of the node (m/s²).
+    pub push: Vec3,
 }
 
 /// The offset from the nearest point of each edge to one node, the parameter along the edge (0…1), and
@@ -211,18 +223,41 @@ impl<S: Simd> PenaltySum<S> {
         Self { p: splat(simd, p), sum: splat(simd, Vec3::ZERO), penalty }
     }
 
-    /// Adds the contributions of eight edges. NaN fails every comparison and adds nothing.
+    /// Adds the contributions of eight edges. NaN fails every comparison and adds nothing. Where contact is
+    /// mutual, what they get back is appended to `reactions`.
     #[inline(always)]
-    pub fn add(&mut self, simd: S, rows: &[NodeRow], edges: &[u32; WIDTH]) {
-        let Off { off, squared, own, .. } = off(simd, rows, edges, self.p);
+    pub fn add(
+        &mut self,
+        simd: S,
+        rows: &[NodeRow],
+        edges: &[u32; WIDTH],
+        reactions: &mut Vec<Reaction>,
+    ) {
+        let Off { off, squared, at, own } = off(simd, rows, edges, self.p);
         let reach = f32x8::splat(simd, self.penalty.reach);
         let touching = own
             & Real::lt(squared, reach * reach)
             & Real::lt(f32x8::splat(simd, SAME_PLACE), squared);
         let distance = Real::sqrt(squared);
         let strength = f32x8::splat(simd, self.penalty.strength);
-        let pushed = off.scale_add(penalty(distance, reach, strength), self.sum);
+        let push = penalty(distance, reach, strength);
+        let pushed = off.scale_add(push, self.sum);
         self.sum = V3::select(touching, pushed, self.sum);
+        let mut lanes = if self.penalty.mutual { touching.to_bitmask() } else { 0 };
+        if lanes == 0 {
+            return;
+        }
+        let push = off.scale(push);
+        let mut seen = [[0.0; WIDTH]; 4];
+        for (seen, lanes) in seen.iter_mut().zip([push.x, push.y, push.z, at]) {
+            lanes.store_array(seen);
+        }
+        while lanes != 0 {
+            let k = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let push = Vec3::new(seen[0][k], seen[1][k], seen[2][k]);
+            reactions.push(Reaction { edge: edges[k], at: seen[3][k], push });
+        }
     }
 
     /// The sum over all lanes (m/s²).

@@ -9,8 +9,9 @@
 //! With exact tests on all edges of the cells, scene 1 took 1.3 times as long.
 
 use super::{
+    StrandContact,
     coarse::Coarse,
-    lanes::{self, Bridges, NodeRow, Penalty, PenaltySum, Pieces, Stack, WIDTH, WetRow},
+    lanes::{self, Bridges, NodeRow, Penalty, PenaltySum, Pieces, Reaction, Stack, WIDTH, WetRow},
     model::{Bridged, Film},
 };
 use crate::base::{
@@ -51,6 +52,10 @@ const MOST_EDGES: usize = 4096;
 const MOST_BYTES: usize = 256 << 20;
 const MOST_BYTES_A_NODE: usize = 1 << 10;
 
+/// Contact is mutual where lists hold up to so many edges a node, in the mean: more only where strands by
+/// the hundred lie in one place, and memory for what each pushes back would grow with the square of their number.
+const MOST_MUTUAL: usize = 256;
+
 /// Longest bridge of water, in units of the reach: the rest of the margin is how far nodes may move
 /// before lists are rebuilt.
 pub(super) const LONGEST_BRIDGE: f32 = 0.6;
@@ -78,6 +83,8 @@ fn per_part(nanos: usize, rows: &[NodeRow], strands: usize) -> Nanos {
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     rows: Vec<NodeRow>,
+    /// What edges get back, by node (m/s²).
+    back: Vec<Vec3>,
     /// Expected positions of the nodes in the middle of the period that lists are used for; empty
     /// for the present positions.
     expected: Vec<NodeRow>,
@@ -133,6 +140,7 @@ struct PartLists {
     /// Groups out of reach tested for the last pushes.
     idle: usize,
     pushes: Vec<Vec3>,
+    reactions: Vec<Reaction>,
     bridged: Vec<Bridged>,
     /// Whether a node had more edges near than its list holds.
     is_crowded: bool,
@@ -207,7 +215,11 @@ impl Neighbours {
 
     /// Evaluates equation 18 for every node, for [`pushes`](Self::pushes) to return. The order of
     /// summation does not depend on threads.
-    pub fn find_pushes(&mut self, radius: f32, strength: f32, lookup: Lookup) {
+    pub fn find_pushes(
+        &mut self,
+        StrandContact { radius, strength, mutual }: StrandContact,
+        lookup: Lookup,
+    ) {
         // Lists are padded with an edge at NaN.
         let nodes = self.strands.last().map_or(0, |strand| strand.end as usize);
         self.rows.truncate(nodes);
@@ -219,9 +231,10 @@ impl Neighbours {
             self.look_up(level, reach, MOST_BYTES + MOST_BYTES_A_NODE * nodes);
             self.measure_displacement();
         }
+        let mutual = mutual && self.pairs() <= MOST_MUTUAL * nodes;
         let Self { rows, strands, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
-        let penalty = Penalty { reach, strength };
+        let penalty = Penalty { reach, strength, mutual };
         for_each_block(
             &mut work,
             per_part(PUSH, rows, strands.len()),
@@ -231,6 +244,22 @@ impl Neighbours {
             },
         );
         lists.idle += parts.iter().map(|part| part.idle).sum::<usize>();
+        if mutual {
+            self.push_back(nodes);
+        }
+    }
+
+    /// Pushes back each edge that pushed a node, by halves: of two strands each pushes the other's nodes.
+    fn push_back(&mut self, nodes: usize) {
+        self.back.clear();
+        self.back.resize(nodes, Vec3::ZERO);
+        for Reaction { edge, at, push } in self.parts.iter().flat_map(|part| &part.reactions) {
+            let edge = *edge as usize;
+            self.back[edge] -= push * (1.0 - at);
+            self.back[edge + 1] -= push * *at;
+        }
+        let pushes = self.parts.iter_mut().flat_map(|part| &mut part.pushes);
+        pushes.zip(&self.back).for_each(|(push, back)| *push = 0.5 * (*push + *back));
     }
 
     /// What [`find_pushes`](Self::find_pushes) found for every node (m/s²), in the order they were added.
@@ -516,6 +545,7 @@ impl PartLists {
         self.idle = 0;
         let nodes = strands.first().map_or(0, |s| s.start) as usize;
         self.pushes.clear();
+        self.reactions.clear();
         let ends = self.starts.windows(2).zip(&self.slacks);
         for ((ends, slack), row) in ends.zip(&rows[nodes..]) {
             if *slack > may_touch {
@@ -528,7 +558,7 @@ impl PartLists {
                     break;
                 }
                 self.idle += usize::from(group.slack > 0.0);
-                sum.add(simd, rows, &group.edges);
+                sum.add(simd, rows, &group.edges, &mut self.reactions);
             }
             self.pushes.push(sum.total());
         }
@@ -567,11 +597,17 @@ impl PartLists {
 
 #[cfg(test)]
 mod limits;
+#[cfg(test)]
+mod mutual;
 
 #[cfg(test)]
 mod tests {
     use super::{super::model::*, *};
     use proptest::prelude::*;
+
+    pub fn printed(radius: f32) -> StrandContact {
+        StrandContact { radius, ..StrandContact::PRINTED }
+    }
 
     /// Equation 18 of all edges but those of the strand `own` at a place `p`.
     fn brute(strands: &[Vec<Vec3>], own: usize, p: Vec3, radius: f32) -> Vec3 {
@@ -591,7 +627,7 @@ mod tests {
     fn pushes(list: &mut Neighbours, strands: &[Vec<Vec3>], radius: f32) -> Vec<Vec3> {
         list.clear();
         strands.iter().for_each(|s| list.add(s, 1));
-        list.find_pushes(radius, 20.0, Lookup::Now);
+        list.find_pushes(printed(radius), Lookup::Now);
         list.pushes().collect()
     }
 
@@ -744,7 +780,7 @@ mod tests {
             }
             let lookup = if step == 0 { Lookup::Now } else { Lookup::Later };
             let before = list.lists.rows.clone();
-            list.find_pushes(1e-3, 20.0, lookup);
+            list.find_pushes(printed(1e-3), lookup);
             let found: Vec<Vec3> = list.pushes().collect();
             looked_up += usize::from(list.lists.rows[..1] != before[..before.len().min(1)]);
             for (k, a) in found.into_iter().enumerate().filter(|(k, _)| k % 6 > 0) {
@@ -802,7 +838,7 @@ mod tests {
             fine.add(&strand(1501, 7e-4 * k as f32), 10);
         }
         let [expected, found] = [&mut coarse, &mut fine].map(|list| {
-            list.find_pushes(1e-3, 20.0, Lookup::Now);
+            list.find_pushes(printed(1e-3), Lookup::Now);
             list.pushes().collect::<Vec<Vec3>>()
         });
         assert_eq!((fine.nodes(), found.len()), (8 * 1501, 8 * 1501));

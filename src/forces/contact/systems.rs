@@ -234,7 +234,7 @@ impl Touching<'_> {
         strands: &'s Query<'w, '_, (&'static Strand, &'static StrandSleep), With<StrandOf>>,
     ) {
         let Self { hair, members, neighbours, contact, step, fault } = self;
-        let StrandContact { radius, strength } = *contact;
+        let radius = contact.radius;
         let LockNeighbours { lists: list, members: (present, had_followers), reported } =
             neighbours.bypass_change_detection();
         // Followers take no part in contact, but in bridges of water.
@@ -269,7 +269,7 @@ impl Touching<'_> {
                 }
             }
         }
-        list.find_pushes(radius, strength, lookup);
+        list.find_pushes(*contact, lookup);
         if fault.is_none() && list.is_crowded() && !core::mem::replace(&mut reported.1, true) {
             *fault = Some(too_crowded(radius).of(*hair));
         }
@@ -307,7 +307,7 @@ pub(crate) fn push_strands_apart(
     let mut strands = strands.p1();
     for Touching { mut neighbours, contact, step, fault, .. } in touching {
         faults.write_batch(fault);
-        let StrandContact { radius, strength } = contact;
+        let StrandContact { radius, strength, .. } = contact;
         let LockNeighbours { lists, members: (present, _), .. } =
             neighbours.bypass_change_detection();
         let mut pushes = lists.pushes();

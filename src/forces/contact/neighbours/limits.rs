@@ -1,6 +1,6 @@
 //! Tests of how much lists may hold, and of searching twice.
 
-use super::*;
+use super::{tests::printed, *};
 
 #[test]
 fn lists_of_crowded_hair_take_no_more_memory_than_allowed() {
@@ -12,7 +12,7 @@ fn lists_of_crowded_hair_take_no_more_memory_than_allowed() {
     let bytes = |list: &Neighbours| -> usize {
         list.parts.iter().map(|part| part.groups.len() * size_of::<EdgeGroup>()).sum()
     };
-    list.find_pushes(1e-3, 20.0, Lookup::Now);
+    list.find_pushes(printed(1e-3), Lookup::Now);
     let (all, expected) = (bytes(&list), list.pushes().nth(1).unwrap());
     assert!(all > 4 << 20 && !list.is_crowded());
     list.look_up(simd_level(), 2e-3, 1 << 20);
@@ -20,7 +20,7 @@ fn lists_of_crowded_hair_take_no_more_memory_than_allowed() {
     assert!(list.is_crowded());
     // The nearest are kept.
     assert!(list.parts.iter().flat_map(|part| &part.slacks).all(|slack| !slack.is_nan()));
-    list.find_pushes(1e-3, 20.0, Lookup::Now);
+    list.find_pushes(printed(1e-3), Lookup::Now);
     let push = list.pushes().nth(1).unwrap();
     assert!(push.is_finite() && push.length() < expected.length());
     list.look_up(simd_level(), 2e-3, all);
@@ -36,7 +36,7 @@ fn a_second_search_of_the_same_nodes_is_the_first() {
         list.expect(strand(z + 4e-4));
     }
     let mut search = |reach: f32| {
-        list.find_pushes(reach, 20.0, Lookup::Now);
+        list.find_pushes(printed(reach), Lookup::Now);
         (list.pushes().collect::<Vec<_>>(), list.rows.len(), list.lists.rows.clone())
     };
     let first = search(1e-3);
