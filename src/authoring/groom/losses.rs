@@ -167,7 +167,7 @@ impl GroomLosses {
         let told = self.all().filter(|(loss, _, broken)| loss.count > 0 && which(*broken));
         let told = told.map(|(loss, what, _)| {
             let mut places: Vec<String> = loss.places.iter().map(ToString::to_string).collect();
-            if places.len() < loss.count && !places.is_empty() {
+            if places.len() < loss.count && places.len() == GroomLoss::MOST_PLACES {
                 places.push("…".to_owned());
             }
             match places.is_empty() {

@@ -1,6 +1,6 @@
 //! Which end of a strand is its root.
 
-use super::{Groom, intake::Intake, losses::GroomPlace};
+use super::{Groom, intake::Intake, losses::GroomPlace, strays::middle};
 use bevy::prelude::*;
 
 /// Which end of each strand in a file is its root.
@@ -74,23 +74,27 @@ fn tip_first(groom: &Groom) -> Vec<bool> {
     };
     let mut roots = if all { backwards } else { ends.clone() };
     // Some strands may be stored otherwise than most.
+    let mut centre = middle(roots.iter().map(|ends| ends[0])).as_vec3();
+    let mut ball = None;
     for _ in 0..ROUNDS {
-        let Some(ball) = Ball::of(&roots) else {
-            break;
-        };
-        roots.iter_mut().for_each(|ends| {
-            if ball.off(ends[1]) < ball.off(ends[0]) {
+        for ends in &mut roots {
+            if ends[1].distance(centre) < ends[0].distance(centre) {
                 ends.swap(0, 1);
             }
-        });
+        }
+        ball = Ball::of(&roots);
+        centre = ball.map_or(centre, |ball| ball.centre);
     }
-    let Some(ball) = Ball::of(&roots).filter(|ball| ball.uneven < UNEVEN) else {
+    let Some(ball) = ball.filter(|ball| ball.uneven < UNEVEN) else {
         return if all { vec![true; ends.len()] } else { Vec::new() };
     };
     let mut off: Vec<f32> = roots.iter().map(|ends| ball.off(ends[0])).collect();
     let scalp = quantile(&mut off, 0.98);
-    let grows =
-        |from: Vec3, to: Vec3| ball.off(from) <= scalp && ball.off(to) > scalp + OFF * ball.radius;
+    // Not from exactly where most roots are, because all of them may be as far off.
+    let margin = OFF * ball.radius;
+    let grows = |from: Vec3, to: Vec3| {
+        ball.off(from) <= scalp + 0.5 * margin && ball.off(to) > scalp + margin
+    };
     ends.iter()
         .map(|&[first, last]| if all { !grows(first, last) } else { grows(last, first) })
         .collect()

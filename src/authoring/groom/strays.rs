@@ -56,7 +56,7 @@ impl Intake {
 }
 
 /// The median of each axis.
-fn middle(points: impl Iterator<Item = Vec3> + Clone) -> DVec3 {
+pub(super) fn middle(points: impl Iterator<Item = Vec3> + Clone) -> DVec3 {
     let axis = |k: usize| f64::from(median(points.clone().map(|p| p[k]).collect()));
     DVec3::new(axis(0), axis(1), axis(2))
 }

@@ -60,7 +60,8 @@ fn chunk(whole: Bytes<'_>, at: u64) -> Result<(u32, &[u8]), GroomFileError> {
 
 fn parse(text: &[u8], start: u64) -> Result<Document, GroomFileError> {
     // Padding should be blanks, but often is not.
-    let end = text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    let is_padding = |byte: &u8| *byte == 0 || byte.is_ascii_whitespace();
+    let end = text.iter().rposition(|byte| !is_padding(byte)).map_or(0, |last| last + 1);
     let text = &text[..end];
     let document: Document = from_slice(text).map_err(|error| {
         let offset = start + offset_of(text, error.line(), error.column());
