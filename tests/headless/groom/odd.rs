@@ -224,7 +224,7 @@ fn strands_stored_tip_first_are_turned() {
     let groom = groom.with_widths(widths).unwrap();
     let settings = GroomSettings { scale: Some(1.0), ..default() };
     let (groom, _) = settings.apply(groom, GroomFormat::Gltf).unwrap();
-    assert_eq!(groom.strand(5).unwrap().widths.unwrap()[0], 7e-5);
+    assert_eq!(groom.strand(5).unwrap().widths.unwrap()[0], 7.0 * 1e-5);
 }
 
 /// Grooms of all presets on the training head, Y up.
