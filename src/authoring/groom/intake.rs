@@ -97,3 +97,12 @@ impl Intake {
         self.losses += losses;
     }
 }
+
+/// At most `count` of these, taken evenly from their order.
+pub(super) fn evenly(of: Vec<usize>, count: usize) -> Vec<usize> {
+    let (all, kept) = (of.len() as u128, count.min(of.len()));
+    if kept == of.len() {
+        return of;
+    }
+    (0..kept as u128).map(|i| of[(i * all / kept as u128) as usize]).collect()
+}

@@ -1,7 +1,8 @@
 //! Grooms made of other grooms: scaled, turned upright, cleaned, resampled, thinned.
 
 use super::{
-    Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis, losses::GroomPlace,
+    Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis, intake::evenly,
+    losses::GroomPlace,
 };
 use crate::base::setting::ValueRange;
 use bevy::{math::Affine3A, prelude::*};
@@ -185,15 +186,6 @@ impl Groom {
         self.uvs.extend(uv);
         Ok(())
     }
-}
-
-/// At most `count` of these, taken evenly from their order.
-pub(super) fn evenly(of: Vec<usize>, count: usize) -> Vec<usize> {
-    let (all, kept) = (of.len() as u128, count.min(of.len()));
-    if kept == of.len() {
-        return of;
-    }
-    (0..kept as u128).map(|i| of[(i * all / kept as u128) as usize]).collect()
 }
 
 /// Lengths from the root up to each node, and up to the tip.

@@ -1,7 +1,8 @@
 //! Import settings: unit, axes and thinning.
 
 use super::{
-    Groom, GroomError, GroomFormat, GroomLosses, RootEnd, UpAxis, intake::Intake, reshape::evenly,
+    Groom, GroomError, GroomFormat, GroomLosses, RootEnd, UpAxis,
+    intake::{Intake, evenly},
 };
 use crate::base::setting::{Ranged, setting};
 use bevy::prelude::*;
