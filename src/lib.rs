@@ -58,6 +58,7 @@ mod book {
         Character: "character.md",
         Colliders: "colliders.md",
         FirstHour: "first-hour.md",
+        Grooms: "grooms.md",
         Saving: "saving.md",
         Styling: "styling.md",
         Water: "water.md",

@@ -116,15 +116,23 @@ fn load(
     let scale = Some(arguments.scale.unwrap_or(kind.0.scale()));
     let up = arguments.up.map(UpAxis::from);
     let name = arguments.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let roots = arguments.roots.into();
+    let (strict, keep_strays) = (arguments.strict, arguments.keep_strays);
     let load = assets.load_builder().with_settings(move |s: &mut GroomSettings| {
         // What is short is known once the scale is.
         (s.scale, s.up, s.shortest_segment) = (scale, up, 0.0);
+        (s.roots, s.strict, s.keep_strays) = (roots, strict, keep_strays);
     });
     commands.insert_resource(Loading(load.load(name)));
 }
 
 /// The groom in a size that hair can have. A scale that was asked for stays.
-fn sized(groom: &Groom, kind: GroomFormat, asked: Option<f32>) -> Result<Groom> {
+fn sized(
+    groom: &Groom,
+    kind: GroomFormat,
+    asked: Option<f32>,
+    up: Option<UpAxis>,
+) -> Result<Groom> {
     let scale = asked.unwrap_or(kind.scale());
     let mut factor = 1.0;
     if let Some(odd) = groom.odd_size(scale) {
@@ -142,6 +150,11 @@ fn sized(groom: &Groom, kind: GroomFormat, asked: Option<f32>) -> Result<Groom> 
     if !losses.is_empty() {
         println!("{losses}");
     }
+    let up = up.unwrap_or(kind.up());
+    if let Some(odd) = groom.odd_up(up) {
+        let name = format!("{odd:?}").to_lowercase().replace("neg", "neg-");
+        println!("with {up:?} up it lies on its side or stands on its head; try --up {name}");
+    }
     Ok(groom)
 }
 
@@ -157,7 +170,8 @@ fn put_on(
     let Some(groom) = grooms.get(&loading.0) else {
         return Ok(());
     };
-    let groom = sized(groom, kind.0, arguments.scale)?;
+    let up = arguments.up.map(UpAxis::from);
+    let groom = sized(groom, kind.0, arguments.scale, up)?;
     let ball = groom.fit_head();
     let roots = || groom.roots().map(|r| r / groom.len() as f32).sum::<Vec3>();
     let centre = ball.map_or_else(roots, |ball| ball.center.into());

@@ -1,4 +1,5 @@
-//! Shows a groom from a file on a head that shakes.
+//! Shows a groom from a file on a head that shakes, and tells what was left out of it and what its size and
+//! axes look like.
 //!
 //! `cargo run --release --example groom_viewer -- hair.tfx`
 //! `cargo run --release --example groom_viewer -- hair.tfx --offscreen pictures`
@@ -56,6 +57,15 @@ struct Arguments {
     /// The file's axis that points up; what is usual for its kind if left out.
     #[arg(long)]
     up: Option<Up>,
+    /// Which end of a strand is its root.
+    #[arg(long, default_value = "found")]
+    roots: Roots,
+    /// Refuses a file of which anything is broken, instead of leaving that out.
+    #[arg(long)]
+    strict: bool,
+    /// Keeps strands that lie apart from all others.
+    #[arg(long)]
+    keep_strays: bool,
     /// How many strands are simulated.
     #[arg(long, default_value_t = GroomGuides::default().count as u32,
           value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -85,6 +95,27 @@ enum Up {
     X,
     Y,
     Z,
+    NegX,
+    NegY,
+    NegZ,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Roots {
+    /// Where the head is, if that can be told.
+    Found,
+    First,
+    Last,
+}
+
+impl From<Roots> for RootEnd {
+    fn from(roots: Roots) -> Self {
+        match roots {
+            Roots::Found => Self::Found,
+            Roots::First => Self::First,
+            Roots::Last => Self::Last,
+        }
+    }
 }
 
 impl From<Up> for UpAxis {
@@ -93,6 +124,9 @@ impl From<Up> for UpAxis {
             Up::X => Self::X,
             Up::Y => Self::Y,
             Up::Z => Self::Z,
+            Up::NegX => Self::NegX,
+            Up::NegY => Self::NegY,
+            Up::NegZ => Self::NegZ,
         }
     }
 }
@@ -129,7 +163,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let blamed = |error: std::io::Error| format!("{path}: {error}");
     let file = arguments.file.canonicalize().map_err(blamed)?;
     let kind = GroomFormat::of(&std::fs::read(&file).map_err(blamed)?)
-        .ok_or_else(|| format!("{path}: expected a .hair, .tfx, .gltf or .glb file"))?;
+        .map_err(|error| format!("{path}: {error}"))?;
     // Before anything that takes long.
     arguments.offscreen.as_deref().map(picture::folder).transpose()?;
     let folder = file.parent().unwrap_or(Path::new("/")).to_string_lossy().into_owned();

@@ -1,7 +1,7 @@
 //! Numbers from untrusted bytes: every read is checked, and nothing is allocated before it is known
 //! that the bytes for it are there.
 
-use super::{Groom, GroomError};
+use super::GroomError;
 
 /// Why a file cannot be read as a groom: where, what was expected, what was found and how to fix it.
 #[derive(thiserror::Error, Clone, Debug, PartialEq)]
@@ -35,17 +35,16 @@ pub enum GroomFileError {
         /// How to fix it.
         hint: &'static str,
     },
-    /// A number that is infinite or NaN.
+    /// A file of another kind.
     #[error(
-        "byte {offset}: {what} is {found}, expected a finite number: repair or leave out that strand"
+        "byte 0: found {found}, expected the beginning of a groom (HAIR, glTF, JSON or a TressFX \
+         version of 3 or 4): {hint}"
     )]
-    NonFinite {
-        /// Where it is.
-        offset: u64,
-        /// What it belongs to.
-        what: &'static str,
-        /// The number.
-        found: f32,
+    Foreign {
+        /// What it is.
+        found: String,
+        /// What to do.
+        hint: &'static str,
     },
     /// glTF whose JSON cannot be understood.
     #[error("byte {offset}: the JSON is wrong, expected glTF 2.0: {message}; export it again")]
@@ -106,7 +105,7 @@ impl<'a> Bytes<'a> {
         self.u32(offset, what).map(f32::from_bits)
     }
 
-    /// `count` groups of N finite numbers, each made into a `T`.
+    /// `count` groups of N numbers, each made into a `T`; they may be anything.
     pub(super) fn groups<T, const N: usize>(
         &self,
         offset: u64,
@@ -116,14 +115,10 @@ impl<'a> Bytes<'a> {
     ) -> Result<Vec<T>, GroomFileError> {
         let bytes = self.array(offset, count, 4 * N as u64, what)?;
         let mut groups = Vec::with_capacity(bytes.len() / (4 * N));
-        for (i, group) in (0..).zip(bytes.chunks_exact(4 * N)) {
+        for group in bytes.chunks_exact(4 * N) {
             let mut numbers = [0.0; N];
             for (number, word) in numbers.iter_mut().zip(words(group)) {
                 *number = f32::from_bits(word);
-            }
-            if let Some(k) = numbers.iter().position(|n| !n.is_finite()) {
-                let offset = offset + i * 4 * N as u64 + 4 * k as u64;
-                return Err(GroomFileError::NonFinite { offset, what, found: numbers[k] });
             }
             groups.push(make(numbers));
         }
@@ -131,24 +126,12 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// Checks that widths, which begin at `offset`, are not negative.
-pub(super) fn widths(offset: u64, widths: Vec<f32>) -> Result<Vec<f32>, GroomFileError> {
-    match (0..).zip(&widths).find(|(_, width)| **width < 0.0) {
-        Some((i, width)) => {
-            let hint = "repair or leave out that strand";
-            value(offset + 4 * i, "a thickness", width, "0 or more", hint)
-        }
-        None => Ok(widths),
+/// An error for a count of strands, which is at `offset`, of 0.
+pub(super) fn some_strands(offset: u64, count: u64) -> Result<(), GroomFileError> {
+    match count {
+        0 => value(offset, "the count of strands", 0, "1 or more", "export hair that has strands"),
+        _ => Ok(()),
     }
-}
-
-/// The groom, if it has at least one strand.
-pub(super) fn some_strands(offset: u64, groom: Groom) -> Result<Groom, GroomFileError> {
-    if groom.is_empty() {
-        let hint = "export hair of strands with two nodes or more";
-        return value(offset, "the count of strands with a segment", 0, "1 or more", hint);
-    }
-    Ok(groom)
 }
 
 fn words(bytes: &[u8]) -> impl Iterator<Item = u32> {

@@ -1,6 +1,6 @@
 //! The file formats that grooms come in.
 
-use super::gltf;
+use super::{GroomFileError, foreign, gltf};
 use bevy::prelude::*;
 
 /// The kinds of files that a groom is read from.
@@ -18,16 +18,29 @@ pub enum GroomFormat {
 }
 
 impl GroomFormat {
-    /// The format of a file by its first bytes, independent of its name. `None` for other formats.
-    pub fn of(file: &[u8]) -> Option<Self> {
+    /// The format of a file by its first bytes, independent of its name.
+    ///
+    /// ```
+    /// # use bevy_keratin::authoring::groom::GroomFormat;
+    /// assert_eq!(GroomFormat::of(b"HAIR"), Ok(GroomFormat::Yuksel));
+    /// let error = GroomFormat::of(b"version https://git-lfs.github.com/spec/v1\n").unwrap_err();
+    /// assert!(error.to_string().contains("git lfs pull"));
+    /// ```
+    ///
+    /// # Errors
+    /// For other formats: with what the file is, if that can be told, and what to do.
+    pub fn of(file: &[u8]) -> Result<Self, GroomFileError> {
         let version = file.first_chunk().map_or(0.0, |bytes| f32::from_le_bytes(*bytes));
         match file {
-            [b'H', b'A', b'I', b'R', ..] => Some(Self::Yuksel),
-            [b'g', b'l', b'T', b'F', ..] => Some(Self::Gltf),
-            _ if (3.0..4.0).contains(&version) => Some(Self::TressFx3),
-            _ if (4.0..5.0).contains(&version) => Some(Self::TressFx4),
-            text if gltf::looks_like_json(text) => Some(Self::Gltf),
-            _ => None,
+            [b'H', b'A', b'I', b'R', ..] => Ok(Self::Yuksel),
+            [b'g', b'l', b'T', b'F', ..] => Ok(Self::Gltf),
+            _ if (3.0..4.0).contains(&version) => Ok(Self::TressFx3),
+            _ if (4.0..5.0).contains(&version) => Ok(Self::TressFx4),
+            text if gltf::looks_like_json(text) => Ok(Self::Gltf),
+            other => {
+                let (found, hint) = foreign::described(other);
+                Err(GroomFileError::Foreign { found, hint })
+            }
         }
     }
 
@@ -72,6 +85,21 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
+    /// All six.
+    pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::NegX, Self::NegY, Self::NegZ];
+
+    /// The axis in the file.
+    pub fn direction(self) -> Vec3 {
+        match self {
+            Self::X => Vec3::X,
+            Self::Y => Vec3::Y,
+            Self::Z => Vec3::Z,
+            Self::NegX => Vec3::NEG_X,
+            Self::NegY => Vec3::NEG_Y,
+            Self::NegZ => Vec3::NEG_Z,
+        }
+    }
+
     /// A vector of a space with this axis up, in Bevy's.
     pub fn to_y_up(self, v: Vec3) -> Vec3 {
         match self {

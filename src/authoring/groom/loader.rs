@@ -1,8 +1,8 @@
 //! Grooms as assets.
 
 use super::{
-    Groom, GroomError, GroomFileError, GroomFormat, GroomLosses, GroomSettings, OddSize, gltf,
-    grown_hair, tressfx, yuksel,
+    Groom, GroomError, GroomFileError, GroomFormat, GroomLoss, GroomLosses, GroomPlace,
+    GroomSettings, OddSize, RootEnd, gltf, grown_hair, tressfx, yuksel,
 };
 use bevy::{
     asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
@@ -52,11 +52,9 @@ impl AssetLoader for GroomLoader {
         let mut file = Vec::new();
         reader.read_to_end(&mut file).await?;
         let mut external = HashMap::default();
-        let format = GroomFormat::of(&file);
-        if format == Some(GroomFormat::Gltf) {
-            let uris: Vec<String> =
-                gltf::GltfFile::parse(&file)?.external().map(str::to_owned).collect();
-            for uri in uris {
+        let format = GroomFormat::of(&file)?;
+        if format == GroomFormat::Gltf {
+            for uri in gltf::GltfFile::parse(&file)?.external() {
                 let failed =
                     |source| GroomLoadError::Buffer { uri: uri.clone(), source: Box::new(source) };
                 // Escapes that are not UTF-8 are taken literally.
@@ -72,14 +70,23 @@ impl AssetLoader for GroomLoader {
             }
         }
         let (groom, losses) = Groom::from_file_with(&file, settings, &external)?;
-        if let Some(format) = format {
-            let (scale, up) = (settings.scale_of(format), settings.up_of(format));
-            let (path, count) = (context.path(), groom.len());
-            tracing::info!("groom {path}: {count} strands, {scale} m a unit, {up:?} up; {losses}");
-            // No warning if the user has set a scale.
-            if let (None, Some(odd)) = (settings.scale, groom.odd_size(scale)) {
-                tracing::warn!("groom {path}: {odd}: set GroomSettings::scale to {}", odd.scale);
-            }
+        let (scale, up) = (settings.scale_of(format), settings.up_of(format));
+        let (path, count) = (context.path(), groom.len());
+        tracing::info!("groom {path}: {count} strands, {scale} m a unit, {up:?} up");
+        if losses.is_broken() {
+            tracing::warn!("groom {path}: {losses}: GroomSettings::strict refuses such files");
+        } else if !losses.is_empty() {
+            tracing::info!("groom {path}: {losses}");
+        }
+        // No warning of what the user has set.
+        if let (None, Some(odd)) = (settings.scale, groom.odd_size(scale)) {
+            tracing::warn!("groom {path}: {odd}: set GroomSettings::scale to {}", odd.scale);
+        }
+        if let (None, Some(odd)) = (settings.up, groom.odd_up(up)) {
+            tracing::warn!(
+                "groom {path}: with {up:?} up it lies on its side or stands on its head: set \
+                 GroomSettings::up to {odd:?}, or to {up:?} if it is right"
+            );
         }
         Ok(groom)
     }
@@ -105,7 +112,8 @@ impl Groom {
     /// ```
     ///
     /// # Errors
-    /// When the bytes are none of these or broken, or the settings out of range.
+    /// When the bytes are none of these or broken, or the settings out of range; where single strands are
+    /// broken, only if the settings are [`strict`](GroomSettings::strict).
     pub fn from_file(
         file: &[u8],
         settings: &GroomSettings,
@@ -118,21 +126,13 @@ impl Groom {
         settings: &GroomSettings,
         external: &HashMap<String, Vec<u8>>,
     ) -> Result<(Self, GroomLosses), GroomFileError> {
-        let format = GroomFormat::of(file).ok_or_else(|| GroomFileError::Value {
-            offset: 0,
-            what: "the beginning",
-            found: file[..file.len().min(4)].escape_ascii().to_string(),
-            expected: "HAIR, glTF, JSON or a TressFX version of 3 or 4".to_owned(),
-            hint: "convert the file to .hair, .tfx, .gltf or .glb",
-        })?;
-        let (groom, mut losses) = match format {
-            GroomFormat::Yuksel => yuksel::read(file)?,
-            GroomFormat::TressFx3 | GroomFormat::TressFx4 => tressfx::read(file)?,
-            GroomFormat::Gltf => gltf::GltfFile::parse(file)?.read(external)?,
+        let format = GroomFormat::of(file)?;
+        let intake = match format {
+            GroomFormat::Yuksel => yuksel::intake(file)?,
+            GroomFormat::TressFx3 | GroomFormat::TressFx4 => tressfx::intake(file)?,
+            GroomFormat::Gltf => gltf::GltfFile::parse(file)?.intake(external)?,
         };
-        let (groom, left_out) = settings.apply(groom, format)?;
-        losses += left_out;
-        Ok((groom, losses))
+        Ok(settings.take(intake, format)?)
     }
 }
 
@@ -147,6 +147,9 @@ impl Plugin for GroomPlugin {
             .register_type::<GroomSettings>()
             .register_type::<GroomFormat>()
             .register_type::<GroomLosses>()
+            .register_type::<GroomLoss>()
+            .register_type::<GroomPlace>()
+            .register_type::<RootEnd>()
             .register_type::<GroomError>()
             .register_type::<OddSize>();
         grown_hair::build(app);

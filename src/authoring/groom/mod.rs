@@ -4,25 +4,30 @@
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
 mod bytes;
+mod foreign;
 mod format;
 pub mod gltf;
 mod grown_hair;
 mod guides;
+mod intake;
 mod loader;
 mod losses;
 mod reshape;
+mod roots;
 mod settings;
 mod size;
+mod strays;
 pub mod tressfx;
 pub mod yuksel;
 
 pub use bytes::GroomFileError;
 pub use format::{GroomFormat, UpAxis};
 pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
-pub use losses::GroomLosses;
+pub use losses::{GroomLoss, GroomLosses, GroomPlace};
 
 pub(crate) use grown_hair::GrownStrands;
 pub use grown_hair::{GroomGuides, GroomedHair};
+pub use roots::RootEnd;
 pub use settings::GroomSettings;
 pub use size::OddSize;
 
@@ -120,6 +125,21 @@ pub enum GroomError {
          short, or its scale is too small"
     )]
     Empty,
+    /// Every strand was left out.
+    #[error("no strand is left, expected 1 or more: {losses}; repair the source")]
+    AllLeftOut {
+        /// What was left out.
+        losses: String,
+    },
+    /// A broken file that is to be read strictly.
+    #[error(
+        "{broken}, expected none: repair the source, or set GroomSettings::strict to false to do \
+         without them"
+    )]
+    Strict {
+        /// What would be left out.
+        broken: String,
+    },
     /// Ends of strands that are not in ascending order.
     #[error("strand {strand} ends at node {found}, expected {expected}: make it by from_polylines")]
     Ends {
@@ -136,6 +156,10 @@ pub enum GroomError {
 }
 
 impl Groom {
+    const WIDTH: &str = "width (m)";
+    const COLOUR: &str = "colour";
+    const UV: &str = "UV";
+
     /// A groom of these polylines (m), root first.
     ///
     /// ```
@@ -269,17 +293,17 @@ impl GroomStrand<'_> {
         let width = |w: &f32| w.is_finite() && *w >= 0.0;
         let widths = self.widths.unwrap_or_default();
         if let Some(at) = widths.iter().position(|w| !width(w)) {
-            return wrong("width (m)", at, widths[at], "a finite diameter, 0 or more");
+            return wrong(Groom::WIDTH, at, widths[at], "a finite diameter, 0 or more");
         }
         let parts = self.colors.unwrap_or_default().iter().map(|c| c.to_f32_array());
         for (at, parts) in parts.enumerate() {
             if let Some(part) = parts.into_iter().find(|part| !part.is_finite()) {
-                return wrong("colour", at, part, "finite numbers");
+                return wrong(Groom::COLOUR, at, part, "finite numbers");
             }
         }
         let uv = self.uv.unwrap_or_default().to_array();
         match uv.into_iter().find(|part| !part.is_finite()) {
-            Some(part) => wrong("UV", 0, part, "finite numbers"),
+            Some(part) => wrong(Groom::UV, 0, part, "finite numbers"),
             None => Ok(()),
         }
     }

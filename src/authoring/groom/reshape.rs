@@ -1,6 +1,9 @@
 //! Grooms made of other grooms: scaled, turned upright, cleaned, resampled, thinned.
 
-use super::{Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis};
+use super::{
+    Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis, intake::evenly,
+    losses::GroomPlace,
+};
 use crate::base::setting::ValueRange;
 use bevy::{math::Affine3A, prelude::*};
 use core::ops::Range;
@@ -85,7 +88,7 @@ impl Groom {
         let mut losses = GroomLosses::default();
         let mut made = self.emptied();
         let mut kept: Vec<usize> = Vec::new();
-        for strand in self.strands() {
+        for (i, strand) in self.strands().enumerate() {
             let points = strand.points;
             let far = |a: usize, b: usize| {
                 let apart = points[a].distance(points[b]);
@@ -103,11 +106,15 @@ impl Groom {
                 kept.pop();
             }
             if !far(tip, kept[kept.len() - 1]) {
-                losses.short_strands += 1;
+                losses.short_strands.add(GroomPlace::Strand(i));
                 continue;
             }
             kept.push(tip);
-            losses.merged_nodes += points.len() - kept.len();
+            let merged = points.len() - kept.len();
+            if merged > 0 {
+                let node = kept.iter().zip(0..).take_while(|(kept, k)| **kept == *k).count();
+                losses.merged_nodes.add_many(merged, GroomPlace::Node { strand: i, node });
+            }
             kept.iter().for_each(|i| made.push_node(&strand, *i));
             made.end_strand(strand.uv)?;
         }
@@ -125,8 +132,7 @@ impl Groom {
 
     /// At most `count` strands, taken evenly from their order.
     pub fn limited(&self, count: usize) -> Self {
-        let kept = count.min(self.len());
-        self.picked((0..kept).map(|i| (i as u128 * self.len() as u128 / kept as u128) as usize))
+        self.picked(evenly((0..self.len()).collect(), count))
     }
 
     /// The strands of these indices; those that are not there are left out.
@@ -143,16 +149,6 @@ impl Groom {
             }
         }
         made
-    }
-
-    /// Without strands of one node, and how many those were.
-    pub(super) fn without_lone_nodes(self) -> (Self, usize) {
-        let lone = (0..self.len()).filter(|i| self.nodes_of(*i).len() < 2).count();
-        if lone == 0 {
-            return (self, 0);
-        }
-        let good = (0..self.len()).filter(|i| self.nodes_of(*i).len() >= 2);
-        (self.picked(good), lone)
     }
 
     /// One strand.

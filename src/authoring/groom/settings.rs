@@ -1,6 +1,9 @@
 //! Import settings: unit, axes and thinning.
 
-use super::{Groom, GroomError, GroomFormat, GroomLosses, UpAxis};
+use super::{
+    Groom, GroomError, GroomFormat, GroomLosses, RootEnd, UpAxis,
+    intake::{Intake, evenly},
+};
 use crate::base::setting::{Ranged, setting};
 use bevy::prelude::*;
 
@@ -23,7 +26,10 @@ setting! {
     ///
     /// Files other than glTF do not specify their unit; the defaults are those of the formats' own
     /// samples. The unit used is logged, with a warning and a better scale if the size is implausible for
-    /// hair: see [`Groom::odd_size`].
+    /// hair: see [`Groom::odd_size`]; and likewise the axis: see [`Groom::odd_up`].
+    ///
+    /// What is broken in a file is left out, counted in [`GroomLosses`] and logged once with the numbers of
+    /// strands and nodes; or refused, if [`strict`](Self::strict).
     ///
     /// | file | metres per unit | up |
     /// |---|---|---|
@@ -39,6 +45,14 @@ setting! {
         pub scale: Option<f32> = None, in SCALE: 1e-9..=1e9, "0.01 takes centimetres to metres";
         /// The file's axis that points up; `None` is what the table says.
         pub up: Option<UpAxis> = None;
+        /// Which end of a strand is its root.
+        pub roots: RootEnd = RootEnd::Found;
+        /// Refuses a file if anything of it had to be left out because it is broken: see
+        /// [`GroomLosses::is_broken`]. The error tells what `false` would leave out.
+        pub strict: bool = false;
+        /// Keeps strands that lie apart from all others, which are else left out: see
+        /// [`GroomLosses::far_strands`] and [`GroomLosses::stray_strands`].
+        pub keep_strays: bool = false;
         /// The place that becomes the groom's origin, such as the head's centre: in metres, Y up.
         /// Zero is the file's own.
         pub origin: Vec3 = Vec3::ZERO;
@@ -57,7 +71,8 @@ setting! {
 
 impl GroomSettings {
     /// Applies these settings to a groom as read from a file of this format, and counts what is left
-    /// out: fewer strands first, then scale and axes, then merging, then resampling.
+    /// out: strays first, then roots are found, then fewer strands, then scale and axes, then merging, then
+    /// resampling.
     ///
     /// # Errors
     /// When a setting is out of range, scaled nodes become non-finite, or no strand is left.
@@ -66,27 +81,39 @@ impl GroomSettings {
         groom: Groom,
         format: GroomFormat,
     ) -> Result<(Groom, GroomLosses), GroomError> {
+        self.take(Intake::of(groom)?, format)
+    }
+
+    /// The same with what was left out before.
+    pub(super) fn take(
+        &self,
+        mut intake: Intake,
+        format: GroomFormat,
+    ) -> Result<(Groom, GroomLosses), GroomError> {
         self.clone().checked()?;
-        let mut groom = groom;
-        let before = groom.len();
-        if self.keep_every != 1 {
-            groom = groom.thinned(self.keep_every)?;
+        if !self.keep_strays {
+            intake.leave_out_strays();
         }
-        if let Some(limit) = self.limit {
-            groom = groom.limited(limit);
+        if self.strict {
+            intake.losses.refuse_broken()?;
         }
-        let thinned_strands = before - groom.len();
+        intake.turn(self.roots);
+        let all = intake.groom.len();
+        let limit = self.limit.unwrap_or(usize::MAX);
+        intake.keep(evenly((0..all).step_by(self.keep_every).collect(), limit));
+        intake.losses.thinned_strands.count += all - intake.groom.len();
+        let groom = core::mem::take(&mut intake.groom);
         let groom =
             groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?.moved(-self.origin)?;
-        let (mut groom, mut losses) = groom.merged(self.shortest_segment)?;
-        losses.thinned_strands = thinned_strands;
+        let (mut groom, losses) = groom.merged(self.shortest_segment)?;
+        intake.add(losses);
         if groom.is_empty() {
-            return Err(GroomError::Empty);
+            return Err(GroomError::AllLeftOut { losses: intake.losses.to_string() });
         }
         if let Some(nodes) = self.nodes {
             groom = groom.resampled(nodes)?;
         }
-        Ok((groom, losses))
+        Ok((groom, intake.losses))
     }
 
     /// Metres per unit of a file of this format.

@@ -12,7 +12,9 @@
 
 use super::{
     Groom, GroomFileError, GroomLosses,
-    bytes::{Bytes, some_strands, value, widths},
+    bytes::{Bytes, some_strands, value},
+    intake::Intake,
+    losses::GroomPlace,
 };
 use bevy::prelude::*;
 
@@ -49,12 +51,16 @@ const V4: Layout = Layout {
 /// A groom from the bytes of a `.tfx` file, in the file's own unit and axes, and what was left out.
 ///
 /// A strand's thickness becomes the diameter of all its nodes. Places of nodes on the texture and
-/// version 3's indices of guides are not read. Which nodes are fixed is not kept: roots are.
+/// version 3's indices of guides are not read. Which nodes are fixed is not kept: roots are. Strands with a
+/// number that is not finite or a thickness that is negative are left out and counted.
 ///
 /// # Errors
-/// When the version is neither 3 nor 4, the header contradicts the file's length, there are no
-/// strands, or a number is not finite or a thickness negative.
+/// When the version is neither 3 nor 4, the header contradicts the file's length, or there are no strands.
 pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
+    intake(file).map(|intake| (intake.groom, intake.losses))
+}
+
+pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
     let bytes = Bytes(file);
     let version = bytes.f32(0, "version")?;
     let layout = match version {
@@ -67,8 +73,9 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     };
     bytes.array(0, layout.header, 1, "header")?;
     let strands = u64::from(bytes.u32(4, "strand count")?);
+    some_strands(4, strands)?;
     let each = u64::from(bytes.u32(8, "node count of a strand")?);
-    if each < 2 && strands > 0 {
+    if each < 2 {
         return value(8, "the node count of a strand", each, "2 or more", "export longer strands");
     }
     // Cannot overflow: both have 32 bits.
@@ -97,7 +104,9 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
         160 => {
             let fixed = |i: u64, w: f32| w == 0.0 && !i.is_multiple_of(each);
             let points = bytes.groups(offset, nodes, "a position", Vec4::from_array)?;
-            losses.freed_nodes = (0..).zip(&points).filter(|(i, p)| fixed(*i, p.w)).count();
+            for (i, _) in (0..).zip(&points).filter(|(i, p)| fixed(*i, p.w)) {
+                losses.freed_nodes.add_node((i / each) as usize, (i % each) as usize);
+            }
             points.iter().map(|p| p.truncate()).collect()
         }
         _ => bytes.groups(offset, nodes, "a position", Vec3::from_array)?,
@@ -107,9 +116,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
         None => Vec::new(),
     };
     let thickness = match array(layout.thickness)? {
-        Some(offset) => {
-            widths(offset, bytes.groups(offset, strands, "a strand's thickness", |[t]| t)?)?
-        }
+        Some(offset) => bytes.groups(offset, strands, "a strand's thickness", |[t]| t)?,
         None => Vec::new(),
     };
     let widths = thickness.iter().flat_map(|t| (0..each).map(|_| *t)).collect();
@@ -121,13 +128,12 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     // A groom cannot hold these, but a file that is truncated there is broken all the same.
     if let Some(offset) = array(layout.vertex_uvs)? {
         bytes.array(offset, nodes, 8, "UVs of nodes")?;
-        losses.unread_arrays += 1;
+        losses.unread_arrays.add(GroomPlace::Part("UVs of nodes".to_owned()));
     }
     if let Some(offset) = layout.guide_indices.map(array).transpose()?.flatten() {
         bytes.array(offset, strands, 4, "indices of guides")?;
-        losses.unread_arrays += 1;
+        losses.unread_arrays.add(GroomPlace::Part("indices of guides".to_owned()));
     }
     let ends = (1..=strands).map(|i| (i * each) as u32).collect();
-    let groom = Groom { points, ends, widths, colors, uvs };
-    Ok((some_strands(4, groom)?.checked()?, losses))
+    Ok(Intake::cleaned(Groom { points, ends, widths, colors, uvs }, losses)?)
 }

@@ -7,7 +7,9 @@
 
 use super::{
     Groom, GroomError, GroomFileError, GroomLosses,
-    bytes::{Bytes, some_strands, value, widths},
+    bytes::{Bytes, some_strands, value},
+    intake::Intake,
+    losses::GroomPlace,
 };
 use bevy::prelude::*;
 
@@ -27,8 +29,9 @@ const UNSET_COLOUR: [f32; 3] = [1.0; 3];
 ///
 /// Thickness becomes the diameter of each node; transparency becomes one minus alpha of the colours.
 /// Where an array is absent the header's default is used for every node, unless it is the unset
-/// value: thickness 1 (or 0), transparency 0, white. Strands without segments are left
-/// out; the header's free text is not kept.
+/// value: thickness 1 (or 0), transparency 0, white. Strands without segments or with a number that is not
+/// finite or a thickness that is negative are left out and counted, and bytes after the end are counted; the
+/// header's free text is not kept.
 ///
 /// ```
 /// # use bevy_keratin::authoring::groom::{Groom, yuksel}; use bevy::prelude::*;
@@ -39,9 +42,12 @@ const UNSET_COLOUR: [f32; 3] = [1.0; 3];
 /// ```
 ///
 /// # Errors
-/// When the header contradicts itself or the file's length, a number is not finite or a thickness
-/// negative, or no strand has a segment.
+/// When the header contradicts itself, the file is too short for it, or no strand is left.
 pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
+    intake(file).map(|intake| (intake.groom, intake.losses))
+}
+
+pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
     let bytes = Bytes(file);
     let magic = bytes.array(0, 4, 1, "the mark HAIR")?;
     if magic != MAGIC {
@@ -54,8 +60,15 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     let bits = bytes.u32(12, "array bits")?;
     if bits & POINTS == 0 || bits >= 2 * COLOURS {
         let expected = "bit 2 (points) set and none above 16";
-        return value(12, "the array bits", format!("{bits:#x}"), expected, EXPORT_AGAIN);
+        let hint = match bits.swap_bytes() {
+            swapped if swapped & POINTS != 0 && swapped < 2 * COLOURS => {
+                "the file is big-endian: swap its bytes or export it again, little-endian"
+            }
+            _ => EXPORT_AGAIN,
+        };
+        return value(12, "the array bits", format!("{bits:#x}"), expected, hint);
     }
+    some_strands(4, strands)?;
     let has = |array: u32| u64::from(bits & array != 0);
 
     let mut at = HEADER;
@@ -76,14 +89,14 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     // Cannot overflow: both factors are below 2³³.
     let length = at + nodes * per_node;
     bytes.array(at, nodes, per_node, "point data")?;
-    if bytes.len() != length {
-        return value(length, "the file's length", bytes.len(), length, EXPORT_AGAIN);
+    let mut losses = GroomLosses::default();
+    if let Some(rest @ 1..) = bytes.len().checked_sub(length) {
+        losses.unread_bytes.add_many(rest as usize, GroomPlace::Byte(length));
     }
 
     let points = bytes.groups(at, nodes, "a point", Vec3::from_array)?;
     at += 12 * nodes;
     let thickness = bytes.groups(at, nodes * has(THICKNESS), "a thickness", |[t]| t)?;
-    let thickness = widths(at, thickness)?;
     at += 4 * nodes * has(THICKNESS);
     let clear = bytes.groups(at, nodes * has(TRANSPARENCY), "a transparency", |[t]| t)?;
     at += 4 * nodes * has(TRANSPARENCY);
@@ -94,7 +107,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     let diameters = match has(THICKNESS) {
         0 => match header(20, "the default thickness")? {
             UNSET_THICKNESS | 0.0 => Vec::new(),
-            thickness => every(widths(20, vec![thickness])?[0]),
+            thickness => every(thickness),
         },
         _ => thickness,
     };
@@ -125,8 +138,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
         ends.push(end);
     }
     let raw = Groom { points, ends, widths: diameters, colors, uvs: Vec::new() };
-    let (groom, short_strands) = raw.without_lone_nodes();
-    Ok((some_strands(4, groom)?.checked()?, GroomLosses { short_strands, ..default() }))
+    Ok(Intake::cleaned(raw, losses)?)
 }
 
 const EXPORT_AGAIN: &str = "export the file again";

@@ -3,6 +3,7 @@
 mod files;
 mod gltf;
 mod malformed;
+mod odd;
 mod reshape;
 mod tressfx;
 mod worn;

@@ -55,7 +55,7 @@ fn short_segments_merge_and_root_and_tip_stay() {
     let strands: Vec<_> = merged.strands().map(|s| s.points.to_vec()).collect();
     assert_eq!(strands[0], [y(0.0), y(0.1), y(0.2), y(0.3)]);
     assert_eq!(strands[1], [y(0.0), y(0.1), y(0.0)]);
-    assert_eq!((strands.len(), losses.short_strands, losses.merged_nodes), (2, 1, 3));
+    assert_eq!((strands.len(), losses.short_strands.count, losses.merged_nodes.count), (2, 1, 3));
     let (same, losses) = merged.merged(1e-5).unwrap();
     assert!(same == merged && losses.is_empty());
     assert!(groom.merged(f32::NAN).is_err());
@@ -87,7 +87,7 @@ fn settings_apply_in_order_and_refuse_nonsense() {
         ..default()
     };
     let (groom, losses) = Groom::from_file(&file, &settings).unwrap();
-    assert_eq!((groom.len(), losses.thinned_strands), (3, 7));
+    assert_eq!((groom.len(), losses.thinned_strands.count), (3, 7));
     // Strands 0, 2, 6 of 0, 2, 4, 6, 8 at (i, i/4, z).
     let strand = groom.strands().nth(1).unwrap();
     assert_eq!(strand.points[0], Vec3::new(0.0, 0.0, -0.25));
@@ -235,7 +235,7 @@ fn an_odd_size_is_reported_with_the_unit_that_fits() {
     let odd = raw.odd_size(1.0).unwrap();
     let fitted = raw.scaled(odd.scale).unwrap();
     let (low, high) = fitted.extents().unwrap();
-    assert!(((high - low).max_element() - 0.4).abs() < 1e-3, "{odd}");
+    assert!(((high - low).max_element() - 0.4).abs() < 0.02, "{odd}");
     assert_eq!(Groom::default().odd_size(1.0), None);
     let point = Groom::from_polylines([[Vec3::ONE; 2]]).unwrap();
     assert_eq!(point.odd_size(1.0), None, "no scale helps");

@@ -2,7 +2,7 @@
 
 use super::files::{Arrays, points, put, tfx};
 use bevy::prelude::*;
-use bevy_keratin::authoring::groom::{GroomFileError, tressfx};
+use bevy_keratin::authoring::groom::{Groom, GroomPlace, GroomSettings, tressfx};
 
 #[test]
 fn every_array_of_both_versions_is_read() {
@@ -25,9 +25,9 @@ fn every_array_of_both_versions_is_read() {
             let expected = [44u8, 45, 46, 47].map(|i| f32::from(i) * 0.01);
             assert_eq!(colour, arrays.colours.then_some(expected));
             let old = version < 4.0;
-            assert_eq!(losses.unread_arrays, (k >> 3) * (1 + usize::from(old)));
+            assert_eq!(losses.unread_arrays.count, (k >> 3) * (1 + usize::from(old)));
             // Of the two fixed nodes of each strand one is the root.
-            assert_eq!(losses.freed_nodes, if old { 0 } else { 3 });
+            assert_eq!(losses.freed_nodes.count, if old { 0 } else { 3 });
         }
     }
 }
@@ -64,14 +64,13 @@ fn errors_say_where_and_what() {
     }
     let mut file = good.clone();
     put(&mut file, 160 + 16 * 5 + 8, f32::NEG_INFINITY.to_bits());
-    let error = tressfx::read(&file).unwrap_err();
-    let offset = 160 + 16 * 5 + 8;
-    let found = f32::NEG_INFINITY;
-    assert_eq!(error, GroomFileError::NonFinite { offset, what: "a position", found });
+    let (groom, losses) = tressfx::read(&file).unwrap();
+    assert_eq!(groom.len(), 2);
+    assert_eq!(losses.broken_strands.places, [GroomPlace::Node { strand: 1, node: 1 }]);
 }
 
 #[test]
-fn files_without_strands_or_with_negative_widths_are_refused() {
+fn files_without_strands_are_refused_and_strands_of_negative_width_left_out() {
     for version in [3.0, 4.0] {
         let mut none = tfx(version, 3, 4, Arrays::ALL);
         put(&mut none, 4, 0);
@@ -80,7 +79,17 @@ fn files_without_strands_or_with_negative_widths_are_refused() {
         let mut wide = tfx(version, 3, 4, Arrays { thickness: true, ..Arrays::default() });
         let at = wide.len() - 4;
         put(&mut wide, at, (-2.0f32).to_bits());
-        let error = tressfx::read(&wide).unwrap_err().to_string();
-        assert!(error.starts_with(&format!("byte {at}: a thickness is -2, expected 0")), "{error}");
+        let (groom, losses) = tressfx::read(&wide).unwrap();
+        assert_eq!((groom.len(), losses.broken_strands.count), (2, 1));
+        let strict = GroomSettings { strict: true, ..default() };
+        let error = Groom::from_file(&wide, &strict).unwrap_err().to_string();
+        assert!(error.contains("(strand 2 node 0), expected none"), "{error}");
+        // All of them: the strands can do without.
+        for i in 0..3 {
+            put(&mut wide, at - 4 * i, (-2.0f32).to_bits());
+        }
+        let (groom, losses) = tressfx::read(&wide).unwrap();
+        assert!(groom.len() == 3 && groom.strands().all(|s| s.widths.is_none()));
+        assert!(losses.to_string().contains("expected a finite diameter"), "{losses}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::files::{hair, points, put};
 use bevy::prelude::*;
-use bevy_keratin::authoring::groom::{Groom, GroomError, GroomFileError, yuksel};
+use bevy_keratin::authoring::groom::{Groom, GroomError, GroomPlace, GroomSettings, yuksel};
 
 #[test]
 fn every_array_is_read_whatever_others_there_are() {
@@ -45,7 +45,7 @@ fn unset_defaults_say_nothing() {
 #[test]
 fn strands_without_segments_are_left_out_and_counted() {
     let (groom, losses) = yuksel::read(&hair(&[0, 2, 0, 1], 31)).unwrap();
-    assert_eq!((groom.len(), losses.short_strands), (2, 2));
+    assert_eq!((groom.len(), losses.short_strands.count), (2, 2));
     let (first, whole) = (groom.strands().next().unwrap(), points(&[0, 2, 0, 1]));
     assert_eq!(first.points, &whole[1..4]);
     assert_eq!(first.widths.unwrap(), [1.01, 2.01, 3.01]);
@@ -86,28 +86,35 @@ fn what_the_format_cannot_hold_is_refused() {
 }
 
 #[test]
-fn files_without_strands_or_with_impossible_widths_are_refused() {
+fn files_without_strands_are_refused_and_impossible_widths_left_out() {
     let mut none = hair(&[1], 2);
     none.truncate(128);
     (4..=16).step_by(4).for_each(|at| put(&mut none, at, 0));
     put(&mut none, 12, 2);
-    let says = "byte 4: the count of strands with a segment is 0, expected 1 or more";
-    for file in [none, hair(&[0, 0], 2), hair(&[0, 0, 0], 3)] {
+    let error = yuksel::read(&none).unwrap_err().to_string();
+    assert!(error.starts_with("byte 4: the count of strands is 0, expected 1 or more"), "{error}");
+    for file in [hair(&[0, 0], 2), hair(&[0, 0, 0], 3)] {
         let error = yuksel::read(&file).unwrap_err().to_string();
-        assert!(error.starts_with(says), "{error}");
+        assert!(error.contains("strands without length left out (strand 0, strand 1"), "{error}");
     }
     // Three counts of two bytes, nine points, and the fourth thickness.
     let at = 128 + 6 + 9 * 12 + 3 * 4;
     let mut wide = hair(&[2, 1, 3], 31);
-    put(&mut wide, at, (-0.5f32).to_bits());
-    let error = yuksel::read(&wide).unwrap_err().to_string();
-    assert!(error.starts_with(&format!("byte {at}: a thickness is -0.5, expected 0")), "{error}");
-    put(&mut wide, at, f32::NAN.to_bits());
-    assert!(matches!(yuksel::read(&wide), Err(GroomFileError::NonFinite { .. })));
+    for wrong in [-0.5, f32::NAN] {
+        put(&mut wide, at, wrong.to_bits());
+        let (groom, losses) = yuksel::read(&wide).unwrap();
+        assert_eq!(groom.len(), 2);
+        assert_eq!(losses.broken_strands.places, [GroomPlace::Node { strand: 1, node: 0 }]);
+        let strict = GroomSettings { strict: true, ..default() };
+        let error = Groom::from_file(&wide, &strict).unwrap_err().to_string();
+        assert!(error.contains("(strand 1 node 0), expected none"), "{error}");
+    }
+    // A default that no strand can have: they do without.
     let mut wide = hair(&[2, 2], 2);
     put(&mut wide, 20, (-1.0f32).to_bits());
-    let error = yuksel::read(&wide).unwrap_err().to_string();
-    assert!(error.starts_with("byte 20: a thickness is -1"), "{error}");
+    let (groom, losses) = yuksel::read(&wide).unwrap();
+    assert!(groom.len() == 2 && groom.strands().all(|s| s.widths.is_none()));
+    assert_eq!((losses.broken_arrays.count, losses.broken_strands.count), (1, 0));
 }
 
 #[test]
@@ -142,11 +149,29 @@ fn errors_say_where_and_what() {
     let mut broken = good.clone();
     // The second point's y, behind three counts of two bytes.
     put(&mut broken, 128 + 6 + 12 + 4, f32::NAN.to_bits());
-    let error = yuksel::read(&broken).unwrap_err();
-    assert!(matches!(error, GroomFileError::NonFinite { offset: 150, .. }), "{error}");
+    let (groom, losses) = yuksel::read(&broken).unwrap();
+    assert_eq!(
+        (groom.len(), &losses.to_string()[..]),
+        (2, "1 strands with a broken number left out (strand 0 node 1)",)
+    );
 
-    let mut long = good.clone();
-    long.push(0);
-    let error = yuksel::read(&long).unwrap_err().to_string();
-    assert!(error.contains("the file's length"), "{error}");
+    let mut swapped = good.clone();
+    put(&mut swapped, 12, 31u32.swap_bytes());
+    let error = yuksel::read(&swapped).unwrap_err().to_string();
+    assert!(error.contains("the file is big-endian"), "{error}");
+}
+
+#[test]
+fn bytes_after_the_end_are_told() {
+    let good = hair(&[2, 1, 3], 31);
+    let (expected, _) = yuksel::read(&good).unwrap();
+    let long = [&good[..], b"\r\n"].concat();
+    let (groom, losses) = yuksel::read(&long).unwrap();
+    assert_eq!(groom, expected);
+    let says = format!("2 bytes after the end not read (from byte {})", good.len());
+    assert_eq!(losses.to_string(), says);
+    let strict = GroomSettings { strict: true, ..default() };
+    let error = Groom::from_file(&long, &strict).unwrap_err().to_string();
+    assert!(error.contains(&says) && error.contains("set GroomSettings::strict"), "{error}");
+    assert!(Groom::from_file(&good, &strict).is_ok());
 }

@@ -1,8 +1,8 @@
 //! Reads numbers from glTF's buffers, with all references checked.
 
-use super::super::GroomFileError;
+use super::super::{GroomFileError, foreign};
+use super::document::{Buffer, Document, compression};
 use super::error::{missing, wrong};
-use ::gltf::json::{Root, accessor::ComponentType, validation::Checked};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use bevy::platform::collections::HashMap;
 use std::borrow::Cow;
@@ -10,26 +10,73 @@ use std::borrow::Cow;
 /// Prefix of the URI of embedded buffers.
 pub const DATA: &str = "data:";
 const EXPORT_AGAIN: &str = "export the file again";
+const DECOMPRESS: &str =
+    "export without compression, or decompress it (gltfpack or gltf-transform do)";
 
-/// The contents of a file's buffers.
-pub struct Buffers<'a>(Vec<Cow<'a, [u8]>>);
+/// What a number in a buffer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Component {
+    I8,
+    U8,
+    I16,
+    U16,
+    U32,
+    F32,
+}
+
+impl Component {
+    fn of(code: u32) -> Option<Self> {
+        let all = [Some(Self::I8), Some(Self::U8), Some(Self::I16), Some(Self::U16), None];
+        let all = all.into_iter().chain([Some(Self::U32), Some(Self::F32)]);
+        all.into_iter().nth(code.checked_sub(5120)? as usize)?
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+        }
+    }
+}
+
+/// How many numbers an element of a type has.
+fn numbers(shape: &str) -> Option<usize> {
+    let shapes = [
+        ("SCALAR", 1),
+        ("VEC2", 2),
+        ("VEC3", 3),
+        ("VEC4", 4),
+        ("MAT2", 4),
+        ("MAT3", 9),
+        ("MAT4", 16),
+    ];
+    shapes.into_iter().find(|(name, _)| *name == shape).map(|(_, count)| count)
+}
+
+/// The contents of a file's buffers, of those that lines need; or why one cannot be had, which matters only
+/// where it is used.
+pub struct Buffers<'a>(Vec<Result<Cow<'a, [u8]>, GroomFileError>>);
 
 impl<'a> Buffers<'a> {
     pub fn new(
-        root: &'a Root,
+        document: &'a Document,
         bin: Option<&'a [u8]>,
         external: &'a HashMap<String, Vec<u8>>,
-    ) -> Result<Self, GroomFileError> {
-        let one = |(i, buffer): (usize, &'a ::gltf::json::Buffer)| {
+    ) -> Self {
+        let needed = document.needed();
+        let one = |(i, buffer): (usize, &'a Buffer)| {
             let path = format!("buffers[{i}]");
+            if !needed[i] {
+                return Ok(Cow::default());
+            }
             let data: Cow<'a, [u8]> = match buffer.uri.as_deref() {
                 None if i > 0 => {
-                    return wrong(
-                        &path,
-                        "no uri",
-                        "a uri, optional only for the first",
-                        EXPORT_AGAIN,
-                    );
+                    let expected = "a uri, optional only for the first";
+                    return match compression(&buffer.extensions) {
+                        Some(name) => wrong(&path, format!("{name}, no uri"), expected, DECOMPRESS),
+                        None => wrong(&path, "no uri", expected, EXPORT_AGAIN),
+                    };
                 }
                 None => bin.unwrap_or_default().into(),
                 Some(uri) => match uri.strip_prefix(DATA) {
@@ -43,54 +90,66 @@ impl<'a> Buffers<'a> {
                     },
                 },
             };
-            if (data.len() as u64) < buffer.byte_length.0 {
-                let (found, expected) = (data.len(), buffer.byte_length.0);
-                let [found, expected] = [format!("{found} bytes"), expected.to_string()];
-                return wrong(&path, found, expected, "the buffer is cut short, export it again");
+            if (data.len() as u64) < buffer.byte_length {
+                let expected = buffer.byte_length.to_string();
+                // Where a file of its own is no buffer at all.
+                let (what, hint) = match (&buffer.uri, foreign::placeholder(&data)) {
+                    (Some(_), Some((what, hint))) => (format!(", {what}"), hint),
+                    _ => (String::new(), "the buffer is cut short, export it again"),
+                };
+                return wrong(&path, format!("{} bytes{what}", data.len()), expected, hint);
             }
             Ok(data)
         };
-        root.buffers.iter().enumerate().map(one).collect::<Result<_, _>>().map(Self)
+        Self(document.buffers.iter().enumerate().map(one).collect())
     }
 
     /// How many bytes all have.
     pub fn size(&self) -> usize {
-        self.0.iter().map(|b| b.len()).sum()
+        self.0.iter().flatten().map(|b| b.len()).sum()
     }
 
     /// The elements of an accessor.
-    pub fn elements(&self, (root, index): (&Root, usize)) -> Result<Elements<'_>, GroomFileError> {
+    pub fn elements(
+        &self,
+        (document, index): (&Document, usize),
+    ) -> Result<Elements<'_>, GroomFileError> {
         let path = format!("accessors[{index}]");
-        let Some(accessor) = root.accessors.get(index) else {
+        let Some(accessor) = document.accessors.get(index) else {
             return missing(&path);
         };
-        let (Checked::Valid(component), Checked::Valid(shape)) =
-            (&accessor.component_type, &accessor.type_)
-        else {
+        let types = Component::of(accessor.component_type).zip(numbers(&accessor.shape));
+        let Some((component, numbers)) = types else {
             return wrong(&path, "an unknown type", "a type of glTF 2.0", EXPORT_AGAIN);
         };
-        let (None, Some(view)) = (&accessor.sparse, &accessor.buffer_view) else {
+        let (None, Some(view_index)) = (&accessor.sparse, accessor.buffer_view) else {
             let hint = "export without compression and sparse accessors";
             return wrong(&path, "no data of its own", "a bufferView, not sparse", hint);
         };
-        let view_path = format!("bufferViews[{}]", view.value());
-        let Some(view) = root.buffer_views.get(view.value()) else {
+        let view_path = format!("bufferViews[{view_index}]");
+        let Some(view) = document.buffer_views.get(view_index) else {
             return missing(&view_path);
         };
-        let Some(buffer) = self.0.get(view.buffer.value()) else {
-            return missing(&format!("buffers[{}]", view.buffer.value()));
+        if let Some(name) = compression(&view.extensions) {
+            return wrong(&view_path, name, "numbers as they are", DECOMPRESS);
+        }
+        let buffer = match self.0.get(view.buffer) {
+            Some(Ok(buffer)) => buffer,
+            Some(Err(error)) => return Err(error.clone()),
+            None => return missing(&format!("buffers[{}]", view.buffer)),
         };
-        let size = component.0.size() * shape.multiplicity();
-        let from = view.byte_offset.unwrap_or_default().0;
+        let size = component.size() * numbers;
+        let from = view.byte_offset;
         let found = |data: &[u8]| format!("{} bytes from byte {from}", data.len());
-        let data = slice(buffer, from, view.byte_length.0);
+        let data = slice(buffer, from, view.byte_length);
         let Some(data) = data else {
-            let expected = view.byte_length.0.to_string();
+            let expected = view.byte_length.to_string();
             return wrong(&view_path, found(buffer), expected, "the buffer is too short");
         };
-        let offset = accessor.byte_offset.unwrap_or_default().0;
-        let stride = view.byte_stride.as_ref().map_or(size, |s| s.0).max(size);
-        let count = accessor.count.0;
+        let offset = accessor.byte_offset;
+        let stride = view.byte_stride.unwrap_or_default();
+        let stride = usize::try_from(stride).unwrap_or(usize::MAX).max(size);
+        let count = accessor.count;
         let span = match count.checked_sub(1) {
             Some(last) => last.checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64)),
             None => Some(0),
@@ -101,9 +160,9 @@ impl<'a> Buffers<'a> {
                 stride,
                 size,
                 count: count as usize,
-                component: component.0,
+                component,
                 normalized: accessor.normalized,
-                offset: from + offset,
+                offset: from.saturating_add(offset),
                 path,
             }),
             None => {
@@ -133,14 +192,14 @@ pub struct Elements<'a> {
     stride: usize,
     size: usize,
     count: usize,
-    component: ComponentType,
+    component: Component,
     normalized: bool,
     /// Of the first element in its buffer.
     offset: u64,
     path: String,
 }
 
-impl Elements<'_> {
+impl<'a> Elements<'a> {
     pub fn count(&self) -> usize {
         self.count
     }
@@ -150,7 +209,7 @@ impl Elements<'_> {
     }
 
     /// Its elements as groups of N numbers; missing ones are 1.
-    pub fn vectors<const N: usize>(&self) -> Result<Vectors<'_, N>, GroomFileError> {
+    pub fn vectors<const N: usize>(self) -> Result<Vectors<'a, N>, GroomFileError> {
         let has = self.size / self.component.size();
         // Colours come with alpha or without.
         if has != N && (has, N) != (3, 4) {
@@ -158,9 +217,9 @@ impl Elements<'_> {
             return wrong(&self.path, found, expected, EXPORT_AGAIN);
         }
         let number: fn(&[u8]) -> f32 = match (self.component, self.normalized) {
-            (ComponentType::F32, _) => |b| f32::from_le_bytes(array(b)),
-            (ComponentType::U8, true) => |b| f32::from(b[0]) / 255.0,
-            (ComponentType::U16, true) => |b| f32::from(u16::from_le_bytes(array(b))) / 65535.0,
+            (Component::F32, _) => |b| f32::from_le_bytes(array(b)),
+            (Component::U8, true) => |b| f32::from(b[0]) / 255.0,
+            (Component::U16, true) => |b| f32::from(u16::from_le_bytes(array(b))) / 65535.0,
             (other, _) => {
                 let expected = "f32, or normalized u8 or u16";
                 return wrong(&self.path, format!("{other:?}"), expected, "export as floats");
@@ -169,12 +228,25 @@ impl Elements<'_> {
         Ok(Vectors { elements: self, number })
     }
 
+    /// The same of whole numbers.
+    pub fn integers<const N: usize>(self) -> Result<Vectors<'a, N>, GroomFileError> {
+        let number: fn(&[u8]) -> f32 = match (self.component, self.size / self.component.size()) {
+            (Component::U8, has) if has == N => |b| f32::from(b[0]),
+            (Component::U16, has) if has == N => |b| f32::from(u16::from_le_bytes(array(b))),
+            (other, has) => {
+                let found = format!("{has} × {other:?}");
+                return wrong(&self.path, found, format!("{N} u8 or u16"), EXPORT_AGAIN);
+            }
+        };
+        Ok(Vectors { elements: self, number })
+    }
+
     /// Each element as an index below `count`.
     pub fn indices(&self, count: usize) -> Result<Vec<u32>, GroomFileError> {
         let number: fn(&[u8]) -> u32 = match (self.component, self.size / self.component.size()) {
-            (ComponentType::U8, 1) => |b| b[0].into(),
-            (ComponentType::U16, 1) => |b| u16::from_le_bytes(array(b)).into(),
-            (ComponentType::U32, 1) => |b| u32::from_le_bytes(array(b)),
+            (Component::U8, 1) => |b| b[0].into(),
+            (Component::U16, 1) => |b| u16::from_le_bytes(array(b)).into(),
+            (Component::U32, 1) => |b| u32::from_le_bytes(array(b)),
             (other, has) => {
                 let found = format!("{has} × {other:?}");
                 return wrong(&self.path, found, "one u8, u16 or u32", EXPORT_AGAIN);
@@ -198,14 +270,14 @@ impl Elements<'_> {
 /// Elements as groups of N numbers, read on demand: many primitives may share an accessor and use
 /// few of its elements.
 pub struct Vectors<'a, const N: usize> {
-    elements: &'a Elements<'a>,
+    elements: Elements<'a>,
     number: fn(&[u8]) -> f32,
 }
 
 impl<const N: usize> Vectors<'_, N> {
-    /// The element `i`, which is below the count.
-    pub fn get(&self, i: u32) -> Result<[f32; N], GroomFileError> {
-        let Elements { data, stride, size, component, offset, path, .. } = self.elements;
+    /// The element `i`, which is below the count. Its numbers may be anything.
+    pub fn get(&self, i: u32) -> [f32; N] {
+        let Elements { data, stride, size, component, .. } = &self.elements;
         let width = component.size();
         let from = i as usize * stride;
         let mut vector = [1.0; N];
@@ -213,15 +285,7 @@ impl<const N: usize> Vectors<'_, N> {
         for (out, bytes) in vector.iter_mut().zip(chunk.chunks_exact(width)) {
             *out = (self.number)(bytes);
         }
-        match vector.iter().position(|x| !x.is_finite()) {
-            None => Ok(vector),
-            Some(k) => {
-                let place =
-                    format!("{path}, byte {} of its buffer", offset + (from + k * width) as u64);
-                let hint = "repair or leave out that strand";
-                wrong(&place, vector[k].to_string(), "a finite number", hint)
-            }
-        }
+        vector
     }
 }
 

@@ -1,5 +1,7 @@
 //! Joins loose segments to strands.
 
+use bevy::platform::collections::HashMap;
+
 /// Chains of nodes, root first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chains {
@@ -35,30 +37,62 @@ impl Chains {
         }
     }
 
-    /// `count` nodes in pairs without shared indices: a pair that begins where the one before ends
-    /// continues its chain.
-    pub fn of_pairs<E>(count: u32, place: impl Fn(u32) -> Result<[f32; 3], E>) -> Result<Self, E> {
-        let mut chains = Self::default();
-        let mut last = None;
-        for i in (0..count / 2).map(|i| 2 * i) {
-            let (from, to) = (place(i)?, place(i + 1)?);
-            if last != Some(from) {
-                if last.is_some() {
-                    chains.end();
-                }
-                chains.nodes.push(i);
+    /// Joins chains that meet at a place, because segments have nodes of their own: one that begins where the
+    /// one before ends continues it, and so does any other that alone begins where only one ends. Chains that
+    /// begin at the same place are strands with the same root.
+    pub fn joined(self, place: impl Fn(u32) -> [f32; 3]) -> Self {
+        let key = |i: u32| {
+            place(i).map(|x| if x.is_nan() { x.to_bits() ^ i } else { (x + 0.0).to_bits() })
+        };
+        let chains: Vec<&[u32]> = self.iter().filter(|chain| !chain.is_empty()).collect();
+        let heads: Vec<[u32; 3]> = chains.iter().map(|c| key(c[0])).collect();
+        let tails: Vec<[u32; 3]> = chains.iter().map(|c| key(c[c.len() - 1])).collect();
+        let sole = |places: &[[u32; 3]]| {
+            let mut sole = HashMap::<[u32; 3], Option<usize>>::default();
+            for (k, place) in places.iter().enumerate() {
+                sole.entry(*place).and_modify(|k| *k = None).or_insert(Some(k));
             }
-            chains.nodes.push(i + 1);
-            last = Some(to);
+            sole
+        };
+        let (heads_at, tails_at) = (sole(&heads), sole(&tails));
+        let follows = |k: usize| k + 1 < chains.len() && tails[k] == heads[k + 1];
+        let next = |k: usize| {
+            let sole = |at: &HashMap<_, Option<usize>>| at.get(&tails[k]).copied().flatten();
+            let other = sole(&heads_at).filter(|j| *j != k && sole(&tails_at) == Some(k));
+            if follows(k) { Some(k + 1) } else { other }
+        };
+        let mut is_next = vec![false; chains.len()];
+        (0..chains.len()).filter_map(next).for_each(|j| is_next[j] = true);
+        let mut made = Self {
+            loops: self.loops,
+            branches: self.branches,
+            repeated: self.repeated,
+            ..Self::default()
+        };
+        let mut done = vec![false; chains.len()];
+        // From chains that continue none, and then round closed lines.
+        for closed in [false, true] {
+            for start in 0..chains.len() {
+                if done[start] || (is_next[start] && !closed) {
+                    continue;
+                }
+                done[start] = true;
+                made.nodes.extend(chains[start]);
+                let mut at = start;
+                while let Some(j) = next(at).filter(|j| !done[*j]) {
+                    done[j] = true;
+                    made.nodes.extend(&chains[j][1..]);
+                    at = j;
+                }
+                made.loops += usize::from(closed);
+                made.end();
+            }
         }
-        if last.is_some() {
-            chains.end();
-        }
-        Ok(chains)
+        made
     }
 
     /// Edges between nodes, two indices each, in any order. A chain begins at the end that has the
-    /// lower index; at nodes with three or more edges, chains end and others begin.
+    /// lower index, a lone edge at its first; at nodes with three or more edges, chains end and others begin.
     pub fn of_edges(indices: &[u32]) -> Self {
         let mut chains = Self::default();
         let Some(mut edges) = Edges::new(indices, &mut chains.repeated) else {
@@ -86,6 +120,12 @@ impl Chains {
 
     /// Adds one chain from `v` through `after`. Returns the branch that it ends at.
     fn walk(&mut self, edges: &mut Edges, v: usize, after: usize) -> Option<usize> {
+        let is_lone = edges.degree(v) == 1 && edges.degree(after) == 1;
+        if is_lone && edges.is_from(after) {
+            self.nodes.extend([edges.index(after), edges.index(v)]);
+            self.end();
+            return None;
+        }
         self.nodes.push(edges.index(v));
         let mut at = after;
         while at != v {
@@ -116,6 +156,8 @@ struct Edges {
     first: Vec<usize>,
     /// Each with its edge.
     neighbours: Vec<(usize, usize)>,
+    /// Whether an edge is from each node.
+    from: Vec<bool>,
     used: Vec<bool>,
     /// Up to where the neighbours of each node have been used.
     next: Vec<usize>,
@@ -136,7 +178,9 @@ impl Edges {
         }
         let mut next = first.clone();
         let mut neighbours = vec![(0, 0); sum];
+        let mut from = vec![false; first.len()];
         for (e, [a, b]) in edges().enumerate() {
+            from[a] = true;
             for (v, other) in [(a, b), (b, a)] {
                 neighbours[next[v]] = (other, e);
                 next[v] += 1;
@@ -144,7 +188,7 @@ impl Edges {
         }
         *repeated = pairs.len() - sum / 2;
         next.clone_from(&first);
-        Some(Self { low, first, neighbours, used: vec![false; sum / 2], next })
+        Some(Self { low, first, neighbours, from, used: vec![false; sum / 2], next })
     }
 
     fn count(&self) -> usize {
@@ -153,6 +197,11 @@ impl Edges {
 
     fn index(&self, v: usize) -> u32 {
         self.low + v as u32
+    }
+
+    /// Whether an edge is from it.
+    fn is_from(&self, v: usize) -> bool {
+        self.from[v]
     }
 
     fn degree(&self, v: usize) -> usize {
@@ -182,7 +231,7 @@ mod tests {
 
     #[test]
     fn edges_in_any_order_become_strands_from_their_lower_end() {
-        assert_eq!(chains(&[2, 3, 1, 0, 1, 2, 5, 4]), [vec![0, 1, 2, 3], vec![4, 5]]);
+        assert_eq!(chains(&[2, 3, 1, 0, 1, 2, 5, 4]), [vec![0, 1, 2, 3], vec![5, 4]]);
     }
 
     #[test]
@@ -205,10 +254,29 @@ mod tests {
 
     #[test]
     fn loose_pairs_follow_each_other_by_place() {
-        let at = |x: f32| [x, 0.0, 0.0];
-        let places = [at(0.0), at(1.0), at(1.0), at(2.0), at(5.0), at(6.0)];
-        let chains = Chains::of_pairs::<()>(6, |i| Ok(places[i as usize])).unwrap();
-        let lines: Vec<_> = chains.iter().collect();
-        assert_eq!(lines, [&[0, 1, 3][..], &[4, 5]]);
+        let joined = |places: &[f32], indices: &[u32]| {
+            let chains = Chains::of_edges(indices).joined(|i| [places[i as usize], 0.0, 0.0]);
+            (chains.iter().map(<[u32]>::to_vec).collect::<Vec<_>>(), chains.loops)
+        };
+        let places = [0.0, 1.0, 1.0, 2.0, 5.0, 6.0];
+        let lines = vec![vec![0, 1, 3], vec![4, 5]];
+        assert_eq!(joined(&places, &[0, 1, 2, 3, 4, 5]), (lines.clone(), 0));
+        // In another order, and against the order of their nodes.
+        assert_eq!(joined(&places, &[2, 3, 4, 5, 0, 1]), (lines, 0));
+        assert_eq!(joined(&places, &[3, 2, 1, 0]), (vec![vec![3, 2, 0]], 0));
+        // Some nodes are shared, one is double.
+        assert_eq!(
+            joined(&[0.0, 1.0, 2.0, 2.0, 3.0], &[0, 1, 1, 2, 3, 4]),
+            (vec![vec![0, 1, 2, 4]], 0)
+        );
+        // Two strands with the same root, in a row, and two that end together.
+        let fan = vec![vec![0, 1], vec![2, 3]];
+        assert_eq!(joined(&[0.0, 1.0, 0.0, 2.0], &[0, 1, 2, 3]), (fan.clone(), 0));
+        assert_eq!(joined(&[1.0, 0.0, 2.0, 0.0], &[0, 1, 2, 3]), (fan, 0));
+        // Closed.
+        let ring = [0.0, 1.0, 1.0, 2.0, 2.0, 0.0];
+        assert_eq!(joined(&ring, &[0, 1, 2, 3, 4, 5]), (vec![vec![0, 1, 3, 5]], 1));
+        let broken = joined(&[0.0, f32::NAN, f32::NAN, 1.0], &[0, 1, 2, 3]);
+        assert_eq!(broken.0.len(), 2);
     }
 }

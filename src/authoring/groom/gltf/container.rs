@@ -4,7 +4,8 @@ use super::super::{
     GroomFileError,
     bytes::{Bytes, value},
 };
-use ::gltf::json::{self, Root};
+use super::document::Document;
+use ::gltf::json::deserialize::from_slice;
 
 const JSON: u32 = u32::from_le_bytes(*b"JSON");
 const BIN: u32 = u32::from_le_bytes(*b"BIN\0");
@@ -19,7 +20,7 @@ pub fn looks_like_json(file: &[u8]) -> bool {
 }
 
 /// The JSON, and GLB's binary chunk if there is one.
-pub fn split(file: &[u8]) -> Result<(Root, Option<&[u8]>), GroomFileError> {
+pub fn split(file: &[u8]) -> Result<(Document, Option<&[u8]>), GroomFileError> {
     if !file.starts_with(b"glTF") {
         let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         return Ok((parse(&file[start..], start as u64)?, None));
@@ -57,16 +58,20 @@ fn chunk(whole: Bytes<'_>, at: u64) -> Result<(u32, &[u8]), GroomFileError> {
     Ok((kind, whole.array(at + CHUNK, length, 1, "chunk")?))
 }
 
-fn parse(text: &[u8], start: u64) -> Result<Root, GroomFileError> {
-    let root: Root = json::deserialize::from_slice(text).map_err(|error| {
+fn parse(text: &[u8], start: u64) -> Result<Document, GroomFileError> {
+    // Padding should be blanks, but often is not.
+    let is_padding = |byte: &u8| *byte == 0 || byte.is_ascii_whitespace();
+    let end = text.iter().rposition(|byte| !is_padding(byte)).map_or(0, |last| last + 1);
+    let text = &text[..end];
+    let document: Document = from_slice(text).map_err(|error| {
         let offset = start + offset_of(text, error.line(), error.column());
         GroomFileError::Json { offset, message: error.to_string() }
     })?;
-    if !root.asset.version.starts_with("2.") {
-        let found = format!("asset.version {:?}", root.asset.version);
+    if !document.asset.version.starts_with("2.") {
+        let found = format!("asset.version {:?}", document.asset.version);
         return super::error::wrong("asset.version", found, "2.0", EXPORT_AGAIN);
     }
-    Ok(root)
+    Ok(document)
 }
 
 /// The byte offset of a line and column, both from 1.

@@ -2,34 +2,36 @@
 //! that were turned into the edges of a mesh.
 //!
 //! `LINE_STRIP` is a strand; `LINE_LOOP` is one, opened at its first node; `LINES` are joined to
-//! strands where they share a node, and branches become strands of their own. The root is the end
-//! that comes first in the file. `POSITION`, `COLOR_0` and `TEXCOORD_0` (of the root) are read, and
-//! nodes' transforms applied. Primitives that are no lines are counted and skipped.
+//! strands where they share a node, or where one ends at the very place where another begins, and branches
+//! become strands of their own. The root is the end that comes first in the file. `POSITION`, `COLOR_0` and
+//! `TEXCOORD_0` (of the root) are read, and nodes' transforms applied, or on skinned lines those of the
+//! joints, as glTF says. Primitives that are no lines are counted and skipped; colours and UVs that cannot be
+//! read are counted and left out.
+//!
+//! Only what lines need is looked at: other buffers may be missing or compressed, materials and animations
+//! broken.
 
 mod accessor;
 mod chain;
 mod container;
+mod document;
 mod error;
+mod skin;
 
-use super::{Groom, GroomError, GroomFileError, GroomLosses};
-use ::gltf::json::{
-    Index, Root,
-    accessor::Accessor,
-    mesh::{Mode, Primitive, Semantic},
-    scene::Node,
-    validation::Checked,
-};
-use accessor::{Buffers, Vectors};
+use super::{Groom, GroomError, GroomFileError, GroomLosses, intake::Intake, losses::GroomPlace};
+use accessor::{Buffers, Elements, Vectors};
 use bevy::{platform::collections::HashMap, prelude::*};
 use chain::Chains;
+use document::{COLOR, Document, Node, POSITION, Primitive, UV, compression};
 use error::{missing, wrong};
+use skin::{Bones, Place};
 
 pub(super) use container::looks_like_json;
 
 /// A glTF or GLB file whose JSON has been read.
 #[derive(Clone, Debug)]
 pub struct GltfFile<'a> {
-    root: Root,
+    document: Document,
     bin: Option<&'a [u8]>,
     size: usize,
 }
@@ -48,76 +50,90 @@ impl<'a> GltfFile<'a> {
     /// # Errors
     /// When the container or the JSON is broken, or it is not glTF 2.
     pub fn parse(file: &'a [u8]) -> Result<Self, GroomFileError> {
-        let (root, bin) = container::split(file)?;
-        Ok(Self { root, bin, size: file.len() })
+        let (document, bin) = container::split(file)?;
+        Ok(Self { document, bin, size: file.len() })
     }
 
-    /// The URIs of buffers that are files of their own, relative to this one, percent-encoded as in
-    /// the file.
-    pub fn external(&self) -> impl Iterator<Item = &str> {
-        let uris = self.root.buffers.iter().filter_map(|b| b.uri.as_deref());
-        uris.filter(|uri| !uri.starts_with(accessor::DATA))
+    /// The URIs of buffers that lines need and that are files of their own, relative to this one,
+    /// percent-encoded as in the file.
+    pub fn external(&self) -> Vec<String> {
+        let buffers = self.document.buffers.iter().zip(self.document.needed());
+        let uris = buffers.filter_map(|(buffer, needed)| buffer.uri.clone().filter(|_| needed));
+        uris.filter(|uri| !uri.starts_with(accessor::DATA)).collect()
     }
 
     /// The groom, in the file's own unit and axes (metres and Y up as glTF has it), and what was left
     /// out. `external` has the contents of the files that [`external`](Self::external) names.
     ///
     /// # Errors
-    /// When there are no lines, a reference is invalid, a number is not finite, or copies would
-    /// take more memory than the file justifies.
+    /// When there are no lines, a reference of theirs is invalid, or copies would take more memory than the
+    /// file justifies.
     pub fn read(
         &self,
         external: &HashMap<String, Vec<u8>>,
     ) -> Result<(Groom, GroomLosses), GroomFileError> {
-        let buffers = Buffers::new(&self.root, self.bin, external)?;
+        self.intake(external).map(|intake| (intake.groom, intake.losses))
+    }
+
+    pub(super) fn intake(
+        &self,
+        external: &HashMap<String, Vec<u8>>,
+    ) -> Result<Intake, GroomFileError> {
+        let document = &self.document;
+        let buffers = Buffers::new(document, self.bin, external);
+        let placed = placed_nodes(document)?;
+        let bones = Bones::new(document, &buffers, &placed);
         let mut reading = Reading {
-            root: &self.root,
+            document,
             limit: self.size + buffers.size(),
             buffers: &buffers,
+            bones: &bones,
             groom: Groom::default(),
             losses: GroomLosses::default(),
         };
-        for (node, place) in placed_nodes(&self.root)? {
-            let Some(mesh) = &node.mesh else {
+        for &(index, place) in &placed {
+            let node = &document.nodes[index];
+            let Some(mesh) = node.mesh else {
                 continue;
             };
-            let mesh_path = format!("meshes[{}]", mesh.value());
-            let Some(found) = self.root.meshes.get(mesh.value()) else {
+            let mesh_path = format!("meshes[{mesh}]");
+            let Some(found) = document.meshes.get(mesh) else {
                 return missing(&mesh_path);
             };
             for (k, primitive) in found.primitives.iter().enumerate() {
-                reading.primitive(primitive, &format!("{mesh_path}.primitives[{k}]"), place)?;
+                let path = format!("{mesh_path}.primitives[{k}]");
+                reading.primitive(primitive, &path, (node, place))?;
             }
         }
         let Reading { groom, losses, .. } = reading;
         if groom.is_empty() {
             return wrong("meshes", "no lines", "primitives of mode 1, 2 or 3", LINES_HINT);
         }
-        Ok((groom.checked()?, losses))
+        Ok(Intake::cleaned(groom, losses)?)
     }
 }
 
 const LINES_HINT: &str = "in Blender convert the curves to a mesh, and export loose edges";
 
-/// All nodes of the scene with their transforms to it, parents first.
-fn placed_nodes(root: &Root) -> Result<Vec<(&Node, Mat4)>, GroomFileError> {
-    let mut parent = vec![false; root.nodes.len()];
-    for child in root.nodes.iter().flat_map(|n| n.children.iter().flatten()) {
-        if let Some(has) = parent.get_mut(child.value()) {
+/// All nodes of the scene by their indices, with their transforms to it, parents first.
+fn placed_nodes(document: &Document) -> Result<Vec<(usize, Mat4)>, GroomFileError> {
+    let nodes = &document.nodes;
+    let mut parent = vec![false; nodes.len()];
+    for child in nodes.iter().flat_map(|n| &n.children) {
+        if let Some(has) = parent.get_mut(*child) {
             *has = true;
         }
     }
-    let scene = root.scene.map_or(0, |scene| scene.value());
-    let mut open: Vec<(usize, Mat4)> = match root.scenes.get(scene) {
-        Some(scene) => scene.nodes.iter().map(|n| (n.value(), Mat4::IDENTITY)).collect(),
+    let mut open: Vec<(usize, Mat4)> = match document.scenes.get(document.scene.unwrap_or(0)) {
+        Some(scene) => scene.nodes.iter().map(|n| (*n, Mat4::IDENTITY)).collect(),
         None => (0..parent.len()).filter(|i| !parent[*i]).map(|i| (i, Mat4::IDENTITY)).collect(),
     };
     open.reverse();
-    let mut seen = vec![false; root.nodes.len()];
+    let mut seen = vec![false; nodes.len()];
     let mut placed = Vec::new();
     while let Some((index, above)) = open.pop() {
         let path = format!("nodes[{index}]");
-        let (Some(node), Some(seen)) = (root.nodes.get(index), seen.get_mut(index)) else {
+        let (Some(node), Some(seen)) = (nodes.get(index), seen.get_mut(index)) else {
             return missing(&path);
         };
         if core::mem::replace(seen, true) {
@@ -125,9 +141,8 @@ fn placed_nodes(root: &Root) -> Result<Vec<(&Node, Mat4)>, GroomFileError> {
             return wrong(&path, "a node with two parents", "a tree of nodes", hint);
         }
         let place = above * local(node);
-        placed.push((node, place));
-        let children = node.children.iter().flatten().rev();
-        open.extend(children.map(|child| (child.value(), place)));
+        placed.push((index, place));
+        open.extend(node.children.iter().rev().map(|child| (*child, place)));
     }
     Ok(placed)
 }
@@ -138,58 +153,45 @@ fn local(node: &Node) -> Mat4 {
         None => Mat4::from_scale_rotation_translation(
             node.scale.map_or(Vec3::ONE, Vec3::from),
             // Unit length is not required here; non-finite values show in the positions.
-            node.rotation.as_ref().map_or(Quat::IDENTITY, |q| Quat::from_array(q.0)),
+            node.rotation.map_or(Quat::IDENTITY, Quat::from_array),
             node.translation.map_or(Vec3::ZERO, Vec3::from),
         ),
     }
 }
 
 struct Reading<'a> {
-    root: &'a Root,
+    document: &'a Document,
     buffers: &'a Buffers<'a>,
+    bones: &'a Bones,
     /// How many nodes the groom may have: as many as there are bytes.
     limit: usize,
     groom: Groom,
     losses: GroomLosses,
 }
 
-impl Reading<'_> {
+impl<'a> Reading<'a> {
     fn primitive(
         &mut self,
         primitive: &Primitive,
         path: &str,
-        place: Mat4,
+        (node, place): (&Node, Mat4),
     ) -> Result<(), GroomFileError> {
-        let Checked::Valid(mode @ (Mode::Lines | Mode::LineLoop | Mode::LineStrip)) =
-            primitive.mode
-        else {
-            self.losses.skipped_primitives += 1;
+        let Some(mode) = primitive.lines() else {
+            self.losses.skipped_primitives.add(GroomPlace::Part(path.to_owned()));
             return Ok(());
         };
-        let buffers = self.buffers;
-        let accessor = |index: &Index<Accessor>| (self.root, index.value());
-        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic));
-        let Some(positions) = attribute(Semantic::Positions) else {
+        let Some(&positions) = primitive.attributes.get(POSITION) else {
             let hint = "export the file again";
             return wrong(path, "no POSITION", "an accessor of positions", hint);
         };
-        let positions = buffers.elements(accessor(positions))?;
+        if let Some(name) = compression(&primitive.extensions) {
+            let hint = "export without compression";
+            return wrong(path, name, "numbers as they are", hint);
+        }
+        let positions = self.buffers.elements((self.document, positions))?;
         let count = positions.count();
-        let of_each = |index: Option<&Index<Accessor>>| {
-            let elements = index.map(|i| buffers.elements(accessor(i))).transpose()?;
-            match elements {
-                Some(e) if e.count() != count => {
-                    let found = format!("{} elements", e.count());
-                    let expected = format!("{count}, as many as positions");
-                    wrong(path, found, expected, "export the file again")
-                }
-                elements => Ok(elements),
-            }
-        };
-        let colours = of_each(attribute(Semantic::Colors(0)))?;
-        let uvs = of_each(attribute(Semantic::TexCoords(0)))?;
-        let indices =
-            primitive.indices.as_ref().map(|i| buffers.elements(accessor(i))).transpose()?;
+        let indices = primitive.indices.map(|i| self.buffers.elements((self.document, i)));
+        let indices = indices.transpose()?;
         let order_count = indices.as_ref().map_or(count, |i| i.count());
         // Checked before allocation. No mode makes more nodes than it has indices.
         if self.groom.points.len().saturating_add(order_count) > self.limit {
@@ -198,19 +200,62 @@ impl Reading<'_> {
             return wrong(path, found, expected, "apply instances before the export");
         }
         let positions = positions.vectors::<3>()?;
-        let order = indices.as_ref().map(|i| i.indices(count)).transpose()?;
-        let chains = match (mode, order) {
-            (Mode::Lines, None) => Chains::of_pairs(count as u32, |i| positions.get(i))?,
-            (Mode::Lines, Some(order)) => Chains::of_edges(&order),
-            (_, None) => Chains::of_strip((0..count as u32).collect(), mode == Mode::LineLoop),
-            (_, Some(order)) => Chains::of_strip(order, mode == Mode::LineLoop),
+        let order = match indices {
+            Some(indices) => indices.indices(count)?,
+            None => (0..count as u32).collect(),
         };
-        self.losses.opened_loops += chains.loops;
-        self.losses.split_branches += chains.branches;
-        self.losses.merged_nodes += chains.repeated;
-        let colours = colours.as_ref().map(|c| c.vectors::<4>()).transpose()?;
-        let uvs = uvs.as_ref().map(|c| c.vectors::<2>()).transpose()?;
+        let chains = match mode {
+            Primitive::LINES => Chains::of_edges(&order).joined(|i| positions.get(i)),
+            _ => Chains::of_strip(order, mode == Primitive::LINE_LOOP),
+        };
+        let losses = &mut self.losses;
+        for (loss, found) in [
+            (&mut losses.opened_loops, chains.loops),
+            (&mut losses.split_branches, chains.branches),
+            (&mut losses.merged_nodes, chains.repeated),
+        ] {
+            if found > 0 {
+                loss.add_many(found, GroomPlace::Part(path.to_owned()));
+            }
+        }
+        let colours = self.optional(primitive, (path, COLOR, count), Elements::vectors::<4>);
+        let uvs = self.optional(primitive, (path, UV, count), Elements::vectors::<2>);
+        let place = match node.skin {
+            None => Place::Node(place),
+            Some(skin) => {
+                let joints = (path, document::JOINTS, count);
+                let joints = self.optional(primitive, joints, Elements::integers::<4>);
+                let weights = (path, document::WEIGHTS, count);
+                let weights = self.optional(primitive, weights, Elements::vectors::<4>);
+                self.bones.place(skin, joints.zip(weights))
+            }
+        };
         self.add(&chains, &positions, colours, uvs, place)
+    }
+
+    /// An attribute that lines can do without: `None`, and counted, if it cannot be read.
+    fn optional<const N: usize>(
+        &mut self,
+        primitive: &Primitive,
+        (path, name, count): (&str, &str, usize),
+        vectors: fn(Elements<'a>) -> Result<Vectors<'a, N>, GroomFileError>,
+    ) -> Option<Vectors<'a, N>> {
+        let index = *primitive.attributes.get(name)?;
+        let elements =
+            self.buffers.elements((self.document, index)).and_then(|e| match e.count() {
+                fits if fits == count => Ok(e),
+                found => {
+                    let expected = format!("{count}, as many as positions");
+                    wrong(name, format!("{found} elements"), expected, "export the file again")
+                }
+            });
+        let (loss, error) = match elements.map(vectors) {
+            Ok(Ok(vectors)) => return Some(vectors),
+            Ok(Err(error)) => (&mut self.losses.unread_arrays, error),
+            Err(error) => (&mut self.losses.broken_arrays, error),
+        };
+        loss.add(GroomPlace::Part(format!("{path}.{name}: {error}")));
+        None
     }
 
     fn add(
@@ -219,7 +264,7 @@ impl Reading<'_> {
         positions: &Vectors<'_, 3>,
         colours: Option<Vectors<'_, 4>>,
         uvs: Option<Vectors<'_, 2>>,
-        place: Mat4,
+        place: Place<'_>,
     ) -> Result<(), GroomFileError> {
         let groom = &mut self.groom;
         // Some primitives may have colours or UVs while others have none.
@@ -231,21 +276,19 @@ impl Reading<'_> {
         }
         let (had_colours, had_uvs) = (!groom.colors.is_empty(), !groom.uvs.is_empty());
         for chain in chains.iter() {
-            let [Some(&root), Some(_)] = [chain.first(), chain.get(1)] else {
-                self.losses.short_strands += 1;
+            let Some(&root) = chain.first() else {
                 continue;
             };
             for &i in chain {
-                let point = Vec3::from_array(positions.get(i)?);
-                groom.points.push(place.transform_point3(point));
+                groom.points.push(place.of(i, Vec3::from_array(positions.get(i))));
                 if let Some(colours) = &colours {
-                    groom.colors.push(LinearRgba::from_f32_array(colours.get(i)?));
+                    groom.colors.push(LinearRgba::from_f32_array(colours.get(i)));
                 } else if had_colours {
                     groom.colors.push(LinearRgba::WHITE);
                 }
             }
             if let Some(uvs) = &uvs {
-                groom.uvs.push(Vec2::from_array(uvs.get(root)?));
+                groom.uvs.push(Vec2::from_array(uvs.get(root)));
             } else if had_uvs {
                 groom.uvs.push(Vec2::ZERO);
             }
