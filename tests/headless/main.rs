@@ -40,6 +40,7 @@ mod attack;
 mod avian;
 mod bonds;
 mod character;
+mod characters;
 mod colliders;
 mod commands;
 mod contact;

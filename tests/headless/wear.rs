@@ -29,9 +29,9 @@ const BONES: [(&str, Vec3); 4] = [
 ];
 
 #[derive(Resource, Default)]
-struct Reported {
-    worn: Vec<HairWorn>,
-    refused: Vec<(Entity, WearError)>,
+pub(super) struct Reported {
+    pub(super) worn: Vec<HairWorn>,
+    pub(super) refused: Vec<(Entity, WearError)>,
 }
 
 pub(super) fn app() -> App {
@@ -51,7 +51,7 @@ fn reported(app: &mut App) -> Reported {
 }
 
 /// Updates until an event of wearing is triggered.
-fn wait(app: &mut App) -> Reported {
+pub(super) fn wait(app: &mut App) -> Reported {
     for _ in 0..4000 {
         app.update();
         let reported = reported(app);
@@ -69,7 +69,7 @@ pub(super) fn worn(app: &mut App) -> Entity {
     reported.worn[0].hair
 }
 
-fn part(mesh: Mesh, place: Transform, joint: u16) -> Mesh {
+pub(super) fn part(mesh: Mesh, place: Transform, joint: u16) -> Mesh {
     let mut mesh = mesh.transformed_by(place);
     mesh.remove_attribute(Mesh::ATTRIBUTE_UV_0);
     let count = mesh.count_vertices();
@@ -119,14 +119,14 @@ pub(super) fn character(app: &mut App, root: Entity, scale: f32) -> (Entity, Ent
     (head, body)
 }
 
-fn strands(app: &mut App, hair: Entity) -> Vec<Strand> {
+pub(super) fn strands(app: &mut App, hair: Entity) -> Vec<Strand> {
     let world = app.world_mut();
     let members: Vec<Entity> = world.get::<Strands>(hair).unwrap().iter().collect();
     members.into_iter().map(|s| world.get::<Strand>(s).unwrap().clone()).collect()
 }
 
 /// From the hair's frame to the wearer's, as transforms are now.
-fn place_in(app: &App, entity: Entity, root: Entity) -> Mat4 {
+pub(super) fn place_in(app: &App, entity: Entity, root: Entity) -> Mat4 {
     let (mut at, mut place) = (entity, Mat4::IDENTITY);
     while at != root {
         place = app.world().get::<Transform>(at).unwrap().to_matrix() * place;
