@@ -153,6 +153,9 @@ fn table(rows: Vec<rows::Row>, json: bool) -> Result<(), Box<dyn std::error::Err
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    if !arguments.files.is_empty() && arguments.scene != Show::Characters {
+        return Err("FILE.glb is for --scene characters".into());
+    }
     let kind = match arguments.scene {
         Show::Scene(kind) => kind,
         Show::Swing => return swing(arguments),

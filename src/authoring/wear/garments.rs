@@ -11,10 +11,14 @@ use crate::{
     base::grid::KdTree,
     forces::contact::{Bake, DistanceGrid, HairCollider, Openings},
 };
-use bevy::{math::Affine3A, platform::collections::HashSet, prelude::*};
+use bevy::{
+    math::Affine3A,
+    platform::collections::{HashMap, HashSet},
+    prelude::*,
+};
 
 /// How far below its outside a garment is solid, and how far out of it (m).
-const DEPTH: f32 = 0.03;
+const DEPTH: f32 = 0.06;
 const OUT: f32 = 2e-3;
 /// Spacing of the points at which distances are known (m).
 const CELL: f32 = 0.012;
@@ -115,17 +119,39 @@ fn outside(mut faces: Vec<Face>) -> Vec<Face> {
     faces
 }
 
-/// A sheet below triangles; `None` without any.
+/// The space below triangles, closed around their border; `None` without any. Below the middle of it hair leaves
+/// on the inside.
 fn sheet(faces: &[&Face]) -> Option<DistanceGrid> {
-    let mut places = Vec::with_capacity(3 * faces.len());
+    // Vertices at one place are one, or the sides of a fold would come apart.
+    let mut known: HashMap<[u32; 3], u32> = default();
+    let (mut places, mut normals): (Vec<Vec3>, Vec<Vec3>) = default();
+    let mut outer: Vec<[u32; 3]> = Vec::with_capacity(faces.len());
     for face in faces {
-        let normal = face.area().try_normalize()?;
-        places.extend(face.corners.map(|p| p - normal * (0.5 * DEPTH - OUT)));
+        let area = face.area();
+        outer.push(face.corners.map(|p| {
+            let v = *known.entry(p.to_array().map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
+                places.push(p);
+                normals.push(Vec3::ZERO);
+                places.len() as u32 - 1
+            });
+            normals[v as usize] += area;
+            v
+        }));
     }
-    let triangles: Vec<[u32; 3]> =
-        (0..faces.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let how = Bake { cell: CELL, openings: Openings::Shell { thickness: DEPTH } };
-    DistanceGrid::bake_with(&places, &triangles, &how).ok()
+    let count = places.len() as u32;
+    let way = |v: usize| normals[v].normalize_or_zero();
+    let mut corners: Vec<Vec3> =
+        places.iter().enumerate().map(|(v, p)| *p + way(v) * OUT).collect();
+    corners.extend(places.iter().enumerate().map(|(v, p)| *p - way(v) * DEPTH));
+    let edges = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+    let all: HashSet<[u32; 2]> = outer.iter().flat_map(edges).collect();
+    let mut triangles = outer.clone();
+    triangles.extend(outer.iter().map(|[a, b, c]| [a + count, c + count, b + count]));
+    for [a, b] in outer.iter().flat_map(edges).filter(|[a, b]| !all.contains(&[*b, *a])) {
+        triangles.extend([[b, a, a + count], [b, a + count, b + count]]);
+    }
+    let how = Bake { cell: CELL, openings: Openings::Fill };
+    DistanceGrid::bake_with(&corners, &triangles, &how).ok()
 }
 
 #[cfg(test)]
@@ -159,8 +185,9 @@ mod tests {
             let grid = sheet(&out.iter().collect::<Vec<_>>()).unwrap();
             let at = |off: f32| grid.distance(Vec3::new(0.01, -0.3, 0.15 + off));
             assert!((at(0.02) - 0.018).abs() < 2e-3, "{way}: {}", at(0.02));
-            assert!(at(-0.005) < -2e-3 && at(-0.02) < 0.0, "{way}: {} {}", at(-0.005), at(-0.02));
-            assert!(at(-0.05) > 0.01, "{way}: {}", at(-0.05));
+            // Deeper by as much on the way in: hair leaves on the outside.
+            assert!((at(-0.005) + 0.007).abs() < 2e-3 && (at(-0.02) + 0.022).abs() < 2e-3);
+            assert!(at(-0.1) > 0.03, "{way}: {}", at(-0.1));
         }
     }
 
