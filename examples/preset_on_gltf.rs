@@ -48,9 +48,9 @@ fn register(app: &mut App) {
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>) {
     let figure = assets.load(GltfAssetLabel::Scene(0).from_asset("figure.glb"));
-    // The head bone is found by its name. glTF's characters look along +Z.
+    // The head bone is found by its name, and where the face looks by the feet.
     commands
-        .spawn((WorldAssetRoot(figure), WearHair::new(HairPreset::Curly).facing(Dir3::Z)))
+        .spawn((WorldAssetRoot(figure), WearHair::new(HairPreset::Curly)))
         .observe(|worn: On<HairWorn>| info!("hair {} is worn", worn.hair))
         .observe(|failed: On<HairNotWorn>| error!("{}", failed.error));
     commands.spawn((
@@ -75,6 +75,6 @@ fn change(keys: Res<ButtonInput<KeyCode>>, mut figure: Single<&mut WearHair>) {
     let digits = [Digit1, Digit2, Digit3, Digit4, Digit5, Digit6, Digit7];
     if let Some(pressed) = digits.into_iter().position(|key| keys.just_pressed(key)) {
         // The old hair stays until the new one is ready.
-        **figure = WearHair::new(HairPreset::ALL[pressed]).facing(Dir3::Z);
+        **figure = WearHair::new(HairPreset::ALL[pressed]);
     }
 }

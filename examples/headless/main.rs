@@ -5,6 +5,8 @@
 //! `swing` is no scene of a paper: a single strand is let go, to be held against the theory of rods.
 //! `-- --scene swing --length 0.2 --bending-length 0.13 --segments 16 --from level --json`
 
+#[path = "../shared/characters.rs"]
+mod characters;
 #[path = "../shared/rows.rs"]
 mod rows;
 #[path = "../shared/scenes/mod.rs"]
@@ -44,6 +46,7 @@ enum Show {
     Scene(SceneKind),
     Swing,
     Worlds,
+    Characters,
 }
 
 impl FromStr for Show {
@@ -52,10 +55,11 @@ impl FromStr for Show {
         match name {
             "swing" => Ok(Self::Swing),
             "worlds" => Ok(Self::Worlds),
+            "characters" => Ok(Self::Characters),
             _ => name
                 .parse()
                 .map(Self::Scene)
-                .map_err(|e: UnknownName| format!("{e}, swing, worlds")),
+                .map_err(|e: UnknownName| format!("{e}, swing, worlds, characters")),
         }
     }
 }
@@ -64,10 +68,13 @@ impl FromStr for Show {
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
-    /// Which scene: bedhead, blow-dry, perm, wet, shower; swing, a single strand; or worlds, what games
-    /// do to a world, as figures against what they should be.
+    /// Which scene: bedhead, blow-dry, perm, wet, shower; swing, a single strand; or, as figures against
+    /// what they should be, worlds, what games do to a world, and characters, hair on glTF files.
     #[arg(long)]
     scene: Show,
+    /// The files of `characters`; the project's own figure if left out.
+    #[arg(value_name = "FILE.glb")]
+    files: Vec<PathBuf>,
     /// Which variant of it; the full treatment if left out.
     #[arg(long)]
     variant: Option<String>,
@@ -118,10 +125,20 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints how hair fares in worlds that move.
-fn worlds(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let table = rows::Rows { rows: worlds::rows() };
-    if arguments.json {
+/// Prints how hair sits on characters.
+fn characters(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/figure.glb");
+    let files = if arguments.files.is_empty() { vec![own] } else { arguments.files.clone() };
+    if let Some(missing) = files.iter().find(|file| !file.is_file()) {
+        return Err(format!("{} is no file: name a .glb", missing.display()).into());
+    }
+    table(characters::rows(&files), arguments.json)
+}
+
+/// Prints rows; an error where one is outside of its tolerance.
+fn table(rows: Vec<rows::Row>, json: bool) -> Result<(), Box<dyn std::error::Error>> {
+    let table = rows::Rows { rows };
+    if json {
         println!("{}", serde_json::to_string(&table)?);
     } else {
         for rows::Row { test, expected, got, tolerance, within } in &table.rows {
@@ -136,10 +153,14 @@ fn worlds(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    if !arguments.files.is_empty() && arguments.scene != Show::Characters {
+        return Err("FILE.glb is for --scene characters".into());
+    }
     let kind = match arguments.scene {
         Show::Scene(kind) => kind,
         Show::Swing => return swing(arguments),
-        Show::Worlds => return worlds(arguments),
+        Show::Worlds => return table(worlds::rows(), arguments.json),
+        Show::Characters => return characters(arguments),
     };
     if arguments.swing.any() {
         return Err(

@@ -101,6 +101,7 @@ fn build(
         mesh: Some(body),
         roots: planted.roots,
         strands_from_mesh: Affine3A::from_translation(to_bone),
+        ..default()
     });
 
     let brows = dressed::brows(preset.settings().look.melanin);

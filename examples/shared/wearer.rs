@@ -24,7 +24,8 @@ pub fn ball(radius: f32) -> Mesh {
     Sphere::new(radius).mesh().uv(48, 32)
 }
 
-fn part(mesh: Mesh, place: Transform, joint: u16) -> Mesh {
+/// A part of a body that moves with one joint.
+pub fn part(mesh: Mesh, place: Transform, joint: u16) -> Mesh {
     let mut mesh = mesh.transformed_by(place);
     mesh.remove_attribute(Mesh::ATTRIBUTE_UV_0);
     let count = mesh.count_vertices();
@@ -34,7 +35,7 @@ fn part(mesh: Mesh, place: Transform, joint: u16) -> Mesh {
 }
 
 /// A head on a neck on a trunk, at rest, its vertices scaled.
-fn skin(scale: f32) -> Mesh {
+pub fn skin(scale: f32) -> Mesh {
     let ball = Sphere::new(1.0).mesh().uv(64, 48);
     // The poles of the ball are along Z.
     let turn = Quat::from_rotation_x(-core::f32::consts::FRAC_PI_2);

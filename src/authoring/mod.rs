@@ -14,6 +14,6 @@ pub mod prelude {
     };
     pub use crate::authoring::plant::{HairPreset, Hairline, Scalp};
     pub use crate::authoring::wear::{
-        HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair,
+        FacingFrom, HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair,
     };
 }

@@ -3,6 +3,10 @@
 #[path = "../../examples/shared/body.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod body;
+#[path = "../../examples/shared/characters.rs"]
+#[allow(dead_code, reason = "each program uses its part")]
+#[cfg(feature = "groom")]
+mod characters_measured;
 #[path = "../common/mod.rs"]
 mod common;
 #[path = "../../examples/shared/scenes/locks.rs"]
@@ -40,6 +44,7 @@ mod attack;
 mod avian;
 mod bonds;
 mod character;
+mod characters;
 mod colliders;
 mod commands;
 mod contact;

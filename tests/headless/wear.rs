@@ -18,12 +18,12 @@ use bevy_keratin::{
 use std::{thread::sleep, time::Duration};
 
 #[derive(Resource, Default)]
-struct Reported {
-    worn: Vec<HairWorn>,
-    refused: Vec<(Entity, WearError)>,
+pub(super) struct Reported {
+    pub(super) worn: Vec<HairWorn>,
+    pub(super) refused: Vec<(Entity, WearError)>,
 }
 
-fn app() -> App {
+pub(super) fn app() -> App {
     let mut app = app_with_meshes(60.0);
     app.init_resource::<Reported>()
         .add_observer(|worn: On<HairWorn>, mut reported: ResMut<Reported>| {
@@ -40,7 +40,7 @@ fn reported(app: &mut App) -> Reported {
 }
 
 /// Updates until an event of wearing is triggered.
-fn wait(app: &mut App) -> Reported {
+pub(super) fn wait(app: &mut App) -> Reported {
     for _ in 0..4000 {
         app.update();
         let reported = reported(app);
@@ -52,20 +52,20 @@ fn wait(app: &mut App) -> Reported {
     panic!("nothing was reported of wearing");
 }
 
-fn worn(app: &mut App) -> Entity {
+pub(super) fn worn(app: &mut App) -> Entity {
     let reported = wait(app);
     assert_eq!(reported.refused, [], "refused");
     reported.worn[0].hair
 }
 
-fn strands(app: &mut App, hair: Entity) -> Vec<Strand> {
+pub(super) fn strands(app: &mut App, hair: Entity) -> Vec<Strand> {
     let world = app.world_mut();
     let members: Vec<Entity> = world.get::<Strands>(hair).unwrap().iter().collect();
     members.into_iter().map(|s| world.get::<Strand>(s).unwrap().clone()).collect()
 }
 
 /// From the hair's frame to the wearer's, as transforms are now.
-fn place_in(app: &App, entity: Entity, root: Entity) -> Mat4 {
+pub(super) fn place_in(app: &App, entity: Entity, root: Entity) -> Mat4 {
     let (mut at, mut place) = (entity, Mat4::IDENTITY);
     while at != root {
         place = app.world().get::<Transform>(at).unwrap().to_matrix() * place;

@@ -16,7 +16,7 @@ mod tie;
 
 pub use error::RootsError;
 pub(crate) use roots::MadeAgain;
-pub use roots::{PlantedRoot, RootsOnMesh, TiedRoots};
+pub use roots::{OtherMesh, PlantedRoot, RootsOnMesh, TiedRoots};
 
 use crate::{
     base::schedule::{HairSystems, HairTick},
@@ -34,6 +34,7 @@ impl Plugin for AttachPlugin {
             return;
         }
         app.register_type::<RootsOnMesh>()
+            .register_type::<OtherMesh>()
             .register_type::<PlantedRoot>()
             .register_type::<TiedRoots>()
             .register_type::<RootsError>()

@@ -9,6 +9,8 @@ use bevy::{
 /// The displacement of one corner by one morph target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shift {
+    /// Of which mesh.
+    part: u16,
     target: u32,
     /// At weight 1, in the mesh's own space.
     by: Vec3,
@@ -16,13 +18,15 @@ pub(super) struct Shift {
 
 impl Shift {
     /// `None` where the target does not move the corner.
-    pub fn new(target: usize, by: Vec3) -> Option<Self> {
-        (by != Vec3::ZERO && by.is_finite()).then_some(Self { target: target as u32, by })
+    pub fn new(part: u16, target: usize, by: Vec3) -> Option<Self> {
+        (by != Vec3::ZERO && by.is_finite()).then_some(Self { part, target: target as u32, by })
     }
 
-    /// The displacement with these weights of all targets. A missing or non-finite weight counts as 0.
-    pub fn at(&self, weights: &[f32]) -> Vec3 {
-        let weight = weights.get(self.target as usize).copied().unwrap_or(0.0);
+    /// The displacement with these weights of all targets of each mesh. A missing or non-finite weight counts
+    /// as 0.
+    pub fn at(&self, weights: &[&[f32]]) -> Vec3 {
+        let own = weights.get(usize::from(self.part)).copied().unwrap_or_default();
+        let weight = own.get(self.target as usize).copied().unwrap_or(0.0);
         if weight.is_finite() { self.by * weight } else { Vec3::ZERO }
     }
 }
@@ -36,13 +40,13 @@ pub(super) struct Morphs<'w, 's> {
 
 impl Morphs<'_, '_> {
     /// Those of a mesh, one for each target; empty where nothing morphs it.
-    pub fn of(&self, mesh: Option<Entity>) -> &[f32] {
-        match mesh.and_then(|mesh| self.meshes.get(mesh).ok()) {
-            Some(MeshMorphWeights::Value { weights }) => weights,
-            Some(MeshMorphWeights::Reference(other)) => {
+    pub fn of(&self, mesh: Entity) -> &[f32] {
+        match self.meshes.get(mesh) {
+            Ok(MeshMorphWeights::Value { weights }) => weights,
+            Ok(MeshMorphWeights::Reference(other)) => {
                 self.shared.get(*other).map_or(&[], MorphWeights::weights)
             }
-            None => &[],
+            Err(_) => &[],
         }
     }
 }

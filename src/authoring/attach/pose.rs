@@ -10,6 +10,7 @@ use bevy::{
     mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     prelude::*,
 };
+use core::ops::Range;
 
 /// A joint that moves some of the triangles; the mesh itself where it is not skinned.
 #[derive(Clone, Copy, Debug)]
@@ -21,40 +22,42 @@ struct Joint {
 /// The joints and morph targets of the corners that roots are tied to.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Movers {
-    mesh: Option<Entity>,
+    meshes: Vec<Entity>,
+    /// Of one mesh after the other.
     joints: Vec<Joint>,
     /// Of every corner that morph targets move; empty on most meshes.
     pub shifts: Vec<Shift>,
 }
 
 impl Movers {
-    /// The movers of a mesh's entity.
-    pub fn of(
+    /// Adds a mesh with its skin. Returns its joints, one at least, among those of all.
+    pub fn add(
+        &mut self,
         mesh: Entity,
         skin: Option<(&SkinnedMesh, &SkinnedMeshInverseBindposes)>,
-    ) -> Result<Self, RootsError> {
-        let joints: Vec<Joint> = match skin {
-            None => vec![Joint { entity: mesh, inverse_bind: Affine3A::IDENTITY }],
-            Some((skin, poses)) => (skin.joints.iter().zip(poses.iter()))
-                .map(|(&entity, pose)| Joint { entity, inverse_bind: Affine3A::from_mat4(*pose) })
-                .collect(),
-        };
-        match (joints.is_empty(), skin) {
-            (true, Some((skin, poses))) => {
-                Err(RootsError::NoJoints { joints: skin.joints.len(), poses: poses.len() })
+    ) -> Result<Range<usize>, RootsError> {
+        let first = self.joints.len();
+        match skin {
+            None => self.joints.push(Joint { entity: mesh, inverse_bind: Affine3A::IDENTITY }),
+            Some((skin, poses)) => {
+                let both = skin.joints.iter().zip(poses.iter());
+                self.joints.extend(both.map(|(&entity, pose)| Joint {
+                    entity,
+                    inverse_bind: Affine3A::from_mat4(*pose),
+                }));
+                if self.joints.len() == first {
+                    let (joints, poses) = (skin.joints.len(), poses.len());
+                    return Err(RootsError::NoJoints { joints, poses });
+                }
             }
-            _ => Ok(Self { mesh: Some(mesh), joints, shifts: Vec::new() }),
         }
+        self.meshes.push(mesh);
+        Ok(first..self.joints.len())
     }
 
-    /// The mesh that they move; `None` before there is one.
-    pub fn mesh(&self) -> Option<Entity> {
-        self.mesh
-    }
-
-    /// How many joints there are, one at least.
-    pub fn joints(&self) -> usize {
-        self.joints.len()
+    /// The meshes that they move; none before there is one.
+    pub fn meshes(&self) -> &[Entity] {
+        &self.meshes
     }
 
     /// The present pose; `None` while a joint has no transform.
@@ -67,7 +70,7 @@ impl Movers {
         Some(MeshPose {
             joints: joints.collect::<Option<_>>()?,
             shifts: &self.shifts,
-            weights: morphs.of(self.mesh),
+            weights: self.meshes.iter().map(|mesh| morphs.of(*mesh)).collect(),
         })
     }
 }
@@ -76,14 +79,15 @@ impl Movers {
 pub(super) struct MeshPose<'a> {
     joints: Vec<Affine3A>,
     shifts: &'a [Shift],
-    weights: &'a [f32],
+    /// Of the morph targets of each mesh.
+    weights: Vec<&'a [f32]>,
 }
 
 impl MeshPose<'_> {
     /// Where a corner is in the world.
     pub fn corner(&self, corner: &Corner) -> Vec3 {
         let own = self.shifts.get(corner.shifts()).unwrap_or_default();
-        let by: Vec3 = own.iter().map(|shift| shift.at(self.weights)).sum();
+        let by: Vec3 = own.iter().map(|shift| shift.at(&self.weights)).sum();
         self.skinned(corner, corner.at + by)
     }
 
@@ -92,10 +96,10 @@ impl MeshPose<'_> {
         self.skinned(corner, corner.at)
     }
 
+    /// As Bevy draws it: weights are not divided by their sum.
     fn skinned(&self, corner: &Corner, at: Vec3) -> Vec3 {
-        let all: f32 = corner.weights.iter().sum();
         let sum: Vec3A = (corner.joints.iter().zip(corner.weights))
-            .map(|(&j, w)| self.joints[j as usize].transform_point3a(at.into()) * (w / all))
+            .map(|(&j, w)| self.joints[j as usize].transform_point3a(at.into()) * w)
             .sum();
         sum.into()
     }

@@ -6,11 +6,12 @@ use super::{
 };
 use crate::authoring::plant::RootOnMesh;
 use bevy::{
+    ecs::entity::MapEntities,
     math::{Affine3A, Isometry3d, Mat3A},
     prelude::*,
 };
 
-/// Ties the strands of a [`Hair`](crate::Hair) to triangles of a mesh, static, skinned or morphed.
+/// Ties the strands of a [`Hair`](crate::Hair) to triangles of a mesh, or several: static, skinned or morphed.
 /// Component of the hair, which best sits on the bone that moves most of it.
 ///
 /// Strands are in the mesh's own space, before any skinning, as planting gives them, or in the space
@@ -37,6 +38,29 @@ pub struct RootsOnMesh {
     /// Transform from the mesh's own space to that of the strands; the identity by default. With the
     /// hair's frame at rest as that space, strands are in place before they are tied.
     pub strands_from_mesh: Affine3A,
+    /// Further meshes that strands grow on, such as the other parts of a head. Roots count vertices on: first those
+    /// of [`mesh`](Self::mesh), then those of each of these, in order. Default none.
+    #[entities]
+    pub others: Vec<OtherMesh>,
+}
+
+/// A further mesh of a [`RootsOnMesh`].
+#[derive(Reflect, MapEntities, Clone, Copy, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+pub struct OtherMesh {
+    /// The entity that carries the `Mesh3d`.
+    #[entities]
+    pub mesh: Entity,
+    /// Transform from this mesh's own space to that of the strands.
+    pub strands_from_mesh: Affine3A,
+}
+
+impl RootsOnMesh {
+    /// All meshes, each with the transform from its space to that of the strands.
+    pub(crate) fn meshes(&self) -> impl Iterator<Item = (Entity, Affine3A)> + '_ {
+        let others = self.others.iter().map(|other| (other.mesh, other.strands_from_mesh));
+        self.mesh.map(|mesh| (mesh, self.strands_from_mesh)).into_iter().chain(others)
+    }
 }
 
 /// How a strand was planted on its mesh, from which its root's place on the posed mesh follows. State of the

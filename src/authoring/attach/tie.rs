@@ -20,7 +20,7 @@ use crate::{
 };
 use bevy::{
     ecs::{entity::EntityHashMap, system::SystemParam},
-    math::Isometry3d,
+    math::{Affine3A, Isometry3d},
     mesh::{
         Mesh, Mesh3d,
         skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
@@ -46,6 +46,14 @@ pub(super) struct Skins<'w, 's> {
 type Skin<'a> = Option<(&'a SkinnedMesh, &'a SkinnedMeshInverseBindposes)>;
 
 impl Skins<'_, '_> {
+    /// Each of several meshes with its skin; `None` while an asset is missing.
+    fn all(
+        &self,
+        entities: impl Iterator<Item = Entity>,
+    ) -> Option<Vec<(Entity, (&Mesh, Skin<'_>))>> {
+        entities.map(|entity| Some((entity, self.get(entity)?))).collect()
+    }
+
     /// A mesh with its skin; `None` while an asset is missing.
     fn get(&self, entity: Entity) -> Option<(&Mesh, Skin<'_>)> {
         let (mesh, skin) = self.skins.get(entity).ok()?;
@@ -58,14 +66,16 @@ impl Skins<'_, '_> {
 /// What moves the corners of some roots, the corners, and the triangles of their mesh.
 type Read = (Movers, Vec<[Corner; 3]>, Triangles);
 
-fn read<'a>(
-    entity: Entity,
-    (mesh, skin): (&Mesh, Skin<'_>),
+fn read<'a, 'm>(
+    meshes: impl IntoIterator<Item = (Entity, (&'m Mesh, Skin<'m>))>,
     roots: impl Iterator<Item = &'a RootOnMesh>,
     known: Option<Triangles>,
 ) -> Result<Read, RootsError> {
-    let mut movers = Movers::of(entity, skin)?;
-    let corners = Corners::of(mesh, skin.is_some(), movers.joints())?;
+    let (mut movers, mut corners) = (Movers::default(), Corners::new());
+    for (entity, (mesh, skin)) in meshes {
+        let joints = movers.add(entity, skin)?;
+        corners.add(mesh, skin.is_some(), joints)?;
+    }
     let triangles = corners.triangles();
     if let Some(known) = known.filter(|known| *known != triangles) {
         let (found, expected) = (triangles.vertices, known.vertices);
@@ -97,11 +107,11 @@ pub(super) fn tie(
         if tied.done {
             continue;
         }
-        let Some(entity) = roots.mesh else {
+        if roots.mesh.is_none() {
             tied.roots.clear();
             continue;
-        };
-        let Some(mesh) = skins.get(entity) else { continue };
+        }
+        let Some(meshes) = skins.all(roots.meshes().map(|(mesh, _)| mesh)) else { continue };
         let mut report = |why| {
             faults.write(
                 HairFault::caused(FaultKind::Roots, why, "those strands do not follow the mesh")
@@ -111,7 +121,8 @@ pub(super) fn tie(
         let planted = members.iter().map(|id| strands.get(id).ok().and_then(|s| s.2).copied());
         let planted: Vec<Option<PlantedRoot>> = planted.collect();
         // Other roots may be on other triangles.
-        let is_known = tied.movers.mesh() == Some(entity);
+        let is_known =
+            roots.meshes().map(|(mesh, _)| mesh).eq(tied.movers.meshes().iter().copied());
         let chosen = assigned(&planted, &roots.roots);
         let is_same = |(root, planted): (&RootOnMesh, &Option<PlantedRoot>)| {
             planted.as_ref().is_some_and(|planted| planted.root == *root)
@@ -119,7 +130,7 @@ pub(super) fn tie(
         let read = chosen.and_then(|chosen| {
             let same = is_known && chosen.iter().zip(&planted).all(is_same);
             let known = tied.triangles.filter(|_| same);
-            let (movers, corners, triangles) = read(entity, mesh, chosen.iter(), known)?;
+            let (movers, corners, triangles) = read(meshes, chosen.iter(), known)?;
             Ok((chosen, movers, corners, triangles))
         });
         let (chosen, movers, corners, triangles) = match read {
@@ -134,8 +145,8 @@ pub(super) fn tie(
         let Some(posed) = movers.pose(place, &morphs) else { continue };
         let mut flat = 0;
         let mut made = Vec::with_capacity(chosen.len());
-        let from_mesh = &roots.strands_from_mesh;
-        let was_on = tied.movers.mesh();
+        let from_mesh: Vec<Affine3A> = roots.meshes().map(|(_, from_mesh)| from_mesh).collect();
+        let was_tied = !tied.movers.meshes().is_empty();
         let aims: EntityHashMap<Isometry3d> =
             tied.roots.iter().map(|root| (root.strand, root.to)).collect();
         for (((member, root), corners), planted) in
@@ -145,14 +156,14 @@ pub(super) fn tie(
             let seen = |at| pose.now().point_in(at);
             let place = Place {
                 root,
-                bind: corners.map(|c| from_mesh.transform_point3(c.at)),
+                bind: corners.map(|c| from_mesh[usize::from(c.part)].transform_point3(c.at)),
                 posed: corners.map(|c| seen(posed.corner(&c))),
                 unmorphed: corners.map(|c| seen(posed.unmorphed(&c))),
             };
             let found = match planted {
                 None => plant(&place, &mut strand, &mut history),
                 Some(planted) => {
-                    let is_new_mesh = was_on.is_some() && !is_known;
+                    let is_new_mesh = was_tied && !is_known;
                     let aim = aims.get(&member).filter(|_| is_known && planted.root == root);
                     put(&place, planted, is_new_mesh, aim, &mut strand, &mut history)
                 }
@@ -334,18 +345,21 @@ pub(super) fn follow_edits(
         })
         .collect();
     for (hair, mut tied, is_made_again) in &mut hairs {
-        let Some(entity) = tied.movers.mesh() else { continue };
-        let is_edited =
-            !edited.is_empty() && drawn.get(entity).is_ok_and(|mesh| edited.contains(&mesh.id()));
         let tied = tied.bypass_change_detection();
-        tied.stale |= is_edited || replaced.contains(entity);
+        let has_changed = |mesh: &Entity| {
+            replaced.contains(*mesh)
+                || !edited.is_empty()
+                    && drawn.get(*mesh).is_ok_and(|mesh| edited.contains(&mesh.id()))
+        };
+        tied.stale |= tied.movers.meshes().iter().any(has_changed);
         if !tied.stale {
             continue;
         }
-        let Some(mesh) = skins.get(entity) else { continue };
+        let meshes = skins.all(tied.movers.meshes().iter().copied());
+        let Some(meshes) = meshes.filter(|meshes| !meshes.is_empty()) else { continue };
         tied.stale = false;
         let roots = tied.roots.iter().map(|tied| &tied.root);
-        match read(entity, mesh, roots, tied.triangles) {
+        match read(meshes, roots, tied.triangles) {
             Ok((movers, corners, triangles)) => {
                 (tied.movers, tied.triangles, tied.lost) = (movers, Some(triangles), false);
                 tied.roots.iter_mut().zip(corners).for_each(|(tied, now)| tied.corners = now);

@@ -40,6 +40,16 @@ pub enum WearError {
         /// Its name.
         name: String,
     },
+    /// No mesh of the given name moves with the head.
+    #[error(
+        "no mesh that moves with the head is named {name:?}, nor is the node above one: name one of {there}"
+    )]
+    NoMeshNamed {
+        /// The name.
+        name: String,
+        /// The names of those that do.
+        there: String,
+    },
     /// An asset that could not be loaded.
     #[error("the {what} was not loaded: {reason}")]
     NotLoaded {

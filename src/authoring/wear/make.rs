@@ -3,7 +3,11 @@
 
 use super::{
     error::WearError,
-    space::{Fitting, MeshPart, cropped, fit},
+    facing::FacingFrom,
+    garments::{garments, is_sheet},
+    part::MeshPart,
+    skin::{Hint, Role},
+    space::{Fitting, cropped, fit},
     target::Target,
     what::{HairSource, WearHair},
 };
@@ -74,9 +78,8 @@ pub(super) struct Made {
     /// Its parent bone or mesh, and its transform there.
     pub(super) parent: Entity,
     pub(super) place: Transform,
-    /// The mesh that its roots are tied to, and the transform from its space to the strands'.
-    pub(super) mesh: Entity,
-    pub(super) from_mesh: Affine3A,
+    /// The meshes that its roots are tied to, each with the transform from its space to the strands'.
+    pub(super) skin: Vec<(Entity, Affine3A)>,
     pub(super) roots: Vec<RootOnMesh>,
     pub(super) hair: GrownStrands,
     pub(super) settings: Option<PresetSettings>,
@@ -88,6 +91,13 @@ pub(super) struct Made {
     /// The meshes that it was fitted to, and the colliders.
     pub(super) parts: Vec<Entity>,
     pub(super) solids: Solids,
+    /// Where the face looks, in the wearer's space, and what told it.
+    pub(super) facing: (Dir3, FacingFrom),
+    /// What was chosen, to be logged.
+    pub(super) choice: String,
+    /// The meshes of hair that the character came with.
+    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only what is drawn is hidden"))]
+    pub(super) old_hair: Vec<Entity>,
 }
 
 /// Colliders that fit a head and its body.
@@ -103,9 +113,8 @@ pub(super) struct Solids {
 pub(super) struct RefitInput {
     pub(super) wear: WearHair,
     pub(super) target: Target,
-    /// The mesh of its roots, and the transform from its space to the strands'.
-    pub(super) mesh: Entity,
-    pub(super) from_mesh: Affine3A,
+    /// The meshes of its roots, each with the transform from its space to the strands'.
+    pub(super) skin: Vec<(Entity, Affine3A)>,
     pub(super) roots: Vec<RootOnMesh>,
     /// The length of the longest strand (m).
     pub(super) longest: f32,
@@ -114,19 +123,27 @@ pub(super) struct RefitInput {
 /// Fits colliders again. The hair stays in the space that it was made in.
 pub(super) fn refit(mut order: RefitInput) -> Result<Solids, WearError> {
     let fitting = fit(&mut order.target.parts, &order.wear)?;
-    let part = order.target.parts.iter().find(|part| part.entity == order.mesh);
-    let part = part.ok_or(WearError::NoMesh)?;
-    let to_hair = fitting.from_wearer * part.to_wearer;
-    let places = part.mesh.attribute(Mesh::ATTRIBUTE_POSITION);
-    let Some(Values::Float32x3(places)) = places else { return Err(WearError::NoMesh) };
+    let part_of = |mesh: &Entity| {
+        order.target.parts.iter().find(|part| part.entity == *mesh).ok_or(WearError::NoMesh)
+    };
+    let mut places = Vec::new();
+    for (mesh, _) in &order.skin {
+        let part = part_of(mesh)?;
+        let to_hair = fitting.from_wearer * part.to_wearer;
+        let own = part.mesh.attribute(Mesh::ATTRIBUTE_POSITION);
+        let Some(Values::Float32x3(own)) = own else { return Err(WearError::NoMesh) };
+        places.extend(own.iter().map(|p| to_hair.transform_point3(Vec3::from(*p))));
+    }
+    let (main, from_mesh) = order.skin.first().ok_or(WearError::NoMesh)?;
+    let to_hair = fitting.from_wearer * part_of(main)?.to_wearer;
     let roots = order.roots.iter().filter_map(|root| {
-        let corner = |i: usize| places.get(root.vertices[i] as usize).map(|p| Vec3::from(*p));
+        let corner = |i: usize| places.get(root.vertices[i] as usize).copied();
         let [a, b, c] = [corner(0)?, corner(1)?, corner(2)?];
         let [u, v, w] = root.weights.to_array();
-        Some(to_hair.transform_point3(a * u + b * v + c * w))
+        Some(a * u + b * v + c * w)
     });
     let mut solids = fit_solids(&fitting, &order.target, roots.collect(), order.longest)?;
-    let back = Mat4::from(order.from_mesh * to_hair.inverse());
+    let back = Mat4::from(*from_mesh * to_hair.inverse());
     for (_, place) in &mut solids.balls {
         *place = Transform::from_matrix(back * place.to_matrix());
     }
@@ -140,16 +157,26 @@ fn fit_solids(
     roots: Vec<Vec3>,
     longest: f32,
 ) -> Result<Solids, WearError> {
-    let head = match &target.parts[fitting.part].skin {
+    let head = match &target.parts[fitting.part()].skin {
         Some(skin) => skin.joints[skin.head.unwrap_or(0)],
         None => target.head,
     };
     let reach = longest + MARGIN;
     let balls = match target.own.above.contains(&head) {
         true => Vec::new(),
-        false => balls(fitting, roots, reach)?,
+        false => balls(fitting, roots.clone(), reach)?,
     };
-    Ok(Solids { balls, capsules: capsules(&target.parts, &target.own.joints, fitting, reach) })
+    // A cape of the same skin is no limb.
+    let is_garment = |(i, part): &(usize, &MeshPart)| {
+        fitting.roles[*i].is_none() && part.skin.is_some() && is_sheet(part)
+    };
+    let (capes, limbs): (Vec<_>, Vec<_>) = target.parts.iter().enumerate().partition(is_garment);
+    let limbs: Vec<&MeshPart> = limbs.into_iter().map(|(_, part)| part).collect();
+    let capes = capes.into_iter().map(|(_, part)| part).filter(|part| part.is_shown);
+    let mut capsules = capsules(&limbs, &target.own.joints, fitting, reach);
+    let worn = capes.chain(&target.garments);
+    capsules.extend(garments(worn, &target.own.joints, fitting, &roots, reach));
+    Ok(Solids { balls, capsules })
 }
 
 /// Makes the hair.
@@ -162,8 +189,8 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
         (HairSource::Groom { .. }, None) => return Err(WearError::NoMesh),
         (HairSource::Preset(preset), _) => plant(*preset, &order.wear, &fitting)?,
     };
-    let part = &order.target.parts[fitting.part];
-    let to_mesh = fitting.to_hair.inverse();
+    let part = &order.target.parts[fitting.part()];
+    let to_mesh = fitting.skin[0].to_hair.inverse();
     let (parent, place) = match &part.skin {
         Some(skin) => {
             let head = skin.head.unwrap_or(0);
@@ -183,8 +210,9 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
     Ok(Made {
         parent,
         place: Transform::from_matrix(place.into()),
-        mesh: part.entity,
-        from_mesh: fitting.to_hair,
+        skin: (fitting.skin.iter())
+            .map(|of| (order.target.parts[of.part].entity, of.to_hair))
+            .collect(),
         roots: grown.roots,
         hair: grown.hair,
         settings: grown.settings,
@@ -194,7 +222,49 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
         fibres: grown.fibres.clamp(*fibres.start(), *fibres.end()),
         parts: order.target.parts.iter().map(|part| part.entity).collect(),
         solids,
+        facing: fitting.facing,
+        choice: choice(&fitting, &order.target.parts),
+        old_hair: old_hair(&fitting, &order.target.parts),
     })
+}
+
+/// What was chosen among the meshes that move with the head, in words.
+fn choice(fitting: &Fitting, parts: &[MeshPart]) -> String {
+    let names = |is: fn(&MeshPart, Option<Role>) -> bool| {
+        let all = parts.iter().zip(&fitting.roles).filter(|(part, role)| is(part, **role));
+        all.map(|(part, _)| format!("{:?}", part.name)).collect::<Vec<_>>().join(", ")
+    };
+    let mut told = format!("it grows on {}", names(|_, role| role == Some(Role::Skin)));
+    let others = [
+        ("over it", names(|_, role| role == Some(Role::Over))),
+        ("within", names(|_, role| role == Some(Role::Within))),
+        ("hidden", names(|part, role| role.is_none() && !part.is_shown)),
+    ];
+    for (what, names) in others.into_iter().filter(|(_, names)| !names.is_empty()) {
+        told += &format!("; {what}: {names}");
+    }
+    told
+}
+
+/// Meshes that lie over the scalp, and are not named like what is no hair.
+fn old_hair(fitting: &Fitting, parts: &[MeshPart]) -> Vec<Entity> {
+    let scalp = &fitting.scalp;
+    let lies_on_scalp = |part: &MeshPart| {
+        let to_hair = fitting.from_wearer * part.to_wearer;
+        let places = match part.mesh.attribute(Mesh::ATTRIBUTE_POSITION) {
+            Some(Values::Float32x3(places)) => &places[..],
+            _ => &[],
+        };
+        let behind =
+            |p: &&[f32; 3]| scalp.behind_hairline(to_hair.transform_point3(Vec3::from(**p))) > 0.0;
+        4 * places.iter().filter(behind).count() > places.len()
+    };
+    let is_old = |(part, role): &(&MeshPart, &Option<Role>)| {
+        **role == Some(Role::Over)
+            && !matches!(Hint::of(&part.name), Hint::Worn | Hint::Skin)
+            && lies_on_scalp(part)
+    };
+    parts.iter().zip(&fitting.roles).filter(is_old).map(|(part, _)| part.entity).collect()
 }
 
 /// Hair on a mesh.
@@ -321,14 +391,16 @@ fn balls(
 /// For each joint that hair reaches the capsule that fits, or balls where it is of another shape; none for the
 /// head's, for those `with_own` colliders, and where the fit fails.
 fn capsules(
-    parts: &[MeshPart],
+    parts: &[&MeshPart],
     with_own: &HashSet<Entity>,
     fitting: &Fitting,
     reach: f32,
 ) -> Vec<(Entity, (HairCollider, Transform))> {
     let mut best: HashMap<Entity, (f32, Vec<(HairCollider, Transform)>)> = default();
     let mut order = Vec::new();
-    for part in parts {
+    // What is hidden holds no hair, unless all is.
+    let is_any_shown = parts.iter().any(|part| part.is_shown);
+    for part in parts.iter().filter(|part| part.is_shown || !is_any_shown) {
         let Some(skin) = &part.skin else { continue };
         let poses: Vec<Mat4> = skin.poses.iter().map(|pose| (*pose).into()).collect();
         let to_hair = fitting.from_wearer * part.to_wearer;

@@ -10,19 +10,30 @@
 //! | step | where |
 //! |---|---|
 //! | finding bone and mesh | `target` |
+//! | which meshes are the head's skin | `skin` |
+//! | where the face looks | `facing` |
 //! | where the head is, and how large | `head` |
 //! | mesh and hair in one space: the face toward −Z, the head's middle at the origin, life size | `space` |
 //! | planting, roots, colliders: a pure function | `make` |
+//! | colliders for capes and collars | `garments` |
+//! | hiding the hair that a character came with | `old_hair` |
 
 mod error;
+mod facing;
+mod garments;
 mod head;
 mod make;
+#[cfg(feature = "render")]
+mod old_hair;
+mod part;
+mod skin;
 mod space;
 mod systems;
 mod target;
 mod what;
 
 pub use error::WearError;
+pub use facing::FacingFrom;
 pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair};
 
 use crate::{authoring::attach::MadeAgain, base::schedule::HairFrame, hair::strand::lacks_strands};
@@ -37,10 +48,13 @@ impl Plugin for WearPlugin {
         if lacks_strands::<Self>(app) {
             return;
         }
+        #[cfg(feature = "render")]
+        app.register_type::<old_hair::HiddenForHair>();
         app.register_type::<WearHair>()
             .register_type::<HairSource>()
             .register_type::<WornHair>()
             .register_type::<target::Fitted>()
+            .register_type::<FacingFrom>()
             .register_type::<HairWorn>()
             .register_type::<HairNotWorn>()
             .register_required_components::<WearHair, systems::Wearing>()

@@ -6,13 +6,13 @@
 
 use super::{
     error::{HEAD_SIZES, WearError},
+    facing::{FacingFrom, by_bones, by_shape, eyes},
     head::{HeadPlace, find_head},
+    part::{MeshPart, head_shares, head_triangles, positions, triangles},
+    skin::{Hint, Role, Shell, roles},
     what::WearHair,
 };
-use crate::{
-    authoring::plant::{PlantError, Scalp},
-    base::setting::Ranged,
-};
+use crate::{authoring::plant::Scalp, base::setting::Ranged};
 use bevy::{
     asset::RenderAssetUsages,
     math::{Affine3A, Mat3A, Vec3A},
@@ -22,47 +22,6 @@ use bevy::{
 
 /// Heights of life-size heads (m).
 const LIFE_SIZE: core::ops::RangeInclusive<f32> = 0.08..=0.16;
-
-/// The joints of a mesh.
-pub(super) struct MeshSkin {
-    pub(super) joints: Vec<Entity>,
-    /// Inverse bind poses.
-    pub(super) poses: Vec<Affine3A>,
-    /// Which joint is the head; `None` where none is known to be.
-    pub(super) head: Option<usize>,
-    /// Which joints are the head or below it.
-    pub(super) of_head: Vec<bool>,
-}
-
-/// A mesh on which hair may grow.
-pub(super) struct MeshPart {
-    pub(super) entity: Entity,
-    /// Its positions, normals, triangles and skin.
-    pub(super) mesh: Mesh,
-    pub(super) skin: Option<MeshSkin>,
-    /// From the mesh, as it is bound, to the wearer.
-    pub(super) to_wearer: Affine3A,
-}
-
-/// Copies the attributes of a mesh that planting, ties and fits need.
-pub(super) fn skin_of(mesh: &Mesh) -> Result<Mesh, WearError> {
-    let extracted = |_| PlantError::Extracted;
-    let mut copy = Mesh::new(mesh.primitive_topology(), RenderAssetUsages::default());
-    for which in [
-        Mesh::ATTRIBUTE_POSITION,
-        Mesh::ATTRIBUTE_NORMAL,
-        Mesh::ATTRIBUTE_JOINT_INDEX,
-        Mesh::ATTRIBUTE_JOINT_WEIGHT,
-    ] {
-        if let Some(values) = mesh.try_attribute_option(which).map_err(extracted)? {
-            copy.insert_attribute(which, values.clone());
-        }
-    }
-    if let Some(indices) = mesh.try_indices_option().map_err(extracted)? {
-        copy.insert_indices(indices.clone());
-    }
-    Ok(copy)
-}
 
 /// The transform from a mesh as it is bound to the wearer, by one of its joints: where the joint is
 /// now, and its inverse bind pose.
@@ -96,48 +55,88 @@ fn quarter_turns(matrix: Mat3A) -> Mat3A {
     Mat3A::from_cols(x, y, z)
 }
 
-/// A mesh in the space of its hair.
+/// The skin of a head in the space of its hair.
 pub(super) struct Fitting {
+    /// Its meshes, that with most of the head first.
+    pub(super) skin: Vec<FittedPart>,
+    /// From the wearer to the hair.
+    pub(super) from_wearer: Affine3A,
+    /// All of them as one, vertices in that order; the red vertex colour is the head's skinning weight.
+    pub(super) mesh: Mesh,
+    pub(super) scalp: Scalp,
+    /// Where the face looks, in the wearer's space, and what told it.
+    pub(super) facing: (Dir3, FacingFrom),
+    /// What each part is for the head; `None` for those that do not move with it or are not shown.
+    pub(super) roles: Vec<Option<Role>>,
+}
+
+/// A mesh on which hair grows.
+#[derive(Clone, Copy)]
+pub(super) struct FittedPart {
     /// Which part it is.
     pub(super) part: usize,
     /// From the mesh as it is bound to the hair.
     pub(super) to_hair: Affine3A,
-    /// From the wearer to the hair.
-    pub(super) from_wearer: Affine3A,
-    /// The mesh in that space; the red vertex colour is the head's skinning weight.
-    pub(super) mesh: Mesh,
-    pub(super) scalp: Scalp,
 }
 
-/// Finds the head among the parts and puts its mesh into the space of the hair.
+impl Fitting {
+    /// Which part has most of the head's skin.
+    pub(super) fn part(&self) -> usize {
+        self.skin[0].part
+    }
+}
+
+/// Finds the head among the parts and puts its skin into the space of the hair.
 pub(super) fn fit(parts: &mut [MeshPart], wear: &WearHair) -> Result<Fitting, WearError> {
     let given = wear.scalp.map(Ranged::checked).transpose()?;
-    let turn = upright(given.as_ref(), wear.facing)?;
-    let mut best: Option<(f32, usize, Vec<f32>)> = None;
-    for (i, part) in parts.iter_mut().enumerate() {
-        let shares = head_shares(part, turn)?;
-        let area = head_area(&part.mesh, &shares);
-        if best.as_ref().is_none_or(|best| area > best.0) {
-            best = Some((area, i, shares));
-        }
+    if let Some(facing) = wear.facing {
+        upright(None, facing)?;
     }
-    let (_, chosen, shares) = best.ok_or(WearError::NoMesh)?;
-    let part = &parts[chosen];
-    let canonical = Affine3A { matrix3: turn, ..default() } * part.to_wearer;
+    let up = given.as_ref().map_or(Vec3::Y, |scalp| scalp.axes()[1]);
+    let shares = parts.iter_mut().map(|part| head_shares(part, up));
+    let shares: Vec<Vec<f32>> = shares.collect::<Result<_, _>>()?;
+    let areas: Vec<f32> = parts.iter().zip(&shares).map(|(p, s)| p.head_area(s)).collect();
+    let roles = part_roles(parts, &shares, &areas);
+    let mut chosen: Vec<usize> =
+        (0..parts.len()).filter(|i| roles[*i] == Some(Role::Skin)).collect();
+    // On ties, the first.
+    chosen.sort_by(|a, b| areas[*b].total_cmp(&areas[*a]));
+    if chosen.is_empty() {
+        chosen.extend((0..parts.len()).find(|i| parts[*i].is_named));
+    }
+    let main = *chosen.first().ok_or(WearError::NoMesh)?;
+    let skin_points = |to: &Affine3A| -> Vec<Vec3> {
+        let of = |i: usize| {
+            let to = *to * parts[i].to_wearer;
+            let places = positions(&parts[i].mesh).iter().zip(&shares[i]);
+            let of_head = places.filter(|(_, share)| **share > 0.5);
+            of_head.map(move |(p, _)| to.transform_point3(Vec3::from_array(*p)))
+        };
+        chosen.iter().flat_map(|i| of(*i)).collect()
+    };
+    let facing = match (&given, wear.facing) {
+        (Some(scalp), _) => (scalp.front, FacingFrom::Given),
+        (None, Some(facing)) => (facing, FacingFrom::Given),
+        (None, None) => by_bones(parts)
+            .or_else(|| {
+                let points = skin_points(&Affine3A::IDENTITY);
+                let head = find_head(&points)?;
+                Some((by_shape(&points, head.center, head.height)?, FacingFrom::Nose))
+            })
+            .unwrap_or((Dir3::NEG_Z, FacingFrom::Assumed)),
+    };
+    let turn = upright(given.as_ref(), facing.0)?;
     let head = match &given {
         Some(scalp) => {
             HeadPlace { center: (turn * Vec3A::from(scalp.center)).into(), height: scalp.height }
         }
         None => {
-            let places = positions(&part.mesh).iter().zip(&shares);
-            let of_head = places.filter(|(_, share)| **share > 0.5).map(|(p, _)| p);
-            let there: Vec<Vec3> =
-                of_head.map(|p| canonical.transform_point3(Vec3::from_array(*p))).collect();
+            let there = skin_points(&Affine3A { matrix3: turn, ..default() });
             // An invalid mesh is reported by planting.
             find_head(&there).unwrap_or(HeadPlace { center: Vec3::ZERO, height: 0.11 })
         }
     };
-    let has_area = head_area(&part.mesh, &shares) > 0.0;
+    let has_area = areas[main] > 0.0;
     if has_area && !HEAD_SIZES.contains(&head.height) {
         return Err(WearError::HeadSize { found: head.height });
     }
@@ -146,8 +145,11 @@ pub(super) fn fit(parts: &mut [MeshPart], wear: &WearHair) -> Result<Fitting, We
     let size = Affine3A::from_scale(Vec3::splat(size));
     let from_wearer =
         size * Affine3A::from_translation(-head.center) * Affine3A { matrix3: turn, ..default() };
-    let to_hair = from_wearer * part.to_wearer;
-    if !to_hair.is_finite() || !to_hair.inverse().is_finite() {
+    let skin: Vec<FittedPart> = chosen
+        .iter()
+        .map(|&part| FittedPart { part, to_hair: from_wearer * parts[part].to_wearer })
+        .collect();
+    if skin.iter().any(|of| !of.to_hair.is_finite() || !of.to_hair.inverse().is_finite()) {
         return Err(WearError::Pose);
     }
     let scalp = Scalp {
@@ -157,8 +159,42 @@ pub(super) fn fit(parts: &mut [MeshPart], wear: &WearHair) -> Result<Fitting, We
         height: life,
         ..given.unwrap_or_default()
     };
-    let mesh = in_space(&part.mesh, &to_hair, &shares);
-    Ok(Fitting { part: chosen, to_hair, from_wearer, mesh, scalp })
+    let moved = |of: &FittedPart| in_space(&parts[of.part].mesh, &of.to_hair, &shares[of.part]);
+    let mesh = merged(skin.iter().map(moved).collect());
+    Ok(Fitting { skin, from_wearer, mesh, scalp, facing, roles })
+}
+
+/// What each part is for the head.
+fn part_roles(parts: &[MeshPart], shares: &[Vec<f32>], areas: &[f32]) -> Vec<Option<Role>> {
+    // Of a character that is hidden as a whole, all parts count.
+    let is_any_shown = (0..parts.len()).any(|i| areas[i] > 0.0 && parts[i].is_shown);
+    let is_head = |i: usize| areas[i] > 0.0 && (parts[i].is_shown || !is_any_shown);
+    let is_chosen = parts.iter().any(|part| !part.is_named);
+    let of_head: Vec<usize> = (0..parts.len()).filter(|i| is_head(*i)).collect();
+    let shells: Vec<Shell> = of_head
+        .iter()
+        .map(|&i| {
+            let to = |p: Vec3| parts[i].to_wearer.transform_point3(p);
+            let triangles = head_triangles(&parts[i].mesh, &shares[i]);
+            let placed = triangles.map(|t| t.map(to)).filter(|t| t.iter().all(|p| p.is_finite()));
+            Shell { triangles: placed.collect(), hint: Hint::of(&parts[i].name) }
+        })
+        .collect();
+    let mut found = vec![None; parts.len()];
+    for (i, role) in of_head.into_iter().zip(roles(&shells, &eyes(parts))) {
+        found[i] = Some(role);
+    }
+    // A mesh that is named is skin, whatever it is like.
+    if is_chosen {
+        for (i, role) in found.iter_mut().enumerate() {
+            match (parts[i].is_named, *role) {
+                (true, _) if areas[i] > 0.0 => *role = Some(Role::Skin),
+                (false, Some(Role::Skin)) => *role = Some(Role::Within),
+                _ => {}
+            }
+        }
+    }
+    found
 }
 
 /// The rotation of the wearer's right, up and front to X, Y and −Z.
@@ -174,75 +210,6 @@ fn upright(scalp: Option<&Scalp>, facing: Dir3) -> Result<Mat3A, WearError> {
         }
     };
     Ok(Mat3A::from_cols(right.into(), up.into(), (-front).into()).transpose())
-}
-
-fn positions(mesh: &Mesh) -> &[[f32; 3]] {
-    match mesh.attribute(Mesh::ATTRIBUTE_POSITION) {
-        Some(Values::Float32x3(positions)) => positions,
-        _ => &[],
-    }
-}
-
-/// The head's skinning weight at each vertex; 1 for a mesh without a skin. Where no joint is known
-/// to be the head, it is the one with the largest weight at the highest vertex.
-fn head_shares(part: &mut MeshPart, turn: Mat3A) -> Result<Vec<f32>, WearError> {
-    let places = positions(&part.mesh);
-    let Some(skin) = &mut part.skin else { return Ok(vec![1.0; places.len()]) };
-    let (Some(Values::Uint16x4(joints)), Some(Values::Float32x4(weights))) = (
-        part.mesh.attribute(Mesh::ATTRIBUTE_JOINT_INDEX),
-        part.mesh.attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT),
-    ) else {
-        return Ok(vec![1.0; places.len()]);
-    };
-    let known = skin.joints.len().min(skin.poses.len());
-    let found = joints.iter().flatten().copied().max().map_or(0, usize::from);
-    if found >= known {
-        let (joints, poses) = (skin.joints.len(), skin.poses.len());
-        return Err(WearError::Joints { joints, poses, found });
-    }
-    if skin.head.is_none() {
-        let height =
-            |p: &[f32; 3]| (turn * part.to_wearer.transform_point3a(Vec3A::from_array(*p))).y;
-        let highest = (0..places.len().min(joints.len()).min(weights.len()))
-            .max_by(|a, b| height(&places[*a]).total_cmp(&height(&places[*b])));
-        if let Some(v) = highest {
-            let most = (0..4).max_by(|a, b| weights[v][*a].total_cmp(&weights[v][*b]));
-            let head = usize::from(joints[v][most.unwrap_or(0)]);
-            skin.head = Some(head);
-            skin.of_head[head] = true;
-        }
-    }
-    let share = |(joints, weights): (&[u16; 4], &[f32; 4])| {
-        let all: f32 = weights.iter().sum();
-        let own = joints.iter().zip(weights).filter(|(j, _)| skin.of_head[usize::from(**j)]);
-        own.map(|(_, weight)| weight).sum::<f32>() / all.max(1e-6)
-    };
-    let mut shares: Vec<f32> = joints.iter().zip(weights).map(share).collect();
-    shares.resize(places.len(), 0.0);
-    Ok(shares)
-}
-
-/// The area of the triangles that are of the head, in the mesh's own unit squared.
-fn head_area(mesh: &Mesh, shares: &[f32]) -> f32 {
-    let places = positions(mesh);
-    let corner = |v: usize| places.get(v).map(|p| Vec3::from_array(*p));
-    let area = |triangle: [usize; 3]| {
-        let of_head = triangle.iter().all(|v| shares.get(*v).is_some_and(|s| *s > 0.5));
-        let [Some(a), Some(b), Some(c)] = triangle.map(corner) else { return 0.0 };
-        if of_head { 0.5 * (b - a).cross(c - a).length() } else { 0.0 }
-    };
-    triangles(mesh).map(area).filter(|area| area.is_finite()).sum()
-}
-
-/// The vertices of each triangle; the winding of strips is ignored.
-fn triangles(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> {
-    let step = if mesh.primitive_topology() == PrimitiveTopology::TriangleStrip { 1 } else { 3 };
-    let indices: Vec<usize> = match mesh.indices() {
-        Some(indices) => indices.iter().collect(),
-        None => (0..mesh.count_vertices()).collect(),
-    };
-    let starts = (0..indices.len().saturating_sub(2)).step_by(step);
-    starts.map(move |i| [indices[i], indices[i + 1], indices[i + 2]])
 }
 
 /// A mesh in another space, with shares as red vertex colour.
@@ -264,6 +231,34 @@ fn in_space(mesh: &Mesh, space: &Affine3A, shares: &[f32]) -> Mesh {
         moved.insert_indices(Indices::U32(turned.collect()));
     }
     moved
+}
+
+/// Meshes as one, their vertices one after the other. The winding of strips among several is ignored.
+fn merged(mut meshes: Vec<Mesh>) -> Mesh {
+    if meshes.len() == 1 {
+        return meshes.remove(0);
+    }
+    let (mut places, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut indices: Vec<u32> = Vec::new();
+    for mesh in &meshes {
+        let first = places.len();
+        places.extend_from_slice(positions(mesh));
+        if let Some(Values::Float32x3(own)) = mesh.attribute(Mesh::ATTRIBUTE_NORMAL) {
+            normals.extend_from_slice(own);
+        }
+        // Where there are none the triangle's own is taken.
+        normals.resize(places.len(), [0.0; 3]);
+        if let Some(Values::Float32x4(own)) = mesh.attribute(Mesh::ATTRIBUTE_COLOR) {
+            colors.extend_from_slice(own);
+        }
+        colors.resize(places.len(), [0.0, 0.0, 0.0, 1.0]);
+        indices.extend(triangles(mesh).flatten().map(|v| (first + v) as u32));
+    }
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, places)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colors)
+        .with_inserted_indices(Indices::U32(indices))
 }
 
 /// The part of a mesh within `reach` (m) of the origin: the same vertices, fewer triangles.

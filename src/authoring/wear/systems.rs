@@ -2,13 +2,14 @@
 
 use super::{
     error::{SEARCH_TIME, WearError},
+    facing::FacingFrom,
     make::{Made, MakeInput, RefitInput, Solids, make, refit},
     target::{Characters, Fitted, Search},
     what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair},
 };
 use crate::{
     authoring::{
-        attach::{RootsOnMesh, TiedRoots},
+        attach::{OtherMesh, RootsOnMesh, TiedRoots},
         groom::Groom,
     },
     base::{
@@ -71,6 +72,8 @@ fn despawn_worn(
     fitted: &Query<(Entity, &Fitted)>,
 ) {
     commands.entity(hair).try_despawn();
+    #[cfg(feature = "render")]
+    super::old_hair::show(commands, wearer);
     for (collider, _) in fitted.iter().filter(|(_, fitted)| fitted.wearer == wearer) {
         commands.entity(collider).try_despawn();
     }
@@ -313,13 +316,18 @@ pub(super) fn put_on(
         let Some(ready) = ready else { continue };
         wearing.stage = WearStage::Done;
         match ready {
-            Ok(made) if entities.contains(made.parent) && entities.contains(made.mesh) => {
+            Ok(made)
+                if entities.contains(made.parent)
+                    && made.skin.iter().all(|(mesh, _)| entities.contains(*mesh)) =>
+            {
                 if let Some(old) = wearing.worn.take() {
                     despawn_worn(&mut commands, wearer, old, &fitted);
                 }
                 let wetting = wetting.as_ref().map(|default| default.0).unwrap_or_default();
+                let ((facing, facing_from), mesh) = (made.facing, made.skin[0].0);
+                tell(wearer, &made);
                 let hair = spawn_hair(&mut commands, wearer, wear, made, wetting);
-                commands.trigger(HairWorn { entity: wearer, hair });
+                commands.trigger(HairWorn { entity: wearer, hair, mesh, facing, facing_from });
                 wearing.worn = Some(hair);
             }
             // The scene was despawned while the hair was made.
@@ -332,6 +340,21 @@ pub(super) fn put_on(
     }
 }
 
+/// Logs what was found of a character.
+fn tell(wearer: Entity, made: &Made) {
+    let (choice, (way, from)) = (&made.choice, made.facing);
+    tracing::info!(
+        "hair of {wearer}: {choice}; the face looks along {:?} ({from:?})",
+        way.to_array()
+    );
+    if from == FacingFrom::Assumed {
+        tracing::warn!(
+            "hair of {wearer}: no bone of an eye, toe or foot and no nose tells where the face looks; it is \
+             taken to look along -Z: set WearHair::facing"
+        );
+    }
+}
+
 fn spawn_hair(
     commands: &mut Commands,
     wearer: Entity,
@@ -339,8 +362,19 @@ fn spawn_hair(
     made: Made,
     wetting: HairWetting,
 ) -> Entity {
-    let roots =
-        RootsOnMesh { mesh: Some(made.mesh), roots: made.roots, strands_from_mesh: made.from_mesh };
+    let (mesh, strands_from_mesh) = made.skin[0];
+    let others =
+        made.skin[1..].iter().map(|&(mesh, from)| OtherMesh { mesh, strands_from_mesh: from });
+    let roots = RootsOnMesh {
+        mesh: Some(mesh),
+        roots: made.roots,
+        strands_from_mesh,
+        others: others.collect(),
+    };
+    #[cfg(feature = "render")]
+    if wear.hides_old_hair {
+        super::old_hair::hide(commands, wearer, &made.old_hair);
+    }
     let is = WornHair { wearer, wear: wear.clone(), parts: made.parts };
     let wetting = HairWetting { fibres: made.fibres, ..wetting };
     let mut hair = commands.spawn((Hair, made.place, ChildOf(made.parent), is, wetting, roots));
@@ -449,9 +483,7 @@ pub(super) fn fit_again(
         if !wearing.has_changed || wearing.refit.is_some() || !wear.colliders {
             continue;
         }
-        let (Some(mesh), Some(pool)) = (roots.mesh, AsyncComputeTaskPool::try_get()) else {
-            continue;
-        };
+        let Some(pool) = AsyncComputeTaskPool::try_get() else { continue };
         let target = match characters.search(wearer, wear) {
             Search::Found(target) => target,
             Search::Loading => continue,
@@ -464,8 +496,7 @@ pub(super) fn fit_again(
         let order = RefitInput {
             wear: wear.clone(),
             target,
-            mesh,
-            from_mesh: roots.strands_from_mesh,
+            skin: roots.meshes().collect(),
             roots: roots.roots.clone(),
             longest: lengths.fold(0.0, f32::max),
         };

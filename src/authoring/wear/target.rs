@@ -1,9 +1,12 @@
 //! Finding the head of a character, and the meshes that make it up.
 
+#[cfg(feature = "render")]
+use super::old_hair::HiddenForHair;
 use super::{
     error::WearError,
     head::{is_head, is_head_of_rigify},
-    space::{MeshPart, MeshSkin, bound_to, skin_of},
+    part::{Cue, MeshPart, MeshSkin, skin_of},
+    space::bound_to,
     what::WearHair,
 };
 use crate::{forces::contact::HairCollider, hair::strand::Hair};
@@ -33,6 +36,8 @@ pub(super) struct Target {
     /// The bone or mesh that it is worn on.
     pub(super) head: Entity,
     pub(super) parts: Vec<MeshPart>,
+    /// What is shown and moves with other bones than the head's, and not with its skin: capes, pauldrons.
+    pub(super) garments: Vec<MeshPart>,
     pub(super) own: OwnColliders,
 }
 
@@ -73,6 +78,8 @@ pub(super) struct Characters<'w, 's> {
     wearers: Query<'w, 's, (), With<WearHair>>,
     colliders: Query<'w, 's, Entity, (With<HairCollider>, Without<Fitted>)>,
     places: Query<'w, 's, (Option<&'static Transform>, Option<&'static ChildOf>)>,
+    #[cfg(feature = "render")]
+    shown: Query<'w, 's, (&'static Visibility, Has<HiddenForHair>)>,
 }
 
 impl Characters<'_, '_> {
@@ -207,6 +214,15 @@ impl Characters<'_, '_> {
             let name = self.name(head).unwrap_or("WearHair's entity").to_owned();
             return Err(WearError::NoSkin { name });
         }
+        let is_named = |entity: Entity| match &wear.mesh {
+            Some(name) => self.is_called(entity, name, &joints),
+            None => true,
+        };
+        if let Some(name) = wear.mesh.as_ref().filter(|_| !chosen.iter().any(|s| is_named(s.0))) {
+            let there: Vec<Entity> = chosen.iter().map(|s| s.0).collect();
+            let there = self.names(&there, &HashSet::default());
+            return Err(WearError::NoMeshNamed { name: name.clone(), there });
+        }
         let part = |&&(entity, mesh, skin): &&(Entity, &Mesh3d, Option<&SkinnedMesh>)| {
             let skin = skin.and_then(|skin| {
                 let poses = self.poses.as_ref()?.get(&skin.inverse_bindposes)?;
@@ -218,13 +234,109 @@ impl Characters<'_, '_> {
                 Some(skin) => self.bound(skin, wearer)?,
                 None => self.relative(entity, wearer).ok_or(WearError::Pose)?,
             };
-            Ok(MeshPart { entity, mesh, skin, to_wearer })
+            Ok(MeshPart {
+                entity,
+                name: self.name_of_mesh(entity, &joints),
+                is_shown: self.is_shown(entity, wearer),
+                is_named: is_named(entity),
+                mesh,
+                skin,
+                to_wearer,
+            })
         };
-        Ok(Target {
-            head,
-            parts: chosen.iter().map(part).collect::<Result<_, WearError>>()?,
-            own: self.own_colliders(wearer, &joints),
+        let parts: Vec<MeshPart> = chosen.iter().map(part).collect::<Result<_, WearError>>()?;
+        let is_other = |s: &&(Entity, &Mesh3d, Option<&SkinnedMesh>)| {
+            is_bone && !chosen.iter().any(|part| part.0 == s.0) && !of_head.contains(&s.0)
+        };
+        let garments = skinned.iter().filter(is_other).filter_map(|s| {
+            let part = match s.2 {
+                Some(_) => part(&s).ok()?,
+                None => self.rigid(s, wearer, &joints, &parts)?,
+            };
+            part.is_shown.then_some(part)
+        });
+        let garments = garments.collect();
+        Ok(Target { head, garments, parts, own: self.own_colliders(wearer, &joints) })
+    }
+
+    /// A mesh without a skin that hangs on a bone of the body, as moved by that bone alone; `None` on none, and for
+    /// what hands hold.
+    fn rigid(
+        &self,
+        &(entity, mesh, _): &(Entity, &Mesh3d, Option<&SkinnedMesh>),
+        wearer: Entity,
+        joints: &HashSet<Entity>,
+        parts: &[MeshPart],
+    ) -> Option<MeshPart> {
+        let joint = self.upward(entity).find(|above| joints.contains(above))?;
+        let mut above = self.upward(joint).take_while(|above| *above != wearer);
+        let is_hand =
+            |at: Entity| self.name(at).is_some_and(|name| Cue::of(name, false) == Cue::Hand);
+        if above.any(is_hand) {
+            return None;
+        }
+        let pose = self.relative(entity, wearer)?;
+        let pose = self.relative(joint, wearer)?.inverse() * pose;
+        // Where the body is bound, the joint may be elsewhere than now.
+        let bound = parts.iter().find_map(|part| {
+            let skin = part.skin.as_ref()?;
+            let at = skin.joints.iter().position(|other| *other == joint)?;
+            Some(part.to_wearer * skin.poses.get(at)?.inverse())
+        });
+        let to_wearer = bound? * pose;
+        let mesh = skin_of(self.meshes.as_ref()?.get(mesh)?).ok()?;
+        let skin = MeshSkin {
+            joints: vec![joint],
+            poses: vec![pose],
+            head: None,
+            of_head: vec![false],
+            cues: vec![Cue::None],
+        };
+        (to_wearer.is_finite() && pose.inverse().is_finite()).then(|| MeshPart {
+            entity,
+            name: self.name_of_mesh(entity, joints),
+            is_shown: self.is_shown(entity, wearer),
+            is_named: false,
+            mesh,
+            skin: Some(skin),
+            to_wearer,
         })
+    }
+
+    /// Whether a mesh, or the node that it is a part of, has this name.
+    fn is_called(&self, mesh: Entity, name: &str, joints: &HashSet<Entity>) -> bool {
+        self.name(mesh) == Some(name) || self.node_of(mesh, joints) == Some(name)
+    }
+
+    /// The name of the node above a mesh, which is not a joint.
+    fn node_of(&self, mesh: Entity, joints: &HashSet<Entity>) -> Option<&str> {
+        let above = self.upward(mesh).nth(1).filter(|above| !joints.contains(above))?;
+        self.name(above)
+    }
+
+    /// The name of a mesh with that of its node.
+    fn name_of_mesh(&self, mesh: Entity, joints: &HashSet<Entity>) -> String {
+        let names = [self.node_of(mesh, joints), self.name(mesh)];
+        names.into_iter().flatten().collect::<Vec<_>>().join("/")
+    }
+
+    /// Whether a mesh is drawn, as far as that is decided below the wearer. What is hidden for worn hair counts as
+    /// shown.
+    #[cfg(feature = "render")]
+    fn is_shown(&self, mesh: Entity, wearer: Entity) -> bool {
+        let below = self.upward(mesh).take_while(|at| *at != wearer);
+        let each = below.filter_map(|at| self.shown.get(at).ok());
+        let decided = each.map(|(is, for_hair)| match is {
+            Visibility::Hidden if !for_hair => Some(false),
+            Visibility::Visible => Some(true),
+            _ => None,
+        });
+        decided.flatten().next().unwrap_or(true)
+    }
+
+    #[cfg(not(feature = "render"))]
+    fn is_shown(&self, _: Entity, _: Entity) -> bool {
+        true
     }
 
     /// Where the character's own colliders are. Those of other wearers, and what games put on hair, are not its own.
@@ -274,9 +386,13 @@ impl Characters<'_, '_> {
             (None, Some(head)) => self.below(skin.joints[head], true).into_iter().collect(),
             (None, None) => default(),
         };
-        let of_head = skin.joints.iter().map(|joint| below.contains(joint)).collect();
+        let of_head: Vec<bool> = skin.joints.iter().map(|joint| below.contains(joint)).collect();
+        let cue = |(joint, of_head): (&Entity, &bool)| {
+            self.name(*joint).map_or(Cue::None, |name| Cue::of(name, *of_head))
+        };
+        let cues = skin.joints.iter().zip(&of_head).map(cue).collect();
         let poses = poses.iter().map(|pose| Affine3A::from_mat4(*pose)).collect();
-        MeshSkin { joints: skin.joints.clone(), poses, head, of_head }
+        MeshSkin { joints: skin.joints.clone(), poses, head, of_head, cues }
     }
 
     /// From a skinned mesh, as it is bound, to the wearer, by the joint that is nearest to the root.

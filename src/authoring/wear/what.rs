@@ -1,6 +1,6 @@
 //! The components and events of worn hair.
 
-use super::error::WearError;
+use super::{error::WearError, facing::FacingFrom};
 #[cfg(feature = "save")]
 use crate::hairdo::save::{Hairdo, HairdoError};
 use crate::{
@@ -21,8 +21,9 @@ use bevy::prelude::*;
 /// # fn wear(mut commands: Commands, character: Entity, groom: Handle<Groom>) {
 /// // On the head, found by its bone's name:
 /// commands.entity(character).insert(WearHair::new(HairPreset::Curly));
-/// // Another bone, and a character that looks along +Z, as glTF's do:
-/// commands.entity(character).insert(WearHair::new(HairPreset::Bob).on("skull").facing(Dir3::Z));
+/// // On another bone, on the mesh of this name, in place of the hair that the character came with:
+/// let bob = WearHair::new(HairPreset::Bob).on("skull").on_mesh("Face").hiding_old_hair();
+/// commands.entity(character).insert(bob);
 /// // What an artist made for this character:
 /// commands.entity(character).insert(WearHair::new(groom));
 /// // Bald again:
@@ -70,10 +71,19 @@ pub struct WearHair {
     /// `J_Bip_C_Head`) or is Rigify's (`DEF-spine.006`), else the only mesh there is: on the joint
     /// that moves its highest vertex.
     pub on: Option<String>,
+    /// The name of the mesh that it grows on, or of the node that its parts are below. Default `None`: the
+    /// skin of the head. Of the meshes that are shown and move with the head, what lies over another, like old
+    /// hair and hats, and what lies within, like eyes and teeth, is left out; the rest is skin, all parts of it.
+    /// Names decide only what is nearly even. The choice is logged.
+    pub mesh: Option<String>,
+    /// Whether hair that the character came with is hidden while this is worn: meshes that lie over the
+    /// scalp, and are not named like hats or glasses. Default `false`. Without the feature `render` nothing is
+    /// hidden.
+    pub hides_old_hair: bool,
     /// The direction in which the face looks, in this entity's space; Y is up and the component
-    /// along Y is ignored. Default −Z, Bevy's forward; characters of glTF files look along +Z
-    /// unless they are converted.
-    pub facing: Dir3,
+    /// along Y is ignored. Default `None`: found, and told in [`HairWorn`], from the bones of eyes, toes and
+    /// feet, else from the shape of the head. Where nothing tells it is −Z, Bevy's forward, which is logged.
+    pub facing: Option<Dir3>,
     /// Seed of the strands' places and variations: the same seed gives the same hair. Default 0.
     pub seed: u64,
     /// How long a preset's hair is, as a multiple of its own length. Default 1, range that of
@@ -115,7 +125,9 @@ impl Default for WearHair {
         Self {
             hair: HairSource::default(),
             on: None,
-            facing: Dir3::NEG_Z,
+            mesh: None,
+            hides_old_hair: false,
+            facing: None,
             seed: 0,
             length: 1.0,
             look: None,
@@ -143,9 +155,21 @@ impl WearHair {
         self
     }
 
+    /// The same on the mesh of this name, or on all parts below the node of this name.
+    pub fn on_mesh(mut self, name: impl Into<String>) -> Self {
+        self.mesh = Some(name.into());
+        self
+    }
+
+    /// The same in place of the hair that the character came with.
+    pub fn hiding_old_hair(mut self) -> Self {
+        self.hides_old_hair = true;
+        self
+    }
+
     /// The same on a face that looks in this direction.
     pub fn facing(mut self, direction: Dir3) -> Self {
-        self.facing = direction;
+        self.facing = Some(direction);
         self
     }
 
@@ -258,6 +282,13 @@ pub struct HairWorn {
     pub entity: Entity,
     /// The hair.
     pub hair: Entity,
+    /// The mesh that it grows on, that with most of the head where there are several:
+    /// [`RootsOnMesh`](crate::authoring::attach::RootsOnMesh) names all.
+    pub mesh: Entity,
+    /// Where the face looks, in the wearer's space.
+    pub facing: Dir3,
+    /// What told that.
+    pub facing_from: FacingFrom,
 }
 
 /// Triggered on an entity with [`WearHair`] whose hair cannot be made; also reported as a
