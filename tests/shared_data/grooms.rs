@@ -94,7 +94,7 @@ fn strict(folder: &Path) {
         match (Groom::from_file(&file, &strict), says) {
             (Ok(_), None) => {}
             (Err(error), Some(says)) => {
-                assert!(error.to_string().contains(says), "{name}: {error}")
+                assert!(error.to_string().contains(says), "{name}: {error}");
             }
             (read, _) => panic!("{name}: {:?}", read.map(|_| "read")),
         }

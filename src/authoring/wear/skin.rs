@@ -190,7 +190,8 @@ mod tests {
     /// A part of an ellipsoid of these half axes, where `is_part` holds for directions.
     fn shell(half: Vec3, at: Vec3, hint: Hint, is_part: impl Fn(Vec3) -> bool) -> Shell {
         let way = |row: usize, column: usize| {
-            let (up, around) = (row as f32 / 24.0 * 3.1416, column as f32 / 48.0 * TAU);
+            let (up, around) =
+                (row as f32 / 24.0 * core::f32::consts::PI, column as f32 / 48.0 * TAU);
             Vec3::new(up.sin() * around.cos(), up.cos(), up.sin() * around.sin())
         };
         let quads = (0..24).flat_map(|row| (0..48).map(move |column| (row, column)));

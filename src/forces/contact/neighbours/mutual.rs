@@ -1,6 +1,7 @@
 //! Tests of mutual contact: it keeps momentum, and is the gradient of an energy.
 
 use super::{tests::printed, *};
+use glam::Quat;
 use proptest::prelude::*;
 
 const RADIUS: f32 = 0.05;
