@@ -11,7 +11,7 @@ fn check(rows: Vec<Row>) {
 
 #[test]
 fn uneven_frames_do_not_move_hair() {
-    check(measured::frames());
+    check(measured::frames(4.0));
 }
 
 #[test]

@@ -230,16 +230,16 @@ fn ride(path: Path, frames: &Frames, moved: Moved, discards: Discards, seconds: 
     ride
 }
 
-/// How long each ride is measured, after how long (s).
-const SECONDS: f64 = 4.0;
+/// After how long rides are measured (s).
 const WARM_UP: f64 = 4.0;
 
-/// Lines 1 and 2: hair of a head that moves evenly hangs as by even frames, whatever the frames are.
-pub fn frames() -> Vec<Row> {
+/// Lines 1 and 2: hair of a head that moves evenly hangs as by even frames, whatever the frames are. Each ride is
+/// measured for some `seconds`.
+pub fn frames(seconds: f64) -> Vec<Row> {
     let mut rows = Vec::new();
     for (speed, spin) in [(3.0, 0.0), (12.0, 0.0), (3.0, 8.0)] {
         let path = Path { speed, spin };
-        let control = ride(path, &EVEN, Moved::FixedUpdate, Discards::Nothing, SECONDS);
+        let control = ride(path, &EVEN, Moved::FixedUpdate, Discards::Nothing, seconds);
         for moved in [Moved::Update, Moved::FixedUpdate, Moved::Both, Moved::Player] {
             for (frames, discards) in UNEVEN
                 .iter()
@@ -249,7 +249,7 @@ pub fn frames() -> Vec<Row> {
                 if discards != Discards::Nothing && moved == Moved::Both {
                     continue;
                 }
-                let got = ride(path, frames, moved, discards, SECONDS);
+                let got = ride(path, frames, moved, discards, seconds);
                 let and = match discards {
                     Discards::Nothing => "",
                     Discards::Overstep => ", overstep discarded",

@@ -151,7 +151,7 @@ fn apart(a: &[Vec3], b: &[Vec3]) -> f32 {
 /// All rows.
 pub fn rows() -> Vec<Row> {
     let mut rows = [
-        frames(),
+        frames(60.0),
         rates(),
         riders(),
         returns(),
