@@ -10,7 +10,7 @@ pub mod wear;
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
     pub use crate::authoring::groom::{
-        Groom, GroomError, GroomGuides, GroomSettings, GroomedHair, UpAxis,
+        Groom, GroomError, GroomGuides, GroomSettings, GroomedHair, RootEnd, UpAxis,
     };
     pub use crate::authoring::plant::{HairPreset, Hairline, Scalp};
     pub use crate::authoring::wear::{

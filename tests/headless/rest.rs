@@ -30,6 +30,6 @@ fn asleep(contact: StrandContact) -> SleepCounts {
 fn locks_that_touch_come_to_rest_where_contact_is_mutual() {
     let [mutual, printed] = [StrandContact::default(), StrandContact::PRINTED].map(asleep);
     println!("mutual {mutual:?}, printed {printed:?}");
-    assert!(mutual.asleep > 2 * mutual.awake, "{mutual:?}");
+    assert!(mutual.asleep > mutual.awake, "{mutual:?}");
     assert!(2 * printed.asleep < printed.awake, "{printed:?}, the control");
 }

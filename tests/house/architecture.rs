@@ -361,8 +361,9 @@ fn no_file_is_too_long_to_be_understood() {
 }
 
 /// Lines of code that `src` may have, Rust and WGSL; 36,182 before rooms were rebuilt, 37,028
-/// before worlds that move, 38,320 before any character was worn on. A commit that raises it says why.
-const MOST_LINES: usize = 39_300;
+/// before worlds that move, 38,320 before hair was worn on any character and read from any file. A commit that
+/// raises it says why.
+const MOST_LINES: usize = 40_400;
 
 #[test]
 fn the_crate_stays_small() {

@@ -149,7 +149,7 @@ fn from_middle(
             skin == 0.0 || skin > off.length() * (1.0 - 0.5 * EYE_DEPTH)
         })
     };
-    let mut roles = vec![Role::Skin; shells.len()];
+    let (mut roles, mut within) = (vec![Role::Skin; shells.len()], Vec::new());
     for (a, outer) in reaches.iter().enumerate() {
         for (b, inner) in reaches.iter().enumerate() {
             let (mut shared, mut over) = (0.0, 0.0);
@@ -167,9 +167,15 @@ fn from_middle(
             };
             if shared >= (SHARED + hint) * covered(outer) && holds_eyes(inner) {
                 roles[a] = Role::Over;
-            } else if shared >= SHARED * covered(inner) && roles[b] == Role::Skin {
-                roles[b] = Role::Within;
+            } else if shared >= SHARED * covered(inner) {
+                within.push((a, b));
             }
+        }
+    }
+    // What lies below hair or a hat is not within the head.
+    for (outer, inner) in within {
+        if roles[outer] != Role::Over && roles[inner] == Role::Skin {
+            roles[inner] = Role::Within;
         }
     }
     if !roles.contains(&Role::Skin) {
@@ -209,7 +215,7 @@ mod tests {
     const HEAD: Vec3 = Vec3::new(0.077, 0.118, 0.098);
 
     fn eye(x: f32) -> Shell {
-        shell(Vec3::splat(0.012), AT + Vec3::new(x, 0.0, 0.085), Hint::None, |_| true)
+        shell(Vec3::splat(0.012), AT + Vec3::new(x, 0.0, 0.075), Hint::None, |_| true)
     }
 
     #[test]

@@ -9,7 +9,6 @@
 //! With exact tests on all edges of the cells, scene 1 took 1.3 times as long.
 
 use super::{
-    StrandContact,
     coarse::Coarse,
     lanes::{self, Bridges, NodeRow, Penalty, PenaltySum, Pieces, Reaction, Stack, WIDTH, WetRow},
     model::{Bridged, Film},
@@ -215,17 +214,12 @@ impl Neighbours {
 
     /// Evaluates equation 18 for every node, for [`pushes`](Self::pushes) to return. The order of
     /// summation does not depend on threads.
-    pub fn find_pushes(
-        &mut self,
-        StrandContact { radius, strength, mutual }: StrandContact,
-        lookup: Lookup,
-    ) {
+    pub fn find_pushes(&mut self, Penalty { reach, strength, mutual }: Penalty, lookup: Lookup) {
         // Lists are padded with an edge at NaN.
         let nodes = self.strands.last().map_or(0, |strand| strand.end as usize);
         self.rows.truncate(nodes);
         self.rows.extend([[f32::NAN; 4]; 2]);
         self.expected.truncate(nodes);
-        let reach = 2.0 * radius;
         let level = simd_level();
         if self.are_stale(reach, lookup) {
             self.look_up(level, reach, MOST_BYTES + MOST_BYTES_A_NODE * nodes);
@@ -605,8 +599,8 @@ mod tests {
     use super::{super::model::*, *};
     use proptest::prelude::*;
 
-    pub fn printed(radius: f32) -> StrandContact {
-        StrandContact { radius, ..StrandContact::PRINTED }
+    pub fn printed(radius: f32) -> Penalty {
+        Penalty { reach: 2.0 * radius, strength: 20.0, mutual: false }
     }
 
     /// Equation 18 of all edges but those of the strand `own` at a place `p`.

@@ -3,6 +3,7 @@
 use super::{
     Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError,
     LockNeighbours, Obstacles, Openings, StrandContact, coarse,
+    lanes::Penalty,
     neighbours::Lookup,
     reach::{Colliders, HairReach, LOOK_AGAIN},
 };
@@ -269,7 +270,8 @@ impl Touching<'_> {
                 }
             }
         }
-        list.find_pushes(*contact, lookup);
+        let StrandContact { strength, mutual, .. } = *contact;
+        list.find_pushes(Penalty { reach, strength, mutual }, lookup);
         if fault.is_none() && list.is_crowded() && !core::mem::replace(&mut reported.1, true) {
             *fault = Some(too_crowded(radius).of(*hair));
         }

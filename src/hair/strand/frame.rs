@@ -343,7 +343,8 @@ impl TickPose {
         }
         self.inertia = Vec2::new(limits.moving, limits.turning);
         (self.seconds, self.shares, self.settles) = (tick.seconds, [0.0; 2], false);
-        let was_away = core::mem::replace(&mut self.tick, tick.number) + 1 != tick.number
+        let was_away = core::mem::replace(&mut self.tick, tick.number).wrapping_add(1)
+            != tick.number
             || core::mem::take(&mut self.waits);
         let requested = core::mem::take(&mut self.jumps);
         let Some(mut to) = end else {

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 const RADIUS: f32 = 0.05;
 
-fn pushes(strands: &[Vec<Vec3>], contact: StrandContact) -> Vec<Vec3> {
+fn pushes(strands: &[Vec<Vec3>], contact: Penalty) -> Vec<Vec3> {
     let mut list = Neighbours::default();
     strands.iter().for_each(|nodes| list.add(nodes, 1));
     list.find_pushes(contact, Lookup::Now);
@@ -14,8 +14,8 @@ fn pushes(strands: &[Vec<Vec3>], contact: StrandContact) -> Vec<Vec3> {
 }
 
 /// The energy of equation 18 for each node and each edge of another strand, by halves (m²/s²).
-fn energy(strands: &[Vec<Vec3>], contact: StrandContact) -> f32 {
-    let reach = 2.0 * contact.radius;
+fn energy(strands: &[Vec<Vec3>], contact: Penalty) -> f32 {
+    let reach = contact.reach;
     let mut sum = 0.0;
     for (own, nodes) in strands.iter().enumerate() {
         for p in &nodes[1..] {
@@ -53,13 +53,12 @@ proptest! {
         raw in proptest::collection::vec((0f32..1.0, 0f32..1.0, 0f32..1.0), 2..6),
     ) {
         let strands = crossing(&raw);
-        let contact = StrandContact { mutual: true, ..printed(RADIUS) };
+        let contact = Penalty { mutual: true, ..printed(RADIUS) };
         let found = pushes(&strands, contact);
         let largest = found.iter().map(|push| push.length()).fold(0.0, f32::max);
         let sum: Vec3 = found.iter().sum();
         prop_assert!(sum.length() <= 1e-5 * largest.max(1.0) * found.len() as f32, "{sum}");
-        let slope = |s: usize, i: usize, axis: Vec3| {
-            let step = 1e-3;
+        let slope = |s: usize, i: usize, axis: Vec3, step: f32| {
             let [ahead, back] = [step, -step].map(|by| {
                 let mut moved = strands.clone();
                 moved[s][i] += axis * by;
@@ -67,13 +66,13 @@ proptest! {
             });
             -(ahead - back) / (2.0 * step)
         };
-        for s in 0..strands.len() {
-            for i in 0..4 {
-                let expected = Vec3::AXES.map(|axis| slope(s, i, axis));
-                let push = found[4 * s + i];
-                // Where a foot leaves an edge the energy has a kink.
-                let off = push.distance(Vec3::from(expected));
-                prop_assert!(off < 0.05 * largest + 0.05, "{s} {i}: {push}, not {expected:?}");
+        for (k, push) in found.iter().enumerate() {
+            for (axis, push) in Vec3::AXES.into_iter().zip(push.to_array()) {
+                let [near, far] = [5e-4, 1e-3].map(|step| slope(k / 4, k % 4, axis, step));
+                // Where a foot goes over to another edge the energy has a step.
+                let is_smooth = (near - far).abs() < 0.02 * largest;
+                let off = (push - near).abs();
+                prop_assert!(!is_smooth || off < 0.05 * largest + 0.05, "{k}: {push}, not {near}");
             }
         }
     }
