@@ -115,7 +115,7 @@ impl Settings<'_, '_> {
         *self.stiffness = default();
         *self.influence = default();
         *self.cuticle = default();
-        **self.contact = StrandContact::PRINTED;
+        *self.contact = default();
         *self.drag = default();
         *self.solver = default();
         *self.gravity = default();

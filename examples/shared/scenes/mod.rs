@@ -213,8 +213,7 @@ impl Surroundings<'_> {
         *self.gravity = default();
         **self.drag = default();
         **self.wetting = default();
-        // As [B] prints it.
-        **self.contact = StrandContact::PRINTED;
+        **self.contact = default();
         *self.substeps = default();
         // The papers' scenes are computed at the papers' step.
         self.solver.substep = 1.0 / 360.0;

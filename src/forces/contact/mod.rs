@@ -43,16 +43,11 @@ setting! {
         pub strength: f32 = 20.0, "m/s²" in STRENGTH: 0.0..=1e6, safe 0.0..=1e3,
             "20 parts locks gently";
         /// Whether an edge that pushes a node is pushed back, and each pair counts by halves from both sides:
-        /// contact then keeps momentum and has an energy. As equation 18 is printed it makes both, and
-        /// hair whose locks touch never comes to rest. Hair by the hundred strands in one place is
-        /// pushed as printed.
-        pub mutual: bool = true;
+        /// contact then keeps momentum and has an energy, and hair whose locks touch comes to rest. By
+        /// default it does not, as equation 18 is printed, which makes both. Where strands by the hundred
+        /// lie in one place they are pushed as printed.
+        pub mutual: bool = false;
     }
-}
-
-impl StrandContact {
-    /// Equation 18 as it is printed: nodes are pushed, and the edges that push them are not.
-    pub const PRINTED: Self = Self { radius: 1e-3, strength: 20.0, mutual: false };
 }
 
 /// The colliders near one hair in this substep, in its frame. Written by `Interaction`, read by

@@ -487,9 +487,6 @@ fn direct_step(root_from: vec4<f32>) {
             }
             contacts(1.0, 1.0);
         }
-        if done + 1u == record.limiter_steps {
-            clamp_lengths(TORN);
-        }
     }
     finish(stage);
     untwist();

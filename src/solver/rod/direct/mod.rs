@@ -200,9 +200,6 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
                 }
                 contacts(simd, b, params.clearance, obstacles);
             }
-            // Lengths have the last word: solids that push against each other would stretch a strand between
-            // them for good.
-            clamp_lengths(simd, b, TORN);
         }
     }
     finish(simd, b, params);
