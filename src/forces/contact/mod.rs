@@ -42,10 +42,10 @@ setting! {
         /// contact between strands off.
         pub strength: f32 = 20.0, "m/s²" in STRENGTH: 0.0..=1e6, safe 0.0..=1e3,
             "20 parts locks gently";
-        /// Whether an edge that pushes a node is pushed back, and each pair counts by halves from both sides:
-        /// contact then keeps momentum and has an energy, and hair whose locks touch comes to rest. By
-        /// default it does not, as equation 18 is printed, which makes both. Where strands by the hundred
-        /// lie in one place they are pushed as printed.
+        /// Whether an edge that pushes a node is pushed back. Contact then keeps momentum and has an energy, so
+        /// that most hair whose locks touch comes to rest: each pair counts by halves from both sides. Default
+        /// `false`, equation 18 as printed, which keeps neither. Where lists hold more than 256 edges a
+        /// node in the mean, as with strands by the hundred in one place, contact is as printed.
         pub mutual: bool = false;
     }
 }
