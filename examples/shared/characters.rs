@@ -242,12 +242,11 @@ fn of(file: &Path, preset: HairPreset) -> Vec<Row> {
     };
     let on = format!("{head}: hair grows on {}", worn.names());
     let looks = format!("{head}: looks along +Z by {:?} (°)", worn.worn.facing_from);
-    // Where nothing tells, as on a ball, it is taken to look along −Z.
-    let expected = if worn.worn.facing_from == FacingFrom::Assumed { 180.0 } else { 0.0 };
     vec![
         Row::new(on, 1.0, f32::from(u8::from(!worn.meshes().is_empty())), 0.0),
         Row::at_most(format!("{head}: roots off the skin (mm)"), worn.off_skin(), 0.5),
         Row::new(format!("{head}: share of the scalp with hair"), 1.0, worn.covered(), 0.05),
-        Row::new(looks, expected, worn.turned(), 1.0),
+        // Where nothing tells it is assumed to be −Z, and this is outside.
+        Row::at_most(looks, worn.turned(), 1.0),
     ]
 }
