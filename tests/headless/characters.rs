@@ -426,7 +426,7 @@ fn characters_of_files_wear_hair_as_their_notes_say() {
         assert!(rows.iter().any(|row| row.test == expected), "{expected}");
     };
     grows_on("human", "Body.skin");
-    grows_on("knight", "Knight_Head.knight_texture");
+    grows_on("knight", "PrototypePete_head.001.knight_texture");
     grows_on("C3_old_hair_mesh_larger_than_face", "Face");
     grows_on("C4_face_and_back_are_two_primitives", "Face and Face");
 }
