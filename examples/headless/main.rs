@@ -7,6 +7,8 @@
 
 #[path = "../shared/characters.rs"]
 mod characters;
+#[path = "../shared/gltf.rs"]
+mod gltf;
 #[path = "../shared/rows.rs"]
 mod rows;
 #[path = "../shared/scenes/mod.rs"]

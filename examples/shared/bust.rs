@@ -1,11 +1,7 @@
 //! The training head upright, with a preset's hair, in light that flatters it.
 
 use crate::{dressed, environment, head, mannequin, renderer};
-use bevy::{
-    core_pipeline::prepass::DepthPrepass,
-    light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap},
-    prelude::*,
-};
+use bevy::{core_pipeline::prepass::DepthPrepass, light::DirectionalLightShadowMap, prelude::*};
 use bevy_keratin::{authoring::plant::HairPreset, prelude::*, render::HairFollowers};
 
 /// Seconds until hair has settled.
@@ -49,32 +45,9 @@ pub fn look(app: &mut App, from: Vec3, to: Vec3) {
     cameras.iter_mut(app.world_mut()).for_each(|mut camera| *camera = place);
 }
 
-/// Key and fill from the front, two kickers so far behind that they draw an edge and do not light the hair
-/// before the ears. All cast shadows, or light from one side would shine through the head.
+/// Lights the head.
 pub fn light(app: &mut App) {
-    let light = |at: Vec3, lux: f32, color: Color| {
-        let light = DirectionalLight {
-            illuminance: lux,
-            color,
-            shadow_maps_enabled: true,
-            shadow_normal_bias: 0.6,
-            shadow_depth_bias: 0.002,
-            ..default()
-        };
-        let cascades = CascadeShadowConfigBuilder {
-            num_cascades: 1,
-            minimum_distance: 0.3,
-            maximum_distance: 1.1,
-            ..default()
-        };
-        let at = Transform::from_translation(at).looking_at(Vec3::ZERO, Vec3::Y);
-        (light, cascades.build(), at)
-    };
-    let world = app.world_mut();
-    world.spawn(light(Vec3::new(1.0, 1.1, 1.2), 8000.0, Color::srgb(1.0, 0.95, 0.88)));
-    world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2000.0, Color::srgb(0.8, 0.88, 1.0)));
-    world.spawn(light(Vec3::new(0.62, 0.5, -1.5), 2000.0, Color::WHITE));
-    world.spawn(light(Vec3::new(-0.62, 0.5, -1.5), 2000.0, Color::WHITE));
+    environment::lights(app.world_mut(), 1.0);
 }
 
 /// Hair of so few drawn strands is drawn whole.

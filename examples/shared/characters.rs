@@ -1,20 +1,15 @@
 //! Hair on characters from glTF files, measured: what it grows on, how far roots are off the skin, how much of the
 //! scalp has hair, and which way the character was found to look.
 
-use super::rows::Row;
+use super::{gltf::register, rows::Row};
 use bevy::{
-    camera::{
-        primitives::Aabb,
-        visibility::{DynamicSkinnedMeshBounds, NoFrustumCulling, VisibilityClass},
-    },
-    gltf::{GltfAssetLabel, GltfMaterialName, GltfMeshName, GltfPlugin, GltfSceneName},
+    gltf::{GltfAssetLabel, GltfPlugin},
     mesh::{
         VertexAttributeValues as Values,
         skinning::{SkinnedMesh, SkinnedMeshInverseBindposes},
     },
     prelude::*,
     time::TimeUpdateStrategy,
-    transform::components::TransformTreeChanged,
     world_serialization::{WorldAssetRoot, WorldSerializationPlugin},
 };
 use bevy_keratin::{
@@ -54,6 +49,7 @@ fn app(folder: &Path) -> App {
         .init_asset::<Mesh>()
         .init_asset::<Image>()
         .init_asset::<SkinnedMeshInverseBindposes>()
+        .init_asset::<AnimationClip>()
         .add_plugins((GltfPlugin::default(), HairPlugins::default()))
         .init_resource::<Told>()
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
@@ -66,29 +62,6 @@ fn app(folder: &Path) -> App {
     app.finish();
     app.cleanup();
     app
-}
-
-/// What glTF scenes are made of.
-fn register(app: &mut App) {
-    app.register_type::<Transform>()
-        .register_type::<GlobalTransform>()
-        .register_type::<TransformTreeChanged>()
-        .register_type::<Visibility>()
-        .register_type::<InheritedVisibility>()
-        .register_type::<ViewVisibility>()
-        .register_type::<VisibilityClass>()
-        .register_type::<DynamicSkinnedMeshBounds>()
-        .register_type::<NoFrustumCulling>()
-        .register_type::<Aabb>()
-        .register_type::<Name>()
-        .register_type::<Children>()
-        .register_type::<ChildOf>()
-        .register_type::<Mesh3d>()
-        .register_type::<MeshMaterial3d<StandardMaterial>>()
-        .register_type::<SkinnedMesh>()
-        .register_type::<GltfSceneName>()
-        .register_type::<GltfMaterialName>()
-        .register_type::<GltfMeshName>();
 }
 
 /// Hair on a character.

@@ -3,6 +3,7 @@
 
 use bevy::{
     asset::RenderAssetUsages,
+    light::CascadeShadowConfigBuilder,
     prelude::*,
     render::render_resource::{
         Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension,
@@ -90,4 +91,33 @@ fn cube(levels: u32, roughness: impl Fn(u32) -> f32) -> Image {
     image.texture_view_descriptor =
         Some(TextureViewDescriptor { dimension: Some(TextureViewDimension::Cube), ..default() });
     image
+}
+
+/// Key and fill from the front, which is +Z, two kickers so far behind that they draw an edge and do not light the
+/// hair before the ears, for heads of life size times `size`. All cast shadows, or light from one side would shine
+/// through the head.
+#[allow(dead_code, reason = "the salon has its own")]
+pub fn lights(world: &mut World, size: f32) {
+    let light = |at: Vec3, lux: f32, color: Color| {
+        let light = DirectionalLight {
+            illuminance: lux,
+            color,
+            shadow_maps_enabled: true,
+            shadow_normal_bias: 0.6,
+            shadow_depth_bias: 0.002,
+            ..default()
+        };
+        let cascades = CascadeShadowConfigBuilder {
+            num_cascades: 1,
+            minimum_distance: 0.3 * size,
+            maximum_distance: 1.1 * size,
+            ..default()
+        };
+        let at = Transform::from_translation(at).looking_at(Vec3::ZERO, Vec3::Y);
+        (light, cascades.build(), at)
+    };
+    world.spawn(light(Vec3::new(1.0, 1.1, 1.2), 8000.0, Color::srgb(1.0, 0.95, 0.88)));
+    world.spawn(light(Vec3::new(-1.5, 0.3, 0.9), 2000.0, Color::srgb(0.8, 0.88, 1.0)));
+    world.spawn(light(Vec3::new(0.62, 0.5, -1.5), 2000.0, Color::WHITE));
+    world.spawn(light(Vec3::new(-0.62, 0.5, -1.5), 2000.0, Color::WHITE));
 }

@@ -13,6 +13,8 @@ pub mod prelude {
         Groom, GroomError, GroomGuides, GroomSettings, GroomedHair, RootEnd, UpAxis,
     };
     pub use crate::authoring::plant::{HairPreset, Hairline, Scalp};
+    #[cfg(feature = "render")]
+    pub use crate::authoring::wear::ScalpShade;
     pub use crate::authoring::wear::{
         FacingFrom, HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair,
     };

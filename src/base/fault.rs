@@ -43,7 +43,8 @@ struct Source(Option<Arc<dyn Error + Send + Sync>>);
 pub enum FaultKind {
     /// A setting or a tool's value outside its range: the nearest valid value is used.
     Setting,
-    /// A strand became non-finite and was put back to the state of the previous substep. What moves it is out
+    /// A strand became non-finite, on the CPU in a softer second attempt as well, and was put back to the state of
+    /// the previous substep. What moves it is out
     /// of proportion: look for forces and settings outside their safe range, and for roots or colliders that
     /// jump without [`Hair::teleport`](crate::Hair::teleport).
     PutBack,

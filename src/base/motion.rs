@@ -50,10 +50,16 @@ struct Track {
     parent: Option<Entity>,
     /// At the end of the last frame, and of this one.
     frames: [Transform; 2],
+    /// The motion of the last frame in which time passed, jumps left out, and how long that was (s).
+    way: ([Transform; 2], f32),
     /// In each tick of the frame.
     ticks: Vec<Transform>,
-    /// In the tick before those.
-    last_tick: Transform,
+    /// In the two ticks before those.
+    last_ticks: [Transform; 2],
+    /// Where the tick with this index began that has jumped.
+    begins: Option<(usize, Transform)>,
+    /// The last frame in which it jumped.
+    jumped: u64,
     /// When it was last looked at.
     seen: Transform,
     /// Whether a tick, or something else in the frame, has changed it since the last frame.
@@ -73,8 +79,11 @@ impl Track {
         Self {
             parent,
             frames: [at; 2],
+            way: ([at; 2], 0.0),
             ticks: Vec::new(),
-            last_tick: at,
+            last_ticks: [at; 2],
+            begins: None,
+            jumped: 0,
             seen: at,
             changed: [false; 2],
             by_ticks: false,
@@ -94,13 +103,95 @@ impl Track {
         if !self.by_ticks {
             return between(&self.frames, tick.shares[usize::from(ends)]);
         }
-        match (ends, tick.index.checked_sub(1)) {
-            (true, _) => self.ticks.get(tick.index).copied().unwrap_or(self.seen),
-            (false, Some(before)) => self.ticks.get(before).copied().unwrap_or(self.seen),
-            (false, None) => self.last_tick,
+        match self.begins {
+            _ if ends => self.in_tick(tick.index),
+            Some((index, at)) if index == tick.index => at,
+            _ => self.before_tick(tick.index),
+        }
+    }
+
+    fn in_tick(&self, index: usize) -> Transform {
+        self.ticks.get(index).copied().unwrap_or(self.seen)
+    }
+
+    fn before_tick(&self, index: usize) -> Transform {
+        index.checked_sub(1).map_or(self.last_ticks[1], |before| self.in_tick(before))
+    }
+
+    /// Its motion before a tick, jumps left out.
+    fn motion_before_tick(&self, index: usize) -> [Transform; 2] {
+        let Some(before) = index.checked_sub(1) else { return self.last_ticks };
+        let begins = self.begins.filter(|(jumped, _)| *jumped == before);
+        [begins.map_or_else(|| self.before_tick(before), |(_, at)| at), self.in_tick(before)]
+    }
+
+    /// Where it was before the motion of this frame or tick, if it has moved in it as it did before.
+    fn carried_back(&self, tick: &TickMoment, frame_seconds: f32) -> Transform {
+        if self.by_ticks {
+            return carried_back(
+                &self.in_tick(tick.index),
+                &self.motion_before_tick(tick.index),
+                1.0,
+            );
+        }
+        let (way, seconds) = &self.way;
+        let times = if *seconds > 0.0 { frame_seconds / seconds } else { 0.0 };
+        carried_back(&self.frames[1], way, times)
+    }
+
+    /// All places that are known of it.
+    fn places_mut(&mut self) -> impl Iterator<Item = (Instant, &mut Transform)> {
+        let frames = self.frames.iter_mut().enumerate();
+        let last_ticks = self.last_ticks.iter_mut().enumerate();
+        let ticks = self.ticks.iter_mut().enumerate();
+        (frames.map(|(i, at)| (Instant::Frame(i), at)))
+            .chain(last_ticks.map(|(i, at)| (Instant::LastTick(i), at)))
+            .chain(ticks.map(|(i, at)| (Instant::Tick(i), at)))
+            .chain(self.begins.as_mut().map(|(i, at)| (Instant::Tick(*i), at)))
+            .chain(self.way.0.iter_mut().enumerate().map(|(i, at)| (Instant::Way(i), at)))
+    }
+
+    fn at_instant(&self, instant: Instant) -> Transform {
+        match instant {
+            Instant::Way(i) => self.way.0[i],
+            Instant::Frame(i) => self.frames[i],
+            Instant::LastTick(i) => self.last_ticks[i],
+            Instant::Tick(i) => self.in_tick(i),
         }
     }
 }
+
+/// When a transform is known.
+#[derive(Clone, Copy)]
+enum Instant {
+    Way(usize),
+    Frame(usize),
+    LastTick(usize),
+    Tick(usize),
+}
+
+/// Where something was that has come to `to` by so many `times` this motion along its own axes.
+fn carried_back(to: &Transform, [from, then]: &[Transform; 2], times: f32) -> Transform {
+    let turn = (then.rotation * from.rotation.inverse()).normalize();
+    let turn = if turn.w < 0.0 { -turn } else { turn };
+    let own = to.rotation * then.rotation.inverse();
+    let spin = own * turn.to_scaled_axis() * times;
+    Transform {
+        translation: to.translation - own * (then.translation - from.translation) * times,
+        rotation: (Quat::from_scaled_axis(-spin) * to.rotation).normalize(),
+        scale: to.scale,
+    }
+}
+
+/// How far two places of an entity are apart: metres, with turns as at 10 cm.
+fn apart(a: &Transform, b: &Transform) -> f32 {
+    let is_mirrored = a.scale.signum() != b.scale.signum();
+    let turned = 0.1 * a.rotation.angle_between(b.rotation);
+    if is_mirrored { f32::INFINITY } else { a.translation.distance(b.translation) + turned }
+}
+
+/// Up to this factor a scale that changes from frame to frame is on its way; beyond, it is set.
+const GROWS: f32 = 2.0;
 
 /// On the way between two transforms, or before the first.
 fn between([from, to]: &[Transform; 2], t: f32) -> Transform {
@@ -130,17 +221,66 @@ pub(crate) struct WorldMotion {
     ended: Option<Duration>,
     /// How long the frame was that has not been closed.
     delta: Duration,
+    /// How long the frame was that was closed last (s).
+    seconds: f32,
 }
 
 impl WorldMotion {
     /// Shifts the world.
     pub(crate) fn shift(&mut self, by: Vec3) {
         for track in self.tracks.values_mut().filter(|track| track.parent.is_none()) {
-            let at = track.frames.iter_mut().chain(&mut track.ticks);
-            for at in at.chain([&mut track.last_tick, &mut track.seen]) {
-                at.translation += by;
+            track.seen.translation += by;
+            track.places_mut().for_each(|(_, at)| at.translation += by);
+        }
+    }
+
+    /// Where an entity was.
+    fn place_at(
+        &self,
+        present: &Placed<'_, '_>,
+        entity: Option<Entity>,
+        instant: Instant,
+    ) -> GlobalTransform {
+        let Some(entity) = entity else { return GlobalTransform::IDENTITY };
+        let (local, parent) = match (self.tracks.get(&entity), present.get(entity)) {
+            (Some(track), _) => (track.at_instant(instant), track.parent),
+            (None, Ok((now, parent))) => (*now, parent.map(ChildOf::parent)),
+            (None, Err(_)) => return GlobalTransform::IDENTITY,
+        };
+        self.place_at(present, parent, instant).mul_transform(local)
+    }
+
+    /// What has got another parent was where it was: that is now told in the frame of its new parent.
+    fn note_parents(&mut self, present: &Placed<'_, '_>) {
+        let mut adopted: Vec<(Entity, Track)> = Vec::new();
+        let mut parents: Vec<(Entity, Track)> = Vec::new();
+        for (entity, track) in &self.tracks {
+            let Ok((now, parent)) = present.get(*entity) else { continue };
+            let parent = parent.map(ChildOf::parent);
+            if parent == track.parent {
+                continue;
+            }
+            let mut own = track.clone();
+            for (instant, at) in own.places_mut() {
+                let place = self.place_at(present, track.parent, instant).mul_transform(*at);
+                let seen = place.reparented_to(&self.place_at(present, parent, instant));
+                // A parent without size has no inside.
+                *at = if seen.is_finite() { seen } else { *now };
+            }
+            own.parent = parent;
+            adopted.push((*entity, own));
+            // From now on it is known how that moves.
+            let mut next = parent;
+            while let Some(parent) = next.filter(|parent| !self.tracks.contains_key(parent))
+                && let Ok((at, above)) = present.get(parent)
+            {
+                next = above.map(ChildOf::parent);
+                let used = self.tick.number;
+                parents.push((parent, Track { used, ..Track::new(*at, next) }));
             }
         }
+        self.tracks.extend(adopted);
+        self.tracks.extend(parents);
     }
 
     /// The next tick, which ends `rest` before the `frame` that ends at `now`; without `rest`
@@ -180,9 +320,12 @@ impl WorldMotion {
             return;
         }
         for track in self.tracks.values_mut() {
-            track.last_tick = track.ticks.last().copied().unwrap_or(track.seen);
+            track.last_ticks = match track.ticks.len() {
+                0 => [track.seen; 2],
+                ticks => track.motion_before_tick(ticks),
+            };
             track.ticks.clear();
-            track.was_put = false;
+            (track.was_put, track.begins) = (false, None);
         }
     }
 }
@@ -224,27 +367,58 @@ impl TickTransforms<'_, '_> {
 
     /// Where it was at the beginning of the tick, carried back from its motion where that is not known.
     pub(crate) fn begin(&mut self, entity: Entity) -> Option<GlobalTransform> {
+        let (end, _) = self.local(entity, true)?;
         let (local, parent) = self.local(entity, false)?;
+        // What only grows has not moved.
+        let local = Transform { scale: end.scale, ..local };
         match parent {
             Some(parent) => self.begin(parent).map(|parent| parent.mul_transform(local)),
             None => Some(local.into()),
         }
     }
 
-    /// Where it is at the end of the frame if frames move it; `None` if ticks do.
-    pub(crate) fn frame_end(&mut self, entity: Entity) -> Option<GlobalTransform> {
-        self.local(entity, true)?;
-        let track = self.motion.tracks.get(&entity).filter(|track| !track.by_ticks)?;
-        let (local, parent) = (track.frames[1], track.parent);
-        match parent {
-            Some(parent) => self.frame_end(parent).map(|parent| parent.mul_transform(local)),
-            None => Some(local.into()),
+    /// It has jumped in this tick: the motion that is not explained by that before is taken out of what it
+    /// is carried by.
+    pub(crate) fn jump(&mut self, entity: Entity) {
+        if self.was_put(entity) {
+            // That was while time stood still: since then it has moved on.
+            return;
         }
+        let WorldMotion { tracks, tick, frames, seconds, .. } = &mut *self.motion;
+        let seconds = *seconds;
+        let (mut next, mut most) = (Some(entity), None);
+        while let Some(at) = next {
+            let Some(track) = tracks.get(&at) else { break };
+            if track.jumped == *frames && (!track.by_ticks || track.begins.is_some()) {
+                // Known by another that it carries.
+                return;
+            }
+            let (began, from) = if track.by_ticks {
+                (track.before_tick(tick.index), track.carried_back(tick, seconds))
+            } else {
+                (track.frames[0], track.carried_back(tick, seconds))
+            };
+            let off = apart(&began, &from);
+            if most.is_none_or(|(_, _, most)| off > most) {
+                most = Some((at, from, off));
+            }
+            next = track.parent;
+        }
+        let Some((jumped, from, _)) = most else { return };
+        if let Some(track) = tracks.get_mut(&jumped) {
+            track.jumped = *frames;
+            match track.by_ticks {
+                true => track.begins = Some((tick.index, from)),
+                false => track.frames[0] = from,
+            }
+        }
+        // Places in this tick are no longer what they were.
+        tracks.values_mut().for_each(|track| track.used = track.used.min(tick.number - 1));
     }
 
-    /// Whether it was moved while time stood still.
+    /// Whether it was moved while time stood still before this tick.
     pub(crate) fn was_put(&self, entity: Entity) -> bool {
-        let track = self.motion.tracks.get(&entity);
+        let track = self.motion.tracks.get(&entity).filter(|_| self.motion.tick.index == 0);
         track.is_some_and(|track| {
             track.was_put || track.parent.is_some_and(|parent| self.was_put(parent))
         })
@@ -264,6 +438,7 @@ impl TickTransforms<'_, '_> {
 
 /// Before the ticks of a frame: what has changed by now was changed by the frame.
 pub(crate) fn see_frame(mut motion: ResMut<WorldMotion>, present: Placed<'_, '_>) {
+    motion.note_parents(&present);
     for (entity, track) in &mut motion.tracks {
         if let Ok((now, _)) = present.get(*entity) {
             track.see(*now, false);
@@ -277,6 +452,7 @@ pub(crate) fn note_tick(
     mut motion: ResMut<WorldMotion>,
     present: Placed<'_, '_>,
 ) {
+    motion.note_parents(&present);
     for (entity, track) in &mut motion.tracks {
         if let Ok((now, _)) = present.get(*entity) {
             track.see(*now, true);
@@ -296,6 +472,8 @@ pub(crate) fn close_frame(
     let now = time.map_or(Duration::ZERO, |time| time.delta());
     let before = core::mem::replace(&mut motion.delta, now);
     let delta = if last { before } else { now };
+    let last_seconds = core::mem::replace(&mut motion.seconds, delta.as_secs_f32());
+    motion.note_parents(&present);
     let WorldMotion { tracks, tick, noted, frames, .. } = &mut *motion;
     *frames += 1;
     tracks.retain(|entity, track| {
@@ -304,9 +482,18 @@ pub(crate) fn close_frame(
         track.see(*now, false);
         let [by_tick, by_frame] = core::mem::take(&mut track.changed);
         track.by_ticks &= by_tick || !by_frame || *noted == 0;
+        if last_seconds > 0.0 {
+            track.way = (track.frames, last_seconds);
+        }
         track.frames = [track.frames[1], *now];
+        let grown = now.scale.length() / track.frames[0].scale.length();
+        if !(GROWS.recip()..GROWS).contains(&grown) {
+            track.frames[0].scale = now.scale;
+        }
         if delta.is_zero() && track.frames[0] != track.frames[1] {
-            (track.was_put, track.last_tick) = (true, *now);
+            // It will go on as it did, from there.
+            let before = carried_back(now, &track.last_ticks, 1.0);
+            (track.was_put, track.last_ticks) = (true, [before, *now]);
         }
         // What nothing has asked for in the last ticks is forgotten.
         track.used + 64 > tick.number
@@ -331,7 +518,7 @@ mod tests {
         // Carried back where the frame began later.
         assert_eq!(track.at(&tick(0, -0.5, 0.5), false), at(0.5));
         track.by_ticks = true;
-        (track.last_tick, track.ticks) = (at(3.0), vec![at(4.0), at(6.0)]);
+        (track.last_ticks, track.ticks) = ([at(3.0); 2], vec![at(4.0), at(6.0)]);
         let both = |index| [false, true].map(|ends| track.at(&tick(index, 0.0, 0.5), ends));
         assert_eq!([both(0), both(1)], [[at(3.0), at(4.0)], [at(4.0), at(6.0)]]);
     }

@@ -18,7 +18,7 @@ use crate::{
     },
     forces::{
         contact::{Obstacles, StrandContact},
-        environment::{AirDrag, Gravity, Winds},
+        environment::{AirDrag, Gravity, Winds, vapour::JET_CORE},
     },
     hair::strand::{Hair, SleepCounts, TickPose},
     keratin::bond::{BondInfluence, Cuticle},
@@ -151,6 +151,7 @@ pub(super) fn write_journals(
             gravity: pose.direction_in(gravity),
             frame_motion: frame.frame_delta(),
             wind: air.steady_wind().unwrap_or_default() + air.headwind,
+            headwind: air.headwind,
             retained: bevy::math::ops::exp(-drag.of(hair).rate * substep.dt),
             influence: influence.of(hair).as_array(),
             bending_length: stiffness.bending_length,
@@ -160,11 +161,18 @@ pub(super) fn write_journals(
             sweeps,
             cuticle: cuticle.of(hair),
             blowers: (air.blowers.iter().take(MAX_BLOWERS))
-                .map(|seen| BlowerRecord {
-                    nozzle: seen.nozzle,
-                    aim: seen.aim,
-                    strength: seen.blower.strength,
-                    drying: seen.blower.drying,
+                .map(|seen| {
+                    let [velocity, spin, center] = seen.moves.parts();
+                    BlowerRecord {
+                        nozzle: seen.nozzle,
+                        aim: seen.aim,
+                        strength: seen.blower.strength,
+                        drying: seen.blower.drying,
+                        velocity,
+                        spin,
+                        center,
+                        core: JET_CORE / pose.size(),
+                    }
                 })
                 .collect(),
             obstacles: solids.iter().take(MAX_OBSTACLES).cloned().collect(),

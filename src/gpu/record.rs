@@ -39,7 +39,7 @@ pub(super) const WORDS: usize = (HEADER + 32 * MAX_OBSTACLES).next_multiple_of(6
 
 /// Words before the obstacles, and before the treatments.
 const HEADER: usize = BEFORE_TREATMENTS + COUNTS + 12 * MOST_TREATMENTS;
-const BEFORE_TREATMENTS: usize = 36 + 8 * MAX_BLOWERS;
+const BEFORE_TREATMENTS: usize = 40 + 20 * MAX_BLOWERS;
 
 /// Words of counts, of how followers move, of sleep and of the projections.
 const COUNTS: usize = 28 + sweeps::WORDS;
@@ -55,6 +55,14 @@ pub struct BlowerRecord {
     pub strength: f32,
     /// Rate per velocity of equation 19 (s/m).
     pub drying: f32,
+    /// How it moves, and turns (m/s, rad/s).
+    pub velocity: Vec3,
+    /// Its angular velocity (rad/s).
+    pub spin: Vec3,
+    /// Where it has that velocity (m).
+    pub center: Vec3,
+    /// How far from it its air keeps its speed (m in the hair's measure).
+    pub core: f32,
 }
 
 /// The substeps of a hair, in their order. Component of a [`Hair`](crate::Hair); filled by the tick, emptied
@@ -188,6 +196,8 @@ pub struct SubstepRecord {
     pub frame_motion: Option<Isometry3d>,
     /// The global wind in the hair's frame (m/s).
     pub wind: Vec3,
+    /// What of it only puts a headwind into metres a second: no jet displaces it (m/s).
+    pub headwind: Vec3,
     /// Share of its velocity relative to the air that hair keeps.
     pub retained: f32,
     /// Influences f_j of the bonds.
@@ -324,6 +334,7 @@ impl SubstepRecord {
         words.numbers(frame_motion.rotation.to_array());
         words.vector(frame_motion.translation.into(), flags);
         words.vector(self.wind, self.retained.to_bits());
+        words.vector(self.headwind, 0);
         words.numbers(self.influence);
         words.numbers(self.change);
         words.numbers(self.share);
@@ -335,6 +346,9 @@ impl SubstepRecord {
         for blower in blowers {
             words.vector(blower.nozzle, blower.strength.to_bits());
             words.vector(blower.aim, blower.drying.to_bits());
+            words.vector(blower.velocity, blower.core.to_bits());
+            words.vector(blower.spin, 0);
+            words.vector(blower.center, 0);
         }
         words.0.resize(start + BEFORE_TREATMENTS, 0);
         let treatments = &self.treatments[..self.treatments.len().min(MOST_TREATMENTS)];

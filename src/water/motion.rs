@@ -15,7 +15,7 @@ use crate::{
         setting::{Ranged, Settings, Violations, report},
     },
     forces::{
-        contact::{Colliders, PlacedCollider, seen_from},
+        contact::{Ball, Colliders, HairCollider, TickColliders, seen_from},
         environment::{
             Gravity, Winds,
             vapour::{DryingAir, WATER, transfer},
@@ -47,7 +47,7 @@ pub(super) fn move_droplets(
         Res<DropletRules>,
     ),
     wetting: Settings<HairWetting>,
-    colliders: Query<PlacedCollider>,
+    (colliders, poses): (Res<TickColliders>, Query<&TickPose, With<HairCollider>>),
     winds: Winds,
     volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,
@@ -70,9 +70,11 @@ pub(super) fn move_droplets(
     let bounds = &*bounds;
     let process = process.clamped().0;
     let world = TickPose::default();
-    let valid: Vec<_> = colliders.iter().map(|placed| (placed.collider(), placed.pose)).collect();
-    let solids =
-        Colliders::new(1, valid.iter().map(|(c, pose)| (c, *pose, seen_from(&world, c, pose))));
+    let solids = colliders.iter().filter_map(|placed| {
+        let (collider, pose) = (&placed.collider, poses.get(placed.id).ok()?);
+        Some((Ball::around(collider, pose), seen_from(&world, collider, pose)))
+    });
+    let solids = Colliders::new(1, solids.collect());
     let winds = winds.seen_from(&world);
     let volumes = volumes.seen_from(&world);
     let mut items: Vec<Moving<'_>> = droplets

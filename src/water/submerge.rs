@@ -17,9 +17,10 @@ use crate::{
     forces::environment::Gravity,
     hair::strand::{
         AddedMass, Hair, Here, InWater, PerHair, Strand, StrandOf, StrandSleep, TickPose,
+        carried_along,
     },
 };
-use bevy::prelude::*;
+use bevy::{math::Isometry3d, prelude::*};
 
 /// Approximate cost of a strand (ns).
 const SUBMERGE: Nanos = Nanos(800);
@@ -42,6 +43,8 @@ struct LocalWater {
     film: f64,
     /// The hair's time step in this substep (s); `None` if it skips this substep.
     dt: Option<f32>,
+    /// Undoes the motion of the frame on its nodes.
+    back: Option<Isometry3d>,
 }
 
 pub(super) fn submerge(
@@ -68,6 +71,7 @@ pub(super) fn submerge(
             lock: wetting.lock(),
             film: AFTER_DRIP * clinging(wetting.bundle(1.0), gravity),
             dt,
+            back: frame.back(),
         })
     };
     let gained = for_each_part(
@@ -79,7 +83,10 @@ pub(super) fn submerge(
             for (of, sleep, strand, added, moisture) in rows {
                 if let Some(water) = waters.index(of.0, || water_of(of.0)) {
                     let dt = waters.values[water].dt.filter(|_| sleep.is_simulated());
-                    let [film, lost] = immerse(&waters.values[water], dt, strand, added, moisture);
+                    let water = &waters.values[water];
+                    // Inertia has acted on those alone that move in this substep.
+                    let back = water.back.as_ref().filter(|_| dt.is_some());
+                    let [film, lost] = immerse(water, (dt, back), strand, added, moisture);
                     gained[0] += film;
                     gained[1] += lost;
                 }
@@ -98,7 +105,7 @@ pub(super) fn submerge(
 /// (m³).
 fn immerse(
     water: &LocalWater,
-    dt: Option<f32>,
+    (dt, back): (Option<f32>, Option<&Isometry3d>),
     strand: &mut Strand,
     added: &mut AddedMass,
     moisture: &mut Moisture,
@@ -116,17 +123,17 @@ fn immerse(
     let mut any = false;
     for i in 0..nodes {
         let (positions, lengths) = (strand.positions(), strand.rest_lengths());
-        let place = positions[i];
+        let place = |i: usize| carried_along(positions, i, back);
         let segment = |i: Option<usize>| i.and_then(|i| lengths.get(i)).copied().unwrap_or(0.0);
         let own = 0.5 * (segment(i.checked_sub(1)) + segment(Some(i)));
-        let depth = water.volumes.water(place);
+        let depth = water.volumes.water(place(i));
         // Over half the segments on either side.
         let share = depth.map_or(0.0, |(depth, _)| (0.5 + depth / own.max(1e-6)).clamp(0.0, 1.0));
         let before = added.in_water[i];
         added.in_water[i] = InWater { share, ..default() };
         if let Some((_, medium)) = depth.filter(|_| share > 0.0) {
             any = true;
-            let (a, b) = (positions[i.saturating_sub(1)], positions[(i + 1).min(nodes - 1)]);
+            let (a, b) = (place(i.saturating_sub(1)), place((i + 1).min(nodes - 1)));
             let load = added.mass.get(i).copied().unwrap_or(0.0);
             // Unchanged while the hair skips substeps.
             added.in_water[i] = InWater { share, ..before };

@@ -17,7 +17,7 @@ use crate::{
         setting,
         stretch::{self, Stretch},
     },
-    forces::environment::vapour::DryingAir,
+    forces::{contact::TickColliders, environment::vapour::DryingAir},
     hair::strand::{
         Hair, Here, MissedOnGpu, ShiftWorld, Strand, TickPose, keep_required, lacks_strands,
     },
@@ -43,6 +43,7 @@ impl Plugin for WaterPlugin {
         app.init_resource::<WaterLedger>()
             .init_resource::<WaterField>()
             .init_resource::<FoundWater>()
+            .init_resource::<TickColliders>()
             .init_resource::<DryingAir>()
             .init_resource::<MissedOnGpu<SoakHair>>()
             .add_message::<SoakHair>()

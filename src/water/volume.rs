@@ -7,7 +7,7 @@ use crate::{
         stretch::{Stretch, Stretched},
     },
     forces::environment::ZoneShape,
-    hair::strand::TickPose,
+    hair::strand::{Carried, TickPose},
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
 
@@ -84,16 +84,16 @@ struct LocalVolume {
     rotation: Quat,
     origin: Vec3,
     scale: f32,
-    /// Its water at its origin.
+    /// Its water where it rests.
     water: Water,
-    /// How it turns.
-    spin: Vec3,
+    /// It moves along.
+    moves: Carried,
 }
 
 impl LocalVolume {
     /// Its water at a place, which moves as the volume does.
     fn water_at(&self, place: Vec3) -> Water {
-        let current = self.water.current + self.spin.cross(place - self.origin);
+        let current = self.water.current + self.moves.at(place);
         Water { current, ..self.water }
     }
 }
@@ -118,7 +118,7 @@ impl Volumes<'_, '_> {
     pub fn seen_from(&self, frame: &TickPose) -> LocalVolumes {
         let pose = frame.now();
         let seen = self.volumes.iter().map(|(volume, stretch, moved)| {
-            let (at, [velocity, spin]) = (moved.now(), frame.carried_by(moved));
+            let at = moved.now();
             let WaterVolume { shape, half_size, density, viscosity, current } = stretch.of(volume);
             let current = pose.direction_in(at.direction_out(current));
             LocalVolume {
@@ -127,8 +127,8 @@ impl Volumes<'_, '_> {
                 rotation: at.rotation.inverse() * pose.rotation,
                 origin: pose.point_in(at.translation),
                 scale: pose.scale / at.scale,
-                water: Water { density, viscosity, current: current + velocity + frame.headwind() },
-                spin,
+                water: Water { density, viscosity, current: current + frame.headwind() },
+                moves: frame.carried_by(moved),
             }
         });
         LocalVolumes(seen.collect())
@@ -176,7 +176,7 @@ mod tests {
             origin: at,
             scale,
             water: Water { density, viscosity: 1e-3, current: Vec3::ZERO },
-            spin: Vec3::ZERO,
+            moves: default(),
         };
         let quarter = Quat::from_rotation_z(FRAC_PI_2);
         let pool = local(ZoneShape::Box, Vec3::X, quarter, 2.0, 1.0);

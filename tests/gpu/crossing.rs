@@ -2,7 +2,7 @@
 
 use crate::{
     residence::{grow, on_gpu},
-    stage::{Stage, curls},
+    stage::{Stage, apart, curls},
 };
 use bevy::prelude::*;
 use bevy_keratin::{LodLevel, gpu::HairResidence, prelude::*};
@@ -138,5 +138,55 @@ pub fn whatever_happens_on_the_way_is_done(stage: &mut Stage) {
             stage.run(12);
         }
         is_whole(stage, name, "on the way there", seen);
+    }
+}
+
+/// Hair of a head that runs, turns and has a blower before it, in wind: each tick after it is asked home.
+fn run_home(stage: &mut Stage, on: SimulateOn, blocking: bool, moves: bool) -> Vec<Vec<Strand>> {
+    grow(stage, SimulateOn::Cpu, curls(12, 7));
+    let world = stage.app.world_mut();
+    world.insert_resource(HairWind { velocity: Vec3::Z * 2.0, gusts: 0.0, ..default() });
+    world.resource_mut::<HairGpu>().blocking = blocking;
+    let aimed = Blower::blow_dry(Vec3::new(0.3, 0.1, 0.0), Vec3::ZERO);
+    let blower = world.spawn((aimed, ChildOf(stage.hair))).id();
+    stage.app.world_mut().entity_mut(stage.hair).insert(on);
+    let mut seen = Vec::new();
+    for tick in 0..60 {
+        let share = if moves { tick as f32 / 60.0 } else { 0.0 };
+        let place = Transform::from_xyz(6.0 * share * share, 0.0, 0.0);
+        let place = place.with_rotation(Quat::from_rotation_y(2.0 * share));
+        stage.app.world_mut().entity_mut(stage.hair).insert(place);
+        if tick == 30 {
+            assert_eq!(stage.is_on_gpu(), on == SimulateOn::Gpu);
+            stage.app.world_mut().entity_mut(stage.hair).insert(SimulateOn::Cpu);
+        }
+        stage.run(1);
+        let is_home = matches!(stage.residence(), HairResidence::Cpu(_));
+        if tick >= 30 && is_home {
+            seen.push(stage.strands());
+        }
+    }
+    stage.app.world_mut().despawn(blower);
+    stage.app.insert_resource(HairWind::default());
+    assert!(stage.faults().is_empty());
+    seen
+}
+
+/// It comes home where it would be, and from then on goes on as that.
+pub fn it_comes_home_from_a_head_that_moves_as_if_it_had_stayed(stage: &mut Stage) {
+    let rests = run_home(stage, SimulateOn::Cpu, true, false);
+    let stayed = run_home(stage, SimulateOn::Cpu, true, true);
+    let felt = apart(rests.last().unwrap(), stayed.last().unwrap());
+    assert!(felt > 0.02, "the motion is felt: {felt} m");
+    for blocking in [true, false] {
+        let returned = run_home(stage, SimulateOn::Gpu, blocking, true);
+        assert!(returned.len() > 20, "home for {} ticks", returned.len());
+        let off = stayed.iter().rev().zip(returned.iter().rev()).map(|(a, b)| apart(a, b));
+        let off: Vec<f32> = off.collect();
+        let worst = off.iter().copied().fold(0.0, f32::max);
+        println!("blocking {blocking}: felt {felt} m, off by {worst} m, at last {} m", off[0]);
+        // Without waiting it is not moved in the frames in which it returns, and catches up.
+        let [most, in_the_end] = if blocking { [1e-4; 2] } else { [2e-2, 2e-3] };
+        assert!(worst < most && off[0] < in_the_end, "blocking {blocking}: {worst}, {} m", off[0]);
     }
 }

@@ -36,7 +36,7 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 pub fn hair_goes_to_the_device_and_comes_home() {
     let mut stage = Stage::new(SimulateOn::Cpu, Vec::new());
     stage.compile();
-    let all: [fn(&mut Stage); 40] = [
+    let all: [fn(&mut Stage); 41] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
@@ -63,6 +63,7 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         lod::roots_of_followers_go_with_their_mesh,
         hair_is_despawned_and_levels_change_on_the_way,
         crossing::whatever_happens_on_the_way_is_done,
+        crossing::it_comes_home_from_a_head_that_moves_as_if_it_had_stayed,
         sweeps::swept_hair_moves_there_as_on_the_processor,
         sweeps::another_solver_takes_over_what_the_one_left,
         sweeps::swept_followers_follow_there,

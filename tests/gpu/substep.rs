@@ -20,7 +20,7 @@ use bevy_keratin::{
 use fearless_simd::Level;
 
 /// Node counts, so that blocks are full, partly filled, and of one strand.
-const NODES: [usize; 10] = [2, 3, 4, 7, 12, 16, 33, 48, 64, 128];
+const NODES: [usize; 10] = [2, 3, 4, 7, 12, 16, 33, 48, 64, 96];
 
 /// Strands of each: a full block and a part of one.
 const COUNT: usize = 60;
@@ -34,7 +34,7 @@ const THREADS: usize = 8;
 /// Passes of a thread's loops in a substep at most, about: each round moves nodes out and restores lengths, and the
 /// rest of the substep looks at an obstacle so many times.
 fn passes(nodes: usize, obstacles: usize, rounds: usize) -> usize {
-    (rounds * (2 * obstacles + 4) + 225 * (obstacles + 1)) * nodes
+    (rounds * (2 * obstacles + 4) + 250 * (obstacles + 1)) * nodes
 }
 
 fn random_obstacle(random: &mut Random, kind: u32, moves: bool) -> Obstacle {
@@ -116,7 +116,8 @@ fn check_one(scene: &str, nodes: usize, errors: &Errors) -> Errors {
             "{scene}, {nodes} nodes: {gpu:e} off f64, lanes {most:e}"
         );
         let most = beyond[0].max(beyond[1]);
-        assert!(beyond[2] <= 2 * most + 2, "{scene}, {nodes} nodes: {beyond:?} are far off");
+        // Whether a node sticks or slides, too, hangs on the last bit.
+        assert!(beyond[2] <= 2 * most + 4, "{scene}, {nodes} nodes: {beyond:?} are far off");
     }
     errors.each_ref().map(|all| {
         let scaled = |errors: &[f64; 3]| core::array::from_fn(|what| errors[what] / scale[what]);
@@ -275,6 +276,7 @@ pub fn strands_whose_roots_lie_in_an_obstacle() {
 pub fn strands_in_wind_that_dries() {
     compare("wind", 11, 0.2, |random| SubstepRecord {
         wind: random.vector() * 3.0,
+        headwind: random.vector(),
         change: [0.0, -0.01, 0.02, 0.0],
         blowers: (0..2)
             .map(|_| BlowerRecord {
@@ -282,6 +284,10 @@ pub fn strands_in_wind_that_dries() {
                 aim: random.vector().normalize_or(Vec3::X),
                 strength: 8.0,
                 drying: 0.3,
+                velocity: random.vector() * 5.0,
+                spin: random.vector(),
+                center: random.vector() * 0.4,
+                core: 0.045,
             })
             .collect(),
         ..plain()

@@ -17,6 +17,11 @@ use bevy_keratin::{
 const THETA: f64 = 0.65;
 const HOLD: f64 = 100.0;
 const FIRMNESS: f64 = 0.95;
+const STUCK: f64 = 0.999;
+const TOUCHING: f64 = 1e-5;
+const LEAVING: usize = 16;
+const NEARER: f64 = 0.98;
+const MAX_STRAIN: f64 = 0.5;
 const FOLDING: f64 = 0.125;
 const TOLERANCE: f64 = 5e-4;
 const TORN: f64 = 0.01;
@@ -67,6 +72,17 @@ fn darboux(before: DQuat, q: DQuat) -> DQuat {
     if omega.w < 0.0 { -omega } else { omega }
 }
 
+/// How a contact pass treats motion along the surface.
+#[derive(Clone, Copy, PartialEq)]
+enum Grip {
+    None,
+    Depth,
+    Between,
+    Assumed,
+    Judged,
+    Solved,
+}
+
 pub struct Twin {
     pub p: Vec<DVec3>,
     pub v: Vec<DVec3>,
@@ -86,11 +102,15 @@ pub struct Twin {
     rest: Vec<DQuat>,
     mass: Vec<f64>,
     support: Vec<DVec3>,
+    sticks: Vec<bool>,
+    drag: Vec<f64>,
+    anchor: Vec<DVec3>,
     drying: Vec<f64>,
     touched: bool,
     sweeps: bool,
     /// Length from the root on that may be in what the root lies in.
     sunk: f64,
+    trapped: bool,
     /// Rounds in which it got out of what it was deep in.
     pub rounds: usize,
 }
@@ -118,10 +138,14 @@ impl Twin {
             rest: vec![DQuat::IDENTITY; edges],
             mass: vec![0.0; edges + 1],
             support: vec![DVec3::ZERO; edges + 1],
+            sticks: vec![false; edges + 1],
+            drag: vec![0.0; edges + 1],
+            anchor: vec![DVec3::ZERO; edges + 1],
             drying: vec![0.0; edges],
             touched: false,
             sweeps: false,
             sunk: 0.0,
+            trapped: false,
             rounds: 0,
         }
     }
@@ -165,21 +189,23 @@ impl Twin {
         let stage = (theta, between, root_turn, damping, twice);
         self.newton(r, stage, if twice { 1.0 } else { 1.0 / theta }, false);
         if twice {
-            self.contacts(r, 0.0, 0.0);
+            self.contacts(r, Grip::Judged);
             self.newton(r, stage, 1.0 / theta, true);
         }
-        self.contacts(r, 1.0 + HOLD, 1.0);
+        self.contacts(r, Grip::Solved);
         for pass in 0..r.limiter_steps {
             if !self.limit(if pass == 0 { -1.0 } else { TOLERANCE }) {
                 break;
             }
-            self.contacts(r, 1.0, 1.0);
-            let repairs = if pass + 1 == r.limiter_steps { REPAIRS } else { 0 };
-            for _ in 0..repairs {
-                if !self.clamp_lengths(TORN) {
+            self.contacts(r, Grip::Between);
+            let repairs = if pass + 1 == r.limiter_steps { REPAIRS + 1 } else { 0 };
+            for repair in 0..repairs {
+                let is_last = repair == REPAIRS;
+                let most = if self.trapped { TORN } else { MAX_STRAIN };
+                if !self.clamp_lengths(if is_last { most } else { TORN }) || is_last {
                     break;
                 }
-                self.contacts(r, 1.0, 1.0);
+                self.contacts(r, Grip::Between);
             }
         }
         self.finish(dt, theta);
@@ -193,6 +219,7 @@ impl Twin {
             let e = i.min(edges - 1);
             let edge = self.p[e + 1] - self.p[e];
             let (mut acceleration, mut drying) = (DVec3::ZERO, 0.0);
+            let (mut shares, mut carried) = (0.0, DVec3::ZERO);
             for b in &r.blowers {
                 let (to, aim) = (self.p[i] - d(b.nozzle), d(b.aim));
                 let along = to.dot(aim);
@@ -202,10 +229,16 @@ impl Twin {
                     let wind = f64::from(b.strength) * sine / (apart / 0.01 + 1.0);
                     acceleration += aim * wind;
                     drying += f64::from(b.drying) * wind;
+                    let core = f64::from(b.core);
+                    let share = core / along.max(core) / (apart / 0.01 + 1.0);
+                    let motion = d(b.velocity) + d(b.spin).cross(self.p[i] - d(b.center));
+                    (shares, carried) = (shares + share, carried + motion * share);
                 }
             }
+            let still = d(r.wind) - d(r.headwind);
+            let flow = d(r.wind) + (carried - still * shares) / f64::max(shares, 1.0);
             self.v[i] =
-                self.v[i] * keep + d(r.gravity) * dt + acceleration * dt + d(r.wind) * (1.0 - keep);
+                self.v[i] * keep + d(r.gravity) * dt + acceleration * dt + flow * (1.0 - keep);
             if i < edges {
                 self.drying[i] = drying * dt;
             }
@@ -265,73 +298,97 @@ impl Twin {
         self.support.fill(DVec3::ZERO);
         let depths = r.obstacles.iter().map(|o| depth(&o.solid, self.p[0], r.skin).1);
         self.sunk = 2.0 * depths.fold(0.0, f64::max);
+        self.trapped = false;
         self.surface(r);
         let mut theta = THETA;
-        self.fall(r, dt * theta);
+        self.advance(r, dt * theta);
         if self.touched {
             theta = 1.0;
             let edges = self.edges();
             self.p[1..=edges].copy_from_slice(&self.from[1..=edges]);
-            self.fall(r, dt);
-        }
-        for i in 1..=self.edges() {
-            if self.support[i] == DVec3::ZERO {
-                self.p[i] -= gravity * (dt * theta).powi(2);
-            }
+            self.advance(r, dt);
         }
         theta
     }
 
-    /// How deep node `i` may be in an obstacle that the root lies in.
-    fn allowed(&self, o: &Obstacle, i: usize, skin: f32) -> f64 {
-        let along = self.l[..i].iter().sum::<f64>();
-        if along >= self.sunk {
-            return 0.0;
+    /// How deep node `i`, which began at `from`, may be in an obstacle: one that the root lies in, or, of a trapped
+    /// strand, as deep as it was.
+    fn allowed(&self, o: &Obstacle, i: usize, skin: f32, from: DVec3) -> f64 {
+        let trapped = match self.trapped {
+            true => depth(&o.solid, along(o, from), skin).1.max(0.0),
+            false => 0.0,
+        };
+        let way = self.l[..i].iter().sum::<f64>();
+        let root = depth(&o.solid, self.p[0], skin).1;
+        if way >= self.sunk || root <= 0.0 {
+            return trapped;
+        }
+        if self.l.iter().sum::<f64>() < 2.0 * root {
+            return f64::INFINITY;
         }
         let deepest = self.sunk / 2.0;
-        let share = (2.0 * depth(&o.solid, self.p[0], skin).1 / deepest).clamp(0.0, 1.0);
-        (deepest - (along / 2.0).powi(2) / deepest).max(0.0) * share
+        let share = (2.0 * root / deepest).clamp(0.0, 1.0);
+        ((deepest - (way / 2.0).powi(2) / deepest).max(0.0) * share).max(trapped)
     }
 
-    fn fall(&mut self, r: &SubstepRecord, ahead: f64) {
+    fn advance(&mut self, r: &SubstepRecord, ahead: f64) {
         self.sweeps = false;
         for i in 1..=self.edges() {
             let mut from = self.p[i];
             for o in &r.obstacles {
-                let (start, may_be) = (along(o, from), self.allowed(o, i, r.skin));
-                if let Some((out, _)) = push_out(o, start, start, 0.0, (r.skin, may_be), false) {
+                let (start, may_be) = (along(o, from), self.allowed(o, i, r.skin, from));
+                if let Some((out, ..)) = push_out(o, start, (r.skin, may_be)) {
                     from += out - start;
                 }
             }
             self.from[i] = from;
-            let mut to = from + (self.v[i] + d(r.gravity) * ahead) * ahead;
+            let mut to = from + self.v[i] * ahead;
             for o in &r.obstacles {
                 let (place, fast, _) = swept(o, along(o, from), to, r.skin);
-                to = if self.allowed(o, i, r.skin) > 0.0 { to } else { place };
+                to = if self.allowed(o, i, r.skin, from) > 0.0 { to } else { place };
                 self.sweeps |= fast;
             }
             self.p[i] = to;
         }
-        self.contacts(r, 0.0, 0.0);
+        self.contacts(r, Grip::Assumed);
+    }
+
+    /// How deep it is in obstacles beyond what its root allows: the most, and the sum.
+    fn penetration(&self, r: &SubstepRecord) -> (f64, f64) {
+        let (mut deepest, mut sum) = (0.0_f64, 0.0);
+        for (i, p) in self.p.iter().enumerate().skip(1) {
+            for o in &r.obstacles {
+                let deep = depth(&o.solid, along(o, *p), r.skin).1 - self.allowed(o, i, r.skin, *p);
+                deepest = deepest.max(deep);
+                sum += deep.max(0.0);
+            }
+        }
+        (deepest, sum)
     }
 
     fn surface(&mut self, r: &SubstepRecord) {
-        let mut deepest = f64::NEG_INFINITY;
-        for (i, p) in self.p.iter().enumerate().skip(1) {
-            for o in &r.obstacles {
-                let deep = depth(&o.solid, along(o, *p), r.skin).1 - self.allowed(o, i, r.skin);
-                deepest = deepest.max(deep);
+        let deep = self.l[0] * 0.25;
+        let (deepest, before) = self.penetration(r);
+        if deepest <= deep {
+            return;
+        }
+        self.sweeps = false;
+        let edges = self.edges();
+        self.from[1..=edges].copy_from_slice(&self.p[1..=edges]);
+        for _ in 0..LEAVING.min(2 * edges) {
+            self.rounds += 1;
+            self.contacts(r, Grip::None);
+            if !self.limit(TORN) {
+                return;
             }
         }
-        if self.l[0] * 0.25 < deepest {
-            self.sweeps = false;
-            for _ in 0..2 * self.edges() {
-                self.rounds += 1;
-                self.contacts(r, 0.0, 0.0);
-                if !self.limit(TORN) {
-                    return;
-                }
-            }
+        let strain = |i: usize| (self.p[i + 1].distance(self.p[i]) / self.l[i] - 1.0).abs();
+        let torn = (0..edges).any(|i| strain(i) > TORN);
+        self.clamp_lengths(TORN);
+        let (deepest, after) = self.penetration(r);
+        self.trapped = torn || deepest > deep;
+        if self.trapped && after >= NEARER * before {
+            self.p[1..=edges].copy_from_slice(&self.from[1..=edges]);
         }
     }
 
@@ -340,32 +397,77 @@ impl Twin {
         (0..self.edges()).map(fast).fold(0.0, f64::max) > (0.03 / dt).powi(2)
     }
 
-    fn contacts(&mut self, r: &SubstepRecord, resting: f64, others: f64) {
+    fn contacts(&mut self, r: &SubstepRecord, grip: Grip) {
         self.touched = false;
         for i in 0..=self.edges() {
-            self.touch(r, i, resting, others);
+            self.touch(r, i, grip);
         }
     }
 
-    fn touch(&mut self, r: &SubstepRecord, i: usize, resting: f64, others: f64) {
-        let grip = if self.support[i] == DVec3::ZERO { others } else { resting };
-        let (mut p, mut support) = (self.p[i], DVec3::ZERO);
+    fn touch(&mut self, r: &SubstepRecord, i: usize, grip: Grip) {
+        let (from, rested) = (self.from[i], self.support[i] != DVec3::ZERO);
+        let (mut p, mut support, mut touched) = (self.p[i], DVec3::ZERO, false);
+        let (mut sticks, mut drag, mut deepest) = (false, 0.0, -1.0);
+        if matches!(grip, Grip::Between | Grip::Solved) {
+            (sticks, drag) = (self.sticks[i], self.drag[i]);
+        }
+        if grip == Grip::Between && rested {
+            (support, touched) = (self.support[i], true);
+        }
         for o in &r.obstacles {
-            let may_be = self.allowed(o, i, r.skin);
+            let may_be = self.allowed(o, i, r.skin, from);
+            let start = along(o, from);
             if self.sweeps {
-                let (place, _, normal) = swept(o, along(o, self.from[i]), p, r.skin);
+                let (place, _, normal) = swept(o, start, p, r.skin);
                 if normal != DVec3::ZERO && may_be <= 0.0 {
-                    (p, support) = (if i == 0 { p } else { place }, normal);
+                    (p, support, touched) = (if i == 0 { p } else { place }, normal, true);
                 }
             }
-            let friction = grip * f64::from(o.friction);
             let layer = (r.skin, may_be);
-            if let Some((out, normal)) = push_out(o, p, self.from[i], friction, layer, true) {
-                (p, support) = (if i == 0 { p } else { out }, normal);
+            let mut push = push_out(o, p, layer);
+            let mut stays = false;
+            if grip == Grip::Assumed {
+                let (normal, depth) = depth(&o.solid, start, r.skin);
+                stays = depth - may_be > -TOUCHING;
+                if stays {
+                    let pushed = push.map_or(0.0, |(.., depth)| depth);
+                    push = Some((start + normal * (depth - may_be), normal, pushed));
+                }
             }
+            let Some((out, normal, depth)) = push else { continue };
+            touched = true;
+            if grip == Grip::Depth || depth > deepest {
+                (deepest, support) = (depth, normal);
+                if matches!(grip, Grip::Assumed | Grip::Judged) {
+                    self.anchor[i] = start;
+                }
+            }
+            let slip = out - start;
+            let slip = slip - normal * slip.dot(normal);
+            let most = f64::from(o.friction) * depth;
+            let coulomb = (most / slip.length().max(1e-12)).min(1.0);
+            let held = match grip {
+                Grip::None => 0.0,
+                Grip::Depth | Grip::Between => coulomb,
+                Grip::Assumed => {
+                    sticks |= stays;
+                    0.0
+                }
+                Grip::Judged => {
+                    sticks |= rested && slip.length() < most;
+                    drag += if rested { most * HOLD } else { 0.0 };
+                    0.0
+                }
+                Grip::Solved if sticks => 1.0,
+                Grip::Solved if drag > 0.0 => 0.0,
+                Grip::Solved => coulomb,
+            };
+            p = if i == 0 { p } else { out - slip * held };
         }
         (self.p[i], self.support[i]) = (p, support);
-        self.touched |= support != DVec3::ZERO;
+        self.sticks[i] = sticks && touched;
+        self.drag[i] = if touched && !sticks { drag } else { 0.0 };
+        self.touched |= touched;
     }
 
     /// One Newton step, all at once.
@@ -461,8 +563,17 @@ impl Twin {
             let mut force = d(r.gravity) * self.mass[i] - pull[i - 1];
             force += pull.get(i).copied().unwrap_or(DVec3::ZERO);
             if twice {
-                diagonal += outer(n, n) * (inert * HOLD);
-                force += (self.from[i] + self.v[i] * ahead - self.p[i]) * inert;
+                let back = self.anchor[i] - self.p[i];
+                let back = back - n * back.dot(n);
+                diagonal += match self.sticks[i] {
+                    true => DMat3::IDENTITY * (inert * HOLD),
+                    false => outer(n, n) * (inert * HOLD),
+                };
+                let friction = match self.sticks[i] {
+                    true => back * HOLD,
+                    false => back * (self.drag[i] / back.length().max(1e-12)),
+                };
+                force += (self.from[i] + self.v[i] * ahead - self.p[i] + friction) * inert;
             }
             add(i, i, diagonal);
             b[3 * (i - 1)..3 * i].copy_from_slice(&force.to_array());
@@ -482,21 +593,24 @@ impl Twin {
     fn limit(&mut self, tolerance: f64) -> bool {
         let edges = self.edges();
         let way = |i: usize| self.p[i + 1] - self.p[i];
-        let off: Vec<f64> = (0..edges).map(|i| way(i).length() - self.l[i]).collect();
-        let worst = (0..edges).map(|i| (off[i] / self.l[i]).abs()).fold(0.0, f64::max);
-        if worst <= tolerance {
+        let strain = |i: usize| way(i).length() / self.l[i] - 1.0;
+        if (0..edges).map(|i| strain(i).abs()).fold(0.0, f64::max) <= tolerance {
             return false;
         }
+        let stretch =
+            |i: usize| (self.tension[i] / self.axial[i]).clamp(0.0, TOLERANCE * self.l[i]);
+        let off: Vec<f64> = (0..edges).map(|i| way(i).length() - self.l[i] - stretch(i)).collect();
         let t: Vec<DVec3> = (0..edges).map(|i| way(i).normalize()).collect();
         let mobile = |i: usize, x: DVec3, y: DVec3| {
             let n = self.support[i];
-            self.w(i) * (x.dot(y) - FIRMNESS * x.dot(n) * y.dot(n))
+            let stuck = if self.sticks[i] { STUCK } else { 0.0 };
+            self.w(i) * ((1.0 - stuck) * x.dot(y) - (FIRMNESS - stuck) * x.dot(n) * y.dot(n))
         };
         let mut a = vec![vec![0.0; edges]; edges];
         for i in 0..edges {
             a[i][i] = mobile(i, t[i], t[i]) + mobile(i + 1, t[i], t[i]);
             if off[i] < 0.0 {
-                a[i][i] *= 1.0 + FOLDING * (-off[i] / self.l[i] - TOLERANCE).max(0.0);
+                a[i][i] *= 1.0 + FOLDING * (-strain(i) - TOLERANCE).max(0.0);
             }
             if i > 0 {
                 let coupling = -mobile(i, t[i - 1], t[i]);
@@ -515,10 +629,11 @@ impl Twin {
             let n = self.support[i + 1];
             let lift = force.dot(n);
             let force = if lift > 0.0 {
-                self.support[i + 1] = DVec3::ZERO;
+                (self.support[i + 1], self.sticks[i + 1]) = (DVec3::ZERO, false);
                 force
             } else {
-                force - n * (FIRMNESS * lift)
+                let stuck = if self.sticks[i + 1] { STUCK } else { 0.0 };
+                force * (1.0 - stuck) - n * ((FIRMNESS - stuck) * lift)
             };
             let w = self.w(i + 1);
             self.p[i + 1] += force * w;
@@ -665,28 +780,11 @@ fn depth(solid: &Solid, p: DVec3, skin: f32) -> (DVec3, f64) {
     }
 }
 
-/// Out of a solid with a skin, where it is deeper than it may be.
-fn push_out(
-    o: &Obstacle,
-    p: DVec3,
-    from: DVec3,
-    friction: f64,
-    (skin, may_be): (f32, f64),
-    slides: bool,
-) -> Option<(DVec3, DVec3)> {
+/// Out of a solid with a skin, where it is deeper than it may be: where to, the normal there, and how deep it was.
+fn push_out(o: &Obstacle, p: DVec3, (skin, may_be): (f32, f64)) -> Option<(DVec3, DVec3, f64)> {
     let (normal, depth) = depth(&o.solid, p, skin);
     let depth = depth - may_be;
-    if depth <= 0.0 {
-        return None;
-    }
-    let out = p + normal * depth;
-    if !slides {
-        return Some((out, normal));
-    }
-    let slip = out - along(o, from);
-    let tangential = slip - normal * slip.dot(normal);
-    let held = (friction * depth / tangential.length().max(1e-12)).min(1.0);
-    Some((out - tangential * held, normal))
+    (depth > 0.0).then(|| (p + normal * depth, normal, depth))
 }
 
 /// Where a node gets to, whether it might pass through, and the normal of what stops it.

@@ -15,12 +15,13 @@ use bevy::{
     prelude::*,
 };
 use bevy_keratin::{
+    ColliderShape,
     authoring::{attach::RootsOnMesh, plant::HairPreset},
     prelude::*,
 };
 
 /// Changes the mesh of an entity.
-fn edit(app: &mut App, mesh: Entity, change: impl FnOnce(&mut Mesh)) {
+pub(super) fn edit(app: &mut App, mesh: Entity, change: impl FnOnce(&mut Mesh)) {
     let handle = app.world().get::<Mesh3d>(mesh).unwrap().0.clone();
     change(&mut app.world_mut().resource_mut::<Assets<Mesh>>().get_mut(&handle).unwrap());
 }
@@ -127,7 +128,7 @@ fn hair_of_mirrored_wearers_and_parents_lies_as_it_does_on_others() {
 }
 
 /// A further mesh that moves with the head of `body`, in place of its own where that is not drawn.
-fn on_head(app: &mut App, body: Entity, name: &str, half: Vec3) -> Entity {
+pub(super) fn on_head(app: &mut App, body: Entity, name: &str, half: Vec3) -> Entity {
     let ball = Sphere::new(1.0).mesh().uv(64, 48);
     let turn = Quat::from_rotation_x(-core::f32::consts::FRAC_PI_2);
     let place = Transform::from_translation(MIDDLE)
@@ -237,7 +238,7 @@ fn old_hair_is_hidden_while_ours_is_worn() {
 }
 
 /// Leaves of a mesh the triangles whose middle is `kept`.
-fn keep(mesh: &mut Mesh, kept: impl Fn(Vec3) -> bool) {
+pub(super) fn keep(mesh: &mut Mesh, kept: impl Fn(Vec3) -> bool) {
     let Some(Values::Float32x3(places)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION) else { return };
     let places: Vec<Vec3> = places.iter().map(|p| Vec3::from(*p)).collect();
     let all: Vec<u32> = mesh.indices().unwrap().iter().map(|v| v as u32).collect();
@@ -392,6 +393,56 @@ fn a_cape_holds_hair_on_its_outside() {
     assert!(bare > 10, "without a cape hair hangs there: {bare}");
     assert!(near > 10 && inside * 20 < near, "{inside} of {near} nodes are inside of the cape");
     assert_eq!(colliders(Some(Visibility::Hidden)).1, bare);
+}
+
+/// A joint moves the lower half of what would be a limb, another the flat shoulder over it.
+#[test]
+fn no_collider_stands_far_out_of_the_skin() {
+    let at = Vec3::new(0.3, 1.45, 0.0);
+    let holds = |is_flat: bool| {
+        let mut app = app();
+        let root = app.world_mut().spawn(Transform::default()).id();
+        let (_, body) = character(&mut app, root, 1.0);
+        let spine = app.world().get::<SkinnedMesh>(body).unwrap().joints[1];
+        add_joint(&mut app, body, spine, "Shoulder", at);
+        let lying = Quat::from_rotation_z(core::f32::consts::FRAC_PI_2);
+        let limb = Capsule3d::new(0.06, 0.2).mesh().rings(12).build();
+        let mut limb = part(limb, Transform::from_translation(at).with_rotation(lying), 4);
+        let places = limb.attribute(Mesh::ATTRIBUTE_POSITION).unwrap().as_float3().unwrap();
+        let is_over = |p: &[f32; 3]| is_flat && p[0] > at.x && p[1] > at.y;
+        let over: Vec<bool> = places.iter().map(is_over).collect();
+        for (slots, _) in joints(&mut limb).iter_mut().zip(&over).filter(|(_, over)| **over) {
+            slots[0] = 0;
+        }
+        for (which, up) in [(Mesh::ATTRIBUTE_POSITION, at.y), (Mesh::ATTRIBUTE_NORMAL, 1.0)] {
+            let Some(Values::Float32x3(values)) = limb.attribute_mut(which) else { panic!() };
+            for (value, _) in values.iter_mut().zip(&over).filter(|(_, over)| **over) {
+                *value = if up == 1.0 { [0.0, 1.0, 0.0] } else { [value[0], up, value[2]] };
+            }
+        }
+        edit(&mut app, body, |mesh| mesh.merge(&limb).unwrap());
+        app.world_mut().entity_mut(root).insert(WearHair::new(HairPreset::Long));
+        worn(&mut app);
+        (0..3).for_each(|_| app.update());
+        // In the shoulder, and over it.
+        [-0.03, 0.04].map(|up| {
+            let p = at + Vec3::new(0.08, up, 0.0);
+            let mut all = app.world_mut().query::<(&HairCollider, &GlobalTransform)>();
+            all.iter(app.world()).any(|(collider, place)| {
+                let p = place.affine().inverse().transform_point3(p);
+                match &collider.shape {
+                    ColliderShape::Sphere(ball) => p.length() < ball.radius,
+                    ColliderShape::Capsule(of) => {
+                        let end = Vec3::Y * of.half_length;
+                        Segment3d::new(-end, end).closest_point(p).distance(p) < of.radius
+                    }
+                    _ => false,
+                }
+            })
+        })
+    };
+    assert_eq!(holds(false), [true, true], "a whole limb is a capsule");
+    assert_eq!(holds(true), [true, false], "only what is below the flat shoulder is solid");
 }
 
 /// The files of `../shared/data`, as their notes say: no root off the skin, hair all over the scalp, the face found.

@@ -14,7 +14,6 @@ use bevy::{
     prelude::*,
 };
 use bevy_keratin::{
-    FaultKind,
     authoring::plant::HairPreset,
     forces::contact::ColliderShape,
     hair::strand::TickPose,
@@ -24,6 +23,7 @@ use bevy_keratin::{
         curve::{DrawnSolid, Guide, arrange, drawn_strands, ring_share, strand_point},
     },
 };
+use rand::{RngExt as _, SeedableRng as _};
 use std::{thread::sleep, time::Duration};
 
 /// What hair can reach of the figure is above this (m).
@@ -179,32 +179,41 @@ fn a_beard_and_short_hair_are_worn_together() {
     let world = app.world_mut();
     world.entity_mut(root).insert(WearHair::new(HairPreset::Undercut).facing(Dir3::Z));
     world.entity_mut(skin).insert(WearHair::new(HairPreset::Beard).facing(Dir3::Z));
-    let mut ticks = 0;
-    for _ in 0..6000 {
+    // Which is planted first is a matter of threads; time begins when both are.
+    world.resource_mut::<Time<Virtual>>().pause();
+    let worn = |app: &mut App| {
         app.update();
-        let mut worn = app.world_mut().query_filtered::<Entity, With<WornHair>>();
-        if worn.iter(app.world()).count() == 2 {
-            ticks += 1;
-        } else {
-            sleep(Duration::from_millis(2));
+        sleep(Duration::from_millis(2));
+        app.world_mut().query::<&WornHair>().iter(app.world()).count() == 2
+    };
+    assert!((0..6000).any(|_| worn(&mut app)), "both are worn");
+    app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+    (0..60).for_each(|_| app.update());
+    assert_eq!(faults(&mut app), []);
+    let mut strands = app.world_mut().query::<&mut Strand>();
+    let before: Vec<Strand> = strands.iter(app.world()).cloned().collect();
+    let strains = before.iter().map(Strand::peak_strain);
+    let count = strains.filter(|strain| *strain > 0.05).count();
+    // Those with a root in balls of both sets that push them into each other.
+    assert!(count < 10, "{count} strands are strained by more than a twentieth");
+    // Thrown about, some are folded between the balls, where no step may fail and lengths keep their limit.
+    let mut rng = rand::rngs::SmallRng::seed_from_u64(1);
+    let mut most = 0.0f32;
+    for _ in 0..40 {
+        for (mut strand, from) in strands.iter_mut(app.world_mut()).zip(&before) {
+            *strand = from.clone();
+            let speed = rng.random_range(0.0..3.0f32);
+            for v in &mut strand.velocities_mut()[1..] {
+                *v = speed * Vec3::from_array([(); 3].map(|()| rng.random_range(-1.0..1.0)));
+            }
         }
-        if ticks > 60 {
-            break;
+        for _ in 0..8 {
+            app.update();
+            most = strands.iter(app.world()).map(Strand::peak_strain).fold(most, f32::max);
         }
     }
-    assert!(ticks > 60, "both are worn");
-    // A strand that lies in the other's balls when they come may become non-finite, by which tick that is: it
-    // is put back, and goes on.
-    let faults = faults(&mut app);
-    let others = faults.iter().filter(|fault| fault.kind != FaultKind::PutBack).count();
-    assert!(others == 0 && faults.len() <= 2, "{faults:?}");
-    let mut strands = app.world_mut().query::<&Strand>();
-    let strains = strands.iter(app.world()).map(Strand::peak_strain);
-    let (count, most) =
-        strains.fold((0, 0.0), |(n, most), s| (n + i32::from(s > 0.05), s.max(most)));
-    println!("strained by {most} at most, {count} by more than a twentieth");
-    // Those with a root in balls of both sets that push them into each other.
-    assert!(most < 2.5 && count < 20, "{count} strands are strained, by {most} at most");
+    assert_eq!(faults(&mut app), []);
+    assert!(most < 0.51, "a strand is strained by {most}");
 }
 
 /// Where the head's mesh wears a beard, hair that is swapped is worn on the head all the same, and not on an eye.

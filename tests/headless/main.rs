@@ -9,6 +9,9 @@ mod body;
 mod characters_measured;
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../../examples/shared/gltf.rs"]
+#[cfg(feature = "groom")]
+mod gltf;
 #[path = "../../examples/shared/scenes/locks.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod locks;
@@ -63,6 +66,7 @@ mod reflection;
 mod rest;
 mod rods;
 mod settle;
+mod shade;
 mod sleep;
 mod style;
 mod submersion;

@@ -9,18 +9,23 @@ use bevy::prelude::*;
 use bevy_keratin::prelude::*;
 use std::{thread::sleep, time::Duration};
 
-/// Strands of a preset that sleep, and that do not, seconds after it was put on a head that stands still.
-fn asleep(contact: StrandContact) -> SleepCounts {
-    let mut app = app_with_meshes(60.0);
-    let head = app.world_mut().resource_mut::<Assets<Mesh>>().add(wearer::ball(0.1));
-    app.world_mut().spawn((Mesh3d(head), Transform::default(), WearHair::new(HairPreset::Wavy)));
+/// Waits for the hair.
+fn worn(app: &mut App) -> Entity {
     let worn = (0..4000).find_map(|_| {
         app.update();
         sleep(Duration::from_millis(2));
         let world = app.world_mut();
         world.query_filtered::<Entity, (With<WornHair>, With<Strands>)>().iter(world).next()
     });
-    let hair = worn.expect("no hair is worn after 8 s");
+    worn.expect("no hair is worn after 8 s")
+}
+
+/// Strands of a preset that sleep, and that do not, seconds after it was put on a head that stands still.
+fn asleep(contact: StrandContact) -> SleepCounts {
+    let mut app = app_with_meshes(60.0);
+    let head = app.world_mut().resource_mut::<Assets<Mesh>>().add(wearer::ball(0.1));
+    app.world_mut().spawn((Mesh3d(head), Transform::default(), WearHair::new(HairPreset::Wavy)));
+    let hair = worn(&mut app);
     app.world_mut().entity_mut(hair).insert(contact);
     run(&mut app, 5.0);
     *app.world().get::<SleepCounts>(hair).unwrap()
@@ -31,6 +36,29 @@ fn locks_that_touch_come_to_rest_where_contact_is_mutual() {
     let [mutual, printed] =
         [true, false].map(|mutual| asleep(StrandContact { mutual, ..default() }));
     println!("mutual {mutual:?}, printed {printed:?}");
-    assert!(mutual.asleep > mutual.awake, "{mutual:?}");
-    assert!(2 * printed.asleep < printed.awake, "{printed:?}, the control");
+    assert!(3 * mutual.awake < mutual.asleep, "{mutual:?}");
+    assert!(2 * mutual.awake < printed.awake, "{mutual:?}, printed {printed:?}");
+}
+
+/// Strands that are awake, and all, of hair on a character of fifty solids five seconds after it was put on.
+fn awake_on_a_character(preset: HairPreset) -> [usize; 2] {
+    let mut app = app_with_meshes(60.0);
+    let root = app.world_mut().spawn((Transform::default(), Visibility::default())).id();
+    wearer::character(&mut app, root, 1.0);
+    app.world_mut().entity_mut(root).insert(WearHair::new(preset).facing(Dir3::Z));
+    let hair = worn(&mut app);
+    let contact = StrandContact { strength: 0.0, ..default() };
+    app.world_mut().entity_mut(hair).insert(contact);
+    run(&mut app, 5.0);
+    let counts = app.world().get::<SleepCounts>(hair).unwrap();
+    [counts.awake, counts.awake + counts.asleep]
+}
+
+#[test]
+fn hair_comes_to_rest_against_the_solids_of_a_head_and_a_body() {
+    for preset in [HairPreset::Wavy, HairPreset::Locs, HairPreset::Undercut] {
+        let [awake, all] = awake_on_a_character(preset);
+        println!("{preset:?}: {awake} of {all} awake");
+        assert!(all > 100 && 20 * awake < all, "{preset:?}: {awake} of {all} are awake");
+    }
 }

@@ -346,8 +346,12 @@ fn a_mirrored_character_wears_mirrored_hair() {
     // In the wearer's own space, where both are the same.
     let apart =
         one.iter().zip(&mirrored).flat_map(|(a, b)| a.positions().iter().zip(b.positions()));
-    let worst = apart.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
-    assert!(worst < 2e-3, "{worst} m apart");
+    let mut apart: Vec<f32> = apart.map(|(a, b)| a.distance(*b)).collect();
+    apart.sort_by(f32::total_cmp);
+    let (middle, worst) = (apart[apart.len() / 2], apart[apart.len() - 1]);
+    println!("{middle} m apart, at most {worst} m");
+    // Where a strand sticks to the skin hangs on the last bits.
+    assert!(middle < 1e-5 && worst < 1e-2, "{middle} m apart, at most {worst} m");
 }
 
 #[test]

@@ -35,6 +35,16 @@ fn a_runner_is_put_elsewhere_and_its_hair_goes_on() {
 }
 
 #[test]
+fn a_portal_in_the_frame_of_a_hitch_is_no_worse() {
+    check(measured::hitches());
+}
+
+#[test]
+fn a_rider_gets_on_a_vehicle_and_off_it() {
+    check(measured::reparented());
+}
+
+#[test]
 fn water_on_hair_goes_along() {
     check(measured::wet_jumps());
 }

@@ -63,7 +63,61 @@ pub fn vehicles() -> Vec<Row> {
     let rides = lean_in_a_vehicle(20.0, 0.0, Some(fan));
     rows.push(Row::new("control, fan at rest: lean (°)", 17.0, rests, 7.0));
     rows.push(Row::new("fan at 20 m/s: lean (°)", rests, rides, 0.5));
+    rows.extend(blowers());
     rows.extend(baths());
+    rows
+}
+
+/// The lean of hair on a car of some scale in a closed cabin, or an open one, blown from behind (degrees); the
+/// cabin ends 40 cm behind the hair, at the car's scale.
+fn lean_before_a_blower(scale: f32, speed: f32, spin: f32, is_closed: bool, strength: f32) -> f32 {
+    let mut app = app(60.0);
+    let (hair, id) = one_strand(&mut app);
+    let car = app.world_mut().spawn(Transform::default()).id();
+    app.world_mut().entity_mut(hair).insert(ChildOf(car));
+    let behind = Transform::from_xyz(-0.3, -0.1, 0.0).looking_to(Vec3::X, Vec3::Y);
+    if strength > 0.0 {
+        app.world_mut().spawn((Blower::new(strength).unwrap(), behind, ChildOf(car)));
+    }
+    if is_closed {
+        let half_size = Vec3::new(1.4, 1.0, 1.0);
+        let cabin = WindZone { half_size, falloff: 0.0, ..WindZone::shelter() };
+        app.world_mut().spawn((cabin, Transform::from_xyz(1.0, 0.0, 0.0), ChildOf(car)));
+    }
+    let mut way = 0.0;
+    for tick in 0..360 {
+        way += (tick as f32 / 120.0).min(1.0) / 60.0;
+        place_mut(&mut app, car, |place| {
+            *place = Path { speed, spin }.at(f64::from(way)).with_scale(Vec3::splat(scale));
+        });
+        app.update();
+    }
+    lean(&strand(&app, id))
+}
+
+/// Line 7: the air of a blower, and of the end of a cabin, is where they are at any speed and scale.
+fn blowers() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for scale in [0.1, 1.0, 10.0] {
+        let rests = lean_before_a_blower(scale, 0.0, 0.0, true, 10.0);
+        rows.push(Row::new(
+            format!("scale {scale}, control, blower at rest: lean (°)"),
+            4.0,
+            rests,
+            1.5,
+        ));
+        for (speed, spin) in [(20.0, 0.0), (0.0, 1.0)] {
+            let rides = lean_before_a_blower(scale, speed, spin, true, 10.0);
+            let what =
+                format!("scale {scale}, blower in a cabin at {speed} m/s, {spin} rad/s: lean (°)");
+            rows.push(Row::new(what, rests, rides, 0.6));
+        }
+    }
+    // In the open its air takes part of the headwind's place; so weak a jet pushes by nothing else.
+    let open = lean_before_a_blower(1.0, 20.0, 0.0, false, 0.0);
+    let blown = lean_before_a_blower(1.0, 20.0, 0.0, false, 1e-3);
+    rows.push(Row::new("control, open at 20 m/s without a blower: lean (°)", 65.0, open, 20.0));
+    rows.push(Row::at_most("open at 20 m/s in the jet of a blower: lean (°)", blown, open - 0.3));
     rows
 }
 

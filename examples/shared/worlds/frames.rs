@@ -230,6 +230,101 @@ fn ride(path: Path, frames: &Frames, moved: Moved, discards: Discards, seconds: 
     ride
 }
 
+/// How often a rider gets on a vehicle, or off it (ticks).
+const STAYS: usize = 11;
+
+/// A ride beside a vehicle and on it by turns, along the same way: where hair is at the end of each tick.
+fn on_and_off(path: Path, frames: &Frames, by_ticks: bool, changes: bool) -> Vec<Strand> {
+    const SEAT: Transform = Transform::from_xyz(0.5, 1.0, 0.0);
+    #[derive(Resource, Default)]
+    struct Seen(Vec<Strand>);
+    let mut app = app_with_players();
+    let (hair, id) = one_strand(&mut app);
+    let vehicle = app.world_mut().spawn((Vehicle, Transform::default())).id();
+    app.init_resource::<Seen>();
+    let ride =
+        move |time: Res<Time>,
+              mut vehicles: Query<&mut Transform, With<Vehicle>>,
+              mut riders: Query<(&mut Transform, Has<ChildOf>), Without<Vehicle>>| {
+            let now = path.at(time.elapsed_secs_f64());
+            vehicles.iter_mut().for_each(|mut place| *place = now);
+            for (mut place, is_on_it) in &mut riders {
+                *place = if is_on_it { SEAT } else { now * SEAT };
+            }
+        };
+    match by_ticks {
+        true => app.add_systems(FixedUpdate, ride),
+        false => app.add_systems(Update, ride),
+    };
+    let watch = move |step: Res<HairStep>, strands: Query<&Strand>, mut seen: ResMut<Seen>| {
+        if let Ok(strand) = strands.get(id)
+            && step.index + 1 == step.count
+        {
+            seen.0.push(strand.clone());
+        }
+    };
+    app.add_systems(HairTick, watch.in_set(HairSystems::Last).ambiguous_with_all());
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(38);
+    let (mut seconds, mut last_change) = (0.0, 0);
+    for i in 0.. {
+        let ticks = app.world().resource::<Seen>().0.len();
+        if changes && seconds > WARM_UP && ticks - last_change > STAYS {
+            last_change = ticks;
+            let was_on_it = app.world().get::<ChildOf>(hair).is_some();
+            let at = app.world().get::<GlobalTransform>(hair).copied().unwrap_or_default();
+            let mut rider = app.world_mut().entity_mut(hair);
+            match was_on_it {
+                true => rider.remove::<ChildOf>().insert(at.compute_transform()),
+                false => rider.insert((ChildOf(vehicle), SEAT)),
+            };
+        }
+        let frame = (frames.frame)(&mut random, i);
+        seconds += frame;
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(frame)));
+        app.update();
+        if seconds > WARM_UP + 4.0 {
+            break;
+        }
+    }
+    app.world_mut().resource_mut::<Seen>().0.split_off((WARM_UP * 64.0) as usize)
+}
+
+/// Line 1: a rider who gets on a vehicle and off it, by another parent, is where he was, in each tick.
+pub fn reparented() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (speed, spin) in [(3.0, 0.0), (12.0, 0.0), (3.0, 1.0)] {
+        for by_ticks in [false, true] {
+            for frames in [&EVEN, &UNEVEN[1], &UNEVEN[3]] {
+                let path = Path { speed, spin };
+                let control = on_and_off(path, frames, by_ticks, false);
+                let got = on_and_off(path, frames, by_ticks, true);
+                let pairs = || control.iter().zip(&got);
+                let off = pairs()
+                    .map(|(a, b)| super::apart(a.positions(), b.positions()))
+                    .fold(0.0, f32::max);
+                let faster = pairs()
+                    .map(|(a, b)| super::apart(a.velocities(), b.velocities()))
+                    .fold(0.0, f32::max);
+                let moved = if by_ticks { "FixedUpdate" } else { "Update" };
+                let what = format!(
+                    "{speed} m/s, {spin} rad/s, on and off a vehicle, {moved}, {} frames",
+                    frames.name
+                );
+                // Within a frame that ticks do not see, a rider beside it goes straight, and one on it with its turn:
+                // in 0.25 s by 1 rad/s at 0.5 m by 4 mm.
+                let cuts_corners = spin > 0.0 && !by_ticks && frames.name == "any";
+                let [most, most_faster] = if cuts_corners { [0.01, 0.1] } else { [1e-3, 0.01] };
+                rows.extend([
+                    Row::new(format!("{what}: ticks"), control.len() as f32, got.len() as f32, 0.0),
+                    Row::at_most(format!("{what}: off (m)"), off, most),
+                    Row::at_most(format!("{what}: other speed (m/s)"), faster, most_faster),
+                ]);
+            }
+        }
+    }
+    rows
+}
+
 /// After how long rides are measured (s).
 const WARM_UP: f64 = 4.0;
 

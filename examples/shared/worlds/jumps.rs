@@ -1,7 +1,7 @@
 //! Jumps: what was away, portals, worlds that are shifted, with water too.
 
 use super::{Row, all, app, head, one_strand, place_mut, strand};
-use bevy::{ecs::entity_disabling::Disabled, prelude::*};
+use bevy::{ecs::entity_disabling::Disabled, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{LodLevel, prelude::*};
 
 /// The fastest node and the farthest move of one, seen from the head, in half a second from now on.
@@ -99,6 +99,8 @@ enum Put {
     Announced(f32),
     /// With the world.
     Shifted,
+    /// Announced, turned, while time stands still for two frames.
+    Paused,
 }
 
 /// Where ticks put a head.
@@ -129,6 +131,7 @@ fn run_and_put(speed: f32, put: Put, in_update: bool) -> Vec<Strand> {
                     app.world_mut().commands().entity(hair).queue(Hair::teleport);
                 }
             }
+            Put::Paused => {}
             Put::Shifted => {
                 world = Transform::from_xyz(-512.0, 0.0, 256.0);
                 app.world_mut().commands().trigger(ShiftWorld { by: world.translation });
@@ -171,6 +174,99 @@ pub fn portals() -> Vec<Row> {
                     Row::at_most(format!("{what}: off (m)"), off, 1e-3),
                     Row::at_most(format!("{what}: speed (m/s)"), faster, 0.05),
                 ]);
+            }
+        }
+    }
+    rows
+}
+
+/// What moves a runner: its body, and its head which looks about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mover {
+    Update,
+    FixedUpdate,
+    /// Its body by ticks, its head by frames, as animated characters are.
+    BodyByTicks,
+    HeadByTicks,
+}
+
+/// The states of hair after the frame of a hitch in which its runner is put elsewhere.
+fn run_and_hitch(put: Put, mover: Mover, hitch: f64) -> Vec<Strand> {
+    const SPEED: f32 = 8.0;
+    #[derive(Resource)]
+    struct World(Transform);
+    let mut app = app(64.0);
+    let body = app.world_mut().spawn(Transform::default()).id();
+    let (hair, id) = one_strand(&mut app);
+    app.world_mut().entity_mut(hair).insert(ChildOf(body));
+    app.insert_resource(World(Transform::IDENTITY));
+    let run = |time: Res<Time>,
+               world: Res<World>,
+               mut all: Query<&mut Transform, Without<Hair>>| {
+        let t = time.elapsed_secs();
+        let x = SPEED * if t < 1.0 { 0.5 * t * t } else { t - 0.5 };
+        all.iter_mut().for_each(|mut place| *place = world.0 * Transform::from_xyz(x, 0.0, 0.0));
+    };
+    let nod = |time: Res<Time>, mut heads: Query<&mut Transform, With<Hair>>| {
+        let t = time.elapsed_secs();
+        for mut head in &mut heads {
+            head.translation.y = 1.6 + 0.05 * (5.0 * t).sin();
+            head.rotation = Quat::from_rotation_y(0.3 * (4.0 * t).sin());
+        }
+    };
+    match mover {
+        Mover::Update => app.add_systems(Update, (run, nod)),
+        Mover::FixedUpdate => app.add_systems(FixedUpdate, (run, nod)),
+        Mover::BodyByTicks => app.add_systems(FixedUpdate, run).add_systems(Update, nod),
+        Mover::HeadByTicks => app.add_systems(Update, run).add_systems(FixedUpdate, nod),
+    };
+    let mut states = Vec::new();
+    for frame in 0..150 {
+        let seconds = if frame == 120 { hitch } else { 1.0 / 60.0 };
+        let seconds = std::time::Duration::from_secs_f64(seconds);
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(seconds));
+        if frame == 120 {
+            let world = match put {
+                Put::Found | Put::Paused => {
+                    Transform::from_xyz(64.0, 3.0, -40.0).with_rotation(Quat::from_rotation_y(1.2))
+                }
+                Put::Announced(far) => Transform::from_xyz(0.0, 0.0, far),
+                Put::Nowhere | Put::Shifted => Transform::IDENTITY,
+            };
+            if matches!(put, Put::Announced(_) | Put::Paused) {
+                app.world_mut().commands().entity(hair).queue(Hair::teleport);
+                app.world_mut().flush();
+            }
+            app.insert_resource(World(world));
+            if put == Put::Paused {
+                app.world_mut().resource_mut::<Time<Virtual>>().pause();
+                place_mut(&mut app, body, |place| *place = world * *place);
+                app.update();
+                app.update();
+                app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+            }
+        }
+        app.update();
+        if frame >= 120 {
+            states.push(strand(&app, id));
+        }
+    }
+    states
+}
+
+/// Line 6: in the frame of a hitch too, whatever moves a runner and its head that looks about.
+pub fn hitches() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for mover in [Mover::Update, Mover::FixedUpdate, Mover::BodyByTicks, Mover::HeadByTicks] {
+        for hitch in [1.0 / 60.0, 0.2] {
+            let control = run_and_hitch(Put::Nowhere, mover, hitch);
+            for put in [Put::Found, Put::Announced(0.3), Put::Paused] {
+                let states = run_and_hitch(put, mover, hitch);
+                let off = states.iter().zip(&control);
+                let off = off.map(|(a, b)| super::apart(a.positions(), b.positions()));
+                let what = format!("{mover:?}, frame of {:.0} ms, {put:?}: off (m)", hitch * 1e3);
+                // Where the head was at a tick's beginning before the frame is not known beside a jump.
+                rows.push(Row::at_most(what, off.fold(0.0, f32::max), 2e-3));
             }
         }
     }

@@ -12,8 +12,8 @@ pub mod wearer;
 pub use air::{far_rain, gusts, scales, vehicles};
 #[cfg(all(feature = "groom", feature = "save"))]
 pub use copies::{copies, edits, roots};
-pub use frames::{frames, rates, riders};
-pub use jumps::{portals, returns, wet_jumps};
+pub use frames::{frames, rates, reparented, riders};
+pub use jumps::{hitches, portals, returns, wet_jumps};
 pub use shapes::{hidden, solids, squashed};
 
 use super::rows::Row;
@@ -153,10 +153,12 @@ pub fn rows() -> Vec<Row> {
     let mut rows = [
         // A minute of frames that lose ticks; longer rides end where f32 no longer resolves their speed.
         frames(20.0),
+        reparented(),
         rates(),
         riders(),
         returns(),
         portals(),
+        hitches(),
         wet_jumps(),
         vehicles(),
         scales(),

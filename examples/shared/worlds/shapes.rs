@@ -7,7 +7,8 @@ use bevy_keratin::prelude::*;
 /// Line 8: a head that is scaled away in first person, while it walks and turns, comes back as it was.
 pub fn hidden() -> Vec<Row> {
     let mut rows = Vec::new();
-    for scale in [0.1, 0.01, 0.0001] {
+    for scale in [0.1, 0.01, 0.0001, 0.0] {
+        rows.extend(hidden_bone(scale));
         let mut app = app(60.0);
         let head = head(&mut app, 10);
         let before = all(&mut app);
@@ -37,6 +38,34 @@ pub fn hidden() -> Vec<Row> {
         ]);
     }
     rows
+}
+
+/// Hair that is not at the middle of the bone that is scaled away, and walks on a little meanwhile.
+fn hidden_bone(scale: f32) -> Vec<Row> {
+    let mut app = app(60.0);
+    let bone = app.world_mut().spawn(Transform::from_xyz(0.0, 1.6, 0.0)).id();
+    let (hair, id) = strand_along(&mut app, 0.3, 12, Vec3::NEG_Y);
+    let beside = Transform::from_xyz(0.0, 0.1, 0.06);
+    app.world_mut().entity_mut(hair).insert((ChildOf(bone), beside));
+    run(&mut app, 1.0);
+    let before = strand(&app, id);
+    let mut off = 0.0f32;
+    for tick in 0..90 {
+        place_mut(&mut app, bone, |place| {
+            place.scale = Vec3::splat(if tick < 30 { scale } else { 1.0 });
+            place.translation.x += if tick < 30 { 0.005 } else { 0.0 };
+        });
+        app.update();
+        off = off.max(apart(strand(&app, id).positions(), before.positions()));
+    }
+    vec![
+        Row::at_most(format!("hair beside a bone hidden at {scale}: off (m)"), off, 1e-3),
+        Row::at_most(
+            format!("hair beside a bone hidden at {scale}: faults"),
+            fault_count(&app),
+            0.0,
+        ),
+    ]
 }
 
 /// Line 8: on a head that is squashed and sheared, roots are where the skin is drawn, and strands keep

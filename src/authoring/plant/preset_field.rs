@@ -113,7 +113,12 @@ impl HairPreset {
                 let down = -up - front * 0.25 + right * (0.4 * aside);
                 return swept * before + down * (1.0 - before);
             }
-            Self::Beard => return right * (0.5 * aside) + front * 0.1 - up,
+            Self::Beard => {
+                // A moustache is combed aside, off the mouth.
+                let (side, moustache) = (aside.signum(), above_mouth(aside, high));
+                let sideways = 0.5 * aside + 1.1 * side * moustache;
+                return right * sideways + front * 0.1 - up * (1.0 - 0.5 * moustache);
+            }
             _ => {}
         }
         let side = if self.aside(scalp, place) < 0.0 { -1.0 } else { 1.0 };
@@ -165,7 +170,9 @@ impl HairPreset {
                 (angle * FRINGE_LENGTH).clamp(0.15, 0.5)
             }
             // The moustache is shorter.
-            Self::Beard => 0.45 + 0.55 * smooth((-0.42 - high) / 0.3),
+            Self::Beard => {
+                0.45 + 0.55 * smooth((-0.42 - high) / 0.3) - 0.1 * above_mouth(aside, high)
+            }
             _ => 1.0,
         }
     }
@@ -174,6 +181,11 @@ impl HairPreset {
 /// The share of an undercut's length at a place in heights of the head.
 fn on_top(aside: f32, high: f32) -> f32 {
     smooth((high - 0.5) / 0.14) * smooth((aside + 0.42) / 0.1)
+}
+
+/// The share of a moustache at a place in heights of the head.
+fn above_mouth(aside: f32, high: f32) -> f32 {
+    smooth((high + 0.6) / 0.06) * smooth((0.34 - aside.abs()) / 0.1)
 }
 
 /// How high the brows are above the middle of the head (rad).
@@ -206,6 +218,12 @@ const EAR: f32 = 84.0;
 /// The lips: how high they are (°), and half of their height and width (°).
 const LIPS: (f32, f32, f32) = (-36.5, 5.0, 15.0);
 
+/// Below the nose and around the lips hair begins within so much shorter a way than on the cheeks, up to this angle from
+/// the face (°): a moustache has no room for more.
+const EDGE_OF_LIPS: f32 = 3.0;
+const EDGE_OF_NOSE: f32 = 2.0;
+const BESIDE_NOSE: f32 = 24.0;
+
 /// A sideburn's lower end and height (°), and the angle from the face at which it ends (°).
 const SIDEBURN: (f32, f32) = (-3.0, 8.0);
 const BEHIND_SIDEBURN: f32 = 92.0;
@@ -221,10 +239,12 @@ impl Scalp {
     pub(super) fn behind_beard_line(&self, place: Vec3) -> f32 {
         let (around, elevation) = self.angles(place);
         let lips = ((elevation - LIPS.0) / LIPS.1).hypot(around / LIPS.2) - 1.0;
-        let within = (piecewise(&CHEEK_LINE, around) - elevation)
+        let beside = smooth((around - BESIDE_NOSE) / BESIDE_NOSE);
+        let steep = EDGE_OF_NOSE + (1.0 - EDGE_OF_NOSE) * beside;
+        let within = ((piecewise(&CHEEK_LINE, around) - elevation) * steep)
             .min(elevation - piecewise(&NECK_LINE, around))
             .min(EAR - around)
-            .min(lips * LIPS.1);
+            .min(lips * LIPS.1 * EDGE_OF_LIPS);
         within.to_radians() * place.distance(self.center)
     }
 }
@@ -234,4 +254,20 @@ fn piecewise(line: &[(f32, f32)], at: f32) -> f32 {
     piece.map_or(line[line.len() - 1].1, |w| {
         w[0].1 + (w[1].1 - w[0].1) * (at - w[0].0) / (w[1].0 - w[0].0)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moustache_is_full_between_nose_and_lips() {
+        let scalp = Scalp::default();
+        let behind = |elevation: f32| {
+            let up = elevation.to_radians();
+            scalp.behind_beard_line(Vec3::new(0.0, up.sin(), up.cos()) * 0.1)
+        };
+        assert!(behind(-29.5) > 7e-3, "{}", behind(-29.5));
+        assert!(behind(-25.0) < 0.0 && behind(-33.0) < 0.0 && behind(-40.0) < 0.0);
+    }
 }

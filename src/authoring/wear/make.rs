@@ -5,7 +5,7 @@ use super::{
     error::WearError,
     facing::FacingFrom,
     garments::{garments, is_sheet},
-    part::MeshPart,
+    part::{MeshPart, positions},
     skin::{Hint, Role},
     space::{Fitting, cropped, fit},
     target::Target,
@@ -30,7 +30,7 @@ use crate::{
     water::HairWetting,
 };
 use bevy::{
-    math::Affine3A,
+    math::{Affine3A, ops::sin_cos},
     mesh::VertexAttributeValues as Values,
     platform::collections::{HashMap, HashSet},
     prelude::*,
@@ -43,6 +43,10 @@ const MAX_BALLS: usize = 48;
 const MAX_JOINT_BALLS: usize = 32;
 /// A capsule that is farther from the skin than this, as a root mean square (m), gives way to balls.
 const LOOSE: f32 = 4e-3;
+/// So does one whose ends are farther outside of the skin (m), as over shoulders that another joint moves, and from
+/// how many sides that is seen.
+const STANDS_OUT: f32 = 15e-3;
+const SIDES: u32 = 64;
 /// How far balls stand out of a head's skin and of a joint's (m), and how far outside of one a point is that it
 /// covers (m; negative within it). Of a figure's nodes and drawn strands less than 0.1 % are in the skin then; with
 /// 24 balls of a joint, or 3 mm out, it would be up to 0.6 %, in the creases between them.
@@ -405,6 +409,7 @@ fn capsules(
         let poses: Vec<Mat4> = skin.poses.iter().map(|pose| (*pose).into()).collect();
         let to_hair = fitting.from_wearer * part.to_wearer;
         let Ok(fitted) = fit_joint_capsules(&part.mesh, &poses) else { continue };
+        let near = near_skin(part, &to_hair, reach);
         for (i, capsule) in fitted.into_iter().enumerate() {
             let is_fitted = || !skin.of_head[i] && !with_own.contains(&skin.joints[i]);
             let Some(capsule) = capsule.filter(|_| is_fitted()) else { continue };
@@ -422,8 +427,9 @@ fn capsules(
                     if known.is_none() {
                         order.push(joint);
                     }
-                    let balls = match capsule.deviation * scale > LOOSE {
-                        true => joint_balls(&part.mesh, i, &(to_hair, there), reach),
+                    let is_loose = capsule.deviation * scale > LOOSE;
+                    let balls = match is_loose || stands_out([a, b], radius, &near.1) {
+                        true => joint_balls(i, &near, &there),
                         false => Vec::new(),
                     };
                     let solids = if balls.is_empty() { vec![collider] } else { balls };
@@ -436,49 +442,49 @@ fn capsules(
     solids.flat_map(|(joint, all)| all.into_iter().map(move |solid| (joint, solid))).collect()
 }
 
-/// Balls that fill what joint `i` moves for the greater part, in the space of the joint, given the transforms
-/// to the hair's from the mesh's and from the joint's.
+/// Vertices within reach, some of them where they are many: the joint that moves most of each, and where it is in
+/// the hair's space with its normal.
+fn near_skin(part: &MeshPart, to_hair: &Affine3A, reach: f32) -> (Vec<usize>, Vec<(Vec3, Vec3)>) {
+    let normals = match part.mesh.attribute(Mesh::ATTRIBUTE_NORMAL) {
+        Some(Values::Float32x3(normals)) => &normals[..],
+        _ => &[],
+    };
+    let joints = part.joints_of_vertices().unwrap_or_default();
+    let each =
+        positions(&part.mesh).iter().zip(normals).zip(joints).map(|((at, normal), joint)| {
+            let normal = to_hair.transform_vector3(Vec3::from(*normal)).normalize_or_zero();
+            (joint, (to_hair.transform_point3(Vec3::from(*at)), normal))
+        });
+    let near: Vec<_> = each.filter(|(_, (at, _))| at.length() < reach).collect();
+    let step = near.len().div_ceil(POINTS).max(1);
+    near.into_iter().step_by(step).unzip()
+}
+
+/// Whether an end of a capsule is far outside of the skin.
+fn stands_out([a, b]: [Vec3; 2], radius: f32, skin: &[(Vec3, Vec3)]) -> bool {
+    (0..SIDES).any(|k| {
+        let up = 1.0 - (2.0 * k as f32 + 1.0) / SIDES as f32;
+        // By the golden angle.
+        let (sine, cosine) = sin_cos(2.399_963 * k as f32);
+        let way = Vec3::new(cosine, 0.0, sine) * (1.0 - up * up).sqrt() + Vec3::Y * up;
+        let at = way * radius + if way.dot(b - a) > 0.0 { b } else { a };
+        let apart = |p: &&(Vec3, Vec3)| p.0.distance_squared(at);
+        let nearest = skin.iter().min_by(|p, q| apart(p).total_cmp(&apart(q)));
+        nearest.is_some_and(|(p, normal)| (at - p).dot(*normal) > STANDS_OUT)
+    })
+}
+
+/// Balls that fill what joint `i` moves for the greater part, in the space of the joint, given the skin that is
+/// near and the transform from the joint's space to the hair's.
 fn joint_balls(
-    mesh: &Mesh,
     i: usize,
-    (from_mesh, from_joint): &(Affine3A, Affine3A),
-    reach: f32,
+    (joints, points): &(Vec<usize>, Vec<(Vec3, Vec3)>),
+    from_joint: &Affine3A,
 ) -> Vec<(HairCollider, Transform)> {
-    let (
-        Some(Values::Float32x3(places)),
-        Some(Values::Float32x3(normals)),
-        Some(Values::Uint16x4(joints)),
-        Some(Values::Float32x4(weights)),
-    ) = (
-        mesh.attribute(Mesh::ATTRIBUTE_POSITION),
-        mesh.attribute(Mesh::ATTRIBUTE_NORMAL),
-        mesh.attribute(Mesh::ATTRIBUTE_JOINT_INDEX),
-        mesh.attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT),
-    )
-    else {
-        return Vec::new();
-    };
-    let near: Vec<(usize, Vec3)> = (places.iter().enumerate())
-        .map(|(v, at)| (v, from_mesh.transform_point3(Vec3::from(*at))))
-        .filter(|(_, at)| at.length() < reach)
-        .collect();
-    let some: Vec<(usize, Vec3)> =
-        near.iter().step_by(near.len().div_ceil(POINTS).max(1)).copied().collect();
-    // A mesh may have fewer normals than vertices.
-    let normal_of = |v: usize| {
-        let normal = normals.get(v).copied().unwrap_or_default();
-        from_mesh.transform_vector3(normal.into()).normalize_or_zero()
-    };
-    let points: Vec<(Vec3, Vec3)> = some.iter().map(|(v, at)| (*at, normal_of(*v))).collect();
-    let is_moved = |k: usize| {
-        let v = some[k].0;
-        let share = joints[v].iter().zip(weights[v]).filter(|(j, _)| usize::from(**j) == i);
-        share.map(|(_, weight)| weight).sum::<f32>() >= 0.5
-    };
     let rules =
         BallRules { widest: 0.12, out: JOINT_OUT, crease: JOINT_CREASE, most: MAX_JOINT_BALLS };
     let (to_joint, scale) = (from_joint.inverse(), from_joint.matrix3.determinant().abs().cbrt());
-    let balls = inscribed_balls(&points, is_moved, &rules);
+    let balls = inscribed_balls(points, |k| joints[k] == i, &rules);
     let each = balls.into_iter().filter_map(|ball| {
         let place = to_joint.transform_point3(ball.center.into());
         let ball = HairCollider::sphere(ball.radius() / scale).ok()?;

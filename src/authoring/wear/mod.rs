@@ -17,6 +17,7 @@
 //! | planting, roots, colliders: a pure function | `make` |
 //! | colliders for capes and collars | `garments` |
 //! | hiding the hair that a character came with | `old_hair` |
+//! | shading the skin under the hair | `shade`, `shell` |
 
 mod error;
 mod facing;
@@ -26,6 +27,10 @@ mod make;
 #[cfg(feature = "render")]
 mod old_hair;
 mod part;
+#[cfg(feature = "render")]
+mod shade;
+#[cfg(feature = "render")]
+mod shell;
 mod skin;
 mod space;
 mod systems;
@@ -34,6 +39,8 @@ mod what;
 
 pub use error::WearError;
 pub use facing::FacingFrom;
+#[cfg(feature = "render")]
+pub use shade::ScalpShade;
 pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair};
 
 use crate::{authoring::attach::MadeAgain, base::schedule::HairFrame, hair::strand::lacks_strands};
@@ -72,5 +79,7 @@ impl Plugin for WearPlugin {
                 )
                     .chain(),
             );
+        #[cfg(feature = "render")]
+        shade::plugin(app);
     }
 }

@@ -20,8 +20,8 @@ pub use systems::ContactPlugin;
 pub(crate) use {
     lanes::WetRow,
     model::{Bridged, Film},
-    reach::{Colliders, HairReach},
-    systems::{PlacedCollider, seen_from},
+    reach::{Ball, Colliders, HairReach},
+    systems::{TickCollider, TickColliders, seen_from},
 };
 
 use crate::{base::setting::setting, solver::rod::obstacle::Obstacle};
@@ -60,9 +60,9 @@ pub struct Obstacles {
     /// The solids.
     #[reflect(ignore)]
     pub solids: Vec<Obstacle>,
-    /// The colliders that it may touch in this tick.
+    /// The colliders that it may touch in this tick, by their indices.
     #[reflect(ignore)]
-    near: Vec<Entity>,
+    near: Vec<u32>,
 }
 
 /// The pairs of strands of one hair that may touch.

@@ -53,14 +53,14 @@ pub(super) const LOOK_AGAIN: u32 = 16;
 
 /// A ball around a collider in the world, and how far it moves in a substep (m).
 #[derive(Clone, Copy, Debug)]
-struct Ball {
+pub(crate) struct Ball {
     center: Vec3,
     radius: f32,
     travel: f32,
 }
 
 impl Ball {
-    fn around(collider: &HairCollider, pose: &TickPose) -> Self {
+    pub(crate) fn around(collider: &HairCollider, pose: &TickPose) -> Self {
         let (before, now) = (pose.before(), pose.now());
         let radius = match &collider.shape {
             ColliderShape::Sphere(s) => s.radius,
@@ -93,6 +93,7 @@ impl Ball {
 
 /// All colliders in a tick of so many substeps, or all droplets in a substep, found by place: in a crowd a hair
 /// is near few of them.
+#[derive(Resource)]
 pub(crate) struct Colliders<T> {
     substeps: u32,
     all: Vec<(Ball, T)>,
@@ -104,23 +105,21 @@ pub(crate) struct Colliders<T> {
     anywhere: Vec<u32>,
 }
 
-impl<T> Colliders<T> {
-    /// From colliders with valid values.
-    pub(crate) fn new<'a>(
-        substeps: u32,
-        colliders: impl Iterator<Item = (&'a HairCollider, &'a TickPose, T)>,
-    ) -> Self {
-        let all = colliders.map(|(collider, pose, item)| (Ball::around(collider, pose), item));
-        Self::of_moving(substeps, all.collect())
+impl<T> Default for Colliders<T> {
+    fn default() -> Self {
+        Self::new(1, Vec::new())
     }
+}
 
+impl<T> Colliders<T> {
     /// From balls that do not move for a substep, each a center in the world and a radius (m).
     pub(crate) fn of_balls(balls: impl Iterator<Item = ((Vec3, f32), T)>) -> Self {
         let still = |((center, radius), item)| (Ball { center, radius, travel: 0.0 }, item);
-        Self::of_moving(1, balls.map(still).collect())
+        Self::new(1, balls.map(still).collect())
     }
 
-    fn of_moving(substeps: u32, all: Vec<(Ball, T)>) -> Self {
+    /// From balls that move for so many substeps.
+    pub(crate) fn new(substeps: u32, all: Vec<(Ball, T)>) -> Self {
         let (mut along_x, mut anywhere, mut largest) = (Vec::new(), Vec::new(), 0.0f32);
         for ((ball, _), i) in all.iter().zip(0..) {
             let room = ball.room(substeps);
@@ -136,7 +135,7 @@ impl<T> Colliders<T> {
     }
 
     /// Those that hair in `frame` may touch within the tick, in the order they were given; all for a hair of
-    /// unknown reach. `found` is scratch space.
+    /// unknown reach. `found` holds their indices afterwards.
     pub(crate) fn near<'a>(
         &'a self,
         frame: &TickPose,
@@ -148,14 +147,19 @@ impl<T> Colliders<T> {
         self.around(center, room, found)
     }
 
+    /// Those with these indices.
+    pub(super) fn iter_many<'a>(&'a self, found: &'a [u32]) -> impl Iterator<Item = &'a T> {
+        found.iter().filter_map(|i| Some(&self.all.get(*i as usize)?.1))
+    }
+
     /// Those that may come within `room` (m) of a point within the tick, in the order they were given.
-    /// `found` is scratch space.
+    /// `found` holds their indices afterwards.
     pub(crate) fn around<'a>(
         &'a self,
         center: Vec3,
         room: f32,
         found: &'a mut Vec<u32>,
-    ) -> impl Iterator<Item = &'a T> + use<'a, T> {
+    ) -> impl Iterator<Item = &'a T> {
         found.clear();
         // A little more, for rounding. Without an end, or NaN, it holds all.
         let far = 1.0001 * (room + self.largest);
@@ -167,7 +171,7 @@ impl<T> Colliders<T> {
         let is_near = |i: &&u32| self.all[**i as usize].0.is_near(center, room, self.substeps);
         found.extend(candidates.filter(is_near));
         found.sort_unstable();
-        found.iter().map(|i| &self.all[*i as usize].1)
+        self.iter_many(found)
     }
 
     /// All of them.
@@ -197,7 +201,7 @@ mod tests {
         let frame = moving(Pose { scale: 2.0, ..default() }, Vec3::Y * 5e-3);
         let is_near = |distance: f32| {
             let ball = Ball { center: Vec3::X * distance, radius: 0.05, travel: 0.01 };
-            let all = Colliders::of_moving(6, vec![(ball, ())]);
+            let all = Colliders::new(6, vec![(ball, ())]);
             let found = all.near(&frame, Some(&reach), &mut Vec::new()).count() == 1;
             let center = frame.now().point_out(reach.center);
             assert_eq!(found, ball.is_near(center, reach.room(&frame, 6), 6));
@@ -270,7 +274,7 @@ mod tests {
                 .filter(|(ball, _)| ball.is_near(center, reach.room(&frame, substeps), substeps))
                 .map(|(_, i)| *i)
                 .collect();
-            let all = Colliders::of_moving(substeps, balls);
+            let all = Colliders::new(substeps, balls);
             let mut scratch = Vec::new();
             let found: Vec<i32> = all.near(&frame, Some(&reach), &mut scratch).copied().collect();
             prop_assert_eq!(found, one_by_one);

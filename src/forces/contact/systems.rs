@@ -5,7 +5,7 @@ use super::{
     LockNeighbours, Obstacles, Openings, StrandContact, coarse,
     lanes::Penalty,
     neighbours::Lookup,
-    reach::{Colliders, HairReach, LOOK_AGAIN},
+    reach::{Ball, Colliders, HairReach, LOOK_AGAIN},
 };
 use crate::{
     base::{
@@ -27,7 +27,7 @@ use crate::{
         shape::{Placed, Shape},
     },
 };
-use bevy::{ecs::query::QueryData, prelude::*};
+use bevy::prelude::*;
 
 /// Strands do not touch each other where more than so many are followers for each one that is not: the
 /// guides of background hair are centimetres apart.
@@ -69,9 +69,14 @@ impl Plugin for ContactPlugin {
             .register_required_components::<Hair, Obstacles>()
             .register_required_components::<Hair, LockNeighbours>()
             .register_required_components::<Hair, HairReach>()
+            .init_resource::<TickColliders>()
             .add_systems(
                 HairTick,
                 (
+                    gather_colliders
+                        .after(HairSystems::Poses)
+                        .before(HairSystems::LevelOfDetail)
+                        .run_if(first_substep),
                     (
                         (find_reach, choose_colliders).chain().run_if(first_substep),
                         gather_obstacles,
@@ -91,19 +96,27 @@ impl Plugin for ContactPlugin {
     }
 }
 
-/// A collider where it is.
-#[derive(QueryData)]
-pub(crate) struct PlacedCollider {
-    collider: &'static HairCollider,
-    stretch: &'static Stretch<HairCollider>,
-    pub(crate) pose: &'static TickPose,
+/// A collider at the start of the tick.
+pub(crate) struct TickCollider {
+    pub(crate) id: Entity,
+    /// With valid values, as it acts where its pose has the mean scale.
+    pub(crate) collider: HairCollider,
+    pub(crate) pose: TickPose,
 }
 
-impl PlacedColliderItem<'_, '_> {
-    /// With valid values, as it acts where its pose has the mean scale.
-    pub(crate) fn collider(&self) -> HairCollider {
-        self.stretch.of(self.collider)
-    }
+/// All colliders of the tick, gathered once.
+pub(crate) type TickColliders = Colliders<TickCollider>;
+
+fn gather_colliders(
+    step: Res<HairStep>,
+    colliders: Query<(Entity, &HairCollider, &Stretch<HairCollider>, &TickPose)>,
+    mut all: ResMut<TickColliders>,
+) {
+    let placed = colliders.iter().map(|(id, collider, stretch, pose)| {
+        let collider = stretch.of(collider);
+        (Ball::around(&collider, pose), TickCollider { id, collider, pose: pose.clone() })
+    });
+    *all = Colliders::new(step.count, placed.collect());
 }
 
 /// A collider in a hair's frame, with the motion of its surface during the substep.
@@ -165,34 +178,30 @@ fn find_reach(
 /// At the start of a tick: which colliders a hair may touch in it; none for a hair without simulated
 /// strands.
 fn choose_colliders(
-    step: Res<HairStep>,
-    colliders: Query<(Entity, PlacedCollider)>,
+    colliders: Res<TickColliders>,
     mut hairs: Query<(&TickPose, &HairReach, &MotionOwner, &mut Obstacles), With<Hair>>,
 ) {
-    let valid: Vec<_> =
-        colliders.iter().map(|(id, placed)| (placed.collider(), placed.pose, id)).collect();
-    let all = Colliders::new(step.count, valid.iter().map(|(c, pose, id)| (c, *pose, *id)));
-    let mut scratch = Vec::new();
     for (pose, reach, owner, mut obstacles) in &mut hairs {
         obstacles.near.clear();
         if owner.moves() {
-            obstacles.near.extend(all.near(pose, Some(reach), &mut scratch));
+            drop(colliders.near(pose, Some(reach), &mut obstacles.near));
         }
     }
 }
 
 fn gather_obstacles(
     steps: EffectiveSubsteps,
-    colliders: Query<PlacedCollider>,
+    all: Res<TickColliders>,
+    poses: Query<&TickPose, With<HairCollider>>,
     mut hairs: Query<(Entity, &TickPose, &mut Obstacles), With<Hair>>,
 ) {
     for (hair, pose, mut obstacles) in &mut hairs {
         // Hair that takes no substep now keeps them: it may be asked what is near.
         if steps.of(hair).is_some() {
             let Obstacles { solids, near } = &mut *obstacles;
-            let near = colliders.iter_many(near);
+            let near = all.iter_many(near).filter_map(|of| Some((of, poses.get(of.id).ok()?)));
             solids.clear();
-            solids.extend(near.map(|placed| seen_from(pose, &placed.collider(), placed.pose)));
+            solids.extend(near.map(|(of, now)| seen_from(pose, &of.collider, now)));
         }
     }
 }

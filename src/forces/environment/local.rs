@@ -7,16 +7,15 @@ use super::{
 };
 use crate::{
     base::{schedule::HairStep, setting::Ranged, stretch::Stretch},
-    hair::strand::{Pose, TickPose},
+    hair::strand::{Carried, Pose, TickPose},
 };
 use bevy::{ecs::system::SystemParam, math::DVec3, prelude::*};
 
 /// A zone in a hair's frame, with valid values.
 pub(super) struct LocalZone {
     zone: WindZone,
-    /// How it moves itself, and turns (m/s, rad/s): its air moves with it.
-    velocity: Vec3,
-    spin: Vec3,
+    /// Its air moves with it.
+    moves: Carried,
     /// Transform from the frame to the zone's, in the zone's metres.
     rotation: Quat,
     origin: Vec3,
@@ -81,19 +80,22 @@ impl Winds<'_, '_> {
     pub(crate) fn seen_from(&self, frame: &TickPose) -> LocalWinds {
         let pose = frame.now();
         let blowers = (self.blowers.iter())
-            .map(|(blower, at)| (blower.clamped(), at.now()))
+            .map(|(blower, moved)| (blower.clamped(), moved))
             .filter(|(blower, _)| blower.strength > 0.0)
-            .map(|(blower, at)| LocalBlower {
-                nozzle: pose.point_in(at.translation),
-                aim: pose.direction_in(at.direction_out(Vec3::NEG_Z)),
-                blower,
+            .map(|(blower, moved)| {
+                let at = moved.now();
+                LocalBlower {
+                    nozzle: pose.point_in(at.translation),
+                    aim: pose.direction_in(at.direction_out(Vec3::NEG_Z)),
+                    blower,
+                    moves: frame.carried_by(moved),
+                }
             });
         let zones = self.zones.iter().map(|(zone, stretch, moved)| {
-            let (at, [velocity, spin]) = (moved.now(), frame.carried_by(moved));
+            let at = moved.now();
             LocalZone {
                 zone: stretch.of(zone),
-                velocity,
-                spin,
+                moves: frame.carried_by(moved),
                 rotation: at.rotation.inverse() * pose.rotation,
                 origin: pose.point_in(at.translation),
                 scale: pose.scale / at.scale,
@@ -157,13 +159,13 @@ impl LocalWinds {
         // The air of shelters that move, by how much each shelters.
         let (mut carried, mut shelters) = (Vec3::ZERO, 0.0);
         let (mut own_motion, mut unsheltered) = (Vec3::ZERO, 0.0);
-        for LocalZone { zone, velocity, spin, rotation, origin, scale } in &self.zones {
+        for LocalZone { zone, moves, rotation, origin, scale } in &self.zones {
             let place = *rotation * (p - *origin) * *scale;
             let share = zone.weight(place);
             if share <= 0.0 {
                 continue;
             }
-            let motion = *velocity + spin.cross(p - *origin);
+            let motion = moves.at(p);
             let shelter = zone.shelter * share;
             open *= 1.0 - shelter;
             (carried, shelters) = (carried + motion * shelter, shelters + shelter);
@@ -176,8 +178,7 @@ impl LocalWinds {
         }
         let carried = carried * ((1.0 - open) / shelters.max(f32::MIN_POSITIVE));
         // A fan in a car moves with the car's air.
-        air.flow = wind * open + flow + carried + (own_motion - carried * unsheltered);
-        air.velocity += air.flow;
+        air.flow_by(wind * open + flow + carried + (own_motion - carried * unsheltered));
     }
 
     /// The air at a point of an `edge`; `wind` is the global wind with gusts there, `zones` whether any
@@ -187,8 +188,7 @@ impl LocalWinds {
         if zones {
             self.add_flow(&mut air, wind, p);
         } else {
-            air.flow = wind;
-            air.velocity += wind;
+            air.flow_by(wind);
         }
         air
     }

@@ -16,11 +16,11 @@ use crate::{
     },
     hair::strand::{
         AddedMass, FollowsHere, Hair, PerHair, ShiftWorld, SimulatedHere, Strand, StrandOf,
-        StrandSleep, TickPose, keep_required, lacks_strands,
+        StrandSleep, TickPose, carried_along, keep_required, lacks_strands,
     },
     keratin::bond::{BondChanges, BondKind},
 };
-use bevy::prelude::*;
+use bevy::{math::Isometry3d, prelude::*};
 
 /// Cost per strand (ns) in still air, and in wind.
 const STILL: usize = 150;
@@ -81,6 +81,7 @@ struct LocalAir {
     retained: f32,
     dt: f32,
     winds: LocalWinds,
+    back: Option<Isometry3d>,
 }
 
 /// A strand that air acts on, with the index of its hair's air.
@@ -91,6 +92,7 @@ type InAir<'a> = (
     &'a mut BondChanges,
     &'a mut BlownAir,
     Option<&'a mut WindReceived>,
+    bool,
 );
 
 /// A strand in the air, as a query reads it.
@@ -125,6 +127,7 @@ fn apply_air(
             retained: bevy::math::ops::exp(-drag.of(hair).rate * dt),
             dt,
             winds: winds.seen_from(frame),
+            back: frame.back(),
         })
     };
     // Wind also dries followers.
@@ -142,12 +145,15 @@ fn apply_air(
             if !sleep.is_asleep()
                 && let Some(air) = airs.index(of.0, || air_of(of.0))
             {
-                items.push((air, strand, added_mass, changes, blown, received));
+                let follows = sleep.is_follower();
+                items.push((air, strand, added_mass, changes, blown, received, follows));
             }
         }
-        in_turn(items, AHEAD, ahead, |(air, strand, added_mass, changes, blown, received)| {
+        in_turn(items, AHEAD, ahead, |(air, strand, added, changes, blown, received, follows)| {
             let air = &airs.values[*air];
-            blow(air, strand, added_mass, changes, blown, received.as_deref_mut());
+            // Inertia has not acted on followers.
+            let back = air.back.as_ref().filter(|_| !*follows);
+            blow((air, back), strand, added, changes, blown, received.as_deref_mut());
         });
         items.clear();
     });
@@ -155,7 +161,7 @@ fn apply_air(
 
 /// Applies a hair's air to one strand in a substep.
 fn blow(
-    air: &LocalAir,
+    (air, back): (&LocalAir, Option<&Isometry3d>),
     strand: &mut Strand,
     added_mass: &AddedMass,
     changes: &mut BondChanges,
@@ -199,8 +205,9 @@ fn blow(
     for (i, velocity) in velocities.iter_mut().enumerate().take(edges + 1).filter(|_| edges > 0) {
         // The tip has no edge of its own: it uses the last one's wind.
         let e = i.min(edges - 1);
-        let edge = positions[e + 1] - positions[e];
-        let mut blown = winds.at(wind, zones, positions[i], edge);
+        let place = |i: usize| carried_along(positions, i, back);
+        let edge = place(e + 1) - place(e);
+        let mut blown = winds.at(wind, zones, place(i), edge);
         // What dries is the air that passes over the hair.
         blown.velocity += winds.headwind - *velocity;
         let wind = blown.acceleration * (air.dt * response(i)) + blown.flow * relaxation;
@@ -232,15 +239,16 @@ mod tests {
         let points: Vec<Vec3> = (0..4).map(|i| Vec3::new(0.0, 0.01 * i as f32, 0.2)).collect();
         let mut strand = Strand::from_polyline(&points).unwrap();
         let blower = Blower { drying: 0.5, ..default() };
-        let blowers = vec![LocalBlower { nozzle: Vec3::ZERO, aim: Vec3::Z, blower }];
+        let blowers =
+            vec![LocalBlower { nozzle: Vec3::ZERO, aim: Vec3::Z, blower, moves: default() }];
         let blown: Vec<Blown> =
             (0..4).map(|i| Blown::at(&blowers, 1.0, points[i], Vec3::Y * 0.01)).collect();
         let winds = LocalWinds { blowers, ..default() };
-        let air = LocalAir { gravity: Vec3::ZERO, retained: 1.0, dt: 0.01, winds };
+        let air = LocalAir { gravity: Vec3::ZERO, retained: 1.0, dt: 0.01, winds, back: None };
         let (mut changes, mut at_nodes) = (BondChanges::default(), BlownAir::default());
         let mut received = WindReceived::default();
         let mut wet = AddedMass { mass: vec![1.0; 4], ..default() };
-        blow(&air, &mut strand, &wet, &mut changes, &mut at_nodes, Some(&mut received));
+        blow((&air, None), &mut strand, &wet, &mut changes, &mut at_nodes, Some(&mut received));
         for (i, blown) in blown.iter().enumerate() {
             let expected = blown.acceleration * (0.01 / 2.0);
             assert!(expected.length() > 1e-4);
@@ -254,7 +262,7 @@ mod tests {
         // On wet hair the wind dries the water at every node.
         wet.moves_bonds = true;
         let mut changes = BondChanges::default();
-        blow(&air, &mut strand, &wet, &mut changes, &mut at_nodes, None);
+        blow((&air, None), &mut strand, &wet, &mut changes, &mut at_nodes, None);
         assert!(at_nodes.nodes.len() == 4 && changes.is_empty());
     }
 }

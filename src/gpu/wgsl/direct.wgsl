@@ -213,9 +213,21 @@ fn eliminate(
     a.d += vec3(inert);
     var b = fma(record.gravity, vec3(mass), force + left.b_next);
     if stage.twice {
-        a = plus_symmetric(a, uniaxial(support_of(i), inert * HOLD, 0.0));
-        let inertial = fma(moving(i).xyz, vec3(stage.ahead), start_of(i));
-        b = fma(inertial - n.xyz, vec3(inert), b);
+        let support = support_of(i);
+        let sticks = select(0.0, 1.0, 0.0 < support.w);
+        let hold = inert * HOLD;
+        a = plus_symmetric(a, uniaxial(support.xyz, hold - hold * sticks, 0.0));
+        a.d += vec3(hold * sticks);
+        let start = start_of(i);
+        var to = fma(moving(i).xyz, vec3(stage.ahead), start) - n.xyz;
+        if support.w != 0.0 {
+            // Friction: where the node sticks as stiff as the support, where it slides a force.
+            let off = taken_along(bearer_of(i), start) - n.xyz;
+            let back = off - support.xyz * dot(off, support.xyz);
+            let way = sqrt(max(dot(back, back), 1e-24));
+            to += back * fma(HOLD, sticks, max(-support.w, 0.0) / way);
+        }
+        b = fma(to, vec3(inert), b);
     }
     let pivot = pivot_of(a, inert * 1e-3, is_held(n.w));
     let near_unscaled = unscaled(pivot, plus_matrix(next, left.between));
@@ -357,12 +369,10 @@ fn untwist() {
     }
 }
 
-// What begins deep inside an obstacle gets out of it with its lengths before the step.
-fn surface() {
-    if record.obstacles == 0u {
-        return;
-    }
-    var deepest = -3.0e38;
+// How deep the strand is in obstacles beyond what its root allows: the most, and the sum (m).
+fn penetration() -> vec2<f32> {
+    var deepest = 0.0;
+    var sum = 0.0;
     var next = 0.0;
     for (var i = 0u; i <= edges; i++) {
         let n = node(i);
@@ -372,28 +382,68 @@ fn surface() {
             continue;
         }
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
-            deepest = max(deepest, depth_in(o, taken_along(o, n.xyz)).w - allowed(o, along));
+            let depth = max(depth_in(o, taken_along(o, n.xyz)).w - allowed(o, along, n.xyz), 0.0);
+            deepest = max(deepest, depth);
+            sum += depth;
         }
     }
-    if !(edge(0u).x * DEEP_SHARE < deepest) {
+    return vec2(deepest, sum);
+}
+
+// The largest strain of an edge.
+fn worst_strain() -> f32 {
+    var worst = 0.0;
+    for (var i = 0u; i < edges; i++) {
+        let l = edge(i).x;
+        worst = max(worst, abs(span(node(i).xyz, node(i + 1u).xyz).w - l) / l);
+    }
+    return worst;
+}
+
+// What begins deep inside an obstacle gets out of it with its lengths before the step. Where it does not, it keeps
+// its lengths and is trapped: in the step it goes no deeper, and what has brought it nearer to the surface stays.
+fn surface() {
+    if record.obstacles == 0u {
+        return;
+    }
+    let deep = edge(0u).x * DEEP_SHARE;
+    let before = penetration();
+    if !(deep < before.x) {
         return;
     }
     sweeps = false;
     near = vec4(0xffffffffu);
     for (var i = 0u; i <= edges; i++) {
-        set_support(i, vec3(0.0));
+        let n = node(i);
+        if !is_held(n.w) {
+            set_start(i, n.xyz);
+        }
+        set_support(i, vec3(0.0), 0.0);
     }
-    for (var round = 0u; round < 2u * edges; round++) {
-        contacts(0.0, 0.0);
+    for (var round = 0u; round < min(LEAVING, 2u * edges); round++) {
+        contacts(GRIP_NONE);
         if !limit_strained(TORN) {
             return;
         }
     }
+    let torn = TORN < worst_strain();
+    _ = clamp_lengths(TORN);
+    let after = penetration();
+    trapped = torn || deep < after.x;
+    if trapped && !(after.y < before.y * NEARER) {
+        for (var i = 0u; i <= edges; i++) {
+            let n = node(i);
+            if !is_held(n.w) {
+                set_node(i, start_of(i), n.w);
+            }
+        }
+    }
 }
 
-fn fall(ahead: f32) {
-    predict_nodes(ahead, record.gravity * ahead);
-    contacts(0.0, 0.0);
+// Nodes on by their velocities. Not by gravity, which elastic forces balance in hair at rest.
+fn advance(ahead: f32) {
+    predict_nodes(ahead);
+    contacts(GRIP_ASSUMED);
 }
 
 // Nodes to the first guess, and what touches. Returns θ.
@@ -402,12 +452,12 @@ fn predict() -> f32 {
     for (var i = 0u; i <= edges; i++) {
         let m = moving(i);
         set_moving(i, m.xyz - gain, m.w);
-        set_support(i, vec3(0.0));
+        set_support(i, vec3(0.0), 0.0);
     }
     choose_near();
     surface();
     var theta = THETA;
-    fall(record.dt * theta);
+    advance(record.dt * theta);
     if touched {
         theta = 1.0;
         for (var i = 0u; i <= edges; i++) {
@@ -416,16 +466,7 @@ fn predict() -> f32 {
                 set_node(i, start_of(i), n.w);
             }
         }
-        fall(record.dt);
-    }
-    let ahead = record.dt * theta;
-    let fallen = record.gravity * (ahead * ahead);
-    for (var i = 0u; i <= edges; i++) {
-        let n = node(i);
-        let support = support_of(i);
-        if !(is_held(n.w) || 0.0 < dot(support, support)) {
-            set_node(i, n.xyz - fallen, n.w);
-        }
+        advance(record.dt);
     }
     return theta;
 }
@@ -469,23 +510,23 @@ fn direct_step(root_from: vec4<f32>) {
     stage.beyond = 1.0 / theta;
     if twice {
         // Which nodes an obstacle bears is not known before: the first step shows.
-        contacts(0.0, 0.0);
+        contacts(GRIP_JUDGED);
         stage.second = true;
         newton_down(stage);
         newton_up(stage);
     }
-    // What obstacles hold has left that share of its depth.
-    contacts(1.0 + HOLD, 1.0);
+    contacts(GRIP_SOLVED);
     for (var done = 0u; done < record.limiter_steps; done++) {
         if !limit_strained(select(TOLERANCE, -1.0, done == 0u)) {
             break;
         }
-        contacts(1.0, 1.0);
-        for (var k = 0u; done + 1u == record.limiter_steps && k < MAX_REPAIRS; k++) {
-            if !clamp_lengths(TORN) {
+        contacts(GRIP_BETWEEN);
+        for (var k = 0u; done + 1u == record.limiter_steps && k <= MAX_REPAIRS; k++) {
+            let is_last = k == MAX_REPAIRS;
+            if !clamp_lengths(select(TORN, MAX_STRAIN, is_last && !trapped)) || is_last {
                 break;
             }
-            contacts(1.0, 1.0);
+            contacts(GRIP_BETWEEN);
         }
     }
     finish(stage);

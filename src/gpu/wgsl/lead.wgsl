@@ -2,7 +2,7 @@
 
 struct Substep {
     // As in strand.wgsl.
-    before: array<vec4<u32>, 17>,
+    before: array<vec4<u32>, 30>,
     treatments: u32,
     first_led: u32,
     led: u32,

@@ -22,11 +22,13 @@ fn span(start: vec3<f32>, to: vec3<f32>) -> vec4<f32> {
 }
 
 // x · W y of a node.
-fn mobility(w: f32, support: vec3<f32>, x: vec3<f32>, y: vec3<f32>, touching: bool) -> f32 {
+fn mobility(w: f32, support: vec4<f32>, x: vec3<f32>, y: vec3<f32>, touching: bool) -> f32 {
+    let free = dot(x, y);
     if !touching {
-        return w * dot(x, y);
+        return w * free;
     }
-    return w * (dot(x, y) - FIRMNESS * dot(x, support) * dot(y, support));
+    let stuck = select(0.0, STUCK, 0.0 < support.w);
+    return w * (free - stuck * free - (FIRMNESS - stuck) * dot(x, support.xyz) * dot(y, support.xyz));
 }
 
 // One damped Newton step on the lengths where one is off by more than the share `tolerance`; whether there was.
@@ -39,7 +41,7 @@ fn limit_strained(tolerance: f32) -> bool {
 fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
     var worst = 0.0;
     var start = node(0u);
-    var start_support = vec3(0.0);
+    var start_support = vec4(0.0);
     if touching {
         start_support = support_of(0u);
     }
@@ -48,16 +50,20 @@ fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
     var coupling = 0.0;
     var rows = Elimination(0.0, 0.0, 0.0);
     for (var i = 0u; i < edges; i++) {
-        var end_support = vec3(0.0);
+        var end_support = vec4(0.0);
         if touching {
             end_support = support_of(i + 1u);
         }
         var diagonal = mobility(start.w, start_support, d.xyz, d.xyz, touching)
             + mobility(end.w, end_support, d.xyz, d.xyz, touching);
         let l = edge(i).x;
-        let off = d.w - l;
+        var off = d.w - l;
         let strain = abs(off) / l;
         worst = max(worst, strain);
+        if guarded {
+            // What its tension stretches it by stays.
+            off -= clamp(moving(i).w / axial_of(l), 0.0, TOLERANCE * l);
+        }
         if guarded && off < 0.0 {
             // Levenberg-Marquardt, where there is something to be folded.
             diagonal = fma(FOLDING * max(strain - TOLERANCE, 0.0), diagonal, diagonal);
@@ -101,12 +107,13 @@ fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
         after = vec4(direction.xyz, lambda);
         if touching {
             let support = support_of(i + 1u);
-            let off = dot(force, support);
+            let off = dot(force, support.xyz);
             if 0.0 < off {
                 // The strand pulls it off the surface: it is let go.
-                set_support(i + 1u, vec3(0.0));
+                set_support(i + 1u, vec3(0.0), 0.0);
             } else {
-                force = fma(support, vec3(-(FIRMNESS * off)), force);
+                let stuck = select(0.0, STUCK, 0.0 < support.w);
+                force = fma(support.xyz, vec3(-((FIRMNESS - stuck) * off)), force * (1.0 - stuck));
             }
         }
         set_node(i + 1u, fma(force, vec3(n.w), n.xyz), n.w);

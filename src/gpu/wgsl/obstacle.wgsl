@@ -7,6 +7,10 @@ var<private> sweeps: bool;
 var<private> touched: bool;
 // Length from the root on that may be in what the root lies in, 0 where it lies in nothing.
 var<private> sunk: f32;
+// Of a strand with such a root its length (m).
+var<private> whole_length: f32;
+// Whether it begins the substep in an obstacle that its length does not let it out of.
+var<private> trapped: bool;
 
 fn is_near(o: u32) -> bool {
     return ((near[o >> 5u] >> (o & 31u)) & 1u) != 0u;
@@ -145,15 +149,25 @@ fn is_beyond(o: u32, p: vec3<f32>, distance: f32) -> bool {
     return reach * reach < dot(off, off) || cap * cap < along * along;
 }
 
-// Where a node gets to, and whether there was anything in its way with which normal.
+// Where a node gets to, and whether there was anything in its way, with which normal, how deep it was inside.
 struct Met {
     place: vec3<f32>,
     meets: bool,
     normal: vec3<f32>,
+    depth: f32,
 }
 
-// How deep a node so far from the root may be in an obstacle that the root lies in.
-fn allowed(o: u32, along: f32) -> f32 {
+// How deep a node that began the substep at `start`, so far from the root, may be in an obstacle: one that the root
+// lies in, or, of a trapped strand, as deep as it was.
+fn allowed(o: u32, along: f32, start: vec3<f32>) -> f32 {
+    let near_root = allowed_near_root(o, along);
+    if !trapped {
+        return near_root;
+    }
+    return max(near_root, depth_in(o, taken_along(o, start)).w);
+}
+
+fn allowed_near_root(o: u32, along: f32) -> f32 {
     if !(along < sunk) {
         return 0.0;
     }
@@ -161,34 +175,40 @@ fn allowed(o: u32, along: f32) -> f32 {
     if is_beyond(o, root, record.skin) {
         return 0.0;
     }
+    let depth = depth_in(o, root).w;
+    // A strand that is too short to get out is not moved by it.
+    if whole_length < depth * ESCAPE_RATIO {
+        return 3.0e38;
+    }
     let deepest = sunk * (1.0 / ESCAPE_RATIO);
-    let share = min(depth_in(o, root).w * DEPTH_RATIO / deepest, 1.0);
+    let share = min(depth * DEPTH_RATIO / deepest, 1.0);
     let way = along * (1.0 / ESCAPE_RATIO);
     return max((deepest - way * way / deepest) * share, 0.0);
 }
 
-// Out of the solid the shortest way where it is deeper than `may_be`, then back along the surface by Coulomb
-// friction.
-fn push_out(o: u32, p: vec3<f32>, start: vec3<f32>, friction: f32, may_be: f32, slides: bool) -> Met {
+// Out of the solid the shortest way where it is deeper than `may_be`: `depth` by that.
+fn push_out(o: u32, p: vec3<f32>, may_be: f32) -> Met {
     // Most nodes that may touch it in the substep do not in this pass.
     if record.obstacle[o].kind == ELLIPSOID && is_beyond(o, p, record.skin) {
-        return Met(p, false, vec3(0.0));
+        return Met(p, false, vec3(0.0), 0.0);
     }
     let found = depth_in(o, p);
-    let normal = found.xyz;
     let depth = found.w - may_be;
     if !(depth > 0.0) {
-        return Met(p, false, vec3(0.0));
+        return Met(p, false, vec3(0.0), 0.0);
     }
-    let out = fma(normal, vec3(depth), p);
-    if !slides {
-        return Met(out, true, normal);
+    return Met(fma(found.xyz, vec3(depth), p), true, found.xyz, depth);
+}
+
+// The same; where the node begins the substep on the surface, it stays there at first.
+fn rest_on(o: u32, p: vec3<f32>, start: vec3<f32>, may_be: f32) -> Met {
+    let found = depth_in(o, start);
+    let depth = found.w - may_be;
+    if !(-TOUCHING < depth) {
+        return push_out(o, p, may_be);
     }
-    let slip = out - taken_along(o, start);
-    let tangential = slip - normal * dot(slip, normal);
-    let length = sqrt(dot(tangential, tangential));
-    let held = min(1.0, friction * depth / max(length, 1e-12));
-    return Met(fma(tangential, vec3(-held), out), true, normal);
+    let other = push_out(o, p, may_be);
+    return Met(fma(found.xyz, vec3(depth), start), true, found.xyz, other.depth);
 }
 
 // Holds a node back that would pass through a thin or fast solid. `fast` says whether it might have.
@@ -238,18 +258,22 @@ fn continuous_collision(o: u32, start: vec3<f32>, p: vec3<f32>) -> Swept {
 fn choose_near() {
     near = vec4(0u);
     sunk = 0.0;
+    trapped = false;
     if record.obstacles == 0u {
         return;
     }
     var pull = 0.0;
     var longest = 0.0;
+    whole_length = 0.0;
     for (var i = 0u; i <= edges; i++) {
         let n = node(i);
         if is_held(n.w) {
             let led = n.xyz - start_of(i);
             pull = max(pull, dot(led, led));
         }
-        longest = max(longest, select(edge(i).x, 0.0, i == edges));
+        let l = select(edge(i).x, 0.0, i == edges);
+        longest = max(longest, l);
+        whole_length += l;
     }
     let margin = sqrt(pull) + longest + record.skin;
     let ahead = FASTER * record.dt;
@@ -281,8 +305,8 @@ fn farther(along: f32, i: u32) -> f32 {
     return along + select(edge(i).x, 0.0, i == edges);
 }
 
-// p* = p + (v + gain) dt, or on what is in the way.
-fn predict_nodes(dt: f32, gain: vec3<f32>) {
+// p* = p + v dt, or on what is in the way.
+fn predict_nodes(dt: f32) {
     sweeps = false;
     var next = 0.0;
     for (var i = 0u; i <= edges; i++) {
@@ -296,62 +320,101 @@ fn predict_nodes(dt: f32, gain: vec3<f32>) {
         var start = n.xyz;
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
             let taken = taken_along(o, start);
-            let out = push_out(o, taken, taken, 0.0, allowed(o, along), false);
+            let out = push_out(o, taken, allowed(o, along, start));
             if out.meets {
                 start += out.place - taken;
             }
         }
         set_start(i, start);
-        var to = fma(moving(i).xyz + gain, vec3(dt), start);
+        var to = fma(moving(i).xyz, vec3(dt), start);
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
             let swept = continuous_collision(o, taken_along(o, start), to);
-            to = select(swept.place, to, allowed(o, along) > 0.0);
+            to = select(swept.place, to, allowed(o, along, start) > 0.0);
             sweeps = sweeps || swept.fast;
         }
         set_node(i, to, n.w);
     }
 }
 
-// Moves nodes out of obstacles and records contacts. Friction takes `resting` of the depth into account where a node
-// rested in the pass before, else `others`.
-fn contacts(resting: f32, others: f32) {
+// Moves nodes out of obstacles and records contacts. Motion along the surface: `Grip` of src/solver/rod/touch.rs.
+fn contacts(grip: u32) {
     touched = false;
     if all(near == vec4(0u)) {
         return;
     }
     var along = 0.0;
     for (var i = 0u; i <= edges; i++) {
-        touch(i, along, resting, others);
+        touch(i, along, grip);
         along = farther(along, i);
     }
 }
 
 // The same of one node, so far from the root.
-fn touch(i: u32, along: f32, resting: f32, others: f32) {
+fn touch(i: u32, along: f32, grip: u32) {
     let n = node(i);
     let held = is_held(n.w);
     let start = start_of(i);
-    let rested = support_of(i);
-    let grip = select(others, resting, dot(rested, rested) > 0.0);
+    let before = support_of(i);
+    let rested = dot(before.xyz, before.xyz) > 0.0;
     var p = n.xyz;
     var rests_on = vec3(0.0);
+    var touches = false;
+    var sticks = false;
+    var drag = 0.0;
+    if grip == GRIP_BETWEEN && rested {
+        rests_on = before.xyz;
+        touches = true;
+    }
+    if grip == GRIP_BETWEEN || grip == GRIP_SOLVED {
+        sticks = 0.0 < before.w;
+        drag = max(-before.w, 0.0);
+    }
+    var deepest = -1.0;
     for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
-        let may_be = allowed(o, along);
+        let may_be = allowed(o, along, start);
+        let taken = taken_along(o, start);
         if sweeps {
-            let swept = continuous_collision(o, taken_along(o, start), p);
+            let swept = continuous_collision(o, taken, p);
             if swept.passes && !(may_be > 0.0) {
                 p = select(swept.place, p, held);
                 rests_on = swept.normal;
-                touched = true;
+                touches = true;
             }
         }
-        let out = push_out(o, p, start, grip * record.obstacle[o].friction, may_be, true);
-        if out.meets {
-            p = select(out.place, p, held);
-            rests_on = out.normal;
-            touched = true;
+        var out: Met;
+        if grip == GRIP_ASSUMED {
+            out = rest_on(o, p, taken, may_be);
+        } else {
+            out = push_out(o, p, may_be);
         }
+        if !out.meets {
+            continue;
+        }
+        // Between two solids it rests on the one that bears more.
+        if grip == GRIP_DEPTH || deepest < out.depth {
+            deepest = out.depth;
+            rests_on = out.normal;
+            set_bearer(i, o);
+        }
+        touches = true;
+        let slip = out.place - taken;
+        let tangential = slip - out.normal * dot(slip, out.normal);
+        let length = sqrt(dot(tangential, tangential));
+        let most = record.obstacle[o].friction * out.depth;
+        var stays = 0.0;
+        if grip == GRIP_ASSUMED {
+            sticks = sticks || -TOUCHING < depth_in(o, taken).w - may_be;
+        } else if grip == GRIP_JUDGED {
+            sticks = sticks || (rested && length < most);
+            drag += select(0.0, most * HOLD, rested);
+        } else if grip == GRIP_SOLVED && sticks {
+            stays = 1.0;
+        } else if grip != GRIP_NONE && !(grip == GRIP_SOLVED && 0.0 < drag) {
+            stays = min(1.0, most / max(length, 1e-12));
+        }
+        p = select(fma(tangential, vec3(-stays), out.place), p, held);
     }
     set_node(i, p, n.w);
-    set_support(i, rests_on);
+    touched = touched || touches;
+    set_support(i, rests_on, select(0.0, select(-drag, 1.0, sticks), touches));
 }

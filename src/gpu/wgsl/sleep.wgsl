@@ -7,7 +7,7 @@ struct Substep {
     carry_turn: vec4<f32>,
     carry_move: vec3<f32>,
     flags: u32,
-    between: array<vec4<u32>, 19>,
+    between: array<vec4<u32>, 32>,
     // How far a node may move (m), an edge turn (rad), for how long (s); the length of the tick (s).
     sleep: vec4<f32>,
     tick: u32,

@@ -31,6 +31,14 @@ struct Blower {
     strength: f32,
     aim: vec3<f32>,
     drying: f32,
+    // How it moves (m/s, rad/s); how far its air keeps its speed (m).
+    velocity: vec3<f32>,
+    core: f32,
+    spin: vec3<f32>,
+    unused: f32,
+    // What it turns about, in metres.
+    center: vec3<f32>,
+    unused_too: f32,
 }
 
 struct Treatment {
@@ -54,6 +62,9 @@ struct Substep {
     // The wind of the place (m/s), share of its velocity that hair keeps against the air.
     wind: vec3<f32>,
     retained: f32,
+    // What of it is no wind of the place (m/s).
+    headwind: vec3<f32>,
+    still: f32,
     influence: vec4<f32>,
     // Δb asked of every joint, by kind, and the share of its rate that is taken off it.
     change: vec4<f32>,
@@ -210,13 +221,23 @@ fn set_start(i: u32, place: vec3<f32>) {
     scratch[slot(i, 6u, 8u)] = vec4(place, 0.0);
 }
 
-// Normal of the obstacle that it rests on, or zero.
-fn support_of(i: u32) -> vec3<f32> {
-    return scratch[slot(i, 7u, 8u)].xyz;
+// Normal of the obstacle that it rests on, or zero; 1 where friction holds it at its start there, or minus the
+// friction that it slides against, as a displacement of a free node in the substep (m).
+fn support_of(i: u32) -> vec4<f32> {
+    return scratch[slot(i, 7u, 8u)];
 }
 
-fn set_support(i: u32, normal: vec3<f32>) {
-    scratch[slot(i, 7u, 8u)] = vec4(normal, 0.0);
+fn set_support(i: u32, normal: vec3<f32>, hold: f32) {
+    scratch[slot(i, 7u, 8u)] = vec4(normal, hold);
+}
+
+// That obstacle.
+fn bearer_of(i: u32) -> u32 {
+    return bitcast<u32>(scratch[slot(i, 6u, 8u)].w);
+}
+
+fn set_bearer(i: u32, o: u32) {
+    scratch[slot(i, 6u, 8u)].w = bitcast<f32>(o);
 }
 
 fn is_held(w: f32) -> bool {

@@ -133,8 +133,8 @@ pub(super) struct Aim<'a> {
     pub(super) along: Option<bool>,
     /// Where it was at the tick's beginning, by its motion in the frame.
     pub(super) begin: &'a mut dyn FnMut() -> Option<Pose>,
-    /// Where it is at the end of the frame; `None` if ticks move it.
-    pub(super) frame_end: &'a mut dyn FnMut() -> Option<Pose>,
+    /// It has jumped: where it is at the tick's beginning and end without what nothing explains, if known.
+    pub(super) jump: &'a mut dyn FnMut() -> Option<[Pose; 2]>,
 }
 
 /// What a tick's motion means for the hair of a pose.
@@ -197,6 +197,9 @@ pub struct Pose {
     /// World units per unit of the hair; negative where the hair is mirrored.
     pub scale: f32,
 }
+
+/// The size of what is scaled to nothing.
+const VANISHED: f32 = 1e-6;
 
 /// About X.
 const HALF_TURN: Quat = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
@@ -286,6 +289,34 @@ impl Pose {
     }
 }
 
+/// The motion of air or water that something carries, in a hair's frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Carried {
+    velocity: Vec3,
+    spin: Vec3,
+    center: Vec3,
+}
+
+impl Carried {
+    /// Without a turn (m/s).
+    #[cfg(test)]
+    pub(crate) fn along(velocity: Vec3) -> Self {
+        Self { velocity, ..Self::default() }
+    }
+
+    /// Its velocity at a place (m/s). Hair that turns along rests in it at any scale: from the hair's
+    /// origin on the turn counts in the hair's measure, up to there in metres.
+    pub(crate) fn at(&self, place: Vec3) -> Vec3 {
+        self.velocity + self.spin.cross(place - self.center)
+    }
+
+    /// For records: velocity, spin and centre.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn parts(&self) -> [Vec3; 3] {
+        [self.velocity, self.spin, self.center]
+    }
+}
+
 impl TickPose {
     /// The pose at the end of this substep.
     pub fn now(&self) -> &Pose {
@@ -329,7 +360,7 @@ impl TickPose {
 
     /// Begins a tick: from where it was to where it is at its end, with what it carries along.
     pub(super) fn aim(&mut self, aim: Aim<'_>) -> Aimed {
-        let Aim { tick, end, was_put, limits, along, begin, frame_end } = aim;
+        let Aim { tick, end, was_put, limits, along, begin, jump } = aim;
         let report = end.is_none() && !self.was_invalid;
         self.was_invalid = end.is_none();
         // Written from outside, for instance by an inspector: start over.
@@ -352,7 +383,7 @@ impl TickPose {
             return Aimed { report, ..default() };
         };
         self.full_size = self.full_size.max(to.size());
-        self.waits = to.size() < limits.hidden_scale * self.full_size;
+        self.waits = to.size() <= VANISHED || to.size() < limits.hidden_scale * self.full_size;
         if self.from.is_none() || self.waits {
             (self.from, self.to, self.now, self.before) = (Some(to), to, to, to);
             return Aimed { report, ..default() };
@@ -366,24 +397,22 @@ impl TickPose {
         let is_explained = kept.explains(&motion, size, &limits);
         // As from a gun: it has moved like this in the tick before.
         let is_launched = !is_explained && seen.explains(&motion, size, &limits);
-        self.motion[1] = motion;
-        let has_jumped = self.jump_frame == tick.frame && tick.frame > 0;
+        // In the frame of a jump what frames have moved is seen without it.
+        if self.jump_frame != tick.frame || tick.frame == 0 {
+            self.motion[1] = motion;
+        }
         let jumps = !was_away
-            && (has_jumped
-                || requested
+            && (requested
                 || to.scale * from.scale < 0.0
                 || along.unwrap_or(!is_explained && !is_launched));
         if jumps {
             // It moves on as before, to where it is now.
-            let frame_end = frame_end();
-            if let Some(end) = frame_end {
-                self.jump_frame = tick.frame;
-                to = kept.carried_back(&end, tick.rest);
-            }
-            if !has_jumped || frame_end.is_none() {
-                from = kept.carried_back(&to, tick.seconds);
-            }
-            motion = kept;
+            self.jump_frame = tick.frame;
+            (from, to) = match jump() {
+                Some([begin, end]) => (Pose { scale: end.scale, ..begin }, end),
+                None => (kept.carried_back(&to, tick.seconds), to),
+            };
+            motion = PoseMotion::between(&from, &to, tick.seconds);
         }
         let came_back = core::mem::take(&mut self.came_back);
         // What has come back is not seen to move before the next tick.
@@ -424,6 +453,17 @@ impl TickPose {
         (own != before && change.is_finite()).then_some(change)
     }
 
+    /// Its pose where it is scaled to nothing, which leaves no direction: that which it had. `None` where
+    /// it has another fault.
+    pub(super) fn vanished(&self, place: &GlobalTransform) -> Option<Pose> {
+        let axes = place.affine().matrix3;
+        let has_vanished =
+            [axes.x_axis, axes.y_axis, axes.z_axis].iter().all(|a| a.length() < 1e-9);
+        let scale = VANISHED.copysign(self.to.scale);
+        let pose = Pose { translation: place.translation(), rotation: self.to.rotation, scale };
+        (has_vanished && pose.is_valid()).then_some(pose)
+    }
+
     /// Whether its hair waits for it to be shown again.
     pub(crate) fn waits(&self) -> bool {
         self.waits
@@ -433,6 +473,11 @@ impl TickPose {
     #[cfg(feature = "gpu")]
     pub(crate) fn settles(&self) -> bool {
         self.settles
+    }
+
+    /// Undoes the motion of the frame on free nodes that it has been applied to.
+    pub(crate) fn back(&self) -> Option<Isometry3d> {
+        self.frame_delta().map(|delta| delta.inverse())
     }
 
     /// The displacement of the entity in this tick (m).
@@ -469,14 +514,15 @@ impl TickPose {
     }
 
     /// How air or water moves here that another pose carries, by the shares of motion that act on
-    /// hair: its velocity at that pose (m/s), and its spin, which times a distance here is one.
-    pub(crate) fn carried_by(&self, other: &Self) -> [Vec3; 2] {
+    /// hair.
+    pub(crate) fn carried_by(&self, other: &Self) -> Carried {
         let PoseMotion { velocity, spin } = other.motion();
-        let spin = self.now.rotation.inverse() * spin[0];
-        [
-            self.now.direction_in(velocity[0] * self.inertia.x),
-            spin * (self.inertia.y * self.now.size()),
-        ]
+        let center = self.now.point_in(other.now.translation);
+        Carried {
+            velocity: self.now.direction_in(velocity[0] * self.inertia.x),
+            spin: self.now.rotation.inverse() * spin[0] * self.inertia.y,
+            center: center * self.now.size(),
+        }
     }
 
     /// What is added here to the velocity of air and water, so that a headwind counts in metres a second
@@ -536,7 +582,7 @@ mod tests {
             limits,
             along: None,
             begin: &mut || end,
-            frame_end: &mut || None,
+            jump: &mut || None,
         })
     }
 
@@ -618,7 +664,7 @@ mod tests {
                         limits,
                         along: None,
                         begin: &mut || at(x),
-                        frame_end: &mut || None,
+                        jump: &mut || None,
                     });
                     jumps.push(aimed.jumps);
                     frame.advance(1.0, false);

@@ -21,6 +21,7 @@ mod strand_sleep;
 mod systems;
 mod teleport;
 
+pub(crate) use frame::Carried;
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
@@ -41,7 +42,7 @@ pub use strand_sleep::{SleepCounts, SleepPose, StrandSleep};
 #[cfg(any(feature = "render", feature = "groom"))]
 pub(crate) use systems::DrawnFrames;
 pub use systems::StrandPlugin;
-pub(crate) use systems::lacks_strands;
+pub(crate) use systems::{carried_along, lacks_strands};
 pub use teleport::ShiftWorld;
 
 use crate::{

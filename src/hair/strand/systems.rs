@@ -216,7 +216,8 @@ fn aim_poses(
                 continue;
             }
             let place = transforms.end(entity);
-            let end = pose_of(place);
+            // One without any size is hidden there.
+            let end = pose_of(place).or_else(|| frame.vanished(place.as_ref()?));
             let displacement = end.map_or(Vec3::ZERO, |end| frame.displacement_to(&end));
             let alike = |with: Vec3| displacement.distance(with) < 0.1 * displacement.length();
             let mut like = displacements.iter().filter(|(with, _)| others && alike(*with));
@@ -230,7 +231,12 @@ fn aim_poses(
                 limits: inertia.of(entity),
                 along,
                 begin: &mut || pose_of(transforms.borrow_mut().begin(entity)),
-                frame_end: &mut || pose_of(transforms.borrow_mut().frame_end(entity)),
+                jump: &mut || {
+                    let mut transforms = transforms.borrow_mut();
+                    transforms.jump(entity);
+                    let begin = pose_of(transforms.begin(entity))?;
+                    Some([begin, pose_of(transforms.end(entity))?])
+                },
             });
             if aimed.report {
                 let message =
@@ -340,6 +346,13 @@ fn apply_frame_inertia(
             }
         },
     );
+}
+
+/// Where air and water find a node: as the head has carried it into this substep. By inertia a free node is
+/// where the substep before left it in the world, [`back`](TickPose::back) undoes that.
+pub(crate) fn carried_along(positions: &[Vec3], node: usize, back: Option<&Isometry3d>) -> Vec3 {
+    let place = positions[node];
+    back.filter(|_| node > 0).map_or(place, |back| *back * place)
 }
 
 fn shift_by(strand: &mut Strand, frame_delta: &Isometry3d) {

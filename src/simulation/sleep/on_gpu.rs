@@ -7,7 +7,7 @@ use super::{
 use crate::{
     base::schedule::{HairStep, HairSystems, HairTick, first_substep},
     forces::{
-        contact::{Colliders, HairReach, PlacedCollider},
+        contact::{HairReach, TickColliders},
         environment::Winds,
     },
     hair::strand::{HairOnGpu, Strands, TickPose},
@@ -37,14 +37,15 @@ impl Disturbance {
 
 /// Part of the feature `gpu`.
 pub(crate) fn watch_on_gpu(app: &mut App) {
-    app.add_systems(HairTick, watch.in_set(HairSystems::Sleep).run_if(first_substep));
+    app.init_resource::<TickColliders>()
+        .add_systems(HairTick, watch.in_set(HairSystems::Sleep).run_if(first_substep));
 }
 
 /// Once a tick.
 fn watch(
     step: Res<HairStep>,
     settings: RestSettings,
-    colliders: Query<PlacedCollider>,
+    colliders: Res<TickColliders>,
     winds: Winds,
     mut hairs: Query<
         (
@@ -58,15 +59,10 @@ fn watch(
         HairOnGpu,
     >,
 ) {
-    if hairs.is_empty() {
-        return;
-    }
-    let valid: Vec<_> = colliders.iter().map(|placed| (placed.collider(), placed.pose)).collect();
-    let all = valid.iter().map(|item| (&item.0, item.1, item));
-    let (colliders, mut scratch) = (Colliders::new(step.count, all), Vec::new());
+    let mut scratch = Vec::new();
     for (hair, frame, mut snapshot, mut disturbance, members, reach) in &mut hairs {
         let near = colliders.near(frame, reach, &mut scratch);
-        let seen = near.map(|(collider, pose)| SeenCollider::of(frame, collider, pose)).collect();
+        let seen = near.map(|placed| SeenCollider::of(frame, placed)).collect();
         let is_regroomed = members.is_some_and(|members| members.is_changed());
         let WakeEvents { sleep, all_wake, solids, .. } = snapshot
             .bypass_change_detection()

@@ -11,7 +11,7 @@ use crate::{
         setting::{self, Settings},
     },
     forces::{
-        contact::{Colliders, HairCollider, HairReach, PlacedCollider, StrandContact, seen_from},
+        contact::{HairReach, StrandContact, TickCollider, TickColliders, seen_from},
         environment::{AirDrag, Gravity, LocalWinds, Winds},
     },
     hair::strand::{
@@ -56,6 +56,7 @@ impl Plugin for SleepPlugin {
         app.register_type::<SleepSnapshot>()
             .register_required_components::<Hair, SleepSnapshot>()
             .register_required_components::<Hair, SleepCounts>()
+            .init_resource::<TickColliders>()
             .add_systems(HairTick, update_sleep.in_set(HairSystems::Sleep).run_if(first_substep));
     }
 }
@@ -212,7 +213,7 @@ pub(super) struct SeenCollider {
 }
 
 impl SeenCollider {
-    pub(super) fn of(frame: &TickPose, collider: &HairCollider, pose: &TickPose) -> Self {
+    pub(super) fn of(frame: &TickPose, TickCollider { collider, pose, .. }: &TickCollider) -> Self {
         let Obstacle { solid, friction, .. } = seen_from(frame, collider, pose);
         let rotation = frame.now().rotation.inverse() * pose.now().rotation;
         Self { solid, friction, rotation }
@@ -242,7 +243,7 @@ struct SleepCandidate<'a> {
 fn update_sleep(
     step: Res<HairStep>,
     settings: RestSettings,
-    colliders: Query<PlacedCollider>,
+    colliders: Res<TickColliders>,
     winds: Winds,
     mut hairs: Query<
         (
@@ -270,9 +271,7 @@ fn update_sleep(
 ) {
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
-    let valid: Vec<_> = colliders.iter().map(|placed| (placed.collider(), placed.pose)).collect();
-    let all = valid.iter().map(|item| (&item.0, item.1, item));
-    let (colliders, mut scratch) = (Colliders::new(step.count, all), Vec::new());
+    let mut scratch = Vec::new();
     for (hair, frame, mut snapshot, sleepers, members, reach) in &mut hairs {
         index_of.insert(hair, wake_events.len());
         let snapshot = snapshot.bypass_change_detection();
@@ -284,7 +283,7 @@ fn update_sleep(
         }
         // A collider that comes within reach counts as new while it is still far from any strand.
         let near = colliders.near(frame, reach, &mut scratch);
-        let seen = near.map(|(collider, pose)| SeenCollider::of(frame, collider, pose)).collect();
+        let seen = near.map(|placed| SeenCollider::of(frame, placed)).collect();
         let is_regroomed = members.is_some_and(|members| members.is_changed());
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);

@@ -5,7 +5,7 @@
 //! The remainders are combined in a second round, so that lanes are full however node counts vary.
 
 use super::{
-    batched::{Batched, Member},
+    batched::{Attempt, Batched, Member},
     gather::{gather_nodes, in_lanes, scatter},
 };
 use crate::{
@@ -21,17 +21,40 @@ use bevy::prelude::*;
 /// Estimated time per node (ns).
 const NODE: usize = 60;
 
-/// One block of strands of equal node count through one substep.
+/// One block of strands of equal node count through one substep. Returns faults of strands that were put back and
+/// not reported before.
 fn solve<T: Batched>(
     lanes: &mut T::Lanes,
     items: &mut [Member<'_, T>],
     params: &T::Params,
 ) -> Vec<HairFault> {
+    let failed = attempt(lanes, items, params, Attempt::First);
+    let mut faults = Vec::new();
+    for lane in (0..items.len()).filter(|lane| failed & (1 << lane) != 0) {
+        let one = &mut items[lane..=lane];
+        let may_repeat = T::may_repeat(params) && one[0].strand.is_finite();
+        if may_repeat && attempt(lanes, one, params, Attempt::Second) == 0 {
+            continue;
+        }
+        let item = &mut items[lane];
+        let fault = item.strand.put_back(item.own.remembered(params));
+        faults.extend(fault.map(|fault| fault.of(item.entity)));
+    }
+    faults
+}
+
+/// Returns a bit for each strand that came out non-finite and is as it was.
+fn attempt<T: Batched>(
+    lanes: &mut T::Lanes,
+    items: &mut [Member<'_, T>],
+    params: &T::Params,
+    attempt: Attempt,
+) -> u32 {
     let sources = in_lanes(items, Member::source);
     let block = T::block(lanes);
     block.resize(sources[0].strand.nodes());
     gather_nodes(block, &sources, T::dt(params));
-    T::step(lanes, &sources, items, params);
+    T::step(lanes, &sources, items, params, attempt);
     scatter(T::block(lanes), items, params)
 }
 
@@ -143,6 +166,7 @@ mod tests {
             _: &[Source<'_>; LANES],
             items: &[Member<'_, Self>],
             params: &u32,
+            _: Attempt,
         ) {
             assert!(items.len() <= LANES && *params == 7);
             assert!(items.iter().all(|item| key(item) == key(&items[0])));

@@ -23,6 +23,14 @@ pub(super) enum Kept {
     Tensions,
 }
 
+/// A strand whose step comes out non-finite is stepped once more.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Attempt {
+    First,
+    /// With what a kernel can leave out to be more robust.
+    Second,
+}
+
 /// A strand taken from its table for one kind of kernel, with the kernel's own columns.
 pub(super) struct Member<'a, K> {
     pub(super) entity: Entity,
@@ -58,6 +66,10 @@ pub(super) trait Batched: Sized + Send {
     fn kept(_params: &Self::Params) -> Kept {
         Kept::Nothing
     }
+    /// Whether a second attempt differs from the first.
+    fn may_repeat(_params: &Self::Params) -> bool {
+        false
+    }
     /// How long the substep is (s).
     fn dt(params: &Self::Params) -> f32;
     /// The block's nodes and edges.
@@ -68,5 +80,6 @@ pub(super) trait Batched: Sized + Send {
         sources: &[Source<'_>; LANES],
         items: &[Member<'_, Self>],
         params: &Self::Params,
+        attempt: Attempt,
     );
 }

@@ -7,12 +7,9 @@
 
 use super::batched::{Batched, Kept, Member, Source};
 use crate::{
-    base::{
-        fault::HairFault,
-        lanes::{
-            LANES, put_numbers, put_vectors, put3, take_numbers, take_quaternions, take_vectors,
-            take3, take4,
-        },
+    base::lanes::{
+        LANES, put_numbers, put_vectors, put3, take_numbers, take_quaternions, take_vectors, take3,
+        take4,
     },
     hair::strand::Strand,
     solver::rod::block::{BlockLanes, NodeLanes},
@@ -37,7 +34,7 @@ pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], d
     for node in &mut block.nodes {
         node.w = [1.0; LANES];
     }
-    block.sunk = [0.0; LANES];
+    (block.sunk, block.trapped) = ([0.0; LANES], [0.0; LANES]);
     block.gravity.clear();
     if from.iter().any(|source| !source.added.in_water.is_empty()) {
         block.gravity.resize(block.nodes.len(), [1.0; LANES]);
@@ -65,14 +62,14 @@ pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], d
     }
 }
 
-/// Writes the lanes back into the strands of `items`. A strand whose new state is not finite is reset to
-/// its previous one; returns faults for those not reported before.
+/// Writes the lanes back into the strands of `items`. Those whose new state is not finite are left as they
+/// are; returns a bit for each of them.
 pub(super) fn scatter<T: Batched>(
     block: &BlockLanes,
     items: &mut [Member<'_, T>],
     params: &T::Params,
-) -> Vec<HairFault> {
-    let mut faults = Vec::new();
+) -> u32 {
+    let mut failed = 0;
     let kept = T::kept(params);
     for (group, four) in items.chunks_mut(4).enumerate() {
         let lanes = 4 * group..4 * group + four.len();
@@ -85,14 +82,13 @@ pub(super) fn scatter<T: Batched>(
                     if block.finite[lane] == 0.0 {
                         scatter_one(block, lane, item.strand, kept);
                     } else {
-                        let fault = item.strand.put_back(item.own.remembered(params));
-                        faults.extend(fault.map(|fault| fault.of(item.entity)));
+                        failed |= 1 << lane;
                     }
                 }
             }
         }
     }
-    faults
+    failed
 }
 
 fn scatter_four(block: &BlockLanes, group: usize, strands: [&mut Strand; 4], kept: Kept) {

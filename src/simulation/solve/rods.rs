@@ -2,7 +2,7 @@
 
 use super::{
     batch::for_each_batch,
-    batched::{Batched, Kept, Member, Source},
+    batched::{Attempt, Batched, Kept, Member, Source},
     gather::in_lanes,
     substeps,
 };
@@ -102,6 +102,10 @@ impl<'a> Batched for RodColumns<'a> {
         }
     }
 
+    fn may_repeat(params: &HairParams<'_>) -> bool {
+        matches!(params.method, Method::Direct { .. })
+    }
+
     fn dt(params: &HairParams<'_>) -> f32 {
         params.dt
     }
@@ -115,6 +119,7 @@ impl<'a> Batched for RodColumns<'a> {
         sources: &[Source<'_>; LANES],
         items: &[Member<'_, Self>],
         params: &HairParams<'_>,
+        attempt: Attempt,
     ) {
         gather_frames(block, sources, items);
         block.near(params.obstacles, params.dt, params.clearance, near);
@@ -123,6 +128,9 @@ impl<'a> Batched for RodColumns<'a> {
                 gather_tensions(block, sources);
                 gather_roots(block, sources, frame_delta.unwrap_or_default());
                 direct::weigh(params.level, block, params.bending_length, params.dt);
+                if attempt == Attempt::Second {
+                    direct::soften(block);
+                }
                 direct::step(params.level, block, direct, near);
             }
             Method::Sweeps(sweeps, settings) => {

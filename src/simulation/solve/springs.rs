@@ -2,7 +2,7 @@
 
 use super::{
     batch::for_each_batch,
-    batched::{Batched, Member, Source},
+    batched::{Attempt, Batched, Member, Source},
 };
 use crate::{
     base::lanes::{LANES, put_quaternions, simd_level},
@@ -77,6 +77,7 @@ impl<'a> Batched for SpringColumns<'a> {
         sources: &[Source<'_>; LANES],
         _: &[Member<'_, Self>],
         HairParams { level, step: params, obstacles }: &HairParams<'_>,
+        _: Attempt,
     ) {
         let strands = &mut lanes.strands;
         for (group, four) in sources.as_chunks::<4>().0.iter().enumerate() {

@@ -34,6 +34,13 @@ pub struct NodeLanes<C = Lane> {
     pub mass: C,
     /// Normal of the obstacle that the node rests on, or zero; written by the contact passes.
     pub rests_on: [C; 3],
+    /// The node's start, moved with the surface of that obstacle (m). Direct method only.
+    pub anchor: [C; 3],
+    /// 1 where friction holds it there, else 0. Direct method only.
+    pub sticks: C,
+    /// Else the friction that it slides against, as a displacement of a free node in the substep (m). Direct
+    /// method only.
+    pub drag: C,
 }
 
 /// One edge of every strand in the block, with the joint at its start.
@@ -95,6 +102,9 @@ pub struct BlockLanes {
     /// Of a strand whose root lies in an obstacle, the length from the root on that may be inside: it is too short
     /// to get out (m). Written by `choose_near`, for the direct method only.
     pub(crate) sunk: Lane,
+    /// 1 for strands that begin the substep in an obstacle that their length does not let them out of, else 0: they
+    /// stay as deep. Written for the direct method only.
+    pub(crate) trapped: Lane,
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
     pub root_from: [Lane; 4],
     pub(super) theta: Lane,
@@ -191,6 +201,12 @@ impl NodeLanes {
     #[inline(always)]
     pub(super) fn set_support<S: Simd>(&mut self, normal: V3<f32x16<S>>) {
         store3(&mut self.rests_on, normal);
+    }
+
+    /// It rests on nothing.
+    pub(super) fn release(&mut self) {
+        self.rests_on = Default::default();
+        (self.sticks, self.drag) = Default::default();
     }
 
     #[inline(always)]

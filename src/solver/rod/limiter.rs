@@ -20,6 +20,16 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 /// strand pressed straight down need not fold within one substep.
 pub(crate) const FIRMNESS: f32 = 0.95;
 
+/// Stiffness with which an obstacle holds a resting node in the direct solve, and along the surface one that sticks, as
+/// a multiple of the node's inertia. Much
+/// stiffer makes fine strands jump off; softer leaves the push-out to the contact pass, which bends
+/// them.
+pub(crate) const HOLD: f64 = 100.0;
+
+/// The share of a sticking node's mobility that friction removes along the surface. Less would let it creep,
+/// because each substep stretches what hangs from it and the limiter shortens that.
+pub(crate) const STUCK: f32 = 0.999;
+
 /// Strain at which the limiter stops.
 pub(crate) const TOLERANCE: f32 = 5e-4;
 
@@ -95,14 +105,19 @@ pub(super) fn limit_strained<S: Simd>(
 /// The fallback where Newton steps on the lengths have failed, as when a root moves farther than
 /// its strand is long: every edge of strain above `torn` is set to its length in its present
 /// direction, root to tip. Edges before a held node are skipped, because both ends are fixed.
-/// Returns whether there were any.
+/// Only in the `lanes` that are not 0. Returns whether there were any.
 #[inline(never)]
-pub(super) fn clamp_lengths<S: Simd>(simd: S, b: &mut BlockLanes, torn: f32) -> bool {
+pub(super) fn clamp_lengths<S: Simd>(
+    simd: S,
+    b: &mut BlockLanes,
+    torn: f32x16<S>,
+    lanes: f32x16<S>,
+) -> bool {
     simd.vectorize(
         #[inline(always)]
         || {
             let [zero, one] = [0.0, 1.0].map(|value| f32x16::splat(simd, value));
-            let [least, most] = [1.0 - torn, 1.0 + torn].map(|share| f32x16::splat(simd, share));
+            let (least, most) = (one - torn, one + torn);
             let mut free = one;
             for (node, row) in b.nodes[1..].iter().zip(&mut b.scratch).rev() {
                 let held = Real::lt(load(simd, &node.w), f32x16::splat(simd, 1e-12));
@@ -115,7 +130,7 @@ pub(super) fn clamp_lengths<S: Simd>(simd: S, b: &mut BlockLanes, torn: f32) -> 
                 let start = b.nodes[i].position(simd);
                 let (direction, length) = span(simd, start, b.nodes[i + 1].position(simd));
                 let off = Real::lt(length, l * least) | Real::lt(l * most, length);
-                let torn = off & Real::lt(zero, load(simd, &b.scratch[i].rhs));
+                let torn = off & Real::lt(zero, load(simd, &b.scratch[i].rhs) * lanes);
                 if torn.to_bitmask() != 0 {
                     any = true;
                     let node = &mut b.nodes[i + 1];
@@ -126,6 +141,19 @@ pub(super) fn clamp_lengths<S: Simd>(simd: S, b: &mut BlockLanes, torn: f32) -> 
             any
         },
     )
+}
+
+/// The largest strain of each lane.
+#[inline(always)]
+pub(super) fn worst_strain<S: Simd>(simd: S, b: &BlockLanes) -> f32x16<S> {
+    let mut worst = f32x16::splat(simd, 0.0);
+    let ends = b.nodes.iter().zip(&b.nodes[1..]);
+    for ((from, to), edge) in ends.zip(&b.edges) {
+        let l = load(simd, &edge.l);
+        let off = span(simd, from.position(simd), to.position(simd)).1 - l;
+        worst = Real::max(worst, Real::max(off, -off) / l);
+    }
+    worst
 }
 
 // Closures that are not inlined would be compiled without the instruction set of their caller, so
@@ -152,7 +180,9 @@ pub(crate) fn mobility<S: Simd, const TOUCHING: bool>(
     let free = x.dot(y);
     if TOUCHING {
         let n = node.support(simd);
-        load(simd, &node.w) * (free - f32x16::splat(simd, FIRMNESS) * x.dot(n) * y.dot(n))
+        let stuck = load(simd, &node.sticks) * f32x16::splat(simd, STUCK);
+        let firm = f32x16::splat(simd, FIRMNESS) - stuck;
+        load(simd, &node.w) * (free - stuck * free - firm * x.dot(n) * y.dot(n))
     } else {
         load(simd, &node.w) * free
     }
@@ -169,8 +199,12 @@ pub(crate) fn along_support<S: Simd>(
     let n = node.support(simd);
     let off = force.dot(n);
     let lifts = Real::lt(zero, off);
+    let stuck = load(simd, &node.sticks);
     node.set_support(V3::select(lifts, V3::new(zero, zero, zero), n));
-    V3::select(lifts, force, n.scale_add(-(firmness * off), force))
+    Real::select(lifts, zero, stuck).store_array(&mut node.sticks);
+    let stuck = stuck * f32x16::splat(simd, STUCK);
+    let along = force.scale(f32x16::splat(simd, 1.0) - stuck);
+    V3::select(lifts, force, n.scale_add(-((firmness - stuck) * off), along))
 }
 
 /// Eliminates from the root to the tip. `TOUCHING` respects obstacles; where there are none it changes
@@ -195,10 +229,14 @@ fn eliminate<S: Simd, const TOUCHING: bool, const GUARDED: bool>(
         let mut diagonal = mobility::<S, TOUCHING>(simd, b, i, d, d)
             + mobility::<S, TOUCHING>(simd, b, i + 1, d, d);
         let l = load(simd, &b.edges[i].l);
-        let off = length - l;
+        let mut off = length - l;
         let strain = Real::max(off, -off) / l;
         worst = Real::max(worst, strain);
         if GUARDED {
+            // What its tension stretches it by stays: else the solve would stretch it again in each substep, and
+            // what hangs would slip over what it lies on.
+            let stretch = load(simd, &b.edges[i].tension) / load(simd, &b.edges[i].axial);
+            off -= Real::min(Real::max(stretch, zero), l * f32x16::splat(simd, TOLERANCE));
             // Levenberg–Marquardt, only for strain above the tolerance: hair within it is at rest.
             let beyond = Real::max(zero, strain - f32x16::splat(simd, TOLERANCE));
             let pressed = Real::select(Real::lt(off, zero), beyond, zero);

@@ -2,7 +2,7 @@
 
 use super::{
     balls::ObstacleBalls,
-    block::BlockLanes,
+    block::{BlockLanes, NodeLanes},
     obstacle::{NearObstacles, Obstacle},
 };
 use crate::base::lanes::{LANES, Real, V3, lanes_in, load, load3, splat3, store3};
@@ -35,7 +35,7 @@ pub(crate) fn choose_near<S: Simd>(
     b.sunk = [0.0; LANES];
     if obstacles.is_empty() {
         // The block may have held other strands before, which rested on something.
-        b.nodes.iter_mut().for_each(|n| n.rests_on = Default::default());
+        b.nodes.iter_mut().for_each(NodeLanes::release);
         return;
     }
     simd.vectorize(
@@ -60,7 +60,7 @@ pub(crate) fn choose_near<S: Simd>(
             ObstacleBalls::collect(&mut b.obstacle_balls, obstacles, whole);
             let each = b.near_obstacles.iter_mut().zip(&mut b.close_obstacles);
             for (n, (near, close)) in b.nodes.iter_mut().zip(each) {
-                n.rests_on = Default::default();
+                n.release();
                 let (p, v) = (load3(simd, &n.p), load3(simd, &n.v));
                 let way = Real::sqrt(v.dot(v)) * ahead;
                 let reach = way + margin;

@@ -274,32 +274,34 @@ impl Solid {
 }
 
 /// How a node is moved out of a solid.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum PushOut {
-    /// Along the normal: for states.
-    Shortest,
-    /// Along the normal, then back along the surface by friction: for steps.
-    WithFriction,
+pub(super) struct Push<S: Simd> {
+    /// Where it gets to.
+    pub(super) to: V3<f32x16<S>>,
+    /// The solid's normal there, or zero in lanes that are not inside.
+    pub(super) normal: V3<f32x16<S>>,
+    /// How deep it was (m), at least 0.
+    pub(super) depth: f32x16<S>,
 }
 
-/// Moves `p` out of the solid where it is deeper inside than `allowed` (m), with Coulomb friction along the
-/// surface relative to the start position `from` moved with the surface.
-///
-/// Returns the new position and the solid's normal there, or zero for lanes that are not inside;
-/// `None` where no lane is.
+impl<S: Simd> Push<S> {
+    /// How far it goes along the surface from `start`, a place that moves with it, and the length of that (m).
+    #[inline(always)]
+    pub(super) fn slip(&self, start: V3<f32x16<S>>) -> (V3<f32x16<S>>, f32x16<S>) {
+        let slip = self.to - start;
+        let along = slip - self.normal.scale(slip.dot(self.normal));
+        (along, Real::sqrt(along.dot(along)))
+    }
+}
+
+/// The shortest way out of the solid for `p` where it is deeper inside than `allowed` (m); `None` where no lane is.
 #[inline(always)]
 pub(super) fn push_out<S: Simd>(
     obstacle: &Obstacle,
     p: V3<f32x16<S>>,
-    from: V3<f32x16<S>>,
-    friction: f32x16<S>,
     clearance: f32,
     allowed: f32x16<S>,
-    way: PushOut,
-) -> Option<(V3<f32x16<S>>, V3<f32x16<S>>)> {
-    let simd = p.x.simd;
-    let zero = f32x16::splat(simd, 0.0);
-    let one = f32x16::splat(simd, 1.0);
+) -> Option<Push<S>> {
+    let zero = f32x16::splat(p.x.simd, 0.0);
     // Most nodes that may touch it in the substep do not in this pass.
     if obstacle.solid.is_clear(p, clearance) {
         return None;
@@ -310,18 +312,9 @@ pub(super) fn push_out<S: Simd>(
     if inside.to_bitmask() == 0 {
         return None;
     }
-    let touching = V3::select(inside, normal, V3::new(zero, zero, zero));
     let depth = Real::max(depth, zero);
-    let out = normal.scale_add(depth, p);
-    if way == PushOut::Shortest {
-        return Some((V3::select(inside, out, p), touching));
-    }
-    let slip = out - obstacle.moved_with(from);
-    let tangential = slip - normal.scale(slip.dot(normal));
-    let length = Real::sqrt(tangential.dot(tangential));
-    // Static where friction suffices, else sliding.
-    let held = Real::min(one, friction * depth / Real::max(length, f32x16::splat(simd, 1e-12)));
-    Some((V3::select(inside, tangential.scale_add(-held, out), p), touching))
+    let to = V3::select(inside, normal.scale_add(depth, p), p);
+    Some(Push { to, normal: V3::select(inside, normal, V3::new(zero, zero, zero)), depth })
 }
 
 /// Continuous collision: stops a node that would pass through a thin or fast solid within the

@@ -13,7 +13,7 @@ use super::{
     sweep::project,
     touch::{contacts, predict_nodes},
 };
-use crate::base::lanes::{LANES, Real, V3, dispatch, load, load3, load4, store3, store4};
+use crate::base::lanes::{LANES, Real, dispatch, load, load3, load4, store3, store4};
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 
 /// Passes that a limiter step takes for strands that touch something.
@@ -43,10 +43,8 @@ pub fn step(level: Level, block: &mut BlockLanes, params: &SweepParams, obstacle
 
 #[inline(always)]
 fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams, obstacles: &[Obstacle]) {
-    let zero = f32x16::splat(simd, 0.0);
-    let none = V3::new(zero, zero, zero);
     b.consider_all_obstacles();
-    predict_nodes(simd, b, f32x16::splat(simd, params.dt), none, params.clearance, obstacles);
+    predict_nodes(simd, b, f32x16::splat(simd, params.dt), params.clearance, obstacles);
     predict_edges(simd, b, params.dt);
     // The projection is chosen outside the loops, so that these have no branches.
     match params.projection {

@@ -2,30 +2,41 @@
 
 use super::{
     block::{BlockLanes, EdgeLanes, NodeLanes},
+    limiter::HOLD,
     near::ESCAPE_RATIO,
-    obstacle::{NearObstacles, Obstacle, PushOut, continuous_collision, push_out},
+    obstacle::{NearObstacles, Obstacle, Push, continuous_collision, push_out},
 };
 use crate::base::lanes::{LANES, Real, V3, load, load3, store3};
-use fearless_simd::{Simd, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 
-/// Computes for each node how deep it may be in an obstacle that its root lies in: nearer to the
-/// root than that is deep, it cannot get out without being torn off.
-pub(super) struct RootPenetration<S: Simd> {
+/// Computes for each node how deep it may be in obstacles: nearer to a root that lies in one than that is deep, it
+/// cannot get out without being torn off; and a strand whose length does not let it out at all stays as deep as it
+/// begins.
+pub(super) struct PenetrationLimits<S: Simd> {
     root: V3<f32x16<S>>,
     sunk: f32x16<S>,
-    any: bool,
+    length: f32x16<S>,
+    trapped: Option<f32x16<S>>,
+    any_sunk: bool,
     along: f32x16<S>,
 }
 
-impl<S: Simd> RootPenetration<S> {
+impl<S: Simd> PenetrationLimits<S> {
     #[inline(always)]
     pub(super) fn new(simd: S, b: &BlockLanes) -> Self {
         let root = b.nodes.first().map(|n| load3(simd, &n.p));
         let zero = f32x16::splat(simd, 0.0);
+        let any_sunk = b.sunk != [0.0; LANES];
+        let mut length = zero;
+        for edge in b.edges.iter().filter(|_| any_sunk) {
+            length += load(simd, &edge.l);
+        }
         Self {
+            length,
             root: root.unwrap_or(V3::new(zero, zero, zero)),
             sunk: load(simd, &b.sunk),
-            any: b.sunk != [0.0; LANES],
+            trapped: (b.trapped != [0.0; LANES]).then(|| load(simd, &b.trapped)),
+            any_sunk,
             along: zero,
         }
     }
@@ -33,7 +44,7 @@ impl<S: Simd> RootPenetration<S> {
     /// Of node `i`, to be asked node after node; `None` where it may be nowhere inside.
     #[inline(always)]
     pub(super) fn at(&mut self, edges: &[EdgeLanes], i: usize) -> Option<AllowedPenetration<S>> {
-        if !self.any {
+        if !self.any_sunk && self.trapped.is_none() {
             return None;
         }
         let simd = self.sunk.simd;
@@ -45,30 +56,58 @@ impl<S: Simd> RootPenetration<S> {
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
         let deepest = self.sunk * f32x16::splat(simd, 1.0 / ESCAPE_RATIO);
         let lanes = Real::select(is_sunk, one, zero);
-        let sunk = AllowedPenetration { root: self.root, deepest, along, lanes };
-        is_sunk.any_true().then_some(sunk)
+        let near_root = is_sunk.any_true();
+        let (root, trapped) = (self.root, self.trapped);
+        let length = self.length;
+        let limit = AllowedPenetration { root, length, near_root, deepest, along, lanes, trapped };
+        (near_root || trapped.is_some()).then_some(limit)
     }
 }
+
+/// Height above an obstacle up to which a node begins the substep on it (m): push-out leaves them there.
+pub(crate) const TOUCHING: f32 = 1e-5;
 
 /// Where a root lies in several obstacles, as in balls that together are a head, it has to get out of the deepest:
 /// those in which it is at least half as deep allow as much.
 pub(crate) const DEPTH_RATIO: f32 = 2.0;
 
-/// A node near a sunk root.
+/// How deep a node may be.
 pub(super) struct AllowedPenetration<S: Simd> {
     root: V3<f32x16<S>>,
+    /// The strand's length.
+    length: f32x16<S>,
+    /// Whether any lane's node is near a sunk root.
+    near_root: bool,
     /// The root's depth in what it is deepest in.
     deepest: f32x16<S>,
     along: f32x16<S>,
     lanes: f32x16<S>,
+    /// 1 in lanes whose strand is trapped.
+    trapped: Option<f32x16<S>>,
 }
 
 impl<S: Simd> AllowedPenetration<S> {
-    /// How deep it may be in this obstacle.
+    /// How deep it may be in this obstacle, if it began the substep at `from`.
     #[inline(always)]
-    pub(super) fn allowed(&self, obstacle: &Obstacle, clearance: f32) -> f32x16<S> {
+    pub(super) fn allowed(
+        &self,
+        obstacle: &Obstacle,
+        clearance: f32,
+        from: V3<f32x16<S>>,
+    ) -> f32x16<S> {
+        let near_root = self.near_root(obstacle, clearance);
+        let Some(trapped) = self.trapped else { return near_root };
+        let start = obstacle.moved_with(from);
+        if obstacle.solid.is_clear(start, clearance) {
+            return near_root;
+        }
+        Real::max(near_root, trapped * obstacle.solid.depth(start, clearance).1)
+    }
+
+    #[inline(always)]
+    fn near_root(&self, obstacle: &Obstacle, clearance: f32) -> f32x16<S> {
         let zero = f32x16::splat(self.along.simd, 0.0);
-        if obstacle.solid.is_clear(self.root, clearance) {
+        if !self.near_root || obstacle.solid.is_clear(self.root, clearance) {
             return zero;
         }
         let depth = obstacle.solid.depth(self.root, clearance).1;
@@ -77,17 +116,19 @@ impl<S: Simd> AllowedPenetration<S> {
         // Less and less, at last by as much as it gets out straight on: so it may first go along another one.
         let along = self.along * f32x16::splat(zero.simd, 1.0 / ESCAPE_RATIO);
         let left = self.lanes * (self.deepest - along * along / self.deepest) * share;
-        Real::select(Real::lt(zero, left), left, zero)
+        let left = Real::select(Real::lt(zero, left), left, zero);
+        // A strand that is too short to get out is not moved by it: that would only crumple it.
+        let never = Real::lt(self.length, depth * f32x16::splat(zero.simd, ESCAPE_RATIO));
+        Real::select(never, f32x16::splat(zero.simd, f32::INFINITY), left)
     }
 }
 
-/// Predicts p* = p + v dt; v already contains the forces, apart from `gain`.
+/// Predicts p* = p + v dt; v already contains the forces.
 #[inline(never)]
 pub(crate) fn predict_nodes<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     dt: f32x16<S>,
-    gain: V3<f32x16<S>>,
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
@@ -96,9 +137,9 @@ pub(crate) fn predict_nodes<S: Simd>(
         || {
             let zero = f32x16::splat(simd, 0.0);
             b.has_fast_nodes = false;
-            let mut sinking = RootPenetration::new(simd, b);
+            let mut limits = PenetrationLimits::new(simd, b);
             for (i, (n, near)) in b.nodes.iter_mut().zip(&b.near_obstacles).enumerate() {
-                let sunk = sinking.at(&b.edges, i);
+                let limit = limits.at(&b.edges, i);
                 let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
                 let p = load3(simd, &n.p);
                 // Nodes that begin inside an obstacle are placed on its surface before the step, so
@@ -106,23 +147,22 @@ pub(crate) fn predict_nodes<S: Simd>(
                 let mut from = p;
                 for o in near.of(obstacles) {
                     let start = o.moved_with(from);
-                    let allowed = sunk.as_ref().map_or(zero, |s| s.allowed(o, clearance));
-                    if let Some((out, _)) =
-                        push_out(o, start, start, zero, clearance, allowed, PushOut::Shortest)
-                    {
-                        from = V3::select(held, from, from + (out - start));
+                    let allowed = limit.as_ref().map_or(zero, |l| l.allowed(o, clearance, from));
+                    if let Some(push) = push_out(o, start, clearance, allowed) {
+                        from = V3::select(held, from, from + (push.to - start));
                     }
                 }
                 let v = load3(simd, &n.v);
                 // Held nodes have their start in `from` and their target in `p`.
                 let start_position = V3::select(held, load3(simd, &n.from), from);
                 store3(&mut n.from, start_position);
-                let mut to = (v + gain).scale_add(dt, from);
+                let mut to = v.scale_add(dt, from);
                 for o in near.of(obstacles) {
                     if let Some((before, _)) =
                         continuous_collision(o, o.moved_with(from), to, clearance)
                     {
-                        let allowed = sunk.as_ref().map_or(zero, |s| s.allowed(o, clearance));
+                        let allowed =
+                            limit.as_ref().map_or(zero, |l| l.allowed(o, clearance, from));
                         let stays = held | Real::lt(zero, allowed);
                         (to, b.has_fast_nodes) = (V3::select(stays, to, before), true);
                     }
@@ -133,6 +173,24 @@ pub(crate) fn predict_nodes<S: Simd>(
     );
 }
 
+/// How a contact pass treats motion along the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Grip {
+    /// No friction.
+    None,
+    /// Coulomb friction, whose normal force is the depth that the node is pushed out by.
+    Depth,
+    /// The same between steps on the lengths: what has touched goes on to, though it may not be inside now.
+    Between,
+    /// Before the first Newton step: nodes stick where they are.
+    Assumed,
+    /// After the first Newton step, which leaves a depth as the support's force: nodes for which friction does not
+    /// suffice slide.
+    Judged,
+    /// After the last Newton step: nodes that stick are where they were.
+    Solved,
+}
+
 /// Pushes nodes out of obstacles, with friction, and records what touches.
 #[inline(always)]
 pub(crate) fn contacts<S: Simd>(
@@ -141,31 +199,17 @@ pub(crate) fn contacts<S: Simd>(
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
-    contacts_with(simd, b, clearance, obstacles, FrictionShare::WHOLE, f32x16::splat(simd, 1.0));
+    contacts_with(simd, b, clearance, obstacles, Grip::Depth, f32x16::splat(simd, 1.0));
 }
 
-/// The share of a node's penetration depth that counts as normal force for friction: for nodes that
-/// rested on an obstacle in the previous pass, and for others.
-#[derive(Clone, Copy)]
-pub(super) struct FrictionShare {
-    pub(super) resting: f32,
-    pub(super) others: f32,
-}
-
-impl FrictionShare {
-    pub(super) const WHOLE: Self = Self { resting: 1.0, others: 1.0 };
-    /// No friction.
-    pub(super) const NONE: Self = Self { resting: 0.0, others: 0.0 };
-}
-
-/// [`contacts`] with another normal force for friction, in the lanes that are not 0.
+/// [`contacts`] with another friction, in the lanes that are not 0.
 #[inline(never)]
 pub(super) fn contacts_with<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     clearance: f32,
     obstacles: &[Obstacle],
-    grip: FrictionShare,
+    grip: Grip,
     lanes: f32x16<S>,
 ) {
     simd.vectorize(
@@ -177,9 +221,9 @@ pub(super) fn contacts_with<S: Simd>(
             }
             let mut touched = f32x16::splat(simd, 0.0);
             let near = b.near_obstacles.iter().zip(&b.close_obstacles);
-            let mut sinking = RootPenetration::new(simd, b);
+            let mut limits = PenetrationLimits::new(simd, b);
             for (i, (n, (near, close))) in b.nodes.iter_mut().zip(near).enumerate() {
-                let sunk = sinking.at(&b.edges, i);
+                let limit = limits.at(&b.edges, i);
                 if *near == NearObstacles::NONE {
                     continue;
                 }
@@ -189,11 +233,11 @@ pub(super) fn contacts_with<S: Simd>(
                     false => close.at(load3(simd, &n.p), *near),
                 };
                 if near == NearObstacles::NONE {
-                    n.rests_on = Default::default();
+                    n.release();
                     continue;
                 }
                 let fast = b.has_fast_nodes;
-                let touches = touch(simd, n, near, fast, clearance, obstacles, grip, lanes, sunk);
+                let touches = touch(simd, n, near, fast, clearance, obstacles, grip, lanes, limit);
                 touched = Real::max(touched, touches);
             }
             touched.store_array(&mut b.touched);
@@ -211,26 +255,27 @@ pub(super) fn touch<S: Simd>(
     has_fast_nodes: bool,
     clearance: f32,
     obstacles: &[Obstacle],
-    grip: FrictionShare,
+    grip: Grip,
     lanes: f32x16<S>,
-    sunk: Option<AllowedPenetration<S>>,
+    limit: Option<AllowedPenetration<S>>,
 ) -> f32x16<S> {
     simd.vectorize(
         #[inline(always)]
         || {
             let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-            let mut touched = zero;
+            let none = V3::new(zero, zero, zero);
             let held = Real::lt(load(simd, &n.w) * lanes, f32x16::splat(simd, 1e-12));
             let from = load3(simd, &n.from);
             let rested = n.support(simd);
-            let grip = Real::select(
-                Real::lt(zero, rested.dot(rested)),
-                f32x16::splat(simd, grip.resting),
-                f32x16::splat(simd, grip.others),
-            );
-            let (mut p, mut rests_on) = (load3(simd, &n.p), V3::new(zero, zero, zero));
+            let is_rested = Real::lt(zero, rested.dot(rested));
+            let (mut p, mut rests_on, mut touched) = (load3(simd, &n.p), none, zero);
+            if grip == Grip::Between {
+                (rests_on, touched) = (rested, Real::select(is_rested, one, zero));
+            }
+            let mut friction = Friction::of(simd, n, grip);
+            let mut deepest = f32x16::splat(simd, -1.0);
             for o in near.of(obstacles) {
-                let allowed = sunk.as_ref().map_or(zero, |s| s.allowed(o, clearance));
+                let allowed = limit.as_ref().map_or(zero, |l| l.allowed(o, clearance, from));
                 // Tunnelling has to be stopped in every pass: the shortest way out may be on the wrong
                 // side.
                 if has_fast_nodes
@@ -244,19 +289,131 @@ pub(super) fn touch<S: Simd>(
                     rests_on = V3::select(stopped, normal, rests_on);
                     touched = Real::select(stopped, one, touched);
                 }
-                let friction = grip * f32x16::splat(simd, o.friction);
-                if let Some((out, normal)) =
-                    push_out(o, p, from, friction, clearance, allowed, PushOut::WithFriction)
-                {
+                let push = match grip {
+                    Grip::Assumed => rest_on(o, p, from, clearance, allowed),
+                    _ => push_out(o, p, clearance, allowed).map(|push| (push, zero)),
+                };
+                if let Some((push, stays)) = push {
+                    let pushed = Real::lt(zero, push.normal.dot(push.normal) * lanes);
+                    // Between two solids it rests on the one that bears more.
+                    let bears = pushed & Real::lt(deepest, push.depth);
+                    let bears = if grip == Grip::Depth { pushed } else { bears };
+                    let out = friction.after(&push, o, from, is_rested, pushed, bears, stays);
                     p = V3::select(held, p, out);
-                    let pushed = Real::lt(zero, normal.dot(normal) * lanes);
-                    rests_on = V3::select(pushed, normal, rests_on);
+                    deepest = Real::select(bears, push.depth, deepest);
+                    rests_on = V3::select(bears, push.normal, rests_on);
                     touched = Real::select(pushed, one, touched);
                 }
             }
             store3(&mut n.p, p);
             store3(&mut n.rests_on, rests_on);
+            friction.put(n, touched);
             touched
         },
     )
+}
+
+/// [`push_out`], and 1 in lanes where `from` begins the substep on the surface: there the node stays at first, because
+/// contact that holds against elastic forces is not found by falling alone and would come and go.
+#[inline(always)]
+fn rest_on<S: Simd>(
+    o: &Obstacle,
+    p: V3<f32x16<S>>,
+    from: V3<f32x16<S>>,
+    clearance: f32,
+    allowed: f32x16<S>,
+) -> Option<(Push<S>, f32x16<S>)> {
+    let zero = f32x16::splat(p.x.simd, 0.0);
+    let start = o.moved_with(from);
+    if o.solid.is_clear(start, clearance + TOUCHING) {
+        return push_out(o, p, clearance, allowed).map(|push| (push, zero));
+    }
+    let (normal, depth) = o.solid.depth(start, clearance);
+    let depth = depth - allowed;
+    let stays = Real::lt(f32x16::splat(p.x.simd, -TOUCHING), depth);
+    let other = push_out(o, p, clearance, allowed);
+    if stays.to_bitmask() == 0 {
+        return other.map(|push| (push, zero));
+    }
+    let none = V3::new(zero, zero, zero);
+    let other = other.unwrap_or(Push { to: p, normal: none, depth: zero });
+    let to = V3::select(stays, normal.scale_add(depth, start), other.to);
+    let normal = V3::select(stays, normal, other.normal);
+    let one = f32x16::splat(p.x.simd, 1.0);
+    Some((Push { to, normal, depth: other.depth }, Real::select(stays, one, zero)))
+}
+
+/// Friction on a node in a pass.
+struct Friction<S: Simd> {
+    kind: Grip,
+    sticks: f32x16<S>,
+    drag: f32x16<S>,
+    anchor: V3<f32x16<S>>,
+}
+
+impl<S: Simd> Friction<S> {
+    #[inline(always)]
+    fn of(simd: S, n: &NodeLanes, kind: Grip) -> Self {
+        let (sticks, drag) = match kind {
+            Grip::Solved | Grip::Between => (load(simd, &n.sticks), load(simd, &n.drag)),
+            _ => (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0)),
+        };
+        Self { kind, sticks, drag, anchor: load3(simd, &n.anchor) }
+    }
+
+    /// Where a node gets to that is pushed out of `o`. `rested`: before this pass; `bears`: more than others so far;
+    /// `stays`: 1 where it begins the substep on the surface.
+    #[inline(always)]
+    fn after(
+        &mut self,
+        push: &Push<S>,
+        o: &Obstacle,
+        from: V3<f32x16<S>>,
+        rested: mask32x16<S>,
+        pushed: mask32x16<S>,
+        bears: mask32x16<S>,
+        stays: f32x16<S>,
+    ) -> V3<f32x16<S>> {
+        if self.kind == Grip::None {
+            return push.to;
+        }
+        let lit = |value: f32| f32x16::splat(from.x.simd, value);
+        let (zero, one) = (lit(0.0), lit(1.0));
+        let start = o.moved_with(from);
+        if self.kind == Grip::Assumed {
+            self.sticks = Real::select(pushed, Real::max(self.sticks, stays), self.sticks);
+            self.anchor = V3::select(bears, start, self.anchor);
+            return push.to;
+        }
+        let (slip, length) = push.slip(start);
+        let most = lit(o.friction) * push.depth;
+        if self.kind == Grip::Judged {
+            let holds = pushed & rested & Real::lt(length, most);
+            self.sticks = Real::select(holds, one, self.sticks);
+            let slows = Real::select(pushed & rested, most * lit(HOLD as f32), zero);
+            self.drag += slows;
+            self.anchor = V3::select(bears, start, self.anchor);
+            return push.to;
+        }
+        // Static where friction suffices, else sliding.
+        let held = Real::min(one, most / Real::max(length, lit(1e-12)));
+        let held = match self.kind {
+            // Sliding was slowed in the solve.
+            Grip::Solved => {
+                Real::max(self.sticks, Real::select(Real::lt(zero, self.drag), zero, held))
+            }
+            _ => held,
+        };
+        V3::select(pushed, slip.scale_add(-held, push.to), push.to)
+    }
+
+    /// Leaves in the node what holds it, unless it touches nothing.
+    #[inline(always)]
+    fn put(self, n: &mut NodeLanes, touched: f32x16<S>) {
+        let sticks = self.sticks * touched;
+        sticks.store_array(&mut n.sticks);
+        let one = f32x16::splat(touched.simd, 1.0);
+        (self.drag * touched * (one - sticks)).store_array(&mut n.drag);
+        store3(&mut n.anchor, self.anchor);
+    }
 }

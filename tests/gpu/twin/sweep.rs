@@ -1,6 +1,6 @@
 //! The paper's projections in a substep of one strand in f64, written for itself.
 
-use super::{FIRMNESS, GRAVITY, Twin, along, dq, push_out, solve, swept};
+use super::{FIRMNESS, GRAVITY, Grip, Twin, along, dq, push_out, solve, swept};
 use bevy::math::{DQuat, DVec3, DVec4};
 use bevy_keratin::{StretchProjection, gpu::SubstepRecord, keratin::bond::model::cuticle_factor};
 
@@ -44,11 +44,11 @@ impl Twin {
         }
         for _ in 0..r.limiter_steps {
             self.limit_all();
-            self.contacts(r, 1.0, 1.0);
+            self.contacts(r, Grip::Depth);
             for _ in 0..2 {
                 if self.touched {
                     self.limit_all();
-                    self.contacts(r, 1.0, 1.0);
+                    self.contacts(r, Grip::Depth);
                 }
             }
         }
@@ -117,7 +117,7 @@ impl Twin {
             let mut from = self.p[i];
             for o in &r.obstacles {
                 let start = along(o, from);
-                if let Some((out, _)) = push_out(o, start, start, 0.0, (r.skin, 0.0), false) {
+                if let Some((out, ..)) = push_out(o, start, (r.skin, 0.0)) {
                     from += out - start;
                 }
             }
@@ -162,9 +162,9 @@ impl Twin {
             self.p[i + 1] -= gamma * (w2 * l);
             let e = pure(DVec3::Z).conjugate();
             self.q[i] = plus(q, times(pure(turning) * q * e, twice * wq[i] * l * l));
-            self.touch(r, i, 1.0, 1.0);
+            self.touch(r, i, Grip::Depth);
         }
-        self.touch(r, edges, 1.0, 1.0);
+        self.touch(r, edges, Grip::Depth);
     }
 
     /// One Newton step on all lengths.

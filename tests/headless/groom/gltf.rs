@@ -101,6 +101,7 @@ fn references_to_nothing_are_errors_with_their_path() {
             r#""componentType":5123,"count":5,"type":"VEC3""#,
             "accessors[0]",
         ),
+        (r#""count":5,"type":"VEC3""#, r#""count":5,"type":"VEC3","sparse":{}"#, "accessors[0]"),
         (r#""version":"2.0""#, r#""version":"1.0""#, "asset.version"),
     ] {
         let json = good.replacen(what, instead, 1);
@@ -119,6 +120,26 @@ fn references_to_nothing_are_errors_with_their_path() {
     bin[122..124].copy_from_slice(&5u16.to_le_bytes());
     let error = gltf::read(&glb(&good, &bin)).unwrap_err().to_string();
     assert!(error.starts_with("accessors[3], byte 122 of its buffer: found 5"), "{error}");
+}
+
+/// By KHR_mesh_quantization, and sparse: what to do is said, and nothing is read wrong.
+#[test]
+fn positions_that_are_not_floats_are_refused_with_advice() {
+    let good = gltf_json(&primitive(1, true), "");
+    let float = r#""componentType":5126,"count":5,"type":"VEC3""#;
+    assert!(gltf::read(&glb(&good, &gltf_bytes())).is_ok());
+    for (instead, found, advice) in [
+        (float.replace("5126", "5120"), "I8", "export as floats"),
+        (float.replace("5126", "5121"), "U8", "export as floats"),
+        (float.replace("5126", r#"5122,"normalized":true"#), "I16", "export as floats"),
+        (float.replace("5126", "5123"), "U16", "export as floats"),
+        (format!(r#"{float},"sparse":{{"count":1}}"#), "no data of its own", "sparse accessors"),
+    ] {
+        let json = good.replacen(float, &instead, 1);
+        let error = gltf::read(&glb(&json, &gltf_bytes())).unwrap_err().to_string();
+        assert!(error.starts_with("accessors[0]"), "{error}");
+        assert!(error.contains(found) && error.contains(advice), "{error}");
+    }
 }
 
 #[test]

@@ -188,3 +188,28 @@ fn strands_that_push_each_other_keep_their_length() {
         assert!(peak < 0.05, "peak strain {peak}");
     }
 }
+
+/// Friction holds against the tension of what hangs on, and what it holds does not creep.
+#[test]
+fn hair_across_a_ball_stays_where_it_lies() {
+    for hertz in [60.0, 144.0] {
+        let [(tip, moved), (fallen, _)] = [0.5, 0.0].map(|friction| {
+            let mut lab = Lab::new(hertz, 6);
+            lab.app.insert_resource(HairDefault(HairSolver::default()));
+            let ball = HairCollider::sphere(0.06).unwrap().with_friction(friction).unwrap();
+            lab.app.world_mut().spawn((ball, Transform::from_xyz(0.0, -0.062, 0.01)));
+            let points = line(0.24, 24, Vec3::X).into_iter().map(|p| p - 0.08 * Vec3::X);
+            let strand = lab.strand(0.02, &points.collect::<Vec<_>>());
+            lab.settle(6.0);
+            let before = lab.get(strand).positions().to_vec();
+            lab.run(20.0);
+            let after = lab.get(strand);
+            assert!(after.peak_strain() < 1e-3, "strain {}", after.peak_strain());
+            let moved = after.positions().iter().zip(&before).map(|(p, q)| p.distance(*q));
+            (lab.tip(strand), moved.fold(0.0, f32::max))
+        });
+        println!("{hertz} Hz: tip at {tip}, moved {moved} m; without friction at {fallen}");
+        assert!(tip.x > 0.0 && moved < 1e-4, "{hertz} Hz: at {tip}, crept {moved} m");
+        assert!(fallen.x < -0.06, "{hertz} Hz: without friction it lies there too, at {fallen}");
+    }
+}

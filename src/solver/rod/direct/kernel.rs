@@ -15,6 +15,7 @@ use crate::{
     base::lanes::{Quaternion, Real, V3},
     solver::rod::{
         block::{EdgeLanes, NodeLanes},
+        limiter::HOLD,
         tridiagonal::{Elimination, back},
     },
 };
@@ -43,11 +44,6 @@ pub(crate) struct NewtonStage<R> {
     /// 1 in lanes that take two Newton steps, else 0: others start from their inertial positions.
     pub twice: R,
 }
-
-/// Stiffness with which an obstacle holds a resting node, as a multiple of the node's inertia. Much
-/// stiffer makes fine strands jump off; softer leaves the push-out to the contact pass, which bends
-/// them.
-pub(crate) const HOLD: f64 = 100.0;
 
 /// State of an edge in the elimination pass.
 #[derive(Clone, Copy)]
@@ -265,9 +261,17 @@ fn eliminate<W: Width, const TWICE: bool>(
     let mut b = stage.gravity.scale_add(weight, force + left.b_next);
     if TWICE {
         let n = w.get3(&node.rests_on);
-        a = a.plus_outer(n, inert * w.lit(HOLD));
+        let (sticks, drag) = (w.get(&node.sticks), w.get(&node.drag));
+        let hold = inert * w.lit(HOLD);
+        a = a.plus_outer(n, hold - hold * sticks).plus_diagonal(hold * sticks);
+        let p = w.get3(&node.p);
         let inertial = w.get3(&node.v).scale_add(stage.ahead, w.get3(&node.from));
-        let pulled = (inertial - w.get3(&node.p)).scale_add(inert, b);
+        // Friction: where the node sticks as stiff as the support, where it slides a force.
+        let back = w.get3(&node.anchor) - p;
+        let back = n.scale_add(-back.dot(n), back);
+        let way = back.dot(back).max(w.lit(1e-24)).sqrt();
+        let friction = back.scale(w.lit(HOLD).mul_add(sticks, drag / way));
+        let pulled = (inertial - p + friction).scale_add(inert, b);
         b = V3::select(w.lit(0.0).lt(stage.twice), pulled, b);
     }
     let next = next.plus(left.between);

@@ -15,17 +15,19 @@
 //! | `width` | the same lines for lanes and for one strand of f64 |
 //!
 //! One substep of length h:
-//! 1. Strands deep inside an obstacle are moved out of it. Predict: nodes move to x + θh v and out
-//!    of obstacles.
+//! 1. Strands deep inside an obstacle are moved out of it, as far as their lengths let them. Predict: nodes
+//!    move to x + θh v and out of obstacles; those that begin on one rest there.
 //! 2. One Newton step for the positions at θh: inertia, stretching, bending, the change of the
-//!    twisting moment as edges rotate, support by obstacles. Strands that touch or are about to
-//!    rotate by more than 0.03 rad take a second.
+//!    twisting moment as edges rotate, support by obstacles, friction. Strands that touch or are about to
+//!    rotate by more than 0.03 rad take a second: after the first, nodes that are pulled off an obstacle are
+//!    free, and those for which Coulomb's friction does not suffice slide against it.
 //! 3. Extrapolate to the end of the substep, x + (x_θ − x)/θ. θ = ½ would damp nothing, stiff modes
 //!    included; θ = 1, implicit Euler, would damp all swings like a Kelvin–Voigt time of h. θ =
 //!    0.65 damps like 0.3 h, which is subtracted from the material's damping, and stiff motion
 //!    decays to 7/13 in each substep. Strands that touch take θ = 1.
-//! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 %, damped so that
-//!    compressed strands fold no farther than necessary and taut ones do not zigzag.
+//! 4. Contacts, and Newton steps on the lengths until they are right within 0.05 % and but for what
+//!    tension stretches, damped so that compressed strands fold no farther than necessary and taut ones do
+//!    not zigzag. Nodes that stick are not moved along the surface.
 //! 5. Frames are transported to the new directions; velocities; twist by a tridiagonal solve.
 //!
 //! # Why not BDF2
@@ -91,18 +93,17 @@ mod width;
 
 use super::{
     block::{BlockLanes, pulled},
-    limiter::{TOLERANCE, clamp_lengths, limit_strained},
+    limiter::{TOLERANCE, clamp_lengths, limit_strained, worst_strain},
     near::choose_near,
     obstacle::Obstacle,
     stiffness::REFERENCE_GRAVITY,
-    touch::{FrictionShare, RootPenetration, contacts, contacts_with, predict_nodes},
+    touch::{Grip, PenetrationLimits, contacts_with, predict_nodes},
 };
 use crate::base::lanes::{
     LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,
 };
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use glam::Vec3;
-pub(crate) use kernel::HOLD;
 use kernel::NewtonStage;
 use width::{Half, Whole, Width};
 
@@ -139,8 +140,19 @@ pub(crate) const TORN: f32 = 0.01;
 /// follows.
 pub(crate) const MAX_REPAIRS: u32 = 4;
 
+/// Strain above which an edge gets its length back though its node ends in an obstacle. Less may remain for some
+/// substeps where a strand that is hit end-on has yet to fold; not of a trapped one, which cannot.
+pub(crate) const MAX_STRAIN: f32 = 0.5;
+
 /// Depth in an obstacle, in edge lengths, above which a strand is moved out of it before the step.
 pub(crate) const DEEP_SHARE: f32 = 0.25;
+
+/// Rounds of push-out and lengths in a substep for strands that are moved out of an obstacle: longer ones take
+/// several substeps.
+pub(crate) const LEAVING: usize = 16;
+
+/// The share of its penetration that may be left for a trapped strand to be moved.
+pub(crate) const NEARER: f32 = 0.98;
 
 /// Largest L_g, in lengths of the strand. Such hair sags by less than a thousandth of its length; f32
 /// is not precise enough for much stiffer hair.
@@ -154,6 +166,9 @@ pub(crate) const BUCKLING_TWIST: f32 = 8.99;
 /// 1/n² of that for n segments. f32 is not precise enough for more. Only segments much shorter than 1 mm
 /// reach it.
 pub(crate) const MAX_STIFFNESS: f32 = 2.5e10;
+
+/// The share of their stiffness that strands have in a step that is repeated.
+const SOFTENING: f32 = 0.01;
 
 /// Steps the block by one substep, with the machine's best instruction set.
 #[doc(hidden)]
@@ -179,30 +194,37 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
         newton::<S, true>(simd, b, params, 2);
         // The first step shows which nodes rest on an obstacle.
         let twice = load(simd, &b.twice);
-        contacts_with(simd, b, params.clearance, obstacles, FrictionShare::NONE, twice);
+        contacts_with(simd, b, params.clearance, obstacles, Grip::Judged, twice);
         newton::<S, true>(simd, b, params, 1);
     }
-    // The solve leaves only this fraction of the depth at supported nodes, which friction makes up
-    // for.
-    let grip = FrictionShare { resting: 1.0 + HOLD as f32, others: 1.0 };
     let all = f32x16::splat(simd, 1.0);
-    contacts_with(simd, b, params.clearance, obstacles, grip, all);
+    contacts_with(simd, b, params.clearance, obstacles, Grip::Solved, all);
     for pass in 0..params.limiter_steps {
         if !limit_strained(simd, b, if pass == 0 { -1.0 } else { TOLERANCE }, all) {
             break;
         }
-        contacts(simd, b, params.clearance, obstacles);
+        contacts_with(simd, b, params.clearance, obstacles, Grip::Between, all);
         if pass + 1 == params.limiter_steps {
-            // Restored lengths may end in an obstacle, and the push-out may tear them again.
-            for _ in 0..MAX_REPAIRS {
-                if !clamp_lengths(simd, b, TORN) {
+            // Restored lengths may end in an obstacle, and the push-out may tear them again. Lengths have the
+            // last word: what is then inside begins the next substep there, see `leave_obstacles`.
+            for repair in 0..=MAX_REPAIRS {
+                let is_last = repair == MAX_REPAIRS;
+                let torn = if is_last { max_strain(simd, b) } else { f32x16::splat(simd, TORN) };
+                if !clamp_lengths(simd, b, torn, all) || is_last {
                     break;
                 }
-                contacts(simd, b, params.clearance, obstacles);
+                contacts_with(simd, b, params.clearance, obstacles, Grip::Between, all);
             }
         }
     }
     finish(simd, b, params);
+}
+
+/// Strain above which lengths have the last word.
+#[inline(always)]
+fn max_strain<S: Simd>(simd: S, b: &BlockLanes) -> f32x16<S> {
+    let [zero, torn, most] = [0.0, TORN, MAX_STRAIN].map(|value| f32x16::splat(simd, value));
+    Real::select(Real::lt(zero, load(simd, &b.trapped)), torn, most)
 }
 
 /// The kernel's widths: all lanes at once where registers hold sixteen, else two halves, because
@@ -317,7 +339,7 @@ fn predict<S: Simd>(
     }
     choose_near(simd, b, params.dt, params.clearance, obstacles);
     leave_obstacles(simd, b, params, obstacles);
-    fall(simd, b, dt * theta, gravity, params.clearance, obstacles);
+    advance(simd, b, dt * theta, params.clearance, obstacles);
     if b.touched != [0.0; LANES] {
         let touched = Real::lt(zero, load(simd, &b.touched));
         theta = Real::select(touched, one, theta);
@@ -326,16 +348,7 @@ fn predict<S: Simd>(
             let back = V3::select(held, load3(simd, &n.p), load3(simd, &n.from));
             store3(&mut n.p, back);
         }
-        fall(simd, b, dt * theta, gravity, params.clearance, obstacles);
-    }
-    let ahead = dt * theta;
-    let fallen = gravity.scale(ahead * ahead);
-    for n in &mut b.nodes {
-        let (held, p) = (Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12)), load3(simd, &n.p));
-        let support = load3(simd, &n.rests_on);
-        let rests = Real::lt(zero, support.dot(support));
-        // The initial guess excludes gravity, which would rotate settled hair in each step.
-        store3(&mut n.p, V3::select(held | rests, p, p - fallen));
+        advance(simd, b, dt * theta, params.clearance, obstacles);
     }
     theta
 }
@@ -360,6 +373,10 @@ fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
 /// Moves strands that begin deep inside an obstacle, as when spawned there, out of it before the step and
 /// restores their lengths, so that they gain no velocity. Shallow penetration, as from contact with
 /// other hair, is left to the step.
+///
+/// Those that do not get out, as between two solids around their root, keep their length and are
+/// [`trapped`](BlockLanes::trapped): in the step they go no deeper, and what has brought them nearer to the
+/// surface stays.
 #[inline(never)]
 fn leave_obstacles<S: Simd>(
     simd: S,
@@ -370,69 +387,95 @@ fn leave_obstacles<S: Simd>(
     simd.vectorize(
         #[inline(always)]
         || {
-            let mut deepest = f32x16::splat(simd, f32::NEG_INFINITY);
-            let mut sinking = RootPenetration::new(simd, b);
-            for (i, (n, near)) in b.nodes.iter().zip(&b.near_obstacles).enumerate() {
-                let sunk = sinking.at(&b.edges, i);
-                for o in near.of(obstacles) {
-                    let start = o.moved_with(load3(simd, &n.p));
-                    // Most nodes are outside of most.
-                    if o.solid.is_clear(start, params.clearance) {
-                        continue;
-                    }
-                    let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
-                    let (_, mut depth) = o.solid.depth(start, params.clearance);
-                    if let Some(sunk) = &sunk {
-                        depth -= sunk.allowed(o, params.clearance);
-                    }
-                    deepest = Real::select(held, deepest, Real::max(deepest, depth));
-                }
-            }
-            let deep =
-                Real::lt(load(simd, &b.edges[0].l) * f32x16::splat(simd, DEEP_SHARE), deepest);
-            if deep.to_bitmask() == 0 {
+            let zero = f32x16::splat(simd, 0.0);
+            let (deep, before) = penetration(simd, b, params.clearance, obstacles);
+            if Real::lt(zero, deep).to_bitmask() == 0 {
                 return;
             }
-            let deep = Real::select(deep, f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
             b.has_fast_nodes = false;
             // Infinitely deep: no way out.
             b.consider_all_obstacles();
             for n in &mut b.nodes {
-                n.rests_on = Default::default();
+                n.release();
+                let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+                let start = V3::select(held, load3(simd, &n.from), load3(simd, &n.p));
+                store3(&mut n.from, start);
             }
             // A correction travels about one edge per round.
-            for _ in 0..2 * b.edges.len() {
-                contacts_with(simd, b, params.clearance, obstacles, FrictionShare::NONE, deep);
+            for _ in 0..LEAVING.min(2 * b.edges.len()) {
+                contacts_with(simd, b, params.clearance, obstacles, Grip::None, deep);
                 if !limit_strained(simd, b, TORN, deep) {
                     return;
                 }
+            }
+            let torn = Real::lt(f32x16::splat(simd, TORN), worst_strain(simd, b));
+            clamp_lengths(simd, b, f32x16::splat(simd, TORN), deep);
+            let (left, after) = penetration(simd, b, params.clearance, obstacles);
+            let trapped = Real::select(torn, deep, left * deep);
+            trapped.store_array(&mut b.trapped);
+            // Else it would go to and fro.
+            let nearer = Real::lt(after, before * f32x16::splat(simd, NEARER));
+            let back = Real::lt(zero, Real::select(nearer, zero, trapped));
+            for n in &mut b.nodes {
+                let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+                let p = load3(simd, &n.p);
+                n.set_position(V3::select(back & !held, load3(simd, &n.from), p));
             }
         },
     );
 }
 
-/// Moves nodes ballistically for `ahead` (s), stopped by obstacles.
+/// How deep strands are inside obstacles, beyond what their roots allow: 1 in lanes with a node that is deep, else
+/// 0, and the sum over all nodes and obstacles (m).
+#[inline(always)]
+fn penetration<S: Simd>(
+    simd: S,
+    b: &BlockLanes,
+    clearance: f32,
+    obstacles: &[Obstacle],
+) -> (f32x16<S>, f32x16<S>) {
+    let [zero, one] = [0.0, 1.0].map(|value| f32x16::splat(simd, value));
+    let (mut deepest, mut sum) = (zero, zero);
+    let mut limits = PenetrationLimits::new(simd, b);
+    for (i, (n, near)) in b.nodes.iter().zip(&b.near_obstacles).enumerate() {
+        let limit = limits.at(&b.edges, i);
+        for o in near.of(obstacles) {
+            let p = load3(simd, &n.p);
+            let start = o.moved_with(p);
+            // Most nodes are outside of most.
+            if o.solid.is_clear(start, clearance) {
+                continue;
+            }
+            let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
+            let (_, mut depth) = o.solid.depth(start, clearance);
+            if let Some(limit) = &limit {
+                depth -= limit.allowed(o, clearance, p);
+            }
+            let depth = Real::select(held, zero, Real::max(depth, zero));
+            deepest = Real::max(deepest, depth);
+            sum += depth;
+        }
+    }
+    let limit = load(simd, &b.edges[0].l) * f32x16::splat(simd, DEEP_SHARE);
+    (Real::select(Real::lt(limit, deepest), one, zero), sum)
+}
+
+/// Moves nodes on by their velocities for `ahead` (s), stopped by obstacles. Not by gravity, which elastic forces
+/// balance in hair at rest: it would be rotated in each step, and pushed against what it only hangs near.
 #[inline(never)]
-fn fall<S: Simd>(
+fn advance<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     ahead: f32x16<S>,
-    gravity: V3<f32x16<S>>,
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            predict_nodes(simd, b, ahead, gravity.scale(ahead), clearance, obstacles);
-            contacts_with(
-                simd,
-                b,
-                clearance,
-                obstacles,
-                FrictionShare::NONE,
-                f32x16::splat(simd, 1.0),
-            );
+            predict_nodes(simd, b, ahead, clearance, obstacles);
+            let all = f32x16::splat(simd, 1.0);
+            contacts_with(simd, b, clearance, obstacles, Grip::Assumed, all);
         },
     );
 }
@@ -443,6 +486,18 @@ fn fall<S: Simd>(
 #[doc(hidden)]
 pub fn weigh(level: Level, block: &mut BlockLanes, bending_length: f32, dt: f32) {
     dispatch!(level, simd => weigh_simd(simd, block, bending_length, dt));
+}
+
+/// For strands of which a step came out non-finite, as of some that are folded between solids: makes them softer by
+/// [`SOFTENING`] and leaves out what lets pivots vanish or exceed f32, their twisting moments in the Hessian, and the
+/// tension of the last step, which may have blown up.
+pub(crate) fn soften(block: &mut BlockLanes) {
+    block.max_twist = [0.0; LANES];
+    for edge in &mut block.edges {
+        edge.tension = [0.0; LANES];
+        edge.k = edge.k.map(|k| k * SOFTENING);
+        edge.axial = edge.axial.map(|axial| axial * SOFTENING);
+    }
 }
 
 #[inline(always)]

@@ -186,6 +186,9 @@ impl Strands<Lane> {
             w: wide(&n.w),
             mass: wide(&n.mass),
             rests_on: n.rests_on.each_ref().map(wide),
+            sticks: wide(&n.sticks),
+            drag: wide(&n.drag),
+            anchor: n.anchor.each_ref().map(wide),
         };
         let edge = |e: &EdgeLanes| EdgeLanes {
             q: e.q.each_ref().map(wide),
@@ -248,8 +251,8 @@ impl Strands<f64> {
         let frame = |q: [f64; 4]| (turn * DQuat::from_array(q)).to_array();
         let mut turned = self.clone();
         for n in &mut turned.nodes {
-            let NodeLanes { p, from, v, rests_on, .. } = n;
-            [p, from, v, rests_on].into_iter().for_each(|v3| *v3 = vector(*v3));
+            let NodeLanes { p, from, v, rests_on, anchor, .. } = n;
+            [p, from, v, rests_on, anchor].into_iter().for_each(|v3| *v3 = vector(*v3));
         }
         turned.edges.iter_mut().for_each(|e| e.q = frame(e.q));
         let Self { root, root_from, root_between, .. } = &mut turned;

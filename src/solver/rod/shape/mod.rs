@@ -379,7 +379,7 @@ mod tests {
         *,
     };
     use crate::base::lanes::{Lane, load, load3};
-    use crate::solver::rod::obstacle::{Obstacle, PushOut, Solid, continuous_collision, push_out};
+    use crate::solver::rod::obstacle::{Obstacle, Solid, continuous_collision, push_out};
     use fearless_simd::{Level, dispatch};
     use glam::{Quat, UVec3};
     use proptest::prelude::*;
@@ -481,9 +481,9 @@ mod tests {
             let (out, beyond) = dispatch!(Level::new(), simd => {
                 let p = crate::base::lanes::splat3(simd, at);
                 let lit = |value: f32| f32x16::splat(simd, value);
-                let out = push_out(&obstacle, p, p, lit(0.0), 0.0, lit(0.0), PushOut::Shortest).map(|(out, _)| {
+                let out = push_out(&obstacle, p, 0.0, lit(0.0)).map(|push| {
                     let lane = |x: f32x16<_>| x[5];
-                    Vec3::new(lane(out.x), lane(out.y), lane(out.z))
+                    Vec3::new(lane(push.to.x), lane(push.to.y), lane(push.to.z))
                 });
                 // As far as it is, less a little, it is not beyond; far away it is.
                 let depth = solid.depth(p, 0.0).1;
