@@ -326,12 +326,14 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
         }
         let (e, blown) = (i.min(edges - 1), blown.get(i)?);
         let along = (positions[e + 1] - positions[e]).normalize_or_zero();
-        Some(Exposure {
+        let exposed = Exposure {
             speed: blown.velocity.cross(along).length(),
             warmth: blown.warmth(air.celsius),
             blown: blown.drying * dt,
             submerged: false,
-        })
+        };
+        // A strand may have become non-finite in this substep: it is put back at its end.
+        exposed.is_finite().then_some(exposed)
     };
     let moved = if *is_busy {
         moisture.exchange(positions, lengths, conditions, exposure, &mut wet.loss);

@@ -60,6 +60,7 @@ mod groom;
 mod hairdo;
 mod lod;
 mod morph;
+mod pairs;
 mod papers_scenes;
 mod plant;
 mod reflection;

@@ -143,7 +143,7 @@ fn hair_is_swapped_when_the_new_is_ready_and_gone_with_its_component() {
     assert_eq!(reported(&mut app).worn, []);
     let colliders =
         |app: &mut App| app.world_mut().query::<&HairCollider>().iter(app.world()).count();
-    assert!((8..60).contains(&colliders(&mut app)), "{} colliders", colliders(&mut app));
+    assert!((8..80).contains(&colliders(&mut app)), "{} colliders", colliders(&mut app));
     app.world_mut().entity_mut(root).remove::<WearHair>();
     app.update();
     assert_eq!((wearers(&mut app), colliders(&mut app)), (0, 0));

@@ -210,3 +210,20 @@ fn nonsense_is_reported_and_breaks_nothing_and_the_water_is_not_needed() {
     assert!(faults(&mut app2).len() >= 3);
     assert!(WindZone::new(f32::NAN, Vec3::ZERO).is_err());
 }
+
+#[test]
+fn a_blower_out_of_the_worlds_measure_breaks_nothing() {
+    let mut app = test_app(60.0);
+    let (hair, e) = one_strand(&mut app, 0.2, 8, Vec3::NEG_Y);
+    app.world_mut().write_message(SoakHair { target: hair, wetness: 1.2 });
+    // In the measure of the hair its place is infinite, and its wind would be NaN.
+    app.world_mut().get_mut::<Transform>(hair).unwrap().scale = Vec3::splat(0.1);
+    app.world_mut().spawn((Blower::default(), Transform::from_xyz(1e38, 1e38, 3e38)));
+    for _ in 0..60 {
+        app.update();
+        let ledger = app.world().resource::<WaterLedger>();
+        assert!(ledger.held.is_finite() && ledger.error() < 1e-9, "{ledger:?}");
+    }
+    assert!(strand(&app, e).is_finite());
+    assert!(faults(&mut app).is_empty());
+}

@@ -11,6 +11,10 @@ use crate::{
 };
 use bevy::{ecs::system::SystemParam, math::DVec3, prelude::*};
 
+/// Blowers farther away do not act: single precision no longer tells where a strand is in their jets,
+/// and farther still its squares overflow (hair's measure).
+const FARTHEST: f32 = 1e9;
+
 /// A zone in a hair's frame, with valid values.
 pub(super) struct LocalZone {
     zone: WindZone,
@@ -90,7 +94,8 @@ impl Winds<'_, '_> {
                     blower,
                     moves: frame.carried_by(moved),
                 }
-            });
+            })
+            .filter(|seen| seen.nozzle.length() < FARTHEST);
         let zones = self.zones.iter().map(|(zone, stretch, moved)| {
             let at = moved.now();
             LocalZone {

@@ -25,6 +25,12 @@ pub(crate) struct Exposure {
     pub submerged: bool,
 }
 
+impl Exposure {
+    pub fn is_finite(&self) -> bool {
+        self.speed.is_finite() && self.warmth.is_finite() && self.blown.is_finite()
+    }
+}
+
 /// Conditions of a substep for the water of all strands of a hair, computed once.
 #[derive(Clone, Debug)]
 pub(crate) struct WaterConditions<'a> {
