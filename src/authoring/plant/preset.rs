@@ -276,8 +276,8 @@ impl HairPreset {
         // Strands of fur are too short to cross each other.
         let contact = match self {
             Self::Fur => StrandContact { strength: 0.0, ..default() },
-            Self::Locs => StrandContact { radius: 3e-3, ..default() },
-            _ => StrandContact::default(),
+            Self::Locs => StrandContact { radius: 3e-3, mutual: true, ..default() },
+            _ => StrandContact { mutual: true, ..default() },
         };
         let fibres = HUMAN_DENSITY / self.planting(&Scalp::default()).density;
         PresetSettings {

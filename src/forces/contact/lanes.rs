@@ -14,9 +14,15 @@ use glam::Vec3;
 /// How many edges are tested side by side.
 pub(super) const WIDTH: usize = 8;
 
-/// A node with data of the edge that starts at it: x, y, z (m), and the parameter along the edge above
-/// which a foot belongs to the next edge: 1, ∞ for the last edge, −∞ for the tip, which starts none.
+/// A node with the kind of the edge that starts at it: x, y, z (m), and [`INNER`] or [`LAST`], negative for
+/// the strand's first edge, or 0 for the tip, which starts none.
 pub(super) type NodeRow = [f32; 4];
+
+/// An edge that is followed by another.
+const INNER: f32 = 1.0;
+
+/// The edge at the tip.
+const LAST: f32 = 2.0;
 
 /// A node's input to bridges of water: its velocity (m/s), and the cross-section of the film on it (m²).
 pub type WetRow = [f32; 4];
@@ -24,12 +30,12 @@ pub type WetRow = [f32; 4];
 /// The nodes of one strand as rows.
 pub(super) fn rows(nodes: &[Vec3]) -> impl Iterator<Item = NodeRow> {
     nodes.iter().enumerate().map(|(i, p)| {
-        let end = match nodes.len() - i {
-            1 => f32::NEG_INFINITY,
-            2 => f32::INFINITY,
-            _ => 1.0,
+        let kind = match nodes.len() - i {
+            1 => 0.0,
+            2 => LAST,
+            _ => INNER,
         };
-        [p.x, p.y, p.z, end]
+        [p.x, p.y, p.z, if i == 0 { -kind } else { kind }]
     })
 }
 
@@ -114,32 +120,67 @@ impl Pieces {
     }
 }
 
-/// A strength of equation 18 with its reach 2r, and whether edges that push are pushed back.
+/// A strength of equation 18 with its reach 2r, whether edges that push are pushed back, and for how long the
+/// pushes act (s).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Penalty {
     pub reach: f32,
     pub strength: f32,
     pub mutual: bool,
+    pub dt: f32,
 }
 
-/// What the edge that pushes a node gets back.
+/// A node that an edge pushes and that pushes it back.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reaction {
-    /// Its start node.
+pub(super) struct Touch {
+    pub node: u32,
+    /// The edge's start node.
     pub edge: u32,
-    /// Where it was touched (0…1).
+    /// Where the edge is touched (0…1).
     pub at: f32,
+    /// The edge's part: less than 1 where the next edge shares in it.
+    pub part: f32,
     /// The acceleration of the node (m/s²).
     pub push: Vec3,
 }
 
-/// The offset from the nearest point of each edge to one node, the parameter along the edge (0…1), and
-/// the mask of edges that the foot belongs to.
+/// The offset from the nearest point of each edge to one node, the parameter along the edge (0…1, and
+/// as it is without an end), the edge's squared length and kind.
 struct Off<S: Simd> {
     off: V3<f32x8<S>>,
     squared: f32x8<S>,
     at: f32x8<S>,
-    own: mask32x8<S>,
+    share: f32x8<S>,
+    length_squared: f32x8<S>,
+    kind: f32x8<S>,
+}
+
+impl<S: Simd> Off<S> {
+    /// Which edges the foot belongs to: one on a shared node belongs to the second edge.
+    #[inline(always)]
+    fn own(&self, simd: S) -> mask32x8<S> {
+        let lit = |value: f32| f32x8::splat(simd, value);
+        let kind = Real::max(self.kind, -self.kind);
+        let is_last = Real::lt(lit(INNER), kind);
+        is_last | (Real::lt(self.share, lit(1.0)) & Real::lt(lit(0.0), kind))
+    }
+
+    /// The part of each edge in what acts on the node: around a shared node both edges share it, so that nothing
+    /// changes at once while the foot goes over from one to the other.
+    #[inline(always)]
+    fn parts(&self, simd: S, reach: f32) -> f32x8<S> {
+        let lit = |value: f32| f32x8::splat(simd, value);
+        let (zero, one) = (lit(0.0), lit(1.0));
+        let per_reach = Real::sqrt(self.length_squared) * lit(0.5 / reach);
+        let part = |inside: f32x8<S>| {
+            let part = lit(0.5) + inside * per_reach;
+            Real::min(Real::max(part, zero), one)
+        };
+        let rise = Real::select(Real::lt(self.kind, zero), one, part(self.share));
+        let kind = Real::max(self.kind, -self.kind);
+        let fall = Real::select(Real::lt(lit(INNER), kind), one, part(one - self.share));
+        Real::select(Real::lt(zero, kind), rise * fall, zero)
+    }
 }
 
 /// Four rows, by column.
@@ -173,7 +214,7 @@ fn eight<S: Simd>(
 #[inline(always)]
 fn off<S: Simd>(simd: S, rows: &[NodeRow], edges: &[u32; WIDTH], p: V3<f32x8<S>>) -> Off<S> {
     let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
-    let (start, end_share) = eight(simd, rows, edges, 0);
+    let (start, kind) = eight(simd, rows, edges, 0);
     let (end, _) = eight(simd, rows, edges, 1);
     let along = end - start;
     let from_start = p - start;
@@ -181,7 +222,7 @@ fn off<S: Simd>(simd: S, rows: &[NodeRow], edges: &[u32; WIDTH], p: V3<f32x8<S>>
     let share = from_start.dot(along) / length_squared;
     let clamped = Real::min(Real::max(share, zero), one);
     let off = from_start - along.scale(clamped);
-    Off { off, squared: off.dot(off), at: clamped, own: Real::lt(share, end_share) }
+    Off { off, squared: off.dot(off), at: clamped, share, length_squared, kind }
 }
 
 #[inline(always)]
@@ -211,52 +252,61 @@ pub(super) fn near<S: Simd>(
 
 /// Equation 18 of groups of eight edges on a node, lane by lane: see [`total`](Self::total).
 pub(super) struct PenaltySum<S: Simd> {
+    node: u32,
     p: V3<f32x8<S>>,
     sum: V3<f32x8<S>>,
     penalty: Penalty,
 }
 
 impl<S: Simd> PenaltySum<S> {
-    /// A zero sum for a node at `p`.
+    /// A zero sum for a node.
     #[inline(always)]
-    pub fn new(simd: S, p: Vec3, penalty: Penalty) -> Self {
-        Self { p: splat(simd, p), sum: splat(simd, Vec3::ZERO), penalty }
+    pub fn new(simd: S, rows: &[NodeRow], node: usize, penalty: Penalty) -> Self {
+        let p = splat(simd, place(&rows[node]));
+        Self { node: node as u32, p, sum: splat(simd, Vec3::ZERO), penalty }
     }
 
     /// Adds the contributions of eight edges. NaN fails every comparison and adds nothing. Where contact is
-    /// mutual, what they get back is appended to `reactions`.
+    /// mutual, they are appended to `touches` instead.
     #[inline(always)]
     pub fn add(
         &mut self,
         simd: S,
         rows: &[NodeRow],
         edges: &[u32; WIDTH],
-        reactions: &mut Vec<Reaction>,
+        touches: &mut Vec<Touch>,
     ) {
-        let Off { off, squared, at, own } = off(simd, rows, edges, self.p);
+        let seen = off(simd, rows, edges, self.p);
+        let Off { off, squared, at, .. } = seen;
         let reach = f32x8::splat(simd, self.penalty.reach);
-        let touching = own
-            & Real::lt(squared, reach * reach)
-            & Real::lt(f32x8::splat(simd, SAME_PLACE), squared);
+        let touching =
+            Real::lt(squared, reach * reach) & Real::lt(f32x8::splat(simd, SAME_PLACE), squared);
         let distance = Real::sqrt(squared);
         let strength = f32x8::splat(simd, self.penalty.strength);
         let push = penalty(distance, reach, strength);
-        let pushed = off.scale_add(push, self.sum);
-        self.sum = V3::select(touching, pushed, self.sum);
-        let mut lanes = if self.penalty.mutual { touching.to_bitmask() } else { 0 };
+        if !self.penalty.mutual {
+            let pushed = off.scale_add(push, self.sum);
+            self.sum = V3::select(touching & seen.own(simd), pushed, self.sum);
+            return;
+        }
+        let mut lanes = touching.to_bitmask();
         if lanes == 0 {
             return;
         }
-        let push = off.scale(push);
-        let mut seen = [[0.0; WIDTH]; 4];
-        for (seen, lanes) in seen.iter_mut().zip([push.x, push.y, push.z, at]) {
+        let parts = seen.parts(simd, self.penalty.reach);
+        let push = off.scale(push * parts);
+        let mut seen = [[0.0; WIDTH]; 5];
+        for (seen, lanes) in seen.iter_mut().zip([push.x, push.y, push.z, at, parts]) {
             lanes.store_array(seen);
         }
         while lanes != 0 {
             let k = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
-            let push = Vec3::new(seen[0][k], seen[1][k], seen[2][k]);
-            reactions.push(Reaction { edge: edges[k], at: seen[3][k], push });
+            let [x, y, z, at, part] = seen.map(|lanes| lanes[k]);
+            if part > 0.0 {
+                let push = Vec3::new(x, y, z);
+                touches.push(Touch { node: self.node, edge: edges[k], at, part, push });
+            }
         }
     }
 
@@ -304,8 +354,9 @@ impl<S: Simd> Bridges<S> {
         let lit = |value: f32| f32x8::splat(simd, value);
         let (zero, one) = (lit(0.0), lit(1.0));
         let Film { reach, longest } = self.film;
-        let Off { off, squared, at, own } = off(simd, rows, edges, self.p);
-        let near = own
+        let seen = off(simd, rows, edges, self.p);
+        let Off { off, squared, at, .. } = seen;
+        let near = seen.own(simd)
             & Real::lt(squared, lit((reach + longest) * (reach + longest)))
             & Real::lt(lit(SAME_PLACE), squared);
         if near.to_bitmask() == 0 {

@@ -42,10 +42,12 @@ setting! {
         /// contact between strands off.
         pub strength: f32 = 20.0, "m/s²" in STRENGTH: 0.0..=1e6, safe 0.0..=1e3,
             "20 parts locks gently";
-        /// Whether an edge that pushes a node is pushed back. Contact then keeps momentum and has an energy, so
-        /// that most hair whose locks touch comes to rest: each pair counts by halves from both sides. Default
-        /// `false`, equation 18 as printed, which keeps neither. Where lists hold more than 256 edges a
-        /// node in the mean, as with strands by the hundred in one place, contact is as printed.
+        /// Whether an edge that pushes a node is pushed back, as presets have it. Contact then keeps momentum, and
+        /// hair whose locks touch comes to rest: each pair counts by halves from both sides, neighbouring edges
+        /// share what is near their common node, and in a step pairs give way by a 25th of their depth at
+        /// most, however many touch. Default `false`, equation 18 as printed, which has none of these. Where lists
+        /// hold more than 256 edges a node in the mean, as with strands by the hundred in one place, contact
+        /// is as printed.
         pub mutual: bool = false;
     }
 }

@@ -114,6 +114,18 @@ impl Edge {
         }
         Some(self.start + self.along * t.max(0.0))
     }
+
+    /// The nearest point of the edge to `p`, where on the edge it is (0…1), and the edge's part in mutual contact
+    /// of this reach: around a node that it shares with another edge of its strand, both have a part.
+    pub(super) fn nearest(&self, p: Vec3, reach: f32, is_first: bool) -> (Vec3, f32, f32) {
+        let t = (p - self.start).dot(self.along) * self.inverse_squared;
+        let part =
+            |inside: f32| (0.5 + inside * self.along.length() / (2.0 * reach)).clamp(0.0, 1.0);
+        let rise = if is_first { 1.0 } else { part(t) };
+        let fall = if self.is_last { 1.0 } else { part(1.0 - t) };
+        let at = t.clamp(0.0, 1.0);
+        (self.start + self.along * at, at, rise * fall)
+    }
 }
 
 #[cfg(test)]

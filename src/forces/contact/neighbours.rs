@@ -10,7 +10,7 @@
 
 use super::{
     coarse::Coarse,
-    lanes::{self, Bridges, NodeRow, Penalty, PenaltySum, Pieces, Reaction, Stack, WIDTH, WetRow},
+    lanes::{self, Bridges, NodeRow, Penalty, PenaltySum, Pieces, Stack, Touch, WIDTH, WetRow},
     model::{Bridged, Film},
 };
 use crate::base::{
@@ -55,6 +55,11 @@ const MOST_BYTES_A_NODE: usize = 1 << 10;
 /// the hundred lie in one place, and memory for what each pushes back would grow with the square of their number.
 const MOST_MUTUAL: usize = 256;
 
+/// The most that mutual contact may take of a pair's depth in a step, summed over what touches a node. Of 113 locks of
+/// curls on a character 34 were awake after 5 s with 0.25, 17 with 0.1 and 3 with 0.04; nodes were on average in
+/// the same places within 0.2 mm.
+const STEEPEST: f32 = 0.04;
+
 /// Longest bridge of water, in units of the reach: the rest of the margin is how far nodes may move
 /// before lists are rebuilt.
 pub(super) const LONGEST_BRIDGE: f32 = 0.6;
@@ -82,8 +87,10 @@ fn per_part(nanos: usize, rows: &[NodeRow], strands: usize) -> Nanos {
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     rows: Vec<NodeRow>,
-    /// What edges get back, by node (m/s²).
-    back: Vec<Vec3>,
+    /// How often each node is touched, by itself and through its edges.
+    touched: Vec<f32>,
+    /// What mutual contact does to each node (m/s²).
+    mutual: Vec<Vec3>,
     /// Expected positions of the nodes in the middle of the period that lists are used for; empty
     /// for the present positions.
     expected: Vec<NodeRow>,
@@ -139,7 +146,7 @@ struct PartLists {
     /// Groups out of reach tested for the last pushes.
     idle: usize,
     pushes: Vec<Vec3>,
-    reactions: Vec<Reaction>,
+    touches: Vec<Touch>,
     bridged: Vec<Bridged>,
     /// Whether a node had more edges near than its list holds.
     is_crowded: bool,
@@ -214,7 +221,8 @@ impl Neighbours {
 
     /// Evaluates equation 18 for every node, for [`pushes`](Self::pushes) to return. The order of
     /// summation does not depend on threads.
-    pub fn find_pushes(&mut self, Penalty { reach, strength, mutual }: Penalty, lookup: Lookup) {
+    pub fn find_pushes(&mut self, penalty: Penalty, lookup: Lookup) {
+        let Penalty { reach, mutual, .. } = penalty;
         // Lists are padded with an edge at NaN.
         let nodes = self.strands.last().map_or(0, |strand| strand.end as usize);
         self.rows.truncate(nodes);
@@ -228,7 +236,7 @@ impl Neighbours {
         let mutual = mutual && self.pairs() <= MOST_MUTUAL * nodes;
         let Self { rows, strands, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
-        let penalty = Penalty { reach, strength, mutual };
+        let penalty = Penalty { mutual, ..penalty };
         for_each_block(
             &mut work,
             per_part(PUSH, rows, strands.len()),
@@ -239,21 +247,37 @@ impl Neighbours {
         );
         lists.idle += parts.iter().map(|part| part.idle).sum::<usize>();
         if mutual {
-            self.push_back(nodes);
+            self.push_both(nodes, penalty);
         }
     }
 
-    /// Pushes back each edge that pushed a node, by halves: of two strands each pushes the other's nodes.
-    fn push_back(&mut self, nodes: usize) {
-        self.back.clear();
-        self.back.resize(nodes, Vec3::ZERO);
-        for Reaction { edge, at, push } in self.parts.iter().flat_map(|part| &part.reactions) {
-            let edge = *edge as usize;
-            self.back[edge] -= push * (1.0 - at);
-            self.back[edge + 1] -= push * *at;
+    /// Pushes each node and the edge that it touches apart, by halves: of two strands each pushes the other's
+    /// nodes. Where a node has so many touches that their push in one step would throw it past where they
+    /// balance, they push by as much less, both sides alike.
+    fn push_both(&mut self, nodes: usize, Penalty { reach, strength, dt, .. }: Penalty) {
+        let Self { touched, mutual, parts, .. } = self;
+        let touches = || parts.iter().flat_map(|part| &part.touches);
+        touched.clear();
+        touched.resize(nodes, 0.0);
+        mutual.clear();
+        mutual.resize(nodes, Vec3::ZERO);
+        for touch in touches() {
+            let (node, edge) = (touch.node as usize, touch.edge as usize);
+            touched[node] += touch.part;
+            touched[edge] += touch.part * (1.0 - touch.at);
+            touched[edge + 1] += touch.part * touch.at;
         }
-        let pushes = self.parts.iter_mut().flat_map(|part| &mut part.pushes);
-        pushes.zip(&self.back).for_each(|(push, back)| *push = 0.5 * (*push + *back));
+        let of_touch = 0.5 * strength / reach * dt * dt;
+        for Touch { node, edge, at, push, .. } in touches() {
+            let (node, edge) = (*node as usize, *edge as usize);
+            let most = touched[node].max(touched[edge] * (1.0 - at) + touched[edge + 1] * at);
+            let push = *push * (0.5 * (STEEPEST / (of_touch * most)).min(1.0));
+            mutual[node] += push;
+            mutual[edge] -= push * (1.0 - at);
+            mutual[edge + 1] -= push * *at;
+        }
+        let pushes = parts.iter_mut().flat_map(|part| &mut part.pushes);
+        pushes.zip(mutual).for_each(|(push, mutual)| *push = *mutual);
     }
 
     /// What [`find_pushes`](Self::find_pushes) found for every node (m/s²), in the order they were added.
@@ -539,20 +563,20 @@ impl PartLists {
         self.idle = 0;
         let nodes = strands.first().map_or(0, |s| s.start) as usize;
         self.pushes.clear();
-        self.reactions.clear();
+        self.touches.clear();
         let ends = self.starts.windows(2).zip(&self.slacks);
-        for ((ends, slack), row) in ends.zip(&rows[nodes..]) {
+        for (node, (ends, slack)) in (nodes..).zip(ends) {
             if *slack > may_touch {
                 self.pushes.push(Vec3::ZERO);
                 continue;
             }
-            let mut sum = PenaltySum::new(simd, lanes::place(row), penalty);
+            let mut sum = PenaltySum::new(simd, rows, node, penalty);
             for group in &self.groups[ends[0] as usize..ends[1] as usize] {
                 if group.slack > may_touch {
                     break;
                 }
                 self.idle += usize::from(group.slack > 0.0);
-                sum.add(simd, rows, &group.edges, &mut self.reactions);
+                sum.add(simd, rows, &group.edges, &mut self.touches);
             }
             self.pushes.push(sum.total());
         }
@@ -600,7 +624,7 @@ mod tests {
     use proptest::prelude::*;
 
     pub fn printed(radius: f32) -> Penalty {
-        Penalty { reach: 2.0 * radius, strength: 20.0, mutual: false }
+        Penalty { reach: 2.0 * radius, strength: 20.0, mutual: false, dt: 1e-3 }
     }
 
     /// Equation 18 of all edges but those of the strand `own` at a place `p`.

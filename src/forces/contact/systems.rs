@@ -280,7 +280,7 @@ impl Touching<'_> {
             }
         }
         let StrandContact { strength, mutual, .. } = *contact;
-        list.find_pushes(Penalty { reach, strength, mutual }, lookup);
+        list.find_pushes(Penalty { reach, strength, mutual, dt: step.dt }, lookup);
         if fault.is_none() && list.is_crowded() && !core::mem::replace(&mut reported.1, true) {
             *fault = Some(too_crowded(radius).of(*hair));
         }
