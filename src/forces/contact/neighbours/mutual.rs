@@ -72,13 +72,14 @@ fn energy(strands: &[Vec<Vec3>], contact: Penalty) -> f32 {
     0.25 * contact.strength / contact.reach * sum
 }
 
-/// Strands that cross above each other.
+/// Strands that cross above each other: a node of every other one lies near the middle of an edge of the next.
 fn crossing(random: &mut Xoshiro256PlusPlus, strands: usize) -> Vec<Vec<Vec3>> {
     let strand = |k: usize| {
         let [a, b, c] = core::array::from_fn(|_| random.random_range(0.0..1.0f32));
         let turned = Quat::from_rotation_z(0.9 * k as f32 + 0.3 * a);
         let height = 0.03 * k as f32 + 0.02 * b;
-        let along = |i: usize| Vec3::new(0.2 * i as f32 - 0.31 - 0.05 * c, 0.02 * c, height);
+        let shift = if k.is_multiple_of(2) { 0.26 - 0.02 * c } else { 0.05 * c };
+        let along = |i: usize| Vec3::new(0.6 * i as f32 - 0.9 + shift, 0.02 * c, height);
         (0..NODES).map(|i| turned * along(i)).collect()
     };
     (0..strands).map(strand).collect()
@@ -97,11 +98,13 @@ fn mutual_contact_keeps_momentum_and_is_the_gradient_of_an_energy() {
         for (k, (found, expected)) in found.iter().zip(brute(&strands, contact)).enumerate() {
             assert!(found.distance(expected) < 1e-3, "{case}, {k}: {found}, not {expected}");
         }
-        // Where a part changes, so does the energy; the push leaves that out.
-        if pairs(&strands, contact.reach).iter().any(|pair| pair.part.fract() != 0.0) {
-            continue;
-        }
+        let pairs = pairs(&strands, contact.reach);
         for (k, push) in found.iter().enumerate().filter(|(_, push)| **push != Vec3::ZERO) {
+            // Where a part changes, so does the energy; the push leaves that out.
+            let is_of = |pair: &Pair| pair.nodes[0] == k || k.wrapping_sub(pair.nodes[1]) < 2;
+            if pairs.iter().any(|pair| is_of(pair) && pair.part.fract() != 0.0) {
+                continue;
+            }
             for (axis, push) in Vec3::AXES.into_iter().zip(push.to_array()) {
                 let [ahead, back] = [5e-4, -5e-4].map(|by| {
                     let mut moved = strands.clone();
@@ -110,10 +113,8 @@ fn mutual_contact_keeps_momentum_and_is_the_gradient_of_an_energy() {
                 });
                 let slope = (back - ahead) / 1e-3;
                 checked += 1;
-                assert!(
-                    (push - slope).abs() < 0.05 * largest + 0.05,
-                    "{case}, {k}: {push}, not {slope}"
-                );
+                let off = (push - slope).abs();
+                assert!(off < 0.05 * largest + 0.05, "{case}, {k}: {push}, not {slope}");
             }
         }
     }
@@ -133,7 +134,7 @@ fn a_node_that_slides_along_a_bent_strand_feels_no_step() {
     };
     for bend in [0.0, 0.2, -0.3] {
         let steps = |contact: Penalty| {
-            let places = (0..400).map(|i| seen(bend, 0.2 + 1e-3 * i as f32, contact));
+            let places = (0..2000).map(|i| seen(bend, 0.3 + 1e-4 * i as f32, contact));
             let pushes: Vec<Vec3> = places.collect();
             assert!(pushes.iter().any(|push| push.length() > 2.0));
             pushes.windows(2).map(|w| w[0].distance(w[1])).fold(0.0, f32::max)
