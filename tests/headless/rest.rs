@@ -67,11 +67,16 @@ fn hair_comes_to_rest_against_the_solids_of_a_head_and_a_body() {
 
 #[test]
 fn presets_come_to_rest_as_they_are_worn() {
-    let presets = [HairPreset::Wavy, HairPreset::Curly, HairPreset::Coily, HairPreset::Locs];
-    for preset in presets {
+    // With contact as printed half of the curls were awake, and a third of the waves. Locs touch the most.
+    let presets = [
+        (HairPreset::Wavy, 20),
+        (HairPreset::Curly, 12),
+        (HairPreset::Coily, 12),
+        (HairPreset::Locs, 8),
+    ];
+    for (preset, share) in presets {
         let [awake, all] = awake_on_a_character(preset, None);
         println!("{preset:?}: {awake} of {all} awake");
-        // With contact as printed half of the curls were awake, and a third of the waves. Locs touch the most: a tenth.
-        assert!(all > 100 && 8 * awake < all, "{preset:?}: {awake} of {all} are awake");
+        assert!(all > 100 && share * awake < all, "{preset:?}: {awake} of {all} are awake");
     }
 }
