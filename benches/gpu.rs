@@ -245,6 +245,7 @@ mod gpu {
             influence: BondInfluence::default().as_array(),
             bending_length: HairStiffness::default().bending_length,
             damping: HairStiffness::default().damping,
+            torsion: HairStiffness::default().torsion,
             skin: StrandContact::default().radius,
             limiter_steps: HairSolver::default().limiter_steps,
             cuticle: default(),

@@ -121,6 +121,7 @@ fn direct_step(bencher: Bencher<'_, '_>, nodes: usize) {
         dt: 1.0 / 360.0,
         gravity: Vec3::NEG_Y * 9.8,
         damping: HairStiffness::default().damping,
+        torsion: HairStiffness::default().torsion,
         limiter_steps: 6,
         clearance: 0.0,
     };

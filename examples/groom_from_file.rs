@@ -14,7 +14,7 @@ fn main() {
 }
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>) -> Result {
-    // .hair, .tfx and glTF are known. Only glTF says what its unit is and where up is.
+    // .abc, .hair, .tfx, .ply, .data and glTF are known. Only glTF says what its unit is and where up is.
     let groom: Handle<Groom> = assets
         .load_builder()
         .with_settings(|settings: &mut GroomSettings| {

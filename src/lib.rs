@@ -55,6 +55,7 @@ mod book {
         ($($name:ident: $file:literal,)*) => {$(#[doc = include_str!(concat!("../docs/src/", $file))] struct $name;)*};
     }
     chapters! {
+        Blender: "blender.md",
         Character: "character.md",
         Colliders: "colliders.md",
         FirstHour: "first-hour.md",

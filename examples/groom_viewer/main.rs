@@ -44,7 +44,7 @@ use std::{
     process::ExitCode,
 };
 
-/// Shows a groom from a .hair, .tfx, .gltf or .glb file on a head that turns to and fro.
+/// Shows a groom from an .abc, .hair, .tfx, .ply, .data, .gltf or .glb file on a head that turns to and fro.
 #[derive(Parser, Resource, Clone)]
 #[command(version)]
 struct Arguments {

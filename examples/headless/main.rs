@@ -9,6 +9,8 @@
 mod characters;
 #[path = "../shared/gltf.rs"]
 mod gltf;
+#[path = "../shared/rods/mod.rs"]
+mod rods;
 #[path = "../shared/rows.rs"]
 mod rows;
 #[path = "../shared/scenes/mod.rs"]
@@ -48,6 +50,7 @@ enum Show {
     Scene(SceneKind),
     Swing,
     Worlds,
+    Rods,
     Characters,
 }
 
@@ -57,11 +60,12 @@ impl FromStr for Show {
         match name {
             "swing" => Ok(Self::Swing),
             "worlds" => Ok(Self::Worlds),
+            "rods" => Ok(Self::Rods),
             "characters" => Ok(Self::Characters),
             _ => name
                 .parse()
                 .map(Self::Scene)
-                .map_err(|e: UnknownName| format!("{e}, swing, worlds, characters")),
+                .map_err(|e: UnknownName| format!("{e}, swing, worlds, rods, characters")),
         }
     }
 }
@@ -71,7 +75,8 @@ impl FromStr for Show {
 #[command(version)]
 struct Arguments {
     /// Which scene: bedhead, blow-dry, perm, wet, shower; swing, a single strand; or, as figures against
-    /// what they should be, worlds, what games do to a world, and characters, hair on glTF files.
+    /// what they should be, worlds, what games do to a world, rods, strands against closed forms, and
+    /// characters, hair on glTF files.
     #[arg(long)]
     scene: Show,
     /// The files of `characters`; the project's own figure if left out.
@@ -143,9 +148,14 @@ fn table(rows: Vec<rows::Row>, json: bool) -> Result<(), Box<dyn std::error::Err
     if json {
         println!("{}", serde_json::to_string(&table)?);
     } else {
-        for rows::Row { test, expected, got, tolerance, within } in &table.rows {
+        for row in &table.rows {
+            let rows::Row { test, expected, got, tolerance, within, .. } = row;
             let mark = if *within { "" } else { "  <- outside" };
-            println!("{test}: {got:.4} for {expected:.4} ± {tolerance:.4}{mark}");
+            let of = match (row.gamma, row.segments) {
+                (Some(gamma), Some(segments)) => format!(", {gamma:.4}, {segments} segments"),
+                _ => String::new(),
+            };
+            println!("{test}{of}: {got:.4} for {expected:.4} ± {tolerance:.4}{mark}");
         }
     }
     match table.rows.iter().filter(|row| !row.within).count() {
@@ -162,6 +172,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         Show::Scene(kind) => kind,
         Show::Swing => return swing(arguments),
         Show::Worlds => return table(worlds::rows(), arguments.json),
+        Show::Rods => return table(rods::rows(), arguments.json),
         Show::Characters => return characters(arguments),
     };
     if arguments.swing.any() {

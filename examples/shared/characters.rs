@@ -1,5 +1,5 @@
 //! Hair on characters from glTF files, measured: what it grows on, how far roots are off the skin, how much of the
-//! scalp has hair, and which way the character was found to look.
+//! scalp has hair, which way the character was found to look, and how many strands are awake once it stands still.
 
 use super::{gltf::register, rows::Row};
 use bevy::{
@@ -22,12 +22,14 @@ use std::{
     time::Duration,
 };
 
-/// What each character wears in turn.
-const PRESETS: [HairPreset; 3] = [HairPreset::Bob, HairPreset::Curly, HairPreset::Short];
 /// Frames to wait for a file and its hair, of 2 ms at least.
 const PATIENCE: u32 = 15_000;
 /// Frames in which hair settles, and its character moves.
 const FRAMES: u32 = 30;
+/// Frames after which a character that stands still has its hair at rest: 5 s.
+const REST: u32 = 300;
+/// A ball that touches hair at rest (m).
+const TOUCH: f32 = 0.03;
 /// Directions in which a head is looked at.
 const DIRECTIONS: usize = 2000;
 /// A place of the scalp has hair where a root is nearer than this, seen from the head's middle.
@@ -189,6 +191,40 @@ impl Worn {
         with / all
     }
 
+    /// The strands that are awake, and all.
+    fn awake(&self) -> [usize; 2] {
+        let counts = self.get::<SleepCounts>(self.worn.hair).copied().unwrap_or_default();
+        [counts.awake, counts.awake + counts.asleep]
+    }
+
+    /// Puts a ball where the tip of a sleeping strand is, and tells how many strands of those that it touches still
+    /// sleep two ticks later. `None` where no strand sleeps.
+    fn asleep_when_touched(&mut self) -> Option<usize> {
+        let members: Vec<Entity> =
+            self.get::<Strands>(self.worn.hair).into_iter().flat_map(|all| all.iter()).collect();
+        let to_world = self.place(self.worn.hair);
+        let nodes = |app: &App, id: Entity| -> Vec<Vec3> {
+            let strand = app.world().get::<Strand>(id);
+            let nodes = strand.into_iter().flat_map(|strand| strand.positions());
+            nodes.map(|p| to_world.transform_point3(*p)).collect()
+        };
+        let asleep = |app: &App, id: Entity| {
+            app.world().get::<StrandSleep>(id).is_some_and(StrandSleep::is_asleep)
+        };
+        let sleeper = members.iter().find(|id| asleep(&self.app, **id));
+        let at = nodes(&self.app, *sleeper?).last().copied()?;
+        let touched: Vec<Entity> = members
+            .into_iter()
+            .filter(|id| nodes(&self.app, *id).iter().skip(1).any(|p| p.distance(at) < TOUCH))
+            .collect();
+        let ball = HairCollider::sphere(TOUCH).expect("a radius");
+        let ball = self.app.world_mut().spawn((ball, Transform::from_translation(at))).id();
+        (0..2).for_each(|_| self.app.update());
+        let still = touched.iter().filter(|id| asleep(&self.app, **id)).count();
+        self.app.world_mut().despawn(ball);
+        Some(still)
+    }
+
     /// The names of the meshes that it grows on.
     fn names(&self) -> String {
         let name = |mesh: Entity| self.get::<Name>(mesh).map_or("?".into(), Name::to_string);
@@ -203,23 +239,37 @@ impl Worn {
 
 /// The rows of each file: glTF's characters look along +Z.
 pub fn rows(files: &[PathBuf]) -> Vec<Row> {
-    files.iter().flat_map(|file| PRESETS.into_iter().flat_map(|preset| of(file, preset))).collect()
+    let all = |file| HairPreset::ALL.into_iter().flat_map(move |preset| of(file, preset));
+    files.iter().flat_map(|file| all(file)).collect()
 }
 
 fn of(file: &Path, preset: HairPreset) -> Vec<Row> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let head = format!("{name}, {}", preset.name());
-    let worn = match wear(file, preset) {
+    let mut worn = match wear(file, preset) {
         Ok(worn) => worn,
         Err(why) => return vec![Row::new(format!("{head}: {why}"), 1.0, 0.0, 0.0)],
     };
     let on = format!("{head}: hair grows on {}", worn.names());
     let looks = format!("{head}: looks along +Z by {:?} (°)", worn.worn.facing_from);
-    vec![
+    let mut rows = vec![
         Row::new(on, 1.0, f32::from(u8::from(!worn.meshes().is_empty())), 0.0),
         Row::at_most(format!("{head}: roots off the skin (mm)"), worn.off_skin(), 0.5),
-        Row::new(format!("{head}: share of the scalp with hair"), 1.0, worn.covered(), 0.05),
         // Where nothing tells it is assumed to be −Z, and this is outside.
         Row::at_most(looks, worn.turned(), 1.0),
-    ]
+    ];
+    // A beard grows on the face, fur without a hairline.
+    if !matches!(preset, HairPreset::Beard | HairPreset::Fur) {
+        let share = format!("{head}: share of the scalp with hair");
+        rows.push(Row::new(share, 1.0, worn.covered(), 0.05));
+    }
+    (FRAMES..REST).for_each(|_| worn.app.update());
+    let [awake, all] = worn.awake();
+    let name = format!("{head}: strands awake after 5 s, of {all}");
+    rows.push(Row::at_most(name, awake as f32, 0.0));
+    if let Some(still) = worn.asleep_when_touched() {
+        let name = format!("{head}: strands asleep that a ball touches");
+        rows.push(Row::at_most(name, still as f32, 0.0));
+    }
+    rows
 }

@@ -2,7 +2,7 @@
 //! written and read again.
 #![no_main]
 
-use bevy_keratin::authoring::groom::{Groom, GroomSettings, yuksel};
+use bevy_keratin::authoring::groom::{Groom, GroomSettings, alembic, yuksel};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|file: &[u8]| {
@@ -10,6 +10,9 @@ fuzz_target!(|file: &[u8]| {
         return;
     };
     assert!(groom.points().len() <= file.len());
+    let archive = alembic::write(&groom).expect("what was read can be written");
+    let (again, _) = alembic::read(&archive).expect("what was written can be read");
+    assert_eq!(again.points(), groom.points());
     let Ok(written) = yuksel::write(&groom) else {
         return;
     };

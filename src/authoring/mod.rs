@@ -9,8 +9,10 @@ pub mod wear;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
+    pub use crate::authoring::attach::RootsOnBones;
     pub use crate::authoring::groom::{
-        Groom, GroomError, GroomGuides, GroomSettings, GroomedHair, RootEnd, UpAxis,
+        BonesFile, Groom, GroomError, GroomGuides, GroomSettings, GroomedHair, RootBones, RootEnd,
+        StrandBones, UpAxis,
     };
     pub use crate::authoring::plant::{HairPreset, Hairline, Scalp};
     #[cfg(feature = "render")]

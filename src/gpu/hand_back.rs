@@ -144,10 +144,10 @@ fn hand_back(world: &mut World, hair: Entity, state: Option<Contents>, why: WhyC
     }
     // It has not been tied on the GPU.
     #[cfg(feature = "groom")]
-    if why == WhyCpu::Unsupported(Unsupported::MovingRoots)
-        && let Some(mut roots) = world.get_mut::<crate::authoring::attach::RootsOnMesh>(hair)
-    {
-        roots.set_changed();
+    if why == WhyCpu::Unsupported(Unsupported::MovingRoots) {
+        use crate::authoring::attach::{RootsOnBones, RootsOnMesh};
+        world.get_mut::<RootsOnMesh>(hair).into_iter().for_each(|mut roots| roots.set_changed());
+        world.get_mut::<RootsOnBones>(hair).into_iter().for_each(|mut roots| roots.set_changed());
     }
     world.write_message_batch(gpu.soaked);
     world.write_message_batch(gpu.treated);

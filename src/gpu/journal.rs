@@ -156,6 +156,7 @@ pub(super) fn write_journals(
             influence: influence.of(hair).as_array(),
             bending_length: stiffness.bending_length,
             damping: stiffness.damping,
+            torsion: stiffness.torsion,
             skin: contact.of(hair).radius,
             limiter_steps: sweeps.map_or(solver.limiter_steps, |s| s.settings.limiter_steps),
             sweeps,

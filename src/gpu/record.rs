@@ -213,6 +213,8 @@ pub struct SubstepRecord {
     pub bending_length: f32,
     /// Kelvin–Voigt time (s).
     pub damping: f32,
+    /// G J/(E I); the paper's projections have 1.
+    pub torsion: f32,
     /// Distance that nodes retained from obstacles (m).
     pub skin: f32,
     /// Newton steps of the length limiter, at most.
@@ -359,7 +361,7 @@ impl SubstepRecord {
         }
         words.word(indices.first_follower_block);
         words.word(indices.first_follower_slot);
-        words.word(0);
+        words.numbers([self.torsion]);
         words.numbers(self.follows.unwrap_or_default().words());
         self.sleep.unwrap_or_default().write(&mut words);
         let sweeps = SweepRecord::words(self.sweeps.as_ref(), self.dt, self.bending_length);

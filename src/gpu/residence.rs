@@ -98,7 +98,7 @@ pub enum Unsupported {
     Colliders,
     /// A collider near that is no ball, ellipsoid, capsule, cylinder or half-space.
     ColliderShape,
-    /// Roots that are held ([`HeldNodes`](crate::HeldNodes)).
+    /// Roots that are held ([`HeldNodes`](crate::HeldNodes)), or held nodes with frames.
     HeldRoots,
     /// Strands of which winding on a [`PermRod`](crate::PermRod) begins.
     Winding,

@@ -6,7 +6,7 @@ use super::{
     treatments::GpuTreatments,
 };
 #[cfg(feature = "groom")]
-use crate::authoring::attach::{RootsOnMesh, TiedRoots};
+use crate::authoring::attach::{RootsOnBones, RootsOnMesh, TiedRoots};
 use crate::{
     base::setting::Settings,
     forces::{
@@ -67,14 +67,17 @@ pub(super) struct Support<'w, 's> {
     disabled: Query<'w, 's, &'static StrandOf, (With<OnGpu>, With<Disabled>)>,
     #[cfg(feature = "groom")]
     on_mesh: Query<'w, 's, (Ref<'static, RootsOnMesh>, &'static TiedRoots)>,
+    #[cfg(feature = "groom")]
+    on_bones: Query<'w, 's, (Ref<'static, RootsOnBones>, &'static TiedRoots)>,
 }
 
 impl Support<'_, '_> {
     /// Reasons of single strands, by hair.
     pub(super) fn of_strands(&self) -> EntityHashMap<Unsupported> {
         let mut found = EntityHashMap::default();
-        let held =
-            self.held.iter().filter(|(.., held)| matches!(held.targets.first(), Some(Some(_))));
+        let held = self.held.iter().filter(|(.., held)| {
+            matches!(held.targets.first(), Some(Some(_))) || held.frames.iter().any(Option::is_some)
+        });
         found.extend(held.map(|(_, of, _)| (of.0, Unsupported::HeldRoots)));
         let begins = self.wound.iter().filter(|(_, strand, on, settings, wound)| {
             self.rods.contains(on.0) && wound.waits(strand, settings)
@@ -120,7 +123,9 @@ impl Support<'_, '_> {
         let unplaced = obstacles.and_then(|all| record::unsupported(&all.solids));
         #[cfg(feature = "groom")]
         let is_being_tied = (self.on_mesh.get(hair))
-            .is_ok_and(|(roots, tied)| roots.is_changed() || roots.mesh.is_some() && tied.wait());
+            .is_ok_and(|(roots, tied)| roots.is_changed() || roots.mesh.is_some() && tied.wait())
+            || (self.on_bones.get(hair))
+                .is_ok_and(|(roots, tied)| roots.is_changed() || tied.wait());
         #[cfg(not(feature = "groom"))]
         let is_being_tied = false;
         let reasons = [

@@ -236,7 +236,8 @@ fn wet_hairs<'a>(
     let locks =
         hairs.iter().map(|(hair, frame, ..)| wetting.of(hair).lock_radius() * frame.now().scale);
     let widest = locks.fold(0.0, f32::max);
-    let balls = Colliders::of_balls((0..).zip(drops).map(|(k, drop)| (ball_of(drop, widest), k)));
+    let balls = (0..).zip(drops).map(|(k, drop)| (ball_of(drop, widest), k));
+    let balls = Colliders::of_balls(hairs.iter().count(), balls);
     let mut scratch = Vec::new();
     for (entity, of, strand, added_mass, moisture, _) in strands {
         let index = wet_hairs.index(of.0, || {

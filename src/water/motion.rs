@@ -352,7 +352,8 @@ mod tests {
                 motion: None,
                 friction: 0.0,
             };
-            let solids = Colliders::of_balls(poses.iter().map(|ball| (*ball, solid(*ball))));
+            let solids = poses.iter().map(|ball| (*ball, solid(*ball)));
+            let solids = Colliders::of_balls(usize::MAX, solids);
             let drop = Droplet::ball(Vec3::ZERO, 2e-3);
             let [mut near, mut all] = [0; 2].map(|_| Droplet { velocity: v.into(), ..drop.clone() });
             let lies = rest_on_solids(&solids, &mut near, 2e-3, &mut Vec::new());

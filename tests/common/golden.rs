@@ -55,6 +55,8 @@ pub struct Substep {
     pub name: String,
     pub dt: f32,
     pub damping: f32,
+    #[serde(default = "isotropic")]
+    pub torsion: f32,
     pub gravity: [f32; 3],
     pub held: Vec<bool>,
     pub from: Vec<[f32; 3]>,
@@ -72,6 +74,10 @@ pub struct Substep {
     pub after: After,
 }
 
+fn isotropic() -> f32 {
+    1.0
+}
+
 #[derive(Deserialize)]
 pub struct After {
     pub p: Vec<[f32; 3]>,
@@ -82,6 +88,6 @@ pub struct After {
 /// Of the direct solver.
 pub fn substeps() -> Vec<Substep> {
     let all: Substeps = serde_json::from_str(include_str!("../data/direct.json")).unwrap();
-    assert_eq!(all.cases.len(), 7);
+    assert_eq!(all.cases.len(), 11);
     all.cases
 }

@@ -8,7 +8,10 @@ use bevy::{
     transform::TransformPlugin,
 };
 use bevy_keratin::{FaultKind, prelude::*};
-use std::time::Duration;
+use std::{
+    thread::sleep,
+    time::{Duration, Instant},
+};
 
 /// An app with the plugin at `hertz`, warmed up.
 pub fn test_app(hertz: f64) -> App {
@@ -47,6 +50,25 @@ pub fn run(app: &mut App, seconds: f64) {
     for _ in 0..(seconds / dt).round() as usize {
         app.update();
     }
+}
+
+/// Updates until there is something, which other threads work on: for as long as two minutes, since these may have to
+/// wait for those of other tests.
+pub fn wait_for<T>(app: &mut App, mut found: impl FnMut(&mut App) -> Option<T>) -> T {
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(120) {
+        app.update();
+        if let Some(found) = found(app) {
+            return found;
+        }
+        sleep(Duration::from_millis(2));
+    }
+    panic!("it did not happen in two minutes");
+}
+
+/// The papers' hair, which resists twist as much as bending: what buckles in a plane stays in it.
+pub fn equally_stiff() -> HairStiffness {
+    HairStiffness { torsion: 1.0, ..default() }
 }
 
 /// A hair with one straight strand of `length` along `direction`, in `segments`.

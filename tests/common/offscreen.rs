@@ -202,10 +202,12 @@ impl Offscreen {
 
     /// Draws the world as it is now.
     pub fn draw(&mut self) -> Picture {
-        // Assets arrive over the first frames; then one frame is caught.
-        for _ in 0..3 {
-            self.app.update();
-        }
+        // Assets arrive over the first frames, which draw nothing: a processor in the place of a graphics card takes
+        // seconds for one. Then there is a frame before the one that is caught.
+        self.activate(false);
+        (0..2).for_each(|_| self.app.update());
+        self.activate(true);
+        self.app.update();
         self.draw_now()
     }
 

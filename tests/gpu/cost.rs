@@ -29,35 +29,46 @@ fn prepared(on: SimulateOn, strands: Vec<Strand>) -> Stage {
     stage
 }
 
-/// How long a tick takes (ms).
-fn tick(stage: &mut Stage) -> f64 {
+/// How long `work` takes (ms).
+fn timed(work: impl FnOnce()) -> f64 {
     let start = Instant::now();
-    stage.run(1);
+    work();
     1e3 * start.elapsed().as_secs_f64()
 }
 
-/// What a tick takes that nothing else on the machine disturbs.
-fn undisturbed(times: &[f64]) -> f64 {
-    times.iter().copied().fold(f64::INFINITY, f64::min)
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
 }
 
-pub fn a_hundred_thousand_strands_cost_a_tenth_of_a_millisecond() {
+/// A look at each node of these strands: what the tick would cost the CPU at least, did it read them.
+fn read_all(world: &mut World, strands: &mut QueryState<&Strand>) -> Vec3 {
+    strands.iter(world).flat_map(Strand::positions).sum()
+}
+
+pub fn a_hundred_thousand_strands_cost_less_than_a_look_at_them() {
     // A device that plays one binds 128 MiB, which 100,000 strands of 16 nodes exceed.
     let mut full = prepared(SimulateOn::Gpu, straight(100_000, 9));
     let mut empty = prepared(SimulateOn::Cpu, Vec::new());
     assert!(full.is_on_gpu());
     let hair = full.hair;
-    let (mut with, mut without) = (Vec::new(), Vec::new());
-    // In turn, so that whatever else the machine does disturbs both.
+    let mut strands = full.app.world_mut().query::<&Strand>();
+    let (mut more, mut look) = (Vec::new(), Vec::new());
+    // In turn: whatever else the machine does disturbs all three, and a tick of a millisecond is compared with its
+    // neighbour, not with the best of all.
     for _ in 0..300 {
-        with.push(tick(&mut full));
-        without.push(tick(&mut empty));
+        let with = timed(|| full.run(1));
+        more.push(with - timed(|| empty.run(1)));
+        look.push(timed(|| {
+            std::hint::black_box(read_all(full.app.world_mut(), &mut strands));
+        }));
         full.app.world_mut().get_mut::<GpuJournal>(hair).unwrap().records.clear();
     }
-    let (with, without) = (undisturbed(&with), undisturbed(&without));
-    println!("a tick of 100,000 strands on the device {with:.3} ms, of none {without:.3} ms");
-    let most = if cfg!(debug_assertions) { 0.3 } else { 0.1 };
-    assert!(with - without < most, "{} ms", with - without);
+    let (more, look) = (median(more), median(look));
+    println!(
+        "100,000 strands on the device add {more:.3} ms to a tick; a look at them takes {look:.3} ms"
+    );
+    assert!(more < 0.5 * look, "{more} ms for {look}");
     // And still a write to any of them is found, if not in the same tick. Nobody brings the hair back here.
     full.app.world_mut().resource_mut::<HairGpu>().blocking = false;
     let strand = full.members()[77_777];

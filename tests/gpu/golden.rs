@@ -73,6 +73,7 @@ impl Substep {
             dt: self.dt,
             gravity: self.gravity.into(),
             damping: self.damping,
+            torsion: self.torsion,
             retained: 1.0,
             wind: Vec3::X * (self.axial[0] * self.l[0]),
             limiter_steps: 0,

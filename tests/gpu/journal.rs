@@ -164,7 +164,7 @@ pub fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
     let held = reported(|app, hair| {
         let strand = members(app, hair)[3];
         let targets = vec![Some(Vec3::X)];
-        app.world_mut().entity_mut(strand).insert(HeldNodes { targets });
+        app.world_mut().entity_mut(strand).insert(HeldNodes { targets, ..default() });
     });
     assert_eq!(held, Some(Unsupported::HeldRoots));
     let settles = reported(|app, hair| {

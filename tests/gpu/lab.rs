@@ -218,6 +218,7 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
         dt,
         gravity: record.gravity,
         damping: record.damping,
+        torsion: record.torsion,
         limiter_steps: record.limiter_steps,
         clearance: record.skin,
     };
@@ -333,6 +334,7 @@ pub fn plain() -> SubstepRecord {
         influence: [0.33, 0.30, 0.20, 0.17],
         bending_length: 0.13,
         damping: 0.01,
+        torsion: 0.46,
         skin: 1e-3,
         limiter_steps: 6,
         cuticle: default(),

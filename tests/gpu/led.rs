@@ -98,7 +98,11 @@ pub fn held_nodes_are_led_there_and_let_go(stage: &mut Stage) {
                 if i % 2 == 0 {
                     targets.extend([None, Some(at(5) + Vec3::X)]);
                 }
-                stage.app.world_mut().entity_mut(*strand).insert(HeldNodes { targets });
+                stage
+                    .app
+                    .world_mut()
+                    .entity_mut(*strand)
+                    .insert(HeldNodes { targets, ..default() });
             }
             stage.run(1);
         }
@@ -135,7 +139,7 @@ pub fn held_nodes_are_led_there_and_let_go(stage: &mut Stage) {
     assert!(far(&gpu.1, &gpu.2) > 5e-3, "let go");
     // A held root is the CPU's.
     let strand = stage.members()[0];
-    let root = HeldNodes { targets: vec![Some(Vec3::Y * 0.09)] };
+    let root = HeldNodes { targets: vec![Some(Vec3::Y * 0.09)], ..default() };
     stage.app.world_mut().entity_mut(strand).insert(root);
     stage.run(1);
     let why = WhyCpu::Unsupported(Unsupported::HeldRoots);

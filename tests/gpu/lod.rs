@@ -121,7 +121,7 @@ pub fn a_change_of_level_is_made_on_the_processor(stage: &mut Stage) {
     let follows = |e: &&Entity| stage.app.world().get::<StrandSleep>(**e).unwrap().is_follower();
     let follower = *members.iter().find(follows).unwrap();
     let targets = vec![None, None, None, Some(Vec3::Y * 0.1)];
-    stage.app.world_mut().entity_mut(follower).insert(HeldNodes { targets });
+    stage.app.world_mut().entity_mut(follower).insert(HeldNodes { targets, ..default() });
     stage.run(1);
     assert_eq!(stage.residence(), HairResidence::Cpu(level_of_detail()));
     stage.run(2);

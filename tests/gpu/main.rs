@@ -50,7 +50,7 @@ device::tests! {
             a_treatment_takes_rates_the_asked_share_of_the_way_and_never_cuts_the_backbone;
     }
     cost {
-        device: a_hundred_thousand_strands_cost_a_tenth_of_a_millisecond;
+        device: a_hundred_thousand_strands_cost_less_than_a_look_at_them;
     }
     golden {
         device: a_substep_of_the_direct_solver;

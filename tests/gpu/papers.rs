@@ -91,18 +91,20 @@ pub fn the_papers_scenes_keep_there_what_they_keep_on_the_processor(stage: &mut 
     stage.app.world_mut().despawn(stage.hair);
     ScenePlugin(Scene::new(SceneKind::Perm, None).unwrap()).build(&mut stage.app);
     stage.app.add_systems(FixedPreUpdate, fetch_before_the_end);
-    for (kind, least) in
-        [(SceneKind::Perm, 0.66), (SceneKind::Bedhead, 0.32), (SceneKind::BlowDry, 0.2)]
-    {
-        let [cpu, gpu] = [SimulateOn::Cpu, SimulateOn::Gpu].map(|on| {
-            let start = std::time::Instant::now();
-            let kept = kept(stage, kind, on);
-            println!("{} {on:?}: kept {kept:.5?}, {:.1?}", kind.name(), start.elapsed());
-            kept
-        });
+    // What the processor keeps: of the first scene run beside it, of the others as it was once, by a control of 20 s
+    // each.
+    let scenes = [
+        (SceneKind::Perm, None),
+        (SceneKind::Bedhead, Some([0.33099, 0.33098])),
+        (SceneKind::BlowDry, Some([0.27738, 0.27753])),
+    ];
+    for (kind, known) in scenes {
+        let cpu = known.unwrap_or_else(|| kept(stage, kind, SimulateOn::Cpu));
+        let gpu = kept(stage, kind, SimulateOn::Gpu);
+        println!("{}: kept {gpu:.5?}, on the CPU {cpu:.5?}", kind.name());
         for (cpu, gpu) in cpu.into_iter().zip(gpu) {
-            assert!(cpu > least, "{} keeps {cpu} on the CPU", kind.name());
             assert!((cpu - gpu).abs() < 0.005, "{}: {gpu}, on the CPU {cpu}", kind.name());
         }
+        assert!(kind != SceneKind::Perm || cpu[0] > 0.66, "a perm keeps {} on the CPU", cpu[0]);
     }
 }

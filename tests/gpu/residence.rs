@@ -5,7 +5,7 @@ use crate::{
     stage::{Stage, apart, curls, free},
     sweeps,
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use bevy_keratin::{
     FaultKind, HairStep,
     gpu::{HairResidence, Unsupported, WhyCpu},
@@ -36,7 +36,7 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 pub fn hair_goes_to_the_device_and_comes_home() {
     let mut stage = Stage::new(SimulateOn::Cpu, Vec::new());
     stage.compile();
-    let all: [fn(&mut Stage); 41] = [
+    let all: [fn(&mut Stage); 42] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
@@ -48,6 +48,7 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         probe::probes_tell_where_strands_are,
         resets_and_restyles_work_as_on_the_processor,
         a_teleported_head_takes_its_hair_along_at_rest,
+        hair_that_was_away_comes_back_at_rest,
         hairdos_are_asked_for_and_arrive,
         broken_strands_are_put_back_and_told_of_once,
         bad::what_is_no_number_counts_as_on_the_processor_and_is_told_of_once,
@@ -368,6 +369,59 @@ fn a_teleported_head_takes_its_hair_along_at_rest(stage: &mut Stage) {
     assert!(fastest < 0.3, "a tick of gravity at most: {fastest} m/s");
 }
 
+/// Pooled, paused, hidden as in first person: carried about meanwhile, it comes back at rest, as it was.
+fn hair_that_was_away_comes_back_at_rest(stage: &mut Stage) {
+    let pooled = |world: &mut World, hair: Entity, away: bool| {
+        let mut hair = world.entity_mut(hair);
+        match away {
+            true => hair.insert_recursive::<Strands>(Disabled),
+            false => hair.remove_recursive::<Strands, Disabled>(),
+        };
+    };
+    let paused = |world: &mut World, _: Entity, away: bool| {
+        let mut time = world.resource_mut::<Time<Virtual>>();
+        if away { time.pause() } else { time.unpause() }
+    };
+    let hidden = |world: &mut World, hair: Entity, away: bool| {
+        let scale = Vec3::splat(if away { 1e-3 } else { 1.0 });
+        world.get_mut::<Transform>(hair).unwrap().scale = scale;
+    };
+    let ways: [(&str, &dyn Fn(&mut World, Entity, bool)); 3] =
+        [("pooled", &pooled), ("paused", &paused), ("hidden", &hidden)];
+    for (name, set) in ways {
+        grow(stage, SimulateOn::Gpu, curls(6, 7));
+        let hair = stage.hair;
+        stage.app.world_mut().entity_mut(hair).insert(AirDrag { rate: 6.0 });
+        stage.at_once(4);
+        stage.run(75);
+        stage.at_once(1);
+        assert!(stage.is_on_gpu(), "{name}");
+        let before = stage.strands();
+        stage.run(1);
+        assert!(stage.is_on_gpu(), "{name}");
+        set(stage.app.world_mut(), hair, true);
+        for _ in 0..10 {
+            let mut place = stage.app.world_mut().get_mut::<Transform>(hair).unwrap();
+            place.translation.x += 0.12;
+            place.rotate_y(0.15);
+            stage.run(1);
+        }
+        set(stage.app.world_mut(), hair, false);
+        let mut last = before.clone();
+        for tick in 0..30 {
+            stage.run(1);
+            let now = stage.strands();
+            let (off, step) = (apart(&before, &now), apart(&last, &now));
+            // The strands are back from the first tick on: a tick's way from where they were.
+            assert!(off < 1e-3, "{name}: {off} m off after {tick} ticks");
+            assert!(step * 60.0 < 0.05, "{name}: {} m/s in tick {tick}", step * 60.0);
+            last = now;
+        }
+        stage.run(2);
+        assert!(stage.is_on_gpu(), "{name}: {:?}", stage.residence());
+    }
+}
+
 fn hairdos_are_asked_for_and_arrive(stage: &mut Stage) {
     on_gpu(stage, 6, 20);
     let hair = stage.hair;
@@ -491,7 +545,7 @@ fn closed_forms_hold_through_the_app(stage: &mut Stage) {
     stage.hair = straightened;
     let strand = stage.members()[0];
     let targets: Vec<_> = straight.iter().map(|p| (p.x > 0.0).then_some(*p)).collect();
-    stage.app.world_mut().entity_mut(strand).insert(HeldNodes { targets });
+    stage.app.world_mut().entity_mut(strand).insert(HeldNodes { targets, ..default() });
     stage.at_once(1);
     stage.run(3);
     write(stage, vec![T::shampoo(permed), T::shampoo(straightened)]);

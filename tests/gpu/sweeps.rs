@@ -383,7 +383,7 @@ pub fn swept_nodes_are_held_there(stage: &mut Stage) {
         for tick in 0..20 {
             let place = start + Vec3::new(0.0, 1.0, 0.5) * (0.02 * (0.3 * tick as f32).sin());
             let targets = vec![None, None, None, None, Some(place)];
-            stage.app.world_mut().entity_mut(strand).insert(HeldNodes { targets });
+            stage.app.world_mut().entity_mut(strand).insert(HeldNodes { targets, ..default() });
             turn_head(stage, tick);
         }
         let held = stage.strands();

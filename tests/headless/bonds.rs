@@ -29,7 +29,7 @@ fn hold_arc(app: &mut App, entity: Entity, turn: f32) {
         let omega = Vec3::X * (0.5 * turn).sin();
         arc.pose(core::iter::repeat_n(omega, arc.edges()));
         let targets = arc.positions().iter().map(|p| Some(*p)).collect();
-        app.world_mut().entity_mut(entity).insert(HeldNodes { targets });
+        app.world_mut().entity_mut(entity).insert(HeldNodes { targets, ..default() });
         run(app, 1.0 / 60.0);
     }
 }

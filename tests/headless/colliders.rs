@@ -108,6 +108,7 @@ fn moving_shapes_carry_hair_along() {
     for (name, collider) in flat {
         let carried = |friction: f32| {
             let mut app = test_app(60.0);
+            app.insert_resource(HairDefault(crate::common::equally_stiff()));
             let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
             let collider = collider.clone().with_friction(friction).unwrap();
             let floor = app.world_mut().spawn((collider, Transform::from_xyz(0.0, -0.2, 0.0))).id();

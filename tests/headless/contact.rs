@@ -45,6 +45,7 @@ fn friction_decides_whether_hair_slides_off() {
     // Hair across a moving floor is taken along by friction and left behind without.
     let dragged = |friction: f32| {
         let mut app = test_app(60.0);
+        app.insert_resource(HairDefault(crate::common::equally_stiff()));
         let (_, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
         let floor = HairCollider::plane(Dir3::Y).with_friction(friction).unwrap();
         let floor = app.world_mut().spawn((floor, Transform::from_xyz(0.0, -0.15, 0.0))).id();

@@ -170,6 +170,7 @@ fn a_substep_of_the_direct_solver_in_f32() {
             dt: c.dt,
             gravity,
             damping: c.damping,
+            torsion: c.torsion,
             limiter_steps: 0,
             clearance: 0.0,
         };

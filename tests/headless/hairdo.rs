@@ -159,7 +159,7 @@ fn permed() -> (App, Entity, Entity, Vec<Vec3>) {
         let omega = Vec3::X * (0.3 * step as f32 / 60.0).sin();
         arc.pose(core::iter::repeat_n(omega, arc.edges()));
         let targets = arc.positions().iter().map(|p| Some(*p)).collect();
-        app.world_mut().entity_mut(entity).insert(HeldNodes { targets });
+        app.world_mut().entity_mut(entity).insert(HeldNodes { targets, ..default() });
         app.update();
     }
     run(&mut app, 0.5);

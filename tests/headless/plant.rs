@@ -833,7 +833,8 @@ proptest! {
             prop_assert_eq!(planted.groom.len(), planted.roots.len());
             for strand in planted.groom.strands() {
                 prop_assert_eq!(strand.points.len(), nodes as usize);
-                prop_assert!(Strand::from_polyline(strand.points).is_ok());
+                let made = Strand::from_polyline(strand.points);
+                prop_assert!(made.is_ok(), "{:?}: {:?}", made.err(), strand.points);
             }
             let mut places = roots(&planted);
             places.truncate(500);

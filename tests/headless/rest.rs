@@ -2,22 +2,18 @@
 #![cfg(all(feature = "groom", feature = "save"))]
 
 use crate::{
-    common::{app_with_meshes, run},
+    common::{app_with_meshes, run, wait_for},
     worlds_measured::wearer,
 };
 use bevy::prelude::*;
 use bevy_keratin::prelude::*;
-use std::{thread::sleep, time::Duration};
 
 /// Waits for the hair.
 fn worn(app: &mut App) -> Entity {
-    let worn = (0..4000).find_map(|_| {
-        app.update();
-        sleep(Duration::from_millis(2));
+    wait_for(app, |app| {
         let world = app.world_mut();
         world.query_filtered::<Entity, (With<WornHair>, With<Strands>)>().iter(world).next()
-    });
-    worn.expect("no hair is worn after 8 s")
+    })
 }
 
 /// Strands of a preset that sleep, and that do not, seconds after it was put on a head that stands still.

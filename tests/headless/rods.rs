@@ -259,7 +259,14 @@ fn a_block_keeps_nothing_of_the_strands_before() {
         let level = fearless_simd::Level::new();
         let dt = 1.0 / 180.0;
         let gravity = Vec3::NEG_Y * REFERENCE_GRAVITY;
-        let params = DirectParams { dt, gravity, damping: 0.01, limiter_steps: 6, clearance: 1e-3 };
+        let params = DirectParams {
+            dt,
+            gravity,
+            damping: 0.01,
+            torsion: 0.46,
+            limiter_steps: 6,
+            clearance: 1e-3,
+        };
         weigh(level, &mut block, 0.13, dt);
         step(level, &mut block, &params, &[]);
         block.nodes.iter().map(|n| n.p).collect::<Vec<_>>()

@@ -3,7 +3,7 @@
 
 use crate::{
     characters::{edit, keep, on_head},
-    common::faults,
+    common::{faults, wait_for},
     wear::{app, place_in, worn},
     worlds_measured::wearer::{HALF, MIDDLE, ball, character},
 };
@@ -33,17 +33,13 @@ fn shells_now(app: &App, hair: Entity) -> Vec<Entity> {
 
 /// What shades the skin under a hair, once it does.
 fn shells(app: &mut App, hair: Entity) -> Vec<Entity> {
-    for _ in 0..2000 {
-        app.update();
+    let shells = wait_for(app, |app| {
         let shells = shells_now(app, hair);
-        if !shells.is_empty() {
-            // Its colour, and its place in the world.
-            app.update();
-            return shells;
-        }
-        sleep(Duration::from_millis(2));
-    }
-    panic!("no skin is shaded");
+        (!shells.is_empty()).then_some(shells)
+    });
+    // Its colour, and its place in the world.
+    app.update();
+    shells
 }
 
 /// All of it in the world, those of hair that is gone too.

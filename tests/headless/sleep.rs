@@ -269,7 +269,7 @@ fn holding_and_letting_go_wakes_it() {
     let hold = |app: &mut App, e: Entity, x: f32| {
         let mut targets = vec![None; 9];
         targets[8] = Some(Vec3::new(x, -0.23, 0.0));
-        app.world_mut().entity_mut(e).insert(HeldNodes { targets });
+        app.world_mut().entity_mut(e).insert(HeldNodes { targets, ..default() });
     };
     let mut app = woken(|app, _, e| hold(app, e, 0.05));
     let e = app.world_mut().query_filtered::<Entity, With<Strand>>().single(app.world()).unwrap();

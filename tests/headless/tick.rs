@@ -213,7 +213,7 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
     let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::X);
     app.update();
     app.world_mut().entity_mut(hair).insert((
-        HairStiffness { bending_length: -1.0, damping: -7.0 },
+        HairStiffness { bending_length: -1.0, damping: -7.0, torsion: 3.0 },
         AirDrag { rate: f32::NAN },
         BondInfluence { hydrogen: 0.0, ionic: 0.0, disulfide: 0.0, peptide: 0.0 },
         HairSolver { limiter_steps: 99, ..default() },
@@ -248,6 +248,7 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
             "HairSolver::limiter_steps",
             "HairStiffness::bending_length (m)",
             "HairStiffness::damping (s)",
+            "HairStiffness::torsion",
             "HairSubsteps",
             "PermRod::radius (m)",
             "PermWinding::from_node",

@@ -2,7 +2,7 @@
 #![cfg(all(feature = "groom", feature = "save"))]
 
 use crate::{
-    common::{app_with_meshes, faults},
+    common::{app_with_meshes, faults, wait_for},
     worlds_measured::wearer::{BONES, HALF, MIDDLE, ball, character},
 };
 use bevy::{
@@ -15,7 +15,6 @@ use bevy_keratin::{
     authoring::{groom::Groom, plant::*},
     prelude::*,
 };
-use std::{thread::sleep, time::Duration};
 
 #[derive(Resource, Default)]
 pub(super) struct Reported {
@@ -41,15 +40,11 @@ fn reported(app: &mut App) -> Reported {
 
 /// Updates until an event of wearing is triggered.
 pub(super) fn wait(app: &mut App) -> Reported {
-    for _ in 0..4000 {
-        app.update();
+    wait_for(app, |app| {
         let reported = reported(app);
-        if !(reported.worn.is_empty() && reported.refused.is_empty()) {
-            return reported;
-        }
-        sleep(Duration::from_millis(2));
-    }
-    panic!("nothing was reported of wearing");
+        let any = !(reported.worn.is_empty() && reported.refused.is_empty());
+        any.then_some(reported)
+    })
 }
 
 pub(super) fn worn(app: &mut App) -> Entity {

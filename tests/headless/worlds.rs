@@ -1,13 +1,6 @@
 //! Worlds that move: each figure that `headless --scene worlds` prints is within its tolerance.
 
-use crate::{rows::Row, worlds_measured as measured};
-
-fn check(rows: Vec<Row>) {
-    assert!(!rows.is_empty());
-    rows.iter().for_each(|row| println!("{row:?}"));
-    let outside: Vec<_> = rows.iter().filter(|row| !row.within).collect();
-    assert!(outside.is_empty(), "{outside:#?}");
-}
+use crate::{check, worlds_measured as measured};
 
 #[test]
 fn uneven_frames_do_not_move_hair() {

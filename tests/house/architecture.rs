@@ -363,8 +363,10 @@ fn no_file_is_too_long_to_be_understood() {
 /// Lines of code that `src` may have, Rust and WGSL; 36,182 before rooms were rebuilt, 37,028
 /// before worlds that move, 38,320 before hair was worn on any character and read from any file, 40,287 before worn
 /// hair shaded its skin, friction acted in the solve, and it was known which bone of a character jumps or gets
-/// another parent, 41,298 before locks that touch came to rest. A commit that raises it says why.
-const MOST_LINES: usize = 41_400;
+/// another parent, 41,298 before locks that touch came to rest, 41,500 before grooms came from Alembic and scans,
+/// 43,069 before hair resisted twist as a fibre does, 43,229 before roots followed bones by name.
+/// A commit that raises it says why.
+const MOST_LINES: usize = 43_850;
 
 #[test]
 fn the_crate_stays_small() {

@@ -13,7 +13,18 @@ pub fn tests() -> Vec<Trial> {
         super::with("odd", "grooms::text_of_tressfx_2", text_of_tressfx_2),
         super::with("", "grooms::real_tressfx_files", real_tressfx_files),
         super::with("blender", "grooms::lines_from_blender", lines_from_blender),
-        super::with("blender", "grooms::alembic_and_usd_are_named", alembic_and_usd_are_named),
+        super::with(
+            "blender",
+            "grooms::alembic_is_what_was_exported",
+            alembic_is_what_was_exported,
+        ),
+        super::with("blender", "grooms::alembic_in_life_size", alembic_in_life_size),
+        super::with("blender", "grooms::broken_alembic", |folder| broken_alembic(folder, 997, 250)),
+        super::with("blender", "grooms::alembic_broken_everywhere", |folder| {
+            broken_alembic(folder, 1, 100_000);
+        })
+        .with_ignored_flag(true),
+        super::with("blender", "grooms::usd_is_named", usd_is_named),
     ]
 }
 
@@ -132,11 +143,92 @@ fn lines_from_blender(folder: &Path) {
     assert!(off < 1e-3, "roots are off the head by {off} of its radius");
 }
 
-fn alembic_and_usd_are_named(folder: &Path) {
-    for (name, says) in
-        [("curves.abc", "Alembic"), ("curves.usdc", "USD"), ("curves-small.usda", "USD")]
-    {
+const ARCHIVES: [&str; 4] =
+    ["curves.abc", "curves-hair-only.abc", "particles.abc", "unreal-style.abc"];
+
+/// Strands, points and extents as Blender and the Alembic library tell them, in the file's unit.
+fn alembic_is_what_was_exported(folder: &Path) {
+    let expected: serde_json::Value =
+        serde_json::from_slice(&bytes(folder, "expected.json")).unwrap();
+    for name in ARCHIVES {
+        let (groom, losses) = alembic::read(&bytes(folder, name)).unwrap();
+        assert!(!losses.is_broken(), "{name}: {losses}");
+        let mut first = 0;
+        let sets = expected[name]["objects"].as_array().unwrap().iter();
+        for set in sets.filter(|set| set.get("curves").is_some()) {
+            let count = |what: &str| set[what].as_u64().unwrap() as usize;
+            let strands = groom.picked(first..first + count("curves"));
+            first += count("curves");
+            assert_eq!(strands.len(), count("curves"), "{name}");
+            assert_eq!(strands.points().len(), count("points"), "{name}");
+            let points = strands.points();
+            let (low, high) = strands.extents().unwrap();
+            let ends = (points[0], points[points.len() - 1]);
+            for (what, found) in
+                [("min", low), ("max", high), ("first_point", ends.0), ("last_point", ends.1)]
+            {
+                for k in 0..3 {
+                    let off = (set[what][k].as_f64().unwrap() - f64::from(found[k])).abs();
+                    assert!(off < 1.1e-5, "{name}: {what} is {found}");
+                }
+            }
+            let total: f64 = strands.strands().map(|s| f64::from(s.length())).sum();
+            let expected = set["total_polyline_m"].as_f64().unwrap();
+            assert!((total / expected - 1.0).abs() < 1e-5, "{name}: {total}");
+        }
+        assert_eq!(groom.len(), first, "{name}");
+        let again = alembic::read(&alembic::write(&groom).unwrap()).unwrap().0;
+        assert!(again == groom, "{name} is another once written");
+    }
+}
+
+fn alembic_in_life_size(folder: &Path) {
+    let (hair, losses) = read(folder, "curves.abc");
+    assert_eq!((hair.len(), losses.skipped_primitives.count), (600, 1), "{losses}");
+    assert_eq!((hair.odd_size(1.0), hair.odd_up(UpAxis::Y)), (None, None));
+    let width = hair.mean_width().unwrap();
+    assert!((width - 6e-5).abs() < 1e-6, "{width} m");
+    // In centimetres, with the guides that the file names.
+    let (unreal, losses) = read(folder, "unreal-style.abc");
+    assert_eq!(unreal.odd_size(1.0).unwrap().scale, 0.01);
+    assert_eq!(unreal.guides(500).len(), 30);
+    assert!(unreal.guides(500).into_iter().all(|i| i < 30));
+    assert!(unreal.strands().all(|s| s.uv.is_some() && s.widths.is_some()));
+    assert!(losses.turned_strands.count == 0 && losses.unread_arrays.count == 10, "{losses}");
+}
+
+/// Cut short and with bytes changed: a groom, or an error that says where; see the unit tests for memory.
+fn broken_alembic(folder: &Path, step: usize, changed: usize) {
+    let mut state = 1u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 33) as usize % below
+    };
+    for name in ARCHIVES {
+        let whole = bytes(folder, name);
+        for end in (6..whole.len()).step_by(step) {
+            let error = alembic::read(&whole[..end]).expect_err("a file cut short").to_string();
+            assert!(error.starts_with("byte ") && error.contains("expected"), "{error}");
+        }
+        for round in 0..changed {
+            let mut file = whole.clone();
+            // The structure is at the end and in headers; most other bytes are numbers.
+            let near = [file.len(), 3000, 600][round % 3];
+            for _ in 0..=random(8) {
+                let at = file.len() - 1 - random(near);
+                file[at] = random(256) as u8;
+            }
+            if let Ok((groom, _)) = alembic::read(&file) {
+                assert!(groom.points().len() <= file.len() / 4);
+                assert!(groom.points().iter().all(|p| p.is_finite()));
+            }
+        }
+    }
+}
+
+fn usd_is_named(folder: &Path) {
+    for name in ["curves.usdc", "curves-small.usda"] {
         let error = GroomFormat::of(&bytes(folder, name)).unwrap_err().to_string();
-        assert!(error.contains(says), "{name}: {error}");
+        assert!(error.contains("USD"), "{name}: {error}");
     }
 }

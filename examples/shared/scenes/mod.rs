@@ -203,6 +203,7 @@ pub struct Surroundings<'w> {
     contact: ResMut<'w, HairDefault<StrandContact>>,
     substeps: ResMut<'w, HairSubsteps>,
     solver: ResMut<'w, HairDefault<HairSolver>>,
+    stiffness: ResMut<'w, HairDefault<HairStiffness>>,
     climate: ResMut<'w, HairClimate>,
     process: ResMut<'w, HairProcessTime>,
     rules: ResMut<'w, DropletRules>,
@@ -217,6 +218,8 @@ impl Surroundings<'_> {
         *self.substeps = default();
         // The papers' scenes are computed at the papers' step.
         self.solver.substep = 1.0 / 360.0;
+        // Hair of the papers resists twist as much as bending.
+        self.stiffness.torsion = 1.0;
         *self.climate = default();
         *self.process = default();
         *self.rules = default();
@@ -275,7 +278,7 @@ pub fn spawn_scene(mut commands: Commands, scene: Res<Scene>, mut surroundings: 
                 _ => StrandModel::Rod,
             };
             // Soft hair, that hangs.
-            let stiffness = HairStiffness::from_bending_length(0.06).expect("6 cm is valid");
+            let stiffness = HairStiffness { bending_length: 0.06, torsion: 1.0, ..default() };
             commands.entity(hair).insert((model, stiffness));
             commands.spawn((
                 Prop,

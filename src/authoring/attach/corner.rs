@@ -22,6 +22,11 @@ pub(super) struct Corner {
 }
 
 impl Corner {
+    /// A point that is on no mesh and moves with joints.
+    pub fn on_joints(at: Vec3, joints: [u16; 4], weights: [f32; 4]) -> Self {
+        Self { at, part: 0, joints, weights, shifts: [0; 2] }
+    }
+
     /// The range of its shifts among those of its hair.
     pub fn shifts(&self) -> Range<usize> {
         self.shifts[0] as usize..self.shifts[1] as usize

@@ -10,8 +10,8 @@ use bevy::prelude::*;
 pub enum RootsError {
     /// Not one root for each strand.
     #[error(
-        "RootsOnMesh has {found} roots, expected {expected}, one for each strand of its hair: \
-         take both from the same planting"
+        "RootsOnMesh or RootsOnBones has {found} roots, expected {expected}, one for each strand of its hair: \
+         take both from the same planting or groom"
     )]
     Count {
         /// How many roots there are.
@@ -64,10 +64,21 @@ pub enum RootsError {
         /// How many inverse bind poses.
         poses: usize,
     },
+    /// Bones that are not there.
+    #[error(
+        "no entity among {named} with names at, below or above the hair of RootsOnBones is named {missing}: put the \
+         hair on its character, or set RootsOnBones::skeleton, or name the bones as the .tfxbone does"
+    )]
+    NoBones {
+        /// Their names, quoted.
+        missing: String,
+        /// How many entities with names there are.
+        named: usize,
+    },
     /// Roots on triangles that have no area, and so no normal, or that are not finite.
     #[error(
-        "{found} roots of RootsOnMesh are on triangles without area, expected none: they stay on \
-         the hair; plant them elsewhere or repair the mesh"
+        "{found} roots of RootsOnMesh or RootsOnBones are on triangles without area, expected none: they stay on \
+         the hair; plant them elsewhere or repair the mesh, or the bones' scale"
     )]
     Flat {
         /// How many there are.

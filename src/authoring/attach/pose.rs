@@ -55,6 +55,17 @@ impl Movers {
         Ok(first..self.joints.len())
     }
 
+    /// Adds a bone, with the transform to its own space from that of the roots at rest. Returns its index.
+    pub fn add_bone(&mut self, entity: Entity, inverse_bind: Affine3A) -> u16 {
+        self.joints.push(Joint { entity, inverse_bind });
+        (self.joints.len() - 1) as u16
+    }
+
+    /// The joints' entities.
+    pub fn bones(&self) -> impl Iterator<Item = Entity> + '_ {
+        self.joints.iter().map(|joint| joint.entity)
+    }
+
     /// The meshes that they move; none before there is one.
     pub fn meshes(&self) -> &[Entity] {
         &self.meshes

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::authoring::plant::RootOnMesh;
 use bevy::{
-    ecs::entity::MapEntities,
+    ecs::entity::{EntityHashMap, MapEntities},
     math::{Affine3A, Isometry3d, Mat3A},
     prelude::*,
 };
@@ -100,8 +100,11 @@ pub struct TiedRoots {
     /// The triangles that the roots are on.
     #[reflect(ignore)]
     pub(super) triangles: Option<Triangles>,
-    /// Whether the roots are those of [`RootsOnMesh`], or never will be.
+    /// Whether the roots are those of [`RootsOnMesh`] or [`RootsOnBones`](super::RootsOnBones), or never will be.
     pub(super) done: bool,
+    /// For how long bones have been searched (s).
+    #[reflect(ignore)]
+    pub(super) searched: f32,
     /// Whether the mesh has changed and is to be read again.
     #[reflect(ignore)]
     pub(super) stale: bool,
@@ -118,6 +121,11 @@ pub struct TiedRoots {
 pub(crate) struct MadeAgain;
 
 impl TiedRoots {
+    /// Where roots are on their way to, if they are on the same meshes or bones as before.
+    pub(super) fn aims(&self, is_known: bool) -> EntityHashMap<Isometry3d> {
+        self.roots.iter().filter(|_| is_known).map(|root| (root.strand, root.to)).collect()
+    }
+
     /// Whether the mesh no longer fits, since the last call of this.
     pub(crate) fn take_lost(&mut self) -> bool {
         core::mem::take(&mut self.lost)

@@ -4,10 +4,11 @@
 //! everything else is derived from that, however often.
 
 use super::{
+    bones::{RootsOnBones, SEARCH_TIME, SEARCHES, Skeletons, on_bones},
     corner::{Corner, Corners, Triangles},
     error::RootsError,
     morph::Morphs,
-    pose::Movers,
+    pose::{MeshPose, Movers},
     roots::{MadeAgain, PlantedRoot, RootsOnMesh, Tied, TiedRoots, triangle},
 };
 use crate::{
@@ -16,7 +17,7 @@ use crate::{
         fault::{FaultKind, HairFault},
         schedule::HairStep,
     },
-    hair::strand::{HairHere, MIN_SEGMENT, Strand, StrandHistory, Strands, TickPose},
+    hair::strand::{HairHere, MIN_SEGMENT, Pose, Strand, StrandHistory, Strands, TickPose},
 };
 use bevy::{
     ecs::{entity::EntityHashMap, system::SystemParam},
@@ -94,7 +95,7 @@ pub(super) fn tie(
     transforms: TransformHelper,
     morphs: Morphs,
     mut hairs: Query<(Entity, Ref<RootsOnMesh>, &mut TiedRoots, &Strands, &TickPose), HairHere>,
-    mut strands: Query<(&mut Strand, &mut StrandHistory, Option<&PlantedRoot>)>,
+    mut strands: Query<Rooted>,
     mut faults: MessageWriter<HairFault>,
 ) {
     if step.index != 0 {
@@ -143,29 +144,146 @@ pub(super) fn tie(
         };
         let place = |entity| transforms.compute_global_transform(entity).ok();
         let Some(posed) = movers.pose(place, &morphs) else { continue };
-        let mut flat = 0;
-        let mut made = Vec::with_capacity(chosen.len());
         let from_mesh: Vec<Affine3A> = roots.meshes().map(|(_, from_mesh)| from_mesh).collect();
-        let was_tied = !tied.movers.meshes().is_empty();
-        let aims: EntityHashMap<Isometry3d> =
-            tied.roots.iter().map(|root| (root.strand, root.to)).collect();
-        for (((member, root), corners), planted) in
-            members.iter().zip(chosen).zip(corners).zip(planted)
-        {
+        let is_new_mesh = !tied.movers.meshes().is_empty() && !is_known;
+        let puts = Puts {
+            bind: |corner: &Corner| from_mesh[usize::from(corner.part)].transform_point3(corner.at),
+            posed: &posed,
+            pose: pose.now(),
+            is_new_mesh,
+            aims: tied.aims(is_known),
+        };
+        let each = members.iter().zip(chosen.into_iter().zip(corners)).zip(planted);
+        let (made, flat) = puts.all(each, &mut strands, &mut commands);
+        *tied =
+            TiedRoots { roots: made, movers, triangles: Some(triangles), done: true, ..default() };
+        if flat > 0 {
+            report(RootsError::Flat { found: flat });
+        }
+    }
+}
+
+/// Ties the strands of new or changed [`RootsOnBones`], once their bones are there.
+pub(super) fn tie_to_bones(
+    step: Res<HairStep>,
+    mut commands: Commands,
+    skeletons: Skeletons,
+    transforms: TransformHelper,
+    morphs: Morphs,
+    mut hairs: Query<
+        (Entity, &mut RootsOnBones, &mut TiedRoots, &Strands),
+        (HairHere, Without<RootsOnMesh>),
+    >,
+    mut strands: Query<Rooted>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    if step.index != 0 {
+        return;
+    }
+    for (hair, mut roots, mut tied, members) in &mut hairs {
+        if roots.is_changed() {
+            (tied.done, tied.searched) = (false, 0.0);
+        }
+        if tied.done {
+            continue;
+        }
+        let before = tied.searched;
+        tied.searched += step.dt * step.count as f32;
+        let searches = |seconds: f32| (SEARCHES * seconds) as u32;
+        if before > 0.0 && searches(before) == searches(tied.searched) {
+            continue;
+        }
+        let found = skeletons.search(hair, &roots);
+        if !found.missing.is_empty() && tied.searched < SEARCH_TIME {
+            continue;
+        }
+        // Where all of them are at the end of the tick: a hair that moves is elsewhere now.
+        let place = |entity| transforms.compute_global_transform(entity).ok();
+        let Some(pose) = place(hair).as_ref().and_then(Pose::of) else { continue };
+        let roots = roots.bypass_change_detection();
+        let (movers, joints) = found.movers(&mut roots.rest, &pose, place);
+        let Some(posed) = movers.pose(place, &morphs) else { continue };
+        let mut report = |why| {
+            faults.write(
+                HairFault::caused(FaultKind::Roots, why, "strands follow the bones that are there")
+                    .of(hair),
+            )
+        };
+        if !found.missing.is_empty() {
+            report(found.error());
+        }
+        let planted = members.iter().map(|id| strands.get(id).ok().and_then(|s| s.2).copied());
+        let planted: Vec<Option<PlantedRoot>> = planted.collect();
+        let count = roots.roots.len().min(roots.bones.strands.len());
+        // The number of a root in place of its triangle.
+        let numbered = |i| RootOnMesh { vertices: [i; 3], weights: Vec3::X };
+        let keys: Vec<RootOnMesh> = (0..count as u32).map(numbered).collect();
+        let chosen = match assigned(&planted, &keys) {
+            Ok(chosen) => chosen,
+            Err(why) => {
+                tied.done = true;
+                report(why);
+                continue;
+            }
+        };
+        let puts = Puts {
+            bind: |corner: &Corner| corner.at,
+            posed: &posed,
+            pose: &pose,
+            is_new_mesh: false,
+            aims: tied.aims(tied.movers.bones().eq(movers.bones())),
+        };
+        let corners = chosen.into_iter().map(|root| {
+            let i = root.vertices[0] as usize;
+            Some((root, on_bones(roots.roots[i], &roots.bones.strands[i], &joints)?))
+        });
+        let bound = members.iter().zip(corners).zip(planted);
+        let each = bound.filter_map(|((id, corners), planted)| Some(((id, corners?), planted)));
+        let (made, flat) = puts.all(each, &mut strands, &mut commands);
+        *tied = TiedRoots { roots: made, movers, done: true, ..default() };
+        if flat > 0 {
+            report(RootsError::Flat { found: flat });
+        }
+    }
+}
+
+/// What a strand has to be tied.
+type Rooted = (&'static mut Strand, &'static mut StrandHistory, Option<&'static PlantedRoot>);
+
+/// How strands are put in their places.
+struct Puts<'a, B> {
+    /// Where a corner is before it is posed.
+    bind: B,
+    posed: &'a MeshPose<'a>,
+    pose: &'a Pose,
+    is_new_mesh: bool,
+    /// Roots that are on their way.
+    aims: EntityHashMap<Isometry3d>,
+}
+
+impl<B: Fn(&Corner) -> Vec3> Puts<'_, B> {
+    /// Puts each strand in its place. Returns those tied, and how many cannot be.
+    fn all(
+        &self,
+        each: impl Iterator<Item = ((Entity, (RootOnMesh, [Corner; 3])), Option<PlantedRoot>)>,
+        strands: &mut Query<Rooted>,
+        commands: &mut Commands,
+    ) -> (Vec<Tied>, usize) {
+        let (mut made, mut flat) = (Vec::new(), 0);
+        for ((member, (root, corners)), planted) in each {
             let Ok((mut strand, mut history, _)) = strands.get_mut(member) else { continue };
-            let seen = |at| pose.now().point_in(at);
+            let seen = |at| self.pose.point_in(at);
             let place = Place {
                 root,
-                bind: corners.map(|c| from_mesh[usize::from(c.part)].transform_point3(c.at)),
-                posed: corners.map(|c| seen(posed.corner(&c))),
-                unmorphed: corners.map(|c| seen(posed.unmorphed(&c))),
+                bind: corners.map(|c| (self.bind)(&c)),
+                posed: corners.map(|c| seen(self.posed.corner(&c))),
+                unmorphed: corners.map(|c| seen(self.posed.unmorphed(&c))),
             };
             let found = match planted {
                 None => plant(&place, &mut strand, &mut history),
                 Some(planted) => {
-                    let is_new_mesh = was_tied && !is_known;
-                    let aim = aims.get(&member).filter(|_| is_known && planted.root == root);
-                    put(&place, planted, is_new_mesh, aim, &mut strand, &mut history)
+                    let aim = self.aims.get(&member).filter(|_| planted.root == root);
+                    put(&place, planted, self.is_new_mesh, aim, &mut strand, &mut history)
                 }
             };
             let Some((is, at)) = found else {
@@ -178,11 +296,7 @@ pub(super) fn tie(
             let offset = is.offset();
             made.push(Tied { strand: member, root, corners, offset, from: at, to: at });
         }
-        *tied =
-            TiedRoots { roots: made, movers, triangles: Some(triangles), done: true, ..default() };
-        if flat > 0 {
-            report(RootsError::Flat { found: flat });
-        }
+        (made, flat)
     }
 }
 

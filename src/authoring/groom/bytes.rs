@@ -37,8 +37,8 @@ pub enum GroomFileError {
     },
     /// A file of another kind.
     #[error(
-        "byte 0: found {found}, expected the beginning of a groom (HAIR, glTF, JSON or a TressFX \
-         version of 3 or 4): {hint}"
+        "byte 0: found {found}, expected the beginning of a groom (HAIR, glTF, JSON, Ogawa, ply or a \
+         TressFX version of 3 or 4): {hint}"
     )]
     Foreign {
         /// What it is.
@@ -66,6 +66,9 @@ pub enum GroomFileError {
         /// How to fix it.
         hint: &'static str,
     },
+    /// A `.tfxbone` that cannot be read; a byte is one of it.
+    #[error("the .tfxbone, {0}; GroomSettings::bones can do without it")]
+    Bones(Box<GroomFileError>),
     /// The data read are no valid groom.
     #[error(transparent)]
     Groom(#[from] GroomError),
@@ -111,18 +114,12 @@ impl<'a> Bytes<'a> {
         offset: u64,
         count: u64,
         what: &'static str,
-        make: impl Fn([f32; N]) -> T,
+        make: impl FnMut([f32; N]) -> T,
     ) -> Result<Vec<T>, GroomFileError> {
         let bytes = self.array(offset, count, 4 * N as u64, what)?;
-        let mut groups = Vec::with_capacity(bytes.len() / (4 * N));
-        for group in bytes.chunks_exact(4 * N) {
-            let mut numbers = [0.0; N];
-            for (number, word) in numbers.iter_mut().zip(words(group)) {
-                *number = f32::from_bits(word);
-            }
-            groups.push(make(numbers));
-        }
-        Ok(groups)
+        let (words, _) = bytes.as_chunks::<4>();
+        let (groups, _) = words.as_chunks::<N>();
+        Ok(groups.iter().map(|group| group.map(f32::from_le_bytes)).map(make).collect())
     }
 }
 
@@ -134,7 +131,7 @@ pub(super) fn some_strands(offset: u64, count: u64) -> Result<(), GroomFileError
     }
 }
 
-fn words(bytes: &[u8]) -> impl Iterator<Item = u32> {
+pub(super) fn words(bytes: &[u8]) -> impl Iterator<Item = u32> {
     bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word))
 }
 

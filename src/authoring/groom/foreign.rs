@@ -1,7 +1,7 @@
 //! What a file is that is no groom that can be read.
 
-const LINES: &str = "export the hair as glTF lines (in Blender: curves converted to a mesh of loose edges), \
-                     .hair or .tfx";
+const LINES: &str = "export the hair as Alembic (.abc), glTF lines, .hair or .tfx";
+const OGAWA: &str = "export it again as Alembic of today (Ogawa); abcconvert -toOgawa does so too";
 const UNPACK: &str = "unpack it and load what is inside";
 const DOWNLOAD: &str =
     "a download left it in place of the file: fetch the file again and look at it";
@@ -10,13 +10,12 @@ const POINTER: &str =
 const SWAPPED: &str = "swap its bytes or export it again, little-endian";
 const OLD: &str = "convert it to a binary .tfx of version 3 or 4 with TressFX's exporter";
 
+const UNKNOWN: &str = "an unknown kind of file";
+
 /// Beginnings of files, what they are, and what to do with them.
-const KNOWN: [(&[u8], &str, &str); 31] = [
+const KNOWN: [(&[u8], &str, &str); 28] = [
     (b"version https://git-lfs", "a Git LFS pointer", POINTER),
-    (b"Ogawa", "an Alembic archive (.abc, Ogawa)", LINES),
-    (b"\x89HDF\r\n\x1a\n", "an HDF5 file, as Alembic archives of before 2013 are", LINES),
-    (b"ply\n", "a PLY file", LINES),
-    (b"ply\r", "a PLY file", LINES),
+    (b"\x89HDF\r\n\x1a\n", "an HDF5 file, as Alembic archives of before 2013 are", OGAWA),
     (b"PXR-USDC", "a USD file (binary)", LINES),
     (b"#usda", "a USD file (text)", LINES),
     (b"BLENDER", "a Blender file", LINES),
@@ -58,9 +57,6 @@ pub(super) fn described(file: &[u8]) -> (String, &'static str) {
     if let Some(found) = markup(text).or_else(|| tressfx(file, text)) {
         return found;
     }
-    if is_salon_data(file) {
-        return ("a USC-HairSalon file (.data)".to_owned(), LINES);
-    }
     if text.is_empty() || file.iter().all(|byte| *byte == 0) {
         return ("nothing but blanks or zeros".to_owned(), "fetch or export it again");
     }
@@ -73,7 +69,12 @@ pub(super) fn described(file: &[u8]) -> (String, &'static str) {
         let found = format!("numbers without a header (it begins with {start})");
         return (found, "write them with the header of a .hair: see yuksel::write");
     }
-    (format!("an unknown kind of file (it begins with {start})"), LINES)
+    (format!("{UNKNOWN} (it begins with {start})"), LINES)
+}
+
+/// Whether nothing is known about it.
+pub(super) fn is_unknown(file: &[u8]) -> bool {
+    described(file).0.starts_with(UNKNOWN)
 }
 
 /// The same for files that stand in place of another one.
@@ -120,25 +121,6 @@ fn tressfx(file: &[u8], text: &[u8]) -> Option<(String, &'static str)> {
     Some((format!("a .tfx of TressFX version {version}"), OLD))
 }
 
-/// A count of strands, then for each a count of nodes and as many points, up to the end of the file.
-fn is_salon_data(file: &[u8]) -> bool {
-    let count = |at: usize| {
-        let word = file.get(at..at.checked_add(4)?)?.first_chunk()?;
-        usize::try_from(i32::from_le_bytes(*word)).ok()
-    };
-    let Some(strands @ 1..) = count(0) else {
-        return false;
-    };
-    let mut at = 4;
-    for _ in 0..strands {
-        let Some(nodes) = count(at) else {
-            return false;
-        };
-        at += 4 + 12 * nodes;
-    }
-    at == file.len()
-}
-
 /// The first line, if it is of numbers.
 fn numbers_of(text: &[u8]) -> Option<&str> {
     let end = text.iter().position(|byte| *byte == b'\n').unwrap_or(text.len()).min(200);
@@ -162,10 +144,6 @@ mod tests {
 
     #[test]
     fn foreign_files_are_named() {
-        let salon: Vec<u8> = [2, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0]
-            .iter()
-            .flat_map(|word: &i32| word.to_le_bytes())
-            .collect();
         let dump: Vec<u8> = (0..30).flat_map(|i| (0.01 * i as f32 - 0.1).to_le_bytes()).collect();
         let tfx = |version: f32, swap: bool| -> Vec<u8> {
             let words = [version.to_bits(), 100, 16];
@@ -182,13 +160,11 @@ mod tests {
             (b"\r\n<!DOCTYPE html>\n<html>", "web page", "download"),
             (b"<HTML><body>not found", "web page", "download"),
             (b"<?xml version='1.0'?><COLLADA>", "XML", "glTF lines"),
-            (b"Ogawa\xff\x00\x01", "Alembic", "glTF lines"),
-            (b"ply\nformat ascii 1.0\n", "PLY", "glTF lines"),
+            (b"\x89HDF\r\n\x1a\n....", "Alembic archives of before 2013", "Ogawa"),
             (b"PK\x03\x04....", "ZIP", "unpack"),
             (b"version 2.0\nscale 1.0\n", "text file of TressFX version 2.0", "version 3 or 4"),
             (&tfx(5.0, false), "TressFX version 5", "version 3 or 4"),
             (&tfx(4.0, true), "big-endian .tfx of TressFX version 4", "little-endian"),
-            (&salon, "USC-HairSalon", "glTF lines"),
             (b"0.1 0.2 0.3\n0.1 0.3 0.3\n", "lines of numbers", "glTF lines"),
             (&dump, "numbers without a header", "yuksel::write"),
             (b"\x00\x00\x00\x00", "zeros", "again"),

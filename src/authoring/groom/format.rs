@@ -1,6 +1,6 @@
 //! The file formats that grooms come in.
 
-use super::{GroomFileError, foreign, gltf};
+use super::{GroomFileError, foreign, gltf, salon};
 use bevy::prelude::*;
 
 /// The kinds of files that a groom is read from.
@@ -15,6 +15,12 @@ pub enum GroomFormat {
     TressFx4,
     /// glTF or GLB.
     Gltf,
+    /// Alembic, in an Ogawa container.
+    Alembic,
+    /// PLY with strands.
+    Ply,
+    /// USC-HairSalon's strands.
+    Salon,
 }
 
 impl GroomFormat {
@@ -34,9 +40,12 @@ impl GroomFormat {
         match file {
             [b'H', b'A', b'I', b'R', ..] => Ok(Self::Yuksel),
             [b'g', b'l', b'T', b'F', ..] => Ok(Self::Gltf),
+            [b'p', b'l', b'y', b'\n' | b'\r', ..] => Ok(Self::Ply),
+            [b'O', b'g', b'a', b'w', b'a', ..] => Ok(Self::Alembic),
             _ if (3.0..4.0).contains(&version) => Ok(Self::TressFx3),
             _ if (4.0..5.0).contains(&version) => Ok(Self::TressFx4),
             text if gltf::looks_like_json(text) => Ok(Self::Gltf),
+            other if foreign::is_unknown(other) && salon::looks_like(other) => Ok(Self::Salon),
             other => {
                 let (found, hint) = foreign::described(other);
                 Err(GroomFileError::Foreign { found, hint })
@@ -44,13 +53,14 @@ impl GroomFormat {
         }
     }
 
-    /// Metres per unit in the format's own samples: tenths of an inch, centimetres, metres. Only glTF
-    /// specifies its unit; [`Groom::odd_size`](super::Groom::odd_size) detects implausible sizes.
+    /// Metres per unit in the format's own samples: tenths of an inch, centimetres, metres; of Alembic
+    /// that of Blender's files, metres. Only glTF specifies its unit;
+    /// [`Groom::odd_size`](super::Groom::odd_size) detects implausible sizes.
     pub fn scale(self) -> f32 {
         match self {
             Self::Yuksel => 0.00254,
             Self::TressFx3 => 0.01,
-            Self::TressFx4 | Self::Gltf => 1.0,
+            Self::TressFx4 | Self::Gltf | Self::Alembic | Self::Ply | Self::Salon => 1.0,
         }
     }
 
@@ -58,7 +68,7 @@ impl GroomFormat {
     pub fn up(self) -> UpAxis {
         match self {
             Self::Yuksel => UpAxis::Z,
-            Self::TressFx3 | Self::TressFx4 | Self::Gltf => UpAxis::Y,
+            _ => UpAxis::Y,
         }
     }
 }

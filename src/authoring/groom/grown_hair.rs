@@ -2,8 +2,9 @@
 
 #[cfg(feature = "render")]
 use super::GroomStrand;
-use super::{Groom, GroomError};
+use super::{Groom, GroomError, RootBones};
 use crate::{
+    authoring::attach::RootsOnBones,
     base::{
         fault::{FaultKind, HairFault},
         schedule::HairFrame,
@@ -17,6 +18,7 @@ use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 /// its strands are spawned once the groom is loaded.
 ///
 /// The groom's origin becomes the entity's: see [`GroomSettings::origin`](super::GroomSettings::origin).
+/// Roots of a groom with [bones](Groom::bones) follow these: see [`RootsOnBones`].
 /// Changing this component, or reloading the asset, makes the hair again; removing it despawns it.
 /// A groom that cannot be used is reported as a [`HairFault`].
 ///
@@ -53,7 +55,7 @@ setting! {
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
     pub struct GroomGuides {
-        /// How many, chosen by [`Groom::guides`].
+        /// How many, chosen by [`Groom::guides`]: of those that the file marks as guides, if it does.
         pub count: usize = 500, in COUNT: 1.0..=1e6, safe 1.0..=1e4, "500 suit a head";
         /// Nodes of a strand, evenly along it.
         pub nodes: usize = 16, in NODES: 2.0..=4096.0, safe 2.0..=64.0, "16 suit hair of a head";
@@ -117,6 +119,12 @@ impl Groom {
                 grown_strands.short
             );
         }
+        if let Some(bones) = grown_strands.bones {
+            commands.entity(hair).queue_silenced(move |mut hair: EntityWorldMut| {
+                let bones = bones.at_rest_as(hair.get());
+                hair.insert(bones);
+            });
+        }
         #[cfg(feature = "render")]
         commands.entity(hair).try_insert(grown_strands.followers);
         Ok(grown_strands
@@ -143,12 +151,21 @@ impl Groom {
         let chosen = self.guides_among(long, guides.count);
         let coarse = self.picked(chosen.iter().copied());
         let coarse = coarse.resampled_by(|length| guides.nodes_of(length))?;
-        let strands = coarse.strands().map(|s| Strand::from_polyline(s.points));
-        let strands: Vec<Strand> = strands.filter_map(Result::ok).collect();
+        let mut bones = RootBones { names: coarse.bones.names.clone(), ..default() };
+        let mut strands = Vec::with_capacity(coarse.len());
+        for (i, line) in coarse.strands().enumerate() {
+            if let Ok(strand) = Strand::from_polyline(line.points) {
+                strands.push(strand);
+                bones.strands.extend(coarse.bones.strands.get(i));
+            }
+        }
         if strands.is_empty() {
             return Err(GroomError::Empty);
         }
+        let roots = || strands.iter().map(|strand| strand.positions()[0]).collect();
+        let is_bound = !bones.strands.is_empty();
         Ok(GrownStrands {
+            bones: is_bound.then(|| RootsOnBones { roots: roots(), bones, ..default() }),
             short: chosen.len() - strands.len(),
             strands,
             #[cfg(feature = "render")]
@@ -175,6 +192,8 @@ impl Groom {
 pub(crate) struct GrownStrands {
     /// The guides.
     pub strands: Vec<Strand>,
+    /// What their roots follow, if the groom says so.
+    pub bones: Option<RootsOnBones>,
     /// All other strands.
     #[cfg(feature = "render")]
     pub followers: crate::render::FollowerRoots,
@@ -189,6 +208,7 @@ pub(super) struct Grown {
     /// The groom that was used, or failed.
     from: Option<GroomedHair>,
     gave_look: bool,
+    gave_bones: bool,
 }
 
 /// Marks a strand that its hair has from its groom.
@@ -255,6 +275,10 @@ fn spawn_grown(
         let has_look = has_look && !grown.gave_look;
         grown.take_off(&mut commands, hair, members, &own);
         grown.from = Some(wanted.clone());
+        let gives_bones = groom.bones().is_some();
+        if core::mem::replace(&mut grown.gave_bones, gives_bones) && !gives_bones {
+            commands.entity(hair).try_remove::<RootsOnBones>();
+        }
         match groom.spawn(&mut commands, hair, &wanted.guides) {
             Ok(strands) => {
                 let marked = strands.into_iter().map(|strand| (strand, GrownStrand));
@@ -308,6 +332,9 @@ fn remove_groomed(
 ) {
     for (hair, mut grown, members) in &mut hairs {
         grown.take_off(&mut commands, hair, members, &own);
+        if grown.gave_bones {
+            commands.entity(hair).remove::<RootsOnBones>();
+        }
         commands.entity(hair).remove::<Grown>();
     }
 }

@@ -1,13 +1,15 @@
 //! A groom on its way in from a file: strands that cannot be are left out, and those that stay keep the
 //! numbers that they have in the file.
 
-use super::{Groom, GroomError, GroomLosses, losses::GroomPlace};
+use super::{Groom, GroomError, GroomLosses, RootBones, losses::GroomPlace};
+use bevy::utils::default;
 
 /// A groom with the number that each strand has in its file, and what was left out.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Intake {
     pub groom: Groom,
     numbers: Vec<u32>,
+    all: usize,
     pub losses: GroomLosses,
 }
 
@@ -19,7 +21,8 @@ impl Intake {
     }
 
     fn new(groom: Groom, losses: GroomLosses) -> Self {
-        Self { numbers: (0..groom.len() as u32).collect(), groom, losses }
+        let all = groom.len();
+        Self { numbers: (0..all as u32).collect(), all, groom, losses }
     }
 
     /// A groom as a file has it, whose numbers may be any: without strands of a single node or with a broken
@@ -29,23 +32,15 @@ impl Intake {
     /// When no strand is left, or its arrays do not fit each other.
     pub fn cleaned(groom: Groom, losses: GroomLosses) -> Result<Self, GroomError> {
         let mut intake = Self::new(groom, losses);
-        let faults = loop {
-            let strands = intake.groom.strands().enumerate();
-            let faults: Vec<_> = strands.map(|(i, strand)| strand.check(i).err()).collect();
-            if !intake.leave_out_array(&faults) {
-                break faults;
-            }
-        };
-        let mut kept = Vec::with_capacity(faults.len());
-        for (i, fault) in faults.into_iter().enumerate() {
-            match fault {
-                None => kept.push(i),
-                Some(
-                    GroomError::NonFinite { node: at, .. } | GroomError::OutOfRange { at, .. },
-                ) => {
+        while intake.leave_out_array() {}
+        let mut kept = Vec::with_capacity(intake.groom.len());
+        for (i, strand) in intake.groom.strands().enumerate() {
+            match strand.check(i) {
+                Ok(()) => kept.push(i),
+                Err(GroomError::NonFinite { node: at, .. } | GroomError::OutOfRange { at, .. }) => {
                     intake.losses.broken_strands.add_node(i, at);
                 }
-                Some(_) => intake.losses.short_strands.add(GroomPlace::Strand(i)),
+                Err(_) => intake.losses.short_strands.add(GroomPlace::Strand(i)),
             }
         }
         intake.keep(kept);
@@ -57,23 +52,35 @@ impl Intake {
     }
 
     /// Leaves out an optional array that breaks more than half of the strands, if there is one.
-    fn leave_out_array(&mut self, faults: &[Option<GroomError>]) -> bool {
+    fn leave_out_array(&mut self) -> bool {
         let arrays: [(&str, fn(&mut Groom)); 3] = [
             (Groom::WIDTH, |groom| groom.widths.clear()),
             (Groom::COLOUR, |groom| groom.colors.clear()),
             (Groom::UV, |groom| groom.uvs.clear()),
         ];
-        for (name, clear) in arrays {
-            let of_it = |fault: &&GroomError| matches!(fault, GroomError::OutOfRange { what, .. } if *what == name);
-            let mut broken = faults.iter().flatten().filter(of_it);
-            let Some(first) = broken.next() else {
+        let Groom { widths, colors, uvs, .. } = &self.groom;
+        if widths.is_empty() && colors.is_empty() && uvs.is_empty() {
+            return false;
+        }
+        let mut broken: [(usize, Option<GroomError>); 3] = default();
+        for (i, strand) in self.groom.strands().enumerate() {
+            let Err(fault @ GroomError::OutOfRange { what, .. }) = strand.check(i) else {
                 continue;
             };
-            if 2 * (broken.count() + 1) > faults.len() {
-                self.losses.broken_arrays.add(GroomPlace::Part(first.to_string()));
-                clear(&mut self.groom);
-                return true;
+            for ((name, _), (count, first)) in arrays.iter().zip(&mut broken) {
+                if *name == what {
+                    *count += 1;
+                    first.get_or_insert_with(|| fault.clone());
+                }
             }
+        }
+        for ((_, clear), (count, first)) in arrays.into_iter().zip(broken) {
+            let Some(first) = first.filter(|_| 2 * count > self.groom.len()) else {
+                continue;
+            };
+            self.losses.broken_arrays.add(GroomPlace::Part(first.to_string()));
+            clear(&mut self.groom);
+            return true;
         }
         false
     }
@@ -84,6 +91,23 @@ impl Intake {
             self.numbers = strands.iter().map(|i| self.numbers[*i]).collect();
             self.groom = self.groom.picked(strands);
         }
+    }
+
+    /// How many strands the file has.
+    pub fn all(&self) -> usize {
+        self.all
+    }
+
+    /// Binds the roots to bones, of at most as many strands as the file has.
+    pub fn bind(&mut self, mut bones: RootBones, losses: GroomLosses) {
+        self.losses += losses;
+        let first = bones.strands.len();
+        let assumed = bones.extend(self.all);
+        if assumed > 0 {
+            self.losses.assumed_bones.add_many(assumed, GroomPlace::Strand(first));
+        }
+        bones.strands = self.numbers.iter().map(|i| bones.strands[*i as usize]).collect();
+        self.groom.bones = bones;
     }
 
     /// The number in the file of a strand.

@@ -1,11 +1,15 @@
 //! Grooms as assets.
 
 use super::{
-    Groom, GroomError, GroomFileError, GroomFormat, GroomLoss, GroomLosses, GroomPlace,
-    GroomSettings, OddSize, RootEnd, gltf, grown_hair, tressfx, yuksel,
+    BonesFile, Groom, GroomError, GroomFileError, GroomFormat, GroomLoss, GroomLosses, GroomPlace,
+    GroomSettings, OddSize, RootBones, RootEnd, StrandBones, alembic, gltf, grown_hair,
+    intake::Intake, ply, salon, tressfx, yuksel,
 };
 use bevy::{
-    asset::{AssetLoader, LoadContext, ReadAssetBytesError, io::Reader},
+    asset::{
+        AssetLoader, AssetPath, LoadContext, ReadAssetBytesError,
+        io::{AssetReaderError, Reader},
+    },
     platform::collections::HashMap,
     prelude::*,
 };
@@ -25,16 +29,25 @@ pub enum GroomLoadError {
         /// Why not.
         source: Box<ReadAssetBytesError>,
     },
+    /// The file of its bones that the settings name.
+    #[error("the bones {path} cannot be read: {source}; correct GroomSettings::bones")]
+    Bones {
+        /// Its path.
+        path: String,
+        /// Why not.
+        source: Box<ReadAssetBytesError>,
+    },
     /// Its contents are in none of the formats, or broken.
     #[error(transparent)]
     File(#[from] GroomFileError),
 }
 
-/// Loads a [`Groom`] from `.hair`, `.tfx`, `.gltf` and `.glb`, detected by their contents.
+/// Loads a [`Groom`] from `.hair`, `.tfx`, `.abc`, `.ply`, `.data`, `.gltf` and `.glb`, detected by their
+/// contents.
 ///
-/// It registers the first two extensions only, so as not to replace Bevy's own glTF loader: name the
-/// type, as in `assets.load::<Groom>("hair.glb")`. The unit and the axis used, and what is left out of a
-/// file, are logged once.
+/// It registers the first three extensions only, so as not to replace Bevy's own glTF loader and loaders of
+/// meshes: name the type, as in `assets.load::<Groom>("hair.glb")`. The unit and the axis used, and what is
+/// left out of a file, are logged once.
 #[derive(TypePath, Clone, Copy, Debug, Default)]
 pub struct GroomLoader;
 
@@ -69,7 +82,11 @@ impl AssetLoader for GroomLoader {
                 external.insert(uri, bytes);
             }
         }
-        let (groom, losses) = Groom::from_file_with(&file, settings, &external)?;
+        let mut intake = intake(&file, format, &external)?;
+        if let Some(bones) = read_bones(format, settings, context).await? {
+            bind(&mut intake, &bones)?;
+        }
+        let (groom, losses) = settings.take(intake, format).map_err(GroomFileError::from)?;
         let (scale, up) = (settings.scale_of(format), settings.up_of(format));
         let (path, count) = (context.path(), groom.len());
         tracing::info!("groom {path}: {count} strands, {scale} m a unit, {up:?} up");
@@ -92,13 +109,13 @@ impl AssetLoader for GroomLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        &["hair", "tfx"]
+        &["hair", "tfx", "abc"]
     }
 }
 
 impl Groom {
-    /// A groom from the bytes of a `.hair`, `.tfx`, GLB or self-contained glTF file, in metres and
-    /// Y up according to the settings, and what was left out.
+    /// A groom from the bytes of a `.hair`, `.tfx`, `.abc`, `.ply`, `.data`, GLB or self-contained glTF file, in
+    /// metres and Y up according to the settings, and what was left out.
     ///
     /// ```
     /// # use bevy_keratin::authoring::groom::*; use bevy::prelude::*;
@@ -118,21 +135,75 @@ impl Groom {
         file: &[u8],
         settings: &GroomSettings,
     ) -> Result<(Self, GroomLosses), GroomFileError> {
-        Self::from_file_with(file, settings, &HashMap::default())
+        let format = GroomFormat::of(file)?;
+        Ok(settings.take(intake(file, format, &HashMap::default())?, format)?)
     }
 
-    fn from_file_with(
+    /// The same with the bytes of a `.tfxbone`, whose bones its roots follow: [`Groom::bones`].
+    ///
+    /// # Errors
+    /// As [`Groom::from_file`], and when the bones are broken or of more strands than the file has.
+    pub fn from_file_with_bones(
         file: &[u8],
+        bones: &[u8],
         settings: &GroomSettings,
-        external: &HashMap<String, Vec<u8>>,
     ) -> Result<(Self, GroomLosses), GroomFileError> {
         let format = GroomFormat::of(file)?;
-        let intake = match format {
-            GroomFormat::Yuksel => yuksel::intake(file)?,
-            GroomFormat::TressFx3 | GroomFormat::TressFx4 => tressfx::intake(file)?,
-            GroomFormat::Gltf => gltf::GltfFile::parse(file)?.intake(external)?,
-        };
+        let mut intake = intake(file, format, &HashMap::default())?;
+        bind(&mut intake, bones)?;
         Ok(settings.take(intake, format)?)
+    }
+}
+
+fn intake(
+    file: &[u8],
+    format: GroomFormat,
+    external: &HashMap<String, Vec<u8>>,
+) -> Result<Intake, GroomFileError> {
+    match format {
+        GroomFormat::Yuksel => yuksel::intake(file),
+        GroomFormat::TressFx3 | GroomFormat::TressFx4 => tressfx::intake(file),
+        GroomFormat::Alembic => alembic::intake(file),
+        GroomFormat::Ply => ply::intake(file),
+        GroomFormat::Salon => salon::intake(file),
+        GroomFormat::Gltf => gltf::GltfFile::parse(file)?.intake(external),
+    }
+}
+
+/// Binds the roots to the bones of a `.tfxbone`.
+fn bind(intake: &mut Intake, file: &[u8]) -> Result<(), GroomFileError> {
+    let read = tressfx::bones_of(file, intake.all() as u64);
+    let (bones, losses) = read.map_err(|why| GroomFileError::Bones(Box::new(why)))?;
+    intake.bind(bones, losses);
+    Ok(())
+}
+
+/// The file of the bones that the settings want; `None` if there is none beside the groom.
+async fn read_bones(
+    format: GroomFormat,
+    settings: &GroomSettings,
+    context: &mut LoadContext<'_>,
+) -> Result<Option<Vec<u8>>, GroomLoadError> {
+    let groom = context.path();
+    let is_tressfx = matches!(format, GroomFormat::TressFx3 | GroomFormat::TressFx4);
+    let path = match &settings.bones {
+        BonesFile::Beside if is_tressfx => {
+            let beside = groom.path().with_extension("tfxbone");
+            AssetPath::from_path_buf(beside).with_source(groom.source().clone_owned())
+        }
+        BonesFile::Beside | BonesFile::Unused => return Ok(None),
+        BonesFile::Named(name) => groom.resolve_embed(&AssetPath::from_path(name.as_ref())),
+    };
+    match context.read_asset_bytes(path.clone()).await {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(ReadAssetBytesError::AssetReaderError(AssetReaderError::NotFound(_)))
+            if settings.bones == BonesFile::Beside =>
+        {
+            Ok(None)
+        }
+        Err(source) => {
+            Err(GroomLoadError::Bones { path: path.to_string(), source: Box::new(source) })
+        }
     }
 }
 
@@ -150,6 +221,9 @@ impl Plugin for GroomPlugin {
             .register_type::<GroomLoss>()
             .register_type::<GroomPlace>()
             .register_type::<RootEnd>()
+            .register_type::<RootBones>()
+            .register_type::<StrandBones>()
+            .register_type::<BonesFile>()
             .register_type::<GroomError>()
             .register_type::<OddSize>();
         grown_hair::build(app);

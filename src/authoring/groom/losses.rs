@@ -114,6 +114,10 @@ losses! {
     /// Optional arrays left out because they have no data, the wrong length, or numbers that most strands
     /// cannot have.
     broken_arrays: "broken arrays left out", true;
+    /// Weights of bones left out because the bone is not there, or they are negative or not finite.
+    broken_bones: "weights of bones left out that cannot be", true;
+    /// Roots that no bone of a `.tfxbone` moves: they stay with the hair.
+    unbound_roots: "roots without bones", true;
     /// Bytes behind the end of what the file's header tells.
     unread_bytes: "bytes after the end not read", true;
     /// Strands left out because they have no segment or no length.
@@ -126,10 +130,18 @@ losses! {
     merged_nodes: "nodes merged with the one before", false;
     /// Nodes besides the root that the file marks as fixed; only roots are held.
     freed_nodes: "fixed nodes besides roots set free", false;
+    /// Roots that a `.tfxbone` does not name and that follow the bones of the last one that it does.
+    assumed_bones: "roots bound like the last one of the bones' file", false;
     /// Arrays of the file that a groom cannot hold, or of a type that is not read.
     unread_arrays: "arrays not read", false;
-    /// Primitives of a glTF file that are no lines.
+    /// Primitives of a glTF file, and objects of an Alembic archive, that are no lines.
     skipped_primitives: "primitives skipped that are no lines", false;
+    /// Curve sets that are hidden, by themselves or with what they are in.
+    hidden_curves: "hidden curve sets left out", false;
+    /// Curve sets without any curve.
+    empty_curves: "empty curve sets left out", false;
+    /// Samples of animated curves after the first.
+    unread_samples: "samples of animated curves after the first not read", false;
     /// Closed lines opened at their first node.
     opened_loops: "closed lines opened", false;
     /// Nodes where a line branched and was split.

@@ -3,6 +3,8 @@
 //! A [`Groom`] holds strands as polylines, root first, in metres. It comes from a file, from game
 //! code ([`Groom::from_polylines`]) or is planted on a mesh.
 
+pub mod alembic;
+mod bones;
 mod bytes;
 mod foreign;
 mod format;
@@ -12,14 +14,17 @@ mod guides;
 mod intake;
 mod loader;
 mod losses;
+pub mod ply;
 mod reshape;
 mod roots;
+pub mod salon;
 mod settings;
 mod size;
 mod strays;
 pub mod tressfx;
 pub mod yuksel;
 
+pub use bones::{BonesFile, RootBones, StrandBones};
 pub use bytes::GroomFileError;
 pub use format::{GroomFormat, UpAxis};
 pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
@@ -34,8 +39,8 @@ pub use size::OddSize;
 use crate::base::setting::InvalidValue;
 use bevy::prelude::*;
 
-/// Many strands as polylines, root first (m), optionally with widths, colours and UVs of the roots. An
-/// asset; immutable, so that its arrays are always consistent.
+/// Many strands as polylines, root first (m), optionally with widths, colours, UVs of the roots,
+/// marks of guides and bones that roots follow. An asset; immutable, so that its arrays are always consistent.
 #[derive(Asset, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct Groom {
@@ -44,6 +49,8 @@ pub struct Groom {
     widths: Vec<f32>,
     colors: Vec<LinearRgba>,
     uvs: Vec<Vec2>,
+    guides: Vec<bool>,
+    bones: RootBones,
 }
 
 /// One strand of a [`Groom`].
@@ -57,6 +64,8 @@ pub struct GroomStrand<'a> {
     pub colors: Option<&'a [LinearRgba]>,
     /// Where the root is on the scalp's texture, if given.
     pub uv: Option<Vec2>,
+    /// Whether it is marked as a guide: see [`Groom::with_guides`].
+    pub is_guide: bool,
 }
 
 /// Why data cannot be a [`Groom`].
@@ -209,6 +218,31 @@ impl Groom {
         self.checked()
     }
 
+    /// The groom with a mark for each strand whether it is a guide: [`Groom::guides`] chooses among marked
+    /// strands only, where there are any, and all others follow them. Some files have such marks.
+    ///
+    /// # Errors
+    /// When there are not as many as strands.
+    pub fn with_guides(mut self, guides: Vec<bool>) -> Result<Self, GroomError> {
+        self.guides = guides;
+        self.checked()
+    }
+
+    /// The groom with the bones that its roots follow: hair grown from it gets
+    /// [`RootsOnBones`](crate::authoring::attach::RootsOnBones).
+    ///
+    /// # Errors
+    /// When there are not as many as strands, or one names a bone that is not there or has a negative weight.
+    pub fn with_bones(mut self, bones: RootBones) -> Result<Self, GroomError> {
+        self.bones = bones;
+        self.checked()
+    }
+
+    /// The bones that the roots follow, if there are any.
+    pub fn bones(&self) -> Option<&RootBones> {
+        Some(&self.bones).filter(|bones| !bones.strands.is_empty())
+    }
+
     fn checked(self) -> Result<Self, GroomError> {
         self.check().map(|()| self)
     }
@@ -223,7 +257,27 @@ impl Groom {
         fits("widths", self.widths.len(), self.points.len())?;
         fits("colors", self.colors.len(), self.points.len())?;
         fits("uvs", self.uvs.len(), self.len())?;
+        fits("guides", self.guides.len(), self.len())?;
+        fits("bones", self.bones.strands.len(), self.len())?;
+        self.check_bones()?;
         self.strands().enumerate().try_for_each(|(i, strand)| strand.check(i))
+    }
+
+    fn check_bones(&self) -> Result<(), GroomError> {
+        let count = self.bones.names.len();
+        for (strand, bones) in self.bones.strands.iter().enumerate() {
+            let wrong = |what, at, found, expected| {
+                Err(GroomError::OutOfRange { what, strand, at, found, expected })
+            };
+            if let Some(at) = bones.weights.iter().position(|w| !(w.is_finite() && *w >= 0.0)) {
+                let expected = "a finite weight, 0 or more";
+                return wrong("bone's weight", at, bones.weights[at], expected);
+            }
+            if let Some((bone, _)) = bones.used().find(|(bone, _)| usize::from(*bone) >= count) {
+                return wrong("bone", 0, bone.into(), "an index of a name");
+            }
+        }
+        Ok(())
     }
 
     /// Every strand begins where the one before ends, and the last ends with the nodes.
@@ -269,6 +323,7 @@ impl Groom {
             widths: self.widths.get(nodes.clone()).filter(|_| !self.widths.is_empty()),
             colors: self.colors.get(nodes).filter(|_| !self.colors.is_empty()),
             uv: self.uvs.get(i).copied(),
+            is_guide: self.guides.get(i) == Some(&true),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Grooms made of other grooms: scaled, turned upright, cleaned, resampled, thinned.
 
 use super::{
-    Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, UpAxis, intake::evenly,
+    Groom, GroomError, GroomLosses, GroomSettings, GroomStrand, RootBones, UpAxis, intake::evenly,
     losses::GroomPlace,
 };
 use crate::base::setting::ValueRange;
@@ -20,6 +20,9 @@ impl Groom {
     /// When the factor is not between 1e-9 and 1e9, or a node becomes non-finite.
     pub fn scaled(mut self, factor: f32) -> Result<Self, GroomError> {
         SCALE.check(factor)?;
+        if factor == 1.0 {
+            return self.checked();
+        }
         self.points.iter_mut().for_each(|p| *p *= factor);
         self.widths.iter_mut().for_each(|w| *w *= factor);
         self.checked()
@@ -27,7 +30,9 @@ impl Groom {
 
     /// The groom turned so that what was `up` is +Y.
     pub fn with_up(mut self, up: UpAxis) -> Self {
-        self.points.iter_mut().for_each(|p| *p = up.to_y_up(*p));
+        if up != UpAxis::Y {
+            self.points.iter_mut().for_each(|p| *p = up.to_y_up(*p));
+        }
         self
     }
 
@@ -66,16 +71,27 @@ impl Groom {
     pub(super) fn resampled_by(&self, nodes: impl Fn(f32) -> usize) -> Result<Self, GroomError> {
         let mut made = self.emptied();
         let mut along = Vec::new();
-        for strand in self.strands() {
+        for (i, strand) in self.strands().enumerate() {
             let length = arc_lengths(strand.points, &mut along);
             let count = nodes(length as f32).max(2);
             for k in 0..count {
                 let at = place(&along, length * k as f64 / (count - 1) as f64);
                 made.push_blend(&strand, if k + 1 == count { (along.len() - 2, 1.0) } else { at });
             }
-            made.end_strand(strand.uv)?;
+            made.end_strand(self, i)?;
         }
         Ok(made)
+    }
+
+    /// Whether [`Self::merged`] would surely change nothing.
+    pub(super) fn is_merged(&self, shortest: f32) -> bool {
+        let least = (shortest * shortest * 1.001).max(f32::MIN_POSITIVE);
+        let is_far = |strand: GroomStrand<'_>| {
+            let near = strand.points.windows(2).map(|p| p[0].distance_squared(p[1]));
+            // Without a branch for each: that is read as fast as it comes.
+            near.fold(true, |is_far, square| is_far & (square >= least))
+        };
+        self.strands().all(is_far)
     }
 
     /// Every strand without nodes nearer than `shortest` (m) to the one before; the tip stays.
@@ -87,6 +103,7 @@ impl Groom {
         SHORTEST.check(shortest)?;
         let mut losses = GroomLosses::default();
         let mut made = self.emptied();
+        made.points.reserve(self.points.len());
         let mut kept: Vec<usize> = Vec::new();
         for (i, strand) in self.strands().enumerate() {
             let points = strand.points;
@@ -116,7 +133,7 @@ impl Groom {
                 losses.merged_nodes.add_many(merged, GroomPlace::Node { strand: i, node });
             }
             kept.iter().for_each(|i| made.push_node(&strand, *i));
-            made.end_strand(strand.uv)?;
+            made.end_strand(self, i)?;
         }
         Ok((made, losses))
     }
@@ -144,7 +161,7 @@ impl Groom {
             };
             (0..strand.points.len()).for_each(|k| made.push_node(&strand, k));
             // A subset cannot have too many nodes, unless strands are repeated.
-            if made.end_strand(strand.uv).is_err() {
+            if made.end_strand(self, i).is_err() {
                 break;
             }
         }
@@ -163,7 +180,8 @@ impl Groom {
 
     /// An empty groom with capacity for as many strands.
     fn emptied(&self) -> Self {
-        Self { ends: Vec::with_capacity(self.len()), ..default() }
+        let bones = RootBones { names: self.bones.names.clone(), ..default() };
+        Self { ends: Vec::with_capacity(self.len()), bones, ..default() }
     }
 
     fn push_node(&mut self, of: &GroomStrand<'_>, i: usize) {
@@ -180,10 +198,13 @@ impl Groom {
         self.colors.extend(of.colors.map(|c| c[i] * (1.0 - t) + c[i + 1] * t));
     }
 
-    fn end_strand(&mut self, uv: Option<Vec2>) -> Result<(), GroomError> {
+    /// Ends a strand that was strand `i` of another groom.
+    fn end_strand(&mut self, of: &Self, i: usize) -> Result<(), GroomError> {
         let found = self.points.len();
         self.ends.push(u32::try_from(found).map_err(|_| GroomError::TooMany { found })?);
-        self.uvs.extend(uv);
+        self.uvs.extend(of.uvs.get(i));
+        self.guides.extend(of.guides.get(i));
+        self.bones.strands.extend(of.bones.strands.get(i));
         Ok(())
     }
 }

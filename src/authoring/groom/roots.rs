@@ -1,6 +1,11 @@
 //! Which end of a strand is its root.
 
-use super::{Groom, intake::Intake, losses::GroomPlace, strays::middle};
+use super::{
+    Groom,
+    intake::Intake,
+    losses::GroomPlace,
+    strays::{middle, sampled},
+};
 use bevy::prelude::*;
 
 /// Which end of each strand in a file is its root.
@@ -32,6 +37,8 @@ const RISE: f32 = 0.2;
 /// the radius.
 const OFF: f32 = 0.1;
 const ROUNDS: usize = 4;
+/// So many strands or more tell where the head is.
+const ENDS: usize = 8192;
 
 impl Intake {
     /// Turns strands that are stored from tip to root.
@@ -62,8 +69,9 @@ impl Intake {
 
 /// Whether each strand is stored from tip to root; empty where none is.
 fn tip_first(groom: &Groom) -> Vec<bool> {
-    let ends: Vec<[Vec3; 2]> =
+    let all_ends: Vec<[Vec3; 2]> =
         groom.strands().map(|s| [s.points[0], s.points[s.points.len() - 1]]).collect();
+    let ends: Vec<[Vec3; 2]> = sampled(all_ends.len(), ENDS).map(|i| all_ends[i]).collect();
     let as_stored = Ball::of(&ends).filter(|ball| ball.may_be_scalp(&ends));
     let backwards: Vec<[Vec3; 2]> = ends.iter().map(|[first, last]| [*last, *first]).collect();
     let reversed = Ball::of(&backwards).filter(|ball| ball.is_scalp(&backwards));
@@ -86,7 +94,7 @@ fn tip_first(groom: &Groom) -> Vec<bool> {
         centre = ball.map_or(centre, |ball| ball.centre);
     }
     let Some(ball) = ball.filter(|ball| ball.uneven < UNEVEN) else {
-        return if all { vec![true; ends.len()] } else { Vec::new() };
+        return if all { vec![true; all_ends.len()] } else { Vec::new() };
     };
     let mut off: Vec<f32> = roots.iter().map(|ends| ball.off(ends[0])).collect();
     let scalp = quantile(&mut off, 0.98);
@@ -95,7 +103,8 @@ fn tip_first(groom: &Groom) -> Vec<bool> {
     let grows = |from: Vec3, to: Vec3| {
         ball.off(from) <= scalp + 0.5 * margin && ball.off(to) > scalp + margin
     };
-    ends.iter()
+    all_ends
+        .iter()
         .map(|&[first, last]| if all { !grows(first, last) } else { grows(last, first) })
         .collect()
 }

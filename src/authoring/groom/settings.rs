@@ -1,7 +1,7 @@
 //! Import settings: unit, axes and thinning.
 
 use super::{
-    Groom, GroomError, GroomFormat, GroomLosses, RootEnd, UpAxis,
+    BonesFile, Groom, GroomError, GroomFormat, GroomLosses, RootEnd, UpAxis,
     intake::{Intake, evenly},
 };
 use crate::base::setting::{Ranged, setting};
@@ -37,6 +37,8 @@ setting! {
     /// | `.tfx`, version 3 | 0.01 (centimetres) | Y |
     /// | `.tfx`, version 4 | 1 | Y |
     /// | glTF | 1 | Y |
+    /// | Alembic | 1, as Blender writes it; Maya's and Unreal Engine's are in centimetres: 0.01 | Y |
+    /// | `.ply`, `.data` | 1 | Y |
     #[derive(Reflect, Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
     #[serde(default)]
     #[reflect(Default, Clone, PartialEq)]
@@ -47,6 +49,8 @@ setting! {
         pub up: Option<UpAxis> = None;
         /// Which end of a strand is its root.
         pub roots: RootEnd = RootEnd::Found;
+        /// Where the bones of the roots are, which the roots of [`GroomedHair`](super::GroomedHair) follow.
+        pub bones: BonesFile = BonesFile::Beside;
         /// Refuses a file if anything of it had to be left out because it is broken: see
         /// [`GroomLosses::is_broken`]. The error tells what `false` would leave out.
         pub strict: bool = false;
@@ -103,10 +107,15 @@ impl GroomSettings {
         intake.keep(evenly((0..all).step_by(self.keep_every).collect(), limit));
         intake.losses.thinned_strands.count += all - intake.groom.len();
         let groom = core::mem::take(&mut intake.groom);
-        let groom =
-            groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?.moved(-self.origin)?;
-        let (mut groom, losses) = groom.merged(self.shortest_segment)?;
-        intake.add(losses);
+        let mut groom = groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?;
+        if self.origin != Vec3::ZERO {
+            groom = groom.moved(-self.origin)?;
+        }
+        if !groom.is_merged(self.shortest_segment) {
+            let (merged, losses) = groom.merged(self.shortest_segment)?;
+            intake.add(losses);
+            groom = merged;
+        }
         if groom.is_empty() {
             return Err(GroomError::AllLeftOut { losses: intake.losses.to_string() });
         }

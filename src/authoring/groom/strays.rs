@@ -5,7 +5,7 @@
 
 use super::{Groom, GroomLosses, intake::Intake, losses::GroomLoss};
 use crate::base::grid::KdTree;
-use bevy::{math::DVec3, prelude::*};
+use bevy::{math::DVec3, platform::collections::HashMap, prelude::*};
 
 /// Fewer strands are not judged.
 const FEWEST: usize = 8;
@@ -24,22 +24,25 @@ const TOGETHER: f32 = 0.3;
 const SPACINGS: f32 = 4.0;
 /// Roots at one place are strays if they are this share of all at most: more are meant.
 const SHARE: f32 = 0.1;
+/// So many nodes or more tell the middle of all.
+const SAMPLE: usize = 1 << 16;
 /// Where this share of the strands looks like strays, they are no strays.
 const MOST: f32 = 0.25;
 
 impl Intake {
     /// Leaves out strands that reach far away from all others, and strays.
     pub fn leave_out_strays(&mut self) {
-        type Find = fn(&Groom) -> Vec<Option<usize>>;
+        type Find = fn(&Groom, &Reaches) -> Vec<Option<usize>>;
         type Loss = fn(&mut GroomLosses) -> &mut GroomLoss;
         let kinds: [(Find, Loss); 2] =
             [(far, |losses| &mut losses.far_strands), (stray, |losses| &mut losses.stray_strands)];
+        let mut reaches = None;
         for (find, loss) in kinds {
             let all = self.groom.len();
             if all < FEWEST {
                 return;
             }
-            let found = find(&self.groom);
+            let found = find(&self.groom, reaches.get_or_insert_with(|| Reaches::of(&self.groom)));
             let share = found.iter().flatten().count() as f32 / all as f32;
             if share == 0.0 || share > MOST {
                 continue;
@@ -51,6 +54,7 @@ impl Intake {
                 }
             }
             self.keep((0..all).filter(|i| found[*i].is_none()).collect());
+            reaches = None;
         }
     }
 }
@@ -70,49 +74,95 @@ pub(super) fn median(mut numbers: Vec<f32>) -> f32 {
     }
 }
 
-/// How far each strand reaches from the middle of all nodes, and by which node.
-fn reaches(groom: &Groom) -> Vec<(f64, usize)> {
-    let middle = middle(groom.points().iter().copied());
-    let reach = |points: &[Vec3]| {
-        let off = points.iter().enumerate().map(|(k, p)| (p.as_dvec3().distance(middle), k));
-        off.fold((0.0, 0), |most, off| if off.0 > most.0 { off } else { most })
-    };
-    groom.strands().map(|strand| reach(strand.points)).collect()
+/// Numbers below `count`, at most twice `most` of them and evenly spread: by an odd step, so that of strands of 16
+/// nodes every one comes up.
+pub(super) fn sampled(count: usize, most: usize) -> impl Iterator<Item = usize> + Clone {
+    (0..count).step_by((count / most).max(1) | 1)
 }
 
-fn typical(reaches: &[(f64, usize)]) -> f64 {
-    f64::from(median(reaches.iter().map(|r| r.0 as f32).collect()))
+/// How far strands reach from the middle of all nodes.
+struct Reaches {
+    middle: DVec3,
+    /// Of each strand.
+    each: Vec<f64>,
+    /// Of half of them.
+    typical: f64,
+}
+
+impl Reaches {
+    fn of(groom: &Groom) -> Self {
+        let points = groom.points();
+        let middle = middle(sampled(points.len(), SAMPLE).map(|i| points[i]));
+        let square = |p: &Vec3| p.as_dvec3().distance_squared(middle);
+        // Not `f64::max`, which looks at NaN in between: there is none.
+        let larger = |a: f64, b: f64| if b > a { b } else { a };
+        let reach = |points: &[Vec3]| points.iter().map(square).fold(0.0, larger).sqrt();
+        let each: Vec<f64> = groom.strands().map(|strand| reach(strand.points)).collect();
+        let typical = f64::from(median(each.iter().map(|reach| *reach as f32).collect()));
+        Self { middle, each, typical }
+    }
+
+    /// The node that is farthest.
+    fn farthest(&self, strand: &[Vec3]) -> usize {
+        let off = strand.iter().enumerate().map(|(k, p)| (p.as_dvec3().distance(self.middle), k));
+        off.fold((0.0, 0), |most, off| if off.0 > most.0 { off } else { most }).1
+    }
 }
 
 /// The farthest node of strands that are far away.
-fn far(groom: &Groom) -> Vec<Option<usize>> {
-    let reaches = reaches(groom);
-    let most = FAR * typical(&reaches);
-    reaches.iter().map(|(reach, node)| (most > 0.0 && *reach > most).then_some(*node)).collect()
+fn far(groom: &Groom, reaches: &Reaches) -> Vec<Option<usize>> {
+    let most = FAR * reaches.typical;
+    let is_far = |reach: &f64| most > 0.0 && *reach > most;
+    let each = groom.strands().zip(&reaches.each);
+    each.map(|(strand, reach)| is_far(reach).then(|| reaches.farthest(strand.points))).collect()
 }
 
 /// The odd node of strays.
-fn stray(groom: &Groom) -> Vec<Option<usize>> {
-    let reaches = reaches(groom);
-    let most = JUMP * typical(&reaches);
+fn stray(groom: &Groom, reaches: &Reaches) -> Vec<Option<usize>> {
+    let most = JUMP * reaches.typical;
     let mut found = apart(groom);
-    for ((strand, (_, farthest)), found) in groom.strands().zip(reaches).zip(&mut found) {
-        let segments: Vec<f32> =
-            strand.points.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
-        let longest = segments.iter().copied().fold(0.0, f32::max);
-        let jumps = segments.len() > 1
+    for (strand, found) in groom.strands().zip(&mut found) {
+        let segments = || strand.points.windows(2).map(|pair| pair[0].distance_squared(pair[1]));
+        let longest = segments().fold(0.0, |a, b| if b > a { b } else { a }).sqrt();
+        let jumps = strand.points.len() > 2
             && most > 0.0
             && f64::from(longest) > most
-            && longest > OWN_JUMP * median(segments);
-        *found = found.or(jumps.then_some(farthest));
+            && longest > OWN_JUMP * median(segments().map(f32::sqrt).collect());
+        *found = found.or_else(|| jumps.then(|| reaches.farthest(strand.points)));
     }
     found
+}
+
+/// Whether every root has one at another place within `near`. May say no where that takes too long to find out.
+fn all_have_company(roots: &[Vec3], near: f32) -> bool {
+    /// So many are compared with all others.
+    const LONE: usize = 64;
+    // Two in a cell are nearer than that.
+    let cell = |root: &Vec3| (root / (0.5 * near)).floor().to_array().map(|x| x as i32);
+    let is_cell = |cell: &[i32; 3]| cell.iter().all(|x| x.unsigned_abs() < 1 << 30);
+    let mut cells: HashMap<[i32; 3], (Vec3, bool)> = HashMap::new();
+    for root in roots {
+        let (first, several) = cells.entry(cell(root)).or_insert((*root, false));
+        *several |= first != root;
+    }
+    let has = |root: &Vec3| {
+        let cell = cell(root);
+        is_cell(&cell) && cells.get(&cell).is_some_and(|(_, several)| *several)
+    };
+    let lone: Vec<&Vec3> = roots.iter().filter(|root| !has(root)).take(LONE + 1).collect();
+    let is_near = |root: &&Vec3| roots.iter().any(|r| r != *root && r.distance(**root) <= near);
+    near > 0.0 && lone.len() <= LONE && lone.iter().all(is_near)
 }
 
 /// Node 0 of strands whose root lies apart from the others, alone or with some at exactly the same place.
 fn apart(groom: &Groom) -> Vec<Option<usize>> {
     let mut found = vec![None; groom.len()];
     let roots: Vec<Vec3> = groom.roots().collect();
+    let middle = middle(roots.iter().copied()).as_vec3();
+    let spread = median(roots.iter().map(|r| r.distance(middle)).collect());
+    if all_have_company(&roots, TOGETHER * spread) {
+        return found;
+    }
     let bits = |i: u32| roots[i as usize].to_array().map(|x| (x + 0.0).to_bits());
     let mut order: Vec<u32> = (0..roots.len() as u32).collect();
     order.sort_by_key(|i| bits(*i));
@@ -128,8 +178,6 @@ fn apart(groom: &Groom) -> Vec<Option<usize>> {
     };
     let gaps: Vec<f32> = (0..).zip(&places).map(gap).collect();
     let spacing = median(gaps.clone());
-    let middle = middle(roots.iter().copied()).as_vec3();
-    let spread = median(roots.iter().map(|r| r.distance(middle)).collect());
     for (place, gap) in places.iter().zip(gaps) {
         let is_apart = match place.len() {
             1 => gap > ALONE * spread,

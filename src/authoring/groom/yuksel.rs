@@ -137,14 +137,15 @@ pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
         end += segments + 1;
         ends.push(end);
     }
-    let raw = Groom { points, ends, widths: diameters, colors, uvs: Vec::new() };
+    let raw = Groom { points, ends, widths: diameters, colors, ..default() };
     Ok(Intake::cleaned(raw, losses)?)
 }
 
 const EXPORT_AGAIN: &str = "export the file again";
 
 /// The bytes of a `.hair` file of this groom, in metres. Values equal for all strands or nodes go
-/// into the header; the format has no UVs.
+/// into the header; the format has no UVs and no marks
+/// of guides.
 ///
 /// Reading what was written gives the same groom, and writing that the same bytes.
 ///

@@ -313,7 +313,11 @@ fn resampled(line: &[Vec3], segment: f32, segments: usize) -> Vec<Vec3> {
             piece = line[i].distance(line[i + 1]);
         }
         let way = (line[i + 1] - line[i]) / piece.max(1e-12);
-        points.push(line[i] + way * (wanted - start));
+        let at = line[i] + way * (wanted - start);
+        // In a narrow cleft a line may come back to where it was.
+        let last = points[k - 1];
+        let is_new = last.distance_squared(at) > (0.01 * segment).powi(2);
+        points.push(if is_new { at } else { last + way.normalize_or(Vec3::Y) * segment });
     }
     points
 }

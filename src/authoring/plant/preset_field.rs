@@ -3,7 +3,7 @@
 use super::{
     hairline::{Hairline, smooth},
     preset::HairPreset,
-    scalp::Scalp,
+    scalp::{Scalp, piecewise},
 };
 use bevy::{math::ops::atan2, prelude::*};
 
@@ -247,13 +247,6 @@ impl Scalp {
             .min(lips * LIPS.1 * EDGE_OF_LIPS);
         within.to_radians() * place.distance(self.center)
     }
-}
-
-fn piecewise(line: &[(f32, f32)], at: f32) -> f32 {
-    let piece = line.windows(2).find(|w| at <= w[1].0);
-    piece.map_or(line[line.len() - 1].1, |w| {
-        w[0].1 + (w[1].1 - w[0].1) * (at - w[0].0) / (w[1].0 - w[0].0)
-    })
 }
 
 #[cfg(test)]

@@ -32,8 +32,22 @@ setting! {
         pub recede: f32 = 0.0, "rad" in RECEDE: -3.2..=3.2, safe -0.2..=0.3, "0 is an adult's";
         /// Angle at the centre over which density fades out at the hairline.
         pub fade: f32 = 0.1, "rad" in FADE: 0.0..=3.2, safe 0.0..=0.5, "0.1 is soft";
+        /// Elevation of the base of the nose, seen from the centre: a moustache begins below it.
+        pub nose: f32 = NOSE, "rad" in NOSE_RANGE: -1.5..=1.5, safe -0.7..=-0.1, "-0.455 is an adult's";
+        /// Elevation of the lower end of the chin. Not above the nose: the face is taken as an adult's then.
+        pub chin: f32 = CHIN, "rad" in CHIN_RANGE: -1.55..=1.5, safe -1.1..=-0.6,
+            "-0.92 is an adult's";
     }
 }
+
+/// The face that the hairline and a beard's edges are drawn for: elevations of the base of its nose and of its chin at
+/// the centre (rad).
+const NOSE: f32 = -0.455;
+const CHIN: f32 = -0.92;
+/// What is higher in the face than this is where it is on that face (rad), and what is as far aside (°); a face turns
+/// into that face below and before.
+const BROW: f32 = 0.17;
+const ASIDE: (f32, f32) = (30.0, 75.0);
 
 /// The hairline of an adult: elevation (°) over the angle from the face (°), both at the centre. In front it
 /// begins 3° below where the face's thirds have it: the eye sees it where half of the density is reached. Before
@@ -87,7 +101,21 @@ impl Scalp {
         let axes = self.axes();
         let [right, up, front] = axes.map(|axis| (place - self.center).dot(axis));
         let flat = right.hypot(front);
-        (atan2(right.abs(), front) * 180.0 / PI, atan2(up, flat) * 180.0 / PI)
+        let around = atan2(right.abs(), front) * 180.0 / PI;
+        (around, self.drawn_elevation(around, atan2(up, flat)) * 180.0 / PI)
+    }
+
+    /// The elevation (rad) at which a place of this face is on the face that lines are drawn for.
+    fn drawn_elevation(&self, around: f32, elevation: f32) -> f32 {
+        let is_that = (self.nose, self.chin) == (NOSE, CHIN);
+        let is_face = BROW > self.nose && self.nose > self.chin && self.chin > -0.5 * PI;
+        if is_that || !is_face || !(-0.5 * PI..BROW).contains(&elevation) || around > ASIDE.1 {
+            return elevation;
+        }
+        let lines = [(-0.5 * PI, -0.5 * PI), (self.chin, CHIN), (self.nose, NOSE), (BROW, BROW)];
+        let drawn = piecewise(&lines, elevation);
+        let aside = ((around - ASIDE.0) / (ASIDE.1 - ASIDE.0)).clamp(0.0, 1.0);
+        drawn + (elevation - drawn) * aside * aside * (3.0 - 2.0 * aside)
     }
 
     /// Angles at the centre: from the face around (°), and above the hairline there (rad).
@@ -109,9 +137,42 @@ impl Scalp {
 }
 
 fn hairline(around: f32) -> f32 {
-    let piece = HAIRLINE.windows(2).find(|w| around <= w[1].0);
-    piece.map_or(HAIRLINE[HAIRLINE.len() - 1].1, |w| {
-        let share = (around - w[0].0) / (w[1].0 - w[0].0);
+    piecewise(&HAIRLINE, around)
+}
+
+/// A line of such points at a place; level beyond its last.
+pub(super) fn piecewise(line: &[(f32, f32)], at: f32) -> f32 {
+    let piece = line.windows(2).find(|w| at <= w[1].0);
+    piece.map_or(line[line.len() - 1].1, |w| {
+        let share = (at - w[0].0) / (w[1].0 - w[0].0);
         w[0].1 + (w[1].1 - w[0].1) * share
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(around: f32, elevation: f32) -> Vec3 {
+        let [a, e] = [around.to_radians(), elevation];
+        Vec3::new(a.sin() * e.cos(), e.sin(), a.cos() * e.cos()) * 0.1
+    }
+
+    #[test]
+    fn a_nose_and_a_chin_are_where_lines_are_drawn_for_them() {
+        let scalp = Scalp { nose: -0.3, chin: -0.7, ..default() };
+        let drawn =
+            |around: f32, elevation: f32| scalp.angles(at(around, elevation)).1.to_radians();
+        assert!((drawn(0.0, -0.3) - NOSE).abs() < 1e-5 && (drawn(20.0, -0.7) - CHIN).abs() < 1e-5);
+        // Neither the forehead nor the ears.
+        assert!((drawn(0.0, 0.5) - 0.5).abs() < 1e-5 && (drawn(80.0, -0.3) + 0.3).abs() < 1e-5);
+        // Nothing is folded.
+        for around in [0.0, 30.0, 45.0, 60.0, 75.0, 90.0] {
+            let all: Vec<f32> = (-150..150).map(|e| drawn(around, 0.01 * e as f32)).collect();
+            assert!(all.windows(2).all(|w| w[0] < w[1]), "{around}");
+        }
+        // A chin above the nose is none.
+        let upside_down = Scalp { nose: -0.7, chin: -0.3, ..default() };
+        assert!((upside_down.angles(at(0.0, -0.5)).1.to_radians() + 0.5).abs() < 1e-5);
+    }
 }

@@ -5,7 +5,7 @@ use super::{
     error::WearError,
     facing::FacingFrom,
     garments::{garments, is_sheet},
-    part::{MeshPart, positions},
+    part::{HEAD_WEIGHT, MeshPart, positions},
     skin::{Hint, Role},
     space::{Fitting, cropped, fit},
     target::Target,
@@ -66,8 +66,6 @@ const HEAD: f32 = 0.133;
 const MARGIN: f32 = 0.15;
 /// Largest median distance of a groom's roots from the mesh (m).
 const MAX_ROOT_DISTANCE: f32 = 0.03;
-/// Smallest weight of the head joint at a vertex that counts as the head, not the neck.
-const HEAD_WEIGHT: f32 = 0.5;
 
 /// The input for making hair.
 pub(super) struct MakeInput {

@@ -23,6 +23,7 @@ mod error;
 mod facing;
 mod garments;
 mod head;
+mod landmarks;
 mod make;
 #[cfg(feature = "render")]
 mod old_hair;

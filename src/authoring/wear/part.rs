@@ -9,6 +9,9 @@ use bevy::{
     prelude::*,
 };
 
+/// Smallest weight of the head joint at a vertex that counts as the head, not the neck.
+pub(super) const HEAD_WEIGHT: f32 = 0.5;
+
 /// What a bone tells about where its character looks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Cue {

@@ -8,11 +8,15 @@ use super::{
     error::{HEAD_SIZES, WearError},
     facing::{FacingFrom, by_bones, by_shape, eyes},
     head::{HeadPlace, find_head},
+    landmarks,
     part::{MeshPart, head_shares, head_triangles, positions, triangles},
     skin::{Hint, Role, Shell, roles},
     what::WearHair,
 };
-use crate::{authoring::plant::Scalp, base::setting::Ranged};
+use crate::{
+    authoring::plant::{Scalp, surface_points},
+    base::setting::Ranged,
+};
 use bevy::{
     asset::RenderAssetUsages,
     math::{Affine3A, Mat3A, Vec3A},
@@ -22,6 +26,8 @@ use bevy::{
 
 /// Heights of life-size heads (m).
 const LIFE_SIZE: core::ops::RangeInclusive<f32> = 0.08..=0.16;
+/// How far from its middle a head's landmarks are looked for, in its heights.
+const NEAR: f32 = 2.2;
 
 /// The transform from a mesh as it is bound to the wearer, by one of its joints: where the joint is
 /// now, and its inverse bind pose.
@@ -68,6 +74,16 @@ pub(super) struct Fitting {
     pub(super) facing: (Dir3, FacingFrom),
     /// What each part is for the head; `None` for those that do not move with it or are not shown.
     pub(super) roles: Vec<Option<Role>>,
+}
+
+/// Where a head is put.
+struct Placed {
+    from_wearer: Affine3A,
+    skin: Vec<FittedPart>,
+    mesh: Mesh,
+    /// How many times it is as large, and its height then (m).
+    size: f32,
+    height: f32,
 }
 
 /// A mesh on which hair grows.
@@ -137,30 +153,52 @@ pub(super) fn fit(parts: &mut [MeshPart], wear: &WearHair) -> Result<Fitting, We
         }
     };
     let has_area = areas[main] > 0.0;
-    if has_area && !HEAD_SIZES.contains(&head.height) {
-        return Err(WearError::HeadSize { found: head.height });
-    }
-    let life = head.height.clamp(*LIFE_SIZE.start(), *LIFE_SIZE.end());
-    let size = if has_area { life / head.height } else { 1.0 };
-    let size = Affine3A::from_scale(Vec3::splat(size));
-    let from_wearer =
-        size * Affine3A::from_translation(-head.center) * Affine3A { matrix3: turn, ..default() };
-    let skin: Vec<FittedPart> = chosen
-        .iter()
-        .map(|&part| FittedPart { part, to_hair: from_wearer * parts[part].to_wearer })
-        .collect();
-    if skin.iter().any(|of| !of.to_hair.is_finite() || !of.to_hair.inverse().is_finite()) {
-        return Err(WearError::Pose);
-    }
-    let scalp = Scalp {
+    let placed = |head: HeadPlace| -> Result<Placed, WearError> {
+        if has_area && !HEAD_SIZES.contains(&head.height) {
+            return Err(WearError::HeadSize { found: head.height });
+        }
+        let life = head.height.clamp(*LIFE_SIZE.start(), *LIFE_SIZE.end());
+        let size = if has_area { life / head.height } else { 1.0 };
+        let from_wearer = Affine3A::from_scale(Vec3::splat(size))
+            * Affine3A::from_translation(-head.center)
+            * Affine3A { matrix3: turn, ..default() };
+        let skin: Vec<FittedPart> = chosen
+            .iter()
+            .map(|&part| FittedPart { part, to_hair: from_wearer * parts[part].to_wearer })
+            .collect();
+        if skin.iter().any(|of| !of.to_hair.is_finite() || !of.to_hair.inverse().is_finite()) {
+            return Err(WearError::Pose);
+        }
+        let moved = |of: &FittedPart| in_space(&parts[of.part].mesh, &of.to_hair, &shares[of.part]);
+        let mesh = merged(skin.iter().map(moved).collect());
+        Ok(Placed { from_wearer, skin, mesh, size, height: life })
+    };
+    let mut fitted = placed(head)?;
+    let mut scalp = Scalp {
         center: Vec3::ZERO,
         up: Dir3::Y,
         front: Dir3::NEG_Z,
-        height: life,
+        height: fitted.height,
         ..given.unwrap_or_default()
     };
-    let moved = |of: &FittedPart| in_space(&parts[of.part].mesh, &of.to_hair, &shares[of.part]);
-    let mesh = merged(skin.iter().map(moved).collect());
+    if given.is_none() {
+        // An invalid mesh is reported by planting.
+        let near = |fitted: &Placed| {
+            let mesh = cropped(&fitted.mesh, NEAR * fitted.height);
+            surface_points(&mesh, landmarks::POINTS).unwrap_or_default()
+        };
+        let mut points = near(&fitted);
+        if let Some((center, height)) = landmarks::by_ears(&points, fitted.height) {
+            let center = head.center + center / fitted.size;
+            fitted = placed(HeadPlace { center, height: height / fitted.size })?;
+            points = near(&fitted);
+        }
+        scalp.height = fitted.height;
+        if let Some([nose, chin]) = landmarks::face(&points, &scalp) {
+            scalp = Scalp { nose, chin, ..scalp };
+        }
+    }
+    let Placed { from_wearer, skin, mesh, .. } = fitted;
     Ok(Fitting { skin, from_wearer, mesh, scalp, facing, roles })
 }
 

@@ -91,6 +91,9 @@ impl Ball {
     }
 }
 
+/// Lookups that cost less without an order than one sort.
+const FEW_LOOKUPS: usize = 16;
+
 /// All colliders in a tick of so many substeps, or all droplets in a substep, found by place: in a crowd a hair
 /// is near few of them.
 #[derive(Resource)]
@@ -112,10 +115,16 @@ impl<T> Default for Colliders<T> {
 }
 
 impl<T> Colliders<T> {
-    /// From balls that do not move for a substep, each a center in the world and a radius (m).
-    pub(crate) fn of_balls(balls: impl Iterator<Item = ((Vec3, f32), T)>) -> Self {
+    /// From balls that do not move for a substep, each a center in the world and a radius (m), to be looked up so
+    /// many times. For a few times they are looked through: sorting costs more.
+    pub(crate) fn of_balls(lookups: usize, balls: impl Iterator<Item = ((Vec3, f32), T)>) -> Self {
         let still = |((center, radius), item)| (Ball { center, radius, travel: 0.0 }, item);
-        Self::new(1, balls.map(still).collect())
+        let all: Vec<(Ball, T)> = balls.map(still).collect();
+        if lookups > FEW_LOOKUPS {
+            return Self::new(1, all);
+        }
+        let anywhere = (0..all.len() as u32).collect();
+        Self { substeps: 1, all, along_x: Vec::new(), largest: 0.0, anywhere }
     }
 
     /// From balls that move for so many substeps.
@@ -210,6 +219,26 @@ mod tests {
         let touches = REACH_MARGIN * 0.1 * 2.0 + 0.05 + (5e-3 + 0.01) * 6.0;
         assert!(is_near(touches - 1e-3) && !is_near(touches + 1e-3));
         assert!(is_near(f32::NAN), "NaN is reported where it is used");
+    }
+
+    #[test]
+    fn few_lookups_find_what_many_find() {
+        let ball = |i: u16| {
+            let [x, y] = [13, 7].map(|k| f32::from(i * k % 101) * 0.01);
+            ((Vec3::new(x, y, if i == 40 { f32::NAN } else { 0.3 }), 0.002 * f32::from(i % 9)), i)
+        };
+        let [few, many] = [1, usize::MAX].map(|n| Colliders::of_balls(n, (0..200).map(ball)));
+        let mut counts = Vec::new();
+        for room in [0.0, 0.05, 0.4, f32::INFINITY] {
+            let [a, b] = [&few, &many].map(|all| {
+                all.around(Vec3::new(0.4, 0.5, 0.3), room, &mut Vec::new())
+                    .copied()
+                    .collect::<Vec<_>>()
+            });
+            assert_eq!(a, b, "within {room}");
+            counts.push(a.len());
+        }
+        assert!(counts.is_sorted() && counts[1] < counts[2] && counts[3] == 200, "{counts:?}");
     }
 
     #[test]

@@ -147,7 +147,7 @@ fn newton_down(stage: Stage) {
             let tension = max(max(axial * (length - l), moving(j).w), 0.0);
             let across = select(tension * r, axial, crushed);
             let k = joint_of(length_before, l, props.y);
-            let elastic = moment(before.q, q, rest_shape(j), k);
+            let elastic = moment(before.q, q, rest_shape(j), k, record.torsion);
             // Friction only ever takes energy, also where twist gives way along the strand.
             let rate = turn - before.turn;
             let square = max(dot(rate, rate), 1e-30);
@@ -333,17 +333,22 @@ fn finish(stage: Stage) {
         set_frame(i - 1u, q);
         let t = tangent(q);
         let k = joint_of(length_before, props.x, props.y);
-        let elastic = moment(q_before, q, rest_shape(i - 1u), k);
+        let rest_q = rest_shape(i - 1u);
+        let elastic = moment(q_before, q, rest_q, k, record.torsion);
+        var stiffness = vec2(1.0, -dot(t, t_before));
+        if record.torsion != 1.0 {
+            stiffness = twist_stiffness(q_before, q, rest_q, record.torsion);
+        }
         if i > 1u {
             moment_before -= dot(elastic, t_before);
-            turns = eliminated(turns, coupling_before, k_before + k, -moment_before, 1e-30);
+            turns = eliminated(turns, coupling_before, k_before + k * stiffness.x, -moment_before, 1e-30);
             note_twist(i - 2u, turns);
         }
-        coupling_before = -(k * dot(t, t_before));
+        coupling_before = k * stiffness.y;
         moment_before = dot(elastic, t);
         q_before = q;
         t_before = t;
-        k_before = k;
+        k_before = k * stiffness.x;
         length_before = props.x;
     }
     turns = eliminated(turns, coupling_before, k_before, -moment_before, 1e-30);
@@ -365,7 +370,7 @@ fn untwist() {
         let r = row(i, 0u);
         twist = clamp(r.x - r.y * twist, -1.5, 1.5);
         let q = frame(i);
-        set_frame(i, normalized(fma(vec4(q.y, -q.x, q.w, -q.z), vec4(twist * 0.5), q)));
+        set_frame(i, normalized(fma(turned_by_e3(q), vec4(twist * 0.5), q)));
     }
 }
 

@@ -74,9 +74,39 @@ fn parallel_transport(q: vec4<f32>, e: vec3<f32>, len: f32) -> TransportedFrame 
 }
 
 // The moment of a joint on the edge behind it: 2K s Im(q (before Q0)‾).
-fn moment(before: vec4<f32>, q: vec4<f32>, rest: vec4<f32>, k: f32) -> vec3<f32> {
+fn moment(before: vec4<f32>, q: vec4<f32>, rest: vec4<f32>, k: f32, torsion: f32) -> vec3<f32> {
     let apart = product(q, conjugate(product(before, rest)));
-    return apart.xyz * select(2.0 * k, -2.0 * k, apart.w < 0.0);
+    let even = apart.xyz * select(2.0 * k, -2.0 * k, apart.w < 0.0);
+    if torsion == 1.0 {
+        return even;
+    }
+    let joint = twist_of(before, q, rest);
+    let share = sqrt(joint.w / joint.z);
+    let nearer = rest * select(1.0, -1.0, apart.w < 0.0);
+    let along = fma(vec2(share), joint.xy, -nearer.wz);
+    let both = fma(vec4(along.y), turned_by_e3(before), before * along.x);
+    return fma(product(both, conjugate(q)).xyz, vec3(2.0 * k * (torsion - 1.0)), even);
+}
+
+// Of a joint's rotation w and z, the sum of their squares, and the same of its rest shape.
+fn twist_of(before: vec4<f32>, q: vec4<f32>, rest: vec4<f32>) -> vec4<f32> {
+    let w = dot(before, q);
+    let z = dot(turned_by_e3(before), q);
+    return vec4(w, z, max(fma(w, w, z * z), 1e-12), max(fma(rest.w, rest.w, rest.z * rest.z), 1e-12));
+}
+
+// Second derivatives of a joint's energy, over K, by the rotations of its edges about their tangents: on the
+// diagonal and off it. At rest exact, elsewhere what bounds them.
+fn twist_stiffness(before: vec4<f32>, q: vec4<f32>, rest: vec4<f32>, torsion: f32) -> vec2<f32> {
+    let joint = twist_of(before, q, rest);
+    let twist = sqrt(joint.z * joint.w) * torsion;
+    let bend = sqrt(max(1.0 - joint.z, 0.0) * max(1.0 - joint.w, 0.0));
+    return vec2(bend + twist, bend - twist);
+}
+
+// q e3.
+fn turned_by_e3(q: vec4<f32>) -> vec4<f32> {
+    return vec4(q.y, -q.x, q.w, -q.z);
 }
 
 // A symmetric matrix: xx yy zz, and yx zx zy.

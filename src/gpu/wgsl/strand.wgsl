@@ -86,7 +86,8 @@ struct Substep {
     follower_led: u32,
     first_follower_block: u32,
     first_follower_slot: u32,
-    unused: u32,
+    // G J/(E I).
+    torsion: f32,
     // How the hair's frame has moved in the tick, and its length (s).
     follow_turn: vec4<f32>,
     follow_move: vec3<f32>,

@@ -130,6 +130,7 @@ impl HairLook {
 }
 
 #[cfg(test)]
+#[cfg(feature = "render")]
 mod tests {
     use super::*;
 

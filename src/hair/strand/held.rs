@@ -14,6 +14,12 @@ pub struct HeldNodes {
     /// For each node from the root its target at the end of the next substep (m, in the hair's
     /// frame), or `None` for a free node. May be shorter than the strand.
     pub targets: Vec<Option<Vec3>>,
+    /// For each node from the root the orientation of the edge before it at the end of the next substep (in the
+    /// hair's frame; its third axis points along the edge, and is turned to do so), or `None` for an edge that is
+    /// free to twist. Counts where both ends of the edge are held; the root's is
+    /// [`Strand::root_frame`]. Together with the two targets it clamps the strand there, as a tie or a braid's
+    /// end does. Empty by default; [`SolverMethod::Sweeps`](crate::SolverMethod::Sweeps) ignores it.
+    pub frames: Vec<Option<Quat>>,
 }
 
 /// Whether targets of a strand's held nodes are out of reach. Kept by the tick.
@@ -133,7 +139,7 @@ mod tests {
     }
 
     fn held(targets: &[Option<Vec3>]) -> Vec<(usize, Vec3)> {
-        HeldNodes { targets: targets.to_vec() }.within_reach(&strand()).collect()
+        HeldNodes { targets: targets.to_vec(), ..default() }.within_reach(&strand()).collect()
     }
 
     #[test]
@@ -161,7 +167,7 @@ mod tests {
     fn a_target_that_is_not_finite_holds_nothing_and_is_reported() {
         let strand = strand();
         let out = |first: Option<Vec3>, x: f32| {
-            let held = HeldNodes { targets: vec![None, first, Some(Vec3::X * x)] };
+            let held = HeldNodes { targets: vec![None, first, Some(Vec3::X * x)], ..default() };
             (held.within_reach(&strand).count(), held.out_of_reach(&strand))
         };
         assert!(matches!(out(Some(Vec3::NAN), 0.1), (1, Some((1, _)))));

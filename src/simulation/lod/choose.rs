@@ -307,7 +307,7 @@ mod tests {
         });
         app.world_mut()
             .entity_mut(own.1[2])
-            .insert(HeldNodes { targets: vec![None, None, Some(Vec3::Y)] });
+            .insert(HeldNodes { targets: vec![None, None, Some(Vec3::Y)], ..default() });
         app.update();
         app.update();
         // A value that only a new partition overwrites.

@@ -29,6 +29,7 @@ use crate::{
         direct::{self, DirectParams},
         obstacle::Obstacle,
         step::{self, SweepParams},
+        stiffness::wet_twist_loss,
     },
 };
 use bevy::{math::Isometry3d, prelude::*};
@@ -126,6 +127,7 @@ impl<'a> Batched for RodColumns<'a> {
         match &params.method {
             Method::Direct { params: direct, frame_delta } => {
                 gather_tensions(block, sources);
+                gather_twist(block, sources);
                 gather_roots(block, sources, frame_delta.unwrap_or_default());
                 direct::weigh(params.level, block, params.bending_length, params.dt);
                 if attempt == Attempt::Second {
@@ -182,6 +184,7 @@ fn step_rods(
                     dt,
                     gravity: pose.now().direction_in(gravity),
                     damping: stiffness.damping,
+                    torsion: stiffness.torsion,
                     limiter_steps: solver.limiter_steps,
                     clearance,
                 },
@@ -254,6 +257,29 @@ fn gather_tensions(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
     for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
         let tensions = four.map(|source| source.strand.tensions());
         put_numbers(&mut block.edges, group, tensions, |e| &mut e.tension);
+    }
+}
+
+/// Orientations of edges that are held, and what water takes from the resistance to twist.
+fn gather_twist(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
+    for edge in &mut block.edges {
+        (edge.clamped, edge.twist_loss) = ([0.0; LANES], [0.0; LANES]);
+    }
+    for (lane, source) in from.iter().enumerate() {
+        for (edge, softening) in block.edges.iter_mut().zip(&source.added.softening) {
+            edge.twist_loss[lane] = wet_twist_loss(*softening);
+        }
+        let Some(held) = source.held.filter(|held| !held.frames.is_empty()) else { continue };
+        let mut before = 0;
+        for (node, _) in held.within_reach(source.strand).filter(|(node, _)| *node > 0) {
+            let frame = held.frames.get(node).copied().flatten().filter(|frame| frame.is_finite());
+            if let (Some(frame), true) = (frame, node == before + 1) {
+                let edge = &mut block.edges[node - 1];
+                edge.clamped[lane] = 1.0;
+                put4(&mut edge.q, lane, frame.normalize());
+            }
+            before = node;
+        }
     }
 }
 

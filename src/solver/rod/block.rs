@@ -66,6 +66,11 @@ pub struct EdgeLanes<C = Lane> {
     pub axial: C,
     /// Tension that the last substep left (N, as `k`). Direct method only.
     pub tension: C,
+    /// 1 where its orientation is held, else 0. Direct method only.
+    pub clamped: C,
+    /// The share of its resistance to twist against bending that the joint at its start lacks: 0 in dry hair. Direct
+    /// method only.
+    pub twist_loss: C,
 }
 
 /// A row of a tridiagonal system over a strand's edges, eliminated from the root on.

@@ -627,7 +627,7 @@ fn attack(seed: u64, operations: usize) {
 fn a_world_that_anything_is_done_to_goes_on() {
     // SEED is another one.
     let seeds =
-        std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).map_or(0..2, |s| s..s + 1);
+        std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).map_or(0..1, |s| s..s + 1);
     for seed in seeds {
         attack(seed, 2000);
     }

@@ -432,7 +432,7 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             let nodes = random.random_range(0..12);
             let far = place * [1.0, 1.0, wrong][random.random_range(0..3)];
             let targets = (0..nodes).map(|i| (i % 2 == 0).then_some(far)).collect();
-            world.entity_mut(strand).insert(HeldNodes { targets });
+            world.entity_mut(strand).insert(HeldNodes { targets, ..default() });
             format!("{nodes} nodes held at {far}")
         }
         (24, _, Some(strand), _) => {

@@ -1,7 +1,8 @@
 //! Files cut short, with extreme numbers, and of random bytes: always an error, never a panic.
 
 use super::files::{Arrays, glb, gltf_bytes, gltf_json, hair, primitive, put, small_glb, tfx};
-use bevy_keratin::authoring::groom::{Groom, GroomSettings};
+use bevy::math::Vec3;
+use bevy_keratin::authoring::groom::{Groom, GroomSettings, alembic};
 use proptest::prelude::*;
 
 fn read(file: &[u8]) -> Result<Groom, String> {
@@ -20,7 +21,13 @@ fn valid_files() -> Vec<Vec<u8>> {
         tfx(3.0, 2, 3, Arrays::default()),
         small_glb(),
         glb(&json, &gltf_bytes()),
+        archive(),
     ]
+}
+
+fn archive() -> Vec<u8> {
+    let strands = [0.0, 0.1, 0.2].map(|x| [Vec3::X * x, Vec3::X * x + Vec3::Y * 0.1]);
+    alembic::write(&Groom::from_polylines(strands).unwrap()).unwrap()
 }
 
 #[test]
@@ -117,13 +124,20 @@ proptest! {
 
     #[test]
     fn random_bytes_behind_a_good_beginning_never_panic(
-        kind in 0..5usize,
+        kind in 0..7usize,
         strands in 0..6u32,
         nodes in 0..20u32,
         bytes in proptest::collection::vec(any::<u8>(), 0..600),
     ) {
-        let start: [&[u8]; 5] =
-            [b"HAIR", &4.0f32.to_le_bytes(), &3.0f32.to_le_bytes(), b"glTF", b"{\"asset\":"];
+        let start: [&[u8]; 7] = [
+            b"HAIR",
+            &4.0f32.to_le_bytes(),
+            &3.0f32.to_le_bytes(),
+            b"glTF",
+            b"{\"asset\":",
+            b"Ogawa\xff\0\x01",
+            b"ply\n",
+        ];
         let mut file = start[kind].to_vec();
         if kind < 3 {
             file.extend(strands.to_le_bytes());
@@ -135,7 +149,7 @@ proptest! {
 
     #[test]
     fn valid_files_with_bytes_changed_never_panic(
-        which in 0..8usize,
+        which in 0..9usize,
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..12),
     ) {
         let mut file = valid_files().swap_remove(which);

@@ -1,6 +1,7 @@
 //! Grooms as assets, and hair that wears them.
 
 use super::files::{Arrays, glb, gltf_bytes, gltf_json, hair, primitive, tfx};
+use crate::common::wait_for;
 use bevy::{
     asset::{
         AssetPlugin, LoadState,
@@ -18,7 +19,7 @@ use bevy_keratin::{
     prelude::*,
     render::{FollowerRoots, HairLook},
 };
-use std::{path::Path, time::Duration};
+use std::path::Path;
 
 #[derive(Resource, Default)]
 struct Reported(Vec<HairFault>);
@@ -47,14 +48,7 @@ fn app(files: &[(&str, Vec<u8>)]) -> App {
 }
 
 fn until(app: &mut App, ready: impl Fn(&mut App) -> bool) {
-    for _ in 0..2000 {
-        app.update();
-        if ready(app) {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    panic!("it did not happen in 2000 updates");
+    wait_for(app, |app| ready(app).then_some(()));
 }
 
 fn load(app: &App, name: &str) -> Handle<Groom> {

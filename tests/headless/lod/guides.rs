@@ -210,7 +210,7 @@ fn a_held_strand_is_simulated_and_is_no_guide() {
     let (guide, other) = (simulated(&app, &ids)[3], carried(&app, &ids)[7]);
     for e in [guide, other] {
         let targets = strand(&app, e).positions().iter().map(|p| Some(*p)).collect();
-        app.world_mut().entity_mut(e).insert(HeldNodes { targets });
+        app.world_mut().entity_mut(e).insert(HeldNodes { targets, ..default() });
     }
     app.update();
     // A group of the 58 that are free, and the two.
@@ -412,7 +412,7 @@ fn frozen_hair_keeps_its_shape_on_the_head_and_goes_on_from_it() {
     // A hand that takes a strand moves it.
     let targets: Vec<_> = strand(&app, ids[5]).positions().iter().map(|p| Some(*p)).collect();
     let lifted = targets.iter().map(|p| p.map(|p| p + Vec3::Y * 1e-3)).collect();
-    app.world_mut().entity_mut(ids[5]).insert(HeldNodes { targets: lifted });
+    app.world_mut().entity_mut(ids[5]).insert(HeldNodes { targets: lifted, ..default() });
     run(&mut app, 0.1);
     assert!(!is_follower(&app, ids[5]));
     let tip = strand(&app, ids[5]).positions()[8];

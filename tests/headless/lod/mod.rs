@@ -193,6 +193,7 @@ fn hair_far_away_sleeps_on_when_its_level_changes() {
 fn a_moving_floor_takes_hair_along_at_every_level() {
     let dragged = |substeps: u32| {
         let mut app = test_app(60.0);
+        app.insert_resource(HairDefault(crate::common::equally_stiff()));
         let (hair, e) = one_strand(&mut app, 0.24, 8, Vec3::NEG_Y);
         app.world_mut().entity_mut(hair).insert(coarse(5, substeps));
         zoom(&mut app, hair, 0.1);

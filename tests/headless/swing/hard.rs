@@ -60,7 +60,7 @@ fn on_a_turning_head_hair_moves_as_in_the_worlds_frame() {
 fn turn_by(substep: &str, mut lab: Lab, most: f32) {
     // A root that is led does not turn about itself, as one on the head does; internal friction feels it.
     lab.undamped();
-    let stiffness = HairStiffness { bending_length: 0.13, damping: 0.0 };
+    let stiffness = HairStiffness { bending_length: 0.13, damping: 0.0, ..default() };
     let head = lab.app.world_mut().spawn((Hair, stiffness)).id();
     let mut pairs = Vec::new();
     let mut led = Vec::new();
@@ -76,7 +76,8 @@ fn turn_by(substep: &str, mut lab: Lab, most: f32) {
             let strand = Strand::from_polyline(&points).unwrap();
             // Both are clamped by their first edge, as the one in the world's frame can only be.
             let first = points[..2].to_vec();
-            let held = HeldNodes { targets: first.iter().copied().map(Some).collect() };
+            let held =
+                HeldNodes { targets: first.iter().copied().map(Some).collect(), ..default() };
             let on_head = lab.app.world_mut().spawn((StrandOf(head), strand, held.clone())).id();
             lab.app.world_mut().entity_mut(world).insert(held);
             led.push((world, first));

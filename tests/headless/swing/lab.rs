@@ -15,6 +15,7 @@ pub struct Lab {
     pub app: App,
     hairs: HashMap<u32, Entity>,
     damping: f32,
+    torsion: f32,
     /// Length of a substep (s).
     pub substep: f64,
     together: u32,
@@ -58,6 +59,7 @@ impl Lab {
             app,
             hairs: HashMap::new(),
             damping: HairStiffness::default().damping,
+            torsion: HairStiffness::default().torsion,
             substep: 1.0 / (hertz * f64::from(substeps)),
             together: 1,
         };
@@ -98,11 +100,17 @@ impl Lab {
         self.damping = 0.0;
     }
 
+    /// G J / E I of all hair to come.
+    pub fn torsion(&mut self, torsion: f64) {
+        self.torsion = torsion as f32;
+    }
+
     /// The hair of this stiffness (m).
     pub fn hair(&mut self, bending_length: f32) -> Entity {
         let world = self.app.world_mut();
         *self.hairs.entry(bending_length.to_bits()).or_insert_with(|| {
-            let stiffness = HairStiffness { bending_length, damping: self.damping };
+            let (damping, torsion) = (self.damping, self.torsion);
+            let stiffness = HairStiffness { bending_length, damping, torsion };
             world.spawn((Hair, stiffness)).id()
         })
     }

@@ -11,5 +11,5 @@ mod theory;
 use crate::trace;
 mod twisted;
 
-/// G J / E I of the crate's hair.
-const TORSION: f64 = 1.0;
+/// G J / E I of a dry fibre.
+const TORSION: f64 = 0.46;

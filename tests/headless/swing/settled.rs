@@ -51,6 +51,7 @@ fn a_hanging_curl_is_as_high_as_a_rod_of_that_shape() {
     let theory = helix.hanging_height(0.06, TORSION);
     let segments = [18, 24, 36, 48, 64, 96];
     for (substep, mut lab) in Lab::both() {
+        lab.torsion(TORSION);
         let curls = segments.map(|n| lab.strand(0.06, &curl(n)));
         lab.settle(10.0);
         let heights = curls.map(|c| f64::from(lab.get(c).positions()[0].y - lab.tip(c).y));

@@ -56,6 +56,7 @@ impl Cranked {
     fn new(mut lab: Lab) -> Self {
         // It would only slow down how the strand bows.
         lab.undamped();
+        lab.torsion(TORSION);
         lab.gravity(Vec3::ZERO);
         let mut points = line(SPAN + EDGE, FREE + 1, Vec3::X);
         points.push(Vec3::new(SPAN + EDGE, EDGE, 0.0));
@@ -155,4 +156,32 @@ fn buckle(substep: &str, lab: Lab) {
     }
     println!("{substep}: buckles at M L / E I = {reached:.3}, theory {buckling:.3}");
     assert!((reached / buckling - 1.0).abs() < 0.1, "{reached}, theory {buckling}");
+}
+
+/// The strand is straight between two clamps whose orientations differ by an angle about it, and by a tilt that an edge
+/// between two held nodes cannot have.
+#[test]
+fn a_clamped_frame_twists_what_lies_between() {
+    for angle in [0.0, 1.2, -2.0] {
+        let mut lab = Lab::usual();
+        lab.torsion(TORSION);
+        lab.gravity(Vec3::ZERO);
+        let points = line(SPAN + EDGE, FREE + 1, Vec3::X);
+        let strand = lab.strand(BENDING_LENGTH, &points);
+        let targets = points.iter().map(|p| (p.x > SPAN - 0.5 * EDGE).then_some(*p)).collect();
+        let tilt = Quat::from_rotation_z(0.3);
+        let frame = tilt * Quat::from_rotation_x(angle) * lab.get(strand).root_frame();
+        let mut frames = vec![None; FREE + 1];
+        frames.push(Some(frame));
+        lab.app.world_mut().entity_mut(strand).insert(HeldNodes { targets, frames });
+        lab.settle(4.0);
+        let strand = lab.get(strand);
+        // Half a cell at the root, whole ones between edges; the last edge is held.
+        let twists = (0..=FREE).map(|j| 2.0 * strand.darboux(j).z.asin());
+        let expected = angle / (FREE as f32 + 0.5);
+        for (j, twist) in twists.enumerate() {
+            let expected = if j == 0 { 0.5 * expected } else { expected };
+            assert!((twist - expected).abs() < 1e-3, "{angle}: {twist} at {j}, not {expected}");
+        }
+    }
 }

@@ -21,11 +21,11 @@ mod skin;
 use super::{Groom, GroomError, GroomFileError, GroomLosses, intake::Intake, losses::GroomPlace};
 use accessor::{Buffers, Elements, Vectors};
 use bevy::{platform::collections::HashMap, prelude::*};
-use chain::Chains;
 use document::{COLOR, Document, Node, POSITION, Primitive, UV, compression};
 use error::{missing, wrong};
 use skin::{Bones, Place};
 
+pub(super) use chain::Chains;
 pub(super) use container::looks_like_json;
 
 /// A glTF or GLB file whose JSON has been read.

@@ -1,12 +1,13 @@
 //! One Newton step of a strand: down the strand to assemble and eliminate, up to solve.
 //!
 //! With e_i the vector of edge i, t_i its frame's tangent and r_i = 1/|e_i|, a displacement turns the
-//! edge by δφ_i = t_i × δe_i r_i. Energies: ½ (EA/l)(|e| − l)² of an edge, 2K|Q − sQ0|² of a joint,
-//! whose exact gradient is the moment m = 2K s Im(q_j (q_{j−1} Q0)‾) and whose Gauss–Newton Hessian
-//! is that of ½K|δφ_j − δφ_{j−1}|².
+//! edge by δφ_i = t_i × δe_i r_i. Energies: ½ (EA/l)(|e| − l)² of an edge, that of [`moment`] of a joint, of which the
+//! moment is the exact gradient and whose Gauss–Newton Hessian is that of ½K|δφ_j − δφ_{j−1}|².
 
 use super::{
-    frames::{choose, moment, parallel_transport, turned_since},
+    frames::{
+        Torsion, choose, moment, parallel_transport, turned_by_e3, turned_since, twist_stiffness,
+    },
     matrix::{Matrix, Pivot, Symmetric},
     row::DirectRow,
     width::Width,
@@ -37,6 +38,8 @@ pub(crate) struct NewtonStage<R> {
     pub max_twist: R,
     /// Kelvin–Voigt time (s), less what the step itself damps.
     pub damping: R,
+    /// How joints resist twist.
+    pub torsion: Torsion<R>,
     /// Whether this is the second Newton step, where frames differ from the start of the substep.
     pub second: bool,
     /// 1 in lanes that take this Newton step, 0 in lanes that are done. Where nothing touches, all do.
@@ -164,7 +167,8 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             let tension = (axial * (length - l)).max(w.get(&edge.tension)).max(zero);
             let across = W::Real::select(crushed, axial, tension * r);
             let k = w.get(&edge.k);
-            let elastic = moment(w, before.q, q, w.get4(&edge.rest), k);
+            let torsion = stage.torsion.less(w.get(&edge.twist_loss));
+            let elastic = moment(w, before.q, q, w.get4(&edge.rest), k, &torsion);
             // Where bends lie in many planes, twist relaxes somewhere along the strand, and
             // rotations passed on from the root overestimate those of edges. Friction must only
             // dissipate energy.
@@ -374,7 +378,8 @@ pub(crate) fn finish<W: Width>(
     let mut x = w.zero3();
     // A row of the tridiagonal system for the rotations α about the tangents: of each joint K, its
     // moment along the tangents it joins, and −K t·t′ off the diagonal.
-    let mut before = Twist { q: w.get4(root), t: w.zero3(), k: zero, moment: zero, coupling: zero };
+    let mut before =
+        Twist { q: w.get4(root), t: w.zero3(), k: zero, clamp: zero, moment: zero, coupling: zero };
     before.t = before.q.tangent();
     let mut turns = Elimination::new(zero);
     for i in 0..nodes.len() {
@@ -398,8 +403,17 @@ pub(crate) fn finish<W: Width>(
         w.put4(q, &mut edge.q);
         sum = q.dot(q) + sum;
         let (t, k) = (q.tangent(), w.get(&edge.k));
-        let elastic = moment(w, before.q, q, w.get4(&edge.rest), k);
-        let now = Twist { q, t, k, moment: elastic.dot(t), coupling: -(k * t.dot(before.t)) };
+        let rest = w.get4(&edge.rest);
+        let torsion = stage.torsion.less(w.get(&edge.twist_loss));
+        let elastic = moment(w, before.q, q, rest, k, &torsion);
+        let (k, coupling) = if torsion.isotropic {
+            (k, -(k * t.dot(before.t)))
+        } else {
+            let (diagonal, off) = twist_stiffness(before.q, q, rest, &torsion);
+            (k * diagonal, k * off)
+        };
+        let clamp = w.get(&edge.clamped) * w.lit(CLAMP);
+        let now = Twist { q, t, k, clamp, moment: elastic.dot(t), coupling };
         if i > 1 {
             before.moment = before.moment - elastic.dot(before.t);
             before.eliminate(k, &mut turns, rows, i - 2, w);
@@ -410,13 +424,18 @@ pub(crate) fn finish<W: Width>(
     sum * zero
 }
 
+/// Stiffness against rotation of an edge whose orientation is held (N m): joints have at most 1e6.
+const CLAMP: f64 = 1e20;
+
 /// State of an edge in the elimination of twist.
 #[derive(Clone, Copy)]
 struct Twist<R> {
     q: Quaternion<R>,
     t: V3<R>,
-    /// Stiffness of the joint at its start.
+    /// Stiffness of the joint at its start against this edge's rotation.
     k: R,
+    /// What holds it besides, if anything.
+    clamp: R,
     /// Moment about its tangent.
     moment: R,
     /// Coupling with the previous edge.
@@ -434,7 +453,8 @@ impl<R: Real> Twist<R> {
         i: usize,
         w: W,
     ) {
-        let upper = turns.row(self.coupling, self.k + k_next, -self.moment, w.lit(1e-30));
+        let upper =
+            turns.row(self.coupling, self.k + k_next + self.clamp, -self.moment, w.lit(1e-30));
         if i > 0 {
             w.put(upper, &mut rows[i - 1].twist_next);
         }
@@ -457,7 +477,6 @@ pub(crate) fn untwist<W: Width>(
         // About the tangent, which in the edge's own frame is e3.
         let q = w.get4(&edge.q);
         let half = twist * w.lit(0.5);
-        let along = Quaternion::new(V3::new(q.v.y, -q.v.x, q.w), -q.v.z);
-        w.put4(q.add_scaled(along, half).normalize(), &mut edge.q);
+        w.put4(q.add_scaled(turned_by_e3(q), half).normalize(), &mut edge.q);
     }
 }

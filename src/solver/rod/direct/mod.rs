@@ -103,6 +103,7 @@ use crate::base::lanes::{
     LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,
 };
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
+use frames::Torsion;
 use glam::Vec3;
 use kernel::NewtonStage;
 use width::{Half, Whole, Width};
@@ -117,6 +118,8 @@ pub struct DirectParams {
     pub gravity: Vec3,
     /// Kelvin–Voigt time of the material (s).
     pub damping: f32,
+    /// G J/(E I).
+    pub torsion: f32,
     /// Newton steps of the length limiter, at most.
     pub limiter_steps: u32,
     /// Distance that nodes keep from obstacles (m).
@@ -312,6 +315,7 @@ fn stage<W: Width<Cell = crate::base::lanes::Lane>>(
         ),
         max_twist: w.get(&b.max_twist),
         damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
+        torsion: Torsion::new(dt, params.torsion),
         second: false,
         again: w.lit(1.0),
         twice: w.get(&b.twice),

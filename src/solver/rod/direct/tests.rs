@@ -12,6 +12,7 @@ use glam::{DQuat, DVec3, Quat};
 mod any_hair;
 mod closed_forms;
 mod golden;
+mod torsion;
 
 const DT: f32 = 1.0 / 360.0;
 
@@ -20,6 +21,7 @@ fn params() -> DirectParams {
         dt: DT,
         gravity: Vec3::NEG_Y * 9.8,
         damping: 0.003,
+        torsion: 0.46,
         limiter_steps: 6,
         clearance: 0.0,
     }
@@ -53,7 +55,10 @@ fn substep(block: &mut BlockLanes, bending_length: f32, obstacles: &[Obstacle]) 
 }
 
 fn prepare(block: &mut BlockLanes, bending_length: f32) {
-    let params = params();
+    prepare_for(block, bending_length, &params());
+}
+
+fn prepare_for(block: &mut BlockLanes, bending_length: f32, params: &DirectParams) {
     for (i, node) in block.nodes.iter_mut().enumerate() {
         node.w = [if i == 0 { 0.0 } else { 1.0 }; LANES];
         node.v[1] = node.v[1].map(|v| v + params.gravity.y * params.dt);
@@ -61,7 +66,7 @@ fn prepare(block: &mut BlockLanes, bending_length: f32) {
     block.nodes[0].from = block.nodes[0].p;
     block.root_from = block.root;
     block.edges.iter_mut().for_each(|edge| edge.k = [1.0; LANES]);
-    weigh(Level::new(), block, bending_length, DT);
+    weigh(Level::new(), block, bending_length, params.dt);
 }
 
 fn wavy(lane: usize, i: usize) -> Vec3 {
@@ -105,6 +110,7 @@ struct Strands<C> {
 struct Step {
     dt: f32,
     damping: f64,
+    torsion: f32,
     gravity: [f64; 3],
 }
 
@@ -131,6 +137,7 @@ impl<C: Copy + Default> Strands<C> {
             ),
             max_twist: w.get(&self.max_twist),
             damping: (w.lit(step.damping) - own).max(w.lit(0.0)),
+            torsion: Torsion::new(theta, step.torsion),
             second: false,
             again: w.lit(1.0),
             twice: w.get(&self.twice),

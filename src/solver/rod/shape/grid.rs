@@ -60,7 +60,7 @@ impl DistanceGrid {
         distances: Vec<f32>,
         (low, high): (Vec3, Vec3),
     ) -> Self {
-        debug_assert_eq!(distances.len(), points.element_product() as usize);
+        assert_eq!(distances.len(), points.element_product() as usize);
         let thickness = -distances.iter().copied().fold(-cell, f32::min);
         let samples = Samples { origin, cell, points, distances, low, high, thickness };
         Self { samples: Arc::new(samples), stretch: Vec3::ONE }

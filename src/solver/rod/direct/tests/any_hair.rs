@@ -112,7 +112,7 @@ impl Shape {
     }
 
     fn step(&self) -> Step {
-        Step { dt: self.dt, damping: self.damping, gravity: [0.0, -9.8, 0.0] }
+        Step { dt: self.dt, damping: self.damping, torsion: 0.46, gravity: [0.0, -9.8, 0.0] }
     }
 }
 

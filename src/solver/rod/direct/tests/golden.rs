@@ -9,6 +9,8 @@ struct Case {
     name: String,
     dt: f64,
     damping: f64,
+    #[serde(default = "isotropic")]
+    torsion: f32,
     gravity: [f64; 3],
     held: Vec<bool>,
     from: Vec<[f64; 3]>,
@@ -24,6 +26,10 @@ struct Case {
     root: [f64; 4],
     root_from: [f64; 4],
     after: After,
+}
+
+fn isotropic() -> f32 {
+    1.0
 }
 
 #[derive(Deserialize)]
@@ -43,7 +49,7 @@ struct Golden {
 fn in_f64_a_substep_is_that_of_a_dense_solve() {
     let golden = include_str!("../../../../../tests/data/direct.json");
     let golden: Golden = serde_json::from_str(golden).unwrap();
-    assert_eq!(golden.cases.len(), 7);
+    assert_eq!(golden.cases.len(), 11);
     for c in golden.cases {
         let (w, theta) = (Single::<f64>::default(), f64::from(THETA));
         let node = |i: usize| {
@@ -79,7 +85,8 @@ fn in_f64_a_substep_is_that_of_a_dense_solve() {
             max_twist: f64::INFINITY,
             twice: 0.0,
         };
-        let step = Step { dt: c.dt as f32, damping: c.damping, gravity: c.gravity };
+        let step =
+            Step { dt: c.dt as f32, damping: c.damping, torsion: c.torsion, gravity: c.gravity };
         assert_eq!(strand.solve::<_, false>(w, &step), 0.0);
         let close = |what: &str, found: &[f64], expected: &[f64], scale: f64| {
             for (found, expected) in found.iter().zip(expected) {

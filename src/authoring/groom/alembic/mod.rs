@@ -1,0 +1,439 @@
+//! Alembic archives (`.abc`) with curves, read and written: hair as Blender, Maya, Houdini and Unreal's users
+//! export it.
+//!
+//! The container is Ogawa; archives of before 2013 are HDF5 and not read. All curve sets of a file become one
+//! groom, in the order of the file and with the transforms above them applied; the first sample of what is
+//! animated counts. The format specifies neither unit nor axes: see
+//! [`GroomSettings`](super::GroomSettings).
+//!
+//! | curves | become |
+//! |---|---|
+//! | linear of any basis, Catmull-Rom | their points, joined |
+//! | Bezier | anchors, and two nodes between each two on the curve |
+//! | B-spline, variable order (NURBS) | as many nodes as points, even in the parameter; without knots from end to end |
+//! | closed | opened at the first point |
+//!
+//! | numbers | where |
+//! |---|---|
+//! | diameters | `groom_width`, else `width`; scaled with the transforms |
+//! | UVs of roots | `groom_root_uv`, else `uv`; V counts from the bottom there, from the top in a [`Groom`] |
+//! | colours | `groom_color`, else `Cd` |
+//! | guides | `groom_guide`: see [`Groom::with_guides`] |
+//!
+//! Each may be one for the set, one a curve or one a point; sets that have none where others do take the mean
+//! of those (zero for UVs).
+
+mod curves;
+mod ogawa;
+mod params;
+
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use write::write;
+
+use super::{
+    Groom, GroomError, GroomFileError, GroomLosses, bytes::value, intake::Intake,
+    losses::GroomPlace,
+};
+use bevy::{
+    math::{DAffine3, DMat3, DQuat, DVec3, DVec4},
+    prelude::*,
+};
+use curves::{CUBIC, Curve, Curves, Kind};
+use ogawa::{Children, Compound, EXPORT_AGAIN, Object, Ogawa, Property, Values};
+use params::{COLOR, Column, Counts, GUIDE, Param, ROOT_UV, WIDTH, first_of, from_the_top};
+
+/// Objects nested deeper are refused.
+const DEEPEST: usize = 256;
+/// So many bytes of the file justify a node, or a strand: sets may share their arrays.
+const BYTES_PER_NODE: usize = 4;
+
+/// A groom from the bytes of an `.abc` file, in the file's own unit and axes, and what was left out.
+///
+/// Hidden objects and those in them are left out and counted, and so are meshes and instances, sets without
+/// curves, further samples, and arrays of which a groom has none. Strands with a number that is not finite
+/// or a width that is negative are left out and counted.
+///
+/// ```
+/// # use bevy_keratin::authoring::groom::{Groom, alembic}; use bevy::prelude::*;
+/// let groom = Groom::from_polylines([[Vec3::ZERO, Vec3::Y * 0.1]]).unwrap();
+/// let file = alembic::write(&groom).unwrap();
+/// assert_eq!(alembic::read(&file).unwrap().0, groom);
+/// ```
+///
+/// # Errors
+/// When the container is broken or unfinished, points and counts of a set contradict each other, its basis is
+/// Hermite or power, or no strand is left.
+pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
+    intake(file).map(|intake| (intake.groom, intake.losses))
+}
+
+pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
+    let archive = Ogawa::open(file)?;
+    let mut reading = Reading {
+        archive: &archive,
+        limit: file.len() / BYTES_PER_NODE,
+        groom: Groom::default(),
+        widths: Column::EMPTY,
+        colors: Column::EMPTY,
+        uvs: Column::EMPTY,
+        guides: Column::EMPTY,
+        losses: GroomLosses::default(),
+    };
+    reading.walk()?;
+    let Reading { mut groom, widths, colors, uvs, guides, losses, .. } = reading;
+    if groom.is_empty() {
+        let hint = "export hair curves or particle hair with it, visible";
+        let found = format!("without curves ({losses})");
+        return value(8, "the archive", found, "one with AbcGeom_Curve", hint);
+    }
+    groom.widths = widths.filled(true).into_iter().map(|[width]| width).collect();
+    groom.colors = colors.filled(true).into_iter().map(LinearRgba::from_f32_array).collect();
+    groom.uvs = uvs.filled(false).into_iter().map(Vec2::from_array).collect();
+    groom.guides = guides.filled(false).into_iter().map(|[guide]| guide != 0.0).collect();
+    Ok(Intake::cleaned(groom, losses)?)
+}
+
+/// An object that others are in.
+struct Open<'a> {
+    name: &'a str,
+    children: Children<'a>,
+    space: DAffine3,
+    hidden: bool,
+}
+
+struct Reading<'a> {
+    archive: &'a Ogawa<'a>,
+    /// How many nodes, and strands, the groom may have.
+    limit: usize,
+    groom: Groom,
+    widths: Column<1>,
+    colors: Column<4>,
+    uvs: Column<2>,
+    guides: Column<1>,
+    losses: GroomLosses,
+}
+
+fn path_of(open: &[Open<'_>], object: Object<'_>) -> String {
+    let above = open.iter().skip(1).map(|open| open.name);
+    let path = above.chain([object.name]).fold(String::new(), |path, name| path + "/" + name);
+    path.chars().take(200).collect()
+}
+
+impl<'a> Reading<'a> {
+    fn walk(&mut self) -> Result<(), GroomFileError> {
+        let archive = self.archive;
+        let top = archive.top();
+        let (space, hidden) = (DAffine3::IDENTITY, false);
+        let mut open = vec![Open { name: "", children: archive.children(top)?, space, hidden }];
+        while let Some(within) = open.last_mut() {
+            let Some(object) = archive.next(&mut within.children)? else {
+                open.pop();
+                continue;
+            };
+            let (mut space, mut hidden) = (within.space, within.hidden);
+            let properties = archive.properties_of(object)?;
+            if let Some(visible) = archive.find_values(properties, "visible")? {
+                hidden |= visible.get(0) == 0.0;
+            }
+            let schema = object.schema();
+            if object.is_instance() {
+                let path = format!("{}, an instance", path_of(&open, object));
+                self.losses.skipped_primitives.add(GroomPlace::Part(path));
+            } else if schema.starts_with("AbcGeom_Xform") {
+                space = self.transform(archive.find_compound(properties, ".xform")?, space)?;
+            } else if schema.starts_with("AbcGeom_Curve") {
+                let path = path_of(&open, object);
+                match hidden {
+                    true => self.losses.hidden_curves.add(GroomPlace::Part(path)),
+                    false => {
+                        let set = archive.find_compound(properties, ".geom")?;
+                        self.curves(set, &space, &path)?;
+                    }
+                }
+            } else if schema.starts_with("AbcGeom_") && !schema.starts_with("AbcGeom_FaceSet") {
+                let path = path_of(&open, object);
+                self.losses.skipped_primitives.add(GroomPlace::Part(path));
+            }
+            if open.len() >= DEEPEST {
+                let expected = format!("at most {DEEPEST}");
+                return value(8, "the depth of objects", "more", expected, EXPORT_AGAIN);
+            }
+            let children = archive.children(object)?;
+            open.push(Open { name: object.name, children, space, hidden });
+        }
+        Ok(())
+    }
+
+    /// The space of a transform's children. Operations are listed outermost first.
+    fn transform(
+        &self,
+        properties: Compound<'a>,
+        above: DAffine3,
+    ) -> Result<DAffine3, GroomFileError> {
+        let find = |name| self.archive.find_values(properties, name);
+        let inherits = find(".inherits")?.is_none_or(|inherits| inherits.get(0) != 0.0);
+        let mut space = if inherits { above } else { DAffine3::IDENTITY };
+        let (Some(operations), values) = (find(".ops")?, find(".vals")?) else {
+            return Ok(space);
+        };
+        let mut at = 0;
+        for operation in operations.iter() {
+            let number = |k: usize| values.map_or(f64::NAN, |values| values.get(at + k));
+            let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
+            let turned = |axis, degrees: f64| {
+                DAffine3::from_quat(DQuat::from_axis_angle(axis, degrees.to_radians()))
+            };
+            let (local, count) = match operation as u32 >> 4 {
+                0 => (DAffine3::from_scale(vector(0)), 3),
+                1 => (DAffine3::from_translation(vector(0)), 3),
+                2 => (turned(vector(0).normalize_or(DVec3::X), number(3)), 4),
+                3 => {
+                    // Row vectors: rows are the images of the axes.
+                    let axes = DMat3::from_cols(vector(0), vector(4), vector(8));
+                    (DAffine3::from_mat3_translation(axes, vector(12)), 16)
+                }
+                4 => (turned(DVec3::X, number(0)), 1),
+                5 => (turned(DVec3::Y, number(0)), 1),
+                6 => (turned(DVec3::Z, number(0)), 1),
+                other => {
+                    let expected = "0 to 6, a scale, translation, rotation or matrix";
+                    let what = "the kind of a transform's operation";
+                    return value(operations.at, what, other, expected, EXPORT_AGAIN);
+                }
+            };
+            at += count;
+            if values.is_none_or(|values| values.len() < at) {
+                let what = "the count of a transform's numbers";
+                let found = values.map_or(0, |values| values.len());
+                let expected = format!("{at} or more");
+                return value(operations.at, what, found, expected, EXPORT_AGAIN);
+            }
+            space *= local;
+        }
+        Ok(space)
+    }
+
+    fn curves(
+        &mut self,
+        set: Compound<'a>,
+        space: &DAffine3,
+        path: &str,
+    ) -> Result<(), GroomFileError> {
+        let archive = self.archive;
+        let place = || GroomPlace::Part(path.to_owned());
+        let positions = archive.find(set, "P")?;
+        let counts = archive.find_values(set, "nVertices")?;
+        let points = positions.map_or(Ok(None), |positions| archive.values(positions))?;
+        let (Some(positions), Some(points), Some(counts)) = (positions, points, counts) else {
+            self.losses.empty_curves.add(place());
+            return Ok(());
+        };
+        let (kind, is_closed) = kind_of(archive.find_values(set, "curveBasisAndType")?, path)?;
+        let curves = self.curves_of(kind, points, counts, path)?;
+        if let Some(more @ 1..) = positions.samples.checked_sub(1) {
+            self.losses.unread_samples.add_many(more as usize, place());
+        }
+        if is_closed {
+            self.losses.opened_loops.add_many(curves.len(), place());
+        }
+        self.nodes(set, points, curves, (space, path))?;
+        self.numbers(set, curves, (space, path))
+    }
+
+    /// The curves of a set, whose counts fit its points.
+    fn curves_of(
+        &self,
+        kind: Kind,
+        points: Values<'a>,
+        counts: Values<'a>,
+        path: &str,
+    ) -> Result<Curves<'a>, GroomFileError> {
+        let found = points.len() / 3;
+        let all: f64 = counts.iter().sum();
+        if all != found as f64 || counts.iter().any(|count| count < 0.0) {
+            let found = format!("{found} in {path}");
+            let expected = format!("{all}, the sum of nVertices, each 0 or more");
+            return value(points.at, "the count of points", found, expected, EXPORT_AGAIN);
+        }
+        let (nodes, strands) = (self.groom.points.len() + found, self.groom.len() + counts.len());
+        if nodes.max(strands) > self.limit {
+            let found = format!("{} in {path}", nodes.max(strands));
+            let expected = format!("at most {}, as the file's size justifies", self.limit);
+            let hint = "apply instances before the export";
+            return value(points.at, "the count of nodes and strands", found, expected, hint);
+        }
+        Ok(Curves { kind, counts })
+    }
+
+    fn nodes(
+        &mut self,
+        set: Compound<'a>,
+        points: Values<'a>,
+        curves: Curves<'a>,
+        (space, path): (&DAffine3, &str),
+    ) -> Result<(), GroomFileError> {
+        let find = |name| self.archive.find_values(set, name);
+        let (weights, orders, all_knots) = (find("w")?, find(".orders")?, find(".knots")?);
+        let weights = weights.filter(|weights| weights.len() == points.len() / 3);
+        let orders = orders.filter(|orders| orders.len() == curves.len());
+        let wanted = |curve: Curve| orders.map_or(CUBIC, |o| o.get(curve.index) as usize);
+        let point = |i: usize| {
+            space.transform_point3(DVec3::from_array([0, 1, 2].map(|k| points.get(3 * i + k))))
+        };
+        let (mut controls, mut weighted, mut knots) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut next_knot, mut bad_knots) = (0_usize, 0);
+        for curve in curves.iter() {
+            let nodes = 0..curve.nodes;
+            let (wanted, first_knot) = (wanted(curve), next_knot);
+            next_knot = first_knot.saturating_add(curve.count).saturating_add(wanted);
+            let made = &mut self.groom.points;
+            match curves.kind {
+                Kind::Joined => made.extend(curve.points().map(|i| point(i).as_vec3())),
+                Kind::Bezier => {
+                    controls.clear();
+                    controls.extend(curve.points().map(point));
+                    made.extend(nodes.map(|node| curves::bezier(&controls, node).as_vec3()));
+                }
+                Kind::Spline if curve.nodes > 1 => {
+                    let weight = |i| weights.map_or(1.0, |weights| weights.get(i));
+                    let control = |i| DVec4::from((point(i) * weight(i), weight(i)));
+                    weighted.clear();
+                    weighted.extend(curve.points().map(control));
+                    let count = weighted.len();
+                    let order = curves::order_of(wanted, count);
+                    knots.clear();
+                    if let Some(all) = all_knots {
+                        let last_knot = first_knot.saturating_add(count + order);
+                        knots.extend((first_knot..last_knot).map(|i| all.get(i)));
+                        bad_knots += usize::from(!curves::are_knots(&knots, count, order));
+                    }
+                    if !curves::are_knots(&knots, count, order) {
+                        curves::clamped_knots(count, order, &mut knots);
+                    }
+                    let node = |node| curves::spline(&weighted, order, &knots, node).as_vec3();
+                    made.extend(nodes.map(node));
+                }
+                Kind::Spline => made.extend(curve.points().map(|i| point(i).as_vec3())),
+            }
+            let found = made.len();
+            let end = u32::try_from(found).map_err(|_| GroomError::TooMany { found })?;
+            self.groom.ends.push(end);
+        }
+        if bad_knots > 0 {
+            let part = format!("{path}.knots: of {bad_knots} curves, which have even ones instead");
+            self.losses.broken_arrays.add(GroomPlace::Part(part));
+        }
+        Ok(())
+    }
+
+    /// The optional numbers of a set.
+    fn numbers(
+        &mut self,
+        set: Compound<'a>,
+        curves: Curves<'a>,
+        (space, path): (&DAffine3, &str),
+    ) -> Result<(), GroomFileError> {
+        let archive = self.archive;
+        let own = archive.find_compound(set, ".arbGeomParams")?;
+        let sum = |of: fn(Curve) -> usize| curves.iter().map(of).sum();
+        let counts = Counts {
+            curves: curves.len(),
+            points: sum(|curve| curve.count),
+            anchors: sum(|curve| curve.anchors),
+        };
+        let nodes = sum(|curve| curve.nodes);
+        let each = || curves.iter().flat_map(|c| (0..c.nodes).map(move |node| (c, node)));
+
+        let width = first_of(archive, &[(own, WIDTH), (set, "width")])?;
+        let width = self.param::<1>(width, counts, path);
+        let scale = space.matrix3.determinant().abs().cbrt() as f32;
+        let width = width.as_ref().map(|width| {
+            each().map(move |(curve, node)| width.at(curve, node).map(|width| width * scale))
+        });
+        self.widths.add(nodes, width);
+
+        let color = first_of(archive, &[(own, COLOR), (own, "Cd")])?;
+        match color.is_some_and(|color| color.extent() == 4) {
+            true => {
+                let color = self.param::<4>(color, counts, path);
+                let color = color.as_ref().map(|color| each().map(|(c, node)| color.at(c, node)));
+                self.colors.add(nodes, color);
+            }
+            false => {
+                let color = self.param::<3>(color, counts, path);
+                let color = color.as_ref().map(|color| each().map(|(c, node)| color.at(c, node)));
+                self.colors.add(nodes, color.map(|color| color.map(|[r, g, b]| [r, g, b, 1.0])));
+            }
+        }
+        let uv = first_of(archive, &[(own, ROOT_UV), (set, "uv")])?;
+        let uv = self.param::<2>(uv, counts, path);
+        let uv = uv.as_ref().map(|uv| curves.iter().map(|curve| from_the_top(uv.at(curve, 0))));
+        self.uvs.add(curves.len(), uv);
+        let guide = self.param::<1>(archive.find(own, GUIDE)?, counts, path);
+        let guide = guide.as_ref().map(|guide| curves.iter().map(|curve| guide.at(curve, 0)));
+        self.guides.add(curves.len(), guide);
+
+        let losses = &mut self.losses;
+        let mut unread = |name: &str| {
+            losses.unread_arrays.add(GroomPlace::Part(format!("{path}.{name}")));
+        };
+        archive.visit(own, |property| {
+            // Of `groom_version_major` and others, which say nothing about strands, as of those that are read.
+            let is_known = READ.contains(&property.name) || NOTES.contains(&property.name);
+            if !is_known && (property.samples > 0 || property.is_compound()) {
+                unread(property.name);
+            }
+            false
+        })?;
+        for name in ["N", ".velocities"] {
+            if archive.find_values(set, name)?.is_some() {
+                unread(name);
+            }
+        }
+        Ok(())
+    }
+
+    /// An array that a set can do without: `None`, and counted, if it cannot be read.
+    fn param<const N: usize>(
+        &mut self,
+        property: Option<Property<'a>>,
+        counts: Counts,
+        path: &str,
+    ) -> Option<Param<'a, N>> {
+        let property = property?;
+        Param::of(self.archive, property, counts).unwrap_or_else(|wrong| {
+            let part = format!("{path}.{}: {wrong}", property.name);
+            self.losses.broken_arrays.add(GroomPlace::Part(part));
+            None
+        })
+    }
+}
+
+/// Attributes that are read …
+const READ: [&str; 5] = [WIDTH, COLOR, ROOT_UV, GUIDE, "Cd"];
+/// … and those about the file.
+const NOTES: [&str; 4] =
+    ["groom_version_major", "groom_version_minor", "groom_tool", "groom_properties"];
+
+/// How curves of a set become strands, and whether they are closed.
+fn kind_of(basis_and_type: Option<Values<'_>>, path: &str) -> Result<(Kind, bool), GroomFileError> {
+    let Some(numbers) = basis_and_type else {
+        return Ok((Kind::Joined, false));
+    };
+    let [kind, wrap, basis] = [0, 1, 2].map(|k| numbers.get(k) as u8);
+    let is_closed = wrap == 1;
+    match (kind, basis) {
+        (1, _) | (0, 0 | 3) => Ok((Kind::Joined, is_closed)),
+        (0, 1) => Ok((Kind::Bezier, is_closed)),
+        (0, 2) | (2, _) => Ok((Kind::Spline, is_closed)),
+        _ => {
+            let found = format!("type {kind} and basis {basis} in {path}");
+            let expected = "linear, variable order, or cubic by Bezier, B-spline or Catmull-Rom";
+            let hint = "convert the curves to linear or Catmull-Rom before the export";
+            value(numbers.at, "the curves' type", found, expected, hint)
+        }
+    }
+}

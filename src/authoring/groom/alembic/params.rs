@@ -1,0 +1,164 @@
+//! Optional numbers of curve sets: one for all, one a curve, a point or an anchor.
+
+use super::{
+    curves::Curve,
+    ogawa::{Compound, Ogawa, Property, Values},
+};
+use crate::authoring::groom::GroomFileError;
+use core::ops::Range;
+
+/// Attributes that Unreal Engine names.
+pub const WIDTH: &str = "groom_width";
+pub const COLOR: &str = "groom_color";
+pub const ROOT_UV: &str = "groom_root_uv";
+pub const GUIDE: &str = "groom_guide";
+
+/// The numbers of one property, N to an element.
+pub struct Param<'a, const N: usize> {
+    values: Values<'a>,
+    indices: Option<Values<'a>>,
+    scope: Scope,
+}
+
+/// What has an element of its own. Told by how many there are: Blender does not write it.
+#[derive(Clone, Copy)]
+enum Scope {
+    Set,
+    Curve,
+    Point,
+    Anchor,
+}
+
+/// How many there are in a set.
+#[derive(Clone, Copy)]
+pub struct Counts {
+    pub curves: usize,
+    pub points: usize,
+    pub anchors: usize,
+}
+
+impl<'a, const N: usize> Param<'a, N> {
+    /// The numbers of a property, `None` if it has none.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn of(
+        archive: &Ogawa<'a>,
+        property: Property<'a>,
+        counts: Counts,
+    ) -> Result<Option<Self>, String> {
+        let told = |error: GroomFileError| error.to_string();
+        let (values, indices) = match property.is_compound() {
+            false => (archive.values(property).map_err(told)?, None),
+            true => {
+                let inside = archive.inside(property).map_err(told)?;
+                let values = archive.find_values(inside, ".vals").map_err(told)?;
+                (values, archive.find_values(inside, ".indices").map_err(told)?)
+            }
+        };
+        let Some(values) = values else {
+            return Ok(None);
+        };
+        let elements = values.len() / N;
+        if indices.is_some_and(|indices| indices.iter().any(|i| i >= elements as f64)) {
+            return Err(format!("an index beyond its {elements} values"));
+        }
+        let found = indices.map_or(elements, |indices| indices.len());
+        let Counts { curves, points, anchors } = counts;
+        let scope = match found {
+            all if all == points => Scope::Point,
+            all if all == curves => Scope::Curve,
+            1 => Scope::Set,
+            all if all == anchors => Scope::Anchor,
+            _ => return Err(format!("{found} values, expected 1, {curves} or {points}")),
+        };
+        Ok(Some(Self { values, indices, scope }))
+    }
+
+    /// At a node of a curve.
+    pub fn at(&self, curve: Curve, node: usize) -> [f32; N] {
+        match self.scope {
+            Scope::Set => self.element(0),
+            Scope::Curve => self.element(curve.index),
+            Scope::Point => self.element(curve.first_point + node),
+            Scope::Anchor => {
+                let anchor = curve.first_anchor + node / 3;
+                let (from, to) = (self.element(anchor), self.element(anchor + 1));
+                match node % 3 {
+                    0 => from,
+                    t => core::array::from_fn(|k| from[k] + (to[k] - from[k]) * t as f32 / 3.0),
+                }
+            }
+        }
+    }
+
+    fn element(&self, i: usize) -> [f32; N] {
+        // `as` saturates, and indices are checked.
+        let i = self.indices.map_or(i, |indices| indices.get(i) as usize);
+        core::array::from_fn(|k| self.values.get(N * i + k) as f32)
+    }
+}
+
+/// The first of these properties that there is.
+pub fn first_of<'a>(
+    archive: &Ogawa<'a>,
+    among: &[(Compound<'a>, &'static str)],
+) -> Result<Option<Property<'a>>, GroomFileError> {
+    for (compound, name) in among {
+        if let Some(found) = archive.find(*compound, name)? {
+            return Ok(Some(found));
+        }
+    }
+    Ok(None)
+}
+
+/// An optional array of a groom, filled set by set.
+pub struct Column<const N: usize> {
+    values: Vec<[f32; N]>,
+    /// Where sets did not have it.
+    gaps: Vec<Range<usize>>,
+    len: usize,
+}
+
+impl<const N: usize> Column<N> {
+    pub const EMPTY: Self = Self { values: Vec::new(), gaps: Vec::new(), len: 0 };
+
+    pub fn add(&mut self, count: usize, values: Option<impl Iterator<Item = [f32; N]>>) {
+        let end = self.len + count;
+        match values {
+            Some(values) => {
+                self.values.resize(self.len, [0.0; N]);
+                self.values.extend(values.take(count));
+            }
+            None => match self.gaps.last_mut() {
+                Some(last) if last.end == self.len => last.end = end,
+                _ => self.gaps.push(self.len..end),
+            },
+        }
+        self.len = end;
+    }
+
+    /// The array, empty if no set had it; sets that did not have zeros, or the mean of the others.
+    pub fn filled(mut self, by_mean: bool) -> Vec<[f32; N]> {
+        if self.values.is_empty() {
+            return self.values;
+        }
+        self.values.resize(self.len, [0.0; N]);
+        if by_mean && !self.gaps.is_empty() {
+            let known = self.len - self.gaps.iter().map(ExactSizeIterator::len).sum::<usize>();
+            let mut mean = [0.0; N];
+            for (value, k) in self.values.iter().flat_map(|value| value.iter().zip(0..)) {
+                mean[k] += if value.is_finite() { f64::from(*value) / known as f64 } else { 0.0 };
+            }
+            for gap in self.gaps {
+                self.values[gap].fill(mean.map(|mean| mean as f32));
+            }
+        }
+        self.values
+    }
+}
+
+/// V counts from the bottom of an image in Alembic, from the top in Bevy's meshes.
+pub fn from_the_top([u, v]: [f32; 2]) -> [f32; 2] {
+    [u, 1.0 - v]
+}

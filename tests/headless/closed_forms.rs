@@ -1,0 +1,37 @@
+//! Strands against Kirchhoff's rod: figures that `headless --scene rods` prints are within their tolerance.
+
+use crate::{check, rods_measured as measured};
+
+#[test]
+fn hair_bends_as_a_cantilever() {
+    check(measured::cantilevers(2, &[16]));
+}
+
+#[test]
+fn a_level_curl_twists_as_an_arc() {
+    check(measured::arcs(&[16]));
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn a_heavy_tip_bends_hair() {
+    check(measured::tip_loads());
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn a_helix_is_a_spring() {
+    check(measured::helices());
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn upright_hair_buckles_where_greenhill_says() {
+    check(measured::greenhill());
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn level_hair_stays_in_its_plane() {
+    check(measured::no_lateral_buckling());
+}
