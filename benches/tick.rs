@@ -119,7 +119,6 @@ fn projection_limiter_2(bencher: Bencher<'_, '_>, nodes: usize) {
 fn direct_step(bencher: Bencher<'_, '_>, nodes: usize) {
     let params = DirectParams {
         dt: 1.0 / 360.0,
-        gravity: Vec3::NEG_Y * 9.8,
         damping: HairStiffness::default().damping,
         torsion: HairStiffness::default().torsion,
         limiter_steps: 6,
@@ -129,6 +128,7 @@ fn direct_step(bencher: Bencher<'_, '_>, nodes: usize) {
     let mut block = block(nodes);
     block.root_from = block.root;
     block.nodes.iter_mut().for_each(|n| n.w = n.w.map(|w| if w == 0.0 { 0.0 } else { 1.0 }));
+    block.nodes.iter_mut().for_each(|n| n.push[1] = [-9.8; LANES]);
     block.edges.iter_mut().for_each(|e| e.k = [1.0; LANES]);
     direct::weigh(level, &mut block, 0.13, 1.0 / 360.0);
     // Items are segments, so that divan prints them per second.

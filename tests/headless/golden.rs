@@ -152,6 +152,7 @@ fn a_substep_of_the_direct_solver_in_f32() {
                 put3(&mut node.p, lane, p.into());
                 put3(&mut node.from, lane, c.from[i].into());
                 put3(&mut node.v, lane, v);
+                put3(&mut node.push, lane, if c.held[i] { Vec3::ZERO } else { gravity });
             }
             node.mass = all(c.mass[i]);
             node.w = all(if c.held[i] { 0.0 } else { 1.0 / c.mass[i] });
@@ -168,7 +169,6 @@ fn a_substep_of_the_direct_solver_in_f32() {
         }
         let params = DirectParams {
             dt: c.dt,
-            gravity,
             damping: c.damping,
             torsion: c.torsion,
             limiter_steps: 0,

@@ -42,6 +42,45 @@ fn soft_hair_hangs_along_gravity_and_what_the_wind_pulls() {
     }
 }
 
+/// Taken for motion, the wind of a substep would bend hair that is at rest under it: soft hair swung by 4° for ever, and
+/// its velocities read 0.36 m/s.
+#[test]
+fn hair_comes_to_rest_in_any_steady_wind() {
+    for speed in [0.0, 2.0, 5.0, 7.0, 10.0, 20.0, 30.0] {
+        let mut app = test_app(60.0);
+        app.insert_resource(wind(Vec3::X * speed, 0.0));
+        app.insert_resource(HairDefault(SleepSettings::never()));
+        let mut strands = Vec::new();
+        for (bending_length, segments) in
+            [0.01, 0.05, 0.2].into_iter().flat_map(|length| [8, 16, 32].map(|n| (length, n)))
+        {
+            let (hair, e) = one_strand(&mut app, 0.3, segments, Vec3::NEG_Y);
+            let stiffness = HairStiffness::from_bending_length(bending_length).unwrap();
+            app.world_mut().entity_mut(hair).insert(stiffness);
+            strands.push((e, bending_length, segments));
+        }
+        run(&mut app, 12.0);
+        let places = |app: &App| -> Vec<Vec3> {
+            strands.iter().map(|(e, ..)| *strand(app, *e).positions().last().unwrap()).collect()
+        };
+        let mut seen = vec![places(&app)];
+        for _ in 0..60 {
+            app.update();
+            seen.push(places(&app));
+        }
+        for (i, (e, bending_length, segments)) in strands.iter().enumerate() {
+            let tips = seen.windows(2).map(|two| two[0][i].distance(two[1][i]) * 60.0);
+            let real = tips.fold(0.0, f32::max);
+            let read = strand(&app, *e).velocities().iter().map(|v| v.length());
+            let read = read.fold(0.0, f32::max);
+            let what = format!("{speed} m/s, {segments} segments of {bending_length} m");
+            println!("{what}: tip at {real} m/s, velocities of {read}");
+            assert!(real < 5e-3, "{what}: the tip goes on at {real} m/s");
+            assert!(read < 1e-2, "{what}: velocities of {read} m/s at rest");
+        }
+    }
+}
+
 #[test]
 fn a_turned_and_scaled_head_feels_the_wind_of_the_world() {
     let (mut app, hair, e) = hanging();

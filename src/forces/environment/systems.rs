@@ -161,6 +161,20 @@ fn apply_air(
 
 /// Applies a hair's air to one strand in a substep.
 fn blow(
+    air: (&LocalAir, Option<&Isometry3d>),
+    strand: &mut Strand,
+    added_mass: &AddedMass,
+    changes: &mut BondChanges,
+    blown: &mut BlownAir,
+    received: Option<&mut WindReceived>,
+) {
+    strand.begin_air();
+    blow_on(air, strand, added_mass, changes, blown, received);
+    strand.end_air();
+}
+
+/// Velocities in the air, and what it asks of bonds.
+fn blow_on(
     (air, back): (&LocalAir, Option<&Isometry3d>),
     strand: &mut Strand,
     added_mass: &AddedMass,

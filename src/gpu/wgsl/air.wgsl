@@ -66,6 +66,11 @@ fn blow() {
             v += acceleration * (record.dt / max(weight, 1.0));
         }
         v += flow * taken_along;
+        var push = (v - m.xyz) * (1.0 / record.dt);
+        if is_held(weight) || MAX_PUSH * MAX_PUSH < dot(push, push) {
+            push = vec3(0.0);
+        }
+        set_push(i, push);
         if is_held(weight) {
             v = vec3(0.0);
             if 0u < i {

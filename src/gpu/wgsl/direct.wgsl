@@ -211,7 +211,7 @@ fn eliminate(
     let inert = mass * inertia;
     var a = plus_symmetric(diagonal, left.next);
     a.d += vec3(inert);
-    var b = fma(record.gravity, vec3(mass), force + left.b_next);
+    var b = fma(push_of(i), vec3(mass), force + left.b_next);
     if stage.twice {
         let support = support_of(i);
         let sticks = select(0.0, 1.0, 0.0 < support.w);
@@ -357,7 +357,7 @@ fn finish(stage: Stage) {
 
 fn note_twist(i: u32, turns: Elimination) {
     if i > 0u {
-        scratch[slot(i - 1u, 0u, 8u)].y = turns.upper;
+        scratch[slot(i - 1u, 0u, SCRATCH)].y = turns.upper;
     }
     set_row(i, 0u, vec4(turns.rhs, 0.0, 0.0, 0.0));
 }
@@ -445,7 +445,7 @@ fn surface() {
     }
 }
 
-// Nodes on by their velocities. Not by gravity, which elastic forces balance in hair at rest.
+// Nodes on by their velocities. Not by air and gravity, which elastic forces balance in hair at rest.
 fn advance(ahead: f32) {
     predict_nodes(ahead);
     contacts(GRIP_ASSUMED);
@@ -453,13 +453,12 @@ fn advance(ahead: f32) {
 
 // Nodes to the first guess, and what touches. Returns θ.
 fn predict() -> f32 {
-    let gain = record.gravity * record.dt;
+    choose_near();
     for (var i = 0u; i <= edges; i++) {
         let m = moving(i);
-        set_moving(i, m.xyz - gain, m.w);
+        set_moving(i, fma(push_of(i), vec3(-record.dt), m.xyz), m.w);
         set_support(i, vec3(0.0), 0.0);
     }
-    choose_near();
     surface();
     var theta = THETA;
     advance(record.dt * theta);

@@ -30,8 +30,8 @@ fn lead(@builtin(global_invocation_id) id: vec3<u32>) {
     if (bits & ROOT) == 0u {
         rest[(of_node * 2u + 1u) * GROUP_SIZE + lane].z = select(0.0, 1.0, (bits & FREE) != 0u);
     }
-    scratch[(of_node * 8u) * GROUP_SIZE + lane] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
-    scratch[(of_node * 8u + 1u) * GROUP_SIZE + lane] = bitcast<vec4<f32>>(frame);
+    scratch[(of_node * SCRATCH) * GROUP_SIZE + lane] = vec4(bitcast<vec3<f32>>(entry.xyz), 0.0);
+    scratch[(of_node * SCRATCH + 1u) * GROUP_SIZE + lane] = bitcast<vec4<f32>>(frame);
 }
 
 // The root of a follower, into what ties it: `scratch` holds that, and the slot is that of its last node's.

@@ -70,10 +70,10 @@ fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
         }
         rows = eliminated(rows, coupling, diagonal, off, 1e-6);
         if i > 0u {
-            scratch[slot(i - 1u, 1u, 8u)].x = rows.upper;
+            scratch[slot(i - 1u, 1u, SCRATCH)].x = rows.upper;
         }
         set_row(i, 0u, vec4(d.xyz, rows.rhs));
-        scratch[slot(i, 1u, 8u)].x = 0.0;
+        scratch[slot(i, 1u, SCRATCH)].x = 0.0;
         if i + 1u < edges {
             let next = node(i + 2u);
             let ahead = span(end.xyz, next.xyz);
@@ -94,7 +94,7 @@ fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
     for (var k = 0u; k < edges; k++) {
         let i = edges - 1u - k;
         let direction = row(i, 0u);
-        lambda = direction.w - scratch[slot(i, 1u, 8u)].x * lambda;
+        lambda = direction.w - scratch[slot(i, 1u, SCRATCH)].x * lambda;
         let tension = direction.xyz * lambda;
         let n = node(i + 1u);
         var force = pull - tension;

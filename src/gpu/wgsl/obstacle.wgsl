@@ -328,8 +328,10 @@ fn predict_nodes(dt: f32) {
         set_start(i, start);
         var to = fma(moving(i).xyz, vec3(dt), start);
         for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
-            let swept = continuous_collision(o, taken_along(o, start), to);
-            to = select(swept.place, to, allowed(o, along, start) > 0.0);
+            let far = select(fma(push_of(i), vec3(record.dt * dt), to), to, spins());
+            let swept = continuous_collision(o, taken_along(o, start), far);
+            let stopped = any(swept.normal != vec3(0.0)) && allowed(o, along, start) <= 0.0;
+            to = select(to, swept.place, stopped);
             sweeps = sweeps || swept.fast;
         }
         set_node(i, to, n.w);

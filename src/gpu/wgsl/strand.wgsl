@@ -130,7 +130,7 @@ struct Substep {
 @group(0) @binding(4) var<storage, read_write> rest: array<vec4<f32>>;
 // Four a node: remembered shape and rate of each kind.
 @group(0) @binding(5) var<storage, read_write> bonds: array<vec4<f32>>;
-// Eight a node. Before a substep the first two hold where a led node comes to, and a led root's frame; of no
+// SCRATCH a node. Before a substep the first two hold where a led node comes to, and a led root's frame; of no
 // meaning otherwise between substeps.
 @group(0) @binding(6) var<storage, read_write> scratch: array<vec4<f32>>;
 // Strands put back, rebuilt, and of the first of them the number from the end; from the 16th on whether a strand
@@ -206,39 +206,48 @@ fn rest_shape(i: u32) -> vec4<f32> {
 }
 
 fn row(i: u32, part: u32) -> vec4<f32> {
-    return scratch[slot(i, part, 8u)];
+    return scratch[slot(i, part, SCRATCH)];
 }
 
 fn set_row(i: u32, part: u32, value: vec4<f32>) {
-    scratch[slot(i, part, 8u)] = value;
+    scratch[slot(i, part, SCRATCH)] = value;
 }
 
 // Where a node began the substep.
 fn start_of(i: u32) -> vec3<f32> {
-    return scratch[slot(i, 6u, 8u)].xyz;
+    return scratch[slot(i, 6u, SCRATCH)].xyz;
 }
 
 fn set_start(i: u32, place: vec3<f32>) {
-    scratch[slot(i, 6u, 8u)] = vec4(place, 0.0);
+    scratch[slot(i, 6u, SCRATCH)] = vec4(place, 0.0);
 }
 
 // Normal of the obstacle that it rests on, or zero; 1 where friction holds it at its start there, or minus the
 // friction that it slides against, as a displacement of a free node in the substep (m).
 fn support_of(i: u32) -> vec4<f32> {
-    return scratch[slot(i, 7u, 8u)];
+    return scratch[slot(i, 7u, SCRATCH)];
 }
 
 fn set_support(i: u32, normal: vec3<f32>, hold: f32) {
-    scratch[slot(i, 7u, 8u)] = vec4(normal, hold);
+    scratch[slot(i, 7u, SCRATCH)] = vec4(normal, hold);
+}
+
+// Acceleration by air and gravity in this substep (m/s²).
+fn push_of(i: u32) -> vec3<f32> {
+    return scratch[slot(i, 8u, SCRATCH)].xyz;
+}
+
+fn set_push(i: u32, push: vec3<f32>) {
+    scratch[slot(i, 8u, SCRATCH)] = vec4(push, 0.0);
 }
 
 // That obstacle.
 fn bearer_of(i: u32) -> u32 {
-    return bitcast<u32>(scratch[slot(i, 6u, 8u)].w);
+    return bitcast<u32>(scratch[slot(i, 6u, SCRATCH)].w);
 }
 
 fn set_bearer(i: u32, o: u32) {
-    scratch[slot(i, 6u, 8u)].w = bitcast<f32>(o);
+    scratch[slot(i, 6u, SCRATCH)].w = bitcast<f32>(o);
 }
 
 fn is_held(w: f32) -> bool {

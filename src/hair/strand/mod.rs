@@ -139,6 +139,12 @@ const FAULT_COOLDOWN: u16 = 360;
 pub struct Strand {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
+    /// Velocities before the forces of this substep, and what air and gravity have added to each (m/s). Empty outside
+    /// a substep.
+    #[reflect(ignore)]
+    unforced: Vec<Vec3>,
+    #[reflect(ignore)]
+    blown: Vec<Vec3>,
     orientations: Vec<Quat>,
     angular_velocities: Vec<Vec3>,
     rest_lengths: Vec<f32>,
@@ -272,6 +278,8 @@ impl Strand {
         let orientations = parallel_transport(points, None);
         Ok(Self {
             velocities: vec![Vec3::ZERO; points.len()],
+            unforced: Vec::new(),
+            blown: Vec::new(),
             angular_velocities: vec![Vec3::ZERO; orientations.len()],
             positions: points.to_vec(),
             root_frame: orientations[0],
@@ -384,6 +392,7 @@ impl Strand {
     /// Sets every velocity to zero.
     pub fn rest(&mut self) {
         self.velocities.fill(Vec3::ZERO);
+        self.blown.clear();
         self.angular_velocities.fill(Vec3::ZERO);
         self.tensions.fill(0.0);
     }
@@ -449,6 +458,8 @@ impl Strand {
     ) {
         *self = Self {
             velocities: vec![Vec3::ZERO; positions.len()],
+            unforced: Vec::new(),
+            blown: Vec::new(),
             angular_velocities: vec![Vec3::ZERO; orientations.len()],
             tensions: vec![0.0; orientations.len()],
             positions,
@@ -458,6 +469,25 @@ impl Strand {
             root_before: None,
             fault_cooldown: 0,
         };
+    }
+
+    /// From here to [`end_air`](Self::end_air) velocities are changed by air and gravity.
+    pub(crate) fn begin_air(&mut self) {
+        self.unforced.clone_from(&self.velocities);
+    }
+
+    pub(crate) fn end_air(&mut self) {
+        let now = self.velocities.iter().zip(&self.unforced);
+        self.blown.clear();
+        self.blown.extend(now.map(|(now, before)| *now - *before));
+    }
+
+    /// Velocities before the forces of this substep, and what air and gravity have added to each (m/s); `None` where
+    /// neither acts.
+    pub(crate) fn forced(&self) -> Option<(&[Vec3], &[Vec3])> {
+        let nodes = self.velocities.len();
+        let is_known = self.unforced.len() == nodes && self.blown.len() == nodes;
+        is_known.then_some((&self.unforced, &self.blown))
     }
 
     /// Prefetches positions, velocities and orientations.
@@ -526,6 +556,7 @@ impl Strand {
     }
 
     pub(crate) fn step_succeeded(&mut self) {
+        self.blown.clear();
         self.fault_cooldown = self.fault_cooldown.saturating_sub(1);
         self.root_before = None;
     }

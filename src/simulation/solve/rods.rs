@@ -9,15 +9,12 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
-        lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level},
+        lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level, take3},
         parallel::{Scratch, prefetch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, lacks},
         setting::{self, Settings},
     },
-    forces::{
-        contact::{Obstacles, StrandContact},
-        environment::Gravity,
-    },
+    forces::contact::{Obstacles, StrandContact},
     hair::strand::{
         AddedMass, Hair, HeldNodes, SimulatedHere, Strand, StrandModel, StrandOf, StrandSleep,
         TickPose, lacks_strands,
@@ -25,8 +22,8 @@ use crate::{
     keratin::bond::{BondInfluence, BondPlugin, Bonds, RestShape},
     solver::rod::{
         HairSolver, HairStiffness, SolverMethod, Sweeps,
-        block::BlockLanes,
-        direct::{self, DirectParams},
+        block::{BlockLanes, NodeLanes},
+        direct::{self, DirectParams, MAX_PUSH},
         obstacle::Obstacle,
         step::{self, SweepParams},
         stiffness::wet_twist_loss,
@@ -127,6 +124,7 @@ impl<'a> Batched for RodColumns<'a> {
         match &params.method {
             Method::Direct { params: direct, frame_delta } => {
                 gather_tensions(block, sources);
+                gather_forces(block, sources, params.dt);
                 gather_twist(block, sources);
                 gather_roots(block, sources, frame_delta.unwrap_or_default());
                 direct::weigh(params.level, block, params.bending_length, params.dt);
@@ -148,7 +146,6 @@ fn step_rods(
     substeps: EffectiveSubsteps,
     model: Settings<StrandModel>,
     (solver, sweeps): (Settings<HairSolver>, Settings<Sweeps>),
-    gravity: Gravity,
     stiffness: Settings<HairStiffness>,
     influence: Settings<BondInfluence>,
     contact: Settings<StrandContact>,
@@ -171,7 +168,6 @@ fn step_rods(
         return;
     }
     let level = simd_level();
-    let gravity = gravity.clamped().0;
     let params_of = |hair: Entity| {
         let (obstacles, pose) =
             hairs.get(hair).ok().filter(|_| model.of(hair) == StrandModel::Rod)?;
@@ -182,7 +178,6 @@ fn step_rods(
             SolverMethod::Direct => Method::Direct {
                 params: DirectParams {
                     dt,
-                    gravity: pose.now().direction_in(gravity),
                     damping: stiffness.damping,
                     torsion: stiffness.torsion,
                     limiter_steps: solver.limiter_steps,
@@ -257,6 +252,40 @@ fn gather_tensions(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
     for (group, four) in from.as_chunks::<4>().0.iter().enumerate() {
         let tensions = four.map(|source| source.strand.tensions());
         put_numbers(&mut block.edges, group, tensions, |e| &mut e.tension);
+    }
+}
+
+/// What air and gravity have added to velocities in this substep, and what else has. Impulses stay in the velocities.
+fn gather_forces(block: &mut BlockLanes, from: &[Source<'_>; LANES], dt: f32) {
+    let forced = from.each_ref().map(|source| source.strand.forced());
+    if forced.iter().all(Option::is_some) {
+        let forced = forced.map(Option::unwrap_or_default);
+        for (group, four) in forced.as_chunks::<4>().0.iter().enumerate() {
+            put_vectors(&mut block.nodes, group, four.map(|(before, _)| before), |n| &mut n.kick);
+            put_vectors(&mut block.nodes, group, four.map(|(_, blown)| blown), |n| &mut n.push);
+        }
+    } else {
+        for n in &mut block.nodes {
+            (n.kick, n.push) = (n.v, default());
+        }
+        for (lane, (before, blown)) in
+            forced.into_iter().enumerate().filter_map(|(lane, forced)| Some((lane, forced?)))
+        {
+            for (n, (before, blown)) in block.nodes.iter_mut().zip(before.iter().zip(blown)) {
+                put3(&mut n.kick, lane, *before);
+                put3(&mut n.push, lane, *blown);
+            }
+        }
+    }
+    let (rate, most) = (1.0 / dt, (MAX_PUSH * dt).powi(2));
+    for NodeLanes { v, push, kick, w, .. } in &mut block.nodes {
+        for lane in 0..LANES {
+            let [by_air, other] = [&*push, &*kick].map(|v3| take3(v3, lane));
+            let other = take3(v, lane) - other - by_air;
+            let is_force = |v: Vec3| w[lane] > 0.0 && v.length_squared() <= most;
+            put3(push, lane, if is_force(by_air) { by_air * rate } else { Vec3::ZERO });
+            put3(kick, lane, if is_force(other) { other } else { Vec3::ZERO });
+        }
     }
 }
 

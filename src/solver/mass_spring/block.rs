@@ -83,7 +83,7 @@ fn step_simd<S: Simd>(
     let over = Xpbd::new(zero, bend, damping, params.dt);
     let zero = f32x16::splat(simd, 0.0);
     b.consider_all_obstacles();
-    predict_nodes(simd, b, f32x16::splat(simd, params.dt), params.clearance, obstacles);
+    predict_nodes(simd, b, f32x16::splat(simd, params.dt), None, params.clearance, obstacles);
     b.touched = [0.0; LANES];
     // Strands that are moved by held nodes may gain energy from them.
     let mut moved = zero;

@@ -2,7 +2,7 @@
 //!
 //! Layout: an array of nodes and an array of edges, each an array of lanes (AoSoA), so that a
 //! constraint reads whole vectors and a strand's sequence runs down the array. A block of sixteen nodes is
-//! about 71 kB, of which a pass of the direct solver goes through 34 to 50 and an iteration of the
+//! about 77 kB, of which a pass of the direct solver goes through 34 to 56 and an iteration of the
 //! sweeps through 18. The arrays are plain old data and may be handed to a compute shader as they are.
 //!
 //! Strands keep their own vectors, so that game code reads and writes them; [`solve`](crate::simulation::solve)
@@ -32,6 +32,10 @@ pub struct NodeLanes<C = Lane> {
     pub w: C,
     /// Mass, relative to a whole node's. Direct method only.
     pub mass: C,
+    /// Acceleration by air and gravity in this substep (m/s²), which `v` contains in full. Direct method only.
+    pub push: [C; 3],
+    /// What else has changed `v` in this substep, as contact with other hair (m/s). Direct method only.
+    pub kick: [C; 3],
     /// Normal of the obstacle that the node rests on, or zero; written by the contact passes.
     pub rests_on: [C; 3],
     /// The node's start, moved with the surface of that obstacle (m). Direct method only.
@@ -89,7 +93,7 @@ pub struct BlockLanes {
     /// Edges, root first.
     pub edges: Vec<EdgeLanes>,
     /// The share of gravity that acts on each node; empty where gravity acts in full. Buoyancy
-    /// reduces it.
+    /// reduces it. For springs only.
     pub(crate) gravity: Vec<Lane>,
     /// The scalp's frame q_{−1} of each strand.
     pub root: [Lane; 4],

@@ -43,9 +43,9 @@ setting! {
         /// is 2 G/E. The less, the sooner a curl hangs as a ringlet rather than as a flat hook.
         ///
         /// Dry human hair has 0.46: E 3.9 GPa, G 0.9 GPa. In water G falls to about a fifth and E to 0.45, so soaked
-        /// hair has 0.44 of what is set here. The default, which presets keep for now, is the papers' 1: twist is
-        /// resisted as much as bending, wet as dry. [`SolverMethod::Sweeps`] has 1 whatever is set here.
-        pub torsion: f32 = 1.0, in TORSION: 0.05..=1.0, safe 0.15..=1.0,
+        /// hair has 0.44 of what is set here. At the papers' 1 twist is resisted as much as bending, wet as dry;
+        /// [`SolverMethod::Sweeps`] has that whatever is set here.
+        pub torsion: f32 = 0.46, in TORSION: 0.05..=1.0, safe 0.15..=1.0,
             "0.46 is dry hair, 1 the papers'";
     }
 }

@@ -123,12 +123,14 @@ impl<S: Simd> AllowedPenetration<S> {
     }
 }
 
-/// Predicts p* = p + v dt; v already contains the forces.
+/// Predicts p* = p + v dt. With `pushed`, the length of the substep (s), by velocities before its forces: these count
+/// only where nodes may pass through an obstacle.
 #[inline(never)]
 pub(crate) fn predict_nodes<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     dt: f32x16<S>,
+    pushed: Option<f32x16<S>>,
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
@@ -153,18 +155,26 @@ pub(crate) fn predict_nodes<S: Simd>(
                     }
                 }
                 let v = load3(simd, &n.v);
+                let v = if pushed.is_some() { v - load3(simd, &n.kick) } else { v };
                 // Held nodes have their start in `from` and their target in `p`.
                 let start_position = V3::select(held, load3(simd, &n.from), from);
                 store3(&mut n.from, start_position);
                 let mut to = v.scale_add(dt, from);
+                let farthest = |to: V3<f32x16<S>>| {
+                    pushed.map_or(to, |time| {
+                        let push = load3(simd, &n.push).scale_add(time, load3(simd, &n.kick));
+                        push.scale_add(dt, to)
+                    })
+                };
                 for o in near.of(obstacles) {
-                    if let Some((before, _)) =
-                        continuous_collision(o, o.moved_with(from), to, clearance)
+                    if let Some((before, normal)) =
+                        continuous_collision(o, o.moved_with(from), farthest(to), clearance)
                     {
                         let allowed =
                             limit.as_ref().map_or(zero, |l| l.allowed(o, clearance, from));
-                        let stays = held | Real::lt(zero, allowed);
-                        (to, b.has_fast_nodes) = (V3::select(stays, to, before), true);
+                        let stopped = Real::lt(zero, normal.dot(normal));
+                        let stopped = stopped & !(held | Real::lt(zero, allowed));
+                        (to, b.has_fast_nodes) = (V3::select(stopped, before, to), true);
                     }
                 }
                 store3(&mut n.p, V3::select(held, p, to));

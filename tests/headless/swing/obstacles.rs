@@ -193,23 +193,43 @@ fn strands_that_push_each_other_keep_their_length() {
 #[test]
 fn hair_across_a_ball_stays_where_it_lies() {
     for hertz in [60.0, 144.0] {
-        let [(tip, moved), (fallen, _)] = [0.5, 0.0].map(|friction| {
+        let [moved, without] = [0.5, 0.0].map(|friction| {
             let mut lab = Lab::new(hertz, 6);
             lab.app.insert_resource(HairDefault(HairSolver::default()));
             let ball = HairCollider::sphere(0.06).unwrap().with_friction(friction).unwrap();
             lab.app.world_mut().spawn((ball, Transform::from_xyz(0.0, -0.062, 0.01)));
-            let points = line(0.24, 24, Vec3::X).into_iter().map(|p| p - 0.08 * Vec3::X);
-            let strand = lab.strand(0.02, &points.collect::<Vec<_>>());
+            let strands: Vec<Entity> = (0..16)
+                .map(|k| {
+                    let (x, z) = (0.07 + 1e-3 * (k * 7 % 16) as f32, 2e-3 + 1.2e-3 * k as f32);
+                    let aside = Vec3::new(-x, 0.0, z);
+                    let points = line(0.24, 24, Vec3::X).into_iter().map(|p| p + aside);
+                    lab.strand(0.02, &points.collect::<Vec<_>>())
+                })
+                .collect();
             lab.settle(6.0);
-            let before = lab.get(strand).positions().to_vec();
+            let before: Vec<_> = strands.iter().map(|s| lab.get(*s).positions().to_vec()).collect();
             lab.run(20.0);
-            let after = lab.get(strand);
-            assert!(after.peak_strain() < 1e-3, "strain {}", after.peak_strain());
-            let moved = after.positions().iter().zip(&before).map(|(p, q)| p.distance(*q));
-            (lab.tip(strand), moved.fold(0.0, f32::max))
+            let moved = strands.iter().zip(&before).map(|(strand, before)| {
+                let after = lab.get(*strand);
+                assert!(after.peak_strain() < 1e-3, "strain {}", after.peak_strain());
+                let moved = after.positions().iter().zip(before).map(|(p, q)| p.distance(*q));
+                moved.fold(0.0, f32::max)
+            });
+            let lying = moved.zip(&strands).filter(|(_, strand)| lab.tip(**strand).x > 0.0);
+            let mut moved: Vec<f32> = lying.map(|(moved, _)| moved).collect();
+            moved.sort_by(f32::total_cmp);
+            moved
         });
-        println!("{hertz} Hz: tip at {tip}, moved {moved} m; without friction at {fallen}");
-        assert!(tip.x > 0.0 && moved < 1e-4, "{hertz} Hz: at {tip}, crept {moved} m");
-        assert!(fallen.x < -0.06, "{hertz} Hz: without friction it lies there too, at {fallen}");
+        let lie = moved.len();
+        println!(
+            "{hertz} Hz: {lie} of 16 lie, {} without friction; moved {moved:?} m",
+            without.len()
+        );
+        assert!(
+            lie >= 12 && without.is_empty(),
+            "{hertz} Hz: {lie} lie, {without:?} without friction"
+        );
+        // What has not relaxed yet slips once and lies.
+        assert!(moved[lie / 2] < 1e-4 && moved[lie - 1] < 2e-3, "{hertz} Hz: crept {moved:?} m");
     }
 }

@@ -32,8 +32,6 @@ pub(crate) struct NewtonStage<R> {
     pub beyond: R,
     /// Rotation of the scalp's frame up to θ.
     pub root_turn: V3<R>,
-    /// Gravity (m/s²).
-    pub gravity: V3<R>,
     /// Largest twist that counts in the Hessian, as a moment over EI (1/m).
     pub max_twist: R,
     /// Kelvin–Voigt time (s), less what the step itself damps.
@@ -101,7 +99,6 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
     nodes: &[NodeLanes<W::Cell>],
     edges: &mut [EdgeLanes<W::Cell>],
     rows: &mut [DirectRow<W::Cell>],
-    gravity: &[W::Cell],
     root: &[W::Cell; 4],
     stage: &NewtonStage<W::Real>,
 ) {
@@ -210,7 +207,6 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
                     &nodes[i],
                     &mut rows[i - 1],
                     stage,
-                    gravity.get(i),
                     inertia,
                     stiff_before.plus(h).minus_both(&before.coupling),
                     before.coupling.plus(now.coupling).minus_symmetric(&h),
@@ -230,7 +226,6 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
         &nodes[count],
         &mut rows[count - 1],
         stage,
-        gravity.get(count),
         inertia,
         stiff_before,
         nothing,
@@ -241,15 +236,13 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
 }
 
 /// Eliminates node `node`: `diagonal` and `next` are its blocks, −`far` the one with the node after
-/// the next, `force` the force of its edges,
-/// `gravity` the share of gravity that acts on it.
+/// the next, `force` the force of its edges.
 #[inline(always)]
 fn eliminate<W: Width, const TWICE: bool>(
     w: W,
     node: &NodeLanes<W::Cell>,
     row: &mut DirectRow<W::Cell>,
     stage: &NewtonStage<W::Real>,
-    gravity: Option<&W::Cell>,
     inertia: W::Real,
     diagonal: Symmetric<W::Real>,
     next: Matrix<W::Real>,
@@ -261,8 +254,9 @@ fn eliminate<W: Width, const TWICE: bool>(
     let held = is_held(w, node);
     let inert = mass * inertia;
     let mut a = diagonal.plus(left.next).plus_diagonal(inert);
-    let weight = gravity.map_or(mass, |share| mass * w.get(share));
-    let mut b = stage.gravity.scale_add(weight, force + left.b_next);
+    let b = w.get3(&node.push).scale_add(mass, force + left.b_next);
+    // Nodes start from where they would be without impulses.
+    let mut kicked = w.get3(&node.kick).scale_add(inert * stage.ahead, b);
     if TWICE {
         let n = w.get3(&node.rests_on);
         let (sticks, drag) = (w.get(&node.sticks), w.get(&node.drag));
@@ -276,7 +270,7 @@ fn eliminate<W: Width, const TWICE: bool>(
         let way = back.dot(back).max(w.lit(1e-24)).sqrt();
         let friction = back.scale(w.lit(HOLD).mul_add(sticks, drag / way));
         let pulled = (inertial - p + friction).scale_add(inert, b);
-        b = V3::select(w.lit(0.0).lt(stage.twice), pulled, b);
+        kicked = V3::select(w.lit(0.0).lt(stage.twice), pulled, kicked);
     }
     let next = next.plus(left.between);
     let pivot = Pivot::new(&a, inert * w.lit(1e-3), held);
@@ -284,7 +278,7 @@ fn eliminate<W: Width, const TWICE: bool>(
     let far_unscaled = pivot.unscaled(far);
     let near = pivot.scaled(&near_unscaled);
     let far = pivot.scaled(&far_unscaled);
-    let y = pivot.forward(b);
+    let y = pivot.forward(kicked);
     for (row, cells) in near.rows.into_iter().zip(&mut row.near) {
         w.put3(row, cells);
     }

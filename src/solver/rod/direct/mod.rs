@@ -16,7 +16,10 @@
 //!
 //! One substep of length h:
 //! 1. Strands deep inside an obstacle are moved out of it, as far as their lengths let them. Predict: nodes
-//!    move to x + θh v and out of obstacles; those that begin on one rest there.
+//!    move to x + θh v and out of obstacles; those that begin on one rest there. The v of that is the one
+//!    before the forces of the substep; taken for motion they would bend hair that is at rest under them in each step.
+//!    Gravity, wind and drag act throughout the substep like elastic forces. What else changes velocities, as contact
+//!    with other hair, acts as an impulse at its start: springs that are evaluated there would gain energy otherwise.
 //! 2. One Newton step for the positions at θh: inertia, stretching, bending, the change of the
 //!    twisting moment as edges rotate, support by obstacles, friction. Strands that touch or are about to
 //!    rotate by more than 0.03 rad take a second: after the first, nodes that are pulled off an obstacle are
@@ -92,7 +95,7 @@ mod tests;
 mod width;
 
 use super::{
-    block::{BlockLanes, pulled},
+    block::{BlockLanes, NodeLanes},
     limiter::{TOLERANCE, clamp_lengths, limit_strained, worst_strain},
     near::choose_near,
     obstacle::Obstacle,
@@ -100,11 +103,10 @@ use super::{
     touch::{Grip, PenetrationLimits, contacts_with, predict_nodes},
 };
 use crate::base::lanes::{
-    LANES, Quaternion, Real, V3, dispatch, load, load3, load4, splat3, store3, store4,
+    LANES, Quaternion, Real, V3, dispatch, load, load3, load4, store3, store4,
 };
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use frames::Torsion;
-use glam::Vec3;
 use kernel::NewtonStage;
 use width::{Half, Whole, Width};
 
@@ -114,8 +116,6 @@ use width::{Half, Whole, Width};
 pub struct DirectParams {
     /// Substep (s).
     pub dt: f32,
-    /// Gravity, in the frame of the positions (m/s²). Velocities already contain it for this substep.
-    pub gravity: Vec3,
     /// Kelvin–Voigt time of the material (s).
     pub damping: f32,
     /// G J/(E I).
@@ -128,6 +128,9 @@ pub struct DirectParams {
 
 /// θ: where in the substep forces are evaluated; see the [module](self).
 pub(crate) const THETA: f32 = 0.65;
+
+/// Largest acceleration by air and gravity that acts throughout the substep (m/s²): more is an impulse at its start.
+pub(crate) const MAX_PUSH: f32 = 500.0;
 
 /// Rotation of an edge in a substep (rad) above which a strand takes two Newton steps.
 pub(crate) const FAST_TURN: f32 = 0.03;
@@ -266,8 +269,8 @@ fn newton<S: Simd, const TWICE: bool>(
                     let is_first_of_two = w.lit(0.0).lt(stage.twice);
                     stage.beyond = <_ as Real>::select(is_first_of_two, w.lit(1.0), stage.beyond);
                 }
-                let BlockLanes { nodes, edges, rows, gravity, root_between, .. } = &mut *b;
-                kernel::down::<_, TWICE>(w, nodes, edges, rows, gravity, root_between, &stage);
+                let BlockLanes { nodes, edges, rows, root_between, .. } = &mut *b;
+                kernel::down::<_, TWICE>(w, nodes, edges, rows, root_between, &stage);
                 kernel::up::<_, TWICE>(w, nodes, edges, rows, &stage);
             });
         },
@@ -308,11 +311,6 @@ fn stage<W: Width<Cell = crate::base::lanes::Lane>>(
         ahead: theta * dt,
         beyond: w.lit(1.0) / theta,
         root_turn: turn.v.scale(two),
-        gravity: V3::new(
-            w.lit(params.gravity.x.into()),
-            w.lit(params.gravity.y.into()),
-            w.lit(params.gravity.z.into()),
-        ),
         max_twist: w.get(&b.max_twist),
         damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
         torsion: Torsion::new(dt, params.torsion),
@@ -333,17 +331,14 @@ fn predict<S: Simd>(
 ) -> f32x16<S> {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let dt = f32x16::splat(simd, params.dt);
-    let gravity = splat3(simd, params.gravity);
     let mut theta = f32x16::splat(simd, THETA);
-    // Velocities already contain gravity for the whole substep.
-    let gain = gravity.scale(dt);
-    for (i, n) in b.nodes.iter_mut().enumerate() {
-        let v = load3(simd, &n.v) - pulled(simd, &b.gravity, i, gain);
+    choose_near(simd, b, params.dt, params.clearance, obstacles);
+    for n in &mut b.nodes {
+        let v = load3(simd, &n.push).scale_add(-dt, load3(simd, &n.v));
         store3(&mut n.v, v);
     }
-    choose_near(simd, b, params.dt, params.clearance, obstacles);
     leave_obstacles(simd, b, params, obstacles);
-    advance(simd, b, dt * theta, params.clearance, obstacles);
+    advance(simd, b, (dt * theta, dt), params.clearance, obstacles);
     if b.touched != [0.0; LANES] {
         let touched = Real::lt(zero, load(simd, &b.touched));
         theta = Real::select(touched, one, theta);
@@ -352,7 +347,7 @@ fn predict<S: Simd>(
             let back = V3::select(held, load3(simd, &n.p), load3(simd, &n.from));
             store3(&mut n.p, back);
         }
-        advance(simd, b, dt * theta, params.clearance, obstacles);
+        advance(simd, b, (dt * theta, dt), params.clearance, obstacles);
     }
     theta
 }
@@ -362,10 +357,11 @@ fn predict<S: Simd>(
 #[inline(always)]
 fn turns_fast<S: Simd>(simd: S, b: &BlockLanes, dt: f32) -> f32x16<S> {
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    let mut before = load3(simd, &b.nodes[0].v);
+    let moving = |n: &NodeLanes| load3(simd, &n.v) - load3(simd, &n.kick);
+    let mut before = moving(&b.nodes[0]);
     let mut fastest = zero;
     for (n, e) in b.nodes[1..].iter().zip(&b.edges) {
-        let v = load3(simd, &n.v);
+        let v = moving(n);
         let (l, apart) = (load(simd, &e.l), v - before);
         fastest = Real::max(fastest, apart.dot(apart) / (l * l));
         before = v;
@@ -464,20 +460,21 @@ fn penetration<S: Simd>(
     (Real::select(Real::lt(limit, deepest), one, zero), sum)
 }
 
-/// Moves nodes on by their velocities for `ahead` (s), stopped by obstacles. Not by gravity, which elastic forces
-/// balance in hair at rest: it would be rotated in each step, and pushed against what it only hangs near.
+/// Moves nodes on by their velocities for `ahead` (s), stopped by obstacles. Not by air and gravity, which elastic
+/// forces balance in hair at rest: it would be rotated in each step, and pushed against what it only hangs near. What
+/// they add to velocities in `dt` only counts where nodes may pass through an obstacle.
 #[inline(never)]
 fn advance<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
-    ahead: f32x16<S>,
+    (ahead, dt): (f32x16<S>, f32x16<S>),
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            predict_nodes(simd, b, ahead, clearance, obstacles);
+            predict_nodes(simd, b, ahead, Some(dt), clearance, obstacles);
             let all = f32x16::splat(simd, 1.0);
             contacts_with(simd, b, clearance, obstacles, Grip::Assumed, all);
         },

@@ -7,7 +7,7 @@ use crate::{
         obstacle::Solid,
     },
 };
-use glam::{DQuat, DVec3, Quat};
+use glam::{DQuat, DVec3, Quat, Vec3};
 
 mod any_hair;
 mod closed_forms;
@@ -15,16 +15,10 @@ mod golden;
 mod torsion;
 
 const DT: f32 = 1.0 / 360.0;
+const GRAVITY: f32 = -9.8;
 
 fn params() -> DirectParams {
-    DirectParams {
-        dt: DT,
-        gravity: Vec3::NEG_Y * 9.8,
-        damping: 0.003,
-        torsion: 0.46,
-        limiter_steps: 6,
-        clearance: 0.0,
-    }
+    DirectParams { dt: DT, damping: 0.003, torsion: 0.46, limiter_steps: 6, clearance: 0.0 }
 }
 
 /// A strand of `edges` edges in each lane, as `place` says, at rest there.
@@ -61,7 +55,8 @@ fn prepare(block: &mut BlockLanes, bending_length: f32) {
 fn prepare_for(block: &mut BlockLanes, bending_length: f32, params: &DirectParams) {
     for (i, node) in block.nodes.iter_mut().enumerate() {
         node.w = [if i == 0 { 0.0 } else { 1.0 }; LANES];
-        node.v[1] = node.v[1].map(|v| v + params.gravity.y * params.dt);
+        node.push[1] = [GRAVITY; LANES];
+        node.v[1] = node.v[1].map(|v| v + GRAVITY * params.dt);
     }
     block.nodes[0].from = block.nodes[0].p;
     block.root_from = block.root;
@@ -111,7 +106,6 @@ struct Step {
     dt: f32,
     damping: f64,
     torsion: f32,
-    gravity: [f64; 3],
 }
 
 impl<C: Copy + Default> Strands<C> {
@@ -130,11 +124,6 @@ impl<C: Copy + Default> Strands<C> {
             ahead: theta * w.lit(dt),
             beyond: w.lit(1.0) / theta,
             root_turn: turn.v.scale(two),
-            gravity: V3::new(
-                w.lit(step.gravity[0]),
-                w.lit(step.gravity[1]),
-                w.lit(step.gravity[2]),
-            ),
             max_twist: w.get(&self.max_twist),
             damping: (w.lit(step.damping) - own).max(w.lit(0.0)),
             torsion: Torsion::new(theta, step.torsion),
@@ -149,12 +138,12 @@ impl<C: Copy + Default> Strands<C> {
             let on_the_way = w.lit(0.0).lt(stage.twice);
             stage.beyond = <_ as Real>::select(on_the_way, w.lit(1.0), stage.beyond);
         }
-        kernel::down::<_, TWICE>(w, nodes, edges, &mut rows, &[], root_between, &stage);
+        kernel::down::<_, TWICE>(w, nodes, edges, &mut rows, root_between, &stage);
         kernel::up::<_, TWICE>(w, nodes, edges, &rows, &stage);
         if TWICE {
             let again = stage.twice;
             stage = NewtonStage { second: true, again, ..finish };
-            kernel::down::<_, TWICE>(w, nodes, edges, &mut rows, &[], root_between, &stage);
+            kernel::down::<_, TWICE>(w, nodes, edges, &mut rows, root_between, &stage);
             kernel::up::<_, TWICE>(w, nodes, edges, &rows, &stage);
         }
         let sum = kernel::finish(w, nodes, edges, &mut rows, root, step.dt, &finish);
@@ -176,7 +165,8 @@ impl Strands<Lane> {
                 if node.w[lane] > 0.0 {
                     let from = take3(&node.p, lane);
                     put3(&mut node.from, lane, from);
-                    put3(&mut node.p, lane, from + theta * dt * take3(&node.v, lane));
+                    let v = take3(&node.v, lane) - take3(&node.kick, lane);
+                    put3(&mut node.p, lane, from + theta * dt * v);
                 }
             }
         }
@@ -192,6 +182,8 @@ impl Strands<Lane> {
             v: n.v.each_ref().map(wide),
             w: wide(&n.w),
             mass: wide(&n.mass),
+            push: n.push.each_ref().map(wide),
+            kick: n.kick.each_ref().map(wide),
             rests_on: n.rests_on.each_ref().map(wide),
             sticks: wide(&n.sticks),
             drag: wide(&n.drag),
@@ -258,8 +250,8 @@ impl Strands<f64> {
         let frame = |q: [f64; 4]| (turn * DQuat::from_array(q)).to_array();
         let mut turned = self.clone();
         for n in &mut turned.nodes {
-            let NodeLanes { p, from, v, rests_on, anchor, .. } = n;
-            [p, from, v, rests_on, anchor].into_iter().for_each(|v3| *v3 = vector(*v3));
+            let NodeLanes { p, from, v, push, kick, rests_on, anchor, .. } = n;
+            [p, from, v, push, kick, rests_on, anchor].into_iter().for_each(|v3| *v3 = vector(*v3));
         }
         turned.edges.iter_mut().for_each(|e| e.q = frame(e.q));
         let Self { root, root_from, root_between, .. } = &mut turned;
@@ -296,7 +288,7 @@ fn half_blocks_do_to_the_bit_what_whole_blocks_do() {
         let w = Whole(simd);
         let stage = stage(w, &whole, &params());
         let BlockLanes { nodes, edges, rows, root, .. } = &mut whole;
-        kernel::down::<_, true>(w, nodes, edges, rows, &[], root, &stage);
+        kernel::down::<_, true>(w, nodes, edges, rows, root, &stage);
         kernel::up::<_, true>(w, nodes, edges, rows, &stage);
         kernel::finish(w, nodes, edges, rows, root, DT, &stage);
     });
@@ -305,7 +297,7 @@ fn half_blocks_do_to_the_bit_what_whole_blocks_do() {
             let w = Half { simd, index };
             let stage = stage(w, &halves, &params());
             let BlockLanes { nodes, edges, rows, root, .. } = &mut halves;
-            kernel::down::<_, true>(w, nodes, edges, rows, &[], root, &stage);
+            kernel::down::<_, true>(w, nodes, edges, rows, root, &stage);
             kernel::up::<_, true>(w, nodes, edges, rows, &stage);
             kernel::finish(w, nodes, edges, rows, root, DT, &stage);
         }

@@ -10,6 +10,8 @@ struct Piece {
     length: f32,
     rest: [f32; 3],
     velocity: [f32; 3],
+    push: [f32; 3],
+    kick: [f32; 3],
     tension: f32,
     water: f32,
     support: Option<[f32; 3]>,
@@ -22,12 +24,15 @@ fn vector(most: f32) -> impl Strategy<Value = [f32; 3]> {
 fn piece() -> impl Strategy<Value = Piece> {
     let (bend, rest, velocity) = (vector(0.5), vector(0.3), vector(0.5));
     let support = prop::option::weighted(0.2, vector(1.0));
-    (bend, 2e-3..2e-2f32, rest, velocity, 0.0..20.0f32, 0.0..2.0f32, support).prop_map(
-        |(bend, length, rest, velocity, tension, water, support)| Piece {
+    let forces = (velocity, vector(30.0), vector(0.1));
+    (bend, 2e-3..2e-2f32, rest, forces, 0.0..20.0f32, 0.0..2.0f32, support).prop_map(
+        |(bend, length, rest, (velocity, push, kick), tension, water, support)| Piece {
             bend,
             length,
             rest,
             velocity,
+            push,
+            kick,
             tension,
             water,
             support,
@@ -92,6 +97,8 @@ impl Shape {
                 let support = piece.support.unwrap_or_default();
                 put3(&mut node.rests_on, lane, Vec3::from(support).normalize_or_zero());
                 node.w[lane] = 1.0 + piece.water;
+                put3(&mut node.push, lane, Vec3::from(piece.push));
+                put3(&mut node.kick, lane, Vec3::from(piece.kick) * degree(lane));
             }
             block.twice[lane] = (lane % 2) as f32;
         }
@@ -112,7 +119,7 @@ impl Shape {
     }
 
     fn step(&self) -> Step {
-        Step { dt: self.dt, damping: self.damping, torsion: 0.46, gravity: [0.0, -9.8, 0.0] }
+        Step { dt: self.dt, damping: self.damping, torsion: 0.46 }
     }
 }
 
@@ -152,19 +159,14 @@ proptest! {
         shape in shape(),
         turn in vector(2.0),
     ) {
-        let (start, mut step) = (shape.strands().alone(3), shape.step());
+        let (start, step) = (shape.strands().alone(3), shape.step());
         let turn = DQuat::from_scaled_axis(Vec3::from(turn).as_dvec3());
         for twice in [false, true] {
             let w = Single::<f64>::default();
             let (mut here, mut there) = (start.clone(), start.turned(turn));
-            let solve = |strand: &mut Strands<f64>, step: &Step| {
-                if twice { strand.solve::<_, true>(w, step) } else { strand.solve::<_, false>(w, step) }
-            };
-            solve(&mut here, &step);
-            let down = step.gravity;
-            step.gravity = (turn * DVec3::from(down)).to_array();
-            solve(&mut there, &step);
-            step.gravity = down;
+            for strand in [&mut here, &mut there] {
+                if twice { strand.solve::<_, true>(w, &step) } else { strand.solve::<_, false>(w, &step) };
+            }
             let (off, turned) = here.turned(turn).apart(&there);
             prop_assert!(off < 2e-6 && turned < 1e-4, "{off} m and {turned} rad apart");
         }
