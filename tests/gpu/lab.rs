@@ -164,6 +164,7 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
         }
         s.spins.iter_mut().for_each(|omega| *omega *= keep);
         let mut drying = vec![0.0; edges + 1];
+        let before = s.velocities.clone();
         for (i, drying) in drying.iter_mut().enumerate() {
             let e = i.min(edges - 1);
             let edge = s.positions[e + 1] - s.positions[e];
@@ -206,6 +207,8 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
         for (i, node) in block.nodes.iter_mut().enumerate() {
             put3(&mut node.p, lane, s.positions[i]);
             put3(&mut node.v, lane, if i == 0 { Vec3::ZERO } else { s.velocities[i] });
+            let push = (s.velocities[i] - before[i]) / dt;
+            put3(&mut node.push, lane, if i == 0 { Vec3::ZERO } else { push });
             node.w[lane] = if i == 0 { 0.0 } else { 1.0 };
         }
         let from = if record.sweeps.is_some() { s.positions[0] } else { root_from };
@@ -216,7 +219,6 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
     assert!(strands.len() <= LANES);
     let params = DirectParams {
         dt,
-        gravity: record.gravity,
         damping: record.damping,
         torsion: record.torsion,
         limiter_steps: record.limiter_steps,

@@ -106,6 +106,7 @@ pub struct Twin {
     drag: Vec<f64>,
     anchor: Vec<DVec3>,
     drying: Vec<f64>,
+    push: Vec<DVec3>,
     touched: bool,
     sweeps: bool,
     /// Length from the root on that may be in what the root lies in.
@@ -142,6 +143,7 @@ impl Twin {
             drag: vec![0.0; edges + 1],
             anchor: vec![DVec3::ZERO; edges + 1],
             drying: vec![0.0; edges],
+            push: vec![DVec3::ZERO; edges + 1],
             touched: false,
             sweeps: false,
             sunk: 0.0,
@@ -237,8 +239,9 @@ impl Twin {
             }
             let still = d(r.wind) - d(r.headwind);
             let flow = d(r.wind) + (carried - still * shares) / f64::max(shares, 1.0);
-            self.v[i] =
-                self.v[i] * keep + d(r.gravity) * dt + acceleration * dt + flow * (1.0 - keep);
+            let before = self.v[i];
+            self.v[i] = before * keep + d(r.gravity) * dt + acceleration * dt + flow * (1.0 - keep);
+            self.push[i] = if i == 0 { DVec3::ZERO } else { (self.v[i] - before) / dt };
             if i < edges {
                 self.drying[i] = drying * dt;
             }
@@ -293,8 +296,8 @@ impl Twin {
     }
 
     fn predict(&mut self, r: &SubstepRecord) -> f64 {
-        let (dt, gravity) = (f64::from(r.dt), d(r.gravity));
-        self.v.iter_mut().for_each(|v| *v -= gravity * dt);
+        let dt = f64::from(r.dt);
+        self.v.iter_mut().zip(&self.push).for_each(|(v, push)| *v -= *push * dt);
         self.support.fill(DVec3::ZERO);
         let depths = r.obstacles.iter().map(|o| depth(&o.solid, self.p[0], r.skin).1);
         self.sunk = 2.0 * depths.fold(0.0, f64::max);
@@ -344,8 +347,10 @@ impl Twin {
             self.from[i] = from;
             let mut to = from + self.v[i] * ahead;
             for o in &r.obstacles {
-                let (place, fast, _) = swept(o, along(o, from), to, r.skin);
-                to = if self.allowed(o, i, r.skin, from) > 0.0 { to } else { place };
+                let far = to + self.push[i] * (f64::from(r.dt) * ahead);
+                let (place, fast, normal) = swept(o, along(o, from), far, r.skin);
+                let stopped = normal != DVec3::ZERO && self.allowed(o, i, r.skin, from) <= 0.0;
+                to = if stopped { place } else { to };
                 self.sweeps |= fast;
             }
             self.p[i] = to;
@@ -560,7 +565,7 @@ impl Twin {
             let inert = self.mass[i] * inertia;
             let n = self.support[i];
             let mut diagonal = DMat3::IDENTITY * inert;
-            let mut force = d(r.gravity) * self.mass[i] - pull[i - 1];
+            let mut force = self.push[i] * self.mass[i] - pull[i - 1];
             force += pull.get(i).copied().unwrap_or(DVec3::ZERO);
             if twice {
                 let back = self.anchor[i] - self.p[i];

@@ -76,3 +76,33 @@ fn presets_come_to_rest_as_they_are_worn() {
         assert!(all > 100 && share * awake < all, "{preset:?}: {awake} of {all} are awake");
     }
 }
+
+/// Presets were drawn at the papers' torsion of 1, where twist is resisted as much as bending: at that of hair they hang
+/// as they were drawn.
+#[test]
+fn presets_look_the_same_with_the_twist_of_hair() {
+    for preset in HairPreset::ALL.into_iter().filter(|preset| *preset != HairPreset::Fur) {
+        let mut app = app_with_meshes(60.0);
+        let root = app.world_mut().spawn((Transform::default(), Visibility::default())).id();
+        wearer::character(&mut app, root, 1.0);
+        app.world_mut().entity_mut(root).insert(WearHair::new(preset).facing(Dir3::Z));
+        let hair = worn(&mut app);
+        let tips = |app: &mut App| -> Vec<Vec3> {
+            run(app, 6.0);
+            let strands = app.world().get::<Strands>(hair).unwrap().collection().to_vec();
+            let tip =
+                |e: Entity| *app.world().get::<Strand>(e).unwrap().positions().last().unwrap();
+            strands.into_iter().map(tip).collect()
+        };
+        let now = tips(&mut app);
+        let mut stiffness = *app.world().get::<HairStiffness>(hair).unwrap();
+        stiffness.torsion = 1.0;
+        app.world_mut().entity_mut(hair).insert(stiffness);
+        let drawn = tips(&mut app);
+        let mut apart: Vec<f32> = now.iter().zip(&drawn).map(|(a, b)| a.distance(*b)).collect();
+        apart.sort_by(f32::total_cmp);
+        let [median, high] = [0.5, 0.95].map(|share| apart[(share * apart.len() as f32) as usize]);
+        println!("{preset:?}: tips {median} m apart in the median, 95 of 100 within {high} m");
+        assert!(median < 5e-3 && high < 0.02, "{preset:?}: {median} m, {high} m");
+    }
+}

@@ -10,8 +10,6 @@ struct Piece {
     length: f32,
     rest: [f32; 3],
     velocity: [f32; 3],
-    push: [f32; 3],
-    kick: [f32; 3],
     tension: f32,
     water: f32,
     support: Option<[f32; 3]>,
@@ -24,15 +22,12 @@ fn vector(most: f32) -> impl Strategy<Value = [f32; 3]> {
 fn piece() -> impl Strategy<Value = Piece> {
     let (bend, rest, velocity) = (vector(0.5), vector(0.3), vector(0.5));
     let support = prop::option::weighted(0.2, vector(1.0));
-    let forces = (velocity, vector(30.0), vector(0.1));
-    (bend, 2e-3..2e-2f32, rest, forces, 0.0..20.0f32, 0.0..2.0f32, support).prop_map(
-        |(bend, length, rest, (velocity, push, kick), tension, water, support)| Piece {
+    (bend, 2e-3..2e-2f32, rest, velocity, 0.0..20.0f32, 0.0..2.0f32, support).prop_map(
+        |(bend, length, rest, velocity, tension, water, support)| Piece {
             bend,
             length,
             rest,
             velocity,
-            push,
-            kick,
             tension,
             water,
             support,
@@ -97,8 +92,10 @@ impl Shape {
                 let support = piece.support.unwrap_or_default();
                 put3(&mut node.rests_on, lane, Vec3::from(support).normalize_or_zero());
                 node.w[lane] = 1.0 + piece.water;
-                put3(&mut node.push, lane, Vec3::from(piece.push));
-                put3(&mut node.kick, lane, Vec3::from(piece.kick) * degree(lane));
+                // Gravity, and winds and impulses of some kind.
+                let [bend, rest] = [piece.bend, piece.rest].map(Vec3::from);
+                put3(&mut node.push, lane, Vec3::NEG_Y * 9.8 + 5.0 * bend);
+                put3(&mut node.kick, lane, 0.05 * rest * degree(lane));
             }
             block.twice[lane] = (lane % 2) as f32;
         }
