@@ -40,9 +40,10 @@ device::tests! {
     }
     coverage {
         device: strands_cover_as_much_from_near_and_far_and_at_their_tips,
-            edges_are_those_of_a_picture_with_sixteen_times_the_pixels,
             smoothing_changes_hair_alone_and_leaves_no_mark,
             nothing_pops_as_a_camera_flies_away;
+        // A million pixels of hair in software.
+        on_request: edges_are_those_of_a_picture_with_sixteen_times_the_pixels;
     }
     dye {
         device: black_hair_is_drawn_pink_and_roots_and_tips_apart,

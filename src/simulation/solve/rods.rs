@@ -279,10 +279,10 @@ fn gather_forces(block: &mut BlockLanes, from: &[Source<'_>; LANES], dt: f32) {
     }
     let (rate, most) = (1.0 / dt, (MAX_PUSH * dt).powi(2));
     for NodeLanes { v, push, kick, w, .. } in &mut block.nodes {
-        for lane in 0..LANES {
+        for (lane, w) in w.iter().enumerate() {
             let [by_air, other] = [&*push, &*kick].map(|v3| take3(v3, lane));
             let other = take3(v, lane) - other - by_air;
-            let is_force = |v: Vec3| w[lane] > 0.0 && v.length_squared() <= most;
+            let is_force = |v: Vec3| *w > 0.0 && v.length_squared() <= most;
             put3(push, lane, if is_force(by_air) { by_air * rate } else { Vec3::ZERO });
             put3(kick, lane, if is_force(other) { other } else { Vec3::ZERO });
         }
