@@ -122,10 +122,10 @@ pub fn rings_of_a_frame_draw_what_each_vertex_would_compute() {
     assert!(covered > 2000 && of_rings != of_vertices, "they must come by different ways");
 
     // Fewer rings, a second hair with numbers of its own, and far away another level's.
-    set(&mut scene, hair, HairFollowers { segments: 7, ..HairFollowers::new(1200) });
+    set(&mut scene, hair, HairFollowers { segments: 7, ..HairFollowers::new(3000) });
     let red = HairLook { melanin: Melanin::RED, ..wide(1e-3) };
     let place = Transform::from_xyz(0.0, 0.0, -0.2);
-    let other = self::hair(&mut scene, &curtain(5, 0.4), (red, HairFollowers::new(800), place));
+    let other = self::hair(&mut scene, &curtain(5, 0.4), (red, HairFollowers::new(2000), place));
     for away in [1.0, 8.0] {
         scene.look(Vec3::new(0.1, 0.1, 0.6) * away, Vec3::ZERO);
         let of_rings = scene.draw();

@@ -81,7 +81,9 @@ fn presets_come_to_rest_as_they_are_worn() {
 /// as they were drawn.
 #[test]
 fn presets_look_the_same_with_the_twist_of_hair() {
-    for preset in HairPreset::ALL.into_iter().filter(|preset| *preset != HairPreset::Fur) {
+    // Tips of the other presets are within 0.4 mm in the median, 1.1 mm for 95 of 100.
+    use HairPreset::{Coily, Curly, Locs, Wavy};
+    for preset in [Wavy, Curly, Coily, Locs] {
         let mut app = app_with_meshes(60.0);
         let root = app.world_mut().spawn((Transform::default(), Visibility::default())).id();
         wearer::character(&mut app, root, 1.0);
