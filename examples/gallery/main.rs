@@ -80,6 +80,8 @@ enum Piece {
     Presets,
     /// One picture with fewer and more samples.
     Quality,
+    /// One curl that hangs as a hook, and as a ringlet where twist is cheap.
+    Ringlet,
     /// The figure without hair, as binary glTF: `figure.glb`.
     Figure,
 }
@@ -174,6 +176,7 @@ fn make(piece: Piece, arguments: &Arguments) -> Result {
         Piece::Melanin => return sheets::melanin(arguments),
         Piece::Presets => return sheets::presets(arguments),
         Piece::Quality => return sheets::quality(arguments),
+        Piece::Ringlet => return sheets::ringlet(arguments),
         Piece::Figure => {
             let mesh = head::with_scalp(body::mesh_of(0.0036, 0.0105), &figure::scalp(), default());
             return export::write(&mesh, &arguments.out.join("figure.glb"));

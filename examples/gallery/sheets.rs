@@ -10,7 +10,11 @@ use crate::{
     set,
 };
 use bevy::{core_pipeline::prepass::DepthPrepass, prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{authoring::plant::HairPreset, prelude::*, render::HairView};
+use bevy_keratin::{
+    authoring::plant::HairPreset,
+    prelude::*,
+    render::{HairFollowers, HairView},
+};
 
 /// Lets time pass (ticks).
 fn run(app: &mut App, ticks: u32) {
@@ -189,4 +193,49 @@ pub fn quality(arguments: &Arguments) -> Result {
         println!("{name}: {:.1} % off", 100.0 * off / best.len() as f32 / mean);
     }
     Ok(arguments.save(picture::beside(&drawn), "quality")?)
+}
+
+/// Locks of one curl, straight at first, which hang as a hook where twist is as dear as bending, and as a ringlet where
+/// it is as cheap as in a hair.
+pub fn ringlet(arguments: &Arguments) -> Result {
+    /// Length, radius of the curl, how far its weight bends it (m).
+    const CURL: [f32; 3] = [0.12, 0.02, 0.045];
+    const SEGMENTS: usize = 32;
+    let mut app = bust::app("", Color::srgb(0.44, 0.46, 0.48));
+    bust::light(&mut app);
+    arguments.thin_out(&mut app);
+    let world = app.world_mut();
+    let [length, radius, bending_length] = CURL;
+    // Held by nothing but themselves, until they are at rest.
+    world.insert_resource(HairDefault(StrandContact { strength: 0.0, ..default() }));
+    world.insert_resource(HairDefault(AirDrag { rate: 4.0 }));
+    for (torsion, x) in [(1.0, -0.04), (0.46, 0.04)] {
+        let stiffness = HairStiffness { bending_length, torsion, ..default() };
+        let followers = HairFollowers { count: 1500, segments: 64, ..default() };
+        let hair = world.spawn((Hair, stiffness, followers, Transform::from_xyz(x, 0.0, 0.0)));
+        let hair = hair.id();
+        for i in 0..37 {
+            // Roots as the seeds of a sunflower.
+            let angle = 2.4 * i as f32;
+            let root = Quat::from_rotation_y(angle) * Vec3::X * (0.004 * (i as f32 / 37.0).sqrt());
+            let at = |k: usize| length * k as f32 / SEGMENTS as f32;
+            let arc = |k| {
+                let (sine, cosine) = (at(k) / radius).sin_cos();
+                root + radius * Vec3::new(1.0 - cosine, -sine, 0.0)
+            };
+            let points: Vec<_> = (0..=SEGMENTS).map(arc).collect();
+            let mut strand = Strand::from_polyline(&points)?;
+            for (k, place) in strand.positions_mut().iter_mut().enumerate() {
+                let aside = 1e-3 * at(k) * at(k) / length;
+                *place = root + Vec3::new(0.0, -at(k), aside);
+            }
+            world.spawn((StrandOf(hair), strand));
+        }
+    }
+    let camera = bust::camera(&mut app);
+    let size = arguments.scaled(600, 480);
+    let pictures = Pictures::new(&mut app, size, arguments.supersample, camera);
+    bust::look(&mut app, Vec3::new(0.0, 0.0, 0.28), Vec3::new(0.01, -0.035, 0.0));
+    run(&mut app, if arguments.most > 1 { 1800 } else { 2 });
+    Ok(arguments.save(pictures.draw(&mut app)?, "ringlet")?)
 }

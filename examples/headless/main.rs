@@ -20,6 +20,7 @@ mod worlds;
 
 #[cfg(feature = "gpu")]
 mod device;
+mod plots;
 mod report;
 mod swing;
 mod trace;
@@ -110,6 +111,9 @@ struct Arguments {
     /// Leaves contact between strands out, as --gpu does.
     #[arg(long)]
     no_contact: bool,
+    /// Draws the figures of `rods` on theory's curves into this folder, as SVG.
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
     #[command(flatten)]
     swing: swing::Options,
 }
@@ -142,6 +146,14 @@ fn characters(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     table(characters::rows(&files), arguments.json)
 }
 
+fn rods(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let rows = rods::rows();
+    if let Some(folder) = &arguments.plots {
+        plots::write(&rows, folder)?;
+    }
+    table(rows, arguments.json)
+}
+
 /// Prints rows; an error where one is outside of its tolerance.
 fn table(rows: Vec<rows::Row>, json: bool) -> Result<(), Box<dyn std::error::Error>> {
     let table = rows::Rows { rows };
@@ -172,7 +184,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         Show::Scene(kind) => kind,
         Show::Swing => return swing(arguments),
         Show::Worlds => return table(worlds::rows(), arguments.json),
-        Show::Rods => return table(rods::rows(), arguments.json),
+        Show::Rods => return rods(arguments),
         Show::Characters => return characters(arguments),
     };
     if arguments.swing.any() {

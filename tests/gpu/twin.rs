@@ -15,9 +15,11 @@ use bevy_keratin::{
 };
 
 const THETA: f64 = 0.65;
-const HOLD: f64 = 100.0;
+const HOLD: f64 = 1e5;
 const FIRMNESS: f64 = 0.95;
-const STUCK: f64 = 0.999;
+const REVERSING: f64 = 1e-7;
+const MOST_STEPS: usize = 4;
+const ROUNDING: f64 = 1.5e-7;
 const TOUCHING: f64 = 1e-5;
 const LEAVING: usize = 16;
 const NEARER: f64 = 0.98;
@@ -105,6 +107,8 @@ pub struct Twin {
     sticks: Vec<bool>,
     drag: Vec<f64>,
     anchor: Vec<DVec3>,
+    /// What holds it, as a displacement of a free node in the substep.
+    reaction: Vec<DVec3>,
     drying: Vec<f64>,
     push: Vec<DVec3>,
     touched: bool,
@@ -142,6 +146,7 @@ impl Twin {
             sticks: vec![false; edges + 1],
             drag: vec![0.0; edges + 1],
             anchor: vec![DVec3::ZERO; edges + 1],
+            reaction: vec![DVec3::ZERO; edges + 1],
             drying: vec![0.0; edges],
             push: vec![DVec3::ZERO; edges + 1],
             touched: false,
@@ -182,7 +187,8 @@ impl Twin {
         self.from[0] = root_place;
         self.v[0] = DVec3::ZERO;
         let theta = self.predict(r);
-        let twice = self.touched || self.whips(dt);
+        let fast = self.whips(dt);
+        let twice = self.touched || fast;
         let share = if root_from.dot(self.root) < 0.0 { -theta } else { theta };
         let between = (root_from * (1.0 - theta) + self.root * share).normalize();
         let turn = between * root_from.conjugate();
@@ -190,8 +196,11 @@ impl Twin {
         let damping = (f64::from(r.damping) - (2.0 * theta - 1.0) * dt).max(0.0);
         let stage = (theta, between, root_turn, damping, twice);
         self.newton(r, stage, if twice { 1.0 } else { 1.0 / theta }, false);
-        if twice {
-            self.contacts(r, Grip::Judged);
+        for step in 1..if twice { MOST_STEPS } else { 1 } {
+            let changed = self.contacts(r, Grip::Judged);
+            if !changed && !(fast && step == 1) {
+                break;
+            }
             self.newton(r, stage, 1.0 / theta, true);
         }
         self.contacts(r, Grip::Solved);
@@ -299,6 +308,7 @@ impl Twin {
         let dt = f64::from(r.dt);
         self.v.iter_mut().zip(&self.push).for_each(|(v, push)| *v -= *push * dt);
         self.support.fill(DVec3::ZERO);
+        self.reaction.fill(DVec3::ZERO);
         let depths = r.obstacles.iter().map(|o| depth(&o.solid, self.p[0], r.skin).1);
         self.sunk = 2.0 * depths.fold(0.0, f64::max);
         self.trapped = false;
@@ -402,17 +412,24 @@ impl Twin {
         (0..self.edges()).map(fast).fold(0.0, f64::max) > (0.03 / dt).powi(2)
     }
 
-    fn contacts(&mut self, r: &SubstepRecord, grip: Grip) {
+    /// Whether a node has been found to stick, slide, rest or leave that did not.
+    fn contacts(&mut self, r: &SubstepRecord, grip: Grip) -> bool {
         self.touched = false;
+        let mut changed = false;
         for i in 0..=self.edges() {
+            let state = |t: &Self| (t.support[i] != DVec3::ZERO, t.sticks[i], t.drag[i] > 0.0);
+            let before = state(self);
             self.touch(r, i, grip);
+            changed |= before != state(self);
         }
+        changed
     }
 
     fn touch(&mut self, r: &SubstepRecord, i: usize, grip: Grip) {
         let (from, rested) = (self.from[i], self.support[i] != DVec3::ZERO);
         let (mut p, mut support, mut touched) = (self.p[i], DVec3::ZERO, false);
         let (mut sticks, mut drag, mut deepest) = (false, 0.0, -1.0);
+        let (bearing, slid) = (self.support[i].dot(self.reaction[i]), self.drag[i] > 0.0);
         if matches!(grip, Grip::Between | Grip::Solved) {
             (sticks, drag) = (self.sticks[i], self.drag[i]);
         }
@@ -436,12 +453,22 @@ impl Twin {
                 stays = depth - may_be > -TOUCHING;
                 if stays {
                     let pushed = push.map_or(0.0, |(.., depth)| depth);
-                    push = Some((start + normal * (depth - may_be), normal, pushed));
+                    push = Some((start + normal * (depth - may_be).max(0.0), normal, pushed));
+                }
+            }
+            if matches!(grip, Grip::Judged | Grip::Solved) && rested {
+                let (normal, depth) = depth(&o.solid, p, r.skin);
+                let depth = depth - may_be;
+                if depth > -TOUCHING && bearing > 0.0 {
+                    push = Some((p + normal * depth.max(0.0), normal, bearing));
+                } else if depth > -TOUCHING && depth < TOUCHING {
+                    push = None;
                 }
             }
             let Some((out, normal, depth)) = push else { continue };
             touched = true;
-            if grip == Grip::Depth || depth > deepest {
+            let bears = grip == Grip::Depth || depth > deepest;
+            if bears {
                 (deepest, support) = (depth, normal);
                 if matches!(grip, Grip::Assumed | Grip::Judged) {
                     self.anchor[i] = start;
@@ -451,21 +478,38 @@ impl Twin {
             let slip = slip - normal * slip.dot(normal);
             let most = f64::from(o.friction) * depth;
             let coulomb = (most / slip.length().max(1e-12)).min(1.0);
+            let holding = self.reaction[i] - normal * self.reaction[i].dot(normal);
             let held = match grip {
                 Grip::None => 0.0,
-                Grip::Depth | Grip::Between => coulomb,
+                Grip::Depth => coulomb,
                 Grip::Assumed => {
-                    sticks |= stays;
+                    sticks = if bears { stays } else { sticks };
                     0.0
                 }
                 Grip::Judged => {
-                    sticks |= rested && slip.length() < most;
-                    drag += if rested { most * HOLD } else { 0.0 };
+                    let pull = if slid { holding } else { holding - slip };
+                    let size = holding.length().max(1e-12);
+                    let holds = match slid {
+                        true => slip.dot(holding) > REVERSING * size,
+                        false => pull.length() < most,
+                    };
+                    sticks |= rested && holds;
+                    drag += if rested { most } else { 0.0 };
+                    if bears && !holds {
+                        self.anchor[i] = out + pull;
+                    }
                     0.0
                 }
                 Grip::Solved if sticks => 1.0,
-                Grip::Solved if drag > 0.0 => 0.0,
-                Grip::Solved => coulomb,
+                Grip::Between if drag > 0.0 => 0.0,
+                Grip::Solved if drag > 0.0 => {
+                    if slip.dot(holding) > 0.0 {
+                        1.0
+                    } else {
+                        0.0
+                    }
+                }
+                Grip::Solved | Grip::Between => coulomb,
             };
             p = if i == 0 { p } else { out - slip * held };
         }
@@ -512,7 +556,12 @@ impl Twin {
             let swing = if crushed { DVec3::ZERO } else { turn };
             let turn = swing + t * turn_before.dot(t);
             self.q[j] = q;
-            let tension = (axial * (length - l)).max(self.tension[j]).max(0.0);
+            let stretch = if crushed { t.dot(e) } else { length } - l;
+            let rounding = ROUNDING * at[j + 1].length();
+            let taut = self.tension[j];
+            let kept = (taut / axial).clamp(stretch - rounding, stretch + rounding);
+            self.tension[j] = axial * kept;
+            let tension = (axial * kept).max(taut).max(0.0);
             let k = self.k[j];
             let elastic = moment(q_before, q, self.rest[j], k);
             let rate = turn - turn_before;
@@ -523,7 +572,7 @@ impl Twin {
             let across = if crushed { axial } else { tension * inverse };
             h[j] += outer(t, t) * axial + (DMat3::IDENTITY - outer(t, t)) * across;
             h[j] += bent(t, inverse);
-            pull[j] += couple.cross(t) * inverse + (e - t * l) * axial;
+            pull[j] += couple.cross(t) * inverse + (e + t * (kept - stretch - l)) * axial;
             if j > 0 {
                 h[j - 1] += bent(t_before, r_before);
                 pull[j - 1] -= couple.cross(t_before) * r_before;
@@ -584,14 +633,23 @@ impl Twin {
             b[3 * (i - 1)..3 * i].copy_from_slice(&force.to_array());
         }
         let x = solve(a, b);
-        let mut solved = at.clone();
+        let mut ways = vec![DVec3::ZERO; edges + 1];
         for i in 1..=edges {
-            solved[i] += DVec3::from_slice(&x[3 * (i - 1)..3 * i]);
-            self.p[i] = self.from[i] + (solved[i] - self.from[i]) * beyond;
+            let solved = DVec3::from_slice(&x[3 * (i - 1)..3 * i]);
+            ways[i] = solved;
+            let n = self.support[i];
+            if twice && n != DVec3::ZERO {
+                let back = self.anchor[i] - self.p[i];
+                let back = back - n * back.dot(n);
+                ways[i] = if self.sticks[i] { back } else { solved - n * n.dot(solved) };
+                let slows = back * (self.drag[i] / back.length().max(1e-12));
+                self.reaction[i] = (ways[i] - solved) * HOLD + slows;
+            }
+            self.p[i] = self.from[i] + (at[i] + ways[i] - self.from[i]) * beyond;
         }
         for j in 0..edges {
-            let along = tangent(self.q[j]).dot(solved[j + 1] - solved[j]);
-            self.tension[j] = self.axial[j] * (along - self.l[j]);
+            let along = tangent(self.q[j]).dot(ways[j + 1] - ways[j]);
+            self.tension[j] += self.axial[j] * along;
         }
     }
 
@@ -602,14 +660,18 @@ impl Twin {
         if (0..edges).map(|i| strain(i).abs()).fold(0.0, f64::max) <= tolerance {
             return false;
         }
-        let stretch =
-            |i: usize| (self.tension[i] / self.axial[i]).clamp(0.0, TOLERANCE * self.l[i]);
+        let stretch = |i: usize| {
+            (self.tension[i] / self.axial[i]).clamp(-TOLERANCE * self.l[i], TOLERANCE * self.l[i])
+        };
         let off: Vec<f64> = (0..edges).map(|i| way(i).length() - self.l[i] - stretch(i)).collect();
         let t: Vec<DVec3> = (0..edges).map(|i| way(i).normalize()).collect();
+        let presses = |i: usize| self.reaction[i].dot(self.support[i]) > 0.0;
+        let pressed: Vec<bool> = (0..=edges).map(presses).collect();
+        let firm = |i: usize| if pressed[i] && i != edges { 1.0 } else { FIRMNESS };
         let mobile = |i: usize, x: DVec3, y: DVec3| {
             let n = self.support[i];
-            let stuck = if self.sticks[i] { STUCK } else { 0.0 };
-            self.w(i) * ((1.0 - stuck) * x.dot(y) - (FIRMNESS - stuck) * x.dot(n) * y.dot(n))
+            let stuck = if self.sticks[i] { 1.0 } else { 0.0 };
+            self.w(i) * ((1.0 - stuck) * x.dot(y) - (firm(i) - stuck) * x.dot(n) * y.dot(n))
         };
         let mut a = vec![vec![0.0; edges]; edges];
         for i in 0..edges {
@@ -633,12 +695,14 @@ impl Twin {
             }
             let n = self.support[i + 1];
             let lift = force.dot(n);
-            let force = if lift > 0.0 {
+            let far = lift * self.w(i + 1) > TOUCHING;
+            let force = if lift > 0.0 && (far || !pressed[i + 1]) {
                 (self.support[i + 1], self.sticks[i + 1]) = (DVec3::ZERO, false);
                 force
             } else {
-                let stuck = if self.sticks[i + 1] { STUCK } else { 0.0 };
-                force * (1.0 - stuck) - n * ((FIRMNESS - stuck) * lift)
+                let stuck = if self.sticks[i + 1] { 1.0 } else { 0.0 };
+                let firm = if lift > 0.0 { 1.0 } else { firm(i + 1) };
+                force * (1.0 - stuck) - n * ((firm - stuck) * lift)
             };
             let w = self.w(i + 1);
             self.p[i + 1] += force * w;

@@ -35,3 +35,27 @@ fn upright_hair_buckles_where_greenhill_says() {
 fn level_hair_stays_in_its_plane() {
     check(measured::no_lateral_buckling());
 }
+
+#[test]
+#[ignore = "takes minutes"]
+fn a_twisted_rod_buckles() {
+    check(measured::wrung());
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn a_tip_on_a_plate_slips() {
+    check(measured::slips());
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn a_slope_holds_what_it_should() {
+    check(measured::slopes());
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn a_cylinder_holds_what_it_should() {
+    check(measured::capstans());
+}

@@ -4,12 +4,16 @@
 //! buckling shares of theory's. A rod of 8 segments may be four times as far off as one of 16: errors are of second
 //! order in a segment's length.
 
+mod friction;
 mod onset;
 mod ring;
 mod shape;
 
+#[allow(unused_imports, reason = "the plots use it")]
+pub use friction::SLIPS;
+pub use friction::{capstans, slips, slopes};
 pub use onset::{curls, greenhill, no_lateral_buckling};
-pub use ring::rings;
+pub use ring::{rings, wrung};
 pub use shape::{arcs, cantilevers, helices, tip_loads};
 
 use super::rows::Row;
@@ -146,7 +150,11 @@ pub fn rows() -> Vec<Row> {
         curls(),
         no_lateral_buckling(),
         rings(),
+        wrung(),
         helices(),
+        slips(),
+        slopes(),
+        capstans(),
     ]
     .concat()
 }

@@ -27,6 +27,64 @@ fn crank(step: Res<bevy_keratin::HairStep>, mut cranks: Query<(&mut Crank, &mut 
     }
 }
 
+/// Lets the held end of a straight rod come closer as the rod leaves the x axis, by what its edges reach.
+#[derive(Component)]
+struct FreeToApproach;
+
+fn approach(mut rods: Query<(&Strand, &mut HeldNodes), With<FreeToApproach>>) {
+    for (strand, mut held) in &mut rods {
+        let (places, last) = (strand.positions(), strand.edges() - 1);
+        let lengths = strand.rest_lengths();
+        let pairs = places.windows(2).zip(lengths).take(last);
+        let along: f32 = pairs.map(|(p, l)| l * (p[1] - p[0]).normalize_or_zero().x).sum();
+        held.targets[last] = Some(Vec3::X * along);
+        held.targets[last + 1] = Some(Vec3::X * (along + lengths[last]));
+    }
+}
+
+/// H: a straight rod whose ends are clamped, one free to approach, buckles when it is twisted by 8.9868 E I/(G J).
+pub fn wrung() -> Vec<Row> {
+    let mut lab = Lab::new();
+    // A rod that sags a little chooses a side.
+    lab.gravity(0.03 * GRAVITY);
+    lab.app.add_systems(HairTick, (crank, approach).chain().in_set(HairSystems::First));
+    let mut tried = Vec::new();
+    for (torsion, segments) in [1.0, 0.46].into_iter().flat_map(|c| SEGMENTS.map(|n| (c, n))) {
+        let onset = 8.9868 / torsion;
+        let rods = wide_shares().map(|share| clamped(&mut lab, torsion, segments, share * onset));
+        tried.push((torsion, segments, onset, rods.collect::<Vec<_>>()));
+    }
+    lab.settle(2.0, 60.0);
+    let away = |p: &Vec3| p.yz().length() / LENGTH;
+    let shares: Vec<f32> = wide_shares().collect();
+    (tried.into_iter())
+        .map(|(torsion, segments, at, rods)| {
+            let bow = |rod: &Entity| lab.get(*rod).iter().map(away).fold(0.0, f32::max);
+            let got = onset_in(&shares, &rods.iter().map(bow).collect::<Vec<_>>(), true);
+            let test = format!("H twist of a clamped rod, C {torsion}");
+            Row::new(test, 1.0, got, allowed(0.03, segments)).of(at, segments)
+        })
+        .collect()
+}
+
+/// A straight rod, its last edge held.
+fn clamped(lab: &mut Lab, torsion: f32, segments: usize, twist: f32) -> Entity {
+    // From the clamp to the middle of the held edge.
+    let edge = LENGTH / (segments as f32 + 0.5);
+    let points: Vec<Vec3> = (0..=segments + 1).map(|i| Vec3::X * (edge * i as f32)).collect();
+    let strand = Strand::from_polyline(&points).unwrap_or_default();
+    let frame = strand.root_frame();
+    let mut held = HeldNodes::default();
+    held.targets.resize(segments + 2, None);
+    held.targets[segments..].copy_from_slice(&[Some(points[segments]), Some(points[segments + 1])]);
+    held.frames.resize(segments + 2, None);
+    held.frames[segments + 1] = Some(frame);
+    let stiffness = HairStiffness { bending_length: LENGTH, torsion, ..default() };
+    let hair = lab.app.world_mut().spawn((Hair, stiffness)).id();
+    let crank = Crank { most: twist, share: 0.0, frame };
+    lab.app.world_mut().spawn((StrandOf(hair), strand, held, crank, FreeToApproach)).id()
+}
+
 /// G: a straight-born rod bent to a circle leaves its plane when it is twisted by 2π √3 E I/(G J).
 pub fn rings() -> Vec<Row> {
     use std::f32::consts::TAU;

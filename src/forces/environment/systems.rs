@@ -153,7 +153,14 @@ fn apply_air(
             let air = &airs.values[*air];
             // Inertia has not acted on followers.
             let back = air.back.as_ref().filter(|_| !*follows);
+            // Followers are not solved.
+            if !*follows {
+                strand.begin_air();
+            }
             blow((air, back), strand, added, changes, blown, received.as_deref_mut());
+            if !*follows {
+                strand.end_air();
+            }
         });
         items.clear();
     });
@@ -161,20 +168,6 @@ fn apply_air(
 
 /// Applies a hair's air to one strand in a substep.
 fn blow(
-    air: (&LocalAir, Option<&Isometry3d>),
-    strand: &mut Strand,
-    added_mass: &AddedMass,
-    changes: &mut BondChanges,
-    blown: &mut BlownAir,
-    received: Option<&mut WindReceived>,
-) {
-    strand.begin_air();
-    blow_on(air, strand, added_mass, changes, blown, received);
-    strand.end_air();
-}
-
-/// Velocities in the air, and what it asks of bonds.
-fn blow_on(
     (air, back): (&LocalAir, Option<&Isometry3d>),
     strand: &mut Strand,
     added_mass: &AddedMass,

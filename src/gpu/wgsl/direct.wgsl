@@ -57,7 +57,7 @@ struct Stage {
     beyond: f32,
     root_turn: vec3<f32>,
     damping: f32,
-    // Whether the strand takes two Newton steps, and whether this is the second.
+    // Whether the strand may take several Newton steps, and whether this is not the first.
     twice: bool,
     second: bool,
 }
@@ -144,7 +144,15 @@ fn newton_down(stage: Stage) {
             let swing = select(turn, vec3(0.0), crushed);
             turn = fma(t, vec3(dot(before.turn, t)), swing);
             set_frame(j, q);
-            let tension = max(max(axial * (length - l), moving(j).w), 0.0);
+            // Positions are rounded, and edges so stiff that this would pull like gravity.
+            let taut = moving(j).w;
+            let stretch = select(length, dot(t, e), crushed) - l;
+            let rounding = sqrt(dot(x, x)) * ROUNDING;
+            let kept_stretch = clamp(taut / axial, stretch - rounding, stretch + rounding);
+            let off = kept_stretch - stretch;
+            let stretched = axial * kept_stretch;
+            set_moving(j, moving(j).xyz, stretched);
+            let tension = max(max(stretched, taut), 0.0);
             let across = select(tension * r, axial, crushed);
             let k = joint_of(length_before, l, props.y);
             let elastic = moment(before.q, q, rest_shape(j), k, record.torsion);
@@ -162,7 +170,7 @@ fn newton_down(stage: Stage) {
                 q, t, r, turn, swing,
                 fma(stiff * r, r, across),
                 axial,
-                fma(cross(couple, t), vec3(r), fma(t, vec3(-l), e) * axial),
+                fma(cross(couple, t), vec3(r), fma(t, vec3(off - l), e) * axial),
                 plus_cross(coupling, (t + before.t) * twist),
             );
         }
@@ -222,7 +230,7 @@ fn eliminate(
         var to = fma(moving(i).xyz, vec3(stage.ahead), start) - n.xyz;
         if support.w != 0.0 {
             // Friction: where the node sticks as stiff as the support, where it slides a force.
-            let off = taken_along(bearer_of(i), start) - n.xyz;
+            let off = back_of(i, n.xyz, sticks);
             let back = off - support.xyz * dot(off, support.xyz);
             let way = sqrt(max(dot(back, back), 1e-24));
             to += back * fma(HOLD, sticks, max(-support.w, 0.0) / way);
@@ -257,11 +265,19 @@ fn eliminate(
     );
 }
 
+// Which way friction acts on a node: towards its start, or if it slides against what pulls it.
+fn back_of(i: u32, p: vec3<f32>, sticks: f32) -> vec3<f32> {
+    if 0.0 < sticks {
+        return taken_along(bearer_of(i), start_of(i)) - p;
+    }
+    return reaction_of(i);
+}
+
 // From the tip to the root.
 fn newton_up(stage: Stage) {
     var next = vec3(0.0);
     var after = vec3(0.0);
-    var end = vec3(0.0);
+    var ahead = vec3(0.0);
     for (var k = 0u; k <= edges; k++) {
         let i = edges - k;
         let n = node(i);
@@ -280,20 +296,35 @@ fn newton_up(stage: Stage) {
             );
             let y1 = fma(-f2.w, start.z, start.y);
             solved = vec3(fma(-f1.w, start.z, fma(-f0.w, y1, start.x)), y1, start.z);
-            y += solved;
         }
+        var moved = solved;
+        let support = support_of(i);
+        if stage.twice && 0u < i && dot(support.xyz, support.xyz) > 0.0 {
+            // Supports do not give way: what they are given to, so that there is a solution, tells their force.
+            let sticks = select(0.0, 1.0, 0.0 < support.w);
+            let drag = max(-support.w, 0.0);
+            var back = vec3(0.0);
+            if support.w != 0.0 {
+                let off = back_of(i, n.xyz, sticks);
+                back = off - support.xyz * dot(off, support.xyz);
+            }
+            moved = fma(solved - support.xyz * dot(support.xyz, solved), vec3(1.0 - sticks), back * sticks);
+            let way = sqrt(max(dot(back, back), 1e-24));
+            set_reaction(i, fma(moved - solved, vec3(HOLD), back * (drag / way)));
+        }
+        y += moved;
         if !is_held(n.w) {
             let start = start_of(i);
             set_node(i, fma(y - start, vec3(stage.beyond), start), n.w);
         }
         if i < edges {
-            let l = edge(i).x;
-            let tension = axial_of(l) * (dot(tangent(frame(i)), end - y) - l);
-            set_moving(i, moving(i).xyz, tension);
+            // Not from places, which are rounded.
+            let m = moving(i);
+            set_moving(i, m.xyz, fma(axial_of(edge(i).x), dot(tangent(frame(i)), ahead - moved), m.w));
         }
-        end = y;
         after = next;
         next = solved;
+        ahead = moved;
     }
 }
 
@@ -423,7 +454,7 @@ fn surface() {
         if !is_held(n.w) {
             set_start(i, n.xyz);
         }
-        set_support(i, vec3(0.0), 0.0);
+        release(i);
     }
     for (var round = 0u; round < min(LEAVING, 2u * edges); round++) {
         contacts(GRIP_NONE);
@@ -457,7 +488,7 @@ fn predict() -> f32 {
     for (var i = 0u; i <= edges; i++) {
         let m = moving(i);
         set_moving(i, fma(push_of(i), vec3(-record.dt), m.xyz), m.w);
-        set_support(i, vec3(0.0), 0.0);
+        release(i);
     }
     surface();
     var theta = THETA;
@@ -494,7 +525,8 @@ fn direct_step(root_from: vec4<f32>) {
     weigh();
     weigh_nodes();
     let theta = predict();
-    let twice = touched || whips();
+    let fast = whips();
+    let twice = touched || fast;
     let root = root_frame();
     let share = select(theta, -theta, dot(root_from, root) < 0.0);
     root_between = normalized(fma(root, vec4(share), root_from * (1.0 - theta)));
@@ -512,10 +544,13 @@ fn direct_step(root_from: vec4<f32>) {
     newton_down(stage);
     newton_up(stage);
     stage.beyond = 1.0 / theta;
-    if twice {
-        // Which nodes an obstacle bears is not known before: the first step shows.
+    // Which nodes an obstacle bears, and which of them stick, is not known before: each step shows.
+    stage.second = true;
+    for (var step = 1u; twice && step < MOST_STEPS; step++) {
         contacts(GRIP_JUDGED);
-        stage.second = true;
+        if !(contact_changed || (fast && step == 1u)) {
+            break;
+        }
         newton_down(stage);
         newton_up(stage);
     }

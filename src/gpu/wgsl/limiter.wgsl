@@ -22,13 +22,23 @@ fn span(start: vec3<f32>, to: vec3<f32>) -> vec4<f32> {
 }
 
 // x · W y of a node.
-fn mobility(w: f32, support: vec4<f32>, x: vec3<f32>, y: vec3<f32>, touching: bool) -> f32 {
+fn mobility(w: f32, support: vec4<f32>, firm: f32, x: vec3<f32>, y: vec3<f32>, touching: bool) -> f32 {
     let free = dot(x, y);
     if !touching {
         return w * free;
     }
-    let stuck = select(0.0, STUCK, 0.0 < support.w);
-    return w * (free - stuck * free - (FIRMNESS - stuck) * dot(x, support.xyz) * dot(y, support.xyz));
+    let stuck = select(0.0, 1.0, 0.0 < support.w);
+    return w * (free - stuck * free - (firm - stuck) * dot(x, support.xyz) * dot(y, support.xyz));
+}
+
+// Whether the solve has found that it presses what it rests on.
+fn presses(i: u32, support: vec4<f32>) -> bool {
+    return 0.0 < dot(reaction_of(i), support.xyz);
+}
+
+// The share of its mobility that its support removes: of a tip not all, on which a straight strand may stand.
+fn firmness(i: u32, support: vec4<f32>) -> f32 {
+    return select(FIRMNESS, 1.0, i != edges && presses(i, support));
 }
 
 // One damped Newton step on the lengths where one is off by more than the share `tolerance`; whether there was.
@@ -42,8 +52,10 @@ fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
     var worst = 0.0;
     var start = node(0u);
     var start_support = vec4(0.0);
+    var start_firm = 0.0;
     if touching {
         start_support = support_of(0u);
+        start_firm = firmness(0u, start_support);
     }
     var end = node(1u);
     var d = span(start.xyz, end.xyz);
@@ -51,18 +63,20 @@ fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
     var rows = Elimination(0.0, 0.0, 0.0);
     for (var i = 0u; i < edges; i++) {
         var end_support = vec4(0.0);
+        var end_firm = 0.0;
         if touching {
             end_support = support_of(i + 1u);
+            end_firm = firmness(i + 1u, end_support);
         }
-        var diagonal = mobility(start.w, start_support, d.xyz, d.xyz, touching)
-            + mobility(end.w, end_support, d.xyz, d.xyz, touching);
+        var diagonal = mobility(start.w, start_support, start_firm, d.xyz, d.xyz, touching)
+            + mobility(end.w, end_support, end_firm, d.xyz, d.xyz, touching);
         let l = edge(i).x;
         var off = d.w - l;
         let strain = abs(off) / l;
         worst = max(worst, strain);
         if guarded {
-            // What its tension stretches it by stays.
-            off -= clamp(moving(i).w / axial_of(l), 0.0, TOLERANCE * l);
+            // What its tension stretches or presses it by stays.
+            off -= clamp(moving(i).w / axial_of(l), -TOLERANCE * l, TOLERANCE * l);
         }
         if guarded && off < 0.0 {
             // Levenberg-Marquardt, where there is something to be folded.
@@ -77,10 +91,11 @@ fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
         if i + 1u < edges {
             let next = node(i + 2u);
             let ahead = span(end.xyz, next.xyz);
-            coupling = -mobility(end.w, end_support, d.xyz, ahead.xyz, touching);
+            coupling = -mobility(end.w, end_support, end_firm, d.xyz, ahead.xyz, touching);
             d = ahead;
             start = end;
             start_support = end_support;
+            start_firm = end_firm;
             end = next;
         }
     }
@@ -108,12 +123,14 @@ fn limit(tolerance: f32, guarded: bool, touching: bool) -> bool {
         if touching {
             let support = support_of(i + 1u);
             let off = dot(force, support.xyz);
-            if 0.0 < off {
+            let up = 0.0 < off;
+            if up && (!presses(i + 1u, support) || TOUCHING < off * n.w) {
                 // The strand pulls it off the surface: it is let go.
                 set_support(i + 1u, vec3(0.0), 0.0);
             } else {
-                let stuck = select(0.0, STUCK, 0.0 < support.w);
-                force = fma(support.xyz, vec3(-((FIRMNESS - stuck) * off)), force * (1.0 - stuck));
+                let stuck = select(0.0, 1.0, 0.0 < support.w);
+                let firm = select(firmness(i + 1u, support), 1.0, up);
+                force = fma(support.xyz, vec3(-((firm - stuck) * off)), force * (1.0 - stuck));
             }
         }
         set_node(i + 1u, fma(force, vec3(n.w), n.xyz), n.w);

@@ -5,6 +5,8 @@
 var<private> near: vec4<u32>;
 var<private> sweeps: bool;
 var<private> touched: bool;
+// Whether a pass has found a node to stick, slide, rest or leave that did not.
+var<private> contact_changed: bool;
 // Length from the root on that may be in what the root lies in, 0 where it lies in nothing.
 var<private> sunk: f32;
 // Of a strand with such a root its length (m).
@@ -208,7 +210,34 @@ fn rest_on(o: u32, p: vec3<f32>, start: vec3<f32>, may_be: f32) -> Met {
         return push_out(o, p, may_be);
     }
     let other = push_out(o, p, may_be);
-    return Met(fma(found.xyz, vec3(depth), start), true, found.xyz, other.depth);
+    return Met(fma(found.xyz, vec3(max(depth, 0.0)), start), true, found.xyz, other.depth);
+}
+
+// The same after a Newton step, of nodes that were free in it; others stay that an obstacle bears with this force.
+fn bear_on(o: u32, p: vec3<f32>, rested: bool, bearing: f32, may_be: f32) -> Met {
+    let found = depth_in(o, p);
+    let depth = found.w - may_be;
+    if rested && -TOUCHING < depth {
+        if 0.0 < bearing {
+            return Met(fma(found.xyz, vec3(max(depth, 0.0)), p), true, found.xyz, bearing);
+        }
+        if depth < TOUCHING {
+            return Met(p, false, vec3(0.0), 0.0);
+        }
+    }
+    return push_out(o, p, may_be);
+}
+
+// It rests on nothing.
+fn release(i: u32) {
+    set_support(i, vec3(0.0), 0.0);
+    set_reaction(i, vec3(0.0));
+}
+
+// 0 for a node that touches nothing, 1 for one without friction, 2 for one that sticks, 3 for one that slides.
+fn contact_of(support: vec4<f32>) -> u32 {
+    let rests = select(0u, 1u, dot(support.xyz, support.xyz) > 0.0);
+    return rests + select(0u, 1u, 0.0 < support.w) + select(0u, 2u, support.w < 0.0);
 }
 
 // Holds a node back that would pass through a thin or fast solid. `fast` says whether it might have.
@@ -341,6 +370,7 @@ fn predict_nodes(dt: f32) {
 // Moves nodes out of obstacles and records contacts. Motion along the surface: `Grip` of src/solver/rod/touch.rs.
 fn contacts(grip: u32) {
     touched = false;
+    contact_changed = false;
     if all(near == vec4(0u)) {
         return;
     }
@@ -371,6 +401,10 @@ fn touch(i: u32, along: f32, grip: u32) {
         sticks = 0.0 < before.w;
         drag = max(-before.w, 0.0);
     }
+    let reaction = reaction_of(i);
+    let bearing = dot(before.xyz, reaction);
+    let slid = before.w < 0.0;
+    var pull = reaction;
     var deepest = -1.0;
     for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
         let may_be = allowed(o, along, start);
@@ -386,6 +420,8 @@ fn touch(i: u32, along: f32, grip: u32) {
         var out: Met;
         if grip == GRIP_ASSUMED {
             out = rest_on(o, p, taken, may_be);
+        } else if grip == GRIP_JUDGED || grip == GRIP_SOLVED {
+            out = bear_on(o, p, rested, bearing, may_be);
         } else {
             out = push_out(o, p, may_be);
         }
@@ -393,7 +429,8 @@ fn touch(i: u32, along: f32, grip: u32) {
             continue;
         }
         // Between two solids it rests on the one that bears more.
-        if grip == GRIP_DEPTH || deepest < out.depth {
+        let bears = grip == GRIP_DEPTH || deepest < out.depth;
+        if bears {
             deepest = out.depth;
             rests_on = out.normal;
             set_bearer(i, o);
@@ -404,19 +441,40 @@ fn touch(i: u32, along: f32, grip: u32) {
         let length = sqrt(dot(tangential, tangential));
         let most = record.obstacle[o].friction * out.depth;
         var stays = 0.0;
+        let held_by = reaction - out.normal * dot(reaction, out.normal);
         if grip == GRIP_ASSUMED {
-            sticks = sticks || -TOUCHING < depth_in(o, taken).w - may_be;
+            if bears {
+                sticks = -TOUCHING < depth_in(o, taken).w - may_be;
+            }
         } else if grip == GRIP_JUDGED {
-            sticks = sticks || (rested && length < most);
-            drag += select(0.0, most * HOLD, rested);
+            // What would have to pull it back: by what it has been held with, or else by what it has slipped.
+            let wanted = select(held_by - tangential, held_by, slid);
+            let size = sqrt(max(dot(held_by, held_by), 1e-24));
+            let reverses = REVERSING * size < dot(tangential, held_by);
+            let holds = select(dot(wanted, wanted) < most * most, reverses, slid);
+            sticks = sticks || (rested && holds);
+            drag += select(0.0, most, rested);
+            if bears {
+                pull = wanted;
+            }
         } else if grip == GRIP_SOLVED && sticks {
             stays = 1.0;
-        } else if grip != GRIP_NONE && !(grip == GRIP_SOLVED && 0.0 < drag) {
+        } else if grip == GRIP_SOLVED && 0.0 < drag {
+            stays = select(0.0, 1.0, 0.0 < dot(tangential, held_by));
+        } else if grip == GRIP_BETWEEN && 0.0 < drag {
+            stays = 0.0;
+        } else if grip != GRIP_NONE {
             stays = min(1.0, most / max(length, 1e-12));
         }
         p = select(fma(tangential, vec3(-stays), out.place), p, held);
     }
     set_node(i, p, n.w);
     touched = touched || touches;
-    set_support(i, rests_on, select(0.0, select(-drag, 1.0, sticks), touches));
+    let support = vec4(rests_on, select(0.0, select(-drag, 1.0, sticks), touches));
+    set_support(i, support.xyz, support.w);
+    contact_changed = contact_changed || contact_of(before) != contact_of(support);
+    if grip == GRIP_JUDGED && support.w < 0.0 && !held {
+        // What the next step slows it against; the support's share is what it was.
+        set_reaction(i, pull + before.xyz * (bearing - dot(pull, before.xyz)));
+    }
 }

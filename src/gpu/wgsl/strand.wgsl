@@ -241,6 +241,15 @@ fn set_push(i: u32, push: vec3<f32>) {
     scratch[slot(i, 8u, SCRATCH)] = vec4(push, 0.0);
 }
 
+// What holds it there, as a displacement of a free node in the substep (m).
+fn reaction_of(i: u32) -> vec3<f32> {
+    return scratch[slot(i, 9u, SCRATCH)].xyz;
+}
+
+fn set_reaction(i: u32, reaction: vec3<f32>) {
+    scratch[slot(i, 9u, SCRATCH)] = vec4(reaction, 0.0);
+}
+
 // That obstacle.
 fn bearer_of(i: u32) -> u32 {
     return bitcast<u32>(scratch[slot(i, 6u, SCRATCH)].w);

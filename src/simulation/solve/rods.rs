@@ -9,7 +9,7 @@ use super::{
 use crate::{
     base::{
         fault::HairFault,
-        lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level, take3},
+        lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level},
         parallel::{Scratch, prefetch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, lacks},
         setting::{self, Settings},
@@ -22,8 +22,8 @@ use crate::{
     keratin::bond::{BondInfluence, BondPlugin, Bonds, RestShape},
     solver::rod::{
         HairSolver, HairStiffness, SolverMethod, Sweeps,
-        block::{BlockLanes, NodeLanes},
-        direct::{self, DirectParams, MAX_PUSH},
+        block::BlockLanes,
+        direct::{self, DirectParams},
         obstacle::Obstacle,
         step::{self, SweepParams},
         stiffness::wet_twist_loss,
@@ -124,7 +124,8 @@ impl<'a> Batched for RodColumns<'a> {
         match &params.method {
             Method::Direct { params: direct, frame_delta } => {
                 gather_tensions(block, sources);
-                gather_forces(block, sources, params.dt);
+                gather_forces(block, sources);
+                direct::split_forces(params.level, block, params.dt);
                 gather_twist(block, sources);
                 gather_roots(block, sources, frame_delta.unwrap_or_default());
                 direct::weigh(params.level, block, params.bending_length, params.dt);
@@ -255,8 +256,8 @@ fn gather_tensions(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
     }
 }
 
-/// What air and gravity have added to velocities in this substep, and what else has. Impulses stay in the velocities.
-fn gather_forces(block: &mut BlockLanes, from: &[Source<'_>; LANES], dt: f32) {
+/// Velocities before the forces of this substep, into `kick`, and what air and gravity have added to them, into `push`.
+fn gather_forces(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
     let forced = from.each_ref().map(|source| source.strand.forced());
     if forced.iter().all(Option::is_some) {
         let forced = forced.map(Option::unwrap_or_default);
@@ -275,16 +276,6 @@ fn gather_forces(block: &mut BlockLanes, from: &[Source<'_>; LANES], dt: f32) {
                 put3(&mut n.kick, lane, *before);
                 put3(&mut n.push, lane, *blown);
             }
-        }
-    }
-    let (rate, most) = (1.0 / dt, (MAX_PUSH * dt).powi(2));
-    for NodeLanes { v, push, kick, w, .. } in &mut block.nodes {
-        for (lane, w) in w.iter().enumerate() {
-            let [by_air, other] = [&*push, &*kick].map(|v3| take3(v3, lane));
-            let other = take3(v, lane) - other - by_air;
-            let is_force = |v: Vec3| *w > 0.0 && v.length_squared() <= most;
-            put3(push, lane, if is_force(by_air) { by_air * rate } else { Vec3::ZERO });
-            put3(kick, lane, if is_force(other) { other } else { Vec3::ZERO });
         }
     }
 }

@@ -231,7 +231,7 @@ fn solve_next<S: Simd, const TOUCHING: bool>(
                 let n = &mut b.nodes[i + 1];
                 let mut force = pull - tension;
                 if TOUCHING {
-                    force = along_support(simd, n, force);
+                    force = along_support(simd, n, false, force);
                 }
                 let p = force.scale_add(load(simd, &n.w), load3(simd, &n.p));
                 store3(&mut n.p, p);

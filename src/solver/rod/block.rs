@@ -40,6 +40,9 @@ pub struct NodeLanes<C = Lane> {
     pub rests_on: [C; 3],
     /// The node's start, moved with the surface of that obstacle (m). Direct method only.
     pub anchor: [C; 3],
+    /// What holds it there, as a displacement of a free node in the substep (m): the support's force and friction.
+    /// Written by the Newton steps of the direct method.
+    pub reaction: [C; 3],
     /// 1 where friction holds it there, else 0. Direct method only.
     pub sticks: C,
     /// Else the friction that it slides against, as a displacement of a free node in the substep (m). Direct
@@ -119,8 +122,12 @@ pub struct BlockLanes {
     pub(super) theta: Lane,
     /// Largest twist that counts in the Hessian, as a moment over EI (1/m). Direct method only.
     pub(super) max_twist: Lane,
-    /// 1 for lanes that take two Newton steps, else 0.
+    /// 1 for lanes that may take more than one Newton step, else 0.
     pub(super) twice: Lane,
+    /// 1 for those that take the present one, else 0.
+    pub(super) again: Lane,
+    /// 1 for lanes in which a node has been found to stick, slide, rest or leave that did not, else 0.
+    pub(super) changed: Lane,
     pub(super) root_between: [Lane; 4],
     pub(crate) scratch: Vec<TridiagonalRow>,
     pub(super) shares: Vec<Shares>,
@@ -215,7 +222,7 @@ impl NodeLanes {
     /// It rests on nothing.
     pub(super) fn release(&mut self) {
         self.rests_on = Default::default();
-        (self.sticks, self.drag) = Default::default();
+        (self.reaction, self.sticks, self.drag) = Default::default();
     }
 
     #[inline(always)]

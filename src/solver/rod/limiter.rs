@@ -11,9 +11,10 @@
 
 use super::{
     block::{BlockLanes, NodeLanes},
+    touch::TOUCHING,
     tridiagonal::{Elimination, back},
 };
-use crate::base::lanes::{LANES, Real, V3, load};
+use crate::base::lanes::{LANES, Real, V3, load, load3};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// a: the share of a node's mobility that an obstacle removes along its normal. Below 1, so that a
@@ -21,14 +22,9 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 pub(crate) const FIRMNESS: f32 = 0.95;
 
 /// Stiffness with which an obstacle holds a resting node in the direct solve, and along the surface one that sticks, as
-/// a multiple of the node's inertia. Much
-/// stiffer makes fine strands jump off; softer leaves the push-out to the contact pass, which bends
-/// them.
-pub(crate) const HOLD: f64 = 100.0;
-
-/// The share of a sticking node's mobility that friction removes along the surface. Less would let it creep,
-/// because each substep stretches what hangs from it and the limiter shortens that.
-pub(crate) const STUCK: f32 = 0.999;
+/// a multiple of the node's inertia: so much that nothing gives way, since nodes are not moved by what the solve has
+/// them give, which is read as the support's force.
+pub(crate) const HOLD: f64 = 1e5;
 
 /// Strain at which the limiter stops.
 pub(crate) const TOLERANCE: f32 = 5e-4;
@@ -180,12 +176,24 @@ pub(crate) fn mobility<S: Simd, const TOUCHING: bool>(
     let free = x.dot(y);
     if TOUCHING {
         let n = node.support(simd);
-        let stuck = load(simd, &node.sticks) * f32x16::splat(simd, STUCK);
-        let firm = f32x16::splat(simd, FIRMNESS) - stuck;
+        let stuck = load(simd, &node.sticks);
+        let firm = firmness(simd, node, n, i == b.edges.len()) - stuck;
         load(simd, &node.w) * (free - stuck * free - firm * x.dot(n) * y.dot(n))
     } else {
         load(simd, &node.w) * free
     }
+}
+
+/// The share of a node's mobility that its support removes: all of what the solve has found pressed, but for a tip, on
+/// which a straight strand may stand.
+#[inline(always)]
+fn firmness<S: Simd>(simd: S, node: &NodeLanes, normal: V3<f32x16<S>>, is_tip: bool) -> f32x16<S> {
+    if is_tip {
+        return f32x16::splat(simd, FIRMNESS);
+    }
+    let [zero, one] = [0.0, 1.0].map(|share| f32x16::splat(simd, share));
+    let pressed = Real::lt(zero, load3(simd, &node.reaction).dot(normal));
+    Real::select(pressed, one, f32x16::splat(simd, FIRMNESS))
 }
 
 /// The part of a force that moves a supported node; a node that is pulled off is released.
@@ -193,16 +201,23 @@ pub(crate) fn mobility<S: Simd, const TOUCHING: bool>(
 pub(crate) fn along_support<S: Simd>(
     simd: S,
     node: &mut NodeLanes,
+    is_tip: bool,
     force: V3<f32x16<S>>,
 ) -> V3<f32x16<S>> {
-    let (zero, firmness) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, FIRMNESS));
+    let zero = f32x16::splat(simd, 0.0);
     let n = node.support(simd);
     let off = force.dot(n);
-    let lifts = Real::lt(zero, off);
+    // What the solve has found pressed is not released by a slight correction.
+    let pressed = Real::lt(zero, load3(simd, &node.reaction).dot(n));
+    let up = Real::lt(zero, off);
+    let far = Real::lt(f32x16::splat(simd, TOUCHING), off * load(simd, &node.w));
+    let lifts = up & (far | !pressed);
+    // A tip that stands may only be pressed into it, from where it is pushed out again.
+    let firmness = firmness(simd, node, n, is_tip);
+    let firmness = Real::select(up, f32x16::splat(simd, 1.0), firmness);
     let stuck = load(simd, &node.sticks);
     node.set_support(V3::select(lifts, V3::new(zero, zero, zero), n));
     Real::select(lifts, zero, stuck).store_array(&mut node.sticks);
-    let stuck = stuck * f32x16::splat(simd, STUCK);
     let along = force.scale(f32x16::splat(simd, 1.0) - stuck);
     V3::select(lifts, force, n.scale_add(-((firmness - stuck) * off), along))
 }
@@ -233,10 +248,11 @@ fn eliminate<S: Simd, const TOUCHING: bool, const GUARDED: bool>(
         let strain = Real::max(off, -off) / l;
         worst = Real::max(worst, strain);
         if GUARDED {
-            // What its tension stretches it by stays: else the solve would stretch it again in each substep, and
+            // What its tension stretches or presses it by stays: else the solve would do it again in each substep, and
             // what hangs would slip over what it lies on.
             let stretch = load(simd, &b.edges[i].tension) / load(simd, &b.edges[i].axial);
-            off -= Real::min(Real::max(stretch, zero), l * f32x16::splat(simd, TOLERANCE));
+            let most = l * f32x16::splat(simd, TOLERANCE);
+            off -= Real::min(Real::max(stretch, -most), most);
             // Levenberg–Marquardt, only for strain above the tolerance: hair within it is at rest.
             let beyond = Real::max(zero, strain - f32x16::splat(simd, TOLERANCE));
             let pressed = Real::select(Real::lt(off, zero), beyond, zero);
@@ -301,7 +317,7 @@ fn solve<S: Simd, const TOUCHING: bool, const SOME: bool, const GUARDED: bool>(
         }
         (after, ahead) = (lambda, d);
         if TOUCHING {
-            force = along_support(simd, node, force);
+            force = along_support(simd, node, i + 1 == edges, force);
         }
         let moved = force.scale_add(w, p);
         node.set_position(if SOME { V3::select(moves, moved, p) } else { moved });

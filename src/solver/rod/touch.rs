@@ -2,7 +2,6 @@
 
 use super::{
     block::{BlockLanes, EdgeLanes, NodeLanes},
-    limiter::HOLD,
     near::ESCAPE_RATIO,
     obstacle::{NearObstacles, Obstacle, Push, continuous_collision, push_out},
 };
@@ -225,11 +224,11 @@ pub(super) fn contacts_with<S: Simd>(
     simd.vectorize(
         #[inline(always)]
         || {
-            b.touched = [0.0; LANES];
+            (b.touched, b.changed) = ([0.0; LANES], [0.0; LANES]);
             if obstacles.is_empty() {
                 return;
             }
-            let mut touched = f32x16::splat(simd, 0.0);
+            let (mut touched, mut changed) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
             let near = b.near_obstacles.iter().zip(&b.close_obstacles);
             let mut limits = PenetrationLimits::new(simd, b);
             for (i, (n, (near, close))) in b.nodes.iter_mut().zip(near).enumerate() {
@@ -242,17 +241,33 @@ pub(super) fn contacts_with<S: Simd>(
                     true => *near,
                     false => close.at(load3(simd, &n.p), *near),
                 };
+                let before = contact_state(simd, n);
                 if near == NearObstacles::NONE {
                     n.release();
-                    continue;
+                } else {
+                    let fast = b.has_fast_nodes;
+                    let touches =
+                        touch(simd, n, near, fast, clearance, obstacles, grip, lanes, limit);
+                    touched = Real::max(touched, touches);
                 }
-                let fast = b.has_fast_nodes;
-                let touches = touch(simd, n, near, fast, clearance, obstacles, grip, lanes, limit);
-                touched = Real::max(touched, touches);
+                let off = before - contact_state(simd, n);
+                changed = Real::max(changed, off * off);
             }
             touched.store_array(&mut b.touched);
+            let one = f32x16::splat(simd, 1.0);
+            Real::min(changed, one).store_array(&mut b.changed);
         },
     );
+}
+
+/// A number for each way in which a node may touch: not at all, resting without friction, sticking, sliding.
+#[inline(always)]
+fn contact_state<S: Simd>(simd: S, n: &NodeLanes) -> f32x16<S> {
+    let [zero, one, two] = [0.0, 1.0, 2.0].map(|number| f32x16::splat(simd, number));
+    let rested = n.support(simd);
+    let rests = Real::select(Real::lt(zero, rested.dot(rested)), one, zero);
+    let slides = Real::select(Real::lt(zero, load(simd, &n.drag)), two, zero);
+    rests + slides + load(simd, &n.sticks)
 }
 
 /// Pushes one node out of obstacles, with friction, and records the normal that it rests on. Returns 1
@@ -283,6 +298,7 @@ pub(super) fn touch<S: Simd>(
                 (rests_on, touched) = (rested, Real::select(is_rested, one, zero));
             }
             let mut friction = Friction::of(simd, n, grip);
+            let bearing = rested.dot(friction.reaction);
             let mut deepest = f32x16::splat(simd, -1.0);
             for o in near.of(obstacles) {
                 let allowed = limit.as_ref().map_or(zero, |l| l.allowed(o, clearance, from));
@@ -301,6 +317,9 @@ pub(super) fn touch<S: Simd>(
                 }
                 let push = match grip {
                     Grip::Assumed => rest_on(o, p, from, clearance, allowed),
+                    Grip::Judged | Grip::Solved => {
+                        bear_on(o, p, is_rested, bearing, clearance, allowed)
+                    }
                     _ => push_out(o, p, clearance, allowed).map(|push| (push, zero)),
                 };
                 if let Some((push, stays)) = push {
@@ -316,8 +335,12 @@ pub(super) fn touch<S: Simd>(
                 }
             }
             store3(&mut n.p, p);
+            let active = Real::lt(zero, lanes);
+            if grip == Grip::Judged {
+                rests_on = V3::select(active, rests_on, rested);
+            }
             store3(&mut n.rests_on, rests_on);
-            friction.put(n, touched);
+            friction.put(n, touched, active);
             touched
         },
     )
@@ -347,10 +370,41 @@ fn rest_on<S: Simd>(
     }
     let none = V3::new(zero, zero, zero);
     let other = other.unwrap_or(Push { to: p, normal: none, depth: zero });
-    let to = V3::select(stays, normal.scale_add(depth, start), other.to);
+    let to = V3::select(stays, normal.scale_add(Real::max(depth, zero), start), other.to);
     let normal = V3::select(stays, normal, other.normal);
     let one = f32x16::splat(p.x.simd, 1.0);
     Some((Push { to, normal, depth: other.depth }, Real::select(stays, one, zero)))
+}
+
+/// [`push_out`] of nodes that were free in the Newton step before; those that were `rested` on the surface go on to if
+/// it bears them. `bearing`: its force, as a displacement of a free node in the substep, which is their depth here.
+#[inline(always)]
+fn bear_on<S: Simd>(
+    o: &Obstacle,
+    p: V3<f32x16<S>>,
+    rested: mask32x16<S>,
+    bearing: f32x16<S>,
+    clearance: f32,
+    allowed: f32x16<S>,
+) -> Option<(Push<S>, f32x16<S>)> {
+    let zero = f32x16::splat(p.x.simd, 0.0);
+    if o.solid.is_clear(p, clearance + TOUCHING) {
+        return None;
+    }
+    let other = push_out(o, p, clearance, allowed);
+    let (normal, depth) = o.solid.depth(p, clearance);
+    let depth = depth - allowed;
+    let touching = f32x16::splat(p.x.simd, TOUCHING);
+    let is_on = rested & Real::lt(-touching, depth);
+    let stays = is_on & Real::lt(zero, bearing);
+    let leaves = is_on & !Real::lt(zero, bearing) & Real::lt(depth, touching);
+    let none = V3::new(zero, zero, zero);
+    let other = other.unwrap_or(Push { to: p, normal: none, depth: zero });
+    let on = normal.scale_add(Real::max(depth, zero), p);
+    let to = V3::select(stays, on, V3::select(leaves, p, other.to));
+    let normal = V3::select(stays, normal, V3::select(leaves, none, other.normal));
+    let depth = Real::select(stays, bearing, Real::select(leaves, zero, other.depth));
+    Some((Push { to, normal, depth }, zero))
 }
 
 /// Friction on a node in a pass.
@@ -358,17 +412,27 @@ struct Friction<S: Simd> {
     kind: Grip,
     sticks: f32x16<S>,
     drag: f32x16<S>,
+    /// Above 0 if it slid in the first Newton step.
+    slid: f32x16<S>,
     anchor: V3<f32x16<S>>,
+    /// What has held it in the first Newton step, as a displacement of a free node in the substep (m).
+    reaction: V3<f32x16<S>>,
 }
+
+/// Way back in a substep above which a node that slides has come to rest (m).
+pub(crate) const REVERSING: f32 = 1e-7;
 
 impl<S: Simd> Friction<S> {
     #[inline(always)]
     fn of(simd: S, n: &NodeLanes, kind: Grip) -> Self {
+        let (sticks, drag) = (load(simd, &n.sticks), load(simd, &n.drag));
+        let slid = drag * (f32x16::splat(simd, 1.0) - sticks);
         let (sticks, drag) = match kind {
-            Grip::Solved | Grip::Between => (load(simd, &n.sticks), load(simd, &n.drag)),
+            Grip::Solved | Grip::Between => (sticks, drag),
             _ => (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0)),
         };
-        Self { kind, sticks, drag, anchor: load3(simd, &n.anchor) }
+        let (anchor, reaction) = (load3(simd, &n.anchor), load3(simd, &n.reaction));
+        Self { kind, sticks, drag, anchor, reaction, slid }
     }
 
     /// Where a node gets to that is pushed out of `o`. `rested`: before this pass; `bears`: more than others so far;
@@ -391,27 +455,38 @@ impl<S: Simd> Friction<S> {
         let (zero, one) = (lit(0.0), lit(1.0));
         let start = o.moved_with(from);
         if self.kind == Grip::Assumed {
-            self.sticks = Real::select(pushed, Real::max(self.sticks, stays), self.sticks);
+            self.sticks = Real::select(bears, stays, self.sticks);
             self.anchor = V3::select(bears, start, self.anchor);
             return push.to;
         }
         let (slip, length) = push.slip(start);
         let most = lit(o.friction) * push.depth;
         if self.kind == Grip::Judged {
-            let holds = pushed & rested & Real::lt(length, most);
+            // What would have to pull it back: by what it has been held with, or else by what it has slipped.
+            let held = self.reaction - push.normal.scale(self.reaction.dot(push.normal));
+            let slid = Real::lt(zero, self.slid);
+            let pull = V3::select(slid, held, held - slip);
+            let suffices = Real::lt(pull.dot(pull), most * most);
+            let size = Real::sqrt(Real::max(held.dot(held), lit(1e-24)));
+            let reverses = Real::lt(lit(REVERSING) * size, slip.dot(held));
+            let holds = pushed & rested & ((slid & reverses) | (suffices & !slid));
             self.sticks = Real::select(holds, one, self.sticks);
-            let slows = Real::select(pushed & rested, most * lit(HOLD as f32), zero);
-            self.drag += slows;
-            self.anchor = V3::select(bears, start, self.anchor);
+            self.drag += Real::select(pushed & rested, most, zero);
+            let ahead = V3::select(holds, start, push.to + pull);
+            self.anchor = V3::select(bears, ahead, self.anchor);
             return push.to;
         }
         // Static where friction suffices, else sliding.
         let held = Real::min(one, most / Real::max(length, lit(1e-12)));
         let held = match self.kind {
-            // Sliding was slowed in the solve.
+            // Friction has acted in the solve: here what it holds stays, and what slides does not go back.
             Grip::Solved => {
-                Real::max(self.sticks, Real::select(Real::lt(zero, self.drag), zero, held))
+                let along = self.reaction - push.normal.scale(self.reaction.dot(push.normal));
+                let reverses = Real::lt(zero, slip.dot(along));
+                let slides = Real::select(reverses, one, zero);
+                Real::max(self.sticks, Real::select(Real::lt(zero, self.drag), slides, held))
             }
+            Grip::Between => Real::select(Real::lt(zero, self.drag), zero, held),
             _ => held,
         };
         V3::select(pushed, slip.scale_add(-held, push.to), push.to)
@@ -419,10 +494,18 @@ impl<S: Simd> Friction<S> {
 
     /// Leaves in the node what holds it, unless it touches nothing.
     #[inline(always)]
-    fn put(self, n: &mut NodeLanes, touched: f32x16<S>) {
-        let sticks = self.sticks * touched;
+    fn put(self, n: &mut NodeLanes, touched: f32x16<S>, active: mask32x16<S>) {
+        let simd = touched.simd;
+        let (sticks, one) = (self.sticks * touched, f32x16::splat(simd, 1.0));
+        if self.kind == Grip::Judged {
+            let drag = self.drag * touched * (one - sticks);
+            Real::select(active, sticks, load(simd, &n.sticks)).store_array(&mut n.sticks);
+            Real::select(active, drag, load(simd, &n.drag)).store_array(&mut n.drag);
+            let before = load3(simd, &n.anchor);
+            store3(&mut n.anchor, V3::select(active, self.anchor, before));
+            return;
+        }
         sticks.store_array(&mut n.sticks);
-        let one = f32x16::splat(touched.simd, 1.0);
         (self.drag * touched * (one - sticks)).store_array(&mut n.drag);
         store3(&mut n.anchor, self.anchor);
     }

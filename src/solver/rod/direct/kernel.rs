@@ -5,6 +5,7 @@
 //! moment is the exact gradient and whose Gauss–Newton Hessian is that of ½K|δφ_j − δφ_{j−1}|².
 
 use super::{
+    ROUNDING,
     frames::{
         Torsion, choose, moment, parallel_transport, turned_by_e3, turned_since, twist_stiffness,
     },
@@ -86,6 +87,13 @@ fn place<W: Width>(w: W, node: &NodeLanes<W::Cell>, stage: &NewtonStage<W::Real>
     V3::select(is_held(w, node), led, p)
 }
 
+/// `wanted` where `value`, the difference of places as large as `x`, is it but for their rounding.
+#[inline(always)]
+fn kept_within<W: Width>(w: W, value: W::Real, wanted: W::Real, x: V3<W::Real>) -> W::Real {
+    let off = x.dot(x).sqrt() * w.lit(ROUNDING);
+    wanted.min(value + off).max(value - off)
+}
+
 #[inline(always)]
 fn is_held<W: Width>(w: W, node: &NodeLanes<W::Cell>) -> <W::Real as Real>::Mask {
     w.get(&node.w).lt(w.lit(1e-12))
@@ -161,7 +169,19 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             let swing = V3::select(crushed, none, turn);
             let turn = t.scale_add(before.turn.dot(t), swing);
             w.put4(if TWICE { choose(zero.lt(stage.again), q, stays) } else { q }, &mut edge.q);
-            let tension = (axial * (length - l)).max(w.get(&edge.tension)).max(zero);
+            let taut = w.get(&edge.tension);
+            // Positions are rounded, and edges so stiff that this rounding would pull like gravity: it would be taken
+            // for what holds nodes where they rest.
+            let stretch = W::Real::select(crushed, t.dot(e), length) - l;
+            let kept = kept_within(w, stretch, taut / axial, x);
+            let (off, stretched) = (kept - stretch, axial * kept);
+            if TWICE {
+                let again = zero.lt(stage.again);
+                w.put(W::Real::select(again, stretched, taut), &mut edge.tension);
+            } else {
+                w.put(stretched, &mut edge.tension);
+            }
+            let tension = stretched.max(taut).max(zero);
             let across = W::Real::select(crushed, axial, tension * r);
             let k = w.get(&edge.k);
             let torsion = stage.torsion.less(w.get(&edge.twist_loss));
@@ -190,7 +210,7 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
                 swing,
                 across: (stiff * r).mul_add(r, across),
                 axial,
-                pull: couple.cross(t).scale_add(r, t.scale_add(-l, e).scale(axial)),
+                pull: couple.cross(t).scale_add(r, t.scale_add(off - l, e).scale(axial)),
                 coupling: coupling.plus_cross((t + before.t).scale(twist)),
             };
         }
@@ -254,16 +274,17 @@ fn eliminate<W: Width, const TWICE: bool>(
     let held = is_held(w, node);
     let inert = mass * inertia;
     let mut a = diagonal.plus(left.next).plus_diagonal(inert);
-    let b = w.get3(&node.push).scale_add(mass, force + left.b_next);
+    let load = w.get3(&node.push).scale_add(mass, force);
+    let b = load + left.b_next;
     // Nodes start from where they would be without impulses.
     let mut kicked = w.get3(&node.kick).scale_add(inert * stage.ahead, b);
     if TWICE {
         let n = w.get3(&node.rests_on);
         let (sticks, drag) = (w.get(&node.sticks), w.get(&node.drag));
-        let hold = inert * w.lit(HOLD);
-        a = a.plus_outer(n, hold - hold * sticks).plus_diagonal(hold * sticks);
         let p = w.get3(&node.p);
         let inertial = w.get3(&node.v).scale_add(stage.ahead, w.get3(&node.from));
+        let hold = inert * w.lit(HOLD);
+        a = a.plus_outer(n, hold - hold * sticks).plus_diagonal(hold * sticks);
         // Friction: where the node sticks as stiff as the support, where it slides a force.
         let back = w.get3(&node.anchor) - p;
         let back = n.scale_add(-back.dot(n), back);
@@ -309,11 +330,11 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
 ) {
     let none = w.zero3();
     let (mut next, mut after) = (none, none);
-    let mut end = none;
+    let mut ahead = none;
     for i in (0..=edges.len()).rev() {
         let node = &mut nodes[i];
         let mut y = place(w, node, stage);
-        let mut solved = none;
+        let (mut solved, mut moved) = (none, none);
         if i > 0 {
             let row = &rows[i - 1];
             let near =
@@ -328,8 +349,23 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
             if TWICE {
                 // Finished lanes and their tensions must not change.
                 solved = V3::select(w.lit(0.0).lt(stage.again), solved, none);
+                // Supports do not give way: what they are given to, so that there is a solution, tells their force.
+                let (n, sticks) = (w.get3(&node.rests_on), w.get(&node.sticks));
+                let back = w.get3(&node.anchor) - w.get3(&node.p);
+                let back = n.scale_add(-back.dot(n), back);
+                let (free, one) = (n.scale_add(-n.dot(solved), solved), w.lit(1.0));
+                moved = free.scale(one - sticks) + back.scale(sticks);
+                let way = back.dot(back).max(w.lit(1e-24)).sqrt();
+                let slows = back.scale(w.get(&node.drag) / way);
+                let holds = (moved - solved).scale_add(w.lit(HOLD), slows);
+                let again = w.lit(0.0).lt(stage.again);
+                moved = V3::select(again, moved, none);
+                let holds = V3::select(again, holds, w.get3(&node.reaction));
+                w.put3(holds, &mut node.reaction);
+            } else {
+                moved = solved;
             }
-            y = y + solved;
+            y = y + moved;
         }
         let start = w.get3(&node.from);
         let to = (y - start).scale_add(stage.beyond, start);
@@ -340,14 +376,11 @@ pub(crate) fn up<W: Width, const TWICE: bool>(
             let edge = &mut edges[i];
             let q = w.get4(&edge.q);
             let t = q.tangent();
-            let tension = w.get(&edge.axial) * (t.dot(end - y) - w.get(&edge.l));
-            let again = w.lit(0.0).lt(stage.again);
-            let tension =
-                if TWICE { W::Real::select(again, tension, w.get(&edge.tension)) } else { tension };
-            w.put(tension, &mut edge.tension);
+            // Not from places, which are rounded. Where the lane is finished it is 0.
+            let more = w.get(&edge.axial) * t.dot(ahead - moved);
+            w.put(w.get(&edge.tension) + more, &mut edge.tension);
         }
-        end = y;
-        (after, next) = (next, solved);
+        (after, next, ahead) = (next, solved, moved);
     }
 }
 

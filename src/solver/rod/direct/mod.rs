@@ -105,7 +105,7 @@ use super::{
 use crate::base::lanes::{
     LANES, Quaternion, Real, V3, dispatch, load, load3, load4, store3, store4,
 };
-use fearless_simd::{Level, Simd, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*};
 use frames::Torsion;
 use kernel::NewtonStage;
 use width::{Half, Whole, Width};
@@ -141,6 +141,12 @@ pub(crate) const STRAIN: f32 = 1e-4;
 
 /// Strain beyond which Newton steps on the lengths have failed.
 pub(crate) const TORN: f32 = 0.01;
+
+/// How far rounding puts the distance of two places off, as a share of their size.
+pub(crate) const ROUNDING: f64 = 1.5e-7;
+
+/// Newton steps in a substep, at most.
+pub(crate) const MOST_STEPS: u32 = 4;
 
 /// The maximum number of repetitions of restoring the lengths of torn strands and the push-out that
 /// follows.
@@ -195,13 +201,22 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
     let between = Quaternion::new(from.v.scale(one - theta), from.w * (one - theta));
     store4(&mut b.root_between, between.add_scaled(to, share).normalize());
     if b.twice == [0.0; LANES] {
-        newton::<S, false>(simd, b, params, 1);
+        newton::<S, false>(simd, b, params, Turn::Only);
     } else {
-        newton::<S, true>(simd, b, params, 2);
-        // The first step shows which nodes rest on an obstacle.
-        let twice = load(simd, &b.twice);
-        contacts_with(simd, b, params.clearance, obstacles, Grip::Judged, twice);
-        newton::<S, true>(simd, b, params, 1);
+        newton::<S, true>(simd, b, params, Turn::First);
+        b.again = b.twice;
+        // Each step shows which nodes rest on an obstacle, and which of them stick.
+        for step in 1..MOST_STEPS {
+            let again = load(simd, &b.again);
+            contacts_with(simd, b, params.clearance, obstacles, Grip::Judged, again);
+            let again = again * load(simd, &b.changed);
+            let again = if step == 1 { Real::max(again, turns_fast) } else { again };
+            again.store_array(&mut b.again);
+            if b.again == [0.0; LANES] {
+                break;
+            }
+            newton::<S, true>(simd, b, params, Turn::Again);
+        }
     }
     let all = f32x16::splat(simd, 1.0);
     contacts_with(simd, b, params.clearance, obstacles, Grip::Solved, all);
@@ -249,23 +264,31 @@ macro_rules! in_lanes {
     };
 }
 
-/// One Newton step; `left` counts this one and those that follow.
+/// Which of a substep's Newton steps it is.
+#[derive(Clone, Copy, PartialEq)]
+enum Turn {
+    Only,
+    First,
+    Again,
+}
+
+/// One Newton step.
 #[inline(never)]
 fn newton<S: Simd, const TWICE: bool>(
     simd: S,
     b: &mut BlockLanes,
     params: &DirectParams,
-    left: u32,
+    turn: Turn,
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
             in_lanes!(simd, w => {
                 let mut stage = stage(w, b, params);
-                if TWICE && left == 1 {
-                    (stage.again, stage.second) = (stage.twice, true);
+                if turn == Turn::Again {
+                    (stage.again, stage.second) = (w.get(&b.again), true);
                 }
-                if TWICE && left == 2 {
+                if turn == Turn::First {
                     let is_first_of_two = w.lit(0.0).lt(stage.twice);
                     stage.beyond = <_ as Real>::select(is_first_of_two, w.lit(1.0), stage.beyond);
                 }
@@ -338,7 +361,7 @@ fn predict<S: Simd>(
         store3(&mut n.v, v);
     }
     leave_obstacles(simd, b, params, obstacles);
-    advance(simd, b, (dt * theta, dt), params.clearance, obstacles);
+    advance(simd, b, theta, params, obstacles);
     if b.touched != [0.0; LANES] {
         let touched = Real::lt(zero, load(simd, &b.touched));
         theta = Real::select(touched, one, theta);
@@ -347,7 +370,7 @@ fn predict<S: Simd>(
             let back = V3::select(held, load3(simd, &n.p), load3(simd, &n.from));
             store3(&mut n.p, back);
         }
-        advance(simd, b, (dt * theta, dt), params.clearance, obstacles);
+        advance(simd, b, theta, params, obstacles);
     }
     theta
 }
@@ -460,25 +483,57 @@ fn penetration<S: Simd>(
     (Real::select(Real::lt(limit, deepest), one, zero), sum)
 }
 
-/// Moves nodes on by their velocities for `ahead` (s), stopped by obstacles. Not by air and gravity, which elastic
+/// Moves nodes on by their velocities to θ of the substep, stopped by obstacles. Not by air and gravity, which elastic
 /// forces balance in hair at rest: it would be rotated in each step, and pushed against what it only hangs near. What
-/// they add to velocities in `dt` only counts where nodes may pass through an obstacle.
+/// they add to velocities in it only counts where nodes may pass through an obstacle.
 #[inline(never)]
 fn advance<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
-    (ahead, dt): (f32x16<S>, f32x16<S>),
-    clearance: f32,
+    theta: f32x16<S>,
+    params: &DirectParams,
     obstacles: &[Obstacle],
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            predict_nodes(simd, b, ahead, Some(dt), clearance, obstacles);
-            let all = f32x16::splat(simd, 1.0);
-            contacts_with(simd, b, clearance, obstacles, Grip::Assumed, all);
+            let (all, dt) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, params.dt));
+            predict_nodes(simd, b, dt * theta, Some(dt), params.clearance, obstacles);
+            contacts_with(simd, b, params.clearance, obstacles, Grip::Assumed, all);
         },
     );
+}
+
+/// Converts gathered velocities before the forces of the substep, in `kick`, and what air and gravity have added to
+/// them, in `push`, to an acceleration, and the rest of the velocity to an impulse. What exceeds [`MAX_PUSH`] is
+/// neither: it counts as motion, as does all that changes held nodes.
+#[doc(hidden)]
+pub fn split_forces(level: Level, block: &mut BlockLanes, dt: f32) {
+    dispatch!(level, simd => split_forces_simd(simd, block, dt));
+}
+
+#[inline(always)]
+fn split_forces_simd<S: Simd>(simd: S, b: &mut BlockLanes, dt: f32) {
+    let most = f32x16::splat(simd, (MAX_PUSH * dt) * (MAX_PUSH * dt));
+    let [zero, rate] = [0.0, 1.0 / dt].map(|value| f32x16::splat(simd, value));
+    for n in &mut b.nodes {
+        let blown = load3(simd, &n.push);
+        let other = load3(simd, &n.v) - load3(simd, &n.kick) - blown;
+        let is_free = Real::lt(zero, load(simd, &n.w));
+        store3(&mut n.push, unless_beyond(blown, most, is_free).scale(rate));
+        store3(&mut n.kick, unless_beyond(other, most, is_free));
+    }
+}
+
+/// `v` where its square is at most `most` and `may_be` holds, else zero. NaN stays.
+#[inline(always)]
+fn unless_beyond<S: Simd>(
+    v: V3<f32x16<S>>,
+    most: f32x16<S>,
+    may_be: mask32x16<S>,
+) -> V3<f32x16<S>> {
+    let zero = f32x16::splat(most.simd, 0.0);
+    V3::select(may_be & !Real::lt(most, v.dot(v)), v, V3::new(zero, zero, zero))
 }
 
 /// Converts gathered values to masses and stiffnesses: a node's `w` is its mass in dry nodes, a joint's

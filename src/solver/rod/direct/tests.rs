@@ -74,6 +74,33 @@ fn bits(block: &BlockLanes, lane: usize) -> Vec<[u32; 3]> {
 }
 
 #[test]
+fn forces_are_told_from_impulses_and_from_what_is_too_fast() {
+    let mut block = strands(2, |_, i| Vec3::X * (0.01 * i as f32));
+    let most = MAX_PUSH * DT;
+    let before = Vec3::new(0.3, -0.2, 0.1);
+    let cases = [(0.2, 0.1), (0.99, 0.0), (1.01, 0.5), (0.5, 1.01), (0.0, 3.0)];
+    for (lane, (blown, other)) in cases.into_iter().enumerate() {
+        for (i, node) in block.nodes.iter_mut().enumerate() {
+            node.w[lane] = if i == 0 { 0.0 } else { 1.0 };
+            put3(&mut node.kick, lane, before);
+            put3(&mut node.push, lane, Vec3::Y * (blown * most));
+            put3(&mut node.v, lane, before + Vec3::Y * (blown * most) + Vec3::Z * (other * most));
+        }
+    }
+    let velocities: Vec<_> = block.nodes.iter().map(|n| n.v).collect();
+    split_forces(Level::new(), &mut block, DT);
+    for (lane, (blown, other)) in cases.into_iter().enumerate() {
+        for (i, node) in block.nodes.iter().enumerate() {
+            let counts = |share: f32| if i > 0 && share <= 1.0 { share * most } else { 0.0 };
+            let [push, kick] = [take3(&node.push, lane), take3(&node.kick, lane)];
+            assert!(push.distance(Vec3::Y * (counts(blown) / DT)) < 1e-3, "{lane} {i}: {push}");
+            assert!(kick.distance(Vec3::Z * counts(other)) < 1e-5, "{lane} {i}: {kick}");
+        }
+    }
+    assert_eq!(block.nodes.iter().map(|n| n.v).collect::<Vec<_>>(), velocities);
+}
+
+#[test]
 fn small_sag_is_that_of_a_beam() {
     for edges in [8, 32] {
         let mut block = strands(edges, |_, i| Vec3::X * (0.1 * i as f32 / edges as f32));
@@ -188,6 +215,7 @@ impl Strands<Lane> {
             sticks: wide(&n.sticks),
             drag: wide(&n.drag),
             anchor: n.anchor.each_ref().map(wide),
+            reaction: n.reaction.each_ref().map(wide),
         };
         let edge = |e: &EdgeLanes| EdgeLanes {
             q: e.q.each_ref().map(wide),
@@ -250,8 +278,10 @@ impl Strands<f64> {
         let frame = |q: [f64; 4]| (turn * DQuat::from_array(q)).to_array();
         let mut turned = self.clone();
         for n in &mut turned.nodes {
-            let NodeLanes { p, from, v, push, kick, rests_on, anchor, .. } = n;
-            [p, from, v, push, kick, rests_on, anchor].into_iter().for_each(|v3| *v3 = vector(*v3));
+            let NodeLanes { p, from, v, push, kick, rests_on, anchor, reaction, .. } = n;
+            [p, from, v, push, kick, rests_on, anchor, reaction]
+                .into_iter()
+                .for_each(|v3| *v3 = vector(*v3));
         }
         turned.edges.iter_mut().for_each(|e| e.q = frame(e.q));
         let Self { root, root_from, root_between, .. } = &mut turned;
