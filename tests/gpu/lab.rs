@@ -336,7 +336,8 @@ pub fn plain() -> SubstepRecord {
         influence: [0.33, 0.30, 0.20, 0.17],
         bending_length: 0.13,
         damping: 0.01,
-        torsion: 0.46,
+        // As the twin has it; the golden vectors hold other ratios.
+        torsion: 1.0,
         skin: 1e-3,
         limiter_steps: 6,
         cuticle: default(),

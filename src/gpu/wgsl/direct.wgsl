@@ -270,7 +270,7 @@ fn back_of(i: u32, p: vec3<f32>, sticks: f32) -> vec3<f32> {
     if 0.0 < sticks {
         return taken_along(bearer_of(i), start_of(i)) - p;
     }
-    return reaction_of(i);
+    return slowed_along(i);
 }
 
 // From the tip to the root.
@@ -298,6 +298,7 @@ fn newton_up(stage: Stage) {
             solved = vec3(fma(-f1.w, start.z, fma(-f0.w, y1, start.x)), y1, start.z);
         }
         var moved = solved;
+        var reaction = vec3(0.0);
         let support = support_of(i);
         if stage.twice && 0u < i && dot(support.xyz, support.xyz) > 0.0 {
             // Supports do not give way: what they are given to, so that there is a solution, tells their force.
@@ -310,8 +311,9 @@ fn newton_up(stage: Stage) {
             }
             moved = fma(solved - support.xyz * dot(support.xyz, solved), vec3(1.0 - sticks), back * sticks);
             let way = sqrt(max(dot(back, back), 1e-24));
-            set_reaction(i, fma(moved - solved, vec3(HOLD), back * (drag / way)));
+            reaction = fma(moved - solved, vec3(HOLD), back * (drag / way));
         }
+        set_reaction(i, reaction);
         y += moved;
         if !is_held(n.w) {
             let start = start_of(i);

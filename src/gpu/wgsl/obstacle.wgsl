@@ -474,7 +474,6 @@ fn touch(i: u32, along: f32, grip: u32) {
     set_support(i, support.xyz, support.w);
     contact_changed = contact_changed || contact_of(before) != contact_of(support);
     if grip == GRIP_JUDGED && support.w < 0.0 && !held {
-        // What the next step slows it against; the support's share is what it was.
-        set_reaction(i, pull + before.xyz * (bearing - dot(pull, before.xyz)));
+        set_slowed_along(i, pull);
     }
 }

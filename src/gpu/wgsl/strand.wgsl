@@ -241,13 +241,34 @@ fn set_push(i: u32, push: vec3<f32>) {
     scratch[slot(i, 8u, SCRATCH)] = vec4(push, 0.0);
 }
 
-// What holds it there, as a displacement of a free node in the substep (m).
+// What holds it there, as a displacement of a free node in the substep (m). Where the last row of the edge before it
+// was, which a Newton step has used when it writes this, and writes only when it has read it.
 fn reaction_of(i: u32) -> vec3<f32> {
-    return scratch[slot(i, 9u, SCRATCH)].xyz;
+    return select(row(max(i, 1u) - 1u, 5u).xyz, vec3(0.0), i == 0u);
 }
 
 fn set_reaction(i: u32, reaction: vec3<f32>) {
-    scratch[slot(i, 9u, SCRATCH)] = vec4(reaction, 0.0);
+    if 0u < i {
+        set_row(i - 1u, 5u, vec4(reaction, 0.0));
+    }
+}
+
+// Two directions across a normal.
+fn across_of(normal: vec3<f32>) -> mat2x3<f32> {
+    let other = select(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), 0.7 < abs(normal.x));
+    let first = normalize(cross(normal, other));
+    return mat2x3(first, cross(normal, first));
+}
+
+// Which way friction acts on a node that slides, across the normal of what it rests on: as an angle.
+fn slowed_along(i: u32) -> vec3<f32> {
+    let angle = scratch[slot(i, 8u, SCRATCH)].w;
+    return across_of(support_of(i).xyz) * vec2(cos(angle), sin(angle));
+}
+
+fn set_slowed_along(i: u32, way: vec3<f32>) {
+    let flat = way * across_of(support_of(i).xyz);
+    scratch[slot(i, 8u, SCRATCH)].w = atan2(flat.y, flat.x);
 }
 
 // That obstacle.

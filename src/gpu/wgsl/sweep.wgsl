@@ -235,6 +235,9 @@ fn sweep_step() {
     // A root has no velocity, wherever it is led.
     set_start(0u, node(0u).xyz);
     choose_near();
+    for (var i = 0u; i <= edges; i++) {
+        release(i);
+    }
     // Sweeps push all nodes.
     sunk = 0.0;
     predict_nodes(record.dt);

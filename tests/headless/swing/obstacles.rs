@@ -56,7 +56,8 @@ fn lead(
         // Nodes keep a lock's radius away.
         let inside = deepest.max(late_depth) + StrandContact::default().radius;
         assert!(inside < 1e-5, "{name}: {deepest} m inside, late {late_depth}");
-        assert!(late < 5e-4, "{name}: strain {late} late");
+        // What a strand is pressed by stays, up to the limiter's tolerance.
+        assert!(late < 5.1e-4, "{name}: strain {late} late");
         assert!(off < most, "{name} at {substep}: an edge is off by {off} m");
     }
 }

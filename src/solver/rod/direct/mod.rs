@@ -146,7 +146,7 @@ pub(crate) const TORN: f32 = 0.01;
 pub(crate) const ROUNDING: f64 = 1.5e-7;
 
 /// Newton steps in a substep, at most.
-pub(crate) const MOST_STEPS: u32 = 4;
+pub(crate) const MOST_STEPS: u32 = 3;
 
 /// The maximum number of repetitions of restoring the lengths of torn strands and the push-out that
 /// follows.
