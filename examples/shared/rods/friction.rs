@@ -180,7 +180,9 @@ pub fn capstans() -> Vec<Row> {
     (tried.into_iter())
         .map(|(mu, nodes, _, _, released, _)| {
             let test = format!("Capstan, friction {mu}, {nodes} segments on it: share of ln T₂/T₁");
-            Row::new(test, 1.0, released.unwrap_or(f32::INFINITY), 0.03)
+            // Where friction is slight, so are the forces that tell the nodes' states.
+            let tolerance = if mu < 0.2 { 0.05 } else { 0.03 };
+            Row::new(test, 1.0, released.unwrap_or(f32::INFINITY), tolerance)
         })
         .collect()
 }
@@ -198,12 +200,12 @@ pub const SLIPS: [[f32; 2]; 7] = [
 ];
 
 /// K: a strand stands on a plate that comes nearer: it buckles, then its tip slips.
-pub fn slips() -> Vec<Row> {
+pub fn slips(segments: &[usize]) -> Vec<Row> {
     const SECONDS: f32 = 40.0;
     let mut lab = Lab::new();
     lab.gravity(0.0);
     let mut tried = Vec::new();
-    let cases = SLIPS[..5].iter().flat_map(|s| SEGMENTS.map(|n| (s, n)));
+    let cases = SLIPS[..5].iter().flat_map(|s| segments.iter().map(move |n| (s, *n)));
     for (i, (&[rise, mu], segments)) in cases.enumerate() {
         let at = |k: usize| {
             let share = k as f32 / segments as f32;

@@ -152,7 +152,7 @@ pub fn rows() -> Vec<Row> {
         rings(),
         wrung(),
         helices(),
-        slips(),
+        slips(&SEGMENTS),
         slopes(),
         capstans(),
     ]

@@ -227,10 +227,10 @@ fn hair_across_a_ball_stays_where_it_lies() {
             without.len()
         );
         assert!(
-            lie >= 12 && without.is_empty(),
+            lie == 16 && without.is_empty(),
             "{hertz} Hz: {lie} lie, {without:?} without friction"
         );
-        // What has not relaxed yet slips once and lies.
-        assert!(moved[lie / 2] < 1e-4 && moved[lie - 1] < 2e-3, "{hertz} Hz: crept {moved:?} m");
+        // To the rounding of places.
+        assert!(moved[lie - 1] < 1e-5, "{hertz} Hz: crept {moved:?} m");
     }
 }
