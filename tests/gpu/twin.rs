@@ -198,10 +198,11 @@ impl Twin {
         self.newton(r, stage, if twice { 1.0 } else { 1.0 / theta }, false);
         for step in 1..if twice { MOST_STEPS } else { 1 } {
             let changed = self.contacts(r, Grip::Judged);
-            if !changed && !(fast && step == 1) {
+            if changed || (fast && step == 1) {
+                self.newton(r, stage, 1.0 / theta, true);
+            } else {
                 break;
             }
-            self.newton(r, stage, 1.0 / theta, true);
         }
         self.contacts(r, Grip::Solved);
         for pass in 0..r.limiter_steps {
