@@ -5,7 +5,6 @@
 //! moment is the exact gradient and whose Gauss–Newton Hessian is that of ½K|δφ_j − δφ_{j−1}|².
 
 use super::{
-    ROUNDING,
     frames::{
         Torsion, choose, moment, parallel_transport, turned_by_e3, turned_since, twist_stiffness,
     },
@@ -90,7 +89,7 @@ fn place<W: Width>(w: W, node: &NodeLanes<W::Cell>, stage: &NewtonStage<W::Real>
 /// `wanted` where `value`, the difference of places as large as `x`, is it but for their rounding.
 #[inline(always)]
 fn kept_within<W: Width>(w: W, value: W::Real, wanted: W::Real, x: V3<W::Real>) -> W::Real {
-    let off = x.dot(x).sqrt() * w.lit(ROUNDING);
+    let off = x.dot(x).sqrt() * w.lit(W::ROUNDING);
     wanted.min(value + off).max(value - off)
 }
 

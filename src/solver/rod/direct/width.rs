@@ -1,5 +1,6 @@
 //! The register and memory types of a kernel, so that one kernel serves lanes and a scalar version.
 
+use super::ROUNDING;
 use crate::base::lanes::{Lane, Quaternion, Real, V3};
 #[cfg(test)]
 use core::marker::PhantomData;
@@ -11,6 +12,8 @@ pub trait Width: Copy {
     type Real: Real;
     /// The memory type.
     type Cell: Copy;
+    /// How far rounding puts the distance of two places off, as a share of their size.
+    const ROUNDING: f64;
     /// `value` in every lane.
     fn lit(self, value: f64) -> Self::Real;
     /// Reads a cell.
@@ -61,6 +64,7 @@ pub(crate) struct Whole<S>(pub(crate) S);
 impl<S: Simd> Width for Whole<S> {
     type Real = f32x16<S>;
     type Cell = Lane;
+    const ROUNDING: f64 = ROUNDING;
     #[inline(always)]
     fn lit(self, value: f64) -> f32x16<S> {
         f32x16::splat(self.0, value as f32)
@@ -87,6 +91,7 @@ pub(crate) struct Half<S> {
 impl<S: Simd> Width for Half<S> {
     type Real = f32x8<S>;
     type Cell = Lane;
+    const ROUNDING: f64 = ROUNDING;
     #[inline(always)]
     fn lit(self, value: f64) -> f32x8<S> {
         f32x8::splat(self.simd, value as f32)
@@ -112,6 +117,7 @@ macro_rules! single {
         impl Width for Single<$t> {
             type Real = $t;
             type Cell = $t;
+            const ROUNDING: f64 = 0.0;
             #[inline(always)]
             fn lit(self, value: f64) -> $t {
                 value as $t
