@@ -366,7 +366,7 @@ fn no_file_is_too_long_to_be_understood() {
 /// another parent, 41,298 before locks that touch came to rest, 41,500 before grooms came from Alembic and scans,
 /// 43,069 before hair resisted twist as a fibre does, 43,229 before roots followed bones by name.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 43_900;
+const MOST_LINES: usize = 44_200;
 
 #[test]
 fn the_crate_stays_small() {
