@@ -13,7 +13,7 @@ use crate::{
     simulation::lod::follow::{GUIDES, OWN_LASTS},
     solver::rod::{
         constraint::EPSILON,
-        direct::*,
+        direct::{width::ROUNDING, *},
         limiter::{FIRMNESS, FOLDING, HOLD, TOLERANCE},
         near::{ESCAPE_RATIO, FASTER},
         step::PASSES_IN_TOUCH,

@@ -100,7 +100,7 @@ mod matrix;
 pub(super) mod row;
 #[cfg(test)]
 mod tests;
-mod width;
+pub(crate) mod width;
 
 use super::{
     block::{BlockLanes, NodeLanes},
@@ -149,9 +149,6 @@ pub(crate) const STRAIN: f32 = 1e-4;
 
 /// Strain beyond which Newton steps on the lengths have failed.
 pub(crate) const TORN: f32 = 0.01;
-
-/// How far rounding puts the distance of two places off, as a share of their size.
-pub(crate) const ROUNDING: f64 = 1.5e-7;
 
 /// Newton steps in a substep, at most.
 pub(crate) const MOST_STEPS: u32 = 4;

@@ -1,10 +1,12 @@
 //! The register and memory types of a kernel, so that one kernel serves lanes and a scalar version.
 
-use super::ROUNDING;
 use crate::base::lanes::{Lane, Quaternion, Real, V3};
 #[cfg(test)]
 use core::marker::PhantomData;
 use fearless_simd::{Simd, f32x8, f32x16, prelude::*};
+
+/// How far rounding puts the distance of two places off, as a share of their size.
+pub(crate) const ROUNDING: f64 = 1.5e-7;
 
 /// A register type and the cell of memory it is loaded from.
 pub trait Width: Copy {
