@@ -76,8 +76,8 @@
 //! None spills. About 7,000 of `substep` are ellipsoids, wherever a node may touch a collider. Per segment and
 //! substep, of hair that touches nothing, each loop counted whole: load 158, air 151, rest shape 173, masses 53,
 //! prediction 126, search for whips 37, Newton step down 677 and up 135, limiter 181, frames and twist 265, check
-//! 49: about 2,000. A second Newton step, of fast strands and of those in which a contact has changed, adds 830, a third as much. In these loops 1,030 bytes
-//! of a node are read and 480 written; its state is 160 of the one and 80 of the other, the rest is scratch and
+//! 49: about 2,000. Each further Newton step, of fast strands and while contacts change, adds 830. In these loops
+//! 1,030 bytes of a node are read and 480 written; its state is 160 of the one and 80 of the other, the rest is scratch and
 //! places read again, which a cache may hold.
 //!
 //! By the paper's projections, 5 iterations and 2 steps of the limiter: load 214, air 151, rest shape 249, masses

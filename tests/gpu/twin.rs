@@ -494,10 +494,9 @@ impl Twin {
                         true => slip.dot(holding) > REVERSING * size,
                         false => pull.length() < most,
                     };
-                    sticks |= rested && holds;
-                    drag += if rested { most } else { 0.0 };
-                    if bears && !holds {
-                        self.anchor[i] = out + pull;
+                    if bears {
+                        (sticks, drag) = (rested && holds, if rested { most } else { drag });
+                        self.anchor[i] = if holds { start } else { out + pull };
                     }
                     0.0
                 }

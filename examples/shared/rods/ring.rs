@@ -74,15 +74,27 @@ fn clamped(lab: &mut Lab, torsion: f32, segments: usize, twist: f32) -> Entity {
     let points: Vec<Vec3> = (0..=segments + 1).map(|i| Vec3::X * (edge * i as f32)).collect();
     let strand = Strand::from_polyline(&points).unwrap_or_default();
     let frame = strand.root_frame();
-    let mut held = HeldNodes::default();
-    held.targets.resize(segments + 2, None);
-    held.targets[segments..].copy_from_slice(&[Some(points[segments]), Some(points[segments + 1])]);
-    held.frames.resize(segments + 2, None);
-    held.frames[segments + 1] = Some(frame);
-    let stiffness = HairStiffness { bending_length: LENGTH, torsion, ..default() };
-    let hair = lab.app.world_mut().spawn((Hair, stiffness)).id();
+    let ends = [points[segments], points[segments + 1]];
     let crank = Crank { most: twist, share: 0.0, frame };
-    lab.app.world_mut().spawn((StrandOf(hair), strand, held, crank, FreeToApproach)).id()
+    let rod = lab.cranked(torsion, strand, ends, crank);
+    lab.app.world_mut().entity_mut(rod).insert(FreeToApproach);
+    rod
+}
+
+impl Lab {
+    /// A rod whose last two nodes are held at `ends`, and turned.
+    fn cranked(&mut self, torsion: f32, strand: Strand, ends: [Vec3; 2], crank: Crank) -> Entity {
+        let nodes = strand.nodes();
+        let mut held = HeldNodes::default();
+        held.targets.resize(nodes - 2, None);
+        held.targets.extend(ends.map(Some));
+        held.frames.resize(nodes - 1, None);
+        held.frames.push(Some(crank.frame));
+        let stiffness = HairStiffness { bending_length: LENGTH, torsion, ..default() };
+        let world = self.app.world_mut();
+        let hair = world.spawn((Hair, stiffness)).id();
+        world.spawn((StrandOf(hair), strand, held, crank)).id()
+    }
 }
 
 /// G: a straight-born rod bent to a circle leaves its plane when it is twisted by 2π √3 E I/(G J).
@@ -133,14 +145,9 @@ fn ring(lab: &mut Lab, torsion: f32, segments: usize, twist: f32) -> Entity {
     for (i, place) in strand.positions_mut().iter_mut().enumerate() {
         place.z += IMPERFECTION * LENGTH * (angle * i as f32).sin().powi(2);
     }
-    let mut held = HeldNodes::default();
-    held.targets.resize(segments + 2, None);
-    held.targets[segments] = Some(Vec3::X * (-0.5 * edge));
-    held.targets[segments + 1] = Some(Vec3::X * (0.5 * edge));
-    held.frames.resize(segments + 2, None);
-    held.frames[segments + 1] = Some(frame);
-    let stiffness = HairStiffness { bending_length: LENGTH, torsion, ..default() };
-    let hair = lab.app.world_mut().spawn((Hair, stiffness)).id();
+    let ends = [-0.5, 0.5].map(|share| Vec3::X * (share * edge));
     let crank = Crank { most: twist, share: 0.0, frame };
-    lab.app.world_mut().spawn((StrandOf(hair), strand, bonds, held, crank)).id()
+    let rod = lab.cranked(torsion, strand, ends, crank);
+    lab.app.world_mut().entity_mut(rod).insert(bonds);
+    rod
 }

@@ -452,9 +452,10 @@ fn touch(i: u32, along: f32, grip: u32) {
             let size = sqrt(max(dot(held_by, held_by), 1e-24));
             let reverses = REVERSING * size < dot(tangential, held_by);
             let holds = select(dot(wanted, wanted) < most * most, reverses, slid);
-            sticks = sticks || (rested && holds);
-            drag += select(0.0, most, rested);
+            // The solid that bears more decides.
             if bears {
+                sticks = rested && holds;
+                drag = select(drag, most, rested);
                 pull = wanted;
             }
         } else if grip == GRIP_SOLVED && sticks {

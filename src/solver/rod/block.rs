@@ -38,7 +38,8 @@ pub struct NodeLanes<C = Lane> {
     pub kick: [C; 3],
     /// Normal of the obstacle that the node rests on, or zero; written by the contact passes.
     pub rests_on: [C; 3],
-    /// The node's start, moved with the surface of that obstacle (m). Direct method only.
+    /// Where friction pulls it to (m): its start, moved with the surface of that obstacle, or where it slides any place
+    /// on the way back. Direct method only.
     pub anchor: [C; 3],
     /// What holds it there, as a displacement of a free node in the substep (m): the support's force and friction.
     /// Written by the Newton steps of the direct method.

@@ -228,7 +228,8 @@ pub(super) fn contacts_with<S: Simd>(
             if obstacles.is_empty() {
                 return;
             }
-            let (mut touched, mut changed) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
+            let zero = f32x16::splat(simd, 0.0);
+            let (mut touched, mut changed) = (zero, zero);
             let near = b.near_obstacles.iter().zip(&b.close_obstacles);
             let mut limits = PenetrationLimits::new(simd, b);
             for (i, (n, (near, close))) in b.nodes.iter_mut().zip(near).enumerate() {
@@ -241,7 +242,8 @@ pub(super) fn contacts_with<S: Simd>(
                     true => *near,
                     false => close.at(load3(simd, &n.p), *near),
                 };
-                let before = contact_state(simd, n);
+                let judged = grip == Grip::Judged;
+                let before = if judged { contact_state(simd, n) } else { zero };
                 if near == NearObstacles::NONE {
                     n.release();
                 } else {
@@ -250,8 +252,10 @@ pub(super) fn contacts_with<S: Simd>(
                         touch(simd, n, near, fast, clearance, obstacles, grip, lanes, limit);
                     touched = Real::max(touched, touches);
                 }
-                let off = before - contact_state(simd, n);
-                changed = Real::max(changed, off * off);
+                if judged {
+                    let off = before - contact_state(simd, n);
+                    changed = Real::max(changed, off * off);
+                }
             }
             touched.store_array(&mut b.touched);
             let one = f32x16::splat(simd, 1.0);
@@ -412,10 +416,10 @@ struct Friction<S: Simd> {
     kind: Grip,
     sticks: f32x16<S>,
     drag: f32x16<S>,
-    /// Above 0 if it slid in the first Newton step.
+    /// Above 0 if it slid in the Newton step before.
     slid: f32x16<S>,
     anchor: V3<f32x16<S>>,
-    /// What has held it in the first Newton step, as a displacement of a free node in the substep (m).
+    /// What has held it in that step, as a displacement of a free node in the substep (m).
     reaction: V3<f32x16<S>>,
 }
 
@@ -425,10 +429,10 @@ pub(crate) const REVERSING: f32 = 1e-7;
 impl<S: Simd> Friction<S> {
     #[inline(always)]
     fn of(simd: S, n: &NodeLanes, kind: Grip) -> Self {
-        let (sticks, drag) = (load(simd, &n.sticks), load(simd, &n.drag));
-        let slid = drag * (f32x16::splat(simd, 1.0) - sticks);
+        // What sticks has no drag.
+        let slid = load(simd, &n.drag);
         let (sticks, drag) = match kind {
-            Grip::Solved | Grip::Between => (sticks, drag),
+            Grip::Solved | Grip::Between => (load(simd, &n.sticks), slid),
             _ => (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0)),
         };
         let (anchor, reaction) = (load3(simd, &n.anchor), load3(simd, &n.reaction));
@@ -470,8 +474,9 @@ impl<S: Simd> Friction<S> {
             let size = Real::sqrt(Real::max(held.dot(held), lit(1e-24)));
             let reverses = Real::lt(lit(REVERSING) * size, slip.dot(held));
             let holds = pushed & rested & ((slid & reverses) | (suffices & !slid));
-            self.sticks = Real::select(holds, one, self.sticks);
-            self.drag += Real::select(pushed & rested, most, zero);
+            // The solid that bears more decides.
+            self.sticks = Real::select(bears, Real::select(holds, one, zero), self.sticks);
+            self.drag = Real::select(bears & rested, most, self.drag);
             let ahead = V3::select(holds, start, push.to + pull);
             self.anchor = V3::select(bears, ahead, self.anchor);
             return push.to;
@@ -496,17 +501,15 @@ impl<S: Simd> Friction<S> {
     #[inline(always)]
     fn put(self, n: &mut NodeLanes, touched: f32x16<S>, active: mask32x16<S>) {
         let simd = touched.simd;
-        let (sticks, one) = (self.sticks * touched, f32x16::splat(simd, 1.0));
+        let (mut sticks, mut anchor) = (self.sticks * touched, self.anchor);
+        let mut drag = self.drag * touched * (f32x16::splat(simd, 1.0) - sticks);
         if self.kind == Grip::Judged {
-            let drag = self.drag * touched * (one - sticks);
-            Real::select(active, sticks, load(simd, &n.sticks)).store_array(&mut n.sticks);
-            Real::select(active, drag, load(simd, &n.drag)).store_array(&mut n.drag);
-            let before = load3(simd, &n.anchor);
-            store3(&mut n.anchor, V3::select(active, self.anchor, before));
-            return;
+            sticks = Real::select(active, sticks, load(simd, &n.sticks));
+            drag = Real::select(active, drag, load(simd, &n.drag));
+            anchor = V3::select(active, anchor, load3(simd, &n.anchor));
         }
         sticks.store_array(&mut n.sticks);
-        (self.drag * touched * (one - sticks)).store_array(&mut n.drag);
-        store3(&mut n.anchor, self.anchor);
+        drag.store_array(&mut n.drag);
+        store3(&mut n.anchor, anchor);
     }
 }

@@ -273,17 +273,16 @@ fn eliminate<W: Width, const TWICE: bool>(
     let held = is_held(w, node);
     let inert = mass * inertia;
     let mut a = diagonal.plus(left.next).plus_diagonal(inert);
-    let load = w.get3(&node.push).scale_add(mass, force);
-    let b = load + left.b_next;
+    let b = w.get3(&node.push).scale_add(mass, force + left.b_next);
     // Nodes start from where they would be without impulses.
     let mut kicked = w.get3(&node.kick).scale_add(inert * stage.ahead, b);
     if TWICE {
         let n = w.get3(&node.rests_on);
         let (sticks, drag) = (w.get(&node.sticks), w.get(&node.drag));
-        let p = w.get3(&node.p);
-        let inertial = w.get3(&node.v).scale_add(stage.ahead, w.get3(&node.from));
         let hold = inert * w.lit(HOLD);
         a = a.plus_outer(n, hold - hold * sticks).plus_diagonal(hold * sticks);
+        let p = w.get3(&node.p);
+        let inertial = w.get3(&node.v).scale_add(stage.ahead, w.get3(&node.from));
         // Friction: where the node sticks as stiff as the support, where it slides a force.
         let back = w.get3(&node.anchor) - p;
         let back = n.scale_add(-back.dot(n), back);
