@@ -59,12 +59,12 @@ fn cantilevers() -> [Curve; 2] {
     for i in 0..=80 {
         let gamma = 10.0_f64.powf(-1.0 + 4.0 * f64::from(i) / 80.0);
         // How far the tip's angle is from plumb, as a power of ten: heavy rods are nearly there.
-        let down = |x: f64| 10.0_f64.powf(x) - std::f64::consts::FRAC_PI_2;
+        let down = |x: f64| std::f64::consts::FRAC_PI_2 - 10.0_f64.powf(x);
         let x = zero(-16.0, std::f64::consts::FRAC_PI_2.log10(), |x| {
             from_tip(gamma, down(x), f64::cos).0
         });
         let (_, along, across) = from_tip(gamma, down(x), f64::cos);
-        sags.push((gamma, -across));
+        sags.push((gamma, across));
         reaches.push((gamma, along));
     }
     [sags, reaches]

@@ -56,3 +56,9 @@ fn a_slope_holds_what_it_should() {
 fn a_cylinder_holds_what_it_should() {
     check(measured::capstans());
 }
+
+#[test]
+#[ignore = "takes minutes"]
+fn a_twisted_ring_leaves_its_plane() {
+    check(measured::rings());
+}

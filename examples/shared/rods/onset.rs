@@ -26,7 +26,7 @@ pub(super) fn onset_in(shares: &[f32], aside: &[f32], rises: bool) -> f32 {
 }
 
 /// The largest distance of a rod's nodes from the plane across `normal` through its root, in lengths.
-pub(super) fn out_of_plane(places: &[Vec3], normal: Vec3) -> f32 {
+fn out_of_plane(places: &[Vec3], normal: Vec3) -> f32 {
     places.iter().map(|p| normal.dot(*p - places[0]).abs() / LENGTH).fold(0.0, f32::max)
 }
 

@@ -410,7 +410,8 @@ fn hair_on_the_floor_lies_still_and_holds_its_length() {
     }
 }
 
-/// AVX2 and AVX-512 agree bit for bit; SSE2 rounds a product before it is added, which they do not.
+/// AVX2 and AVX-512 agree bit for bit; SSE2 rounds a product before it is added, which they do not. A node that lands
+/// then may do so a substep earlier or later, so velocities are compared to a tenth of what nodes land at.
 #[test]
 fn instruction_sets_agree() {
     let wall = Solid::HalfSpace { normal: Vec3::X, point: Vec3::X * -0.01 };
@@ -429,15 +430,18 @@ fn instruction_sets_agree() {
     });
     let runs: Vec<_> = runs.collect();
     let (best, first) = &runs[0];
-    let numbers = |block: &BlockLanes| -> Vec<f32> {
-        let nodes = block.nodes.iter().flat_map(|n| n.p.into_iter().chain(n.v));
-        nodes.chain(block.edges.iter().flat_map(|e| e.q)).flatten().collect()
+    let numbers = |block: &BlockLanes| -> [Vec<f32>; 3] {
+        let p = block.nodes.iter().flat_map(|n| n.p).flatten().collect();
+        let v = block.nodes.iter().flat_map(|n| n.v).flatten().collect();
+        [p, v, block.edges.iter().flat_map(|e| e.q).flatten().collect()]
     };
     let first = numbers(first);
     for (name, block) in &runs[1..] {
-        let apart = first.iter().zip(numbers(block)).map(|(a, b)| (a - b).abs());
-        let most = apart.fold(0.0, f32::max);
-        println!("{name} is up to {most:e} from {best}");
-        assert!(if *name == "sse2" { most < 1e-2 } else { most == 0.0 }, "{name}: {most}");
+        let most: Vec<f32> = (first.iter().zip(numbers(block)))
+            .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max))
+            .collect();
+        println!("{name} is up to {most:?} (m, m/s, frame) from {best}");
+        let allowed = if *name == "sse2" { [1e-3, 1e-1, 1e-2] } else { [0.0; 3] };
+        assert!(most.iter().zip(allowed).all(|(most, allowed)| *most <= allowed), "{name}");
     }
 }
