@@ -61,6 +61,14 @@ impl Default for Rod {
     }
 }
 
+/// Moves a tip, and the rest of its strand by the square of its share of the way.
+fn move_aside(strand: &mut Strand, tip: Vec3) {
+    let segments = strand.edges() as f32;
+    for (i, place) in strand.positions_mut().iter_mut().enumerate() {
+        *place += tip * (i as f32 / segments).powi(2);
+    }
+}
+
 impl Lab {
     fn new() -> Self {
         let mut app = App::new();
@@ -91,10 +99,7 @@ impl Lab {
         let half = Quat::from_scaled_axis(whole * 0.5 / segments as f32);
         strand.pose((0..segments).map(|i| if i == 0 { half } else { joint }.xyz()));
         let bonds = Bonds::of(&strand);
-        for (i, place) in strand.positions_mut().iter_mut().enumerate() {
-            let share = i as f32 / segments as f32;
-            *place += rod.aside * share * share;
-        }
+        move_aside(&mut strand, rod.aside);
         let bending_length = LENGTH / gamma.cbrt();
         let stiffness = HairStiffness { bending_length, torsion, ..default() };
         let hair = self.app.world_mut().spawn((Hair, stiffness)).id();

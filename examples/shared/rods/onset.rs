@@ -83,7 +83,7 @@ pub fn curls() -> Vec<Row> {
         (0.46, 8.0, 13.4, true),
         (0.46, 10.0, 20.2, true),
         (0.46, 6.0, 81.2, false),
-        (0.46, 8.0, 51.1, false),
+        (0.46, 8.0, 207.5, false),
         (1.0, 8.0, 64.6, false),
     ];
     const LEVEL: [(f32, f32, f32, bool); 8] = [
@@ -102,13 +102,20 @@ pub fn curls() -> Vec<Row> {
         let mut tried = Vec::new();
         for (case, segments) in onsets.iter().flat_map(|c| SEGMENTS.map(|n| (c, n))) {
             let (torsion, angle, at, _) = *case;
-            let (curl, aside) = (Vec3::Z * angle, Vec3::Z * (IMPERFECTION * LENGTH));
+            let curl = Vec3::Z * angle;
             let rods = shares().map(|share| {
                 let gamma = share * at;
-                lab.rod(Rod { gamma, torsion, segments, way, curl, aside, ..default() })
+                lab.rod(Rod { gamma, torsion, segments, way, curl, ..default() })
             });
             let rods = rods.collect::<Vec<_>>();
             tried.push((case, segments, rods));
+        }
+        // First in its plane, then moved aside: there are helices beside a flat curl that is stable.
+        lab.settle(8.0, 10.0);
+        for rod in tried.iter().flat_map(|(.., rods)| rods) {
+            if let Some(mut strand) = lab.app.world_mut().get_mut::<Strand>(*rod) {
+                move_aside(&mut strand, Vec3::Z * (IMPERFECTION * LENGTH));
+            }
         }
         lab.settle(2.0, 60.0);
         for (&(torsion, angle, at, rises), segments, rods) in tried {

@@ -70,20 +70,23 @@ pub fn wrung() -> Vec<Row> {
         .collect()
 }
 
-/// A straight rod, its last edge held.
-fn clamped(lab: &mut Lab, torsion: f32, segments: usize, twist: f32) -> Entity {
-    // From the clamp to the middle of the held edge.
-    let edge = LENGTH / (segments as f32 + 0.5);
+/// A straight strand along x whose rod, between the middles of its outer edges, has this many segments.
+fn straight(segments: usize) -> Strand {
+    let edge = LENGTH / segments as f32;
     let points: Vec<Vec3> = (0..=segments + 1).map(|i| Vec3::X * (edge * i as f32)).collect();
-    let strand = Strand::from_polyline(&points).unwrap_or_default();
-    let frame = strand.root_frame();
-    let ends = [points[segments], points[segments + 1]];
-    let crank = Crank { most: twist, share: 0.0, frame };
+    Strand::from_polyline(&points).unwrap_or_default()
+}
+
+/// A straight rod.
+fn clamped(lab: &mut Lab, torsion: f32, segments: usize, twist: f32) -> Entity {
+    let strand = straight(segments);
+    let ends = [segments, segments + 1].map(|i| strand.positions()[i]);
+    let crank = Crank { most: twist, share: 0.0, frame: strand.root_frame() };
     lab.cranked(torsion, strand, ends, (crank, FreeToApproach))
 }
 
 impl Lab {
-    /// A rod whose last two nodes are held at `ends`, and turned.
+    /// A rod whose outer edges are held: the first along x, the last at `ends`, where it can be turned.
     fn cranked(
         &mut self,
         torsion: f32,
@@ -95,7 +98,9 @@ impl Lab {
         let mut held = HeldNodes::default();
         held.targets.resize(nodes - 2, None);
         held.targets.extend(ends.map(Some));
+        held.targets[1] = strand.rest_lengths().first().map(|edge| Vec3::X * *edge);
         held.frames.resize(nodes - 1, None);
+        held.frames[1] = Some(strand.root_frame());
         held.frames.push(Some(strand.root_frame()));
         let stiffness = HairStiffness { bending_length: LENGTH, torsion, ..default() };
         let world = self.app.world_mut();
@@ -150,20 +155,16 @@ fn wide_shares() -> impl Iterator<Item = f32> {
 
 /// A closed ring in the xy plane, both ends clamped in one frame.
 fn ring(lab: &mut Lab, torsion: f32, segments: usize, twist: f32) -> Entity {
-    // The last edge is held: its middle is where the ring closes.
-    let edge = LENGTH / (segments as f32 + 0.5);
-    let angle = std::f32::consts::TAU / (segments as f32 + 0.5);
-    let points: Vec<Vec3> = (0..=segments + 1).map(|i| Vec3::X * (edge * i as f32)).collect();
-    let mut strand = Strand::from_polyline(&points).unwrap_or_default();
+    let mut strand = straight(segments);
+    let ends = [0, 1].map(|i| strand.positions()[i]);
     let bonds = Bonds::of(&strand);
     let frame = strand.root_frame();
-    let axis = frame.inverse() * Vec3::Z;
-    let bend = |angle: f32| Quat::from_axis_angle(axis, angle).xyz();
-    strand.pose((0..=segments).map(|i| bend(if i == 0 { 0.5 * angle } else { angle })));
+    let angle = std::f32::consts::TAU / segments as f32;
+    let bend = Quat::from_axis_angle(frame.inverse() * Vec3::Z, angle).xyz();
+    strand.pose((0..=segments).map(|i| if i == 0 { Vec3::ZERO } else { bend }));
     for (i, place) in strand.positions_mut().iter_mut().enumerate() {
-        place.z += IMPERFECTION * LENGTH * (angle * i as f32).sin().powi(2);
+        place.z += IMPERFECTION * LENGTH * (angle * (i as f32 - 0.5)).sin().powi(2);
     }
-    let ends = [-0.5, 0.5].map(|share| Vec3::X * (share * edge));
     let crank = Crank { most: twist, share: 0.0, frame };
     lab.cranked(torsion, strand, ends, (crank, bonds))
 }
