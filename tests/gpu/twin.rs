@@ -99,6 +99,7 @@ pub struct Twin {
     l: Vec<f64>,
     k: Vec<f64>,
     axial: Vec<f64>,
+    taken: Vec<f64>,
     /// Largest twist that counts in the Hessian, as a moment over EI.
     max_twist: f64,
     rest: Vec<DQuat>,
@@ -139,6 +140,7 @@ impl Twin {
             l: s.lengths.iter().map(|l| f64::from(*l)).collect(),
             k: vec![0.0; edges],
             axial: vec![0.0; edges],
+            taken: vec![0.0; edges],
             max_twist: 0.0,
             rest: vec![DQuat::IDENTITY; edges],
             mass: vec![0.0; edges + 1],
@@ -196,7 +198,7 @@ impl Twin {
         let damping = (f64::from(r.damping) - (2.0 * theta - 1.0) * dt).max(0.0);
         let stage = (theta, between, root_turn, damping, twice);
         self.newton(r, stage, if twice { 1.0 } else { 1.0 / theta }, false);
-        for step in 1..if twice { MOST_STEPS } else { 1 } {
+        for step in 1..if twice && !self.trapped { MOST_STEPS } else { 1 } {
             let changed = self.contacts(r, Grip::Judged);
             if changed || (fast && step == 1) {
                 self.newton(r, stage, 1.0 / theta, true);
@@ -298,7 +300,8 @@ impl Twin {
             let after = self.l.get(i).copied().unwrap_or(0.0);
             if i < self.edges() {
                 self.k[i] = (self.k[i] * bending / (before + after)).min(firmest * after * after);
-                self.axial[i] = (GRAVITY * count / 1e-4 / after).min(firmest);
+                let least = 15.0 * bending / after.powi(2);
+                self.axial[i] = ((GRAVITY * count / 1e-4).max(least) / after).min(firmest);
             }
             self.mass[i] = (before + after) * density * 0.5;
             before = after;
@@ -559,7 +562,13 @@ impl Twin {
             let stretch = if crushed { t.dot(e) } else { length } - l;
             let rounding = ROUNDING * at[j + 1].length();
             let taut = self.tension[j];
-            let kept = (taut / axial).clamp(stretch - rounding, stretch + rounding);
+            if !second {
+                let wanted = taut / axial;
+                let up_to = |strain: f64| wanted.clamp(-strain * l, strain * l);
+                self.taken[j] = up_to(0.02) - up_to(5e-4);
+            }
+            let strained = stretch + self.taken[j];
+            let kept = (taut / axial).clamp(strained - rounding, strained + rounding);
             self.tension[j] = axial * kept;
             let tension = (axial * kept).max(taut).max(0.0);
             let k = self.k[j];

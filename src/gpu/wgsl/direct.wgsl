@@ -37,7 +37,8 @@ fn joint_of(before: f32, after: f32, share: f32) -> f32 {
 }
 
 fn axial_of(length: f32) -> f32 {
-    return min(axial_stiffness / length, firmest);
+    let least = bending * (0.5 * STRETCH_RATIO) / (length * length);
+    return min(max(axial_stiffness, least) / length, firmest);
 }
 
 // Inverse masses beside the places.
@@ -148,7 +149,13 @@ fn newton_down(stage: Stage) {
             let taut = moving(j).w;
             let stretch = select(length, dot(t, e), crushed) - l;
             let rounding = sqrt(dot(x, x)) * ROUNDING;
-            let kept_stretch = clamp(taut / axial, stretch - rounding, stretch + rounding);
+            let wanted = taut / axial;
+            if !stage.second {
+                let kept = clamp(wanted, -TOLERANCE * l, TOLERANCE * l);
+                set_taken(j, clamp(wanted, -MAX_TENSION * l, MAX_TENSION * l) - kept);
+            }
+            let strained = stretch + taken_of(j);
+            let kept_stretch = clamp(wanted, strained - rounding, strained + rounding);
             let off = kept_stretch - stretch;
             let stretched = axial * kept_stretch;
             set_moving(j, moving(j).xyz, stretched);
@@ -548,7 +555,8 @@ fn direct_step(root_from: vec4<f32>) {
     stage.beyond = 1.0 / theta;
     // Which nodes an obstacle bears, and which of them stick, is not known before: each step shows.
     stage.second = true;
-    for (var step = 1u; twice && step < MOST_STEPS; step++) {
+    // A strand that cannot get out stays where it touches.
+    for (var step = 1u; twice && !trapped && step < MOST_STEPS; step++) {
         contacts(GRIP_JUDGED);
         if !(contact_changed || (fast && step == 1u)) {
             break;

@@ -241,6 +241,15 @@ fn set_push(i: u32, push: vec3<f32>) {
     scratch[slot(i, 8u, SCRATCH)] = vec4(push, 0.0);
 }
 
+// How much of the stretch of an edge's tension the length limiter has taken off (m).
+fn taken_of(i: u32) -> f32 {
+    return scratch[slot(i, 9u, SCRATCH)].x;
+}
+
+fn set_taken(i: u32, stretch: f32) {
+    scratch[slot(i, 9u, SCRATCH)].x = stretch;
+}
+
 // What holds it there, as a displacement of a free node in the substep (m). Where the last row of the edge before it
 // was, which a Newton step has used when it writes this, and writes only when it has read it.
 fn reaction_of(i: u32) -> vec3<f32> {

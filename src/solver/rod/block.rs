@@ -74,6 +74,8 @@ pub struct EdgeLanes<C = Lane> {
     pub axial: C,
     /// Tension that the last substep left (N, as `k`). Direct method only.
     pub tension: C,
+    /// How much of the stretch of that tension the length limiter has taken off (m). Direct method only.
+    pub taken: C,
     /// 1 where its orientation is held, else 0. Direct method only.
     pub clamped: C,
     /// The share of its resistance to twist against bending that the joint at its start lacks: 0 in dry hair. Direct

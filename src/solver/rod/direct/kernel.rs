@@ -5,6 +5,7 @@
 //! moment is the exact gradient and whose Gauss–Newton Hessian is that of ½K|δφ_j − δφ_{j−1}|².
 
 use super::{
+    MAX_TENSION,
     frames::{
         Torsion, choose, moment, parallel_transport, turned_by_e3, turned_since, twist_stiffness,
     },
@@ -16,7 +17,7 @@ use crate::{
     base::lanes::{Quaternion, Real, V3},
     solver::rod::{
         block::{EdgeLanes, NodeLanes},
-        limiter::HOLD,
+        limiter::{HOLD, TOLERANCE},
         tridiagonal::{Elimination, back},
     },
 };
@@ -172,7 +173,19 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             // Positions are rounded, and edges so stiff that this rounding would pull like gravity: it would be taken
             // for what holds nodes where they rest.
             let stretch = W::Real::select(crushed, t.dot(e), length) - l;
-            let kept = kept_within(w, stretch, taut / axial, x);
+            let wanted = taut / axial;
+            let taken = if TWICE && stage.second {
+                w.get(&edge.taken)
+            } else {
+                // Of what it has stretched, the limiter has left this.
+                let up_to = |strain: f32| {
+                    let most = l * w.lit(strain.into());
+                    wanted.min(most).max(-most)
+                };
+                up_to(MAX_TENSION) - up_to(TOLERANCE)
+            };
+            w.put(taken, &mut edge.taken);
+            let kept = kept_within(w, stretch + taken, wanted, x);
             let (off, stretched) = (kept - stretch, axial * kept);
             if TWICE {
                 let again = zero.lt(stage.again);

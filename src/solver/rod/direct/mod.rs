@@ -36,7 +36,9 @@
 //!
 //! Supports do not give way: what the system of equations lets them give, a hundred thousandth of a free node's way, is
 //! read as their force and not moved. Edges are so stiff that the rounding of places to f32 pulls like gravity; an edge
-//! keeps the tension that the last solve has found wherever its length differs from that by no more than rounding does.
+//! keeps the tension that the last solve has found wherever its length differs from that by no more than rounding does,
+//! and when the limiter takes its stretch: hair is stiffer than f32 allows edges to be, so the length is right and the
+//! tension is, too.
 //! Both matter: with supports a hundred times as stiff as a node's inertia, a strand that stands on its tip sank and
 //! was pushed out in each step, and slipped at any friction; with the tension read from lengths, hair slid on slopes that
 //! hold it.
@@ -147,6 +149,13 @@ pub(crate) const FAST_TURN: f32 = 0.03;
 /// exceeds the precision of f32; softer leaves more to the length limiter, which bends hair.
 pub(crate) const STRAIN: f32 = 1e-4;
 
+/// E A l²/(E I) of an edge, at least: short stiff hair that its root presses against the scalp would be stretched
+/// rather than bent. More exceeds the precision of f32.
+pub(crate) const STRETCH_RATIO: f32 = 30.0;
+
+/// Strain up to which an edge keeps its tension when the limiter gives it back its length.
+pub(crate) const MAX_TENSION: f32 = 0.02;
+
 /// Strain beyond which Newton steps on the lengths have failed.
 pub(crate) const TORN: f32 = 0.01;
 
@@ -209,7 +218,11 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
         newton::<S, false>(simd, b, params, Turn::Only);
     } else {
         newton::<S, true>(simd, b, params, Turn::First);
-        b.again = b.twice;
+        // A strand that cannot get out stays where it touches.
+        let free = Real::lt(load(simd, &b.trapped), one);
+        let [once, turns_fast] = [load(simd, &b.twice), turns_fast]
+            .map(|lanes| Real::select(free, lanes, f32x16::splat(simd, 0.0)));
+        once.store_array(&mut b.again);
         // Each step shows which nodes rest on an obstacle, and which of them stick.
         for step in 1..MOST_STEPS {
             let again = load(simd, &b.again);
@@ -593,7 +606,8 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32
             after = load(simd, &e.l);
             let joint = load(simd, &e.k) * bending / (before + after);
             Real::min(joint, stiffest * after * after).store_array(&mut e.k);
-            Real::min(axial / after, stiffest).store_array(&mut e.axial);
+            let least = bending * f32x16::splat(simd, 0.5 * STRETCH_RATIO) / (after * after);
+            Real::min(Real::max(axial, least) / after, stiffest).store_array(&mut e.axial);
         }
         // Half a cell on either side, so the tip carries half a mass.
         let dry_nodes = load(simd, &n.w);
