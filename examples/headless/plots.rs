@@ -13,6 +13,9 @@ type Curve = Vec<(f64, f64)>;
 const SIZE: (u32, u32) = (640, 400);
 const STEPS: usize = 2000;
 
+/// The heaviest of the upright rods.
+const MOST_GAMMA: f64 = 21.0;
+
 /// Segments and their colours.
 const POINTS: [(usize, RGBColor); 4] = [
     (8, RGBColor(214, 96, 77)),
@@ -58,14 +61,12 @@ fn cantilevers() -> [Curve; 2] {
     let (mut sags, mut reaches) = (Vec::new(), Vec::new());
     for i in 0..=80 {
         let gamma = 10.0_f64.powf(-1.0 + 4.0 * f64::from(i) / 80.0);
-        // How far the tip's angle is from plumb, as a power of ten: heavy rods are nearly there.
-        let down = |x: f64| std::f64::consts::FRAC_PI_2 - 10.0_f64.powf(x);
-        let x = zero(-16.0, std::f64::consts::FRAC_PI_2.log10(), |x| {
-            from_tip(gamma, down(x), f64::cos).0
-        });
-        let (_, along, across) = from_tip(gamma, down(x), f64::cos);
-        sags.push((gamma, across));
-        reaches.push((gamma, along));
+        // By the angle from plumb, the tip's as a power of ten: of heavy rods it is tiny.
+        let plumb = |x: f64| from_tip(-gamma, 10.0_f64.powf(x), f64::sin);
+        let level = std::f64::consts::FRAC_PI_2;
+        let (_, along, across) = plumb(zero(-40.0, level.log10(), |x| plumb(x).0 - level));
+        sags.push((gamma, along));
+        reaches.push((gamma, across));
     }
     [sags, reaches]
 }
@@ -76,6 +77,9 @@ fn buckled() -> [Curve; 2] {
     for i in 1..=100 {
         let tip = 2.7 * f64::from(i) / 100.0;
         let gamma = zero(7.0, 40.0, |gamma| from_tip(gamma, tip, f64::sin).0);
+        if gamma > MOST_GAMMA {
+            break;
+        }
         let (_, high, aside) = from_tip(gamma, tip, f64::sin);
         highs.push((gamma, high));
         asides.push((gamma, aside));
@@ -139,15 +143,21 @@ pub fn write(rows: &[Row], folder: &Path) -> Result {
     draw(&folder.join("rods-level.svg"), level, range, &cantilevers(), &points(&["A "], got))?;
     let upright = ("Upright hair: how high its tip is, and how far aside", "Γ", "share of L");
     let beyond = points(&["C height", "C aside"], got);
-    draw(&folder.join("rods-upright.svg"), upright, (7.0..21.0, -0.45..1.05), &buckled(), &beyond)?;
+    draw(
+        &folder.join("rods-upright.svg"),
+        upright,
+        (7.0..MOST_GAMMA, -0.45..1.05),
+        &buckled(),
+        &beyond,
+    )?;
     let onset =
         ("Onsets of buckling, as shares of theory's", "Γ, or twist in rad", "share of theory's");
-    let one = vec![(5.0, 1.0), (100.0, 1.0)];
+    let one = vec![(5.0, 1.0), (250.0, 1.0)];
     let onsets = points(&["C upright", "E ", "G ", "H "], got);
     draw(
         &folder.join("rods-onsets.svg"),
         onset,
-        ((5.0..100.0).log_scale(), 0.85..1.15),
+        ((5.0..250.0).log_scale(), 0.85..1.15),
         &[one],
         &onsets,
     )?;

@@ -21,7 +21,7 @@ pub(super) const POSE: usize = 2;
 pub(super) const MOTION: usize = 2;
 pub(super) const REST: usize = 2;
 pub(super) const BONDS: usize = 4;
-pub(super) const SCRATCH: usize = 10;
+pub(super) const SCRATCH: usize = 9;
 pub(super) const STILL: usize = 2;
 
 /// Bytes per node in all buffers of a hair that may sleep together; 16 more where edges have angular velocities.

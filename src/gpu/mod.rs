@@ -36,7 +36,7 @@
 //!
 //! # Where scratch lies
 //!
-//! In memory, 160 bytes a node, of which an elimination fills 96 on the way down and reads them once on the way
+//! In memory, 144 bytes a node, of which an elimination fills 96 on the way down and reads them once on the way
 //! up. A variant with scratch in workgroup memory is not there, because it does not fit: 32 strands of 16 nodes
 //! need 64 KiB, of 9 nodes 36, and devices guarantee 16 and have 32 to 64. Four strands of 32 nodes would fill
 //! the 16, which leaves 28 of 32 threads idle. Where 64 KiB are there, as on RDNA 2 with 128 for four SIMDs, two

@@ -300,8 +300,8 @@ impl Twin {
             let after = self.l.get(i).copied().unwrap_or(0.0);
             if i < self.edges() {
                 self.k[i] = (self.k[i] * bending / (before + after)).min(firmest * after * after);
-                let least = 15.0 * bending / after.powi(2);
-                self.axial[i] = ((GRAVITY * count / 1e-4).max(least) / after).min(firmest);
+                let least = (15.0 * bending / after.powi(3)).min(firmest / 16.0);
+                self.axial[i] = (GRAVITY * count / 1e-4 / after).min(firmest).max(least);
             }
             self.mass[i] = (before + after) * density * 0.5;
             before = after;

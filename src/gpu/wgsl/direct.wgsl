@@ -37,8 +37,8 @@ fn joint_of(before: f32, after: f32, share: f32) -> f32 {
 }
 
 fn axial_of(length: f32) -> f32 {
-    let least = bending * (0.5 * STRETCH_RATIO) / (length * length);
-    return min(max(axial_stiffness, least) / length, firmest);
+    let least = bending * (0.5 * STRETCH_RATIO) / (length * length * length);
+    return max(min(axial_stiffness / length, firmest), min(least, STRETCH_SHARE * firmest));
 }
 
 // Inverse masses beside the places.

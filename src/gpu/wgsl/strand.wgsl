@@ -241,15 +241,6 @@ fn set_push(i: u32, push: vec3<f32>) {
     scratch[slot(i, 8u, SCRATCH)] = vec4(push, 0.0);
 }
 
-// How much of the stretch of an edge's tension the length limiter has taken off (m).
-fn taken_of(i: u32) -> f32 {
-    return scratch[slot(i, 9u, SCRATCH)].x;
-}
-
-fn set_taken(i: u32, stretch: f32) {
-    scratch[slot(i, 9u, SCRATCH)].x = stretch;
-}
-
 // What holds it there, as a displacement of a free node in the substep (m). Where the last row of the edge before it
 // was, which a Newton step has used when it writes this, and writes only when it has read it.
 fn reaction_of(i: u32) -> vec3<f32> {
@@ -280,13 +271,24 @@ fn set_slowed_along(i: u32, way: vec3<f32>) {
     scratch[slot(i, 8u, SCRATCH)].w = atan2(flat.y, flat.x);
 }
 
-// That obstacle.
+// That obstacle: the last eight bits of where the edge after the node has the stretch that was taken off it.
 fn bearer_of(i: u32) -> u32 {
-    return bitcast<u32>(scratch[slot(i, 6u, SCRATCH)].w);
+    return bitcast<u32>(scratch[slot(i, 6u, SCRATCH)].w) & 255u;
 }
 
 fn set_bearer(i: u32, o: u32) {
-    scratch[slot(i, 6u, SCRATCH)].w = bitcast<f32>(o);
+    let taken = bitcast<u32>(scratch[slot(i, 6u, SCRATCH)].w) & ~255u;
+    scratch[slot(i, 6u, SCRATCH)].w = bitcast<f32>(taken | o);
+}
+
+// How much of the stretch of an edge's tension the length limiter has taken off (m).
+fn taken_of(i: u32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(scratch[slot(i, 6u, SCRATCH)].w) & ~255u);
+}
+
+fn set_taken(i: u32, stretch: f32) {
+    let taken = bitcast<u32>(stretch) & ~255u;
+    scratch[slot(i, 6u, SCRATCH)].w = bitcast<f32>(taken | bearer_of(i));
 }
 
 fn is_held(w: f32) -> bool {

@@ -4,6 +4,7 @@
 mod fast;
 mod hard;
 mod lab;
+mod lying;
 mod obstacles;
 mod settled;
 mod swings;

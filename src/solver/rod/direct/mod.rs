@@ -150,8 +150,11 @@ pub(crate) const FAST_TURN: f32 = 0.03;
 pub(crate) const STRAIN: f32 = 1e-4;
 
 /// E A l²/(E I) of an edge, at least: short stiff hair that its root presses against the scalp would be stretched
-/// rather than bent. More exceeds the precision of f32.
+/// rather than bent. Up to [`STRETCH_SHARE`] of [`MAX_STIFFNESS`]: more exceeds the precision of f32.
 pub(crate) const STRETCH_RATIO: f32 = 30.0;
+
+/// See [`STRETCH_RATIO`].
+pub(crate) const STRETCH_SHARE: f32 = 1.0 / 16.0;
 
 /// Strain up to which an edge keeps its tension when the limiter gives it back its length.
 pub(crate) const MAX_TENSION: f32 = 0.02;
@@ -606,8 +609,11 @@ fn weigh_simd<S: Simd>(simd: S, b: &mut BlockLanes, bending_length: f32, dt: f32
             after = load(simd, &e.l);
             let joint = load(simd, &e.k) * bending / (before + after);
             Real::min(joint, stiffest * after * after).store_array(&mut e.k);
-            let least = bending * f32x16::splat(simd, 0.5 * STRETCH_RATIO) / (after * after);
-            Real::min(Real::max(axial, least) / after, stiffest).store_array(&mut e.axial);
+            let least =
+                bending * f32x16::splat(simd, 0.5 * STRETCH_RATIO) / (after * after * after);
+            let least = Real::min(least, stiffest * f32x16::splat(simd, STRETCH_SHARE));
+            let axial = Real::min(axial / after, stiffest);
+            Real::max(axial, least).store_array(&mut e.axial);
         }
         // Half a cell on either side, so the tip carries half a mass.
         let dry_nodes = load(simd, &n.w);

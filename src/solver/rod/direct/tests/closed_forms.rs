@@ -101,8 +101,8 @@ fn masses_and_stiffnesses_are_those_of_the_hair() {
                 let edge = &block.edges[i];
                 near("bending", edge.k[lane], joint.min(most * l[i] * l[i]));
                 // E A l²/(E I) is 30 at least.
-                let least = 30.0 * 0.5 * ei / l[i].powi(2);
-                near("stretching", edge.axial[lane], ((g * n / 1e-4).max(least) / l[i]).min(most));
+                let least = (30.0 * 0.5 * ei / l[i].powi(3)).min(most / 16.0);
+                near("stretching", edge.axial[lane], (g * n / 1e-4 / l[i]).min(most).max(least));
             }
             for i in 0..=edges {
                 let before = if i == 0 { 0.0 } else { l[i - 1] };
