@@ -300,7 +300,7 @@ impl Twin {
             let after = self.l.get(i).copied().unwrap_or(0.0);
             if i < self.edges() {
                 self.k[i] = (self.k[i] * bending / (before + after)).min(firmest * after * after);
-                let least = (15.0 * bending / after.powi(3)).min(firmest / 16.0);
+                let least = (5.0 * bending / after.powi(3)).min(firmest / 16.0);
                 self.axial[i] = (GRAVITY * count / 1e-4 / after).min(firmest).max(least);
             }
             self.mass[i] = (before + after) * density * 0.5;
@@ -564,8 +564,7 @@ impl Twin {
             let taut = self.tension[j];
             if !second {
                 let wanted = taut / axial;
-                let up_to = |strain: f64| wanted.clamp(-strain * l, strain * l);
-                self.taken[j] = up_to(0.02) - up_to(5e-4);
+                self.taken[j] = (wanted.min(0.02 * l) - wanted.min(5e-4 * l)).max(0.0);
             }
             let strained = stretch + self.taken[j];
             let kept = (taut / axial).clamp(strained - rounding, strained + rounding);

@@ -151,8 +151,8 @@ fn newton_down(stage: Stage) {
             let rounding = sqrt(dot(x, x)) * ROUNDING;
             let wanted = taut / axial;
             if !stage.second {
-                let kept = clamp(wanted, -TOLERANCE * l, TOLERANCE * l);
-                set_taken(j, clamp(wanted, -MAX_TENSION * l, MAX_TENSION * l) - kept);
+                let left = min(wanted, TOLERANCE * l);
+                set_taken(j, max(min(wanted, MAX_TENSION * l), left) - left);
             }
             let strained = stretch + taken_of(j);
             let kept_stretch = clamp(wanted, strained - rounding, strained + rounding);

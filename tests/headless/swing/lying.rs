@@ -145,7 +145,13 @@ fn landing_gains_no_energy() {
             .collect();
         let probes = (strands.iter().zip(&cases)).map(|(strand, (bending, _))| {
             let bending = f64::from(*bending);
-            (*strand, Box::new(move |s: &Strand| energy(s, bending)) as Probe)
+            let mut k = 0;
+            (*strand, Box::new(move |s: &Strand| { k += 1; if std::env::var("TRACE").is_ok() && bending > 0.1 && s.edges() == 64 && s.velocities().iter().any(|v| v.length() > 6.0) {
+                let l = s.rest_lengths();
+                let vs: Vec<String> = s.velocities().iter().zip(s.positions()).enumerate().filter(|(_, (v, _))| v.length() > 3.0).map(|(i, (v, p))| format!("{i}: v {:.1},{:.1},{:.1} y {:.2}mm", v.x, v.y, v.z, (p.y + 0.1) * 1e3)).collect();
+                let st: f32 = s.positions().windows(2).zip(l).map(|(p, l)| (p[0].distance(p[1]) / l - 1.0).abs()).fold(0.0, f32::max);
+                println!("TR {k} strain {st:.4} {}", vs.join("; ").chars().take(700).collect::<String>());
+            } energy(s, bending) }) as Probe)
         });
         let probes = probes.collect();
         let energies = lab.record(3.0, probes);
@@ -154,6 +160,11 @@ fn landing_gains_no_energy() {
             for energy in &energies[1..] {
                 rise = rise.max(energy - least);
                 least = least.min(*energy);
+            }
+            if *n == 64 || *n == 32 {
+                let at = (1..energies.len()).max_by(|a, b| (energies[*a] - energies[*a - 1]).total_cmp(&(energies[*b] - energies[*b - 1]))).unwrap();
+                let unit = 9.8 * f64::from(LENGTH * LENGTH);
+                println!("KT {substep} {bending} {n}: step {at}: {:?}", energies[at.saturating_sub(3)..(at + 6).min(energies.len())].iter().map(|e| (e / unit * 1e4).round() / 1e4).collect::<Vec<_>>());
             }
             let share = rise / (9.8 * f64::from(LENGTH * LENGTH));
             println!("{substep}, L_g {bending}, {n} segments: energy rises by {share:.1e} g L²");

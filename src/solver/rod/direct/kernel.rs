@@ -177,12 +177,11 @@ pub(crate) fn down<W: Width, const TWICE: bool>(
             let taken = if TWICE && stage.second {
                 w.get(&edge.taken)
             } else {
-                // Of what it has stretched, the limiter has left this.
-                let up_to = |strain: f32| {
-                    let most = l * w.lit(strain.into());
-                    wanted.min(most).max(-most)
-                };
-                up_to(MAX_TENSION) - up_to(TOLERANCE)
+                // Of what it has stretched, the limiter has left this. What presses is not kept: it would buckle the
+                // strand once it has landed.
+                let most = w.lit(MAX_TENSION.into());
+                let left = wanted.min(l * w.lit(TOLERANCE.into()));
+                wanted.min(l * most).max(left) - left
             };
             w.put(taken, &mut edge.taken);
             let kept = kept_within(w, stretch + taken, wanted, x);

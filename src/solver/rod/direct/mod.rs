@@ -151,7 +151,7 @@ pub(crate) const STRAIN: f32 = 1e-4;
 
 /// E A l²/(E I) of an edge, at least: short stiff hair that its root presses against the scalp would be stretched
 /// rather than bent. Up to [`STRETCH_SHARE`] of [`MAX_STIFFNESS`]: more exceeds the precision of f32.
-pub(crate) const STRETCH_RATIO: f32 = 30.0;
+pub(crate) const STRETCH_RATIO: f32 = 10.0;
 
 /// See [`STRETCH_RATIO`].
 pub(crate) const STRETCH_SHARE: f32 = 1.0 / 16.0;

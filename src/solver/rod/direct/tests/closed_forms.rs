@@ -100,8 +100,8 @@ fn masses_and_stiffnesses_are_those_of_the_hair() {
                 let joint = f64::from(share(lane, i)) * ei / (before + l[i]);
                 let edge = &block.edges[i];
                 near("bending", edge.k[lane], joint.min(most * l[i] * l[i]));
-                // E A l²/(E I) is 30 at least.
-                let least = (30.0 * 0.5 * ei / l[i].powi(3)).min(most / 16.0);
+                // E A l²/(E I) is 10 at least.
+                let least = (10.0 * 0.5 * ei / l[i].powi(3)).min(most / 16.0);
                 near("stretching", edge.axial[lane], (g * n / 1e-4 / l[i]).min(most).max(least));
             }
             for i in 0..=edges {
