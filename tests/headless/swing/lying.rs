@@ -60,33 +60,41 @@ fn farthest(places: &[Vec3], others: &[Vec3]) -> f32 {
 /// Friction holds against the tension of what hangs on, and what it holds does not creep.
 #[test]
 fn hair_across_a_ball_stays_where_it_lies() {
-    for hertz in HERTZ {
-        let [moved, without] =
-            [0.5, 0.0].map(|friction| Drape::new(hertz, friction, 8.0).creep(20.0));
-        let lie = moved.len();
-        println!(
-            "{hertz} Hz: {lie} of 16 lie, {} without friction; moved {moved:?} m",
-            without.len()
-        );
-        assert!(
-            lie == 16 && without.is_empty(),
-            "{hertz} Hz: {lie} lie, {without:?} without friction"
-        );
-        // To the rounding of places; one that has come to lie at the edge of what friction holds may slip once.
-        assert!(moved[lie - 2] < 5e-5 && moved[lie - 1] < 2e-3, "{hertz} Hz: crept {moved:?} m");
+    for hertz in [60.0, 144.0] {
+        stays(hertz, 20.0);
     }
 }
 
-/// Where hair comes to lie does not depend on the rate of ticks.
 #[test]
+#[ignore = "takes minutes"]
+fn hair_across_a_ball_stays_where_it_lies_at_any_rate() {
+    for hertz in HERTZ {
+        stays(hertz, 60.0);
+    }
+}
+
+fn stays(hertz: f64, seconds: f64) {
+    let [moved, without] =
+        [0.5, 0.0].map(|friction| Drape::new(hertz, friction, 8.0).creep(seconds));
+    let lie = moved.len();
+    println!("{hertz} Hz: {lie} of 16 lie, {} without friction; moved {moved:?} m", without.len());
+    // One falls at the edge of what friction holds.
+    assert!(lie >= 15 && without.is_empty(), "{hertz} Hz: {lie} lie, {without:?} without friction");
+    assert!(moved[lie - 1] < 2e-5, "{hertz} Hz: crept {moved:?} m");
+}
+
+/// Where hair comes to lie depends on how it got there, as friction does, but hardly on the rate of ticks.
+#[test]
+#[ignore = "takes a minute"]
 fn hair_comes_to_lie_in_one_place_at_any_rate() {
     for (how, drag) in [("laid down", 40.0), ("dropped", 8.0)] {
         let all = HERTZ.map(|hertz| Drape::new(hertz, 0.5, drag).places());
         for (hertz, places) in HERTZ.iter().zip(&all) {
-            let off = places.iter().zip(&all[4]).map(|(p, q)| farthest(p, q) * 1e3);
+            let off = places.iter().zip(&all[4]).map(|(p, q)| farthest(p, q));
             let mut off: Vec<f32> = off.collect();
             off.sort_by(f32::total_cmp);
-            println!("{how} at {hertz} Hz: {off:.2?} mm from 1000 Hz");
+            println!("{how} at {hertz} Hz: {off:?} m from 1000 Hz");
+            assert!(off[7] < 3e-3 && off[15] < 1e-2, "{how} at {hertz} Hz: {off:?} m off");
         }
     }
 }
@@ -96,46 +104,44 @@ fn hair_comes_to_lie_in_one_place_at_any_rate() {
 fn a_ball_that_turns_takes_its_hair_along() {
     let mut drape = Drape::new(60.0, 0.5, 8.0);
     let before = drape.places();
-    let lab = &mut drape.lab;
-    let world = lab.app.world_mut();
+    let world = drape.lab.app.world_mut();
     let middle = Vec3::new(0.0, -0.062, 0.01);
-    let mut turned = world.query_filtered::<Entity, Or<(With<Hair>, With<HairCollider>)>>();
-    let turned: Vec<Entity> = turned.iter(world).collect();
-    let places = turned.clone().into_iter().map(|id| *world.get::<Transform>(id).unwrap());
-    let places: Vec<Transform> = places.collect();
-    let mut rate = 0.0_f32;
-    let mut angle = 0.0_f32;
-    for frame in 0..240 {
+    let mut turned =
+        world.query_filtered::<(Entity, &Transform), Or<(With<Hair>, With<HairCollider>)>>();
+    let turned: Vec<(Entity, Transform)> =
+        turned.iter(world).map(|(id, place)| (id, *place)).collect();
+    let (mut rate, mut angle) = (0.0_f32, 0.0);
+    for _ in 0..240 {
         // Half a second to get going.
         rate = (rate + 0.5 / 30.0).min(0.5);
         angle += rate / 60.0;
         let turn = Quat::from_rotation_y(angle);
-        for (id, place) in turned.iter().zip(&places) {
-            let at = middle + turn * (place.translation - middle);
-            *lab.app.world_mut().get_mut::<Transform>(*id).unwrap() =
-                Transform { translation: at, rotation: turn * place.rotation, ..*place };
+        for (id, place) in &turned {
+            let translation = middle + turn * (place.translation - middle);
+            *drape.lab.app.world_mut().get_mut::<Transform>(*id).unwrap() =
+                Transform { translation, rotation: turn * place.rotation, ..*place };
         }
-        lab.app.update();
-        if frame % 60 == 59 {
-            let off: Vec<f32> = drape
-                .strands
-                .iter()
-                .zip(&before)
-                .map(|(strand, before)| farthest(lab.get(*strand).positions(), before) * 1e3)
-                .collect();
-            println!("{frame}: {off:.3?} mm, in the frame that turns");
-        }
+        drape.lab.app.update();
     }
+    // In the frame that turns.
+    let mut off: Vec<f32> =
+        drape.places().iter().zip(&before).map(|(now, before)| farthest(now, before)).collect();
+    off.sort_by(f32::total_cmp);
+    println!("carried along but for {off:?} m");
+    // What hangs free is 0.4 mm farther out; three of the sixteen slip.
+    assert!(off[7] < 1.5e-3 && off[12] < 5e-3, "slipped by {off:?} m");
 }
 
 /// What lands loses energy, at any number of segments.
 #[test]
+#[ignore = "not reached: fine segments of stiff hair gain energy where they land tip first"]
 fn landing_gains_no_energy() {
+    const LENGTH: f32 = 0.2;
+    let mut wrong = Vec::new();
     for (substep, mut lab) in Lab::both() {
         lab.undamped();
         let floor = HairCollider::plane(Dir3::Y).with_friction(0.3).unwrap();
         lab.app.world_mut().spawn((floor, Transform::from_xyz(0.0, -0.1, 0.0)));
-        const LENGTH: f32 = 0.2;
         let cases: Vec<(f32, usize)> = [0.02, 0.06, 0.13]
             .into_iter()
             .flat_map(|bending| [8, 16, 32, 64].map(|n| (bending, n)))
@@ -145,29 +151,21 @@ fn landing_gains_no_energy() {
             .collect();
         let probes = (strands.iter().zip(&cases)).map(|(strand, (bending, _))| {
             let bending = f64::from(*bending);
-            let mut k = 0;
-            (*strand, Box::new(move |s: &Strand| { k += 1; if std::env::var("TRACE").is_ok() && bending > 0.1 && s.edges() == 64 && s.velocities().iter().any(|v| v.length() > 6.0) {
-                let l = s.rest_lengths();
-                let vs: Vec<String> = s.velocities().iter().zip(s.positions()).enumerate().filter(|(_, (v, _))| v.length() > 3.0).map(|(i, (v, p))| format!("{i}: v {:.1},{:.1},{:.1} y {:.2}mm", v.x, v.y, v.z, (p.y + 0.1) * 1e3)).collect();
-                let st: f32 = s.positions().windows(2).zip(l).map(|(p, l)| (p[0].distance(p[1]) / l - 1.0).abs()).fold(0.0, f32::max);
-                println!("TR {k} strain {st:.4} {}", vs.join("; ").chars().take(700).collect::<String>());
-            } energy(s, bending) }) as Probe)
+            (*strand, Box::new(move |s: &Strand| energy(s, bending)) as Probe)
         });
         let probes = probes.collect();
-        let energies = lab.record(3.0, probes);
-        for ((bending, n), energies) in cases.iter().zip(energies) {
+        for ((bending, n), energies) in cases.iter().zip(lab.record(3.0, probes)) {
             let (mut least, mut rise) = (energies[0], 0.0_f64);
             for energy in &energies[1..] {
                 rise = rise.max(energy - least);
                 least = least.min(*energy);
             }
-            if *n == 64 || *n == 32 {
-                let at = (1..energies.len()).max_by(|a, b| (energies[*a] - energies[*a - 1]).total_cmp(&(energies[*b] - energies[*b - 1]))).unwrap();
-                let unit = 9.8 * f64::from(LENGTH * LENGTH);
-                println!("KT {substep} {bending} {n}: step {at}: {:?}", energies[at.saturating_sub(3)..(at + 6).min(energies.len())].iter().map(|e| (e / unit * 1e4).round() / 1e4).collect::<Vec<_>>());
-            }
             let share = rise / (9.8 * f64::from(LENGTH * LENGTH));
             println!("{substep}, L_g {bending}, {n} segments: energy rises by {share:.1e} g L²");
+            if share.is_nan() || share > 1e-4 {
+                wrong.push((substep, *bending, *n, share));
+            }
         }
     }
+    assert!(wrong.is_empty(), "substep, L_g, segments, rise in g L²: {wrong:#?}");
 }
