@@ -64,7 +64,11 @@ fn cantilevers() -> [Curve; 2] {
         // By the angle from plumb, the tip's as a power of ten: of heavy rods it is tiny.
         let plumb = |x: f64| from_tip(-gamma, 10.0_f64.powf(x), f64::sin);
         let level = std::f64::consts::FRAC_PI_2;
-        let (_, along, across) = plumb(zero(-40.0, level.log10(), |x| plumb(x).0 - level));
+        let mut most = -40.0;
+        while plumb(most).0 < level {
+            most += 0.1;
+        }
+        let (_, along, across) = plumb(zero(most - 0.1, most, |x| plumb(x).0 - level));
         sags.push((gamma, along));
         reaches.push((gamma, across));
     }
@@ -94,6 +98,7 @@ fn draw<X>(
     (x, y): (X, std::ops::Range<f64>),
     curves: &[Curve],
     points: &[(usize, f64, f64)],
+    legend: SeriesLabelPosition,
 ) -> Result
 where
     X: plotters::coord::ranged1d::AsRangedCoord<Value = f64>,
@@ -121,7 +126,6 @@ where
             .label(format!("{segments} segments"))
             .legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.stroke_width(2)));
     }
-    let legend = SeriesLabelPosition::MiddleRight;
     chart.configure_series_labels().position(legend).border_style(BLACK).draw()?;
     area.present()?;
     eprintln!("{}", path.display());
@@ -138,9 +142,17 @@ pub fn write(rows: &[Row], folder: &Path) -> Result {
     };
     let level =
         ("Level hair under its own weight: how far its tip sags and reaches", "Γ", "share of L");
+    let right = SeriesLabelPosition::MiddleRight;
     let range = ((0.1..1000.0).log_scale(), 0.0..1.05);
     let got = |row: &Row| row.got;
-    draw(&folder.join("rods-level.svg"), level, range, &cantilevers(), &points(&["A "], got))?;
+    draw(
+        &folder.join("rods-level.svg"),
+        level,
+        range,
+        &cantilevers(),
+        &points(&["A "], got),
+        right,
+    )?;
     let upright = ("Upright hair: how high its tip is, and how far aside", "Γ", "share of L");
     let beyond = points(&["C height", "C aside"], got);
     draw(
@@ -160,6 +172,7 @@ pub fn write(rows: &[Row], folder: &Path) -> Result {
         ((5.0..250.0).log_scale(), 0.85..1.15),
         &[one],
         &onsets,
+        SeriesLabelPosition::UpperLeft,
     )?;
     let slip = (
         "A tip on a plate that comes nearer: friction with which it slips",
@@ -173,5 +186,6 @@ pub fn write(rows: &[Row], folder: &Path) -> Result {
         (0.0..0.35, 0.0..0.4),
         &[slips.to_vec()],
         &points(&["K "], got),
+        SeriesLabelPosition::MiddleRight,
     )
 }

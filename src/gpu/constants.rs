@@ -14,7 +14,7 @@ use crate::{
     solver::rod::{
         constraint::EPSILON,
         direct::{width::ROUNDING, *},
-        limiter::{FIRMNESS, FOLDING, HOLD, TOLERANCE},
+        limiter::{FIRMNESS, FOLDING, HOLD, MAX_TENSION, TOLERANCE},
         near::{ESCAPE_RATIO, FASTER},
         step::PASSES_IN_TOUCH,
         stiffness::REFERENCE_GRAVITY,

@@ -29,6 +29,9 @@ pub(crate) const HOLD: f64 = 1e5;
 /// Strain at which the limiter stops.
 pub(crate) const TOLERANCE: f32 = 5e-4;
 
+/// Strain up to which an edge keeps its tension when it gets its length back.
+pub(crate) const MAX_TENSION: f32 = 0.02;
+
 /// Damping of a compressed edge in a [`GUARDED`](limit_strained) step, as a multiple of its strain.
 /// A straight strand that is compressed end to end has to fold; by how much is not determined by
 /// its lengths in first order, and Newton's step overshoots. With an eighth it folds by about as

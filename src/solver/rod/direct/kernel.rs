@@ -5,7 +5,6 @@
 //! moment is the exact gradient and whose Gauss–Newton Hessian is that of ½K|δφ_j − δφ_{j−1}|².
 
 use super::{
-    MAX_TENSION,
     frames::{
         Torsion, choose, moment, parallel_transport, turned_by_e3, turned_since, twist_stiffness,
     },
@@ -17,7 +16,7 @@ use crate::{
     base::lanes::{Quaternion, Real, V3},
     solver::rod::{
         block::{EdgeLanes, NodeLanes},
-        limiter::{HOLD, TOLERANCE},
+        limiter::{HOLD, MAX_TENSION, TOLERANCE},
         tridiagonal::{Elimination, back},
     },
 };

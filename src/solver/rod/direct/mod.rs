@@ -156,9 +156,6 @@ pub(crate) const STRETCH_RATIO: f32 = 10.0;
 /// See [`STRETCH_RATIO`].
 pub(crate) const STRETCH_SHARE: f32 = 1.0 / 16.0;
 
-/// Strain up to which an edge keeps its tension when the limiter gives it back its length.
-pub(crate) const MAX_TENSION: f32 = 0.02;
-
 /// Strain beyond which Newton steps on the lengths have failed.
 pub(crate) const TORN: f32 = 0.01;
 
