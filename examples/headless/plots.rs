@@ -142,7 +142,6 @@ pub fn write(rows: &[Row], folder: &Path) -> Result {
     };
     let level =
         ("Level hair under its own weight: how far its tip sags and reaches", "Γ", "share of L");
-    let right = SeriesLabelPosition::MiddleRight;
     let range = ((0.1..1000.0).log_scale(), 0.0..1.05);
     let got = |row: &Row| row.got;
     draw(
@@ -151,7 +150,7 @@ pub fn write(rows: &[Row], folder: &Path) -> Result {
         range,
         &cantilevers(),
         &points(&["A "], got),
-        right,
+        SeriesLabelPosition::MiddleRight,
     )?;
     let upright = ("Upright hair: how high its tip is, and how far aside", "Γ", "share of L");
     let beyond = points(&["C height", "C aside"], got);
@@ -161,6 +160,7 @@ pub fn write(rows: &[Row], folder: &Path) -> Result {
         (7.0..MOST_GAMMA, -0.45..1.05),
         &buckled(),
         &beyond,
+        SeriesLabelPosition::MiddleRight,
     )?;
     let onset =
         ("Onsets of buckling, as shares of theory's", "Γ, or twist in rad", "share of theory's");
