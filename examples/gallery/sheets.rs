@@ -235,7 +235,7 @@ pub fn ringlet(arguments: &Arguments) -> Result {
     let camera = bust::camera(&mut app);
     let size = arguments.scaled(600, 480);
     let pictures = Pictures::new(&mut app, size, arguments.supersample, camera);
-    bust::look(&mut app, Vec3::new(0.0, 0.0, 0.28), Vec3::new(0.01, -0.035, 0.0));
+    bust::look(&mut app, Vec3::new(0.012, -0.035, 0.24), Vec3::new(0.012, -0.035, 0.0));
     run(&mut app, if arguments.most > 1 { 1800 } else { 2 });
     Ok(arguments.save(pictures.draw(&mut app)?, "ringlet")?)
 }
