@@ -233,9 +233,16 @@ pub fn ringlet(arguments: &Arguments) -> Result {
         }
     }
     let camera = bust::camera(&mut app);
-    let size = arguments.scaled(600, 480);
+    let size = arguments.scaled(720, 480);
     let pictures = Pictures::new(&mut app, size, arguments.supersample, camera);
-    bust::look(&mut app, Vec3::new(0.012, -0.035, 0.24), Vec3::new(0.012, -0.035, 0.0));
+    // A long lens.
+    let world = app.world_mut();
+    for mut lens in world.query::<&mut Projection>().iter_mut(world) {
+        if let Projection::Perspective(lens) = &mut *lens {
+            lens.fov *= 0.55;
+        }
+    }
+    bust::look(&mut app, Vec3::new(0.016, -0.035, 0.24), Vec3::new(0.016, -0.035, 0.0));
     run(&mut app, if arguments.most > 1 { 1800 } else { 2 });
     Ok(arguments.save(pictures.draw(&mut app)?, "ringlet")?)
 }
