@@ -28,6 +28,9 @@ pub(super) const MAX_TARGETS: usize = 1 << 21;
 /// The maximum number of obstacles in a record.
 pub const MAX_OBSTACLES: usize = 128;
 
+// `bearer_of` in `strand.wgsl` has eight bits.
+const _: () = assert!(MAX_OBSTACLES <= 256);
+
 /// The maximum number of blowers in a record.
 pub const MAX_BLOWERS: usize = 4;
 

@@ -411,7 +411,7 @@ fn hair_on_the_floor_lies_still_and_holds_its_length() {
 }
 
 /// AVX2 and AVX-512 agree bit for bit; SSE2 rounds a product before it is added, which they do not. A node that lands
-/// then may do so a substep earlier or later, so velocities are compared to a tenth of what nodes land at.
+/// then may do so a substep earlier or later, so velocities differ most.
 #[test]
 fn instruction_sets_agree() {
     let wall = Solid::HalfSpace { normal: Vec3::X, point: Vec3::X * -0.01 };
@@ -441,7 +441,7 @@ fn instruction_sets_agree() {
             .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max))
             .collect();
         println!("{name} is up to {most:?} (m, m/s, frame) from {best}");
-        let allowed = if *name == "sse2" { [1e-3, 1e-1, 1e-2] } else { [0.0; 3] };
+        let allowed = if *name == "sse2" { [5e-4, 5e-2, 1e-2] } else { [0.0; 3] };
         assert!(most.iter().zip(allowed).all(|(most, allowed)| *most <= allowed), "{name}");
     }
 }
