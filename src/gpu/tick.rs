@@ -57,7 +57,7 @@ pub(super) fn decide(
             &HairResidence,
             Option<&mut GpuHair>,
             Option<&mut StaysOnCpu>,
-            Option<Ref<Strands>>,
+            Option<&Strands>,
             Option<&mut HairReach>,
             Option<&GpuJournal>,
         ),
@@ -166,9 +166,7 @@ pub(super) fn decide(
         if on.is_returning() {
             continue;
         }
-        let regroomed = members.is_none_or(|members| {
-            members.is_changed() && members.collection()[..] != on.members[..]
-        });
+        let regroomed = members.is_none_or(|members| members.collection()[..] != on.members[..]);
         let reasons = [
             (!wants, WhyCpu::NotAsked),
             (regroomed, WhyCpu::Unsupported(Unsupported::Regroomed)),

@@ -66,10 +66,13 @@ use bevy::prelude::*;
 pub struct Hair;
 
 /// Counts as changed where strands of a hair have come, gone or been enabled, or where game code has written
-/// to one: noted once a tick, before anything is derived from the strands. The only detector of that; it
-/// leaves out strands on the GPU.
+/// to one: noted once a tick, before anything is derived from the strands. The only detector of that; of
+/// strands on the GPU it knows when they come and go, not when they are written to.
 #[derive(Component, Clone, Copy, Debug, Default)]
-pub(crate) struct Regroomed;
+pub(crate) struct Regroomed {
+    /// Whether strands have come or gone since the tick before; if not, they were written to or enabled.
+    pub(crate) members: bool,
+}
 
 /// Makes an entity a strand of a [`Hair`].
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]

@@ -156,7 +156,7 @@ fn note_regrooming(
     written: Query<&StrandOf, (Or<(Changed<Strand>, Changed<StrandOf>)>, Here)>,
     mut enabled: RemovedComponents<Disabled>,
     of: Query<&StrandOf>,
-    mut hairs: Query<(Ref<Strands>, &mut Regroomed)>,
+    mut hairs: Query<(Option<Ref<Strands>>, &mut Regroomed)>,
 ) {
     let enabled = enabled.read().filter_map(|strand| of.get(strand).ok());
     for of in written.iter().chain(enabled) {
@@ -165,7 +165,9 @@ fn note_regrooming(
         }
     }
     for (members, mut regroomed) in &mut hairs {
-        if members.is_changed() {
+        let is_changed = members.is_some_and(|members| members.is_changed());
+        regroomed.bypass_change_detection().members = is_changed;
+        if is_changed {
             regroomed.set_changed();
         }
     }

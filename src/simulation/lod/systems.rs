@@ -14,7 +14,7 @@ use crate::{
         schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
         setting::{self, Ranged},
     },
-    hair::strand::{Hair, MotionOwner, Strand, Strands, keep_required, lacks_strands},
+    hair::strand::{Hair, MotionOwner, Regroomed, Strand, Strands, keep_required, lacks_strands},
 };
 use bevy::prelude::*;
 
@@ -70,7 +70,7 @@ fn choose(
         (
             &HairLod,
             &HairScreenShare,
-            Ref<Strands>,
+            (&Strands, Ref<Regroomed>),
             &mut PresentLod,
             &mut SubstepLimits,
             &MotionOwner,
@@ -84,7 +84,7 @@ fn choose(
     let budget = budget.clamped();
     let mut chosen: Vec<_> = hairs
         .iter_mut()
-        .map(|(lod, share, members, mut present, limits, owner)| {
+        .map(|(lod, share, (members, regroomed), mut present, limits, owner)| {
             let mut lod = lod.clamped();
             if *owner == MotionOwner::Settling {
                 // Frozen strands and followers would not come to rest, but hang as they were planted.
@@ -92,7 +92,7 @@ fn choose(
             }
             let before = present.level.saturating_sub(present.budget_levels);
             let wanted = model::choose(&lod.levels, lod.hysteresis, before, share.0);
-            if present.segments == 0 || members.is_changed() {
+            if present.segments == 0 || regroomed.is_changed() {
                 present.bypass_change_detection().segments =
                     strands.iter_many(members.collection()).map(Strand::edges).sum();
             }

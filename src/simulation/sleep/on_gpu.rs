@@ -10,7 +10,7 @@ use crate::{
         contact::{HairReach, TickColliders},
         environment::Winds,
     },
-    hair::strand::{HairOnGpu, Strands, TickPose},
+    hair::strand::{HairOnGpu, Regroomed, TickPose},
     solver::rod::obstacle::Solid,
 };
 use bevy::prelude::*;
@@ -53,20 +53,19 @@ fn watch(
             &TickPose,
             &mut SleepSnapshot,
             &mut Disturbance,
-            Option<Ref<Strands>>,
+            &Regroomed,
             Option<&HairReach>,
         ),
         HairOnGpu,
     >,
 ) {
     let mut scratch = Vec::new();
-    for (hair, frame, mut snapshot, mut disturbance, members, reach) in &mut hairs {
+    for (hair, frame, mut snapshot, mut disturbance, regroomed, reach) in &mut hairs {
         let near = colliders.near(frame, reach, &mut scratch);
         let seen = near.map(|placed| SeenCollider::of(frame, placed)).collect();
-        let is_regroomed = members.is_some_and(|members| members.is_changed());
         let WakeEvents { sleep, all_wake, solids, .. } = snapshot
             .bypass_change_detection()
-            .wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);
+            .wake_events(settings.of(hair), frame.now(), regroomed.members, seen, step.count);
         // Wind that reaches none of its strands keeps it awake as well.
         let air = winds.seen_from(frame);
         let is_blown = air.steady_wind() != Some(Vec3::ZERO)

@@ -16,7 +16,7 @@ use crate::{
     },
     hair::strand::{
         AddedMass, Hair, HairHere, HeldNodes, Pose, SimulatedHere, SleepCounts, SleepPose, Strand,
-        StrandModel, StrandOf, StrandSleep, Strands, TickPose, lacks_strands,
+        Regroomed, StrandModel, StrandOf, StrandSleep, TickPose, lacks_strands,
     },
     keratin::{
         bond::{BondChanges, BondInfluence, BondPlugin, Bonds, Cuticle},
@@ -251,7 +251,7 @@ fn update_sleep(
             &TickPose,
             &mut SleepSnapshot,
             &mut SleepCounts,
-            Option<Ref<Strands>>,
+            &Regroomed,
             Option<&HairReach>,
         ),
         HairHere,
@@ -272,7 +272,7 @@ fn update_sleep(
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
     let mut scratch = Vec::new();
-    for (hair, frame, mut snapshot, sleepers, members, reach) in &mut hairs {
+    for (hair, frame, mut snapshot, sleepers, regroomed, reach) in &mut hairs {
         index_of.insert(hair, wake_events.len());
         let snapshot = snapshot.bypass_change_detection();
         // Hair without simulated strands has none to wake; the first that it gets are awake.
@@ -284,7 +284,7 @@ fn update_sleep(
         // A collider that comes within reach counts as new while it is still far from any strand.
         let near = colliders.near(frame, reach, &mut scratch);
         let seen = near.map(|placed| SeenCollider::of(frame, placed)).collect();
-        let is_regroomed = members.is_some_and(|members| members.is_changed());
+        let is_regroomed = regroomed.members;
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);
         new.winds = winds.seen_from(frame);
