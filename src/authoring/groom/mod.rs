@@ -19,6 +19,7 @@ mod reshape;
 mod roots;
 pub mod salon;
 mod settings;
+mod shared;
 mod size;
 mod strays;
 pub mod tressfx;
@@ -37,19 +38,21 @@ pub use settings::GroomSettings;
 pub use size::OddSize;
 
 use crate::base::setting::InvalidValue;
+use shared::Shared;
 use bevy::prelude::*;
 
 /// Many strands as polylines, root first (m), optionally with widths, colours, UVs of the roots,
-/// marks of guides and bones that roots follow. An asset; immutable, so that its arrays are always consistent.
+/// marks of guides and bones that roots follow. An asset; immutable, so that its arrays are always consistent,
+/// and a clone shares them.
 #[derive(Asset, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct Groom {
-    points: Vec<Vec3>,
-    ends: Vec<u32>,
-    widths: Vec<f32>,
-    colors: Vec<LinearRgba>,
-    uvs: Vec<Vec2>,
-    guides: Vec<bool>,
+    points: Shared<Vec3>,
+    ends: Shared<u32>,
+    widths: Shared<f32>,
+    colors: Shared<LinearRgba>,
+    uvs: Shared<Vec2>,
+    guides: Shared<bool>,
     bones: RootBones,
 }
 
@@ -191,12 +194,24 @@ impl Groom {
         groom.checked()
     }
 
+    /// A groom as a file has it, not yet checked.
+    fn raw(
+        points: Vec<Vec3>,
+        ends: Vec<u32>,
+        widths: Vec<f32>,
+        colors: Vec<LinearRgba>,
+        uvs: Vec<Vec2>,
+    ) -> Self {
+        let (points, ends, widths) = (points.into(), ends.into(), widths.into());
+        Self { points, ends, widths, colors: colors.into(), uvs: uvs.into(), ..default() }
+    }
+
     /// The groom with a diameter (m) for each node, strand after strand.
     ///
     /// # Errors
     /// When there are not as many as nodes, or one is negative or not finite.
     pub fn with_widths(mut self, widths: Vec<f32>) -> Result<Self, GroomError> {
-        self.widths = widths;
+        self.widths = widths.into();
         self.checked()
     }
 
@@ -205,7 +220,7 @@ impl Groom {
     /// # Errors
     /// When there are not as many as nodes, or one is not finite.
     pub fn with_colors(mut self, colors: Vec<LinearRgba>) -> Result<Self, GroomError> {
-        self.colors = colors;
+        self.colors = colors.into();
         self.checked()
     }
 
@@ -214,7 +229,7 @@ impl Groom {
     /// # Errors
     /// When there are not as many as strands, or one is not finite.
     pub fn with_uvs(mut self, uvs: Vec<Vec2>) -> Result<Self, GroomError> {
-        self.uvs = uvs;
+        self.uvs = uvs.into();
         self.checked()
     }
 
@@ -224,7 +239,7 @@ impl Groom {
     /// # Errors
     /// When there are not as many as strands.
     pub fn with_guides(mut self, guides: Vec<bool>) -> Result<Self, GroomError> {
-        self.guides = guides;
+        self.guides = guides.into();
         self.checked()
     }
 
@@ -247,7 +262,7 @@ impl Groom {
         self.check().map(|()| self)
     }
 
-    /// Validates it: grooms also come from files and through reflection.
+    /// Validates it: grooms also come from files.
     fn check(&self) -> Result<(), GroomError> {
         self.check_ends()?;
         let fits = |what, found: usize, expected: usize| {

@@ -384,7 +384,7 @@ fn strands(mut found: Found, losses: &mut GroomLosses) -> Result<Groom, GroomFil
         return value(0, "the count of vertices", found, "vertices of whole strands", hint);
     }
     let Found { points, colors, widths, .. } = found;
-    Ok(Groom { points, ends, widths, colors, ..default() })
+    Ok(Groom::raw(points, ends, widths, colors, Vec::new()))
 }
 
 /// Ends of runs, where a vertex begins another one.

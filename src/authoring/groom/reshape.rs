@@ -181,7 +181,7 @@ impl Groom {
     /// An empty groom with capacity for as many strands.
     fn emptied(&self) -> Self {
         let bones = RootBones { names: self.bones.names.clone(), ..default() };
-        Self { ends: Vec::with_capacity(self.len()), bones, ..default() }
+        Self { ends: Vec::with_capacity(self.len()).into(), bones, ..default() }
     }
 
     fn push_node(&mut self, of: &GroomStrand<'_>, i: usize) {

@@ -138,7 +138,7 @@ pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
         losses.unread_arrays.add(GroomPlace::Part("indices of guides".to_owned()));
     }
     let ends = (1..=strands).map(|i| (i * each) as u32).collect();
-    Ok(Intake::cleaned(Groom { points, ends, widths, colors, uvs, ..default() }, losses)?)
+    Ok(Intake::cleaned(Groom::raw(points, ends, widths, colors, uvs), losses)?)
 }
 
 /// Most bones that a file may name: joints have indices of 16 bits.

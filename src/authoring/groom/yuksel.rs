@@ -137,7 +137,7 @@ pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
         end += segments + 1;
         ends.push(end);
     }
-    let raw = Groom { points, ends, widths: diameters, colors, ..default() };
+    let raw = Groom::raw(points, ends, diameters, colors, Vec::new());
     Ok(Intake::cleaned(raw, losses)?)
 }
 
@@ -150,8 +150,8 @@ const EXPORT_AGAIN: &str = "export the file again";
 /// Reading what was written gives the same groom, and writing that the same bytes.
 ///
 /// # Errors
-/// When the groom is empty, a strand has more than 65,535 segments, there are more strands than 32
-/// bits count, or it holds numbers, set through reflection, that [`read`] would refuse.
+/// When the groom is empty, a strand has more than 65,535 segments, or there are more strands than 32
+/// bits count.
 pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
     groom.check()?;
     if groom.is_empty() {
