@@ -26,10 +26,7 @@ pub use diagnostics::HairDiagnosticsPlugin;
 #[cfg(feature = "debug")]
 pub use {config::HairGizmos, gizmos::HairDebugPlugin};
 
-use crate::{
-    hair::strand::{Hair, OnGpu, StrandOf, StrandSleep},
-    simulation::{lod::PresentLod, settle::Settling},
-};
+use crate::hair::strand::{Hair, MotionOwner, StrandOf, StrandSleep};
 use bevy::{ecs::system::SystemParam, prelude::*};
 
 /// The room's share of [the prelude](crate::prelude).
@@ -39,7 +36,7 @@ pub mod prelude {
     pub use crate::debug::{HairDebugPlugin, HairGizmos};
 }
 
-/// What moves a strand.
+/// What moves a strand: its hair's [`MotionOwner`], and within that its own sleep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Owner {
     Simulated,
@@ -53,20 +50,18 @@ enum Owner {
 /// What moves each strand.
 #[derive(SystemParam)]
 struct Owners<'w, 's> {
-    hairs: Query<'w, 's, (Has<OnGpu>, Has<Settling>, Option<&'static PresentLod>), With<Hair>>,
+    hairs: Query<'w, 's, &'static MotionOwner, With<Hair>>,
 }
 
 impl Owners<'_, '_> {
     fn of(&self, strand: &StrandOf, sleep: &StrandSleep) -> Owner {
-        let (on_gpu, settles, lod) = self.hairs.get(strand.0).unwrap_or_default();
-        let is_frozen = lod.is_some_and(|lod| lod.simulated_share() <= 0.0);
-        match sleep.is_follower() {
-            _ if on_gpu => Owner::Gpu,
-            true if is_frozen => Owner::Frozen,
-            _ if settles => Owner::Settling,
-            true => Owner::Follower,
-            false if sleep.is_asleep() => Owner::Asleep,
-            false => Owner::Simulated,
+        match self.hairs.get(strand.0).copied().unwrap_or_default() {
+            MotionOwner::Gpu | MotionOwner::AsleepOnGpu => Owner::Gpu,
+            MotionOwner::Frozen => Owner::Frozen,
+            MotionOwner::Settling => Owner::Settling,
+            _ if sleep.is_follower() => Owner::Follower,
+            _ if sleep.is_asleep() => Owner::Asleep,
+            _ => Owner::Simulated,
         }
     }
 }

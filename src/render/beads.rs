@@ -239,14 +239,15 @@ fn pack(
 }
 
 /// Room for `count` beads where there is room for `present`: made smaller where it is much too large, because all
-/// of it is written in every frame.
+/// of it is written whenever beads change.
 fn capacity(count: usize, present: usize) -> usize {
     let fits = count.max(MIN_CAPACITY).next_power_of_two();
     if (fits..4 * fits).contains(&present) { present } else { fits }
 }
 
-/// Writes the beads to the GPU. A buffer created in this frame is uploaded with its contents instead.
+/// Writes beads that have changed to the GPU. A buffer created in this frame is uploaded with its contents instead.
 fn upload(
+    mut is_stale: Local<bool>,
     drawn: Extract<Option<Res<DrawnBeads>>>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
     queue: Option<Res<RenderQueue>>,
@@ -255,12 +256,15 @@ fn upload(
         return;
     };
     let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
+    *is_stale |= drawn.is_changed() || queue.is_changed();
     // Skipped in the frame in which a new device's queue is combined with buffers of a lost one.
-    if let Some(gpu) = buffers.get(&drawn.buffer)
+    if *is_stale
+        && let Some(gpu) = buffers.get(&drawn.buffer)
         && !queue.is_changed()
         && gpu.buffer.size() == bytes.len() as u64
     {
         queue.write_buffer(&gpu.buffer, 0, bytes);
+        *is_stale = false;
     }
 }
 

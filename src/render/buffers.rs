@@ -27,7 +27,7 @@ use half::{f16, slice::HalfFloatSliceExt};
 /// handles change too.
 #[derive(Component, Reflect, Clone, Debug)]
 #[component(clone_behavior = Ignore)]
-#[reflect(Component, Clone)]
+#[reflect(Clone)]
 pub struct HairBuffers {
     /// The nodes of all guides, one guide after the other.
     pub nodes: Handle<ShaderBuffer>,

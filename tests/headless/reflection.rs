@@ -2,7 +2,7 @@
 
 use bevy::{
     asset::AssetPlugin,
-    ecs::reflect::AppTypeRegistry,
+    ecs::reflect::{AppTypeRegistry, ReflectComponent},
     prelude::*,
     reflect::{TypeInfo, enums::VariantInfo},
     render::storage::ShaderBuffer,
@@ -81,6 +81,33 @@ fn every_public_reflected_type_is_registered() {
     }
     assert!(missing.is_empty(), "not registered: {missing:#?}");
     assert!(known > 60, "only {known} types were found");
+}
+
+#[test]
+fn scenes_leave_out_what_follows_from_other_state() {
+    let app = app();
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let is_written = |name: &str| {
+        let kind = registry.get_with_short_type_path(name).expect(name);
+        kind.data::<ReflectComponent>().is_some()
+    };
+    let derived = [
+        "AddedMass",
+        "BlownAir",
+        "Guides",
+        "HairBuffers",
+        "LockNeighbours",
+        "Obstacles",
+        "RestShape",
+        "SleepPose",
+        "StrandHistory",
+        "TickPose",
+        "TiedRoots",
+    ];
+    assert_eq!(derived.into_iter().find(|name| is_written(name)), None);
+    let state =
+        ["Bonds", "HairStyle", "Moisture", "RootsOnMesh", "Strand", "Treatments", "WearHair"];
+    assert_eq!(state.into_iter().find(|name| !is_written(name)), None);
 }
 
 /// The names of public structs and enums that derive `Reflect`, with their files.

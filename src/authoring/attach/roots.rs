@@ -91,7 +91,7 @@ impl PlantedRoot {
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct TiedRoots {
     #[reflect(ignore)]
     pub(super) roots: Vec<Tied>,

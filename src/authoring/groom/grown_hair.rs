@@ -137,7 +137,6 @@ impl Groom {
     /// The strands and followers that [`Groom::spawn`] spawns.
     pub(crate) fn grown_strands(&self, guides: &GroomGuides) -> Result<GrownStrands, GroomError> {
         guides.checked()?;
-        self.check()?;
         if self.is_empty() {
             return Err(GroomError::Empty);
         }

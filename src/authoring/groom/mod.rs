@@ -38,14 +38,14 @@ pub use settings::GroomSettings;
 pub use size::OddSize;
 
 use crate::base::setting::InvalidValue;
-use shared::Shared;
 use bevy::prelude::*;
+use shared::Shared;
 
 /// Many strands as polylines, root first (m), optionally with widths, colours, UVs of the roots,
 /// marks of guides and bones that roots follow. An asset; immutable, so that its arrays are always consistent,
 /// and a clone shares them.
 #[derive(Asset, Reflect, Clone, Debug, Default, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
+#[reflect(opaque, Default, Clone, PartialEq)]
 pub struct Groom {
     points: Shared<Vec3>,
     ends: Shared<u32>,

@@ -1,47 +1,45 @@
 //! Arrays that copies of a groom share until one of them is written to.
 
-use bevy::prelude::*;
 use std::{
     ops::{Deref, DerefMut},
     sync::Arc,
 };
 
 /// A list that its first writer copies, not whoever clones it.
-#[derive(Reflect, Debug)]
-#[reflect(opaque, Clone)]
-pub(super) struct Shared<T: Send + Sync + 'static>(Arc<Vec<T>>);
+#[derive(Debug)]
+pub(super) struct Shared<T>(Arc<Vec<T>>);
 
-impl<T: Send + Sync + 'static> Clone for Shared<T> {
+impl<T> Clone for Shared<T> {
     fn clone(&self) -> Self {
         Self(Arc::clone(&self.0))
     }
 }
 
-impl<T: Send + Sync + 'static> Default for Shared<T> {
+impl<T> Default for Shared<T> {
     fn default() -> Self {
         Vec::new().into()
     }
 }
 
-impl<T: PartialEq + Send + Sync + 'static> PartialEq for Shared<T> {
+impl<T: PartialEq> PartialEq for Shared<T> {
     fn eq(&self, other: &Self) -> bool {
         self.0 == other.0
     }
 }
 
-impl<T: Send + Sync + 'static> From<Vec<T>> for Shared<T> {
+impl<T> From<Vec<T>> for Shared<T> {
     fn from(list: Vec<T>) -> Self {
         Self(Arc::new(list))
     }
 }
 
-impl<T: Send + Sync + 'static> FromIterator<T> for Shared<T> {
+impl<T> FromIterator<T> for Shared<T> {
     fn from_iter<I: IntoIterator<Item = T>>(items: I) -> Self {
         Vec::from_iter(items).into()
     }
 }
 
-impl<T: Send + Sync + 'static> Deref for Shared<T> {
+impl<T> Deref for Shared<T> {
     type Target = Vec<T>;
 
     fn deref(&self) -> &Vec<T> {
@@ -49,7 +47,7 @@ impl<T: Send + Sync + 'static> Deref for Shared<T> {
     }
 }
 
-impl<T: Clone + Send + Sync + 'static> DerefMut for Shared<T> {
+impl<T: Clone> DerefMut for Shared<T> {
     fn deref_mut(&mut self) -> &mut Vec<T> {
         Arc::make_mut(&mut self.0)
     }

@@ -153,7 +153,6 @@ const EXPORT_AGAIN: &str = "export the file again";
 /// When the groom is empty, a strand has more than 65,535 segments, or there are more strands than 32
 /// bits count.
 pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
-    groom.check()?;
     if groom.is_empty() {
         return Err(GroomError::Empty);
     }

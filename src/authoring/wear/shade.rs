@@ -13,7 +13,7 @@ use crate::{
     },
     hair::{
         look::{HairColor, HairDye, HairLook},
-        strand::Settling,
+        strand::MotionOwner,
     },
     render::FollowerRoots,
 };
@@ -169,20 +169,20 @@ fn remove_shells(
 /// Shows shells that are made, once their hair has settled.
 fn show(
     mut commands: Commands,
-    mut hairs: Query<(Entity, &mut Shading, Has<Settling>)>,
+    mut hairs: Query<(Entity, &mut Shading, &MotionOwner)>,
     skins: Query<(&Mesh3d, Option<&SkinnedMesh>, Option<&MeshMorphWeights>, Option<&RenderLayers>)>,
     shown: Query<(Entity, &ChildOf), With<ScalpShell>>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
-    for (hair, mut shading, is_settling) in &mut hairs {
+    for (hair, mut shading, owner) in &mut hairs {
         if let Shading::Making(task) = &mut *shading
             && let Some(made) = check_ready(task)
         {
             *shading = Shading::Made(made);
         }
         let Shading::Made(shells) = &mut *shading else { continue };
-        if is_settling {
+        if *owner == MotionOwner::Settling {
             continue;
         }
         let shells = core::mem::take(shells);

@@ -57,7 +57,7 @@ setting! {
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct Obstacles {
     /// The solids.
     #[reflect(ignore)]
@@ -71,7 +71,7 @@ pub struct Obstacles {
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct LockNeighbours {
     #[reflect(ignore)]
     lists: neighbours::Neighbours,

@@ -81,7 +81,7 @@ impl Blown {
 /// The effect of the air on each node of a wet strand, root first. Kept by the tick while any air moves.
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct BlownAir {
     #[reflect(ignore)]
     pub(crate) nodes: Vec<Blown>,

@@ -17,7 +17,7 @@ use bevy::{
 /// where the entity is at the end of the tick.
 #[derive(Component, Reflect, Clone, Debug)]
 #[component(clone_behavior = Ignore)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct TickPose {
     from: Option<Pose>,
     to: Pose,

@@ -161,7 +161,7 @@ pub struct Strand {
 /// Positions of a strand's nodes at the end of the previous tick, in the hair's frame: drawing
 /// interpolates from these to the present ones by the overstep of the fixed clock.
 #[derive(Component, Reflect, Clone, Debug, Default)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct StrandHistory {
     /// Positions (m), root first; empty until the first tick.
     pub positions: Vec<Vec3>,
@@ -215,7 +215,7 @@ impl Ranged for StrandModel {}
 /// What makes a strand heavier and softer than in its dry state, such as water. Written by the
 /// tick; empty on dry hair.
 #[derive(Component, Reflect, Clone, Debug, Default)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct AddedMass {
     /// Added mass of each node, over its dry mass. Inverse masses, wind and contacts depend on it.
     #[reflect(ignore)]

@@ -98,7 +98,7 @@ impl SleepCounts {
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct SleepPose {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) orientations: Vec<Quat>,

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 /// Rest shape and stiffness of a rod's joints in this substep, written by `RestShape`, read by
 /// `Projection`.
 #[derive(Component, Reflect, Clone, Debug, Default)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct RestShape {
     /// Rest shape of each joint, a full quaternion with real part ≥ 0: for the direct solver the shape
     /// that closed bonds remember, Ω* = Σ f b Ω_j / Σ f b; for sweeps Ω0 of equation 15, which follows

@@ -31,7 +31,7 @@ pub struct Follower {
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
-#[reflect(Component, Default, Clone)]
+#[reflect(Default, Clone)]
 pub struct Guides {
     /// In spread order.
     #[reflect(ignore)]

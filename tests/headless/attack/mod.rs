@@ -548,6 +548,7 @@ fn springs_shaken_against_a_head_recover() {
 /// A world with two heads of hair.
 fn world() -> App {
     let mut app = test_app(60.0);
+    operations::reach_derived(&mut app);
     for x in [0.0, 1.0] {
         let hair = app.world_mut().spawn((Hair, Transform::from_xyz(x, 0.0, 0.0))).id();
         for i in 0..8 {

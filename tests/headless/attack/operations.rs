@@ -13,8 +13,15 @@ use bevy::{
 use bevy_keratin::{
     AddedMass, BondChanges, HairLod, HairSubsteps, Shower, SleepSettings, SoakHair, SolverMethod,
     WindReceived, WindZone,
-    hair::strand::{StrandSleep, TickPose},
+    authoring::attach::TiedRoots,
+    forces::{
+        contact::{LockNeighbours, Obstacles},
+        environment::BlownAir,
+    },
+    hair::strand::{SleepPose, StrandHistory, StrandSleep, TickPose},
+    keratin::bond::RestShape,
     prelude::*,
+    simulation::lod::Guides,
 };
 use rand::{RngExt, rngs::Xoshiro256PlusPlus, seq::IndexedRandom};
 
@@ -34,6 +41,20 @@ const WRONG: [f32; 12] = [
     0.37,
     1e6,
 ];
+
+/// Lets operations reach what scenes leave out as derived, and code may touch all the same.
+pub fn reach_derived(app: &mut App) {
+    app.register_type_data::<AddedMass, ReflectComponent>()
+        .register_type_data::<BlownAir, ReflectComponent>()
+        .register_type_data::<Guides, ReflectComponent>()
+        .register_type_data::<LockNeighbours, ReflectComponent>()
+        .register_type_data::<Obstacles, ReflectComponent>()
+        .register_type_data::<RestShape, ReflectComponent>()
+        .register_type_data::<SleepPose, ReflectComponent>()
+        .register_type_data::<StrandHistory, ReflectComponent>()
+        .register_type_data::<TickPose, ReflectComponent>()
+        .register_type_data::<TiedRoots, ReflectComponent>();
+}
 
 /// Writes something into a part of a value, however deep. Says where.
 fn spoil(value: &mut dyn PartialReflect, random: &mut Random) -> String {

@@ -264,23 +264,9 @@ fn numbers_that_hair_cannot_have_are_refused() {
 }
 
 #[test]
-fn what_reflection_breaks_is_an_error_and_no_panic() {
-    let groom = Groom::from_polylines([[Vec3::ZERO, Vec3::Y], [Vec3::X, Vec3::ONE]]).unwrap();
-    let ends = |ends: Vec<u32>| {
-        let mut broken = groom.clone();
-        let field = broken.reflect_mut().as_struct().unwrap().field_mut("ends").unwrap();
-        field.apply(&ends);
-        *field.try_downcast_mut::<Vec<u32>>().unwrap() = ends;
-        broken
-    };
-    for broken in [vec![2, 9], vec![3, 1], vec![4, u32::MAX], vec![2, 2], vec![2, 3]] {
-        let broken = ends(broken);
-        let error = yuksel::write(&broken).unwrap_err();
-        let mut world = World::new();
-        let hair = world.spawn_empty().id();
-        let grown = broken.spawn(&mut world.commands(), hair, &default());
-        assert_eq!(grown.unwrap_err(), error);
-    }
+fn reflection_cannot_make_arrays_disagree() {
+    let mut groom = Groom::from_polylines([[Vec3::ZERO, Vec3::Y]]).unwrap();
+    assert!(groom.reflect_mut().as_opaque().is_ok());
 }
 
 #[test]

@@ -216,9 +216,8 @@ pub(super) fn floats(numbers: impl IntoIterator<Item = f32>) -> Vec<u8> {
 /// ```
 ///
 /// # Errors
-/// When the groom is empty, or holds numbers, set through reflection, that [`read`](super::read) would refuse.
+/// When the groom is empty.
 pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
-    groom.check()?;
     let (low, high) = groom.extents().ok_or(GroomError::Empty)?;
     let mut archive = Archive::new();
     let bounds = [low, high].map(|corner| corner.to_array().map(f64::from)).concat();
