@@ -74,9 +74,9 @@ fn darboux(before: DQuat, q: DQuat) -> DQuat {
     if omega.w < 0.0 { -omega } else { omega }
 }
 
-/// How a contact pass treats motion along the surface.
+/// What friction does in a pass over the contacts.
 #[derive(Clone, Copy, PartialEq)]
-enum Grip {
+enum FrictionPass {
     None,
     Depth,
     Between,
@@ -199,19 +199,19 @@ impl Twin {
         let stage = (theta, between, root_turn, damping, twice);
         self.newton(r, stage, if twice { 1.0 } else { 1.0 / theta }, false);
         for step in 1..if twice && !self.trapped { MOST_STEPS } else { 1 } {
-            let changed = self.contacts(r, Grip::Judged);
+            let changed = self.contacts(r, FrictionPass::Judged);
             if changed || (fast && step == 1) {
                 self.newton(r, stage, 1.0 / theta, true);
             } else {
                 break;
             }
         }
-        self.contacts(r, Grip::Solved);
+        self.contacts(r, FrictionPass::Solved);
         for pass in 0..r.limiter_steps {
             if !self.limit(if pass == 0 { -1.0 } else { TOLERANCE }) {
                 break;
             }
-            self.contacts(r, Grip::Between);
+            self.contacts(r, FrictionPass::Between);
             let repairs = if pass + 1 == r.limiter_steps { REPAIRS + 1 } else { 0 };
             for repair in 0..repairs {
                 let is_last = repair == REPAIRS;
@@ -219,7 +219,7 @@ impl Twin {
                 if !self.clamp_lengths(if is_last { most } else { TORN }) || is_last {
                     break;
                 }
-                self.contacts(r, Grip::Between);
+                self.contacts(r, FrictionPass::Between);
             }
         }
         self.finish(dt, theta);
@@ -369,7 +369,7 @@ impl Twin {
             }
             self.p[i] = to;
         }
-        self.contacts(r, Grip::Assumed);
+        self.contacts(r, FrictionPass::Assumed);
     }
 
     /// How deep it is in obstacles beyond what its root allows: the most, and the sum.
@@ -396,7 +396,7 @@ impl Twin {
         self.from[1..=edges].copy_from_slice(&self.p[1..=edges]);
         for _ in 0..LEAVING.min(2 * edges) {
             self.rounds += 1;
-            self.contacts(r, Grip::None);
+            self.contacts(r, FrictionPass::None);
             if !self.limit(TORN) {
                 return;
             }
@@ -417,27 +417,27 @@ impl Twin {
     }
 
     /// Whether a node has been found to stick, slide, rest or leave that did not.
-    fn contacts(&mut self, r: &SubstepRecord, grip: Grip) -> bool {
+    fn contacts(&mut self, r: &SubstepRecord, pass: FrictionPass) -> bool {
         self.touched = false;
         let mut changed = false;
         for i in 0..=self.edges() {
             let state = |t: &Self| (t.support[i] != DVec3::ZERO, t.sticks[i], t.drag[i] > 0.0);
             let before = state(self);
-            self.touch(r, i, grip);
+            self.touch(r, i, pass);
             changed |= before != state(self);
         }
         changed
     }
 
-    fn touch(&mut self, r: &SubstepRecord, i: usize, grip: Grip) {
+    fn touch(&mut self, r: &SubstepRecord, i: usize, pass: FrictionPass) {
         let (from, rested) = (self.from[i], self.support[i] != DVec3::ZERO);
         let (mut p, mut support, mut touched) = (self.p[i], DVec3::ZERO, false);
         let (mut sticks, mut drag, mut deepest) = (false, 0.0, -1.0);
         let (bearing, slid) = (self.support[i].dot(self.reaction[i]), self.drag[i] > 0.0);
-        if matches!(grip, Grip::Between | Grip::Solved) {
+        if matches!(pass, FrictionPass::Between | FrictionPass::Solved) {
             (sticks, drag) = (self.sticks[i], self.drag[i]);
         }
-        if grip == Grip::Between && rested {
+        if pass == FrictionPass::Between && rested {
             (support, touched) = (self.support[i], true);
         }
         for o in &r.obstacles {
@@ -452,7 +452,7 @@ impl Twin {
             let layer = (r.skin, may_be);
             let mut push = push_out(o, p, layer);
             let mut stays = false;
-            if grip == Grip::Assumed {
+            if pass == FrictionPass::Assumed {
                 let (normal, depth) = depth(&o.solid, start, r.skin);
                 stays = depth - may_be > -TOUCHING;
                 if stays {
@@ -460,7 +460,7 @@ impl Twin {
                     push = Some((start + normal * (depth - may_be).max(0.0), normal, pushed));
                 }
             }
-            if matches!(grip, Grip::Judged | Grip::Solved) && rested {
+            if matches!(pass, FrictionPass::Judged | FrictionPass::Solved) && rested {
                 let (normal, depth) = depth(&o.solid, p, r.skin);
                 let depth = depth - may_be;
                 if depth > -TOUCHING && bearing > 0.0 {
@@ -471,10 +471,10 @@ impl Twin {
             }
             let Some((out, normal, depth)) = push else { continue };
             touched = true;
-            let bears = grip == Grip::Depth || depth > deepest;
+            let bears = pass == FrictionPass::Depth || depth > deepest;
             if bears {
                 (deepest, support) = (depth, normal);
-                if matches!(grip, Grip::Assumed | Grip::Judged) {
+                if matches!(pass, FrictionPass::Assumed | FrictionPass::Judged) {
                     self.anchor[i] = start;
                 }
             }
@@ -483,14 +483,14 @@ impl Twin {
             let most = f64::from(o.friction) * depth;
             let coulomb = (most / slip.length().max(1e-12)).min(1.0);
             let holding = self.reaction[i] - normal * self.reaction[i].dot(normal);
-            let held = match grip {
-                Grip::None => 0.0,
-                Grip::Depth => coulomb,
-                Grip::Assumed => {
+            let held = match pass {
+                FrictionPass::None => 0.0,
+                FrictionPass::Depth => coulomb,
+                FrictionPass::Assumed => {
                     sticks = if bears { stays } else { sticks };
                     0.0
                 }
-                Grip::Judged => {
+                FrictionPass::Judged => {
                     let pull = if slid { holding } else { holding - slip };
                     let size = holding.length().max(1e-12);
                     let holds = match slid {
@@ -503,16 +503,16 @@ impl Twin {
                     }
                     0.0
                 }
-                Grip::Solved if sticks => 1.0,
-                Grip::Between if drag > 0.0 => 0.0,
-                Grip::Solved if drag > 0.0 => {
+                FrictionPass::Solved if sticks => 1.0,
+                FrictionPass::Between if drag > 0.0 => 0.0,
+                FrictionPass::Solved if drag > 0.0 => {
                     if slip.dot(holding) > 0.0 {
                         1.0
                     } else {
                         0.0
                     }
                 }
-                Grip::Solved | Grip::Between => coulomb,
+                FrictionPass::Solved | FrictionPass::Between => coulomb,
             };
             p = if i == 0 { p } else { out - slip * held };
         }

@@ -38,8 +38,8 @@ pub use settings::GroomSettings;
 pub use size::OddSize;
 
 use crate::base::setting::InvalidValue;
-use shared::Shared;
 use bevy::prelude::*;
+use shared::Shared;
 
 /// Many strands as polylines, root first (m), optionally with widths, colours, UVs of the roots,
 /// marks of guides and bones that roots follow. An asset; immutable, so that its arrays are always consistent,

@@ -186,7 +186,7 @@ fn sweep_over() {
         }
         set_node(i, n1.xyz + c.p1, n1.w);
         if touching {
-            touch(i, 0.0, GRIP_DEPTH);
+            touch(i, 0.0, FRICTION_PASS_DEPTH);
         }
         before = renormalized(q + c.q);
         n1 = vec4(n2.xyz + c.p2, n2.w);
@@ -194,7 +194,7 @@ fn sweep_over() {
     set_frame(edges - 1u, before);
     set_node(edges, n1.xyz, n1.w);
     if touching {
-        touch(edges, 0.0, GRIP_DEPTH);
+        touch(edges, 0.0, FRICTION_PASS_DEPTH);
     }
 }
 
@@ -248,12 +248,12 @@ fn sweep_step() {
     }
     for (var done = 0u; done < record.limiter_steps; done++) {
         limit_all();
-        contacts(GRIP_DEPTH);
+        contacts(FRICTION_PASS_DEPTH);
         // Hair pressed on a surface has to fold; each pass can fold it further.
         for (var again = 1u; again < PASSES_IN_TOUCH; again++) {
             if touched {
                 _ = limit(0.0, false, true);
-                contacts(GRIP_DEPTH);
+                contacts(FRICTION_PASS_DEPTH);
             }
         }
     }

@@ -48,14 +48,7 @@ fn watch(
     colliders: Res<TickColliders>,
     winds: Winds,
     mut hairs: Query<
-        (
-            Entity,
-            &TickPose,
-            &mut SleepSnapshot,
-            &mut Disturbance,
-            &Regroomed,
-            Option<&HairReach>,
-        ),
+        (Entity, &TickPose, &mut SleepSnapshot, &mut Disturbance, &Regroomed, Option<&HairReach>),
         HairOnGpu,
     >,
 ) {

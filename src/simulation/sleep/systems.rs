@@ -15,8 +15,8 @@ use crate::{
         environment::{AirDrag, Gravity, LocalWinds, Winds},
     },
     hair::strand::{
-        AddedMass, Hair, HairHere, HeldNodes, Pose, SimulatedHere, SleepCounts, SleepPose, Strand,
-        Regroomed, StrandModel, StrandOf, StrandSleep, TickPose, lacks_strands,
+        AddedMass, Hair, HairHere, HeldNodes, Pose, Regroomed, SimulatedHere, SleepCounts,
+        SleepPose, Strand, StrandModel, StrandOf, StrandSleep, TickPose, lacks_strands,
     },
     keratin::{
         bond::{BondChanges, BondInfluence, BondPlugin, Bonds, Cuticle},
@@ -246,14 +246,7 @@ fn update_sleep(
     colliders: Res<TickColliders>,
     winds: Winds,
     mut hairs: Query<
-        (
-            Entity,
-            &TickPose,
-            &mut SleepSnapshot,
-            &mut SleepCounts,
-            &Regroomed,
-            Option<&HairReach>,
-        ),
+        (Entity, &TickPose, &mut SleepSnapshot, &mut SleepCounts, &Regroomed, Option<&HairReach>),
         HairHere,
     >,
     mut strands: Query<

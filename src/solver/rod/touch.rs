@@ -182,9 +182,9 @@ pub(crate) fn predict_nodes<S: Simd>(
     );
 }
 
-/// How a contact pass treats motion along the surface.
+/// What friction does in a pass over the contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Grip {
+pub(crate) enum FrictionPass {
     /// No friction.
     None,
     /// Coulomb friction, whose normal force is the depth that the node is pushed out by.
@@ -208,7 +208,7 @@ pub(crate) fn contacts<S: Simd>(
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
-    contacts_with(simd, b, clearance, obstacles, Grip::Depth, f32x16::splat(simd, 1.0));
+    contacts_with(simd, b, clearance, obstacles, FrictionPass::Depth, f32x16::splat(simd, 1.0));
 }
 
 /// [`contacts`] with another friction, in the lanes that are not 0.
@@ -218,7 +218,7 @@ pub(super) fn contacts_with<S: Simd>(
     b: &mut BlockLanes,
     clearance: f32,
     obstacles: &[Obstacle],
-    grip: Grip,
+    pass: FrictionPass,
     lanes: f32x16<S>,
 ) {
     simd.vectorize(
@@ -242,14 +242,14 @@ pub(super) fn contacts_with<S: Simd>(
                     true => *near,
                     false => close.at(load3(simd, &n.p), *near),
                 };
-                let judged = grip == Grip::Judged;
+                let judged = pass == FrictionPass::Judged;
                 let before = if judged { contact_state(simd, n) } else { zero };
                 if near == NearObstacles::NONE {
                     n.release();
                 } else {
                     let fast = b.has_fast_nodes;
                     let touches =
-                        touch(simd, n, near, fast, clearance, obstacles, grip, lanes, limit);
+                        touch(simd, n, near, fast, clearance, obstacles, pass, lanes, limit);
                     touched = Real::max(touched, touches);
                 }
                 if judged {
@@ -284,7 +284,7 @@ pub(super) fn touch<S: Simd>(
     has_fast_nodes: bool,
     clearance: f32,
     obstacles: &[Obstacle],
-    grip: Grip,
+    pass: FrictionPass,
     lanes: f32x16<S>,
     limit: Option<AllowedPenetration<S>>,
 ) -> f32x16<S> {
@@ -298,10 +298,10 @@ pub(super) fn touch<S: Simd>(
             let rested = n.support(simd);
             let is_rested = Real::lt(zero, rested.dot(rested));
             let (mut p, mut rests_on, mut touched) = (load3(simd, &n.p), none, zero);
-            if grip == Grip::Between {
+            if pass == FrictionPass::Between {
                 (rests_on, touched) = (rested, Real::select(is_rested, one, zero));
             }
-            let mut friction = Friction::of(simd, n, grip);
+            let mut friction = Friction::of(simd, n, pass);
             let bearing = rested.dot(friction.reaction);
             let mut deepest = f32x16::splat(simd, -1.0);
             for o in near.of(obstacles) {
@@ -319,9 +319,9 @@ pub(super) fn touch<S: Simd>(
                     rests_on = V3::select(stopped, normal, rests_on);
                     touched = Real::select(stopped, one, touched);
                 }
-                let push = match grip {
-                    Grip::Assumed => rest_on(o, p, from, clearance, allowed),
-                    Grip::Judged | Grip::Solved => {
+                let push = match pass {
+                    FrictionPass::Assumed => rest_on(o, p, from, clearance, allowed),
+                    FrictionPass::Judged | FrictionPass::Solved => {
                         bear_on(o, p, is_rested, bearing, clearance, allowed)
                     }
                     _ => push_out(o, p, clearance, allowed).map(|push| (push, zero)),
@@ -330,7 +330,7 @@ pub(super) fn touch<S: Simd>(
                     let pushed = Real::lt(zero, push.normal.dot(push.normal) * lanes);
                     // Between two solids it rests on the one that bears more.
                     let bears = pushed & Real::lt(deepest, push.depth);
-                    let bears = if grip == Grip::Depth { pushed } else { bears };
+                    let bears = if pass == FrictionPass::Depth { pushed } else { bears };
                     let out = friction.after(&push, o, from, is_rested, pushed, bears, stays);
                     p = V3::select(held, p, out);
                     deepest = Real::select(bears, push.depth, deepest);
@@ -340,7 +340,7 @@ pub(super) fn touch<S: Simd>(
             }
             store3(&mut n.p, p);
             let active = Real::lt(zero, lanes);
-            if grip == Grip::Judged {
+            if pass == FrictionPass::Judged {
                 rests_on = V3::select(active, rests_on, rested);
             }
             store3(&mut n.rests_on, rests_on);
@@ -413,7 +413,7 @@ fn bear_on<S: Simd>(
 
 /// Friction on a node in a pass.
 struct Friction<S: Simd> {
-    kind: Grip,
+    pass: FrictionPass,
     sticks: f32x16<S>,
     drag: f32x16<S>,
     /// Above 0 if it slid in the Newton step before.
@@ -428,15 +428,15 @@ pub(crate) const REVERSING: f32 = 1e-7;
 
 impl<S: Simd> Friction<S> {
     #[inline(always)]
-    fn of(simd: S, n: &NodeLanes, kind: Grip) -> Self {
+    fn of(simd: S, n: &NodeLanes, pass: FrictionPass) -> Self {
         // What sticks has no drag.
         let slid = load(simd, &n.drag);
-        let (sticks, drag) = match kind {
-            Grip::Solved | Grip::Between => (load(simd, &n.sticks), slid),
+        let (sticks, drag) = match pass {
+            FrictionPass::Solved | FrictionPass::Between => (load(simd, &n.sticks), slid),
             _ => (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0)),
         };
         let (anchor, reaction) = (load3(simd, &n.anchor), load3(simd, &n.reaction));
-        Self { kind, sticks, drag, anchor, reaction, slid }
+        Self { pass, sticks, drag, anchor, reaction, slid }
     }
 
     /// Where a node gets to that is pushed out of `o`. `rested`: before this pass; `bears`: more than others so far;
@@ -452,20 +452,20 @@ impl<S: Simd> Friction<S> {
         bears: mask32x16<S>,
         stays: f32x16<S>,
     ) -> V3<f32x16<S>> {
-        if self.kind == Grip::None {
+        if self.pass == FrictionPass::None {
             return push.to;
         }
         let lit = |value: f32| f32x16::splat(from.x.simd, value);
         let (zero, one) = (lit(0.0), lit(1.0));
         let start = o.moved_with(from);
-        if self.kind == Grip::Assumed {
+        if self.pass == FrictionPass::Assumed {
             self.sticks = Real::select(bears, stays, self.sticks);
             self.anchor = V3::select(bears, start, self.anchor);
             return push.to;
         }
         let (slip, length) = push.slip(start);
         let most = lit(o.friction) * push.depth;
-        if self.kind == Grip::Judged {
+        if self.pass == FrictionPass::Judged {
             // What would have to pull it back: by what it has been held with, or else by what it has slipped.
             let held = self.reaction - push.normal.scale(self.reaction.dot(push.normal));
             let slid = Real::lt(zero, self.slid);
@@ -483,15 +483,15 @@ impl<S: Simd> Friction<S> {
         }
         // Static where friction suffices, else sliding.
         let held = Real::min(one, most / Real::max(length, lit(1e-12)));
-        let held = match self.kind {
+        let held = match self.pass {
             // Friction has acted in the solve: here what it holds stays, and what slides does not go back.
-            Grip::Solved => {
+            FrictionPass::Solved => {
                 let along = self.reaction - push.normal.scale(self.reaction.dot(push.normal));
                 let reverses = Real::lt(zero, slip.dot(along));
                 let slides = Real::select(reverses, one, zero);
                 Real::max(self.sticks, Real::select(Real::lt(zero, self.drag), slides, held))
             }
-            Grip::Between => Real::select(Real::lt(zero, self.drag), zero, held),
+            FrictionPass::Between => Real::select(Real::lt(zero, self.drag), zero, held),
             _ => held,
         };
         V3::select(pushed, slip.scale_add(-held, push.to), push.to)
@@ -503,7 +503,7 @@ impl<S: Simd> Friction<S> {
         let simd = touched.simd;
         let (mut sticks, mut anchor) = (self.sticks * touched, self.anchor);
         let mut drag = self.drag * touched * (f32x16::splat(simd, 1.0) - sticks);
-        if self.kind == Grip::Judged {
+        if self.pass == FrictionPass::Judged {
             sticks = Real::select(active, sticks, load(simd, &n.sticks));
             drag = Real::select(active, drag, load(simd, &n.drag));
             anchor = V3::select(active, anchor, load3(simd, &n.anchor));
