@@ -23,14 +23,14 @@ use bevy_keratin::{
 };
 
 /// Curls that come to rest soon.
-pub fn calm() -> (SleepSettings, AirDrag) {
+pub fn damped() -> (SleepSettings, AirDrag) {
     (SleepSettings::default(), AirDrag { rate: 20.0 })
 }
 
 fn resting(stage: &mut Stage, on: SimulateOn) {
     grow(stage, on, curls(40, 5));
     let hair = stage.hair;
-    stage.app.world_mut().entity_mut(hair).insert(calm());
+    stage.app.world_mut().entity_mut(hair).insert(damped());
     stage.run(1);
     assert_eq!(stage.is_on_gpu(), on == SimulateOn::Gpu);
 }
@@ -249,7 +249,7 @@ pub fn hair_with_followers_sleeps_as_well(stage: &mut Stage) {
     let hair = stage.hair;
     let level = LodLevel::new(0.5, 2, 3).unwrap().with_strands(0.5).unwrap();
     let lod = HairLod { levels: vec![level], ..default() };
-    stage.app.world_mut().entity_mut(hair).insert((calm(), lod, HairScreenShare(0.4)));
+    stage.app.world_mut().entity_mut(hair).insert((damped(), lod, HairScreenShare(0.4)));
     stage.run(3);
     stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);
     stage.run(1);

@@ -3,7 +3,7 @@
 use crate::{
     lab::{Device, LabStrand, Random, swept},
     residence::grow,
-    sleep::{calm, until_asleep},
+    sleep::{damped, until_asleep},
     stage::{Stage, apart, curls},
     vectors::projections,
 };
@@ -401,7 +401,7 @@ pub fn swept_nodes_are_held_there(stage: &mut Stage) {
 
 pub fn swept_hair_sleeps_there(stage: &mut Stage) {
     grow_swept(stage, SimulateOn::Gpu, curls(8, 5));
-    stage.app.world_mut().entity_mut(stage.hair).insert(calm());
+    stage.app.world_mut().entity_mut(stage.hair).insert(damped());
     let ticks = until_asleep(stage, 1);
     assert!(stage.is_on_gpu(), "{:?}", stage.residence());
     let bits = stage.bits();
