@@ -115,7 +115,7 @@ pub struct Twin {
     touched: bool,
     sweeps: bool,
     /// Length from the root on that may be in what the root lies in.
-    sunk: f64,
+    escape_length: f64,
     trapped: bool,
     /// Rounds in which it got out of what it was deep in.
     pub rounds: usize,
@@ -153,7 +153,7 @@ impl Twin {
             push: vec![DVec3::ZERO; edges + 1],
             touched: false,
             sweeps: false,
-            sunk: 0.0,
+            escape_length: 0.0,
             trapped: false,
             rounds: 0,
         }
@@ -314,7 +314,7 @@ impl Twin {
         self.support.fill(DVec3::ZERO);
         self.reaction.fill(DVec3::ZERO);
         let depths = r.obstacles.iter().map(|o| depth(&o.solid, self.p[0], r.skin).1);
-        self.sunk = 2.0 * depths.fold(0.0, f64::max);
+        self.escape_length = 2.0 * depths.fold(0.0, f64::max);
         self.trapped = false;
         self.surface(r);
         let mut theta = THETA;
@@ -337,13 +337,13 @@ impl Twin {
         };
         let way = self.l[..i].iter().sum::<f64>();
         let root = depth(&o.solid, self.p[0], skin).1;
-        if way >= self.sunk || root <= 0.0 {
+        if way >= self.escape_length || root <= 0.0 {
             return trapped;
         }
         if self.l.iter().sum::<f64>() < 2.0 * root {
             return f64::INFINITY;
         }
-        let deepest = self.sunk / 2.0;
+        let deepest = self.escape_length / 2.0;
         let share = (2.0 * root / deepest).clamp(0.0, 1.0);
         ((deepest - (way / 2.0).powi(2) / deepest).max(0.0) * share).max(trapped)
     }

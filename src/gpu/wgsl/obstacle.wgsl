@@ -8,7 +8,7 @@ var<private> touched: bool;
 // Whether a pass has found a node to stick, slide, rest or leave that did not.
 var<private> contact_changed: bool;
 // Length from the root on that may be in what the root lies in, 0 where it lies in nothing.
-var<private> sunk: f32;
+var<private> escape_length: f32;
 // Of a strand with such a root its length (m).
 var<private> whole_length: f32;
 // Whether it begins the substep in an obstacle that its length does not let it out of.
@@ -170,7 +170,7 @@ fn allowed(o: u32, along: f32, start: vec3<f32>) -> f32 {
 }
 
 fn allowed_near_root(o: u32, along: f32) -> f32 {
-    if !(along < sunk) {
+    if !(along < escape_length) {
         return 0.0;
     }
     let root = node(0u).xyz;
@@ -182,7 +182,7 @@ fn allowed_near_root(o: u32, along: f32) -> f32 {
     if whole_length < depth * ESCAPE_RATIO {
         return 3.0e38;
     }
-    let deepest = sunk * (1.0 / ESCAPE_RATIO);
+    let deepest = escape_length * (1.0 / ESCAPE_RATIO);
     let share = min(depth * DEPTH_RATIO / deepest, 1.0);
     let way = along * (1.0 / ESCAPE_RATIO);
     return max((deepest - way * way / deepest) * share, 0.0);
@@ -286,7 +286,7 @@ fn continuous_collision(o: u32, start: vec3<f32>, p: vec3<f32>) -> Swept {
 // Chooses the obstacles of this strand. Held nodes must know where they come from.
 fn choose_near() {
     near = vec4(0u);
-    sunk = 0.0;
+    escape_length = 0.0;
     trapped = false;
     if record.obstacles == 0u {
         return;
@@ -324,7 +324,7 @@ fn choose_near() {
     let root = node(0u).xyz;
     for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
         if !is_beyond(o, root, record.skin) {
-            sunk = max(sunk, ESCAPE_RATIO * depth_in(o, root).w);
+            escape_length = max(escape_length, ESCAPE_RATIO * depth_in(o, root).w);
         }
     }
 }

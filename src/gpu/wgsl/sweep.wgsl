@@ -239,7 +239,7 @@ fn sweep_step() {
         release(i);
     }
     // Sweeps push all nodes.
-    sunk = 0.0;
+    escape_length = 0.0;
     predict_nodes(record.dt);
     predict_frames();
     for (var done = 0u; done < record.iterations; done++) {

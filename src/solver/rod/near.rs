@@ -17,13 +17,13 @@ pub(crate) const FASTER: f32 = 1.5;
 /// velocity: most nodes go less far in a substep.
 const CLOSE: f32 = 0.25;
 
-/// Length from a sunk root on within which a strand may be inside, as a multiple of the root's depth: it gets out
-/// up to 60° aslant.
+/// Length within which a strand may be inside from a root that is, as a multiple of the root's depth: it gets out up
+/// to 60° aslant.
 pub(crate) const ESCAPE_RATIO: f32 = 2.0;
 
 /// Finds the obstacles that each node may touch in a substep of `dt`, so that its passes skip the
-/// others: on a head of dozens of solids most nodes are near one or none. Also how far each strand is sunk
-/// in them. `from` of held nodes must be set.
+/// others: on a head of dozens of solids most nodes are near one or none. Sets `escape_length`. `from` of held
+/// nodes must be set.
 #[inline(never)]
 pub(crate) fn choose_near<S: Simd>(
     simd: S,
@@ -32,7 +32,7 @@ pub(crate) fn choose_near<S: Simd>(
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
-    b.sunk = [0.0; LANES];
+    b.escape_length = [0.0; LANES];
     if obstacles.is_empty() {
         // The block may have held other strands before, which rested on something.
         b.nodes.iter_mut().for_each(NodeLanes::release);
@@ -93,14 +93,14 @@ pub(crate) fn choose_near<S: Simd>(
                     }
                 }
             }
-            let (root, mut sunk) = (load3(simd, &b.nodes[0].p), zero);
+            let (root, mut deepest) = (load3(simd, &b.nodes[0].p), zero);
             for o in b.near_obstacles[0].of(obstacles) {
                 if !o.solid.is_clear(root, clearance) {
                     let depth = o.solid.depth(root, clearance).1;
-                    sunk = Real::select(Real::lt(sunk, depth), depth, sunk);
+                    deepest = Real::select(Real::lt(deepest, depth), depth, deepest);
                 }
             }
-            (sunk * f32x16::splat(simd, ESCAPE_RATIO)).store_array(&mut b.sunk);
+            (deepest * f32x16::splat(simd, ESCAPE_RATIO)).store_array(&mut b.escape_length);
         },
     );
 }

@@ -13,10 +13,10 @@ use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 /// begins.
 pub(super) struct PenetrationLimits<S: Simd> {
     root: V3<f32x16<S>>,
-    sunk: f32x16<S>,
+    escape_length: f32x16<S>,
     length: f32x16<S>,
     trapped: Option<f32x16<S>>,
-    any_sunk: bool,
+    any_inside: bool,
     along: f32x16<S>,
 }
 
@@ -25,17 +25,17 @@ impl<S: Simd> PenetrationLimits<S> {
     pub(super) fn new(simd: S, b: &BlockLanes) -> Self {
         let root = b.nodes.first().map(|n| load3(simd, &n.p));
         let zero = f32x16::splat(simd, 0.0);
-        let any_sunk = b.sunk != [0.0; LANES];
+        let any_inside = b.escape_length != [0.0; LANES];
         let mut length = zero;
-        for edge in b.edges.iter().filter(|_| any_sunk) {
+        for edge in b.edges.iter().filter(|_| any_inside) {
             length += load(simd, &edge.l);
         }
         Self {
             length,
             root: root.unwrap_or(V3::new(zero, zero, zero)),
-            sunk: load(simd, &b.sunk),
+            escape_length: load(simd, &b.escape_length),
             trapped: (b.trapped != [0.0; LANES]).then(|| load(simd, &b.trapped)),
-            any_sunk,
+            any_inside,
             along: zero,
         }
     }
@@ -43,19 +43,19 @@ impl<S: Simd> PenetrationLimits<S> {
     /// Of node `i`, to be asked node after node; `None` where it may be nowhere inside.
     #[inline(always)]
     pub(super) fn at(&mut self, edges: &[EdgeLanes], i: usize) -> Option<AllowedPenetration<S>> {
-        if !self.any_sunk && self.trapped.is_none() {
+        if !self.any_inside && self.trapped.is_none() {
             return None;
         }
-        let simd = self.sunk.simd;
-        let is_sunk = Real::lt(self.along, self.sunk);
+        let simd = self.escape_length.simd;
+        let is_within = Real::lt(self.along, self.escape_length);
         let along = self.along;
         if let Some(edge) = edges.get(i) {
             self.along += load(simd, &edge.l);
         }
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        let deepest = self.sunk * f32x16::splat(simd, 1.0 / ESCAPE_RATIO);
-        let lanes = Real::select(is_sunk, one, zero);
-        let near_root = is_sunk.any_true();
+        let deepest = self.escape_length * f32x16::splat(simd, 1.0 / ESCAPE_RATIO);
+        let lanes = Real::select(is_within, one, zero);
+        let near_root = is_within.any_true();
         let (root, trapped) = (self.root, self.trapped);
         let length = self.length;
         let limit = AllowedPenetration { root, length, near_root, deepest, along, lanes, trapped };
@@ -75,7 +75,7 @@ pub(super) struct AllowedPenetration<S: Simd> {
     root: V3<f32x16<S>>,
     /// The strand's length.
     length: f32x16<S>,
-    /// Whether any lane's node is near a sunk root.
+    /// Whether any lane's node is near a root that lies inside.
     near_root: bool,
     /// The root's depth in what it is deepest in.
     deepest: f32x16<S>,
