@@ -123,13 +123,13 @@ impl GpuHair {
 
 /// What a follower follows; `None` where it has no guides. Those of the hair are given by their indices.
 fn follower_view<'a>(strand: &EntityRef<'a>, guides: &[Option<u32>]) -> Option<FollowerView<'a>> {
-    let ties = strand.get::<Follower>()?.ties();
+    let offsets = strand.get::<Follower>()?.offsets();
     let edges = strand.get::<Strand>()?.edges();
     let mut own = [0; GUIDES];
-    for (own, (guide, _)) in own.iter_mut().zip(&ties.guides) {
+    for (own, (guide, _)) in own.iter_mut().zip(&offsets.guides) {
         *own = (*guides.get(*guide as usize)?)?;
     }
-    ties.fit(edges).then_some(FollowerView { ties, guides: own })
+    offsets.fit(edges).then_some(FollowerView { offsets, guides: own })
 }
 
 /// Hands a hair over, if all its strands can be.

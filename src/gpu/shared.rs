@@ -197,7 +197,7 @@ impl Shared {
         pending.drain(..count);
     }
 
-    /// Runs the first pending substeps by themselves where all together lead too many nodes for a buffer.
+    /// Runs the first pending substeps by themselves where all together have too many targets for a buffer.
     fn run_excess(&mut self) {
         loop {
             let mut targets = 0;

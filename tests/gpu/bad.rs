@@ -237,8 +237,8 @@ pub fn what_a_game_spoils_is_mended_and_goes_back(stage: &mut Stage) {
     }
 }
 
-/// A held node that is led nowhere is free, as on the CPU.
-pub fn a_target_that_is_no_number_leads_nothing(stage: &mut Stage) {
+/// A held node without a target is free, as on the CPU.
+pub fn a_target_that_is_nan_holds_nothing(stage: &mut Stage) {
     let held =
         |target: Option<Vec3>| HeldNodes { targets: vec![None, None, None, target], ..default() };
     let [free, broken] = [None, Some(Vec3::NAN)].map(|target| {

@@ -21,7 +21,6 @@ mod crossing;
 mod golden;
 mod journal;
 mod layout;
-mod led;
 mod lod;
 mod papers;
 mod pictures;
@@ -34,6 +33,7 @@ mod sleep;
 mod stage;
 mod substep;
 mod sweeps;
+mod targets;
 
 device::tests! {
     bits {

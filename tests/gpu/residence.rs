@@ -1,9 +1,9 @@
 //! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
 use crate::{
-    bad, crossing, led, lod, papers, probe, shapes, sleep,
+    bad, crossing, lod, papers, probe, shapes, sleep,
     stage::{Stage, apart, curls, free},
-    sweeps,
+    sweeps, targets,
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use bevy_keratin::{
@@ -53,11 +53,11 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         broken_strands_are_put_back_and_told_of_once,
         bad::what_is_no_number_counts_as_on_the_processor_and_is_told_of_once,
         bad::what_a_game_spoils_is_mended_and_goes_back,
-        bad::a_target_that_is_no_number_leads_nothing,
+        bad::a_target_that_is_nan_holds_nothing,
         closed_forms_hold_through_the_app,
-        led::roots_on_a_mesh_go_with_it_there,
-        led::held_nodes_are_led_there_and_let_go,
-        led::strands_are_wound_there_and_keep_their_curl,
+        targets::roots_on_a_mesh_go_with_it_there,
+        targets::held_nodes_move_there_and_are_released,
+        targets::strands_are_wound_there_and_keep_their_curl,
         lod::followers_follow_there_as_on_the_processor,
         lod::a_change_of_level_is_made_on_the_processor,
         lod::a_budget_is_that_of_the_processor,

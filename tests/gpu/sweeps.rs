@@ -393,10 +393,10 @@ pub fn swept_nodes_are_held_there(stage: &mut Stage) {
         (start, held, stage.strands())
     });
     let [(start, held, let_go), (_, gpu_held, gpu_let_go)] = &both;
-    let led = held[3].positions()[4].distance(*start);
+    let moved = held[3].positions()[4].distance(*start);
     let off = [apart(held, gpu_held), apart(let_go, gpu_let_go)];
-    println!("led by {led} m; off by {off:?} m");
-    assert!(led > 1e-3 && off.iter().all(|off| *off < 1e-3), "{led} m, {off:?} m");
+    println!("moved by {moved} m; off by {off:?} m");
+    assert!(moved > 1e-3 && off.iter().all(|off| *off < 1e-3), "{moved} m, {off:?} m");
 }
 
 pub fn swept_hair_sleeps_there(stage: &mut Stage) {

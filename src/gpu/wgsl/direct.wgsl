@@ -84,7 +84,7 @@ struct Left {
     b_after: vec3<f32>,
 }
 
-// Where a node is at θ of the substep: held ones are on the way to where they are led.
+// Where a node is at θ of the substep: held ones are on the way to their targets.
 fn place_at(i: u32, theta: f32) -> vec3<f32> {
     let n = node(i);
     if is_held(n.w) {

@@ -297,8 +297,8 @@ fn choose_near() {
     for (var i = 0u; i <= edges; i++) {
         let n = node(i);
         if is_held(n.w) {
-            let led = n.xyz - start_of(i);
-            pull = max(pull, dot(led, led));
+            let pulled = n.xyz - start_of(i);
+            pull = max(pull, dot(pulled, pulled));
         }
         let l = select(edge(i).x, 0.0, i == edges);
         longest = max(longest, l);

@@ -43,7 +43,7 @@ fn load() {
             motion[slot(i, 1u, 2u)] = vec4(pose_in[slot(i, 0u, 2u)].xyz, 0.0);
         }
     }
-    if (record.flags & TARGETS_ROOTS) != 0u {
+    if (record.flags & ROOT_TARGETS) != 0u {
         set_node(0u, row(0u, 0u).xyz, 0.0);
         set_frame(edges, row(0u, 1u));
     }

@@ -232,7 +232,7 @@ fn limit_all() {
 // One substep.
 fn sweep_step() {
     weigh_swept();
-    // A root has no velocity, wherever it is led.
+    // A root has no velocity, wherever its target is.
     set_start(0u, node(0u).xyz);
     choose_near();
     for (var i = 0u; i <= edges; i++) {

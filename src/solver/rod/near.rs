@@ -46,9 +46,9 @@ pub(crate) fn choose_near<S: Simd>(
             // an edge.
             let mut pull = zero;
             for n in &b.nodes {
-                let led = load3(simd, &n.p) - load3(simd, &n.from);
+                let pulled = load3(simd, &n.p) - load3(simd, &n.from);
                 let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
-                pull = Real::max(pull, Real::select(held, led.dot(led), zero));
+                pull = Real::max(pull, Real::select(held, pulled.dot(pulled), zero));
             }
             let mut edge = zero;
             for e in &b.edges {
@@ -192,7 +192,7 @@ mod tests {
             obstacles in proptest::collection::vec(obstacle(), 1..80),
             nodes in proptest::collection::vec((vector(0.2), vector(3.0)), 2..6),
             ways in proptest::collection::vec(vector(1.0), 8),
-            led in vector(0.05),
+            pull in vector(0.05),
             broken in 0usize..4,
         ) {
             let (dt, clearance, length) = (1.0 / 180.0, 1e-3, 0.01);
@@ -206,7 +206,7 @@ mod tests {
             b.edges.iter_mut().for_each(|e| e.l = [length; LANES]);
             // The root is held; one lane lies elsewhere.
             b.nodes[0].w = [0.0; LANES];
-            b.nodes[0].from = (nodes[0].0 - led).to_array().map(|x| [x; LANES]);
+            b.nodes[0].from = (nodes[0].0 - pull).to_array().map(|x| [x; LANES]);
             b.nodes[1].p[1][7] += 0.1;
             // A strand that is not finite hides no obstacle from others.
             match broken {
@@ -235,7 +235,7 @@ mod tests {
                 for lane in [0, 7] {
                     let at = |c: &[[f32; LANES]; 3]| Vec3::from_array(c.map(|c| c[lane]));
                     let (p, v) = (at(&n.p), at(&n.v));
-                    let reach = v.length() * dt + length + led.length();
+                    let reach = v.length() * dt + length + pull.length();
                     for o in obstacles.iter().filter(|o| near.of(&obstacles).all(|n| !core::ptr::eq(n, *o))) {
                         // Also when the node moves with the obstacle.
                         let starts = [p, o.motion.map_or(p, |m| m.transform_point3(p))];
