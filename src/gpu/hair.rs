@@ -52,7 +52,7 @@ pub(super) struct GpuHair {
     pub(super) returns: Option<(WhyCpu, u64)>,
     /// What came near in this tick that no record can hold: it rests, and returns in the next.
     pub(super) unsupported: Option<Unsupported>,
-    /// Somebody waits for the answer of this number.
+    /// The number of the answer that is waited for.
     pub(super) awaited: Option<u64>,
     /// The last state that was read back.
     pub(super) checkpoint: Option<Contents>,
@@ -80,7 +80,7 @@ pub(super) struct GpuHair {
     pub(super) treated: Vec<HairTreatment>,
 }
 
-/// has just returned, and stays for so long (s).
+/// Keeps hair that has just returned on the CPU for this long (s).
 #[derive(Component, Debug)]
 #[component(clone_behavior = Ignore)]
 pub(super) struct StaysOnCpu(pub(super) f32);

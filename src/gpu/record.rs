@@ -285,7 +285,7 @@ pub(super) const ROOT: u32 = 1 << 30;
 pub(super) const FREE: u32 = 1 << 31;
 
 // Flags of a record.
-pub(super) const CARRIES: u32 = 1;
+pub(super) const FRAME_MOVES: u32 = 1;
 pub(super) const SHAPES: u32 = 2;
 pub(super) const REMEMBERS: u32 = 4;
 pub(super) const NOTES_BEFORE: u32 = 8;
@@ -322,7 +322,7 @@ impl SubstepRecord {
             || self.change.iter().chain(&self.share).any(|c| *c != 0.0)
             || !self.treatments.is_empty();
         let flags = [
-            (self.frame_motion.is_some(), CARRIES),
+            (self.frame_motion.is_some(), FRAME_MOVES),
             (self.shapes, SHAPES),
             (remembers, REMEMBERS),
             (self.notes_before, NOTES_BEFORE),

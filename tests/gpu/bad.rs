@@ -1,5 +1,5 @@
-//! What is no number: in a setting, an obstacle, a treatment, a pose, a strand. It counts as on the CPU, is
-//! told of once, and other hair does not notice.
+//! NaN: in a setting, an obstacle, a treatment, a pose, a strand. It counts as on the CPU, is
+//! reported once, and other hair does not notice.
 
 use crate::{
     residence::{grow, on_gpu},
@@ -177,7 +177,7 @@ fn after(stage: &mut Stage, act: Act) -> ([Vec<u32>; 2], Vec<HairFault>) {
     (states, faults)
 }
 
-pub fn what_is_no_number_counts_as_on_the_processor_and_is_told_of_once(stage: &mut Stage) {
+pub fn nan_counts_as_on_the_processor_and_is_reported_once(stage: &mut Stage) {
     let (untouched, faults) = after(stage, nothing);
     assert!(faults.is_empty(), "{faults:?}");
     for Spoilt { what, kind, spoil, instead } in all() {

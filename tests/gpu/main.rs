@@ -17,8 +17,8 @@ mod bad;
 mod bits;
 mod closed_forms;
 mod cost;
-mod crossing;
 mod golden;
+mod handover;
 mod journal;
 mod layout;
 mod lod;
@@ -39,9 +39,9 @@ device::tests! {
     bits {
         device: hand_over_and_return_without_a_substep_change_no_bit,
             ten_runs_are_equal_to_the_bit_whatever_stands_beside_and_however_they_are_submitted,
-            what_is_no_number_stays_with_its_strand_and_is_counted_once,
+            nan_stays_with_its_strand_and_is_counted_once,
             obstacles_out_of_reach_change_no_bit_however_many,
-            records_of_no_numbers_leave_strands_whole,
+            records_of_nan_leave_strands_whole,
             a_shaken_strand_of_64_segments_holds_its_length;
     }
     closed_forms {
@@ -91,7 +91,7 @@ device::tests! {
     sweeps {
         device: golden_vectors_of_the_papers_projections,
             swept_strands_keep_their_bits,
-            what_is_no_number_stays_with_its_swept_strand,
+            nan_stays_with_its_swept_strand,
             closed_forms_by_the_papers_projections;
     }
 }

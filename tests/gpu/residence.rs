@@ -1,7 +1,7 @@
 //! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
 use crate::{
-    bad, crossing, lod, papers, probe, shapes, sleep,
+    bad, handover, lod, papers, probe, shapes, sleep,
     stage::{Stage, apart, curls, free},
     sweeps, targets,
 };
@@ -51,7 +51,7 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         hair_that_was_away_comes_back_at_rest,
         hairdos_are_asked_for_and_arrive,
         broken_strands_are_put_back_and_told_of_once,
-        bad::what_is_no_number_counts_as_on_the_processor_and_is_told_of_once,
+        bad::nan_counts_as_on_the_processor_and_is_reported_once,
         bad::what_a_game_spoils_is_mended_and_goes_back,
         bad::a_target_that_is_nan_holds_nothing,
         closed_forms_hold_through_the_app,
@@ -63,8 +63,8 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         lod::a_budget_is_that_of_the_processor,
         lod::roots_of_followers_go_with_their_mesh,
         hair_is_despawned_and_levels_change_on_the_way,
-        crossing::whatever_happens_on_the_way_is_done,
-        crossing::it_comes_home_from_a_head_that_moves_as_if_it_had_stayed,
+        handover::whatever_happens_on_the_way_is_done,
+        handover::it_comes_home_from_a_head_that_moves_as_if_it_had_stayed,
         sweeps::swept_hair_moves_there_as_on_the_processor,
         sweeps::another_solver_takes_over_what_the_one_left,
         sweeps::swept_followers_follow_there,

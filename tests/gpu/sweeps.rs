@@ -198,7 +198,7 @@ pub fn swept_strands_keep_their_bits() {
     }
 }
 
-pub fn what_is_no_number_stays_with_its_swept_strand() {
+pub fn nan_stays_with_its_swept_strand() {
     let device = Device::get();
     let (sound, records) = (strands(70), records(6));
     let mut on = device.hand_over(&sound);

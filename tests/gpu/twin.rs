@@ -51,7 +51,7 @@ fn cross_matrix(v: DVec3) -> DMat3 {
 }
 
 /// q turned the shortest way so that its tangent is along e, and twice the turn's vector part.
-fn carry(q: DQuat, e: DVec3) -> (DQuat, DVec3) {
+fn parallel_transport(q: DQuat, e: DVec3) -> (DQuat, DVec3) {
     let (t, len) = (tangent(q), e.length());
     let cosine = len + t.dot(e);
     let turn = if cosine < len * 1e-6 {
@@ -227,7 +227,7 @@ impl Twin {
     }
 
     fn blow(&mut self, r: &SubstepRecord) {
-        let (dt, keep) = (f64::from(r.dt), f64::from(r.retained));
+        let (dt, retained) = (f64::from(r.dt), f64::from(r.retained));
         let edges = self.edges();
         for i in 0..=edges {
             let e = i.min(edges - 1);
@@ -252,7 +252,8 @@ impl Twin {
             let still = d(r.wind) - d(r.headwind);
             let flow = d(r.wind) + (carried - still * shares) / f64::max(shares, 1.0);
             let before = self.v[i];
-            self.v[i] = before * keep + d(r.gravity) * dt + acceleration * dt + flow * (1.0 - keep);
+            self.v[i] =
+                before * retained + d(r.gravity) * dt + acceleration * dt + flow * (1.0 - retained);
             self.push[i] = if i == 0 { DVec3::ZERO } else { (self.v[i] - before) / dt };
             if i < edges {
                 self.drying[i] = drying * dt;
@@ -546,7 +547,7 @@ impl Twin {
             let e = at[j + 1] - at[j];
             let (l, length, axial) = (self.l[j], e.length(), self.axial[j]);
             let crushed = length < 0.5 * l;
-            let (carried, mut turn) = carry(self.q[j], e);
+            let (carried, mut turn) = parallel_transport(self.q[j], e);
             let q = if crushed { self.q[j] } else { carried };
             let lever = length.max(0.2 * l);
             let inverse = 1.0 / lever;
@@ -742,7 +743,7 @@ impl Twin {
         for i in 0..edges {
             let e = self.p[i + 1] - self.p[i];
             if e.length() >= 0.5 * self.l[i] {
-                self.q[i] = carry(self.q[i], e).0;
+                self.q[i] = parallel_transport(self.q[i], e).0;
             }
             let (t, k) = (tangent(self.q[i]), self.k[i]);
             let elastic = moment(q_before, self.q[i], self.rest[i], k);

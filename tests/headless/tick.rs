@@ -159,7 +159,7 @@ fn a_strand_that_goes_wrong_is_put_back_and_its_neighbours_do_not_notice() {
     let (mut healthy, ids) = build();
     run(&mut healthy, 0.2);
 
-    // a velocity from somewhere: no number, or one that the step cannot carry
+    // a velocity that is NaN, or one that the step cannot carry
     for (velocity, kind) in
         [(Vec3::NAN, FaultKind::Strand), (Vec3::splat(1e30), FaultKind::PutBack)]
     {
@@ -173,7 +173,7 @@ fn a_strand_that_goes_wrong_is_put_back_and_its_neighbours_do_not_notice() {
         }
     }
 
-    // the pose itself: no number, or numbers from which no step leads on
+    // the pose itself: infinite, or too large for a step
     for far in [f32::INFINITY, f32::MAX, 1e30] {
         let (mut app, ids_c) = build();
         app.world_mut().get_mut::<Strand>(ids_c[2]).unwrap().positions_mut()[5] = Vec3::splat(far);

@@ -56,8 +56,8 @@ struct Substep {
     gravity: vec3<f32>,
     dt: f32,
     // What the frame's motion does to what rests in the world.
-    carry_turn: vec4<f32>,
-    carry_move: vec3<f32>,
+    frame_turn: vec4<f32>,
+    frame_move: vec3<f32>,
     flags: u32,
     // The wind of the place (m/s), share of its velocity that hair keeps against the air.
     wind: vec3<f32>,

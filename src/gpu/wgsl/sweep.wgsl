@@ -134,8 +134,8 @@ fn weigh_swept() {
 fn load_spins() {
     for (var i = 0u; i < edges; i++) {
         var omega = spin(i) * record.retained;
-        if (record.flags & CARRIES) != 0u {
-            omega = rotated(record.carry_turn, omega);
+        if (record.flags & FRAME_MOVES) != 0u {
+            omega = rotated(record.frame_turn, omega);
         }
         set_spin(i, select(omega, vec3(0.0), (record.flags & RESTS) != 0u));
     }

@@ -22,12 +22,12 @@ fn times(q: DQuat, s: f64) -> DQuat {
 impl Twin {
     pub(super) fn sweep(&mut self, r: &SubstepRecord) {
         let dt = f64::from(r.dt);
-        if let Some(carry) = r.frame_motion {
-            let turn = dq(carry.rotation);
+        if let Some(motion) = r.frame_motion {
+            let turn = dq(motion.rotation);
             self.spins.iter_mut().for_each(|omega| *omega = turn * *omega);
         }
-        let keep = f64::from(r.retained);
-        self.spins.iter_mut().for_each(|omega| *omega *= keep);
+        let retained = f64::from(r.retained);
+        self.spins.iter_mut().for_each(|omega| *omega *= retained);
         self.blow(r);
         let wq = self.weigh_swept(r);
         self.v[0] = DVec3::ZERO;
