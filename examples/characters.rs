@@ -64,7 +64,7 @@ fn preset(name: &str) -> Result<HairPreset, String> {
 }
 
 /// How many characters stand in the window at least.
-const FEWEST: usize = 3;
+const MIN_CHARACTERS: usize = 3;
 /// How long a file and its hair may take.
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Ticks in which hair settles.
@@ -87,7 +87,7 @@ struct Hat;
 
 /// Worn hair, or why there is none.
 #[derive(Resource, Default)]
-struct Told(Option<Result<Entity, String>>);
+struct Outcome(Option<Result<Entity, String>>);
 
 fn main() -> ExitCode {
     let mut arguments = Arguments::parse();
@@ -119,10 +119,12 @@ fn app(arguments: &Arguments, offscreen: bool) -> App {
     app.insert_resource(Time::<Fixed>::from_hz(60.0))
         .insert_resource(GlobalAmbientLight::NONE)
         .insert_resource(ClearColor(Color::srgb(0.44, 0.46, 0.48)))
-        .init_resource::<Told>()
-        .add_observer(|worn: On<HairWorn>, mut told: ResMut<Told>| told.0 = Some(Ok(worn.hair)))
-        .add_observer(|not: On<HairNotWorn>, mut told: ResMut<Told>| {
-            told.0 = Some(Err(not.error.to_string()));
+        .init_resource::<Outcome>()
+        .add_observer(|worn: On<HairWorn>, mut outcome: ResMut<Outcome>| {
+            outcome.0 = Some(Ok(worn.hair))
+        })
+        .add_observer(|not: On<HairNotWorn>, mut outcome: ResMut<Outcome>| {
+            outcome.0 = Some(Err(not.error.to_string()));
         });
     app
 }
@@ -144,7 +146,7 @@ impl Arguments {
 /// All in a window.
 fn show(arguments: &Arguments) -> Result {
     let files = arguments.files()?;
-    let count = files.len().max(FEWEST);
+    let count = files.len().max(MIN_CHARACTERS);
     let mut app = app(arguments, false);
     for i in 0..count {
         let file = files[i % files.len()].clone();
@@ -253,7 +255,7 @@ fn shoot(arguments: &Arguments, folder: &std::path::Path) -> Result {
             PathBuf::from(&file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let mut is_lit = false;
         for preset in &arguments.presets {
-            app.world_mut().resource_mut::<Told>().0 = None;
+            app.world_mut().resource_mut::<Outcome>().0 = None;
             app.world_mut().entity_mut(character).insert(WearHair::new(*preset));
             let hair = wait(&mut app)?;
             thin_out(&mut app, hair, arguments.strands);
@@ -302,8 +304,8 @@ fn wait(app: &mut App) -> Result<Entity> {
     let start = Instant::now();
     while start.elapsed() < PATIENCE {
         app.update();
-        if let Some(told) = app.world_mut().resource_mut::<Told>().0.take() {
-            return Ok(told?);
+        if let Some(outcome) = app.world_mut().resource_mut::<Outcome>().0.take() {
+            return Ok(outcome?);
         }
         sleep(Duration::from_millis(2));
     }

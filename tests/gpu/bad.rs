@@ -148,7 +148,7 @@ fn all() -> [Spoilt; 14] {
     ]
 }
 
-/// Two hairs, of which one is treated so; their states after it, and what was told.
+/// Two hairs, of which one is treated so; their states after it, and what was reported.
 fn after(stage: &mut Stage, act: Act) -> ([Vec<u32>; 2], Vec<HairFault>) {
     on_gpu(stage, 12, 2);
     let hair = stage.hair;
@@ -181,11 +181,11 @@ pub fn nan_counts_as_on_the_processor_and_is_reported_once(stage: &mut Stage) {
     let (untouched, faults) = after(stage, nothing);
     assert!(faults.is_empty(), "{faults:?}");
     for Spoilt { what, kind, spoil, instead } in all() {
-        let (sound, told) = after(stage, instead);
-        assert!(told.is_empty(), "{what}: {told:?}");
-        let (found, told) = after(stage, spoil);
-        let kinds: Vec<FaultKind> = told.iter().map(|fault| fault.kind).collect();
-        assert_eq!(kinds, [kind], "{what}: {told:?}");
+        let (sound, reported) = after(stage, instead);
+        assert!(reported.is_empty(), "{what}: {reported:?}");
+        let (found, reported) = after(stage, spoil);
+        let kinds: Vec<FaultKind> = reported.iter().map(|fault| fault.kind).collect();
+        assert_eq!(kinds, [kind], "{what}: {reported:?}");
         assert!(found == sound, "{what}: it is not what counts in its place");
         let global = ["a blower", "a radius"].contains(&what);
         assert!(global || found[1] == untouched[1], "{what}: other hair notices");
@@ -227,8 +227,8 @@ pub fn what_a_game_spoils_is_mended_and_goes_back(stage: &mut Stage) {
             assert!(stage.strands().iter().all(Strand::is_finite), "{what}");
             (stage.strands(), faults)
         });
-        let [(sound, told), (found, faults)] = &mut after;
-        assert!(told.is_empty(), "{what}: {told:?}");
+        let [(sound, reported), (found, faults)] = &mut after;
+        assert!(reported.is_empty(), "{what}: {reported:?}");
         assert_eq!(faults.len(), 1, "{what}: {faults:?}");
         assert_eq!(faults[0].kind, kind, "{what}: {faults:?}");
         for (i, (a, b)) in sound.iter().zip(found).enumerate().filter(|(i, _)| *i != 7) {

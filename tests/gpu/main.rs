@@ -57,7 +57,7 @@ device::tests! {
     }
     journal {
         device: a_journal_holds_all_that_the_tick_does_to_hair_that_moves;
-        anywhere: what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told;
+        anywhere: what_the_kernels_lack_keeps_hair_on_the_processor_and_is_reported;
     }
     layout {
         anywhere: slots_never_overlap_and_lie_within,

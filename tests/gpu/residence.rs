@@ -50,7 +50,7 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         a_teleported_head_takes_its_hair_along_at_rest,
         hair_that_was_away_comes_back_at_rest,
         hairdos_are_asked_for_and_arrive,
-        broken_strands_are_put_back_and_told_of_once,
+        broken_strands_are_put_back_and_reported_once,
         bad::nan_counts_as_on_the_processor_and_is_reported_once,
         bad::what_a_game_spoils_is_mended_and_goes_back,
         bad::a_target_that_is_nan_holds_nothing,
@@ -210,7 +210,7 @@ fn what_is_not_supported_brings_hair_home_and_is_done_there(stage: &mut Stage) {
     assert!(water(stage) > 0.0, "it is wet");
     stage.run(70);
     assert_eq!(stage.residence(), HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::Water)));
-    // The same without waiting: it is told when it is back.
+    // The same without waiting: it answers when it is back.
     on_gpu(stage, 6, 5);
     let hair = stage.hair;
     stage.app.world_mut().resource_mut::<HairGpu>().blocking = false;
@@ -450,7 +450,7 @@ fn hairdos_are_asked_for_and_arrive(stage: &mut Stage) {
     assert!(Hairdo::of(stage.app.world(), hair).unwrap().to_bytes() == bytes);
 }
 
-fn broken_strands_are_put_back_and_told_of_once(stage: &mut Stage) {
+fn broken_strands_are_put_back_and_reported_once(stage: &mut Stage) {
     grow(stage, SimulateOn::Cpu, curls(40, 7));
     let (hair, broken) = (stage.hair, stage.members()[17]);
     stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);

@@ -227,7 +227,7 @@ pub fn nan_stays_with_its_swept_strand() {
 }
 
 /// The joints' share of a turn of 0.5 rad each that a strand has kept which was straight, has been held so, had its
-/// bonds moved as told and was let go without weight.
+/// bonds moved as given and was let go without weight.
 fn kept(device: &Device, changes: &[[f32; 4]]) -> f32 {
     const EDGES: usize = 8;
     let frame = |i: usize| Quat::from_rotation_x(0.5 * i as f32);

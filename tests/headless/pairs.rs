@@ -29,9 +29,9 @@ fn app(plugins: PluginGroupBuilder) -> App {
         .add_plugins(plugins)
         .insert_resource(Time::<Fixed>::from_hz(60.0))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
-        .init_resource::<Told>()
-        .add_systems(Last, |mut faults: MessageReader<HairFault>, mut told: ResMut<Told>| {
-            told.0.extend(faults.read().cloned());
+        .init_resource::<AllFaults>()
+        .add_systems(Last, |mut faults: MessageReader<HairFault>, mut all: ResMut<AllFaults>| {
+            all.0.extend(faults.read().cloned());
         });
     app.finish();
     app.cleanup();
@@ -39,7 +39,7 @@ fn app(plugins: PluginGroupBuilder) -> App {
 }
 
 #[derive(Resource, Default)]
-struct Told(Vec<HairFault>);
+struct AllFaults(Vec<HairFault>);
 
 /// A head as a mesh and as a collider, with hair on its upper half; returns the parent, the hair and
 /// its strands.
@@ -251,9 +251,9 @@ fn scenario(seed: u64, seconds: u32) {
     if let Some(ledger) = app.world().get_resource::<WaterLedger>() {
         assert!(ledger.error() < 1e-5, "{ledger:?}; {label}");
     }
-    let told = &app.world().resource::<Told>().0;
-    for (i, fault) in told.iter().enumerate() {
-        assert!(!told[..i].contains(fault), "told again: {fault}; {label}");
+    let all = &app.world().resource::<AllFaults>().0;
+    for (i, fault) in all.iter().enumerate() {
+        assert!(!all[..i].contains(fault), "reported again: {fault}; {label}");
     }
 }
 

@@ -263,11 +263,14 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
     );
     assert!(reported.iter().all(|f| f.kind == FaultKind::Setting));
     // What is edited and what a constructor takes are checked by the same rule.
-    let told_of =
+    let reported_of =
         |what| reported.iter().filter_map(|f| f.cause::<InvalidValue>()).find(|v| v.what == what);
-    assert_eq!(told_of("Blower::strength (m/s²)"), Blower::new(-5.0).err().as_ref());
-    assert_eq!(told_of("PermRod::radius (m)"), PermRod::new(0.0, 0.1).err().as_ref());
-    assert_eq!(told_of("ColliderShape::radius (m)"), HairCollider::sphere(-0.05).err().as_ref());
+    assert_eq!(reported_of("Blower::strength (m/s²)"), Blower::new(-5.0).err().as_ref());
+    assert_eq!(reported_of("PermRod::radius (m)"), PermRod::new(0.0, 0.1).err().as_ref());
+    assert_eq!(
+        reported_of("ColliderShape::radius (m)"),
+        HairCollider::sphere(-0.05).err().as_ref()
+    );
     assert!(HairCollider::default().with_friction(f32::NAN).is_err());
     run(&mut app, 0.5);
     assert_eq!(faults(&mut app), []);

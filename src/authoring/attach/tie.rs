@@ -478,7 +478,7 @@ pub(super) fn follow_edits(
                 (tied.movers, tied.triangles, tied.lost) = (movers, Some(triangles), false);
                 tied.roots.iter_mut().zip(corners).for_each(|(tied, now)| tied.corners = now);
             }
-            // Told of once, until it fits again.
+            // Reported once, until it fits again.
             Err(why) => {
                 let is_new = !replace(&mut tied.lost, true);
                 if is_new && !is_made_again {

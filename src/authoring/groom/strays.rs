@@ -24,7 +24,7 @@ const TOGETHER: f32 = 0.3;
 const SPACINGS: f32 = 4.0;
 /// Roots at one place are strays if they are this share of all at most: more are meant.
 const MAX_COINCIDENT_SHARE: f32 = 0.1;
-/// So many nodes or more tell the middle of all.
+/// Nodes that are enough to find the middle of all.
 const SAMPLE: usize = 1 << 16;
 /// Where this share of the strands looks like strays, they are no strays.
 const MAX_STRAY_SHARE: f32 = 0.25;

@@ -107,7 +107,7 @@ fn hair_is_wound_under_tension_and_gives_way_when_its_rod_is_taken_too_far() {
         lab.drag(2.0);
         let strands = SEGMENTS.map(|n| lab.straight(0.13, LENGTH, n, Vec3::NEG_Y));
         // Out of reach of the quarter of the hair that is not to be wound: the coil closes as near to the
-        // rod as the hair comes, beside it and partly in it. How deep is told, not bound; coils in reach
+        // rod as the hair comes, beside it and partly in it. How deep is printed, not bound; coils in reach
         // are never in their rods (unit tests of `winding`).
         let rod = lab.app.world_mut();
         let rod = rod.spawn((
