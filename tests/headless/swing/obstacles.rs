@@ -25,7 +25,7 @@ fn worst(lab: &Lab, strands: &[Entity], depth: impl Fn(Vec3) -> f32) -> (f32, f3
 
 /// Moves a collider, which may put edges off their lengths by no more than `most` (m) in any substep, as
 /// `path` says for `seconds`, then leaves it there for three more.
-fn lead(
+fn move_collider(
     (name, most): (&str, f64),
     collider: HairCollider,
     seconds: f32,
@@ -65,7 +65,7 @@ fn lead(
 #[test]
 fn a_comb_goes_through_hair() {
     let radius = 0.005;
-    lead(
+    move_collider(
         ("comb", 2e-4),
         HairCollider::capsule(radius, 0.3).unwrap(),
         1.0,
@@ -79,7 +79,7 @@ fn a_comb_goes_through_hair() {
 
 #[test]
 fn hair_falls_end_on_onto_a_floor_that_rises() {
-    lead(
+    move_collider(
         // Straight hair that is met end-on is pressed for a substep or two until it gives way sideways: its
         // last edge is shorter by what the floor has come meanwhile, however long that edge is.
         ("floor", 2.2e-3),
@@ -92,7 +92,7 @@ fn hair_falls_end_on_onto_a_floor_that_rises() {
 
 #[test]
 fn a_ball_swings_into_hair() {
-    lead(
+    move_collider(
         ("ball", 2e-4),
         HairCollider::sphere(0.06).unwrap(),
         1.0,
