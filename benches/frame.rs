@@ -3,7 +3,7 @@
 //! A head of hair that fills a picture of 1920 × 1080, four samples a pixel, under a sun and a spot with shadow
 //! maps; then a hundred heads in one picture. Hair stands still: simulating it is not in these numbers. A frame is
 //! submitted and waited for, so that the processor's part is in it as well; the first row has no hair. Where
-//! the device tells times, those of its passes are told for each row. On a software device only a small row is
+//! the device measures times, those of its passes are printed for each row. On a software device only a small row is
 //! run, for a look at the code.
 
 #[path = "../tests/common/offscreen.rs"]
@@ -109,9 +109,9 @@ fn time(row: &Row, (width, height, frames): (u32, u32, u32)) {
     let store = scene.app.world().resource::<DiagnosticsStore>();
     let mut passes: Vec<(String, f64)> = store
         .iter()
-        .filter_map(|told| {
-            let path = told.path().as_str().strip_suffix("/elapsed_gpu")?;
-            Some((path.to_string(), told.average()?))
+        .filter_map(|measured| {
+            let path = measured.path().as_str().strip_suffix("/elapsed_gpu")?;
+            Some((path.to_string(), measured.average()?))
         })
         .filter(|(_, time)| *time > 0.005)
         .collect();

@@ -1,4 +1,4 @@
-//! Hair that compute shaders simulate. The log tells where it is, and why.
+//! Hair that compute shaders simulate. The log says where it is, and why.
 //!
 //! `cargo run --release --features gpu --example gpu`
 

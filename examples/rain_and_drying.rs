@@ -1,4 +1,4 @@
-//! Rain wets hair for eight seconds, then a hair dryer dries it. The log tells how wet it is.
+//! Rain wets hair for eight seconds, then a hair dryer dries it. The log says how wet it is.
 //!
 //! `cargo run --release --example rain_and_drying`
 

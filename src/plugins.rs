@@ -23,6 +23,34 @@ use bevy::{
 
 /// All plugins that simulate hair and, with the feature `render`, draw it.
 ///
+/// | plugin | what it does | needs |
+/// |---|---|---|
+/// | [`TickPlugin`] | the clock and the order of systems in a tick | |
+/// | [`StrandPlugin`] | hair and strands as entities, their frames, who moves them | `TickPlugin` |
+/// | [`BondPlugin`] | rest shapes from bonds, bonds that break and re-form | strands |
+/// | [`EnvironmentPlugin`] | gravity, wind, wind zones, blowers, drag, climate | strands |
+/// | [`ContactPlugin`] | colliders and contact between strands | strands |
+/// | [`TreatmentPlugin`] | treatments and perm rods | strands, `BondPlugin` |
+/// | [`WaterPlugin`] | droplets, showers, water volumes, wetting and drying | strands; `BondPlugin` to wet hair |
+/// | [`RodPlugin`] | steps Cosserat rods | strands, `BondPlugin` |
+/// | [`SpringPlugin`] | steps mass-spring strands | strands, `BondPlugin` |
+/// | [`SettlePlugin`] | settles new hair before it is drawn | strands, `BondPlugin` |
+/// | [`SleepPlugin`] | puts strands at rest to sleep and wakes them | strands, `BondPlugin` |
+/// | [`LodPlugin`] | levels of detail, guides and followers, the budget | strands |
+/// | [`StylePlugin`] | measures how much of a style is left | strands, `BondPlugin` |
+/// | [`LookPlugin`] | registers colour, width and dye | |
+/// | `HairRenderPlugin` | draws hair and droplets | feature `render`, strands, Bevy's renderer |
+/// | `HairGpuPlugin` | simulates hair by compute shaders | feature `gpu`, strands, `BondPlugin`, Bevy's renderer |
+/// | `SavePlugin` | captures and applies hairdos | feature `save`, strands, `BondPlugin` |
+/// | `GroomPlugin` | loads grooms and grows them | feature `groom`, Bevy's `AssetPlugin` |
+/// | `PlantPlugin` | registers the settings of planting | feature `groom` |
+/// | `ColliderFitPlugin` | registers the results of fitting colliders | feature `groom` |
+/// | `AttachPlugin` | roots follow meshes and bones | feature `groom`, strands |
+/// | `WearPlugin` | hair on characters with `WearHair` | feature `groom`, strands |
+///
+/// Strands are those of `StrandPlugin`. Without a plugin of this table that they need, plugins do nothing: that is
+/// logged once.
+///
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_keratin::prelude::*;

@@ -1,4 +1,4 @@
-//! Shows a groom from a file on a head that shakes, and tells what was left out of it and what its size and
+//! Shows a groom from a file on a head that shakes, and prints what was left out of it and what its size and
 //! axes look like.
 //!
 //! `cargo run --release --example groom_viewer -- hair.tfx`
@@ -102,7 +102,7 @@ enum Up {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Roots {
-    /// Where the head is, if that can be told.
+    /// Where the head is, if that is known.
     Found,
     First,
     Last,

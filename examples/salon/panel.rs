@@ -40,7 +40,7 @@ fn show(
     mut settings: Settings,
     measured: Res<Measured>,
     mut hand: Local<Hand>,
-    mut calm: Local<u32>,
+    mut idle_frames: Local<u32>,
     mut orbits: Query<&mut Orbit>,
     mut wardrobe: Wardrobe,
     (plots, spared): (Res<PlotsShown>, Option<Res<Spared>>),
@@ -81,7 +81,7 @@ fn show(
             ui.small("Keys: space plays, R restarts, right arrow steps.");
         });
     });
-    release_focus(ctx, &mut calm);
+    release_focus(ctx, &mut idle_frames);
     // The action in the middle of what is left free.
     let right = if plots.0 { PLOTS } else { 0.0 };
     let shift = 0.5 * (WIDTH - right) / area.height().max(1.0);
@@ -95,9 +95,10 @@ fn show(
 
 /// A button or slider that was clicked keeps the keyboard, and the keys of the story with it. Shortly
 /// after the click it lets go; a number that is being typed does not.
-fn release_focus(ctx: &egui::Context, calm: &mut u32) {
-    *calm = if ctx.input(|i| i.pointer.any_down()) { 0 } else { calm.saturating_add(1) };
-    if *calm == 2 && !ctx.text_edit_focused() {
+fn release_focus(ctx: &egui::Context, idle_frames: &mut u32) {
+    *idle_frames =
+        if ctx.input(|i| i.pointer.any_down()) { 0 } else { idle_frames.saturating_add(1) };
+    if *idle_frames == 2 && !ctx.text_edit_focused() {
         ctx.memory_mut(|memory| {
             if let Some(id) = memory.focused() {
                 memory.surrender_focus(id);

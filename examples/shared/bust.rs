@@ -51,14 +51,14 @@ pub fn light(app: &mut App) {
 }
 
 /// Hair of so few drawn strands is drawn whole.
-const FEW: u32 = 2000;
+const MIN_DRAWN: u32 = 2000;
 
 /// Draws no more than so many strands of a head of 40,000, of others in proportion: those wider and of
 /// fewer segments.
 pub fn thin_out(app: &mut App, strands: u32) {
     let share = (strands as f32 / 40_000.0).min(1.0);
     // Brows and lashes stay.
-    let thin = move |count: u32| ((count as f32 * share) as u32).max(FEW).min(count);
+    let thin = move |count: u32| ((count as f32 * share) as u32).max(MIN_DRAWN).min(count);
     let coarse =
         move |segments: u32| ((segments as f32 * share.sqrt()) as u32).max(12).min(segments);
     let wider = |before: u32, now: u32| (before as f32 / now.max(1) as f32).sqrt();

@@ -37,7 +37,7 @@ const NEAR: f32 = 0.2;
 
 /// What happened to a wearer.
 #[derive(Resource, Default)]
-struct Told {
+struct Outcome {
     worn: Option<HairWorn>,
     refused: Option<String>,
 }
@@ -53,13 +53,13 @@ fn app(folder: &Path) -> App {
         .init_asset::<SkinnedMeshInverseBindposes>()
         .init_asset::<AnimationClip>()
         .add_plugins((GltfPlugin::default(), HairPlugins::default()))
-        .init_resource::<Told>()
+        .init_resource::<Outcome>()
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     register(&mut app);
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
-    app.add_observer(|worn: On<HairWorn>, mut told: ResMut<Told>| told.worn = Some(*worn));
-    app.add_observer(|not: On<HairNotWorn>, mut told: ResMut<Told>| {
-        told.refused = Some(not.error.to_string());
+    app.add_observer(|worn: On<HairWorn>, mut outcome: ResMut<Outcome>| outcome.worn = Some(*worn));
+    app.add_observer(|not: On<HairNotWorn>, mut outcome: ResMut<Outcome>| {
+        outcome.refused = Some(not.error.to_string());
     });
     app.finish();
     app.cleanup();
@@ -84,11 +84,11 @@ fn wear(file: &Path, preset: HairPreset) -> Result<Worn, String> {
     app.world_mut().spawn((WorldAssetRoot(scene), at, WearHair::new(preset)));
     for _ in 0..PATIENCE {
         app.update();
-        let told = app.world().resource::<Told>();
-        if let Some(why) = &told.refused {
+        let outcome = app.world().resource::<Outcome>();
+        if let Some(why) = &outcome.refused {
             return Err(why.clone());
         }
-        if let Some(worn) = told.worn {
+        if let Some(worn) = outcome.worn {
             (0..FRAMES).for_each(|_| app.update());
             return Ok(Worn { app, worn });
         }

@@ -44,7 +44,7 @@ fn renderer() -> RenderPlugin {
     }
 }
 
-/// Software rendering, bare displays and missing drivers are all right or told in other words.
+/// Software rendering, bare displays and missing drivers are all right or reported in other words.
 const QUIET: &str = "warn,bevy_log=off,bevy_render::renderer=error,bevy_light=error,bevy_egui=error,\
      wgpu=error,wgpu_hal=off,winit=error";
 

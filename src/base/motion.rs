@@ -250,7 +250,7 @@ impl WorldMotion {
         self.place_at(present, parent, instant).mul_transform(local)
     }
 
-    /// What has got another parent was where it was: that is now told in the frame of its new parent.
+    /// What has got another parent was where it was: that is now given in the frame of its new parent.
     fn note_parents(&mut self, present: &Placed<'_, '_>) {
         let mut adopted: Vec<(Entity, Track)> = Vec::new();
         let mut parents: Vec<(Entity, Track)> = Vec::new();

@@ -50,9 +50,9 @@ pub struct HairTicks;
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct HairTicked;
 
-/// The hair that is simulated ahead while all other hair waits; `None` in the tick itself.
+/// The hair that takes a [`SettleTick`] while all other hair waits; `None` in the tick itself.
 #[derive(Resource, Clone, Debug, Default)]
-pub(crate) struct Ahead(pub(crate) Option<EntityHashSet>);
+pub(crate) struct SettleTickHairs(pub(crate) Option<EntityHashSet>);
 
 /// States the order of a substep once: sets, their parts, and what each does. The enum, the order of
 /// the schedule and the table in the docs are made from it.
@@ -262,7 +262,7 @@ impl MergedSubsteps {
 #[derive(SystemParam)]
 pub(crate) struct EffectiveSubsteps<'w, 's> {
     step: Res<'w, HairStep>,
-    ahead: Res<'w, Ahead>,
+    settling: Res<'w, SettleTickHairs>,
     hairs: Query<
         'w,
         's,
@@ -297,8 +297,8 @@ impl EffectiveSubsteps<'_, '_> {
 
     /// Whether any hair takes a substep now; others wait until several are merged.
     pub(crate) fn any(&self) -> bool {
-        if let Some(ahead) = &self.ahead.0 {
-            return ahead.iter().any(|hair| self.of(*hair).is_some());
+        if let Some(hairs) = &self.settling.0 {
+            return hairs.iter().any(|hair| self.of(*hair).is_some());
         }
         let HairStep { index, count, .. } = *self.step;
         let takes = |(limits, own): (Option<&SubstepLimits>, Option<&MergedSubsteps>)| {
@@ -314,7 +314,7 @@ impl EffectiveSubsteps<'_, '_> {
 
     /// The substep that `hair` takes now, or `None` while it waits for a longer one.
     pub(crate) fn of(&self, hair: Entity) -> Option<EffectiveSubstep> {
-        if self.ahead.0.as_ref().is_some_and(|ahead| !ahead.contains(&hair)) {
+        if self.settling.0.as_ref().is_some_and(|hairs| !hairs.contains(&hair)) {
             return None;
         }
         let HairStep { dt, index, count } = *self.step;
@@ -432,7 +432,7 @@ impl Plugin for TickPlugin {
             }
         };
         app.init_resource::<HairStep>()
-            .init_resource::<Ahead>()
+            .init_resource::<SettleTickHairs>()
             .init_resource::<WorldMotion>()
             .init_resource::<NotedTicks>()
             .init_schedule(HairTicked)

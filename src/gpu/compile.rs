@@ -151,7 +151,7 @@ pub(super) struct Ready {
 }
 
 impl AppDevice<'_> {
-    /// The device with its kernels, which are compiled once somebody asks.
+    /// The device with its kernels, which are compiled when first needed.
     pub(super) fn ready(&self) -> Result<Ready, WhyCpu> {
         let (Some(device), Some(queue), Some(adapter), Some(_)) =
             (&self.device, &self.queue, &self.adapter, &self.sources)

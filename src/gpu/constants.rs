@@ -1,7 +1,7 @@
 //! Constants that kernels share with the code that they follow, written out in WGSL under the same names.
 
 use super::{
-    followers::TIES,
+    followers::OFFSET_VECTORS,
     layout::{GROUP_SIZE, SCRATCH},
     record::*,
     sweeps::{PRINTED, SPLIT},
@@ -18,17 +18,17 @@ use crate::{
         near::{ESCAPE_RATIO, FASTER},
         step::PASSES_IN_TOUCH,
         stiffness::REFERENCE_GRAVITY,
-        touch::{DEPTH_RATIO, Grip, REVERSING, TOUCHING},
+        touch::{DEPTH_RATIO, FrictionPass, REVERSING, TOUCHING},
     },
 };
 use std::sync::LazyLock;
 
-const GRIP_NONE: u32 = Grip::None as u32;
-const GRIP_DEPTH: u32 = Grip::Depth as u32;
-const GRIP_BETWEEN: u32 = Grip::Between as u32;
-const GRIP_ASSUMED: u32 = Grip::Assumed as u32;
-const GRIP_JUDGED: u32 = Grip::Judged as u32;
-const GRIP_SOLVED: u32 = Grip::Solved as u32;
+const FRICTION_PASS_NONE: u32 = FrictionPass::None as u32;
+const FRICTION_PASS_DEPTH: u32 = FrictionPass::Depth as u32;
+const FRICTION_PASS_BETWEEN: u32 = FrictionPass::Between as u32;
+const FRICTION_PASS_ASSUMED: u32 = FrictionPass::Assumed as u32;
+const FRICTION_PASS_JUDGED: u32 = FrictionPass::Judged as u32;
+const FRICTION_PASS_SOLVED: u32 = FrictionPass::Solved as u32;
 
 macro_rules! wgsl {
     ($($type:ident { $($name:ident)* })*) => {
@@ -40,11 +40,12 @@ static CONSTANTS: LazyLock<String> = LazyLock::new(|| {
     let all = wgsl! {
         u32 {
             GROUP_SIZE SCRATCH MAX_OBSTACLES MAX_BLOWERS MOST_TREATMENTS
-            CARRIES SHAPES REMEMBERS NOTES_BEFORE RESTS TARGETS_ROOTS HOLDS FOLLOWS WAKES SWEEPS
+            FRAME_MOVES SHAPES REMEMBERS NOTES_BEFORE RESTS ROOT_TARGETS HOLDS FOLLOWS WAKES SWEEPS
             HALF_SPACE CAPSULE CYLINDER ELLIPSOID
-            SLEPT ROOT FREE GUIDES TIES SPLIT PRINTED
+            SLEPT ROOT FREE GUIDES OFFSET_VECTORS SPLIT PRINTED
             PASSES_IN_TOUCH MAX_REPAIRS LEAVING MOST_STEPS
-            GRIP_NONE GRIP_DEPTH GRIP_BETWEEN GRIP_ASSUMED GRIP_JUDGED GRIP_SOLVED
+            FRICTION_PASS_NONE FRICTION_PASS_DEPTH FRICTION_PASS_BETWEEN
+            FRICTION_PASS_ASSUMED FRICTION_PASS_JUDGED FRICTION_PASS_SOLVED
         }
         f32 {
             THETA MAX_PUSH FAST_TURN STRAIN STRETCH_RATIO STRETCH_SHARE MAX_TENSION TORN MAX_STRAIN NEARER DEEP_SHARE MAX_BENDING_LENGTH MAX_STIFFNESS BUCKLING_TWIST HOLD ROUNDING

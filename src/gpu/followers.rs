@@ -4,10 +4,10 @@ use super::layout::{FollowerView, GROUP_SIZE, Layout};
 use crate::simulation::lod::follow::{GUIDES, GuideOffsets};
 use bevy::math::{Quat, Vec3, ops};
 
-/// Vectors per node of what ties a follower.
-pub(super) const TIES: usize = 6;
+/// Vectors per node of a follower's guide offsets.
+pub(super) const OFFSET_VECTORS: usize = 6;
 
-/// Where a targets root of a follower is, in the ties of its last node.
+/// Where the target of a follower's root is, in the guide offsets of its last node.
 pub(super) const ROOT_PART: usize = 3;
 
 /// How followers move in a substep.
@@ -33,20 +33,20 @@ impl FollowRecord {
     }
 }
 
-/// The ties of a hair's followers as the kernel reads them.
+/// The guide offsets of a hair's followers as the kernel reads them.
 pub(super) fn pack(layout: &Layout, followers: &[(usize, FollowerView<'_>)]) -> Vec<[f32; 4]> {
-    let mut packed = vec![[0.0; 4]; layout.follower_vectors(TIES)];
+    let mut packed = vec![[0.0; 4]; layout.follower_vectors(OFFSET_VECTORS)];
     for (strand, view) in followers {
         let edges = layout.nodes(*strand) - 1;
-        let guides = view.ties.guides.len().min(GUIDES);
-        let at = |node, part| tie_index(layout, *strand, node, part);
-        let (own, since) = view.ties.own_motion();
-        let mut ties = view.ties.edges();
+        let guides = view.offsets.guides.len().min(GUIDES);
+        let at = |node, part| offset_index(layout, *strand, node, part);
+        let (own, since) = view.offsets.own_motion();
+        let mut offsets = view.offsets.edges();
         for edge in 0..edges {
             let mut position = [0.0; GUIDES];
             let mut segment = Vec3::ZERO;
             for (guide, place) in position.iter_mut().enumerate().take(guides) {
-                let Some((relative, along, at_edge)) = ties.next() else { break };
+                let Some((relative, along, at_edge)) = offsets.next() else { break };
                 packed[at(edge, guide)] = relative.to_array();
                 *place = at_edge;
                 if guide == 0 {
@@ -62,7 +62,7 @@ pub(super) fn pack(layout: &Layout, followers: &[(usize, FollowerView<'_>)]) -> 
         let mut head = [0.0; 4];
         let mut weights = [0.0, 0.0, 0.0, since];
         let mut ends = [0.0; 4];
-        for (guide, (_, weight)) in view.ties.guides.iter().enumerate().take(guides) {
+        for (guide, (_, weight)) in view.offsets.guides.iter().enumerate().take(guides) {
             let of = view.guides[guide] as usize;
             head[guide] = layout.slot(of, 0) as f32;
             ends[guide] = (layout.nodes(of) - 2) as f32;
@@ -77,7 +77,8 @@ pub(super) fn pack(layout: &Layout, followers: &[(usize, FollowerView<'_>)]) -> 
     packed
 }
 
-/// Where part `part` of a follower's node lies among the ties.
-pub(super) fn tie_index(layout: &Layout, strand: usize, node: usize, part: usize) -> usize {
-    layout.index(strand, node, part, TIES) - layout.first_follower_slot() * TIES * GROUP_SIZE
+/// Where part `part` of a follower's node lies among the guide offsets.
+pub(super) fn offset_index(layout: &Layout, strand: usize, node: usize, part: usize) -> usize {
+    layout.index(strand, node, part, OFFSET_VECTORS)
+        - layout.first_follower_slot() * OFFSET_VECTORS * GROUP_SIZE
 }

@@ -52,7 +52,7 @@ pub(super) struct GpuHair {
     pub(super) returns: Option<(WhyCpu, u64)>,
     /// What came near in this tick that no record can hold: it rests, and returns in the next.
     pub(super) unsupported: Option<Unsupported>,
-    /// Somebody waits for the answer of this number.
+    /// The number of the answer that is waited for.
     pub(super) awaited: Option<u64>,
     /// The last state that was read back.
     pub(super) checkpoint: Option<Contents>,
@@ -80,7 +80,7 @@ pub(super) struct GpuHair {
     pub(super) treated: Vec<HairTreatment>,
 }
 
-/// has just returned, and stays for so long (s).
+/// Keeps hair that has just returned on the CPU for this long (s).
 #[derive(Component, Debug)]
 #[component(clone_behavior = Ignore)]
 pub(super) struct StaysOnCpu(pub(super) f32);
@@ -123,13 +123,13 @@ impl GpuHair {
 
 /// What a follower follows; `None` where it has no guides. Those of the hair are given by their indices.
 fn follower_view<'a>(strand: &EntityRef<'a>, guides: &[Option<u32>]) -> Option<FollowerView<'a>> {
-    let ties = strand.get::<Follower>()?.ties();
+    let offsets = strand.get::<Follower>()?.offsets();
     let edges = strand.get::<Strand>()?.edges();
     let mut own = [0; GUIDES];
-    for (own, (guide, _)) in own.iter_mut().zip(&ties.guides) {
+    for (own, (guide, _)) in own.iter_mut().zip(&offsets.guides) {
         *own = (*guides.get(*guide as usize)?)?;
     }
-    ties.fit(edges).then_some(FollowerView { ties, guides: own })
+    offsets.fit(edges).then_some(FollowerView { offsets, guides: own })
 }
 
 /// Hands a hair over, if all its strands can be.

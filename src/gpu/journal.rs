@@ -8,7 +8,7 @@ use super::{
         unsupported,
     },
     sweeps::SweepRecord,
-    targets::Leading,
+    targets::TargetQueries,
     treatments::GpuTreatments,
 };
 use crate::{
@@ -59,7 +59,7 @@ pub(super) fn write_journals(
     (solver, sweeps, stiffness): (Settings<HairSolver>, Settings<Sweeps>, Settings<HairStiffness>),
     (drag, contact): (Settings<AirDrag>, Settings<StrandContact>),
     (influence, cuticle): (Settings<BondInfluence>, Settings<Cuticle>),
-    leading: Leading,
+    target_queries: TargetQueries,
     mut hairs: Query<
         (
             Entity,
@@ -74,7 +74,7 @@ pub(super) fn write_journals(
     >,
 ) {
     let gravity = gravity.clamped().0;
-    let mut held = leading.held();
+    let mut held = target_queries.held();
     for (hair, frame, obstacles, mut journal, treatments, on, rest) in &mut hairs {
         let Some(substep) = substeps.of(hair) else { continue };
         let solids = obstacles.map_or(&[][..], |all| &all.solids);
@@ -89,7 +89,7 @@ pub(super) fn write_journals(
         }
         let is_last = step.index + 1 == step.count;
         let follows = follow_record(&mut journal, frame, &substep, is_last);
-        let targets = leading.of(hair, &mut held, &mut journal);
+        let targets = target_queries.of(hair, &mut held, &mut journal);
         let (disturbance, drawn, sleepers) = rest;
         let sleep = disturbance.map(|disturbance| disturbance.sleep);
         let sleep =
@@ -109,7 +109,7 @@ pub(super) fn write_journals(
                 rest.wake();
             }
         }
-        if rest.add_targets(&targets, sleep.distance(), sleep.angle())
+        if rest.note_targets(&targets, sleep.distance(), sleep.angle())
             || treatments.as_ref().is_some_and(|treatments| treatments.act())
         {
             rest.wake();

@@ -170,7 +170,7 @@ impl Layout {
 #[derive(Clone, Copy, Debug)]
 pub struct FollowerView<'a> {
     /// How.
-    pub ties: &'a GuideOffsets,
+    pub offsets: &'a GuideOffsets,
     /// The indices of its guides among the hair's strands.
     pub guides: [u32; GUIDES],
 }

@@ -67,8 +67,8 @@
 //! | `substep` | a substep | 18,180 | 128 | 8 |
 //! | `sweep` | a substep by the paper's projections | 10,960 | 96 | 10 |
 //! | `follow` | a substep, of followers | 1,080 | 56 | 18 |
-//! | `lead` | a substep, of targets nodes | 45 | 16 | 32 |
-//! | `lead_followers` | a tick, of targets roots | 28 | 16 | 32 |
+//! | `set_targets` | a substep, of nodes with targets | 45 | 16 | 32 |
+//! | `set_root_targets` | a tick, of followers' roots with targets | 28 | 16 | 32 |
 //! | `sleep` | a tick, of hair that may sleep | 192 | 16 | 32 |
 //! | `measure` | a frame | 275 | 24 | 32 |
 //! | `present` | a frame | 380 | 32 | 32 |

@@ -41,15 +41,15 @@ pub(super) const KERNELS: [(&str, &str, &[usize]); COUNT] = [
     ("substep", SUBSTEP, &[0, 1]),
     ("present", include_str!("wgsl/present.wgsl"), &[2]),
     ("measure", include_str!("wgsl/measure.wgsl"), &[3]),
-    ("lead", include_str!("wgsl/lead.wgsl"), &[4, 1]),
-    ("lead_followers", include_str!("wgsl/lead.wgsl"), &[4, 1]),
+    ("set_targets", include_str!("wgsl/targets.wgsl"), &[4, 1]),
+    ("set_root_targets", include_str!("wgsl/targets.wgsl"), &[4, 1]),
     ("follow", SUBSTEP, &[0, 1]),
     ("sleep", include_str!("wgsl/sleep.wgsl"), &[5, 1]),
     ("sweep", SUBSTEP, &[0, 1]),
 ];
 
-/// The groups that kernels bind, with their labels: a hair, a record, what packing, measuring, leading
-/// and sleep bind.
+/// The groups that kernels bind, with their labels: a hair, a record, what packing, measuring,
+/// targets and sleep bind.
 pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); GROUPS] {
     const STAGE: ShaderStages = ShaderStages::COMPUTE;
     let read = || storage_buffer_read_only_sized(false, None);
@@ -66,7 +66,7 @@ pub(super) fn layouts() -> [(&'static str, Vec<BindGroupLayoutEntry>); GROUPS] {
         ("hair substep", BindGroupLayoutEntries::single(STAGE, record).to_vec()),
         ("drawn hair", BindGroupLayoutEntries::sequential(STAGE, drawn).to_vec()),
         ("measured hair", BindGroupLayoutEntries::sequential(STAGE, measured).to_vec()),
-        ("targets hair", BindGroupLayoutEntries::sequential(STAGE, targets).to_vec()),
+        ("kinematic targets", BindGroupLayoutEntries::sequential(STAGE, targets).to_vec()),
         ("still hair", BindGroupLayoutEntries::sequential(STAGE, still).to_vec()),
     ]
 }
@@ -86,10 +86,10 @@ pub struct HairKernels {
     /// What measuring binds.
     pub(super) measured: BindGroupLayout,
     pub(super) measure: ComputePipeline,
-    /// What leading nodes binds beside a record.
+    /// What writing targets binds beside a record.
     pub(super) targets: BindGroupLayout,
-    pub(super) lead: ComputePipeline,
-    pub(super) lead_followers: ComputePipeline,
+    pub(super) set_targets: ComputePipeline,
+    pub(super) set_root_targets: ComputePipeline,
     /// Binds what a substep does.
     pub(super) follow: ComputePipeline,
     /// What sleep binds beside a record.
@@ -122,7 +122,8 @@ impl HairKernels {
         pipelines: [ComputePipeline; COUNT],
     ) -> Self {
         let [hair, record, drawn, measured, targets, still] = layouts;
-        let [substep, present, measure, lead, lead_followers, follow, sleep, sweep] = pipelines;
+        let [substep, present, measure, set_targets, set_root_targets, follow, sleep, sweep] =
+            pipelines;
         Self {
             hair,
             record,
@@ -133,8 +134,8 @@ impl HairKernels {
             measured,
             measure,
             targets,
-            lead,
-            lead_followers,
+            set_targets,
+            set_root_targets,
             follow,
             still,
             sleep,

@@ -22,7 +22,7 @@ use bevy::{
 };
 use core::ops::Range;
 
-/// Led nodes of substeps that are uploaded together, at most: 64 MB.
+/// Kinematic targets of substeps that are uploaded together, at most: 64 MB.
 pub(super) const MAX_TARGETS: usize = 1 << 21;
 
 /// The maximum number of obstacles in a record.
@@ -98,7 +98,7 @@ pub(super) struct Rest {
     pub(super) disturbed: u32,
     /// Whether a substep of this tick has been written down.
     pub(super) has_begun: bool,
-    /// The nodes that were targets when targets nodes last moved.
+    /// The kinematic targets when they last moved.
     pub(super) targets: Vec<KinematicTarget>,
 }
 
@@ -108,8 +108,8 @@ impl Rest {
         (self.is_asleep, self.wakes) = (false, true);
     }
 
-    /// Whether nodes are targets elsewhere than when this last was so.
-    pub(super) fn add_targets(
+    /// Whether the targets have moved since this last was so.
+    pub(super) fn note_targets(
         &mut self,
         targets: &[KinematicTarget],
         distance: f32,
@@ -147,7 +147,7 @@ impl GpuJournal {
         falls
     }
 
-    /// Whether more than so many substeps wait, or more targets nodes than are uploaded together.
+    /// Whether more than so many substeps wait, or more targets than are uploaded together.
     pub(super) fn is_long(&self, most: usize) -> bool {
         self.records.len() > most
             || self.records.iter().map(|record| record.targets.len()).sum::<usize>() > MAX_TARGETS
@@ -236,7 +236,7 @@ pub struct SubstepRecord {
     pub rests: bool,
     /// Whether rest shapes are computed from the bonds first.
     pub shapes: bool,
-    /// Nodes that are targets in this substep, and those that no longer are. All roots or none.
+    /// Nodes that have a target in this substep, and those that no longer have. All roots or none.
     pub targets: Vec<KinematicTarget>,
     /// How followers move; in the tick's last substep.
     pub follows: Option<FollowRecord>,
@@ -285,12 +285,12 @@ pub(super) const ROOT: u32 = 1 << 30;
 pub(super) const FREE: u32 = 1 << 31;
 
 // Flags of a record.
-pub(super) const CARRIES: u32 = 1;
+pub(super) const FRAME_MOVES: u32 = 1;
 pub(super) const SHAPES: u32 = 2;
 pub(super) const REMEMBERS: u32 = 4;
 pub(super) const NOTES_BEFORE: u32 = 8;
 pub(super) const RESTS: u32 = 16;
-pub(super) const TARGETS_ROOTS: u32 = 32;
+pub(super) const ROOT_TARGETS: u32 = 32;
 pub(super) const HOLDS: u32 = 64;
 pub(super) const FOLLOWS: u32 = 128;
 pub(super) const WAKES: u32 = 256;
@@ -322,13 +322,13 @@ impl SubstepRecord {
             || self.change.iter().chain(&self.share).any(|c| *c != 0.0)
             || !self.treatments.is_empty();
         let flags = [
-            (self.frame_motion.is_some(), CARRIES),
+            (self.frame_motion.is_some(), FRAME_MOVES),
             (self.shapes, SHAPES),
             (remembers, REMEMBERS),
             (self.notes_before, NOTES_BEFORE),
             (self.rests, RESTS),
-            (self.targets.iter().any(|targets| targets.node == 0), TARGETS_ROOTS),
-            (self.targets.iter().any(|targets| targets.node > 0 && targets.place.is_some()), HOLDS),
+            (self.targets.iter().any(|target| target.node == 0), ROOT_TARGETS),
+            (self.targets.iter().any(|target| target.node > 0 && target.place.is_some()), HOLDS),
             (self.follows.is_some(), FOLLOWS),
             (self.sleep.is_none_or(|sleep| sleep.wakes), WAKES),
             (indices.has_spins, SWEEPS),
@@ -358,9 +358,9 @@ impl SubstepRecord {
         words.0.resize(start + BEFORE_TREATMENTS, 0);
         let treatments = &self.treatments[..self.treatments.len().min(MOST_TREATMENTS)];
         words.word(treatments.len() as u32);
-        for targets in [&indices.targets, &indices.followers_led] {
-            words.word(targets.start);
-            words.word(targets.end - targets.start);
+        for range in [&indices.targets, &indices.root_targets] {
+            words.word(range.start);
+            words.word(range.end - range.start);
         }
         words.word(indices.first_follower_block);
         words.word(indices.first_follower_slot);
@@ -399,9 +399,9 @@ fn is_supported(solid: &Solid) -> bool {
 /// Where the kernels find what belongs to a record.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Indices {
-    /// The targets nodes of simulated strands, and the targets roots of followers.
+    /// The targets of simulated strands' nodes, and of followers' roots.
     pub(super) targets: Range<u32>,
-    pub(super) followers_led: Range<u32>,
+    pub(super) root_targets: Range<u32>,
     pub(super) first_follower_block: u32,
     pub(super) first_follower_slot: u32,
     /// Whether the strands have angular velocities, which the paper's projections need.

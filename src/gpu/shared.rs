@@ -68,7 +68,7 @@ pub(super) struct Replies {
 struct Probed {
     strands: Vec<u32>,
     tick: u32,
-    crossing: PendingReadback,
+    readback: PendingReadback,
 }
 
 impl Link {
@@ -116,11 +116,11 @@ impl Link {
 
     /// The nodes of strands that were asked for, and of which tick they are.
     pub(super) fn take_probed(&self) -> Option<(Vec<(u32, Vec<Vec3>)>, u32)> {
-        let Probed { strands, tick, crossing } = {
+        let Probed { strands, tick, readback } = {
             let probed = &mut self.replies().probed;
-            probed.take_if(|probed| probed.crossing.has_arrived())?
+            probed.take_if(|probed| probed.readback.has_arrived())?
         };
-        let bytes = crossing.take()??;
+        let bytes = readback.take()??;
         let mut places = bytes.chunks_exact(16).map(|place| {
             let number =
                 |i: usize| f32::from_le_bytes([place[i], place[i + 1], place[i + 2], place[i + 3]]);
@@ -135,20 +135,20 @@ impl Link {
 
     /// The state that has arrived, with the number of its request; `Err` where the device failed.
     pub(super) fn take_state(&self) -> Option<(u64, Result<Contents, ()>)> {
-        let arrived = |(_, crossing): &mut (u64, PendingReadback)| crossing.has_arrived();
-        let (number, crossing) = self.replies().copy.take_if(arrived)?;
+        let arrived = |(_, readback): &mut (u64, PendingReadback)| readback.has_arrived();
+        let (number, readback) = self.replies().copy.take_if(arrived)?;
         let read = |bytes: Vec<u8>| Contents::of_bytes(&self.layout, &bytes);
-        Some((number, crossing.take()?.map(read).ok_or(())))
+        Some((number, readback.take()?.map(read).ok_or(())))
     }
 
     /// A report that has arrived.
     pub(super) fn take_report(&self) -> Option<Measured> {
         let reports = &mut self.replies().reports;
         let bytes = reports.0.front()?.take()?;
-        let crossing = reports.0.pop_front()?;
+        let readback = reports.0.pop_front()?;
         let report = Measured::of(&bytes?);
-        crossing.is_mapped.store(false, Ordering::Release);
-        reports.1.push(crossing);
+        readback.is_mapped.store(false, Ordering::Release);
+        reports.1.push(readback);
         Some(report)
     }
 }
@@ -197,7 +197,7 @@ impl Shared {
         pending.drain(..count);
     }
 
-    /// Runs the first pending substeps by themselves where all together lead too many nodes for a buffer.
+    /// Runs the first pending substeps by themselves where all together have too many targets for a buffer.
     fn run_excess(&mut self) {
         loop {
             let mut targets = 0;
@@ -259,9 +259,9 @@ impl Shared {
             && let Some(number) = self.asked.take()
         {
             let size = Contents::bytes(self.strands.layout());
-            let crossing = PendingReadback::new(&self.device, size);
-            self.strands.copy_state(encoder, &crossing.buffer);
-            replies.copy = Some((number, crossing));
+            let readback = PendingReadback::new(&self.device, size);
+            self.strands.copy_state(encoder, &readback.buffer);
+            replies.copy = Some((number, readback));
         }
         self.copy_probed(&mut replies, encoder);
         if has_run {
@@ -289,24 +289,24 @@ impl Shared {
             (0..layout.nodes(strand as usize)).map(move |node| (strand, node))
         };
         let count = strands.iter().flat_map(nodes).count() as u64;
-        let crossing = PendingReadback::new(&self.device, 16 * count.max(1));
+        let readback = PendingReadback::new(&self.device, 16 * count.max(1));
         for ((strand, node), to) in strands.iter().flat_map(nodes).zip(0..) {
-            self.strands.copy_place((strand as usize, node), encoder, &crossing.buffer, 16 * to);
+            self.strands.copy_place((strand as usize, node), encoder, &readback.buffer, 16 * to);
         }
         let tick = tick.saturating_sub(late as u32);
-        replies.probed = Some(Probed { strands: core::mem::take(strands), tick, crossing });
+        replies.probed = Some(Probed { strands: core::mem::take(strands), tick, readback });
     }
 
     /// After the submission: has the copies mapped.
     pub(super) fn map(&self) {
         let replies = self.replies.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, crossing)) = &replies.copy {
-            crossing.map(&self.device);
+        if let Some((_, readback)) = &replies.copy {
+            readback.map(&self.device);
         }
         if let Some(probed) = &replies.probed {
-            probed.crossing.map(&self.device);
+            probed.readback.map(&self.device);
         }
-        replies.reports.0.iter().for_each(|crossing| crossing.map(&self.device));
+        replies.reports.0.iter().for_each(|readback| readback.map(&self.device));
     }
 }
 
@@ -365,10 +365,10 @@ impl Reports {
             return;
         }
         let size = REPORT_BYTES as u64;
-        let crossing = self.1.pop().unwrap_or_else(|| PendingReadback::new(device, size));
-        encoder.copy_buffer_to_buffer(report, 0, &crossing.buffer, 0, size);
+        let readback = self.1.pop().unwrap_or_else(|| PendingReadback::new(device, size));
+        encoder.copy_buffer_to_buffer(report, 0, &readback.buffer, 0, size);
         encoder.clear_buffer(report, 0, Some(size));
-        self.0.push_back(crossing);
+        self.0.push_back(readback);
     }
 }
 

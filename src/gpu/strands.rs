@@ -56,8 +56,8 @@ pub struct GpuStrands {
     groups: [BindGroup; 2],
     records: Option<(Buffer, BindGroup)>,
     words: Vec<u32>,
-    add_targets: KinematicTargets,
-    /// What leading binds beside `add_targets`.
+    targets: KinematicTargets,
+    /// What writing targets binds beside `targets`.
     scratch: Buffer,
     followers: Option<Followers>,
     /// Where simulated strands have been still, once that is asked for; which uploaded substeps end a tick
@@ -71,10 +71,10 @@ pub struct GpuStrands {
     fingerprints: Mutex<Vec<Fingerprint>>,
 }
 
-/// What followers bind: their ties in place of scratch.
+/// What followers bind: their guide offsets in place of scratch.
 #[derive(Debug)]
 struct Followers {
-    ties: Buffer,
+    offsets: Buffer,
     groups: [BindGroup; 2],
 }
 
@@ -128,10 +128,11 @@ impl GpuStrands {
         let following: Vec<_> =
             following.into_iter().filter_map(|(strand, view)| Some((strand, view?))).collect();
         let followers = (!following.is_empty()).then(|| {
-            let ties = followers::pack(&layout, &following);
-            let ties = with("hair ties", bytemuck::cast_slice(&ties));
-            let groups = [group(&poses[0], &poses[1], &ties), group(&poses[1], &poses[0], &ties)];
-            Followers { ties, groups }
+            let offsets = followers::pack(&layout, &following);
+            let offsets = with("guide offsets", bytemuck::cast_slice(&offsets));
+            let groups =
+                [group(&poses[0], &poses[1], &offsets), group(&poses[1], &poses[0], &offsets)];
+            Followers { offsets, groups }
         });
         let measured = [&poses[0], &poses[1]].map(|pose| {
             device.create_bind_group(
@@ -158,7 +159,7 @@ impl GpuStrands {
             groups,
             records: None,
             words: Vec::new(),
-            add_targets: KinematicTargets::default(),
+            targets: KinematicTargets::default(),
             scratch,
             followers,
             still: None,
@@ -229,7 +230,7 @@ impl GpuStrands {
             return;
         }
         self.words.clear();
-        self.add_targets.clear();
+        self.targets.clear();
         self.rests.clear();
         self.rests
             .extend(substeps.iter().map(|record| record.sleep.is_some_and(|sleep| sleep.ends)));
@@ -237,17 +238,11 @@ impl GpuStrands {
             self.watch_rest(device, kernels);
         }
         for record in substeps {
-            let indices = self.add_targets.push(&self.layout, record);
+            let indices = self.targets.push(&self.layout, record);
             record.write_of(&mut self.words, &indices);
         }
-        let followers = self.followers.as_ref().map(|followers| &followers.ties);
-        self.add_targets.upload(
-            device,
-            queue,
-            kernels,
-            &self.rest,
-            [Some(&self.scratch), followers],
-        );
+        let followers = self.followers.as_ref().map(|followers| &followers.offsets);
+        self.targets.upload(device, queue, kernels, &self.rest, [Some(&self.scratch), followers]);
         let bytes: &[u8] = bytemuck::cast_slice(&self.words);
         let size = bytes.len() as u64;
         if self.records.as_ref().is_none_or(|(buffer, _)| buffer.size() < size) {
@@ -288,7 +283,7 @@ impl GpuStrands {
             pass.set_bind_group(1, records, &[record]);
             pass.dispatch_workgroups(count as u32, 1, 1);
         };
-        for (pipeline, group, count) in self.add_targets.of(index, kernels) {
+        for (pipeline, group, count) in self.targets.of(index, kernels) {
             dispatch(pipeline, group, count);
         }
         let simulated = self.layout.simulated_blocks();

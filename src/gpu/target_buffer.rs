@@ -46,21 +46,21 @@ impl KinematicTargets {
             first..self.words.len() as u32
         };
         let targets =
-            put(&mut record.targets.iter().filter_map(|targets| target_words(layout, targets)));
+            put(&mut record.targets.iter().filter_map(|target| target_words(layout, target)));
         // Roots of followers move once a tick.
         let roots = record.targets.iter().filter(|_| record.follows.is_some());
-        let followers_led = put(&mut roots.filter_map(|targets| follower_words(layout, targets)));
-        self.counts.push([&targets, &followers_led].map(|range| range.end - range.start));
+        let root_targets = put(&mut roots.filter_map(|target| root_words(layout, target)));
+        self.counts.push([&targets, &root_targets].map(|range| range.end - range.start));
         Indices {
             targets,
-            followers_led,
+            root_targets,
             first_follower_block: layout.simulated_blocks() as u32,
             first_follower_slot: layout.first_follower_slot() as u32,
             has_spins: layout.has_spins(),
         }
     }
 
-    /// Has the device take them: into the scratch of simulated strands, and into the ties of followers.
+    /// Has the device take them: into the scratch of simulated strands, and into the guide offsets of followers.
     pub(super) fn upload(
         &mut self,
         device: &RenderDevice,
@@ -74,10 +74,10 @@ impl KinematicTargets {
         if size == 0 {
             return;
         }
-        let uploaded = self.uploaded.take().filter(|add_targets| add_targets.buffer.size() >= size);
+        let uploaded = self.uploaded.take().filter(|uploaded| uploaded.buffer.size() >= size);
         let uploaded = uploaded.unwrap_or_else(|| {
             let buffer = device.create_buffer(&BufferDescriptor {
-                label: Some("targets hair"),
+                label: Some("kinematic targets"),
                 size: size.next_power_of_two(),
                 usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
                 mapped_at_creation: false,
@@ -88,7 +88,7 @@ impl KinematicTargets {
                     rest.as_entire_binding(),
                     into.as_entire_binding(),
                 ));
-                device.create_bind_group("targets hair", &kernels.targets, &entries)
+                device.create_bind_group("kinematic targets", &kernels.targets, &entries)
             };
             let groups = into.map(|into| into.map(group));
             Uploaded { buffer, groups }
@@ -104,37 +104,38 @@ impl KinematicTargets {
         kernels: &'a HairKernels,
     ) -> impl Iterator<Item = (&'a ComputePipeline, &'a BindGroup, usize)> {
         let counts = self.counts.get(substep).copied().unwrap_or_default();
-        let groups = self.uploaded.iter().flat_map(|add_targets| &add_targets.groups);
-        let all = [&kernels.lead, &kernels.lead_followers].into_iter().zip(groups).zip(counts);
+        let groups = self.uploaded.iter().flat_map(|uploaded| &uploaded.groups);
+        let all =
+            [&kernels.set_targets, &kernels.set_root_targets].into_iter().zip(groups).zip(counts);
         all.filter(|(_, count)| *count > 0).filter_map(|((pipeline, group), count)| {
             Some((pipeline, group.as_ref()?, count.div_ceil(GROUP) as usize))
         })
     }
 }
 
-/// A targets node as lead.wgsl reads it; `None` for one that does not exist.
-fn target_words(layout: &Layout, targets: &KinematicTarget) -> Option<[u32; 8]> {
-    let (strand, node) = (targets.strand as usize, targets.node as usize);
+/// A node's target as targets.wgsl reads it; `None` for a node that does not exist.
+fn target_words(layout: &Layout, target: &KinematicTarget) -> Option<[u32; 8]> {
+    let (strand, node) = (target.strand as usize, target.node as usize);
     if strand >= layout.strands() || node >= layout.nodes(strand) || layout.is_follower(strand) {
         return None;
     }
     let slot = layout.slot(strand, node);
-    let root = if targets.node == 0 { ROOT } else { 0 };
-    let free = if targets.place.is_none() { FREE } else { 0 };
-    let [x, y, z] = targets.place.unwrap_or_default().to_array().map(f32::to_bits);
-    let [a, b, c, d] = targets.frame.to_array().map(f32::to_bits);
+    let root = if target.node == 0 { ROOT } else { 0 };
+    let free = if target.place.is_none() { FREE } else { 0 };
+    let [x, y, z] = target.place.unwrap_or_default().to_array().map(f32::to_bits);
+    let [a, b, c, d] = target.frame.to_array().map(f32::to_bits);
     Some([x, y, z, slot | root | free, a, b, c, d])
 }
 
-/// A follower's targets root as lead.wgsl reads it; `None` for another node.
-fn follower_words(layout: &Layout, targets: &KinematicTarget) -> Option<[u32; 8]> {
-    let strand = targets.strand as usize;
-    if strand >= layout.strands() || targets.node > 0 || !layout.is_follower(strand) {
+/// The target of a follower's root as targets.wgsl reads it; `None` for another node.
+fn root_words(layout: &Layout, target: &KinematicTarget) -> Option<[u32; 8]> {
+    let strand = target.strand as usize;
+    if strand >= layout.strands() || target.node > 0 || !layout.is_follower(strand) {
         return None;
     }
     let tip = layout.nodes(strand) - 1;
-    let slot = followers::tie_index(layout, strand, tip, followers::ROOT_PART) as u32;
-    let [x, y, z] = targets.place?.to_array().map(f32::to_bits);
-    let [a, b, c, d] = targets.frame.to_array().map(f32::to_bits);
+    let slot = followers::offset_index(layout, strand, tip, followers::ROOT_PART) as u32;
+    let [x, y, z] = target.place?.to_array().map(f32::to_bits);
+    let [a, b, c, d] = target.frame.to_array().map(f32::to_bits);
     Some([x, y, z, slot, a, b, c, d])
 }

@@ -6,9 +6,9 @@ use crate::hair::strand::{HeldNodes, PerHair, Strand, StrandOf, Strands};
 use crate::{authoring::attach::TiedRoots, base::schedule::HairStep};
 use bevy::{ecs::system::SystemParam, math::Isometry3d, prelude::*};
 
-/// What add_targets nodes.
+/// What gives nodes kinematic targets.
 #[derive(SystemParam)]
-pub(super) struct Leading<'w, 's> {
+pub(super) struct TargetQueries<'w, 's> {
     #[cfg(feature = "groom")]
     step: Res<'w, HairStep>,
     members: Query<'w, 's, &'static Strands>,
@@ -22,7 +22,7 @@ pub(super) struct Leading<'w, 's> {
 /// Strands with held nodes, by their hair.
 pub(super) type HeldStrands<'a> = PerHair<Vec<(Entity, &'a Strand, &'a HeldNodes)>>;
 
-impl Leading<'_, '_> {
+impl TargetQueries<'_, '_> {
     /// Strands with held nodes, hair by hair.
     pub(super) fn held(&self) -> HeldStrands<'_> {
         let mut all = HeldStrands::default();
@@ -36,7 +36,7 @@ impl Leading<'_, '_> {
         all
     }
 
-    /// The targets nodes of a hair in the substep that ends now.
+    /// The kinematic targets of a hair in the substep that ends now.
     pub(super) fn of(
         &self,
         hair: Entity,

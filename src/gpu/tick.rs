@@ -281,7 +281,7 @@ pub(super) fn treat(
     }
 }
 
-/// Somebody asks for a hair's strands.
+/// Answers [`AskForStrands`].
 pub(super) fn ask(request: On<AskForStrands>, mut hairs: Query<&mut GpuHair>) {
     if let Ok(mut hair) = hairs.get_mut(request.entity) {
         hair.await_state();

@@ -78,8 +78,8 @@ pub struct HairBeads(pub Vec<Bead>);
 pub struct HairBeadSystems;
 
 /// How long a drop takes to flatten where it lies (s), and by how much, as a share of its radius.
-const SINKING: f32 = 0.06;
-const SUNK: f32 = 0.6;
+const FLATTENING_SECONDS: f32 = 0.06;
+const FLATTENED_SHARE: f32 = 0.6;
 
 /// Run condition: there is any droplet, or one is still shown.
 pub(super) fn are_any(beads: Res<HairBeads>, droplets: Query<(), With<Droplet>>) -> bool {
@@ -100,7 +100,8 @@ pub(super) fn show_droplets(
         }
         _ => 0.0,
     };
-    let longest = rules.map(|rules| rules.clamped()).unwrap_or_default().resting_time.max(SINKING);
+    let longest =
+        rules.map(|rules| rules.clamped()).unwrap_or_default().resting_time.max(FLATTENING_SECONDS);
     let down = gravity.map_or(Vec3::NEG_Y, |gravity| gravity.normalize_or_zero());
     beads.clear();
     beads.extend(droplets.iter().map(|drop| {
@@ -109,11 +110,11 @@ pub(super) fn show_droplets(
         if drop.lying <= 0.0 {
             return Bead { position, radius, velocity: drop.velocity };
         }
-        let sunk = SUNK * (drop.lying / SINKING).min(1.0);
+        let flattened = FLATTENED_SHARE * (drop.lying / FLATTENING_SECONDS).min(1.0);
         let left = (1.0 - drop.lying / longest).clamp(0.0, 1.0).sqrt();
         // The cap stays on the surface as it shrinks.
-        let position = position + down * (radius * (1.0 - left * (1.0 - sunk)));
-        Bead { position, radius: radius * left * (1.0 + 0.3 * sunk), velocity: Vec3::ZERO }
+        let position = position + down * (radius * (1.0 - left * (1.0 - flattened)));
+        Bead { position, radius: radius * left * (1.0 + 0.3 * flattened), velocity: Vec3::ZERO }
     }));
 }
 

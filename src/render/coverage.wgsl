@@ -1,7 +1,7 @@
 // Strands thinner than a pixel are drawn a pixel wide and light so many of its samples as they cover
 // of it (Enderton et al. 2010, "Stochastic transparency"): any number of layers, in any order, with
-// depth. Which samples is drawn by lot from strand and pixel, so that all passes of a frame agree and
-// a still picture stands still.
+// depth. Which samples is a hash of strand and pixel, so that all passes of a frame agree and a still
+// picture stands still.
 #define_import_path bevy_keratin::coverage
 
 #import bevy_pbr::mesh_view_bindings::view
@@ -17,11 +17,11 @@ fn scramble(seed: u32) -> u32 {
 
 // Which samples of its pixel a strand that covers `share` of it lights.
 //
-// How many is rounded by a lot. Lots of neighbouring pixels differ as much as they can (Roberts' R2
+// How many is rounded by a threshold. Those of neighbouring pixels differ as much as they can (Roberts' R2
 // sequence), so that a few pixels along a strand have its mean: that is less to be seen than dots. Each
 // strand goes through the sequence its own way, or strands would hide one another all along.
 fn covered_samples(share: f32, seed: u32, frag_coord: vec2<f32>) -> u32 {
-    // Temporal antialiasing shifts the view by parts of a pixel, each time another lot.
+    // Temporal antialiasing shifts the view by parts of a pixel, each time to other thresholds.
     let jitter = bitcast<u32>(view.clip_from_view[2].x) ^ (bitcast<u32>(view.clip_from_view[2].y) << 1u);
     let own = scramble(seed ^ jitter);
     let turned = scramble(own);

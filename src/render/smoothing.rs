@@ -14,7 +14,7 @@ use bevy::{
 };
 
 /// How far hair is averaged along its strands in a camera's picture: against grain, stipple and flicker of strands
-/// thinner than a pixel, of which four samples a pixel light a few by lot. All [`Camera3d`]s have it.
+/// thinner than a pixel, whose coverage of four samples a pixel is stochastic. All [`Camera3d`]s have it.
 ///
 /// Each pixel of hair gets the mean of those before and behind it in a line along the strands there, which count less
 /// the more strands cross or curl within three pixels. What shows through is kept where no strand is. Edges of

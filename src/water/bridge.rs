@@ -131,14 +131,15 @@ pub(super) fn join_wet_strands(
 /// The pull is explicit and limited to what the substep can follow; the film's drag relaxes to the
 /// common velocity by the exact solution, stable at any strength.
 fn joined(v: Vec3, bridged: &Bridged, wetting: &HairWetting, load: f32, dt: f32) -> Vec3 {
-    if bridged.grip <= 0.0 {
+    if bridged.strength <= 0.0 {
         return v;
     }
     let pull = wetting.cohesion * dt;
     let follows = (1.0 + load) / (pull * dt * bridged.steepness).max(1e-9);
     let pulled = v + bridged.pull * (pull * follows.min(1.0) / (1.0 + load));
-    let shared = 1.0 - bevy::math::ops::exp(-wetting.film_drag * dt * bridged.grip / (1.0 + load));
-    pulled.lerp(bridged.drift / bridged.grip, shared)
+    let shared =
+        1.0 - bevy::math::ops::exp(-wetting.film_drag * dt * bridged.strength / (1.0 + load));
+    pulled.lerp(bridged.drift / bridged.strength, shared)
 }
 
 #[cfg(test)]
@@ -147,7 +148,8 @@ mod tests {
 
     #[test]
     fn a_bridge_pulls_up_to_the_stable_limit_and_shares_motion() {
-        let bridged = Bridged { pull: Vec3::X, steepness: 1e3, drift: Vec3::Y * 2.0, grip: 2.0 };
+        let bridged =
+            Bridged { pull: Vec3::X, steepness: 1e3, drift: Vec3::Y * 2.0, strength: 2.0 };
         let wetting = HairWetting { cohesion: 10.0, film_drag: 0.0, ..default() };
         let dt = 1.0 / 360.0;
         let v = joined(Vec3::ZERO, &bridged, &wetting, 0.0, dt);
@@ -158,7 +160,7 @@ mod tests {
         let steep = Bridged { steepness: 2.0 / (10.0 * dt * dt), ..bridged };
         let v = joined(Vec3::ZERO, &steep, &wetting, 0.0, dt);
         assert!(v.distance(Vec3::X * 5.0 * dt) < 1e-6, "{v}");
-        // The common velocity is drift over grip: the limit of infinite drag.
+        // The common velocity is drift over strength: the limit of infinite drag.
         let wetting = HairWetting { cohesion: 0.0, film_drag: 1e9, ..default() };
         assert!(joined(Vec3::X, &bridged, &wetting, 0.0, dt).distance(Vec3::Y) < 1e-6);
         let wetting = HairWetting { cohesion: 0.0, film_drag: 30.0, ..default() };

@@ -246,8 +246,8 @@ pub(super) fn exchange_water(
             done.any |= has_water;
             done.busy |= is_busy;
             // What the air was around it when it fell asleep no longer counts.
-            let is_calm = is_still || sleep.is_asleep();
-            let blown = if is_calm { &[][..] } else { &air.nodes };
+            let in_still_air = is_still || sleep.is_asleep();
+            let blown = if in_still_air { &[][..] } else { &air.nodes };
             let is_dried = || blown.iter().any(|air| air.drying > HARDLY_DRIES);
             let is_busy = is_busy || has_water && is_dried();
             if (is_busy || is_due && (damp || has_water))

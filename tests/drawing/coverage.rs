@@ -15,7 +15,7 @@ fn curtain() -> Vec<Vec<Vec3>> {
 }
 
 /// The area (m²) that is covered between two heights (m), the mean over views some pixels aside:
-/// which samples a thin strand lights is drawn by lot in each.
+/// the coverage of thin strands is stochastic.
 fn area(scene: &mut Offscreen, height: f32, bands: &[(f32, f32)]) -> Vec<f32> {
     let mut areas = vec![0.0; bands.len()];
     const VIEWS: u32 = 6;
@@ -152,7 +152,7 @@ pub fn smoothing_changes_hair_alone_and_leaves_no_mark() {
     }
     let smooth = draw(&mut scene, 3.0);
     let grain = draw(&mut scene, 0.0);
-    assert!(grain == draw(&mut scene, f32::NAN), "what is no number is off");
+    assert!(grain == draw(&mut scene, f32::NAN), "NaN switches it off");
     assert!(smooth == draw(&mut scene, 3.0), "it is switched on again");
     for picture in [&bare, &smooth, &grain] {
         assert!(picture.rgba.chunks_exact(4).all(|p| p[3] == 255), "marks are left");

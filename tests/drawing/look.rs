@@ -158,7 +158,7 @@ pub fn no_look_however_absurd_leaves_a_pixel_without_a_number() {
         ("usual", of(HairLook::default())),
         ("endless width", of(HairLook { width: f32::INFINITY, ..default() })),
         ("no width", of(HairLook { width: 0.0, taper: 0.0, ..default() })),
-        ("width of no number", of(HairLook { width: f32::NAN, ..default() })),
+        ("NaN width", of(HairLook { width: f32::NAN, ..default() })),
         ("endless pigment", of(HairLook { melanin: Melanin::new(f32::MAX, 1e9), ..default() })),
         ("pigment below none", of(HairLook { melanin: Melanin::new(-1e9, f32::NAN), ..default() })),
         ("mirrors", of(HairLook { roughness: 0.0, gloss: 1e9, ..default() })),

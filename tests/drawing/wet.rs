@@ -18,8 +18,8 @@ const PIXEL: f32 = 0.8e-3;
 fn bent() -> Vec<Vec<Vec3>> {
     let strand = |i: u32| {
         let (row, k) = (i / 150, i % 150);
-        let lot = (i as f32 * 0.754_877_7).fract();
-        let x = (k as f32 + 0.5 * (row % 2) as f32 + 0.9 * lot) / 150.0 * 0.05 - 0.025;
+        let part = (i as f32 * 0.754_877_7).fract();
+        let x = (k as f32 + 0.5 * (row % 2) as f32 + 0.9 * part) / 150.0 * 0.05 - 0.025;
         let radius = RADIUS - 1e-4 * row as f32;
         let node = |n: usize| {
             let (sin, cos) = (100.0 - 200.0 * n as f32 / (NODES - 1) as f32).to_radians().sin_cos();

@@ -1,5 +1,5 @@
-//! What is no number: in a setting, an obstacle, a treatment, a pose, a strand. It counts as on the CPU, is
-//! told of once, and other hair does not notice.
+//! NaN: in a setting, an obstacle, a treatment, a pose, a strand. It counts as on the CPU, is
+//! reported once, and other hair does not notice.
 
 use crate::{
     residence::{grow, on_gpu},
@@ -148,7 +148,7 @@ fn all() -> [Spoilt; 14] {
     ]
 }
 
-/// Two hairs, of which one is treated so; their states after it, and what was told.
+/// Two hairs, of which one is treated so; their states after it, and what was reported.
 fn after(stage: &mut Stage, act: Act) -> ([Vec<u32>; 2], Vec<HairFault>) {
     on_gpu(stage, 12, 2);
     let hair = stage.hair;
@@ -177,15 +177,15 @@ fn after(stage: &mut Stage, act: Act) -> ([Vec<u32>; 2], Vec<HairFault>) {
     (states, faults)
 }
 
-pub fn what_is_no_number_counts_as_on_the_processor_and_is_told_of_once(stage: &mut Stage) {
+pub fn nan_counts_as_on_the_processor_and_is_reported_once(stage: &mut Stage) {
     let (untouched, faults) = after(stage, nothing);
     assert!(faults.is_empty(), "{faults:?}");
     for Spoilt { what, kind, spoil, instead } in all() {
-        let (sound, told) = after(stage, instead);
-        assert!(told.is_empty(), "{what}: {told:?}");
-        let (found, told) = after(stage, spoil);
-        let kinds: Vec<FaultKind> = told.iter().map(|fault| fault.kind).collect();
-        assert_eq!(kinds, [kind], "{what}: {told:?}");
+        let (sound, reported) = after(stage, instead);
+        assert!(reported.is_empty(), "{what}: {reported:?}");
+        let (found, reported) = after(stage, spoil);
+        let kinds: Vec<FaultKind> = reported.iter().map(|fault| fault.kind).collect();
+        assert_eq!(kinds, [kind], "{what}: {reported:?}");
         assert!(found == sound, "{what}: it is not what counts in its place");
         let global = ["a blower", "a radius"].contains(&what);
         assert!(global || found[1] == untouched[1], "{what}: other hair notices");
@@ -227,8 +227,8 @@ pub fn what_a_game_spoils_is_mended_and_goes_back(stage: &mut Stage) {
             assert!(stage.strands().iter().all(Strand::is_finite), "{what}");
             (stage.strands(), faults)
         });
-        let [(sound, told), (found, faults)] = &mut after;
-        assert!(told.is_empty(), "{what}: {told:?}");
+        let [(sound, reported), (found, faults)] = &mut after;
+        assert!(reported.is_empty(), "{what}: {reported:?}");
         assert_eq!(faults.len(), 1, "{what}: {faults:?}");
         assert_eq!(faults[0].kind, kind, "{what}: {faults:?}");
         for (i, (a, b)) in sound.iter().zip(found).enumerate().filter(|(i, _)| *i != 7) {
@@ -237,8 +237,8 @@ pub fn what_a_game_spoils_is_mended_and_goes_back(stage: &mut Stage) {
     }
 }
 
-/// A held node that is led nowhere is free, as on the CPU.
-pub fn a_target_that_is_no_number_leads_nothing(stage: &mut Stage) {
+/// A held node without a target is free, as on the CPU.
+pub fn a_target_that_is_nan_holds_nothing(stage: &mut Stage) {
     let held =
         |target: Option<Vec3>| HeldNodes { targets: vec![None, None, None, target], ..default() };
     let [free, broken] = [None, Some(Vec3::NAN)].map(|target| {

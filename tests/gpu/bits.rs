@@ -85,7 +85,7 @@ pub fn ten_runs_are_equal_to_the_bit_whatever_stands_beside_and_however_they_are
     }
 }
 
-pub fn what_is_no_number_stays_with_its_strand_and_is_counted_once() {
+pub fn nan_stays_with_its_strand_and_is_counted_once() {
     let device = Device::get();
     let (sound, records) = (strands(70), records(6));
     let expected = device.run(&mut device.hand_over(&sound), &records);
@@ -153,7 +153,7 @@ pub fn obstacles_out_of_reach_change_no_bit_however_many() {
 }
 
 /// The tick makes no such record. Whatever a kernel makes of it: a substep later strands are whole.
-pub fn records_of_no_numbers_leave_strands_whole() {
+pub fn records_of_nan_leave_strands_whole() {
     type Spoil = fn(&mut SubstepRecord);
     const NAN: f32 = f32::NAN;
     let all: [(&str, Spoil); 14] = [

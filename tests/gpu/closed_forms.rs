@@ -1,4 +1,4 @@
-//! The closed forms of the bonds: a strand first straight, bent, its bonds moved as told, then let go
+//! The closed forms of the bonds: a strand first straight, bent, its bonds moved as given, then let go
 //! without gravity, rests at Ω* = Σ f b Ω_j / Σ f b.
 
 use crate::lab::{Device, LabStrand, plain};

@@ -117,7 +117,7 @@ pub fn a_journal_holds_all_that_the_tick_does_to_hair_that_moves() {
 }
 
 /// An app without a GPU says so once nothing else keeps hair from it.
-pub fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told() {
+pub fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_reported() {
     let reported = |change: fn(&mut App, Entity)| {
         let (mut app, hair, passing) = scene();
         app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);

@@ -151,30 +151,30 @@ impl LabStrand {
 pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord) {
     let mut block = BlockLanes::default();
     block.resize(strands[0].positions.len());
-    let SubstepRecord { dt, retained: keep, .. } = *record;
-    let carry = record.frame_motion.unwrap_or_default();
+    let SubstepRecord { dt, retained, .. } = *record;
+    let frame_motion = record.frame_motion.unwrap_or_default();
     let mut asked = Vec::new();
     for (lane, s) in strands.iter_mut().enumerate() {
-        let (root_from, edges) = (carry * s.positions[0], s.lengths.len());
+        let (root_from, edges) = (frame_motion * s.positions[0], s.lengths.len());
         if let Some(Isometry3d { rotation, .. }) = record.frame_motion {
-            s.positions.iter_mut().skip(1).for_each(|p| *p = carry * *p);
+            s.positions.iter_mut().skip(1).for_each(|p| *p = frame_motion * *p);
             s.velocities.iter_mut().for_each(|v| *v = rotation * *v);
             s.orientations.iter_mut().for_each(|q| *q = (rotation * *q).normalize());
             s.spins.iter_mut().for_each(|omega| *omega = rotation * *omega);
         }
-        s.spins.iter_mut().for_each(|omega| *omega *= keep);
+        s.spins.iter_mut().for_each(|omega| *omega *= retained);
         let mut drying = vec![0.0; edges + 1];
         let before = s.velocities.clone();
         for (i, drying) in drying.iter_mut().enumerate() {
             let e = i.min(edges - 1);
             let edge = s.positions[e + 1] - s.positions[e];
-            let mut v = s.velocities[i] * keep + record.gravity * dt;
+            let mut v = s.velocities[i] * retained + record.gravity * dt;
             for b in &record.blowers {
                 let blown = wind(b.strength, b.nozzle, b.aim, s.positions[i], edge);
                 v += blown * dt;
                 *drying += b.drying * blown.length() * dt;
             }
-            s.velocities[i] = v + record.wind * (1.0 - keep);
+            s.velocities[i] = v + record.wind * (1.0 - retained);
         }
         asked.push(drying);
         let mut distance = 0.0;
@@ -214,7 +214,7 @@ pub fn in_lanes(level: Level, strands: &mut [LabStrand], record: &SubstepRecord)
         let from = if record.sweeps.is_some() { s.positions[0] } else { root_from };
         put3(&mut block.nodes[0].from, lane, from);
         put4(&mut block.root, lane, s.root_frame);
-        put4(&mut block.root_from, lane, carry.rotation * s.root_frame);
+        put4(&mut block.root_from, lane, frame_motion.rotation * s.root_frame);
     }
     assert!(strands.len() <= LANES);
     let params = DirectParams {

@@ -1,9 +1,9 @@
 //! Levels of detail: strands that are not simulated follow others there as on the CPU.
 
 use crate::{
-    led::{moved, scalp, tied},
     residence::grow,
     stage::{Stage, apart, curls},
+    targets::{moved, scalp, tied},
 };
 use bevy::prelude::*;
 use bevy_keratin::{

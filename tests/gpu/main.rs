@@ -17,11 +17,10 @@ mod bad;
 mod bits;
 mod closed_forms;
 mod cost;
-mod crossing;
 mod golden;
+mod handover;
 mod journal;
 mod layout;
-mod led;
 mod lod;
 mod papers;
 mod pictures;
@@ -34,14 +33,15 @@ mod sleep;
 mod stage;
 mod substep;
 mod sweeps;
+mod targets;
 
 device::tests! {
     bits {
         device: hand_over_and_return_without_a_substep_change_no_bit,
             ten_runs_are_equal_to_the_bit_whatever_stands_beside_and_however_they_are_submitted,
-            what_is_no_number_stays_with_its_strand_and_is_counted_once,
+            nan_stays_with_its_strand_and_is_counted_once,
             obstacles_out_of_reach_change_no_bit_however_many,
-            records_of_no_numbers_leave_strands_whole,
+            records_of_nan_leave_strands_whole,
             a_shaken_strand_of_64_segments_holds_its_length;
     }
     closed_forms {
@@ -57,7 +57,7 @@ device::tests! {
     }
     journal {
         device: a_journal_holds_all_that_the_tick_does_to_hair_that_moves;
-        anywhere: what_the_kernels_lack_keeps_hair_on_the_processor_and_is_told;
+        anywhere: what_the_kernels_lack_keeps_hair_on_the_processor_and_is_reported;
     }
     layout {
         anywhere: slots_never_overlap_and_lie_within,
@@ -91,7 +91,7 @@ device::tests! {
     sweeps {
         device: golden_vectors_of_the_papers_projections,
             swept_strands_keep_their_bits,
-            what_is_no_number_stays_with_its_swept_strand,
+            nan_stays_with_its_swept_strand,
             closed_forms_by_the_papers_projections;
     }
 }

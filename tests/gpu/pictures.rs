@@ -74,10 +74,10 @@ pub fn pictures_of_hair_on_the_device_and_at_home_are_the_same() {
     let grown = curls(60, 9);
     let members: Vec<Entity> = scene.app.world().get::<Strands>(hair).unwrap().iter().collect();
     let tip = |strand: &Strand| *strand.positions().last().unwrap();
-    let sunk = members.iter().zip(&grown).filter(|(e, grown)| {
+    let moved = members.iter().zip(&grown).filter(|(e, grown)| {
         tip(scene.app.world().get::<Strand>(**e).unwrap()).distance(tip(grown)) > 0.01
     });
-    assert!(sunk.count() > 20);
+    assert!(moved.count() > 20);
 }
 
 /// Bevy quits when the device is lost, unless the app says how to go on.

@@ -1,9 +1,9 @@
 //! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
 use crate::{
-    bad, crossing, led, lod, papers, probe, shapes, sleep,
+    bad, handover, lod, papers, probe, shapes, sleep,
     stage::{Stage, apart, curls, free},
-    sweeps,
+    sweeps, targets,
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 use bevy_keratin::{
@@ -50,21 +50,21 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         a_teleported_head_takes_its_hair_along_at_rest,
         hair_that_was_away_comes_back_at_rest,
         hairdos_are_asked_for_and_arrive,
-        broken_strands_are_put_back_and_told_of_once,
-        bad::what_is_no_number_counts_as_on_the_processor_and_is_told_of_once,
+        broken_strands_are_put_back_and_reported_once,
+        bad::nan_counts_as_on_the_processor_and_is_reported_once,
         bad::what_a_game_spoils_is_mended_and_goes_back,
-        bad::a_target_that_is_no_number_leads_nothing,
+        bad::a_target_that_is_nan_holds_nothing,
         closed_forms_hold_through_the_app,
-        led::roots_on_a_mesh_go_with_it_there,
-        led::held_nodes_are_led_there_and_let_go,
-        led::strands_are_wound_there_and_keep_their_curl,
+        targets::roots_on_a_mesh_go_with_it_there,
+        targets::held_nodes_move_there_and_are_released,
+        targets::strands_are_wound_there_and_keep_their_curl,
         lod::followers_follow_there_as_on_the_processor,
         lod::a_change_of_level_is_made_on_the_processor,
         lod::a_budget_is_that_of_the_processor,
         lod::roots_of_followers_go_with_their_mesh,
         hair_is_despawned_and_levels_change_on_the_way,
-        crossing::whatever_happens_on_the_way_is_done,
-        crossing::it_comes_home_from_a_head_that_moves_as_if_it_had_stayed,
+        handover::whatever_happens_on_the_way_is_done,
+        handover::it_comes_home_from_a_head_that_moves_as_if_it_had_stayed,
         sweeps::swept_hair_moves_there_as_on_the_processor,
         sweeps::another_solver_takes_over_what_the_one_left,
         sweeps::swept_followers_follow_there,
@@ -210,7 +210,7 @@ fn what_is_not_supported_brings_hair_home_and_is_done_there(stage: &mut Stage) {
     assert!(water(stage) > 0.0, "it is wet");
     stage.run(70);
     assert_eq!(stage.residence(), HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::Water)));
-    // The same without waiting: it is told when it is back.
+    // The same without waiting: it answers when it is back.
     on_gpu(stage, 6, 5);
     let hair = stage.hair;
     stage.app.world_mut().resource_mut::<HairGpu>().blocking = false;
@@ -450,7 +450,7 @@ fn hairdos_are_asked_for_and_arrive(stage: &mut Stage) {
     assert!(Hairdo::of(stage.app.world(), hair).unwrap().to_bytes() == bytes);
 }
 
-fn broken_strands_are_put_back_and_told_of_once(stage: &mut Stage) {
+fn broken_strands_are_put_back_and_reported_once(stage: &mut Stage) {
     grow(stage, SimulateOn::Cpu, curls(40, 7));
     let (hair, broken) = (stage.hair, stage.members()[17]);
     stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);

@@ -23,14 +23,14 @@ use bevy_keratin::{
 };
 
 /// Curls that come to rest soon.
-pub fn calm() -> (SleepSettings, AirDrag) {
+pub fn damped() -> (SleepSettings, AirDrag) {
     (SleepSettings::default(), AirDrag { rate: 20.0 })
 }
 
 fn resting(stage: &mut Stage, on: SimulateOn) {
     grow(stage, on, curls(40, 5));
     let hair = stage.hair;
-    stage.app.world_mut().entity_mut(hair).insert(calm());
+    stage.app.world_mut().entity_mut(hair).insert(damped());
     stage.run(1);
     assert_eq!(stage.is_on_gpu(), on == SimulateOn::Gpu);
 }
@@ -61,7 +61,7 @@ pub fn it_sleeps_when_the_last_strand_would(stage: &mut Stage) {
     assert_ne!(hair, stage.hair);
     let gpu = until_asleep(stage, 1);
     println!("asleep after {cpu} ticks on the CPU, {gpu} on the device");
-    // What it tells arrives some frames later.
+    // Its report arrives some frames later.
     assert!((gpu as f32) < 1.15 * cpu as f32 + 8.0 && cpu as f32 <= 1.15 * gpu as f32);
     let slept = stage.strands();
     assert!(apart(&there, &slept) < 5e-4, "{}", apart(&there, &slept));
@@ -228,7 +228,7 @@ pub fn whatever_disturbs_it_wakes_it_in_the_same_tick(stage: &mut Stage) {
     }
 }
 
-/// What goes on while it falls asleep, sleeps and wakes does not depend on when what it tells arrives.
+/// What goes on while it falls asleep, sleeps and wakes does not depend on when its report arrives.
 pub fn sleep_is_the_same_however_many_ticks_a_frame(stage: &mut Stage) {
     let mut first = None;
     for at_once in [1, 4, 12] {
@@ -249,7 +249,7 @@ pub fn hair_with_followers_sleeps_as_well(stage: &mut Stage) {
     let hair = stage.hair;
     let level = LodLevel::new(0.5, 2, 3).unwrap().with_strands(0.5).unwrap();
     let lod = HairLod { levels: vec![level], ..default() };
-    stage.app.world_mut().entity_mut(hair).insert((calm(), lod, HairScreenShare(0.4)));
+    stage.app.world_mut().entity_mut(hair).insert((damped(), lod, HairScreenShare(0.4)));
     stage.run(3);
     stage.app.world_mut().entity_mut(hair).insert(SimulateOn::Gpu);
     stage.run(1);
@@ -291,7 +291,7 @@ pub fn a_pause_is_caught_up_with_in_some_frames(stage: &mut Stage) {
     });
     let [(whole, ..), (parts, oldest, after)] = &mut all;
     assert!(whole == parts, "nothing is lost");
-    // A frame or two until what it tells arrives, of 15 ticks each.
+    // A frame or two until its report arrives, of 15 ticks each.
     assert!(*oldest > 40 && *oldest <= 60 + 4 + 3 * 15 && *after < 6, "{oldest}, {after}");
     stage.app.world_mut().despawn(observer);
     let residence = |at: Query<&HairResidence>| at.iter().all(|at| *at == HairResidence::Gpu);

@@ -263,7 +263,7 @@ pub fn strands_among_obstacles() {
 /// there.
 pub fn strands_whose_roots_lie_in_an_obstacle() {
     for moves in [false, true] {
-        compare("sunk", 41, 0.3, |random| {
+        compare("root inside", 41, 0.3, |random| {
             let ground = random_obstacle(random, 0, moves);
             let normal = random.vector().normalize_or(Vec3::Y);
             let point = normal * random.between(0.0, 0.08);

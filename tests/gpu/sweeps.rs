@@ -3,7 +3,7 @@
 use crate::{
     lab::{Device, LabStrand, Random, swept},
     residence::grow,
-    sleep::{calm, until_asleep},
+    sleep::{damped, until_asleep},
     stage::{Stage, apart, curls},
     vectors::projections,
 };
@@ -198,7 +198,7 @@ pub fn swept_strands_keep_their_bits() {
     }
 }
 
-pub fn what_is_no_number_stays_with_its_swept_strand() {
+pub fn nan_stays_with_its_swept_strand() {
     let device = Device::get();
     let (sound, records) = (strands(70), records(6));
     let mut on = device.hand_over(&sound);
@@ -227,7 +227,7 @@ pub fn what_is_no_number_stays_with_its_swept_strand() {
 }
 
 /// The joints' share of a turn of 0.5 rad each that a strand has kept which was straight, has been held so, had its
-/// bonds moved as told and was let go without weight.
+/// bonds moved as given and was let go without weight.
 fn kept(device: &Device, changes: &[[f32; 4]]) -> f32 {
     const EDGES: usize = 8;
     let frame = |i: usize| Quat::from_rotation_x(0.5 * i as f32);
@@ -393,15 +393,15 @@ pub fn swept_nodes_are_held_there(stage: &mut Stage) {
         (start, held, stage.strands())
     });
     let [(start, held, let_go), (_, gpu_held, gpu_let_go)] = &both;
-    let led = held[3].positions()[4].distance(*start);
+    let moved = held[3].positions()[4].distance(*start);
     let off = [apart(held, gpu_held), apart(let_go, gpu_let_go)];
-    println!("led by {led} m; off by {off:?} m");
-    assert!(led > 1e-3 && off.iter().all(|off| *off < 1e-3), "{led} m, {off:?} m");
+    println!("moved by {moved} m; off by {off:?} m");
+    assert!(moved > 1e-3 && off.iter().all(|off| *off < 1e-3), "{moved} m, {off:?} m");
 }
 
 pub fn swept_hair_sleeps_there(stage: &mut Stage) {
     grow_swept(stage, SimulateOn::Gpu, curls(8, 5));
-    stage.app.world_mut().entity_mut(stage.hair).insert(calm());
+    stage.app.world_mut().entity_mut(stage.hair).insert(damped());
     let ticks = until_asleep(stage, 1);
     assert!(stage.is_on_gpu(), "{:?}", stage.residence());
     let bits = stage.bits();

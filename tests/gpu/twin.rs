@@ -51,7 +51,7 @@ fn cross_matrix(v: DVec3) -> DMat3 {
 }
 
 /// q turned the shortest way so that its tangent is along e, and twice the turn's vector part.
-fn carry(q: DQuat, e: DVec3) -> (DQuat, DVec3) {
+fn parallel_transport(q: DQuat, e: DVec3) -> (DQuat, DVec3) {
     let (t, len) = (tangent(q), e.length());
     let cosine = len + t.dot(e);
     let turn = if cosine < len * 1e-6 {
@@ -74,9 +74,9 @@ fn darboux(before: DQuat, q: DQuat) -> DQuat {
     if omega.w < 0.0 { -omega } else { omega }
 }
 
-/// How a contact pass treats motion along the surface.
+/// What friction does in a pass over the contacts.
 #[derive(Clone, Copy, PartialEq)]
-enum Grip {
+enum FrictionPass {
     None,
     Depth,
     Between,
@@ -115,7 +115,7 @@ pub struct Twin {
     touched: bool,
     sweeps: bool,
     /// Length from the root on that may be in what the root lies in.
-    sunk: f64,
+    escape_length: f64,
     trapped: bool,
     /// Rounds in which it got out of what it was deep in.
     pub rounds: usize,
@@ -153,7 +153,7 @@ impl Twin {
             push: vec![DVec3::ZERO; edges + 1],
             touched: false,
             sweeps: false,
-            sunk: 0.0,
+            escape_length: 0.0,
             trapped: false,
             rounds: 0,
         }
@@ -199,19 +199,19 @@ impl Twin {
         let stage = (theta, between, root_turn, damping, twice);
         self.newton(r, stage, if twice { 1.0 } else { 1.0 / theta }, false);
         for step in 1..if twice && !self.trapped { MOST_STEPS } else { 1 } {
-            let changed = self.contacts(r, Grip::Judged);
+            let changed = self.contacts(r, FrictionPass::Judged);
             if changed || (fast && step == 1) {
                 self.newton(r, stage, 1.0 / theta, true);
             } else {
                 break;
             }
         }
-        self.contacts(r, Grip::Solved);
+        self.contacts(r, FrictionPass::Solved);
         for pass in 0..r.limiter_steps {
             if !self.limit(if pass == 0 { -1.0 } else { TOLERANCE }) {
                 break;
             }
-            self.contacts(r, Grip::Between);
+            self.contacts(r, FrictionPass::Between);
             let repairs = if pass + 1 == r.limiter_steps { REPAIRS + 1 } else { 0 };
             for repair in 0..repairs {
                 let is_last = repair == REPAIRS;
@@ -219,7 +219,7 @@ impl Twin {
                 if !self.clamp_lengths(if is_last { most } else { TORN }) || is_last {
                     break;
                 }
-                self.contacts(r, Grip::Between);
+                self.contacts(r, FrictionPass::Between);
             }
         }
         self.finish(dt, theta);
@@ -227,7 +227,7 @@ impl Twin {
     }
 
     fn blow(&mut self, r: &SubstepRecord) {
-        let (dt, keep) = (f64::from(r.dt), f64::from(r.retained));
+        let (dt, retained) = (f64::from(r.dt), f64::from(r.retained));
         let edges = self.edges();
         for i in 0..=edges {
             let e = i.min(edges - 1);
@@ -252,7 +252,8 @@ impl Twin {
             let still = d(r.wind) - d(r.headwind);
             let flow = d(r.wind) + (carried - still * shares) / f64::max(shares, 1.0);
             let before = self.v[i];
-            self.v[i] = before * keep + d(r.gravity) * dt + acceleration * dt + flow * (1.0 - keep);
+            self.v[i] =
+                before * retained + d(r.gravity) * dt + acceleration * dt + flow * (1.0 - retained);
             self.push[i] = if i == 0 { DVec3::ZERO } else { (self.v[i] - before) / dt };
             if i < edges {
                 self.drying[i] = drying * dt;
@@ -314,7 +315,7 @@ impl Twin {
         self.support.fill(DVec3::ZERO);
         self.reaction.fill(DVec3::ZERO);
         let depths = r.obstacles.iter().map(|o| depth(&o.solid, self.p[0], r.skin).1);
-        self.sunk = 2.0 * depths.fold(0.0, f64::max);
+        self.escape_length = 2.0 * depths.fold(0.0, f64::max);
         self.trapped = false;
         self.surface(r);
         let mut theta = THETA;
@@ -337,13 +338,13 @@ impl Twin {
         };
         let way = self.l[..i].iter().sum::<f64>();
         let root = depth(&o.solid, self.p[0], skin).1;
-        if way >= self.sunk || root <= 0.0 {
+        if way >= self.escape_length || root <= 0.0 {
             return trapped;
         }
         if self.l.iter().sum::<f64>() < 2.0 * root {
             return f64::INFINITY;
         }
-        let deepest = self.sunk / 2.0;
+        let deepest = self.escape_length / 2.0;
         let share = (2.0 * root / deepest).clamp(0.0, 1.0);
         ((deepest - (way / 2.0).powi(2) / deepest).max(0.0) * share).max(trapped)
     }
@@ -369,7 +370,7 @@ impl Twin {
             }
             self.p[i] = to;
         }
-        self.contacts(r, Grip::Assumed);
+        self.contacts(r, FrictionPass::Assumed);
     }
 
     /// How deep it is in obstacles beyond what its root allows: the most, and the sum.
@@ -396,7 +397,7 @@ impl Twin {
         self.from[1..=edges].copy_from_slice(&self.p[1..=edges]);
         for _ in 0..LEAVING.min(2 * edges) {
             self.rounds += 1;
-            self.contacts(r, Grip::None);
+            self.contacts(r, FrictionPass::None);
             if !self.limit(TORN) {
                 return;
             }
@@ -417,27 +418,27 @@ impl Twin {
     }
 
     /// Whether a node has been found to stick, slide, rest or leave that did not.
-    fn contacts(&mut self, r: &SubstepRecord, grip: Grip) -> bool {
+    fn contacts(&mut self, r: &SubstepRecord, pass: FrictionPass) -> bool {
         self.touched = false;
         let mut changed = false;
         for i in 0..=self.edges() {
             let state = |t: &Self| (t.support[i] != DVec3::ZERO, t.sticks[i], t.drag[i] > 0.0);
             let before = state(self);
-            self.touch(r, i, grip);
+            self.touch(r, i, pass);
             changed |= before != state(self);
         }
         changed
     }
 
-    fn touch(&mut self, r: &SubstepRecord, i: usize, grip: Grip) {
+    fn touch(&mut self, r: &SubstepRecord, i: usize, pass: FrictionPass) {
         let (from, rested) = (self.from[i], self.support[i] != DVec3::ZERO);
         let (mut p, mut support, mut touched) = (self.p[i], DVec3::ZERO, false);
         let (mut sticks, mut drag, mut deepest) = (false, 0.0, -1.0);
         let (bearing, slid) = (self.support[i].dot(self.reaction[i]), self.drag[i] > 0.0);
-        if matches!(grip, Grip::Between | Grip::Solved) {
+        if matches!(pass, FrictionPass::Between | FrictionPass::Solved) {
             (sticks, drag) = (self.sticks[i], self.drag[i]);
         }
-        if grip == Grip::Between && rested {
+        if pass == FrictionPass::Between && rested {
             (support, touched) = (self.support[i], true);
         }
         for o in &r.obstacles {
@@ -452,7 +453,7 @@ impl Twin {
             let layer = (r.skin, may_be);
             let mut push = push_out(o, p, layer);
             let mut stays = false;
-            if grip == Grip::Assumed {
+            if pass == FrictionPass::Assumed {
                 let (normal, depth) = depth(&o.solid, start, r.skin);
                 stays = depth - may_be > -TOUCHING;
                 if stays {
@@ -460,7 +461,7 @@ impl Twin {
                     push = Some((start + normal * (depth - may_be).max(0.0), normal, pushed));
                 }
             }
-            if matches!(grip, Grip::Judged | Grip::Solved) && rested {
+            if matches!(pass, FrictionPass::Judged | FrictionPass::Solved) && rested {
                 let (normal, depth) = depth(&o.solid, p, r.skin);
                 let depth = depth - may_be;
                 if depth > -TOUCHING && bearing > 0.0 {
@@ -471,10 +472,10 @@ impl Twin {
             }
             let Some((out, normal, depth)) = push else { continue };
             touched = true;
-            let bears = grip == Grip::Depth || depth > deepest;
+            let bears = pass == FrictionPass::Depth || depth > deepest;
             if bears {
                 (deepest, support) = (depth, normal);
-                if matches!(grip, Grip::Assumed | Grip::Judged) {
+                if matches!(pass, FrictionPass::Assumed | FrictionPass::Judged) {
                     self.anchor[i] = start;
                 }
             }
@@ -483,14 +484,14 @@ impl Twin {
             let most = f64::from(o.friction) * depth;
             let coulomb = (most / slip.length().max(1e-12)).min(1.0);
             let holding = self.reaction[i] - normal * self.reaction[i].dot(normal);
-            let held = match grip {
-                Grip::None => 0.0,
-                Grip::Depth => coulomb,
-                Grip::Assumed => {
+            let held = match pass {
+                FrictionPass::None => 0.0,
+                FrictionPass::Depth => coulomb,
+                FrictionPass::Assumed => {
                     sticks = if bears { stays } else { sticks };
                     0.0
                 }
-                Grip::Judged => {
+                FrictionPass::Judged => {
                     let pull = if slid { holding } else { holding - slip };
                     let size = holding.length().max(1e-12);
                     let holds = match slid {
@@ -503,16 +504,16 @@ impl Twin {
                     }
                     0.0
                 }
-                Grip::Solved if sticks => 1.0,
-                Grip::Between if drag > 0.0 => 0.0,
-                Grip::Solved if drag > 0.0 => {
+                FrictionPass::Solved if sticks => 1.0,
+                FrictionPass::Between if drag > 0.0 => 0.0,
+                FrictionPass::Solved if drag > 0.0 => {
                     if slip.dot(holding) > 0.0 {
                         1.0
                     } else {
                         0.0
                     }
                 }
-                Grip::Solved | Grip::Between => coulomb,
+                FrictionPass::Solved | FrictionPass::Between => coulomb,
             };
             p = if i == 0 { p } else { out - slip * held };
         }
@@ -546,7 +547,7 @@ impl Twin {
             let e = at[j + 1] - at[j];
             let (l, length, axial) = (self.l[j], e.length(), self.axial[j]);
             let crushed = length < 0.5 * l;
-            let (carried, mut turn) = carry(self.q[j], e);
+            let (carried, mut turn) = parallel_transport(self.q[j], e);
             let q = if crushed { self.q[j] } else { carried };
             let lever = length.max(0.2 * l);
             let inverse = 1.0 / lever;
@@ -742,7 +743,7 @@ impl Twin {
         for i in 0..edges {
             let e = self.p[i + 1] - self.p[i];
             if e.length() >= 0.5 * self.l[i] {
-                self.q[i] = carry(self.q[i], e).0;
+                self.q[i] = parallel_transport(self.q[i], e).0;
             }
             let (t, k) = (tangent(self.q[i]), self.k[i]);
             let elastic = moment(q_before, self.q[i], self.rest[i], k);

@@ -312,7 +312,7 @@ fn add_joint(app: &mut App, body: Entity, above: Entity, name: &str, place: Vec3
 }
 
 #[test]
-fn where_a_face_looks_is_found_and_told() {
+fn where_a_face_looks_is_found_and_reported() {
     let looks = |facing: Option<Dir3>, build: &dyn Fn(&mut App, Entity, Entity)| {
         let mut app = app();
         let root = app.world_mut().spawn(Transform::default()).id();
@@ -473,7 +473,7 @@ fn characters_of_files_wear_hair_as_their_notes_say() {
     for row in &rows {
         println!("{}: {}", row.test, row.got);
     }
-    // Nothing tells where a ball with two joints looks.
+    // Nothing shows where a ball with two joints looks.
     let is_ball =
         |row: &crate::rows::Row| row.test.starts_with('C') && row.test.contains("by Assumed");
     assert!(rows.iter().all(|row| row.within || is_ball(row)));

@@ -334,7 +334,7 @@ fn a_plane_whose_normal_was_written_into_still_holds_hair_up() {
 fn strands_whose_root_lies_in_a_collider_come_out_whole() {
     const BALL: f32 = 0.08;
     let settings = HairPreset::Undercut.settings();
-    for sunk in [0.5e-3, 1.5e-3, 3e-3, 4e-3, 6e-3] {
+    for depth in [0.5e-3, 1.5e-3, 3e-3, 4e-3, 6e-3] {
         let mut app = test_app(60.0);
         let world = app.world_mut();
         let stiff = (settings.stiffness, settings.contact, settings.drag);
@@ -346,7 +346,7 @@ fn strands_whose_root_lies_in_a_collider_come_out_whole() {
                 let out = turn * Vec3::new((0.1 * i as f32).cos(), (0.1 * i as f32).sin(), 0.0);
                 let lean =
                     Quat::from_axis_angle(out.any_orthonormal_vector(), 0.15 * (i % 8) as f32);
-                let root = out * (BALL - sunk);
+                let root = out * (BALL - depth);
                 let points: Vec<Vec3> =
                     (0..12).map(|k| root + lean * out * (1.15e-3 * k as f32)).collect();
                 world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap())).id()
@@ -358,10 +358,10 @@ fn strands_whose_root_lies_in_a_collider_come_out_whole() {
         let strain = all().map(Strand::peak_strain).fold(0.0, f32::max);
         let speed = all().map(rms_speed).fold(0.0, f32::max);
         let lowest = all().map(|s| s.positions()[11].length() - BALL).fold(f32::MAX, f32::min);
-        println!("{sunk} m deep: strain {strain}, {speed} m/s, tips {lowest} m off the ball");
-        assert!(strain < 0.01, "{sunk} m deep: strained by {strain}");
-        assert!(speed < 0.01, "{sunk} m deep: {speed} m/s");
-        assert!(lowest > 0.0, "{sunk} m deep: a tip is {lowest} m off");
+        println!("{depth} m deep: strain {strain}, {speed} m/s, tips {lowest} m off the ball");
+        assert!(strain < 0.01, "{depth} m deep: strained by {strain}");
+        assert!(speed < 0.01, "{depth} m deep: {speed} m/s");
+        assert!(lowest > 0.0, "{depth} m deep: a tip is {lowest} m off");
     }
 }
 

@@ -165,16 +165,16 @@ fn hair_covers_the_scalp_beside_the_parting() {
 fn locks_have_sizes_and_no_period() {
     const WIDTH: f32 = 0.4;
     const BIN: f32 = 1e-3;
-    let mut lots = 1u32;
-    let mut lot = || {
-        lots = lots.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (lots >> 8) as f32 / 16_777_216.0 - 0.5
+    let mut state = 1u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / 16_777_216.0 - 0.5
     };
     let guides: Vec<Vec<Vec3>> = (0..3 * 22)
         .map(|i| {
             let (x, z) = ((i % 22) as f32 * 0.02, (i / 22) as f32 * 0.02);
-            let root = Vec3::new(x + 0.006 * lot(), 0.0, z + 0.006 * lot());
-            let lean = Vec3::new(0.1 * lot(), -1.0, 0.1 * lot());
+            let root = Vec3::new(x + 0.006 * random(), 0.0, z + 0.006 * random());
+            let lean = Vec3::new(0.1 * random(), -1.0, 0.1 * random());
             (0..12).map(|k| root + lean * (0.02 * k as f32)).collect()
         })
         .collect();

@@ -818,7 +818,7 @@ fn no_flipped_bit_or_cut_in_looks_goes_unnoticed() {
         let error = Hairdo::from_bytes(&sealed(2, &payload[..end])).unwrap_err();
         assert!(matches!(error, HairdoError::Malformed { .. }), "{end}: {error}");
     }
-    // Changed and sealed: told, or a hairdo that can be written again.
+    // Changed and sealed: refused, or a hairdo that can be written again.
     let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
     let mut read = 0;
     for _ in 0..5000 {

@@ -29,9 +29,9 @@ fn app(plugins: PluginGroupBuilder) -> App {
         .add_plugins(plugins)
         .insert_resource(Time::<Fixed>::from_hz(60.0))
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
-        .init_resource::<Told>()
-        .add_systems(Last, |mut faults: MessageReader<HairFault>, mut told: ResMut<Told>| {
-            told.0.extend(faults.read().cloned());
+        .init_resource::<AllFaults>()
+        .add_systems(Last, |mut faults: MessageReader<HairFault>, mut all: ResMut<AllFaults>| {
+            all.0.extend(faults.read().cloned());
         });
     app.finish();
     app.cleanup();
@@ -39,7 +39,7 @@ fn app(plugins: PluginGroupBuilder) -> App {
 }
 
 #[derive(Resource, Default)]
-struct Told(Vec<HairFault>);
+struct AllFaults(Vec<HairFault>);
 
 /// A head as a mesh and as a collider, with hair on its upper half; returns the parent, the hair and
 /// its strands.
@@ -114,22 +114,22 @@ fn hair_of_a_mirrored_character_is_the_mirror_image() {
 
 type Switch = fn(PluginGroupBuilder) -> PluginGroupBuilder;
 
-/// Three hairs with features by lot: active for `seconds`, then left alone.
+/// Three hairs with random features: active for `seconds`, then left alone.
 fn scenario(seed: u64, seconds: u32) {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut lot = |share: f64| random.random_bool(share);
-    let [water, contact, sleeps, settles] = [0.8, 0.85, 0.8, 0.8].map(&mut lot);
+    let mut chance = |share: f64| random.random_bool(share);
+    let [water, contact, sleeps, settles] = [0.8, 0.85, 0.8, 0.8].map(&mut chance);
     let off: [(bool, Switch); 8] = [
         (water, |group| group.disable::<WaterPlugin>()),
         (contact, |group| group.disable::<ContactPlugin>()),
         (sleeps, |group| group.disable::<SleepPlugin>()),
         (settles, |group| group.disable::<SettlePlugin>()),
-        (lot(0.9), |group| group.disable::<LodPlugin>()),
-        (lot(0.9), |group| group.disable::<StylePlugin>()),
-        (lot(0.9), |group| group.disable::<LookPlugin>()),
-        (lot(0.9), |group| group.disable::<SpringPlugin>()),
+        (chance(0.9), |group| group.disable::<LodPlugin>()),
+        (chance(0.9), |group| group.disable::<StylePlugin>()),
+        (chance(0.9), |group| group.disable::<LookPlugin>()),
+        (chance(0.9), |group| group.disable::<SpringPlugin>()),
     ];
-    let treatment = lot(0.9);
+    let treatment = chance(0.9);
     let mut plugins =
         off.iter().fold(
             HairPlugins::default().build(),
@@ -141,8 +141,8 @@ fn scenario(seed: u64, seconds: u32) {
         plugins = plugins.disable::<TreatmentPlugin>();
     }
     let mut app = app(plugins);
-    let [wind, zone, shower, blower] = [0.5, 0.5, 0.4, 0.3].map(&mut lot);
-    let humidity = if lot(0.3) { 0.8 } else { 0.45 };
+    let [wind, zone, shower, blower] = [0.5, 0.5, 0.4, 0.3].map(&mut chance);
+    let humidity = if chance(0.3) { 0.8 } else { 0.45 };
     app.insert_resource(HairClimate { humidity, ..default() });
     let mut hairs = Vec::new();
     let mut is_wet = shower || humidity > 0.5;
@@ -158,10 +158,10 @@ fn scenario(seed: u64, seconds: u32) {
             Vec3::splat(2.0),
             Vec3::new(0.5, 0.5, -0.5),
         ];
-        let scale = scales[(0..4).filter(|_| lot(0.5)).count()];
+        let scale = scales[(0..4).filter(|_| chance(0.5)).count()];
         let place = Transform::from_xyz(i as f32 * 1.2, 0.0, 0.0).with_scale(scale);
         let [tied, settling, lod, gpu, soaked, spring, rod, style] =
-            [0.5, 0.5, 0.5, 0.3, 0.3, 0.2, 0.2, 0.5].map(&mut lot);
+            [0.5, 0.5, 0.5, 0.3, 0.3, 0.2, 0.2, 0.5].map(&mut chance);
         let (parent, hair, strands) = head(&mut app, place, tied);
         label += &format!(
             "\n  scale {scale}, tied {tied}, settling {settling}, lod {lod}, gpu {gpu}, soaked {soaked}, spring \
@@ -251,9 +251,9 @@ fn scenario(seed: u64, seconds: u32) {
     if let Some(ledger) = app.world().get_resource::<WaterLedger>() {
         assert!(ledger.error() < 1e-5, "{ledger:?}; {label}");
     }
-    let told = &app.world().resource::<Told>().0;
-    for (i, fault) in told.iter().enumerate() {
-        assert!(!told[..i].contains(fault), "told again: {fault}; {label}");
+    let all = &app.world().resource::<AllFaults>().0;
+    for (i, fault) in all.iter().enumerate() {
+        assert!(!all[..i].contains(fault), "reported again: {fault}; {label}");
     }
 }
 

@@ -163,7 +163,7 @@ fn roots_lie_on_the_triangles_they_name() {
 }
 
 #[test]
-fn texture_coordinates_go_along() {
+fn strands_have_the_texture_coordinates_of_their_roots() {
     let planted = straight(2e4).plant(&plane(0.2, 0.4)).unwrap();
     for strand in planted.groom.strands() {
         let (uv, root) = (strand.uv.unwrap(), strand.points[0]);

@@ -159,7 +159,7 @@ fn a_strand_that_goes_wrong_is_put_back_and_its_neighbours_do_not_notice() {
     let (mut healthy, ids) = build();
     run(&mut healthy, 0.2);
 
-    // a velocity from somewhere: no number, or one that the step cannot carry
+    // a velocity that is NaN, or one that the step cannot carry
     for (velocity, kind) in
         [(Vec3::NAN, FaultKind::Strand), (Vec3::splat(1e30), FaultKind::PutBack)]
     {
@@ -173,7 +173,7 @@ fn a_strand_that_goes_wrong_is_put_back_and_its_neighbours_do_not_notice() {
         }
     }
 
-    // the pose itself: no number, or numbers from which no step leads on
+    // the pose itself: infinite, or too large for a step
     for far in [f32::INFINITY, f32::MAX, 1e30] {
         let (mut app, ids_c) = build();
         app.world_mut().get_mut::<Strand>(ids_c[2]).unwrap().positions_mut()[5] = Vec3::splat(far);
@@ -263,11 +263,14 @@ fn invalid_edits_are_reported_once_and_the_nearest_valid_value_is_used() {
     );
     assert!(reported.iter().all(|f| f.kind == FaultKind::Setting));
     // What is edited and what a constructor takes are checked by the same rule.
-    let told_of =
+    let reported_of =
         |what| reported.iter().filter_map(|f| f.cause::<InvalidValue>()).find(|v| v.what == what);
-    assert_eq!(told_of("Blower::strength (m/s²)"), Blower::new(-5.0).err().as_ref());
-    assert_eq!(told_of("PermRod::radius (m)"), PermRod::new(0.0, 0.1).err().as_ref());
-    assert_eq!(told_of("ColliderShape::radius (m)"), HairCollider::sphere(-0.05).err().as_ref());
+    assert_eq!(reported_of("Blower::strength (m/s²)"), Blower::new(-5.0).err().as_ref());
+    assert_eq!(reported_of("PermRod::radius (m)"), PermRod::new(0.0, 0.1).err().as_ref());
+    assert_eq!(
+        reported_of("ColliderShape::radius (m)"),
+        HairCollider::sphere(-0.05).err().as_ref()
+    );
     assert!(HairCollider::default().with_friction(f32::NAN).is_err());
     run(&mut app, 0.5);
     assert_eq!(faults(&mut app), []);

@@ -201,9 +201,9 @@ fn a_film_holds_what_would_part() {
 /// Knocks every strand of one of two equal heads in a direction of its own, and says what share of
 /// what that does to its tip each has in common with its nearest neighbour: 0 for strands that know
 /// nothing of each other, 1 for one body.
-fn moving_together(calm: &mut App, app: &mut App) -> f64 {
+fn moving_together(undisturbed: &mut App, app: &mut App) -> f64 {
     let before = tips(app);
-    assert_eq!(before, tips(calm), "equal heads");
+    assert_eq!(before, tips(undisturbed), "equal heads");
     let neighbour: Vec<usize> = (0..before.len())
         .map(|i| {
             let others = (0..before.len()).filter(|&j| j != i);
@@ -218,8 +218,8 @@ fn moving_together(calm: &mut App, app: &mut App) -> f64 {
         let knock = Vec3::new(angle.cos(), 0.0, angle.sin()) * 0.1;
         strand.velocities_mut()[5..].iter_mut().for_each(|v| *v += knock);
     }
-    [&mut *calm, app].into_iter().for_each(|app| run(app, 0.15));
-    let way: Vec<Vec3> = tips(app).iter().zip(tips(calm)).map(|(a, b)| *a - b).collect();
+    [&mut *undisturbed, app].into_iter().for_each(|app| run(app, 0.15));
+    let way: Vec<Vec3> = tips(app).iter().zip(tips(undisturbed)).map(|(a, b)| *a - b).collect();
     let square = |v: Vec3| f64::from(v.length_squared());
     let apart: f64 = neighbour.iter().enumerate().map(|(i, &j)| square(way[i] - way[j])).sum();
     let all: f64 =

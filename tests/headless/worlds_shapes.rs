@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use bevy_keratin::{FaultKind, prelude::*};
 
 #[test]
-fn what_cannot_be_scaled_so_is_told_once_with_the_scale_that_it_has() {
+fn what_cannot_be_scaled_so_is_reported_once_with_the_scale_that_it_has() {
     let reported = |bundle: fn(&mut App) -> Entity| {
         let mut app = test_app(60.0);
         let entity = bundle(&mut app);
@@ -17,21 +17,21 @@ fn what_cannot_be_scaled_so_is_told_once_with_the_scale_that_it_has() {
         );
         all.into_iter().map(|fault| fault.message).collect::<Vec<_>>()
     };
-    let told = reported(|app| {
+    let faults = reported(|app| {
         let flat = Transform::from_scale(Vec3::new(4.0, 1.0, 1.0));
         app.world_mut().spawn((HairCollider::capsule(0.1, 0.2).unwrap(), flat)).id()
     });
-    assert_eq!(told.len(), 1);
+    assert_eq!(faults.len(), 1);
     assert!(
-        told[0].contains("4.000, 1.000, 1.000") && told[0].contains("2.000, 1.000, 2.000"),
-        "{told:?}"
+        faults[0].contains("4.000, 1.000, 1.000") && faults[0].contains("2.000, 1.000, 2.000"),
+        "{faults:?}"
     );
-    let told = reported(|app| {
+    let faults = reported(|app| {
         let long = app.world_mut().spawn(Transform::from_scale(Vec3::new(3.0, 1.0, 1.0))).id();
         let turned = Transform::from_rotation(Quat::from_rotation_z(0.8));
         app.world_mut().spawn((HairCollider::sphere(0.1).unwrap(), turned, ChildOf(long))).id()
     });
-    assert!(told.len() == 1 && told[0].contains("shears"), "{told:?}");
+    assert!(faults.len() == 1 && faults[0].contains("shears"), "{faults:?}");
     for spawn in [
         |app: &mut App| {
             app.world_mut()
@@ -52,7 +52,7 @@ fn what_cannot_be_scaled_so_is_told_once_with_the_scale_that_it_has() {
         assert_eq!(reported(spawn).len(), 1);
     }
     // What is scaled evenly, mirrored or turned, or can be as it is drawn, is not.
-    let told = reported(|app| {
+    let faults = reported(|app| {
         let parent = app.world_mut().spawn(Transform::from_scale(Vec3::new(-2.0, 2.0, 2.0))).id();
         let turned = Transform::from_rotation(Quat::from_rotation_z(0.8));
         app.world_mut().spawn((HairCollider::capsule(0.1, 0.2).unwrap(), turned, ChildOf(parent)));
@@ -60,5 +60,5 @@ fn what_cannot_be_scaled_so_is_told_once_with_the_scale_that_it_has() {
             .spawn((WindZone::shelter(), Transform::from_scale(Vec3::new(1.0, 3.0, 2.0))))
             .id()
     });
-    assert_eq!(told, [""; 0]);
+    assert_eq!(faults, [""; 0]);
 }

@@ -1,6 +1,7 @@
 //! README and book: samples can be pasted, they are whole, and name the Bevy that the crate is built on; links and
 //! examples are there. That samples compile is seen by the doc tests, which are made of them.
 
+use crate::architecture::files_below;
 use bevy::{
     asset::RenderAssetUsages,
     image::{CompressedImageFormats, ImageSampler, ImageType},
@@ -64,6 +65,25 @@ fn links_lead_to_files_that_are_there() {
             }
         }
     }
+}
+
+#[test]
+fn the_index_of_words_names_each_setting() {
+    let index = fs::read_to_string(root().join("docs/src/index-of-words.md")).unwrap();
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    let words: Vec<&str> = index.split(|c: char| !is_part(c)).collect();
+    let mut count = 0;
+    for file in files_below(&root().join("src"), "rs") {
+        let text = fs::read_to_string(&file).unwrap();
+        let blocks = text.split("\nsetting! {\n").skip(1);
+        for block in blocks.map(|rest| rest.split("\n}").next().unwrap()) {
+            let Some(named) = block.split("\n    pub struct ").nth(1) else { continue };
+            let name = named.split(|c: char| !is_part(c)).next().unwrap();
+            assert!(words.contains(&name), "{}: {name} is not named", file.display());
+            count += 1;
+        }
+    }
+    assert!(count >= 45, "only {count} settings");
 }
 
 /// The book shows the substep as it runs.

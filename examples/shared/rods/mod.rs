@@ -1,6 +1,6 @@
 //! Strands held against the closed forms of Kirchhoff's rod, a row for each figure.
 //!
-//! A strand of length L is told by Γ = ρ g A L³/(E I) = (L/L_g)³ and C = G J/(E I). Lengths are shares of L, onsets of
+//! A strand of length L is given by Γ = ρ g A L³/(E I) = (L/L_g)³ and C = G J/(E I). Lengths are shares of L, onsets of
 //! buckling shares of theory's. A rod of 8 segments may be four times as far off as one of 16: errors are of second
 //! order in a segment's length.
 

@@ -12,7 +12,7 @@ pub fn tip_spacing(tips: &[Vec3]) -> f64 {
 fn nearest_distances(tips: &[Vec3]) -> Vec<f32> {
     let mut grid = UniformGrid::default();
     let mut best = vec![f32::INFINITY; tips.len()];
-    // Cells grow until everybody has found somebody in the cells around.
+    // Cells grow until each tip has another in the cells around.
     let mut cell = 2e-3;
     while cell < 100.0 && best.iter().any(|d| !d.is_finite()) {
         grid.build(cell, tips.iter().zip(0..).map(|(p, i)| (*p, i)));

@@ -27,7 +27,7 @@ use core::{fmt, str::FromStr};
 #[allow(unused_imports, reason = "each example uses its own part")]
 pub use script::{BUST_HIGH, Director, Moment};
 
-/// Which story is told.
+/// Which story is played.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SceneKind {
     Bedhead,

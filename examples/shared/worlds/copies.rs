@@ -717,7 +717,7 @@ pub fn edits() -> Vec<Row> {
     rows
 }
 
-/// Line 13: a mesh of other triangles: roots stay on the mesh as it was, which is told once, until they get
+/// Line 13: a mesh of other triangles: roots stay on the mesh as it was, which is reported once, until they get
 /// roots on this one.
 fn other_triangles() -> Vec<Row> {
     let mut own = groomed(1.0);
@@ -725,7 +725,7 @@ fn other_triangles() -> Vec<Row> {
     let handle = own.app.world_mut().resource_mut::<Assets<Mesh>>().add(other.clone());
     own.app.world_mut().entity_mut(own.body).insert(Mesh3d(handle));
     run(&mut own.app, 0.3);
-    let told = fault_count(&own.app);
+    let faults = fault_count(&own.app);
     let kept = off_skin(&own, 1, |p| place(1.0).transform_point(p));
     let places = own.planted.groom.strands().map(|strand| strand.points[0]);
     let nearest = RootOnMesh::nearest(&other, places).unwrap();
@@ -740,7 +740,7 @@ fn other_triangles() -> Vec<Row> {
         off = off.max((at.length() - 1.2 * HEAD).abs());
     }
     vec![
-        Row::new("other triangles: faults", 1.0, told, 0.0),
+        Row::new("other triangles: faults", 1.0, faults, 0.0),
         Row::at_most("other triangles: roots off the mesh as it was (m)", kept, 1e-4),
         Row::at_most("other triangles, new roots: off the mesh (m)", off, 2e-3),
         Row::new(

@@ -331,18 +331,18 @@ mod tests {
         grow(&mut app, hair);
         let hz = 1.0 / app.world().resource::<Time<Fixed>>().timestep().as_secs_f32();
         let reports = |app: &mut App, seconds: f32| -> Vec<String> {
-            let mut told = Vec::new();
+            let mut faults = Vec::new();
             for _ in 0..(seconds * hz) as u32 {
                 run_ticks(app, 1);
-                told.extend(app.world_mut().resource_mut::<Messages<HairFault>>().drain());
+                faults.extend(app.world_mut().resource_mut::<Messages<HairFault>>().drain());
             }
-            assert!(told.iter().all(|fault| fault.kind == FaultKind::Roots));
-            told.into_iter().map(|fault| fault.to_string()).collect()
+            assert!(faults.iter().all(|fault| fault.kind == FaultKind::Roots));
+            faults.into_iter().map(|fault| fault.to_string()).collect()
         };
         assert!(reports(&mut app, SEARCH_TIME - 0.5).is_empty());
-        let told = reports(&mut app, 2.0);
-        assert_eq!(told.len(), 1, "{told:?}");
-        assert!(told[0].contains(r#"is named "rig:jaw""#), "{told:?}");
+        let faults = reports(&mut app, 2.0);
+        assert_eq!(faults.len(), 1, "{faults:?}");
+        assert!(faults[0].contains(r#"is named "rig:jaw""#), "{faults:?}");
         app.world_mut().get_mut::<Transform>(head).unwrap().translation.y += 0.01;
         run_ticks(&mut app, 2);
         let up = |i: usize| ROOTS[i] + Vec3::Y * 0.01;

@@ -365,7 +365,7 @@ fn plant(
 ) -> Option<(PlantedRoot, Isometry3d)> {
     let [bind, now] = place.frames()?;
     let scale = place.scale();
-    let at = carry(strand, history, &bind, &now, scale)?;
+    let at = transform_strand(strand, history, &bind, &now, scale)?;
     let offset = now.inverse() * at;
     let planted = PlantedRoot {
         root: place.root,
@@ -406,12 +406,12 @@ fn put(
     if aim.is_some() || is_there {
         return Some((planted, *aim.unwrap_or(&root)));
     }
-    Some((planted, carry(strand, history, &root, &at, larger)?))
+    Some((planted, transform_strand(strand, history, &root, &at, larger)?))
 }
 
 /// Moves, rotates and scales a strand as a whole: its shape and the shapes that its bonds remember stay the
 /// same. Returns place and frame of its root; `None` where it cannot be.
-fn carry(
+fn transform_strand(
     strand: &mut Mut<'_, Strand>,
     history: &mut Mut<'_, StrandHistory>,
     from: &Isometry3d,
@@ -478,7 +478,7 @@ pub(super) fn follow_edits(
                 (tied.movers, tied.triangles, tied.lost) = (movers, Some(triangles), false);
                 tied.roots.iter_mut().zip(corners).for_each(|(tied, now)| tied.corners = now);
             }
-            // Told of once, until it fits again.
+            // Reported once, until it fits again.
             Err(why) => {
                 let is_new = !replace(&mut tied.lost, true);
                 if is_new && !is_made_again {

@@ -42,7 +42,7 @@ impl RootBones {
     }
 }
 
-/// Which file tells the bones of a groom's roots: see [`GroomSettings::bones`](super::GroomSettings::bones).
+/// Which file names the bones of a groom's roots: see [`GroomSettings::bones`](super::GroomSettings::bones).
 #[derive(Reflect, Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum BonesFile {

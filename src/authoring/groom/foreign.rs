@@ -44,7 +44,7 @@ const KNOWN: [(&[u8], &str, &str); 28] = [
     (b"v ", "a Wavefront OBJ file", LINES),
 ];
 
-/// What the file is, as far as can be told, and what to do.
+/// What the file is, as far as is known, and what to do.
 pub(super) fn described(file: &[u8]) -> (String, &'static str) {
     if file.is_empty() {
         return ("an empty file".to_owned(), "fetch or export it again");

@@ -34,7 +34,7 @@ impl GroomFormat {
     /// ```
     ///
     /// # Errors
-    /// For other formats: with what the file is, if that can be told, and what to do.
+    /// For other formats: with what the file is, if that is known, and what to do.
     pub fn of(file: &[u8]) -> Result<Self, GroomFileError> {
         let version = file.first_chunk().map_or(0.0, |bytes| f32::from_le_bytes(*bytes));
         match file {

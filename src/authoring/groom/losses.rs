@@ -118,7 +118,7 @@ losses! {
     broken_bones: "weights of bones left out that cannot be", true;
     /// Roots that no bone of a `.tfxbone` moves: they stay with the hair.
     unbound_roots: "roots without bones", true;
-    /// Bytes behind the end of what the file's header tells.
+    /// Bytes behind the end of what the file's header gives.
     unread_bytes: "bytes after the end not read", true;
     /// Strands left out because they have no segment or no length.
     short_strands: "strands without length left out", false;
@@ -176,8 +176,8 @@ impl GroomLosses {
     }
 
     fn sentence(&self, which: impl Fn(bool) -> bool) -> String {
-        let told = self.all().filter(|(loss, _, broken)| loss.count > 0 && which(*broken));
-        let told = told.map(|(loss, what, _)| {
+        let found = self.all().filter(|(loss, _, broken)| loss.count > 0 && which(*broken));
+        let found = found.map(|(loss, what, _)| {
             let mut places: Vec<String> = loss.places.iter().map(ToString::to_string).collect();
             if places.len() < loss.count && places.len() == GroomLoss::MOST_PLACES {
                 places.push("…".to_owned());
@@ -187,7 +187,7 @@ impl GroomLosses {
                 false => format!("{} {what} ({})", loss.count, places.join(", ")),
             }
         });
-        told.collect::<Vec<_>>().join("; ")
+        found.collect::<Vec<_>>().join("; ")
     }
 }
 

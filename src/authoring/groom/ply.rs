@@ -1,6 +1,6 @@
 //! PLY files (`.ply`) with strands, as reconstructions from photographs write them, read: ascii and binary.
 //!
-//! | strands are told by | as written by |
+//! | strands are recognised by | as written by |
 //! |---|---|
 //! | an element `strand` with `nsegs`, segments of each | hairutil, for CT2Hair |
 //! | an element `edge` with `vertex1` and `vertex2` | MeshLab, Open3D, Blender |
@@ -239,7 +239,7 @@ struct Found {
 /// bytes. Colours that only tell strands apart are not read. Faces are skipped and counted.
 ///
 /// # Errors
-/// When the header or the numbers are broken, it cannot be told which vertices are a strand, or no strand is
+/// When the header or the numbers are broken, it is not known which vertices are a strand, or no strand is
 /// left.
 pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
     intake(file).map(|intake| (intake.groom, intake.losses))
@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn strands_are_told_apart_by_whatever_there_is() {
+    fn strands_are_kept_apart_by_whatever_there_is() {
         let none = |_| String::new();
         let segments = "element strand 2\nproperty ushort nsegs\n";
         assert_eq!(lengths(ascii("", none, segments, "3\n1\n").as_bytes()), [4, 2]);

@@ -146,7 +146,7 @@ impl Ball {
         ends.iter().filter(leaves).count() as f32 / ends.len() as f32
     }
 
-    /// Whether roots lie on it, and it cannot be told that strands grow into it.
+    /// Whether roots lie on it, and it is not certain that strands grow into it.
     fn may_be_scalp(&self, ends: &[[Vec3; 2]]) -> bool {
         self.uneven < UNEVEN && self.leaving(ends, 0.0) > 0.5
     }

@@ -8,7 +8,7 @@ use crate::base::grid::KdTree;
 use bevy::{math::DVec3, platform::collections::HashMap, prelude::*};
 
 /// Fewer strands are not judged.
-const FEWEST: usize = 8;
+const MIN_STRANDS: usize = 8;
 /// A strand is far away if it reaches so many times as far from the middle as half of the strands do.
 const FAR: f64 = 30.0;
 /// A segment jumps if it is so many times as long as that reach …
@@ -23,11 +23,11 @@ const TOGETHER: f32 = 0.3;
 /// … and so many times as far as roots usually are from each other.
 const SPACINGS: f32 = 4.0;
 /// Roots at one place are strays if they are this share of all at most: more are meant.
-const SHARE: f32 = 0.1;
-/// So many nodes or more tell the middle of all.
+const MAX_COINCIDENT_SHARE: f32 = 0.1;
+/// Nodes that are enough to find the middle of all.
 const SAMPLE: usize = 1 << 16;
 /// Where this share of the strands looks like strays, they are no strays.
-const MOST: f32 = 0.25;
+const MAX_STRAY_SHARE: f32 = 0.25;
 
 impl Intake {
     /// Leaves out strands that reach far away from all others, and strays.
@@ -39,12 +39,12 @@ impl Intake {
         let mut reaches = None;
         for (find, loss) in kinds {
             let all = self.groom.len();
-            if all < FEWEST {
+            if all < MIN_STRANDS {
                 return;
             }
             let found = find(&self.groom, reaches.get_or_insert_with(|| Reaches::of(&self.groom)));
             let share = found.iter().flatten().count() as f32 / all as f32;
-            if share == 0.0 || share > MOST {
+            if share == 0.0 || share > MAX_STRAY_SHARE {
                 continue;
             }
             for (i, node) in found.iter().enumerate() {
@@ -167,7 +167,7 @@ fn apart(groom: &Groom) -> Vec<Option<usize>> {
     let mut order: Vec<u32> = (0..roots.len() as u32).collect();
     order.sort_by_key(|i| bits(*i));
     let places: Vec<&[u32]> = order.chunk_by(|a, b| bits(*a) == bits(*b)).collect();
-    if places.len() < FEWEST / 2 {
+    if places.len() < MIN_STRANDS / 2 {
         return found;
     }
     let at = |place: &[u32]| roots[place[0] as usize];
@@ -182,7 +182,7 @@ fn apart(groom: &Groom) -> Vec<Option<usize>> {
         let is_apart = match place.len() {
             1 => gap > ALONE * spread,
             few => {
-                few as f32 <= SHARE * roots.len() as f32
+                few as f32 <= MAX_COINCIDENT_SHARE * roots.len() as f32
                     && gap > TOGETHER * spread
                     && gap > SPACINGS * spacing
             }

@@ -420,10 +420,10 @@ pub(crate) mod tests {
         })
     }
 
-    /// Seconds of a core that this thread has had, where the system tells it; else those of the clock.
+    /// Seconds of a core that this thread has had, where the system knows it; else those of the clock.
     fn seconds(since: Instant) -> f64 {
-        let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-        let nanos = told.split(' ').next().and_then(|nanos| nanos.parse::<f64>().ok());
+        let stat = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+        let nanos = stat.split(' ').next().and_then(|nanos| nanos.parse::<f64>().ok());
         nanos.map_or_else(|| since.elapsed().as_secs_f64(), |nanos| nanos * 1e-9)
     }
 

@@ -3,7 +3,7 @@
 use super::part::{Cue, MeshPart};
 use bevy::prelude::*;
 
-/// What told which way a character looks, see [`HairWorn`](super::HairWorn).
+/// What shows which way a character looks, see [`HairWorn`](super::HairWorn).
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum FacingFrom {
@@ -20,7 +20,7 @@ pub enum FacingFrom {
     Nose,
 }
 
-/// The least share of an offset that is level, for it to tell a direction.
+/// The least share of an offset that is level, to show a direction.
 const LEVEL: f32 = 0.2;
 /// How much farther nose and chin reach than the nape at least, in heights of the head.
 const NOSE: f32 = 0.1;

@@ -19,7 +19,7 @@ const EAR_LENGTH: Range<f32> = 0.12..0.7;
 const EAR_DEPTH: Range<f32> = 0.05..0.45;
 const UNEVEN: f32 = 0.15;
 /// Samples on a side that are an ear.
-const FEW: usize = 10;
+const MIN_EAR_SAMPLES: usize = 10;
 /// Half the width of the strip of a face in which its profile is taken, the step of the profile and half of the height
 /// of a bin, in heights of the head.
 const STRIP: f32 = 0.1;
@@ -42,7 +42,7 @@ pub(super) fn by_ears(points: &[SurfacePoint], height: f32) -> Option<(Vec3, f32
     let mut widths: Vec<f32> =
         of_head().filter(|p| SKULL.contains(&p.y)).map(|p| p.x.abs()).collect();
     widths.sort_by(f32::total_cmp);
-    let wide = *widths.iter().rev().nth(FEW)?;
+    let wide = *widths.iter().rev().nth(MIN_EAR_SAMPLES)?;
     // Upper end and middle from front to back.
     let side = |sign: f32| {
         let outside = |p: &Vec3| sign * p.x > STANDS_OUT * wide && EARS.contains(&p.y);
@@ -55,7 +55,7 @@ pub(super) fn by_ears(points: &[SurfacePoint], height: f32) -> Option<(Vec3, f32
         };
         let [Some(low), Some(high)] = span(|p| p.y) else { return None };
         let [Some(front), Some(back)] = span(|p| p.z) else { return None };
-        let is_ear = ear.len() >= FEW
+        let is_ear = ear.len() >= MIN_EAR_SAMPLES
             && EAR_LENGTH.contains(&(high - low))
             && EAR_DEPTH.contains(&(back - front));
         is_ear.then_some(Vec2::new(high, 0.5 * (front + back)))

@@ -93,7 +93,7 @@ pub(super) struct Made {
     /// The meshes that it was fitted to, and the colliders.
     pub(super) parts: Vec<Entity>,
     pub(super) solids: Solids,
-    /// Where the face looks, in the wearer's space, and what told it.
+    /// Where the face looks, in the wearer's space, and what shows it.
     pub(super) facing: (Dir3, FacingFrom),
     /// What was chosen, to be logged.
     pub(super) choice: String,
@@ -236,16 +236,16 @@ fn choice(fitting: &Fitting, parts: &[MeshPart]) -> String {
         let all = parts.iter().zip(&fitting.roles).filter(|(part, role)| is(part, **role));
         all.map(|(part, _)| format!("{:?}", part.name)).collect::<Vec<_>>().join(", ")
     };
-    let mut told = format!("it grows on {}", names(|_, role| role == Some(Role::Skin)));
+    let mut text = format!("it grows on {}", names(|_, role| role == Some(Role::Skin)));
     let others = [
         ("over it", names(|_, role| role == Some(Role::Over))),
         ("within", names(|_, role| role == Some(Role::Within))),
         ("hidden", names(|part, role| role.is_none() && !part.is_shown)),
     ];
     for (what, names) in others.into_iter().filter(|(_, names)| !names.is_empty()) {
-        told += &format!("; {what}: {names}");
+        text += &format!("; {what}: {names}");
     }
-    told
+    text
 }
 
 /// Meshes that lie over the scalp, and are not named like what is no hair.

@@ -12,7 +12,7 @@ use bevy::{
 /// Smallest weight of the head joint at a vertex that counts as the head, not the neck.
 pub(super) const HEAD_WEIGHT: f32 = 0.5;
 
-/// What a bone tells about where its character looks.
+/// What a bone shows about where its character looks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Cue {
     #[default]
@@ -55,7 +55,7 @@ pub(super) struct MeshSkin {
     pub(super) head: Option<usize>,
     /// Which joints are the head or below it.
     pub(super) of_head: Vec<bool>,
-    /// What their names tell.
+    /// What their names show.
     pub(super) cues: Vec<Cue>,
 }
 

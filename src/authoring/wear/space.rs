@@ -70,7 +70,7 @@ pub(super) struct Fitting {
     /// All of them as one, vertices in that order; the red vertex colour is the head's skinning weight.
     pub(super) mesh: Mesh,
     pub(super) scalp: Scalp,
-    /// Where the face looks, in the wearer's space, and what told it.
+    /// Where the face looks, in the wearer's space, and what shows it.
     pub(super) facing: (Dir3, FacingFrom),
     /// What each part is for the head; `None` for those that do not move with it or are not shown.
     pub(super) roles: Vec<Option<Role>>,

@@ -325,7 +325,7 @@ pub(super) fn put_on(
                 }
                 let wetting = wetting.as_ref().map(|default| default.0).unwrap_or_default();
                 let ((facing, facing_from), mesh) = (made.facing, made.skin[0].0);
-                tell(wearer, &made);
+                log_made(wearer, &made);
                 let hair = spawn_hair(&mut commands, wearer, wear, made, wetting);
                 commands.trigger(HairWorn { entity: wearer, hair, mesh, facing, facing_from });
                 wearing.worn = Some(hair);
@@ -341,7 +341,7 @@ pub(super) fn put_on(
 }
 
 /// Logs what was found of a character.
-fn tell(wearer: Entity, made: &Made) {
+fn log_made(wearer: Entity, made: &Made) {
     let (choice, (way, from)) = (&made.choice, made.facing);
     tracing::info!(
         "hair of {wearer}: {choice}; the face looks along {:?} ({from:?})",
@@ -349,7 +349,7 @@ fn tell(wearer: Entity, made: &Made) {
     );
     if from == FacingFrom::Assumed {
         tracing::warn!(
-            "hair of {wearer}: no bone of an eye, toe or foot and no nose tells where the face looks; it is \
+            "hair of {wearer}: no bone of an eye, toe or foot and no nose shows where the face looks; it is \
              taken to look along -Z: set WearHair::facing"
         );
     }

@@ -81,8 +81,8 @@ pub struct WearHair {
     /// hidden.
     pub hides_old_hair: bool,
     /// The direction in which the face looks, in this entity's space; Y is up and the component
-    /// along Y is ignored. Default `None`: found, and told in [`HairWorn`], from the bones of eyes, toes and
-    /// feet, else from the shape of the head. Where nothing tells it is −Z, Bevy's forward, which is logged.
+    /// along Y is ignored. Default `None`: found, and reported in [`HairWorn`], from the bones of eyes, toes and
+    /// feet, else from the shape of the head. Where nothing shows it, it is −Z, Bevy's forward, which is logged.
     pub facing: Option<Dir3>,
     /// Seed of the strands' places and variations: the same seed gives the same hair. Default 0.
     pub seed: u64,
@@ -287,7 +287,7 @@ pub struct HairWorn {
     pub mesh: Entity,
     /// Where the face looks, in the wearer's space.
     pub facing: Dir3,
-    /// What told that.
+    /// What shows that.
     pub facing_from: FacingFrom,
 }
 

@@ -329,7 +329,7 @@ pub(super) struct Bridges<S: Simd> {
     pull: V3<f32x8<S>>,
     steepness: f32x8<S>,
     drift: V3<f32x8<S>>,
-    grip: f32x8<S>,
+    strength: f32x8<S>,
 }
 
 impl<S: Simd> Bridges<S> {
@@ -344,7 +344,7 @@ impl<S: Simd> Bridges<S> {
             pull: splat(simd, Vec3::ZERO),
             steepness: zero,
             drift: splat(simd, Vec3::ZERO),
-            grip: zero,
+            strength: zero,
         }
     }
 
@@ -381,7 +381,7 @@ impl<S: Simd> Bridges<S> {
         let steep = amount / Real::min(Real::max(longest, lit(1e-9)), lit(0.5 * reach));
         self.steepness += Real::select(joined, steep, zero);
         self.drift = V3::select(joined, velocity.scale_add(left, self.drift), self.drift);
-        self.grip += Real::select(joined, left, zero);
+        self.strength += Real::select(joined, left, zero);
     }
 
     /// The sums over all lanes.
@@ -392,7 +392,7 @@ impl<S: Simd> Bridges<S> {
             pull: sum(self.pull),
             steepness: self.steepness.reduce_sum(),
             drift: sum(self.drift),
-            grip: self.grip.reduce_sum(),
+            strength: self.strength.reduce_sum(),
         }
     }
 }

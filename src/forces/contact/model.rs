@@ -43,10 +43,10 @@ pub struct Bridged {
     pub pull: Vec3,
     /// Upper bound of the gradient of `pull` (1/m).
     pub steepness: f32,
-    /// Sum of the velocities of the bridged points, each weighted by its part of `grip` (m/s).
+    /// Sum of the velocities of the bridged points, each weighted by its share of `strength` (m/s).
     pub drift: Vec3,
     /// Total strength: 1 for each full bridge.
-    pub grip: f32,
+    pub strength: f32,
 }
 
 impl Bridged {
@@ -57,7 +57,7 @@ impl Bridged {
             pull: self.pull.lerp(to.pull, t),
             steepness: mix(self.steepness, to.steepness),
             drift: self.drift.lerp(to.drift, t),
-            grip: mix(self.grip, to.grip),
+            strength: mix(self.strength, to.strength),
         }
     }
 }
@@ -80,7 +80,7 @@ pub(super) fn bridged(p: Vec3, foot: Vec3, velocity: Vec3, area: f32, film: Film
         pull: -off / distance * (left * pressed * pressed),
         steepness: amount / longest.min(0.5 * film.reach),
         drift: velocity * left,
-        grip: left,
+        strength: left,
     }
 }
 
@@ -135,12 +135,12 @@ mod tests {
     #[test]
     fn a_bridge_of_much_water_is_as_long_as_the_lists_cover() {
         let reach = 2e-3;
-        let grip = |distance: f32| {
+        let strength = |distance: f32| {
             let film = Film::between(reach);
-            bridged(Vec3::X * distance, Vec3::ZERO, Vec3::ZERO, 1e-4, film).grip
+            bridged(Vec3::X * distance, Vec3::ZERO, Vec3::ZERO, 1e-4, film).strength
         };
         let ends = reach * 1.6;
-        assert!(grip(ends - 1e-5) > 0.0 && grip(ends + 1e-5) == 0.0);
+        assert!(strength(ends - 1e-5) > 0.0 && strength(ends + 1e-5) == 0.0);
     }
 
     #[test]

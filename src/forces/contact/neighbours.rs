@@ -749,7 +749,7 @@ mod tests {
                             all.pull += one.pull;
                             all.drift += one.drift;
                             all.steepness += one.steepness;
-                            all.grip += one.grip;
+                            all.strength += one.strength;
                         }
                     }
                     all
@@ -759,7 +759,7 @@ mod tests {
                     .into_iter()
                     .flat_map(|d| [d * 2e-6, d * -2e-6])
                     .map(|d| brute(strands[own][n] + d))
-                    .map(|b| b.pull.distance(expected.pull) + (b.grip - expected.grip).abs())
+                    .map(|b| b.pull.distance(expected.pull) + (b.strength - expected.strength).abs())
                     .sum();
                 // It has a step where a bridge breaks.
                 let breaks = Vec3::AXES
@@ -770,7 +770,7 @@ mod tests {
                 let off = (found.steepness - expected.steepness).abs();
                 prop_assert!(off < most, "steepness {} of {}, not {}", k, found.steepness, expected.steepness);
                 prop_assert!(found.pull.distance(expected.pull) < 1e-3 + rounding, "pull {}", k);
-                prop_assert!((found.grip - expected.grip).abs() < 1e-3 + rounding, "grip {}", k);
+                prop_assert!((found.strength - expected.strength).abs() < 1e-3 + rounding, "strength {}", k);
                 let most = 1e-2 + 50.0 * rounding;
                 prop_assert!(found.drift.distance(expected.drift) < most, "drift {}", k);
             }

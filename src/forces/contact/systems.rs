@@ -163,7 +163,7 @@ fn find_reach(
 ) {
     for (members, mut reach, regroomed, owner) in &mut hairs {
         let reach = reach.bypass_change_detection();
-        // On the GPU roots stay, or somebody says that they have moved.
+        // On the GPU roots stay, or the GPU reports that they have moved.
         reach.age += u32::from(!owner.is_on_gpu());
         if reach.age < LOOK_AGAIN && (owner.is_on_gpu() || !regroomed.is_changed()) {
             continue;

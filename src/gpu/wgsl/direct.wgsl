@@ -84,7 +84,7 @@ struct Left {
     b_after: vec3<f32>,
 }
 
-// Where a node is at θ of the substep: held ones are on the way to where they are led.
+// Where a node is at θ of the substep: held ones are on the way to their targets.
 fn place_at(i: u32, theta: f32) -> vec3<f32> {
     let n = node(i);
     if is_held(n.w) {
@@ -466,7 +466,7 @@ fn surface() {
         release(i);
     }
     for (var round = 0u; round < min(LEAVING, 2u * edges); round++) {
-        contacts(GRIP_NONE);
+        contacts(FRICTION_PASS_NONE);
         if !limit_strained(TORN) {
             return;
         }
@@ -488,7 +488,7 @@ fn surface() {
 // Nodes on by their velocities. Not by air and gravity, which elastic forces balance in hair at rest.
 fn advance(ahead: f32) {
     predict_nodes(ahead);
-    contacts(GRIP_ASSUMED);
+    contacts(FRICTION_PASS_ASSUMED);
 }
 
 // Nodes to the first guess, and what touches. Returns θ.
@@ -557,25 +557,25 @@ fn direct_step(root_from: vec4<f32>) {
     stage.second = true;
     // A strand that cannot get out stays where it touches.
     for (var step = 1u; twice && !trapped && step < MOST_STEPS; step++) {
-        contacts(GRIP_JUDGED);
+        contacts(FRICTION_PASS_JUDGED);
         if !(contact_changed || (fast && step == 1u)) {
             break;
         }
         newton_down(stage);
         newton_up(stage);
     }
-    contacts(GRIP_SOLVED);
+    contacts(FRICTION_PASS_SOLVED);
     for (var done = 0u; done < record.limiter_steps; done++) {
         if !limit_strained(select(TOLERANCE, -1.0, done == 0u)) {
             break;
         }
-        contacts(GRIP_BETWEEN);
+        contacts(FRICTION_PASS_BETWEEN);
         for (var k = 0u; done + 1u == record.limiter_steps && k <= MAX_REPAIRS; k++) {
             let is_last = k == MAX_REPAIRS;
             if !clamp_lengths(select(TORN, MAX_STRAIN, is_last && !trapped)) || is_last {
                 break;
             }
-            contacts(GRIP_BETWEEN);
+            contacts(FRICTION_PASS_BETWEEN);
         }
     }
     finish(stage);

@@ -1,12 +1,12 @@
 // A follower in a substep: its bonds, and in the tick's last one its pose, by the frames of its guides. Rust
-// twins: src/simulation/lod/{follow,followers}.rs. In place of scratch it binds its ties, six a node:
-// frame relative to each of three guides; segment in its own frame, edge of the first guide; angular velocity
-// of its own, edge of the second; edge of the third.
-// At the tip: guides' slots and their number; weights, and seconds since it was tied; guides' edges, and what
-// is left of its own motion; where a led root comes to; its frame.
+// twins: src/simulation/lod/{follow,followers}.rs. In place of scratch it binds its guide offsets, six vectors
+// a node: frame relative to each of three guides; segment in its own frame, edge of the first guide; angular
+// velocity of its own, edge of the second; edge of the third.
+// At the tip: guides' slots and their number; weights, and seconds since guides were assigned; guides' edges,
+// and what is left of its own motion; the target of a root that has one; its frame.
 
-fn tie(i: u32, part: u32) -> vec4<f32> {
-    return scratch[((first - record.first_follower_slot + i) * TIES + part) * GROUP_SIZE + lane];
+fn guide_offset(i: u32, part: u32) -> vec4<f32> {
+    return scratch[((first - record.first_follower_slot + i) * OFFSET_VECTORS + part) * GROUP_SIZE + lane];
 }
 
 // The frame between two edges of a guide.
@@ -30,30 +30,30 @@ fn turned_by(rotation: vec3<f32>) -> vec4<f32> {
 }
 
 fn follow_guides() {
-    let head = tie(edges, 0u);
-    let weights = tie(edges, 1u);
-    let ends = tie(edges, 2u);
+    let head = guide_offset(edges, 0u);
+    let weights = guide_offset(edges, 1u);
+    let ends = guide_offset(edges, 2u);
     let count = min(u32(head.w), GUIDES);
     let since = weights.w + record.follow_since;
     var own_motion = since * ends.w * record.follow_decay;
     if since > OWN_LASTS * record.follow_lasts {
         own_motion = 0.0;
     }
-    if (record.flags & TARGETS_ROOTS) != 0u {
-        set_node(0u, tie(edges, 3u).xyz, 0.0);
-        set_frame(edges, tie(edges, 4u));
+    if (record.flags & ROOT_TARGETS) != 0u {
+        set_node(0u, guide_offset(edges, 3u).xyz, 0.0);
+        set_frame(edges, guide_offset(edges, 4u));
     }
     set_moving(0u, vec3(0.0), moving(0u).w);
     var p = node(0u).xyz;
     for (var i = 0u; i < edges; i++) {
-        let segment = tie(i, 3u);
-        let spin = tie(i, 4u);
-        let at = vec3(segment.w, spin.w, tie(i, 5u).x);
+        let segment = guide_offset(i, 3u);
+        let spin = guide_offset(i, 4u);
+        let at = vec3(segment.w, spin.w, guide_offset(i, 5u).x);
         var like = vec4(0.0, 0.0, 0.0, 1.0);
         var sum = vec4(0.0);
         for (var g = 0u; g < count; g++) {
             let frame = guide_frame(u32(head[g]), u32(ends[g]), at[g]);
-            let one = product(frame, tie(i, g));
+            let one = product(frame, guide_offset(i, g));
             if g == 0u {
                 like = one;
             }

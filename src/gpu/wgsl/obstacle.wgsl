@@ -8,7 +8,7 @@ var<private> touched: bool;
 // Whether a pass has found a node to stick, slide, rest or leave that did not.
 var<private> contact_changed: bool;
 // Length from the root on that may be in what the root lies in, 0 where it lies in nothing.
-var<private> sunk: f32;
+var<private> escape_length: f32;
 // Of a strand with such a root its length (m).
 var<private> whole_length: f32;
 // Whether it begins the substep in an obstacle that its length does not let it out of.
@@ -170,7 +170,7 @@ fn allowed(o: u32, along: f32, start: vec3<f32>) -> f32 {
 }
 
 fn allowed_near_root(o: u32, along: f32) -> f32 {
-    if !(along < sunk) {
+    if !(along < escape_length) {
         return 0.0;
     }
     let root = node(0u).xyz;
@@ -182,7 +182,7 @@ fn allowed_near_root(o: u32, along: f32) -> f32 {
     if whole_length < depth * ESCAPE_RATIO {
         return 3.0e38;
     }
-    let deepest = sunk * (1.0 / ESCAPE_RATIO);
+    let deepest = escape_length * (1.0 / ESCAPE_RATIO);
     let share = min(depth * DEPTH_RATIO / deepest, 1.0);
     let way = along * (1.0 / ESCAPE_RATIO);
     return max((deepest - way * way / deepest) * share, 0.0);
@@ -286,7 +286,7 @@ fn continuous_collision(o: u32, start: vec3<f32>, p: vec3<f32>) -> Swept {
 // Chooses the obstacles of this strand. Held nodes must know where they come from.
 fn choose_near() {
     near = vec4(0u);
-    sunk = 0.0;
+    escape_length = 0.0;
     trapped = false;
     if record.obstacles == 0u {
         return;
@@ -297,8 +297,8 @@ fn choose_near() {
     for (var i = 0u; i <= edges; i++) {
         let n = node(i);
         if is_held(n.w) {
-            let led = n.xyz - start_of(i);
-            pull = max(pull, dot(led, led));
+            let pulled = n.xyz - start_of(i);
+            pull = max(pull, dot(pulled, pulled));
         }
         let l = select(edge(i).x, 0.0, i == edges);
         longest = max(longest, l);
@@ -324,7 +324,7 @@ fn choose_near() {
     let root = node(0u).xyz;
     for (var o = next_near(0u); o < record.obstacles; o = next_near(o + 1u)) {
         if !is_beyond(o, root, record.skin) {
-            sunk = max(sunk, ESCAPE_RATIO * depth_in(o, root).w);
+            escape_length = max(escape_length, ESCAPE_RATIO * depth_in(o, root).w);
         }
     }
 }
@@ -367,8 +367,8 @@ fn predict_nodes(dt: f32) {
     }
 }
 
-// Moves nodes out of obstacles and records contacts. Motion along the surface: `Grip` of src/solver/rod/touch.rs.
-fn contacts(grip: u32) {
+// Moves nodes out of obstacles and records contacts. Friction: `FrictionPass` of src/solver/rod/touch.rs.
+fn contacts(friction_pass: u32) {
     touched = false;
     contact_changed = false;
     if all(near == vec4(0u)) {
@@ -376,13 +376,13 @@ fn contacts(grip: u32) {
     }
     var along = 0.0;
     for (var i = 0u; i <= edges; i++) {
-        touch(i, along, grip);
+        touch(i, along, friction_pass);
         along = farther(along, i);
     }
 }
 
 // The same of one node, so far from the root.
-fn touch(i: u32, along: f32, grip: u32) {
+fn touch(i: u32, along: f32, friction_pass: u32) {
     let n = node(i);
     let held = is_held(n.w);
     let start = start_of(i);
@@ -393,11 +393,11 @@ fn touch(i: u32, along: f32, grip: u32) {
     var touches = false;
     var sticks = false;
     var drag = 0.0;
-    if grip == GRIP_BETWEEN && rested {
+    if friction_pass == FRICTION_PASS_BETWEEN && rested {
         rests_on = before.xyz;
         touches = true;
     }
-    if grip == GRIP_BETWEEN || grip == GRIP_SOLVED {
+    if friction_pass == FRICTION_PASS_BETWEEN || friction_pass == FRICTION_PASS_SOLVED {
         sticks = 0.0 < before.w;
         drag = max(-before.w, 0.0);
     }
@@ -418,9 +418,9 @@ fn touch(i: u32, along: f32, grip: u32) {
             }
         }
         var out: Met;
-        if grip == GRIP_ASSUMED {
+        if friction_pass == FRICTION_PASS_ASSUMED {
             out = rest_on(o, p, taken, may_be);
-        } else if grip == GRIP_JUDGED || grip == GRIP_SOLVED {
+        } else if friction_pass == FRICTION_PASS_JUDGED || friction_pass == FRICTION_PASS_SOLVED {
             out = bear_on(o, p, rested, bearing, may_be);
         } else {
             out = push_out(o, p, may_be);
@@ -429,7 +429,7 @@ fn touch(i: u32, along: f32, grip: u32) {
             continue;
         }
         // Between two solids it rests on the one that bears more.
-        let bears = grip == GRIP_DEPTH || deepest < out.depth;
+        let bears = friction_pass == FRICTION_PASS_DEPTH || deepest < out.depth;
         if bears {
             deepest = out.depth;
             rests_on = out.normal;
@@ -442,11 +442,11 @@ fn touch(i: u32, along: f32, grip: u32) {
         let most = record.obstacle[o].friction * out.depth;
         var stays = 0.0;
         let held_by = reaction - out.normal * dot(reaction, out.normal);
-        if grip == GRIP_ASSUMED {
+        if friction_pass == FRICTION_PASS_ASSUMED {
             if bears {
                 sticks = -TOUCHING < depth_in(o, taken).w - may_be;
             }
-        } else if grip == GRIP_JUDGED {
+        } else if friction_pass == FRICTION_PASS_JUDGED {
             // What would have to pull it back: by what it has been held with, or else by what it has slipped.
             let wanted = select(held_by - tangential, held_by, slid);
             let size = sqrt(max(dot(held_by, held_by), 1e-24));
@@ -458,13 +458,13 @@ fn touch(i: u32, along: f32, grip: u32) {
                 drag = select(drag, most, rested);
                 pull = wanted;
             }
-        } else if grip == GRIP_SOLVED && sticks {
+        } else if friction_pass == FRICTION_PASS_SOLVED && sticks {
             stays = 1.0;
-        } else if grip == GRIP_SOLVED && 0.0 < drag {
+        } else if friction_pass == FRICTION_PASS_SOLVED && 0.0 < drag {
             stays = select(0.0, 1.0, 0.0 < dot(tangential, held_by));
-        } else if grip == GRIP_BETWEEN && 0.0 < drag {
+        } else if friction_pass == FRICTION_PASS_BETWEEN && 0.0 < drag {
             stays = 0.0;
-        } else if grip != GRIP_NONE {
+        } else if friction_pass != FRICTION_PASS_NONE {
             stays = min(1.0, most / max(length, 1e-12));
         }
         p = select(fma(tangential, vec3(-stays), out.place), p, held);
@@ -474,7 +474,7 @@ fn touch(i: u32, along: f32, grip: u32) {
     let support = vec4(rests_on, select(0.0, select(-drag, 1.0, sticks), touches));
     set_support(i, support.xyz, support.w);
     contact_changed = contact_changed || contact_of(before) != contact_of(support);
-    if grip == GRIP_JUDGED && support.w < 0.0 && !held {
+    if friction_pass == FRICTION_PASS_JUDGED && support.w < 0.0 && !held {
         set_slowed_along(i, pull);
     }
 }

@@ -4,8 +4,8 @@
 struct Substep {
     // As in strand.wgsl.
     gravity: vec4<f32>,
-    carry_turn: vec4<f32>,
-    carry_move: vec3<f32>,
+    frame_turn: vec4<f32>,
+    frame_move: vec3<f32>,
     flags: u32,
     between: array<vec4<u32>, 32>,
     // How far a node may move (m), an edge turn (rad), for how long (s); the length of the tick (s).

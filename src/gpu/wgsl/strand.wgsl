@@ -56,8 +56,8 @@ struct Substep {
     gravity: vec3<f32>,
     dt: f32,
     // What the frame's motion does to what rests in the world.
-    carry_turn: vec4<f32>,
-    carry_move: vec3<f32>,
+    frame_turn: vec4<f32>,
+    frame_move: vec3<f32>,
     flags: u32,
     // The wind of the place (m/s), share of its velocity that hair keeps against the air.
     wind: vec3<f32>,
@@ -79,11 +79,11 @@ struct Substep {
     obstacles: u32,
     blower: array<Blower, MAX_BLOWERS>,
     treatments: u32,
-    // Led nodes, and led roots of followers: first and number.
-    first_led: u32,
-    led: u32,
-    first_follower_led: u32,
-    follower_led: u32,
+    // Kinematic targets of nodes, and of followers' roots: first and number.
+    first_target: u32,
+    targets: u32,
+    first_root_target: u32,
+    root_targets: u32,
     first_follower_block: u32,
     first_follower_slot: u32,
     // G J/(E I).
@@ -130,7 +130,7 @@ struct Substep {
 @group(0) @binding(4) var<storage, read_write> rest: array<vec4<f32>>;
 // Four a node: remembered shape and rate of each kind.
 @group(0) @binding(5) var<storage, read_write> bonds: array<vec4<f32>>;
-// SCRATCH a node. Before a substep the first two hold where a led node comes to, and a led root's frame; of no
+// SCRATCH a node. Before a substep the first two hold a node's kinematic target, and the frame of a root's; of no
 // meaning otherwise between substeps.
 @group(0) @binding(6) var<storage, read_write> scratch: array<vec4<f32>>;
 // Strands put back, rebuilt, and of the first of them the number from the end; from the 16th on whether a strand

@@ -4,22 +4,22 @@
 // The place of a node and the frame behind it, as the substep finds them after the frame's motion.
 fn carried_place(i: u32) -> vec3<f32> {
     let p = pose_in[slot(i, 0u, 2u)].xyz;
-    if i == 0u || (record.flags & CARRIES) == 0u {
+    if i == 0u || (record.flags & FRAME_MOVES) == 0u {
         return p;
     }
-    return rotated(record.carry_turn, p) + record.carry_move;
+    return rotated(record.frame_turn, p) + record.frame_move;
 }
 
 fn carried_frame(i: u32) -> vec4<f32> {
     let q = pose_in[slot(i, 1u, 2u)];
-    if i == edges || (record.flags & CARRIES) == 0u {
+    if i == edges || (record.flags & FRAME_MOVES) == 0u {
         return q;
     }
-    return normalized(product(record.carry_turn, q));
+    return normalized(product(record.frame_turn, q));
 }
 
 fn load() {
-    let carries = (record.flags & CARRIES) != 0u;
+    let frame_moves = (record.flags & FRAME_MOVES) != 0u;
     let rests = (record.flags & RESTS) != 0u;
     let holds = (record.flags & HOLDS) != 0u;
     for (var i = 0u; i <= edges; i++) {
@@ -32,8 +32,8 @@ fn load() {
         set_frame(i, carried_frame(i));
         set_start(i, p);
         var m = moving(i);
-        if carries {
-            m = vec4(rotated(record.carry_turn, m.xyz), m.w);
+        if frame_moves {
+            m = vec4(rotated(record.frame_turn, m.xyz), m.w);
         }
         if rests {
             m = vec4(0.0);
@@ -43,22 +43,22 @@ fn load() {
             motion[slot(i, 1u, 2u)] = vec4(pose_in[slot(i, 0u, 2u)].xyz, 0.0);
         }
     }
-    if (record.flags & TARGETS_ROOTS) != 0u {
+    if (record.flags & ROOT_TARGETS) != 0u {
         set_node(0u, row(0u, 0u).xyz, 0.0);
         set_frame(edges, row(0u, 1u));
     }
-    if carries {
-        set_start(0u, rotated(record.carry_turn, pose_in[slot(0u, 0u, 2u)].xyz) + record.carry_move);
+    if frame_moves {
+        set_start(0u, rotated(record.frame_turn, pose_in[slot(0u, 0u, 2u)].xyz) + record.frame_move);
     }
 }
 
 // Where the scalp's frame was as the substep began.
 fn root_from() -> vec4<f32> {
     let before = pose_in[slot(edges, 1u, 2u)];
-    if (record.flags & CARRIES) == 0u {
+    if (record.flags & FRAME_MOVES) == 0u {
         return before;
     }
-    return product(record.carry_turn, before);
+    return product(record.frame_turn, before);
 }
 
 fn is_finite_strand() -> bool {

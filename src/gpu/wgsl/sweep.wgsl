@@ -134,8 +134,8 @@ fn weigh_swept() {
 fn load_spins() {
     for (var i = 0u; i < edges; i++) {
         var omega = spin(i) * record.retained;
-        if (record.flags & CARRIES) != 0u {
-            omega = rotated(record.carry_turn, omega);
+        if (record.flags & FRAME_MOVES) != 0u {
+            omega = rotated(record.frame_turn, omega);
         }
         set_spin(i, select(omega, vec3(0.0), (record.flags & RESTS) != 0u));
     }
@@ -186,7 +186,7 @@ fn sweep_over() {
         }
         set_node(i, n1.xyz + c.p1, n1.w);
         if touching {
-            touch(i, 0.0, GRIP_DEPTH);
+            touch(i, 0.0, FRICTION_PASS_DEPTH);
         }
         before = renormalized(q + c.q);
         n1 = vec4(n2.xyz + c.p2, n2.w);
@@ -194,7 +194,7 @@ fn sweep_over() {
     set_frame(edges - 1u, before);
     set_node(edges, n1.xyz, n1.w);
     if touching {
-        touch(edges, 0.0, GRIP_DEPTH);
+        touch(edges, 0.0, FRICTION_PASS_DEPTH);
     }
 }
 
@@ -232,14 +232,14 @@ fn limit_all() {
 // One substep.
 fn sweep_step() {
     weigh_swept();
-    // A root has no velocity, wherever it is led.
+    // A root has no velocity, wherever its target is.
     set_start(0u, node(0u).xyz);
     choose_near();
     for (var i = 0u; i <= edges; i++) {
         release(i);
     }
     // Sweeps push all nodes.
-    sunk = 0.0;
+    escape_length = 0.0;
     predict_nodes(record.dt);
     predict_frames();
     for (var done = 0u; done < record.iterations; done++) {
@@ -248,12 +248,12 @@ fn sweep_step() {
     }
     for (var done = 0u; done < record.limiter_steps; done++) {
         limit_all();
-        contacts(GRIP_DEPTH);
+        contacts(FRICTION_PASS_DEPTH);
         // Hair pressed on a surface has to fold; each pass can fold it further.
         for (var again = 1u; again < PASSES_IN_TOUCH; again++) {
             if touched {
                 _ = limit(0.0, false, true);
-                contacts(GRIP_DEPTH);
+                contacts(FRICTION_PASS_DEPTH);
             }
         }
     }

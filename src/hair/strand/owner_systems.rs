@@ -1,4 +1,4 @@
-//! Who moves a hair is written down here alone, and asked for by these filters.
+//! Who moves a hair is decided here, but for hair that the GPU takes or returns, and asked for by these filters.
 
 use super::{Hair, KinematicStrand, MotionOwner, OnGpu, Settling, SleepCounts, Strands, TickPose};
 use bevy::prelude::*;

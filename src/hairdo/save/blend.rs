@@ -8,7 +8,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-const SHARE: ValueRange =
+const BLEND_RANGE: ValueRange =
     ValueRange::new("Hairdo::blend's t", 0.0..=1.0, "0 is the first hairdo, 1 the second");
 
 impl Hairdo {
@@ -23,7 +23,7 @@ impl Hairdo {
     /// # Errors
     /// When the hairdos differ in strands or nodes, or `t` is outside 0…1.
     pub fn blend(a: &Self, b: &Self, t: f32) -> Result<Self, HairdoError> {
-        let t = SHARE.check(t)?;
+        let t = BLEND_RANGE.check(t)?;
         b.check_fit(a.strands.iter().map(|strand| strand.positions.len()))?;
         if t == 0.0 || t == 1.0 {
             return Ok(if t == 0.0 { a } else { b }.clone());

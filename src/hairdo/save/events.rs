@@ -94,7 +94,7 @@ fn answer(world: &mut World, hair: Entity) {
     }
 }
 
-/// Somebody waits for the hairdo of hair that is on the GPU.
+/// Marks hair on the GPU whose hairdo is asked for.
 #[cfg(feature = "gpu")]
 #[derive(Component)]
 pub(super) struct Awaited;

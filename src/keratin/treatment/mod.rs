@@ -179,7 +179,7 @@ impl Treatments {
 
 setting! {
     /// A cylinder along Y that strands are wound on: see [`PermWinding`]. Despawn it to release
-    /// them. It is as round as it is told: an uneven scale of its transform counts by its mean, which is
+    /// them. It stays round: an uneven scale of its transform counts by its mean, which is
     /// reported.
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]

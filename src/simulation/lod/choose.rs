@@ -2,10 +2,10 @@
 
 use super::{
     PresentLod,
+    assign::assign_guides,
     follow::GuideOffsets,
     guides::{Follower, GroupStrand, Guides},
     spread::spread_order,
-    tie::tie,
 };
 use crate::{
     base::setting::Settings,
@@ -120,7 +120,7 @@ pub(crate) fn choose_guides(
         // A non-finite strand is repaired by being simulated. Only writes from outside make it so, also
         // while it is disabled and no system notices. Guides overwrite all but a follower's root.
         let is_followed = sleep.is_follower() && !strand.is_changed();
-        let is_finite = if is_followed && follower.ties.fit(strand.edges()) {
+        let is_finite = if is_followed && follower.offsets.fit(strand.edges()) {
             strand.positions().first().is_some_and(|root| root.is_finite())
         } else {
             strand.is_finite()
@@ -199,19 +199,19 @@ fn partition(group: &mut HairPartition<'_>, guides: &mut Guides) -> usize {
         if !is_follower && sleep.is_follower() {
             // It continues from its present position and velocity.
             sleep.set_follower(false);
-            follower.thaws = follower.ties.guides.is_empty();
+            follower.thaws = follower.offsets.guides.is_empty();
             guides.thaws |= follower.thaws;
             if core::mem::take(&mut follower.synced_asleep) {
                 sleep.wake_up();
             }
-            follower.ties = GuideOffsets::default();
+            follower.offsets = GuideOffsets::default();
             // Followers' history is written as they move.
             history.bypass_change_detection().remember(strand);
         }
         // A strand that was written to stays where it was put and follows from there.
         let is_new = !sleep.is_follower() || strand.is_changed();
-        if is_follower && (is_new || !follower.ties.fit(strand.edges())) {
-            follower.ties = GuideOffsets::default();
+        if is_follower && (is_new || !follower.offsets.fit(strand.edges())) {
+            follower.offsets = GuideOffsets::default();
         }
         follower.guide = guide;
     }
@@ -224,7 +224,7 @@ fn partition(group: &mut HairPartition<'_>, guides: &mut Guides) -> usize {
         guides.level = *level;
         replace_guides(members, strands, guides, first_follower, keep);
     }
-    tie(members, strands, guides);
+    assign_guides(members, strands, guides);
     count
 }
 
@@ -267,13 +267,13 @@ fn replace_guides(
     }
     let index_now: Vec<Option<u32>> = before.iter().map(|e| now.get(e).copied()).collect();
     for member in members {
-        let ties = &mut member.follower.bypass_change_detection().ties;
+        let offsets = &mut member.follower.bypass_change_detection().offsets;
         let stays = |(guide, _): &mut (u32, f32)| {
             let index = index_now.get(*guide as usize).copied().flatten();
             index.map(|index| *guide = index).is_some()
         };
-        if !keep || !ties.guides.iter_mut().all(stays) {
-            *ties = GuideOffsets::default();
+        if !keep || !offsets.guides.iter_mut().all(stays) {
+            *offsets = GuideOffsets::default();
         }
     }
 }

@@ -5,13 +5,13 @@ use bevy::prelude::*;
 
 impl Follower {
     /// How it follows its guides; they are indices of [`Guides::entities`].
-    pub(crate) fn ties(&self) -> &GuideOffsets {
-        &self.ties
+    pub(crate) fn offsets(&self) -> &GuideOffsets {
+        &self.offsets
     }
 
     /// It has followed elsewhere for so long (s), and its root is here.
     pub(crate) fn pass(&mut self, seconds: f32, root: Vec3) {
-        self.ties.pass(seconds);
+        self.offsets.pass(seconds);
         self.root = root;
         self.synced_asleep = false;
     }

@@ -2,7 +2,7 @@
 //!
 //! Each of its edges rotates with its guides' edges at the same distance from the root, and the
 //! strand is rebuilt from its own root with its own segments. So it keeps its lengths exactly, its
-//! root stays on the scalp, and it is continuous when it is tied: rotations start at zero.
+//! root stays on the scalp, and it is continuous when its guides are assigned: rotations start at zero.
 //! Its angular velocity relative to the guides at that time decays and its displacement returns to zero.
 
 use crate::base::parallel::prefetch;
@@ -25,7 +25,7 @@ pub struct GuideOffsets {
     pub guides: Vec<(u32, f32)>,
     /// For each edge and guide, edge by edge.
     edges: Vec<EdgeOffset>,
-    /// Angular velocity of each edge relative to its guides when it was tied (rad/s); empty once that
+    /// Angular velocity of each edge relative to its guides when they were assigned (rad/s); empty once that
     /// has decayed.
     own: Vec<Vec3>,
     /// Time since then (s).
@@ -43,7 +43,7 @@ struct EdgeOffset {
     at: f32,
 }
 
-/// State of a strand that is tied, or of a guide that it is tied to.
+/// State of a follower or a guide.
 #[derive(Clone, Copy, Debug)]
 pub struct StrandState<'a> {
     /// Node positions (m).
@@ -139,10 +139,10 @@ impl GuideOffsets {
     /// Of each edge and guide, edge by edge: the edge's frame in that of the guide, its segment in its own
     /// frame (m), and the guide's edge beside it, with the share toward the next.
     pub(crate) fn edges(&self) -> impl Iterator<Item = (Quat, Vec3, f32)> + '_ {
-        self.edges.iter().map(|tie| (tie.relative, tie.segment, tie.at))
+        self.edges.iter().map(|offset| (offset.relative, offset.segment, offset.at))
     }
 
-    /// Angular velocity of each edge relative to its guides when it was tied (rad/s), none once that has
+    /// Angular velocity of each edge relative to its guides when they were assigned (rad/s), none once that has
     /// decayed, and the time since (s).
     pub(crate) fn own_motion(&self) -> (&[Vec3], f32) {
         (&self.own, self.since)
@@ -229,12 +229,12 @@ impl GuideOffsets {
         let (stays, has_spins) = (frame.0.is_none(), !pose.spins.is_empty());
         let nodes = pose.positions.iter_mut().zip(pose.velocities.iter_mut()).skip(1);
         let edges = self.edges.chunks_exact(self.guides.len()).zip(pose.orientations.iter_mut());
-        for (i, ((ties, orientation), (position, velocity))) in edges.zip(nodes).enumerate() {
-            let mut turn = self.turn(ties, &frames);
+        for (i, ((offsets, orientation), (position, velocity))) in edges.zip(nodes).enumerate() {
+            let mut turn = self.turn(offsets, &frames);
             if let Some(own) = self.own.get(i) {
                 turn = Quat::from_scaled_axis(*own * own_motion) * turn;
             }
-            p += turn * ties[0].segment;
+            p += turn * offsets[0].segment;
             let before = core::mem::replace(position, p);
             if let Some(kept) = pose.before.get_mut(i + 1) {
                 *kept = before;
@@ -256,16 +256,16 @@ impl GuideOffsets {
 
     /// The frame of an edge that its guides give it.
     #[inline]
-    fn turn(&self, ties: &[EdgeOffset], frames: &[Option<&[Quat]>; GUIDES]) -> Quat {
+    fn turn(&self, offsets: &[EdgeOffset], frames: &[Option<&[Quat]>; GUIDES]) -> Quat {
         // Fast path: at coarse levels followers have one guide.
-        if let ([tie], Some(turns)) = (ties, frames[0]) {
-            return between(turns, tie.at) * tie.relative;
+        if let ([offset], Some(turns)) = (offsets, frames[0]) {
+            return between(turns, offset.at) * offset.relative;
         }
         let mut first = None;
         let mut sum = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-        for ((tie, turns), (_, weight)) in ties.iter().zip(frames).zip(&self.guides) {
+        for ((offset, turns), (_, weight)) in offsets.iter().zip(frames).zip(&self.guides) {
             let Some(turns) = turns else { continue };
-            let one = between(turns, tie.at) * tie.relative;
+            let one = between(turns, offset.at) * offset.relative;
             // q and −q are the same rotation.
             let like = *first.get_or_insert(one);
             sum += one * if like.dot(one) < 0.0 { -*weight } else { *weight };
@@ -353,7 +353,7 @@ mod tests {
         StrandState { positions: &parts.0, velocities: &[], turns: &parts.1, lengths: &parts.2 }
     }
 
-    fn tied(own: &Parts, guides: &[(&Parts, f32)]) -> GuideOffsets {
+    fn offsets_of(own: &Parts, guides: &[(&Parts, f32)]) -> GuideOffsets {
         let guides = guides.iter().zip(0..);
         GuideOffsets::new(
             state_of(own),
@@ -371,7 +371,7 @@ mod tests {
         let velocities = vec![Vec3::ZERO; 9];
         let strand = StrandState { velocities: &speed, ..state_of(&own) };
         let guides = [(0, 1.0, StrandState { velocities: &velocities, ..state_of(&guide) })];
-        let mut ties = GuideOffsets::new(strand, guides);
+        let mut offsets = GuideOffsets::new(strand, guides);
         let mut step = |own: &mut Parts| {
             let (mut v, mut w) = (vec![Vec3::ZERO; 9], vec![Vec3::ZERO; 8]);
             let mut pose = StrandPose {
@@ -381,7 +381,7 @@ mod tests {
                 orientations: &mut own.1,
                 spins: &mut w,
             };
-            ties.follow(&mut pose, |_| Some(&guide.1[..]), &Frame::default(), 1.0 / 60.0);
+            offsets.follow(&mut pose, |_| Some(&guide.1[..]), &Frame::default(), 1.0 / 60.0);
             v
         };
         let first = step(&mut own);
@@ -397,7 +397,7 @@ mod tests {
 
     /// Moves a follower; returns whether it followed, and its velocities.
     fn moved(
-        ties: &mut GuideOffsets,
+        offsets: &mut GuideOffsets,
         own: &mut Parts,
         guides: &[Option<&[Quat]>],
     ) -> (bool, Vec<Vec3>) {
@@ -412,21 +412,22 @@ mod tests {
             orientations: &mut own.1,
             spins: &mut spins,
         };
-        let went = ties.follow(&mut pose, |i| guides[i as usize], &Frame::default(), 0.1);
+        let went = offsets.follow(&mut pose, |i| guides[i as usize], &Frame::default(), 0.1);
         assert!(velocities.iter().chain(&spins).all(|v| v.is_finite()));
         assert!(!went || before == was, "where it was is kept");
         (went, velocities)
     }
 
     #[test]
-    fn a_tied_strand_stays_where_it_is_until_guides_move() {
+    fn a_follower_stays_where_it_is_until_guides_move() {
         let guides = [curl(9, 0.0), curl(12, 2.0), straight(Vec3::X, 5, 0.03)];
         let before = curl(9, 1.0);
         let mut own = before.clone();
-        let mut ties = tied(&own, &[(&guides[0], 0.5), (&guides[1], 0.3), (&guides[2], 0.2)]);
+        let mut offsets =
+            offsets_of(&own, &[(&guides[0], 0.5), (&guides[1], 0.3), (&guides[2], 0.2)]);
         let turns = guides.each_ref().map(|g| Some(&g.1[..]));
-        let (went, velocities) = moved(&mut ties, &mut own, &turns);
-        assert!(went && ties.fit(8) && !ties.fit(9));
+        let (went, velocities) = moved(&mut offsets, &mut own, &turns);
+        assert!(went && offsets.fit(8) && !offsets.fit(9));
         for (a, b) in own.0.iter().zip(&before.0) {
             assert!(a.distance(*b) < 1e-6, "{a} {b}");
         }
@@ -438,10 +439,10 @@ mod tests {
         let guide = straight(Vec3::ZERO, 9, 0.02);
         let before = curl(9, 0.7);
         let mut own = before.clone();
-        let mut ties = tied(&own, &[(&guide, 1.0)]);
+        let mut offsets = offsets_of(&own, &[(&guide, 1.0)]);
         let turn = Quat::from_rotation_z(0.8);
         let turned: Vec<Quat> = guide.1.iter().map(|q| turn * *q).collect();
-        let (_, velocities) = moved(&mut ties, &mut own, &[Some(&turned)]);
+        let (_, velocities) = moved(&mut offsets, &mut own, &[Some(&turned)]);
         for (i, p) in own.0.iter().enumerate() {
             let expected = before.0[0] + turn * (before.0[i] - before.0[0]);
             assert!(p.distance(expected) < 1e-6);
@@ -454,19 +455,19 @@ mod tests {
     fn lengths_stay_for_any_motion_and_node_count_of_guides() {
         let (a, b) = (straight(Vec3::ZERO, 9, 0.02), straight(Vec3::X, 4, 0.07));
         let mut own = curl(14, 0.3);
-        let mut ties = tied(&own, &[(&a, 0.7), (&b, 0.3)]);
+        let mut offsets = offsets_of(&own, &[(&a, 0.7), (&b, 0.3)]);
         let bent = |parts: &Parts, by: f32| -> Vec<Quat> {
             let turn = |i: usize| Quat::from_rotation_x(by * i as f32) * Quat::from_rotation_y(by);
             parts.1.iter().enumerate().map(|(i, q)| turn(i) * *q).collect()
         };
         let (to, other) = (bent(&a, 0.2), bent(&b, -0.3));
-        moved(&mut ties, &mut own, &[Some(&to), Some(&other)]);
+        moved(&mut offsets, &mut own, &[Some(&to), Some(&other)]);
         let now = own.0.windows(2).map(|p| p[0].distance(p[1]));
         assert!(now.zip(&own.2).all(|(now, rest)| (now / rest - 1.0).abs() < 1e-4));
         // Opposite turns have no mean: the first guide's is taken.
         let half = |q: &Quat| Quat::from_rotation_x(core::f32::consts::PI) * *q;
         let turned: Vec<Quat> = a.1.iter().map(half).collect();
-        let (went, _) = moved(&mut ties, &mut own, &[Some(&turned), Some(&b.1)]);
+        let (went, _) = moved(&mut offsets, &mut own, &[Some(&turned), Some(&b.1)]);
         assert!(went && own.0.iter().all(|p| p.is_finite()));
     }
 
@@ -488,12 +489,12 @@ mod tests {
         let guide = straight(Vec3::ZERO, 9, 0.02);
         let before = curl(9, 0.7);
         let mut own = before.clone();
-        let mut ties = tied(&own, &[(&guide, 1.0)]);
-        let (went, velocities) = moved(&mut ties, &mut own, &[None]);
+        let mut offsets = offsets_of(&own, &[(&guide, 1.0)]);
+        let (went, velocities) = moved(&mut offsets, &mut own, &[None]);
         assert!(!went && own.0 == before.0 && velocities == [Vec3::ZERO; 9]);
         assert!(!moved(&mut GuideOffsets::default(), &mut own, &[]).0);
         own.0[0] = Vec3::NAN;
-        assert!(!moved(&mut ties, &mut own, &[Some(&guide.1)]).0);
+        assert!(!moved(&mut offsets, &mut own, &[Some(&guide.1)]).0);
         assert_eq!(own.0[1..], before.0[1..]);
     }
 
@@ -501,7 +502,7 @@ mod tests {
     fn points_at_rest_in_the_world_have_no_velocity_in_a_moving_frame() {
         let guide = straight(Vec3::ZERO, 9, 0.02);
         let mut own = straight(Vec3::X * 0.01, 9, 0.02);
-        let mut ties = tied(&own, &[(&guide, 1.0)]);
+        let mut offsets = offsets_of(&own, &[(&guide, 1.0)]);
         let turn = Quat::from_rotation_y(0.3);
         let mut frame = Frame::default();
         // The root stays in the frame; were it where the world is, all would be at rest.
@@ -516,7 +517,7 @@ mod tests {
             orientations: &mut own.1,
             spins: &mut w,
         };
-        ties.follow(&mut pose, |_| Some(&turned[..]), &frame, 0.1);
+        offsets.follow(&mut pose, |_| Some(&turned[..]), &frame, 0.1);
         assert!(v.iter().chain(&w).all(|v| v.length() < 1e-4), "{v:?} {w:?}");
     }
 }

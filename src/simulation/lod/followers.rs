@@ -96,7 +96,7 @@ pub(crate) fn sync_follower_sleep(
             || is_written
             || match awake {
                 Awake::None => false,
-                Awake::Some => follower.ties.guides.iter().any(is_awake),
+                Awake::Some => follower.offsets.guides.iter().any(is_awake),
                 Awake::All => true,
             };
         if moves && sleep.is_asleep() {
@@ -160,7 +160,7 @@ pub(crate) fn move_followers(
     let ahead = |(_, strand, history, follower): &Moved<'_>| {
         strand.prefetch();
         prefetch(&history.positions);
-        follower.ties.prefetch();
+        follower.offsets.prefetch();
     };
     for_each_part(FOLLOW, tables(&mut followers), Vec::new, |items, rows| {
         let mut per_hair = PerHair::default();
@@ -198,7 +198,7 @@ fn follow_guides(
     let mut pose =
         StrandPose { positions: &mut *positions, before, velocities, orientations, spins };
     follower.root = pose.positions.first().copied().unwrap_or_default();
-    if !follower.ties.follow(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds) {
+    if !follower.offsets.follow(&mut pose, |guide| guides.turns(guide), &guides.frame, seconds) {
         history.positions.copy_from_slice(positions);
         // Without guides it translates with its root.
         let way = follower.root - root_before;

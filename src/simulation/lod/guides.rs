@@ -17,7 +17,7 @@ pub struct Follower {
     #[reflect(ignore)]
     pub(super) guide: Option<u32>,
     #[reflect(ignore)]
-    pub(super) ties: GuideOffsets,
+    pub(super) offsets: GuideOffsets,
     /// Position of its root when it last moved (m).
     pub(super) root: Vec3,
     /// Whether it was frozen and is simulated again from this tick on.
@@ -63,7 +63,7 @@ impl Guides {
     /// The guides of a follower.
     #[cfg(feature = "debug")]
     pub(crate) fn of(&self, follower: &Follower) -> impl Iterator<Item = Entity> {
-        follower.ties.guides().filter_map(|i| self.strands.get(i as usize).copied())
+        follower.offsets.guides().filter_map(|i| self.strands.get(i as usize).copied())
     }
 
     pub(super) fn turns(&self, guide: u32) -> Option<&[Quat]> {

@@ -40,6 +40,7 @@
 //!
 //! Drawing needs no level: strands thinner than a pixel are drawn fewer and wider, smoothly.
 
+mod assign;
 mod budget;
 mod choose;
 #[cfg(feature = "gpu")]
@@ -54,7 +55,6 @@ mod release;
 #[doc(hidden)]
 pub mod spread;
 mod systems;
-mod tie;
 
 pub use budget::{HairBudget, HairEstimate};
 pub use guides::{Follower, Guides};

@@ -3,7 +3,7 @@
 use super::{SettleSettings, Settling};
 use crate::{
     base::{
-        schedule::{Ahead, HairStep, HairTicked, SettleTick, lacks},
+        schedule::{HairStep, HairTicked, SettleTick, SettleTickHairs, lacks},
         setting::{self, Settings},
     },
     hair::strand::{Hair, Strand, StrandHistory, Strands, TickPose, lacks_strands},
@@ -57,7 +57,7 @@ fn settle(world: &mut World) {
     for mut pose in world.query::<&mut TickPose>().iter_mut(world) {
         pose.bypass_change_detection().hold();
     }
-    let mut calm = SystemState::<SettleDamping>::new(world);
+    let mut damping = SystemState::<SettleDamping>::new(world);
     for round in 0.. {
         hairs.retain(|(hair, settings)| {
             let settling = world.get::<Settling>(*hair);
@@ -72,18 +72,18 @@ fn settle(world: &mut World) {
         if hairs.is_empty() {
             break;
         }
-        world.resource_mut::<Ahead>().0 = Some(hairs.iter().map(|(hair, _)| *hair).collect());
+        world.resource_mut::<SettleTickHairs>().0 = Some(hairs.iter().map(|h| h.0).collect());
         for index in 0..present.count {
             *world.resource_mut::<HairStep>() = HairStep { index, ..present };
             world.run_schedule(SettleTick);
         }
         let seconds = present.dt * present.count as f32;
         for (hair, settings) in &hairs {
-            let Ok(calm) = calm.get_mut(world) else { continue };
-            calm.slow_down(*hair, settings, seconds);
+            let Ok(damping) = damping.get_mut(world) else { continue };
+            damping.slow_down(*hair, settings, seconds);
         }
     }
-    world.resource_mut::<Ahead>().0 = None;
+    world.resource_mut::<SettleTickHairs>().0 = None;
     *world.resource_mut::<HairStep>() = present;
 }
 

@@ -34,7 +34,7 @@ pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], d
     for node in &mut block.nodes {
         node.w = [1.0; LANES];
     }
-    (block.sunk, block.trapped) = ([0.0; LANES], [0.0; LANES]);
+    (block.escape_length, block.trapped) = ([0.0; LANES], [0.0; LANES]);
     block.gravity.clear();
     if from.iter().any(|source| !source.added.in_water.is_empty()) {
         block.gravity.resize(block.nodes.len(), [1.0; LANES]);

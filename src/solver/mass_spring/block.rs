@@ -269,10 +269,10 @@ fn keep_energy<S: Simd>(
                 if gains.to_bitmask() == 0 {
                     break;
                 }
-                let keep = Real::select(gains, if halved < HALVINGS { half } else { zero }, one);
+                let scale = Real::select(gains, if halved < HALVINGS { half } else { zero }, one);
                 for n in &mut b.nodes {
                     let (p, moved) = place(simd, n);
-                    let shorter = moved.scale_add(keep, load3(simd, &n.from));
+                    let shorter = moved.scale_add(scale, load3(simd, &n.from));
                     store3(&mut n.p, V3::select(gains, shorter, p));
                 }
                 left = left_of(simd, b, params, gravity, before);

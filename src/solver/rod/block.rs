@@ -116,7 +116,7 @@ pub struct BlockLanes {
     pub(super) obstacle_balls: Vec<ObstacleBalls>,
     /// Of a strand whose root lies in an obstacle, the length from the root on that may be inside: it is too short
     /// to get out (m). Written by `choose_near`, for the direct method only.
-    pub(crate) sunk: Lane,
+    pub(crate) escape_length: Lane,
     /// 1 for strands that begin the substep in an obstacle that their length does not let them out of, else 0: they
     /// stay as deep. Written for the direct method only.
     pub(crate) trapped: Lane,

@@ -17,13 +17,13 @@ pub(crate) const FASTER: f32 = 1.5;
 /// velocity: most nodes go less far in a substep.
 const CLOSE: f32 = 0.25;
 
-/// Length from a sunk root on within which a strand may be inside, as a multiple of the root's depth: it gets out
-/// up to 60° aslant.
+/// Length within which a strand may be inside from a root that is, as a multiple of the root's depth: it gets out up
+/// to 60° aslant.
 pub(crate) const ESCAPE_RATIO: f32 = 2.0;
 
 /// Finds the obstacles that each node may touch in a substep of `dt`, so that its passes skip the
-/// others: on a head of dozens of solids most nodes are near one or none. Also how far each strand is sunk
-/// in them. `from` of held nodes must be set.
+/// others: on a head of dozens of solids most nodes are near one or none. Sets `escape_length`. `from` of held
+/// nodes must be set.
 #[inline(never)]
 pub(crate) fn choose_near<S: Simd>(
     simd: S,
@@ -32,7 +32,7 @@ pub(crate) fn choose_near<S: Simd>(
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
-    b.sunk = [0.0; LANES];
+    b.escape_length = [0.0; LANES];
     if obstacles.is_empty() {
         // The block may have held other strands before, which rested on something.
         b.nodes.iter_mut().for_each(NodeLanes::release);
@@ -46,9 +46,9 @@ pub(crate) fn choose_near<S: Simd>(
             // an edge.
             let mut pull = zero;
             for n in &b.nodes {
-                let led = load3(simd, &n.p) - load3(simd, &n.from);
+                let pulled = load3(simd, &n.p) - load3(simd, &n.from);
                 let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
-                pull = Real::max(pull, Real::select(held, led.dot(led), zero));
+                pull = Real::max(pull, Real::select(held, pulled.dot(pulled), zero));
             }
             let mut edge = zero;
             for e in &b.edges {
@@ -93,14 +93,14 @@ pub(crate) fn choose_near<S: Simd>(
                     }
                 }
             }
-            let (root, mut sunk) = (load3(simd, &b.nodes[0].p), zero);
+            let (root, mut deepest) = (load3(simd, &b.nodes[0].p), zero);
             for o in b.near_obstacles[0].of(obstacles) {
                 if !o.solid.is_clear(root, clearance) {
                     let depth = o.solid.depth(root, clearance).1;
-                    sunk = Real::select(Real::lt(sunk, depth), depth, sunk);
+                    deepest = Real::select(Real::lt(deepest, depth), depth, deepest);
                 }
             }
-            (sunk * f32x16::splat(simd, ESCAPE_RATIO)).store_array(&mut b.sunk);
+            (deepest * f32x16::splat(simd, ESCAPE_RATIO)).store_array(&mut b.escape_length);
         },
     );
 }
@@ -192,7 +192,7 @@ mod tests {
             obstacles in proptest::collection::vec(obstacle(), 1..80),
             nodes in proptest::collection::vec((vector(0.2), vector(3.0)), 2..6),
             ways in proptest::collection::vec(vector(1.0), 8),
-            led in vector(0.05),
+            pull in vector(0.05),
             broken in 0usize..4,
         ) {
             let (dt, clearance, length) = (1.0 / 180.0, 1e-3, 0.01);
@@ -206,7 +206,7 @@ mod tests {
             b.edges.iter_mut().for_each(|e| e.l = [length; LANES]);
             // The root is held; one lane lies elsewhere.
             b.nodes[0].w = [0.0; LANES];
-            b.nodes[0].from = (nodes[0].0 - led).to_array().map(|x| [x; LANES]);
+            b.nodes[0].from = (nodes[0].0 - pull).to_array().map(|x| [x; LANES]);
             b.nodes[1].p[1][7] += 0.1;
             // A strand that is not finite hides no obstacle from others.
             match broken {
@@ -235,7 +235,7 @@ mod tests {
                 for lane in [0, 7] {
                     let at = |c: &[[f32; LANES]; 3]| Vec3::from_array(c.map(|c| c[lane]));
                     let (p, v) = (at(&n.p), at(&n.v));
-                    let reach = v.length() * dt + length + led.length();
+                    let reach = v.length() * dt + length + pull.length();
                     for o in obstacles.iter().filter(|o| near.of(&obstacles).all(|n| !core::ptr::eq(n, *o))) {
                         // Also when the node moves with the obstacle.
                         let starts = [p, o.motion.map_or(p, |m| m.transform_point3(p))];

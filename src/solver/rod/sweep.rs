@@ -10,7 +10,7 @@ use super::{
         BendShares, EdgeWeights, StretchProjection, StretchShares, bend_twist, stretch_shear,
     },
     obstacle::Obstacle,
-    touch::{Grip, touch},
+    touch::{FrictionPass, touch},
 };
 use crate::base::lanes::{LANES, Quaternion, Real, V3, load, load4, store3, store4};
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -114,7 +114,7 @@ fn sweeps<S: Simd, const P: usize>(
                             b.has_fast_nodes,
                             clearance,
                             obstacles,
-                            Grip::Depth,
+                            FrictionPass::Depth,
                             all,
                             None,
                         );
@@ -132,7 +132,7 @@ fn sweeps<S: Simd, const P: usize>(
                                 b.has_fast_nodes,
                                 clearance,
                                 obstacles,
-                                Grip::Depth,
+                                FrictionPass::Depth,
                                 all,
                                 None,
                             );

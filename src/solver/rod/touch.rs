@@ -13,10 +13,10 @@ use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 /// begins.
 pub(super) struct PenetrationLimits<S: Simd> {
     root: V3<f32x16<S>>,
-    sunk: f32x16<S>,
+    escape_length: f32x16<S>,
     length: f32x16<S>,
     trapped: Option<f32x16<S>>,
-    any_sunk: bool,
+    any_inside: bool,
     along: f32x16<S>,
 }
 
@@ -25,17 +25,17 @@ impl<S: Simd> PenetrationLimits<S> {
     pub(super) fn new(simd: S, b: &BlockLanes) -> Self {
         let root = b.nodes.first().map(|n| load3(simd, &n.p));
         let zero = f32x16::splat(simd, 0.0);
-        let any_sunk = b.sunk != [0.0; LANES];
+        let any_inside = b.escape_length != [0.0; LANES];
         let mut length = zero;
-        for edge in b.edges.iter().filter(|_| any_sunk) {
+        for edge in b.edges.iter().filter(|_| any_inside) {
             length += load(simd, &edge.l);
         }
         Self {
             length,
             root: root.unwrap_or(V3::new(zero, zero, zero)),
-            sunk: load(simd, &b.sunk),
+            escape_length: load(simd, &b.escape_length),
             trapped: (b.trapped != [0.0; LANES]).then(|| load(simd, &b.trapped)),
-            any_sunk,
+            any_inside,
             along: zero,
         }
     }
@@ -43,19 +43,19 @@ impl<S: Simd> PenetrationLimits<S> {
     /// Of node `i`, to be asked node after node; `None` where it may be nowhere inside.
     #[inline(always)]
     pub(super) fn at(&mut self, edges: &[EdgeLanes], i: usize) -> Option<AllowedPenetration<S>> {
-        if !self.any_sunk && self.trapped.is_none() {
+        if !self.any_inside && self.trapped.is_none() {
             return None;
         }
-        let simd = self.sunk.simd;
-        let is_sunk = Real::lt(self.along, self.sunk);
+        let simd = self.escape_length.simd;
+        let is_within = Real::lt(self.along, self.escape_length);
         let along = self.along;
         if let Some(edge) = edges.get(i) {
             self.along += load(simd, &edge.l);
         }
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        let deepest = self.sunk * f32x16::splat(simd, 1.0 / ESCAPE_RATIO);
-        let lanes = Real::select(is_sunk, one, zero);
-        let near_root = is_sunk.any_true();
+        let deepest = self.escape_length * f32x16::splat(simd, 1.0 / ESCAPE_RATIO);
+        let lanes = Real::select(is_within, one, zero);
+        let near_root = is_within.any_true();
         let (root, trapped) = (self.root, self.trapped);
         let length = self.length;
         let limit = AllowedPenetration { root, length, near_root, deepest, along, lanes, trapped };
@@ -75,7 +75,7 @@ pub(super) struct AllowedPenetration<S: Simd> {
     root: V3<f32x16<S>>,
     /// The strand's length.
     length: f32x16<S>,
-    /// Whether any lane's node is near a sunk root.
+    /// Whether any lane's node is near a root that lies inside.
     near_root: bool,
     /// The root's depth in what it is deepest in.
     deepest: f32x16<S>,
@@ -182,9 +182,9 @@ pub(crate) fn predict_nodes<S: Simd>(
     );
 }
 
-/// How a contact pass treats motion along the surface.
+/// What friction does in a pass over the contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Grip {
+pub(crate) enum FrictionPass {
     /// No friction.
     None,
     /// Coulomb friction, whose normal force is the depth that the node is pushed out by.
@@ -208,7 +208,7 @@ pub(crate) fn contacts<S: Simd>(
     clearance: f32,
     obstacles: &[Obstacle],
 ) {
-    contacts_with(simd, b, clearance, obstacles, Grip::Depth, f32x16::splat(simd, 1.0));
+    contacts_with(simd, b, clearance, obstacles, FrictionPass::Depth, f32x16::splat(simd, 1.0));
 }
 
 /// [`contacts`] with another friction, in the lanes that are not 0.
@@ -218,7 +218,7 @@ pub(super) fn contacts_with<S: Simd>(
     b: &mut BlockLanes,
     clearance: f32,
     obstacles: &[Obstacle],
-    grip: Grip,
+    pass: FrictionPass,
     lanes: f32x16<S>,
 ) {
     simd.vectorize(
@@ -242,14 +242,14 @@ pub(super) fn contacts_with<S: Simd>(
                     true => *near,
                     false => close.at(load3(simd, &n.p), *near),
                 };
-                let judged = grip == Grip::Judged;
+                let judged = pass == FrictionPass::Judged;
                 let before = if judged { contact_state(simd, n) } else { zero };
                 if near == NearObstacles::NONE {
                     n.release();
                 } else {
                     let fast = b.has_fast_nodes;
                     let touches =
-                        touch(simd, n, near, fast, clearance, obstacles, grip, lanes, limit);
+                        touch(simd, n, near, fast, clearance, obstacles, pass, lanes, limit);
                     touched = Real::max(touched, touches);
                 }
                 if judged {
@@ -284,7 +284,7 @@ pub(super) fn touch<S: Simd>(
     has_fast_nodes: bool,
     clearance: f32,
     obstacles: &[Obstacle],
-    grip: Grip,
+    pass: FrictionPass,
     lanes: f32x16<S>,
     limit: Option<AllowedPenetration<S>>,
 ) -> f32x16<S> {
@@ -298,10 +298,10 @@ pub(super) fn touch<S: Simd>(
             let rested = n.support(simd);
             let is_rested = Real::lt(zero, rested.dot(rested));
             let (mut p, mut rests_on, mut touched) = (load3(simd, &n.p), none, zero);
-            if grip == Grip::Between {
+            if pass == FrictionPass::Between {
                 (rests_on, touched) = (rested, Real::select(is_rested, one, zero));
             }
-            let mut friction = Friction::of(simd, n, grip);
+            let mut friction = Friction::of(simd, n, pass);
             let bearing = rested.dot(friction.reaction);
             let mut deepest = f32x16::splat(simd, -1.0);
             for o in near.of(obstacles) {
@@ -319,9 +319,9 @@ pub(super) fn touch<S: Simd>(
                     rests_on = V3::select(stopped, normal, rests_on);
                     touched = Real::select(stopped, one, touched);
                 }
-                let push = match grip {
-                    Grip::Assumed => rest_on(o, p, from, clearance, allowed),
-                    Grip::Judged | Grip::Solved => {
+                let push = match pass {
+                    FrictionPass::Assumed => rest_on(o, p, from, clearance, allowed),
+                    FrictionPass::Judged | FrictionPass::Solved => {
                         bear_on(o, p, is_rested, bearing, clearance, allowed)
                     }
                     _ => push_out(o, p, clearance, allowed).map(|push| (push, zero)),
@@ -330,7 +330,7 @@ pub(super) fn touch<S: Simd>(
                     let pushed = Real::lt(zero, push.normal.dot(push.normal) * lanes);
                     // Between two solids it rests on the one that bears more.
                     let bears = pushed & Real::lt(deepest, push.depth);
-                    let bears = if grip == Grip::Depth { pushed } else { bears };
+                    let bears = if pass == FrictionPass::Depth { pushed } else { bears };
                     let out = friction.after(&push, o, from, is_rested, pushed, bears, stays);
                     p = V3::select(held, p, out);
                     deepest = Real::select(bears, push.depth, deepest);
@@ -340,7 +340,7 @@ pub(super) fn touch<S: Simd>(
             }
             store3(&mut n.p, p);
             let active = Real::lt(zero, lanes);
-            if grip == Grip::Judged {
+            if pass == FrictionPass::Judged {
                 rests_on = V3::select(active, rests_on, rested);
             }
             store3(&mut n.rests_on, rests_on);
@@ -413,7 +413,7 @@ fn bear_on<S: Simd>(
 
 /// Friction on a node in a pass.
 struct Friction<S: Simd> {
-    kind: Grip,
+    pass: FrictionPass,
     sticks: f32x16<S>,
     drag: f32x16<S>,
     /// Above 0 if it slid in the Newton step before.
@@ -428,15 +428,15 @@ pub(crate) const REVERSING: f32 = 1e-7;
 
 impl<S: Simd> Friction<S> {
     #[inline(always)]
-    fn of(simd: S, n: &NodeLanes, kind: Grip) -> Self {
+    fn of(simd: S, n: &NodeLanes, pass: FrictionPass) -> Self {
         // What sticks has no drag.
         let slid = load(simd, &n.drag);
-        let (sticks, drag) = match kind {
-            Grip::Solved | Grip::Between => (load(simd, &n.sticks), slid),
+        let (sticks, drag) = match pass {
+            FrictionPass::Solved | FrictionPass::Between => (load(simd, &n.sticks), slid),
             _ => (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0)),
         };
         let (anchor, reaction) = (load3(simd, &n.anchor), load3(simd, &n.reaction));
-        Self { kind, sticks, drag, anchor, reaction, slid }
+        Self { pass, sticks, drag, anchor, reaction, slid }
     }
 
     /// Where a node gets to that is pushed out of `o`. `rested`: before this pass; `bears`: more than others so far;
@@ -452,20 +452,20 @@ impl<S: Simd> Friction<S> {
         bears: mask32x16<S>,
         stays: f32x16<S>,
     ) -> V3<f32x16<S>> {
-        if self.kind == Grip::None {
+        if self.pass == FrictionPass::None {
             return push.to;
         }
         let lit = |value: f32| f32x16::splat(from.x.simd, value);
         let (zero, one) = (lit(0.0), lit(1.0));
         let start = o.moved_with(from);
-        if self.kind == Grip::Assumed {
+        if self.pass == FrictionPass::Assumed {
             self.sticks = Real::select(bears, stays, self.sticks);
             self.anchor = V3::select(bears, start, self.anchor);
             return push.to;
         }
         let (slip, length) = push.slip(start);
         let most = lit(o.friction) * push.depth;
-        if self.kind == Grip::Judged {
+        if self.pass == FrictionPass::Judged {
             // What would have to pull it back: by what it has been held with, or else by what it has slipped.
             let held = self.reaction - push.normal.scale(self.reaction.dot(push.normal));
             let slid = Real::lt(zero, self.slid);
@@ -483,15 +483,15 @@ impl<S: Simd> Friction<S> {
         }
         // Static where friction suffices, else sliding.
         let held = Real::min(one, most / Real::max(length, lit(1e-12)));
-        let held = match self.kind {
+        let held = match self.pass {
             // Friction has acted in the solve: here what it holds stays, and what slides does not go back.
-            Grip::Solved => {
+            FrictionPass::Solved => {
                 let along = self.reaction - push.normal.scale(self.reaction.dot(push.normal));
                 let reverses = Real::lt(zero, slip.dot(along));
                 let slides = Real::select(reverses, one, zero);
                 Real::max(self.sticks, Real::select(Real::lt(zero, self.drag), slides, held))
             }
-            Grip::Between => Real::select(Real::lt(zero, self.drag), zero, held),
+            FrictionPass::Between => Real::select(Real::lt(zero, self.drag), zero, held),
             _ => held,
         };
         V3::select(pushed, slip.scale_add(-held, push.to), push.to)
@@ -503,7 +503,7 @@ impl<S: Simd> Friction<S> {
         let simd = touched.simd;
         let (mut sticks, mut anchor) = (self.sticks * touched, self.anchor);
         let mut drag = self.drag * touched * (f32x16::splat(simd, 1.0) - sticks);
-        if self.kind == Grip::Judged {
+        if self.pass == FrictionPass::Judged {
             sticks = Real::select(active, sticks, load(simd, &n.sticks));
             drag = Real::select(active, drag, load(simd, &n.drag));
             anchor = V3::select(active, anchor, load3(simd, &n.anchor));

@@ -1,6 +1,6 @@
 //! The paper's projections in a substep of one strand in f64, written for itself.
 
-use super::{FIRMNESS, GRAVITY, Grip, Twin, along, dq, push_out, solve, swept};
+use super::{FIRMNESS, FrictionPass, GRAVITY, Twin, along, dq, push_out, solve, swept};
 use bevy::math::{DQuat, DVec3, DVec4};
 use bevy_keratin::{StretchProjection, gpu::SubstepRecord, keratin::bond::model::cuticle_factor};
 
@@ -22,12 +22,12 @@ fn times(q: DQuat, s: f64) -> DQuat {
 impl Twin {
     pub(super) fn sweep(&mut self, r: &SubstepRecord) {
         let dt = f64::from(r.dt);
-        if let Some(carry) = r.frame_motion {
-            let turn = dq(carry.rotation);
+        if let Some(motion) = r.frame_motion {
+            let turn = dq(motion.rotation);
             self.spins.iter_mut().for_each(|omega| *omega = turn * *omega);
         }
-        let keep = f64::from(r.retained);
-        self.spins.iter_mut().for_each(|omega| *omega *= keep);
+        let retained = f64::from(r.retained);
+        self.spins.iter_mut().for_each(|omega| *omega *= retained);
         self.blow(r);
         let wq = self.weigh_swept(r);
         self.v[0] = DVec3::ZERO;
@@ -44,11 +44,11 @@ impl Twin {
         }
         for _ in 0..r.limiter_steps {
             self.limit_all();
-            self.contacts(r, Grip::Depth);
+            self.contacts(r, FrictionPass::Depth);
             for _ in 0..2 {
                 if self.touched {
                     self.limit_all();
-                    self.contacts(r, Grip::Depth);
+                    self.contacts(r, FrictionPass::Depth);
                 }
             }
         }
@@ -162,9 +162,9 @@ impl Twin {
             self.p[i + 1] -= gamma * (w2 * l);
             let e = pure(DVec3::Z).conjugate();
             self.q[i] = plus(q, times(pure(turning) * q * e, twice * wq[i] * l * l));
-            self.touch(r, i, Grip::Depth);
+            self.touch(r, i, FrictionPass::Depth);
         }
-        self.touch(r, edges, Grip::Depth);
+        self.touch(r, edges, FrictionPass::Depth);
     }
 
     /// One Newton step on all lengths.

@@ -250,22 +250,22 @@ fn what_real_hair_is_like_is_not_odd_and_what_it_is_not_is() {
         let right = turned.strands().zip(&strands).filter(|(s, of)| s.points == &of[..]).count();
         assert_eq!(losses.turned_strands.count, right, "{preset:?}");
         let share = right as f32 / groom.len() as f32;
-        let told = UpAxis::ALL.into_iter().filter(|up| {
+        let noticed = UpAxis::ALL.into_iter().filter(|up| {
             let odd = groom.clone().with_up(*up).odd_up(UpAxis::Y);
             odd.is_some_and(|odd| odd.to_y_up(up.to_y_up(Vec3::Y)).y > 0.99)
         });
-        let told = told.count();
+        let noticed = noticed.count();
         use HairPreset::*;
         if matches!(preset, Curly | Coily | Short | Bob | Long | Fringe | Undercut | Locs) {
             assert!(share > 0.99, "{preset:?}: {share} turned");
         }
         // Where they cover a scalp.
-        assert!(told >= 3 || matches!(preset, Beard | Fur), "{preset:?}: {told} of 5 axes");
+        assert!(noticed >= 3 || matches!(preset, Beard | Fur), "{preset:?}: {noticed} of 5 axes");
     }
 }
 
 #[test]
-fn millimetres_with_x_up_are_told() {
+fn millimetres_with_x_up_are_noticed() {
     for strands in [head(HEAD, 0.12), head(Vec3::ZERO, 0.3)] {
         let (groom, _) = read(&file(&strands, 0.001, UpAxis::X));
         let odd = groom.odd_size(UNIT).expect("2.54 times too large");
@@ -291,7 +291,7 @@ fn millimetres_with_x_up_are_told() {
 }
 
 #[test]
-fn a_mane_in_centimetres_is_told_by_size_and_length_together() {
+fn a_mane_in_centimetres_is_noticed_by_size_and_length_together() {
     // Down the back of a figure, 0.9 m, of strands of 8 cm: as metres it is fine.
     let strand = |i: usize| {
         let at = i as f32 / 300.0;
@@ -307,7 +307,7 @@ fn a_mane_in_centimetres_is_told_by_size_and_length_together() {
 }
 
 #[test]
-fn files_that_are_no_grooms_are_told_for_what_they_are() {
+fn files_that_are_no_grooms_are_reported_for_what_they_are() {
     let dump: Vec<u8> = (0..300).flat_map(|i| (i as f32 * 0.01).sin().to_le_bytes()).collect();
     for (file, says) in [
         (

@@ -162,7 +162,7 @@ fn errors_say_where_and_what() {
 }
 
 #[test]
-fn bytes_after_the_end_are_told() {
+fn bytes_after_the_end_are_reported() {
     let good = hair(&[2, 1, 3], 31);
     let (expected, _) = yuksel::read(&good).unwrap();
     let long = [&good[..], b"\r\n"].concat();

@@ -104,8 +104,11 @@ fn a_budget_makes_the_least_important_hair_coarser_without_flicker() {
     app.insert_resource(HairBudget { milliseconds: 0.0, ..default() });
     (0..3).for_each(|_| app.update());
     assert_eq!(levels(&app), [3; 6], "nothing at all is frozen, and goes on");
-    let told = faults(&mut app);
-    assert!(told.len() == 1 && told[0].to_string().contains("the budget of 0 ms"), "{told:?}");
+    let reported = faults(&mut app);
+    assert!(
+        reported.len() == 1 && reported[0].to_string().contains("the budget of 0 ms"),
+        "{reported:?}"
+    );
 }
 
 #[test]

@@ -26,24 +26,24 @@ fn hair_that_is_shaken_hard_keeps_its_length() {
 }
 
 /// A head that turns about the vertical: its hair in the head's frame, and the same hair in the
-/// world's, whose first edge is led round.
+/// world's, whose first edge is turned by its targets.
 #[derive(Resource)]
 struct Turning {
     /// Angle at the tick's beginning and end (rad).
     from: f32,
     to: f32,
     head: Entity,
-    led: Vec<(Entity, Vec<Vec3>)>,
+    turned: Vec<(Entity, Vec<Vec3>)>,
 }
 
 fn turn_head(turning: Res<Turning>, mut heads: Query<&mut Transform>) {
     heads.get_mut(turning.head).unwrap().rotation = Quat::from_rotation_y(turning.to);
 }
 
-fn lead(step: Res<HairStep>, turning: Res<Turning>, mut strands: Query<&mut HeldNodes>) {
+fn turn_held(step: Res<HairStep>, turning: Res<Turning>, mut strands: Query<&mut HeldNodes>) {
     let share = (step.index + 1) as f32 / step.count as f32;
     let turn = Quat::from_rotation_y(turning.from + (turning.to - turning.from) * share);
-    for (strand, first) in &turning.led {
+    for (strand, first) in &turning.turned {
         let targets = first.iter().map(|p| Some(turn * *p)).collect();
         strands.get_mut(*strand).unwrap().targets = targets;
     }
@@ -58,12 +58,12 @@ fn on_a_turning_head_hair_moves_as_in_the_worlds_frame() {
 }
 
 fn turn_by(substep: &str, mut lab: Lab, most: f32) {
-    // A root that is led does not turn about itself, as one on the head does; internal friction feels it.
+    // A root with a target does not turn about itself, as one on the head does; internal friction feels it.
     lab.undamped();
     let stiffness = HairStiffness { bending_length: 0.13, damping: 0.0, ..default() };
     let head = lab.app.world_mut().spawn((Hair, stiffness)).id();
     let mut pairs = Vec::new();
-    let mut led = Vec::new();
+    let mut turned = Vec::new();
     for n in SEGMENTS {
         for (root, direction) in [
             (Vec3::X * 0.09, Vec3::X),
@@ -80,14 +80,14 @@ fn turn_by(substep: &str, mut lab: Lab, most: f32) {
                 HeldNodes { targets: first.iter().copied().map(Some).collect(), ..default() };
             let on_head = lab.app.world_mut().spawn((StrandOf(head), strand, held.clone())).id();
             lab.app.world_mut().entity_mut(world).insert(held);
-            led.push((world, first));
+            turned.push((world, first));
             pairs.push((n, direction, on_head, world));
         }
     }
     lab.app
-        .insert_resource(Turning { from: 0.0, to: 0.0, head, led })
+        .insert_resource(Turning { from: 0.0, to: 0.0, head, turned })
         .add_systems(FixedUpdate, turn_head)
-        .add_systems(HairTick, lead.in_set(HairSystems::First));
+        .add_systems(HairTick, turn_held.in_set(HairSystems::First));
     lab.drag(2.0);
     lab.run(2.0);
     // Two revolutions a second for a second, then stopped.

@@ -25,7 +25,7 @@ fn worst(lab: &Lab, strands: &[Entity], depth: impl Fn(Vec3) -> f32) -> (f32, f3
 
 /// Moves a collider, which may put edges off their lengths by no more than `most` (m) in any substep, as
 /// `path` says for `seconds`, then leaves it there for three more.
-fn lead(
+fn move_collider(
     (name, most): (&str, f64),
     collider: HairCollider,
     seconds: f32,
@@ -65,7 +65,7 @@ fn lead(
 #[test]
 fn a_comb_goes_through_hair() {
     let radius = 0.005;
-    lead(
+    move_collider(
         ("comb", 2e-4),
         HairCollider::capsule(radius, 0.3).unwrap(),
         1.0,
@@ -79,7 +79,7 @@ fn a_comb_goes_through_hair() {
 
 #[test]
 fn hair_falls_end_on_onto_a_floor_that_rises() {
-    lead(
+    move_collider(
         // Straight hair that is met end-on is pressed for a substep or two until it gives way sideways: its
         // last edge is shorter by what the floor has come meanwhile, however long that edge is.
         ("floor", 2.2e-3),
@@ -92,7 +92,7 @@ fn hair_falls_end_on_onto_a_floor_that_rises() {
 
 #[test]
 fn a_ball_swings_into_hair() {
-    lead(
+    move_collider(
         ("ball", 2e-4),
         HairCollider::sphere(0.06).unwrap(),
         1.0,
@@ -107,7 +107,7 @@ fn hair_is_wound_under_tension_and_gives_way_when_its_rod_is_taken_too_far() {
         lab.drag(2.0);
         let strands = SEGMENTS.map(|n| lab.straight(0.13, LENGTH, n, Vec3::NEG_Y));
         // Out of reach of the quarter of the hair that is not to be wound: the coil closes as near to the
-        // rod as the hair comes, beside it and partly in it. How deep is told, not bound; coils in reach
+        // rod as the hair comes, beside it and partly in it. How deep is printed, not bound; coils in reach
         // are never in their rods (unit tests of `winding`).
         let rod = lab.app.world_mut();
         let rod = rod.spawn((

@@ -1,7 +1,7 @@
 //! Twist: a strand whose tip is turned by a crank.
 //!
 //! Beyond the clamped tip the strand goes on as an arm across, at rest with that corner. Its nodes
-//! are held and led round the axis, so the corner turns the strand, as a handle does.
+//! are held and moved round the axis, so the corner turns the strand, as a handle does.
 
 use super::{TORSION, lab::*, theory::*};
 use bevy::prelude::*;
@@ -73,7 +73,7 @@ impl Cranked {
         self.lab.app.world_mut().resource_mut::<Crank>().rate = rate;
     }
 
-    fn lead_tip(&mut self, to: f32) {
+    fn move_tip(&mut self, to: f32) {
         self.lab.app.world_mut().resource_mut::<Crank>().tip = Some(to);
     }
 
@@ -119,12 +119,12 @@ fn keep_twist(substep: &str, lab: Lab) {
         assert!((twist / mean - 1.0).abs() < 0.01, "joint {j} is twisted by {twist}, mean {mean}");
     }
     // Let loose, whirled about and drawn out again, it is twisted as before: nothing of it leaks away.
-    cranked.lead_tip(0.95 * SPAN);
+    cranked.move_tip(0.95 * SPAN);
     cranked.lab.gravity(Vec3::new(0.0, -30.0, 10.0));
     cranked.lab.run(1.0);
     assert!(cranked.bow() > 0.1, "{}", cranked.bow());
     cranked.lab.gravity(Vec3::ZERO);
-    cranked.lead_tip(SPAN);
+    cranked.move_tip(SPAN);
     cranked.lab.settle(4.0);
     assert!(cranked.bow() < 0.01, "{}", cranked.bow());
     let left = cranked.twists().iter().sum::<f64>();

@@ -20,7 +20,7 @@ pub struct Param<'a, const N: usize> {
     scope: Scope,
 }
 
-/// What has an element of its own. Told by how many there are: Blender does not write it.
+/// What has an element of its own. Recognised by their number: Blender does not write it.
 #[derive(Clone, Copy)]
 enum Scope {
     Set,
@@ -47,13 +47,13 @@ impl<'a, const N: usize> Param<'a, N> {
         property: Property<'a>,
         counts: Counts,
     ) -> Result<Option<Self>, String> {
-        let told = |error: GroomFileError| error.to_string();
+        let text = |error: GroomFileError| error.to_string();
         let (values, indices) = match property.is_compound() {
-            false => (archive.values(property).map_err(told)?, None),
+            false => (archive.values(property).map_err(text)?, None),
             true => {
-                let inside = archive.inside(property).map_err(told)?;
-                let values = archive.find_values(inside, ".vals").map_err(told)?;
-                (values, archive.find_values(inside, ".indices").map_err(told)?)
+                let inside = archive.inside(property).map_err(text)?;
+                let values = archive.find_values(inside, ".vals").map_err(text)?;
+                (values, archive.find_values(inside, ".indices").map_err(text)?)
             }
         };
         let Some(values) = values else {

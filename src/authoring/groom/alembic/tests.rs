@@ -227,7 +227,7 @@ fn several_sets_are_joined_and_others_counted() {
 }
 
 #[test]
-fn optional_numbers_are_told_by_their_count() {
+fn optional_numbers_are_recognised_by_their_count() {
     let widths = |values: Vec<f32>, indices: Option<&[i32]>| {
         one(4, [0, 0, 1], |archive| {
             let values = floats(values);

@@ -82,8 +82,8 @@ struct FillIn<R> {
 #[inline(always)]
 fn place<W: Width>(w: W, node: &NodeLanes<W::Cell>, stage: &NewtonStage<W::Real>) -> V3<W::Real> {
     let (p, from) = (w.get3(&node.p), w.get3(&node.from));
-    let led = (p - from).scale_add(stage.theta, from);
-    V3::select(is_held(w, node), led, p)
+    let between = (p - from).scale_add(stage.theta, from);
+    V3::select(is_held(w, node), between, p)
 }
 
 /// `wanted` where `value`, the difference of places as large as `x`, is it but for their rounding.

@@ -110,7 +110,7 @@ use super::{
     near::choose_near,
     obstacle::Obstacle,
     stiffness::REFERENCE_GRAVITY,
-    touch::{Grip, PenetrationLimits, contacts_with, predict_nodes},
+    touch::{FrictionPass, PenetrationLimits, contacts_with, predict_nodes},
 };
 use crate::base::lanes::{
     LANES, Quaternion, Real, V3, dispatch, load, load3, load4, store3, store4,
@@ -226,7 +226,7 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
         // Each step shows which nodes rest on an obstacle, and which of them stick.
         for step in 1..MOST_STEPS {
             let again = load(simd, &b.again);
-            contacts_with(simd, b, params.clearance, obstacles, Grip::Judged, again);
+            contacts_with(simd, b, params.clearance, obstacles, FrictionPass::Judged, again);
             let again = again * load(simd, &b.changed);
             let again = if step == 1 { Real::max(again, turns_fast) } else { again };
             again.store_array(&mut b.again);
@@ -237,12 +237,12 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
         }
     }
     let all = f32x16::splat(simd, 1.0);
-    contacts_with(simd, b, params.clearance, obstacles, Grip::Solved, all);
+    contacts_with(simd, b, params.clearance, obstacles, FrictionPass::Solved, all);
     for pass in 0..params.limiter_steps {
         if !limit_strained(simd, b, if pass == 0 { -1.0 } else { TOLERANCE }, all) {
             break;
         }
-        contacts_with(simd, b, params.clearance, obstacles, Grip::Between, all);
+        contacts_with(simd, b, params.clearance, obstacles, FrictionPass::Between, all);
         if pass + 1 == params.limiter_steps {
             // Restored lengths may end in an obstacle, and the push-out may tear them again. Lengths have the
             // last word: what is then inside begins the next substep there, see `leave_obstacles`.
@@ -252,7 +252,7 @@ fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &DirectParams, obstac
                 if !clamp_lengths(simd, b, torn, all) || is_last {
                     break;
                 }
-                contacts_with(simd, b, params.clearance, obstacles, Grip::Between, all);
+                contacts_with(simd, b, params.clearance, obstacles, FrictionPass::Between, all);
             }
         }
     }
@@ -444,7 +444,7 @@ fn leave_obstacles<S: Simd>(
             }
             // A correction travels about one edge per round.
             for _ in 0..LEAVING.min(2 * b.edges.len()) {
-                contacts_with(simd, b, params.clearance, obstacles, Grip::None, deep);
+                contacts_with(simd, b, params.clearance, obstacles, FrictionPass::None, deep);
                 if !limit_strained(simd, b, TORN, deep) {
                     return;
                 }
@@ -517,7 +517,7 @@ fn advance<S: Simd>(
         || {
             let (all, dt) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, params.dt));
             predict_nodes(simd, b, dt * theta, Some(dt), params.clearance, obstacles);
-            contacts_with(simd, b, params.clearance, obstacles, Grip::Assumed, all);
+            contacts_with(simd, b, params.clearance, obstacles, FrictionPass::Assumed, all);
         },
     );
 }

@@ -74,7 +74,7 @@ fn bits(block: &BlockLanes, lane: usize) -> Vec<[u32; 3]> {
 }
 
 #[test]
-fn forces_are_told_from_impulses_and_from_what_is_too_fast() {
+fn forces_are_distinguished_from_impulses_and_from_what_is_too_fast() {
     let mut block = strands(2, |_, i| Vec3::X * (0.01 * i as f32));
     let most = MAX_PUSH * DT;
     let before = Vec3::new(0.3, -0.2, 0.1);

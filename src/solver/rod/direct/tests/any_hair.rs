@@ -104,7 +104,7 @@ impl Shape {
         for node in [0, held] {
             let node = &mut block.nodes[node];
             (node.w, node.from) = ([0.0; LANES], node.p);
-            // Led along: held nodes have the velocity that takes them there.
+            // Held nodes that move have the velocity that takes them there.
             for axis in 0..3 {
                 for lane in 0..LANES {
                     node.p[axis][lane] += self.dt * node.v[axis][lane];

@@ -38,7 +38,7 @@ fn frames_turn_with_their_edges_by_the_shortest_way() {
 
 /// Roots lie under the skin, inside of colliders.
 #[test]
-fn held_nodes_within_an_obstacle_end_where_they_are_led() {
+fn held_nodes_within_an_obstacle_end_at_their_targets() {
     let floor = Solid::HalfSpace { normal: Vec3::Y, point: Vec3::Y * 0.002 };
     let floor = [Obstacle { solid: floor, motion: None, friction: 0.4 }];
     for way in [Vec3::ZERO, Vec3::new(2e-4, -1e-4, 1e-4)] {
@@ -49,8 +49,8 @@ fn held_nodes_within_an_obstacle_end_where_they_are_led() {
         let mut block = strands(12, upright);
         for _ in 0..10 {
             let from = block.nodes[0].p;
-            let led = block.nodes[0].p.map(|c| c[3]);
-            let led = Vec3::from(led) + way;
+            let target = block.nodes[0].p.map(|c| c[3]);
+            let target = Vec3::from(target) + way;
             for lane in 0..LANES {
                 let to = take3(&from, lane) + way;
                 put3(&mut block.nodes[0].p, lane, to);
@@ -58,7 +58,7 @@ fn held_nodes_within_an_obstacle_end_where_they_are_led() {
             prepare(&mut block, 0.13);
             block.nodes[0].from = from;
             step(Level::new(), &mut block, &params(), &floor);
-            assert_eq!(take3(&block.nodes[0].p, 3), led, "led by {way}");
+            assert_eq!(take3(&block.nodes[0].p, 3), target, "moved by {way}");
         }
     }
 }

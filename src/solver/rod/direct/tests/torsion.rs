@@ -147,8 +147,8 @@ fn curls_come_to_rest_at_any_ratio() {
             let params = DirectParams { torsion, dt: 1.0 / 180.0, damping: 0.01, ..params() };
             for k in 0..2400 {
                 prepare_for(&mut block, length / f32::cbrt(gamma), &params);
-                let keep = if k < 1800 { 0.96 } else { 0.99 };
-                block.nodes.iter_mut().for_each(|n| n.v = n.v.map(|v| v.map(|v| keep * v)));
+                let retained = if k < 1800 { 0.96 } else { 0.99 };
+                block.nodes.iter_mut().for_each(|n| n.v = n.v.map(|v| v.map(|v| retained * v)));
                 step(Level::new(), &mut block, &params, &[]);
             }
             for lane in 0..LANES {

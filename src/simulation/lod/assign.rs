@@ -1,4 +1,4 @@
-//! GuideOffsets of followers to the guides that they follow.
+//! Which guides each follower follows.
 
 use super::{
     follow::{GUIDES, GuideOffsets, StrandState},
@@ -23,14 +23,14 @@ const SINGLE_GUIDE_SHARE: f32 = 0.125;
 /// Distance from a guide below which its weight hardly grows (m).
 const ALIKE: f32 = 1e-3;
 
-/// GuideOffsets followers without guides to guides that are near and similar.
-pub(super) fn tie(
+/// Assigns followers without guides those that are near and similar.
+pub(super) fn assign_guides(
     members: &mut [GroupStrand<'_>],
     strands: &[Ref<'_, Strand>],
     guides: &mut Guides,
 ) {
     let is_loose = |m: &GroupStrand<'_>| {
-        m.free && m.follower.guide.is_none() && m.follower.ties.guides.is_empty()
+        m.free && m.follower.guide.is_none() && m.follower.offsets.guides.is_empty()
     };
     if !members.iter().any(is_loose) {
         return;
@@ -88,7 +88,7 @@ pub(super) fn tie(
         let weight = |apart: f32| 1.0 / (apart + ALIKE * ALIKE);
         let sum: f32 = found.iter().map(|f| weight(f.0)).sum();
         let guides = found.into_iter().map(|(apart, i, guide)| (i, weight(apart) / sum, guide));
-        follower.ties = GuideOffsets::new(state_of(strand), guides);
+        follower.offsets = GuideOffsets::new(state_of(strand), guides);
         follower.root = own[0];
     });
 }

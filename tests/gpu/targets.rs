@@ -81,7 +81,7 @@ pub fn roots_on_a_mesh_go_with_it_there(stage: &mut Stage) {
     stage.app.world_mut().despawn(mesh);
 }
 
-pub fn held_nodes_are_led_there_and_let_go(stage: &mut Stage) {
+pub fn held_nodes_move_there_and_are_released(stage: &mut Stage) {
     let mut both = [SimulateOn::Cpu, SimulateOn::Gpu].map(|on| {
         grow(stage, on, curls(40, 7));
         stage.run(3);
@@ -106,7 +106,7 @@ pub fn held_nodes_are_led_there_and_let_go(stage: &mut Stage) {
             }
             stage.run(1);
         }
-        let led = stage.strands();
+        let there = stage.strands();
         // Half of them are let go, some by an empty list.
         for (i, strand) in held.iter().enumerate() {
             let mut strand = stage.app.world_mut().entity_mut(*strand);
@@ -118,7 +118,7 @@ pub fn held_nodes_are_led_there_and_let_go(stage: &mut Stage) {
         }
         stage.run(12);
         assert_eq!(stage.is_on_gpu(), on == SimulateOn::Gpu, "{:?}", stage.residence());
-        (started, led, stage.strands())
+        (started, there, stage.strands())
     });
     let [cpu, gpu] = &mut both;
     let of = |strands: &[Strand]| {
@@ -128,7 +128,7 @@ pub fn held_nodes_are_led_there_and_let_go(stage: &mut Stage) {
         of(a).iter().zip(of(b)).map(|(a, b)| a.distance(b)).fold(0.0, f32::max)
     };
     println!(
-        "led by {}; off by {}, and {}",
+        "moved by {}; off by {}, and {}",
         far(&cpu.0, &cpu.1),
         apart(&gpu.1, &cpu.1),
         apart(&gpu.2, &cpu.2)
