@@ -98,43 +98,43 @@ impl DrawnNodes<'_> {
         let (mut low, mut high) = (last, last);
         let mut rest = 0.0_f32;
         let mut strain_below = None;
-        for (i, node) in out.iter_mut().enumerate().take(strand.nodes()) {
-            let p = place(i);
-            if usable(p) {
-                last = p;
+        let count = out.len().min(strand.nodes());
+        for (block, nodes) in out[..count].chunks_mut(HALVES).enumerate() {
+            let mut numbers = [[0.0; 6]; HALVES];
+            for (k, (node, numbers)) in nodes.iter_mut().zip(&mut numbers).enumerate() {
+                let i = HALVES * block + k;
+                let p = place(i);
+                if usable(p) {
+                    last = p;
+                }
+                (low, high) = (low.min(last), high.max(last));
+                // User code may have shortened a list of the strand since the last tick.
+                let ends = strand.positions().get(i).zip(strand.positions().get(i + 1));
+                let length = strand.rest_lengths().get(i).copied();
+                let strain_above =
+                    length.zip(ends).map(|(length, (a, b))| (a.distance(*b) / length - 1.0).abs());
+                let strain = match (strain_below, strain_above) {
+                    (Some(a), Some(b)) => 0.5 * (a + b),
+                    (a, b) => a.or(b).unwrap_or(0.0),
+                };
+                strain_below = strain_above;
+                // The tip has no joint: it shows the last one's. Before the first tick all bonds are closed.
+                let joint = bonds.joints.get(i).or(bonds.joints.last());
+                let rates = joint.map_or([1.0; 4], |j| j.rates);
+                let moisture = wet.get(i).copied().unwrap_or(0.0).clamp(0.0, 1.0);
+                let motion = match known && first.is_some() {
+                    true => (last - packed_place(node)) * MOTION_UNITS,
+                    false => Vec3::ZERO,
+                };
+                let from_root = if rest.is_finite() { rest.to_bits() } else { 0 };
+                let [x, y, z] = [last.x.to_bits(), last.y.to_bits(), last.z.to_bits()];
+                *node = [x, y, z, unorm8(rates), 0, from_root, 0, 0];
+                *numbers = [strain, moisture, motion.x, motion.y, motion.z, shown];
+                rest += length.unwrap_or(0.0);
             }
-            (low, high) = (low.min(last), high.max(last));
-            // User code may have shortened a list of the strand since the last tick.
-            let ends = strand.positions().get(i).zip(strand.positions().get(i + 1));
-            let strain_above = (strand.rest_lengths().get(i).zip(ends))
-                .map(|(length, (a, b))| (a.distance(*b) / length - 1.0).abs());
-            let strain = match (strain_below, strain_above) {
-                (Some(a), Some(b)) => 0.5 * (a + b),
-                (a, b) => a.or(b).unwrap_or(0.0),
-            };
-            strain_below = strain_above;
-            // The tip has no joint: it shows the last one's. Before the first tick all bonds are closed.
-            let joint = bonds.joints.get(i).or(bonds.joints.last());
-            let rates = joint.map_or([1.0; 4], |j| j.rates);
-            let moisture = wet.get(i).copied().unwrap_or(0.0);
-            let motion = match known && first.is_some() {
-                true => (last - packed_place(node)) * MOTION_UNITS,
-                false => Vec3::ZERO,
-            };
-            let [x, y, z] = last.to_array().map(f32::to_bits);
-            let halves =
-                halves([strain, moisture.clamp(0.0, 1.0), motion.x, motion.y, motion.z, shown]);
-            *node = [
-                x,
-                y,
-                z,
-                unorm8(rates),
-                halves[0],
-                if rest.is_finite() { rest.to_bits() } else { 0 },
-                halves[1],
-                halves[2],
-            ];
-            rest += strand.rest_lengths().get(i).copied().unwrap_or(0.0);
+            for (node, halves) in nodes.iter_mut().zip(&halves(&numbers)) {
+                [node[4], node[6], node[7]] = *halves;
+            }
         }
         first.map(|_| (low, high))
     }
@@ -149,25 +149,33 @@ pub(super) fn packed_place(node: &PackedNode) -> Vec3 {
     Vec3::new(f32::from_bits(node[0]), f32::from_bits(node[1]), f32::from_bits(node[2]))
 }
 
+/// How many nodes' numbers become f16s in one call, which costs as much as some of them.
+const HALVES: usize = 8;
+
 /// The nearest f16s, two in a word. NaN becomes 0; too large values become the largest.
 #[inline(always)]
-fn halves(x: [f32; 6]) -> [u32; 3] {
+fn halves(numbers: &[[f32; 6]; HALVES]) -> [[u32; 3]; HALVES] {
     let most = f16::MAX.to_f32_const();
-    // Eight at a time, for which some targets have an instruction.
-    let mut all = [0.0; 8];
-    for (to, x) in all.iter_mut().zip(x) {
+    let (mut all, mut halves) = ([[0.0; 6]; HALVES], [[f16::ZERO; 6]; HALVES]);
+    // Closures passed to `map` are not always inlined.
+    for (to, x) in all.as_flattened_mut().iter_mut().zip(numbers.as_flattened()) {
         *to = if x.is_nan() { 0.0 } else { x.clamp(-most, most) };
     }
-    let mut halves = [f16::ZERO; 8];
-    halves.convert_from_f32_slice(&all);
-    let bits = |i: usize| u32::from(halves[i].to_bits());
-    [0, 2, 4].map(|i| bits(i) | bits(i + 1) << 16)
+    halves.as_flattened_mut().convert_from_f32_slice(all.as_flattened());
+    let mut words = [[0; 3]; HALVES];
+    for (word, [low, high]) in
+        words.as_flattened_mut().iter_mut().zip(halves.as_flattened().as_chunks().0)
+    {
+        *word = u32::from(low.to_bits()) | u32::from(high.to_bits()) << 16;
+    }
+    words
 }
 
 #[inline(always)]
 fn unorm8(rates: [f32; 4]) -> u32 {
     // `as` saturates and takes NaN as 0.
-    u32::from_le_bytes(rates.map(|r| (r * 255.0 + 0.5) as u8))
+    let byte = |rate: f32| u32::from((rate * 255.0 + 0.5) as u8);
+    byte(rates[0]) | byte(rates[1]) << 8 | byte(rates[2]) << 16 | byte(rates[3]) << 24
 }
 
 /// The static buffers' contents.
@@ -229,10 +237,13 @@ mod tests {
 
     #[test]
     fn halves_are_the_nearest_and_always_finite() {
-        let halves = halves([1.0, -2.0, 65504.0, 1e9, f32::NAN, 0.1]);
-        assert_eq!(halves, [0xc000_3c00, 0x7bff_7bff, 0x2e66_0000]);
-        let odd = super::halves([f32::INFINITY, f32::MIN, 1e-9, 1e-7, 0.0, f32::MAX]);
-        assert_eq!(odd, [0xfbff_7bff, 0x0002_0000, 0x7bff_0000]);
+        let mut numbers = [[0.0; 6]; HALVES];
+        numbers[0] = [1.0, -2.0, 65504.0, 1e9, f32::NAN, 0.1];
+        numbers[HALVES - 1] = [f32::INFINITY, f32::MIN, 1e-9, 1e-7, 0.0, f32::MAX];
+        let halves = halves(&numbers);
+        assert_eq!(halves[0], [0xc000_3c00, 0x7bff_7bff, 0x2e66_0000]);
+        assert_eq!(halves[1..HALVES - 1], [[0; 3]; HALVES - 2]);
+        assert_eq!(halves[HALVES - 1], [0xfbff_7bff, 0x0002_0000, 0x7bff_0000]);
     }
 
     #[test]

@@ -34,6 +34,7 @@ use crate::{
 use bevy::{
     asset::RenderAssetUsages,
     camera::{primitives::Aabb, visibility::NoAutoAabb},
+    ecs::system::NonSendMarker,
     prelude::*,
     render::{renderer::RenderDevice, storage::ShaderBuffer},
 };
@@ -148,7 +149,8 @@ pub(super) fn pack(
     mut materials: ResMut<Assets<RibbonMaterial>>,
     mut shader_buffers: ResMut<Assets<ShaderBuffer>>,
     mut faults: MessageWriter<HairFault>,
-    mut free: Local<Vec<GuideBlock<'static>>>,
+    // The main thread joins in its parts; it waits for a system that a thread of the pool runs.
+    (mut free, _main): (Local<Vec<GuideBlock<'static>>>, NonSendMarker),
 ) {
     let overstep = match time {
         Some(time) if interpolate.0 => time.overstep_fraction().clamp(0.0, 1.0),

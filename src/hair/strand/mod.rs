@@ -188,6 +188,7 @@ impl StrandHistory {
 
     /// Position at which a node is drawn, in the hair's frame: interpolated between the previous
     /// tick and the present by the overstep of the fixed clock (0…1).
+    #[inline]
     pub fn drawn(&self, strand: &Strand, node: usize, overstep: f32) -> Vec3 {
         let place = self.between(strand, node, overstep);
         match self.root {
