@@ -13,7 +13,7 @@ pub fn probes_tell_where_strands_are(stage: &mut Stage) {
         .app
         .world_mut()
         .add_observer(|probed: On<HairProbed>, mut probes: ResMut<Probes>| {
-            probes.0.push(probed.clone())
+            probes.0.push(probed.clone());
         })
         .id();
     // More than are asked about at once; half of them do not matter to anybody.

@@ -475,7 +475,7 @@ mod tests {
         assert_eq!((groom.len(), groom.colors[5]), (2, LinearRgba::RED));
         assert_eq!(lengths(ascii("", none, "", "").replace('\n', "\r\n").as_bytes()), [3, 3]);
         let widths = ascii("property float radius\n", |_| "0.25".to_owned(), "", "");
-        assert_eq!(read(widths.as_bytes()).unwrap().0.widths, [0.5; 6]);
+        assert_eq!(read(widths.as_bytes()).unwrap().0.widths[..], [0.5; 6]);
         let faces = "element face 1\nproperty list uchar int vertex_indices\n";
         assert_eq!(
             read(ascii("", none, faces, "3 0 1 2\n").as_bytes())

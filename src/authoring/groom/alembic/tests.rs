@@ -244,7 +244,7 @@ fn optional_numbers_are_recognised_by_their_count() {
             (vec![other], vec![width])
         })
     };
-    let read_widths = |file: &[u8]| read(file).unwrap().0.widths;
+    let read_widths = |file: &[u8]| read(file).unwrap().0.widths.to_vec();
     assert_eq!(read_widths(&widths(vec![0.5], None)), [0.5; 8]);
     assert_eq!(read_widths(&widths(vec![1.0, 2.0], None)), [1., 1., 1., 1., 2., 2., 2., 2.]);
     let each: Vec<f32> = (0..8).map(|i| i as f32).collect();
