@@ -101,7 +101,7 @@ fn app(arguments: &Arguments, offscreen: bool) -> App {
         .insert_resource(ClearColor(Color::srgb(0.44, 0.46, 0.48)))
         .init_resource::<Outcome>()
         .add_observer(|worn: On<HairWorn>, mut outcome: ResMut<Outcome>| {
-            outcome.0 = Some(Ok(worn.hair))
+            outcome.0 = Some(Ok(worn.hair));
         })
         .add_observer(|not: On<HairNotWorn>, mut outcome: ResMut<Outcome>| {
             outcome.0 = Some(Err(not.error.to_string()));
