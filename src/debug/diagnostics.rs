@@ -179,7 +179,7 @@ mod tests {
         {
             let mut app = App::new();
             app.add_plugins((MinimalPlugins, HairDiagnosticsPlugin));
-            grow(&mut app, crate::OnGpu::HANDED_OVER, 4);
+            grow(&mut app, (crate::OnGpu::HANDED_OVER, MotionOwner::Gpu), 4);
             app.update();
             expected = [0.0; 6];
             expected[Owner::Gpu as usize] = 4.0;

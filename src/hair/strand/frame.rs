@@ -507,12 +507,6 @@ impl TickPose {
         self.motion().spin[0]
     }
 
-    /// The velocity of a point of the world that moves along with it (m/s).
-    pub fn velocity_at(&self, place: Vec3) -> Vec3 {
-        let PoseMotion { velocity, spin } = self.motion();
-        velocity[0] + spin[0].cross(place - self.now.translation)
-    }
-
     /// How air or water moves here that another pose carries, by the shares of motion that act on
     /// hair.
     pub(crate) fn carried_by(&self, other: &Self) -> Carried {

@@ -295,16 +295,6 @@ impl Strand {
         })
     }
 
-    /// The same strand, leaving the scalp along `direction` instead of along its first edge: the
-    /// root joint is then bent at rest.
-    pub fn leaving_along(mut self, direction: Dir3) -> Self {
-        if let Some(&first) = self.orientations.first() {
-            let turn = Quat::from_rotation_arc(first * Vec3::Z, *direction);
-            self.root_frame = (turn * first).normalize();
-        }
-        self
-    }
-
     /// How many nodes there are, root and tip included.
     pub fn nodes(&self) -> usize {
         self.positions.len()
