@@ -15,13 +15,13 @@ use crate::{
         setting::{Ranged, Settings, Violations, report},
     },
     forces::{
-        contact::{Ball, Colliders, HairCollider, TickColliders, seen_from},
+        contact::{Ball, Colliders, HairCollider, HairReach, TickColliders, seen_from},
         environment::{
             Gravity, Winds,
             vapour::{DryingAir, WATER, transfer},
         },
     },
-    hair::strand::{Hair, PerHair, Pose, Strand, StrandOf, TickPose},
+    hair::strand::{Hair, Pose, Strand, StrandOf, TickPose},
     solver::rod::obstacle::Obstacle,
 };
 use bevy::prelude::*;
@@ -37,6 +37,8 @@ struct Moving<'a> {
     is_removed: bool,
 }
 
+type HairParts = (&'static TickPose, Option<&'static HairReach>);
+
 pub(super) fn move_droplets(
     mut commands: Commands,
     step: Res<HairStep>,
@@ -50,7 +52,7 @@ pub(super) fn move_droplets(
     (colliders, poses): (Res<TickColliders>, Query<&TickPose, With<HairCollider>>),
     winds: Winds,
     volumes: Volumes,
-    hairs: Query<&TickPose, With<Hair>>,
+    hairs: Query<HairParts, With<Hair>>,
     strands: Query<(&StrandOf, &Strand)>,
     mut droplets: Query<(Entity, &mut Droplet)>,
     mut ledger: ResMut<WaterLedger>,
@@ -65,7 +67,7 @@ pub(super) fn move_droplets(
     let gravity = gravity.clamped().0;
     let down = gravity.normalize_or_zero();
     if step.index == 0 || bounds.is_empty() {
-        *bounds = HairBounds::of(&hairs, &strands, down);
+        *bounds = HairBounds::of(&hairs, down);
     }
     let bounds = &*bounds;
     let process = process.clamped().0;
@@ -110,7 +112,8 @@ pub(super) fn move_droplets(
 
             let carrier = drop.ride.and_then(|ride| {
                 let (of, strand) = strands.get(ride.strand).ok()?;
-                (strand.nodes() >= 2).then_some((ride, strand, hairs.get(of.0).ok()?.now(), of.0))
+                let (pose, _) = hairs.get(of.0).ok()?;
+                (strand.nodes() >= 2).then_some((ride, strand, pose.now(), of.0))
             });
             match carrier {
                 Some((ride, strand, pose, hair)) => {
@@ -154,49 +157,31 @@ pub(super) fn move_droplets(
     }
 }
 
-/// Where a hair is in the world (m), by roots, middles and tips.
+/// A ball around a hair in the world (m).
 #[derive(Clone, Copy)]
 pub(super) struct HairBounds {
-    low: Vec3,
-    high: Vec3,
+    center: Vec3,
+    radius: f32,
     /// How far down it reaches.
     lowest: f32,
 }
 
 impl HairBounds {
     /// Of all hair with nodes; of a point at the origin that reaches down without end while there is none.
-    fn of(
-        hairs: &Query<&TickPose, With<Hair>>,
-        strands: &Query<(&StrandOf, &Strand)>,
-        down: Vec3,
-    ) -> Vec<Self> {
-        let mut all = PerHair::default();
-        let nowhere = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, lowest: f32::MIN };
-        for (of, strand) in strands {
-            let begin = || hairs.get(of.0).ok().map(|pose| (*pose.now(), nowhere));
-            let p = strand.positions();
-            if let Some(index) = all.index(of.0, begin)
-                && let [Some(root), Some(middle), Some(tip)] =
-                    [p.first(), p.get(p.len() / 2), p.last()]
-            {
-                let (pose, bounds): &mut (Pose, Self) = &mut all.values[index];
-                for place in [root, middle, tip].map(|p| pose.point_out(*p)) {
-                    bounds.low = bounds.low.min(place);
-                    bounds.high = bounds.high.max(place);
-                    bounds.lowest = bounds.lowest.max(place.dot(down));
-                }
-            }
-        }
-        let all = all.values.into_iter().map(|(_, bounds)| bounds);
-        let mut all: Vec<Self> = all.filter(|bounds| bounds.low.is_finite()).collect();
+    fn of(hairs: &Query<HairParts, With<Hair>>, down: Vec3) -> Vec<Self> {
+        let of = |(pose, reach): (&TickPose, Option<&HairReach>)| {
+            let (center, radius) = reach.copied().unwrap_or_default().ball(pose.now())?;
+            Some(Self { center, radius, lowest: center.dot(down) + radius })
+        };
+        let mut all: Vec<Self> = hairs.iter().filter_map(of).collect();
         if all.is_empty() {
-            all.push(Self { low: Vec3::ZERO, high: Vec3::ZERO, lowest: f32::INFINITY });
+            all.push(Self { center: Vec3::ZERO, radius: 0.0, lowest: f32::INFINITY });
         }
         all
     }
 
     fn is_near(&self, place: Vec3, down: Vec3, rules: &DropletRules) -> bool {
-        let apart = (self.low - place).max(place - self.high).max_element();
+        let apart = self.center.distance(place) - self.radius;
         apart <= rules.removal_distance && place.dot(down) <= self.lowest + rules.removal_depth
     }
 }
@@ -315,7 +300,7 @@ mod tests {
 
     #[test]
     fn drops_are_kept_near_any_hair_above_its_own_depth() {
-        let at = |place: Vec3| HairBounds { low: place, high: place + 1.0, lowest: -place.y };
+        let at = |center: Vec3| HairBounds { center, radius: 1.0, lowest: 1.0 - center.y };
         let bounds = [at(Vec3::ZERO), at(Vec3::new(5000.0, 800.0, 0.0))];
         let (rules, mut last) = (DropletRules::default(), 0);
         let mut is_kept = |place| {
@@ -323,12 +308,12 @@ mod tests {
             near_any(&bounds, &mut last, &drop, Vec3::NEG_Y, &rules)
         };
         for (place, kept) in [
-            (Vec3::Y * -4.0, true),
-            (Vec3::Y * -6.0, false),
-            (Vec3::new(5000.0, 900.0, 99.0), true),
-            (Vec3::new(5000.0, 900.0, 102.0), false),
+            (Vec3::Y * -5.9, true),
+            (Vec3::Y * -6.1, false),
+            (Vec3::new(5000.0, 800.0, 100.9), true),
+            (Vec3::new(5000.0, 800.0, 101.1), false),
             // Far below the hair on the mountain, though above that in the valley.
-            (Vec3::new(5000.0, 794.0, 0.0), false),
+            (Vec3::new(5000.0, 793.9, 0.0), false),
             (Vec3::new(2500.0, 10.0, 0.0), false),
             (Vec3::Y * 100.0, true),
             (Vec3::NAN, false),

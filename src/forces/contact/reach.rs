@@ -1,7 +1,7 @@
 //! Which colliders a hair may touch within a tick, by bounding balls sorted along an axis.
 
 use super::{ColliderShape, HairCollider};
-use crate::hair::strand::TickPose;
+use crate::hair::strand::{Pose, TickPose};
 use bevy::prelude::*;
 
 /// A bounding ball of a hair in any pose, in its own frame.
@@ -32,6 +32,12 @@ impl HairReach {
         }
         let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high) + longest);
         Self { center, radius, age: 0 }
+    }
+
+    /// The ball around the hair in the world, of its lengths as they are drawn (m); none without strands.
+    pub(crate) fn ball(&self, pose: &Pose) -> Option<(Vec3, f32)> {
+        let center = pose.point_out(self.center);
+        center.is_finite().then_some((center, self.radius * pose.size()))
     }
 
     /// Roots have moved.
