@@ -9,6 +9,8 @@ mod body;
 mod characters_measured;
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/example.rs"]
+mod example;
 #[path = "../../examples/shared/gltf.rs"]
 #[cfg(feature = "groom")]
 mod gltf;

@@ -1,24 +1,14 @@
 //! The paper's scenes as a user runs them: through the `headless` example and its JSON.
 
+use crate::example::example;
 use serde_json::Value;
 use std::{
-    path::PathBuf,
-    process::{Command, Output, Stdio},
+    process::{Output, Stdio},
     time::{Duration, Instant},
 };
 
-/// The example as `cargo test` has just built it.
-fn example() -> PathBuf {
-    let mut path = std::env::current_exe().unwrap();
-    path.pop();
-    path.pop();
-    path.push(format!("examples/headless{}", std::env::consts::EXE_SUFFIX));
-    assert!(path.exists(), "{} is missing: run `cargo test`, which builds it", path.display());
-    path
-}
-
 fn headless(arguments: &[&str]) -> Output {
-    Command::new(example()).args(arguments).output().unwrap()
+    example("headless").args(arguments).output().unwrap()
 }
 
 fn scene(scene: &str, variant: &str) -> Value {
@@ -116,26 +106,6 @@ fn the_papers_projections_keep_the_same_shares() {
     near(&dried, "relaxed_error", 0.0, 1e-3);
 }
 
-/// What it comes to there tests/gpu compares, with fewer strands.
-#[cfg(feature = "gpu")]
-#[test]
-fn a_scene_runs_on_a_graphics_device_and_says_so() {
-    let out = headless(&["--scene", "perm", "--seconds", "1", "--gpu", "--json"]);
-    let text = String::from_utf8_lossy(&out.stderr);
-    if text.contains("Unable to find a GPU") {
-        println!("skipped: no graphics driver");
-        return;
-    }
-    assert!(out.status.success(), "{text}");
-    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
-    assert_eq!(report["residence"], "gpu");
-    assert_eq!(report["finite"], true);
-    // Of 60, less those in which its kernels were compiled.
-    let (ticks, frames) = (number(&report, "gpu_ticks"), number(&report, "frames"));
-    assert!(ticks > 30.0 && ticks <= frames, "{ticks} of {frames}");
-    assert!(!report["adapter"].as_str().unwrap().is_empty());
-}
-
 fn swing(from: &str, segments: &str, more: &[&str]) -> Value {
     let strand = ["--scene", "swing", "--length", "0.2", "--bending-length", "0.13", "--json"];
     let out = headless(&[&strand, &["--from", from, "--segments", segments][..], more].concat());
@@ -207,7 +177,7 @@ fn a_table_that_cannot_be_written_is_named_and_no_frame_is_an_error() {
 #[test]
 fn a_run_that_is_interrupted_leaves_whole_lines() {
     let table = std::env::temp_dir().join(format!("interrupted-{}.csv", std::process::id()));
-    let mut run = Command::new(example())
+    let mut run = example("headless")
         .args(["--scene", "bedhead", "--csv", table.to_str().unwrap()])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
