@@ -1,5 +1,7 @@
 //! Apps that draw, on any Vulkan device.
 
+#[path = "../common/plugins.rs"]
+mod all_plugins;
 #[path = "../common/mod.rs"]
 mod common;
 #[path = "../common/device.rs"]
