@@ -1,5 +1,9 @@
 //! Apps without a device that draws, as on a server.
 
+#[path = "../common/plugins.rs"]
+#[cfg(all(feature = "groom", feature = "gpu", feature = "save"))]
+#[allow(dead_code, reason = "each program uses its part")]
+mod all_plugins;
 #[path = "../../examples/shared/body.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod body;
