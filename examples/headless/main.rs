@@ -83,7 +83,9 @@ struct Arguments {
     /// The files of `characters`; the project's own figure if left out.
     #[arg(value_name = "FILE.glb")]
     files: Vec<PathBuf>,
-    /// Which variant of it; the full treatment if left out.
+    /// Which variant of it; the full treatment, `treated` or `rods`, if left out. bedhead: never-wet,
+    /// never-dried; blow-dry: no-drying, uniform; perm: water-set, cut-only, untreated; wet: springs;
+    /// shower: never-wet, dried-free, two-hairs (side by side).
     #[arg(long)]
     variant: Option<String>,
     /// How long the story runs (s) before it is measured; the paper's length if left out.

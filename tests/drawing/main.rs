@@ -1,9 +1,13 @@
 //! Apps that draw, on any Vulkan device.
 
+#[path = "../common/plugins.rs"]
+mod all_plugins;
 #[path = "../common/mod.rs"]
 mod common;
 #[path = "../common/device.rs"]
 mod device;
+#[path = "../common/example.rs"]
+mod example;
 #[path = "../common/linear.rs"]
 mod linear;
 #[path = "../../examples/shared/mannequin.rs"]
@@ -17,6 +21,7 @@ mod scenes {
     pub const HEAD_RADIUS: f32 = 0.1;
 }
 
+mod commands;
 mod cost;
 mod coverage;
 mod dye;
@@ -32,6 +37,9 @@ mod twin;
 mod wet;
 
 device::tests! {
+    commands {
+        device: a_tail_in_the_wrong_unit_is_shown_in_the_right_one_and_without_a_head;
+    }
     cost {
         device: a_hair_is_one_draw_call_in_every_view_and_one_of_depth_before_it_in_pictures,
             a_hundred_heads_share_a_mesh_of_few_strands;

@@ -4,6 +4,8 @@
 mod common;
 #[path = "../common/device.rs"]
 mod device;
+#[path = "../common/example.rs"]
+mod example;
 mod lab;
 #[path = "../common/offscreen.rs"]
 mod offscreen;
@@ -16,6 +18,7 @@ mod vectors;
 mod bad;
 mod bits;
 mod closed_forms;
+mod commands;
 mod cost;
 mod golden;
 mod handover;
@@ -48,6 +51,9 @@ device::tests! {
         device: sets_keep_the_share_of_the_bonds_that_formed,
             a_perm_keeps_two_thirds_and_survives_washing_in_part,
             a_treatment_takes_rates_the_asked_share_of_the_way_and_never_cuts_the_backbone;
+    }
+    commands {
+        device: a_scene_runs_on_a_graphics_device_and_says_so;
     }
     cost {
         device: a_hundred_thousand_strands_cost_less_than_a_look_at_them;

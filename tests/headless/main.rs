@@ -1,5 +1,9 @@
 //! Apps without a device that draws, as on a server.
 
+#[path = "../common/plugins.rs"]
+#[cfg(all(feature = "groom", feature = "gpu", feature = "save"))]
+#[allow(dead_code, reason = "each program uses its part")]
+mod all_plugins;
 #[path = "../../examples/shared/body.rs"]
 #[allow(dead_code, reason = "each program uses its part")]
 mod body;
@@ -9,6 +13,8 @@ mod body;
 mod characters_measured;
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/example.rs"]
+mod example;
 #[path = "../../examples/shared/gltf.rs"]
 #[cfg(feature = "groom")]
 mod gltf;

@@ -1,24 +1,15 @@
 //! The paper's scenes as a user runs them: through the `headless` example and its JSON.
 
+use crate::example::example;
 use serde_json::Value;
 use std::{
-    path::PathBuf,
-    process::{Command, Output, Stdio},
+    process::{Output, Stdio},
+    sync::atomic::{AtomicUsize, Ordering},
     time::{Duration, Instant},
 };
 
-/// The example as `cargo test` has just built it.
-fn example() -> PathBuf {
-    let mut path = std::env::current_exe().unwrap();
-    path.pop();
-    path.pop();
-    path.push(format!("examples/headless{}", std::env::consts::EXE_SUFFIX));
-    assert!(path.exists(), "{} is missing: run `cargo test`, which builds it", path.display());
-    path
-}
-
 fn headless(arguments: &[&str]) -> Output {
-    Command::new(example()).args(arguments).output().unwrap()
+    example("headless").args(arguments).output().unwrap()
 }
 
 fn scene(scene: &str, variant: &str) -> Value {
@@ -116,26 +107,6 @@ fn the_papers_projections_keep_the_same_shares() {
     near(&dried, "relaxed_error", 0.0, 1e-3);
 }
 
-/// What it comes to there tests/gpu compares, with fewer strands.
-#[cfg(feature = "gpu")]
-#[test]
-fn a_scene_runs_on_a_graphics_device_and_says_so() {
-    let out = headless(&["--scene", "perm", "--seconds", "1", "--gpu", "--json"]);
-    let text = String::from_utf8_lossy(&out.stderr);
-    if text.contains("Unable to find a GPU") {
-        println!("skipped: no graphics driver");
-        return;
-    }
-    assert!(out.status.success(), "{text}");
-    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
-    assert_eq!(report["residence"], "gpu");
-    assert_eq!(report["finite"], true);
-    // Of 60, less those in which its kernels were compiled.
-    let (ticks, frames) = (number(&report, "gpu_ticks"), number(&report, "frames"));
-    assert!(ticks > 30.0 && ticks <= frames, "{ticks} of {frames}");
-    assert!(!report["adapter"].as_str().unwrap().is_empty());
-}
-
 fn swing(from: &str, segments: &str, more: &[&str]) -> Value {
     let strand = ["--scene", "swing", "--length", "0.2", "--bending-length", "0.13", "--json"];
     let out = headless(&[&strand, &["--from", from, "--segments", segments][..], more].concat());
@@ -207,7 +178,7 @@ fn a_table_that_cannot_be_written_is_named_and_no_frame_is_an_error() {
 #[test]
 fn a_run_that_is_interrupted_leaves_whole_lines() {
     let table = std::env::temp_dir().join(format!("interrupted-{}.csv", std::process::id()));
-    let mut run = Command::new(example())
+    let mut run = example("headless")
         .args(["--scene", "bedhead", "--csv", table.to_str().unwrap()])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
@@ -283,34 +254,130 @@ fn ten_thousand_strands_gather_around_droplets() {
     assert!(b < a && a < 0.98 && b < 0.8, "{a} {b}");
 }
 
+/// The names that are answered to a wrong one, without what is no scene.
+fn valid(wrong: &[&str]) -> Vec<String> {
+    let out = headless(wrong);
+    let text = String::from_utf8(out.stderr).unwrap();
+    let (_, names) = text.trim_end().split_once("valid: ").unwrap_or_else(|| panic!("{text}"));
+    let names = names.lines().next().unwrap().split(", ").take_while(|name| *name != "swing");
+    names.map(str::to_owned).collect()
+}
+
+/// A scene with a variant, for how long (s), and by what it is run.
+struct Run<'a> {
+    scene: &'a str,
+    variant: &'a str,
+    seconds: &'a str,
+    threads: &'a str,
+    /// An instruction set; the machine's best if `None`.
+    set: Option<&'a str>,
+}
+
+impl Run<'_> {
+    fn hash(&self) -> String {
+        let mut program = example("headless");
+        program.args(["--scene", self.scene, "--variant", self.variant, "--seconds", self.seconds]);
+        program.args(["--threads", self.threads, "--json"]).env_remove("KERATIN_SIMD");
+        let out = program.envs(self.set.map(|set| ("KERATIN_SIMD", set))).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert_eq!(report["finite"], true, "{report}");
+        report["state_hash"].as_str().unwrap().to_owned()
+    }
+}
+
+/// The hashes that runs come to, two at a time.
+fn hashes(runs: &[Run]) -> Vec<String> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let own = std::iter::from_fn(|| {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            runs.get(i).map(|run| (i, run.hash()))
+        });
+        own.collect::<Vec<_>>()
+    };
+    let mut all = std::thread::scope(|scope| {
+        let other = scope.spawn(work);
+        let own = work();
+        [own, other.join().unwrap()].concat()
+    });
+    all.sort_unstable();
+    all.into_iter().map(|(_, hash)| hash).collect()
+}
+
+/// All scenes with all their variants, each for so long.
+fn every_scene(seconds: impl Fn(&str, &str) -> &'static str) -> Vec<[String; 3]> {
+    let scenes = valid(&["--scene", "none"]);
+    let mut all = Vec::new();
+    for scene in scenes {
+        for variant in valid(&["--scene", &scene, "--variant", "none"]) {
+            let seconds = seconds(&scene, &variant).to_owned();
+            all.push([scene.clone(), variant, seconds]);
+        }
+    }
+    assert!(all.len() >= 16, "{all:?}");
+    all
+}
+
 #[test]
 fn every_bit_is_the_same_again_and_on_two_threads() {
-    // Long enough for wind, contact with the floor and bond changes; winding in the perm.
-    for (scene, variant, seconds) in [
-        ("bedhead", "treated", "8"),
-        ("blow-dry", "treated", "8"),
-        ("perm", "treated", "10"),
-        ("shower", "treated", "4"),
-        ("wet", "rods", "5"),
-        ("wet", "springs", "4.5"),
-    ] {
-        let hash = |threads: &str| {
-            let out = headless(&[
-                "--scene",
-                scene,
-                "--variant",
-                variant,
-                "--seconds",
-                seconds,
-                "--threads",
-                threads,
-                "--json",
-            ]);
-            let report: Value = serde_json::from_slice(&out.stdout).unwrap();
-            report["state_hash"].as_str().unwrap().to_owned()
-        };
-        assert_eq!(hash("1"), hash("2"), "{scene}: a second run, on two threads, differs");
+    // Until after what sets a variant apart. The full treatments long enough for wind, contact with the floor and
+    // bond changes; winding in the perm, droplets on ten thousand strands.
+    let all = every_scene(|scene, variant| match (scene, variant) {
+        ("wet", "rods") => "5",
+        ("wet", _) => "4.5",
+        ("shower", "treated") => "4",
+        ("shower", _) => "2.5",
+        ("perm", "treated") => "10",
+        (_, "treated") => "8",
+        _ => "7",
+    });
+    let runs = all.iter().flat_map(|[scene, variant, seconds]| {
+        ["1", "2"].map(|threads| Run { scene, variant, seconds, threads, set: None })
+    });
+    let found = hashes(&runs.collect::<Vec<_>>());
+    for (scene, hashes) in all.iter().zip(found.chunks(2)) {
+        println!("{scene:?}: {hashes:?}");
+        assert_eq!(hashes[0], hashes[1], "{scene:?}: a second run, on two threads, differs");
     }
+}
+
+/// AVX2 and AVX-512 fuse the same products; SSE2 cannot, and rounds twice, but always alike.
+#[test]
+#[cfg(target_arch = "x86_64")]
+fn every_bit_is_the_same_by_each_instruction_set_that_fuses() {
+    let best = fearless_simd::Level::new();
+    let mut by = vec![("sse2", "1"), ("sse2", "2")];
+    for (set, threads, has) in
+        [("avx2", "2", best.as_avx2().is_some()), ("avx512", "1", best.as_avx512().is_some())]
+    {
+        if has {
+            by.push((set, threads));
+        } else {
+            println!("not tested, since this machine lacks it: {set}");
+        }
+    }
+    // Hair that falls in wind, is wound, gets wet, and springs. What comes later are other numbers for the same
+    // kernels.
+    let all = every_scene(|scene, _| match scene {
+        "wet" => "0.2",
+        "shower" => "1.5",
+        _ => "2",
+    });
+    let runs = all.iter().flat_map(|[scene, variant, seconds]| {
+        let run = move |(set, threads)| Run { scene, variant, seconds, threads, set: Some(set) };
+        by.iter().copied().map(run)
+    });
+    let found = hashes(&runs.collect::<Vec<_>>());
+    let mut chosen = false;
+    for (scene, hashes) in all.iter().zip(found.chunks(by.len())) {
+        println!("{scene:?}: {hashes:?} by {by:?}");
+        let (sse2, fused) = hashes.split_at(2);
+        assert_eq!(sse2[0], sse2[1], "{scene:?}: SSE2 on two threads");
+        assert!(fused.iter().all(|hash| *hash == fused[0]), "{scene:?}: AVX-512 differs from AVX2");
+        chosen |= fused.iter().all(|hash| *hash != sse2[0]);
+    }
+    assert!(chosen, "KERATIN_SIMD chooses nothing");
 }
 
 #[test]

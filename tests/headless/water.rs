@@ -821,6 +821,47 @@ fn hair_in_damp_air_sleeps_while_it_takes_up_vapour() {
     assert!(ledger(&app).error() < 1e-9, "{:?}", ledger(&app));
 }
 
+/// In how many substeps a strand has moved, and where it was then.
+#[derive(Resource, Default)]
+struct Moves(usize, Vec<Vec3>);
+
+fn count_moves(strand: Single<&Strand>, mut seen: ResMut<Moves>) {
+    if seen.1 != strand.positions() {
+        // Where it grows it has not moved.
+        let count = seen.0 + usize::from(!seen.1.is_empty());
+        *seen = Moves(count, strand.positions().to_vec());
+    }
+}
+
+/// The same as `damp_air_costs_what_dry_air_costs`, counted.
+#[test]
+fn hair_in_damp_air_joins_substeps_and_sleeps_as_in_dry_air() {
+    let counts = [0.5, 0.51, 0.9].map(|humidity| {
+        let mut app = test_app(60.0);
+        app.insert_resource(HairClimate { humidity, ..default() })
+            .init_resource::<Moves>()
+            .add_systems(HairTick, count_moves.in_set(HairSystems::Last));
+        one_strand(&mut app, 0.24, 8, Vec3::X);
+        run(&mut app, 1.0);
+        let moves = app.world().resource::<Moves>().0;
+        assert!(wetness(&mut app) > 0.0 || humidity == 0.5, "vapour is taken up");
+        let (mut app, hair) = curtain(30, humidity);
+        let awake = |_| {
+            app.update();
+            app.world().get::<SleepCounts>(hair).unwrap().awake
+        };
+        let awake: Vec<usize> = (0..240).map(awake).collect();
+        (moves, awake.iter().position(|awake| *awake == 0), awake[120..].iter().sum::<usize>())
+    });
+    println!("substeps with motion, ticks until all sleep, and awake later: {counts:?}");
+    // The six substeps of a tick are joined in pairs.
+    assert!(counts.iter().all(|(moves, ..)| *moves == 180), "{counts:?}");
+    let ticks = counts.map(|(_, ticks, _)| ticks.expect("all sleep"));
+    let dry = ticks[0];
+    assert!(ticks.iter().all(|ticks| ticks.abs_diff(dry) < 10), "{counts:?}");
+    assert!(counts.iter().all(|(.., awake)| *awake <= 60), "one in sixty: {counts:?}");
+}
+
 #[test]
 #[ignore = "measures time: run it alone on an idle machine"]
 fn damp_air_costs_what_dry_air_costs() {
@@ -888,6 +929,37 @@ fn rain_on_one_hair_changes_no_bit_of_another() {
     assert_eq!(alone[0], among[0], "other hairs change nothing");
     assert_ne!(alone[0], dry[0], "it rains on this one");
     assert_eq!(among[1..], dry[1..], "and on no other");
+}
+
+/// How many strands of each hair have been sorted for contact with droplets, ever since they grew.
+fn sorted_for_droplets(app: &App, hairs: &[Entity]) -> Vec<usize> {
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let blocks = registry.get_with_short_type_path("StrandBlocks").unwrap();
+    let blocks = blocks.data::<ReflectComponent>().unwrap();
+    let sorted = hairs.iter().map(|hair| {
+        let blocks = blocks.reflect(app.world().entity(*hair)).unwrap();
+        let order = blocks.reflect_ref().as_struct().unwrap().field("order").unwrap();
+        order.reflect_ref().as_list().unwrap().len()
+    });
+    sorted.collect()
+}
+
+/// The same as `rain_on_one_of_thirty_hairs_costs_little`, counted.
+#[test]
+fn rain_on_one_of_thirty_hairs_is_no_work_of_others() {
+    let (mut app, hairs) = heads(30, 6);
+    let above = app.world_mut().spawn(Shower::rain_on(Vec3::X * 7.0)).id();
+    run(&mut app, 1.5);
+    let count = droplets(&mut app);
+    assert!(count > 50, "{count} droplets");
+    let mut expected = vec![0; 30];
+    expected[7] = 6;
+    assert_eq!(sorted_for_droplets(&app, &hairs), expected);
+    // Of another one where the rain moves on.
+    app.world_mut().entity_mut(above).insert(Shower::rain_on(Vec3::X * 20.0));
+    run(&mut app, 1.0);
+    expected[20] = 6;
+    assert_eq!(sorted_for_droplets(&app, &hairs), expected);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::{check, worlds_measured as measured};
 
 #[test]
 fn uneven_frames_do_not_move_hair() {
-    check(measured::frames(4.0));
+    check(measured::frames(&measured::RIDES[1..3], 2.0));
 }
 
 #[test]
@@ -30,6 +30,11 @@ fn a_runner_is_put_elsewhere_and_its_hair_goes_on() {
 #[test]
 fn a_portal_in_the_frame_of_a_hitch_is_no_worse() {
     check(measured::hitches());
+}
+
+#[test]
+fn a_shift_of_the_world_moves_nothing_in_it() {
+    check(measured::shifts());
 }
 
 #[test]
@@ -87,6 +92,12 @@ fn roots_that_are_touched_again_move_nothing() {
 #[test]
 fn a_copy_of_a_character_has_one_hair_on_its_own_head() {
     check(measured::copies());
+}
+
+#[cfg(all(feature = "groom", feature = "save"))]
+#[test]
+fn characters_and_gusts_are_as_they_were_saved_as_text() {
+    check(measured::scenes());
 }
 
 #[cfg(all(feature = "groom", feature = "save"))]

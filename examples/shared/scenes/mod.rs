@@ -8,7 +8,8 @@
 //!
 //! `wet` strews droplets over a head of ten thousand strands, which gather in locks. `shower` wets
 //! straight hair, presses it on the floor, lets a night dry it, lifts it, and showers it again; no code
-//! sets a bond's rate there.
+//! sets a bond's rate there. Its variant `two-hairs` has a second hair beside the first, under the same
+//! drops.
 //!
 //! Winding is done by the simulation's own [`PermWinding`]: nodes are guided through ever tighter
 //! helices onto the rod.
@@ -80,7 +81,7 @@ impl SceneKind {
             Self::BlowDry => &["treated", "no-drying", "uniform"],
             Self::Perm => &["treated", "water-set", "cut-only", "untreated"],
             Self::Wet => &["rods", "springs"],
-            Self::Shower => &["treated", "never-wet", "dried-free"],
+            Self::Shower => &["treated", "never-wet", "dried-free", TWO_HAIRS],
         }
     }
 
@@ -166,6 +167,9 @@ impl Default for Strewn {
         Self { count: 1000, radius: 0.003 }
     }
 }
+
+/// The variant with a second hair beside the first.
+const TWO_HAIRS: &str = "two-hairs";
 
 /// How far the hair's roots are below the centre of the head that is drawn (m).
 pub const HEAD_RADIUS: f32 = 0.1;
@@ -298,4 +302,10 @@ pub fn spawn_scene(mut commands: Commands, scene: Res<Scene>, mut surroundings: 
         }
     }
     strands::spawn(&mut commands, scene.kind, hair);
+    if scene.variant == TWO_HAIRS {
+        // Where the drops go that pass the first; it moves along with it.
+        let beside = Transform::from_xyz(0.055, 0.0, 0.0);
+        let second = commands.spawn((Prop, Hair, ChildOf(hair), beside)).id();
+        strands::spawn(&mut commands, scene.kind, second);
+    }
 }

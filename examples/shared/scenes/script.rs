@@ -1,7 +1,7 @@
 //! What happens when, in seconds of the scene's own clock.
 
 use super::{
-    Model, Prop, Scene, SceneKind, Strewn, Treated, locks,
+    Model, Prop, Scene, SceneKind, Strewn, TWO_HAIRS, Treated, locks,
     measure::{Lift, heights, shapes, tips, weighted_rate},
 };
 use bevy::{ecs::system::SystemParam, prelude::*};
@@ -206,7 +206,7 @@ pub fn direct(
             director.rates[1] = hydrogen_rates(all());
         }
         let [first, second] = [Moment::SHOWER, Moment::REWET];
-        let wets = variant == "treated";
+        let wets = ["treated", TWO_HAIRS].contains(&variant);
         if wets && passes(first[0]) || passes(second[0]) {
             commands.spawn(shower(transform.translation));
         }

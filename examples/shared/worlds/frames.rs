@@ -29,25 +29,39 @@ impl Path {
 struct Frames {
     name: &'static str,
     frame: fn(&mut Xoshiro256PlusPlus, usize) -> f64,
+    /// How fast game time passes in each.
+    pace: fn(usize) -> f32,
     /// What such a game may do besides.
     discards: &'static [Discards],
 }
 
-const EVEN: Frames = Frames { name: "even", frame: |_, _| 1.0 / 60.0, discards: &[] };
+const FRAMES: Frames =
+    Frames { name: "even", frame: |_, _| 1.0 / 60.0, pace: |_| 1.0, discards: &[] };
+const EVEN: Frames = Frames { discards: &[Discards::Nothing, Discards::Clock], ..FRAMES };
+const ALTERNATING: Frames = Frames {
+    name: "alternating",
+    frame: |_, i| [1.0 / 60.0, 1.0 / 30.0][i % 2],
+    discards: &[Discards::Nothing, Discards::Clock],
+    ..FRAMES
+};
+const ANY: Frames = Frames {
+    name: "any",
+    frame: |random, _| random.random_range(0.004..0.25),
+    discards: &[Discards::Nothing],
+    ..FRAMES
+};
 
-const UNEVEN: [Frames; 4] = [
-    Frames {
-        name: "alternating",
-        frame: |_, i| [1.0 / 60.0, 1.0 / 30.0][i % 2],
-        discards: &[Discards::Nothing],
-    },
+const ALL: [Frames; 7] = [
+    EVEN,
+    ALTERNATING,
     Frames {
         name: "hitches",
         frame: |random, i| match i % 40 {
             39 => random.random_range(0.05..0.25),
             _ => 1.0 / 60.0,
         },
-        discards: &[Discards::Overstep],
+        discards: &[Discards::Nothing, Discards::Overstep],
+        ..FRAMES
     },
     Frames {
         name: "load spike",
@@ -56,19 +70,30 @@ const UNEVEN: [Frames; 4] = [
             _ => random.random_range(0.08..0.25),
         },
         discards: &[Discards::Ticks],
+        ..FRAMES
     },
+    ANY,
+    // A second, and two at a twentieth.
     Frames {
-        name: "any",
-        frame: |random, _| random.random_range(0.004..0.25),
+        name: "bullet time 0.05",
+        pace: |i| if i % 180 < 60 { 1.0 } else { 0.05 },
         discards: &[Discards::Nothing],
+        ..FRAMES
+    },
+    // A second, and two in a fifth.
+    Frames {
+        name: "fast forward 10",
+        pace: |i| if i % 72 < 60 { 1.0 } else { 10.0 },
+        discards: &[Discards::Nothing],
+        ..FRAMES
     },
 ];
 
 /// What hair of a moving head does.
 #[derive(Clone, Copy, Debug, Default)]
 struct Ride {
-    /// The largest error of the head's speed in a tick, as a share.
-    speed_error: f32,
+    /// The largest error of the head's speed in a tick, as a share, and of its spin.
+    errors: [f32; 2],
     /// The lean of the hair (°), least and most.
     lean: [f32; 2],
     /// The largest acceleration of a tip seen from the head (m/s²).
@@ -94,6 +119,8 @@ enum Discards {
     Overstep,
     /// What is left after three ticks of a frame.
     Ticks,
+    /// It is a new clock of fixed ticks, now and then, of another rate.
+    Clock,
 }
 
 /// Has an animation player move a hair along a path.
@@ -147,10 +174,19 @@ fn app_with_players() -> App {
     app
 }
 
+/// What is seen of a tick.
+struct Tick {
+    seconds: f32,
+    speed: f32,
+    spin: f32,
+    lean: f32,
+    tip: Vec3,
+}
+
 /// Rides along a path by these frames.
 fn ride(path: Path, frames: &Frames, moved: Moved, discards: Discards, seconds: f64) -> Ride {
     #[derive(Resource, Default)]
-    struct Seen(Vec<(f32, f32, Vec3)>);
+    struct Seen(Vec<Tick>);
     let mut app = app_with_players();
     let (hair, id) = one_strand(&mut app);
     app.insert_resource(path).init_resource::<Seen>();
@@ -194,18 +230,28 @@ fn ride(path: Path, frames: &Frames, moved: Moved, discards: Discards, seconds: 
             *before = Some(pose.before().translation);
         }
         if let Some(from) = before.filter(|_| step.index + 1 == step.count) {
-            let speed = (pose.now().translation - from).length() / (step.dt * step.count as f32);
-            let tip = *strand.positions().last().unwrap();
-            seen.0.push((speed, lean(strand), tip));
+            let seconds = step.dt * step.count as f32;
+            seen.0.push(Tick {
+                seconds,
+                speed: (pose.now().translation - from).length() / seconds,
+                spin: pose.spin().length(),
+                lean: lean(strand),
+                tip: *strand.positions().last().unwrap(),
+            });
         }
     };
     app.add_systems(HairTick, watch.in_set(HairSystems::Last));
     let mut random = Xoshiro256PlusPlus::seed_from_u64(38);
-    let tick = 1.0 / 64.0;
     // It starts from rest. Where time is discarded, fewer ticks pass.
-    let [first, last] = [WARM_UP, WARM_UP + seconds].map(|at| (at / f64::from(tick)) as usize);
+    let [first, last] = [WARM_UP, WARM_UP + seconds].map(|at| (at * 64.0) as usize);
     for i in 0.. {
         let frame = (frames.frame)(&mut random, i);
+        let pace = (frames.pace)(i);
+        app.world_mut().resource_mut::<Time<Virtual>>().set_relative_speed(pace);
+        if discards == Discards::Clock && i % 50 == 49 {
+            let hertz = [30.0, 60.0, 64.0][(i / 50) % 3];
+            app.insert_resource(Time::<Fixed>::from_hz(hertz));
+        }
         app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(frame)));
         app.update();
         if discards == Discards::Overstep && i % 50 == 49 {
@@ -217,15 +263,20 @@ fn ride(path: Path, frames: &Frames, moved: Moved, discards: Discards, seconds: 
     }
     let seen = &app.world().resource::<Seen>().0[first..];
     let mut ride = Ride { lean: [f32::INFINITY, 0.0], ..default() };
-    for (speed, lean, _) in seen {
-        if path.speed > 0.0 {
-            ride.speed_error = ride.speed_error.max((speed / path.speed - 1.0).abs());
+    for tick in seen {
+        for (i, (is, of)) in [(tick.speed, path.speed), (tick.spin, path.spin)].iter().enumerate() {
+            if *of > 0.0 {
+                ride.errors[i] = ride.errors[i].max((is / of - 1.0).abs());
+            }
         }
-        ride.lean = [ride.lean[0].min(*lean), ride.lean[1].max(*lean)];
+        ride.lean = [ride.lean[0].min(tick.lean), ride.lean[1].max(tick.lean)];
     }
-    for tips in seen.windows(3) {
-        let [a, b, c] = [tips[0].2, tips[1].2, tips[2].2];
-        ride.acceleration = ride.acceleration.max((a - 2.0 * b + c).length() / (tick * tick));
+    for ticks in seen.windows(3) {
+        let [a, b, c] = [&ticks[0], &ticks[1], &ticks[2]];
+        if [a, b].iter().all(|tick| (tick.seconds - c.seconds).abs() < 1e-6) {
+            let change = (a.tip - 2.0 * b.tip + c.tip).length() / c.seconds.powi(2);
+            ride.acceleration = ride.acceleration.max(change);
+        }
     }
     ride
 }
@@ -294,7 +345,7 @@ pub fn reparented() -> Vec<Row> {
     let mut rows = Vec::new();
     for (speed, spin) in [(3.0, 0.0), (12.0, 0.0), (3.0, 1.0)] {
         for by_ticks in [false, true] {
-            for frames in [&EVEN, &UNEVEN[1], &UNEVEN[3]] {
+            for frames in [&EVEN, &ALL[2], &ANY] {
                 let path = Path { speed, spin };
                 let control = on_and_off(path, frames, by_ticks, false);
                 let got = on_and_off(path, frames, by_ticks, true);
@@ -328,55 +379,94 @@ pub fn reparented() -> Vec<Row> {
 /// After how long rides are measured (s).
 const WARM_UP: f64 = 4.0;
 
+/// How heads ride: speeds (m/s) and spins (rad/s).
+pub const RIDES: [(f32, f32); 5] = [(3.0, 0.0), (12.0, 0.0), (3.0, 8.0), (1.0, 0.0), (12.0, 8.0)];
+
 /// Lines 1 and 2: hair of a head that moves evenly hangs as by even frames, whatever the frames are. Each ride is
 /// measured for some `seconds`.
-pub fn frames(seconds: f64) -> Vec<Row> {
+pub fn frames(rides: &[(f32, f32)], seconds: f64) -> Vec<Row> {
     let mut rows = Vec::new();
-    for (speed, spin) in [(3.0, 0.0), (12.0, 0.0), (3.0, 8.0)] {
+    for (speed, spin) in rides.iter().copied() {
         let path = Path { speed, spin };
         let control = ride(path, &EVEN, Moved::FixedUpdate, Discards::Nothing, seconds);
         for moved in [Moved::Update, Moved::FixedUpdate, Moved::Both, Moved::Player] {
-            for (frames, discards) in UNEVEN
+            for (frames, discards) in ALL
                 .iter()
                 .flat_map(|frames| frames.discards.iter().map(move |discards| (frames, *discards)))
             {
-                // Where time is discarded, what ticks move stands still and what frames move does not.
-                if discards != Discards::Nothing && moved == Moved::Both {
-                    continue;
-                }
-                let got = ride(path, frames, moved, discards, seconds);
-                let and = match discards {
-                    Discards::Nothing => "",
-                    Discards::Overstep => ", overstep discarded",
-                    Discards::Ticks => ", at most 3 ticks a frame",
+                // Where time is discarded, what ticks move stands still and what frames move does not. What they
+                // move by a clock that starts anew is somewhere else then.
+                let is_other = match moved {
+                    Moved::Both => discards != Discards::Nothing,
+                    Moved::FixedUpdate => discards == Discards::Clock,
+                    _ => false,
                 };
-                let what =
-                    format!("{speed} m/s, {spin} rad/s, {} frames, {moved:?}{and}", frames.name);
-                let [[least, most], [low, high]] = [control.lean, got.lean];
-                let twice = 2.0 * control.acceleration + 0.5;
-                let error = format!("{what}: error of speed");
-                rows.push(Row::at_most(error, got.speed_error, 0.1));
-                // By frames it turns by up to 1.6 rad while no tick runs, and its hair with it, which then
-                // leans to where the wind no longer comes from: it swings, and is not whipped.
-                let turns_unseen = spin > 0.0
-                    && discards == Discards::Ticks
-                    && matches!(moved, Moved::Update | Moved::Player);
-                if turns_unseen {
-                    rows.extend([
-                        Row::at_most(format!("{what}: lean, turned unseen (°)"), high, 60.0),
-                        Row::at_most(format!("{what}: tips (m/s²)"), got.acceleration, 100.0),
-                    ]);
-                    continue;
+                if !is_other {
+                    rows.extend(row_of_ride(path, frames, moved, discards, &control, seconds));
                 }
-                rows.extend([
-                    Row::new(format!("{what}: least lean (°)"), least, low, 3.0),
-                    Row::new(format!("{what}: most lean (°)"), most, high, 3.0),
-                    Row::at_most(format!("{what}: tips (m/s²)"), got.acceleration, twice),
-                ]);
             }
         }
     }
     rows
+}
+
+/// One ride, against its control.
+fn row_of_ride(
+    path: Path,
+    frames: &Frames,
+    moved: Moved,
+    discards: Discards,
+    control: &Ride,
+    seconds: f64,
+) -> Vec<Row> {
+    let Path { speed, spin } = path;
+    let got = ride(path, frames, moved, discards, seconds);
+    let and = match discards {
+        Discards::Nothing => "",
+        Discards::Overstep => ", overstep discarded",
+        Discards::Ticks => ", at most 3 ticks a frame",
+        Discards::Clock => ", new Time<Fixed> of 30, 60, 64 Hz",
+    };
+    let what = format!("{speed} m/s, {spin} rad/s, {} frames, {moved:?}{and}", frames.name);
+    let [[least, most], [low, high]] = [control.lean, got.lean];
+    let mut rows = vec![Row::at_most(format!("{what}: error of speed"), got.errors[0], 0.1)];
+    if spin > 0.0 {
+        rows.push(Row::at_most(format!("{what}: error of spin"), got.errors[1], 0.1));
+    }
+    // By frames it turns by up to 1.6 rad while no tick runs, and its hair with it, which then leans to where
+    // the wind no longer comes from: it swings, and is not whipped.
+    let turns_unseen =
+        spin > 0.0 && discards == Discards::Ticks && matches!(moved, Moved::Update | Moved::Player);
+    if turns_unseen {
+        rows.extend([
+            Row::at_most(format!("{what}: lean, turned unseen (°)"), high, 60.0),
+            Row::at_most(format!("{what}: tips (m/s²)"), got.acceleration, 100.0),
+        ]);
+        return rows;
+    }
+    let tips = format!("{what}: tips, at most twice the control's or 0.5 m/s² more (m/s²)");
+    rows.extend([
+        Row::new(format!("{what}: least lean (°)"), least, low, 3.0),
+        Row::new(format!("{what}: most lean (°)"), most, high, 3.0),
+        Row::at_most(tips, got.acceleration, 2.0 * control.acceleration + 0.5),
+    ]);
+    rows
+}
+
+/// Line 3: how hair leans that is 10 cm off the axis of a head that spins at 17 rad/s (°).
+fn lean_in_a_spin(hertz: f64) -> f32 {
+    let mut app = app(hertz);
+    let pivot = app.world_mut().spawn(Transform::default()).id();
+    let (hair, id) = one_strand(&mut app);
+    app.world_mut().entity_mut(hair).insert((ChildOf(pivot), Transform::from_xyz(0.1, 0.0, 0.0)));
+    let mut turn = 0.0;
+    for tick in 0..(4.0 * hertz) as usize {
+        turn += 17.0 / hertz * (tick as f64 / hertz).min(1.0);
+        let rotation = Quat::from_rotation_y(turn.rem_euclid(core::f64::consts::TAU) as f32);
+        place_mut(&mut app, pivot, |place| place.rotation = rotation);
+        app.update();
+    }
+    lean(&strand(&app, id))
 }
 
 /// Line 3: no speed is a jump that lasts, and the lean is the same at any rate of ticks.
@@ -400,6 +490,16 @@ pub fn riders() -> Vec<Row> {
             rows.push(Row::new(what, control, lean_at(hertz, speed), 0.01 * control));
         }
     }
+    let small = lean_in_a_spin(480.0);
+    rows.push(Row::new("control, spin of 17 rad/s at 480 Hz: lean (°)", 75.0, small, 15.0));
+    for hertz in [30.0, 60.0, 64.0] {
+        let what = format!("spin of 17 rad/s at {hertz} Hz: lean (°)");
+        rows.push(Row::new(what, small, lean_in_a_spin(hertz), 0.02 * small));
+    }
+    let path = Path { speed: 14.0, spin: 0.0 };
+    let control = ride(path, &EVEN, Moved::FixedUpdate, Discards::Nothing, 1.0);
+    let frames = Frames { name: "30 Hz", frame: |_, _| 1.0 / 30.0, ..FRAMES };
+    rows.extend(row_of_ride(path, &frames, Moved::Update, Discards::Nothing, &control, 4.0));
     rows
 }
 

@@ -101,6 +101,8 @@ enum Put {
     Shifted,
     /// Announced, turned, while time stands still for two frames.
     Paused,
+    /// Back by so many metres along its way, as in an endless runner, without a word.
+    Wrapped(f32),
 }
 
 /// Where ticks put a head.
@@ -131,6 +133,7 @@ fn run_and_put(speed: f32, put: Put, in_update: bool) -> Vec<Strand> {
                     app.world_mut().commands().entity(hair).queue(Hair::teleport);
                 }
             }
+            Put::Wrapped(far) => world = Transform::from_xyz(-far, 0.0, 0.0),
             Put::Paused => {}
             Put::Shifted => {
                 world = Transform::from_xyz(-512.0, 0.0, 256.0);
@@ -158,21 +161,27 @@ pub fn portals() -> Vec<Row> {
     for in_update in [true, false] {
         for speed in [0.0, 1.5, 8.0, 40.0] {
             let control = run_and_put(speed, Put::Nowhere, in_update);
-            for put in [Put::Found, Put::Announced(0.3), Put::Announced(64.0), Put::Shifted] {
+            for put in [
+                Put::Found,
+                Put::Announced(0.3),
+                Put::Announced(64.0),
+                Put::Shifted,
+                Put::Wrapped(3.0),
+            ] {
                 let (mut off, mut faster) = (0.0f32, 0.0f32);
                 for (a, b) in run_and_put(speed, put, in_update).iter().zip(&control) {
                     for (p, q) in a.positions().iter().zip(b.positions()) {
                         off = off.max(p.distance(*q));
                     }
                     for (v, w) in a.velocities().iter().zip(b.velocities()) {
-                        faster = faster.max((v.length() - w.length()).abs());
+                        faster = faster.max(v.distance(*w));
                     }
                 }
                 let moved = if in_update { "Update" } else { "FixedUpdate" };
                 let what = format!("{speed} m/s, {moved}, {put:?}");
                 rows.extend([
                     Row::at_most(format!("{what}: off (m)"), off, 1e-3),
-                    Row::at_most(format!("{what}: speed (m/s)"), faster, 0.05),
+                    Row::at_most(format!("{what}: other velocity (m/s)"), faster, 0.05),
                 ]);
             }
         }
@@ -231,6 +240,7 @@ fn run_and_hitch(put: Put, mover: Mover, hitch: f64) -> Vec<Strand> {
                     Transform::from_xyz(64.0, 3.0, -40.0).with_rotation(Quat::from_rotation_y(1.2))
                 }
                 Put::Announced(far) => Transform::from_xyz(0.0, 0.0, far),
+                Put::Wrapped(far) => Transform::from_xyz(-far, 0.0, 0.0),
                 Put::Nowhere | Put::Shifted => Transform::IDENTITY,
             };
             if matches!(put, Put::Announced(_) | Put::Paused) {
@@ -258,15 +268,23 @@ fn run_and_hitch(put: Put, mover: Mover, hitch: f64) -> Vec<Strand> {
 pub fn hitches() -> Vec<Row> {
     let mut rows = Vec::new();
     for mover in [Mover::Update, Mover::FixedUpdate, Mover::BodyByTicks, Mover::HeadByTicks] {
-        for hitch in [1.0 / 60.0, 0.2] {
+        for hitch in [1.0 / 60.0, 0.1, 0.2] {
             let control = run_and_hitch(Put::Nowhere, mover, hitch);
-            for put in [Put::Found, Put::Announced(0.3), Put::Paused] {
+            // In a frame that moves it a head that wraps around by less than 25 m/s has to say so.
+            let by_frames = matches!(mover, Mover::Update | Mover::HeadByTicks);
+            let far = if by_frames && hitch > 0.1 { 6.0 } else { 3.0 };
+            for put in [
+                Put::Found,
+                Put::Announced(0.3),
+                Put::Announced(3.0),
+                Put::Paused,
+                Put::Wrapped(far),
+            ] {
                 let states = run_and_hitch(put, mover, hitch);
                 let off = states.iter().zip(&control);
                 let off = off.map(|(a, b)| super::apart(a.positions(), b.positions()));
                 let what = format!("{mover:?}, frame of {:.0} ms, {put:?}: off (m)", hitch * 1e3);
-                // Where the head was at a tick's beginning before the frame is not known beside a jump.
-                rows.push(Row::at_most(what, off.fold(0.0, f32::max), 2e-3));
+                rows.push(Row::at_most(what, off.fold(0.0, f32::max), 1e-3));
             }
         }
     }
@@ -372,4 +390,85 @@ pub fn wet_jumps() -> Vec<Row> {
         ]);
     }
     rows
+}
+
+/// How a world is moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shift {
+    Not,
+    Told,
+    Untold,
+}
+
+/// Strands, and drops in the air, for half a second after a world was moved back to its origin by `by`: with
+/// gusts, a fan, water that hair dips into, and drops that fall, all at once.
+fn weathers(shift: Shift, by: Vec3) -> (Vec<Strand>, Vec<Vec3>) {
+    let mut app = app(60.0);
+    app.insert_resource(HairWind { velocity: Vec3::new(4.0, 0.0, 1.5), ..default() });
+    let fan =
+        WindZone { half_size: Vec3::new(0.4, 0.3, 0.3), velocity: Vec3::Z * 3.0, ..default() };
+    app.world_mut().spawn((fan, Transform::from_xyz(0.8, 1.7, 0.1)));
+    let pool = WaterVolume { half_size: Vec3::new(8.0, 0.5, 8.0), current: Vec3::Z, ..default() };
+    app.world_mut().spawn((pool, Transform::from_xyz(0.0, 1.06, 0.0)));
+    let head = head(&mut app, 24);
+    let (mut strands, mut drops) = (Vec::new(), Vec::new());
+    let mut origin = Vec3::ZERO;
+    for tick in 0..150 {
+        place_mut(&mut app, head, |place| place.translation.x += 1.0 / 60.0);
+        if tick == 110 {
+            let at = app.world().get::<Transform>(head).map_or(Vec3::ZERO, |it| it.translation);
+            for i in 0..120 {
+                let (sine, cosine) = (2.4 * i as f32).sin_cos();
+                let high = 0.2 + 0.01 * i as f32;
+                let droplet = Droplet::new(at + Vec3::new(0.1 * cosine, high, 0.1 * sine), 5e-9);
+                app.world_mut().spawn(droplet.unwrap_or_default());
+            }
+        }
+        if tick == 120 && shift != Shift::Not {
+            origin = by;
+            let world = app.world_mut();
+            let mut roots = world.query_filtered::<&mut Transform, Without<ChildOf>>();
+            roots.iter_mut(world).for_each(|mut place| place.translation += by);
+            if shift == Shift::Told {
+                world.commands().trigger(ShiftWorld { by });
+                world.flush();
+            }
+        }
+        app.update();
+        if tick >= 120 {
+            strands.extend(all(&mut app));
+            let world = app.world_mut();
+            drops.extend(world.query::<&Droplet>().iter(world).map(|it| it.position - origin));
+        }
+    }
+    (strands, drops)
+}
+
+/// Line 6: a shift of the world moves nothing of what is in it.
+pub fn shifts() -> Vec<Row> {
+    const BY: Vec3 = Vec3::new(-512.0, 0.0, 256.0);
+    let control = weathers(Shift::Not, BY);
+    let compare = |shift| {
+        let got = weathers(shift, BY);
+        let pairs = || control.0.iter().zip(&got.0);
+        let off = pairs().map(|(a, b)| super::apart(a.positions(), b.positions()));
+        let faster = pairs().map(|(a, b)| super::apart(a.velocities(), b.velocities()));
+        let [off, faster] = [off.fold(0.0, f32::max), faster.fold(0.0, f32::max)];
+        [off, faster, super::apart(&control.1, &got.1), got.1.len() as f32]
+    };
+    let [told, untold] = [Shift::Told, Shift::Untold].map(compare);
+    let what = "gusts, fan, pool and falling drops, world shifted";
+    let moved = f32::from(u8::from(untold[0] > 5e-3));
+    vec![
+        Row::at_most(format!("{what}: off (m)"), told[0], 1e-3),
+        Row::at_most(format!("{what}: other velocity (m/s)"), told[1], 0.05),
+        Row::at_most(format!("{what}: drops off (m)"), told[2], 1e-3),
+        Row::new(format!("{what}: drops"), control.1.len() as f32, told[3], 0.0),
+        Row::new(format!("control, {what} without a word: hair is moved"), 1.0, moved, 0.0),
+        Row::at_most(
+            format!("control, {what} without a word: drops that are left near hair"),
+            untold[3],
+            0.5 * told[3],
+        ),
+    ]
 }

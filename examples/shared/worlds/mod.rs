@@ -5,6 +5,8 @@ mod air;
 mod copies;
 mod frames;
 mod jumps;
+#[cfg(all(feature = "groom", feature = "save"))]
+mod scenes;
 mod shapes;
 #[path = "../wearer.rs"]
 pub mod wearer;
@@ -12,11 +14,15 @@ pub mod wearer;
 pub use air::{far_rain, gusts, scales, vehicles};
 #[cfg(all(feature = "groom", feature = "save"))]
 pub use copies::{copies, edits, roots};
-pub use frames::{frames, rates, reparented, riders};
-pub use jumps::{hitches, portals, returns, wet_jumps};
+pub use frames::{RIDES, frames, rates, reparented, riders};
+pub use jumps::{hitches, portals, returns, shifts, wet_jumps};
+#[cfg(all(feature = "groom", feature = "save"))]
+pub use scenes::scenes;
 pub use shapes::{hidden, solids, squashed};
 
 use super::rows::Row;
+#[cfg(all(feature = "groom", feature = "save"))]
+use bevy::asset::io::{AssetSourceBuilder, AssetSourceId, memory::MemoryAssetReader};
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::prelude::*;
 use std::time::Duration;
@@ -41,7 +47,14 @@ fn app(hertz: f64) -> App {
 fn app_with_meshes() -> App {
     let mut app = App::new();
     let frame = Duration::from_secs_f64(1.0 / 60.0);
-    app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default()))
+    let files = scenes::Files::default();
+    let root = files.0.clone();
+    let memory =
+        AssetSourceBuilder::new(move || Box::new(MemoryAssetReader { root: root.clone() }));
+    app.register_asset_source(AssetSourceId::Default, memory)
+        .insert_resource(files)
+        .add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default()))
+        .add_plugins(bevy::world_serialization::WorldSerializationPlugin)
         .init_asset::<Mesh>()
         .init_asset::<bevy::mesh::skinning::SkinnedMeshInverseBindposes>()
         .add_plugins(HairPlugins::default())
@@ -152,13 +165,14 @@ fn apart(a: &[Vec3], b: &[Vec3]) -> f32 {
 pub fn rows() -> Vec<Row> {
     let mut rows = [
         // A minute of frames that lose ticks; longer rides end where f32 no longer resolves their speed.
-        frames(20.0),
+        frames(&RIDES, 20.0),
         reparented(),
         rates(),
         riders(),
         returns(),
         portals(),
         hitches(),
+        shifts(),
         wet_jumps(),
         vehicles(),
         scales(),
@@ -170,6 +184,6 @@ pub fn rows() -> Vec<Row> {
     ]
     .concat();
     #[cfg(all(feature = "groom", feature = "save"))]
-    rows.extend([roots(), copies(), edits()].concat());
+    rows.extend([roots(), copies(), scenes(), edits()].concat());
     rows
 }

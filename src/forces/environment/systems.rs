@@ -215,8 +215,9 @@ fn blow(
         let place = |i: usize| carried_along(positions, i, back);
         let edge = place(e + 1) - place(e);
         let mut blown = winds.at(wind, zones, place(i), edge);
-        // What dries is the air that passes over the hair.
-        blown.velocity += winds.headwind - *velocity;
+        // What dries is the air that passes over the hair, which drag has slowed down by its part of the flow.
+        let dragged = blown.flow * if under.is_empty() { relaxation } else { relaxation * open(i) };
+        blown.velocity += winds.headwind - (*velocity + dragged);
         let wind = blown.acceleration * (air.dt * response(i)) + blown.flow * relaxation;
         *velocity += if under.is_empty() { wind } else { wind * open(i) };
         // On wet hair the wind dries the water, and the bonds follow that.
