@@ -246,9 +246,9 @@ fn scenario(seed: u64, seconds: u32) {
     if let Some(ledger) = app.world().get_resource::<WaterLedger>() {
         assert!(ledger.error() < 1e-5, "{ledger:?}; {label}");
     }
-    let told = &app.world().resource::<AllFaults>().0;
-    for (i, fault) in told.iter().enumerate() {
-        assert!(!told[..i].contains(fault), "told again: {fault}; {label}");
+    let all = &app.world().resource::<AllFaults>().0;
+    for (i, fault) in all.iter().enumerate() {
+        assert!(!all[..i].contains(fault), "reported again: {fault}; {label}");
     }
 }
 
