@@ -183,7 +183,7 @@ fn have_nodes(nodes: usize, strand_lanes: &[StrandLane<'_>]) -> bool {
 
 /// The order in which a hair's strands are grouped into blocks: their roots along a Morton curve.
 #[derive(Component, Reflect, Clone, Debug, Default)]
-#[reflect(Default, Clone)]
+#[reflect(Component, Default, Clone)]
 pub(super) struct StrandBlocks {
     order: Vec<u32>,
 }

@@ -168,7 +168,6 @@ fn heaters() -> Vec<Row> {
             .map(|(speed, warmth)| left_by_a_heater(speed, warmth));
     let differs = |other: [f32; 2]| f32::from(u8::from((other[0] - rests[0]).abs() > 0.1));
     vec![
-        Row::new("heater in a cabin at 20 m/s: share of water left", rests[0], rides[0], 0.01),
         Row::new("heater in a cabin at 20 m/s: bonds set", rests[1], rides[1], 0.01),
         Row::new("control, heater at rest: share of water left", 0.1, rests[0], 0.05),
         Row::new("control, no heat: another share is left", 1.0, differs(cold), 0.0),

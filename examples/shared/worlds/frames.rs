@@ -439,8 +439,8 @@ fn row_of_ride(
         spin > 0.0 && discards == Discards::Ticks && matches!(moved, Moved::Update | Moved::Player);
     if turns_unseen {
         rows.extend([
-            Row::at_most(format!("{what}: lean, turned unseen (°)"), high, 60.0),
-            Row::at_most(format!("{what}: tips (m/s²)"), got.acceleration, 100.0),
+            Row::at_most(format!("{what}: lean, turned unseen (°)"), high, 36.0 + 8.0 * speed),
+            Row::at_most(format!("{what}: tips (m/s²)"), got.acceleration, 10.0 + 30.0 * speed),
         ]);
         return rows;
     }
