@@ -142,7 +142,8 @@ fn used(without: &[Switch], ticks: u32) -> (App, Vec<Entity>) {
     (app, strands)
 }
 
-/// Warnings and errors as they are logged.
+/// Warnings and errors of the crate as they are logged: Bevy has some of its own about messages that no plugin
+/// has registered.
 #[derive(Clone, Default)]
 struct Warnings(Arc<Mutex<Vec<String>>>);
 
@@ -154,7 +155,7 @@ impl tracing::field::Visit for Warnings {
 
 impl tracing::Subscriber for Warnings {
     fn enabled(&self, about: &tracing::Metadata<'_>) -> bool {
-        *about.level() <= tracing::Level::WARN
+        *about.level() <= tracing::Level::WARN && about.target().starts_with("bevy_keratin")
     }
     fn new_span(&self, _: &tracing::span::Attributes<'_>) -> tracing::span::Id {
         tracing::span::Id::from_u64(1)
