@@ -13,7 +13,7 @@ use crate::{
         setting::{Ranged, Settings, report},
     },
     forces::environment::{
-        Blown, BlownAir, Gravity, Winds,
+        Blown, BlownAir, Gravity, LocalWinds, Winds,
         vapour::{DryingAir, WATER},
     },
     hair::strand::{
@@ -119,6 +119,7 @@ pub(super) fn run_showers(
 struct LocalWater<'a> {
     wetting: HairWetting,
     pose: Pose,
+    winds: LocalWinds,
     /// Of a substep, and of the time since bound water last moved.
     steps: [Passing<'a>; 2],
     /// Share of the difference by which bonds would approach it until bound water moves again.
@@ -135,7 +136,7 @@ struct Passing<'a> {
 struct Wet<'a> {
     strand: &'a Strand,
     bonds: &'a Bonds,
-    /// The air at each node; empty while it is still.
+    /// The air at each node; empty where the tick has not looked: in still air, and while it sleeps.
     blown: &'a [Blown],
     moisture: &'a mut Moisture,
     added_mass: &'a mut AddedMass,
@@ -228,14 +229,15 @@ pub(super) fn exchange_water(
     let is_still = winds.are_still();
     let gravity = gravity.clamped().0;
     let water_of = |hair: Entity| {
-        let pose = *hairs.get(hair).ok()?.0.now();
-        let wetting = wetting.of(hair);
+        let frame = hairs.get(hair).ok()?.0;
+        let pose = *frame.now();
+        let (wetting, winds) = (wetting.of(hair), winds.seen_from(frame));
         let steps = [(step.dt, process), (1.0, waited)].map(|(dt, process)| {
             let gravity = pose.direction_in(gravity);
             let conditions = WaterConditions::new(wetting, gravity, &air, dt, process);
             Passing { conditions, bonds_follow: wetting.bonds_follow(process * dt) }
         });
-        Some(LocalWater { wetting, pose, steps, to_come: wetting.bonds_follow(PERIOD) })
+        Some(LocalWater { wetting, pose, winds, steps, to_come: wetting.bonds_follow(PERIOD) })
     };
     let done = for_each_part(EXCHANGE, tables(&mut strands), Vec::new, |items, rows| {
         let (mut waters, mut done) = (PerHair::default(), Done::default());
@@ -246,8 +248,7 @@ pub(super) fn exchange_water(
             done.any |= has_water;
             done.busy |= is_busy;
             // What the air was around it when it fell asleep no longer counts.
-            let in_still_air = is_still || sleep.is_asleep();
-            let blown = if in_still_air { &[][..] } else { &air.nodes };
+            let blown = if is_still || sleep.is_asleep() { &[][..] } else { &air.nodes };
             let is_dried = || blown.iter().any(|air| air.drying > HARDLY_DRIES);
             let is_busy = is_busy || has_water && is_dried();
             if (is_busy || is_due && (damp || has_water))
@@ -315,17 +316,26 @@ struct Done {
 
 /// One strand's water in one step, with its effects on bonds and weight.
 fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bool, dt: f32) {
-    let LocalWater { wetting, steps, to_come, .. } = water;
+    let LocalWater { wetting, winds, steps, to_come, .. } = water;
     let Wet { strand, bonds, blown, moisture, added_mass, changes, sleep, is_busy, .. } = wet;
     let Passing { conditions, bonds_follow } = &steps[usize::from(!*is_busy)];
     wet.removed += moisture.fit(strand.nodes());
     let (positions, lengths, edges) = (strand.positions(), strand.rest_lengths(), strand.edges());
+    let (velocities, sleeps) = (strand.velocities(), sleep.is_asleep());
     let exposure = |i: usize| {
         if added_mass.in_water.get(i).is_some_and(InWater::is_under) {
             return Some(Exposure { submerged: true, ..default() });
         }
-        let (e, blown) = (i.min(edges - 1), blown.get(i)?);
-        let along = (positions[e + 1] - positions[e]).normalize_or_zero();
+        let e = i.min(edges - 1);
+        let edge = positions[e + 1] - positions[e];
+        let blown = match blown.get(i) {
+            Some(blown) => *blown,
+            // Air too slow to wake it may be warm.
+            None if sleeps && winds.are_still() => return None,
+            None if sleeps => winds.around_edge(positions[i], edge),
+            None => Blown::passing(winds.headwind - velocities[i]),
+        };
+        let along = edge.normalize_or_zero();
         let exposed = Exposure {
             speed: blown.velocity.cross(along).length(),
             warmth: blown.warmth(air.celsius),

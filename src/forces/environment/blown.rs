@@ -38,6 +38,11 @@ pub(crate) struct Blown {
 }
 
 impl Blown {
+    /// The room's own air, which passes at a velocity (m/s).
+    pub(crate) fn passing(velocity: Vec3) -> Self {
+        Self { velocity, ..default() }
+    }
+
     /// At a point of an `edge`, in a frame with `scale` world units per unit. Off its axis a jet falls
     /// off like equation 17's wind.
     pub(super) fn at(blowers: &[LocalBlower], scale: f32, p: Vec3, edge: Vec3) -> Self {
