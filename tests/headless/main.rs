@@ -68,6 +68,7 @@ mod fit;
 mod golden;
 mod groom;
 mod hairdo;
+mod held;
 mod lod;
 mod morph;
 mod pairs;

@@ -5,8 +5,10 @@ use crate::base::fault::{FaultKind, HairFault};
 use bevy::prelude::*;
 
 /// Nodes held by something else: a rod they are wound on, a hand, a clip. Held nodes have inverse
-/// mass 0 and move to their targets as far as the strand reaches: no edge is stretched. A target out of
-/// reach is reported once as a fault of kind [`FaultKind::Strand`]. Add it to a strand entity.
+/// mass 0 and move to their targets as far as the strand reaches by the way that colliders leave free: where an edge
+/// would be stretched or crushed by more than 4 % (with [`Sweeps`](crate::SolverMethod::Sweeps) 5 %, of springs 50 %) they
+/// give way. A target out of reach is reported once as a fault of kind [`FaultKind::Strand`]. Add it to a strand entity.
+/// Hair on the graphics card gives way to its own length only, not to colliders.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
 #[require(HeldNodesState)]
@@ -22,13 +24,27 @@ pub struct HeldNodes {
     pub frames: Vec<Option<Quat>>,
 }
 
-/// Whether targets of a strand's held nodes are out of reach. Kept by the tick.
-#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How held nodes come to their targets. Kept by the tick.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct HeldNodesState {
     /// A target is out of reach, which has been reported.
     pub out_of_reach: bool,
+    /// How far a node moves toward its target in a substep at most (m), since the strand could not follow; `None`
+    /// while it can, 0 where none is held for one substep.
+    pub(crate) pace: Option<f32>,
+    /// How often it could not since it was last at its targets.
+    pub(crate) refused: u16,
 }
+
+/// Pace of a strand that could not follow, as a share of the way that was refused; how much faster it may go after
+/// each substep in which it could; and the least (m), that of a strand which has been let go for a substep.
+const SLOWER: f32 = 0.25;
+const FASTER: f32 = 1.25;
+const SLOWEST: f32 = 1e-5;
+
+/// Refused substeps after which a target counts as out of reach.
+const REFUSALS: u16 = 16;
 
 /// Maximum extension of hair between two held nodes, as a share of its length. Fully straight
 /// hair has more length constraints than degrees of freedom, and its tensions are undetermined.
@@ -48,20 +64,48 @@ const SLACK: f32 = 1e-3;
 impl HeldNodes {
     /// Index and position of each held node. A target out of reach of the previous held node, or of
     /// the root, is moved within reach, and adjacent held nodes follow at the length of their edges; a
-    /// target that is not finite leaves the node free.
+    /// target that is not finite leaves the node free. With a `pace` nodes go together, none by more than that (m).
+    /// With a pace of 0 none is held.
     pub(crate) fn within_reach<'a>(
         &'a self,
         strand: &'a Strand,
+        pace: Option<f32>,
     ) -> impl Iterator<Item = (usize, Vec3)> + 'a {
         let root = strand.positions.first().copied().unwrap_or_default();
-        self.within_reach_of(root, strand)
+        let share = pace.map(|pace| (pace / self.farthest(strand)).min(1.0));
+        let is_held = pace.is_none_or(|pace| pace > 0.0);
+        let held = self.partly_within_reach(root, strand, share.filter(|share| *share < 1.0));
+        held.filter(move |_| is_held)
     }
 
     /// The same for a strand whose root is here.
+    #[cfg(feature = "gpu")]
     pub(crate) fn within_reach_of<'a>(
         &'a self,
         root: Vec3,
         strand: &'a Strand,
+    ) -> impl Iterator<Item = (usize, Vec3)> + 'a {
+        self.partly_within_reach(root, strand, None)
+    }
+
+    /// The largest distance of a held node from its target (m).
+    fn farthest(&self, strand: &Strand) -> f32 {
+        let held = self.targets.iter().zip(&strand.positions).skip(1);
+        held.filter_map(|(target, p)| Some(target.filter(|t| t.is_finite())?.distance(*p)))
+            .fold(0.0, f32::max)
+    }
+
+    /// The last held node that a target leads; 0 if there is none.
+    fn last(&self, strand: &Strand) -> usize {
+        let mut held = self.targets.iter().take(strand.nodes());
+        held.rposition(|target| target.is_some_and(|t| t.is_finite())).unwrap_or(0)
+    }
+
+    fn partly_within_reach<'a>(
+        &'a self,
+        root: Vec3,
+        strand: &'a Strand,
+        share: Option<f32>,
     ) -> impl Iterator<Item = (usize, Vec3)> + 'a {
         let targets = self.targets.iter().take(strand.nodes()).enumerate();
         let (mut last, mut length) = (root, 0.0);
@@ -77,12 +121,13 @@ impl HeldNodes {
                 last = target;
                 return Some((node, last));
             };
+            let target = share.map_or(target, |share| strand.positions[node].lerp(target, share));
             // Squares of user values may overflow f32.
             let direction = (target - last).as_dvec3();
             let distance = direction.length() as f32;
             let apart = if is_drawn {
                 drawn_out(distance, length)
-            } else if is_displaced {
+            } else if is_displaced || share.is_some() {
                 length
             } else {
                 distance.min(length)
@@ -103,10 +148,89 @@ impl HeldNodes {
         let unknown = unknown.map(|node| (node, f32::INFINITY));
         let most = SLACK * strand.length();
         unknown.or_else(|| {
-            self.within_reach(strand)
+            self.within_reach(strand, None)
                 .map(|(node, place)| (node, self.targets[node].map_or(0.0, |t| t.distance(place))))
                 .find(|(_, short)| *short > most)
         })
+    }
+}
+
+/// The held nodes of a strand that is stepped.
+pub(crate) struct Held<'a> {
+    pub(crate) nodes: &'a HeldNodes,
+    pub(crate) state: &'a mut HeldNodesState,
+}
+
+impl Held<'_> {
+    /// Index and position of each held node in this substep, root first.
+    pub(crate) fn places<'a>(
+        &'a self,
+        strand: &'a Strand,
+    ) -> impl Iterator<Item = (usize, Vec3)> + 'a {
+        self.nodes.within_reach(strand, self.state.pace)
+    }
+
+    /// Whether the strand is free in this substep, for it could not be held.
+    pub(crate) fn is_let_go(&self) -> bool {
+        self.state.pace == Some(0.0)
+    }
+
+    /// Whether a substep that brings nodes to a `place` is taken, which strains no edge before the last held node by
+    /// more than `most_strain`; else the strand is to give way. Sets the pace of the next one.
+    pub(crate) fn accepts(
+        &mut self,
+        strand: &Strand,
+        most_strain: f32,
+        place: impl Fn(usize) -> Vec3,
+    ) -> bool {
+        let mut before = place(0);
+        let fits = |(l, node): (&f32, usize)| {
+            let p = place(node);
+            let length = core::mem::replace(&mut before, p).distance(p);
+            (length - l).abs() <= most_strain * l
+        };
+        let held = strand.rest_lengths.iter().zip(1..=self.nodes.last(strand));
+        let is_let_go = self.is_let_go();
+        let state = &mut *self.state;
+        if is_let_go {
+            state.pace = Some(SLOWEST);
+            return true;
+        }
+        if held.map(fits).all(|fits| fits) {
+            state.pace = state.pace.filter(|pace| *pace < self.nodes.farthest(strand));
+            match &mut state.pace {
+                Some(pace) => *pace *= FASTER,
+                None => state.refused = 0,
+            }
+            return true;
+        }
+        let tried = state.pace.unwrap_or(f32::INFINITY).min(self.nodes.farthest(strand));
+        state.pace = Some(if tried > SLOWEST { (tried * SLOWER).max(SLOWEST) } else { 0.0 });
+        state.refused = state.refused.saturating_add(1);
+        false
+    }
+}
+
+impl Strand {
+    /// Does not take a substep: nodes up to the last held one stay where they are, at rest, as far as their edges'
+    /// lengths let them when the root has moved.
+    pub(crate) fn give_way(&mut self, held: &HeldNodes, most_strain: f32) {
+        let last = held.last(self);
+        for edge in 0..last {
+            let (start, end) = (self.positions[edge], self.positions[edge + 1]);
+            let (along, l) = ((end - start).as_dvec3(), self.rest_lengths[edge]);
+            let length = along.length() as f32;
+            if (length - l).abs() > 0.1 * most_strain * l {
+                let along = along.as_vec3().normalize_or(self.root_frame * Vec3::Z);
+                self.positions[edge + 1] = start + along * l;
+            }
+        }
+        for node in 0..=last {
+            self.velocities[node] = Vec3::ZERO;
+        }
+        self.tensions[..last].fill(0.0);
+        self.angular_velocities[..last].fill(Vec3::ZERO);
+        self.step_succeeded();
     }
 }
 
@@ -115,17 +239,34 @@ pub(super) fn report_out_of_reach(
     mut strands: Query<(Entity, &Strand, &HeldNodes, &mut HeldNodesState)>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    for (entity, strand, held, mut reach) in strands.iter_mut().filter(|s| s.1.nodes() > 1) {
-        let found = held.out_of_reach(strand);
-        if let (Some((node, short)), false) = (found, reach.out_of_reach) {
-            let message = format!(
+    for (entity, strand, held, mut state) in strands.iter_mut().filter(|s| s.1.nodes() > 1) {
+        let by_length = held.out_of_reach(strand);
+        let by_way = || {
+            let at = held.targets.iter().zip(&strand.positions).enumerate().skip(1);
+            let short = at.filter_map(|(i, (target, p))| Some((i, target.as_ref()?.distance(*p))));
+            short
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+                .filter(|(_, short)| *short > SLACK * strand.length())
+        };
+        let by_way = if state.refused >= REFUSALS { by_way() } else { None };
+        let message = match (by_length, by_way) {
+            (Some((node, short)), _) => Some(format!(
                 "node {node} of the strand is held {short} m farther away than hair of {} m reaches; \
                  it is held as near to its target as possible",
                 strand.length()
-            );
+            )),
+            (None, Some((node, short))) => Some(format!(
+                "node {node} of the strand is held {short} m farther away than hair of {} m reaches by the way \
+                 that colliders leave; it is held as near to its target as it gets by that",
+                strand.length()
+            )),
+            (None, None) => None,
+        };
+        let out_of_reach = message.is_some() || state.out_of_reach && state.pace.is_some();
+        if let Some(message) = message.filter(|_| !state.out_of_reach) {
             faults.write(HairFault::new(FaultKind::Strand, message).of(entity));
         }
-        reach.set_if_neq(HeldNodesState { out_of_reach: found.is_some() });
+        state.set_if_neq(HeldNodesState { out_of_reach, ..*state });
     }
 }
 
@@ -139,7 +280,7 @@ mod tests {
     }
 
     fn held(targets: &[Option<Vec3>]) -> Vec<(usize, Vec3)> {
-        HeldNodes { targets: targets.to_vec(), ..default() }.within_reach(&strand()).collect()
+        HeldNodes { targets: targets.to_vec(), ..default() }.within_reach(&strand(), None).collect()
     }
 
     #[test]
@@ -168,7 +309,7 @@ mod tests {
         let strand = strand();
         let out = |first: Option<Vec3>, x: f32| {
             let held = HeldNodes { targets: vec![None, first, Some(Vec3::X * x)], ..default() };
-            (held.within_reach(&strand).count(), held.out_of_reach(&strand))
+            (held.within_reach(&strand, None).count(), held.out_of_reach(&strand))
         };
         assert!(matches!(out(Some(Vec3::NAN), 0.1), (1, Some((1, _)))));
         assert_eq!(out(Some(Vec3::X * 0.1), 0.20001), (2, None), "rounding");

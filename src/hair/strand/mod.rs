@@ -23,6 +23,7 @@ mod teleport;
 
 pub(crate) use frame::Carried;
 pub use frame::{HairInertia, Pose, TickPose};
+pub(crate) use held::Held;
 pub(crate) use held::drawn_out;
 pub use held::{HeldNodes, HeldNodesState};
 pub use on_gpu::OnGpu;

@@ -214,7 +214,7 @@ impl Stretched for PermRod {
     }
 }
 
-/// The rod that a strand is wound on. Removing it, or despawning the rod, releases the strand.
+/// The rod that a strand is wound on. Removing it, despawning the rod or removing its [`PermRod`] releases the strand.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component, Clone, PartialEq)]
 #[relationship(relationship_target = WoundStrands)]

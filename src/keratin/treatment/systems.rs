@@ -47,6 +47,7 @@ impl Plugin for TreatmentPlugin {
                 messages.write(treat.event().clone());
             })
             .add_observer(release)
+            .add_observer(release_all)
             .add_systems(
                 HairTick,
                 (begin_treatments, apply_treatments).chain().in_set(HairSystems::Treatments),
@@ -187,5 +188,12 @@ fn release(left: On<Remove, WoundOn>, mut strands: Query<(&mut WindingProgress, 
     if let Ok((mut wound, mut held)) = strands.get_mut(left.entity) {
         held.targets.clear();
         *wound = default();
+    }
+}
+
+/// Releases the strands of a rod that is none any more.
+fn release_all(gone: On<Remove, PermRod>, rods: Query<&WoundStrands>, mut commands: Commands) {
+    for strand in rods.get(gone.entity).iter().flat_map(|wound| wound.iter()) {
+        commands.entity(strand).try_remove::<WoundOn>();
     }
 }

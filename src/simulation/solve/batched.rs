@@ -2,7 +2,7 @@
 
 use crate::{
     base::lanes::LANES,
-    hair::strand::{AddedMass, HeldNodes, Strand},
+    hair::strand::{AddedMass, Held, Strand},
     solver::rod::block::BlockLanes,
 };
 use bevy::prelude::*;
@@ -12,7 +12,7 @@ use bevy::prelude::*;
 pub(super) struct Source<'a> {
     pub(super) strand: &'a Strand,
     pub(super) added: &'a AddedMass,
-    pub(super) held: Option<&'a HeldNodes>,
+    pub(super) held: Option<&'a Held<'a>>,
 }
 
 /// Edge state besides orientations that a method keeps between substeps.
@@ -37,13 +37,13 @@ pub(super) struct Member<'a, K> {
     pub(super) hair: Entity,
     pub(super) strand: &'a mut Strand,
     pub(super) added: &'a AddedMass,
-    pub(super) held: Option<&'a HeldNodes>,
+    pub(super) held: Option<Held<'a>>,
     pub(super) own: K,
 }
 
 impl<K> Member<'_, K> {
     pub(super) fn source(&self) -> Source<'_> {
-        Source { strand: self.strand, added: self.added, held: self.held }
+        Source { strand: self.strand, added: self.added, held: self.held.as_ref() }
     }
 }
 
@@ -65,6 +65,10 @@ pub(super) trait Batched: Sized + Send {
     /// Edge state besides orientations that is written back.
     fn kept(_params: &Self::Params) -> Kept {
         Kept::Nothing
+    }
+    /// Strain of an edge by whose size a strand with held nodes does not take a substep.
+    fn most_strain(_params: &Self::Params) -> f32 {
+        0.5
     }
     /// Whether a second attempt differs from the first.
     fn may_repeat(_params: &Self::Params) -> bool {

@@ -56,7 +56,7 @@ pub(super) fn gather_nodes(block: &mut BlockLanes, from: &[Source<'_>; LANES], d
         };
         let positions = strand.positions();
         hold(&mut block.nodes[0], positions[0], positions[0]);
-        for (node, target) in held.iter().flat_map(|held| held.within_reach(strand)) {
+        for (node, target) in held.iter().flat_map(|held| held.places(strand)) {
             hold(&mut block.nodes[node], positions[node], target);
         }
     }
@@ -73,12 +73,16 @@ pub(super) fn scatter<T: Batched>(
     let kept = T::kept(params);
     for (group, four) in items.chunks_mut(4).enumerate() {
         let lanes = 4 * group..4 * group + four.len();
+        let any_held = four.iter().any(|item| item.held.is_some());
         match four {
-            [a, b, c, d] if block.finite[lanes.clone()] == [0.0; 4] => {
+            [a, b, c, d] if block.finite[lanes.clone()] == [0.0; 4] && !any_held => {
                 scatter_four(block, group, [a, b, c, d].map(|item| &mut *item.strand), kept);
             }
             four => {
                 for (lane, item) in lanes.zip(four) {
+                    if gives_way(block, lane, item, T::most_strain(params)) {
+                        continue;
+                    }
                     if block.finite[lane] == 0.0 {
                         scatter_one(block, lane, item.strand, kept);
                     } else {
@@ -89,6 +93,24 @@ pub(super) fn scatter<T: Batched>(
         }
     }
     failed
+}
+
+/// Whether a strand with held nodes does not take the substep, and stays where it was.
+fn gives_way<T>(
+    block: &BlockLanes,
+    lane: usize,
+    item: &mut Member<'_, T>,
+    most_strain: f32,
+) -> bool {
+    let Some(held) = &mut item.held else { return false };
+    if block.finite[lane] != 0.0 && (held.is_let_go() || !item.strand.is_finite()) {
+        return false;
+    }
+    let gives = !held.accepts(item.strand, most_strain, |node| take3(&block.nodes[node].p, lane));
+    if gives {
+        item.strand.give_way(held.nodes, most_strain);
+    }
+    gives
 }
 
 fn scatter_four(block: &BlockLanes, group: usize, strands: [&mut Strand; 4], kept: Kept) {

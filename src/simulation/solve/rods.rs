@@ -16,8 +16,8 @@ use crate::{
     },
     forces::contact::{Obstacles, StrandContact},
     hair::strand::{
-        AddedMass, Hair, HeldNodes, SimulatedHere, Strand, StrandModel, StrandOf, StrandSleep,
-        TickPose, lacks_strands,
+        AddedMass, Hair, Held, HeldNodes, HeldNodesState, SimulatedHere, Strand, StrandModel,
+        StrandOf, StrandSleep, TickPose, lacks_strands,
     },
     keratin::bond::{BondInfluence, BondPlugin, Bonds, RestShape},
     solver::rod::{
@@ -100,6 +100,13 @@ impl<'a> Batched for RodColumns<'a> {
         }
     }
 
+    fn most_strain(params: &HairParams<'_>) -> f32 {
+        match params.method {
+            Method::Direct { .. } => 0.04,
+            Method::Sweeps(..) => 0.05,
+        }
+    }
+
     fn may_repeat(params: &HairParams<'_>) -> bool {
         matches!(params.method, Method::Direct { .. })
     }
@@ -158,7 +165,7 @@ fn step_rods(
             &RestShape,
             &Bonds,
             &AddedMass,
-            Option<&HeldNodes>,
+            (Option<&HeldNodes>, Option<&mut HeldNodesState>),
         ),
         SimulatedHere,
     >,
@@ -221,6 +228,7 @@ fn step_rods(
                 && rest.darboux.len() == strand.edges()
                 && rest.stiffness.len() == strand.edges();
             let (entity, hair) = (*entity, of.0);
+            let held = held.0.zip(held.1).map(|(nodes, state)| Held { nodes, state });
             let own = RodColumns { rest, bonds };
             is_stepped.then_some(Member { entity, hair, strand, added, held, own })
         },
@@ -289,10 +297,11 @@ fn gather_twist(block: &mut BlockLanes, from: &[Source<'_>; LANES]) {
         for (edge, softening) in block.edges.iter_mut().zip(&source.added.softening) {
             edge.twist_loss[lane] = wet_twist_loss(*softening);
         }
-        let Some(held) = source.held.filter(|held| !held.frames.is_empty()) else { continue };
+        let Some(held) = source.held.filter(|held| !held.nodes.frames.is_empty()) else { continue };
         let mut before = 0;
-        for (node, _) in held.within_reach(source.strand).filter(|(node, _)| *node > 0) {
-            let frame = held.frames.get(node).copied().flatten().filter(|frame| frame.is_finite());
+        for (node, _) in held.places(source.strand).filter(|(node, _)| *node > 0) {
+            let frame =
+                held.nodes.frames.get(node).copied().flatten().filter(|frame| frame.is_finite());
             if let (Some(frame), true) = (frame, node == before + 1) {
                 let edge = &mut block.edges[node - 1];
                 edge.clamped[lane] = 1.0;

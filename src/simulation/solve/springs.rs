@@ -17,8 +17,8 @@ use crate::{
         environment::Gravity,
     },
     hair::strand::{
-        AddedMass, HeldNodes, SimulatedHere, Strand, StrandModel, StrandOf, StrandSleep, TickPose,
-        lacks_strands,
+        AddedMass, Held, HeldNodes, HeldNodesState, SimulatedHere, Strand, StrandModel, StrandOf,
+        StrandSleep, TickPose, lacks_strands,
     },
     keratin::bond::BondPlugin,
     solver::{
@@ -98,7 +98,14 @@ fn step_springs(
     gravity: Gravity,
     hairs: Query<(Option<&Obstacles>, &TickPose)>,
     mut strands: Query<
-        (Entity, &StrandOf, &StrandSleep, &mut Strand, &AddedMass, Option<&HeldNodes>),
+        (
+            Entity,
+            &StrandOf,
+            &StrandSleep,
+            &mut Strand,
+            &AddedMass,
+            (Option<&HeldNodes>, Option<&mut HeldNodesState>),
+        ),
         SimulatedHere,
     >,
     mut faults: MessageWriter<HairFault>,
@@ -131,6 +138,7 @@ fn step_springs(
         |(entity, of, sleep, strand, added, held)| {
             let is_stepped = sleep.is_simulated() && strand.nodes() >= 2;
             let (entity, hair) = (*entity, of.0);
+            let held = held.0.zip(held.1).map(|(nodes, state)| Held { nodes, state });
             is_stepped.then_some(Member {
                 entity,
                 hair,
