@@ -54,6 +54,7 @@ mod scenes {
 
 mod attack;
 mod avian;
+mod blink;
 mod bonds;
 mod character;
 mod characters;
