@@ -132,6 +132,7 @@ substep! {
         DropletContact: "Droplets pull the strands they touch (\\[W\\] 2 to 5)",
         Bridges: "Films between wet strands pull them together",
         RodWinding: "Perm rods guide the strands wound on them",
+        Ties: "Hair ties gather their strands and hold them",
     }
     RestShape: "Stiffness from the cuticle (13, 14), rest shapes from the bonds (15)" {}
     Projection: "Positions and velocities" {

@@ -100,7 +100,8 @@ pub enum Unsupported {
     ColliderShape,
     /// Roots that are held ([`HeldNodes`](crate::HeldNodes)), or held nodes with frames.
     HeldRoots,
-    /// Strands of which winding on a [`PermRod`](crate::PermRod) begins.
+    /// Strands of which winding on a [`PermRod`](crate::PermRod), or gathering to a [`HairTie`](crate::HairTie),
+    /// begins.
     Winding,
     /// Roots that are being tied to a mesh.
     MovingRoots,
@@ -157,7 +158,7 @@ impl fmt::Display for Unsupported {
                 "colliders other than balls, ellipsoids, capsules, cylinders and half-spaces are not supported there"
             }
             Self::HeldRoots => "held roots are not supported there",
-            Self::Winding => "its strands begin to be wound on a rod",
+            Self::Winding => "its strands begin to be wound on a rod or gathered to a tie",
             Self::MovingRoots => "its roots are being tied to a mesh",
             Self::LevelOfDetail => "at its level of detail other strands are simulated, or none",
             Self::Settling => "it is still settling",

@@ -14,7 +14,10 @@ use crate::{
         environment::{WindReceived, Winds},
     },
     hair::strand::{Hair, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose},
-    hairdo::style::HairStyle,
+    hairdo::{
+        style::HairStyle,
+        tie::{TieProgress, Tied},
+    },
     keratin::treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
     simulation::{
         lod::{Guides, PresentLod},
@@ -62,6 +65,7 @@ pub(super) struct Support<'w, 's> {
             &'static WindingProgress,
         ),
     >,
+    tied: Query<'w, 's, (&'static StrandOf, &'static TieProgress), With<Tied>>,
     rods: Query<'w, 's, (), With<PermRod>>,
     counted: Query<'w, 's, &'static StrandOf, With<WindReceived>>,
     disabled: Query<'w, 's, &'static StrandOf, (With<OnGpu>, With<Disabled>)>,
@@ -83,6 +87,8 @@ impl Support<'_, '_> {
             self.rods.contains(on.0) && wound.waits(strand, settings)
         });
         found.extend(begins.map(|(of, ..)| (of.0, Unsupported::Winding)));
+        let begins = self.tied.iter().filter(|(_, tie)| tie.waits());
+        found.extend(begins.map(|(of, _)| (of.0, Unsupported::Winding)));
         found.extend(self.counted.iter().map(|of| (of.0, Unsupported::WindReceived)));
         found.extend(self.disabled.iter().map(|of| (of.0, Unsupported::Strands)));
         found

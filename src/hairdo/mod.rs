@@ -1,8 +1,10 @@
-//! Shapes that hair has been given: [`style`] measures how much of one is left, `save` keeps one as bytes.
+//! Shapes that hair has been given: [`style`] measures how much of one is left, [`tie`] holds strands together, `save`
+//! keeps a hairdo as bytes.
 
 #[cfg(feature = "save")]
 pub mod save;
 pub mod style;
+pub mod tie;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
@@ -12,4 +14,7 @@ pub mod prelude {
         HairdoRejected,
     };
     pub use crate::hairdo::style::{HairCondition, HairStyle, KeptStyle, StyleFaded};
+    pub use crate::hairdo::tie::{
+        HairTie, HairTied, StrandRegion, TieHair, TieProgress, Tied, TiedStrands,
+    };
 }

@@ -10,7 +10,7 @@ use bevy_keratin::{
     forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
     gpu::HairGpuPlugin,
     hair::{look::LookPlugin, strand::StrandPlugin},
-    hairdo::{save::SavePlugin, style::StylePlugin},
+    hairdo::{save::SavePlugin, style::StylePlugin, tie::TiePlugin},
     keratin::{bond::BondPlugin, treatment::TreatmentPlugin},
     render::HairRenderPlugin,
     simulation::{
@@ -32,7 +32,7 @@ macro_rules! switches {
 }
 
 /// All of the group.
-pub const ALL: [(&str, Switch); 22] = switches![
+pub const ALL: [(&str, Switch); 23] = switches![
     TickPlugin,
     StrandPlugin,
     BondPlugin,
@@ -46,6 +46,7 @@ pub const ALL: [(&str, Switch); 22] = switches![
     SleepPlugin,
     LodPlugin,
     StylePlugin,
+    TiePlugin,
     LookPlugin,
     HairRenderPlugin,
     HairGpuPlugin,

@@ -85,6 +85,7 @@ mod style;
 mod submersion;
 mod swing;
 mod tick;
+mod tie;
 mod water;
 mod wear;
 mod wind;

@@ -2,7 +2,7 @@
 
 use super::Strand;
 use crate::base::fault::{FaultKind, HairFault};
-use bevy::prelude::*;
+use bevy::{math::Isometry3d, prelude::*};
 
 /// Nodes held by something else: a rod they are wound on, a hand, a clip. Held nodes have inverse
 /// mass 0 and move to their targets as far as the strand reaches by the way that colliders leave free: where an edge
@@ -33,15 +33,19 @@ pub struct HeldNodesState {
     /// How far a node moves toward its target in a substep at most (m), since the strand could not follow; `None`
     /// while it can, 0 where none is held for one substep.
     pub(crate) pace: Option<f32>,
-    /// How often it could not since it was last at its targets.
+    /// How often it could not since it was last at its targets, and how often in a row.
     pub(crate) refused: u16,
+    in_a_row: u8,
 }
 
 /// Pace of a strand that could not follow, as a share of the way that was refused; how much faster it may go after
 /// each substep in which it could; and the least (m), that of a strand which has been let go for a substep.
 const SLOWER: f32 = 0.25;
-const FASTER: f32 = 1.25;
+const FASTER: f32 = 1.5;
 const SLOWEST: f32 = 1e-5;
+
+/// Refused substeps in a row at the slowest pace after which a strand is let go.
+const STUCK: u8 = 4;
 
 /// Refused substeps after which a target counts as out of reach.
 const REFUSALS: u16 = 16;
@@ -193,10 +197,11 @@ impl Held<'_> {
         let is_let_go = self.is_let_go();
         let state = &mut *self.state;
         if is_let_go {
-            state.pace = Some(SLOWEST);
+            (state.pace, state.in_a_row) = (Some(SLOWEST), 0);
             return true;
         }
         if held.map(fits).all(|fits| fits) {
+            state.in_a_row = 0;
             state.pace = state.pace.filter(|pace| *pace < self.nodes.farthest(strand));
             match &mut state.pace {
                 Some(pace) => *pace *= FASTER,
@@ -205,28 +210,39 @@ impl Held<'_> {
             return true;
         }
         let tried = state.pace.unwrap_or(f32::INFINITY).min(self.nodes.farthest(strand));
-        state.pace = Some(if tried > SLOWEST { (tried * SLOWER).max(SLOWEST) } else { 0.0 });
+        state.in_a_row = if tried > SLOWEST { 0 } else { state.in_a_row + 1 };
+        let is_stuck = state.in_a_row >= STUCK;
+        state.pace = Some(if is_stuck { 0.0 } else { (tried * SLOWER).max(SLOWEST) });
         state.refused = state.refused.saturating_add(1);
         false
     }
 }
 
 impl Strand {
-    /// Does not take a substep: nodes up to the last held one stay where they are, at rest, as far as their edges'
-    /// lengths let them when the root has moved.
-    pub(crate) fn give_way(&mut self, held: &HeldNodes, most_strain: f32) {
-        let last = held.last(self);
-        for edge in 0..last {
-            let (start, end) = (self.positions[edge], self.positions[edge + 1]);
+    /// Does not take a substep of `dt` (s), in which points at rest in the world have moved by `frame_delta`: nodes stay
+    /// where they were on the head, as far as their edges' lengths let them when the root has moved; those up to the last
+    /// held one at rest.
+    pub(crate) fn give_way(
+        &mut self,
+        held: &HeldNodes,
+        most_strain: f32,
+        frame_delta: Isometry3d,
+        dt: f32,
+    ) {
+        let (last, back) = (held.last(self), frame_delta.inverse());
+        for edge in 0..self.edges() {
+            let (start, shifted) = (self.positions[edge], self.positions[edge + 1]);
+            let mut end = back * shifted;
             let (along, l) = ((end - start).as_dvec3(), self.rest_lengths[edge]);
             let length = along.length() as f32;
             if (length - l).abs() > 0.1 * most_strain * l {
-                let along = along.as_vec3().normalize_or(self.root_frame * Vec3::Z);
-                self.positions[edge + 1] = start + along * l;
+                end = start + along.as_vec3().normalize_or(self.root_frame * Vec3::Z) * l;
             }
+            self.positions[edge + 1] = end;
+            self.orientations[edge] = (back.rotation * self.orientations[edge]).normalize();
         }
-        for node in 0..=last {
-            self.velocities[node] = Vec3::ZERO;
+        for (v, p) in self.velocities.iter_mut().zip(&self.positions).take(last + 1) {
+            *v = (*p - frame_delta * *p) / dt;
         }
         self.tensions[..last].fill(0.0);
         self.angular_velocities[..last].fill(Vec3::ZERO);

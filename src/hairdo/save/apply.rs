@@ -1,6 +1,6 @@
 //! Taking a hairdo from a hair in the world, and putting it on.
 
-use super::{Hairdo, HairdoError, StyledStrand};
+use super::{Hairdo, HairdoError, StyledStrand, holds::holds_of};
 use crate::{
     base::{
         fault::{FaultKind, HairFault},
@@ -35,27 +35,31 @@ impl Hairdo {
 
     /// Of what its strands hold, wherever it is simulated.
     pub(super) fn of_strands(world: &World, hair: Entity) -> Result<Self, HairdoError> {
-        let strands = members(world, hair)?
+        let mut members = members(world, hair)?;
+        members.retain(|member| world.get::<Strand>(*member).is_some());
+        let (ties, holds) = holds_of(world, hair, &members);
+        let strands = members
             .into_iter()
-            .filter_map(|member| {
+            .zip(holds)
+            .filter_map(|(member, hold)| {
                 let strand = world.get::<Strand>(member)?;
                 let (bonds, water) = (world.get::<Bonds>(member), world.get::<Moisture>(member));
-                Some(StyledStrand::of(strand, bonds, water))
+                Some(StyledStrand { hold, ..StyledStrand::of(strand, bonds, water) })
             })
             .collect();
         let cuticle = world.get::<Cuticle>(hair).copied();
         let look = world.get::<HairLook>(hair).map(Ranged::clamped);
         let dye = world.get::<HairDye>(hair).map(Ranged::clamped).unwrap_or_default();
         let preset = world.get::<WornPreset>(hair).map(Ranged::clamped);
-        Self { strands, cuticle, look, dye, preset }.checked()
+        Self { strands, cuticle, look, dye, preset, ties }.checked()
     }
 
     /// Puts the hairdo on a hair of the same groom, at rest: all strands, or in case of an error
     /// none.
     ///
     /// Roots stay where they are; a strand whose root has moved since, as on a skinned mesh, is
-    /// moved with it. Acting treatments end, winding on a rod starts again, nodes held by
-    /// [`HeldNodes`] otherwise stay held. Drops stay where they are in the world. Water that the
+    /// moved with it. Acting treatments end, winding on a rod starts again. Ties of the hairdo come as children of the
+    /// hair, others let go of its strands; nodes held by [`HeldNodes`] otherwise stay held. Drops stay where they are in the world. Water that the
     /// hairdo adds or the old one removes is entered in the [`WaterLedger`]. Look and dye are put
     /// on too; without a [`look`](Self::look) of the hairdo's own the hair keeps its look.
     ///
@@ -74,9 +78,10 @@ impl Hairdo {
             gravity: (world.get_resource::<HairGravity>()).map_or(0.0, |g| g.clamped().length()),
         };
         let mut added = 0.0;
-        for (member, style) in members.into_iter().zip(&self.strands) {
-            added += style.apply(world.entity_mut(member), &conditions);
+        for (member, style) in members.iter().zip(&self.strands) {
+            added += style.apply(world.entity_mut(*member), &conditions);
         }
+        self.hold(world, hair, &members);
         if let Some(mut ledger) = world.get_resource_mut::<WaterLedger>()
             && added != 0.0
         {
@@ -190,6 +195,7 @@ impl StyledStrand {
             joints,
             film: water.map(|water| fitted(water.film())).unwrap_or_default(),
             bound: water.map(|water| fitted(water.bound())).unwrap_or_default(),
+            hold: None,
         }
     }
 

@@ -18,7 +18,7 @@ impl Hairdo {
     /// lengths, where blended positions would shrink them. Remembered shapes are weighted by the
     /// rates of their bonds. Pigments, bleach and dyes are blended by absorption,
     /// [`HairLook::dye`](crate::hair::look::HairLook::dye) in linear light. Where only one has a cuticle
-    /// or a look of its own, that of the nearer hairdo is used, as is its preset.
+    /// or a look of its own, that of the nearer hairdo is used, as are its preset and what holds its strands.
     ///
     /// # Errors
     /// When the hairdos differ in strands or nodes, or `t` is outside 0…1.
@@ -48,7 +48,8 @@ impl Hairdo {
             _ => nearer.look.clone(),
         };
         let (dye, preset) = (a.dye.blend(&b.dye, t), nearer.preset.clone());
-        Self { strands, cuticle, look, dye, preset }.checked()
+        let ties = nearer.ties.clone();
+        Self { strands, cuticle, look, dye, preset, ties }.checked()
     }
 }
 
@@ -76,6 +77,7 @@ impl StyledStrand {
             joints: joints.map(|(a, b)| joint(a, b, t)).collect(),
             film: water(&self.film, &other.film, t),
             bound: water(&self.bound, &other.bound, t),
+            hold: if t < 0.5 { self } else { other }.hold.clone(),
         }
     }
 

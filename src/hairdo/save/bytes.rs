@@ -12,8 +12,8 @@
 //! damage and softening as an option; then strand by strand its nodes, whether it is wet, the
 //! root's frame, positions, orientations, rest lengths, joints, and if wet film and bound water.
 //! Counts are varints. A joint is a byte that marks which of its shapes and rates are omitted
-//! because they can be derived, then the others. Format 2 appends looks, see `looks`; a hairdo
-//! without any is written in format 1.
+//! because they can be derived, then the others. Format 2 appends looks, see `looks`, format 3 what holds
+//! strands, see `holds`; a hairdo without them is written in format 1.
 
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::keratin::bond::{BondKind, Cuticle, JointBonds};
@@ -22,10 +22,13 @@ use serde::{Deserialize, Serialize};
 
 /// The newest format that can be read. Hairdos are written in the oldest format that holds all
 /// their data.
-pub const NEWEST_FORMAT: u16 = 2;
+pub const NEWEST_FORMAT: u16 = 3;
 
 /// The first format that has looks.
 const WITH_LOOKS: u16 = 2;
+
+/// The first format that has ties and held nodes.
+const WITH_HOLDS: u16 = 3;
 
 const MAGIC: [u8; 8] = *b"\x8bhairdo\n";
 /// Magic, format and length.
@@ -44,14 +47,21 @@ impl Hairdo {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Writer(Vec::with_capacity(HEAD + CHECKSUM + 48 * self.nodes()));
         out.0.extend(MAGIC);
-        let format = if self.has_looks() { WITH_LOOKS } else { 1 };
+        let format = match (self.has_holds(), self.has_looks()) {
+            (true, _) => WITH_HOLDS,
+            (_, true) => WITH_LOOKS,
+            _ => 1,
+        };
         out.0.extend(format.to_le_bytes());
         out.0.extend([0; 8]);
         out.put(&(self.strands.len() as u64));
         out.put(&self.cuticle.map(|c| (c.damage, c.softening)));
         self.strands.iter().for_each(|strand| out.strand(strand));
-        if self.has_looks() {
+        if format >= WITH_LOOKS {
             self.write_looks(&mut out);
+        }
+        if format >= WITH_HOLDS {
+            self.write_holds(&mut out);
         }
         let length = (out.0.len() - HEAD) as u64;
         out.0[HEAD - 8..HEAD].copy_from_slice(&length.to_le_bytes());
@@ -98,6 +108,9 @@ impl Hairdo {
         let mut hairdo = reader.hairdo()?;
         if format >= WITH_LOOKS {
             hairdo.read_looks(&mut reader)?;
+        }
+        if format >= WITH_HOLDS {
+            hairdo.read_holds(&mut reader)?;
         }
         if !reader.rest.is_empty() {
             return Err(reader.wrong("the checksum"));
@@ -188,7 +201,11 @@ impl<'a> Reader<'a> {
 
     /// A count of items of at least `size` bytes each, checked against the bytes that are left, so that a
     /// damaged file causes no huge allocation.
-    fn count(&mut self, size: usize, expected: &'static str) -> Result<usize, HairdoError> {
+    pub(super) fn count(
+        &mut self,
+        size: usize,
+        expected: &'static str,
+    ) -> Result<usize, HairdoError> {
         let before = self.rest;
         let count: u64 = self.take(expected)?;
         match usize::try_from(count) {
@@ -200,7 +217,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn many<T: Deserialize<'a>, U>(
+    pub(super) fn many<T: Deserialize<'a>, U>(
         &mut self,
         count: usize,
         expected: &'static str,
@@ -233,6 +250,7 @@ impl<'a> Reader<'a> {
             joints: (0..edges).map(|_| self.joint()).collect::<Result<_, _>>()?,
             film: self.many(watered, "a film", |volume| volume)?,
             bound: self.many(watered, "bound water", |volume| volume)?,
+            hold: None,
         })
     }
 

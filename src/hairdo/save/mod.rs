@@ -2,8 +2,8 @@
 //! another groom, blended and undone.
 //!
 //! A [`Hairdo`] holds everything that makes a style: where the nodes are, which shapes the bonds
-//! remember and how many of them are closed, the water, the cuticle's wear, its look with bleach
-//! and dye, and which preset it was made on. It does not hold the rest of a hair: roots belong to
+//! remember and how many of them are closed, the water, what ties and holds it, the cuticle's wear, its look with
+//! bleach and dye, and which preset it was made on. It does not hold the rest of a hair: roots belong to
 //! the scalp, settings such as [`HairStiffness`](crate::HairStiffness) to the character, drops of
 //! water to the world.
 //!
@@ -18,6 +18,7 @@ mod blend;
 mod bytes;
 mod error;
 mod events;
+mod holds;
 mod looks;
 mod plugin;
 mod resample;
@@ -37,6 +38,7 @@ use crate::{
     solver::rod::frame::darboux,
 };
 use bevy::prelude::*;
+use holds::{Hold, StyledTie};
 
 /// The style of one [`Hair`](crate::Hair) at one moment: nodes, bonds, water and wear of every
 /// strand, in the order of [`Strands`](crate::Strands), with look and dye. Lengths are in the hair's
@@ -72,6 +74,7 @@ pub struct Hairdo {
     look: Option<HairLook>,
     dye: HairDye,
     preset: Option<WornPreset>,
+    ties: Vec<StyledTie>,
 }
 
 /// One strand of a [`Hairdo`].
@@ -86,6 +89,7 @@ pub struct StyledStrand {
     joints: Vec<JointBonds>,
     film: Vec<f64>,
     bound: Vec<f64>,
+    hold: Option<Hold>,
 }
 
 /// The maximum water of a node (m³).
@@ -142,6 +146,7 @@ impl Hairdo {
 
     /// The hairdo, if all its numbers are valid.
     fn checked(self) -> Result<Self, HairdoError> {
+        self.check_holds()?;
         for (index, strand) in self.strands.iter().enumerate() {
             strand.check(index)?;
         }

@@ -21,7 +21,7 @@ impl Hairdo {
     /// With as many strands, each takes the style of the one with its index; else of the one with
     /// the nearest root. Along a strand everything is mapped by the share of its length. Curvature
     /// is kept, not the angles of joints: a curl has the same radius on fewer or more nodes, and on
-    /// longer hair more turns. Water is kept per length. Lengths, roots and the scalp's frames are
+    /// longer hair more turns. Ties hold it as far from the root. Water is kept per length. Lengths, roots and the scalp's frames are
     /// the new groom's.
     ///
     /// # Limits
@@ -56,7 +56,8 @@ impl Hairdo {
         });
         let (strands, preset) = (strands.collect(), other.preset.clone());
         let (look, dye) = (self.look.clone(), self.dye.clone());
-        Self { strands, cuticle: self.cuticle, look, dye, preset }.checked()
+        let ties = self.ties.clone();
+        Self { strands, cuticle: self.cuticle, look, dye, preset, ties }.checked()
     }
 }
 
@@ -110,8 +111,23 @@ impl StyledStrand {
             joints,
             film: water(&self.film),
             bound: water(&self.bound),
+            hold: self.hold_for(lengths),
         }
     }
+}
+
+/// The node of a strand with `new` lengths that is as far along it as `node` along `old` ones; `None` if it is shorter.
+pub(super) fn nearest_node(old: &[f32], node: usize, new: &[f32]) -> Option<usize> {
+    let along: f32 = old.iter().take(node).sum();
+    let mut arc = 0.0;
+    let arcs = core::iter::once(0.0).chain(new.iter().map(|l| {
+        arc += l;
+        arc
+    }));
+    let (nearest, off) =
+        arcs.map(|arc| arc - along).enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    let edge = new.get(nearest.saturating_sub(1))?;
+    (off >= -0.5 * edge).then_some(nearest)
 }
 
 /// Arc lengths along an old and a new strand, both in the old one's lengths.

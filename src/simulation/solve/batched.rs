@@ -5,7 +5,7 @@ use crate::{
     hair::strand::{AddedMass, Held, Strand},
     solver::rod::block::BlockLanes,
 };
-use bevy::prelude::*;
+use bevy::{math::Isometry3d, prelude::*};
 
 /// The data that a lane is filled from.
 #[derive(Clone, Copy)]
@@ -65,6 +65,10 @@ pub(super) trait Batched: Sized + Send {
     /// Edge state besides orientations that is written back.
     fn kept(_params: &Self::Params) -> Kept {
         Kept::Nothing
+    }
+    /// How points at rest in the world moved in the hair's frame, if they did.
+    fn frame_delta(_params: &Self::Params) -> Option<Isometry3d> {
+        None
     }
     /// Strain of an edge by whose size a strand with held nodes does not take a substep.
     fn most_strain(_params: &Self::Params) -> f32 {

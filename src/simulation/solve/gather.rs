@@ -80,7 +80,7 @@ pub(super) fn scatter<T: Batched>(
             }
             four => {
                 for (lane, item) in lanes.zip(four) {
-                    if gives_way(block, lane, item, T::most_strain(params)) {
+                    if gives_way(block, lane, item, params) {
                         continue;
                     }
                     if block.finite[lane] == 0.0 {
@@ -96,19 +96,21 @@ pub(super) fn scatter<T: Batched>(
 }
 
 /// Whether a strand with held nodes does not take the substep, and stays where it was.
-fn gives_way<T>(
+fn gives_way<T: Batched>(
     block: &BlockLanes,
     lane: usize,
     item: &mut Member<'_, T>,
-    most_strain: f32,
+    params: &T::Params,
 ) -> bool {
+    let most_strain = T::most_strain(params);
     let Some(held) = &mut item.held else { return false };
     if block.finite[lane] != 0.0 && (held.is_let_go() || !item.strand.is_finite()) {
         return false;
     }
     let gives = !held.accepts(item.strand, most_strain, |node| take3(&block.nodes[node].p, lane));
     if gives {
-        item.strand.give_way(held.nodes, most_strain);
+        let frame_delta = T::frame_delta(params).unwrap_or_default();
+        item.strand.give_way(held.nodes, most_strain, frame_delta, T::dt(params));
     }
     gives
 }

@@ -56,6 +56,8 @@ struct HairParams<'a> {
     level: Level,
     method: Method,
     dt: f32,
+    /// How points at rest in the world moved in the hair's frame.
+    frame_delta: Option<Isometry3d>,
     clearance: f32,
     bending_length: f32,
     influence: [f32; 4],
@@ -63,11 +65,7 @@ struct HairParams<'a> {
 }
 
 enum Method {
-    Direct {
-        params: DirectParams,
-        /// How points at rest in the world moved in the hair's frame.
-        frame_delta: Option<Isometry3d>,
-    },
+    Direct(DirectParams),
     Sweeps(SweepParams, Sweeps),
 }
 
@@ -95,20 +93,24 @@ impl<'a> Batched for RodColumns<'a> {
 
     fn kept(params: &HairParams<'_>) -> Kept {
         match params.method {
-            Method::Direct { .. } => Kept::Tensions,
+            Method::Direct(_) => Kept::Tensions,
             Method::Sweeps(..) => Kept::AngularVelocities,
         }
     }
 
+    fn frame_delta(params: &HairParams<'_>) -> Option<Isometry3d> {
+        params.frame_delta
+    }
+
     fn most_strain(params: &HairParams<'_>) -> f32 {
         match params.method {
-            Method::Direct { .. } => 0.04,
+            Method::Direct(_) => 0.04,
             Method::Sweeps(..) => 0.05,
         }
     }
 
     fn may_repeat(params: &HairParams<'_>) -> bool {
-        matches!(params.method, Method::Direct { .. })
+        matches!(params.method, Method::Direct(_))
     }
 
     fn dt(params: &HairParams<'_>) -> f32 {
@@ -129,12 +131,12 @@ impl<'a> Batched for RodColumns<'a> {
         gather_frames(block, sources, items);
         block.near(params.obstacles, params.dt, params.clearance, near);
         match &params.method {
-            Method::Direct { params: direct, frame_delta } => {
+            Method::Direct(direct) => {
                 gather_tensions(block, sources);
                 gather_forces(block, sources);
                 direct::split_forces(params.level, block, params.dt);
                 gather_twist(block, sources);
-                gather_roots(block, sources, frame_delta.unwrap_or_default());
+                gather_roots(block, sources, params.frame_delta.unwrap_or_default());
                 direct::weigh(params.level, block, params.bending_length, params.dt);
                 if attempt == Attempt::Second {
                     direct::soften(block);
@@ -183,16 +185,13 @@ fn step_rods(
         let (dt, clearance, stiffness) = (substep.dt, contact.of(hair).radius, stiffness.of(hair));
         let solver = solver.of(hair);
         let method = match solver.method {
-            SolverMethod::Direct => Method::Direct {
-                params: DirectParams {
-                    dt,
-                    damping: stiffness.damping,
-                    torsion: stiffness.torsion,
-                    limiter_steps: solver.limiter_steps,
-                    clearance,
-                },
-                frame_delta: pose.frame_delta(),
-            },
+            SolverMethod::Direct => Method::Direct(DirectParams {
+                dt,
+                damping: stiffness.damping,
+                torsion: stiffness.torsion,
+                limiter_steps: solver.limiter_steps,
+                clearance,
+            }),
             SolverMethod::Sweeps => {
                 let sweeps = sweeps.of(hair);
                 let params = SweepParams {
@@ -210,6 +209,7 @@ fn step_rods(
             level,
             method,
             dt,
+            frame_delta: pose.frame_delta(),
             clearance,
             bending_length: stiffness.bending_length,
             influence: influence.of(hair).as_array(),

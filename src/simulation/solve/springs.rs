@@ -29,7 +29,7 @@ use crate::{
         rod::{block::BlockLanes, obstacle::Obstacle, step::weigh},
     },
 };
-use bevy::prelude::*;
+use bevy::{math::Isometry3d, prelude::*};
 use core::marker::PhantomData;
 use fearless_simd::Level;
 
@@ -53,6 +53,8 @@ impl Plugin for SpringPlugin {
 struct HairParams<'a> {
     level: Level,
     step: SpringParams,
+    /// How points at rest in the world moved in the hair's frame.
+    frame_delta: Option<Isometry3d>,
     obstacles: &'a [Obstacle],
 }
 
@@ -68,6 +70,10 @@ impl<'a> Batched for SpringColumns<'a> {
         params.step.dt
     }
 
+    fn frame_delta(params: &HairParams<'_>) -> Option<Isometry3d> {
+        params.frame_delta
+    }
+
     fn block((lanes, _): &mut Self::Lanes) -> &mut BlockLanes {
         &mut lanes.strands
     }
@@ -76,7 +82,7 @@ impl<'a> Batched for SpringColumns<'a> {
         (lanes, near): &mut Self::Lanes,
         sources: &[Source<'_>; LANES],
         _: &[Member<'_, Self>],
-        HairParams { level, step: params, obstacles }: &HairParams<'_>,
+        HairParams { level, step: params, obstacles, .. }: &HairParams<'_>,
         _: Attempt,
     ) {
         let strands = &mut lanes.strands;
@@ -126,7 +132,7 @@ fn step_springs(
                 clearance: contact.of(hair).radius,
             };
             let obstacles = obstacles.map_or(&[][..], |all| &all.solids);
-            HairParams { level, step, obstacles }
+            HairParams { level, step, obstacles, frame_delta: pose.frame_delta() }
         })
     };
     let nodes = strands.iter().next().map_or(0, |(_, _, _, strand, ..)| strand.nodes());
