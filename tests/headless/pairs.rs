@@ -222,7 +222,12 @@ fn scenario(seed: u64, seconds: u32) {
     }
     tools.into_iter().for_each(|tool| app.world_mut().entity_mut(tool).despawn());
     app.insert_resource(HairWind::default());
-    (0..60 * 6).for_each(|_| app.update());
+    // Springs have no damping of a swing but the air's, which takes it from 5 cm to what counts as still in 7 s.
+    let is_spring = |hair: &Entity| {
+        matches!(app.world().get::<StrandModel>(*hair), Some(StrandModel::MassSpring))
+    };
+    let rest = if hairs.iter().any(|(_, hair, ..)| is_spring(hair)) { 9 } else { 6 };
+    (0..60 * rest).for_each(|_| app.update());
     for (i, (_, hair, strands, rod, _)) in hairs.iter().enumerate() {
         let world = app.world();
         let is_hidden = world.entity(*hair).contains::<Settling>();
@@ -269,7 +274,8 @@ fn features_go_together() {
 fn features_go_together_for_an_hour() {
     let number = |name| std::env::var(name).ok().and_then(|value| value.parse::<u64>().ok());
     let end = Instant::now() + Duration::from_secs(number("KERATIN_PAIRS_SECONDS").unwrap_or(3600));
-    let mut seed = number("KERATIN_PAIRS_SEED").unwrap_or(1000);
+    let first = number("KERATIN_PAIRS_SEED").unwrap_or(1000);
+    let mut seed = first;
     let mut broken = Vec::new();
     while Instant::now() < end {
         let seconds = 1 + (seed % 3) as u32;
@@ -278,5 +284,6 @@ fn features_go_together_for_an_hour() {
         }
         seed += 1;
     }
+    println!("{} seeds from {first} on", seed - first);
     assert!(broken.is_empty(), "seeds {broken:?}");
 }

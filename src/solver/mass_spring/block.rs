@@ -17,7 +17,7 @@ use crate::{
         block::{BlockLanes, NodeLanes, pulled},
         limiter::{along_support, mobility},
         obstacle::Obstacle,
-        touch::{contacts, predict_nodes},
+        touch::{FrictionPass, contacts_with, predict_nodes},
         tridiagonal::{Elimination, back},
     },
 };
@@ -85,6 +85,7 @@ fn step_simd<S: Simd>(
     b.consider_all_obstacles();
     predict_nodes(simd, b, f32x16::splat(simd, params.dt), None, params.clearance, obstacles);
     b.touched = [0.0; LANES];
+    b.nodes.iter_mut().for_each(NodeLanes::release);
     // Strands that are moved by held nodes may gain energy from them.
     let mut moved = zero;
     for n in &b.nodes {
@@ -103,7 +104,7 @@ fn step_simd<S: Simd>(
         } else {
             solve_next::<S, true>(simd, b, tensions, next);
         }
-        contacts(simd, b, params.clearance, obstacles);
+        contacts_with(simd, b, params.clearance, obstacles, FrictionPass::Summed, one);
         moved = Real::max(moved, load(simd, &b.touched));
         in_touch |= b.touched != [0.0; LANES];
     }
@@ -389,7 +390,7 @@ mod tests {
         base::lanes::{put3, put4, take3},
         solver::rod::obstacle::Solid,
     };
-    use glam::Quat;
+    use glam::{Quat, Vec3Swizzles};
     use proptest::prelude::*;
 
     const G: Vec3 = Vec3::new(0.0, -9.8, 0.0);
@@ -546,6 +547,58 @@ mod tests {
             |pair: &[NodeLanes]| take3(&pair[0].p, 0).distance(take3(&pair[1].p, 0)) / 0.03 - 1.0;
         let most = block.strands.nodes.windows(2).map(strain).fold(0.0, f32::max);
         assert!(most < 0.05, "{most}");
+    }
+
+    #[test]
+    fn what_lies_on_a_head_is_held_by_friction_and_creeps_no_further() {
+        // Each leans away from the vertical plane in which it would lie without friction.
+        let direction = |lane: usize| {
+            let (y, turn) = (0.3 + 0.04 * lane as f32, 2.4 * lane as f32);
+            let across = (1.0_f32 - y * y).sqrt();
+            Vec3::new(across * turn.cos(), y, across * turn.sin())
+        };
+        let lean = Vec3::new(0.4, 0.0, 0.2);
+        let edge = |lane: usize| (direction(lane) + lean).normalize() * 0.03;
+        let at = |lane, i| (direction(lane) * 0.2 + edge(lane) * i as f32, Vec3::ZERO);
+        let mut block = block(8, at);
+        let head = Solid::Capsule { a: Vec3::ZERO, b: Vec3::ZERO, radius: 0.2 };
+        let head = Obstacle { solid: head, motion: None, friction: 0.3 };
+        let places = |block: &SpringLanes| -> Vec<Vec3> {
+            let nodes = block.strands.nodes.iter();
+            nodes.flat_map(|n| (0..LANES).map(|lane| take3(&n.p, lane))).collect()
+        };
+        let params = params(Springs::default(), G, 360.0);
+        let mut run = |substeps: usize| {
+            (0..substeps).for_each(|_| advance_on(&mut block, &params, 0.995, &[head.clone()]));
+            places(&block)
+        };
+        let (before, after) = (run(4 * 360), run(180));
+        // The last one that lies on it moves with what swings below.
+        let lies = |k: &usize| (0..2).all(|next| before[k + next * LANES].length() < 0.2 + 1e-5);
+        let lying: Vec<usize> = (0..7 * LANES).filter(lies).collect();
+        assert!(lying.len() > 4 * LANES, "{} nodes lie on it", lying.len());
+        let most = lying.iter().map(|k| before[*k].distance(after[*k])).fold(0.0, f32::max);
+        assert!(most < 1e-6, "{most} m in half a second");
+        let aside = (0..LANES).filter(|lane| {
+            let (root, tip) = (after[*lane], after[7 * LANES + lane]);
+            (root.x * tip.z - root.z * tip.x).abs() > 0.01 * root.xz().length()
+        });
+        assert!(aside.count() > LANES / 2, "held where friction holds them");
+    }
+
+    #[test]
+    fn a_strand_across_a_slope_slips_where_friction_is_less_than_its_tangent() {
+        let normal = Vec3::new(0.0, 1.0, 0.2).normalize();
+        let slips = |friction: f32| {
+            let mut block = block(8, |_, i| (Vec3::X * (0.03 * i as f32), Vec3::ZERO));
+            let solid = Solid::HalfSpace { normal, point: Vec3::ZERO };
+            let slope = Obstacle { solid, motion: None, friction };
+            let params = params(Springs::default(), G, 360.0);
+            (0..360).for_each(|_| advance_on(&mut block, &params, 1.0, &[slope.clone()]));
+            take3(&block.strands.nodes[7].p, 3).distance(Vec3::X * 0.21)
+        };
+        let (holds, slides) = (slips(0.205), slips(0.19));
+        assert!(holds < 1e-6 && slides > 0.02, "{holds} {slides}");
     }
 
     fn peak_strain(block: &mut SpringLanes, springs: Springs, obstacles: &[Obstacle]) -> f32 {

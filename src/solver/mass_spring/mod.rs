@@ -24,9 +24,10 @@ setting! {
         /// k/m of springs to the next-but-one node, which resist bending. A straight pair of segments
         /// hardly resists a small bend: a property of the model.
         pub bend: f32 = 1e4, "1/s²" in BEND: 0.0..=1e12, safe 0.0..=1e7, "1e4 bends easily";
-        /// c/m of the dampers along the springs.
+        /// c/m of the dampers along the springs. They hardly act on a swing, which changes no spring's length: the air
+        /// brings it to rest, by a factor e a second at the default [`AirDrag`](crate::AirDrag).
         pub damping: f32 = 10.0, "1/s" in DAMPING: 0.0..=1e6, safe 0.0..=1000.0,
-            "10 comes to rest within a second";
+            "10 calms stretching within a second";
         /// Iterations per substep: more make bending more accurate.
         pub iterations: u32 = 2, in ITERATIONS: 1.0..=1000.0, safe 1.0..=50.0, "2 are usual";
     }

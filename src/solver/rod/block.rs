@@ -42,7 +42,7 @@ pub struct NodeLanes<C = Lane> {
     /// on the way back. Direct method only.
     pub anchor: [C; 3],
     /// What holds it there, as a displacement of a free node in the substep (m): the support's force and friction.
-    /// Written by the Newton steps of the direct method.
+    /// Written by the Newton steps of the direct method, and for springs by the contact passes.
     pub reaction: [C; 3],
     /// 1 where friction holds it there, else 0. Direct method only.
     pub sticks: C,
@@ -223,7 +223,7 @@ impl NodeLanes {
     }
 
     /// It rests on nothing.
-    pub(super) fn release(&mut self) {
+    pub(crate) fn release(&mut self) {
         self.rests_on = Default::default();
         (self.reaction, self.sticks, self.drag) = Default::default();
     }

@@ -198,6 +198,10 @@ pub(crate) enum FrictionPass {
     Judged,
     /// After the last Newton step: nodes that stick are where they were.
     Solved,
+    /// Coulomb friction whose normal force is all that the node has been pushed out by in this substep, as it holds all
+    /// that it has slipped: friction of a pass alone is too weak where the one before has pushed the node out, and lets
+    /// hair creep.
+    Summed,
 }
 
 /// Pushes nodes out of obstacles, with friction, and records what touches.
@@ -213,7 +217,7 @@ pub(crate) fn contacts<S: Simd>(
 
 /// [`contacts`] with another friction, in the lanes that are not 0.
 #[inline(never)]
-pub(super) fn contacts_with<S: Simd>(
+pub(crate) fn contacts_with<S: Simd>(
     simd: S,
     b: &mut BlockLanes,
     clearance: f32,
@@ -324,13 +328,17 @@ pub(super) fn touch<S: Simd>(
                     FrictionPass::Judged | FrictionPass::Solved => {
                         bear_on(o, p, is_rested, bearing, clearance, allowed)
                     }
+                    FrictionPass::Summed => {
+                        lie_on(o, p, is_rested, friction.reaction, clearance, allowed)
+                    }
                     _ => push_out(o, p, clearance, allowed).map(|push| (push, zero)),
                 };
                 if let Some((push, stays)) = push {
                     let pushed = Real::lt(zero, push.normal.dot(push.normal) * lanes);
                     // Between two solids it rests on the one that bears more.
                     let bears = pushed & Real::lt(deepest, push.depth);
-                    let bears = if pass == FrictionPass::Depth { pushed } else { bears };
+                    let is_swept = matches!(pass, FrictionPass::Depth | FrictionPass::Summed);
+                    let bears = if is_swept { pushed } else { bears };
                     let out = friction.after(&push, o, from, is_rested, pushed, bears, stays);
                     p = V3::select(held, p, out);
                     deepest = Real::select(bears, push.depth, deepest);
@@ -411,6 +419,35 @@ fn bear_on<S: Simd>(
     Some((Push { to, normal, depth }, zero))
 }
 
+/// [`push_out`]; and nodes that are `rested` and have hardly left the surface are drawn back to it, by as much as they
+/// have been pushed out at most: their depth is negative. `reaction`: what contact has moved them by in this substep.
+#[inline(always)]
+fn lie_on<S: Simd>(
+    o: &Obstacle,
+    p: V3<f32x16<S>>,
+    rested: mask32x16<S>,
+    reaction: V3<f32x16<S>>,
+    clearance: f32,
+    allowed: f32x16<S>,
+) -> Option<(Push<S>, f32x16<S>)> {
+    let zero = f32x16::splat(p.x.simd, 0.0);
+    if o.solid.is_clear(p, clearance + TOUCHING) {
+        return None;
+    }
+    let (normal, depth) = o.solid.depth(p, clearance);
+    let depth = depth - allowed;
+    let lies = rested & Real::lt(f32x16::splat(p.x.simd, -TOUCHING), depth);
+    let pushed = lies | Real::lt(zero, depth);
+    if pushed.to_bitmask() == 0 {
+        return None;
+    }
+    let bearing = Real::max(reaction.dot(normal), zero);
+    let depth = Real::select(pushed, Real::max(depth, -bearing), zero);
+    let none = V3::new(zero, zero, zero);
+    let normal = V3::select(pushed, normal, none);
+    Some((Push { to: normal.scale_add(depth, p), normal, depth }, zero))
+}
+
 /// Friction on a node in a pass.
 struct Friction<S: Simd> {
     pass: FrictionPass,
@@ -419,7 +456,7 @@ struct Friction<S: Simd> {
     /// Above 0 if it slid in the Newton step before.
     slid: f32x16<S>,
     anchor: V3<f32x16<S>>,
-    /// What has held it in that step, as a displacement of a free node in the substep (m).
+    /// What has held it in that step, as a displacement of a free node in the substep (m); or in all passes so far.
     reaction: V3<f32x16<S>>,
 }
 
@@ -464,6 +501,17 @@ impl<S: Simd> Friction<S> {
             return push.to;
         }
         let (slip, length) = push.slip(start);
+        if self.pass == FrictionPass::Summed {
+            let before = self.reaction.dot(push.normal);
+            let bearing = Real::max(before + push.depth, zero);
+            let held = self.reaction - push.normal.scale(before);
+            let pull = held - slip;
+            let size = Real::sqrt(Real::max(pull.dot(pull), lit(1e-24)));
+            let pull = pull.scale(Real::min(one, lit(o.friction) * bearing / size));
+            let reaction = push.normal.scale_add(bearing, pull);
+            self.reaction = V3::select(pushed, reaction, self.reaction);
+            return V3::select(pushed, push.to + (pull - held), push.to);
+        }
         let most = lit(o.friction) * push.depth;
         if self.pass == FrictionPass::Judged {
             // What would have to pull it back: by what it has been held with, or else by what it has slipped.
@@ -501,6 +549,9 @@ impl<S: Simd> Friction<S> {
     #[inline(always)]
     fn put(self, n: &mut NodeLanes, touched: f32x16<S>, active: mask32x16<S>) {
         let simd = touched.simd;
+        if self.pass == FrictionPass::Summed {
+            return store3(&mut n.reaction, self.reaction.scale(touched));
+        }
         let (mut sticks, mut anchor) = (self.sticks * touched, self.anchor);
         let mut drag = self.drag * touched * (f32x16::splat(simd, 1.0) - sticks);
         if self.pass == FrictionPass::Judged {
