@@ -283,6 +283,16 @@ pub(crate) struct EffectiveSubstep {
     most_iterations: u32,
 }
 
+/// A substep of what moves among all hair, such as droplets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SharedSubstep {
+    /// How long it is (s).
+    pub(crate) dt: f32,
+    /// Whether it is the first in this tick, and the last.
+    pub(crate) is_first: bool,
+    pub(crate) is_last: bool,
+}
+
 impl EffectiveSubsteps<'_, '_> {
     fn together(&self, hair: Entity) -> (u32, SubstepLimits) {
         let (limits, own) = self.hairs.get(hair).unwrap_or_default();
@@ -300,11 +310,28 @@ impl EffectiveSubsteps<'_, '_> {
         if let Some(hairs) = &self.settling.0 {
             return hairs.iter().any(|hair| self.of(*hair).is_some());
         }
-        let HairStep { index, count, .. } = *self.step;
+        self.any_in(self.step.index)
+    }
+
+    /// Whether any hair takes a substep in the tick's substep `index`.
+    fn any_in(&self, index: u32) -> bool {
         let takes = |(limits, own): (Option<&SubstepLimits>, Option<&MergedSubsteps>)| {
-            merged(index, count, Self::longer(limits, own)).is_some()
+            merged(index, self.step.count, Self::longer(limits, own)).is_some()
         };
         self.hairs.iter().any(takes)
+    }
+
+    /// What moves among hair takes a substep where any hair does, and in a tick's last: nothing depends on it in
+    /// between.
+    pub(crate) fn shared(&self) -> Option<SharedSubstep> {
+        let HairStep { dt, index, count } = *self.step;
+        let is_last = index + 1 >= count;
+        if !is_last && !self.any_in(index) {
+            return None;
+        }
+        let before = (0..index).rev().find(|before| self.any_in(*before));
+        let since = before.map_or(0, |before| before + 1);
+        Some(SharedSubstep { dt: dt * (index + 1 - since) as f32, is_first: since == 0, is_last })
     }
 
     fn longer(limits: Option<&SubstepLimits>, own: Option<&MergedSubsteps>) -> u32 {

@@ -68,7 +68,7 @@ impl Plugin for WaterPlugin {
                     repair_moistures,
                     count_overwritten,
                     run_showers,
-                    exchange_water,
+                    exchange_water.run_if(first_substep),
                     (update_is_wet, widen_contact).chain().run_if(first_substep),
                 )
                     .chain()

@@ -128,6 +128,8 @@ struct Lists {
     moved: f32,
     /// Groups out of reach tested since.
     idle: usize,
+    /// Whether strands move so fast that the margin is the smaller one.
+    is_fast: bool,
     /// For how many more lookups these lists are used, however far nodes move.
     good_for: u32,
 }
@@ -204,7 +206,7 @@ impl Neighbours {
 
     /// For how many lookups the next lists will be used if motion stays the same.
     pub fn lookups(&self) -> u32 {
-        if self.lists.margin == FAST_MARGIN { FAST_LOOKUPS } else { 1 }
+        if self.lists.is_fast { FAST_LOOKUPS } else { 1 }
     }
 
     /// Sets where the nodes of the strand that was added last are expected. Takes effect only if set for
@@ -293,11 +295,13 @@ impl Neighbours {
         if expected.len() + 2 == rows.len() {
             let way = |(a, b)| lanes::place(a).distance_squared(lanes::place(b));
             let farthest = rows.iter().zip(&*expected).map(way).fold(0.0, f32::max).sqrt();
-            fast = *beyond == 0.0 && farthest >= 0.5 * MARGIN * reach;
+            fast = farthest >= 0.5 * (MARGIN * reach - *beyond);
             expected.extend([[f32::NAN; 4]; 2]);
             places = expected;
         }
-        lists.begin(places, strands, reach, if fast { FAST_MARGIN } else { MARGIN });
+        let margin = if fast { FAST_MARGIN.max(*beyond / reach) } else { MARGIN };
+        lists.begin(places, strands, reach, margin);
+        lists.is_fast = fast;
         lists.good_for = if fast { FAST_LOOKUPS - 1 } else { 0 };
         parts.resize_with(strands.len().div_ceil(PART), PartLists::default);
         let most_groups = most_bytes / size_of::<EdgeGroup>();
