@@ -158,7 +158,7 @@ fn crowd_rows(threads: usize) {
 /// The time that each part of a substep takes.
 #[derive(Resource)]
 struct PartTimes {
-    last: Instant,
+    last: Clock,
     parts: Vec<(HairSystems, Duration)>,
 }
 
@@ -169,14 +169,14 @@ fn time_parts(app: &mut App) {
         .flat_map(|set| if set.parts().is_empty() { vec![set] } else { set.parts().to_vec() })
         .collect();
     app.insert_resource(PartTimes {
-        last: Instant::now(),
+        last: Clock::start(),
         parts: all.iter().map(|part| (*part, Duration::ZERO)).collect(),
     });
     for (i, part) in all.iter().copied().enumerate() {
         let mark = move |mut times: ResMut<PartTimes>| {
-            let (now, times) = (Instant::now(), &mut *times);
-            times.parts[i].1 += now - times.last;
-            times.last = now;
+            let times = &mut *times;
+            times.parts[i].1 += times.last.passed();
+            times.last = Clock::start();
         };
         match all.get(i + 1) {
             Some(next) => app.add_systems(HairTick, mark.after(part).before(*next)),

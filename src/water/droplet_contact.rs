@@ -10,18 +10,15 @@ use super::{
     strand_block::{StrandBlocks, StrandLane},
 };
 use crate::{
-    base::schedule::{EffectiveSubsteps, HairProcessTime},
-    forces::environment::vapour::WATER,
-};
-use crate::{
     base::{
         lanes::{LANES, simd_level},
         parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
+        schedule::{HairProcessTime, HairStep},
         setting::{Ranged, Settings},
     },
     forces::{
         contact::{Colliders, HairReach, WetRow},
-        environment::Gravity,
+        environment::{Gravity, vapour::WATER},
     },
     hair::strand::{AddedMass, Hair, Here, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose},
 };
@@ -103,7 +100,7 @@ type AmongDroplets = (
 type RainedOn = (Entity, &'static TickPose, &'static mut StrandBlocks, Option<&'static HairReach>);
 
 pub(super) fn wet_strands(
-    steps: EffectiveSubsteps,
+    step: Res<HairStep>,
     gravity: Gravity,
     process: Res<HairProcessTime>,
     wetting: Settings<HairWetting>,
@@ -115,7 +112,7 @@ pub(super) fn wet_strands(
 ) {
     let WaterField { fields, loaded, outcomes, local, buffers, .. } =
         scratch.bypass_change_detection();
-    let Some(step) = steps.shared() else { return };
+    let Some(step) = step.shared() else { return };
     // Droplets have added to the mass of the strands that carried them.
     for strand in loaded.drain(..) {
         if let Ok((_, of, strand, mut added_mass, moisture, _)) = strands.get_mut(strand) {
@@ -391,7 +388,10 @@ fn sum_up(chunks: &[DropletContacts], pose: &Pose, outcomes: &mut [Outcome]) {
         |(), (first, outcomes)| {
             for chunk in chunks {
                 for (outcome, sum) in outcomes.iter_mut().zip(&chunk.sums[*first..]) {
-                    outcome.impulse += pose.direction_out(sum.impulse);
+                    // Most chunks are near few droplets.
+                    if sum.impulse != Vec3::ZERO {
+                        outcome.impulse += pose.direction_out(sum.impulse);
+                    }
                     outcome.touch_count += sum.touch_count;
                     outcome.wanted += sum.wanted;
                 }

@@ -9,7 +9,7 @@ use crate::{
     base::{
         fault::{FaultKind, HairFault},
         parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
-        schedule::{EffectiveSubsteps, HairProcessTime, HairStep},
+        schedule::{HairProcessTime, HairStep},
         setting::{Ranged, Settings, report},
     },
     forces::environment::{
@@ -66,14 +66,11 @@ pub(super) fn repair_moistures(
 
 pub(super) fn run_showers(
     mut commands: Commands,
-    steps: EffectiveSubsteps,
+    step: Res<HairStep>,
     mut showers: Query<(Entity, &mut Shower, &TickPose)>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    if showers.is_empty() {
-        return;
-    }
-    let Some(step) = steps.shared() else { return };
+    let Some(step) = step.shared() else { return };
     for (entity, mut shower, pose) in &mut showers {
         let shower = shower.bypass_change_detection();
         let mut valid = shower.clamped();

@@ -1,7 +1,6 @@
 //! `Interaction`: droplets that touch merge.
 
 use super::{Droplet, DropletRules, model::ball_radius};
-use crate::base::schedule::EffectiveSubsteps;
 use bevy::{platform::collections::HashMap, prelude::*};
 
 /// Failed candidates after which a drop stops searching in a tick. Only drops whose merged volume
@@ -21,12 +20,11 @@ const FAR: Vec3 = Vec3::splat(1e9);
 /// larger one.
 pub(super) fn merge_droplets(
     mut commands: Commands,
-    steps: EffectiveSubsteps,
     rules: Res<DropletRules>,
     mut droplets: Query<(Entity, &mut Droplet)>,
     mut merging: Local<Merging>,
 ) {
-    if droplets.iter().len() < 2 || steps.shared().is_none_or(|step| !step.is_last) {
+    if droplets.iter().len() < 2 {
         return;
     }
     let mut drops: Vec<(Entity, Mut<'_, Droplet>)> = droplets.iter_mut().collect();

@@ -11,7 +11,7 @@ use crate::{
     base::{
         fault::HairFault,
         parallel::{Nanos, for_each_block},
-        schedule::{EffectiveSubsteps, HairProcessTime, HairStep},
+        schedule::{HairProcessTime, HairStep},
         setting::{Ranged, Settings, Violations, report},
     },
     forces::{
@@ -41,7 +41,7 @@ type HairParts = (&'static TickPose, Option<&'static HairReach>);
 
 pub(super) fn move_droplets(
     mut commands: Commands,
-    (step, steps): (Res<HairStep>, EffectiveSubsteps),
+    step: Res<HairStep>,
     (air, process, gravity, rules): (
         Res<DryingAir>,
         Res<HairProcessTime>,
@@ -63,7 +63,7 @@ pub(super) fn move_droplets(
         bounds.clear();
         return;
     }
-    let Some(shared) = steps.shared() else { return };
+    let Some(shared) = step.shared() else { return };
     let rules = rules.clamped();
     let gravity = gravity.clamped().0;
     let down = gravity.normalize_or_zero();
@@ -143,8 +143,10 @@ pub(super) fn move_droplets(
                 None => {
                     drop.ride = None;
                     drop.touch_count = 1;
-                    drop.velocity = fall(drop.velocity, gravity, wind, radius, dt);
-                    drop.position += drop.velocity * dt;
+                    // By the mean velocity a step of any length falls as far.
+                    let before = drop.velocity;
+                    drop.velocity = fall(before, gravity, wind, radius, dt);
+                    drop.position += before.midpoint(drop.velocity) * dt;
                     let lies = rest_on_solids(&solids, drop, radius, found);
                     drop.lying = if lies { drop.lying + dt } else { 0.0 };
                 }
@@ -317,12 +319,12 @@ fn rest_on(obstacle: &Obstacle, drop: &mut Droplet, radius: f32) -> bool {
 
 /// After the strands have moved: droplets on strands move with them.
 pub(super) fn follow_strands(
-    steps: EffectiveSubsteps,
+    step: Res<HairStep>,
     hairs: Query<&TickPose, With<Hair>>,
     strands: Query<(&StrandOf, &Strand)>,
     mut droplets: Query<&mut Droplet>,
 ) {
-    if droplets.is_empty() || steps.shared().is_none() {
+    if step.shared().is_none() {
         return;
     }
     for mut drop in &mut droplets {

@@ -91,15 +91,13 @@ impl<'a> WaterConditions<'a> {
         f64::from(flux * PI * self.diameter * self.process) / WATER
     }
 
-    /// Gravity along a segment (m/s²), and how far the film on its ends (m³) flows and creeps along it in this
-    /// step, as shares of its length.
-    fn courant(&self, ends: &[Vec3], length: f32, film: &[f64]) -> [f32; 3] {
-        let along = (ends[1] - ends[0]).normalize_or_zero().dot(self.gravity);
-        let source = if along >= 0.0 { film[0] } else { film[1] };
-        let thickness = source as f32 / (PI * self.diameter * length);
-        let speed = along.abs() * thickness * thickness * (WATER as f32 / (3.0 * WATER_VISCOSITY));
-        let creeps = self.wetting.wicking * self.process / (length * length);
-        [along, speed * self.dt / length, creeps]
+    /// How far a film (m³) on a segment flows in this step where gravity along it is `along` (m/s²), and how far it
+    /// creeps, as shares of its length.
+    fn courant(&self, film: f64, along: f32, length: f32) -> [f32; 2] {
+        const THINNING: f32 = WATER as f32 / (3.0 * WATER_VISCOSITY);
+        let thickness = film as f32 / (PI * self.diameter * length);
+        let speed = along.abs() * thickness * thickness * THINNING;
+        [speed * self.dt / length, self.wetting.wicking * self.process / (length * length)]
     }
 }
 
@@ -215,12 +213,10 @@ impl Moisture {
     /// The film flows along each segment under gravity and spreads by wicking, in as many rounds as it takes to
     /// resolve that.
     fn flow(&mut self, positions: &[Vec3], lengths: &[f32], conditions: &WaterConditions<'_>) {
-        let segments = positions.windows(2).zip(lengths).zip(self.film.windows(2));
-        let fastest = segments.fold(0.0_f32, |fastest, ((ends, length), film)| {
-            if film == [0.0; 2] {
-                return fastest;
-            }
-            let [_, flows, creeps] = conditions.courant(ends, *length, film);
+        let gravity = conditions.gravity.length();
+        let segments = lengths.iter().zip(self.film.windows(2));
+        let fastest = segments.fold(0.0_f32, |fastest, (length, film)| {
+            let [flows, creeps] = conditions.courant(film[0].max(film[1]), gravity, *length);
             fastest.max(flows / COURANT).max(creeps / (0.5 * COURANT))
         });
         let rounds = fastest.ceil().clamp(1.0, MOST_ROUNDS);
@@ -243,9 +239,10 @@ impl Moisture {
             if above == 0.0 && below == 0.0 && inflow == 0.0 {
                 continue;
             }
-            let ends = &positions[i..i + 2];
-            let [along, flows, creeps] = conditions.courant(ends, length, &[above, below]);
+            let edge = positions[i + 1] - positions[i];
+            let along = edge.normalize_or_zero().dot(conditions.gravity);
             let source = if along >= 0.0 { above } else { below };
+            let [flows, creeps] = conditions.courant(source, along, length);
             let flowing = f64::from((flows * share).min(COURANT)) * source;
             let creeping = (above - below) * f64::from((creeps * share).min(0.5 * COURANT));
             let crossing = flowing.copysign(f64::from(along)) + creeping;
