@@ -2,7 +2,7 @@
 //!
 //! Each preset on a head with shoulders, at rest and on a character who walks and looks around,
 //! with and without contact between strands; some as a skinned figure wears them, among the balls that fit
-//! its skin; then crowds. Medians of five runs of 20 ticks; nothing
+//! its skin; then presets in water, beside the same hair dry; then crowds. Medians of five runs of 20 ticks; nothing
 //! is drawn and nothing sleeps. On one thread only its own processor time counts, whatever else runs
 //! on the machine. `KERATIN_BENCH_ONLY=wavy,crowd` prints only these rows. `KERATIN_BENCH_PARTS=1` prints
 //! after each crowd which parts of a substep take the time.
@@ -20,6 +20,8 @@ mod mannequin;
 #[path = "../examples/shared/skeleton.rs"]
 #[allow(dead_code, reason = "the example uses all of it")]
 mod skeleton;
+#[path = "game/wet.rs"]
+mod wet;
 #[path = "game/worn.rs"]
 mod worn;
 
@@ -41,7 +43,8 @@ use std::{
 
 const THREADS: &str = "KERATIN_BENCH_THREADS";
 
-/// The rows to print, if not all: presets by name, `worn`, `crowd`.
+/// The rows to print, if not all: presets by name, `worn`, `wet` or a preset as `wet-wavy`, `crowd`,
+/// `wet-crowd`.
 const ONLY: &str = "KERATIN_BENCH_ONLY";
 
 /// Whether to print what each part of a substep takes.
@@ -77,8 +80,17 @@ fn rows(threads: usize) {
     if wanted("worn") {
         worn::rows(threads);
     }
+    for preset in HairPreset::ALL {
+        let name = format!("{preset:?}").to_lowercase();
+        if wanted("wet") || wanted(&format!("wet-{name}")) {
+            wet::rows(&name, preset, threads);
+        }
+    }
     if wanted("crowd") {
         crowd_rows(threads);
+    }
+    if wanted("wet") || wanted("wet-crowd") {
+        wet::crowd(threads);
     }
 }
 
@@ -146,7 +158,7 @@ fn crowd_rows(threads: usize) {
 /// The time that each part of a substep takes.
 #[derive(Resource)]
 struct PartTimes {
-    last: Instant,
+    last: Clock,
     parts: Vec<(HairSystems, Duration)>,
 }
 
@@ -157,14 +169,14 @@ fn time_parts(app: &mut App) {
         .flat_map(|set| if set.parts().is_empty() { vec![set] } else { set.parts().to_vec() })
         .collect();
     app.insert_resource(PartTimes {
-        last: Instant::now(),
+        last: Clock::start(),
         parts: all.iter().map(|part| (*part, Duration::ZERO)).collect(),
     });
     for (i, part) in all.iter().copied().enumerate() {
         let mark = move |mut times: ResMut<PartTimes>| {
-            let (now, times) = (Instant::now(), &mut *times);
-            times.parts[i].1 += now - times.last;
-            times.last = now;
+            let times = &mut *times;
+            times.parts[i].1 += times.last.passed();
+            times.last = Clock::start();
         };
         match all.get(i + 1) {
             Some(next) => app.add_systems(HairTick, mark.after(part).before(*next)),
@@ -198,10 +210,12 @@ fn in_turns<const N: usize>(app: &mut App, ready: impl Fn(&mut App, usize)) -> [
             runs[run] = start.passed().as_secs_f64() * 1e3 / f64::from(TICKS);
         }
     }
-    runs.map(|mut runs| {
-        runs.sort_by(f64::total_cmp);
-        runs[RUNS / 2]
-    })
+    runs.map(median)
+}
+
+fn median(mut runs: [f64; RUNS]) -> f64 {
+    runs.sort_by(f64::total_cmp);
+    runs[RUNS / 2]
 }
 
 /// On one thread the time that it runs, so that others on the machine do not count; where there are

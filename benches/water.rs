@@ -41,6 +41,11 @@ const PAPER: [(usize, Option<f64>); 7] = [
 const REACH: f32 = 0.015;
 
 fn main() {
+    // `cargo bench --bench water -- hairs` runs only thirty hairs with a shower over one of them.
+    if std::env::args().any(|arg| arg == "hairs") {
+        shower_row();
+        return;
+    }
     println!(
         "droplets | paper, GT 630, ms | rods, ms | springs, ms | rods with film and bonds, ms | \
          springs with film, ms | peak strain of each"
@@ -73,9 +78,7 @@ fn main() {
     if !named.is_empty() {
         return;
     }
-    println!("\n30 hairs of 100 strands, ms | with a shower over one of them, ms | ratio");
-    let [dry, rain] = shower_over_one();
-    println!("{dry:.2} | {rain:.2} | {:.2}", rain / dry);
+    shower_row();
     println!("\n400 strands of 12 nodes at rest, in air of a humidity | ms | asleep");
     for (humidity, ms, asleep) in at_rest([0.5, 0.51, 0.9]) {
         println!("{humidity} | {ms:.2} | {asleep}");
@@ -149,6 +152,12 @@ fn medians<const N: usize>(apps: &mut [App; N], ticks: usize) -> [f64; N] {
         times.sort_unstable_by(f64::total_cmp);
         times[times.len() / 2]
     })
+}
+
+fn shower_row() {
+    println!("\n30 hairs of 100 strands, ms | with a shower over one of them, ms | ratio");
+    let [dry, rain] = shower_over_one();
+    println!("{dry:.2} | {rain:.2} | {:.2}", rain / dry);
 }
 
 /// A tick of thirty hairs without and with a shower over one of them (ms).

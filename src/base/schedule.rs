@@ -284,6 +284,30 @@ pub(crate) struct EffectiveSubstep {
     most_iterations: u32,
 }
 
+/// The longest substep of what moves among all hair, such as droplets (s): that of hair by default. It is the same
+/// whatever hair there is, so that one character does not depend on another.
+const LONGEST_SHARED: f32 = 1.0 / 180.0;
+
+/// A substep of what moves among all hair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SharedSubstep {
+    /// How long it is (s).
+    pub(crate) dt: f32,
+    /// Whether it is the first in this tick, and the last.
+    pub(crate) is_first: bool,
+    pub(crate) is_last: bool,
+}
+
+impl HairStep {
+    /// The substep that what moves among hair takes now, or `None` while it waits for a longer one.
+    pub(crate) fn shared(&self) -> Option<SharedSubstep> {
+        let Self { dt, index, count } = *self;
+        let substeps = merged(index, count, MergedSubsteps::within(LONGEST_SHARED, self).0)?;
+        let (is_first, is_last) = (index + 1 == substeps, index + 1 == count);
+        Some(SharedSubstep { dt: dt * substeps as f32, is_first, is_last })
+    }
+}
+
 impl EffectiveSubsteps<'_, '_> {
     fn together(&self, hair: Entity) -> (u32, SubstepLimits) {
         let (limits, own) = self.hairs.get(hair).unwrap_or_default();
@@ -644,6 +668,20 @@ mod tests {
             let longest_taken = *all.iter().max().unwrap() as f32 * step.dt;
             assert!(longest_taken < longest * 1.001, "{rate} Hz: {longest_taken} s");
             before = solves;
+        }
+    }
+
+    #[test]
+    fn what_moves_among_hair_takes_as_many_substeps_as_hair_does_by_default() {
+        for rate in [20.0, 30.0, 60.0, 64.0, 90.0, 120.0, 240.0, 400.0] {
+            let (tick, count) = (1.0 / rate, HairSubsteps::Auto.count(1.0 / rate));
+            let step = |index| HairStep { dt: tick / count as f32, index, count }.shared();
+            let all: Vec<SharedSubstep> = (0..count).filter_map(step).collect();
+            assert_eq!(all.len(), (180.0 / rate).ceil() as usize, "{rate} Hz");
+            let seconds: f32 = all.iter().map(|step| step.dt).sum();
+            assert!((seconds * rate - 1.0).abs() < 1e-5, "{rate} Hz: {seconds} s");
+            assert!(all[0].is_first && all.iter().filter(|step| step.is_first).count() == 1);
+            assert!(all[all.len() - 1].is_last && all.iter().filter(|step| step.is_last).count() == 1);
         }
     }
 

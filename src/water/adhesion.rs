@@ -135,7 +135,10 @@ impl ContactParams<'_> {
         strand_block.place(level, strand_lanes);
         let mut is_weighed = false;
         out.scratch.at.resize(self.field.pullers.len(), 0);
-        for i in 0..strand_block.rows.len() {
+        let (low, high) = strand_block.bounds();
+        self.field.pulling(level, low, high, &mut out.scratch.near);
+        let pulled = if out.scratch.near.balls.is_empty() { 0 } else { strand_block.rows.len() };
+        for i in 0..pulled {
             let row = &strand_block.rows[i];
             self.field.pulling(level, row.low, row.high, &mut out.scratch.near);
             if !out.scratch.near.balls.is_empty() {
@@ -158,7 +161,8 @@ impl ContactParams<'_> {
         {
             self.absorb_from_riders(strand_lane, first + k, out);
         }
-        let edges = if self.field.fallers.is_empty() { &[] } else { &strand_block.rows[..] };
+        self.field.falling(level, low, high, &mut out.scratch.near);
+        let edges = if out.scratch.near.balls.is_empty() { &[] } else { &strand_block.rows[..] };
         for (i, ends) in edges.windows(2).enumerate() {
             let (low, high) = (ends[0].low.min(ends[1].low), ends[0].high.max(ends[1].high));
             self.field.falling(level, low, high, &mut out.scratch.near);

@@ -13,7 +13,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-/// Whether any strand of a hair is wet: has a film or is under water. Updated once a tick.
+/// Whether any strand of a hair has a film. Updated once a tick.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct IsWet(pub(crate) bool);
 
@@ -39,20 +39,17 @@ pub struct HairDried {
 pub(super) fn update_is_wet(
     found: Res<FoundWater>,
     mut hairs: Query<(Entity, &Strands, &mut IsWet, &mut HoldsWater), HairHere>,
-    strands: Query<(&Moisture, &AddedMass)>,
+    strands: Query<&Moisture>,
     mut commands: Commands,
 ) {
     for (entity, members, mut is_wet, mut holds) in &mut hairs {
         let members = || strands.iter_many(members.collection());
-        let holds_water = found.any && members().any(|(moisture, _)| !moisture.is_untouched());
+        let holds_water = found.any && members().any(|moisture| !moisture.is_untouched());
         if holds.0 && !holds_water {
             commands.trigger(HairDried { entity });
         }
         holds.set_if_neq(HoldsWater(holds_water));
-        let wet = |(moisture, added): (&Moisture, &AddedMass)| {
-            moisture.has_film() || !added.in_water.is_empty()
-        };
-        is_wet.set_if_neq(IsWet(found.busy && members().any(wet)));
+        is_wet.set_if_neq(IsWet(found.busy && members().any(Moisture::has_film)));
     }
 }
 
@@ -108,7 +105,7 @@ pub(super) fn join_wet_strands(
         if list.nodes() != rows.len() {
             continue;
         }
-        let mut bridges = list.bridges(rows, film);
+        let mut bridges = list.bridges(rows, film, substep.is_first);
         let mut members = strands.iter_many_mut(members.collection());
         while let Some((mut strand, _, added_mass, sleep)) = members.fetch_next() {
             let nodes = strand.nodes();

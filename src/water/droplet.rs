@@ -43,6 +43,8 @@ setting! {
         pub(super) ride: Option<StrandPoint> = None => Ranged::clamp_values;
         /// Where it was a substep ago.
         pub(super) before: Vec3 = Vec3::ZERO, "m" in BEFORE: -1e6..=1e6, "where it was";
+        /// For how long it has yet to move (s); negative where it came into being within a substep.
+        pub(super) lag: f32 = 0.0, "s" in LAG: -1e3..=1e3, "0 is up to date";
         /// How much of it the ledger has counted (m³).
         #[reflect(ignore)]
         pub(super) counted: Counted = Counted(0.0);

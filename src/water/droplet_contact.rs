@@ -9,21 +9,20 @@ use super::{
     moisture::node_lengths,
     strand_block::{StrandBlocks, StrandLane},
 };
-use crate::{base::schedule::HairProcessTime, forces::environment::vapour::WATER};
 use crate::{
     base::{
         lanes::{LANES, simd_level},
         parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
-        schedule::HairStep,
+        schedule::{HairProcessTime, HairStep},
         setting::{Ranged, Settings},
     },
     forces::{
         contact::{Colliders, HairReach, WetRow},
-        environment::Gravity,
+        environment::{Gravity, vapour::WATER},
     },
     hair::strand::{AddedMass, Hair, Here, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose},
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity::EntityHashMap, prelude::*};
 use core::slice::from_ref;
 
 /// Largest number of sums, over all work chunks and droplets.
@@ -113,11 +112,10 @@ pub(super) fn wet_strands(
 ) {
     let WaterField { fields, loaded, outcomes, local, buffers, .. } =
         scratch.bypass_change_detection();
-    // The exchange has rewritten the added mass of wet hair; on other hair droplets have added to it.
+    let Some(step) = step.shared() else { return };
+    // Droplets have added to the mass of the strands that carried them.
     for strand in loaded.drain(..) {
-        if let Ok((_, of, strand, mut added_mass, moisture, _)) = strands.get_mut(strand)
-            && !moisture.has_film()
-        {
+        if let Ok((_, of, strand, mut added_mass, moisture, _)) = strands.get_mut(strand) {
             let added_mass = added_mass.bypass_change_detection();
             if moisture.is_untouched() {
                 *added_mass = default();
@@ -126,7 +124,9 @@ pub(super) fn wet_strands(
             }
         }
     }
-    let mut drops: Vec<Mut<'_, Droplet>> = droplets.iter_mut().collect();
+    // Those that have yet to move are far from all hair.
+    let mut drops: Vec<Mut<'_, Droplet>> =
+        droplets.iter_mut().filter(|drop| drop.lag <= 0.0).collect();
     if drops.is_empty() {
         return;
     }
@@ -147,7 +147,7 @@ pub(super) fn wet_strands(
     outcomes.clear();
     outcomes.resize(drops.len(), Outcome::default());
     let mut wet_hairs =
-        wet_hairs(&mut hairs, &wetting, &mut strands, step.index == 0, &drops, buffers);
+        wet_hairs(&mut hairs, &wetting, &mut strands, step.is_first, &drops, buffers);
     fields.resize_with(fields.len().max(wet_hairs.len()), default);
     for (WetHair { pose, wetting, drops: near, strands }, (field, chunks)) in
         wet_hairs.iter_mut().zip(&mut *fields)
@@ -239,13 +239,21 @@ fn wet_hairs<'a>(
     let balls = (0..).zip(drops).map(|(k, drop)| (ball_of(drop, widest), k));
     let balls = Colliders::of_balls(hairs.iter().count(), balls);
     let mut scratch = Vec::new();
+    let mut near = EntityHashMap::<Vec<u32>>::default();
+    for (hair, frame, _, reach) in hairs.iter() {
+        let drops: Vec<u32> = balls.near(frame, reach, &mut scratch).copied().collect();
+        if !drops.is_empty() {
+            near.insert(hair, drops);
+        }
+    }
+    if near.is_empty() {
+        *buffers = unused.collect();
+        return Vec::new();
+    }
     for (entity, of, strand, added_mass, moisture, _) in strands {
         let index = wet_hairs.index(of.0, || {
-            let (_, frame, _, reach) = hairs.get(of.0).ok()?;
-            let drops: Vec<u32> = balls.near(frame, reach, &mut scratch).copied().collect();
-            if drops.is_empty() {
-                return None;
-            }
+            let (_, frame, ..) = hairs.get(of.0).ok()?;
+            let drops = near.remove(&of.0)?;
             let (pose, wetting) = (*frame.now(), wetting.of(of.0));
             let (unsorted, sorted) = unused.next().unwrap_or_default();
             let wet_hair = WetHair { pose, wetting, drops, strands: emptied(sorted) };
@@ -380,7 +388,10 @@ fn sum_up(chunks: &[DropletContacts], pose: &Pose, outcomes: &mut [Outcome]) {
         |(), (first, outcomes)| {
             for chunk in chunks {
                 for (outcome, sum) in outcomes.iter_mut().zip(&chunk.sums[*first..]) {
-                    outcome.impulse += pose.direction_out(sum.impulse);
+                    // Most chunks are near few droplets.
+                    if sum.impulse != Vec3::ZERO {
+                        outcome.impulse += pose.direction_out(sum.impulse);
+                    }
                     outcome.touch_count += sum.touch_count;
                     outcome.wanted += sum.wanted;
                 }

@@ -1,7 +1,7 @@
 //! `ExternalForces`: showers spawn drops, hair soaks and dries, and hydrogen bonds follow the water.
 
 use super::{
-    Counted, Droplet, HairWetting, Moisture, Shower, SoakHair, WaterLedger, WaterVolume,
+    Counted, Droplet, HairWetting, Moisture, Shower, SoakHair, WaterLedger,
     model::{ball_radius, clinging},
     moisture::{AFTER_DRIP, Exposure, WaterConditions, WaterLoss, node_lengths},
 };
@@ -22,10 +22,7 @@ use crate::{
     },
     keratin::bond::{BondChanges, BondKind, Bonds},
 };
-use bevy::{
-    ecs::{entity_disabling::Disabled, system::SystemParam},
-    prelude::*,
-};
+use bevy::{ecs::entity_disabling::Disabled, prelude::*};
 
 /// Approximate cost of a strand (ns), averaged over wet and dry ones.
 const EXCHANGE: Nanos = Nanos(500);
@@ -37,28 +34,15 @@ const PERIOD: f32 = 1.0;
 /// Drying by moving air (1/s) below which bound water is in no hurry.
 const HARDLY_DRIES: f32 = 1e-6;
 
-/// What the last substep that looked found in any hair: while none is busy, the others need not look.
+/// What the exchange of this tick found in any hair.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub(super) struct FoundWater {
     /// Whether there is water.
     pub(super) any: bool,
-    /// Whether some of it changes in every substep, such as a film.
+    /// Whether some of it changes in every tick, such as a film.
     pub(super) busy: bool,
     /// Process time since bound water last moved (s).
     waited: f32,
-}
-
-/// Whether there is something that wets hair: then every substep looks.
-#[derive(SystemParam)]
-pub(super) struct Wetting<'w, 's> {
-    droplets: Query<'w, 's, (), With<Droplet>>,
-    volumes: Query<'w, 's, (), With<WaterVolume>>,
-}
-
-impl Wetting<'_, '_> {
-    fn is_any(&self) -> bool {
-        !self.droplets.is_empty() || !self.volumes.is_empty()
-    }
 }
 
 /// Repairs moisture of new strands and moisture written from outside, for instance by an inspector. Our
@@ -86,17 +70,23 @@ pub(super) fn run_showers(
     mut showers: Query<(Entity, &mut Shower, &TickPose)>,
     mut faults: MessageWriter<HairFault>,
 ) {
+    let Some(step) = step.shared() else { return };
     for (entity, mut shower, pose) in &mut showers {
         let shower = shower.bypass_change_detection();
         let mut valid = shower.clamped();
         let pose = pose.now();
-        let drops: Vec<Droplet> = (valid.make(step.dt))
+        let mut drops: Vec<Droplet> = (valid.make(step.dt))
             .map(|drop| {
                 let position = pose.point_out(drop.position);
                 let velocity = pose.direction_out(drop.velocity);
                 Droplet { position, velocity, before: position, ..drop }
             })
             .collect();
+        // One after the other within the substep, not all at its beginning.
+        let each = step.dt / drops.len().max(1) as f32;
+        for (drop, i) in drops.iter_mut().zip(0u16..) {
+            drop.lag = -each * (f32::from(i) + 0.5);
+        }
         if valid.is_limited && !shower.is_limited {
             let message = format!(
                 "the shower's rate of {} drops/s makes more than {} in a substep of {} s: the rest is left \
@@ -115,12 +105,12 @@ pub(super) fn run_showers(
     }
 }
 
-/// The conditions for water in the frame of one hair.
+/// The conditions for water in the frame of one hair in a tick.
 struct LocalWater<'a> {
     wetting: HairWetting,
     pose: Pose,
     winds: LocalWinds,
-    /// Of a substep, and of the time since bound water last moved.
+    /// Of the tick, and of the time since bound water last moved.
     steps: [Passing<'a>; 2],
     /// Share of the difference by which bonds would approach it until bound water moves again.
     to_come: f32,
@@ -142,7 +132,7 @@ struct Wet<'a> {
     added_mass: &'a mut AddedMass,
     changes: &'a mut BondChanges,
     sleep: &'a mut StrandSleep,
-    /// Whether it changes in every substep.
+    /// Whether it changes in every tick.
     is_busy: bool,
     loss: WaterLoss,
     /// Water of removed nodes (m³).
@@ -161,6 +151,7 @@ impl Wet<'_> {
     }
 }
 
+/// Once a tick: the film, which hardly moves within one, and bound water.
 pub(super) fn exchange_water(
     mut commands: Commands,
     step: Res<HairStep>,
@@ -182,18 +173,15 @@ pub(super) fn exchange_water(
         Here,
     >,
     on_gpu: Query<(), With<OnGpu>>,
-    (mut soaks, wets): (MessageReader<SoakHair>, Wetting),
+    mut soaks: MessageReader<SoakHair>,
     mut missed: ResMut<MissedOnGpu<SoakHair>>,
     (mut ledger, mut found): (ResMut<WaterLedger>, ResMut<FoundWater>),
     mut faults: MessageWriter<HairFault>,
 ) {
     let process = process.clamped().0;
-    if step.index == 0 {
-        found.waited += process * step.dt * step.count as f32;
-    } else if !(found.busy || !soaks.is_empty() || wets.is_any() || found.any && winds.dry()) {
-        return;
-    }
-    let is_due = step.index == 0 && found.waited >= PERIOD;
+    let tick = step.dt * step.count as f32;
+    found.waited += process * tick;
+    let is_due = found.waited >= PERIOD;
     let waited = if is_due { core::mem::take(&mut found.waited) } else { 0.0 };
     let damp = air.equilibrium > 0.0;
     let held = |hair: Entity| clinging(wetting.of(hair).bundle(1.0), gravity.clamped().0.length());
@@ -232,7 +220,7 @@ pub(super) fn exchange_water(
         let frame = hairs.get(hair).ok()?.0;
         let pose = *frame.now();
         let (wetting, winds) = (wetting.of(hair), winds.seen_from(frame));
-        let steps = [(step.dt, process), (1.0, waited)].map(|(dt, process)| {
+        let steps = [(tick, process), (1.0, waited)].map(|(dt, process)| {
             let gravity = pose.direction_in(gravity);
             let conditions = WaterConditions::new(wetting, gravity, &air, dt, process);
             Passing { conditions, bonds_follow: wetting.bonds_follow(process * dt) }
@@ -273,7 +261,7 @@ pub(super) fn exchange_water(
         }
         let ahead = |(_, wet): &(usize, Wet<'_>)| wet.prefetch();
         in_turn(items, AHEAD, ahead, |(hair, wet)| {
-            exchange(wet, &waters.values[*hair], &air, damp, step.dt);
+            exchange(wet, &waters.values[*hair], &air, damp, tick);
         });
         for (hair, wet) in items.drain(..) {
             done.evaporated += wet.loss.evaporated;
@@ -342,7 +330,7 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
             blown: blown.drying * dt,
             submerged: false,
         };
-        // A strand may have become non-finite in this substep: it is put back at its end.
+        // A strand may have become non-finite.
         exposed.is_finite().then_some(exposed)
     };
     let moved = if *is_busy {
@@ -354,9 +342,6 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
     // All lost water is in `loss`.
     moisture.recount();
     let behind = open_bonds(bonds, moisture.wetness(), *bonds_follow, changes);
-    if moisture.note_change(moved.max(behind * bonds_follow), behind * to_come) {
-        sleep.wake();
-    }
     let capacity = wetting.capacity() * f64::from(strand.length());
     if !damp
         && added_mass.in_water.is_empty()
@@ -367,26 +352,34 @@ fn exchange(wet: &mut Wet<'_>, water: &LocalWater<'_>, air: &DryingAir, damp: bo
         **added_mass = default();
         return;
     }
-    bear_water(added_mass, moisture, lengths, wetting);
+    let weighs = bear_water(added_mass, moisture, lengths, wetting);
+    if moisture.note_change(moved.max(behind * bonds_follow).max(weighs), behind * to_come) {
+        sleep.wake();
+    }
 }
 
-/// Sets the added mass and the softening of a strand to those of its water.
+/// Sets the added mass and the softening of a strand to those of its water. Returns the largest change of a
+/// node's mass, as a share of it.
 pub(super) fn bear_water(
     added_mass: &mut AddedMass,
     moisture: &Moisture,
     lengths: &[f32],
     wetting: &HairWetting,
-) {
+) -> f32 {
     let dry = f64::from(wetting.dry_mass());
     let water = moisture.film().iter().zip(moisture.bound()).map(|(film, bound)| film + bound);
-    added_mass.mass.clear();
-    added_mass.mass.extend(
-        (node_lengths(lengths).zip(water)).map(|(l, v)| (WATER * v / (dry * f64::from(l))) as f32),
-    );
+    added_mass.mass.resize(moisture.film().len(), 0.0);
+    let mut change = 0.0_f32;
+    for ((mass, length), volume) in added_mass.mass.iter_mut().zip(node_lengths(lengths)).zip(water) {
+        let now = (WATER * volume / (dry * f64::from(length))) as f32;
+        change = change.max((now - *mass).abs() / (1.0 + now));
+        *mass = now;
+    }
     added_mass.moves_bonds = true;
     added_mass.softening.clear();
     let wetness = moisture.wetness().iter().take(lengths.len());
     added_mass.softening.extend(wetness.map(|w| w * wetting.softening));
+    change
 }
 
 /// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close retained

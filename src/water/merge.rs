@@ -1,7 +1,6 @@
 //! `Interaction`: droplets that touch merge.
 
 use super::{Droplet, DropletRules, model::ball_radius};
-use crate::base::schedule::HairStep;
 use bevy::{platform::collections::HashMap, prelude::*};
 
 /// Failed candidates after which a drop stops searching in a tick. Only drops whose merged volume
@@ -17,15 +16,15 @@ const MAX_VOLUME: f64 = *Droplet::VOLUME.valid.end() as f64;
 /// Largest cell coordinate; all drops beyond it share a cell.
 const FAR: Vec3 = Vec3::splat(1e9);
 
-/// Once a tick: droplets that touch merge at the position of the larger one.
+/// At the end of a tick, when all are where they are then: droplets that touch merge at the position of the
+/// larger one.
 pub(super) fn merge_droplets(
     mut commands: Commands,
-    step: Res<HairStep>,
     rules: Res<DropletRules>,
     mut droplets: Query<(Entity, &mut Droplet)>,
     mut merging: Local<Merging>,
 ) {
-    if step.index != 0 || droplets.iter().len() < 2 {
+    if droplets.iter().len() < 2 {
         return;
     }
     let mut drops: Vec<(Entity, Mut<'_, Droplet>)> = droplets.iter_mut().collect();

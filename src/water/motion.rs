@@ -4,7 +4,7 @@ use super::{
     Droplet, DropletRules, HairWetting, StrandPoint, WaterLedger,
     exchange::{detached_drop, on_strand},
     model::{clinging, fall, hanging, slide},
-    volume::Volumes,
+    volume::{LocalVolumes, Volumes},
 };
 use crate::{
     base::lanes::V3,
@@ -63,11 +63,12 @@ pub(super) fn move_droplets(
         bounds.clear();
         return;
     }
-    let (dt, rules) = (step.dt, rules.clamped());
+    let Some(shared) = step.shared() else { return };
+    let rules = rules.clamped();
     let gravity = gravity.clamped().0;
     let down = gravity.normalize_or_zero();
-    if step.index == 0 || bounds.is_empty() {
-        *bounds = HairBounds::of(&hairs, down);
+    if shared.is_first || bounds.is_empty() {
+        *bounds = HairBounds::of(&hairs, down, step.count);
     }
     let bounds = &*bounds;
     let process = process.clamped().0;
@@ -76,7 +77,8 @@ pub(super) fn move_droplets(
         let (collider, pose) = (&placed.collider, poses.get(placed.id).ok()?);
         Some((Ball::around(collider, pose), seen_from(&world, collider, pose)))
     });
-    let solids = Colliders::new(1, solids.collect());
+    let solids = Colliders::new(step.count, solids.collect());
+    let tick = step.dt * step.count as f32;
     let winds = winds.seen_from(&world);
     let volumes = volumes.seen_from(&world);
     let mut items: Vec<Moving<'_>> = droplets
@@ -92,17 +94,29 @@ pub(super) fn move_droplets(
         .collect();
     for_each_block(
         &mut items,
-        Nanos(500),
+        Nanos(200),
         || (Vec::new(), 0),
         |(found, last), Moving { drop, violations, new, evaporated, is_removed, .. }| {
+            // Its own values are valid.
+            let is_changed = drop.is_changed();
             let drop = drop.bypass_change_detection();
-            drop.repair(violations);
+            if is_changed {
+                drop.repair(violations);
+            }
             *new = drop.volume - drop.counted.0;
             drop.before = drop.position;
+            drop.lag += shared.dt;
 
             let blown = winds.around(drop.position);
             let (wind, warmth) = (blown.velocity, blown.warmth(air.celsius));
             let radius = drop.radius();
+            // A drop that meets nothing within the tick moves once, at its end.
+            let way = (drop.velocity.length().max(wind.length()) + gravity.length() * tick) * tick;
+            if !shared.is_last && falls_freely(drop, way + radius, bounds, &solids, &volumes, found) {
+                drop.counted.0 = drop.volume;
+                return;
+            }
+            let dt = core::mem::take(&mut drop.lag).max(0.0);
             let speed = air.draught + (wind - drop.velocity).length();
             let area = 4.0 * core::f32::consts::PI * radius * radius;
             let flux = transfer(speed, 2.0 * radius.max(1e-6)) * air.drive(warmth);
@@ -129,8 +143,10 @@ pub(super) fn move_droplets(
                 None => {
                     drop.ride = None;
                     drop.touch_count = 1;
-                    drop.velocity = fall(drop.velocity, gravity, wind, radius, dt);
-                    drop.position += drop.velocity * dt;
+                    // By the mean velocity a step of any length falls as far.
+                    let before = drop.velocity;
+                    drop.velocity = fall(before, gravity, wind, radius, dt);
+                    drop.position += before.midpoint(drop.velocity) * dt;
                     let lies = rest_on_solids(&solids, drop, radius, found);
                     drop.lying = if lies { drop.lying + dt } else { 0.0 };
                 }
@@ -157,27 +173,57 @@ pub(super) fn move_droplets(
     }
 }
 
+/// Whether nothing that a falling drop acts on or that acts on it is within a `way` (m).
+fn falls_freely(
+    drop: &Droplet,
+    way: f32,
+    bounds: &[HairBounds],
+    solids: &Colliders<Obstacle>,
+    volumes: &LocalVolumes,
+    found: &mut Vec<u32>,
+) -> bool {
+    let place = drop.position;
+    let [x, y, z] = place.to_array();
+    let is_near = |solid: &Obstacle| !(solid.solid.depth(V3::new(x, y, z), way + SHORT_PUSH).1 <= 0.0);
+    drop.ride.is_none()
+        && drop.lying == 0.0
+        && !bounds.iter().any(|hair| hair.may_touch(place, way + drop.r_max.max(drop.r_min)))
+        && volumes.depth(place).is_none_or(|depth| depth < -way)
+        && !solids.around(place, way + SHORT_PUSH, found).any(is_near)
+}
+
 /// A ball around a hair in the world (m).
 #[derive(Clone, Copy)]
 pub(super) struct HairBounds {
     center: Vec3,
     radius: f32,
+    /// How far from the center its strands may come within the tick.
+    room: f32,
     /// How far down it reaches.
     lowest: f32,
 }
 
 impl HairBounds {
     /// Of all hair with nodes; of a point at the origin that reaches down without end while there is none.
-    fn of(hairs: &Query<HairParts, With<Hair>>, down: Vec3) -> Vec<Self> {
+    fn of(hairs: &Query<HairParts, With<Hair>>, down: Vec3, substeps: u32) -> Vec<Self> {
         let of = |(pose, reach): (&TickPose, Option<&HairReach>)| {
-            let (center, radius) = reach.copied().unwrap_or_default().ball(pose.now())?;
-            Some(Self { center, radius, lowest: center.dot(down) + radius })
+            let reach = reach.copied().unwrap_or_default();
+            let (center, radius) = reach.ball(pose.now())?;
+            let room = reach.room(pose, substeps);
+            Some(Self { center, radius, room, lowest: center.dot(down) + radius })
         };
         let mut all: Vec<Self> = hairs.iter().filter_map(of).collect();
         if all.is_empty() {
-            all.push(Self { center: Vec3::ZERO, radius: 0.0, lowest: f32::INFINITY });
+            all.push(Self { center: Vec3::ZERO, radius: 0.0, room: -1.0, lowest: f32::INFINITY });
         }
         all
+    }
+
+    /// Whether a strand may come within a distance (m) of a place within the tick; not of hair that there is not.
+    fn may_touch(&self, place: Vec3, within: f32) -> bool {
+        let apart = self.room + within;
+        // NaN is not beyond.
+        self.room >= 0.0 && !(self.center.distance_squared(place) > apart * apart)
     }
 
     fn is_near(&self, place: Vec3, down: Vec3, rules: &DropletRules) -> bool {
@@ -273,10 +319,14 @@ fn rest_on(obstacle: &Obstacle, drop: &mut Droplet, radius: f32) -> bool {
 
 /// After the strands have moved: droplets on strands move with them.
 pub(super) fn follow_strands(
+    step: Res<HairStep>,
     hairs: Query<&TickPose, With<Hair>>,
     strands: Query<(&StrandOf, &Strand)>,
     mut droplets: Query<&mut Droplet>,
 ) {
+    if step.shared().is_none() {
+        return;
+    }
     for mut drop in &mut droplets {
         let Some(ride) = drop.ride else { continue };
         if let Ok((of, strand)) = strands.get(ride.strand)
@@ -300,7 +350,8 @@ mod tests {
 
     #[test]
     fn drops_are_kept_near_any_hair_above_its_own_depth() {
-        let at = |center: Vec3| HairBounds { center, radius: 1.0, lowest: 1.0 - center.y };
+        let at =
+            |center: Vec3| HairBounds { center, radius: 1.0, room: 1.0, lowest: 1.0 - center.y };
         let bounds = [at(Vec3::ZERO), at(Vec3::new(5000.0, 800.0, 0.0))];
         let (rules, mut last) = (DropletRules::default(), 0);
         let mut is_kept = |place| {

@@ -118,6 +118,12 @@ impl StrandBlock {
         });
     }
 
+    /// The box around all its finite nodes (m).
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        self.rows.iter().fold(none, |(low, high), row| (low.min(row.low), high.max(row.high)))
+    }
+
     /// Loads velocities and masses, before droplets act.
     pub fn weigh(&mut self, strand_lanes: &[StrandLane<'_>], wetting: &HairWetting) {
         for (group, four) in strand_lanes.chunks(4).enumerate() {

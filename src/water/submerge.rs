@@ -11,7 +11,7 @@ use super::{
 use crate::{
     base::{
         parallel::{Nanos, for_each_part, tables},
-        schedule::EffectiveSubsteps,
+        schedule::{EffectiveSubsteps, HairStep},
         setting::Settings,
     },
     forces::environment::Gravity,
@@ -41,30 +41,34 @@ struct LocalWater {
     lock: Lock,
     /// The film of a node that emerges (m³).
     film: f64,
-    /// The hair's time step in this substep (s); `None` if it skips this substep.
-    dt: Option<f32>,
+    /// The hair's time step (s).
+    dt: f32,
     /// Undoes the motion of the frame on its nodes.
     back: Option<Isometry3d>,
 }
 
 pub(super) fn submerge(
-    steps: EffectiveSubsteps,
+    (step, steps): (Res<HairStep>, EffectiveSubsteps),
     gravity: Gravity,
     wetting: Settings<HairWetting>,
     volumes: Volumes,
     hairs: Query<&TickPose, With<Hair>>,
     mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture), Here>,
     mut ledger: ResMut<WaterLedger>,
-    mut had_volumes: Local<bool>,
+    mut emerging: Local<u32>,
 ) {
-    // Runs once more after the last volume was removed, so that hair emerges from it.
-    if volumes.are_none() && !core::mem::take(&mut *had_volumes) {
+    // Goes on for a tick after the last volume was removed, so that all hair emerges from it.
+    if !volumes.are_none() {
+        *emerging = step.count;
+    } else if *emerging == 0 {
         return;
+    } else {
+        *emerging -= 1;
     }
-    *had_volumes = !volumes.are_none();
     let gravity = gravity.clamped().0.length();
     let water_of = |hair: Entity| {
-        let (frame, dt) = (hairs.get(hair).ok()?, steps.of(hair).map(|step| step.dt));
+        // While hair skips substeps nothing reads what water does to it.
+        let (frame, dt) = (hairs.get(hair).ok()?, steps.of(hair)?.dt);
         let wetting = wetting.of(hair);
         Some(LocalWater {
             volumes: volumes.seen_from(frame),
@@ -82,8 +86,8 @@ pub(super) fn submerge(
             let (mut waters, mut gained) = (PerHair::default(), [0.0, 0.0]);
             for (of, sleep, strand, added, moisture) in rows {
                 if let Some(water) = waters.index(of.0, || water_of(of.0)) {
-                    let dt = waters.values[water].dt.filter(|_| sleep.is_simulated());
                     let water = &waters.values[water];
+                    let dt = sleep.is_simulated().then_some(water.dt);
                     // Inertia has acted on those alone that move in this substep.
                     let back = water.back.as_ref().filter(|_| dt.is_some());
                     let [film, lost] = immerse(water, (dt, back), strand, added, moisture);
@@ -135,7 +139,7 @@ fn immerse(
             any = true;
             let (a, b) = (place(i.saturating_sub(1)), place((i + 1).min(nodes - 1)));
             let load = added.mass.get(i).copied().unwrap_or(0.0);
-            // Unchanged while the hair skips substeps.
+            // Unchanged while the strand is not simulated.
             added.in_water[i] = InWater { share, ..before };
             if let Some(dt) = dt {
                 let velocity = &mut strand.velocities_mut()[i];

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     base::{
-        schedule::{HairStep, HairSystems, HairTick, first_substep},
+        schedule::{HairStep, HairSystems, HairTick, first_substep, last_substep},
         setting,
         stretch::{self, Stretch},
     },
@@ -68,7 +68,7 @@ impl Plugin for WaterPlugin {
                     repair_moistures,
                     count_overwritten,
                     run_showers,
-                    exchange_water,
+                    exchange_water.run_if(first_substep),
                     (update_is_wet, widen_contact).chain().run_if(first_substep),
                 )
                     .chain()
@@ -77,7 +77,9 @@ impl Plugin for WaterPlugin {
             .add_systems(
                 HairTick,
                 (
-                    (move_droplets, merge_droplets).chain().in_set(HairSystems::Droplets),
+                    (move_droplets, merge_droplets.run_if(last_substep))
+                        .chain()
+                        .in_set(HairSystems::Droplets),
                     wet_strands.in_set(HairSystems::DropletContact),
                     join_wet_strands.in_set(HairSystems::Bridges),
                 ),

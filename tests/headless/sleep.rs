@@ -316,7 +316,7 @@ fn bonds_that_change_wake_it_and_keep_it_awake() {
 }
 
 #[test]
-fn water_wakes_it_and_wet_hair_does_not_sleep() {
+fn water_wakes_it_and_so_does_what_it_loses_of_it() {
     let mut app = woken(|app, hair, _| {
         app.insert_resource(HairProcessTime(100.0));
         app.world_mut().write_message(SoakHair::dripping(hair));
@@ -324,12 +324,25 @@ fn water_wakes_it_and_wet_hair_does_not_sleep() {
     let e = app.world_mut().query_filtered::<Entity, With<Strand>>().single(app.world()).unwrap();
     let water = |app: &App| app.world().get::<Moisture>(e).unwrap().clone();
     let mut ticks = 0;
+    // While its film runs down and dries it wakes whenever a node's mass has changed by a hundredth.
+    let masses = |app: &App| -> Vec<f32> {
+        app.world().get::<AddedMass>(e).unwrap().mass.iter().map(|added| 1.0 + added).collect()
+    };
+    let (mut awake, mut asleep) = (masses(&app), 0);
     while water(&app).has_film() {
-        assert!(!is_asleep(&app, e) && ticks < 18_000);
+        assert!(ticks < 18_000);
         app.update();
         ticks += 1;
+        if is_asleep(&app, e) {
+            asleep += 1;
+            let nodes = awake.iter().zip(masses(&app)).skip(1);
+            let change = nodes.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f32::max);
+            assert!(change < 0.013, "{change} of its mass has changed in its sleep");
+        } else {
+            awake = masses(&app);
+        }
     }
-    assert!(ticks > 60, "{ticks}");
+    assert!(ticks > 60 && asleep > 0, "{asleep} of {ticks} ticks asleep");
     // Then it dries through, and wakes whenever that has changed it.
     let (mut before, mut asleep) = (water(&app).wetness()[0], 0.0);
     while !water(&app).is_untouched() {

@@ -833,6 +833,42 @@ fn count_moves(strand: Single<&Strand>, mut seen: ResMut<Moves>) {
     }
 }
 
+/// Water ends neither joined substeps nor sleep.
+#[test]
+fn wet_hair_joins_substeps_and_sleeps() {
+    let mut app = test_app(60.0);
+    app.init_resource::<Moves>().add_systems(HairTick, count_moves.in_set(HairSystems::Last));
+    let (hair, strand) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.world_mut().write_message(SoakHair::dripping(hair));
+    run(&mut app, 1.0);
+    assert_eq!(app.world().resource::<Moves>().0, 180, "six substeps of a tick in pairs");
+    let mut asleep = 0;
+    for _ in 0..600 {
+        app.update();
+        asleep += usize::from(app.world().get::<StrandSleep>(strand).unwrap().is_asleep());
+    }
+    assert!(app.world().get::<Moisture>(strand).unwrap().has_film(), "it is still wet");
+    assert!(asleep > 300, "asleep in {asleep} of 600 ticks");
+}
+
+/// A drop that meets nothing moves once a tick, others as hair does.
+#[test]
+fn a_drop_far_from_hair_falls_as_one_near_it() {
+    let mut app = test_app(60.0);
+    app.insert_resource(HairProcessTime(0.0));
+    one_strand(&mut app, 0.24, 8, Vec3::Y);
+    let [near, far] = [Vec3::new(0.1, 0.3, 0.0), Vec3::new(50.0, 0.3, 0.0)]
+        .map(|at| app.world_mut().spawn(Droplet::new(at, 4.2e-9).unwrap()).id());
+    for tick in 1..=60 {
+        app.update();
+        let [near, far] = [near, far].map(|drop| app.world().get::<Droplet>(drop).unwrap());
+        let seconds = tick as f32 / 60.0;
+        let apart = (near.position - far.position).reject_from(Vec3::X).length();
+        assert!(apart < 2e-3 * seconds.max(0.1), "{apart} m apart after {seconds} s");
+        assert!((near.velocity - far.velocity).length() < 0.02, "{near:?} {far:?}");
+    }
+}
+
 /// The same as `damp_air_costs_what_dry_air_costs`, counted.
 #[test]
 fn hair_in_damp_air_joins_substeps_and_sleeps_as_in_dry_air() {

@@ -14,6 +14,10 @@ use glam::Vec3;
 /// How many edges are tested side by side.
 pub(super) const WIDTH: usize = 8;
 
+/// Edges that are bridged within a tick are no farther at its start than this many of the longest bridges: strands
+/// that water joins move together.
+const SOON: f32 = 1.5;
+
 /// A node with the kind of the edge that starts at it: x, y, z (m), and [`INNER`] or [`LAST`], negative for
 /// the strand's first edge, or 0 for the tip, which starts none.
 pub(super) type NodeRow = [f32; 4];
@@ -75,7 +79,7 @@ impl Stack {
 
     /// Appends the lanes for which the mask holds.
     #[inline(always)]
-    fn push<S: Simd, L: SimdInt<S, Element = u32>>(&mut self, lanes: L, mask: L::Mask) {
+    pub fn push<S: Simd, L: SimdInt<S, Element = u32>>(&mut self, lanes: L, mask: L::Mask) {
         lanes.compress(mask).store_slice(&mut self.items[self.len..self.len + L::LEN]);
         self.len += mask.to_bitmask().count_ones() as usize;
     }
@@ -348,22 +352,55 @@ impl<S: Simd> Bridges<S> {
         }
     }
 
-    /// Adds the bridges to eight edges. NaN fails every comparison and adds nothing.
+    /// Adds the bridges to eight edges. NaN fails every comparison and adds nothing. Those that may be bridged
+    /// within the tick are appended to `soon`.
     #[inline(always)]
-    pub fn add(&mut self, simd: S, rows: &[NodeRow], wet: &[WetRow], edges: &[u32; WIDTH]) {
-        let lit = |value: f32| f32x8::splat(simd, value);
-        let (zero, one) = (lit(0.0), lit(1.0));
-        let Film { reach, longest } = self.film;
+    pub fn find(
+        &mut self,
+        simd: S,
+        rows: &[NodeRow],
+        wet: &[WetRow],
+        edges: &[u32; WIDTH],
+        soon: &mut Stack,
+    ) {
         let seen = off(simd, rows, edges, self.p);
-        let Off { off, squared, at, .. } = seen;
-        let near = seen.own(simd)
-            & Real::lt(squared, lit((reach + longest) * (reach + longest)))
-            & Real::lt(lit(SAME_PLACE), squared);
+        let Film { reach, longest } = self.film;
+        let within = reach + SOON * longest;
+        let near = Real::lt(seen.squared, f32x8::splat(simd, within * within));
         if near.to_bitmask() == 0 {
             return;
         }
         let (start, start_area) = eight(simd, wet, edges, 0);
         let (end, end_area) = eight(simd, wet, edges, 1);
+        let film = self.area + start_area + end_area;
+        let near = near & Real::lt(f32x8::splat(simd, 0.0), film);
+        soon.push(u32x8::load_array_ref(simd, edges), near);
+        self.join(simd, seen, (start, start_area), (end, end_area));
+    }
+
+    /// The same for edges that were found at the start of the tick.
+    #[inline(always)]
+    pub fn add(&mut self, simd: S, rows: &[NodeRow], wet: &[WetRow], edges: &[u32; WIDTH]) {
+        let seen = off(simd, rows, edges, self.p);
+        self.join(simd, seen, eight(simd, wet, edges, 0), eight(simd, wet, edges, 1));
+    }
+
+    /// Adds the bridges to eight edges with films of these cross-sections, whose ends move so.
+    #[inline(always)]
+    fn join(
+        &mut self,
+        simd: S,
+        seen: Off<S>,
+        (start, start_area): (V3<f32x8<S>>, f32x8<S>),
+        (end, end_area): (V3<f32x8<S>>, f32x8<S>),
+    ) {
+        let lit = |value: f32| f32x8::splat(simd, value);
+        let (zero, one) = (lit(0.0), lit(1.0));
+        let Film { reach, longest } = self.film;
+        let Off { off, squared, at, .. } = seen;
+        let near = seen.own(simd)
+            & Real::lt(squared, lit((reach + longest) * (reach + longest)))
+            & Real::lt(lit(SAME_PLACE), squared);
         let area = self.area + start_area + (end_area - start_area) * at;
         let velocity = start + (end - start).scale(at);
 

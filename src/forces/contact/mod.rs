@@ -103,13 +103,15 @@ impl LockNeighbours {
     }
 
     /// The bridges of water at every node, at the positions of the last contact search. `wet` has a row
-    /// for each node, in the order of the hair's strands.
+    /// for each node, in the order of the hair's strands. Which edges are joined is looked for `again` once a
+    /// tick.
     pub(crate) fn bridges(
         &mut self,
         wet: &mut Vec<WetRow>,
         film: Film,
+        again: bool,
     ) -> impl Iterator<Item = Bridged> {
-        self.lists.bridges(wet, film)
+        self.lists.bridges(wet, film, again)
     }
 
     /// Nodes and the nearest points of edges of other strands that they touch (m), at the last contact

@@ -128,8 +128,12 @@ struct Lists {
     moved: f32,
     /// Groups out of reach tested since.
     idle: usize,
+    /// Whether strands move so fast that the margin is the smaller one.
+    is_fast: bool,
     /// For how many more lookups these lists are used, however far nodes move.
     good_for: u32,
+    /// Whether the parts' lists of bridged edges are of these.
+    are_joined: bool,
 }
 
 /// The lists and pushes of some strands' nodes.
@@ -148,6 +152,10 @@ struct PartLists {
     pushes: Vec<Vec3>,
     touches: Vec<Touch>,
     bridged: Vec<Bridged>,
+    /// The edges that water may join to each node in this tick, and where each node's end.
+    joined: Vec<[u32; WIDTH]>,
+    joined_ends: Vec<u32>,
+    soon: Stack,
     /// Whether a node had more edges near than its list holds.
     is_crowded: bool,
 }
@@ -204,7 +212,7 @@ impl Neighbours {
 
     /// For how many lookups the next lists will be used if motion stays the same.
     pub fn lookups(&self) -> u32 {
-        if self.lists.margin == FAST_MARGIN { FAST_LOOKUPS } else { 1 }
+        if self.lists.is_fast { FAST_LOOKUPS } else { 1 }
     }
 
     /// Sets where the nodes of the strand that was added last are expected. Takes effect only if set for
@@ -293,11 +301,13 @@ impl Neighbours {
         if expected.len() + 2 == rows.len() {
             let way = |(a, b)| lanes::place(a).distance_squared(lanes::place(b));
             let farthest = rows.iter().zip(&*expected).map(way).fold(0.0, f32::max).sqrt();
-            fast = *beyond == 0.0 && farthest >= 0.5 * MARGIN * reach;
+            fast = farthest >= 0.5 * (MARGIN * reach - *beyond);
             expected.extend([[f32::NAN; 4]; 2]);
             places = expected;
         }
-        lists.begin(places, strands, reach, if fast { FAST_MARGIN } else { MARGIN });
+        let margin = if fast { FAST_MARGIN.max(*beyond / reach) } else { MARGIN };
+        lists.begin(places, strands, reach, margin);
+        lists.is_fast = fast;
         lists.good_for = if fast { FAST_LOOKUPS - 1 } else { 0 };
         parts.resize_with(strands.len().div_ceil(PART), PartLists::default);
         let most_groups = most_bytes / size_of::<EdgeGroup>();
@@ -373,20 +383,31 @@ impl Neighbours {
     }
 
     /// The bridges of water at every node, after [`find_pushes`](Self::find_pushes) of the same places. `wet` has
-    /// a row for each node, in the order they were added.
-    pub fn bridges(&mut self, wet: &mut Vec<WetRow>, film: Film) -> impl Iterator<Item = Bridged> {
+    /// a row for each node, in the order they were added. Bridges form and break at the start of a tick, where
+    /// `again` says to look for them.
+    pub fn bridges(
+        &mut self,
+        wet: &mut Vec<WetRow>,
+        film: Film,
+        again: bool,
+    ) -> impl Iterator<Item = Bridged> {
         self.coarse.pick(wet);
         wet.resize(self.rows.len(), [f32::NAN; 4]);
         let level = simd_level();
         let Self { rows, strands, coarse, lists, parts, .. } = self;
         let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
         let reaches = film.longest + 2.0 * lists.moved;
+        let known = core::mem::replace(&mut lists.are_joined, true) && !again;
         for_each_block(
             &mut work,
             per_part(BRIDGE, rows, strands.len()),
             || (),
             |(), (part, strands)| {
-                dispatch!(level, simd => part.bridge(simd, rows, wet, strands, reaches, film));
+                dispatch!(level, simd => if known {
+                    part.bridge_known(simd, rows, wet, strands, film);
+                } else {
+                    part.bridge(simd, rows, wet, strands, reaches, film);
+                });
             },
         );
         let bridged = parts.iter().flat_map(|part| part.bridged.iter().copied());
@@ -446,7 +467,7 @@ impl Lists {
 
     /// Puts all edges into the grid.
     fn begin(&mut self, rows: &[NodeRow], strands: &[Range<u32>], reach: f32, margin: f32) {
-        (self.moved, self.idle) = (0.0, 0);
+        (self.moved, self.idle, self.are_joined) = (0.0, 0, false);
         (self.reach, self.margin) = (reach, margin);
         self.rows.clear();
         self.rows.extend_from_slice(rows);
@@ -582,7 +603,33 @@ impl PartLists {
         }
     }
 
-    /// Sums the bridges of water over these strands' lists.
+    /// Sums the bridges of water over the edges that water joins in this tick.
+    #[inline(always)]
+    fn bridge_known<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &[NodeRow],
+        wet: &[WetRow],
+        strands: &[Range<u32>],
+        film: Film,
+    ) {
+        let nodes = strands.first().map_or(0, |s| s.start) as usize;
+        self.bridged.clear();
+        let mut first = 0;
+        for (node, end) in (nodes..).zip(&self.joined_ends) {
+            let edges = &self.joined[first..*end as usize];
+            first = *end as usize;
+            if edges.is_empty() {
+                self.bridged.push(Bridged::default());
+                continue;
+            }
+            let mut sum = Bridges::new(simd, lanes::place(&rows[node]), wet[node][3], film);
+            edges.iter().for_each(|edges| sum.add(simd, rows, wet, edges));
+            self.bridged.push(sum.total());
+        }
+    }
+
+    /// Sums the bridges of water over these strands' lists, and notes which edges are joined.
     #[inline(always)]
     fn bridge<S: Simd>(
         &mut self,
@@ -594,20 +641,28 @@ impl PartLists {
         film: Film,
     ) {
         let nodes = strands.first().map_or(0, |s| s.start) as usize;
+        let nowhere = rows.len() as u32 - 2;
         self.bridged.clear();
+        self.joined.clear();
+        self.joined_ends.clear();
         for (k, (ends, slack)) in self.starts.windows(2).zip(&self.slacks).enumerate() {
             let node = nodes + k;
             if *slack > reaches {
                 self.bridged.push(Bridged::default());
+                self.joined_ends.push(self.joined.len() as u32);
                 continue;
             }
+            let groups = &self.groups[ends[0] as usize..ends[1] as usize];
+            self.soon.clear(groups.len() * WIDTH);
             let mut sum = Bridges::new(simd, lanes::place(&rows[node]), wet[node][3], film);
-            for group in &self.groups[ends[0] as usize..ends[1] as usize] {
+            for group in groups {
                 if group.slack > reaches {
                     break;
                 }
-                sum.add(simd, rows, wet, &group.edges);
+                sum.find(simd, rows, wet, &group.edges, &mut self.soon);
             }
+            self.joined.extend_from_slice(self.soon.eights(nowhere));
+            self.joined_ends.push(self.joined.len() as u32);
             self.bridged.push(sum.total());
         }
     }
@@ -727,7 +782,7 @@ mod tests {
                 .map(|k| (k / nodes, k % nodes))
                 .map(|(s, i)| speed(s, i).extend(area(s, i)).to_array())
                 .collect();
-            let found: Vec<Bridged> = list.bridges(&mut wet, film).collect();
+            let found: Vec<Bridged> = list.bridges(&mut wet, film, true).collect();
             for (k, found) in found.iter().enumerate() {
                 let (own, n) = (k / nodes, k % nodes);
                 if n == 0 {

@@ -46,8 +46,8 @@ impl HairReach {
         self.age = LOOK_AGAIN;
     }
 
-    /// How far from its center it may be within a tick (m).
-    fn room(&self, frame: &TickPose, substeps: u32) -> f32 {
+    /// How far from its center it may be within a tick (m, in the world).
+    pub(crate) fn room(&self, frame: &TickPose, substeps: u32) -> f32 {
         let (before, now) = (frame.before(), frame.now());
         let travel = before.translation.distance(now.translation);
         REACH_MARGIN * self.radius * now.size() + travel * substeps as f32

@@ -259,12 +259,11 @@ impl Touching<'_> {
             present.extend(members.collection().iter().filter(takes_part));
             *had_followers = with_followers;
         }
-        // Bridges of water need complete lists. Dry strands are searched once a tick at most, at their
-        // expected positions in the middle of the time until the next search: most move with their
-        // neighbours.
-        let lookup = if step.is_first || with_followers { Lookup::Now } else { Lookup::Later };
+        // Strands are searched once a tick at most, at their expected positions in the middle of the time until
+        // the next search: most move with their neighbours.
+        let lookup = if step.is_first { Lookup::Now } else { Lookup::Later };
         let until = list.lookups() as f32 * step.tick - step.dt;
-        let ahead = (step.is_first && !with_followers).then_some(0.5 * until);
+        let ahead = step.is_first.then_some(0.5 * until);
         for some in present.chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
             for (strand, ..) in strands.iter_many(some) {

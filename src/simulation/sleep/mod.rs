@@ -4,12 +4,12 @@
 //! could move it or its bonds? Then it sleeps ([`StrandSleep`](crate::StrandSleep)): velocities are
 //! zero, and forces, contacts, rest shapes and projection skip it. It wakes when the head moves,
 //! gravity or a setting changes, a blower reaches it, a collider appears, disappears or moves near
-//! it, contact with a neighbour changes, its held nodes or its root move, bonds are treated, a film of
-//! water or a droplet is on it, its bound water has changed by a hundredth, or game code writes to its [`Strand`](crate::Strand) or
-//! [`Bonds`](crate::Bonds).
+//! it, contact with a neighbour changes, its held nodes or its root move, bonds are treated, a droplet is on it, its
+//! bound water or its mass with the water on it has changed by a hundredth, or game code writes to its
+//! [`Strand`](crate::Strand) or [`Bonds`](crate::Bonds).
 //!
-//! Hair with a film of water, hair in the wind and hair whose bonds are changing never sleeps: a style that is still
-//! forming would be frozen. The equations are in [`model`].
+//! Hair in the wind and hair whose bonds are changing never sleeps: a style that is still forming would be frozen. The
+//! equations are in [`model`].
 
 #[doc(hidden)]
 pub mod model;

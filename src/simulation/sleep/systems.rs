@@ -303,8 +303,7 @@ fn update_sleep(
             || !changes.is_empty()
             || !added_mass.in_water.is_empty()
             || !added_mass.mass.is_empty() && water.is_none_or(Moisture::is_untouched)
-            || treatments.is_some_and(|t| !t.acting().is_empty())
-            || water.is_some_and(Moisture::has_film);
+            || treatments.is_some_and(|t| !t.acting().is_empty());
         items.push(SleepCandidate { hair, strand, sleep, still, held, restless });
     }
     let seconds = step.dt * step.count as f32;

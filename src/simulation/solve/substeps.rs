@@ -7,7 +7,6 @@ use crate::{
     },
     hair::strand::{Hair, StrandModel, TickPose},
     solver::rod::{HairSolver, SolverMethod},
-    water::IsWet,
 };
 use bevy::prelude::*;
 
@@ -18,22 +17,21 @@ pub(super) fn plugin(app: &mut App) {
     );
 }
 
-/// Directly solved rods without water take longer substeps.
+/// Directly solved rods take longer substeps.
 fn choose_substeps(
     step: Res<HairStep>,
     solver: Settings<HairSolver>,
     model: Settings<StrandModel>,
-    mut hairs: Query<(Entity, &TickPose, Option<&IsWet>, &mut MergedSubsteps), With<Hair>>,
+    mut hairs: Query<(Entity, &TickPose, &mut MergedSubsteps), With<Hair>>,
 ) {
-    for (hair, pose, wet, mut merged) in &mut hairs {
+    for (hair, pose, mut merged) in &mut hairs {
         if pose.waits() {
             merged.set_if_neq(MergedSubsteps::WAITS);
             continue;
         }
         let solver = solver.of(hair);
-        let takes_longer = solver.method == SolverMethod::Direct
-            && model.of(hair) == StrandModel::Rod
-            && wet.is_none_or(|wet| !wet.0);
+        let takes_longer =
+            solver.method == SolverMethod::Direct && model.of(hair) == StrandModel::Rod;
         merged.set_if_neq(if takes_longer {
             MergedSubsteps::within(solver.substep, &step)
         } else {
@@ -49,7 +47,7 @@ mod tests {
     use bevy::ecs::system::RunSystemOnce;
 
     #[test]
-    fn only_dry_rods_of_the_direct_solver_take_longer_substeps() {
+    fn only_rods_of_the_direct_solver_take_longer_substeps() {
         let mut world = World::new();
         world.insert_resource(HairStep { dt: 1.0 / 360.0, index: 0, count: 6 });
         world.init_resource::<HairDefault<HairSolver>>();
@@ -57,8 +55,7 @@ mod tests {
         let sweeps = HairSolver { method: SolverMethod::Sweeps, ..default() };
         let fine = HairSolver { substep: 1.0 / 360.0, ..default() };
         let hairs = [
-            (world.spawn(IsWet(false)).id(), 2),
-            (world.spawn(IsWet(true)).id(), 1),
+            (world.spawn_empty().id(), 2),
             (world.spawn(sweeps).id(), 1),
             (world.spawn(StrandModel::MassSpring).id(), 1),
             (world.spawn(fine).id(), 1),

@@ -1,4 +1,4 @@
-//! Transport of a strand's water in a substep: flow along it, soaking, drying and drips.
+//! Transport of a strand's water in a tick: flow along it, soaking, drying and drips.
 
 use super::super::{
     droplet::Droplet,
@@ -9,17 +9,20 @@ use crate::forces::environment::vapour::{DryingAir, WATER, transfer};
 use bevy::{math::ops::exp_m1, prelude::*};
 use core::f32::consts::PI;
 
-/// Courant number of the film's flow: how far it moves in one step, as a share of a segment.
+/// Courant number of the film's flow: how far it moves in one round, as a share of a segment.
 const COURANT: f32 = 0.4;
 
-/// Exposure of a node to moving air in a substep.
+/// Rounds of flow in a step, at most: more only where a film is so thick that most of it drips off.
+const MOST_ROUNDS: f32 = 6.0;
+
+/// Exposure of a node to moving air in a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Exposure {
     /// Speed of the air beyond the room's draught (m/s).
     pub speed: f32,
     /// Its temperature above the room's (K).
     pub warmth: f32,
-    /// Share of the node's capacity that equation 19 dries away in this substep: Σ drying |Δv_w|.
+    /// Share of the node's capacity that equation 19 dries away in this step: Σ drying |Δv_w|.
     pub blown: f32,
     /// Whether it is submerged instead: it soaks, and has no film.
     pub submerged: bool,
@@ -31,7 +34,7 @@ impl Exposure {
     }
 }
 
-/// Conditions of a substep for the water of all strands of a hair, computed once.
+/// Conditions of a step for the water of all strands of a hair, computed once.
 #[derive(Clone, Debug)]
 pub(crate) struct WaterConditions<'a> {
     wetting: HairWetting,
@@ -43,7 +46,7 @@ pub(crate) struct WaterConditions<'a> {
     diameter: f32,
     /// Capacity for bound water per metre of strand (m³/m).
     capacity: f64,
-    /// Share of the free capacity that soaking fills in this substep.
+    /// Share of the free capacity that soaking fills in this step.
     soaked: f64,
     /// Film capacity of a node and of a tip (m³).
     held: f64,
@@ -54,7 +57,7 @@ pub(crate) struct WaterConditions<'a> {
 
 impl<'a> WaterConditions<'a> {
     /// For a hair with this `wetting`, under `gravity` in its frame (m/s²), in a room's `air`, in a
-    /// substep of `dt` (s) in which chemistry is `process` times as fast as in reality.
+    /// step of `dt` (s) in which chemistry is `process` times as fast as in reality.
     pub fn new(
         wetting: HairWetting,
         gravity: Vec3,
@@ -80,16 +83,25 @@ impl<'a> WaterConditions<'a> {
         conditions
     }
 
-    /// Evaporation per metre of strand in this substep (m³/m).
+    /// Evaporation per metre of strand in this step (m³/m).
     fn drying(&self, exposed: &Exposure) -> f64 {
         let speed = self.air.draught + exposed.speed;
         let drive = self.air.drive(exposed.warmth) * self.wetting.evaporation;
         let flux = transfer(speed, self.diameter) * drive;
         f64::from(flux * PI * self.diameter * self.process) / WATER
     }
+
+    /// How far a film (m³) on a segment flows in this step where gravity along it is `along` (m/s²), and how far it
+    /// creeps, as shares of its length.
+    fn courant(&self, film: f64, along: f32, length: f32) -> [f32; 2] {
+        const THINNING: f32 = WATER as f32 / (3.0 * WATER_VISCOSITY);
+        let thickness = film as f32 / (PI * self.diameter * length);
+        let speed = along.abs() * thickness * thickness * THINNING;
+        [speed * self.dt / length, self.wetting.wicking * self.process / (length * length)]
+    }
 }
 
-/// Water that a strand lost in a substep.
+/// Water that a strand lost in a step.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct WaterLoss {
     /// Evaporated (m³); negative in damp air.
@@ -101,7 +113,7 @@ pub(crate) struct WaterLoss {
 }
 
 impl Moisture {
-    /// One substep of the water of a strand with nodes at `positions` and segments of rest `lengths`
+    /// One step of the water of a strand with nodes at `positions` and segments of rest `lengths`
     /// (m): the film flows and creeps, soaks in, dries and drips. `exposure` is `None` in still
     /// air. The arrays must have an element for each node.
     pub(crate) fn exchange(
@@ -163,7 +175,7 @@ impl Moisture {
             if *film > limit {
                 // A drop at the tip takes most of the film; elsewhere only the excess drips.
                 let drop = if i == last { 0.8 * *film } else { *film - AFTER_DRIP * limit };
-                // The rest of a film that no drop can hold follows in the next substeps.
+                // The rest of a film that no drop can hold follows in the next steps.
                 let drop = drop.min(f64::from(*Droplet::VOLUME.valid.end()));
                 *film -= drop;
                 loss.drips.push((i, drop));
@@ -198,24 +210,41 @@ impl Moisture {
         moved
     }
 
-    /// The film flows along each segment under gravity and spreads by wicking.
+    /// The film flows along each segment under gravity and spreads by wicking, in as many rounds as it takes to
+    /// resolve that.
     fn flow(&mut self, positions: &[Vec3], lengths: &[f32], conditions: &WaterConditions<'_>) {
-        let WaterConditions { wetting, gravity, dt, process, diameter, .. } = conditions;
-        let girth = PI * diameter;
-        let thinning = WATER as f32 / (3.0 * WATER_VISCOSITY);
+        let gravity = conditions.gravity.length();
+        let segments = lengths.iter().zip(self.film.windows(2));
+        let fastest = segments.fold(0.0_f32, |fastest, (length, film)| {
+            let [flows, creeps] = conditions.courant(film[0].max(film[1]), gravity, *length);
+            fastest.max(flows / COURANT).max(creeps / (0.5 * COURANT))
+        });
+        let rounds = fastest.ceil().clamp(1.0, MOST_ROUNDS);
+        for _ in 0..rounds as u32 {
+            self.flow_by(positions, lengths, conditions, rounds.recip());
+        }
+    }
+
+    /// The same for a share of the step.
+    fn flow_by(
+        &mut self,
+        positions: &[Vec3],
+        lengths: &[f32],
+        conditions: &WaterConditions<'_>,
+        share: f32,
+    ) {
         let mut inflow = 0.0;
         for (i, &length) in lengths.iter().enumerate() {
             let (above, below) = (self.film[i], self.film[i + 1]);
             if above == 0.0 && below == 0.0 && inflow == 0.0 {
                 continue;
             }
-            let along = (positions[i + 1] - positions[i]).normalize_or_zero().dot(*gravity);
+            let edge = positions[i + 1] - positions[i];
+            let along = edge.normalize_or_zero().dot(conditions.gravity);
             let source = if along >= 0.0 { above } else { below };
-            let thickness = source as f32 / (girth * length);
-            let speed = along.abs() * thickness * thickness * thinning;
-            let flowing = f64::from((speed * dt / length).min(COURANT)) * source;
-            let creep = (wetting.wicking * process / (length * length)).min(0.5 * COURANT);
-            let creeping = (above - below) * f64::from(creep);
+            let [flows, creeps] = conditions.courant(source, along, length);
+            let flowing = f64::from((flows * share).min(COURANT)) * source;
+            let creeping = (above - below) * f64::from((creeps * share).min(0.5 * COURANT));
             let crossing = flowing.copysign(f64::from(along)) + creeping;
             // Limits the flow so that no film becomes negative.
             let crossing = crossing.clamp(-0.5 * below, 0.5 * above);
