@@ -85,6 +85,7 @@ mod swing;
 mod tick;
 mod water;
 mod wear;
+mod wearers;
 mod wind;
 mod without_a_device;
 mod worlds;
