@@ -40,7 +40,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) -> Result {
 /// Wet hair has no hydrogen bonds; those that form as it dries remember the shape it has then.
 fn treat(
     time: Res<Time>,
-    worn: Option<Single<(Entity, Ref<WornHair>)>>,
+    worn: Option<Single<(Entity, Ref<WornAs>)>>,
     mut dried: Local<bool>,
     mut treat: MessageWriter<HairTreatment>,
 ) {

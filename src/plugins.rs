@@ -79,7 +79,7 @@ impl HairPlugins {
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use bevy_keratin::{prelude::*, run_ticks};
+/// use bevy_keratin::prelude::*;
 ///
 /// let mut app = App::new();
 /// app.add_plugins((MinimalPlugins, HairPlugins::default()));

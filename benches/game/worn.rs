@@ -69,7 +69,7 @@ fn figure(threads: usize, skin: &Mesh, preset: HairPreset) -> (App, Entity) {
     let hair = (0..6000).find_map(|_| {
         app.update();
         sleep(Duration::from_millis(2));
-        let mut worn = app.world_mut().query_filtered::<Entity, With<WornHair>>();
+        let mut worn = app.world_mut().query_filtered::<Entity, With<WornAs>>();
         worn.iter(app.world()).next()
     });
     (app, hair.expect("hair is worn"))

@@ -98,8 +98,6 @@ pub fn put_on(world: &mut World, preset: HairPreset) -> Result {
     world.insert_resource(HairDefault(settings.stiffness));
     world.insert_resource(HairDefault(settings.wetting));
     world.insert_resource(HairDefault(settings.contact));
-    world.insert_resource(HairDefault(settings.solver));
-    world.insert_resource(HairDefault(settings.drag));
     world.insert_resource(HairDefault(look));
     world.insert_resource(HairDefault(followers));
 

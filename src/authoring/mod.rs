@@ -11,13 +11,13 @@ pub mod wear;
 pub mod prelude {
     pub use crate::authoring::attach::RootsOnBones;
     pub use crate::authoring::groom::{
-        BonesFile, Groom, GroomError, GroomGuides, GroomSettings, GroomedHair, RootBones, RootEnd,
-        StrandBones, UpAxis,
+        BonesFile, Groom, GroomError, GroomFileError, GroomGuides, GroomLoss, GroomLosses,
+        GroomPlace, GroomSettings, GroomedHair, RootBones, RootEnd, StrandBones, UpAxis,
     };
     pub use crate::authoring::plant::{HairPreset, Hairline, Scalp};
     #[cfg(feature = "render")]
     pub use crate::authoring::wear::ScalpShade;
     pub use crate::authoring::wear::{
-        FacingFrom, HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornHair,
+        FacingFrom, HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornAs,
     };
 }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// as a warning.
 ///
 /// ```
-/// # use bevy_keratin::{prelude::*, FaultKind, InvalidValue}; use bevy::prelude::*;
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
 /// fn react(mut faults: MessageReader<HairFault>) {
 ///     for fault in faults.read().filter(|fault| fault.kind == FaultKind::Setting) {
 ///         let value = fault.cause::<InvalidValue>().map(|value| value.what);

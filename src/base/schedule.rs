@@ -485,6 +485,7 @@ impl Plugin for TickPlugin {
         match self.schedule {
             Some(schedule) => {
                 let alone = !is_fixed(schedule);
+                app.insert_resource(OwnSchedule { label: schedule, idle: 0.0 });
                 let tick = move |world: &mut World| {
                     note(world, alone);
                     run_noted(world);
@@ -533,6 +534,25 @@ pub(crate) fn lacks<Needed: Plugin, Own: Plugin>(app: &mut App) -> bool {
     is_missing
 }
 
+/// A schedule of the game's own in which ticks run, and for how long it has run none (s).
+#[derive(Resource)]
+pub(crate) struct OwnSchedule {
+    pub(crate) label: InternedScheduleLabel,
+    idle: f32,
+}
+
+impl OwnSchedule {
+    /// For how long it runs none before that is said (s).
+    pub(crate) const LONG: f32 = 2.0;
+
+    /// Another `step` (s) has passed without one: whether that is to be said now.
+    pub(crate) fn is_idle_for(&mut self, step: f32) -> bool {
+        let before = self.idle;
+        self.idle += step;
+        before < Self::LONG && self.idle >= Self::LONG
+    }
+}
+
 /// How many ticks may wait to be run.
 const MOST_TICKS: usize = 1024;
 
@@ -559,6 +579,9 @@ fn note(world: &mut World, alone: bool) {
     let clock = *world.resource::<Time>();
     if clock.delta_secs() <= 0.0 {
         return;
+    }
+    if let Some(mut own) = world.get_resource_mut::<OwnSchedule>() {
+        own.idle = 0.0;
     }
     let _ = world.run_system_cached_with(note_tick, alone);
     let frame = world.get_resource::<Time<Virtual>>();
@@ -681,7 +704,9 @@ mod tests {
             let seconds: f32 = all.iter().map(|step| step.dt).sum();
             assert!((seconds * rate - 1.0).abs() < 1e-5, "{rate} Hz: {seconds} s");
             assert!(all[0].is_first && all.iter().filter(|step| step.is_first).count() == 1);
-            assert!(all[all.len() - 1].is_last && all.iter().filter(|step| step.is_last).count() == 1);
+            assert!(
+                all[all.len() - 1].is_last && all.iter().filter(|step| step.is_last).count() == 1
+            );
         }
     }
 

@@ -9,7 +9,8 @@ pub mod prelude {
     #[cfg(feature = "avian")]
     pub use crate::forces::contact::{AvianHairCollider, AvianShapeError};
     pub use crate::forces::contact::{
-        BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, StrandContact,
+        Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, Openings,
+        StrandContact,
     };
     pub use crate::forces::environment::{
         AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindTravel, WindZone,

@@ -14,7 +14,10 @@ use crate::{
         schedule::{HairSystems, HairTick, first_substep},
         setting,
     },
-    hair::strand::{Hair, ReturnToCpu, keep_required, lacks_strands},
+    hair::{
+        strand::{Hair, ReturnToCpu, keep_required, lacks_strands},
+        worn,
+    },
     keratin::treatment::HairTreatment,
     simulation::sleep,
     water::SoakHair,
@@ -31,7 +34,7 @@ impl Plugin for HairGpuPlugin {
         if lacks_strands::<Self>(app) {
             return;
         }
-        setting::plugin::<SimulateOn>(app);
+        worn::setting::<SimulateOn>(app);
         sleep::watch_on_gpu(app);
         setting::resource::<HairGpu>(app);
         keep_required::<Hair, HairResidence>(app);

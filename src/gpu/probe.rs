@@ -9,8 +9,8 @@ use bevy::{ecs::entity::EntityHashMap, prelude::*};
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// fn follow_a_tip(mut commands: Commands, strand: Single<Entity, With<Strand>>) {
-///     commands.entity(*strand).insert(HairProbe).observe(|probed: On<HairProbed>| {
+/// fn follow_a_tip(In(strand): In<Entity>, mut commands: Commands) {
+///     commands.entity(strand).insert(HairProbe).observe(|probed: On<HairProbed>| {
 ///         println!("its tip was at {:?}, {} ticks ago", probed.positions.last(), probed.age);
 ///     });
 /// }

@@ -15,7 +15,7 @@ use core::fmt;
 /// the next tick, of more than 16,384 strands on the GPU after as many ticks as there are times that number.
 ///
 /// ```
-/// # use bevy_keratin::{gpu::SimulateOn, prelude::*}; use bevy::prelude::*;
+/// # use bevy_keratin::prelude::*; use bevy::prelude::*;
 /// fn crowd(mut commands: Commands) {
 ///     let free = StrandContact { strength: 0.0, ..default() };
 ///     commands.spawn((Hair, SimulateOn::Gpu, free));

@@ -16,7 +16,10 @@ use crate::{
         setting::{Ranged, Settings},
     },
     forces::contact::HairReach,
-    hair::strand::{AskForStrands, Hair, MissedOnGpu, Strand, StrandOf, Strands},
+    hair::{
+        strand::{AskForStrands, Hair, MissedOnGpu, Strand, StrandOf, Strands},
+        worn::HairsOf,
+    },
     keratin::treatment::{HairTreatment, PermWinding, WindingProgress},
     simulation::lod::PresentLod,
     solver::rod::SolverMethod,
@@ -64,7 +67,7 @@ pub(super) fn decide(
         With<Hair>,
     >,
     mut written: WrittenStrands,
-    (of, now): (Query<&StrandOf>, SystemChangeTick),
+    (of, of_wearer, now): (Query<&StrandOf>, HairsOf, SystemChangeTick),
     (mut soaks, mut treats): (MessageReader<SoakHair>, MessageReader<HairTreatment>),
     (soaks_missed, treats_missed): (
         Option<ResMut<MissedOnGpu<SoakHair>>>,
@@ -72,7 +75,11 @@ pub(super) fn decide(
     ),
 ) -> Vec<(Entity, Decision)> {
     let hair_of = |target: Entity| of.get(target).map_or(target, |of| of.0);
-    let mut soaked: Vec<_> = soaks.read().map(|soak| (hair_of(soak.target), *soak)).collect();
+    let each = |soak: &SoakHair| -> Vec<_> {
+        let targets = of_wearer.of(&soak.target).iter();
+        targets.map(|&target| (hair_of(target), SoakHair { target, ..*soak })).collect()
+    };
+    let mut soaked: Vec<_> = soaks.read().flat_map(each).collect();
     // Of a hair as a whole they are no reason to return to the CPU.
     let mut treated: Vec<_> = (treats.read().filter(|treat| of.contains(treat.target)))
         .map(|treat| (hair_of(treat.target), treat.clone()))
@@ -268,11 +275,14 @@ pub(super) fn treat(
     step: Res<HairStep>,
     process: Res<HairProcessTime>,
     mut requests: MessageReader<HairTreatment>,
+    of: HairsOf,
     mut hairs: Query<(&mut GpuTreatments, &GpuHair)>,
 ) {
     for request in requests.read() {
-        if let Ok((mut treatments, _)) = hairs.get_mut(request.target) {
-            treatments.push(request.clamped());
+        for &target in of.of(&request.target) {
+            if let Ok((mut treatments, _)) = hairs.get_mut(target) {
+                treatments.push(HairTreatment { target, ..request.clamped() });
+            }
         }
     }
     let dt = step.dt * process.clamped().0;

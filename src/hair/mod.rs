@@ -1,7 +1,8 @@
-//! What hair is: [`strand`], its entities and their state, and [`look`], its colour and gloss.
+//! What hair is: [`strand`], its entities and their state, [`look`], its colour and gloss, and [`worn`], who wears it.
 
 pub mod look;
 pub mod strand;
+pub mod worn;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
@@ -12,4 +13,5 @@ pub mod prelude {
         AddedMass, Hair, HairInertia, HeldNodes, HeldNodesState, MotionOwner, OnGpu, ShiftWorld,
         SleepCounts, Strand, StrandError, StrandModel, StrandOf, StrandSleep, Strands,
     };
+    pub use crate::hair::worn::{WornBy, WornHair};
 }

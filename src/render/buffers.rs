@@ -3,7 +3,10 @@
 use super::drawn_strand::DrawnStrand;
 use crate::{
     base::parallel::prefetch,
-    hair::strand::{Strand, StrandHistory},
+    hair::{
+        strand::{Strand, StrandHistory},
+        worn::ActsOn,
+    },
     keratin::bond::Bonds,
 };
 use bevy::{prelude::*, render::storage::ShaderBuffer};
@@ -44,9 +47,15 @@ pub struct HairBuffers {
     pub guide_count: u32,
     /// How many strands are drawn, guides included.
     pub strand_count: u32,
-    /// The child that carries mesh and material. Put `NotShadowCaster`, `RenderLayers` and the like
-    /// on it.
+    /// The child that carries mesh and material. `RenderLayers`, `NoFrustumCulling`, `NotShadowCaster` and
+    /// `NotShadowReceiver` of the hair or its wearer are copied to it; put others on it.
     pub drawn: Entity,
+}
+
+impl ActsOn for HairBuffers {
+    fn others(&self) -> &[Entity] {
+        core::slice::from_ref(&self.drawn)
+    }
 }
 
 /// A node as the shader reads it: 32 bytes.

@@ -62,6 +62,7 @@ mod draw;
 mod drawn_strand;
 mod elsewhere;
 mod expand;
+mod flags;
 mod follower_roots;
 mod followers;
 mod frame;
@@ -107,8 +108,11 @@ pub(crate) use {
 pub use crate::hair::look::{HairDye, HairLook, HairShading, Melanin};
 
 use crate::{
-    base::{schedule::HairTicks, setting},
-    hair::strand::{DrawnFrames, Hair, lacks_strands},
+    base::schedule::HairTicks,
+    hair::{
+        strand::{DrawnFrames, Hair, lacks_strands},
+        worn,
+    },
     simulation::settle::{SettlePlugin, Settling},
 };
 use bevy::{
@@ -141,9 +145,9 @@ impl Plugin for HairRenderPlugin {
         if lacks_strands::<Self>(app) {
             return;
         }
-        setting::plugin::<HairFollowers>(app);
-        setting::plugin::<HairView>(app);
-        setting::plugin::<HairDetail>(app);
+        worn::setting::<HairFollowers>(app);
+        worn::setting::<HairView>(app);
+        worn::setting::<HairDetail>(app);
         app.insert_resource(Interpolate(self.interpolate))
             .init_resource::<HairBeads>()
             .register_type::<HairBeads>()
@@ -230,6 +234,7 @@ impl Plugin for HairRenderPlugin {
                 .before(VisibilitySystems::VisibilityPropagate)
                 .before(AssetEventSystems),
         );
+        flags::plugin(app);
         smoothing::plugin(app);
         upload::plugin(app);
         expand::plugin(app);

@@ -2,6 +2,8 @@
 
 #import bevy_pbr::view_transformations::position_world_to_clip
 #import bevy_pbr::mesh_functions
+#import bevy_pbr::mesh_bindings::mesh
+#import bevy_pbr::mesh_types::MESH_FLAGS_SHADOW_RECEIVER_BIT
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
 #import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
@@ -120,6 +122,7 @@ fn fragment(in: ForwardVertex) -> Fragment {
     fibre.turn = linear * (1.0 / fibre.scale);
     fibre.local = in.local;
     fibre.place = volume_place(in.local);
+    fibre.shadowed = (mesh[in.instance].flags & MESH_FLAGS_SHADOW_RECEIVER_BIT) != 0u;
     let lit = lit_hair(fibre);
 
     var pbr = pbr_input_new();

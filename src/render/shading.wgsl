@@ -41,6 +41,8 @@ struct Fibre {
     turn: mat3x3<f32>,
     scale: f32,
     place: VolumePlace,
+    // Whether shadow maps act on it.
+    shadowed: bool,
 }
 
 // What a fibre is made of at one place.
@@ -263,7 +265,7 @@ fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32>
     var p: Arrival;
     let known = vec4((*light).position_radius.xyz, 1.0);
     let hair = way_of(fibre, l);
-    if ((*light).flags & mesh_view_types::POINT_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
+    if !fibre.shadowed || ((*light).flags & mesh_view_types::POINT_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
         p = uncounted(fibre, l, known);
     } else if spot {
         p = counted(spot_passage(id, hair), fibre, hair, l, known);
@@ -296,7 +298,7 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         let l = (*sun).direction_to_light;
         var p: Arrival;
         let hair = way_of(fibre, l);
-        if ((*sun).flags & mesh_view_types::DIRECTIONAL_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
+        if !fibre.shadowed || ((*sun).flags & mesh_view_types::DIRECTIONAL_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
             p = uncounted(fibre, l, vec4(l, 0.0));
         } else {
             p = counted(sun_passage(i, hair, view_z), fibre, hair, l, vec4(l, 0.0));

@@ -7,8 +7,9 @@ use super::{
 use crate::{
     base::{schedule::EffectiveSubsteps, setting::Settings},
     forces::contact::{Bridged, Film, LockNeighbours, StrandContact},
-    hair::strand::{
-        AddedMass, Hair, HairHere, MotionOwner, Strand, StrandOf, StrandSleep, Strands,
+    hair::{
+        strand::{AddedMass, Hair, HairHere, MotionOwner, Strand, StrandOf, StrandSleep, Strands},
+        worn::WornBy,
     },
 };
 use bevy::prelude::*;
@@ -21,18 +22,20 @@ pub(crate) struct IsWet(pub(crate) bool);
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct HoldsWater(bool);
 
-/// Triggered on a wet [`Hair`] when it has dried to the regain at room humidity.
+/// Triggered on a wet [`Hair`] when it has dried to the regain at room humidity, then on its wearer
+/// ([`WornBy`]). An observer of the whole app sees both; `On::original_event_target` is the hair.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// fn watch(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
-///     commands.entity(*hair).observe(|dried: On<HairDried>| info!("{} is dry", dried.entity));
+/// fn watch(In(character): In<Entity>, mut commands: Commands) {
+///     commands.entity(character).observe(|dried: On<HairDried>| info!("{} is dry", dried.entity));
 /// }
 /// ```
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[entity_event(propagate = &'static WornBy, auto_propagate)]
 #[reflect(Clone, PartialEq)]
 pub struct HairDried {
-    /// The hair.
+    /// The hair, or its wearer.
     pub entity: Entity,
 }
 

@@ -16,9 +16,12 @@ use crate::{
         Blown, BlownAir, Gravity, LocalWinds, Winds,
         vapour::{DryingAir, WATER},
     },
-    hair::strand::{
-        AddedMass, Hair, Here, InWater, MissedOnGpu, OnGpu, PerHair, Pose, Strand, StrandOf,
-        StrandSleep, Strands, TickPose,
+    hair::{
+        strand::{
+            AddedMass, Hair, Here, InWater, MissedOnGpu, OnGpu, PerHair, Pose, Strand, StrandOf,
+            StrandSleep, Strands, TickPose,
+        },
+        worn::HairsOf,
     },
     keratin::bond::{BondChanges, BondKind, Bonds},
 };
@@ -157,7 +160,7 @@ pub(super) fn exchange_water(
     step: Res<HairStep>,
     (air, process, gravity): (Res<DryingAir>, Res<HairProcessTime>, Gravity),
     wetting: Settings<HairWetting>,
-    hairs: Query<(&TickPose, Option<&Strands>), With<Hair>>,
+    (hairs, of_wearer): (Query<(&TickPose, Option<&Strands>), With<Hair>>, HairsOf),
     winds: Winds,
     mut strands: Query<
         (
@@ -191,15 +194,17 @@ pub(super) fn exchange_water(
             missed.0.push(*soak);
             continue;
         }
-        let members = match hairs.get(soak.target) {
-            Ok((_, members)) => members.map(|m| m.collection().to_vec()).unwrap_or_default(),
-            Err(_) if strands.contains(soak.target) => vec![soak.target],
-            Err(_) => {
-                let message = "the target of SoakHair is neither a Hair nor a strand";
-                faults.write(HairFault::new(FaultKind::NoTarget, message).of(soak.target));
-                continue;
-            }
-        };
+        let is_known = |target: &&Entity| hairs.contains(**target) || strands.contains(**target);
+        let targets = of_wearer.of(&soak.target);
+        if let Some(unknown) = targets.iter().find(|target| !is_known(target)) {
+            faults.write(of_wearer.no_target("SoakHair", *unknown));
+            continue;
+        }
+        let members = targets.iter().flat_map(|target| match hairs.get(*target) {
+            Ok((_, own)) => own.map(|own| own.collection().to_vec()).unwrap_or_default(),
+            Err(_) => vec![*target],
+        });
+        let members: Vec<Entity> = members.collect();
         report(Some(soak.target), soak.violations(), &mut faults);
         let share = soak.clamped().wetness;
         for member in members {
@@ -370,7 +375,8 @@ pub(super) fn bear_water(
     let water = moisture.film().iter().zip(moisture.bound()).map(|(film, bound)| film + bound);
     added_mass.mass.resize(moisture.film().len(), 0.0);
     let mut change = 0.0_f32;
-    for ((mass, length), volume) in added_mass.mass.iter_mut().zip(node_lengths(lengths)).zip(water) {
+    for ((mass, length), volume) in added_mass.mass.iter_mut().zip(node_lengths(lengths)).zip(water)
+    {
         let now = (WATER * volume / (dry * f64::from(length))) as f32;
         change = change.max((now - *mass).abs() / (1.0 + now));
         *mass = now;

@@ -84,16 +84,16 @@ impl DropletRules {
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// fn bath(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
-///     commands.trigger(SoakHair::dripping(*hair));
+/// fn bath(In(character): In<Entity>, mut commands: Commands) {
+///     commands.trigger(SoakHair::dripping(character));
 ///     // and to dry it off at once
-///     commands.trigger(SoakHair { target: *hair, wetness: 0.0 });
+///     commands.trigger(SoakHair { target: character, wetness: 0.0 });
 /// }
 /// ```
 #[derive(EntityEvent, Message, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct SoakHair {
-    /// The [`Hair`](crate::Hair) or strand.
+    /// The [`Hair`](crate::Hair) or strand, or who wears it.
     #[event_target]
     pub target: Entity,
     /// Share of what hair can bind: 1 soaks through, 0 dries. Up to 1 the film is removed; the

@@ -112,7 +112,8 @@ pub(super) fn move_droplets(
             let radius = drop.radius();
             // A drop that meets nothing within the tick moves once, at its end.
             let way = (drop.velocity.length().max(wind.length()) + gravity.length() * tick) * tick;
-            if !shared.is_last && falls_freely(drop, way + radius, bounds, &solids, &volumes, found) {
+            if !shared.is_last && falls_freely(drop, way + radius, bounds, &solids, &volumes, found)
+            {
                 drop.counted.0 = drop.volume;
                 return;
             }
@@ -184,7 +185,8 @@ fn falls_freely(
 ) -> bool {
     let place = drop.position;
     let [x, y, z] = place.to_array();
-    let is_near = |solid: &Obstacle| !(solid.solid.depth(V3::new(x, y, z), way + SHORT_PUSH).1 <= 0.0);
+    let is_near =
+        |solid: &Obstacle| !(solid.solid.depth(V3::new(x, y, z), way + SHORT_PUSH).1 <= 0.0);
     drop.ride.is_none()
         && drop.lying == 0.0
         && !bounds.iter().any(|hair| hair.may_touch(place, way + drop.r_max.max(drop.r_min)))

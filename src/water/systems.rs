@@ -18,8 +18,11 @@ use crate::{
         stretch::{self, Stretch},
     },
     forces::{contact::TickColliders, environment::vapour::DryingAir},
-    hair::strand::{
-        Hair, Here, MissedOnGpu, ShiftWorld, Strand, TickPose, keep_required, lacks_strands,
+    hair::{
+        strand::{
+            Hair, Here, MissedOnGpu, ShiftWorld, Strand, TickPose, keep_required, lacks_strands,
+        },
+        worn,
     },
 };
 use bevy::{ecs::entity_disabling::Disabled, prelude::*};
@@ -32,7 +35,7 @@ impl Plugin for WaterPlugin {
         if lacks_strands::<Self>(app) {
             return;
         }
-        setting::plugin::<HairWetting>(app);
+        worn::setting::<HairWetting>(app);
         strand_block::plugin(app);
         setting::resource::<DropletRules>(app);
         setting::component::<Shower>(app);

@@ -337,7 +337,7 @@ fn strands_whose_root_lies_in_a_collider_come_out_whole() {
     for depth in [0.5e-3, 1.5e-3, 3e-3, 4e-3, 6e-3] {
         let mut app = test_app(60.0);
         let world = app.world_mut();
-        let stiff = (settings.stiffness, settings.contact, settings.drag);
+        let stiff = (settings.stiffness, settings.contact, AirDrag { rate: 3.0 });
         let hair = world.spawn((Hair, stiff)).id();
         world.spawn((HairCollider::sphere(BALL).unwrap(), Transform::default()));
         let strands: Vec<Entity> = (0..64)

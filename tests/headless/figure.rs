@@ -181,7 +181,7 @@ fn a_beard_and_short_hair_are_worn_together() {
     // Which is planted first is a matter of threads; time begins when both are.
     world.resource_mut::<Time<Virtual>>().pause();
     wait_for(&mut app, |app| {
-        let both = app.world_mut().query::<&WornHair>().iter(app.world()).count() == 2;
+        let both = app.world_mut().query::<&WornAs>().iter(app.world()).count() == 2;
         both.then_some(())
     });
     app.world_mut().resource_mut::<Time<Virtual>>().unpause();
@@ -233,11 +233,11 @@ fn hair_beside_a_beard_is_swapped_and_a_beard_goes_with_its_mesh() {
     let wear = |app: &mut App, on: Entity, preset: HairPreset| {
         app.world_mut().entity_mut(on).insert(WearHair::new(preset).facing(Dir3::Z));
         wait_for(app, |app| {
-            let mut worn = app.world_mut().query::<(Entity, &WornHair)>();
+            let mut worn = app.world_mut().query::<(Entity, &WornAs, &WornBy)>();
             let of = worn
                 .iter(app.world())
-                .find(|(_, worn)| worn.wearer == on && worn.preset() == Some(preset));
-            of.map(|(hair, _)| hair)
+                .find(|(_, worn, by)| by.0 == on && worn.preset() == Some(preset));
+            of.map(|(hair, ..)| hair)
         })
     };
     let _ = wear(&mut app, root, HairPreset::Short);
@@ -268,7 +268,7 @@ fn depths(mesh: &Mesh, preset: HairPreset) -> [[Depths; 2]; 2] {
     let world = app.world_mut();
     world.entity_mut(root).insert(WearHair::new(preset).facing(Dir3::Z));
     let hair = wait_for(&mut app, |app| {
-        let mut worn = app.world_mut().query_filtered::<Entity, With<WornHair>>();
+        let mut worn = app.world_mut().query_filtered::<Entity, With<WornAs>>();
         worn.iter(app.world()).next()
     });
     // Drawn strands are chosen as they grow.

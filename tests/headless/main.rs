@@ -88,6 +88,7 @@ mod tick;
 mod tie;
 mod water;
 mod wear;
+mod wearers;
 mod wind;
 mod without_a_device;
 mod worlds;

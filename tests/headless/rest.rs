@@ -12,7 +12,7 @@ use bevy_keratin::prelude::*;
 fn worn(app: &mut App) -> Entity {
     wait_for(app, |app| {
         let world = app.world_mut();
-        world.query_filtered::<Entity, (With<WornHair>, With<Strands>)>().iter(world).next()
+        world.query_filtered::<Entity, (With<WornAs>, With<Strands>)>().iter(world).next()
     })
 }
 

@@ -8,6 +8,7 @@ use crate::{
     worlds_measured::wearer::{HALF, MIDDLE, ball, character},
 };
 use bevy::{
+    camera::visibility::RenderLayers,
     mesh::{VertexAttributeValues as Values, skinning::SkinnedMesh},
     prelude::*,
 };
@@ -215,6 +216,19 @@ fn it_follows_a_mesh_that_is_edited() {
 }
 
 #[test]
+fn it_is_in_the_render_layers_of_its_hair() {
+    let (mut app, _, _, hair) = wearing(WearHair::new(HairPreset::Short));
+    let shell = shells(&mut app, hair)[0];
+    let layers = |app: &App| app.world().get::<RenderLayers>(shell).cloned();
+    app.world_mut().entity_mut(hair).insert(RenderLayers::layer(3));
+    app.update();
+    assert_eq!(layers(&app), Some(RenderLayers::layer(3)));
+    app.world_mut().entity_mut(hair).remove::<RenderLayers>();
+    app.update();
+    assert_eq!(layers(&app), None);
+}
+
+#[test]
 fn a_copy_of_a_character_has_its_own() {
     let (mut app, root, _, hair) = wearing(WearHair::new(HairPreset::Short));
     let shell = shells(&mut app, hair)[0];
@@ -225,7 +239,7 @@ fn a_copy_of_a_character_has_its_own() {
         app.update();
         sleep(Duration::from_millis(1));
     });
-    let mut worn = app.world_mut().query::<(Entity, &WornHair)>();
+    let mut worn = app.world_mut().query::<(Entity, &WornAs)>();
     let copy = worn.iter(app.world()).map(|(hair, _)| hair).find(|other| *other != hair).unwrap();
     assert_eq!((shells_now(&app, hair).len(), shells_now(&app, copy).len()), (1, 1));
     app.world_mut().entity_mut(copy).insert(HairDye::pink());

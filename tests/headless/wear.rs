@@ -76,7 +76,7 @@ fn off_head(p: Vec3) -> f32 {
 }
 
 fn wearers(app: &mut App) -> usize {
-    app.world_mut().query::<&WornHair>().iter(app.world()).count()
+    app.world_mut().query::<&WornAs>().iter(app.world()).count()
 }
 
 #[test]
@@ -90,8 +90,8 @@ fn a_preset_waits_for_the_character_and_is_planted_on_its_head() {
     let hair = worn(&mut app);
     let world = app.world();
     assert_eq!(world.get::<ChildOf>(hair).unwrap().parent(), head);
-    let is = world.get::<WornHair>(hair).unwrap();
-    assert_eq!((is.wearer, is.preset()), (root, Some(HairPreset::Short)));
+    assert_eq!(world.get::<WornBy>(hair), Some(&WornBy(root)));
+    assert_eq!(world.get::<WornAs>(hair).unwrap().preset(), Some(HairPreset::Short));
     assert_eq!(world.get::<HairStiffness>(hair), Some(&HairPreset::Short.settings().stiffness));
     // 223 fibres for each cm², 0.8 guides.
     let fibres = world.get::<HairWetting>(hair).unwrap().fibres;
@@ -130,7 +130,7 @@ fn hair_is_swapped_when_the_new_is_ready_and_gone_with_its_component() {
     let coily = worn(&mut app);
     let world = app.world();
     assert!(world.get_entity(bob).is_err(), "the old is gone with the new");
-    assert_eq!(world.get::<WornHair>(coily).unwrap().preset(), Some(HairPreset::Coily));
+    assert_eq!(world.get::<WornAs>(coily).unwrap().preset(), Some(HairPreset::Coily));
     assert_eq!(wearers(&mut app), 1);
     // A write without a change makes no new hair.
     app.world_mut().get_mut::<WearHair>(root).unwrap().hair = HairPreset::Coily.into();
@@ -321,7 +321,7 @@ fn a_head_is_free_again_when_its_wearer_is_gone() {
     assert_eq!(faults(&mut app).len(), 1, "reported once");
     app.world_mut().entity_mut(root).remove::<WearHair>();
     let hair = worn(&mut app);
-    assert_eq!(app.world().get::<WornHair>(hair).unwrap().wearer, other);
+    assert_eq!(app.world().get::<WornBy>(hair), Some(&WornBy(other)));
     assert_eq!(wearers(&mut app), 1);
 }
 
@@ -461,7 +461,7 @@ fn a_saved_hairdo_is_worn_again() {
     assert!(faults(&mut app).is_empty());
 }
 
-fn groom() -> Groom {
+pub(super) fn groom() -> Groom {
     let golden = 2.399_963;
     let strand = |i: usize| {
         let y = 0.2 + 0.8 * (i as f32 + 0.5) / 300.0;
@@ -485,7 +485,7 @@ fn a_groom_is_worn_where_it_was_made() {
     assert_eq!(reported(&mut app).worn, [], "it waits for the groom");
     app.world_mut().resource_mut::<Assets<Groom>>().insert(&handle, groom()).unwrap();
     let hair = worn(&mut app);
-    let is = app.world().get::<WornHair>(hair).unwrap();
+    let is = app.world().get::<WornAs>(hair).unwrap();
     assert!(matches!(&is.wear.hair, HairSource::Groom { groom, .. } if *groom == handle));
     assert_eq!(is.preset(), None);
     // Each stands for the skin around it: the upper 0.4 of 0.12 m² at 223 a cm², 300 strands.
@@ -504,10 +504,27 @@ fn a_groom_is_worn_where_it_was_made() {
     app.world_mut().resource_mut::<Assets<Groom>>().insert(&handle, half).unwrap();
     let hair = worn(&mut app);
     assert_eq!(strands(&mut app, hair).len(), 150);
+    // In centimetres it is told so, as it is by any unit.
+    for unit in [0.01f32, 100.0] {
+        let other = groom().scaled(1.0 / unit).unwrap();
+        let other = app.world_mut().resource_mut::<Assets<Groom>>().add(other);
+        app.world_mut().get_mut::<WearHair>(root).unwrap().hair = other.into();
+        let refused = wait(&mut app).refused;
+        let WearError::Beside { scale, .. } = &refused[0].1 else { panic!("{refused:?}") };
+        assert_eq!(*scale, Some(unit));
+        let message = refused[0].1.to_string();
+        assert!(message.contains(&format!("at {unit} times its size")), "{message}");
+    }
+    app.world_mut().get_mut::<WearHair>(root).unwrap().hair = handle.clone().into();
+    let hair = worn(&mut app);
     // A groom far from the character is an error.
     app.world_mut().get_mut::<WearHair>(root).unwrap().place = Transform::from_xyz(0.0, 0.0, 0.5);
     let reported = wait(&mut app);
-    assert!(matches!(reported.refused[0].1, WearError::Beside { .. }), "{:?}", reported.refused);
+    assert!(
+        matches!(reported.refused[0].1, WearError::Beside { scale: None, .. }),
+        "{:?}",
+        reported.refused
+    );
     assert!(app.world().get::<Hair>(hair).is_some(), "the old stays");
     app.world_mut().get_mut::<WearHair>(root).unwrap().place =
         Transform::from_translation(Vec3::NAN);

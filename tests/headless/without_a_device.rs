@@ -71,7 +71,7 @@ fn a_renderer_without_a_device_is_fine() {
 
 /// What the crate has logged.
 #[derive(Clone, Default)]
-struct Reported(Arc<Mutex<Vec<String>>>);
+pub(crate) struct Reported(pub(crate) Arc<Mutex<Vec<String>>>);
 
 impl tracing::field::Visit for Reported {
     fn record_debug(&mut self, _: &tracing::field::Field, value: &dyn core::fmt::Debug) {

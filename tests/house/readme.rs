@@ -131,6 +131,34 @@ fn samples_are_whole() {
     }
 }
 
+/// Games have a second character: what asks for the only one of its kind then runs no more, in silence.
+#[test]
+fn samples_survive_a_second_character() {
+    let docs = files_below(&root().join("src"), "rs").into_iter().map(|file| {
+        let text = fs::read_to_string(&file).unwrap();
+        let is_doc = |line: &&str| line.trim_start().starts_with("//");
+        (file, text.lines().filter(is_doc).collect::<Vec<_>>().join("\n"))
+    });
+    for (file, text) in pages().into_iter().chain(docs) {
+        for only in ["Single<", ".single(", ".single_mut("] {
+            assert!(!text.contains(only), "{only} in {}", file.display());
+        }
+    }
+}
+
+/// A sample that is pasted needs the two preludes. Functions of a file format are called by its module.
+#[test]
+fn samples_need_only_the_prelude() {
+    for (file, text) in pages() {
+        let uses = text.lines().filter(|line| line.starts_with("use bevy_keratin::"));
+        for line in uses {
+            let is_known = line == "use bevy_keratin::prelude::*;"
+                || line == "use bevy_keratin::{authoring::groom::alembic, prelude::*};";
+            assert!(is_known, "{}: {line}", file.display());
+        }
+    }
+}
+
 #[test]
 fn the_bevy_that_is_named_is_the_one_that_it_is_built_on() {
     let version = |text: &str, before: &str| {

@@ -309,8 +309,7 @@ fn worn(app: &mut App, wearer: Entity) -> Entity {
 }
 
 pub(super) fn hair_of(app: &mut App, wearer: Entity) -> Vec<Entity> {
-    let mut worn = app.world_mut().query::<(Entity, &WornHair)>();
-    worn.iter(app.world()).filter(|(_, worn)| worn.wearer == wearer).map(|(hair, _)| hair).collect()
+    app.world().get::<WornHair>(wearer).map_or_else(Vec::new, |worn| worn.collection().clone())
 }
 
 pub(super) fn count<T: Component>(app: &mut App) -> usize {

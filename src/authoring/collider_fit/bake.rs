@@ -12,8 +12,7 @@ impl DistanceGrid {
     ///
     /// ```
     /// # use bevy_keratin::{forces::contact::*, prelude::*}; use bevy::prelude::*;
-    /// # fn bake(mut commands: Commands, meshes: Res<Assets<Mesh>>, sofa: Single<(Entity, &Mesh3d)>) -> Result {
-    /// let (entity, mesh) = *sofa;
+    /// # fn bake(mut commands: Commands, meshes: Res<Assets<Mesh>>, entity: Entity, mesh: &Mesh3d) -> Result {
     /// if let Some(mesh) = meshes.get(mesh) {
     ///     let grid = DistanceGrid::of_mesh(mesh, &Bake { cell: 0.02, ..default() })?;
     ///     commands.entity(entity).insert(HairCollider::grid(grid));

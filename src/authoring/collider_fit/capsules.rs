@@ -111,15 +111,16 @@ const STEPS: usize = 40;
 ///     mut commands: Commands,
 ///     meshes: Res<Assets<Mesh>>,
 ///     poses: Res<Assets<SkinnedMeshInverseBindposes>>,
-///     body: Single<(&Mesh3d, &SkinnedMesh)>,
+///     bodies: Query<(&Mesh3d, &SkinnedMesh), Added<SkinnedMesh>>,
 /// ) -> Result {
-///     let (mesh, skin) = *body;
-///     let (Some(mesh), Some(poses)) = (meshes.get(mesh), poses.get(&skin.inverse_bindposes)) else {
-///         return Ok(());
-///     };
-///     for (joint, capsule) in skin.joints.iter().zip(fit_joint_capsules(mesh, poses)?) {
-///         if let Some(capsule) = capsule {
-///             commands.spawn((capsule.collider()?, ChildOf(*joint)));
+///     for (mesh, skin) in &bodies {
+///         let (Some(mesh), Some(poses)) = (meshes.get(mesh), poses.get(&skin.inverse_bindposes)) else {
+///             continue;
+///         };
+///         for (joint, capsule) in skin.joints.iter().zip(fit_joint_capsules(mesh, poses)?) {
+///             if let Some(capsule) = capsule {
+///                 commands.spawn((capsule.collider()?, ChildOf(*joint)));
+///             }
 ///         }
 ///     }
 ///     Ok(())

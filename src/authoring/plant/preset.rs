@@ -10,12 +10,8 @@ use super::{
 #[cfg(feature = "render")]
 use crate::render::{HairFollowers, HairLook};
 use crate::{
-    base::setting::Ranged,
-    forces::{contact::StrandContact, environment::AirDrag},
-    hair::look::WornPreset,
-    simulation::settle::Settling,
-    solver::rod::{HairSolver, HairStiffness, Sweeps},
-    water::HairWetting,
+    base::setting::Ranged, forces::contact::StrandContact, hair::look::WornPreset,
+    simulation::settle::Settling, solver::rod::HairStiffness, water::HairWetting,
 };
 use bevy::prelude::*;
 
@@ -72,18 +68,13 @@ pub enum HairPreset {
     Fur,
 }
 
-/// The settings of a [`HairPreset`], a bundle for the [`Hair`](crate::Hair) entity.
+/// The settings of a [`HairPreset`], a bundle for the [`Hair`](crate::Hair) entity: only what is the preset's own.
+/// How air drags, how strands are solved and all else is that of all hair ([`HairDefault`](crate::HairDefault)).
 #[derive(Bundle, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct PresetSettings {
     /// How stiff it is.
     pub stiffness: HairStiffness,
-    /// How it swings.
-    pub drag: AirDrag,
-    /// How it is solved.
-    pub solver: HairSolver,
-    /// How sweeps solve it.
-    pub sweeps: Sweeps,
     /// How its strands keep apart.
     pub contact: StrandContact,
     /// How it wets, with as many fibres in a strand as grow around a guide.
@@ -282,9 +273,6 @@ impl HairPreset {
         let fibres = HUMAN_DENSITY / self.planting(&Scalp::default()).density;
         PresetSettings {
             stiffness: HairStiffness { bending_length, ..default() },
-            drag: AirDrag { rate: 3.0 },
-            solver: HairSolver::default(),
-            sweeps: Sweeps { internal_damping: 4.0, ..default() },
             contact,
             wetting: HairWetting { fibres, ..default() },
             settling: Settling::default(),

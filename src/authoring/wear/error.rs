@@ -18,6 +18,16 @@ pub enum WearError {
          mesh, or on the root of a character"
     )]
     NoMesh,
+    /// An asset of the wearer, such as its scene, that could not be loaded, so that there is no mesh.
+    #[error(
+        "WearHair's entity has no mesh, because {path} was not loaded: mend its path, or the file ({reason})"
+    )]
+    NoScene {
+        /// The asset's path.
+        path: String,
+        /// What the asset server says.
+        reason: String,
+    },
     /// No bone or mesh of the given name.
     #[error("nothing is named {name:?} below WearHair's entity; there are {there}")]
     NoBone {
@@ -106,13 +116,22 @@ pub enum WearError {
     /// A groom too far from the character's mesh.
     #[error(
         "half of the groom's strands grow farther than {found} m from the mesh, expected less than \
-         {most} m: set its origin with WearHair::place"
+         {most} m: {}",
+        match scale {
+            Some(scale) => format!(
+                "at {scale} times its size it fits, as if it were in another unit: multiply GroomSettings::scale, \
+                 or the scale of WearHair::place, by {scale}"
+            ),
+            None => "set its origin with WearHair::place".to_owned(),
+        }
     )]
     Beside {
         /// The median distance (m, scaled to a life-size head).
         found: f32,
         /// The limit (m).
         most: f32,
+        /// By which scale of its lengths the groom would be on the mesh, where another unit explains it.
+        scale: Option<f32>,
     },
     /// An error of planting.
     #[error(transparent)]

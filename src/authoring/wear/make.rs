@@ -30,7 +30,11 @@ use crate::{
     water::HairWetting,
 };
 use bevy::{
-    math::{Affine3A, ops::sin_cos},
+    math::{
+        Affine3A,
+        bounding::{Aabb3d, BoundingVolume},
+        ops::sin_cos,
+    },
     mesh::VertexAttributeValues as Values,
     platform::collections::{HashMap, HashSet},
     prelude::*,
@@ -66,6 +70,10 @@ const HEAD: f32 = 0.133;
 const MARGIN: f32 = 0.15;
 /// Largest median distance of a groom's roots from the mesh (m).
 const MAX_ROOT_DISTANCE: f32 = 0.03;
+/// Units that grooms are made in, in metres, and metres of characters that are in these: what is tried where a groom
+/// is far from its mesh; and how wide its roots then lie, on a head of life size (m).
+const UNITS: [f32; 7] = [0.01, 0.001, 0.0254, 0.1, 10.0, 100.0, 1000.0];
+const WIDTHS: core::ops::RangeInclusive<f32> = 0.06..=3.0;
 
 /// The input for making hair.
 pub(super) struct MakeInput {
@@ -325,14 +333,15 @@ fn from_groom(
     fitting: &Fitting,
     place: &Transform,
 ) -> Result<Grown, WearError> {
-    let groom = groom.clone().mapped(&(fitting.from_wearer * place.compute_affine()))?;
-    let hair = groom.grown_strands(guides)?;
+    let in_hair = groom.clone().mapped(&(fitting.from_wearer * place.compute_affine()))?;
+    let hair = in_hair.grown_strands(guides)?;
     let places: Vec<Vec3> = hair.strands.iter().map(|s| s.positions()[0]).collect();
     let (roots, mut apart): (Vec<_>, Vec<_>) =
         RootOnMesh::nearest(&fitting.mesh, places.iter().copied())?.into_iter().unzip();
     let found = median(&mut apart).unwrap_or(0.0);
     if found > MAX_ROOT_DISTANCE {
-        return Err(WearError::Beside { found, most: MAX_ROOT_DISTANCE });
+        let scale = unit_that_fits(groom, fitting, place);
+        return Err(WearError::Beside { found, most: MAX_ROOT_DISTANCE, scale });
     }
     Ok(Grown {
         fibres: HUMAN_DENSITY * area_of_each(&places),
@@ -341,6 +350,24 @@ fn from_groom(
         settings: None,
         preset: None,
     })
+}
+
+/// The unit (m) in which the groom would be on the mesh and of a likely size, were its lengths in that.
+fn unit_that_fits(groom: &Groom, fitting: &Fitting, place: &Transform) -> Option<f32> {
+    let is_near = |unit: &f32| {
+        let unit = Affine3A::from_scale(Vec3::splat(*unit));
+        let to_hair = fitting.from_wearer * place.compute_affine() * unit;
+        let roots = groom.strands().filter_map(|strand| strand.points.first());
+        let places: Vec<Vec3> = roots.map(|root| to_hair.transform_point3(*root)).collect();
+        let around = Aabb3d::from_point_cloud(Isometry3d::IDENTITY, places.iter().copied());
+        if !WIDTHS.contains(&(2.0 * around.half_size().max_element())) {
+            return Some(false);
+        }
+        let near = RootOnMesh::nearest(&fitting.mesh, places).ok()?;
+        let mut apart: Vec<f32> = near.into_iter().map(|(_, apart)| apart).collect();
+        Some(median(&mut apart)? < MAX_ROOT_DISTANCE)
+    };
+    UNITS.into_iter().find(|unit| is_near(unit) == Some(true))
 }
 
 /// Approximate area of skin per root (m²), from the distances of neighbours.

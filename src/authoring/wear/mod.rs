@@ -16,6 +16,7 @@
 //! | mesh and hair in one space: the face toward −Z, the head's middle at the origin, life size | `space` |
 //! | planting, roots, colliders: a pure function | `make` |
 //! | colliders for capes and collars | `garments` |
+//! | which asset is to blame for a missing mesh | `missing` |
 //! | hiding the hair that a character came with | `old_hair` |
 //! | shading the skin under the hair | `shade`, `shell` |
 
@@ -25,6 +26,7 @@ mod garments;
 mod head;
 mod landmarks;
 mod make;
+mod missing;
 #[cfg(feature = "render")]
 mod old_hair;
 mod part;
@@ -42,9 +44,16 @@ pub use error::WearError;
 pub use facing::FacingFrom;
 #[cfg(feature = "render")]
 pub use shade::ScalpShade;
-pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair};
+pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornAs};
 
-use crate::{authoring::attach::MadeAgain, base::schedule::HairFrame, hair::strand::lacks_strands};
+use crate::{
+    authoring::attach::MadeAgain,
+    base::schedule::HairFrame,
+    hair::{
+        strand::lacks_strands,
+        worn::{PassedOn, Wearer},
+    },
+};
 use bevy::prelude::*;
 
 /// Puts hair on entities with [`WearHair`].
@@ -60,13 +69,15 @@ impl Plugin for WearPlugin {
         app.register_type::<old_hair::HiddenForHair>();
         app.register_type::<WearHair>()
             .register_type::<HairSource>()
-            .register_type::<WornHair>()
+            .register_type::<WornAs>()
             .register_type::<target::Fitted>()
             .register_type::<FacingFrom>()
             .register_type::<HairWorn>()
             .register_type::<HairNotWorn>()
+            .init_resource::<what::PutsHairOn>()
             .register_required_components::<WearHair, systems::Wearing>()
-            .register_required_components::<WornHair, MadeAgain>()
+            .register_required_components::<WearHair, Wearer>()
+            .register_required_components::<WornAs, MadeAgain>()
             .add_observer(systems::leave)
             .add_systems(
                 HairFrame,
@@ -78,7 +89,8 @@ impl Plugin for WearPlugin {
                     systems::put_on,
                     systems::fit_again,
                 )
-                    .chain(),
+                    .chain()
+                    .before(PassedOn),
             );
         #[cfg(feature = "render")]
         shade::plugin(app);

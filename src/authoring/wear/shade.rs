@@ -3,23 +3,24 @@
 use super::{
     part::skin_of,
     shell::{MadeOf, Shell, Skin, shells},
-    what::WornHair,
+    what::WornAs,
 };
 use crate::{
     authoring::attach::RootsOnMesh,
     base::{
         schedule::HairFrame,
-        setting::{self, Settings, setting},
+        setting::{Settings, setting},
     },
     hair::{
         look::{HairColor, HairDye, HairLook},
         strand::MotionOwner,
+        worn::{self, ActsOn, CopyOf, pass_on},
     },
     render::FollowerRoots,
 };
 use bevy::{
     asset::AssetEventSystems,
-    camera::visibility::RenderLayers,
+    camera::visibility::{RenderLayers, VisibilitySystems},
     light::NotShadowCaster,
     mesh::{morph::MeshMorphWeights, skinning::SkinnedMesh},
     platform::collections::HashSet,
@@ -73,9 +74,21 @@ struct ScalpShell {
     made_of: MadeOf,
 }
 
+/// The shells of a hair: its own render layers replace those of the skin.
+#[derive(Component)]
+#[component(clone_behavior = Ignore)]
+struct ScalpShells(Vec<Entity>);
+
+impl ActsOn for ScalpShells {
+    fn others(&self) -> &[Entity] {
+        &self.0
+    }
+}
+
 pub(super) fn plugin(app: &mut App) {
-    setting::plugin::<ScalpShade>(app);
+    worn::setting::<ScalpShade>(app);
     app.register_type::<ScalpShell>()
+        .register_type::<CopyOf<RenderLayers>>()
         .add_systems(
             HairFrame,
             (begin, show, tint)
@@ -83,6 +96,10 @@ pub(super) fn plugin(app: &mut App) {
                 .after(super::systems::fit_again)
                 .run_if(resource_exists::<Assets<StandardMaterial>>)
                 .run_if(resource_exists::<Assets<Mesh>>),
+        )
+        .add_systems(
+            PostUpdate,
+            pass_on::<RenderLayers, ScalpShells>.before(VisibilitySystems::CheckVisibility),
         )
         .add_systems(
             PostUpdate,
@@ -98,7 +115,7 @@ fn begin(
     mut commands: Commands,
     hairs: Query<
         (Entity, Ref<RootsOnMesh>, Option<Ref<FollowerRoots>>, Option<&Shading>),
-        With<WornHair>,
+        With<WornAs>,
     >,
     settings: Settings<ScalpShade>,
     (skins, meshes): (Query<&Mesh3d>, Res<Assets<Mesh>>),
@@ -196,6 +213,7 @@ fn show(
         });
         // Also those that were copied, or loaded, with the hair.
         remove_shells(&mut commands, hair, &shown);
+        let mut all = Vec::new();
         for mut shell in shells {
             let Ok((mesh, skin, weights, layers)) = skins.get(shell.skin) else { continue };
             let of_skin = meshes.get(&mesh.0);
@@ -218,7 +236,9 @@ fn show(
             skin.map(|skin| spawned.insert(skin.clone()));
             weights.map(|weights| spawned.insert(weights.clone()));
             layers.map(|layers| spawned.insert(layers.clone()));
+            all.push(spawned.id());
         }
+        commands.entity(hair).insert(ScalpShells(all));
         *shading = Shading::Shown(material);
     }
 }

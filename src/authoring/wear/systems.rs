@@ -4,8 +4,9 @@ use super::{
     error::{SEARCH_TIME, WearError},
     facing::FacingFrom,
     make::{Made, MakeInput, RefitInput, Solids, make, refit},
+    missing::missing_asset,
     target::{Characters, Fitted, Search},
-    what::{HairNotWorn, HairSource, HairWorn, WearHair, WornHair},
+    what::{HairNotWorn, HairSource, HairWorn, WearHair, WornAs},
 };
 use crate::{
     authoring::{
@@ -19,6 +20,7 @@ use crate::{
     hair::{
         look::HairDye,
         strand::{Hair, Strand, StrandOf, Strands},
+        worn::{Wearer, WornBy, WornHair},
     },
     hairdo::style::{HairStyle, KeptStyle},
     simulation::settle::Settling,
@@ -84,27 +86,26 @@ fn despawn_worn(
 pub(super) fn leave(
     gone: On<Remove, Wearing>,
     mut commands: Commands,
-    wearers: Query<&Wearing>,
-    worn: Query<(Entity, &WornHair)>,
+    wearers: Query<(&Wearing, Option<&WornHair>)>,
+    made: Query<(), With<WornAs>>,
     fitted: Query<(Entity, &Fitted)>,
 ) {
     let wearer = gone.entity;
+    let Ok((wearing, worn)) = wearers.get(wearer) else { return };
     // One that has just been copied has not found its hair yet.
-    let hair = wearers.get(wearer).ok().and_then(|wearing| wearing.worn);
-    let hair = hair.or_else(|| worn.iter().find(|(_, worn)| worn.wearer == wearer).map(|w| w.0));
-    if let Some(hair) = hair {
+    let named = || worn.and_then(|worn| worn.iter().find(|hair| made.contains(*hair)));
+    if let Some(hair) = wearing.worn.or_else(named) {
         despawn_worn(&mut commands, wearer, hair, &fitted);
     }
 }
 
 /// Wearers that are new find the hair that names them: copies and loaded scenes.
 pub(super) fn find_worn(
-    mut wearers: Query<(Entity, &mut Wearing), Added<Wearing>>,
-    worn: Query<(Entity, &WornHair, Option<&ChildOf>)>,
+    mut wearers: Query<(&mut Wearing, &WornHair), Added<Wearing>>,
+    made: Query<(Entity, &WornAs, Option<&ChildOf>)>,
 ) {
-    for (wearer, mut wearing) in &mut wearers {
-        let found = worn.iter().find(|(_, worn, _)| worn.wearer == wearer);
-        if let Some((hair, worn, on)) = found {
+    for (mut wearing, worn) in &mut wearers {
+        if let Some((hair, worn, on)) = made.iter_many(worn.iter()).next() {
             *wearing = Wearing {
                 wanted: Some(worn.wear.clone()),
                 stage: WearStage::Done,
@@ -122,7 +123,7 @@ pub(super) fn take_off(
     bald: Query<Entity, (With<Wearing>, Without<WearHair>)>,
 ) {
     for entity in &bald {
-        commands.entity(entity).remove::<Wearing>();
+        commands.entity(entity).remove::<(Wearing, Wearer)>();
     }
 }
 
@@ -132,7 +133,7 @@ pub(super) fn detect_changes(
     mut commands: Commands,
     mut wearers: Query<(Ref<WearHair>, &mut Wearing)>,
     mut events: Option<MessageReader<AssetEvent<Groom>>>,
-    mut hairs: Query<(&mut WornHair, &mut TiedRoots), With<Hair>>,
+    mut hairs: Query<(&mut WornAs, &mut TiedRoots), With<Hair>>,
 ) {
     let changed: HashSet<_> = events
         .iter_mut()
@@ -253,7 +254,12 @@ pub(super) fn find_heads(
         };
         wearing.stage = match characters.search(wearer, wear) {
             Search::Loading => WearStage::Searching { seconds, reported },
-            Search::Nothing if seconds > SEARCH_TIME => failed(WearError::NoMesh),
+            Search::Nothing if seconds > SEARCH_TIME => {
+                if !reported {
+                    commands.queue(move |world: &mut World| report_no_mesh(world, wearer));
+                }
+                WearStage::Searching { seconds: SEARCH_TIME, reported: true }
+            }
             Search::Nothing => WearStage::Searching { seconds, reported },
             Search::Failed(error) => failed(error),
             Search::Found(target) => {
@@ -288,9 +294,20 @@ fn report_failure(
     wearer: Entity,
     error: WearError,
 ) {
-    let outcome = "the wearer keeps the hair that it has";
-    faults.write(HairFault::caused(FaultKind::Wear, error.clone(), outcome).of(wearer));
+    faults.write(fault(wearer, error.clone()));
     commands.trigger(HairNotWorn { entity: wearer, error });
+}
+
+fn fault(wearer: Entity, error: WearError) -> HairFault {
+    let outcome = "the wearer keeps the hair that it has";
+    HairFault::caused(FaultKind::Wear, error, outcome).of(wearer)
+}
+
+/// Reports that a wearer has no mesh, with the asset that is to blame for it.
+fn report_no_mesh(world: &mut World, wearer: Entity) {
+    let error = missing_asset(world, wearer).unwrap_or(WearError::NoMesh);
+    world.write_message(fault(wearer, error.clone()));
+    world.trigger(HairNotWorn { entity: wearer, error });
 }
 
 /// Replaces worn hair by finished new hair.
@@ -375,7 +392,7 @@ fn spawn_hair(
     if wear.hides_old_hair {
         super::old_hair::hide(commands, wearer, &made.old_hair);
     }
-    let is = WornHair { wearer, wear: wear.clone(), parts: made.parts };
+    let is = (WornBy(wearer), WornAs { wear: wear.clone(), parts: made.parts });
     let wetting = HairWetting { fibres: made.fibres, ..wetting };
     let mut hair = commands.spawn((Hair, made.place, ChildOf(made.parent), is, wetting, roots));
     if let Some(mut settings) = made.settings {
@@ -445,7 +462,7 @@ pub(super) fn fit_again(
     replaced: Query<(), Changed<Mesh3d>>,
     meshes: Query<&Mesh3d>,
     mut wearers: Query<(Entity, &WearHair, &mut Wearing)>,
-    hairs: Query<(&WornHair, &RootsOnMesh, &Strands)>,
+    hairs: Query<(&WornAs, &RootsOnMesh, &Strands)>,
     strands: Query<&Strand>,
     fitted: Query<(Entity, &Fitted)>,
     joints: Query<()>,

@@ -11,7 +11,11 @@ use crate::{
     hair::look::{HairDye, HairLook},
     hairdo::style::HairStyle,
 };
-use bevy::prelude::*;
+use bevy::{
+    app::MainScheduleOrder,
+    ecs::{lifecycle::HookContext, world::DeferredWorld},
+    prelude::*,
+};
 
 /// Puts hair on a character. Component of any entity with a mesh, or of one that has a character
 /// below it, such as the root of a glTF scene; the scene may still be loading.
@@ -32,20 +36,17 @@ use bevy::prelude::*;
 /// ```
 ///
 /// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there
-/// is none), with [`WornHair`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] has its entity.
-/// It settles before it is first drawn ([`Settling`](crate::Settling)) unless it is styled. Its
-/// settings are the preset's, and a [`HairWetting`](crate::HairWetting) with the number of fibres
-/// that grow there; to change them, wait for it:
+/// is none), with [`WornBy`](crate::WornBy), [`WornAs`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] has its entity, and
+/// [`WornHair`](crate::WornHair) on the wearer. It settles before it is first drawn
+/// ([`Settling`](crate::Settling)) unless it is styled. Its settings are the preset's, and a
+/// [`HairWetting`](crate::HairWetting) with the number of fibres that grow there. Others are put on the wearer,
+/// before or after; all hair that it wears takes them over, this one and those to come:
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
 /// # fn wear(commands: &mut Commands, character: Entity) {
-/// commands
-///     .entity(character)
-///     .insert(WearHair::new(HairPreset::Wavy))
-///     .observe(|worn: On<HairWorn>, mut commands: Commands| {
-///         commands.entity(worn.hair).insert(AirDrag { rate: 5.0 });
-///     });
+/// let wear = WearHair::new(HairPreset::Wavy);
+/// commands.entity(character).insert((wear, AirDrag { rate: 5.0 }, HairLod::default()));
 /// # }
 /// ```
 ///
@@ -62,6 +63,7 @@ use bevy::prelude::*;
 /// When its meshes are edited, by a character creator or skinning on the CPU, roots follow in the same frame, and
 /// colliders are fitted again off the main thread. On a mesh of other triangles the hair is made again.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[component(on_insert = tell_if_nothing_wears)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct WearHair {
     /// What is worn.
@@ -248,15 +250,37 @@ impl From<Handle<Groom>> for HairSource {
     }
 }
 
-/// What a worn [`Hair`](crate::Hair) was made from, and for whom. Component of the hair, written when it is
-/// spawned. A wearer that has none yet but that such hair names wears it: one that was cloned with its
-/// character, or loaded from a scene.
+/// In an app that puts hair on.
+#[derive(Resource, Default)]
+pub(super) struct PutsHairOn;
+
+/// Whether it was said that nothing does.
+#[derive(Resource, Default)]
+struct ToldNothingWears;
+
+/// Without plugins no system runs that could say so.
+fn tell_if_nothing_wears(mut world: DeferredWorld, context: HookContext) {
+    // Not in the world of a scene asset, which is no app.
+    let is_app = world.contains_resource::<MainScheduleOrder>();
+    if !is_app
+        || world.contains_resource::<PutsHairOn>()
+        || world.contains_resource::<ToldNothingWears>()
+    {
+        return;
+    }
+    world.commands().init_resource::<ToldNothingWears>();
+    tracing::warn!(
+        "hair, entity {}: WearHair does nothing without HairPlugins: app.add_plugins(HairPlugins::default())",
+        context.entity
+    );
+}
+
+/// What a worn [`Hair`](crate::Hair) was made from. Component of the hair, written when it is spawned; its
+/// [`WornBy`](crate::WornBy) has the wearer. A wearer that has none yet but is named by such hair wears it: one that was cloned with
+/// its character, or loaded from a scene.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Clone, PartialEq)]
-pub struct WornHair {
-    /// The entity with the [`WearHair`].
-    #[entities]
-    pub wearer: Entity,
+pub struct WornAs {
     /// The component that it was made from.
     pub wear: WearHair,
     /// The meshes that its colliders were fitted to.
@@ -264,7 +288,7 @@ pub struct WornHair {
     pub(super) parts: Vec<Entity>,
 }
 
-impl WornHair {
+impl WornAs {
     /// Which preset it is; `None` for a groom.
     pub fn preset(&self) -> Option<HairPreset> {
         match self.wear.hair {

@@ -18,9 +18,12 @@ use crate::{
         setting::{self, Settings},
         stretch::{self, Stretch},
     },
-    hair::strand::{
-        Hair, HairHere, MotionOwner, Regroomed, SleepCounts, SleepPose, Strand, StrandOf,
-        StrandSleep, Strands, TickPose, keep_required, lacks_strands,
+    hair::{
+        strand::{
+            Hair, HairHere, MotionOwner, Regroomed, SleepCounts, SleepPose, Strand, StrandOf,
+            StrandSleep, Strands, TickPose, keep_required, lacks_strands,
+        },
+        worn,
     },
     solver::rod::{
         obstacle::{Obstacle, Solid},
@@ -47,7 +50,7 @@ impl Plugin for ContactPlugin {
         if lacks_strands::<Self>(app) {
             return;
         }
-        setting::plugin::<StrandContact>(app);
+        worn::setting::<StrandContact>(app);
         #[cfg(feature = "avian")]
         super::avian::plugin(app);
         setting::component::<HairCollider>(app);

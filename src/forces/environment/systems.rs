@@ -14,9 +14,12 @@ use crate::{
         setting::{self, Ranged, Settings},
         stretch::{self, Stretch},
     },
-    hair::strand::{
-        AddedMass, FollowsHere, Hair, PerHair, ShiftWorld, SimulatedHere, Strand, StrandOf,
-        StrandSleep, TickPose, carried_along, keep_required, lacks_strands,
+    hair::{
+        strand::{
+            AddedMass, FollowsHere, Hair, PerHair, ShiftWorld, SimulatedHere, Strand, StrandOf,
+            StrandSleep, TickPose, carried_along, keep_required, lacks_strands,
+        },
+        worn,
     },
     keratin::bond::{BondChanges, BondKind},
 };
@@ -34,7 +37,7 @@ impl Plugin for EnvironmentPlugin {
         if lacks_strands::<Self>(app) {
             return;
         }
-        setting::plugin::<AirDrag>(app);
+        worn::setting::<AirDrag>(app);
         setting::component::<Blower>(app);
         setting::component::<WindZone>(app);
         setting::resource::<HairWind>(app);

@@ -22,7 +22,7 @@ pub use origin::WornPreset;
 pub use pigment::{HairColor, Melanin};
 pub use streaks::Streaks;
 
-use crate::base::setting;
+use crate::hair::worn;
 use bevy::prelude::*;
 
 /// Registers the settings of looks.
@@ -31,8 +31,8 @@ pub struct LookPlugin;
 
 impl Plugin for LookPlugin {
     fn build(&self, app: &mut App) {
-        setting::plugin::<HairLook>(app);
-        setting::plugin::<HairDye>(app);
+        worn::setting::<HairLook>(app);
+        worn::setting::<HairDye>(app);
         app.register_type::<WornPreset>();
     }
 }

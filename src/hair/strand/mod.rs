@@ -60,7 +60,8 @@ use bevy::prelude::*;
 /// The wearer's hair as one thing. Put it on any entity with a transform, such as a head bone; spawn
 /// strands with [`StrandOf`] pointing here. Settings ([`HairStiffness`](crate::HairStiffness),
 /// [`HairSolver`](crate::HairSolver), [`AirDrag`](crate::AirDrag), [`BondInfluence`](crate::BondInfluence),
-/// [`Cuticle`](crate::Cuticle), [`StrandContact`](crate::StrandContact)) may be added as components.
+/// [`Cuticle`](crate::Cuticle), [`StrandContact`](crate::StrandContact)) may be added as components, here or on who wears
+/// it ([`WornBy`](crate::WornBy)).
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(Transform, TickPose, MergedSubsteps, MotionOwner, Regroomed)]
@@ -73,6 +74,8 @@ pub struct Hair;
 pub(crate) struct Regroomed {
     /// Whether strands have come or gone since the tick before; if not, they were written to or enabled.
     pub(crate) members: bool,
+    /// How many there were in the last tick: of a copy, those of its original.
+    pub(super) strands: usize,
 }
 
 /// Makes an entity a strand of a [`Hair`].

@@ -10,15 +10,18 @@ use super::{
     owner_systems::{begin_settling, end_settling, update_owners},
     teleport::{ShiftWorld, shift_poses},
 };
-use crate::base::{
-    fault::{FaultKind, HairChecks, HairFault},
-    motion::TickTransforms,
-    parallel::{Nanos, for_each_part, tables},
-    schedule::{
-        EffectiveSubsteps, HairStep, HairSystems, HairTick, MergedSubsteps, TickPlugin,
-        first_substep, lacks,
+use crate::{
+    base::{
+        fault::{FaultKind, HairChecks, HairFault},
+        motion::TickTransforms,
+        parallel::{Nanos, for_each_part, tables},
+        schedule::{
+            EffectiveSubsteps, HairStep, HairSystems, HairTick, MergedSubsteps, OwnSchedule,
+            TickPlugin, first_substep, lacks,
+        },
+        setting::Settings,
     },
-    setting::{self, Settings},
+    hair::worn,
 };
 use bevy::{
     ecs::{entity_disabling::Disabled, query::QueryFilter},
@@ -38,8 +41,9 @@ impl Plugin for StrandPlugin {
         if lacks::<TickPlugin, Self>(app) {
             return;
         }
-        setting::plugin::<StrandModel>(app);
-        setting::plugin::<HairInertia>(app);
+        worn::plugin(app);
+        worn::setting::<StrandModel>(app);
+        worn::setting::<HairInertia>(app);
         keep_required::<Hair, Transform>(app);
         keep_required::<Hair, TickPose>(app);
         keep_required::<Hair, MergedSubsteps>(app);
@@ -70,6 +74,7 @@ impl Plugin for StrandPlugin {
             .add_observer(begin_settling)
             .add_observer(end_settling)
             .add_systems(HairChecks, report_unusable)
+            .add_systems(HairChecks, report_idle.run_if(resource_exists::<OwnSchedule>))
             .add_systems(
                 PostUpdate,
                 draw_as_simulated.after(TransformSystems::Propagate).in_set(DrawnFrames),
@@ -156,20 +161,50 @@ fn note_regrooming(
     written: Query<&StrandOf, (Or<(Changed<Strand>, Changed<StrandOf>)>, Here)>,
     mut enabled: RemovedComponents<Disabled>,
     of: Query<&StrandOf>,
-    mut hairs: Query<(Option<Ref<Strands>>, &mut Regroomed)>,
+    mut hairs: Query<(Entity, Option<Ref<Strands>>, &mut Regroomed)>,
+    mut faults: MessageWriter<HairFault>,
 ) {
     let enabled = enabled.read().filter_map(|strand| of.get(strand).ok());
     for of in written.iter().chain(enabled) {
-        if let Ok((_, mut regroomed)) = hairs.get_mut(of.0) {
+        if let Ok((.., mut regroomed)) = hairs.get_mut(of.0) {
             regroomed.set_changed();
         }
     }
-    for (members, mut regroomed) in &mut hairs {
-        let is_changed = members.is_some_and(|members| members.is_changed());
-        regroomed.bypass_change_detection().members = is_changed;
+    for (hair, members, mut regroomed) in &mut hairs {
+        let is_changed = members.as_ref().is_some_and(|members| members.is_changed());
+        let count = members.map_or(0, |members| members.len());
+        if regroomed.is_added() && regroomed.strands > 0 && count == 0 {
+            let message = format!(
+                "the hair is a copy without the {} strands of its original: copy it with \
+                 EntityClonerBuilder::linked_cloning(true), or spawn strands with StrandOf({hair})",
+                regroomed.strands
+            );
+            faults.write(HairFault::new(FaultKind::Strand, message).of(hair));
+        }
+        let noted = regroomed.bypass_change_detection();
+        (noted.members, noted.strands) = (is_changed, count);
         if is_changed {
             regroomed.set_changed();
         }
+    }
+}
+
+/// Says that a schedule of the game's own runs no ticks.
+fn report_idle(
+    mut own: ResMut<OwnSchedule>,
+    time: Option<Res<Time<Virtual>>>,
+    strands: Query<(), With<Strand>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let step = time.map_or(0.0, |time| time.delta_secs());
+    if !strands.is_empty() && own.is_idle_for(step) {
+        let message = format!(
+            "hair has not moved for {} s: HairPlugins::new({:?}) names a schedule that runs no ticks, or ran only \
+             once; name one that runs every frame or tick, such as FixedUpdate",
+            OwnSchedule::LONG,
+            own.label
+        );
+        faults.write(HairFault::new(FaultKind::Setting, message));
     }
 }
 

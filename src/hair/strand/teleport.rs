@@ -1,11 +1,11 @@
 //! Teleporting a character with its hair, and shifting the world.
 
 use super::{Hair, TickPose};
-use crate::base::motion::WorldMotion;
+use crate::{base::motion::WorldMotion, hair::worn::hairs_of};
 use bevy::prelude::*;
 
 impl Hair {
-    /// Call before a character is teleported: its hair keeps its shape and its motion, seen from the
+    /// Queue on a hair, or on its wearer, before a character is teleported: its hair keeps its shape and its motion, seen from the
     /// head and turned with it, and so do colliders, rods and blowers of the same character. Use it for
     /// portals and cut scenes: without it jumps are detected that change the head's velocity by more
     /// than 25 m/s or its spin by more than 40 rad/s within a tick
@@ -15,21 +15,25 @@ impl Hair {
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
     /// fn step_through_the_portal(
     ///     mut commands: Commands,
-    ///     hair: Single<Entity, With<Hair>>,
-    ///     mut hero: Single<&mut Transform, With<Name>>,
+    ///     mut heroes: Query<(Entity, &mut Transform), With<WornHair>>,
     /// ) {
-    ///     commands.entity(*hair).queue(Hair::teleport);
-    ///     hero.translation.x += 0.4;
+    ///     for (hero, mut place) in &mut heroes {
+    ///         commands.entity(hero).queue(Hair::teleport);
+    ///         place.translation.x += 0.4;
+    ///     }
     /// }
     /// ```
     pub fn teleport(mut hair: EntityWorldMut<'_>) {
         let id = hair.id();
         hair.world_scope(|world| {
-            let mut root = id;
-            while let Some(parent) = world.get::<ChildOf>(root) {
-                root = parent.parent();
-            }
-            let mut todo = vec![root];
+            let root = |of: Entity| {
+                let parent = |of: &Entity| world.get::<ChildOf>(*of).map(ChildOf::parent);
+                core::iter::successors(Some(of), parent).last().unwrap_or(of)
+            };
+            let mut todo: Vec<Entity> =
+                core::iter::once(id).chain(hairs_of(world, id)).map(root).collect();
+            todo.sort_unstable();
+            todo.dedup();
             while let Some(entity) = todo.pop() {
                 if let Some(mut pose) = world.get_mut::<TickPose>(entity) {
                     pose.jump();
@@ -48,10 +52,10 @@ impl Hair {
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
 /// fn keep_the_origin_near(
 ///     mut commands: Commands,
-///     hero: Single<&GlobalTransform, With<Name>>,
+///     cameras: Query<&GlobalTransform, With<Camera>>,
 ///     mut roots: Query<&mut Transform, Without<ChildOf>>,
 /// ) {
-///     let far = hero.translation();
+///     let far = cameras.iter().next().map_or(Vec3::ZERO, GlobalTransform::translation);
 ///     if far.length() > 1000.0 {
 ///         roots.iter_mut().for_each(|mut root| root.translation -= far);
 ///         commands.trigger(ShiftWorld { by: -far });

@@ -9,9 +9,8 @@ use crate::{
     forces::environment::HairGravity,
     hair::{
         look::{HairDye, HairLook, WornPreset},
-        strand::{
-            AddedMass, Hair, HeldNodes, Strand, StrandHistory, Strands, is_on_gpu, return_to_cpu,
-        },
+        strand::{AddedMass, HeldNodes, Strand, StrandHistory, Strands, is_on_gpu, return_to_cpu},
+        worn::hairs_of,
     },
     keratin::{
         bond::{BondChanges, Bonds, Cuticle, RestShape},
@@ -22,11 +21,13 @@ use crate::{
 use bevy::{ecs::system::EntityCommand, prelude::*};
 
 impl Hairdo {
-    /// The present hairdo of a [`Hair`], a snapshot of its pose even in motion.
+    /// The present hairdo of a [`Hair`], or of the one that an entity wears: a snapshot of its pose even in motion.
     ///
     /// # Errors
-    /// When `hair` is no hair, is on the GPU, or a strand has fewer than two nodes or invalid numbers.
+    /// When `hair` is no hair and wears none, or several, when it is on the GPU, or a strand has fewer than two nodes
+    /// or invalid numbers.
     pub fn of(world: &World, hair: Entity) -> Result<Self, HairdoError> {
+        let hair = the_hair(world, hair)?;
         if is_on_gpu(world, hair) {
             return Err(HairdoError::OnGpu { entity: hair });
         }
@@ -35,7 +36,7 @@ impl Hairdo {
 
     /// Of what its strands hold, wherever it is simulated.
     pub(super) fn of_strands(world: &World, hair: Entity) -> Result<Self, HairdoError> {
-        let mut members = members(world, hair)?;
+        let mut members = members(world, hair);
         members.retain(|member| world.get::<Strand>(*member).is_some());
         let (ties, holds) = holds_of(world, hair, &members);
         let strands = members
@@ -54,7 +55,7 @@ impl Hairdo {
         Self { strands, cuticle, look, dye, preset, ties }.checked()
     }
 
-    /// Puts the hairdo on a hair of the same groom, at rest: all strands, or in case of an error
+    /// Puts the hairdo on a hair of the same groom, or on the one that an entity wears, at rest: all strands, or in case of an error
     /// none.
     ///
     /// Roots stay where they are; a strand whose root has moved since, as on a skinned mesh, is
@@ -66,10 +67,11 @@ impl Hairdo {
     /// In a system use [`Hairdo::apply`], or [`ApplyHairdo`](super::ApplyHairdo) to get an answer.
     ///
     /// # Errors
-    /// When `hair` is no hair, or its strands do not match the hairdo's.
+    /// When `hair` is no hair and wears none, or several, or its strands do not match the hairdo's.
     pub fn apply(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
+        let hair = the_hair(world, hair)?;
         return_to_cpu(world, hair);
-        let mut members = members(world, hair)?;
+        let mut members = members(world, hair);
         members.retain(|member| world.get::<Strand>(*member).is_some());
         let nodes = members.iter().map(|m| world.get::<Strand>(*m).map_or(0, Strand::nodes));
         self.check_fit(nodes)?;
@@ -110,8 +112,8 @@ impl Hairdo {
     /// #[derive(Resource)]
     /// struct BestHairdo(Hairdo);
     ///
-    /// fn to_the_ball(mut commands: Commands, hair: Single<Entity, With<Hair>>, best: Res<BestHairdo>) {
-    ///     commands.entity(*hair).queue(best.0.clone().into_command());
+    /// fn to_the_ball(In(character): In<Entity>, mut commands: Commands, best: Res<BestHairdo>) {
+    ///     commands.entity(character).queue(best.0.clone().into_command());
     /// }
     /// ```
     pub fn into_command(self) -> impl EntityCommand<Out = ()> {
@@ -158,9 +160,18 @@ pub(super) fn report(world: &mut World, hair: Entity, wrong: HairdoError) {
     world.write_message(HairFault::caused(FaultKind::Hairdo, wrong, outcome).of(hair));
 }
 
-fn members(world: &World, hair: Entity) -> Result<Vec<Entity>, HairdoError> {
-    world.get::<Hair>(hair).ok_or(HairdoError::NoHair { entity: hair })?;
-    Ok(world.get::<Strands>(hair).into_iter().flat_map(Strands::iter).collect())
+/// The one hair that an entity is or wears.
+pub(super) fn the_hair(world: &World, entity: Entity) -> Result<Entity, HairdoError> {
+    let hairs = hairs_of(world, entity);
+    match hairs[..] {
+        [hair] => Ok(hair),
+        [] => Err(HairdoError::NoHair { entity }),
+        _ => Err(HairdoError::SeveralHairs { entity, hairs }),
+    }
+}
+
+fn members(world: &World, hair: Entity) -> Vec<Entity> {
+    world.get::<Strands>(hair).into_iter().flat_map(Strands::iter).collect()
 }
 
 fn setting<T: HairSetting>(world: &World, hair: Entity) -> T {

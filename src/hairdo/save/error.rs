@@ -1,6 +1,6 @@
 //! Errors of saving, loading and applying hairdos.
 
-use crate::base::setting::InvalidValue;
+use crate::{base::setting::InvalidValue, hair::worn::listed};
 use bevy::prelude::*;
 
 /// Why a [`Hairdo`](super::Hairdo) cannot be taken, read or put on. Whatever the error, the present
@@ -10,10 +10,20 @@ use bevy::prelude::*;
 #[non_exhaustive]
 pub enum HairdoError {
     /// The entity is not there or carries no [`Hair`](crate::Hair).
-    #[error("{entity} is not a Hair: name the entity that the strands point to with StrandOf")]
+    #[error(
+        "{entity} is not a Hair and wears none: name its wearer, or the entity that the strands point to with StrandOf"
+    )]
     NoHair {
         /// What was named.
         entity: Entity,
+    },
+    /// The entity wears several hairs, such as a beard beside hair.
+    #[error("{entity} wears {}: name one of them", listed(hairs))]
+    SeveralHairs {
+        /// What was named.
+        entity: Entity,
+        /// The hairs.
+        hairs: Vec<Entity>,
     },
     /// The hair is simulated on the GPU.
     #[error(

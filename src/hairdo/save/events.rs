@@ -1,35 +1,38 @@
 //! Hairdos for systems: requests and answers by events.
 
-use super::{Hairdo, HairdoError, apply::report};
+use super::{
+    Hairdo, HairdoError,
+    apply::{report, the_hair},
+};
 #[cfg(feature = "gpu")]
 use crate::hair::strand::{AskForStrands, StrandsArrived, is_on_gpu};
 use bevy::prelude::*;
 
-/// Requests the hairdo of a [`Hair`](crate::Hair). Answered by [`HairdoCaptured`] on the
-/// same entity, or by [`HairdoRejected`].
+/// Requests the hairdo of a [`Hair`](crate::Hair), or of the one that the entity wears. Answered by
+/// [`HairdoCaptured`] on the same entity, or by [`HairdoRejected`].
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
 /// #[derive(Resource)]
 /// struct Photo(Vec<u8>);
 ///
-/// fn at_the_hairdresser(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
-///     commands.entity(*hair).observe(|taken: On<HairdoCaptured>, mut commands: Commands| {
+/// fn at_the_hairdresser(In(character): In<Entity>, mut commands: Commands) {
+///     commands.entity(character).observe(|taken: On<HairdoCaptured>, mut commands: Commands| {
 ///         commands.insert_resource(Photo(taken.hairdo.to_bytes()));
 ///     });
-///     commands.trigger(CaptureHairdo { entity: *hair });
+///     commands.trigger(CaptureHairdo { entity: character });
 /// }
 ///
-/// fn the_same_please(hair: Single<Entity, With<Hair>>, photo: Res<Photo>, mut commands: Commands) -> Result {
+/// fn the_same_please(In(other): In<Entity>, photo: Res<Photo>, mut commands: Commands) -> Result {
 ///     let hairdo = Hairdo::from_bytes(&photo.0)?;
-///     commands.trigger(ApplyHairdo { entity: *hair, hairdo });
+///     commands.trigger(ApplyHairdo { entity: other, hairdo });
 ///     Ok(())
 /// }
 /// ```
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct CaptureHairdo {
-    /// The hair.
+    /// The hair, or its wearer.
     pub entity: Entity,
 }
 
@@ -37,29 +40,29 @@ pub struct CaptureHairdo {
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct HairdoCaptured {
-    /// The hair.
+    /// The hair, or its wearer.
     pub entity: Entity,
     /// Its hairdo at the moment of the request; of hair on the GPU a few frames later.
     pub hairdo: Hairdo,
 }
 
-/// Requests that a hairdo is put on a [`Hair`](crate::Hair), strand by strand where it has as many
+/// Requests that a hairdo is put on a [`Hair`](crate::Hair), or on the one that the entity wears, strand by strand where it has as many
 /// strands and nodes ([`Hairdo::apply`]), else resampled ([`Hairdo::apply_resampled`]). Answered by
 /// [`HairdoApplied`] on the same entity, or by [`HairdoRejected`].
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct ApplyHairdo {
-    /// The hair.
+    /// The hair, or its wearer.
     pub entity: Entity,
     /// The hairdo to put on.
     pub hairdo: Hairdo,
 }
 
-/// Triggered on a [`Hair`](crate::Hair) that wears the hairdo of a [`ApplyHairdo`].
+/// Triggered on the entity of an [`ApplyHairdo`] whose hair wears the hairdo.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct HairdoApplied {
-    /// The hair.
+    /// The hair, or its wearer.
     pub entity: Entity,
 }
 
@@ -75,29 +78,31 @@ pub struct HairdoRejected {
 }
 
 pub(super) fn take(request: On<CaptureHairdo>, mut commands: Commands) {
-    let hair = request.entity;
-    commands.queue(move |world: &mut World| {
+    let asked = request.entity;
+    commands.queue(move |world: &mut World| match the_hair(world, asked) {
         #[cfg(feature = "gpu")]
-        if is_on_gpu(world, hair) {
-            world.entity_mut(hair).insert(Awaited);
+        Ok(hair) if is_on_gpu(world, hair) => {
+            let mut awaited = world.entity_mut(hair);
+            awaited.entry::<Awaited>().or_default().get_mut().0.push(asked);
             world.trigger(AskForStrands { entity: hair });
-            return;
         }
-        answer(world, hair);
+        Ok(hair) => answer(world, hair, asked),
+        Err(error) => refuse(world, asked, error),
     });
 }
 
-fn answer(world: &mut World, hair: Entity) {
+/// Tells the one that was asked the hairdo of a hair.
+fn answer(world: &mut World, hair: Entity, asked: Entity) {
     match Hairdo::of_strands(world, hair) {
-        Ok(hairdo) => world.trigger(HairdoCaptured { entity: hair, hairdo }),
-        Err(error) => refuse(world, hair, error),
+        Ok(hairdo) => world.trigger(HairdoCaptured { entity: asked, hairdo }),
+        Err(error) => refuse(world, asked, error),
     }
 }
 
-/// Marks hair on the GPU whose hairdo is asked for.
+/// On hair on the GPU: the entities on which its hairdo was asked for.
 #[cfg(feature = "gpu")]
-#[derive(Component)]
-pub(super) struct Awaited;
+#[derive(Component, Default)]
+pub(super) struct Awaited(Vec<Entity>);
 
 #[cfg(feature = "gpu")]
 pub(super) fn answer_arrived(
@@ -107,8 +112,12 @@ pub(super) fn answer_arrived(
 ) {
     let hair = arrived.entity;
     if awaited.contains(hair) {
-        commands.entity(hair).remove::<Awaited>();
-        commands.queue(move |world: &mut World| answer(world, hair));
+        commands.queue(move |world: &mut World| {
+            let awaited = world.entity_mut(hair).take::<Awaited>();
+            for asked in awaited.into_iter().flat_map(|awaited| awaited.0) {
+                answer(world, hair, asked);
+            }
+        });
     }
 }
 

@@ -9,10 +9,13 @@ mod model;
 use crate::{
     base::{
         schedule::{HairSystems, HairTick, lacks, last_substep},
-        setting::{self, Ranged, Settings, setting},
+        setting::{Ranged, Settings, setting},
     },
     forces::environment::vapour::WATER,
-    hair::strand::{Hair, Strands, lacks_strands},
+    hair::{
+        strand::{Hair, Strands, lacks_strands},
+        worn::{self, HairsOf, WornBy},
+    },
     keratin::bond::{BondInfluence, BondPlugin, Bonds},
     water::Moisture,
 };
@@ -29,7 +32,7 @@ impl Plugin for StylePlugin {
             return;
         }
         lacks::<BondPlugin, Self>(app);
-        setting::component::<HairStyle>(app);
+        worn::component::<HairStyle>(app);
         app.register_type::<KeptStyle>()
             .register_type::<StyledJoints>()
             .register_type::<StyleFaded>()
@@ -39,15 +42,15 @@ impl Plugin for StylePlugin {
 
 setting! {
     /// Takes the shape in which a hair's bonds hold it now as its style, and measures from then on
-    /// how much of it is left. Component of a [`Hair`]; insert it again when the hair has been
+    /// how much of it is left. Component of a [`Hair`] or its wearer; insert it again when the hair has been
     /// restyled: soaked ([`SoakHair`](crate::SoakHair)) and dried in shape
     /// ([`HairDried`](crate::HairDried)). On wet hair, whose hydrogen bonds are open, it cannot see what
     /// they will hold. Costs a pass over all joints once a tick.
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-    /// fn styled(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
-    ///     commands.entity(*hair).insert(HairStyle::default()).observe(|faded: On<StyleFaded>| {
+    /// fn styled(In(character): In<Entity>, mut commands: Commands) {
+    ///     commands.entity(character).insert(HairStyle::default()).observe(|faded: On<StyleFaded>| {
     ///         info!("only {:.0} % of the curls are left", 100.0 * faded.kept);
     ///     });
     /// }
@@ -85,11 +88,13 @@ impl KeptStyle {
 }
 
 /// Triggered on a [`Hair`] when less of its [`HairStyle`] is left than
-/// [`fades_below`](HairStyle::fades_below): once, and again after restyling or recovery.
+/// [`fades_below`](HairStyle::fades_below): once, and again after restyling or recovery. Then on its wearer
+/// ([`WornBy`]). An observer of the whole app sees both; `On::original_event_target` is the hair.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+#[entity_event(propagate = &'static WornBy, auto_propagate)]
 #[reflect(Clone, PartialEq)]
 pub struct StyleFaded {
-    /// The hair.
+    /// The hair, or its wearer.
     pub entity: Entity,
     /// The share of the style that is left.
     pub kept: f32,
@@ -152,28 +157,34 @@ fn measure_styles(
     }
 }
 
-/// System parameter with queries of a hair's state.
+/// System parameter with queries of the state of a hair, or of all that a character wears.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// fn towel_needed(hair: Single<Entity, With<Hair>>, condition: HairCondition) -> bool {
-///     condition.wetness(*hair) > 0.3
+/// fn towel_needed(In(character): In<Entity>, condition: HairCondition) -> bool {
+///     condition.wetness(character) > 0.3
 /// }
 /// ```
 #[derive(SystemParam)]
 pub struct HairCondition<'w, 's> {
+    of: HairsOf<'w, 's>,
     hairs: Query<'w, 's, &'static Strands>,
     moistures: Query<'w, 's, &'static Moisture>,
     kept: Query<'w, 's, &'static KeptStyle>,
 }
 
 impl HairCondition<'_, '_> {
+    /// The strands of a hair or a wearer.
+    fn strands(&self, of: &Entity) -> Vec<Entity> {
+        let hairs = self.of.of(of).iter().filter_map(|hair| self.hairs.get(*hair).ok());
+        hairs.flat_map(|members| members.iter()).collect()
+    }
+
     /// Mean wetness inside a hair over all nodes: 0 as in a room, 1 as under water. 0 for an entity that
-    /// is not a hair.
+    /// is no hair and wears none.
     pub fn wetness(&self, hair: Entity) -> f32 {
-        let Ok(members) = self.hairs.get(hair) else { return 0.0 };
         let (mut sum, mut strands) = (0.0, 0);
-        for id in members.iter() {
+        for id in self.strands(&hair) {
             strands += 1;
             let Ok(moisture) = self.moistures.get(id) else { continue };
             let nodes = moisture.wetness();
@@ -184,16 +195,17 @@ impl HairCondition<'_, '_> {
 
     /// The water on and in a hair, beyond the regain of a room (kg).
     pub fn water(&self, hair: Entity) -> f64 {
-        let Ok(members) = self.hairs.get(hair) else { return 0.0 };
         let of =
             |moisture: &Moisture| -> f64 { moisture.film().iter().chain(moisture.bound()).sum() };
-        let all = members.iter().filter_map(|id| self.moistures.get(id).ok()).map(of);
+        let all = self.strands(&hair).into_iter();
+        let all = all.filter_map(|id| self.moistures.get(id).ok()).map(of);
         // An empty `sum` is −0.
         all.fold(0.0_f64, |sum, volume| sum + volume) * WATER
     }
 
-    /// How much of its style a hair has kept; see [`KeptStyle::kept`].
+    /// How much of its style a hair has kept, see [`KeptStyle::kept`]; of several on a wearer the least.
     pub fn kept_style(&self, hair: Entity) -> Option<f32> {
-        self.kept.get(hair).ok()?.kept()
+        let hairs = self.of.of(&hair).iter();
+        hairs.filter_map(|hair| self.kept.get(*hair).ok()?.kept()).reduce(f32::min)
     }
 }

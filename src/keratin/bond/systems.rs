@@ -16,11 +16,14 @@ use crate::{
         schedule::{
             EffectiveSubsteps, HairSystems, HairTick, SettleTick, first_substep, last_substep,
         },
-        setting::{self, Ranged, Settings, Violations, report},
+        setting::{Ranged, Settings, Violations, report},
     },
-    hair::strand::{
-        AddedMass, Here, KinematicStrand, PerHair, SimulatedHere, Strand, StrandOf, StrandSleep,
-        keep_required, lacks_strands,
+    hair::{
+        strand::{
+            AddedMass, Here, KinematicStrand, PerHair, SimulatedHere, Strand, StrandOf,
+            StrandSleep, keep_required, lacks_strands,
+        },
+        worn,
     },
     solver::rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
 };
@@ -42,8 +45,8 @@ impl Plugin for BondPlugin {
         if lacks_strands::<Self>(app) {
             return;
         }
-        setting::plugin::<BondInfluence>(app);
-        setting::plugin::<Cuticle>(app);
+        worn::setting::<BondInfluence>(app);
+        worn::setting::<Cuticle>(app);
         keep_required::<Strand, Bonds>(app);
         keep_required::<Strand, BondChanges>(app);
         keep_required::<Strand, RestShape>(app);

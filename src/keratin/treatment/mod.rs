@@ -16,22 +16,22 @@ use crate::{
 use bevy::prelude::*;
 use core::ops::Range;
 
-/// A request to change bond rates, for a hair or one strand, all joints or some, at once or over
+/// A request to change bond rates, for a hair (or its wearer) or one strand, all joints or some, at once or over
 /// time: an event on its entity, or a message where many are sent. From the next tick on it acts through
 /// equation 16, so that bonds which re-form remember the shape of that moment.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// fn shower(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
-///     commands.trigger(HairTreatment::wet(*hair));
+/// fn shower(In(character): In<Entity>, mut commands: Commands) {
+///     commands.trigger(HairTreatment::wet(character));
 ///     // dry the outer half in two seconds
-///     commands.trigger(HairTreatment::dry(*hair).over(2.0).joints(4..8));
+///     commands.trigger(HairTreatment::dry(character).over(2.0).joints(4..8));
 /// }
 /// ```
 #[derive(EntityEvent, Message, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct HairTreatment {
-    /// The [`Hair`](crate::Hair) or strand to treat.
+    /// The [`Hair`](crate::Hair) or strand to treat, or who wears it.
     #[event_target]
     pub target: Entity,
     /// The joints to treat, from the root; `None` all.
@@ -71,8 +71,8 @@ impl HairTreatment {
     ///
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-    /// fn perm(hair: Single<Entity, With<Hair>>, mut treat: MessageWriter<HairTreatment>) {
-    ///     treat.write_batch(HairTreatment::perm_set(*hair, 5.0));
+    /// fn perm(In(character): In<Entity>, mut treat: MessageWriter<HairTreatment>) {
+    ///     treat.write_batch(HairTreatment::perm_set(character, 5.0));
     /// }
     /// ```
     pub fn perm_set(target: Entity, seconds: f32) -> [Self; 3] {

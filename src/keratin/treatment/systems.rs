@@ -6,15 +6,18 @@ use super::{
 };
 use crate::{
     base::{
-        fault::{FaultKind, HairFault},
+        fault::HairFault,
         parallel::{Nanos, for_each},
         schedule::{HairProcessTime, HairStep, HairSystems, HairTick, lacks},
         setting::{self, Ranged, report},
         stretch::{self, Stretch},
     },
-    hair::strand::{
-        HeldNodes, Here, MissedOnGpu, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required,
-        lacks_strands,
+    hair::{
+        strand::{
+            HeldNodes, Here, MissedOnGpu, OnGpu, Strand, StrandOf, Strands, TickPose,
+            keep_required, lacks_strands,
+        },
+        worn::HairsOf,
     },
     keratin::bond::{BondChanges, BondKind, BondPlugin, Bonds},
 };
@@ -58,7 +61,7 @@ impl Plugin for TreatmentPlugin {
 
 fn begin_treatments(
     mut requests: MessageReader<HairTreatment>,
-    hairs: Query<&Strands>,
+    (hairs, of): (Query<&Strands>, HairsOf),
     mut strands: Query<&mut Treatments, (With<StrandOf>, Here)>,
     on_gpu: Query<(), (With<OnGpu>, With<StrandOf>)>,
     mut missed: ResMut<MissedOnGpu<HairTreatment>>,
@@ -70,18 +73,19 @@ fn begin_treatments(
             missed.0.push(request.clone());
             continue;
         }
-        let (treat, entity) = (request.clamped(), request.target);
-        report(Some(entity), request.violations(), &mut faults);
-        if let Ok(members) = hairs.get(entity) {
-            let mut members = strands.iter_many_mut(members.collection());
-            while let Some(mut treatments) = members.fetch_next() {
-                treatments.acting.push(treat.clone());
+        report(Some(request.target), request.violations(), &mut faults);
+        for &target in of.of(&request.target) {
+            let treat = HairTreatment { target, ..request.clamped() };
+            if let Ok(members) = hairs.get(target) {
+                let mut members = strands.iter_many_mut(members.collection());
+                while let Some(mut treatments) = members.fetch_next() {
+                    treatments.acting.push(treat.clone());
+                }
+            } else if let Ok(mut treatments) = strands.get_mut(target) {
+                treatments.acting.push(treat);
+            } else {
+                faults.write(of.no_target("HairTreatment", target));
             }
-        } else if let Ok(mut treatments) = strands.get_mut(entity) {
-            treatments.acting.push(treat);
-        } else {
-            let message = "the treatment's target is neither a Hair nor a strand";
-            faults.write(HairFault::new(FaultKind::NoTarget, message).of(entity));
         }
     }
 }

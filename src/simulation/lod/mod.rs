@@ -60,15 +60,14 @@ pub use budget::{HairBudget, HairEstimate};
 pub use guides::{Follower, Guides};
 pub use systems::LodPlugin;
 
-use crate::base::{
-    schedule::SubstepLimits,
-    setting::{InvalidValue, Ranged, setting},
-};
+use crate::base::setting::{InvalidValue, Ranged, setting};
 use bevy::prelude::*;
 
 setting! {
     /// How cheaply a hair is simulated when it is small on the screen. Component of a
-    /// [`Hair`](crate::Hair), may change at any time; hair without it is always simulated in full.
+    /// [`Hair`](crate::Hair) or its wearer, may change at any time; where absent,
+    /// [`HairDefault<HairLod>`](crate::HairDefault) holds, which has no levels unless the game gives it some. Hair
+    /// without levels is always simulated in full.
     ///
     /// The feature `render` writes [`HairScreenShare`] from the cameras; without it a game writes that itself.
     ///
@@ -76,10 +75,11 @@ setting! {
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
     /// # let mut world = World::new();
     /// world.spawn((Hair, HairLod::default()));
+    /// // for all hair:
+    /// world.insert_resource(HairDefault(HairLod::default()));
     /// ```
     #[derive(Component, Reflect, Clone, Debug, PartialEq)]
     #[reflect(Component, Default, Clone, PartialEq)]
-    #[require(HairScreenShare, PresentLod, SubstepLimits)]
     pub struct HairLod {
         /// The levels, from near to far, each for smaller hair than the one before.
         pub levels: Vec<LodLevel> =

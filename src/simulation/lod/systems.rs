@@ -12,9 +12,13 @@ use crate::{
     base::{
         fault::{FaultKind, HairFault},
         schedule::{HairStep, HairSystems, HairTick, SubstepLimits, first_substep},
-        setting::{self, Ranged},
+        setting::{self, HairDefault, Ranged, Settings},
     },
-    hair::strand::{Hair, MotionOwner, Regroomed, Strand, Strands, keep_required, lacks_strands},
+    hair::{
+        strand::{Hair, MotionOwner, Regroomed, Strand, Strands, keep_required, lacks_strands},
+        worn,
+    },
+    water::IsWet,
 };
 use bevy::prelude::*;
 
@@ -26,7 +30,11 @@ impl Plugin for LodPlugin {
         if lacks_strands::<Self>(app) {
             return;
         }
-        setting::component::<HairLod>(app);
+        // None until the game sets levels for all hair.
+        if !app.world().contains_resource::<HairDefault<HairLod>>() {
+            app.insert_resource(HairDefault(HairLod { levels: Vec::new(), ..default() }));
+        }
+        worn::setting::<HairLod>(app);
         setting::resource::<HairBudget>(app);
         keep_required::<Strand, Follower>(app);
         app.init_resource::<HairEstimate>()
@@ -37,7 +45,10 @@ impl Plugin for LodPlugin {
             .register_type::<Follower>()
             .register_type::<Guides>()
             .register_required_components::<Strand, Follower>()
-            .register_required_components::<HairLod, Guides>()
+            .register_required_components::<Hair, HairScreenShare>()
+            .register_required_components::<Hair, PresentLod>()
+            .register_required_components::<Hair, SubstepLimits>()
+            .register_required_components::<Hair, Guides>()
             .add_observer(reset_level)
             .add_observer(release_follower)
             .add_observer(release_without_follower)
@@ -55,6 +66,13 @@ impl Plugin for LodPlugin {
     }
 }
 
+/// What was said of the budget.
+#[derive(Default)]
+struct Told {
+    exceeded: bool,
+    left_out: bool,
+}
+
 /// Hair without levels is simulated in full.
 fn reset_level(left: On<Remove, HairLod>, mut hairs: Query<(&mut PresentLod, &mut SubstepLimits)>) {
     if let Ok((mut present, mut limits)) = hairs.get_mut(left.entity) {
@@ -66,58 +84,89 @@ fn choose(
     step: Res<HairStep>,
     budget: Res<HairBudget>,
     mut estimate: ResMut<HairEstimate>,
+    lods: Settings<HairLod>,
     mut hairs: Query<
         (
-            &HairLod,
+            (Entity, Has<HairLod>),
             &HairScreenShare,
             (&Strands, Ref<Regroomed>),
             &mut PresentLod,
             &mut SubstepLimits,
-            &MotionOwner,
+            (&MotionOwner, Option<&IsWet>),
         ),
         With<Hair>,
     >,
     strands: Query<&Strand>,
-    mut exceeded: Local<bool>,
+    mut told: Local<Told>,
     mut faults: MessageWriter<HairFault>,
 ) {
     let budget = budget.clamped();
+    // Of hair without levels (ms), and the dearest of it that the game has said nothing about.
+    let mut fixed = 0.0;
+    let mut left_out: Option<(f32, Entity)> = None;
     let mut chosen: Vec<_> = hairs
         .iter_mut()
-        .map(|(lod, share, (members, regroomed), mut present, limits, owner)| {
-            let mut lod = lod.clamped();
+        .filter_map(|((hair, is_own), share, (members, regroomed), mut present, mut limits, of)| {
+            let (owner, is_wet) = (of.0, of.1.is_some_and(|wet| wet.0));
+            let mut lod = lods.of(hair);
+            if present.segments == 0 || regroomed.is_changed() {
+                present.bypass_change_detection().segments =
+                    strands.iter_many(members.collection()).map(Strand::edges).sum();
+            }
+            let segments = present.segments;
+            // On the GPU it costs this processor nothing, so nothing is won by making it coarser.
+            let is_elsewhere = owner.is_on_gpu() || present.is_leaving;
+            if lod.levels.is_empty() {
+                let cost = costs(&[], segments, step.count, is_wet).next().unwrap_or(0.0);
+                let cost = if is_elsewhere { 0.0 } else { cost };
+                fixed += cost;
+                if !is_own && left_out.is_none_or(|(most, _)| cost > most) {
+                    left_out = Some((cost, hair));
+                }
+                if present.level > 0 {
+                    (*present, *limits) = default();
+                }
+                return None;
+            }
             if *owner == MotionOwner::Settling {
                 // Frozen strands and followers would not come to rest, but hang as they were planted.
                 lod.levels.iter_mut().for_each(|level| level.strands = 1.0);
             }
             let before = present.level.saturating_sub(present.budget_levels);
             let wanted = model::choose(&lod.levels, lod.hysteresis, before, share.0);
-            if present.segments == 0 || regroomed.is_changed() {
-                present.bypass_change_detection().segments =
-                    strands.iter_many(members.collection()).map(Strand::edges).sum();
-            }
-            let segments = present.segments;
             // Hair already made coarser stays so until other hair is clearly less important.
             let held = if present.budget_levels > 0 { 1.0 + lod.hysteresis } else { 1.0 };
             let importance = share.0.max(0.0) * lod.importance / held;
-            // On the GPU it costs this processor nothing, so nothing is won by making it coarser.
-            let costs = match owner.is_on_gpu() || present.is_leaving {
+            let costs = match is_elsewhere {
                 true => vec![0.0; wanted + 1],
-                false => costs(&lod.levels, segments, step.count),
+                false => costs(&lod.levels, segments, step.count, is_wet).collect(),
             };
-            (Candidate { importance, wanted, costs }, lod.levels.clone(), present, limits)
+            Some((Candidate { importance, wanted, costs }, lod.levels, present, limits))
         })
         .collect();
     let candidates: Vec<Candidate> = chosen.iter().map(|c| c.0.clone()).collect();
-    let levels = fit(&candidates, budget.milliseconds / budget.slowness);
+    let levels = fit(&candidates, budget.milliseconds / budget.slowness - fixed);
     let cost_of = |level: &dyn Fn(usize) -> usize| -> f32 {
         let costs = candidates.iter().enumerate().map(|(i, c)| c.costs[level(i)]);
-        costs.sum::<f32>() * budget.slowness
+        (fixed + costs.sum::<f32>()) * budget.slowness
     };
     let present = cost_of(&|i| levels[i]);
     estimate.set_if_neq(HairEstimate { unbudgeted: cost_of(&|i| candidates[i].wanted), present });
     let exceeds = present > budget.milliseconds;
-    if exceeds && !core::mem::replace(&mut *exceeded, exceeds) {
+    let is_coarser = levels.iter().zip(&candidates).any(|(level, hair)| *level > hair.wanted);
+    if let Some((cost, hair)) = left_out.filter(|(cost, _)| *cost > 0.0)
+        && (is_coarser || exceeds)
+        && !core::mem::replace(&mut told.left_out, true)
+    {
+        let message = format!(
+            "the budget of {} ms leaves out hair without HairLod, which is simulated in full, for {} ms, while other \
+             hair is made coarser: give it HairLod, of no levels if that is meant",
+            budget.milliseconds,
+            cost * budget.slowness
+        );
+        faults.write(HairFault::new(FaultKind::Setting, message).of(hair));
+    }
+    if exceeds && !told.exceeded {
         let message = format!(
             "the budget of {} ms is too small: at their coarsest levels all hairs take about {present} ms, \
              and are simulated at those all the same",
@@ -125,7 +174,7 @@ fn choose(
         );
         faults.write(HairFault::new(FaultKind::Setting, message));
     }
-    *exceeded = exceeds;
+    told.exceeded = exceeds;
     for ((candidate, settings, present, limits), level) in chosen.iter_mut().zip(levels) {
         let settings_of = |level: usize| level.checked_sub(1).and_then(|i| settings.get(i));
         let wanted_strands = settings_of(candidate.wanted).map(|l| l.strands);

@@ -4,9 +4,12 @@ use super::{SettleSettings, Settling};
 use crate::{
     base::{
         schedule::{HairStep, HairTicked, SettleTick, SettleTickHairs, lacks},
-        setting::{self, Settings},
+        setting::Settings,
     },
-    hair::strand::{Hair, Strand, StrandHistory, Strands, TickPose, lacks_strands},
+    hair::{
+        strand::{Hair, Strand, StrandHistory, Strands, TickPose, lacks_strands},
+        worn,
+    },
     keratin::bond::{BondChanges, BondPlugin},
 };
 use bevy::{ecs::system::SystemState, prelude::*};
@@ -21,7 +24,7 @@ impl Plugin for SettlePlugin {
             return;
         }
         lacks::<BondPlugin, Self>(app);
-        setting::plugin::<SettleSettings>(app);
+        worn::setting::<SettleSettings>(app);
         app.add_systems(HairTicked, settle.run_if(any_with_component::<Settling>));
     }
 }

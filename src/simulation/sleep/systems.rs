@@ -8,15 +8,18 @@ use crate::{
     base::{
         parallel::{Nanos, for_each},
         schedule::{HairStep, HairSystems, HairTick, first_substep, lacks},
-        setting::{self, Settings},
+        setting::Settings,
     },
     forces::{
         contact::{HairReach, StrandContact, TickCollider, TickColliders, seen_from},
         environment::{AirDrag, Gravity, LocalWinds, Winds},
     },
-    hair::strand::{
-        AddedMass, Hair, HairHere, HeldNodes, Pose, Regroomed, SimulatedHere, SleepCounts,
-        SleepPose, Strand, StrandModel, StrandOf, StrandSleep, TickPose, lacks_strands,
+    hair::{
+        strand::{
+            AddedMass, Hair, HairHere, HeldNodes, Pose, Regroomed, SimulatedHere, SleepCounts,
+            SleepPose, Strand, StrandModel, StrandOf, StrandSleep, TickPose, lacks_strands,
+        },
+        worn,
     },
     keratin::{
         bond::{BondChanges, BondInfluence, BondPlugin, Bonds, Cuticle},
@@ -52,7 +55,7 @@ impl Plugin for SleepPlugin {
             return;
         }
         lacks::<BondPlugin, Self>(app);
-        setting::plugin::<SleepSettings>(app);
+        worn::setting::<SleepSettings>(app);
         app.register_type::<SleepSnapshot>()
             .register_required_components::<Hair, SleepSnapshot>()
             .register_required_components::<Hair, SleepCounts>()

@@ -12,12 +12,15 @@ use crate::{
         lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level},
         parallel::{Scratch, prefetch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, lacks},
-        setting::{self, Settings},
+        setting::Settings,
     },
     forces::contact::{Obstacles, StrandContact},
-    hair::strand::{
-        AddedMass, Hair, Held, HeldNodes, HeldNodesState, SimulatedHere, Strand, StrandModel,
-        StrandOf, StrandSleep, TickPose, lacks_strands,
+    hair::{
+        strand::{
+            AddedMass, Hair, Held, HeldNodes, HeldNodesState, SimulatedHere, Strand, StrandModel,
+            StrandOf, StrandSleep, TickPose, lacks_strands,
+        },
+        worn,
     },
     keratin::bond::{BondInfluence, BondPlugin, Bonds, RestShape},
     solver::rod::{
@@ -42,9 +45,9 @@ impl Plugin for RodPlugin {
             return;
         }
         lacks::<BondPlugin, Self>(app);
-        setting::plugin::<HairStiffness>(app);
-        setting::plugin::<HairSolver>(app);
-        setting::plugin::<Sweeps>(app);
+        worn::setting::<HairStiffness>(app);
+        worn::setting::<HairSolver>(app);
+        worn::setting::<Sweeps>(app);
         substeps::plugin(app);
         app.add_systems(HairTick, step_rods.in_set(HairSystems::Rods))
             .add_systems(SettleTick, step_rods.in_set(HairSystems::Rods));

@@ -10,15 +10,18 @@ use crate::{
         fault::HairFault,
         parallel::{Scratch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, lacks},
-        setting::{self, Settings},
+        setting::Settings,
     },
     forces::{
         contact::{Obstacles, StrandContact},
         environment::Gravity,
     },
-    hair::strand::{
-        AddedMass, Held, HeldNodes, HeldNodesState, SimulatedHere, Strand, StrandModel, StrandOf,
-        StrandSleep, TickPose, lacks_strands,
+    hair::{
+        strand::{
+            AddedMass, Held, HeldNodes, HeldNodesState, SimulatedHere, Strand, StrandModel,
+            StrandOf, StrandSleep, TickPose, lacks_strands,
+        },
+        worn,
     },
     keratin::bond::BondPlugin,
     solver::{
@@ -43,7 +46,7 @@ impl Plugin for SpringPlugin {
             return;
         }
         lacks::<BondPlugin, Self>(app);
-        setting::plugin::<Springs>(app);
+        worn::setting::<Springs>(app);
         app.add_systems(HairTick, step_springs.in_set(HairSystems::Springs))
             .add_systems(SettleTick, step_springs.in_set(HairSystems::Springs));
     }
