@@ -134,7 +134,7 @@ impl StrandRegion {
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct TieHair {
-    /// The [`Hair`](crate::Hair).
+    /// The [`Hair`](crate::Hair), or who wears it.
     #[event_target]
     pub hair: Entity,
     /// The [`HairTie`].

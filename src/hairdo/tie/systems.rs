@@ -10,8 +10,11 @@ use crate::{
         schedule::{HairStep, HairSystems, HairTick},
         setting::{self, Ranged},
     },
-    hair::strand::{
-        HeldNodes, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required, lacks_strands,
+    hair::{
+        strand::{
+            HeldNodes, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required, lacks_strands,
+        },
+        worn::HairsOf,
     },
     keratin::treatment::WoundOn,
 };
@@ -44,24 +47,28 @@ impl Plugin for TiePlugin {
 /// Marks the strands of a region as tied.
 fn tie(
     request: On<TieHair>,
-    hairs: Query<&Strands>,
+    (hairs, of): (Query<&Strands>, HairsOf),
     ties: Query<(), With<HairTie>>,
     strands: Query<(&Strand, Option<&Tied>)>,
     mut commands: Commands,
     mut faults: MessageWriter<HairFault>,
 ) {
     let TieHair { hair, tie, region } = *request;
-    let Ok(members) = hairs.get(hair) else {
-        let message = "the target of TieHair is no Hair with strands";
-        faults.write(HairFault::new(FaultKind::NoTarget, message).of(hair));
-        return;
-    };
     if !ties.contains(tie) {
         let message = format!("{tie} of TieHair has no HairTie: no strand is tied");
         faults.write(HairFault::new(FaultKind::NoTarget, message).of(hair));
         return;
     }
-    for member in members.iter() {
+    let mut members = Vec::new();
+    for &hair in of.of(&hair) {
+        match hairs.get(hair) {
+            Ok(own) => members.extend(own.iter()),
+            Err(_) => {
+                faults.write(of.no_target("TieHair", hair));
+            }
+        }
+    }
+    for member in members {
         if let Ok((strand, tied)) = strands.get(member)
             && strand.positions().first().is_some_and(|root| region.contains(*root))
             && tied.is_none_or(|tied| tied.0 != tie)
