@@ -680,7 +680,9 @@ mod tests {
             let seconds: f32 = all.iter().map(|step| step.dt).sum();
             assert!((seconds * rate - 1.0).abs() < 1e-5, "{rate} Hz: {seconds} s");
             assert!(all[0].is_first && all.iter().filter(|step| step.is_first).count() == 1);
-            assert!(all[all.len() - 1].is_last && all.iter().filter(|step| step.is_last).count() == 1);
+            assert!(
+                all[all.len() - 1].is_last && all.iter().filter(|step| step.is_last).count() == 1
+            );
         }
     }
 

@@ -360,7 +360,8 @@ pub(super) fn bear_water(
     let water = moisture.film().iter().zip(moisture.bound()).map(|(film, bound)| film + bound);
     added_mass.mass.resize(moisture.film().len(), 0.0);
     let mut change = 0.0_f32;
-    for ((mass, length), volume) in added_mass.mass.iter_mut().zip(node_lengths(lengths)).zip(water) {
+    for ((mass, length), volume) in added_mass.mass.iter_mut().zip(node_lengths(lengths)).zip(water)
+    {
         let now = (WATER * volume / (dry * f64::from(length))) as f32;
         change = change.max((now - *mass).abs() / (1.0 + now));
         *mass = now;
