@@ -185,8 +185,10 @@ fn falls_freely(
 ) -> bool {
     let place = drop.position;
     let [x, y, z] = place.to_array();
-    let is_near =
-        |solid: &Obstacle| !(solid.solid.depth(V3::new(x, y, z), way + SHORT_PUSH).1 <= 0.0);
+    let is_near = |solid: &Obstacle| {
+        let depth = solid.solid.depth(V3::new(x, y, z), way + SHORT_PUSH).1;
+        depth > 0.0 || depth.is_nan()
+    };
     drop.ride.is_none()
         && drop.lying == 0.0
         && !bounds.iter().any(|hair| hair.may_touch(place, way + drop.r_max.max(drop.r_min)))
@@ -224,8 +226,8 @@ impl HairBounds {
     /// Whether a strand may come within a distance (m) of a place within the tick; not of hair that there is not.
     fn may_touch(&self, place: Vec3, within: f32) -> bool {
         let apart = self.room + within;
-        // NaN is not beyond.
-        self.room >= 0.0 && !(self.center.distance_squared(place) > apart * apart)
+        let squared = self.center.distance_squared(place);
+        self.room >= 0.0 && (squared <= apart * apart || squared.is_nan())
     }
 
     fn is_near(&self, place: Vec3, down: Vec3, rules: &DropletRules) -> bool {
