@@ -99,7 +99,6 @@ fn requests_take_a_wearer_and_answer_it() {
     let mut app = test_app(60.0);
     let (character, hair) = wearing(&mut app);
     let (other, _) = wearing(&mut app);
-    app.world_mut().resource_mut::<HairProcessTime>().0 = 1e5;
     app.init_resource::<Told>();
     app.world_mut().entity_mut(character).observe(
         |dried: On<HairDried>, mut told: ResMut<Told>| told.0.push(dried.original_event_target()),
@@ -115,10 +114,11 @@ fn requests_take_a_wearer_and_answer_it() {
     let [own, of_hair] = ask(&mut app, [character, hair]);
     assert!(own > 0.9 && own == of_hair, "{own} {of_hair}");
     assert_eq!(ask(&mut app, [other, other]), [0.0; 2]);
+    app.world_mut().resource_mut::<HairProcessTime>().0 = 1e5;
     run(&mut app, 1.0);
     assert_eq!(app.world().resource::<Told>().0, [hair], "its wearer is told that it has dried");
 
-    app.world_mut().write_message(HairTreatment::lotion(character).over(1e9));
+    app.world_mut().write_message(HairTreatment::lotion(character).over(1e6));
     app.update();
     let acting = |app: &App, hair: Entity| {
         let strand = app.world().get::<Strands>(hair).unwrap().collection()[0];
@@ -154,7 +154,7 @@ fn requests_take_a_wearer_and_answer_it() {
     let error = Hairdo::of(app.world(), character).unwrap_err();
     let message = error.to_string();
     assert!(message.contains(&format!("{hair} and {beard}")), "{message}");
-    app.world_mut().trigger(HairTreatment::lotion(character).over(1e9));
+    app.world_mut().trigger(HairTreatment::lotion(character).over(1e6));
     app.update();
     assert_eq!([hair, beard].map(|hair| acting(&app, hair)), [2, 1]);
     assert_eq!(faults(&mut app), []);
@@ -395,6 +395,7 @@ mod drawn {
 #[cfg(all(feature = "groom", feature = "save"))]
 mod worn_by_one_component {
     use super::*;
+    use bevy::world_serialization::{WorldAsset, WorldAssetRoot};
 
     /// A character that wears a groom.
     fn dressed(app: &mut App, with: impl Bundle) -> (Entity, Entity) {
@@ -471,16 +472,14 @@ mod worn_by_one_component {
     #[test]
     fn a_scene_that_was_not_loaded_is_named() {
         let mut app = app_with_meshes(2.0);
-        app.add_plugins(bevy::world_serialization::WorldSerializationPlugin)
+        app.init_asset::<WorldAsset>()
+            .register_type::<WorldAssetRoot>()
             .init_resource::<wear::Reported>()
             .add_observer(|not: On<HairNotWorn>, mut reported: ResMut<wear::Reported>| {
                 reported.refused.push((not.entity, not.error.clone()));
             });
         let scene = app.world().resource::<AssetServer>().load("models/nobody.scn.ron");
-        let root = app
-            .world_mut()
-            .spawn((bevy::world_serialization::WorldAssetRoot(scene), WearHair::default()))
-            .id();
+        let root = app.world_mut().spawn((WorldAssetRoot(scene), WearHair::default())).id();
         let refused = wait(&mut app).refused;
         assert_eq!(refused[0].0, root);
         let message = refused[0].1.to_string();
