@@ -25,6 +25,7 @@ mod handover;
 mod journal;
 mod layout;
 mod lod;
+mod pairs;
 mod papers;
 mod pictures;
 mod pipelined;

@@ -1,7 +1,7 @@
 //! Hair goes to the device and returns to the CPU, whatever happens on the way.
 
 use crate::{
-    bad, handover, lod, papers, probe, shapes, sleep,
+    bad, handover, lod, pairs, papers, probe, shapes, sleep,
     stage::{Stage, apart, curls, free},
     sweeps, targets,
 };
@@ -36,7 +36,7 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 pub fn hair_goes_to_the_device_and_comes_home() {
     let mut stage = Stage::new(SimulateOn::Cpu, Vec::new());
     stage.compile();
-    let all: [fn(&mut Stage); 42] = [
+    let all: [fn(&mut Stage); 43] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
@@ -79,6 +79,7 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         sleep::hair_with_followers_sleeps_as_well,
         sleep::a_pause_is_caught_up_with_in_some_frames,
         papers::the_papers_scenes_keep_there_what_they_keep_on_the_processor,
+        pairs::features_go_together_there,
     ];
     for one in all {
         let start = std::time::Instant::now();
