@@ -214,6 +214,11 @@ pub(crate) fn first_substep(step: Res<HairStep>) -> bool {
     step.index == 0
 }
 
+/// Run condition: in the substeps of what moves among hair.
+pub(crate) fn shared_substep(step: Res<HairStep>) -> bool {
+    step.shared().is_some()
+}
+
 /// Run condition: in the last substep of a tick.
 pub(crate) fn last_substep(step: Res<HairStep>) -> bool {
     step.index + 1 == step.count

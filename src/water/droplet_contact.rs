@@ -112,6 +112,7 @@ pub(super) fn wet_strands(
 ) {
     let WaterField { fields, loaded, outcomes, local, buffers, .. } =
         scratch.bypass_change_detection();
+    let substep = step.dt;
     let Some(step) = step.shared() else { return };
     // Droplets have added to the mass of the strands that carried them.
     for strand in loaded.drain(..) {
@@ -158,6 +159,7 @@ pub(super) fn wet_strands(
             wetting,
             field,
             dt: step.dt,
+            steepest: 1.0 / (substep * substep),
             uptake: 1.0 - bevy::math::ops::exp(-wetting.uptake * process * step.dt),
             film_capacity: clinging(wetting.bundle(1.0), gravity.length()),
             gravity: pose.direction_in(gravity),

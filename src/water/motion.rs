@@ -323,14 +323,10 @@ fn rest_on(obstacle: &Obstacle, drop: &mut Droplet, radius: f32) -> bool {
 
 /// After the strands have moved: droplets on strands move with them.
 pub(super) fn follow_strands(
-    step: Res<HairStep>,
     hairs: Query<&TickPose, With<Hair>>,
     strands: Query<(&StrandOf, &Strand)>,
     mut droplets: Query<&mut Droplet>,
 ) {
-    if step.shared().is_none() {
-        return;
-    }
     for mut drop in &mut droplets {
         let Some(ride) = drop.ride else { continue };
         if let Ok((of, strand)) = strands.get(ride.strand)
