@@ -11,7 +11,7 @@ use crate::{
     base::{
         fault::HairFault,
         parallel::{Nanos, for_each_block},
-        schedule::{HairProcessTime, HairStep},
+        schedule::{EffectiveSubsteps, HairProcessTime, HairStep},
         setting::{Ranged, Settings, Violations, report},
     },
     forces::{
@@ -41,7 +41,7 @@ type HairParts = (&'static TickPose, Option<&'static HairReach>);
 
 pub(super) fn move_droplets(
     mut commands: Commands,
-    step: Res<HairStep>,
+    (step, steps): (Res<HairStep>, EffectiveSubsteps),
     (air, process, gravity, rules): (
         Res<DryingAir>,
         Res<HairProcessTime>,
@@ -63,7 +63,7 @@ pub(super) fn move_droplets(
         bounds.clear();
         return;
     }
-    let Some(shared) = step.shared() else { return };
+    let Some(shared) = steps.shared() else { return };
     let rules = rules.clamped();
     let gravity = gravity.clamped().0;
     let down = gravity.normalize_or_zero();
