@@ -215,6 +215,11 @@ pub(crate) fn first_substep(step: Res<HairStep>) -> bool {
     step.index == 0
 }
 
+/// Run condition: in the substeps of what moves among hair.
+pub(crate) fn shared_substep(steps: EffectiveSubsteps) -> bool {
+    steps.shared().is_some()
+}
+
 /// Run condition: in the last substep of a tick.
 pub(crate) fn last_substep(step: Res<HairStep>) -> bool {
     step.index + 1 == step.count
@@ -284,8 +289,7 @@ pub(crate) struct EffectiveSubstep {
     most_iterations: u32,
 }
 
-/// The longest substep of what moves among all hair, such as droplets (s): that of hair by default. It is the same
-/// whatever hair there is, so that one character does not depend on another.
+/// The longest substep of what moves among all hair, such as droplets (s): that of hair by default.
 const LONGEST_SHARED: f32 = 1.0 / 180.0;
 
 /// A substep of what moves among all hair.
@@ -296,16 +300,6 @@ pub(crate) struct SharedSubstep {
     /// Whether it is the first in this tick, and the last.
     pub(crate) is_first: bool,
     pub(crate) is_last: bool,
-}
-
-impl HairStep {
-    /// The substep that what moves among hair takes now, or `None` while it waits for a longer one.
-    pub(crate) fn shared(&self) -> Option<SharedSubstep> {
-        let Self { dt, index, count } = *self;
-        let substeps = merged(index, count, MergedSubsteps::within(LONGEST_SHARED, self).0)?;
-        let (is_first, is_last) = (index + 1 == substeps, index + 1 == count);
-        Some(SharedSubstep { dt: dt * substeps as f32, is_first, is_last })
-    }
 }
 
 impl EffectiveSubsteps<'_, '_> {
@@ -330,6 +324,17 @@ impl EffectiveSubsteps<'_, '_> {
             merged(index, count, Self::longer(limits, own)).is_some()
         };
         self.hairs.iter().any(takes)
+    }
+
+    /// The substep that what moves among all hair takes now: as short as that of any solver. `None` while it waits
+    /// for a longer one. Levels of detail do not count, so that no character depends on how far another is.
+    pub(crate) fn shared(&self) -> Option<SharedSubstep> {
+        let HairStep { dt, index, count } = *self.step;
+        let most = MergedSubsteps::within(LONGEST_SHARED, &self.step).0;
+        let own = self.hairs.iter().filter_map(|(_, own)| own);
+        let substeps = merged(index, count, own.fold(most, |most, own| most.min(own.0)))?;
+        let (is_first, is_last) = (index + 1 == substeps, index + 1 == count);
+        Some(SharedSubstep { dt: dt * substeps as f32, is_first, is_last })
     }
 
     fn longer(limits: Option<&SubstepLimits>, own: Option<&MergedSubsteps>) -> u32 {
@@ -621,6 +626,7 @@ fn run_noted(world: &mut World) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy::ecs::system::RunSystemOnce;
 
     /// `KERATIN_WRITE_DOCS=1 cargo test --lib docs_show` rewrites the table.
     #[test]
@@ -695,19 +701,31 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_among_hair_takes_as_many_substeps_as_hair_does_by_default() {
-        for rate in [20.0, 30.0, 60.0, 64.0, 90.0, 120.0, 240.0, 400.0] {
-            let (tick, count) = (1.0 / rate, HairSubsteps::Auto.count(1.0 / rate));
-            let step = |index| HairStep { dt: tick / count as f32, index, count }.shared();
-            let all: Vec<SharedSubstep> = (0..count).filter_map(step).collect();
-            assert_eq!(all.len(), (180.0 / rate).ceil() as usize, "{rate} Hz");
-            let seconds: f32 = all.iter().map(|step| step.dt).sum();
-            assert!((seconds * rate - 1.0).abs() < 1e-5, "{rate} Hz: {seconds} s");
-            assert!(all[0].is_first && all.iter().filter(|step| step.is_first).count() == 1);
-            assert!(
-                all[all.len() - 1].is_last && all.iter().filter(|step| step.is_last).count() == 1
-            );
-        }
+    fn what_moves_among_hair_takes_the_shortest_substeps_of_a_solver() {
+        let mut world = World::new();
+        world.init_resource::<SettleTickHairs>();
+        let mut shared = |hairs: &[(u32, u32)]| -> Vec<(f32, bool, bool)> {
+            let hairs: Vec<Entity> = (hairs.iter())
+                .map(|&(own, substeps)| {
+                    let limits = SubstepLimits { substeps, ..default() };
+                    world.spawn((MergedSubsteps(own), limits)).id()
+                })
+                .collect();
+            let now = |index| {
+                world.insert_resource(HairStep { dt: 1.0 / 360.0, index, count: 6 });
+                let shared = |steps: EffectiveSubsteps| steps.shared();
+                let SharedSubstep { dt, is_first, is_last } =
+                    world.run_system_once(shared).unwrap()?;
+                Some(((360.0 * dt).round(), is_first, is_last))
+            };
+            let all = (0..6).filter_map(now).collect();
+            hairs.into_iter().for_each(|hair| assert!(world.despawn(hair)));
+            all
+        };
+        let pairs = [(2.0, true, false), (2.0, false, false), (2.0, false, true)];
+        assert_eq!(shared(&[]), pairs);
+        assert_eq!(shared(&[(2, 6), (MergedSubsteps::WAITS.0, 1)]), pairs, "details do not count");
+        assert_eq!(shared(&[(2, 1), (1, 1)]).len(), 6);
     }
 
     #[test]

@@ -15,11 +15,6 @@ use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*, u32x16};
 /// Squared distance (m²) from a droplet's centre up to which there is no direction of pull.
 const SAME_PLACE: f32 = 1e-18;
 
-/// Largest force gradient, in units of 1/dt², that a substep resolves without overshooting: that of
-/// about thirteen droplets of 3/15 mm at a node at 30 m/s² and 1/360 s. A larger pull is scaled
-/// down.
-const MAX_GRADIENT: f32 = 1.0;
-
 /// Largest upward acceleration by droplets, as a share of gravity.
 const LIFT: f32 = 0.2;
 
@@ -105,6 +100,9 @@ pub(super) struct ContactParams<'a> {
     pub wetting: &'a HairWetting,
     pub field: &'a Field,
     pub dt: f32,
+    /// Largest force gradient (1/s²) that is resolved without overshooting: that of about thirteen droplets of
+    /// 3/15 mm at a node at 30 m/s², where it is 1/dt² of 1/360 s. A larger pull is scaled down.
+    pub steepest: f32,
     /// Share of a node's free film capacity that a droplet fills in this substep.
     pub uptake: f32,
     /// Film capacity of a node (m³).
@@ -219,7 +217,8 @@ impl ContactParams<'_> {
             }
         }
         let inertia = load(simd, &row.load) + 1.0;
-        let share = Real::min(inertia * MAX_GRADIENT / steepness, f32x16::splat(simd, 1.0));
+        let most = self.steepest * self.dt * self.dt;
+        let share = Real::min(inertia * most / steepness, f32x16::splat(simd, 1.0));
         // A droplet hangs on hair itself and cannot support other hair: the lift is limited.
         let up = splat3(simd, -self.gravity.normalize_or_zero());
         let lift = change.dot(up) * share / inertia;
@@ -426,7 +425,9 @@ mod tests {
         field: &'a Field,
         dt: f32,
     ) -> ContactParams<'a> {
-        ContactParams { wetting, field, dt, uptake: 0.0, film_capacity: 0.0, gravity: Vec3::ZERO }
+        let steepest = 1.0 / (dt * dt);
+        let (uptake, film_capacity, gravity) = (0.0, 0.0, Vec3::ZERO);
+        ContactParams { wetting, field, dt, steepest, uptake, film_capacity, gravity }
     }
 
     #[test]

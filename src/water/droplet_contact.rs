@@ -13,7 +13,7 @@ use crate::{
     base::{
         lanes::{LANES, simd_level},
         parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
-        schedule::{HairProcessTime, HairStep},
+        schedule::{EffectiveSubsteps, HairProcessTime, HairStep},
         setting::{Ranged, Settings},
     },
     forces::{
@@ -100,7 +100,7 @@ type AmongDroplets = (
 type RainedOn = (Entity, &'static TickPose, &'static mut StrandBlocks, Option<&'static HairReach>);
 
 pub(super) fn wet_strands(
-    step: Res<HairStep>,
+    (step, steps): (Res<HairStep>, EffectiveSubsteps),
     gravity: Gravity,
     process: Res<HairProcessTime>,
     wetting: Settings<HairWetting>,
@@ -112,7 +112,8 @@ pub(super) fn wet_strands(
 ) {
     let WaterField { fields, loaded, outcomes, local, buffers, .. } =
         scratch.bypass_change_detection();
-    let Some(step) = step.shared() else { return };
+    let substep = step.dt;
+    let Some(step) = steps.shared() else { return };
     // Droplets have added to the mass of the strands that carried them.
     for strand in loaded.drain(..) {
         if let Ok((_, of, strand, mut added_mass, moisture, _)) = strands.get_mut(strand) {
@@ -158,6 +159,7 @@ pub(super) fn wet_strands(
             wetting,
             field,
             dt: step.dt,
+            steepest: 1.0 / (substep * substep),
             uptake: 1.0 - bevy::math::ops::exp(-wetting.uptake * process * step.dt),
             film_capacity: clinging(wetting.bundle(1.0), gravity.length()),
             gravity: pose.direction_in(gravity),

@@ -9,7 +9,7 @@ use crate::{
     base::{
         fault::{FaultKind, HairFault},
         parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
-        schedule::{HairProcessTime, HairStep},
+        schedule::{EffectiveSubsteps, HairProcessTime, HairStep},
         setting::{Ranged, Settings, report},
     },
     forces::environment::{
@@ -69,11 +69,11 @@ pub(super) fn repair_moistures(
 
 pub(super) fn run_showers(
     mut commands: Commands,
-    step: Res<HairStep>,
+    steps: EffectiveSubsteps,
     mut showers: Query<(Entity, &mut Shower, &TickPose)>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    let Some(step) = step.shared() else { return };
+    let Some(step) = steps.shared() else { return };
     for (entity, mut shower, pose) in &mut showers {
         let shower = shower.bypass_change_detection();
         let mut valid = shower.clamped();

@@ -11,7 +11,7 @@ use crate::{
     base::{
         fault::HairFault,
         parallel::{Nanos, for_each_block},
-        schedule::{HairProcessTime, HairStep},
+        schedule::{EffectiveSubsteps, HairProcessTime, HairStep},
         setting::{Ranged, Settings, Violations, report},
     },
     forces::{
@@ -41,7 +41,7 @@ type HairParts = (&'static TickPose, Option<&'static HairReach>);
 
 pub(super) fn move_droplets(
     mut commands: Commands,
-    step: Res<HairStep>,
+    (step, steps): (Res<HairStep>, EffectiveSubsteps),
     (air, process, gravity, rules): (
         Res<DryingAir>,
         Res<HairProcessTime>,
@@ -63,7 +63,7 @@ pub(super) fn move_droplets(
         bounds.clear();
         return;
     }
-    let Some(shared) = step.shared() else { return };
+    let Some(shared) = steps.shared() else { return };
     let rules = rules.clamped();
     let gravity = gravity.clamped().0;
     let down = gravity.normalize_or_zero();
@@ -323,14 +323,10 @@ fn rest_on(obstacle: &Obstacle, drop: &mut Droplet, radius: f32) -> bool {
 
 /// After the strands have moved: droplets on strands move with them.
 pub(super) fn follow_strands(
-    step: Res<HairStep>,
     hairs: Query<&TickPose, With<Hair>>,
     strands: Query<(&StrandOf, &Strand)>,
     mut droplets: Query<&mut Droplet>,
 ) {
-    if step.shared().is_none() {
-        return;
-    }
     for mut drop in &mut droplets {
         let Some(ride) = drop.ride else { continue };
         if let Ok((of, strand)) = strands.get(ride.strand)

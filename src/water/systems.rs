@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     base::{
-        schedule::{HairStep, HairSystems, HairTick, first_substep, last_substep},
+        schedule::{HairStep, HairSystems, HairTick, first_substep, last_substep, shared_substep},
         setting,
         stretch::{self, Stretch},
     },
@@ -70,7 +70,7 @@ impl Plugin for WaterPlugin {
                 (
                     repair_moistures,
                     count_overwritten,
-                    run_showers,
+                    run_showers.run_if(shared_substep),
                     exchange_water.run_if(first_substep),
                     (update_is_wet, widen_contact).chain().run_if(first_substep),
                 )
@@ -80,16 +80,19 @@ impl Plugin for WaterPlugin {
             .add_systems(
                 HairTick,
                 (
-                    (move_droplets, merge_droplets.run_if(last_substep))
+                    // Not in other substeps: what was written to a droplet is changed until it is repaired.
+                    (move_droplets.run_if(shared_substep), merge_droplets.run_if(last_substep))
                         .chain()
                         .in_set(HairSystems::Droplets),
-                    wet_strands.in_set(HairSystems::DropletContact),
+                    wet_strands.run_if(shared_substep).in_set(HairSystems::DropletContact),
                     join_wet_strands.in_set(HairSystems::Bridges),
                 ),
             )
             .add_systems(
                 HairTick,
-                (follow_strands, sum_held_water).chain().in_set(HairSystems::WaterLedger),
+                (follow_strands.run_if(shared_substep), sum_held_water)
+                    .chain()
+                    .in_set(HairSystems::WaterLedger),
             );
     }
 }

@@ -328,8 +328,10 @@ fn in_its_limit_the_loop_is_equation_19() {
     app.world_mut().spawn((Blower::default(), Transform::from_xyz(0.0, 0.1, 0.3)));
     app.world_mut().entity_mut(entity).insert(bevy_keratin::WindReceived::default());
     run(&mut app, 1.5);
+    let wind = app.world().get::<bevy_keratin::WindReceived>(entity).unwrap().total.clone();
+    // Water goes by the wind of the tick before.
+    run(&mut app, 1.0 / 60.0);
     let bonds = app.world().get::<Bonds>(entity).unwrap();
-    let wind = &app.world().get::<bevy_keratin::WindReceived>(entity).unwrap().total;
     // What the wind gave is felt less by heavy hair; equation 19 goes by the wind.
     let mut varied = 0.0_f32;
     for (b, wind) in bonds.rates(BondKind::Hydrogen).zip(wind) {
@@ -838,17 +840,20 @@ fn count_moves(strand: Single<&Strand>, mut seen: ResMut<Moves>) {
 fn wet_hair_joins_substeps_and_sleeps() {
     let mut app = test_app(60.0);
     app.init_resource::<Moves>().add_systems(HairTick, count_moves.in_set(HairSystems::Last));
+    // A film that stays as it is.
+    let stays = HairWetting { soaking: 0.0, evaporation: 0.0, wicking: 0.0, ..default() };
+    app.insert_resource(HairDefault(stays));
     let (hair, strand) = one_strand(&mut app, 0.24, 8, Vec3::X);
-    app.world_mut().write_message(SoakHair::dripping(hair));
+    app.world_mut().write_message(SoakHair { target: hair, wetness: 1.05 });
     run(&mut app, 1.0);
     assert_eq!(app.world().resource::<Moves>().0, 180, "six substeps of a tick in pairs");
     let mut asleep = 0;
-    for _ in 0..600 {
+    for _ in 0..900 {
         app.update();
         asleep += usize::from(app.world().get::<StrandSleep>(strand).unwrap().is_asleep());
     }
     assert!(app.world().get::<Moisture>(strand).unwrap().has_film(), "it is still wet");
-    assert!(asleep > 300, "asleep in {asleep} of 600 ticks");
+    assert!(asleep > 100, "asleep in {asleep} of 900 ticks");
 }
 
 /// A drop that meets nothing moves once a tick, others as hair does.
@@ -864,8 +869,9 @@ fn a_drop_far_from_hair_falls_as_one_near_it() {
         let [near, far] = [near, far].map(|drop| app.world().get::<Droplet>(drop).unwrap());
         let seconds = tick as f32 / 60.0;
         let apart = (near.position - far.position).reject_from(Vec3::X).length();
-        assert!(apart < 2e-3 * seconds.max(0.1), "{apart} m apart after {seconds} s");
-        assert!((near.velocity - far.velocity).length() < 0.02, "{near:?} {far:?}");
+        // The drag of a step goes by its last velocity.
+        assert!(apart < 0.02 * seconds, "{apart} m apart after {seconds} s");
+        assert!((near.velocity - far.velocity).length() < 0.05, "{near:?} {far:?}");
     }
 }
 
