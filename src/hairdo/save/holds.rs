@@ -5,9 +5,8 @@
 //! with its place.
 
 use super::{
-    Hairdo, HairdoError, StyledStrand,
+    Hairdo, HairdoError, Hold, StyledStrand, StyledTie,
     bytes::{Reader, Writer},
-    resample::nearest_node,
 };
 use crate::{
     base::setting::Ranged,
@@ -16,26 +15,6 @@ use crate::{
     keratin::treatment::WoundOn,
 };
 use bevy::prelude::*;
-
-/// A tie of a hairdo, with its place in the hair's frame.
-#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
-#[reflect(Default, Clone, PartialEq)]
-pub(super) struct StyledTie {
-    tie: HairTie,
-    place: Vec3,
-    turn: Quat,
-    scale: f32,
-}
-
-/// What holds a strand.
-#[derive(Reflect, Clone, Debug, PartialEq)]
-#[reflect(Clone, PartialEq)]
-pub(super) enum Hold {
-    /// A node, by the hairdo's tie of this index, at a place in the tie's frame (m).
-    Tied { tie: u32, node: u32, place: Vec3 },
-    /// Nodes at places in the hair's frame (m).
-    Nodes(Vec<(u32, Vec3)>),
-}
 
 /// A tie that has come with a hairdo, and goes with it.
 #[derive(Component)]
@@ -274,4 +253,18 @@ fn held(nodes: impl IntoIterator<Item = (u32, Vec3)>) -> HeldNodes {
         targets[node] = Some(at);
     }
     HeldNodes { targets, ..default() }
+}
+
+/// The node of a strand with `new` lengths that is as far along it as `node` along `old` ones; `None` if it is shorter.
+fn nearest_node(old: &[f32], node: usize, new: &[f32]) -> Option<usize> {
+    let along: f32 = old.iter().take(node).sum();
+    let mut arc = 0.0;
+    let arcs = core::iter::once(0.0).chain(new.iter().map(|l| {
+        arc += l;
+        arc
+    }));
+    let (nearest, off) =
+        arcs.map(|arc| arc - along).enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    let edge = new.get(nearest.saturating_sub(1))?;
+    (off >= -0.5 * edge).then_some(nearest)
 }

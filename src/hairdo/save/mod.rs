@@ -34,11 +34,11 @@ use crate::{
         look::{HairDye, HairLook, WornPreset},
         strand::MIN_SEGMENT,
     },
+    hairdo::tie::HairTie,
     keratin::bond::{BondKind, Cuticle, JointBonds},
     solver::rod::frame::darboux,
 };
 use bevy::prelude::*;
-use holds::{Hold, StyledTie};
 
 /// The style of one [`Hair`](crate::Hair) at one moment: nodes, bonds, water and wear of every
 /// strand, in the order of [`Strands`](crate::Strands), with look and dye. Lengths are in the hair's
@@ -90,6 +90,26 @@ pub struct StyledStrand {
     film: Vec<f64>,
     bound: Vec<f64>,
     hold: Option<Hold>,
+}
+
+/// A tie of a hairdo, with its place in the hair's frame.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+struct StyledTie {
+    tie: HairTie,
+    place: Vec3,
+    turn: Quat,
+    scale: f32,
+}
+
+/// What holds a strand.
+#[derive(Reflect, Clone, Debug, PartialEq)]
+#[reflect(Clone, PartialEq)]
+enum Hold {
+    /// A node, by the hairdo's tie of this index, at a place in the tie's frame (m).
+    Tied { tie: u32, node: u32, place: Vec3 },
+    /// Nodes at places in the hair's frame (m).
+    Nodes(Vec<(u32, Vec3)>),
 }
 
 /// The maximum water of a node (m³).

@@ -117,20 +117,6 @@ impl StyledStrand {
     }
 }
 
-/// The node of a strand with `new` lengths that is as far along it as `node` along `old` ones; `None` if it is shorter.
-pub(super) fn nearest_node(old: &[f32], node: usize, new: &[f32]) -> Option<usize> {
-    let along: f32 = old.iter().take(node).sum();
-    let mut arc = 0.0;
-    let arcs = core::iter::once(0.0).chain(new.iter().map(|l| {
-        arc += l;
-        arc
-    }));
-    let (nearest, off) =
-        arcs.map(|arc| arc - along).enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    let edge = new.get(nearest.saturating_sub(1))?;
-    (off >= -0.5 * edge).then_some(nearest)
-}
-
 /// Arc lengths along an old and a new strand, both in the old one's lengths.
 struct Along {
     old_nodes: Vec<f32>,

@@ -25,11 +25,11 @@ setting! {
     /// ```
     /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
     /// /// A ponytail behind the head, which looks along −Z.
-    /// fn ponytail(hair: Single<Entity, With<Hair>>, mut commands: Commands) {
+    /// fn ponytail(mut commands: Commands, hair: Entity) {
     ///     let behind = Transform::from_xyz(0.0, 0.05, 0.12)
     ///         .with_rotation(Quat::from_rotation_arc(Vec3::Y, Vec3::new(0.0, 0.4, 0.9).normalize()));
-    ///     let tie = commands.spawn((HairTie::default(), behind, ChildOf(*hair))).id();
-    ///     commands.trigger(TieHair::all(*hair, tie));
+    ///     let tie = commands.spawn((HairTie::default(), behind, ChildOf(hair))).id();
+    ///     commands.trigger(TieHair::all(hair, tie));
     /// }
     /// ```
     #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]

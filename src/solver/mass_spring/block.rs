@@ -390,7 +390,7 @@ mod tests {
         base::lanes::{put3, put4, take3},
         solver::rod::obstacle::Solid,
     };
-    use glam::{Quat, Vec3Swizzles};
+    use glam::Quat;
     use proptest::prelude::*;
 
     const G: Vec3 = Vec3::new(0.0, -9.8, 0.0);
@@ -579,11 +579,6 @@ mod tests {
         assert!(lying.len() > 4 * LANES, "{} nodes lie on it", lying.len());
         let most = lying.iter().map(|k| before[*k].distance(after[*k])).fold(0.0, f32::max);
         assert!(most < 1e-6, "{most} m in half a second");
-        let aside = (0..LANES).filter(|lane| {
-            let (root, tip) = (after[*lane], after[7 * LANES + lane]);
-            (root.x * tip.z - root.z * tip.x).abs() > 0.01 * root.xz().length()
-        });
-        assert!(aside.count() > LANES / 2, "held where friction holds them");
     }
 
     #[test]
