@@ -549,8 +549,8 @@ pub fn rates() -> Vec<Row> {
         let what = format!("{hertz} Hz: solves of dry hair a second");
         rows.push(Row::new(what, (hertz * each) as f32, solves(hertz, false), 3.0));
     }
-    for (hertz, expected) in [(60, 360), (72, 360)] {
-        let what = format!("{hertz} Hz: solves of wet hair a second, as many as substeps");
+    for (hertz, expected) in [(60, 180), (72, 216)] {
+        let what = format!("{hertz} Hz: solves of wet hair a second, as many as of dry hair");
         rows.push(Row::new(what, expected as f32, solves(hertz, true), 3.0));
     }
     let [swings, rests] = swing(60.0);

@@ -62,6 +62,7 @@ pub struct WearPlugin;
 
 impl Plugin for WearPlugin {
     fn build(&self, app: &mut App) {
+        app.init_resource::<what::KnowsOfWearing>();
         if lacks_strands::<Self>(app) {
             return;
         }
@@ -74,7 +75,6 @@ impl Plugin for WearPlugin {
             .register_type::<FacingFrom>()
             .register_type::<HairWorn>()
             .register_type::<HairNotWorn>()
-            .init_resource::<what::PutsHairOn>()
             .register_required_components::<WearHair, systems::Wearing>()
             .register_required_components::<WearHair, Wearer>()
             .register_required_components::<WornAs, MadeAgain>()

@@ -250,9 +250,9 @@ impl From<Handle<Groom>> for HairSource {
     }
 }
 
-/// In an app that puts hair on.
+/// In an app that puts hair on, or has said why it does not.
 #[derive(Resource, Default)]
-pub(super) struct PutsHairOn;
+pub(super) struct KnowsOfWearing;
 
 /// Whether it was said that nothing does.
 #[derive(Resource, Default)]
@@ -263,7 +263,7 @@ fn tell_if_nothing_wears(mut world: DeferredWorld, context: HookContext) {
     // Not in the world of a scene asset, which is no app.
     let is_app = world.contains_resource::<MainScheduleOrder>();
     if !is_app
-        || world.contains_resource::<PutsHairOn>()
+        || world.contains_resource::<KnowsOfWearing>()
         || world.contains_resource::<ToldNothingWears>()
     {
         return;
