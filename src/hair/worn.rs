@@ -1,7 +1,7 @@
 //! Who wears a hair, and what of a wearer acts on it.
 //!
 //! [`WornBy`] and [`WornHair`] lead from a hair to its character and back. What a game puts on the character acts on
-//! its hair: [`setting`] and [`component`] register that for a component, [`HairsOf`] finds the hair that a request
+//! its hair: `setting` and `component` register that for a component, `HairsOf` finds the hair that a request
 //! to a character is about.
 
 use crate::{

@@ -193,14 +193,14 @@ impl Held<'_> {
             let length = core::mem::replace(&mut before, p).distance(p);
             (length - l).abs() <= most_strain * l
         };
-        let held = strand.rest_lengths.iter().zip(1..=self.nodes.last(strand));
+        let mut held = strand.rest_lengths.iter().zip(1..=self.nodes.last(strand));
         let is_let_go = self.is_let_go();
         let state = &mut *self.state;
         if is_let_go {
             (state.pace, state.in_a_row) = (Some(SLOWEST), 0);
             return true;
         }
-        if held.map(fits).all(|fits| fits) {
+        if held.all(fits) {
             state.in_a_row = 0;
             state.pace = state.pace.filter(|pace| *pace < self.nodes.farthest(strand));
             match &mut state.pace {

@@ -21,7 +21,7 @@ use crate::{
 use bevy::{ecs::system::EntityCommand, prelude::*};
 
 impl Hairdo {
-    /// The present hairdo of a [`Hair`], or of the one that an entity wears: a snapshot of its pose even in motion.
+    /// The present hairdo of a [`Hair`](crate::Hair), or of the one that an entity wears: a snapshot of its pose even in motion.
     ///
     /// # Errors
     /// When `hair` is no hair and wears none, or several, when it is on the GPU, or a strand has fewer than two nodes

@@ -569,7 +569,8 @@ mod tests {
         };
         let params = params(Springs::default(), G, 360.0);
         let mut run = |substeps: usize| {
-            (0..substeps).for_each(|_| advance_on(&mut block, &params, 0.995, &[head.clone()]));
+            (0..substeps)
+                .for_each(|_| advance_on(&mut block, &params, 0.995, std::slice::from_ref(&head)));
             places(&block)
         };
         let (before, after) = (run(4 * 360), run(180));
@@ -589,7 +590,8 @@ mod tests {
             let solid = Solid::HalfSpace { normal, point: Vec3::ZERO };
             let slope = Obstacle { solid, motion: None, friction };
             let params = params(Springs::default(), G, 360.0);
-            (0..360).for_each(|_| advance_on(&mut block, &params, 1.0, &[slope.clone()]));
+            (0..360)
+                .for_each(|_| advance_on(&mut block, &params, 1.0, std::slice::from_ref(&slope)));
             take3(&block.strands.nodes[7].p, 3).distance(Vec3::X * 0.21)
         };
         let (holds, slides) = (slips(0.205), slips(0.19));
