@@ -30,7 +30,6 @@ mod systems;
 mod volume;
 
 pub use bridge::HairDried;
-#[cfg(feature = "gpu")]
 pub(crate) use bridge::IsWet;
 pub use droplet::{Droplet, Shower, StrandPoint};
 pub use moisture::{HairWetting, Moisture};
