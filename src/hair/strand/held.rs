@@ -165,12 +165,21 @@ pub(crate) struct Held<'a> {
     pub(crate) state: &'a mut HeldNodesState,
 }
 
-impl Held<'_> {
+impl<'a> Held<'a> {
+    /// `None` of strands of which no node is held.
+    pub(crate) fn of(
+        nodes: Option<&'a HeldNodes>,
+        state: Option<&'a mut HeldNodesState>,
+    ) -> Option<Self> {
+        let (nodes, state) = nodes.zip(state)?;
+        (!nodes.targets.is_empty()).then_some(Self { nodes, state })
+    }
+
     /// Index and position of each held node in this substep, root first.
-    pub(crate) fn places<'a>(
-        &'a self,
-        strand: &'a Strand,
-    ) -> impl Iterator<Item = (usize, Vec3)> + 'a {
+    pub(crate) fn places<'b>(
+        &'b self,
+        strand: &'b Strand,
+    ) -> impl Iterator<Item = (usize, Vec3)> + 'b {
         self.nodes.within_reach(strand, self.state.pace)
     }
 
@@ -262,7 +271,7 @@ pub(super) fn report_out_of_reach(
             let short = at.filter_map(|(i, (target, p))| Some((i, target.as_ref()?.distance(*p))));
             short
                 .max_by(|a, b| a.1.total_cmp(&b.1))
-                .filter(|(_, short)| *short > SLACK * strand.length())
+                .filter(|(_, short)| *short > (1.0 - TAUT) * strand.length())
         };
         let by_way = if state.refused >= REFUSALS { by_way() } else { None };
         let message = match (by_length, by_way) {

@@ -231,7 +231,7 @@ fn step_rods(
                 && rest.darboux.len() == strand.edges()
                 && rest.stiffness.len() == strand.edges();
             let (entity, hair) = (*entity, of.0);
-            let held = held.0.zip(held.1).map(|(nodes, state)| Held { nodes, state });
+            let held = Held::of(held.0, held.1);
             let own = RodColumns { rest, bonds };
             is_stepped.then_some(Member { entity, hair, strand, added, held, own })
         },

@@ -147,7 +147,7 @@ fn step_springs(
         |(entity, of, sleep, strand, added, held)| {
             let is_stepped = sleep.is_simulated() && strand.nodes() >= 2;
             let (entity, hair) = (*entity, of.0);
-            let held = held.0.zip(held.1).map(|(nodes, state)| Held { nodes, state });
+            let held = Held::of(held.0, held.1);
             is_stepped.then_some(Member {
                 entity,
                 hair,
