@@ -4,7 +4,7 @@ use crate::{
     base::schedule::TickPlugin,
     forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
     hair::{look::LookPlugin, strand::StrandPlugin},
-    hairdo::{style::StylePlugin, tie::TiePlugin},
+    hairdo::{cut::CutPlugin, style::StylePlugin, tie::TiePlugin},
     keratin::{bond::BondPlugin, treatment::TreatmentPlugin},
     simulation::{
         lod::LodPlugin,
@@ -39,6 +39,7 @@ use bevy::{
 /// | [`LodPlugin`] | levels of detail, guides and followers, the budget | strands |
 /// | [`StylePlugin`] | measures how much of a style is left | strands, `BondPlugin` |
 /// | [`TiePlugin`] | hair ties | strands |
+/// | [`CutPlugin`] | cuts hair | strands |
 /// | [`LookPlugin`] | registers colour, width and dye | |
 /// | `HairRenderPlugin` | draws hair and droplets | feature `render`, strands, Bevy's renderer |
 /// | `HairGpuPlugin` | simulates hair by compute shaders | feature `gpu`, strands, `BondPlugin`, Bevy's renderer |
@@ -113,6 +114,7 @@ impl PluginGroup for HairPlugins {
             .add(LodPlugin)
             .add(StylePlugin)
             .add(TiePlugin)
+            .add(CutPlugin)
             .add(LookPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin {

@@ -10,8 +10,9 @@ pub mod prelude {
         DyeLayer, HairColor, HairDye, HairLook, HairShading, Melanin, Streaks, WornPreset,
     };
     pub use crate::hair::strand::{
-        AddedMass, Hair, HairInertia, HeldNodes, HeldNodesState, MotionOwner, OnGpu, ShiftWorld,
-        SleepCounts, Strand, StrandError, StrandModel, StrandOf, StrandSleep, Strands,
+        AddedMass, CutStrand, FollowerCuts, Hair, HairInertia, HeldNodes, HeldNodesState,
+        MotionOwner, OnGpu, ShiftWorld, SleepCounts, Strand, StrandError, StrandModel, StrandOf,
+        StrandSleep, Strands,
     };
     pub use crate::hair::worn::{WornBy, WornHair};
 }

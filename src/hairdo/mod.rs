@@ -1,20 +1,24 @@
-//! Shapes that hair has been given: [`style`] measures how much of one is left, [`tie`] holds strands together, `save`
+//! Shapes that hair has been given: [`style`] measures how much of one is left, [`tie`] holds strands together, [`cut`] shortens them, `save`
 //! keeps a hairdo as bytes.
 
+pub mod cut;
+mod region;
 #[cfg(feature = "save")]
 pub mod save;
 pub mod style;
 pub mod tie;
 
+pub use region::StrandRegion;
+
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
+    pub use crate::hairdo::StrandRegion;
+    pub use crate::hairdo::cut::{Cut, CutHair, HairCut};
     #[cfg(feature = "save")]
     pub use crate::hairdo::save::{
         ApplyHairdo, CaptureHairdo, Hairdo, HairdoApplied, HairdoCaptured, HairdoError,
         HairdoRejected,
     };
     pub use crate::hairdo::style::{HairCondition, HairStyle, KeptStyle, StyleFaded};
-    pub use crate::hairdo::tie::{
-        HairTie, HairTied, StrandRegion, TieHair, TieProgress, Tied, TiedStrands,
-    };
+    pub use crate::hairdo::tie::{HairTie, HairTied, TieHair, TieProgress, Tied, TiedStrands};
 }

@@ -21,7 +21,7 @@ use half::{f16, slice::HalfFloatSliceExt};
 /// | buffer | stride | holds |
 /// |---|---|---|
 /// | `nodes` | 32 | position (3 × f32), bond rates (hydrogen, ionic, disulfide, peptide as unorm8 from the lowest byte), strain and moisture (2 × f16), length from the root at rest (m), motion since the frame before (3 × f16, in m/1024), 1 if the guide is valid (f16) |
-/// | `guides` | 8 | first node and number of nodes of each guide |
+/// | `guides` | 16 | first node and number of nodes of each guide (u32), how many edges it had before it was cut and where in these it ends (f32) |
 /// | `strands` | 128 | [`DrawnStrand`]: the guides first, then the followers |
 /// | `frame` | 12,848 | share of the strands that is drawn, share over which they fade, how many times wider they are (3 × f32), number of solids (u32), lowest corner of the grid in which fibres are counted and cells along its side (3 × f32, u32), size of a cell (3 × f32) and a free word, the four brightest lights (place and 1, or direction to it and 0, 4 × f32) in the world's frame and again in the hair's, 24 bounding balls of eight solids each (middle and radius, 4 × f32), then up to 192 solids of 64 bytes that strands are pushed out of |
 /// | `rings` | 32 | of each strand that is drawn at the present distance, by its rank and root to tip, the places between its straight segments: position (3 × f32), tangent (octahedral, 2 × snorm16), what it is from the middle of a lock that water draws together (3 × f16, m), moisture (f16), bond rates (4 × unorm8), strain and 1 if it is drawn (2 × f16) |

@@ -12,6 +12,7 @@ use super::{
 use bevy::prelude::*;
 
 pub use super::{
+    drawn_strand::GuideEnd,
     packed_frame::packed_frame,
     solids::{DrawnSolid, arrange},
 };
@@ -25,31 +26,6 @@ pub struct CurvePoint {
     pub slope: Vec3,
 }
 
-/// Catmull–Rom through a guide's `nodes` at `share` (0 root, 1 tip) of its length. With fewer than
-/// two nodes, the node or the origin.
-pub fn guide_point(nodes: &[Vec3], share: f32) -> CurvePoint {
-    if nodes.len() < 2 {
-        return CurvePoint {
-            position: nodes.first().copied().unwrap_or_default(),
-            slope: Vec3::ZERO,
-        };
-    }
-    let last = nodes.len() - 1;
-    let along = share.clamp(0.0, 1.0) * last as f32;
-    let i = (along as usize).min(last - 1);
-    let f = along - i as f32;
-    let (p1, p2) = (nodes[i], nodes[i + 1]);
-    let p0 = if i > 0 { nodes[i - 1] } else { 2.0 * p1 - p2 };
-    let p3 = nodes.get(i + 2).copied().unwrap_or(2.0 * p2 - p1);
-    let a = 0.5 * (p2 - p0);
-    let b = p0 - 2.5 * p1 + 2.0 * p2 - 0.5 * p3;
-    let c = 1.5 * (p1 - p2) + 0.5 * (p3 - p0);
-    CurvePoint {
-        position: p1 + f * (a + f * (b + f * c)),
-        slope: (a + f * (2.0 * b + 3.0 * f * c)) * last as f32,
-    }
-}
-
 /// The nodes of a guide, root first.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Guide<'a> {
@@ -57,6 +33,81 @@ pub struct Guide<'a> {
     pub nodes: &'a [Vec3],
     /// How wet each node looks; dry where absent.
     pub moisture: &'a [f32],
+    /// Where it ends if it has been cut.
+    pub end: Option<GuideEnd>,
+}
+
+/// Where a share of a whole guide falls.
+struct GuidePlace {
+    below: usize,
+    /// How far on to the next node, above 1 beyond the end of one that is cut.
+    on: f32,
+    /// Length between the two, in edges of the whole guide.
+    edge: f32,
+}
+
+impl<'a> Guide<'a> {
+    /// A dry guide that has not been cut.
+    pub fn new(nodes: &'a [Vec3]) -> Self {
+        Self { nodes, ..Self::default() }
+    }
+
+    fn root(&self) -> Vec3 {
+        self.nodes.first().copied().unwrap_or_default()
+    }
+
+    fn end(&self) -> GuideEnd {
+        self.end.unwrap_or_else(|| GuideEnd::whole(self.nodes.len() as u32))
+    }
+
+    /// What is left of it, a share of its edges.
+    pub(super) fn share(&self) -> f32 {
+        let GuideEnd { edges, end } = self.end();
+        if edges > 0.0 { end / edges } else { 1.0 }
+    }
+
+    /// `None` with fewer than two nodes.
+    fn place(&self, share: f32) -> Option<GuidePlace> {
+        let last = self.nodes.len().checked_sub(2)?;
+        let GuideEnd { edges, end } = self.end();
+        let along = share.clamp(0.0, 1.0) * edges;
+        let below = (along as usize).min(last);
+        let edge = if below == last { end - below as f32 } else { 1.0 };
+        Some(GuidePlace { below, on: (along - below as f32) / edge, edge })
+    }
+
+    /// Catmull–Rom through the nodes at `share` (0 root, 1 tip) of its length before it was cut, straight on from where
+    /// it was. With fewer than two nodes, the node or the origin.
+    pub fn point(&self, share: f32) -> CurvePoint {
+        let nodes = self.nodes;
+        let Some(GuidePlace { below: i, on, edge }) = self.place(share) else {
+            let position = nodes.first().copied().unwrap_or_default();
+            return CurvePoint { position, slope: Vec3::ZERO };
+        };
+        let f = on.min(1.0);
+        let (p1, p2) = (nodes[i], nodes[i + 1]);
+        let p0 = if i > 0 { nodes[i - 1] } else { 2.0 * p1 - p2 };
+        let p3 = nodes.get(i + 2).copied().unwrap_or(2.0 * p2 - p1);
+        let a = 0.5 * (p2 - p0);
+        let b = p0 - 2.5 * p1 + 2.0 * p2 - 0.5 * p3;
+        let c = 1.5 * (p1 - p2) + 0.5 * (p3 - p0);
+        let slope = a + f * (2.0 * b + 3.0 * f * c);
+        CurvePoint {
+            position: p1 + f * (a + f * (b + f * c)) + (on - f) * slope,
+            slope: slope * (self.end().edges / edge),
+        }
+    }
+
+    /// How wet it is at a share of its length, and the derivative.
+    fn moisture(&self, share: f32) -> (f32, f32) {
+        let of = |i: usize| self.moisture.get(i).copied().unwrap_or(0.0);
+        let Some(GuidePlace { below, on, edge }) = self.place(share) else {
+            return (of(0), 0.0);
+        };
+        let rise = of(below + 1) - of(below);
+        let rising = if on > 1.0 { 0.0 } else { rise * self.end().edges / edge };
+        (of(below) + rise * on.min(1.0), rising)
+    }
 }
 
 /// The drawn strands for `guides` (their nodes, root first): the guides, then the followers.
@@ -98,9 +149,22 @@ pub fn ring_share(ring: u32, segments: u32) -> f32 {
     t - NEAR_ROOT * t * left * left * left
 }
 
-/// The point at `t` (0 root, 1 tip) of a drawn strand, in the hair's frame; `guide` gives the guides
+/// The point at `t` (0 root, 1 tip) of what is left of a drawn strand, in the hair's frame; `guide` gives the guides
 /// by their index. Pushed out of `solids`.
 pub fn strand_point<'a>(
+    strand: &DrawnStrand,
+    guide: impl Fn(u32) -> Guide<'a>,
+    t: f32,
+    followers: &HairFollowers,
+    solids: &[DrawnSolid],
+) -> CurvePoint {
+    let CurvePoint { position, slope } =
+        whole_point(strand, guide, t * strand.cut, followers, solids);
+    CurvePoint { position, slope: slope * strand.cut }
+}
+
+/// The point at `t` of a strand as if it were whole.
+fn whole_point<'a>(
     strand: &DrawnStrand,
     guide: impl Fn(u32) -> Guide<'a>,
     t: f32,
@@ -113,21 +177,20 @@ pub fn strand_point<'a>(
     let eased = eased(t);
     let share = strand.phase * eased.value + t * reach;
     let pace = reach + strand.phase * eased.rate;
-    let near_guide = guide(strand.guides[0]);
-    let near = near_guide.nodes;
-    let near_root = near.first().copied().unwrap_or_default();
-    let near_point = guide_point(near, share);
+    let near = guide(strand.guides[0]);
+    let near_root = near.root();
+    let near_point = near.point(share);
 
     let locks = locks_at(strand, t, followers);
     let own = (strand.weights[0] + locks.weights[0]).max(0.0);
     let mut sum = own;
     let mut root = strand.root + strand.weights[0] * near_root;
-    let from = |nodes: &[Vec3], root: Vec3, point: CurvePoint| {
-        let shift = guide_point(nodes, strand.phase).position - root;
+    let from = |guide: &Guide<'_>, root: Vec3, point: CurvePoint| {
+        let shift = guide.point(strand.phase).position - root;
         let way = point.position - root - shift * eased.value;
         (way, point.slope * pace - shift * eased.rate)
     };
-    let (near_way, near_slope) = from(near, near_root, near_point);
+    let (near_way, near_slope) = from(&near, near_root, near_point);
     let mut way = own * near_way;
     let mut slope = own * near_slope + locks.rates[0] * near_way;
     for k in 1..3 {
@@ -135,18 +198,21 @@ pub fn strand_point<'a>(
         if strand.weights[k] <= 0.0 && own <= 0.0 {
             continue;
         }
-        let nodes = guide(strand.guides[k]).nodes;
-        let guide_root = nodes.first().copied().unwrap_or_default();
-        let point = guide_point(nodes, share);
+        let guide = guide(strand.guides[k]);
+        let guide_root = guide.root();
+        let point = guide.point(share);
         root += strand.weights[k] * guide_root;
-        let (guide_way, guide_slope) = from(nodes, guide_root, point);
+        let (guide_way, guide_slope) = from(&guide, guide_root, point);
         let apart =
             point.position.distance(near_point.position) / guide_root.distance(near_root).max(1e-4);
         let together =
             guide_way.dot(near_way) / (guide_way.length() * near_way.length()).max(1e-12);
         let together = if t <= 0.0 { 1.0 } else { smoothstep(0.0, 0.6, together) };
         let parting = followers.parting;
-        let blending = (1.0 - smoothstep(parting, 1.5 * parting, apart)) * together;
+        let GuideEnd { edges, end } = guide.end();
+        let blending = (1.0 - smoothstep(parting, 1.5 * parting, apart))
+            * together
+            * (1.0 - smoothstep(0.0, 1.0, share * edges - end));
         sum += own * blending;
         way += own * blending * guide_way;
         slope += blending * (own * guide_slope + locks.rates[k] * guide_way);
@@ -168,7 +234,7 @@ pub fn strand_point<'a>(
         + frizz.position;
     let loose_slope =
         slope * (larger / sum) + locks.root_rate + gather + 2.0 * t * strand.stray + frizz.slope;
-    let (moisture, rise) = moisture_at(&near_guide, share);
+    let (moisture, rise) = near.moisture(share);
     let tight = most * moisture * t * (2.0 - t);
     let tighter = most * (rise * pace * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
     let inward = near_point.position - loose;
@@ -264,19 +330,6 @@ fn frizz_at(strand: &DrawnStrand, root: Vec3, t: f32, most: f32) -> CurvePoint {
     }
 }
 
-/// How wet a guide is at `share` of its length, and the derivative.
-fn moisture_at(guide: &Guide<'_>, share: f32) -> (f32, f32) {
-    if guide.nodes.len() < 2 {
-        return (guide.moisture.first().copied().unwrap_or(0.0), 0.0);
-    }
-    let last = guide.nodes.len() - 1;
-    let along = share.clamp(0.0, 1.0) * last as f32;
-    let i = (along as usize).min(last - 1);
-    let of = |i: usize| guide.moisture.get(i).copied().unwrap_or(0.0);
-    let rise = of(i + 1) - of(i);
-    (of(i) + rise * (along - i as f32), rise * last as f32)
-}
-
 fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -297,13 +350,14 @@ mod tests {
     #[test]
     fn the_curve_goes_through_the_nodes_and_its_slope_is_its_derivative() {
         for (i, node) in BENT.iter().enumerate() {
-            let at = guide_point(&BENT, i as f32 / 3.0);
+            let at = Guide::new(&BENT).point(i as f32 / 3.0);
             assert!(at.position.distance(*node) < 1e-6);
         }
         for k in 1..50 {
             let (t, h) = (k as f32 / 50.0, 1e-3);
-            let rise = guide_point(&BENT, t + h).position - guide_point(&BENT, t - h).position;
-            assert!((rise / (2.0 * h)).distance(guide_point(&BENT, t).slope) < 1e-2);
+            let rise =
+                Guide::new(&BENT).point(t + h).position - Guide::new(&BENT).point(t - h).position;
+            assert!((rise / (2.0 * h)).distance(Guide::new(&BENT).point(t).slope) < 1e-2);
         }
     }
 
@@ -315,7 +369,7 @@ mod tests {
             DrawnStrand { guides: [0, 1, 0], weights: [0.6, 0.4, 0.0], length: 1.0, ..default() };
         let followers = HairFollowers { clump: 0.0, parting: 5.0, frizz: 0.0, ..default() };
         let tip = |right: &[Vec3]| {
-            let guide = |i| Guide { nodes: if i == 0 { &left } else { right }, moisture: &[] };
+            let guide = |i| Guide::new(if i == 0 { &left } else { right });
             strand_point(&strand, guide, 1.0, &followers, &[]).position
         };
         let root = Vec3::X * -0.002;
@@ -335,10 +389,10 @@ mod tests {
         };
         let followers = HairFollowers { wet_clump: 0.8, clump: 0.0, frizz: 0.0, ..default() };
         let point = |t: f32, moisture: &[f32]| {
-            strand_point(&strand, |_| Guide { nodes: &BENT, moisture }, t, &followers, &[])
+            strand_point(&strand, |_| Guide { moisture, ..Guide::new(&BENT) }, t, &followers, &[])
         };
         let apart = |t, moisture: &[f32]| {
-            point(t, moisture).position.distance(guide_point(&BENT, t).position)
+            point(t, moisture).position.distance(Guide::new(&BENT).point(t).position)
         };
         let (dry, wet) = ([0.0; 4], [1.0; 4]);
         assert_eq!(apart(0.0, &wet), apart(0.0, &dry), "roots stay in the scalp");

@@ -3,14 +3,15 @@
 use super::{
     HairFollowers, HairView, WetLook,
     buffers::{DrawnNodes, HairBuffers, PackedNode, pack_strands, packed_place},
-    drawn_strand::{DrawnStrand, GuideRoot},
+    curve::Guide,
+    drawn_strand::{DrawnStrand, GuideEnd, GuideRoot},
     elsewhere::DrawnElsewhere,
     follower_roots::{FollowerRoots, misplaced},
     material::{Ribbon, RibbonKey, RibbonMaterial},
     packed_frame::{DrawnFrame, PackedFrame},
     ribbon_mesh::{RibbonLevel, RibbonMeshes},
     rings::Rings,
-    scatter::scatter,
+    scatter::{scatter, shorten},
     sets::Interpolate,
     smoothing::Marks,
     streaks::DrawnStreaks,
@@ -25,7 +26,7 @@ use crate::{
     },
     hair::{
         look::{HairDye, HairLook},
-        strand::{Hair, MotionOwner, Strand, StrandHistory, Strands},
+        strand::{CutStrand, FollowerCuts, Hair, MotionOwner, Strand, StrandHistory, Strands},
     },
     keratin::bond::Bonds,
     simulation::settle::Settling,
@@ -81,6 +82,8 @@ struct PackedGuide {
     strand: Entity,
     /// How many nodes it has.
     nodes: u32,
+    /// Where it ends.
+    end: GuideEnd,
     /// Position of its root when followers were laid out (m).
     root: Vec3,
 }
@@ -91,6 +94,7 @@ type GuideParts = (
     &'static Bonds,
     Option<&'static Moisture>,
     Option<&'static WetLook>,
+    Option<&'static CutStrand>,
 );
 
 /// Prepares new hair for drawing, and cleans up removed hair.
@@ -134,7 +138,7 @@ pub(super) fn pack(
         &mut Packed,
         Option<&HairBuffers>,
         Option<&Strands>,
-        Option<Ref<FollowerRoots>>,
+        (Option<Ref<FollowerRoots>>, Option<Ref<FollowerCuts>>),
         &GlobalTransform,
         Option<&mut DrawnElsewhere>,
     )>,
@@ -158,9 +162,9 @@ pub(super) fn pack(
     };
     let new_device = device.is_some_and(|device| device.is_changed());
     let roots_removed: Vec<Entity> = roots_removed.read().collect();
-    for ((hair, owner), mut packed, buffers, members, follower_roots, place, elsewhere) in
-        &mut hairs
+    for ((hair, owner), mut packed, buffers, members, followers_own, place, elsewhere) in &mut hairs
     {
+        let (follower_roots, cuts) = followers_own;
         if *owner == MotionOwner::Settling {
             continue;
         }
@@ -181,6 +185,7 @@ pub(super) fn pack(
         }
         has_new_layout |=
             follower_roots.as_ref().map_or(roots_removed.contains(&hair), Ref::is_changed);
+        has_new_layout |= cuts.as_ref().is_some_and(Ref::is_changed);
 
         let (low, high) = match elsewhere {
             Some(corners) => {
@@ -229,7 +234,8 @@ pub(super) fn pack(
             continue;
         }
 
-        let strands = packed.scatter(&strands, follower_roots.as_deref(), &settings);
+        let strands =
+            packed.scatter(&strands, follower_roots.as_deref(), cuts.as_deref(), &settings);
         faults.write_batch(misplaced(&strands).map(|fault| fault.of(hair)));
         let counts = (packed.layout.len() as u32, strands.len() as u32);
         (packed.rings, packed.volume) = default();
@@ -240,9 +246,10 @@ pub(super) fn pack(
         let mut first = 0;
         let ranges = packed.layout.iter().map(|guide| {
             first += guide.nodes;
-            [first - guide.nodes, guide.nodes]
+            let GuideEnd { edges, end } = guide.end;
+            [first - guide.nodes, guide.nodes, edges.to_bits(), end.to_bits()]
         });
-        let ranges: Vec<[u32; 2]> = ranges.collect();
+        let ranges: Vec<[u32; 4]> = ranges.collect();
         let mut add = |bytes: &[u8]| shader_buffers.add(buffer(bytes));
         let nodes = add(bytemuck::cast_slice(&packed.nodes));
         let material = RibbonMaterial {
@@ -315,7 +322,7 @@ impl GuideBlock<'_> {
     #[inline(always)]
     fn pack(&mut self, strands: &Query<GuideParts>, overstep: f32, known: bool, far: f32) {
         let parts: [_; GuideBlock::GUIDES] = core::array::from_fn(|i| {
-            let (strand, history, bonds, water, wet) =
+            let (strand, history, bonds, water, wet, _) =
                 strands.get(self.guides.get(i)?.strand).ok()?;
             let wet = wet.map_or_else(|| water.map_or(&[][..], Moisture::sheen), |wet| &wet.0);
             let nodes = DrawnNodes { strand, history, bonds, wet };
@@ -341,7 +348,28 @@ fn around_both((a, b): (Vec3, Vec3), (c, d): (Vec3, Vec3)) -> (Vec3, Vec3) {
     (a.min(c), b.max(d))
 }
 
+/// The root of a guide, as long as it was before it was cut.
+pub(super) fn guide_root(strand: &Strand, cut: Option<&CutStrand>) -> GuideRoot {
+    let [root, .., tip] = strand.positions() else { return GuideRoot::default() };
+    GuideRoot {
+        place: *root,
+        normal: strand.root_frame() * Vec3::Z,
+        length: cut.map_or_else(|| strand.length(), CutStrand::whole_length),
+        reach: cut.map_or(*tip - *root, |cut| cut.reach),
+    }
+}
+
 impl Packed {
+    /// The guides that are drawn.
+    pub(super) fn guides(&self) -> impl ExactSizeIterator<Item = Entity> + '_ {
+        self.layout.iter().map(|guide| guide.strand)
+    }
+
+    /// The roots of guides that the roots of followers refer to.
+    pub(super) fn known_roots(&self, followers: Option<&FollowerRoots>) -> Option<&[GuideRoot]> {
+        (followers.is_some() && !self.roots.is_empty()).then_some(&self.roots)
+    }
+
     /// Straight segments of each drawn strand.
     pub(super) fn segments(&self) -> u32 {
         self.followers.map_or(1, |followers| followers.segments)
@@ -356,17 +384,22 @@ impl Packed {
         let mut count = 0;
         let mut changed = false;
         for guide in members {
-            let Ok((strand, ..)) = strands.get(guide) else {
+            let Ok((strand, .., cut)) = strands.get(guide) else {
                 continue;
             };
             if strand.nodes() < 2 {
                 continue;
             }
             let nodes = strand.nodes() as u32;
-            match self.layout.get(count) {
-                Some(known) if known.strand == guide && known.nodes == nodes => {}
+            let end = cut.map_or_else(|| GuideEnd::whole(nodes), GuideEnd::from);
+            match self.layout.get_mut(count) {
+                // Its root stays when it is cut.
+                Some(known) if known.strand == guide => {
+                    changed |= (known.nodes, known.end) != (nodes, end);
+                    (known.nodes, known.end) = (nodes, end);
+                }
                 _ => {
-                    let entry = PackedGuide { strand: guide, nodes, root: Vec3::ZERO };
+                    let entry = PackedGuide { strand: guide, nodes, end, root: Vec3::ZERO };
                     self.layout.truncate(count);
                     self.layout.push(entry);
                     self.roots.clear();
@@ -436,27 +469,21 @@ impl Packed {
         &mut self,
         strands: &Query<GuideParts>,
         follower_roots: Option<&FollowerRoots>,
+        cuts: Option<&FollowerCuts>,
         followers: &HairFollowers,
     ) -> Vec<DrawnStrand> {
-        if follower_roots.is_none() || self.roots.is_empty() {
+        if self.known_roots(follower_roots).is_none() {
             self.roots.clear();
             self.roots.extend(self.layout.iter().map(|guide| {
-                let Ok((strand, ..)) = strands.get(guide.strand) else {
-                    return GuideRoot::default();
-                };
-                let places = strand.positions();
-                let [root, .., tip] = places else { return GuideRoot::default() };
-                GuideRoot {
-                    place: *root,
-                    normal: strand.root_frame() * Vec3::Z,
-                    length: strand.length(),
-                    reach: *tip - *root,
-                }
+                let guide = strands.get(guide.strand);
+                guide.map_or_else(|_| default(), |(strand, .., cut)| guide_root(strand, cut))
             }));
         }
         let roots = core::mem::take(&mut self.roots);
         self.record_roots();
-        let drawn = scatter(&roots, follower_roots, followers);
+        let mut drawn = scatter(&roots, follower_roots, followers);
+        let ends: Vec<GuideEnd> = self.layout.iter().map(|guide| guide.end).collect();
+        shorten(&mut drawn, &ends, cuts);
         let reach = |strand: &DrawnStrand| {
             let own = roots[strand.guides[0] as usize].place;
             let apart = |k: usize| roots[strand.guides[k] as usize].place.distance(own);
@@ -482,11 +509,11 @@ impl Packed {
         let nodes: Vec<Vec3> = self.nodes.iter().map(packed_place).collect();
         let mut rest = &nodes[..];
         let guides = self.layout.iter().map(|guide| {
-            let (own, others) = rest.split_at(guide.nodes as usize);
+            let (nodes, others) = rest.split_at(guide.nodes as usize);
             rest = others;
-            own
+            Guide { end: Some(guide.end), ..Guide::new(nodes) }
         });
-        let guides: Vec<&[Vec3]> = guides.collect();
+        let guides: Vec<Guide> = guides.collect();
         Thickness::of(drawn, |k| guides[k as usize], followers)
     }
 
@@ -540,7 +567,7 @@ mod tests {
             };
             let bonds = if i % 11 == 0 { Bonds::default() } else { Bonds::of(&strand) };
             let strand = world.spawn((strand, history, bonds)).id();
-            packed.layout.push(PackedGuide { strand, nodes, root });
+            packed.layout.push(PackedGuide { strand, nodes, end: GuideEnd::whole(nodes), root });
         }
         (world, packed)
     }

@@ -1,6 +1,8 @@
 //! A strand as it is drawn.
 
+use crate::hair::strand::CutStrand;
 use bevy::prelude::*;
+use half::f16;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 /// The offset from a strand to the centre strand of its lock.
@@ -37,6 +39,8 @@ pub struct DrawnStrand {
     pub size: f32,
     /// Width as a share of the look's.
     pub width: f32,
+    /// Where it is cut, a share of its length; 1 is whole.
+    pub cut: f32,
     /// To the middles of its locks, large to small.
     pub locks: [LockOffset; 3],
 }
@@ -54,6 +58,7 @@ impl Default for DrawnStrand {
             is_guide: false,
             size: 0.0,
             width: 1.0,
+            cut: 1.0,
             locks: default(),
         }
     }
@@ -101,7 +106,9 @@ impl DrawnStrand {
             put(28 + level, &lock.weights[2..]);
         }
         // Guides are marked by a sign.
-        put(31, &[if self.is_guide { -1.0 } else { self.width.max(0.0) }]);
+        let width = f16::from_f32(if self.is_guide { -1.0 } else { self.width.max(0.0) });
+        let cut = (self.cut.clamp(0.0, 1.0) * 65535.0).round() as u32;
+        words[31] = u32::from(width.to_bits()) | cut << 16;
         words
     }
 }
@@ -115,6 +122,29 @@ pub(super) struct GuideRoot {
     pub(super) length: f32,
     /// From root to tip (m).
     pub(super) reach: Vec3,
+}
+
+/// Where a guide that has been cut ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuideEnd {
+    /// How many edges it had before.
+    pub edges: f32,
+    /// Where it ends, in these edges: 6.25 is a quarter along the seventh.
+    pub end: f32,
+}
+
+impl GuideEnd {
+    /// Of a guide with these nodes that is whole.
+    pub(super) fn whole(nodes: u32) -> Self {
+        let edges = nodes.saturating_sub(1) as f32;
+        Self { edges, end: edges }
+    }
+}
+
+impl From<&CutStrand> for GuideEnd {
+    fn from(cut: &CutStrand) -> Self {
+        Self { edges: cut.edges as f32, end: cut.end }
+    }
 }
 
 /// A random direction.

@@ -56,6 +56,7 @@ pub mod curve;
 
 mod beads;
 mod buffers;
+mod cuts;
 mod depth;
 mod detail;
 mod draw;
@@ -226,6 +227,7 @@ impl Plugin for HairRenderPlugin {
         let draw =
             (draw::appear, draw::pack, frame::prepare, depth::follow).chain().run_if(supported);
         app.init_resource::<ribbon_mesh::RibbonMeshes>();
+        app.add_observer(cuts::cut_followers);
         app.add_systems(PostUpdate, draw.in_set(HairRenderSystems)).configure_sets(
             PostUpdate,
             HairRenderSystems

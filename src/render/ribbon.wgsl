@@ -5,7 +5,8 @@
 #import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_keratin::strands::{
-    ribbon, strands, frame, ring_share, strand_alpha, StrandState, DrawnStrand, VIEW_GUIDES,
+    ribbon, strands, frame, ring_share, strand_alpha, strand_cut, strand_width, StrandState, DrawnStrand,
+    VIEW_GUIDES,
 }
 #ifdef HAIR_EXPANDED
 #import bevy_keratin::strands::rank_of
@@ -49,8 +50,9 @@ struct RibbonVertex {
     outward: vec3<f32>,
     // Of the hair's frame to the world.
     scale: f32,
-    // 0 root ... 1 tip.
+    // 0 root ... 1 tip, and of the strand before it was cut.
     along: f32,
+    whole: f32,
     seed: u32,
     state: StrandState,
     // How much of what is drawn the strand covers, and how far it has come out of the scalp: 1 is all.
@@ -116,9 +118,9 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     out.outward = linear * ring.outward;
     let eye = toward_eye(center);
 
-    let own_width = select(strand.width, 1.0, strand.width < 0.0);
-    out.grown = out.along * strand.size / max(ribbon.root_fade, 1e-9);
-    let width = scale * ribbon.width * frame.wider * own_width * mix(1.0, ribbon.taper, smoothstep(BLUNT, 1.0, out.along));
+    out.whole = out.along * strand_cut(strand);
+    out.grown = out.whole * strand.size / max(ribbon.root_fade, 1e-9);
+    let width = scale * ribbon.width * frame.wider * strand_width(strand) * mix(1.0, ribbon.taper, smoothstep(BLUNT, 1.0, out.along));
     // Of a shadow map, a texel.
     let drawn = max(width, pixel_size((view.clip_from_world * vec4(center, 1.0)).w));
     out.share = alpha * width / max(drawn, 1e-9);

@@ -69,7 +69,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
         case 7u: { value = vertex.state.moisture; }
         default: {}
     }
-    out.along = vec4(vertex.along, value, vertex.state.moisture, density_at(vertex.along) / max(vertex.scale, 1e-6));
+    out.along = vec4(vertex.whole, value, vertex.state.moisture, density_at(vertex.along) / max(vertex.scale, 1e-6));
     return out;
 }
 

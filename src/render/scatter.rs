@@ -1,12 +1,12 @@
-//! Which strands are drawn: guides, and followers scattered between them.
+//! Which strands are drawn: guides, and followers scattered between them; and where they end.
 
 use super::{
-    drawn_strand::{DrawnStrand, GuideRoot, direction},
+    drawn_strand::{DrawnStrand, GuideEnd, GuideRoot, direction},
     follower_roots::{FollowerRoots, lay_followers},
     followers::HairFollowers,
     locks::draw_together,
 };
-use crate::base::grid::KdTree;
+use crate::{base::grid::KdTree, hair::strand::FollowerCuts};
 use bevy::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
@@ -27,6 +27,39 @@ pub(super) fn scatter(
     }
     draw_together(&mut drawn[roots.len()..], roots, followers);
     drawn
+}
+
+/// What [`FollowerCuts`] have for a whole follower.
+pub(super) const WHOLE: f32 = u16::MAX as f32;
+/// The least that is left of a follower, a share of its length.
+pub(super) const LEAST: f32 = 0.01;
+
+/// Ends drawn strands where their guides end, and followers where `cuts` says if it is of these.
+pub(super) fn shorten(drawn: &mut [DrawnStrand], ends: &[GuideEnd], cuts: Option<&FollowerCuts>) {
+    let (guides, followers) = drawn.split_at_mut(ends.len());
+    let cuts = cuts.filter(|cuts| cuts.0.len() == followers.len());
+    if cuts.is_none() && ends.iter().all(|end| end.end == end.edges) {
+        return;
+    }
+    for (guide, end) in guides.iter_mut().zip(ends) {
+        guide.cut = share(end);
+    }
+    for (i, follower) in followers.iter_mut().enumerate() {
+        let end = |k: usize| &ends[follower.guides[k] as usize];
+        // No farther beyond its nearest guide than an edge: the others may have parted from it.
+        let farthest = (end(0).end + 1.0) / end(0).edges.max(1.0);
+        let mean = || (0..3).map(|k| follower.weights[k] * share(end(k))).sum::<f32>();
+        let own = cuts.map(|cuts| f32::from(cuts.0[i]) / WHOLE);
+        let guided = own.map_or_else(mean, |_| 1.0).min(farthest);
+        // From a share of the guides to one of its own.
+        let (begin, whole) = (follower.phase, follower.length.min(1.0));
+        let guided = if guided < whole { (guided - begin) / (whole - begin) } else { 1.0 };
+        follower.cut = own.unwrap_or(1.0).min(guided).clamp(LEAST, 1.0);
+    }
+}
+
+fn share(end: &GuideEnd) -> f32 {
+    if end.end < end.edges { end.end / end.edges } else { 1.0 }
 }
 
 /// Adds followers evenly between the guides.

@@ -34,7 +34,20 @@ struct DrawnStrand {
     lock_middle: vec4<f32>,
     lock_small: vec4<f32>,
     lock_third: vec3<f32>,
-    width: f32,            // share of the look's; below 0 for guides themselves
+    // Width as a share of the look's as f16, below 0 for guides themselves; above it where the strand is cut, a
+    // share of its length as unorm16.
+    width_cut: u32,
+}
+
+// Width as a share of the look's.
+fn strand_width(strand: DrawnStrand) -> f32 {
+    let width = unpack2x16float(strand.width_cut).x;
+    return select(width, 1.0, width < 0.0);
+}
+
+// Where a strand is cut: a share of its length, 1 for whole ones.
+fn strand_cut(strand: DrawnStrand) -> f32 {
+    return unpack2x16unorm(strand.width_cut).y;
 }
 
 // A layer of bleach and dye, from `begin` to `end` of the length.
@@ -113,8 +126,14 @@ struct DrawnFrame {
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(0) var<uniform> ribbon: Ribbon;
 @group(#{MATERIAL_BIND_GROUP}) @binding(1) var<storage, read> nodes: array<HairNode>;
-// First node and number of nodes of each guide.
-@group(#{MATERIAL_BIND_GROUP}) @binding(2) var<storage, read> guides: array<vec2<u32>>;
+struct DrawnGuide {
+    first: u32,            // node
+    count: u32,            // of nodes
+    edges: f32,            // before it was cut
+    end: f32,              // where it ends, in these
+}
+
+@group(#{MATERIAL_BIND_GROUP}) @binding(2) var<storage, read> guides: array<DrawnGuide>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(3) var<storage, read> strands: array<DrawnStrand>;
 // Of each strand the layers of dye whose streaks it is in, a bit each; one word where none has streaks.
 @group(#{MATERIAL_BIND_GROUP}) @binding(4) var<storage, read> streaks: array<u32>;
@@ -157,34 +176,44 @@ struct CurvePoint {
     slope: vec3<f32>,      // derivative by the share of the length
 }
 
-// Where `share` (0 root ... 1 tip) falls: node below, and how far on to the next.
-fn node_below(guide: vec2<u32>, share: f32) -> vec2<f32> {
-    let along = saturate(share) * f32(guide.y - 1u);
-    let below = min(floor(along), f32(guide.y - 2u));
-    return vec2(below, along - below);
+// Where a share (0 root ... 1 tip) of a whole guide falls.
+struct GuidePlace {
+    below: u32,            // the node below, in the buffer
+    on: f32,               // how far on to the next, above 1 beyond the end of one that is cut
+    edge: f32,             // length between the two, in edges of the whole guide
 }
 
-// Catmull-Rom through the nodes of a guide.
-fn guide_point(guide: vec2<u32>, share: f32) -> CurvePoint {
-    let at = node_below(guide, share);
-    let i = u32(at.x);
-    let f = at.y;
-    let p1 = node_place(guide.x + i);
-    let p2 = node_place(guide.x + i + 1u);
+fn guide_place(guide: DrawnGuide, share: f32) -> GuidePlace {
+    let along = saturate(share) * guide.edges;
+    let below = min(floor(along), f32(guide.count - 2u));
+    var out: GuidePlace;
+    out.below = guide.first + u32(below);
+    out.edge = select(1.0, guide.end - below, u32(below) + 2u == guide.count);
+    out.on = (along - below) / out.edge;
+    return out;
+}
+
+// Catmull-Rom through the nodes of a guide, straight on from where it is cut.
+fn guide_point(guide: DrawnGuide, share: f32) -> CurvePoint {
+    let place = guide_place(guide, share);
+    let f = min(place.on, 1.0);
+    let p1 = node_place(place.below);
+    let p2 = node_place(place.below + 1u);
     var p0 = 2.0 * p1 - p2;
-    if i > 0u {
-        p0 = node_place(guide.x + i - 1u);
+    if place.below > guide.first {
+        p0 = node_place(place.below - 1u);
     }
     var p3 = 2.0 * p2 - p1;
-    if i + 2u < guide.y {
-        p3 = node_place(guide.x + i + 2u);
+    if place.below + 2u < guide.first + guide.count {
+        p3 = node_place(place.below + 2u);
     }
     let a = 0.5 * (p2 - p0);
     let b = p0 - 2.5 * p1 + 2.0 * p2 - 0.5 * p3;
     let c = 1.5 * (p1 - p2) + 0.5 * (p3 - p0);
+    let slope = a + f * (2.0 * b + 3.0 * f * c);
     var point: CurvePoint;
-    point.position = p1 + f * (a + f * (b + f * c));
-    point.slope = (a + f * (2.0 * b + 3.0 * f * c)) * f32(guide.y - 1u);
+    point.position = p1 + f * (a + f * (b + f * c)) + (place.on - f) * slope;
+    point.slope = slope * (guide.edges / place.edge);
     return point;
 }
 
@@ -283,7 +312,7 @@ fn frizz_at(strand: DrawnStrand, root: vec3<f32>, t: f32) -> CurvePoint {
 }
 
 // The way that a guide has gone from its root at a point, shifted by the phase.
-fn way_along(guide: vec2<u32>, root: vec3<f32>, point: CurvePoint, phase: f32, eased: Rising,
+fn way_along(guide: DrawnGuide, root: vec3<f32>, point: CurvePoint, phase: f32, eased: Rising,
     pace: f32) -> CurvePoint {
     var shift = vec3(0.0);
     if phase > 0.0 {
@@ -385,9 +414,18 @@ fn ring_share(ring: u32) -> f32 {
     return t - NEAR_ROOT * t * left * left * left;
 }
 
-fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
+// The point at a share `own` (0 root ... 1 tip) of what is left of a strand.
+fn strand_point(strand: DrawnStrand, own: f32) -> StrandPoint {
+    let cut = strand_cut(strand);
+    var out = whole_point(strand, own * cut);
+    out.slope *= cut;
+    return out;
+}
+
+// The point at `t` of a strand as if it were whole.
+fn whole_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     var out: StrandPoint;
-    let follows = select(1.0, 0.0, strand.width < 0.0);
+    let follows = select(1.0, 0.0, unpack2x16float(strand.width_cut).x < 0.0);
     let reach = min(strand.length, 1.0) - strand.phase;
     // What is longer than its guides is like them, but larger.
     let larger = max(strand.length, 1.0);
@@ -395,23 +433,23 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     out.share = strand.phase * eased.value + t * reach;
     let pace = reach + strand.phase * eased.rate;
     let near = guides[strand.guides.x];
-    let near_root = node_place(near.x);
+    let near_root = node_place(near.first);
     let near_point = guide_point(near, out.share);
 
     let locks = locks_at(strand, t);
     let own = max(strand.weights + locks.weights, vec3(0.0));
-    var weights = vec3(own.x * node_shown(near.x), 0.0, 0.0);
+    var weights = vec3(own.x * node_shown(near.first), 0.0, 0.0);
     var root = strand.root + strand.weights.x * near_root;
     let near_way = way_along(near, near_root, near_point, strand.phase, eased, pace);
     var way = weights.x * near_way.position;
     var slope = weights.x * near_way.slope
-        + locks.rates.x * node_shown(near.x) * near_way.position;
+        + locks.rates.x * node_shown(near.first) * near_way.position;
     for (var i = 1; i < 3; i++) {
         if strand.weights[i] <= 0.0 && own[i] <= 0.0 {
             continue;
         }
         let guide = guides[strand.guides[i]];
-        let guide_root = node_place(guide.x);
+        let guide_root = node_place(guide.first);
         let point = guide_point(guide, out.share);
         root += strand.weights[i] * guide_root;
         let guide_way = way_along(guide, guide_root, point, strand.phase, eased, pace);
@@ -420,7 +458,9 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
             / max(distance(guide_root, near_root), 1e-4);
         let together = dot(guide_way.position, near_way.position)
             / max(length(guide_way.position) * length(near_way.position), 1e-12);
-        let goes = node_shown(guide.x)
+        let beyond = out.share * guide.edges - guide.end;
+        let goes = node_shown(guide.first)
+            * (1.0 - smoothstep(0.0, 1.0, beyond))
             * (1.0 - smoothstep(ribbon.parting, 1.5 * ribbon.parting, apart))
             * select(smoothstep(0.0, 0.6, together), 1.0, t <= 0.0);
         weights[i] = own[i] * goes;
@@ -443,13 +483,14 @@ fn strand_point(strand: DrawnStrand, t: f32) -> StrandPoint {
     let loose_slope = slope * (larger / sum) + locks.root_rate + gather + 2.0 * t * strand.stray
         + frizz.slope;
     // Water draws a lock together around its guide, from the root on.
-    let at = node_below(near, out.share);
-    let low = node_moisture(near.x + u32(at.x));
-    let rise = node_moisture(near.x + u32(at.x) + 1u) - low;
-    let most = ribbon.wet_clump * follows * node_shown(near.x);
-    let moisture = low + rise * at.y;
+    let at = guide_place(near, out.share);
+    let low = node_moisture(at.below);
+    let rise = node_moisture(at.below + 1u) - low;
+    let most = ribbon.wet_clump * follows * node_shown(near.first);
+    let moisture = low + rise * min(at.on, 1.0);
+    let rising = select(rise * near.edges / at.edge, 0.0, at.on > 1.0);
     let tight = most * moisture * t * (2.0 - t);
-    let tighter = most * (rise * f32(near.y - 1u) * pace * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
+    let tighter = most * (rising * pace * t * (2.0 - t) + moisture * (2.0 - 2.0 * t));
     let inward = near_point.position - loose;
     out.position = loose + inward * tight;
     out.outward = inward * (tight - 1.0);
@@ -483,11 +524,12 @@ fn strand_state(strand: DrawnStrand, point: StrandPoint) -> StrandState {
             continue;
         }
         let guide = guides[strand.guides[i]];
-        let at = node_below(guide, point.share);
-        let n = nodes[guide.x + u32(at.x)];
-        let m = nodes[guide.x + u32(at.x) + 1u];
-        state.rates += weight * mix(unpack4x8unorm(n.rates), unpack4x8unorm(m.rates), at.y);
-        let own = mix(unpack2x16float(n.strain_moisture), unpack2x16float(m.strain_moisture), at.y);
+        let at = guide_place(guide, point.share);
+        let n = nodes[at.below];
+        let m = nodes[at.below + 1u];
+        let on = min(at.on, 1.0);
+        state.rates += weight * mix(unpack4x8unorm(n.rates), unpack4x8unorm(m.rates), on);
+        let own = mix(unpack2x16float(n.strain_moisture), unpack2x16float(m.strain_moisture), on);
         state.strain += weight * own.x;
         state.moisture += weight * own.y;
     }

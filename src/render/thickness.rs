@@ -1,7 +1,7 @@
 //! Density of the drawn strands of a groom, which determines how far light penetrates.
 
 use super::{
-    curve::{Guide, guide_point, strand_point},
+    curve::{Guide, strand_point},
     drawn_strand::DrawnStrand,
     followers::HairFollowers,
 };
@@ -31,22 +31,21 @@ const ENOUGH: f64 = 8.0;
 const STAIRS: f32 = 1.5;
 
 impl Thickness {
-    /// Of `drawn` strands; `guide` gives the present nodes of each guide.
+    /// Of `drawn` strands; `guide` gives each guide as it is at present.
     pub(super) fn of<'a>(
         drawn: &[DrawnStrand],
-        guide: impl Fn(u32) -> &'a [Vec3] + Copy,
+        guide: impl Fn(u32) -> Guide<'a> + Copy,
         followers: &HairFollowers,
     ) -> Self {
         let length = |strand: &DrawnStrand| {
-            let nodes = guide(strand.guides[0]);
-            let whole: f32 = nodes.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-            let length = whole * (strand.length - strand.phase).max(0.0);
+            let near = guide(strand.guides[0]);
+            let left: f32 = near.nodes.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+            let length = left / near.share() * strand.cut * (strand.length - strand.phase).max(0.0);
             if length.is_finite() { length } else { 0.0 }
         };
         let total: f32 = drawn.iter().map(length).sum();
         // Evenly over strands and along them.
         let every = (total / (STEP * POINTS as f32)).ceil().max(1.0) as usize;
-        let dry = |k: u32| Guide { nodes: guide(k), moisture: &[] };
         let mut points = Vec::new();
         for (i, strand) in (0u32..).zip(drawn.iter().step_by(every)) {
             let pieces = (length(strand) / STEP).round().clamp(1.0, 256.0) as u32;
@@ -54,8 +53,8 @@ impl Thickness {
             let offset = (strand.seed >> 8) as f32 / (1 << 24) as f32;
             let places = (0..pieces).map(|i| (i as f32 + offset) / pieces as f32).map(|t| {
                 let place = match strand.is_guide {
-                    true => guide_point(guide(strand.guides[0]), t).position,
-                    false => strand_point(strand, dry, t, followers, &[]).position,
+                    true => guide(strand.guides[0]).point(t * strand.cut).position,
+                    false => strand_point(strand, guide, t, followers, &[]).position,
                 };
                 Point { place, share: t, strand: i }
             });
@@ -139,7 +138,7 @@ mod tests {
         let nodes: Vec<[Vec3; 2]> =
             (0..count).map(|i| [root(i), root(i) - Vec3::Y * 0.2]).collect();
         let drawn: Vec<_> = (0..count).map(DrawnStrand::guide).collect();
-        Thickness::of(&drawn, |k| &nodes[k as usize], &HairFollowers::default())
+        Thickness::of(&drawn, |k| Guide::new(&nodes[k as usize]), &HairFollowers::default())
     }
 
     #[test]
@@ -172,7 +171,8 @@ mod tests {
             })
             .collect();
         let drawn: Vec<_> = (0..10_000).map(DrawnStrand::guide).collect();
-        let thickness = Thickness::of(&drawn, |k| &nodes[k as usize], &HairFollowers::default());
+        let thickness =
+            Thickness::of(&drawn, |k| Guide::new(&nodes[k as usize]), &HairFollowers::default());
         for (i, density) in thickness.densities.iter().enumerate() {
             let radius = 0.05 + 0.1 * (i as f32 + 0.5) / PIECES as f32;
             let truth = 10_000.0 / (4.0 * core::f32::consts::PI * radius * radius);
@@ -183,11 +183,12 @@ mod tests {
 
     #[test]
     fn no_hair_and_broken_hair_have_no_thickness() {
-        let none = Thickness::of(&[], |_| &[], &HairFollowers::default());
+        let none = Thickness::of(&[], |_| Guide::default(), &HairFollowers::default());
         assert_eq!(none, Thickness::default());
         let broken = [Vec3::NAN; 4];
         let strand = DrawnStrand::guide(0);
-        let thickness = Thickness::of(&[strand], |_| &broken, &HairFollowers::default());
+        let thickness =
+            Thickness::of(&[strand], |_| Guide::new(&broken), &HairFollowers::default());
         assert!(thickness.densities.iter().all(|d| d.is_finite()) && thickness.layers.is_finite());
     }
 }

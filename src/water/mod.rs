@@ -159,7 +159,6 @@ impl WaterLedger {
     }
 
     /// Counts water that was added to hair at once (m³), or removed if negative, also in `held`.
-    #[cfg(feature = "save")]
     pub(crate) fn replace(&mut self, change: f64) {
         self.record(change);
         self.held += change;

@@ -10,7 +10,7 @@ use bevy_keratin::{
     forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
     gpu::HairGpuPlugin,
     hair::{look::LookPlugin, strand::StrandPlugin},
-    hairdo::{save::SavePlugin, style::StylePlugin, tie::TiePlugin},
+    hairdo::{cut::CutPlugin, save::SavePlugin, style::StylePlugin, tie::TiePlugin},
     keratin::{bond::BondPlugin, treatment::TreatmentPlugin},
     render::HairRenderPlugin,
     simulation::{
@@ -32,7 +32,7 @@ macro_rules! switches {
 }
 
 /// All of the group.
-pub const ALL: [(&str, Switch); 23] = switches![
+pub const ALL: [(&str, Switch); 24] = switches![
     TickPlugin,
     StrandPlugin,
     BondPlugin,
@@ -47,6 +47,7 @@ pub const ALL: [(&str, Switch); 23] = switches![
     LodPlugin,
     StylePlugin,
     TiePlugin,
+    CutPlugin,
     LookPlugin,
     HairRenderPlugin,
     HairGpuPlugin,

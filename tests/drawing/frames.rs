@@ -5,7 +5,7 @@ use crate::offscreen::{Offscreen, Picture, luma};
 use bevy::{light::CascadeShadowConfigBuilder, prelude::*};
 use bevy_keratin::{
     prelude::*,
-    render::{curve::guide_point, *},
+    render::{curve::Guide, *},
 };
 
 const BLACK: [u8; 3] = [0; 3];
@@ -78,7 +78,7 @@ pub fn hair_is_where_the_guides_are_and_shows_their_rates() {
     for (k, nodes) in guides.iter().enumerate() {
         let expected = heat(k as f32 / 11.0).to_srgba().to_u8_array();
         for i in 1..40 {
-            let point = guide_point(nodes, i as f32 / 40.0).position;
+            let point = Guide::new(nodes).point(i as f32 / 40.0).position;
             let at = scene.project(place.transform_point(point)).unwrap();
             let pixel = picture.at(at.x as u32, at.y as u32);
             samples += 1;

@@ -24,6 +24,7 @@ mod scenes {
 mod commands;
 mod cost;
 mod coverage;
+mod cut;
 mod dye;
 mod fibre;
 mod frames;
@@ -52,6 +53,10 @@ device::tests! {
             nothing_pops_as_a_camera_flies_away;
         // A million pixels of hair in software.
         on_request: edges_are_those_of_a_picture_with_sixteen_times_the_pixels;
+    }
+    cut {
+        device: a_blunt_cut_ends_all_drawn_strands_and_leaves_the_rest_of_the_picture,
+            a_cut_to_a_length_ends_followers_with_roots_of_their_own;
     }
     dye {
         device: black_hair_is_drawn_pink_and_roots_and_tips_apart,

@@ -26,7 +26,7 @@ use bevy_keratin::{
     forces::contact::ColliderShape,
     render::{
         DrawnStrand, HairFollowers, LockOffset,
-        curve::{CurvePoint, DrawnSolid, Guide, arrange, packed_frame, strand_point},
+        curve::{CurvePoint, DrawnSolid, Guide, GuideEnd, arrange, packed_frame, strand_point},
     },
 };
 
@@ -73,6 +73,8 @@ struct RandomGuide {
     nodes: Vec<Vec3>,
     moisture: Vec<f32>,
     motion: Vec<Vec3>,
+    /// Every third one has been cut.
+    end: Option<GuideEnd>,
 }
 
 impl RandomGuide {
@@ -109,6 +111,10 @@ fn random_guides(random: &mut Random) -> Vec<RandomGuide> {
                 guide.moisture.push(if k % 2 == 0 { 0.0 } else { wet });
                 guide.motion.push((random.vector() * 16.0).round());
             }
+            let last = guide.nodes.len() as f32 - 2.0;
+            let end = last + 0.2 + 0.9 * random.share();
+            guide.end =
+                (k % 3 == 0).then_some(GuideEnd { edges: last + 2.0 + (k % 4) as f32, end });
             guide
         })
         .collect()
@@ -130,6 +136,12 @@ fn random_strand(random: &mut Random, k: u32) -> DrawnStrand {
         stray: random.vector() * 0.02,
         seed: (random.share() * 1e6) as u32,
         size: 0.3 * random.share(),
+        // As exact as it is packed.
+        cut: if k.is_multiple_of(2) {
+            1.0
+        } else {
+            (65535.0 * (0.3 + 0.7 * random.share())).round() / 65535.0
+        },
         locks: [(); 3].map(|()| random_lock(random)),
         ..default()
     }
@@ -254,9 +266,11 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
     let strands: Vec<_> = (0..120).map(|k| random_strand(&mut random, k)).collect();
 
     let mut nodes: Vec<[u32; 8]> = Vec::new();
-    let mut ranges: Vec<[u32; 2]> = Vec::new();
+    let mut ranges: Vec<[u32; 4]> = Vec::new();
     for guide in &guides {
-        ranges.push([nodes.len() as u32, guide.nodes.len() as u32]);
+        let whole = guide.nodes.len() as f32 - 1.0;
+        let GuideEnd { edges, end } = guide.end.unwrap_or(GuideEnd { edges: whole, end: whole });
+        ranges.push([nodes.len() as u32, guide.nodes.len() as u32, edges.to_bits(), end.to_bits()]);
         nodes.extend(guide.packed());
     }
     // Of the size of the shader's uniform: no dye, so only its head counts.
@@ -294,14 +308,14 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
 
     let past: Vec<Vec<Vec3>> = guides.iter().map(RandomGuide::past).collect();
     let now = |k: u32| {
-        let RandomGuide { nodes, moisture, .. } = &guides[k as usize];
-        Guide { nodes, moisture }
+        let RandomGuide { nodes, moisture, end, .. } = &guides[k as usize];
+        Guide { nodes, moisture, end: *end }
     };
     let before = |k: u32| Guide { nodes: &past[k as usize], ..now(k) };
     let dry = |k: u32| Guide { moisture: &[], ..now(k) };
     let parted = HairFollowers { parting: 1e6, ..followers };
     let [mut worst, mut worst_past, mut worst_ring] = [0.0f32; 3];
-    let [mut parts, mut drawn_in, mut pushed] = [0; 3];
+    let [mut parts, mut drawn_in, mut pushed, mut cut] = [0; 4];
     for (k, strand) in strands.iter().enumerate() {
         for i in 0..SAMPLES {
             let t = i as f32 / (SAMPLES - 1) as f32;
@@ -321,14 +335,18 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
             parts += u32::from(differs(strand_point(strand, now, t, &parted, &solids)));
             drawn_in += u32::from(differs(strand_point(strand, dry, t, &followers, &solids)));
             pushed += u32::from(differs(strand_point(strand, now, t, &followers, &[])));
+            let grown = |k: u32| Guide { end: None, ..now(k) };
+            cut += u32::from(differs(strand_point(strand, grown, t, &followers, &solids)));
         }
     }
     println!("largest difference {worst} m, in the frame before {worst_past} m");
     println!("rings lose {worst_ring}");
-    println!("{parts} points of parted guides, {drawn_in} drawn in by water, {pushed} pushed out");
+    println!(
+        "{parts} points of parted guides, {drawn_in} drawn in by water, {pushed} pushed out, {cut} cut"
+    );
     assert!(worst < 1e-5 && worst_past < 1e-5, "shader and twin differ by {worst}, {worst_past} m");
     assert!((1e-6..1e-3).contains(&worst_ring), "packing a ring loses {worst_ring}");
-    assert!(parts > 100 && drawn_in > 100 && pushed > 100, "the data must contain all kinds");
+    assert!(parts.min(drawn_in).min(pushed).min(cut) > 100, "the data must contain all kinds");
 }
 
 const FIBRE: &str = "

@@ -394,7 +394,7 @@ fn other_files_are_reported_and_the_hair_is_left_alone() {
         assert_eq!(error(bytes), HairdoError::NotAHairdo);
     }
     let future = error(&sealed(NEWEST_FORMAT + 6, &[1, 2, 3]));
-    assert_eq!(future, HairdoError::FutureVersion { found: 9, newest: 3 });
+    assert_eq!(future, HairdoError::FutureVersion { found: 10, newest: 4 });
     assert!(future.to_string().contains("update"), "{future}");
     assert!(matches!(error(&sealed(0, payload)), HairdoError::Malformed { offset: 8, .. }));
     let mut damaged = good.clone();

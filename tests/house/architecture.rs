@@ -368,7 +368,7 @@ fn no_file_is_too_long_to_be_understood() {
 /// put on a character or asked of it acted on its hair, 44,850 before held hair gave way, hair was tied and wet hair took
 /// the substeps of dry hair.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 45_900;
+const MOST_LINES: usize = 46_600;
 
 #[test]
 fn the_crate_stays_small() {

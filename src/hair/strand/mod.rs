@@ -9,6 +9,7 @@
 //! substeps; drawing places the nodes with the pose that is drawn, so roots never lag. Lengths are
 //! in the hair's units: a scaled character's hair behaves as if unscaled.
 
+mod cut;
 pub mod frame;
 mod held;
 mod on_gpu;
@@ -21,6 +22,8 @@ mod strand_sleep;
 mod systems;
 mod teleport;
 
+pub use cut::{CutStrand, FollowerCuts};
+pub(crate) use cut::{SHORTEST_END, StrandPlace};
 pub(crate) use frame::Carried;
 pub use frame::{HairInertia, Pose, TickPose};
 pub(crate) use held::Held;

@@ -9,7 +9,10 @@ use crate::{
     forces::environment::HairGravity,
     hair::{
         look::{HairDye, HairLook, WornPreset},
-        strand::{AddedMass, HeldNodes, Strand, StrandHistory, Strands, is_on_gpu, return_to_cpu},
+        strand::{
+            AddedMass, CutStrand, FollowerCuts, HeldNodes, Strand, StrandHistory, Strands,
+            is_on_gpu, return_to_cpu,
+        },
         worn::hairs_of,
     },
     keratin::{
@@ -45,20 +48,22 @@ impl Hairdo {
             .filter_map(|(member, hold)| {
                 let strand = world.get::<Strand>(member)?;
                 let (bonds, water) = (world.get::<Bonds>(member), world.get::<Moisture>(member));
-                Some(StyledStrand { hold, ..StyledStrand::of(strand, bonds, water) })
+                let cut = world.get::<CutStrand>(member).copied();
+                Some(StyledStrand { hold, cut, ..StyledStrand::of(strand, bonds, water) })
             })
             .collect();
         let cuticle = world.get::<Cuticle>(hair).copied();
         let look = world.get::<HairLook>(hair).map(Ranged::clamped);
         let dye = world.get::<HairDye>(hair).map(Ranged::clamped).unwrap_or_default();
         let preset = world.get::<WornPreset>(hair).map(Ranged::clamped);
-        Self { strands, cuticle, look, dye, preset, ties }.checked()
+        let followers = world.get::<FollowerCuts>(hair).cloned().unwrap_or_default();
+        Self { strands, cuticle, look, dye, preset, ties, followers }.checked()
     }
 
     /// Puts the hairdo on a hair of the same groom, or on the one that an entity wears, at rest: all strands, or in case of an error
     /// none.
     ///
-    /// Roots stay where they are; a strand whose root has moved since, as on a skinned mesh, is
+    /// Strands are cut as they are in the hairdo, or grow back to that. Roots stay where they are; a strand whose root has moved since, as on a skinned mesh, is
     /// moved with it. Acting treatments end, winding on a rod starts again. Ties of the hairdo come as children of the
     /// hair, others let go of its strands; nodes held by [`HeldNodes`] otherwise stay held. Drops stay where they are in the world. Water that the
     /// hairdo adds or the old one removes is entered in the [`WaterLedger`]. Look and dye are put
@@ -73,7 +78,12 @@ impl Hairdo {
         return_to_cpu(world, hair);
         let mut members = members(world, hair);
         members.retain(|member| world.get::<Strand>(*member).is_some());
-        let nodes = members.iter().map(|m| world.get::<Strand>(*m).map_or(0, Strand::nodes));
+        // Strands that have grown alike fit however they are cut.
+        let nodes = members.iter().enumerate().map(|(i, member)| {
+            let Some(strand) = world.get::<Strand>(*member) else { return 0 };
+            let own = self.strands.get(i).filter(|own| own.is_of(strand, world.get(*member)));
+            own.map_or_else(|| strand.nodes(), |own| own.positions.len())
+        });
         self.check_fit(nodes)?;
         let conditions = WettingConditions {
             wetting: setting(world, hair),
@@ -90,6 +100,11 @@ impl Hairdo {
             ledger.replace(added);
         }
         let mut hair = world.entity_mut(hair);
+        if self.followers.0.is_empty() {
+            hair.remove::<FollowerCuts>();
+        } else {
+            hair.insert(self.followers.clone());
+        }
         match self.cuticle {
             Some(cuticle) => hair.insert(cuticle),
             None => hair.remove::<Cuticle>(),
@@ -207,6 +222,7 @@ impl StyledStrand {
             film: water.map(|water| fitted(water.film())).unwrap_or_default(),
             bound: water.map(|water| fitted(water.bound())).unwrap_or_default(),
             hold: None,
+            cut: None,
         }
     }
 
@@ -234,6 +250,10 @@ impl StyledStrand {
             strand.replace(positions.clone(), orientations, rest_lengths, root_frame);
             positions
         });
+        match self.cut {
+            Some(cut) => entity.insert(cut),
+            None => entity.remove::<CutStrand>(),
+        };
         // Without this it would be drawn interpolated across the jump.
         if let Some(mut history) = entity.get_mut::<StrandHistory>() {
             history.positions = placed.unwrap_or_default();

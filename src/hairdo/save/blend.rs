@@ -48,8 +48,8 @@ impl Hairdo {
             _ => nearer.look.clone(),
         };
         let (dye, preset) = (a.dye.blend(&b.dye, t), nearer.preset.clone());
-        let ties = nearer.ties.clone();
-        Self { strands, cuticle, look, dye, preset, ties }.checked()
+        let (ties, followers) = (nearer.ties.clone(), nearer.followers.clone());
+        Self { strands, cuticle, look, dye, preset, ties, followers }.checked()
     }
 }
 
@@ -67,6 +67,7 @@ impl StyledStrand {
             orientations.push(turn);
             positions.push(place);
         }
+        let nearer = if t < 0.5 { self } else { other };
         let rest = self.rest_lengths.iter().zip(&other.rest_lengths);
         let joints = self.joints.iter().zip(&other.joints);
         Self {
@@ -77,7 +78,8 @@ impl StyledStrand {
             joints: joints.map(|(a, b)| joint(a, b, t)).collect(),
             film: water(&self.film, &other.film, t),
             bound: water(&self.bound, &other.bound, t),
-            hold: if t < 0.5 { self } else { other }.hold.clone(),
+            hold: nearer.hold.clone(),
+            cut: nearer.cut,
         }
     }
 

@@ -13,7 +13,7 @@
 //! root's frame, positions, orientations, rest lengths, joints, and if wet film and bound water.
 //! Counts are varints. A joint is a byte that marks which of its shapes and rates are omitted
 //! because they can be derived, then the others. Format 2 appends looks, see `looks`, format 3 what holds
-//! strands, see `holds`; a hairdo without them is written in format 1.
+//! strands, see `holds`, format 4 where they were cut, see `cuts`; a hairdo without them is written in format 1.
 
 use super::{Hairdo, HairdoError, StyledStrand};
 use crate::keratin::bond::{BondKind, Cuticle, JointBonds};
@@ -22,13 +22,16 @@ use serde::{Deserialize, Serialize};
 
 /// The newest format that can be read. Hairdos are written in the oldest format that holds all
 /// their data.
-pub const NEWEST_FORMAT: u16 = 3;
+pub const NEWEST_FORMAT: u16 = 4;
 
 /// The first format that has looks.
 const WITH_LOOKS: u16 = 2;
 
 /// The first format that has ties and held nodes.
 const WITH_HOLDS: u16 = 3;
+
+/// The first format that has cut strands.
+const WITH_CUTS: u16 = 4;
 
 const MAGIC: [u8; 8] = *b"\x8bhairdo\n";
 /// Magic, format and length.
@@ -47,9 +50,10 @@ impl Hairdo {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Writer(Vec::with_capacity(HEAD + CHECKSUM + 48 * self.nodes()));
         out.0.extend(MAGIC);
-        let format = match (self.has_holds(), self.has_looks()) {
-            (true, _) => WITH_HOLDS,
-            (_, true) => WITH_LOOKS,
+        let format = match (self.has_cuts(), self.has_holds(), self.has_looks()) {
+            (true, ..) => WITH_CUTS,
+            (_, true, _) => WITH_HOLDS,
+            (.., true) => WITH_LOOKS,
             _ => 1,
         };
         out.0.extend(format.to_le_bytes());
@@ -62,6 +66,9 @@ impl Hairdo {
         }
         if format >= WITH_HOLDS {
             self.write_holds(&mut out);
+        }
+        if format >= WITH_CUTS {
+            self.write_cuts(&mut out);
         }
         let length = (out.0.len() - HEAD) as u64;
         out.0[HEAD - 8..HEAD].copy_from_slice(&length.to_le_bytes());
@@ -111,6 +118,9 @@ impl Hairdo {
         }
         if format >= WITH_HOLDS {
             hairdo.read_holds(&mut reader)?;
+        }
+        if format >= WITH_CUTS {
+            hairdo.read_cuts(&mut reader)?;
         }
         if !reader.rest.is_empty() {
             return Err(reader.wrong("the checksum"));
@@ -251,6 +261,7 @@ impl<'a> Reader<'a> {
             film: self.many(watered, "a film", |volume| volume)?,
             bound: self.many(watered, "bound water", |volume| volume)?,
             hold: None,
+            cut: None,
         })
     }
 

@@ -2,7 +2,7 @@
 //! another groom, blended and undone.
 //!
 //! A [`Hairdo`] holds everything that makes a style: where the nodes are, which shapes the bonds
-//! remember and how many of them are closed, the water, what ties and holds it, the cuticle's wear, its look with
+//! remember and how many of them are closed, the water, what ties and holds it, where it is cut, the cuticle's wear, its look with
 //! bleach and dye, and which preset it was made on. It does not hold the rest of a hair: roots belong to
 //! the scalp, settings such as [`HairStiffness`](crate::HairStiffness) to the character, drops of
 //! water to the world.
@@ -16,6 +16,7 @@
 mod apply;
 mod blend;
 mod bytes;
+mod cuts;
 mod error;
 mod events;
 mod holds;
@@ -32,7 +33,7 @@ use crate::{
     base::setting::Ranged,
     hair::{
         look::{HairDye, HairLook, WornPreset},
-        strand::MIN_SEGMENT,
+        strand::{CutStrand, FollowerCuts, MIN_SEGMENT},
     },
     hairdo::tie::HairTie,
     keratin::bond::{BondKind, Cuticle, JointBonds},
@@ -75,6 +76,7 @@ pub struct Hairdo {
     dye: HairDye,
     preset: Option<WornPreset>,
     ties: Vec<StyledTie>,
+    followers: FollowerCuts,
 }
 
 /// One strand of a [`Hairdo`].
@@ -90,6 +92,7 @@ pub struct StyledStrand {
     film: Vec<f64>,
     bound: Vec<f64>,
     hold: Option<Hold>,
+    cut: Option<CutStrand>,
 }
 
 /// A tie of a hairdo, with its place in the hair's frame.
@@ -282,6 +285,7 @@ impl StyledStrand {
         let rates = &mut self.joints.iter().flat_map(|j| j.rates).map(f64::from);
         within("rate (four of each joint)", "0 to 1", rates, 0.0, 1.0)?;
         let water = &mut self.film.iter().chain(&self.bound).copied();
-        within("water (m³; film, then bound) of node", "0 to 1", water, 0.0, MAX_WATER)
+        within("water (m³; film, then bound) of node", "0 to 1", water, 0.0, MAX_WATER)?;
+        self.check_cut(strand)
     }
 }

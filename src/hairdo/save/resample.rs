@@ -57,8 +57,8 @@ impl Hairdo {
         });
         let (strands, preset) = (strands.collect(), other.preset.clone());
         let (look, dye) = (self.look.clone(), self.dye.clone());
-        let ties = self.ties.clone();
-        Self { strands, cuticle: self.cuticle, look, dye, preset, ties }.checked()
+        let (ties, followers) = (self.ties.clone(), other.followers.clone());
+        Self { strands, cuticle: self.cuticle, look, dye, preset, ties, followers }.checked()
     }
 }
 
@@ -67,7 +67,7 @@ impl StyledStrand {
     fn resampled(&self, layout: &Self) -> Self {
         let lengths = &layout.rest_lengths;
         if (&self.rest_lengths, self.root_frame) == (lengths, layout.root_frame) {
-            let mut same = self.clone();
+            let mut same = Self { cut: layout.cut, ..self.clone() };
             let moved = layout.positions[0] - self.positions[0];
             if moved != Vec3::ZERO {
                 same.positions.iter_mut().for_each(|p| *p += moved);
@@ -113,6 +113,7 @@ impl StyledStrand {
             film: water(&self.film),
             bound: water(&self.bound),
             hold: self.hold_for(lengths),
+            cut: layout.cut,
         }
     }
 }

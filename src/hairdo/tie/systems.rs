@@ -1,7 +1,7 @@
 //! Ties gather and hold their strands in `Interaction`.
 
 use super::{
-    HairTie, HairTied, StrandRegion, TieHair, TieProgress, Tied, TiedStrands,
+    HairTie, HairTied, TieHair, TieProgress, Tied, TiedStrands,
     model::{Gathering, ball_through, in_disc, on_the_way},
 };
 use crate::{
@@ -16,6 +16,7 @@ use crate::{
         },
         worn::HairsOf,
     },
+    hairdo::region::StrandRegion,
     keratin::treatment::WoundOn,
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
@@ -157,9 +158,12 @@ fn hold(
     step: Res<HairStep>,
     hairs: Query<&TickPose>,
     ties: Query<(&HairTie, &TickPose)>,
-    mut strands: Query<(&StrandOf, &Tied, &mut TieProgress, &mut HeldNodes), Without<WoundOn>>,
+    mut strands: Query<
+        (&StrandOf, &Strand, &Tied, &mut TieProgress, &mut HeldNodes),
+        Without<WoundOn>,
+    >,
 ) {
-    for (of, tied, mut tie, mut held) in &mut strands {
+    for (of, strand, tied, mut tie, mut held) in &mut strands {
         let (Ok(hair), Ok((ring, at))) = (hairs.get(of.0), ties.get(tied.0)) else { continue };
         if tie.waits() {
             continue;
@@ -174,6 +178,11 @@ fn hold(
             place
         };
         let node = tie.node as usize;
+        let (Some(root), true) = (strand.positions().first(), node < strand.nodes()) else {
+            continue;
+        };
+        let reach: f32 = strand.rest_lengths()[..node].iter().sum();
+        let place = *root + (place - *root).clamp_length_max(reach);
         if held.targets.len() != node + 1 || held.targets[..node].iter().any(Option::is_some) {
             held.targets = vec![None; node + 1];
         }

@@ -1,6 +1,6 @@
 // Adds the strands up in the cells of a grid: the area that they block, by their direction.
 
-#import bevy_keratin::strands::{ribbon, strands, frame, alpha_of_rank, strand_of_rank, hash, VIEW_GUIDES}
+#import bevy_keratin::strands::{ribbon, strands, frame, alpha_of_rank, strand_of_rank, strand_width, hash, VIEW_GUIDES}
 #import bevy_keratin::rings::{PackedRing, unpacked, rings_of_strand}
 #import bevy_keratin::counts::UNIT
 
@@ -45,8 +45,7 @@ fn fill(
     }
     let way = high.position - low.position;
     let length = length(way);
-    let own_width = select(strands[strand].width, 1.0, strands[strand].width < 0.0);
-    let width = ribbon.width * ribbon.shadow_density * frame.wider * own_width * alpha_of_rank(rank);
+    let width = ribbon.width * ribbon.shadow_density * frame.wider * strand_width(strands[strand]) * alpha_of_rank(rank);
     let size = frame.volume_cell;
     // As fibres one behind the other in a cell as deep as it is on average.
     let deep = pow(size.x * size.y * size.z, 1.0 / 3.0);

@@ -285,6 +285,19 @@ impl Moisture {
         self.recount()
     }
 
+    /// After a cut: `within` says what is left of what nodes carry. Returns the loss (m³).
+    pub(crate) fn cut(&mut self, within: impl Fn(&[f64]) -> Vec<f64>) -> f64 {
+        if self.is_untouched() {
+            return 0.0;
+        }
+        (self.film, self.bound) = (within(&self.film), within(&self.bound));
+        // Recomputed in the next exchange.
+        self.wetness.resize(self.film.len(), 0.0);
+        self.sheen.resize(self.film.len(), 0.0);
+        self.hurries = true;
+        -self.recount()
+    }
+
     /// Marks its water as counted. Returns the difference to what was counted before (m³).
     pub(super) fn recount(&mut self) -> f64 {
         let volume = self.volume();

@@ -1,7 +1,7 @@
 //! Hair that is small on the screen is simulated more cheaply, without visible transitions.
 
 mod guides;
-mod head;
+pub mod head;
 mod treated;
 
 use crate::common::*;
