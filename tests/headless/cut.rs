@@ -116,7 +116,8 @@ fn a_plane_ends_strands_and_leaves_the_rest_as_it_was() {
             mean += moved / strands.len() as f32;
         }
         println!("moved by {mean} m in the mean");
-        assert!(mean < 0.01, "{mean} m");
+        // Relieved of what hung from them they rise a little.
+        assert!(mean < 0.03, "{mean} m");
         let asleep = strands
             .iter()
             .filter(|id| app.world().get::<StrandSleep>(**id).is_some_and(StrandSleep::is_asleep));
@@ -204,7 +205,7 @@ fn water_that_is_cut_off_is_drained_to_the_drop() {
     assert!((before - left - drained).abs() < 1e-12 * before, "{before} {left} {drained}");
     // As much as the length, for it was wet all along.
     let share = left / before;
-    let length = 0.107 / f64::from(0.02 * 12.0 + 0.003);
+    let length = 0.107 / (0.02 * 12.0 + 0.003);
     assert!((share / length - 1.0).abs() < 0.12, "{share} for {length}");
     run(&mut app, 1.0);
     let error = app.world().resource::<WaterLedger>().error();

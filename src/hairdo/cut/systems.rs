@@ -150,7 +150,8 @@ fn cut_strand(entity: &mut EntityWorldMut<'_>, meeting: Meeting) -> Option<f64> 
         *added = AddedMass::default();
     }
     if let Some(mut held) = entity.get_mut::<HeldNodes>() {
-        held.targets.truncate(nodes);
+        // The new tip is where no node was.
+        held.targets.truncate(nodes - 1);
     }
     if entity.contains::<WoundOn>() {
         if let Some(mut winding) = entity.get_mut::<WindingProgress>() {
@@ -160,7 +161,7 @@ fn cut_strand(entity: &mut EntityWorldMut<'_>, meeting: Meeting) -> Option<f64> 
             held.targets.clear();
         }
     }
-    if entity.get::<TieProgress>().is_some_and(|tie| tie.node as usize >= nodes) {
+    if entity.get::<TieProgress>().is_some_and(|tie| tie.node as usize >= nodes - 1) {
         entity.remove::<Tied>();
     }
     let lost = entity
