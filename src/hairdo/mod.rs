@@ -13,7 +13,7 @@ pub use region::StrandRegion;
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
     pub use crate::hairdo::StrandRegion;
-    pub use crate::hairdo::cut::{Cut, CutHair, HairCut};
+    pub use crate::hairdo::cut::{CutBy, CutHair, HairCut};
     #[cfg(feature = "save")]
     pub use crate::hairdo::save::{
         ApplyHairdo, CaptureHairdo, Hairdo, HairdoApplied, HairdoCaptured, HairdoError,

@@ -14,7 +14,7 @@ use crate::{
         setting::Settings,
     },
     hair::strand::{CutStrand, FollowerCuts, Strand},
-    hairdo::cut::{Cut, HairCut},
+    hairdo::cut::{CutBy, HairCut},
     water::Moisture,
 };
 use bevy::prelude::*;
@@ -78,11 +78,11 @@ fn cut_at<'a>(
     strand: &DrawnStrand,
     guide: impl Fn(u32) -> Guide<'a> + Copy,
     followers: &HairFollowers,
-    by: &Cut,
+    by: &CutBy,
 ) -> f32 {
     let (point, normal) = match *by {
-        Cut::Length(length) => return strand.cut.min(length / strand.size.max(length)),
-        Cut::Plane { point, normal } => (point, normal),
+        CutBy::Length(length) => return strand.cut.min(length / strand.size.max(length)),
+        CutBy::Plane { point, normal } => (point, normal),
     };
     let whole = DrawnStrand { cut: 1.0, ..*strand };
     let is_beyond = |t: f32| {

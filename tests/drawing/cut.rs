@@ -39,7 +39,7 @@ pub fn a_blunt_cut_ends_all_drawn_strands_and_leaves_the_rest_of_the_picture() {
     let followers = HairFollowers { flyaways: 0.0, ..HairFollowers::new(6000) };
     let (hair, _) = curtain(&mut scene, followers);
     let before = scene.draw();
-    let plane = Cut::Plane { point: Vec3::ZERO, normal: Vec3::NEG_Y };
+    let plane = CutBy::Plane { point: Vec3::ZERO, normal: Vec3::NEG_Y };
     scene.app.world_mut().trigger(CutHair::all(hair, plane));
     let after = scene.draw();
     let line = scene.project(Vec3::new(0.0, 0.0, 0.004)).unwrap().y;
@@ -87,7 +87,7 @@ pub fn a_cut_to_a_length_ends_followers_with_roots_of_their_own() {
     let before = scene.draw();
     let line = scene.project(Vec3::new(0.0, 0.05, 0.004)).unwrap().y;
     assert!(ends(&before).iter().flatten().any(|y| *y as f32 > line + 40.0));
-    scene.app.world_mut().trigger(CutHair::all(hair, Cut::Length(0.15)));
+    scene.app.world_mut().trigger(CutHair::all(hair, CutBy::Length(0.15)));
     let after = scene.draw();
     let ends = ends(&after);
     let right = ends.iter().flatten().filter(|y| (**y as f32 + 0.5 - line).abs() < 6.0).count();

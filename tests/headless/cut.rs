@@ -59,7 +59,7 @@ fn all(app: &App, strands: &[Entity]) -> Vec<Strand> {
     strands.iter().map(|id| strand(app, *id).clone()).collect()
 }
 
-const LEVEL: Cut = Cut::Plane { point: Vec3::new(0.0, -0.05, 0.0), normal: Vec3::NEG_Y };
+const LEVEL: CutBy = CutBy::Plane { point: Vec3::new(0.0, -0.05, 0.0), normal: Vec3::NEG_Y };
 
 #[test]
 fn a_plane_ends_strands_and_leaves_the_rest_as_it_was() {
@@ -133,7 +133,7 @@ fn a_length_leaves_what_is_shorter_and_the_least_is_a_millimetre() {
     run(&mut app, 0.1);
     let mut whole = strand(&app, strands[7]).length();
     for (length, cut) in [(0.3, 0), (0.2, 40), (0.2, 0), (0.0401, 40), (0.02, 40), (1e-3, 40)] {
-        request(&mut app, CutHair::all(hair, Cut::Length(length)));
+        request(&mut app, CutHair::all(hair, CutBy::Length(length)));
         assert_eq!(answer(&mut app).strands, cut, "to {length} m");
         let now = strand(&app, strands[7]);
         whole = whole.min(length);
@@ -146,15 +146,15 @@ fn a_length_leaves_what_is_shorter_and_the_least_is_a_millimetre() {
     assert_eq!(strand(&app, strands[7]).edges(), 1);
     assert_eq!(fault_kinds(&mut app), []);
     // Its root is beyond this plane.
-    request(&mut app, CutHair::all(hair, Cut::Plane { point: Vec3::ZERO, normal: Vec3::Y }));
+    request(&mut app, CutHair::all(hair, CutBy::Plane { point: Vec3::ZERO, normal: Vec3::Y }));
     let told = answer(&mut app);
     assert_eq!((told.strands, told.refused), (0, 40));
     for wrong in [
-        Cut::Length(f32::NAN),
-        Cut::Length(0.0),
-        Cut::Length(-1.0),
-        Cut::Plane { point: Vec3::ZERO, normal: Vec3::ZERO },
-        Cut::Plane { point: Vec3::NAN, normal: Vec3::Y },
+        CutBy::Length(f32::NAN),
+        CutBy::Length(0.0),
+        CutBy::Length(-1.0),
+        CutBy::Plane { point: Vec3::ZERO, normal: Vec3::ZERO },
+        CutBy::Plane { point: Vec3::NAN, normal: Vec3::Y },
     ] {
         request(&mut app, CutHair::all(hair, wrong));
         app.update();
@@ -177,7 +177,7 @@ fn a_region_of_a_wearers_hairs_is_cut() {
     }
     app.update();
     let right = StrandRegion::Above { point: Vec3::ZERO, normal: Vec3::X };
-    request(&mut app, CutHair { hair: wearer, by: Cut::Length(0.05), region: right });
+    request(&mut app, CutHair { hair: wearer, by: CutBy::Length(0.05), region: right });
     let told = core::mem::take(&mut app.world_mut().resource_mut::<Answers>().0);
     assert_eq!(told.len(), 2);
     for id in strands {
@@ -199,7 +199,7 @@ fn water_that_is_cut_off_is_drained_to_the_drop() {
     let before = held(&app);
     assert!(before > 0.0);
     let out = app.world().resource::<WaterLedger>().water_out;
-    request(&mut app, CutHair::all(hair, Cut::Length(0.107)));
+    request(&mut app, CutHair::all(hair, CutBy::Length(0.107)));
     let drained = app.world().resource::<WaterLedger>().water_out - out;
     let left = held(&app);
     assert!((before - left - drained).abs() < 1e-12 * before, "{before} {left} {drained}");
@@ -233,7 +233,7 @@ fn ties_rods_and_held_nodes_beyond_the_cut_let_go() {
     // Nothing that a tie asks for is out of reach.
     let said = faults(&mut app);
     assert!(said.iter().all(|fault| fault.message.contains("colliders leave")), "{said:#?}");
-    request(&mut app, CutHair::all(hair, Cut::Length(0.05)));
+    request(&mut app, CutHair::all(hair, CutBy::Length(0.05)));
     run(&mut app, 2.0);
     // A strand that grows beside the ring reaches it still.
     assert!(tied(&app) < 3, "{}", tied(&app));
@@ -302,8 +302,8 @@ fn hair_is_cut_whoever_moves_it_and_a_thousand_times() {
         let entities = app.world().entities().len();
         for i in 0..250 {
             let by = match i % 2 {
-                0 => Cut::Length(0.2 - 0.19 * i as f32 / 250.0),
-                _ => Cut::Plane {
+                0 => CutBy::Length(0.2 - 0.19 * i as f32 / 250.0),
+                _ => CutBy::Plane {
                     point: Vec3::new(0.05, -0.05, 0.0),
                     normal: Vec3::new(1.0, -1.0 - i as f32 * 0.01, 0.3 * (i as f32).sin()),
                 },
@@ -333,7 +333,7 @@ fn a_cut_within_a_tick_is_made_whole() {
             HairTick,
             (move |mut commands: Commands| {
                 length *= 0.99;
-                commands.trigger(CutHair::all(hair, Cut::Length(f32::max(length, 0.01))));
+                commands.trigger(CutHair::all(hair, CutBy::Length(f32::max(length, 0.01))));
             })
             .in_set(set),
         );

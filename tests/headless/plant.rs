@@ -457,7 +457,7 @@ fn falling_hair_lies_on_the_mesh_and_ends_below() {
 #[test]
 fn a_cut_ends_strands_at_its_plane() {
     let wall = plane(0.2, 0.2).transformed_by(Transform::from_rotation(Quat::from_rotation_x(1.2)));
-    let cut = PlantedCut { at: Vec3::NEG_Y * 0.15, normal: Vec3::Y, least: 0.03 };
+    let cut = Cut { at: Vec3::NEG_Y * 0.15, normal: Vec3::Y, least: 0.03 };
     let planting = Planting {
         length: 0.4,
         nodes: 40,
@@ -470,7 +470,7 @@ fn a_cut_ends_strands_at_its_plane() {
         let tip = strand.points[39];
         assert!((tip.y + 0.15).abs() < 6e-3, "{tip}");
     }
-    let above = PlantedCut { at: Vec3::Y, ..cut };
+    let above = Cut { at: Vec3::Y, ..cut };
     let planted = Planting { cut: Some(above), ..planting }.plant(&wall).unwrap();
     for strand in planted.groom.strands() {
         let strand = Strand::from_polyline(strand.points).unwrap();
@@ -617,11 +617,8 @@ fn what_cannot_be_planted_says_why() {
         ("over", Planting { drape: drape(down, 0.0, 0.0, 0.0), ..base }),
         ("clearance", Planting { drape: drape(down, 0.1, -1.0, 0.0), ..base }),
         ("layering", Planting { drape: drape(down, 0.1, 0.0, f32::NAN), ..base }),
-        (
-            "PlantedCut::normal",
-            Planting { cut: Some(PlantedCut { normal: Vec3::ZERO, ..default() }), ..base },
-        ),
-        ("least", Planting { cut: Some(PlantedCut { least: 0.0, ..default() }), ..base }),
+        ("Cut::normal", Planting { cut: Some(Cut { normal: Vec3::ZERO, ..default() }), ..base }),
+        ("least", Planting { cut: Some(Cut { least: 0.0, ..default() }), ..base }),
     ];
     for (what, planting) in odd {
         let error = refuse(planting);

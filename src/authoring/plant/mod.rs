@@ -40,7 +40,7 @@ pub(crate) use place::{SurfacePoint, surface_points};
 pub use planting::{Planted, RootOnMesh};
 pub use preset::{HairPreset, PresetSettings};
 pub use recipe::{
-    Clump, CombPattern, Curl, CurlPhase, Drape, HUMAN_DENSITY, MAX_ROOTS, PlantedCut, Planting,
+    Clump, CombPattern, Curl, CurlPhase, Cut, Drape, HUMAN_DENSITY, MAX_ROOTS, Planting,
 };
 pub use scalp::Scalp;
 

@@ -4,7 +4,7 @@ use super::{
     error::PlantError,
     map::{PlantingMaps, RootPlace},
     planting::Planted,
-    recipe::{Clump, CombPattern, Curl, CurlPhase, Drape, HUMAN_DENSITY, PlantedCut, Planting},
+    recipe::{Clump, CombPattern, Curl, CurlPhase, Cut, Drape, HUMAN_DENSITY, Planting},
     scalp::Scalp,
 };
 #[cfg(feature = "render")]
@@ -220,8 +220,7 @@ impl HairPreset {
             Self::Fur => CombPattern::Along(-front - up * 0.5),
             _ => CombPattern::Parted { at: scalp.center, across: right, along: -front * 0.4 },
         };
-        let cut =
-            |high, normal| PlantedCut { at: scalp.place(0.0, high, 0.0), normal, least: 0.03 };
+        let cut = |high, normal| Cut { at: scalp.place(0.0, high, 0.0), normal, least: 0.03 };
         Planting {
             density,
             nodes,

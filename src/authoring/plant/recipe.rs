@@ -62,12 +62,12 @@ setting! {
         /// How strands bend and lie down over the mesh; with `None` each grows straight.
         pub drape: Option<Drape> = None => Ranged::clamp_values;
         /// Where strands are cut.
-        pub cut: Option<PlantedCut> = None => Ranged::clamp_values;
+        pub cut: Option<Cut> = None => Ranged::clamp_values;
     }
 }
 
 impl Planting {
-    /// How far a [`PlantedCut`] moves down, as a share of the change of length.
+    /// How far a [`Cut`] moves down, as a share of the change of length.
     const CUT_SHIFT: f32 = 0.5;
     /// The minimum number of segments of a shortened strand.
     const MIN_SEGMENTS: f32 = 6.0;
@@ -79,7 +79,7 @@ impl Planting {
         let segments = self.nodes.saturating_sub(1) as f32;
         let fewest = segments.min(Self::MIN_SEGMENTS);
         let longer = self.length * (times - 1.0) * Self::CUT_SHIFT;
-        let cut = self.cut.map(|cut| PlantedCut {
+        let cut = self.cut.map(|cut| Cut {
             at: cut.at - cut.normal.normalize_or_zero() * longer,
             least: cut.least * times,
             ..cut
@@ -139,7 +139,7 @@ impl Ranged for CombPattern {
 }
 
 fn place(what: &'static str, at: &mut Vec3, violations: &mut Violations) {
-    PlantedCut::AT.named(what).clamp(at, || Vec3::ZERO, violations);
+    Cut::AT.named(what).clamp(at, || Vec3::ZERO, violations);
 }
 
 /// Checks that a direction is longer than 0.
@@ -232,11 +232,11 @@ setting! {
     /// A plane at which strands are cut.
     #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
     #[reflect(Default, Clone, PartialEq)]
-    pub struct PlantedCut {
+    pub struct Cut {
         /// A point of the plane.
         pub at: Vec3 = Vec3::ZERO, "m" in AT: -1e6..=1e6, "give a finite place";
         /// Toward the side where hair stays.
-        pub normal: Vec3 = Vec3::Y => |way, violations| direction("PlantedCut::normal", way, violations);
+        pub normal: Vec3 = Vec3::Y => |way, violations| direction("Cut::normal", way, violations);
         /// Minimum length that is left, also of strands that grow beyond the plane.
         pub least: f32 = 0.02, "m" in LEAST: 1e-5..=1e4, safe 1e-3..=1.0,
             "0.02 is a centimetre of stubble or two";

@@ -16,7 +16,7 @@ use bevy::prelude::*;
 /// Where hair is cut.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
-pub enum Cut {
+pub enum CutBy {
     /// Each strand at this length along it from its root (m), 1 mm or more. Shorter ones stay as they are.
     Length(f32),
     /// Each strand where it first goes through a plane: scissors that are drawn along a comb. Strands whose roots are
@@ -29,7 +29,7 @@ pub enum Cut {
     },
 }
 
-impl Default for Cut {
+impl Default for CutBy {
     /// A bob.
     fn default() -> Self {
         Self::Length(0.25)
@@ -42,7 +42,7 @@ impl Default for Cut {
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
 /// /// Ends 12 cm below the middle of the head, all round.
 /// fn bob(mut commands: Commands, hair: Entity) {
-///     let level = Cut::Plane { point: Vec3::NEG_Y * 0.12, normal: Vec3::NEG_Y };
+///     let level = CutBy::Plane { point: Vec3::NEG_Y * 0.12, normal: Vec3::NEG_Y };
 ///     commands.trigger(CutHair::all(hair, level));
 /// }
 /// ```
@@ -57,14 +57,14 @@ pub struct CutHair {
     #[event_target]
     pub hair: Entity,
     /// Where.
-    pub by: Cut,
+    pub by: CutBy,
     /// Which of its strands.
     pub region: StrandRegion,
 }
 
 impl CutHair {
     /// All strands.
-    pub fn all(hair: Entity, by: Cut) -> Self {
+    pub fn all(hair: Entity, by: CutBy) -> Self {
         Self { hair, by, region: StrandRegion::All }
     }
 }
@@ -77,7 +77,7 @@ pub struct HairCut {
     #[event_target]
     pub hair: Entity,
     /// Where.
-    pub by: Cut,
+    pub by: CutBy,
     /// Which of its strands were to be cut.
     pub region: StrandRegion,
     /// How many simulated strands were cut.

@@ -75,3 +75,55 @@ pub(super) fn within(carried: &[f64], old: &[f32], new: &[f32]) -> Vec<f64> {
     nodes.push(below(total) - before);
     nodes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_strand_that_curls_through_a_plane_is_cut_where_it_first_does() {
+        let at = |y: f32| Vec3::new(0.0, y, 0.0);
+        let curl = [at(0.03), at(0.01), at(-0.01), at(0.02), at(-0.04)];
+        let meet = |y: f32| through_plane(&curl, at(y), Vec3::NEG_Y * 3.0);
+        assert_eq!(meet(0.0), Meeting::At(StrandPlace { edge: 1, share: 0.5 }));
+        assert_eq!(meet(-0.05), Meeting::Misses);
+        assert_eq!(meet(0.04), Meeting::Whole);
+        assert_eq!(through_plane(&[], Vec3::ZERO, Vec3::Y), Meeting::Whole);
+    }
+
+    #[test]
+    fn a_length_is_measured_along_the_edges() {
+        let lengths = [0.01, 0.02, 0.03];
+        assert_eq!(at_length(&lengths, 0.02), Meeting::At(StrandPlace { edge: 1, share: 0.5 }));
+        assert_eq!(at_length(&lengths, 0.07), Meeting::Misses);
+        assert_eq!(at_length(&lengths, 0.0), Meeting::Whole);
+    }
+
+    proptest! {
+        /// What is spread evenly stays so, and no more is left than there was before the cut.
+        #[test]
+        fn what_nodes_carry_is_split_by_length(
+            lengths in prop::collection::vec(0.002_f32..0.05, 1..12),
+            carried in prop::collection::vec(0.0_f64..1e-8, 13),
+            edge in 0_usize..12,
+            share in 0.01_f32..1.0,
+        ) {
+            let edge = edge.min(lengths.len() - 1);
+            let mut new = lengths[..=edge].to_vec();
+            new[edge] *= share;
+            let even: Vec<f64> = crate::water::moisture::node_lengths(&lengths).map(f64::from).collect();
+            let left = within(&even, &lengths, &new);
+            for (left, expected) in left.iter().zip(crate::water::moisture::node_lengths(&new)) {
+                prop_assert!((left - f64::from(expected)).abs() < 1e-7, "{left} for {expected}");
+            }
+            let carried = &carried[..=lengths.len()];
+            let left = within(carried, &lengths, &new);
+            prop_assert!(left.len() == new.len() + 1 && left.iter().all(|amount| *amount >= 0.0));
+            prop_assert!(left.iter().sum::<f64>() <= carried.iter().sum::<f64>() * (1.0 + 1e-12));
+            let all = within(carried, &lengths, &lengths);
+            let sums = (all.iter().sum::<f64>(), carried.iter().sum::<f64>());
+            prop_assert!((sums.0 - sums.1).abs() <= 1e-12 * sums.1, "{sums:?}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Cuts strands when they are asked for.
 
 use super::{
-    Cut, CutHair, HairCut,
+    CutBy, CutHair, HairCut,
     model::{Meeting, at_length, through_plane, within},
 };
 use crate::{
@@ -33,7 +33,7 @@ impl Plugin for CutPlugin {
         }
         app.register_type::<CutStrand>()
             .register_type::<FollowerCuts>()
-            .register_type::<Cut>()
+            .register_type::<CutBy>()
             .register_type::<CutHair>()
             .register_type::<HairCut>()
             .add_observer(cut);
@@ -45,7 +45,7 @@ fn cut(request: On<CutHair>, mut commands: Commands) {
     commands.queue(move |world: &mut World| cut_all(world, &request));
 }
 
-impl Cut {
+impl CutBy {
     /// Why it cannot be done.
     fn wrong(&self) -> Option<String> {
         match *self {
