@@ -78,6 +78,7 @@ mod plant;
 mod reflection;
 mod rest;
 mod rods;
+mod rollback;
 mod settle;
 mod shade;
 mod sleep;
