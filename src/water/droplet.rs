@@ -152,6 +152,13 @@ impl Droplet {
         }
     }
 
+    /// What droplets that are taken one after the other are sorted by: their rows change with what else lives in the
+    /// world. Equal ones are where it does not matter.
+    pub(super) fn order(&self) -> ([u32; 3], u64, [u32; 3]) {
+        let bits = |v: Vec3| v.to_array().map(f32::to_bits);
+        (bits(self.position), self.volume.to_bits(), bits(self.velocity))
+    }
+
     fn check_radii(&mut self, violations: &mut Violations) {
         let ValueRange { what, valid, hint, .. } = Self::R_MAX;
         // A value that is out of the setting's own range has been reported already.

@@ -20,20 +20,22 @@ use crate::{
         contact::{Colliders, HairReach, WetRow},
         environment::{Gravity, vapour::WATER},
     },
-    hair::strand::{AddedMass, Hair, Here, PerHair, Pose, Strand, StrandOf, StrandSleep, TickPose},
+    hair::strand::{
+        AddedMass, Hair, Here, PerHair, Pose, Strand, StrandOf, StrandRank, StrandSleep, TickPose,
+    },
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 use core::slice::from_ref;
 
-/// Largest number of sums, over all work chunks and droplets.
+/// Largest number of sums of a hair, over all work chunks and droplets around it.
 const MAX_SUMS: usize = 1 << 18;
 
 /// Droplets per task of the summation.
 const DROPS_PER_TASK: usize = 64;
 
-/// Strands per work chunk, a multiple of a block: the same on any number of threads, so that
-/// effects on droplets are summed in the same order. Every chunk needs sums for all droplets, so
-/// with many droplets there are few chunks.
+/// Strands per work chunk, a multiple of a block: the same on any number of threads and whatever other hair there
+/// is, so that effects on droplets are summed in the same order. Every chunk needs sums for all droplets around its
+/// hair, so with many droplets there are few chunks.
 fn chunk_size(strands: usize, drops: usize) -> usize {
     let chunks = (MAX_SUMS / drops.max(1)).clamp(4, 64);
     // There may be no strands: those without edges are left out.
@@ -69,6 +71,7 @@ struct WetHair<'a> {
 
 struct WetStrand<'a> {
     entity: Entity,
+    rank: StrandRank,
     strand: Mut<'a, Strand>,
     added_mass: &'a AddedMass,
     moisture: Mut<'a, Moisture>,
@@ -88,7 +91,7 @@ struct Outcome {
 
 /// What droplets act on, as a query reads it.
 type AmongDroplets = (
-    Entity,
+    (Entity, &'static StrandRank),
     &'static StrandOf,
     &'static mut Strand,
     &'static mut AddedMass,
@@ -131,6 +134,7 @@ pub(super) fn wet_strands(
     if drops.is_empty() {
         return;
     }
+    drops.sort_by_cached_key(|drop| drop.order());
     let gravity = gravity.clamped().0;
     // A drop adds its mass to the strand that carries it.
     for drop in &drops {
@@ -164,7 +168,7 @@ pub(super) fn wet_strands(
             film_capacity: clinging(wetting.bundle(1.0), gravity.length()),
             gravity: pose.direction_in(gravity),
         };
-        let chunk = chunk_size(strands.len(), drops.len());
+        let chunk = chunk_size(strands.len(), near.len());
         chunks.resize_with(strands.len().div_ceil(chunk), default);
         contact_all(strands.chunks_mut(chunk).zip(&mut *chunks).collect(), &params);
         local.clear();
@@ -178,7 +182,7 @@ pub(super) fn wet_strands(
     for (WetHair { drops: near, strands, .. }, (_, chunks)) in
         wet_hairs.iter_mut().zip(&mut *fields)
     {
-        let chunk = chunk_size(strands.len(), drops.len());
+        let chunk = chunk_size(strands.len(), near.len());
         let shares: Vec<f64> = near.iter().map(|k| shares[*k as usize]).collect();
         absorb_all(strands.chunks_mut(chunk).zip(&mut *chunks).collect(), &shares);
         ledger.water_out += chunks.iter().map(|out| out.removed).sum::<f64>();
@@ -243,7 +247,12 @@ fn wet_hairs<'a>(
     let mut scratch = Vec::new();
     let mut near = EntityHashMap::<Vec<u32>>::default();
     for (hair, frame, _, reach) in hairs.iter() {
-        let drops: Vec<u32> = balls.near(frame, reach, &mut scratch).copied().collect();
+        // None of those that only wider locks of other hair would meet.
+        let clearance = wetting.of(hair).lock_radius() * frame.now().scale;
+        let ball = |k: u32| ball_of(&drops[k as usize], clearance);
+        let is_near = |k: &u32| reach.is_none_or(|reach| reach.is_near(frame, ball(*k)));
+        let drops = balls.near(frame, reach, &mut scratch).copied();
+        let drops: Vec<u32> = drops.filter(is_near).collect();
         if !drops.is_empty() {
             near.insert(hair, drops);
         }
@@ -252,7 +261,7 @@ fn wet_hairs<'a>(
         *buffers = unused.collect();
         return Vec::new();
     }
-    for (entity, of, strand, added_mass, moisture, _) in strands {
+    for ((entity, rank), of, strand, added_mass, moisture, _) in strands {
         let index = wet_hairs.index(of.0, || {
             let (_, frame, ..) = hairs.get(of.0).ok()?;
             let drops = near.remove(&of.0)?;
@@ -267,15 +276,17 @@ fn wet_hairs<'a>(
             let added_mass = &*added_mass.into_inner();
             wet_hairs.values[index].2.push(Some(WetStrand {
                 entity,
+                rank: *rank,
                 strand,
                 added_mass,
                 moisture,
             }));
         }
     }
+    wet_hairs.values.sort_by_key(|(hair, ..)| hair.index_u32());
     let sorted = wet_hairs.values.into_iter().map(|(hair, mut wet_hair, mut unsorted)| {
         if let Ok((_, _, mut blocks, _)) = hairs.get_mut(hair) {
-            let roots = unsorted.iter().flatten().map(|s| s.strand.positions()[0]);
+            let roots = unsorted.iter().flatten().map(|s| (s.strand.positions()[0], s.rank));
             let order = blocks.bypass_change_detection().order(resort, unsorted.len(), roots);
             for (i, k) in order.iter().enumerate() {
                 // The order is not sequential in memory.

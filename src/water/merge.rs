@@ -28,6 +28,7 @@ pub(super) fn merge_droplets(
         return;
     }
     let mut drops: Vec<(Entity, Mut<'_, Droplet>)> = droplets.iter_mut().collect();
+    drops.sort_by_cached_key(|(_, drop)| drop.order());
     if !rules.merging && drops.iter().all(|(_, drop)| !drop.drip) {
         return;
     }
@@ -48,7 +49,8 @@ pub(super) struct Merging {
     /// Position, radius, and volume including merged drops.
     drops: Vec<(Vec3, f32, f64)>,
     order: Vec<usize>,
-    /// The radius of the largest drop of each level; in a level are drops of up to half of it.
+    /// The largest radius of each level, a power of two whatever drops there are; in a level are drops of more than
+    /// half of it.
     levels: Vec<f32>,
     /// The last drop inserted into a cell of a level.
     cells: HashMap<(usize, IVec3), usize>,
@@ -79,7 +81,7 @@ impl Merging {
         order.clear();
         let counts = |i: &usize| drops[*i].2 >= MIN_VOLUME && drops[*i].0.is_finite();
         order.extend((0..drops.len()).filter(counts));
-        // Equal ones in the order of their entities, which is deterministic.
+        // Equal ones in the order that they were given in.
         order.sort_unstable_by(|a, b| drops[*b].2.total_cmp(&drops[*a].2).then(a.cmp(b)));
         for &i in &*order {
             let (place, radius, volume) = drops[i];
@@ -113,8 +115,8 @@ impl Merging {
                 pairs.push([larger, i]);
                 continue;
             }
-            if levels.last().is_none_or(|largest| radius < 0.5 * largest) {
-                levels.push(radius);
+            if levels.last().is_none_or(|largest| radius <= 0.5 * largest) {
+                levels.push(power_above(radius));
             }
             let level = levels.len() - 1;
             if let Some(last) = cells.insert((level, cell(place, levels[level])), i) {
@@ -123,6 +125,12 @@ impl Merging {
         }
         pairs
     }
+}
+
+/// The smallest power of two that is not below a radius (m).
+fn power_above(radius: f32) -> f32 {
+    let power = f32::from_bits(radius.to_bits() & 0x7f80_0000);
+    if power < radius { 2.0 * power } else { power }
 }
 
 /// The cell of a position in a level with drops of up to this radius (m): two drops that touch

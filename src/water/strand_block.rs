@@ -9,7 +9,7 @@ use crate::{
         LANES, Lane, V3, dispatch, load3, put_numbers, put_vectors, put3, splat3, take_vectors,
         take3,
     },
-    hair::strand::Hair,
+    hair::strand::{Hair, StrandRank},
 };
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
@@ -196,18 +196,20 @@ pub(super) struct StrandBlocks {
 
 impl StrandBlocks {
     /// The indices of `count` strands with these `roots`, in order. Sorted again if `resort` or if their
-    /// number has changed; the grouping affects only speed.
+    /// number has changed. Those in one cell are in the order of their ranks.
     pub fn order(
         &mut self,
         resort: bool,
         count: usize,
-        roots: impl Iterator<Item = Vec3>,
+        roots: impl Iterator<Item = (Vec3, StrandRank)>,
     ) -> &[u32] {
         if resort || self.order.len() != count {
-            let mut keys: Vec<(u64, u32)> = roots.map(place_on_curve).zip(0..).collect();
+            let places = roots.zip(0..);
+            let mut keys: Vec<(u64, StrandRank, u32)> =
+                places.map(|((root, rank), i)| (place_on_curve(root), rank, i)).collect();
             keys.sort_unstable();
             self.order.clear();
-            self.order.extend(keys.into_iter().map(|(_, strand)| strand));
+            self.order.extend(keys.into_iter().map(|(.., strand)| strand));
         }
         &self.order
     }
@@ -245,7 +247,8 @@ mod tests {
         let roots = roots.map(|i| Vec3::new((i % 32) as f32, 5.0, (i / 32) as f32) * 0.003);
         let roots: Vec<Vec3> = roots.collect();
         let mut blocks = StrandBlocks::default();
-        let order = blocks.order(true, 1024, roots.iter().copied()).to_vec();
+        let ranked = |root: &Vec3| (*root, StrandRank::default());
+        let order = blocks.order(true, 1024, roots.iter().map(ranked)).to_vec();
         let mut all = order.clone();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..1024), "each strand once");
@@ -257,8 +260,8 @@ mod tests {
         let mean = widths.sum::<f32>() / 64.0;
         assert!(mean < 0.02, "sixteen strands fill 12 mm by 12 mm, here {mean} m");
         // Kept while `resort` is false, but not for another number of strands.
-        assert_eq!(blocks.order(false, 1024, [Vec3::NAN; 1024].into_iter()), order);
-        assert_eq!(blocks.order(false, 3, roots[..3].iter().copied()).len(), 3);
+        assert_eq!(blocks.order(false, 1024, [Vec3::NAN; 1024].iter().map(ranked)), order);
+        assert_eq!(blocks.order(false, 3, roots[..3].iter().map(ranked)).len(), 3);
     }
 
     #[test]
@@ -344,7 +347,8 @@ mod tests {
     fn non_finite_roots_have_an_order_too() {
         let mut blocks = StrandBlocks::default();
         let roots = [Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::ZERO];
-        let mut order = blocks.order(true, 4, roots.into_iter()).to_vec();
+        let ranked = roots.into_iter().map(|root| (root, StrandRank::default()));
+        let mut order = blocks.order(true, 4, ranked).to_vec();
         order.sort_unstable();
         assert_eq!(order, [0, 1, 2, 3]);
     }

@@ -80,6 +80,7 @@ mod reflection;
 mod rest;
 mod restyle;
 mod rods;
+mod rollback;
 mod settle;
 mod shade;
 mod sleep;

@@ -46,6 +46,12 @@ impl HairReach {
         self.age = LOOK_AGAIN;
     }
 
+    /// Whether it may come to a ball in the world, a center and a radius (m), in a substep.
+    pub(crate) fn is_near(&self, frame: &TickPose, (center, radius): (Vec3, f32)) -> bool {
+        let ball = Ball { center, radius, travel: 0.0 };
+        ball.is_near(frame.now().point_out(self.center), self.room(frame, 1), 1)
+    }
+
     /// How far from its center it may be within a tick (m, in the world).
     pub(crate) fn room(&self, frame: &TickPose, substeps: u32) -> f32 {
         let (before, now) = (frame.before(), frame.now());

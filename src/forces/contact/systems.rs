@@ -119,7 +119,10 @@ fn gather_colliders(
         let collider = stretch.of(collider);
         (Ball::around(&collider, pose), TickCollider { id, collider, pose: pose.clone() })
     });
-    *all = Colliders::new(step.count, placed.collect());
+    let mut placed: Vec<_> = placed.collect();
+    // Not of their rows, which change with what else lives in the world.
+    placed.sort_by_key(|(_, collider)| collider.id.index_u32());
+    *all = Colliders::new(step.count, placed);
 }
 
 /// A collider in a hair's frame, with the motion of its surface during the substep.

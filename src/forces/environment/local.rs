@@ -52,8 +52,9 @@ pub struct WindTravel(pub DVec3);
 #[derive(SystemParam)]
 pub(crate) struct Winds<'w, 's> {
     wind: Option<Res<'w, HairWind>>,
-    blowers: Query<'w, 's, (&'static Blower, &'static TickPose)>,
-    zones: Query<'w, 's, (&'static WindZone, &'static Stretch<WindZone>, &'static TickPose)>,
+    blowers: Query<'w, 's, (Entity, &'static Blower, &'static TickPose)>,
+    zones:
+        Query<'w, 's, (Entity, &'static WindZone, &'static Stretch<WindZone>, &'static TickPose)>,
     travel: Option<Res<'w, WindTravel>>,
     step: Res<'w, HairStep>,
 }
@@ -63,6 +64,13 @@ pub(super) fn travel(wind: Res<HairWind>, time: Res<Time>, mut travel: ResMut<Wi
     let seconds = time.delta_secs_f64();
     let way = wind.clamped().velocity.as_dvec3() * seconds;
     travel.0 = if travel.0.is_finite() { travel.0 + way } else { way };
+}
+
+/// What acts, in an order that does not change with what else lives in the world.
+fn in_order<T>(sources: impl Iterator<Item = (Entity, T)>) -> impl IntoIterator<Item = T> {
+    let mut sources: Vec<_> = sources.collect();
+    sources.sort_by_key(|(id, _)| id.index_u32());
+    sources.into_iter().map(|(_, source)| source)
 }
 
 impl Winds<'_, '_> {
@@ -77,14 +85,15 @@ impl Winds<'_, '_> {
 
     /// Whether any source sets the bonds of dry hair.
     pub(crate) fn dry(&self) -> bool {
-        !self.blowers.is_empty() || self.zones.iter().any(|(zone, ..)| zone.drying > 0.0)
+        !self.blowers.is_empty() || self.zones.iter().any(|(_, zone, ..)| zone.drying > 0.0)
     }
 
     /// Seen from a frame.
     pub(crate) fn seen_from(&self, frame: &TickPose) -> LocalWinds {
         let pose = frame.now();
-        let blowers = (self.blowers.iter())
-            .map(|(blower, moved)| (blower.clamped(), moved))
+        let blowers = in_order(self.blowers.iter().map(|of| (of.0, of)));
+        let blowers = (blowers.into_iter())
+            .map(|(_, blower, moved)| (blower.clamped(), moved))
             .filter(|(blower, _)| blower.strength > 0.0)
             .map(|(blower, moved)| {
                 let at = moved.now();
@@ -96,7 +105,8 @@ impl Winds<'_, '_> {
                 }
             })
             .filter(|seen| seen.nozzle.length() < FARTHEST);
-        let zones = self.zones.iter().map(|(zone, stretch, moved)| {
+        let zones = in_order(self.zones.iter().map(|of| (of.0, of)));
+        let zones = zones.into_iter().map(|(_, zone, stretch, moved)| {
             let at = moved.now();
             LocalZone {
                 zone: stretch.of(zone),

@@ -16,6 +16,7 @@ mod on_gpu;
 mod owner;
 mod owner_systems;
 mod per_hair;
+mod rank;
 mod repair;
 mod required;
 mod strand_sleep;
@@ -40,6 +41,7 @@ pub(crate) use owner_systems::HairOnGpu;
 pub(crate) use owner_systems::is_on_gpu;
 pub(crate) use owner_systems::{FollowsHere, HairHere, Here, SimulatedHere};
 pub(crate) use per_hair::PerHair;
+pub(crate) use rank::StrandRank;
 pub(crate) use required::keep_required;
 pub(crate) use strand_sleep::KinematicStrand;
 pub use strand_sleep::{SleepCounts, SleepPose, StrandSleep};
@@ -145,7 +147,7 @@ const FAULT_COOLDOWN: u16 = 360;
 /// the number of nodes is fixed.
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[reflect(Component, Default, Clone)]
-#[require(StrandHistory, AddedMass, StrandSleep, SleepPose)]
+#[require(StrandHistory, AddedMass, StrandSleep, SleepPose, StrandRank)]
 pub struct Strand {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,

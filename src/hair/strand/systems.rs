@@ -3,11 +3,12 @@
 use super::{
     AddedMass, Hair, HeldNodes, HeldNodesState, Here, KinematicStrand, MotionOwner, PerHair,
     Regroomed, Settling, SimulatedHere, SleepCounts, SleepPose, Strand, StrandError, StrandHistory,
-    StrandModel, StrandOf, StrandSleep, Strands, TickPose,
+    StrandModel, StrandOf, StrandRank, StrandSleep, Strands, TickPose,
     frame::{ALIKE, Aim, HairInertia, Pose},
     held::report_out_of_reach,
     keep_required,
     owner_systems::{begin_settling, end_settling, update_owners},
+    rank::rank_strands,
     teleport::{ShiftWorld, shift_poses},
 };
 use crate::{
@@ -53,6 +54,7 @@ impl Plugin for StrandPlugin {
         keep_required::<Strand, AddedMass>(app);
         keep_required::<Strand, StrandSleep>(app);
         keep_required::<Strand, SleepPose>(app);
+        keep_required::<Strand, StrandRank>(app);
         keep_required::<HeldNodes, HeldNodesState>(app);
         app.register_type::<Hair>()
             .register_type::<TickPose>()
@@ -85,7 +87,9 @@ impl Plugin for StrandPlugin {
                     (
                         repair_strands::<Without<KinematicStrand>>,
                         repair_strands::<With<KinematicStrand>>.run_if(first_substep),
-                        (note_regrooming, report_out_of_reach).chain().run_if(first_substep),
+                        (note_regrooming, rank_strands, report_out_of_reach)
+                            .chain()
+                            .run_if(first_substep),
                         store_history,
                     )
                         .chain()

@@ -2,7 +2,7 @@
 
 use crate::{
     base::lanes::LANES,
-    hair::strand::{AddedMass, Held, Strand},
+    hair::strand::{AddedMass, Held, Strand, StrandRank},
     solver::rod::block::BlockLanes,
 };
 use bevy::{math::Isometry3d, prelude::*};
@@ -35,6 +35,7 @@ pub(super) enum Attempt {
 pub(super) struct Member<'a, K> {
     pub(super) entity: Entity,
     pub(super) hair: Entity,
+    pub(super) rank: StrandRank,
     pub(super) strand: &'a mut Strand,
     pub(super) added: &'a AddedMass,
     pub(super) held: Option<Held<'a>>,

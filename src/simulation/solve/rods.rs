@@ -18,7 +18,7 @@ use crate::{
     hair::{
         strand::{
             AddedMass, Hair, Held, HeldNodes, HeldNodesState, SimulatedHere, Strand, StrandModel,
-            StrandOf, StrandSleep, TickPose, lacks_strands,
+            StrandOf, StrandRank, StrandSleep, TickPose, lacks_strands,
         },
         worn,
     },
@@ -165,7 +165,7 @@ fn step_rods(
     hairs: Query<(Option<&Obstacles>, &TickPose), With<Hair>>,
     mut strands: Query<
         (
-            (Entity, &StrandOf, &StrandSleep),
+            (Entity, &StrandOf, &StrandRank, &StrandSleep),
             &mut Strand,
             &RestShape,
             &Bonds,
@@ -225,15 +225,15 @@ fn step_rods(
         nodes,
         &scratch,
         params_of,
-        |((entity, of, sleep), strand, rest, bonds, added, held)| {
+        |((entity, of, rank, sleep), strand, rest, bonds, added, held)| {
             let is_stepped = sleep.is_simulated()
                 && strand.nodes() >= 2
                 && rest.darboux.len() == strand.edges()
                 && rest.stiffness.len() == strand.edges();
-            let (entity, hair) = (*entity, of.0);
+            let (entity, hair, rank) = (*entity, of.0, *rank);
             let held = Held::of(held.0, held.1);
             let own = RodColumns { rest, bonds };
-            is_stepped.then_some(Member { entity, hair, strand, added, held, own })
+            is_stepped.then_some(Member { entity, hair, rank, strand, added, held, own })
         },
     );
     faults.write_batch(lost);

@@ -19,7 +19,7 @@ use crate::{
     hair::{
         strand::{
             AddedMass, Held, HeldNodes, HeldNodesState, SimulatedHere, Strand, StrandModel,
-            StrandOf, StrandSleep, TickPose, lacks_strands,
+            StrandOf, StrandRank, StrandSleep, TickPose, lacks_strands,
         },
         worn,
     },
@@ -109,7 +109,7 @@ fn step_springs(
     mut strands: Query<
         (
             Entity,
-            &StrandOf,
+            (&StrandOf, &StrandRank),
             &StrandSleep,
             &mut Strand,
             &AddedMass,
@@ -144,13 +144,14 @@ fn step_springs(
         nodes,
         &scratch,
         params_of,
-        |(entity, of, sleep, strand, added, held)| {
+        |(entity, (of, rank), sleep, strand, added, held)| {
             let is_stepped = sleep.is_simulated() && strand.nodes() >= 2;
-            let (entity, hair) = (*entity, of.0);
+            let (entity, hair, rank) = (*entity, of.0, *rank);
             let held = Held::of(held.0, held.1);
             is_stepped.then_some(Member {
                 entity,
                 hair,
+                rank,
                 strand,
                 added,
                 held,

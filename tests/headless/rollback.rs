@@ -1,0 +1,149 @@
+//! What a hair's bits hang on: its own state, not what else lives in the world.
+
+use crate::common::*;
+use bevy::prelude::*;
+use bevy_keratin::prelude::*;
+
+/// Where the other character stands (m).
+const FAR: Vec3 = Vec3::new(50.0, 0.0, 0.0);
+
+/// What hair goes through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Scene {
+    Dry,
+    Gusts,
+    Wet,
+}
+
+const SCENES: [Scene; 3] = [Scene::Dry, Scene::Gusts, Scene::Wet];
+
+/// A head with hair in locks that touch, and what the scene does to it. Returns the hair.
+fn character(world: &mut World, scene: Scene, at: Vec3) -> Entity {
+    let head = HairCollider::sphere(0.09).unwrap();
+    world.spawn((head, Transform::from_translation(at)));
+    let shoulders = HairCollider::capsule(0.07, 0.3).unwrap();
+    let across = Quat::from_rotation_z(core::f32::consts::FRAC_PI_2);
+    let below = at - Vec3::Y * 0.2;
+    world.spawn((shoulders, Transform::from_translation(below).with_rotation(across)));
+    let hair = world.spawn((Hair, Transform::from_translation(at))).id();
+    for i in 0..50 {
+        let turn = 2.4 * i as f32;
+        let up = 0.95 - 0.01 * i as f32;
+        let out = (1.0 - up * up).sqrt();
+        let out = Vec3::new(turn.cos() * out, up, turn.sin() * out);
+        let nodes = 8 + i % 3;
+        let along = |k: usize| 0.092 + 0.018 * k as f32;
+        let points: Vec<Vec3> = (0..nodes).map(|k| out * along(k)).collect();
+        world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
+    }
+    if scene == Scene::Wet {
+        world.trigger(SoakHair::dripping(hair));
+        let cloud =
+            Transform::from_translation(at + Vec3::Y * 0.4).looking_to(Dir3::NEG_Y, Dir3::X);
+        world.spawn((Shower { opening: 0.12, ..Shower::rain(400.0, 0.12).unwrap() }, cloud));
+    }
+    hair
+}
+
+fn app_in(scene: Scene) -> App {
+    let mut app = test_app(60.0);
+    app.insert_resource(HairDefault(StrandContact { radius: 4e-3, ..default() }));
+    if scene == Scene::Gusts {
+        app.insert_resource(HairWind {
+            velocity: Vec3::new(3.0, 0.0, 1.0),
+            gusts: 0.5,
+            ..default()
+        });
+    }
+    app
+}
+
+fn strands_of(app: &App, hair: Entity) -> Vec<Entity> {
+    app.world().get::<Strands>(hair).unwrap().collection().to_vec()
+}
+
+/// All the bits of a hair's motion and water.
+fn bits(app: &App, hair: Entity) -> Vec<u64> {
+    let mut bits = Vec::new();
+    for strand in strands_of(app, hair) {
+        let world = app.world();
+        let water = world.get::<Moisture>(strand).unwrap();
+        bits.extend(water.film().iter().chain(water.bound()).map(|water| water.to_bits()));
+        let strand = world.get::<Strand>(strand).unwrap();
+        let vectors = strand.positions().iter().chain(strand.velocities());
+        bits.extend(vectors.flat_map(|v| v.to_array()).map(|x| u64::from(x.to_bits())));
+        let turns = strand.orientations().iter().flat_map(|q| q.to_array());
+        bits.extend(turns.map(|x| u64::from(x.to_bits())));
+    }
+    bits
+}
+
+/// What else lives in the world.
+#[derive(Clone, Copy, Debug)]
+enum Other {
+    Stays,
+    Leaves,
+    LosesAStrand,
+    Comes,
+    /// Nobody, but some strands carry a marker, from the start or from then on.
+    Marker,
+}
+
+#[derive(Component)]
+struct Marker;
+
+/// The bits of a hair after a second, in a world with something else in it or alone.
+fn after_a_second(scene: Scene, other: Option<Other>) -> Vec<u64> {
+    let mut app = app_in(scene);
+    let comes_first = matches!(other, Some(Other::Stays | Other::Leaves | Other::LosesAStrand));
+    let before: Vec<Entity> = app.world_mut().query::<Entity>().iter(app.world()).collect();
+    let there = comes_first.then(|| character(app.world_mut(), scene, FAR));
+    let theirs: Vec<Entity> = app.world_mut().query::<Entity>().iter(app.world()).collect();
+    let theirs: Vec<Entity> = theirs.into_iter().filter(|e| !before.contains(e)).collect();
+    let hair = character(app.world_mut(), scene, Vec3::ZERO);
+    let mine = strands_of(&app, hair);
+    run(&mut app, 0.3);
+    match other {
+        Some(Other::Leaves) => theirs.into_iter().for_each(|e| {
+            app.world_mut().try_despawn(e).ok();
+        }),
+        Some(Other::LosesAStrand) => {
+            let one = strands_of(&app, there.unwrap())[3];
+            app.world_mut().despawn(one);
+        }
+        Some(Other::Comes) => {
+            character(app.world_mut(), scene, FAR);
+        }
+        Some(Other::Marker) => mine.iter().step_by(3).for_each(|e| {
+            app.world_mut().entity_mut(*e).insert(Marker);
+        }),
+        Some(Other::Stays) | None => {}
+    }
+    run(&mut app, 0.7);
+    bits(&app, hair)
+}
+
+fn hangs_on_nothing_else(scene: Scene) {
+    let alone = after_a_second(scene, None);
+    use Other::*;
+    let different: Vec<Other> = [Stays, Leaves, LosesAStrand, Comes, Marker]
+        .into_iter()
+        .filter(|other| after_a_second(scene, Some(*other)) != alone)
+        .collect();
+    assert!(different.is_empty(), "{scene:?}: moved by another that {different:?}");
+}
+
+#[test]
+fn bits_of_dry_hair_hang_on_nothing_else_in_the_world() {
+    hangs_on_nothing_else(SCENES[0]);
+}
+
+#[test]
+fn bits_of_hair_in_gusts_hang_on_nothing_else_in_the_world() {
+    hangs_on_nothing_else(SCENES[1]);
+}
+
+#[test]
+fn bits_of_wet_hair_hang_on_nothing_else_in_the_world() {
+    hangs_on_nothing_else(SCENES[2]);
+}
