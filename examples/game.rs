@@ -23,8 +23,8 @@ fn main() {
     app.add_plugins((DefaultPlugins, HairPlugins::default()))
         // Hair dries in minutes, players wait seconds.
         .insert_resource(HairProcessTime(60.0))
-        // Two milliseconds for the crowd; the hero comes first by its importance.
-        .insert_resource(HairBudget { milliseconds: 2.0, ..default() })
+        // The hero comes first by its importance.
+        .insert_resource(HairBudget { milliseconds: 8.0, ..default() })
         .insert_resource(ClearColor(Color::srgb(0.45, 0.52, 0.6)))
         .add_systems(Startup, (world, characters))
         .add_systems(Update, (walk, stroll, turn_heads, follow, weather, barber, report))
@@ -37,7 +37,8 @@ fn main() {
 /// Who the player is.
 #[derive(Component, Default)]
 struct Hero {
-    /// Upward (m/s).
+    /// Above the ground (m), and upward (m/s).
+    height: f32,
     rise: f32,
     /// Since a key moved it (s).
     idle: f32,
@@ -54,26 +55,27 @@ struct Saved(Vec<u8>);
 const LAKE: Vec3 = Vec3::new(-5.0, 0.0, 0.0);
 const FIRE: Vec3 = Vec3::new(3.0, 0.0, 0.0);
 
+/// Height of the ground; the lake is as deep as a character's shoulders are high.
+fn ground(at: Vec3) -> f32 {
+    let shore = (3.2 - at.with_y(0.0).distance(LAKE)).clamp(0.0, 1.6) / 1.6;
+    -1.4 * shore * shore * (3.0 - 2.0 * shore)
+}
+
 fn world(mut commands: Commands, assets: Res<AssetServer>) {
     let plain = |color: Color| MeshMaterial3d(assets.add(StandardMaterial::from(color)));
     let grass = plain(Color::srgb(0.3, 0.38, 0.22));
     let stone = plain(Color::srgb(0.4, 0.38, 0.36));
-    let water = plain(Color::srgba(0.15, 0.3, 0.4, 0.6));
+    let water = plain(Color::srgb(0.15, 0.28, 0.36));
+    commands.spawn((Mesh3d(assets.add(Plane3d::default().mesh().size(60.0, 60.0).build())), grass));
+    commands.spawn((HairCollider::plane(Dir3::Y), Transform::from_xyz(0.0, -1.4, 0.0)));
+    let lying = Quat::from_rotation_x(-core::f32::consts::FRAC_PI_2);
     commands.spawn((
-        Mesh3d(assets.add(Plane3d::default().mesh().size(60.0, 60.0).build())),
-        grass,
-        HairCollider::plane(Dir3::Y),
+        Mesh3d(assets.add(Circle::new(3.0).mesh().build())),
+        water,
+        Transform::from_translation(LAKE + Vec3::Y * 0.01).with_rotation(lying),
     ));
-    // The lake comes up to the shoulders of who stands in it.
-    let shore = Transform::from_translation(LAKE).with_scale(Vec3::new(2.5, 1.0, 2.5));
-    commands.spawn((Mesh3d(assets.add(Circle::new(1.0).mesh().build())), water, {
-        let level = shore.translation + Vec3::Y * 1.45;
-        Transform::from_translation(level)
-            .with_rotation(Quat::from_rotation_x(-core::f32::consts::FRAC_PI_2))
-            .with_scale(Vec3::splat(2.5))
-    }));
-    if let Ok(lake) = WaterVolume::pool(Vec3::new(1.7, 0.725, 1.7)) {
-        commands.spawn((lake, Transform::from_translation(LAKE + Vec3::Y * 0.725)));
+    if let Ok(lake) = WaterVolume::pool(Vec3::new(3.0, 0.7, 3.0)) {
+        commands.spawn((lake, Transform::from_translation(LAKE - Vec3::Y * 0.7)));
     }
     commands.spawn((
         WindZone::fire(),
@@ -138,14 +140,15 @@ fn walk(
         let facing = Transform::default().looking_to(-ahead, Vec3::Y).rotation;
         at.rotation = at.rotation.slerp(facing, (6.0 * dt).min(1.0));
     }
-    if at.translation.y <= 0.0 && keys.just_pressed(Space) {
+    if hero.height == 0.0 && keys.just_pressed(Space) {
         hero.rise = 4.0;
     }
     hero.rise -= 9.81 * dt;
-    at.translation.y = (at.translation.y + hero.rise * dt).max(0.0);
-    if at.translation.y == 0.0 {
+    hero.height = (hero.height + hero.rise * dt).max(0.0);
+    if hero.height == 0.0 {
         hero.rise = 0.0;
     }
+    at.translation.y = ground(at.translation) + hero.height;
 }
 
 /// The crowd goes round and round.
@@ -169,7 +172,7 @@ fn follow(
     hero: Single<&Transform, With<Hero>>,
     mut camera: Single<&mut Transform, (With<Camera3d>, Without<Hero>)>,
 ) {
-    let at = hero.translation.with_y(0.0);
+    let at = hero.translation.with_y(0.6 * hero.translation.y);
     camera.translation = camera.translation.lerp(at + Vec3::new(0.5, 1.75, 2.2), 0.08);
     camera.look_at(at + Vec3::Y * 1.35, Vec3::Y);
 }

@@ -232,7 +232,7 @@ fn ties_rods_and_held_nodes_beyond_the_cut_let_go() {
     assert!(tied(&app) > 10);
     // Nothing that a tie asks for is out of reach.
     let said = faults(&mut app);
-    assert!(said.iter().all(|fault| fault.message.contains("colliders leave")), "{said:#?}");
+    assert!(said.is_empty(), "{said:#?}");
     request(&mut app, CutHair::all(hair, CutBy::Length(0.05)));
     run(&mut app, 2.0);
     // A strand that grows beside the ring reaches it still.

@@ -36,6 +36,9 @@ pub struct HeldNodesState {
     /// How often it could not since it was last at its targets, and how often in a row.
     pub(crate) refused: u16,
     in_a_row: u8,
+    /// Whether it is held by what leads strands itself, by many ways at a time: those of them that give way meanwhile are
+    /// no news.
+    pub(crate) is_led: bool,
 }
 
 /// Pace of a strand that could not follow, as a share of the way that was refused; how much faster it may go after
@@ -273,7 +276,8 @@ pub(super) fn report_out_of_reach(
                 .max_by(|a, b| a.1.total_cmp(&b.1))
                 .filter(|(_, short)| *short > (1.0 - TAUT) * strand.length())
         };
-        let by_way = if state.refused >= REFUSALS { by_way() } else { None };
+        let is_news = state.refused >= REFUSALS && !state.is_led;
+        let by_way = if is_news { by_way() } else { None };
         let message = match (by_length, by_way) {
             (Some((node, short)), _) => Some(format!(
                 "node {node} of the strand is held {short} m farther away than hair of {} m reaches; \

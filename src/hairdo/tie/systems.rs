@@ -12,7 +12,7 @@ use crate::{
     },
     hair::{
         strand::{
-            HeldNodes, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required, lacks_strands,
+            HeldNodes, HeldNodesState, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required, lacks_strands,
         },
         worn::HairsOf,
     },
@@ -159,11 +159,11 @@ fn hold(
     hairs: Query<&TickPose>,
     ties: Query<(&HairTie, &TickPose)>,
     mut strands: Query<
-        (&StrandOf, &Strand, &Tied, &mut TieProgress, &mut HeldNodes),
+        (&StrandOf, &Strand, &Tied, &mut TieProgress, &mut HeldNodes, &mut HeldNodesState),
         Without<WoundOn>,
     >,
 ) {
-    for (of, strand, tied, mut tie, mut held) in &mut strands {
+    for (of, strand, tied, mut tie, mut held, mut state) in &mut strands {
         let (Ok(hair), Ok((ring, at))) = (hairs.get(of.0), ties.get(tied.0)) else { continue };
         if tie.waits() {
             continue;
@@ -177,6 +177,7 @@ fn hold(
         } else {
             place
         };
+        state.bypass_change_detection().is_led = true;
         let node = tie.node as usize;
         let (Some(root), true) = (strand.positions().first(), node < strand.nodes()) else {
             continue;
@@ -192,9 +193,13 @@ fn hold(
 }
 
 /// Releases a strand that leaves its tie for any reason.
-fn release(left: On<Remove, Tied>, mut strands: Query<(&mut TieProgress, &mut HeldNodes)>) {
-    if let Ok((mut tie, mut held)) = strands.get_mut(left.entity) {
+fn release(
+    left: On<Remove, Tied>,
+    mut strands: Query<(&mut TieProgress, &mut HeldNodes, &mut HeldNodesState)>,
+) {
+    if let Ok((mut tie, mut held, mut state)) = strands.get_mut(left.entity) {
         held.targets.clear();
+        state.is_led = false;
         *tie = default();
     }
 }
