@@ -60,6 +60,7 @@ mod book {
         Colliders: "colliders.md",
         FirstHour: "first-hour.md",
         Grooms: "grooms.md",
+        Rollback: "rollback.md",
         Saving: "saving.md",
         Styling: "styling.md",
         Water: "water.md",

@@ -9,6 +9,7 @@ pub(crate) mod parallel;
 pub mod schedule;
 pub mod setting;
 pub(crate) mod stretch;
+pub(crate) mod tape;
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {

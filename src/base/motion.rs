@@ -5,6 +5,7 @@
 //! known, and find each transform where it was on its way at their time. What fixed ticks themselves
 //! move, for instance physics, is where each of them left it. A hierarchy may mix both.
 
+use crate::base::tape::Tape;
 use bevy::{
     ecs::{entity::EntityHashMap, system::SystemParam},
     prelude::*,
@@ -125,6 +126,17 @@ impl Track {
         [begins.map_or_else(|| self.before_tick(before), |(_, at)| at), self.in_tick(before)]
     }
 
+    /// From the next tick on, of this `index` in the frame, it goes on from this motion.
+    fn go_on_from(&mut self, index: usize, motion: [Transform; 2]) {
+        self.begins = None;
+        self.ticks.resize(index, motion[1]);
+        match index {
+            0 => self.last_ticks = motion,
+            1 => (self.last_ticks[1], self.ticks[0]) = (motion[0], motion[1]),
+            _ => (self.ticks[index - 2], self.ticks[index - 1]) = (motion[0], motion[1]),
+        }
+    }
+
     /// Where it was before the motion of this frame or tick, if it has moved in it as it did before.
     fn carried_back(&self, tick: &TickMoment, frame_seconds: f32) -> Transform {
         if self.by_ticks {
@@ -211,6 +223,8 @@ fn between([from, to]: &[Transform; 2], t: f32) -> Transform {
 #[derive(Resource, Default, Debug)]
 pub(crate) struct WorldMotion {
     tracks: EntityHashMap<Track>,
+    /// Scratch space of snapshots.
+    known: Vec<Entity>,
     /// The tick that runs.
     pub(crate) tick: TickMoment,
     /// How many frames were closed.
@@ -306,6 +320,37 @@ impl WorldMotion {
         }
         self.noted += 1;
         moment
+    }
+
+    /// The tick that ran last, in the present frame.
+    pub(crate) fn moment(&self) -> TickMoment {
+        TickMoment { frame: self.frames, ..self.tick }
+    }
+
+    /// Takes down, or puts back, how things that ticks move have moved in the last one.
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        let index = self.noted;
+        let transform = |tape: &mut Tape<'_>, at: &mut Transform| {
+            tape.values([&mut at.translation, &mut at.scale]);
+            tape.value(&mut at.rotation);
+        };
+        let mut known = core::mem::take(&mut self.known);
+        known.clear();
+        known.extend(self.tracks.keys());
+        known.sort_unstable_by_key(|entity| entity.index_u32());
+        let count = tape.count(known.len(), size_of::<u64>());
+        known.resize(count, Entity::PLACEHOLDER);
+        for mut entity in known.drain(..) {
+            tape.entity(&mut entity);
+            let track = self.tracks.get_mut(&entity);
+            let mut motion =
+                track.as_ref().map_or_else(default, |track| track.motion_before_tick(index));
+            motion.iter_mut().for_each(|at| transform(tape, at));
+            if let (Tape::Read(Some(_)), Some(track)) = (&*tape, track) {
+                track.go_on_from(index, motion);
+            }
+        }
+        self.known = known;
     }
 
     /// Begins a tick.

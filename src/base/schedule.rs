@@ -563,9 +563,16 @@ const MOST_TICKS: usize = 1024;
 
 /// Ticks that are to run, with the clocks that they run by.
 #[derive(Resource, Default)]
-struct NotedTicks {
+pub(crate) struct NotedTicks {
     waiting: Vec<(Time, TickMoment)>,
     reported: bool,
+}
+
+impl NotedTicks {
+    /// How many wait to be run.
+    pub(crate) fn waiting(&self) -> usize {
+        self.waiting.len()
+    }
 }
 
 /// Says once that nothing runs the ticks that wait.

@@ -1,8 +1,9 @@
-//! Shapes that hair has been given: [`style`] measures how much of one is left, [`tie`] holds strands together, [`cut`] shortens them, `save`
-//! keeps a hairdo as bytes.
+//! Shapes that hair has been given: [`style`] measures how much of one is left, [`tie`] holds strands together, [`cut`]
+//! shortens them, `save` keeps a hairdo as bytes, [`rollback`] the state of a tick.
 
 pub mod cut;
 mod region;
+pub mod rollback;
 #[cfg(feature = "save")]
 pub mod save;
 pub mod style;
@@ -14,6 +15,9 @@ pub use region::StrandRegion;
 pub mod prelude {
     pub use crate::hairdo::StrandRegion;
     pub use crate::hairdo::cut::{CutBy, CutHair, HairCut};
+    pub use crate::hairdo::rollback::{
+        HairSnapshot, HairSnapshots, HairWorldSnapshot, SnapshotError,
+    };
     #[cfg(feature = "save")]
     pub use crate::hairdo::save::{
         ApplyHairdo, CaptureHairdo, Hairdo, HairdoApplied, HairdoCaptured, HairdoError,

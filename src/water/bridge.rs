@@ -20,7 +20,7 @@ pub(crate) struct IsWet(pub(crate) bool);
 
 /// Whether any strand of a hair holds water beyond the regain at room humidity. Updated once a tick.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct HoldsWater(bool);
+pub(crate) struct HoldsWater(pub(crate) bool);
 
 /// Triggered on a wet [`Hair`] when it has dried to the regain at room humidity, then on its wearer
 /// ([`WornBy`]). An observer of the whole app sees both; `On::original_event_target` is the hair.

@@ -5,7 +5,10 @@ use super::{
     model::{ball_radius, ball_volume},
 };
 use crate::{
-    base::setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+    base::{
+        setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
+        tape::Tape,
+    },
     hair::strand::TickPose,
 };
 use bevy::prelude::*;
@@ -152,6 +155,29 @@ impl Droplet {
         }
     }
 
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.values([&mut self.position, &mut self.velocity, &mut self.before]);
+        tape.values([&mut self.volume, &mut self.counted.0]);
+        tape.values([&mut self.r_min, &mut self.r_max, &mut self.lag, &mut self.lying]);
+        tape.value(&mut self.touch_count);
+        tape.flags([&mut self.drip]);
+        let mut is_carried = self.ride.is_some();
+        tape.flags([&mut is_carried]);
+        if !is_carried {
+            self.ride = None;
+            return;
+        }
+        let ride = StrandPoint { strand: Entity::PLACEHOLDER, at: 0.0 };
+        let ride = self.ride.get_or_insert(ride);
+        tape.entity(&mut ride.strand);
+        tape.value(&mut ride.at);
+    }
+
+    /// The ledger counts none of its water.
+    pub(crate) fn forget(&mut self) {
+        self.counted.0 = 0.0;
+    }
+
     /// What droplets that are taken one after the other are sorted by: their rows change with what else lives in the
     /// world. Equal ones are where it does not matter.
     pub(super) fn order(&self) -> ([u32; 3], u64, [u32; 3]) {
@@ -248,6 +274,13 @@ setting! {
 }
 
 impl Shower {
+    /// What it has emitted.
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.value(&mut self.emitted);
+        tape.value(&mut self.due);
+        tape.flags([&mut self.is_limited]);
+    }
+
     /// Largest number of drops per substep: that of the highest rate in 1/50 s. A longer substep
     /// leaves the rest out, which is reported.
     pub const MAX_DROPS: u64 = 2000;

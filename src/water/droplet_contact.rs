@@ -15,6 +15,7 @@ use crate::{
         parallel::{Nanos, TASK, emptied, for_each_block, prefetch},
         schedule::{EffectiveSubsteps, HairProcessTime, HairStep},
         setting::{Ranged, Settings},
+        tape::Tape,
     },
     forces::{
         contact::{Colliders, HairReach, WetRow},
@@ -44,7 +45,7 @@ fn chunk_size(strands: usize, drops: usize) -> usize {
 
 /// Buffers of a substep, reused in the next.
 #[derive(Resource, Default)]
-pub(super) struct WaterField {
+pub(crate) struct WaterField {
     /// The droplets around each hair, and the results of its work chunks.
     fields: Vec<(Field, Vec<DropletContacts>)>,
     /// Strands that carry a droplet's weight.
@@ -55,6 +56,15 @@ pub(super) struct WaterField {
     /// Those of the droplets around one hair.
     local: Vec<Outcome>,
     buffers: Vec<Buffers>,
+}
+
+impl WaterField {
+    /// What a substep finds of the one before.
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        let count = tape.count(self.loaded.len(), size_of::<u64>());
+        self.loaded.resize(count, Entity::PLACEHOLDER);
+        self.loaded.iter_mut().for_each(|strand| tape.entity(strand));
+    }
 }
 
 /// Buffers for a hair's strands, unsorted and sorted.
@@ -117,6 +127,11 @@ pub(super) fn wet_strands(
         scratch.bypass_change_detection();
     let substep = step.dt;
     let Some(step) = steps.shared() else { return };
+    if step.is_first {
+        hairs.iter_mut().for_each(|(_, _, mut blocks, _)| {
+            blocks.bypass_change_detection().forget();
+        });
+    }
     // Droplets have added to the mass of the strands that carried them.
     for strand in loaded.drain(..) {
         if let Ok((_, of, strand, mut added_mass, moisture, _)) = strands.get_mut(strand) {
@@ -151,8 +166,7 @@ pub(super) fn wet_strands(
     let process = process.clamped().0;
     outcomes.clear();
     outcomes.resize(drops.len(), Outcome::default());
-    let mut wet_hairs =
-        wet_hairs(&mut hairs, &wetting, &mut strands, step.is_first, &drops, buffers);
+    let mut wet_hairs = wet_hairs(&mut hairs, &wetting, &mut strands, &drops, buffers);
     fields.resize_with(fields.len().max(wet_hairs.len()), default);
     for (WetHair { pose, wetting, drops: near, strands }, (field, chunks)) in
         wet_hairs.iter_mut().zip(&mut *fields)
@@ -233,7 +247,6 @@ fn wet_hairs<'a>(
     hairs: &mut Query<RainedOn, With<Hair>>,
     wetting: &Settings<HairWetting>,
     strands: &'a mut Query<AmongDroplets, Here>,
-    resort: bool,
     drops: &[Mut<'_, Droplet>],
     buffers: &mut Vec<Buffers>,
 ) -> Vec<WetHair<'a>> {
@@ -287,7 +300,7 @@ fn wet_hairs<'a>(
     let sorted = wet_hairs.values.into_iter().map(|(hair, mut wet_hair, mut unsorted)| {
         if let Ok((_, _, mut blocks, _)) = hairs.get_mut(hair) {
             let roots = unsorted.iter().flatten().map(|s| (s.strand.positions()[0], s.rank));
-            let order = blocks.bypass_change_detection().order(resort, unsorted.len(), roots);
+            let order = blocks.bypass_change_detection().order(unsorted.len(), roots);
             for (i, k) in order.iter().enumerate() {
                 // The order is not sequential in memory.
                 let later = order.get(i + 16).and_then(|k| unsorted.get(*k as usize));

@@ -11,6 +11,7 @@ use crate::{
         parallel::{AHEAD, Nanos, for_each_part, in_turn, prefetch, tables},
         schedule::{EffectiveSubsteps, HairProcessTime, HairStep},
         setting::{Ranged, Settings, report},
+        tape::Tape,
     },
     forces::environment::{
         Blown, BlownAir, Gravity, LocalWinds, Winds,
@@ -39,13 +40,23 @@ const HARDLY_DRIES: f32 = 1e-6;
 
 /// What the exchange of this tick found in any hair.
 #[derive(Resource, Clone, Copy, Debug, Default)]
-pub(super) struct FoundWater {
+pub(crate) struct FoundWater {
     /// Whether there is water.
     pub(super) any: bool,
     /// Whether some of it changes in every tick, such as a film.
     pub(super) busy: bool,
     /// Process time since bound water last moved (s).
     waited: f32,
+    /// For how many more substeps hair may emerge from a volume of water that is gone.
+    pub(super) emerging: u32,
+}
+
+impl FoundWater {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.flags([&mut self.any, &mut self.busy]);
+        tape.value(&mut self.waited);
+        tape.value(&mut self.emerging);
+    }
 }
 
 /// Repairs moisture of new strands and moisture written from outside, for instance by an inspector. Our

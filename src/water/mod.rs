@@ -30,13 +30,17 @@ mod systems;
 mod volume;
 
 pub use bridge::HairDried;
-pub(crate) use bridge::IsWet;
+pub(crate) use bridge::{HoldsWater, IsWet};
 pub use droplet::{Droplet, Shower, StrandPoint};
 pub use moisture::{HairWetting, Moisture};
 pub use systems::WaterPlugin;
 pub use volume::WaterVolume;
+pub(crate) use {droplet_contact::WaterField, exchange::FoundWater};
 
-use crate::base::setting::{Ranged, ValueRange, Violations, setting};
+use crate::base::{
+    setting::{Ranged, ValueRange, Violations, setting},
+    tape::Tape,
+};
 use bevy::prelude::*;
 
 setting! {
@@ -153,6 +157,11 @@ pub struct WaterLedger {
 }
 
 impl WaterLedger {
+    /// Takes it down, or puts it back.
+    pub(crate) fn on_tape(&mut self, tape: &mut Tape<'_>) {
+        tape.values([&mut self.water_in, &mut self.held, &mut self.water_out]);
+    }
+
     /// Counts water that was added (m³), or removed if negative.
     fn record(&mut self, change: f64) {
         *(if change > 0.0 { &mut self.water_in } else { &mut self.water_out }) += change.abs();

@@ -195,15 +195,19 @@ pub(super) struct StrandBlocks {
 }
 
 impl StrandBlocks {
-    /// The indices of `count` strands with these `roots`, in order. Sorted again if `resort` or if their
-    /// number has changed. Those in one cell are in the order of their ranks.
+    /// From now on they are sorted again.
+    pub fn forget(&mut self) {
+        self.order.clear();
+    }
+
+    /// The indices of `count` strands with these `roots`, in order. Kept until their number changes or they are
+    /// forgotten. Those in one cell are in the order of their ranks.
     pub fn order(
         &mut self,
-        resort: bool,
         count: usize,
         roots: impl Iterator<Item = (Vec3, StrandRank)>,
     ) -> &[u32] {
-        if resort || self.order.len() != count {
+        if self.order.len() != count {
             let places = roots.zip(0..);
             let mut keys: Vec<(u64, StrandRank, u32)> =
                 places.map(|((root, rank), i)| (place_on_curve(root), rank, i)).collect();
@@ -248,7 +252,7 @@ mod tests {
         let roots: Vec<Vec3> = roots.collect();
         let mut blocks = StrandBlocks::default();
         let ranked = |root: &Vec3| (*root, StrandRank::default());
-        let order = blocks.order(true, 1024, roots.iter().map(ranked)).to_vec();
+        let order = blocks.order(1024, roots.iter().map(ranked)).to_vec();
         let mut all = order.clone();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..1024), "each strand once");
@@ -259,9 +263,9 @@ mod tests {
         });
         let mean = widths.sum::<f32>() / 64.0;
         assert!(mean < 0.02, "sixteen strands fill 12 mm by 12 mm, here {mean} m");
-        // Kept while `resort` is false, but not for another number of strands.
-        assert_eq!(blocks.order(false, 1024, [Vec3::NAN; 1024].iter().map(ranked)), order);
-        assert_eq!(blocks.order(false, 3, roots[..3].iter().map(ranked)).len(), 3);
+        // Kept, but not for another number of strands.
+        assert_eq!(blocks.order(1024, [Vec3::NAN; 1024].iter().map(ranked)), order);
+        assert_eq!(blocks.order(3, roots[..3].iter().map(ranked)).len(), 3);
     }
 
     #[test]
@@ -348,7 +352,7 @@ mod tests {
         let mut blocks = StrandBlocks::default();
         let roots = [Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::ZERO];
         let ranked = roots.into_iter().map(|root| (root, StrandRank::default()));
-        let mut order = blocks.order(true, 4, ranked).to_vec();
+        let mut order = blocks.order(4, ranked).to_vec();
         order.sort_unstable();
         assert_eq!(order, [0, 1, 2, 3]);
     }

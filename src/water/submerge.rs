@@ -4,6 +4,7 @@
 use super::{
     HairWetting, Moisture, WaterLedger,
     drag::Lock,
+    exchange::FoundWater,
     model::clinging,
     moisture::AFTER_DRIP,
     volume::{LocalVolumes, Volumes},
@@ -55,15 +56,15 @@ pub(super) fn submerge(
     hairs: Query<&TickPose, With<Hair>>,
     mut strands: Query<(&StrandOf, &StrandSleep, &mut Strand, &mut AddedMass, &mut Moisture), Here>,
     mut ledger: ResMut<WaterLedger>,
-    mut emerging: Local<u32>,
+    mut found: ResMut<FoundWater>,
 ) {
     // Goes on for a tick after the last volume was removed, so that all hair emerges from it.
     if !volumes.are_none() {
-        *emerging = step.count;
-    } else if *emerging == 0 {
+        found.emerging = step.count;
+    } else if found.emerging == 0 {
         return;
     } else {
-        *emerging -= 1;
+        found.emerging -= 1;
     }
     let gravity = gravity.clamped().0.length();
     let water_of = |hair: Entity| {

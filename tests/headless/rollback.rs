@@ -1,8 +1,9 @@
-//! What a hair's bits hang on: its own state, not what else lives in the world.
+//! What a hair's bits hang on: its own state, not what else lives in the world. And that this state can be taken and put
+//! back.
 
 use crate::common::*;
-use bevy::prelude::*;
-use bevy_keratin::prelude::*;
+use bevy::{ecs::system::RunSystemOnce, prelude::*, time::TimeUpdateStrategy};
+use bevy_keratin::{MotionOwner, SleepCounts, prelude::*};
 
 /// Where the other character stands (m).
 const FAR: Vec3 = Vec3::new(50.0, 0.0, 0.0);
@@ -13,9 +14,8 @@ enum Scene {
     Dry,
     Gusts,
     Wet,
+    BlowDry,
 }
-
-const SCENES: [Scene; 3] = [Scene::Dry, Scene::Gusts, Scene::Wet];
 
 /// A head with hair in locks that touch, and what the scene does to it. Returns the hair.
 fn character(world: &mut World, scene: Scene, at: Vec3) -> Entity {
@@ -45,16 +45,17 @@ fn character(world: &mut World, scene: Scene, at: Vec3) -> Entity {
     hair
 }
 
-fn app_in(scene: Scene) -> App {
-    let mut app = test_app(60.0);
+fn set_up(app: &mut App, scene: Scene) {
     app.insert_resource(HairDefault(StrandContact { radius: 4e-3, ..default() }));
     if scene == Scene::Gusts {
-        app.insert_resource(HairWind {
-            velocity: Vec3::new(3.0, 0.0, 1.0),
-            gusts: 0.5,
-            ..default()
-        });
+        let velocity = Vec3::new(3.0, 0.0, 1.0);
+        app.insert_resource(HairWind { velocity, gusts: 0.5, ..default() });
     }
+}
+
+fn app_in(scene: Scene) -> App {
+    let mut app = test_app(60.0);
+    set_up(&mut app, scene);
     app
 }
 
@@ -135,15 +136,211 @@ fn hangs_on_nothing_else(scene: Scene) {
 
 #[test]
 fn bits_of_dry_hair_hang_on_nothing_else_in_the_world() {
-    hangs_on_nothing_else(SCENES[0]);
+    hangs_on_nothing_else(Scene::Dry);
 }
 
 #[test]
 fn bits_of_hair_in_gusts_hang_on_nothing_else_in_the_world() {
-    hangs_on_nothing_else(SCENES[1]);
+    hangs_on_nothing_else(Scene::Gusts);
 }
 
 #[test]
 fn bits_of_wet_hair_hang_on_nothing_else_in_the_world() {
-    hangs_on_nothing_else(SCENES[2]);
+    hangs_on_nothing_else(Scene::Wet);
+}
+
+/// What is rolled back, and what was seen at each tick.
+#[derive(Resource)]
+struct Past {
+    scene: Scene,
+    hair: Entity,
+    head: Entity,
+    tick: usize,
+    seen: Vec<(HairSnapshot, HairWorldSnapshot)>,
+    random: u32,
+    cycles: usize,
+    asleep: usize,
+}
+
+impl Past {
+    /// A number below `most`.
+    fn below(&mut self, most: usize) -> usize {
+        self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (self.random >> 8) as usize % most
+    }
+}
+
+/// Where bytes differ, and of how many.
+fn differ(a: &[u8], b: &[u8]) -> Vec<(usize, usize)> {
+    let other = (16..a.len().max(b.len())).filter(|i| a.get(*i) != b.get(*i));
+    other.map(|i| (i, b.len())).take(8).collect()
+}
+
+/// At the beginning of a tick: the state is what it was when the tick ran before. Now and then it is an earlier one.
+fn roll_back(mut past: ResMut<Past>, mut hairs: HairSnapshots) -> Result {
+    let (hair, tick) = (past.hair, past.tick);
+    let (mut own, mut world) = (HairSnapshot::default(), HairWorldSnapshot::default());
+    hairs.take(hair, &mut own)?;
+    hairs.take_world(&mut world)?;
+    match past.seen.get(tick) {
+        Some((first, shared)) => {
+            let of = format!("tick {tick} in {:?}", past.scene);
+            assert_eq!(differ(&own.to_bytes(), &first.to_bytes()), [], "hair in {of}");
+            assert_eq!(differ(&world.to_bytes(), &shared.to_bytes()), [], "world in {of}");
+            assert!(own == *first && own.hash() == first.hash() && world == *shared);
+        }
+        None => past.seen.push((own, world)),
+    }
+    if let Some(long_ago) = tick.checked_sub(40) {
+        past.seen[long_ago] = default();
+    }
+    if past.below(12) == 0 && tick > 0 {
+        let back = past.below(12.min(tick));
+        let to = tick - back;
+        let (own, world) = &past.seen[to];
+        let (own, world) = (
+            HairSnapshot::from_bytes(&own.to_bytes())?,
+            HairWorldSnapshot::from_bytes(&world.to_bytes())?,
+        );
+        hairs.restore(hair, &own)?;
+        hairs.restore_world(&world)?;
+        past.tick = to;
+        past.cycles += 1;
+    }
+    Ok(())
+}
+
+/// What the game does in a tick, which it does again after a rollback.
+fn play(
+    mut past: ResMut<Past>,
+    mut places: Query<&mut Transform>,
+    blowers: Query<Entity, With<Blower>>,
+    counts: Query<&SleepCounts>,
+    mut soak: MessageWriter<SoakHair>,
+) -> Result {
+    let t = past.tick as f32;
+    let mut head = places.get_mut(past.head)?;
+    // A second in motion, two at rest.
+    let stride = (t % 180.0).min(60.0) * 0.2;
+    head.translation = Vec3::new(0.05 * stride.sin(), 0.02 * stride.cos(), 0.0);
+    head.rotation = Quat::from_rotation_y(0.4 * stride.sin());
+    for blower in &blowers {
+        *places.get_mut(blower)? =
+            Transform::from_xyz(0.3, 0.1, 0.2 * (0.1 * t).sin()).looking_at(Vec3::ZERO, Vec3::Y);
+    }
+    if past.scene != Scene::Dry && past.tick % 100 == 3 {
+        soak.write(SoakHair::dripping(past.hair));
+    }
+    past.asleep += usize::from(counts.get(past.hair)?.asleep > 0);
+    past.tick += 1;
+    Ok(())
+}
+
+/// Cycles of rolling back at random ticks.
+fn cycles(scene: Scene, count: usize) -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, HairPlugins::new(FixedPostUpdate)))
+        .insert_resource(Time::<Fixed>::from_hz(60.0))
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    set_up(&mut app, scene);
+    let world = app.world_mut();
+    let hair = character(world, scene, Vec3::ZERO);
+    let head = world.spawn(Transform::default()).id();
+    let solids: Vec<Entity> =
+        world.query_filtered::<Entity, With<HairCollider>>().iter(world).collect();
+    world.entity_mut(head).add_child(hair).add_children(&solids);
+    // Beside it goes dry hair that is not rolled back.
+    character(world, Scene::Dry, FAR);
+    if scene == Scene::BlowDry {
+        world.spawn(Blower::default());
+    }
+    let (seen, random) = (Vec::new(), 7);
+    let past = Past { scene, hair, head, tick: 0, seen, random, cycles: 0, asleep: 0 };
+    app.insert_resource(past).add_systems(FixedUpdate, (roll_back, play).chain());
+    app.finish();
+    app.cleanup();
+    while app.world().resource::<Past>().cycles < count {
+        app.update();
+    }
+    app
+}
+
+#[test]
+fn dry_hair_that_is_rolled_back_goes_on_to_the_same_bits() {
+    let _ = cycles(Scene::Dry, 10);
+}
+
+#[test]
+fn hair_in_gusts_that_is_rolled_back_goes_on_to_the_same_bits() {
+    let _ = cycles(Scene::Gusts, 10);
+}
+
+#[test]
+fn wet_hair_that_is_rolled_back_goes_on_to_the_same_bits() {
+    let _ = cycles(Scene::Wet, 10);
+}
+
+#[test]
+fn hair_under_a_dryer_that_is_rolled_back_goes_on_to_the_same_bits() {
+    let _ = cycles(Scene::BlowDry, 10);
+}
+
+/// As many as a game has in some minutes.
+#[test]
+#[ignore = "takes minutes"]
+fn hair_that_is_rolled_back_a_thousand_times_goes_on_to_the_same_bits() {
+    for scene in [Scene::Dry, Scene::BlowDry, Scene::Wet, Scene::Gusts] {
+        let app = cycles(scene, 1000);
+        let Past { tick, asleep, seen, .. } = app.world().resource::<Past>();
+        let bytes = seen.last().map_or(0, |(own, _)| own.size());
+        println!("{scene:?}: {tick} ticks, {asleep} with sleepers, {} bytes a strand", bytes / 50);
+    }
+}
+
+/// What a snapshot of a hair says in a system of the app.
+fn taken(app: &mut App, hair: Entity) -> Result<HairSnapshot, SnapshotError> {
+    let take = move |mut hairs: HairSnapshots| {
+        let mut snapshot = HairSnapshot::default();
+        hairs.take(hair, &mut snapshot).map(|()| snapshot)
+    };
+    app.world_mut().run_system_once(take).unwrap()
+}
+
+fn put_back(app: &mut App, hair: Entity, snapshot: &HairSnapshot) -> Result<(), SnapshotError> {
+    let snapshot = snapshot.clone();
+    let restore = move |mut hairs: HairSnapshots| hairs.restore(hair, &snapshot);
+    app.world_mut().run_system_once(restore).unwrap()
+}
+
+#[test]
+fn what_cannot_be_rolled_back_says_so() {
+    let mut app = test_app(60.0);
+    let (hair, strand) = one_strand(&mut app, 0.2, 8, Vec3::X);
+    let (other, _) = one_strand(&mut app, 0.2, 9, Vec3::X);
+    run(&mut app, 0.1);
+    let snapshot = taken(&mut app, hair).unwrap();
+    assert_eq!(put_back(&mut app, hair, &snapshot), Ok(()));
+    let nodes = SnapshotError::Nodes { strand: 0, found: 9, expected: 10 };
+    assert_eq!(put_back(&mut app, other, &snapshot), Err(nodes));
+    let strands = SnapshotError::Strands { found: 0, expected: 1 };
+    assert_eq!(put_back(&mut app, hair, &HairSnapshot::default()), Err(strands));
+    assert_eq!(taken(&mut app, strand), Err(SnapshotError::NoHair { entity: strand }));
+    app.world_mut().entity_mut(hair).insert(MotionOwner::Gpu);
+    assert_eq!(taken(&mut app, hair), Err(SnapshotError::OnGpu { entity: hair }));
+    app.world_mut().entity_mut(hair).insert((MotionOwner::Simulated, Settling::default()));
+    assert_eq!(taken(&mut app, hair), Err(SnapshotError::Settles { entity: hair }));
+    // Bytes.
+    let bytes = snapshot.to_bytes();
+    assert_eq!(HairSnapshot::from_bytes(&bytes), Ok(snapshot));
+    assert_eq!(HairSnapshot::from_bytes(&bytes[..bytes.len() - 1]), Err(SnapshotError::Damaged));
+    assert_eq!(HairWorldSnapshot::from_bytes(&bytes), Err(SnapshotError::NotASnapshot));
+    // Ticks that run at the end of the frame.
+    let second = move |mut hairs: HairSnapshots, mut ticks: Local<u32>| {
+        *ticks += 1;
+        let found = hairs.take(other, &mut HairSnapshot::default());
+        let waits = Err(SnapshotError::TicksWait { ticks: 1 });
+        assert_eq!(found, if ticks.is_multiple_of(2) { waits } else { Ok(()) });
+    };
+    app.add_systems(FixedUpdate, second).insert_resource(TimeUpdateStrategy::FixedTimesteps(2));
+    app.update();
 }

@@ -56,23 +56,30 @@ pub(super) fn aim_roots(
         (Entity, &mut TiedRoots, Option<&PresentLod>, Option<&SleepCounts>),
         With<Hair>,
     >,
+    strands: Query<(&Strand, &StrandSleep), Without<OnGpu>>,
 ) {
     if step.index != 0 {
         return;
     }
+    // From where a strand's root is: it may have been rolled back.
+    let present = |root: &Tied| {
+        let (strand, _) = strands.get(root.strand).ok().filter(|of| !of.1.is_follower())?;
+        let (place, frame) = (*strand.positions().first()?, strand.root_frame());
+        (place.is_finite() && frame.is_finite()).then(|| Isometry3d::new(place, frame))
+    };
     let mut place = |entity| transforms.end(entity);
-    for (hair, mut tied, present, sleepers) in &mut hairs {
+    for (hair, mut tied, level, sleepers) in &mut hairs {
         // The pose at the end of the tick, where the mesh will be too.
         let Some(pose) = place(hair).as_ref().and_then(Pose::of) else { continue };
         let TiedRoots { roots, movers, rest, .. } = tied.bypass_change_detection();
         let Some(mesh) = movers.pose(&mut place, &morphs) else { continue };
         let aimed = |root: &Tied| Some(root.to.translation.into());
-        *rest = is_coarse(present, sleepers) && stay(roots, &mesh, &pose, aimed);
+        *rest = is_coarse(level, sleepers) && stay(roots, &mesh, &pose, aimed);
         if *rest {
             continue;
         }
         for root in roots {
-            root.from = root.to;
+            root.from = present(root).unwrap_or(root.to);
             root.to = place_of(root, &mesh, &pose).unwrap_or(root.to);
         }
     }

@@ -24,7 +24,10 @@ pub(crate) use {
     systems::{TickCollider, TickColliders, seen_from},
 };
 
-use crate::{base::setting::setting, solver::rod::obstacle::Obstacle};
+use crate::{
+    base::{setting::setting, tape::Tape},
+    solver::rod::obstacle::Obstacle,
+};
 use bevy::prelude::*;
 
 setting! {
@@ -92,6 +95,10 @@ impl Film {
 }
 
 impl LockNeighbours {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        self.lists.record(tape);
+    }
+
     /// The number of nodes of the lists.
     pub(crate) fn nodes(&self) -> usize {
         self.lists.nodes()

@@ -102,6 +102,8 @@ pub struct Neighbours {
     parts: Vec<PartLists>,
     /// Extra margin for bridges of water (m).
     beyond: f32,
+    /// Scratch space of snapshots.
+    restored: Vec<u32>,
 }
 
 /// When lists that may miss a pair are rebuilt.
@@ -166,6 +168,11 @@ struct EdgeGroup {
     edges: [u32; WIDTH],
     /// How far the nearest of them was beyond the reach (m); no edge of a later group was nearer.
     slack: f32,
+}
+
+/// The most memory of lists for so many nodes.
+fn most_bytes(nodes: usize) -> usize {
+    MOST_BYTES + MOST_BYTES_A_NODE * nodes
 }
 
 /// How long lists may become.
@@ -238,7 +245,7 @@ impl Neighbours {
         self.expected.truncate(nodes);
         let level = simd_level();
         if self.are_stale(reach, lookup) {
-            self.look_up(level, reach, MOST_BYTES + MOST_BYTES_A_NODE * nodes);
+            self.look_up(level, reach, most_bytes(nodes));
             self.measure_displacement();
         }
         let mutual = mutual && self.pairs() <= MOST_MUTUAL * nodes;
@@ -306,30 +313,9 @@ impl Neighbours {
             places = expected;
         }
         let margin = if fast { FAST_MARGIN.max(*beyond / reach) } else { MARGIN };
-        lists.begin(places, strands, reach, margin);
         lists.is_fast = fast;
         lists.good_for = if fast { FAST_LOOKUPS - 1 } else { 0 };
-        parts.resize_with(strands.len().div_ceil(PART), PartLists::default);
-        let most_groups = most_bytes / size_of::<EdgeGroup>();
-        let each = per_part(SEARCH, places, strands.len());
-        let mut search = |most_edges: usize| {
-            // Whether the sum is too large does not depend on the order.
-            let groups = AtomicUsize::new(0);
-            let limit = Limit { most_edges, most_groups, groups: &groups };
-            let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
-            for_each_block(
-                &mut work,
-                each,
-                Default::default,
-                |scratch: &mut SearchScratch, (part, strands)| {
-                    dispatch!(level, simd => part.search(simd, places, strands, lists, &limit, scratch));
-                },
-            );
-            groups.into_inner() <= most_groups
-        };
-        if !search(MOST_EDGES) {
-            search(most_groups / places.len() * WIDTH);
-        }
+        lists.build(level, (places, strands), (reach, margin), parts, most_bytes);
     }
 
     /// Whether the lists have to be rebuilt for the present nodes.
@@ -463,6 +449,39 @@ impl Lists {
     fn around(&self, p: Vec3) -> [Range<usize>; 4] {
         let close = self.close();
         self.grid.rows_in_box((p - close) * SLICED, (p + close) * SLICED)
+    }
+
+    /// Builds the lists of nodes at their `places`, padded with two at NaN, of about `most_bytes` at most.
+    fn build(
+        &mut self,
+        level: Level,
+        (places, strands): (&[NodeRow], &[Range<u32>]),
+        (reach, margin): (f32, f32),
+        parts: &mut Vec<PartLists>,
+        most_bytes: usize,
+    ) {
+        self.begin(places, strands, reach, margin);
+        parts.resize_with(strands.len().div_ceil(PART), PartLists::default);
+        let most_groups = most_bytes / size_of::<EdgeGroup>();
+        let each = per_part(SEARCH, places, strands.len());
+        let mut search = |most_edges: usize| {
+            // Whether the sum is too large does not depend on the order.
+            let groups = AtomicUsize::new(0);
+            let limit = Limit { most_edges, most_groups, groups: &groups };
+            let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
+            for_each_block(
+                &mut work,
+                each,
+                Default::default,
+                |scratch: &mut SearchScratch, (part, strands)| {
+                    dispatch!(level, simd => part.search(simd, places, strands, self, &limit, scratch));
+                },
+            );
+            groups.into_inner() <= most_groups
+        };
+        if !search(MOST_EDGES) {
+            search(most_groups / places.len() * WIDTH);
+        }
     }
 
     /// Puts all edges into the grid.
@@ -667,6 +686,8 @@ impl PartLists {
         }
     }
 }
+
+mod record;
 
 #[cfg(test)]
 mod limits;

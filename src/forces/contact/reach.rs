@@ -1,7 +1,10 @@
 //! Which colliders a hair may touch within a tick, by bounding balls sorted along an axis.
 
 use super::{ColliderShape, HairCollider};
-use crate::hair::strand::{Pose, TickPose};
+use crate::{
+    base::tape::Tape,
+    hair::strand::{Pose, TickPose},
+};
 use bevy::prelude::*;
 
 /// A bounding ball of a hair in any pose, in its own frame.
@@ -24,6 +27,12 @@ impl Default for HairReach {
 const REACH_MARGIN: f32 = 1.25;
 
 impl HairReach {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.value(&mut self.center);
+        tape.value(&mut self.radius);
+        tape.value(&mut self.age);
+    }
+
     /// Around strands with these roots and lengths (m).
     pub(super) fn around(strands: impl Iterator<Item = (Vec3, f32)>) -> Self {
         let (mut low, mut high, mut longest) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f32);

@@ -1,7 +1,7 @@
 //! The effect of the air at a node: computed once, for velocities, bonds and water.
 
 use super::{Blower, vapour::jet, wind::wind};
-use crate::{hair::strand::Carried, keratin::bond::model::drying};
+use crate::{base::tape::Tape, hair::strand::Carried, keratin::bond::model::drying};
 use bevy::prelude::*;
 
 /// A blower in a hair's frame, with valid values.
@@ -19,7 +19,8 @@ pub(crate) struct LocalBlower {
 const CALM: f32 = 5e-3;
 
 /// The air flow at a node.
-#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Blown {
     /// Acceleration of the edge that begins here, equation 17 (m/s²).
     pub(crate) acceleration: Vec3,
@@ -90,6 +91,12 @@ impl Blown {
 pub struct BlownAir {
     #[reflect(ignore)]
     pub(crate) nodes: Vec<Blown>,
+}
+
+impl BlownAir {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.list(&mut self.nodes);
+    }
 }
 
 #[cfg(test)]

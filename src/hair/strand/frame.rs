@@ -7,7 +7,7 @@
 //! points at rest in the world move the opposite way: each substep the nodes are moved by the
 //! inverse of the frame's motion, which is exactly inertia.
 
-use crate::base::{motion::TickMoment, setting::setting};
+use crate::base::{motion::TickMoment, setting::setting, tape::Tape};
 use bevy::{
     math::{Affine3A, Isometry3d, Mat3A},
     prelude::*,
@@ -317,7 +317,40 @@ impl Carried {
     }
 }
 
+impl Pose {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.value(&mut self.translation);
+        tape.value(&mut self.rotation);
+        tape.value(&mut self.scale);
+    }
+}
+
 impl TickPose {
+    /// Its state; of ticks and frames whether they are the present ones.
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>, now: TickMoment) {
+        tape.option(&mut self.from, |tape, pose| pose.record(tape));
+        for pose in [&mut self.to, &mut self.now, &mut self.before] {
+            pose.record(tape);
+        }
+        for motion in &mut self.motion {
+            tape.value(&mut motion.velocity);
+            tape.value(&mut motion.spin);
+        }
+        tape.value(&mut self.shares);
+        tape.value(&mut self.inertia);
+        tape.value(&mut self.stretch);
+        tape.values([&mut self.seconds, &mut self.full_size]);
+        tape.flags([&mut self.jumps, &mut self.was_invalid, &mut self.settles]);
+        tape.flags([&mut self.came_back, &mut self.waits]);
+        for (at, now) in [(&mut self.tick, now.number), (&mut self.jump_frame, now.frame)] {
+            let mut is_past = *at != now;
+            tape.flags([&mut is_past]);
+            if let Tape::Read(_) = tape {
+                *at = now.wrapping_sub(u64::from(is_past));
+            }
+        }
+    }
+
     /// The pose at the end of this substep.
     pub fn now(&self) -> &Pose {
         &self.now

@@ -1,7 +1,10 @@
 //! Held nodes, and how far from the root they can be held.
 
 use super::Strand;
-use crate::base::fault::{FaultKind, HairFault};
+use crate::base::{
+    fault::{FaultKind, HairFault},
+    tape::Tape,
+};
 use bevy::{math::Isometry3d, prelude::*};
 
 /// Nodes held by something else: a rod they are wound on, a hand, a clip. Held nodes have inverse
@@ -39,6 +42,15 @@ pub struct HeldNodesState {
     /// Whether it is held by what leads strands itself, by many ways at a time: those of them that give way meanwhile are
     /// no news.
     pub(crate) is_led: bool,
+}
+
+impl HeldNodesState {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.flags([&mut self.out_of_reach]);
+        tape.option(&mut self.pace, Tape::value);
+        tape.value(&mut self.refused);
+        tape.value(&mut self.in_a_row);
+    }
 }
 
 /// Pace of a strand that could not follow, as a share of the way that was refused; how much faster it may go after

@@ -17,6 +17,7 @@ mod owner;
 mod owner_systems;
 mod per_hair;
 mod rank;
+mod record;
 mod repair;
 mod required;
 mod strand_sleep;
@@ -241,7 +242,8 @@ pub struct AddedMass {
 }
 
 /// Effects of surrounding water on a node in a substep.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct InWater {
     /// The share of the node that is under water.
     pub(crate) share: f32,

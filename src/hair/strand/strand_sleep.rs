@@ -1,6 +1,7 @@
 //! A strand's sleep state, which other systems read. [`sleep`](crate::simulation::sleep) decides which strands
 //! fall asleep and wake.
 
+use crate::base::tape::Tape;
 use bevy::prelude::*;
 
 /// Whether a strand is simulated in this tick. One that sleeps keeps its pose and is skipped by all
@@ -55,6 +56,12 @@ impl StrandSleep {
         core::mem::take(&mut self.disturbed)
     }
 
+    /// Its state but for whether it follows.
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.value(&mut self.still);
+        tape.flags([&mut self.asleep, &mut self.disturbed]);
+    }
+
     /// Adds `seconds` to the time it has been still.
     pub(crate) fn add_still_time(&mut self, seconds: f32) {
         self.still += seconds;
@@ -88,6 +95,14 @@ pub struct SleepCounts {
 }
 
 impl SleepCounts {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        for count in [&mut self.asleep, &mut self.awake] {
+            let mut number = *count as u32;
+            tape.value(&mut number);
+            *count = number as usize;
+        }
+    }
+
     /// Whether all of the hair sleeps.
     pub fn all(&self) -> bool {
         self.asleep > 0 && self.awake == 0
@@ -115,6 +130,16 @@ pub struct SleepPose {
 }
 
 impl SleepPose {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.list(&mut self.positions);
+        tape.list(&mut self.orientations);
+        tape.list(&mut self.pushes);
+        tape.value(&mut self.root_frame);
+        tape.values([&mut self.low, &mut self.high]);
+        tape.value(&mut self.held);
+        tape.value(&mut self.distance);
+    }
+
     /// Stores a strand's present pose: node positions, edge orientations and the scalp's frame.
     pub(crate) fn begin(
         &mut self,

@@ -8,7 +8,6 @@ use super::{
     held::report_out_of_reach,
     keep_required,
     owner_systems::{begin_settling, end_settling, update_owners},
-    rank::rank_strands,
     teleport::{ShiftWorld, shift_poses},
 };
 use crate::{
@@ -156,6 +155,25 @@ fn repair_strands<F: QueryFilter>(
     for (entity, found) in strands.chain(loads).chain(histories) {
         if let Some(found) = found {
             faults.write(HairFault::new(FaultKind::Strand, found).of(entity));
+        }
+    }
+}
+
+/// Numbers the strands of each hair of which some have come, gone or been cut.
+fn rank_strands(
+    hairs: Query<&Strands, Changed<Regroomed>>,
+    strands: Query<&Strand, Allow<Disabled>>,
+    mut ranks: Query<&mut StrandRank, Allow<Disabled>>,
+) {
+    for members in &hairs {
+        let nodes = |id: &Entity| strands.get(*id).map_or(0, Strand::nodes);
+        let mut order: Vec<(usize, Entity)> =
+            members.collection().iter().map(|id| (nodes(id), *id)).collect();
+        order.sort_by_key(|(nodes, _)| *nodes);
+        for (rank, (_, id)) in (0..).zip(order) {
+            if let Ok(mut own) = ranks.get_mut(id) {
+                own.set_if_neq(StrandRank(rank));
+            }
         }
     }
 }
@@ -409,6 +427,7 @@ fn shift_by(strand: &mut Strand, frame_delta: &Isometry3d) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy::ecs::system::RunSystemOnce;
     use core::f32::consts::FRAC_PI_2;
 
     #[test]
@@ -430,5 +449,23 @@ mod tests {
         assert!(near(strand.velocities(), &[Vec3::Y, Vec3::Y, Vec3::NEG_X, Vec3::Z]));
         assert!(near(strand.angular_velocities(), &[Vec3::Y, Vec3::NEG_X, Vec3::Z]));
         assert!(strand.orientations().iter().all(|q| (*q * Vec3::Z).distance(Vec3::Y) < 1e-6));
+    }
+
+    #[test]
+    fn strands_are_ranked_by_node_count_and_then_as_they_were_spawned() {
+        let mut world = World::new();
+        let hair = world.spawn(Regroomed::default()).id();
+        let strand = |nodes: usize| {
+            let points: Vec<Vec3> = (0..nodes).map(|k| Vec3::Y * k as f32).collect();
+            Strand::from_polyline(&points).unwrap()
+        };
+        let ids = [5, 3, 4, 3].map(|nodes| world.spawn((StrandOf(hair), strand(nodes))).id());
+        let ranks = |world: &mut World| {
+            world.run_system_once(rank_strands).unwrap();
+            ids.map(|id| world.get::<StrandRank>(id).map(|rank| rank.0))
+        };
+        assert_eq!(ranks(&mut world), [3, 0, 2, 1].map(Some));
+        world.despawn(ids[1]);
+        assert_eq!(ranks(&mut world), [Some(2), None, Some(1), Some(0)]);
     }
 }

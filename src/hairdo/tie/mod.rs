@@ -14,7 +14,10 @@ pub use systems::TiePlugin;
 
 use super::region::StrandRegion;
 use crate::{
-    base::setting::{InvalidValue, Ranged, setting},
+    base::{
+        setting::{InvalidValue, Ranged, setting},
+        tape::Tape,
+    },
     hair::strand::{HeldNodes, TickPose},
 };
 use bevy::prelude::*;
@@ -86,6 +89,13 @@ pub struct TieProgress {
 }
 
 impl TieProgress {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        let Self { progress, node, place, start, middle, side } = self;
+        tape.value(progress);
+        tape.value(node);
+        tape.values([place, start, middle, side]);
+    }
+
     /// 0 has just begun, 1 is tied.
     pub fn progress(&self) -> f32 {
         self.progress

@@ -12,7 +12,8 @@ use crate::{
     },
     hair::{
         strand::{
-            HeldNodes, HeldNodesState, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required, lacks_strands,
+            HeldNodes, HeldNodesState, OnGpu, Strand, StrandOf, Strands, TickPose, keep_required,
+            lacks_strands,
         },
         worn::HairsOf,
     },

@@ -1,7 +1,10 @@
 //! A strand's bonds, and requested changes of them.
 
 use super::{kind::BondKind, model::JointBonds};
-use crate::{base::parallel::prefetch, hair::strand::Strand};
+use crate::{
+    base::{parallel::prefetch, tape::Tape},
+    hair::strand::Strand,
+};
 use bevy::prelude::*;
 
 /// The bonds of a strand: one [`JointBonds`] a joint, joint i at node i, joint 0 at the scalp.
@@ -20,6 +23,27 @@ impl Bonds {
         let joints =
             (0..strand.edges()).map(|i| JointBonds::closed(strand.darboux(i).xyz())).collect();
         Self { joints }
+    }
+
+    /// Bonds that are all closed around one shape take a fifth.
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        let bits = |shape: &Vec3| shape.to_array().map(f32::to_bits);
+        let is_plain = |joint: &JointBonds| {
+            joint.rates == [1.0; BondKind::COUNT]
+                && joint.shapes.iter().all(|shape| bits(shape) == bits(&joint.shapes[0]))
+        };
+        let mut are_plain = self.joints.iter().all(is_plain);
+        tape.flags([&mut are_plain]);
+        if !are_plain {
+            tape.list(&mut self.joints);
+            return;
+        }
+        let count = tape.count(self.joints.len(), size_of::<Vec3>());
+        self.joints.resize(count, JointBonds::default());
+        for joint in &mut self.joints {
+            tape.value(&mut joint.shapes[0]);
+            *joint = JointBonds::closed(joint.shapes[0]);
+        }
     }
 
     /// Resizes to the strand's joints: kept joints, counted from the root, stay unchanged; new ones are
@@ -83,6 +107,15 @@ impl BondChanges {
         *sum = (*sum + change).clamp(-MAX_CHANGE, MAX_CHANGE);
         self.any = true;
         true
+    }
+
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.flags([&mut self.any, &mut self.wake]);
+        if self.any {
+            tape.list(&mut self.joints);
+        } else {
+            self.joints.fill([0.0; BondKind::COUNT]);
+        }
     }
 
     /// Whether nothing was requested.

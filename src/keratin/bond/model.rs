@@ -10,7 +10,8 @@ use glam::{Quat, Vec3};
 
 /// The bonds of one joint: for each kind its remembered shape Ω_j and its rate b_j ∈ \[0, 1\]. One
 /// cache line.
-#[derive(Reflect, Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct JointBonds {
     /// Remembered Darboux vector Ω_j of each kind, by [`BondKind`] as index.
     pub shapes: [Vec3; BondKind::COUNT],

@@ -1,7 +1,7 @@
 //! Rest shapes and stiffness of rods.
 
 use super::{kind::BondKind, settings::Cuticle};
-use crate::solver::rod::Sweeps;
+use crate::{base::tape::Tape, solver::rod::Sweeps};
 use bevy::prelude::*;
 
 /// Rest shape and stiffness of a rod's joints in this substep, written by `RestShape`, read by
@@ -26,6 +26,15 @@ pub struct RestShape {
 }
 
 impl RestShape {
+    /// What of it does not follow from bonds and settings; the rest is made again.
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.list(&mut self.softened);
+        if let Tape::Read(_) = tape {
+            self.closed = false;
+            self.stiffness.clear();
+        }
+    }
+
     pub(super) fn is_finite(&self) -> bool {
         self.darboux.iter().all(|q| q.is_finite())
             && self.stiffness.iter().chain(&self.softened).all(|k| k.is_finite())

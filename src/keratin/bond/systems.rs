@@ -178,9 +178,8 @@ fn shape(
     let joints = &bonds.joints;
     rest.closed = joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
     rest.darboux.resize(joints.len(), Quat::IDENTITY);
-    let changed = rest.key != Some(*key)
-        || rest.stiffness.len() != strand.edges()
-        || has_softened(&rest.softened, &added_mass.softening);
+    let is_other = rest.key != Some(*key) || has_softened(&rest.softened, &added_mass.softening);
+    let changed = is_other || rest.stiffness.len() != strand.edges();
     match key.sweeps {
         None => {
             rest.stiffness.resize(joints.len(), 0.0);
@@ -191,7 +190,7 @@ fn shape(
         }
         Some(_) => rest_shapes(level, frames(strand), joints, &key.influence, &mut rest.darboux),
     }
-    if changed {
+    if is_other {
         rest.key = Some(*key);
         rest.softened.clone_from(&added_mass.softening);
     }

@@ -9,6 +9,7 @@ use crate::{
     base::{
         setting::{InvalidValue, Ranged, ValueRange, Violations, setting},
         stretch::{Stretch, Stretched},
+        tape::Tape,
     },
     hair::strand::{HeldNodes, Strand, TickPose},
     keratin::bond::{BondKind, JointBonds},
@@ -165,6 +166,23 @@ pub struct Treatments {
 }
 
 impl Treatments {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        let count = tape.count(self.acting.len(), size_of::<Entity>());
+        self.acting.resize_with(count, || HairTreatment::wet(Entity::PLACEHOLDER));
+        for HairTreatment { target, joints, rates, seconds, delay } in &mut self.acting {
+            tape.entity(target);
+            tape.option(joints, |tape, Range { start, end }| {
+                for at in [start, end] {
+                    let mut joint = *at as u64;
+                    tape.value(&mut joint);
+                    *at = joint as usize;
+                }
+            });
+            rates.iter_mut().for_each(|rate| tape.option(rate, Tape::value));
+            tape.values([seconds, delay]);
+        }
+    }
+
     /// The treatments, oldest first, with the remaining delay and duration.
     pub fn acting(&self) -> &[HairTreatment] {
         &self.acting
@@ -260,6 +278,12 @@ pub struct WindingProgress {
 }
 
 impl WindingProgress {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.value(&mut self.progress);
+        tape.list(&mut self.start);
+        tape.list(&mut self.on_rod);
+    }
+
     /// Whether winding of the strand on its rod has not begun.
     pub(crate) fn waits(&self, strand: &Strand, settings: &PermWinding) -> bool {
         settings.clamped().from_node < strand.edges() && self.start.len() != strand.nodes()

@@ -15,11 +15,13 @@
 pub mod model;
 #[cfg(feature = "gpu")]
 mod on_gpu;
+mod record;
 mod systems;
 
 #[cfg(feature = "gpu")]
 pub(crate) use on_gpu::{Disturbance, watch_on_gpu};
 pub use systems::SleepPlugin;
+pub(crate) use systems::{Conditions, RestSettings, SleepSnapshot};
 
 use crate::base::setting::setting;
 use bevy::prelude::*;

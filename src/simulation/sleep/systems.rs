@@ -66,7 +66,7 @@ impl Plugin for SleepPlugin {
 
 /// All settings on which the equilibrium of hair depends.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq)]
-pub(super) struct Conditions {
+pub(crate) struct Conditions {
     gravity: Vec3,
     sleep: SleepSettings,
     stiffness: HairStiffness,
@@ -81,7 +81,7 @@ pub(super) struct Conditions {
 }
 
 #[derive(SystemParam)]
-pub(super) struct RestSettings<'w, 's> {
+pub(crate) struct RestSettings<'w, 's> {
     gravity: Gravity<'w>,
     sleep: Settings<'w, 's, SleepSettings>,
     stiffness: Settings<'w, 's, HairStiffness>,
@@ -96,7 +96,7 @@ pub(super) struct RestSettings<'w, 's> {
 }
 
 impl RestSettings<'_, '_> {
-    pub(super) fn of(&self, hair: Entity) -> Conditions {
+    pub(crate) fn of(&self, hair: Entity) -> Conditions {
         Conditions {
             gravity: self.gravity.clamped().0,
             sleep: self.sleep.of(hair),
@@ -117,12 +117,12 @@ impl RestSettings<'_, '_> {
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[component(clone_behavior = Ignore)]
 #[reflect(Default, Clone)]
-pub(super) struct SleepSnapshot {
-    conditions: Option<Conditions>,
-    pose: Pose,
+pub(crate) struct SleepSnapshot {
+    pub(super) conditions: Option<Conditions>,
+    pub(super) pose: Pose,
     /// The colliders in its frame.
     #[reflect(ignore)]
-    solids: Vec<SeenCollider>,
+    pub(super) solids: Vec<SeenCollider>,
 }
 
 /// Changes of a hair as a whole since the previous tick.
@@ -210,9 +210,9 @@ impl SleepSnapshot {
 /// A collider in the frame of a hair.
 #[derive(Clone, Debug)]
 pub(super) struct SeenCollider {
-    solid: Solid,
-    friction: f32,
-    rotation: Quat,
+    pub(super) solid: Solid,
+    pub(super) friction: f32,
+    pub(super) rotation: Quat,
 }
 
 impl SeenCollider {

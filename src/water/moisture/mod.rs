@@ -9,7 +9,7 @@ mod flow;
 pub(crate) use flow::{Exposure, WaterConditions, WaterLoss};
 
 use super::{Counted, drag::Lock};
-use crate::base::{parallel::prefetch, setting::setting};
+use crate::base::{parallel::prefetch, setting::setting, tape::Tape};
 use crate::forces::environment::vapour::WATER;
 use bevy::prelude::*;
 use core::f32::consts::PI;
@@ -176,6 +176,22 @@ impl Moisture {
     /// All its water (m³).
     pub fn volume(&self) -> f64 {
         self.film.iter().chain(&self.bound).sum()
+    }
+
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        tape.list(&mut self.film);
+        tape.list(&mut self.bound);
+        tape.list(&mut self.wetness);
+        tape.list(&mut self.sheen);
+        tape.value(&mut self.drift);
+        tape.flags([&mut self.hurries]);
+        tape.value(&mut self.counted.0);
+    }
+
+    /// Whether all is known of each node.
+    pub(crate) fn is_even(&self) -> bool {
+        let nodes = self.film.len();
+        self.bound.len() == nodes && self.wetness.len() == nodes && self.sheen.len() == nodes
     }
 
     /// Resizes to `nodes`. Returns the water of removed nodes (m³).
