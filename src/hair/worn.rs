@@ -138,7 +138,27 @@ pub(crate) fn component<T: Passed + Ranged>(app: &mut App) {
     acts_from_wearer::<T>(app);
 }
 
+/// The components that act from a wearer: what passes each on to hair that has just been put on.
+#[derive(Resource, Default)]
+pub(crate) struct PassedTypes(Vec<fn(&mut World, Entity, Entity)>);
+
+impl PassedTypes {
+    /// Copies what is on a wearer to its new hair at once, not in the next frame.
+    pub(crate) fn pass(world: &mut World, wearer: Entity, hair: Entity) {
+        let all = world.get_resource::<Self>().map(|all| all.0.clone());
+        all.into_iter().flatten().for_each(|pass| pass(world, wearer, hair));
+    }
+}
+
+fn pass_now<T: Passed>(world: &mut World, from: Entity, to: Entity) {
+    let Some(value) = world.get::<T>(from).cloned() else { return };
+    let Ok(mut to) = world.get_entity_mut(to) else { return };
+    let before = to.get::<T>().cloned();
+    to.insert((value, CopyOf { from, before }));
+}
+
 fn acts_from_wearer<T: Passed>(app: &mut App) {
+    app.world_mut().get_resource_or_init::<PassedTypes>().0.push(pass_now::<T>);
     app.register_type::<CopyOf<T>>()
         .add_systems(HairFrame, pass_on::<T, WornHair>.in_set(PassedOn))
         .add_systems(HairChecks, report_stray::<T>);

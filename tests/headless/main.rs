@@ -56,6 +56,7 @@ mod attack;
 mod avian;
 mod blink;
 mod bonds;
+mod change;
 mod character;
 mod characters;
 mod closed_forms;

@@ -1,6 +1,6 @@
 //! Hair that settles before it is seen, and hair in time that stands still or goes slowly.
 
-use crate::common::{run, strand, test_app};
+use crate::common::{run, strand, test_app, wait_for};
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{MotionOwner, prelude::*};
 use std::time::Duration;
@@ -225,4 +225,43 @@ fn hair_that_is_out_of_sight_settles_all_the_same() {
     run(&mut app, 2.0);
     let seen = farthest(&first, &nodes(&app, &strands));
     assert!(seen < 3e-3, "it falls by {seen} m in view");
+}
+
+#[test]
+fn hair_settles_while_time_stands_still_or_goes_slowly() {
+    let settled = {
+        let mut app = test_app(60.0);
+        let (hair, strands) = spawn(&mut app, true);
+        until_drawn(&mut app, hair);
+        nodes(&app, &strands)
+    };
+    for speed in [0.0, 0.1] {
+        let mut app = test_app(60.0);
+        app.insert_resource(frames(1.0 / 60.0));
+        let mut time = app.world_mut().resource_mut::<Time<Virtual>>();
+        match speed {
+            0.0 => time.pause(),
+            speed => time.set_relative_speed(speed),
+        }
+        let (hair, strands) = spawn(&mut app, true);
+        let place = Transform::from_xyz(3.0, 1.0, 0.0).with_rotation(Quat::from_rotation_y(1.0));
+        let colliders: Vec<Entity> = {
+            let mut all = app.world_mut().query_filtered::<Entity, With<HairCollider>>();
+            all.iter(app.world()).collect()
+        };
+        for entity in [hair].into_iter().chain(colliders) {
+            app.world_mut().entity_mut(entity).insert(place);
+        }
+        wait_for(&mut app, |app| (!app.world().entity(hair).contains::<Settling>()).then_some(()));
+        let ticks = app.world().resource::<Time<Fixed>>().elapsed_secs() * 60.0;
+        let apart = farthest(&settled, &nodes(&app, &strands));
+        println!(
+            "at a speed of {speed}: {apart} m from where it settles else, after {ticks} ticks"
+        );
+        assert!(apart < 3e-3 && ticks < 29.0, "{apart} m after {ticks} ticks");
+        app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+        app.world_mut().resource_mut::<Time<Virtual>>().set_relative_speed(1.0);
+        run(&mut app, 1.0);
+        assert!(farthest(&settled, &nodes(&app, &strands)) < 3e-3);
+    }
 }

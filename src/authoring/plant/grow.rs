@@ -32,18 +32,19 @@ struct StrandRandom {
     clearance: f32,
 }
 
-/// The polyline of each root; `None` where the length map leaves it bald.
+/// The polyline of each root of a surface, kept out of a `solid`; `None` where the length map leaves it bald.
 pub(super) fn grow(
     planting: &Planting,
     maps: &PlantingMaps,
     surface: &Surface,
+    solid: &Surface,
     roots: &[Root],
 ) -> Vec<Option<Vec<Vec3>>> {
     let leaders = leaders(planting, maps, roots);
     let draws = draw_random(planting, maps, surface, roots, &leaders);
     let steps = steps(planting);
     let reach = draws.iter().map(|drawn| drawn.clearance).fold(0.0, f32::max);
-    let shell = planting.drape.map(|drape| Shell::of(surface, reach, 0.6 * drape.over));
+    let shell = planting.drape.map(|drape| Shell::of(solid, reach, 0.6 * drape.over));
     let axis_of = |i: usize, leader: Option<&[Vec3]>| {
         axis(planting, &roots[i].place, &draws[i], shell.as_ref(), steps, leader)
     };

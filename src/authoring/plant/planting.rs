@@ -48,11 +48,23 @@ impl Planting {
     /// # Errors
     /// Those of [`plant`](Self::plant); also when the density map leaves no room for a single strand.
     pub fn plant_with(&self, mesh: &Mesh, maps: &PlantingMaps) -> Result<Planted, PlantError> {
+        self.plant_beside(mesh, None, maps)
+    }
+
+    /// The same with hair that lies on `beside`, of which the mesh is a part.
+    pub(super) fn plant_beside(
+        &self,
+        mesh: &Mesh,
+        beside: Option<&Mesh>,
+        maps: &PlantingMaps,
+    ) -> Result<Planted, PlantError> {
         self.check()?;
         let surface = Surface::of(mesh)?;
-        self.check_reach(&surface)?;
+        let beside = beside.map(Surface::of).transpose()?;
+        let solid = beside.as_ref().unwrap_or(&surface);
+        self.check_reach(solid)?;
         let roots = scatter::scatter(&surface, self.density, self.seed, maps)?;
-        let lines = grow::grow(self, maps, &surface, &roots);
+        let lines = grow::grow(self, maps, &surface, solid, &roots);
         let mut planted = Planted::default();
         let (mut kept, mut uvs) = (Vec::with_capacity(lines.len()), Vec::new());
         for (root, line) in roots.iter().zip(lines) {

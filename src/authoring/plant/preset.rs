@@ -146,14 +146,14 @@ impl HairPreset {
         mesh: &Mesh,
         scalp: &Scalp,
     ) -> Result<Planted, PlantError> {
-        self.plant_where(planting, mesh, scalp, &|_| 1.0)
+        self.plant_where(planting, [mesh, mesh], scalp, &|_| 1.0)
     }
 
-    /// The same with the density multiplied by `share`.
+    /// The same with the density multiplied by `share`, of hair that lies on `beside`, of which the mesh is a part.
     pub(crate) fn plant_where(
         self,
         planting: &Planting,
-        mesh: &Mesh,
+        [mesh, beside]: [&Mesh; 2],
         scalp: &Scalp,
         share: &dyn Fn(&RootPlace) -> f32,
     ) -> Result<Planted, PlantError> {
@@ -165,7 +165,8 @@ impl HairPreset {
         if self.is_combed() {
             maps = maps.direction(&direction);
         }
-        planting.plant_with(mesh, &maps)
+        let beside = (!core::ptr::eq(mesh, beside)).then_some(beside);
+        planting.plant_beside(mesh, beside, &maps)
     }
 }
 

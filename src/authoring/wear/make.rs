@@ -4,6 +4,7 @@
 use super::{
     error::WearError,
     facing::FacingFrom,
+    fall::Fall,
     garments::{garments, is_sheet},
     part::{HEAD_WEIGHT, MeshPart, positions},
     skin::{Hint, Role},
@@ -12,7 +13,15 @@ use super::{
     what::{HairSource, WearHair},
 };
 #[cfg(feature = "render")]
-use crate::{authoring::plant::FollowerPlanting, base::setting::Ranged, hair::look::HairLook};
+use super::{
+    shell::{Shell, Skin, drawn, shells},
+    space::FittedPart,
+};
+#[cfg(feature = "render")]
+use crate::{
+    authoring::plant::FollowerPlanting, base::setting::Ranged, hair::look::HairLook,
+    render::FollowerRoots,
+};
 use crate::{
     authoring::{
         collider_fit::{
@@ -24,12 +33,15 @@ use crate::{
             SurfacePoint, surface_points,
         },
     },
-    base::grid::KdTree,
+    base::{fault::HairFault, grid::KdTree},
     forces::contact::HairCollider,
     hair::{look::WornPreset, strand::Strand},
+    keratin::bond::Bonds,
+    simulation::settle::{SettleAhead, SettleConditions, Settled},
     water::HairWetting,
 };
 use bevy::{
+    ecs::entity::EntityHashMap,
     math::{
         Affine3A,
         bounding::{Aabb3d, BoundingVolume},
@@ -39,6 +51,7 @@ use bevy::{
     platform::collections::{HashMap, HashSet},
     prelude::*,
 };
+use std::sync::Arc;
 
 /// Surface points of head and body for fitting balls.
 const POINTS: usize = 2500;
@@ -81,9 +94,27 @@ pub(super) struct MakeInput {
     pub(super) target: Target,
     /// The groom, where one is worn.
     pub(super) groom: Option<Groom>,
+    /// How the hair fell that is worn now.
+    pub(super) before: Option<Arc<Fall>>,
+    pub(super) conditions: SettleConditions,
+    /// Whether it shades the skin.
+    pub(super) shades: bool,
+}
+
+impl MakeInput {
+    /// Gravity as it settles, in the wearer's space: along the nearest of its axes, so that it does not hang on how
+    /// the wearer moves at the time.
+    pub(super) fn down(&self) -> Vec3 {
+        let gravity = self.target.turn.inverse() * self.conditions.gravity;
+        let axis = gravity.abs().max_position();
+        let mut along = Vec3::ZERO;
+        along[axis] = self.conditions.gravity.length().copysign(gravity[axis]);
+        along
+    }
 }
 
 /// Finished hair, ready to be spawned.
+#[derive(Clone)]
 pub(super) struct Made {
     /// Its parent bone or mesh, and its transform there.
     pub(super) parent: Entity,
@@ -91,7 +122,17 @@ pub(super) struct Made {
     /// The meshes that its roots are tied to, each with the transform from its space to the strands'.
     pub(super) skin: Vec<(Entity, Affine3A)>,
     pub(super) roots: Vec<RootOnMesh>,
-    pub(super) hair: GrownStrands,
+    /// Its strands at rest, with their bonds, how they fell if that was found out, and what was reported meanwhile.
+    pub(super) strands: Vec<(Strand, Bonds)>,
+    pub(super) fall: Option<Arc<Fall>>,
+    /// Whether it took over how other hair lay.
+    pub(super) is_carried: bool,
+    pub(super) faults: Vec<HairFault>,
+    #[cfg(feature = "render")]
+    pub(super) followers: FollowerRoots,
+    /// What shades its skin.
+    #[cfg(feature = "render")]
+    pub(super) shells: Option<Vec<Shell>>,
     pub(super) settings: Option<PresetSettings>,
     pub(super) preset: Option<WornPreset>,
     #[cfg(feature = "render")]
@@ -110,8 +151,24 @@ pub(super) struct Made {
     pub(super) old_hair: Vec<Entity>,
 }
 
+impl Made {
+    /// Makes it over to another wearer, with these entities in place of those that it was made for.
+    pub(super) fn give_to(&mut self, entities: &EntityHashMap<Entity>) {
+        let skin = self.skin.iter_mut().map(|(mesh, _)| mesh);
+        let joints = self.solids.capsules.iter_mut().map(|(joint, _)| joint);
+        let all = core::iter::once(&mut self.parent).chain(skin).chain(joints);
+        #[cfg(feature = "render")]
+        let all = all.chain(self.shells.iter_mut().flatten().map(|shell| &mut shell.skin));
+        for entity in all.chain(&mut self.parts).chain(&mut self.old_hair) {
+            if let Some(own) = entities.get(entity) {
+                *entity = *own;
+            }
+        }
+    }
+}
+
 /// Colliders that fit a head and its body.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Solids {
     /// In the hair's space.
     pub(super) balls: Vec<(HairCollider, Transform)>,
@@ -189,8 +246,11 @@ fn fit_solids(
     Ok(Solids { balls, capsules })
 }
 
-/// Makes the hair.
-pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
+/// Makes the hair, which settles as long as it is `wanted`.
+pub(super) fn make(
+    mut order: MakeInput,
+    wanted: &(dyn Fn() -> bool + Sync),
+) -> Result<Made, WearError> {
     let fitting = fit(&mut order.target.parts, &order.wear)?;
     let grown = match (&order.wear.hair, &order.groom) {
         (HairSource::Groom { guides, .. }, Some(groom)) => {
@@ -217,6 +277,26 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
         default()
     };
     let fibres = HairWetting::FIBRES.safe;
+    let planted = &grown.hair.strands;
+    // A saved style is put on as it is.
+    #[cfg(feature = "save")]
+    let is_styled = order.wear.hairdo.is_some();
+    #[cfg(not(feature = "save"))]
+    let is_styled = false;
+    let before = order.before.as_ref().filter(|_| !is_styled);
+    let carried = before.and_then(|before| before.carried(planted));
+    let is_carried = carried.is_some();
+    let (rested, fall) = match carried {
+        _ if is_styled => (Settled::as_planted(planted), None),
+        Some(strands) => (Settled { strands, faults: Vec::new() }, None),
+        None => {
+            let rested = settle(&order, &fitting, &grown, &solids, wanted);
+            let fall = Fall::new(planted, &rested.strands);
+            (rested, Some(Arc::new(fall)))
+        }
+    };
+    #[cfg(feature = "render")]
+    let shells = order.shades.then(|| shade(&order.target, &fitting, &grown));
     Ok(Made {
         parent,
         place: Transform::from_matrix(place.into()),
@@ -224,7 +304,14 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
             .map(|of| (order.target.parts[of.part].entity, of.to_hair))
             .collect(),
         roots: grown.roots,
-        hair: grown.hair,
+        strands: rested.strands,
+        fall,
+        is_carried,
+        faults: rested.faults,
+        #[cfg(feature = "render")]
+        shells,
+        #[cfg(feature = "render")]
+        followers: grown.hair.followers,
         settings: grown.settings,
         preset: grown.preset,
         #[cfg(feature = "render")]
@@ -236,6 +323,59 @@ pub(super) fn make(mut order: MakeInput) -> Result<Made, WearError> {
         choice: choice(&fitting, &order.target.parts),
         old_hair: old_hair(&fitting, &order.target.parts),
     })
+}
+
+/// What shades the skin under it.
+#[cfg(feature = "render")]
+fn shade(target: &Target, fitting: &Fitting, grown: &Grown) -> Vec<Shell> {
+    let skin = |of: &FittedPart| {
+        let part = &target.parts[of.part];
+        Skin { entity: part.entity, mesh: part.mesh.clone(), to_hair: of.to_hair }
+    };
+    let skins: Vec<Skin> = fitting.skin.iter().map(skin).collect();
+    shells(&skins, &drawn(&grown.hair.followers, &grown.roots, &skins))
+}
+
+/// Lets it settle on the character as it is bound to its skeleton.
+fn settle(
+    order: &MakeInput,
+    fitting: &Fitting,
+    grown: &Grown,
+    solids: &Solids,
+    wanted: &(dyn Fn() -> bool + Sync),
+) -> Settled {
+    let Target { parts, garments, own, size, .. } = &order.target;
+    let mut joints: HashMap<Entity, Affine3A> = default();
+    for part in parts.iter().chain(garments) {
+        let Some(skin) = &part.skin else { continue };
+        let to_hair = fitting.from_wearer * part.to_wearer;
+        for (joint, pose) in skin.joints.iter().zip(&skin.poses) {
+            joints.entry(*joint).or_insert_with(|| to_hair * pose.inverse());
+        }
+    }
+    let placed = |place: Affine3A| Transform::from_matrix(place.into());
+    let capsules = solids.capsules.iter().filter_map(|(joint, (collider, place))| {
+        Some((collider.clone(), placed(*joints.get(joint)? * place.compute_affine())))
+    });
+    let own = own.solids.iter().filter_map(|solid| {
+        let there = match solid.joint {
+            Some(joint) => *joints.get(&joint)?,
+            None => fitting.from_wearer,
+        };
+        Some((solid.collider.clone(), placed(there * solid.place)))
+    });
+    let solids: Vec<_> = solids.balls.iter().cloned().chain(capsules).chain(own).collect();
+    let scale = fitting.from_wearer.matrix3.determinant().abs().cbrt();
+    let down = fitting.from_wearer.transform_vector3(order.down()) / scale;
+    let ahead = SettleAhead {
+        strands: &grown.hair.strands,
+        own: grown.settings.as_ref().map(|settings| (settings.stiffness, settings.contact)),
+        solids: &solids,
+        size: size / scale,
+        gravity: down,
+        conditions: &order.conditions,
+    };
+    ahead.settle(wanted).unwrap_or_else(|| Settled::as_planted(&grown.hair.strands))
 }
 
 /// What was chosen among the meshes that move with the head, in words.
@@ -290,19 +430,28 @@ fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown
     let length = WornPreset::LENGTH.named("WearHair::length").check(wear.length)?;
     let worn = WornPreset { seed: wear.seed, length, ..WornPreset::of(preset) };
     let mut planting = Planting { seed: wear.seed, ..preset.planting(&fitting.scalp) };
+    let own_length = planting.length;
     if worn.length != 1.0 {
         planting = planting.lengthened(worn.length);
     }
     let whole = preset.is_everywhere();
-    let mesh = match whole {
+    let within = |reach: f32| match whole {
         true => fitting.mesh.clone(),
-        false => cropped(&fitting.mesh, planting.length + MARGIN),
+        false => cropped(&fitting.mesh, reach + MARGIN),
     };
+    // Roots are the same whatever the length is.
+    let mesh = within(own_length);
+    let beside = (worn.length > 1.0).then(|| within(planting.length));
     let of_head = |place: &RootPlace| match place.color {
         Some(color) if !whole && color.x <= HEAD_WEIGHT => 0.0,
         _ => 1.0,
     };
-    let planted = preset.plant_where(&planting, &mesh, &fitting.scalp, &of_head)?;
+    let planted = preset.plant_where(
+        &planting,
+        [&mesh, beside.as_ref().unwrap_or(&mesh)],
+        &fitting.scalp,
+        &of_head,
+    )?;
     let strands = planted.groom.strands().map(|s| Strand::from_polyline(s.points));
     let hair = GrownStrands {
         strands: strands.collect::<Result<_, _>>()?,

@@ -3,7 +3,7 @@
 //! [`WearHair`] sets what is worn, a preset or a groom, and where: on an entity's own mesh, or on
 //! the head of a character below it, found by the name of a bone. It waits for a scene that still
 //! loads, makes the hair on the async compute task pool, ties its roots, fits colliders to head and
-//! body, bones with colliders of their own left out, and spawns it as a [`Hair`](crate::Hair) of its
+//! body, bones with colliders of their own left out, lets it settle, and spawns it as a [`Hair`](crate::Hair) of its
 //! own. [`HairWorn`] is triggered when it is there, [`HairNotWorn`] when it cannot be. Change the
 //! component and the hair is swapped, once the new one is ready; remove it and the hair is removed.
 //!
@@ -14,14 +14,18 @@
 //! | where the face looks | `facing` |
 //! | where the head is, and how large | `head` |
 //! | mesh and hair in one space: the face toward −Z, the head's middle at the origin, life size | `space` |
-//! | planting, roots, colliders: a pure function | `make` |
+//! | planting, roots, colliders, rest: a pure function | `make` |
+//! | how hair lies that takes the place of other | `fall` |
+//! | making it once for all who get the same | `alike` |
 //! | colliders for capes and collars | `garments` |
 //! | which asset is to blame for a missing mesh | `missing` |
 //! | hiding the hair that a character came with | `old_hair` |
 //! | shading the skin under the hair | `shade`, `shell` |
 
+mod alike;
 mod error;
 mod facing;
+mod fall;
 mod garments;
 mod head;
 mod landmarks;
@@ -48,7 +52,7 @@ pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornAs};
 
 use crate::{
     authoring::attach::MadeAgain,
-    base::schedule::HairFrame,
+    base::schedule::{HairFrame, HairSystems, HairTick, first_substep},
     hair::{
         strand::lacks_strands,
         worn::{PassedOn, Wearer},
@@ -68,7 +72,8 @@ impl Plugin for WearPlugin {
         }
         #[cfg(feature = "render")]
         app.register_type::<old_hair::HiddenForHair>();
-        app.register_type::<WearHair>()
+        app.init_resource::<alike::Makings>()
+            .register_type::<WearHair>()
             .register_type::<HairSource>()
             .register_type::<WornAs>()
             .register_type::<target::Fitted>()
@@ -86,12 +91,22 @@ impl Plugin for WearPlugin {
                     systems::find_worn,
                     systems::detect_changes,
                     systems::find_heads,
+                    systems::start,
                     systems::put_on,
                     systems::fit_again,
                 )
                     .chain()
                     .before(PassedOn),
+            )
+            .add_systems(
+                HairTick,
+                systems::put_on_due
+                    .before(HairSystems::First)
+                    .before(HairSystems::Roots)
+                    .run_if(first_substep.and_then(systems::any_with_time)),
             );
+        #[cfg(feature = "render")]
+        app.configure_sets(HairFrame, shade::ShadeSystems.after(systems::fit_again));
         #[cfg(feature = "render")]
         shade::plugin(app);
     }

@@ -69,6 +69,7 @@ pub(super) struct MeshPart {
     pub(super) is_named: bool,
     /// Its positions, normals, triangles and skin.
     pub(super) mesh: Mesh,
+    pub(super) mesh_id: AssetId<Mesh>,
     pub(super) skin: Option<MeshSkin>,
     /// From the mesh, as it is bound, to the wearer.
     pub(super) to_wearer: Affine3A,

@@ -2,14 +2,14 @@
 
 use super::{
     part::skin_of,
-    shell::{MadeOf, Shell, Skin, shells},
+    shell::{MadeOf, Shell, Skin, drawn, shells},
     what::WornAs,
 };
 use crate::{
     authoring::attach::RootsOnMesh,
     base::{
         schedule::HairFrame,
-        setting::{Settings, setting},
+        setting::{HairDefault, Settings, setting},
     },
     hair::{
         look::{HairColor, HairDye, HairLook},
@@ -59,7 +59,7 @@ const BETWEEN: f32 = 0.5;
 /// What is done for a hair.
 #[derive(Component)]
 #[component(clone_behavior = Ignore)]
-enum Shading {
+pub(super) enum Shading {
     Making(Task<Vec<Shell>>),
     Made(Vec<Shell>),
     Shown(Handle<StandardMaterial>),
@@ -85,6 +85,10 @@ impl ActsOn for ScalpShells {
     }
 }
 
+/// What shades skin, once hair has been put on.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct ShadeSystems;
+
 pub(super) fn plugin(app: &mut App) {
     worn::setting::<ScalpShade>(app);
     app.register_type::<ScalpShell>()
@@ -93,7 +97,7 @@ pub(super) fn plugin(app: &mut App) {
             HairFrame,
             (begin, show, tint)
                 .chain()
-                .after(super::systems::fit_again)
+                .in_set(ShadeSystems)
                 .run_if(resource_exists::<Assets<StandardMaterial>>)
                 .run_if(resource_exists::<Assets<Mesh>>),
         )
@@ -110,6 +114,13 @@ pub(super) fn plugin(app: &mut App) {
         );
 }
 
+/// Whether hair that a wearer puts on shades its skin from the beginning.
+pub(super) fn shades(world: &World, wearer: Entity) -> bool {
+    let all = world.get_resource::<HairDefault<ScalpShade>>().map(|all| &all.0);
+    let strength = world.get::<ScalpShade>(wearer).or(all).map_or(0.0, |shade| shade.strength);
+    world.contains_resource::<Assets<StandardMaterial>>() && strength > 0.0
+}
+
 /// Starts to make shells for hair that has none, and removes them where none are wanted.
 fn begin(
     mut commands: Commands,
@@ -124,7 +135,8 @@ fn begin(
     for (hair, roots, followers, shading) in &hairs {
         let is_wanted = settings.of(hair).strength > 0.0;
         if let Some(shading) = shading {
-            let is_other = roots.is_changed() || followers.is_some_and(|f| f.is_changed());
+            let is_written = roots.is_changed() && !roots.is_added();
+            let is_other = is_written || followers.is_some_and(|f| f.is_changed() && !f.is_added());
             if !is_wanted || is_other && !matches!(shading, Shading::Making(_)) {
                 commands.entity(hair).remove::<Shading>();
             }
@@ -143,34 +155,14 @@ fn begin(
         // Some are still loading.
         let Some(meshes) = meshes.collect::<Option<Vec<_>>>() else { continue };
         let skins: Vec<Skin> = meshes.into_iter().filter_map(Result::ok).collect();
-        let drawn =
-            followers.map(|followers| followers.0.iter().map(|f| (f.place, f.width)).collect());
-        let drawn: Vec<(Vec3, f32)> = drawn
-            .filter(|drawn: &Vec<_>| !drawn.is_empty())
-            .unwrap_or_else(|| guides(&roots, &skins));
+        let none = FollowerRoots::default();
+        let drawn = drawn(followers.as_deref().unwrap_or(&none), &roots.roots, &skins);
         let shading = match AsyncComputeTaskPool::try_get() {
             Some(pool) => Shading::Making(pool.spawn(async move { shells(&skins, &drawn) })),
             None => Shading::Made(shells(&skins, &drawn)),
         };
         commands.entity(hair).insert(shading);
     }
-}
-
-/// Roots of guides in the hair's frame, for hair whose followers have no roots of their own.
-fn guides(roots: &RootsOnMesh, skins: &[Skin]) -> Vec<(Vec3, f32)> {
-    let places: Vec<Vec3> = skins
-        .iter()
-        .flat_map(|skin| {
-            let own = super::part::positions(&skin.mesh).iter();
-            own.map(|place| skin.to_hair.transform_point3(Vec3::from(*place)))
-        })
-        .collect();
-    let place = |root: &crate::authoring::plant::RootOnMesh| {
-        let [a, b, c] = root.vertices.map(|v| places.get(v as usize).copied());
-        let [u, v, w] = root.weights.to_array();
-        Some((a? * u + b? * v + c? * w, 1.0))
-    };
-    roots.roots.iter().filter_map(place).collect()
 }
 
 fn remove_shells(

@@ -2,7 +2,11 @@
 //! grows densely there. A pure function, for any thread.
 
 use super::part::{positions, triangles};
-use crate::base::grid::{KdTree, UniformGrid};
+use crate::{
+    authoring::plant::RootOnMesh,
+    base::grid::{KdTree, UniformGrid},
+    render::FollowerRoots,
+};
 use bevy::{
     asset::RenderAssetUsages,
     math::Affine3A,
@@ -30,6 +34,7 @@ pub(super) struct Skin {
 }
 
 /// What covers one of them.
+#[derive(Clone)]
 pub(super) struct Shell {
     pub(super) skin: Entity,
     /// From the mesh to the hair.
@@ -133,6 +138,31 @@ fn median(values: impl Iterator<Item = f32>) -> f32 {
     let mut values: Vec<f32> = values.collect();
     values.sort_by(f32::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Roots of drawn strands in the hair's frame, with their widths; of guides, for hair whose followers have none of their
+/// own.
+pub(super) fn drawn(
+    followers: &FollowerRoots,
+    roots: &[RootOnMesh],
+    skins: &[Skin],
+) -> Vec<(Vec3, f32)> {
+    if !followers.0.is_empty() {
+        return followers.0.iter().map(|f| (f.place, f.width)).collect();
+    }
+    let places: Vec<Vec3> = skins
+        .iter()
+        .flat_map(|skin| {
+            let own = positions(&skin.mesh).iter();
+            own.map(|place| skin.to_hair.transform_point3(Vec3::from(*place)))
+        })
+        .collect();
+    let place = |root: &RootOnMesh| {
+        let [a, b, c] = root.vertices.map(|v| places.get(v as usize).copied());
+        let [u, v, w] = root.weights.to_array();
+        Some((a? * u + b? * v + c? * w, 1.0))
+    };
+    roots.iter().filter_map(place).collect()
 }
 
 /// The shells over the skins, given place and width of each drawn strand's root in the hair's frame. None over skins

@@ -1,11 +1,13 @@
 //! The systems: find heads, start tasks that make hair, spawn and despawn it.
 
 use super::{
+    alike::{Makings, Share},
     error::{SEARCH_TIME, WearError},
     facing::FacingFrom,
-    make::{Made, MakeInput, RefitInput, Solids, make, refit},
+    fall::Fall,
+    make::{Made, MakeInput, RefitInput, Solids, refit},
     missing::missing_asset,
-    target::{Characters, Fitted, Search},
+    target::{Characters, Fitted, Search, Target},
     what::{HairNotWorn, HairSource, HairWorn, WearHair, WornAs},
 };
 use crate::{
@@ -20,18 +22,28 @@ use crate::{
     hair::{
         look::HairDye,
         strand::{Hair, Strand, StrandOf, Strands},
-        worn::{Wearer, WornBy, WornHair},
+        worn::{PassedTypes, Wearer, WornBy, WornHair},
     },
     hairdo::style::{HairStyle, KeptStyle},
-    simulation::settle::Settling,
+    simulation::settle::{SettleConditions, Settling},
     water::HairWetting,
 };
 use bevy::{
+    ecs::system::SystemParam,
     mesh::Mesh3d,
-    platform::collections::{HashMap, HashSet},
+    platform::{
+        collections::{HashMap, HashSet},
+        time::Instant,
+    },
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
+use core::time::Duration;
+use std::sync::Arc;
+
+/// How long heads are found in a frame, where there are many, and how many strands are spawned in one.
+const FIND_TIME: Duration = Duration::from_millis(2);
+const MOST_STRANDS: usize = 800;
 
 /// State of a wearer.
 #[derive(Component, Default)]
@@ -39,6 +51,14 @@ pub(super) struct Wearing {
     /// What is worn or being made.
     wanted: Option<WearHair>,
     stage: WearStage,
+    /// Whether another is wanted than the one that is being made, which is put on first.
+    lags: bool,
+    /// How the worn hair fell when it settled.
+    fall: Option<Arc<Fall>>,
+    /// Whether the worn hair took over how other hair lay, and time has stood still since; and whether what is being
+    /// made is the same hair, settled.
+    is_carried: bool,
+    settles: bool,
     /// The bone or mesh that it is worn on.
     head: Option<Entity>,
     /// The worn hair.
@@ -55,15 +75,29 @@ enum WearStage {
     Begun,
     /// The same, for `seconds`; once a failure has been `reported`, from [`SEARCH_TIME`] to a second later.
     Searching { seconds: f32, reported: bool },
+    /// Its hair is to be made.
+    Found(Box<Found>),
     /// Its hair is being made.
-    Making(Making),
+    Making(Share),
     /// It has its hair, or cannot have it.
     Done,
 }
 
-enum Making {
-    Running(Task<Result<Made, WearError>>),
-    Ready(Option<Box<Result<Made, WearError>>>),
+/// What hair is made of, but for the world's settings.
+struct Found {
+    wear: WearHair,
+    target: Target,
+    groom: Option<Groom>,
+}
+
+impl Wearing {
+    /// Its hair is to be made, from the beginning.
+    fn begin(&mut self, wear: &WearHair) {
+        self.wanted = Some(wear.clone());
+        self.stage = WearStage::Begun;
+        self.head = None;
+        (self.lags, self.settles) = (false, false);
+    }
 }
 
 /// Despawns worn hair with the colliders that were fitted for it.
@@ -132,6 +166,7 @@ pub(super) fn take_off(
 pub(super) fn detect_changes(
     mut commands: Commands,
     mut wearers: Query<(Ref<WearHair>, &mut Wearing)>,
+    time: Option<Res<Time<Virtual>>>,
     mut events: Option<MessageReader<AssetEvent<Groom>>>,
     mut hairs: Query<(&mut WornAs, &mut TiedRoots), With<Hair>>,
 ) {
@@ -143,7 +178,10 @@ pub(super) fn detect_changes(
             _ => None,
         })
         .collect();
+    let stands_still = time.is_some_and(|time| time.is_paused());
     for (wear, mut wearing) in &mut wearers {
+        // In time that goes on, hair settles before the eyes.
+        wearing.bypass_change_detection().is_carried &= stands_still;
         let mut is_other = wear.is_changed() && wearing.wanted.as_ref() != Some(&*wear);
         if is_other
             && let Some(hair) = &wearing.worn
@@ -158,10 +196,21 @@ pub(super) fn detect_changes(
             wearing.wanted = Some(WearHair::clone(&wear));
             is_other = false;
         }
+        if wearing.settles && (is_other || !stands_still) {
+            (wearing.stage, wearing.settles) = (WearStage::Done, false);
+        }
+        // A slider that is dragged: what is being made is shown before the next is begun.
+        let is_making = matches!(wearing.stage, WearStage::Making(_));
+        let is_variation = || wearing.wanted.as_ref().is_some_and(|old| old.is_variation(&wear));
+        if is_other && is_making && is_variation() {
+            wearing.lags = !wearing.wanted.as_ref().is_some_and(|old| old.is_same_hair(&wear));
+            is_other = false;
+        }
         let is_reloaded = match &wear.hair {
             HairSource::Groom { groom, .. } => changed.contains(&groom.id()),
             HairSource::Preset(_) => false,
         };
+        let is_overdue = wearing.lags && matches!(wearing.stage, WearStage::Done);
         let is_gone = wearing.worn.as_ref().is_some_and(|hair| !hairs.contains(*hair));
         let is_done = matches!(wearing.stage, WearStage::Done);
         let has_lost_roots = is_done
@@ -170,10 +219,13 @@ pub(super) fn detect_changes(
                     .get_mut(hair)
                     .is_ok_and(|(_, mut tied)| tied.bypass_change_detection().take_lost())
             });
-        if is_other || is_reloaded || has_lost_roots || (is_gone && is_done) {
-            wearing.wanted = Some(WearHair::clone(&wear));
-            wearing.stage = WearStage::Begun;
-            wearing.head = None;
+        if is_reloaded && is_making {
+            wearing.lags = true;
+        } else if is_other || is_overdue || is_reloaded || has_lost_roots || (is_gone && is_done) {
+            wearing.begin(&wear);
+        } else if wearing.is_carried && is_done && wear.at.is_none() {
+            wearing.begin(&wear);
+            (wearing.is_carried, wearing.settles) = (false, true);
         }
     }
 }
@@ -200,91 +252,134 @@ fn restyle(commands: &mut Commands, hair: Entity, before: &WearHair, wear: &Wear
     }
 }
 
-/// Searches for heads, and starts to make hair for those that are found.
-pub(super) fn find_heads(
-    mut commands: Commands,
-    time: Option<Res<Time<Real>>>,
-    characters: Characters,
-    grooms: Option<Res<Assets<Groom>>>,
-    mut wearers: Query<(Entity, &WearHair, &mut Wearing)>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    // The wearer of a preset on each head.
-    let mut taken: HashMap<Entity, Entity> = wearers
-        .iter()
-        .filter(|(_, wear, _)| matches!(wear.hair, HairSource::Preset(_)))
-        .filter_map(|(wearer, _, wearing)| Some((wearing.head?, wearer)))
-        .collect();
-    let step = time.map_or(0.0, |time| time.delta_secs());
-    for (wearer, wear, mut wearing) in &mut wearers {
-        let (seconds, reported) = match wearing.stage {
-            WearStage::Begun => (0.0, false),
-            WearStage::Searching { seconds, reported } => {
-                let seconds = seconds + step;
-                if reported && seconds < SEARCH_TIME + 1.0 {
-                    wearing.bypass_change_detection().stage =
-                        WearStage::Searching { seconds, reported };
-                    continue;
-                }
-                (seconds, reported)
+/// Finds the heads of wearers.
+#[derive(SystemParam)]
+pub(super) struct Finder<'w, 's> {
+    commands: Commands<'w, 's>,
+    time: Option<Res<'w, Time<Real>>>,
+    characters: Characters<'w, 's>,
+    grooms: Option<Res<'w, Assets<Groom>>>,
+    wearers: Query<'w, 's, (Entity, &'static WearHair, &'static mut Wearing)>,
+    faults: MessageWriter<'w, HairFault>,
+}
+
+/// Searches for heads.
+pub(super) fn find_heads(finder: Finder) {
+    finder.find(None);
+}
+
+impl Finder<'_, '_> {
+    /// All, in the time that a frame has for it; or those of hair that is due by now.
+    fn find(self, due: Option<Duration>) {
+        let Self { mut commands, time, characters, grooms, mut wearers, mut faults } = self;
+        // The wearer of a preset on each head.
+        let mut taken: HashMap<Entity, Entity> = (wearers.iter())
+            .filter(|(_, wear, _)| matches!(wear.hair, HairSource::Preset(_)))
+            .filter_map(|(wearer, _, wearing)| Some((wearing.head?, wearer)))
+            .collect();
+        let start = Instant::now();
+        let step = time.filter(|_| due.is_none()).map_or(0.0, |time| time.delta_secs());
+        for (wearer, wear, mut wearing) in &mut wearers {
+            if due.is_some_and(|now| wear.at.is_none_or(|at| at > now)) {
+                continue;
             }
-            WearStage::Making(_) | WearStage::Done => continue,
-        };
-        // The scene may change: it is searched again.
-        let mut failed = |error: WearError| {
-            if !reported {
-                report_failure(&mut commands, &mut faults, wearer, error);
-            }
-            WearStage::Searching { seconds: SEARCH_TIME, reported: true }
-        };
-        let groom = match &wear.hair {
-            HairSource::Preset(_) => None,
-            HairSource::Groom { groom, .. } => {
-                match grooms.as_ref().and_then(|grooms| grooms.get(groom)) {
-                    Some(groom) => Some(groom),
-                    None => {
-                        wearing.stage = match characters.failure(groom.id().untyped()) {
-                            Some(reason) => failed(WearError::NotLoaded { what: "groom", reason }),
-                            None => WearStage::Searching { seconds, reported },
-                        };
+            let (seconds, reported) = match wearing.stage {
+                WearStage::Begun => (0.0, false),
+                WearStage::Searching { seconds, reported } => {
+                    let seconds = seconds + step;
+                    if reported && seconds < SEARCH_TIME + 1.0 {
+                        wearing.bypass_change_detection().stage =
+                            WearStage::Searching { seconds, reported };
                         continue;
                     }
+                    (seconds, reported)
                 }
-            }
-        };
-        wearing.stage = match characters.search(wearer, wear) {
-            Search::Loading => WearStage::Searching { seconds, reported },
-            Search::Nothing if seconds > SEARCH_TIME => {
+                WearStage::Found(_) | WearStage::Making(_) | WearStage::Done => continue,
+            };
+            // The scene may change: it is searched again.
+            let mut failed = |error: WearError| {
                 if !reported {
-                    commands.queue(move |world: &mut World| report_no_mesh(world, wearer));
+                    report_failure(&mut commands, &mut faults, wearer, error);
                 }
                 WearStage::Searching { seconds: SEARCH_TIME, reported: true }
-            }
-            Search::Nothing => WearStage::Searching { seconds, reported },
-            Search::Failed(error) => failed(error),
-            Search::Found(target) => {
-                let is_preset = matches!(wear.hair, HairSource::Preset(_));
-                match taken.get(&target.head).filter(|by| is_preset && **by != wearer) {
-                    Some(&by) => failed(WearError::Taken { by }),
-                    None => {
-                        if is_preset {
-                            taken.insert(target.head, wearer);
+            };
+            let groom = match &wear.hair {
+                HairSource::Preset(_) => None,
+                HairSource::Groom { groom, .. } => {
+                    match grooms.as_ref().and_then(|grooms| grooms.get(groom)) {
+                        Some(groom) => Some(groom),
+                        None => {
+                            wearing.stage = match characters.failure(groom.id().untyped()) {
+                                Some(reason) => {
+                                    failed(WearError::NotLoaded { what: "groom", reason })
+                                }
+                                None => WearStage::Searching { seconds, reported },
+                            };
+                            continue;
                         }
-                        wearing.head = Some(target.head);
-                        let input = MakeInput { wear: wear.clone(), target, groom: groom.cloned() };
-                        WearStage::Making(begin(input))
                     }
                 }
+            };
+            wearing.stage = match characters.search(wearer, wear) {
+                Search::Loading => WearStage::Searching { seconds, reported },
+                Search::Nothing if seconds > SEARCH_TIME => {
+                    if !reported {
+                        commands.queue(move |world: &mut World| report_no_mesh(world, wearer));
+                    }
+                    WearStage::Searching { seconds: SEARCH_TIME, reported: true }
+                }
+                Search::Nothing => WearStage::Searching { seconds, reported },
+                Search::Failed(error) => failed(error),
+                Search::Found(target) => {
+                    let is_preset = matches!(wear.hair, HairSource::Preset(_));
+                    match taken.get(&target.head).filter(|by| is_preset && **by != wearer) {
+                        Some(&by) => failed(WearError::Taken { by }),
+                        None => {
+                            if is_preset {
+                                taken.insert(target.head, wearer);
+                            }
+                            wearing.head = Some(target.head);
+                            let (wear, groom) = (wear.clone(), groom.cloned());
+                            WearStage::Found(Box::new(Found { wear, target, groom }))
+                        }
+                    }
+                }
+            };
+            let is_found = matches!(wearing.stage, WearStage::Found(_));
+            if is_found && due.is_none() && start.elapsed() > FIND_TIME {
+                break;
             }
-        };
+        }
     }
 }
 
-/// Makes hair on the async compute pool, or at once in an app without pools.
-fn begin(input: MakeInput) -> Making {
-    match AsyncComputeTaskPool::try_get() {
-        Some(pool) => Making::Running(pool.spawn(async move { make(input) })),
-        None => Making::Ready(Some(Box::new(make(input)))),
+/// Starts to make hair for heads that were found.
+pub(super) fn start(world: &mut World, all: &mut QueryState<(Entity, &mut Wearing)>) {
+    let found = all.iter_mut(world).filter_map(|(wearer, mut wearing)| {
+        let wearing = wearing.bypass_change_detection();
+        match core::mem::take(&mut wearing.stage) {
+            WearStage::Found(found) => {
+                Some((wearer, found, wearing.fall.clone().filter(|_| !wearing.settles)))
+            }
+            stage => {
+                wearing.stage = stage;
+                None
+            }
+        }
+    });
+    let found: Vec<_> = found.collect();
+    for (wearer, found, fall) in found {
+        let Found { wear, target, groom } = *found;
+        let conditions = SettleConditions::of(world, wearer);
+        #[cfg(feature = "render")]
+        let shades = super::shade::shades(world, wearer);
+        #[cfg(not(feature = "render"))]
+        let shades = false;
+        let input = MakeInput { wear, target, groom, before: fall, conditions, shades };
+        let share = world.resource_mut::<Makings>().share(input);
+        if let Some(mut wearing) = world.get_mut::<Wearing>(wearer) {
+            wearing.stage = WearStage::Making(share);
+        }
     }
 }
 
@@ -311,50 +406,109 @@ fn report_no_mesh(world: &mut World, wearer: Entity) {
 }
 
 /// Replaces worn hair by finished new hair.
-pub(super) fn put_on(
-    mut commands: Commands,
-    mut wearers: Query<(Entity, &WearHair, &mut Wearing)>,
-    entities: Query<()>,
-    fitted: Query<(Entity, &Fitted)>,
-    wetting: Option<Res<HairDefault<HairWetting>>>,
-    mut faults: MessageWriter<HairFault>,
-) {
-    for (wearer, wear, mut wearing) in &mut wearers {
-        if !matches!(wearing.stage, WearStage::Making(_)) {
-            continue;
-        }
-        let WearStage::Making(making) = &mut wearing.bypass_change_detection().stage else {
-            continue;
-        };
-        let ready = match making {
-            Making::Running(task) => check_ready(task),
-            Making::Ready(made) => made.take().map(|made| *made),
-        };
-        let Some(ready) = ready else { continue };
-        wearing.stage = WearStage::Done;
-        match ready {
-            Ok(made)
-                if entities.contains(made.parent)
-                    && made.skin.iter().all(|(mesh, _)| entities.contains(*mesh)) =>
-            {
-                if let Some(old) = wearing.worn.take() {
-                    despawn_worn(&mut commands, wearer, old, &fitted);
-                }
-                let wetting = wetting.as_ref().map(|default| default.0).unwrap_or_default();
-                let ((facing, facing_from), mesh) = (made.facing, made.skin[0].0);
-                log_made(wearer, &made);
-                let hair = spawn_hair(&mut commands, wearer, wear, made, wetting);
-                commands.trigger(HairWorn { entity: wearer, hair, mesh, facing, facing_from });
-                wearing.worn = Some(hair);
+#[derive(SystemParam)]
+pub(super) struct Hairdresser<'w, 's> {
+    commands: Commands<'w, 's>,
+    wearers: Query<'w, 's, (Entity, &'static WearHair, &'static mut Wearing)>,
+    entities: Query<'w, 's, ()>,
+    fitted: Query<'w, 's, (Entity, &'static Fitted)>,
+    wetting: Option<Res<'w, HairDefault<HairWetting>>>,
+    faults: MessageWriter<'w, HairFault>,
+}
+
+/// Puts on what is ready.
+pub(super) fn put_on(dresser: Hairdresser) {
+    dresser.put_on(None);
+}
+
+impl Hairdresser<'_, '_> {
+    /// What is ready, as much as a frame has time for; or what is due by now, which is waited for.
+    fn put_on(self, due: Option<Duration>) {
+        let Self { mut commands, mut wearers, entities, fitted, wetting, mut faults } = self;
+        let wetting = wetting.as_ref().map(|default| default.0).unwrap_or_default();
+        let mut spawned = 0;
+        for (wearer, wear, mut wearing) in &mut wearers {
+            let is_meant = match due {
+                Some(now) => wear.at.is_some_and(|at| at <= now),
+                None => wear.at.is_none() && spawned < MOST_STRANDS,
+            };
+            let is_ready = |stage: &WearStage| match stage {
+                WearStage::Making(share) => share.is_ready(due.is_some()),
+                _ => false,
+            };
+            if !is_meant || !is_ready(&wearing.stage) {
+                continue;
             }
-            // The scene was despawned while the hair was made.
-            Ok(_) => wearing.stage = WearStage::Begun,
-            Err(error) => {
-                wearing.head = None;
-                report_failure(&mut commands, &mut faults, wearer, error);
+            let stage = core::mem::replace(&mut wearing.stage, WearStage::Done);
+            let WearStage::Making(share) = stage else { continue };
+            let Some(ready) = share.take() else { continue };
+            match ready {
+                Ok(mut made)
+                    if entities.contains(made.parent)
+                        && made.skin.iter().all(|(mesh, _)| entities.contains(*mesh)) =>
+                {
+                    if let Some(old) = wearing.worn.take() {
+                        despawn_worn(&mut commands, wearer, old, &fitted);
+                    }
+                    spawned += made.strands.len();
+                    let ((facing, facing_from), mesh) = (made.facing, made.skin[0].0);
+                    log_made(wearer, &made);
+                    let fall = made.fall.take();
+                    (wearing.is_carried, wearing.settles) = (made.is_carried, false);
+                    let of_strands = core::mem::take(&mut made.faults);
+                    // What was made, looking as is wanted now.
+                    let made_as = wearing.wanted.clone().unwrap_or_else(|| wear.clone());
+                    let made_as = made_as.looking_like(wear);
+                    wearing.wanted = Some(made_as.clone());
+                    let hair = spawn_hair(&mut commands, wearer, &made_as, made, wetting);
+                    faults.write_batch(of_strands.into_iter().map(|fault| fault.of(hair)));
+                    let event = HairWorn { entity: wearer, hair, mesh, facing, facing_from };
+                    commands.trigger(event);
+                    wearing.worn = Some(hair);
+                    wearing.fall = fall.or(wearing.fall.take());
+                }
+                // The scene was despawned while the hair was made.
+                Ok(_) => wearing.begin(wear),
+                Err(error) => {
+                    wearing.head = None;
+                    report_failure(&mut commands, &mut faults, wearer, error);
+                }
             }
         }
     }
+}
+
+/// Before a tick: puts on the hair whose time has come.
+pub(super) fn put_on_due(world: &mut World, all: &mut QueryState<(&WearHair, &mut Wearing)>) {
+    let now = world.resource::<Time>().elapsed();
+    let mut is_any = false;
+    for (wear, mut wearing) in all.iter_mut(world) {
+        if wear.at.is_none_or(|at| at > now) {
+            continue;
+        }
+        // Written since the frame began.
+        let is_known = wearing.wanted.as_ref().is_some_and(|wanted| wanted.is_same_hair(wear));
+        if !is_known {
+            wearing.begin(wear);
+        }
+        is_any |= !matches!(wearing.stage, WearStage::Done);
+    }
+    if is_any {
+        let _ = world.run_system_cached_with(
+            |In(now): In<Duration>, finder: Finder| finder.find(Some(now)),
+            now,
+        );
+        let _ = world.run_system_cached(start);
+        let _ = world.run_system_cached_with(
+            |In(now): In<Duration>, dresser: Hairdresser| dresser.put_on(Some(now)),
+            now,
+        );
+    }
+}
+
+/// Whether hair is put on at a time of the game's choice.
+pub(super) fn any_with_time(wearers: Query<&WearHair>) -> bool {
+    wearers.iter().any(|wear| wear.at.is_some())
 }
 
 /// Logs what was found of a character.
@@ -402,29 +556,24 @@ fn spawn_hair(
     if let Some(preset) = made.preset {
         hair.insert(preset);
     }
-    // A saved style is put on as it is.
-    #[cfg(feature = "save")]
-    let is_styled = wear.hairdo.is_some();
-    #[cfg(not(feature = "save"))]
-    let is_styled = false;
-    if is_styled {
-        hair.remove::<Settling>();
-    } else {
-        hair.insert(Settling::default());
-    }
+    // It has settled.
+    hair.remove::<Settling>();
     #[cfg(feature = "render")]
     {
         if let Some(look) = made.look {
             hair.insert(look);
         }
-        if !made.hair.followers.0.is_empty() {
-            hair.insert(made.hair.followers);
+        if !made.followers.0.is_empty() {
+            hair.insert(made.followers);
+        }
+        if let Some(shells) = made.shells {
+            hair.insert(super::shade::Shading::Made(shells));
         }
     }
     let hair = hair.id();
-    for strand in made.hair.strands {
-        commands.spawn((StrandOf(hair), strand));
-    }
+    let strands =
+        made.strands.into_iter().map(move |(strand, bonds)| (StrandOf(hair), strand, bonds));
+    commands.spawn_batch(strands.collect::<Vec<_>>());
     spawn_solids(commands, wearer, hair, made.solids);
     #[cfg(feature = "save")]
     if let Some(hairdo) = wear.hairdo.clone() {
@@ -441,6 +590,7 @@ fn spawn_hair(
     if let Some(style) = wear.style {
         own.insert(style);
     }
+    commands.queue(move |world: &mut World| PassedTypes::pass(world, wearer, hair));
     hair
 }
 

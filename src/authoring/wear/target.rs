@@ -39,6 +39,9 @@ pub(super) struct Target {
     /// What is shown and moves with other bones than the head's, and not with its skin: capes, pauldrons.
     pub(super) garments: Vec<MeshPart>,
     pub(super) own: OwnColliders,
+    /// How the wearer is turned in the world, and how many metres one of its own is there.
+    pub(super) turn: Quat,
+    pub(super) size: f32,
 }
 
 /// Where a character has colliders that were not fitted for worn hair.
@@ -48,6 +51,16 @@ pub(super) struct OwnColliders {
     pub(super) above: HashSet<Entity>,
     /// The joints that they are on: the first at or above each.
     pub(super) joints: HashSet<Entity>,
+    /// Those below the wearer.
+    pub(super) solids: Vec<OwnSolid>,
+}
+
+/// A collider of a character's own.
+pub(super) struct OwnSolid {
+    pub(super) collider: HairCollider,
+    /// The joint that it is on, and where it is there; in the wearer's space where it is on none.
+    pub(super) joint: Option<Entity>,
+    pub(super) place: Affine3A,
 }
 
 /// Result of the search for a head.
@@ -76,7 +89,7 @@ pub(super) struct Characters<'w, 's> {
     skins: Query<'w, 's, (&'static Mesh3d, Option<&'static SkinnedMesh>)>,
     hairs: Query<'w, 's, (), With<Hair>>,
     wearers: Query<'w, 's, (), With<WearHair>>,
-    colliders: Query<'w, 's, Entity, (With<HairCollider>, Without<Fitted>)>,
+    colliders: Query<'w, 's, (Entity, &'static HairCollider), Without<Fitted>>,
     places: Query<'w, 's, (Option<&'static Transform>, Option<&'static ChildOf>)>,
     #[cfg(feature = "render")]
     shown: Query<'w, 's, (&'static Visibility, Has<HiddenForHair>)>,
@@ -228,6 +241,7 @@ impl Characters<'_, '_> {
                 let poses = self.poses.as_ref()?.get(&skin.inverse_bindposes)?;
                 Some(self.skin(skin, poses, is_bone.then_some((head, &of_head))))
             });
+            let mesh_id = mesh.id();
             let mesh = self.meshes.as_ref().and_then(|meshes| meshes.get(mesh));
             let mesh = skin_of(mesh.ok_or(WearError::NoMesh)?)?;
             let to_wearer = match &skin {
@@ -240,6 +254,7 @@ impl Characters<'_, '_> {
                 is_shown: self.is_shown(entity, wearer),
                 is_named: is_named(entity),
                 mesh,
+                mesh_id,
                 skin,
                 to_wearer,
             })
@@ -256,7 +271,20 @@ impl Characters<'_, '_> {
             part.is_shown.then_some(part)
         });
         let garments = garments.collect();
-        Ok(Target { head, garments, parts, own: self.own_colliders(wearer, &joints) })
+        let own = self.own_colliders(wearer, &joints);
+        let (turn, size) = self.stands(wearer);
+        Ok(Target { head, garments, parts, own, turn, size })
+    }
+
+    /// How an entity is turned in the world, and how large it is.
+    fn stands(&self, entity: Entity) -> (Quat, f32) {
+        let place = |at: Entity| self.places.get(at).ok()?.0.map(Transform::compute_affine);
+        let world = self.upward(entity).filter_map(place);
+        let world = world.fold(Affine3A::IDENTITY, |below, at| at * below);
+        let (scale, turn, _) = world.to_scale_rotation_translation();
+        let size = scale.element_product().abs().cbrt();
+        let is_sound = turn.is_finite() && size.is_finite() && size > 0.0;
+        if is_sound { (turn, size) } else { (Quat::IDENTITY, 1.0) }
     }
 
     /// A mesh without a skin that hangs on a bone of the body, as moved by that bone alone; `None` on none, and for
@@ -284,6 +312,7 @@ impl Characters<'_, '_> {
             Some(part.to_wearer * skin.poses.get(at)?.inverse())
         });
         let to_wearer = bound? * pose;
+        let mesh_id = mesh.id();
         let mesh = skin_of(self.meshes.as_ref()?.get(mesh)?).ok()?;
         let skin = MeshSkin {
             joints: vec![joint],
@@ -298,6 +327,7 @@ impl Characters<'_, '_> {
             is_shown: self.is_shown(entity, wearer),
             is_named: false,
             mesh,
+            mesh_id,
             skin: Some(skin),
             to_wearer,
         })
@@ -342,18 +372,22 @@ impl Characters<'_, '_> {
     /// Where the character's own colliders are. Those of other wearers, and what games put on hair, are not its own.
     fn own_colliders(&self, wearer: Entity, joints: &HashSet<Entity>) -> OwnColliders {
         let mut own = OwnColliders::default();
-        for collider in &self.colliders {
-            let mut is_on_joint = false;
-            for entity in self.upward(collider) {
+        for (at, collider) in &self.colliders {
+            let (mut joint, mut is_below) = (None, false);
+            for entity in self.upward(at) {
                 own.above.insert(entity);
-                if !is_on_joint && joints.contains(&entity) {
-                    is_on_joint = true;
+                if joint.is_none() && joints.contains(&entity) {
+                    joint = Some(entity);
                     own.joints.insert(entity);
                 }
+                is_below |= entity == wearer;
                 let is_other = entity != wearer && self.wearers.contains(entity);
                 if is_other || self.hairs.contains(entity) {
                     break;
                 }
+            }
+            if let Some(place) = self.relative(at, joint.unwrap_or(wearer)).filter(|_| is_below) {
+                own.solids.push(OwnSolid { collider: collider.clone(), joint, place });
             }
         }
         own

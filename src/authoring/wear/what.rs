@@ -16,6 +16,7 @@ use bevy::{
     ecs::{lifecycle::HookContext, world::DeferredWorld},
     prelude::*,
 };
+use core::time::Duration;
 
 /// Puts hair on a character. Component of any entity with a mesh, or of one that has a character
 /// below it, such as the root of a glTF scene; the scene may still be loading.
@@ -37,8 +38,8 @@ use bevy::{
 ///
 /// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there
 /// is none), with [`WornBy`](crate::WornBy), [`WornAs`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] has its entity, and
-/// [`WornHair`](crate::WornHair) on the wearer. It settles before it is first drawn
-/// ([`Settling`](crate::Settling)) unless it is styled. Its settings are the preset's, and a
+/// [`WornHair`](crate::WornHair) on the wearer. Unless it is styled it has settled then, as
+/// [`SettleSettings`](crate::SettleSettings) say, on the character as it is bound to its skeleton. Its settings are the preset's, and a
 /// [`HairWetting`](crate::HairWetting) with the number of fibres that grow there. Others are put on the wearer,
 /// before or after; all hair that it wears takes them over, this one and those to come:
 ///
@@ -50,9 +51,13 @@ use bevy::{
 /// # }
 /// ```
 ///
-/// Hair is made off the main thread and put on in [`PreUpdate`]. Whenever this component changes
-/// the hair is made again, and the old one stays until the new one is ready; another
-/// [`look`](Self::look), [`dye`](Self::dye) or [`style`](Self::style) is applied to the worn hair.
+/// Hair is made and settles off the main thread, paused or not, and is put on in [`PreUpdate`], or in the tick of
+/// [`at`](Self::at). Whenever this component changes the hair is made again, and the old one is drawn until the new
+/// one is ready; another [`look`](Self::look), [`dye`](Self::dye) or [`style`](Self::style) is applied to the worn
+/// hair. Hair that grows from the same roots, as with another [`length`](Self::length), takes over how the old one lay
+/// and settles before the eyes: a slider shows each value that it is made for while it is dragged. The same hair for
+/// many alike is made once. What a game has put on the wearer stays; what it has put on the old hair itself goes with
+/// it, and so do water, treatments and ties.
 /// Hair that cannot be worn is reported once, as a [`HairFault`](crate::HairFault) and by
 /// [`HairNotWorn`]; the wearer keeps the hair that it has.
 ///
@@ -114,6 +119,19 @@ pub struct WearHair {
     /// head's; on a mesh without a skin, those of the mesh. One on the character's root replaces none. Each
     /// worn hair brings its own, also a beard beside hair. Default `true`.
     pub colliders: bool,
+    /// When it is put on, by [`Time<Fixed>::elapsed`](Time::elapsed): before the tick that reaches this; the game
+    /// waits for it there where it is not ready. So the same ticks move it on any machine, as lockstep, rollback and
+    /// replays need. Hair takes a second or two to be made, in which nobody waits; a mesh or groom that is still
+    /// loading is not waited for. Default `None`: as soon as it is ready, at once with time standing still.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*; use std::time::Duration;
+    /// fn join(mut commands: Commands, time: Res<Time<Fixed>>) {
+    ///     let later = time.elapsed() + Duration::from_secs(3);
+    ///     commands.spawn((Transform::default(), WearHair::new(HairPreset::Bob).at(later)));
+    /// }
+    /// ```
+    pub at: Option<Duration>,
     /// How the hair is styled: put on at once, or resampled where it is of other strands. A hairdo
     /// saved from worn hair fits the same [`hair`](Self::hair), [`seed`](Self::seed) and
     /// [`length`](Self::length) on the same character strand by strand:
@@ -139,6 +157,7 @@ impl Default for WearHair {
             hairline: None,
             place: Transform::IDENTITY,
             colliders: true,
+            at: None,
             #[cfg(feature = "save")]
             hairdo: None,
         }
@@ -187,10 +206,37 @@ impl WearHair {
         self
     }
 
+    /// The same, put on before the tick in which `Time<Fixed>::elapsed` reaches this.
+    pub fn at(mut self, time: Duration) -> Self {
+        self.at = Some(time);
+        self
+    }
+
+    /// Without what worn hair can take, and its time.
+    pub(super) fn bare(&self) -> Self {
+        Self { look: None, dye: None, style: None, at: None, ..self.clone() }
+    }
+
     /// Whether they differ only in what worn hair can take.
     pub(super) fn is_same_hair(&self, other: &Self) -> bool {
-        let bare = |wear: &Self| Self { look: None, dye: None, style: None, ..wear.clone() };
-        bare(self) == bare(other)
+        self.bare() == other.bare()
+    }
+
+    /// Whether they are the same preset, or grooms, on the same head, perhaps of another length, seed or hairline.
+    pub(super) fn is_variation(&self, other: &Self) -> bool {
+        let kind = |wear: &Self| {
+            let mut kind = Self { length: 1.0, seed: 0, hairline: None, ..wear.bare() };
+            if let HairSource::Groom { groom, guides } = &mut kind.hair {
+                (*groom, *guides) = default();
+            }
+            kind
+        };
+        kind(self) == kind(other)
+    }
+
+    /// This hair with the look, dye and style of another.
+    pub(super) fn looking_like(self, other: &Self) -> Self {
+        Self { look: other.look.clone(), dye: other.dye.clone(), style: other.style, ..self }
     }
 
     /// The same styled like this.

@@ -52,9 +52,10 @@ impl MotionOwner {
 }
 
 /// Makes a [`Hair`](crate::Hair) settle before it is first drawn, as [`SettleSettings`](crate::SettleSettings) says; removed by
-/// the tick once it has. Presets' settings and worn hair include it; insert it on hair made by hand.
+/// the tick once it has. Presets' settings include it; insert it on hair made by hand. Hair that `WearHair` puts on has
+/// settled by then.
 ///
-/// Nothing settles while time is paused: such hair stays hidden.
+/// While the game's time stands still or goes slowly it settles on another thread, without ticks.
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;

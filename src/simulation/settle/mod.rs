@@ -9,11 +9,20 @@
 //!
 //! The hair also takes part in the game's own ticks, so its surroundings are up to date when it is
 //! drawn.
+//!
+//! Hair that [`WearHair`](crate::WearHair) puts on has settled by then: `ahead` does the same in a world of its
+//! own, on another thread. So does, where ticks are rare because time stands still or goes slowly, `elsewhere` for all
+//! other hair.
 
+mod ahead;
+mod elsewhere;
+mod plugin;
 mod systems;
 
 pub use crate::hair::strand::Settling;
-pub use systems::SettlePlugin;
+#[cfg(feature = "groom")]
+pub(crate) use ahead::{SettleAhead, SettleConditions, Settled};
+pub use plugin::SettlePlugin;
 
 use crate::base::setting::setting;
 use bevy::prelude::*;
@@ -34,7 +43,8 @@ setting! {
         /// Maximum number of ticks that are simulated ahead; 0 draws hair at once, as planted.
         pub ticks: u32 = 120, in TICKS: 0.0..=1e5, safe 0.0..=600.0, "120 are two seconds at 60 Hz";
         /// How many of them run with each tick of the game, which is also their cost in ticks of
-        /// this hair. The hair is hidden for at most `ticks` / `at_once` ticks of the game.
+        /// this hair. The hair is hidden for at most `ticks` / `at_once` ticks of the game. Worn hair settles
+        /// elsewhere and does not need it.
         pub at_once: u32 = 4, in AT_ONCE: 1.0..=1e5, safe 1.0..=32.0,
             "4 hide it for half a second at most";
         /// Speed below which a node counts as at rest.

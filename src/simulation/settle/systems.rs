@@ -3,31 +3,13 @@
 use super::{SettleSettings, Settling};
 use crate::{
     base::{
-        schedule::{HairStep, HairTicked, SettleTick, SettleTickHairs, lacks},
+        schedule::{HairStep, SettleTick, SettleTickHairs},
         setting::Settings,
     },
-    hair::{
-        strand::{Hair, Strand, StrandHistory, Strands, TickPose, lacks_strands},
-        worn,
-    },
-    keratin::bond::{BondChanges, BondPlugin},
+    hair::strand::{Hair, Strand, StrandHistory, Strands, TickPose},
+    keratin::bond::BondChanges,
 };
 use bevy::{ecs::system::SystemState, prelude::*};
-
-/// Hair settles before it is drawn.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SettlePlugin;
-
-impl Plugin for SettlePlugin {
-    fn build(&self, app: &mut App) {
-        if lacks_strands::<Self>(app) {
-            return;
-        }
-        lacks::<BondPlugin, Self>(app);
-        worn::setting::<SettleSettings>(app);
-        app.add_systems(HairTicked, settle.run_if(any_with_component::<Settling>));
-    }
-}
 
 /// How long all of it has to be still (s): longer than the turning point of a swing.
 const STILL_SECONDS: f32 = 0.25;
@@ -50,7 +32,7 @@ fn settling_hairs(
 }
 
 /// Runs additional ticks of all hair that settles.
-fn settle(world: &mut World) {
+pub(super) fn settle(world: &mut World) {
     let mut hairs = world.run_system_cached(settling_hairs).unwrap_or_default();
     let present = *world.resource::<HairStep>();
     if hairs.is_empty() || present.count == 0 {
@@ -120,7 +102,7 @@ impl SettleDamping<'_, '_> {
 }
 
 /// Ends settling: the hair is at rest and is drawn from now on.
-fn end(world: &mut World, hair: Entity) {
+pub(super) fn end(world: &mut World, hair: Entity) {
     let members = world.get::<Strands>(hair).map(|members| members.collection().to_vec());
     for strand in members.unwrap_or_default() {
         if let Ok(mut strand) = world.get_entity_mut(strand)
