@@ -116,7 +116,7 @@ impl Grid {
                 for _ in 0..3 {
                     p -= normal(distance, p) * distance(p);
                 }
-                // Where the surface has an edge, it may have gone scattered.
+                // Where the surface has an edge, it may have gone astray.
                 let p = p.clamp(2.0 * low - high, 2.0 * high - low);
                 positions.push(p.to_array());
                 normals.push(normal(distance, p).to_array());

@@ -60,7 +60,7 @@
 //!
 //! # What it costs
 //!
-//! No card was measured. What Mesa 22.3.6 makes of the kernels for RDNA 2 (Navi 21), compiled without a card:
+//! Times on a card are in the book (`docs/src/gpu.md`). What Mesa 22.3.6 makes of the kernels for RDNA 2 (Navi 21), compiled without a card:
 //!
 //! | kernel | runs | instructions | vector registers | waves a SIMD |
 //! |---|---|---|---|---|

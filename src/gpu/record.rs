@@ -218,7 +218,7 @@ pub struct SubstepRecord {
     pub damping: f32,
     /// G J/(E I); the paper's projections have 1.
     pub torsion: f32,
-    /// Distance that nodes retained from obstacles (m).
+    /// Distance that nodes keep from obstacles (m).
     pub skin: f32,
     /// Newton steps of the length limiter, at most.
     pub limiter_steps: u32,

@@ -57,13 +57,14 @@ impl Default for HairResidence {
 #[reflect(Clone, PartialEq)]
 #[non_exhaustive]
 pub enum WhyCpu {
-    /// [`SimulateOn`] asks for it.
+    /// [`SimulateOn::Cpu`], the default, asks for it.
     NotAsked,
     /// The app has no GPU, or no assets for its shaders.
     NoRenderer,
     /// The device has no compute shaders with eight storage buffers.
     NoCompute,
-    /// The device is a processor that plays one, slower than the tick itself; see [`HairGpu::software`].
+    /// The device is software on the processor, such as Mesa's, slower than the tick itself; see
+    /// [`HairGpu::software`].
     Software,
     /// The kernels are being compiled.
     Compiling,
@@ -84,7 +85,7 @@ pub enum WhyCpu {
 #[reflect(Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Unsupported {
-    /// Strands push each other ([`StrandContact`](crate::StrandContact)); a radius or strength of 0 has them not.
+    /// Strands push each other ([`StrandContact`](crate::StrandContact)); with a radius or strength of 0 they do not.
     StrandContact,
     /// Water on the hair, droplets, showers or volumes of water anywhere.
     Water,
@@ -106,7 +107,7 @@ pub enum Unsupported {
     /// Roots that are being tied to a mesh.
     MovingRoots,
     /// A level of detail at which no strand is simulated, or a change of which strands are. A level that a
-    /// [`HairBudget`](crate::HairBudget) gives it does not retained it: it goes at that of its size on the screen.
+    /// [`HairBudget`](crate::HairBudget) gives it does not keep it here: it goes at that of its size on the screen.
     LevelOfDetail,
     /// It is still [`Settling`](crate::Settling).
     Settling,

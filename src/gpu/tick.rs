@@ -34,7 +34,7 @@ use bevy::{
 pub(super) enum Decision {
     /// It goes to the device.
     Goes(Ready, SolverMethod),
-    /// It goes as soon as its level of detail is that which it has without the budget.
+    /// It goes as soon as it has the level of detail that it would have without a budget.
     Waits,
     /// Strands begin to be wound: where they are has to be known.
     Winds,

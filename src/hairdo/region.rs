@@ -1,4 +1,4 @@
-//! Which strands of a hair a tool takes.
+//! Which strands of a hair a tie or a cut acts on.
 
 use bevy::prelude::*;
 

@@ -30,7 +30,7 @@
 //!
 //! # Against path tracing
 //!
-//! Scenes of `tests/render_reference.rs`, rebuilt from path-traced ones of the same strands, melanin and light
+//! Scenes of `tests/drawing/reference.rs`, rebuilt from path-traced ones of the same strands, melanin and light
 //! (Cycles' Chiang model, up to 512 bounces). Ratios of this renderer to the reference, for hair with no, a
 //! blond's, a brown's and a black's melanin; mean of the channels.
 //!

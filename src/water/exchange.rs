@@ -399,7 +399,7 @@ pub(super) fn bear_water(
     change
 }
 
-/// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close retained
+/// Moves hydrogen bonds by a `share` of the difference toward 1 − wetness; those that close keep
 /// the present shape by equation 16. Returns the largest difference.
 fn open_bonds(bonds: &Bonds, wetness: &[f32], share: f32, changes: &mut BondChanges) -> f32 {
     let joints = bonds.rates(BondKind::Hydrogen).zip(wetness).enumerate();

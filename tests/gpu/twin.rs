@@ -761,7 +761,7 @@ impl Twin {
             rows[i][0] -= share * rows[i][1];
             rows[i][2] -= share * rows[i - 1][2];
         }
-        // An edge that would turn too far is stopped, and those before it apply_report that.
+        // An edge that would turn too far is stopped, and those before it take account of that.
         let (mut turn, mut coupling) = (0.0, 0.0);
         for (q, [diagonal, before, rhs]) in self.q.iter_mut().zip(rows).rev() {
             turn = ((rhs - coupling * turn) / diagonal).clamp(-1.5_f64, 1.5);

@@ -72,7 +72,7 @@ impl Crate {
     fn home(&self, path: &[String]) -> Vec<String> {
         let mut at: Vec<String> = Vec::new();
         let mut path = path.to_vec();
-        // A circle of re-exports would not compile; a glob may lead scattered, so it ends.
+        // A circle of re-exports would not compile; a glob may lead astray, so it ends.
         for _ in 0..32 {
             let Some(next) = path.first().cloned() else { return at };
             at.push(next.clone());

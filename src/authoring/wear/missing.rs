@@ -1,4 +1,4 @@
-//! Finds the asset that is to blame where a wearer has no mesh: a path with a slip of the pen.
+//! Finds the asset that is to blame where a wearer has no mesh: a path with a typing error.
 
 use super::error::WearError;
 use bevy::{

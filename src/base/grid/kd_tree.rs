@@ -38,7 +38,7 @@ impl KdTree {
     }
 
     /// The `N` nearest to `point`, nearest first, with their squared distances; fewer where there are
-    /// not as many, none for a non-finite point. GuideOffsets are ordered by index.
+    /// not as many, none for a non-finite point. Ties are ordered by index.
     pub fn nearest<const N: usize>(
         &self,
         point: Vec3,
@@ -131,7 +131,7 @@ fn insert(found: &mut [(f32, u32)], one: (f32, u32)) {
 }
 
 /// Partitions items so that `first` of them come first along the widest axis of their points; returns
-/// that axis. GuideOffsets are ordered by index: the same halves on every machine.
+/// that axis. Ties are ordered by index: the same halves on every machine.
 pub(crate) fn split_at_median<T>(
     items: &mut [T],
     first: usize,

@@ -1,4 +1,4 @@
-// Vectors, quaternions (Hamilton's, x y z w) and 3x3 blocks. Rust twins: src/math/lanes/algebra.rs,
+// Vectors, quaternions (Hamilton's, x y z w) and 3x3 blocks. Rust twins: src/base/lanes/algebra.rs,
 // src/solver/rod/direct/{frames,matrix}.rs.
 
 fn normalized(q: vec4<f32>) -> vec4<f32> {

@@ -71,7 +71,7 @@ pub struct HairdoApplied {
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct HairdoRejected {
-    /// What was named.
+    /// The entity that the request named.
     pub entity: Entity,
     /// Why.
     pub error: HairdoError,

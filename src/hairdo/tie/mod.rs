@@ -71,7 +71,7 @@ pub struct Tied(pub Entity);
 #[relationship_target(relationship = Tied)]
 pub struct TiedStrands(Vec<Entity>);
 
-/// Where a strand is tied. Kept by the tick.
+/// How far a strand has been gathered into its tie, and where it is held. Kept by the tick.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct TieProgress {
@@ -114,7 +114,7 @@ impl TieProgress {
 }
 
 /// A request to tie strands of a hair: an event on its entity. Strands that are tied elsewhere change over. The answer
-/// is [`HairTied`].
+/// is [`HairTied`], where any strand is in the region and not in this tie already.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct TieHair {

@@ -99,7 +99,7 @@ fn begin(
     if waiting.is_empty() {
         return;
     }
-    // In the order of their hair, which does not hang on tables.
+    // In the order of the hair's strands, which does not depend on archetype tables.
     let mut places = EntityHashMap::<usize>::default();
     for ((hair, _), _) in &waiting {
         if let Ok((_, members)) = hairs.get(*hair) {
@@ -205,7 +205,7 @@ fn release(
     }
 }
 
-/// Releases the strands of a tie that is none any more.
+/// Releases the strands of an entity that has lost its [`HairTie`].
 fn release_all(gone: On<Remove, HairTie>, ties: Query<&TiedStrands>, mut commands: Commands) {
     for strand in ties.get(gone.entity).iter().flat_map(|tied| tied.iter()) {
         commands.entity(strand).try_remove::<Tied>();

@@ -195,7 +195,7 @@ fn release(left: On<Remove, WoundOn>, mut strands: Query<(&mut WindingProgress, 
     }
 }
 
-/// Releases the strands of a rod that is none any more.
+/// Releases the strands of an entity that has lost its [`PermRod`].
 fn release_all(gone: On<Remove, PermRod>, rods: Query<&WoundStrands>, mut commands: Commands) {
     for strand in rods.get(gone.entity).iter().flat_map(|wound| wound.iter()) {
         commands.entity(strand).try_remove::<WoundOn>();

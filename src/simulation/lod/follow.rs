@@ -158,7 +158,7 @@ impl GuideOffsets {
 }
 
 impl GuideOffsets {
-    /// GuideOffsets a strand in its present pose to guides in theirs, with their weights.
+    /// Of a strand in its present pose to guides in theirs, with their weights.
     pub fn new<'a>(
         strand: StrandState<'_>,
         guides: impl IntoIterator<Item = (u32, f32, StrandState<'a>)>,

@@ -55,7 +55,7 @@
 //! # Against theory and the sweeps
 //! Drag 0; strand 20 cm, L_g 13 cm unless noted; theory is the elastica, and the vibration of a
 //! beam under its own weight, hanging or about the elastica. The direct solver at the papers' 1/360
-//! s and at the default 1/180 s (`tests/swing` prints these numbers), sweeps with their defaults at
+//! s and at the default 1/180 s (`tests/headless/swing` prints these numbers), sweeps with their defaults at
 //! 1/360 s.
 //!
 //! | | segments | theory | direct, 1/360 s | direct, 1/180 s | sweeps |
