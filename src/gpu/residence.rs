@@ -132,7 +132,7 @@ pub enum Unsupported {
 impl fmt::Display for WhyCpu {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::NotAsked => "it is not asked to be elsewhere",
+            Self::NotAsked => "SimulateOn::Gpu is not set",
             Self::NoRenderer => "the app has no GPU",
             Self::NoCompute => "the GPU lacks compute shaders with 8 storage buffers",
             Self::Software => "the GPU is software; HairGpu { software: true } takes it",

@@ -223,21 +223,22 @@ impl HairsOf<'_, '_> {
     /// is none.
     pub(crate) fn near(&self, entity: Entity) -> String {
         let parent = |of: &Entity| self.parents.get(*of).ok().map(ChildOf::parent);
-        let above = core::iter::successors(parent(&entity), parent).find_map(|at| self.told(at));
-        if let Some(told) = above {
-            return format!("; {told}, above it");
+        let above =
+            core::iter::successors(parent(&entity), parent).find_map(|at| self.described(at));
+        if let Some(found) = above {
+            return format!("; {found}, above it");
         }
         let mut todo = VecDeque::from([entity]);
         while let Some(at) = todo.pop_front() {
-            if let Some(told) = self.told(at) {
-                return format!("; {told}, below it");
+            if let Some(found) = self.described(at) {
+                return format!("; {found}, below it");
             }
             todo.extend(self.children.get(at).into_iter().flatten());
         }
         String::new()
     }
 
-    fn told(&self, at: Entity) -> Option<String> {
+    fn described(&self, at: Entity) -> Option<String> {
         if self.hairs.contains(at) {
             return Some(format!("{at} is a Hair"));
         }

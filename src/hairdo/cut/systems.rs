@@ -76,7 +76,7 @@ impl CutBy {
 
 fn cut_all(world: &mut World, request: &CutHair) {
     if let Some(wrong) = request.by.wrong() {
-        world.write_message(HairFault::new(FaultKind::NoTarget, wrong).of(request.hair));
+        world.write_message(HairFault::new(FaultKind::Setting, wrong).of(request.hair));
         return;
     }
     let hairs = hairs_of(world, request.hair);

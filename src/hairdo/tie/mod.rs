@@ -114,7 +114,7 @@ impl TieProgress {
 }
 
 /// A request to tie strands of a hair: an event on its entity. Strands that are tied elsewhere change over. The answer
-/// is [`HairTied`], where any strand is in the region and not in this tie already.
+/// is [`HairTied`] on each hair: with 0 strands where none of the region is left that is not in this tie already.
 #[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct TieHair {

@@ -61,20 +61,22 @@ fn tie(
         faults.write(HairFault::new(FaultKind::NoTarget, message).of(hair));
         return;
     }
-    let mut members = Vec::new();
     for &hair in of.of(&hair) {
-        match hairs.get(hair) {
-            Ok(own) => members.extend(own.iter()),
-            Err(_) => {
-                faults.write(of.no_target("TieHair", hair));
-            }
+        let Ok(members) = hairs.get(hair) else {
+            faults.write(of.no_target("TieHair", hair));
+            continue;
+        };
+        let is_taken = |member: &Entity| {
+            strands.get(*member).is_ok_and(|(strand, tied)| {
+                strand.positions().first().is_some_and(|root| region.contains(*root))
+                    && tied.is_none_or(|tied| tied.0 != tie)
+            })
+        };
+        let mut taken = members.iter().filter(is_taken).peekable();
+        if taken.peek().is_none() {
+            commands.trigger(HairTied { hair, tie, strands: 0, too_short: 0 });
         }
-    }
-    for member in members {
-        if let Ok((strand, tied)) = strands.get(member)
-            && strand.positions().first().is_some_and(|root| region.contains(*root))
-            && tied.is_none_or(|tied| tied.0 != tie)
-        {
+        for member in taken {
             commands.entity(member).insert((Tied(tie), TieProgress::default()));
         }
     }

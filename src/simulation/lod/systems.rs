@@ -68,7 +68,7 @@ impl Plugin for LodPlugin {
 
 /// What was said of the budget.
 #[derive(Default)]
-struct Told {
+struct Reported {
     exceeded: bool,
     left_out: bool,
 }
@@ -97,7 +97,7 @@ fn choose(
         With<Hair>,
     >,
     strands: Query<&Strand>,
-    mut told: Local<Told>,
+    mut reported: Local<Reported>,
     mut faults: MessageWriter<HairFault>,
 ) {
     let budget = budget.clamped();
@@ -156,7 +156,7 @@ fn choose(
     let is_coarser = levels.iter().zip(&candidates).any(|(level, hair)| *level > hair.wanted);
     if let Some((cost, hair)) = left_out.filter(|(cost, _)| *cost > 0.0)
         && (is_coarser || exceeds)
-        && !core::mem::replace(&mut told.left_out, true)
+        && !core::mem::replace(&mut reported.left_out, true)
     {
         let message = format!(
             "the budget of {} ms leaves out hair without HairLod, which is simulated in full, for {} ms, while other \
@@ -166,7 +166,7 @@ fn choose(
         );
         faults.write(HairFault::new(FaultKind::Setting, message).of(hair));
     }
-    if exceeds && !told.exceeded {
+    if exceeds && !reported.exceeded {
         let message = format!(
             "the budget of {} ms is too small: at their coarsest levels all hairs take about {present} ms, \
              and are simulated at those all the same",
@@ -174,7 +174,7 @@ fn choose(
         );
         faults.write(HairFault::new(FaultKind::Setting, message));
     }
-    told.exceeded = exceeds;
+    reported.exceeded = exceeds;
     for ((candidate, settings, present, limits), level) in chosen.iter_mut().zip(levels) {
         let settings_of = |level: usize| level.checked_sub(1).and_then(|i| settings.get(i));
         let wanted_strands = settings_of(candidate.wanted).map(|l| l.strands);
