@@ -4,7 +4,7 @@ use crate::{
     base::schedule::TickPlugin,
     forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
     hair::{look::LookPlugin, strand::StrandPlugin},
-    hairdo::{cut::CutPlugin, style::StylePlugin, tie::TiePlugin},
+    hairdo::{cut::CutPlugin, rollback::RollbackPlugin, style::StylePlugin, tie::TiePlugin},
     keratin::{bond::BondPlugin, treatment::TreatmentPlugin},
     simulation::{
         lod::LodPlugin,
@@ -40,6 +40,7 @@ use bevy::{
 /// | [`StylePlugin`] | measures how much of a style is left | strands, `BondPlugin` |
 /// | [`TiePlugin`] | hair ties | strands |
 /// | [`CutPlugin`] | cuts hair | strands |
+/// | [`RollbackPlugin`] | registers snapshots for rollback | |
 /// | [`LookPlugin`] | registers colour, width and dye | |
 /// | `HairRenderPlugin` | draws hair and droplets | feature `render`, strands, Bevy's renderer |
 /// | `HairGpuPlugin` | simulates hair by compute shaders | feature `gpu`, strands, `BondPlugin`, Bevy's renderer |
@@ -115,6 +116,7 @@ impl PluginGroup for HairPlugins {
             .add(StylePlugin)
             .add(TiePlugin)
             .add(CutPlugin)
+            .add(RollbackPlugin)
             .add(LookPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin {

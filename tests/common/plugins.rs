@@ -10,7 +10,10 @@ use bevy_keratin::{
     forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
     gpu::HairGpuPlugin,
     hair::{look::LookPlugin, strand::StrandPlugin},
-    hairdo::{cut::CutPlugin, save::SavePlugin, style::StylePlugin, tie::TiePlugin},
+    hairdo::{
+        cut::CutPlugin, rollback::RollbackPlugin, save::SavePlugin, style::StylePlugin,
+        tie::TiePlugin,
+    },
     keratin::{bond::BondPlugin, treatment::TreatmentPlugin},
     render::HairRenderPlugin,
     simulation::{
@@ -32,7 +35,7 @@ macro_rules! switches {
 }
 
 /// All of the group.
-pub const ALL: [(&str, Switch); 24] = switches![
+pub const ALL: [(&str, Switch); 25] = switches![
     TickPlugin,
     StrandPlugin,
     BondPlugin,
@@ -48,6 +51,7 @@ pub const ALL: [(&str, Switch); 24] = switches![
     StylePlugin,
     TiePlugin,
     CutPlugin,
+    RollbackPlugin,
     LookPlugin,
     HairRenderPlugin,
     HairGpuPlugin,

@@ -38,6 +38,18 @@ use bevy::{ecs::system::SystemParam, prelude::*};
 use hair::{HairState, StrandState};
 use shared::SharedState;
 
+/// Registers snapshots, which work without it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RollbackPlugin;
+
+impl Plugin for RollbackPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<HairSnapshot>()
+            .register_type::<HairWorldSnapshot>()
+            .register_type::<SnapshotError>();
+    }
+}
+
 /// Takes snapshots of hair and puts them back, within a tick: a parameter of a system.
 ///
 /// ```
