@@ -67,7 +67,7 @@ impl Plugin for HairDiagnosticsPlugin {
         }
         app.init_resource::<StageTimes>().add_systems(Update, count_strands);
         let all = HairSystems::ALL;
-        app.add_systems(HairTick, begin.before(all[0]));
+        app.add_systems(HairTick, begin.before(all[0]).ambiguous_with_all());
         for (stage, set) in all.into_iter().enumerate() {
             let lap = move |mut times: ResMut<StageTimes>| times.lap(stage);
             match all.get(stage + 1) {
