@@ -142,6 +142,7 @@ pub(crate) fn component<T: Passed + Ranged>(app: &mut App) {
 #[derive(Resource, Default)]
 pub(crate) struct PassedTypes(Vec<fn(&mut World, Entity, Entity)>);
 
+#[cfg(feature = "groom")]
 impl PassedTypes {
     /// Copies what is on a wearer to its new hair at once, not in the next frame.
     pub(crate) fn pass(world: &mut World, wearer: Entity, hair: Entity) {

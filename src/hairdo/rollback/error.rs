@@ -8,7 +8,7 @@ use bevy::prelude::*;
 #[reflect(Clone, PartialEq)]
 #[non_exhaustive]
 pub enum SnapshotError {
-    /// The entity is not there or carries no [`Hair`].
+    /// The entity is not there or carries no [`Hair`](crate::Hair).
     #[error(
         "{entity} is not a Hair and wears none: name its wearer, or the entity that the strands point to with StrandOf"
     )]
