@@ -29,7 +29,11 @@ pub(super) fn cut_followers(
 ) {
     let HairCut { hair, by, region, .. } = *cut;
     let Ok((packed, follower_roots, cuts)) = hairs.get(hair) else { return };
-    let guides: Vec<_> = packed.guides().map_while(|guide| strands.get(guide).ok()).collect();
+    let guides = packed.guides().map_while(|guide| {
+        let (strand, cut, water) = strands.get(guide).ok()?;
+        Some((strand, cut.filter(|cut| cut.fits(strand.nodes())), water))
+    });
+    let guides: Vec<_> = guides.collect();
     let settings = settings.of(hair);
     if guides.is_empty() || guides.len() != packed.guides().len() {
         return;

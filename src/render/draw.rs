@@ -351,6 +351,7 @@ fn around_both((a, b): (Vec3, Vec3), (c, d): (Vec3, Vec3)) -> (Vec3, Vec3) {
 /// The root of a guide, as long as it was before it was cut.
 pub(super) fn guide_root(strand: &Strand, cut: Option<&CutStrand>) -> GuideRoot {
     let [root, .., tip] = strand.positions() else { return GuideRoot::default() };
+    let cut = cut.filter(|cut| cut.fits(strand.nodes()));
     GuideRoot {
         place: *root,
         normal: strand.root_frame() * Vec3::Z,
@@ -387,6 +388,7 @@ impl Packed {
             let Ok((strand, .., cut)) = strands.get(guide) else {
                 continue;
             };
+            let cut = cut.filter(|cut| cut.fits(strand.nodes()));
             if strand.nodes() < 2 {
                 continue;
             }

@@ -281,6 +281,25 @@ fn a_hairdo_keeps_the_cut_and_an_older_one_lets_hair_grow_back() {
 }
 
 #[test]
+fn a_strand_in_the_place_of_a_cut_one_is_whole() {
+    let mut app = barber();
+    let (hair, strands) = head(&mut app, Transform::default());
+    run(&mut app, 0.1);
+    request(&mut app, CutHair::all(hair, CutBy::Length(0.05)));
+    // A game grows a new one on the same entity.
+    let points: Vec<Vec3> = (0..21).map(|i| Vec3::Y * (0.09 + 0.01 * i as f32)).collect();
+    let grown = Strand::from_polyline(&points).unwrap();
+    app.world_mut().entity_mut(strands[0]).insert(grown);
+    run(&mut app, 0.1);
+    let hairdo = Hairdo::of(app.world(), hair).unwrap();
+    assert_eq!(Hairdo::from_bytes(&hairdo.to_bytes()).unwrap(), hairdo);
+    request(&mut app, CutHair::all(hair, CutBy::Length(0.1)));
+    assert!((strand(&app, strands[0]).length() - 0.1).abs() < 1e-6);
+    let cut = app.world().get::<CutStrand>(strands[0]).unwrap();
+    assert!((cut.whole_length() - 0.2).abs() < 1e-6 && (cut.share() - 0.5).abs() < 1e-5, "{cut:?}");
+}
+
+#[test]
 fn hair_is_cut_whoever_moves_it_and_a_thousand_times() {
     for kind in 0..4 {
         let mut app = barber();

@@ -27,6 +27,16 @@ impl CutStrand {
         Self { edges, end: edges as f32, length: strand.length(), reach }
     }
 
+    /// Whether a strand of so many nodes ends where this says: it may have been replaced since, or this been edited.
+    pub(crate) fn fits(&self, nodes: usize) -> bool {
+        let edges = nodes.saturating_sub(1) as f32;
+        self.end > edges - 1.0
+            && self.end <= (edges + 1.0).min(self.edges as f32)
+            && self.length > 0.0
+            && self.length.is_finite()
+            && self.reach.is_finite()
+    }
+
     /// Length of the whole strand (m).
     pub fn whole_length(&self) -> f32 {
         self.length

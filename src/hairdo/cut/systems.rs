@@ -122,7 +122,8 @@ fn cut_strand(entity: &mut EntityWorldMut<'_>, meeting: Meeting) -> Option<f64> 
     let Meeting::At(place) = meeting else { return None };
     let whole = entity.get::<Strand>()?;
     let old = whole.rest_lengths().to_vec();
-    let mut cut = entity.get::<CutStrand>().copied().unwrap_or_else(|| CutStrand::whole(whole));
+    let before = entity.get::<CutStrand>().copied().filter(|cut| cut.fits(whole.nodes()));
+    let mut cut = before.unwrap_or_else(|| CutStrand::whole(whole));
     if !entity.get_mut::<Strand>()?.cut(place, &mut cut) {
         return None;
     }

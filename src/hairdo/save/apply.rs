@@ -49,6 +49,7 @@ impl Hairdo {
                 let strand = world.get::<Strand>(member)?;
                 let (bonds, water) = (world.get::<Bonds>(member), world.get::<Moisture>(member));
                 let cut = world.get::<CutStrand>(member).copied();
+                let cut = cut.filter(|cut| cut.fits(strand.nodes()));
                 Some(StyledStrand { hold, cut, ..StyledStrand::of(strand, bonds, water) })
             })
             .collect();

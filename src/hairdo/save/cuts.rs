@@ -47,13 +47,7 @@ impl StyledStrand {
     pub(super) fn check_cut(&self, strand: usize) -> Result<(), HairdoError> {
         let Some(cut) = self.cut else { return Ok(()) };
         let last = self.rest_lengths.len().saturating_sub(1);
-        let whole = cut.edges as f32;
-        let is_possible = cut.end > last as f32
-            && cut.end <= whole
-            && cut.length > 0.0
-            && cut.length.is_finite()
-            && cut.reach.is_finite();
-        if is_possible {
+        if cut.fits(self.positions.len()) {
             return Ok(());
         }
         let (what, at, found) = ("cut", last, f64::from(cut.end));
@@ -72,7 +66,7 @@ impl StyledStrand {
             || (self.rest_lengths.len() as u32, self.rest_lengths.iter().sum()),
             |cut| (cut.edges, cut.length),
         );
-        let other = cut.map_or_else(
+        let other = cut.filter(|cut| cut.fits(strand.nodes())).map_or_else(
             || (strand.edges() as u32, strand.length()),
             |cut| (cut.edges, cut.length),
         );
