@@ -4,11 +4,30 @@
 
 use crate::offscreen::has_adapter;
 use libtest_mimic::{Arguments, Completion, Trial, run};
+use std::sync::RwLock;
 
 const NO_DEVICE: &str = "no Vulkan driver; Debian's mesa-vulkan-drivers draws in software";
 
+/// Read by tests that run beside each other, written by one that measures time.
+static MACHINE: RwLock<()> = RwLock::new(());
+
 /// A test that needs a device.
 pub fn device(name: &str, test: fn()) -> Trial {
+    on_device(name, move || {
+        let _beside = MACHINE.read();
+        test();
+    })
+}
+
+/// A test that needs a device and measures time: no other of its program runs meanwhile.
+pub fn alone(name: &str, test: fn()) -> Trial {
+    on_device(name, move || {
+        let _alone = MACHINE.write();
+        test();
+    })
+}
+
+fn on_device(name: &str, test: impl FnOnce() + Send + 'static) -> Trial {
     Trial::ignorable_test(name, move || {
         if has_adapter() {
             test();
@@ -29,6 +48,7 @@ pub fn on_request(name: &str, test: fn()) -> Trial {
 /// A test that needs no device.
 pub fn anywhere(name: &str, test: fn()) -> Trial {
     Trial::test(name, move || {
+        let _beside = MACHINE.read();
         test();
         Ok(())
     })

@@ -57,7 +57,7 @@ device::tests! {
         device: a_scene_runs_on_a_graphics_device_and_says_so;
     }
     cost {
-        device: a_hundred_thousand_strands_cost_less_than_a_look_at_them;
+        alone: a_hundred_thousand_strands_cost_less_than_a_look_at_them;
     }
     golden {
         device: a_substep_of_the_direct_solver;
