@@ -1,8 +1,8 @@
 //! A walk through a small world: rain, a lake to wade into, a campfire to dry at, a crowd of passers-by, a barber's
 //! chair in the pause menu, and a saved game.
 //!
-//! Arrows walk, space jumps, R is rain, T ties a ponytail, X cuts to the chin, P pauses, F5 saves, F9 loads. Without a key the
-//! character goes its round by itself.
+//! Arrows walk, space jumps, R is rain, H puts a hat on, T ties a ponytail, X cuts to the chin, P pauses, F5 saves, F9 loads.
+//! Without a key the character goes its round by itself.
 //!
 //! `cargo run --release --example game`
 
@@ -47,6 +47,9 @@ struct Hero {
 /// A passer-by, with its own place on the round.
 #[derive(Component)]
 struct Walker(f32);
+
+#[derive(Component)]
+struct Hat;
 
 /// The hairdo of the saved game.
 #[derive(Resource)]
@@ -196,29 +199,42 @@ fn weather(
     }
 }
 
-/// In the pause menu too.
+/// In the pause menu too. What is put on goes with the hair.
 fn barber(
     keys: Res<ButtonInput<KeyCode>>,
     hero: Single<(Entity, &WornHair), With<Hero>>,
-    ties: Query<Entity, With<HairTie>>,
+    (ties, hats): (Query<Entity, With<HairTie>>, Query<Entity, With<Hat>>),
+    assets: Res<AssetServer>,
     mut commands: Commands,
-) {
+) -> Result {
     let (hero, worn) = hero.into_inner();
+    let Some(hair) = worn.iter().next() else { return Ok(()) };
     if keys.just_pressed(KeyX) {
         let level = CutBy::Plane { point: Vec3::NEG_Y * 0.09, normal: Vec3::NEG_Y };
         commands.trigger(CutHair::all(hero, level));
     }
     if keys.just_pressed(KeyT) && !ties.is_empty() {
         ties.iter().for_each(|tie| commands.entity(tie).despawn());
-    } else if keys.just_pressed(KeyT)
-        && let Some(hair) = worn.iter().next()
-    {
+    } else if keys.just_pressed(KeyT) {
         let out = Vec3::new(0.0, 0.3, 0.95).normalize();
         let behind = Transform::from_translation(0.12 * out)
             .with_rotation(Quat::from_rotation_arc(Vec3::Y, out));
         let tie = commands.spawn((HairTie::default(), behind, ChildOf(hair))).id();
         commands.trigger(TieHair::all(hair, tie));
     }
+    if keys.just_pressed(KeyH) && !hats.is_empty() {
+        hats.iter().for_each(|hat| commands.entity(hat).despawn());
+    } else if keys.just_pressed(KeyH) {
+        let straw = MeshMaterial3d(assets.add(StandardMaterial::from(Color::srgb(0.7, 0.55, 0.3))));
+        let part = |radius: f32, height: f32, at: f32| {
+            let place = Transform::from_xyz(0.0, at, 0.0).with_scale(Vec3::new(1.0, 1.0, 1.2));
+            (Mesh3d(assets.add(Cylinder::new(radius, height).mesh().build())), straw.clone(), place)
+        };
+        let parts = children![part(0.1, 0.08, 0.09), part(0.17, 0.005, 0.05)];
+        let inside = HairCollider::inside(Vec3::new(0.1, 0.13, 0.12), 0.05)?;
+        commands.spawn((Hat, inside, Visibility::default(), ChildOf(hair), parts));
+    }
+    Ok(())
 }
 
 fn pause(keys: Res<ButtonInput<KeyCode>>, mut time: ResMut<Time<Virtual>>) {

@@ -3,9 +3,9 @@
 use bevy::prelude::*;
 use bevy_keratin::prelude::*;
 
-/// What H shows and hides.
-#[derive(Component)]
-pub struct Hat;
+/// What H shows and hides; some hold hair while they are shown.
+#[derive(Component, Default)]
+pub struct Hat(Option<HairCollider>);
 
 /// Finds the hats that a character has, and makes one for a character without. They are off at first.
 pub fn bring_hat(
@@ -14,9 +14,14 @@ pub fn bring_hat(
     children: Query<&Children>,
     names: Query<&Name>,
     hairs: Query<(&Transform, &ChildOf)>,
+    hats: Query<(), With<Hat>>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) -> Result {
+    // Another hair of the same character.
+    if children.iter_descendants(worn.entity).any(|e| hats.contains(e)) {
+        return Ok(());
+    }
     let is_hat = |e: &Entity| {
         names
             .get(*e)
@@ -24,20 +29,20 @@ pub fn bring_hat(
     };
     let own: Vec<Entity> = children.iter_descendants(worn.entity).filter(is_hat).collect();
     for hat in &own {
-        commands.entity(*hat).insert((Hat, Visibility::Hidden));
+        commands.entity(*hat).insert((Hat::default(), Visibility::Hidden));
     }
+    // Hair has the head's size, its middle at the origin.
+    let (hair, on) = hairs.get(worn.hair)?;
+    let inside = HairCollider::inside(Vec3::new(0.105, 0.13, 0.125), 0.04)?;
+    let hat = commands.spawn((Hat(Some(inside)), *hair, Visibility::Hidden, ChildOf(on.parent())));
+    let hat = hat.id();
     if own.is_empty() {
-        // Hair of the head's size, its middle at the origin.
-        let (hair, on) = hairs.get(worn.hair)?;
         let felt = materials.add(StandardMaterial {
             perceptual_roughness: 0.9,
             ..Color::srgb(0.12, 0.16, 0.24).into()
         });
-        let at = |y: f32| *hair * Transform::from_xyz(0.0, y, 0.01);
-        let hat = commands
-            .spawn((Hat, Transform::default(), Visibility::Hidden, ChildOf(on.parent())))
-            .id();
-        for (radius, height, y) in [(0.15, 0.008, 0.085), (0.1, 0.1, 0.13)] {
+        let at = |y: f32| Transform::from_xyz(0.0, y, 0.0).with_scale(Vec3::new(1.0, 1.0, 1.2));
+        for (radius, height, y) in [(0.16, 0.006, 0.04), (0.105, 0.1, 0.09)] {
             let part = Mesh3d(meshes.add(Cylinder::new(radius, height)));
             commands.spawn((part, MeshMaterial3d(felt.clone()), at(y), ChildOf(hat)));
         }
@@ -45,8 +50,26 @@ pub fn bring_hat(
     Ok(())
 }
 
-pub fn put_on_hats(keys: Res<ButtonInput<KeyCode>>, mut hats: Query<&mut Visibility, With<Hat>>) {
+pub fn put_on_hats(
+    keys: Res<ButtonInput<KeyCode>>,
+    hats: Query<(Entity, &Hat, &mut Visibility)>,
+    commands: Commands,
+) {
     if keys.just_pressed(KeyCode::KeyH) {
-        hats.iter_mut().for_each(|mut hat| hat.toggle_inherited_hidden());
+        toggle(hats, commands);
+    }
+}
+
+pub fn toggle(mut hats: Query<(Entity, &Hat, &mut Visibility)>, mut commands: Commands) {
+    for (hat, Hat(collider), mut visibility) in &mut hats {
+        visibility.toggle_inherited_hidden();
+        match collider {
+            Some(collider) if *visibility != Visibility::Hidden => {
+                commands.entity(hat).insert(collider.clone());
+            }
+            _ => {
+                commands.entity(hat).remove::<HairCollider>();
+            }
+        }
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release --example characters -- [FILE.glb…] [--shot DIR]`
 //!
-//! With `--shot` there is no window: each preset on each character without its hat, from the
-//! front, the side, behind and above.
+//! With `--shot` there is no window: each preset on each character from the front, the side, behind and above; with
+//! `--hats` a second after the hat is put on.
 
 #[path = "../shared/environment.rs"]
 mod environment;
@@ -46,6 +46,9 @@ struct Arguments {
     /// Drawn strands of each hair at most in pictures; fewer are wider.
     #[arg(long, default_value = "40000", value_parser = clap::value_parser!(u32).range(100..))]
     strands: u32,
+    /// Put hats on in pictures.
+    #[arg(long)]
+    hats: bool,
     /// Leave the skin under the hair as it is.
     #[arg(long)]
     bare: bool,

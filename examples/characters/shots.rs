@@ -2,7 +2,7 @@
 
 use crate::{
     Arguments, Outcome, app, environment,
-    hats::bring_hat,
+    hats::{self, bring_hat},
     picture::{self, Pictures},
     spawn,
 };
@@ -49,6 +49,12 @@ pub fn shoot(arguments: &Arguments, folder: &Path) -> Result {
             thin_out(&mut app, hair, arguments.strands);
             app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
             (0..SETTLING).for_each(|_| app.update());
+            if arguments.hats {
+                app.world_mut()
+                    .run_system_cached(hats::toggle)
+                    .map_err(|error| error.to_string())?;
+                (0..60).for_each(|_| app.update());
+            }
             app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
             let head =
                 app.world().get::<GlobalTransform>(hair).ok_or("the hair is gone")?.to_matrix();
@@ -66,6 +72,11 @@ pub fn shoot(arguments: &Arguments, folder: &Path) -> Result {
                 let mut cameras = app.world_mut().query_filtered::<&mut Transform, With<Camera>>();
                 cameras.iter_mut(app.world_mut()).for_each(|mut camera| *camera = place);
                 views.push(pictures.draw(&mut app)?);
+            }
+            if arguments.hats {
+                app.world_mut()
+                    .run_system_cached(hats::toggle)
+                    .map_err(|error| error.to_string())?;
             }
             let path = folder.join(format!("{name}-{}.png", preset.name()));
             picture::save(picture::beside(&views), &path)?;

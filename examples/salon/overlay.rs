@@ -58,7 +58,7 @@ fn colliders(mut gizmos: Gizmos<HairGizmos>, colliders: Query<(&HairCollider, &G
                 cuboid.half_size *= scale;
                 gizmos.primitive_3d(&cuboid, at, SOLID);
             }
-            ColliderShape::Ellipsoid { radii } => {
+            ColliderShape::Ellipsoid { radii } | ColliderShape::Hat { radii, .. } => {
                 // An ellipse around each axis.
                 for turn in [Quat::IDENTITY, Quat::from_rotation_x(FRAC_PI_2)] {
                     let half = (turn.inverse() * radii).abs() * scale;

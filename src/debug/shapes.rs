@@ -44,7 +44,9 @@ pub(super) fn collider(lines: &mut Lines, pose: &Pose, collider: &HairCollider, 
             let size = 2.0 * cuboid.half_size * scale;
             lines.rounded_cuboid(at, size, color).edge_radius(rounding * scale);
         }
-        ColliderShape::Ellipsoid { radii } => ellipsoid(lines, at, *radii * scale, color),
+        ColliderShape::Ellipsoid { radii } | ColliderShape::Hat { radii, .. } => {
+            ellipsoid(lines, at, *radii * scale, color);
+        }
         ColliderShape::Hull(hull) => {
             let depth = |p| hull.planes().map(|(n, d)| n.dot(p) - d).fold(f32::MIN, f32::max);
             contours(lines, pose, Shape::Hull(hull.clone()).bounds(), depth, color);

@@ -14,14 +14,25 @@ use super::{
     view::HairView,
     volume::{self, BrightLights, HairVolume},
 };
-use crate::{base::setting::Settings, forces::contact::HairCollider, hair::look::HairLook};
+use crate::{
+    base::setting::Settings,
+    forces::contact::{HairCollider, Obstacles},
+    hair::look::HairLook,
+};
 use bevy::{
     asset::RenderAssetUsages, camera::primitives::Aabb, prelude::*, render::storage::ShaderBuffer,
 };
 
 /// After strands have been packed: chooses how many are drawn, and gathers the solids near them.
 pub(super) fn prepare(
-    mut hairs: Query<(Entity, &mut HairBuffers, &mut Packed, &GlobalTransform, &mut DrawnFrame)>,
+    mut hairs: Query<(
+        Entity,
+        &mut HairBuffers,
+        &mut Packed,
+        &GlobalTransform,
+        &mut DrawnFrame,
+        Option<&Obstacles>,
+    )>,
     mut drawn: Query<(&mut Mesh3d, &Aabb, &MeshMaterial3d<RibbonMaterial>)>,
     colliders: Query<(Entity, &HairCollider, &GlobalTransform)>,
     (looks, views, details): (Settings<HairLook>, Settings<HairView>, Settings<HairDetail>),
@@ -41,7 +52,7 @@ pub(super) fn prepare(
         .extend(colliders.iter().filter_map(|(entity, of, place)| Ball::around(entity, of, place)));
     // The largest first: they block light, and stay where there are too many.
     balls.sort_by(|a, b| b.radius.total_cmp(&a.radius));
-    for (hair, mut buffers, mut packed, place, mut frame) in &mut hairs {
+    for (hair, mut buffers, mut packed, place, mut frame, obstacles) in &mut hairs {
         let frame = frame.bypass_change_detection();
         let packed = packed.bypass_change_detection();
         let Ok((mut mesh, around, material)) = drawn.get_mut(buffers.drawn) else { continue };
@@ -96,7 +107,8 @@ pub(super) fn prepare(
         let near = balls.iter().filter(|ball| ball.is_near(inside, &hair_place));
         solids.extend(near.filter_map(|ball| {
             let (_, of, at) = colliders.get(ball.collider).ok()?;
-            DrawnSolid::new(&of.shape, &(from_world * at.affine()))
+            let holds = obstacles.is_some_and(|obstacles| obstacles.is_held_by(ball.collider));
+            DrawnSolid::new(&of.shape, &(from_world * at.affine()), holds)
         }));
         arrange(&mut solids);
         frame.packed.set_solids(&solids);

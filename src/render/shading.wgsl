@@ -217,6 +217,10 @@ fn beside(solid: DrawnSolid, place: vec4<f32>, l: vec3<f32>, away: f32) -> f32 {
     let begin = vec3(dot(solid.x, place), dot(solid.y, place), dot(solid.z, place));
     let way = vec3(dot(solid.x.xyz, l), dot(solid.y.xyz, l), dot(solid.z.xyz, l));
     let square = max(dot(way, way), 1e-12);
+    // A hat's mesh casts its own shadow.
+    if solid.half < 0.0 {
+        return 1.0;
+    }
     // Nearest places of the ray and of the segment, in turn.
     var nearest = 0.0;
     var t = 0.0;

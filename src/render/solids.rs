@@ -16,6 +16,8 @@ const BLOCKERS: usize = 16;
 /// How many times a point goes through all solids, at most: what one pushes out may come to lie in an
 /// earlier one.
 const SWEEPS: usize = 3;
+/// How far around a hat holds strands, in times its size.
+const UNDER_HAT: f32 = 4.0;
 /// How far outside strands are drawn (m): between two rings they cut through what is round.
 const CLEARANCE: f32 = 0.8e-3;
 /// Length from the root over which pushing sets in (m), or half of a strand that is shorter than twice
@@ -29,19 +31,24 @@ const ROOT: f32 = 5e-3;
 pub struct DrawnSolid {
     /// The axes, by which a point's coordinates are found, and where they begin.
     axes: [Vec4; 3],
-    /// Half the segment's length.
+    /// Half the segment's length; of a hat [`HOLDS`] or [`KEEPS_OUT`].
     half: f32,
     /// The clearance.
     room: f32,
     /// Radius of a ball around the middle that holds the solid with its clearance (m).
     reach: f32,
-    unused: f32,
+    /// Of a hat: it is above this along Y.
+    rim: f32,
 }
 
+/// [`DrawnSolid::half`] of a hat that strands stay under, and of one that they stay outside of.
+const HOLDS: f32 = -1.0;
+const KEEPS_OUT: f32 = -2.0;
+
 impl DrawnSolid {
-    /// What `shape` fills at this place in the hair's frame; `None` if that is no finite solid of these
-    /// kinds.
-    pub fn new(shape: &ColliderShape, place: &Affine3A) -> Option<Self> {
+    /// What `shape` fills at this place in the hair's frame; of a hat whether it `holds` the hair. `None` if that is no
+    /// finite solid of these kinds.
+    pub fn new(shape: &ColliderShape, place: &Affine3A, holds: bool) -> Option<Self> {
         let (radii, half_length) = size(shape)?;
         if radii.min_element() <= 0.0 {
             return None;
@@ -56,21 +63,26 @@ impl DrawnSolid {
             row(rows.z_axis.into(), begin.z, radii.z),
         ];
         let scale = place.matrix3.determinant().abs().cbrt();
-        let (half, room) = (half_length / radii.y, CLEARANCE / (radii.min_element() * scale));
+        let (mut half, room) = (half_length / radii.y, CLEARANCE / (radii.min_element() * scale));
+        let mut rim = 0.0;
+        if let ColliderShape::Hat { rim: height, .. } = shape {
+            (half, rim) = (if holds { HOLDS } else { KEEPS_OUT }, height / radii.y);
+        }
         let m = place.matrix3;
         let longest = [m.x_axis, m.y_axis, m.z_axis].map(|axis| axis.length()).into_iter();
         let longest = longest.fold(0.0, f32::max);
         // The clearance is a share of the radii.
-        let reach = (radii.max_element() + half_length) * longest * (1.0 + room.max(0.0));
+        let around = if half == HOLDS { UNDER_HAT } else { 1.0 + room.max(0.0) };
+        let reach = (radii.max_element() + half_length) * longest * around;
         let is_usable = axes.iter().all(|row| row.is_finite() && row.truncate() != Vec3::ZERO)
-            && [half, room, reach].into_iter().all(f32::is_finite);
-        is_usable.then_some(Self { axes, half, room, reach, unused: 0.0 })
+            && [half, room, reach, rim].into_iter().all(f32::is_finite);
+        is_usable.then_some(Self { axes, half, room, reach, rim })
     }
 
     /// A ball (m), for tests and tools.
     pub fn ball(center: Vec3, radius: f32) -> Option<Self> {
         let ball = ColliderShape::Sphere(Sphere { radius });
-        Self::new(&ball, &Affine3A::from_translation(center))
+        Self::new(&ball, &Affine3A::from_translation(center), false)
     }
 
     /// Its middle, in the hair's frame.
@@ -85,13 +97,26 @@ impl DrawnSolid {
     /// Moves a point of a strand out if it is inside, and turns its slope along the surface.
     fn push(&self, position: &mut Vec3, slope: &mut Vec3) -> bool {
         let own = Vec3::from(self.axes.map(|row| row.truncate().dot(*position) + row.w));
-        let own = own - Vec3::Y * own.y.clamp(-self.half, self.half);
+        let above = own.y - self.rim;
+        let half = self.half.max(0.0);
+        let own = own - Vec3::Y * own.y.clamp(-half, half);
         let apart = own.length();
-        let missing = 1.0 + self.room - apart;
+        let mut out = own / apart.max(1e-6);
+        let mut missing = 1.0 + self.room - apart;
+        if self.half < 0.0 && above <= 0.0 {
+            return false;
+        }
+        if self.half == HOLDS {
+            // In or down, whichever is shorter.
+            missing = self.room + apart - 1.0;
+            out = -out;
+            if above < missing {
+                (missing, out) = (above, Vec3::NEG_Y);
+            }
+        }
         if missing <= 0.0 {
             return false;
         }
-        let out = own / apart.max(1e-6);
         let rows = self.axes.map(Vec4::truncate);
         let way = |row: Vec3| row / row.length_squared();
         *position += (way(rows[0]) * out.x + way(rows[1]) * out.y + way(rows[2]) * out.z) * missing;
@@ -146,7 +171,9 @@ fn size(shape: &ColliderShape) -> Option<(Vec3, f32)> {
     match shape {
         ColliderShape::Sphere(s) => Some((Vec3::splat(s.radius), 0.0)),
         ColliderShape::Capsule(c) => Some((Vec3::splat(c.radius), c.half_length)),
-        ColliderShape::Ellipsoid { radii } => Some((*radii, 0.0)),
+        ColliderShape::Ellipsoid { radii } | ColliderShape::Hat { radii, .. } => {
+            Some((*radii, 0.0))
+        }
         _ => None,
     }
 }
@@ -212,7 +239,7 @@ mod tests {
         let capsule = ColliderShape::Capsule(Capsule3d::new(0.1, 0.4));
         let turn = Quat::from_rotation_z(core::f32::consts::FRAC_PI_2);
         let place = Affine3A::from_scale_rotation_translation(Vec3::splat(2.0), turn, Vec3::Z);
-        let capsule = DrawnSolid::new(&capsule, &place).unwrap();
+        let capsule = DrawnSolid::new(&capsule, &place, false).unwrap();
         let out = pushed(&capsule, 0.1, Vec3::new(0.3, 0.1, 1.0));
         assert!(out.distance(Vec3::new(0.3, 0.2 + CLEARANCE, 1.0)) < 1e-5, "{out}");
         let end = pushed(&capsule, 0.1, Vec3::new(-0.45, 0.0, 1.0));
@@ -223,11 +250,11 @@ mod tests {
     fn what_is_no_finite_solid_is_left_out() {
         let at = Affine3A::from_translation;
         let ball = |radius| ColliderShape::Sphere(Sphere { radius });
-        assert_eq!(DrawnSolid::new(&ball(0.1), &at(Vec3::NAN)), None);
-        assert_eq!(DrawnSolid::new(&ball(0.0), &at(Vec3::ZERO)), None);
-        assert_eq!(DrawnSolid::new(&ball(0.1), &Affine3A::from_scale(Vec3::ZERO)), None);
+        assert_eq!(DrawnSolid::new(&ball(0.1), &at(Vec3::NAN), false), None);
+        assert_eq!(DrawnSolid::new(&ball(0.0), &at(Vec3::ZERO), false), None);
+        assert_eq!(DrawnSolid::new(&ball(0.1), &Affine3A::from_scale(Vec3::ZERO), false), None);
         let plane = ColliderShape::Plane(InfinitePlane3d::new(Vec3::Y));
-        assert_eq!(DrawnSolid::new(&plane, &at(Vec3::ZERO)), None);
+        assert_eq!(DrawnSolid::new(&plane, &at(Vec3::ZERO), false), None);
         let inside = pushed(&DrawnSolid::ball(Vec3::ZERO, 0.1).unwrap(), 0.1, Vec3::ZERO);
         assert!(inside.is_finite());
     }

@@ -98,10 +98,10 @@ struct DrawnSolid {
     x: vec4<f32>,          // the frame's axes, by which a place's coordinates are found
     y: vec4<f32>,
     z: vec4<f32>,
-    half: f32,             // of the segment's length
+    half: f32,             // of the segment's length; HOLDS of a hat that strands stay under, less of another
     room: f32,             // how far outside strands stay
     reach: f32,            // of a ball around it, with that room (m)
-    unused: f32,
+    rim: f32,              // of a hat: it is above this along Y
 }
 
 // What differs from frame to frame besides nodes.
@@ -333,18 +333,33 @@ const GROUP: u32 = 8u;
 // How many times a point goes through all solids, at most: what one pushes out may come to lie in an
 // earlier one.
 const SWEEPS: u32 = 3u;
+const HOLDS: f32 = -1.0;
 
 // Moves a point of a strand out of a solid if it is inside, and turns its slope along the surface.
 fn push_out(solid: DrawnSolid, point: ptr<function, StrandPoint>) -> u32 {
     let place = vec4((*point).position, 1.0);
     var own = vec3(dot(solid.x, place), dot(solid.y, place), dot(solid.z, place));
-    own.y -= clamp(own.y, -solid.half, solid.half);
+    let above = own.y - solid.rim;
+    let half = max(solid.half, 0.0);
+    own.y -= clamp(own.y, -half, half);
     let apart = length(own);
-    let missing = 1.0 + solid.room - apart;
+    var out = own / max(apart, 1e-6);
+    var missing = 1.0 + solid.room - apart;
+    if solid.half < 0.0 && above <= 0.0 {
+        return 0u;
+    }
+    if solid.half == HOLDS {
+        // In or down, whichever is shorter.
+        missing = solid.room + apart - 1.0;
+        out = -out;
+        if above < missing {
+            missing = above;
+            out = vec3(0.0, -1.0, 0.0);
+        }
+    }
     if missing <= 0.0 {
         return 0u;
     }
-    let out = own / max(apart, 1e-6);
     let x = solid.x.xyz;
     let y = solid.y.xyz;
     let z = solid.z.xyz;

@@ -22,7 +22,10 @@ use crate::{
         },
     },
     hair::strand::{Hair, Pose, Strand, StrandOf, TickPose},
-    solver::rod::obstacle::Obstacle,
+    solver::rod::{
+        obstacle::{Obstacle, Solid},
+        shape::Shape,
+    },
 };
 use bevy::prelude::*;
 
@@ -283,6 +286,9 @@ fn slide_along(
     (at, wetting.sliding == 0.0 || drop.volume <= most)
 }
 
+/// How deep in a hat a drop is under it, in times its size.
+const UNDER_HAT: f32 = 0.1;
+
 /// How far solids push a drop in a substep while only those near it are looked at (m).
 const SHORT_PUSH: f32 = 0.05;
 
@@ -310,9 +316,16 @@ fn rest_on_solids(
 /// Moves a drop out of a solid onto its surface and removes the velocity into it. Returns whether it was
 /// inside.
 fn rest_on(obstacle: &Obstacle, drop: &mut Droplet, radius: f32) -> bool {
-    let [x, y, z] = drop.position.to_array();
-    let (normal, depth) = obstacle.solid.depth(V3::new(x, y, z), radius);
+    let at = |place: Vec3| obstacle.solid.depth(V3::new(place.x, place.y, place.z), radius);
+    let (normal, depth) = at(drop.position);
     if depth.is_nan() || depth <= 0.0 {
+        return false;
+    }
+    // What drips under a hat stays there.
+    if let Solid::Placed(placed) = &obstacle.solid
+        && let Shape::Hat { radii, .. } = &placed.shape
+        && at(drop.before).1 > UNDER_HAT * radii.min_element() * placed.scale
+    {
         return false;
     }
     let normal = Vec3::new(normal.x, normal.y, normal.z);

@@ -285,7 +285,7 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
     let capsule = ColliderShape::Capsule(Capsule3d::new(0.03, 0.05));
     let mut solids = vec![
         DrawnSolid::ball(Vec3::new(0.02, -0.03, 0.01), 0.04).unwrap(),
-        DrawnSolid::new(&capsule, &place).unwrap(),
+        DrawnSolid::new(&capsule, &place, false).unwrap(),
     ];
     solids.extend((0..60).map(|_| DrawnSolid::ball(0.08 * random.vector(), 0.012).unwrap()));
     arrange(&mut solids);

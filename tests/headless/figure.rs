@@ -145,7 +145,7 @@ fn solids(world: &mut World, hair: Entity) -> Vec<DrawnSolid> {
                 ColliderShape::Ellipsoid { radii } => radii.max_element(),
                 _ => return None,
             };
-            let solid = DrawnSolid::new(&collider.shape, &(place.inverse() * at.affine()))?;
+            let solid = DrawnSolid::new(&collider.shape, &(place.inverse() * at.affine()), false)?;
             Some((reach, solid))
         })
         .collect();

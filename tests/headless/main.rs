@@ -71,6 +71,7 @@ mod fit;
 mod golden;
 mod groom;
 mod hairdo;
+mod hat;
 mod held;
 mod lod;
 mod morph;

@@ -67,6 +67,14 @@ pub enum ColliderShape {
     Hull(ConvexHull),
     /// Any shape, baked.
     Grid(DistanceGrid),
+    /// A hat, which holds hair of its wearer under it and keeps all else out: an ellipsoid along the axes above a plane
+    /// across Y.
+    Hat {
+        /// Half the axes of the ellipsoid (m): the longest at most 100 times the shortest.
+        radii: Vec3,
+        /// Where the rim is along Y (m): below it is no hat.
+        rim: f32,
+    },
 }
 
 impl ColliderShape {
@@ -85,6 +93,9 @@ impl ColliderShape {
     /// The range of the radius of a box' edges.
     pub const ROUNDING: ValueRange =
         ValueRange::new("ColliderShape::rounding (m)", 0.0..=1e5, "0 makes edges sharp");
+    /// The range of the height of a hat's rim.
+    pub const RIM: ValueRange =
+        ValueRange::new("ColliderShape::rim (m)", -1e5..=1e5, "0 is the middle of the ellipsoid");
     /// Largest ratio of an ellipsoid's longest to its shortest axis.
     const MAX_RATIO: f32 = 100.0;
     /// The range of half the length between a capsule's centres, or half a cylinder's height.
@@ -115,7 +126,7 @@ impl Ranged for ColliderShape {
                 range.clamp(rounding, || 0.0, violations);
                 return;
             }
-            Self::Ellipsoid { radii } => {
+            Self::Ellipsoid { radii } | Self::Hat { radii, .. } => {
                 for radius in radii.as_mut() {
                     Self::RADIUS.clamp(radius, || 0.09, violations);
                 }
@@ -124,6 +135,9 @@ impl Ranged for ColliderShape {
                 let range = ValueRange::new(Self::RADIUS.what, within, hint);
                 for radius in radii.as_mut() {
                     range.clamp(radius, || 0.09, violations);
+                }
+                if let Self::Hat { rim, .. } = self {
+                    Self::RIM.clamp(rim, || 0.0, violations);
                 }
                 return;
             }
@@ -191,6 +205,20 @@ impl HairCollider {
         Self::from(ColliderShape::Ellipsoid { radii }).checked()
     }
 
+    /// A hat that holds hair under it: an ellipsoid of these half axes (m), with its rim at a height along Y (m), below
+    /// which hair hangs out. Spawn it as a child of the head or its bone, and despawn it to take it off.
+    ///
+    /// It holds hair that is worn by an entity above it, that is a child of one, or that lies below its own parent. To such
+    /// hair it comes from above within 0.4 s, however suddenly it is there; drawn strands are under it at once. Other hair
+    /// and drops stay outside. It is smooth: its friction is 0.
+    ///
+    /// # Errors
+    /// As [`ellipsoid`](Self::ellipsoid), and when the rim's height is not finite or beyond 100 km.
+    pub fn inside(radii: Vec3, rim: f32) -> Result<Self, InvalidValue> {
+        let hat = Self { friction: 0.0, ..Self::from(ColliderShape::Hat { radii, rim }) };
+        hat.checked()
+    }
+
     /// The convex hull of points (m): [`ConvexHull::new`].
     ///
     /// # Errors
@@ -228,7 +256,9 @@ impl Stretched for HairCollider {
         };
         match &self.shape {
             ColliderShape::Sphere(s) => of_radii(Vec3::splat(s.radius)),
-            ColliderShape::Ellipsoid { radii } => of_radii(*radii),
+            ColliderShape::Ellipsoid { radii } | ColliderShape::Hat { radii, .. } => {
+                of_radii(*radii)
+            }
             // At least as long as it is thick.
             ColliderShape::Capsule(Capsule3d { radius, half_length }) => {
                 let along = factors.y.max(across * radius / (radius + half_length));
@@ -246,6 +276,9 @@ impl Stretched for HairCollider {
         let shape = match self.shape {
             ColliderShape::Sphere(s) => ColliderShape::Ellipsoid { radii: s.radius * by },
             ColliderShape::Ellipsoid { radii } => ColliderShape::Ellipsoid { radii: radii * by },
+            ColliderShape::Hat { radii, rim } => {
+                ColliderShape::Hat { radii: radii * by, rim: rim * by.y }
+            }
             ColliderShape::Capsule(Capsule3d { radius, half_length }) => {
                 let end = (radius + half_length) * by.y;
                 let radius = radius * by.x;

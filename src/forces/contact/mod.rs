@@ -5,6 +5,7 @@ mod avian;
 mod bake;
 mod coarse;
 mod collider;
+mod hat;
 mod lanes;
 pub mod model;
 mod neighbours;
@@ -68,6 +69,9 @@ pub struct Obstacles {
     /// The colliders that it may touch in this tick, by their indices.
     #[reflect(ignore)]
     near: Vec<u32>,
+    /// The hats that hold it.
+    #[reflect(ignore)]
+    hats: Vec<hat::WornHat>,
 }
 
 /// The pairs of strands of one hair that may touch.

@@ -89,7 +89,9 @@ impl Ball {
             ColliderShape::Cylinder(c) => c.radius.hypot(c.half_height),
             ColliderShape::Plane(_) => f32::INFINITY,
             ColliderShape::Cuboid { cuboid, .. } => cuboid.half_size.length(),
-            ColliderShape::Ellipsoid { radii } => radii.max_element(),
+            ColliderShape::Ellipsoid { radii } | ColliderShape::Hat { radii, .. } => {
+                radii.max_element()
+            }
             ColliderShape::Hull(hull) => hull.reach(),
             ColliderShape::Grid(grid) => grid.reach(),
         };

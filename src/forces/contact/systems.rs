@@ -3,6 +3,7 @@
 use super::{
     Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError,
     LockNeighbours, Obstacles, Openings, StrandContact, coarse,
+    hat::find_hats,
     lanes::Penalty,
     neighbours::Lookup,
     reach::{Ball, Colliders, HairReach, LOOK_AGAIN},
@@ -76,7 +77,8 @@ impl Plugin for ContactPlugin {
             .add_systems(
                 HairTick,
                 (
-                    gather_colliders
+                    (gather_colliders, find_hats)
+                        .chain()
                         .after(HairSystems::Poses)
                         .before(HairSystems::LevelOfDetail)
                         .run_if(first_substep),
@@ -125,7 +127,7 @@ fn gather_colliders(
     *all = Colliders::new(step.count, placed);
 }
 
-/// A collider in a hair's frame, with the motion of its surface during the substep.
+/// A collider in a hair's frame, with the motion of its surface during the substep. A hat keeps things out.
 pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPose) -> Obstacle {
     let (now, own) = (hair.now(), pose.now());
     let scale = own.size() / now.size();
@@ -156,6 +158,9 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
             placed(Shape::Cuboid { half: cuboid.half_size, rounding: *rounding })
         }
         ColliderShape::Ellipsoid { radii } => placed(Shape::Ellipsoid { radii: *radii }),
+        ColliderShape::Hat { radii, rim } => {
+            placed(Shape::Hat { radii: *radii, rim: *rim, holds: false })
+        }
         ColliderShape::Hull(hull) => placed(Shape::Hull(hull.clone())),
         ColliderShape::Grid(grid) => placed(Shape::Grid(grid.clone())),
     };
@@ -203,11 +208,17 @@ fn gather_obstacles(
 ) {
     for (hair, pose, mut obstacles) in &mut hairs {
         // Hair that takes no substep now keeps them: it may be asked what is near.
-        if steps.of(hair).is_some() {
-            let Obstacles { solids, near } = &mut *obstacles;
+        if let Some(step) = steps.of(hair) {
+            let Obstacles { solids, near, hats } = &mut *obstacles;
             let near = all.iter_many(near).filter_map(|of| Some((of, poses.get(of.id).ok()?)));
             solids.clear();
-            solids.extend(near.map(|(of, now)| seen_from(pose, &of.collider, now)));
+            solids.extend(near.map(|(of, now)| {
+                let mut seen = seen_from(pose, &of.collider, now);
+                if let Some(hat) = hats.iter_mut().find(|hat| hat.id == of.id) {
+                    hat.come_down(&mut seen, step.dt);
+                }
+                seen
+            }));
         }
     }
 }

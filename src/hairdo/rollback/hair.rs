@@ -10,7 +10,7 @@ use crate::{
         tape::{Tape, hash},
     },
     forces::{
-        contact::{HairReach, LockNeighbours},
+        contact::{HairReach, LockNeighbours, Obstacles},
         environment::{BlownAir, WindReceived},
     },
     hair::strand::{
@@ -54,6 +54,7 @@ pub(super) type HairState = (
         Option<&'static mut HairReach>,
         Option<&'static mut LockNeighbours>,
         Option<&'static mut HoldsWater>,
+        Option<&'static mut Obstacles>,
     ),
 );
 
@@ -178,6 +179,7 @@ struct HairParts<'a> {
     reach: Option<&'a mut HairReach>,
     neighbours: Option<&'a mut LockNeighbours>,
     water: Option<&'a mut HoldsWater>,
+    obstacles: Option<&'a mut Obstacles>,
 }
 
 impl HairParts<'_> {
@@ -188,6 +190,7 @@ impl HairParts<'_> {
         part(tape, self.reach, HairReach::record);
         part(tape, self.neighbours, LockNeighbours::record);
         part(tape, self.water, |water, tape| tape.flags([&mut water.0]));
+        part(tape, self.obstacles, Obstacles::record);
     }
 }
 
@@ -244,6 +247,7 @@ fn with_whole<T>(
         reach: seen(&mut others.2),
         neighbours: seen(&mut others.3),
         water: seen(&mut others.4),
+        obstacles: seen(&mut others.5),
     };
     work(Whole { members, parts, strands })
 }
@@ -334,6 +338,7 @@ fn is_whole(state: &[u8]) -> bool {
     let nodes = own_nodes(&mut tape);
     let (mut pose, mut counts, mut reach) = (TickPose::default(), default(), default());
     let (mut sleep, mut neighbours, mut water) = (default(), LockNeighbours::default(), default());
+    let mut obstacles = Obstacles::default();
     let hair = HairParts {
         pose: &mut pose,
         counts: Some(&mut counts),
@@ -341,6 +346,7 @@ fn is_whole(state: &[u8]) -> bool {
         reach: Some(&mut reach),
         neighbours: Some(&mut neighbours),
         water: Some(&mut water),
+        obstacles: Some(&mut obstacles),
     };
     hair.record(&mut tape, None, TickMoment::default());
     for nodes in nodes {

@@ -11,6 +11,9 @@
 // Whether a place is deeper inside than `within` (m): strands on a solid share cells with what is below its
 // surface.
 fn is_in(solid: DrawnSolid, place: vec4<f32>, within: f32) -> bool {
+    if solid.half < 0.0 {
+        return false;
+    }
     let own = vec3(dot(solid.x, place), dot(solid.y, place), dot(solid.z, place));
     let off = own - vec3(0.0, clamp(own.y, -solid.half, solid.half), 0.0);
     let unit = max(length(solid.x.xyz), max(length(solid.y.xyz), length(solid.z.xyz)));

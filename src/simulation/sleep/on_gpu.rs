@@ -7,7 +7,7 @@ use super::{
 use crate::{
     base::schedule::{HairStep, HairSystems, HairTick, first_substep},
     forces::{
-        contact::{HairReach, TickColliders},
+        contact::{HairReach, Obstacles, TickColliders},
         environment::Winds,
     },
     hair::strand::{HairOnGpu, Regroomed, TickPose},
@@ -48,14 +48,21 @@ fn watch(
     colliders: Res<TickColliders>,
     winds: Winds,
     mut hairs: Query<
-        (Entity, &TickPose, &mut SleepSnapshot, &mut Disturbance, &Regroomed, Option<&HairReach>),
+        (
+            Entity,
+            &TickPose,
+            &mut SleepSnapshot,
+            &mut Disturbance,
+            &Regroomed,
+            (Option<&HairReach>, Option<&Obstacles>),
+        ),
         HairOnGpu,
     >,
 ) {
     let mut scratch = Vec::new();
-    for (hair, frame, mut snapshot, mut disturbance, regroomed, reach) in &mut hairs {
+    for (hair, frame, mut snapshot, mut disturbance, regroomed, (reach, obstacles)) in &mut hairs {
         let near = colliders.near(frame, reach, &mut scratch);
-        let seen = near.map(|placed| SeenCollider::of(frame, placed)).collect();
+        let seen = near.map(|placed| SeenCollider::of(frame, obstacles, placed)).collect();
         let WakeEvents { sleep, all_wake, solids, .. } = snapshot
             .bypass_change_detection()
             .wake_events(settings.of(hair), frame.now(), regroomed.members, seen, step.count);

@@ -82,6 +82,8 @@ fn record_shape(shape: &mut Shape, tape: &mut Tape<'_>) {
         Shape::Cuboid { .. } => 0u8,
         Shape::Ellipsoid { .. } => 1,
         Shape::Hull(_) | Shape::Grid(_) => 2,
+        Shape::Hat { holds: false, .. } => 3,
+        Shape::Hat { holds: true, .. } => 4,
     };
     let before = kind;
     tape.value(&mut kind);
@@ -89,6 +91,7 @@ fn record_shape(shape: &mut Shape, tape: &mut Tape<'_>) {
         _ if kind == before => {}
         0 => *shape = Shape::Cuboid { half: Vec3::ZERO, rounding: 0.0 },
         1 => *shape = Shape::Ellipsoid { radii: Vec3::ZERO },
+        3 | 4 => *shape = Shape::Hat { radii: Vec3::ZERO, rim: 0.0, holds: kind == 4 },
         _ => {}
     }
     match shape {
@@ -97,6 +100,10 @@ fn record_shape(shape: &mut Shape, tape: &mut Tape<'_>) {
             tape.value(rounding);
         }
         Shape::Ellipsoid { radii } if kind == 1 => tape.value(radii),
+        Shape::Hat { radii, rim, .. } if kind >= 3 => {
+            tape.value(radii);
+            tape.value(rim);
+        }
         _ => {}
     }
 }

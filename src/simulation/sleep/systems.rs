@@ -11,7 +11,7 @@ use crate::{
         setting::Settings,
     },
     forces::{
-        contact::{HairReach, StrandContact, TickCollider, TickColliders, seen_from},
+        contact::{HairReach, Obstacles, StrandContact, TickCollider, TickColliders, seen_from},
         environment::{AirDrag, Gravity, LocalWinds, Winds},
     },
     hair::{
@@ -30,6 +30,7 @@ use crate::{
         rod::{
             HairSolver, HairStiffness, Sweeps,
             obstacle::{Obstacle, Solid},
+            shape::Shape,
         },
     },
     water::Moisture,
@@ -216,8 +217,17 @@ pub(super) struct SeenCollider {
 }
 
 impl SeenCollider {
-    pub(super) fn of(frame: &TickPose, TickCollider { collider, pose, .. }: &TickCollider) -> Self {
-        let Obstacle { solid, friction, .. } = seen_from(frame, collider, pose);
+    pub(super) fn of(
+        frame: &TickPose,
+        obstacles: Option<&Obstacles>,
+        TickCollider { id, collider, pose }: &TickCollider,
+    ) -> Self {
+        let Obstacle { mut solid, friction, .. } = seen_from(frame, collider, pose);
+        if let Solid::Placed(placed) = &mut solid
+            && let Shape::Hat { holds, .. } = &mut placed.shape
+        {
+            *holds = obstacles.is_some_and(|of| of.is_held_by(*id));
+        }
         let rotation = frame.now().rotation.inverse() * pose.now().rotation;
         Self { solid, friction, rotation }
     }
@@ -249,7 +259,14 @@ fn update_sleep(
     colliders: Res<TickColliders>,
     winds: Winds,
     mut hairs: Query<
-        (Entity, &TickPose, &mut SleepSnapshot, &mut SleepCounts, &Regroomed, Option<&HairReach>),
+        (
+            Entity,
+            &TickPose,
+            &mut SleepSnapshot,
+            &mut SleepCounts,
+            &Regroomed,
+            (Option<&HairReach>, Option<&Obstacles>),
+        ),
         HairHere,
     >,
     mut strands: Query<
@@ -268,7 +285,7 @@ fn update_sleep(
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
     let mut scratch = Vec::new();
-    for (hair, frame, mut snapshot, sleepers, regroomed, reach) in &mut hairs {
+    for (hair, frame, mut snapshot, sleepers, regroomed, (reach, obstacles)) in &mut hairs {
         index_of.insert(hair, wake_events.len());
         let snapshot = snapshot.bypass_change_detection();
         // Hair without simulated strands has none to wake; the first that it gets are awake.
@@ -279,7 +296,7 @@ fn update_sleep(
         }
         // A collider that comes within reach counts as new while it is still far from any strand.
         let near = colliders.near(frame, reach, &mut scratch);
-        let seen = near.map(|placed| SeenCollider::of(frame, placed)).collect();
+        let seen = near.map(|placed| SeenCollider::of(frame, obstacles, placed)).collect();
         let is_regroomed = regroomed.members;
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);

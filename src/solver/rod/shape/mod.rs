@@ -30,7 +30,22 @@ pub enum Shape {
     Hull(ConvexHull),
     /// Baked distances.
     Grid(DistanceGrid),
+    /// A hat: an ellipsoid above a plane across Y.
+    Hat {
+        /// Half the axes of the ellipsoid.
+        radii: Vec3,
+        /// Where the plane is.
+        rim: f32,
+        /// Whether it holds nodes under it: all that is outside of the ellipsoid and above an endless brim is solid. Else
+        /// what is inside of the hat is.
+        holds: bool,
+    },
 }
+
+/// How far a hat that holds nodes under it reaches around, in times its size.
+const ENDLESS: f32 = 100.0;
+/// How steeply the brim of a hat falls: under a level one hair that cannot get below it would be caught outside.
+const BRIM: f32 = 0.35;
 
 /// A [`Shape`] in the frame of the nodes.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +68,13 @@ impl Shape {
             Self::Ellipsoid { radii } => (Vec3::ZERO, *radii),
             Self::Hull(hull) => hull.bounds(),
             Self::Grid(grid) => grid.bounds(),
+            Self::Hat { radii, holds: true, .. } => {
+                (Vec3::ZERO, Vec3::splat(ENDLESS * radii.max_element()))
+            }
+            Self::Hat { radii, rim, holds: false } => {
+                let low = rim.clamp(-radii.y, radii.y);
+                (0.5 * Vec3::Y * (radii.y + low), radii.with_y(0.5 * (radii.y - low)))
+            }
         }
     }
 
@@ -60,7 +82,7 @@ impl Shape {
     pub fn reach(&self) -> f32 {
         match self {
             Self::Cuboid { half, .. } => half.length(),
-            Self::Ellipsoid { radii } => radii.max_element(),
+            Self::Ellipsoid { radii } | Self::Hat { radii, .. } => radii.max_element(),
             Self::Hull(hull) => hull.reach(),
             Self::Grid(grid) => grid.reach(),
         }
@@ -70,7 +92,7 @@ impl Shape {
     fn thickness(&self) -> f32 {
         match self {
             Self::Cuboid { half, .. } => half.min_element(),
-            Self::Ellipsoid { radii } => radii.min_element(),
+            Self::Ellipsoid { radii } | Self::Hat { radii, .. } => radii.min_element(),
             Self::Hull(hull) => hull.thickness(),
             Self::Grid(grid) => grid.thickness(),
         }
@@ -83,6 +105,11 @@ impl Shape {
                 a.distance(*b) + (r - s).abs()
             }
             (Self::Ellipsoid { radii: a }, Self::Ellipsoid { radii: b }) => a.distance(*b),
+            (Self::Hat { radii: a, rim: y, holds }, Self::Hat { radii: b, rim: z, holds: too })
+                if holds == too =>
+            {
+                a.distance(*b) + (y - z).abs()
+            }
             (one, other) if one == other => 0.0,
             _ => f32::INFINITY,
         }
@@ -96,6 +123,8 @@ impl Shape {
             Self::Ellipsoid { radii } => ellipsoid(p, *radii),
             Self::Hull(hull) => hull.distance(p),
             Self::Grid(grid) => grid.sample(p),
+            Self::Hat { radii, rim, holds: true } => around_hat(p, *radii, *rim),
+            Self::Hat { radii, rim, holds: false } => hat(p, *radii, *rim),
         }
     }
 
@@ -118,7 +147,7 @@ impl Shape {
                 middle_within(start, way, sides.into_iter())
             }
             Self::Hull(hull) => middle_within(start, way, hull.planes()),
-            Self::Ellipsoid { radii } => {
+            Self::Ellipsoid { radii } | Self::Hat { radii, holds: false, .. } => {
                 let squeezed = |v: V3<R>| {
                     let inverse = radii.recip();
                     V3::new(v.x * lit(inverse.x), v.y * lit(inverse.y), v.z * lit(inverse.z))
@@ -137,6 +166,8 @@ impl Shape {
                 }
                 share
             }
+            // Of a way from below.
+            Self::Hat { .. } => one,
         }
     }
 }
@@ -250,6 +281,44 @@ fn ellipsoid<R: Real>(p: V3<R>, radii: Vec3) -> (V3<R>, R) {
     (signed(normal, p), off.dot(normal) * lit(size))
 }
 
+/// An ellipsoid above a plane: what comes in from below is not pushed back.
+#[inline(always)]
+fn hat<R: Real>(p: V3<R>, radii: Vec3, rim: f32) -> (V3<R>, R) {
+    let below = p.x.lit(rim.into()) - p.y;
+    let (outward, off) = ellipsoid(p, radii);
+    (outward, R::select(p.x.lit(0.0).lt(below), off.max(below), off))
+}
+
+/// How far a point is above the brim of a hat, to first order, the normal there, upward, and the brim's breadth from the
+/// rim to the nearest point of it: below 0 where the rim is nearer.
+#[inline(always)]
+fn above_brim<R: Real>(p: V3<R>, radii: Vec3, rim: f32) -> (V3<R>, R, R) {
+    let lit = |value: f32| p.x.lit(value.into());
+    let zero = lit(0.0);
+    let breadth = 0.5 * (radii.x + radii.z);
+    // Across, as a share of the ellipsoid's breadth.
+    let (x, z) = (p.x * lit(1.0 / radii.x), p.z * lit(1.0 / radii.z));
+    let across = (x * x + z * z).sqrt();
+    let at_rim = (1.0 - (rim / radii.y).powi(2)).max(0.0).sqrt();
+    let beyond = ((across - lit(at_rim)) * lit(breadth)).max(zero);
+    let outward = lit(breadth) / across.max(lit(1e-6));
+    let off =
+        V3::new(x * outward * lit(BRIM / radii.x), lit(1.0), z * outward * lit(BRIM / radii.z));
+    let unit = lit(1.0 / (1.0 + BRIM * BRIM).sqrt());
+    let above = (p.y - lit(rim) + beyond * lit(BRIM)) * unit;
+    let normal = off.scale(lit(1.0) / off.dot(off).sqrt());
+    (normal, above, beyond - above * lit(BRIM) * unit)
+}
+
+/// All that is outside of an ellipsoid and above a brim: the way out is in or under that, whichever is shorter.
+#[inline(always)]
+fn around_hat<R: Real>(p: V3<R>, radii: Vec3, rim: f32) -> (V3<R>, R) {
+    let (outward, off) = ellipsoid(p, radii);
+    let (up, above, breadth) = above_brim(p, radii, rim);
+    let above = R::select(breadth.lt(p.x.lit(0.0)), off, above);
+    (V3::select(above.lt(off), -up, -outward), -above.min(off))
+}
+
 impl Placed {
     /// A point in the frame of the shape.
     #[inline(always)]
@@ -286,7 +355,7 @@ impl Placed {
 
     /// Whether it is worth a test by [`is_beyond`](Self::is_beyond) first to know that a point is outside.
     pub(super) fn is_costly(&self) -> bool {
-        matches!(self.shape, Shape::Ellipsoid { .. })
+        matches!(self.shape, Shape::Ellipsoid { .. } | Shape::Hat { .. })
     }
 
     /// As [`Solid::is_beyond`](super::obstacle::Solid::is_beyond).
@@ -313,6 +382,22 @@ impl Placed {
                         let far = lit(radii.max_element()) + distance;
                         Real::lt(near * near, squeezed.dot(squeezed))
                             | Real::lt(far * far, p.dot(p))
+                    }
+                    Shape::Hat { radii, rim, holds } => {
+                        let inverse = radii.recip();
+                        let (x, y, z) =
+                            (p.x * lit(inverse.x), p.y * lit(inverse.y), p.z * lit(inverse.z));
+                        let squeezed = V3::new(x, y, z).dot(V3::new(x, y, z));
+                        // Scaled to a ball distances do not shrink.
+                        let room = distance * lit(1.0 / radii.min_element());
+                        if *holds {
+                            let near = Real::max(lit(1.0) - room, lit(0.0));
+                            let (_, above, _) = above_brim(p, *radii, *rim);
+                            Real::lt(squeezed, near * near) | Real::lt(distance, -above)
+                        } else {
+                            let near = lit(1.0) + room;
+                            Real::lt(near * near, squeezed) | Real::lt(distance, lit(*rim) - p.y)
+                        }
                     }
                     Shape::Hull(hull) => Real::lt(distance, hull.distance(p).1),
                     Shape::Grid(grid) => {
@@ -396,6 +481,41 @@ mod tests {
     /// How fast a distance may change with the place.
     fn steepest(shape: &Shape) -> f32 {
         if matches!(shape, Shape::Grid(_)) { 3f32.sqrt() } else { 1.0 }
+    }
+
+    /// From outside the way under a hat that holds is in or down; one that does not keeps what is inside out.
+    #[test]
+    fn a_hat_holds_what_is_its_own_and_keeps_out_what_is_not() {
+        let hat = |holds| Shape::Hat { radii: Vec3::splat(0.1), rim: 0.01, holds };
+        let at = |off: f32| Vec3::new(0.0, 0.6, 0.8) * (0.1 + off);
+        for off in [-0.03, 0.0, 0.02, 0.05] {
+            let (normal, free) = distance(&hat(true), at(off));
+            assert!((free + off).abs() < 1e-6, "{free} for {off}");
+            assert!(normal.distance(-at(off).normalize()) < 1e-5);
+            let (normal, free) = distance(&hat(false), at(off));
+            assert!((free - off).abs() < 1e-6 && normal.y > 0.0, "{free} for {off}");
+        }
+        // A brim's breadth outside of the rim, over it and under it.
+        let up = Vec3::new(BRIM, 1.0, 0.0).normalize();
+        let on = Vec3::new(0.0099_f32.sqrt() + 0.2, 0.01 - 0.2 * BRIM, 0.0);
+        for over in [-0.02, 0.0, 0.02] {
+            let (normal, free) = distance(&hat(true), on + up * over);
+            assert!((free + over).abs() < 1e-6, "{free} for {over}");
+            assert!(normal.distance(-up) < 1e-5, "{normal}");
+        }
+        let (_, free) = distance(&hat(false), Vec3::new(0.1, 0.0, 0.0));
+        assert!((free - 0.01).abs() < 1e-6, "{free}");
+    }
+
+    /// Where depths come from one face and then from another they do not jump: nodes would.
+    #[test]
+    fn depths_around_a_hat_are_continuous() {
+        let hat = Shape::Hat { radii: Vec3::new(0.1, 0.12, 0.1), rim: 0.02, holds: true };
+        let at = |i: i32, k: i32| distance(&hat, 1e-3 * Vec3::new(i as f32, k as f32, 0.3)).1;
+        for (i, k) in (-200..200).flat_map(|i| (-200..200).map(move |k| (i, k))) {
+            let apart = (at(i + 1, k) - at(i, k)).abs().max((at(i, k + 1) - at(i, k)).abs());
+            assert!(apart < 1.5e-3, "{i}, {k}: {apart}");
+        }
     }
 
     proptest! {

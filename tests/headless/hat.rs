@@ -1,0 +1,190 @@
+//! A hat holds hair under it, put on and taken off, dry and wet, and keeps rain off.
+
+use crate::common::{fault_kinds, run, strand, test_app};
+use bevy::prelude::*;
+use bevy_keratin::prelude::*;
+use core::f32::consts::TAU;
+
+const HEAD: f32 = 0.09;
+const HAT: Vec3 = Vec3::new(0.1, 0.105, 0.1);
+const RIM: f32 = 0.02;
+
+/// How hair belongs to the head that the hat is put on.
+#[derive(Clone, Copy)]
+enum On {
+    Head,
+    Character,
+    Wearer,
+}
+
+struct Scene {
+    app: App,
+    character: Entity,
+    head: Entity,
+    hair: Entity,
+    strands: Vec<Entity>,
+}
+
+impl Scene {
+    /// A head with strands of 25 cm all over its upper half, which stand on end.
+    fn new(on: On, place: Transform) -> Self {
+        let mut app = test_app(60.0);
+        let ball = HairCollider::sphere(HEAD).unwrap();
+        let world = app.world_mut();
+        let character = world.spawn(place).id();
+        let head = world.spawn((ball, Transform::default(), ChildOf(character))).id();
+        let hair = match on {
+            On::Head => world.spawn((Hair, ChildOf(head))).id(),
+            On::Character => world.spawn((Hair, ChildOf(character))).id(),
+            On::Wearer => world.spawn((Hair, WornBy(character), place)).id(),
+        };
+        let strands = Self::grow(&mut app, hair);
+        Self { app, character, head, hair, strands }
+    }
+
+    fn hanging(on: On, place: Transform) -> Self {
+        let mut scene = Self::new(on, place);
+        run(&mut scene.app, 3.0);
+        scene
+    }
+
+    fn grow(app: &mut App, hair: Entity) -> Vec<Entity> {
+        let strand = |i: usize| {
+            let y = (i as f32 + 0.5) / 60.0;
+            let across = (1.0 - y * y).sqrt();
+            let (sine, cosine) = (2.4 * i as f32).sin_cos();
+            let normal = Vec3::new(across * cosine, y, across * sine);
+            let node = |k: usize| normal * (HEAD + 0.002 + 0.25 / 15.0 * k as f32);
+            Strand::from_polyline(&(0..16).map(node).collect::<Vec<_>>()).unwrap()
+        };
+        (0..60).map(|i| app.world_mut().spawn((StrandOf(hair), strand(i))).id()).collect()
+    }
+
+    /// Puts a hat on, for a second; the largest speed (m/s) and strain meanwhile.
+    fn put_on(&mut self) -> (Entity, f32, f32) {
+        let hat = HairCollider::inside(HAT, RIM).unwrap();
+        let hat = self.app.world_mut().spawn((hat, ChildOf(self.head))).id();
+        let (mut speed, mut strain) = (0.0_f32, 0.0_f32);
+        for _ in 0..60 {
+            self.app.update();
+            for id in &self.strands {
+                let own = strand(&self.app, *id);
+                speed = own.velocities().iter().map(|v| v.length()).fold(speed, f32::max);
+                strain = strain.max(own.peak_strain());
+            }
+        }
+        (hat, speed, strain)
+    }
+
+    /// Nodes above the rim: how many, and how far the farthest is outside of the hat (m, about).
+    fn under(&self) -> (usize, f32) {
+        let nodes = self.strands.iter().flat_map(|id| strand(&self.app, *id).positions());
+        let above = nodes.filter(|p| p.y > RIM + 2e-3);
+        let off = above.map(|p| ((*p / HAT).length() - 1.0) * HAT.x);
+        off.fold((0, f32::NEG_INFINITY), |(count, most), off| (count + 1, most.max(off)))
+    }
+}
+
+#[test]
+fn hair_stays_under_a_hat_and_hangs_from_its_rim() {
+    let far = Transform::from_xyz(150.0, 1.6, 20.0).with_rotation(Quat::from_rotation_y(1.0));
+    let near = Transform::from_xyz(0.0, 1.6, 0.0);
+    for (on, place, wet) in [
+        (On::Head, near, 0.0),
+        (On::Wearer, near, 1.0),
+        (On::Character, far.with_scale(Vec3::splat(1.7)), 0.0),
+    ] {
+        let mut scene = Scene::hanging(on, place);
+        if wet > 0.0 {
+            scene.app.world_mut().write_message(SoakHair { target: scene.hair, wetness: wet });
+            run(&mut scene.app, 0.5);
+        }
+        let (bare, outside) = scene.under();
+        assert!(outside > 0.002, "{outside} m: a hat must have something to hold");
+        let (hat, speed, strain) = scene.put_on();
+        let (held, outside) = scene.under();
+        println!(
+            "wet {wet}: {held} of {bare} nodes above the rim, {outside} m outside, {speed} m/s, strain {strain}"
+        );
+        assert!(held > bare / 5, "{held} of {bare}");
+        assert!(outside < 0.5e-3, "{outside} m outside of the hat");
+        assert!(speed < 6.0 && strain < 0.005, "{speed} m/s, {strain}");
+        // Shaken by 10 cm at 2 Hz none leaves it.
+        let (mut most, mut strain) = (f32::NEG_INFINITY, 0.0_f32);
+        for tick in 0..90 {
+            let swing = (TAU * 2.0 * tick as f32 / 60.0).sin();
+            for id in [scene.character, scene.hair] {
+                let mut at = scene.app.world_mut().get_mut::<Transform>(id).unwrap();
+                if id == scene.character || matches!(on, On::Wearer) {
+                    at.translation.x = place.translation.x + 0.1 * swing;
+                }
+            }
+            scene.app.update();
+            most = most.max(scene.under().1);
+            let of = |id: &Entity| strand(&scene.app, *id).peak_strain();
+            strain = scene.strands.iter().map(of).fold(strain, f32::max);
+        }
+        println!("shaken: {most} m outside, strain {strain}");
+        assert!(most < 1e-3 && strain < 0.01, "{most} m outside of the hat, strain {strain}");
+        scene.app.world_mut().despawn(hat);
+        run(&mut scene.app, 3.0);
+        assert!(scene.strands.iter().all(|id| strand(&scene.app, *id).peak_strain() < 0.01));
+        assert_eq!(fault_kinds(&mut scene.app), []);
+    }
+}
+
+/// Hair on end, which no hat could come down on at once, and hair that sleeps.
+#[test]
+fn a_hat_that_is_there_at_once_tears_nothing() {
+    let mut scene = Scene::new(On::Head, Transform::default());
+    let (_, speed, strain) = scene.put_on();
+    let (_, outside) = scene.under();
+    println!("on end: {outside} m outside, {speed} m/s, strain {strain}");
+    assert!(
+        strain < 0.005 && speed < 6.0 && outside < 0.5e-3,
+        "{speed} m/s, {strain}, {outside} m"
+    );
+    assert_eq!(fault_kinds(&mut scene.app), []);
+}
+
+#[test]
+fn a_hat_keeps_other_hair_and_rain_outside() {
+    let mut scene = Scene::hanging(On::Head, Transform::from_xyz(0.0, 1.6, 0.0));
+    scene.put_on();
+    // A strand of somebody else, that falls on the hat.
+    let hair = scene.app.world_mut().spawn(Hair).id();
+    let points: Vec<Vec3> = (0..10).map(|k| Vec3::new(0.015 * k as f32, 1.708, 0.0)).collect();
+    let other = Strand::from_polyline(&points).unwrap();
+    let other = scene.app.world_mut().spawn((StrandOf(hair), other)).id();
+    for i in 0..40 {
+        let (sine, cosine) = (2.4 * i as f32).sin_cos();
+        let across = 0.07 * (i as f32 / 40.0).sqrt();
+        let position = Vec3::new(across * cosine, 1.85 + 0.01 * i as f32, across * sine);
+        let drop = Droplet::new(position, 4e-9).unwrap().with_velocity(Vec3::NEG_Y * 3.0).unwrap();
+        scene.app.world_mut().spawn(drop);
+    }
+    // What drips inside stays inside.
+    let own = Droplet::new(Vec3::Y * (1.6 + HEAD + 2e-3), 1e-10).unwrap();
+    let own = scene.app.world_mut().spawn(own).id();
+    let mut nearest = f32::INFINITY;
+    for _ in 0..60 {
+        scene.app.update();
+        let mut drops = scene.app.world_mut().query::<(Entity, &Droplet)>();
+        for (id, drop) in drops.iter(scene.app.world()) {
+            let p = drop.position - Vec3::Y * 1.6;
+            let at = (p / HAT).length();
+            match id == own {
+                true => assert!(at < 0.95, "{at}"),
+                false if p.y > RIM + 0.005 => nearest = nearest.min(at),
+                false => {}
+            }
+        }
+    }
+    println!("the nearest drop is at {nearest} of the hat's radius");
+    assert!(nearest > 0.999 && nearest < 1.5, "{nearest}");
+    let over = |p: &Vec3| ((*p - Vec3::Y * 1.6) / HAT).length();
+    let p = strand(&scene.app, other).positions().to_vec();
+    let nearest = p.iter().filter(|p| p.y > 1.6 + RIM).map(over).fold(f32::INFINITY, f32::min);
+    println!("somebody's hair is at {nearest}");
+    assert!((0.999..1.2).contains(&nearest), "{nearest}");
+}
