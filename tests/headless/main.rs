@@ -83,6 +83,7 @@ mod rest;
 mod restyle;
 mod rods;
 mod rollback;
+mod second_day;
 mod settle;
 mod shade;
 mod sleep;
