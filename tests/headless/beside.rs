@@ -116,6 +116,41 @@ fn a_beard_and_short_hair_keep_their_length_from_the_first_frame_on() {
     assert_eq!(faults(&mut app), []);
 }
 
+/// Of short hair some roots lie between ear and temple, where the ellipsoid of an ear reaches beyond what is bare.
+#[test]
+fn no_root_lies_in_an_ear_and_hair_beside_it_keeps_its_length() {
+    let mut app = app_with_meshes(60.0);
+    let (root, ..) = figure(&mut app, &crate::body::mesh_of(0.009, 0.009));
+    let wear = WearHair::new(HairPreset::Short).facing(Dir3::Z);
+    app.world_mut().entity_mut(root).insert(wear);
+    app.world_mut().resource_mut::<Time<Virtual>>().pause();
+    let hair = wait_for(&mut app, |app| hairs(app, root).first().copied());
+    app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+    let mut all = app.world_mut().query::<(&ChildOf, &Transform, &HairCollider)>();
+    let ears = all.iter(app.world()).filter_map(|(of, at, ear)| match ear.shape {
+        ColliderShape::Ellipsoid { radii } if of.parent() == hair => Some((*at, radii)),
+        _ => None,
+    });
+    let ears: Vec<_> = ears.collect();
+    assert!(ears.len() >= 2, "{} ears", ears.len());
+    let roots: Vec<Vec3> = strands(&mut app, hair).iter().map(|(nodes, _)| nodes[0]).collect();
+    for (at, radii) in ears {
+        let share = |p: &Vec3| (at.rotation.inverse() * (*p - at.translation) / radii).length();
+        let nearest = roots.iter().map(share).fold(f32::MAX, f32::min);
+        assert!(nearest > 0.999, "a root lies in an ear, at {nearest} of the way out");
+    }
+    let mut most = 0.0f32;
+    for tick in 0..60 {
+        let aside = shaken(tick as f32 / 60.0);
+        app.world_mut().get_mut::<Transform>(root).unwrap().translation.x = aside;
+        app.update();
+        most = most.max(most_strain(&mut app));
+    }
+    println!("strain, shaken: {most}");
+    assert!(most < 0.05, "{most}");
+    assert_eq!(faults(&mut app), []);
+}
+
 #[test]
 fn one_is_swapped_or_taken_off_and_the_other_stays_as_it_is() {
     let mut app = app();

@@ -75,7 +75,7 @@ const JOINT_CREASE: f32 = 5e-4;
 const EARS: ProtrusionRules =
     ProtrusionRules { apart: -5e-4, link: 0.018, longest: 0.06, out: 1.5e-3 };
 const FINE_POINTS: usize = 15_000;
-/// How far from hair's roots they stay (m): what grows in a solid is pushed out of it.
+/// How far from hair's roots these points are at least (m): what grows in a solid is pushed out of it.
 const BARE: f32 = 8e-3;
 /// Height of a head, as [`Scalp`](crate::authoring::plant::Scalp) measures it (m).
 const HEAD: f32 = 0.133;
@@ -266,7 +266,7 @@ fn fit_solids(
     let reach = longest + MARGIN;
     let balls = match target.own.above.contains(&head) {
         true => Vec::new(),
-        false => balls(fitting, roots.clone(), reach)?,
+        false => balls(fitting, &roots, reach)?,
     };
     // A cape of the same skin is no limb.
     let is_garment = |(i, part): &(usize, &MeshPart)| {
@@ -607,7 +607,7 @@ fn median(values: &mut [f32]) -> Option<f32> {
 /// joints, all of it that hair reaches.
 fn balls(
     fitting: &Fitting,
-    roots: Vec<Vec3>,
+    roots: &[Vec3],
     reach: f32,
 ) -> Result<Vec<(HairCollider, Transform)>, WearError> {
     let cropped = cropped(&fitting.mesh, reach);
@@ -624,16 +624,18 @@ fn balls(
     let balls = inscribed_balls(&places, |i| is_on_head(&points[i]), &rules);
     let skin = surface_points(&cropped, FINE_POINTS)?;
     let size = height / HEAD;
-    let roots = KdTree::new(roots.into_iter().zip(0u32..));
+    let near_roots = KdTree::new(roots.iter().copied().zip(0u32..));
     let clear = (0, (BARE * size).powi(2));
-    let is_bare = |p: &SurfacePoint| roots.nearer_than(p.at, clear) == clear;
+    let is_bare = |p: &SurfacePoint| near_roots.nearer_than(p.at, clear) == clear;
     let bare = skin.iter().filter(|p| is_on_head(p) && is_bare(p)).map(|p| p.at);
-    let ears = protrusions(bare, &balls, &EARS.scaled(size));
+    let ears = protrusions(bare, &balls, &EARS.scaled(size)).into_iter();
+    // Around what is bare there may be roots within: those of a sideburn in the ellipsoid around ear and temple.
+    let ears = ears.filter_map(|ear| ear.clear_of(roots));
     let balls = balls.into_iter().map(|ball| {
         let place = Transform::from_translation(ball.center.into());
         Ok((HairCollider::sphere(ball.radius())?, place))
     });
-    let ears = ears.into_iter().map(|ear| Ok((HairCollider::ellipsoid(ear.radii)?, ear.place)));
+    let ears = ears.map(|ear| Ok((HairCollider::ellipsoid(ear.radii)?, ear.place)));
     balls.chain(ears).collect()
 }
 
